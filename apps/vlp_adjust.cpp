@@ -13,8 +13,8 @@
 #include "geometry/angles.h"
 #include "program/app.h"
 #include "program/steps/capture_options.h"
-#include "program/steps/step_outcome.h"
 #include "program/steps/print_calibration.h"
+#include "program/steps/step_outcome.h"
 #include "rig/input_error.h"
 #include "session/adjust_step.h"
 #include "session/session_folder.h"
@@ -35,22 +35,24 @@ struct Options {
 };
 
 /// Reads a set: a folder of images or a table of detections, and the captures.csv in its folder.
-AdjustSet read_set(const Options& options, const std::string& set, bool turn, const LampMap& lamps,
-                   const Calibration& calibration) {
+AdjustSet read_set(const Options& options, const std::string& set, bool is_in_place_rotation,
+                   const LampMap& lamps, const Calibration& calibration) {
   const fs::path path(set);
   const bool folder = fs::is_directory(path);
-  AdjustSet read{
-      last_path_component(path), {}, {}, turn || last_path_component(path) == "rotation"};
+  AdjustSet read{last_path_component(path),
+                 {},
+                 {},
+                 is_in_place_rotation || last_path_component(path) == "rotation"};
   if (folder) {
     CaptureOptions images = options.images;
     images.images = set;
-    read.frames =
-        collect_kept_frames(observe_captures(images, ImageUse::fixes, lamps, calibration).images);
+    read.frames = collect_kept_frames(
+        detect_lamps_in_captures(images, ImageUse::fixes, lamps, calibration).images);
     read.captures =
-        options.place_sd_m ? read_captures_with_truth(path) : read_captures_of_folder(path);
+        options.place_sd_m ? read_captures_with_truth(path) : read_captures_csv_of_folder(path);
   } else {
     read.frames = read_detections(path);
-    read.captures = read_captures_of_folder(path.parent_path());
+    read.captures = read_captures_csv_of_folder(path.parent_path());
   }
   return read;
 }
@@ -70,7 +72,7 @@ void run(const CLI::App& app, const Options& options) {
       }
     }
   }
-  check_outputs({{"--output", images.output}, {"--refine-map", options.refined_map}}, inputs);
+  check_output_files({{"--output", images.output}, {"--refine-map", options.refined_map}}, inputs);
   AdjustStepInput input;
   input.lamps = read_lamps_of_room(images.lamps, images.frontend.room);
   input.lamps_file = images.lamps;
@@ -80,7 +82,7 @@ void run(const CLI::App& app, const Options& options) {
   input.map_sd_m = options.map_sd_m;
   input.place_sd_m = options.place_sd_m;
   input.lens_sd_px = options.lens_sd_px;
-  input.motion = options.motion.motion();
+  input.motion = options.motion.make_known_motion();
   input.yaw_rate_sd_rad_per_s = rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0));
   input.refine_map = !options.refined_map.empty();
   for (const std::string& set : options.sets) {
@@ -91,11 +93,13 @@ void run(const CLI::App& app, const Options& options) {
   }
   std::vector<std::string> paths = options.sets;
   paths.insert(paths.end(), options.turns.begin(), options.turns.end());
-  make_set_names_unique(input.sets, paths);
-  for (const AdjustSet& set : input.sets) check_lamps(set.frames, input.lamps, input.lamps_file);
-  const AdjustStepResult result = solve_adjustment(input, make_program_history_entry(app, inputs));
-  print_remarks(result);
-  throw_if_failed(result);
+  make_adjust_set_names_unique(input.sets, paths);
+  for (const AdjustSet& set : input.sets)
+    check_lamps_in_map(set.frames, input.lamps, input.lamps_file);
+  const AdjustStepResult result =
+      run_adjustment_step(input, make_program_history_entry(app, inputs));
+  print_step_remarks(result);
+  throw_if_step_failed(result);
   if (input.refine_map) {
     write_refined_map(options.refined_map, result.found.refined, images.frontend.room);
   }
@@ -151,7 +155,7 @@ int main(int argc, char** argv) {
       ->option_text("FILE");
   app.add_option("--map-sd-m", options.map_sd_m,
                  "Standard deviation per axis of lamp positions without sd_m, in m")
-      ->check(vlp::finite_not_negative());
+      ->check(vlp::make_finite_non_negative_validator());
   app.add_option("--position-sd-m", options.place_sd_m,
                  "Standard deviation per axis of known positions without position_sd_m, in m. Also "
                  "uses truth.csv in folders of images (default: such positions are ignored)")

@@ -32,12 +32,12 @@ void run(Options options) {
   options.how.program = {kName, VLP_VERSION};
   SessionLog log;
   const SessionResult result =
-      run_session(options.session, options.results, options.how, log.observer());
+      run_session(options.session, options.results, options.how, log.make_session_observer());
   if (result.verdict == SessionVerdict::no_result) {
     if (result.failure == StepFailure::undetermined) throw Undetermined(result.reason);
     throw std::invalid_argument(result.reason);
   }
-  print_session(result, options.results);
+  print_session_result(result, options.results);
   if (result.verdict == SessionVerdict::gate) throw GateNotMet(result.reason);
 }
 
@@ -68,7 +68,7 @@ int calibrate(int argc, char** argv) {
       kName);
   Options options;
   auto& how = options.how;
-  how.frontend = make_default_frontend();
+  how.frontend = make_default_frontend_options();
   app.add_option("session", options.session, "Input folder of the captures")->required();
   app.add_option("-o,--output", options.results,
                  "Output folder, created if missing: calibration.yaml, check-fixes.csv, "
@@ -97,7 +97,7 @@ int calibrate(int argc, char** argv) {
       },
       "Read requests from stdin, one line of JSON for each session; see apps/vlp-calibrate.md. "
       "Excludes all other arguments");
-  app.footer("Gates:\n" + gate_descriptions(session_metrics()));
+  app.footer("Gates:\n" + describe_available_gates(list_session_metrics()));
   return run_app(app, argc, argv, [&] { run(options); });
 }
 
@@ -108,7 +108,7 @@ int main(int argc, char** argv) {
   if (argc != 2 || std::string_view(argv[1]) != "--batch-stdin") return vlp::calibrate(argc, argv);
   CLI::App app("", vlp::kName);
   return vlp::run_app(app, 1, argv, [] {
-    vlp::prepare_tag_family("tag36h11");  // family of most boards
-    vlp::run_each(vlp::kName, vlp::calibrate);
+    vlp::load_tag_family("tag36h11");  // family of most boards
+    vlp::run_for_each_stdin_line(vlp::kName, vlp::calibrate);
   });
 }

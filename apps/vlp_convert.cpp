@@ -42,32 +42,32 @@ void print_region(const Options& options, const Camera& camera, const ImageRegio
   if (region.empty()) return;
   const bool kept = options.to == "calibration" || options.to == "mrcal";
   fmt::print("known         in {:.1f} % of the image, which {}\n",
-             100 * compute_image_fraction(region, camera.imager_px),
+             100 * compute_fraction_of_image_area(region, camera.imager_px),
              kept ? "is kept" : "the format does not support");
 }
 
 void run(const CLI::App& app, const Options& options) {
-  check_output(options.output, {options.input});
-  const auto [read, region] = read_any_camera(options.input);
+  check_output_file(options.output, {options.input});
+  const auto [read, region] = read_camera_of_any_format(options.input);
   FittedCamera fitted{read, 0, 1};
   const std::string was(to_string(fitted.camera.lens_model));
   if (!options.lens.empty()) {
-    fitted = fit_lens_model(fitted.camera, *lens_model_from_name(options.lens));
+    fitted = convert_to_lens_model(fitted.camera, *lens_model_from_name(options.lens));
   }
   Camera& camera = fitted.camera;
   if (!options.camera_id.empty()) camera.id = options.camera_id;
   if (options.to == "calibration") {
-    write_calibration(options.output,
-                      with_camera(camera, make_region_report(region),
-                                  make_program_history_entry(app, {options.input})));
+    write_calibration(options.output, make_calibration_with_camera(
+                                          camera, make_region_report(region),
+                                          make_program_history_entry(app, {options.input})));
   } else {
     write_file(options.output, format_camera_file(options, camera, region));
   }
   if (options.to == "calibration") {
     fmt::print("kept          the camera alone; vlp-rotation and vlp-dispersion add the rest\n");
   }
-  fmt::print("camera        {}, {} x {} px\n", printable_line(camera.id), camera.imager_px[0],
-             camera.imager_px[1]);
+  fmt::print("camera        {}, {} x {} px\n", escape_for_single_line(camera.id),
+             camera.imager_px[0], camera.imager_px[1]);
   if (was == to_string(camera.lens_model)) {
     fmt::print("lens          {}, unchanged\n", was);
   } else {

@@ -25,18 +25,18 @@ namespace {
 std::map<std::string, double> frame_times(const std::vector<Observation>& images) {
   std::map<std::string, double> times_s;
   for (const Observation& image : images) {
-    if (image.is_kept() && image.time_s) times_s.emplace(image.name(), *image.time_s);
+    if (image.is_kept() && image.time_s) times_s.emplace(image.file_name(), *image.time_s);
   }
   return times_s;
 }
 
 void run(const CaptureOptions& options, const std::string& captures) {
-  const std::vector<std::string> inputs = list_inputs(options);
-  check_outputs(
+  const std::vector<std::string> inputs = list_capture_input_files(options);
+  check_output_files(
       {{"--output", options.output}, {"--lights", options.lights}, {"--captures", captures}},
       inputs);
-  check_every(options.frontend.every, {options.images});
-  if (!captures.empty() && !is_video_name(options.images)) {
+  check_frame_step_needs_video(options.frontend.every, {options.images});
+  if (!captures.empty() && !is_video_file_name(options.images)) {
     throw std::invalid_argument("--captures: images have no frame times; use it for a video only");
   }
   std::optional<Calibration> calibration;
@@ -46,22 +46,22 @@ void run(const CaptureOptions& options, const std::string& captures) {
     throw std::invalid_argument(
         "lamps cannot be identified; give --calibration, --row-time-s or --classifier");
   }
-  const Observations found =
-      observe_captures(options, ImageUse::fixes,
-                       read_lamps_of_room(options.lamps, options.frontend.room), calibration);
+  const Observations found = detect_lamps_in_captures(
+      options, ImageUse::fixes, read_lamps_of_room(options.lamps, options.frontend.room),
+      calibration);
   const std::vector<Frame> frames = collect_kept_frames(found.images);
   write_detections(options.output, frames);
-  if (!captures.empty()) write_times(captures, frame_times(found.images));
+  if (!captures.empty()) write_capture_times(captures, frame_times(found.images));
   const auto empty = std::count_if(frames.begin(), frames.end(),
                                    [](const Frame& frame) { return frame.detections.empty(); });
-  const auto count = [&](LightKind kind) { return count_lights(found.images, kind); };
+  const auto count = [&](LightKind kind) { return count_lights_of_kind(found.images, kind); };
   fmt::print("images      {}\n  skipped   {}\n  no lamp   {}\n", found.images.size(),
              found.images.size() - frames.size(), empty);
   fmt::print("lamps       {}\n", count(LightKind::lamp));
   fmt::print("left out    {} cut by the image's edge, {} unknown, {} steady, {} without form\n",
              count(LightKind::cut), count(LightKind::unknown), count(LightKind::steady),
              count(LightKind::formless));
-  for (const auto& [kind, reason, lights] : count_reasons(found.images)) {
+  for (const auto& [kind, reason, lights] : count_light_reasons(found.images)) {
     fmt::print("  {:<8}  {}, {}: {}\n", lights, to_string(kind), to_string(reason),
                describe(reason));
   }
@@ -100,7 +100,7 @@ int main(int argc, char** argv) {
                  "Output file of all lights, CSV, with class, reason and measured values");
   std::string captures;
   app.add_option("--captures", captures, "Output file of the frame times of a video, captures.csv");
-  vlp::add_every_option(app, options.frontend.every);
+  vlp::add_frame_step_option(app, options.frontend.every);
   vlp::add_detect_options(app, options);
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options, captures); });
 }

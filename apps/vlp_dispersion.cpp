@@ -13,8 +13,8 @@
 
 #include "program/app.h"
 #include "program/steps/capture_options.h"
-#include "program/steps/step_outcome.h"
 #include "program/steps/print_calibration.h"
+#include "program/steps/step_outcome.h"
 #include "report/plots/gnuplot.h"
 #include "rig/input_error.h"
 #include "session/dispersion_step.h"
@@ -41,7 +41,7 @@ struct Options {
 CapturesTable read_captures_table(const Options& options) {
   CapturesTable captures;
   if (!options.captures.empty()) {
-    captures = read_captures(options.captures);
+    captures = read_captures_csv(options.captures);
   } else if (std::filesystem::is_directory(options.images.images)) {
     captures = read_captures_with_truth(options.images.images);
   }
@@ -50,12 +50,12 @@ CapturesTable read_captures_table(const Options& options) {
   return captures;
 }
 
-KnownPlaces find_places(const Options& options, const std::vector<Frame>& frames,
-                        const CapturesTable& captures) {
+KnownPositions find_places(const Options& options, const std::vector<Frame>& frames,
+                           const CapturesTable& captures) {
   std::optional<Eigen::Vector2d> station_m;
   if (options.station_m) station_m = Eigen::Vector2d(options.station_m->data());
-  KnownPlaces places = collect_known_places(frames, captures, station_m,
-                                            options.of == "axis" ? PlaceOf::axis : PlaceOf::camera);
+  KnownPositions places = collect_reference_positions(
+      frames, captures, station_m, options.of == "axis" ? PlaceOf::axis : PlaceOf::camera);
   if (places.captures.empty() && captures.empty()) {
     throw std::invalid_argument(
         "the positions of the captures are unknown; give --reference-point or --captures");
@@ -74,24 +74,24 @@ KnownPlaces find_places(const Options& options, const std::vector<Frame>& frames
 }
 
 void run(const CLI::App& app, Options options) {
-  std::vector<std::string> inputs = list_inputs(options.images);
+  std::vector<std::string> inputs = list_capture_input_files(options.images);
   if (!options.captures.empty()) inputs.push_back(options.captures);
   for (const char* table : {"captures.csv", "truth.csv"}) {
     const auto beside = std::filesystem::path(options.images.images) / table;
     if (options.captures.empty() && std::filesystem::exists(beside)) inputs.push_back(beside);
   }
-  check_outputs({{"--output", options.images.output}, {"--plot", options.plot}}, inputs);
+  check_output_files({{"--output", options.images.output}, {"--plot", options.plot}}, inputs);
   const CapturesTable captures = read_captures_table(options);
   options.images.captures = captures;
   const LampCaptures input = read_lamp_captures(options.images, ImageUse::places);
-  check_lamps(input.frames, input.lamps, input.lamps_file);
-  const KnownPlaces places = find_places(options, input.frames, captures);
+  check_lamps_in_map(input.frames, input.lamps, input.lamps_file);
+  const KnownPositions places = find_places(options, input.frames, captures);
   const DispersionResult found =
-      solve_dispersion(input, places, kMethods.at(options.method), kCircles.at(options.circle),
-                       make_program_history_entry(app, inputs));
-  print_remarks(found);
-  throw_if_failed(found);
-  if (!options.plot.empty()) draw(options.plot, found.drawing());
+      run_dispersion_step(input, places, kMethods.at(options.method), kCircles.at(options.circle),
+                          make_program_history_entry(app, inputs));
+  print_step_remarks(found);
+  throw_if_step_failed(found);
+  if (!options.plot.empty()) write_plot(options.plot, found.drawing());
   write_calibration(options.images.output, found.calibration);
   print_dispersion(found.fit, input.calibration.camera.focal_px(), places.captures.size());
 }
@@ -119,7 +119,7 @@ int main(int argc, char** argv) {
       app.add_option(
              "--reference-point", options.station_m,
              "Known position of all captures in the world, in m. Overrides positions in tables")
-          ->check(vlp::finite())
+          ->check(vlp::make_finite_validator())
           ->option_text("X_M Y_M");
   app.add_option("--position-of", options.of,
                  "Point to which --reference-point refers: camera (default), or axis, the rotation "
@@ -135,7 +135,7 @@ int main(int argc, char** argv) {
                  "Method. camera (default): separates errors that rotate with the camera from "
                  "errors in the world; needs several yaws. chen-guan: moves the circle center to "
                  "the reference point; needs one yaw and an exact lamp map and reference point")
-      ->check(vlp::present_value())
+      ->check(vlp::make_former_value_validator())
       ->check(CLI::IsMember({"camera", "chen-guan"}))
       ->option_text("camera|chen-guan");
   app.add_option("--circle", options.circle,

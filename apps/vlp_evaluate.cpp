@@ -25,8 +25,8 @@
 #include "evaluation/proposed_gates.h"
 #include "program/app.h"
 #include "program/steps/capture_options.h"
-#include "program/steps/step_outcome.h"
 #include "program/steps/print_fixes.h"
+#include "program/steps/step_outcome.h"
 #include "rig/file.h"
 #include "session/evaluate_step.h"
 
@@ -50,7 +50,7 @@ struct Options {
   std::vector<std::string> gates;
   double noise_px = 0;
   std::optional<double> station_mm;
-  int threads = count_cores();
+  int threads = count_cpu_cores();
   ReportOption report;
 };
 
@@ -67,14 +67,14 @@ void check_line(const std::string& option, const std::array<double, 4>& line_m) 
 }
 
 std::vector<MetricKind> known_metrics() {
-  return metric_kinds({MetricSource::evaluation, MetricSource::reference});
+  return list_metric_kinds({MetricSource::evaluation, MetricSource::reference});
 }
 
 /// Returns the gates of the file and of the command line, which takes precedence.
 std::vector<Gate> parse_gates(const Options& options) {
   std::vector<Gate> gates;
   if (!options.gates_file.empty()) gates = read_gates(options.gates_file, known_metrics());
-  return with_changes(std::move(gates), parse_gates(options.gates, known_metrics()));
+  return merge_gates(std::move(gates), parse_gates(options.gates, known_metrics()));
 }
 
 /// Returns the input files, without those of the report; names may be empty.
@@ -93,11 +93,11 @@ void check_files(const Options& options) {
     inputs.push_back(fixes);
     check_line("--track " + fixes, {x0_m, y0_m, x1_m, y1_m});
   }
-  check_outputs({{"--json", options.json},
-                 {"--junit", options.junit},
-                 {"--propose-gates", options.proposed_gates},
-                 {"--report", report.file}},
-                inputs);
+  check_output_files({{"--json", options.json},
+                      {"--junit", options.junit},
+                      {"--propose-gates", options.proposed_gates},
+                      {"--report", report.file}},
+                     inputs);
 }
 
 void check_options(const Options& options, const std::vector<Gate>& gates) {
@@ -124,7 +124,7 @@ void check_options(const Options& options, const std::vector<Gate>& gates) {
 
 double station_m(const Options& options) {
   if (options.station_mm) return 1e-3 * *options.station_mm;
-  return compute_place_radius_m(
+  return compute_same_position_radius_m(
       options.calibration.empty() ? Calibration{} : read_calibration(options.calibration));
 }
 
@@ -132,11 +132,11 @@ EvaluationInput read_input(const Options& options) {
   EvaluationInput input;
   // The two large tables are read in parallel; if both are bad, the error is that of the fixes.
   auto truth = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, [&] {
-    return options.truth.empty() ? std::vector<TruthRow>() : read_truth(options.truth);
+    return options.truth.empty() ? std::vector<TruthRow>() : read_truth_table(options.truth);
   });
   input.fixes = {options.fixes, read_fixes(options.fixes)};
   if (!options.truth.empty()) input.truth = {options.truth, truth.get()};
-  if (!options.path.empty()) input.path = read_path(options.path);
+  if (!options.path.empty()) input.path = read_path_table(options.path);
   if (const auto& line_m = options.line_m; !line_m.empty()) {
     input.line_m = {Eigen::Vector2d{line_m[0], line_m[1]}, Eigen::Vector2d{line_m[2], line_m[3]}};
   }
@@ -172,7 +172,7 @@ std::string render_report(const CLI::App& app, const Options& options, const Eva
 
 /// Returns the text of the file of proposed gates. Throws Undetermined if there are too few units.
 std::string make_proposed_gates(const EvaluationInput& input, const Evaluation& evaluation) {
-  const std::vector<Gate> gates = propose_gates(input, evaluation);
+  const std::vector<Gate> gates = propose_gates_from_evaluation(input, evaluation);
   if (gates.empty()) {
     throw Undetermined(
         fmt::format("--propose-gates: too few reference points or captures to propose gates; at "
@@ -187,7 +187,7 @@ std::string make_proposed_gates(const EvaluationInput& input, const Evaluation& 
 std::vector<JUnitTest> make_evaluation_tests(const EvaluateResult& found) {
   std::vector<JUnitTest> tests = make_junit_tests(found.gates);
   const auto& comparison = found.evaluation.comparison;
-  if (!comparison || !comparison->too_few()) return tests;
+  if (!comparison || !comparison->has_too_few_clusters()) return tests;
   for (JUnitTest& test : tests) {
     if (test.name != "worse_mm") continue;
     test.warnings.emplace_back(
@@ -199,13 +199,13 @@ std::vector<JUnitTest> make_evaluation_tests(const EvaluateResult& found) {
 void run_evaluation(const CLI::App& app, const Options& options, const std::vector<Gate>& gates) {
   const EvaluationInput input = read_input(options);
   const EvaluateResult found = evaluate_fixes(input, gates);
-  throw_if_failed(found);
+  throw_if_step_failed(found);
   for (const CheckedMetric& gate : found.gates) {
     if (gate.value) continue;
     throw std::invalid_argument(
         "gate '" + gate.name +
         "': the metric has no value here; remove the gate or give what the metric needs: " +
-        metric_kind(gate.name)->meaning);
+        find_metric_kind(gate.name)->meaning);
   }
   std::string report, proposed;
   if (!options.report.file.empty()) report = render_report(app, options, input, found);
@@ -216,7 +216,7 @@ void run_evaluation(const CLI::App& app, const Options& options, const std::vect
   }
   if (!report.empty()) write_file(options.report.file, report);
   if (!proposed.empty()) write_file(options.proposed_gates, proposed);
-  print_remarks(found);
+  print_step_remarks(found);
   print_evaluation(found.evaluation, found.gates);
   const std::string failed = describe_failed_gates(found.gates);
   if (!failed.empty()) throw GateNotMet(failed);
@@ -264,7 +264,8 @@ void add_report_options(CLI::App& app, ReportOption& option) {
 }
 
 void add_options(CLI::App& app, Options& options) {
-  app.add_option("fixes", options.fixes, "Fixes to evaluate, fixes.csv of vlp-locate")->required();
+  app.add_option("fixes", options.fixes, "Fixes to evaluate, fixes.csv of vlp-locate")
+      ->get_required();
   app.add_option("--truth", options.truth,
                  "Ground truth, truth.csv: image, x_m, y_m [, z_m, yaw_rad]. Captures without a "
                  "fix count as missing");
@@ -275,7 +276,7 @@ void add_options(CLI::App& app, Options& options) {
                  "Commanded straight line, in m. Errors are distances from it: of the fixes, and "
                  "of a line fitted to them (Chen and Guan)")
       ->expected(4)
-      ->check(finite())
+      ->check(make_finite_validator())
       ->option_text("X0_M Y0_M X1_M Y1_M");
   app.add_option("--station-mm", options.station_mm,
                  "Maximum distance between true positions of one reference point (station), in mm "
@@ -333,6 +334,6 @@ int main(int argc, char** argv) {
       vlp::kName);
   vlp::Options options;
   vlp::add_options(app, options);
-  app.footer("Gates:\n" + vlp::gate_descriptions(vlp::known_metrics()));
+  app.footer("Gates:\n" + vlp::describe_available_gates(vlp::known_metrics()));
   return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
 }

@@ -25,8 +25,8 @@
 #include "program/app.h"
 #include "program/progress.h"
 #include "program/steps/capture_options.h"
-#include "program/steps/step_outcome.h"
 #include "program/steps/print_calibration.h"
+#include "program/steps/step_outcome.h"
 #include "rig/file.h"
 #include "session/lens_step.h"
 
@@ -38,7 +38,7 @@ struct Options {
   std::string board, output, corners, ros, kalibr, opencv, plot;
   std::optional<std::array<int, 2>> imager_px;
   std::string camera_id = "camera", lens = "LENSMODEL_OPENCV8";
-  FrontendOptions frontend = make_default_frontend();
+  FrontendOptions frontend = make_default_frontend_options();
   std::optional<double> pixel_pitch_m;
   int held_out = 0;
   WarpChoice warp = WarpChoice::automatic;
@@ -77,10 +77,10 @@ std::string corner_file(const CLI::App& app, const Options& options) {
   if (!options.imager_px) {
     throw std::invalid_argument(*found + ": a file of corners has no image size; give --imager-px");
   }
-  for (const char* digest_images :
+  for (const char* image_option :
        {"--cache", "--threads", "--max-mpx", "--max-blur-px", "--max-white-fraction", "--every"}) {
-    if (app.count(digest_images) == 0) continue;
-    throw std::invalid_argument(std::string(digest_images) + ": only for images, and " + *found +
+    if (app.count(image_option) == 0) continue;
+    throw std::invalid_argument(std::string(image_option) + ": only for images, and " + *found +
                                 " is a file of corners; leave it out");
   }
   return *found;
@@ -92,8 +92,9 @@ Observations observe(const std::vector<std::filesystem::path>& images, const Boa
     return read_board_views(corners, board, options.board, *options.imager_px, options.frontend);
   }
   Progress progress("images");
-  return observe_boards(images, board, options.board, options.frontend,
-                        [&](std::size_t done, std::size_t total) { progress.update(done, total); });
+  return detect_boards_in_images(
+      images, board, options.board, options.frontend,
+      [&](std::size_t done, std::size_t total) { progress.update_display(done, total); });
 }
 
 /// Replaces the extension: camera.yaml and ".cameramodel" give camera.cameramodel.
@@ -132,15 +133,15 @@ void check_exports(const Options& options, Camera camera) {
 
 /// Returns the default gates with the changes of the command line.
 std::vector<Gate> parse_gates(const Options& options) {
-  return with_changes(default_lens_gates(),
-                      parse_gates(options.gates, metric_kinds({MetricSource::lens})));
+  return merge_gates(make_default_lens_gates(),
+                     parse_gates(options.gates, list_metric_kinds({MetricSource::lens})));
 }
 
 /// Returns true if a gate of the lens fails, not only gates of the views.
 bool has_failed_lens_gate(const std::vector<CheckedMetric>& gates) {
   return std::ranges::any_of(gates, [](const CheckedMetric& gate) {
-    return !gate.passed() && (gate.name == "rms_px" || gate.name == "expected_max_error_px" ||
-                              gate.name == "split_half_px");
+    return !gate.has_passed() && (gate.name == "rms_px" || gate.name == "expected_max_error_px" ||
+                                  gate.name == "split_half_px");
   });
 }
 
@@ -148,23 +149,24 @@ void run(const CLI::App& app, const Options& options) {
   const std::vector<Gate> gates = parse_gates(options);
   if (!chooses_lens(options)) check_exports(options, known_camera(options));
   const std::string corners = corner_file(app, options);
-  check_every(options.frontend.every, options.images);
-  const auto images = corners.empty() ? expand_folders(options.images)
+  check_frame_step_needs_video(options.frontend.every, options.images);
+  const auto images = corners.empty() ? replace_folders_by_images(options.images)
                                       : std::vector<std::filesystem::path>{options.images.front()};
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
-  check_outputs({{"--output", options.output},
-                 {"--output's .cameramodel", replace_extension(options.output, ".cameramodel")},
-                 {"--output's .corners.vnl", replace_extension(options.output, ".corners.vnl")},
-                 {"--ros", options.ros},
-                 {"--kalibr", options.kalibr},
-                 {"--opencv", options.opencv},
-                 {"--corners", options.corners},
-                 {"--plot", options.plot}},
-                inputs);
+  check_output_files(
+      {{"--output", options.output},
+       {"--output's .cameramodel", replace_extension(options.output, ".cameramodel")},
+       {"--output's .corners.vnl", replace_extension(options.output, ".corners.vnl")},
+       {"--ros", options.ros},
+       {"--kalibr", options.kalibr},
+       {"--opencv", options.opencv},
+       {"--corners", options.corners},
+       {"--plot", options.plot}},
+      inputs);
   if (!options.corners.empty()) check_names(images);
   const Board board = read_board(options.board);
-  select_warp(board, options.warp);  // throws before the images are read
+  select_board_warp_model(board, options.warp);  // throws before the images are read
   LensInput input{observe(images, board, corners, options),
                   board,
                   options.board,
@@ -173,26 +175,28 @@ void run(const CLI::App& app, const Options& options) {
                   options.warp,
                   chooses_lens(options)};
   // After the images: unusable files are not read for their digests.
-  const LensResult result = solve_lens(std::move(input), make_program_history_entry(app, inputs));
-  print_remarks(result);
+  const LensResult result =
+      run_lens_step(std::move(input), make_program_history_entry(app, inputs));
+  print_step_remarks(result);
   const LensEstimate& lens = result.lens;
   if (!options.corners.empty() && !lens.views.empty()) {
     write_corner_table(options.corners, lens.views, board);
   }
-  throw_if_failed(result);
+  throw_if_step_failed(result);
   check_exports(options, result.calibration.camera);  // the selected lens model
   write_calibration(options.output, result.calibration);
-  if (has_mrcal(result.calibration.camera.lens_model)) {
-    write_cameramodel(replace_extension(options.output, ".cameramodel"), lens.solution);
+  if (is_supported_by_mrcal(result.calibration.camera.lens_model)) {
+    write_mrcal_cameramodel(replace_extension(options.output, ".cameramodel"), lens.solution);
   } else {
     // A file of an earlier run would belong to another lens.
     std::filesystem::remove(replace_extension(options.output, ".cameramodel"));
   }
-  write_corners(replace_extension(options.output, ".corners.vnl"), lens.solution, lens.images);
+  write_mrcal_corners(replace_extension(options.output, ".corners.vnl"), lens.solution,
+                      lens.images);
   write_exports(options, result.calibration.camera);
-  if (!options.plot.empty()) draw(options.plot, result.drawing());
+  if (!options.plot.empty()) write_plot(options.plot, result.drawing());
   if (lens.choice) fmt::print("lens model    {}\n", describe(*lens.choice));
-  print_summary(lens.solution, lens.report, lens.coverage, lens.held_out);
+  print_calibration_summary(lens.solution, lens.report, lens.coverage, lens.held_out);
   if (lens.print_px) {
     fmt::print("board print   {:.3f} px, in the covariance and not in the uncertainty above\n",
                *lens.print_px);
@@ -205,7 +209,7 @@ void run(const CLI::App& app, const Options& options) {
   }
   if (std::isfinite(lens.report.uncertainty_worst_px)) {
     throw GateNotMet(
-        fmt::format("{}; add views, next {}", failed, recommend_next_view(lens.coverage)));
+        fmt::format("{}; add views, next {}", failed, recommend_next_board_view(lens.coverage)));
   }
   throw GateNotMet(
       fmt::format("{}; the estimated lens has no rays in part of the image: use another lens "
@@ -243,7 +247,7 @@ void add_solve_options(CLI::App& app, Options& options) {
   app.add_option("--corners", options.corners,
                  "Output file of the detected corners, .csv. It can replace the images in a later "
                  "calibration")
-      ->check(make_ending_validator(".csv"));
+      ->check(make_file_extension_validator(".csv"));
   app.add_option("--pixel-pitch-m", options.pixel_pitch_m, "Pixel pitch of the imager, in m")
       ->check(CLI::Range(1e-7, 1e-4));
   app.add_option("--held-out", options.held_out,
@@ -280,10 +284,10 @@ void add_output_options(CLI::App& app, Options& options) {
   app.add_option(
          "--plot", options.plot,
          "Output file of a plot of corners, residuals and uncertainty over the image, .png or .svg")
-      ->check(is_plot_file());
+      ->check(make_plot_file_validator());
   app.add_option("--cache", options.frontend.corner_cache,
                  "Folder for the detected corners of each image, which later runs reuse");
-  add_every_option(app, options.frontend.every);
+  add_frame_step_option(app, options.frontend.every);
   add_max_mpx_option(app, options.frontend.max_mpx);
   add_board_limit_options(app, options.frontend);
   add_threads_option(app, options.frontend.threads);

@@ -51,7 +51,7 @@ std::string make_title(const Options& options) {
 UnitErrors stated_errors(const Options& options, const LampMap& lamps,
                          const Calibration& calibration) {
   UnitErrors unit(lamps, calibration);
-  if (!unit.common().stated()) {
+  if (!unit.common().are_errors_known()) {
     throw InputError(options.calibration,
                      "has no uncertainties, and " + options.lamps +
                          " has no sd_m; use --principal-point-px, --tilt-deg and --lamp-map-mm "
@@ -61,14 +61,14 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
                                                                       "lamp map"};
   std::string unstated;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (unit.common().stated(kCommonErrorSources[i])) continue;
+    if (unit.common().are_errors_known(kCommonErrorSources[i])) continue;
     unstated.append(unstated.empty() ? "" : ", ").append(names[i]);
   }
   if (!unstated.empty()) {
     spdlog::warn("{}: the uncertainties are missing and count as zero", unstated);
   }
   if (const int elsewhere = unit.common().lamps_elsewhere(); elsewhere > 0) {
-    spdlog::warn(describe_lamps_elsewhere(elsewhere));
+    spdlog::warn(describe_lamps_moved_since_calibration(elsewhere));
   }
   return unit;
 }
@@ -76,7 +76,7 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
 /// Returns the prior of velocity, yaw rate, roll and pitch.
 BodyPrior make_body_prior(const Options& options, const Camera& camera) {
   BodyPrior prior;
-  if (const auto motion = options.motion.motion()) {
+  if (const auto motion = options.motion.make_known_motion()) {
     check_row_time(camera);
     prior.velocity_sd_m_per_s = motion->velocity_sd_m_per_s;
     prior.yaw_rate_sd_rad_per_s = motion->yaw_rate_sd_rad_per_s;
@@ -90,25 +90,26 @@ FloorLimits find_floor_limits(const Options& options, const LampMap& lamps, cons
   const BodyPrior prior = make_body_prior(options, calibration.camera);
   const double yaw_rad = rad_from_deg(options.yaw_deg);
   if (options.stated) {
-    return compute_floor_limits(stated_errors(options, lamps, calibration), grid, options.height_m,
-                                yaw_rad, options.noise_px, prior);
+    return compute_accuracy_limits_on_floor(stated_errors(options, lamps, calibration), grid,
+                                            options.height_m, yaw_rad, options.noise_px, prior);
   }
-  return compute_floor_limits(lamps, calibration.camera, grid, options.height_m, yaw_rad,
-                              {options.noise_px, options.center_px, rad_from_deg(options.tilt_deg),
-                               1e-3 * options.lamp_map_mm},
-                              prior);
+  return compute_accuracy_limits_on_floor(
+      lamps, calibration.camera, grid, options.height_m, yaw_rad,
+      {options.noise_px, options.center_px, rad_from_deg(options.tilt_deg),
+       1e-3 * options.lamp_map_mm},
+      prior);
 }
 
 void run(const Options& options) {
-  check_outputs({{"--map", options.map}, {"--picture", options.picture}},
-                {options.lamps, options.calibration});
+  check_output_files({{"--map", options.map}, {"--picture", options.picture}},
+                     {options.lamps, options.calibration});
   const LampMap lamps = read_lamps_of_room(options.lamps, options.room);
-  FloorGrid grid = make_floor_grid(lamps, options.step_m);
+  FloorGrid grid = make_grid_of_floor_positions(lamps, options.step_m);
   if (const auto& floor = options.floor_m; !floor.empty()) {
     grid = {floor[0], floor[1], floor[2], floor[3], options.step_m};
   }
   const FloorLimits limits = find_floor_limits(options, lamps, grid);
-  const auto summary = summarize(limits);
+  const auto summary = summarize_floor_limits(limits);
   const bool is_free = options.motion.max_speed_m_per_s || options.roll_pitch_sd_deg > 0;
   if (!summary && is_free && std::any_of(limits.places.begin(), limits.places.end(), [](auto& one) {
         return one.lamps > 1;
@@ -123,12 +124,13 @@ void run(const Options& options) {
         "two lamps are visible from no position on this floor: is it under the lamps, and the "
         "camera below them? Otherwise lower the camera, widen the lens, or add lamps");
   }
-  if (!options.map.empty()) write_limits(options.map, limits);
+  if (!options.map.empty()) write_floor_limits(options.map, limits);
   if (!options.picture.empty()) {
-    draw_floor_plot(options.picture, make_plot(limits, make_title(options), options.step_m), lamps);
+    write_floor_plot(options.picture,
+                     collect_plot_data(limits, make_title(options), options.step_m), lamps);
   }
-  print_limits(*summary, limits, is_free);
-  if (options.stated) print_advice(*summary);
+  print_floor_limits(*summary, limits, is_free);
+  if (options.stated) print_largest_error_source(*summary);
 }
 
 void add_options(CLI::App& app, Options& options) {
@@ -139,7 +141,7 @@ void add_options(CLI::App& app, Options& options) {
       ->required();
   app.add_option("--height-m", options.height_m, "Height of the camera in the world, in m")
       ->required()
-      ->check(finite());
+      ->check(make_finite_validator());
   app.add_option("--noise-px", options.noise_px,
                  "Standard deviation of lamp positions in the image, per axis, in px")
       ->required()
@@ -147,16 +149,16 @@ void add_options(CLI::App& app, Options& options) {
   auto* center =
       app.add_option("--principal-point-px", options.center_px,
                      "Standard deviation of the principal point, per axis, in px (default: 0)")
-          ->check(finite_not_negative());
+          ->check(make_finite_non_negative_validator());
   auto* tilt =
       app.add_option("--tilt-deg", options.tilt_deg,
                      "Standard deviation of the camera tilt, per axis, in degrees (default: 0)")
-          ->check(finite_not_negative());
+          ->check(make_finite_non_negative_validator());
   auto* lamp_map =
       app.add_option(
              "--lamp-map-mm", options.lamp_map_mm,
              "Standard deviation of lamp positions in the map, per axis, in mm (default: 0)")
-          ->check(finite_not_negative());
+          ->check(make_finite_non_negative_validator());
   app.add_flag("--from-calibration", options.stated,
                "Use the uncertainties of lens, zenith and dispersion offset in the calibration "
                "instead of these three options. Those of the lamps are sd_m of the map, or from "
@@ -171,13 +173,13 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--roll-pitch-sd-deg", options.roll_pitch_sd_deg,
                  "Standard deviation of roll and pitch, in degrees. Adds the contribution of "
                  "estimating both (default: 0, known); 90: unknown")
-      ->check(finite_not_negative());
+      ->check(make_finite_non_negative_validator());
   app.add_option("--yaw-deg", options.yaw_deg, "Yaw of the camera, in degrees (default: 0)")
-      ->check(finite());
+      ->check(make_finite_validator());
   app.add_option("--floor-m", options.floor_m,
                  "Limits of the floor, in m (default: rectangle around the lamps)")
       ->expected(4)
-      ->check(finite())
+      ->check(make_finite_validator())
       ->option_text("X_MIN X_MAX Y_MIN Y_MAX");
   app.add_option("--step-m", options.step_m, "Grid spacing on the floor, in m (default: 0.05)")
       ->check(make_finite_positive_validator());
@@ -185,7 +187,7 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option(
          "--picture", options.picture,
          "Output file of a plot of the horizontal standard deviation over the floor, .png or .svg")
-      ->check(is_plot_file());
+      ->check(make_plot_file_validator());
 }
 
 }  // namespace

@@ -47,10 +47,10 @@ struct Options {
 
 /// Reads the table of the captures: the named file, or the one in the folder of images.
 CapturesTable read_captures_table(const Options& options) {
-  if (!options.captures.empty()) return read_captures(options.captures);
+  if (!options.captures.empty()) return read_captures_csv(options.captures);
   const bool folder = std::filesystem::is_directory(options.images.images);
   CapturesTable captures =
-      folder ? read_captures_of_folder(options.images.images) : CapturesTable{};
+      folder ? read_captures_csv_of_folder(options.images.images) : CapturesTable{};
   if (captures.empty() &&
       (options.one_lamp || options.inclination_sigma_deg || options.height_sd_m ||
        options.yaw_rate_sd_deg_per_s || options.window_size > 1)) {
@@ -101,7 +101,7 @@ LocateInput make_input(const Options& options, const CapturesTable& captures) {
   input.inclination_sigma_rad = rad_from_deg(options.inclination_sigma_deg.value_or(0));
   input.one_lamp = options.one_lamp;
   input.yaw_sd_rad = rad_from_deg(options.yaw_sd_deg.value_or(0));
-  input.motion = options.motion.motion();
+  input.motion = options.motion.make_known_motion();
   input.yaw_rate_sd_rad_per_s = rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0));
   input.roll_pitch_sd_rad = rad_from_deg(options.roll_pitch_sd_deg.value_or(0));
   input.height_sd_m = options.height_sd_m;
@@ -110,23 +110,23 @@ LocateInput make_input(const Options& options, const CapturesTable& captures) {
 }
 
 LocateResult locate_in_images(const Options& options, LocateInput input) {
-  check_image_outputs(options.images);
-  const LampImages images = make_lamp_images(options.images, input.lamps, input.calibration);
+  check_image_output_options(options.images);
+  const LampImages images = make_lamp_image_inputs(options.images, input.lamps, input.calibration);
   LocateResult found;
   {
     Progress progress("images");
-    found =
-        locate_images(images, ImageUse::fixes, std::move(input), options.images.frontend,
-                      [&](std::size_t done, std::size_t total) { progress.update(done, total); });
+    found = locate_camera_in_images(
+        images, ImageUse::fixes, std::move(input), options.images.frontend,
+        [&](std::size_t done, std::size_t total) { progress.update_display(done, total); });
   }
-  print_lights(found.seen);
+  print_each_light(found.seen);
   return found;
 }
 
 void run(Options options) {
-  std::vector<std::string> inputs = list_inputs(options.images);
+  std::vector<std::string> inputs = list_capture_input_files(options.images);
   inputs.push_back(options.captures);
-  check_output(options.images.output, inputs);
+  check_output_file(options.images.output, inputs);
   const CapturesTable captures = read_captures_table(options);
   options.images.captures = captures;
   if (const auto& mount = options.camera_on_robot) {
@@ -138,13 +138,13 @@ void run(Options options) {
     found = locate_in_images(options, std::move(input));
   } else {
     input.frames = read_detection_captures(options.images);
-    found = locate_frames(input);
+    found = locate_camera_in_frames(input);
   }
-  print_remarks(found);
-  if (found.rows.empty()) throw_if_failed(found);
+  print_step_remarks(found);
+  if (found.rows.empty()) throw_if_step_failed(found);
   write_fixes(options.images.output, found.rows);
   print_fixes(found.summary);
-  throw_if_failed(found);
+  throw_if_step_failed(found);
 }
 
 /// Adds the options of motion, roll and pitch, mount, and of the values in captures.csv.
@@ -152,11 +152,11 @@ void add_sensor_options(CLI::App& app, Options& options) {
   app.add_option("--inclination-sigma-deg", options.inclination_sigma_deg,
                  "Standard deviation of each angle of the inclination sensor, in degrees. Roll and "
                  "pitch are then estimated together with the position (default: 0, exact)")
-      ->check(finite_not_negative());
+      ->check(make_finite_non_negative_validator());
   app.add_option("--camera-on-robot", options.camera_on_robot,
                  "Position and yaw of the camera in the frame of the robot, in m and degrees. "
                  "Fixes are then of the robot center")
-      ->check(finite())
+      ->check(make_finite_validator())
       ->option_text("X_M Y_M Z_M YAW_DEG");
   CLI::Option* const one_lamp =
       app.add_flag("--one-lamp", options.one_lamp,
@@ -164,7 +164,7 @@ void add_sensor_options(CLI::App& app, Options& options) {
   app.add_option("--yaw-sd-deg", options.yaw_sd_deg,
                  "Standard deviation of yaw_rad in captures.csv for --one-lamp, in degrees "
                  "(default: 0, exact). For z_m use --height-sd-m")
-      ->check(finite_not_negative())
+      ->check(make_finite_non_negative_validator())
       ->needs(one_lamp);
   add_motion_options(app, options.motion,
                      "Maximum speed of the camera or robot, in m/s. Estimates the motion of each "
@@ -174,7 +174,7 @@ void add_sensor_options(CLI::App& app, Options& options) {
                  "Standard deviation of roll and pitch about level, in degrees, for captures "
                  "without inclination. Estimates both from each image; 90: unknown, needs three "
                  "lamps or more (default: 0, level)")
-      ->check(finite_not_negative());
+      ->check(make_finite_non_negative_validator());
   app.add_option("--height-sd-m", options.height_sd_m,
                  "Standard deviation of z_m in captures.csv, in m. All fixes then use z_m, which "
                  "also selects among several solutions for three lamps (default: only --one-lamp "

@@ -25,26 +25,28 @@ struct Options {
   std::string scene, output;
   std::vector<std::string> folders;
   std::optional<int> seed, archive;
-  int threads = count_cores();
+  int threads = count_cpu_cores();
 };
 
 void run(const Options& options) {
-  check_output((std::filesystem::path(options.output) / "scene.yaml").string(), {options.scene});
+  check_output_file((std::filesystem::path(options.output) / "scene.yaml").string(),
+                    {options.scene});
   Scene scene = read_scene(options.scene);
   std::optional<std::uint64_t> seed;
   if (options.seed) {
     seed = scene.seed = static_cast<std::uint64_t>(*options.seed);
-    draw_random_parts(scene);
+    draw_random_scene_parts(scene);
   }
   cv::setNumThreads(1);  // captures are rendered in parallel
   const std::string what = options.archive ? "sessions" : "captures";
-  const SimulationOptions how{options.folders, options.threads,
-                              make_provenance(options.scene, seed, "vlp-simulate", VLP_VERSION)};
+  const SimulationOptions how{
+      options.folders, options.threads,
+      make_simulation_provenance(options.scene, seed, "vlp-simulate", VLP_VERSION)};
   SimulationSummary summary;
   {
     Progress progress(what);
     const auto show = [&](const SimulationSummary& so_far, std::size_t total) {
-      progress.update(so_far.rendered + so_far.found, total, so_far.found);
+      progress.update_display(so_far.rendered + so_far.found, total, so_far.found);
     };
     summary = options.archive ? simulate_archive(scene, static_cast<std::size_t>(*options.archive),
                                                  options.output, how, show)

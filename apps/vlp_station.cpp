@@ -32,7 +32,7 @@ void add_run(CLI::App& app, StationRunOptions& options) {
       run->add_option(
              "--camera-id", options.camera_id,
              "Camera id of the unit (default: scanned or typed ids, one per line, until q)")
-          ->check([](const std::string& id) { return camera_id_problem(id); });
+          ->check([](const std::string& id) { return describe_camera_id_problem(id); });
   auto* batch =
       run->add_option("--batch", options.batch,
                       "Folder with complete folders boards, rotation, dispersion and check. Runs "
@@ -107,10 +107,10 @@ CLI::App* add_records_command(CLI::App& app, const char* name, const char* what,
       ->add_option(
           "--since", options.filter.since,
           "Only runs that ended at or after this time, in UTC, as 2026-11-21 or 2026-11-21T13:45")
-      ->check(utc_problem);
+      ->check(describe_utc_problem);
   command
       ->add_option("--until", options.filter.until, "Only runs that ended before this time, in UTC")
-      ->check(utc_problem);
+      ->check(describe_utc_problem);
   command->add_option("--last", options.filter.last, "Maximum number of runs, the latest ones")
       ->check(CLI::Range(1, 1'000'000));
   return command;
@@ -147,12 +147,12 @@ void add_upkeep(CLI::App& app, StationRecordsOptions& options) {
   clean->add_option("--station", options.station, "Station configuration, station.yaml")
       ->required();
   clean->add_flag("--delete", options.remove, "Delete the folders (default: only list them)");
-  CLI::App* verify_records =
+  CLI::App* print_audit_trail_check =
       add_records_location(app, "verify-records",
                            "Check that the records are unchanged. Lists runs that were changed, "
                            "removed or added by hand; exit code 1 if there are any",
                            options);
-  verify_records->add_option(
+  print_audit_trail_check->add_option(
       "--expected-digest", options.expected_digest,
       "Last digest printed by an earlier verify-records. The trail must still contain it");
   CLI::App* voided = add_records_location(
@@ -230,25 +230,25 @@ void run_command(const CLI::App& app, const StationRunOptions& run,
                  const StationRecordsOptions& records) {
   if (app.got_subcommand("run")) {
     if (run.camera_id.empty()) {
-      run_shift(run);
+      measure_scanned_units(run);
     } else {
-      run_unit(run);
+      measure_unit(run);
     }
   }
-  if (app.got_subcommand("verify")) run_verify(run);
+  if (app.got_subcommand("verify")) verify_station_with_golden_unit(run);
   if (app.got_subcommand("hook")) run_hooks(run);
   if (app.got_subcommand("list")) print_runs(records);
   if (app.got_subcommand("show")) print_run(records);
   if (app.got_subcommand("restore")) restore_run(records);
-  if (app.got_subcommand("certificate")) write_certificate(records);
-  if (app.got_subcommand("clean")) clean_expired_folders(records);
+  if (app.got_subcommand("certificate")) write_calibration_certificate(records);
+  if (app.got_subcommand("clean")) list_or_delete_expired_folders(records);
   if (app.got_subcommand("void")) void_run(records);
-  if (app.got_subcommand("verify-records")) verify_records(records);
+  if (app.got_subcommand("verify-records")) print_audit_trail_check(records);
   if (app.got_subcommand("import")) import_archive(records);
   if (app.got_subcommand("export")) export_runs(records);
-  if (app.got_subcommand("trend")) print_trend(records);
-  if (app.got_subcommand("capability")) print_capability(records);
-  if (app.got_subcommand("study")) print_study(records);
+  if (app.got_subcommand("trend")) print_metric_trend(records);
+  if (app.got_subcommand("capability")) print_process_capability(records);
+  if (app.got_subcommand("study")) print_measurement_study(records);
 }
 
 }  // namespace
@@ -273,7 +273,7 @@ int main(int argc, char** argv) {
   app.fallthrough();
   vlp::StationRunOptions run;
   vlp::StationRecordsOptions records;
-  run.threads = vlp::count_cores();
+  run.threads = vlp::count_cpu_cores();
   vlp::add_run(app, run);
   vlp::add_verify(app, run);
   vlp::add_hook(app, run);

@@ -13,8 +13,8 @@
 #include "program/app.h"
 #include "program/progress.h"
 #include "program/steps/capture_options.h"
-#include "program/steps/step_outcome.h"
 #include "program/steps/print_training.h"
+#include "program/steps/step_outcome.h"
 #include "rig/input_error.h"
 #include "session/row_time_step.h"
 #include "session/train_step.h"
@@ -28,7 +28,7 @@ struct Options {
   std::vector<std::string> folders;
   std::string lamps, calibration, labels, output;
   bool row_time = false;
-  FrontendOptions frontend = make_default_frontend();
+  FrontendOptions frontend = make_default_frontend_options();
 };
 
 /// Inputs read from the files of the options.
@@ -54,25 +54,25 @@ std::vector<Frame> read_labels(const fs::path& folder, const std::string& table,
 }
 
 Inputs read_inputs(const Options& options) {
-  check_output(options.output, {options.lamps, options.calibration});
+  check_output_file(options.output, {options.lamps, options.calibration});
   Inputs inputs;
   inputs.lamps = read_lamps_of_room(options.lamps, options.frontend.room);
   if (!options.calibration.empty()) inputs.calibration = read_calibration(options.calibration);
   for (const std::string& folder : options.folders) {
     for (const fs::path& image : list_images(folder))
-      check_output(options.output, {image.string()});
+      check_output_file(options.output, {image.string()});
     inputs.labels.push_back(read_labels(folder, options.labels, !options.row_time));
   }
   {
     Progress progress("images");
-    inputs.seen =
-        detect_lights({options.folders.begin(), options.folders.end()}, inputs.lamps,
-                      inputs.calibration, !options.row_time, options.frontend,
-                      [&](std::size_t done, std::size_t total) { progress.update(done, total); });
+    inputs.seen = detect_lights(
+        {options.folders.begin(), options.folders.end()}, inputs.lamps, inputs.calibration,
+        !options.row_time, options.frontend,
+        [&](std::size_t done, std::size_t total) { progress.update_display(done, total); });
   }
   StepResult remarks;
-  add_remarks(inputs.seen.seen, remarks);
-  print_remarks(remarks);
+  add_intake_remarks(inputs.seen.seen, remarks);
+  print_step_remarks(remarks);
   return inputs;
 }
 
@@ -80,10 +80,10 @@ void train(const Options& options) {
   const Inputs inputs = read_inputs(options);
   const TrainStepResult result =
       train_lamp_classifier(inputs.seen, inputs.labels, inputs.lamps, options.folders.front());
-  print_remarks(result);
-  throw_if_failed(result);
+  print_step_remarks(result);
+  throw_if_step_failed(result);
   write_lamp_classifier(options.output, result.classifier);
-  print_training(result);
+  print_classifier_training(result);
 }
 
 void train_row_time(const CLI::App& app, const Options& options) {
@@ -95,10 +95,10 @@ void train_row_time(const CLI::App& app, const Options& options) {
   std::vector<std::string> files = options.folders;
   files.push_back(options.lamps);
   const RowTimeStepResult result =
-      find_row_time(inputs.seen, inputs.labels, inputs.lamps, options.lamps, inputs.calibration,
-                    make_program_history_entry(app, files));
-  print_remarks(result);
-  throw_if_failed(result);
+      estimate_row_time_from_lights(inputs.seen, inputs.labels, inputs.lamps, options.lamps,
+                                    inputs.calibration, make_program_history_entry(app, files));
+  print_step_remarks(result);
+  throw_if_step_failed(result);
   if (!options.output.empty()) write_calibration(options.output, result.calibration);
   print_row_time(result.found, inputs.seen.camera.readout);
 }

@@ -19,7 +19,7 @@ namespace {
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
 /// d(x/z, y/z) / d(x, y, z).
-Matrix23 division_jacobian(const Eigen::Vector2d& z, double inverse_depth) {
+Matrix23 perspective_division_jacobian(const Eigen::Vector2d& z, double inverse_depth) {
   Matrix23 jacobian;
   jacobian << inverse_depth, 0, -z.x() * inverse_depth, 0, inverse_depth, -z.y() * inverse_depth;
   return jacobian;
@@ -31,7 +31,7 @@ class Opencv : public LensFamily {
   explicit Opencv(std::span<const double> distortions)
       : distortions_(static_cast<Eigen::Index>(distortions.size())) {
     std::copy(distortions.begin(), distortions.end(), distortion_.k.begin());
-    const double radius = distortion_.valid_radius();
+    const double radius = distortion_.compute_max_valid_radius();
     valid_radius_squared_ = radius * radius;
   }
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x) const override {
@@ -42,12 +42,12 @@ class Opencv : public LensFamily {
   Jacobians jacobians(const Eigen::Vector3d& x) const override {
     const double inverse_depth = 1 / x.z();
     const Eigen::Vector2d z = x.head<2>() * inverse_depth;
-    return {distortion_(z).d_distorted_d_z * division_jacobian(z, inverse_depth),
-            distortion_.coefficient_jacobian(z).leftCols(distortions_)};
+    return {distortion_(z).d_distorted_d_z * perspective_division_jacobian(z, inverse_depth),
+            distortion_.distortion_coefficient_jacobian(z).leftCols(distortions_)};
   }
   std::optional<Ray> unproject(const Eigen::Vector2d& plane) const override {
     Eigen::Matrix2d d_plane_d_z;
-    const auto z = undistort(plane, d_plane_d_z);
+    const auto z = undistort_point_newton(plane, d_plane_d_z);
     if (!z) return std::nullopt;
     Ray ray;
     ray.direction << *z, 1;
@@ -56,23 +56,23 @@ class Opencv : public LensFamily {
   }
 
  private:
-  std::optional<Eigen::Vector2d> undistort(const Eigen::Vector2d& distorted,
-                                           Eigen::Matrix2d& d_distorted_d_z) const;
+  std::optional<Eigen::Vector2d> undistort_point_newton(const Eigen::Vector2d& distorted,
+                                                        Eigen::Matrix2d& d_distorted_d_z) const;
 
   Eigen::Index distortions_;
   Distortion distortion_;
   double valid_radius_squared_;
 };
 
-std::optional<Eigen::Vector2d> Opencv::undistort(const Eigen::Vector2d& distorted,
-                                                 Eigen::Matrix2d& d_distorted_d_z) const {
+std::optional<Eigen::Vector2d> Opencv::undistort_point_newton(
+    const Eigen::Vector2d& distorted, Eigen::Matrix2d& d_distorted_d_z) const {
   constexpr double searched_radius_squared =
       Distortion::searched_radius * Distortion::searched_radius;
   const double reach_squared = std::min(valid_radius_squared_, searched_radius_squared);
   const double squared_norm = distorted.squaredNorm();
   // An initial point without the radial distortion at the distorted point saves a step. It is used
   // if it lies within the valid radius.
-  Eigen::Vector2d z = distorted / distortion_.radial_factor(squared_norm);
+  Eigen::Vector2d z = distorted / distortion_.radial_distortion_factor(squared_norm);
   if (squared_norm > reach_squared) {
     z = distorted * (0.9 * std::sqrt(reach_squared / squared_norm));
   } else if (!(z.squaredNorm() <= reach_squared)) {
@@ -112,7 +112,7 @@ std::optional<Eigen::Vector2d> Opencv::undistort(const Eigen::Vector2d& distorte
 struct StereographicPoint {
   explicit StereographicPoint(const Eigen::Vector3d& x)
       : norm(x.norm()), depth(norm + x.z()), plane(x.head<2>() * (2 / depth)) {}
-  Matrix23 jacobian(const Eigen::Vector3d& x) const {
+  Matrix23 compute_projection_jacobian(const Eigen::Vector3d& x) const {
     const Eigen::Vector3d d_depth = x / norm + Eigen::Vector3d::UnitZ();
     return 2 / depth * (Matrix23::Identity() - plane / 2 * d_depth.transpose());
   }
@@ -129,7 +129,7 @@ class Stereographic : public LensFamily {
     return at.plane;
   }
   Jacobians jacobians(const Eigen::Vector3d& x) const override {
-    return {StereographicPoint(x).jacobian(x), {}};
+    return {StereographicPoint(x).compute_projection_jacobian(x), {}};
   }
   std::optional<Ray> unproject(const Eigen::Vector2d& plane) const override {
     Ray ray;
@@ -147,17 +147,17 @@ class Splined : public LensFamily {
 
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x) const override {
     const StereographicPoint at(x);
-    if (!(at.depth > 0) || !surface_.covers(at.plane)) return std::nullopt;
-    return surface_.distorted(at.plane);
+    if (!(at.depth > 0) || !surface_.is_defined_at(at.plane)) return std::nullopt;
+    return surface_.distort_point(at.plane);
   }
   Jacobians jacobians(const Eigen::Vector3d& x) const override {
     const StereographicPoint at(x);
-    return {surface_(at.plane).d_distorted_d_u * at.jacobian(x), {}};
+    return {surface_(at.plane).d_distorted_d_u * at.compute_projection_jacobian(x), {}};
   }
   std::vector<DistortionDerivative> compute_distortion_derivatives(
       const Eigen::Vector3d& x) const override {
-    const SplineSurface::Weights at = surface_.weights(StereographicPoint(x).plane);
-    const SplineGrid& grid = surface_.grid();
+    const SplineSurface::Weights at = surface_.spline_weights(StereographicPoint(x).plane);
+    const SplineGrid& grid = surface_.spline_grid();
     const auto width = static_cast<std::size_t>(grid.order) + 1;
     std::vector<DistortionDerivative> derivatives;
     for (std::size_t j = 0; j < width; ++j) {
@@ -172,7 +172,7 @@ class Splined : public LensFamily {
   }
   std::optional<Ray> unproject(const Eigen::Vector2d& plane) const override {
     Eigen::Matrix2d d_plane_d_u;
-    const auto u = surface_.undistorted(plane, d_plane_d_u);
+    const auto u = surface_.undistort_point(plane, d_plane_d_u);
     if (!u) return std::nullopt;
     const Eigen::Matrix2d d_u_d_plane = d_plane_d_u.inverse();
     std::optional<Ray> ray(std::in_place);
@@ -192,11 +192,11 @@ class OpencvFisheye : public LensFamily {
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x) const override {
     const double axis_distance = x.head<2>().norm();
     const double angle_rad = std::atan2(axis_distance, x.z());
-    if (!x.allFinite() || !(angle_rad <= angles_.valid_rad()) ||
+    if (!x.allFinite() || !(angle_rad <= angles_.max_valid_angle_rad()) ||
         !(axis_distance > 0 || x.z() > 0)) {
       return std::nullopt;
     }
-    return x.head<2>() * (fisheye_.distance(angle_rad) / std::max(axis_distance, kOnAxis));
+    return x.head<2>() * (fisheye_.radius_from_angle(angle_rad) / std::max(axis_distance, kOnAxis));
   }
   Jacobians jacobians(const Eigen::Vector3d& x) const override;
   std::optional<Ray> unproject(const Eigen::Vector2d& plane) const override;
@@ -213,9 +213,9 @@ LensFamily::Jacobians OpencvFisheye::jacobians(const Eigen::Vector3d& x) const {
   const Eigen::Vector2d xy = x.head<2>();
   const double axis_distance = xy.norm(), squared_norm = x.squaredNorm();
   const double angle_rad = std::atan2(axis_distance, x.z());
-  const double slope = fisheye_.slope(angle_rad);
+  const double slope = fisheye_.radius_derivative(angle_rad);
   const bool on_axis = axis_distance <= kOnAxis;
-  const double scale = on_axis ? 1 / x.z() : fisheye_.distance(angle_rad) / axis_distance;
+  const double scale = on_axis ? 1 / x.z() : fisheye_.radius_from_angle(angle_rad) / axis_distance;
   const Eigen::Vector2d radial_direction =
       on_axis ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(xy / axis_distance);
   Jacobians result;
@@ -240,7 +240,8 @@ std::optional<LensFamily::Ray> OpencvFisheye::unproject(const Eigen::Vector2d& p
   const bool on_axis = distance <= kOnAxis;
   const double inverse = on_axis ? 0 : 1 / distance, across = on_axis ? 1 : sine * inverse;
   const double x = plane.x() * inverse, y = plane.y() * inverse;
-  const double by_slope = 1 / fisheye_.slope(angle_rad), more = cosine * by_slope - across;
+  const double by_slope = 1 / fisheye_.radius_derivative(angle_rad),
+               more = cosine * by_slope - across;
   std::optional<Ray> ray(std::in_place);
   ray->direction << across * plane, cosine;
   ray->d_direction_d_plane << across + more * x * x, more * x * y,  //
@@ -251,7 +252,8 @@ std::optional<LensFamily::Ray> OpencvFisheye::unproject(const Eigen::Vector2d& p
 
 std::shared_ptr<const LensFamily> make_lens_family(LensModel model,
                                                    std::span<const double> distortions) {
-  if (is_splined(model)) return std::make_shared<Splined>(grid_of(model), distortions);
+  if (is_splined_lens_model(model))
+    return std::make_shared<Splined>(spline_grid_of_model(model), distortions);
   switch (model) {
     case LensModel::stereographic:
       return std::make_shared<Stereographic>();
@@ -307,7 +309,7 @@ std::optional<Lens::Projection> Lens::project_with_jacobians(
   return result;
 }
 
-std::optional<Lens::SparseJacobian> Lens::compute_parameter_jacobian(
+std::optional<Lens::SparseJacobian> Lens::compute_intrinsics_jacobian(
     const Eigen::Vector3d& x_in_camera) const {
   const auto projection = project_with_jacobians(x_in_camera);
   if (!projection) return std::nullopt;

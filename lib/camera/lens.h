@@ -23,11 +23,11 @@ class Lens {
   ///         not finite or a focal length is not positive
   Lens(LensModel model, std::span<const double> parameters);
 
-  LensModel model() const { return model_; }
+  LensModel lens_model() const { return model_; }
   /// Focal lengths fx, fy in pixels.
   const Eigen::Vector2d& focal_px() const { return focal_px_; }
   /// Principal point cx, cy in pixels.
-  const Eigen::Vector2d& center_px() const { return center_px_; }
+  const Eigen::Vector2d& principal_point_px() const { return center_px_; }
 
   /// Projects a point to a pixel.
   ///
@@ -38,8 +38,8 @@ class Lens {
   ///   PINHOLE, OPENCVn  at or behind the plane z = 0
   ///   other models      straight behind the camera
   ///   OPENCVn, OPENCV_FISHEYE, splined
-  ///                     beyond Distortion::valid_radius, Fisheye::valid_angle_rad or
-  ///                     SplineSurface::reach
+  ///                     beyond Distortion::compute_max_valid_radius(),
+  ///                     Fisheye::max_valid_angle_rad() or SplineSurface::half_extent()
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x_in_camera) const;
 
   struct Projection {
@@ -61,7 +61,7 @@ class Lens {
   };
   /// Computes the Jacobian of a point's pixel with respect to all parameters, including the control
   /// points of splined lenses. Returns std::nullopt for points that project() rejects.
-  std::optional<SparseJacobian> compute_parameter_jacobian(
+  std::optional<SparseJacobian> compute_intrinsics_jacobian(
       const Eigen::Vector3d& x_in_camera) const;
 
   struct Ray {

@@ -13,10 +13,10 @@ namespace vlp {
 /// p = (x, y, z). The center of the top-left pixel is (0, 0).
 ///   PINHOLE         pixel = f * (x/z, y/z) + c
 ///   STEREOGRAPHIC   pixel = f * 2 (x, y) / (|p| + z) + c
-///   OPENCVn         pixel = f * distorted(x/z, y/z) + c  (camera/distortion.h)
+///   OPENCVn         pixel = f * distort_point(x/z, y/z) + c  (camera/distortion.h)
 ///   OPENCV_FISHEYE  pixel = f * d(a) (x, y) / |(x, y)| + c,  a = atan2(|(x, y)|, z)
 ///                   (camera/fisheye.h)
-///   splined         pixel = f * distorted(2 (x, y) / (|p| + z)) + c  (camera/spline_surface.h)
+///   splined         pixel = f * distort_point(2 (x, y) / (|p| + z)) + c  (camera/spline_surface.h)
 /// Each grid of mrcal's splined lenses is a model; lens_model_from_name() returns it by its name,
 /// for example "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14_fov_x_deg=190". All models
 /// except OPENCV_FISHEYE are mrcal's LENSMODEL_... of the same names (mrcal documentation, "Lens

@@ -39,10 +39,10 @@ static_assert(kModels.size() == static_cast<std::size_t>(LensModel::fisheye) + 1
 
 }  // namespace
 
-std::span<const LensModelRow> lens_models() { return kModels; }
+std::span<const LensModelRow> list_lens_models() { return kModels; }
 
-std::span<const LensDistortion> distortions_of(LensModel model) {
-  if (is_splined(model)) return {};
+std::span<const LensDistortion> list_distortion_names_and_start_values(LensModel model) {
+  if (is_splined_lens_model(model)) return {};
   return kModels[static_cast<std::size_t>(model)].distortions;
 }
 

@@ -25,10 +25,10 @@ struct LensModelRow {
 };
 
 /// Returns the models with fixed names (all except splined lenses), in the order of LensModel.
-std::span<const LensModelRow> lens_models();
+std::span<const LensModelRow> list_lens_models();
 
 /// Returns the distortions of a model. Empty for a splined lens: its control points have no names
 /// and their initial value is 0.
-std::span<const LensDistortion> distortions_of(LensModel model);
+std::span<const LensDistortion> list_distortion_names_and_start_values(LensModel model);
 
 }  // namespace vlp

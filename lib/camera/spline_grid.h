@@ -23,7 +23,7 @@ struct SplineGrid {
 
   static constexpr int kMaxKnots = 255, kMaxFov_deg = 359;
 
-  std::size_t control_points() const {
+  std::size_t num_control_points() const {
     return static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny);
   }
   bool operator==(const SplineGrid&) const = default;
@@ -32,16 +32,16 @@ struct SplineGrid {
 /// Returns the LensModel of the splined lens with this grid. Its value holds the four numbers of
 /// the grid in separate bits, above the enumerators of LensModel.
 /// @pre The numbers are within the bounds of SplineGrid.
-constexpr LensModel lens_model_for(const SplineGrid& grid) {
+constexpr LensModel lens_model_for_spline_grid(const SplineGrid& grid) {
   return static_cast<LensModel>(1 << 30 | (grid.order - 2) << 29 | grid.fov_x_deg << 20 |
                                 grid.nx << 10 | grid.ny);
 }
 /// Returns true for a splined lens of any grid.
-constexpr bool is_splined(LensModel model) { return static_cast<int>(model) >= 1 << 30; }
+constexpr bool is_splined_lens_model(LensModel model) { return static_cast<int>(model) >= 1 << 30; }
 
 /// Returns the grid of a splined lens.
-/// @pre is_splined(model)
-constexpr SplineGrid grid_of(LensModel model) {
+/// @pre is_splined_lens_model(model)
+constexpr SplineGrid spline_grid_of_model(LensModel model) {
   const int bits = static_cast<int>(model);
   return {2 + (bits >> 29 & 1), bits >> 10 & 1023, bits & 1023, bits >> 20 & 511};
 }

@@ -17,17 +17,17 @@ namespace {
 /// a polynomial of t, the constant first. t is in [0, 1] for cubic pieces and [-1/2, 1/2] for
 /// quadratic ones.
 template <int Order>
-Eigen::Matrix<double, Order + 1, Order + 1> basis();
+Eigen::Matrix<double, Order + 1, Order + 1> compute_spline_basis();
 
 template <>
-Eigen::Matrix3d basis<2>() {
+Eigen::Matrix3d compute_spline_basis<2>() {
   Eigen::Matrix3d rows;
   rows << 1, -4, 4, 6, 0, -8, 1, 4, 4;
   return rows / 8;
 }
 
 template <>
-Eigen::Matrix4d basis<3>() {
+Eigen::Matrix4d compute_spline_basis<3>() {
   Eigen::Matrix4d rows;
   rows << 1, -3, 3, -1, 4, 0, -6, 3, 1, 3, 3, -3, 0, 0, 0, 1;
   return rows / 6;
@@ -41,7 +41,7 @@ struct Piece {
 
 /// Returns the piece at a position, which counts in control points from the first one.
 template <int Order>
-Piece piece_at(double at, int control_points) {
+Piece find_spline_piece(double at, int control_points) {
   constexpr double middle = Order == 2 ? 0.5 : 0;
   const int interval = std::clamp(static_cast<int>(at + middle), 1, control_points - Order);
   return {interval - 1, at - interval};
@@ -55,17 +55,17 @@ SplineSurface::SplineSurface(const SplineGrid& grid, std::span<const double> con
   pieces_per_u_ = (grid.nx - grid.order) / (2 * edge);
   reach_ = {edge, (grid.ny - grid.order) / (2 * pieces_per_u_)};
   if (grid.order == 2) {
-    fill_pieces<2>(control_points);
+    fill_polynomial_pieces<2>(control_points);
   } else {
-    fill_pieces<3>(control_points);
+    fill_polynomial_pieces<3>(control_points);
   }
-  fill_initial_points();
+  fill_initial_point_table();
 }
 
 template <int Order>
-void SplineSurface::fill_pieces(std::span<const double> control_points) {
+void SplineSurface::fill_polynomial_pieces(std::span<const double> control_points) {
   constexpr int width = Order + 1;
-  const Eigen::Matrix<double, width, width> by_power = basis<Order>().transpose();
+  const Eigen::Matrix<double, width, width> by_power = compute_spline_basis<Order>().transpose();
   Eigen::Matrix<double, width, width> x, y;
   for (int row = 0; row < grid_.ny - Order; ++row) {
     for (int column = 0; column < grid_.nx - Order; ++column) {
@@ -86,10 +86,12 @@ void SplineSurface::fill_pieces(std::span<const double> control_points) {
 }
 
 template <int Order>
-SplineSurface::Value SplineSurface::value(const Eigen::Vector2d& u) const {
+SplineSurface::Value SplineSurface::evaluate_spline(const Eigen::Vector2d& u) const {
   constexpr int width = Order + 1;
-  const auto [column, x] = piece_at<Order>(u.x() * pieces_per_u_ + (grid_.nx - 1) / 2.0, grid_.nx);
-  const auto [row, y] = piece_at<Order>(u.y() * pieces_per_u_ + (grid_.ny - 1) / 2.0, grid_.ny);
+  const auto [column, x] =
+      find_spline_piece<Order>(u.x() * pieces_per_u_ + (grid_.nx - 1) / 2.0, grid_.nx);
+  const auto [row, y] =
+      find_spline_piece<Order>(u.y() * pieces_per_u_ + (grid_.ny - 1) / 2.0, grid_.ny);
   const Eigen::Vector2d* powers = pieces_.data() + static_cast<std::ptrdiff_t>(width * width) *
                                                        (row * (grid_.nx - Order) + column);
   Eigen::Vector2d shift(0, 0), by_x(0, 0), by_y(0, 0);
@@ -112,15 +114,15 @@ SplineSurface::Value SplineSurface::value(const Eigen::Vector2d& u) const {
 }
 
 SplineSurface::Value SplineSurface::operator()(const Eigen::Vector2d& u) const {
-  return grid_.order == 2 ? value<2>(u) : value<3>(u);
+  return grid_.order == 2 ? evaluate_spline<2>(u) : evaluate_spline<3>(u);
 }
 
 template <int Order>
-SplineSurface::Weights SplineSurface::compute_weights(const Eigen::Vector2d& u) const {
-  const Piece x = piece_at<Order>(u.x() * pieces_per_u_ + (grid_.nx - 1) / 2.0, grid_.nx),
-              y = piece_at<Order>(u.y() * pieces_per_u_ + (grid_.ny - 1) / 2.0, grid_.ny);
+SplineSurface::Weights SplineSurface::compute_spline_weights(const Eigen::Vector2d& u) const {
+  const Piece x = find_spline_piece<Order>(u.x() * pieces_per_u_ + (grid_.nx - 1) / 2.0, grid_.nx),
+              y = find_spline_piece<Order>(u.y() * pieces_per_u_ + (grid_.ny - 1) / 2.0, grid_.ny);
   Weights weights{x.index, y.index, {}, {}};
-  const auto rows = basis<Order>();
+  const auto rows = compute_spline_basis<Order>();
   double power_x = 1, power_y = 1;
   for (int power = 0; power <= Order; ++power, power_x *= x.t, power_y *= y.t) {
     for (int i = 0; i <= Order; ++i) {
@@ -131,26 +133,25 @@ SplineSurface::Weights SplineSurface::compute_weights(const Eigen::Vector2d& u) 
   return weights;
 }
 
-SplineSurface::Weights SplineSurface::weights(const Eigen::Vector2d& u) const {
-  return grid_.order == 2 ? compute_weights<2>(u) : compute_weights<3>(u);
+SplineSurface::Weights SplineSurface::spline_weights(const Eigen::Vector2d& u) const {
+  return grid_.order == 2 ? compute_spline_weights<2>(u) : compute_spline_weights<3>(u);
 }
 
 template <int Order>
-std::optional<Eigen::Vector2d> SplineSurface::search(Eigen::Vector2d u,
-                                                     const Eigen::Vector2d& distorted,
-                                                     Eigen::Matrix2d& d_distorted_d_u) const {
+std::optional<Eigen::Vector2d> SplineSurface::search_undistorted_point(
+    Eigen::Vector2d u, const Eigen::Vector2d& distorted, Eigen::Matrix2d& d_distorted_d_u) const {
   constexpr int max_iterations = 50, max_halvings = 12;
   constexpr double numeric_tolerance = 1e-12;  // relative to the reach, for pixels at its very end
   Eigen::Vector2d from = u, step(0, 0);
   double smallest = std::numeric_limits<double>::infinity();
   for (int iterations = 0, halvings = 0; iterations < max_iterations;) {
     // The only call, so that the compiler inlines it into the loop.
-    const Value at = value<Order>(u);
+    const Value at = evaluate_spline<Order>(u);
     const Eigen::Vector2d error = at.distorted - distorted;
     if (!(error.squaredNorm() < smallest)) {  // halve the step until the error decreases
       if (++halvings == max_halvings) return std::nullopt;
       step /= 2;
-      u = clamp_to_reach(from + step);
+      u = clamp_to_half_extent(from + step);
       continue;
     }
     const Eigen::Matrix2d& j = at.d_distorted_d_u;
@@ -166,22 +167,23 @@ std::optional<Eigen::Vector2d> SplineSurface::search(Eigen::Vector2d u,
         return std::nullopt;
       }
       d_distorted_d_u = j;
-      return clamp_to_reach(u);
+      return clamp_to_half_extent(u);
     }
     from = u, smallest = error.squaredNorm(), halvings = 0, ++iterations;
-    u = clamp_to_reach(from + step);
+    u = clamp_to_half_extent(from + step);
   }
   return std::nullopt;
 }
 
-std::optional<Eigen::Vector2d> SplineSurface::undistorted(const Eigen::Vector2d& distorted,
-                                                          Eigen::Matrix2d& d_distorted_d_u) const {
-  const Eigen::Vector2d start = compute_initial_point(distorted);
-  return grid_.order == 2 ? search<2>(start, distorted, d_distorted_d_u)
-                          : search<3>(start, distorted, d_distorted_d_u);
+std::optional<Eigen::Vector2d> SplineSurface::undistort_point(
+    const Eigen::Vector2d& distorted, Eigen::Matrix2d& d_distorted_d_u) const {
+  const Eigen::Vector2d start = compute_initial_undistorted_point(distorted);
+  return grid_.order == 2 ? search_undistorted_point<2>(start, distorted, d_distorted_d_u)
+                          : search_undistorted_point<3>(start, distorted, d_distorted_d_u);
 }
 
-Eigen::Vector2d SplineSurface::compute_initial_point(const Eigen::Vector2d& distorted) const {
+Eigen::Vector2d SplineSurface::compute_initial_undistorted_point(
+    const Eigen::Vector2d& distorted) const {
   const Eigen::Vector2d at = (distorted - first_node_).cwiseProduct(nodes_per_unit_);
   const auto clamp_node = [](double node) { return node > 0 ? std::min(node, kNodes - 1.0) : 0; };
   const double column = clamp_node(at.x()), row = clamp_node(at.y());
@@ -190,11 +192,11 @@ Eigen::Vector2d SplineSurface::compute_initial_point(const Eigen::Vector2d& dist
   const double x = column - i, y = row - j;
   const Eigen::Vector2d* node =
       initial_points_.data() + static_cast<std::ptrdiff_t>(j) * kNodes + i;
-  return clamp_to_reach((1 - y) * ((1 - x) * node[0] + x * node[1]) +
-                        y * ((1 - x) * node[kNodes] + x * node[kNodes + 1]));
+  return clamp_to_half_extent((1 - y) * ((1 - x) * node[0] + x * node[1]) +
+                              y * ((1 - x) * node[kNodes] + x * node[kNodes + 1]));
 }
 
-void SplineSurface::fill_initial_points() {
+void SplineSurface::fill_initial_point_table() {
   constexpr int num_samples = 2 * kNodes - 1;
   constexpr double inf = std::numeric_limits<double>::infinity();
   std::vector<std::pair<Eigen::Vector2d, Value>> places;
@@ -225,7 +227,7 @@ void SplineSurface::fill_initial_points() {
     const double distance = (node - whole).squaredNorm();
     if (!(distance < distances[index])) continue;
     distances[index] = distance;
-    initial_points_[index] = clamp_to_reach(start);
+    initial_points_[index] = clamp_to_half_extent(start);
   }
   // Nodes without a sample take the initial point of a neighbor: right and down, then left and up.
   const auto copy_from = [&](std::size_t to, std::size_t from) {

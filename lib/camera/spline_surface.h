@@ -24,16 +24,16 @@ namespace vlp {
 /// Splines", 1978.
 class SplineSurface {
  public:
-  /// Creates the surface from control points, row by row, x before y.
+  /// Creates the surface from control points row by row, the x and then the y component of each.
   /// @pre There are two numbers for each control point of the grid.
   SplineSurface(const SplineGrid& grid, std::span<const double> control_points);
 
-  const SplineGrid& grid() const { return grid_; }
+  const SplineGrid& spline_grid() const { return grid_; }
 
   /// Half extent of the surface along x and y. Beyond it the lens is not defined.
-  const Eigen::Vector2d& reach() const { return reach_; }
+  const Eigen::Vector2d& half_extent() const { return reach_; }
   /// Returns true if the surface is defined at `u`.
-  bool covers(const Eigen::Vector2d& u) const {
+  bool is_defined_at(const Eigen::Vector2d& u) const {
     return std::abs(u.x()) <= reach_.x() && std::abs(u.y()) <= reach_.y();
   }
 
@@ -42,9 +42,9 @@ class SplineSurface {
     Eigen::Matrix2d d_distorted_d_u;
   };
   /// Computes the distorted point and its derivative.
-  /// @pre covers(u), also for distorted() and weights()
+  /// @pre is_defined_at(u), also for distort_point() and spline_weights()
   Value operator()(const Eigen::Vector2d& u) const;
-  Eigen::Vector2d distorted(const Eigen::Vector2d& u) const { return (*this)(u).distorted; }
+  Eigen::Vector2d distort_point(const Eigen::Vector2d& u) const { return (*this)(u).distorted; }
 
   /// Weights of the control points at a point u: x[i] y[j] for the control point in column
   /// `column + i` and row `row + j`, with i and j from 0 to the order.
@@ -52,37 +52,38 @@ class SplineSurface {
     int column, row;
     std::array<double, 4> x, y;
   };
-  Weights weights(const Eigen::Vector2d& u) const;
+  Weights spline_weights(const Eigen::Vector2d& u) const;
 
   /// Computes the point u with this distorted position by Newton's method, from an initial point in
-  /// a table of fixed size. Returns std::nullopt if no such point within reach() is found. The
-  /// derivative is evaluated before the last step, at most 1e-6 from u.
-  std::optional<Eigen::Vector2d> undistorted(const Eigen::Vector2d& distorted,
-                                             Eigen::Matrix2d& d_distorted_d_u) const;
+  /// a table of fixed size. Returns std::nullopt if no such point within half_extent() is found.
+  /// The derivative is evaluated before the last step, at most 1e-6 from u.
+  std::optional<Eigen::Vector2d> undistort_point(const Eigen::Vector2d& distorted,
+                                                 Eigen::Matrix2d& d_distorted_d_u) const;
 
  private:
   template <int Order>
-  void fill_pieces(std::span<const double> control_points);
+  void fill_polynomial_pieces(std::span<const double> control_points);
   template <int Order>
-  Weights compute_weights(const Eigen::Vector2d& u) const;
+  Weights compute_spline_weights(const Eigen::Vector2d& u) const;
   template <int Order>
-  inline Value value(const Eigen::Vector2d& u) const;
+  inline Value evaluate_spline(const Eigen::Vector2d& u) const;
   template <int Order>
-  std::optional<Eigen::Vector2d> search(Eigen::Vector2d u, const Eigen::Vector2d& distorted,
-                                        Eigen::Matrix2d& d_distorted_d_u) const;
-  Eigen::Vector2d clamp_to_reach(const Eigen::Vector2d& u) const {
+  std::optional<Eigen::Vector2d> search_undistorted_point(Eigen::Vector2d u,
+                                                          const Eigen::Vector2d& distorted,
+                                                          Eigen::Matrix2d& d_distorted_d_u) const;
+  Eigen::Vector2d clamp_to_half_extent(const Eigen::Vector2d& u) const {
     return u.cwiseMax(-reach_).cwiseMin(reach_);
   }
-  void fill_initial_points();
-  Eigen::Vector2d compute_initial_point(const Eigen::Vector2d& distorted) const;
+  void fill_initial_point_table();
+  Eigen::Vector2d compute_initial_undistorted_point(const Eigen::Vector2d& distorted) const;
 
   SplineGrid grid_;
   double pieces_per_u_;
   Eigen::Vector2d reach_;
   /// Coefficients of x^i y^j of each piece, pieces row by row; for each j all i.
   std::vector<Eigen::Vector2d> pieces_;
-  /// Initial points of undistorted(): points whose distorted positions are close to the nodes of a
-  /// kNodes x kNodes lattice over the range of the distorted positions.
+  /// Initial points of undistort_point(): points whose distorted positions are close to the nodes
+  /// of a kNodes x kNodes lattice over the range of the distorted positions.
   static constexpr int kNodes = 33;
   Eigen::Vector2d first_node_, nodes_per_unit_;
   std::vector<Eigen::Vector2d> initial_points_;

@@ -25,8 +25,8 @@ struct Capture {
   PlaceOf place = PlaceOf::camera;
   /// Standard deviation of the position per axis, if known.
   std::optional<double> place_sd_m;
-  /// Name of the rotation in place to which the capture belongs: captures of one name share axis
-  /// and height. May be empty.
+  /// Name of the rotation in place to which the capture belongs (column pivot): captures of one
+  /// name share axis and height. May be empty.
   std::string spot;
   /// Reading of the inclination sensor: roll_rad and pitch_rad, both or neither.
   std::optional<Inclination> inclination;
@@ -45,12 +45,13 @@ using CapturesTable = std::map<std::string, Capture>;
 /// @throws InputError as CsvTable; if an image occurs twice; if only one of roll_rad and pitch_rad,
 /// or of the velocities, is given; if a reference point is neither camera nor axis; if a standard
 /// deviation is negative or has no velocity
-CapturesTable read_captures(const std::filesystem::path& file);
+CapturesTable read_captures_csv(const std::filesystem::path& file);
 
 /// Reads the captures.csv of a folder; returns an empty table if there is none. Throws InputError.
-CapturesTable read_captures_of_folder(const std::filesystem::path& folder);
+CapturesTable read_captures_csv_of_folder(const std::filesystem::path& folder);
 
 /// Writes a `captures.csv` with the time of each image. Throws InputError if it cannot be written.
-void write_times(const std::filesystem::path& file, const std::map<std::string, double>& times_s);
+void write_capture_times(const std::filesystem::path& file,
+                         const std::map<std::string, double>& times_s);
 
 }  // namespace vlp

@@ -18,7 +18,7 @@ namespace vlp {
 namespace {
 
 template <typename Number>
-std::optional<Number> parsed(std::string_view text) {
+std::optional<Number> parse_number(std::string_view text) {
   if (text.starts_with('+')) text.remove_prefix(1);
   Number value{};
   const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -47,13 +47,13 @@ struct CsvParsing {
   CsvParsing& operator=(const CsvParsing&) = delete;
 
   static void on_field(void* data, std::size_t size, void* self) {
-    static_cast<CsvParsing*>(self)->field({static_cast<const char*>(data), size});
+    static_cast<CsvParsing*>(self)->add_field({static_cast<const char*>(data), size});
   }
   static void on_row(int, void* self) { static_cast<CsvParsing*>(self)->row(); }
 
-  void field(std::string_view text) {
+  void add_field(std::string_view text) {
     if (row_fields++ == 0) row_line = line;
-    if (text.starts_with('\'') && begins_like_formula(text)) text.remove_prefix(1);
+    if (text.starts_with('\'') && begins_like_spreadsheet_formula(text)) text.remove_prefix(1);
     if (in_header) {
       table.header_.emplace_back(text);
     } else {
@@ -104,8 +104,8 @@ CsvTable::CsvTable(const std::filesystem::path& file) : file_(file) {
   }
 }
 
-CsvTable::Column CsvTable::required(std::string_view name) const {
-  if (const auto column = optional(name)) return *column;
+CsvTable::Column CsvTable::get_required_column(std::string_view name) const {
+  if (const auto column = get_optional(name)) return *column;
   constexpr std::size_t max_names_bytes = 500;  // all columns of the program's tables
   std::string names;
   for (const std::string& have : header_) names += (names.empty() ? "" : ", ") + have;
@@ -114,7 +114,7 @@ CsvTable::Column CsvTable::required(std::string_view name) const {
       "this column is missing; the columns are: " + truncate_text(names, max_names_bytes));
 }
 
-std::optional<CsvTable::Column> CsvTable::optional(std::string_view name) const {
+std::optional<CsvTable::Column> CsvTable::get_optional(std::string_view name) const {
   const auto found = std::find(header_.begin(), header_.end(), name);
   if (found == header_.end()) {
     const std::string_view former = find_former_name(NameKind::column, name);
@@ -126,56 +126,56 @@ std::optional<CsvTable::Column> CsvTable::optional(std::string_view name) const 
   return Column{static_cast<std::size_t>(found - header_.begin())};
 }
 
-std::string_view CsvTable::text(std::size_t row, Column column) const {
+std::string_view CsvTable::get_text(std::size_t row, Column column) const {
   const std::size_t field = row * header_.size() + column.index;
   const std::size_t begin = field == 0 ? 0 : ends_[field - 1];
   return std::string_view(fields_).substr(begin, ends_[field] - begin);
 }
 
-double CsvTable::number(std::size_t row, Column column) const {
-  const auto value = parsed<double>(text(row, column));
+double CsvTable::get_number(std::size_t row, Column column) const {
+  const auto value = parse_number<double>(get_text(row, column));
   if (!value || !std::isfinite(*value)) {
-    throw error(row, column,
-                "should be a finite number, not '" + std::string(text(row, column)) + "'");
+    throw make_error(row, column,
+                     "should be a finite number, not '" + std::string(get_text(row, column)) + "'");
   }
   return *value;
 }
 
-double CsvTable::coordinate_m(std::size_t row, Column column) const {
-  const double value_m = number(row, column);
+double CsvTable::get_coordinate_m(std::size_t row, Column column) const {
+  const double value_m = get_number(row, column);
   if (std::abs(value_m) > kMaxCoordinate_m) {
-    throw error(
+    throw make_error(
         row, column,
-        "should be within 1,000 km, in meters, not '" + std::string(text(row, column)) + "'");
+        "should be within 1,000 km, in meters, not '" + std::string(get_text(row, column)) + "'");
   }
   return value_m;
 }
 
-int CsvTable::integer(std::size_t row, Column column) const {
-  const auto value = parsed<int>(text(row, column));
+int CsvTable::get_integer(std::size_t row, Column column) const {
+  const auto value = parse_number<int>(get_text(row, column));
   if (!value) {
-    throw error(row, column,
-                "should be a whole number, not '" + std::string(text(row, column)) + "'");
+    throw make_error(row, column,
+                     "should be a whole number, not '" + std::string(get_text(row, column)) + "'");
   }
   return *value;
 }
 
-std::optional<double> CsvTable::optional_number(std::size_t row,
-                                                std::optional<Column> column) const {
-  if (!column || text(row, *column).empty()) return std::nullopt;
-  return number(row, *column);
+std::optional<double> CsvTable::get_optional_number(std::size_t row,
+                                                    std::optional<Column> column) const {
+  if (!column || get_text(row, *column).empty()) return std::nullopt;
+  return get_number(row, *column);
 }
 
-InputError CsvTable::error(std::size_t row, Column column, const std::string& problem) const {
+InputError CsvTable::make_error(std::size_t row, Column column, const std::string& problem) const {
   return {file_, lines_[row], header_[column.index], problem};
 }
 
-std::string_view read_unique_name(const CsvTable& csv, std::size_t row, CsvTable::Column column,
-                                  NameIndex& names) {
-  const std::string_view name = csv.text(row, column);
-  if (name.empty()) throw csv.error(row, column, "is empty");
+std::string_view read_unique_name_of_row(const CsvTable& csv, std::size_t row,
+                                         CsvTable::Column column, NameIndex& names) {
+  const std::string_view name = csv.get_text(row, column);
+  if (name.empty()) throw csv.make_error(row, column, "is empty");
   if (!names.insert(name)) {
-    throw csv.error(row, column, "'" + std::string(name) + "' occurs twice");
+    throw csv.make_error(row, column, "'" + std::string(name) + "' occurs twice");
   }
   return name;
 }

@@ -31,23 +31,23 @@ class CsvTable {
   };
   /// Returns a column. Throws InputError if it is missing, or, also if it is optional, if the table
   /// has it under its former name.
-  Column required(std::string_view name) const;
-  std::optional<Column> optional(std::string_view name) const;
+  Column get_required_column(std::string_view name) const;
+  std::optional<Column> get_optional(std::string_view name) const;
 
   std::size_t rows() const { return lines_.size(); }
-  std::string_view text(std::size_t row, Column column) const;
+  std::string_view get_text(std::size_t row, Column column) const;
   /// Returns a finite number, or an integer. Throws InputError for other fields.
-  double number(std::size_t row, Column column) const;
-  int integer(std::size_t row, Column column) const;
+  double get_number(std::size_t row, Column column) const;
+  int get_integer(std::size_t row, Column column) const;
   /// Returns a coordinate in meters. Throws InputError also if it exceeds kMaxCoordinate_m.
-  double coordinate_m(std::size_t row, Column column) const;
+  double get_coordinate_m(std::size_t row, Column column) const;
   /// Returns a number; std::nullopt if the column is missing or the field is empty.
-  std::optional<double> optional_number(std::size_t row, std::optional<Column> column) const;
+  std::optional<double> get_optional_number(std::size_t row, std::optional<Column> column) const;
 
   /// Returns the line in the file at which a row begins, from 1.
   std::size_t line(std::size_t row) const { return lines_[row]; }
 
-  InputError error(std::size_t row, Column column, const std::string& problem) const;
+  InputError make_error(std::size_t row, Column column, const std::string& problem) const;
 
  private:
   friend struct CsvParsing;
@@ -79,7 +79,7 @@ class NameIndex {
 
 /// Returns the name in a cell and adds it to `names`. Throws InputError if it is empty or occurs in
 /// an earlier row.
-std::string_view read_unique_name(const CsvTable& csv, std::size_t row, CsvTable::Column column,
-                                  NameIndex& names);
+std::string_view read_unique_name_of_row(const CsvTable& csv, std::size_t row,
+                                         CsvTable::Column column, NameIndex& names);
 
 }  // namespace vlp

@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-std::string quoted(std::string_view field) {
+std::string quote_csv_field(std::string_view field) {
   std::string text(2 * field.size() + 2, '\0');
   text.resize(csv_write(text.data(), text.size(), field.data(), field.size()));
   return text;
@@ -38,14 +38,14 @@ void CsvWriter::write_row(std::span<const std::string_view> fields) {
   for (const std::string_view field : fields) {
     buffer_ += separator;
     separator = ",";
-    if (begins_like_formula(field) && !is_number(field)) {
+    if (begins_like_spreadsheet_formula(field) && !is_number(field)) {
       const std::string text = "'" + std::string(field);
-      buffer_ += quoted(std::string_view(text));
+      buffer_ += quote_csv_field(std::string_view(text));
       continue;
     }
     const bool plain = field.find_first_of(",\"\r\n") == std::string_view::npos &&
                        !field.starts_with(' ') && !field.ends_with(' ');
-    buffer_ += plain ? std::string(field) : quoted(field);
+    buffer_ += plain ? std::string(field) : quote_csv_field(field);
   }
   buffer_ += '\n';
   constexpr std::size_t flush_bytes = 1 << 16;
@@ -57,14 +57,14 @@ void CsvWriter::flush_buffer() {
   buffer_.clear();
 }
 
-void CsvWriter::save() {
+void CsvWriter::save_file() {
   flush_buffer();
-  file_.save();
+  file_.save_file();
 }
 
-void CsvWriter::save_unsynced() {
+void CsvWriter::save_without_fsync() {
   flush_buffer();
-  file_.save_unsynced();
+  file_.save_without_fsync();
 }
 
 }  // namespace vlp

@@ -17,16 +17,16 @@ namespace vlp {
 /// or a carriage return, and has more characters. Leading apostrophes are skipped, so that CsvTable
 /// can remove the one that CsvWriter inserts. Returns true for signed numbers, too; the caller
 /// handles these. Source: OWASP, "CSV Injection".
-constexpr bool begins_like_formula(std::string_view field) {
+constexpr bool begins_like_spreadsheet_formula(std::string_view field) {
   const auto first = field.find_first_not_of('\'');
   if (first == std::string_view::npos || first + 1 == field.size()) return false;
   return std::string_view("=+-@\t\r").find(field[first]) != std::string_view::npos;
 }
 
-/// Writer of a CSV file. Rows are buffered and written to a temporary file; save() puts it in place
-/// atomically. Fields are quoted if necessary. Text that a spreadsheet would evaluate gets a
-/// leading apostrophe (begins_like_formula()). All functions throw InputError if the file cannot be
-/// written.
+/// Writer of a CSV file. Rows are buffered and written to a temporary file; save_file() puts it in
+/// place atomically. Fields are quoted if necessary. Text that a spreadsheet would evaluate gets a
+/// leading apostrophe (begins_like_spreadsheet_formula()). All functions throw InputError if the
+/// file cannot be written.
 class CsvWriter {
  public:
   CsvWriter(const std::filesystem::path& file, std::initializer_list<std::string_view> header)
@@ -41,9 +41,9 @@ class CsvWriter {
   /// Writes a row with as many fields as the header has.
   void row(std::initializer_list<std::string_view> fields);
   void row(const std::vector<std::string>& fields);
-  void save();
-  /// See AtomicFileWriter::save_unsynced().
-  void save_unsynced();
+  void save_file();
+  /// See AtomicFileWriter::save_without_fsync().
+  void save_without_fsync();
 
  private:
   void flush_buffer();

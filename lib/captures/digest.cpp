@@ -23,7 +23,7 @@ class Sha256 {
   void add(std::string_view bytes) {
     check(EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size()));
   }
-  std::string digits() {
+  std::string to_hex_digits() {
     std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
     unsigned int size = 0;
     check(EVP_DigestFinal_ex(context_.get(), digest.data(), &size));
@@ -41,20 +41,20 @@ class Sha256 {
 
 }  // namespace
 
-std::string sha256_of_text(std::string_view text) {
+std::string compute_text_sha256(std::string_view text) {
   Sha256 sha;
   sha.add(text);
-  return sha.digits();
+  return sha.to_hex_digits();
 }
 
-std::string sha256_of_file(const std::filesystem::path& file) {
+std::string compute_file_sha256(const std::filesystem::path& file) {
   InputFile input(file, std::numeric_limits<std::size_t>::max());
   Sha256 sha;
   std::array<char, 1 << 16> block;
   while (const std::size_t count = input.read(block.data(), block.size())) {
     sha.add({block.data(), count});
   }
-  return sha.digits();
+  return sha.to_hex_digits();
 }
 
 }  // namespace vlp

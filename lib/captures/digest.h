@@ -9,10 +9,10 @@
 namespace vlp {
 
 /// Computes the SHA-256 of a text, in hexadecimal digits.
-std::string sha256_of_text(std::string_view text);
+std::string compute_text_sha256(std::string_view text);
 
 /// Computes the SHA-256 of a file's content, in hexadecimal digits. Throws InputError if it cannot
 /// be read.
-std::string sha256_of_file(const std::filesystem::path& file);
+std::string compute_file_sha256(const std::filesystem::path& file);
 
 }  // namespace vlp

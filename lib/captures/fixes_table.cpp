@@ -18,18 +18,18 @@ namespace {
 
 struct FixColumns {
   explicit FixColumns(const CsvTable& csv)
-      : pose{csv.required("x_m"), csv.required("y_m"), csv.required("z_m"),
-             csv.required("yaw_rad")},
-        sd{csv.optional("x_sd_m"), csv.optional("y_sd_m"), csv.optional("z_sd_m"),
-           csv.optional("yaw_sd_rad")},
-        noise_sd{csv.optional("x_noise_sd_m"), csv.optional("y_noise_sd_m"),
-                 csv.optional("z_noise_sd_m"), csv.optional("yaw_noise_sd_rad")},
-        residual_px(csv.optional("residual_px")),
-        time_s(csv.optional("time_s")),
-        velocity{csv.optional("vx_m_per_s"), csv.optional("vy_m_per_s")},
-        lean{csv.optional("roll_rad"), csv.optional("pitch_rad")},
-        rejected(csv.optional("rejected")),
-        outside_region(csv.optional("outside_region")) {}
+      : pose{csv.get_required_column("x_m"), csv.get_required_column("y_m"),
+             csv.get_required_column("z_m"), csv.get_required_column("yaw_rad")},
+        sd{csv.get_optional("x_sd_m"), csv.get_optional("y_sd_m"), csv.get_optional("z_sd_m"),
+           csv.get_optional("yaw_sd_rad")},
+        noise_sd{csv.get_optional("x_noise_sd_m"), csv.get_optional("y_noise_sd_m"),
+                 csv.get_optional("z_noise_sd_m"), csv.get_optional("yaw_noise_sd_rad")},
+        residual_px(csv.get_optional("residual_px")),
+        time_s(csv.get_optional("time_s")),
+        velocity{csv.get_optional("vx_m_per_s"), csv.get_optional("vy_m_per_s")},
+        lean{csv.get_optional("roll_rad"), csv.get_optional("pitch_rad")},
+        rejected(csv.get_optional("rejected")),
+        outside_region(csv.get_optional("outside_region")) {}
 
   std::array<CsvTable::Column, 4> pose;
   std::array<std::optional<CsvTable::Column>, 4> sd, noise_sd;
@@ -38,10 +38,11 @@ struct FixColumns {
   std::optional<CsvTable::Column> rejected, outside_region;
 };
 
-std::optional<Eigen::Vector2d> read_pair(
+std::optional<Eigen::Vector2d> read_optional_pair(
     const CsvTable& csv, std::size_t row,
     const std::array<std::optional<CsvTable::Column>, 2>& columns) {
-  const auto a = csv.optional_number(row, columns[0]), b = csv.optional_number(row, columns[1]);
+  const auto a = csv.get_optional_number(row, columns[0]),
+             b = csv.get_optional_number(row, columns[1]);
   if (!a || !b) return std::nullopt;
   return Eigen::Vector2d(*a, *b);
 }
@@ -52,9 +53,9 @@ std::optional<Eigen::Vector4d> read_sds(
   Eigen::Vector4d sd;
   for (int i = 0; i < 4; ++i) {
     const auto column = columns[static_cast<std::size_t>(i)];
-    const auto value = csv.optional_number(row, column);
+    const auto value = csv.get_optional_number(row, column);
     if (!value) return std::nullopt;
-    if (*value < 0) throw csv.error(row, *column, "should not be negative");
+    if (*value < 0) throw csv.make_error(row, *column, "should not be negative");
     sd[i] = *value;
   }
   return sd;
@@ -62,27 +63,28 @@ std::optional<Eigen::Vector4d> read_sds(
 
 FixRow::Fix read_fix(const CsvTable& csv, std::size_t row, const FixColumns& columns) {
   const auto [x_m, y_m, z_m, yaw_rad] = columns.pose;
-  FixRow::Fix fix{
-      {{csv.coordinate_m(row, x_m), csv.coordinate_m(row, y_m), csv.coordinate_m(row, z_m)},
-       csv.number(row, yaw_rad)},
-      read_sds(csv, row, columns.sd),
-      csv.optional_number(row, columns.residual_px).value_or(0),
-      read_sds(csv, row, columns.noise_sd)};
-  fix.velocity_m_per_s = read_pair(csv, row, columns.velocity);
-  if (const auto lean = read_pair(csv, row, columns.lean)) fix.inclination = {lean->x(), lean->y()};
+  FixRow::Fix fix{{{csv.get_coordinate_m(row, x_m), csv.get_coordinate_m(row, y_m),
+                    csv.get_coordinate_m(row, z_m)},
+                   csv.get_number(row, yaw_rad)},
+                  read_sds(csv, row, columns.sd),
+                  csv.get_optional_number(row, columns.residual_px).value_or(0),
+                  read_sds(csv, row, columns.noise_sd)};
+  fix.velocity_m_per_s = read_optional_pair(csv, row, columns.velocity);
+  if (const auto lean = read_optional_pair(csv, row, columns.lean))
+    fix.inclination = {lean->x(), lean->y()};
   return fix;
 }
 
 /// Reads ids separated by blanks.
-std::vector<int> read_ids(const CsvTable& csv, std::size_t row, CsvTable::Column column) {
+std::vector<int> read_id_list(const CsvTable& csv, std::size_t row, CsvTable::Column column) {
   std::vector<int> ids;
-  std::string_view remaining = csv.text(row, column);
+  std::string_view remaining = csv.get_text(row, column);
   while (!remaining.empty()) {
     const std::string_view word = remaining.substr(0, remaining.find(' '));
     int id = 0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), id);
     if (error != std::errc() || end != word.data() + word.size()) {
-      throw csv.error(row, column, "should be ids of lamps, separated by blanks");
+      throw csv.make_error(row, column, "should be ids of lamps, separated by blanks");
     }
     ids.push_back(id);
     remaining.remove_prefix(std::min(remaining.size(), word.size() + 1));
@@ -99,24 +101,26 @@ struct AddedColumn {
   std::string (*text)(const FixRow&);
 };
 
-std::string format_time(const FixRow& row) { return row.time_s ? fixed(*row.time_s, kDigits) : ""; }
+std::string format_time(const FixRow& row) {
+  return row.time_s ? format_fixed_decimals(*row.time_s, kDigits) : "";
+}
 
 template <int axis>
 std::string format_noise_sd(const FixRow& row) {
   if (!row.fix || !row.fix->noise_sd) return "";
-  return significant((*row.fix->noise_sd)[axis], kSdDigits);
+  return format_significant_digits((*row.fix->noise_sd)[axis], kSdDigits);
 }
 
 template <int axis>
 std::string format_velocity(const FixRow& row) {
   if (!row.fix || !row.fix->velocity_m_per_s) return "";
-  return fixed((*row.fix->velocity_m_per_s)[axis], kDigits);
+  return format_fixed_decimals((*row.fix->velocity_m_per_s)[axis], kDigits);
 }
 
 template <double Inclination::*angle>
-std::string format_lean(const FixRow& row) {
+std::string format_roll_pitch(const FixRow& row) {
   if (!row.fix || !row.fix->inclination) return "";
-  return fixed((*row.fix->inclination).*angle, kDigits);
+  return format_fixed_decimals((*row.fix->inclination).*angle, kDigits);
 }
 
 template <std::vector<int> FixRow::*lamps>
@@ -137,8 +141,8 @@ constexpr std::array<AddedColumn, 11> kAddedColumns{
      {"yaw_noise_sd_rad", format_noise_sd<3>},
      {"vx_m_per_s", format_velocity<0>},
      {"vy_m_per_s", format_velocity<1>},
-     {"roll_rad", format_lean<&Inclination::roll_rad>},
-     {"pitch_rad", format_lean<&Inclination::pitch_rad>},
+     {"roll_rad", format_roll_pitch<&Inclination::roll_rad>},
+     {"pitch_rad", format_roll_pitch<&Inclination::pitch_rad>},
      {"rejected", format_ids<&FixRow::rejected>},
      {"outside_region", format_ids<&FixRow::outside_region>}}};
 
@@ -170,40 +174,42 @@ void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& r
       const std::array<double, 4> pose{position_m.x(), position_m.y(), position_m.z(),
                                        fix->pose.yaw_rad};
       for (std::size_t i = 0; i < 4; ++i) {
-        fields[2 + i] = fixed(pose[i], kDigits);
-        if (fix->sd) fields[6 + i] = significant((*fix->sd)[static_cast<int>(i)], kSdDigits);
+        fields[2 + i] = format_fixed_decimals(pose[i], kDigits);
+        if (fix->sd)
+          fields[6 + i] = format_significant_digits((*fix->sd)[static_cast<int>(i)], kSdDigits);
       }
-      fields[11] = significant(fix->residual_px, kSdDigits);
+      fields[11] = format_significant_digits(fix->residual_px, kSdDigits);
     }
     for (const AddedColumn& column : added) fields.push_back(column.text(row));
     csv.row(fields);
   }
-  csv.save();
+  csv.save_file();
 }
 
 std::vector<FixRow> read_fixes(const std::filesystem::path& file) {
   const CsvTable csv(file);
-  const auto image = csv.required("image"), status = csv.required("status");
-  const auto lamps = csv.optional("lamps");
+  const auto image = csv.get_required_column("image"), status = csv.get_required_column("status");
+  const auto lamps = csv.get_optional("lamps");
   const FixColumns columns(csv);
   NameIndex images(csv.rows());
   std::vector<FixRow> rows;
   rows.reserve(csv.rows());
   for (std::size_t row = 0; row < csv.rows(); ++row) {
-    const auto name = read_unique_name(csv, row, image, images);
+    const auto name = read_unique_name_of_row(csv, row, image, images);
     FixRow& read = rows.emplace_back(FixRow{std::string(name),
-                                            std::string(csv.text(row, status)),
+                                            std::string(csv.get_text(row, status)),
                                             {},
-                                            lamps ? csv.integer(row, *lamps) : 0,
+                                            lamps ? csv.get_integer(row, *lamps) : 0,
                                             csv.line(row)});
-    if (read.status.empty()) throw csv.error(row, status, "is empty");
-    if (utf8_length(read.status) != read.status.size()) {
-      throw csv.error(row, status, "should be UTF-8");
+    if (read.status.empty()) throw csv.make_error(row, status, "is empty");
+    if (count_utf8_characters(read.status) != read.status.size()) {
+      throw csv.make_error(row, status, "should be UTF-8");
     }
     if (read.status == "ok") read.fix = read_fix(csv, row, columns);
-    if (columns.rejected) read.rejected = read_ids(csv, row, *columns.rejected);
-    if (columns.outside_region) read.outside_region = read_ids(csv, row, *columns.outside_region);
-    read.time_s = csv.optional_number(row, columns.time_s);
+    if (columns.rejected) read.rejected = read_id_list(csv, row, *columns.rejected);
+    if (columns.outside_region)
+      read.outside_region = read_id_list(csv, row, *columns.outside_region);
+    read.time_s = csv.get_optional_number(row, columns.time_s);
   }
   if (rows.empty()) throw InputError(file, "contains no fix");
   return rows;

@@ -19,9 +19,9 @@ class Id {
   Id(std::string text, const std::filesystem::path& source, std::string_view kind);
 
   /// Returns true if a text is an id.
-  static bool accepts(std::string_view text);
+  static bool is_valid_id(std::string_view text);
 
-  const std::string& text() const { return text_; }
+  const std::string& get_text() const { return text_; }
 
  private:
   std::string text_;

@@ -6,8 +6,12 @@
 
 namespace vlp {
 
-std::string fixed(double value, int digits) { return fmt::format("{:.{}f}", value, digits); }
+std::string format_fixed_decimals(double value, int digits) {
+  return fmt::format("{:.{}f}", value, digits);
+}
 
-std::string significant(double value, int digits) { return fmt::format("{:.{}g}", value, digits); }
+std::string format_significant_digits(double value, int digits) {
+  return fmt::format("{:.{}g}", value, digits);
+}
 
 }  // namespace vlp

@@ -7,8 +7,8 @@
 namespace vlp {
 
 /// Formats a number with `digits` digits after the point.
-std::string fixed(double value, int digits);
+std::string format_fixed_decimals(double value, int digits);
 /// Formats a number with `digits` significant digits.
-std::string significant(double value, int digits);
+std::string format_significant_digits(double value, int digits);
 
 }  // namespace vlp

@@ -10,11 +10,11 @@ namespace vlp {
 /// Escapes a text with untrusted names for a terminal or a log. Control characters, including those
 /// of ISO 6429 beyond ASCII, marks of direction, line separators, noncharacters and bytes that are
 /// not UTF-8 become \xNN per byte. Line ends and tabulators stay.
-std::string printable(std::string_view text);
+std::string escape_for_terminal(std::string_view text);
 
-/// Escapes a text as printable(), and line ends and tabulators, too. An untrusted name therefore
-/// cannot add a line to a list.
-std::string printable_line(std::string_view text);
+/// Escapes a text as escape_for_terminal(), and line ends and tabulators, too. An untrusted name
+/// therefore cannot add a line to a list.
+std::string escape_for_single_line(std::string_view text);
 
 /// Returns the longest prefix of a UTF-8 text with at most `max_bytes` bytes and no truncated
 /// character.

@@ -54,7 +54,7 @@ SharedFolder::~SharedFolder() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-void SharedFolder::check_place() const {
+void SharedFolder::check_folder_not_replaced() const {
   const auto present = read_status(AT_FDCWD, path_.string());
   struct stat opened {};
   if (present && ::fstat(descriptor_, &opened) == 0 && present->st_dev == opened.st_dev &&
@@ -68,7 +68,7 @@ fs::path SharedFolder::opened_path() const {
   return "/proc/self/fd/" + std::to_string(descriptor_);
 }
 
-fs::path SharedFolder::checked(const std::string& name) const {
+fs::path SharedFolder::checked_entry_path(const std::string& name) const {
   const bool is_one_part = !name.empty() && name != "." && name != ".." &&
                            name.find('/') == std::string::npos &&
                            name.find('\0') == std::string::npos;
@@ -76,35 +76,35 @@ fs::path SharedFolder::checked(const std::string& name) const {
   return path_ / name;
 }
 
-std::optional<SharedFolder> SharedFolder::find_folder(const Id& name) const {
-  fs::path path = path_ / name.text();
-  const int found = ::openat(descriptor_, name.text().c_str(), kFolderFlags | O_NOFOLLOW);
+std::optional<SharedFolder> SharedFolder::open_subfolder_if_exists(const Id& name) const {
+  fs::path path = path_ / name.get_text();
+  const int found = ::openat(descriptor_, name.get_text().c_str(), kFolderFlags | O_NOFOLLOW);
   if (found >= 0) return SharedFolder(std::move(path), found);
   const int reason = errno;
-  const auto status = read_status(descriptor_, name.text());
+  const auto status = read_status(descriptor_, name.get_text());
   if (!status) return std::nullopt;
   if (S_ISLNK(status->st_mode)) throw InputError(path, kLink);
   errno = reason;
   fail(path, "cannot be opened");
 }
 
-SharedFolder SharedFolder::make_folder(const Id& name) const {
+SharedFolder SharedFolder::make_subfolder(const Id& name) const {
   constexpr mode_t mode = 0777;
-  const int made = ::mkdirat(descriptor_, name.text().c_str(), mode);
+  const int made = ::mkdirat(descriptor_, name.get_text().c_str(), mode);
   const int reason = errno;
-  auto folder = find_folder(name);
+  auto folder = open_subfolder_if_exists(name);
   if (folder) return std::move(*folder);
   errno = made == 0 ? ENOENT : reason;
-  fail(path_ / name.text(), "cannot be made");
+  fail(path_ / name.get_text(), "cannot be made");
 }
 
-bool SharedFolder::has(const std::string& name) const {
-  checked(name);
+bool SharedFolder::contains_entry(const std::string& name) const {
+  checked_entry_path(name);
   return read_status(descriptor_, name).has_value();
 }
 
 int SharedFolder::open(const std::string& name, int flags) const {
-  const fs::path path = checked(name);
+  const fs::path path = checked_entry_path(name);
   constexpr mode_t mode = 0666;
   // Without waiting for the other end of a pipe.
   const int descriptor =
@@ -125,7 +125,7 @@ int SharedFolder::open(const std::string& name, int flags) const {
 
 std::optional<std::string> SharedFolder::read(const std::string& name,
                                               std::size_t max_bytes) const {
-  const fs::path path = checked(name);
+  const fs::path path = checked_entry_path(name);
   const int descriptor = open(name, O_RDONLY);
   if (descriptor < 0) {
     if (errno == ENOENT) return std::nullopt;
@@ -135,34 +135,34 @@ std::optional<std::string> SharedFolder::read(const std::string& name,
   return read_file(file);
 }
 
-void SharedFolder::replace(const std::string& name, std::string_view content) const {
-  AtomicFileWriter file(opened_path(), name, checked(name));
+void SharedFolder::replace_file(const std::string& name, std::string_view content) const {
+  AtomicFileWriter file(opened_path(), name, checked_entry_path(name));
   file.write(content);
-  file.save();
+  file.save_file();
 }
 
-bool SharedFolder::rename(const std::string& from, const std::string& to) const {
-  const fs::path path = checked(from);
-  checked(to);
+bool SharedFolder::rename_file(const std::string& from, const std::string& to) const {
+  const fs::path path = checked_entry_path(from);
+  checked_entry_path(to);
   if (::renameat(descriptor_, from.c_str(), descriptor_, to.c_str()) == 0) return true;
   if (errno == ENOENT) return false;
   fail(path, "cannot be renamed");
 }
 
-void SharedFolder::remove(const std::string& name) const {
-  const fs::path path = checked(name);
+void SharedFolder::remove_file(const std::string& name) const {
+  const fs::path path = checked_entry_path(name);
   if (::unlinkat(descriptor_, name.c_str(), 0) != 0 && errno != ENOENT) {
     fail(path, "cannot be removed");
   }
 }
 
-void SharedFolder::remove_folder(const Id& name) const {
-  if (::unlinkat(descriptor_, name.text().c_str(), AT_REMOVEDIR) != 0) {
-    fail(path_ / name.text(), "cannot be deleted");
+void SharedFolder::remove_subfolder(const Id& name) const {
+  if (::unlinkat(descriptor_, name.get_text().c_str(), AT_REMOVEDIR) != 0) {
+    fail(path_ / name.get_text(), "cannot be deleted");
   }
 }
 
-void SharedFolder::remove_content() const {
+void SharedFolder::remove_all_entries() const {
   std::error_code error;
   std::vector<fs::path> entries;
   for (fs::directory_iterator entry(opened_path(), error);
@@ -175,7 +175,7 @@ void SharedFolder::remove_content() const {
   if (error) throw InputError(path_, "cannot be deleted: " + error.message());
 }
 
-void check_json_bounds(std::string_view text) {
+void check_json_size_and_depth(std::string_view text) {
   constexpr std::size_t max_levels = 16, max_values = 1'000'000;
   std::size_t levels = 0, values = 0;
   bool is_in_string = false;

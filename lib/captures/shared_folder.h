@@ -27,36 +27,36 @@ class SharedFolder {
   const std::filesystem::path& path() const { return path_; }
   /// Checks that the path of a folder, made or found in another one, still leads to it, and not by
   /// a link.
-  void check_place() const;
+  void check_folder_not_replaced() const;
 
   /// Opens a folder in this one. Returns std::nullopt if it does not exist.
-  std::optional<SharedFolder> find_folder(const Id& name) const;
+  std::optional<SharedFolder> open_subfolder_if_exists(const Id& name) const;
   /// Opens a folder in this one, and creates it first if it does not exist.
-  SharedFolder make_folder(const Id& name) const;
+  SharedFolder make_subfolder(const Id& name) const;
 
   /// Returns true if an entry of this name exists, including a symbolic link.
-  bool has(const std::string& name) const;
+  bool contains_entry(const std::string& name) const;
   /// Reads a regular file. Returns std::nullopt if it does not exist. Throws if it is a link, a
   /// pipe or a device, or longer than `max_bytes`.
   std::optional<std::string> read(const std::string& name, std::size_t max_bytes) const;
   /// Replaces or creates a file atomically: a temporary file, fsync, rename. Mode and owner of a
   /// replaced regular file are kept. A link is replaced and not followed.
-  void replace(const std::string& name, std::string_view content) const;
+  void replace_file(const std::string& name, std::string_view content) const;
   /// Opens a regular file with the flags of open(2). Returns -1 if it cannot be opened; throws if
   /// it is a link, a pipe or a device.
   int open(const std::string& name, int flags) const;
   /// Renames a file within the folder. Returns false if it does not exist.
-  bool rename(const std::string& from, const std::string& to) const;
+  bool rename_file(const std::string& from, const std::string& to) const;
   /// Removes a file if it exists.
-  void remove(const std::string& name) const;
+  void remove_file(const std::string& name) const;
   /// Removes all entries of the folder, including its folders. Of a link, only the link is removed.
-  void remove_content() const;
+  void remove_all_entries() const;
   /// Removes an empty folder in this one.
-  void remove_folder(const Id& name) const;
+  void remove_subfolder(const Id& name) const;
 
  private:
   SharedFolder(std::filesystem::path path, int descriptor);
-  std::filesystem::path checked(const std::string& name) const;
+  std::filesystem::path checked_entry_path(const std::string& name) const;
   /// Returns a path of the open folder, whose name may refer to another one by now.
   std::filesystem::path opened_path() const;
 
@@ -67,6 +67,6 @@ class SharedFolder {
 /// Checks that a JSON text from an untrusted source has at most 16 levels and a million values.
 /// Call it before parsing: a parser needs 100 bytes for a value of two bytes of text. Values in
 /// strings do not count. Throws std::runtime_error with the bound that is exceeded.
-void check_json_bounds(std::string_view text);
+void check_json_size_and_depth(std::string_view text);
 
 }  // namespace vlp

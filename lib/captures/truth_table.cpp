@@ -9,28 +9,28 @@
 
 namespace vlp {
 
-std::vector<TruthRow> read_truth(const std::filesystem::path& file) {
+std::vector<TruthRow> read_truth_table(const std::filesystem::path& file) {
   const CsvTable csv(file);
-  const auto image = csv.required("image");
-  const auto x_m = csv.required("x_m"), y_m = csv.required("y_m");
-  const auto z_m = csv.optional("z_m"), yaw_rad = csv.optional("yaw_rad");
+  const auto image = csv.get_required_column("image");
+  const auto x_m = csv.get_required_column("x_m"), y_m = csv.get_required_column("y_m");
+  const auto z_m = csv.get_optional("z_m"), yaw_rad = csv.get_optional("yaw_rad");
   NameIndex images(csv.rows());
   std::vector<TruthRow> rows;
   rows.reserve(csv.rows());
   for (std::size_t row = 0; row < csv.rows(); ++row) {
-    const auto name = read_unique_name(csv, row, image, images);
+    const auto name = read_unique_name_of_row(csv, row, image, images);
     TruthRow& read = rows.emplace_back();
     read.image = name;
-    read.xy_m = {csv.coordinate_m(row, x_m), csv.coordinate_m(row, y_m)};
-    if (z_m && !csv.text(row, *z_m).empty()) read.z_m = csv.coordinate_m(row, *z_m);
-    read.yaw_rad = csv.optional_number(row, yaw_rad);
+    read.xy_m = {csv.get_coordinate_m(row, x_m), csv.get_coordinate_m(row, y_m)};
+    if (z_m && !csv.get_text(row, *z_m).empty()) read.z_m = csv.get_coordinate_m(row, *z_m);
+    read.yaw_rad = csv.get_optional_number(row, yaw_rad);
     read.line = csv.line(row);
   }
   if (rows.empty()) throw InputError(file, "contains no position");
   return rows;
 }
 
-NearestOnPath find_nearest_on_path(const Path& path, const Eigen::Vector2d& position_m) {
+NearestOnPath find_nearest_point_on_path(const Path& path, const Eigen::Vector2d& position_m) {
   NearestOnPath nearest{path.waypoints_m.front(), {}};
   double min_squared_distance = std::numeric_limits<double>::infinity();
   std::size_t leg = 0;
@@ -54,14 +54,14 @@ NearestOnPath find_nearest_on_path(const Path& path, const Eigen::Vector2d& posi
   return nearest;
 }
 
-Path read_path(const std::filesystem::path& file) {
+Path read_path_table(const std::filesystem::path& file) {
   const CsvTable csv(file);
-  const auto x_m = csv.required("x_m"), y_m = csv.required("y_m");
-  const auto z_m = csv.optional("z_m");
+  const auto x_m = csv.get_required_column("x_m"), y_m = csv.get_required_column("y_m");
+  const auto z_m = csv.get_optional("z_m");
   Path path;
   for (std::size_t row = 0; row < csv.rows(); ++row) {
-    path.waypoints_m.emplace_back(csv.coordinate_m(row, x_m), csv.coordinate_m(row, y_m));
-    if (z_m) path.z_m.push_back(csv.coordinate_m(row, *z_m));
+    path.waypoints_m.emplace_back(csv.get_coordinate_m(row, x_m), csv.get_coordinate_m(row, y_m));
+    if (z_m) path.z_m.push_back(csv.get_coordinate_m(row, *z_m));
   }
   const bool leads_somewhere =
       std::any_of(path.waypoints_m.begin(), path.waypoints_m.end(),

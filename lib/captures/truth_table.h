@@ -24,7 +24,7 @@ struct TruthRow {
 /// be empty.
 /// @throws InputError as CsvTable; if a coordinate exceeds kMaxCoordinate_m; if an image name is
 /// empty or occurs twice; if there are no rows
-std::vector<TruthRow> read_truth(const std::filesystem::path& file);
+std::vector<TruthRow> read_truth_table(const std::filesystem::path& file);
 
 /// A polyline in the world with at least two waypoints.
 struct Path {
@@ -41,11 +41,11 @@ struct NearestOnPath {
 };
 
 /// Returns the point of a path closest to a position.
-NearestOnPath find_nearest_on_path(const Path& path, const Eigen::Vector2d& position_m);
+NearestOnPath find_nearest_point_on_path(const Path& path, const Eigen::Vector2d& position_m);
 
 /// Reads a path. Columns: x_m, y_m and, optionally, z_m.
 /// @throws InputError as CsvTable; if a coordinate exceeds kMaxCoordinate_m; if there are fewer
 /// than two waypoints, or all coincide
-Path read_path(const std::filesystem::path& file);
+Path read_path_table(const std::filesystem::path& file);
 
 }  // namespace vlp

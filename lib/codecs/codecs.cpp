@@ -14,14 +14,14 @@ const Codecs& load_codecs() {
   // Binding the functions of all its libraries at once takes 15 ms.
   // POSIX allows the conversion of a symbol's address to a function pointer.
   const auto make = reinterpret_cast<Make>(  // NOLINT
-      load_function(VLP_CODECS_LIBRARY, "vlp_codecs", "images cannot be read or written",
-                    RTLD_LAZY));
+      load_library_function(VLP_CODECS_LIBRARY, "vlp_codecs", "images cannot be read or written",
+                            RTLD_LAZY));
   return *make();
 }
 
 }  // namespace
 
-const Codecs& codecs() {
+const Codecs& get_codecs() {
   static const Codecs& loaded = load_codecs();
   return loaded;
 }

@@ -22,8 +22,8 @@ class VideoReader {
   VideoReader& operator=(const VideoReader&) = delete;
 
   virtual bool open(const std::string& source, int api) = 0;
-  virtual bool grab() = 0;
-  virtual bool retrieve(cv::Mat& frame) = 0;
+  virtual bool grab_frame() = 0;
+  virtual bool retrieve_frame(cv::Mat& frame) = 0;
   virtual double get(int property) const = 0;
   virtual void set(int property, double value) = 0;
 };
@@ -40,15 +40,15 @@ class Codecs {
   /// Decodes the bytes of an image file with the flags of cv::imread. The bytes are not changed.
   /// Returns an empty matrix if they cannot be decoded.
   /// @throws cv::Exception as cv::imdecode does
-  virtual cv::Mat decode(std::string& bytes, int flags) const = 0;
+  virtual cv::Mat decode_image(std::string& bytes, int flags) const = 0;
 
   /// Encodes an image as the bytes of a file.
   ///
   /// @param ending      file name extension, for example ".png"
   /// @param parameters  as for cv::imwrite
   /// @throws            std::runtime_error if the image cannot be encoded
-  virtual std::string encode(const std::string& ending, const cv::Mat& image,
-                             const std::vector<int>& parameters) const = 0;
+  virtual std::string encode_image_file(const std::string& ending, const cv::Mat& image,
+                                        const std::vector<int>& parameters) const = 0;
 
   /// Returns true if this backend of cv::VideoCapture can read videos, for example cv::CAP_FFMPEG.
   virtual bool has_video_backend(int api) const = 0;
@@ -58,6 +58,6 @@ class Codecs {
 
 /// Returns the codecs. Loads their library at the first call.
 /// @throws std::runtime_error if the library cannot be loaded
-const Codecs& codecs();
+const Codecs& get_codecs();
 
 }  // namespace vlp

@@ -15,7 +15,7 @@ namespace vlp {
 /// @param binding   RTLD_NOW; or RTLD_LAZY to bind functions when they are called, which starts
 ///                  faster, but ends the process if one is missing
 /// @throws std::runtime_error if the library cannot be loaded or lacks the function
-void* load_function(const char* library, const char* function, const std::string& problem,
-                    int binding);
+void* load_library_function(const char* library, const char* function, const std::string& problem,
+                            int binding);
 
 }  // namespace vlp

@@ -13,8 +13,8 @@ namespace {
 class OpencvVideoReader : public VideoReader {
  public:
   bool open(const std::string& source, int api) override { return video_.open(source, api); }
-  bool grab() override { return video_.grab(); }
-  bool retrieve(cv::Mat& frame) override { return video_.retrieve(frame); }
+  bool grab_frame() override { return video_.grab(); }
+  bool retrieve_frame(cv::Mat& frame) override { return video_.retrieve(frame); }
   double get(int property) const override { return video_.get(property); }
   void set(int property, double value) override { video_.set(property, value); }
 
@@ -24,12 +24,12 @@ class OpencvVideoReader : public VideoReader {
 
 class OpencvCodecs : public Codecs {
  public:
-  cv::Mat decode(std::string& bytes, int flags) const override {
+  cv::Mat decode_image(std::string& bytes, int flags) const override {
     return cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8U, bytes.data()), flags);
   }
 
-  std::string encode(const std::string& ending, const cv::Mat& image,
-                     const std::vector<int>& parameters) const override {
+  std::string encode_image_file(const std::string& ending, const cv::Mat& image,
+                                const std::vector<int>& parameters) const override {
     std::vector<unsigned char> bytes;
     if (!cv::imencode(ending, image, bytes, parameters)) {
       throw std::runtime_error("the image cannot be encoded as " + ending);
@@ -49,7 +49,7 @@ class OpencvCodecs : public Codecs {
 }  // namespace
 }  // namespace vlp
 
-/// The function that codecs() calls.
+/// The function that get_codecs() calls.
 extern "C" __attribute__((visibility("default"))) const vlp::Codecs* vlp_codecs() {
   static const vlp::OpencvCodecs codecs;
   return &codecs;

@@ -19,9 +19,9 @@ Path make_reference_path(const EvaluationInput& input) {
 void add_horizontal(Evaluation& evaluation, const std::vector<FixError>& errors, int threads) {
   auto [sizes_m, clusters] =
       collect_component(errors, [](const FixError& error) { return error.horizontal_m.norm(); });
-  evaluation.intervals_m = compute_error_intervals(sizes_m, clusters, threads);
+  evaluation.intervals_m = bootstrap_error_intervals(sizes_m, clusters, threads);
   evaluation.horizontal_m = compute_error_statistics(sizes_m);
-  evaluation.distribution_m = compute_distribution(std::move(sizes_m));
+  evaluation.distribution_m = compute_percentiles(std::move(sizes_m));
 }
 
 std::optional<SignedErrorStatistics> compute_signed_statistics(
@@ -33,29 +33,29 @@ std::optional<SignedErrorStatistics> compute_signed_statistics(
 
 void add_comparison(Evaluation& evaluation, const EvaluationInput& input,
                     const std::vector<FixError>& errors) {
-  if (!input.truth) check_same_images(input.fixes, *input.others);
-  const FixErrors others = compute_errors(input, *input.others);
-  evaluation.comparison =
-      compare(input.fixes.rows, errors, input.others->rows, others.errors, input.threads);
+  if (!input.truth) check_same_images_in_fixes(input.fixes, *input.others);
+  const FixErrors others = compute_fix_errors(input, *input.others);
+  evaluation.comparison = compare_horizontal_errors(input.fixes.rows, errors, input.others->rows,
+                                                    others.errors, input.threads);
 }
 
 /// Returns the lower end of the difference's interval, negative if the fixes may be better. Returns
 /// 0 for too few clusters, and for a positive difference too small to matter.
-double compute_worsening_m(const Comparison& comparison) {
-  if (comparison.too_few()) return 0;
+double compute_loss_against_reference_m(const Comparison& comparison) {
+  if (comparison.has_too_few_clusters()) return 0;
   const double low_m = comparison.interval_m->low;
   return low_m > 0 && low_m <= comparison.min_relevant_m ? 0 : low_m;
 }
 
 }  // namespace
 
-FixErrors compute_errors(const EvaluationInput& input, const FromFile<FixRow>& fixes) {
-  if (input.truth) return errors_against_truth(fixes, *input.truth, input.station_m);
-  return errors_against_path(fixes.rows, make_reference_path(input));
+FixErrors compute_fix_errors(const EvaluationInput& input, const FromFile<FixRow>& fixes) {
+  if (input.truth) return compute_errors_against_truth(fixes, *input.truth, input.station_m);
+  return compute_errors_against_path(fixes.rows, make_reference_path(input));
 }
 
 Evaluation evaluate(const EvaluationInput& input) {
-  const auto [captures, missing, errors] = compute_errors(input, input.fixes);
+  const auto [captures, missing, errors] = compute_fix_errors(input, input.fixes);
   Evaluation evaluation;
   evaluation.reference = input.truth ? "truth" : input.path ? "path" : "line";
   evaluation.captures = captures;
@@ -67,7 +67,7 @@ Evaluation evaluate(const EvaluationInput& input) {
   evaluation.yaw_rad = compute_signed_statistics(errors, &FixError::yaw_rad);
   evaluation.resampling_unit = "runs of fixes";
   if (input.truth) {
-    evaluation.stations = compute_bias_and_scatter(errors, input.truth->rows);
+    evaluation.stations = compute_bias_and_repeatability(errors, input.truth->rows);
     evaluation.resampling_unit = evaluation.stations ? "stations" : "captures";
     evaluation.normalized_errors = compute_normalized_errors(input.fixes.rows, errors);
   }
@@ -76,12 +76,12 @@ Evaluation evaluate(const EvaluationInput& input) {
     evaluation.limit =
         compute_crlb_ratio(errors, input.truth->rows, lamps, camera, noise_px, input.threads);
   }
-  if (input.line_m) evaluation.fit = fit_line(input.fixes.rows, *input.line_m);
+  if (input.line_m) evaluation.fit = fit_line_to_fixes(input.fixes.rows, *input.line_m);
   if (input.others) add_comparison(evaluation, input, errors);
   return evaluation;
 }
 
-std::vector<Metric> collect_metrics(const Evaluation& evaluation) {
+std::vector<Metric> collect_evaluation_metrics(const Evaluation& evaluation) {
   std::vector<Metric> metrics;
   const auto add = [&](const char* name, double value) { metrics.push_back({name, value}); };
   const auto add_mm = [&](const char* name, double value_m) { add(name, 1e3 * value_m); };
@@ -107,7 +107,7 @@ std::vector<Metric> collect_metrics(const Evaluation& evaluation) {
     add_mm("fitted_max_mm", fit->distances_m.max);
   }
   if (const auto& comparison = evaluation.comparison; comparison && comparison->pairs > 0) {
-    add_mm("worse_mm", compute_worsening_m(*comparison));
+    add_mm("worse_mm", compute_loss_against_reference_m(*comparison));
   }
   return metrics;
 }

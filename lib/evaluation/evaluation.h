@@ -58,7 +58,7 @@ struct Evaluation {
   std::string resampling_unit;
   std::optional<SignedErrorStatistics> height_m, yaw_rad;
   /// Only with a ground truth, if reference points have two fixes or more.
-  std::optional<BiasAndScatter> stations;
+  std::optional<BiasAndRepeatability> stations;
   /// Only with a commanded line, if the fixes determine a direction.
   std::optional<LineFit> fit;
   /// Only with a ground truth.
@@ -69,7 +69,7 @@ struct Evaluation {
 
 /// Computes the errors of single fixes against the reference of `input`.
 /// @throws InputError if image names do not match
-FixErrors compute_errors(const EvaluationInput& input, const FromFile<FixRow>& fixes);
+FixErrors compute_fix_errors(const EvaluationInput& input, const FromFile<FixRow>& fixes);
 
 /// Evaluates the fixes of `input`.
 /// @throws InputError if image names do not match
@@ -77,6 +77,6 @@ Evaluation evaluate(const EvaluationInput& input);
 
 /// Returns the metrics of MetricSource::evaluation and ::reference that were measured, in their
 /// order.
-std::vector<Metric> collect_metrics(const Evaluation& evaluation);
+std::vector<Metric> collect_evaluation_metrics(const Evaluation& evaluation);
 
 }  // namespace vlp

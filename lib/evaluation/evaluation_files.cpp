@@ -50,7 +50,7 @@ Json to_json(const std::vector<std::pair<double, double>>& distribution_m) {
   return points;
 }
 
-Json to_json(const BiasAndScatter& statistics) {
+Json to_json(const BiasAndRepeatability& statistics) {
   Json list = Json::array();
   for (const auto& station : statistics.stations) {
     list.push_back({{"x_m", station.xy_m.x()},
@@ -90,15 +90,18 @@ Json to_json(const NormalizedErrors& normalized_errors) {
 }
 
 Json to_json(const Comparison& comparison) {
-  Json json{{"verdict", comparison.verdict()},       {"pairs", comparison.pairs},
-            {"clusters", comparison.clusters},       {"only_these", comparison.only_these},
-            {"only_others", comparison.only_others}, {"smaller_errors", comparison.smaller},
+  Json json{{"verdict", comparison.comparison_verdict()},
+            {"pairs", comparison.pairs},
+            {"clusters", comparison.clusters},
+            {"only_these", comparison.only_these},
+            {"only_others", comparison.only_others},
+            {"smaller_errors", comparison.smaller},
             {"larger_errors", comparison.larger}};
   if (comparison.pairs > 0) {
     json["mean_difference_mm"] = kMmKeys.factor * comparison.mean_difference_m;
   }
   json["min_relevant_difference_mm"] = kMmKeys.factor * comparison.min_relevant_m;
-  if (comparison.too_few()) json["reason"] = "too few clusters";
+  if (comparison.has_too_few_clusters()) json["reason"] = "too few clusters";
   if (comparison.interval_m) json["interval_95_mm"] = to_json(*comparison.interval_m);
   return json;
 }
@@ -111,12 +114,12 @@ Json to_json(const std::vector<CheckedMetric>& gates) {
                     {"value", gate.value ? Json(*gate.value) : Json(nullptr)},
                     {"limit", gate.limit.value()},
                     {"direction", describe(gate.direction)},
-                    {"passed", gate.passed()}});
+                    {"passed", gate.has_passed()}});
   }
   return list;
 }
 
-bool failed(const CheckedMetric& gate) { return !gate.passed(); }
+bool is_gate_failed(const CheckedMetric& gate) { return !gate.has_passed(); }
 
 }  // namespace
 
@@ -147,12 +150,12 @@ std::string to_json(const Evaluation& evaluation, const std::vector<CheckedMetri
   if (evaluation.limit) {
     json["limit"] = {{"ratio", evaluation.limit->horizontal},
                      {"limit_rms_mm", kMmKeys.factor * evaluation.limit->limit_m},
-                     {"beaten", evaluation.limit->is_below_limit()},
+                     {"beaten", evaluation.limit->is_below_crlb()},
                      {"fixes", evaluation.limit->fixes}};
   }
   if (evaluation.comparison) json["comparison"] = to_json(*evaluation.comparison);
   json["gates"] = to_json(gates);
-  json["passed"] = std::none_of(gates.begin(), gates.end(), failed);
+  json["passed"] = std::none_of(gates.begin(), gates.end(), is_gate_failed);
   return json.dump(2) + "\n";
 }
 

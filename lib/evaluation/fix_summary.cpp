@@ -10,7 +10,7 @@
 
 namespace vlp {
 
-FixSummary summarize(std::span<const FixRow> rows) {
+FixSummary summarize_fixes(std::span<const FixRow> rows) {
   FixSummary summary;
   summary.frames = rows.size();
   std::vector<double> residual_px, horizontal_m, height_m, yaw_rad;

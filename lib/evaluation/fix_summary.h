@@ -34,6 +34,6 @@ struct FixSummary {
 };
 
 /// Summarizes fixes.
-FixSummary summarize(std::span<const FixRow> rows);
+FixSummary summarize_fixes(std::span<const FixRow> rows);
 
 }  // namespace vlp

@@ -25,20 +25,22 @@ std::string join_names(const std::vector<MetricKind>& known) {
 }
 
 std::string with_unit(double value, const std::string& unit) {
-  return significant(value, kDigits) + (unit.empty() ? "" : " " + unit);
+  return format_significant_digits(value, kDigits) + (unit.empty() ? "" : " " + unit);
 }
 
 /// Returns an error message on an invalid limit; empty if it is valid.
 std::string describe_invalid_limit(const MetricKind& kind, double limit) {
   constexpr int digits = 6;
-  const std::string text = significant(limit, digits);
+  const std::string text = format_significant_digits(limit, digits);
   if (limit < 0) return "should not be negative, as no metric is below zero: " + text;
   if (limit <= kind.largest) return "";
   if (kind.largest > 1) {
     return "should be at most " + with_unit(kind.largest, kind.unit) + ", not " + text;
   }
   return "should be a fraction from 0 to 1, not " + text +
-         (limit > 100 ? "" : ": for " + text + " % say " + significant(limit / 100, digits));
+         (limit > 100
+              ? ""
+              : ": for " + text + " % say " + format_significant_digits(limit / 100, digits));
 }
 
 CheckedMetric make_checked_metric(const MetricKind& kind, const std::vector<Metric>& metrics) {
@@ -52,7 +54,7 @@ double CheckedMetric::acceptance_limit() const {
   return direction == Direction::at_least ? limit.value() + width : limit.value() - width;
 }
 
-bool CheckedMetric::passed() const {
+bool CheckedMetric::has_passed() const {
   if (!limit) return true;
   if (!value) return false;
   return direction == Direction::at_least ? *value >= acceptance_limit()
@@ -65,7 +67,7 @@ std::optional<double> CheckedMetric::conformance_probability() const {
   return std::erfc(-room / guard->standard_uncertainty / std::numbers::sqrt2) / 2;
 }
 
-std::string gate_descriptions(const std::vector<MetricKind>& known) {
+std::string describe_available_gates(const std::vector<MetricKind>& known) {
   std::size_t width = 0;
   for (const MetricKind& kind : known) width = std::max(width, std::string(kind.name).size());
   std::string text;
@@ -117,29 +119,30 @@ std::vector<Gate> parse_gates(const std::vector<std::string>& texts,
 }
 
 std::vector<Gate> read_gates(const YamlValue& value, const std::vector<MetricKind>& known) {
-  YamlMap map = value.map();
+  YamlMap map = value.get_mapping();
   std::vector<Gate> gates;
   for (const MetricKind& kind : known) {
-    const auto limit = map.optional(kind.name);
+    const auto limit = map.get_optional(kind.name);
     if (!limit) continue;
-    gates.push_back({kind.name, limit->number()});
+    gates.push_back({kind.name, limit->get_number()});
     const std::string problem = describe_invalid_limit(kind, gates.back().limit);
-    if (!problem.empty()) throw limit->error(problem);
+    if (!problem.empty()) throw limit->make_error(problem);
   }
-  map.finish();
-  if (gates.empty()) throw value.error("contains no gate; the gates are: " + join_names(known));
+  map.check_all_keys_read();
+  if (gates.empty())
+    throw value.make_error("contains no gate; the gates are: " + join_names(known));
   return gates;
 }
 
 std::vector<Gate> read_gates(const std::filesystem::path& file,
                              const std::vector<MetricKind>& known) {
   YamlMap document = read_yaml(file, "vlp-gates/1");
-  const YamlValue gates = document.required("gates");
-  document.finish();
+  const YamlValue gates = document.get_required_column("gates");
+  document.check_all_keys_read();
   return read_gates(gates, known);
 }
 
-std::vector<Gate> with_changes(std::vector<Gate> gates, const std::vector<Gate>& changes) {
+std::vector<Gate> merge_gates(std::vector<Gate> gates, const std::vector<Gate>& changes) {
   for (const Gate& change : changes) {
     const auto same = std::find_if(gates.begin(), gates.end(),
                                    [&](const Gate& gate) { return gate.metric == change.metric; });
@@ -157,16 +160,16 @@ std::vector<CheckedMetric> check_gates(const std::vector<Gate>& gates,
   std::vector<CheckedMetric> results;
   results.reserve(gates.size());
   for (const Gate& gate : gates) {
-    results.push_back(make_checked_metric(metric_kind(gate.metric).value(), metrics));
+    results.push_back(make_checked_metric(find_metric_kind(gate.metric).value(), metrics));
     results.back().limit = gate.limit;
     results.back().guard = gate.guard;
   }
   return results;
 }
 
-std::vector<CheckedMetric> check_all(const std::vector<Gate>& gates,
-                                     const std::vector<Metric>& metrics,
-                                     const std::vector<MetricKind>& known) {
+std::vector<CheckedMetric> check_all_metrics(const std::vector<Gate>& gates,
+                                             const std::vector<Metric>& metrics,
+                                             const std::vector<MetricKind>& known) {
   std::vector<CheckedMetric> results;
   for (const MetricKind& kind : known) {
     CheckedMetric result = make_checked_metric(kind, metrics);
@@ -195,14 +198,14 @@ std::string describe_guard_band(const CheckedMetric& gate) {
 std::string describe_failed_gates(const std::vector<CheckedMetric>& gates) {
   std::string words;
   for (const CheckedMetric& gate : gates) {
-    if (!gate.passed()) words.append(words.empty() ? "" : "; ").append(describe(gate));
+    if (!gate.has_passed()) words.append(words.empty() ? "" : "; ").append(describe(gate));
   }
   return words;
 }
 
-std::string describe_failure(const CheckedMetric& gate) {
+std::string describe_failed_gate(const CheckedMetric& gate) {
   if (!gate.value) return describe(gate);
-  const auto kind = metric_kind(gate.name);
+  const auto kind = find_metric_kind(gate.name);
   return std::string(kind ? kind->cause : "a gate is not met") + " (" + describe(gate) + ")";
 }
 

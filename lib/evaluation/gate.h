@@ -49,7 +49,7 @@ struct CheckedMetric {
   /// @pre there is a gate
   double acceptance_limit() const;
   /// Returns true if the gate is passed, or if there is none. A gate without a value is not passed.
-  bool passed() const;
+  bool has_passed() const;
   /// Returns the probability that the true value is within the limit, given only the measured
   /// value: Phi((limit - value) / u), or Phi((value - limit) / u) (JCGM 106:2012, section 7).
   /// Returns std::nullopt without a value, a limit or a guard band.
@@ -57,7 +57,7 @@ struct CheckedMetric {
 };
 
 /// Describes the metrics and what each requires, one line each, for humans.
-std::string gate_descriptions(const std::vector<MetricKind>& known);
+std::string describe_available_gates(const std::vector<MetricKind>& known);
 
 /// Parses "NAME=VALUE".
 /// @throws std::invalid_argument with the valid names, if no kind has the name
@@ -81,18 +81,18 @@ std::vector<Gate> read_gates(const std::filesystem::path& file,
 
 /// Returns the gates with the limits of `changes`, and with the gates of `changes` on other metrics
 /// appended. Guard bands are kept.
-std::vector<Gate> with_changes(std::vector<Gate> gates, const std::vector<Gate>& changes);
+std::vector<Gate> merge_gates(std::vector<Gate> gates, const std::vector<Gate>& changes);
 
 /// Returns the metrics with gates, in the order of the gates.
-/// @pre here and below: the metric of each gate exists (metric_kind())
+/// @pre here and below: the metric of each gate exists (find_metric_kind())
 std::vector<CheckedMetric> check_gates(const std::vector<Gate>& gates,
                                        const std::vector<Metric>& metrics);
 
 /// Returns all metrics, with and without gates, and the gates whose metric was not measured. They
 /// are in the order of the kinds.
-std::vector<CheckedMetric> check_all(const std::vector<Gate>& gates,
-                                     const std::vector<Metric>& metrics,
-                                     const std::vector<MetricKind>& known);
+std::vector<CheckedMetric> check_all_metrics(const std::vector<Gate>& gates,
+                                             const std::vector<Metric>& metrics,
+                                             const std::vector<MetricKind>& known);
 
 /// Describes a gate, for example "mean_mm is 1.25 mm, at most 1 mm is asked for", or "at most 1 mm
 /// less a guard band of 0.04 mm".
@@ -108,6 +108,6 @@ std::string describe_failed_gates(const std::vector<CheckedMetric>& gates);
 
 /// Returns the probable cause of a failed gate, followed by describe(); describe() alone if the
 /// metric was not measured.
-std::string describe_failure(const CheckedMetric& gate);
+std::string describe_failed_gate(const CheckedMetric& gate);
 
 }  // namespace vlp

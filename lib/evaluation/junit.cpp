@@ -15,7 +15,7 @@ void append_test(pugi::xml_node suite, const std::string& suite_name, const JUni
   pugi::xml_node node = suite.append_child("testcase");
   node.append_attribute("classname") = suite_name.c_str();
   node.append_attribute("name") = test.name.c_str();
-  const std::string message = printable(test.message);  // XML has no control characters
+  const std::string message = escape_for_terminal(test.message);  // XML has no control characters
   if (test.result == JUnitTest::Result::failed) {
     node.append_child("failure").append_attribute("message") = message.c_str();
   }
@@ -25,7 +25,8 @@ void append_test(pugi::xml_node suite, const std::string& suite_name, const JUni
     error.append_attribute("message") = message.c_str();
   }
   std::string warnings;
-  for (const std::string& warning : test.warnings) warnings.append(printable(warning)).append("\n");
+  for (const std::string& warning : test.warnings)
+    warnings.append(escape_for_terminal(warning)).append("\n");
   if (!warnings.empty()) node.append_child("system-err").text() = warnings.c_str();
 }
 
@@ -36,9 +37,9 @@ std::vector<JUnitTest> make_junit_tests(std::span<const CheckedMetric> gates) {
   tests.reserve(gates.size());
   for (const CheckedMetric& gate : gates) {
     JUnitTest test{gate.name};
-    if (!gate.passed()) {
+    if (!gate.has_passed()) {
       test.result = JUnitTest::Result::failed;
-      test.message = describe_failure(gate);
+      test.message = describe_failed_gate(gate);
     }
     tests.push_back(std::move(test));
   }

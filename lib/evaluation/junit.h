@@ -28,8 +28,8 @@ struct JUnitTest {
   std::vector<std::string> warnings = {};
 };
 
-/// Returns a test for each gate, in their order; `failed` with describe_failure() if the gate is
-/// not passed.
+/// Returns a test for each gate, in their order; `failed` with describe_failed_gate() if the gate
+/// is not passed.
 /// @pre all have a limit
 std::vector<JUnitTest> make_junit_tests(std::span<const CheckedMetric> gates);
 

@@ -11,30 +11,30 @@
 
 namespace vlp {
 
-void write_limits(const std::filesystem::path& file, const FloorLimits& limits) {
+void write_floor_limits(const std::filesystem::path& file, const FloorLimits& limits) {
   constexpr int digits = 6;
   std::vector<std::string> header{"x_m",    "y_m",    "z_m",    "yaw_rad",   "lamps",
                                   "x_sd_m", "y_sd_m", "z_sd_m", "yaw_sd_rad"};
   for (const auto& [name, key] : limits.sources) header.push_back(std::string(key) + "_m");
   header.emplace_back("horizontal_m");
   CsvWriter csv(file, header);
-  const auto format = [](double value) { return significant(value, digits); };
+  const auto format = [](double value) { return format_significant_digits(value, digits); };
   for (const FloorLimits::Place& place : limits.places) {
     const auto& [position_m, yaw_rad] = place.camera;
     std::vector<std::string> row{format(position_m.x()), format(position_m.y()),
                                  format(position_m.z()), format(yaw_rad),
                                  std::to_string(place.lamps)};
     if (!place.parts.empty()) {
-      const Eigen::Vector4d sd = place.total().diagonal().cwiseMax(0).cwiseSqrt();
+      const Eigen::Vector4d sd = place.total_covariance().diagonal().cwiseMax(0).cwiseSqrt();
       for (const double sd_component : sd) row.push_back(format(sd_component));
       for (const Matrix4& part : place.parts)
         row.push_back(format(compute_fix_sds(part).horizontal_m));
-      row.push_back(format(compute_fix_sds(place.total()).horizontal_m));
+      row.push_back(format(compute_fix_sds(place.total_covariance()).horizontal_m));
     }
     row.resize(header.size());
     csv.row(row);
   }
-  csv.save();
+  csv.save_file();
 }
 
 }  // namespace vlp

@@ -14,6 +14,6 @@ namespace vlp {
 ///   horizontal_m, the standard deviation of all sources together
 /// Cells of positions without a fix are empty.
 /// @throws InputError if the file cannot be written
-void write_limits(const std::filesystem::path& file, const FloorLimits& limits);
+void write_floor_limits(const std::filesystem::path& file, const FloorLimits& limits);
 
 }  // namespace vlp

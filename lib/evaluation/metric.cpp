@@ -160,7 +160,7 @@ std::string describe(Direction required) {
   return required == Direction::at_least ? "at least" : "at most";
 }
 
-std::vector<MetricKind> metric_kinds(std::initializer_list<MetricSource> sources) {
+std::vector<MetricKind> list_metric_kinds(std::initializer_list<MetricSource> sources) {
   std::vector<MetricKind> kinds;
   for (const MetricKind& kind : kMetricKinds) {
     const bool required = std::find(sources.begin(), sources.end(), kind.source) != sources.end();
@@ -169,13 +169,13 @@ std::vector<MetricKind> metric_kinds(std::initializer_list<MetricSource> sources
   return kinds;
 }
 
-std::optional<MetricKind> metric_kind(const std::string& name) {
+std::optional<MetricKind> find_metric_kind(const std::string& name) {
   const auto kind = std::find_if(kMetricKinds.begin(), kMetricKinds.end(),
                                  [&](const MetricKind& each) { return each.name == name; });
   return kind == kMetricKinds.end() ? std::nullopt : std::optional(*kind);
 }
 
-std::string present_metric_name(const std::string& name) {
+std::string find_present_metric_name(const std::string& name) {
   const std::string_view present = find_present_name(NameKind::metric, name);
   return present.empty() ? name : std::string(present);
 }

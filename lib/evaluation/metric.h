@@ -47,13 +47,13 @@ struct MetricKind {
 };
 
 /// Returns the metrics of these sources, causes before effects.
-std::vector<MetricKind> metric_kinds(std::initializer_list<MetricSource> sources);
+std::vector<MetricKind> list_metric_kinds(std::initializer_list<MetricSource> sources);
 
 /// Returns the metric of this unique name; std::nullopt if there is none.
-std::optional<MetricKind> metric_kind(const std::string& name);
+std::optional<MetricKind> find_metric_kind(const std::string& name);
 
 /// Returns the present name of a metric of a record, which may have been kept under a former one.
-std::string present_metric_name(const std::string& name);
+std::string find_present_metric_name(const std::string& name);
 
 /// Measured metric.
 struct Metric {

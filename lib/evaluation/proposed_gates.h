@@ -11,17 +11,18 @@
 namespace vlp {
 
 /// Proposes gates that runs of the same accuracy pass: mean_mm, p90_mm, height_rms_mm, yaw_rms_deg
-/// (those that were measured) and missing. Returns none if there are fewer than kMinClusters
-/// independent clusters (FixError::cluster).
+/// (those that were measured) and missing_fraction. Returns none if there are fewer than
+/// kMinClusters independent clusters (FixError::cluster).
 ///
 /// The limit of an error is the measured value plus z sqrt(2) times its standard error, which comes
-/// from its bootstrap interval (compute_error_intervals()). With z = 3.09, another run of the same
-/// accuracy exceeds it with a probability of 0.1 %. For 40 clusters the probability is 0.5 %, since
-/// their intervals are too narrow.
+/// from its bootstrap interval (bootstrap_error_intervals()). With z = 3.09, another run of the
+/// same accuracy exceeds it with a probability of 0.1 %. For 40 clusters the probability is 0.5 %,
+/// since their intervals are too narrow.
 ///
 /// The margin is at least 1 % and 1 um (0.001 degrees), and limits are rounded up to three digits.
 /// The limit of `missing_fraction` is the measured fraction, rounded up to a millionth.
-std::vector<Gate> propose_gates(const EvaluationInput& input, const Evaluation& evaluation);
+std::vector<Gate> propose_gates_from_evaluation(const EvaluationInput& input,
+                                                const Evaluation& evaluation);
 
 /// Formats gates as a file `vlp-gates/1`, with the value each is derived from as a comment.
 std::string format_gates(const std::vector<Gate>& gates, const Evaluation& evaluation);

@@ -10,10 +10,10 @@ namespace vlp {
 namespace {
 
 /// Number of clusters from which percentile intervals are nearly as wide as they should be, see
-/// compute_error_intervals().
+/// bootstrap_error_intervals().
 constexpr std::size_t kSufficientClusters = 50;
 
-std::string describe_few(std::size_t clusters, const std::string& resampling_unit) {
+std::string describe_small_sample(std::size_t clusters, const std::string& resampling_unit) {
   return "of so few as " + std::to_string(clusters) + " " + resampling_unit + " ";
 }
 
@@ -31,11 +31,11 @@ std::string make_missing_fixes_warning(const Evaluation& evaluation,
          " no fix, and there is no gate 'missing_fraction'";
 }
 
-std::string make_limit_warning(const Evaluation& evaluation) {
+std::string make_crlb_warning(const Evaluation& evaluation) {
   const auto& limit = evaluation.limit;
-  if (!limit || !limit->is_below_limit()) return "";
+  if (!limit || !limit->is_below_crlb()) return "";
   constexpr int digits = 3;
-  return "the errors are " + significant(limit->horizontal, digits) +
+  return "the errors are " + format_significant_digits(limit->horizontal, digits) +
          " times the theoretical limit: either the stated pixel noise is too large, or the fixes "
          "use more information than one image of a level camera with completely visible lamps "
          "(other frames, a known height, partly visible lamps, a tilted camera)";
@@ -51,17 +51,17 @@ std::vector<std::string> make_sample_size_warnings(const Evaluation& evaluation)
     const std::string p90 =
         intervals->p90 ? ", that of p90 most"
                        : ", and p90 has none, which needs " + std::to_string(kMinClustersForP90);
-    warnings.push_back(describe_few(intervals->clusters, resampling_unit) +
+    warnings.push_back(describe_small_sample(intervals->clusters, resampling_unit) +
                        "intervals are somewhat too narrow" + p90);
   }
   if (const auto& comparison = evaluation.comparison; !comparison) {
     return warnings;
-  } else if (comparison->too_few()) {
-    warnings.push_back(describe_few(comparison->clusters, resampling_unit) +
+  } else if (comparison->has_too_few_clusters()) {
+    warnings.push_back(describe_small_sample(comparison->clusters, resampling_unit) +
                        "with a fix in both files a comparison is no evidence, which needs " +
                        std::to_string(kMinClustersCompared));
   } else if (comparison->clusters < kSufficientClusters) {
-    warnings.push_back(describe_few(comparison->clusters, resampling_unit) +
+    warnings.push_back(describe_small_sample(comparison->clusters, resampling_unit) +
                        "with a fix in both files the difference's interval is somewhat too narrow");
   }
   return warnings;

@@ -19,7 +19,7 @@ std::string make_missing_fixes_warning(const Evaluation& evaluation,
 /// Returns a warning if the errors are below the theoretical limit, without a full stop; empty
 /// otherwise. Either the assumed pixel noise is too large, or the fixes use more information than
 /// one image of a level camera.
-std::string make_limit_warning(const Evaluation& evaluation);
+std::string make_crlb_warning(const Evaluation& evaluation);
 
 /// Returns warnings about intervals and verdicts from few stations or captures, one line each
 /// without a full stop. For a comparison, clusters of the pairs count. Returns none for 50 clusters

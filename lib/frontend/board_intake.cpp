@@ -49,7 +49,7 @@ std::string describe_too_few_corners(const Board& board, const BoardDetection& s
   if (board.kind == BoardKind::chessboard && seen.points.empty()) {
     return "the chessboard is not completely visible";
   }
-  if (board.has_squares() || !seen.points.empty()) {
+  if (board.has_chessboard_squares() || !seen.points.empty()) {
     return fmt::format("only {} corners of the board can be used, or too many of them in a line",
                        seen.points.size());
   }
@@ -78,7 +78,7 @@ void reject_other_sizes(std::vector<Observation>& images) {
   const std::array<int, 2> size_px = most_frequent->size_px;
   for (Observation& image : images) {
     if (!image.board || image.size_px == size_px) continue;
-    image.reject(RejectionReason::wrong_size, describe_wrong_size(image.size_px, size_px));
+    image.set_rejection(RejectionReason::wrong_size, describe_wrong_size(image.size_px, size_px));
     image.board.reset();
   }
 }
@@ -92,7 +92,7 @@ bool is_upside_down(const BoardView& view) {
   return down_px < 0;
 }
 
-void note_orientation(const Board& board, Observations& result) {
+void note_image_orientation(const Board& board, Observations& result) {
   if (board.kind == BoardKind::chessboard) {
     result.details.emplace_back(
         "a chessboard has the same appearance after a rotation by 180 degrees; this does not "
@@ -118,18 +118,18 @@ std::vector<BoardView> collect_views(const std::vector<Observation>& images) {
 FrontendOptions make_sparse_options(const std::vector<fs::path>& images, FrontendOptions options) {
   constexpr std::size_t num_samples = 12;
   const std::size_t step =
-      std::max<std::size_t>(1, ImageSource(images, options).expected() / num_samples);
+      std::max<std::size_t>(1, ImageSource(images, options).expected_image_count() / num_samples);
   options.every *= static_cast<int>(step);
   return options;
 }
 
 /// Reads up to `num_samples` images that can be read, until `inspect` returns false.
-void inspect_samples(const std::vector<fs::path>& images, const FrontendOptions& options,
-                     int num_samples,
-                     const std::function<bool(const fs::path& file, const cv::Mat&)>& inspect) {
+void explain_from_sample_images(
+    const std::vector<fs::path>& images, const FrontendOptions& options, int num_samples,
+    const std::function<bool(const fs::path& file, const cv::Mat&)>& inspect) {
   const FrontendOptions sparse = make_sparse_options(images, options);
   ImageSource source(images, sparse);
-  while (const auto image = source.next()) {
+  while (const auto image = source.read_next()) {
     try {
       if (!inspect(image->file, image->read(sparse)) || --num_samples == 0) return;
     } catch (const InputError&) {
@@ -144,11 +144,13 @@ IntakeFailure explain_no_chessboard(const std::vector<fs::path>& images, const B
                                     std::size_t num_views) {
   constexpr int num_samples = 12;
   std::array<int, 2> largest{0, 0};
-  inspect_samples(images, options, num_samples, [&](const fs::path&, const cv::Mat& image) {
-    const auto squares = count_chessboard_squares(image);
-    if (squares[0] * squares[1] > largest[0] * largest[1]) largest = squares;
-    return true;
-  });
+  explain_from_sample_images(images, options, num_samples,
+                             [&](const fs::path&, const cv::Mat& image) {
+                               const auto squares = count_chessboard_squares(image);
+                               if (squares[0] * squares[1] > largest[0] * largest[1])
+                                 largest = squares;
+                               return true;
+                             });
   // The board may be rotated by 90 degrees.
   if ((largest[0] < largest[1]) != (board.cols < board.rows)) std::swap(largest[0], largest[1]);
   const auto [cols, rows] = largest;
@@ -184,12 +186,13 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
   std::string description;
   fs::path described_file;
   constexpr int num_samples = 3;
-  inspect_samples(images, options, num_samples, [&](const fs::path& file, const cv::Mat& image) {
-    white = std::max(white, white_fraction(image, cv::Rect({}, image.size())));
-    description = describe_other_tags(board, image);
-    described_file = file;
-    return description.empty();
-  });
+  explain_from_sample_images(
+      images, options, num_samples, [&](const fs::path& file, const cv::Mat& image) {
+        white = std::max(white, compute_saturated_fraction(image, cv::Rect({}, image.size())));
+        description = describe_tags_of_other_kinds(board, image);
+        described_file = file;
+        return description.empty();
+      });
   constexpr double max_white = 0.1;
   if (white > max_white || (overexposed > 0 && 2 * overexposed > unusable)) {
     std::string message = fmt::format(
@@ -210,7 +213,7 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
   const auto foreign = std::find_if(views.begin(), views.end(),
                                     [](const auto& view) { return !view.seen.foreign.empty(); });
   if (foreign != views.end()) {
-    const std::string layout = check_board(board, views, {}).problem;
+    const std::string layout = check_board_layout(board, views, {}).problem;
     return {true,
             fmt::format("the images show tags of {}, but with other ids than those of the board, "
                         "{} to {} ({} of them in {}){}",
@@ -220,18 +223,18 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
                         layout.empty() ? "" : "; " + layout),
             board_file};
   }
-  const char* tag = board.has_squares() ? "marker" : "tag";
+  const char* tag = board.has_chessboard_squares() ? "marker" : "tag";
   return {false, fmt::format("no {} of {} is visible in {} images: is the board in them, sharp, "
                              "well lit, and each {} wider than 20 px?",
                              tag, board.family, views.size(), tag)};
 }
 
 /// Rejects corners that contradict their neighbors. A tag is rejected as a whole.
-void remove_blunders(const BoardLattice& lattice, BoardView& view,
-                     std::vector<std::string>& warnings) {
-  const auto blunders = find_corner_outliers(lattice.corners(view.seen));
+void remove_corner_outliers(const BoardLattice& lattice, BoardView& view,
+                            std::vector<std::string>& warnings) {
+  const auto blunders = find_corner_outliers(lattice.match_corners_to_flat_board(view.seen));
   if (blunders.empty()) return;
-  const auto corners = collect_corners(view.seen);
+  const auto corners = collect_detected_corners(view.seen);
   const Eigen::Vector2d first = corners[blunders.front()].pixel;
   warnings.push_back(
       fmt::format("{}: {} of its {} corners are not where their neighbors predict them, the first "
@@ -254,14 +257,15 @@ bool is_mrcal_table(const fs::path& file) { return file.extension() == ".vnl"; }
 /// Rejects an image with too few corners to determine the pose of the board.
 void reject_few_corners(const Board& board, const BoardLattice& lattice, Observation& image) {
   const BoardDetection& seen = image.board->seen;
-  if (lattice.sufficient(seen)) return;
-  if (!seen.any() && !seen.foreign.empty()) {
-    return image.reject(RejectionReason::other_board, "shows tags that the board does not have");
+  if (lattice.has_sufficient_corners(seen)) return;
+  if (!seen.has_corners() && !seen.foreign.empty()) {
+    return image.set_rejection(RejectionReason::other_board,
+                               "shows tags that the board does not have");
   }
-  if (!seen.any() && seen.unusable == 0 && board.kind != BoardKind::chessboard) {
-    return image.reject(RejectionReason::no_board, "does not show the board");
+  if (!seen.has_corners() && seen.unusable == 0 && board.kind != BoardKind::chessboard) {
+    return image.set_rejection(RejectionReason::no_board, "does not show the board");
   }
-  image.reject(
+  image.set_rejection(
       are_tags_overexposed(seen) ? RejectionReason::overexposed : RejectionReason::too_few_corners,
       describe_too_few_corners(board, seen));
 }
@@ -277,16 +281,16 @@ BoardIntake::BoardIntake(const Board& board, const FrontendOptions& options,
       imager_px_(imager_px),
       cache_(options.corner_cache, board) {}
 
-Observation BoardIntake::observe(const SourceImage& source) const {
+Observation BoardIntake::detect_in_image(const SourceImage& source) const {
   Observation result{source.file, source.time_s};
   std::optional<CachedView> found = cache_.find(source);
   if (found && (!imager_px_ || found->view.imager_px == *imager_px_)) {
     result.size_px = found->view.imager_px;
   } else {
-    observe_pixels(source, options_, imager_px_, result, [&](const cv::Mat& image) {
-      const ImageBlur blur = measure_blur(image);
-      BoardView view{result.name(), result.size_px, detector_.detect(image)};
-      const double white = white_fraction(image, find_board_region(view.seen, image));
+    read_image_and_detect(source, options_, imager_px_, result, [&](const cv::Mat& image) {
+      const ImageBlur blur = measure_image_blur(image);
+      BoardView view{result.file_name(), result.size_px, detector_.detect_board(image)};
+      const double white = compute_saturated_fraction(image, find_board_region(view.seen, image));
       found = CachedView{std::move(view),
                          std::isfinite(blur.sigma_px) ? std::optional(blur.sigma_px) : std::nullopt,
                          blur.bright_fraction, white};
@@ -304,45 +308,46 @@ void BoardIntake::reject_unusable(Observation& image, double bright_fraction,
                                   double white_fraction) const {
   const BoardDetection& seen = image.board->seen;
   if (white_fraction > options_.max_white_fraction) {
-    return image.reject(
+    return image.set_rejection(
         RejectionReason::overexposed,
         fmt::format("overexposed: {:.0f} % of the {} is at full scale, {:.0f} % at most",
-                    100 * white_fraction, seen.any() ? "board" : "image",
+                    100 * white_fraction, seen.has_corners() ? "board" : "image",
                     100 * options_.max_white_fraction));
   }
-  if (!lattice_.sufficient(seen) && bright_fraction < options_.min_bright_fraction) {
-    return image.reject(RejectionReason::too_dark,
-                        fmt::format("too dark: the brightest 1 % reach {:.0f} % of the full scale, "
-                                    "{:.0f} % at least",
-                                    100 * bright_fraction, 100 * options_.min_bright_fraction));
+  if (!lattice_.has_sufficient_corners(seen) && bright_fraction < options_.min_bright_fraction) {
+    return image.set_rejection(
+        RejectionReason::too_dark,
+        fmt::format("too dark: the brightest 1 % reach {:.0f} % of the full scale, "
+                    "{:.0f} % at least",
+                    100 * bright_fraction, 100 * options_.min_bright_fraction));
   }
-  if (!image.blur_px) return image.reject(RejectionReason::no_contrast, "no contrast");
+  if (!image.blur_px) return image.set_rejection(RejectionReason::no_contrast, "no contrast");
   if (*image.blur_px > options_.max_blur_px) {
-    return image.reject(
+    return image.set_rejection(
         RejectionReason::blurred,
         fmt::format("blurred: {:.1f} px, {:.1f} at most", *image.blur_px, options_.max_blur_px));
   }
   reject_few_corners(board_, lattice_, image);
 }
 
-Observations observe_boards(const std::vector<fs::path>& images, const Board& board,
-                            const fs::path& board_file, const FrontendOptions& options,
-                            const IntakeProgress& progress) {
+Observations detect_boards_in_images(const std::vector<fs::path>& images, const Board& board,
+                                     const fs::path& board_file, const FrontendOptions& options,
+                                     const IntakeProgress& progress) {
   const BoardIntake intake(board, options);
   ImageSource source(images, options);
-  Observations result = observe_images(
-      source, options.threads, [&](const SourceImage& image) { return intake.observe(image); },
-      progress);
-  check_any_readable(images.front().parent_path(), result.images);
+  Observations result = detect_in_images(
+      source, options.threads,
+      [&](const SourceImage& image) { return intake.detect_in_image(image); }, progress);
+  check_any_image_readable(images.front().parent_path(), result.images);
   reject_other_sizes(result.images);
-  reject_repeated(result.images, ImageUse::boards, options);
+  reject_repeated_images(result.images, ImageUse::boards, options);
   if (std::none_of(result.images.begin(), result.images.end(), [](const Observation& image) {
-        return image.board && image.board->seen.any();
+        return image.board && image.board->seen.has_corners();
       })) {
     result.failure =
         explain_no_board(images, board, board_file, options, collect_views(result.images));
   }
-  note_orientation(board, result);
+  note_image_orientation(board, result);
   return result;
 }
 
@@ -355,17 +360,17 @@ Observations read_board_views(const fs::path& file, const Board& board, const fs
   Observations result;
   const BoardLattice lattice(board);
   bool is_seen = false;
-  for (BoardView& view : is_mrcal_table(file) ? read_corners(file, board, imager_px)
+  for (BoardView& view : is_mrcal_table(file) ? read_mrcal_corners(file, board, imager_px)
                                               : read_corner_table(file, board, imager_px)) {
-    remove_blunders(lattice, view, result.warnings);
-    is_seen = is_seen || view.seen.any();
+    remove_corner_outliers(lattice, view, result.warnings);
+    is_seen = is_seen || view.seen.has_corners();
     Observation image{view.image};
     image.size_px = view.imager_px;
     image.board = std::move(view);
     reject_few_corners(board, lattice, image);
     result.images.push_back(std::move(image));
   }
-  reject_repeated(result.images, ImageUse::boards, options);
+  reject_repeated_images(result.images, ImageUse::boards, options);
   if (!is_seen) {
     result.failure = {true,
                       fmt::format("none of its {} images has a corner of the board; is it of "
@@ -373,7 +378,7 @@ Observations read_board_views(const fs::path& file, const Board& board, const fs
                                   result.images.size(), board_file.string()),
                       file};
   }
-  note_orientation(board, result);
+  note_image_orientation(board, result);
   return result;
 }
 

@@ -27,7 +27,7 @@ class BoardIntake {
   /// Detects the board in an image. Rejects the image if it is unreadable, of another size,
   /// overexposed, too dark, blurred, or shows too few corners to determine the board's pose.
   /// Repeated images are not rejected here, see Selection.
-  Observation observe(const SourceImage& source) const;
+  Observation detect_in_image(const SourceImage& source) const;
 
  private:
   /// Rejects an image that is overexposed, too dark, blurred, or shows too few corners.
@@ -48,16 +48,17 @@ class BoardIntake {
 /// Sets Observations::failure if no image shows the board. Its file is `board_file` if the images
 /// show another board.
 /// @throws InputError if no image can be read
-Observations observe_boards(const std::vector<std::filesystem::path>& images, const Board& board,
-                            const std::filesystem::path& board_file, const FrontendOptions& options,
-                            const IntakeProgress& progress = {});
+Observations detect_boards_in_images(const std::vector<std::filesystem::path>& images,
+                                     const Board& board, const std::filesystem::path& board_file,
+                                     const FrontendOptions& options,
+                                     const IntakeProgress& progress = {});
 
 /// Returns true if the extension is that of a file of corners: .vnl of mrcal, or .csv.
 bool is_corner_file(const std::filesystem::path& file);
 
-/// Reads the corners of a board from a file of mrcal (read_corners()) or from a table
-/// (read_corner_table()), instead of images of size `imager_px`. Selects views as observe_boards()
-/// does. Rejects corners that contradict their neighbors, with a warning.
+/// Reads the corners of a board from a file of mrcal (read_mrcal_corners()) or from a table
+/// (read_corner_table()), instead of images of size `imager_px`. Selects views as
+/// detect_boards_in_images() does. Rejects corners that contradict their neighbors, with a warning.
 /// @throws InputError if the file cannot be read
 Observations read_board_views(const std::filesystem::path& file, const Board& board,
                               const std::filesystem::path& board_file,

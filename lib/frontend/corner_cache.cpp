@@ -23,11 +23,11 @@ namespace fs = std::filesystem;
 std::string describe_settings(const Board& board) {
   std::string settings = fmt::format(
       "12 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols, board.rows,
-      shortest(board.tag_size_m), shortest(board.tag_spacing), board.border_bits,
+      format_shortest(board.tag_size_m), format_shortest(board.tag_spacing), board.border_bits,
       board.corner_squares, board.first_id, to_string(board.id_order));
-  if (board.has_squares()) {
+  if (board.has_chessboard_squares()) {
     settings += fmt::format(" {} {} {}", static_cast<int>(board.kind),
-                            shortest(board.square_size_m), board.top_left_white);
+                            format_shortest(board.square_size_m), board.top_left_white);
   }
   return settings;
 }
@@ -48,7 +48,7 @@ class NumberFile {
   /// text is cut short or damaged.
   void transfer(double& value) {
     if (!is_read_) {
-      text_ += shortest(value) + " ";
+      text_ += format_shortest(value) + " ";
       return;
     }
     const char* const end = text_.data() + text_.size();
@@ -131,10 +131,10 @@ void transfer_view(NumberFile& file, CachedView& cached) {
 }
 
 std::string compute_digest(const SourceImage& image) {
-  if (image.frame.empty()) return sha256_of_file(image.file);
+  if (image.frame.empty()) return compute_file_sha256(image.file);
   const cv::Mat levels = image.frame.isContinuous() ? image.frame : image.frame.clone();
   const std::string bytes(levels.ptr<char>(), levels.total() * levels.elemSize());
-  return sha256_of_text(fmt::format("{} {} {}", levels.cols, levels.rows, bytes));
+  return compute_text_sha256(fmt::format("{} {} {}", levels.cols, levels.rows, bytes));
 }
 
 }  // namespace
@@ -148,7 +148,7 @@ CornerCache::CornerCache(fs::path folder, const Board& board)
 }
 
 fs::path CornerCache::make_path(const SourceImage& image) const {
-  return folder_ / (sha256_of_text(compute_digest(image) + " " + settings_) + ".txt");
+  return folder_ / (compute_text_sha256(compute_digest(image) + " " + settings_) + ".txt");
 }
 
 std::optional<CachedView> CornerCache::find(const SourceImage& image) const {
@@ -173,7 +173,7 @@ void CornerCache::keep(const SourceImage& image, CachedView view) const {
     transfer_view(numbers, view);
     AtomicFileWriter file(make_path(image));
     file.write(numbers.text());
-    file.save_unsynced();
+    file.save_without_fsync();
   } catch (const InputError&) {  // a full disk; the view itself is there
   }
 }

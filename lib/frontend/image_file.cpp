@@ -50,8 +50,8 @@ using Size = std::optional<std::array<std::int64_t, 2>>;
 enum class ByteOrder { big, little };
 
 /// Reads an unsigned number of `count` bytes; std::nullopt beyond the end.
-std::optional<std::int64_t> number_at(std::string_view bytes, std::size_t at, std::size_t count,
-                                      ByteOrder order) {
+std::optional<std::int64_t> read_number_at(std::string_view bytes, std::size_t at,
+                                           std::size_t count, ByteOrder order) {
   if (at > bytes.size() || bytes.size() - at < count) return {};
   std::int64_t value = 0;
   for (std::size_t i = 0; i < count; ++i) {
@@ -68,21 +68,21 @@ Size make_size(const std::optional<std::int64_t>& width,
 }
 
 /// Reads the size from the first chunk, IHDR. Its length and type follow the signature of 8 bytes.
-Size png_size(std::string_view bytes) {
-  return make_size(number_at(bytes, 16, 4, ByteOrder::big),
-                   number_at(bytes, 20, 4, ByteOrder::big));
+Size read_png_size(std::string_view bytes) {
+  return make_size(read_number_at(bytes, 16, 4, ByteOrder::big),
+                   read_number_at(bytes, 20, 4, ByteOrder::big));
 }
 
 /// Reads the size of a BMP. A negative height means that rows are stored from the top.
-Size bmp_size(std::string_view bytes) {
-  const auto header = number_at(bytes, 14, 4, ByteOrder::little);
+Size read_bmp_size(std::string_view bytes) {
+  const auto header = read_number_at(bytes, 14, 4, ByteOrder::little);
   constexpr std::int64_t oldest = 12;  // of OS/2, with sizes of two bytes
   if (header == oldest) {
-    return make_size(number_at(bytes, 18, 2, ByteOrder::little),
-                     number_at(bytes, 20, 2, ByteOrder::little));
+    return make_size(read_number_at(bytes, 18, 2, ByteOrder::little),
+                     read_number_at(bytes, 20, 2, ByteOrder::little));
   }
   const auto signed_at = [&](std::size_t at) -> std::optional<std::int64_t> {
-    const auto value = number_at(bytes, at, 4, ByteOrder::little);
+    const auto value = read_number_at(bytes, at, 4, ByteOrder::little);
     if (!value) return {};
     const auto with_sign = static_cast<std::int32_t>(*value);
     return with_sign < 0 ? -static_cast<std::int64_t>(with_sign) : with_sign;
@@ -92,7 +92,7 @@ Size bmp_size(std::string_view bytes) {
 
 /// Reads the frame header, SOF: FF C0 to FF CF but for C4, C8 and CC. The segments before it are
 /// skipped by their lengths, as libjpeg does.
-Size jpeg_size(std::string_view bytes) {
+Size read_jpeg_size(std::string_view bytes) {
   std::size_t at = 2;
   while (at + 4 <= bytes.size()) {
     if (bytes[at] != '\xff') {  // decoders look for the next marker, too
@@ -109,12 +109,12 @@ Size jpeg_size(std::string_view bytes) {
       continue;
     }
     if (marker == 0xd8 || marker == 0xd9) return {};  // another start, or the end
-    const auto length = number_at(bytes, at + 2, 2, ByteOrder::big);
+    const auto length = read_number_at(bytes, at + 2, 2, ByteOrder::big);
     const bool frame =
         marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
     if (frame) {
-      return make_size(number_at(bytes, at + 7, 2, ByteOrder::big),
-                       number_at(bytes, at + 5, 2, ByteOrder::big));
+      return make_size(read_number_at(bytes, at + 7, 2, ByteOrder::big),
+                       read_number_at(bytes, at + 5, 2, ByteOrder::big));
     }
     if (!length || *length < 2) return {};
     at += 2 + static_cast<std::size_t>(*length);
@@ -135,24 +135,24 @@ constexpr TiffLayout kTiff{4, 4, 2, 12, 8}, kBigTiff{8, 8, 8, 20, 12};
 /// Reads tags 256 and 257 of the first directory, each a SHORT (3), a LONG (4) or, in BigTIFF, a
 /// LONG8 (16). libtiff reads others, too, but no usual program writes them. Of a tag that occurs
 /// twice the first counts, as in libtiff.
-Size tiff_size(std::string_view bytes, const TiffLayout& layout) {
+Size read_tiff_size(std::string_view bytes, const TiffLayout& layout) {
   const ByteOrder order = bytes[0] == 'M' ? ByteOrder::big : ByteOrder::little;
-  const auto directory = number_at(bytes, layout.directory_at, layout.place_bytes, order);
+  const auto directory = read_number_at(bytes, layout.directory_at, layout.place_bytes, order);
   if (!directory || *directory < 0) return {};
   const auto start = static_cast<std::size_t>(*directory);
-  const auto entries = number_at(bytes, start, layout.count_bytes, order);
+  const auto entries = read_number_at(bytes, start, layout.count_bytes, order);
   if (!entries || *entries < 0) return {};
   std::optional<std::int64_t> width, height;
   for (std::size_t i = 0; i < static_cast<std::size_t>(*entries); ++i) {
     const std::size_t entry = start + layout.count_bytes + i * layout.entry_bytes;
-    const auto tag = number_at(bytes, entry, 2, order),
-               type = number_at(bytes, entry + 2, 2, order);
+    const auto tag = read_number_at(bytes, entry, 2, order),
+               type = read_number_at(bytes, entry + 2, 2, order);
     if (!tag || !type) return {};
     if (*tag != 256 && *tag != 257) continue;
     const std::size_t value_bytes = *type == 3 ? 2 : *type == 4 ? 4 : *type == 16 ? 8 : 0;
     if (value_bytes == 0 || value_bytes > layout.place_bytes) return {};
     auto& size = *tag == 256 ? width : height;
-    if (!size) size = number_at(bytes, entry + layout.value_at, value_bytes, order);
+    if (!size) size = read_number_at(bytes, entry + layout.value_at, value_bytes, order);
     if (!size) return {};
   }
   return make_size(width, height);
@@ -160,7 +160,7 @@ Size tiff_size(std::string_view bytes, const TiffLayout& layout) {
 
 /// Reads the size of a PBM, PGM or PPM: "P5", width and height, separated by white space and
 /// comments.
-Size pnm_size(std::string_view bytes) {
+Size read_pnm_size(std::string_view bytes) {
   std::size_t at = 2;
   const auto is_space = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; };
   const auto next = [&]() -> std::optional<std::int64_t> {
@@ -189,16 +189,16 @@ struct ImageFormat {
 /// Returns the format of a file; nullptr for other files.
 const ImageFormat* find_format(std::string_view bytes) {
   using namespace std::string_view_literals;
-  constexpr auto tiff = [](std::string_view file) { return tiff_size(file, kTiff); };
-  constexpr auto big_tiff = [](std::string_view file) { return tiff_size(file, kBigTiff); };
-  static constexpr std::array formats{ImageFormat{"\x89PNG\r\n\x1a\n"sv, png_size},
-                                      ImageFormat{"\xff\xd8"sv, jpeg_size},
-                                      ImageFormat{"BM"sv, bmp_size},
+  constexpr auto tiff = [](std::string_view file) { return read_tiff_size(file, kTiff); };
+  constexpr auto big_tiff = [](std::string_view file) { return read_tiff_size(file, kBigTiff); };
+  static constexpr std::array formats{ImageFormat{"\x89PNG\r\n\x1a\n"sv, read_png_size},
+                                      ImageFormat{"\xff\xd8"sv, read_jpeg_size},
+                                      ImageFormat{"BM"sv, read_bmp_size},
                                       ImageFormat{"II*\0"sv, tiff},
                                       ImageFormat{"MM\0*"sv, tiff},
                                       ImageFormat{"II+\0"sv, big_tiff},
                                       ImageFormat{"MM\0+"sv, big_tiff},
-                                      ImageFormat{"P1"sv, pnm_size},
+                                      ImageFormat{"P1"sv, read_pnm_size},
                                       ImageFormat{"P2"sv, pnm_size},
                                       ImageFormat{"P3"sv, pnm_size},
                                       ImageFormat{"P4"sv, pnm_size},
@@ -213,17 +213,18 @@ const ImageFormat* find_format(std::string_view bytes) {
 
 bool has_image_signature(std::string_view bytes) { return find_format(bytes) != nullptr; }
 
-Size read_header_size(std::string_view bytes) {
+Size read_image_size_from_header(std::string_view bytes) {
   const ImageFormat* const format = find_format(bytes);
   return format == nullptr ? Size() : format->read_size(bytes);
 }
 
-void check_size(const fs::path& file, std::int64_t width, std::int64_t height, double max_mpx) {
+void check_image_size(const fs::path& file, std::int64_t width, std::int64_t height,
+                      double max_mpx) {
   constexpr double million = 1e6;
   if (static_cast<double>(width) * static_cast<double>(height) <= max_mpx * million) return;
   throw InputError(
       file, "is " + std::to_string(width) + " x " + std::to_string(height) + " px, more than the " +
-                shortest(max_mpx) +
+                format_shortest(max_mpx) +
                 " million that are allowed; --max-mpx of vlp-detect and vlp-intrinsics "
                 "allows more");
 }
@@ -234,24 +235,24 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
   const char* const cut = "cannot be read as an image: it is cut short";
   if (is_cut_jpeg(bytes)) throw InputError(file, cut);
   // Other formats are rejected, because the memory that they need is unknown before decoding.
-  const auto size = read_header_size(bytes);
+  const auto size = read_image_size_from_header(bytes);
   if (!size) {
     throw InputError(
         file, has_image_signature(bytes)
                   ? "cannot be read as an image: it is cut short or damaged"
                   : "cannot be read as an image: it is not PNG, JPEG, BMP, TIFF, PBM, PGM or PPM");
   }
-  check_size(file, (*size)[0], (*size)[1], max_mpx);
+  check_image_size(file, (*size)[0], (*size)[1], max_mpx);
   if (is_cut_png(bytes)) throw InputError(file, cut);
   cv::Mat image;
   try {
-    image = codecs().decode(
+    image = get_codecs().decode_image(
         bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
   } catch (const cv::Exception& failure) {
     throw InputError(file, "cannot be read as an image: " + failure.err);
   }
   if (image.empty()) throw InputError(file, "cannot be read as an image");
-  check_size(file, image.cols, image.rows, max_mpx);
+  check_image_size(file, image.cols, image.rows, max_mpx);
   if (image.depth() != CV_8U && image.depth() != CV_16U) {
     throw InputError(file, "has neither 8 nor 16 bits");
   }

@@ -13,8 +13,8 @@
 namespace vlp {
 
 /// Throws InputError if an image has more than `max_mpx` megapixels.
-void check_size(const std::filesystem::path& file, std::int64_t width, std::int64_t height,
-                double max_mpx);
+void check_image_size(const std::filesystem::path& file, std::int64_t width, std::int64_t height,
+                      double max_mpx);
 
 /// Returns true if a file begins with the signature of PNG, JPEG, BMP, TIFF, PBM, PGM or PPM.
 bool has_image_signature(std::string_view bytes);
@@ -22,7 +22,7 @@ bool has_image_signature(std::string_view bytes);
 /// Parses width and height in pixels from the header of a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM
 /// file. The image is not decoded, because a file of a megabyte can contain gigapixels. Returns
 /// std::nullopt for other files, and for files truncated before the size.
-std::optional<std::array<std::int64_t, 2>> read_header_size(std::string_view bytes);
+std::optional<std::array<std::int64_t, 2>> read_image_size_from_header(std::string_view bytes);
 
 /// Reads an image as gray levels of 8 or 16 bits and converts color. The format is recognized by
 /// the content: PNG, JPEG, BMP, TIFF, PBM, PGM or PPM. An orientation tag in the file is ignored,

@@ -18,7 +18,7 @@ bool has_extension(const fs::path& file, std::initializer_list<std::string_view>
   return std::ranges::find(extensions, extension) != extensions.end();
 }
 
-bool is_image_name(const fs::path& file) {
+bool is_image_file_name(const fs::path& file) {
   return has_extension(file, {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"});
 }
 
@@ -29,7 +29,7 @@ std::vector<fs::path> list_images(const fs::path& folder) {
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
     std::error_code no_file;  // a folder, a pipe, a link that leads nowhere
-    if (entry->is_regular_file(no_file) && is_image_name(entry->path()))
+    if (entry->is_regular_file(no_file) && is_image_file_name(entry->path()))
       images.push_back(entry->path());
   }
   if (error) throw InputError(folder, "cannot be read: " + error.message());
@@ -40,7 +40,7 @@ std::vector<fs::path> list_images(const fs::path& folder) {
   return images;
 }
 
-std::vector<fs::path> expand_folders(const std::vector<std::string>& names) {
+std::vector<fs::path> replace_folders_by_images(const std::vector<std::string>& names) {
   std::vector<fs::path> files;
   for (const std::string& name : names) {
     if (!fs::is_directory(name)) {

@@ -15,7 +15,7 @@ bool has_extension(const std::filesystem::path& file,
                    std::initializer_list<std::string_view> extensions);
 
 /// Returns true if the extension is that of an image: PNG, JPEG, BMP, TIFF or PGM.
-bool is_image_name(const std::filesystem::path& file);
+bool is_image_file_name(const std::filesystem::path& file);
 
 /// Lists the images in a folder, sorted by name.
 /// @throws InputError if it is no folder or contains no image
@@ -23,6 +23,6 @@ std::vector<std::filesystem::path> list_images(const std::filesystem::path& fold
 
 /// Replaces each folder among the names by the images in it.
 /// @throws InputError as list_images()
-std::vector<std::filesystem::path> expand_folders(const std::vector<std::string>& names);
+std::vector<std::filesystem::path> replace_folders_by_images(const std::vector<std::string>& names);
 
 }  // namespace vlp

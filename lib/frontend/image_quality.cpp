@@ -14,7 +14,7 @@ namespace vlp {
 namespace {
 
 /// Returns the largest value of an image.
-double full_scale(const cv::Mat& image) {
+double get_full_scale_level(const cv::Mat& image) {
   constexpr double full_8 = 255, full_16 = 65535;
   return image.depth() == CV_8U ? full_8 : full_16;
 }
@@ -61,7 +61,7 @@ double estimate_noise(const cv::Mat& image) {
 }
 
 /// Returns the darkest and the brightest median of a pixel and its neighbors on both sides.
-std::pair<double, double> find_extremes(const cv::Mat& image, const cv::Point& side) {
+std::pair<double, double> find_gray_level_extremes(const cv::Mat& image, const cv::Point& side) {
   if (image.cols < 3 || image.rows < 3) return {0, 0};
   const cv::Rect inner(side, cv::Size(image.cols - 2 * side.x, image.rows - 2 * side.y));
   const cv::Mat before = image(inner - side), here = image(inner), after = image(inner + side);
@@ -74,12 +74,12 @@ std::pair<double, double> find_extremes(const cv::Mat& image, const cv::Point& s
 
 }  // namespace
 
-ImageBlur measure_blur(const cv::Mat& image) {
+ImageBlur measure_image_blur(const cv::Mat& image) {
   constexpr double smoothing_px = 1;  // against noise; its variance is subtracted below
   // The difference over two pixels averages the rise over them: a blur by a box 2 px wide.
   constexpr double difference_px2 = 4.0 / 12;
   cv::Mat1f smooth, along_x, along_y;
-  image.convertTo(smooth, CV_32F, 1 / full_scale(image));
+  image.convertTo(smooth, CV_32F, 1 / get_full_scale_level(image));
   cv::GaussianBlur(smooth, smooth, {}, smoothing_px);
   const Histogram levels(smooth);
   const double bright = levels.quantile(0.99), dark = levels.quantile(0.01);
@@ -96,19 +96,19 @@ ImageBlur measure_blur(const cv::Mat& image) {
   return {std::sqrt(std::max(0.0, variance_px2)), bright};
 }
 
-ImageSignal measure_signal(const cv::Mat& image) {
-  const auto [dark_along, bright_along] = find_extremes(image, {1, 0});
-  const auto [dark_across, bright_across] = find_extremes(image, {0, 1});
+ImageSignal measure_image_signal(const cv::Mat& image) {
+  const auto [dark_along, bright_along] = find_gray_level_extremes(image, {1, 0});
+  const auto [dark_across, bright_across] = find_gray_level_extremes(image, {0, 1});
   const double dark = std::min(dark_along, dark_across);
   const double bright = std::max(bright_along, bright_across);
-  return {dark / full_scale(image), (bright - dark) / estimate_noise(image)};
+  return {dark / get_full_scale_level(image), (bright - dark) / estimate_noise(image)};
 }
 
-double white_fraction(const cv::Mat& image, cv::Rect region) {
+double compute_saturated_fraction(const cv::Mat& image, cv::Rect region) {
   region &= cv::Rect({}, image.size());
   if (region.empty()) return 0;
   constexpr double tolerance = 0.004;  // a level of 8 bits, by which JPEG changes white
-  const cv::Mat white = image(region) >= (1 - tolerance) * full_scale(image);
+  const cv::Mat white = image(region) >= (1 - tolerance) * get_full_scale_level(image);
   return cv::countNonZero(white) / static_cast<double>(region.area());
 }
 

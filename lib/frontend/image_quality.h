@@ -18,7 +18,7 @@ struct ImageBlur {
 };
 
 /// Measures the blur of an image of 8 or 16 bits.
-ImageBlur measure_blur(const cv::Mat& image);
+ImageBlur measure_image_blur(const cv::Mat& image);
 
 /// Signal of an image relative to its noise.
 struct ImageSignal {
@@ -33,10 +33,10 @@ struct ImageSignal {
 };
 
 /// Measures the signal of an image of 8 or 16 bits.
-ImageSignal measure_signal(const cv::Mat& image);
+ImageSignal measure_image_signal(const cv::Mat& image);
 
 /// Computes the fraction of white pixels in a region of an image of 8 or 16 bits. White is full
 /// scale or one 8-bit level below. Returns 0 for a region outside the image.
-double white_fraction(const cv::Mat& image, cv::Rect region);
+double compute_saturated_fraction(const cv::Mat& image, cv::Rect region);
 
 }  // namespace vlp

@@ -19,49 +19,49 @@ ImageSource::ImageSource(std::vector<std::filesystem::path> files, const Fronten
                          const std::optional<std::array<int, 2>>& imager_px)
     : files_(std::move(files)), every_(options.every) {
   for (const auto& file : files_) {
-    if (!is_video_name(file)) {
+    if (!is_video_file_name(file)) {
       ++expected_;
       continue;
     }
     Video video(file.string());
     const auto [width, height] = video.size_px();
-    check_size(file, width, height, options.max_mpx);
-    check_imager(file, {width, height}, imager_px);
-    if (!video.next()) throw InputError(file, "contains no frame that can be decoded");
+    check_image_size(file, width, height, options.max_mpx);
+    check_image_matches_imager(file, {width, height}, imager_px);
+    if (!video.read_next()) throw InputError(file, "contains no frame that can be decoded");
     const auto every = static_cast<std::size_t>(every_);
-    expected_ += (std::max<std::size_t>(video.reported_frames(), 1) + every - 1) / every;
+    expected_ += (std::max<std::size_t>(video.reported_frame_count(), 1) + every - 1) / every;
   }
 }
 
 ImageSource::~ImageSource() = default;
 
-std::size_t ImageSource::expected() const { return expected_; }
+std::size_t ImageSource::expected_image_count() const { return expected_; }
 
 std::optional<SourceImage> ImageSource::next_frame() {
   const auto& file = files_[file_];
   if (!video_) {
     video_ = std::make_unique<Video>(file.string());
   } else {
-    for (int i = 1; i < every_; ++i) video_->skip();
+    for (int i = 1; i < every_; ++i) video_->skip_frame();
   }
-  auto frame = video_->next();
+  auto frame = video_->read_next();
   if (!frame) {
-    const std::string missing = video_->missing();
+    const std::string missing = video_->describe_missing_frames();
     if (!missing.empty()) warnings_.push_back(file.string() + ": " + missing);
     video_.reset();
     return {};
   }
-  SourceImage image(frame_name(file.string(), frame->number));
+  SourceImage image(make_video_frame_name(file.string(), frame->number));
   image.frame = std::move(frame->image);
   image.time_s = frame->time_s;
   return image;
 }
 
-std::optional<SourceImage> ImageSource::next() {
+std::optional<SourceImage> ImageSource::read_next() {
   const std::lock_guard lock(mutex_);
   for (; file_ < files_.size(); ++file_) {
     std::optional<SourceImage> image;
-    if (is_video_name(files_[file_])) {
+    if (is_video_file_name(files_[file_])) {
       image = next_frame();
       if (!image) continue;
     } else {
@@ -73,9 +73,9 @@ std::optional<SourceImage> ImageSource::next() {
   return {};
 }
 
-void images_in_parallel(std::size_t count, int threads,
-                        const std::function<void(std::size_t)>& process,
-                        const std::function<void(std::size_t done)>& progress) {
+void process_images_in_parallel(std::size_t count, int threads,
+                                const std::function<void(std::size_t)>& process,
+                                const std::function<void(std::size_t done)>& progress) {
   cv::setNumThreads(1);
   std::mutex counting;
   std::size_t done = 0;
@@ -91,10 +91,10 @@ void for_each_image(ImageSource& source, int threads,
                     const std::function<void(const SourceImage&)>& task) {
   const auto workers = static_cast<std::size_t>(threads);
   std::atomic<bool> failed = false;
-  images_in_parallel(workers, threads, [&](std::size_t) {
+  process_images_in_parallel(workers, threads, [&](std::size_t) {
     try {
       while (!failed) {
-        const auto image = source.next();
+        const auto image = source.read_next();
         if (!image) return;
         task(*image);
       }
@@ -111,8 +111,9 @@ std::string describe_wrong_size(const std::array<int, 2>& size_px,
                      imager_px[0], imager_px[1]);
 }
 
-void check_imager(const std::filesystem::path& file, const std::array<int, 2>& size_px,
-                  const std::optional<std::array<int, 2>>& imager_px) {
+void check_image_matches_imager(const std::filesystem::path& file,
+                                const std::array<int, 2>& size_px,
+                                const std::optional<std::array<int, 2>>& imager_px) {
   if (!imager_px || size_px == *imager_px) return;
   throw InputError(file, describe_wrong_size(size_px, *imager_px));
 }

@@ -25,7 +25,7 @@ class Video;
 struct SourceImage {
   explicit SourceImage(std::filesystem::path image_file) : file(std::move(image_file)) {}
 
-  /// Image file, or frame_name() (VIDEO#000123) for a frame.
+  /// Image file, or make_video_frame_name() (VIDEO#000123) for a frame.
   std::filesystem::path file;
   /// Pixels of a video's frame; empty for an image file.
   cv::Mat frame = {};
@@ -54,11 +54,11 @@ class ImageSource {
   ~ImageSource();
 
   /// Returns the next image; std::nullopt at the end.
-  std::optional<SourceImage> next();
+  std::optional<SourceImage> read_next();
   /// Number of images, with the frames that the headers of the videos report.
-  std::size_t expected() const;
+  std::size_t expected_image_count() const;
   /// Warnings of videos with missing frames among those already read, one line each.
-  const std::vector<std::string>& warnings() const { return warnings_; }
+  const std::vector<std::string>& video_warnings() const { return warnings_; }
 
  private:
   std::optional<SourceImage> next_frame();
@@ -76,11 +76,12 @@ class ImageSource {
 /// run.
 ///
 /// @param progress  called with the number of images done; calls do not overlap; may be empty
-void images_in_parallel(std::size_t count, int threads,
-                        const std::function<void(std::size_t)>& process,
-                        const std::function<void(std::size_t done)>& progress = {});
+void process_images_in_parallel(std::size_t count, int threads,
+                                const std::function<void(std::size_t)>& process,
+                                const std::function<void(std::size_t done)>& progress = {});
 
-/// Calls task(image) for each image of the source on several threads, as images_in_parallel().
+/// Calls task(image) for each image of the source on several threads, as
+/// process_images_in_parallel().
 void for_each_image(ImageSource& source, int threads,
                     const std::function<void(const SourceImage&)>& task);
 
@@ -89,7 +90,8 @@ std::string describe_wrong_size(const std::array<int, 2>& size_px,
                                 const std::array<int, 2>& imager_px);
 
 /// Throws InputError if the size of an image is not `imager_px`.
-void check_imager(const std::filesystem::path& file, const std::array<int, 2>& size_px,
-                  const std::optional<std::array<int, 2>>& imager_px);
+void check_image_matches_imager(const std::filesystem::path& file,
+                                const std::array<int, 2>& size_px,
+                                const std::optional<std::array<int, 2>>& imager_px);
 
 }  // namespace vlp

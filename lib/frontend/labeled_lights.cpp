@@ -10,7 +10,8 @@
 namespace vlp {
 namespace {
 
-std::unordered_map<std::string, const Frame*> frames_by_image(const std::vector<Frame>& labels) {
+std::unordered_map<std::string, const Frame*> index_frames_by_image(
+    const std::vector<Frame>& labels) {
   std::unordered_map<std::string, const Frame*> frames;
   for (const Frame& frame : labels) frames[frame.image] = &frame;
   return frames;
@@ -22,7 +23,7 @@ bool may_be_lamp(const Light& light, const std::array<int, 2>& size_px) {
 
 }  // namespace
 
-const Light* find_light(const Observation& image, const Eigen::Vector2d& pixel) {
+const Light* find_light_at_pixel(const Observation& image, const Eigen::Vector2d& pixel) {
   constexpr double max_distance_fraction = 0.5;
   const Light* nearest = nullptr;
   for (const Light& light : image.lights) {
@@ -36,14 +37,14 @@ const Light* find_light(const Observation& image, const Eigen::Vector2d& pixel) 
 
 void add_labeled_lights(std::span<const Observation> images, const std::vector<Frame>& labels,
                         LabeledLights& labeled) {
-  const auto frames = frames_by_image(labels);
+  const auto frames = index_frames_by_image(labels);
   std::size_t number = labeled.lights.empty() ? 0 : labeled.lights.back().image + 1;
   for (const Observation& image : images) {
-    const auto frame = frames.find(image.name());
+    const auto frame = frames.find(image.file_name());
     if (frame == frames.end() || !image.is_kept()) continue;
     for (const Detection& label : frame->second->detections) {
       ++labeled.labels;
-      if (const Light* light = find_light(image, label.pixel)) {
+      if (const Light* light = find_light_at_pixel(image, label.pixel)) {
         labeled.lights.push_back({label.lamp, light->stripes, number});
       } else {
         ++labeled.without_light;
@@ -53,13 +54,13 @@ void add_labeled_lights(std::span<const Observation> images, const std::vector<F
   }
 }
 
-std::vector<LightPeriod> collect_periods(std::span<const Observation> images,
-                                         const std::vector<Frame>& labels) {
-  const auto frames = frames_by_image(labels);
+std::vector<LightPeriod> collect_light_periods(std::span<const Observation> images,
+                                               const std::vector<Frame>& labels) {
+  const auto frames = index_frames_by_image(labels);
   std::vector<LightPeriod> periods;
   const auto add = [&](std::size_t image, const Light& light, std::optional<int> lamp) {
     const Stripes& stripes = light.stripes;
-    if (!is_reliable(stripes)) return;
+    if (!are_stripes_reliable(stripes)) return;
     periods.push_back(
         {{stripes.period_lines, lamp, stripes.duty}, image, light.pixel, light.sigma_px});
   };
@@ -76,10 +77,10 @@ std::vector<LightPeriod> collect_periods(std::span<const Observation> images,
       }
       continue;
     }
-    const auto frame = frames.find(image.name());
+    const auto frame = frames.find(image.file_name());
     if (frame == frames.end()) continue;
     for (const Detection& label : frame->second->detections) {
-      if (const Light* light = find_light(image, label.pixel)) add(i, *light, label.lamp);
+      if (const Light* light = find_light_at_pixel(image, label.pixel)) add(i, *light, label.lamp);
     }
   }
   return periods;

@@ -16,7 +16,7 @@ namespace vlp {
 
 /// Finds the light of a label: the nearest modulated light that is completely in view and whose
 /// center is within half its radius of `pixel`. Returns nullptr if there is none.
-const Light* find_light(const Observation& image, const Eigen::Vector2d& pixel);
+const Light* find_light_at_pixel(const Observation& image, const Eigen::Vector2d& pixel);
 
 /// Lights whose lamps are given by a table.
 struct LabeledLights {
@@ -37,9 +37,9 @@ struct LightPeriod : MeasuredPeriod {
   double sigma_px;
 };
 
-/// Returns the periods of the lights that are completely in view and whose stripes are
-/// trustworthy(). If `labels` is not empty, only of labeled lights.
-std::vector<LightPeriod> collect_periods(std::span<const Observation> images,
-                                         const std::vector<Frame>& labels);
+/// Returns the periods of the lights that are completely in view and whose stripes are reliable
+/// (are_stripes_reliable()). If `labels` is not empty, only of labeled lights.
+std::vector<LightPeriod> collect_light_periods(std::span<const Observation> images,
+                                               const std::vector<Frame>& labels);
 
 }  // namespace vlp

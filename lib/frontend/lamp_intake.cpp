@@ -39,12 +39,13 @@ constexpr std::size_t kMaxLines = 5;
 bool is_overexposed(const Light& light, const cv::Mat& image) {
   const cv::Point low(static_cast<int>(light.low.x()), static_cast<int>(light.low.y()));
   const cv::Point high(static_cast<int>(light.high.x()), static_cast<int>(light.high.y()));
-  return light.kind == LightKind::unknown && white_fraction(image, {low, high}) > kMaxWhiteFraction;
+  return light.kind == LightKind::unknown &&
+         compute_saturated_fraction(image, {low, high}) > kMaxWhiteFraction;
 }
 
 /// Returns true if the range of the gray levels is small (image uniformly dark or white), so that
-/// the signal may be noise. Takes a small part of the time of measure_signal().
-bool is_flat(const cv::Mat& image) {
+/// the signal may be noise. Takes a small part of the time of measure_image_signal().
+bool is_image_uniform(const cv::Mat& image) {
   constexpr double max_range = 0.25;  // of the full scale
   double min = 0, max = 0;
   cv::minMaxLoc(image, &min, &max);
@@ -52,16 +53,16 @@ bool is_flat(const cv::Mat& image) {
 }
 
 /// Rejects an image in which nothing exceeds the noise, as too dark or overexposed.
-void reject_without_signal(const cv::Mat& image, Observation& result) {
-  const ImageSignal signal = measure_signal(image);
+void reject_image_without_signal(const cv::Mat& image, Observation& result) {
+  const ImageSignal signal = measure_image_signal(image);
   if (signal.signal_to_noise < kMinSignalToNoise && signal.dark_fraction > kMaxDarkFraction) {
-    return result.reject(
+    return result.set_rejection(
         RejectionReason::overexposed,
         fmt::format("overexposed: all of the image is at {:.0f} % of the full scale or more",
                     100 * signal.dark_fraction));
   }
   if (signal.signal_to_noise < kMinSignalToNoise) {
-    return result.reject(
+    return result.set_rejection(
         RejectionReason::too_dark,
         fmt::format("too dark: the brightest is {:.0f} times the noise over the darkest, {:.0f} "
                     "wanted",
@@ -70,8 +71,8 @@ void reject_without_signal(const cv::Mat& image, Observation& result) {
 }
 
 /// Rejects an image with too few lamps, with the exposure as the reason if it is one.
-void reject_few_lamps(const cv::Mat& image, Observation& result) {
-  reject_without_signal(image, result);
+void reject_image_with_few_lamps(const cv::Mat& image, Observation& result) {
+  reject_image_without_signal(image, result);
   if (!result.is_kept()) return;
   const auto count = [&](const auto& condition) {
     return std::count_if(result.lights.begin(), result.lights.end(), condition);
@@ -83,13 +84,13 @@ void reject_few_lamps(const cv::Mat& image, Observation& result) {
   const auto unknown = count(is_kind(LightKind::unknown));
   const auto white = count([&](const Light& light) { return is_overexposed(light, image); });
   if (white > 0) {
-    return result.reject(
+    return result.set_rejection(
         RejectionReason::overexposed,
         fmt::format(
             "overexposed: {} of {} lights are completely at full scale, {} of the visible lamps",
             white, unknown, lamps));
   }
-  result.reject(
+  result.set_rejection(
       RejectionReason::too_few_lamps,
       fmt::format("too few lamps: {} visible, {} cut off by the image border, {} lights unlike any",
                   lamps, count(is_kind(LightKind::cut)), unknown));
@@ -100,7 +101,7 @@ LampClassifier read_classifier(const LampImages& images, const fs::path& file,
                                std::vector<std::string>& warnings) {
   LampClassifier classifier = read_lamp_classifier(file);
   for (const auto& lamp : classifier.lamps) {
-    if (find_lamp(images.lamps.lamps, lamp.lamp) != nullptr) continue;
+    if (find_lamp_by_id(images.lamps.lamps, lamp.lamp) != nullptr) continue;
     throw InputError(file,
                      fmt::format("lamp {} is not in {}", lamp.lamp, images.lamps_file.string()));
   }
@@ -123,15 +124,16 @@ LampClassifier read_classifier(const LampImages& images, const fs::path& file,
   return classifier;
 }
 
-void warn_of_rest(std::size_t count, const char* items, std::vector<std::string>& warnings) {
+void warn_about_other_findings(std::size_t count, const char* items,
+                               std::vector<std::string>& warnings) {
   if (count > kMaxLines) {
     warnings.push_back(fmt::format("and {} more {}", count - kMaxLines, items));
   }
 }
 
 /// Warns of lamps in the map that are hard to distinguish, or whose stripes are hard to see.
-void warn_of_map(const LampImages& images, const DetectorCamera& camera,
-                 const std::optional<double>& exposure_s, std::vector<std::string>& warnings) {
+void warn_about_map(const LampImages& images, const DetectorCamera& camera,
+                    const std::optional<double>& exposure_s, std::vector<std::string>& warnings) {
   std::optional<double> focal_px;
   if (images.calibration) {
     focal_px = images.calibration->camera.intrinsics[camera.readout == Readout::rows ? 1 : 0];
@@ -145,8 +147,9 @@ void warn_of_map(const LampImages& images, const DetectorCamera& camera,
         "{:.1f} % are needed; change one of the frequencies, or a duty by 0.3",
         first, second, 100 * gap, 100 * needed));
   }
-  warn_of_rest(alike.size(), "pairs of lamps with frequencies that are too near", warnings);
-  const auto unreadable = find_unreadable_lamps(images.lamps, conditions);
+  warn_about_other_findings(alike.size(), "pairs of lamps with frequencies that are too near",
+                            warnings);
+  const auto unreadable = find_lamps_with_unreadable_period(images.lamps, conditions);
   for (std::size_t i = 0; i < std::min(unreadable.size(), kMaxLines); ++i) {
     const auto& [lamp, period_lines, periods, contrast] = unreadable[i];
     if (period_lines < kMinPeriod_lines) {
@@ -165,7 +168,7 @@ void warn_of_map(const LampImages& images, const DetectorCamera& camera,
           lamp, 100 * contrast, microseconds * *exposure_s));
     }
   }
-  warn_of_rest(unreadable.size(), "lamps with barely visible stripes", warnings);
+  warn_about_other_findings(unreadable.size(), "lamps with barely visible stripes", warnings);
 }
 
 /// Returns the pairs of lamps that have one frequency, for example "1 and 7, 2 and 8"; empty if
@@ -175,7 +178,7 @@ std::string list_shared_frequencies(const LampMap& map) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     for (std::size_t j = i + 1; j < map.lamps.size(); ++j) {
       const Lamp &a = map.lamps[i], &b = map.lamps[j];
-      if (share_frequency(a, b)) pairs.push_back(fmt::format("{} and {}", a.id, b.id));
+      if (are_lamps_indistinguishable(a, b)) pairs.push_back(fmt::format("{} and {}", a.id, b.id));
     }
   }
   const std::size_t more = pairs.size() > kMaxLines ? pairs.size() - kMaxLines : 0;
@@ -186,7 +189,7 @@ std::string list_shared_frequencies(const LampMap& map) {
 
 /// Explains that no lamp is identified, with the reason that most of the lights have.
 std::string explain_no_lamp(const std::vector<Observation>& images, const LampMap& map) {
-  const auto count = [&](LightKind kind) { return count_lights(images, kind); };
+  const auto count = [&](LightKind kind) { return count_lights_of_kind(images, kind); };
   const auto skipped = std::count_if(images.begin(), images.end(),
                                      [](const Observation& image) { return !image.is_kept(); });
   std::string message = fmt::format(
@@ -194,7 +197,7 @@ std::string explain_no_lamp(const std::vector<Observation>& images, const LampMa
       "image's edge, {} lights flicker unlike any lamp of the map, {} are steady, {} have no form)",
       images.size(), skipped, count(LightKind::cut), count(LightKind::unknown),
       count(LightKind::steady), count(LightKind::formless));
-  const auto reasons = count_reasons(images);
+  const auto reasons = count_light_reasons(images);
   if (reasons.empty()) {
     return message + ": are lamps lit and in view, and the exposure long enough?";
   }
@@ -226,7 +229,7 @@ LightDetector make_detector(const LampImages& images, const FrontendOptions& opt
                               : DetectorCamera{Readout::rows, options.row_time_s, {}};
   std::optional<LampClassifier> classifier;
   if (options.classifier.empty()) {
-    check_frequencies(images.lamps, images.lamps_file);
+    check_lamp_frequencies(images.lamps, images.lamps_file);
     if (!camera.row_time_s) {
       throw InputError(
           images.calibration_file,
@@ -243,20 +246,20 @@ LightDetector make_detector(const LampImages& images, const FrontendOptions& opt
     if (!known_readout) known_readout = images.calibration->camera.readout;
   }
   const std::size_t num_warnings = result.warnings.size();
-  camera.readout =
-      find_readout(list_lamp_images(images.images), known_readout, options, imager_px, result);
+  camera.readout = estimate_readout_direction(list_lamp_images(images.images), known_readout,
+                                              options, imager_px, result);
   // Without a calibration the readout direction is chosen per image.
   if (!images.calibration) result.warnings.resize(num_warnings);
-  if (!classifier) warn_of_map(images, camera, options.exposure_s, result.warnings);
+  if (!classifier) warn_about_map(images, camera, options.exposure_s, result.warnings);
   return LightDetector(images.lamps, camera, std::move(classifier));
 }
 
 /// Returns the level rotations of a set of images, by its table of captures.
-LevelRotations read_levels(const LampImages& images) {
+LevelRotations read_level_rotations(const LampImages& images) {
   if (!images.calibration) return {};
   CapturesTable captures = images.captures.value_or(CapturesTable());
-  if (!images.captures && !is_video_name(images.images))
-    captures = read_captures_of_folder(images.images);
+  if (!images.captures && !is_video_file_name(images.images))
+    captures = read_captures_csv_of_folder(images.images);
   return compute_level_rotations(captures, *images.calibration, images.yaw_in_robot_rad);
 }
 
@@ -290,7 +293,7 @@ LampIntake::LampIntake(LightDetector detector, ImageUse use, const FrontendOptio
       imager_px_(imager_px) {}
 
 LampIntake::LampIntake(const LampImages& images, ImageUse use, const FrontendOptions& options)
-    : levels_(read_levels(images)),
+    : levels_(read_level_rotations(images)),
       detector_(make_detector(images, options, remarks_)),
       use_(use),
       options_(options),
@@ -299,54 +302,56 @@ LampIntake::LampIntake(const LampImages& images, ImageUse use, const FrontendOpt
   if (!options.annotate.empty()) create_annotate_folder(options.annotate, images.images);
 }
 
-LampIntake LampIntake::with_levels(const LevelRotations& levels) const {
+LampIntake LampIntake::copy_with_level_rotations(const LevelRotations& levels) const {
   LampIntake other = *this;
   other.use_ = ImageUse::fixes;
   for (const auto& [image, level] : levels) other.levels_.insert_or_assign(image, level);
   return other;
 }
 
-LampIntake LampIntake::with_annotate(const fs::path& folder) const {
+LampIntake LampIntake::with_annotation_folder(const fs::path& folder) const {
   LampIntake other = *this;
   other.options_.annotate = folder;
   return other;
 }
 
-Observation LampIntake::observe(const SourceImage& source) const {
+Observation LampIntake::detect_in_image(const SourceImage& source) const {
   Observation result{source.file, source.time_s};
   result.readout = detector_.readout();
   cv::Mat pixels;
-  observe_pixels(source, options_, imager_px_, result, [&](const cv::Mat& image) {
+  read_image_and_detect(source, options_, imager_px_, result, [&](const cv::Mat& image) {
     pixels = image;
-    if (min_lamps(use_) > 0 && is_flat(image)) reject_without_signal(image, result);
+    if (min_lamps_for_use(use_) > 0 && is_image_uniform(image))
+      reject_image_without_signal(image, result);
     if (!result.is_kept()) return;
-    const auto level = levels_.find(result.name());
+    const auto level = levels_.find(result.file_name());
     const LightDetector detector =
         level == levels_.end() ? detector_ : detector_.with_tilt(level->second);
     if (can_turn_) {
-      auto [readout, lights] = detect_with_either_readout(detector, image_view(image));
+      auto [readout, lights] = detect_lights_with_unknown_readout(detector, to_image_view(image));
       result.readout = readout;
       result.lights = std::move(lights);
     } else {
-      result.lights = detector.detect(image_view(image));
+      result.lights = detector.detect(to_image_view(image));
     }
-    if (std::cmp_less(collect_lamps(result).size(), min_lamps(use_)))
-      reject_few_lamps(image, result);
+    if (std::cmp_less(collect_identified_lamps(result).size(), min_lamps_for_use(use_)))
+      reject_image_with_few_lamps(image, result);
   });
   if (!options_.annotate.empty() && !pixels.empty()) {
-    write_annotated(options_.annotate, source.file,
-                    render_annotated(pixels, result.lights, result.readout));
+    write_annotated_image(options_.annotate, source.file,
+                          render_annotated_image(pixels, result.lights, result.readout));
   }
   for (Light& light : result.lights) std::vector<EdgePoint>().swap(light.outline);
   return result;
 }
 
-Observations LampIntake::observe_all(const std::vector<fs::path>& files,
-                                     const IntakeProgress& progress) const {
+Observations LampIntake::detect_in_all_images(const std::vector<fs::path>& files,
+                                              const IntakeProgress& progress) const {
   ImageSource source(files, options_, imager_px_);
-  Observations result = observe_images(
-      source, options_.threads, [&](const SourceImage& image) { return observe(image); }, progress);
-  reject_repeated(result.images, use_, options_);
+  Observations result = detect_in_images(
+      source, options_.threads, [&](const SourceImage& image) { return detect_in_image(image); },
+      progress);
+  reject_repeated_images(result.images, use_, options_);
   const auto turned =
       std::count_if(result.images.begin(), result.images.end(),
                     [&](const Observation& image) { return image.readout != detector_.readout(); });
@@ -360,41 +365,44 @@ Observations LampIntake::observe_all(const std::vector<fs::path>& files,
 }
 
 std::vector<fs::path> list_lamp_images(const fs::path& images) {
-  return is_video_name(images) ? std::vector{images} : list_images(images);
+  return is_video_file_name(images) ? std::vector{images} : list_images(images);
 }
 
-Observations observe_lamps(const LampImages& images, ImageUse use, const FrontendOptions& options,
-                           const IntakeProgress& progress) {
-  Observations result =
-      LampIntake(images, use, options).observe_all(list_lamp_images(images.images), progress);
-  check_lamps_seen(images, result);
+Observations detect_lamps_in_images(const LampImages& images, ImageUse use,
+                                    const FrontendOptions& options,
+                                    const IntakeProgress& progress) {
+  Observations result = LampIntake(images, use, options)
+                            .detect_in_all_images(list_lamp_images(images.images), progress);
+  check_lamps_identified(images, result);
   return result;
 }
 
-void check_lamps_seen(const LampImages& images, Observations& result) {
-  check_any_readable(images.images, result.images);
-  if (count_lights(result.images, LightKind::lamp) == 0) {
+void check_lamps_identified(const LampImages& images, Observations& result) {
+  check_any_image_readable(images.images, result.images);
+  if (count_lights_of_kind(result.images, LightKind::lamp) == 0) {
     result.failure = {false, explain_no_lamp(result.images, images.lamps)};
   } else if (std::none_of(result.images.begin(), result.images.end(),
                           [](const Observation& image) { return image.is_kept(); })) {
-    result.failure = {false, describe_none_kept(result.images)};
+    result.failure = {false, describe_why_no_image_is_kept(result.images)};
   }
 }
 
-Readout find_readout(const std::vector<fs::path>& images, const std::optional<Readout>& known,
-                     const FrontendOptions& options,
-                     const std::optional<std::array<int, 2>>& imager_px, Observations& result) {
+Readout estimate_readout_direction(const std::vector<fs::path>& images,
+                                   const std::optional<Readout>& known,
+                                   const FrontendOptions& options,
+                                   const std::optional<std::array<int, 2>>& imager_px,
+                                   Observations& result) {
   if (known) return *known;
   ImageSource source(images, options, imager_px);
   cv::Mat pixels;
-  const auto found = find_readout(source.expected(), [&](std::size_t) {
-    const auto image = source.next();
+  const auto found = estimate_readout_direction(source.expected_image_count(), [&](std::size_t) {
+    const auto image = source.read_next();
     pixels.release();
     try {
       if (image) pixels = image->read(options);
     } catch (const InputError&) {  // rejected when its lights are detected
     }
-    return image_view(pixels);
+    return to_image_view(pixels);
   });
   if (!found) {
     result.warnings.emplace_back(
@@ -407,7 +415,7 @@ Readout find_readout(const std::vector<fs::path>& images, const std::optional<Re
   return *found;
 }
 
-void check_frequencies(const LampMap& lamps, const fs::path& lamps_file) {
+void check_lamp_frequencies(const LampMap& lamps, const fs::path& lamps_file) {
   if (std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
                   [](const Lamp& lamp) { return lamp.frequency_hz.has_value(); })) {
     return;
@@ -416,10 +424,11 @@ void check_frequencies(const LampMap& lamps, const fs::path& lamps_file) {
                    "no lamp has a frequency_hz, which is needed to identify lamps; add it");
 }
 
-void check_lamps(std::span<const Frame> frames, const LampMap& lamps, const fs::path& lamps_file) {
+void check_lamps_in_map(std::span<const Frame> frames, const LampMap& lamps,
+                        const fs::path& lamps_file) {
   for (const Frame& frame : frames) {
     for (const Detection& detection : frame.detections) {
-      if (find_lamp(lamps.lamps, detection.lamp) != nullptr) return;
+      if (find_lamp_by_id(lamps.lamps, detection.lamp) != nullptr) return;
     }
   }
   throw InputError(lamps_file, "has none of the lamps in the captures");

@@ -22,7 +22,7 @@
 namespace vlp {
 
 /// Rotations level_from_camera of images, by name; std::nullopt if unknown
-/// (LightDetector::leaning).
+/// (LightDetector::with_tilt()).
 using LevelRotations = std::map<std::string, std::optional<Eigen::Matrix3d>>;
 
 /// Computes level_from_camera from the inclination of a robot. Its yaw is arbitrary; a detector
@@ -62,7 +62,7 @@ class LampIntake {
              const std::optional<std::array<int, 2>>& imager_px, LevelRotations levels = {});
 
   /// Creates the intake of a set of images: reads the classifier and estimates the readout
-  /// direction if it is not known. observe_all() returns its notes and warnings, too.
+  /// direction if it is not known. detect_in_all_images() returns its notes and warnings, too.
   /// @throws InputError if the row time, the frequencies or images are missing, if the classifier
   /// is
   ///         for other lamps or another row time, or if captures.csv cannot be read
@@ -72,17 +72,17 @@ class LampIntake {
   /// dark, overexposed, or shows fewer lamps than its use needs. Repeated images are not rejected
   /// here, see Selection.
   /// @throws InputError if an annotated image cannot be written
-  Observation observe(const SourceImage& source) const;
+  Observation detect_in_image(const SourceImage& source) const;
 
   /// Returns an intake that repeats a detection with other level rotations for some images. It
   /// rejects no image for its content.
-  LampIntake with_levels(const LevelRotations& levels) const;
+  LampIntake copy_with_level_rotations(const LevelRotations& levels) const;
   /// Returns the same intake with annotated images in `folder`; without them if it is empty.
-  LampIntake with_annotate(const std::filesystem::path& folder) const;
+  LampIntake with_annotation_folder(const std::filesystem::path& folder) const;
 
-  /// Applies observe() to images and videos.
-  Observations observe_all(const std::vector<std::filesystem::path>& files,
-                           const IntakeProgress& progress = {}) const;
+  /// Applies detect_in_image() to images and videos.
+  Observations detect_in_all_images(const std::vector<std::filesystem::path>& files,
+                                    const IntakeProgress& progress = {}) const;
 
   Readout readout() const { return detector_.readout(); }
 
@@ -94,7 +94,8 @@ class LampIntake {
   ImageUse use_;
   FrontendOptions options_;
   std::optional<std::array<int, 2>> imager_px_;
-  /// True if an image may be read out in the other direction (detect_with_either_readout()).
+  /// True if an image may be read out in the other direction
+  /// (detect_lights_with_unknown_readout()).
   bool can_turn_ = false;
 };
 
@@ -105,26 +106,29 @@ std::vector<std::filesystem::path> list_lamp_images(const std::filesystem::path&
 /// of lamps in the map that are hard to distinguish. Sets Observations::failure if no lamp is
 /// identified or no image can be used.
 /// @throws InputError as LampIntake, and if no image can be read
-Observations observe_lamps(const LampImages& images, ImageUse use, const FrontendOptions& options,
-                           const IntakeProgress& progress = {});
+Observations detect_lamps_in_images(const LampImages& images, ImageUse use,
+                                    const FrontendOptions& options,
+                                    const IntakeProgress& progress = {});
 
 /// Sets Observations::failure if no lamp is identified in any image, or no image is kept.
 /// @throws InputError if no image can be read
-void check_lamps_seen(const LampImages& images, Observations& result);
+void check_lamps_identified(const LampImages& images, Observations& result);
 
 /// Estimates the readout direction from images unless it is known. Adds a note to `result`, or a
 /// warning if the images do not determine it and rows are assumed.
-Readout find_readout(const std::vector<std::filesystem::path>& images,
-                     const std::optional<Readout>& known, const FrontendOptions& options,
-                     const std::optional<std::array<int, 2>>& imager_px, Observations& result);
+Readout estimate_readout_direction(const std::vector<std::filesystem::path>& images,
+                                   const std::optional<Readout>& known,
+                                   const FrontendOptions& options,
+                                   const std::optional<std::array<int, 2>>& imager_px,
+                                   Observations& result);
 
 /// Checks the frequencies of a lamp map.
 /// @throws InputError if no lamp has a frequency
-void check_frequencies(const LampMap& lamps, const std::filesystem::path& lamps_file);
+void check_lamp_frequencies(const LampMap& lamps, const std::filesystem::path& lamps_file);
 
 /// Checks that a lamp map belongs to captures.
 /// @throws InputError if the map has none of the lamps in the captures
-void check_lamps(std::span<const Frame> frames, const LampMap& lamps,
-                 const std::filesystem::path& lamps_file);
+void check_lamps_in_map(std::span<const Frame> frames, const LampMap& lamps,
+                        const std::filesystem::path& lamps_file);
 
 }  // namespace vlp

@@ -35,7 +35,7 @@ std::string lamp_name(const Light& light) { return light.lamp ? std::to_string(*
 
 }  // namespace
 
-int count_lights(std::span<const Observation> images, LightKind kind) {
+int count_lights_of_kind(std::span<const Observation> images, LightKind kind) {
   std::ptrdiff_t count = 0;
   for (const Observation& image : images) {
     count += std::count_if(image.lights.begin(), image.lights.end(),
@@ -44,7 +44,7 @@ int count_lights(std::span<const Observation> images, LightKind kind) {
   return static_cast<int>(count);
 }
 
-std::vector<CountedReason> count_reasons(std::span<const Observation> images) {
+std::vector<CountedReason> count_light_reasons(std::span<const Observation> images) {
   std::map<std::pair<LightKind, LightReason>, int> counts;
   for (const Observation& image : images) {
     for (const Light& light : image.lights) {
@@ -136,26 +136,29 @@ std::string describe_light(const Light& light) {
                     stripes.periods, stripes.period_lines, stripes.periodicity_r2, light.coherence);
 }
 
-void write_lights(const std::filesystem::path& file, std::span<const Observation> images) {
+void write_lights_table(const std::filesystem::path& file, std::span<const Observation> images) {
   CsvWriter csv(file, {"image", "kind", "reason", "lamp", "u_px", "v_px", "sigma_px", "radius_px",
                        "outline", "edge_rise_px", "inlier_fraction", "contrast", "period_lines",
                        "periods", "periodicity_r2", "coherence", "duty"});
-  const auto number_if = [](bool there, double value) { return there ? fixed(value, 4) : ""; };
+  const auto number_if = [](bool there, double value) {
+    return there ? format_fixed_decimals(value, 4) : "";
+  };
   for (const Observation& image : images) {
     for (const Light& light : image.lights) {
       const Stripes& stripes = light.stripes;
       const bool form = light.kind != LightKind::formless;
       const bool striped = form && stripes.period_lines > 0;
-      csv.row({image.name(), to_string(light.kind), to_string(light.reason), lamp_name(light),
-               fixed(light.pixel.x(), 4), fixed(light.pixel.y(), 4),
-               number_if(form, light.sigma_px), fixed(light.radius_px, 4), outline_name(light),
-               number_if(form, light.rise_px), number_if(form, light.roundness),
-               number_if(form, stripes.contrast), number_if(striped, stripes.period_lines),
-               number_if(striped, stripes.periods), number_if(striped, stripes.periodicity_r2),
-               number_if(striped, light.coherence), number_if(striped, stripes.duty)});
+      csv.row({image.file_name(), to_string(light.kind), to_string(light.reason), lamp_name(light),
+               format_fixed_decimals(light.pixel.x(), 4), format_fixed_decimals(light.pixel.y(), 4),
+               number_if(form, light.sigma_px), format_fixed_decimals(light.radius_px, 4),
+               outline_name(light), number_if(form, light.rise_px),
+               number_if(form, light.roundness), number_if(form, stripes.contrast),
+               number_if(striped, stripes.period_lines), number_if(striped, stripes.periods),
+               number_if(striped, stripes.periodicity_r2), number_if(striped, light.coherence),
+               number_if(striped, stripes.duty)});
     }
   }
-  csv.save();
+  csv.save_file();
 }
 
 namespace {
@@ -179,14 +182,14 @@ std::string make_label(const Light& light) {
   return std::to_string(*light.lamp) + (light.kind == LightKind::cut ? " cut" : "");
 }
 
-cv::Point fine(const Eigen::Vector2d& pixel) {
+cv::Point to_fixed_point(const Eigen::Vector2d& pixel) {
   constexpr double unit = 1 << kShift;
   return {static_cast<int>(std::lround(pixel.x() * unit)),
           static_cast<int>(std::lround(pixel.y() * unit))};
 }
 
 /// Converts an image to color and brightens it, so that dark surroundings are visible.
-cv::Mat brightened(const cv::Mat& image) {
+cv::Mat brighten_image(const cv::Mat& image) {
   constexpr double gamma = 0.5;
   const double white = image.depth() == CV_8U ? 255 : 65535;
   cv::Mat levels, result;
@@ -214,8 +217,9 @@ void write_label(cv::Mat& picture, const Light& light, double size) {
 
 }  // namespace
 
-cv::Mat render_annotated(const cv::Mat& image, const std::vector<Light>& lights, Readout readout) {
-  cv::Mat picture = brightened(image);
+cv::Mat render_annotated_image(const cv::Mat& image, const std::vector<Light>& lights,
+                               Readout readout) {
+  cv::Mat picture = brighten_image(image);
   const double size = std::max(1.0, picture.cols / 1000.0);  // of letters and crosses
   const int thickness = static_cast<int>(std::lround(size));
   for (const Light& light : lights) {
@@ -223,23 +227,24 @@ cv::Mat render_annotated(const cv::Mat& image, const std::vector<Light>& lights,
     for (const EdgePoint& edge : light.outline) {
       const Eigen::Vector2d at =
           readout == Readout::rows ? edge.pixel : Eigen::Vector2d(edge.pixel.reverse());
-      cv::circle(picture, fine(at), fine({size, 0}).x, color, cv::FILLED, cv::LINE_AA, kShift);
+      cv::circle(picture, to_fixed_point(at), to_fixed_point({size, 0}).x, color, cv::FILLED,
+                 cv::LINE_AA, kShift);
     }
     const Eigen::Vector2d across(6 * size, 0), along(0, 6 * size);
-    cv::line(picture, fine(light.pixel - across), fine(light.pixel + across), color, thickness,
-             cv::LINE_AA, kShift);
-    cv::line(picture, fine(light.pixel - along), fine(light.pixel + along), color, thickness,
-             cv::LINE_AA, kShift);
+    cv::line(picture, to_fixed_point(light.pixel - across), to_fixed_point(light.pixel + across),
+             color, thickness, cv::LINE_AA, kShift);
+    cv::line(picture, to_fixed_point(light.pixel - along), to_fixed_point(light.pixel + along),
+             color, thickness, cv::LINE_AA, kShift);
     write_label(picture, light, size);
   }
   return picture;
 }
 
-void write_annotated(const std::filesystem::path& folder, const std::filesystem::path& image_file,
-                     const cv::Mat& picture) {
+void write_annotated_image(const std::filesystem::path& folder,
+                           const std::filesystem::path& image_file, const cv::Mat& picture) {
   std::filesystem::path file = folder / image_file.filename();
   file += ".png";
-  write_file(file, codecs().encode(".png", picture, {}));
+  write_file(file, get_codecs().encode_image_file(".png", picture, {}));
 }
 
 }  // namespace vlp

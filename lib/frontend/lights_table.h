@@ -16,7 +16,7 @@
 namespace vlp {
 
 /// Returns the number of lights of a kind.
-int count_lights(std::span<const Observation> images, LightKind kind);
+int count_lights_of_kind(std::span<const Observation> images, LightKind kind);
 
 /// Number of lights with the same kind and reason.
 struct CountedReason {
@@ -27,7 +27,7 @@ struct CountedReason {
 
 /// Counts the lights that are no lamps, per kind and reason. The most frequent reason comes first.
 /// Lights without outline come last, because they are rarely lamps.
-std::vector<CountedReason> count_reasons(std::span<const Observation> images);
+std::vector<CountedReason> count_light_reasons(std::span<const Observation> images);
 
 /// Returns the enumerator as a word, for example "steady" and "too_few_periods".
 std::string_view to_string(LightKind kind);
@@ -44,19 +44,20 @@ std::string describe_light(const Light& light);
 /// inlier_fraction, contrast, period_lines, periods, periodicity_r2, coherence, duty; see Light and
 /// Stripes. Cells are empty for a light without lamp, stripes or outline.
 /// @throws InputError if the file cannot be written
-void write_lights(const std::filesystem::path& file, std::span<const Observation> images);
+void write_lights_table(const std::filesystem::path& file, std::span<const Observation> images);
 
 /// Renders the detected lights into a brightened color copy of an image, for visual inspection.
 /// Draws outline points, center, kind and reason of each light. Lamps are green, truncated lights
 /// yellow, unknown ones red, unmodulated ones blue, and lights without outline gray.
 ///
 /// @param image  one channel of 8 or 16 bits
-cv::Mat render_annotated(const cv::Mat& image, const std::vector<Light>& lights, Readout readout);
+cv::Mat render_annotated_image(const cv::Mat& image, const std::vector<Light>& lights,
+                               Readout readout);
 
 /// Writes an annotated image atomically as PNG into `folder`, named like the image with `.png`
 /// appended.
 /// @throws InputError if the file cannot be written
-void write_annotated(const std::filesystem::path& folder, const std::filesystem::path& image_file,
-                     const cv::Mat& picture);
+void write_annotated_image(const std::filesystem::path& folder,
+                           const std::filesystem::path& image_file, const cv::Mat& picture);
 
 }  // namespace vlp

@@ -11,7 +11,7 @@ namespace vlp {
 /// Returns a view of an image's pixels, which is valid as long as the image. Empty for an empty
 /// image.
 /// @pre The image has one channel of 8 or 16 bits, or is empty.
-inline ImageView image_view(const cv::Mat& image) {
+inline ImageView to_image_view(const cv::Mat& image) {
   if (image.empty()) return {};
   CV_Assert(image.type() == CV_8UC1 || image.type() == CV_16UC1);
   return {image.data, image.cols, image.rows, std::ptrdiff_t(image.step[0]),

@@ -18,7 +18,7 @@ namespace vlp {
 namespace {
 
 /// Returns a message without the name of the file that it begins with, in one line.
-std::string message_about(const std::filesystem::path& file, const std::exception& error) {
+std::string make_one_line_message(const std::filesystem::path& file, const std::exception& error) {
   std::string message = error.what();
   std::replace(message.begin(), message.end(), '\n', ' ');
   const std::string prefix = file.string() + ": ";
@@ -66,7 +66,7 @@ void prepend_remarks(const Observations& remarks, Observations& result) {
   result.notes.insert(result.notes.begin(), remarks.notes.begin(), remarks.notes.end());
 }
 
-std::vector<Detection> collect_lamps(const Observation& image) {
+std::vector<Detection> collect_identified_lamps(const Observation& image) {
   std::vector<Detection> lamps;
   for (const Light& light : image.lights) {
     if (light.kind == LightKind::lamp) lamps.push_back({*light.lamp, light.pixel, light.sigma_px});
@@ -85,12 +85,12 @@ std::vector<BoardView> collect_kept_views(std::span<const Observation> images) {
 std::vector<Frame> collect_kept_frames(std::span<const Observation> images) {
   std::vector<Frame> frames;
   for (const Observation& image : images) {
-    if (image.is_kept()) frames.push_back({image.name(), collect_lamps(image)});
+    if (image.is_kept()) frames.push_back({image.file_name(), collect_identified_lamps(image)});
   }
   return frames;
 }
 
-std::string summarize_rejections(std::span<const Observation> images) {
+std::string summarize_image_rejections(std::span<const Observation> images) {
   std::map<std::pair<RejectionReason, std::string>, int> counts;
   std::map<std::pair<RejectionReason, std::string>, std::string> remedies;
   int rejected = 0;
@@ -113,12 +113,13 @@ std::string summarize_rejections(std::span<const Observation> images) {
   return text.append(remedy);
 }
 
-std::string describe_none_kept(std::span<const Observation> images) {
+std::string describe_why_no_image_is_kept(std::span<const Observation> images) {
   return fmt::format("none of the {} images can be used: {}", images.size(),
-                     summarize_rejections(images));
+                     summarize_image_rejections(images));
 }
 
-void check_any_readable(const std::filesystem::path& where, std::span<const Observation> images) {
+void check_any_image_readable(const std::filesystem::path& where,
+                              std::span<const Observation> images) {
   const auto is_readable = [](const Observation& image) {
     return image.is_kept() || (image.rejection->reason != RejectionReason::unreadable &&
                                image.rejection->reason != RejectionReason::wrong_size);
@@ -126,33 +127,33 @@ void check_any_readable(const std::filesystem::path& where, std::span<const Obse
   if (std::any_of(images.begin(), images.end(), is_readable)) return;
   std::string message = fmt::format("none of its {} images can be used", images.size());
   if (!images.empty()) {
-    message += fmt::format("; the first, {}: {}", images.front().name(),
+    message += fmt::format("; the first, {}: {}", images.front().file_name(),
                            images.front().rejection->message);
   }
   throw InputError(where, message);
 }
 
-void observe_pixels(const SourceImage& source, const FrontendOptions& options,
-                    const std::optional<std::array<int, 2>>& imager_px, Observation& result,
-                    const std::function<void(const cv::Mat&)>& detect) {
+void read_image_and_detect(const SourceImage& source, const FrontendOptions& options,
+                           const std::optional<std::array<int, 2>>& imager_px, Observation& result,
+                           const std::function<void(const cv::Mat&)>& detect) {
   RejectionReason reason = RejectionReason::unreadable;
   try {
     const cv::Mat image = source.read(options);
     result.size_px = {image.cols, image.rows};
     reason = RejectionReason::wrong_size;
-    check_imager(source.file, result.size_px, imager_px);
+    check_image_matches_imager(source.file, result.size_px, imager_px);
     reason = RejectionReason::unreadable;
     detect(image);
   } catch (const InputError& error) {
-    result.reject(reason, message_about(source.file, error));
+    result.set_rejection(reason, make_one_line_message(source.file, error));
   } catch (const std::exception& error) {
-    result.reject(reason, "cannot be used: " + message_about(source.file, error));
+    result.set_rejection(reason, "cannot be used: " + make_one_line_message(source.file, error));
   }
 }
 
-Observations observe_images(ImageSource& source, int threads,
-                            const std::function<Observation(const SourceImage&)>& observe,
-                            const IntakeProgress& progress) {
+Observations detect_in_images(ImageSource& source, int threads,
+                              const std::function<Observation(const SourceImage&)>& observe,
+                              const IntakeProgress& progress) {
   Observations result;
   std::mutex counting;
   std::size_t done = 0;
@@ -162,19 +163,19 @@ Observations observe_images(ImageSource& source, int threads,
     if (result.images.size() <= image.index) result.images.resize(image.index + 1);
     result.images[image.index] = std::move(observation);
     ++done;
-    if (progress) progress(done, std::max(done, source.expected()));
+    if (progress) progress(done, std::max(done, source.expected_image_count()));
   });
-  result.warnings = source.warnings();
+  result.warnings = source.video_warnings();
   return result;
 }
 
 namespace {
 
 /// Returns the corners of the board, or the lamps by their ids, sorted by index.
-std::vector<PointDetection> points_in(const Observation& image) {
-  if (image.board) return collect_corners(image.board->seen);
+std::vector<PointDetection> get_points_in(const Observation& image) {
+  if (image.board) return collect_detected_corners(image.board->seen);
   std::vector<PointDetection> points;
-  for (const Detection& lamp : collect_lamps(image)) {
+  for (const Detection& lamp : collect_identified_lamps(image)) {
     points.push_back({static_cast<std::size_t>(lamp.lamp), lamp.pixel});
   }
   std::sort(points.begin(), points.end(),
@@ -182,15 +183,15 @@ std::vector<PointDetection> points_in(const Observation& image) {
   return points;
 }
 
-bool are_equal(const std::vector<PointDetection>& a, const std::vector<PointDetection>& b) {
+bool are_points_equal(const std::vector<PointDetection>& a, const std::vector<PointDetection>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(),
                     [](const PointDetection& one, const PointDetection& two) {
                       return one.index == two.index && one.pixel == two.pixel;
                     });
 }
 
-bool are_close(const std::vector<PointDetection>& a, const std::vector<PointDetection>& b,
-               double max_distance_px) {
+bool are_points_close(const std::vector<PointDetection>& a, const std::vector<PointDetection>& b,
+                      double max_distance_px) {
   constexpr double min_shared_fraction = 0.7;
   double sum_px2 = 0, shared = 0;
   auto other = b.begin();
@@ -207,32 +208,34 @@ bool are_close(const std::vector<PointDetection>& a, const std::vector<PointDete
 
 }  // namespace
 
-int min_lamps(ImageUse use) { return use == ImageUse::turn || use == ImageUse::places ? 2 : 0; }
+int min_lamps_for_use(ImageUse use) {
+  return use == ImageUse::turn || use == ImageUse::places ? 2 : 0;
+}
 
 void Selection::add(Observation& image) {
   if (!image.is_kept() || use_ == ImageUse::fixes) return;
-  std::vector<PointDetection> points = points_in(image);
+  std::vector<PointDetection> points = get_points_in(image);
   if (points.empty()) return;
   for (const Kept& kept : kept_) {
-    if (!are_equal(points, kept.points)) continue;
-    return image.reject(RejectionReason::same_image, "is the same image as " + kept.name);
+    if (!are_points_equal(points, kept.points)) continue;
+    return image.set_rejection(RejectionReason::same_image, "is the same image as " + kept.name);
   }
   if (use_ != ImageUse::places) {
     for (const Kept& kept : kept_) {
-      if (!are_close(points, kept.points, same_view_fraction_ * image.size_px[0])) continue;
-      return image.reject(RejectionReason::same_view,
-                          "shows the same view as " + kept.name + ": views count once");
+      if (!are_points_close(points, kept.points, same_view_fraction_ * image.size_px[0])) continue;
+      return image.set_rejection(RejectionReason::same_view,
+                                 "shows the same view as " + kept.name + ": views count once");
     }
   }
-  kept_.push_back({image.name(), std::move(points)});
+  kept_.push_back({image.file_name(), std::move(points)});
 }
 
 void Selection::keep(const Observation& image) {
-  if (use_ != ImageUse::fixes) kept_.push_back({image.name(), points_in(image)});
+  if (use_ != ImageUse::fixes) kept_.push_back({image.file_name(), get_points_in(image)});
 }
 
-void reject_repeated(std::vector<Observation>& images, ImageUse use,
-                     const FrontendOptions& options) {
+void reject_repeated_images(std::vector<Observation>& images, ImageUse use,
+                            const FrontendOptions& options) {
   Selection selection(use, options);
   for (Observation& image : images) selection.add(image);
 }

@@ -55,7 +55,7 @@ struct Rejection {
 
 /// Result of the intake of one image: its detections, and the rejection if it is not used.
 struct Observation {
-  /// Image file, or frame_name() (VIDEO#000123) for a frame of a video.
+  /// Image file, or make_video_frame_name() (VIDEO#000123) for a frame of a video.
   std::filesystem::path file;
   /// Time of a video's frame since the start of the video.
   std::optional<double> time_s = {};
@@ -74,8 +74,8 @@ struct Observation {
   Readout readout = Readout::rows;
 
   bool is_kept() const { return !rejection; }
-  std::string name() const { return file.filename().string(); }
-  void reject(RejectionReason reason, std::string message) {
+  std::string file_name() const { return file.filename().string(); }
+  void set_rejection(RejectionReason reason, std::string message) {
     rejection = Rejection{reason, std::move(message)};
   }
 };
@@ -101,7 +101,7 @@ struct Observations {
 void prepend_remarks(const Observations& remarks, Observations& result);
 
 /// Returns the lamps among the lights, with their centers.
-std::vector<Detection> collect_lamps(const Observation& image);
+std::vector<Detection> collect_identified_lamps(const Observation& image);
 
 /// Returns the views of the boards in the images that are used.
 std::vector<BoardView> collect_kept_views(std::span<const Observation> images);
@@ -111,20 +111,21 @@ std::vector<Frame> collect_kept_frames(std::span<const Observation> images);
 
 /// Returns the number of rejected images per reason, for example "10 blurred, 2 too dark". Appends
 /// the remedy if one reason applies to more than half of them. Empty if no image is rejected.
-std::string summarize_rejections(std::span<const Observation> images);
+std::string summarize_image_rejections(std::span<const Observation> images);
 
 /// Describes that none of the images can be used, with their number per reason.
-std::string describe_none_kept(std::span<const Observation> images);
+std::string describe_why_no_image_is_kept(std::span<const Observation> images);
 
 /// Checks that at least one image can be read.
 /// @throws InputError with the reason of the first image if none can be read
-void check_any_readable(const std::filesystem::path& where, std::span<const Observation> images);
+void check_any_image_readable(const std::filesystem::path& where,
+                              std::span<const Observation> images);
 
 /// Reads an image and passes its pixels to `detect`. Rejects the image, with the reason, if it
 /// cannot be read, is not of `imager_px`, or makes `detect` throw an exception.
-void observe_pixels(const SourceImage& source, const FrontendOptions& options,
-                    const std::optional<std::array<int, 2>>& imager_px, Observation& result,
-                    const std::function<void(const cv::Mat&)>& detect);
+void read_image_and_detect(const SourceImage& source, const FrontendOptions& options,
+                           const std::optional<std::array<int, 2>>& imager_px, Observation& result,
+                           const std::function<void(const cv::Mat&)>& detect);
 
 /// Callback with the number of images done and their total, as far as the headers of videos report
 /// it. Calls do not overlap.
@@ -132,9 +133,9 @@ using IntakeProgress = std::function<void(std::size_t done, std::size_t total)>;
 
 /// Calls `observe` for each image of the source on several threads and returns the results in the
 /// order of the images. An image that cannot be used does not end the run.
-Observations observe_images(ImageSource& source, int threads,
-                            const std::function<Observation(const SourceImage&)>& observe,
-                            const IntakeProgress& progress = {});
+Observations detect_in_images(ImageSource& source, int threads,
+                              const std::function<Observation(const SourceImage&)>& observe,
+                              const IntakeProgress& progress = {});
 
 /// Use of a set of images, which determines the reasons for a rejection.
 enum class ImageUse {
@@ -170,10 +171,10 @@ class Selection {
 };
 
 /// Applies a Selection to images in their order.
-void reject_repeated(std::vector<Observation>& images, ImageUse use,
-                     const FrontendOptions& options);
+void reject_repeated_images(std::vector<Observation>& images, ImageUse use,
+                            const FrontendOptions& options);
 
 /// Returns the minimum number of lamps that an image needs.
-int min_lamps(ImageUse use);
+int min_lamps_for_use(ImageUse use);
 
 }  // namespace vlp

@@ -20,7 +20,7 @@ struct FrontendOptions {
   /// Every n-th frame of a video is used.
   int every = 1;
 
-  /// Board images: largest sigma of the blur of the sharpest edges (measure_blur()).
+  /// Board images: largest sigma of the blur of the sharpest edges (measure_image_blur()).
   double max_blur_px = 2;
   /// Board images: largest fraction of the board's pixels at full scale. More displaces edges.
   double max_white_fraction = 0.25;

@@ -12,14 +12,14 @@
 namespace vlp {
 
 /// Returns true if the extension is that of a video: AVI, MP4, M4V, MOV, MKV, WebM, MPG, MPEG.
-bool is_video_name(const std::filesystem::path& file);
+bool is_video_file_name(const std::filesystem::path& file);
 
 /// Returns the name of a frame, VIDEO#000123, which replaces the name of an image file. Frames are
 /// numbered from 0; only those that can be decoded count.
-std::string frame_name(const std::string& video, std::size_t number);
+std::string make_video_frame_name(const std::string& video, std::size_t number);
 
 /// Parses the name of a frame, VIDEO#000123, and returns VIDEO; std::nullopt for other names.
-std::optional<std::string> parse_video_name(const std::string& name);
+std::optional<std::string> parse_video_of_frame_name(const std::string& name);
 
 /// Decoded frame of a video.
 struct VideoFrame {
@@ -43,26 +43,26 @@ class Video {
   Video& operator=(const Video&) = delete;
 
   /// Returns the next frame that can be decoded; std::nullopt at the end.
-  std::optional<VideoFrame> next();
+  std::optional<VideoFrame> read_next();
   /// Skips the next frame.
-  void skip();
+  void skip_frame();
 
-  bool is_camera() const;
+  bool is_live_camera() const;
   std::array<int, 2> size_px() const;
   /// Number of frames according to the header of the file; 0 if unknown.
-  std::size_t reported_frames() const;
+  std::size_t reported_frame_count() const;
   /// Describes missing frames in one line without the file name; empty if there are none.
   /// @pre The end of the video has been reached.
-  std::string missing() const;
+  std::string describe_missing_frames() const;
 
  private:
-  bool grab();
+  bool grab_frame();
 
   struct Capture;
   std::string source_;
   std::unique_ptr<Capture> capture_;
   std::size_t grabbed_ = 0;
-  /// Number and time of the last frame that next() returned.
+  /// Number and time of the last frame that read_next() returned.
   std::optional<std::size_t> last_;
   double last_s_ = -1;
   bool gap_ = false, ended_ = false;

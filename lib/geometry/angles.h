@@ -11,7 +11,7 @@ constexpr double rad_from_deg(double angle_deg) { return angle_deg * (std::numbe
 constexpr double deg_from_rad(double angle_rad) { return angle_rad * (180.0 / std::numbers::pi); }
 
 /// Returns the same direction in [-pi, pi], in rad; unchanged if the angle lies there already.
-inline double wrap_rad(double angle_rad) {
+inline double wrap_angle_rad(double angle_rad) {
   return std::abs(angle_rad) <= std::numbers::pi ? angle_rad
                                                  : std::remainder(angle_rad, 2 * std::numbers::pi);
 }

@@ -76,7 +76,7 @@ struct Cholesky {
   }
 
   /// Returns column i of the inverse of A.
-  std::array<double, n> inverse_column(std::size_t i) const {
+  std::array<double, n> compute_inverse_column(std::size_t i) const {
     std::array<double, n> unit{};
     unit[i] = 1;
     return solve(unit);

@@ -14,12 +14,12 @@ inline Eigen::Vector2d complex_product(const Eigen::Vector2d& a, const Eigen::Ve
 }
 
 /// Returns conj(a) b. The real part is the dot product, the imaginary part the cross product.
-inline Eigen::Vector2d conj_product(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+inline Eigen::Vector2d conjugate_product(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return {a.x() * b.x() + a.y() * b.y(), a.x() * b.y() - a.y() * b.x()};
 }
 
 /// Returns the matrix M for which M b is complex_product(a, b).
-inline Eigen::Matrix2d product_matrix(const Eigen::Vector2d& a) {
+inline Eigen::Matrix2d complex_product_matrix(const Eigen::Vector2d& a) {
   return (Eigen::Matrix2d() << a.x(), -a.y(), a.y(), a.x()).finished();
 }
 

@@ -27,7 +27,7 @@ namespace vlp {
 ///
 /// @param squares             squared residuals, not empty
 /// @param degrees_of_freedom  of the residuals; at least one is assumed
-inline double robust_linear_variance(std::vector<double> squares, double degrees_of_freedom) {
+inline double estimate_robust_variance_1d(std::vector<double> squares, double degrees_of_freedom) {
   assert(!squares.empty());
   constexpr double median_of_unit_variance = 0.454936;  // 0.67449^2
   const double rows = static_cast<double>(squares.size());
@@ -40,7 +40,7 @@ inline double robust_linear_variance(std::vector<double> squares, double degrees
 ///
 /// @param squares             squared lengths of the residuals, not empty
 /// @param degrees_of_freedom  of the residuals; at least one is assumed
-inline double robust_planar_variance(std::vector<double> squares, double degrees_of_freedom) {
+inline double estimate_robust_variance_2d(std::vector<double> squares, double degrees_of_freedom) {
   assert(!squares.empty());
   constexpr double median_of_unit_variance = 2 * std::numbers::ln2;
   const double rows = 2 * static_cast<double>(squares.size());
@@ -48,18 +48,19 @@ inline double robust_planar_variance(std::vector<double> squares, double degrees
          std::max(degrees_of_freedom, 1.0);
 }
 
-/// Computes the outlier bound of squared linear residuals, in units of robust_linear_variance().
-/// Normal residuals exceed it as rarely as they exceed sigmas^2 if the variance is known.
+/// Computes the outlier bound of squared linear residuals, in units of
+/// estimate_robust_variance_1d(). Normal residuals exceed it as rarely as they exceed sigmas^2 if
+/// the variance is known.
 inline double compute_squared_outlier_bound_1d(double sigmas, double degrees_of_freedom) {
   constexpr double m_per_residual = 0.367540;  // 2 (2 q phi(q))^2
   return compute_t_squared_bound(sigmas, m_per_residual * std::max(degrees_of_freedom, 1.0));
 }
 
-/// Computes the same bound for planar residuals, in units of robust_planar_variance().
+/// Computes the same bound for planar residuals, in units of estimate_robust_variance_2d().
 ///
 /// Half the quotient is F(2, m), and the quotient exceeds x with the probability
 /// (1 + x / m)^(-m / 2): x = m (exp(sigmas^2 / m) - 1).
-inline double planar_outlier_bound(double sigmas, double degrees_of_freedom) {
+inline double compute_squared_outlier_bound_2d(double sigmas, double degrees_of_freedom) {
   constexpr double m_per_row = std::numbers::ln2 * std::numbers::ln2;
   const double m = m_per_row * std::max(degrees_of_freedom, 1.0);
   return m * std::expm1(sigmas * sigmas / m);

@@ -30,7 +30,8 @@ struct Similarity {
 ///   factor = sum conj(from_i - from')(to_i - to') / sum |from_i - from'|^2,
 ///   offset = to' - factor * from'.
 template <typename From, typename To>
-std::optional<Similarity> fit_similarity(std::size_t count, const From& from, const To& to) {
+std::optional<Similarity> fit_similarity_transform(std::size_t count, const From& from,
+                                                   const To& to) {
   if (count < 2) return std::nullopt;
   Eigen::Vector2d from_mean = Eigen::Vector2d::Zero(), to_mean = Eigen::Vector2d::Zero();
   for (std::size_t i = 0; i < count; ++i) {
@@ -43,7 +44,7 @@ std::optional<Similarity> fit_similarity(std::size_t count, const From& from, co
   double sum_of_squares = 0, from_magnitude = 0, to_magnitude = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Vector2d difference = from(i) - from_mean;
-    product += conj_product(difference, to(i) - to_mean);
+    product += conjugate_product(difference, to(i) - to_mean);
     sum_of_squares += difference.squaredNorm();
     from_magnitude += from(i).squaredNorm();
     to_magnitude += to(i).squaredNorm();

@@ -30,7 +30,7 @@ inline double compute_t_squared_bound(double sigmas, double m) {
 ///
 ///   m (1 - 2 / (9 m) + sigmas sqrt(2 / (9 m)))^3
 /// Source: Wilson and Hilferty, The distribution of chi-square (1931).
-inline double chi_squared_bound(double sigmas, double m) {
+inline double compute_chi_squared_bound(double sigmas, double m) {
   const double part = 2 / (9 * m);
   const double root = 1 - part + sigmas * std::sqrt(part);
   return m * root * root * root;

@@ -20,9 +20,11 @@ SymmetricEigen<N> decompose(const Eigen::Matrix<double, N, N>& matrix) {
 
 }  // namespace
 
-SymmetricEigen<2> decompose_symmetric(const Eigen::Matrix2d& matrix) { return decompose(matrix); }
+SymmetricEigen<2> eigendecompose_symmetric(const Eigen::Matrix2d& matrix) {
+  return decompose(matrix);
+}
 
-SymmetricEigen<Eigen::Dynamic> decompose_symmetric(const Eigen::MatrixXd& matrix) {
+SymmetricEigen<Eigen::Dynamic> eigendecompose_symmetric(const Eigen::MatrixXd& matrix) {
   return decompose(matrix);
 }
 

@@ -18,8 +18,8 @@ struct SymmetricEigen {
 };
 
 /// Computes the eigendecomposition of a symmetric matrix. Reads its lower triangle only.
-SymmetricEigen<2> decompose_symmetric(const Eigen::Matrix2d& matrix);
-SymmetricEigen<Eigen::Dynamic> decompose_symmetric(const Eigen::MatrixXd& matrix);
+SymmetricEigen<2> eigendecompose_symmetric(const Eigen::Matrix2d& matrix);
+SymmetricEigen<Eigen::Dynamic> eigendecompose_symmetric(const Eigen::MatrixXd& matrix);
 
 /// Computes the inverse of a positive definite matrix, such as one of normal equations. Returns
 /// std::nullopt if the matrix is not positive definite or its inverse is not finite.

@@ -52,7 +52,7 @@ int compute_max_dark_rows(const LampMap& lamps, const std::optional<double>& row
 
 /// Returns true if no pixel can be brighter: full scale of 8 bits, or of a converter of 10 to 16
 /// bits.
-bool is_full_scale(double level, int bits_per_pixel) {
+bool is_full_scale_level(double level, int bits_per_pixel) {
   constexpr double nearly = 0.98;
   const int min_bits = bits_per_pixel == 16 ? 10 : 8;
   for (int bits = min_bits; bits <= bits_per_pixel; bits += 2) {
@@ -80,16 +80,17 @@ double clipped_fraction(const ImageView& lines, const Eigen::Vector2d& low,
       count += level == brightest ? 1 : 0;
     }
   }
-  if (!is_full_scale(brightest, pixels.bits)) return 0;
+  if (!is_full_scale_level(brightest, pixels.bits)) return 0;
   return double(count) / (double(pixels.width) * pixels.height);
 }
 
 /// Adds the error of an unknown lens to the sigma of the lights. Must be called last, because
-/// keep_best_claim() compares sigmas without this error.
-void add_unknown_lens(const ImageSize& size, std::vector<Light>& lights) {
+/// keep_best_light_of_lamp() compares sigmas without this error.
+void add_error_of_unknown_lens(const ImageSize& size, std::vector<Light>& lights) {
   for (Light& light : lights) {
     if (light.kind == LightKind::formless) continue;
-    const double sigma_px = std::hypot(light.sigma_px, compute_unknown_lens_sd_px(light, size));
+    const double sigma_px =
+        std::hypot(light.sigma_px, predict_center_sd_without_lens_px(light, size));
     light.sigma_px = std::min(sigma_px, kMaxSigma_px);
   }
 }
@@ -97,20 +98,20 @@ void add_unknown_lens(const ImageSize& size, std::vector<Light>& lights) {
 /// Maximum width of a sharp edge, as a fraction of the radius.
 constexpr double kMaxRise = 0.3;
 
-bool is_sharp(const Light& light) { return light.rise_px <= kMaxRise * light.radius_px; }
+bool is_outline_sharp(const Light& light) { return light.rise_px <= kMaxRise * light.radius_px; }
 
 bool has_clear_outline(const Light& light) {
-  return !light.is_glow && !light.is_doubtful && is_sharp(light) &&
+  return !light.is_glow && !light.is_doubtful && is_outline_sharp(light) &&
          light.roundness >= kMinRoundness;
 }
 
 /// Returns true if the center of one light is within the radius of the larger light.
-bool are_at_one_place(const Light& a, const Light& b) {
+bool are_at_same_position(const Light& a, const Light& b) {
   return (a.pixel - b.pixel).norm() < std::max(a.radius_px, b.radius_px);
 }
 
 /// Returns the reason why a light is steady; std::nullopt if it is modulated.
-std::optional<LightReason> find_steady_reason(const Light& light) {
+std::optional<LightReason> find_reason_for_steady_light(const Light& light) {
   constexpr double min_clarity = 0.5, min_clipped = 0.5;
   const Stripes& stripes = light.stripes;
   if (!(stripes.contrast >= kMinContrast)) {
@@ -145,25 +146,26 @@ Blob clip(std::span<const Blob> blobs, const PixelBox& box) {
 
 /// Returns the lit pixels of a light: the blob of which the light is the largest part, or the runs
 /// near its box.
-Blob find_lit_pixels(const PixelBox& box, std::span<const Blob> blobs, const ImageSize& size) {
+Blob find_pixels_above_level(const PixelBox& box, std::span<const Blob> blobs,
+                             const ImageSize& size) {
   constexpr int max_area_ratio = 4;
   for (const Blob& blob : blobs) {
-    const PixelBox whole = blob.box();
+    const PixelBox whole = blob.bounding_box();
     const bool is_most = 2 * intersection(whole, box).area() > box.area();
     if (is_most && whole.area() < max_area_ratio * box.area()) return blob;
   }
-  return clip(blobs, grow(box, std::max(box.width, box.height) / 4, size));
+  return clip(blobs, expand_and_clip_box(box, std::max(box.width, box.height) / 4, size));
 }
 
 Light make_light_without_outline(const ImageView& lines, const ModulatedLight& found,
                                  const LightShape& shape) {
   Light light{};
-  light.pixel = shape.turned(found.center);
+  light.pixel = shape.swap_image_and_scanline_axes(found.center);
   light.sigma_px = std::clamp(found.center_sd_px, kMinSigma_px, kMaxSigma_px);
   light.radius_px = found.radius_px;
   const PixelBox& box = found.box;
-  light.low = shape.turned({box.x - 0.5, box.y - 0.5});
-  light.high = shape.turned(
+  light.low = shape.swap_image_and_scanline_axes({box.x - 0.5, box.y - 0.5});
+  light.high = shape.swap_image_and_scanline_axes(
       {std::min(box.right(), lines.width) - 0.5, std::min(box.bottom(), lines.height) - 0.5});
   light.rise_px = found.radius_px / 2;
   light.roundness = 1;
@@ -172,17 +174,17 @@ Light make_light_without_outline(const ImageView& lines, const ModulatedLight& f
 }
 
 /// Converts a light that was found by its modulation to a Light. The outline is the rim, see
-/// fit_rim(), if the rim is clear. Otherwise the light has no outline, and its center is the
-/// centroid of the lit area. Kind, reason and lamp are not set.
+/// fit_rim_of_light(), if the rim is clear. Otherwise the light has no outline, and its center is
+/// the centroid of the lit area. Kind, reason and lamp are not set.
 ///
 /// @param lines  image whose rows are the scanlines
 /// @param blobs  lit pixels of the image, in which the rim is searched
 Light make_light_from_modulation(const ImageView& lines, const ModulatedLight& found,
                                  std::span<const Blob> blobs, const Background& background,
                                  const LightShape& shape) {
-  const Blob blob = find_lit_pixels(found.box, blobs, lines.size());
+  const Blob blob = find_pixels_above_level(found.box, blobs, lines.size());
   std::optional<Rim> rim;
-  if (!blob.runs.empty()) rim = fit_rim(lines, blob, background, shape);
+  if (!blob.runs.empty()) rim = fit_rim_of_light(lines, blob, background, shape);
   Light light = make_light_without_outline(lines, found, shape);
   if (rim && rim->light.roundness >= kMinRoundness) {
     // Without a clear rim either center may be correct.
@@ -200,7 +202,7 @@ Light make_light_from_modulation(const ImageView& lines, const ModulatedLight& f
 }
 
 /// Merges boxes that overlap, until none do.
-std::vector<PixelBox> merge_overlapping(std::vector<PixelBox> boxes) {
+std::vector<PixelBox> merge_overlapping_boxes(std::vector<PixelBox> boxes) {
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     for (std::size_t j = 0; j < boxes.size(); ++j) {
       if (j == i || intersection(boxes[i], boxes[j]).area() == 0) continue;
@@ -270,10 +272,10 @@ LightDetector LightDetector::with_readout_direction(Readout readout) const {
   return {lamps_, camera, classifier_};
 }
 
-std::vector<LightPart> LightDetector::find_parts(const ImageView& lines, const Blob& blob,
-                                                 const Background& background) const {
+std::vector<LightPart> LightDetector::find_light_parts(const ImageView& lines, const Blob& blob,
+                                                       const Background& background) const {
   constexpr std::size_t max_lights = 4;
-  const PixelBox box = blob.box();
+  const PixelBox box = blob.bounding_box();
   std::vector<LightPart> parts;
   auto remaining = find_outline(lines, blob, background);
   for (const auto& [kind, detect] : kShapeDetectors) {
@@ -285,7 +287,7 @@ std::vector<LightPart> LightDetector::find_parts(const ImageView& lines, const B
     }
   }
   while (parts.size() < max_lights) {
-    auto light = shape_.fit_light(remaining, background);
+    auto light = shape_.fit_light_to_outline(remaining, background);
     if (!light && !parts.empty()) break;
     auto outline = std::move(remaining);
     remaining = light ? shape_.outside(*light, outline) : std::vector<EdgePoint>();
@@ -299,47 +301,50 @@ std::vector<LightPart> LightDetector::find_parts(const ImageView& lines, const B
   constexpr double min_edge_roundness = 0.5;
   // Each of several touching lights has an edge; their brightness may differ.
   const auto sharp_parts = std::count_if(parts.begin(), parts.end(), [](const LightPart& part) {
-    return part.light && is_sharp(*part.light);
+    return part.light && is_outline_sharp(*part.light);
   });
   const std::optional<Light>& first = parts.front().light;
   const bool has_edge =
-      sharp_parts > 1 ||
-      (sharp_parts == 1 && first && is_sharp(*first) && first->roundness >= min_edge_roundness &&
-       !is_unevenly_lit(lines, blob, first->outline, background));
+      sharp_parts > 1 || (sharp_parts == 1 && first && is_outline_sharp(*first) &&
+                          first->roundness >= min_edge_roundness &&
+                          !is_blob_unevenly_lit(lines, blob, first->outline, background));
   for (LightPart& part : parts) {
     if (part.light) part.light->is_doubtful = !has_edge;
   }
   return parts;
 }
 
-void LightDetector::add_by_modulation(const ImageView& lines, const std::vector<Blob>& blobs,
-                                      const Background& background,
-                                      std::vector<Light>& lights) const {
+void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
+                                                   const std::vector<Blob>& blobs,
+                                                   const Background& background,
+                                                   std::vector<Light>& lights) const {
   const auto is_conclusive = [&](const Light& light) {
     if (!has_clear_outline(light)) return false;
-    const auto steady = find_steady_reason(light);
+    const auto steady = find_reason_for_steady_light(light);
     if (steady) return *steady == LightReason::steady || *steady == LightReason::overexposed;
     return identify_lamp(light.stripes).has_value();
   };
   std::vector<PixelBox> boxes;
   for (const Blob& blob : blobs) {
-    const PixelBox box = blob.box();
+    const PixelBox box = blob.bounding_box();
     const Eigen::Vector2d middle(box.x + box.width / 2.0, box.y + box.height / 2.0);
     const bool is_known = std::any_of(lights.begin(), lights.end(), [&](const Light& light) {
       return is_conclusive(light) &&
-             (shape_.turned(light.pixel) - middle).norm() < light.radius_px / 2 &&
+             (shape_.swap_image_and_scanline_axes(light.pixel) - middle).norm() <
+                 light.radius_px / 2 &&
              std::max(box.width, box.height) < 3 * light.radius_px;
     });
-    if (!is_known) boxes.push_back(grow(box, std::max(box.width, box.height) / 2, lines.size()));
+    if (!is_known)
+      boxes.push_back(expand_and_clip_box(box, std::max(box.width, box.height) / 2, lines.size()));
   }
   for (const ModulatedLight& found : find_modulated_lights(
-           lines, merge_overlapping(std::move(boxes)), background, lamp_periods_)) {
+           lines, merge_overlapping_boxes(std::move(boxes)), background, lamp_periods_)) {
     Light light = make_light_from_modulation(lines, found, blobs, background, shape_);
     if (found.lamp) light.lamp = lamps_by_period_[*found.lamp];
     // Lamps with the same period differ in duty; without known periods a classifier decides.
     const bool has_choice = found.lamp ? !light.lamp : lamp_periods_.empty();
     if (has_choice) light.lamp = identify_lamp(light.stripes);
-    const auto is_at_it = [&](const Light& other) { return are_at_one_place(other, light); };
+    const auto is_at_it = [&](const Light& other) { return are_at_same_position(other, light); };
     const auto is_better = [&](const Light& other) {
       return is_at_it(other) && (!found.lamp || other.by_modulation || is_conclusive(other));
     };
@@ -349,13 +354,15 @@ void LightDetector::add_by_modulation(const ImageView& lines, const std::vector<
   }
 }
 
-void LightDetector::measure(const ImageView& lines, const Background& background,
-                            Light& light) const {
+void LightDetector::refine_and_measure_light(const ImageView& lines, const Background& background,
+                                             Light& light) const {
   if (is_disc(light)) {
-    const DiscImage disc{shape_.turned(light.low), shape_.turned(light.high),
-                         shape_.turned(light.pixel)};
+    const DiscImage disc{shape_.swap_image_and_scanline_axes(light.low),
+                         shape_.swap_image_and_scanline_axes(light.high),
+                         shape_.swap_image_and_scanline_axes(light.pixel)};
     auto outline = refine_outline(lines, light.outline, disc, background);
-    auto better = shape_.fit_light(std::move(outline.points), background, outline.is_mottled);
+    auto better =
+        shape_.fit_light_to_outline(std::move(outline.points), background, outline.is_mottled);
     if (better && 2 * better->outline.size() > light.outline.size()) {
       better->roundness = light.roundness;
       better->outside = light.outside;
@@ -363,20 +370,23 @@ void LightDetector::measure(const ImageView& lines, const Background& background
       light = std::move(*better);
     }
   }
-  const Eigen::Vector2d low = shape_.turned(light.low), high = shape_.turned(light.high);
-  const auto chords = is_disc(light)
-                          ? find_chords_in_ellipse(low, high, lines.size())
-                          : find_chords_in_polygon(shape_.turned(light.face), lines.size());
-  const auto signal = compute_line_signal(lines, chords, background.level);
+  const Eigen::Vector2d low = shape_.swap_image_and_scanline_axes(light.low),
+                        high = shape_.swap_image_and_scanline_axes(light.high);
+  const auto chords =
+      is_disc(light)
+          ? find_chords_in_ellipse(low, high, lines.size())
+          : find_chords_in_polygon(shape_.swap_image_and_scanline_axes(light.face), lines.size());
+  const auto signal = compute_scanline_signal(lines, chords, background.level);
   light.stripes = measure_stripes(signal);
   light.peak = signal.empty() ? 0 : *std::max_element(signal.begin(), signal.end());
   if (light.stripes.period_lines > 0) {
-    light.coherence = compute_coherence(lines, chords, background, light.stripes.period_lines);
+    light.coherence =
+        compute_stripe_coherence(lines, chords, background, light.stripes.period_lines);
   }
   if (light.stripes.contrast < kMinContrast) light.clipped = clipped_fraction(lines, low, high);
 }
 
-void LightDetector::correct_shear(std::vector<Light>& lights) const {
+void LightDetector::correct_centers_for_motion(std::vector<Light>& lights) const {
   const auto has_sharp_circle = [](const Light& light) {
     return !light.sums.empty() && !light.is_glow && !light.is_uneven;
   };
@@ -384,36 +394,38 @@ void LightDetector::correct_shear(std::vector<Light>& lights) const {
   for (const Light& light : lights) {
     if (has_sharp_circle(light)) sums.push_back(light.sums);
   }
-  const auto shear = Shear::estimate(sums);
+  const auto shear = Shear::estimate_shear_from_outlines(sums);
   if (!shear) return;
   for (Light& light : lights) {
     if (!has_sharp_circle(light)) continue;
-    shape_.apply_shear(shear->predict_oval(light.sums), shear->motion_at(light.sums), light);
+    shape_.correct_light_for_motion(shear->predict_oval_from_motion(light.sums),
+                                    shear->motion_per_scanline_of(light.sums), light);
   }
 }
 
 std::vector<Light> LightDetector::detect(const ImageView& image) const {
   const Background background = estimate_background(image);
   const auto [lines, lit, memory] = make_scanline_image(image, camera_.readout, background);
-  const auto blobs =
-      group_pixel_runs(find_pixel_runs(lines, background.threshold, lit), max_dark_rows_);
+  const auto blobs = group_pixel_runs_into_blobs(find_pixel_runs(lines, background.threshold, lit),
+                                                 max_dark_rows_);
   std::vector<LightPart> parts;
   parts.reserve(blobs.size());
   for (const Blob& blob : blobs) {
-    for (LightPart& part : find_parts(lines, blob, background)) parts.push_back(std::move(part));
+    for (LightPart& part : find_light_parts(lines, blob, background))
+      parts.push_back(std::move(part));
   }
-  std::vector<Light> lights = join_parts(parts, shape_, background);
-  for (Light& light : lights) measure(lines, background, light);
-  correct_shear(lights);
-  add_by_modulation(lines, blobs, background, lights);
-  for (Light& light : make_formless_lights(std::move(parts), lights, shape_, lines.size())) {
+  std::vector<Light> lights = join_parts_of_one_light(parts, shape_, background);
+  for (Light& light : lights) refine_and_measure_light(lines, background, light);
+  correct_centers_for_motion(lights);
+  add_lights_found_by_modulation(lines, blobs, background, lights);
+  for (Light& light : make_lights_without_outline(std::move(parts), lights, shape_, lines.size())) {
     lights.push_back(std::move(light));
   }
   std::sort(lights.begin(), lights.end(), [](const Light& a, const Light& b) {
     return a.pixel.y() != b.pixel.y() ? a.pixel.y() < b.pixel.y() : a.pixel.x() < b.pixel.x();
   });
-  identify(lights, image.size());
-  if (!shape_.has_lens()) add_unknown_lens(image.size(), lights);
+  identify_lights(lights, image.size());
+  if (!shape_.has_lens()) add_error_of_unknown_lens(image.size(), lights);
   return lights;
 }
 
@@ -422,7 +434,7 @@ namespace {
 /// Adds the error of a partly hidden light to its sigma. If the aspect ratio differs from that of
 /// the lamp, an object may hide one end: the center of the visible part is offset by half of the
 /// hidden length.
-void add_hidden_end_error(double off, double tilt_sd, Light& light) {
+void add_error_of_hidden_end(double off, double tilt_sd, Light& light) {
   constexpr double clear = 3;
   if (!(off > tilt_sd + clear * light.aspect_sd)) return;
   const double length_px =
@@ -444,12 +456,12 @@ void reject_contradicting_periods(const LampMap& lamps, double row_time_s,
                                   std::vector<Light>& lights) {
   constexpr std::size_t min_lights = 3;
   const auto has_clear_period = [](const Light& light) {
-    return !light.by_modulation && is_reliable(light.stripes);
+    return !light.by_modulation && are_stripes_reliable(light.stripes);
   };
   std::vector<std::pair<Light*, double>> log_ratios;
   std::vector<double> clear_ones;
   for (Light& light : lights) {
-    const Lamp* lamp = light.lamp ? find_lamp(lamps.lamps, *light.lamp) : nullptr;
+    const Lamp* lamp = light.lamp ? find_lamp_by_id(lamps.lamps, *light.lamp) : nullptr;
     if (lamp == nullptr || !lamp->frequency_hz) continue;
     const double log_ratio =
         std::log(light.stripes.period_lines * row_time_s * *lamp->frequency_hz);
@@ -469,7 +481,7 @@ void reject_contradicting_periods(const LampMap& lamps, double row_time_s,
 /// with the smallest sigma is kept, among lights without the largest one. Rejects all if two of
 /// them have similar size and brightness. A mirror reflects less than all light, and lenses darken
 /// the corners of an image.
-void keep_best_claim(int lamp, std::vector<Light>& lights) {
+void keep_best_light_of_lamp(int lamp, std::vector<Light>& lights) {
   constexpr double min_area_ratio = 2, min_peak_ratio = 2;
   std::vector<Light*> claims;
   for (Light& light : lights) {
@@ -514,10 +526,11 @@ std::optional<int> LightDetector::identify_lamp(const Stripes& stripes) const {
   return identify_lamp_by_frequency(lamps_, *camera_.row_time_s, stripes);
 }
 
-std::optional<double> LightDetector::compute_aspect_deviation(const Light& light, int lamp) const {
+std::optional<double> LightDetector::compute_log_aspect_ratio_difference(const Light& light,
+                                                                         int lamp) const {
   // An unknown lens changes the aspect ratio by more than an unknown tilt.
   const double max_off = shape_.has_lens() ? 2 * kUnknownTiltSd : 0.3;
-  const Lamp* mapped = find_lamp(lamps_.lamps, lamp);  // a classifier may have other lamps
+  const Lamp* mapped = find_lamp_by_id(lamps_.lamps, lamp);  // a classifier may have other lamps
   const LampShape shape = mapped != nullptr ? mapped->shape : LampShape();
   if (shape.kind != light.shape) return std::nullopt;
   const double aspect = shape.size_m ? shape.size_m->maxCoeff() / shape.size_m->minCoeff() : 1;
@@ -525,7 +538,7 @@ std::optional<double> LightDetector::compute_aspect_deviation(const Light& light
   return off < max_off ? std::optional(off) : std::nullopt;
 }
 
-void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) const {
+void LightDetector::identify_lights(std::vector<Light>& lights, const ImageSize& size) const {
   // A surface that blurs the image of a lamp reflects less than 5 % of its light in one direction.
   // A tone curve of gamma 2.2 displays this as a quarter of the level.
   constexpr double min_peak_ratio = 0.25;
@@ -533,7 +546,7 @@ void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) 
   double sharpest_px = std::numeric_limits<double>::infinity(), brightest = 0;
   for (Light& light : lights) {
     if (light.kind == LightKind::formless) continue;
-    const auto steady = find_steady_reason(light);
+    const auto steady = find_reason_for_steady_light(light);
     light.kind = steady ? LightKind::steady : LightKind::unknown;
     light.reason = steady.value_or(LightReason::unknown_period);
     if (steady) {
@@ -542,13 +555,13 @@ void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) 
     }
     if (!light.is_uneven && !light.is_glow) sharpest_px = std::min(sharpest_px, light.rise_px);
     if (!light.by_modulation) light.lamp = identify_lamp(light.stripes);
-    if (!is_readable(light.stripes)) light.reason = LightReason::no_clear_period;
+    if (!are_stripes_readable(light.stripes)) light.reason = LightReason::no_clear_period;
     if (!light.lamp) continue;
-    const auto off = compute_aspect_deviation(light, *light.lamp);
+    const auto off = compute_log_aspect_ratio_difference(light, *light.lamp);
     if (!off) {
       reject(light, LightReason::wrong_shape);
     } else if (shape_.has_lens()) {
-      add_hidden_end_error(*off, shape_.has_tilt() ? 0 : kUnknownTiltSd, light);
+      add_error_of_hidden_end(*off, shape_.has_tilt() ? 0 : kUnknownTiltSd, light);
     }
     if (light.lamp && !light.is_glow) brightest = std::max(brightest, light.peak);
   }
@@ -570,7 +583,7 @@ void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) 
   if (camera_.row_time_s && !classifier_) {
     reject_contradicting_periods(lamps_, *camera_.row_time_s, lights);
   }
-  for (const Lamp& lamp : lamps_.lamps) keep_best_claim(lamp.id, lights);
+  for (const Lamp& lamp : lamps_.lamps) keep_best_light_of_lamp(lamp.id, lights);
   const bool sure = std::any_of(lights.begin(), lights.end(), [](const Light& light) {
     return light.lamp && light.stripes.periods >= kMinReliablePeriods;
   });

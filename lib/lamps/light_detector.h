@@ -31,8 +31,8 @@ DetectorCamera make_detector_camera(const Calibration& calibration);
 /// Center: estimated from the outline of the lit scanlines, never from brightness, see LightShape.
 /// Other shapes than discs are searched if the map has them, see ShapeDetector. Where no light with
 /// a clear outline is identified, lights are detected by their modulation, whatever their shape,
-/// see find_modulated_lights(). Their center is that of their rim, see fit_rim(). Without a clear
-/// rim it is the centroid of the lit area.
+/// see find_modulated_lights(). Their center is that of their rim, see fit_rim_of_light(). Without
+/// a clear rim it is the centroid of the lit area.
 ///
 /// Identity: a lamp of frequency f has stripes with a period of 1 / (f row_time) scanlines (Chen
 /// and Guan, section 2.1). With a trained classifier the classifier decides.
@@ -55,20 +55,22 @@ class LightDetector {
 
  private:
   /// Fits outlines to a blob: one, or several if lights touch. Sets Light::is_doubtful.
-  std::vector<LightPart> find_parts(const ImageView& lines, const Blob& blob,
-                                    const Background& background) const;
+  std::vector<LightPart> find_light_parts(const ImageView& lines, const Blob& blob,
+                                          const Background& background) const;
   /// Searches for modulated lights in blobs without an identified light that has a clear outline.
   /// Replaces the lights at the position of each modulated light.
-  void add_by_modulation(const ImageView& lines, const std::vector<Blob>& blobs,
-                         const Background& background, std::vector<Light>& lights) const;
+  void add_lights_found_by_modulation(const ImageView& lines, const std::vector<Blob>& blobs,
+                                      const Background& background,
+                                      std::vector<Light>& lights) const;
   /// Refines the outline of a light and measures its stripes.
-  void measure(const ImageView& lines, const Background& background, Light& light) const;
+  void refine_and_measure_light(const ImageView& lines, const Background& background,
+                                Light& light) const;
   /// Corrects the centers of partly visible lights for camera motion, see Shear.
-  void correct_shear(std::vector<Light>& lights) const;
-  void identify(std::vector<Light>& lights, const ImageSize& size) const;
+  void correct_centers_for_motion(std::vector<Light>& lights) const;
+  void identify_lights(std::vector<Light>& lights, const ImageSize& size) const;
   /// Returns the absolute difference between the log aspect ratios of a light and a lamp. Returns
   /// std::nullopt if the light has another shape or the difference exceeds its limit.
-  std::optional<double> compute_aspect_deviation(const Light& light, int lamp) const;
+  std::optional<double> compute_log_aspect_ratio_difference(const Light& light, int lamp) const;
   /// Returns the id of the lamp with these stripes; std::nullopt if no lamp or several lamps agree.
   std::optional<int> identify_lamp(const Stripes& stripes) const;
 

@@ -6,14 +6,14 @@
 
 namespace vlp {
 
-std::optional<Readout> ReadoutEvidence::readout() const {
+std::optional<Readout> ReadoutDirectionEvidence::readout() const {
   constexpr double min_ratio = 3, min_evidence = 1;
   if (rows >= min_evidence && rows >= min_ratio * columns) return Readout::rows;
   if (columns >= min_evidence && columns >= min_ratio * rows) return Readout::columns;
   return std::nullopt;
 }
 
-double compute_readout_evidence(std::span<const Light> lights) {
+double sum_readout_evidence(std::span<const Light> lights) {
   double sum = 0;
   for (const Light& light : lights) {
     if (!is_modulated(light)) continue;
@@ -22,41 +22,41 @@ double compute_readout_evidence(std::span<const Light> lights) {
   return sum;
 }
 
-void add_evidence(const ImageView& image, ReadoutEvidence& evidence) {
+void add_readout_evidence_of_image(const ImageView& image, ReadoutDirectionEvidence& evidence) {
   const LightDetector by_rows({}, {Readout::rows, {}, {}});
-  evidence.rows += compute_readout_evidence(by_rows.detect(image));
+  evidence.rows += sum_readout_evidence(by_rows.detect(image));
   evidence.columns +=
-      compute_readout_evidence(by_rows.with_readout_direction(Readout::columns).detect(image));
+      sum_readout_evidence(by_rows.with_readout_direction(Readout::columns).detect(image));
 }
 
-std::optional<Readout> find_readout(std::size_t images,
-                                    const std::function<ImageView(std::size_t)>& image) {
+std::optional<Readout> estimate_readout_direction(
+    std::size_t images, const std::function<ImageView(std::size_t)>& image) {
   constexpr double sufficient_evidence = 6;
   constexpr int max_used = 8;
-  ReadoutEvidence evidence;
+  ReadoutDirectionEvidence evidence;
   int used = 0;
   for (std::size_t i = 0; i < images && used < max_used; ++i) {
     const ImageView frame = image(i);
     if (frame.empty()) continue;
     const double before = evidence.rows + evidence.columns;
-    add_evidence(frame, evidence);
+    add_readout_evidence_of_image(frame, evidence);
     if (evidence.rows + evidence.columns > before) ++used;
     if (evidence.rows + evidence.columns >= sufficient_evidence && evidence.readout()) break;
   }
   return evidence.readout();
 }
 
-LightsWithReadout detect_with_either_readout(const LightDetector& detector,
-                                             const ImageView& image) {
+LightsWithReadout detect_lights_with_unknown_readout(const LightDetector& detector,
+                                                     const ImageView& image) {
   const Readout default_readout = detector.readout();
   const Readout other_readout = default_readout == Readout::rows ? Readout::columns : Readout::rows;
   LightsWithReadout result{default_readout, detector.detect(image)};
   std::vector<Light> lights = detector.with_readout_direction(other_readout).detect(image);
-  const double default_evidence = compute_readout_evidence(result.lights),
-               other_evidence = compute_readout_evidence(lights);
-  const ReadoutEvidence evidence = default_readout == Readout::rows
-                                       ? ReadoutEvidence{default_evidence, other_evidence}
-                                       : ReadoutEvidence{other_evidence, default_evidence};
+  const double default_evidence = sum_readout_evidence(result.lights),
+               other_evidence = sum_readout_evidence(lights);
+  const ReadoutDirectionEvidence evidence =
+      default_readout == Readout::rows ? ReadoutDirectionEvidence{default_evidence, other_evidence}
+                                       : ReadoutDirectionEvidence{other_evidence, default_evidence};
   if (evidence.readout() == other_readout) result = {other_readout, std::move(lights)};
   return result;
 }

@@ -15,7 +15,7 @@
 namespace vlp {
 
 /// Evidence of images for each readout direction.
-struct ReadoutEvidence {
+struct ReadoutDirectionEvidence {
   /// Sum over the modulated lights detected with readout along rows, and along columns, of
   /// periodicity times contrast times roundness, each from 0 to 1.
   double rows = 0, columns = 0;
@@ -25,13 +25,13 @@ struct ReadoutEvidence {
   std::optional<Readout> readout() const;
 };
 
-/// Returns the sum of ReadoutEvidence over `lights`, which were detected with one readout
+/// Returns the sum of ReadoutDirectionEvidence over `lights`, which were detected with one readout
 /// direction.
-double compute_readout_evidence(std::span<const Light> lights);
+double sum_readout_evidence(std::span<const Light> lights);
 
-/// Adds the evidence of an image. With the correct readout direction a lamp has stripes; with the
-/// other one it breaks into pieces or has no stripes.
-void add_evidence(const ImageView& image, ReadoutEvidence& evidence);
+/// Adds the evidence of a whole image. With the correct readout direction a lamp has stripes; with
+/// the other one it breaks into pieces or has no stripes.
+void add_readout_evidence_of_image(const ImageView& image, ReadoutDirectionEvidence& evidence);
 
 /// Estimates the readout direction from images in their order, from at most eight images with
 /// modulated lights. Stops when the evidence is clear. Returns std::nullopt if it is not.
@@ -39,8 +39,8 @@ void add_evidence(const ImageView& image, ReadoutEvidence& evidence);
 /// @param images  number of images
 /// @param image   returns an image by index, valid until the next call; empty if the image is
 ///        unusable
-std::optional<Readout> find_readout(std::size_t images,
-                                    const std::function<ImageView(std::size_t)>& image);
+std::optional<Readout> estimate_readout_direction(
+    std::size_t images, const std::function<ImageView(std::size_t)>& image);
 
 /// Lights of an image and the readout direction with which they were detected.
 struct LightsWithReadout {
@@ -50,6 +50,7 @@ struct LightsWithReadout {
 
 /// Detects the lights of an image with unknown readout direction. Uses the detector's direction, or
 /// the other one if the image has clear evidence for it, for example if a phone rotated the image.
-LightsWithReadout detect_with_either_readout(const LightDetector& detector, const ImageView& image);
+LightsWithReadout detect_lights_with_unknown_readout(const LightDetector& detector,
+                                                     const ImageView& image);
 
 }  // namespace vlp

@@ -48,7 +48,7 @@ TwoLampPoses compute_two_lamp_poses(const Sighting& first, const Sighting& secon
       continue;
     }
     const Eigen::Vector2d level_d = height_m * difference + h * second.z;
-    const Eigen::Vector2d turn = conj_product(level_d, d);
+    const Eigen::Vector2d turn = conjugate_product(level_d, d);
     const double length = turn.norm();
     if (!(length > 0)) continue;
     const Eigen::Vector2d heading = turn / length;
@@ -64,13 +64,13 @@ namespace {
 
 constexpr double kSameHeight_m = 1e-6;
 
-bool at_one_height(std::span<const Sighting> sightings) {
+bool are_at_one_height(std::span<const Sighting> sightings) {
   return std::all_of(sightings.begin(), sightings.end(), [&](const Sighting& sighting) {
     return std::abs(sighting.lamp_m.z() - sightings.front().lamp_m.z()) <= kSameHeight_m;
   });
 }
 
-const Sighting& farthest_from(const Sighting& from, std::span<const Sighting> sightings) {
+const Sighting& find_farthest_from(const Sighting& from, std::span<const Sighting> sightings) {
   return *std::max_element(sightings.begin(), sightings.end(),
                            [&](const Sighting& a, const Sighting& b) {
                              return (a.z - from.z).squaredNorm() < (b.z - from.z).squaredNorm();
@@ -78,12 +78,12 @@ const Sighting& farthest_from(const Sighting& from, std::span<const Sighting> si
 }
 
 /// Returns the sum of the squared residuals in z. A lamp that is not above the pose adds 1e6.
-double disagreement(const Pose& pose, std::span<const Sighting> sightings) {
+double compute_disagreement(const Pose& pose, std::span<const Sighting> sightings) {
   const LevelPose camera(pose);
   double sum = 0;
   for (const Sighting& sighting : sightings) {
-    sum += height_above(camera, sighting.lamp_m) > 0
-               ? (sighting.z - predict_z(camera, sighting.lamp_m)).squaredNorm()
+    sum += lamp_height_above_camera(camera, sighting.lamp_m) > 0
+               ? (sighting.z - project_to_normalized_point(camera, sighting.lamp_m)).squaredNorm()
                : 1e6;
   }
   return sum;
@@ -92,25 +92,25 @@ double disagreement(const Pose& pose, std::span<const Sighting> sightings) {
 }  // namespace
 
 InitialPose compute_initial_pose(std::span<const Sighting> sightings) {
-  if (sightings.size() > 2 && at_one_height(sightings)) {
-    const auto pose = compute_coplanar_pose(sightings);
+  if (sightings.size() > 2 && are_at_one_height(sightings)) {
+    const auto pose = compute_pose_from_coplanar_lamps(sightings);
     if (!pose) return {FixStatus::degenerate, {}};
     return {FixStatus::ok, *pose};
   }
-  const Sighting& first = farthest_from(sightings.front(), sightings);
-  const TwoLampPoses pair = compute_two_lamp_poses(first, farthest_from(first, sightings));
+  const Sighting& first = find_farthest_from(sightings.front(), sightings);
+  const TwoLampPoses pair = compute_two_lamp_poses(first, find_farthest_from(first, sightings));
   if (pair.count == 0) {
     return {pair.lamp_below_camera ? FixStatus::lamp_below_camera : FixStatus::degenerate, {}};
   }
   if (pair.count == 1) return {FixStatus::ok, pair.poses[0]};
   if (sightings.size() == 2) return {FixStatus::ambiguous, {}};
-  const bool second =
-      disagreement(pair.poses[1], sightings) < disagreement(pair.poses[0], sightings);
+  const bool second = compute_disagreement(pair.poses[1], sightings) <
+                      compute_disagreement(pair.poses[0], sightings);
   return {FixStatus::ok, pair.poses[second ? 1 : 0]};
 }
 
-std::optional<Pose> compute_coplanar_pose(std::span<const Sighting> sightings) {
-  const auto similarity = fit_similarity(
+std::optional<Pose> compute_pose_from_coplanar_lamps(std::span<const Sighting> sightings) {
+  const auto similarity = fit_similarity_transform(
       sightings.size(), [&](std::size_t i) { return sightings[i].z; },
       [&](std::size_t i) -> Eigen::Vector2d { return sightings[i].lamp_m.head<2>(); });
   if (!similarity) return std::nullopt;
@@ -149,7 +149,8 @@ std::optional<Pose> compute_pose_at_known_height_and_yaw(const Sighting& sightin
 
 Matrix4 compute_one_lamp_covariance(const Sighting& sighting, const Pose& pose) {
   const Eigen::Matrix2d d_pixel_d_xy =
-      sighting.d_pixel_d_z * predict(LevelPose(pose), sighting.lamp_m).d_z_d_state.leftCols<2>();
+      sighting.d_pixel_d_z *
+      predict_normalized_point(LevelPose(pose), sighting.lamp_m).d_z_d_state.leftCols<2>();
   const Eigen::Matrix2d d_xy_d_pixel = d_pixel_d_xy.inverse();
   Matrix4 covariance = Matrix4::Zero();
   covariance.topLeftCorner<2, 2>() =
@@ -185,11 +186,12 @@ Matrix4 compute_one_lamp_sensor_covariance(const Sighting& sighting, const Pose&
 Eigen::Matrix<double, 4, 3> compute_one_lamp_rotation_jacobian(const Sighting& sighting,
                                                                const Pose& pose) {
   Eigen::Matrix<double, 2, 3> d_z;
-  d_z << tilt_jacobian(sighting.z), Eigen::Vector2d(-sighting.z.y(), sighting.z.x());
+  d_z << compute_point_jacobian_wrt_level_tilt(sighting.z),
+      Eigen::Vector2d(-sighting.z.y(), sighting.z.x());
   const LevelPose camera(pose);
   Eigen::Matrix<double, 4, 3> effect = Eigen::Matrix<double, 4, 3>::Zero();
-  effect.topRows<2>() =
-      -height_above(camera, sighting.lamp_m) * product_matrix(camera.heading) * d_z;
+  effect.topRows<2>() = -lamp_height_above_camera(camera, sighting.lamp_m) *
+                        complex_product_matrix(camera.heading) * d_z;
   return effect;
 }
 

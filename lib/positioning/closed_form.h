@@ -35,7 +35,7 @@ TwoLampPoses compute_two_lamp_poses(const Sighting& first, const Sighting& secon
 /// least-squares similarity p = s + c z gives H = |c|, g = arg c (the method of [19] in Chen and
 /// Guan). All lamps have equal weights. Returns std::nullopt if the lamps coincide in the image.
 /// @pre the lamps have equal heights; their mean is used
-std::optional<Pose> compute_coplanar_pose(std::span<const Sighting> sightings);
+std::optional<Pose> compute_pose_from_coplanar_lamps(std::span<const Sighting> sightings);
 
 /// A pose in closed form and its status.
 struct InitialPose {

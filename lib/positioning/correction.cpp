@@ -10,7 +10,7 @@ namespace vlp {
 namespace {
 
 /// Returns the shear that takes z to z - offset.
-Eigen::Matrix3d shear(const Eigen::Vector2d& offset) {
+Eigen::Matrix3d make_shear_matrix(const Eigen::Vector2d& offset) {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
   matrix.topRightCorner<2, 1>() = -offset;
   return matrix;
@@ -28,7 +28,7 @@ Eigen::Matrix3d level_from_camera(const Calibration& calibration, Correction cor
     throw std::invalid_argument("the calibration has no dispersion");
   }
   const Eigen::Vector2d focal_px = calibration.camera.focal_px();
-  const Eigen::Vector2d center_px = calibration.camera.center_px();
+  const Eigen::Vector2d center_px = calibration.camera.principal_point_px();
   if (rotation && !(rotation->zenith_in_camera.allFinite() && rotation->center_px.allFinite() &&
                     rotation->zenith_in_camera.z() > 0)) {
     throw std::invalid_argument("the rotation_center is not finite or its zenith not in front");
@@ -40,11 +40,12 @@ Eigen::Matrix3d level_from_camera(const Calibration& calibration, Correction cor
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
   if (rotation && (correction == Correction::rotation || correction == Correction::all)) {
     matrix = tilts ? level_from_zenith(rotation->zenith_in_camera)
-                   : shear((rotation->center_px - center_px).cwiseQuotient(focal_px));
+                   : make_shear_matrix((rotation->center_px - center_px).cwiseQuotient(focal_px));
   }
   if (dispersion && (correction == Correction::dispersion || correction == Correction::all)) {
     const Eigen::Vector2d offset = dispersion->offset_px.cwiseQuotient(focal_px);
-    matrix = (tilts ? level_from_zenith({offset.x(), offset.y(), 1}) : shear(offset)) * matrix;
+    matrix = (tilts ? level_from_zenith({offset.x(), offset.y(), 1}) : make_shear_matrix(offset)) *
+             matrix;
   }
   return matrix;
 }

@@ -20,8 +20,8 @@ namespace {
 
 /// Returns the derivatives of the rotation by the two coordinates of an error.
 template <typename With>
-void add_turns(std::vector<Eigen::Matrix3d>& turns, const Calibration& calibration,
-               Correction correction, With with_error) {
+void add_rotation_vectors(std::vector<Eigen::Matrix3d>& turns, const Calibration& calibration,
+                          Correction correction, With with_error) {
   constexpr double step = 1e-5;  // central differences have errors of second order: 1e-10
   for (int axis = 0; axis < 2; ++axis) {
     const Eigen::Vector2d error = step * Eigen::Vector2d::Unit(axis);
@@ -34,7 +34,8 @@ void add_turns(std::vector<Eigen::Matrix3d>& turns, const Calibration& calibrati
 /// Returns the reduction of a covariance if the errors of these rows become known:
 ///   S_:P S_PP^-1 S_P:
 /// Directions in which S_PP has only rounding errors contribute zero.
-Eigen::MatrixXd known_by(const Eigen::MatrixXd& covariance, Eigen::Index first, Eigen::Index size) {
+Eigen::MatrixXd compute_posterior_covariance(const Eigen::MatrixXd& covariance, Eigen::Index first,
+                                             Eigen::Index size) {
   if (size == 0) return Eigen::MatrixXd::Zero(covariance.rows(), covariance.cols());
   if (first + size == covariance.rows()) return covariance;  // the last rows own the remainder
   const Eigen::MatrixXd columns = covariance.middleCols(first, size);
@@ -42,7 +43,7 @@ Eigen::MatrixXd known_by(const Eigen::MatrixXd& covariance, Eigen::Index first, 
   const Eigen::VectorXd inverse_sd =
       (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(size));
   const Eigen::MatrixXd scaled = columns * inverse_sd.asDiagonal();
-  const auto eigen = decompose_symmetric(
+  const auto eigen = eigendecompose_symmetric(
       Eigen::MatrixXd(inverse_sd.asDiagonal() * scaled.middleRows(first, size)));
   constexpr double rounding = 1e-12;
   const Eigen::ArrayXd values = eigen.values;
@@ -58,8 +59,8 @@ Eigen::MatrixXd known_by(const Eigen::MatrixXd& covariance, Eigen::Index first, 
 }
 
 /// Converts a covariance in px^2 to units of the normalized plane.
-Eigen::Matrix2d normalized(const std::optional<Matrix2>& covariance_px,
-                           const Eigen::Vector2d& focal_px) {
+Eigen::Matrix2d normalized_point_from_pixel(const std::optional<Matrix2>& covariance_px,
+                                            const Eigen::Vector2d& focal_px) {
   if (!covariance_px) return Eigen::Matrix2d::Zero();
   const Eigen::Vector2d inverse = focal_px.cwiseInverse();
   return inverse.asDiagonal() * *covariance_px * inverse.asDiagonal();
@@ -83,36 +84,37 @@ const Place* find_place(const std::vector<Place>& places, int id) {
 
 CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration,
                            Correction correction)
-    : intrinsics_(count_reported_intrinsics(calibration.camera)),
+    : intrinsics_(count_intrinsics_with_covariance(calibration.camera)),
       base_from_camera_(level_from_camera(calibration, correction)),
       camera_from_base_(base_from_camera_.inverse()) {
   const bool turned = calibration.rotation_center &&
                       (correction == Correction::rotation || correction == Correction::all);
   const bool shifted = calibration.dispersion &&
                        (correction == Correction::dispersion || correction == Correction::all);
-  if (turned) add_turns(turns_, calibration, correction, with_zenith_error);
-  if (shifted) add_turns(turns_, calibration, correction, with_offset_error);
+  if (turned) add_rotation_vectors(turns_, calibration, correction, with_zenith_error);
+  if (shifted) add_rotation_vectors(turns_, calibration, correction, with_offset_error);
   offset_ = intrinsics_ + (turned ? 2 : 0);
-  assign_rows(lamps, calibration);
-  set_lens_and_zenith(calibration);
-  set_lamps(lamps, calibration.adjustment);
-  if (turned || shifted) propagate_to_zenith_and_offset(lamps, calibration);
+  assign_covariance_rows_to_lamps(lamps, calibration);
+  set_lens_and_zenith_covariances(calibration);
+  set_lamp_covariances(lamps, calibration.adjustment);
+  if (turned || shifted) propagate_errors_to_zenith_and_offset(lamps, calibration);
   stated_ =
       calibration.adjustment || covariance_.diagonal().maxCoeff() > 0 ||
       std::ranges::any_of(lamps_, [](const LampErrors& lamp) { return lamp.variance_m2 > 0; });
 }
 
-void CommonErrors::assign_rows(std::span<const Lamp> lamps, const Calibration& calibration) {
+void CommonErrors::assign_covariance_rows_to_lamps(std::span<const Lamp> lamps,
+                                                   const Calibration& calibration) {
   const auto is_correlated = [&](const Lamp& lamp) {
     const auto* adjusted =
         calibration.adjustment ? find_place(calibration.adjustment->lamps, lamp.id) : nullptr;
     if (adjusted != nullptr && is_at(lamp, adjusted->position_m)) return true;
     const auto* uncertain =
-        has_offset() ? find_place(calibration.dispersion->by_lamps, lamp.id) : nullptr;
+        has_offset_errors() ? find_place(calibration.dispersion->by_lamps, lamp.id) : nullptr;
     return uncertain != nullptr && is_at(lamp, uncertain->position_m);
   };
   lamps_.resize(lamps.size());
-  Eigen::Index size = shared();
+  Eigen::Index size = num_shared_errors();
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     if (!is_correlated(lamps[i])) continue;
     lamps_[i].row = size;
@@ -121,45 +123,45 @@ void CommonErrors::assign_rows(std::span<const Lamp> lamps, const Calibration& c
   covariance_ = Eigen::MatrixXd::Zero(size, size);
 }
 
-Eigen::Matrix3d CommonErrors::covariance_of_lamp(std::size_t lamp) const {
+Eigen::Matrix3d CommonErrors::lamp_position_covariance(std::size_t lamp) const {
   const auto& [row, variance_m2] = lamps_[lamp];
   if (!row) return variance_m2 * Eigen::Matrix3d::Identity();
   return covariance_.block<3, 3>(*row, *row);
 }
 
-Eigen::Matrix3d CommonErrors::covariance_of_lamps(std::size_t lamp, std::size_t other) const {
-  if (lamp == other) return covariance_of_lamp(lamp);
+Eigen::Matrix3d CommonErrors::lamp_cross_covariance(std::size_t lamp, std::size_t other) const {
+  if (lamp == other) return lamp_position_covariance(lamp);
   const auto &row = lamps_[lamp].row, &column = lamps_[other].row;
   if (!row || !column) return Eigen::Matrix3d::Zero();
   return covariance_.block<3, 3>(*row, *column);
 }
 
-void CommonErrors::set_lens_and_zenith(const Calibration& calibration) {
+void CommonErrors::set_lens_and_zenith_covariances(const Calibration& calibration) {
   const auto& center = calibration.rotation_center;
   const auto& dispersion = calibration.dispersion;
   const auto& adjustment = calibration.adjustment;
   const auto& report = calibration.intrinsics_report;
   // A part that was calibrated with the lens compensates its errors in part: without by_intrinsics
   // these would count twice.
-  const bool lens_counts_once = has_zenith()   ? center->by_intrinsics.has_value()
-                                : has_offset() ? dispersion->by_intrinsics.has_value()
-                                               : true;
+  const bool lens_counts_once = has_zenith_errors()   ? center->by_intrinsics.has_value()
+                                : has_offset_errors() ? dispersion->by_intrinsics.has_value()
+                                                      : true;
   const bool lens = report && report->covariance && lens_counts_once;
-  const bool zenith_stated = adjustment || (has_zenith() && center->covariance);
+  const bool zenith_stated = adjustment || (has_zenith_errors() && center->covariance);
   complete_ = adjustment || (lens && zenith_stated);
   part_stated_ = {adjustment || lens, zenith_stated,
-                  !has_offset() || dispersion->covariance.has_value(), true};
+                  !has_offset_errors() || dispersion->covariance.has_value(), true};
   if (lens && !adjustment) {
     covariance_.topLeftCorner(intrinsics_, intrinsics_) = *report->covariance;
   }
-  if (has_zenith() && !adjustment) {
+  if (has_zenith_errors() && !adjustment) {
     covariance_.block<2, 2>(intrinsics_, intrinsics_) =
-        normalized(center->covariance, calibration.camera.focal_px());
+        normalized_point_from_pixel(center->covariance, calibration.camera.focal_px());
   }
 }
 
-void CommonErrors::set_lamps(std::span<const Lamp> lamps,
-                             const std::optional<Adjustment>& adjustment) {
+void CommonErrors::set_lamp_covariances(std::span<const Lamp> lamps,
+                                        const std::optional<Adjustment>& adjustment) {
   // Pairs of a row here and the same row of the adjustment's covariance.
   std::vector<std::pair<Eigen::Index, Eigen::Index>> adjusted;
   if (adjustment) {
@@ -192,31 +194,32 @@ void CommonErrors::set_lamps(std::span<const Lamp> lamps,
   }
 }
 
-void CommonErrors::propagate_to_zenith_and_offset(std::span<const Lamp> lamps,
-                                                  const Calibration& calibration) {
-  const Eigen::Index rows = shared() - intrinsics_;
+void CommonErrors::propagate_errors_to_zenith_and_offset(std::span<const Lamp> lamps,
+                                                         const Calibration& calibration) {
+  const Eigen::Index rows = num_shared_errors() - intrinsics_;
   // Derivatives of zenith and offset by independent errors: lens, the zenith's step, the offset's
   // step, lamps.
   Eigen::MatrixXd derivatives = Eigen::MatrixXd::Zero(rows, covariance_.cols());
   derivatives.middleCols(intrinsics_, rows).setIdentity();
-  if (has_zenith() && !calibration.adjustment && calibration.rotation_center->by_intrinsics) {
+  if (has_zenith_errors() && !calibration.adjustment &&
+      calibration.rotation_center->by_intrinsics) {
     derivatives.topLeftCorner(2, intrinsics_) = *calibration.rotation_center->by_intrinsics;
   }
-  if (has_offset()) {
+  if (has_offset_errors()) {
     const Dispersion& dispersion = *calibration.dispersion;
     covariance_.block<2, 2>(offset_, offset_) =
-        normalized(dispersion.covariance, calibration.camera.focal_px());
+        normalized_point_from_pixel(dispersion.covariance, calibration.camera.focal_px());
     auto of_offset = derivatives.bottomRows<2>();
     if (dispersion.by_intrinsics) of_offset.leftCols(intrinsics_) = *dispersion.by_intrinsics;
     for (const Dispersion::UncertainLamp& uncertain : dispersion.by_lamps) {
-      if (const auto row = find_stated_row(lamps, uncertain)) {
+      if (const auto row = find_covariance_row_of_lamp(lamps, uncertain)) {
         of_offset.middleCols<3>(*row) = uncertain.by_position;
       } else {
         const Eigen::Matrix<double, 2, 3> move = uncertain.sd_m * uncertain.by_position;
         covariance_.block<2, 2>(offset_, offset_) += move * move.transpose();
       }
     }
-    if (has_zenith()) {
+    if (has_zenith_errors()) {
       // The offset compensates the error of the zenith.
       const Eigen::Matrix2d by_zenith = dispersion.by_zenith
                                             ? Eigen::Matrix2d(*dispersion.by_zenith)
@@ -228,22 +231,22 @@ void CommonErrors::propagate_to_zenith_and_offset(std::span<const Lamp> lamps,
   covariance_.middleCols(intrinsics_, rows) = covariance_ * derivatives.transpose();
 }
 
-std::optional<Eigen::Index> CommonErrors::find_stated_row(
+std::optional<Eigen::Index> CommonErrors::find_covariance_row_of_lamp(
     std::span<const Lamp> lamps, const Dispersion::UncertainLamp& uncertain) const {
-  const Lamp* lamp = find_lamp(lamps, uncertain.id);
+  const Lamp* lamp = find_lamp_by_id(lamps, uncertain.id);
   if (lamp == nullptr || !is_at(*lamp, uncertain.position_m)) return std::nullopt;
   const auto row = lamps_[static_cast<std::size_t>(lamp - lamps.data())].row;
   const bool is_stated = lamp->sd_m || covariance_.block<3, 3>(*row, *row).trace() > 0;
   return is_stated ? row : std::nullopt;
 }
 
-CommonErrors CommonErrors::only(CommonErrorSource part) const {
-  const std::array<Eigen::Index, kCommonErrorSources.size() + 1> rows{0, intrinsics_, offset_,
-                                                                      shared(), covariance_.rows()};
+CommonErrors CommonErrors::extract_error_source(CommonErrorSource part) const {
+  const std::array<Eigen::Index, kCommonErrorSources.size() + 1> rows{
+      0, intrinsics_, offset_, num_shared_errors(), covariance_.rows()};
   CommonErrors one = *this;
   MatrixX remainder = 0.5 * (covariance_ + covariance_.transpose());  // to the last bit
   for (std::size_t i = 0;; ++i) {
-    one.covariance_ = known_by(remainder, rows[i], rows[i + 1] - rows[i]);
+    one.covariance_ = compute_posterior_covariance(remainder, rows[i], rows[i + 1] - rows[i]);
     if (kCommonErrorSources[i] == part) break;
     remainder -= one.covariance_;
   }
@@ -257,9 +260,9 @@ CommonErrors CommonErrors::only(CommonErrorSource part) const {
   return one;
 }
 
-CommonErrors::RayJacobian CommonErrors::effect_on_ray(const Eigen::Vector3d& ray_in_base,
-                                                      const Lens& lens) const {
-  RayJacobian effect = RayJacobian::Zero(3, shared());
+CommonErrors::RayJacobian CommonErrors::compute_ray_error_jacobian(
+    const Eigen::Vector3d& ray_in_base, const Lens& lens) const {
+  RayJacobian effect = RayJacobian::Zero(3, num_shared_errors());
   const Eigen::Vector3d ray = camera_from_base_ * ray_in_base;
   if (const auto seen = lens.project_with_jacobians(ray)) {
     // For a fixed pixel the ray moves within its plane of z.
@@ -273,37 +276,40 @@ CommonErrors::RayJacobian CommonErrors::effect_on_ray(const Eigen::Vector3d& ray
   return effect;
 }
 
-CommonErrors::Effect CommonErrors::effect_on(const Sighting& sighting, const LevelPose& pose,
-                                             const Lens& lens,
-                                             const Eigen::Matrix3d& level_from_base) const {
+CommonErrors::Effect CommonErrors::compute_observation_error_jacobians(
+    const Sighting& sighting, const LevelPose& pose, const Lens& lens,
+    const Eigen::Matrix3d& level_from_base) const {
   // Derivative of z by the direction, which has z = 1.
   Eigen::Matrix<double, 2, 3> d_z;
   d_z << 1, 0, -sighting.z.x(), 0, 1, -sighting.z.y();
   const Eigen::Matrix<double, 2, 3> d_z_d_base = d_z * level_from_base;
   Effect effect;
-  effect.jacobian_wrt_lamp = predict(pose, sighting.lamp_m).d_z_d_state.leftCols<3>();
+  effect.jacobian_wrt_lamp =
+      predict_normalized_point(pose, sighting.lamp_m).d_z_d_state.leftCols<3>();
   effect.jacobian_wrt_shared = d_z_d_base.lazyProduct(
-      effect_on_ray(level_from_base.transpose() * sighting.z.homogeneous(), lens));
+      compute_ray_error_jacobian(level_from_base.transpose() * sighting.z.homogeneous(), lens));
   return effect;
 }
 
-CommonErrors::Gain CommonErrors::compute_error_gain(std::span<const Sighting> sightings,
-                                                    std::span<const std::size_t> lamps,
-                                                    const PoseEstimate& camera, const Lens& lens,
-                                                    const Eigen::Matrix3d& level_from_base) const {
+CommonErrors::Gain CommonErrors::compute_gain_of_fix_errors(
+    std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
+    const PoseEstimate& camera, const Lens& lens, const Eigen::Matrix3d& level_from_base) const {
   const LevelPose pose(camera.pose);
-  Gain gain(shared());
+  Gain gain(num_shared_errors());
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     const Sighting& sighting = sightings[i];
-    const Effect effect = effect_on(sighting, pose, lens, level_from_base);
+    const Effect effect =
+        compute_observation_error_jacobians(sighting, pose, lens, level_from_base);
     Eigen::Matrix<double, 4, 2> d_fix_d_z;
     if (sightings.size() == 1) {
       // compute_pose_at_known_height_and_yaw(): s = p - H e^{jg} z.
       d_fix_d_z.setZero();
-      d_fix_d_z.topRows<2>() = -height_above(pose, sighting.lamp_m) * product_matrix(pose.heading);
+      d_fix_d_z.topRows<2>() =
+          -lamp_height_above_camera(pose, sighting.lamp_m) * complex_product_matrix(pose.heading);
     } else {
       const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
-      d_fix_d_z = camera.covariance * predict(pose, sighting.lamp_m).d_z_d_state.transpose() *
+      d_fix_d_z = camera.covariance *
+                  predict_normalized_point(pose, sighting.lamp_m).d_z_d_state.transpose() *
                   (whitening.transpose() * whitening);
     }
     gain.jacobian_wrt_shared.noalias() += d_fix_d_z.lazyProduct(effect.jacobian_wrt_shared);
@@ -312,30 +318,30 @@ CommonErrors::Gain CommonErrors::compute_error_gain(std::span<const Sighting> si
   return gain;
 }
 
-CommonErrors::BodyEffect CommonErrors::effect_on(const BodyObservation& sighting,
-                                                 const EvaluatedState& body,
-                                                 const Eigen::Vector3d& arm_m, const Lens& lens,
-                                                 const Eigen::Matrix3d& body_from_base) const {
+CommonErrors::BodyEffect CommonErrors::compute_observation_error_jacobians(
+    const BodyObservation& sighting, const EvaluatedState& body, const Eigen::Vector3d& arm_m,
+    const Lens& lens, const Eigen::Matrix3d& body_from_base) const {
   const Eigen::Matrix<double, 2, 3> d_pixel = d_whitened_pixel_d_lamp(
       sighting, body.lamp_in_body(sighting.lamp_m, sighting.time_s) - arm_m);
   BodyEffect effect;
   effect.jacobian_wrt_state =
-      d_pixel.lazyProduct(body.d_lamp_in_body(sighting.lamp_m, sighting.time_s));
+      d_pixel.lazyProduct(body.d_lamp_in_body_d_state(sighting.lamp_m, sighting.time_s));
   const Eigen::Matrix<double, 2, 3> by_ray = sighting.whitened_pixel_from_ray * body_from_base;
-  effect.by_errors.jacobian_wrt_shared =
-      by_ray.lazyProduct(effect_on_ray(body_from_base.transpose() * sighting.ray, lens));
+  effect.by_errors.jacobian_wrt_shared = by_ray.lazyProduct(
+      compute_ray_error_jacobian(body_from_base.transpose() * sighting.ray, lens));
   effect.by_errors.jacobian_wrt_lamp = effect.jacobian_wrt_state.leftCols<3>();
   return effect;
 }
 
-CommonErrors::BodyGain CommonErrors::compute_error_gain(
+CommonErrors::BodyGain CommonErrors::compute_gain_of_fix_errors(
     std::span<const BodyObservation> sightings, std::span<const std::size_t> lamps,
     const Eigen::Vector3d& arm_m, const BodyFix& fix, const Lens& lens,
     const Eigen::Matrix3d& body_from_base) const {
   const EvaluatedState body(fix.state);
-  BodyGain whole(shared());
+  BodyGain whole(num_shared_errors());
   for (std::size_t i = 0; i < sightings.size(); ++i) {
-    const auto [by_state, by_errors] = effect_on(sightings[i], body, arm_m, lens, body_from_base);
+    const auto [by_state, by_errors] =
+        compute_observation_error_jacobians(sightings[i], body, arm_m, lens, body_from_base);
     const Eigen::Matrix<double, kBodyStates, 2> gain =
         fix.covariance.lazyProduct(by_state.transpose());
     whole.jacobian_wrt_shared.noalias() += gain.lazyProduct(by_errors.jacobian_wrt_shared);
@@ -352,17 +358,17 @@ Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::compute_co
   using Covariance = Eigen::Matrix<double, States, States>;
   const SharedGain& jacobian_wrt_shared = gain.jacobian_wrt_shared;
   const auto& jacobian_wrt_lamp = gain.jacobian_wrt_lamp;
-  const Eigen::Index n = shared();
+  const Eigen::Index n = num_shared_errors();
   const SharedGain with_shared = jacobian_wrt_shared.lazyProduct(covariance_.topLeftCorner(n, n));
   Covariance sum = with_shared.lazyProduct(jacobian_wrt_shared.transpose());
   for (std::size_t i = 0; i < gain.size; ++i) {
     // Half of the lamp's own errors, the shared errors, and those of the lamps before it.
-    LampGain other = 0.5 * jacobian_wrt_lamp[i] * covariance_of_lamp(gain.lamps[i]);
+    LampGain other = 0.5 * jacobian_wrt_lamp[i] * lamp_position_covariance(gain.lamps[i]);
     if (const auto& row = lamps_[gain.lamps[i]].row) {
       other += jacobian_wrt_shared.lazyProduct(covariance_.block(0, *row, n, 3));
     }
     for (std::size_t j = 0; j < i; ++j) {
-      other += jacobian_wrt_lamp[j] * covariance_of_lamps(gain.lamps[j], gain.lamps[i]);
+      other += jacobian_wrt_lamp[j] * lamp_cross_covariance(gain.lamps[j], gain.lamps[i]);
     }
     const Covariance half = other * jacobian_wrt_lamp[i].transpose();
     sum += half + half.transpose();
@@ -370,32 +376,34 @@ Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::compute_co
   return sum;
 }
 
-double CommonErrors::expected_chi_squared(std::span<const Sighting> sightings,
-                                          std::span<const std::size_t> lamps,
-                                          const PoseEstimate& camera, const Matrix4& common,
-                                          const Lens& lens,
-                                          const Eigen::Matrix3d& level_from_base) const {
+double CommonErrors::compute_expected_chi_squared(std::span<const Sighting> sightings,
+                                                  std::span<const std::size_t> lamps,
+                                                  const PoseEstimate& camera, const Matrix4& common,
+                                                  const Lens& lens,
+                                                  const Eigen::Matrix3d& level_from_base) const {
   const LevelPose pose(camera.pose);
   double sum = -(camera.covariance.inverse() * common).trace();
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     const Eigen::Matrix2d whitening = sightings[i].d_pixel_d_z / sightings[i].sigma_px;
-    const Effect effect = effect_on(sightings[i], pose, lens, level_from_base);
+    const Effect effect =
+        compute_observation_error_jacobians(sightings[i], pose, lens, level_from_base);
     sum += (whitening * compute_covariance(effect, lamps[i]) * whitening.transpose()).trace();
   }
   return sum;
 }
 
-double CommonErrors::expected_chi_squared(std::span<const BodyObservation> sightings,
-                                          std::span<const std::size_t> lamps,
-                                          const Eigen::Vector3d& arm_m, const BodyFix& fix,
-                                          const BodyCovariance& common, const Lens& lens,
-                                          const Eigen::Matrix3d& body_from_base) const {
+double CommonErrors::compute_expected_chi_squared(std::span<const BodyObservation> sightings,
+                                                  std::span<const std::size_t> lamps,
+                                                  const Eigen::Vector3d& arm_m, const BodyFix& fix,
+                                                  const BodyCovariance& common, const Lens& lens,
+                                                  const Eigen::Matrix3d& body_from_base) const {
   const EvaluatedState body(fix.state);
   Eigen::Matrix<double, kBodyStates, kBodyStates> information;
   information.setZero();
   double sum = 0;
   for (std::size_t i = 0; i < sightings.size(); ++i) {
-    const auto [by_state, by_errors] = effect_on(sightings[i], body, arm_m, lens, body_from_base);
+    const auto [by_state, by_errors] =
+        compute_observation_error_jacobians(sightings[i], body, arm_m, lens, body_from_base);
     sum += compute_covariance(by_errors, lamps[i]).trace();
     information += by_state.transpose() * by_state;
   }
@@ -413,7 +421,7 @@ template Matrix4 CommonErrors::compute_covariance(const Gain& gain) const;
 template BodyCovariance CommonErrors::compute_covariance(const BodyGain& gain) const;
 
 Matrix2 CommonErrors::compute_covariance(const Effect& effect, std::size_t lamp) const {
-  GainMatrix<2> gain(shared());
+  GainMatrix<2> gain(num_shared_errors());
   gain.jacobian_wrt_shared = effect.jacobian_wrt_shared;
   gain.add(lamp, effect.jacobian_wrt_lamp);
   return compute_covariance(gain);
@@ -434,7 +442,7 @@ OutlierLamps find_outlier_lamps(std::span<const Sighting> sightings,
         const Sighting& one = sightings[i];
         const Eigen::Matrix2d by_pixel = one.d_pixel_d_z.inverse() * one.sigma_px;
         const Eigen::Matrix2d covariance = by_pixel * by_pixel.transpose() + common[i];
-        const Prediction prediction = predict(pose, one.lamp_m);
+        const Prediction prediction = predict_normalized_point(pose, one.lamp_m);
         use(i, covariance, prediction.d_z_d_state, Eigen::Vector2d(one.z - prediction.z));
       }
     };
@@ -461,7 +469,7 @@ OutlierLamps find_outlier_lamps(std::span<const Sighting> sightings,
       worst_lamp = i;
     });
     const double freedom = 2 * static_cast<double>(left) - 4;
-    if (chi_squared <= chi_squared_bound(kSigmasOfOneInTenThousand, freedom)) return found;
+    if (chi_squared <= compute_chi_squared_bound(kSigmasOfOneInTenThousand, freedom)) return found;
     // Three contradicting lamps do not determine which is wrong; nor does a minority.
     if (!(worst > 0) || left == 3 || 2 * (left - 1) <= sightings.size()) return {};
     rejected.set(worst_lamp);
@@ -473,36 +481,38 @@ OutlierLamps find_outlier_lamps(std::span<const Sighting> sightings,
 namespace {
 
 /// Returns true if the calibration reports errors of its lens that `errors` lacks.
-bool lack_lens(const CommonErrors& errors, const Calibration& calibration) {
+bool lacks_lens_covariance(const CommonErrors& errors, const Calibration& calibration) {
   const auto& report = calibration.intrinsics_report;
-  return report && report->covariance && !errors.stated(CommonErrorSource::lens);
+  return report && report->covariance && !errors.are_errors_known(CommonErrorSource::lens);
 }
 
 }  // namespace
 
 std::optional<Matrix2> compute_zenith_covariance(const Calibration& calibration) {
   const CommonErrors errors({}, calibration, Correction::all);
-  if (!errors.stated(CommonErrorSource::zenith) || lack_lens(errors, calibration))
+  if (!errors.are_errors_known(CommonErrorSource::zenith) ||
+      lacks_lens_covariance(errors, calibration))
     return std::nullopt;
-  const Eigen::Index zenith = count_reported_intrinsics(calibration.camera);
-  return Matrix2(errors.joint().block<2, 2>(zenith, zenith));
+  const Eigen::Index zenith = count_intrinsics_with_covariance(calibration.camera);
+  return Matrix2(errors.joint_covariance().block<2, 2>(zenith, zenith));
 }
 
 std::optional<Matrix2> compute_offset_covariance(const Calibration& calibration) {
   const CommonErrors errors({}, calibration, Correction::all);
-  if (!errors.stated(CommonErrorSource::offset) || lack_lens(errors, calibration))
+  if (!errors.are_errors_known(CommonErrorSource::offset) ||
+      lacks_lens_covariance(errors, calibration))
     return std::nullopt;
   if (!calibration.adjustment) {
     const Dispersion& dispersion = *calibration.dispersion;
     const auto& report = calibration.intrinsics_report;
     if (report && report->covariance && !dispersion.by_intrinsics) return std::nullopt;
     const bool turned = calibration.rotation_center.has_value();
-    if (turned && !(errors.stated(CommonErrorSource::zenith) && dispersion.by_zenith))
+    if (turned && !(errors.are_errors_known(CommonErrorSource::zenith) && dispersion.by_zenith))
       return std::nullopt;
   }
-  const Eigen::Index offset = errors.joint().rows() - 2;
+  const Eigen::Index offset = errors.joint_covariance().rows() - 2;
   const Eigen::Vector2d focal_px = calibration.camera.focal_px();
-  return Matrix2(focal_px.asDiagonal() * errors.joint().block<2, 2>(offset, offset) *
+  return Matrix2(focal_px.asDiagonal() * errors.joint_covariance().block<2, 2>(offset, offset) *
                  focal_px.asDiagonal());
 }
 

@@ -52,12 +52,14 @@ class CommonErrors {
   CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration, Correction correction);
 
   /// Returns true if any of the errors is known.
-  bool stated() const { return stated_; }
+  bool are_errors_known() const { return stated_; }
   /// Returns true if the errors of lens, zenith and every lamp of the map are known. Only then can
   /// a wrong lamp be identified by them.
-  bool complete() const { return complete_; }
+  bool are_lens_zenith_and_lamp_errors_known() const { return complete_; }
   /// Returns true if the errors of the part are known, or if the calibration lacks the part.
-  bool stated(CommonErrorSource part) const { return part_stated_[static_cast<std::size_t>(part)]; }
+  bool are_errors_known(CommonErrorSource part) const {
+    return part_stated_[static_cast<std::size_t>(part)];
+  }
   /// Returns one part of C, with the others taken as exact. The parts add up to C, and no part
   /// makes a variance negative.
   ///
@@ -65,7 +67,7 @@ class CommonErrors {
   /// in the order of kCommonErrorSources already are (block Cholesky). For sequential steps a part
   /// holds the errors of its own step. The part of the lens includes its effects on later steps.
   /// The part of the lamps excludes errors that an offset found with the same map compensates.
-  CommonErrors only(CommonErrorSource part) const;
+  CommonErrors extract_error_source(CommonErrorSource part) const;
   /// Returns the number of lamps of the adjustment that the map has at another position. Their
   /// correlation with the calibration is lost.
   int lamps_elsewhere() const { return lamps_elsewhere_; }
@@ -73,7 +75,8 @@ class CommonErrors {
   /// Derivative of the ray of a pixel by the shared errors, along the axes of the base, which are
   /// those of the level camera.
   using RayJacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 20>;
-  RayJacobian effect_on_ray(const Eigen::Vector3d& ray_in_base, const Lens& lens) const;
+  RayJacobian compute_ray_error_jacobian(const Eigen::Vector3d& ray_in_base,
+                                         const Lens& lens) const;
 
   /// Derivatives of z of one lamp by the errors: 2 rows each.
   struct Effect {
@@ -82,8 +85,9 @@ class CommonErrors {
   };
   /// Returns the derivatives for an observation by a camera at `pose`. Its rotation
   /// level_from_camera is level_from_base base_from_camera.
-  Effect effect_on(const Sighting& sighting, const LevelPose& pose, const Lens& lens,
-                   const Eigen::Matrix3d& level_from_base) const;
+  Effect compute_observation_error_jacobians(const Sighting& sighting, const LevelPose& pose,
+                                             const Lens& lens,
+                                             const Eigen::Matrix3d& level_from_base) const;
 
   template <int States>
   /// G: derivatives of the states of a fix by the shared errors and by the errors of each lamp.
@@ -111,27 +115,30 @@ class CommonErrors {
   /// Returns the gain of a least-squares fix (estimate_pose_least_squares) with the covariance of
   /// `camera`. `lamps` are the indices in the map of the observed lamps. For a single lamp, returns
   /// the gain of compute_pose_at_known_height_and_yaw().
-  Gain compute_error_gain(std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
-                          const PoseEstimate& camera, const Lens& lens,
-                          const Eigen::Matrix3d& level_from_base) const;
+  Gain compute_gain_of_fix_errors(std::span<const Sighting> sightings,
+                                  std::span<const std::size_t> lamps, const PoseEstimate& camera,
+                                  const Lens& lens, const Eigen::Matrix3d& level_from_base) const;
   /// Returns the gain of a body with the camera at `arm_m`. The gain of the pixels, in standard
   /// deviations, is that of the least-squares fix (estimate_body).
-  BodyGain compute_error_gain(std::span<const BodyObservation> sightings,
-                              std::span<const std::size_t> lamps, const Eigen::Vector3d& arm_m,
-                              const BodyFix& fix, const Lens& lens,
-                              const Eigen::Matrix3d& body_from_base) const;
+  BodyGain compute_gain_of_fix_errors(std::span<const BodyObservation> sightings,
+                                      std::span<const std::size_t> lamps,
+                                      const Eigen::Vector3d& arm_m, const BodyFix& fix,
+                                      const Lens& lens,
+                                      const Eigen::Matrix3d& body_from_base) const;
   /// Computes the expected contribution of the errors to chi-squared, from the common covariance
   /// `common` = G C G' of the fix:
   ///   tr(R C R') = tr(W J_c C J_c') - tr(N common),   R = W^1/2 (J_c - J G),   N = J' W J.
   /// For a body with priors of information P, N + 2 P takes the place of N.
-  double expected_chi_squared(std::span<const Sighting> sightings,
-                              std::span<const std::size_t> lamps, const PoseEstimate& camera,
-                              const Matrix4& common, const Lens& lens,
-                              const Eigen::Matrix3d& level_from_base) const;
-  double expected_chi_squared(std::span<const BodyObservation> sightings,
-                              std::span<const std::size_t> lamps, const Eigen::Vector3d& arm_m,
-                              const BodyFix& fix, const BodyCovariance& common, const Lens& lens,
-                              const Eigen::Matrix3d& body_from_base) const;
+  double compute_expected_chi_squared(std::span<const Sighting> sightings,
+                                      std::span<const std::size_t> lamps,
+                                      const PoseEstimate& camera, const Matrix4& common,
+                                      const Lens& lens,
+                                      const Eigen::Matrix3d& level_from_base) const;
+  double compute_expected_chi_squared(std::span<const BodyObservation> sightings,
+                                      std::span<const std::size_t> lamps,
+                                      const Eigen::Vector3d& arm_m, const BodyFix& fix,
+                                      const BodyCovariance& common, const Lens& lens,
+                                      const Eigen::Matrix3d& body_from_base) const;
   /// Returns G C G' of a gain.
   template <int States>
   Eigen::Matrix<double, States, States, Eigen::DontAlign> compute_covariance(
@@ -141,13 +148,13 @@ class CommonErrors {
 
   /// Returns the joint covariance: intrinsics, zenith and offset, as far as they exist. Lamps with
   /// correlated errors follow, in the order of the map.
-  const MatrixX& joint() const { return covariance_; }
+  const MatrixX& joint_covariance() const { return covariance_; }
   Eigen::Index intrinsics() const { return intrinsics_; }
-  Eigen::Index shared() const { return intrinsics_ + std::ssize(turns_); }
+  Eigen::Index num_shared_errors() const { return intrinsics_ + std::ssize(turns_); }
 
  private:
-  bool has_zenith() const { return offset_ > intrinsics_; }
-  bool has_offset() const { return shared() > offset_; }
+  bool has_zenith_errors() const { return offset_ > intrinsics_; }
+  bool has_offset_errors() const { return num_shared_errors() > offset_; }
   /// Errors of a lamp of the map. A large map has few lamps whose errors are correlated with
   /// others: those of an adjustment or of a dispersion have rows in the joint covariance.
   struct LampErrors {
@@ -162,26 +169,29 @@ class CommonErrors {
     Eigen::Matrix<double, 2, kBodyStates> jacobian_wrt_state;
     Effect by_errors;
   };
-  BodyEffect effect_on(const BodyObservation& sighting, const EvaluatedState& body,
-                       const Eigen::Vector3d& arm_m, const Lens& lens,
-                       const Eigen::Matrix3d& body_from_base) const;
+  BodyEffect compute_observation_error_jacobians(const BodyObservation& sighting,
+                                                 const EvaluatedState& body,
+                                                 const Eigen::Vector3d& arm_m, const Lens& lens,
+                                                 const Eigen::Matrix3d& body_from_base) const;
   /// Gives rows to the lamps that are correlated with other errors, and sets the size of the joint
   /// covariance.
-  void assign_rows(std::span<const Lamp> lamps, const Calibration& calibration);
+  void assign_covariance_rows_to_lamps(std::span<const Lamp> lamps, const Calibration& calibration);
   /// Returns the covariance of a lamp's position.
-  Eigen::Matrix3d covariance_of_lamp(std::size_t lamp) const;
+  Eigen::Matrix3d lamp_position_covariance(std::size_t lamp) const;
   /// Returns the covariance of two lamps of the map.
-  Eigen::Matrix3d covariance_of_lamps(std::size_t lamp, std::size_t other) const;
+  Eigen::Matrix3d lamp_cross_covariance(std::size_t lamp, std::size_t other) const;
   /// Sets which parts are stated, and the covariances of lens and zenith without an adjustment.
-  void set_lens_and_zenith(const Calibration& calibration);
+  void set_lens_and_zenith_covariances(const Calibration& calibration);
   /// Sets the covariances of the lamps, and all that an adjustment states.
-  void set_lamps(std::span<const Lamp> lamps, const std::optional<Adjustment>& adjustment);
+  void set_lamp_covariances(std::span<const Lamp> lamps,
+                            const std::optional<Adjustment>& adjustment);
   /// Adds the effects of earlier steps to zenith and offset. @pre one of them is applied
-  void propagate_to_zenith_and_offset(std::span<const Lamp> lamps, const Calibration& calibration);
+  void propagate_errors_to_zenith_and_offset(std::span<const Lamp> lamps,
+                                             const Calibration& calibration);
   /// Returns the first row of a lamp of the dispersion if the map has it at the same place and
   /// states its error.
-  std::optional<Eigen::Index> find_stated_row(std::span<const Lamp> lamps,
-                                              const Dispersion::UncertainLamp& uncertain) const;
+  std::optional<Eigen::Index> find_covariance_row_of_lamp(
+      std::span<const Lamp> lamps, const Dispersion::UncertainLamp& uncertain) const;
 
   /// Number of intrinsics, and index of the first row of the offset.
   Eigen::Index intrinsics_, offset_ = 0;

@@ -13,10 +13,9 @@ namespace {
 
 const Eigen::Vector3d kNoArm = Eigen::Vector3d::Zero();
 
-std::optional<BodyObservation> exact_sighting(const Eigen::Vector3d& lamp_m, const Lens& lens,
-                                              const Eigen::Matrix3d& camera_from_level,
-                                              const Pose& level, double noise_px,
-                                              const std::optional<RowClock>& row_clock) {
+std::optional<BodyObservation> make_noise_free_observation(
+    const Eigen::Vector3d& lamp_m, const Lens& lens, const Eigen::Matrix3d& camera_from_level,
+    const Pose& level, double noise_px, const std::optional<RowClock>& row_clock) {
   const auto pixel = lens.project(camera_from_level * level_from_world(level, lamp_m));
   if (!pixel) return std::nullopt;
   const auto ray = lens.unproject(*pixel);
@@ -27,43 +26,46 @@ std::optional<BodyObservation> exact_sighting(const Eigen::Vector3d& lamp_m, con
       whitened_pixel_from_ray(direction, level_from_camera * ray->d_direction_d_pixel, noise_px);
   if (!whitened) return std::nullopt;
   return BodyObservation{lamp_m, direction.normalized(), *whitened, noise_px,
-                         row_clock ? row_clock->time_s(*pixel) : 0};
+                         row_clock ? row_clock->compute_time_from_middle_row_s(*pixel) : 0};
 }
 
-std::optional<Matrix4> pose_covariance(const BodyLimit& limit, const BodyPrior& prior) {
-  const auto fix = estimate_body(limit.frame.span(), kNoArm, prior, limit.fix.state);
+std::optional<Matrix4> compute_pose_covariance(const BodyPoseBound& limit, const BodyPrior& prior) {
+  const auto fix = estimate_body_state(limit.frame.as_span(), kNoArm, prior, limit.fix.state);
   if (!fix) return std::nullopt;
   return Matrix4(fix->covariance.topLeftCorner<4, 4>());
 }
 
 }  // namespace
 
-bool may_move(const BodyPrior& prior) {
+bool is_motion_estimated(const BodyPrior& prior) {
   return prior.velocity_sd_m_per_s > 0 || prior.yaw_rate_sd_rad_per_s > 0;
 }
 
-bool is_free(const BodyPrior& prior) { return may_move(prior) || prior.inclination_sd_rad > 0; }
+bool is_motion_or_tilt_estimated(const BodyPrior& prior) {
+  return is_motion_estimated(prior) || prior.inclination_sd_rad > 0;
+}
 
-std::optional<BodyLimit> compute_body_limit(std::span<const Eigen::Vector3d> lamps_m,
-                                            const Lens& lens,
-                                            const Eigen::Matrix3d& camera_from_level,
-                                            const Pose& level, double noise_px,
-                                            const BodyPrior& prior,
-                                            const std::optional<RowClock>& row_clock) {
+std::optional<BodyPoseBound> compute_pose_crlb(std::span<const Eigen::Vector3d> lamps_m,
+                                               const Lens& lens,
+                                               const Eigen::Matrix3d& camera_from_level,
+                                               const Pose& level, double noise_px,
+                                               const BodyPrior& prior,
+                                               const std::optional<RowClock>& row_clock) {
   if (lamps_m.size() < 2 || lamps_m.size() > kMaxSightings) return std::nullopt;
   // Exact observations neither contradict the fix nor fit a mirrored map: the limit has no effect.
   constexpr double residual_limit = 0.1;
-  BodyLimit limit;
+  BodyPoseBound limit;
   BodyObservations& frame = limit.frame;
   for (const Eigen::Vector3d& lamp_m : lamps_m) {
-    const auto seen = exact_sighting(lamp_m, lens, camera_from_level, level, noise_px, row_clock);
+    const auto seen =
+        make_noise_free_observation(lamp_m, lens, camera_from_level, level, noise_px, row_clock);
     if (!seen) return std::nullopt;
     frame.sightings[frame.size] = *seen;
     frame.nearest_m[frame.size] = std::numeric_limits<double>::infinity();
     frame.ids[frame.size] = static_cast<int>(frame.size);
     frame.num_current = ++frame.size;
   }
-  const auto [status, fix] = estimate_body_robust(frame, kNoArm, prior, residual_limit);
+  const auto [status, fix] = estimate_body_state_robust(frame, kNoArm, prior, residual_limit);
   if (status != FixStatus::ok) return std::nullopt;
   limit.fix = fix;
   // The fix is at rest and level to rounding.
@@ -72,7 +74,8 @@ std::optional<BodyLimit> compute_body_limit(std::span<const Eigen::Vector3d> lam
   level_prior.inclination_sd_rad = 0;
   BodyPrior standing = level_prior;
   standing.velocity_sd_m_per_s = standing.yaw_rate_sd_rad_per_s = 0;
-  const auto noise = pose_covariance(limit, standing), moving = pose_covariance(limit, level_prior);
+  const auto noise = compute_pose_covariance(limit, standing),
+             moving = compute_pose_covariance(limit, level_prior);
   if (!noise || !moving) return std::nullopt;
   limit.noise = *noise;
   limit.motion = *moving - *noise;
@@ -95,8 +98,8 @@ struct Row {
 
 std::optional<Row> linearize_lamp(const Eigen::Vector3d& lamp_m, const Lens& lens,
                                   const LevelPose& camera) {
-  if (!(height_above(camera, lamp_m) > 0)) return std::nullopt;
-  const Prediction prediction = predict(camera, lamp_m);
+  if (!(lamp_height_above_camera(camera, lamp_m) > 0)) return std::nullopt;
+  const Prediction prediction = predict_normalized_point(camera, lamp_m);
   const auto projection = lens.project_with_jacobians({prediction.z.x(), prediction.z.y(), 1});
   if (!projection) return std::nullopt;
   // On the plane z = 1, where the sightings are.
@@ -105,7 +108,7 @@ std::optional<Row> linearize_lamp(const Eigen::Vector3d& lamp_m, const Lens& len
 }
 
 /// Returns the derivative by the lamp's position: minus the derivative by the camera's position.
-Eigen::Matrix<double, 2, 3> d_pixel_d_lamp(const Row& row) {
+Eigen::Matrix<double, 2, 3> d_pixel_d_lamp_position(const Row& row) {
   return -row.d_pixel_d_state.leftCols<3>();
 }
 
@@ -125,8 +128,8 @@ std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d>
     const Matrix42 transposed = row->d_pixel_d_state.transpose();
     information += transposed * row->d_pixel_d_state;
     center_gradient += transposed;
-    tilt_gradient += transposed * row->d_pixel_d_z * tilt_jacobian(row->z);
-    const Matrix43 lamp_gradient = transposed * d_pixel_d_lamp(*row);
+    tilt_gradient += transposed * row->d_pixel_d_z * compute_point_jacobian_wrt_level_tilt(row->z);
+    const Matrix43 lamp_gradient = transposed * d_pixel_d_lamp_position(*row);
     lamp_map_gradient += lamp_gradient * lamp_gradient.transpose();
   }
   const auto inverse = invert_positive_definite(information);
@@ -143,17 +146,18 @@ std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d>
                                                 const Lens& lens, const Pose& level,
                                                 const ErrorSources& sources, const BodyPrior& prior,
                                                 const std::optional<RowClock>& row_clock) {
-  const auto limit = compute_body_limit(lamps_m, lens, Eigen::Matrix3d::Identity(), level,
-                                        sources.noise_px, prior, row_clock);
+  const auto limit = compute_pose_crlb(lamps_m, lens, Eigen::Matrix3d::Identity(), level,
+                                       sources.noise_px, prior, row_clock);
   if (!limit) return std::nullopt;
   const EvaluatedState body(limit->fix.state);
   const Eigen::Matrix<double, 4, kBodyStates> covariance = limit->fix.covariance.topRows<4>();
   Matrix42 by_center = Matrix42::Zero(), by_tilt = Matrix42::Zero();
   Eigen::Matrix4d of_lamps = Eigen::Matrix4d::Zero();
-  for (const BodyObservation& seen : limit->frame.span()) {
+  for (const BodyObservation& seen : limit->frame.as_span()) {
     const Eigen::Vector3d in_body = body.lamp_in_body(seen.lamp_m, seen.time_s);
     const Eigen::Matrix<double, 2, kBodyStates> d_pixel_d_state =
-        d_whitened_pixel_d_lamp(seen, in_body) * body.d_lamp_in_body(seen.lamp_m, seen.time_s);
+        d_whitened_pixel_d_lamp(seen, in_body) *
+        body.d_lamp_in_body_d_state(seen.lamp_m, seen.time_s);
     const Matrix42 gain = covariance * d_pixel_d_state.transpose();
     by_center += gain / sources.noise_px;
     Eigen::Matrix<double, 3, 2> d_ray_d_tilt;

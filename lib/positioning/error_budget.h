@@ -16,12 +16,12 @@
 namespace vlp {
 
 /// Returns true if velocity, yaw rate or roll and pitch are estimated together with the pose.
-bool is_free(const BodyPrior& prior);
+bool is_motion_or_tilt_estimated(const BodyPrior& prior);
 /// Returns true if velocity or yaw rate are estimated.
-bool may_move(const BodyPrior& prior);
+bool is_motion_estimated(const BodyPrior& prior);
 
 /// Cramer-Rao lower bound of a camera that may move and be tilted, predicted from the pixel noise.
-struct BodyLimit {
+struct BodyPoseBound {
   /// Covariances of (X, Y, Z, yaw): `noise` for known motion, roll and pitch; `motion` is the
   /// increase due to unknown motion; `roll_pitch` the increase due to unknown roll and pitch.
   Matrix4 noise, motion, roll_pitch;
@@ -34,15 +34,15 @@ struct BodyLimit {
 /// rest and level.
 ///
 /// @param noise_px   standard deviation of each pixel per axis
-/// @return std::nullopt if estimate_body_robust() finds no fix, or if the lens does not image a
-/// lamp
+/// @return std::nullopt if estimate_body_state_robust() finds no fix, or if the lens does not image
+/// a lamp
 /// @pre `row_clock` has a value if the prior leaves the motion free
-std::optional<BodyLimit> compute_body_limit(std::span<const Eigen::Vector3d> lamps_m,
-                                            const Lens& lens,
-                                            const Eigen::Matrix3d& camera_from_level,
-                                            const Pose& level, double noise_px,
-                                            const BodyPrior& prior,
-                                            const std::optional<RowClock>& row_clock);
+std::optional<BodyPoseBound> compute_pose_crlb(std::span<const Eigen::Vector3d> lamps_m,
+                                               const Lens& lens,
+                                               const Eigen::Matrix3d& camera_from_level,
+                                               const Pose& level, double noise_px,
+                                               const BodyPrior& prior,
+                                               const std::optional<RowClock>& row_clock);
 
 /// Standard deviations of the error sources of a fix. Errors are normal and independent of each
 /// other.
@@ -69,10 +69,12 @@ struct ErrorBudget {
   Matrix4 tilt;
   Matrix4 lamp_map;
   /// Increase of `noise` due to unknown motion, and the further increase due to unknown roll and
-  /// pitch (BodyLimit). Zero if they are known.
+  /// pitch (BodyPoseBound). Zero if they are known.
   Matrix4 motion = Matrix4::Zero(), roll_pitch = Matrix4::Zero();
 
-  Matrix4 total() const { return noise + center + tilt + lamp_map + motion + roll_pitch; }
+  Matrix4 total_covariance() const {
+    return noise + center + tilt + lamp_map + motion + roll_pitch;
+  }
 };
 
 /// Computes the error budget of a fix at `level`, the pose of a level camera that observes

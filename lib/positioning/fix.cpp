@@ -43,11 +43,13 @@ constexpr std::array<Entry, 13> kStatuses{{
      "a camera that moves needs row_time_s and readout in its calibration"},
 }};
 
-const Entry& entry_of(FixStatus status) { return kStatuses[static_cast<std::size_t>(status)]; }
+const Entry& find_status_entry(FixStatus status) {
+  return kStatuses[static_cast<std::size_t>(status)];
+}
 
 }  // namespace
 
-std::string_view to_string(FixStatus status) { return entry_of(status).name; }
-std::string_view describe(FixStatus status) { return entry_of(status).explanation; }
+std::string_view to_string(FixStatus status) { return find_status_entry(status).name; }
+std::string_view describe(FixStatus status) { return find_status_entry(status).explanation; }
 
 }  // namespace vlp

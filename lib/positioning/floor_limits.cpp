@@ -14,7 +14,7 @@ namespace vlp {
 
 namespace {
 
-int places_along(double min_m, double max_m, double step_m) {
+int count_positions_along(double min_m, double max_m, double step_m) {
   constexpr double max_places = 1e7, tolerance = 1e-9;
   const double places = std::floor((max_m - min_m) / step_m + tolerance) + 1;
   if (!(step_m > 0) || !(places >= 1)) {
@@ -26,9 +26,10 @@ int places_along(double min_m, double max_m, double step_m) {
   return static_cast<int>(places);
 }
 
-std::vector<FloorLimits::Place> places_on(const FloorGrid& grid, double z_m, double yaw_rad) {
-  const int columns = places_along(grid.x_min_m, grid.x_max_m, grid.step_m);
-  const int rows = places_along(grid.y_min_m, grid.y_max_m, grid.step_m);
+std::vector<FloorLimits::Place> make_positions_on(const FloorGrid& grid, double z_m,
+                                                  double yaw_rad) {
+  const int columns = count_positions_along(grid.x_min_m, grid.x_max_m, grid.step_m);
+  const int rows = count_positions_along(grid.y_min_m, grid.y_max_m, grid.step_m);
   if (double{1} * columns * rows > 1e7) {
     throw std::invalid_argument("the floor has more than ten million places: take a larger step");
   }
@@ -43,8 +44,8 @@ std::vector<FloorLimits::Place> places_on(const FloorGrid& grid, double z_m, dou
   return places;
 }
 
-std::vector<Eigen::Vector3d> positions_of(const LampMap& map,
-                                          const std::vector<std::size_t>& lamps) {
+std::vector<Eigen::Vector3d> get_lamp_positions(const LampMap& map,
+                                                const std::vector<std::size_t>& lamps) {
   std::vector<Eigen::Vector3d> places_m;
   places_m.reserve(lamps.size());
   for (const std::size_t lamp : lamps) places_m.push_back(map.lamps[lamp].position_m);
@@ -55,24 +56,25 @@ using Source = FloorLimits::Source;
 constexpr Source kLampMap{"lamp map", "lamp_map"};
 
 /// Returns the sources that are independent between images.
-std::vector<Source> image_sources(const BodyPrior& prior) {
+std::vector<Source> list_image_error_sources(const BodyPrior& prior) {
   std::vector<Source> sources{{"noise", "noise"}};
-  if (may_move(prior)) sources.push_back({"motion", "motion"});
+  if (is_motion_estimated(prior)) sources.push_back({"motion", "motion"});
   if (prior.inclination_sd_rad > 0) sources.push_back({"roll and pitch", "roll_pitch"});
   return sources;
 }
 
 template <typename Budget>
-std::vector<Matrix4> parts_of_image(const Budget& budget, const BodyPrior& prior) {
+std::vector<Matrix4> split_covariance_by_image_source(const Budget& budget,
+                                                      const BodyPrior& prior) {
   std::vector<Matrix4> parts{budget.noise};
-  if (may_move(prior)) parts.push_back(budget.motion);
+  if (is_motion_estimated(prior)) parts.push_back(budget.motion);
   if (prior.inclination_sd_rad > 0) parts.push_back(budget.roll_pitch);
   return parts;
 }
 
 }  // namespace
 
-FloorGrid make_floor_grid(const LampMap& map, double step_m) {
+FloorGrid make_grid_of_floor_positions(const LampMap& map, double step_m) {
   const Eigen::Vector3d& first = map.lamps.front().position_m;
   FloorGrid grid{first.x(), first.x(), first.y(), first.y(), step_m};
   for (const Lamp& lamp : map.lamps) {
@@ -86,22 +88,23 @@ FloorGrid make_floor_grid(const LampMap& map, double step_m) {
 
 std::vector<Eigen::Vector3d> find_visible_lamps(const LampMap& map, const Camera& camera,
                                                 const Pose& pose) {
-  return positions_of(map, find_lamps_in_view(map, Lens(camera.lens_model, camera.intrinsics),
-                                              camera.imager_px, Eigen::Matrix3d::Identity(), pose));
+  return get_lamp_positions(
+      map, find_lamps_in_view(map, Lens(camera.lens_model, camera.intrinsics), camera.imager_px,
+                              Eigen::Matrix3d::Identity(), pose));
 }
 
-Matrix4 FloorLimits::Place::total() const {
+Matrix4 FloorLimits::Place::total_covariance() const {
   Matrix4 sum = Matrix4::Zero();
   for (const Matrix4& part : parts) sum += part;
   return sum;
 }
 
-FloorLimits compute_floor_limits(const LampMap& map, const Camera& camera, const FloorGrid& grid,
-                                 double z_m, double yaw_rad, const ErrorSources& sources,
-                                 const BodyPrior& prior) {
+FloorLimits compute_accuracy_limits_on_floor(const LampMap& map, const Camera& camera,
+                                             const FloorGrid& grid, double z_m, double yaw_rad,
+                                             const ErrorSources& sources, const BodyPrior& prior) {
   const Lens lens(camera.lens_model, camera.intrinsics);
   const auto row_clock = make_row_clock(camera);
-  FloorLimits limits{image_sources(prior), places_on(grid, z_m, yaw_rad)};
+  FloorLimits limits{list_image_error_sources(prior), make_positions_on(grid, z_m, yaw_rad)};
   for (const auto& source : {Source{"center", "center"}, {"tilt", "tilt"}, kLampMap}) {
     limits.sources.push_back(source);
   }
@@ -109,33 +112,36 @@ FloorLimits compute_floor_limits(const LampMap& map, const Camera& camera, const
     const auto lamps =
         find_lamps_in_view(map, lens, camera.imager_px, Eigen::Matrix3d::Identity(), place.camera);
     place.lamps = static_cast<int>(lamps.size());
-    const auto lamps_m = positions_of(map, lamps);
-    const auto budget = is_free(prior) ? compute_error_budget(lamps_m, lens, place.camera, sources,
-                                                              prior, row_clock)
-                                       : compute_error_budget(lamps_m, lens, place.camera, sources);
+    const auto lamps_m = get_lamp_positions(map, lamps);
+    const auto budget =
+        is_motion_or_tilt_estimated(prior)
+            ? compute_error_budget(lamps_m, lens, place.camera, sources, prior, row_clock)
+            : compute_error_budget(lamps_m, lens, place.camera, sources);
     if (!budget) continue;
-    place.parts = parts_of_image(*budget, prior);
+    place.parts = split_covariance_by_image_source(*budget, prior);
     place.parts.insert(place.parts.end(), {budget->center, budget->tilt, budget->lamp_map});
   }
   return limits;
 }
 
-FloorLimits compute_floor_limits(const UnitErrors& unit, const FloorGrid& grid, double z_m,
-                                 double yaw_rad, double noise_px, const BodyPrior& prior) {
-  FloorLimits limits{image_sources(prior), places_on(grid, z_m, yaw_rad)};
+FloorLimits compute_accuracy_limits_on_floor(const UnitErrors& unit, const FloorGrid& grid,
+                                             double z_m, double yaw_rad, double noise_px,
+                                             const BodyPrior& prior) {
+  FloorLimits limits{list_image_error_sources(prior), make_positions_on(grid, z_m, yaw_rad)};
   limits.sources.push_back({"lens", "lens"});
   limits.sources.push_back({"zenith", "zenith"});
-  if (unit.has_offset()) limits.sources.push_back({"offset", "offset"});
+  if (unit.has_offset_errors()) limits.sources.push_back({"offset", "offset"});
   limits.sources.push_back(kLampMap);
   for (FloorLimits::Place& place : limits.places) {
     const auto lamps = unit.find_visible_lamps(place.camera);
     place.lamps = static_cast<int>(lamps.size());
-    const auto budget = is_free(prior) ? unit.budget(place.camera, lamps, noise_px, prior)
-                                       : unit.budget(place.camera, lamps, noise_px);
+    const auto budget = is_motion_or_tilt_estimated(prior)
+                            ? unit.compute_budget(place.camera, lamps, noise_px, prior)
+                            : unit.compute_budget(place.camera, lamps, noise_px);
     if (!budget) continue;
-    place.parts = parts_of_image(*budget, prior);
+    place.parts = split_covariance_by_image_source(*budget, prior);
     place.parts.insert(place.parts.end(), {budget->lens, budget->zenith});
-    if (unit.has_offset()) place.parts.push_back(budget->offset);
+    if (unit.has_offset_errors()) place.parts.push_back(budget->offset);
     place.parts.push_back(budget->lamp_map);
   }
   return limits;
@@ -148,7 +154,7 @@ struct MedianAndWorst {
 };
 
 /// @pre `values` is not empty
-MedianAndWorst compute_median_and_worst(const std::vector<double>& values) {
+MedianAndWorst find_median_and_worst(const std::vector<double>& values) {
   return {lower_median(values), *std::max_element(values.begin(), values.end())};
 }
 
@@ -165,10 +171,10 @@ FloorSummary::Row summarize_source(const FloorLimits::Source& source, const Floo
     height_m.push_back(spread.height_m);
     yaw_rad.push_back(spread.yaw_rad);
     part += spread.horizontal_m * spread.horizontal_m;
-    whole += place.total().topLeftCorner<2, 2>().trace();
+    whole += place.total_covariance().topLeftCorner<2, 2>().trace();
   }
-  const auto h = compute_median_and_worst(horizontal_m), z = compute_median_and_worst(height_m),
-             yaw = compute_median_and_worst(yaw_rad);
+  const auto h = find_median_and_worst(horizontal_m), z = find_median_and_worst(height_m),
+             yaw = find_median_and_worst(yaw_rad);
   return {source, {h.median, z.median, yaw.median}, {h.worst, z.worst, yaw.worst}, part / whole};
 }
 
@@ -181,21 +187,22 @@ FixSds compute_fix_sds(const Matrix4& covariance) {
           root(covariance(3, 3))};
 }
 
-const FloorSummary::Row& FloorSummary::largest() const {
+const FloorSummary::Row& FloorSummary::largest_error_source() const {
   return *std::max_element(sources.begin(), sources.end(),
                            [](const Row& a, const Row& b) { return a.fraction < b.fraction; });
 }
 
-std::optional<FloorSummary> summarize(const FloorLimits& limits) {
+std::optional<FloorSummary> summarize_floor_limits(const FloorLimits& limits) {
   const auto with_fix =
       std::count_if(limits.places.begin(), limits.places.end(),
                     [](const FloorLimits::Place& place) { return !place.parts.empty(); });
   if (with_fix == 0) return std::nullopt;
   using Place = FloorLimits::Place;
-  FloorSummary summary{{},
-                       summarize_source({"together", "horizontal"}, limits,
-                                        [](const Place& place) { return place.total(); }),
-                       static_cast<std::size_t>(with_fix)};
+  FloorSummary summary{
+      {},
+      summarize_source({"together", "horizontal"}, limits,
+                       [](const Place& place) { return place.total_covariance(); }),
+      static_cast<std::size_t>(with_fix)};
   for (std::size_t i = 0; i < limits.sources.size(); ++i) {
     summary.sources.push_back(summarize_source(limits.sources[i], limits,
                                                [i](const Place& place) { return place.parts[i]; }));

@@ -26,7 +26,7 @@ struct FloorGrid {
 
 /// Returns the smallest grid around the lamps.
 /// @pre the map has lamps
-FloorGrid make_floor_grid(const LampMap& map, double step_m);
+FloorGrid make_grid_of_floor_positions(const LampMap& map, double step_m);
 
 /// Error budget of each position on a floor.
 struct FloorLimits {
@@ -45,7 +45,7 @@ struct FloorLimits {
     /// visible, or if these do not determine all estimated quantities.
     std::vector<Matrix4> parts;
 
-    Matrix4 total() const;
+    Matrix4 total_covariance() const;
   };
   std::vector<Place> places;
 };
@@ -62,15 +62,17 @@ std::vector<Eigen::Vector3d> find_visible_lamps(const LampMap& map, const Camera
 /// @throws std::invalid_argument if the step is not positive, if the grid has no extent or more
 /// than ten million positions, or if the intrinsics do not match the lens model
 /// @pre the camera has row time and readout direction if it may move
-FloorLimits compute_floor_limits(const LampMap& map, const Camera& camera, const FloorGrid& grid,
-                                 double z_m, double yaw_rad, const ErrorSources& sources,
-                                 const BodyPrior& prior = {});
+FloorLimits compute_accuracy_limits_on_floor(const LampMap& map, const Camera& camera,
+                                             const FloorGrid& grid, double z_m, double yaw_rad,
+                                             const ErrorSources& sources,
+                                             const BodyPrior& prior = {});
 
 /// Computes the same for a calibrated camera with its tilt, from the reported uncertainties of
 /// calibration and lamp map. Sources: noise, motion, roll and pitch, lens, zenith, offset if there
 /// is one, lamp map.
-FloorLimits compute_floor_limits(const UnitErrors& unit, const FloorGrid& grid, double z_m,
-                                 double yaw_rad, double noise_px, const BodyPrior& prior = {});
+FloorLimits compute_accuracy_limits_on_floor(const UnitErrors& unit, const FloorGrid& grid,
+                                             double z_m, double yaw_rad, double noise_px,
+                                             const BodyPrior& prior = {});
 
 /// Standard deviations of a fix. `horizontal_m` is the root of the sum of the variances of x and y.
 /// Negative variances, which result from rounding, count as zero.
@@ -102,10 +104,10 @@ struct FloorSummary {
 
   /// Returns the source with the largest fraction, which has the greatest potential for
   /// improvement.
-  const Row& largest() const;
+  const Row& largest_error_source() const;
 };
 
 /// Computes the summary. Returns std::nullopt if no position has a fix.
-std::optional<FloorSummary> summarize(const FloorLimits& limits);
+std::optional<FloorSummary> summarize_floor_limits(const FloorLimits& limits);
 
 }  // namespace vlp

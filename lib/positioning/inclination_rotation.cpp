@@ -22,10 +22,11 @@ InclinationRotation compute_inclination_rotation(const Inclination& inclination,
   return lean;
 }
 
-PoseEstimate compute_robot_pose(const PoseEstimate& camera,
-                                const InclinationJacobian& d_pose_d_inclination,
-                                double inclination_sigma_rad, const CameraMount& mount,
-                                const InclinationRotation& lean) {
+PoseEstimate compute_robot_pose_from_camera_pose(const PoseEstimate& camera,
+                                                 const InclinationJacobian& d_pose_d_inclination,
+                                                 double inclination_sigma_rad,
+                                                 const CameraMount& mount,
+                                                 const InclinationRotation& lean) {
   const Eigen::Matrix3d world_from_level = rotation_about_z(camera.pose.yaw_rad);
   const Eigen::Vector3d arm_in_level =
       lean.level_from_base * rotation_about_z(-mount.yaw_in_robot_rad) * mount.position_in_robot_m;
@@ -39,7 +40,7 @@ PoseEstimate compute_robot_pose(const PoseEstimate& camera,
   }
   robot_by_lean *= inclination_sigma_rad;
   return {{camera.pose.position_m - arm_in_world,
-           wrap_rad(camera.pose.yaw_rad - mount.yaw_in_robot_rad)},
+           wrap_angle_rad(camera.pose.yaw_rad - mount.yaw_in_robot_rad)},
           d_robot_d_camera * camera.covariance * d_robot_d_camera.transpose() +
               robot_by_lean * robot_by_lean.transpose()};
 }

@@ -12,7 +12,7 @@ namespace vlp {
 
 /// Rotation of the camera due to the robot's inclination.
 struct InclinationRotation {
-  /// From the camera's frame, corrected for its calibrated tilt, to its level frame.
+  /// Rotation from the tilt-corrected camera frame (base) to the level frame.
   Eigen::Matrix3d level_from_base = Eigen::Matrix3d::Identity();
   /// Rotation axes in the level frame of an error of the roll and of an error of the pitch.
   Eigen::Matrix<double, 3, 2> error_axes = Eigen::Matrix<double, 3, 2>::Zero();
@@ -36,9 +36,10 @@ using InclinationJacobian = Eigen::Matrix<double, 4, 2>;
 /// @param camera   pose of the camera with the covariance from pixel noise
 /// @param d_pose_d_inclination  derivative of the camera pose by the inclination; m depends on the
 /// inclination, too
-PoseEstimate compute_robot_pose(const PoseEstimate& camera,
-                                const InclinationJacobian& d_pose_d_inclination,
-                                double inclination_sigma_rad, const CameraMount& mount,
-                                const InclinationRotation& lean);
+PoseEstimate compute_robot_pose_from_camera_pose(const PoseEstimate& camera,
+                                                 const InclinationJacobian& d_pose_d_inclination,
+                                                 double inclination_sigma_rad,
+                                                 const CameraMount& mount,
+                                                 const InclinationRotation& lean);
 
 }  // namespace vlp

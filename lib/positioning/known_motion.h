@@ -7,7 +7,7 @@
 namespace vlp {
 
 /// Returns true if the camera moves, or may move, between the readout times of two lamps.
-inline bool moves(const KnownMotion& motion) {
+inline bool may_camera_move_during_readout(const KnownMotion& motion) {
   return !motion.velocity_m_per_s.isZero(0) || motion.yaw_rate_rad_per_s != 0 ||
          motion.velocity_sd_m_per_s > 0 || motion.yaw_rate_sd_rad_per_s > 0;
 }

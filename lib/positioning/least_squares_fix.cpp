@@ -21,8 +21,8 @@ struct NormalEquations {
 NormalEquations linearize(std::span<const Sighting> sightings, const LevelPose& camera) {
   NormalEquations normal;
   for (const Sighting& sighting : sightings) {
-    if (!(height_above(camera, sighting.lamp_m) > 0)) return {.lamps_above = false};
-    const Prediction prediction = predict(camera, sighting.lamp_m);
+    if (!(lamp_height_above_camera(camera, sighting.lamp_m) > 0)) return {.lamps_above = false};
+    const Prediction prediction = predict_normalized_point(camera, sighting.lamp_m);
     const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
     const Eigen::Matrix<double, 2, 4> jacobian = whitening * prediction.d_z_d_state;
     const Eigen::Vector2d residual = whitening * (sighting.z - prediction.z);
@@ -34,15 +34,17 @@ NormalEquations linearize(std::span<const Sighting> sightings, const LevelPose& 
 }
 
 /// Rotates along the tangent, which equals the angle for small steps.
-LevelPose moved(const LevelPose& pose, const Eigen::Vector4d& step) {
+LevelPose apply_pose_step(const LevelPose& pose, const Eigen::Vector4d& step) {
   return {pose.position_m + step.head<3>(),
           complex_product(pose.heading, {1, step[3]}).normalized()};
 }
 
-double residual_px(std::span<const Sighting> sightings, const LevelPose& camera) {
+double compute_residual_rms_px(std::span<const Sighting> sightings, const LevelPose& camera) {
   double sum = 0;
   for (const Sighting& sighting : sightings) {
-    sum += (sighting.d_pixel_d_z * (sighting.z - predict_z(camera, sighting.lamp_m))).squaredNorm();
+    sum +=
+        (sighting.d_pixel_d_z * (sighting.z - project_to_normalized_point(camera, sighting.lamp_m)))
+            .squaredNorm();
   }
   return std::sqrt(sum / static_cast<double>(sightings.size()));
 }
@@ -59,19 +61,19 @@ std::optional<LeastSquaresFix> estimate_pose_least_squares(std::span<const Sight
   LevelPose camera(start);
   NormalEquations normal = linearize(sightings, camera);
   if (!normal.lamps_above) return std::nullopt;
-  const double scale_m = height_above(camera, sightings.front().lamp_m);
+  const double scale_m = lamp_height_above_camera(camera, sightings.front().lamp_m);
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     const Eigen::LLT<Eigen::Matrix4d> factor(normal.information);
     if (factor.info() != Eigen::Success) return std::nullopt;
     Eigen::Vector4d step = factor.solve(normal.gradient);
     if (!step.allFinite()) return std::nullopt;
     for (;; step /= 2) {
-      const LevelPose next = moved(camera, step);
+      const LevelPose next = apply_pose_step(camera, step);
       if (step.head<3>().norm() <= small_step * scale_m && std::abs(step[3]) <= small_step) {
         const Eigen::Matrix4d covariance = normal.information.inverse();
         if (!covariance.allFinite()) return std::nullopt;
         return LeastSquaresFix{next.pose(), covariance, normal.chi_squared,
-                               residual_px(sightings, next)};
+                               compute_residual_rms_px(sightings, next)};
       }
       const NormalEquations next_normal = linearize(sightings, next);
       if (next_normal.lamps_above &&

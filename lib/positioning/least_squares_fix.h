@@ -14,7 +14,8 @@ namespace vlp {
 /// Least-squares pose with covariance and statistics of the residuals.
 struct LeastSquaresFix {
   Pose pose;
-  /// Covariance of (X, Y, Zs, g) in meters and radians: (J^T W J)^-1 for the pixels' sigma_px.
+  /// Covariance of (X, Y, Zs, g), with the camera's height Zs and yaw g, in meters and radians:
+  /// (J^T W J)^-1 for the pixels' sigma_px.
   Matrix4 covariance;
   /// Sum of the squared pixel residuals over sigma_px^2; 2n - 4 degrees of freedom.
   double chi_squared;

@@ -31,7 +31,8 @@ struct Consensus {
 /// lamps the pairs are a fixed selection. Returns std::nullopt without a majority of at least
 /// three.
 /// @pre at most kMaxSightings observations
-std::optional<Consensus> find_consensus(std::span<const Sighting> sightings, double max_residual);
+std::optional<Consensus> find_largest_consistent_set(std::span<const Sighting> sightings,
+                                                     double max_residual);
 
 /// A least-squares fix and its status.
 struct ConsistentFix {
@@ -44,10 +45,10 @@ struct ConsistentFix {
 ///   degenerate    the lamps do not determine it: the standard deviation of the height exceeds the
 ///                 height
 ///   inconsistent  of three lamps or more, one has a residual of z above `max_residual`
-ConsistentFix estimate_pose_checked(std::span<const Sighting> sightings, double max_residual);
+ConsistentFix estimate_and_check_pose(std::span<const Sighting> sightings, double max_residual);
 
 /// Computes the RMS distance of the observations from their mean, in z.
-double compute_rms_radius(std::span<const Sighting> sightings);
+double compute_rms_observation_radius(std::span<const Sighting> sightings);
 
 /// Lamps observed in one frame or in several. The arrays have a fixed size, so that no memory is
 /// allocated.
@@ -64,7 +65,7 @@ struct LampObservations {
   int rejected_lamps = 0;
   std::array<int, kMaxSightings> rejected_ids = {};
 
-  std::span<const Observation> span() const { return {sightings.data(), size}; }
+  std::span<const Observation> as_span() const { return {sightings.data(), size}; }
 };
 
 /// Lamps observed in one frame by a level camera.
@@ -73,7 +74,7 @@ struct FrameObservations : LampObservations<Sighting> {
   bool is_weighed_by_noise = true;
 
   /// Removes all observations except those in `kept`. The removed ones count as rejected.
-  void keep(const std::bitset<kMaxSightings>& kept);
+  void keep_only(const std::bitset<kMaxSightings>& kept);
 };
 
 /// Computes the fix of a frame with two lamps or more whose identities may be wrong.

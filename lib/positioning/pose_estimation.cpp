@@ -19,14 +19,16 @@ using Matrix23 = Eigen::Matrix<double, 2, 3>;
 using BodyVector = Eigen::Matrix<double, kBodyStates, 1>;
 
 /// Returns `v` rotated about z by minus the angle of the unit complex number.
-Eigen::Vector3d turned_back(const Eigen::Vector2d& heading, const Eigen::Vector3d& v) {
+Eigen::Vector3d rotate_back_by_heading(const Eigen::Vector2d& heading, const Eigen::Vector3d& v) {
   return {heading.x() * v.x() + heading.y() * v.y(), heading.x() * v.y() - heading.y() * v.x(),
           v.z()};
 }
-Eigen::Vector2d unit(double angle_rad) { return {std::cos(angle_rad), std::sin(angle_rad)}; }
+Eigen::Vector2d make_unit_heading(double angle_rad) {
+  return {std::cos(angle_rad), std::sin(angle_rad)};
+}
 
 /// Returns z x v.
-Eigen::Vector3d about_z(const Eigen::Vector3d& v) { return {-v.y(), v.x(), 0}; }
+Eigen::Vector3d cross_z(const Eigen::Vector3d& v) { return {-v.y(), v.x(), 0}; }
 
 /// Intermediate results of q: relative to R along the level axes of time 0, without u t; along the
 /// level axes of time t; and q + arm.
@@ -39,12 +41,13 @@ LampTerms compute_lamp_terms(const EvaluatedState& at, const Eigen::Vector3d& la
                              double time_s) {
   const BodyMotion& motion = at.state.motion;
   LampTerms terms;
-  terms.still = turned_back(at.heading, lamp_m - at.state.pose.position_m);
+  terms.still = rotate_back_by_heading(at.heading, lamp_m - at.state.pose.position_m);
   Eigen::Vector3d level = terms.still;
   level.head<2>() -= motion.velocity_m_per_s * time_s;
-  terms.turn = motion.yaw_rate_rad_per_s == 0 ? Eigen::Vector2d(1, 0)
-                                              : unit(motion.yaw_rate_rad_per_s * time_s);
-  terms.turned_level = turned_back(terms.turn, level);
+  terms.turn = motion.yaw_rate_rad_per_s == 0
+                   ? Eigen::Vector2d(1, 0)
+                   : make_unit_heading(motion.yaw_rate_rad_per_s * time_s);
+  terms.turned_level = rotate_back_by_heading(terms.turn, level);
   terms.in_body = at.body_from_level * terms.turned_level;
   return terms;
 }
@@ -59,8 +62,8 @@ struct States {
   static constexpr std::size_t kYawRate = velocity ? 6 : 4, kLean = kYawRate + (yaw_rate ? 1 : 0);
   static constexpr std::size_t kCount = kLean + (lean ? 2 : 0);
 
-  static Columns<kCount> d_in_body(const EvaluatedState& at, const LampTerms& terms,
-                                   double time_s) {
+  static Columns<kCount> d_lamp_in_body_d_estimated_states(const EvaluatedState& at,
+                                                           const LampTerms& terms, double time_s) {
     const auto& body_from_level = at.body_from_level;
     const Eigen::Vector2d back(terms.turn.x() * at.heading.x() - terms.turn.y() * at.heading.y(),
                                -terms.turn.x() * at.heading.y() - terms.turn.y() * at.heading.x());
@@ -68,13 +71,13 @@ struct States {
     d[0] = body_from_level * Eigen::Vector3d(-back.x(), -back.y(), 0);
     d[1] = body_from_level * Eigen::Vector3d(back.y(), -back.x(), 0);
     d[2] = -body_from_level.col(2);
-    d[3] = body_from_level * -about_z(turned_back(terms.turn, terms.still));
+    d[3] = body_from_level * -cross_z(rotate_back_by_heading(terms.turn, terms.still));
     if constexpr (velocity) {
       const Eigen::Vector2d turn = time_s * terms.turn;
       d[4] = body_from_level * Eigen::Vector3d(-turn.x(), turn.y(), 0);
       d[5] = body_from_level * Eigen::Vector3d(-turn.y(), -turn.x(), 0);
     }
-    if constexpr (yaw_rate) d[kYawRate] = body_from_level * (-time_s * about_z(terms.turned_level));
+    if constexpr (yaw_rate) d[kYawRate] = body_from_level * (-time_s * cross_z(terms.turned_level));
     if constexpr (lean) {
       d[kLean] = Eigen::Vector3d(0, terms.in_body.z(), -terms.in_body.y());
       d[kLean + 1] = terms.in_body.cross(at.pitch_axis);
@@ -83,7 +86,7 @@ struct States {
   }
 
   /// Index of each estimated state among all states.
-  static constexpr std::array<int, kCount> indices() {
+  static constexpr std::array<int, kCount> estimated_state_indices() {
     std::array<int, kCount> all{0, 1, 2, 3};
     std::size_t next = 4;
     if (velocity) all[next++] = kBodyVelocity, all[next++] = kBodyVelocity + 1;
@@ -93,7 +96,7 @@ struct States {
   }
 };
 
-BodyState plus(const BodyState& from, const BodyVector& step) {
+BodyState apply_body_step(const BodyState& from, const BodyVector& step) {
   BodyState next = from;
   next.pose.position_m += step.head<3>();
   next.pose.yaw_rad += step[kBodyYaw];
@@ -124,8 +127,9 @@ BodyVector compute_prior_residuals(const BodyState& state, const BodyPrior& prio
   if (prior.height) deviations[2] = state.pose.position_m.z() - prior.height->z_m;
   deviations.segment<2>(kBodyVelocity) = motion.velocity_m_per_s - mean.velocity_m_per_s;
   deviations[kBodyYawRate] = motion.yaw_rate_rad_per_s - mean.yaw_rate_rad_per_s;
-  deviations[kBodyRoll] = wrap_rad(motion.inclination.roll_rad - mean.inclination.roll_rad);
-  deviations[kBodyPitch] = wrap_rad(motion.inclination.pitch_rad - mean.inclination.pitch_rad);
+  deviations[kBodyRoll] = wrap_angle_rad(motion.inclination.roll_rad - mean.inclination.roll_rad);
+  deviations[kBodyPitch] =
+      wrap_angle_rad(motion.inclination.pitch_rad - mean.inclination.pitch_rad);
   return deviations.cwiseProduct(weights);
 }
 
@@ -143,7 +147,7 @@ LampResidual compute_lamp_residual(const BodyObservation& sighting, const Eigen:
 }
 
 /// Returns the derivative of the lamp's pixel by q.
-Matrix23 d_pixel(const BodyObservation& sighting, const LampResidual& residual) {
+Matrix23 d_pixel_d_lamp_in_body(const BodyObservation& sighting, const LampResidual& residual) {
   return residual.inverse_depth *
          (sighting.whitened_pixel_from_ray + residual.value * sighting.ray.transpose());
 }
@@ -164,8 +168,8 @@ struct Linearized : Normal<S::kCount> {
         lamps_ahead = false;
         return;
       }
-      const Matrix23 d_pixel_d_q = d_pixel(sighting, residual);
-      const auto d_q = S::d_in_body(at, terms, sighting.time_s);
+      const Matrix23 d_pixel_d_q = d_pixel_d_lamp_in_body(sighting, residual);
+      const auto d_q = S::d_lamp_in_body_d_estimated_states(at, terms, sighting.time_s);
       for (const int axis : {0, 1}) {
         const Eigen::Vector3d d_axis = d_pixel_d_q.row(axis);
         std::array<double, S::kCount> row;
@@ -178,7 +182,7 @@ struct Linearized : Normal<S::kCount> {
     }
     pixels_chi_squared = chi_squared;
     const BodyVector deviations = compute_prior_residuals(at.state, prior, weights);
-    constexpr auto indices = S::indices();
+    constexpr auto indices = S::estimated_state_indices();
     for (std::size_t i = 2; i < S::kCount; ++i) {
       const double weight = weights[indices[i]];
       this->information[i][i] += weight * weight;
@@ -191,7 +195,7 @@ struct Linearized : Normal<S::kCount> {
 /// Convergence tolerances of a step, relative to the distance, 1 rad, 1 m/s and 1 rad/s. After a
 /// full step of this size the error is its square, or a thousandth of it with noise in the pixels:
 /// below any noise. A halved step must meet the smaller tolerance.
-bool negligible(const BodyVector& step, double scale_m, bool whole) {
+bool is_step_negligible(const BodyVector& step, double scale_m, bool whole) {
   const double small_step = whole ? 1e-7 : 1e-10, small_rate = whole ? 1e-6 : 1e-8;
   return step.head<3>().norm() <= small_step * scale_m && std::abs(step[kBodyYaw]) <= small_step &&
          step.segment<3>(kBodyVelocity).cwiseAbs().maxCoeff() <= small_rate &&
@@ -203,14 +207,14 @@ BodyFix finished(const Linearized<S>& normal, const Cholesky<S::kCount>& factor,
                  const BodyVector& weights, const BodyState& state, double lamps) {
   BodyFix fix;
   fix.state = state;
-  fix.state.pose.yaw_rad = wrap_rad(state.pose.yaw_rad);
+  fix.state.pose.yaw_rad = wrap_angle_rad(state.pose.yaw_rad);
   fix.chi_squared = normal.chi_squared;
   fix.pixels_chi_squared = normal.pixels_chi_squared;
   fix.residual_px = std::sqrt(normal.sum_px2 / lamps);
   fix.redundancy = 2 * lamps - static_cast<double>(S::kCount);
-  constexpr auto indices = S::indices();
+  constexpr auto indices = S::estimated_state_indices();
   for (std::size_t i = 0; i < S::kCount; ++i) {
-    const auto column = factor.inverse_column(i);
+    const auto column = factor.compute_inverse_column(i);
     const double weight = weights[indices[i]];
     fix.redundancy += weight * weight * column[i];
     for (std::size_t k = 0; k < S::kCount; ++k) {
@@ -227,7 +231,7 @@ std::optional<BodyFix> solve(std::span<const BodyObservation> sightings,
   constexpr int max_iterations = 50, max_halvings = 60;
   // Near the minimum the sum of squares changes by less than it can be computed.
   constexpr double rounding = 1e-12;
-  constexpr auto indices = S::indices();
+  constexpr auto indices = S::estimated_state_indices();
   const BodyVector weights = compute_prior_weights(prior);
   EvaluatedState at(start);
   Linearized<S> normal(sightings, arm_m, prior, weights, at);
@@ -241,8 +245,8 @@ std::optional<BodyFix> solve(std::span<const BodyObservation> sightings,
     for (std::size_t i = 0; i < S::kCount; ++i) step[indices[i]] = solution[i];
     if (!step.allFinite()) return std::nullopt;
     for (int halving = 0;; ++halving, step /= 2) {
-      const BodyState next_state = plus(at.state, step);
-      if (negligible(step, scale_m, halving == 0)) {
+      const BodyState next_state = apply_body_step(at.state, step);
+      if (is_step_negligible(step, scale_m, halving == 0)) {
         const auto lamps = static_cast<double>(sightings.size());
         std::optional<BodyFix> fix = finished<S>(normal, factor, weights, next_state, lamps);
         if (!fix->covariance.allFinite()) fix.reset();
@@ -276,9 +280,10 @@ std::optional<Eigen::Matrix<double, 2, 3>> whitened_pixel_from_ray(
   return pixel_from_ray / sigma_px;
 }
 
-EvaluatedState::EvaluatedState(const BodyState& at) : state(at), heading(unit(at.pose.yaw_rad)) {
-  const Eigen::Vector2d roll = unit(at.motion.inclination.roll_rad);
-  const Eigen::Vector2d pitch = unit(at.motion.inclination.pitch_rad);
+EvaluatedState::EvaluatedState(const BodyState& at)
+    : state(at), heading(make_unit_heading(at.pose.yaw_rad)) {
+  const Eigen::Vector2d roll = make_unit_heading(at.motion.inclination.roll_rad);
+  const Eigen::Vector2d pitch = make_unit_heading(at.motion.inclination.pitch_rad);
   const double cr = roll.x(), sr = roll.y(), cp = pitch.x(), sp = pitch.y();
   body_from_level << cp, 0, -sp, sr * sp, cr, sr * cp, cr * sp, -sr, cr * cp;
   pitch_axis = {0, cr, -sr};
@@ -288,10 +293,10 @@ Eigen::Vector3d EvaluatedState::lamp_in_body(const Eigen::Vector3d& lamp_m, doub
   return compute_lamp_terms(*this, lamp_m, time_s).in_body;
 }
 
-Eigen::Matrix<double, 3, kBodyStates> EvaluatedState::d_lamp_in_body(const Eigen::Vector3d& lamp_m,
-                                                                     double time_s) const {
-  const auto columns =
-      States<true, true, true>::d_in_body(*this, compute_lamp_terms(*this, lamp_m, time_s), time_s);
+Eigen::Matrix<double, 3, kBodyStates> EvaluatedState::d_lamp_in_body_d_state(
+    const Eigen::Vector3d& lamp_m, double time_s) const {
+  const auto columns = States<true, true, true>::d_lamp_in_body_d_estimated_states(
+      *this, compute_lamp_terms(*this, lamp_m, time_s), time_s);
   Eigen::Matrix<double, 3, kBodyStates> derivative;
   for (int i = 0; i < kBodyStates; ++i) derivative.col(i) = columns[static_cast<std::size_t>(i)];
   return derivative;
@@ -299,7 +304,7 @@ Eigen::Matrix<double, 3, kBodyStates> EvaluatedState::d_lamp_in_body(const Eigen
 
 Matrix23 d_whitened_pixel_d_lamp(const BodyObservation& sighting,
                                  const Eigen::Vector3d& lamp_from_camera_m) {
-  return d_pixel(sighting, compute_lamp_residual(sighting, lamp_from_camera_m));
+  return d_pixel_d_lamp_in_body(sighting, compute_lamp_residual(sighting, lamp_from_camera_m));
 }
 
 std::optional<double> compute_chi_squared(std::span<const BodyObservation> sightings,
@@ -317,9 +322,9 @@ std::optional<double> compute_chi_squared(std::span<const BodyObservation> sight
   return sum;
 }
 
-std::optional<BodyFix> estimate_body(std::span<const BodyObservation> sightings,
-                                     const Eigen::Vector3d& arm_in_body_m, const BodyPrior& prior,
-                                     const BodyState& start) {
+std::optional<BodyFix> estimate_body_state(std::span<const BodyObservation> sightings,
+                                           const Eigen::Vector3d& arm_in_body_m,
+                                           const BodyPrior& prior, const BodyState& start) {
   using Solver = std::optional<BodyFix> (*)(
       std::span<const BodyObservation>, const Eigen::Vector3d&, const BodyPrior&, const BodyState&);
   static constexpr std::array<Solver, 8> solvers{

@@ -97,8 +97,8 @@ class EvaluatedState {
   /// Returns q + arm of a lamp.
   Eigen::Vector3d lamp_in_body(const Eigen::Vector3d& lamp_m, double time_s) const;
   /// Returns the derivative of q by the states X, Y, Z, yaw, u, w, roll, pitch.
-  Eigen::Matrix<double, 3, kBodyStates> d_lamp_in_body(const Eigen::Vector3d& lamp_m,
-                                                       double time_s) const;
+  Eigen::Matrix<double, 3, kBodyStates> d_lamp_in_body_d_state(const Eigen::Vector3d& lamp_m,
+                                                               double time_s) const;
 
   BodyState state;
   Eigen::Vector2d heading;
@@ -123,8 +123,8 @@ std::optional<double> compute_chi_squared(std::span<const BodyObservation> sight
 /// ray at `start`, if lamps and priors do not determine the state, or without convergence in 50
 /// steps.
 /// @pre `start` has the values of the states that the prior fixes
-std::optional<BodyFix> estimate_body(std::span<const BodyObservation> sightings,
-                                     const Eigen::Vector3d& arm_in_body_m, const BodyPrior& prior,
-                                     const BodyState& start);
+std::optional<BodyFix> estimate_body_state(std::span<const BodyObservation> sightings,
+                                           const Eigen::Vector3d& arm_in_body_m,
+                                           const BodyPrior& prior, const BodyState& start);
 
 }  // namespace vlp

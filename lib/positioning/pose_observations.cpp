@@ -27,7 +27,7 @@ struct Problem {
   const Eigen::Vector3d& arm_m;
   const BodyPrior& prior;
 
-  bool lean_is_free() const {
+  bool is_roll_pitch_estimated() const {
     constexpr double gentle_rad = 0.15;
     return prior.inclination_sd_rad > gentle_rad;
   }
@@ -46,7 +46,7 @@ struct LevelSightings {
   std::array<Sighting, kMaxSightings> sightings;
   std::size_t size = 0;
 
-  std::span<const Sighting> span() const { return {sightings.data(), size}; }
+  std::span<const Sighting> as_span() const { return {sightings.data(), size}; }
 
   bool fill(const BodyObservations& frame, const Eigen::Matrix3d& level_from_body) {
     for (; size < frame.num_current; ++size) {
@@ -69,7 +69,7 @@ InitialStates compute_level_state(const BodyObservations& frame, const Problem& 
   const Eigen::Matrix3d lean = level_from_inclination(problem.prior.mean.inclination);
   LevelSightings level;
   if (!level.fill(frame, lean)) return {FixStatus::lamp_below_camera, 0, {}};
-  const InitialPose start = compute_initial_pose(level.span());
+  const InitialPose start = compute_initial_pose(level.as_span());
   if (start.status != FixStatus::ok) return {start.status, 0, {}};
   return {FixStatus::ok, 1, {make_body_state(start.pose, problem, lean)}};
 }
@@ -144,7 +144,7 @@ double distance_from_ray(const BodyObservation& seen, const Problem& problem,
 
 double distance_m(const BodyObservations& frame, const BodyState& state) {
   double sum = 0;
-  for (const BodyObservation& seen : frame.span()) {
+  for (const BodyObservation& seen : frame.as_span()) {
     sum += (seen.lamp_m - state.pose.position_m).norm();
   }
   return sum / static_cast<double>(frame.size);
@@ -167,16 +167,16 @@ bool are_below_lamps(const BodyObservations& frame, const Problem& problem,
 
 /// Returns the fix with the smallest chi-squared from several initial states; `ambiguous` if
 /// another fix explains the frame nearly as well.
-BodySolution find_best_fix(const InitialStates& initial_states, const BodyObservations& frame,
-                           const Problem& problem) {
+BodySolution find_best_body_solution(const InitialStates& initial_states,
+                                     const BodyObservations& frame, const Problem& problem) {
   constexpr double hopeless = 100, small = 100, unlikely = 12, same_m = 1e-4;
   std::array<double, 4> at_start;
   at_start.fill(std::numeric_limits<double>::infinity());
   if (initial_states.count == 1) at_start[0] = 0;
   for (std::size_t i = 0; initial_states.count > 1 && static_cast<int>(i) < initial_states.count;
        ++i) {
-    const auto chi_squared =
-        compute_chi_squared(frame.span(), problem.arm_m, problem.prior, initial_states.states[i]);
+    const auto chi_squared = compute_chi_squared(frame.as_span(), problem.arm_m, problem.prior,
+                                                 initial_states.states[i]);
     if (chi_squared) at_start[i] = *chi_squared;
   }
   const double min_chi_squared = *std::min_element(at_start.begin(), at_start.end());
@@ -184,8 +184,8 @@ BodySolution find_best_fix(const InitialStates& initial_states, const BodyObserv
   double second = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; static_cast<int>(i) < initial_states.count; ++i) {
     if (!(at_start[i] <= hopeless * (min_chi_squared + small))) continue;
-    const auto fix =
-        estimate_body(frame.span(), problem.arm_m, problem.prior, initial_states.states[i]);
+    const auto fix = estimate_body_state(frame.as_span(), problem.arm_m, problem.prior,
+                                         initial_states.states[i]);
     if (!fix || !are_below_lamps(frame, problem, fix->state)) continue;
     if (!best) {
       best = fix;
@@ -216,8 +216,8 @@ bool has_fix(const BodySolution& solution) {
 /// Computes the fix with free roll and pitch from the three lamps that are farthest apart. If
 /// motion or noise hides their pose, tries other lamps in place of the third. Returns std::nullopt
 /// if all lamps are collinear.
-std::optional<BodySolution> estimate_body_free_tilt(const BodyObservations& frame,
-                                                    const Problem& problem) {
+std::optional<BodySolution> estimate_body_with_free_tilt(const BodyObservations& frame,
+                                                         const Problem& problem) {
   constexpr std::size_t max_tries = 8;
   if (frame.num_current < 3) return std::nullopt;
   const auto [first, second, widest] = find_widest_lamps(frame);
@@ -230,7 +230,7 @@ std::optional<BodySolution> estimate_body_free_tilt(const BodyObservations& fram
     const InitialStates initial_states =
         compute_initial_states(frame, {first, second, third}, problem);
     const BodySolution solution = initial_states.count > 0
-                                      ? find_best_fix(initial_states, frame, problem)
+                                      ? find_best_body_solution(initial_states, frame, problem)
                                       : BodySolution{initial_states.status, {}};
     const bool better =
         !best || (has_fix(solution) &&
@@ -242,16 +242,16 @@ std::optional<BodySolution> estimate_body_free_tilt(const BodyObservations& fram
 }
 
 /// Computes the fix of all lamps, assuming that the identities are correct.
-BodySolution estimate_body_all_lamps(const BodyObservations& frame, const Problem& problem) {
-  if (problem.lean_is_free()) {
-    if (const auto solution = estimate_body_free_tilt(frame, problem);
+BodySolution estimate_body_from_all_lamps(const BodyObservations& frame, const Problem& problem) {
+  if (problem.is_roll_pitch_estimated()) {
+    if (const auto solution = estimate_body_with_free_tilt(frame, problem);
         solution && has_fix(*solution)) {
       return *solution;
     }
   }
   const InitialStates start = compute_level_state(frame, problem);
   if (start.count == 0) return {start.status, {}};
-  return find_best_fix(start, frame, problem);
+  return find_best_body_solution(start, frame, problem);
 }
 
 /// Returns the largest accepted distance of a lamp from its ray, in m.
@@ -259,7 +259,7 @@ double compute_residual_limit(const BodyObservations& frame, double max_residual
   constexpr double max_neighbor_fraction = 0.15;
   Eigen::Vector3d mean_m = Eigen::Vector3d::Zero();
   const double n = static_cast<double>(frame.size);
-  for (const BodyObservation& seen : frame.span()) mean_m += seen.lamp_m / n;
+  for (const BodyObservation& seen : frame.as_span()) mean_m += seen.lamp_m / n;
   double sum = 0, nearest_m = frame.nearest_m[0];
   for (std::size_t i = 0; i < frame.size; ++i) {
     sum += (frame.sightings[i].lamp_m - mean_m).squaredNorm();
@@ -272,8 +272,8 @@ double compute_residual_limit(const BodyObservations& frame, double max_residual
 bool is_within_prior(const BodyPrior& prior, const BodyMotion& motion) {
   constexpr double sigmas = 5;
   const Inclination &lean = motion.inclination, &mean = prior.mean.inclination;
-  const double tilt_rad = std::hypot(wrap_rad(lean.roll_rad - mean.roll_rad),
-                                     wrap_rad(lean.pitch_rad - mean.pitch_rad));
+  const double tilt_rad = std::hypot(wrap_angle_rad(lean.roll_rad - mean.roll_rad),
+                                     wrap_angle_rad(lean.pitch_rad - mean.pitch_rad));
   return (motion.velocity_m_per_s - prior.mean.velocity_m_per_s).norm() <=
              sigmas * prior.velocity_sd_m_per_s &&
          std::abs(motion.yaw_rate_rad_per_s - prior.mean.yaw_rate_rad_per_s) <=
@@ -281,8 +281,8 @@ bool is_within_prior(const BodyPrior& prior, const BodyMotion& motion) {
          tilt_rad <= sigmas * prior.inclination_sd_rad;
 }
 
-Agreeing find_agreeing(const BodyState& state, const BodyObservations& frame,
-                       const Problem& problem, double limit_m) {
+Agreeing find_agreeing_observations(const BodyState& state, const BodyObservations& frame,
+                                    const Problem& problem, double limit_m) {
   Agreeing agreeing;
   const EvaluatedState body(state);
   for (std::size_t i = 0; i < frame.size; ++i) {
@@ -294,7 +294,8 @@ Agreeing find_agreeing(const BodyState& state, const BodyObservations& frame,
 bool is_consistent(const BodySolution& solution, const BodyObservations& frame,
                    const Problem& problem, double limit_m) {
   return has_fix(solution) && is_within_prior(problem.prior, solution.fix.state.motion) &&
-         find_agreeing(solution.fix.state, frame, problem, limit_m).count() == frame.size;
+         find_agreeing_observations(solution.fix.state, frame, problem, limit_m).count() ==
+             frame.size;
 }
 
 BodyObservations select_lamps(const BodyObservations& frame, const Agreeing& agreeing) {
@@ -314,15 +315,15 @@ BodyObservations select_lamps(const BodyObservations& frame, const Agreeing& agr
 }
 
 /// Returns the frame with the mirror image of the map.
-BodyObservations mirror_map(BodyObservations frame) {
+BodyObservations mirror_lamp_positions(BodyObservations frame) {
   for (std::size_t i = 0; i < frame.size; ++i) frame.sightings[i].lamp_m.y() *= -1;
   return frame;
 }
 
 /// Finds the largest set of lamps that agree with a state of free roll and pitch, at rest. Every
 /// triple of lamps proposes its states.
-std::optional<Agreeing> find_majority_free_tilt(const BodyObservations& frame,
-                                                const Problem& problem, double limit_m) {
+std::optional<Agreeing> find_majority_with_free_tilt(const BodyObservations& frame,
+                                                     const Problem& problem, double limit_m) {
   constexpr std::size_t few = 12, at_least = 4;
   const std::size_t n = frame.num_current, stride = n <= few ? 1 : n * n * n / (few * few * few);
   Agreeing best;
@@ -334,7 +335,7 @@ std::optional<Agreeing> find_majority_free_tilt(const BodyObservations& frame,
         const InitialStates initial_states = compute_initial_states(frame, {i, j, k}, problem);
         for (std::size_t m = 0; static_cast<int>(m) < initial_states.count; ++m) {
           const Agreeing agreeing =
-              find_agreeing(initial_states.states[m], frame, problem, limit_m);
+              find_agreeing_observations(initial_states.states[m], frame, problem, limit_m);
           if (agreeing.count() > best.count()) best = agreeing;
         }
       }
@@ -345,45 +346,47 @@ std::optional<Agreeing> find_majority_free_tilt(const BodyObservations& frame,
 }
 
 /// Finds the largest set of lamps that agree with a state with the inclination of the prior.
-std::optional<Agreeing> find_majority_level(const BodyObservations& frame, const Problem& problem,
-                                            double limit_m) {
+std::optional<Agreeing> find_majority_if_level(const BodyObservations& frame,
+                                               const Problem& problem, double limit_m) {
   const Eigen::Matrix3d lean = level_from_inclination(problem.prior.mean.inclination);
   LevelSightings level;
   if (!level.fill(frame, lean)) return std::nullopt;
   // The limit is converted to z by the ratio of the distances between lamps.
   double sum_z = 0, sum_m = 0;
   const Sighting& first = level.sightings[0];
-  for (const Sighting& seen : level.span()) {
+  for (const Sighting& seen : level.as_span()) {
     sum_z += (seen.z - first.z).norm();
     sum_m += (seen.lamp_m - first.lamp_m).head<2>().norm();
   }
-  const auto majority = find_consensus(level.span(), limit_m * sum_z / sum_m);
+  const auto majority = find_largest_consistent_set(level.as_span(), limit_m * sum_z / sum_m);
   if (!majority) return std::nullopt;
-  return find_agreeing(make_body_state(majority->pose, problem, lean), frame, problem, limit_m);
+  return find_agreeing_observations(make_body_state(majority->pose, problem, lean), frame, problem,
+                                    limit_m);
 }
 
 /// Computes the fix of a majority of the lamps, and removes the others from the frame.
-BodySolution estimate_body_majority(BodyObservations& frame, const Problem& problem,
-                                    double max_residual_share) {
+BodySolution estimate_body_from_majority(BodyObservations& frame, const Problem& problem,
+                                         double max_residual_share) {
   const BodySolution none{FixStatus::inconsistent, {}};
   const double limit_m = compute_residual_limit(frame, max_residual_share);
   double latest_s = 0;
-  for (const BodyObservation& seen : frame.span()) {
+  for (const BodyObservation& seen : frame.as_span()) {
     latest_s = std::max(latest_s, std::abs(seen.time_s));
   }
   const double driven_m = 2 * problem.prior.velocity_sd_m_per_s * latest_s;
-  auto agreeing = problem.lean_is_free()
-                      ? find_majority_free_tilt(frame, problem, limit_m + driven_m)
-                      : find_majority_level(frame, problem, limit_m + driven_m);
+  auto agreeing = problem.is_roll_pitch_estimated()
+                      ? find_majority_with_free_tilt(frame, problem, limit_m + driven_m)
+                      : find_majority_if_level(frame, problem, limit_m + driven_m);
   // The majority ignored motion: with estimated motion, rejected lamps may agree.
   constexpr int max_iterations = 3;
   for (int iteration = 0; agreeing && iteration < max_iterations; ++iteration) {
     if (2 * agreeing->count() <= frame.size) return none;
     BodyObservations remaining = select_lamps(frame, *agreeing);
     if (remaining.num_current < 2) return none;
-    const BodySolution solution = estimate_body_all_lamps(remaining, problem);
+    const BodySolution solution = estimate_body_from_all_lamps(remaining, problem);
     if (solution.status != FixStatus::ok) return {solution.status, solution.fix};
-    const Agreeing now_agreeing = find_agreeing(solution.fix.state, frame, problem, limit_m);
+    const Agreeing now_agreeing =
+        find_agreeing_observations(solution.fix.state, frame, problem, limit_m);
     if (now_agreeing == *agreeing) {
       if (!is_within_prior(problem.prior, solution.fix.state.motion)) return none;
       frame = remaining;
@@ -410,7 +413,7 @@ std::optional<BodySolution> reject_moved_lamps(BodyObservations& frame, const Pr
       const BodyObservations without = select_lamps(remaining, others);
       if (without.num_current < 2) continue;
       const auto fix =
-          estimate_body(without.span(), problem.arm_m, problem.prior, solution.fix.state);
+          estimate_body_state(without.as_span(), problem.arm_m, problem.prior, solution.fix.state);
       if (!fix) continue;
       if (!best || fix->chi_squared < best->chi_squared) {
         if (best) second = best->chi_squared;
@@ -441,16 +444,18 @@ std::optional<BodySolution> reject_moved_lamps(BodyObservations& frame, const Pr
 
 }  // namespace
 
-BodySolution estimate_body_robust(BodyObservations& frame, const Eigen::Vector3d& arm_in_body_m,
-                                  const BodyPrior& prior, double max_residual_share) {
+BodySolution estimate_body_state_robust(BodyObservations& frame,
+                                        const Eigen::Vector3d& arm_in_body_m,
+                                        const BodyPrior& prior, double max_residual_share) {
   const Problem problem{arm_in_body_m, prior};
   const double limit_m = compute_residual_limit(frame, max_residual_share);
-  const BodySolution all = estimate_body_all_lamps(frame, problem);
+  const BodySolution all = estimate_body_from_all_lamps(frame, problem);
   if (frame.size < 3) return all;
   if (is_consistent(all, frame, problem, limit_m)) {
     if (all.status != FixStatus::ok || compute_reduced_chi_squared(all.fix, frame) <= kUnexplained)
       return all;
-    const BodySolution mirror_image = estimate_body_all_lamps(mirror_map(frame), problem);
+    const BodySolution mirror_image =
+        estimate_body_from_all_lamps(mirror_lamp_positions(frame), problem);
     if (mirror_image.status == FixStatus::ok &&
         kMuchBetter * compute_reduced_chi_squared(mirror_image.fix, frame) <
             compute_reduced_chi_squared(all.fix, frame)) {
@@ -461,14 +466,14 @@ BodySolution estimate_body_robust(BodyObservations& frame, const Eigen::Vector3d
     if (!frame.noise_is_stated) return all;
     return reject_moved_lamps(frame, problem, all).value_or(all);
   }
-  const BodyObservations mirror_frame = mirror_map(frame);
-  const BodySolution mirror_image = estimate_body_all_lamps(mirror_frame, problem);
+  const BodyObservations mirror_frame = mirror_lamp_positions(frame);
+  const BodySolution mirror_image = estimate_body_from_all_lamps(mirror_frame, problem);
   if (mirror_image.status == FixStatus::ok &&
       is_consistent(mirror_image, mirror_frame, problem, limit_m)) {
     return {FixStatus::mirrored_map, {}};
   }
   if (frame.size < 4) return has_fix(all) ? BodySolution{FixStatus::inconsistent, {}} : all;
-  const BodySolution majority = estimate_body_majority(frame, problem, max_residual_share);
+  const BodySolution majority = estimate_body_from_majority(frame, problem, max_residual_share);
   if (majority.status == FixStatus::inconsistent && !has_fix(all)) return all;
   return majority;
 }

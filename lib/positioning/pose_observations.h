@@ -42,7 +42,8 @@ struct BodySolution {
 ///   ambiguous     another solution is nearly as likely: by a factor of exp(-6) or more
 ///   inconsistent  velocity, yaw rate or roll and pitch differ from the prior by more than five
 ///                 standard deviations
-BodySolution estimate_body_robust(BodyObservations& frame, const Eigen::Vector3d& arm_in_body_m,
-                                  const BodyPrior& prior, double max_residual_share);
+BodySolution estimate_body_state_robust(BodyObservations& frame,
+                                        const Eigen::Vector3d& arm_in_body_m,
+                                        const BodyPrior& prior, double max_residual_share);
 
 }  // namespace vlp

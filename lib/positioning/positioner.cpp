@@ -26,7 +26,7 @@ namespace {
 
 using Sightings = std::span<const Sighting>;
 
-void check_places(const std::vector<Lamp>& lamps) {
+void check_lamp_positions(const std::vector<Lamp>& lamps) {
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     const std::string name = "lamp " + std::to_string(lamps[i].id);
     if (!lamps[i].position_m.allFinite()) {
@@ -42,7 +42,7 @@ void check_places(const std::vector<Lamp>& lamps) {
 
 std::vector<Lamp> sorted_by_id(std::vector<Lamp> lamps) {
   if (lamps.empty()) throw std::invalid_argument("the lamp map is empty");
-  check_places(lamps);
+  check_lamp_positions(lamps);
   std::ranges::sort(lamps, {}, &Lamp::id);
   for (std::size_t i = 1; i < lamps.size(); ++i) {
     if (lamps[i].id == lamps[i - 1].id) {
@@ -71,7 +71,7 @@ bool finite(const Sensors& sensors) {
 }
 
 /// Returns the mean position of the lamps, relative to which national coordinates lose no digits.
-Eigen::Vector3d center_of(const std::vector<Lamp>& lamps) {
+Eigen::Vector3d get_lamp_center(const std::vector<Lamp>& lamps) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Lamp& lamp : lamps) sum += lamp.position_m - lamps.front().position_m;
   return lamps.front().position_m + sum / static_cast<double>(lamps.size());
@@ -79,7 +79,7 @@ Eigen::Vector3d center_of(const std::vector<Lamp>& lamps) {
 
 /// Returns the horizontal distance of each lamp to the nearest other one; infinity if there is
 /// none.
-std::vector<double> distances_to_nearest(const std::vector<Lamp>& lamps) {
+std::vector<double> compute_distances_to_nearest_lamp(const std::vector<Lamp>& lamps) {
   std::vector<double> nearest_m(lamps.size(), std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     for (std::size_t k = 0; k < i; ++k) {
@@ -92,14 +92,14 @@ std::vector<double> distances_to_nearest(const std::vector<Lamp>& lamps) {
 }
 
 /// Returns true if more than a pose is estimated, or if the camera moves during the readout.
-bool needs_body(const Sensors& sensors) {
+bool needs_body_estimation(const Sensors& sensors) {
   return sensors.inclination_sigma_rad > 0 || sensors.height ||
-         (sensors.motion && moves(*sensors.motion));
+         (sensors.motion && may_camera_move_during_readout(*sensors.motion));
 }
 
 /// Rotates velocity and covariances from the level frame to the world. `common` is added to the
 /// covariance of the fix's own noise.
-BodyEstimate in_world(const BodyFix& fix, const BodyCovariance& common) {
+BodyEstimate rotate_estimate_to_world(const BodyFix& fix, const BodyCovariance& common) {
   const Eigen::Rotation2Dd world_from_level(fix.state.pose.yaw_rad);
   const BodyMotion& motion = fix.state.motion;
   BodyEstimate estimate{world_from_level * motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
@@ -120,14 +120,14 @@ BodyEstimate in_world(const BodyFix& fix, const BodyCovariance& common) {
 }
 
 template <typename Frame>
-void set_rejected(const Frame& frame, Fix& fix) {
+void set_rejected_lamps(const Frame& frame, Fix& fix) {
   fix.rejected_lamps = frame.rejected_lamps;
   const auto listed =
       std::min(static_cast<std::size_t>(frame.rejected_lamps), fix.rejected_ids.size());
   std::copy_n(frame.rejected_ids.begin(), listed, fix.rejected_ids.begin());
 }
 
-Fix without_fix(FixStatus status, int unknown_lamps) {
+Fix make_fix_without_pose(FixStatus status, int unknown_lamps) {
   Fix fix;
   fix.status = status;
   fix.unknown_lamps = unknown_lamps;
@@ -143,7 +143,7 @@ class Positioner::Impl {
   Impl(const LampMap& map, const Calibration& calibration, const PositionerOptions& options)
       : lamps_(sorted_by_id(map.lamps)),
         lens_(calibration.camera.lens_model, calibration.camera.intrinsics),
-        origin_m_(center_of(lamps_)),
+        origin_m_(get_lamp_center(lamps_)),
         base_from_camera_(level_from_camera(calibration, options.correction)),
         common_(lamps_, calibration, options.correction),
         mount_(options.mount.value_or(CameraMount{Eigen::Vector3d::Zero(), 0})),
@@ -154,7 +154,7 @@ class Positioner::Impl {
         computes_common_chi_squared_(options.computes_common_chi_squared),
         row_clock_(make_row_clock(calibration.camera)) {
     for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
-    nearest_m_ = distances_to_nearest(lamps_);
+    nearest_m_ = compute_distances_to_nearest_lamp(lamps_);
     if (!(mount_.position_in_robot_m.allFinite() && std::isfinite(mount_.yaw_in_robot_rad))) {
       throw std::invalid_argument("the position of the camera on the robot is not finite");
     }
@@ -166,8 +166,8 @@ class Positioner::Impl {
   }
 
   Fix locate(std::span<const Detection> detections, const Sensors& sensors) const {
-    if (!finite(sensors)) return without_fix(FixStatus::not_finite, 0);
-    if (needs_body(sensors) && detections.size() > 1) {
+    if (!finite(sensors)) return make_fix_without_pose(FixStatus::not_finite, 0);
+    if (needs_body_estimation(sensors) && detections.size() > 1) {
       if (auto fix = locate_body(detections, sensors, {})) return *fix;
     }
     const InclinationRotation lean =
@@ -175,43 +175,43 @@ class Positioner::Impl {
             ? compute_inclination_rotation(*sensors.inclination, mount_.yaw_in_robot_rad)
             : InclinationRotation();
     FrameObservations frame;
-    const FixStatus seen = sight(detections, lean.level_from_base, frame);
-    if (seen != FixStatus::ok) return without_fix(seen, frame.unknown_lamps);
+    const FixStatus seen = make_observations(detections, lean.level_from_base, frame);
+    if (seen != FixStatus::ok) return make_fix_without_pose(seen, frame.unknown_lamps);
 
     Fix fix;
     Matrix4 height_and_yaw_covariance = Matrix4::Zero();
     InclinationJacobian d_pose_d_inclination = InclinationJacobian::Zero();
     if (frame.size > 1) {
       // If common errors are known, the noise alone must not reject lamps.
-      const bool total = common_.complete();
+      const bool total = common_.are_lens_zenith_and_lamp_errors_known();
       if (total) frame.noise_is_stated = false;
       ConsistentFix found = estimate_pose_robust(frame, max_residual_share_);
       if (total) reject_outlier_lamps(frame, lean.level_from_base, found);
       const auto& [status, solution] = found;
-      if (status != FixStatus::ok) return without_fix(status, frame.unknown_lamps);
+      if (status != FixStatus::ok) return make_fix_without_pose(status, frame.unknown_lamps);
       fix.estimate = {solution.pose, solution.covariance};
       fix.residual_px = solution.residual_px;
       fix.chi_squared = solution.chi_squared;
     } else if (frame.size == 1 && sensors.height_and_yaw) {
       const auto readout = motion_at_readout(detections, frame.ids.front(), sensors);
-      if (!readout) return without_fix(FixStatus::row_time_unknown, frame.unknown_lamps);
+      if (!readout) return make_fix_without_pose(FixStatus::row_time_unknown, frame.unknown_lamps);
       const Sighting& sighting = frame.sightings.front();
       HeightAndYaw known = *sensors.height_and_yaw;
       known.z_m -= origin_m_.z();
       const auto pose = compute_pose_at_known_height_and_yaw(sighting, known, *readout);
-      if (!pose) return without_fix(FixStatus::lamp_below_camera, frame.unknown_lamps);
+      if (!pose) return make_fix_without_pose(FixStatus::lamp_below_camera, frame.unknown_lamps);
       fix.estimate = {*pose, compute_one_lamp_covariance(sighting, *pose)};
       height_and_yaw_covariance =
           compute_one_lamp_sensor_covariance(sighting, *pose, known, *readout);
       d_pose_d_inclination = compute_one_lamp_rotation_jacobian(sighting, *pose) * lean.error_axes;
     } else {
-      return without_fix(FixStatus::too_few_lamps, frame.unknown_lamps);
+      return make_fix_without_pose(FixStatus::too_few_lamps, frame.unknown_lamps);
     }
     fix.status = FixStatus::ok;
     fix.lamps = fix.sightings = static_cast<int>(frame.size);
     fix.redundancy = frame.size < 3 ? 0 : 2 * static_cast<double>(frame.size) - 4;
     fix.time_s = sensors.time_s;
-    set_rejected(frame, fix);
+    set_rejected_lamps(frame, fix);
     fix.unknown_lamps = frame.unknown_lamps;
     add_covariances(frame, lean, d_pose_d_inclination, sensors, height_and_yaw_covariance, fix);
     fix.estimate.pose.position_m += origin_m_;
@@ -223,7 +223,7 @@ class Positioner::Impl {
     const bool finite_times =
         std::all_of(earlier.begin(), earlier.end(),
                     [](const EarlierFrame& before) { return std::isfinite(before.before_s); });
-    if (!finite(sensors) || !finite_times) return without_fix(FixStatus::not_finite, 0);
+    if (!finite(sensors) || !finite_times) return make_fix_without_pose(FixStatus::not_finite, 0);
     if (const auto fix = locate_body(detections, sensors, earlier)) return *fix;
     return locate(detections, sensors);
   }
@@ -275,51 +275,53 @@ class Positioner::Impl {
     const LevelPose pose(solution.fix.pose);
     std::array<Matrix2, max_lamps> common;
     for (std::size_t i = 0; i < frame.size; ++i) {
-      common[i] = common_.compute_covariance(
-          common_.effect_on(frame.sightings[i], pose, lens_, level_from_base),
-          find_index(frame.ids[i]));
+      common[i] = common_.compute_covariance(common_.compute_observation_error_jacobians(
+                                                 frame.sightings[i], pose, lens_, level_from_base),
+                                             find_index(frame.ids[i]));
     }
     const OutlierLamps wrong =
-        find_outlier_lamps(frame.span(), {common.data(), frame.size}, solution.fix);
+        find_outlier_lamps(frame.as_span(), {common.data(), frame.size}, solution.fix);
     if (wrong.count == 0) return;
     std::bitset<kMaxSightings> kept;
     kept.set();
     for (std::size_t i = 0; i < wrong.count; ++i) kept.reset(wrong.lamps[i]);
-    frame.keep(kept);
-    solution = estimate_pose_checked(frame.span(), std::numeric_limits<double>::infinity());
+    frame.keep_only(kept);
+    solution = estimate_and_check_pose(frame.as_span(), std::numeric_limits<double>::infinity());
   }
 
   /// Returns G C G'. Sets fix.common_chi_squared if PositionerOptions require it.
-  Matrix4 common_covariance(const FrameObservations& frame, const Eigen::Matrix3d& level_from_base,
-                            Fix& fix) const {
+  Matrix4 compute_common_covariance(const FrameObservations& frame,
+                                    const Eigen::Matrix3d& level_from_base, Fix& fix) const {
     std::array<std::size_t, max_lamps> lamps;
     for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_index(frame.ids[i]);
     const std::span<const std::size_t> in_map(lamps.data(), frame.size);
-    const Matrix4 common = common_.compute_covariance(
-        common_.compute_error_gain(frame.span(), in_map, fix.estimate, lens_, level_from_base));
+    const Matrix4 common = common_.compute_covariance(common_.compute_gain_of_fix_errors(
+        frame.as_span(), in_map, fix.estimate, lens_, level_from_base));
     if (computes_common_chi_squared_ && fix.redundancy > 0) {
-      fix.common_chi_squared = common_.expected_chi_squared(frame.span(), in_map, fix.estimate,
-                                                            common, lens_, level_from_base);
+      fix.common_chi_squared = common_.compute_expected_chi_squared(
+          frame.as_span(), in_map, fix.estimate, common, lens_, level_from_base);
     }
     return common;
   }
 
-  BodyCovariance common_covariance(const BodyObservations& frame, const Eigen::Vector3d& arm_m,
-                                   const BodyFix& solution, Fix& fix) const {
+  BodyCovariance compute_common_covariance(const BodyObservations& frame,
+                                           const Eigen::Vector3d& arm_m, const BodyFix& solution,
+                                           Fix& fix) const {
     std::array<std::size_t, max_lamps> lamps;
     for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_index(frame.ids[i]);
     const std::span<const std::size_t> in_map(lamps.data(), frame.size);
-    const BodyCovariance common = common_.compute_covariance(
-        common_.compute_error_gain(frame.span(), in_map, arm_m, solution, lens_, body_from_base_));
+    const BodyCovariance common = common_.compute_covariance(common_.compute_gain_of_fix_errors(
+        frame.as_span(), in_map, arm_m, solution, lens_, body_from_base_));
     if (computes_common_chi_squared_ && fix.redundancy > 0) {
-      fix.common_chi_squared = common_.expected_chi_squared(frame.span(), in_map, arm_m, solution,
-                                                            common, lens_, body_from_base_);
+      fix.common_chi_squared = common_.compute_expected_chi_squared(
+          frame.as_span(), in_map, arm_m, solution, common, lens_, body_from_base_);
     }
     return common;
   }
 
-  FixStatus sight(std::span<const Detection> detections, const Eigen::Matrix3d& level_from_base,
-                  FrameObservations& frame) const {
+  FixStatus make_observations(std::span<const Detection> detections,
+                              const Eigen::Matrix3d& level_from_base,
+                              FrameObservations& frame) const {
     const Eigen::Matrix3d level_from_camera = level_from_base * base_from_camera_;
     const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
                          double sigma_px) {
@@ -340,15 +342,16 @@ class Positioner::Impl {
     return find_lamps(detections, frame, add);
   }
 
-  FixStatus sight_from_body(std::span<const Detection> detections, double time_s,
-                            BodyObservations& frame) const {
+  FixStatus make_body_observations(std::span<const Detection> detections, double time_s,
+                                   BodyObservations& frame) const {
     const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
                          double sigma_px) {
       const Eigen::Vector3d direction = body_from_camera_ * ray.direction;
       const auto whitened =
           whitened_pixel_from_ray(direction, body_from_camera_ * ray.d_direction_d_pixel, sigma_px);
       if (!whitened) return FixStatus::outside_lens;
-      const double read_s = row_clock_ ? row_clock_->time_s(detection.pixel) : 0;
+      const double read_s =
+          row_clock_ ? row_clock_->compute_time_from_middle_row_s(detection.pixel) : 0;
       frame.sightings[frame.size] = {lamp.position_m, direction.normalized(), *whitened, sigma_px,
                                      time_s + read_s};
       return FixStatus::ok;
@@ -360,7 +363,8 @@ class Positioner::Impl {
   std::optional<Fix> locate_body(std::span<const Detection> detections, const Sensors& sensors,
                                  std::span<const EarlierFrame> earlier) const {
     const KnownMotion motion = sensors.motion.value_or(KnownMotion());
-    if (moves(motion) && !row_clock_) return without_fix(FixStatus::row_time_unknown, 0);
+    if (may_camera_move_during_readout(motion) && !row_clock_)
+      return make_fix_without_pose(FixStatus::row_time_unknown, 0);
     BodyPrior prior{{motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
                      sensors.inclination.value_or(Inclination{0, 0})},
                     motion.velocity_sd_m_per_s,
@@ -370,32 +374,35 @@ class Positioner::Impl {
     if (prior.height) prior.height->z_m -= origin_m_.z();
     Fix fix;
     BodyObservations frame;
-    const FixStatus seen = sight_from_body(detections, 0, frame);
+    const FixStatus seen = make_body_observations(detections, 0, frame);
     fix.unknown_lamps = frame.unknown_lamps;
-    if (seen != FixStatus::ok) return without_fix(seen, fix.unknown_lamps);
+    if (seen != FixStatus::ok) return make_fix_without_pose(seen, fix.unknown_lamps);
     frame.num_current = frame.size;
     for (const EarlierFrame& before : earlier) {
-      const FixStatus status = sight_from_body(before.detections, -before.before_s, frame);
-      if (status != FixStatus::ok) return without_fix(status, fix.unknown_lamps);
+      const FixStatus status = make_body_observations(before.detections, -before.before_s, frame);
+      if (status != FixStatus::ok) return make_fix_without_pose(status, fix.unknown_lamps);
     }
     if (frame.num_current < 2) return std::nullopt;
     // If common errors are known, the noise alone must not reject lamps.
-    if (common_.complete()) frame.noise_is_stated = false;
+    if (common_.are_lens_zenith_and_lamp_errors_known()) frame.noise_is_stated = false;
     const Eigen::Vector3d& arm_m = mount_.position_in_robot_m;
-    const auto [status, solution] = estimate_body_robust(frame, arm_m, prior, max_residual_share_);
-    if (status != FixStatus::ok) return without_fix(status, fix.unknown_lamps);
+    const auto [status, solution] =
+        estimate_body_state_robust(frame, arm_m, prior, max_residual_share_);
+    if (status != FixStatus::ok) return make_fix_without_pose(status, fix.unknown_lamps);
     fix.status = status;
     fix.redundancy = solution.redundancy;
     fix.chi_squared = solution.pixels_chi_squared;
-    fix.body = in_world(solution, common_.stated() ? common_covariance(frame, arm_m, solution, fix)
-                                                   : BodyCovariance(BodyCovariance::Zero()));
+    fix.body = rotate_estimate_to_world(solution,
+                                        common_.are_errors_known()
+                                            ? compute_common_covariance(frame, arm_m, solution, fix)
+                                            : BodyCovariance(BodyCovariance::Zero()));
     fix.noise_covariance = fix.body->noise_covariance.topLeftCorner<4, 4>();
     fix.estimate = {solution.state.pose, fix.body->covariance.topLeftCorner<4, 4>()};
     fix.estimate.pose.position_m += origin_m_;
     fix.residual_px = solution.residual_px;
     fix.lamps = static_cast<int>(frame.num_current);
     fix.sightings = static_cast<int>(frame.size);
-    set_rejected(frame, fix);
+    set_rejected_lamps(frame, fix);
     fix.time_s = sensors.time_s;
     return fix;
   }
@@ -403,14 +410,14 @@ class Positioner::Impl {
   /// Replaces covariance and redundancy for equal noise in the undistorted image, by which the fix
   /// weighs its sightings, by those for equal noise in the image:
   ///   A = N^-1 J' W,   cov = A V A',   redundancy = tr(W V) - tr(N cov),   N = J' W J.
-  void convert_to_image_noise(const FrameObservations& frame,
-                              const Eigen::Matrix3d& level_from_base, Fix& fix) const {
+  void convert_covariance_to_image_noise(const FrameObservations& frame,
+                                         const Eigen::Matrix3d& level_from_base, Fix& fix) const {
     const LevelPose pose(fix.estimate.pose);
     const Eigen::Matrix3d camera_from_level = (level_from_base * base_from_camera_).transpose();
     const Matrix4 by_weights = fix.estimate.covariance;
     Matrix4 covariance = Matrix4::Zero();
     double expected_squares = 0;
-    for (const Sighting& sighting : frame.span()) {
+    for (const Sighting& sighting : frame.as_span()) {
       const auto seen = lens_.project_with_jacobians(camera_from_level * sighting.z.homogeneous());
       Eigen::Matrix2d d_pixel_d_z = sighting.d_pixel_d_z;
       if (seen) d_pixel_d_z = seen->d_pixel_d_point * camera_from_level.leftCols<2>();
@@ -418,7 +425,7 @@ class Positioner::Impl {
       const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
       const Eigen::Matrix2d residual_by_noise = whitening * z_by_noise;
       const Eigen::Matrix<double, 4, 2> fix_by_noise =
-          by_weights * predict(pose, sighting.lamp_m).d_z_d_state.transpose() *
+          by_weights * predict_normalized_point(pose, sighting.lamp_m).d_z_d_state.transpose() *
           whitening.transpose() * residual_by_noise;
       covariance += fix_by_noise * fix_by_noise.transpose();
       expected_squares += residual_by_noise.squaredNorm();
@@ -434,16 +441,20 @@ class Positioner::Impl {
                        const InclinationJacobian& d_pose_d_inclination, const Sensors& sensors,
                        const Matrix4& height_and_yaw_covariance, Fix& fix) const {
     const double sigma_rad = sensors.inclination_sigma_rad;
-    const Matrix4 common = common_.stated() ? common_covariance(frame, lean.level_from_base, fix)
-                                            : Matrix4(Matrix4::Zero());
-    if (!frame.is_weighed_by_noise) convert_to_image_noise(frame, lean.level_from_base, fix);
+    const Matrix4 common = common_.are_errors_known()
+                               ? compute_common_covariance(frame, lean.level_from_base, fix)
+                               : Matrix4(Matrix4::Zero());
+    if (!frame.is_weighed_by_noise)
+      convert_covariance_to_image_noise(frame, lean.level_from_base, fix);
     fix.estimate.covariance += height_and_yaw_covariance;
     // The error of the inclination is independent between frames, too.
     PoseEstimate whole = fix.estimate;
     whole.covariance += common;
-    fix.noise_covariance =
-        compute_robot_pose(fix.estimate, d_pose_d_inclination, sigma_rad, mount_, lean).covariance;
-    fix.estimate = compute_robot_pose(whole, d_pose_d_inclination, sigma_rad, mount_, lean);
+    fix.noise_covariance = compute_robot_pose_from_camera_pose(fix.estimate, d_pose_d_inclination,
+                                                               sigma_rad, mount_, lean)
+                               .covariance;
+    fix.estimate =
+        compute_robot_pose_from_camera_pose(whole, d_pose_d_inclination, sigma_rad, mount_, lean);
   }
 
   /// Returns the motion of the camera when a lamp is read, or std::nullopt if it moves and the row
@@ -451,12 +462,12 @@ class Positioner::Impl {
   std::optional<MotionAtReadout> motion_at_readout(std::span<const Detection> detections, int lamp,
                                                    const Sensors& sensors) const {
     MotionAtReadout readout;
-    if (!sensors.motion || !moves(*sensors.motion)) return readout;
+    if (!sensors.motion || !may_camera_move_during_readout(*sensors.motion)) return readout;
     if (!row_clock_) return std::nullopt;
     const auto detection = std::find_if(detections.begin(), detections.end(),
                                         [&](const Detection& one) { return one.lamp == lamp; });
     readout.motion = *sensors.motion;
-    readout.time_s = row_clock_->time_s(detection->pixel);
+    readout.time_s = row_clock_->compute_time_from_middle_row_s(detection->pixel);
     const Eigen::Rotation2Dd camera_from_robot(-mount_.yaw_in_robot_rad);
     readout.motion.velocity_m_per_s = camera_from_robot * sensors.motion->velocity_m_per_s;
     readout.arm_m = camera_from_robot * mount_.position_in_robot_m.head<2>();

@@ -108,9 +108,10 @@ class Positioner {
   ///   two   closed form
   ///   more  estimate_pose_least_squares() from compute_initial_pose(), without outliers
   ///   (estimate_pose_robust)
-  /// With two lamps or more estimate_body_robust() is used instead if the sensors leave motion or
-  /// inclination free, or give a height. If the covariances of calibration or survey cover every
-  /// lamp, lamps that contradict all uncertainties together are rejected, too (find_outlier_lamps).
+  /// With two lamps or more estimate_body_state_robust() is used instead if the sensors leave
+  /// motion or inclination free, or give a height. If the covariances of calibration or survey
+  /// cover every lamp, lamps that contradict all uncertainties together are rejected, too
+  /// (find_outlier_lamps).
   Fix locate(std::span<const Detection> detections, const Sensors& sensors = {}) const noexcept;
   /// Computes the fix of one frame together with frames from shortly before. Velocity, yaw rate,
   /// roll and pitch are assumed constant over the frames. If the current frame has fewer than two

@@ -16,7 +16,7 @@ namespace {
 bool has_redundancy(const Fix& fix) { return fix.ok() && fix.redundancy > 0; }
 
 /// Returns the median of chi_squared over its degrees of freedom.
-double median_reduced_chi_squared(std::span<const Fix> fixes) {
+double compute_median_reduced_chi_squared(std::span<const Fix> fixes) {
   std::vector<double> ratios;
   for (const Fix& fix : fixes) {
     if (has_redundancy(fix)) ratios.push_back(fix.chi_squared / fix.redundancy);
@@ -29,10 +29,10 @@ double median_reduced_chi_squared(std::span<const Fix> fixes) {
 
 }  // namespace
 
-ResidualSums sum_squared_residuals(std::span<const Fix> fixes) {
+ResidualSums sum_squared_residuals_of_fixes(std::span<const Fix> fixes) {
   // Five standard deviations of the others: no fix of normal noise, but one with a wrong lamp.
   constexpr double max_ratio = 25;
-  const double max_reduced = max_ratio * median_reduced_chi_squared(fixes);
+  const double max_reduced = max_ratio * compute_median_reduced_chi_squared(fixes);
   ResidualSums sums;
   for (const Fix& fix : fixes) {
     if (!has_redundancy(fix) || fix.chi_squared > max_reduced * fix.redundancy) continue;
@@ -44,13 +44,13 @@ ResidualSums sum_squared_residuals(std::span<const Fix> fixes) {
   return sums;
 }
 
-std::optional<double> estimate_noise_px(const ResidualSums& sums) {
+std::optional<double> estimate_pixel_noise_px(const ResidualSums& sums) {
   if (!(sums.degrees_of_freedom > 0)) return std::nullopt;
   return std::clamp(std::sqrt(sums.squares_px2 / sums.degrees_of_freedom), kMinSigma_px,
                     kMaxSigma_px);
 }
 
-std::optional<double> estimate_noise_factor(const ResidualSums& sums) {
+std::optional<double> estimate_noise_scale_factor(const ResidualSums& sums) {
   if (!(sums.degrees_of_freedom > 0)) return std::nullopt;
   constexpr double min_fraction = 0.25;
   const double noise_chi_squared =

@@ -20,13 +20,13 @@ struct ResidualSums {
 };
 
 /// Computes the sums.
-ResidualSums sum_squared_residuals(std::span<const Fix> fixes);
+ResidualSums sum_squared_residuals_of_fixes(std::span<const Fix> fixes);
 
 /// Estimates the standard deviation of a pixel per axis from the residuals:
 ///   sqrt(sum of squared residuals / degrees of freedom)
 /// Errors of calibration and lamp map count as noise. Clamped to [kMinSigma_px, kMaxSigma_px].
 /// Returns std::nullopt without redundancy.
-std::optional<double> estimate_noise_px(const ResidualSums& sums);
+std::optional<double> estimate_pixel_noise_px(const ResidualSums& sums);
 
 /// Estimates the ratio of the pixel noise to the noise with which the fixes were computed. Reported
 /// errors of calibration and map do not count as noise:
@@ -35,7 +35,7 @@ std::optional<double> estimate_noise_px(const ResidualSums& sums);
 /// realization of the errors of calibration and map, which may be far from its expectation. Returns
 /// std::nullopt without redundancy.
 /// @pre the fixes were computed with PositionerOptions::computes_common_chi_squared
-std::optional<double> estimate_noise_factor(const ResidualSums& sums);
+std::optional<double> estimate_noise_scale_factor(const ResidualSums& sums);
 
 /// Estimates the factor by which the reported noise is too small according to the residuals, at
 /// least 1 (Birge ratio; Birge 1932, Phys. Rev. 40, 207). Twice the expectation of the errors of

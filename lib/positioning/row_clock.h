@@ -14,7 +14,7 @@ struct RowClock {
   double row_time_s, middle_row;
   Readout readout;
 
-  double time_s(const Eigen::Vector2d& pixel) const {
+  double compute_time_from_middle_row_s(const Eigen::Vector2d& pixel) const {
     return row_time_s * ((readout == Readout::rows ? pixel.y() : pixel.x()) - middle_row);
   }
 };

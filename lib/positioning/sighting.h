@@ -46,23 +46,24 @@ struct Prediction {
 };
 
 /// Returns the height of a lamp above the camera, in m.
-inline double height_above(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
+inline double lamp_height_above_camera(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
   return lamp_m.z() - camera.position_m.z();
 }
 
 /// Computes z of a lamp from a pose.
 /// @pre the lamp is above the camera
-inline Eigen::Vector2d predict_z(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
+inline Eigen::Vector2d project_to_normalized_point(const LevelPose& camera,
+                                                   const Eigen::Vector3d& lamp_m) {
   const Eigen::Vector2d offset = (lamp_m - camera.position_m).head<2>();
-  return conj_product(camera.heading, offset) / height_above(camera, lamp_m);
+  return conjugate_product(camera.heading, offset) / lamp_height_above_camera(camera, lamp_m);
 }
 
 /// Computes z of a lamp from a pose, and its derivatives.
 /// @pre the lamp is above the camera
-inline Prediction predict(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
-  const double inverse_height = 1 / height_above(camera, lamp_m);
+inline Prediction predict_normalized_point(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
+  const double inverse_height = 1 / lamp_height_above_camera(camera, lamp_m);
   const double c = camera.heading.x() * inverse_height, s = camera.heading.y() * inverse_height;
-  const Eigen::Vector2d z = predict_z(camera, lamp_m);
+  const Eigen::Vector2d z = project_to_normalized_point(camera, lamp_m);
   Prediction prediction{z, {}};
   prediction.d_z_d_state << -c, -s, z.x() * inverse_height, z.y(),  //
       s, -c, z.y() * inverse_height, -z.x();
@@ -70,7 +71,7 @@ inline Prediction predict(const LevelPose& camera, const Eigen::Vector3d& lamp_m
 }
 
 /// Returns the derivative of z by a small rotation of the level frame about its x and y axes.
-inline Eigen::Matrix2d tilt_jacobian(const Eigen::Vector2d& z) {
+inline Eigen::Matrix2d compute_point_jacobian_wrt_level_tilt(const Eigen::Vector2d& z) {
   Eigen::Matrix2d jacobian;
   jacobian << -z.x() * z.y(), 1 + z.x() * z.x(), -(1 + z.y() * z.y()), z.x() * z.y();
   return jacobian;

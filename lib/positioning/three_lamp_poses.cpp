@@ -14,7 +14,7 @@ namespace {
 
 /// Returns a real root of x^3 + b x^2 + c x + d. Of three roots, approximately the one farthest
 /// from the others, where the cubic is steep.
-double steep_root(double b, double c, double d) {
+double find_steep_cubic_root(double b, double c, double d) {
   const double inflection = -b / 3;
   const double slope = c - b * b / 3;  // at the inflection
   const double value = d + inflection * (c + inflection * (b + inflection));
@@ -39,7 +39,8 @@ double steep_root(double b, double c, double d) {
 }
 
 /// Returns v^T A w for symmetric A.
-double form(const Eigen::Matrix3d& a, const Eigen::Vector3d& v, const Eigen::Vector3d& w) {
+double evaluate_bilinear_form(const Eigen::Matrix3d& a, const Eigen::Vector3d& v,
+                              const Eigen::Vector3d& w) {
   return v.dot(a * w);
 }
 
@@ -53,7 +54,7 @@ Eigen::Matrix3d adjugate(const Eigen::Matrix3d& a) {
 
 /// Returns the two lines whose product is the conic of rank two; std::nullopt if they are not
 /// real.
-int factor_conic(const Eigen::Matrix3d& conic, std::array<Eigen::Vector3d, 2>& lines) {
+int split_degenerate_conic(const Eigen::Matrix3d& conic, std::array<Eigen::Vector3d, 2>& lines) {
   const Eigen::Matrix3d adj = adjugate(conic);
   Eigen::Index i = 0;
   adj.diagonal().cwiseAbs().maxCoeff(&i);
@@ -88,7 +89,7 @@ Cones make_cones(const std::array<Eigen::Vector3d, 3>& points_m,
 }
 
 /// Refines the distances by Newton steps on the three equations.
-void polish(const Cones& cones, Eigen::Vector3d& distances) {
+void refine_distances_by_newton(const Cones& cones, Eigen::Vector3d& distances) {
   for (int i = 0; i < 3; ++i) {
     Eigen::Matrix3d jacobian;
     const Eigen::Vector3d d01 = cones.m01 * distances, d02 = cones.m02 * distances,
@@ -130,17 +131,19 @@ ThreeLampPoses compute_three_lamp_poses(const std::array<Eigen::Vector3d, 3>& po
   const double quadratic = adj2.cwiseProduct(first).sum();
   const double linear = adj1.cwiseProduct(second).sum();
   const double constant = adj1.cwiseProduct(first).sum() / 3;
-  const double x = steep_root(quadratic / cubic, linear / cubic, constant / cubic);
+  const double x = find_steep_cubic_root(quadratic / cubic, linear / cubic, constant / cubic);
   if (!std::isfinite(x)) return found;
   std::array<Eigen::Vector3d, 2> lines;
-  const int count = factor_conic(first + x * second, lines);
+  const int count = split_degenerate_conic(first + x * second, lines);
   const Eigen::Matrix3d world_frame = compute_point_frame(points_m[0], points_m[1], points_m[2]);
   if (!(world_frame.col(2).squaredNorm() > 0)) return found;  // on one line
   for (int i = 0; i < count; ++i) {
     // Two directions span the line; the conic along a + s b is a quadratic in s.
     const Eigen::Vector3d line = lines[static_cast<std::size_t>(i)].normalized();
     const Eigen::Vector3d a = line.unitOrthogonal(), b = line.cross(a);
-    const double faa = form(second, a, a), fab = form(second, a, b), fbb = form(second, b, b);
+    const double faa = evaluate_bilinear_form(second, a, a),
+                 fab = evaluate_bilinear_form(second, a, b),
+                 fbb = evaluate_bilinear_form(second, b, b);
     const double discriminant = fab * fab - faa * fbb;
     // Noise may remove two nearly equal solutions; the point between them is close to both.
     constexpr double near = 1e-2;
@@ -153,10 +156,11 @@ ThreeLampPoses compute_three_lamp_poses(const std::array<Eigen::Vector3d, 3>& po
       if (found.count == 4) break;
       const Eigen::Vector3d towards = ratio.sum() < 0 ? Eigen::Vector3d(-ratio) : ratio;
       if (!(towards.minCoeff() > 0)) continue;
-      const double scale = form(cones.m01, towards, towards) + form(cones.m02, towards, towards) +
-                           form(cones.m12, towards, towards);
+      const double scale = evaluate_bilinear_form(cones.m01, towards, towards) +
+                           evaluate_bilinear_form(cones.m02, towards, towards) +
+                           evaluate_bilinear_form(cones.m12, towards, towards);
       Eigen::Vector3d distances = std::sqrt((cones.a01 + cones.a02 + cones.a12) / scale) * towards;
-      polish(cones, distances);
+      refine_distances_by_newton(cones, distances);
       if (!(distances.minCoeff() > 0) || !distances.allFinite()) continue;
       const std::array<Eigen::Vector3d, 3> seen{distances[0] * rays[0], distances[1] * rays[1],
                                                 distances[2] * rays[2]};

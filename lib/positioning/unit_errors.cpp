@@ -40,24 +40,27 @@ UnitErrors::UnitErrors(const LampMap& map, const Calibration& calibration)
       lens_(camera_.lens_model, camera_.intrinsics),
       camera_from_level_(level_from_camera(calibration, Correction::all).inverse()),
       whole_(map_.lamps, calibration, Correction::all),
-      parts_{whole_.only(CommonErrorSource::lens), whole_.only(CommonErrorSource::zenith),
-             whole_.only(CommonErrorSource::offset), whole_.only(CommonErrorSource::lamps)},
+      parts_{whole_.extract_error_source(CommonErrorSource::lens),
+             whole_.extract_error_source(CommonErrorSource::zenith),
+             whole_.extract_error_source(CommonErrorSource::offset),
+             whole_.extract_error_source(CommonErrorSource::lamps)},
       has_offset_(calibration.dispersion.has_value()) {}
 
 std::vector<std::size_t> UnitErrors::find_visible_lamps(const Pose& level) const {
   return find_lamps_in_view(map_, lens_, camera_.imager_px, camera_from_level_, level);
 }
 
-std::optional<UnitBudget> UnitErrors::budget(const Pose& level, std::span<const std::size_t> lamps,
-                                             double noise_px) const {
+std::optional<UnitBudget> UnitErrors::compute_budget(const Pose& level,
+                                                     std::span<const std::size_t> lamps,
+                                                     double noise_px) const {
   if (lamps.size() < 2 || lamps.size() > kMaxSightings) return std::nullopt;
   const LevelPose pose(level);
   std::vector<Sighting> sightings;
   Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
   for (const std::size_t lamp : lamps) {
     const Eigen::Vector3d& lamp_m = map_.lamps[lamp].position_m;
-    if (!(height_above(pose, lamp_m) > 0)) return std::nullopt;
-    const Prediction seen = predict(pose, lamp_m);
+    if (!(lamp_height_above_camera(pose, lamp_m) > 0)) return std::nullopt;
+    const Prediction seen = predict_normalized_point(pose, lamp_m);
     const auto projection = lens_.project_with_jacobians(camera_from_level_ * seen.z.homogeneous());
     if (!projection) return std::nullopt;
     const Eigen::Matrix2d d_pixel_d_z =
@@ -68,8 +71,8 @@ std::optional<UnitBudget> UnitErrors::budget(const Pose& level, std::span<const 
   }
   const auto noise = invert_positive_definite(information);
   if (!noise) return std::nullopt;
-  const CommonErrors::Gain gain = whole_.compute_error_gain(sightings, lamps, {level, *noise},
-                                                            lens_, Eigen::Matrix3d::Identity());
+  const CommonErrors::Gain gain = whole_.compute_gain_of_fix_errors(
+      sightings, lamps, {level, *noise}, lens_, Eigen::Matrix3d::Identity());
   const auto part = [&](CommonErrorSource of) {
     return parts_[static_cast<std::size_t>(of)].compute_covariance(gain);
   };
@@ -77,17 +80,19 @@ std::optional<UnitBudget> UnitErrors::budget(const Pose& level, std::span<const 
                     part(CommonErrorSource::offset), part(CommonErrorSource::lamps)};
 }
 
-std::optional<UnitBudget> UnitErrors::budget(const Pose& level, std::span<const std::size_t> lamps,
-                                             double noise_px, const BodyPrior& prior) const {
+std::optional<UnitBudget> UnitErrors::compute_budget(const Pose& level,
+                                                     std::span<const std::size_t> lamps,
+                                                     double noise_px,
+                                                     const BodyPrior& prior) const {
   std::vector<Eigen::Vector3d> lamps_m;
   lamps_m.reserve(lamps.size());
   for (const std::size_t lamp : lamps) lamps_m.push_back(map_.lamps[lamp].position_m);
-  const auto limit = compute_body_limit(lamps_m, lens_, camera_from_level_, level, noise_px, prior,
-                                        make_row_clock(camera_));
+  const auto limit = compute_pose_crlb(lamps_m, lens_, camera_from_level_, level, noise_px, prior,
+                                       make_row_clock(camera_));
   if (!limit) return std::nullopt;
   const CommonErrors::BodyGain gain =
-      whole_.compute_error_gain(limit->frame.span(), lamps, Eigen::Vector3d::Zero(), limit->fix,
-                                lens_, Eigen::Matrix3d::Identity());
+      whole_.compute_gain_of_fix_errors(limit->frame.as_span(), lamps, Eigen::Vector3d::Zero(),
+                                        limit->fix, lens_, Eigen::Matrix3d::Identity());
   const auto part = [&](CommonErrorSource of) {
     return Matrix4(
         parts_[static_cast<std::size_t>(of)].compute_covariance(gain).topLeftCorner<4, 4>());

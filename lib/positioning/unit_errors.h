@@ -29,15 +29,15 @@ std::vector<std::size_t> find_lamps_in_view(const LampMap& map, const Lens& lens
 
 /// Covariances of (X, Y, Z, yaw) in meters and radians. `noise` is independent between images.
 /// `lens`, `zenith`, `offset` and `lamp_map` are the parts common to all fixes of a camera
-/// (CommonErrors::only).
+/// (CommonErrors::extract_error_source()).
 struct UnitBudget {
   Matrix4 noise, lens, zenith, offset, lamp_map;
   /// Increase of `noise` due to unknown motion, and the further increase due to unknown roll and
-  /// pitch (BodyLimit). Independent between images, too.
+  /// pitch (BodyPoseBound). Independent between images, too.
   Matrix4 motion = Matrix4::Zero(), roll_pitch = Matrix4::Zero();
 
   Matrix4 common() const { return lens + zenith + offset + lamp_map; }
-  Matrix4 total() const { return noise + motion + roll_pitch + common(); }
+  Matrix4 total_covariance() const { return noise + motion + roll_pitch + common(); }
 };
 
 /// Predicts the covariance of a calibrated camera's fixes from pixel noise and from the reported
@@ -49,7 +49,7 @@ class UnitErrors {
   UnitErrors(const LampMap& map, const Calibration& calibration);
 
   const CommonErrors& common() const { return whole_; }
-  bool has_offset() const { return has_offset_; }
+  bool has_offset_errors() const { return has_offset_; }
 
   /// Returns the indices in the map of the lamps that are fully visible to the camera with its
   /// calibrated tilt. `level` is the pose of its level frame. Such a lamp has its center, and its
@@ -60,12 +60,12 @@ class UnitErrors {
   /// covariance of Positioner::locate(). Returns std::nullopt for fewer than two lamps or more than
   /// kMaxSightings, for lamps that the lens does not image, or for lamps that do not determine a
   /// fix.
-  std::optional<UnitBudget> budget(const Pose& level, std::span<const std::size_t> lamps,
-                                   double noise_px) const;
+  std::optional<UnitBudget> compute_budget(const Pose& level, std::span<const std::size_t> lamps,
+                                           double noise_px) const;
   /// Computes the budget of a camera that may move and be tilted, as compute_error_budget().
   /// @pre the calibration has row time and readout direction if the prior leaves the motion free
-  std::optional<UnitBudget> budget(const Pose& level, std::span<const std::size_t> lamps,
-                                   double noise_px, const BodyPrior& prior) const;
+  std::optional<UnitBudget> compute_budget(const Pose& level, std::span<const std::size_t> lamps,
+                                           double noise_px, const BodyPrior& prior) const;
 
  private:
   LampMap map_;

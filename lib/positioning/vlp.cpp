@@ -36,7 +36,7 @@ static_assert(VLP_MAX_LAMPS == Positioner::max_lamps);
 /// An array without a destructor, since a thread may read it while it ends.
 thread_local std::array<char, 1024> last_error;
 
-std::int32_t failed(std::int32_t code, std::string_view message) {
+std::int32_t set_error_and_return_code(std::int32_t code, std::string_view message) {
   const auto length = std::min(message.size(), last_error.size() - 1);
   std::copy_n(message.begin(), length, last_error.begin());
   last_error[length] = '\0';
@@ -89,7 +89,7 @@ void fill_covariance(const Matrix4& of_pose, const BodyCovariance& of_body, doub
 }
 
 /// Returns the given motion, roll and pitch of a body that was not estimated.
-BodyEstimate told_body(const Sensors& sensors, double yaw_rad) {
+BodyEstimate get_given_body_estimate(const Sensors& sensors, double yaw_rad) {
   BodyEstimate body;
   if (sensors.inclination) body.inclination = *sensors.inclination;
   const double variance = sensors.inclination_sigma_rad * sensors.inclination_sigma_rad;
@@ -117,7 +117,7 @@ void fill(const Fix& from, const Sensors& sensors, vlp_fix& fix) {
   fix.unknown_lamps = from.unknown_lamps;
   if (!from.ok()) return;
   const auto& [pose, covariance] = from.estimate;
-  const BodyEstimate body = from.body ? *from.body : told_body(sensors, pose.yaw_rad);
+  const BodyEstimate body = from.body ? *from.body : get_given_body_estimate(sensors, pose.yaw_rad);
   std::copy_n(pose.position_m.data(), 3, fix.position_m);
   fix.roll_rad = body.inclination.roll_rad;
   fix.pitch_rad = body.inclination.pitch_rad;
@@ -135,19 +135,19 @@ void fill(const Fix& from, const Sensors& sensors, vlp_fix& fix) {
 }
 
 /// Returns the code of the exception that is being handled, and keeps its message.
-std::int32_t failed_by_exception() {
+std::int32_t set_error_from_exception() {
   try {
     throw;
   } catch (const InputError& error) {
-    return failed(VLP_BAD_FILE, error.what());
+    return set_error_and_return_code(VLP_BAD_FILE, error.what());
   } catch (const std::invalid_argument& error) {
-    return failed(VLP_BAD_ARGUMENT, error.what());
+    return set_error_and_return_code(VLP_BAD_ARGUMENT, error.what());
   } catch (const std::bad_alloc&) {
-    return failed(VLP_NO_MEMORY, "there is not enough memory");
+    return set_error_and_return_code(VLP_NO_MEMORY, "there is not enough memory");
   } catch (const std::exception& error) {
-    return failed(VLP_FAILED, error.what());
+    return set_error_and_return_code(VLP_FAILED, error.what());
   } catch (...) {
-    return failed(VLP_FAILED, "an unknown exception");
+    return set_error_and_return_code(VLP_FAILED, "an unknown exception");
   }
 }
 
@@ -162,10 +162,10 @@ class DetectionBuffer {
  public:
   DetectionBuffer() {}
 
-  bool has_room_for(std::size_t count) const { return count <= Positioner::max_lamps - size_; }
+  bool fits_in_buffer(std::size_t count) const { return count <= Positioner::max_lamps - size_; }
 
   /// Copies the detections of a frame.
-  /// @pre has_room_for(count)
+  /// @pre fits_in_buffer(count)
   std::span<const Detection> add(const vlp_detection* from, std::size_t count) {
     Detection* const first = detections_.data() + size_;
     for (std::size_t i = 0; i < count; ++i) {
@@ -197,25 +197,27 @@ int32_t vlp_open(const char* lamps_yaml, const char* calibration_yaml, const vlp
 int32_t vlp_open_room(const char* lamps_yaml, const char* room, const char* calibration_yaml,
                       const vlp_options* options, vlp_positioner** positioner) {
   using namespace vlp;
-  if (positioner == nullptr) return failed(VLP_BAD_ARGUMENT, "positioner is a null pointer");
+  if (positioner == nullptr)
+    return set_error_and_return_code(VLP_BAD_ARGUMENT, "positioner is a null pointer");
   *positioner = nullptr;
   if (lamps_yaml == nullptr || calibration_yaml == nullptr) {
-    return failed(VLP_BAD_ARGUMENT, "the name of a file is a null pointer");
+    return set_error_and_return_code(VLP_BAD_ARGUMENT, "the name of a file is a null pointer");
   }
   try {
-    const LampMapFile lamps = read_lamps_with_rooms(lamps_yaml, room != nullptr ? room : "");
+    const LampMapFile lamps = read_lamps_and_room_names(lamps_yaml, room != nullptr ? room : "");
     const Calibration calibration = read_calibration(calibration_yaml);
     const PositionerOptions chosen =
         options != nullptr ? convert_options(*options) : PositionerOptions();
     std::optional<LampDetector> detector;
     if (calibration.camera.row_time_s) detector.emplace(lamps.map, calibration);
-    std::string room_error = explain_missing_room(lamps, "the argument room of vlp_open_room()");
+    std::string room_error =
+        explain_why_room_is_needed(lamps, "the argument room of vlp_open_room()");
     if (!room_error.empty()) room_error = InputError(lamps_yaml, room_error).what();
     *positioner = new vlp_positioner{Positioner(lamps.map, calibration, chosen),
                                      std::move(detector), std::move(room_error)};
     return VLP_OK;
   } catch (...) {
-    return failed_by_exception();
+    return set_error_from_exception();
   }
 }
 
@@ -227,13 +229,15 @@ int32_t vlp_detect(const vlp_positioner* positioner, const vlp_image* image,
   if (count != nullptr) *count = 0;
   if (positioner == nullptr || image == nullptr || count == nullptr ||
       (detections == nullptr && capacity > 0)) {
-    return failed(VLP_BAD_ARGUMENT, "a pointer is null");
+    return set_error_and_return_code(VLP_BAD_ARGUMENT, "a pointer is null");
   }
   if (!positioner->detector) {
-    return failed(VLP_ROW_TIME_UNKNOWN,
-                  "the calibration has no row_time_s, which is needed to identify lamps");
+    return set_error_and_return_code(
+        VLP_ROW_TIME_UNKNOWN,
+        "the calibration has no row_time_s, which is needed to identify lamps");
   }
-  if (!positioner->room_error.empty()) return failed(VLP_BAD_FILE, positioner->room_error);
+  if (!positioner->room_error.empty())
+    return set_error_and_return_code(VLP_BAD_FILE, positioner->room_error);
   try {
     const auto seen = positioner->detector->detect(make_view(*image));
     for (std::size_t i = 0; i < std::min(seen.size(), capacity); ++i) {
@@ -242,9 +246,10 @@ int32_t vlp_detect(const vlp_positioner* positioner, const vlp_image* image,
     }
     *count = seen.size();
     if (seen.size() <= capacity) return VLP_OK;
-    return failed(VLP_TOO_SMALL, "the image shows " + std::to_string(seen.size()) + " lamps");
+    return set_error_and_return_code(VLP_TOO_SMALL,
+                                     "the image shows " + std::to_string(seen.size()) + " lamps");
   } catch (...) {
-    return failed_by_exception();
+    return set_error_from_exception();
   }
 }
 
@@ -266,7 +271,7 @@ int32_t vlp_locate_with_earlier(const vlp_positioner* positioner, const vlp_dete
     return fix->status = VLP_BAD_ARGUMENT;
   }
   DetectionBuffer buffer;
-  if (!buffer.has_room_for(count)) return fix->status = VLP_TOO_MANY_LAMPS;
+  if (!buffer.fits_in_buffer(count)) return fix->status = VLP_TOO_MANY_LAMPS;
   const std::span<const Detection> frame = buffer.add(detections, count);
   std::array<EarlierFrame, Positioner::max_lamps> before;
   std::size_t frames = 0;
@@ -274,7 +279,7 @@ int32_t vlp_locate_with_earlier(const vlp_positioner* positioner, const vlp_dete
     const vlp_earlier_frame& one = earlier[i];
     if (one.count == 0) continue;
     if (one.detections == nullptr) return fix->status = VLP_BAD_ARGUMENT;
-    if (!buffer.has_room_for(one.count)) return fix->status = VLP_TOO_MANY_LAMPS;
+    if (!buffer.fits_in_buffer(one.count)) return fix->status = VLP_TOO_MANY_LAMPS;
     before[frames++] = {buffer.add(one.detections, one.count), one.before_s};
   }
   const Sensors known = sensors != nullptr ? convert_sensors(*sensors) : Sensors();

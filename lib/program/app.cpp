@@ -34,7 +34,8 @@ class PrintableMessage : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm&,
               spdlog::memory_buf_t& line) override {
-    const std::string text = printable_line({message.payload.data(), message.payload.size()});
+    const std::string text =
+        escape_for_single_line({message.payload.data(), message.payload.size()});
     line.append(text.data(), text.data() + text.size());
   }
   std::unique_ptr<custom_flag_formatter> clone() const override {
@@ -54,7 +55,7 @@ void log_to_stderr(const std::string& program, bool quiet, bool verbose) {
   spdlog::set_default_logger(logger);
 }
 
-CLI::Validator number_check(const std::string& name, bool (*accepts)(double)) {
+CLI::Validator make_number_validator(const std::string& name, bool (*accepts)(double)) {
   return CLI::Validator(
       [name, accepts](const std::string& text) {
         double value = 0;
@@ -101,7 +102,7 @@ std::string describe_unknown_options(const CLI::App& app) {
 
 /// Returns an error about an unknown or missing command, with the list of commands; empty if a
 /// command was given.
-std::string command_problem(const CLI::App& app) {
+std::string describe_command_problem(const CLI::App& app) {
   const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
   if (commands.empty() || !app.get_subcommands().empty()) return "";
   std::string names;
@@ -115,7 +116,7 @@ std::string command_problem(const CLI::App& app) {
 }
 
 /// Discards everything printed to stdout. The descriptor stays open for `--output /dev/stdout`.
-bool silence_stdout() {
+bool redirect_stdout_to_null() {
   std::FILE* nowhere = std::fopen("/dev/null", "w");
   if (nowhere == nullptr) return false;
   stdout = nowhere;
@@ -123,7 +124,7 @@ bool silence_stdout() {
 }
 
 /// Returns `exit_code`; reports an error and returns kBadInput if stdout could not be written.
-int check_stdout(int exit_code) {
+int check_stdout_written(int exit_code) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
   spdlog::error("stdout cannot be written");
   return kBadInput;
@@ -139,27 +140,29 @@ bool same_file(const std::string& one, const std::string& other) {
 
 }  // namespace
 
-int count_cores() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
+int count_cpu_cores() {
+  return static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+}
 
-CLI::Validator finite() {
-  return number_check("finite", [](double) { return true; });
+CLI::Validator make_finite_validator() {
+  return make_number_validator("finite", [](double) { return true; });
 }
 CLI::Validator make_finite_positive_validator() {
-  return number_check("finite positive", [](double value) { return value > 0; });
+  return make_number_validator("finite positive", [](double value) { return value > 0; });
 }
-CLI::Validator finite_not_negative() {
-  return number_check("finite and not negative", [](double value) { return value >= 0; });
+CLI::Validator make_finite_non_negative_validator() {
+  return make_number_validator("finite and not negative", [](double value) { return value >= 0; });
 }
 
-CLI::Validator make_ending_validator(const std::string& ending) {
+CLI::Validator make_file_extension_validator(const std::string& ending) {
   return ending_check({ending}, "the file's name should end in " + ending);
 }
 
-CLI::Validator is_plot_file() {
+CLI::Validator make_plot_file_validator() {
   return ending_check({".png", ".svg"}, "a picture's name should end in .png or .svg");
 }
 
-CLI::Validator present_value() {
+CLI::Validator make_former_value_validator() {
   return CLI::Validator(
       [](const std::string& text) {
         const std::string_view present = find_present_name(NameKind::value, text);
@@ -173,7 +176,7 @@ void add_threads_option(CLI::App& app, int& threads, const std::string& what) {
       ->check(CLI::Range(1, 1024));
 }
 
-void check_output(const std::string& output, const std::vector<std::string>& inputs) {
+void check_output_file(const std::string& output, const std::vector<std::string>& inputs) {
   for (const std::string& input : inputs) {
     std::error_code missing;
     if (std::filesystem::equivalent(output, input, missing)) {
@@ -182,11 +185,11 @@ void check_output(const std::string& output, const std::vector<std::string>& inp
   }
 }
 
-void check_outputs(const std::vector<std::pair<std::string, std::string>>& outputs,
-                   const std::vector<std::string>& inputs) {
+void check_output_files(const std::vector<std::pair<std::string, std::string>>& outputs,
+                        const std::vector<std::string>& inputs) {
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     const auto& [option, file] = outputs[i];
-    check_output(file, inputs);
+    check_output_file(file, inputs);
     for (std::size_t k = 0; k < i; ++k) {
       if (!same_file(file, outputs[k].second)) continue;
       throw std::invalid_argument(
@@ -209,22 +212,22 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
   std::signal(SIGXFSZ,
               SIG_IGN);  // a write beyond the size limit fails; temporary files are removed
   if (argc == 3 && std::string_view(argv[1]) == "--reference") {
-    const std::string text = format_reference(app, argv[2]);
+    const std::string text = format_program_reference(app, argv[2]);
     if (!text.empty()) {  // the parser reports other names
       std::fputs(text.c_str(), stdout);
-      return check_stdout(kDone);
+      return check_stdout_written(kDone);
     }
   }
   try {
     app.parse(argc, argv);
     log_to_stderr(app.get_name(), quiet, verbose);
-    if (quiet && !silence_stdout()) return kBadInput;
+    if (quiet && !redirect_stdout_to_null()) return kBadInput;
     run();
-    return check_stdout(kDone);
+    return check_stdout_written(kDone);
   } catch (const CLI::Success& success) {  // --help, --version
-    return check_stdout(app.exit(success));
+    return check_stdout_written(app.exit(success));
   } catch (const CLI::ParseError& error) {
-    std::string problem = command_problem(app);
+    std::string problem = describe_command_problem(app);
     // A misspelled option is more informative than a missing one.
     if (problem.empty()) problem = describe_unknown_options(app);
     if (problem.empty()) problem = error.what();
@@ -232,10 +235,10 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
     return kBadInput;
   } catch (const GateNotMet& error) {
     spdlog::error("{}", error.what());
-    return check_stdout(kGateNotMet);
+    return check_stdout_written(kGateNotMet);
   } catch (const Undetermined& error) {
     spdlog::error("{}", error.what());
-    return check_stdout(kUndetermined);
+    return check_stdout_written(kUndetermined);
   } catch (const std::exception& error) {  // includes InputError and std::invalid_argument
     spdlog::error("{}", error.what());
     return kBadInput;

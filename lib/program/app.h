@@ -30,34 +30,34 @@ class GateNotMet : public std::runtime_error {
 };
 
 /// Returns the default number of threads: the number of cores, at least 1.
-int count_cores();
+int count_cpu_cores();
 
 /// Return validators of options that accept finite numbers: any, positive, or not negative.
-CLI::Validator finite();
+CLI::Validator make_finite_validator();
 CLI::Validator make_finite_positive_validator();
-CLI::Validator finite_not_negative();
+CLI::Validator make_finite_non_negative_validator();
 
 /// Returns a validator that rejects the former name of a value and names the present one.
-CLI::Validator present_value();
+CLI::Validator make_former_value_validator();
 
 /// Returns a validator that accepts file names with this ending.
-CLI::Validator make_ending_validator(const std::string& ending);
+CLI::Validator make_file_extension_validator(const std::string& ending);
 /// Returns a validator that accepts file names of plots: .png or .svg.
-CLI::Validator is_plot_file();
+CLI::Validator make_plot_file_validator();
 
 /// Adds --threads. `what` describes the parallel items in --help.
 void add_threads_option(CLI::App& app, int& threads,
                         const std::string& what = "Number of images to process in parallel");
 
 /// Throws std::invalid_argument if `output` is one of the input files.
-void check_output(const std::string& output, const std::vector<std::string>& inputs);
+void check_output_file(const std::string& output, const std::vector<std::string>& inputs);
 
-/// Applies check_output() to all outputs and throws std::invalid_argument if two of them are the
-/// same file.
+/// Applies check_output_file() to all outputs and throws std::invalid_argument if two of them are
+/// the same file.
 ///
 /// @param outputs  option and file name of each output; an empty name is ignored
-void check_outputs(const std::vector<std::pair<std::string, std::string>>& outputs,
-                   const std::vector<std::string>& inputs);
+void check_output_files(const std::vector<std::pair<std::string, std::string>>& outputs,
+                        const std::vector<std::string>& inputs);
 
 /// Runs a program: adds --quiet, --verbose and --version to `app`, formats its --help in 80
 /// columns, parses the arguments and calls `run`. Messages go through spdlog to stderr.

@@ -21,7 +21,7 @@ class Progress {
 
   /// Updates the display. `skipped` items needed no work: they are included in `done`, but do not
   /// enter the speed.
-  void update(std::size_t done, std::size_t total, std::size_t skipped = 0);
+  void update_display(std::size_t done, std::size_t total, std::size_t skipped = 0);
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -60,7 +60,7 @@ std::vector<std::string> parse_choices(const CLI::Option& option) {
 
 enum class Value { none, choice, file, other };
 
-Value classify_value(const CLI::Option& option) {
+Value classify_option_value(const CLI::Option& option) {
   if (option.get_items_expected_max() == 0) return Value::none;  // a flag
   if (!parse_choices(option).empty()) return Value::choice;
   const std::string type = option.get_type_name();
@@ -156,7 +156,7 @@ std::string format_bash_options(const CLI::App& app, const std::string& indent) 
   for (const CLI::Option* option : find_options(app)) {
     const auto option_names = collect_names(*option);
     names.insert(names.end(), option_names.begin(), option_names.end());
-    const Value value = classify_value(*option);
+    const Value value = classify_option_value(*option);
     if (value == Value::none) continue;
     std::string effect;
     if (value == Value::choice) {
@@ -185,7 +185,7 @@ std::string format_zsh_option(const CLI::Option& option) {
   }
   const std::string list = join_words(names, ",");
   spec.append(names.size() > 1 ? "{" + list + "}" : list).append("'[" + text + "]");
-  const Value value = classify_value(option);
+  const Value value = classify_option_value(option);
   const int values = value == Value::none ? 0 : std::max(1, option.get_items_expected_min());
   for (int i = 0; i < values; ++i) {
     spec.append(":value:");
@@ -298,7 +298,7 @@ std::string format_zsh_completion(const CLI::App& app) {
   return text + "esac\n";
 }
 
-std::string format_reference(const CLI::App& app, std::string_view which) {
+std::string format_program_reference(const CLI::App& app, std::string_view which) {
   if (which == "man") return format_manual_page(app);
   if (which == "bash") return format_bash_completion(app);
   if (which == "zsh") return format_zsh_completion(app);

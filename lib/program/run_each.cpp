@@ -70,7 +70,7 @@ Request parse_request(const std::string& line) {
   std::_Exit(code);
 }
 
-std::string read_tail(std::FILE* output) {
+std::string read_end_of_file(std::FILE* output) {
   constexpr long max_bytes = 4096;
   std::fseek(output, 0, SEEK_END);
   std::fseek(output, std::max(0L, std::ftell(output) - max_bytes), SEEK_SET);
@@ -100,13 +100,14 @@ std::string run_request(const char* name, const Request& request,
   const nlohmann::json answer{
       {"exit_code", WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status)},
       {"cpu_s", to_seconds(used.ru_utime) + to_seconds(used.ru_stime)},
-      {"said", read_tail(output.get())}};
+      {"said", read_end_of_file(output.get())}};
   return answer.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace
 
-void run_each(const char* name, const std::function<int(int argc, char** argv)>& program) {
+void run_for_each_stdin_line(const char* name,
+                             const std::function<int(int argc, char** argv)>& program) {
   std::string line;
   while (std::getline(std::cin, line)) {
     fmt::print("{}\n", run_request(name, parse_request(line), program));

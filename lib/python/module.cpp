@@ -61,7 +61,7 @@ py::ssize_t count_rows(const Doubles& array, py::ssize_t columns, const char* na
 }
 
 template <typename Wide>
-bool all_fit(const py::array& array) {
+bool do_all_fit_int32(const py::array& array) {
   const auto wide = py::array_t<Wide, py::array::c_style | py::array::forcecast>::ensure(array);
   return wide && std::all_of(wide.data(), wide.data() + wide.size(),
                              [](Wide value) { return std::in_range<int>(value); });
@@ -72,8 +72,8 @@ Integers to_integers(const py::object& given, const char* name) {
   const auto array = py::array::ensure(given);
   const char kind = array ? array.dtype().kind() : '?';
   // numpy converts an empty list to an array of floats.
-  const bool whole = (kind == 'i' && all_fit<std::int64_t>(array)) ||
-                     (kind == 'u' && all_fit<std::uint64_t>(array)) ||
+  const bool whole = (kind == 'i' && do_all_fit_int32<std::int64_t>(array)) ||
+                     (kind == 'u' && do_all_fit_int32<std::uint64_t>(array)) ||
                      (kind == 'f' && array.size() == 0);
   if (!whole) throw std::invalid_argument(std::string(name) + " should be integers, of 32 bits");
   return Integers::ensure(array);
@@ -92,18 +92,19 @@ const Matrix4 kUnknown = Matrix4::Constant(kNone);
 
 // Lamp map, calibration, lens
 
-LampMapFile lamps_of(const std::filesystem::path& file, const std::optional<std::string>& room) {
-  return read_lamps_with_rooms(file, room.value_or(""));
+LampMapFile make_lamp_map_file(const std::filesystem::path& file,
+                               const std::optional<std::string>& room) {
+  return read_lamps_and_room_names(file, room.value_or(""));
 }
 
-Rows3 positions_of(const LampMapFile& lamps) {
+Rows3 get_lamp_positions(const LampMapFile& lamps) {
   Rows3 positions(std::ssize(lamps.map.lamps), 3);
   Eigen::Index row = 0;
   for (const Lamp& lamp : lamps.map.lamps) positions.row(row++) = lamp.position_m;
   return positions;
 }
 
-Eigen::VectorXi ids_of(const LampMapFile& lamps) {
+Eigen::VectorXi get_lamp_ids(const LampMapFile& lamps) {
   Eigen::VectorXi ids(std::ssize(lamps.map.lamps));
   std::ranges::transform(lamps.map.lamps, ids.begin(), &Lamp::id);
   return ids;
@@ -159,11 +160,11 @@ Positioner make_positioner(const LampMapFile& lamps, const Calibration& calibrat
   return {lamps.map, calibration, options};
 }
 
-Sensors make_sensors(const std::optional<Pair>& inclination_rad, double inclination_sigma_rad,
-                     const std::optional<Pair>& height_and_yaw, const Pair& height_and_yaw_sd,
-                     const std::optional<Pair>& velocity_m_per_s, double velocity_sd_m_per_s,
-                     double yaw_rate_rad_per_s, double yaw_rate_sd_rad_per_s,
-                     const std::optional<Pair>& height_m, const std::optional<double>& time_s) {
+Sensors make_sensor_data(const std::optional<Pair>& inclination_rad, double inclination_sigma_rad,
+                         const std::optional<Pair>& height_and_yaw, const Pair& height_and_yaw_sd,
+                         const std::optional<Pair>& velocity_m_per_s, double velocity_sd_m_per_s,
+                         double yaw_rate_rad_per_s, double yaw_rate_sd_rad_per_s,
+                         const std::optional<Pair>& height_m, const std::optional<double>& time_s) {
   Sensors sensors;
   if (inclination_rad) sensors.inclination = {(*inclination_rad)[0], (*inclination_rad)[1]};
   sensors.inclination_sigma_rad = inclination_sigma_rad;
@@ -224,9 +225,9 @@ std::vector<std::size_t> find_frame_begins(const Integers& frames) {
   return begins;
 }
 
-py::dict locate_frames(const Positioner& positioner, const py::object& frame_of_each,
-                       const py::object& lamps, const Doubles& pixels,
-                       const std::optional<Doubles>& sigma_px, const Sensors& sensors) {
+py::dict locate_camera_in_frames(const Positioner& positioner, const py::object& frame_of_each,
+                                 const py::object& lamps, const Doubles& pixels,
+                                 const std::optional<Doubles>& sigma_px, const Sensors& sensors) {
   const auto detections = make_detections(to_integers(lamps, "lamps"), pixels, sigma_px);
   const Integers frames = to_integers(frame_of_each, "frames");
   check_length(frames, detections.size(), "frames");
@@ -260,17 +261,17 @@ py::dict locate_frames(const Positioner& positioner, const py::object& frame_of_
                   "lamps"_a = used);
 }
 
-std::optional<BodyCovariance> body_covariance(const Fix& fix) {
+std::optional<BodyCovariance> make_body_covariance_array(const Fix& fix) {
   return fix.body ? std::optional(fix.body->covariance) : std::nullopt;
 }
 
-std::vector<int> rejected_ids(const Fix& fix) {
+std::vector<int> list_rejected_lamp_ids(const Fix& fix) {
   const auto count =
       std::min(static_cast<std::size_t>(fix.rejected_lamps), fix.rejected_ids.size());
   return {fix.rejected_ids.begin(), fix.rejected_ids.begin() + static_cast<std::ptrdiff_t>(count)};
 }
 
-std::string shown(const Fix& fix) {
+std::string to_repr(const Fix& fix) {
   if (!fix.ok()) return "<vlp.Fix: " + std::string(to_string(fix.status)) + ">";
   const Pose& pose = fix.estimate.pose;
   std::array<char, 160> text{};
@@ -312,7 +313,7 @@ struct ImageDetector {
   std::array<int, 2> imager_px;
 };
 
-std::string in_px(int width, int height) {
+std::string format_pixel_size(int width, int height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
 
@@ -321,9 +322,9 @@ py::tuple detect(const ImageDetector& of_camera, const py::array& array) {
   const auto rows = py::array::ensure(array, py::array::c_style);
   const ImageView image = make_image_view(rows);
   if (image.width != imager_px[0] || image.height != imager_px[1]) {
-    throw std::invalid_argument("the image is " + in_px(image.width, image.height) +
+    throw std::invalid_argument("the image is " + format_pixel_size(image.width, image.height) +
                                 ", the calibration's camera has " +
-                                in_px(imager_px[0], imager_px[1]) + " px");
+                                format_pixel_size(imager_px[0], imager_px[1]) + " px");
   }
   std::vector<Detection> detections;
   {
@@ -346,7 +347,7 @@ ImageDetector make_detector(const LampMapFile& lamps, const Calibration& calibra
   std::optional<LampClassifier> trained;
   if (classifier) {
     trained = read_lamp_classifier(*classifier);
-  } else if (const auto error = explain_missing_room(lamps, "the argument room of LampMap");
+  } else if (const auto error = explain_why_room_is_needed(lamps, "the argument room of LampMap");
              !error.empty()) {
     throw InputError(lamps.file, error);
   }
@@ -356,7 +357,7 @@ ImageDetector make_detector(const LampMapFile& lamps, const Calibration& calibra
 
 // Tables
 
-py::dict detections_table(const std::filesystem::path& file) {
+py::dict make_detections_dict(const std::filesystem::path& file) {
   const auto read = read_detections(file);
   std::vector<Detection> all;
   std::vector<int> frames;
@@ -371,7 +372,7 @@ py::dict detections_table(const std::filesystem::path& file) {
                   "lamps"_a = arrays[0], "pixels"_a = arrays[1], "sigma_px"_a = arrays[2]);
 }
 
-py::dict fixes_table(const std::filesystem::path& file) {
+py::dict make_fixes_dict(const std::filesystem::path& file) {
   const auto rows = read_fixes(file);
   const auto n = std::ssize(rows);
   py::list images, statuses;
@@ -391,8 +392,8 @@ py::dict fixes_table(const std::filesystem::path& file) {
                   "yaw_rad"_a = yaw, "sd"_a = sd);
 }
 
-py::dict truth_table(const std::filesystem::path& file) {
-  const auto rows = read_truth(file);
+py::dict make_truth_dict(const std::filesystem::path& file) {
+  const auto rows = read_truth_table(file);
   const auto n = std::ssize(rows);
   py::list images;
   Rows3 position(n, 3);
@@ -437,10 +438,10 @@ void define_statuses(py::module_& m) {
 /// Defines lamp map, lens and calibration.
 void define_calibration(py::module_& m) {
   py::class_<LampMapFile>(m, "LampMap", "The lamps of a room, lamps.yaml.")
-      .def(py::init(&lamps_of), "file"_a, "room"_a = py::none(),
+      .def(py::init(&make_lamp_map_file), "file"_a, "room"_a = py::none(),
            "room: only the lamps that state this room; None: all lamps.")
-      .def_property_readonly("ids", &ids_of)
-      .def_property_readonly("positions_m", &positions_of, "(n, 3), in the world.")
+      .def_property_readonly("ids", &get_lamp_ids)
+      .def_property_readonly("positions_m", &get_lamp_positions, "(n, 3), in the world.")
       .def("__len__", [](const LampMapFile& lamps) { return lamps.map.lamps.size(); });
 
   py::class_<Lens>(m, "Lens", "A lens: directions to pixels and back.")
@@ -505,22 +506,22 @@ void define_fix(py::module_& m) {
                              [](const Fix& fix) { return fix.ok() ? fix.residual_px : kNone; })
       .def_readonly("lamps", &Fix::lamps, "Used for the fix.")
       .def_property_readonly(
-          "body_covariance", &body_covariance,
+          "body_covariance", &make_body_covariance_array,
           "Covariance of (x, y, z, yaw, vx, vy, yaw rate, roll, pitch), where motion or tilt was "
           "estimated.")
       .def_readonly("rejected_lamps", &Fix::rejected_lamps)
       .def_property_readonly(
-          "rejected_ids", &rejected_ids,
+          "rejected_ids", &list_rejected_lamp_ids,
           "Lamps that were left out because the others contradict them, the first 32.")
       .def_readonly("unknown_lamps", &Fix::unknown_lamps)
       .def_readonly("time_s", &Fix::time_s)
-      .def("__repr__", &shown);
+      .def("__repr__", &to_repr);
 }
 
 /// Defines sensors, positioner and lamp detector.
 void define_positioner(py::module_& m) {
   py::class_<Sensors>(m, "Sensors", "Sensor readings of the robot for a frame.")
-      .def(py::init(&make_sensors), py::kw_only(), "inclination_rad"_a = py::none(),
+      .def(py::init(&make_sensor_data), py::kw_only(), "inclination_rad"_a = py::none(),
            "inclination_sigma_rad"_a = 0.0, "height_and_yaw"_a = py::none(),
            "height_and_yaw_sd"_a = Pair{0, 0}, "velocity_m_per_s"_a = py::none(),
            "velocity_sd_m_per_s"_a = 0.0, "yaw_rate_rad_per_s"_a = 0.0,
@@ -542,7 +543,7 @@ void define_positioner(py::module_& m) {
            "earlier: frames from shortly before, (lamps, pixels, sigma_px, before_s) each, which\n"
            "determine velocity, yaw rate, roll and pitch together with this one.")
       .def(
-          "locate_frames", &locate_frames, "frames"_a, "lamps"_a, "pixels"_a,
+          "locate_frames", &locate_camera_in_frames, "frames"_a, "lamps"_a, "pixels"_a,
           "sigma_px"_a = py::none(), "sensors"_a = Sensors(),
           "Fixes of many frames: the detections of one follow each other and have the same number\n"
           "in `frames`. A dict of arrays, a row for each frame: frame, status (an index of\n"
@@ -559,12 +560,13 @@ void define_positioner(py::module_& m) {
 
 /// Defines the readers of tables.
 void define_tables(py::module_& m) {
-  m.def("read_detections", &detections_table, "file"_a,
+  m.def("read_detections", &make_detections_dict, "file"_a,
         "detections.csv as a dict: images, and for each detection frames (an index of images),\n"
         "lamps, pixels, sigma_px.");
-  m.def("read_fixes", &fixes_table, "file"_a,
+  m.def("read_fixes", &make_fixes_dict, "file"_a,
         "fixes.csv as a dict: images, statuses, position_m, yaw_rad, sd (n, 4).");
-  m.def("read_truth", &truth_table, "file"_a, "truth.csv as a dict: images, position_m, yaw_rad.");
+  m.def("read_truth", &make_truth_dict, "file"_a,
+        "truth.csv as a dict: images, position_m, yaw_rad.");
 }
 
 }  // namespace

@@ -12,10 +12,10 @@
 namespace vlp {
 namespace {
 
-std::string format_six_digits(double value) { return significant(value, 6); }
+std::string format_six_digits(double value) { return format_significant_digits(value, 6); }
 
 /// Formats a standard deviation.
-std::string format_sd(double value) { return significant(value, 2); }
+std::string format_sd(double value) { return format_significant_digits(value, 2); }
 
 std::string format_pair(const Eigen::Vector2d& values, const std::string& unit) {
   return format_six_digits(values.x()) + ", " + format_six_digits(values.y()) + " " + unit;
@@ -31,7 +31,7 @@ std::string format_sds(const std::optional<Matrix2>& covariance, double scale,
 
 }  // namespace
 
-std::string camera_table(const Camera& camera) {
+std::string make_camera_html_table(const Camera& camera) {
   HtmlTable table;
   const auto add_row = [&](const char* label, std::string value) {
     table.rows.push_back({label, std::move(value)});
@@ -52,20 +52,20 @@ std::string camera_table(const Camera& camera) {
     add_row("pixel pitch", format_six_digits(1e6 * *camera.pixel_pitch_m) + " um");
   if (camera.row_time_s) add_row("row time", format_six_digits(1e6 * *camera.row_time_s) + " us");
   if (camera.readout) add_row("read-out", *camera.readout == Readout::rows ? "rows" : "columns");
-  return html_table(table);
+  return make_html_table(table);
 }
 
-std::string intrinsics_table(const IntrinsicsReport& report) {
+std::string make_intrinsics_html_table(const IntrinsicsReport& report) {
   HtmlTable table{"Lens calibration", {}, {}};
   if (report.views > 0) {
     table.rows = {{"views of the board", std::to_string(report.views)},
                   {"corners", std::to_string(report.corners)},
                   {"outliers", std::to_string(report.outliers)},
-                  {"residual, rms per axis", significant(report.rms_px, 3) + " px"}};
+                  {"residual, rms per axis", format_significant_digits(report.rms_px, 3) + " px"}};
   }
   if (report.expected_max_error_px) {
     table.rows.push_back({"largest error of the projection that is to be expected",
-                          significant(*report.expected_max_error_px, 3) + " px"});
+                          format_significant_digits(*report.expected_max_error_px, 3) + " px"});
   }
   if (!report.region_px.empty()) {
     table.rows.push_back({"known", "in the valid region (valid_region_px) only"});
@@ -73,31 +73,34 @@ std::string intrinsics_table(const IntrinsicsReport& report) {
   if (report.board_warp_m) {
     const auto& [x_m, y_m] = *report.board_warp_m;
     table.rows.push_back({"deflection of the board along x, y",
-                          significant(1e3 * x_m, 3) + ", " + significant(1e3 * y_m, 3) + " mm"});
+                          format_significant_digits(1e3 * x_m, 3) + ", " +
+                              format_significant_digits(1e3 * y_m, 3) + " mm"});
   }
-  return html_table(table);
+  return make_html_table(table);
 }
 
-std::string format_rotation_table(const RotationCenter& center) {
+std::string make_rotation_html_table(const RotationCenter& center) {
   const Eigen::Vector3d& up = center.zenith_in_camera;
   const double tilt_rad = std::atan2(up.head<2>().norm(), up.z());
-  HtmlTable table{"",
-                  {},
-                  {{"rotation center in the undistorted image",
-                    format_pair(center.center_px, "px") + format_sds(center.covariance, 1, "px")},
-                   {"tilt of the camera", significant(deg_from_rad(tilt_rad), 4) + " degrees"},
-                   {"correction", center.model == RotationModel::tilt ? "tilt" : "shift"}}};
+  HtmlTable table{
+      "",
+      {},
+      {{"rotation center in the undistorted image",
+        format_pair(center.center_px, "px") + format_sds(center.covariance, 1, "px")},
+       {"tilt of the camera", format_significant_digits(deg_from_rad(tilt_rad), 4) + " degrees"},
+       {"correction", center.model == RotationModel::tilt ? "tilt" : "shift"}}};
   if (center.lever_arm_m) {
     table.rows.push_back({"from the axis of rotation to the camera",
                           format_pair(1e3 * *center.lever_arm_m, "mm") +
                               format_sds(center.lever_arm_covariance, 1e3, "mm")});
   }
-  return html_table(table);
+  return make_html_table(table);
 }
 
-std::string dispersion_table(const Dispersion& dispersion, const Eigen::Vector2d& focal_px) {
-  const auto mm = [](double value_m) { return significant(1e3 * value_m, 3); };
-  return html_table(
+std::string make_dispersion_html_table(const Dispersion& dispersion,
+                                       const Eigen::Vector2d& focal_px) {
+  const auto mm = [](double value_m) { return format_significant_digits(1e3 * value_m, 3); };
+  return make_html_table(
       {"",
        {},
        {{"captures at the station", std::to_string(dispersion.captures)},
@@ -106,23 +109,24 @@ std::string dispersion_table(const Dispersion& dispersion, const Eigen::Vector2d
          mm(dispersion.center_m.x()) + ", " + mm(dispersion.center_m.y()) + " mm"},
         {"offset subtracted from the image",
          format_pair(dispersion.offset_px, "px") +
-             format_sds(offset_covariance_with_map(dispersion, focal_px), 1, "px")}}});
+             format_sds(compute_offset_covariance_with_map(dispersion, focal_px), 1, "px")}}});
 }
 
-std::string history_list(const std::vector<HistoryEntry>& entries) {
+std::string make_history_html_list(const std::vector<HistoryEntry>& entries) {
   constexpr std::size_t max_unfolded = 8;
   std::string html;
   for (const auto& entry : entries) {
     html += entry.inputs.size() > max_unfolded ? "<details>\n" : "<details open>\n";
-    html += html_element("summary", entry.part + ": " + entry.program + " " + entry.version + ", " +
-                                        std::to_string(entry.inputs.size()) +
-                                        (entry.inputs.size() == 1 ? " input" : " inputs"));
+    html += make_html_element("summary", entry.part + ": " + entry.program + " " + entry.version +
+                                             ", " + std::to_string(entry.inputs.size()) +
+                                             (entry.inputs.size() == 1 ? " input" : " inputs"));
     if (!entry.options.empty()) {
-      html += "<p>Options: <code>" + html_text(entry.options) + "</code></p>\n";
+      html += "<p>Options: <code>" + escape_html_text(entry.options) + "</code></p>\n";
     }
     HtmlTable table{"", {"input", "SHA-256"}, {}};
     for (const auto& [file, sha256] : entry.inputs) table.rows.push_back({file, sha256});
-    if (!table.rows.empty()) html += "<div class=\"digests\">\n" + html_table(table) + "</div>\n";
+    if (!table.rows.empty())
+      html += "<div class=\"digests\">\n" + make_html_table(table) + "</div>\n";
     html += "</details>\n";
   }
   return html;

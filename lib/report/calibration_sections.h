@@ -10,13 +10,14 @@
 namespace vlp {
 
 /// Return the parts of a calibration as HTML tables.
-std::string camera_table(const Camera& camera);
-std::string intrinsics_table(const IntrinsicsReport& report);
-std::string format_rotation_table(const RotationCenter& center);
-std::string dispersion_table(const Dispersion& dispersion, const Eigen::Vector2d& focal_px);
+std::string make_camera_html_table(const Camera& camera);
+std::string make_intrinsics_html_table(const IntrinsicsReport& report);
+std::string make_rotation_html_table(const RotationCenter& center);
+std::string make_dispersion_html_table(const Dispersion& dispersion,
+                                       const Eigen::Vector2d& focal_px);
 
 /// Returns a foldable list in HTML: program, version and options of each part, and the digests of
 /// its inputs.
-std::string history_list(const std::vector<HistoryEntry>& entries);
+std::string make_history_html_list(const std::vector<HistoryEntry>& entries);
 
 }  // namespace vlp

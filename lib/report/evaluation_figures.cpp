@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-std::string format_number(double value) { return readable(value, 3); }
+std::string format_number(double value) { return format_for_humans(value, 3); }
 
 std::string format_range(double low, double high) {
   return format_number(low) + " to " + format_number(high);
@@ -23,7 +23,8 @@ ReportStatistic make_length_statistic(const std::string& label, double value_m,
           interval_m == nullptr ? "" : format_range(1e3 * interval_m->low, 1e3 * interval_m->high)};
 }
 
-void add_horizontal(std::vector<ReportStatistic>& figures, const Evaluation& evaluation) {
+void add_horizontal_statistics(std::vector<ReportStatistic>& figures,
+                               const Evaluation& evaluation) {
   const ErrorStatistics& errors_m = evaluation.horizontal_m;
   const auto& intervals_m = evaluation.intervals_m;
   const auto add_row = [&](const char* name, double value_m, const Interval* interval_m) {
@@ -39,7 +40,7 @@ void add_horizontal(std::vector<ReportStatistic>& figures, const Evaluation& eva
 }
 
 std::string describe_comparison(const Comparison& comparison) {
-  std::string note = "Compared with the other fixes: " + comparison.words() + "; ";
+  std::string note = "Compared with the other fixes: " + comparison.describe_result() + "; ";
   if (comparison.pairs > 0) {
     note += "the mean error is " + format_mm(std::abs(comparison.mean_difference_m)) + " mm " +
             (comparison.mean_difference_m < 0 ? "smaller" : "larger") + " than theirs";
@@ -59,7 +60,7 @@ std::vector<ReportStatistic> make_report_statistics(const Evaluation& evaluation
   std::vector<ReportStatistic> figures = {
       {"captures", std::to_string(evaluation.captures), "", ""},
       {"without a fix", std::to_string(evaluation.captures - evaluation.fixes), "", ""}};
-  add_horizontal(figures, evaluation);
+  add_horizontal_statistics(figures, evaluation);
   if (const auto& height_m = evaluation.height_m) {
     figures.push_back(make_length_statistic("height error, root mean square", height_m->sizes.rms));
     figures.push_back(make_length_statistic("height error, mean", height_m->bias));
@@ -107,7 +108,7 @@ std::vector<std::string> make_report_notes(const Evaluation& evaluation) {
                     " " + evaluation.resampling_unit + ".");
   }
   if (evaluation.comparison) notes.push_back(describe_comparison(*evaluation.comparison));
-  if (const std::string warning = make_limit_warning(evaluation); !warning.empty()) {
+  if (const std::string warning = make_crlb_warning(evaluation); !warning.empty()) {
     notes.push_back("Caution: " + warning + ".");
   }
   for (const std::string& warning : make_sample_size_warnings(evaluation)) {

@@ -15,7 +15,7 @@
 namespace vlp {
 namespace {
 
-Eigen::Vector2d fix_position_m(const FixRow& row) { return row.fix->pose.position_m.head<2>(); }
+Eigen::Vector2d get_fix_position_m(const FixRow& row) { return row.fix->pose.position_m.head<2>(); }
 
 ErrorPlot make_floor_plan(const EvaluationInput& input, const std::vector<FixError>& errors,
                           const LampMap& lamps) {
@@ -23,7 +23,7 @@ ErrorPlot make_floor_plan(const EvaluationInput& input, const std::vector<FixErr
   std::vector<bool> has_fix(input.truth ? input.truth->rows.size() : 0);
   plot.fixes.reserve(errors.size());
   for (const FixError& error : errors) {
-    const Eigen::Vector2d fix_m = fix_position_m(input.fixes.rows[error.fix]);
+    const Eigen::Vector2d fix_m = get_fix_position_m(input.fixes.rows[error.fix]);
     plot.fixes.push_back({fix_m - error.horizontal_m, fix_m, input.fixes.rows[error.fix].image});
     if (input.truth) has_fix[error.truth] = true;
   }
@@ -36,22 +36,25 @@ ErrorPlot make_floor_plan(const EvaluationInput& input, const std::vector<FixErr
 }  // namespace
 
 Drawing make_floor_plan_drawing(const EvaluationInput& input, const LampMap& lamps) {
-  return make_drawing(make_floor_plan(input, compute_errors(input, input.fixes).errors, lamps));
+  return make_gnuplot_drawing(
+      make_floor_plan(input, compute_fix_errors(input, input.fixes).errors, lamps));
 }
 
 std::vector<ReportPlot> make_evaluation_plots(const EvaluationInput& input,
                                               const Evaluation& evaluation, const LampMap& lamps) {
-  const std::vector<FixError> errors = compute_errors(input, input.fixes).errors;
+  const std::vector<FixError> errors = compute_fix_errors(input, input.fixes).errors;
   std::vector<ReportPlot> pictures;
   if (!input.line_m) {
-    pictures.push_back(make_report_plot(make_drawing(make_floor_plan(input, errors, lamps))));
+    pictures.push_back(
+        make_report_plot(make_gnuplot_drawing(make_floor_plan(input, errors, lamps))));
   } else if (evaluation.fit) {
-    pictures.push_back(make_drive_plot("Drive", input.fixes.rows, *input.line_m, *evaluation.fit));
+    pictures.push_back(
+        plot_drive_along_line("Drive", input.fixes.rows, *input.line_m, *evaluation.fit));
   }
   CdfPlot::Curve curve{"fixes", {}, evaluation.horizontal_m.median, evaluation.horizontal_m.p90};
   curve.errors_m.reserve(errors.size());
   for (const FixError& error : errors) curve.errors_m.push_back(error.horizontal_m.norm());
-  pictures.push_back(make_report_plot(make_drawing(CdfPlot{"Horizontal errors", {curve}})));
+  pictures.push_back(make_report_plot(make_gnuplot_drawing(CdfPlot{"Horizontal errors", {curve}})));
   pictures.back().alt += " The median error is " + format_mm_with_unit(curve.p50_m) +
                          ", nine tenths no further than " + format_mm_with_unit(curve.p90_m) + ".";
   return pictures;
@@ -72,7 +75,7 @@ std::optional<ReportPlot> make_budget_plot(const std::vector<FixRow>& fixes, con
       return std::find(rejected.begin(), rejected.end(), lamps.lamps[lamp].id) != rejected.end();
     });
     constexpr double arbitrary_px = 1;  // arbitrary: the proportions do not depend on it
-    const auto budget = unit.budget(row.fix->pose, visible, arbitrary_px);
+    const auto budget = unit.compute_budget(row.fix->pose, visible, arbitrary_px);
     if (!budget) continue;
     const double common_m = compute_fix_sds(budget->common()).horizontal_m;
     if (!(common_m > 0)) continue;
@@ -87,8 +90,8 @@ std::optional<ReportPlot> make_budget_plot(const std::vector<FixRow>& fixes, con
                                  part_variance_m2(budget->lamp_map)});
   }
   if (plot.variances_m2.empty()) return std::nullopt;
-  ReportPlot picture = make_report_plot(make_drawing(plot));
-  const std::vector<double> fractions = plot.fractions();
+  ReportPlot picture = make_report_plot(make_gnuplot_drawing(plot));
+  const std::vector<double> fractions = plot.compute_contribution_fractions();
   for (std::size_t i = 0; i < fractions.size(); ++i) {
     picture.alt +=
         fmt::format("{} {} {:.0f} %", i == 0 ? "" : ",", plot.parts[i], 100 * fractions[i]);
@@ -97,13 +100,13 @@ std::optional<ReportPlot> make_budget_plot(const std::vector<FixRow>& fixes, con
   return picture;
 }
 
-ReportPlot make_drive_plot(const std::string& title, const std::vector<FixRow>& fixes,
-                           const CommandedLine& commanded_m, const LineFit& fit) {
+ReportPlot plot_drive_along_line(const std::string& title, const std::vector<FixRow>& fixes,
+                                 const CommandedLine& commanded_m, const LineFit& fit) {
   TrackPlot plot{title, commanded_m, {}, fit.line_m};
   for (const FixRow& row : fixes) {
-    if (row.fix) plot.fixes_m.push_back(fix_position_m(row));
+    if (row.fix) plot.fixes_m.push_back(get_fix_position_m(row));
   }
-  ReportPlot picture = make_report_plot(make_drawing(plot));
+  ReportPlot picture = make_report_plot(make_gnuplot_drawing(plot));
   picture.caption = title + ". " + picture.caption;
   picture.alt = title + ". " + picture.alt + " The fitted line is off by " +
                 format_mm_with_unit(fit.distances_m.mean) + " on average.";

@@ -25,7 +25,7 @@ std::string base64(const std::string& bytes) {
 
 }  // namespace
 
-std::string html_text(std::string_view text) {
+std::string escape_html_text(std::string_view text) {
   static const std::map<char, std::string_view> escapes{
       {'&', "&amp;"},  {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"},
       {'\'', "&#39;"}, {'\n', " "},   {'\t', " "}};
@@ -45,32 +45,34 @@ std::string html_text(std::string_view text) {
   return escaped;
 }
 
-std::string html_element(std::string_view name, std::string_view text) {
+std::string make_html_element(std::string_view name, std::string_view text) {
   const std::string tag(name);
-  return "<" + tag + ">" + html_text(text) + "</" + tag + ">\n";
+  return "<" + tag + ">" + escape_html_text(text) + "</" + tag + ">\n";
 }
 
-std::string html_page(const std::string& title, const std::string& content) {
+std::string make_html_page(const std::string& title, const std::string& content) {
   return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
          "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n" +
-         html_element("title", title) + "<style>" + std::string(kReportStyle) +
-         "</style>\n</head>\n<body>\n<header>\n" + html_element("h1", title) +
+         make_html_element("title", title) + "<style>" + std::string(kReportStyle) +
+         "</style>\n</head>\n<body>\n<header>\n" + make_html_element("h1", title) +
          "</header>\n<main>\n" + content + "</main>\n</body>\n</html>\n";
 }
 
-std::string html_section(const std::string& heading, const std::string& body) {
+std::string make_html_section(const std::string& heading, const std::string& body) {
   if (body.empty()) return "";
-  return "<section>\n" + html_element("h2", heading) + body + "</section>\n";
+  return "<section>\n" + make_html_element("h2", heading) + body + "</section>\n";
 }
 
-std::string html_table(const HtmlTable& table) {
+std::string make_html_table(const HtmlTable& table) {
   // Focusable, so that it can be scrolled without a mouse.
   std::string html = "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"" +
-                     html_text(table.caption.empty() ? "Table" : table.caption) + "\">\n<table>\n";
-  if (!table.caption.empty()) html += html_element("caption", table.caption);
+                     escape_html_text(table.caption.empty() ? "Table" : table.caption) +
+                     "\">\n<table>\n";
+  if (!table.caption.empty()) html += make_html_element("caption", table.caption);
   if (!table.header.empty()) {
     html += "<thead><tr>";
-    for (const auto& cell : table.header) html += "<th scope=\"col\">" + html_text(cell) + "</th>";
+    for (const auto& cell : table.header)
+      html += "<th scope=\"col\">" + escape_html_text(cell) + "</th>";
     html += "</tr></thead>\n";
   }
   html += "<tbody>\n";
@@ -81,7 +83,7 @@ std::string html_table(const HtmlTable& table) {
     html += marked ? "<tr class=\"marked\">" : "<tr>";
     for (std::size_t i = 0; i < row.size(); ++i) {
       html += i == 0 ? "<th scope=\"row\">" : "<td>";
-      html += html_text(row[i]);
+      html += escape_html_text(row[i]);
       html += i == 0 ? "</th>" : "</td>";
     }
     html += "</tr>\n";
@@ -89,7 +91,7 @@ std::string html_table(const HtmlTable& table) {
   return html + "</tbody>\n</table>\n</div>\n";
 }
 
-std::string html_figure(const ReportPlot& picture) {
+std::string make_html_figure(const ReportPlot& picture) {
   const bool png = picture.image.rfind("\x89PNG", 0) == 0;
   HtmlTable table{"", {}, {}};
   if (!picture.table.empty()) {
@@ -100,9 +102,10 @@ std::string html_figure(const ReportPlot& picture) {
   return "<figure" + large +
          ">\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Picture\">"
          "<img alt=\"" +
-         html_text(picture.alt) + "\" src=\"data:image/" + (png ? "png" : "svg+xml") + ";base64," +
-         base64(picture.image) + "\"></div>\n" + html_element("figcaption", picture.caption) +
-         "</figure>\n" + (table.rows.empty() ? "" : html_table(table));
+         escape_html_text(picture.alt) + "\" src=\"data:image/" + (png ? "png" : "svg+xml") +
+         ";base64," + base64(picture.image) + "\"></div>\n" +
+         make_html_element("figcaption", picture.caption) + "</figure>\n" +
+         (table.rows.empty() ? "" : make_html_table(table));
 }
 
 }  // namespace vlp

@@ -13,16 +13,16 @@ namespace vlp {
 
 /// Escapes text for HTML elements and attributes. Line breaks and tabs become spaces, other control
 /// characters U+FFFD.
-std::string html_text(std::string_view text);
+std::string escape_html_text(std::string_view text);
 
 /// Returns `<name>text</name>` with escaped text, and a newline.
-std::string html_element(std::string_view name, std::string_view text);
+std::string make_html_element(std::string_view name, std::string_view text);
 
 /// Returns a self-contained page with the report's style. `content` is HTML.
-std::string html_page(const std::string& title, const std::string& content);
+std::string make_html_page(const std::string& title, const std::string& content);
 
 /// Returns a section with a heading. `body` is HTML; the result is empty if the body is.
-std::string html_section(const std::string& heading, const std::string& body);
+std::string make_html_section(const std::string& heading, const std::string& body);
 
 /// Table that scrolls on its own if it is too wide. The first cell of each row is its header. Cells
 /// are escaped. An empty caption or header is omitted. Marked rows are highlighted.
@@ -32,9 +32,9 @@ struct HtmlTable {
   std::vector<std::vector<std::string>> rows;
   std::vector<std::size_t> marked = {};
 };
-std::string html_table(const HtmlTable& table);
+std::string make_html_table(const HtmlTable& table);
 
 /// Returns a figure with the embedded image, its caption, and its table below.
-std::string html_figure(const ReportPlot& picture);
+std::string make_html_figure(const ReportPlot& picture);
 
 }  // namespace vlp

@@ -19,59 +19,61 @@ std::string with_unit(const std::string& text, const std::string& unit) {
   return text.empty() || unit.empty() ? text : text + kSpace + unit;
 }
 
-std::string quantity(const std::optional<double>& value, const std::string& unit) {
-  return value ? with_unit(significant(*value, 4), unit) : "none";
+std::string format_quantity(const std::optional<double>& value, const std::string& unit) {
+  return value ? with_unit(format_significant_digits(*value, 4), unit) : "none";
 }
 
 std::vector<std::string> make_row(const CheckedMetric& gate, bool may_be_out_of_reach) {
   const bool out_of_reach = may_be_out_of_reach && !gate.value;
-  const std::string result = gate.passed()  ? "met"
-                             : out_of_reach ? "not\u00a0reached"
-                                            : "NOT\u00a0MET";
+  const std::string result = gate.has_passed() ? "met"
+                             : out_of_reach    ? "not\u00a0reached"
+                                               : "NOT\u00a0MET";
   const auto sure = gate.conformance_probability();
-  return {gate.name, quantity(gate.value, gate.unit),
-          describe(gate.direction) + kSpace + quantity(gate.limit, gate.unit) +
+  return {gate.name, format_quantity(gate.value, gate.unit),
+          describe(gate.direction) + kSpace + format_quantity(gate.limit, gate.unit) +
               describe_guard_band(gate),
-          result + (sure ? ", conforms with p\u00a0=\u00a0" + significant(*sure, 3) : "")};
+          result +
+              (sure ? ", conforms with p\u00a0=\u00a0" + format_significant_digits(*sure, 3) : "")};
 }
 
-std::string gates_table(const Report& report) {
+std::string make_gates_table(const Report& report) {
   HtmlTable table{"", {"gate", "figure", "limit", "result"}, {}};
   for (const auto& gate : report.gates) {
     const bool given = report.verdict.has_value();
-    if (!gate.passed() && (gate.value || !given)) table.marked.push_back(table.rows.size());
+    if (!gate.has_passed() && (gate.value || !given)) table.marked.push_back(table.rows.size());
     table.rows.push_back(make_row(gate, given));
   }
-  return table.rows.empty() ? "" : html_table(table);
+  return table.rows.empty() ? "" : make_html_table(table);
 }
 
-std::string verdict_box(const char* look, const std::string& word, const std::string& content) {
-  return std::string("<div class=\"verdict ") + look + "\"><strong>" + html_text(word) +
+std::string make_verdict_box(const char* look, const std::string& word,
+                             const std::string& content) {
+  return std::string("<div class=\"verdict ") + look + "\"><strong>" + escape_html_text(word) +
          "</strong>" + content + "</div>\n";
 }
 
 std::string format_verdict(const ReportVerdict& verdict) {
   constexpr std::array looks{"pass", "fail", "none"};
   std::string causes;
-  for (const std::string& cause : verdict.causes) causes += html_element("p", cause);
-  return verdict_box(looks.at(static_cast<std::size_t>(verdict.look)), verdict.word, causes);
+  for (const std::string& cause : verdict.causes) causes += make_html_element("p", cause);
+  return make_verdict_box(looks.at(static_cast<std::size_t>(verdict.look)), verdict.word, causes);
 }
 
 std::string format_gate_verdict(const std::vector<CheckedMetric>& gates,
                                 const std::string& caution) {
   if (gates.empty()) {
-    return verdict_box("none", "NO VERDICT", "No gates were set.");
+    return make_verdict_box("none", "NO VERDICT", "No gates were set.");
   }
-  const auto missed =
-      std::count_if(gates.begin(), gates.end(), [](const auto& gate) { return !gate.passed(); });
+  const auto missed = std::count_if(gates.begin(), gates.end(),
+                                    [](const auto& gate) { return !gate.has_passed(); });
   const std::string count = std::to_string(gates.size());
   const std::string of_gates = gates.size() == 1 ? " gate" : " gates";
   const std::string reason = missed == 0
                                  ? "Every metric is within its limit (" + count + of_gates + ")."
                                  : std::to_string(missed) + " of " + count + of_gates +
                                        (missed == 1 ? " is" : " are") + " not met.";
-  return verdict_box(missed == 0 ? "pass" : "fail", missed == 0 ? "PASS" : "FAIL",
-                     reason + (caution.empty() ? "" : html_element("p", caution)));
+  return make_verdict_box(missed == 0 ? "pass" : "fail", missed == 0 ? "PASS" : "FAIL",
+                          reason + (caution.empty() ? "" : make_html_element("p", caution)));
 }
 
 std::string verdict(const Report& report) {
@@ -79,17 +81,17 @@ std::string verdict(const Report& report) {
                         : format_gate_verdict(report.gates, report.caution);
 }
 
-std::string facts_table(const Report& report) {
+std::string make_facts_table(const Report& report) {
   HtmlTable table{"", {}, {}};
   for (const auto& [label, value] : report.facts) table.rows.push_back({label, value});
-  return table.rows.empty() ? "" : html_table(table);
+  return table.rows.empty() ? "" : make_html_table(table);
 }
 
 std::string format_rejected_images(const Report& report) {
   if (report.refused.empty()) return "";
   HtmlTable table{"", {"image", "why it was not used"}, {}};
   for (const auto& [image, reason] : report.refused) table.rows.push_back({image, reason});
-  return html_table(table);
+  return make_html_table(table);
 }
 
 std::string format_statistics(const Report& report) {
@@ -103,16 +105,16 @@ std::string format_statistics(const Report& report) {
       table.rows.push_back({label, with_unit(value, unit)});
       if (intervals) table.rows.back().push_back(with_unit(interval, unit));
     }
-    html += html_table(table);
+    html += make_html_table(table);
   }
-  for (const auto& note : report.notes) html += html_element("p", note);
+  for (const auto& note : report.notes) html += make_html_element("p", note);
   return html;
 }
 
 std::string format_plots(const Report& report, ReportPart part) {
   std::string html;
   for (const auto& picture : report.pictures) {
-    if (picture.part == part) html += html_figure(picture);
+    if (picture.part == part) html += make_html_figure(picture);
   }
   return html;
 }
@@ -121,36 +123,38 @@ std::string format_history(const Report& report) {
   std::vector<HistoryEntry> entries;
   if (report.calibration) entries = report.calibration->history;
   if (report.evaluation) entries.push_back(*report.evaluation);
-  return history_list(entries);
+  return make_history_html_list(entries);
 }
 
 }  // namespace
 
-std::string report_html(const Report& report) {
+std::string render_report_html(const Report& report) {
   std::string camera, rotation, dispersion;
   if (const auto& calibration = report.calibration) {
-    camera = camera_table(calibration->camera);
-    if (calibration->intrinsics_report) camera += intrinsics_table(*calibration->intrinsics_report);
+    camera = make_camera_html_table(calibration->camera);
+    if (calibration->intrinsics_report)
+      camera += make_intrinsics_html_table(*calibration->intrinsics_report);
     if (calibration->rotation_center)
-      rotation = format_rotation_table(*calibration->rotation_center);
+      rotation = make_rotation_html_table(*calibration->rotation_center);
     if (calibration->dispersion)
-      dispersion = dispersion_table(*calibration->dispersion, calibration->camera.focal_px());
+      dispersion =
+          make_dispersion_html_table(*calibration->dispersion, calibration->camera.focal_px());
   }
   const auto pictures = [&](ReportPart part) { return format_plots(report, part); };
-  return html_page(
+  return make_html_page(
       report.title,
-      verdict(report) + facts_table(report) +
-          html_section("Fixes on the floor", pictures(ReportPart::floor)) +
-          html_section("Gates", gates_table(report)) +
-          html_section("Figures", format_statistics(report)) +
-          html_section("Camera", camera + pictures(ReportPart::camera)) +
-          html_section("Rotation center", rotation + pictures(ReportPart::rotation)) +
-          html_section("Dispersion", dispersion + pictures(ReportPart::dispersion)) +
-          html_section("Distribution of the errors", pictures(ReportPart::distribution)) +
-          html_section("Moving tracks", pictures(ReportPart::tracks)) +
-          html_section("More pictures", pictures(ReportPart::other)) +
-          html_section("Images that were not used", format_rejected_images(report)) +
-          html_section("History", format_history(report)));
+      verdict(report) + make_facts_table(report) +
+          make_html_section("Fixes on the floor", pictures(ReportPart::floor)) +
+          make_html_section("Gates", make_gates_table(report)) +
+          make_html_section("Figures", format_statistics(report)) +
+          make_html_section("Camera", camera + pictures(ReportPart::camera)) +
+          make_html_section("Rotation center", rotation + pictures(ReportPart::rotation)) +
+          make_html_section("Dispersion", dispersion + pictures(ReportPart::dispersion)) +
+          make_html_section("Distribution of the errors", pictures(ReportPart::distribution)) +
+          make_html_section("Moving tracks", pictures(ReportPart::tracks)) +
+          make_html_section("More pictures", pictures(ReportPart::other)) +
+          make_html_section("Images that were not used", format_rejected_images(report)) +
+          make_html_section("History", format_history(report)));
 }
 
 }  // namespace vlp

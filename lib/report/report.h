@@ -66,6 +66,6 @@ struct Report {
 /// Order: verdict, facts, fixes on the floor, gates, statistics, camera, rotation center,
 /// dispersion, distribution, tracks, other plots, rejected images, history. Laid out for a screen,
 /// a phone and A4 paper. The same report yields the same bytes.
-std::string report_html(const Report& report);
+std::string render_report_html(const Report& report);
 
 }  // namespace vlp

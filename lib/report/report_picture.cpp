@@ -65,7 +65,7 @@ constexpr std::array<Kind, 8> kKinds = {
       "Map of the theoretical limit over the floor with the lamps."}}};
 
 /// Returns the text between <title> and </title>; empty if there is none.
-std::string_view svg_title(std::string_view svg) {
+std::string_view find_svg_title(std::string_view svg) {
   constexpr std::string_view opening = "<title>";
   const std::size_t start = svg.find(opening);
   if (start == std::string_view::npos) return {};
@@ -74,18 +74,18 @@ std::string_view svg_title(std::string_view svg) {
 }
 
 /// Returns true if the file ends in the chunk IEND with its checksum.
-bool is_whole_png(std::string_view png) {
+bool is_complete_png(std::string_view png) {
   constexpr std::string_view end("IEND\xAE\x42\x60\x82");
   return png.ends_with(end);
 }
 
-bool is_whole_svg(const std::string& svg) {
+bool is_complete_svg(const std::string& svg) {
   pugi::xml_document document;
   return document.load_buffer(svg.data(), svg.size()) && document.child("svg").first_child();
 }
 
 ReportPlot classify_image(std::string image, const std::string& name) {
-  const std::string_view title = svg_title(image);
+  const std::string_view title = find_svg_title(image);
   const auto* kind = std::find_if(kKinds.begin(), kKinds.end(),
                                   [&](const Kind& other) { return other.title == title; });
   if (kind == kKinds.end()) return {ReportPart::other, std::move(image), name, "Picture " + name};
@@ -101,7 +101,7 @@ ReportPlot read_report_plot(const std::filesystem::path& file) {
   if (!png && image.substr(0, head).find("<svg") == std::string::npos) {
     throw InputError(file, "is neither an SVG nor a PNG");
   }
-  if (png ? !is_whole_png(image) : !is_whole_svg(image)) {
+  if (png ? !is_complete_png(image) : !is_complete_svg(image)) {
     throw InputError(file, "is cut short, or holds no picture");
   }
   return classify_image(std::move(image), file.filename().string());

@@ -28,17 +28,17 @@ constexpr int kMaxTags = 1000;
 constexpr int kMinSquares = 4, kMaxSquares = 100;
 constexpr int kMaxId = 1'000'000;  // families have fewer
 constexpr double kMinTag_m = 1e-4, kMaxTag_m = 2;
-constexpr double kMaxPrintSd = 0.02;  // check_board() detects larger errors
+constexpr double kMaxPrintSd = 0.02;  // check_board_layout() detects larger errors
 
 /// Returns the index of a word among `names`. For other words, the message lists the names after
 /// `introduction`.
 std::size_t find_word(const YamlValue& value, const auto& names, const std::string& introduction) {
   std::string list;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (value.text() == names[i]) return i;
+    if (value.get_text() == names[i]) return i;
     list += (i == 0 ? "" : ", ") + std::string(names[i]);
   }
-  throw value.unknown(introduction + list);
+  throw value.make_unknown_word_error(introduction + list);
 }
 
 IdOrder read_id_order(const YamlValue& value) {
@@ -54,35 +54,36 @@ IdOrder read_id_order(const YamlValue& value) {
 }
 
 /// Returns a board of squares without tags.
-Board make_board_of_squares(BoardKind kind) {
+Board read_board_of_squares(BoardKind kind) {
   Board board{"", 0, 0, 0, 1, 1, false, 0, {false, BoardCorner::top_left}};
   board.kind = kind;
   return board;
 }
 
 Board read_squares(YamlMap& map, BoardKind kind) {
-  Board board = make_board_of_squares(kind);
-  board.cols = map.required("cols").integer_within(kMinSquares, kMaxSquares);
-  board.rows = map.required("rows").integer_within(kMinSquares, kMaxSquares);
-  board.square_size_m = map.required("square_size_m").number_within(kMinTag_m, kMaxTag_m, "m");
+  Board board = read_board_of_squares(kind);
+  board.cols = map.get_required_column("cols").get_integer_within(kMinSquares, kMaxSquares);
+  board.rows = map.get_required_column("rows").get_integer_within(kMinSquares, kMaxSquares);
+  board.square_size_m =
+      map.get_required_column("square_size_m").get_number_within(kMinTag_m, kMaxTag_m, "m");
   if (kind == BoardKind::chessboard) return board;
-  const YamlValue marker = map.required("marker_size_m");
-  board.tag_size_m = marker.number_within(kMinTag_m, kMaxTag_m, "m");
+  const YamlValue marker = map.get_required_column("marker_size_m");
+  board.tag_size_m = marker.get_number_within(kMinTag_m, kMaxTag_m, "m");
   if (!(board.tag_size_m < board.square_size_m)) {
-    throw marker.error("a marker is smaller than the square around it");
+    throw marker.make_error("a marker is smaller than the square around it");
   }
-  const YamlValue dictionary = map.required("dictionary");
-  board.family = dictionary.text();
+  const YamlValue dictionary = map.get_required_column("dictionary");
+  board.family = dictionary.get_text();
   if (!board.family.starts_with("DICT_")) {
-    throw dictionary.error("should be one of OpenCV's dictionaries, such as DICT_5X5_100");
+    throw dictionary.make_error("should be one of OpenCV's dictionaries, such as DICT_5X5_100");
   }
-  if (const auto first = map.optional("first_id")) {
-    board.first_id = first->integer_within(0, kMaxId);
+  if (const auto first = map.get_optional("first_id")) {
+    board.first_id = first->get_integer_within(0, kMaxId);
   }
-  if (const auto top_left = map.optional("top_left")) {
-    board.top_left_white = top_left->text() == "white";
-    if (!board.top_left_white && top_left->text() != "black") {
-      throw top_left->unknown("the colors of a square are: black, white");
+  if (const auto top_left = map.get_optional("top_left")) {
+    board.top_left_white = top_left->get_text() == "white";
+    if (!board.top_left_white && top_left->get_text() != "black") {
+      throw top_left->make_unknown_word_error("the colors of a square are: black, white");
     }
   }
   return board;
@@ -90,14 +91,20 @@ Board read_squares(YamlMap& map, BoardKind kind) {
 
 /// Reads Kalibr's checkerboard, which counts corners.
 Board read_kalibr_checkerboard(YamlMap& map) {
-  Board board = make_board_of_squares(BoardKind::chessboard);
-  board.cols = map.required("targetCols").integer_within(kMinSquares - 1, kMaxSquares - 1) + 1;
-  board.rows = map.required("targetRows").integer_within(kMinSquares - 1, kMaxSquares - 1) + 1;
-  const YamlValue height = map.required("rowSpacingMeters");
-  board.square_size_m = map.required("colSpacingMeters").number_within(kMinTag_m, kMaxTag_m, "m");
+  Board board = read_board_of_squares(BoardKind::chessboard);
+  board.cols =
+      map.get_required_column("targetCols").get_integer_within(kMinSquares - 1, kMaxSquares - 1) +
+      1;
+  board.rows =
+      map.get_required_column("targetRows").get_integer_within(kMinSquares - 1, kMaxSquares - 1) +
+      1;
+  const YamlValue height = map.get_required_column("rowSpacingMeters");
+  board.square_size_m =
+      map.get_required_column("colSpacingMeters").get_number_within(kMinTag_m, kMaxTag_m, "m");
   constexpr double rounding = 1e-9;
-  if (std::abs(height.number_within(kMinTag_m, kMaxTag_m, "m") - board.square_size_m) > rounding) {
-    throw height.error("is not colSpacingMeters: the lens is found from squares");
+  if (std::abs(height.get_number_within(kMinTag_m, kMaxTag_m, "m") - board.square_size_m) >
+      rounding) {
+    throw height.make_error("is not colSpacingMeters: the lens is found from squares");
   }
   return board;
 }
@@ -106,18 +113,20 @@ Board read_kalibr_checkerboard(YamlMap& map) {
 /// a border of two bits and squares at the corners. Ids count from codeOffset, or 0, along the rows
 /// from the bottom left.
 Board read_kalibr_target(YamlMap& map) {
-  const YamlValue kind = map.required("target_type");
-  if (kind.text() == "checkerboard") return read_kalibr_checkerboard(map);
-  if (kind.text() != "aprilgrid") {
-    throw kind.error("should be aprilgrid or checkerboard; from others no lens is found");
+  const YamlValue kind = map.get_required_column("target_type");
+  if (kind.get_text() == "checkerboard") return read_kalibr_checkerboard(map);
+  if (kind.get_text() != "aprilgrid") {
+    throw kind.make_error("should be aprilgrid or checkerboard; from others no lens is found");
   }
   Board board{"tag36h11", 0, 0, 0, 0, 2, true, 0, {false, BoardCorner::bottom_left}};
-  board.cols = map.required("tagCols").integer_within(1, kMaxTags);
-  board.rows = map.required("tagRows").integer_within(1, kMaxTags);
-  board.tag_size_m = map.required("tagSize").number_within(kMinTag_m, kMaxTag_m, "m");
-  board.tag_spacing = map.required("tagSpacing").number_within(0.01, 10, "(gap / tag)");
-  if (const auto first = map.optional("codeOffset")) {
-    board.first_id = first->integer_within(0, kMaxId);
+  board.cols = map.get_required_column("tagCols").get_integer_within(1, kMaxTags);
+  board.rows = map.get_required_column("tagRows").get_integer_within(1, kMaxTags);
+  board.tag_size_m =
+      map.get_required_column("tagSize").get_number_within(kMinTag_m, kMaxTag_m, "m");
+  board.tag_spacing =
+      map.get_required_column("tagSpacing").get_number_within(0.01, 10, "(gap / tag)");
+  if (const auto first = map.get_optional("codeOffset")) {
+    board.first_id = first->get_integer_within(0, kMaxId);
   }
   return board;
 }
@@ -130,62 +139,65 @@ std::string to_string(const IdOrder& order) {
 }
 
 Board read_board(YamlMap& map) {
-  const auto named = map.optional("kind");
+  const auto named = map.get_optional("kind");
   const BoardKind kind =
       named ? static_cast<BoardKind>(find_word(*named, kKinds, "the kinds of boards are: "))
             : BoardKind::apriltags;
   if (kind != BoardKind::apriltags) return read_squares(map, kind);
   Board board;
-  board.family = kFamilies[find_word(map.required("family"), kFamilies, "the families are: ")];
-  board.cols = map.required("cols").integer_within(1, kMaxTags);
-  board.rows = map.required("rows").integer_within(1, kMaxTags);
-  board.tag_size_m = map.required("tag_size_m").number_within(kMinTag_m, kMaxTag_m, "m");
-  board.tag_spacing = map.required("tag_spacing").number_within(0.01, 10, "(gap / tag)");
-  board.border_bits = map.required("border_bits").integer_within(1, 2);
-  board.corner_squares = map.required("corner_squares").boolean();
-  board.first_id = map.required("first_id").integer_within(0, kMaxId);
-  board.id_order = read_id_order(map.required("id_order"));
+  board.family =
+      kFamilies[find_word(map.get_required_column("family"), kFamilies, "the families are: ")];
+  board.cols = map.get_required_column("cols").get_integer_within(1, kMaxTags);
+  board.rows = map.get_required_column("rows").get_integer_within(1, kMaxTags);
+  board.tag_size_m =
+      map.get_required_column("tag_size_m").get_number_within(kMinTag_m, kMaxTag_m, "m");
+  board.tag_spacing =
+      map.get_required_column("tag_spacing").get_number_within(0.01, 10, "(gap / tag)");
+  board.border_bits = map.get_required_column("border_bits").get_integer_within(1, 2);
+  board.corner_squares = map.get_required_column("corner_squares").get_boolean();
+  board.first_id = map.get_required_column("first_id").get_integer_within(0, kMaxId);
+  board.id_order = read_id_order(map.get_required_column("id_order"));
   return board;
 }
 
 Board read_board(const std::filesystem::path& file) {
   YamlMap document = read_yaml(file);
   const bool kalibr = document.has("target_type");
-  if (!kalibr) require_format(document, kBoardFormat);
+  if (!kalibr) check_file_format(document, kBoardFormat);
   Board board = kalibr ? read_kalibr_target(document) : read_board(document);
-  if (const auto print_sd = kalibr ? std::nullopt : document.optional("print_sd")) {
-    board.print_sd = print_sd->number_within(0, kMaxPrintSd, "(relative)");
+  if (const auto print_sd = kalibr ? std::nullopt : document.get_optional("print_sd")) {
+    board.print_sd = print_sd->get_number_within(0, kMaxPrintSd, "(relative)");
   }
-  document.finish();
+  document.check_all_keys_read();
   return board;
 }
 
 void write_board(const std::filesystem::path& file, const Board& board) {
   YAML::Emitter out;
   out << YAML::BeginMap;
-  emit_word(out, "format", kBoardFormat);
-  if (board.has_squares()) {
-    emit_word(out, "kind", kKinds[static_cast<std::size_t>(board.kind)]);
+  emit_plain_word(out, "format", kBoardFormat);
+  if (board.has_chessboard_squares()) {
+    emit_plain_word(out, "kind", kKinds[static_cast<std::size_t>(board.kind)]);
   } else {
-    emit_word(out, "family", board.family);
+    emit_plain_word(out, "family", board.family);
   }
   emit_integer(out, "cols", board.cols);
   emit_integer(out, "rows", board.rows);
-  if (board.has_squares()) {
+  if (board.has_chessboard_squares()) {
     emit_number(out, "square_size_m", board.square_size_m);
   } else {
     emit_number(out, "tag_size_m", board.tag_size_m);
     emit_number(out, "tag_spacing", board.tag_spacing);
     emit_integer(out, "border_bits", board.border_bits);
-    emit_word(out, "corner_squares", board.corner_squares ? "true" : "false");
+    emit_plain_word(out, "corner_squares", board.corner_squares ? "true" : "false");
     emit_integer(out, "first_id", board.first_id);
-    emit_word(out, "id_order", to_string(board.id_order));
+    emit_plain_word(out, "id_order", to_string(board.id_order));
   }
   if (board.kind == BoardKind::charuco) {
     emit_number(out, "marker_size_m", board.tag_size_m);
-    emit_word(out, "dictionary", board.family);
+    emit_plain_word(out, "dictionary", board.family);
     emit_integer(out, "first_id", board.first_id);
-    emit_word(out, "top_left", board.top_left_white ? "white" : "black");
+    emit_plain_word(out, "top_left", board.top_left_white ? "white" : "black");
   }
   if (board.print_sd > 0) emit_number(out, "print_sd", board.print_sd);
   out << YAML::EndMap << YAML::Newline;

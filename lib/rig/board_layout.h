@@ -25,13 +25,13 @@ double compute_tag_pitch_m(const Board& board);
 
 /// Returns the distance from the first tag's left (top) edge to the last tag's right (bottom) edge.
 /// Boards of squares: from the first inner corner to the last.
-Eigen::Vector2d tag_field_m(const Board& board);
+Eigen::Vector2d compute_tag_field_size_m(const Board& board);
 
 /// Returns true if the square is black. `col` and `row` count from the top left square.
-bool is_black(const Board& board, int col, int row);
+bool is_square_black(const Board& board, int col, int row);
 
 /// Returns the inner corners of a board of squares, row by row from the top left.
-std::vector<Eigen::Vector2d> square_corners_m(const Board& board);
+std::vector<Eigen::Vector2d> list_chessboard_corners_m(const Board& board);
 
 /// Returns the tags or markers of a board, row by row from the top left; none for a chessboard.
 std::vector<BoardTag> list_board_tags(const Board& board);

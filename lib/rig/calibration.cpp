@@ -19,20 +19,20 @@ namespace vlp {
 namespace {
 
 LensModel read_lens_model(const YamlValue& value) {
-  if (const auto model = lens_model_from_name(value.text())) return *model;
-  throw value.unknown("the models are: " + lens_model_names());
+  if (const auto model = lens_model_from_name(value.get_text())) return *model;
+  throw value.make_unknown_word_error("the models are: " + lens_model_names());
 }
 
 Readout read_readout(const YamlValue& value) {
-  if (value.text() == "rows") return Readout::rows;
-  if (value.text() == "columns") return Readout::columns;
-  throw value.unknown("the read-out is along rows or columns");
+  if (value.get_text() == "rows") return Readout::rows;
+  if (value.get_text() == "columns") return Readout::columns;
+  throw value.make_unknown_word_error("the read-out is along rows or columns");
 }
 
 std::vector<double> read_intrinsics(const YamlValue& value, LensModel model) {
-  std::vector<double> intrinsics = value.numbers(parameter_count(model));
+  std::vector<double> intrinsics = value.get_numbers(parameter_count(model));
   if (intrinsics[0] <= 0 || intrinsics[1] <= 0) {
-    throw value.error("the focal lengths, the first two, should be positive");
+    throw value.make_error("the focal lengths, the first two, should be positive");
   }
   return intrinsics;
 }
@@ -50,18 +50,18 @@ constexpr std::size_t kMaxUncertainLamps = 1000;
 
 /// Reads `rows` rows of `cols` numbers.
 Eigen::MatrixXd read_matrix(const YamlValue& value, std::size_t rows, std::size_t cols) {
-  const auto list = value.list();
+  const auto list = value.get_list();
   if (list.size() != rows) {
-    throw value.error("should be " + std::to_string(rows) + " rows of " + std::to_string(cols) +
-                      " numbers");
+    throw value.make_error("should be " + std::to_string(rows) + " rows of " +
+                           std::to_string(cols) + " numbers");
   }
   Eigen::MatrixXd matrix(rows, cols);
   for (std::size_t row = 0; row < rows; ++row) {
     matrix.row(static_cast<Eigen::Index>(row)) = Eigen::Map<const Eigen::RowVectorXd>(
-        list[row].numbers(cols).data(), static_cast<Eigen::Index>(cols));
+        list[row].get_numbers(cols).data(), static_cast<Eigen::Index>(cols));
   }
   if (matrix.cwiseAbs().maxCoeff() > kMaxDerivative) {
-    throw value.error("contains a derivative beyond 1e12: is the file damaged?");
+    throw value.make_error("contains a derivative beyond 1e12: is the file damaged?");
   }
   return matrix;
 }
@@ -69,19 +69,19 @@ Eigen::MatrixXd read_matrix(const YamlValue& value, std::size_t rows, std::size_
 /// Throws InputError if a standard deviation exceeds kMaxSd.
 void check_variances(const YamlValue& value, const Eigen::MatrixXd& covariance) {
   if (covariance.diagonal().maxCoeff() <= kMaxSd * kMaxSd) return;
-  throw value.error("states a standard deviation beyond 1,000,000: is it in the right unit?");
+  throw value.make_error("states a standard deviation beyond 1,000,000: is it in the right unit?");
 }
 
 /// Reads the rows of the lower triangle: 1, 2, 3 ... numbers.
 Eigen::MatrixXd read_joint_covariance(const YamlValue& value, std::size_t size) {
-  const auto list = value.list();
+  const auto list = value.get_list();
   if (list.size() != size) {
-    throw value.error("should be " + std::to_string(size) +
-                      " rows of 1, 2, 3 ... numbers, the lower triangle");
+    throw value.make_error("should be " + std::to_string(size) +
+                           " rows of 1, 2, 3 ... numbers, the lower triangle");
   }
   Eigen::MatrixXd matrix(size, size);
   for (std::size_t row = 0; row < size; ++row) {
-    const auto numbers = list[row].numbers(row + 1);
+    const auto numbers = list[row].get_numbers(row + 1);
     for (std::size_t col = 0; col <= row; ++col) {
       const auto i = static_cast<Eigen::Index>(row), j = static_cast<Eigen::Index>(col);
       matrix(i, j) = matrix(j, i) = numbers[col];
@@ -92,7 +92,7 @@ Eigen::MatrixXd read_joint_covariance(const YamlValue& value, std::size_t size) 
       constexpr double rounding = 1e-9;
       if (matrix(i, i) < 0 ||
           matrix(i, j) * matrix(i, j) > matrix(i, i) * matrix(j, j) * (1 + rounding)) {
-        throw list[row].error("is not a covariance's: no correlation is beyond 1");
+        throw list[row].make_error("is not a covariance's: no correlation is beyond 1");
       }
     }
   }
@@ -101,17 +101,18 @@ Eigen::MatrixXd read_joint_covariance(const YamlValue& value, std::size_t size) 
 }
 
 Matrix2 read_covariance(const YamlValue& value) {
-  const auto rows = value.list();
-  if (rows.size() != 2) throw value.error("should be two rows of two numbers");
+  const auto rows = value.get_list();
+  if (rows.size() != 2) throw value.make_error("should be two rows of two numbers");
   Matrix2 covariance;
   for (int row = 0; row < 2; ++row) {
-    covariance.row(row) = Eigen::RowVector2d(rows[static_cast<std::size_t>(row)].numbers(2).data());
+    covariance.row(row) =
+        Eigen::RowVector2d(rows[static_cast<std::size_t>(row)].get_numbers(2).data());
   }
   const double product = covariance(0, 0) * covariance(1, 1);
   constexpr double rounding = 1e-12;  // of a full correlation
   if (covariance(0, 1) != covariance(1, 0) || covariance(0, 0) < 0 || covariance(1, 1) < 0 ||
       covariance(0, 1) * covariance(0, 1) > product * (1 + rounding)) {
-    throw value.error("is not a covariance: it should be symmetric and not negative");
+    throw value.make_error("is not a covariance: it should be symmetric and not negative");
   }
   check_variances(value, covariance);
   return covariance;
@@ -120,58 +121,59 @@ Matrix2 read_covariance(const YamlValue& value) {
 template <typename Matrix>
 std::optional<Matrix> read_optional_matrix(YamlMap& map, const std::string& key, std::size_t rows,
                                            std::size_t cols) {
-  const auto value = map.optional(key);
+  const auto value = map.get_optional(key);
   return value ? std::optional<Matrix>(read_matrix(*value, rows, cols)) : std::nullopt;
 }
 
 std::optional<Matrix2> read_optional_covariance(YamlMap& map, const std::string& key) {
-  const auto value = map.optional(key);
+  const auto value = map.get_optional(key);
   return value ? std::optional(read_covariance(*value)) : std::nullopt;
 }
 
 IntrinsicsReport read_intrinsics_report(YamlMap& map, std::size_t intrinsics) {
   IntrinsicsReport report;
-  report.views = map.required("views").integer_within(0, kLarge);
-  report.corners = map.required("corners").integer_within(0, kLarge);
-  report.outliers = map.required("outliers").integer_within(0, kLarge);
-  report.rms_px = map.required("rms_px").number_within(0, kInfinity, "px");
-  if (const auto value = map.optional("board_warp_m")) {
-    const auto warp = value->numbers(2);
+  report.views = map.get_required_column("views").get_integer_within(0, kLarge);
+  report.corners = map.get_required_column("corners").get_integer_within(0, kLarge);
+  report.outliers = map.get_required_column("outliers").get_integer_within(0, kLarge);
+  report.rms_px = map.get_required_column("rms_px").get_number_within(0, kInfinity, "px");
+  if (const auto value = map.get_optional("board_warp_m")) {
+    const auto warp = value->get_numbers(2);
     report.board_warp_m = {warp[0], warp[1]};
   }
-  report.expected_max_error_px = map.optional_number("expected_max_error_px", 0, kInfinity, "px");
-  if (const auto value = map.optional("covariance")) {
+  report.expected_max_error_px =
+      map.get_optional_number("expected_max_error_px", 0, kInfinity, "px");
+  if (const auto value = map.get_optional("covariance")) {
     report.covariance = read_joint_covariance(*value, intrinsics);
   }
-  if (const auto value = map.optional("valid_region_px")) {
-    for (const YamlValue& corner : value->list()) {
-      report.region_px.emplace_back(corner.numbers(2).data());
+  if (const auto value = map.get_optional("valid_region_px")) {
+    for (const YamlValue& corner : value->get_list()) {
+      report.region_px.emplace_back(corner.get_numbers(2).data());
     }
-    if (report.region_px.size() < 3) throw value->error("should have three corners or more");
+    if (report.region_px.size() < 3) throw value->make_error("should have three corners or more");
   }
   return report;
 }
 
 RotationCenter read_rotation_center(YamlMap& map, std::size_t intrinsics) {
   RotationCenter center;
-  const YamlValue model = map.required("model");
-  if (model.text() != "shift" && model.text() != "tilt") {
-    throw model.unknown("the models are: shift, tilt");
+  const YamlValue model = map.get_required_column("model");
+  if (model.get_text() != "shift" && model.get_text() != "tilt") {
+    throw model.make_unknown_word_error("the models are: shift, tilt");
   }
-  center.model = model.text() == "tilt" ? RotationModel::tilt : RotationModel::shift;
-  center.center_px = Eigen::Vector2d(map.required("center_px").numbers(2).data());
-  const YamlValue zenith = map.required("zenith_in_camera");
-  center.zenith_in_camera = Eigen::Vector3d(zenith.numbers(3).data());
+  center.model = model.get_text() == "tilt" ? RotationModel::tilt : RotationModel::shift;
+  center.center_px = Eigen::Vector2d(map.get_required_column("center_px").get_numbers(2).data());
+  const YamlValue zenith = map.get_required_column("zenith_in_camera");
+  center.zenith_in_camera = Eigen::Vector3d(zenith.get_numbers(3).data());
   // Six digits, as typed by a person, suffice.
   if (std::abs(center.zenith_in_camera.norm() - 1) > 1e-5 || center.zenith_in_camera.z() <= 0) {
-    throw zenith.error("should be a unit vector with z > 0");
+    throw zenith.make_error("should be a unit vector with z > 0");
   }
   center.covariance = read_optional_covariance(map, "covariance");
-  const auto lever_arm = map.optional("lever_arm_m");
-  if (lever_arm) center.lever_arm_m = Eigen::Vector2d(lever_arm->numbers(2).data());
+  const auto lever_arm = map.get_optional("lever_arm_m");
+  if (lever_arm) center.lever_arm_m = Eigen::Vector2d(lever_arm->get_numbers(2).data());
   const auto check_lever_arm = [&](const std::string& key) {
-    const auto value = map.optional(key);
-    if (value && !lever_arm) throw value->error("is of no lever_arm_m");
+    const auto value = map.get_optional(key);
+    if (value && !lever_arm) throw value->make_error("is of no lever_arm_m");
     return key;
   };
   center.lever_arm_covariance =
@@ -186,30 +188,33 @@ RotationCenter read_rotation_center(YamlMap& map, std::size_t intrinsics) {
 
 Dispersion::UncertainLamp read_uncertain_lamp(YamlMap& map) {
   Dispersion::UncertainLamp lamp;
-  lamp.id = map.required("id").integer_within(0, kLarge);
-  lamp.position_m = Eigen::Vector3d(map.required("position_m").numbers(3).data());
-  lamp.sd_m = map.required("sd_m").number_within(0, kMaxSd, "m");
-  lamp.by_position = read_matrix(map.required("by_position"), 2, 3);
+  lamp.id = map.get_required_column("id").get_integer_within(0, kLarge);
+  lamp.position_m = Eigen::Vector3d(map.get_required_column("position_m").get_numbers(3).data());
+  lamp.sd_m = map.get_required_column("sd_m").get_number_within(0, kMaxSd, "m");
+  lamp.by_position = read_matrix(map.get_required_column("by_position"), 2, 3);
   return lamp;
 }
 
 Dispersion read_dispersion(YamlMap& map, std::size_t intrinsics) {
   Dispersion dispersion;
-  dispersion.offset_px = Eigen::Vector2d(map.required("offset_px").numbers(2).data());
-  dispersion.radius_m = map.required("radius_m").number_within(0, kInfinity, "m");
-  dispersion.center_m = Eigen::Vector2d(map.required("center_m").numbers(2).data());
-  dispersion.captures = map.required("captures").integer_within(1, kLarge);
+  dispersion.offset_px =
+      Eigen::Vector2d(map.get_required_column("offset_px").get_numbers(2).data());
+  dispersion.radius_m = map.get_required_column("radius_m").get_number_within(0, kInfinity, "m");
+  dispersion.center_m = Eigen::Vector2d(map.get_required_column("center_m").get_numbers(2).data());
+  dispersion.captures = map.get_required_column("captures").get_integer_within(1, kLarge);
   dispersion.covariance = read_optional_covariance(map, "covariance");
   dispersion.by_intrinsics =
       read_optional_matrix<MatrixX>(map, "jacobian_intrinsics", 2, intrinsics);
   dispersion.by_zenith = read_optional_matrix<Matrix2>(map, "jacobian_zenith", 2, 2);
-  if (const auto value = map.optional("by_lamps")) {
-    const auto items = value->list();
-    if (items.size() > kMaxUncertainLamps) throw value->error("contains more than 1,000 lamps");
+  if (const auto value = map.get_optional("by_lamps")) {
+    const auto items = value->get_list();
+    if (items.size() > kMaxUncertainLamps)
+      throw value->make_error("contains more than 1,000 lamps");
     for (const YamlValue& item : items) {
       const Dispersion::UncertainLamp lamp = item.read_map(read_uncertain_lamp);
       const auto has_same_id = [&](const auto& earlier) { return earlier.id == lamp.id; };
-      if (std::ranges::any_of(dispersion.by_lamps, has_same_id)) throw item.error("occurs twice");
+      if (std::ranges::any_of(dispersion.by_lamps, has_same_id))
+        throw item.make_error("occurs twice");
       dispersion.by_lamps.push_back(lamp);
     }
   }
@@ -217,56 +222,60 @@ Dispersion read_dispersion(YamlMap& map, std::size_t intrinsics) {
 }
 
 Adjustment::Place read_place(YamlMap& map) {
-  return {map.required("id").integer_within(0, kLarge),
-          Eigen::Vector3d(map.required("position_m").numbers(3).data())};
+  return {map.get_required_column("id").get_integer_within(0, kLarge),
+          Eigen::Vector3d(map.get_required_column("position_m").get_numbers(3).data())};
 }
 
 Adjustment read_adjustment(YamlMap& map, const Camera& camera) {
   Adjustment adjustment;
-  for (const YamlValue& item : map.required("sets").list()) adjustment.sets.push_back(item.text());
-  adjustment.captures = map.required("captures").integer_within(1, kLarge);
-  adjustment.detections = map.required("detections").integer_within(1, kLarge);
-  adjustment.residual_px = map.required("residual_px").number_within(0, kInfinity, "px");
-  adjustment.lamps = map.required("lamps").read_maps(read_place);
-  const YamlValue parameters = map.required("parameters");
-  const auto found = parameters.list();
+  for (const YamlValue& item : map.get_required_column("sets").get_list())
+    adjustment.sets.push_back(item.get_text());
+  adjustment.captures = map.get_required_column("captures").get_integer_within(1, kLarge);
+  adjustment.detections = map.get_required_column("detections").get_integer_within(1, kLarge);
+  adjustment.residual_px =
+      map.get_required_column("residual_px").get_number_within(0, kInfinity, "px");
+  adjustment.lamps = map.get_required_column("lamps").read_maps(read_place);
+  const YamlValue parameters = map.get_required_column("parameters");
+  const auto found = parameters.get_list();
   const auto names = parameter_names(camera, adjustment);
   for (std::size_t i = 0; i < std::max(found.size(), names.size()); ++i) {
-    if (i >= found.size() || i >= names.size() || found[i].text() != names[i]) {
-      throw parameters.error(
+    if (i >= found.size() || i >= names.size() || found[i].get_text() != names[i]) {
+      throw parameters.make_error(
           "should be the lens model's, the zenith, the lever arm, the lamps: " +
           (i < names.size() ? names[i] + " is missing in its place" : "there are more than these"));
     }
   }
-  adjustment.covariance = read_joint_covariance(map.required("covariance"), names.size());
+  adjustment.covariance =
+      read_joint_covariance(map.get_required_column("covariance"), names.size());
   return adjustment;
 }
 
 HistoryEntry::Input read_input(YamlMap& map) {
-  return {map.required("file").text(), map.required("sha256").text()};
+  return {map.get_required_column("file").get_text(), map.get_required_column("sha256").get_text()};
 }
 
 HistoryEntry read_history_entry(YamlMap& map) {
-  return {map.required("part").text(), map.required("program").text(),
-          map.required("version").text(), map.required("options").text(),
-          map.required("inputs").read_maps(read_input)};
+  return {map.get_required_column("part").get_text(), map.get_required_column("program").get_text(),
+          map.get_required_column("version").get_text(),
+          map.get_required_column("options").get_text(),
+          map.get_required_column("inputs").read_maps(read_input)};
 }
 
-void begin_part(YAML::Emitter& out, const char* key) {
+void begin_yaml_section(YAML::Emitter& out, const char* key) {
   out << YAML::Key << key << YAML::Value << YAML::BeginMap;
 }
 
 /// Required keys come last, see write_calibration().
 void emit_camera(YAML::Emitter& out, const Camera& camera) {
-  begin_part(out, "camera");
+  begin_yaml_section(out, "camera");
   emit_quoted(out, "id", camera.id);
   if (camera.pixel_pitch_m) emit_number(out, "pixel_pitch_m", *camera.pixel_pitch_m);
   if (camera.row_time_s) emit_number(out, "row_time_s", *camera.row_time_s);
   if (camera.readout) {
-    emit_word(out, "readout", *camera.readout == Readout::rows ? "rows" : "columns");
+    emit_plain_word(out, "readout", *camera.readout == Readout::rows ? "rows" : "columns");
   }
   emit_integers(out, "imager_px", camera.imager_px);
-  emit_word(out, "lens_model", to_string(camera.lens_model));
+  emit_plain_word(out, "lens_model", to_string(camera.lens_model));
   emit_numbers(out, "intrinsics", camera.intrinsics);
   out << YAML::EndMap;
 }
@@ -275,7 +284,7 @@ void emit_matrix(YAML::Emitter& out, const char* key, const Eigen::MatrixXd& mat
   out << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginSeq;
   for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
     const Eigen::VectorXd numbers = matrix.row(row);
-    emit_row(out, {numbers.data(), static_cast<std::size_t>(numbers.size())});
+    emit_inline_list(out, {numbers.data(), static_cast<std::size_t>(numbers.size())});
   }
   out << YAML::EndSeq;
 }
@@ -285,13 +294,13 @@ void emit_joint_covariance(YAML::Emitter& out, const Eigen::MatrixXd& covariance
   out << YAML::Key << "covariance" << YAML::Value << YAML::BeginSeq;
   for (Eigen::Index row = 0; row < covariance.rows(); ++row) {
     const Eigen::VectorXd numbers = covariance.row(row).head(row + 1);
-    emit_row(out, {numbers.data(), static_cast<std::size_t>(numbers.size())});
+    emit_inline_list(out, {numbers.data(), static_cast<std::size_t>(numbers.size())});
   }
   out << YAML::EndSeq;
 }
 
 void emit_intrinsics_report(YAML::Emitter& out, const IntrinsicsReport& report) {
-  begin_part(out, "intrinsics_report");
+  begin_yaml_section(out, "intrinsics_report");
   emit_integer(out, "views", report.views);
   emit_integer(out, "corners", report.corners);
   emit_integer(out, "outliers", report.outliers);
@@ -305,7 +314,7 @@ void emit_intrinsics_report(YAML::Emitter& out, const IntrinsicsReport& report) 
   if (!report.region_px.empty()) {
     out << YAML::Key << "valid_region_px" << YAML::Value << YAML::Flow << YAML::BeginSeq;
     for (const Eigen::Vector2d& corner : report.region_px) {
-      emit_row(out, std::array{corner.x(), corner.y()});
+      emit_inline_list(out, std::array{corner.x(), corner.y()});
     }
     out << YAML::EndSeq;
   }
@@ -317,8 +326,8 @@ void emit_optional_matrix(YAML::Emitter& out, const char* key, const auto& matri
 }
 
 void emit_rotation_center(YAML::Emitter& out, const RotationCenter& center) {
-  begin_part(out, "rotation_center");
-  emit_word(out, "model", center.model == RotationModel::tilt ? "tilt" : "shift");
+  begin_yaml_section(out, "rotation_center");
+  emit_plain_word(out, "model", center.model == RotationModel::tilt ? "tilt" : "shift");
   emit_numbers(out, "center_px", center.center_px);
   emit_numbers(out, "zenith_in_camera", center.zenith_in_camera);
   emit_optional_matrix(out, "covariance", center.covariance);
@@ -344,7 +353,7 @@ void emit_uncertain_lamps(YAML::Emitter& out, const std::vector<Dispersion::Unce
 }
 
 void emit_dispersion(YAML::Emitter& out, const Dispersion& dispersion) {
-  begin_part(out, "dispersion");
+  begin_yaml_section(out, "dispersion");
   emit_numbers(out, "offset_px", dispersion.offset_px);
   emit_number(out, "radius_m", dispersion.radius_m);
   emit_numbers(out, "center_m", dispersion.center_m);
@@ -357,7 +366,7 @@ void emit_dispersion(YAML::Emitter& out, const Dispersion& dispersion) {
 }
 
 void emit_adjustment(YAML::Emitter& out, const Camera& camera, const Adjustment& adjustment) {
-  begin_part(out, "adjustment");
+  begin_yaml_section(out, "adjustment");
   out << YAML::Key << "sets" << YAML::Value << YAML::Flow << YAML::BeginSeq;
   for (const std::string& set : adjustment.sets) out << YAML::DoubleQuoted << set;
   out << YAML::EndSeq;
@@ -382,8 +391,8 @@ void emit_history(YAML::Emitter& out, const std::vector<HistoryEntry>& history) 
   out << YAML::Key << "history" << YAML::Value << YAML::BeginSeq;
   for (const HistoryEntry& entry : history) {
     out << YAML::BeginMap;
-    emit_word(out, "part", entry.part);
-    emit_word(out, "program", entry.program);
+    emit_plain_word(out, "part", entry.part);
+    emit_plain_word(out, "program", entry.program);
     emit_quoted(out, "version", entry.version);
     emit_quoted(out, "options", entry.options);
     out << YAML::Key << "inputs" << YAML::Value << YAML::BeginSeq;
@@ -402,22 +411,23 @@ void emit_history(YAML::Emitter& out, const std::vector<HistoryEntry>& history) 
 
 Camera read_camera(YamlMap& map) {
   Camera camera;
-  camera.id = map.required("id").text();
-  const YamlValue imager_px = map.required("imager_px");
-  const auto imager = imager_px.list();
-  if (imager.size() != 2) throw imager_px.error("should be [width, height]");
-  camera.imager_px = {imager[0].integer_within(1, 1 << 20), imager[1].integer_within(1, 1 << 20)};
-  camera.lens_model = read_lens_model(map.required("lens_model"));
-  camera.intrinsics = read_intrinsics(map.required("intrinsics"), camera.lens_model);
-  camera.pixel_pitch_m = map.optional_number("pixel_pitch_m", 1e-7, 1e-4, "m");
-  camera.row_time_s = map.optional_number("row_time_s", 1e-8, 1e-3, "s");
-  if (const auto value = map.optional("readout")) camera.readout = read_readout(*value);
+  camera.id = map.get_required_column("id").get_text();
+  const YamlValue imager_px = map.get_required_column("imager_px");
+  const auto imager = imager_px.get_list();
+  if (imager.size() != 2) throw imager_px.make_error("should be [width, height]");
+  camera.imager_px = {imager[0].get_integer_within(1, 1 << 20),
+                      imager[1].get_integer_within(1, 1 << 20)};
+  camera.lens_model = read_lens_model(map.get_required_column("lens_model"));
+  camera.intrinsics = read_intrinsics(map.get_required_column("intrinsics"), camera.lens_model);
+  camera.pixel_pitch_m = map.get_optional_number("pixel_pitch_m", 1e-7, 1e-4, "m");
+  camera.row_time_s = map.get_optional_number("row_time_s", 1e-8, 1e-3, "s");
+  if (const auto value = map.get_optional("readout")) camera.readout = read_readout(*value);
   return camera;
 }
 
 std::vector<std::string> parameter_names(const Camera& camera, const Adjustment& adjustment) {
   std::vector<std::string> names{"fx", "fy", "cx", "cy"};
-  for (const auto& distortion : distortions_of(camera.lens_model)) {
+  for (const auto& distortion : list_distortion_names_and_start_values(camera.lens_model)) {
     names.emplace_back(distortion.name);
   }
   names.insert(names.end(), {"zenith_x", "zenith_y", "lever_arm_x_m", "lever_arm_y_m"});
@@ -431,39 +441,40 @@ std::vector<std::string> parameter_names(const Camera& camera, const Adjustment&
 Calibration read_calibration(const std::filesystem::path& file) {
   YamlMap document = read_yaml(file, "vlp-calibration/1");
   Calibration calibration;
-  const auto camera = document.required("camera");
-  const auto report = document.optional("intrinsics_report");
-  const auto rotation_center = document.optional("rotation_center");
-  const auto dispersion = document.optional("dispersion");
-  const auto adjustment = document.optional("adjustment");
-  const auto history = document.optional("history");
-  document.finish();
+  const auto camera = document.get_required_column("camera");
+  const auto report = document.get_optional("intrinsics_report");
+  const auto rotation_center = document.get_optional("rotation_center");
+  const auto dispersion = document.get_optional("dispersion");
+  const auto adjustment = document.get_optional("adjustment");
+  const auto history = document.get_optional("history");
+  document.check_all_keys_read();
   calibration.camera = camera.read_map(read_camera);
   const auto read_if = [](const auto& value, const auto& read, const auto& argument) {
     const auto read_part = [&](YamlMap& map) { return read(map, argument); };
     return value ? std::optional(value->read_map(read_part)) : std::nullopt;
   };
-  const auto intrinsics = static_cast<std::size_t>(count_reported_intrinsics(calibration.camera));
+  const auto intrinsics =
+      static_cast<std::size_t>(count_intrinsics_with_covariance(calibration.camera));
   calibration.intrinsics_report = read_if(report, read_intrinsics_report, intrinsics);
   calibration.rotation_center = read_if(rotation_center, read_rotation_center, intrinsics);
   calibration.dispersion = read_if(dispersion, read_dispersion, intrinsics);
   calibration.adjustment = read_if(adjustment, read_adjustment, calibration.camera);
   if (!history) return calibration;
-  for (const YamlValue& item : history->list()) {
+  for (const YamlValue& item : history->get_list()) {
     calibration.history.push_back(item.read_map(read_history_entry));
     const std::string& part = calibration.history.back().part;
     if ((part == "rotation_center" && !rotation_center) || (part == "dispersion" && !dispersion) ||
         (part == "adjustment" && !adjustment)) {
-      throw item.error("lists a part '" + part + "': is the file cut short?");
+      throw item.make_error("lists a part '" + part + "': is the file cut short?");
     }
   }
   return calibration;
 }
 
-std::string calibration_text(const Calibration& calibration) {
+std::string format_calibration_yaml(const Calibration& calibration) {
   YAML::Emitter out;
   out << YAML::BeginMap;
-  emit_word(out, "format", "vlp-calibration/1");
+  emit_plain_word(out, "format", "vlp-calibration/1");
   if (!calibration.history.empty()) emit_history(out, calibration.history);
   if (calibration.intrinsics_report) emit_intrinsics_report(out, *calibration.intrinsics_report);
   if (calibration.rotation_center) emit_rotation_center(out, *calibration.rotation_center);
@@ -477,7 +488,7 @@ std::string calibration_text(const Calibration& calibration) {
 }
 
 void write_calibration(const std::filesystem::path& file, const Calibration& calibration) {
-  write_file(file, calibration_text(calibration));
+  write_file(file, format_calibration_yaml(calibration));
 }
 
 }  // namespace vlp

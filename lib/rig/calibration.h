@@ -33,7 +33,7 @@ struct Camera {
 
   /// fx, fy and cx, cy: the first four intrinsics of every lens model.
   Eigen::Vector2d focal_px() const { return {intrinsics[0], intrinsics[1]}; }
-  Eigen::Vector2d center_px() const { return {intrinsics[2], intrinsics[3]}; }
+  Eigen::Vector2d principal_point_px() const { return {intrinsics[2], intrinsics[3]}; }
 };
 
 /// Quality of the intrinsic calibration. A lens from another program has no views, and only the

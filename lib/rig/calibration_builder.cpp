@@ -19,7 +19,8 @@ void add_history(Calibration& calibration, const std::string& part, HistoryEntry
 
 }  // namespace
 
-Calibration with_camera(Camera camera, std::optional<IntrinsicsReport> report, HistoryEntry entry) {
+Calibration make_calibration_with_camera(Camera camera, std::optional<IntrinsicsReport> report,
+                                         HistoryEntry entry) {
   Calibration calibration;
   calibration.camera = std::move(camera);
   calibration.intrinsics_report = std::move(report);

@@ -15,7 +15,8 @@ namespace vlp {
 
 /// Returns a calibration with this camera alone. All other parts depend on the camera and are
 /// removed.
-Calibration with_camera(Camera camera, std::optional<IntrinsicsReport> report, HistoryEntry entry);
+Calibration make_calibration_with_camera(Camera camera, std::optional<IntrinsicsReport> report,
+                                         HistoryEntry entry);
 
 /// Sets the rotation center, and removes dispersion and adjustment.
 Calibration with_rotation_center(Calibration calibration, const RotationCenter& rotation_center,

@@ -11,21 +11,21 @@ namespace vlp {
 namespace {
 
 /// Updates center_px to the pixel of the zenith in the undistorted image.
-void recenter(Calibration& calibration) {
+void move_principal_point_to_zenith(Calibration& calibration) {
   if (!calibration.rotation_center) return;
   RotationCenter& center = *calibration.rotation_center;
-  center.center_px = zenith_point(center).cwiseProduct(calibration.camera.focal_px()) +
-                     calibration.camera.center_px();
+  center.center_px = normalized_zenith_point(center).cwiseProduct(calibration.camera.focal_px()) +
+                     calibration.camera.principal_point_px();
 }
 
 }  // namespace
 
-Eigen::Index count_reported_intrinsics(const Camera& camera) {
+Eigen::Index count_intrinsics_with_covariance(const Camera& camera) {
   constexpr Eigen::Index core = 4;
-  return is_splined(camera.lens_model) ? core : std::ssize(camera.intrinsics);
+  return is_splined_lens_model(camera.lens_model) ? core : std::ssize(camera.intrinsics);
 }
 
-Eigen::Vector2d zenith_point(const RotationCenter& center) {
+Eigen::Vector2d normalized_zenith_point(const RotationCenter& center) {
   return center.zenith_in_camera.hnormalized();
 }
 
@@ -38,15 +38,15 @@ Calibration with_lens_error(Calibration calibration, const Eigen::VectorXd& erro
       *center->lever_arm_m -= *center->lever_arm_by_zenith * (*center->by_intrinsics * error);
     }
   }
-  recenter(calibration);
+  move_principal_point_to_zenith(calibration);
   return calibration;
 }
 
 Calibration with_zenith_error(Calibration calibration, const Eigen::Vector2d& error) {
   RotationCenter& center = *calibration.rotation_center;
-  center.zenith_in_camera = (zenith_point(center) + error).homogeneous().normalized();
+  center.zenith_in_camera = (normalized_zenith_point(center) + error).homogeneous().normalized();
   if (center.lever_arm_by_zenith) *center.lever_arm_m += *center.lever_arm_by_zenith * error;
-  recenter(calibration);
+  move_principal_point_to_zenith(calibration);
   return calibration;
 }
 
@@ -55,8 +55,8 @@ Calibration with_offset_error(Calibration calibration, const Eigen::Vector2d& er
   return calibration;
 }
 
-std::optional<Matrix2> offset_covariance_with_map(const Dispersion& dispersion,
-                                                  const Eigen::Vector2d& focal_px) {
+std::optional<Matrix2> compute_offset_covariance_with_map(const Dispersion& dispersion,
+                                                          const Eigen::Vector2d& focal_px) {
   if (!dispersion.covariance) return std::nullopt;
   Eigen::Matrix2d covariance = *dispersion.covariance;
   for (const Dispersion::UncertainLamp& lamp : dispersion.by_lamps) {

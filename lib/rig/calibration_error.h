@@ -15,14 +15,14 @@ namespace vlp {
 /// intrinsics. Splined lenses: 4, for fx, fy, cx, cy, since few corners determine each control
 /// point. Errors of the control points are only included in
 /// IntrinsicsReport::expected_max_error_px.
-Eigen::Index count_reported_intrinsics(const Camera& camera);
+Eigen::Index count_intrinsics_with_covariance(const Camera& camera);
 
 /// Returns the normalized point of the zenith.
-Eigen::Vector2d zenith_point(const RotationCenter& center);
+Eigen::Vector2d normalized_zenith_point(const RotationCenter& center);
 
-/// Adds an error to the count_reported_intrinsics(). The zenith does not change; center_px is
-/// updated. The lever arm changes by its derivative by the intrinsics, without the part through the
-/// zenith.
+/// Adds an error to the count_intrinsics_with_covariance(). The zenith does not change; center_px
+/// is updated. The lever arm changes by its derivative by the intrinsics, without the part through
+/// the zenith.
 Calibration with_lens_error(Calibration calibration, const Eigen::VectorXd& error);
 
 /// Adds an error to the zenith's normalized point. center_px and the correlated lever arm are
@@ -36,7 +36,7 @@ Calibration with_offset_error(Calibration calibration, const Eigen::Vector2d& er
 
 /// Computes the covariance of offset_px from captures and lamp map, in px^2, with lens and zenith
 /// taken as exact. Returns std::nullopt without Dispersion::covariance.
-std::optional<Matrix2> offset_covariance_with_map(const Dispersion& dispersion,
-                                                  const Eigen::Vector2d& focal_px);
+std::optional<Matrix2> compute_offset_covariance_with_map(const Dispersion& dispersion,
+                                                          const Eigen::Vector2d& focal_px);
 
 }  // namespace vlp

@@ -11,7 +11,7 @@
 namespace vlp {
 
 /// Returns the text that write_calibration() writes.
-std::string calibration_text(const Calibration& calibration);
+std::string format_calibration_yaml(const Calibration& calibration);
 
 }  // namespace vlp
 #pragma GCC visibility pop

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 /// Returns the target of a symbolic link, which need not exist. Stops at a link in `descriptors`,
 /// the folder of this process' open descriptors, if it is given.
-fs::path without_links(fs::path path, const std::optional<fs::path>& descriptors) {
+fs::path resolve_symbolic_links(fs::path path, const std::optional<fs::path>& descriptors) {
   std::error_code error;
   const fs::path wanted = path;
   for (int max_links = 40; fs::is_symlink(fs::symlink_status(path, error)); --max_links) {
@@ -52,7 +52,7 @@ bool is_number(const fs::path& name) {
 
 /// Returns true for the paths by which the system names the descriptors of a process. A link
 /// elsewhere, such as in /dev/shm, may be of another user, and does not lead to a descriptor.
-bool can_name_descriptor(const fs::path& path) {
+bool can_name_file_descriptor(const fs::path& path) {
   if (path == "/dev/stdin" || path == "/dev/stdout" || path == "/dev/stderr") return true;
   if (!is_number(path.filename())) return false;
   const fs::path folder = path.parent_path(), process = folder.parent_path();
@@ -61,12 +61,12 @@ bool can_name_descriptor(const fs::path& path) {
          (process.filename() == "self" || is_number(process.filename()));
 }
 
-Target find_target(const fs::path& path) {
+Target resolve_write_target(const fs::path& path) {
   std::error_code error;
   std::optional<fs::path> descriptors;
-  if (can_name_descriptor(path)) descriptors = fs::canonical("/proc/self/fd", error);
+  if (can_name_file_descriptor(path)) descriptors = fs::canonical("/proc/self/fd", error);
   if (error) descriptors.reset();
-  Target target{without_links(path, descriptors), std::nullopt};
+  Target target{resolve_symbolic_links(path, descriptors), std::nullopt};
   if (!descriptors || !fs::is_symlink(fs::symlink_status(target.path, error))) return target;
   const std::string name = target.path.filename().string();
   int number = 0;
@@ -81,27 +81,27 @@ std::string describe_bytes(std::size_t bytes) {
                           : std::to_string(bytes / mebibyte) + " MiB";
 }
 
-[[noreturn]] void fail_as_too_long(const fs::path& path, std::size_t max_bytes) {
+[[noreturn]] void throw_file_too_long(const fs::path& path, std::size_t max_bytes) {
   throw InputError(path, "is longer than " + describe_bytes(max_bytes) + ": is it the right file?");
 }
 
 /// Checks that an open file is a regular one, or the stream that `path` names, and returns its
 /// size; 0 for a stream.
-std::size_t check_kind(const fs::path& path, int descriptor, std::size_t max_bytes) {
+std::size_t check_file_kind(const fs::path& path, int descriptor, std::size_t max_bytes) {
   struct stat status {};
   if (::fstat(descriptor, &status) != 0) throw InputError(path, "cannot be read");
   if (S_ISDIR(status.st_mode)) throw InputError(path, "is a folder, not a file");
   if (!S_ISREG(status.st_mode)) {
-    if (find_target(path).descriptor) return 0;
+    if (resolve_write_target(path).descriptor) return 0;
     throw InputError(path, "is a pipe or a device, not a file");
   }
   const auto bytes = static_cast<std::size_t>(status.st_size);
-  if (bytes > max_bytes) fail_as_too_long(path, max_bytes);
+  if (bytes > max_bytes) throw_file_too_long(path, max_bytes);
   return bytes;
 }
 
 /// Creates a file in the folder of `target` with a name that is unique among processes and threads.
-int create_beside(const fs::path& target, mode_t mode, fs::path& temporary) {
+int create_temporary_file_beside(const fs::path& target, mode_t mode, fs::path& temporary) {
   constexpr std::size_t max_bytes = 200;  // of the 255 of a file name
   const std::string name = "." + target.filename().string().substr(0, max_bytes) + ".tmp-" +
                            std::to_string(::getpid()) + "-";
@@ -112,35 +112,17 @@ int create_beside(const fs::path& target, mode_t mode, fs::path& temporary) {
   }
 }
 
-/// Sets the permissions (read, write, execute), owner and group of an open file to those of the
-/// file that it replaces; owner and group as far as this process may set them. If the group
-/// differs, it gets no permissions. Returns false, and sets errno, if they cannot be read or set.
-bool keep_mode_and_owner(int descriptor, const struct stat& former) {
-  constexpr auto same_owner = static_cast<uid_t>(-1);
-  constexpr mode_t permissions = 0777, group_permissions = 0070;
-  if (::fchown(descriptor, former.st_uid, former.st_gid) != 0) {
-    [[maybe_unused]] const int kept = ::fchown(descriptor, same_owner, former.st_gid);
-  }
-  struct stat present {};
-  if (::fstat(descriptor, &present) != 0) return false;
-  // Another group must not get the permissions of the former one.
-  const bool has_group = present.st_gid == former.st_gid;
-  const mode_t mode = former.st_mode & permissions & (has_group ? permissions : ~group_permissions);
-  // A file system without modes, such as FAT, refuses to set them.
-  return (present.st_mode & permissions) == mode || ::fchmod(descriptor, mode) == 0;
-}
-
 /// Creates the file that will replace `target`, with its permissions, and its owner and group as
 /// far as the system allows. Until then only the owner can read it.
 int create_replacement(const fs::path& target, fs::path& temporary) {
   constexpr mode_t as_user_set = 0666, private_to_owner = 0600;
   struct stat old {};
   if (::lstat(target.c_str(), &old) != 0 || !S_ISREG(old.st_mode)) {
-    return create_beside(target, as_user_set, temporary);
+    return create_temporary_file_beside(target, as_user_set, temporary);
   }
-  const int descriptor = create_beside(target, private_to_owner, temporary);
+  const int descriptor = create_temporary_file_beside(target, private_to_owner, temporary);
   if (descriptor < 0) return descriptor;
-  if (keep_mode_and_owner(descriptor, old)) return descriptor;
+  if (copy_mode_and_owner(descriptor, old)) return descriptor;
   const int reason = errno;
   ::close(descriptor);
   ::unlink(temporary.c_str());
@@ -157,7 +139,7 @@ void sync_folder(const fs::path& folder) {
   ::close(descriptor);
 }
 
-bool is_special(const fs::path& path) {
+bool is_special_file(const fs::path& path) {
   std::error_code error;
   const auto status = fs::status(path, error);
   return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
@@ -188,7 +170,7 @@ InputFile::InputFile(const fs::path& path, int descriptor, std::size_t max_bytes
     throw InputError(path, std::string("cannot be opened: ") + std::strerror(errno));
   }
   try {
-    bytes_ = check_kind(path, descriptor_, max_bytes);
+    bytes_ = check_file_kind(path, descriptor_, max_bytes);
   } catch (const InputError&) {
     ::close(descriptor_);
     throw;
@@ -204,7 +186,7 @@ std::size_t InputFile::read(char* data, std::size_t bytes) {
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) throw InputError(path_, std::string("cannot be read: ") + std::strerror(errno));
     read_bytes_ += static_cast<std::size_t>(count);
-    if (read_bytes_ > max_bytes_) fail_as_too_long(path_, max_bytes_);
+    if (read_bytes_ > max_bytes_) throw_file_too_long(path_, max_bytes_);
     return static_cast<std::size_t>(count);
   }
 }
@@ -247,10 +229,10 @@ std::string read_text_file(const fs::path& path, std::size_t max_bytes) {
 }
 
 AtomicFileWriter::AtomicFileWriter(const fs::path& path) : path_(path) {
-  const Target target = find_target(path);
+  const Target target = resolve_write_target(path);
   if (target.descriptor) {
     descriptor_ = ::fcntl(*target.descriptor, F_DUPFD_CLOEXEC, 0);
-  } else if (is_special(path)) {
+  } else if (is_special_file(path)) {
     descriptor_ = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
   } else {
     target_ = target.path;
@@ -277,14 +259,14 @@ void AtomicFileWriter::write(std::string_view content) {
   }
 }
 
-void AtomicFileWriter::save() {
+void AtomicFileWriter::save_file() {
   if (temporary_.empty()) return;
   if (::fsync(descriptor_) != 0) fail(path_);
-  save_unsynced();
+  save_without_fsync();
   sync_folder(target_.has_parent_path() ? target_.parent_path() : ".");
 }
 
-void AtomicFileWriter::save_unsynced() {
+void AtomicFileWriter::save_without_fsync() {
   if (temporary_.empty()) return;
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail(path_);
   temporary_.clear();
@@ -298,10 +280,10 @@ AtomicFileWriter::~AtomicFileWriter() {
 void write_file(const fs::path& path, std::string_view content) {
   AtomicFileWriter file(path);
   file.write(content);
-  file.save();
+  file.save_file();
 }
 
-bool keep_mode_and_owner(int descriptor, const struct stat& former) {
+bool copy_mode_and_owner(int descriptor, const struct stat& former) {
   constexpr auto same_owner = static_cast<uid_t>(-1);
   constexpr mode_t permissions = 0777, group_permissions = 0070;
   if (::fchown(descriptor, former.st_uid, former.st_gid) != 0) {

@@ -14,8 +14,8 @@ namespace vlp {
 class InputFile {
  public:
   /// Opens the file. Never waits for the writer of a pipe.
-  /// @throws InputError if it cannot be opened, is a folder, another pipe or a device, or has more
-  /// than `max_bytes`
+  /// @throws InputError if it cannot be opened, is a folder, a device or a pipe other than this
+  /// process's streams, or has more than `max_bytes`
   [[gnu::visibility("hidden")]] InputFile(const std::filesystem::path& path, std::size_t max_bytes);
   /// Reads an open regular file, whose descriptor it closes. `path` is its name in messages.
   [[gnu::visibility("hidden")]] InputFile(const std::filesystem::path& path, int descriptor,
@@ -67,12 +67,12 @@ class AtomicFileWriter {
                                                  const std::filesystem::path& shown);
   [[gnu::visibility("hidden")]] void write(std::string_view content);
   /// Flushes the content to disk and renames the file to `path`.
-  [[gnu::visibility("hidden")]] void save();
+  [[gnu::visibility("hidden")]] void save_file();
   /// Saves without waiting for the disk, for content that can be produced again. After a power
   /// failure the file may be truncated, which its reader must detect.
-  [[gnu::visibility("hidden")]] void save_unsynced();
+  [[gnu::visibility("hidden")]] void save_without_fsync();
 
-  /// Without save(), `path` is unchanged.
+  /// Without save_file(), `path` is unchanged.
   [[gnu::visibility("hidden")]] ~AtomicFileWriter();
   AtomicFileWriter(const AtomicFileWriter&) = delete;
   AtomicFileWriter& operator=(const AtomicFileWriter&) = delete;
@@ -89,6 +89,6 @@ class AtomicFileWriter {
 /// Sets the permissions (read, write, execute), owner and group of an open file to those of the
 /// file that it replaces; owner and group as far as this process may set them. If the group
 /// differs, it gets no permissions. Returns false, and sets errno, if they cannot be read or set.
-[[gnu::visibility("hidden")]] bool keep_mode_and_owner(int descriptor, const struct stat& former);
+[[gnu::visibility("hidden")]] bool copy_mode_and_owner(int descriptor, const struct stat& former);
 
 }  // namespace vlp

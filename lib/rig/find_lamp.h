@@ -9,6 +9,6 @@
 namespace vlp {
 
 /// Returns the lamp with this id; nullptr if there is none.
-const Lamp* find_lamp(std::span<const Lamp> lamps, int id);
+const Lamp* find_lamp_by_id(std::span<const Lamp> lamps, int id);
 
 }  // namespace vlp

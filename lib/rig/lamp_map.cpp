@@ -24,26 +24,27 @@ constexpr double kMaxSurveySd_m = 1;  // larger values indicate millimeters
 
 Lamp read_lamp(YamlMap& map) {
   Lamp lamp;
-  lamp.id = map.required("id").integer_within(0, std::numeric_limits<int>::max());
-  const auto position = map.required("position_m");
-  lamp.position_m = Eigen::Vector3d(position.numbers(3).data());
-  position.list()[2].number_within(-kMaxHeight_m, kMaxHeight_m, "m");
-  lamp.shape = read_shape(map);
-  lamp.frequency_hz = map.optional_number("frequency_hz", 50, 1e6, "Hz");
-  lamp.duty = map.optional_number("duty", 0.01, 0.99, "(a fraction of the period)");
-  lamp.sd_m = map.optional_number("sd_m", 0, kMaxSurveySd_m, "m");
+  lamp.id = map.get_required_column("id").get_integer_within(0, std::numeric_limits<int>::max());
+  const auto position = map.get_required_column("position_m");
+  lamp.position_m = Eigen::Vector3d(position.get_numbers(3).data());
+  position.get_list()[2].get_number_within(-kMaxHeight_m, kMaxHeight_m, "m");
+  lamp.shape = read_lamp_shape(map);
+  lamp.frequency_hz = map.get_optional_number("frequency_hz", 50, 1e6, "Hz");
+  lamp.duty = map.get_optional_number("duty", 0.01, 0.99, "(a fraction of the period)");
+  lamp.sd_m = map.get_optional_number("sd_m", 0, kMaxSurveySd_m, "m");
   return lamp;
 }
 
-void UniqueLamps::check(const Lamp& lamp, const YamlValue& item) const {
-  if (ids_.contains(lamp.id)) throw item.error("id " + std::to_string(lamp.id) + " occurs twice");
+void UniqueLamps::check_id_and_position_unique(const Lamp& lamp, const YamlValue& item) const {
+  if (ids_.contains(lamp.id))
+    throw item.make_error("id " + std::to_string(lamp.id) + " occurs twice");
   const double x_m = lamp.position_m.x();
   const auto end = lamps_.upper_bound(x_m + kCoincident_m);
   for (auto near = lamps_.lower_bound(x_m - kCoincident_m); near != end; ++near) {
     const Lamp& other = near->second;
     if ((other.position_m - lamp.position_m).norm() < kCoincident_m) {
-      throw item.error("lamp " + std::to_string(lamp.id) + " is where lamp " +
-                       std::to_string(other.id) + " is");
+      throw item.make_error("lamp " + std::to_string(lamp.id) + " is where lamp " +
+                            std::to_string(other.id) + " is");
     }
   }
 }
@@ -53,7 +54,7 @@ void UniqueLamps::add(const Lamp& lamp) {
   lamps_.emplace(lamp.position_m.x(), lamp);
 }
 
-const Lamp* find_lamp(std::span<const Lamp> lamps, int id) {
+const Lamp* find_lamp_by_id(std::span<const Lamp> lamps, int id) {
   const auto lamp =
       std::find_if(lamps.begin(), lamps.end(), [&](const Lamp& one) { return one.id == id; });
   return lamp == lamps.end() ? nullptr : &*lamp;
@@ -62,36 +63,36 @@ const Lamp* find_lamp(std::span<const Lamp> lamps, int id) {
 LampMap read_lamp_map(const std::filesystem::path& file) { return read_lamps_of_room(file, ""); }
 
 LampMap read_lamps_of_room(const std::filesystem::path& file, const std::string& room) {
-  return read_lamps_with_rooms(file, room).map;
+  return read_lamps_and_room_names(file, room).map;
 }
 
-LampMapFile read_lamps_with_rooms(const std::filesystem::path& file, const std::string& room) {
+LampMapFile read_lamps_and_room_names(const std::filesystem::path& file, const std::string& room) {
   YamlMap document = read_yaml(file, kLampsFormat);
-  const auto sd_m = document.optional_number("sd_m", 0, kMaxSurveySd_m, "m");
-  const YamlValue list = document.required("lamps");
-  document.finish();
+  const auto sd_m = document.get_optional_number("sd_m", 0, kMaxSurveySd_m, "m");
+  const YamlValue list = document.get_required_column("lamps");
+  document.check_all_keys_read();
   LampMapFile result{file, {}, {}};
   UniqueLamps in_room;
   std::unordered_set<int> ids_of_other_rooms;
-  const auto items = list.list();
+  const auto items = list.get_list();
   std::vector<Lamp>& lamps = result.map.lamps;
   lamps.reserve(items.size());
   result.rooms.reserve(items.size());
   for (const YamlValue& item : items) {
-    YamlMap keys = item.map();
+    YamlMap keys = item.get_mapping();
     Lamp lamp = read_lamp(keys);
-    const auto lamp_room = keys.optional("room");
+    const auto lamp_room = keys.get_optional("room");
     if (!room.empty() && !lamp_room) {
-      throw item.error("has no key room, and lamps of room " + room +
-                       " are selected: state the room of each lamp");
+      throw item.make_error("has no key room, and lamps of room " + room +
+                            " are selected: state the room of each lamp");
     }
-    std::string room_name = lamp_room ? lamp_room->text() : "";
+    std::string room_name = lamp_room ? lamp_room->get_text() : "";
     const bool is_in_room = room.empty() || room_name == room;
     if (!lamp.sd_m) lamp.sd_m = sd_m;
-    keys.finish();
-    in_room.check(lamp, item);
+    keys.check_all_keys_read();
+    in_room.check_id_and_position_unique(lamp, item);
     if (ids_of_other_rooms.contains(lamp.id)) {
-      throw item.error("id " + std::to_string(lamp.id) + " occurs twice");
+      throw item.make_error("id " + std::to_string(lamp.id) + " occurs twice");
     }
     if (is_in_room) {
       in_room.add(lamp);
@@ -105,20 +106,20 @@ LampMapFile read_lamps_with_rooms(const std::filesystem::path& file, const std::
     throw InputError(
         file, "has no lamp with 'room: " + room + "': name another room, or correct the map");
   }
-  if (lamps.empty()) throw list.error("contains no lamp");
+  if (lamps.empty()) throw list.make_error("contains no lamp");
   return result;
 }
 
 void write_lamp_map(const std::filesystem::path& file, const LampMap& map) {
   YAML::Emitter out;
   out << YAML::BeginMap;
-  emit_word(out, "format", kLampsFormat);
+  emit_plain_word(out, "format", kLampsFormat);
   out << YAML::Key << "lamps" << YAML::Value << YAML::BeginSeq;
   for (const Lamp& lamp : map.lamps) {
     out << YAML::Flow << YAML::BeginMap;
     emit_integer(out, "id", lamp.id);
     emit_numbers(out, "position_m", lamp.position_m);
-    emit_shape(out, lamp.shape);
+    emit_lamp_shape(out, lamp.shape);
     if (lamp.frequency_hz) emit_number(out, "frequency_hz", *lamp.frequency_hz);
     if (lamp.duty) emit_number(out, "duty", *lamp.duty);
     if (lamp.sd_m) emit_number(out, "sd_m", *lamp.sd_m);

@@ -18,7 +18,8 @@ struct LampMapFile {
   std::vector<std::string> rooms;
 };
 
-/// Reads what read_lamps_of_room() reads, with the room of each lamp. Throws InputError.
-LampMapFile read_lamps_with_rooms(const std::filesystem::path& file, const std::string& room);
+/// Reads the lamps of read_lamps_of_room() and the name of the room of each lamp. Throws
+/// InputError.
+LampMapFile read_lamps_and_room_names(const std::filesystem::path& file, const std::string& room);
 
 }  // namespace vlp

@@ -49,42 +49,44 @@ std::vector<Eigen::Vector3d> outline_of(const LampShape& shape, const Eigen::Vec
   return points_m;
 }
 
-LampShape read_shape(YamlMap& map) {
+LampShape read_lamp_shape(YamlMap& map) {
   LampShape shape;
-  const auto word = map.optional("shape");
+  const auto word = map.get_optional("shape");
   if (word) {
-    const std::string name = word->text();
+    const std::string name = word->get_text();
     const auto* traits = std::ranges::find(kShapeTraits, name, &ShapeTraits::name);
-    if (traits == kShapeTraits.end()) throw word->unknown(list_names(false));
+    if (traits == kShapeTraits.end()) throw word->make_unknown_word_error(list_names(false));
     shape.kind = traits->kind;
   }
   const ShapeTraits& traits = traits_of(shape.kind);
-  const auto diameter = map.optional("diameter_m");
-  const auto size = map.optional("size_m"), yaw = map.optional("yaw_rad");
+  const auto diameter = map.get_optional("diameter_m");
+  const auto size = map.get_optional("size_m"), yaw = map.get_optional("yaw_rad");
   if (!traits.has_two_sizes) {
     if (size || yaw) {
       const std::string names = list_names(true);
-      throw(size ? size : yaw)->error("is of a " + names + ": say 'shape: " + names + "', too");
+      throw(size ? size : yaw)
+          ->make_error("is of a " + names + ": say 'shape: " + names + "', too");
     }
-    return diameter ? make_disc(diameter->number_within(kMinSize_m, kMaxSize_m, "m")) : shape;
+    return diameter ? make_disc(diameter->get_number_within(kMinSize_m, kMaxSize_m, "m")) : shape;
   }
   if (diameter) {
-    throw diameter->error("is of a disc, and this is a " + std::string(traits.name) +
-                          ": it has a size_m");
+    throw diameter->make_error("is of a disc, and this is a " + std::string(traits.name) +
+                               ": it has a size_m");
   }
-  const YamlValue sides = map.required("size_m");
-  shape.size_m = Eigen::Vector2d(sides.numbers(2).data());
-  if (yaw) shape.yaw_rad = yaw->number_within(-kMaxYaw_rad, kMaxYaw_rad, "rad");
-  for (const YamlValue& side : sides.list()) side.number_within(kMinSize_m, kMaxSize_m, "m");
+  const YamlValue sides = map.get_required_column("size_m");
+  shape.size_m = Eigen::Vector2d(sides.get_numbers(2).data());
+  if (yaw) shape.yaw_rad = yaw->get_number_within(-kMaxYaw_rad, kMaxYaw_rad, "rad");
+  for (const YamlValue& side : sides.get_list())
+    side.get_number_within(kMinSize_m, kMaxSize_m, "m");
   return shape;
 }
 
-void emit_shape(YAML::Emitter& out, const LampShape& shape) {
+void emit_lamp_shape(YAML::Emitter& out, const LampShape& shape) {
   assert(shape.size_m || !traits_of(shape.kind).has_two_sizes);
   if (!shape.size_m) return;
   const ShapeTraits& traits = traits_of(shape.kind);
   if (!traits.has_two_sizes) return emit_number(out, "diameter_m", shape.size_m->x());
-  emit_word(out, "shape", traits.name);
+  emit_plain_word(out, "shape", traits.name);
   emit_numbers(out, "size_m", *shape.size_m);
   emit_number(out, "yaw_rad", shape.yaw_rad);
 }

@@ -15,22 +15,22 @@
 namespace vlp {
 
 /// Readers of the parts that several kinds of documents contain. Each reads the keys of `map` that
-/// are the fields of its result. The caller reads its own keys and calls finish(). All throw
-/// InputError if a value is invalid.
+/// are the fields of its result. The caller reads its own keys and calls check_all_keys_read(). All
+/// throw InputError if a value is invalid.
 Lamp read_lamp(YamlMap& map);
 /// Reads a shape. Its size is unknown for a disc without diameter_m.
-LampShape read_shape(YamlMap& map);
+LampShape read_lamp_shape(YamlMap& map);
 Board read_board(YamlMap& map);
 Camera read_camera(YamlMap& map);
 
-/// Writes the keys for read_shape().
-void emit_shape(YAML::Emitter& out, const LampShape& shape);
+/// Writes the keys for read_lamp_shape().
+void emit_lamp_shape(YAML::Emitter& out, const LampShape& shape);
 
 /// Lamps that were already read, by id and position.
 class UniqueLamps {
  public:
   /// Throws InputError at `item` if an earlier lamp has the same id or position.
-  void check(const Lamp& lamp, const YamlValue& item) const;
+  void check_id_and_position_unique(const Lamp& lamp, const YamlValue& item) const;
   void add(const Lamp& lamp);
 
  private:

@@ -25,15 +25,16 @@ class TreeBuilder : public YAML::EventHandler {
  public:
   explicit TreeBuilder(const std::filesystem::path& file) : file_(file) {}
 
-  bool found_document() const { return found_document_; }
-  YamlNode take_root() { return std::move(root_); }
+  bool has_found_document() const { return found_document_; }
+  YamlNode take_root_node() { return std::move(root_); }
 
   void OnDocumentStart(const YAML::Mark& mark) override {
-    if (found_document_) refuse(mark, "a second YAML document begins; the file should contain one");
+    if (found_document_)
+      throw_not_supported(mark, "a second YAML document begins; the file should contain one");
     found_document_ = true;
   }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
-    refuse(mark, "an alias (*) is not supported: write out the value");
+    throw_not_supported(mark, "an alias (*) is not supported: write out the value");
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
                        YAML::EmitterStyle::value) override {
@@ -47,18 +48,19 @@ class TreeBuilder : public YAML::EventHandler {
   void OnMapEnd() override { close(); }
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark& mark, YAML::anchor_t) override {
-    add({YamlNode::Kind::null, line_of(mark), {}, {}});
+    add({YamlNode::Kind::null, line_of_yaml_mark(mark), {}, {}});
   }
   void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
                 const std::string& text) override {
-    add({YamlNode::Kind::scalar, line_of(mark), text, {}});
+    add({YamlNode::Kind::scalar, line_of_yaml_mark(mark), text, {}});
   }
 
  private:
   void open(YamlNode::Kind kind, const YAML::Mark& mark) {
     constexpr std::size_t max_depth = 20;
-    open_.push_back({kind, line_of(mark), {}, {}});
-    if (open_.size() > max_depth) refuse(mark, "is nested too deep: is it the right file?");
+    open_.push_back({kind, line_of_yaml_mark(mark), {}, {}});
+    if (open_.size() > max_depth)
+      throw_not_supported(mark, "is nested too deep: is it the right file?");
   }
   void close() {
     YamlNode node = std::move(open_.back());
@@ -72,8 +74,8 @@ class TreeBuilder : public YAML::EventHandler {
       open_.back().children.push_back(std::move(node));
     }
   }
-  [[noreturn]] void refuse(const YAML::Mark& mark, const std::string& problem) const {
-    throw InputError(file_, line_of(mark), "", problem);
+  [[noreturn]] void throw_not_supported(const YAML::Mark& mark, const std::string& problem) const {
+    throw InputError(file_, line_of_yaml_mark(mark), "", problem);
   }
   const std::filesystem::path& file_;
   bool found_document_ = false;
@@ -82,7 +84,7 @@ class TreeBuilder : public YAML::EventHandler {
 };
 
 YamlNode build_tree(const std::filesystem::path& file, const std::string& text) {
-  const std::size_t valid = utf8_length(text);
+  const std::size_t valid = count_utf8_characters(text);
   if (valid < text.size()) {
     const auto line = std::count(text.begin(), text.begin() + std::ptrdiff_t(valid), '\n') + 1;
     throw InputError(file, std::size_t(line), "", "is not UTF-8 text: save it in that encoding");
@@ -93,21 +95,21 @@ YamlNode build_tree(const std::filesystem::path& file, const std::string& text) 
     YAML::Parser parser(stream);
     while (parser.HandleNextDocument(tree)) {
     }
-    if (!tree.found_document()) throw InputError(file, "contains no YAML document");
-    return tree.take_root();
+    if (!tree.has_found_document()) throw InputError(file, "contains no YAML document");
+    return tree.take_root_node();
   } catch (const YAML::Exception& failure) {
     const bool tabs = text.find('\t') != std::string::npos;
-    throw InputError(file, line_of(failure.mark), "",
+    throw InputError(file, line_of_yaml_mark(failure.mark), "",
                      "is not valid YAML: " + failure.msg +
                          (tabs ? " (there are tabs: YAML is indented with spaces)" : ""));
   }
 }
 
 /// Describes a value for a message: 'text', a list, a mapping, nothing.
-std::string quote(const YamlNode& node) {
+std::string describe_yaml_value(const YamlNode& node) {
   switch (node.kind) {
     case YamlNode::Kind::scalar:
-      return in_quotes(node.text);
+      return quote_for_message(node.text);
     case YamlNode::Kind::list:
       return "a list";
     case YamlNode::Kind::map:
@@ -131,15 +133,15 @@ YamlMap::YamlMap(const YamlPart& node, const std::filesystem::path* file, std::s
   entries_.reserve(node->children.size() / 2);
   for (std::size_t i = 0; i + 1 < node->children.size(); i += 2) {
     const YamlNode &name = node->children[i], &value = node->children[i + 1];
-    if (name.kind != YamlNode::Kind::scalar) throw error(name.line, "a key should be a word");
+    if (name.kind != YamlNode::Kind::scalar) throw make_error(name.line, "a key should be a word");
     if (!seen.insert(name.text).second) {
-      throw error(name.line, "key " + in_quotes(name.text) + " occurs twice");
+      throw make_error(name.line, "key " + quote_for_message(name.text) + " occurs twice");
     }
     entries_.push_back({name.text, name.line, YamlPart(node, &value)});
   }
 }
 
-std::optional<YamlValue> YamlMap::optional(const std::string& key) {
+std::optional<YamlValue> YamlMap::get_optional(const std::string& key) {
   if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.push_back(key);
   for (const Entry& entry : entries_) {
     if (entry.key != key) continue;
@@ -148,85 +150,90 @@ std::optional<YamlValue> YamlMap::optional(const std::string& key) {
     const std::size_t line = is_null ? entry.line : entry.value->line;
     return YamlValue(entry.value, file_, prefix_.empty() ? key : prefix_ + "." + key, line);
   }
-  check_renamed(key);
+  check_key_not_renamed(key);
   return std::nullopt;
 }
 
 bool YamlMap::has(const std::string& key) const {
   const bool found = std::any_of(entries_.begin(), entries_.end(),
                                  [&](const Entry& entry) { return entry.key == key; });
-  if (!found) check_renamed(key);
+  if (!found) check_key_not_renamed(key);
   return found;
 }
 
 /// Throws InputError if an entry has the former name of `key`, which may be that of a metric.
-void YamlMap::check_renamed(std::string_view key) const {
+void YamlMap::check_key_not_renamed(std::string_view key) const {
   for (const NameKind kind : {NameKind::key, NameKind::metric}) {
     const std::string_view former = find_former_name(kind, key);
     for (const Entry& entry : entries_) {
       if (!former.empty() && entry.key == former) {
-        throw error(entry.line, "key " + describe_renaming(former, key));
+        throw make_error(entry.line, "key " + describe_renaming(former, key));
       }
     }
   }
 }
 
-std::optional<double> YamlMap::optional_number(const std::string& key, double min, double max,
-                                               std::string_view unit) {
-  const auto value = optional(key);
-  return value ? std::optional(value->number_within(min, max, unit)) : std::nullopt;
+std::optional<double> YamlMap::get_optional_number(const std::string& key, double min, double max,
+                                                   std::string_view unit) {
+  const auto value = get_optional(key);
+  return value ? std::optional(value->get_number_within(min, max, unit)) : std::nullopt;
 }
 
-YamlValue YamlMap::required(const std::string& key) {
-  if (auto value = optional(key)) return *value;
+YamlValue YamlMap::get_required_column(const std::string& key) {
+  if (auto value = get_optional(key)) return *value;
   std::string names;
   for (const Entry& entry : entries_) names += (names.empty() ? "" : ", ") + entry.key;
-  throw error(line_, "key '" + key + "' is missing; the keys are: " + truncate_text(names, 150));
+  throw make_error(line_,
+                   "key '" + key + "' is missing; the keys are: " + truncate_text(names, 150));
 }
 
-void YamlMap::finish() const {
+void YamlMap::check_all_keys_read() const {
   for (const Entry& entry : entries_) {
     if (std::find(known_.begin(), known_.end(), entry.key) != known_.end()) continue;
-    for (const std::string& name : known_) check_renamed(name);
+    for (const std::string& name : known_) check_key_not_renamed(name);
     std::string names;
     for (const std::string& name : known_) names += (names.empty() ? "" : ", ") + name;
-    throw error(entry.line, "key " + in_quotes(entry.key) + " is unknown; the keys are: " + names);
+    throw make_error(entry.line,
+                     "key " + quote_for_message(entry.key) + " is unknown; the keys are: " + names);
   }
 }
 
-InputError YamlMap::error(const std::string& problem) const { return error(line_, problem); }
+InputError YamlMap::make_error(const std::string& problem) const {
+  return make_error(line_, problem);
+}
 
-InputError YamlMap::error(std::size_t line, const std::string& problem) const {
+InputError YamlMap::make_error(std::size_t line, const std::string& problem) const {
   return {*file_, line, prefix_, problem};
 }
 
 YamlMap read_yaml(const std::filesystem::path& file) {
   const auto node =
       std::make_shared<YamlNode>(build_tree(file, read_text_file(file, kMaxYamlBytes)));
-  return YamlValue(node, &file, "", node->line).map();
+  return YamlValue(node, &file, "", node->line).get_mapping();
 }
 
 YamlMap read_yaml(const std::filesystem::path& file, const std::string& format) {
   YamlMap map = read_yaml(file);
-  require_format(map, format);
+  check_file_format(map, format);
   return map;
 }
 
-void require_format(YamlMap& map, const std::string& format) {
-  const auto found = map.optional("format");
+void check_file_format(YamlMap& map, const std::string& format) {
+  const auto found = map.get_optional("format");
   if (!found) {
-    throw map.error("key 'format' is missing: the file should begin with 'format: " + format + "'");
+    throw map.make_error("key 'format' is missing: the file should begin with 'format: " + format +
+                         "'");
   }
-  if (found->text() != format) {
-    throw found->error("should be '" + format + "', not " + in_quotes(found->text()) +
-                       ": is it the right file?");
+  if (found->get_text() != format) {
+    throw found->make_error("should be '" + format + "', not " +
+                            quote_for_message(found->get_text()) + ": is it the right file?");
   }
 }
 
 namespace {
 
 template <typename Number>
-std::optional<Number> parsed(const YamlNode& node) {
+std::optional<Number> parse_number(const YamlNode& node) {
   if (node.kind != YamlNode::Kind::scalar) return std::nullopt;
   const std::string& text = node.text;
   const char* begin = text.data() + (text.starts_with('+') && !text.starts_with("+-") ? 1 : 0);
@@ -242,62 +249,65 @@ YamlValue::YamlValue(YamlPart node, const std::filesystem::path* file, std::stri
                      std::size_t line)
     : node_(std::move(node)), file_(file), key_(std::move(key)), line_(line) {}
 
-double YamlValue::number() const {
-  const auto value = parsed<double>(*node_);
+double YamlValue::get_number() const {
+  const auto value = parse_number<double>(*node_);
   if (!value || !std::isfinite(*value)) {
-    throw error("should be a finite number, not " + quote(*node_));
+    throw make_error("should be a finite number, not " + describe_yaml_value(*node_));
   }
   return *value;
 }
 
-double YamlValue::number_within(double min, double max, std::string_view unit) const {
-  const double value = number();
+double YamlValue::get_number_within(double min, double max, std::string_view unit) const {
+  const double value = get_number();
   if (value < min || value > max) {
-    throw error(shortest(value) + " " + std::string(unit) + " is not within " + shortest(min) +
-                " and " + shortest(max) + " " + std::string(unit) + ": is it in the right unit?");
+    throw make_error(format_shortest(value) + " " + std::string(unit) + " is not within " +
+                     format_shortest(min) + " and " + format_shortest(max) + " " +
+                     std::string(unit) + ": is it in the right unit?");
   }
   return value;
 }
 
-int YamlValue::integer_within(int min, int max) const {
-  const auto value = parsed<int>(*node_);
+int YamlValue::get_integer_within(int min, int max) const {
+  const auto value = parse_number<int>(*node_);
   if (!value || *value < min || *value > max) {
-    throw error("should be a whole number within " + std::to_string(min) + " and " +
-                std::to_string(max) + ", not " + quote(*node_));
+    throw make_error("should be a whole number within " + std::to_string(min) + " and " +
+                     std::to_string(max) + ", not " + describe_yaml_value(*node_));
   }
   return *value;
 }
 
-bool YamlValue::boolean() const {
+bool YamlValue::get_boolean() const {
   if (node_->kind == YamlNode::Kind::scalar && node_->text == "true") return true;
   if (node_->kind == YamlNode::Kind::scalar && node_->text == "false") return false;
-  throw error("should be true or false, not " + quote(*node_));
+  throw make_error("should be true or false, not " + describe_yaml_value(*node_));
 }
 
-std::string YamlValue::text() const {
-  if (node_->kind != YamlNode::Kind::scalar) throw error("should be text, not " + quote(*node_));
+std::string YamlValue::get_text() const {
+  if (node_->kind != YamlNode::Kind::scalar)
+    throw make_error("should be text, not " + describe_yaml_value(*node_));
   return node_->text;
 }
 
-std::vector<double> YamlValue::numbers(std::size_t count) const {
+std::vector<double> YamlValue::get_numbers(std::size_t count) const {
   std::vector<double> values;
-  for (const YamlValue& item : list()) values.push_back(item.number());
+  for (const YamlValue& item : get_list()) values.push_back(item.get_number());
   if (values.size() != count) {
-    throw error("should be " + std::to_string(count) + " numbers, not " +
-                std::to_string(values.size()));
+    throw make_error("should be " + std::to_string(count) + " numbers, not " +
+                     std::to_string(values.size()));
   }
   return values;
 }
 
 std::vector<double> YamlValue::numbers_within(std::size_t count, double min, double max,
                                               std::string_view unit) const {
-  std::vector<double> values = numbers(count);
-  for (const YamlValue& item : list()) item.number_within(min, max, unit);
+  std::vector<double> values = get_numbers(count);
+  for (const YamlValue& item : get_list()) item.get_number_within(min, max, unit);
   return values;
 }
 
-std::vector<YamlValue> YamlValue::list() const {
-  if (node_->kind != YamlNode::Kind::list) throw error("should be a list, not " + quote(*node_));
+std::vector<YamlValue> YamlValue::get_list() const {
+  if (node_->kind != YamlNode::Kind::list)
+    throw make_error("should be a list, not " + describe_yaml_value(*node_));
   std::vector<YamlValue> items;
   items.reserve(node_->children.size());
   for (const YamlNode& item : node_->children) {
@@ -307,19 +317,19 @@ std::vector<YamlValue> YamlValue::list() const {
   return items;
 }
 
-YamlMap YamlValue::map() const {
+YamlMap YamlValue::get_mapping() const {
   if (node_->kind != YamlNode::Kind::map) {
-    throw error("should be a mapping of keys to values, not " + quote(*node_));
+    throw make_error("should be a mapping of keys to values, not " + describe_yaml_value(*node_));
   }
   return {node_, file_, key_};
 }
 
-InputError YamlValue::error(const std::string& problem) const {
+InputError YamlValue::make_error(const std::string& problem) const {
   return {*file_, line_, key_, problem};
 }
 
-InputError YamlValue::unknown(const std::string& known) const {
-  return error(quote(*node_) + " is unknown; " + known);
+InputError YamlValue::make_unknown_word_error(const std::string& known) const {
+  return make_error(describe_yaml_value(*node_) + " is unknown; " + known);
 }
 
 }  // namespace vlp

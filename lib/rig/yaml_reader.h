@@ -41,19 +41,19 @@ class YamlValue {
  public:
   YamlValue(YamlPart node, const std::filesystem::path* file, std::string key, std::size_t line);
 
-  /// Returns a finite number. number_within() also throws InputError if it is outside [min, max];
-  /// `unit` is for the message.
-  double number() const;
-  double number_within(double min, double max, std::string_view unit) const;
-  int integer_within(int min, int max) const;
-  bool boolean() const;
-  std::string text() const;
-  /// Returns exactly `count` numbers. numbers_within() checks them as number_within().
-  std::vector<double> numbers(std::size_t count) const;
+  /// Returns a finite number. get_number_within() also throws InputError if it is outside [min,
+  /// max]; `unit` is for the message.
+  double get_number() const;
+  double get_number_within(double min, double max, std::string_view unit) const;
+  int get_integer_within(int min, int max) const;
+  bool get_boolean() const;
+  std::string get_text() const;
+  /// Returns exactly `count` numbers. numbers_within() checks them as get_number_within().
+  std::vector<double> get_numbers(std::size_t count) const;
   std::vector<double> numbers_within(std::size_t count, double min, double max,
                                      std::string_view unit) const;
-  std::vector<YamlValue> list() const;
-  YamlMap map() const;
+  std::vector<YamlValue> get_list() const;
+  YamlMap get_mapping() const;
   /// Returns what `read`, a function of a YamlMap&, makes of a mapping; it reads all valid keys.
   template <typename Read>
   auto read_map(const Read& read) const;
@@ -61,9 +61,9 @@ class YamlValue {
   template <typename Read>
   auto read_maps(const Read& read) const;
 
-  InputError error(const std::string& problem) const;
+  InputError make_error(const std::string& problem) const;
   /// Returns the error for a word that is not among the valid ones, `known`.
-  InputError unknown(const std::string& known) const;
+  InputError make_unknown_word_error(const std::string& known) const;
 
  private:
   YamlPart node_;
@@ -72,38 +72,39 @@ class YamlValue {
   std::size_t line_;
 };
 
-/// A mapping. The caller reads every valid key, then calls finish(). `file` must outlive it.
+/// A mapping. The caller reads every valid key, then calls check_all_keys_read(). `file` must
+/// outlive it.
 class YamlMap {
  public:
   YamlMap(const YamlPart& node, const std::filesystem::path* file, std::string key);
 
   /// The readers of keys also throw InputError if the mapping has the key under its former name.
   bool has(const std::string& key) const;
-  YamlValue required(const std::string& key);
-  std::optional<YamlValue> optional(const std::string& key);
-  /// Return std::nullopt without the key, otherwise YamlValue::number_within() or read_map().
-  std::optional<double> optional_number(const std::string& key, double min, double max,
-                                        std::string_view unit);
+  YamlValue get_required_column(const std::string& key);
+  std::optional<YamlValue> get_optional(const std::string& key);
+  /// Return std::nullopt without the key, otherwise YamlValue::get_number_within() or read_map().
+  std::optional<double> get_optional_number(const std::string& key, double min, double max,
+                                            std::string_view unit);
   template <typename Read>
   auto optional_map(const std::string& key, const Read& read) {
-    const auto value = optional(key);
+    const auto value = get_optional(key);
     return value ? std::optional(value->read_map(read)) : std::nullopt;
   }
   /// Returns YamlValue::read_maps(); an empty list without the key.
   template <typename Read>
   auto optional_maps(const std::string& key, const Read& read) {
-    const auto value = optional(key);
+    const auto value = get_optional(key);
     return value ? value->read_maps(read) : decltype(value->read_maps(read))();
   }
   /// Throws InputError for the first key that was not read.
-  void finish() const;
+  void check_all_keys_read() const;
 
   /// Returns an error of the entire mapping.
-  InputError error(const std::string& problem) const;
+  InputError make_error(const std::string& problem) const;
 
  private:
-  InputError error(std::size_t line, const std::string& problem) const;
-  void check_renamed(std::string_view key) const;
+  InputError make_error(std::size_t line, const std::string& problem) const;
+  void check_key_not_renamed(std::string_view key) const;
 
   struct Entry {
     std::string key;
@@ -119,16 +120,16 @@ class YamlMap {
 
 template <typename Read>
 auto YamlValue::read_map(const Read& read) const {
-  YamlMap keys = map();
+  YamlMap keys = get_mapping();
   auto result = read(keys);
-  keys.finish();
+  keys.check_all_keys_read();
   return result;
 }
 
 template <typename Read>
 auto YamlValue::read_maps(const Read& read) const {
   std::vector<decltype(read_map(read))> results;
-  for (const YamlValue& item : list()) results.push_back(item.read_map(read));
+  for (const YamlValue& item : get_list()) results.push_back(item.read_map(read));
   return results;
 }
 
@@ -148,7 +149,7 @@ YamlMap read_yaml(const std::filesystem::path& file);
 /// formats, too.
 YamlMap read_yaml(const std::filesystem::path& file, const std::string& format);
 /// Throws InputError if the key `format` is missing or has another value.
-void require_format(YamlMap& map, const std::string& format);
+void check_file_format(YamlMap& map, const std::string& format);
 
 }  // namespace vlp
 #pragma GCC visibility pop

@@ -12,7 +12,7 @@ namespace {
 
 std::string finite(double value) {
   if (!std::isfinite(value)) throw std::invalid_argument("a number to be saved is not finite");
-  return shortest(value);
+  return format_shortest(value);
 }
 
 YAML::Emitter& emit_key(YAML::Emitter& out, std::string_view key) {
@@ -39,13 +39,13 @@ void emit_quoted(YAML::Emitter& out, std::string_view key, const std::string& va
   emit_key(out, key) << YAML::DoubleQuoted << value;
 }
 
-void emit_word(YAML::Emitter& out, std::string_view key, std::string_view value) {
+void emit_plain_word(YAML::Emitter& out, std::string_view key, std::string_view value) {
   emit_key(out, key) << std::string(value);
 }
 
 void emit_numbers(YAML::Emitter& out, std::string_view key, std::span<const double> values) {
   emit_key(out, key);
-  emit_row(out, values);
+  emit_inline_list(out, values);
 }
 
 void emit_numbers(YAML::Emitter& out, std::string_view key,
@@ -53,7 +53,7 @@ void emit_numbers(YAML::Emitter& out, std::string_view key,
   emit_numbers(out, key, std::span(values.data(), static_cast<std::size_t>(values.size())));
 }
 
-void emit_row(YAML::Emitter& out, std::span<const double> values) {
+void emit_inline_list(YAML::Emitter& out, std::span<const double> values) {
   out << YAML::Flow << YAML::BeginSeq;
   for (const double value : values) out << finite(value);
   out << YAML::EndSeq;

@@ -21,12 +21,12 @@ void emit_integer(YAML::Emitter& out, std::string_view key, int value);
 void emit_integers(YAML::Emitter& out, std::string_view key, std::span<const int> values);
 void emit_quoted(YAML::Emitter& out, std::string_view key, const std::string& value);
 /// Writes a word that needs no quotes: a format, a model, an enumerator.
-void emit_word(YAML::Emitter& out, std::string_view key, std::string_view value);
+void emit_plain_word(YAML::Emitter& out, std::string_view key, std::string_view value);
 void emit_numbers(YAML::Emitter& out, std::string_view key, std::span<const double> values);
 void emit_numbers(YAML::Emitter& out, std::string_view key,
                   const Eigen::Ref<const Eigen::VectorXd>& values);
 /// Writes a list within a list.
-void emit_row(YAML::Emitter& out, std::span<const double> values);
+void emit_inline_list(YAML::Emitter& out, std::span<const double> values);
 
 }  // namespace vlp
 #pragma GCC visibility pop

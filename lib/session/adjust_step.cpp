@@ -24,10 +24,11 @@ namespace vlp {
 namespace {
 
 /// Returns the spot of each image of a rotation in place: one spot per height.
-std::map<std::string, std::string> find_spots(const AdjustSet& set, const AdjustStepInput& input,
-                                              AdjustStepResult& result) {
+std::map<std::string, std::string> find_pivot_of_images(const AdjustSet& set,
+                                                        const AdjustStepInput& input,
+                                                        AdjustStepResult& result) {
   const RotationCaptures turn =
-      find_rotation_captures(set.frames, input.lamps, input.calibration.camera);
+      find_in_place_rotation_captures(set.frames, input.lamps, input.calibration.camera);
   std::map<std::string, std::string> spots;
   if (turn.status != RotationStatus::ok) {
     result.warnings.push_back(fmt::format("{} is not treated as a rotation in place: {}", set.name,
@@ -40,8 +41,8 @@ std::map<std::string, std::string> find_spots(const AdjustSet& set, const Adjust
   return spots;
 }
 
-std::optional<KnownPlace> make_known_place(const Capture& capture, const AdjustSet& set,
-                                           const AdjustStepInput& input, int& without_sd) {
+std::optional<KnownPosition> make_known_place(const Capture& capture, const AdjustSet& set,
+                                              const AdjustStepInput& input, int& without_sd) {
   if (!capture.x_m || !capture.y_m) return std::nullopt;
   const auto sd_m = capture.place_sd_m ? capture.place_sd_m : input.place_sd_m;
   if (!sd_m) {
@@ -51,7 +52,7 @@ std::optional<KnownPlace> make_known_place(const Capture& capture, const AdjustS
   if (!(*sd_m > 0)) {
     throw InputError(set.name, "position_sd_m is 0; state the standard deviation of the position");
   }
-  return KnownPlace{capture.place, {*capture.x_m, *capture.y_m}, capture.z_m, *sd_m};
+  return KnownPosition{capture.place, {*capture.x_m, *capture.y_m}, capture.z_m, *sd_m};
 }
 
 AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepResult& result) {
@@ -68,7 +69,8 @@ AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepRe
                        "has a lens covariance already; leave --lens-sd-px out");
     }
     if (!report) report.emplace();
-    report->covariance = make_lens_covariance(all.calibration.camera, *input.lens_sd_px);
+    report->covariance =
+        make_nominal_intrinsics_covariance(all.calibration.camera, *input.lens_sd_px);
   }
   for (Lamp& lamp : all.lamps.lamps) {
     if (!lamp.sd_m) lamp.sd_m = input.map_sd_m;
@@ -81,8 +83,8 @@ AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepRe
     }
   }
   for (const AdjustSet& set : input.sets) {
-    const auto turned =
-        set.turn ? find_spots(set, input, result) : std::map<std::string, std::string>();
+    const auto turned = set.is_in_place_rotation ? find_pivot_of_images(set, input, result)
+                                                 : std::map<std::string, std::string>();
     int without_sd = 0;
     for (const Frame& frame : set.frames) {
       const auto entry = set.captures.find(frame.image);
@@ -95,9 +97,9 @@ AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepRe
         capture.spot = set.name + "/" + spot->second;
       }
       capture.place = make_known_place(capture_entry, set, input, without_sd);
-      capture.motion = find_motion(capture_entry, input.motion, input.yaw_rate_sd_rad_per_s)
+      capture.motion = find_capture_motion(capture_entry, input.motion, input.yaw_rate_sd_rad_per_s)
                            .value_or(KnownMotion());
-      if (moves(capture.motion)) check_row_time(input.calibration.camera);
+      if (may_camera_move_during_readout(capture.motion)) check_row_time(input.calibration.camera);
       all.captures.push_back(std::move(capture));
     }
     if (without_sd > 0) {
@@ -147,7 +149,8 @@ void add_warnings(AdjustStepResult& result, const MapErrors& map_errors) {
 
 }  // namespace
 
-void make_set_names_unique(std::vector<AdjustSet>& sets, const std::vector<std::string>& paths) {
+void make_adjust_set_names_unique(std::vector<AdjustSet>& sets,
+                                  const std::vector<std::string>& paths) {
   std::vector<std::string> names;
   names.reserve(sets.size());
   for (const AdjustSet& set : sets) names.push_back(set.name);
@@ -160,9 +163,9 @@ void make_set_names_unique(std::vector<AdjustSet>& sets, const std::vector<std::
   }
 }
 
-AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry entry) {
+AdjustStepResult run_adjustment_step(const AdjustStepInput& input, HistoryEntry entry) {
   AdjustStepResult result;
-  const Calibration alone = extract_camera(input.calibration);
+  const Calibration alone = extract_camera_calibration(input.calibration);
   const AdjustmentInput all = make_adjustment_input(input, result);
   // The check of the map assumes level captures: it skips inclined ones.
   LampCaptures captures{{}, all.lamps, input.lamps_file, input.calibration};
@@ -171,17 +174,17 @@ AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry ent
     captures.frames.push_back({capture.name, capture.detections});
     captures.motions.push_back(capture.motion);
   }
-  const MapErrors map_errors = check_map(captures, alone, result);
+  const MapErrors map_errors = check_lamp_map(captures, alone, result);
   if (!result.ok()) return result;
-  result.found = adjust_captures(all);
+  result.found = run_bundle_adjustment(all);
   const AdjustmentResult& found = result.found;
   if (!found.ok()) {
-    result.fail(StepFailure::undetermined, found.undetermined);
-    explain_failure_by_map(captures, alone, result);
+    result.set_failure(StepFailure::undetermined, found.undetermined);
+    explain_failure_by_map_errors(captures, alone, result);
     return result;
   }
   add_warnings(result, map_errors);
-  result.metrics = {{"tilt_deg", deg_from_rad(compute_tilt(found.center).angle_rad)}};
+  result.metrics = {{"tilt_deg", deg_from_rad(compute_camera_tilt(found.center).angle_rad)}};
   if (const auto& arm_m = found.center.lever_arm_m) {
     result.metrics.push_back({"lever_arm_mm", 1e3 * arm_m->norm()});
   }
@@ -198,7 +201,7 @@ AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry ent
   Calibration calibration = input.calibration;
   calibration.camera = found.camera;
   if (calibration.intrinsics_report && calibration.intrinsics_report->covariance) {
-    const Eigen::Index n = count_reported_intrinsics(found.camera);
+    const Eigen::Index n = count_intrinsics_with_covariance(found.camera);
     calibration.intrinsics_report->covariance = adjustment.covariance.topLeftCorner(n, n);
   }
   result.calibration = with_adjustment(std::move(calibration), found.center, std::move(adjustment),

@@ -19,17 +19,18 @@ struct AdjustSet {
   std::string name;
   std::vector<Frame> frames;
   CapturesTable captures;
-  /// True if captures without a `pivot` are one rotation in place, grouped by height as in
-  /// RotationCaptures.
-  bool turn = false;
+  /// True if captures without a pivot (Capture::spot) are one rotation in place, grouped by height
+  /// as in RotationCaptures.
+  bool is_in_place_rotation = false;
 };
 
 /// Replaces the names of sets that share one name by their paths, because a spot is identified by
 /// the name of its set. `paths` are in the order of `sets`. Throws std::invalid_argument if a path
 /// occurs twice.
-void make_set_names_unique(std::vector<AdjustSet>& sets, const std::vector<std::string>& paths);
+void make_adjust_set_names_unique(std::vector<AdjustSet>& sets,
+                                  const std::vector<std::string>& paths);
 
-/// Input of solve_adjustment().
+/// Input of run_adjustment_step().
 struct AdjustStepInput {
   std::vector<AdjustSet> sets;
   LampMap lamps;
@@ -38,18 +39,18 @@ struct AdjustStepInput {
   std::filesystem::path calibration_file;
   /// Standard deviations, per axis, of lamps and of places without one of their own.
   std::optional<double> map_sd_m, place_sd_m;
-  /// Standard deviation of a lens without a covariance (make_lens_covariance()). std::nullopt:
-  /// such a lens is exact.
+  /// Standard deviation of a lens without a covariance (make_nominal_intrinsics_covariance()).
+  /// std::nullopt: such a lens is exact.
   std::optional<double> lens_sd_px = {};
   /// Motion of captures without velocity and yaw rate in captures.csv, and the standard deviation
-  /// of the yaw rates in captures.csv (find_motion()).
+  /// of the yaw rates in captures.csv (find_capture_motion()).
   std::optional<KnownMotion> motion = {};
   double yaw_rate_sd_rad_per_s = 0;
   /// Keeps the covariance and the lamps of the refined map; otherwise those of the surveyed map.
   bool refine_map = false;
 };
 
-/// Result of solve_adjustment().
+/// Result of run_adjustment_step().
 struct AdjustStepResult : StepResult {
   AdjustmentResult found;
 };
@@ -65,6 +66,6 @@ struct AdjustStepResult : StepResult {
 ///         lens_sd_px is given for a lens with a covariance, or the calibration is adjusted already
 /// @throws std::invalid_argument if the camera moves and its calibration lacks row_time_s or
 /// readout
-AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry entry);
+AdjustStepResult run_adjustment_step(const AdjustStepInput& input, HistoryEntry entry);
 
 }  // namespace vlp

@@ -67,7 +67,7 @@ Outliers find_outliers(const std::vector<CaptureError>& errors, double min_size)
 
 }  // namespace
 
-std::string describe_check_outliers(const std::vector<CaptureError>& errors_m) {
+std::string describe_position_error_outliers(const std::vector<CaptureError>& errors_m) {
   const Outliers outliers = find_outliers(errors_m, kMinOutlierError_m);
   if (outliers.captures.empty()) return "";
   const double max_mm = kMmPerM * outliers.max, others_mm = kMmPerM * upper_median(outliers.others);

@@ -18,9 +18,11 @@
 
 namespace vlp {
 
-KnownPlaces collect_known_places(std::span<const Frame> frames, const CapturesTable& table,
-                                 const std::optional<Eigen::Vector2d>& place_m, PlaceOf place_of) {
-  KnownPlaces places;
+KnownPositions collect_reference_positions(std::span<const Frame> frames,
+                                           const CapturesTable& table,
+                                           const std::optional<Eigen::Vector2d>& place_m,
+                                           PlaceOf place_of) {
+  KnownPositions places;
   for (const Frame& frame : frames) {
     const auto entry = table.find(frame.image);
     const Capture capture_entry = entry == table.end() ? Capture{} : entry->second;
@@ -48,9 +50,9 @@ Fix locate_capture(const Positioner& positioner, const ReferencePointCapture& ca
 
 /// Returns the captures with places of the camera. Captures without a fix have no yaw and keep
 /// their places.
-std::vector<ReferencePointCapture> move_places_to_camera(const KnownPlaces& places,
-                                                         const LampMap& lamps,
-                                                         const Calibration& leveled) {
+std::vector<ReferencePointCapture> move_reference_points_to_camera(const KnownPositions& places,
+                                                                   const LampMap& lamps,
+                                                                   const Calibration& leveled) {
   std::vector<ReferencePointCapture> captures = places.captures;
   const Positioner positioner(lamps, leveled);
   const Eigen::Vector2d& arm_m = *leveled.rotation_center->lever_arm_m;
@@ -65,7 +67,7 @@ std::vector<ReferencePointCapture> move_places_to_camera(const KnownPlaces& plac
 }
 
 /// Returns the mean height of the first lamp of the map above the cameras, m; 0 without a fix.
-double compute_mean_height_m(const KnownPlaces& places, const LampMap& lamps,
+double compute_mean_height_m(const KnownPositions& places, const LampMap& lamps,
                              const Calibration& leveled) {
   const Positioner positioner(lamps, leveled);
   double height_m = 0;
@@ -80,8 +82,8 @@ double compute_mean_height_m(const KnownPlaces& places, const LampMap& lamps,
 }
 
 /// Warns of an offset that equals the lever arm. An offset d acts as a camera displaced by H d / f.
-void warn_of_lever_arm(DispersionResult& result, const KnownPlaces& places, const LampMap& lamps,
-                       const Calibration& leveled) {
+void warn_about_lever_arm(DispersionResult& result, const KnownPositions& places,
+                          const LampMap& lamps, const Calibration& leveled) {
   const auto& center = leveled.rotation_center;
   if (!center || !center->lever_arm_m) return;
   const Eigen::Vector2d& arm_m = *center->lever_arm_m;
@@ -112,8 +114,8 @@ void propagate_uncertainty(DispersionResult& result, const CapturesFor& captures
                            DispersionCircle circle) {
   Dispersion& dispersion = result.fit.dispersion;
   const auto offset_for = [&](const Calibration& perturbed) -> std::optional<Eigen::VectorXd> {
-    const DispersionFit fit =
-        fit_dispersion(captures_for(perturbed), input.lamps, perturbed, method, circle);
+    const DispersionFit fit = estimate_heading_dependent_offset(
+        captures_for(perturbed), input.lamps, perturbed, method, circle);
     if (fit.status != DispersionStatus::ok) return {};
     return Eigen::VectorXd(fit.dispersion.offset_px.cwiseQuotient(perturbed.camera.focal_px()));
   };
@@ -125,7 +127,7 @@ void propagate_uncertainty(DispersionResult& result, const CapturesFor& captures
       return offset_for(with_lens_error(input.calibration, error));
     };
     dispersion.by_intrinsics =
-        estimate_jacobian(offset_for_lens_error, nominal, *report->covariance);
+        estimate_numeric_jacobian(offset_for_lens_error, nominal, *report->covariance);
     is_propagated = dispersion.by_intrinsics.has_value();
   }
   if (const auto& center = input.calibration.rotation_center; center && center->covariance) {
@@ -136,8 +138,8 @@ void propagate_uncertainty(DispersionResult& result, const CapturesFor& captures
     const auto offset_for_zenith_error = [&](const Eigen::VectorXd& error) {
       return offset_for(with_zenith_error(input.calibration, error));
     };
-    const auto by_zenith = estimate_jacobian(offset_for_zenith_error, nominal,
-                                             step * step * Eigen::Matrix2d::Identity());
+    const auto by_zenith = estimate_numeric_jacobian(offset_for_zenith_error, nominal,
+                                                     step * step * Eigen::Matrix2d::Identity());
     if (by_zenith) dispersion.by_zenith = *by_zenith;
     is_propagated = is_propagated && by_zenith;
   }
@@ -163,7 +165,7 @@ void add_lever_arm_covariance(Dispersion& dispersion, const LampCaptures& input,
   *dispersion.covariance += 0.5 * (added + added.transpose());
 }
 
-void warn_of_few_captures(DispersionResult& result, DispersionMethod method) {
+void warn_about_few_captures(DispersionResult& result, DispersionMethod method) {
   constexpr int min_captures = 4;  // three have only two degrees of freedom
   if (method != DispersionMethod::camera || result.fit.noise_is_stated ||
       result.fit.dispersion.captures >= min_captures) {
@@ -176,31 +178,33 @@ void warn_of_few_captures(DispersionResult& result, DispersionMethod method) {
 
 }  // namespace
 
-DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& places,
-                                  DispersionMethod method, DispersionCircle circle,
-                                  HistoryEntry entry) {
+DispersionResult run_dispersion_step(const LampCaptures& input, const KnownPositions& places,
+                                     DispersionMethod method, DispersionCircle circle,
+                                     HistoryEntry entry) {
   DispersionResult result;
   Calibration leveled = input.calibration;
   leveled.dispersion.reset();
-  check_map(input, leveled, result);
+  check_lamp_map(input, leveled, result);
   if (!result.ok()) return result;
   const bool of_axis =
       std::find(places.of.begin(), places.of.end(), PlaceOf::axis) != places.of.end();
   const auto& center = input.calibration.rotation_center;
   if (of_axis && !(center && center->lever_arm_m)) {
-    result.fail(StepFailure::undetermined,
-                "the positions are those of the axis, and the calibration has no lever arm; run "
-                "vlp-rotation with captures at two heights");
+    result.set_failure(
+        StepFailure::undetermined,
+        "the positions are those of the axis, and the calibration has no lever arm; run "
+        "vlp-rotation with captures at two heights");
     return result;
   }
   const CapturesFor captures_for = [&](const Calibration& calibration) {
     if (!of_axis) return places.captures;
     Calibration without = calibration;
     without.dispersion.reset();
-    return move_places_to_camera(places, input.lamps, without);
+    return move_reference_points_to_camera(places, input.lamps, without);
   };
   const std::vector<ReferencePointCapture> captures = captures_for(leveled);
-  result.fit = fit_dispersion(captures, input.lamps, input.calibration, method, circle);
+  result.fit =
+      estimate_heading_dependent_offset(captures, input.lamps, input.calibration, method, circle);
   const DispersionFit& fit = result.fit;
   std::string why(describe(fit.status));
   if (fit.status == DispersionStatus::no_fix) {
@@ -208,18 +212,19 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   }
   if (fit.status != DispersionStatus::ok) {
     const bool is_far = fit.status == DispersionStatus::station_far;
-    result.fail(is_far ? StepFailure::wrong_place : StepFailure::undetermined, std::move(why));
+    result.set_failure(is_far ? StepFailure::wrong_place : StepFailure::undetermined,
+                       std::move(why));
     const bool is_of_captures = fit.status == DispersionStatus::too_few_captures ||
                                 fit.status == DispersionStatus::one_yaw ||
                                 fit.status == DispersionStatus::many_yaws;
-    if (!is_far && !is_of_captures) explain_failure_by_map(input, leveled, result);
+    if (!is_far && !is_of_captures) explain_failure_by_map_errors(input, leveled, result);
     return result;
   }
   if (!input.calibration.rotation_center) {
     result.warnings.emplace_back("the calibration has no rotation_center: run vlp-rotation first");
   }
-  warn_of_few_captures(result, method);
-  if (!of_axis) warn_of_lever_arm(result, places, input.lamps, leveled);
+  warn_about_few_captures(result, method);
+  if (!of_axis) warn_about_lever_arm(result, places, input.lamps, leveled);
   constexpr double millimeters = 1e3;
   result.metrics = {{"dispersion_mm", millimeters * fit.dispersion.radius_m},
                     {"dispersion_offset_px", fit.dispersion.offset_px.norm()}};
@@ -232,7 +237,9 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   }
   propagate_uncertainty(result, captures_for, input, method, circle);
   result.calibration = with_dispersion(input.calibration, fit.dispersion, std::move(entry));
-  result.drawing = [fit] { return make_drawing(make_plot("Fixes at a reference point", fit)); };
+  result.drawing = [fit] {
+    return make_gnuplot_drawing(collect_plot_data("Fixes at a reference point", fit));
+  };
   return result;
 }
 

@@ -14,7 +14,7 @@
 namespace vlp {
 
 /// Captures at known places.
-struct KnownPlaces {
+struct KnownPositions {
   std::vector<ReferencePointCapture> captures;
   /// Point to which each place refers, in the order of `captures`: camera or axis.
   std::vector<PlaceOf> of = {};
@@ -24,11 +24,12 @@ struct KnownPlaces {
 
 /// Collects the captures at known places, with the inclinations of the table. A place is that of
 /// the table, or `place_m` of the point `place_of` for captures without one in the table.
-KnownPlaces collect_known_places(std::span<const Frame> frames, const CapturesTable& table,
-                                 const std::optional<Eigen::Vector2d>& place_m = {},
-                                 PlaceOf place_of = PlaceOf::camera);
+KnownPositions collect_reference_positions(std::span<const Frame> frames,
+                                           const CapturesTable& table,
+                                           const std::optional<Eigen::Vector2d>& place_m = {},
+                                           PlaceOf place_of = PlaceOf::camera);
 
-/// Result of solve_dispersion().
+/// Result of run_dispersion_step().
 struct DispersionResult : StepResult {
   DispersionFit fit;
 };
@@ -43,8 +44,8 @@ struct DispersionResult : StepResult {
 /// Metrics: dispersion_mm, dispersion_offset_px, and world_offset_mm if the world offset is known.
 /// Failures: wrong_map, wrong_place, undetermined.
 /// @pre at least one capture
-DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& places,
-                                  DispersionMethod method, DispersionCircle circle,
-                                  HistoryEntry entry);
+DispersionResult run_dispersion_step(const LampCaptures& input, const KnownPositions& places,
+                                     DispersionMethod method, DispersionCircle circle,
+                                     HistoryEntry entry);
 
 }  // namespace vlp

@@ -15,9 +15,9 @@
 namespace vlp {
 namespace {
 
-void add_drive(Report& report, const Drive& drive) {
+void add_line_drive(Report& report, const Drive& drive) {
   const auto& [fixes, commanded_m] = drive;
-  const auto fit = fit_line(fixes.rows, commanded_m);
+  const auto fit = fit_line_to_fixes(fixes.rows, commanded_m);
   if (!fit) {
     throw InputError(fixes.file,
                      "no line can be fitted to its fixes: they do not determine a direction");
@@ -25,7 +25,7 @@ void add_drive(Report& report, const Drive& drive) {
   const std::string name = fixes.file.filename().string();
   const auto metrics = make_report_statistics(name, *fit);
   report.metrics.insert(report.metrics.end(), metrics.begin(), metrics.end());
-  report.pictures.push_back(make_drive_plot(name, fixes.rows, commanded_m, *fit));
+  report.pictures.push_back(plot_drive_along_line(name, fixes.rows, commanded_m, *fit));
 }
 
 void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
@@ -38,7 +38,7 @@ void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
   if (input.line_m && !evaluation.fit) {
     result.warnings.emplace_back("no line is fitted: the fixes do not determine a direction");
   }
-  if (std::string warning = make_limit_warning(evaluation); !warning.empty()) {
+  if (std::string warning = make_crlb_warning(evaluation); !warning.empty()) {
     result.warnings.push_back(std::move(warning));
   }
   if (!result.caution.empty()) result.warnings.push_back(result.caution);
@@ -49,7 +49,7 @@ void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
 
 }  // namespace
 
-double compute_place_radius_m(const Calibration& calibration) {
+double compute_same_position_radius_m(const Calibration& calibration) {
   constexpr double repeated_m = 1e-3;
   const auto& center = calibration.rotation_center;
   return repeated_m + (center && center->lever_arm_m ? 2 * center->lever_arm_m->norm() : 0);
@@ -63,13 +63,13 @@ EvaluateResult evaluate_fixes(const EvaluationInput& input, const std::vector<Ga
     const auto& [status, count] =
         *std::max_element(evaluation.missing.begin(), evaluation.missing.end(),
                           [](const auto& a, const auto& b) { return a.second < b.second; });
-    result.fail(StepFailure::undetermined,
-                fmt::format("none of {} captures has a fix ({} of them: {})", evaluation.captures,
-                            count, status),
-                input.fixes.file);
+    result.set_failure(StepFailure::undetermined,
+                       fmt::format("none of {} captures has a fix ({} of them: {})",
+                                   evaluation.captures, count, status),
+                       input.fixes.file);
     return result;
   }
-  result.metrics = collect_metrics(evaluation);
+  result.metrics = collect_evaluation_metrics(evaluation);
   result.gates = check_gates(gates, result.metrics);
   result.caution = make_missing_fixes_warning(evaluation, result.gates);
   add_warnings(result, input);
@@ -85,7 +85,7 @@ std::string render_report_page(EvaluationReport report_content) {
   if (report.calibration && !report.calibration->camera.id.empty()) {
     report.title = "Accuracy report: " + report.calibration->camera.id;
   }
-  for (const Drive& drive : report_content.drives) add_drive(report, drive);
+  for (const Drive& drive : report_content.drives) add_line_drive(report, drive);
   for (auto& picture : make_evaluation_plots(report_content.input, report_content.result.evaluation,
                                              report_content.lamps)) {
     report.pictures.push_back(std::move(picture));
@@ -96,7 +96,7 @@ std::string render_report_page(EvaluationReport report_content) {
     if (budget) report.pictures.push_back(std::move(*budget));
   }
   if (report.evaluation) report.evaluation->part = "evaluation";
-  return report_html(report);
+  return render_report_html(report);
 }
 
 }  // namespace vlp

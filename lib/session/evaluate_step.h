@@ -22,10 +22,11 @@ struct EvaluateResult : StepResult {
 
 /// Returns the distance within which captures are at the same place, in m: 1 mm plus twice the
 /// length of the calibration's lever arm.
-double compute_place_radius_m(const Calibration& calibration);
+double compute_same_position_radius_m(const Calibration& calibration);
 
-/// Evaluates fixes against ground truth. Metrics: all that gates can limit (metrics_of()). Failure:
-/// undetermined, if no capture has a fix. Throws InputError if the image names do not match.
+/// Evaluates fixes against ground truth. Metrics: all that gates can limit
+/// (collect_evaluation_metrics()). Failure: undetermined, if no capture has a fix. Throws
+/// InputError if the image names do not match.
 EvaluateResult evaluate_fixes(const EvaluationInput& input, const std::vector<Gate>& gates);
 
 /// Fixes of a drive along a commanded straight line.
@@ -45,8 +46,8 @@ struct EvaluationReport {
   Report page;
 };
 
-/// Renders the report as HTML (report_html()). Throws InputError if no line can be fitted to a
-/// drive.
+/// Renders the report as HTML (render_report_html()). Throws InputError if no line can be fitted to
+/// a drive.
 std::string render_report_page(EvaluationReport report);
 
 }  // namespace vlp

@@ -6,9 +6,9 @@
 
 namespace vlp {
 
-std::optional<KnownMotion> find_motion(const Capture& capture,
-                                       const std::optional<KnownMotion>& otherwise,
-                                       double yaw_rate_sd_rad_per_s) {
+std::optional<KnownMotion> find_capture_motion(const Capture& capture,
+                                               const std::optional<KnownMotion>& otherwise,
+                                               double yaw_rate_sd_rad_per_s) {
   if (!capture.velocity_m_per_s && !capture.yaw_rate_rad_per_s) return otherwise;
   KnownMotion motion = otherwise.value_or(KnownMotion());
   if (capture.velocity_m_per_s) {
@@ -22,9 +22,10 @@ std::optional<KnownMotion> find_motion(const Capture& capture,
   return motion;
 }
 
-std::vector<KnownMotion> find_motions(std::span<const Frame> frames, const CapturesTable& captures,
-                                      const std::optional<KnownMotion>& otherwise,
-                                      double yaw_rate_sd_rad_per_s) {
+std::vector<KnownMotion> find_capture_motions(std::span<const Frame> frames,
+                                              const CapturesTable& captures,
+                                              const std::optional<KnownMotion>& otherwise,
+                                              double yaw_rate_sd_rad_per_s) {
   std::vector<KnownMotion> motions;
   motions.reserve(frames.size());
   bool any = false;
@@ -32,9 +33,9 @@ std::vector<KnownMotion> find_motions(std::span<const Frame> frames, const Captu
     const auto entry = captures.find(frame.image);
     const auto known = entry == captures.end()
                            ? otherwise
-                           : find_motion(entry->second, otherwise, yaw_rate_sd_rad_per_s);
+                           : find_capture_motion(entry->second, otherwise, yaw_rate_sd_rad_per_s);
     motions.push_back(known.value_or(KnownMotion()));
-    any = any || moves(motions.back());
+    any = any || may_camera_move_during_readout(motions.back());
   }
   if (!any) motions.clear();
   return motions;

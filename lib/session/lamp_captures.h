@@ -32,14 +32,16 @@ struct LampCaptures {
 /// @param otherwise              motion without a table; std::nullopt: the camera stands
 /// @param yaw_rate_sd_rad_per_s  standard deviation of the table's yaw rate; the standard deviation
 ///                               of its velocity is in the table
-std::optional<KnownMotion> find_motion(const Capture& capture,
-                                       const std::optional<KnownMotion>& otherwise,
-                                       double yaw_rate_sd_rad_per_s);
+std::optional<KnownMotion> find_capture_motion(const Capture& capture,
+                                               const std::optional<KnownMotion>& otherwise,
+                                               double yaw_rate_sd_rad_per_s);
 
-/// Returns find_motion() for each frame; an empty vector if the camera stands in all of them.
-std::vector<KnownMotion> find_motions(std::span<const Frame> frames, const CapturesTable& captures,
-                                      const std::optional<KnownMotion>& otherwise,
-                                      double yaw_rate_sd_rad_per_s);
+/// Returns find_capture_motion() for each frame; an empty vector if the camera stands in all of
+/// them.
+std::vector<KnownMotion> find_capture_motions(std::span<const Frame> frames,
+                                              const CapturesTable& captures,
+                                              const std::optional<KnownMotion>& otherwise,
+                                              double yaw_rate_sd_rad_per_s);
 
 /// Throws std::invalid_argument if the camera lacks row_time_s or readout, which motion
 /// compensation requires.

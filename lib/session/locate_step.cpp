@@ -28,14 +28,14 @@
 
 namespace vlp {
 
-Sensors make_sensors(const std::string& image, const LocateInput& input) {
+Sensors make_sensor_data(const std::string& image, const LocateInput& input) {
   Sensors sensors;
   sensors.motion = input.motion;
   sensors.inclination_sigma_rad = input.roll_pitch_sd_rad;
   const auto entry = input.captures.find(image);
   if (entry == input.captures.end()) return sensors;
   const Capture& capture = entry->second;
-  sensors.motion = find_motion(capture, input.motion, input.yaw_rate_sd_rad_per_s);
+  sensors.motion = find_capture_motion(capture, input.motion, input.yaw_rate_sd_rad_per_s);
   sensors.time_s = capture.time_s;
   if (capture.inclination) {
     sensors.inclination = capture.inclination;
@@ -53,7 +53,8 @@ Sensors make_sensors(const std::string& image, const LocateInput& input) {
   return sensors;
 }
 
-std::size_t count_far_outside(std::span<const Frame> frames, const std::array<int, 2>& imager_px) {
+std::size_t count_detections_outside_image(std::span<const Frame> frames,
+                                           const std::array<int, 2>& imager_px) {
   constexpr double fraction = 0.1;
   const Eigen::Array2d size(imager_px[0], imager_px[1]);
   std::size_t outside = 0;
@@ -82,7 +83,7 @@ class EarlierFrames {
       by_time_.emplace(*entry->second.time_s, i);
     }
   }
-  std::vector<EarlierFrame> before(const std::optional<double>& time_s) const {
+  std::vector<EarlierFrame> list_earlier_frames(const std::optional<double>& time_s) const {
     std::vector<EarlierFrame> earlier;
     if (!time_s) return earlier;
     auto at = by_time_.lower_bound(*time_s);
@@ -106,7 +107,7 @@ class EarlierFrames {
 /// estimates the fix of the frame alone.
 Fix locate_frame(const Frame& frame, const Positioner& positioner, const EarlierFrames& frames,
                  const Sensors& sensors) {
-  const auto earlier = frames.before(sensors.time_s);
+  const auto earlier = frames.list_earlier_frames(sensors.time_s);
   if (!earlier.empty() && sensors.motion) {
     const Fix joint_fix = positioner.locate(frame.detections, sensors, earlier);
     if (joint_fix.ok()) return joint_fix;
@@ -120,7 +121,7 @@ std::vector<Fix> locate_all_frames(const LocateInput& input, const PositionerOpt
   std::vector<Fix> fixes;
   fixes.reserve(input.frames.size());
   for (const Frame& frame : input.frames) {
-    fixes.push_back(locate_frame(frame, positioner, frames, make_sensors(frame.image, input)));
+    fixes.push_back(locate_frame(frame, positioner, frames, make_sensor_data(frame.image, input)));
   }
   return fixes;
 }
@@ -129,14 +130,14 @@ void check_motion(const LocateInput& input) {
   const bool motion =
       input.motion ||
       std::any_of(input.frames.begin(), input.frames.end(), [&](const Frame& frame) {
-        const auto known = make_sensors(frame.image, input).motion;
-        return known && moves(*known);
+        const auto known = make_sensor_data(frame.image, input).motion;
+        return known && may_camera_move_during_readout(*known);
       });
   if (motion) check_row_time(input.calibration.camera);
 }
 
 /// Returns the input with LocateInput::sigma_px in all detections.
-LocateInput apply_given_sigma(LocateInput input) {
+LocateInput apply_given_pixel_noise(LocateInput input) {
   for (Frame& frame : input.frames) {
     for (Detection& detection : frame.detections) detection.sigma_px = input.sigma_px;
   }
@@ -144,7 +145,7 @@ LocateInput apply_given_sigma(LocateInput input) {
   return input;
 }
 
-bool has_sigma(const Frame& frame) {
+bool has_pixel_noise(const Frame& frame) {
   return std::all_of(frame.detections.begin(), frame.detections.end(),
                      [](const Detection& detection) { return detection.sigma_px.has_value(); });
 }
@@ -182,7 +183,7 @@ FixRow make_fix_row(const Frame& frame, const CapturesTable& captures, const Fix
 
 /// Warns if the residuals are much larger than the given noise, and returns true. `factor` scales
 /// the standard deviations.
-bool warn_of_noise(LocateResult& result, const std::vector<Frame>& frames, double factor) {
+bool warn_about_noise(LocateResult& result, const std::vector<Frame>& frames, double factor) {
   double stated_px = 0;
   for (const Frame& frame : frames) {
     for (const Detection& detection : frame.detections) {
@@ -190,7 +191,7 @@ bool warn_of_noise(LocateResult& result, const std::vector<Frame>& frames, doubl
     }
   }
   constexpr double max_noise_ratio = 3;
-  const auto estimated_px = estimate_noise_px(sum_squared_residuals(result.fixes));
+  const auto estimated_px = estimate_pixel_noise_px(sum_squared_residuals_of_fixes(result.fixes));
   if (estimated_px && stated_px > 0) {
     result.metrics.push_back({"residual_ratio", *estimated_px / stated_px});
   }
@@ -205,7 +206,7 @@ bool warn_of_noise(LocateResult& result, const std::vector<Frame>& frames, doubl
 /// Returns true if no motion of the camera is given.
 bool is_assumed_standing(const LocateInput& input) {
   return std::none_of(input.frames.begin(), input.frames.end(), [&](const Frame& frame) {
-    return make_sensors(frame.image, input).motion.has_value();
+    return make_sensor_data(frame.image, input).motion.has_value();
   });
 }
 
@@ -232,7 +233,7 @@ std::optional<double> find_speed_m_per_s(const std::vector<Fix>& fixes) {
 
 /// Warns if motion explains failed frames or residuals of a camera that is assumed to stand.
 /// Criterion: half as many failures, or half the residual.
-void warn_of_motion(LocateResult& result, const LocateInput& input, bool is_noisy) {
+void warn_about_motion(LocateResult& result, const LocateInput& input, bool is_noisy) {
   const std::size_t failed = input.frames.size() - count_fixes(result.fixes);
   if (!make_row_clock(input.calibration.camera) || !is_assumed_standing(input) ||
       (!is_noisy && 2 * failed < input.frames.size())) {
@@ -242,8 +243,8 @@ void warn_of_motion(LocateResult& result, const LocateInput& input, bool is_nois
   LocateInput moving = input;
   moving.motion = KnownMotion::up_to(max_speed_m_per_s, max_yaw_rate_rad_per_s);
   const std::vector<Fix> fixes = locate_all_frames(moving, input.how);
-  const auto standing_px = estimate_noise_px(sum_squared_residuals(result.fixes));
-  const auto moving_px = estimate_noise_px(sum_squared_residuals(fixes));
+  const auto standing_px = estimate_pixel_noise_px(sum_squared_residuals_of_fixes(result.fixes));
+  const auto moving_px = estimate_pixel_noise_px(sum_squared_residuals_of_fixes(fixes));
   const std::size_t still_failed = input.frames.size() - count_fixes(fixes);
   const bool fits =
       is_noisy ? moving_px && *moving_px < *standing_px / 2 : 2 * still_failed < failed;
@@ -251,7 +252,7 @@ void warn_of_motion(LocateResult& result, const LocateInput& input, bool is_nois
   // Velocity and yaw rate fit the errors if there are few residuals.
   constexpr double min_degrees_of_freedom = 12;
   if (!fits || !speed_m_per_s || *speed_m_per_s > max_speed_m_per_s ||
-      sum_squared_residuals(fixes).degrees_of_freedom < min_degrees_of_freedom) {
+      sum_squared_residuals_of_fixes(fixes).degrees_of_freedom < min_degrees_of_freedom) {
     return;
   }
   result.warnings.push_back(
@@ -277,8 +278,8 @@ LocateInput scale_stated_noise(LocateInput input, const std::vector<Fix>& fixes,
 }
 
 /// Locates frames again, with scaled noise, from the lamps that their fixes use.
-void locate_again(const LocateInput& input, const PositionerOptions& how, double factor,
-                  std::vector<Fix>& fixes) {
+void locate_with_scaled_noise(const LocateInput& input, const PositionerOptions& how, double factor,
+                              std::vector<Fix>& fixes) {
   std::vector<Fix> rescaled = locate_all_frames(scale_stated_noise(input, fixes, factor), how);
   for (std::size_t i = 0; i < fixes.size(); ++i) {
     if (!fixes[i].ok() || !rescaled[i].ok()) continue;
@@ -298,13 +299,13 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
   result.fixes = locate_all_frames(input, how);
   std::vector<Fix> stated, unstated;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    (has_sigma(input.frames[i]) ? stated : unstated).push_back(result.fixes[i]);
+    (has_pixel_noise(input.frames[i]) ? stated : unstated).push_back(result.fixes[i]);
   }
-  const ResidualSums residuals = sum_squared_residuals(stated);
+  const ResidualSums residuals = sum_squared_residuals_of_fixes(stated);
   const double factor = estimate_birge_ratio(residuals);
   bool is_noisy = false;
-  if (unstated.empty()) is_noisy = warn_of_noise(result, input.frames, factor);
-  warn_of_motion(result, input, is_noisy);
+  if (unstated.empty()) is_noisy = warn_about_noise(result, input.frames, factor);
+  warn_about_motion(result, input, is_noisy);
   constexpr double chance_sds = 3;
   if (!is_noisy && factor > 1 + chance_sds * std::sqrt(0.5 / residuals.degrees_of_freedom)) {
     result.notes.push_back(fmt::format(
@@ -313,10 +314,11 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
   how = input.how;
   bool is_known = true;
   if (!unstated.empty()) {
-    auto unstated_factor = estimate_noise_factor(sum_squared_residuals(unstated));
+    auto unstated_factor = estimate_noise_scale_factor(sum_squared_residuals_of_fixes(unstated));
     // Few frames without given noise may have no redundancy: then the noise in pixels is estimated
     // from all frames.
-    if (!unstated_factor) unstated_factor = estimate_noise_px(sum_squared_residuals(result.fixes));
+    if (!unstated_factor)
+      unstated_factor = estimate_pixel_noise_px(sum_squared_residuals_of_fixes(result.fixes));
     is_known = unstated_factor.has_value();
     if (is_known) {
       how.unstated_sigma_px =
@@ -329,14 +331,14 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
     }
   }
   if (factor > 1 || (is_known && !unstated.empty())) {
-    locate_again(input, how, factor, result.fixes);
+    locate_with_scaled_noise(input, how, factor, result.fixes);
   }
   return is_known;
 }
 
-void warn_of_image(LocateResult& result, const LocateInput& input) {
+void warn_about_image(LocateResult& result, const LocateInput& input) {
   const auto& [width, height] = input.calibration.camera.imager_px;
-  const std::size_t outside = count_far_outside(input.frames, {width, height});
+  const std::size_t outside = count_detections_outside_image(input.frames, {width, height});
   if (outside == 0) return;
   result.warnings.push_back(
       fmt::format("{} detections are far outside the {} x {} px of the camera: is it the "
@@ -346,7 +348,7 @@ void warn_of_image(LocateResult& result, const LocateInput& input) {
 
 /// Marks the fixes that use lamps outside the calibrated region of the image, where the board was
 /// not seen.
-void mark_outside_region(LocateResult& result, const LocateInput& input) {
+void mark_fixes_outside_valid_region(LocateResult& result, const LocateInput& input) {
   const auto& report = input.calibration.intrinsics_report;
   if (!report || report->region_px.empty()) return;
   std::size_t outside = 0, fixes = 0;
@@ -358,7 +360,7 @@ void mark_outside_region(LocateResult& result, const LocateInput& input) {
     auto& lamps_outside = result.rows[i].outside_region;
     for (const Detection& detection : detections) {
       if (polygon_contains(report->region_px, detection.pixel)) continue;
-      if (find_lamp(input.lamps.lamps, detection.lamp) == nullptr) continue;
+      if (find_lamp_by_id(input.lamps.lamps, detection.lamp) == nullptr) continue;
       if (std::find(rejected.begin(), rejected.end(), detection.lamp) != rejected.end()) continue;
       lamps_outside.push_back(detection.lamp);
     }
@@ -376,7 +378,7 @@ void mark_outside_region(LocateResult& result, const LocateInput& input) {
                   outside, fixes));
 }
 
-void warn_of_captures(LocateResult& result, const LocateInput& input) {
+void warn_about_captures(LocateResult& result, const LocateInput& input) {
   const auto& captures = input.captures;
   const auto without = std::count_if(
       input.frames.begin(), input.frames.end(),
@@ -393,19 +395,19 @@ MapErrors find_errors_while_standing(const LocateInput& input, const std::vector
   std::vector<Frame> frames;
   MapErrorOptions options;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    const Sensors sensors = make_sensors(input.frames[i].image, input);
-    if (sensors.motion && moves(*sensors.motion)) continue;
+    const Sensors sensors = make_sensor_data(input.frames[i].image, input);
+    if (sensors.motion && may_camera_move_during_readout(*sensors.motion)) continue;
     const auto& body = fixes[i].body;
     frames.push_back(input.frames[i]);
     options.inclinations.push_back(body ? std::optional(body->inclination) : sensors.inclination);
   }
   if (input.how.mount) options.yaw_in_robot_rad = input.how.mount->yaw_in_robot_rad;
   if (input.lamp_offsets) options.max_captures = std::max<std::size_t>(frames.size(), 1);
-  return find_map_errors(frames, input.lamps, input.calibration, options);
+  return detect_misplaced_or_swapped_lamps(frames, input.lamps, input.calibration, options);
 }
 
-void warn_of_rejected_lamps(LocateResult& result, const LocateInput& input,
-                            const MapErrors& map_errors) {
+void warn_about_rejected_lamps(LocateResult& result, const LocateInput& input,
+                               const MapErrors& map_errors) {
   int unknown = 0, rejected = 0;
   std::map<int, int> captures;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
@@ -441,8 +443,8 @@ void warn_of_rejected_lamps(LocateResult& result, const LocateInput& input,
 
 }  // namespace
 
-LocateResult locate_frames(const LocateInput& input) {
-  if (input.sigma_px) return locate_frames(apply_given_sigma(input));
+LocateResult locate_camera_in_frames(const LocateInput& input) {
+  if (input.sigma_px) return locate_camera_in_frames(apply_given_pixel_noise(input));
   check_motion(input);
   LocateResult result;
   const bool noise_known = locate_with_noise(input, result);
@@ -451,18 +453,18 @@ LocateResult locate_frames(const LocateInput& input) {
     result.rows.push_back(
         make_fix_row(input.frames[i], input.captures, result.fixes[i], noise_known));
   }
-  warn_of_image(result, input);
-  mark_outside_region(result, input);
+  warn_about_image(result, input);
+  mark_fixes_outside_valid_region(result, input);
   const int elsewhere = Positioner(input.lamps, input.calibration, input.how).lamps_elsewhere();
-  if (elsewhere > 0) result.warnings.push_back(describe_lamps_elsewhere(elsewhere));
-  warn_of_captures(result, input);
+  if (elsewhere > 0) result.warnings.push_back(describe_lamps_moved_since_calibration(elsewhere));
+  warn_about_captures(result, input);
   const bool is_contradicted =
       std::any_of(result.fixes.begin(), result.fixes.end(),
                   [](const Fix& fix) { return !fix.ok() || fix.rejected_lamps > 0; });
   MapErrors map_errors;
   if (input.lamp_offsets || is_contradicted)
     map_errors = find_errors_while_standing(input, result.fixes);
-  warn_of_rejected_lamps(result, input, map_errors);
+  warn_about_rejected_lamps(result, input, map_errors);
   if (input.lamp_offsets) {
     result.lamp_offsets = std::move(map_errors.offsets);
     if (input.frames.size() > 1 && result.lamp_offsets.empty()) {
@@ -470,10 +472,11 @@ LocateResult locate_frames(const LocateInput& input) {
           "relative lamp positions are not checked: captures do not tie all lamps together");
     }
   }
-  result.summary = summarize(result.rows);
+  result.summary = summarize_fixes(result.rows);
   if (result.summary.fixes == 0) {
-    result.fail(StepFailure::undetermined, fmt::format("no frame has a fix; the first: {}",
-                                                       describe(result.fixes.front().status)));
+    result.set_failure(
+        StepFailure::undetermined,
+        fmt::format("no frame has a fix; the first: {}", describe(result.fixes.front().status)));
   }
   return result;
 }
@@ -497,16 +500,16 @@ class TiltedCaptures {
         base_from_camera_(level_from_camera(input.calibration, input.how.correction)) {
     for (std::size_t i = 0; i < input.frames.size(); ++i) {
       const Frame& frame = input.frames[i];
-      if (make_sensors(frame.image, input).inclination_sigma_rad > 0) {
+      if (make_sensor_data(frame.image, input).inclination_sigma_rad > 0) {
         captures_.push_back({i, frame.detections});
       }
     }
   }
 
-  LevelRotations iterate() {
+  LevelRotations iterate_until_tilt_converges() {
     if (captures_.empty()) return {};
-    fixes_ = locate_frames(input_).fixes;
-    start_from_ellipses();
+    fixes_ = locate_camera_in_frames(input_).fixes;
+    initialize_tilt_from_ellipses();
     constexpr int max_iterations = 6;
     for (int i = 0; i < max_iterations && redetect_in_level_planes(); ++i) {
     }
@@ -522,7 +525,7 @@ class TiltedCaptures {
     return input_.frames[capture.frame].image;
   }
 
-  void detect_in(const LevelRotations& levels) {
+  void detect_in_level_planes(const LevelRotations& levels) {
     if (levels.empty()) return;
     std::vector<Frame> seen = redetect_(levels);
     for (const TiltedCapture& capture : captures_) {
@@ -534,20 +537,20 @@ class TiltedCaptures {
         input_.frames[capture.frame].detections = std::move(frame->detections);
       }
     }
-    fixes_ = locate_frames(input_).fixes;
+    fixes_ = locate_camera_in_frames(input_).fixes;
   }
 
-  void start_from_ellipses() {
+  void initialize_tilt_from_ellipses() {
     constexpr double max_small_tilt_rad = 0.05;
     const std::vector<Fix> first = fixes_;
     LevelRotations levels;
     for (TiltedCapture& capture : captures_) {
-      const double sd_rad = make_sensors(image_name(capture), input_).inclination_sigma_rad;
+      const double sd_rad = make_sensor_data(image_name(capture), input_).inclination_sigma_rad;
       if (sd_rad <= max_small_tilt_rad && fixes_[capture.frame].ok()) continue;
       capture.level.emplace();
       levels.emplace(image_name(capture), std::nullopt);
     }
-    detect_in(levels);
+    detect_in_level_planes(levels);
     for (TiltedCapture& capture : captures_) {
       const Fix& fix = first[capture.frame];
       std::vector<Detection>& seen = input_.frames[capture.frame].detections;
@@ -573,20 +576,20 @@ class TiltedCaptures {
       levels.emplace(image_name(capture), *capture.level);
     }
     const std::vector<Fix> before = fixes_;
-    detect_in(levels);
+    detect_in_level_planes(levels);
     for (TiltedCapture& capture : captures_) {
       if (capture.has_converged) continue;
-      capture.has_converged = is_unchanged(before[capture.frame], fixes_[capture.frame]);
+      capture.has_converged = has_fix_converged(before[capture.frame], fixes_[capture.frame]);
     }
     return !levels.empty();
   }
 
-  static bool is_unchanged(const Fix& before, const Fix& after) {
+  static bool has_fix_converged(const Fix& before, const Fix& after) {
     constexpr double tolerance_sd = 0.1;
     if (!after.ok()) return true;
     Eigen::Vector4d change;
     change << after.estimate.pose.position_m - before.estimate.pose.position_m,
-        wrap_rad(after.estimate.pose.yaw_rad - before.estimate.pose.yaw_rad);
+        wrap_angle_rad(after.estimate.pose.yaw_rad - before.estimate.pose.yaw_rad);
     const Eigen::Vector4d sd = after.noise_covariance.diagonal().cwiseSqrt();
     return (change.cwiseAbs().array() <= tolerance_sd * sd.array()).all();
   }
@@ -599,14 +602,14 @@ class TiltedCaptures {
 };
 
 /// Applies an intake to the named images again.
-Observations observe_again(const LampIntake& intake,
-                           const std::vector<std::filesystem::path>& files,
-                           const LevelRotations& levels) {
+Observations detect_in_images_again(const LampIntake& intake,
+                                    const std::vector<std::filesystem::path>& files,
+                                    const LevelRotations& levels) {
   std::vector<std::filesystem::path> named;
   std::copy_if(files.begin(), files.end(), std::back_inserter(named), [&](const auto& file) {
     return levels.find(file.filename().string()) != levels.end();
   });
-  return intake.with_levels(levels).observe_all(named);
+  return intake.copy_with_level_rotations(levels).detect_in_all_images(named);
 }
 
 bool has_detections(const std::vector<Frame>& frames) {
@@ -616,34 +619,35 @@ bool has_detections(const std::vector<Frame>& frames) {
 
 }  // namespace
 
-LocateResult locate_images(const LampImages& images, ImageUse use, LocateInput input,
-                           const FrontendOptions& options, const IntakeProgress& progress) {
+LocateResult locate_camera_in_images(const LampImages& images, ImageUse use, LocateInput input,
+                                     const FrontendOptions& options,
+                                     const IntakeProgress& progress) {
   const LampIntake intake(images, use, options);
   if (!input.calibration.camera.readout) input.calibration.camera.readout = intake.readout();
   const auto files = list_lamp_images(images.images);
-  Observations seen = intake.observe_all(files, progress);
-  check_lamps_seen(images, seen);
+  Observations seen = intake.detect_in_all_images(files, progress);
+  check_lamps_identified(images, seen);
   input.frames = collect_kept_frames(seen.images);
-  const LampIntake without_pictures = intake.with_annotate({});
+  const LampIntake without_pictures = intake.with_annotation_folder({});
   std::map<std::string, Observation> latest;
   const LevelRotations levels = redetect_tilted_captures(input, [&](const LevelRotations& tilted) {
-    const Observations repeated = observe_again(without_pictures, files, tilted);
+    const Observations repeated = detect_in_images_again(without_pictures, files, tilted);
     for (const Observation& image : repeated.images) {
-      if (image.is_kept()) latest.insert_or_assign(image.name(), image);
+      if (image.is_kept()) latest.insert_or_assign(image.file_name(), image);
     }
     return collect_kept_frames(repeated.images);
   });
   for (Observation& image : seen.images) {
-    const auto repeated = latest.find(image.name());
-    if (levels.contains(image.name()) && repeated != latest.end()) image = repeated->second;
+    const auto repeated = latest.find(image.file_name());
+    if (levels.contains(image.file_name()) && repeated != latest.end()) image = repeated->second;
   }
-  if (!options.annotate.empty()) observe_again(intake, files, levels);
+  if (!options.annotate.empty()) detect_in_images_again(intake, files, levels);
   LocateResult result;
   if (has_detections(input.frames)) {
     seen.failure.reset();
-    result = locate_frames(input);
+    result = locate_camera_in_frames(input);
   }
-  add_remarks(seen, result);
+  add_intake_remarks(seen, result);
   // A classifier identifies lamps without the row time: it is no reason why there is no result.
   if (options.classifier.empty() || result.ok()) {
     explain_by_row_time(seen.images, input.lamps, make_detector_camera(input.calibration),
@@ -654,7 +658,7 @@ LocateResult locate_images(const LampImages& images, ImageUse use, LocateInput i
 }
 
 LevelRotations redetect_tilted_captures(LocateInput& input, const Redetector& redetect) {
-  return TiltedCaptures(input, redetect).iterate();
+  return TiltedCaptures(input, redetect).iterate_until_tilt_converges();
 }
 
 }  // namespace vlp

@@ -25,7 +25,8 @@ struct LocateInput {
   std::vector<Frame> frames;
   LampMap lamps;
   Calibration calibration;
-  /// Table of the captures: times, motions, heights, yaws. Its inclinations are always used.
+  /// Table of the captures. Its times, motions and inclinations are always used, its heights and
+  /// yaws only with `one_lamp` or `height_sd_m`.
   CapturesTable captures = {};
   PositionerOptions how = {};
   /// Standard deviation of the lamp positions in the image, per axis; overrides that of the
@@ -55,19 +56,20 @@ struct LocateInput {
 };
 
 /// Returns the sensor data of a capture: motion, time, inclination, height and yaw.
-Sensors make_sensors(const std::string& image, const LocateInput& input);
+Sensors make_sensor_data(const std::string& image, const LocateInput& input);
 
 /// Counts the detections outside the image by more than 10 % of its width or height. The center of
 /// a lamp at the image's edge may be slightly outside.
-std::size_t count_far_outside(std::span<const Frame> frames, const std::array<int, 2>& imager_px);
+std::size_t count_detections_outside_image(std::span<const Frame> frames,
+                                           const std::array<int, 2>& imager_px);
 
-/// Result of locate_frames().
+/// Result of locate_camera_in_frames().
 struct LocateResult : StepResult {
   /// Fix of each frame, in the order of LocateInput::frames.
   std::vector<Fix> fixes;
   std::vector<FixRow> rows;
   FixSummary summary;
-  /// Observations of the images in which the lamps were detected (locate_images()).
+  /// Observations of the images in which the lamps were detected (locate_camera_in_images()).
   Observations seen = {};
 };
 
@@ -81,17 +83,18 @@ struct LocateResult : StepResult {
 /// Warnings: residuals larger than the reported noise explains; detections outside the image or the
 /// calibrated region (region_px); images missing in `captures`; rejected lamps.
 /// @throws std::invalid_argument if a camera moves and its calibration lacks row_time_s or readout
-LocateResult locate_frames(const LocateInput& input);
+LocateResult locate_camera_in_frames(const LocateInput& input);
 
-/// Detects the lamps in images (observe_lamps()) and locates the camera of each image. `input`
-/// holds everything except the frames. If the tilt of a camera is estimated, its lamps are detected
-/// again in the plane that is level by its fix (redetect_tilted_captures()).
+/// Detects the lamps in images (detect_lamps_in_images()) and locates the camera of each image.
+/// `input` holds everything except the frames. If the tilt of a camera is estimated, its lamps are
+/// detected again in the plane that is level by its fix (redetect_tilted_captures()).
 ///
-/// Skipped images and remarks of the intake are part of the result. It fails as locate_frames()
-/// does, or if no lamp is identified.
-/// @throws as observe_lamps() and locate_frames()
-LocateResult locate_images(const LampImages& images, ImageUse use, LocateInput input,
-                           const FrontendOptions& options, const IntakeProgress& progress = {});
+/// Skipped images and remarks of the intake are part of the result. It fails as
+/// locate_camera_in_frames() does, or if no lamp is identified.
+/// @throws as detect_lamps_in_images() and locate_camera_in_frames()
+LocateResult locate_camera_in_images(const LampImages& images, ImageUse use, LocateInput input,
+                                     const FrontendOptions& options,
+                                     const IntakeProgress& progress = {});
 
 /// Function that detects the lamps of the named images again, in their level planes. Returns a
 /// frame per image, by name.

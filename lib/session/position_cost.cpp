@@ -17,7 +17,7 @@ namespace {
 /// A pose needs three lamps. Where lights are left out, three others may agree by chance.
 constexpr std::size_t kMinLights = 3, kMinMajority = 4;
 /// Standard deviation of roll and pitch of a camera that is mounted, or held, to look up.
-/// estimate_body_robust() rejects more than five times this value.
+/// estimate_body_state_robust() rejects more than five times this value.
 constexpr double kLeanSd_rad = 0.15;
 constexpr double kMaxSquare = kMaxResidualSds * kMaxResidualSds;
 
@@ -29,14 +29,14 @@ struct Tolerance {
 // 0.1 is what a positioner allows (PositionerOptions::max_residual_share).
 constexpr Tolerance kWithLens{0.03, 0.1}, kWithoutLens{0.1, 0.3};
 
-Lens nominal_lens(const std::array<int, 2>& size_px) {
+Lens make_nominal_lens(const std::array<int, 2>& size_px) {
   const double width = size_px[0], height = size_px[1], focal_px = std::hypot(width, height) / 2;
   return {LensModel::pinhole, std::array{focal_px, focal_px, (width - 1) / 2, (height - 1) / 2}};
 }
 
 /// Root of the mean squared distance of points from their mean.
 template <typename Point>
-double rms_spread(const std::vector<Point>& points) {
+double compute_rms_spread(const std::vector<Point>& points) {
   const double n = static_cast<double>(points.size());
   Point mean = Point::Zero();
   for (const Point& point : points) mean += point / n;
@@ -46,7 +46,7 @@ double rms_spread(const std::vector<Point>& points) {
 }
 
 /// Distance on the floor plan from a lamp to the nearest other one.
-double nearest_m(const Lamp& lamp, const LampMap& lamps) {
+double distance_to_nearest_lamp_m(const Lamp& lamp, const LampMap& lamps) {
   double nearest = std::numeric_limits<double>::infinity();
   for (const Lamp& other : lamps.lamps) {
     if (other.id == lamp.id) continue;
@@ -68,7 +68,7 @@ std::vector<AssignedLight> assigned_lights(const GroupedLights& image,
   std::vector<AssignedLight> assigned;
   for (std::size_t i = 0; i < image.lights.size(); ++i) {
     const std::vector<int>& ids = candidate.lamps[image.lights[i].group];
-    if (!ids.empty()) assigned.push_back({i, find_lamp(lamps.lamps, ids.front())});
+    if (!ids.empty()) assigned.push_back({i, find_lamp_by_id(lamps.lamps, ids.front())});
   }
   return assigned;
 }
@@ -82,7 +82,7 @@ BodyObservations make_frame(const GroupedLights& image, std::vector<AssignedLigh
   positions_m.reserve(assigned.size());
   for (const GroupedLight& light : image.lights) pixels.push_back(light.pixel);
   for (const AssignedLight& light : assigned) positions_m.push_back(light.lamp->position_m);
-  const double spread_px = rms_spread(pixels), spread_m = rms_spread(positions_m);
+  const double spread_px = compute_rms_spread(pixels), spread_m = compute_rms_spread(positions_m);
   BodyObservations frame;
   std::vector<AssignedLight> kept;
   for (const AssignedLight& light : assigned) {
@@ -97,7 +97,7 @@ BodyObservations make_frame(const GroupedLights& image, std::vector<AssignedLigh
     frame.sightings[frame.size] = {lamp.position_m, ray->direction.normalized(), *whitened, sd_px,
                                    0};
     frame.ids[frame.size] = lamp.id;
-    frame.nearest_m[frame.size++] = nearest_m(lamp, lamps);
+    frame.nearest_m[frame.size++] = distance_to_nearest_lamp_m(lamp, lamps);
     kept.push_back(light);
   }
   assigned = std::move(kept);
@@ -112,9 +112,10 @@ bool has_pose(FixStatus status) {
 }
 
 /// Squared residuals of the lights of an image from the pose that fits them best, in their order.
-std::vector<double> squared_residuals(const GroupedLights& image, const RowTimeCandidate& candidate,
-                                      const LampMap& lamps, const Lens& lens,
-                                      const Tolerance& tolerance) {
+std::vector<double> compute_squared_residuals_of_lights(const GroupedLights& image,
+                                                        const RowTimeCandidate& candidate,
+                                                        const LampMap& lamps, const Lens& lens,
+                                                        const Tolerance& tolerance) {
   std::vector<double> squares(image.lights.size(), kMaxSquare);
   std::vector<AssignedLight> assigned = assigned_lights(image, candidate, lamps);
   if (assigned.size() < kMinLights || assigned.size() > kMaxSightings) return squares;
@@ -123,8 +124,8 @@ std::vector<double> squared_residuals(const GroupedLights& image, const RowTimeC
   BodyPrior prior;
   prior.inclination_sd_rad = kLeanSd_rad;
   BodyObservations agreeing = frame;
-  const auto [status, fix] = estimate_body_robust(agreeing, Eigen::Vector3d::Zero(), prior,
-                                                  tolerance.max_residual_fraction);
+  const auto [status, fix] = estimate_body_state_robust(agreeing, Eigen::Vector3d::Zero(), prior,
+                                                        tolerance.max_residual_fraction);
   if (!has_pose(status) || agreeing.size < std::min(frame.size, kMinMajority)) return squares;
   const auto& [roll_rad, pitch_rad] = fix.state.motion.inclination;
   const double lean_square = (roll_rad * roll_rad + pitch_rad * pitch_rad) /
@@ -142,7 +143,7 @@ std::vector<double> squared_residuals(const GroupedLights& image, const RowTimeC
 }
 
 /// Returns the groups that can be one lamp at most for every candidate.
-std::vector<bool> are_unique(const RowTimeCandidates& found) {
+std::vector<bool> find_unique_lamps(const RowTimeCandidates& found) {
   std::vector<bool> unique(found.groups.size(), true);
   for (const RowTimeCandidate& candidate : found.candidates) {
     for (std::size_t i = 0; i < unique.size(); ++i) {
@@ -154,10 +155,11 @@ std::vector<bool> are_unique(const RowTimeCandidates& found) {
 
 }  // namespace
 
-std::vector<double> compute_position_costs(const RowTimeCandidates& found,
-                                           std::span<const GroupedLights> images,
-                                           const LampMap& lamps, const std::optional<Lens>& lens) {
-  const std::vector<bool> unique = are_unique(found);
+std::vector<double> compute_lamp_position_costs(const RowTimeCandidates& found,
+                                                std::span<const GroupedLights> images,
+                                                const LampMap& lamps,
+                                                const std::optional<Lens>& lens) {
+  const std::vector<bool> unique = find_unique_lamps(found);
   const Tolerance& tolerance = lens ? kWithLens : kWithoutLens;
   // Squared residuals of the images by candidate and group.
   std::vector<std::vector<std::vector<double>>> squares(
@@ -165,10 +167,10 @@ std::vector<double> compute_position_costs(const RowTimeCandidates& found,
   for (GroupedLights image : images) {
     std::erase_if(image.lights, [&](const GroupedLight& light) { return !unique[light.group]; });
     if (image.lights.size() < kMinLights) continue;
-    const Lens lens_of_image = lens ? *lens : nominal_lens(image.size_px);
+    const Lens lens_of_image = lens ? *lens : make_nominal_lens(image.size_px);
     for (std::size_t i = 0; i < squares.size(); ++i) {
-      const auto of_lights =
-          squared_residuals(image, found.candidates[i], lamps, lens_of_image, tolerance);
+      const auto of_lights = compute_squared_residuals_of_lights(image, found.candidates[i], lamps,
+                                                                 lens_of_image, tolerance);
       for (std::size_t k = 0; k < of_lights.size(); ++k) {
         squares[i][image.lights[k].group].push_back(of_lights[k]);
       }

@@ -33,17 +33,17 @@ RotationFit fit_rotation(const RotationCaptures& spot, const Camera& camera,
     case RotationMethod::axis:
       return fit_rotation_axis(spot, camera);
     case RotationMethod::joint:
-      return fit_joint_center(spot, camera);
+      return fit_joint_rotation_center(spot, camera);
     case RotationMethod::circle:
       break;
   }
-  return fit_circle_centers(spot, camera).mean;
+  return fit_centers_of_lamp_circles(spot, camera).mean;
 }
 
 /// Returns the zenith point and, if known, the lever arm.
 Eigen::VectorXd make_solution_vector(const RotationCenter& center) {
   Eigen::VectorXd solved(center.lever_arm_m ? 4 : 2);
-  solved.head<2>() = zenith_point(center);
+  solved.head<2>() = normalized_zenith_point(center);
   if (center.lever_arm_m) solved.tail<2>() = *center.lever_arm_m;
   return solved;
 }
@@ -57,12 +57,13 @@ void propagate_lens_errors(
   const auto& report = input.calibration.intrinsics_report;
   if (!report || !report->covariance) return;
   const auto with_error = [&](const Eigen::VectorXd& error) -> std::optional<Eigen::VectorXd> {
-    const auto moved = center_for(with_lens_error(extract_camera(input.calibration), error).camera);
+    const auto moved =
+        center_for(with_lens_error(extract_camera_calibration(input.calibration), error).camera);
     if (!moved || moved->lever_arm_m.has_value() != center.lever_arm_m.has_value()) return {};
     return make_solution_vector(*moved);
   };
-  if (const auto jacobian =
-          estimate_jacobian(with_error, make_solution_vector(center), *report->covariance)) {
+  if (const auto jacobian = estimate_numeric_jacobian(with_error, make_solution_vector(center),
+                                                      *report->covariance)) {
     center.by_intrinsics = jacobian->topRows(2);
     if (center.lever_arm_m) center.lever_arm_by_intrinsics = jacobian->bottomRows(2);
     return;
@@ -73,7 +74,7 @@ void propagate_lens_errors(
 }
 
 /// Returns true if two sets of captures have the same sightings in the same order.
-bool has_same_sightings(const RotationCaptures& a, const RotationCaptures& b) {
+bool has_same_observations(const RotationCaptures& a, const RotationCaptures& b) {
   return a.heights.size() == b.heights.size() &&
          std::equal(a.captures.begin(), a.captures.end(), b.captures.begin(), b.captures.end(),
                     [](const auto& one, const auto& other) { return one.image == other.image; }) &&
@@ -88,8 +89,9 @@ bool has_same_sightings(const RotationCaptures& a, const RotationCaptures& b) {
 void propagate_lens_errors(RotationResult& result, const LampCaptures& input,
                            RotationMethod method) {
   const auto center_for = [&](const Camera& camera) -> std::optional<RotationCenter> {
-    const RotationCaptures spot = find_rotation_captures(input.frames, input.lamps, camera);
-    if (spot.status != RotationStatus::ok || !has_same_sightings(spot, result.spot)) return {};
+    const RotationCaptures spot =
+        find_in_place_rotation_captures(input.frames, input.lamps, camera);
+    if (spot.status != RotationStatus::ok || !has_same_observations(spot, result.spot)) return {};
     const RotationFit fit = fit_rotation(spot, camera, method);
     if (!fit.converged || fit.used_observations != result.fit.used_observations) return {};
     return fit.center;
@@ -129,7 +131,7 @@ void add_warnings(RotationResult& result) {
 void add_metrics(RotationResult& result) {
   const RotationCenter& center = result.fit.center;
   result.metrics = {{"rotation_px", result.fit.residual_px},
-                    {"tilt_deg", deg_from_rad(compute_tilt(center).angle_rad)}};
+                    {"tilt_deg", deg_from_rad(compute_camera_tilt(center).angle_rad)}};
   if (!result.circles.circles.empty()) {
     result.metrics.push_back({"rotation_spread_px", result.circles.spread_px});
   }
@@ -147,13 +149,15 @@ MapErrors find_errors(const LampCaptures& input, const Calibration& calibration,
                       double min_offset_px) {
   std::vector<Frame> frames;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    if (input.motions.empty() || !moves(input.motions[i])) frames.push_back(input.frames[i]);
+    if (input.motions.empty() || !may_camera_move_during_readout(input.motions[i]))
+      frames.push_back(input.frames[i]);
   }
   MapErrorOptions options;
   options.min_offset_px = min_offset_px;
-  MapErrors found = find_map_errors(frames, input.lamps, calibration, options);
+  MapErrors found = detect_misplaced_or_swapped_lamps(frames, input.lamps, calibration, options);
   if (frames.size() == input.frames.size() || !found.errors.empty()) return found;
-  MapErrors all = find_map_errors(input.frames, input.lamps, calibration, options);
+  MapErrors all =
+      detect_misplaced_or_swapped_lamps(input.frames, input.lamps, calibration, options);
   std::erase_if(all.errors, [](const MapError& error) {
     return error.kind == MapErrorKind::moved || error.kind == MapErrorKind::unsteady;
   });
@@ -171,16 +175,17 @@ std::string format_height_m(double z_m) {
   return text == "-0.000" ? "0.000" : text;
 }
 
-Calibration extract_camera(const Calibration& calibration) {
+Calibration extract_camera_calibration(const Calibration& calibration) {
   Calibration alone;
   alone.camera = calibration.camera;
   return alone;
 }
 
-MapErrors check_map(const LampCaptures& input, const Calibration& calibration, StepResult& result) {
+MapErrors check_lamp_map(const LampCaptures& input, const Calibration& calibration,
+                         StepResult& result) {
   MapErrors found = find_errors(input, calibration, MapErrorOptions().min_offset_px);
-  if (found.is_unusable()) {
-    result.fail(StepFailure::wrong_map, describe(found.errors), input.lamps_file);
+  if (found.is_map_unusable()) {
+    result.set_failure(StepFailure::wrong_map, describe(found.errors), input.lamps_file);
     return found;
   }
   for (const MapError& error : found.errors) {
@@ -189,48 +194,48 @@ MapErrors check_map(const LampCaptures& input, const Calibration& calibration, S
   return found;
 }
 
-void explain_failure_by_map(const LampCaptures& input, const Calibration& calibration,
-                            StepResult& result) {
+void explain_failure_by_map_errors(const LampCaptures& input, const Calibration& calibration,
+                                   StepResult& result) {
   const MapErrors found = find_errors(input, calibration, kMinBlame_px);
   const bool has_lamps = std::any_of(found.errors.begin(), found.errors.end(),
                                      [](const MapError& error) { return !error.lamps.empty(); });
   if (found.errors.empty() || (!has_lamps && result.failure == StepFailure::wrong_map)) return;
   // The advice of a fit that diverges because of a lamp is misleading.
-  result.fail(StepFailure::wrong_map, describe(found.errors), input.lamps_file);
+  result.set_failure(StepFailure::wrong_map, describe(found.errors), input.lamps_file);
   for (const MapError& error : found.errors) std::erase(result.warnings, describe(error));
 }
 
-RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
-                              HistoryEntry entry) {
+RotationResult run_rotation_step(const LampCaptures& input, RotationMethod method,
+                                 HistoryEntry entry) {
   RotationResult result;
-  check_map(input, extract_camera(input.calibration), result);
+  check_lamp_map(input, extract_camera_calibration(input.calibration), result);
   if (!result.ok()) return result;
   const Camera& camera = input.calibration.camera;
-  result.spot = find_rotation_captures(input.frames, input.lamps, camera);
+  result.spot = find_in_place_rotation_captures(input.frames, input.lamps, camera);
   for (const auto& [image, reason] : result.spot.rejected) {
     result.warnings.push_back(fmt::format("{}: left out: {}", image, reason));
   }
   if (result.spot.status != RotationStatus::ok) {
     const bool map = result.spot.status == RotationStatus::other_map;
-    result.fail(map ? StepFailure::wrong_map : StepFailure::undetermined,
-                std::string(describe(result.spot.status)),
-                map ? input.lamps_file : std::filesystem::path());
+    result.set_failure(map ? StepFailure::wrong_map : StepFailure::undetermined,
+                       std::string(describe(result.spot.status)),
+                       map ? input.lamps_file : std::filesystem::path());
     if (map || result.spot.status == RotationStatus::moved) {
-      explain_failure_by_map(input, extract_camera(input.calibration), result);
+      explain_failure_by_map_errors(input, extract_camera_calibration(input.calibration), result);
     }
     return result;
   }
-  result.circles = fit_circle_centers(result.spot, camera);
+  result.circles = fit_centers_of_lamp_circles(result.spot, camera);
   result.fit = fit_rotation(result.spot, camera, method);
   if (!result.fit.converged) {
     const bool is_noise = method == RotationMethod::circle && result.circles.undetermined > 0;
-    result.fail(
+    result.set_failure(
         StepFailure::undetermined,
         is_noise ? "noise determines most circles, as with captures at two yaws: add captures at "
                    "other yaws, preferably twelve over a full turn, or use --method joint"
                  : "no rotation center fits the captures: take them at one position per height, "
                    "over more of the turn, with more visible lamps, and check lens and lamp map");
-    explain_failure_by_map(input, extract_camera(input.calibration), result);
+    explain_failure_by_map_errors(input, extract_camera_calibration(input.calibration), result);
     return result;
   }
   propagate_lens_errors(result, input, method);
@@ -239,15 +244,15 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
   result.calibration = with_rotation_center(input.calibration, result.fit.center, std::move(entry));
   const std::string title = fmt::format("{}, method {}", camera.id, name_of(method));
   result.drawing = [title, spot = result.spot, circles = result.circles, fit = result.fit, camera] {
-    return make_drawing(make_plot(title, spot, circles, fit, camera));
+    return make_gnuplot_drawing(collect_plot_data(title, spot, circles, fit, camera));
   };
   return result;
 }
 
-LevelingResult solve_leveling(const LampCaptures& input, bool refine_map, HistoryEntry entry) {
-  LevelingResult result;
-  const Calibration alone = extract_camera(input.calibration);
-  check_map(input, alone, result);
+TiltResult run_tilt_step(const LampCaptures& input, bool refine_map, HistoryEntry entry) {
+  TiltResult result;
+  const Calibration alone = extract_camera_calibration(input.calibration);
+  check_lamp_map(input, alone, result);
   if (!result.ok()) return result;
   TiltCalibrationOptions options;
   options.refine_map = refine_map;
@@ -261,13 +266,13 @@ LevelingResult solve_leveling(const LampCaptures& input, bool refine_map, Histor
   TiltCalibration& leveling = result.leveling;
   leveling = leveled(input.calibration.camera);
   if (!leveling.undetermined.empty()) {
-    result.fail(StepFailure::undetermined, leveling.undetermined);
-    explain_failure_by_map(input, alone, result);
+    result.set_failure(StepFailure::undetermined, leveling.undetermined);
+    explain_failure_by_map_errors(input, alone, result);
     return result;
   }
   if (leveling.captures_rejected > leveling.captures) {
-    result.fail(StepFailure::wrong_map, describe(MapError{MapErrorKind::other_room}),
-                input.lamps_file);
+    result.set_failure(StepFailure::wrong_map, describe(MapError{MapErrorKind::other_room}),
+                       input.lamps_file);
     return result;
   }
   const auto center_for = [&](const Camera& camera) {
@@ -275,7 +280,7 @@ LevelingResult solve_leveling(const LampCaptures& input, bool refine_map, Histor
     return other.undetermined.empty() ? std::optional(other.center) : std::nullopt;
   };
   propagate_lens_errors(leveling.center, input, center_for, result);
-  result.metrics = {{"tilt_deg", deg_from_rad(compute_tilt(leveling.center).angle_rad)}};
+  result.metrics = {{"tilt_deg", deg_from_rad(compute_camera_tilt(leveling.center).angle_rad)}};
   constexpr double max_noise_scale = 3;
   if (leveling.noise_scale > max_noise_scale) {
     result.warnings.push_back(

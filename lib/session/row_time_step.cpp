@@ -29,7 +29,7 @@ struct PeriodsOfImages {
   PeriodsOfImages(std::span<const std::span<const Observation>> folders,
                   const std::vector<std::vector<Frame>>& labels) {
     for (std::size_t i = 0; i < folders.size(); ++i) {
-      for (LightPeriod light : collect_periods(folders[i], labels[i])) {
+      for (LightPeriod light : collect_light_periods(folders[i], labels[i])) {
         light.image += sizes_px.size();
         lights.push_back(std::move(light));
       }
@@ -67,7 +67,7 @@ std::vector<MeasuredPeriod> collect_lamp_periods(const std::vector<Observation>&
     if (!image.is_kept()) continue;  // excludes copies and images of another camera
     for (const Light& light : image.lights) {
       const bool is_measured = light.kind == LightKind::lamp && light.lamp &&
-                               !light.by_modulation && is_reliable(light.stripes);
+                               !light.by_modulation && are_stripes_reliable(light.stripes);
       if (!is_measured) continue;
       periods.push_back({light.stripes.period_lines, light.lamp});
     }
@@ -87,15 +87,15 @@ std::vector<std::span<const Observation>> DetectedLights::folders() const {
   return folders;
 }
 
-RowTimeResult choose_row_time_by_places(std::span<const std::span<const Observation>> folders,
-                                        const std::vector<std::vector<Frame>>& labels,
-                                        const LampMap& lamps, const std::optional<Lens>& lens) {
+RowTimeResult select_row_time_by_positions(std::span<const std::span<const Observation>> folders,
+                                           const std::vector<std::vector<Frame>>& labels,
+                                           const LampMap& lamps, const std::optional<Lens>& lens) {
   const PeriodsOfImages periods(folders, labels);
-  const RowTimeCandidates found = estimate_row_time(
+  const RowTimeCandidates found = estimate_row_time_candidates(
       std::vector<MeasuredPeriod>(periods.lights.begin(), periods.lights.end()), lamps);
-  if (found.candidates.size() < 2) return choose_row_time(found);
+  if (found.candidates.size() < 2) return select_row_time_candidate(found);
   const auto images = periods.group_lights(found.groups);
-  return choose_row_time(found, compute_position_costs(found, images, lamps, lens));
+  return select_row_time_candidate(found, compute_lamp_position_costs(found, images, lamps, lens));
 }
 
 DetectedLights detect_lights(const std::vector<fs::path>& folders, const LampMap& lamps,
@@ -118,11 +118,11 @@ DetectedLights detect_lights(const std::vector<fs::path>& folders, const LampMap
     images.insert(images.end(), in_folder.begin(), in_folder.end());
   }
   Observations remarks;
-  lights.camera.readout = find_readout(images, readout, options, imager_px, remarks);
+  lights.camera.readout = estimate_readout_direction(images, readout, options, imager_px, remarks);
   const LampIntake intake(LightDetector(lamps, lights.camera), ImageUse::fixes, options, imager_px);
-  lights.seen = intake.observe_all(images, progress);
+  lights.seen = intake.detect_in_all_images(images, progress);
   prepend_remarks(remarks, lights.seen);
-  check_any_readable(folders.front(), lights.seen.images);
+  check_any_image_readable(folders.front(), lights.seen.images);
   return lights;
 }
 
@@ -140,17 +140,17 @@ std::string compare_row_times(const RowTime& measured, const GivenRowTime& given
 
 RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMap& lamps,
                             const GivenRowTime& given) {
-  const auto found = estimate_row_time(collect_lamp_periods(images), lamps);
+  const auto found = estimate_row_time_candidates(collect_lamp_periods(images), lamps);
   if (found.candidates.empty()) return {};
   const RowTime& measured = found.candidates.front().row_time;
   if (measured.lamps < kMinRowTimeLamps) return {};
   return {measured, compare_row_times(measured, given)};
 }
 
-std::string find_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
-                                const std::optional<Lens>& lens, const GivenRowTime& given) {
+std::string describe_other_row_time(const std::vector<Observation>& images, const LampMap& lamps,
+                                    const std::optional<Lens>& lens, const GivenRowTime& given) {
   const auto found =
-      choose_row_time_by_places(std::array{std::span(images)}, {{}}, lamps, lens).found;
+      select_row_time_by_positions(std::array{std::span(images)}, {{}}, lamps, lens).found;
   return found ? compare_row_times(*found, given) : "";
 }
 
@@ -161,35 +161,36 @@ void explain_by_row_time(const std::vector<Observation>& images, const LampMap& 
   const GivenRowTime given{*camera.row_time_s, source};
   std::string error;
   if (result.ok()) error = check_row_time(images, lamps, given).error;
-  if (error.empty()) error = find_row_time_error(images, lamps, camera.lens, given);
+  if (error.empty()) error = describe_other_row_time(images, lamps, camera.lens, given);
   if (error.empty()) return;
   if (result.ok()) {
     result.warnings.push_back(std::move(error));
   } else {
-    result.fail(StepFailure::bad_input, std::move(error));
+    result.set_failure(StepFailure::bad_input, std::move(error));
   }
 }
 
-std::vector<Metric> row_time_metrics(const RowTimeCheck& check) {
+std::vector<Metric> make_row_time_metrics(const RowTimeCheck& check) {
   if (!check.measured) return {};
   return {{"row_time_us", kMicrosecondsPerSecond * check.measured->row_time_s},
           {"row_time_sd_us", kMicrosecondsPerSecond * check.measured->sd_s}};
 }
 
-RowTimeStepResult find_row_time(const DetectedLights& seen,
-                                const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,
-                                const fs::path& lamps_file,
-                                const std::optional<Calibration>& calibration, HistoryEntry entry) {
-  check_frequencies(lamps, lamps_file);
+RowTimeStepResult estimate_row_time_from_lights(const DetectedLights& seen,
+                                                const std::vector<std::vector<Frame>>& labels,
+                                                const LampMap& lamps, const fs::path& lamps_file,
+                                                const std::optional<Calibration>& calibration,
+                                                HistoryEntry entry) {
+  check_lamp_frequencies(lamps, lamps_file);
   RowTimeStepResult result;
   const RowTimeResult estimate =
-      choose_row_time_by_places(seen.folders(), labels, lamps, seen.camera.lens);
+      select_row_time_by_positions(seen.folders(), labels, lamps, seen.camera.lens);
   if (!estimate.found) {
-    result.fail(StepFailure::undetermined, estimate.problem);
+    result.set_failure(StepFailure::undetermined, estimate.problem);
     return result;
   }
   result.found = *estimate.found;
-  result.metrics = row_time_metrics({result.found});
+  result.metrics = make_row_time_metrics({result.found});
   if (!calibration) return result;
   if (const auto& stated_s = calibration->camera.row_time_s) {
     std::string error = compare_row_times(result.found, {*stated_s, "the calibration"});

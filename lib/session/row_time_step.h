@@ -41,27 +41,29 @@ DetectedLights detect_lights(const std::vector<std::filesystem::path>& folders,
                              const IntakeProgress& progress = {});
 
 /// Chooses a row time by periods and duty cycles of the lights in the images of each folder. Also
-/// uses their positions if several row times fit (compute_position_costs()).
+/// uses their positions if several row times fit (compute_lamp_position_costs()).
 ///
 /// @param labels  lights of each folder that are lamps; empty: all lights
-RowTimeResult choose_row_time_by_places(std::span<const std::span<const Observation>> folders,
-                                        const std::vector<std::vector<Frame>>& labels,
-                                        const LampMap& lamps, const std::optional<Lens>& lens);
+RowTimeResult select_row_time_by_positions(std::span<const std::span<const Observation>> folders,
+                                           const std::vector<std::vector<Frame>>& labels,
+                                           const LampMap& lamps, const std::optional<Lens>& lens);
 
-/// Result of find_row_time().
+/// Result of estimate_row_time_from_lights().
 struct RowTimeStepResult : StepResult {
   RowTime found{};
 };
 
-/// Estimates the row time from lamps with a frequency in the map (estimate_row_time()). If several
-/// row times explain their periods, chooses by their positions (compute_position_costs()). Adds row
-/// time and readout direction to the camera of `calibration`, if given, and warns if it states
-/// another row time (compare_row_times()). Failure: undetermined. Throws InputError if no lamp has
-/// a frequency.
-RowTimeStepResult find_row_time(const DetectedLights& seen,
-                                const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,
-                                const std::filesystem::path& lamps_file,
-                                const std::optional<Calibration>& calibration, HistoryEntry entry);
+/// Estimates the row time from lamps with a frequency in the map (estimate_row_time_candidates()).
+/// If several row times explain their periods, chooses by their positions
+/// (compute_lamp_position_costs()). Adds row time and readout direction to the camera of
+/// `calibration`, if given, and warns if it states another row time (compare_row_times()). Failure:
+/// undetermined. Throws InputError if no lamp has a frequency.
+RowTimeStepResult estimate_row_time_from_lights(const DetectedLights& seen,
+                                                const std::vector<std::vector<Frame>>& labels,
+                                                const LampMap& lamps,
+                                                const std::filesystem::path& lamps_file,
+                                                const std::optional<Calibration>& calibration,
+                                                HistoryEntry entry);
 
 /// Row time given by a file or an option.
 struct GivenRowTime {
@@ -84,8 +86,9 @@ struct RowTimeCheck {
 ///          measured
 std::string compare_row_times(const RowTime& measured, const GivenRowTime& given);
 
-/// Estimates the row time from the identified lamps of the kept images (estimate_row_time()) and
-/// compares it with the given one. They contradict each other if
+/// Estimates the row time from the identified lamps of the kept images
+/// (estimate_row_time_candidates()) and compares it with the given one. They contradict each other
+/// if
 ///
 ///     |log(measured / stated)| > kLampDrift + 3 sd / measured.
 ///
@@ -96,18 +99,18 @@ RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMa
                             const GivenRowTime& given);
 
 /// Finds another row time that makes the lights of the images lamps of the map, by their periods
-/// and positions, independently of their identification (choose_row_time()): a wrong row time
-/// leaves lights unknown or exchanges lamps.
+/// and positions, independently of their identification (select_row_time_candidate()): a wrong row
+/// time leaves lights unknown or exchanges lamps.
 ///
 /// @return  the contradiction in one line; empty unless at least three lamps contradict the given
 ///          row time as in check_row_time()
-std::string find_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
-                                const std::optional<Lens>& lens, const GivenRowTime& given);
+std::string describe_other_row_time(const std::vector<Observation>& images, const LampMap& lamps,
+                                    const std::optional<Lens>& lens, const GivenRowTime& given);
 
 /// Adds a contradiction of the row time of `camera` to the result of a step: in place of the reason
 /// if the step failed, as a warning otherwise, because fixes at rest are valid. The contradiction
 /// is that of check_row_time() if there is a result. Otherwise, and if identified lamps agree
-/// because each was taken for its neighbor, it is that of find_row_time_error(). An unknown
+/// because each was taken for its neighbor, it is that of describe_other_row_time(). An unknown
 /// row time adds nothing.
 ///
 /// @param source  name of the file or of the option that gives the row time
@@ -116,6 +119,6 @@ void explain_by_row_time(const std::vector<Observation>& images, const LampMap& 
                          StepResult& result);
 
 /// Returns the metrics row_time_us and row_time_sd_us; none if the row time was not measured.
-std::vector<Metric> row_time_metrics(const RowTimeCheck& check);
+std::vector<Metric> make_row_time_metrics(const RowTimeCheck& check);
 
 }  // namespace vlp

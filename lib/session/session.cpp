@@ -70,12 +70,13 @@ constexpr std::array<std::pair<MetricSource, std::string_view>, 5> kStepsOfMetri
 constexpr std::array kPlots{"lens.svg", "rotation.svg", "dispersion.svg"};
 
 /// Returns the gates of the session: those of the lens, if it is estimated, and those of its file.
-std::vector<Gate> gates_for(const SessionFolder& session, const SessionOptions& options) {
+std::vector<Gate> select_gates_of_step(const SessionFolder& session,
+                                       const SessionOptions& options) {
   std::vector<Gate> gates;
-  if (!session.camera()) gates = default_lens_gates();
-  const fs::path file = session.gates().value_or(options.gates_file);
+  if (!session.camera_file()) gates = make_default_lens_gates();
+  const fs::path file = session.gates_file().value_or(options.gates_file);
   if (file.empty()) return gates;
-  return with_changes(std::move(gates), read_gates(file, session_metrics()));
+  return merge_gates(std::move(gates), read_gates(file, list_session_metrics()));
 }
 
 /// Result of a step, and the function that writes its outputs.
@@ -103,20 +104,20 @@ class SessionRun {
         gates_(std::move(gates)) {}
 
   SessionResult run() {
-    check_redo();
-    results_.plan(outputs());
-    if (calibrate() && locate()) {
+    check_redo_option();
+    results_.plan_steps(list_outputs());
+    if (run_calibration_steps() && locate()) {
       add_gates_of_missing_steps();
       evaluate();
     }
-    conclude();
+    finish_session();
     return std::move(result_);
   }
 
  private:
-  void check_redo() const {
+  void check_redo_option() const {
     std::vector<std::string> names;
-    for (const auto& [step, files] : outputs()) names.push_back(step);
+    for (const auto& [step, files] : list_outputs()) names.push_back(step);
     for (const std::string& name : options_.redo) {
       if (std::ranges::find(names, name) != names.end()) continue;
       throw std::invalid_argument(
@@ -128,11 +129,11 @@ class SessionRun {
     return std::ranges::find(options_.redo, step) != options_.redo.end();
   }
 
-  fs::path out(const std::string& name) const { return results_.file(name); }
+  fs::path output_path_of(const std::string& name) const { return results_.file(name); }
   fs::path fixes_of(const fs::path& captures) const {
-    return out(captures.filename().string() + "-fixes.csv");
+    return output_path_of(captures.filename().string() + "-fixes.csv");
   }
-  fs::path lamps_file() const { return session_.lamps(); }
+  fs::path lamps_file() const { return session_.lamp_map_file(); }
   LampMap read_lamps() const { return read_lamps_of_room(lamps_file(), options_.frontend.room); }
 
   std::string remove_folder(std::string text) const {
@@ -140,19 +141,20 @@ class SessionRun {
                               results_.path());
   }
 
-  std::vector<fs::path> lines() const {
-    return options_.report ? session_.lines() : std::vector<fs::path>();
+  std::vector<fs::path> line_drive_folders() const {
+    return options_.report ? session_.line_drive_folders() : std::vector<fs::path>();
   }
 
   /// Returns the steps of this session with their outputs.
-  std::vector<StepOutputs> outputs() const {
+  std::vector<StepOutputs> list_outputs() const {
     const auto with_picture = [&](std::vector<std::string> names, const char* picture) {
       if (options_.report) names.emplace_back(picture);
       return names;
     };
     std::vector<std::string> lens;
-    if (!session_.camera()) lens = with_picture({"lens.yaml"}, "lens.svg");
-    if (!session_.camera() && (options_.choose_lens_model || has_mrcal(options_.lens_model))) {
+    if (!session_.camera_file()) lens = with_picture({"lens.yaml"}, "lens.svg");
+    if (!session_.camera_file() &&
+        (options_.choose_lens_model || is_supported_by_mrcal(options_.lens_model))) {
       lens.insert(lens.begin() + 1, "lens.cameramodel");
     }
     std::vector<StepOutputs> steps{
@@ -161,7 +163,7 @@ class SessionRun {
         {"rotation", with_picture({"rotated.yaml"}, "rotation.svg")},
         {"dispersion", with_picture({"calibration.yaml"}, "dispersion.svg")}};
     if (session_.check()) steps.push_back({"check", {"check-fixes.csv"}});
-    for (const fs::path& line : lines()) {
+    for (const fs::path& line : line_drive_folders()) {
       steps.push_back({line.filename().string(), {fixes_of(line).filename().string()}});
     }
     steps.push_back({"evaluate", with_picture({"evaluation.json"}, "report.html")});
@@ -174,13 +176,14 @@ class SessionRun {
       if (input.empty()) continue;
       text += input.filename().string() + " ";
       try {
-        text += fs::is_directory(input) ? digests_.digest_folder(input) : sha256_of_file(input);
+        text += fs::is_directory(input) ? digests_.compute_folder_digest(input)
+                                        : compute_file_sha256(input);
       } catch (const InputError&) {
         text += "cannot be read";
       }
       text += "\n";
     }
-    return sha256_of_text(text);
+    return compute_text_sha256(text);
   }
 
   /// Runs a step unless inputs, options, program and outputs are unchanged since it last ended.
@@ -190,13 +193,13 @@ class SessionRun {
     if (observer_.begins) observer_.begins(name);
     const std::string key = compute_step_key(inputs, options);
     SessionStep done{name, false, {}};
-    if (auto cached_result = results_.cached_result(name, key);
+    if (auto cached_result = results_.find_cached_result(name, key);
         cached_result && !is_redo_requested(name)) {
       done.is_up_to_date = true;
       done.result = std::move(*cached_result);
     } else {
-      results_.remove_step(name);
-      done.result = run_work(work);
+      results_.remove_outputs_of_step(name);
+      done.result = run_step_work(work);
       results_.store_result(name, key, done.result);
     }
     if (done.result.ok())
@@ -222,7 +225,7 @@ class SessionRun {
   std::vector<Gate> find_step_gates(const std::string& step) const {
     std::vector<Gate> gates;
     for (const Gate& gate : gates_) {
-      const std::pair gated(metric_kind(gate.metric)->source, std::string_view(step));
+      const std::pair gated(find_metric_kind(gate.metric)->source, std::string_view(step));
       if (std::ranges::find(kStepsOfMetrics, gated) != kStepsOfMetrics.end()) gates.push_back(gate);
     }
     return gates;
@@ -230,33 +233,33 @@ class SessionRun {
 
   /// Runs the work of a step and writes its outputs. A bad input becomes the failure bad_input;
   /// errors of writing are thrown.
-  StepResult run_work(const std::function<Work()>& work) const {
+  StepResult run_step_work(const std::function<Work()>& work) const {
     Work done;
     try {
       done = work();
     } catch (const InputError& error) {
-      done.result.fail(StepFailure::bad_input, error.what());
+      done.result.set_failure(StepFailure::bad_input, error.what());
     } catch (const std::invalid_argument& error) {
-      done.result.fail(StepFailure::bad_input, error.what());
+      done.result.set_failure(StepFailure::bad_input, error.what());
     }
     StepResult& result = done.result;
-    result.fail(result.failure, remove_folder(message_of(result)));
+    result.set_failure(result.failure, remove_folder(format_failure_message(result)));
     for (std::string& warning : result.warnings) warning = remove_folder(std::move(warning));
     for (auto& [image, reason] : result.skipped) reason = remove_folder(std::move(reason));
     if (result.ok()) done.write();
     return std::move(result);
   }
 
-  HistoryEntry history(const std::string& options, const std::vector<fs::path>& inputs) {
+  HistoryEntry make_step_history(const std::string& options, const std::vector<fs::path>& inputs) {
     return vlp::make_history_entry(options_.program, options, inputs, digests_);
   }
 
   void write_picture(const StepResult& result, const std::string& name) const {
-    if (options_.report && result.drawing) draw(out(name), result.drawing());
+    if (options_.report && result.drawing) write_plot(output_path_of(name), result.drawing());
   }
 
   /// Returns the options of the camera as text for the history.
-  std::string camera_options() const {
+  std::string format_camera_options() const {
     std::string text = "--camera-id " + options_.camera_id;
     if (options_.frontend.row_time_s)
       text += fmt::format(" --row-time-s {}", *options_.frontend.row_time_s);
@@ -275,55 +278,59 @@ class SessionRun {
     return text.append(options_.choose_lens_model ? "auto" : to_string(options_.lens_model));
   }
 
-  bool find_lens() {
-    const std::string settings = fmt::format("{} {}", camera_options(), options_.report);
-    return step("lens", {session_.boards(), session_.board()}, settings, [&] {
+  bool run_lens() {
+    const std::string settings = fmt::format("{} {}", format_camera_options(), options_.report);
+    return step("lens", {session_.board_images_folder(), session_.board_file()}, settings, [&] {
       LensInput input;
-      input.board = read_board(session_.board());
-      input.board_file = session_.board();
+      input.board = read_board(session_.board_file());
+      input.board_file = session_.board_file();
       FrontendOptions options = options_.frontend;
-      options.corner_cache = results_.corners();
-      input.seen = observe_boards(list_images(session_.boards()), input.board, session_.board(),
-                                  options, observer_.progress);
+      options.corner_cache = results_.corner_cache_folder();
+      input.seen = detect_boards_in_images(list_images(session_.board_images_folder()), input.board,
+                                           session_.board_file(), options, observer_.progress);
       input.camera.id = options_.camera_id;
       input.camera.lens_model = options_.lens_model;
       input.camera.row_time_s = options_.frontend.row_time_s;
       input.camera.readout = options_.frontend.readout;
       input.choose_lens_model = options_.choose_lens_model;
-      LensResult lens = solve_lens(
-          std::move(input), history(camera_options(), {session_.board(), session_.boards()}));
+      LensResult lens =
+          run_lens_step(std::move(input),
+                        make_step_history(format_camera_options(),
+                                          {session_.board_file(), session_.board_images_folder()}));
       if (lens.lens.choice) lens.notes.push_back("lens model: " + describe(*lens.lens.choice));
       return Work{lens, [this, lens] {
-                    if (has_mrcal(lens.calibration.camera.lens_model)) {
-                      write_cameramodel(out("lens.cameramodel"), lens.lens.solution);
+                    if (is_supported_by_mrcal(lens.calibration.camera.lens_model)) {
+                      write_mrcal_cameramodel(output_path_of("lens.cameramodel"),
+                                              lens.lens.solution);
                     }
                     write_picture(lens, "lens.svg");
-                    write_calibration(out("lens.yaml"), lens.calibration);
+                    write_calibration(output_path_of("lens.yaml"), lens.calibration);
                   }};
     });
   }
 
-  bool find_row_time(const fs::path& camera_file) {
-    return step("row-time", {session_.rotation(), lamps_file(), camera_file}, "", [&] {
+  bool estimate_row_time_from_lights(const fs::path& camera_file) {
+    return step("row-time", {session_.rotation_folder(), lamps_file(), camera_file}, "", [&] {
       const LampMap lamps = read_lamps();
       const Calibration camera = read_calibration(camera_file);
       FrontendOptions options = options_.frontend;
       options.readout.reset();
-      const DetectedLights seen =
-          detect_lights({session_.rotation()}, lamps, camera, false, options, observer_.progress);
-      RowTimeStepResult found =
-          vlp::find_row_time(seen, {{}}, lamps, lamps_file(), camera,
-                             history("--row-time", {session_.rotation(), lamps_file()}));
-      add_remarks(seen.seen, found);
-      return Work{found,
-                  [this, found] { write_calibration(out("camera.yaml"), found.calibration); }};
+      const DetectedLights seen = detect_lights({session_.rotation_folder()}, lamps, camera, false,
+                                                options, observer_.progress);
+      RowTimeStepResult found = vlp::estimate_row_time_from_lights(
+          seen, {{}}, lamps, lamps_file(), camera,
+          make_step_history("--row-time", {session_.rotation_folder(), lamps_file()}));
+      add_intake_remarks(seen.seen, found);
+      return Work{found, [this, found] {
+                    write_calibration(output_path_of("camera.yaml"), found.calibration);
+                  }};
     });
   }
 
-  FrontendOptions lamp_options() const {
+  FrontendOptions make_lamp_options() const {
     FrontendOptions options = options_.frontend;
     options.readout.reset();  // already part of the calibration
-    if (const auto classifier = session_.classifier()) options.classifier = *classifier;
+    if (const auto classifier = session_.classifier_file()) options.classifier = *classifier;
     return options;
   }
 
@@ -331,16 +338,17 @@ class SessionRun {
   /// and the failure if no image can be used.
   StepResult observe(const LampImages& images, ImageUse use, LampCaptures& captures,
                      std::vector<Observation>& seen) const {
-    Observations observed = observe_lamps(images, use, lamp_options(), observer_.progress);
+    Observations observed =
+        detect_lamps_in_images(images, use, make_lamp_options(), observer_.progress);
     captures.frames = collect_kept_frames(observed.images);
     StepResult result;
-    add_remarks(observed, result);
+    add_intake_remarks(observed, result);
     seen = std::move(observed.images);
     explain_by_row_time(captures, seen, result);
     const auto& row_time_s = captures.calibration.camera.row_time_s;
     if (use == ImageUse::turn && is_row_time_given() && row_time_s) {
-      result.metrics =
-          row_time_metrics(check_row_time(seen, captures.lamps, {*row_time_s, row_time_source()}));
+      result.metrics = make_row_time_metrics(
+          check_row_time(seen, captures.lamps, {*row_time_s, describe_row_time_source()}));
     }
     return result;
   }
@@ -348,19 +356,19 @@ class SessionRun {
   /// Adds a contradiction of the row time to the result of a step (explain_by_row_time()).
   void explain_by_row_time(const LampCaptures& captures, const std::vector<Observation>& images,
                            StepResult& result) const {
-    if (session_.classifier()) return;  // the lamps are not identified by frequency
+    if (session_.classifier_file()) return;  // the lamps are not identified by frequency
     vlp::explain_by_row_time(images, captures.lamps, make_detector_camera(captures.calibration),
-                             row_time_source(), result);
+                             describe_row_time_source(), result);
   }
 
   /// Returns false if the row time was estimated by the step row-time, or is not used.
   bool is_row_time_given() const {
-    return !session_.classifier() && (session_.camera() || options_.frontend.row_time_s);
+    return !session_.classifier_file() && (session_.camera_file() || options_.frontend.row_time_s);
   }
 
   /// Returns the name of the file or the option that gives the row time.
-  std::string row_time_source() const {
-    if (session_.camera()) return session_.camera()->filename().string();
+  std::string describe_row_time_source() const {
+    if (session_.camera_file()) return session_.camera_file()->filename().string();
     return options_.frontend.row_time_s ? "--row-time-s" : "camera.yaml";
   }
 
@@ -378,50 +386,52 @@ class SessionRun {
     return {folder, captures.lamps, captures.lamps_file, captures.calibration, calibration_file};
   }
 
-  std::vector<fs::path> lamp_inputs(const fs::path& folder, const fs::path& calibration) const {
-    return {folder, lamps_file(), calibration, session_.classifier().value_or("")};
+  std::vector<fs::path> list_lamp_inputs(const fs::path& folder,
+                                         const fs::path& calibration) const {
+    return {folder, lamps_file(), calibration, session_.classifier_file().value_or("")};
   }
 
-  std::string picture_setting() const { return options_.report ? "picture" : ""; }
+  std::string format_plot_setting() const { return options_.report ? "picture" : ""; }
 
-  bool find_rotation(const fs::path& camera_file) {
-    const auto inputs = lamp_inputs(session_.rotation(), camera_file);
-    return step("rotation", inputs, picture_setting(), [&] {
+  bool run_rotation(const fs::path& camera_file) {
+    const auto inputs = list_lamp_inputs(session_.rotation_folder(), camera_file);
+    return step("rotation", inputs, format_plot_setting(), [&] {
       LampCaptures captures{{}, read_lamps(), lamps_file(), read_calibration(camera_file)};
-      LampImages images = lamp_images(session_.rotation(), captures, camera_file);
+      LampImages images = lamp_images(session_.rotation_folder(), captures, camera_file);
       images.captures.emplace();  // inclinations are ignored: the axis is level
       std::vector<Observation> seen;
       const StepResult remarks = observe(images, ImageUse::turn, captures, seen);
       if (!remarks.ok()) return Work{remarks};
-      RotationResult found = solve_rotation(captures, RotationMethod::axis, history("", inputs));
+      RotationResult found =
+          run_rotation_step(captures, RotationMethod::axis, make_step_history("", inputs));
       if (!found.ok()) explain_by_row_time(captures, seen, found);
       add(remarks, found);
       return Work{found, [this, found] {
                     write_picture(found, "rotation.svg");
-                    write_calibration(out("rotated.yaml"), found.calibration);
+                    write_calibration(output_path_of("rotated.yaml"), found.calibration);
                   }};
     });
   }
 
-  bool find_dispersion() {
-    const fs::path folder = *session_.dispersion(), rotated = out("rotated.yaml");
-    const auto inputs = lamp_inputs(folder, rotated);
-    return step("dispersion", inputs, picture_setting(), [&] {
+  bool run_dispersion() {
+    const fs::path folder = *session_.dispersion_folder(), rotated = output_path_of("rotated.yaml");
+    const auto inputs = list_lamp_inputs(folder, rotated);
+    return step("dispersion", inputs, format_plot_setting(), [&] {
       LampCaptures captures{{}, read_lamps(), lamps_file(), read_calibration(rotated)};
       std::vector<Observation> seen;
       const StepResult remarks =
           observe(lamp_images(folder, captures, rotated), ImageUse::places, captures, seen);
       if (!remarks.ok()) return Work{remarks};
-      const KnownPlaces places =
-          collect_known_places(captures.frames, read_captures_with_truth(folder));
+      const KnownPositions places =
+          collect_reference_positions(captures.frames, read_captures_with_truth(folder));
       if (places.captures.empty()) {
         throw InputError(folder,
                          "its captures have no positions; add x_m and y_m to captures.csv, with "
                          "the names of the images");
       }
       DispersionResult found =
-          solve_dispersion(captures, places, DispersionMethod::camera, DispersionCircle::mean,
-                           history("", with_tables(inputs, folder)));
+          run_dispersion_step(captures, places, DispersionMethod::camera, DispersionCircle::mean,
+                              make_step_history("", add_capture_tables(inputs, folder)));
       if (!found.ok()) explain_by_row_time(captures, seen, found);
       add(remarks, found);
       if (places.without > 0) {
@@ -431,48 +441,49 @@ class SessionRun {
       }
       return Work{found, [this, found] {
                     write_picture(found, "dispersion.svg");
-                    write_calibration(out("calibration.yaml"), found.calibration);
+                    write_calibration(output_path_of("calibration.yaml"), found.calibration);
                   }};
     });
   }
 
-  static std::vector<fs::path> with_tables(std::vector<fs::path> inputs, const fs::path& folder) {
+  static std::vector<fs::path> add_capture_tables(std::vector<fs::path> inputs,
+                                                  const fs::path& folder) {
     for (const char* table : {"captures.csv", "truth.csv"}) {
       if (fs::exists(folder / table)) inputs.push_back(folder / table);
     }
     return inputs;
   }
 
-  bool calibrate() {
-    fs::path camera = out("lens.yaml");
-    if (const auto is_known_step = session_.camera()) {
+  bool run_calibration_steps() {
+    fs::path camera = output_path_of("lens.yaml");
+    if (const auto is_known_step = session_.camera_file()) {
       camera = *is_known_step;
       if (!read_given_camera(camera)) return false;
-    } else if (!find_lens()) {
+    } else if (!run_lens()) {
       return false;
     }
     result_.calibration = read_calibration(camera);
-    if (result_.calibration->camera.row_time_s || session_.classifier()) {
-      results_.remove_step("row-time");
+    if (result_.calibration->camera.row_time_s || session_.classifier_file()) {
+      results_.remove_outputs_of_step("row-time");
       if (is_redo_requested("row-time")) {
         throw std::invalid_argument(
             "there is no step row-time in this session, as the row time is known or there is a "
             "classifier; leave it out of --redo");
       }
-    } else if (!find_row_time(camera)) {
+    } else if (!estimate_row_time_from_lights(camera)) {
       return false;
     } else {
-      camera = out("camera.yaml");
+      camera = output_path_of("camera.yaml");
     }
-    if (!find_rotation(camera)) return false;
-    result_.calibration = read_calibration(out("rotated.yaml"));
-    if (!session_.dispersion()) {
-      results_.remove_step("dispersion");
-      write_calibration(out("calibration.yaml"), *result_.calibration);
+    if (!run_rotation(camera)) return false;
+    result_.calibration = read_calibration(output_path_of("rotated.yaml"));
+    if (!session_.dispersion_folder()) {
+      results_.remove_outputs_of_step("dispersion");
+      write_calibration(output_path_of("calibration.yaml"), *result_.calibration);
       return true;
     }
-    if (!find_dispersion()) return false;
-    result_.calibration = read_calibration(out("calibration.yaml"));
+    if (!run_dispersion()) return false;
+    result_.calibration = read_calibration(output_path_of("calibration.yaml"));
     return true;
   }
 
@@ -511,22 +522,22 @@ class SessionRun {
 
   bool locate() {
     if (const auto check = session_.check(); check && !locate(*check)) return false;
-    for (const fs::path& line : lines()) {
+    for (const fs::path& line : line_drive_folders()) {
       if (!locate(line)) return false;
     }
     return true;
   }
 
   bool locate(const fs::path& folder) {
-    const fs::path calibration = out("calibration.yaml");
-    return step(folder.filename().string(), lamp_inputs(folder, calibration), "", [&] {
+    const fs::path calibration = output_path_of("calibration.yaml");
+    return step(folder.filename().string(), list_lamp_inputs(folder, calibration), "", [&] {
       LocateInput input{
-          {}, read_lamps(), read_calibration(calibration), read_captures_of_folder(folder)};
+          {}, read_lamps(), read_calibration(calibration), read_captures_csv_of_folder(folder)};
       input.lamp_offsets = session_.check() == folder;
       const LampImages images{folder, input.lamps, lamps_file(), input.calibration, calibration};
       const ImageUse use = session_.check() == folder ? ImageUse::places : ImageUse::fixes;
-      LocateResult found =
-          locate_images(images, use, std::move(input), lamp_options(), observer_.progress);
+      LocateResult found = locate_camera_in_images(images, use, std::move(input),
+                                                   make_lamp_options(), observer_.progress);
       return Work{found,
                   [this, folder, rows = found.rows] { write_fixes(fixes_of(folder), rows); }};
     });
@@ -534,21 +545,23 @@ class SessionRun {
 
   void evaluate() {
     std::optional<fs::path> truth;
-    std::vector<fs::path> inputs{out("check-fixes.csv"), lamps_file(), out("calibration.yaml")};
+    std::vector<fs::path> inputs{output_path_of("check-fixes.csv"), lamps_file(),
+                                 output_path_of("calibration.yaml")};
     if (const auto check = session_.check()) {
-      for (const fs::path& table : with_tables({}, *check)) inputs.push_back(table);
+      for (const fs::path& table : add_capture_tables({}, *check)) inputs.push_back(table);
     }
     for (const char* plot : kPlots) {
-      if (options_.report && fs::exists(out(plot))) inputs.push_back(out(plot));
+      if (options_.report && fs::exists(output_path_of(plot)))
+        inputs.push_back(output_path_of(plot));
     }
-    for (const fs::path& line : lines()) {
+    for (const fs::path& line : line_drive_folders()) {
       inputs.push_back(fixes_of(line));
-      for (const fs::path& table : with_tables({}, line)) inputs.push_back(table);
+      for (const fs::path& table : add_capture_tables({}, line)) inputs.push_back(table);
     }
     const std::vector<Gate> gates = find_step_gates("evaluate");
     std::string limits;
     for (const Gate& gate : gates_) limits += fmt::format("{} {}\n", gate.metric, gate.limit);
-    step("evaluate", inputs, picture_setting() + limits, [&] {
+    step("evaluate", inputs, format_plot_setting() + limits, [&] {
       const auto check = session_.check();
       if (check) truth = find_truth_file(*check);
       if (truth) return evaluate_check(*truth, inputs, gates);
@@ -564,55 +577,57 @@ class SessionRun {
   Work evaluate_check(const fs::path& truth, const std::vector<fs::path>& inputs,
                       const std::vector<Gate>& gates) {
     auto input = std::make_shared<EvaluationInput>();
-    input->fixes = {out("check-fixes.csv"), read_fixes(out("check-fixes.csv"))};
-    input->truth = {truth, read_truth_places(truth.parent_path())};
-    input->station_m = compute_place_radius_m(*result_.calibration);
+    input->fixes = {output_path_of("check-fixes.csv"),
+                    read_fixes(output_path_of("check-fixes.csv"))};
+    input->truth = {truth, read_truth_positions(truth.parent_path())};
+    input->station_m = compute_same_position_radius_m(*result_.calibration);
     input->threads = options_.frontend.threads;
     EvaluateResult found = evaluate_fixes(*input, gates);
     std::vector<Drive> drives;
-    for (const fs::path& line : lines()) {
+    for (const fs::path& line : line_drive_folders()) {
       const fs::path places = *find_truth_file(line), fixes = fixes_of(line);
-      drives.push_back(
-          {{fixes, read_fixes(fixes)}, find_drive_ends(places, read_truth_places(line))});
-      if (fit_line(drives.back().fixes.rows, drives.back().commanded_m)) continue;
+      drives.push_back({{fixes, read_fixes(fixes)},
+                        find_end_points_of_drive(places, read_truth_positions(line))});
+      if (fit_line_to_fixes(drives.back().fixes.rows, drives.back().commanded_m)) continue;
       throw InputError(fixes, "no line can be fitted to its fixes: they have no direction");
     }
     if (!found.ok()) return {found};
     std::vector<CaptureError> errors;
-    for (const FixError& error : compute_errors(*input, input->fixes).errors) {
+    for (const FixError& error : compute_fix_errors(*input, input->fixes).errors) {
       const FixRow& row = input->fixes.rows[error.fix];
       constexpr int min_lamps =
           3;  // fixes of two lamps may have large errors at the edge of a room
       if (row.lamps < min_lamps) continue;
       errors.push_back({row.image, error.horizontal_m.norm(), error.fix});
     }
-    if (std::string outliers = describe_check_outliers(errors); !outliers.empty()) {
+    if (std::string outliers = describe_position_error_outliers(errors); !outliers.empty()) {
       found.warnings.push_back(std::move(outliers));
     }
     return {found, [=, this] {
-              write_file(out("evaluation.json"), to_json(found.evaluation, found.gates));
+              write_file(output_path_of("evaluation.json"), to_json(found.evaluation, found.gates));
               if (!options_.report) return;
               Report page;
               page.gates = result_.gates;
               page.gates.insert(page.gates.end(), found.gates.begin(), found.gates.end());
               page.calibration = result_.calibration;
               for (const char* plot : kPlots) {
-                if (fs::exists(out(plot))) page.pictures.push_back(read_report_plot(out(plot)));
+                if (fs::exists(output_path_of(plot)))
+                  page.pictures.push_back(read_report_plot(output_path_of(plot)));
               }
-              page.evaluation = history("", inputs);
-              write_file(out("report.html"),
+              page.evaluation = make_step_history("", inputs);
+              write_file(output_path_of("report.html"),
                          render_report_page({*input, found, read_lamps(), drives, page}));
             }};
   }
 
   /// Sets the verdict, removes outputs of later steps if the run failed, and writes the summaries.
-  void conclude() {
+  void finish_session() {
     const SessionStep& last = result_.steps.back();
     if (!last.result.ok()) {
       result_.verdict = SessionVerdict::no_result;
       result_.failure = last.result.failure;
       result_.reason = last.name + ": " + last.result.why;
-      results_.remove_later_steps(last.name);
+      results_.remove_outputs_of_later_steps(last.name);
     }
     const std::string missed = describe_failed_gates(result_.gates);
     if (!missed.empty() && last.result.ok()) {
@@ -646,14 +661,14 @@ std::string to_string(SessionVerdict verdict) {
   return "";
 }
 
-std::vector<MetricKind> session_metrics() {
-  return metric_kinds({MetricSource::lens, MetricSource::rotation, MetricSource::dispersion,
-                       MetricSource::evaluation});
+std::vector<MetricKind> list_session_metrics() {
+  return list_metric_kinds({MetricSource::lens, MetricSource::rotation, MetricSource::dispersion,
+                            MetricSource::evaluation});
 }
 
 SessionResult run_session(const fs::path& session, const fs::path& results,
                           const SessionOptions& options, const SessionObserver& observer) {
-  if (!options.gates_file.empty()) read_gates(options.gates_file, session_metrics());
+  if (!options.gates_file.empty()) read_gates(options.gates_file, list_session_metrics());
   if (!fs::is_directory(session)) throw InputError(session, "is not a folder of captures");
   if (is_captures_folder(session, results)) {
     throw InputError(results, "contains captures: choose another folder for the results");
@@ -663,16 +678,16 @@ SessionResult run_session(const fs::path& session, const fs::path& results,
   std::vector<Gate> gates;
   try {
     folder.emplace(session);
-    gates = gates_for(*folder, options);
+    gates = select_gates_of_step(*folder, options);
   } catch (const InputError& error) {
     SessionResult result;
     result.verdict = SessionVerdict::no_result;
     result.failure = StepFailure::bad_input;
     result.reason = remove_folder(error.what(), session);
     if (folder) {
-      session_results.remove_evaluation();  // other results remain valid
+      session_results.remove_evaluation_outputs();  // other results remain valid
     } else {
-      session_results.remove_all_steps();
+      session_results.remove_outputs_of_all_steps();
     }
     write_summaries(session_results, result, options);
     return result;

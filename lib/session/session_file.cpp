@@ -42,12 +42,12 @@ Json make_calibration_json(const Calibration& calibration) {
   }
   if (const auto& row_time_s = calibration.camera.row_time_s) json["row_time_s"] = *row_time_s;
   if (const auto& center = calibration.rotation_center) {
-    const auto [angle_rad, azimuth_rad] = compute_tilt(*center);
+    const auto [angle_rad, azimuth_rad] = compute_camera_tilt(*center);
     json["rotation_center_px"] = {center->center_px.x(), center->center_px.y()};
     json["rotation_center_sd_px"] = make_sd_json(center->covariance, 1);
     json["tilt_deg"] = deg_from_rad(angle_rad);
     json["tilt_azimuth_deg"] = deg_from_rad(azimuth_rad);
-    const Eigen::Vector2d zenith = zenith_point(*center);
+    const Eigen::Vector2d zenith = normalized_zenith_point(*center);
     json["zenith_deg"] = {kDegrees * zenith.x(), kDegrees * zenith.y()};
     json["zenith_sd_deg"] = make_sd_json(compute_zenith_covariance(calibration), kDegrees);
     if (const auto& arm_m = center->lever_arm_m) {
@@ -87,7 +87,7 @@ Json make_metrics_json(const SessionResult& result) {
     for (Json metric : of_step.at("metrics")) {
       const auto name = metric.at("name").get<std::string>();
       metric["step"] = step.name;
-      if (const auto kind = metric_kind(name)) {
+      if (const auto kind = find_metric_kind(name)) {
         metric["unit"] = kind->unit;
       }
       for (const CheckedMetric& gate : step.result.gates) {
@@ -105,7 +105,9 @@ constexpr const char* kStepFormat = "vlp-step/1";
 /// Largest size of a record: a step with 100,000 skipped images and their reasons.
 constexpr std::size_t kMaxStepBytes = std::size_t{64} << 20;
 
-Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+Json json_number_or_null(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
 double number_or_nan(const Json& json) {
   return json.is_null() ? std::numeric_limits<double>::quiet_NaN() : json.get<double>();
 }
@@ -117,8 +119,8 @@ Eigen::Vector2d parse_vector(const Json& json) {
 StepResult parse_result(const Json& json) {
   StepResult result;
   const auto failure = step_failure_from_name(json.at("failure").get<std::string>());
-  result.fail(failure.value_or(StepFailure::bad_input), json.at("message").get<std::string>(),
-              json.at("file").get<std::string>());
+  result.set_failure(failure.value_or(StepFailure::bad_input),
+                     json.at("message").get<std::string>(), json.at("file").get<std::string>());
   for (const Json& metric : json.at("metrics")) {
     result.metrics.push_back(
         {metric.at("name").get<std::string>(), number_or_nan(metric.at("value"))});
@@ -149,7 +151,7 @@ Json to_json(const CheckedMetric& gate) {
           {"value", gate.value ? Json(*gate.value) : Json(nullptr)},
           {"limit", gate.limit ? Json(*gate.limit) : Json(nullptr)},
           {"direction", describe(gate.direction)},
-          {"passed", gate.passed()}};
+          {"passed", gate.has_passed()}};
 }
 
 Json to_json(const StepResult& result) {
@@ -163,7 +165,7 @@ Json to_json(const StepResult& result) {
             {"rejected_lamps", Json::array()},
             {"lamp_offsets", Json::array()}};
   for (const auto& [name, value] : result.metrics) {
-    json["metrics"].push_back({{"name", name}, {"value", number_or_null(value)}});
+    json["metrics"].push_back({{"name", name}, {"value", json_number_or_null(value)}});
   }
   for (const auto& [image, reason] : result.skipped) {
     json["skipped"].push_back({{"image", image}, {"reason", reason}});
@@ -187,7 +189,7 @@ std::optional<StepRecord> read_step_record(const std::filesystem::path& file) {
     const auto text =
         SharedFolder(file.parent_path()).read(file.filename().string(), kMaxStepBytes);
     if (!text) return std::nullopt;
-    check_json_bounds(*text);
+    check_json_size_and_depth(*text);
     const Json json = Json::parse(*text, nullptr, false);
     if (!json.is_object()) return std::nullopt;
     if (json.at("format").get<std::string>() != kStepFormat) return std::nullopt;
@@ -205,7 +207,7 @@ void write_step_record(const std::filesystem::path& file, const StepRecord& step
                   {"result", to_json(step.result)}};
   AtomicFileWriter whole(file);
   whole.write(json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
-  whole.save_unsynced();  // an incomplete record is ignored, and the step runs again
+  whole.save_without_fsync();  // an incomplete record is ignored, and the step runs again
 }
 
 std::string format_session_json(const SessionResult& result, const SessionOptions& options) {

@@ -12,9 +12,9 @@ namespace vlp {
 namespace fs = std::filesystem;
 
 CapturesTable read_captures_with_truth(const fs::path& folder) {
-  CapturesTable captures = read_captures_of_folder(folder);
+  CapturesTable captures = read_captures_csv_of_folder(folder);
   if (!fs::exists(folder / "truth.csv")) return captures;
-  for (const TruthRow& row : read_truth(folder / "truth.csv")) {
+  for (const TruthRow& row : read_truth_table(folder / "truth.csv")) {
     Capture& capture = captures[row.image];
     capture.x_m = row.xy_m.x();
     capture.y_m = row.xy_m.y();
@@ -29,17 +29,17 @@ CapturesTable read_captures_with_truth(const fs::path& folder) {
 std::optional<fs::path> find_truth_file(const fs::path& folder) {
   if (fs::exists(folder / "truth.csv")) return folder / "truth.csv";
   if (!fs::exists(folder / "captures.csv")) return std::nullopt;
-  const CapturesTable captures = read_captures(folder / "captures.csv");
+  const CapturesTable captures = read_captures_csv(folder / "captures.csv");
   const bool places = std::any_of(captures.begin(), captures.end(), [](const auto& capture) {
     return capture.second.x_m && capture.second.y_m && capture.second.place == PlaceOf::camera;
   });
   return places ? std::optional(folder / "captures.csv") : std::nullopt;
 }
 
-std::vector<TruthRow> read_truth_places(const fs::path& folder) {
-  if (fs::exists(folder / "truth.csv")) return read_truth(folder / "truth.csv");
+std::vector<TruthRow> read_truth_positions(const fs::path& folder) {
+  if (fs::exists(folder / "truth.csv")) return read_truth_table(folder / "truth.csv");
   std::vector<TruthRow> rows;
-  for (const auto& [image, capture] : read_captures_of_folder(folder)) {
+  for (const auto& [image, capture] : read_captures_csv_of_folder(folder)) {
     if (!capture.x_m || !capture.y_m || capture.place == PlaceOf::axis) continue;
     rows.push_back({image, {*capture.x_m, *capture.y_m}, capture.z_m, capture.yaw_rad});
   }
@@ -48,7 +48,7 @@ std::vector<TruthRow> read_truth_places(const fs::path& folder) {
 
 namespace {
 
-bool is_drive(const fs::path& folder) {
+bool is_line_drive_folder(const fs::path& folder) {
   if (!folder.filename().string().starts_with("line-") || !fs::is_directory(folder)) return false;
   try {
     return find_truth_file(folder).has_value();
@@ -66,22 +66,22 @@ SessionFolder::SessionFolder(const fs::path& folder) : folder_(folder) {
   };
   need("lamps.yaml");
   need("rotation");
-  if (!camera() && !fs::exists(board()) && !fs::exists(boards())) {
+  if (!camera_file() && !fs::exists(board_file()) && !fs::exists(board_images_folder())) {
     throw InputError(folder, "has neither boards with board.yaml nor camera.yaml");
   }
-  if (!camera()) {
+  if (!camera_file()) {
     need("board.yaml");
     need("boards");
   }
   for (const auto& entry : fs::directory_iterator(folder_)) {
-    if (!is_drive(entry.path())) continue;
+    if (!is_line_drive_folder(entry.path())) continue;
     const Id name(entry.path().filename().string(), folder_, "drive");  // used in names of outputs
-    lines_.push_back(folder_ / name.text());
+    lines_.push_back(folder_ / name.get_text());
   }
   std::sort(lines_.begin(), lines_.end());
 }
 
-std::optional<fs::path> SessionFolder::find_existing(const char* name) const {
+std::optional<fs::path> SessionFolder::find_existing_entry(const char* name) const {
   return fs::exists(folder_ / name) ? std::optional(folder_ / name) : std::nullopt;
 }
 
@@ -97,8 +97,8 @@ bool is_captures_folder(const fs::path& session, const fs::path& results) {
   return false;
 }
 
-std::array<Eigen::Vector2d, 2> find_drive_ends(const fs::path& truth,
-                                               const std::vector<TruthRow>& places) {
+std::array<Eigen::Vector2d, 2> find_end_points_of_drive(const fs::path& truth,
+                                                        const std::vector<TruthRow>& places) {
   const std::array<Eigen::Vector2d, 2> ends_m{places.front().xy_m, places.back().xy_m};
   if (ends_m[0] == ends_m[1]) throw InputError(truth, "start and end of the drive are equal");
   return ends_m;

@@ -21,7 +21,7 @@ namespace vlp {
 ///
 /// All functions throw InputError if a table cannot be read.
 
-/// Returns captures.csv with the places of truth.csv; an empty table without both files.
+/// Returns captures.csv with the places of truth.csv; empty if neither file exists.
 CapturesTable read_captures_with_truth(const std::filesystem::path& folder);
 /// Returns the table with the ground truth of the folder: truth.csv, or captures.csv if it has
 /// places of the camera. Returns std::nullopt if neither exists.
@@ -29,7 +29,7 @@ std::optional<std::filesystem::path> find_truth_file(const std::filesystem::path
 /// Returns the places in find_truth_file(): in the order of truth.csv, or in the order of the image
 /// names for captures.csv, which need not have a place for every image.
 /// @pre find_truth_file() returns a file
-std::vector<TruthRow> read_truth_places(const std::filesystem::path& folder);
+std::vector<TruthRow> read_truth_positions(const std::filesystem::path& folder);
 
 // clang-format off
 /// Folder with the captures of a camera, which is only read:
@@ -52,23 +52,29 @@ class SessionFolder {
   explicit SessionFolder(const std::filesystem::path& folder);
 
   const std::filesystem::path& path() const { return folder_; }
-  std::filesystem::path lamps() const { return folder_ / "lamps.yaml"; }
-  std::filesystem::path board() const { return folder_ / "board.yaml"; }
-  std::filesystem::path boards() const { return folder_ / "boards"; }
-  std::filesystem::path rotation() const { return folder_ / "rotation"; }
-  std::optional<std::filesystem::path> camera() const { return find_existing("camera.yaml"); }
-  std::optional<std::filesystem::path> dispersion() const { return find_existing("dispersion"); }
-  std::optional<std::filesystem::path> check() const { return find_existing("check"); }
-  std::optional<std::filesystem::path> classifier() const {
-    return find_existing("classifier.yaml");
+  std::filesystem::path lamp_map_file() const { return folder_ / "lamps.yaml"; }
+  std::filesystem::path board_file() const { return folder_ / "board.yaml"; }
+  std::filesystem::path board_images_folder() const { return folder_ / "boards"; }
+  std::filesystem::path rotation_folder() const { return folder_ / "rotation"; }
+  std::optional<std::filesystem::path> camera_file() const {
+    return find_existing_entry("camera.yaml");
   }
-  std::optional<std::filesystem::path> gates() const { return find_existing("gates.yaml"); }
+  std::optional<std::filesystem::path> dispersion_folder() const {
+    return find_existing_entry("dispersion");
+  }
+  std::optional<std::filesystem::path> check() const { return find_existing_entry("check"); }
+  std::optional<std::filesystem::path> classifier_file() const {
+    return find_existing_entry("classifier.yaml");
+  }
+  std::optional<std::filesystem::path> gates_file() const {
+    return find_existing_entry("gates.yaml");
+  }
   /// Folders of the drives along a line with known places, sorted by name. Includes drives whose
   /// table cannot be read: their steps report the error.
-  const std::vector<std::filesystem::path>& lines() const { return lines_; }
+  const std::vector<std::filesystem::path>& line_drive_folders() const { return lines_; }
 
  private:
-  std::optional<std::filesystem::path> find_existing(const char* name) const;
+  std::optional<std::filesystem::path> find_existing_entry(const char* name) const;
 
   std::filesystem::path folder_;
   std::vector<std::filesystem::path> lines_;
@@ -79,7 +85,7 @@ class SessionFolder {
 bool is_captures_folder(const std::filesystem::path& session, const std::filesystem::path& results);
 
 /// Returns the first and the last place of a drive, in m. Throws InputError if they are equal.
-std::array<Eigen::Vector2d, 2> find_drive_ends(const std::filesystem::path& truth,
-                                               const std::vector<TruthRow>& places);
+std::array<Eigen::Vector2d, 2> find_end_points_of_drive(const std::filesystem::path& truth,
+                                                        const std::vector<TruthRow>& places);
 
 }  // namespace vlp

@@ -40,18 +40,18 @@ bool contains(std::span<const char* const> names, std::string_view name) {
 }
 
 /// Returns the file with the path of the session of these results.
-fs::path mark_file(const fs::path& results) { return results / "steps/session"; }
+fs::path owner_mark_file(const fs::path& results) { return results / "steps/session"; }
 
-std::string mark_text(const fs::path& session) {
+std::string owner_mark_text(const fs::path& session) {
   return fs::weakly_canonical(session / "").string() + "\n";
 }
 
 /// Throws InputError if the folder holds results of another session or files of other origin.
 void check_owner(const fs::path& results, const fs::path& session) {
-  const fs::path mark = mark_file(results);
+  const fs::path mark = owner_mark_file(results);
   constexpr std::size_t max_bytes = 1 << 16;
   if (fs::exists(mark)) {
-    if (read_text_file(mark, max_bytes) == mark_text(session)) return;
+    if (read_text_file(mark, max_bytes) == owner_mark_text(session)) return;
     throw InputError(results, "contains the results of another session; choose another folder");
   }
   std::vector<const char*> foreign_names(kResults.begin(), kResults.end());
@@ -73,10 +73,12 @@ std::string record_name(const std::string& step) {
 }
 
 /// Returns true for the names of drives, which are folders of a session and steps.
-bool is_drive_name(std::string_view step) { return step.starts_with("line-") && Id::accepts(step); }
+bool is_drive_name(std::string_view step) {
+  return step.starts_with("line-") && Id::is_valid_id(step);
+}
 
 SharedFolder make_steps_folder(const fs::path& results) {
-  return SharedFolder(results).make_folder({"steps", results, "step"});
+  return SharedFolder(results).make_subfolder({"steps", results, "step"});
 }
 
 int lock_folder(const SharedFolder& steps, const fs::path& results) {
@@ -136,21 +138,21 @@ SessionResults::SessionResults(fs::path folder, const fs::path& session)
   if (not_made) throw InputError(folder_, "cannot be made: " + not_made.message());
   const SharedFolder steps = make_steps_folder(folder_);
   lock_ = lock_folder(steps, folder_);
-  steps.find_folder({"corners", folder_, "step"});  // throws if it is a link
-  if (steps.has("session")) return;
+  steps.open_subfolder_if_exists({"corners", folder_, "step"});  // throws if it is a link
+  if (steps.contains_entry("session")) return;
   // The list of files that do not require a plan, written before the mark: a folder without the
   // mark is free.
-  steps.replace(kOutputs, "junit.xml\nsession.json\n");
-  steps.replace("session", mark_text(session));
+  steps.replace_file(kOutputs, "junit.xml\nsession.json\n");
+  steps.replace_file("session", owner_mark_text(session));
 }
 
 SessionResults::~SessionResults() { ::close(lock_); }
 
-fs::path SessionResults::record_file(const std::string& step) const {
+fs::path SessionResults::step_record_file(const std::string& step) const {
   return file(record_name(step));
 }
 
-std::set<std::string> SessionResults::outputs() const {
+std::set<std::string> SessionResults::list_outputs() const {
   constexpr std::size_t max_bytes = 1 << 20;
   const auto list = make_steps_folder(folder_).read(kOutputs, max_bytes);
   if (!list) return find_unlisted_outputs(folder_, steps_);
@@ -162,9 +164,10 @@ std::set<std::string> SessionResults::outputs() const {
   return names;
 }
 
-std::set<std::string> SessionResults::remove_outputs(const std::set<std::string>& wanted) const {
+std::set<std::string> SessionResults::remove_unwanted_outputs(
+    const std::set<std::string>& wanted) const {
   std::set<std::string> not_removed;
-  for (const std::string& name : outputs()) {
+  for (const std::string& name : list_outputs()) {
     if (wanted.contains(name)) continue;
     std::error_code error;
     fs::remove(file(name), error);
@@ -173,14 +176,14 @@ std::set<std::string> SessionResults::remove_outputs(const std::set<std::string>
   return not_removed;
 }
 
-void SessionResults::plan(std::vector<StepOutputs> steps) {
+void SessionResults::plan_steps(std::vector<StepOutputs> steps) {
   steps_ = std::move(steps);
   std::set<std::string> wanted{"session.json", "junit.xml"};
   for (const auto& [step, files] : steps_) {
     wanted.insert(files.begin(), files.end());
     wanted.insert(record_name(step));
   }
-  const std::set<std::string> written = outputs();
+  const std::set<std::string> written = list_outputs();
   for (const std::string& name : wanted) {
     if (is_existing(file(name)) && (!written.contains(name) || fs::is_symlink(file(name)))) {
       throw InputError(folder_, fmt::format("holds {}, which is not of vlp-calibrate; give the "
@@ -188,18 +191,18 @@ void SessionResults::plan(std::vector<StepOutputs> steps) {
                                             name));
     }
   }
-  wanted.merge(remove_outputs(wanted));  // the next run tries again
+  wanted.merge(remove_unwanted_outputs(wanted));  // the next run tries again
   const SharedFolder records = make_steps_folder(folder_);
   // An unchanged list is not written again, which avoids waiting for the disk.
-  if (wanted == written && records.has(kOutputs)) return;
+  if (wanted == written && records.contains_entry(kOutputs)) return;
   std::string list;
   for (const std::string& name : wanted) list.append(name).append("\n");
-  records.replace(kOutputs, list);
+  records.replace_file(kOutputs, list);
 }
 
-std::optional<StepResult> SessionResults::cached_result(const std::string& step,
-                                                        const std::string& key) const {
-  auto cached_result = read_step_record(record_file(step));
+std::optional<StepResult> SessionResults::find_cached_result(const std::string& step,
+                                                             const std::string& key) const {
+  auto cached_result = read_step_record(step_record_file(step));
   if (!cached_result || cached_result->result.failure == StepFailure::bad_input)
     return std::nullopt;
   if (cached_result->key != key || cached_result->outputs != compute_outputs_digest(step))
@@ -209,7 +212,7 @@ std::optional<StepResult> SessionResults::cached_result(const std::string& step,
 
 void SessionResults::store_result(const std::string& step, const std::string& key,
                                   const StepResult& result) const {
-  write_step_record(record_file(step), {key, compute_outputs_digest(step), result});
+  write_step_record(step_record_file(step), {key, compute_outputs_digest(step), result});
 }
 
 std::vector<std::string> SessionResults::outputs_of(const std::string& step) const {
@@ -220,32 +223,33 @@ std::vector<std::string> SessionResults::outputs_of(const std::string& step) con
 std::string SessionResults::compute_outputs_digest(const std::string& step) const {
   std::string digests;
   for (const std::string& output : outputs_of(step)) {
-    digests += output + " " + (fs::exists(file(output)) ? sha256_of_file(file(output)) : "") + "\n";
+    digests +=
+        output + " " + (fs::exists(file(output)) ? compute_file_sha256(file(output)) : "") + "\n";
   }
-  return sha256_of_text(digests);
+  return compute_text_sha256(digests);
 }
 
-void SessionResults::remove_step(const std::string& step) const {
+void SessionResults::remove_outputs_of_step(const std::string& step) const {
   std::error_code ignored;
-  fs::remove(record_file(step), ignored);
+  fs::remove(step_record_file(step), ignored);
   for (const std::string& output : outputs_of(step)) fs::remove(file(output), ignored);
 }
 
-void SessionResults::remove_later_steps(const std::string& step) const {
+void SessionResults::remove_outputs_of_later_steps(const std::string& step) const {
   bool is_later = false;
   for (const auto& [name, files] : steps_) {
-    if (is_later) remove_step(name);
+    if (is_later) remove_outputs_of_step(name);
     is_later = is_later || name == step;
   }
 }
 
-void SessionResults::remove_evaluation() const {
-  const std::set<std::string> written = outputs();
+void SessionResults::remove_evaluation_outputs() const {
+  const std::set<std::string> written = list_outputs();
   for (const char* name : {"evaluation.json", "report.html", "steps/evaluate.json"}) {
     if (written.contains(name)) fs::remove(file(name));
   }
 }
 
-void SessionResults::remove_all_steps() const { remove_outputs({}); }
+void SessionResults::remove_outputs_of_all_steps() const { remove_unwanted_outputs({}); }
 
 }  // namespace vlp

@@ -24,11 +24,13 @@ struct StepOutputs {
 ///   lens.yaml, report.html, ...   the outputs of the steps
 ///   session.json                  outcome of the last run
 ///   steps/STEP.json               result of a step, digests of its inputs and outputs
+///   steps/corners                 cached corners of boards
 ///   steps/session                 path of the session of these results
 ///   steps/outputs                 names of all files above that runs wrote or may have written
 ///   steps/lock                    locked while a run uses the folder
 ///
-/// Only files named in steps/outputs are ever removed or overwritten.
+/// Only files named in steps/outputs are ever removed or overwritten. If this file is missing, as
+/// in folders of earlier versions, all names count that the steps of those versions could write.
 class SessionResults {
  public:
   /// Locks the folder for this session and creates it if missing. The operating system releases the
@@ -42,37 +44,38 @@ class SessionResults {
   const std::filesystem::path& path() const { return folder_; }
   std::filesystem::path file(const std::string& name) const { return folder_ / name; }
   /// Returns the folder with the cached corners of boards.
-  std::filesystem::path corners() const { return folder_ / "steps/corners"; }
+  std::filesystem::path corner_cache_folder() const { return folder_ / "steps/corners"; }
 
   /// Sets the steps of this run, in their order, and removes files of earlier runs that this run
   /// does not write. Throws InputError if the run would overwrite a file that no run wrote.
-  void plan(std::vector<StepOutputs> steps);
+  void plan_steps(std::vector<StepOutputs> steps);
 
   /// Returns the result of the last execution of a step if it is up to date. `key`, the digest of
   /// all that the step depends on, and the outputs must be unchanged. Returns std::nullopt
   /// otherwise, and after bad_input, because the file may have been corrected.
-  std::optional<StepResult> cached_result(const std::string& step, const std::string& key) const;
+  std::optional<StepResult> find_cached_result(const std::string& step,
+                                               const std::string& key) const;
   /// Records the result of a step, with its key and the digest of its outputs.
   void store_result(const std::string& step, const std::string& key,
                     const StepResult& result) const;
 
   /// Removes the outputs and the record of a step.
-  void remove_step(const std::string& step) const;
+  void remove_outputs_of_step(const std::string& step) const;
   /// Removes outputs and records of all later steps.
-  void remove_later_steps(const std::string& step) const;
+  void remove_outputs_of_later_steps(const std::string& step) const;
   /// Removes outputs and record of the step evaluate, which depend on the gates. Does not require
-  /// plan().
-  void remove_evaluation() const;
-  /// Removes outputs and records of all steps. Does not require plan().
-  void remove_all_steps() const;
+  /// plan_steps().
+  void remove_evaluation_outputs() const;
+  /// Removes outputs and records of all steps. Does not require plan_steps().
+  void remove_outputs_of_all_steps() const;
 
  private:
-  std::filesystem::path record_file(const std::string& step) const;
-  std::set<std::string> outputs() const;
+  std::filesystem::path step_record_file(const std::string& step) const;
+  std::set<std::string> list_outputs() const;
   /// Returns the files of a step of this run; none for other steps.
   std::vector<std::string> outputs_of(const std::string& step) const;
   /// Removes the outputs that are not wanted. Returns those that cannot be removed.
-  std::set<std::string> remove_outputs(const std::set<std::string>& wanted) const;
+  std::set<std::string> remove_unwanted_outputs(const std::set<std::string>& wanted) const;
   std::string compute_outputs_digest(const std::string& step) const;
 
   std::filesystem::path folder_;

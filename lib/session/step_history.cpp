@@ -14,21 +14,21 @@ std::string last_path_component(const std::filesystem::path& path) {
   return std::filesystem::weakly_canonical(path).filename().string();
 }
 
-const std::string& InputDigests::digest_file(const std::filesystem::path& file) {
+const std::string& InputDigests::compute_file_digest(const std::filesystem::path& file) {
   const auto known = known_.find(file);
   return known != known_.end() ? known->second
-                               : known_.emplace(file, sha256_of_file(file)).first->second;
+                               : known_.emplace(file, compute_file_sha256(file)).first->second;
 }
 
-std::string InputDigests::digest_images(const std::filesystem::path& folder) {
+std::string InputDigests::compute_image_folder_digest(const std::filesystem::path& folder) {
   std::string digests;
   for (const auto& image : list_images(folder)) {
-    digests += fmt::format("{}  {}\n", digest_file(image), image.filename().string());
+    digests += fmt::format("{}  {}\n", compute_file_digest(image), image.filename().string());
   }
-  return sha256_of_text(digests);
+  return compute_text_sha256(digests);
 }
 
-std::string InputDigests::digest_folder(const std::filesystem::path& folder) {
+std::string InputDigests::compute_folder_digest(const std::filesystem::path& folder) {
   std::map<std::string, std::string> digests;
   std::error_code error;
   for (std::filesystem::recursive_directory_iterator entry(folder, error), end;
@@ -37,14 +37,14 @@ std::string InputDigests::digest_folder(const std::filesystem::path& folder) {
     if (!entry->is_regular_file(no_file)) continue;
     std::string& digest = digests[entry->path().lexically_relative(folder).string()];
     try {
-      digest = digest_file(entry->path());
+      digest = compute_file_digest(entry->path());
     } catch (const InputError&) {
       digest = "cannot be read";
     }
   }
   std::string text;
   for (const auto& [name, digest] : digests) text += fmt::format("{}  {}\n", digest, name);
-  return sha256_of_text(text);
+  return compute_text_sha256(text);
 }
 
 HistoryEntry make_history_entry(const ProgramVersion& program, const std::string& options,
@@ -53,9 +53,10 @@ HistoryEntry make_history_entry(const ProgramVersion& program, const std::string
   HistoryEntry entry{"", program.program, program.version, options, {}};
   for (const auto& input : inputs) {
     if (input.empty()) continue;
-    entry.inputs.push_back({last_path_component(input), std::filesystem::is_directory(input)
-                                                            ? digests.digest_images(input)
-                                                            : digests.digest_file(input)});
+    entry.inputs.push_back(
+        {last_path_component(input), std::filesystem::is_directory(input)
+                                         ? digests.compute_image_folder_digest(input)
+                                         : digests.compute_file_digest(input)});
   }
   return entry;
 }

@@ -20,13 +20,13 @@ struct ProgramVersion {
 class InputDigests {
  public:
   /// Returns the digest of a file's content. Throws InputError if the file cannot be read.
-  const std::string& digest_file(const std::filesystem::path& file);
+  const std::string& compute_file_digest(const std::filesystem::path& file);
   /// Returns the digest of the images in a folder: that of a text with a line "SHA-256  NAME" per
   /// image, by name. Throws InputError if an image cannot be read.
-  std::string digest_images(const std::filesystem::path& folder);
+  std::string compute_image_folder_digest(const std::filesystem::path& folder);
   /// Returns the digest of all files in a folder and its subfolders, likewise. A file that cannot
   /// be read enters as "cannot be read".
-  std::string digest_folder(const std::filesystem::path& folder);
+  std::string compute_folder_digest(const std::filesystem::path& folder);
 
  private:
   std::map<std::filesystem::path, std::string> known_;

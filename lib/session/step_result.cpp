@@ -29,7 +29,7 @@ struct SkippedFrames {
   int count;
 };
 
-void prepend(const std::vector<std::string>& remarks, std::vector<std::string>& all) {
+void prepend_remarks(const std::vector<std::string>& remarks, std::vector<std::string>& all) {
   all.insert(all.begin(), remarks.begin(), remarks.end());
 }
 
@@ -49,7 +49,7 @@ std::optional<StepFailure> step_failure_from_name(std::string_view name) {
   return std::nullopt;
 }
 
-std::vector<SkippedImage> skipped_images(const std::vector<Observation>& images) {
+std::vector<SkippedImage> list_skipped_images(const std::vector<Observation>& images) {
   const bool is_one_folder = std::all_of(images.begin(), images.end(), [&](const auto& other) {
     return other.file.parent_path() == images.front().file.parent_path();
   });
@@ -57,8 +57,8 @@ std::vector<SkippedImage> skipped_images(const std::vector<Observation>& images)
   std::vector<SkippedFrames> frames;
   for (const Observation& image : images) {
     if (image.is_kept()) continue;
-    const std::string name = is_one_folder ? image.name() : image.file.string();
-    const auto video = parse_video_name(name);
+    const std::string name = is_one_folder ? image.file_name() : image.file.string();
+    const auto video = parse_video_of_frame_name(name);
     if (!video) {
       skipped.push_back({name, image.rejection->message});
       continue;
@@ -79,22 +79,23 @@ std::vector<SkippedImage> skipped_images(const std::vector<Observation>& images)
   return skipped;
 }
 
-void add_remarks(const Observations& seen, StepResult& result) {
-  const auto skipped = skipped_images(seen.images);
+void add_intake_remarks(const Observations& seen, StepResult& result) {
+  const auto skipped = list_skipped_images(seen.images);
   result.skipped.insert(result.skipped.begin(), skipped.begin(), skipped.end());
-  prepend(seen.warnings, result.warnings);
-  prepend(seen.notes, result.notes);
-  prepend(seen.details, result.details);
+  prepend_remarks(seen.warnings, result.warnings);
+  prepend_remarks(seen.notes, result.notes);
+  prepend_remarks(seen.details, result.details);
   for (const Observation& image : seen.images) {
-    if (image.is_kept() || !parse_video_name(image.name())) continue;
-    result.details.push_back(image.name() + ": " + image.rejection->message);
+    if (image.is_kept() || !parse_video_of_frame_name(image.file_name())) continue;
+    result.details.push_back(image.file_name() + ": " + image.rejection->message);
   }
   if (!seen.failure) return;
   const auto& [is_wrong_file, message, file] = *seen.failure;
-  result.fail(is_wrong_file ? StepFailure::wrong_board : StepFailure::undetermined, message, file);
+  result.set_failure(is_wrong_file ? StepFailure::wrong_board : StepFailure::undetermined, message,
+                     file);
 }
 
-std::string message_of(const StepResult& result) {
+std::string format_failure_message(const StepResult& result) {
   return result.subject.empty() ? result.why : InputError(result.subject, result.why).what();
 }
 

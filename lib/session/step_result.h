@@ -63,7 +63,7 @@ struct StepResult {
 
   bool ok() const { return failure == StepFailure::none; }
   /// Sets failure, message and file to correct.
-  void fail(StepFailure how, std::string words, std::filesystem::path file = {}) {
+  void set_failure(StepFailure how, std::string words, std::filesystem::path file = {}) {
     failure = how;
     why = std::move(words);
     subject = std::move(file);
@@ -77,13 +77,13 @@ std::optional<StepFailure> step_failure_from_name(std::string_view name);
 
 /// Returns the rejected images with their reasons. Names include the folder if there are several
 /// folders. Rejected frames of a video are combined to one entry per reason, with their number.
-std::vector<SkippedImage> skipped_images(const std::vector<Observation>& images);
+std::vector<SkippedImage> list_skipped_images(const std::vector<Observation>& images);
 
 /// Adds the remarks of an intake to the result of a step: skipped images, warnings, notes, details.
 /// Fails the step if no image can be used.
-void add_remarks(const Observations& seen, StepResult& result);
+void add_intake_remarks(const Observations& seen, StepResult& result);
 
 /// Returns "FILE: message", or the message alone without a file.
-std::string message_of(const StepResult& result);
+std::string format_failure_message(const StepResult& result);
 
 }  // namespace vlp

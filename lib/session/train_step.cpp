@@ -36,12 +36,14 @@ bool has_examples(std::span<const LabeledLight> lights, const LampMap& lamps,
     few += fmt::format("{}{} (has {})", few.empty() ? "" : ", ", lamp, count);
   }
   if (!few.empty()) {
-    result.fail(StepFailure::undetermined,
-                fmt::format("too few labeled lights of lamps {}: add captures in which they are "
-                            "wholly in view, {} or more of each",
-                            few, kMinExamples));
+    result.set_failure(
+        StepFailure::undetermined,
+        fmt::format("too few labeled lights of lamps {}: add captures in which they are "
+                    "wholly in view, {} or more of each",
+                    few, kMinExamples));
   } else if (counts.size() < 2) {
-    result.fail(StepFailure::undetermined, "a classifier needs two lamps or more; add lamps");
+    result.set_failure(StepFailure::undetermined,
+                       "a classifier needs two lamps or more; add lamps");
   }
   return result.ok();
 }
@@ -54,14 +56,15 @@ bool has_kept_examples(const LampClassifier& classifier, TrainStepResult& result
     few += fmt::format("{}{}", few.empty() ? "" : ", ", lamp.lamp);
   }
   if (few.empty()) return true;
-  result.fail(StepFailure::undetermined,
-              fmt::format("the lights of lamps {} differ too much: are their labels right? Add "
-                          "captures that show them clearly",
-                          few));
+  result.set_failure(
+      StepFailure::undetermined,
+      fmt::format("the lights of lamps {} differ too much: are their labels right? Add "
+                  "captures that show them clearly",
+                  few));
   return false;
 }
 
-void warn_of_inseparable(const LampClassifier& classifier, TrainStepResult& result) {
+void warn_about_inseparable_lamps(const LampClassifier& classifier, TrainStepResult& result) {
   constexpr std::size_t max_lines = 10;
   const auto pairs = find_inseparable_lamps(classifier);
   for (std::size_t i = 0; i < std::min(pairs.size(), max_lines); ++i) {
@@ -77,11 +80,11 @@ void warn_of_inseparable(const LampClassifier& classifier, TrainStepResult& resu
 }
 
 /// Warns if the labeled lamps contradict the row time of the calibration.
-void warn_of_row_time(const DetectedLights& seen, const std::vector<std::vector<Frame>>& labels,
-                      const LampMap& lamps, TrainStepResult& result) {
+void warn_about_row_time(const DetectedLights& seen, const std::vector<std::vector<Frame>>& labels,
+                         const LampMap& lamps, TrainStepResult& result) {
   if (!seen.camera.row_time_s) return;
   const auto measured =
-      choose_row_time_by_places(seen.folders(), labels, lamps, seen.camera.lens).found;
+      select_row_time_by_positions(seen.folders(), labels, lamps, seen.camera.lens).found;
   if (!measured) return;
   std::string error = compare_row_times(*measured, {*seen.camera.row_time_s, "the calibration"});
   if (!error.empty()) result.warnings.push_back(std::move(error));
@@ -105,12 +108,12 @@ TrainStepResult train_lamp_classifier(const DetectedLights& seen,
                      "equal, with their endings");
   }
   if (!has_examples(labeled.lights, lamps, result)) return result;
-  result.classifier = train_classifier(labeled.lights);
+  result.classifier = fit_lamp_classifier(labeled.lights);
   result.classifier.row_time_s = seen.camera.row_time_s;
   if (!has_kept_examples(result.classifier, result)) return result;
-  result.confusion = cross_validate(labeled.lights, train_classifier);
-  warn_of_inseparable(result.classifier, result);
-  warn_of_row_time(seen, labels, lamps, result);
+  result.confusion = cross_validate_lamp_classifier(labeled.lights, fit_lamp_classifier);
+  warn_about_inseparable_lamps(result.classifier, result);
+  warn_about_row_time(seen, labels, lamps, result);
   return result;
 }
 

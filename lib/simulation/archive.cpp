@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<fs::path> images_in_order(const fs::path& folder) {
+std::vector<fs::path> list_images_in_order(const fs::path& folder) {
   std::vector<fs::path> images;
   for (const auto& entry : fs::directory_iterator(folder)) {
     const fs::path ending = entry.path().extension();
@@ -66,7 +66,7 @@ std::size_t count_chosen(std::size_t n, double fraction) {
 
 /// Returns the number of the choice (from 0) that falls on session `index`; std::nullopt if it is
 /// not chosen.
-std::optional<std::size_t> find_choice(std::size_t index, double fraction) {
+std::optional<std::size_t> find_chosen_index(std::size_t index, double fraction) {
   const std::size_t before = count_chosen(index, fraction);
   if (count_chosen(index + 1, fraction) == before) return std::nullopt;
   return before;
@@ -78,7 +78,7 @@ std::string format_numbered(const std::string& name, std::size_t number, std::si
 }
 
 /// Returns the mount tilted further by `tilt_rad` towards an azimuth of the image.
-Mount tilted(const Mount& mount, double tilt_rad, double azimuth_rad) {
+Mount tilt_mount(const Mount& mount, double tilt_rad, double azimuth_rad) {
   const Eigen::Vector3d zenith_in_camera = mount.level_from_camera.row(2);
   const Eigen::Vector3d axis(-std::sin(azimuth_rad), std::cos(azimuth_rad), 0);
   return {level_from_zenith(Eigen::AngleAxisd(tilt_rad, axis) * zenith_in_camera),
@@ -95,12 +95,12 @@ void draw_camera(Scene& scene, const ArchiveVariation& variation, cv::RNG random
     intrinsics[i] *= 1 + variation.distortion_fraction * fraction();
   }
   const double tilt_rad = variation.tilt_rad * std::abs(fraction());
-  scene.mount = tilted(scene.mount, tilt_rad, std::numbers::pi * fraction());
+  scene.mount = tilt_mount(scene.mount, tilt_rad, std::numbers::pi * fraction());
   for (double& part : scene.mount.lever_arm_m) part += variation.lever_arm_m * fraction();
 }
 
 void draw_session(Scene& scene, const ArchiveVariation& variation, cv::RNG random) {
-  scene.seed = draw_seed_from(random);
+  scene.seed = draw_random_seed(random);
   for (SceneLamp& lamp : scene.lamps) {
     for (double& part : lamp.map_error_m) {
       part += variation.map_error_m * random.uniform(-1.0, 1.0);
@@ -108,8 +108,8 @@ void draw_session(Scene& scene, const ArchiveVariation& variation, cv::RNG rando
   }
 }
 
-void apply(ArchiveFault fault, Scene& scene) {
-  if (fault == ArchiveFault::tilted) scene.mount = tilted(scene.mount, rad_from_deg(4), 0);
+void apply_archive_fault(ArchiveFault fault, Scene& scene) {
+  if (fault == ArchiveFault::tilted) scene.mount = tilt_mount(scene.mount, rad_from_deg(4), 0);
   if (fault == ArchiveFault::out_of_focus) {
     scene.optics.blur_px = std::max(0.8, 1.5 * scene.optics.blur_px);
   }
@@ -134,12 +134,13 @@ void write_table(const Scene& scene, std::size_t sessions, const fs::path& outpu
     table.row({session.camera, session.session, to_string(session.fault), to_string(session.damage),
                session.damaged});
   }
-  table.save();
+  table.save_file();
 }
 
 /// Renders a session into a temporary folder, then moves it into place. Returns false if the
 /// session exists already.
-bool render(const ArchiveSession& session, const fs::path& output, const std::string& provenance) {
+bool render_archive_session(const ArchiveSession& session, const fs::path& output,
+                            const std::string& provenance) {
   const fs::path place = output / session.camera / session.session;
   if (fs::exists(place)) return false;
   const fs::path unfinished = output / ".unfinished" / (session.camera + "-" + session.session);
@@ -149,7 +150,7 @@ bool render(const ArchiveSession& session, const fs::path& output, const std::st
   simulate(session.scene, unfinished,
            {{}, 1, first_line + ": " + session.camera + "/" + session.session + " of an archive\n"},
            [](const SimulationSummary&, std::size_t) {});
-  damage(session, unfinished);
+  damage_session_files(session, unfinished);
   fs::rename(unfinished, place);
   return true;
 }
@@ -164,17 +165,17 @@ std::string_view to_string(ArchiveDamage damage) {
   return kDamageNames[static_cast<std::size_t>(damage)];
 }
 
-void damage(const ArchiveSession& session, const fs::path& folder) {
+void damage_session_files(const ArchiveSession& session, const fs::path& folder) {
   if (session.fault == ArchiveFault::cut_image) {
     const auto& sets = session.scene.sets;
     const auto lamps =
         std::find_if(sets.rbegin(), sets.rend(), [](const CaptureSet& set) { return !set.board; });
-    truncate_image(images_in_order(folder / lamps->folder).front());
+    truncate_image(list_images_in_order(folder / lamps->folder).front());
   }
   const fs::path target = folder / session.damaged;
   switch (session.damage) {
     case ArchiveDamage::cut_images:
-      for (const fs::path& image : images_in_order(target)) truncate_image(image);
+      for (const fs::path& image : list_images_in_order(target)) truncate_image(image);
       break;
     case ArchiveDamage::missing:
       fs::remove_all(target);
@@ -204,15 +205,17 @@ ArchiveSession make_archive_session(const Scene& scene, std::size_t index) {
                          ArchiveDamage::none,
                          ""};
   session.scene.camera.id = session.camera;
-  draw_camera(session.scene, variation, make_random(scene.seed, "archive camera", camera));
-  draw_session(session.scene, variation, make_random(scene.seed, "archive session", index));
-  const auto fault = find_choice(index, variation.fault_fraction);
-  if (const auto damage_target = find_choice(index, variation.damage_fraction)) {
+  draw_camera(session.scene, variation,
+              make_seeded_generator(scene.seed, "archive camera", camera));
+  draw_session(session.scene, variation,
+               make_seeded_generator(scene.seed, "archive session", index));
+  const auto fault = find_chosen_index(index, variation.fault_fraction);
+  if (const auto damage_target = find_chosen_index(index, variation.damage_fraction)) {
     std::tie(session.damage, session.damaged) =
         kDamageTargets[*damage_target % kDamageTargets.size()];
   } else if (fault) {
     session.fault = static_cast<ArchiveFault>(1 + *fault % (kFaultNames.size() - 1));
-    apply(session.fault, session.scene);
+    apply_archive_fault(session.fault, session.scene);
   }
   return session;
 }
@@ -227,7 +230,8 @@ SimulationSummary simulate_archive(const Scene& scene, std::size_t sessions, con
   std::mutex counting;
   try {
     parallel_for(sessions, options.threads, [&](std::size_t index) {
-      const bool rendered = render(make_archive_session(scene, index), output, options.provenance);
+      const bool rendered =
+          render_archive_session(make_archive_session(scene, index), output, options.provenance);
       const std::lock_guard lock(counting);
       ++(rendered ? summary.rendered : summary.found);
       progress(summary, sessions);

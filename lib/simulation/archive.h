@@ -56,7 +56,7 @@ ArchiveSession make_archive_session(const Scene& scene, std::size_t index);
 
 /// Applies the cut_image fault and the damage of a session to its files in `folder`. A second call
 /// has no further effect.
-void damage(const ArchiveSession& session, const std::filesystem::path& folder);
+void damage_session_files(const ArchiveSession& session, const std::filesystem::path& folder);
 
 /// Renders the first `sessions` sessions of an archive into `output`:
 ///   scene.yaml, archive.csv (camera, session, fault, damage, damaged)

@@ -24,16 +24,17 @@ using Context = std::unique_ptr<cairo_t, void (*)(cairo_t*)>;
 using Surface = std::unique_ptr<cairo_surface_t, void (*)(cairo_surface_t*)>;
 
 /// Returns the width of the border around the tag field that is printed or has to stay white.
-double border_m(const Board& board) {
-  if (board.has_squares() || board.corner_squares) return printed_border_m(board);
+double get_page_margin_m(const Board& board) {
+  if (board.has_chessboard_squares() || board.corner_squares)
+    return compute_printed_border_m(board);
   return std::min(board.tag_size_m * board.tag_spacing, board.tag_size_m) / 2;
 }
 
 Eigen::Vector2d printed_size_m(const Board& board) {
-  return tag_field_m(board) + 2 * Eigen::Vector2d::Constant(border_m(board));
+  return compute_tag_field_size_m(board) + 2 * Eigen::Vector2d::Constant(get_page_margin_m(board));
 }
 
-bool fits(const Board& board, const Eigen::Vector2d& sheet_m) {
+bool fits_on_sheet(const Board& board, const Eigen::Vector2d& sheet_m) {
   const Eigen::Vector2d room_m =
       sheet_m - 2 * Eigen::Vector2d::Constant(kMargin_m) - Eigen::Vector2d(0, kFooter_m);
   return (printed_size_m(board).array() <= room_m.array() + 1e-9).all();
@@ -42,9 +43,9 @@ bool fits(const Board& board, const Eigen::Vector2d& sheet_m) {
 /// Returns the page size, in landscape only if the board fits only so; std::nullopt if it does not
 /// fit.
 std::optional<Eigen::Vector2d> find_sheet_m(const Board& board, const PageSize& paper) {
-  if (fits(board, paper.size_m)) return paper.size_m;
+  if (fits_on_sheet(board, paper.size_m)) return paper.size_m;
   const Eigen::Vector2d lying = paper.size_m.reverse();
-  if (fits(board, lying)) return lying;
+  if (fits_on_sheet(board, lying)) return lying;
   return {};
 }
 
@@ -60,7 +61,7 @@ void draw_board(cairo_t* context, const Board& board) {
 
 std::string format_mm(double length_m) {
   constexpr double um_per_m = 1e6, um_per_mm = 1e3;
-  return shortest(std::round(length_m * um_per_m) / um_per_mm) + " mm";
+  return format_shortest(std::round(length_m * um_per_m) / um_per_mm) + " mm";
 }
 
 std::string describe_parameters(const Board& board) {
@@ -104,27 +105,27 @@ cairo_status_t append(void* text, const unsigned char* bytes, unsigned int count
 
 }  // namespace
 
-const std::vector<PageSize>& page_sizes() {
+const std::vector<PageSize>& list_page_sizes() {
   static const std::vector<PageSize> all{{"A4", {0.210, 0.297}}, {"A3", {0.297, 0.420}},
                                          {"A2", {0.420, 0.594}}, {"A1", {0.594, 0.841}},
                                          {"A0", {0.841, 1.189}}, {"Letter", {0.2159, 0.2794}}};
   return all;
 }
 
-const PageSize& find_page_size(const std::string& name) {
-  for (const PageSize& paper : page_sizes()) {
+const PageSize& find_paper_size_by_name(const std::string& name) {
+  for (const PageSize& paper : list_page_sizes()) {
     if (paper.name == name) return paper;
   }
   std::string names;
-  for (const PageSize& paper : page_sizes())
+  for (const PageSize& paper : list_page_sizes())
     names.append(names.empty() ? "" : ", ").append(paper.name);
   throw std::invalid_argument("there is no paper '" + name + "', only " + names);
 }
 
-std::optional<double> find_largest_size_m(const Board& board, const PageSize& paper) {
+std::optional<double> find_largest_board_size_m(const Board& board, const PageSize& paper) {
   constexpr int min_mm = 5, max_mm = 1000;
   Board candidate = board;
-  double& size_m = board.has_squares() ? candidate.square_size_m : candidate.tag_size_m;
+  double& size_m = board.has_chessboard_squares() ? candidate.square_size_m : candidate.tag_size_m;
   for (int size_mm = max_mm; size_mm >= min_mm; --size_mm) {
     size_m = size_mm / 1000.0;
     if (find_sheet_m(candidate, paper)) return size_m;
@@ -152,7 +153,7 @@ std::string render_board_pdf(const Board& board, const PageSize& paper) {
     cairo_scale(context.get(), kPointsPerMeter, kPointsPerMeter);
     cairo_save(context.get());
     const Eigen::Vector2d room_m = *sheet_m - Eigen::Vector2d(0, kFooter_m);
-    const Eigen::Vector2d begin_m = (room_m - tag_field_m(board)) / 2;
+    const Eigen::Vector2d begin_m = (room_m - compute_tag_field_size_m(board)) / 2;
     cairo_translate(context.get(), begin_m.x(), begin_m.y());
     draw_board(context.get(), board);
     cairo_restore(context.get());

@@ -23,7 +23,7 @@ struct TagPattern {
   std::vector<bool> white;
 
   int width() const { return border_width + 2 * outside; }
-  std::size_t index(int column, int row) const {
+  std::size_t flat_index(int column, int row) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(width()) +
            static_cast<std::size_t>(column);
   }
@@ -45,10 +45,10 @@ struct Ink {
 /// family
 std::vector<Rectangle> make_board_pattern(const Board& board, const Ink& ink);
 
-/// Returns the distance from the edge of the tag field (tag_field_m()) to the outermost printed
-/// edge, m. Corner squares and the outer squares of chessboards extend beyond the field; otherwise
-/// 0.
-double printed_border_m(const Board& board);
+/// Returns the distance from the edge of the tag field (compute_tag_field_size_m()) to the
+/// outermost printed edge, m. Corner squares and the outer squares of chessboards extend beyond the
+/// field; otherwise 0.
+double compute_printed_border_m(const Board& board);
 
 /// Deflection of a warped board along z of the board frame (SceneBoard::warp_m).
 class BoardWarp {
@@ -61,28 +61,29 @@ class BoardWarp {
     Eigen::Vector2d slope;
   };
   /// Returns the deflection at a point (x, y) of the board, m.
-  Depth depth(const Eigen::Vector2d& at_m) const;
-  bool flat() const { return warp_m_.isZero(0); }
+  Depth compute_deflection(const Eigen::Vector2d& at_m) const;
+  bool is_flat() const { return warp_m_.isZero(0); }
 
  private:
   Eigen::Vector2d field_m_, warp_m_;
 };
 
-/// Printed board, warped or flat, for add_shape(). Values are radiances minus that of
+/// Printed board, warped or flat, for add_shape_to_image(). Values are radiances minus that of
 /// the surroundings.
 class BoardPattern {
  public:
-  /// @throws std::invalid_argument if the board cannot be printed, see make_tag_pattern()
+  /// @throws std::invalid_argument if make_board_pattern() rejects the board
   explicit BoardPattern(const SceneBoard& board);
 
   /// Returns (x, y) of the intersection of a ray with the board, in the board frame; NaN if there
   /// is none.
-  Eigen::Vector2d hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
-  double integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
-    return mosaic_.integrate_edge(p, q);
+  Eigen::Vector2d intersect_ray(const Eigen::Vector3d& origin,
+                                const Eigen::Vector3d& direction) const;
+  double integrate_shape_along_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
+    return mosaic_.integrate_shape_along_edge(p, q);
   }
-  std::optional<double> constant_value(const std::array<Eigen::Vector2d, 4>& corners) const {
-    return mosaic_.constant_value(corners);
+  std::optional<double> find_constant_value(const std::array<Eigen::Vector2d, 4>& corners) const {
+    return mosaic_.find_constant_value(corners);
   }
 
  private:

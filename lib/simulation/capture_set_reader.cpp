@@ -13,17 +13,18 @@ namespace {
 /// Largest number of captures of one folder.
 constexpr int kMaxCaptures = 1'000'000;
 
-/// Rejects more than kMaxCaptures captures. `where` provides error() for the message.
+/// Rejects more than kMaxCaptures captures. `where` provides make_error() for the message.
 template <typename Place>
-void check_count(double captures, const Place& where) {
+void check_capture_count(double captures, const Place& where) {
   if (captures <= kMaxCaptures) return;
-  throw where.error("makes more than " + std::to_string(kMaxCaptures) + " captures");
+  throw where.make_error("makes more than " + std::to_string(kMaxCaptures) + " captures");
 }
 
 /// Rejects a height at which a light would not be above the camera.
 void check_height(const YamlValue& item, double height_m, const Scene& scene) {
   const auto check = [&](const Glow& glow, const std::string& name) {
-    if (glow.position_m.z() <= height_m + 1e-3) throw item.error(name + " is not above the camera");
+    if (glow.position_m.z() <= height_m + 1e-3)
+      throw item.make_error(name + " is not above the camera");
   };
   const Clutter& clutter = scene.clutter;
   for (const SceneLamp& lamp : scene.lamps) check(lamp.glow, "lamp " + std::to_string(lamp.id));
@@ -33,28 +34,29 @@ void check_height(const YamlValue& item, double height_m, const Scene& scene) {
 }
 
 /// Rejects a spot that does not leave space in the room for a rotation of the camera about it.
-void check_spot(const Eigen::Vector2d& spot_m, const Room& room, double lever_arm_m,
-                const YamlValue& value) {
+void check_pivot(const Eigen::Vector2d& spot_m, const Room& room, double lever_arm_m,
+                 const YamlValue& value) {
   const Eigen::Array2d spot = spot_m.array();
   const bool inside = (spot - lever_arm_m >= room.min_m.head<2>().array()).all() &&
                       (spot + lever_arm_m <= room.max_m.head<2>().array()).all();
-  if (!inside) throw value.error("moves the camera outside the room");
+  if (!inside) throw value.make_error("moves the camera outside the room");
 }
 
-Eigen::Vector2d read_spot(const YamlValue& value, const Room& room, double lever_arm_m) {
-  const Eigen::Vector2d spot_m(value.numbers(2).data());
-  check_spot(spot_m, room, lever_arm_m, value);
+Eigen::Vector2d read_pivot(const YamlValue& value, const Room& room, double lever_arm_m) {
+  const Eigen::Vector2d spot_m(value.get_numbers(2).data());
+  check_pivot(spot_m, room, lever_arm_m, value);
   return spot_m;
 }
 
 std::vector<Eigen::Vector2d> read_grid(const YamlValue& value, const Room& room,
                                        double lever_arm_m) {
-  YamlMap map = value.map();
-  const auto x = map.required("x_m").numbers(2), y = map.required("y_m").numbers(2);
-  const int columns = map.required("columns").integer_within(2, 1000);
-  const int rows = map.required("rows").integer_within(2, 1000);
-  map.finish();
-  for (const std::size_t end : {0U, 1U}) check_spot({x[end], y[end]}, room, lever_arm_m, value);
+  YamlMap map = value.get_mapping();
+  const auto x = map.get_required_column("x_m").get_numbers(2),
+             y = map.get_required_column("y_m").get_numbers(2);
+  const int columns = map.get_required_column("columns").get_integer_within(2, 1000);
+  const int rows = map.get_required_column("rows").get_integer_within(2, 1000);
+  map.check_all_keys_read();
+  for (const std::size_t end : {0U, 1U}) check_pivot({x[end], y[end]}, room, lever_arm_m, value);
   std::vector<Eigen::Vector2d> spots;
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
@@ -65,13 +67,14 @@ std::vector<Eigen::Vector2d> read_grid(const YamlValue& value, const Room& room,
   return spots;
 }
 
-StraightDrive read_drive(const YamlValue& value, const Room& room, double lever_arm_m) {
+StraightDrive read_straight_drive(const YamlValue& value, const Room& room, double lever_arm_m) {
   const StraightDrive drive = value.read_map([&](YamlMap& map) {
-    return StraightDrive{read_spot(map.required("from_m"), room, lever_arm_m),
-                         read_spot(map.required("to_m"), room, lever_arm_m),
-                         map.required("speed_m_per_s").number_within(1e-6, 20, "m/s")};
+    return StraightDrive{
+        read_pivot(map.get_required_column("from_m"), room, lever_arm_m),
+        read_pivot(map.get_required_column("to_m"), room, lever_arm_m),
+        map.get_required_column("speed_m_per_s").get_number_within(1e-6, 20, "m/s")};
   });
-  if (drive.from_m == drive.to_m) throw value.error("has no length");
+  if (drive.from_m == drive.to_m) throw value.make_error("has no length");
   return drive;
 }
 
@@ -81,7 +84,7 @@ std::vector<Eigen::Vector2d> compute_positions_along(const StraightDrive& drive,
   const double step_m = drive.speed_m_per_s * interval_s;
   constexpr double rounding = 1e-12;
   const double steps = std::floor(displacement.norm() / step_m * (1 + rounding));
-  check_count(steps + 1, value);
+  check_capture_count(steps + 1, value);
   std::vector<Eigen::Vector2d> places;
   for (int i = 0; i <= steps; ++i) {
     places.push_back(drive.from_m + displacement.normalized() * (step_m * i));
@@ -91,68 +94,70 @@ std::vector<Eigen::Vector2d> compute_positions_along(const StraightDrive& drive,
 
 /// Reads the position of the rotation axis at each capture: spots, a grid or a drive, all inside
 /// the room.
-void read_places(YamlMap& map, const Scene& scene, const Room& room, LampShots& captures) {
+void read_capture_positions(YamlMap& map, const Scene& scene, const Room& room,
+                            LampShots& captures) {
   const double lever_arm_m = scene.mount.lever_arm_m.norm();
-  const auto spots = map.optional("spots_m"), grid = map.optional("grid");
-  const auto drive = map.optional("drive");
+  const auto spots = map.get_optional("spots_m"), grid = map.get_optional("grid");
+  const auto drive = map.get_optional("drive");
   if (spots.has_value() + grid.has_value() + drive.has_value() != 1) {
-    throw map.error("needs one of the keys spots_m, grid, drive, views");
+    throw map.make_error("needs one of the keys spots_m, grid, drive, views");
   }
   if (spots) {
-    for (const YamlValue& spot : spots->list()) {
-      captures.spots_m.push_back(read_spot(spot, room, lever_arm_m));
+    for (const YamlValue& spot : spots->get_list()) {
+      captures.spots_m.push_back(read_pivot(spot, room, lever_arm_m));
     }
-    if (captures.spots_m.empty()) throw spots->error("contains no spot");
+    if (captures.spots_m.empty()) throw spots->make_error("contains no spot");
   } else if (grid) {
     captures.spots_m = read_grid(*grid, room, lever_arm_m);
   } else {
-    captures.drive = read_drive(*drive, room, lever_arm_m);
+    captures.drive = read_straight_drive(*drive, room, lever_arm_m);
     captures.spots_m = compute_positions_along(*captures.drive, captures.interval_s, *drive);
   }
 }
 
-void read_heights(const YamlValue& list, const Scene& scene, const Room& room,
-                  LampShots& captures) {
-  for (const YamlValue& item : list.list()) {
-    const double height_m = item.number_within(-200, 200, "m");
+void read_capture_heights(const YamlValue& list, const Scene& scene, const Room& room,
+                          LampShots& captures) {
+  for (const YamlValue& item : list.get_list()) {
+    const double height_m = item.get_number_within(-200, 200, "m");
     check_height(item, height_m, scene);
     if (height_m < room.min_m.z() || height_m > room.max_m.z()) {
-      throw item.error("moves the camera outside the room");
+      throw item.make_error("moves the camera outside the room");
     }
     captures.heights_m.push_back(height_m);
   }
-  if (captures.heights_m.empty()) throw list.error("contains no height");
+  if (captures.heights_m.empty()) throw list.make_error("contains no height");
 }
 
 void read_yaws(YamlMap& map, LampShots& captures) {
   captures.yaw_jitter_rad = 0;
-  const auto yaws = map.optional("yaws_deg"), turn = map.optional("turn");
+  const auto yaws = map.get_optional("yaws_deg"), turn = map.get_optional("turn");
   if (yaws.has_value() == turn.has_value()) {
-    throw map.error("needs one of the keys yaws_deg and turn");
+    throw map.make_error("needs one of the keys yaws_deg and turn");
   }
   if (yaws) {
-    for (const YamlValue& yaw : yaws->list()) {
-      captures.yaws_rad.push_back(rad_from_deg(yaw.number_within(-360, 360, "degrees")));
+    for (const YamlValue& yaw : yaws->get_list()) {
+      captures.yaws_rad.push_back(rad_from_deg(yaw.get_number_within(-360, 360, "degrees")));
     }
-    if (captures.yaws_rad.empty()) throw yaws->error("contains no yaw");
+    if (captures.yaws_rad.empty()) throw yaws->make_error("contains no yaw");
     return;
   }
-  YamlMap keys = turn->map();
-  const int count = keys.required("count").integer_within(1, 100'000);
+  YamlMap keys = turn->get_mapping();
+  const int count = keys.get_required_column("count").get_integer_within(1, 100'000);
   captures.yaw_jitter_rad =
-      rad_from_deg(keys.required("jitter_deg").number_within(0, 180, "degrees"));
-  keys.finish();
+      rad_from_deg(keys.get_required_column("jitter_deg").get_number_within(0, 180, "degrees"));
+  keys.check_all_keys_read();
   for (int i = 0; i < count; ++i) captures.yaws_rad.push_back(rad_from_deg(360.0 * i / count));
 }
 
 Vibration read_vibration(YamlMap& map) {
-  return {rad_from_deg(map.required("amplitude_deg").number_within(0, 10, "degrees")),
-          map.required("frequency_hz").number_within(1e-3, 1000, "Hz")};
+  return {
+      rad_from_deg(map.get_required_column("amplitude_deg").get_number_within(0, 10, "degrees")),
+      map.get_required_column("frequency_hz").get_number_within(1e-3, 1000, "Hz")};
 }
 
 void read_roll_pitch(YamlMap map, LampShots& captures) {
   const auto ramp = [&](const std::string& key) {
-    const auto value = map.optional(key);
+    const auto value = map.get_optional(key);
     if (!value) return std::pair(0.0, 0.0);
     const auto ends = value->numbers_within(2, -85, 85, "degrees");
     return std::pair(rad_from_deg(ends[0]), rad_from_deg(ends[1]));
@@ -160,55 +165,58 @@ void read_roll_pitch(YamlMap map, LampShots& captures) {
   captures.roll_rad = ramp("roll_deg");
   captures.pitch_rad = ramp("pitch_deg");
   captures.vibration = map.optional_map("vibration", read_vibration).value_or(captures.vibration);
-  map.finish();
+  map.check_all_keys_read();
 }
 
 LampShots read_lamp_captures(YamlMap& map, const Scene& scene, const Room& room) {
-  if (scene.lamps.empty()) throw map.error("the scene has no lamps");
+  if (scene.lamps.empty()) throw map.make_error("the scene has no lamps");
   LampShots captures;
-  captures.interval_s = map.required("interval_s").number_within(1e-6, 1e5, "s");
-  read_places(map, scene, room, captures);
-  read_heights(map.required("heights_m"), scene, room, captures);
+  captures.interval_s = map.get_required_column("interval_s").get_number_within(1e-6, 1e5, "s");
+  read_capture_positions(map, scene, room, captures);
+  read_capture_heights(map.get_required_column("heights_m"), scene, room, captures);
   read_yaws(map, captures);
   captures.turn_rate_rad_per_s = rad_from_deg(
-      map.optional_number("turn_rate_deg_per_s", -720, 720, "degrees per second").value_or(0));
-  if (const auto lean = map.optional("roll_pitch")) read_roll_pitch(lean->map(), captures);
-  const auto repeat = map.optional("repeat");
-  captures.repeat = repeat ? repeat->integer_within(1, kMaxCaptures) : 1;
-  const auto known = map.optional("known");
-  captures.known = known && known->boolean();
-  check_count(double(captures.spots_m.size()) * double(captures.heights_m.size()) *
-                  double(captures.yaws_rad.size()) * captures.repeat,
-              map);
+      map.get_optional_number("turn_rate_deg_per_s", -720, 720, "degrees per second").value_or(0));
+  if (const auto lean = map.get_optional("roll_pitch"))
+    read_roll_pitch(lean->get_mapping(), captures);
+  const auto repeat = map.get_optional("repeat");
+  captures.repeat = repeat ? repeat->get_integer_within(1, kMaxCaptures) : 1;
+  const auto known = map.get_optional("known");
+  captures.known = known && known->get_boolean();
+  check_capture_count(double(captures.spots_m.size()) * double(captures.heights_m.size()) *
+                          double(captures.yaws_rad.size()) * captures.repeat,
+                      map);
   if (captures.drive && captures.yaw_jitter_rad > 0) {
-    throw map.error("yaws do not jitter on a drive: set jitter_deg to 0");
+    throw map.make_error("yaws do not jitter on a drive: set jitter_deg to 0");
   }
   return captures;
 }
 
 BoardViews read_board_views(YamlMap& map) {
   BoardViews views;
-  views.count = map.required("count").integer_within(1, kMaxCaptures);
-  views.distance_m = read_range(map.required("distance_m"), 1e-3, 100, "m");
-  views.tilt_rad = rad_from_deg(map.required("tilt_deg").number_within(0, 80, "degrees"));
-  views.roll_rad = rad_from_deg(map.required("roll_deg").number_within(0, 180, "degrees"));
-  views.spread =
-      map.required("field_coverage").number_within(0, 1, "(of the way to the image's edge)");
+  views.count = map.get_required_column("count").get_integer_within(1, kMaxCaptures);
+  views.distance_m = read_yaml_range(map.get_required_column("distance_m"), 1e-3, 100, "m");
+  views.tilt_rad =
+      rad_from_deg(map.get_required_column("tilt_deg").get_number_within(0, 80, "degrees"));
+  views.roll_rad =
+      rad_from_deg(map.get_required_column("roll_deg").get_number_within(0, 180, "degrees"));
+  views.spread = map.get_required_column("field_coverage")
+                     .get_number_within(0, 1, "(of the way to the image's edge)");
   views.velocity_m_per_s.setZero();
-  if (const auto velocity = map.optional("velocity_m_per_s")) {
+  if (const auto velocity = map.get_optional("velocity_m_per_s")) {
     views.velocity_m_per_s = Eigen::Vector3d(velocity->numbers_within(3, -10, 10, "m/s").data());
   }
   return views;
 }
 
 std::string read_folder(const YamlValue& value) {
-  const std::string folder = value.text();
+  const std::string folder = value.get_text();
   const auto plain = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
            c == '_';
   };
   if (folder.empty() || !std::all_of(folder.begin(), folder.end(), plain)) {
-    throw value.error("should be a name of letters, digits, - and _");
+    throw value.make_error("should be a name of letters, digits, - and _");
   }
   return folder;
 }
@@ -217,10 +225,10 @@ std::string read_folder(const YamlValue& value) {
 
 CaptureSet read_capture_set(YamlMap& map, const Scene& scene, const Room& room) {
   CaptureSet set;
-  set.folder = read_folder(map.required("folder"));
-  set.exposure_s = map.required("exposure_s").number_within(1e-7, 1, "s");
-  if (const auto views = map.optional("views")) {
-    if (!scene.board) throw map.error("views are of a board, and the scene has none");
+  set.folder = read_folder(map.get_required_column("folder"));
+  set.exposure_s = map.get_required_column("exposure_s").get_number_within(1e-7, 1, "s");
+  if (const auto views = map.get_optional("views")) {
+    if (!scene.board) throw map.make_error("views are of a board, and the scene has none");
     set.board = views->read_map(read_board_views);
   } else {
     set.lamps = read_lamp_captures(map, scene, room);

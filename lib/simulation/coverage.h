@@ -17,13 +17,14 @@ namespace vlp {
 using TargetFromCamera = std::function<Eigen::Isometry3d(int line)>;
 
 /// Returns the intersection of a ray with the plane z = 0 of the target; NaN if there is none.
-inline Eigen::Vector2d plane_hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
+inline Eigen::Vector2d intersect_ray_with_plane(const Eigen::Vector3d& origin,
+                                                const Eigen::Vector3d& direction) {
   const double distance = -origin.z() / direction.z();
   if (!(distance > 0)) return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   return origin.head<2>() + distance * direction.head<2>();
 }
 
-inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+inline double cross_product_2d(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
@@ -31,31 +32,31 @@ inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 /// pattern g over the element: a pixel or, with `per_px` 2, a quarter of one.
 ///
 /// The mean is exact for the element's image on the pattern, a quadrilateral Q. By Green's theorem
-/// the integral of g over Q is the sum of shape.integrate_edge(p, q) over its edges. An edge
-/// integral is the integral along the edge of any G(x, y) that Green's theorem turns into g.
+/// the integral of g over Q is the sum of shape.integrate_shape_along_edge(p, q) over its edges. An
+/// edge integral is the integral along the edge of any G(x, y) that Green's theorem turns into g.
 ///
 /// Reason for quarters of pixels: a lens blurs the light before pixels integrate it. Blurring pixel
 /// means instead would displace an edge by 0.01 px. Rays within a pixel are interpolated linearly
 /// between those of its corners.
 ///
-/// A shape has hit(origin, direction) in its frame and integrate_edge(p, q). Its
-/// constant_value(corners) is the value of the pattern if it is constant over a whole
+/// A shape has hit(origin, direction) in its frame and integrate_shape_along_edge(p, q). Its
+/// find_constant_value(corners) is the value of the pattern if it is constant over a whole
 /// quadrilateral.
 template <typename Shape>
-void add_shape(const PixelRays& rays, const PixelWindow& window,
-               const TargetFromCamera& target_from_camera, const Shape& shape, double weight,
-               cv::Mat1f& image, int per_px = 1) {
+void add_shape_to_image(const PixelRays& rays, const PixelWindow& window,
+                        const TargetFromCamera& target_from_camera, const Shape& shape,
+                        double weight, cv::Mat1f& image, int per_px = 1) {
   struct Edge {
     double integral, area;
   };
   const auto edge = [&](const Eigen::Vector2d& p, const Eigen::Vector2d& q) {
-    return Edge{shape.integrate_edge(p, q), cross(p, q) / 2};
+    return Edge{shape.integrate_shape_along_edge(p, q), cross_product_2d(p, q) / 2};
   };
   const auto corner_ray = [&](int row, int column) -> Eigen::Vector3d {
     const int line = window.line_begin + row / per_px, place = window.place_begin + column / per_px;
     const int next_line = line + row % per_px, next_place = place + column % per_px;
-    return rays.corner(line, place) + rays.corner(line, next_place) +
-           rays.corner(next_line, place) + rays.corner(next_line, next_place);
+    return rays.pixel_corner_ray(line, place) + rays.pixel_corner_ray(line, next_place) +
+           rays.pixel_corner_ray(next_line, place) + rays.pixel_corner_ray(next_line, next_place);
   };
   const auto columns = static_cast<std::size_t>(image.cols);
   std::vector<Eigen::Vector2d> above(columns + 1), below(columns + 1);
@@ -64,15 +65,16 @@ void add_shape(const PixelRays& rays, const PixelWindow& window,
     const Eigen::Vector3d origin = pose.translation();
     for (std::size_t i = 0; i <= columns; ++i) {
       const int column = static_cast<int>(i);
-      above[i] =
-          row % per_px == 0 ? shape.hit(origin, pose.linear() * corner_ray(row, column)) : below[i];
-      below[i] = shape.hit(origin, pose.linear() * corner_ray(row + 1, column));
+      above[i] = row % per_px == 0
+                     ? shape.intersect_ray(origin, pose.linear() * corner_ray(row, column))
+                     : below[i];
+      below[i] = shape.intersect_ray(origin, pose.linear() * corner_ray(row + 1, column));
     }
     std::optional<Edge> left;
     for (std::size_t i = 0; i < columns; ++i) {
       float& element = image(row, static_cast<int>(i));
       if (const auto even =
-              shape.constant_value({above[i], above[i + 1], below[i + 1], below[i]})) {
+              shape.find_constant_value({above[i], above[i + 1], below[i + 1], below[i]})) {
         element += static_cast<float>(weight * *even);
         left.reset();
         continue;

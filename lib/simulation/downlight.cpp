@@ -56,7 +56,7 @@ double compute_halo_fraction(const Halo& halo, double radius_m, const Eigen::Vec
 
 }  // namespace
 
-double compute_radiance_fraction(const Recess& recess, double radius_m,
+double compute_relative_radiance(const Recess& recess, double radius_m,
                                  const Eigen::Vector3d& eye_m, const Eigen::Vector2d& at_m) {
   if (eye_m.z() >= 0) return 0;
   const Eigen::Vector2d slope = (at_m - eye_m.head<2>()) / -eye_m.z();
@@ -73,25 +73,26 @@ double compute_radiance_fraction(const Recess& recess, double radius_m,
   return wall + (1 - wall) * source;
 }
 
-double light_radius_m(const Glow& glow) {
+double compute_light_radius_m(const Glow& glow) {
   return glow.radius_m() + (glow.halo ? kHaloLengths * glow.halo->length_m : 0);
 }
 
-void add_downlight(const PixelRays& rays, const PixelWindow& window,
-                   const TargetFromCamera& glow_from_camera, const Glow& glow, cv::Mat1f& image) {
+void add_downlight_to_image(const PixelRays& rays, const PixelWindow& window,
+                            const TargetFromCamera& glow_from_camera, const Glow& glow,
+                            cv::Mat1f& image) {
   const double radius_m = glow.radius_m();
-  cv::Mat1f inside = window.image(0);
-  add_shape(rays, window, glow_from_camera, Disc(*glow.shape.size_m / 2, 1), 1, inside);
+  cv::Mat1f inside = window.make_constant_image(0);
+  add_shape_to_image(rays, window, glow_from_camera, Disc(*glow.shape.size_m / 2, 1), 1, inside);
   if (!glow.recess) {
-    add_shape(rays, window, glow_from_camera,
-              Disc(*glow.shape.size_m / 2, glow.rim_to_center_ratio), glow.electron_rate_e_per_s,
-              image);
+    add_shape_to_image(rays, window, glow_from_camera,
+                       Disc(*glow.shape.size_m / 2, glow.rim_to_center_ratio),
+                       glow.electron_rate_e_per_s, image);
   }
   for (int line = window.line_begin; line < window.line_end; ++line) {
     const Eigen::Isometry3d pose = glow_from_camera(line);
     const Eigen::Vector3d eye_m = pose.translation();
     const auto hit = [&](int at_line, int place) {
-      return plane_hit(eye_m, pose.linear() * rays.corner(at_line, place));
+      return intersect_ray_with_plane(eye_m, pose.linear() * rays.pixel_corner_ray(at_line, place));
     };
     for (int place = window.place_begin; place < window.place_end; ++place) {
       const int row = line - window.line_begin, column = place - window.place_begin;
@@ -103,7 +104,7 @@ void add_downlight(const PixelRays& rays, const PixelWindow& window,
       if (!at_m.allFinite()) continue;
       double fraction = 0;
       if (glow.recess)
-        fraction += part * compute_radiance_fraction(*glow.recess, radius_m, eye_m, at_m);
+        fraction += part * compute_relative_radiance(*glow.recess, radius_m, eye_m, at_m);
       if (glow.chips) fraction += part * compute_chip_fraction(*glow.chips, radius_m, at_m);
       fraction += part * compute_hot_spot_fraction(glow.hot_spots, at_m);
       if (glow.halo && eye_m.z() < 0)

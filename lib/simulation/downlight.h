@@ -8,22 +8,24 @@
 namespace vlp {
 
 /// Returns the radius up to which a glow emits light, its halo included, m.
-double light_radius_m(const Glow& glow);
+double compute_light_radius_m(const Glow& glow);
 
 /// Returns the radiance on a ray inside the rim, as a fraction of the source's radiance; see
 /// Recess. 0 for an eye above the rim's plane.
 ///
+/// @param radius_m  radius of the rim, m
 /// @param eye_m  start of the ray, from the rim's center, m
 /// @param at_m  intersection of the ray with the rim's plane, from the rim's center, m
-double compute_radiance_fraction(const Recess& recess, double radius_m,
+double compute_relative_radiance(const Recess& recess, double radius_m,
                                  const Eigen::Vector3d& eye_m, const Eigen::Vector2d& at_m);
 
 /// Adds to each pixel of the window, which is all of `image`, the radiance of a glow with a recess,
 /// chips, hot spots or a halo.
 ///
-/// The fraction of a pixel inside the rim is exact (add_shape()). Radiances are evaluated at the
-/// pixel's center, so they should vary little within a pixel.
-void add_downlight(const PixelRays& rays, const PixelWindow& window,
-                   const TargetFromCamera& glow_from_camera, const Glow& glow, cv::Mat1f& image);
+/// The fraction of a pixel inside the rim is exact (add_shape_to_image()). Radiances are evaluated
+/// at the pixel's center, so they should vary little within a pixel.
+void add_downlight_to_image(const PixelRays& rays, const PixelWindow& window,
+                            const TargetFromCamera& glow_from_camera, const Glow& glow,
+                            cv::Mat1f& image);
 
 }  // namespace vlp

@@ -37,7 +37,7 @@ float draw_poisson(float mean, cv::RNG& random) {
       std::max(0.0, std::round(mean + std::sqrt(mean - added) * z + (z * z - 1) / 6)));
 }
 
-void add_bloom(const Bloom& bloom, float full_well_e, cv::Mat1f& electrons) {
+void add_blooming(const Bloom& bloom, float full_well_e, cv::Mat1f& electrons) {
   cv::Mat1f excess(electrons - full_well_e);
   excess = cv::max(excess, 0);
   if (cv::countNonZero(excess) == 0) return;
@@ -48,23 +48,23 @@ void add_bloom(const Bloom& bloom, float full_well_e, cv::Mat1f& electrons) {
 void apply_filters(const Bayer& bayer, cv::Mat1f& electrons) {
   for (int line = 0; line < electrons.rows; ++line) {
     for (int place = 0; place < electrons.cols; ++place) {
-      electrons(line, place) *= static_cast<float>(filter_transmission(bayer, line, place));
+      electrons(line, place) *= static_cast<float>(bayer_filter_transmission(bayer, line, place));
     }
   }
 }
 
 }  // namespace
 
-double white_dn(const Sensor& sensor) { return sensor.bits == 8 ? 255 : 65535; }
+double white_level_dn(const Sensor& sensor) { return sensor.bits == 8 ? 255 : 65535; }
 
-int filter_at(int line, int place) {
+int bayer_filter_at(int line, int place) {
   const auto parity = [](int i) { return ((i % 2) + 2) % 2; };
   return 2 - parity(line) - parity(place);
 }
 
-double filter_transmission(const Bayer& bayer, int line, int place) {
+double bayer_filter_transmission(const Bayer& bayer, int line, int place) {
   const std::array transmissions{bayer.blue_to_green_ratio, 1.0, bayer.red_to_green_ratio};
-  return transmissions[static_cast<std::size_t>(filter_at(line, place))];
+  return transmissions[static_cast<std::size_t>(bayer_filter_at(line, place))];
 }
 
 std::vector<cv::Mat1f> demosaic(const Bayer& bayer, const Sensor& sensor, const cv::Mat1f& levels) {
@@ -78,7 +78,8 @@ std::vector<cv::Mat1f> demosaic(const Bayer& bayer, const Sensor& sensor, const 
     cv::Mat1f channel(levels.size(), 0);
     for (int line = 0; line < levels.rows; ++line) {
       for (int place = 0; place < levels.cols; ++place) {
-        if (filter_at(line, place) == color) channel(line, place) = levels(line, place) - black;
+        if (bayer_filter_at(line, place) == color)
+          channel(line, place) = levels(line, place) - black;
       }
     }
     cv::Mat1f& filled = colors[static_cast<std::size_t>(color)];
@@ -90,15 +91,17 @@ std::vector<cv::Mat1f> demosaic(const Bayer& bayer, const Sensor& sensor, const 
   return colors;
 }
 
-double apply_tone_curve(const ImageProcessing& picture, const Sensor& sensor, double level_dn) {
-  const double black = sensor.black_level_dn, white = white_dn(sensor);
+double correct_views_for_tone_curve(const ImageProcessing& picture, const Sensor& sensor,
+                                    double level_dn) {
+  const double black = sensor.black_level_dn, white = white_level_dn(sensor);
   const double fraction = std::clamp((level_dn - black) / (white - black), 0.0, 1.0);
   return white * std::pow(fraction, 1 / picture.gamma);
 }
 
-void develop(const ImageProcessing& picture, const Sensor& sensor, cv::Mat1f& levels) {
+void apply_tone_curve_and_sharpening(const ImageProcessing& picture, const Sensor& sensor,
+                                     cv::Mat1f& levels) {
   for (float& level : levels) {
-    level = static_cast<float>(apply_tone_curve(picture, sensor, double(level)));
+    level = static_cast<float>(correct_views_for_tone_curve(picture, sensor, double(level)));
   }
   if (!picture.sharpening) return;
   const auto [amount, radius_px] = *picture.sharpening;
@@ -107,7 +110,7 @@ void develop(const ImageProcessing& picture, const Sensor& sensor, cv::Mat1f& le
   levels += amount * (levels - soft);
 }
 
-std::string image_extension(const std::optional<ImageProcessing>& picture) {
+std::string image_file_extension(const std::optional<ImageProcessing>& picture) {
   return picture && picture->jpeg_quality ? ".jpg" : ".png";
 }
 
@@ -115,13 +118,14 @@ std::vector<unsigned char> encode_image(const cv::Mat& image,
                                         const std::optional<ImageProcessing>& picture) {
   const std::string bytes =
       picture && picture->jpeg_quality
-          ? codecs().encode(".jpg", image, {cv::IMWRITE_JPEG_QUALITY, *picture->jpeg_quality})
-          : codecs().encode(".png", image, {cv::IMWRITE_PNG_COMPRESSION, 1});
+          ? get_codecs().encode_image_file(".jpg", image,
+                                           {cv::IMWRITE_JPEG_QUALITY, *picture->jpeg_quality})
+          : get_codecs().encode_image_file(".png", image, {cv::IMWRITE_PNG_COMPRESSION, 1});
   return {bytes.begin(), bytes.end()};
 }
 
-cv::Mat expose(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint64_t seed,
-               const std::optional<ImageProcessing>& picture) {
+cv::Mat simulate_sensor(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint64_t seed,
+                        const std::optional<ImageProcessing>& picture) {
   cv::RNG random(seed);
   cv::Mat1f electrons = mean_electrons.clone();
   if (picture && picture->bayer) apply_filters(*picture->bayer, electrons);
@@ -129,7 +133,7 @@ cv::Mat expose(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint6
     for (float& value : electrons) value = draw_poisson(value, random);
   }
   const auto full_well = static_cast<float>(sensor.full_well_e);
-  if (sensor.bloom) add_bloom(*sensor.bloom, full_well, electrons);
+  if (sensor.bloom) add_blooming(*sensor.bloom, full_well, electrons);
   const auto read_noise = sensor.read_noise_e;
   for (float& value : electrons) {
     value = std::min(value, full_well);
@@ -144,14 +148,15 @@ cv::Mat expose(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint6
   cv::Mat1f levels;
   electrons.convertTo(levels, CV_32F, sensor.gain_dn_per_e, sensor.black_level_dn);
   if (!picture->bayer) {
-    develop(*picture, sensor, levels);
+    apply_tone_curve_and_sharpening(*picture, sensor, levels);
     levels.convertTo(image, type);
     return image;
   }
   // The analog-to-digital converter rounds before demosaicing.
-  for (float& level : levels) level = std::clamp(std::round(level), 0.F, float(white_dn(sensor)));
+  for (float& level : levels)
+    level = std::clamp(std::round(level), 0.F, float(white_level_dn(sensor)));
   auto colors = demosaic(*picture->bayer, sensor, levels);
-  for (cv::Mat1f& color : colors) develop(*picture, sensor, color);
+  for (cv::Mat1f& color : colors) apply_tone_curve_and_sharpening(*picture, sensor, color);
   cv::Mat color_image;
   cv::merge(colors, color_image);
   color_image.convertTo(image, type);

@@ -13,26 +13,28 @@
 namespace vlp {
 
 /// Returns the white level of the sensor, 255 or 65535.
-double white_dn(const Sensor& sensor);
+double white_level_dn(const Sensor& sensor);
 
 /// Returns the Bayer filter of a pixel: 0 blue, 1 green, 2 red, as in color images.
-int filter_at(int line, int place);
+int bayer_filter_at(int line, int place);
 
 /// Returns the fraction of a pixel's light that its filter passes, relative to green.
-double filter_transmission(const Bayer& bayer, int line, int place);
+double bayer_filter_transmission(const Bayer& bayer, int line, int place);
 
 /// Demosaics the gray levels behind a mosaic of filters and balances the three colors.
 std::vector<cv::Mat1f> demosaic(const Bayer& bayer, const Sensor& sensor, const cv::Mat1f& levels);
 
 /// Applies the tone curve of Picture to one gray level, DN.
-double apply_tone_curve(const ImageProcessing& picture, const Sensor& sensor, double level_dn);
+double correct_views_for_tone_curve(const ImageProcessing& picture, const Sensor& sensor,
+                                    double level_dn);
 
 /// Applies tone curve and sharpening of Picture to gray levels before rounding. Border pixels are
 /// replicated.
-void develop(const ImageProcessing& picture, const Sensor& sensor, cv::Mat1f& levels);
+void apply_tone_curve_and_sharpening(const ImageProcessing& picture, const Sensor& sensor,
+                                     cv::Mat1f& levels);
 
 /// Returns the file name extension of the images: ".jpg" or ".png".
-std::string image_extension(const std::optional<ImageProcessing>& picture);
+std::string image_file_extension(const std::optional<ImageProcessing>& picture);
 
 /// Encodes the image as JPEG, or losslessly as PNG.
 std::vector<unsigned char> encode_image(const cv::Mat& image,
@@ -44,7 +46,7 @@ std::vector<unsigned char> encode_image(const cv::Mat& image,
 /// black level, demosaicing, tone curve and sharpening of a picture, rounding, limits of 8 or 16
 /// bits. The result has 8 or 16 bits; behind color filters it has three colors, blue first. The
 /// same seed yields the same image.
-cv::Mat expose(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint64_t seed,
-               const std::optional<ImageProcessing>& picture = {});
+cv::Mat simulate_sensor(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint64_t seed,
+                        const std::optional<ImageProcessing>& picture = {});
 
 }  // namespace vlp

@@ -21,12 +21,13 @@ namespace vlp {
 namespace {
 
 cv::Mat1f compute_vignetting(const PixelRays& rays, double power) {
-  cv::Mat1f image(rays.lines(), rays.places());
+  cv::Mat1f image(rays.lines(), rays.pixels_per_line());
   for (int line = 0; line < rays.lines(); ++line) {
-    for (int place = 0; place < rays.places(); ++place) {
-      const Eigen::Vector3d ray =
-          rays.corner(line, place).normalized() + rays.corner(line, place + 1).normalized() +
-          rays.corner(line + 1, place).normalized() + rays.corner(line + 1, place + 1).normalized();
+    for (int place = 0; place < rays.pixels_per_line(); ++place) {
+      const Eigen::Vector3d ray = rays.pixel_corner_ray(line, place).normalized() +
+                                  rays.pixel_corner_ray(line, place + 1).normalized() +
+                                  rays.pixel_corner_ray(line + 1, place).normalized() +
+                                  rays.pixel_corner_ray(line + 1, place + 1).normalized();
       const double cosine = ray.normalized().z();
       // Rays beyond 90 degrees off the axis arrive only without vignetting. NaN: the pixel has no
       // ray.
@@ -43,7 +44,7 @@ cv::Mat1f compute_vignetting(const PixelRays& rays, double power) {
 
 FrameRenderer::FrameRenderer(const Scene& scene)
     : scene_(scene),
-      rays_(scene.camera, blur_radius_px(scene.optics)),
+      rays_(scene.camera, compute_blur_radius_px(scene.optics)),
       optics_(scene.optics, rays_),
       transmission_(compute_vignetting(rays_, scene.optics.vignetting_power)) {
   transmission_ = transmission_.mul(compute_dust_transmission(scene.optics.dust, rays_));
@@ -51,12 +52,12 @@ FrameRenderer::FrameRenderer(const Scene& scene)
 }
 
 cv::Mat1f FrameRenderer::apply_exposure(const cv::Mat1f& electrons_per_s, double exposure_s) const {
-  return cv::Mat1f(rays_.without_margin(electrons_per_s).mul(transmission_, exposure_s));
+  return cv::Mat1f(rays_.crop_margin(electrons_per_s).mul(transmission_, exposure_s));
 }
 
 namespace {
 
-Eigen::Isometry3d panel_from_world(const Panel& panel) {
+Eigen::Isometry3d compute_panel_from_world(const Panel& panel) {
   Eigen::Isometry3d world_from_panel;
   const Eigen::Vector3d a = panel.edge_a_m.normalized(), b = panel.edge_b_m.normalized();
   world_from_panel.linear() << a, b, a.cross(b);
@@ -64,7 +65,7 @@ Eigen::Isometry3d panel_from_world(const Panel& panel) {
   return world_from_panel.inverse();
 }
 
-std::vector<Eigen::AlignedBox2d> make_bars(const Blind& blind) {
+std::vector<Eigen::AlignedBox2d> make_window_bars(const Blind& blind) {
   std::vector<Eigen::AlignedBox2d> bars;
   bars.reserve(std::size_t(blind.slats));
   for (int slat = 0; slat < blind.slats; ++slat) {
@@ -75,7 +76,7 @@ std::vector<Eigen::AlignedBox2d> make_bars(const Blind& blind) {
 }
 
 /// Returns a mosaic with the value 1 in boxes of a panel, given as fractions of its edges.
-Mosaic make_mosaic(const Panel& panel, const std::vector<Eigen::AlignedBox2d>& boxes) {
+Mosaic make_panel_mosaic(const Panel& panel, const std::vector<Eigen::AlignedBox2d>& boxes) {
   const Eigen::Vector2d size_m(panel.edge_a_m.norm(), panel.edge_b_m.norm());
   std::vector<Rectangle> rectangles;
   for (const Eigen::AlignedBox2d& box : boxes) {
@@ -86,7 +87,7 @@ Mosaic make_mosaic(const Panel& panel, const std::vector<Eigen::AlignedBox2d>& b
   return Mosaic(rectangles);
 }
 
-Mosaic make_mosaic(const Panel& panel) {
+Mosaic make_panel_mosaic(const Panel& panel) {
   return Mosaic({{0, 0, panel.edge_a_m.norm(), panel.edge_b_m.norm(), 1}});
 }
 
@@ -129,19 +130,19 @@ class LampFrame {
         shot_(shot),
         motion_(shot.motion),
         part_(part) {
-    if (!scene.clutter.occluders.empty() || mirror) transmittance_ = rays_.image(1);
+    if (!scene.clutter.occluders.empty() || mirror) transmittance_ = rays_.make_constant_image(1);
     for (const Panel& occluder : scene.clutter.occluders) {
-      transmittance_ = transmittance_.mul(1 - compute_coverage(occluder));
+      transmittance_ = transmittance_.mul(1 - compute_shape_coverage(occluder));
     }
     if (!mirror) return;
-    transmittance_ = transmittance_.mul(mirror->reflectance * compute_coverage(mirror->pane));
-    pane_window_ = compute_window(outline_of(mirror->pane), motion_, part_, rays_);
+    transmittance_ = transmittance_.mul(mirror->reflectance * compute_shape_coverage(mirror->pane));
+    pane_window_ = compute_object_window(outline_of(mirror->pane), motion_, part_, rays_);
     mirror_ = mirror;
-    reflection_ = reflection_about(mirror->pane);
+    reflection_ = make_reflection_about_panel(mirror->pane);
   }
 
   /// Returns the light of all sources that are always on.
-  cv::Mat1f render_steady() const {
+  cv::Mat1f render_steady_light() const {
     const Clutter& clutter = scene_.clutter;
     cv::Mat1f image = render_ceiling();
     if (clutter.windows.empty() && clutter.steady_lamps.empty() && clutter.occluders.empty() &&
@@ -149,132 +150,141 @@ class LampFrame {
       return image;
     }
     for (const Panel& window : clutter.windows) {
-      replace_ceiling(window, make_mosaic(window), image);
+      replace_ceiling_by_panel(window, make_panel_mosaic(window), image);
     }
     for (const Blind& blind : clutter.blinds) {
-      replace_ceiling(blind.window, make_mosaic(blind.window, make_bars(blind)), image);
+      replace_ceiling_by_panel(blind.window,
+                               make_panel_mosaic(blind.window, make_window_bars(blind)), image);
     }
     for (const Sign& sign : clutter.signs) {
-      replace_ceiling(sign.panel, make_mosaic(sign.panel, sign.strokes), image);
+      replace_ceiling_by_panel(sign.panel, make_panel_mosaic(sign.panel, sign.strokes), image);
     }
     for (const Glow& lamp : clutter.steady_lamps) {
       const PixelWindow window = compute_light_window(lamp);
-      if (!window.empty()) draw(lamp, window, window.crop(image, rays_.margin_px()));
+      if (!window.empty()) draw(lamp, window, window.crop_to_window(image, rays_.margin_px()));
     }
     for (const Panel& occluder : clutter.occluders) {
-      const cv::Mat1f hidden = compute_coverage(occluder);
+      const cv::Mat1f hidden = compute_shape_coverage(occluder);
       image = image.mul(1 - hidden) + occluder.electron_rate_e_per_s * hidden;
     }
-    optics_.spread(image, {-rays_.margin_px(), -rays_.margin_px()});
-    optics_.add_veil(image);
+    optics_.apply_point_spread(image, {-rays_.margin_px(), -rays_.margin_px()});
+    optics_.add_veiling_glare(image);
     return image;
   }
 
   /// Adds a switched light. In a mirror: only lights on the camera's side of its plane.
   void add(const Source& source, cv::Mat1f& image) const {
     const Eigen::Vector3d eye_m = motion_.world_from_camera(0).translation();
-    if (mirror_ && !is_before(*mirror_, source.glow.position_m, eye_m)) return;
+    if (mirror_ && !are_on_same_side_of_mirror(*mirror_, source.glow.position_m, eye_m)) return;
     const PixelWindow window = compute_light_window(source.glow);
     if (window.empty()) return;
-    cv::Mat1f patch = window.image(0);
+    cv::Mat1f patch = window.make_constant_image(0);
     draw(source.glow, window, patch);
-    if (!transmittance_.empty()) patch = patch.mul(window.crop(transmittance_, rays_.margin_px()));
-    optics_.spread(patch, {window.line_begin, window.place_begin});
+    if (!transmittance_.empty())
+      patch = patch.mul(window.crop_to_window(transmittance_, rays_.margin_px()));
+    optics_.apply_point_spread(patch, {window.line_begin, window.place_begin});
     // Light that a veil scatters to all pixels.
-    if (const float scattered_e_per_s = optics_.scatter(patch); scattered_e_per_s != 0) {
+    if (const float scattered_e_per_s = optics_.remove_scattered_light(patch);
+        scattered_e_per_s != 0) {
       for (int row = 0; row < image.rows; ++row) {
-        image.row(row) += lit_fraction(source.wave, row - rays_.margin_px()) * scattered_e_per_s;
+        image.row(row) +=
+            compute_lit_fraction(source.wave, row - rays_.margin_px()) * scattered_e_per_s;
       }
     }
-    cv::Mat1f target = window.crop(image, rays_.margin_px());
+    cv::Mat1f target = window.crop_to_window(image, rays_.margin_px());
     for (int line = window.line_begin; line < window.line_end; ++line) {
       const int row = line - window.line_begin;
-      target.row(row) += lit_fraction(source.wave, line) * patch.row(row);
+      target.row(row) += compute_lit_fraction(source.wave, line) * patch.row(row);
     }
   }
 
  private:
-  double lit_fraction(const LightWave& wave, int line) const {
+  double compute_lit_fraction(const LightWave& wave, int line) const {
     return std::visit(
-        [&](const auto& each) { return each.lit_fraction(part_.begin_s(line), part_.end_s(line)); },
+        [&](const auto& each) {
+          return each.compute_lit_fraction(part_.begin_s(line), part_.end_s(line));
+        },
         wave);
   }
 
   /// Returns the ceiling's radiance while a line is exposed.
-  double ceiling_radiance(int line) const {
+  double compute_ceiling_radiance(int line) const {
     if (!scene_.clutter.ambient_flicker) return scene_.ambient_e_per_s;
     RectifiedSine wave = *scene_.clutter.ambient_flicker;
     wave.phase = shot_.ambient_phase;
-    return scene_.ambient_e_per_s * lit_fraction(wave, line);
+    return scene_.ambient_e_per_s * compute_lit_fraction(wave, line);
   }
 
   cv::Mat1f render_ceiling() const {
-    cv::Mat1f image = rays_.image(0);
+    cv::Mat1f image = rays_.make_constant_image(0);
     for (int row = 0; row < image.rows; ++row) {
-      image.row(row) = static_cast<float>(ceiling_radiance(row - rays_.margin_px()));
+      image.row(row) = static_cast<float>(compute_ceiling_radiance(row - rays_.margin_px()));
     }
     return image;
   }
 
   /// Replaces the radiance of the ceiling by that of a panel where the pattern is 1.
-  void replace_ceiling(const Panel& panel, const Mosaic& pattern, cv::Mat1f& image) const {
-    const PixelWindow window = compute_window(outline_of(panel), motion_, part_, rays_);
+  void replace_ceiling_by_panel(const Panel& panel, const Mosaic& pattern, cv::Mat1f& image) const {
+    const PixelWindow window = compute_object_window(outline_of(panel), motion_, part_, rays_);
     if (window.empty()) return;
-    cv::Mat1f cover = window.image(0);
-    add_shape(rays_, window, target_from_camera(panel_from_world(panel)), pattern, 1, cover);
-    cv::Mat1f target = window.crop(image, rays_.margin_px());
+    cv::Mat1f cover = window.make_constant_image(0);
+    add_shape_to_image(rays_, window, compute_target_from_camera(compute_panel_from_world(panel)),
+                       pattern, 1, cover);
+    cv::Mat1f target = window.crop_to_window(image, rays_.margin_px());
     for (int line = window.line_begin; line < window.line_end; ++line) {
       const int row = line - window.line_begin;
-      target.row(row) += (panel.electron_rate_e_per_s - ceiling_radiance(line)) * cover.row(row);
+      target.row(row) +=
+          (panel.electron_rate_e_per_s - compute_ceiling_radiance(line)) * cover.row(row);
     }
   }
   /// Returns the fraction of each pixel that a panel covers.
-  cv::Mat1f compute_coverage(const Panel& panel) const {
-    cv::Mat1f covered = rays_.image(0);
-    const PixelWindow window = compute_window(outline_of(panel), motion_, part_, rays_);
-    if (!window.empty()) draw(panel, 1, window, window.crop(covered, rays_.margin_px()));
+  cv::Mat1f compute_shape_coverage(const Panel& panel) const {
+    cv::Mat1f covered = rays_.make_constant_image(0);
+    const PixelWindow window = compute_object_window(outline_of(panel), motion_, part_, rays_);
+    if (!window.empty()) draw(panel, 1, window, window.crop_to_window(covered, rays_.margin_px()));
     return covered;
   }
   PixelWindow compute_light_window(const Glow& glow) const {
     auto outline_m = outline_of(glow);
-    if (!mirror_) return compute_window(outline_m, motion_, part_, rays_);
+    if (!mirror_) return compute_object_window(outline_m, motion_, part_, rays_);
     for (Eigen::Vector3d& point_m : outline_m) point_m = reflection_ * point_m;
-    return intersect(compute_window(outline_m, motion_, part_, rays_), pane_window_);
+    return intersect_windows(compute_object_window(outline_m, motion_, part_, rays_), pane_window_);
   }
   /// Returns the pose of the camera in a target's frame; for a mirror, of the reflected camera.
-  TargetFromCamera target_from_camera(const Eigen::Isometry3d& target_from_world) const {
+  TargetFromCamera compute_target_from_camera(const Eigen::Isometry3d& target_from_world) const {
     return [this, target_from_rays = target_from_world * reflection_](int line) {
-      return target_from_rays * motion_.world_from_camera(part_.middle_s(line));
+      return target_from_rays * motion_.world_from_camera(part_.time_sample_middle_s(line));
     };
   }
   /// Draws a glow. `target` is the window's part of an image.
   void draw(const Glow& glow, const PixelWindow& window, cv::Mat1f target) const {
     if (!traits_of(glow.shape.kind).is_round) {
-      const Panel panel = make_bounding_panel(glow);
+      const Panel panel = make_panel_around_glow(glow);
       if (glow.rim_to_center_ratio == 1)
         return draw(panel, glow.electron_rate_e_per_s, window, target);
-      cv::Mat1f patch = window.image(0);
+      cv::Mat1f patch = window.make_constant_image(0);
       draw(panel, glow.electron_rate_e_per_s, window, patch);
-      fade(panel, glow.rim_to_center_ratio, window, patch);
+      apply_panel_falloff(panel, glow.rim_to_center_ratio, window, patch);
       target += patch;
       return;
     }
     const Eigen::Isometry3d world_from_glow =
         Eigen::Translation3d(glow.position_m) *
         Eigen::AngleAxisd(glow.shape.yaw_rad, Eigen::Vector3d::UnitZ());
-    const TargetFromCamera glow_from_camera = target_from_camera(world_from_glow.inverse());
+    const TargetFromCamera glow_from_camera = compute_target_from_camera(world_from_glow.inverse());
     if (glow.recess || glow.chips || !glow.hot_spots.empty() || glow.halo) {
-      add_downlight(rays_, window, glow_from_camera, glow, target);
+      add_downlight_to_image(rays_, window, glow_from_camera, glow, target);
       return;
     }
-    add_shape(rays_, window, glow_from_camera,
-              Disc(*glow.shape.size_m / 2, glow.rim_to_center_ratio), glow.electron_rate_e_per_s,
-              target);
+    add_shape_to_image(rays_, window, glow_from_camera,
+                       Disc(*glow.shape.size_m / 2, glow.rim_to_center_ratio),
+                       glow.electron_rate_e_per_s, target);
   }
   /// Applies the falloff of Glow towards the edges of a panel, evaluated at each pixel's center.
-  void fade(const Panel& panel, double rim_to_center_ratio, const PixelWindow& window,
-            cv::Mat1f& patch) const {
-    const TargetFromCamera panel_from_camera = target_from_camera(panel_from_world(panel));
+  void apply_panel_falloff(const Panel& panel, double rim_to_center_ratio,
+                           const PixelWindow& window, cv::Mat1f& patch) const {
+    const TargetFromCamera panel_from_camera =
+        compute_target_from_camera(compute_panel_from_world(panel));
     const Eigen::Array2d size_m(panel.edge_a_m.norm(), panel.edge_b_m.norm());
     for (int line = window.line_begin; line < window.line_end; ++line) {
       const Eigen::Isometry3d pose = panel_from_camera(line);
@@ -282,8 +292,9 @@ class LampFrame {
         float& value = patch(line - window.line_begin, place - window.place_begin);
         if (value == 0) continue;
         const Eigen::Vector3d middle =
-            rays_.corner(line, place) + rays_.corner(line + 1, place + 1);
-        const Eigen::Vector2d at_m = plane_hit(pose.translation(), pose.linear() * middle);
+            rays_.pixel_corner_ray(line, place) + rays_.pixel_corner_ray(line + 1, place + 1);
+        const Eigen::Vector2d at_m =
+            intersect_ray_with_plane(pose.translation(), pose.linear() * middle);
         const Eigen::Array2d off = 2 * at_m.array() / size_m - 1;
         const Eigen::Array2d left = (1 - (1 - rim_to_center_ratio) * off.square()).max(0);
         value *= static_cast<float>(left.prod());
@@ -292,8 +303,8 @@ class LampFrame {
   }
   /// Draws a panel. `target` is the window's part of an image.
   void draw(const Panel& panel, double value, const PixelWindow& window, cv::Mat1f target) const {
-    add_shape(rays_, window, target_from_camera(panel_from_world(panel)), make_mosaic(panel), value,
-              target);
+    add_shape_to_image(rays_, window, compute_target_from_camera(compute_panel_from_world(panel)),
+                       make_panel_mosaic(panel), value, target);
   }
 
   const Scene& scene_;
@@ -310,7 +321,7 @@ class LampFrame {
   Eigen::Isometry3d reflection_ = Eigen::Isometry3d::Identity();
 };
 
-/// Returns points on the outlines of everything in view, for compute_motion_px().
+/// Returns points on the outlines of everything in view, for compute_max_image_motion_px().
 std::vector<Eigen::Vector3d> collect_outlines(const Scene& scene) {
   std::vector<Eigen::Vector3d> points_m;
   const auto add = [&](const auto& thing) {
@@ -331,19 +342,19 @@ std::vector<Eigen::Vector3d> collect_outlines(const Scene& scene) {
 
 }  // namespace
 
-cv::Mat1f FrameRenderer::lamp_electrons(const LampShot& shot) const {
-  Shutter part = shutter(shot.exposure_s);
-  if (!shot.motion.at_rest()) {
+cv::Mat1f FrameRenderer::render_lamp_electrons(const LampShot& shot) const {
+  Shutter part = make_shutter(shot.exposure_s);
+  if (!shot.motion.is_at_rest()) {
     const auto pose = [&](double time_s) {
       return shot.motion.world_from_camera(time_s).inverse();
     };
-    part.count = count_exposure_parts(
-        compute_motion_px(collect_outlines(scene_), pose, shot.exposure_s, rays_));
+    part.count = count_exposure_time_samples(
+        compute_max_image_motion_px(collect_outlines(scene_), pose, shot.exposure_s, rays_));
   }
-  cv::Mat1f sum = rays_.image(0);
+  cv::Mat1f sum = rays_.make_constant_image(0);
   for (; part.index < part.count; ++part.index) {
     const LampFrame frame(scene_, rays_, optics_, shot, part);
-    sum += frame.render_steady();
+    sum += frame.render_steady_light();
     for (const Source& source : list_sources(scene_, shot, false)) frame.add(source, sum);
     for (const Mirror& mirror : scene_.clutter.mirrors) {
       const LampFrame mirrored(scene_, rays_, optics_, shot, part, &mirror);
@@ -355,11 +366,11 @@ cv::Mat1f FrameRenderer::lamp_electrons(const LampShot& shot) const {
 
 namespace {
 
-/// Returns points all over the board, for compute_motion_px().
-std::vector<Eigen::Vector3d> sample_points(const Board& board) {
+/// Returns points all over the board, for compute_max_image_motion_px().
+std::vector<Eigen::Vector3d> sample_surface_points(const Board& board) {
   std::vector<Eigen::Vector3d> points_m;
-  if (board.has_squares()) {
-    for (const Eigen::Vector2d& at_m : square_corners_m(board)) {
+  if (board.has_chessboard_squares()) {
+    for (const Eigen::Vector2d& at_m : list_chessboard_corners_m(board)) {
       points_m.emplace_back(at_m.x(), at_m.y(), 0);
     }
     return points_m;
@@ -373,26 +384,26 @@ std::vector<Eigen::Vector3d> sample_points(const Board& board) {
 
 }  // namespace
 
-cv::Mat1f FrameRenderer::board_electrons(const BoardShot& shot) const {
-  Shutter part = shutter(shot.exposure_s);
+cv::Mat1f FrameRenderer::render_board_electrons(const BoardShot& shot) const {
+  Shutter part = make_shutter(shot.exposure_s);
   if (!shot.velocity_in_camera_m_per_s.isZero(0)) {
     const auto pose = [&](double time_s) { return shot.camera_from_board(time_s); };
-    part.count = count_exposure_parts(
-        compute_motion_px(sample_points(scene_.board->print), pose, shot.exposure_s, rays_));
+    part.count = count_exposure_time_samples(compute_max_image_motion_px(
+        sample_surface_points(scene_.board->print), pose, shot.exposure_s, rays_));
   }
   const auto surround = static_cast<float>(scene_.board->surround_e_per_s);
-  const cv::Size pixels = rays_.image(0).size();
+  const cv::Size pixels = rays_.make_constant_image(0).size();
   cv::Mat1f supersampled(2 * pixels.height, 2 * pixels.width, surround), image;
   for (; part.index < part.count; ++part.index) {
     const auto board_from_camera = [&](int line) {
-      return shot.camera_from_board(part.middle_s(line)).inverse();
+      return shot.camera_from_board(part.time_sample_middle_s(line)).inverse();
     };
-    add_shape(rays_, whole_window(rays_), board_from_camera, *pattern_, 1.0 / part.count,
-              supersampled, 2);
+    add_shape_to_image(rays_, make_whole_image_window(rays_), board_from_camera, *pattern_,
+                       1.0 / part.count, supersampled, 2);
   }
-  optics_.spread(supersampled, {-rays_.margin_px(), -rays_.margin_px(), 2});
+  optics_.apply_point_spread(supersampled, {-rays_.margin_px(), -rays_.margin_px(), 2});
   cv::resize(supersampled, image, pixels, 0, 0, cv::INTER_AREA);
-  optics_.add_veil(image);
+  optics_.add_veiling_glare(image);
   return apply_exposure(image, shot.exposure_s);
 }
 

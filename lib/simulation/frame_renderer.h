@@ -13,10 +13,11 @@
 namespace vlp {
 
 /// Renders the light that a scene's camera collects: the mean number of electrons of each pixel.
-///   - A pixel integrates over its area (add_shape()) and over its exposure. Line i is exposed
-///     around Shutter::center_s(i), from the pose of the camera at that time. Exposures during
-///     which something in view moves by more than 0.1 px are sums of several shorter ones.
-///   - A board is blurred at twice the resolution, before pixels integrate (add_shape()).
+///   - A pixel integrates over its area (add_shape_to_image()) and over its exposure. Line i is
+///   exposed
+///     around Shutter::exposure_center_s(i), from the pose of the camera at that time. Exposures
+///     during which something in view moves by more than 0.1 px are sums of several shorter ones.
+///   - A board is blurred at twice the resolution, before pixels integrate (add_shape_to_image()).
 ///   - Mirrors (Clutter::mirrors) show lights by rays that are reflected at the plane of the pane.
 ///   - The light of a lamp is first blurred by the lens, then switched at each line's exposure
 ///     time, as with a rolling shutter.
@@ -24,15 +25,15 @@ namespace vlp {
 class FrameRenderer {
  public:
   /// The scene must outlive the renderer.
-  /// @throws std::invalid_argument if the board cannot be printed
+  /// @throws std::invalid_argument if make_board_pattern() rejects the board
   explicit FrameRenderer(const Scene& scene);
 
   /// Returns electrons per pixel, as lines x places (PixelRays).
-  cv::Mat1f lamp_electrons(const LampShot& shot) const;
-  cv::Mat1f board_electrons(const BoardShot& shot) const;
+  cv::Mat1f render_lamp_electrons(const LampShot& shot) const;
+  cv::Mat1f render_board_electrons(const BoardShot& shot) const;
 
-  const PixelRays& rays() const { return rays_; }
-  Shutter shutter(double exposure_s) const {
+  const PixelRays& pixel_rays() const { return rays_; }
+  Shutter make_shutter(double exposure_s) const {
     return {*scene_.camera.row_time_s, exposure_s, rays_.lines()};
   }
 

@@ -22,30 +22,31 @@ class PixelRays {
 
   const Lens& lens() const { return lens_; }
   Readout readout() const { return readout_; }
-  /// Size of the image without the margin.
+  /// Size of the image in readout order, without the margin.
   int lines() const { return lines_; }
-  int places() const { return places_; }
+  int pixels_per_line() const { return places_; }
+  /// Width of the margin on each side.
   int margin_px() const { return margin_px_; }
 
   /// Returns the ray through the corner between the pixels (line - 1, place - 1) and (line, place),
   /// in the camera frame, not normalized. Valid for line and place from -margin to count + margin.
   /// NaN where the lens has no ray.
-  const Eigen::Vector3d& corner(int line, int place) const {
+  const Eigen::Vector3d& pixel_corner_ray(int line, int place) const {
     return corners_[static_cast<std::size_t>(line + margin_px_) * stride_ +
                     static_cast<std::size_t>(place + margin_px_)];
   }
 
   /// Returns (line, place) of a pixel (u, v), which need not be integer.
-  Eigen::Vector2d line_and_place(const Eigen::Vector2d& pixel) const {
+  Eigen::Vector2d line_and_place_of_pixel(const Eigen::Vector2d& pixel) const {
     return readout_ == Readout::rows ? Eigen::Vector2d(pixel.y(), pixel.x()) : pixel;
   }
 
   /// Returns a constant image of lines x places with the margin all around.
-  cv::Mat1f image(float value) const {
+  cv::Mat1f make_constant_image(float value) const {
     return cv::Mat1f(lines_ + 2 * margin_px_, places_ + 2 * margin_px_, value);
   }
-  /// Returns the part of an image without the margin.
-  cv::Mat1f without_margin(const cv::Mat1f& image) const {
+  /// Returns the part of an image with margin that is inside the margin.
+  cv::Mat1f crop_margin(const cv::Mat1f& image) const {
     return image(cv::Rect(margin_px_, margin_px_, places_, lines_));
   }
 

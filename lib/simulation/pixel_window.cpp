@@ -11,13 +11,14 @@
 
 namespace vlp {
 
-PixelWindow whole_window(const PixelRays& rays) {
+PixelWindow make_whole_image_window(const PixelRays& rays) {
   const int margin = rays.margin_px();
-  return {-margin, rays.lines() + margin, -margin, rays.places() + margin};
+  return {-margin, rays.lines() + margin, -margin, rays.pixels_per_line() + margin};
 }
 
-PixelWindow compute_window(const std::vector<Eigen::Vector3d>& outline_m, const BaseMotion& motion,
-                           const Shutter& shutter, const PixelRays& rays) {
+PixelWindow compute_object_window(const std::vector<Eigen::Vector3d>& outline_m,
+                                  const BaseMotion& motion, const Shutter& shutter,
+                                  const PixelRays& rays) {
   const double begin_s = shutter.begin_s(-rays.margin_px());
   const double end_s = shutter.end_s(rays.lines() + rays.margin_px());
   // Between two samples an arc of 450 px deviates from its chord by less than 0.1 px.
@@ -36,28 +37,28 @@ PixelWindow compute_window(const std::vector<Eigen::Vector3d>& outline_m, const 
     const Eigen::Isometry3d camera_from_world = motion.world_from_camera(time_s).inverse();
     for (const Eigen::Vector3d& point_m : outline_m) {
       const auto pixel = rays.lens().project(camera_from_world * point_m);
-      if (!pixel) return whole_window(rays);
+      if (!pixel) return make_whole_image_window(rays);
       const Eigen::Array2d at =
-          rays.line_and_place(*pixel).array().max(-max_coordinate).min(max_coordinate);
+          rays.line_and_place_of_pixel(*pixel).array().max(-max_coordinate).min(max_coordinate);
       lower = lower.min(at);
       upper = upper.max(at);
     }
   }
   constexpr int bulge_px = 2;  // bulge of the outline between two points
   const int spare = rays.margin_px() + bulge_px;
-  const PixelWindow all = whole_window(rays);
+  const PixelWindow all = make_whole_image_window(rays);
   return {std::max(all.line_begin, int(std::floor(lower[0])) - spare),
           std::min(all.line_end, int(std::ceil(upper[0])) + spare + 1),
           std::max(all.place_begin, int(std::floor(lower[1])) - spare),
           std::min(all.place_end, int(std::ceil(upper[1])) + spare + 1)};
 }
 
-PixelWindow intersect(const PixelWindow& a, const PixelWindow& b) {
+PixelWindow intersect_windows(const PixelWindow& a, const PixelWindow& b) {
   return {std::max(a.line_begin, b.line_begin), std::min(a.line_end, b.line_end),
           std::max(a.place_begin, b.place_begin), std::min(a.place_end, b.place_end)};
 }
 
-Panel make_bounding_panel(const Glow& glow) {
+Panel make_panel_around_glow(const Glow& glow) {
   const auto at = [&](double x, double y) {
     return world_from_shape(glow.shape, glow.position_m, {x, y});
   };
@@ -66,8 +67,8 @@ Panel make_bounding_panel(const Glow& glow) {
 }
 
 std::vector<Eigen::Vector3d> outline_of(const Glow& glow) {
-  return outline_of(glow.halo ? make_disc(2 * light_radius_m(glow)) : glow.shape, glow.position_m,
-                    96);
+  return outline_of(glow.halo ? make_disc(2 * compute_light_radius_m(glow)) : glow.shape,
+                    glow.position_m, 96);
 }
 
 std::vector<Eigen::Vector3d> outline_of(const Panel& panel) {
@@ -83,13 +84,13 @@ std::vector<Eigen::Vector3d> outline_of(const Panel& panel) {
   return points_m;
 }
 
-double compute_motion_px(const std::vector<Eigen::Vector3d>& points_m,
-                         const CameraFromTarget& camera_from_target, double exposure_s,
-                         const PixelRays& rays) {
+double compute_max_image_motion_px(const std::vector<Eigen::Vector3d>& points_m,
+                                   const CameraFromTarget& camera_from_target, double exposure_s,
+                                   const PixelRays& rays) {
   constexpr int pieces = 16;
-  const Eigen::Array2d size(rays.lines(), rays.places());
+  const Eigen::Array2d size(rays.lines(), rays.pixels_per_line());
   const auto near_image = [&](const Eigen::Vector2d& pixel) {
-    const Eigen::Array2d at = rays.line_and_place(pixel);
+    const Eigen::Array2d at = rays.line_and_place_of_pixel(pixel);
     return (at >= -0.1 * size).all() && (at <= 1.1 * size).all();
   };
   std::vector<std::optional<Eigen::Vector2d>> before(points_m.size());
@@ -106,9 +107,9 @@ double compute_motion_px(const std::vector<Eigen::Vector3d>& points_m,
   return lengths_px.empty() ? 0 : *std::max_element(lengths_px.begin(), lengths_px.end());
 }
 
-int count_exposure_parts(double compute_motion_px) {
+int count_exposure_time_samples(double motion_px) {
   constexpr double max_motion_px = 0.1, max_parts = 1000;
-  return 1 + static_cast<int>(std::min(compute_motion_px / max_motion_px, max_parts - 1));
+  return 1 + static_cast<int>(std::min(motion_px / max_motion_px, max_parts - 1));
 }
 
 }  // namespace vlp

@@ -14,11 +14,11 @@ namespace {
 constexpr double kGaussianReach = 4;
 constexpr double kDiscStep_px = 0.5;
 
-double max_radius_px(const Defocus& defocus) {
+double compute_max_defocus_radius_px(const Defocus& defocus) {
   return std::abs(defocus.radius_px) + defocus.tilt_px.lpNorm<1>();
 }
 
-void blur(cv::Mat1f& image, double sigma_px) {
+void blur_by_kernel(cv::Mat1f& image, double sigma_px) {
   if (sigma_px == 0) return;
   const int size = 2 * static_cast<int>(std::ceil(kGaussianReach * sigma_px)) + 1;
   cv::GaussianBlur(image, image, {size, size}, sigma_px, sigma_px, cv::BORDER_REPLICATE);
@@ -47,7 +47,8 @@ cv::Mat1f blur_by_disc(const cv::Mat1f& image, double radius) {
 
 /// Evaluates a function of (line, place), in pixels, at each element of a part.
 template <typename Figure>
-cv::Mat1f map_over(const cv::Mat1f& part, const SpreadWindow& window, const Figure& figure) {
+cv::Mat1f map_pixels_by_distance(const cv::Mat1f& part, const SpreadWindow& window,
+                                 const Figure& figure) {
   cv::Mat1f map(part.size());
   const auto pixel = [&](int begin, int i) { return begin + (i + 0.5) / window.per_px - 0.5; };
   for (int row = 0; row < map.rows; ++row) {
@@ -61,31 +62,31 @@ cv::Mat1f map_over(const cv::Mat1f& part, const SpreadWindow& window, const Figu
 
 /// Returns the profile of a soft spot, cos^2: 1 in the middle, 0 from 1 on. `distance` is in units
 /// of its radius.
-double soft_spot(double distance) {
+double compute_soft_spot_profile(double distance) {
   const double cosine = distance < 1 ? std::cos(distance * std::numbers::pi / 2) : 0;
   return cosine * cosine;
 }
 
 }  // namespace
 
-int blur_radius_px(const Optics& optics) {
+int compute_blur_radius_px(const Optics& optics) {
   double reach = kGaussianReach * optics.blur_px;
-  if (optics.defocus) reach += max_radius_px(*optics.defocus);
+  if (optics.defocus) reach += compute_max_defocus_radius_px(*optics.defocus);
   double halo = 0;
   for (const LensSmear& smear : optics.smears) halo = std::max(halo, 3 * smear.sigma_px);
   return static_cast<int>(std::ceil(reach + halo));
 }
 
-void PointSpread::spread(cv::Mat1f& part, const SpreadWindow& window) const {
-  blur(part, window.per_px * optics_.blur_px);
-  if (optics_.defocus) defocus(part, window);
-  for (const LensSmear& each : optics_.smears) smear(each, part, window);
+void PointSpread::apply_point_spread(cv::Mat1f& part, const SpreadWindow& window) const {
+  blur_by_kernel(part, window.per_px * optics_.blur_px);
+  if (optics_.defocus) apply_defocus(part, window);
+  for (const LensSmear& each : optics_.smears) apply_lens_smear(each, part, window);
 }
 
-void PointSpread::defocus(cv::Mat1f& part, const SpreadWindow& window) const {
-  const Eigen::Array2d half(rays_.lines() / 2.0, rays_.places() / 2.0);
-  const Eigen::Vector2d tilt_px = rays_.line_and_place(optics_.defocus->tilt_px);
-  const cv::Mat1f radii = map_over(part, window, [&](const Eigen::Vector2d& at) {
+void PointSpread::apply_defocus(cv::Mat1f& part, const SpreadWindow& window) const {
+  const Eigen::Array2d half(rays_.lines() / 2.0, rays_.pixels_per_line() / 2.0);
+  const Eigen::Vector2d tilt_px = rays_.line_and_place_of_pixel(optics_.defocus->tilt_px);
+  const cv::Mat1f radii = map_pixels_by_distance(part, window, [&](const Eigen::Vector2d& at) {
     const Eigen::Vector2d from_middle = (at.array() + 0.5 - half) / half;
     return std::abs(optics_.defocus->radius_px + tilt_px.dot(from_middle));
   });
@@ -110,37 +111,40 @@ void PointSpread::defocus(cv::Mat1f& part, const SpreadWindow& window) const {
   part = result;
 }
 
-void PointSpread::smear(const LensSmear& smear, cv::Mat1f& part, const SpreadWindow& window) const {
-  const Eigen::Vector2d middle = rays_.line_and_place(smear.at_px);
-  const cv::Mat1f scattered = map_over(part, window, [&](const Eigen::Vector2d& at) {
-    return smear.fraction * soft_spot((at - middle).norm() / smear.radius_px);
+void PointSpread::apply_lens_smear(const LensSmear& smear, cv::Mat1f& part,
+                                   const SpreadWindow& window) const {
+  const Eigen::Vector2d middle = rays_.line_and_place_of_pixel(smear.at_px);
+  const cv::Mat1f scattered = map_pixels_by_distance(part, window, [&](const Eigen::Vector2d& at) {
+    return smear.fraction * compute_soft_spot_profile((at - middle).norm() / smear.radius_px);
   });
   cv::Mat1f halo = part.clone();
-  blur(halo, window.per_px * smear.sigma_px);
+  blur_by_kernel(halo, window.per_px * smear.sigma_px);
   part = part + scattered.mul(halo - part);
 }
 
-void PointSpread::add_veil(cv::Mat1f& image) const {
+void PointSpread::add_veiling_glare(cv::Mat1f& image) const {
   if (optics_.veil == 0) return;
   const double mean = cv::mean(image)[0];
   image = (1 - optics_.veil) * image + optics_.veil * mean;
 }
 
-float PointSpread::scatter(cv::Mat1f& part) const {
+float PointSpread::remove_scattered_light(cv::Mat1f& part) const {
   if (optics_.veil == 0) return 0;
-  const double pixels = double(rays_.lines()) * rays_.places();
+  const double pixels = double(rays_.lines()) * rays_.pixels_per_line();
   const double scattered = optics_.veil * cv::sum(part)[0] / pixels;
   part = part * (1 - optics_.veil);
   return static_cast<float>(scattered);
 }
 
 cv::Mat1f compute_dust_transmission(const std::vector<Dust>& dust, const PixelRays& rays) {
-  cv::Mat1f transmission(rays.lines(), rays.places(), 1.F);
+  cv::Mat1f transmission(rays.lines(), rays.pixels_per_line(), 1.F);
   for (const Dust& speck : dust) {
-    const Eigen::Vector2d middle = rays.line_and_place(speck.at_px);
-    const cv::Mat1f shadow = map_over(transmission, {0, 0}, [&](const Eigen::Vector2d& at) {
-      return 1 - speck.depth * soft_spot((at - middle).norm() / speck.radius_px);
-    });
+    const Eigen::Vector2d middle = rays.line_and_place_of_pixel(speck.at_px);
+    const cv::Mat1f shadow =
+        map_pixels_by_distance(transmission, {0, 0}, [&](const Eigen::Vector2d& at) {
+          return 1 -
+                 speck.depth * compute_soft_spot_profile((at - middle).norm() / speck.radius_px);
+        });
     transmission = transmission.mul(shadow);
   }
   return transmission;

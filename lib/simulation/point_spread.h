@@ -11,7 +11,7 @@ namespace vlp {
 
 /// Returns the radius of the point spread of the optics, px: less than 1e-3 of the light falls
 /// outside. The veil is not included, as it extends over the whole image.
-int blur_radius_px(const Optics& optics);
+int compute_blur_radius_px(const Optics& optics);
 
 /// Position and resolution of a part of an image, lines x places, to be blurred.
 struct SpreadWindow {
@@ -33,18 +33,18 @@ class PointSpread {
   PointSpread(const Optics& optics, const PixelRays& rays) : optics_(optics), rays_(rays) {}
 
   /// Applies everything except the veil.
-  void spread(cv::Mat1f& part, const SpreadWindow& window) const;
+  void apply_point_spread(cv::Mat1f& part, const SpreadWindow& window) const;
 
   /// Applies the veil to an image of the whole scene.
-  void add_veil(cv::Mat1f& image) const;
+  void add_veiling_glare(cv::Mat1f& image) const;
 
   /// Removes the fraction scattered by the veil from the light of a part of the scene. Returns the
   /// amount that each pixel of the image receives of it.
-  float scatter(cv::Mat1f& part) const;
+  float remove_scattered_light(cv::Mat1f& part) const;
 
  private:
-  void defocus(cv::Mat1f& part, const SpreadWindow& window) const;
-  void smear(const LensSmear& smear, cv::Mat1f& part, const SpreadWindow& window) const;
+  void apply_defocus(cv::Mat1f& part, const SpreadWindow& window) const;
+  void apply_lens_smear(const LensSmear& smear, cv::Mat1f& part, const SpreadWindow& window) const;
 
   const Optics& optics_;
   const PixelRays& rays_;

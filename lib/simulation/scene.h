@@ -24,10 +24,10 @@ namespace vlp {
 
 /// Returns a random generator seeded by a seed, a name and an index alone; the same on every
 /// machine.
-cv::RNG make_random(std::uint64_t seed, std::string_view name, std::size_t index);
+cv::RNG make_seeded_generator(std::uint64_t seed, std::string_view name, std::size_t index);
 
 /// Draws a seed of 64 bits.
-std::uint64_t draw_seed_from(cv::RNG& random);
+std::uint64_t draw_random_seed(cv::RNG& random);
 
 /// Square wave that switches a lamp: lit while frac(frequency t + phase) < duty.
 struct SquareWave {
@@ -36,7 +36,7 @@ struct SquareWave {
   double phase;  // in periods
 
   /// Returns the lit fraction of the time from begin_s to end_s > begin_s, in closed form.
-  double lit_fraction(double begin_s, double end_s) const;
+  double compute_lit_fraction(double begin_s, double end_s) const;
 };
 
 /// Wave of a light on the mains, as a fraction of its greatest brightness:
@@ -48,13 +48,13 @@ struct RectifiedSine {
   double phase;  // in periods
 
   /// Returns the mean over the time from begin_s to end_s > begin_s, in closed form.
-  double lit_fraction(double begin_s, double end_s) const;
+  double compute_lit_fraction(double begin_s, double end_s) const;
 };
 
 using LightWave = std::variant<SquareWave, RectifiedSine>;
 
 /// Returns the wave with another phase, in periods.
-LightWave with_phase(LightWave wave, double phase);
+LightWave with_wave_phase(LightWave wave, double phase);
 
 /// Straight drive at constant speed.
 struct StraightDrive {
@@ -204,7 +204,7 @@ struct Glow {
   std::optional<Halo> halo = {};
   std::optional<Chips> chips = {};
   std::optional<RandomChips> random_chips = {};
-  /// Hot spots drawn from random_chips by draw_random_parts().
+  /// Hot spots drawn from random_chips by draw_random_scene_parts().
   std::vector<HotSpot> hot_spots = {};
 
   /// Returns half of the first axis: the radius of a disc.
@@ -272,7 +272,7 @@ struct Blind {
 struct Sign {
   Panel panel;
   int lines, letters;
-  /// Strokes as fractions of the edges, drawn by draw_random_parts().
+  /// Strokes as fractions of the edges, drawn by draw_random_scene_parts().
   std::vector<Eigen::AlignedBox2d> strokes;
 };
 
@@ -444,15 +444,16 @@ Scene read_scene(const std::filesystem::path& file);
 /// spots of random chips, for each lamp by its id, and the letters of signs.
 ///
 /// read_scene() calls it. Call it again after a change of the seed or of one of these parts.
-void draw_random_parts(Scene& scene);
+void draw_random_scene_parts(Scene& scene);
 
 /// Returns the reflection about a panel's plane, in the world:
 ///   p -> p - 2 n n'(p - corner), with the unit normal n.
 /// It is its own inverse; its linear part has the determinant -1.
-Eigen::Isometry3d reflection_about(const Panel& pane);
+Eigen::Isometry3d make_reflection_about_panel(const Panel& pane);
 
 /// Returns true if light and eye are on one side of the mirror's plane, so that the mirror may show
 /// the light.
-bool is_before(const Mirror& mirror, const Eigen::Vector3d& light_m, const Eigen::Vector3d& eye_m);
+bool are_on_same_side_of_mirror(const Mirror& mirror, const Eigen::Vector3d& light_m,
+                                const Eigen::Vector3d& eye_m);
 
 }  // namespace vlp

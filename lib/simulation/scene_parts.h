@@ -18,11 +18,11 @@ struct Room {
   Eigen::Vector3d min_m, max_m;
 };
 
-Eigen::Vector3d read_point(const YamlValue& value);
-double read_radiance(YamlMap& map, const std::string& key);
+Eigen::Vector3d read_yaml_point(const YamlValue& value);
+double read_electron_rate(YamlMap& map, const std::string& key);
 /// Reads two ascending numbers [least, most] within min and max.
-std::pair<double, double> read_range(const YamlValue& value, double min, double max,
-                                     std::string_view unit);
+std::pair<double, double> read_yaml_range(const YamlValue& value, double min, double max,
+                                          std::string_view unit);
 /// Read lamps, or other objects; lights are checked to be inside the room.
 std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room);
 Clutter read_clutter(YamlMap& map, const std::vector<SceneLamp>& lamps, const Room& room);

@@ -22,7 +22,7 @@ std::vector<double> merge_lines(std::vector<double> lines) {
 }
 
 /// Returns the number of lines at or below a coordinate: 0 before the first.
-int find_cell(const std::vector<double>& lines, double at) {
+int find_cell_of_coordinate(const std::vector<double>& lines, double at) {
   return static_cast<int>(std::upper_bound(lines.begin(), lines.end(), at) - lines.begin());
 }
 
@@ -41,7 +41,7 @@ Eigen::Matrix<double, 2, 4> to_matrix(const std::array<Eigen::Vector2d, 4>& corn
 /// it ends.
 struct CellTraversal {
   CellTraversal(const std::vector<double>& all, double from, double displacement)
-      : lines(all), start(from), length(displacement), cell(find_cell(all, from)) {
+      : lines(all), start(from), length(displacement), cell(find_cell_of_coordinate(all, from)) {
     if (displacement < 0 && cell > 0 && all[std::size_t(cell) - 1] == from) --cell;  // downwards
   }
   double end() const {
@@ -68,7 +68,7 @@ Mosaic::Mosaic(const std::vector<Rectangle>& rectangles) {
   stride_ = x_m_.size() + 1;
   values_.assign(stride_ * (y_m_.size() + 1), 0);
   for (const Rectangle& rectangle : rectangles) fill(rectangle);
-  accumulate_rows();
+  accumulate_row_sums();
 }
 
 void Mosaic::fill(const Rectangle& rectangle) {
@@ -78,12 +78,12 @@ void Mosaic::fill(const Rectangle& rectangle) {
             right = find_closest_line(x_m_, rectangle.right_m);
   for (int row = top + 1; row <= bottom; ++row) {
     for (int column = left + 1; column <= right; ++column) {
-      values_[index(column, row)] = rectangle.value;
+      values_[flat_index(column, row)] = rectangle.value;
     }
   }
 }
 
-void Mosaic::accumulate_rows() {
+void Mosaic::accumulate_row_sums() {
   sums_.assign(values_.size(), 0);
   for (std::size_t i = 0; i < values_.size(); ++i) {
     const std::size_t column = i % stride_;
@@ -93,13 +93,14 @@ void Mosaic::accumulate_rows() {
 }
 
 /// Returns the integral of the pattern along a row up to x, which lies in the given column.
-double Mosaic::value_sum(int column, int row, double x) const {
+double Mosaic::integrate_row_up_to(int column, int row, double x) const {
   if (column == 0) return 0;
-  const std::size_t i = index(column, row);
+  const std::size_t i = flat_index(column, row);
   return sums_[i] + values_[i] * (x - x_m_[static_cast<std::size_t>(column) - 1]);
 }
 
-double Mosaic::integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
+double Mosaic::integrate_shape_along_edge(const Eigen::Vector2d& p,
+                                          const Eigen::Vector2d& q) const {
   const Eigen::Vector2d displacement = q - p;
   if (!displacement.allFinite()) return std::numeric_limits<double>::quiet_NaN();
   CellTraversal x(x_m_, p.x(), displacement.x()), y(y_m_, p.y(), displacement.y());
@@ -108,7 +109,7 @@ double Mosaic::integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q
     const double x_end = x.end(), y_end = y.end();
     const double next = std::min({x_end, y_end, 1.0});
     const double middle = p.x() + displacement.x() * (done + next) / 2;
-    sum += value_sum(x.cell, y.cell, middle) * (next - done);
+    sum += integrate_row_up_to(x.cell, y.cell, middle) * (next - done);
     if (x_end <= y_end) {
       x.step();
     } else {
@@ -119,35 +120,39 @@ double Mosaic::integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q
   return sum * displacement.y();
 }
 
-std::optional<double> Mosaic::constant_value(const std::array<Eigen::Vector2d, 4>& corners) const {
+std::optional<double> Mosaic::find_constant_value(
+    const std::array<Eigen::Vector2d, 4>& corners) const {
   const auto points = to_matrix(corners);
   if (!points.allFinite()) return std::nullopt;
   const Eigen::Vector2d lower = points.rowwise().minCoeff(), upper = points.rowwise().maxCoeff();
-  const int column = find_cell(x_m_, lower.x()), row = find_cell(y_m_, lower.y());
+  const int column = find_cell_of_coordinate(x_m_, lower.x()),
+            row = find_cell_of_coordinate(y_m_, lower.y());
   const auto ends_before = [](const std::vector<double>& lines, int cell, double at) {
     return cell < static_cast<int>(lines.size()) && lines[static_cast<std::size_t>(cell)] <= at;
   };
   if (ends_before(x_m_, column, upper.x()) || ends_before(y_m_, row, upper.y()))
     return std::nullopt;
-  return values_[index(column, row)];
+  return values_[flat_index(column, row)];
 }
 
 double Disc::integrate_triangle(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
-  return cross(p, q) * (0.5 - fall_ / 12 * (p.squaredNorm() + p.dot(q) + q.squaredNorm()));
+  return cross_product_2d(p, q) *
+         (0.5 - fall_ / 12 * (p.squaredNorm() + p.dot(q) + q.squaredNorm()));
 }
 
 double Disc::integrate_sector(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
-  return std::atan2(cross(p, q), p.dot(q)) * (0.5 - fall_ / 4);
+  return std::atan2(cross_product_2d(p, q), p.dot(q)) * (0.5 - fall_ / 4);
 }
 
-std::optional<double> Disc::constant_value(const std::array<Eigen::Vector2d, 4>& corners) const {
+std::optional<double> Disc::find_constant_value(
+    const std::array<Eigen::Vector2d, 4>& corners) const {
   const auto points = to_matrix(corners);
   const bool outside =
       points.rowwise().minCoeff().maxCoeff() > 1 || points.rowwise().maxCoeff().minCoeff() < -1;
   return outside ? std::optional(0.0) : std::nullopt;
 }
 
-double Disc::integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
+double Disc::integrate_shape_along_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
   if (p.squaredNorm() <= 1 && q.squaredNorm() <= 1) return integrate_triangle(p, q);
   // |p + t (q - p)| = 1
   const Eigen::Vector2d displacement = q - p;

@@ -17,31 +17,32 @@ struct Rectangle {
   double value;
 };
 
-/// Flat pattern of rectangles, zero around them.
+/// Piecewise constant function of rectangles; 0 outside.
 class Mosaic {
  public:
   /// Later rectangles cover earlier ones. Edges closer than 1 nm are merged.
   explicit Mosaic(const std::vector<Rectangle>& rectangles);
 
-  Eigen::Vector2d hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
-    return plane_hit(origin, direction);
+  Eigen::Vector2d intersect_ray(const Eigen::Vector3d& origin,
+                                const Eigen::Vector3d& direction) const {
+    return intersect_ray_with_plane(origin, direction);
   }
 
   /// Returns the integral of G dy along the edge from p to q. G(x, y) is the integral of the
   /// pattern along the row from minus infinity to x.
-  double integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
+  double integrate_shape_along_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
 
   /// Returns the value of the pattern over a quadrilateral; std::nullopt if a line of the pattern
   /// lies between its corners.
-  std::optional<double> constant_value(const std::array<Eigen::Vector2d, 4>& corners) const;
+  std::optional<double> find_constant_value(const std::array<Eigen::Vector2d, 4>& corners) const;
 
  private:
   void fill(const Rectangle& rectangle);
-  void accumulate_rows();
-  std::size_t index(int column, int row) const {
+  void accumulate_row_sums();
+  std::size_t flat_index(int column, int row) const {
     return static_cast<std::size_t>(row) * stride_ + static_cast<std::size_t>(column);
   }
-  double value_sum(int column, int row, double x) const;
+  double integrate_row_up_to(int column, int row, double x) const;
 
   std::vector<double> x_m_, y_m_;
   /// Row by row. Each row begins with the empty cell to its left and ends with the one to its
@@ -57,18 +58,19 @@ class Disc {
   Disc(const Eigen::Vector2d& half_axes_m, double rim_to_center_ratio)
       : half_axes_m_(half_axes_m), fall_(1 - rim_to_center_ratio) {}
 
-  Eigen::Vector2d hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
-    return plane_hit(origin, direction).cwiseQuotient(half_axes_m_);
+  Eigen::Vector2d intersect_ray(const Eigen::Vector3d& origin,
+                                const Eigen::Vector3d& direction) const {
+    return intersect_ray_with_plane(origin, direction).cwiseQuotient(half_axes_m_);
   }
 
   /// Returns 0 for a quadrilateral on the outer side of one side of the square around the disc.
-  std::optional<double> constant_value(const std::array<Eigen::Vector2d, 4>& corners) const;
+  std::optional<double> find_constant_value(const std::array<Eigen::Vector2d, 4>& corners) const;
 
   /// Returns the integral over the part of the triangle (0, p, q) inside the disc, in units of the
-  /// radius. add_shape() needs no other triangles.
+  /// radius. add_shape_to_image() needs no other triangles.
   ///   Triangle inside: the area (p x q) / 2; of r^2, (p x q) (p p + p q + q q) / 12.
   ///   Sector of angle a: the area a / 2; of r^2, a / 4.
-  double integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
+  double integrate_shape_along_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
 
  private:
   double integrate_triangle(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;

@@ -19,7 +19,7 @@ namespace {
 std::string make_image_name(const Scene& scene, std::size_t index, std::size_t count) {
   const std::string number = std::to_string(index);
   const std::size_t digits = std::max<std::size_t>(4, std::to_string(count - 1).size());
-  return std::string(digits - number.size(), '0') + number + image_extension(scene.picture);
+  return std::string(digits - number.size(), '0') + number + image_file_extension(scene.picture);
 }
 
 Eigen::Matrix3d rotation(double angle_rad, const Eigen::Vector3d& axis) {
@@ -93,7 +93,7 @@ Eigen::Isometry3d BoardShot::camera_from_board(double time_s) const {
   return Eigen::Translation3d(velocity_in_camera_m_per_s * time_s) * camera_from_board_at_0;
 }
 
-std::size_t count_shots(const CaptureSet& set) {
+std::size_t count_captures_of_set(const CaptureSet& set) {
   if (set.board) return static_cast<std::size_t>(set.board->count);
   const LampShots& lamps = *set.lamps;
   return lamps.heights_m.size() * lamps.spots_m.size() * lamps.yaws_rad.size() *
@@ -102,12 +102,12 @@ std::size_t count_shots(const CaptureSet& set) {
 
 LampShot make_lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index) {
   const LampShots& captures = *set.lamps;
-  cv::RNG random = make_random(scene.seed, set.folder, index);
+  cv::RNG random = make_seeded_generator(scene.seed, set.folder, index);
   const CaptureIndices indices = find_capture_indices(captures, index);
   const double jitter_rad = captures.yaw_jitter_rad * random.uniform(-1.0, 1.0);
 
   LampShot shot;
-  shot.image = make_image_name(scene, index, count_shots(set));
+  shot.image = make_image_name(scene, index, count_captures_of_set(set));
   shot.time_s = static_cast<double>(index) * captures.interval_s;
   shot.exposure_s = set.exposure_s;
   shot.motion.axis_m << captures.spots_m[indices.spot], captures.heights_m[indices.height];
@@ -120,7 +120,7 @@ LampShot make_lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t i
   shot.motion.yaw_rad =
       captures.yaws_rad[indices.yaw] + jitter_rad + captures.turn_rate_rad_per_s * indices.driven_s;
   shot.motion.mount = scene.mount;
-  const std::size_t last = count_shots(set) - 1;
+  const std::size_t last = count_captures_of_set(set) - 1;
   const double fraction = last > 0 ? static_cast<double>(index) / static_cast<double>(last) : 0;
   const auto ramp = [&](const std::pair<double, double>& ends) {
     return ends.first + fraction * (ends.second - ends.first);
@@ -137,12 +137,13 @@ LampShot make_lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t i
   for (const SceneLamp& lamp : scene.lamps) {
     shot.waves.push_back({lamp.frequency_hz, lamp.duty, draw_phase(lamp.phase, lamp.frequency_hz)});
   }
-  shot.noise_seed = draw_seed_from(random);
+  shot.noise_seed = draw_random_seed(random);
   // Drawn last, so that the other random values equal those of a scene without such lights.
   for (const ForeignLight& light : scene.clutter.foreign_lights) {
     const double frequency_hz =
         std::visit([](const auto& wave) { return wave.frequency_hz; }, light.wave);
-    shot.foreign_waves.push_back(with_phase(light.wave, draw_phase(light.phase, frequency_hz)));
+    shot.foreign_waves.push_back(
+        with_wave_phase(light.wave, draw_phase(light.phase, frequency_hz)));
   }
   if (scene.clutter.ambient_flicker) shot.ambient_phase = random.uniform(0.0, 1.0);
   return shot;
@@ -151,7 +152,7 @@ LampShot make_lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t i
 BoardShot make_board_shot(const Scene& scene, const CaptureSet& set, std::size_t index) {
   const BoardViews& views = *set.board;
   const Lens lens(scene.camera.lens_model, scene.camera.intrinsics);
-  cv::RNG random = make_random(scene.seed, set.folder, index);
+  cv::RNG random = make_seeded_generator(scene.seed, set.folder, index);
   const auto fraction = [&] { return random.uniform(-1.0, 1.0); };
 
   // The board's center is placed on a random ray and the board faces the camera; then it is rotated
@@ -171,16 +172,16 @@ BoardShot make_board_shot(const Scene& scene, const CaptureSet& set, std::size_t
   const Eigen::Vector3d tilt_axis(std::cos(azimuth), std::sin(azimuth), 0);
 
   BoardShot shot;
-  shot.image = make_image_name(scene, index, count_shots(set));
+  shot.image = make_image_name(scene, index, count_captures_of_set(set));
   shot.exposure_s = set.exposure_s;
   shot.camera_from_board_at_0.linear() =
       facing * rotation(tilt, tilt_axis) * rotation(roll, Eigen::Vector3d::UnitZ());
   Eigen::Vector3d middle_m(0, 0, 0);
-  middle_m.head<2>() = tag_field_m(scene.board->print) / 2;
+  middle_m.head<2>() = compute_tag_field_size_m(scene.board->print) / 2;
   shot.camera_from_board_at_0.translation() =
       distance_m * sight - shot.camera_from_board_at_0.linear() * middle_m;
   shot.velocity_in_camera_m_per_s = views.velocity_m_per_s;
-  shot.noise_seed = draw_seed_from(random);
+  shot.noise_seed = draw_random_seed(random);
   return shot;
 }
 

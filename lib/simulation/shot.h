@@ -20,12 +20,12 @@ struct Shutter {
   int index = 0, count = 1;
 
   /// Returns the middle of the whole exposure. Lines may be fractional or outside the image.
-  double center_s(double line) const { return (line - (lines - 1) / 2.0) * row_time_s; }
+  double exposure_center_s(double line) const { return (line - (lines - 1) / 2.0) * row_time_s; }
   double begin_s(int line) const {
-    return center_s(line) + (double(index) / count - 0.5) * exposure_s;
+    return exposure_center_s(line) + (double(index) / count - 0.5) * exposure_s;
   }
   double end_s(int line) const { return begin_s(line) + exposure_s / count; }
-  double middle_s(int line) const { return (begin_s(line) + end_s(line)) / 2; }
+  double time_sample_middle_s(int line) const { return (begin_s(line) + end_s(line)) / 2; }
 };
 
 /// Motion of the camera on its base during a capture. Time 0 is the middle of the exposure of the
@@ -44,7 +44,7 @@ struct BaseMotion {
   /// Phase of the vibration at time 0.
   double phase_rad = 0;
 
-  bool at_rest() const {
+  bool is_at_rest() const {
     return velocity_m_per_s.isZero(0) && turn_rate_rad_per_s == 0 && vibration.amplitude_rad == 0;
   }
   bool is_level() const {
@@ -84,7 +84,7 @@ struct BoardShot {
 };
 
 /// Returns the number of captures of a set.
-std::size_t count_shots(const CaptureSet& set);
+std::size_t count_captures_of_set(const CaptureSet& set);
 
 /// Returns capture `index` of a set. It depends on the scene, its seed, the set's folder and the
 /// index alone.

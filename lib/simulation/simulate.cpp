@@ -58,21 +58,22 @@ void write_image(const fs::path& file, const cv::Mat& lines, const Scene& scene)
 }
 
 /// Renders a capture. Returns false if the image exists already.
-bool render(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
-            std::size_t index, const fs::path& folder) {
+bool render_capture(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
+                    std::size_t index, const fs::path& folder) {
   const auto write = [&](const std::string& image, const auto& electrons, std::uint64_t seed) {
     if (fs::exists(folder / image)) return false;
-    write_image(folder / image, expose(scene.sensor, electrons(), seed, scene.picture), scene);
+    write_image(folder / image, simulate_sensor(scene.sensor, electrons(), seed, scene.picture),
+                scene);
     return true;
   };
   if (set.board) {
     const BoardShot shot = make_board_shot(scene, set, index);
     return write(
-        shot.image, [&] { return renderer.board_electrons(shot); }, shot.noise_seed);
+        shot.image, [&] { return renderer.render_board_electrons(shot); }, shot.noise_seed);
   }
   const LampShot shot = make_lamp_shot(scene, set, index);
   return write(
-      shot.image, [&] { return renderer.lamp_electrons(shot); }, shot.noise_seed);
+      shot.image, [&] { return renderer.render_lamp_electrons(shot); }, shot.noise_seed);
 }
 
 /// Returns the gray level of a source that fills a pixel on the axis. Without a picture it may
@@ -82,16 +83,16 @@ double compute_level(const Scene& scene, const CaptureSet& set, double electron_
   const double level =
       sensor.black_level_dn +
       sensor.gain_dn_per_e * std::min(electron_rate_e_per_s * set.exposure_s, sensor.full_well_e);
-  return scene.picture ? apply_tone_curve(*scene.picture, sensor, level) : level;
+  return scene.picture ? correct_views_for_tone_curve(*scene.picture, sensor, level) : level;
 }
 
 std::string whole(double value) { return std::to_string(std::lround(value)); }
 
-void add_brightness(const Scene& scene, const CaptureSet& set, const std::string& bright,
-                    double bright_e_per_s, const std::string& dark, double dark_e_per_s,
-                    std::vector<std::string>& warnings) {
+void add_brightness_warnings(const Scene& scene, const CaptureSet& set, const std::string& bright,
+                             double bright_e_per_s, const std::string& dark, double dark_e_per_s,
+                             std::vector<std::string>& warnings) {
   constexpr double too_dark = 0.03, too_bright = 0.6;
-  const double white = white_dn(scene.sensor);
+  const double white = white_level_dn(scene.sensor);
   const std::string fit =
       ": does sensor.gain_dn_per_e suit sensor.bits, and the light the exposure?";
   const double high = compute_level(scene, set, bright_e_per_s);
@@ -106,7 +107,8 @@ void add_brightness(const Scene& scene, const CaptureSet& set, const std::string
   }
 }
 
-void add_stripes(const Scene& scene, const CaptureSet& set, std::vector<std::string>& warnings) {
+void add_stripe_warnings(const Scene& scene, const CaptureSet& set,
+                         std::vector<std::string>& warnings) {
   constexpr double min_period_lines = 2.2;
   for (const SceneLamp& lamp : scene.lamps) {
     const std::string name = set.folder + ": lamp " + std::to_string(lamp.id);
@@ -121,8 +123,8 @@ void add_stripes(const Scene& scene, const CaptureSet& set, std::vector<std::str
 
 }  // namespace
 
-std::string make_provenance(const fs::path& scene, std::optional<std::uint64_t> seed,
-                            const std::string& program, const std::string& version) {
+std::string make_simulation_provenance(const fs::path& scene, std::optional<std::uint64_t> seed,
+                                       const std::string& program, const std::string& version) {
   constexpr std::size_t max_bytes = 1 << 20;
   std::string text = read_text_file(scene, max_bytes);
   const std::string mark = "# " + program + " ";
@@ -167,20 +169,20 @@ SimulationSummary simulate(const Scene& scene, const fs::path& output,
   write_common_files(scene, output);
 
   std::size_t total = 0;
-  for (const CaptureSet& set : sets) total += count_shots(set);
+  for (const CaptureSet& set : sets) total += count_captures_of_set(set);
   SimulationSummary summary;
   std::mutex counting;
   for (const CaptureSet& set : sets) {
     const fs::path folder = output / set.folder;
     make_folder(folder);
-    const auto warnings = find_warnings(scene, set);
+    const auto warnings = find_scene_warnings(scene, set);
     summary.warnings.insert(summary.warnings.end(), warnings.begin(), warnings.end());
-    if (const std::size_t empty = write_truth(scene, renderer, set, folder); empty > 0) {
+    if (const std::size_t empty = write_truth_tables(scene, renderer, set, folder); empty > 0) {
       summary.warnings.push_back(set.folder + ": nothing is in view in " + std::to_string(empty) +
-                                 " of " + std::to_string(count_shots(set)) + " captures");
+                                 " of " + std::to_string(count_captures_of_set(set)) + " captures");
     }
-    parallel_for(count_shots(set), options.threads, [&](std::size_t index) {
-      const bool rendered = render(scene, renderer, set, index, folder);
+    parallel_for(count_captures_of_set(set), options.threads, [&](std::size_t index) {
+      const bool rendered = render_capture(scene, renderer, set, index, folder);
       const std::lock_guard lock(counting);
       ++(rendered ? summary.rendered : summary.found);
       progress(summary, total);
@@ -189,20 +191,20 @@ SimulationSummary simulate(const Scene& scene, const fs::path& output,
   return summary;
 }
 
-std::vector<std::string> find_warnings(const Scene& scene, const CaptureSet& set) {
+std::vector<std::string> find_scene_warnings(const Scene& scene, const CaptureSet& set) {
   std::vector<std::string> warnings;
   if (set.board) {
-    add_brightness(scene, set, "the board's white", scene.board->white_e_per_s, "its black",
-                   scene.board->black_e_per_s, warnings);
+    add_brightness_warnings(scene, set, "the board's white", scene.board->white_e_per_s,
+                            "its black", scene.board->black_e_per_s, warnings);
     return warnings;
   }
   double brightest = 0;
   for (const SceneLamp& lamp : scene.lamps) {
     brightest = std::max(brightest, lamp.glow.electron_rate_e_per_s);
   }
-  add_brightness(scene, set, "the brightest lamp", brightest + scene.ambient_e_per_s, "the ceiling",
-                 scene.ambient_e_per_s, warnings);
-  add_stripes(scene, set, warnings);
+  add_brightness_warnings(scene, set, "the brightest lamp", brightest + scene.ambient_e_per_s,
+                          "the ceiling", scene.ambient_e_per_s, warnings);
+  add_stripe_warnings(scene, set, warnings);
   return warnings;
 }
 

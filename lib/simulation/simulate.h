@@ -27,13 +27,14 @@ struct SimulationOptions {
 /// vlp-simulate 0.1.0". An existing line of that kind is replaced. If `seed` is given, it replaces
 /// the seed of the scene.
 /// @throws InputError if the file cannot be read, or if its seed has no line of its own
-std::string make_provenance(const std::filesystem::path& scene, std::optional<std::uint64_t> seed,
-                            const std::string& program, const std::string& version);
+std::string make_simulation_provenance(const std::filesystem::path& scene,
+                                       std::optional<std::uint64_t> seed,
+                                       const std::string& program, const std::string& version);
 
 /// Counts and warnings of a simulation.
 struct SimulationSummary {
-  /// Warnings about useless captures: find_warnings() each folder, and captures without a lamp or
-  /// corner in view.
+  /// Warnings about useless captures: find_scene_warnings() each folder, and captures without a
+  /// lamp or corner in view.
   std::vector<std::string> warnings;
   std::size_t rendered = 0;
   /// Number of complete images that existed from an earlier execution.
@@ -47,7 +48,7 @@ using SimulationProgress = std::function<void(const SimulationSummary& so_far, s
 ///   scene.yaml, lamps.yaml (as surveyed), board.yaml, true_calibration.yaml,
 ///   true_lamps.yaml
 ///   FOLDER/0000.png, 0001.png, ... (.jpg if the scene sets a JPEG quality)
-///   FOLDER/ the tables of write_truth()
+///   FOLDER/ the tables of write_truth_tables()
 /// Files are written atomically. Existing images are kept, so that an interrupted simulation can be
 /// resumed. The bytes depend on the scene alone, not on the number of threads.
 /// @throws InputError if a folder holds something else, or if files cannot be written
@@ -65,6 +66,6 @@ void claim_output_folder(const std::filesystem::path& output, const std::string&
 ///
 /// Covers images that are nearly black or white, exposures that blur the stripes, and stripes that
 /// are too fine.
-std::vector<std::string> find_warnings(const Scene& scene, const CaptureSet& set);
+std::vector<std::string> find_scene_warnings(const Scene& scene, const CaptureSet& set);
 
 }  // namespace vlp

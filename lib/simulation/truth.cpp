@@ -40,11 +40,11 @@ std::optional<ImagePoint> find_image_point(const FrameRenderer& renderer, const 
   double time_s = 0;
   // Each iteration multiplies the error by the lines that the point moves in a row time.
   for (int iteration = 0; iteration < 200; ++iteration) {
-    const auto pixel = renderer.rays().lens().project(camera_from_target(time_s) * point_m);
+    const auto pixel = renderer.pixel_rays().lens().project(camera_from_target(time_s) * point_m);
     if (!pixel) return std::nullopt;
     if (before && (*pixel - *before).norm() < tolerance_px) return ImagePoint{*pixel, time_s};
     before = pixel;
-    time_s = shutter.center_s(renderer.rays().line_and_place(*pixel)[0]);
+    time_s = shutter.exposure_center_s(renderer.pixel_rays().line_and_place_of_pixel(*pixel)[0]);
   }
   return std::nullopt;
 }
@@ -54,8 +54,8 @@ bool is_in_image(const Camera& camera, const Eigen::Vector2d& pixel) {
          pixel.y() < camera.imager_px[1] - 0.5;
 }
 
-bool is_hidden_by(const Panel& panel, const Eigen::Vector3d& eye_m,
-                  const Eigen::Vector3d& point_m) {
+bool is_point_hidden_by(const Panel& panel, const Eigen::Vector3d& eye_m,
+                        const Eigen::Vector3d& point_m) {
   const Eigen::Vector3d normal = panel.edge_a_m.cross(panel.edge_b_m);
   const Eigen::Vector3d displacement = point_m - eye_m;
   const double fraction = normal.dot(panel.corner_m - eye_m) / normal.dot(displacement);
@@ -71,7 +71,7 @@ struct GlowPoints {
   std::vector<Eigen::Vector3d> face_m, rim_m;
 };
 
-GlowPoints sample_points(const Glow& glow) {
+GlowPoints sample_surface_points(const Glow& glow) {
   constexpr int count = 200, per_side = 14, rim_points = 120;
   constexpr double golden_angle = std::numbers::pi * (3 - 2.2360679774997896964);
   GlowPoints points;
@@ -104,19 +104,19 @@ double compute_visible_fraction(const Scene& scene, const FrameRenderer& rendere
                                 const Shutter& shutter, const Motion& camera_from_world,
                                 const Glow& glow, const Mirror* mirror) {
   Eigen::Isometry3d reflection = Eigen::Isometry3d::Identity();
-  if (mirror) reflection = reflection_about(mirror->pane);
+  if (mirror) reflection = make_reflection_about_panel(mirror->pane);
   const auto visible = [&](const Eigen::Vector3d& glow_point_m) {
     const Eigen::Vector3d point_m = reflection * glow_point_m;
     const auto at = find_image_point(renderer, shutter, camera_from_world, point_m);
     if (!at || !is_in_image(scene.camera, at->pixel)) return false;
     const Eigen::Vector3d eye_m = camera_from_world(at->time_s).inverse().translation();
-    if (mirror && !is_hidden_by(mirror->pane, eye_m, point_m)) return false;
+    if (mirror && !is_point_hidden_by(mirror->pane, eye_m, point_m)) return false;
     const auto& occluders = scene.clutter.occluders;
     return std::none_of(occluders.begin(), occluders.end(), [&](const Panel& occluder) {
-      return is_hidden_by(occluder, eye_m, point_m);
+      return is_point_hidden_by(occluder, eye_m, point_m);
     });
   };
-  const auto [face_m, rim_m] = sample_points(glow);
+  const auto [face_m, rim_m] = sample_surface_points(glow);
   const auto count = std::count_if(face_m.begin(), face_m.end(), visible);
   const auto points = static_cast<double>(face_m.size());
   if (count < std::ptrdiff_t(face_m.size())) return double(count) / points;
@@ -135,10 +135,10 @@ std::optional<GlowImage> find_glow_image(const Scene& scene, const FrameRenderer
   Eigen::Vector3d center_m = glow.position_m;
   if (mirror) {
     const Eigen::Vector3d eye_m = shot.motion.world_from_camera(0).translation();
-    if (!is_before(*mirror, center_m, eye_m)) return std::nullopt;
-    center_m = reflection_about(mirror->pane) * center_m;
+    if (!are_on_same_side_of_mirror(*mirror, center_m, eye_m)) return std::nullopt;
+    center_m = make_reflection_about_panel(mirror->pane) * center_m;
   }
-  const Shutter shutter = renderer.shutter(shot.exposure_s);
+  const Shutter shutter = renderer.make_shutter(shot.exposure_s);
   const auto center = find_image_point(renderer, shutter, camera_from_world, center_m);
   if (!center) return std::nullopt;
   const double in_view =
@@ -147,17 +147,17 @@ std::optional<GlowImage> find_glow_image(const Scene& scene, const FrameRenderer
   return GlowImage{center->pixel, in_view};
 }
 
-std::string length(double value_m) { return fixed(value_m, 9); }
-std::string angle(double value_rad) { return fixed(value_rad, 10); }
-std::string pixel(double value_px) { return fixed(value_px, 6); }
+std::string length(double value_m) { return format_fixed_decimals(value_m, 9); }
+std::string angle(double value_rad) { return format_fixed_decimals(value_rad, 10); }
+std::string pixel(double value_px) { return format_fixed_decimals(value_px, 6); }
 
 std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
                              const CaptureSet& set, const std::filesystem::path& folder) {
   // Columns that no capture of the set needs are omitted.
   bool moves = false, has_roll_pitch = false;
-  for (std::size_t i = 0; i < count_shots(set); ++i) {
+  for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
     const BaseMotion motion = make_lamp_shot(scene, set, i).motion;
-    moves = moves || !motion.at_rest();
+    moves = moves || !motion.is_at_rest();
     has_roll_pitch = has_roll_pitch || !motion.is_level();
   }
   std::vector<std::string> columns{"image", "x_m", "y_m", "z_m", "yaw_rad"};
@@ -174,12 +174,12 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
       known ? std::initializer_list<std::string_view>{"image", "time_s", "x_m", "y_m", "z_m"}
             : std::initializer_list<std::string_view>{"image", "time_s"});
   std::size_t empty = 0;
-  for (std::size_t i = 0; i < count_shots(set); ++i) {
+  for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
     const LampShot shot = make_lamp_shot(scene, set, i);
     const auto& [position_m, yaw_rad] = shot.motion.pose(0);
     const std::string x = length(position_m.x()), y = length(position_m.y());
-    const std::string z = length(position_m.z()), time = fixed(shot.time_s, 9);
-    std::vector<std::string> row{shot.image, x, y, z, angle(wrap_rad(yaw_rad))};
+    const std::string z = length(position_m.z()), time = format_fixed_decimals(shot.time_s, 9);
+    std::vector<std::string> row{shot.image, x, y, z, angle(wrap_angle_rad(yaw_rad))};
     if (moves) {
       const Eigen::Vector2d velocity_m_per_s = shot.motion.camera_velocity_m_per_s();
       row.insert(row.end(), {time, length(velocity_m_per_s.x()), length(velocity_m_per_s.y()),
@@ -195,16 +195,16 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
     } else {
       captures.row({shot.image, time});
     }
-    const auto lamps = find_true_lamps(scene, renderer, shot);
+    const auto lamps = find_true_lamps_in_image(scene, renderer, shot);
     empty += lamps.empty();
     for (const auto& [id, at_px, in_view] : lamps) {
       detections.row({shot.image, std::to_string(id), pixel(at_px.x()), pixel(at_px.y()),
-                      significant(in_view, 3)});
+                      format_significant_digits(in_view, 3)});
     }
   }
-  truth.save();
-  detections.save();
-  captures.save();
+  truth.save_file();
+  detections.save_file();
+  captures.save_file();
   return empty;
 }
 
@@ -213,14 +213,15 @@ void write_other_lights(const Scene& scene, const FrameRenderer& renderer, const
   if (scene.clutter.mirrors.empty() && scene.clutter.foreign_lights.empty()) return;
   CsvWriter table(folder / "true_other_lights.csv",
                   {"image", "kind", "lamp", "u_px", "v_px", "in_view"});
-  for (std::size_t i = 0; i < count_shots(set); ++i) {
+  for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
     const LampShot shot = make_lamp_shot(scene, set, i);
-    for (const auto& [kind, lamp, at_px, in_view] : find_true_other_lights(scene, renderer, shot)) {
+    for (const auto& [kind, lamp, at_px, in_view] :
+         find_other_lights_in_image(scene, renderer, shot)) {
       table.row({shot.image, kind, lamp ? std::to_string(*lamp) : "", pixel(at_px.x()),
-                 pixel(at_px.y()), significant(in_view, 3)});
+                 pixel(at_px.y()), format_significant_digits(in_view, 3)});
     }
   }
-  table.save();
+  table.save_file();
 }
 
 std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
@@ -228,10 +229,10 @@ std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
   CsvWriter boards(folder / "true_boards.csv",
                    {"image", "x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"});
   std::vector<std::string> columns{"image", "tag", "corner", "u_px", "v_px"};
-  if (scene.board->print.has_squares()) columns.erase(columns.begin() + 1);
+  if (scene.board->print.has_chessboard_squares()) columns.erase(columns.begin() + 1);
   CsvWriter corners(folder / "true_corners.csv", columns);
   std::size_t empty = 0;
-  for (std::size_t i = 0; i < count_shots(set); ++i) {
+  for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
     const BoardShot shot = make_board_shot(scene, set, i);
     const Eigen::Isometry3d camera_from_board = shot.camera_from_board(0);
     const Eigen::Vector3d place_m = camera_from_board.translation();
@@ -240,7 +241,7 @@ std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
     boards.row({shot.image, length(place_m.x()), length(place_m.y()), length(place_m.z()),
                 angle(rotation_vector_rad.x()), angle(rotation_vector_rad.y()),
                 angle(rotation_vector_rad.z())});
-    const auto visible_corners = find_true_corners(scene, renderer, shot);
+    const auto visible_corners = find_true_corners_in_image(scene, renderer, shot);
     empty += visible_corners.empty();
     for (const auto& [tag, corner, at_px] : visible_corners) {
       std::vector<std::string> row{shot.image};
@@ -249,15 +250,15 @@ std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
       corners.row(row);
     }
   }
-  boards.save();
-  corners.save();
+  boards.save_file();
+  corners.save_file();
   return empty;
 }
 
 }  // namespace
 
-std::vector<TrueLamp> find_true_lamps(const Scene& scene, const FrameRenderer& renderer,
-                                      const LampShot& shot) {
+std::vector<TrueLamp> find_true_lamps_in_image(const Scene& scene, const FrameRenderer& renderer,
+                                               const LampShot& shot) {
   std::vector<TrueLamp> lamps;
   for (const SceneLamp& lamp : scene.lamps) {
     const auto glow_image = find_glow_image(scene, renderer, shot, lamp.glow);
@@ -266,9 +267,9 @@ std::vector<TrueLamp> find_true_lamps(const Scene& scene, const FrameRenderer& r
   return lamps;
 }
 
-std::vector<TrueOtherLight> find_true_other_lights(const Scene& scene,
-                                                   const FrameRenderer& renderer,
-                                                   const LampShot& shot) {
+std::vector<TrueOtherLight> find_other_lights_in_image(const Scene& scene,
+                                                       const FrameRenderer& renderer,
+                                                       const LampShot& shot) {
   std::vector<TrueOtherLight> lights;
   for (const Mirror& mirror : scene.clutter.mirrors) {
     for (const SceneLamp& lamp : scene.lamps) {
@@ -286,20 +287,21 @@ std::vector<TrueOtherLight> find_true_other_lights(const Scene& scene,
   return lights;
 }
 
-std::vector<TrueCorner> find_true_corners(const Scene& scene, const FrameRenderer& renderer,
-                                          const BoardShot& shot) {
+std::vector<TrueCorner> find_true_corners_in_image(const Scene& scene,
+                                                   const FrameRenderer& renderer,
+                                                   const BoardShot& shot) {
   const BoardWarp warp(*scene.board);
   const auto camera_from_board = [&](double time_s) { return shot.camera_from_board(time_s); };
   std::vector<TrueCorner> corners;
   const auto add = [&](std::optional<int> tag, int corner, const Eigen::Vector2d& at_m) {
-    const Eigen::Vector3d point_m(at_m.x(), at_m.y(), warp.depth(at_m).depth_m);
-    const auto at =
-        find_image_point(renderer, renderer.shutter(shot.exposure_s), camera_from_board, point_m);
+    const Eigen::Vector3d point_m(at_m.x(), at_m.y(), warp.compute_deflection(at_m).depth_m);
+    const auto at = find_image_point(renderer, renderer.make_shutter(shot.exposure_s),
+                                     camera_from_board, point_m);
     if (at && is_in_image(scene.camera, at->pixel)) corners.push_back({tag, corner, at->pixel});
   };
   const Board& print = scene.board->print;
-  if (print.has_squares()) {
-    const auto corners_m = square_corners_m(print);
+  if (print.has_chessboard_squares()) {
+    const auto corners_m = list_chessboard_corners_m(print);
     for (std::size_t i = 0; i < corners_m.size(); ++i) add({}, static_cast<int>(i), corners_m[i]);
     return corners;
   }
@@ -316,8 +318,8 @@ Calibration make_true_calibration(const Scene& scene) {
   RotationCenter center;
   center.model = RotationModel::tilt;
   center.zenith_in_camera = scene.mount.level_from_camera.row(2);
-  center.center_px =
-      lens.focal_px().cwiseProduct(center.zenith_in_camera.hnormalized()) + lens.center_px();
+  center.center_px = lens.focal_px().cwiseProduct(center.zenith_in_camera.hnormalized()) +
+                     lens.principal_point_px();
   Calibration calibration;
   calibration.camera = scene.camera;
   calibration.rotation_center = center;
@@ -334,8 +336,8 @@ LampMap make_lamp_map(const Scene& scene, bool surveyed) {
   return map;
 }
 
-std::size_t write_truth(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
-                        const std::filesystem::path& folder) {
+std::size_t write_truth_tables(const Scene& scene, const FrameRenderer& renderer,
+                               const CaptureSet& set, const std::filesystem::path& folder) {
   if (set.board) {
     return write_board_truth(scene, renderer, set, folder);
   }

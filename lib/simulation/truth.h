@@ -16,7 +16,7 @@ namespace vlp {
 /// Lamp as it appears in a capture.
 struct TrueLamp {
   int id;
-  /// Image of the center of the disc or rectangle, each line of the image at its own time.
+  /// Pixel of the lamp's center when that pixel's line is exposed.
   Eigen::Vector2d pixel;
   /// Fraction of the lamp that is inside the image and not hidden, from some 200 points spread over
   /// it.
@@ -25,8 +25,8 @@ struct TrueLamp {
 
 /// Returns the lamps that are at least partly in view and whose center the lens describes. The
 /// center may lie outside the image.
-std::vector<TrueLamp> find_true_lamps(const Scene& scene, const FrameRenderer& renderer,
-                                      const LampShot& shot);
+std::vector<TrueLamp> find_true_lamps_in_image(const Scene& scene, const FrameRenderer& renderer,
+                                               const LampShot& shot);
 
 /// Flickering light that is not one of the lamps, as it appears in a capture.
 struct TrueOtherLight {
@@ -44,12 +44,12 @@ struct TrueOtherLight {
 
 /// Returns the mirror images and foreign lights that are at least partly in view and whose center
 /// the lens describes.
-std::vector<TrueOtherLight> find_true_other_lights(const Scene& scene,
-                                                   const FrameRenderer& renderer,
-                                                   const LampShot& shot);
+std::vector<TrueOtherLight> find_other_lights_in_image(const Scene& scene,
+                                                       const FrameRenderer& renderer,
+                                                       const LampShot& shot);
 
 /// Corner of a tag's black border as it appears in a capture, in the order of BoardTag. For a board
-/// of squares without tags: an inner corner, numbered as in square_corners_m().
+/// of squares without tags: an inner corner, numbered as in list_chessboard_corners_m().
 struct TrueCorner {
   std::optional<int> tag;
   int corner;
@@ -57,8 +57,9 @@ struct TrueCorner {
 };
 
 /// Returns the corners inside the image.
-std::vector<TrueCorner> find_true_corners(const Scene& scene, const FrameRenderer& renderer,
-                                          const BoardShot& shot);
+std::vector<TrueCorner> find_true_corners_in_image(const Scene& scene,
+                                                   const FrameRenderer& renderer,
+                                                   const BoardShot& shot);
 
 /// Returns the scene's camera, with its tilt as the rotation center.
 Calibration make_true_calibration(const Scene& scene);
@@ -73,7 +74,7 @@ LampMap make_lamp_map(const Scene& scene, bool surveyed);
 ///   and a rotation vector in radians).
 /// Returns the number of captures without a lamp, or without a corner, in view.
 /// @throws InputError if a file cannot be written
-std::size_t write_truth(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
-                        const std::filesystem::path& folder);
+std::size_t write_truth_tables(const Scene& scene, const FrameRenderer& renderer,
+                               const CaptureSet& set, const std::filesystem::path& folder);
 
 }  // namespace vlp

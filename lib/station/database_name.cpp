@@ -39,7 +39,7 @@ Parts parse_parts(const std::string& where) {
 }
 
 /// Returns true if a part of the password could be interpreted as host or database.
-bool may_be_misread(const std::string& where, const Parts& parts) {
+bool may_password_be_misread(const std::string& where, const Parts& parts) {
   const std::string without_parameters = where.substr(0, where.find('?'));
   const auto begin = without_parameters.find(kScheme) + std::string(kScheme).size();
   const auto slash = std::min(without_parameters.find('/', begin), without_parameters.size());
@@ -54,7 +54,7 @@ bool may_be_misread(const std::string& where, const Parts& parts) {
 }
 
 /// Returns true for a connection string of keywords, as of libpq's own tools.
-bool has_keyword_form(const std::string& where) {
+bool is_keyword_connection_string(const std::string& where) {
   return where.find("password=") != std::string::npos || where.find("host=") != std::string::npos ||
          where.find("dbname=") != std::string::npos;
 }
@@ -84,20 +84,21 @@ bool contains_password(const std::string& where) {
 std::string describe_database(const std::string& where) {
   const std::string form = "is not of the form postgresql://USER@HOST/NAME";
   if (!is_server_address(where)) {
-    if (has_keyword_form(where)) throw InputError("a connection string of keywords", form);
+    if (is_keyword_connection_string(where))
+      throw InputError("a connection string of keywords", form);
     return where;
   }
   const std::string hidden = where.substr(0, where.find(kScheme)) + kScheme + "...";
   auto parts = parse_parts(where);
   if (parts.empty()) throw InputError(hidden, form);
-  if (may_be_misread(where, parts)) {
+  if (may_password_be_misread(where, parts)) {
     throw InputError(hidden, form + "; in user and password '@' is %40, ':' is %3A, '/' is %2F");
   }
   const std::string port = parts.contains("port") ? ":" + parts["port"] : "";
   return "postgresql://" + parts["host"] + port + "/" + parts["dbname"];
 }
 
-std::string make_records_database_id(const std::string& where) {
+std::string derive_database_identity(const std::string& where) {
   const std::string name = describe_database(where);
   if (!is_server_address(where)) {
     return get_host_name() + ":" + std::filesystem::absolute(name).lexically_normal().string();
@@ -140,7 +141,7 @@ bool is_server_responding(const std::string& where) {
   return PQpingParams(keywords.data(), values.data(), 1) == PQPING_OK;
 }
 
-int timeout_s(const std::string& where) {
+int get_database_timeout_s(const std::string& where) {
   if (!is_server_address(where)) return kPatienceWithFile_s;
   const auto parts = parse_parts(where);
   const auto without_parameters = parts.find(kPatience);

@@ -23,42 +23,43 @@ constexpr int kMany = 10'000;
 
 /// Returns the path in a value.
 fs::path resolve_path(const YamlValue& value, const fs::path& file) {
-  const fs::path path = value.text();
-  if (path.empty()) throw value.error("names nothing");
+  const fs::path path = value.get_text();
+  if (path.empty()) throw value.make_error("names nothing");
   return path.is_absolute() ? path : file.parent_path() / path;
 }
 
-void read_into(YamlMap& map, const char* key, int& metric) {
-  if (const auto value = map.optional(key)) metric = value->integer_within(1, kMany);
+void read_optional_into(YamlMap& map, const char* key, int& metric) {
+  if (const auto value = map.get_optional(key)) metric = value->get_integer_within(1, kMany);
 }
-void read_into(YamlMap& map, const char* key, double& metric, double max, const char* unit) {
-  if (const auto value = map.optional(key)) metric = value->number_within(0, max, unit);
+void read_optional_into(YamlMap& map, const char* key, double& metric, double max,
+                        const char* unit) {
+  if (const auto value = map.get_optional(key)) metric = value->get_number_within(0, max, unit);
 }
 
-CompletionCriteria read_enough(YamlMap map) {
+CompletionCriteria read_completion_criteria(YamlMap map) {
   CompletionCriteria sufficient;
-  read_into(map, "board_views", sufficient.board_views);
-  read_into(map, "board_coverage", sufficient.board_coverage, 1, "(share)");
-  read_into(map, "turn_captures", sufficient.turn_captures);
-  read_into(map, "turn_heights", sufficient.turn_heights);
+  read_optional_into(map, "board_views", sufficient.board_views);
+  read_optional_into(map, "board_coverage", sufficient.board_coverage, 1, "(share)");
+  read_optional_into(map, "turn_captures", sufficient.turn_captures);
+  read_optional_into(map, "turn_heights", sufficient.turn_heights);
   double arc_deg = deg_from_rad(sufficient.turn_arc_rad);
-  read_into(map, "turn_arc_deg", arc_deg, 360, "degrees");
+  read_optional_into(map, "turn_arc_deg", arc_deg, 360, "degrees");
   sufficient.turn_arc_rad = rad_from_deg(arc_deg);
-  read_into(map, "dispersion_captures", sufficient.dispersion_captures);
-  read_into(map, "check_captures", sufficient.check_captures);
-  map.finish();
+  read_optional_into(map, "dispersion_captures", sufficient.dispersion_captures);
+  read_optional_into(map, "check_captures", sufficient.check_captures);
+  map.check_all_keys_read();
   return sufficient;
 }
 
-void read_refusal(YamlMap map, StationConfig& config) {
+void read_rejection_limits(YamlMap map, StationConfig& config) {
   constexpr double max_px = 100;
   FrontendOptions& limits = config.frontend;
-  read_into(map, "blur_px", limits.max_blur_px, max_px, "px");
-  read_into(map, "dark_fraction", limits.min_bright_fraction, 1, "(share)");
-  read_into(map, "white_fraction", limits.max_white_fraction, 1, "(share)");
-  read_into(map, "same_pose_fraction", limits.same_view_fraction, 1, "(share)");
-  read_into(map, "max_consecutive_rejections", config.max_consecutive_rejections);
-  map.finish();
+  read_optional_into(map, "blur_px", limits.max_blur_px, max_px, "px");
+  read_optional_into(map, "dark_fraction", limits.min_bright_fraction, 1, "(share)");
+  read_optional_into(map, "white_fraction", limits.max_white_fraction, 1, "(share)");
+  read_optional_into(map, "same_pose_fraction", limits.same_view_fraction, 1, "(share)");
+  read_optional_into(map, "max_consecutive_rejections", config.max_consecutive_rejections);
+  map.check_all_keys_read();
 }
 
 /// Reads the files that a station names, and stores their digests.
@@ -71,12 +72,12 @@ class Files {
     add(file);
     return file;
   }
-  std::string sha256() const { return sha256_of_text(digests_); }
-  const std::vector<fs::path>& names() const { return names_; }
+  std::string compute_sha256() const { return compute_text_sha256(digests_); }
+  const std::vector<fs::path>& file_names() const { return names_; }
 
  private:
   void add(const fs::path& file) {
-    digests_ += sha256_of_file(file) + "\n";
+    digests_ += compute_file_sha256(file) + "\n";
     names_.push_back(file);
   }
 
@@ -86,10 +87,10 @@ class Files {
 };
 
 /// Reads a calibration whose camera has row time and readout.
-Calibration read_shutter(const YamlValue& value, Files& files) {
+Calibration read_row_time_and_readout(const YamlValue& value, Files& files) {
   Calibration calibration = read_calibration(files(value));
   if (!calibration.camera.row_time_s || !calibration.camera.readout) {
-    throw value.error(
+    throw value.make_error(
         "its camera should have row_time_s and readout, which are needed to identify lamps");
   }
   return calibration;
@@ -98,53 +99,56 @@ Calibration read_shutter(const YamlValue& value, Files& files) {
 /// Adds guard bands to gates: {k: 1.645, standard_uncertainties: {METRIC: U}}.
 void read_guard_bands(YamlMap map, std::vector<Gate>& gates) {
   constexpr double max_k = 10, max_u = 1e6;
-  const YamlValue factor = map.required("k");
-  const double k = factor.number_within(0, max_k, "(factor)");
-  const YamlValue stated = map.required("standard_uncertainties");
-  YamlMap uncertainties = stated.map();
+  const YamlValue factor = map.get_required_column("k");
+  const double k = factor.get_number_within(0, max_k, "(factor)");
+  const YamlValue stated = map.get_required_column("standard_uncertainties");
+  YamlMap uncertainties = stated.get_mapping();
   int found = 0;
   for (Gate& gate : gates) {
-    const auto value = uncertainties.optional(gate.metric.c_str());
+    const auto value = uncertainties.get_optional(gate.metric.c_str());
     if (!value) continue;
     ++found;
-    const double u = value->number_within(0, max_u, "(in the gate's unit)");
-    if (!(u > 0)) throw value->error("should be above 0");
+    const double u = value->get_number_within(0, max_u, "(in the gate's unit)");
+    if (!(u > 0)) throw value->make_error("should be above 0");
     gate.guard = GuardBand{u, k};
-    const MetricKind kind = metric_kind(gate.metric).value();
+    const MetricKind kind = find_metric_kind(gate.metric).value();
     const double accepted =
         CheckedMetric{gate.metric, "", {}, gate.limit, kind.direction, gate.guard}
             .acceptance_limit();
     if (accepted >= 0 && accepted <= kind.largest) continue;
-    throw value->error(
+    throw value->make_error(
         "leaves no value within the gate: k times this uncertainty exceeds the limit; lower k");
   }
-  uncertainties.finish();  // uncertainties of metrics without a gate
-  if (found == 0) throw stated.error("names no gate");
-  map.finish();
+  uncertainties.check_all_keys_read();  // uncertainties of metrics without a gate
+  if (found == 0) throw stated.make_error("names no gate");
+  map.check_all_keys_read();
 }
 
 GoldenUnit read_golden(YamlMap map, Files& files) {
-  const YamlValue camera = map.required("camera_id");
-  if (!Id::accepts(camera.text())) throw camera.error("is no id of a camera: it names a folder");
-  GoldenUnit golden{camera.text(), {}, {}};
-  const YamlValue calibration = map.required("calibration");
-  golden.calibration = read_shutter(calibration, files);
+  const YamlValue camera = map.get_required_column("camera_id");
+  if (!Id::is_valid_id(camera.get_text()))
+    throw camera.make_error("is no id of a camera: it names a folder");
+  GoldenUnit golden{camera.get_text(), {}, {}};
+  const YamlValue calibration = map.get_required_column("calibration");
+  golden.calibration = read_row_time_and_readout(calibration, files);
   if (!golden.calibration.rotation_center) {
-    throw calibration.error("should be a complete calibration: it has no rotation_center");
+    throw calibration.make_error("should be a complete calibration: it has no rotation_center");
   }
-  golden.gates = read_gates(map.required("gates"), unit_metrics());
-  map.finish();
+  golden.gates = read_gates(map.get_required_column("gates"), list_unit_metrics());
+  map.check_all_keys_read();
   return golden;
 }
 
-VerificationInterval read_verify_due(YamlMap map) {
+VerificationInterval read_verification_interval(YamlMap map) {
   VerificationInterval due;
   constexpr double max_h = 10'000;
-  if (const auto hours = map.optional("hours")) due.hours = hours->number_within(0, max_h, "h");
-  if (const auto units = map.optional("units")) due.units = units->integer_within(1, 1'000'000);
-  if (!due.hours && !due.units) throw map.error("should have hours or units");
-  if (due.hours == 0) throw map.error("hours should be above 0");
-  map.finish();
+  if (const auto hours = map.get_optional("hours"))
+    due.hours = hours->get_number_within(0, max_h, "h");
+  if (const auto units = map.get_optional("units"))
+    due.units = units->get_integer_within(1, 1'000'000);
+  if (!due.hours && !due.units) throw map.make_error("should have hours or units");
+  if (due.hours == 0) throw map.make_error("hours should be above 0");
+  map.check_all_keys_read();
   return due;
 }
 
@@ -152,11 +156,11 @@ Retention read_retention(YamlMap map) {
   Retention keep;
   constexpr int max_days = 36'525;
   const auto days = [&](const char* key, std::optional<int>& metric) {
-    if (const auto value = map.optional(key)) metric = value->integer_within(1, max_days);
+    if (const auto value = map.get_optional(key)) metric = value->get_integer_within(1, max_days);
   };
   days("images_days", keep.images_days);
   days("results_days", keep.results_days);
-  map.finish();
+  map.check_all_keys_read();
   return keep;
 }
 
@@ -199,7 +203,8 @@ class CountedIterator {
 };
 
 /// Returns the reason why a serial does not match a pattern; empty if it does.
-std::string pattern_problem(const std::string& serial, const std::string& pattern) {
+std::string describe_serial_pattern_mismatch(const std::string& serial,
+                                             const std::string& pattern) {
   long steps = 0;
   const CountedIterator begin(serial.data(), &steps), end(serial.data() + serial.size(), &steps);
   try {
@@ -212,11 +217,11 @@ std::string pattern_problem(const std::string& serial, const std::string& patter
 }
 
 std::string read_pattern(const YamlValue& value) {
-  std::string pattern = value.text();
+  std::string pattern = value.get_text();
   try {
     const std::regex compiled(pattern);
   } catch (const std::regex_error& error) {
-    throw value.error(std::string("is no regular expression: ") + error.what());
+    throw value.make_error(std::string("is no regular expression: ") + error.what());
   }
   return pattern;
 }
@@ -225,108 +230,113 @@ std::string read_pattern(const YamlValue& value) {
 /// others are found by PATH.
 Hook read_hook(YamlMap map, const fs::path& file) {
   Hook hook;
-  const YamlValue command = map.required("command");
-  for (const YamlValue& word : command.list()) hook.command.push_back(word.text());
+  const YamlValue command = map.get_required_column("command");
+  for (const YamlValue& word : command.get_list()) hook.command.push_back(word.get_text());
   if (hook.command.empty() || hook.command.front().empty()) {
-    throw command.error("should be a program and its arguments: [PROGRAM, ...]");
+    throw command.make_error("should be a program and its arguments: [PROGRAM, ...]");
   }
   hook.folder = fs::absolute(file).parent_path();
   std::string& program = hook.command.front();
   if (program.find('/') != std::string::npos) program = (hook.folder / program).string();
   constexpr double max_s = 3600;
-  if (const auto limit = map.optional("time_limit_s")) {
-    hook.time_limit_s = limit->number_within(0, max_s, "seconds");
-    if (!(hook.time_limit_s > 0)) throw limit->error("should be above 0");
+  if (const auto limit = map.get_optional("time_limit_s")) {
+    hook.time_limit_s = limit->get_number_within(0, max_s, "seconds");
+    if (!(hook.time_limit_s > 0)) throw limit->make_error("should be above 0");
   }
-  map.finish();
+  map.check_all_keys_read();
   return hook;
 }
 
 /// Returns a database: a file relative to the station, or a server.
 std::string read_records(const YamlValue& value, const fs::path& file) {
-  const std::string where = value.text();
+  const std::string where = value.get_text();
   if (where.starts_with("postgresql://") || where.starts_with("postgres://")) return where;
-  if (is_server_address(where)) throw value.error("should name a file, or be postgresql://...");
+  if (is_server_address(where))
+    throw value.make_error("should name a file, or be postgresql://...");
   describe_database(where);  // checks the name of a file
   return resolve_path(value, file).string();
 }
 
 }  // namespace
 
-std::string camera_id_problem(const std::string& camera_id) {
+std::string describe_camera_id_problem(const std::string& camera_id) {
   if (std::regex_match(camera_id, std::regex("[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}"))) return "";
   return "a camera's id has letters, digits, '-', '_' and '.', up to 64, no '.' first";
 }
 
-std::string serial_problem(const StationConfig& config, const std::string& serial) {
-  std::string problem = camera_id_problem(serial);
+std::string describe_serial_problem(const StationConfig& config, const std::string& serial) {
+  std::string problem = describe_camera_id_problem(serial);
   if (!problem.empty() || config.serial_pattern.empty()) return problem;
-  return pattern_problem(serial, config.serial_pattern);
+  return describe_serial_pattern_mismatch(serial, config.serial_pattern);
 }
 
-std::vector<MetricKind> unit_metrics() {
-  return metric_kinds({MetricSource::station, MetricSource::lens, MetricSource::rotation,
-                       MetricSource::dispersion});
+std::vector<MetricKind> list_unit_metrics() {
+  return list_metric_kinds({MetricSource::station, MetricSource::lens, MetricSource::rotation,
+                            MetricSource::dispersion});
 }
 
-StationConfig read_station(const fs::path& file) {
+StationConfig read_station_config(const fs::path& file) {
   YamlMap document = read_yaml(file, "vlp-station/1");
   Files files(file);
   StationConfig config;
   config.file = file;
-  config.station = document.required("station").text();
-  const YamlValue type = document.required("camera_type");
-  config.type = read_shutter(type, files).camera;
-  config.type_file = fs::path(type.text()).filename().string();
-  const YamlValue board = document.required("board");
+  config.station = document.get_required_column("station").get_text();
+  const YamlValue type = document.get_required_column("camera_type");
+  config.type = read_row_time_and_readout(type, files).camera;
+  config.type_file = fs::path(type.get_text()).filename().string();
+  const YamlValue board = document.get_required_column("board");
   config.board = read_board(files(board));
-  if (config.board.has_squares()) {
-    throw board.error("is a board of squares: the station looks for one of AprilTags");
+  if (config.board.has_chessboard_squares()) {
+    throw board.make_error("is a board of squares: the station looks for one of AprilTags");
   }
-  const auto room = document.optional("room");
-  config.lamps =
-      read_lamps_of_room(files(document.required("lamps")), room ? room->text() : std::string());
-  if (const auto place = document.optional("dispersion_station_m")) {
-    config.dispersion_station_m = Eigen::Vector2d(place->numbers(2).data());
+  const auto room = document.get_optional("room");
+  config.lamps = read_lamps_of_room(files(document.get_required_column("lamps")),
+                                    room ? room->get_text() : std::string());
+  if (const auto place = document.get_optional("dispersion_station_m")) {
+    config.dispersion_station_m = Eigen::Vector2d(place->get_numbers(2).data());
   }
-  if (const auto sufficient = document.optional("completion"))
-    config.sufficient = read_enough(sufficient->map());
-  if (const auto refuse = document.optional("rejection")) read_refusal(refuse->map(), config);
-  config.gates = read_gates(document.required("gates"), unit_metrics());
-  if (const auto guard = document.optional("guard_bands")) {
-    read_guard_bands(guard->map(), config.gates);
+  if (const auto sufficient = document.get_optional("completion"))
+    config.sufficient = read_completion_criteria(sufficient->get_mapping());
+  if (const auto refuse = document.get_optional("rejection"))
+    read_rejection_limits(refuse->get_mapping(), config);
+  config.gates = read_gates(document.get_required_column("gates"), list_unit_metrics());
+  if (const auto guard = document.get_optional("guard_bands")) {
+    read_guard_bands(guard->get_mapping(), config.gates);
   }
-  if (const auto golden = document.optional("golden")) {
-    config.golden = read_golden(golden->map(), files);
+  if (const auto golden = document.get_optional("golden")) {
+    config.golden = read_golden(golden->get_mapping(), files);
   }
-  if (const auto due = document.optional("verify_due")) {
-    if (!config.golden) throw due->error("needs a golden unit: add the key 'golden'");
-    config.verify_due = read_verify_due(due->map());
+  if (const auto due = document.get_optional("verify_due")) {
+    if (!config.golden) throw due->make_error("needs a golden unit: add the key 'golden'");
+    config.verify_due = read_verification_interval(due->get_mapping());
   }
-  if (const auto pattern = document.optional("serial_pattern")) {
+  if (const auto pattern = document.get_optional("serial_pattern")) {
     config.serial_pattern = read_pattern(*pattern);
   }
-  if (const auto operators = document.optional("void_operators")) {
-    const std::vector<YamlValue> names = operators->list();
-    if (names.empty()) throw operators->error("names nobody; leave it out if all may void runs");
+  if (const auto operators = document.get_optional("void_operators")) {
+    const std::vector<YamlValue> names = operators->get_list();
+    if (names.empty())
+      throw operators->make_error("names nobody; leave it out if all may void runs");
     std::ranges::transform(names, std::back_inserter(config.void_operators),
-                           [](const YamlValue& name) { return name.text(); });
+                           [](const YamlValue& name) { return name.get_text(); });
   }
-  config.captures = resolve_path(document.required("captures"), file);
-  config.results = resolve_path(document.required("results"), file);
-  config.records = read_records(document.required("records"), file);
-  const auto spool = document.optional("spool");
+  config.captures = resolve_path(document.get_required_column("captures"), file);
+  config.results = resolve_path(document.get_required_column("results"), file);
+  config.records = read_records(document.get_required_column("records"), file);
+  const auto spool = document.get_optional("spool");
   config.spool = spool ? resolve_path(*spool, file) : file.parent_path() / "spool";
-  if (const auto keep = document.optional("retention")) config.keep = read_retention(keep->map());
-  if (const auto hook = document.optional("hook")) config.hook = read_hook(hook->map(), file);
-  document.finish();
+  if (const auto keep = document.get_optional("retention"))
+    config.keep = read_retention(keep->get_mapping());
+  if (const auto hook = document.get_optional("hook"))
+    config.hook = read_hook(hook->get_mapping(), file);
+  document.check_all_keys_read();
   const auto& lamps = config.lamps.lamps;
   if (std::none_of(lamps.begin(), lamps.end(), [](const Lamp& l) { return l.frequency_hz; })) {
     throw InputError(
         file, "no lamp of the map has a frequency_hz, which is needed to identify lamps; add it");
   }
-  config.inputs = files.names();
-  config.sha256 = files.sha256();
+  config.inputs = files.file_names();
+  config.sha256 = files.compute_sha256();
   return config;
 }
 

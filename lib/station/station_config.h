@@ -107,14 +107,14 @@ struct StationConfig {
 };
 
 /// Returns the reason why a text is no valid camera id, which names folders; empty if it is valid.
-std::string camera_id_problem(const std::string& camera_id);
+std::string describe_camera_id_problem(const std::string& camera_id);
 
 /// Returns the reason why a text is no valid serial of a unit of the station; empty if it is valid.
 /// A serial names folders. Comparing it with `serial_pattern` must not take too long.
-std::string serial_problem(const StationConfig& config, const std::string& serial);
+std::string describe_serial_problem(const StationConfig& config, const std::string& serial);
 
 /// Returns the metrics of a unit, including all metrics that its gates can limit.
-std::vector<MetricKind> unit_metrics();
+std::vector<MetricKind> list_unit_metrics();
 
 /// Reads a station's configuration.
 ///
@@ -123,6 +123,6 @@ std::vector<MetricKind> unit_metrics();
 /// - a gate of an unknown metric,
 /// - a guard band of a metric without a gate, or one that leaves no acceptable value,
 /// - a camera type or a golden unit without row time or readout.
-StationConfig read_station(const std::filesystem::path& file);
+StationConfig read_station_config(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -27,8 +27,8 @@ void check_free_space(const SharedFolder& folder, std::uintmax_t bytes) {
                                  double(space.available) / megabyte, double(bytes) / megabyte));
   }
   constexpr const char* probe = ".writable";
-  folder.replace(probe, "results can be written here\n");
-  folder.remove(probe);
+  folder.replace_file(probe, "results can be written here\n");
+  folder.remove_file(probe);
 }
 
 }  // namespace vlp

@@ -58,11 +58,11 @@ Lens read_lens(const std::string& text, LensModel model) {
   return Lens(model, parameters);
 }
 
-/// Writes the corners as write_corners() does, with the weights of the solve: relative to the noise
-/// for which it is regularized.
+/// Writes the corners as write_mrcal_corners() does, with the weights of the solve: relative to the
+/// noise for which it is regularized.
 void write_weighted(const std::filesystem::path& file, const IntrinsicsSolution& solution,
                     std::span<const std::string> names) {
-  write_corners(file, solution, names);
+  write_mrcal_corners(file, solution, names);
   std::ifstream written(file);
   std::string text, line;
   std::getline(written, line);
@@ -142,7 +142,7 @@ bool compare(const Case& test_case, int num_repetitions) {
       "--focal {} --object-spacing {} --object-width-n {} --object-height-n {} "
       "--imagersize {} {} --outdir {} {} '*.png*' >{}/log 2>&1",
       corners, to_string(test_case.input.lens_model), test_case.focal_px,
-      test_case.input.lattice.spacing_m(), test_case.input.lattice.cols(),
+      test_case.input.lattice.point_spacing_m(), test_case.input.lattice.cols(),
       test_case.input.lattice.rows(), width, height, folder.string(), test_case.options,
       folder.string());
   int status = std::system(command.c_str());
@@ -162,7 +162,7 @@ bool compare(const Case& test_case, int num_repetitions) {
   }
   const ProjectionUncertainty uncertainty(solution);
   const auto known = [&](const Eigen::Vector2d& pixel) {
-    return uncertainty.worst_px(pixel) <= test_case.known_px ? 1.0 : INFINITY;
+    return uncertainty.max_direction_sd_px(pixel) <= test_case.known_px ? 1.0 : INFINITY;
   };
   const auto difference =
       compute_projection_difference(read_lens(model.str(), test_case.input.lens_model),
@@ -200,7 +200,7 @@ int compare() {
                0.05,
                0.001,
                0};
-  splined.input.lens_model = lens_model_for({3, 14, 14, 205});
+  splined.input.lens_model = lens_model_for_spline_grid({3, 14, 14, 205});
   splined.input.warp = WarpChoice::on;
   const bool plain_good = compare(plain, 10), splined_good = compare(splined, 1);
   return plain_good && splined_good ? 0 : 1;

@@ -81,7 +81,7 @@ Sensor sensor_behind(const Sensor& sensor, const std::optional<ImageProcessing>&
 
 cv::Mat developed(const Scene& scene, const cv::Mat1f& electrons, std::uint64_t seed,
                   const std::optional<ImageProcessing>& picture) {
-  cv::Mat image = expose(scene.sensor, electrons, seed, picture);
+  cv::Mat image = simulate_sensor(scene.sensor, electrons, seed, picture);
   if (scene.camera.readout == Readout::columns) image = image.t();  // lines are columns
   return cv::imdecode(encode_image(image, picture), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
 }
@@ -90,8 +90,8 @@ cv::Mat developed(const Scene& scene, const cv::Mat1f& electrons, std::uint64_t 
 /// image.
 double worst_within(const ImageRegion& region, const Lens& truth, const Lens& lens,
                     const std::array<int, 2>& imager_px) {
-  const auto pixels = make_pixel_grid(imager_px);
-  const auto turned = fit_rotation(truth, lens, pixels);
+  const auto pixels = make_regular_pixel_grid(imager_px);
+  const auto turned = fit_rotation_between_lenses(truth, lens, pixels);
   double worst_px = 0;
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto ray = truth.unproject(pixel);
@@ -110,9 +110,9 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
   input.camera = scene.camera;
   input.seen.images.resize(electrons.size());
   const auto threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  const double holds_e =
-      std::min(scene.sensor.full_well_e,
-               (white_dn(scene.sensor) - scene.sensor.black_level_dn) / scene.sensor.gain_dn_per_e);
+  const double holds_e = std::min(
+      scene.sensor.full_well_e,
+      (white_level_dn(scene.sensor) - scene.sensor.black_level_dn) / scene.sensor.gain_dn_per_e);
   const double white_e = scene.board->white_e_per_s * boards.exposure_s;
   const double exposures = development.white > 0 ? development.white * holds_e / white_e : 1;
   parallel_for(electrons.size(), threads, [&](std::size_t i) {
@@ -120,7 +120,8 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
     cv::Mat1f lit;
     electrons[i].convertTo(lit, CV_32F, exposures);
     const cv::Mat image = developed(scene, lit, shot.noise_seed, development.picture);
-    input.seen.images[i] = observed({shot.image, {image.cols, image.rows}, detector.detect(image)});
+    input.seen.images[i] =
+        observed({shot.image, {image.cols, image.rows}, detector.detect_board(image)});
   });
   std::size_t tags = 0, usable = 0;
   for (const BoardView& view : collect_kept_views(input.seen.images)) {
@@ -129,10 +130,10 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
   }
   const BoardLattice lattice(input.board);
   for (Observation& image : input.seen.images) {
-    if (lattice.sufficient(image.board->seen)) continue;
-    image.reject(RejectionReason::too_few_corners, "shows too little of the board");
+    if (lattice.has_sufficient_corners(image.board->seen)) continue;
+    image.set_rejection(RejectionReason::too_few_corners, "shows too little of the board");
   }
-  const LensResult result = solve_lens(input, {});
+  const LensResult result = run_lens_step(input, {});
   const std::string detected_percent =
       fmt::format("{:.1f}", 100 * static_cast<double>(usable) / static_cast<double>(tags));
   if (!result.ok()) {
@@ -161,10 +162,10 @@ void try_seed(Scene scene, std::uint64_t seed, int views, const std::string& wan
   if (views > 0) boards.board->count = views;
   const FrameRenderer renderer(scene);
   const BoardDetector detector(scene.board->print);
-  std::vector<cv::Mat1f> electrons(count_shots(boards));
+  std::vector<cv::Mat1f> electrons(count_captures_of_set(boards));
   parallel_for(electrons.size(), static_cast<int>(std::thread::hardware_concurrency()),
                [&](std::size_t i) {
-                 electrons[i] = renderer.board_electrons(make_board_shot(scene, boards, i));
+                 electrons[i] = renderer.render_board_electrons(make_board_shot(scene, boards, i));
                });
   fmt::print("seed {}, {} views\n", seed, electrons.size());
   for (const Development& development : developments()) {

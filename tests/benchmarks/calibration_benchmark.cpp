@@ -14,7 +14,7 @@ void detect(benchmark::State& state, const std::string& scene) {
   const std::string rig = VLP_SOURCE_DIR "/datasets/" + scene + "/rendered";
   const BoardDetector detector(read_board(rig + "/board.yaml"));
   const cv::Mat image = read_image(rig + "/sample-boards/0000.png");
-  for (auto _ : state) benchmark::DoNotOptimize(detector.detect(image));
+  for (auto _ : state) benchmark::DoNotOptimize(detector.detect_board(image));
 }
 BENCHMARK_CAPTURE(detect, plain, "paper-rig")->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(detect, kalibr, "paper-rig-faulty")->Unit(benchmark::kMillisecond);

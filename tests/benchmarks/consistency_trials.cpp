@@ -239,14 +239,14 @@ void add_lever_arm_errors(Trial& trial, const RotationCenter& found, const Eigen
 Trial try_rotation(const Cell& cell, Random& random, RotationMethod method, double tilt_rad,
                    const Turn& turn) {
   Room room(cell, tilt_rad, random);
-  LampCaptures input{{}, room.surveyed_map(), {}, extract_camera(room.calibration())};
+  LampCaptures input{{}, room.surveyed_map(), {}, extract_camera_calibration(room.calibration())};
   for (std::size_t height = 0; height < turn.heights_m.size(); ++height) {
     for (int k = 0; k < cell.captures; ++k) {
       const Pose pose = turn.pose(height, room.draw_yaw(k));
       input.frames.push_back({std::to_string(input.frames.size()), room.draw_detections(pose)});
     }
   }
-  const RotationResult result = solve_rotation(input, method, {});
+  const RotationResult result = run_rotation_step(input, method, {});
   Trial trial = make_trial(result);
   if (!trial.has_result) return trial;
   add_center_errors(trial, result.fit.center, room.center());
@@ -276,11 +276,11 @@ Trial try_axis(const Cell& cell, Random& random) {
 
 Trial try_lamps(const Cell& cell, Random& random) {
   Room room(cell, kTilt_rad, random);
-  LampCaptures input{{}, room.surveyed_map(), {}, extract_camera(room.calibration())};
+  LampCaptures input{{}, room.surveyed_map(), {}, extract_camera_calibration(room.calibration())};
   for (int k = 0; k < cell.captures; ++k) {
     input.frames.push_back({std::to_string(k), room.draw_detections(room.draw_pose(k))});
   }
-  const LevelingResult result = solve_leveling(input, false, {});
+  const TiltResult result = run_tilt_step(input, false, {});
   Trial trial = make_trial(result);
   if (trial.has_result) add_center_errors(trial, result.leveling.center, room.center());
   return trial;
@@ -298,7 +298,7 @@ Trial try_dispersion(const Cell& cell, Random& random, DispersionMethod method) 
       tilted_by(believed.camera, kTilt_rad - zenith_error_rad, kTiltAzimuth_rad);
   std::vector<ReferencePointCapture> exact;
   LampCaptures input{{}, room.surveyed_map(), {}, believed};
-  KnownPlaces places;
+  KnownPositions places;
   for (int k = 0; k < cell.captures; ++k) {
     const double z_m = has_two_heights ? height_m(k) : 0;
     const Pose pose{{station_m.x(), station_m.y(), z_m}, room.draw_yaw(k)};
@@ -308,12 +308,13 @@ Trial try_dispersion(const Cell& cell, Random& random, DispersionMethod method) 
     input.frames.push_back({std::to_string(k), places.captures.back().detections});
   }
   const DispersionResult result =
-      solve_dispersion(input, places, method, DispersionCircle::mean, {});
+      run_dispersion_step(input, places, method, DispersionCircle::mean, {});
   Trial trial = make_trial(result);
-  const DispersionFit truth = fit_dispersion(exact, room.true_map(), believed, method);
+  const DispersionFit truth =
+      estimate_heading_dependent_offset(exact, room.true_map(), believed, method);
   if (!trial.has_result || truth.status != DispersionStatus::ok) return trial;
   const Dispersion& found = result.fit.dispersion;
-  const auto covariance_px2 = offset_covariance_with_map(found, believed.camera.focal_px());
+  const auto covariance_px2 = compute_offset_covariance_with_map(found, believed.camera.focal_px());
   if (!covariance_px2) return trial;
   trial.errors.push_back(normalize(found.offset_px - truth.dispersion.offset_px, *covariance_px2));
   return trial;
@@ -333,7 +334,7 @@ Trial try_adjustment(const Cell& cell, Random& random) {
   Room room(cell, kTilt_rad, random);
   AdjustStepInput input;
   input.lamps = room.surveyed_map();
-  input.calibration = extract_camera(room.calibration());
+  input.calibration = extract_camera_calibration(room.calibration());
   AdjustSet set{.name = "turns", .frames = {}, .captures = {}};
   for (std::size_t height = 0; height < turn.heights_m.size(); ++height) {
     Capture measured;
@@ -351,7 +352,7 @@ Trial try_adjustment(const Cell& cell, Random& random) {
     }
   }
   input.sets.push_back(std::move(set));
-  const AdjustStepResult result = solve_adjustment(input, {});
+  const AdjustStepResult result = run_adjustment_step(input, {});
   Trial trial = make_trial(result);
   if (!trial.has_result) return trial;
   add_center_errors(trial, result.found.center, room.center());
@@ -368,7 +369,7 @@ Trial try_fixes(const Cell& cell, Random& random) {
     truth.push_back(room.draw_pose(k));
     input.frames.push_back({std::to_string(k), room.draw_detections(truth.back())});
   }
-  const LocateResult result = locate_frames(input);
+  const LocateResult result = locate_camera_in_frames(input);
   Trial trial = make_trial(result);
   if (!trial.has_result) return trial;
   trial.errors.resize(3);
@@ -376,7 +377,7 @@ Trial try_fixes(const Cell& cell, Random& random) {
     const auto& fix = result.rows[k].fix;
     if (!fix || !fix->sd) continue;
     const Eigen::Vector3d error_m = fix->pose.position_m - truth[k].position_m;
-    const double yaw_error_rad = wrap_rad(fix->pose.yaw_rad - truth[k].yaw_rad);
+    const double yaw_error_rad = wrap_angle_rad(fix->pose.yaw_rad - truth[k].yaw_rad);
     trial.errors[0].push_back(error_m.x() / (*fix->sd)[0]);
     trial.errors[0].push_back(error_m.y() / (*fix->sd)[1]);
     trial.errors[1].push_back(error_m.z() / (*fix->sd)[2]);

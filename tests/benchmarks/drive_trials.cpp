@@ -17,7 +17,7 @@
 /// bound for pixels of that noise.
 ///
 /// "possible" is the bound of exact centers with the noise of the standing camera
-/// (compute_body_limit()), divided by that of a camera known to stand. For centers, prints the mean
+/// (compute_pose_crlb()), divided by that of a camera known to stand. For centers, prints the mean
 /// error along and across the motion of the lamps in the image, and the standard deviation per
 /// axis.
 #include <fmt/core.h>
@@ -57,7 +57,7 @@ struct Errors {
     const Pose pose = truth.pose(0);
     Eigen::Vector4d error;
     error << fix.estimate.pose.position_m - pose.position_m,
-        wrap_rad(fix.estimate.pose.yaw_rad - pose.yaw_rad);
+        wrap_angle_rad(fix.estimate.pose.yaw_rad - pose.yaw_rad);
     horizontal += error.head<2>().squaredNorm();
     height += error[2] * error[2];
     yaw += error[3] * error[3];
@@ -191,10 +191,10 @@ class Trials {
                  .head<2>();
         DrivenCapture seen{{}, motion.pose(0), speed_m_per_s, std::abs(motion.turn_rate_rad_per_s)};
         for (const Detection& detection : detections) {
-          seen.lamps_m.push_back(find_lamp(lamps.lamps, detection.lamp)->position_m);
+          seen.lamps_m.push_back(find_lamp_by_id(lamps.lamps, detection.lamp)->position_m);
         }
         captures_seen.push_back(std::move(seen));
-        for (const TrueLamp& lamp : find_true_lamps(scene_, renderer, shot)) {
+        for (const TrueLamp& lamp : find_true_lamps_in_image(scene_, renderer, shot)) {
           for (const Detection& detection : detections) {
             if (detection.lamp != lamp.id || lamp.in_view < 1) continue;
             centers.add(detection.pixel - lamp.pixel, image_motion);
@@ -261,8 +261,8 @@ class Trials {
       prior.velocity_sd_m_per_s = odometry ? 0.01 * seen.speed_m_per_s : known.velocity_sd_m_per_s;
       prior.yaw_rate_sd_rad_per_s =
           odometry ? 0.01 * seen.turn_rate_rad_per_s : known.yaw_rate_sd_rad_per_s;
-      const auto limit = compute_body_limit(seen.lamps_m, lens, camera_from_level, seen.pose,
-                                            noise_px, prior, clock);
+      const auto limit = compute_pose_crlb(seen.lamps_m, lens, camera_from_level, seen.pose,
+                                           noise_px, prior, clock);
       if (!limit) continue;
       moving.add(limit->fix.covariance);
       BodyCovariance still = BodyCovariance::Zero();
@@ -283,9 +283,10 @@ class Trials {
 
   std::vector<Detection> detections_in(const FrameRenderer& renderer, const LightDetector& detector,
                                        const LampShot& shot) const {
-    const cv::Mat image = expose(scene_.sensor, renderer.lamp_electrons(shot), shot.noise_seed);
+    const cv::Mat image =
+        simulate_sensor(scene_.sensor, renderer.render_lamp_electrons(shot), shot.noise_seed);
     std::vector<Detection> detections;
-    for (const Light& light : detector.detect(image_view(image))) {
+    for (const Light& light : detector.detect(to_image_view(image))) {
       if (light.kind == LightKind::lamp) {
         detections.push_back({*light.lamp, light.pixel, light.sigma_px});
       }

@@ -38,7 +38,8 @@ Tables written(std::size_t count, std::size_t at_each) {
     const Eigen::Vector3d error_m(1e-3 * random.normal(), 1e-3 * random.normal(), 1e-3);
     const Eigen::Vector4d sd = Eigen::Vector4d::Constant(1e-3);
     fixes.push_back({image, "ok", FixRow::Fix{{place_m + error_m, 0.1}, sd, 0.1}, 4});
-    truth << image << ',' << fixed(place_m.x(), 9) << ',' << fixed(place_m.y(), 9) << ",0.0,0.1\n";
+    truth << image << ',' << format_fixed_decimals(place_m.x(), 9) << ','
+          << format_fixed_decimals(place_m.y(), 9) << ",0.0,0.1\n";
   }
   write_fixes(tables.fixes, fixes);
   return tables;
@@ -65,7 +66,7 @@ void read_tables(benchmark::State& state) {
       written(static_cast<std::size_t>(state.range(0)), static_cast<std::size_t>(state.range(1)));
   for (auto _ : state) {
     benchmark::DoNotOptimize(read_fixes(tables.fixes));
-    benchmark::DoNotOptimize(read_truth(tables.truth));
+    benchmark::DoNotOptimize(read_truth_table(tables.truth));
   }
 }
 BENCHMARK(read_tables)->Apply(arguments);
@@ -75,7 +76,7 @@ void evaluate_fixes(benchmark::State& state) {
       written(static_cast<std::size_t>(state.range(0)), static_cast<std::size_t>(state.range(1)));
   EvaluationInput input;
   input.fixes = {tables.fixes, read_fixes(tables.fixes)};
-  input.truth = FromFile<TruthRow>{tables.truth, read_truth(tables.truth)};
+  input.truth = FromFile<TruthRow>{tables.truth, read_truth_table(tables.truth)};
   input.threads = 2;
   for (auto _ : state) benchmark::DoNotOptimize(evaluate(input));
 }

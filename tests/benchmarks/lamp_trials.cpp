@@ -41,13 +41,13 @@ namespace {
 
 /// The only call of the detector.
 std::vector<Light> detect_lights(const LightDetector& detector, const cv::Mat& image) {
-  return detector.detect(image_view(image));
+  return detector.detect(to_image_view(image));
 }
 
 /// Returns the image of a shot as read from a file: gray, rows from the top.
 cv::Mat render_image(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot) {
-  cv::Mat image =
-      expose(scene.sensor, renderer.lamp_electrons(shot), shot.noise_seed, scene.picture);
+  cv::Mat image = simulate_sensor(scene.sensor, renderer.render_lamp_electrons(shot),
+                                  shot.noise_seed, scene.picture);
   if (scene.camera.readout == Readout::columns) image = image.t();
   if (!scene.picture) return image;
   return cv::imdecode(encode_image(image, scene.picture),
@@ -76,7 +76,7 @@ std::vector<Eigen::Vector3d> bright_points(const Glow& lamp, const Eigen::Vector
                                                             2 * (i / steps + 0.5) / steps - 1);
     if (at_m.norm() > radius_m) continue;
     const double radiance_fraction =
-        compute_radiance_fraction(*lamp.recess, radius_m, eye_m - lamp.position_m, at_m);
+        compute_relative_radiance(*lamp.recess, radius_m, eye_m - lamp.position_m, at_m);
     fractions_at_points.emplace_back(radiance_fraction,
                                      lamp.position_m + Eigen::Vector3d(at_m.x(), at_m.y(), 0));
     greatest = std::max(greatest, radiance_fraction);
@@ -91,7 +91,7 @@ std::vector<Eigen::Vector3d> bright_points(const Glow& lamp, const Eigen::Vector
 Extent compute_extent(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot,
                       const SceneLamp& lamp, const Eigen::Vector2d& center) {
   const Eigen::Isometry3d camera_from_world = shot.motion.world_from_camera(0).inverse();
-  const Lens& lens = renderer.rays().lens();
+  const Lens& lens = renderer.pixel_rays().lens();
   double radius_px = 0, first_line = INFINITY, last_line = -INFINITY;
   Glow rim = lamp.glow;
   rim.halo.reset();
@@ -103,7 +103,7 @@ Extent compute_extent(const Scene& scene, const FrameRenderer& renderer, const L
   for (const Eigen::Vector3d& point_m : bright_points(lamp.glow, eye_m)) {
     const auto pixel = lens.project(camera_from_world * point_m);
     if (!pixel) continue;
-    const double line = renderer.rays().line_and_place(*pixel)[0];
+    const double line = renderer.pixel_rays().line_and_place_of_pixel(*pixel)[0];
     first_line = std::min(first_line, line);
     last_line = std::max(last_line, line);
   }
@@ -122,7 +122,7 @@ class Score {
   void add(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot,
            const std::vector<Light>& lights) {
     ++images_;
-    const auto truth = find_true_lamps(scene, renderer, shot);
+    const auto truth = find_true_lamps_in_image(scene, renderer, shot);
     std::vector<Extent> extents;
     for (const TrueLamp& lamp : truth) {
       const auto in_scene = std::ranges::find(scene.lamps, lamp.id, &SceneLamp::id);
@@ -196,7 +196,7 @@ class Score {
     const double near_px = 0.08 * scene.camera.imager_px[0];
     std::string name = "elsewhere";
     double min_px = near_px;
-    for (const TrueOtherLight& other : find_true_other_lights(scene, renderer, shot)) {
+    for (const TrueOtherLight& other : find_other_lights_in_image(scene, renderer, shot)) {
       const double distance_px = (other.pixel - pixel).norm();
       if (distance_px > min_px) continue;
       min_px = distance_px;
@@ -236,7 +236,7 @@ void try_shot(const Scene& scene, const FrameRenderer& renderer, const LightDete
   score.add(scene, renderer, shot, detect_lights(detector.with_tilt(level_from_camera), image));
 }
 
-LightDetector detector_for(const Scene& scene) {
+LightDetector make_detector_for_image(const Scene& scene) {
   return {make_lamp_map(scene, false), make_detector_camera(make_true_calibration(scene))};
 }
 
@@ -248,18 +248,19 @@ void try_scene(Scene scene, std::uint64_t seed, int images, bool new_seed_in_eac
   }
   if (sets.empty()) throw std::invalid_argument("the scene has no captures of lamps");
   const FrameRenderer renderer(scene);
-  const LightDetector detector = detector_for(scene);
+  const LightDetector detector = make_detector_for_image(scene);
   for (int i = 0; i < images; ++i) {
     const auto index = static_cast<std::size_t>(i) / sets.size();
     const CaptureSet& set = sets[static_cast<std::size_t>(i) % sets.size()];
-    const auto round = new_seed_in_each ? static_cast<std::size_t>(i) : index / count_shots(set);
+    const auto round =
+        new_seed_in_each ? static_cast<std::size_t>(i) : index / count_captures_of_set(set);
     scene.seed = seed + round;
-    draw_random_parts(scene);
+    draw_random_scene_parts(scene);
     // Spread over the whole folder, even for few images.
     const auto wanted = static_cast<std::size_t>(images) / sets.size() + 1;
-    const std::size_t step = std::max<std::size_t>(1, count_shots(set) / wanted);
-    try_shot(scene, renderer, detector, make_lamp_shot(scene, set, index * step % count_shots(set)),
-             score);
+    const std::size_t step = std::max<std::size_t>(1, count_captures_of_set(set) / wanted);
+    try_shot(scene, renderer, detector,
+             make_lamp_shot(scene, set, index * step % count_captures_of_set(set)), score);
   }
 }
 
@@ -301,18 +302,18 @@ class ForeignScene {
 
   /// Sets a different duty cycle for each lamp, also in the lamp map.
   void draw_duties(int index) {
-    cv::RNG random = make_random(seed_, "duties", static_cast<std::size_t>(index));
+    cv::RNG random = make_seeded_generator(seed_, "duties", static_cast<std::size_t>(index));
     for (SceneLamp& lamp : scene_.lamps) lamp.duty = random.uniform(0.3, 0.7);
   }
 
   LampShot draw_shot(int index) {
-    random_ = make_random(seed_, "foreign lights", static_cast<std::size_t>(index));
+    random_ = make_seeded_generator(seed_, "foreign lights", static_cast<std::size_t>(index));
     set_.lamps->spots_m = {{random_.uniform(-0.7, 0.7), random_.uniform(-0.3, 0.3)}};
     set_.lamps->heights_m = {random_.uniform(0.0, 0.7)};
     set_.lamps->yaws_rad = {random_.uniform(0.0, 2 * std::numbers::pi)};
-    scene_.seed = draw_seed_from(random_);
+    scene_.seed = draw_random_seed(random_);
     draw_clutter();
-    draw_random_parts(scene_);
+    draw_random_scene_parts(scene_);
     return make_lamp_shot(scene_, set_, 0);
   }
 
@@ -458,7 +459,7 @@ void try_foreign(std::uint64_t seed, int images, Score& score) {
   for (int i = 0; i < images; ++i) {
     if (i % images_of_a_rig == 0) {
       foreign.draw_duties(i);
-      detector.emplace(detector_for(foreign.scene()));
+      detector.emplace(make_detector_for_image(foreign.scene()));
     }
     const LampShot shot = foreign.draw_shot(i);
     try_shot(foreign.scene(), renderer, *detector, shot, score);

@@ -59,13 +59,13 @@ void try_set(int set, Counts& counts) {
     ++counts.unsolved;
     return;
   }
-  const CalibrationReport report = compute_report(solution, input);
+  const CalibrationReport report = compute_calibration_report(solution, input);
   LensEstimate lens;
   lens.solution = solution;
   lens.report = report;
-  lens.coverage = compute_view_coverage(solution, input);
+  lens.coverage = compute_board_view_coverage(solution, input);
   const auto metrics = collect_lens_metrics(lens);
-  if (!describe_failed_gates(check_gates(default_lens_gates(), metrics)).empty()) {
+  if (!describe_failed_gates(check_gates(make_default_lens_gates(), metrics)).empty()) {
     ++counts.refused;
     return;
   }

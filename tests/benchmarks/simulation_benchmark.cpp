@@ -29,27 +29,28 @@ const Rig& rig() {
 
 void lamp_light(benchmark::State& state) {
   const LampShot shot = make_lamp_shot(rig().scene, rig().set("check"), 100);
-  for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.lamp_electrons(shot));
+  for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.render_lamp_electrons(shot));
 }
 
 void board_light(benchmark::State& state) {
   const BoardShot shot = make_board_shot(rig().scene, rig().set("boards"), 3);
-  for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.board_electrons(shot));
+  for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.render_board_electrons(shot));
 }
 
 cv::Mat1f electrons(bool board) {
-  return board
-             ? rig().renderer.board_electrons(make_board_shot(rig().scene, rig().set("boards"), 3))
-             : rig().renderer.lamp_electrons(make_lamp_shot(rig().scene, rig().set("check"), 100));
+  return board ? rig().renderer.render_board_electrons(
+                     make_board_shot(rig().scene, rig().set("boards"), 3))
+               : rig().renderer.render_lamp_electrons(
+                     make_lamp_shot(rig().scene, rig().set("check"), 100));
 }
 
 void sensor(benchmark::State& state, bool board) {
   const cv::Mat1f light = electrons(board);
-  for (auto _ : state) benchmark::DoNotOptimize(expose(rig().scene.sensor, light, 1));
+  for (auto _ : state) benchmark::DoNotOptimize(simulate_sensor(rig().scene.sensor, light, 1));
 }
 
 void png(benchmark::State& state, bool board) {
-  const cv::Mat image = expose(rig().scene.sensor, electrons(board), 1);
+  const cv::Mat image = simulate_sensor(rig().scene.sensor, electrons(board), 1);
   std::vector<unsigned char> bytes;
   for (auto _ : state) cv::imencode(".png", image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 1});
 }

@@ -53,7 +53,7 @@ class FoldingLens : public testing::TestWithParam<FoldedLens> {
     return result;
   }
   const Lens lens_{model(), parameters_with(model(), GetParam().distortion)};
-  const double valid_radius_ = distortion().valid_radius();
+  const double valid_radius_ = distortion().compute_max_valid_radius();
 };
 
 TEST_P(FoldingLens, UnprojectReturnsValidRayOrNulloptInAndAroundImage) {
@@ -113,10 +113,12 @@ TEST(Unproject, RejectsExactlyPixelsBeyondFoldOfBarrelLens) {
   for (double around_rad = 0; around_rad < 6.3; around_rad += 0.01) {
     const Vector2d direction(std::cos(around_rad), std::sin(around_rad));
     for (const double fraction : {0.1, 0.9, 0.999, 1 - 1e-6, 1 - 1e-9}) {
-      EXPECT_TRUE(lens.unproject(lens.center_px() + fraction * edge_px * direction)) << fraction;
+      EXPECT_TRUE(lens.unproject(lens.principal_point_px() + fraction * edge_px * direction))
+          << fraction;
     }
     for (const double fraction : {1 + 1e-9, 1 + 1e-6, 1.001, 1.1, 2.0, 10.0, 1e6}) {
-      EXPECT_FALSE(lens.unproject(lens.center_px() + fraction * edge_px * direction)) << fraction;
+      EXPECT_FALSE(lens.unproject(lens.principal_point_px() + fraction * edge_px * direction))
+          << fraction;
     }
   }
 }

@@ -59,13 +59,13 @@ TEST(LensModelNames, ListsAllModels) {
 TEST(LensModelFromName, ReturnsDistinctModelForEachSplineGrid) {
   for (const SplineGrid& grid : {SplineGrid{2, 3, 3, 1}, SplineGrid{3, 4, 4, 359},
                                  SplineGrid{2, 255, 255, 359}, SplineGrid{3, 30, 20, 170}}) {
-    const LensModel model = lens_model_for(grid);
-    EXPECT_TRUE(is_splined(model));
-    EXPECT_EQ(grid_of(model), grid);
+    const LensModel model = lens_model_for_spline_grid(grid);
+    EXPECT_TRUE(is_splined_lens_model(model));
+    EXPECT_EQ(spline_grid_of_model(model), grid);
     EXPECT_EQ(lens_model_from_name(to_string(model)), model);
     EXPECT_EQ(parameter_count(model), 4U + 2U * static_cast<unsigned>(grid.nx * grid.ny));
   }
-  EXPECT_EQ(to_string(lens_model_for({3, 30, 20, 170})),
+  EXPECT_EQ(to_string(lens_model_for_spline_grid({3, 30, 20, 170})),
             "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=30_Ny=20_fov_x_deg=170");
 }
 

@@ -57,7 +57,7 @@ TEST_P(LensAgainstMrcal, JacobiansMatchGradients) {
       ASSERT_THAT(by_parameters,
                   IsNear(expected.d_pixel_d_parameters, rounding(expected.d_pixel_d_parameters)));
       const Eigen::Index num_dense = projection->d_pixel_d_parameters.cols();
-      ASSERT_EQ(num_dense, is_splined(GetParam()) ? 4 : by_parameters.cols());
+      ASSERT_EQ(num_dense, is_splined_lens_model(GetParam()) ? 4 : by_parameters.cols());
       ASSERT_EQ(projection->d_pixel_d_parameters, by_parameters.leftCols(num_dense));
     }
   }

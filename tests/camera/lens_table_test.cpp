@@ -17,18 +17,19 @@ using testing::ElementsAre;
 
 std::vector<std::string_view> names_of(LensModel model) {
   std::vector<std::string_view> names;
-  for (const LensDistortion& distortion : distortions_of(model)) names.push_back(distortion.name);
+  for (const LensDistortion& distortion : list_distortion_names_and_start_values(model))
+    names.push_back(distortion.name);
   return names;
 }
 
-TEST(LensModels, MatchOrderOfEnumeration) {
-  ASSERT_FALSE(lens_models().empty());
-  for (std::size_t i = 0; i < lens_models().size(); ++i) {
-    EXPECT_EQ(static_cast<std::size_t>(lens_models()[i].model), i);
+TEST(ListLensModels, MatchOrderOfEnumeration) {
+  ASSERT_FALSE(list_lens_models().empty());
+  for (std::size_t i = 0; i < list_lens_models().size(); ++i) {
+    EXPECT_EQ(static_cast<std::size_t>(list_lens_models()[i].model), i);
   }
 }
 
-TEST(DistortionsOf, ReturnsNamesInParameterOrder) {
+TEST(ListDistortionParameters, ReturnsNamesInParameterOrder) {
   EXPECT_THAT(names_of(LensModel::stereographic), ElementsAre());
   EXPECT_THAT(names_of(LensModel::opencv5), ElementsAre("k1", "k2", "p1", "p2", "k3"));
   EXPECT_THAT(names_of(LensModel::fisheye), ElementsAre("k1", "k2", "k3", "k4"));
@@ -38,10 +39,11 @@ TEST(DistortionsOf, ReturnsNamesInParameterOrder) {
               ElementsAre());
 }
 
-TEST(DistortionsOf, InitialFisheyeLensIsNearlyStereographic) {
+TEST(ListDistortionParameters, InitialFisheyeLensIsNearlyStereographic) {
   std::vector<double> parameters{400, 400, 320, 240};
   const Lens stereographic(LensModel::stereographic, parameters);
-  for (const LensDistortion& distortion : distortions_of(LensModel::fisheye)) {
+  for (const LensDistortion& distortion :
+       list_distortion_names_and_start_values(LensModel::fisheye)) {
     parameters.push_back(distortion.start);
   }
   const Lens fisheye(LensModel::fisheye, parameters);

@@ -19,15 +19,15 @@ TEST_P(EveryLens, ReturnsItsModelFocalLengthsAndCenter) {
   auto parameters = parameters_with(GetParam(), {});
   parameters[1] = 530;
   const Lens lens(GetParam(), parameters);
-  EXPECT_EQ(lens.model(), GetParam());
+  EXPECT_EQ(lens.lens_model(), GetParam());
   EXPECT_EQ(lens.focal_px(), Vector2d(520, 530));
-  EXPECT_EQ(lens.center_px(), Vector2d(399.5, 299.5));
+  EXPECT_EQ(lens.principal_point_px(), Vector2d(399.5, 299.5));
 }
 
 TEST_P(EveryLens, ProjectsOpticalAxisToCenter) {
   const Lens lens = plain_lens(GetParam());
-  EXPECT_EQ(lens.project({0, 0, 2}), lens.center_px());
-  const auto ray = lens.unproject(lens.center_px());
+  EXPECT_EQ(lens.project({0, 0, 2}), lens.principal_point_px());
+  const auto ray = lens.unproject(lens.principal_point_px());
   ASSERT_TRUE(ray);
   EXPECT_EQ(ray->direction, Vector3d::UnitZ());
 }

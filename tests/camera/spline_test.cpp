@@ -20,10 +20,10 @@ Vector3d ray_of(const Vector2d& u) { return {u.x(), u.y(), 1 - u.squaredNorm() /
 class SplinedLens : public testing::TestWithParam<LensModel> {
  protected:
   Random random_{61};
-  const SplineGrid grid_ = grid_of(GetParam());
+  const SplineGrid grid_ = spline_grid_of_model(GetParam());
   const std::vector<double> parameters_ = splined_parameters(grid_, 0.01, random_);
   const Lens lens_{GetParam(), parameters_};
-  const Vector2d reach_ = SplineSurface(grid_, std::span(parameters_).subspan(4)).reach();
+  const Vector2d reach_ = SplineSurface(grid_, std::span(parameters_).subspan(4)).half_extent();
 
   Vector2d random_position() {
     const double y = random_.uniform(-1, 1), x = random_.uniform(-1, 1);
@@ -72,7 +72,7 @@ TEST_P(SplinedLens, ProjectsUpToEndOfPiecesOnly) {
         EXPECT_TRUE(lens_.unproject(*pixel)) << edge.transpose();
         EXPECT_FALSE(lens_.project(ray_of((1 + 1e-9) * edge)));
         EXPECT_FALSE(lens_.project_with_jacobians(ray_of((1 + 1e-9) * edge)));
-        EXPECT_FALSE(lens_.compute_parameter_jacobian(ray_of((1 + 1e-9) * edge)));
+        EXPECT_FALSE(lens_.compute_intrinsics_jacobian(ray_of((1 + 1e-9) * edge)));
       }
     }
   }
@@ -101,7 +101,7 @@ TEST_P(SplinedLens, CopyProjectsToSamePixels) {
   const Lens copy = lens_;
   const Vector3d ray = ray_of(random_position());
   EXPECT_EQ(copy.project(ray), lens_.project(ray));
-  EXPECT_EQ(copy.model(), GetParam());
+  EXPECT_EQ(copy.lens_model(), GetParam());
 }
 
 INSTANTIATE_TEST_SUITE_P(Grids, SplinedLens, testing::Values(kCubic, kQuadratic),
@@ -113,8 +113,8 @@ TEST(SplinedLensWithRandomControlPoints, UnprojectReturnsRaysOnlyWithoutFold) {
   Random random(62);
   int rays = 0;
   for (int trial = 0; trial < 20; ++trial) {
-    const LensModel model = lens_model_for({3, 12, 10, 120});
-    const Lens lens(model, splined_parameters(grid_of(model), 0.4, random));
+    const LensModel model = lens_model_for_spline_grid({3, 12, 10, 120});
+    const Lens lens(model, splined_parameters(spline_grid_of_model(model), 0.4, random));
     for (double v = -300; v <= 900; v += 37) {
       for (double x = -300; x <= 1100; x += 37) {
         const auto ray = lens.unproject({x, v});
@@ -131,7 +131,7 @@ TEST(SplinedLensWithRandomControlPoints, UnprojectReturnsRaysOnlyWithoutFold) {
 }
 
 TEST(SplinedLensWithRandomControlPoints, ReturnsOnlyFiniteResults) {
-  const LensModel model = lens_model_for({3, 5, 4, 90});
+  const LensModel model = lens_model_for_spline_grid({3, 5, 4, 90});
   for (const double all : {0.0, -1.0, 1e150, -1e300}) {
     std::vector<double> parameters(parameter_count(model), all);
     std::fill_n(parameters.begin(), 4, 500);

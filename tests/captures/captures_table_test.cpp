@@ -12,9 +12,9 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(ReadCaptures, ReadsAnyColumns) {
+TEST(ReadCapturesCsv, ReadsAnyColumns) {
   const TemporaryFolder folder;
-  const auto captures = read_captures(
+  const auto captures = read_captures_csv(
       folder.file("captures.csv",
                   "image,z_m,roll_rad,yaw_rad,pitch_rad,time_s\na,0.1,0.01,3,0.02,5\nb,,,,,\n"));
   ASSERT_EQ(captures.size(), 2);
@@ -30,9 +30,9 @@ TEST(ReadCaptures, ReadsAnyColumns) {
   EXPECT_FALSE(captures.at("b").z_m);
 }
 
-TEST(ReadCaptures, ReadsPlaceAndSpot) {
+TEST(ReadCapturesCsv, ReadsPlaceAndSpot) {
   const TemporaryFolder folder;
-  const auto captures = read_captures(folder.file(
+  const auto captures = read_captures_csv(folder.file(
       "captures.csv",
       "image,x_m,y_m,reference_point,position_sd_m,pivot\na,1,2,axis,0.001,s1\nb,1,2,,,\n"));
   EXPECT_EQ(captures.at("a").place, PlaceOf::axis);
@@ -43,10 +43,10 @@ TEST(ReadCaptures, ReadsPlaceAndSpot) {
   EXPECT_TRUE(captures.at("b").spot.empty());
 }
 
-TEST(ReadCaptures, NamesThePresentColumn) {
+TEST(ReadCapturesCsv, NamesThePresentColumn) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& content) {
-    return rejection_message([&] { read_captures(folder.file("c.csv", content)); });
+    return rejection_message([&] { read_captures_csv(folder.file("c.csv", content)); });
   };
   EXPECT_THAT(refusal("image,spot\na,s1\n"),
               HasSubstr("c.csv:1: column 'spot' is now called 'pivot'"));
@@ -56,9 +56,9 @@ TEST(ReadCaptures, NamesThePresentColumn) {
               HasSubstr("c.csv:1: column 'place_sd_m' is now called 'position_sd_m'"));
 }
 
-TEST(ReadCaptures, ReadsOdometry) {
+TEST(ReadCapturesCsv, ReadsOdometry) {
   const TemporaryFolder folder;
-  const auto captures = read_captures(folder.file(
+  const auto captures = read_captures_csv(folder.file(
       "captures.csv",
       "image,vx_m_per_s,vy_m_per_s,yaw_rate_rad_per_s,velocity_sd_m_per_s\na,1,-2,0.5,0.01\n"
       "b,3,4,,\nc,,,,\n"));
@@ -71,10 +71,10 @@ TEST(ReadCaptures, ReadsOdometry) {
   EXPECT_FALSE(captures.at("c").velocity_m_per_s);
 }
 
-TEST(ReadCaptures, RejectsContradictions) {
+TEST(ReadCapturesCsv, RejectsContradictions) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& content) {
-    return rejection_message([&] { read_captures(folder.file("c.csv", content)); });
+    return rejection_message([&] { read_captures_csv(folder.file("c.csv", content)); });
   };
   EXPECT_THAT(refusal("z_m\n1\n"), HasSubstr("c.csv:1: image: this column is missing"));
   EXPECT_THAT(refusal("image\na\na\n"), HasSubstr("c.csv:3: image: 'a' occurs twice"));

@@ -24,35 +24,35 @@ class CsvTableTest : public testing::Test {
 TEST_F(CsvTableTest, FindsColumnsByNameInAnyOrder) {
   const CsvTable table = read("b,extra,a\n1,x,2\n3,,4\n");
   ASSERT_EQ(table.rows(), 2);
-  EXPECT_EQ(table.number(0, table.required("a")), 2);
-  EXPECT_EQ(table.number(1, table.required("b")), 3);
-  EXPECT_EQ(table.text(1, table.required("extra")), "");
-  EXPECT_FALSE(table.optional("c"));
+  EXPECT_EQ(table.get_number(0, table.get_required_column("a")), 2);
+  EXPECT_EQ(table.get_number(1, table.get_required_column("b")), 3);
+  EXPECT_EQ(table.get_text(1, table.get_required_column("extra")), "");
+  EXPECT_FALSE(table.get_optional("c"));
 }
 
 TEST_F(CsvTableTest, ReadsQuotedFields) {
   const CsvTable table =
       read("image,a\n\"one, two.png\",1\n\"say \"\"hi\"\"\",2\n\"two\nlines\",3\n\"\",4\n");
   ASSERT_EQ(table.rows(), 4);
-  const auto image = table.required("image");
-  EXPECT_EQ(table.text(0, image), "one, two.png");
-  EXPECT_EQ(table.text(1, image), "say \"hi\"");
-  EXPECT_EQ(table.text(2, image), "two\nlines");
-  EXPECT_EQ(table.text(3, image), "");
+  const auto image = table.get_required_column("image");
+  EXPECT_EQ(table.get_text(0, image), "one, two.png");
+  EXPECT_EQ(table.get_text(1, image), "say \"hi\"");
+  EXPECT_EQ(table.get_text(2, image), "two\nlines");
+  EXPECT_EQ(table.get_text(3, image), "");
 }
 
 TEST_F(CsvTableTest, ReadsCarriageReturnsByteOrderMarkAndEmptyLines) {
   const CsvTable table = read("\xEF\xBB\xBFimage,a\r\n\r\nx.png,1\r\ny.png,2\r\n\r\n");
   ASSERT_EQ(table.rows(), 2);
-  EXPECT_EQ(table.text(1, table.required("image")), "y.png");
-  EXPECT_EQ(table.integer(1, table.required("a")), 2);
+  EXPECT_EQ(table.get_text(1, table.get_required_column("image")), "y.png");
+  EXPECT_EQ(table.get_integer(1, table.get_required_column("a")), 2);
 }
 
 TEST_F(CsvTableTest, ReadsHeaderWithoutRows) { EXPECT_EQ(read("a,b\n").rows(), 0); }
 
 TEST_F(CsvTableTest, ReportsMissingColumn) {
   const CsvTable table = read("image,lamp\nx,1\n");
-  EXPECT_THAT(rejection_message([&] { (void)table.required("u_px"); }),
+  EXPECT_THAT(rejection_message([&] { (void)table.get_required_column("u_px"); }),
               HasSubstr("a.csv:1: u_px: this column is missing; the columns are: image, lamp"));
 }
 
@@ -77,23 +77,25 @@ TEST_F(CsvTableTest, RejectsInvalidCsv) {
 TEST_F(CsvTableTest, ReportsLineAndColumnOfInvalidNumber) {
   for (const std::string bad : {"", "x", "1.5 m", "nan", "inf", "-inf", "1e999", "0x10", "1,5"}) {
     const CsvTable table = read("image,u_px\nok,1\nbad,\"" + bad + "\"\n");
-    EXPECT_THAT(rejection_message([&] { (void)table.number(1, table.required("u_px")); }),
-                HasSubstr("a.csv:3: u_px: should be a finite number, not '" + bad + "'"));
+    EXPECT_THAT(
+        rejection_message([&] { (void)table.get_number(1, table.get_required_column("u_px")); }),
+        HasSubstr("a.csv:3: u_px: should be a finite number, not '" + bad + "'"));
   }
   const CsvTable table = read("lamp\n1.5\n");
-  EXPECT_THAT(rejection_message([&] { (void)table.integer(0, table.required("lamp")); }),
-              HasSubstr("a.csv:2: lamp: should be a whole number, not '1.5'"));
+  EXPECT_THAT(
+      rejection_message([&] { (void)table.get_integer(0, table.get_required_column("lamp")); }),
+      HasSubstr("a.csv:2: lamp: should be a whole number, not '1.5'"));
 }
 
 TEST_F(CsvTableTest, ReadsFieldsOfCsvWriter) {
   const std::vector<std::string> fields{"plain", "a,b", "say \"hi\"", "two\nlines", " spaces ", ""};
   CsvWriter writer(folder / "b.csv", {"one", "two"});
   for (const std::string& field : fields) writer.row({field, "x"});
-  writer.save();
+  writer.save_file();
   const CsvTable table(folder / "b.csv");
   ASSERT_EQ(table.rows(), fields.size());
   for (std::size_t row = 0; row < fields.size(); ++row) {
-    EXPECT_EQ(table.text(row, table.required("one")), fields[row]);
+    EXPECT_EQ(table.get_text(row, table.get_required_column("one")), fields[row]);
   }
 }
 
@@ -102,21 +104,21 @@ TEST_F(CsvTableTest, ReadsFormulasEscapedByCsvWriter) {
                                           "'=1",  "''=", "=\"a\"", "=a,b",    "-1-1", "+1 m"};
   CsvWriter writer(folder / "b.csv", {"one", "=two"});
   for (const std::string& formula : formulas) writer.row({formula, "x"});
-  writer.save();
+  writer.save_file();
   const std::string content = folder.read_content(folder / "b.csv");
   EXPECT_THAT(content, HasSubstr("\n\"'=1+1\",x\n"));
   const CsvTable table(folder / "b.csv");
   ASSERT_EQ(table.rows(), formulas.size());
-  EXPECT_TRUE(table.optional("=two"));
+  EXPECT_TRUE(table.get_optional("=two"));
   for (std::size_t row = 0; row < formulas.size(); ++row) {
-    EXPECT_EQ(table.text(row, table.required("one")), formulas[row]);
+    EXPECT_EQ(table.get_text(row, table.get_required_column("one")), formulas[row]);
   }
 }
 
 TEST_F(CsvTableTest, ReadsNumbersUnescapedByCsvWriter) {
   CsvWriter writer(folder / "b.csv", {"a", "b", "c", "d", "e", "f"});
   writer.row({"-0.5", "+1.5e-3", "-", "'quoted'", "a=b", "-inf"});
-  writer.save();
+  writer.save_file();
   EXPECT_EQ(folder.read_content(folder / "b.csv"),
             "a,b,c,d,e,f\n-0.5,+1.5e-3,-,'quoted',a=b,-inf\n");
 }
@@ -131,7 +133,7 @@ TEST_F(CsvTableTest, ReportsDuplicateColumnAmongMany) {
   EXPECT_THAT(refusal(header + ",twice\n" + row + ",0\n"),
               HasSubstr("a.csv:1: twice: this column occurs twice"));
   const CsvTable table = read(header + "\n" + row + "\n");
-  EXPECT_LT(rejection_message([&] { (void)table.required("u_px"); }).size(), 1000);
+  EXPECT_LT(rejection_message([&] { (void)table.get_required_column("u_px"); }).size(), 1000);
 }
 
 }  // namespace

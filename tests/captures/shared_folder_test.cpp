@@ -29,32 +29,32 @@ class SharedFolderTest : public testing::Test {
 
 TEST_F(SharedFolderTest, WritesReadsRenamesAndRemovesFiles) {
   const SharedFolder shared(path);
-  EXPECT_FALSE(shared.has("a"));
+  EXPECT_FALSE(shared.contains_entry("a"));
   EXPECT_EQ(shared.read("a", 10), std::nullopt);
-  shared.replace("a", "first");
-  shared.replace("a", "second");
+  shared.replace_file("a", "first");
+  shared.replace_file("a", "second");
   EXPECT_EQ(shared.read("a", 6), "second");
   EXPECT_THAT(rejection_message([&] { shared.read("a", 5); }),
               HasSubstr("a: is longer than 5 bytes"));
-  EXPECT_TRUE(shared.rename("a", "b"));
-  EXPECT_FALSE(shared.rename("a", "b"));
+  EXPECT_TRUE(shared.rename_file("a", "b"));
+  EXPECT_FALSE(shared.rename_file("a", "b"));
   EXPECT_EQ(shared.read("b", 10), "second");
-  shared.remove("b");
-  shared.remove("b");
-  EXPECT_FALSE(shared.has("b"));
+  shared.remove_file("b");
+  shared.remove_file("b");
+  EXPECT_FALSE(shared.contains_entry("b"));
   EXPECT_TRUE(fs::is_empty(path)) << "no temporary file is left";
 }
 
 TEST_F(SharedFolderTest, CreatesAndFindsFolders) {
   const SharedFolder shared(path);
-  EXPECT_FALSE(shared.find_folder(id("0001")));
-  shared.make_folder(id("0001")).replace("a", "a");
-  const auto found = shared.find_folder(id("0001"));
+  EXPECT_FALSE(shared.open_subfolder_if_exists(id("0001")));
+  shared.make_subfolder(id("0001")).replace_file("a", "a");
+  const auto found = shared.open_subfolder_if_exists(id("0001"));
   ASSERT_TRUE(found);
   EXPECT_EQ(found->path(), path / "0001");
   EXPECT_EQ(found->read("a", 1), "a");
-  shared.replace("file", "");
-  EXPECT_THAT(rejection_message([&] { shared.make_folder(id("file")); }),
+  shared.replace_file("file", "");
+  EXPECT_THAT(rejection_message([&] { shared.make_subfolder(id("file")); }),
               HasSubstr("file: cannot be"));
   EXPECT_THAT(rejection_message([&] { SharedFolder(path / "file"); }),
               HasSubstr("cannot be opened"));
@@ -69,14 +69,14 @@ TEST_F(SharedFolderTest, RejectsLinksInFolder) {
   };
   expect_refused([&] { shared.read("link", 100); });
   expect_refused([&] { shared.open("link", O_CREAT | O_RDWR); });
-  expect_refused([&] { shared.find_folder(id("folder")); });
-  expect_refused([&] { shared.make_folder(id("folder")); });
-  EXPECT_TRUE(shared.has("link"));
-  shared.replace("link", "ours");
+  expect_refused([&] { shared.open_subfolder_if_exists(id("folder")); });
+  expect_refused([&] { shared.make_subfolder(id("folder")); });
+  EXPECT_TRUE(shared.contains_entry("link"));
+  shared.replace_file("link", "ours");
   EXPECT_EQ(shared.read("link", 100), "ours");
   fs::remove(path / "link");
   fs::create_symlink(outside, path / "link");
-  shared.remove("link");
+  shared.remove_file("link");
   EXPECT_EQ(TemporaryFolder::read_content(outside), "mine");
 }
 
@@ -88,13 +88,13 @@ TEST_F(SharedFolderTest, RejectsNamesOutsideFolder) {
     const auto expect_refused = [&](const auto& action) {
       EXPECT_THAT(rejection_message(action), HasSubstr("is no name of a file in it")) << name;
     };
-    expect_refused([&] { shared.has(name); });
+    expect_refused([&] { shared.contains_entry(name); });
     expect_refused([&] { shared.read(name, 100); });
-    expect_refused([&] { shared.replace(name, "x"); });
+    expect_refused([&] { shared.replace_file(name, "x"); });
     expect_refused([&] { shared.open(name, O_RDONLY); });
-    expect_refused([&] { shared.rename(name, "a"); });
-    expect_refused([&] { shared.rename("a", name); });
-    expect_refused([&] { shared.remove(name); });
+    expect_refused([&] { shared.rename_file(name, "a"); });
+    expect_refused([&] { shared.rename_file("a", name); });
+    expect_refused([&] { shared.remove_file(name); });
   }
   EXPECT_EQ(TemporaryFolder::read_content(outside), "mine");
 }
@@ -107,7 +107,7 @@ TEST_F(SharedFolderTest, RemovesContentOfOpenedFolderAfterRename) {
   const SharedFolder shared(path);
   fs::rename(path, folder / "moved");
   fs::create_directory_symlink(folder / "elsewhere", path);
-  shared.remove_content();
+  shared.remove_all_entries();
   EXPECT_TRUE(fs::is_empty(folder / "moved"));
   EXPECT_TRUE(fs::exists(folder / "elsewhere/kept"));
 }
@@ -126,14 +126,14 @@ TEST_F(SharedFolderTest, ReadsRegularFilesOnly) {
 
 TEST_F(SharedFolderTest, KeepsModeAndOwnerOfReplacedFile) {
   const SharedFolder shared(path);
-  shared.replace("a", "first");
+  shared.replace_file("a", "first");
   ASSERT_EQ(::chmod((path / "a").c_str(), 0640), 0);
   const bool is_root = ::geteuid() == 0;
   constexpr uid_t other = 12345;
   if (is_root) {
     ASSERT_EQ(::chown((path / "a").c_str(), other, other), 0);
   }
-  shared.replace("a", "second");
+  shared.replace_file("a", "second");
   struct stat status {};
   ASSERT_EQ(::stat((path / "a").c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777U, 0640U);
@@ -143,24 +143,23 @@ TEST_F(SharedFolderTest, KeepsModeAndOwnerOfReplacedFile) {
   EXPECT_EQ(shared.read("a", 10), "second");
 }
 
-
 std::string error_message(const std::string& text) {
-  return rejection_message<std::runtime_error>([&] { check_json_bounds(text); });
+  return rejection_message<std::runtime_error>([&] { check_json_size_and_depth(text); });
 }
 
-TEST(CheckJsonBounds, AcceptsLevelsAndValuesUpToLimits) {
+TEST(CheckJsonSizeAndDepth, AcceptsLevelsAndValuesUpToLimits) {
   EXPECT_EQ(error_message(""), "");
   EXPECT_EQ(error_message(std::string(16, '[') + std::string(16, ']')), "");
   EXPECT_EQ(error_message("[" + std::string(999'999, ',') + "]"), "");
 }
 
-TEST(CheckJsonBounds, ThrowsAboveLimits) {
+TEST(CheckJsonSizeAndDepth, ThrowsAboveLimits) {
   EXPECT_THAT(error_message(std::string(17, '[')), HasSubstr("more than 16 levels"));
   EXPECT_THAT(error_message(R"({"a":)" + std::string(16, '{')), HasSubstr("more than 16 levels"));
   EXPECT_THAT(error_message("[" + std::string(1'000'000, ',')), HasSubstr("more than a million"));
 }
 
-TEST(CheckJsonBounds, IgnoresContentOfStrings) {
+TEST(CheckJsonSizeAndDepth, IgnoresContentOfStrings) {
   EXPECT_EQ(error_message("\"" + std::string(100, '[') + std::string(2'000'000, ',') + "\""), "");
   EXPECT_EQ(error_message(R"("\"[[[[[[[[[[[[[[[[[[")"), "");
   EXPECT_THAT(error_message(R"("\\")" + std::string(17, '[')), HasSubstr("levels"));

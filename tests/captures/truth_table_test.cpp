@@ -13,9 +13,10 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(ReadTruth, AcceptsMissingHeightAndYaw) {
+TEST(ReadTruthTable, AcceptsMissingHeightAndYaw) {
   const TemporaryFolder folder;
-  const auto rows = read_truth(folder.file("t.csv", "image,x_m,y_m,yaw_rad\nb,1,2,\na,3,4,0.5\n"));
+  const auto rows =
+      read_truth_table(folder.file("t.csv", "image,x_m,y_m,yaw_rad\nb,1,2,\na,3,4,0.5\n"));
   ASSERT_EQ(rows.size(), 2);
   EXPECT_EQ(rows[0].image, "b");
   EXPECT_EQ(rows[1].xy_m, Eigen::Vector2d(3, 4));
@@ -25,11 +26,11 @@ TEST(ReadTruth, AcceptsMissingHeightAndYaw) {
   EXPECT_EQ(rows[1].line, 3);
 }
 
-TEST(ReadTruth, ReportsLineOfInvalidRow) {
+TEST(ReadTruthTable, ReportsLineOfInvalidRow) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& rows) {
     return rejection_message(
-        [&] { read_truth(folder.file("t.csv", "image,x_m,y_m,z_m\n" + rows)); });
+        [&] { read_truth_table(folder.file("t.csv", "image,x_m,y_m,z_m\n" + rows)); });
   };
   EXPECT_THAT(refusal("a,0,0,\na,1,1,\n"), HasSubstr("t.csv:3: image: 'a' occurs twice"));
   EXPECT_THAT(refusal("a,0,0,\n,1,1,\n"), HasSubstr("t.csv:3: image: is empty"));
@@ -41,27 +42,28 @@ TEST(ReadTruth, ReportsLineOfInvalidRow) {
   EXPECT_THAT(refusal(""), HasSubstr("t.csv: contains no position"));
 }
 
-TEST(ReadPath, ReadsOptionalHeights) {
+TEST(ReadPathTable, ReadsOptionalHeights) {
   const TemporaryFolder folder;
-  const Path flat = read_path(folder.file("p.csv", "y_m,x_m\n1,2\n3,4\n"));
+  const Path flat = read_path_table(folder.file("p.csv", "y_m,x_m\n1,2\n3,4\n"));
   ASSERT_EQ(flat.waypoints_m.size(), 2);
   EXPECT_EQ(flat.waypoints_m[1], Eigen::Vector2d(4, 3));
   EXPECT_TRUE(flat.z_m.empty());
-  EXPECT_EQ(read_path(folder.file("p.csv", "x_m,y_m,z_m\n1,2,3\n4,5,6\n")).z_m,
+  EXPECT_EQ(read_path_table(folder.file("p.csv", "x_m,y_m,z_m\n1,2,3\n4,5,6\n")).z_m,
             (std::vector<double>{3, 6}));
 }
 
-TEST(ReadPath, RejectsPathWithoutLength) {
+TEST(ReadPathTable, RejectsPathWithoutLength) {
   const TemporaryFolder folder;
   for (const char* text : {"x_m,y_m\n", "x_m,y_m\n1,2\n", "x_m,y_m\n1,2\n1,2\n"}) {
-    EXPECT_THAT(rejection_message([&] { read_path(folder.file("p.csv", text)); }),
+    EXPECT_THAT(rejection_message([&] { read_path_table(folder.file("p.csv", text)); }),
                 HasSubstr("two or more waypoints at different positions"));
   }
-  EXPECT_THAT(rejection_message([&] { read_path(folder.file("p.csv", "x_m,y_m\n1,nan\n1,2\n")); }),
-              HasSubstr("p.csv:2: y_m"));
+  EXPECT_THAT(
+      rejection_message([&] { read_path_table(folder.file("p.csv", "x_m,y_m\n1,nan\n1,2\n")); }),
+      HasSubstr("p.csv:2: y_m"));
 }
 
-TEST(FindNearestOnPath, ReturnsNearestPoint) {
+TEST(FindNearestPointOnPath, ReturnsNearestPoint) {
   Random random(1);
   Path path;
   for (int i = 0; i < 30; ++i) {
@@ -79,16 +81,16 @@ TEST(FindNearestOnPath, ReturnsNearestPoint) {
         min_squared_distance = std::min(min_squared_distance, (point - place).norm());
       }
     }
-    EXPECT_NEAR((find_nearest_on_path(path, place).xy_m - place).norm(), min_squared_distance,
+    EXPECT_NEAR((find_nearest_point_on_path(path, place).xy_m - place).norm(), min_squared_distance,
                 2e-3);
   }
 }
 
-TEST(ReadPath, RejectsDistantWaypoint) {
+TEST(ReadPathTable, RejectsDistantWaypoint) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& row) {
     return rejection_message(
-        [&] { read_path(folder.file("p.csv", "x_m,y_m,z_m\n1,2,3\n" + row)); });
+        [&] { read_path_table(folder.file("p.csv", "x_m,y_m,z_m\n1,2,3\n" + row)); });
   };
   EXPECT_EQ(refusal("1e6,-1e6,0\n"), "");
   EXPECT_THAT(refusal("1e308,0,0\n"), HasSubstr("p.csv:3: x_m: should be within 1,000 km"));
@@ -96,11 +98,11 @@ TEST(ReadPath, RejectsDistantWaypoint) {
   EXPECT_THAT(refusal("0,0,1e7\n"), HasSubstr("p.csv:3: z_m"));
 }
 
-TEST(FindNearestOnPath, InterpolatesHeight) {
+TEST(FindNearestPointOnPath, InterpolatesHeight) {
   const Path path{{{0, 0}, {2, 0}, {2, 2}}, {0, 1, 5}};
-  EXPECT_DOUBLE_EQ(find_nearest_on_path(path, {1, 1e-3}).z_m.value(), 0.5);
-  EXPECT_DOUBLE_EQ(find_nearest_on_path(path, {3, 1.5}).z_m.value(), 4);
-  EXPECT_DOUBLE_EQ(find_nearest_on_path(path, {9, 9}).z_m.value(), 5);
+  EXPECT_DOUBLE_EQ(find_nearest_point_on_path(path, {1, 1e-3}).z_m.value(), 0.5);
+  EXPECT_DOUBLE_EQ(find_nearest_point_on_path(path, {3, 1.5}).z_m.value(), 4);
+  EXPECT_DOUBLE_EQ(find_nearest_point_on_path(path, {9, 9}).z_m.value(), 5);
 }
 
 }  // namespace

@@ -25,8 +25,8 @@ cv::Mat1w gradient() {
 TEST(Codecs, DecodeRestoresEncodedImage) {
   const cv::Mat1w image = gradient();
   for (const char* ending : {".png", ".tiff", ".pgm"}) {
-    std::string bytes = codecs().encode(ending, image, {});
-    const cv::Mat decoded = codecs().decode(bytes, kUnchanged);
+    std::string bytes = get_codecs().encode_image_file(ending, image, {});
+    const cv::Mat decoded = get_codecs().decode_image(bytes, kUnchanged);
     ASSERT_EQ(decoded.type(), CV_16UC1) << ending;
     ASSERT_EQ(decoded.size(), image.size()) << ending;
     EXPECT_EQ(cv::norm(decoded, image, cv::NORM_INF), 0) << ending;
@@ -35,21 +35,21 @@ TEST(Codecs, DecodeRestoresEncodedImage) {
 
 TEST(Codecs, DecodeReturnsEmptyImageForOtherBytes) {
   std::string bytes = "no image";
-  EXPECT_TRUE(codecs().decode(bytes, kUnchanged).empty());
+  EXPECT_TRUE(get_codecs().decode_image(bytes, kUnchanged).empty());
 }
 
 TEST(Codecs, EncodeThrowsForUnknownExtension) {
-  EXPECT_ANY_THROW(codecs().encode(".unknown", gradient(), {}));
+  EXPECT_ANY_THROW(get_codecs().encode_image_file(".unknown", gradient(), {}));
 }
 
 TEST(VideoReader, OpenFailsForMissingFile) {
   constexpr int ffmpeg = 1900;  // cv::CAP_FFMPEG
-  if (!codecs().has_video_backend(ffmpeg)) GTEST_SKIP() << "OpenCV without FFmpeg";
-  const auto reader = codecs().make_video_reader();
+  if (!get_codecs().has_video_backend(ffmpeg)) GTEST_SKIP() << "OpenCV without FFmpeg";
+  const auto reader = get_codecs().make_video_reader();
   ASSERT_TRUE(reader);
   EXPECT_FALSE(reader->open("/nonexistent.avi", ffmpeg));
   cv::Mat frame;
-  EXPECT_FALSE(reader->grab() && reader->retrieve(frame));
+  EXPECT_FALSE(reader->grab_frame() && reader->retrieve_frame(frame));
 }
 
 }  // namespace

@@ -14,14 +14,14 @@ FixRow row(int lamps, double residual_px, double sd_m) {
       lamps};
 }
 
-TEST(Summarize, CountsFixesStatusesAndLamps) {
+TEST(SummarizeFixes, CountsFixesStatusesAndLamps) {
   const std::vector<FixRow> rows{row(2, 0, 1),
                                  row(5, 3, 2),
                                  row(3, 1, 3),
                                  {"", "degenerate", {}, 0},
                                  {"", "too_few_lamps", {}, 0},
                                  {"", "degenerate", {}, 0}};
-  const FixSummary summary = summarize(rows);
+  const FixSummary summary = summarize_fixes(rows);
   EXPECT_EQ(summary.frames, 6);
   EXPECT_EQ(summary.fixes, 3);
   EXPECT_EQ(summary.refused.at("degenerate"), 2);
@@ -37,11 +37,11 @@ TEST(Summarize, CountsFixesStatusesAndLamps) {
   EXPECT_EQ(summary.median_sd->yaw_rad, 4);
 }
 
-TEST(Summarize, OmitsMissingStatistics) {
-  EXPECT_FALSE(summarize({}).typical);
+TEST(SummarizeFixes, OmitsMissingStatistics) {
+  EXPECT_FALSE(summarize_fixes({}).typical);
   FixRow without_sd = row(3, 1, 1);
   without_sd.fix->sd.reset();
-  const FixSummary summary = summarize({&without_sd, 1});
+  const FixSummary summary = summarize_fixes({&without_sd, 1});
   EXPECT_TRUE(summary.typical);
   EXPECT_FALSE(summary.median_sd);
 }

@@ -40,9 +40,9 @@ TEST(CheckGates, PassesIfValueDoesNotExceedLimit) {
                                     {"missing_fraction", 0.25},
                                     {"missing_fraction", 0.249},
                                     {"height_rms_mm", 2.9}},
-                                   collect_metrics(evaluation()));
+                                   collect_evaluation_metrics(evaluation()));
   std::vector<bool> passed;
-  for (const CheckedMetric& result : results) passed.push_back(result.passed());
+  for (const CheckedMetric& result : results) passed.push_back(result.has_passed());
   ASSERT_EQ(passed, (std::vector<bool>{true, false, true, true, false, false}));
   EXPECT_NEAR(results[5].value.value(), 3, 1e-9);
   EXPECT_EQ(results[5].unit, "mm");
@@ -50,31 +50,31 @@ TEST(CheckGates, PassesIfValueDoesNotExceedLimit) {
 }
 
 TEST(CheckGates, IncludesLimitInBothDirections) {
-  EXPECT_TRUE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.3}})[0].passed());
-  EXPECT_FALSE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.31}})[0].passed());
+  EXPECT_TRUE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.3}})[0].has_passed());
+  EXPECT_FALSE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.31}})[0].has_passed());
   const auto coverage = check_gates({{"coverage", 0.7}}, {{"coverage", 0.69}});
-  EXPECT_FALSE(coverage[0].passed());
+  EXPECT_FALSE(coverage[0].has_passed());
   EXPECT_EQ(describe(coverage[0]), "coverage is 0.69, at least 0.7 is asked for");
-  EXPECT_EQ(describe_failure(coverage[0]),
+  EXPECT_EQ(describe_failed_gate(coverage[0]),
             "the board views do not cover the image (" + describe(coverage[0]) + ")");
-  EXPECT_TRUE(check_gates({{"coverage", 0.7}}, {{"coverage", 0.7}})[0].passed());
+  EXPECT_TRUE(check_gates({{"coverage", 0.7}}, {{"coverage", 0.7}})[0].has_passed());
 }
 
 TEST(CheckGates, TightensLimitByGuardBand) {
   const auto of = [](const char* metric, double limit, double value) {
-    return check_all({{metric, limit, GuardBand{0.01, 1.5}}}, {{metric, value}},
-                     {metric_kind(metric).value()})[0];
+    return check_all_metrics({{metric, limit, GuardBand{0.01, 1.5}}}, {{metric, value}},
+                             {find_metric_kind(metric).value()})[0];
   };
-  EXPECT_TRUE(of("rms_px", 0.3, 0.2849).passed());
+  EXPECT_TRUE(of("rms_px", 0.3, 0.2849).has_passed());
   const CheckedMetric within = of("rms_px", 0.3, 0.286);
-  EXPECT_FALSE(within.passed());
+  EXPECT_FALSE(within.has_passed());
   EXPECT_EQ(describe(within),
             "rms_px is 0.286 px, at most 0.3 px less a guard band of 0.015 px is asked for");
   EXPECT_FALSE(
-      check_gates({{"rms_px", 0.3, GuardBand{0.01, 1.5}}}, {{"rms_px", 0.286}})[0].passed());
-  EXPECT_TRUE(of("coverage", 0.7, 0.7151).passed());
+      check_gates({{"rms_px", 0.3, GuardBand{0.01, 1.5}}}, {{"rms_px", 0.286}})[0].has_passed());
+  EXPECT_TRUE(of("coverage", 0.7, 0.7151).has_passed());
   const CheckedMetric below = of("coverage", 0.7, 0.714);
-  EXPECT_FALSE(below.passed());
+  EXPECT_FALSE(below.has_passed());
   EXPECT_EQ(describe(below),
             "coverage is 0.714, at least 0.7 and a guard band of 0.015 is asked for");
   // Tables of the normal distribution.
@@ -98,7 +98,7 @@ TEST(ConformanceProbability, MatchesSimulatedDecisionErrors) {
     const double truth = random.uniform(limit - 5 * u, limit + 5 * u);
     unit.value = truth + u * random.normal();
     const double conforms = unit.conformance_probability().value();
-    if (unit.passed()) {
+    if (unit.has_passed()) {
       passed_falsely += truth > limit ? 1 : 0;
       stated_passed += 1 - conforms;
     } else {
@@ -106,7 +106,7 @@ TEST(ConformanceProbability, MatchesSimulatedDecisionErrors) {
       stated_failed += conforms;
     }
     unit.value = limit + u * random.normal();
-    passed_at_limit += unit.passed() ? 1 : 0;
+    passed_at_limit += unit.has_passed() ? 1 : 0;
   }
   // 630 units pass falsely: their number has a standard error of 4 %.
   EXPECT_NEAR(passed_falsely / stated_passed, 1, 0.1);
@@ -114,36 +114,37 @@ TEST(ConformanceProbability, MatchesSimulatedDecisionErrors) {
   EXPECT_NEAR(double(passed_at_limit) / clusters, 0.05, 0.005);
 }
 
-TEST(CheckAll, IncludesMetricsWithoutGateAndGatesWithoutValue) {
+TEST(CheckAllMetrics, IncludesMetricsWithoutGateAndGatesWithoutValue) {
   const double infinity = std::numeric_limits<double>::infinity();
-  const auto known = metric_kinds({MetricSource::lens, MetricSource::rotation});
-  const auto all = check_all({{"rms_px", 0.3}}, {{"tilt_deg", 1}, {"rms_px", infinity}}, known);
+  const auto known = list_metric_kinds({MetricSource::lens, MetricSource::rotation});
+  const auto all =
+      check_all_metrics({{"rms_px", 0.3}}, {{"tilt_deg", 1}, {"rms_px", infinity}}, known);
   ASSERT_EQ(all.size(), 2);
   EXPECT_EQ(all[0].name, "rms_px");
   EXPECT_FALSE(all[0].value);
-  EXPECT_FALSE(all[0].passed());
+  EXPECT_FALSE(all[0].has_passed());
   EXPECT_EQ(describe_failed_gates(all), "rms_px is not known, at most 0.3 px is asked for");
   EXPECT_EQ(all[1].value, 1);
   EXPECT_FALSE(all[1].limit);
-  EXPECT_TRUE(all[1].passed());
+  EXPECT_TRUE(all[1].has_passed());
 }
 
-TEST(WithChanges, ReplacesLimitsAndAppendsNewGates) {
+TEST(MergeGates, ReplacesLimitsAndAppendsNewGates) {
   const auto gates =
-      with_changes({{"rms_px", 1}, {"split_half_px", 1}}, {{"coverage", 0.6}, {"rms_px", 2}});
+      merge_gates({{"rms_px", 1}, {"split_half_px", 1}}, {{"coverage", 0.6}, {"rms_px", 2}});
   ASSERT_EQ(gates.size(), 3);
   EXPECT_EQ(gates[0].limit, 2);
   EXPECT_EQ(gates[1].limit, 1);
   EXPECT_EQ(gates[2].metric, "coverage");
 }
 
-TEST(CheckGates, ComparisonOfTooFewUnitsPasses) {
+TEST(CheckGates, PassesWorseGateWhenClustersAreTooFew) {
   Evaluation compared = evaluation();
   compared.comparison = Comparison{};
   const auto passed = [&] {
-    return check_gates({{"worse_mm", 0}}, collect_metrics(compared))[0].passed();
+    return check_gates({{"worse_mm", 0}}, collect_evaluation_metrics(compared))[0].has_passed();
   };
-  EXPECT_FALSE(find_metric_value(collect_metrics(compared), "worse_mm")) << "no pair";
+  EXPECT_FALSE(find_metric_value(collect_evaluation_metrics(compared), "worse_mm")) << "no pair";
   compared.comparison->pairs = compared.comparison->clusters = 19;
   compared.comparison->interval_m = {0.1, 1};
   EXPECT_TRUE(passed());
@@ -157,7 +158,7 @@ TEST(CheckGates, ComparisonOfTooFewUnitsPasses) {
 }
 
 TEST(ParseGate, RejectsUnreachableLimits) {
-  const auto known = metric_kinds({MetricSource::lens, MetricSource::evaluation});
+  const auto known = list_metric_kinds({MetricSource::lens, MetricSource::evaluation});
   const auto words = [&](const char* text) -> std::string {
     try {
       return parse_gate(text, known).metric;
@@ -200,7 +201,7 @@ TEST(CheckGates, FailsGateWithoutValue) {
 }
 
 TEST(ParseGate, ParsesNameAndLimit) {
-  const auto known = metric_kinds({MetricSource::evaluation});
+  const auto known = list_metric_kinds({MetricSource::evaluation});
   const Gate gate = parse_gate("p90_mm=2.5", known);
   EXPECT_EQ(gate.metric, "p90_mm");
   EXPECT_EQ(gate.limit, 2.5);
@@ -212,7 +213,7 @@ TEST(ParseGate, ParsesNameAndLimit) {
 
 TEST(ReadGates, ReadsFileAndRejectsInvalidOnes) {
   const TemporaryFolder folder;
-  const auto known = metric_kinds({MetricSource::evaluation});
+  const auto known = list_metric_kinds({MetricSource::evaluation});
   const auto gates = read_gates(
       folder.file("g.yaml", "format: vlp-gates/1\ngates: {missing_fraction: 0, mean_mm: 1.5}\n"),
       known);
@@ -231,9 +232,9 @@ TEST(ReadGates, ReadsFileAndRejectsInvalidOnes) {
 }
 
 TEST(EvaluationJson, HasUnitsInKeys) {
-  const auto json = nlohmann::json::parse(to_json(
-      evaluation(),
-      check_gates({{"max_mm", 5}, {"missing_fraction", 1}}, collect_metrics(evaluation()))));
+  const auto json = nlohmann::json::parse(
+      to_json(evaluation(), check_gates({{"max_mm", 5}, {"missing_fraction", 1}},
+                                        collect_evaluation_metrics(evaluation()))));
   EXPECT_EQ(json["format"], "vlp-evaluation/2");
   EXPECT_EQ(json["captures"], 4);
   EXPECT_EQ(json["missing"]["degenerate"], 1);

@@ -10,23 +10,23 @@
 namespace vlp {
 namespace {
 
-TEST(MetricKinds, HaveUniqueNamesAndDescriptions) {
+TEST(ListMetricKinds, HaveUniqueNamesAndDescriptions) {
   std::set<std::string> names;
   const auto kinds =
-      metric_kinds({MetricSource::station, MetricSource::lens, MetricSource::rotation,
-                    MetricSource::dispersion, MetricSource::evaluation});
+      list_metric_kinds({MetricSource::station, MetricSource::lens, MetricSource::rotation,
+                         MetricSource::dispersion, MetricSource::evaluation});
   ASSERT_FALSE(kinds.empty());
   for (const MetricKind& kind : kinds) {
     EXPECT_TRUE(names.insert(kind.name).second) << kind.name;
     EXPECT_STRNE(kind.cause, "");
     EXPECT_STRNE(kind.meaning, "");
-    EXPECT_EQ(metric_kind(kind.name).value().name, kind.name);
+    EXPECT_EQ(find_metric_kind(kind.name).value().name, kind.name);
     const std::string unit = kind.unit;
     if (unit == "mm" || unit == "px" || unit == "deg") {
       EXPECT_TRUE(std::string(kind.name).ends_with("_" + unit)) << kind.name;
     }
   }
-  EXPECT_FALSE(metric_kind("mean_cm"));
+  EXPECT_FALSE(find_metric_kind("mean_cm"));
 }
 
 TEST(FindMetricValue, ReturnsNulloptForMissingOrNonFiniteMetric) {

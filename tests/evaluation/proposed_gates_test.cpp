@@ -34,16 +34,16 @@ EvaluationInput draw_run(std::size_t count, unsigned seed, double height_scale =
   return input;
 }
 
-TEST(ProposeGates, RunsOfSameAccuracyPass) {
+TEST(ProposeGatesFromEvaluation, RunsOfSameAccuracyPass) {
   int exceeded = 0, checked = 0;
   for (unsigned seed = 0; seed < 200; ++seed) {
     const EvaluationInput first = draw_run(40, 2 * seed), second = draw_run(40, 2 * seed + 1);
-    const auto gates = propose_gates(first, evaluate(first));
+    const auto gates = propose_gates_from_evaluation(first, evaluate(first));
     ASSERT_EQ(gates.size(), 5);
-    for (const auto& gate : check_gates(gates, collect_metrics(evaluate(second)))) {
+    for (const auto& gate : check_gates(gates, collect_evaluation_metrics(evaluate(second)))) {
       if (gate.name == "missing_fraction") continue;
       ++checked;
-      if (!gate.passed()) ++exceeded;
+      if (!gate.has_passed()) ++exceeded;
     }
   }
   ASSERT_EQ(checked, 800);
@@ -51,20 +51,21 @@ TEST(ProposeGates, RunsOfSameAccuracyPass) {
   EXPECT_LE(exceeded, 5);
 }
 
-TEST(ProposeGates, RunWithScaledHeightErrorsFails) {
+TEST(ProposeGatesFromEvaluation, RunWithScaledHeightErrorsFails) {
   const EvaluationInput good = draw_run(40, 1), wrong = draw_run(40, 2, 3);
-  const auto gates = propose_gates(good, evaluate(good));
+  const auto gates = propose_gates_from_evaluation(good, evaluate(good));
   ASSERT_FALSE(gates.empty());
-  EXPECT_THAT(describe_failed_gates(check_gates(gates, collect_metrics(evaluate(wrong)))),
-              HasSubstr("height_rms_mm is"));
+  EXPECT_THAT(
+      describe_failed_gates(check_gates(gates, collect_evaluation_metrics(evaluate(wrong)))),
+      HasSubstr("height_rms_mm is"));
 }
 
-TEST(ProposeGates, KeepsMarginWithoutScatter) {
+TEST(ProposeGatesFromEvaluation, KeepsMarginWithoutScatter) {
   EvaluationInput input = draw_run(8, 1);
   for (std::size_t i = 0; i < 8; ++i) {
     input.fixes.rows[i].fix->pose = {{static_cast<double>(i) + 1e-3, 0, 0}, 0};
   }
-  const auto gates = propose_gates(input, evaluate(input));
+  const auto gates = propose_gates_from_evaluation(input, evaluate(input));
   ASSERT_EQ(gates.size(), 4) << "p90 needs 20 units";
   EXPECT_EQ(gates[0].metric, "mean_mm");
   EXPECT_NEAR(gates[0].limit, 1.01, 1e-9);
@@ -74,9 +75,9 @@ TEST(ProposeGates, KeepsMarginWithoutScatter) {
   EXPECT_EQ(gates[3].limit, 0);
 }
 
-TEST(ProposeGates, ReturnsNoneForFewerThanFiveUnits) {
+TEST(ProposeGatesFromEvaluation, ReturnsNoneForFewerThanFiveUnits) {
   const EvaluationInput input = draw_run(4, 1);
-  EXPECT_TRUE(propose_gates(input, evaluate(input)).empty());
+  EXPECT_TRUE(propose_gates_from_evaluation(input, evaluate(input)).empty());
 }
 
 TEST(FormatGates, OwnRunWithMissingCapturesPasses) {
@@ -86,19 +87,20 @@ TEST(FormatGates, OwnRunWithMissingCapturesPasses) {
   ASSERT_NEAR(evaluation.missing_fraction(), 1.0 / 3, 1e-12);
   const TemporaryFolder folder;
   const auto gates = read_gates(
-      folder.file("gates.yaml", format_gates(propose_gates(input, evaluation), evaluation)),
-      metric_kinds({MetricSource::evaluation}));
+      folder.file("gates.yaml",
+                  format_gates(propose_gates_from_evaluation(input, evaluation), evaluation)),
+      list_metric_kinds({MetricSource::evaluation}));
   ASSERT_FALSE(gates.empty());
-  EXPECT_EQ(describe_failed_gates(check_gates(gates, collect_metrics(evaluation))), "");
+  EXPECT_EQ(describe_failed_gates(check_gates(gates, collect_evaluation_metrics(evaluation))), "");
 }
 
 TEST(FormatGates, RoundTripsThroughReadGates) {
   const EvaluationInput input = draw_run(40, 1);
   const Evaluation evaluation = evaluate(input);
-  const auto gates = propose_gates(input, evaluation);
+  const auto gates = propose_gates_from_evaluation(input, evaluation);
   const TemporaryFolder folder;
   const auto read = read_gates(folder.file("gates.yaml", format_gates(gates, evaluation)),
-                               metric_kinds({MetricSource::evaluation}));
+                               list_metric_kinds({MetricSource::evaluation}));
   ASSERT_EQ(gates.size(), 5);
   ASSERT_EQ(read.size(), gates.size());
   for (std::size_t i = 0; i < gates.size(); ++i) {

@@ -40,15 +40,15 @@ struct BoardIntakeOfFolder : testing::Test {
   /// Returns the observation of an image with these pixels.
   Observation observe(const cv::Mat& image) const {
     return BoardIntake(board, options, std::array{good.cols, good.rows})
-        .observe(SourceImage(write("image.png", image)));
+        .detect_in_image(SourceImage(write("image.png", image)));
   }
   Observations observe_all() const {
-    return observe_boards(list_images(folder / ""), board, "board.yaml", options);
+    return detect_boards_in_images(list_images(folder / ""), board, "board.yaml", options);
   }
 };
 
 RejectionReason rejection_reason(const Observation& image) {
-  EXPECT_TRUE(image.rejection) << image.name() << " is not rejected";
+  EXPECT_TRUE(image.rejection) << image.file_name() << " is not rejected";
   return image.rejection ? image.rejection->reason : RejectionReason::not_needed;
 }
 
@@ -102,7 +102,7 @@ TEST_F(BoardIntakeOfFolder, AppliesLimitsOfOptions) {
 TEST_F(BoardIntakeOfFolder, RejectsImagesWithTooFewTags) {
   // Some tags are left, then none.
   cv::Mat few = good.clone(), none = good.clone();
-  const BoardDetection seen = BoardDetector(board).detect(good);
+  const BoardDetection seen = BoardDetector(board).detect_board(good);
   ASSERT_GE(seen.tags.size(), 6U);
   const auto hide = [](const TagDetection& tag, cv::Mat& image) {
     std::vector<cv::Point> corners;
@@ -136,18 +136,19 @@ TEST_F(BoardIntakeOfFolder, ReturnsSameResultForAnyNumberOfThreads) {
   std::size_t last = 0;
   const Observations one = observe_all();
   options.threads = 4;
-  const Observations four = observe_boards(list_images(folder / ""), board, "board.yaml", options,
-                                           [&](std::size_t done, std::size_t total) {
-                                             last = done;
-                                             EXPECT_EQ(total, 6U);
-                                           });
+  const Observations four =
+      detect_boards_in_images(list_images(folder / ""), board, "board.yaml", options,
+                              [&](std::size_t done, std::size_t total) {
+                                last = done;
+                                EXPECT_EQ(total, 6U);
+                              });
   EXPECT_EQ(last, 6U);
   ASSERT_EQ(four.images.size(), 6U);
   ASSERT_EQ(one.images.size(), 6U);
   int compared = 0;
   for (std::size_t i = 0; i < one.images.size(); ++i) {
-    EXPECT_EQ(one.images[i].name(), four.images[i].name());
-    ASSERT_EQ(one.images[i].is_kept(), four.images[i].is_kept()) << one.images[i].name();
+    EXPECT_EQ(one.images[i].file_name(), four.images[i].file_name());
+    ASSERT_EQ(one.images[i].is_kept(), four.images[i].is_kept()) << one.images[i].file_name();
     ASSERT_EQ(one.images[i].board.has_value(), four.images[i].board.has_value());
     if (!one.images[i].board) continue;
     const auto &tags = one.images[i].board->seen.tags, &others = four.images[i].board->seen.tags;
@@ -217,9 +218,9 @@ TEST_F(BoardIntakeOfFolder, ReturnsCachedDetection) {
   const fs::path file = write("a.png", good);
   options.corner_cache = folder / "cache";
   const BoardIntake intake(board, options);
-  const Observation detected = intake.observe(SourceImage(file));
+  const Observation detected = intake.detect_in_image(SourceImage(file));
   ASSERT_FALSE(fs::is_empty(options.corner_cache));
-  const Observation cached = intake.observe(SourceImage(file));
+  const Observation cached = intake.detect_in_image(SourceImage(file));
   ASSERT_TRUE(detected.board && cached.board);
   ASSERT_TRUE(detected.blur_px);
   ASSERT_FALSE(detected.board->seen.tags.empty());
@@ -229,10 +230,10 @@ TEST_F(BoardIntakeOfFolder, ReturnsCachedDetection) {
   // The stored figures count, not the image.
   CornerCache(options.corner_cache, board)
       .keep(SourceImage(file), {*detected.board, 1.25, 0.9, 0.1});
-  EXPECT_EQ(intake.observe(SourceImage(file)).blur_px, 1.25);
+  EXPECT_EQ(intake.detect_in_image(SourceImage(file)).blur_px, 1.25);
   // Limits are no part of the cache.
   options.max_blur_px = 0.1;
-  EXPECT_EQ(rejection_reason(BoardIntake(board, options).observe(SourceImage(file))),
+  EXPECT_EQ(rejection_reason(BoardIntake(board, options).detect_in_image(SourceImage(file))),
             RejectionReason::blurred);
 }
 

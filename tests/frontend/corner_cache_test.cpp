@@ -30,7 +30,7 @@ TEST(CornerCache, IgnoresTruncatedFiles) {
   options.corner_cache = folder / "cache";
   const auto view = [&] {
     const fs::path image = rig / "sample-boards/0000.png";
-    return BoardIntake(board, options).observe(SourceImage(image)).board.value();
+    return BoardIntake(board, options).detect_in_image(SourceImage(image)).board.value();
   };
   const BoardView whole = view();
   ASSERT_GE(whole.seen.tags.size(), 20U);
@@ -61,14 +61,15 @@ TEST(CornerCache, RestoresFitsForAllToneCurves) {
   }
   cv::LUT(coded, table, coded);
   // One tag, of which an edge looks otherwise, keeps libapriltag's corners.
-  const TagDetection whole = BoardDetector(board).detect(coded).tags.at(7);
+  const TagDetection whole = BoardDetector(board).detect_board(coded).tags.at(7);
   const Eigen::Vector2d from = whole.corners_px[0], to = whole.corners_px[1];
   const Eigen::Vector2d outwards = 4 * (from - whole.corners_px[3]).normalized();
   for (const double fraction : {0.1, 0.25, 0.4, 0.55, 0.7, 0.85}) {
     const Eigen::Vector2d at = from + fraction * (to - from) + outwards;
     cv::circle(coded, cv::Point2d(at.x(), at.y()), 1, cv::Scalar(0), -1);
   }
-  const BoardView view{"coded.png", {coded.cols, coded.rows}, BoardDetector(board).detect(coded)};
+  const BoardView view{
+      "coded.png", {coded.cols, coded.rows}, BoardDetector(board).detect_board(coded)};
   ASSERT_EQ(view.seen.curve_costs.size(), 5U);
   const auto spoilt = std::ranges::find(view.seen.tags, whole.id, &TagDetection::id);
   ASSERT_NE(spoilt, view.seen.tags.end());

@@ -14,7 +14,9 @@ const std::string kSample = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample"
 
 std::vector<Observation> sample_lights() {
   const LightDetector detector({}, {Readout::rows, {}, {}});
-  return LampIntake(detector, ImageUse::fixes, {}, {}).observe_all(list_images(kSample)).images;
+  return LampIntake(detector, ImageUse::fixes, {}, {})
+      .detect_in_all_images(list_images(kSample))
+      .images;
 }
 
 TEST(AddLabeled, AddsLightsNamedByTable) {
@@ -57,12 +59,12 @@ TEST(AddLabeled, RejectsTruncatedLights) {
 
 TEST(MeasuredPeriods, ReturnsPeriodsOfAllOrLabeledLights) {
   const auto images = sample_lights();
-  const auto all = collect_periods(images, {});
+  const auto all = collect_light_periods(images, {});
   EXPECT_GE(all.size(), 8);
   EXPECT_FALSE(all[0].lamp);
   auto labels = read_detections(kSample + "/true_detections.csv");
   labels.pop_back();
-  const auto some = collect_periods(images, labels);
+  const auto some = collect_light_periods(images, labels);
   EXPECT_LE(some.size(), 6);
   EXPECT_GE(some.size(), 4);
   for (const MeasuredPeriod& period : some) EXPECT_TRUE(period.lamp);

@@ -26,7 +26,7 @@ struct LampIntakeOfImage : testing::Test {
     cv::imwrite(file.string(), image);
     return LampIntake(LightDetector(lamps, make_detector_camera(calibration)), use, {},
                       calibration.camera.imager_px)
-        .observe(SourceImage(file));
+        .detect_in_image(SourceImage(file));
   }
   std::string refusal(const cv::Mat& image) const {
     const Observation seen = observe(image);
@@ -70,9 +70,9 @@ TEST_F(LampIntakeOfImage, RejectsImageOfOtherSize) {
 TEST_F(LampIntakeOfImage, KeepsImageWithLamps) {
   const Observation image = observe(read_image(kRig + "/sample/0000.png"));
   EXPECT_TRUE(image.is_kept());
-  EXPECT_GE(collect_lamps(image).size(), 4U);
+  EXPECT_GE(collect_identified_lamps(image).size(), 4U);
   EXPECT_EQ(collect_kept_frames(std::vector{image}).at(0).detections.size(),
-            collect_lamps(image).size());
+            collect_identified_lamps(image).size());
   for (const Light& light : image.lights) EXPECT_TRUE(light.outline.empty());
 }
 
@@ -80,10 +80,10 @@ TEST_F(LampIntakeOfImage, KeepsImageWithLamps) {
 TEST_F(LampIntakeOfImage, KeepsDarkImageForFixes) {
   const Observation image = observe(ceiling(2, 0.5, 2), ImageUse::fixes);
   EXPECT_TRUE(image.is_kept());
-  EXPECT_TRUE(collect_lamps(image).empty());
+  EXPECT_TRUE(collect_identified_lamps(image).empty());
 }
 
-TEST(ObserveLamps, RejectsRepeatedImagesUnlessUsedForFixes) {
+TEST(DetectLampsInImages, RejectsRepeatedImagesUnlessUsedForFixes) {
   const TemporaryFolder folder;
   for (const char* name : {"a.png", "b.png"}) {
     std::filesystem::copy_file(kRig + "/sample/0000.png", folder / name);
@@ -92,7 +92,7 @@ TEST(ObserveLamps, RejectsRepeatedImagesUnlessUsedForFixes) {
   folder.file("d.png", "no image");
   const LampImages images{folder / "", read_lamp_map(kRig + "/lamps.yaml"), "lamps.yaml",
                           read_calibration(kRig + "/true_calibration.yaml"), "calibration.yaml"};
-  const Observations turn = observe_lamps(images, ImageUse::turn, {});
+  const Observations turn = detect_lamps_in_images(images, ImageUse::turn, {});
   ASSERT_EQ(turn.images.size(), 4U);
   EXPECT_TRUE(turn.images[0].is_kept());
   ASSERT_FALSE(turn.images[1].is_kept());
@@ -101,7 +101,8 @@ TEST(ObserveLamps, RejectsRepeatedImagesUnlessUsedForFixes) {
   ASSERT_FALSE(turn.images[3].is_kept());
   EXPECT_EQ(turn.images[3].rejection->reason, RejectionReason::unreadable);
   EXPECT_EQ(collect_kept_frames(turn.images).size(), 2U);
-  EXPECT_EQ(collect_kept_frames(observe_lamps(images, ImageUse::fixes, {}).images).size(), 3U);
+  EXPECT_EQ(collect_kept_frames(detect_lamps_in_images(images, ImageUse::fixes, {}).images).size(),
+            3U);
 }
 
 }  // namespace

@@ -40,20 +40,20 @@ Observation image_with(const char* name, std::vector<Light> lights) {
   return image;
 }
 
-TEST(WriteLights, WritesOneRowPerLight) {
+TEST(WriteLightsTable, WritesOneRowPerLight) {
   Light lamp = light_of_kind(LightKind::lamp, LightReason::identified);
   lamp.lamp = 4;
   Light steady = light_of_kind(LightKind::steady, LightReason::overexposed);
   steady.stripes = {};
   const Light formless = light_of_kind(LightKind::formless, LightReason::incomplete);
   const TemporaryFolder folder;
-  write_lights(folder / "lights.csv",
-               std::vector{image_with("a, b.png", {lamp, steady}), image_with("none.png", {}),
-                           image_with("c.png", {formless})});
+  write_lights_table(folder / "lights.csv",
+                     std::vector{image_with("a, b.png", {lamp, steady}), image_with("none.png", {}),
+                                 image_with("c.png", {formless})});
   const CsvTable table(folder / "lights.csv");
   ASSERT_EQ(table.rows(), 3U);
   const auto text = [&](std::size_t row, const char* column) {
-    return std::string(table.text(row, table.required(column)));
+    return std::string(table.get_text(row, table.get_required_column(column)));
   };
   EXPECT_EQ(text(0, "image"), "a, b.png");
   EXPECT_EQ(text(0, "kind"), "lamp");
@@ -75,10 +75,10 @@ TEST(WriteLights, WritesOneRowPerLight) {
        {"sigma_px", "outline", "edge_rise_px", "inlier_fraction", "contrast"}) {
     EXPECT_EQ(text(2, column), "") << column;
   }
-  EXPECT_THROW(write_lights(folder / "no" / "lights.csv", {}), InputError);
+  EXPECT_THROW(write_lights_table(folder / "no" / "lights.csv", {}), InputError);
 }
 
-TEST(CountReasons, SortsByFrequencyWithFormlessLightsLast) {
+TEST(CountLightReasons, SortsByCountWithFormlessLightsLast) {
   Light lamp = light_of_kind(LightKind::lamp, LightReason::identified);
   lamp.lamp = 4;
   const Light soft = light_of_kind(LightKind::unknown, LightReason::reflection);
@@ -86,7 +86,7 @@ TEST(CountReasons, SortsByFrequencyWithFormlessLightsLast) {
   const Light small = light_of_kind(LightKind::formless, LightReason::incomplete);
   const std::vector images{image_with("a.png", {small, small, lamp, soft, even}),
                            image_with("b.png", {small, even, lamp})};
-  const auto reasons = count_reasons(images);
+  const auto reasons = count_light_reasons(images);
   ASSERT_EQ(reasons.size(), 3U);
   EXPECT_EQ(reasons[0].reason, LightReason::steady);
   EXPECT_EQ(reasons[0].lights, 2);
@@ -94,8 +94,8 @@ TEST(CountReasons, SortsByFrequencyWithFormlessLightsLast) {
   EXPECT_EQ(reasons[1].kind, LightKind::unknown);
   EXPECT_EQ(reasons[2].reason, LightReason::incomplete) << "though it is the most frequent";
   EXPECT_EQ(reasons[2].lights, 3);
-  EXPECT_EQ(count_lights(images, LightKind::lamp), 2);
-  EXPECT_EQ(count_lights(images, LightKind::cut), 0);
+  EXPECT_EQ(count_lights_of_kind(images, LightKind::lamp), 2);
+  EXPECT_EQ(count_lights_of_kind(images, LightKind::cut), 0);
 }
 
 TEST(LightReasonText, IsUniqueForEachReason) {
@@ -118,7 +118,7 @@ const cv::Size kReasonSize(300, 200);
 /// Detects the lights in a drawing by a detector whose map contains its lamp.
 std::vector<Light> lights_in_drawing(const cv::Mat& image) {
   return LightDetector({{drawn_lamp(1, kReasonPeriod_lines)}}, drawn_camera(kReasonSize))
-      .detect(image_view(image));
+      .detect(to_image_view(image));
 }
 
 cv::Mat drawn_lamp_at(const Eigen::Vector2d& center, double radius_px, double level = 0.7,

@@ -31,24 +31,25 @@ cv::Mat checkerboard(double sigma_px, double dark, double bright, double angle_r
   return image;
 }
 
-TEST(MeasureBlur, MatchesSigmaOfEdges) {
+TEST(MeasureImageBlur, MatchesSigmaOfEdges) {
   // Edges with a blur of less than half a pixel are undersampled.
   for (const double sigma_px : {0.3, 0.5, 1.0, 2.0, 3.0, 5.0}) {
     for (const double angle_rad : {0.02, 0.15, 0.7}) {
-      const double found_px = measure_blur(checkerboard(sigma_px, 20, 220, angle_rad)).sigma_px;
+      const double found_px =
+          measure_image_blur(checkerboard(sigma_px, 20, 220, angle_rad)).sigma_px;
       std::printf("blur %.2f px at %.2f rad: %.3f px\n", sigma_px, angle_rad, found_px);
       EXPECT_NEAR(found_px, sigma_px, sigma_px < 0.5 ? 0.2 : 0.02 + 0.05 * sigma_px);
     }
   }
 }
 
-TEST(MeasureBlur, IsIndependentOfContrast) {
-  EXPECT_NEAR(measure_blur(checkerboard(2, 20, 60)).sigma_px,
-              measure_blur(checkerboard(2, 20, 220)).sigma_px, 0.1);
+TEST(MeasureImageBlur, IsIndependentOfContrast) {
+  EXPECT_NEAR(measure_image_blur(checkerboard(2, 20, 60)).sigma_px,
+              measure_image_blur(checkerboard(2, 20, 220)).sigma_px, 0.1);
 }
 
-TEST(MeasureBlur, ReturnsInfinityWithoutContrast) {
-  const ImageBlur blur = measure_blur(cv::Mat1b(300, 400, static_cast<unsigned char>(3)));
+TEST(MeasureImageBlur, ReturnsInfinityWithoutContrast) {
+  const ImageBlur blur = measure_image_blur(cv::Mat1b(300, 400, static_cast<unsigned char>(3)));
   EXPECT_TRUE(std::isinf(blur.sigma_px));
   EXPECT_NEAR(blur.bright_fraction, 3.0 / 255, 1e-6);
 }

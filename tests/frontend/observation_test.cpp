@@ -20,11 +20,11 @@ const std::filesystem::path kImage = kRig + "/sample/0000.png";
 Observation observe(const std::function<void(const cv::Mat&)>& detect,
                     const std::optional<std::array<int, 2>>& imager_px = std::nullopt) {
   Observation image{kImage};
-  observe_pixels(SourceImage(kImage), {}, imager_px, image, detect);
+  read_image_and_detect(SourceImage(kImage), {}, imager_px, image, detect);
   return image;
 }
 
-TEST(ObservePixels, PassesPixelsToDetector) {
+TEST(ReadImageAndDetect, PassesPixelsToDetector) {
   cv::Size size;
   const Observation image = observe([&](const cv::Mat& pixels) { size = pixels.size(); });
   EXPECT_TRUE(image.is_kept());
@@ -32,7 +32,7 @@ TEST(ObservePixels, PassesPixelsToDetector) {
   EXPECT_EQ(image.size_px, (std::array{800, 600}));
 }
 
-TEST(ObservePixels, RejectsImageWithReasonInOneLine) {
+TEST(ReadImageAndDetect, RejectsImageWithReasonInOneLine) {
   const Observation broken =
       observe([](const cv::Mat&) { throw std::runtime_error("first\nsecond"); });
   ASSERT_FALSE(broken.is_kept());
@@ -42,17 +42,17 @@ TEST(ObservePixels, RejectsImageWithReasonInOneLine) {
   EXPECT_EQ(other.rejection->reason, RejectionReason::wrong_size);
   EXPECT_EQ(other.rejection->message, "is 800 x 600 px, the camera's images are 640 x 480 px");
   Observation missing{"none.png"};
-  observe_pixels(SourceImage("none.png"), {}, {}, missing, [](const cv::Mat&) { FAIL(); });
+  read_image_and_detect(SourceImage("none.png"), {}, {}, missing, [](const cv::Mat&) { FAIL(); });
   ASSERT_FALSE(missing.is_kept());
   EXPECT_EQ(missing.rejection->reason, RejectionReason::unreadable);
   EXPECT_EQ(missing.rejection->message, "cannot be opened: No such file or directory");
 }
 
-TEST(ObservePixels, RejectsLargeImagesWithoutDecoding) {
+TEST(ReadImageAndDetect, RejectsLargeImagesWithoutDecoding) {
   FrontendOptions options;
   options.max_mpx = 0.1;
   Observation image{kImage};
-  observe_pixels(SourceImage(kImage), options, {}, image, [](const cv::Mat&) { FAIL(); });
+  read_image_and_detect(SourceImage(kImage), options, {}, image, [](const cv::Mat&) { FAIL(); });
   ASSERT_FALSE(image.is_kept());
   EXPECT_EQ(image.rejection->reason, RejectionReason::unreadable);
   EXPECT_THAT(image.rejection->message, HasSubstr("more than the 0.1 million"));
@@ -62,18 +62,19 @@ std::vector<Observation> rejected(const std::vector<RejectionReason>& reasons) {
   std::vector<Observation> images(1, Observation{"good.png"});
   for (const RejectionReason reason : reasons) {
     Observation image{"bad.png"};
-    image.reject(reason, "why");
+    image.set_rejection(reason, "why");
     images.push_back(image);
   }
   return images;
 }
 
-TEST(SummarizeRejections, CountsReasonsAndReportsRemedyOfMajority) {
+TEST(SummarizeImageRejections, CountsReasonsAndReportsRemedyOfMajority) {
   using enum RejectionReason;
-  EXPECT_EQ(summarize_rejections(rejected({})), "");
-  EXPECT_EQ(summarize_rejections(rejected({blurred, too_dark, too_dark})),
+  EXPECT_EQ(summarize_image_rejections(rejected({})), "");
+  EXPECT_EQ(summarize_image_rejections(rejected({blurred, too_dark, too_dark})),
             "2 too dark, 1 blurred: more exposure, gain or light");
-  EXPECT_EQ(summarize_rejections(rejected({blurred, overexposed})), "1 overexposed, 1 blurred");
+  EXPECT_EQ(summarize_image_rejections(rejected({blurred, overexposed})),
+            "1 overexposed, 1 blurred");
 }
 
 TEST(RejectionReasonName, IsUniqueForEachReason) {
@@ -88,11 +89,11 @@ TEST(RejectionReasonName, IsUniqueForEachReason) {
   EXPECT_EQ(std::ssize(names), count);
 }
 
-TEST(CheckAnyReadable, ThrowsWithReasonOfFirstImage) {
+TEST(CheckAnyImageReadable, ThrowsWithReasonOfFirstImage) {
   auto images = rejected({RejectionReason::unreadable, RejectionReason::wrong_size});
-  EXPECT_NO_THROW(check_any_readable("folder", images));
+  EXPECT_NO_THROW(check_any_image_readable("folder", images));
   images.erase(images.begin());
-  EXPECT_EQ(rejection_message([&] { check_any_readable("folder", images); }),
+  EXPECT_EQ(rejection_message([&] { check_any_image_readable("folder", images); }),
             "folder: none of its 2 images can be used; the first, bad.png: why");
 }
 

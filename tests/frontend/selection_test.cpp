@@ -26,7 +26,7 @@ Observation image_of_lamps(const std::string& name, const std::vector<Eigen::Vec
 
 /// Returns the reasons of the images, after a selection; std::nullopt for those that are kept.
 std::vector<std::optional<RejectionReason>> select(std::vector<Observation> images, ImageUse use) {
-  reject_repeated(images, use, {});
+  reject_repeated_images(images, use, {});
   std::vector<std::optional<RejectionReason>> reasons;
   for (const Observation& image : images) {
     reasons.push_back(image.is_kept() ? std::nullopt : std::optional(image.rejection->reason));
@@ -62,7 +62,7 @@ TEST(Selection, KeepsViewsWithFewCommonLamps) {
 
 TEST(Selection, ComparesWithKeptImagesOnly) {
   auto images = std::vector{image_of_lamps("a", kPixels), image_of_lamps("b", kPixels)};
-  images[0].reject(RejectionReason::blurred, "blurred");
+  images[0].set_rejection(RejectionReason::blurred, "blurred");
   EXPECT_EQ(select(images, ImageUse::turn), (Reasons{RejectionReason::blurred, {}}));
 }
 

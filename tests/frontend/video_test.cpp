@@ -45,7 +45,7 @@ class VideoOfFrames : public testing::Test {
   }
   std::vector<std::string> names(ImageSource& source) const {
     std::vector<std::string> all;
-    while (const auto image = source.next()) all.push_back(image->file.filename().string());
+    while (const auto image = source.read_next()) all.push_back(image->file.filename().string());
     return all;
   }
   /// Writes a file with the first part of the video.
@@ -60,29 +60,29 @@ class VideoOfFrames : public testing::Test {
 };
 
 TEST(VideoNames, MatchFilesAndFrames) {
-  EXPECT_TRUE(is_video_name("a/drive.MP4"));
-  EXPECT_FALSE(is_video_name("a/drive.png"));
-  EXPECT_EQ(frame_name("drive.mp4", 123), "drive.mp4#000123");
-  EXPECT_EQ(frame_name("drive.mp4", 1234567), "drive.mp4#1234567");
-  EXPECT_EQ(parse_video_name("drive.mp4#000123"), "drive.mp4");
+  EXPECT_TRUE(is_video_file_name("a/drive.MP4"));
+  EXPECT_FALSE(is_video_file_name("a/drive.png"));
+  EXPECT_EQ(make_video_frame_name("drive.mp4", 123), "drive.mp4#000123");
+  EXPECT_EQ(make_video_frame_name("drive.mp4", 1234567), "drive.mp4#1234567");
+  EXPECT_EQ(parse_video_of_frame_name("drive.mp4#000123"), "drive.mp4");
   for (const char* other : {"drive.mp4", "drive.mp4#", "drive.mp4#12a", "a.png#000123"}) {
-    EXPECT_EQ(parse_video_name(other), std::nullopt) << other;
+    EXPECT_EQ(parse_video_of_frame_name(other), std::nullopt) << other;
   }
 }
 
 TEST_F(VideoOfFrames, ReturnsAllFramesWithTimes) {
   Video video(film.string());
-  EXPECT_EQ(video.reported_frames(), std::size_t{kFrames});
+  EXPECT_EQ(video.reported_frame_count(), std::size_t{kFrames});
   EXPECT_EQ(video.size_px(), (std::array{320, 240}));
   for (int i = 0; i < kFrames; ++i) {
-    const auto frame = video.next();
+    const auto frame = video.read_next();
     ASSERT_TRUE(frame);
     EXPECT_EQ(frame->number, std::size_t(i));
     EXPECT_NEAR(frame->time_s, 0.05 * i, 1e-9);
     EXPECT_EQ(cv::norm(frame->image, frames[std::size_t(i)], cv::NORM_INF), 0);
   }
-  EXPECT_FALSE(video.next());
-  EXPECT_EQ(video.missing(), "");
+  EXPECT_FALSE(video.read_next());
+  EXPECT_EQ(video.describe_missing_frames(), "");
 }
 
 TEST_F(VideoOfFrames, SourceReturnsEveryNthFrameBetweenImages) {
@@ -91,13 +91,13 @@ TEST_F(VideoOfFrames, SourceReturnsEveryNthFrameBetweenImages) {
   FrontendOptions options;
   options.every = 15;
   ImageSource all({image, film, image}, options);
-  EXPECT_EQ(all.expected(), 5U);
+  EXPECT_EQ(all.expected_image_count(), 5U);
   EXPECT_THAT(names(all), ElementsAre("image.png", "film.avi#000000", "film.avi#000015",
                                       "film.avi#000030", "image.png"));
-  EXPECT_THAT(all.warnings(), IsEmpty());
+  EXPECT_THAT(all.video_warnings(), IsEmpty());
   ImageSource source({film}, options);
-  source.next();
-  const auto second = source.next();
+  source.read_next();
+  const auto second = source.read_next();
   ASSERT_TRUE(second);
   EXPECT_NEAR(second->time_s.value(), 0.75, 1e-9);
   EXPECT_EQ(cv::norm(second->read(options), frames[15], cv::NORM_INF), 0);
@@ -108,7 +108,7 @@ TEST_F(VideoOfFrames, SourceWarnsOfTruncatedVideo) {
   const auto count = names(source).size();
   EXPECT_GT(count, 20U);
   EXPECT_LT(count, 27U);
-  EXPECT_THAT(source.warnings(),
+  EXPECT_THAT(source.video_warnings(),
               ElementsAre(HasSubstr("cut.avi: " + std::to_string(count) +
                                     " of its 40 frames can be decoded; is it cut short, or "
                                     "damaged?")));
@@ -123,7 +123,7 @@ TEST_F(VideoOfFrames, ReadingContinuesAfterDamagedFrames) {
   Video video(folder.file("bad.avi", bytes).string());
   std::size_t count = 0;
   double last_s = 0;
-  while (const auto frame = video.next()) {
+  while (const auto frame = video.read_next()) {
     EXPECT_EQ(frame->number, count);
     ++count;
     last_s = frame->time_s;
@@ -131,7 +131,7 @@ TEST_F(VideoOfFrames, ReadingContinuesAfterDamagedFrames) {
   EXPECT_GT(count, 33U);
   EXPECT_LT(count, 39U);
   EXPECT_NEAR(last_s, 1.95, 1e-9);
-  EXPECT_THAT(video.missing(), HasSubstr(" of its 40 frames can be decoded"));
+  EXPECT_THAT(video.describe_missing_frames(), HasSubstr(" of its 40 frames can be decoded"));
 }
 
 TEST_F(VideoOfFrames, SourceThrowsForInvalidVideos) {
@@ -167,17 +167,18 @@ TEST_F(VideoOfFrames, YieldsSameLampsAsImages) {
   const auto seen = [&](const std::vector<fs::path>& sources, int threads) {
     FrontendOptions options;
     options.threads = threads;
-    return LampIntake(detector, ImageUse::fixes, options, {}).observe_all(sources).images;
+    return LampIntake(detector, ImageUse::fixes, options, {}).detect_in_all_images(sources).images;
   };
   const auto of_images = seen(files, 1), of_film = seen({film}, 3);
   ASSERT_EQ(of_images.size(), files.size());
   ASSERT_EQ(of_film.size(), files.size());
   EXPECT_FALSE(of_images[1].time_s);
-  EXPECT_EQ(of_film[1].name(), "film.avi#000001");
+  EXPECT_EQ(of_film[1].file_name(), "film.avi#000001");
   EXPECT_NEAR(of_film[1].time_s.value(), 0.05, 1e-9);
   for (std::size_t i = 0; i < files.size(); ++i) {
-    const auto one = collect_lamps(of_images[i]), other = collect_lamps(of_film[i]);
-    EXPECT_EQ(of_film[i].name(), frame_name("film.avi", i));
+    const auto one = collect_identified_lamps(of_images[i]),
+               other = collect_identified_lamps(of_film[i]);
+    EXPECT_EQ(of_film[i].file_name(), make_video_frame_name("film.avi", i));
     ASSERT_EQ(one.size(), other.size());
     EXPECT_GE(one.size(), 4U);
     for (std::size_t k = 0; k < one.size(); ++k) {
@@ -194,15 +195,15 @@ TEST_F(VideoOfFrames, YieldsSameBoardsAsImages) {
   ASSERT_TRUE(write_video(film, {image, image / 2}));
   const Board board = read_board(kRig + "/board.yaml");
   const BoardDetector detector(board);
-  const BoardDetection of_image = detector.detect(image);
+  const BoardDetection of_image = detector.detect_board(image);
   ASSERT_GE(of_image.tags.size(), 20U);
   for (int run = 0; run < 2; ++run) {
     FrontendOptions options;
     options.threads = 2;
     options.corner_cache = folder / "cache";
-    const auto seen = observe_boards({film}, board, "board.yaml", options).images;
+    const auto seen = detect_boards_in_images({film}, board, "board.yaml", options).images;
     ASSERT_EQ(seen.size(), 2U);
-    EXPECT_EQ(seen[1].name(), "film.avi#000001");
+    EXPECT_EQ(seen[1].file_name(), "film.avi#000001");
     ASSERT_TRUE(seen[0].board && seen[1].board);
     ASSERT_EQ(seen[0].board->seen.tags.size(), of_image.tags.size());
     for (std::size_t i = 0; i < of_image.tags.size(); ++i) {

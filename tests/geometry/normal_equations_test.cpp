@@ -37,7 +37,7 @@ TEST(NormalEquations, SolutionMatchesWeightedLeastSquares) {
               IsNear(Vector(information.inverse() * gradient), 1e-12));
   Matrix inverse;
   for (std::size_t i = 0; i < kUnknowns; ++i) {
-    inverse.col(Eigen::Index(i)) = Vector::Map(factor.inverse_column(i).data());
+    inverse.col(Eigen::Index(i)) = Vector::Map(factor.compute_inverse_column(i).data());
   }
   EXPECT_THAT(inverse, IsNear(Matrix(information.inverse()), 1e-12));
 }

@@ -39,24 +39,24 @@ TEST(ComplexProduct, MatchesStdComplex) {
   }
 }
 
-TEST(ConjProduct, ConjugatesFirstFactor) {
+TEST(ConjugateProduct, ConjugatesFirstFactor) {
   Random random(2);
   for (int trial = 0; trial < 100; ++trial) {
     const auto [a, b] = random_pair(random);
     const Complex expected = std::conj(to_complex(a)) * to_complex(b);
-    EXPECT_THAT(conj_product(a, b), IsNear(to_vector(expected), kRounding));
+    EXPECT_THAT(conjugate_product(a, b), IsNear(to_vector(expected), kRounding));
   }
 }
 
-TEST(ConjProduct, ReturnsDotAndCrossProduct) {
-  EXPECT_EQ(conj_product({1, 2}, {3, 5}), Eigen::Vector2d(1 * 3 + 2 * 5, 1 * 5 - 2 * 3));
+TEST(ConjugateProduct, ReturnsDotAndCrossProduct) {
+  EXPECT_EQ(conjugate_product({1, 2}, {3, 5}), Eigen::Vector2d(1 * 3 + 2 * 5, 1 * 5 - 2 * 3));
 }
 
-TEST(ProductMatrix, MatchesComplexProduct) {
+TEST(ComplexProductMatrix, MatchesComplexProduct) {
   Random random(3);
   for (int trial = 0; trial < 100; ++trial) {
     const auto [a, b] = random_pair(random);
-    EXPECT_THAT(product_matrix(a) * b, IsNear(complex_product(a, b), kRounding));
+    EXPECT_THAT(complex_product_matrix(a) * b, IsNear(complex_product(a, b), kRounding));
   }
 }
 

@@ -22,7 +22,7 @@ inline Points random_points(Random& random, std::size_t count, double half_width
 }
 
 inline std::optional<Similarity> fit(const Points& from, const Points& to) {
-  return fit_similarity(
+  return fit_similarity_transform(
       from.size(), [&](std::size_t i) { return from[i]; }, [&](std::size_t i) { return to[i]; });
 }
 

@@ -13,12 +13,12 @@ namespace {
 
 using Eigen::Vector2d;
 
-TEST(FitSimilarity, ReturnsNulloptForFewerThanTwoPairs) {
+TEST(FitSimilarityTransform, ReturnsNulloptForFewerThanTwoPairs) {
   EXPECT_FALSE(fit({}, {}));
   EXPECT_FALSE(fit({{1, 2}}, {{3, 4}}));
 }
 
-TEST(FitSimilarity, ReturnsNulloptForCoincidentPoints) {
+TEST(FitSimilarityTransform, ReturnsNulloptForCoincidentPoints) {
   // 0.1 is not a binary number: the mean of three differs from it in the last place.
   for (const double offset : {0.0, 0.1, 1.0 / 3, 5e6 + 0.1}) {
     for (const std::size_t count : {2U, 3U, 7U}) {
@@ -31,12 +31,12 @@ TEST(FitSimilarity, ReturnsNulloptForCoincidentPoints) {
   }
 }
 
-TEST(FitSimilarity, ReturnsNulloptForDistancesWithinRounding) {
+TEST(FitSimilarityTransform, ReturnsNulloptForDistancesWithinRounding) {
   EXPECT_FALSE(fit({{0.3, 0}, {0.1 + 0.2, 0}}, {{0, 0}, {1, 0}}));
   EXPECT_FALSE(fit({{0, 0}, {1, 0}}, {{5e6, 0}, {5e6 + 1e-9, 0}}));
 }
 
-TEST(FitSimilarity, ReturnsNulloptForMirroredRegularPolygon) {
+TEST(FitSimilarityTransform, ReturnsNulloptForMirroredRegularPolygon) {
   // Its best factor is zero: no scale and no angle.
   for (const int corners : {3, 4, 5, 8}) {
     Points from, to;
@@ -49,7 +49,7 @@ TEST(FitSimilarity, ReturnsNulloptForMirroredRegularPolygon) {
   }
 }
 
-TEST(FitSimilarity, ReturnsNulloptForNonFinitePoints) {
+TEST(FitSimilarityTransform, ReturnsNulloptForNonFinitePoints) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(fit({{0, 0}, {1, nan}}, {{0, 0}, {1, 1}}));
 }

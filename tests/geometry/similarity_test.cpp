@@ -32,14 +32,14 @@ double sum_of_squares(const Similarity& similarity, const Points& from, const Po
   return sum;
 }
 
-TEST(FitSimilarity, ReturnsKnownQuarterTurn) {
+TEST(FitSimilarityTransform, ReturnsKnownQuarterTurn) {
   const auto found = fit({{0, 0}, {1, 0}}, {{5, 5}, {5, 7}});
   ASSERT_TRUE(found);
   EXPECT_THAT(found->factor, IsNear(Vector2d(0, 2), 1e-15));
   EXPECT_THAT(found->offset, IsNear(Vector2d(5, 5), 1e-15));
 }
 
-TEST(FitSimilarity, IsExactForTwoPairs) {
+TEST(FitSimilarityTransform, IsExactForTwoPairs) {
   Random random(1);
   for (int trial = 0; trial < 1000; ++trial) {
     const Points from = random_points(random, 2), to = random_points(random, 2);
@@ -52,7 +52,7 @@ TEST(FitSimilarity, IsExactForTwoPairs) {
   }
 }
 
-TEST(FitSimilarity, RecoversTrueTransform) {
+TEST(FitSimilarityTransform, RecoversTrueTransform) {
   Random random(2);
   for (const std::size_t count : {2U, 3U, 4U, 10U, 1000U}) {
     for (int trial = 0; trial < 20; ++trial) {
@@ -69,7 +69,7 @@ TEST(FitSimilarity, RecoversTrueTransform) {
   }
 }
 
-TEST(FitSimilarity, MinimizesSquaredDistances) {
+TEST(FitSimilarityTransform, MinimizesSquaredDistances) {
   Random random(3);
   for (int trial = 0; trial < 50; ++trial) {
     const Points from = random_points(random, 5), to = random_points(random, 5);
@@ -86,7 +86,7 @@ TEST(FitSimilarity, MinimizesSquaredDistances) {
   }
 }
 
-TEST(FitSimilarity, ExcludesReflections) {
+TEST(FitSimilarityTransform, ExcludesReflections) {
   // The mirror image of a triangle cannot be fitted, the triangle itself is.
   const Points from{{0, 0}, {1, 0}, {0, 2}};
   const Points mirrored{{0, 0}, {-1, 0}, {0, 2}};
@@ -94,10 +94,10 @@ TEST(FitSimilarity, ExcludesReflections) {
   ASSERT_TRUE(found);
   EXPECT_GT(sum_of_squares(*found, from, mirrored), 1);
   // The map is a rotation and a stretch whatever the points: orientation is kept.
-  EXPECT_GT(product_matrix(found->factor).determinant(), 0);
+  EXPECT_GT(complex_product_matrix(found->factor).determinant(), 0);
 }
 
-TEST(FitSimilarity, IsAccurateInUtmCoordinates) {
+TEST(FitSimilarityTransform, IsAccurateInUtmCoordinates) {
   Random random(4);
   const Similarity truth{{5e5, 5e6}, {-1.2, 0.7}};
   for (int trial = 0; trial < 100; ++trial) {
@@ -110,7 +110,7 @@ TEST(FitSimilarity, IsAccurateInUtmCoordinates) {
   }
 }
 
-TEST(FitSimilarity, IsAccurateBetweenMapsFarFromOrigin) {
+TEST(FitSimilarityTransform, IsAccurateBetweenMapsFarFromOrigin) {
   Random random(5);
   const Similarity truth{{-3e5, 4e5}, {0.6, 0.8}};
   Points from = random_points(random, 4, 10);

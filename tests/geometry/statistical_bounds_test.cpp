@@ -65,10 +65,10 @@ TEST(StudentBound, IsExceededAsRarelyAsSigmas) {
   }
 }
 
-TEST(ChiSquaredBound, IsExceededAsRarelyAsSigmas) {
+TEST(ComputeChiSquaredBound, IsExceededAsRarelyAsSigmas) {
   for (const double sigmas : kSigmas) {
     for (const double m : kDegreesOfFreedom) {
-      const double tail = chi_squared_upper_tail(chi_squared_bound(sigmas, m), m);
+      const double tail = chi_squared_upper_tail(compute_chi_squared_bound(sigmas, m), m);
       EXPECT_GT(find_sigmas(tail), sigmas - 0.01) << m;
       EXPECT_LT(find_sigmas(tail), sigmas + 0.25) << m;
     }
@@ -79,7 +79,7 @@ TEST(StatisticalBounds, ApproachNormalDistribution) {
   constexpr double m = 1e9;
   for (const double sigmas : kSigmas) {
     EXPECT_NEAR(compute_t_squared_bound(sigmas, m), sigmas * sigmas, 1e-6);
-    EXPECT_NEAR((chi_squared_bound(sigmas, m) - m) / std::sqrt(2 * m), sigmas, 1e-3);
+    EXPECT_NEAR((compute_chi_squared_bound(sigmas, m) - m) / std::sqrt(2 * m), sigmas, 1e-3);
   }
 }
 

@@ -25,15 +25,15 @@ TEST(SymmetricEigen, ReconstructsMatrixFromAscendingValues) {
         Eigen::MatrixXd(eigen.vectors * eigen.values.asDiagonal() * eigen.vectors.transpose()),
         IsNear(Eigen::MatrixXd(matrix), 1e-14));
   };
-  expect_same(decompose_symmetric(two), two);
-  expect_same(decompose_symmetric(four), four);
+  expect_same(eigendecompose_symmetric(two), two);
+  expect_same(eigendecompose_symmetric(four), four);
 }
 
 TEST(SymmetricEigen, ReturnsNanForNanMatrix) {
   const Eigen::MatrixXd none =
       Eigen::MatrixXd::Constant(3, 3, std::numeric_limits<double>::quiet_NaN());
-  EXPECT_FALSE(decompose_symmetric(none).values.minCoeff() > 0);
-  EXPECT_EQ(decompose_symmetric(none).vectors.cols(), 3);
+  EXPECT_FALSE(eigendecompose_symmetric(none).values.minCoeff() > 0);
+  EXPECT_EQ(eigendecompose_symmetric(none).vectors.cols(), 3);
 }
 
 TEST(InvertPositiveDefinite, ReturnsInverseOrNullopt) {

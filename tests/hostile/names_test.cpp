@@ -159,17 +159,17 @@ class HostileNames : public testing::Test {
   const TemporaryFolder folder;
 };
 
-TEST_F(HostileNames, PrintableLineReturnsOneHarmlessLine) {
+TEST_F(HostileNames, EscapeForSingleLineReturnsOneHarmlessLine) {
   int as_they_are = 0;
   for (int i = 0; i < kNames; ++i) {
     const std::string name = random_name(random);
-    const std::string line = printable_line(name);
+    const std::string line = escape_for_single_line(name);
     ASSERT_TRUE(is_harmless(line)) << line;
-    ASSERT_EQ(printable_line(line), line);
+    ASSERT_EQ(escape_for_single_line(line), line);
     if (line == name) ++as_they_are;
     const std::string message = InputError(name, name).what();
     ASSERT_EQ(message.find('\n'), std::string::npos);
-    ASSERT_TRUE(is_harmless(printable_line(message)));
+    ASSERT_TRUE(is_harmless(escape_for_single_line(message)));
   }
   EXPECT_GT(as_they_are, kNames / 100) << "some are good";
 }
@@ -179,7 +179,7 @@ TEST_F(HostileNames, IdAcceptsOnlySinglePathComponents) {
   const fs::path root = "/results";
   for (int i = 0; i < kNames; ++i) {
     const std::string name = random_name(random);
-    if (!Id::accepts(name)) {
+    if (!Id::is_valid_id(name)) {
       const std::string refusal = rejection_message([&] { Id(name, "spool/a.json", "camera"); });
       ASSERT_NE(refusal, "");
       ASSERT_LT(refusal.size(), 300U);
@@ -206,11 +206,11 @@ TEST_F(HostileNames, SharedFolderOpensNoFileOutsideIt) {
       if (file < 0) continue;  // too long
       ::close(file);
       ++made;
-      ASSERT_TRUE(shared.has(name));
-      if (i % 1000 == 0) shared.replace(name, name);
-      if (i % 10 == 0) shared.rename(name, "renamed");
-      shared.remove(name);
-      if (Id::accepts(name)) shared.make_folder({name, "test", "camera"});
+      ASSERT_TRUE(shared.contains_entry(name));
+      if (i % 1000 == 0) shared.replace_file(name, name);
+      if (i % 10 == 0) shared.rename_file(name, "renamed");
+      shared.remove_file(name);
+      if (Id::is_valid_id(name)) shared.make_subfolder({name, "test", "camera"});
     } catch (const InputError&) {
       continue;
     }
@@ -241,16 +241,16 @@ TEST_F(HostileNames, SharedFolderFollowsNoLinkOutOfIt) {
     ASSERT_NE(rejection_message([&] { ::close(shared.open(name, O_WRONLY | O_TRUNC)); }), "")
         << name;
     ASSERT_NE(rejection_message([&] { (void)shared.read(name, kMaxBytes); }), "") << name;
-    shared.replace(name, name);
+    shared.replace_file(name, name);
     ASSERT_FALSE(fs::is_symlink(link)) << name;
-    shared.remove(name);
-    if (!Id::accepts(name)) continue;
+    shared.remove_file(name);
+    if (!Id::is_valid_id(name)) continue;
     ++folders;
     ASSERT_EQ(::symlink((folder / "outside").c_str(), link.c_str()), 0);
     const Id id{name, "test", "camera"};
-    ASSERT_NE(rejection_message([&] { (void)shared.make_folder(id); }), "") << name;
-    ASSERT_NE(rejection_message([&] { (void)shared.find_folder(id); }), "") << name;
-    shared.remove(name);
+    ASSERT_NE(rejection_message([&] { (void)shared.make_subfolder(id); }), "") << name;
+    ASSERT_NE(rejection_message([&] { (void)shared.open_subfolder_if_exists(id); }), "") << name;
+    shared.remove_file(name);
     ASSERT_EQ(TemporaryFolder::read_content(canary), "mine") << name;
   }
   EXPECT_GT(files, kNames / every / 10);
@@ -259,7 +259,7 @@ TEST_F(HostileNames, SharedFolderFollowsNoLinkOutOfIt) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder / "outside"), {}), 1);
 }
 
-TEST_F(HostileNames, ReadRunReturnsWrittenNames) {
+TEST_F(HostileNames, ReadSpooledRunReturnsWrittenNames) {
   int refused = 0;
   constexpr int every = 20;  // parsing takes long without optimization
   for (int i = 0; i < kNames; ++i) {
@@ -267,14 +267,14 @@ TEST_F(HostileNames, ReadRunReturnsWrittenNames) {
     const std::string text = serialize_run({run_with(name, i), name});
     if (i % every != 0) continue;
     const auto json = nlohmann::json::parse(text);
-    ASSERT_EQ(json.at("station"), printable_line(name));
-    ASSERT_EQ(json.at("images")[0].at("image"), printable_line(name));
+    ASSERT_EQ(json.at("station"), escape_for_single_line(name));
+    ASSERT_EQ(json.at("images")[0].at("image"), escape_for_single_line(name));
     const fs::path file = folder.file("run.json", text);
-    if (!Id::accepts(printable_line(name))) {
-      ASSERT_NE(rejection_message([&] { read_run(file); }), "");
+    if (!Id::is_valid_id(escape_for_single_line(name))) {
+      ASSERT_NE(rejection_message([&] { read_spooled_run(file); }), "");
       ++refused;
     } else {
-      ASSERT_EQ(read_run(file).run.operator_name, printable_line(name));
+      ASSERT_EQ(read_spooled_run(file).run.operator_name, escape_for_single_line(name));
     }
   }
   EXPECT_GT(refused, 0);
@@ -294,7 +294,7 @@ TEST_F(HostileNames, ReportsEscapeNames) {
   const auto report = [](const std::string& name) {
     RunRecord run = run_with(name, 0);
     run.events.clear();
-    return make_unit_report(printable_run(std::move(run)), {}, {});
+    return make_unit_report(escape_run_texts(std::move(run)), {}, {});
   };
   const std::string plain = extract_tags(report("a"));
   ASSERT_GT(plain.size(), 100U);
@@ -303,26 +303,27 @@ TEST_F(HostileNames, ReportsEscapeNames) {
     const std::string name = random_name(random) + "x";  // an empty fact has no row
     const std::string page = report(name);
     ASSERT_TRUE(is_utf8(page));
-    ASSERT_EQ(extract_tags(page), plain) << printable_line(name);
+    ASSERT_EQ(extract_tags(page), plain) << escape_for_single_line(name);
   }
 }
 
-TEST_F(HostileNames, WriteRunsAddsNoRows) {
+TEST_F(HostileNames, ExportRunsToFileAddsNoRows) {
   constexpr int every = 10;
   std::vector<RunRecord> runs;
   runs.reserve(kNames / every);
   for (int i = 0; i < kNames / every; ++i) runs.push_back(run_with(random_name(random), i));
-  write_runs(folder / "runs.json", runs);
+  export_runs_to_file(folder / "runs.json", runs);
   const auto json = nlohmann::json::parse(TemporaryFolder::read_content(folder / "runs.json"));
   ASSERT_EQ(json.size(), runs.size());
-  for (RunRecord& run : runs) run = printable_run(std::move(run));  // as in records
-  write_runs(folder / "runs.csv", runs);
+  for (RunRecord& run : runs) run = escape_run_texts(std::move(run));  // as in records
+  export_runs_to_file(folder / "runs.csv", runs);
   const CsvTable table(folder / "runs.csv");
   ASSERT_EQ(table.rows(), runs.size());
-  const auto verdict = table.required("verdict"), name = table.required("run");
+  const auto verdict = table.get_required_column("verdict"),
+             name = table.get_required_column("run");
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    ASSERT_EQ(table.text(row, verdict), "FAIL");
-    ASSERT_EQ(table.text(row, name), runs[row].run);
+    ASSERT_EQ(table.get_text(row, verdict), "FAIL");
+    ASSERT_EQ(table.get_text(row, name), runs[row].run);
     ASSERT_EQ(json[row].at("verdict"), "FAIL");
   }
 }
@@ -332,9 +333,9 @@ TEST_F(HostileNames, ReadCalibrationReturnsWrittenCameraId) {
   Calibration calibration = read_calibration(example);
   constexpr int every = 50;
   for (int i = 0; i < kNames / every; ++i) {
-    const std::string name = "a" + printable_line(random_name(random));
+    const std::string name = "a" + escape_for_single_line(random_name(random));
     calibration.camera.id = name;
-    const auto file = folder.file("calibration.yaml", calibration_text(calibration));
+    const auto file = folder.file("calibration.yaml", format_calibration_yaml(calibration));
     const Calibration read = read_calibration(file);
     ASSERT_EQ(read.camera.id, name);
     ASSERT_EQ(read.camera.intrinsics, calibration.camera.intrinsics);
@@ -349,9 +350,9 @@ TEST_F(HostileNames, RecordsAddNoRuns) {
     for (int i = 0; i < kNames / every; ++i) {
       std::string name = random_name(random);
       std::erase(name, '\0');  // of texts of databases
-      records.keep(printable_run(run_with(name, i)));
+      records.store_run(escape_run_texts(run_with(name, i)));
     }
-    EXPECT_EQ(records.list({}).size(), std::size_t{kNames / every});
+    EXPECT_EQ(records.list_runs({}).size(), std::size_t{kNames / every});
     EXPECT_THAT(records.check("").problems, testing::IsEmpty());
   }
   const auto listed = run_program("vlp-station list --records " + where);

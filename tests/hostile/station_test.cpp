@@ -102,7 +102,7 @@ class HostileStation : public SmallStation {
     run.causes = "no images\n";
     run.calibration = "format: vlp-calibration/1\n";
     std::string text =
-        serialize_run({run, make_records_database_id((home / "records.db").string())});
+        serialize_run({run, derive_database_identity((home / "records.db").string())});
     const auto at = text.find(from);
     ASSERT_NE(at, std::string::npos) << from;
     write("spool/a.json", text.replace(at, from.size(), to));

@@ -52,11 +52,11 @@ Handle open(const Calibration& calibration) {
 
 TEST(LampDetector, MatchesLightDetector) {
   const cv::Mat image = sample();
-  const auto lamps = LampDetector(lamp_map(), calibration()).detect(image_view(image));
+  const auto lamps = LampDetector(lamp_map(), calibration()).detect(to_image_view(image));
   ASSERT_EQ(lamps.size(), 6U);
   std::size_t i = 0;
   const LightDetector lights(lamp_map(), make_detector_camera(calibration()));
-  for (const Light& light : lights.detect(image_view(image))) {
+  for (const Light& light : lights.detect(to_image_view(image))) {
     if (light.kind != LightKind::lamp) continue;
     ASSERT_LT(i, lamps.size());
     EXPECT_EQ(lamps[i].lamp, light.lamp);
@@ -69,8 +69,8 @@ TEST(LampDetector, MatchesLightDetector) {
 TEST(LampDetector, ThrowsForImagesThatDoNotMatchCamera) {
   const cv::Mat image = sample();
   const LampDetector detector(lamp_map(), calibration());
-  const auto message_of = [&](const auto& change) -> std::string {
-    ImageView view = image_view(image);
+  const auto format_failure_message = [&](const auto& change) -> std::string {
+    ImageView view = to_image_view(image);
     change(view);
     try {
       detector.detect(view);
@@ -79,15 +79,21 @@ TEST(LampDetector, ThrowsForImagesThatDoNotMatchCamera) {
     }
     return "none";
   };
-  EXPECT_EQ(message_of([](ImageView&) {}), "none");
-  EXPECT_THAT(message_of([](ImageView& view) { view.data = nullptr; }), HasSubstr("no pixels"));
-  EXPECT_THAT(message_of([](ImageView& view) { view.width = 799; }), HasSubstr("799 x 600"));
-  EXPECT_THAT(message_of([](ImageView& view) { view.height = -1; }), HasSubstr("800 x -1"));
-  EXPECT_THAT(message_of([](ImageView& view) { view.stride = 799; }), HasSubstr("stride"));
-  EXPECT_THAT(message_of([](ImageView& view) { view.stride = -800; }), HasSubstr("stride"));
-  EXPECT_THAT(message_of([](ImageView& view) { view.bits = 16; }), HasSubstr("stride"));
-  EXPECT_THAT(message_of([](ImageView& view) { view.bits = 12; }), HasSubstr("12 bits"));
-  EXPECT_THAT(message_of([](ImageView& view) { view.bits = 16, view.stride = 1601; }),
+  EXPECT_EQ(format_failure_message([](ImageView&) {}), "none");
+  EXPECT_THAT(format_failure_message([](ImageView& view) { view.data = nullptr; }),
+              HasSubstr("no pixels"));
+  EXPECT_THAT(format_failure_message([](ImageView& view) { view.width = 799; }),
+              HasSubstr("799 x 600"));
+  EXPECT_THAT(format_failure_message([](ImageView& view) { view.height = -1; }),
+              HasSubstr("800 x -1"));
+  EXPECT_THAT(format_failure_message([](ImageView& view) { view.stride = 799; }),
+              HasSubstr("stride"));
+  EXPECT_THAT(format_failure_message([](ImageView& view) { view.stride = -800; }),
+              HasSubstr("stride"));
+  EXPECT_THAT(format_failure_message([](ImageView& view) { view.bits = 16; }), HasSubstr("stride"));
+  EXPECT_THAT(format_failure_message([](ImageView& view) { view.bits = 12; }),
+              HasSubstr("12 bits"));
+  EXPECT_THAT(format_failure_message([](ImageView& view) { view.bits = 16, view.stride = 1601; }),
               HasSubstr("odd addresses"));
   Calibration without = calibration();
   without.camera.row_time_s.reset();
@@ -96,16 +102,16 @@ TEST(LampDetector, ThrowsForImagesThatDoNotMatchCamera) {
 
 TEST(VlpDetect, MatchesLampDetector) {
   const cv::Mat image = sample();
-  const auto expected = LampDetector(lamp_map(), calibration()).detect(image_view(image));
+  const auto expected = LampDetector(lamp_map(), calibration()).detect(to_image_view(image));
   ASSERT_EQ(expected.size(), 6U);
   const Handle positioner = open(calibration());
   // Rows without padding, and rows with padding.
   cv::Mat wide(image.rows, image.cols + 13, CV_8U, cv::Scalar(255));
   image.copyTo(wide(cv::Rect(0, 0, image.cols, image.rows)));
-  vlp_image without_gap = c_image(image_view(image));
+  vlp_image without_gap = c_image(to_image_view(image));
   without_gap.stride = 0;
   for (const vlp_image& given :
-       {without_gap, c_image(image_view(wide(cv::Rect(0, 0, image.cols, image.rows))))}) {
+       {without_gap, c_image(to_image_view(wide(cv::Rect(0, 0, image.cols, image.rows))))}) {
     Detections detections;
     std::size_t count = 0;
     ASSERT_EQ(vlp_detect(positioner.get(), &given, detections.data(), detections.size(), &count),
@@ -122,7 +128,7 @@ TEST(VlpDetect, MatchesLampDetector) {
 TEST(VlpDetect, ReturnsRequiredCountWhenArrayIsTooSmall) {
   const cv::Mat image = sample();
   const Handle positioner = open(calibration());
-  const vlp_image given = c_image(image_view(image));
+  const vlp_image given = c_image(to_image_view(image));
   for (const std::size_t capacity : {0U, 1U, 5U, 6U}) {
     std::vector<vlp_detection> detections(capacity);  // of exactly this size, for the sanitizers
     std::size_t count = 99;
@@ -137,7 +143,7 @@ TEST(VlpDetect, ReturnsRequiredCountWhenArrayIsTooSmall) {
 TEST(VlpDetect, RejectsInvalidArguments) {
   const cv::Mat image = sample();
   const Handle positioner = open(calibration());
-  const vlp_image valid_image = c_image(image_view(image));
+  const vlp_image valid_image = c_image(to_image_view(image));
   Detections detections;
   std::size_t count = 99;
   const auto detect = [&](const vlp_positioner* with, const vlp_image* given, vlp_detection* to) {
@@ -178,7 +184,7 @@ TEST(VlpDetect, RejectsInvalidArguments) {
 
 TEST(VlpDetect, ReturnsErrorWithoutRowTime) {
   const cv::Mat image = sample();
-  const vlp_image given = c_image(image_view(image));
+  const vlp_image given = c_image(to_image_view(image));
   Calibration without = calibration();
   without.camera.row_time_s.reset();
   Detections detections;
@@ -212,7 +218,7 @@ TEST(VlpOpenRoom, IdentifiesLampsOfTheChosenRoom) {
   const std::string lamps = folder.file("lamps.yaml", two_rooms());
   const std::string camera = kRendered + "true_calibration.yaml";
   const cv::Mat image = sample();
-  const vlp_image given = c_image(image_view(image));
+  const vlp_image given = c_image(to_image_view(image));
   Detections detections;
   const auto detect_in = [&](const char* room, std::size_t& count) {
     vlp_positioner* opened = nullptr;

@@ -40,7 +40,7 @@ TEST(FitRectangle, FindsPanelsAndTubesWithUnknownTilt) {
   EXPECT_LT(score.chi_square / score.lamps, 1.5);
 }
 
-TEST(FitRectangle, DoesNotChangeDiscs) {
+TEST(LightDetector, KeepsDiscsWhenMapHasRectangles) {
   const Captures captures("panels", "check");
   LampMap discs = captures.lamps();
   for (Lamp& lamp : discs.lamps) {
@@ -50,8 +50,8 @@ TEST(FitRectangle, DoesNotChangeDiscs) {
   int compared = 0;
   for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
     const cv::Mat image = captures.image(captures.shot(i));
-    const auto lights = captures.detector().detect(image_view(image)),
-               others = without.detect(image_view(image));
+    const auto lights = captures.detector().detect(to_image_view(image)),
+               others = without.detect(to_image_view(image));
     for (const Light& light : lights) {
       if (!light.lamp || is_panel_or_tube(*light.lamp)) continue;
       const auto same = std::find_if(others.begin(), others.end(), [&](const Light& other) {
@@ -74,7 +74,7 @@ TEST(LightDetector, RejectsPanelsWithWrongAspectRatio) {
   const LightDetector detector(swapped, make_detector_camera(captures.calibration()));
   int refused = 0;
   for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
-    for (const Light& light : detector.detect(image_view(captures.image(captures.shot(i))))) {
+    for (const Light& light : detector.detect(to_image_view(captures.image(captures.shot(i))))) {
       if (is_disc(light)) continue;
       EXPECT_FALSE(light.lamp);
       EXPECT_EQ(light.kind, LightKind::unknown);
@@ -92,7 +92,7 @@ TEST(FitRectangle, CorrectsCenterOfPanelsByEdgeCurvatureWithoutLens) {
   for (std::size_t i = 0; i < captures.size(); i += 3 * kStep) {
     const LampShot shot = captures.shot(i);
     const auto truth = captures.truth(shot);
-    for (const Light& light : detector.detect(image_view(captures.image(shot)))) {
+    for (const Light& light : detector.detect(to_image_view(captures.image(shot)))) {
       if (light.kind != LightKind::lamp || is_disc(light)) continue;
       const auto lamp = std::find_if(truth.begin(), truth.end(), [&](const TrueLamp& candidate) {
         return candidate.id == light.lamp;
@@ -142,7 +142,7 @@ TEST(FitRectangle, SigmaCoversErrorsOfPartlyHiddenPanels) {
   for (std::size_t i = 0; i < captures.size(); i += 5) {
     const LampShot shot = captures.shot(i);
     const auto truth = captures.truth(shot);
-    for (const Light& light : captures.detector().detect(image_view(captures.image(shot)))) {
+    for (const Light& light : captures.detector().detect(to_image_view(captures.image(shot)))) {
       if (light.kind != LightKind::lamp || is_disc(light)) continue;
       const auto lamp = std::find_if(truth.begin(), truth.end(), [&](const TrueLamp& candidate) {
         return candidate.id == light.lamp;
@@ -166,7 +166,7 @@ TEST(LightDetector, RejectsPanelsCutByImageBorder) {
   int cut = 0, identified = 0;
   for (std::size_t i = 0; i < captures.size(); i += 5) {
     const LampShot shot = captures.shot(i);
-    const auto lights = captures.detector().detect(image_view(captures.image(shot)));
+    const auto lights = captures.detector().detect(to_image_view(captures.image(shot)));
     identified += static_cast<int>(std::count_if(
         lights.begin(), lights.end(), [](const Light& light) { return light.lamp.has_value(); }));
     for (const TrueLamp& lamp : captures.truth(shot)) {
@@ -204,7 +204,7 @@ TEST(Positioner, ComputesFixFromPanels) {
   for (std::size_t i = 0; i < captures.size(); i += 2 * kStep) {
     const LampShot shot = captures.shot(i);
     std::vector<Detection> detections;
-    for (const Light& light : captures.detector().detect(image_view(captures.image(shot)))) {
+    for (const Light& light : captures.detector().detect(to_image_view(captures.image(shot)))) {
       if (light.kind != LightKind::lamp || is_disc(light)) continue;
       detections.push_back({*light.lamp, light.pixel, light.sigma_px});
     }

@@ -17,10 +17,10 @@ cv::Mat sample(const std::string& scene) {
 }
 
 std::optional<Readout> found_in(const cv::Mat& image) {
-  return find_readout(1, [&](std::size_t) { return image_view(image); });
+  return estimate_readout_direction(1, [&](std::size_t) { return to_image_view(image); });
 }
 
-TEST(FindReadout, ReturnsReadoutOfRenderedImages) {
+TEST(EstimateReadoutDirection, ReturnsReadoutOfRenderedImages) {
   for (const char* scene : {"paper-rig", "paper-rig-faulty", "clutter"}) {
     EXPECT_EQ(found_in(sample(scene)), Readout::rows) << scene;
     EXPECT_EQ(found_in(sample(scene).t()), Readout::columns) << scene;
@@ -29,27 +29,27 @@ TEST(FindReadout, ReturnsReadoutOfRenderedImages) {
   EXPECT_EQ(found_in(sample("wide").t()), Readout::rows);
 }
 
-TEST(FindReadout, ReturnsNulloptWithoutLamps) {
+TEST(EstimateReadoutDirection, ReturnsNulloptWithoutLamps) {
   EXPECT_FALSE(found_in(cv::Mat(120, 160, CV_8U, cv::Scalar(30))));
   EXPECT_FALSE(found_in({}));
-  EXPECT_FALSE(find_readout(0, [](std::size_t) { return ImageView(); }));
+  EXPECT_FALSE(estimate_readout_direction(0, [](std::size_t) { return ImageView(); }));
 }
 
-TEST(FindReadout, StopsAfterFirstConclusiveImages) {
+TEST(EstimateReadoutDirection, StopsAfterFirstConclusiveImages) {
   const cv::Mat lamps = sample("paper-rig"), dark(600, 800, CV_8U, cv::Scalar(2));
   const std::array images{cv::Mat(), dark, lamps, lamps, cv::Mat()};
   std::size_t asked = 0;
-  EXPECT_EQ(
-      find_readout(images.size(), [&](std::size_t i) { return ++asked, image_view(images[i]); }),
-      Readout::rows);
+  EXPECT_EQ(estimate_readout_direction(
+                images.size(), [&](std::size_t i) { return ++asked, to_image_view(images[i]); }),
+            Readout::rows);
   EXPECT_LE(asked, 4);
 }
 
-TEST(ReadoutEvidence, ReturnsNulloptWhenEvidenceIsWeakOrContradictory) {
-  EXPECT_FALSE((ReadoutEvidence{0.9, 0}).readout());
-  EXPECT_FALSE((ReadoutEvidence{3, 2}).readout());
-  EXPECT_EQ((ReadoutEvidence{3, 0.5}).readout(), Readout::rows);
-  EXPECT_EQ((ReadoutEvidence{0.5, 3}).readout(), Readout::columns);
+TEST(ReadoutDirectionEvidence, ReturnsNulloptWhenEvidenceIsWeakOrContradictory) {
+  EXPECT_FALSE((ReadoutDirectionEvidence{0.9, 0}).readout());
+  EXPECT_FALSE((ReadoutDirectionEvidence{3, 2}).readout());
+  EXPECT_EQ((ReadoutDirectionEvidence{3, 0.5}).readout(), Readout::rows);
+  EXPECT_EQ((ReadoutDirectionEvidence{0.5, 3}).readout(), Readout::columns);
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 
 std::map<int, Light> lamps_in(const LightDetector& detector, const cv::Mat& image) {
   std::map<int, Light> lamps;
-  for (Light& light : detector.detect(image_view(image))) {
+  for (Light& light : detector.detect(to_image_view(image))) {
     if (light.kind == LightKind::lamp) lamps.emplace(*light.lamp, std::move(light));
   }
   return lamps;
@@ -63,22 +63,25 @@ template <typename ImageProcessing>
 Identified identified(const fs::path& data, const ImageProcessing& picture) {
   const LightDetector detector(read_lamp_map(data / "lamps.yaml"), {Readout::columns, 15.1e-6, {}});
   const CsvTable table(data / "expected.csv");
-  const auto image_column = table.required("image"), lamp_column = table.required("lamp");
-  const auto u_column = table.required("u_px"), v_column = table.required("v_px");
-  const auto size_column = table.required("size_px");
+  const auto image_column = table.get_required_column("image"),
+             lamp_column = table.get_required_column("lamp");
+  const auto u_column = table.get_required_column("u_px"),
+             v_column = table.get_required_column("v_px");
+  const auto size_column = table.get_required_column("size_px");
   std::map<std::string, std::map<int, Light>> found;
   Identified result;
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::string image(table.text(row, image_column));
+    const std::string image(table.get_text(row, image_column));
     if (!found.contains(image)) found[image] = lamps_in(detector, picture(data / image));
-    const auto lamp = found[image].find(table.integer(row, lamp_column));
+    const auto lamp = found[image].find(table.get_integer(row, lamp_column));
     if (lamp == found[image].end()) continue;
     // Expected positions are those of the lit area, accurate to about 20 px; its middle is not that
     // of the rim.
-    const Eigen::Vector2d expected(table.number(row, u_column), table.number(row, v_column));
+    const Eigen::Vector2d expected(table.get_number(row, u_column),
+                                   table.get_number(row, v_column));
     const double apart_px = (lamp->second.pixel - expected).norm();
     ++result.lamps;
-    result.wrong += apart_px > table.number(row, size_column) / 2;
+    result.wrong += apart_px > table.get_number(row, size_column) / 2;
   }
   return result;
 }
@@ -116,11 +119,12 @@ TEST_F(LightDetectorOnRealDownlights, YieldsRowTime) {
   const LightDetector detector(map(), {Readout::columns, {}, {}});
   std::vector<MeasuredPeriod> periods;
   for (int number = 1; number <= 5; ++number) {
-    for (const Light& light : detector.detect(image_view(read_image(image(number))))) {
-      if (is_reliable(light.stripes)) periods.push_back({light.stripes.period_lines, {}});
+    for (const Light& light : detector.detect(to_image_view(read_image(image(number))))) {
+      if (are_stripes_reliable(light.stripes)) periods.push_back({light.stripes.period_lines, {}});
     }
   }
-  const RowTimeResult result = choose_row_time(estimate_row_time(periods, map()));
+  const RowTimeResult result =
+      select_row_time_candidate(estimate_row_time_candidates(periods, map()));
   ASSERT_TRUE(result.found) << result.problem;
   EXPECT_NEAR(result.found->row_time_s / 15.10e-6, 1, 0.002);
 }
@@ -135,7 +139,7 @@ TEST(LightDetectorOnRealObliqueDownlights, IdentifiesAllLamps) {
 }
 
 /// Photographs with readout along rows and along columns, without a given readout direction.
-TEST(DetectWithEitherReadout, FindsReadoutOfRealGlows) {
+TEST(DetectLightsWithUnknownReadout, FindsReadoutOfRealGlows) {
   const fs::path data = real_data("luxapose");
   if (data.empty()) GTEST_SKIP() << "no real captures here";
   const LightDetector by_rows(read_lamp_map(data / "lamps.yaml"), {Readout::rows, 1 / 47540.0, {}});
@@ -146,7 +150,8 @@ TEST(DetectWithEitherReadout, FindsReadoutOfRealGlows) {
           std::tuple("2014-02-27--18-15-03-62.jpg", Readout::columns, 3),
           std::tuple("small_blob.jpg", Readout::rows, 5)}) {
       const cv::Mat image = read_image(data / name);
-      const LightsWithReadout found = detect_with_either_readout(detector, image_view(image));
+      const LightsWithReadout found =
+          detect_lights_with_unknown_readout(detector, to_image_view(image));
       EXPECT_EQ(found.readout, readout) << name;
       EXPECT_EQ(std::count_if(found.lights.begin(), found.lights.end(),
                               [](const Light& light) { return light.kind == LightKind::lamp; }),

@@ -42,7 +42,7 @@ ImageDetections detect_lamps_in(const std::filesystem::path& folder, const char*
   result.map = read_lamp_map(folder / "lamps.yaml");
   result.calibration.camera = make_camera(image, readout);
   const LightDetector detector(result.map, make_detector_camera(result.calibration));
-  for (const Light& light : detector.detect(image_view(image))) {
+  for (const Light& light : detector.detect(to_image_view(image))) {
     if (light.kind != LightKind::lamp) continue;
     EXPECT_FALSE(result.lamps.contains(*light.lamp)) << "one lamp twice";
     result.lamps[*light.lamp] = light;

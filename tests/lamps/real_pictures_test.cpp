@@ -26,7 +26,7 @@ LampMap map_of_five() {
 
 void expect_no_lamp(const std::filesystem::path& file, Readout readout, double row_time_s) {
   const LightDetector detector(map_of_five(), {readout, row_time_s, {}});
-  for (const Light& light : detector.detect(image_view(read_image(file)))) {
+  for (const Light& light : detector.detect(to_image_view(read_image(file)))) {
     EXPECT_FALSE(light.lamp) << file << " at " << light.pixel.transpose() << ", " << row_time_s;
   }
 }

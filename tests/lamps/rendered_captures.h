@@ -49,19 +49,19 @@ class Captures {
 
   LampShot shot(std::size_t index) const { return make_lamp_shot(scene_, set_, index); }
   cv::Mat image(const LampShot& shot) const {
-    const cv::Mat lines =
-        expose(scene_.sensor, renderer_.lamp_electrons(shot), shot.noise_seed, scene_.picture);
+    const cv::Mat lines = simulate_sensor(scene_.sensor, renderer_.render_lamp_electrons(shot),
+                                          shot.noise_seed, scene_.picture);
     const cv::Mat image = scene_.camera.readout == Readout::rows ? lines : cv::Mat(lines.t());
     return cv::imdecode(encode_image(image, scene_.picture),
                         cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
   }
   std::vector<TrueLamp> truth(const LampShot& shot) const {
-    return find_true_lamps(scene_, renderer_, shot);
+    return find_true_lamps_in_image(scene_, renderer_, shot);
   }
   LampMap lamps() const { return make_lamp_map(scene_, false); }
   Calibration calibration() const { return make_true_calibration(scene_); }
   LightDetector detector() const { return {lamps(), make_detector_camera(calibration())}; }
-  std::size_t size() const { return count_shots(set_); }
+  std::size_t size() const { return count_captures_of_set(set_); }
 
   /// Evaluates every `step`-th capture for the lamps selected by `counts`; wrong identifications
   /// count for all lamps.
@@ -73,10 +73,10 @@ class Captures {
       std::size_t step, const LightDetector& lamp_detector,
       const std::function<bool(int)>& counts = [](int) { return true; }) const {
     Score score;
-    for (std::size_t i = 0; i < count_shots(set_); i += step) {
+    for (std::size_t i = 0; i < count_captures_of_set(set_); i += step) {
       const LampShot shot = this->shot(i);
       std::map<int, Light> found;
-      for (Light& light : lamp_detector.detect(image_view(image(shot)))) {
+      for (Light& light : lamp_detector.detect(to_image_view(image(shot)))) {
         if (light.kind != LightKind::lamp) continue;
         EXPECT_FALSE(found.contains(*light.lamp)) << "one lamp twice in image " << i;
         found[*light.lamp] = light;

@@ -34,7 +34,7 @@ void expect_both(const Touching& touching) {
   const LampMap map{{drawn_lamp(1, kPeriods_lines[0]), drawn_lamp(2, kPeriods_lines[1])}};
   const LightDetector detector(map, drawn_camera(kTouchingSize));
   const auto lights = detector.detect(
-      image_view(render_lamps({first_lamp, second_lamp}, kTouchingSize, touching.depth, 0.5)));
+      to_image_view(render_lamps({first_lamp, second_lamp}, kTouchingSize, touching.depth, 0.5)));
   int lamps = 0;
   for (const Light& light : lights) {
     if (light.kind != LightKind::lamp) continue;

@@ -106,8 +106,8 @@ TEST_F(VlpAdjust, RefinesMapAndReportsUncertaintyOfFixes) {
                   "--calibration " + path("adjusted.yaml") + "-o " + path("fixes.csv"));
   ASSERT_EQ(located.exit_code, 0) << located.errors;
   const CsvTable fixes(folder / "fixes.csv");
-  EXPECT_GT(fixes.number(0, fixes.required("x_sd_m")),
-            fixes.number(0, fixes.required("x_noise_sd_m")));
+  EXPECT_GT(fixes.get_number(0, fixes.get_required_column("x_sd_m")),
+            fixes.get_number(0, fixes.get_required_column("x_noise_sd_m")));
 }
 
 /// Turns that do not stop for their captures: 60 degrees a second, 9 degrees an image.
@@ -164,7 +164,8 @@ TEST_F(VlpAdjust, EstimatesLensWithoutCovariance) {
 
 TEST_F(VlpAdjust, RejectsLensSdForLensWithCovariance) {
   rig.calibration.intrinsics_report.emplace();
-  rig.calibration.intrinsics_report->covariance = make_lens_covariance(rig.calibration.camera, 1);
+  rig.calibration.intrinsics_report->covariance =
+      make_nominal_intrinsics_covariance(rig.calibration.camera, 1);
   const ProgramResult result = adjust("--map-sd-m 0.001 --lens-sd-px 10");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr("camera.yaml: has a lens covariance already"));

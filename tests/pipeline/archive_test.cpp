@@ -66,7 +66,7 @@ TEST_F(VlpSimulateArchive, DamagesSessionsAsListedInTable) {
   std::set<std::string> kinds;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const auto cell = [&](const char* column) {
-      return std::string(table.text(row, table.required(column)));
+      return std::string(table.get_text(row, table.get_required_column(column)));
     };
     const fs::path session = output / cell("camera") / cell("session");
     const fs::path target = session / cell("damaged");

@@ -48,10 +48,10 @@ TEST_F(VlpBoard, PrintsTagsToScale) {
   const cv::Mat page = cv::imread((folder / "page.png").string(), cv::IMREAD_GRAYSCALE);
   EXPECT_NEAR(page.cols, 297 * px_per_mm, 2);
   const Board board = read_board(folder / "board.yaml");
-  const BoardDetection seen = BoardDetector(board).detect(page);
+  const BoardDetection seen = BoardDetector(board).detect_board(page);
   ASSERT_EQ(seen.tags.size(), 30U);
   const double width_px = (seen.tags[5].corners_px[2] - seen.tags[0].corners_px[3]).norm();
-  EXPECT_NEAR(width_px / px_per_mm / 1000, tag_field_m(board).x(), 1e-4);
+  EXPECT_NEAR(width_px / px_per_mm / 1000, compute_tag_field_size_m(board).x(), 1e-4);
 }
 
 TEST_F(VlpBoard, RejectsBoardLargerThanPage) {

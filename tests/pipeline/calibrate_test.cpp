@@ -386,7 +386,7 @@ TEST_F(SingleStepPrograms, MatchVlpCalibrate) {
 TEST_F(SingleStepPrograms, MatchVlpCalibrateWithInclinationSensor) {
   // One that reads a little, and a table of places without truth.csv.
   std::string captures = "image,x_m,y_m,z_m,roll_rad,pitch_rad\n";
-  for (const TruthRow& row : read_truth(folder / "a session/check/truth.csv")) {
+  for (const TruthRow& row : read_truth_table(folder / "a session/check/truth.csv")) {
     captures +=
         fmt::format("{},{},{},{},0.001,-0.002\n", row.image, row.xy_m.x(), row.xy_m.y(), *row.z_m);
   }

@@ -53,9 +53,12 @@ TEST(DetectLamps, IsUnbiasedForVisibleLedChips) {
   double squares = 0, chi_square = 0, worst_px = 0;
   int lamps = 0;
   for (std::size_t row = 0; row < truth.rows(); ++row) {
-    const auto number = [&](const char* name) { return truth.number(row, truth.required(name)); };
-    const std::string image(truth.text(row, truth.required("image")));
-    const auto lamp = found.find({image, truth.integer(row, truth.required("lamp"))});
+    const auto number = [&](const char* name) {
+      return truth.get_number(row, truth.get_required_column(name));
+    };
+    const std::string image(truth.get_text(row, truth.get_required_column("image")));
+    const auto lamp =
+        found.find({image, truth.get_integer(row, truth.get_required_column("lamp"))});
     if (number("in_view") < 1) continue;
     ASSERT_NE(lamp, found.end()) << "row " << row;
     const Eigen::Vector2d off_px =

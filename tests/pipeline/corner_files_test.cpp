@@ -71,7 +71,7 @@ TEST_F(VlpIntrinsicsCornerFiles, TolerateOutlier) {
   constexpr double noise_px = 0.02;
   while (seen.size() < 10) {
     const BoardDetection view = views.random_view(random, noise_px);
-    if (!lattice.sufficient(view)) continue;
+    if (!lattice.has_sufficient_corners(view)) continue;
     seen.push_back({"view" + std::to_string(seen.size()) + ".png", views.imager_px, view});
   }
   const fs::path table = folder / "corners.csv", board = folder / "board.yaml";
@@ -159,7 +159,7 @@ TEST_F(VlpIntrinsicsCornerFiles, GiveLensOfImagesExactly) {
     break;
   }
   ASSERT_LT(theirs_px, right_px);
-  const Camera found = read_any_camera(folder / "mrcal/camera-0.cameramodel").camera;
+  const Camera found = read_camera_of_any_format(folder / "mrcal/camera-0.cameramodel").camera;
   const Lens theirs(found.lens_model, found.intrinsics);
   EXPECT_LT(compute_projection_difference(theirs, here, imager_px, one)->worst_px, 0.01);
   // mrcal counts the corners that are not seen, too, and its regularization, a tenth of the squares

@@ -96,7 +96,7 @@ TEST_F(VlpDetect, IdentifiesOnlyLampsOfRoomOption) {
   const CsvTable found(folder / "rooms.csv");
   ASSERT_GT(found.rows(), 0U);
   for (std::size_t row = 0; row < found.rows(); ++row) {
-    EXPECT_LT(found.number(row, found.required("lamp")), 900);
+    EXPECT_LT(found.get_number(row, found.get_required_column("lamp")), 900);
   }
   const auto attic = detect_in(" --room attic");
   EXPECT_EQ(attic.exit_code, 2);
@@ -112,10 +112,11 @@ TEST_F(VlpDetect, YieldsTruePositionWithVlpLocate) {
   const CsvTable fixes(folder / "fixes.csv"), truth(kRig + "/sample/truth.csv");
   ASSERT_EQ(fixes.rows(), 2);
   for (std::size_t row = 0; row < 2; ++row) {
-    EXPECT_EQ(fixes.text(row, fixes.required("image")), truth.text(row, truth.required("image")));
+    EXPECT_EQ(fixes.get_text(row, fixes.get_required_column("image")),
+              truth.get_text(row, truth.get_required_column("image")));
     for (const char* axis : {"x_m", "y_m", "z_m"}) {
-      EXPECT_NEAR(fixes.number(row, fixes.required(axis)), truth.number(row, truth.required(axis)),
-                  1e-4);
+      EXPECT_NEAR(fixes.get_number(row, fixes.get_required_column(axis)),
+                  truth.get_number(row, truth.get_required_column(axis)), 1e-4);
     }
   }
 }
@@ -148,11 +149,11 @@ TEST_F(VlpDetect, ReportsClassAndReasonOfEachLight) {
   const CsvTable table(lights), lamps(folder / "found.csv");
   std::map<std::string, std::size_t> kinds;
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::string kind(table.text(row, table.required("kind")));
+    const std::string kind(table.get_text(row, table.get_required_column("kind")));
     ++kinds[kind];
     const bool identified = kind == "lamp" || kind == "cut";
-    EXPECT_EQ(identified, table.text(row, table.required("reason")) == "identified");
-    EXPECT_EQ(identified, !table.text(row, table.required("lamp")).empty());
+    EXPECT_EQ(identified, table.get_text(row, table.get_required_column("reason")) == "identified");
+    EXPECT_EQ(identified, !table.get_text(row, table.get_required_column("lamp")).empty());
   }
   EXPECT_EQ(kinds["lamp"], lamps.rows());
   EXPECT_EQ(kinds["steady"], 2U) << "the steady lamp and the window";
@@ -171,7 +172,7 @@ TEST_F(VlpDetect, WritesLightsWithoutLamp) {
   const CsvTable table(lights);
   EXPECT_GT(table.rows(), 0U);
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    EXPECT_EQ(table.text(row, table.required("lamp")), "");
+    EXPECT_EQ(table.get_text(row, table.get_required_column("lamp")), "");
   }
 }
 
@@ -202,8 +203,8 @@ TEST_F(VlpDetect, RequiresOnlyRowTimeOfCamera) {
   ASSERT_EQ(without.rows(), with.rows());
   for (std::size_t row = 0; row < with.rows(); ++row) {
     // The lens moves the middle of an outline by as much.
-    EXPECT_NEAR(without.number(row, without.required("u_px")),
-                with.number(row, with.required("u_px")), 1);
+    EXPECT_NEAR(without.get_number(row, without.get_required_column("u_px")),
+                with.get_number(row, with.get_required_column("u_px")), 1);
   }
 }
 
@@ -222,7 +223,7 @@ TEST_F(VlpDetect, MatchesVlpLocateOnImages) {
   ASSERT_EQ(run_program("vlp-locate " + images.string() + rig + "3.csv").exit_code, 0);
   const CsvTable fixes(folder / "fixes3.csv");
   ASSERT_EQ(fixes.rows(), 3);
-  EXPECT_NE(fixes.text(2, fixes.required("status")), "ok");
+  EXPECT_NE(fixes.get_text(2, fixes.get_required_column("status")), "ok");
 }
 
 TEST_F(VlpDetect, GivesSameBytesForAllThreadCounts) {

@@ -68,9 +68,9 @@ TEST_F(VlpDispersion, MakesFixesExactAtOtherPositions) {
                   "--calibration " + path("calibration.yaml") + "-o " + path("fixes.csv"));
   ASSERT_EQ(located.exit_code, 0) << located.errors;
   const CsvTable fixes(folder / "fixes.csv");
-  EXPECT_NEAR(fixes.number(0, fixes.required("x_m")), -0.3, 2e-6);
-  EXPECT_NEAR(fixes.number(0, fixes.required("y_m")), 0.2, 2e-6);
-  EXPECT_NEAR(fixes.number(0, fixes.required("z_m")), 0.25, 2e-6);
+  EXPECT_NEAR(fixes.get_number(0, fixes.get_required_column("x_m")), -0.3, 2e-6);
+  EXPECT_NEAR(fixes.get_number(0, fixes.get_required_column("y_m")), 0.2, 2e-6);
+  EXPECT_NEAR(fixes.get_number(0, fixes.get_required_column("z_m")), 0.25, 2e-6);
 }
 
 TEST_F(VlpDispersion, ReadsPlacesFromCapturesCsv) {

@@ -22,11 +22,13 @@ std::vector<double> horizontal_errors_m(const std::filesystem::path& fixes_file)
   EXPECT_EQ(fixes.rows(), truth.rows());
   std::vector<double> errors_m;
   for (std::size_t row = 0; row < truth.rows(); ++row) {
-    EXPECT_EQ(fixes.text(row, fixes.required("image")), truth.text(row, truth.required("image")));
-    EXPECT_EQ(fixes.text(row, fixes.required("status")), "ok");
-    errors_m.push_back(std::hypot(
-        fixes.number(row, fixes.required("x_m")) - truth.number(row, truth.required("x_m")),
-        fixes.number(row, fixes.required("y_m")) - truth.number(row, truth.required("y_m"))));
+    EXPECT_EQ(fixes.get_text(row, fixes.get_required_column("image")),
+              truth.get_text(row, truth.get_required_column("image")));
+    EXPECT_EQ(fixes.get_text(row, fixes.get_required_column("status")), "ok");
+    errors_m.push_back(std::hypot(fixes.get_number(row, fixes.get_required_column("x_m")) -
+                                      truth.get_number(row, truth.get_required_column("x_m")),
+                                  fixes.get_number(row, fixes.get_required_column("y_m")) -
+                                      truth.get_number(row, truth.get_required_column("y_m"))));
   }
   return errors_m;
 }

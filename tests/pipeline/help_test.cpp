@@ -219,14 +219,14 @@ TEST(ZshCompletion, AcceptsAllValuesOfOption) {
 }
 
 /// An option that was renamed would be recorded.
-TEST(OptionsWithoutHistory, ExistInPrograms) {
+TEST(ListOptionsNotInHistory, ReturnsOnlyExistingOptions) {
   std::vector<std::string> options;
   for (const char* program : {"vlp-adjust", "vlp-convert", "vlp-dispersion", "vlp-evaluate",
                               "vlp-intrinsics", "vlp-rotation", "vlp-train"}) {
     const auto more = options_in(run_program(std::string(program) + " --help").output);
     options.insert(options.end(), more.begin(), more.end());
   }
-  for (const std::string_view option : options_without_history()) {
+  for (const std::string_view option : list_options_not_in_history()) {
     EXPECT_THAT(options, testing::Contains(option));
   }
 }

@@ -96,7 +96,7 @@ class TiltedCamera : public testing::Test {
     return folder / (set + "-fixes.csv");
   }
   void add_errors(const std::string& set, Errors& errors) const {
-    const auto truth = read_truth(folder / "out" / set / "truth.csv");
+    const auto truth = read_truth_table(folder / "out" / set / "truth.csv");
     const auto fixes = read_fixes(fixes_file(set));
     ASSERT_EQ(fixes.size(), truth.size());
     for (std::size_t i = 0; i < fixes.size(); ++i) {
@@ -144,7 +144,7 @@ TEST_F(TiltedCamera, HasErrorsAsPredictedFromInclinationSensor) {
     for (const std::string axis : {"roll", "pitch"}) {
       const std::string set = fmt::format("{}{}", axis, tilt_deg);
       std::string table = "image,roll_rad,pitch_rad\n";
-      for (const TruthRow& row : read_truth(folder / "out" / set / "truth.csv")) {
+      for (const TruthRow& row : read_truth_table(folder / "out" / set / "truth.csv")) {
         const double tilt_rad = tilt_deg * std::numbers::pi / 180;
         table += fmt::format("{},{},{}\n", row.image, axis == "roll" ? tilt_rad : 0,
                              axis == "pitch" ? tilt_rad : 0);

@@ -41,14 +41,15 @@ TEST(VlpLimits, WritesMapAsTableAndPlot) {
   const CsvTable map(folder / "map.csv");
   ASSERT_EQ(map.rows(), 5 * 2);
   for (std::size_t row = 0; row < map.rows(); ++row) {
-    const double noise_m = map.number(row, map.required("noise_m"));
-    const double tilt_m = map.number(row, map.required("tilt_m"));
+    const double noise_m = map.get_number(row, map.get_required_column("noise_m"));
+    const double tilt_m = map.get_number(row, map.get_required_column("tilt_m"));
     // 0.1 px is about 0.2 mm, one degree on each of two axes at 1.6 m about 40 mm.
     EXPECT_GT(noise_m, 0.1e-3);
     EXPECT_LT(noise_m, 0.5e-3);
     EXPECT_NEAR(tilt_m, 40e-3, 8e-3);
-    EXPECT_NEAR(map.number(row, map.required("horizontal_m")), std::hypot(noise_m, tilt_m), 1e-6);
-    EXPECT_EQ(map.number(row, map.required("center_m")), 0);
+    EXPECT_NEAR(map.get_number(row, map.get_required_column("horizontal_m")),
+                std::hypot(noise_m, tilt_m), 1e-6);
+    EXPECT_EQ(map.get_number(row, map.get_required_column("center_m")), 0);
   }
   EXPECT_THAT(TemporaryFolder::read_content(folder / "map.png"), StartsWith("\x89PNG"));
 }
@@ -73,17 +74,18 @@ TEST(VlpLimits, ReportsEffectOfMotionAndTilt) {
   ASSERT_EQ(map.rows(), standing.rows());
   int with_fix = 0;
   for (std::size_t row = 0; row < map.rows(); ++row) {
-    EXPECT_EQ(map.number(row, map.required("lamps")),
-              standing.number(row, standing.required("lamps")));
-    if (map.text(row, map.required("noise_m")).empty()) continue;
+    EXPECT_EQ(map.get_number(row, map.get_required_column("lamps")),
+              standing.get_number(row, standing.get_required_column("lamps")));
+    if (map.get_text(row, map.get_required_column("noise_m")).empty()) continue;
     ++with_fix;
-    const double noise_m = map.number(row, map.required("noise_m"));
-    EXPECT_NEAR(noise_m, standing.number(row, standing.required("noise_m")), 1e-3 * noise_m);
-    EXPECT_NEAR(map.number(row, map.required("horizontal_m")),
-                std::hypot(noise_m, map.number(row, map.required("motion_m")),
-                           map.number(row, map.required("roll_pitch_m"))),
+    const double noise_m = map.get_number(row, map.get_required_column("noise_m"));
+    EXPECT_NEAR(noise_m, standing.get_number(row, standing.get_required_column("noise_m")),
+                1e-3 * noise_m);
+    EXPECT_NEAR(map.get_number(row, map.get_required_column("horizontal_m")),
+                std::hypot(noise_m, map.get_number(row, map.get_required_column("motion_m")),
+                           map.get_number(row, map.get_required_column("roll_pitch_m"))),
                 1e-8);  // six digits
-    EXPECT_GT(map.number(row, map.required("roll_pitch_m")), noise_m);
+    EXPECT_GT(map.get_number(row, map.get_required_column("roll_pitch_m")), noise_m);
   }
   EXPECT_GT(with_fix, 0);
 }
@@ -137,10 +139,11 @@ TEST_F(VlpLimitsFromCalibration, NamesLargestErrorSource) {
   for (std::size_t row = 0; row < map.rows(); ++row) {
     double variance = 0;
     for (const char* part : {"noise_m", "lens_m", "zenith_m", "lamp_map_m"}) {
-      variance += std::pow(map.number(row, map.required(part)), 2);
+      variance += std::pow(map.get_number(row, map.get_required_column(part)), 2);
     }
-    EXPECT_NEAR(map.number(row, map.required("horizontal_m")), std::sqrt(variance), 1e-8);
-    EXPECT_EQ(map.number(row, map.required("lens_m")), 0);
+    EXPECT_NEAR(map.get_number(row, map.get_required_column("horizontal_m")), std::sqrt(variance),
+                1e-8);
+    EXPECT_EQ(map.get_number(row, map.get_required_column("lens_m")), 0);
   }
 }
 
@@ -214,11 +217,11 @@ TEST(VlpLimits, CoverFieldOfViewOfFisheye) {
   int more = 0;
   for (std::size_t row = 0; row < by_fisheye.rows(); ++row) {
     const auto lamps = [row](const CsvTable& map) {
-      return map.number(row, map.required("lamps"));
+      return map.get_number(row, map.get_required_column("lamps"));
     };
     EXPECT_GE(lamps(by_fisheye), lamps(by_other));
     if (lamps(by_fisheye) > lamps(by_other)) ++more;
-    EXPECT_GT(by_fisheye.number(row, by_fisheye.required("noise_m")), 0);
+    EXPECT_GT(by_fisheye.get_number(row, by_fisheye.get_required_column("noise_m")), 0);
   }
   EXPECT_GT(more, 0);
 }

@@ -31,11 +31,11 @@ class VlpLocate : public testing::Test {
   }
   double figure(std::size_t row, const char* column) {
     const CsvTable fixes(folder / "fixes.csv");
-    return fixes.number(row, fixes.required(column));
+    return fixes.get_number(row, fixes.get_required_column(column));
   }
   std::string word(std::size_t row, const char* column) {
     const CsvTable fixes(folder / "fixes.csv");
-    return std::string(fixes.text(row, fixes.required(column)));
+    return std::string(fixes.get_text(row, fixes.get_required_column(column)));
   }
   std::vector<Detection> seen(std::size_t lamps, std::optional<double> sigma_px = 0.1) {
     auto detections = seen_from(rig);

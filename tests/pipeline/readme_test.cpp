@@ -174,7 +174,7 @@ void expect_formats_to_name_columns(const fs::path& results) {
   EXPECT_GT(tables, 10U);
 }
 
-TEST(Pages, CommandsRunAsTyped) {
+TEST(DocumentationPages, CommandsRunAsTyped) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "hundreds of images; the programs' own tests run under the sanitizers";
 #endif
@@ -211,7 +211,7 @@ std::vector<std::string> program_names() {
   return names;
 }
 
-TEST(Pages, ExistForEachProgram) {
+TEST(DocumentationPages, ExistForEachProgram) {
   const auto names = program_names();
   ASSERT_THAT(names, testing::Contains("vlp-locate"));
   for (const std::string& name : names) {
@@ -246,7 +246,7 @@ std::vector<std::string> named_options(const std::string& code) {
   return matches(code, "(?:^|[ |])(--[a-z][a-z0-9-]*)");
 }
 
-TEST(Pages, NameOptionsOfTheirPrograms) {
+TEST(DocumentationPages, NameOptionsOfTheirPrograms) {
   std::set<std::string> names;
   std::map<std::string, std::set<std::string>> options;
   for (const std::string& name : program_names()) {
@@ -274,7 +274,7 @@ TEST(Pages, NameOptionsOfTheirPrograms) {
   EXPECT_GT(checked, 60U);
 }
 
-TEST(Pages, NamedOptionsAreFoundInCode) {
+TEST(DocumentationPages, NamedOptionsAreFoundInCode) {
   EXPECT_THAT(named_options("vlp-locate FOLDER --camera-on-robot"),
               testing::ElementsAre("--camera-on-robot"));
   EXPECT_THAT(named_options("--gate missing_fraction=0 --json=out/no--option.json"),
@@ -285,7 +285,7 @@ TEST(Pages, NamedOptionsAreFoundInCode) {
 
 /// Each metric has one row in "Choosing gates", marked if its gate is a minimum or not of the
 /// camera.
-TEST(Pages, DefineEachMetricOnce) {
+TEST(DocumentationPages, DefineEachMetricOnce) {
   std::vector<std::string> defined, kinds;
   for (const std::string& line : lines_in(kSource / "apps/choosing-gates.md")) {
     if (!line.starts_with("| `")) continue;
@@ -294,23 +294,25 @@ TEST(Pages, DefineEachMetricOnce) {
     const bool of_camera = cell.find("\u2020") == std::string::npos;
     for (const std::string& name : matches(cell, "`([a-z0-9_]+)`")) {
       defined.push_back(name);
-      const auto kind = metric_kind(name);
+      const auto kind = find_metric_kind(name);
       ASSERT_TRUE(kind) << name;
       EXPECT_EQ(kind->direction == Direction::at_least, at_least) << name;
       EXPECT_EQ(kind->of_camera, of_camera) << name;
     }
   }
-  for (const MetricKind& kind : metric_kinds({MetricSource::station, MetricSource::lens,
-                                              MetricSource::rotation, MetricSource::dispersion,
-                                              MetricSource::evaluation, MetricSource::reference})) {
+  for (const MetricKind& kind : list_metric_kinds(
+           {MetricSource::station, MetricSource::lens, MetricSource::rotation,
+            MetricSource::dispersion, MetricSource::evaluation, MetricSource::reference})) {
     kinds.emplace_back(kind.name);
   }
   EXPECT_THAT(defined, testing::UnorderedElementsAreArray(kinds));
 }
 
-TEST(Pages, ReadmeFitsOnOnePage) { EXPECT_LE(fs::file_size(kSource / "README.md"), 6000U); }
+TEST(DocumentationPages, ReadmeFitsOnOnePage) {
+  EXPECT_LE(fs::file_size(kSource / "README.md"), 6000U);
+}
 
-TEST(Pages, LinksHaveTargets) {
+TEST(DocumentationPages, LinksHaveTargets) {
   std::size_t links = 0;
   for (const fs::path& page : pages()) {
     for (const std::string& link : matches(read_prose(page), "\\]\\(([^)\\s]+)\\)")) {
@@ -326,7 +328,7 @@ TEST(Pages, LinksHaveTargets) {
   EXPECT_GT(links, 100U);
 }
 
-TEST(Pages, PathsExist) {
+TEST(DocumentationPages, NameExistingPaths) {
   // A file of source, with a folder, or anything in a folder of the tree; not with * or such.
   const char* path =
       "`([A-Za-z0-9_.-]+/[A-Za-z0-9_./-]*\\.(?:h|cpp|md|py|sh)"
@@ -407,7 +409,7 @@ std::string read_section(const fs::path& page, const std::string& heading) {
   return std::regex_replace(text, std::regex(" +"), " ");
 }
 
-TEST(Pages, AnswerQuestionsWithinTwoClicks) {
+TEST(DocumentationPages, AnswerQuestionsWithinTwoClicks) {
   std::set<std::string> reached{"README.md"};
   for (int click = 0; click < 2; ++click) {
     for (const std::string& page : std::set(reached)) {
@@ -425,7 +427,7 @@ TEST(Pages, AnswerQuestionsWithinTwoClicks) {
   }
 }
 
-TEST(Pages, EachJsonDocumentHasSchema) {
+TEST(DocumentationPages, EachJsonDocumentHasSchema) {
   std::set<std::string> writers, have_schemas;
   for (const fs::path& file : find_files({".cpp", ".h", ".py", ".sh"})) {
     const std::string name = name_of_page(file);
@@ -451,7 +453,7 @@ TEST(Pages, EachJsonDocumentHasSchema) {
   EXPECT_EQ(writers, have_schemas);
 }
 
-TEST(Pages, NamedTestsAndBenchmarksExist) {
+TEST(DocumentationPages, NamedTestsAndBenchmarksExist) {
   std::string tests;
   for (const fs::path& file : find_files({".cpp", ".txt", ".sh"})) {
     if (name_of_page(file).starts_with("tests/")) tests += TemporaryFolder::read_content(file);
@@ -472,7 +474,7 @@ TEST(Pages, NamedTestsAndBenchmarksExist) {
   EXPECT_GT(programs, 5U);
 }
 
-TEST(Pages, TheoryHasCitedSections) {
+TEST(DocumentationPages, TheoryHasCitedSections) {
   const auto headings = find_headings(kSource / "lib/THEORY.md");
   std::size_t citations = 0;
   for (const fs::path& file : find_files({".h", ".cpp"})) {

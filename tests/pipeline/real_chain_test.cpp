@@ -127,7 +127,9 @@ TEST_F(VlpIntrinsics, YieldsCrlbOfPhoneUnderRealLamps) {
   ASSERT_EQ(limits.exit_code, 0) << limits.errors;
   const CsvTable map(folder / "map.csv");
   ASSERT_EQ(map.rows(), 1);
-  const auto figure = [&](const char* column) { return map.number(0, map.required(column)); };
+  const auto figure = [&](const char* column) {
+    return map.get_number(0, map.get_required_column(column));
+  };
   // n lamps about the camera, S the sum of their squared distances from its axis:
   // sd_x = sigma h / (f sqrt(n)), sd_z = sigma h^2 / (f sqrt(S)); the lens stretches the image by
   // up to 3 k1 r^2 = 2 % there, which makes them smaller.

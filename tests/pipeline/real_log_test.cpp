@@ -62,7 +62,7 @@ class RealLog : public testing::Test {
   void keep_every_third_frame() const {
     const CsvTable all(log / "detections.csv");
     const auto text = [&](std::size_t row, const char* name) {
-      return all.text(row, all.required(name));
+      return all.get_text(row, all.get_required_column(name));
     };
     CsvWriter some(folder / "third.csv", {"image", "lamp", "u_px", "v_px"});
     std::string_view image;
@@ -73,7 +73,7 @@ class RealLog : public testing::Test {
       if (images % 3 != 1) continue;
       some.row({image, text(row, "lamp"), text(row, "u_px"), text(row, "v_px")});
     }
-    some.save_unsynced();
+    some.save_without_fsync();
   }
 
   struct Figures {
@@ -89,18 +89,18 @@ class RealLog : public testing::Test {
     std::vector<Eigen::Vector2d> driven;
     const CsvTable waypoints(log / "path.csv");
     for (std::size_t row = 0; row < waypoints.rows(); ++row) {
-      driven.emplace_back(waypoints.number(row, waypoints.required("x_m")),
-                          waypoints.number(row, waypoints.required("y_m")));
+      driven.emplace_back(waypoints.get_number(row, waypoints.get_required_column("x_m")),
+                          waypoints.get_number(row, waypoints.get_required_column("y_m")));
     }
     const CsvTable fixes(folder / "fixes.csv");
     EXPECT_EQ(fixes.rows(), 5057);
     double sum_m = 0;
     std::vector<double> residuals_px;
     for (std::size_t row = 0; row < fixes.rows(); ++row) {
-      EXPECT_EQ(fixes.text(row, fixes.required("status")), "ok");
-      sum_m += distance_from(driven, {fixes.number(row, fixes.required("x_m")),
-                                      fixes.number(row, fixes.required("y_m"))});
-      residuals_px.push_back(fixes.number(row, fixes.required("residual_px")));
+      EXPECT_EQ(fixes.get_text(row, fixes.get_required_column("status")), "ok");
+      sum_m += distance_from(driven, {fixes.get_number(row, fixes.get_required_column("x_m")),
+                                      fixes.get_number(row, fixes.get_required_column("y_m"))});
+      residuals_px.push_back(fixes.get_number(row, fixes.get_required_column("residual_px")));
     }
     std::nth_element(residuals_px.begin(), residuals_px.begin() + 2528, residuals_px.end());
     return {sum_m / 5057, residuals_px[2528]};
@@ -211,8 +211,8 @@ TEST_F(RealLog, ContradictsGivenLens) {
          {std::pair(log / "path.csv", &driven), std::pair(folder / "fixes.csv", &fixes)}) {
       const CsvTable table(file);
       for (std::size_t row = 0; row < table.rows(); ++row) {
-        points->emplace_back(table.number(row, table.required("x_m")),
-                             table.number(row, table.required("y_m")));
+        points->emplace_back(table.get_number(row, table.get_required_column("x_m")),
+                             table.get_number(row, table.get_required_column("y_m")));
       }
     }
     return path_over_fixes(driven, fixes);
@@ -233,8 +233,8 @@ TEST_F(RealLog, ContradictsGivenLens) {
   const CsvTable fixes(folder / "fixes.csv");
   double variance_m2 = 0;
   for (std::size_t row = 0; row < fixes.rows(); ++row) {
-    const double x_m = fixes.number(row, fixes.required("x_sd_m"));
-    const double y_m = fixes.number(row, fixes.required("y_sd_m"));
+    const double x_m = fixes.get_number(row, fixes.get_required_column("x_sd_m"));
+    const double y_m = fixes.get_number(row, fixes.get_required_column("y_sd_m"));
     variance_m2 += (x_m * x_m + y_m * y_m) / 2 / static_cast<double>(fixes.rows());
   }
   const double ratio = after.mean_distance_m / (0.798 * std::sqrt(variance_m2));

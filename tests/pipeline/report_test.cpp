@@ -40,12 +40,13 @@ class VlpEvaluateReport : public testing::Test {
          " --reference-point 0.1 0 -o" + in("calibration.yaml") + " --plot" + in("dispersion.svg"));
     must("vlp-locate " + kExample + "detections.csv" + rig(kExample + "calibration.yaml") + " -o" +
          in("fixes.csv"));
-    draw(folder / "camera.svg", make_drawing(IntrinsicsPlot{"unit 7",
-                                                            {800, 600},
-                                                            {{{10, 20}, {0.1, 0.2}, false},
-                                                             {{700, 500}, {-0.1, 0.1}, false}},
-                                                            2,
-                                                            {0.1, 0.2, 0.3, 0.4}}));
+    write_plot(folder / "camera.svg",
+               make_gnuplot_drawing(
+                   IntrinsicsPlot{"unit 7",
+                                  {800, 600},
+                                  {{{10, 20}, {0.1, 0.2}, false}, {{700, 500}, {-0.1, 0.1}, false}},
+                                  2,
+                                  {0.1, 0.2, 0.3, 0.4}}));
     folder.file("track.csv",
                 "image,status,x_m,y_m,z_m,yaw_rad,x_sd_m,y_sd_m,z_sd_m,yaw_sd_rad,"
                 "lamps,residual_px\n0,ok,0,0.001,0,0,,,,,3,0.1\n"
@@ -107,9 +108,9 @@ TEST_F(VlpEvaluateReport, RejectsInvalidContent) {
 /// A page that passes, small enough to be broken in many ways.
 std::string good_page() {
   Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, Direction::at_most}}, {}, {}, {}, {}, {}};
-  report.pictures = {
-      make_report_plot(make_drawing(CdfPlot{"errors", {{"fixes", {0.001, 0.002}, 0.001, 0.002}}}))};
-  return report_html(report);
+  report.pictures = {make_report_plot(
+      make_gnuplot_drawing(CdfPlot{"errors", {{"fixes", {0.001, 0.002}, 0.001, 0.002}}}))};
+  return render_report_html(report);
 }
 
 TEST(BrowserCheck, DetectsFaults) {

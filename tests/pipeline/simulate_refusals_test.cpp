@@ -51,7 +51,7 @@ TEST_F(VlpSimulateErrors, KeepFolderOfOtherFiles) {
   }
 }
 
-TEST_F(VlpSimulateErrors, KeepSceneFile) {
+TEST_F(VlpSimulateErrors, RefuseToOverwriteSceneFile) {
   output = folder / "";
   expect_refused("", "scene.yaml: is also an input and would be overwritten");
   EXPECT_EQ(files_below(output).at("scene.yaml"), kSmallScene);

@@ -129,11 +129,13 @@ Differences located_against_truth(const std::filesystem::path& output) {
   EXPECT_EQ(fixes.rows(), truth.rows());
   Differences differences;
   for (std::size_t row = 0; row < fixes.rows() && row < truth.rows(); ++row) {
-    EXPECT_EQ(fixes.text(row, fixes.required("image")), truth.text(row, truth.required("image")));
-    if (fixes.text(row, fixes.required("status")) != "ok") continue;
+    EXPECT_EQ(fixes.get_text(row, fixes.get_required_column("image")),
+              truth.get_text(row, truth.get_required_column("image")));
+    if (fixes.get_text(row, fixes.get_required_column("status")) != "ok") continue;
     ++differences.fixes;
     const auto difference = [&](const char* column) {
-      return fixes.number(row, fixes.required(column)) - truth.number(row, truth.required(column));
+      return fixes.get_number(row, fixes.get_required_column(column)) -
+             truth.get_number(row, truth.get_required_column(column));
     };
     for (const char* axis : {"x_m", "y_m", "z_m"}) {
       differences.position_m = std::max(differences.position_m, std::abs(difference(axis)));

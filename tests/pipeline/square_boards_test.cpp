@@ -142,7 +142,7 @@ TEST_F(VlpIntrinsicsSquareBoards, ArePrintedToScale) {
         run_program("pdftoppm -r 127 -gray -singlefile -png " + page + ".pdf " + page).exit_code,
         0);
     const BoardDetection seen =
-        BoardDetector(print).detect(cv::imread(page + ".png", cv::IMREAD_GRAYSCALE));
+        BoardDetector(print).detect_board(cv::imread(page + ".png", cv::IMREAD_GRAYSCALE));
     ASSERT_EQ(seen.points.size(), static_cast<std::size_t>((print.cols - 1) * (print.rows - 1)));
     const double width_px =
         (seen.points[static_cast<std::size_t>(print.cols - 2)].pixel - seen.points[0].pixel).norm();

@@ -81,7 +81,7 @@ void VlpStationKilled::expect_all_there() const {
     for (const auto& image : run["images"]) {
       const auto file = folder / "station/captures" / ("b." + name) / std::string(image["step"]) /
                         std::string(image["image"]);
-      EXPECT_EQ(sha256_of_file(file), image["sha256"].get<std::string>()) << file;
+      EXPECT_EQ(compute_file_sha256(file), image["sha256"].get<std::string>()) << file;
     }
     const auto results = folder / "station/results/b" / name;
     EXPECT_EQ(TemporaryFolder::read_content(results / "calibration.yaml"), calibration);
@@ -157,7 +157,7 @@ TEST_F(VlpStationKilled, KeepsVerdictWhileRecordsAreUnavailable) {
 }
 
 /// A hook that was not run to its end is known as such, though its run ended.
-TEST_F(VlpStationKilled, ReportsUnfinishedHook) {
+TEST_F(VlpStationKilled, ListsHookAsUnfinishedAfterKill) {
   change("station.yaml", "records: records.db",
          "records: records.db\nhook: {command: [sh, hook.sh]}");
   folder.file("station/hook.sh", "echo $$ >pid.new; mv pid.new pid; exec sleep 100\n");

@@ -36,10 +36,10 @@ class VlpRotationByLamps : public testing::Test {
     return frames;
   }
   ProgramResult level(const std::vector<Frame>& frames, const std::string& options = "") {
-    Calibration extract_camera = rig.calibration;
-    extract_camera.rotation_center.reset();
-    extract_camera.dispersion = Dispersion{{1, 2}, 0, {0, 0}, 1, {}};
-    write_calibration(folder / "camera.yaml", extract_camera);
+    Calibration camera_with_dispersion = rig.calibration;
+    camera_with_dispersion.rotation_center.reset();
+    camera_with_dispersion.dispersion = Dispersion{{1, 2}, 0, {0, 0}, 1, {}};
+    write_calibration(folder / "camera.yaml", camera_with_dispersion);
     write_lamp_map(folder / "lamps.yaml", surveyed);
     write_detections(folder / "detections.csv", frames);
     return run_program("vlp-rotation --method lamps " + path("detections.csv") + "--lamps " +
@@ -130,7 +130,7 @@ TEST_F(VlpRotationByLamps, AcceptsCapturesOfMovingCamera) {
   }
 }
 
-TEST_F(VlpRotationByLamps, ReportsRemedyOrCause) {
+TEST_F(VlpRotationByLamps, RejectsUnusableCapturesWithCause) {
   const auto one = level(drive(1));
   EXPECT_EQ(one.exit_code, 3);
   EXPECT_THAT(one.errors, HasSubstr("add captures"));

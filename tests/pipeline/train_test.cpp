@@ -63,12 +63,12 @@ TEST_F(VlpTrain, MakesClassifierForVlpDetectAndVlpLocate) {
   ASSERT_EQ(found.rows(), 12);
   for (std::size_t row = 0; row < found.rows(); ++row) {
     const auto matches = [&](std::size_t other) {
-      return found.text(row, found.required("image")) ==
-                 truth.text(other, truth.required("image")) &&
-             found.integer(row, found.required("lamp")) ==
-                 truth.integer(other, truth.required("lamp")) &&
-             std::abs(found.number(row, found.required("u_px")) -
-                      truth.number(other, truth.required("u_px"))) < 0.5;
+      return found.get_text(row, found.get_required_column("image")) ==
+                 truth.get_text(other, truth.get_required_column("image")) &&
+             found.get_integer(row, found.get_required_column("lamp")) ==
+                 truth.get_integer(other, truth.get_required_column("lamp")) &&
+             std::abs(found.get_number(row, found.get_required_column("u_px")) -
+                      truth.get_number(other, truth.get_required_column("u_px"))) < 0.5;
     };
     int matching = 0;
     for (std::size_t other = 0; other < truth.rows(); ++other) matching += matches(other);

@@ -65,7 +65,8 @@ TEST_F(VlpDetectVideo, YieldsSameDetectionsAsImages) {
   EXPECT_EQ(with(with(table, "drive.avi#000000", "0000.png"), "drive.avi#000001", "0001.png"),
             TemporaryFolder::read_content(folder / "images.csv"));
   EXPECT_TRUE(fs::exists(folder / "pictures/drive.avi#000001.png"));
-  EXPECT_NEAR(*read_captures(folder / "captures.csv").at("drive.avi#000001").time_s, 0.05, 1e-9);
+  EXPECT_NEAR(*read_captures_csv(folder / "captures.csv").at("drive.avi#000001").time_s, 0.05,
+              1e-9);
   // Both go on to the fixes.
   const auto located = run_program("vlp-locate " + (folder / "film.csv").string() + " --captures " +
                                    (folder / "captures.csv").string() + " --lamps " + kRig +

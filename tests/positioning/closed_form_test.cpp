@@ -11,7 +11,8 @@ namespace vlp {
 namespace {
 
 Sighting seen(const Eigen::Vector3d& lamp_m, const Pose& pose) {
-  return {lamp_m, predict_z(LevelPose(pose), lamp_m), Matrix2::Identity() * 500, 1};
+  return {lamp_m, project_to_normalized_point(LevelPose(pose), lamp_m), Matrix2::Identity() * 500,
+          1};
 }
 
 Pose random_pose(Random& random) {
@@ -21,7 +22,7 @@ Pose random_pose(Random& random) {
 
 void expect_pose(const Pose& pose, const Pose& truth) {
   EXPECT_THAT(pose.position_m, IsNear(truth.position_m, 1e-9));
-  EXPECT_NEAR(wrap_rad(pose.yaw_rad - truth.yaw_rad), 0, 1e-9);
+  EXPECT_NEAR(wrap_angle_rad(pose.yaw_rad - truth.yaw_rad), 0, 1e-9);
 }
 
 TEST(ComputeTwoLampPoses, ReturnsOnlyPoseForEqualHeights) {
@@ -51,8 +52,8 @@ TEST(ComputeTwoLampPoses, ContainsTruthForDifferentHeights) {
     EXPECT_LT((nearest.position_m - truth.position_m).norm(), 1e-6);
     for (int k = 0; k < fix.count; ++k) {
       const LevelPose pose(fix.poses[static_cast<std::size_t>(k)]);
-      EXPECT_THAT(predict_z(pose, a.lamp_m), IsNear(a.z, 1e-9));
-      EXPECT_THAT(predict_z(pose, b.lamp_m), IsNear(b.z, 1e-9));
+      EXPECT_THAT(project_to_normalized_point(pose, a.lamp_m), IsNear(a.z, 1e-9));
+      EXPECT_THAT(project_to_normalized_point(pose, b.lamp_m), IsNear(b.z, 1e-9));
     }
   }
   EXPECT_GT(doubles, 10) << "the ambiguous case was not met";
@@ -74,7 +75,7 @@ TEST(ComputeTwoLampPoses, ReportsLampBelowCamera) {
   EXPECT_TRUE(fix.lamp_below_camera);
 }
 
-TEST(ComputeCoplanarPose, MatchesTruthForThreeLampsOrMore) {
+TEST(ComputePoseFromCoplanarLamps, MatchesTruthForThreeLampsOrMore) {
   Random random(5);
   for (int i = 0; i < 200; ++i) {
     const Pose truth = random_pose(random);
@@ -82,7 +83,7 @@ TEST(ComputeCoplanarPose, MatchesTruthForThreeLampsOrMore) {
     for (int lamp = 0; lamp < 3 + i % 6; ++lamp) {
       sightings.push_back(seen({random.uniform(-1, 1), random.uniform(-1, 1), 2.2}, truth));
     }
-    const auto pose = compute_coplanar_pose(sightings);
+    const auto pose = compute_pose_from_coplanar_lamps(sightings);
     ASSERT_TRUE(pose);
     expect_pose(*pose, truth);
   }

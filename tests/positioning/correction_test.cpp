@@ -43,7 +43,7 @@ TEST_F(LevelFromCamera, TiltMapsZenithToOrigin) {
 }
 
 TEST_F(LevelFromCamera, ShiftSubtractsCenterInUndistortedPlane) {
-  const Eigen::Vector2d principal = calibration.camera.center_px();
+  const Eigen::Vector2d principal = calibration.camera.principal_point_px();
   calibration.rotation_center = {
       RotationModel::shift, principal + Eigen::Vector2d(9, -4), {0, 0, 1}, {}};
   const Eigen::Vector2d moved = seen_at(level_from_camera(calibration, Correction::all), z);

@@ -149,7 +149,8 @@ TEST_F(CommonErrorsTest, MatchesFiniteDifferencesIfOnlyLensIsUncertain) {
 /// A part without derivatives by the lens hides the errors of the lens.
 TEST_F(CommonErrorsTest, StatedReportsLensOnlyWithDerivatives) {
   const auto stated = [&](Correction correction) {
-    return CommonErrors(rig.map.lamps, rig.calibration, correction).stated(CommonErrorSource::lens);
+    return CommonErrors(rig.map.lamps, rig.calibration, correction)
+        .are_errors_known(CommonErrorSource::lens);
   };
   rig.calibrate_in_a_row();
   for (const Correction correction :
@@ -186,13 +187,15 @@ TEST_F(CommonErrorsTest, MatchesWithAndWithoutRowsOfLamps) {
         {lamp.id, lamp.position_m, *lamp.sd_m, Eigen::Matrix<double, 2, 3>::Zero()});
   }
   const CommonErrors large(rig.map.lamps, rig.calibration, Correction::all);
-  EXPECT_EQ(small.joint().rows(), small.shared());
-  EXPECT_EQ(large.joint().rows(), large.shared() + 3 * std::ssize(rig.map.lamps));
+  EXPECT_EQ(small.joint_covariance().rows(), small.num_shared_errors());
+  EXPECT_EQ(large.joint_covariance().rows(),
+            large.num_shared_errors() + 3 * std::ssize(rig.map.lamps));
   const Fix with = Positioner(rig.map, rig.calibration).locate(detections);
   ASSERT_TRUE(with.ok() && without.ok());
   const double scale = with.estimate.covariance.norm();
   EXPECT_THAT(without.estimate.covariance, IsNear(with.estimate.covariance, 1e-12 * scale));
-  EXPECT_TRUE(small.stated() && small.only(CommonErrorSource::lamps).stated());
+  EXPECT_TRUE(small.are_errors_known() &&
+              small.extract_error_source(CommonErrorSource::lamps).are_errors_known());
 }
 
 /// The offset depends on a lamp of the adjustment, whose error is not in the survey.
@@ -206,9 +209,9 @@ TEST_F(CommonErrorsTest, PropagatesAdjustedLampToOffset) {
   dispersion.by_lamps = {{2, rig.map.lamps[1].position_m, 0.001, by_position}};
   const CommonErrors errors(rig.map.lamps, rig.calibration, Correction::all);
   const Eigen::Matrix3d lamp = rig.calibration.adjustment->covariance.block<3, 3>(19, 19);
-  ASSERT_EQ(errors.joint().rows(), 12 + 2 + 2 + 24);
-  const Eigen::Matrix2d offset = errors.joint().block<2, 2>(14, 14);
-  const Eigen::Matrix<double, 2, 3> mixed = errors.joint().block<2, 3>(14, 19);
+  ASSERT_EQ(errors.joint_covariance().rows(), 12 + 2 + 2 + 24);
+  const Eigen::Matrix2d offset = errors.joint_covariance().block<2, 2>(14, 14);
+  const Eigen::Matrix<double, 2, 3> mixed = errors.joint_covariance().block<2, 3>(14, 19);
   EXPECT_THAT(offset, IsNear((by_position * lamp * by_position.transpose()).eval(), 1e-18));
   EXPECT_THAT(mixed, IsNear((by_position * lamp).eval(), 1e-18));
   EXPECT_EQ(errors.lamps_elsewhere(), 0);
@@ -260,7 +263,7 @@ class FindOutlierLamps : public testing::Test {
     sightings.clear();
     for (std::size_t i = 0; i < count; ++i) {
       const Eigen::Vector3d& lamp_m = map.lamps[i].position_m;
-      sightings.push_back({lamp_m, predict_z(LevelPose(fix.pose), lamp_m),
+      sightings.push_back({lamp_m, project_to_normalized_point(LevelPose(fix.pose), lamp_m),
                            Matrix2::Identity() * kFocal_px, kSigma_px});
     }
     common.assign(count, kCommonSd * kCommonSd * Matrix2::Identity());
@@ -272,7 +275,8 @@ class FindOutlierLamps : public testing::Test {
     Eigen::MatrixXd jacobian(2 * std::ssize(sightings), 4);
     Eigen::VectorXd residuals(jacobian.rows());
     for (std::size_t i = 0; i < sightings.size(); ++i) {
-      const Prediction prediction = predict(LevelPose(fix.pose), sightings[i].lamp_m);
+      const Prediction prediction =
+          predict_normalized_point(LevelPose(fix.pose), sightings[i].lamp_m);
       const auto row = 2 * static_cast<Eigen::Index>(i);
       jacobian.middleRows<2>(row) = prediction.d_z_d_state / sd;
       residuals.segment<2>(row) = (sightings[i].z - prediction.z) / sd;
@@ -283,8 +287,8 @@ class FindOutlierLamps : public testing::Test {
   void displace(std::size_t lamp, double factor) {
     const Eigen::Vector2d exact = sightings[lamp].z, direction(0.8, -0.6);
     sightings[lamp].z = exact + direction;
-    const double bound =
-        chi_squared_bound(kSigmasOfOneInTenThousand, 2 * static_cast<double>(sightings.size()) - 4);
+    const double bound = compute_chi_squared_bound(kSigmasOfOneInTenThousand,
+                                                   2 * static_cast<double>(sightings.size()) - 4);
     sightings[lamp].z = exact + std::sqrt(factor * bound / compute_chi_squared()) * direction;
   }
 };

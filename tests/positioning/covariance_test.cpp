@@ -5,8 +5,8 @@
 /// fraction of 5 % to 0.15 %.
 #include <gtest/gtest.h>
 
-#include "positioning/error_budget.h"
 #include "positioning/closed_form.h"
+#include "positioning/error_budget.h"
 #include "positioning/positioner.h"
 #include "support/body_rig.h"
 #include "support/scatter.h"
@@ -281,11 +281,11 @@ TEST(FixCovariance, ClosedFormsReachCramerRaoBoundWithPinhole) {
     Random random(16);
     for (int i = 0; i < kDraws; ++i) {
       for (Sighting& sighting : sightings) {
-        sighting.z = predict_z(camera, sighting.lamp_m) +
+        sighting.z = project_to_normalized_point(camera, sighting.lamp_m) +
                      sigma_px / 520 * Eigen::Vector2d(random.normal(), random.normal());
       }
       scatter.add(lamps == 2 ? compute_two_lamp_poses(sightings[0], sightings[1]).poses[0]
-                             : compute_coplanar_pose(sightings).value());
+                             : compute_pose_from_coplanar_lamps(sightings).value());
     }
     expect_efficient(scatter);
   }

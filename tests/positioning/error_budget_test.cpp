@@ -15,7 +15,7 @@
 namespace vlp {
 namespace {
 
-std::vector<Eigen::Vector3d> positions_of(const LampMap& map) {
+std::vector<Eigen::Vector3d> get_lamp_positions(const LampMap& map) {
   std::vector<Eigen::Vector3d> positions_m;
   for (const Lamp& lamp : map.lamps) positions_m.push_back(lamp.position_m);
   return positions_m;
@@ -25,7 +25,7 @@ TEST(ComputeErrorBudget, MatchesFormulaForPinholeAndEqualHeights) {
   const double focal_px = 520, sigma_px = 0.3;
   const Lens lens(LensModel::pinhole, std::array{focal_px, focal_px, 400.0, 300.0});
   for (const std::size_t n : {2u, 3u, 5u, 8u}) {
-    auto lamps_m = positions_of(synthetic_lamps());
+    auto lamps_m = get_lamp_positions(synthetic_lamps());
     lamps_m.resize(n);
     const Pose pose{{0.4, -0.7, 0.25}, 1.1};
     const Eigen::Vector3d mean =
@@ -55,8 +55,8 @@ class ErrorBudgetTerm : public testing::Test {
 
   ErrorBudget budget(const ErrorSources& sources) {
     const Camera& camera = rig.calibration.camera;
-    return compute_error_budget(positions_of(rig.map), Lens(camera.lens_model, camera.intrinsics),
-                                rig.camera, sources)
+    return compute_error_budget(get_lamp_positions(rig.map),
+                                Lens(camera.lens_model, camera.intrinsics), rig.camera, sources)
         .value();
   }
 
@@ -122,12 +122,12 @@ TEST_F(ErrorBudgetTerm, NoiseMatchesScatter) {
   });
 }
 
-TEST(ComputeErrorBudget, TotalIsSumOfSources) {
+TEST(ComputeErrorBudget, TotalCovarianceIsSumOfSourceCovariances) {
   const Lens lens(LensModel::pinhole, std::array{520.0, 520.0, 400.0, 300.0});
-  const auto budget = compute_error_budget(positions_of(synthetic_lamps()), lens, {{0, 0, 0}, 0},
-                                           {0.1, 0.2, 0.003, 0.004});
+  const auto budget = compute_error_budget(get_lamp_positions(synthetic_lamps()), lens,
+                                           {{0, 0, 0}, 0}, {0.1, 0.2, 0.003, 0.004});
   ASSERT_TRUE(budget);
-  EXPECT_THAT(budget->total(),
+  EXPECT_THAT(budget->total_covariance(),
               IsNear(Matrix4(budget->noise + budget->center + budget->tilt + budget->lamp_map), 0));
   EXPECT_GT(budget->lamp_map(0, 0), 0);
 }
@@ -168,8 +168,9 @@ class ErrorBudgetWithPrior : public testing::TestWithParam<FreeStates> {
   }
   std::optional<ErrorBudget> budget(const BodyPrior& prior) const {
     const Camera& camera = rig.calibration.camera;
-    return compute_error_budget(positions_of(rig.map), Lens(camera.lens_model, camera.intrinsics),
-                                rig.body.pose, sources, prior, make_row_clock(camera));
+    return compute_error_budget(get_lamp_positions(rig.map),
+                                Lens(camera.lens_model, camera.intrinsics), rig.body.pose, sources,
+                                prior, make_row_clock(camera));
   }
   Eigen::Vector4d locate(const BodyRig& with, const std::vector<Detection>& detections) const {
     const Fix fix = with.positioner().locate(detections, sensors());
@@ -202,9 +203,10 @@ TEST_P(ErrorBudgetWithPrior, MatchesReportedCovarianceOfFix) {
   const auto& [drive, turn, lean] = GetParam();
   EXPECT_EQ(found->motion.diagonal().minCoeff() > 0, drive || turn);
   EXPECT_EQ(found->roll_pitch.diagonal().maxCoeff() > 1e-12, lean);
-  EXPECT_THAT(found->total(), IsNear(Matrix4(found->noise + found->motion + found->roll_pitch +
-                                             found->center + found->tilt + found->lamp_map),
-                                     1e-15));
+  EXPECT_THAT(found->total_covariance(),
+              IsNear(Matrix4(found->noise + found->motion + found->roll_pitch + found->center +
+                             found->tilt + found->lamp_map),
+                     1e-15));
 }
 
 /// The effects of single errors on fixes match the budget.
@@ -240,7 +242,7 @@ TEST_P(ErrorBudgetWithPrior, MatchesEffectOfErrorsOnFix) {
     }
   }
   // Errors of second order in the steps. Two errors change four states: yaw and height barely.
-  const Eigen::Vector4d scale = found->total().diagonal().cwiseSqrt();
+  const Eigen::Vector4d scale = found->total_covariance().diagonal().cwiseSqrt();
   const auto relative = [&](const Eigen::Matrix4d& difference) {
     return difference.cwiseQuotient(scale * scale.transpose()).cwiseAbs().maxCoeff();
   };
@@ -268,11 +270,12 @@ TEST_F(ErrorBudgetPriorCases, MatchesStandingCameraWhenPriorIsTight) {
   prior.velocity_sd_m_per_s = prior.inclination_sd_rad = 1e-7;
   const auto found = budget(prior);
   const Camera& camera = rig.calibration.camera;
-  const auto standing = compute_error_budget(
-      positions_of(rig.map), Lens(camera.lens_model, camera.intrinsics), rig.body.pose, sources);
+  const auto standing =
+      compute_error_budget(get_lamp_positions(rig.map), Lens(camera.lens_model, camera.intrinsics),
+                           rig.body.pose, sources);
   ASSERT_TRUE(found && standing);
   expect_close(found->noise, standing->noise, 1e-6);
-  expect_close(found->total(), standing->total(), 1e-6);
+  expect_close(found->total_covariance(), standing->total_covariance(), 1e-6);
 }
 
 /// An unknown tilt is estimated, independently of the calibration.

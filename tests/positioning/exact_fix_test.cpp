@@ -36,7 +36,7 @@ void expect_exact(const SyntheticRig& rig, const Sensors& sensors = {}) {
   ASSERT_TRUE(fix.ok()) << to_string(fix.status);
   EXPECT_EQ(fix.lamps, static_cast<int>(detections.size()));
   EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, kExact_m));
-  EXPECT_NEAR(wrap_rad(fix.estimate.pose.yaw_rad - rig.camera.yaw_rad), 0, kExact_rad);
+  EXPECT_NEAR(wrap_angle_rad(fix.estimate.pose.yaw_rad - rig.camera.yaw_rad), 0, kExact_rad);
   EXPECT_NEAR(fix.residual_px, 0, 1e-6);  // 1e-9 m at f / H = 325 px/m
 }
 

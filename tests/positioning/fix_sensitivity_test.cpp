@@ -142,7 +142,7 @@ TEST_F(FixSensitivity, MatchesCovarianceOfLevelCamera) {
 }
 
 /// The fix weights equal noise in the undistorted image; the covariance is for the image.
-TEST_F(FixSensitivity, MatchesCovarianceWithoutReportedSigma) {
+TEST_F(FixSensitivity, CovarianceMatchesSensitivityWhenSigmaIsUnset) {
   stand_level();
   options.unstated_sigma_px = 0.3;
   for (const std::size_t lamps : {2u, 3u, 8u}) {
@@ -162,7 +162,7 @@ TEST_F(FixSensitivity, MatchesCovarianceOfRobotWithExactInclination) {
   expect_matches();
 }
 
-TEST_F(FixSensitivity, MatchesCovarianceForOneLamp) {
+TEST_F(FixSensitivity, CovarianceMatchesNumericalSensitivityForOneLamp) {
   for (const bool on_robot : {false, true}) {
     SCOPED_TRACE(on_robot);
     if (on_robot) rig.mount = CameraMount{{0.3, -0.2, 0.4}, 0.5};

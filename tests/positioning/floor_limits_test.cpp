@@ -55,10 +55,10 @@ TEST(FindVisibleLamps, DependsOnYaw) {
   EXPECT_EQ(find_visible_lamps(map, pinhole_camera(), {{0, 0, 0}, M_PI / 2}).size(), 0);
 }
 
-TEST(ComputeFloorLimits, CoversGridRowByRow) {
+TEST(ComputeAccuracyLimitsOnFloor, CoversGridRowByRow) {
   const LampMap map = synthetic_lamps();
-  const auto limits =
-      compute_floor_limits(map, pinhole_camera(), {0, 0.3, -0.1, 0.1, 0.1}, 0.2, 0, kNoise);
+  const auto limits = compute_accuracy_limits_on_floor(map, pinhole_camera(),
+                                                       {0, 0.3, -0.1, 0.1, 0.1}, 0.2, 0, kNoise);
   ASSERT_EQ(limits.places.size(), 4 * 3);
   ASSERT_FALSE(limits.sources.empty());
   EXPECT_THAT(limits.places[5].camera.position_m, IsNear(Eigen::Vector3d(0.1, 0, 0.2), 1e-15));
@@ -67,7 +67,7 @@ TEST(ComputeFloorLimits, CoversGridRowByRow) {
   }
 }
 
-TEST(ComputeFloorLimits, IncludesMotionAndLeanWhenFree) {
+TEST(ComputeAccuracyLimitsOnFloor, IncludesMotionAndLeanWhenFree) {
   Camera camera = pinhole_camera();
   camera.row_time_s = 3e-5;
   camera.readout = Readout::rows;
@@ -75,8 +75,10 @@ TEST(ComputeFloorLimits, IncludesMotionAndLeanWhenFree) {
   prior.velocity_sd_m_per_s = 1;
   prior.inclination_sd_rad = 2;
   const FloorGrid grid{-1.5, 1.5, -0.3, 0.3, 0.3};
-  const auto standing = compute_floor_limits(synthetic_lamps(), camera, grid, 0.2, 0, kNoise);
-  const auto limits = compute_floor_limits(synthetic_lamps(), camera, grid, 0.2, 0, kNoise, prior);
+  const auto standing =
+      compute_accuracy_limits_on_floor(synthetic_lamps(), camera, grid, 0.2, 0, kNoise);
+  const auto limits =
+      compute_accuracy_limits_on_floor(synthetic_lamps(), camera, grid, 0.2, 0, kNoise, prior);
   ASSERT_EQ(limits.sources.size(), 6);
   EXPECT_EQ(limits.sources[1].key, "motion");
   EXPECT_EQ(limits.sources[2].key, "roll_pitch");
@@ -95,17 +97,18 @@ TEST(ComputeFloorLimits, IncludesMotionAndLeanWhenFree) {
     ASSERT_FALSE(standing.places[i].parts.empty());
     // Additional estimated states increase the covariance.
     EXPECT_THAT(place.parts[0], IsNear(standing.places[i].parts[0], 1e-12));
-    EXPECT_GT(place.total()(0, 0), standing.places[i].total()(0, 0));
+    EXPECT_GT(place.total_covariance()(0, 0), standing.places[i].total_covariance()(0, 0));
   }
   EXPECT_GT(with_fix, 0);
   EXPECT_GT(without, 0) << "some see too few lamps for roll and pitch";
 }
 
-TEST(ComputeFloorLimits, MatchesScatterWithFisheye) {
+TEST(ComputeAccuracyLimitsOnFloor, MatchesScatterWithFisheye) {
   constexpr int draws = 4000;
   const FloorGrid grid{-1.2, 1.2, 0.2, 0.2, 0.8};
   SyntheticRig rig{synthetic_lamps(), {fisheye_camera(), {}, {}, {}, {}}, {}, {}};
-  const auto limits = compute_floor_limits(rig.map, rig.calibration.camera, grid, 0.2, 0.5, kNoise);
+  const auto limits =
+      compute_accuracy_limits_on_floor(rig.map, rig.calibration.camera, grid, 0.2, 0.5, kNoise);
   ASSERT_EQ(limits.places.size(), 4);
   const Positioner positioner(rig.map, rig.calibration);
   Random random{23};
@@ -123,17 +126,18 @@ TEST(ComputeFloorLimits, MatchesScatterWithFisheye) {
   }
 }
 
-TEST(ComputeFloorLimits, ReturnsNoPartsWithoutVisibleLamps) {
-  const auto limits =
-      compute_floor_limits(synthetic_lamps(), pinhole_camera(), {50, 50, 0, 0, 1}, 0, 0, kNoise);
+TEST(ComputeAccuracyLimitsOnFloor, ReturnsNoPartsWithoutVisibleLamps) {
+  const auto limits = compute_accuracy_limits_on_floor(synthetic_lamps(), pinhole_camera(),
+                                                       {50, 50, 0, 0, 1}, 0, 0, kNoise);
   ASSERT_EQ(limits.places.size(), 1);
   EXPECT_EQ(limits.places[0].lamps, 0);
   EXPECT_TRUE(limits.places[0].parts.empty());
 }
 
-TEST(ComputeFloorLimits, ThrowsOnInvalidGrid) {
+TEST(ComputeAccuracyLimitsOnFloor, ThrowsOnInvalidGrid) {
   const auto on = [](const FloorGrid& grid) {
-    return compute_floor_limits(synthetic_lamps(), pinhole_camera(), grid, 0, 0, kNoise);
+    return compute_accuracy_limits_on_floor(synthetic_lamps(), pinhole_camera(), grid, 0, 0,
+                                            kNoise);
   };
   EXPECT_THROW(on({0, 1, 0, 1, 0}), std::invalid_argument);
   EXPECT_THROW(on({0, 1, 0, 1, -1}), std::invalid_argument);
@@ -143,8 +147,8 @@ TEST(ComputeFloorLimits, ThrowsOnInvalidGrid) {
   EXPECT_THROW(on({0, NAN, 0, 1, 0.1}), std::invalid_argument);
 }
 
-TEST(MakeFloorGrid, ReturnsBoundingBoxOfLamps) {
-  const FloorGrid grid = make_floor_grid(synthetic_lamps(), 0.05);
+TEST(MakeGridOfFloorPositions, ReturnsBoundingBoxOfLamps) {
+  const FloorGrid grid = make_grid_of_floor_positions(synthetic_lamps(), 0.05);
   EXPECT_EQ(grid.x_min_m, -0.8);
   EXPECT_EQ(grid.x_max_m, 0.8);
   EXPECT_EQ(grid.y_min_m, -0.5);

@@ -24,33 +24,34 @@ std::array<Sighting, 5> sightings() {
                                                {0, 0.5, 1.8}};
   std::array<Sighting, 5> seen;
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    seen[i] = {lamps_m[i], predict_z(LevelPose(kTruth), lamps_m[i]), Matrix2::Identity(), 0.05};
+    seen[i] = {lamps_m[i], project_to_normalized_point(LevelPose(kTruth), lamps_m[i]),
+               Matrix2::Identity(), 0.05};
   }
   return seen;
 }
 
-TEST(FindConsensus, ReturnsPoseWithSmallestResidualsAmongEqualCounts) {
+TEST(FindLargestConsistentSet, ReturnsPoseWithSmallestResidualsAmongEqualCounts) {
   auto seen = sightings();
   seen[0].z.x() += 0.004;  // the first pairs propose wrong poses
-  const auto consensus = find_consensus(seen, 0.1);
+  const auto consensus = find_largest_consistent_set(seen, 0.1);
   ASSERT_TRUE(consensus);
   EXPECT_EQ(consensus->count, 5u);
   EXPECT_THAT(consensus->pose.position_m, IsNear(kTruth.position_m, 1e-12));
 }
 
-TEST(FindConsensus, ReturnsNulloptWithoutMajorityOfThree) {
+TEST(FindLargestConsistentSet, ReturnsNulloptWithoutMajorityOfThree) {
   auto seen = sightings();
   seen[0].z.x() += 0.1, seen[1].z.y() -= 0.15;
-  const auto consensus = find_consensus(seen, 0.01);
+  const auto consensus = find_largest_consistent_set(seen, 0.01);
   ASSERT_TRUE(consensus);
   EXPECT_EQ(consensus->agreeing.to_ulong(), 0b11100u);
-  EXPECT_FALSE(find_consensus(std::span(seen).first(4), 0.01)) << "two of four";
+  EXPECT_FALSE(find_largest_consistent_set(std::span(seen).first(4), 0.01)) << "two of four";
 }
 
-TEST(EstimatePoseChecked, ReturnsDegenerateWhenHeightSdExceedsHeight) {
+TEST(EstimateAndCheckPose, ReturnsDegenerateWhenHeightSdExceedsHeight) {
   auto seen = sightings();
   for (Sighting& sighting : seen) sighting.lamp_m.z() += 2;  // all of it 2 m higher
-  const ConsistentFix fix = estimate_pose_checked(seen, 1);
+  const ConsistentFix fix = estimate_and_check_pose(seen, 1);
   ASSERT_EQ(fix.status, FixStatus::ok);
   EXPECT_NEAR(fix.fix.pose.position_m.z(), 2, 1e-9);
   const double height_m = seen.front().lamp_m.z() - 2;
@@ -59,7 +60,7 @@ TEST(EstimatePoseChecked, ReturnsDegenerateWhenHeightSdExceedsHeight) {
        {std::pair(0.98, FixStatus::ok), {1.02, FixStatus::degenerate}}) {
     auto noisy = seen;
     for (Sighting& sighting : noisy) sighting.sigma_px *= factor * height_m / height_sd_m;
-    EXPECT_EQ(estimate_pose_checked(noisy, 1).status, status) << factor;
+    EXPECT_EQ(estimate_and_check_pose(noisy, 1).status, status) << factor;
   }
 }
 

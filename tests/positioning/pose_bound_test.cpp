@@ -26,7 +26,7 @@ struct OverLimit {
     }
     Eigen::Array4d error;
     error << (fix.estimate.pose.position_m - truth.position_m).array(),
-        wrap_rad(fix.estimate.pose.yaw_rad - truth.yaw_rad);
+        wrap_angle_rad(fix.estimate.pose.yaw_rad - truth.yaw_rad);
     over_limit += error.square() / limit.diagonal().array();
     over_stated += error.square() / fix.noise_covariance.diagonal().array();
     ++fixes;
@@ -42,22 +42,22 @@ std::optional<Matrix4> compute_limit(const BodyRig& rig, const Sensors& sensors)
   return exact.noise_covariance;
 }
 
-TEST(MayMove, ReturnsTrueForAnyFreeVelocityOrYawRate) {
+TEST(IsMotionEstimated, ReturnsTrueForAnyFreeVelocityOrYawRate) {
   BodyPrior prior;
-  EXPECT_FALSE(may_move(prior) || is_free(prior));
+  EXPECT_FALSE(is_motion_estimated(prior) || is_motion_or_tilt_estimated(prior));
   prior.velocity_sd_m_per_s = 0.01;
-  EXPECT_TRUE(may_move(prior) && is_free(prior));
+  EXPECT_TRUE(is_motion_estimated(prior) && is_motion_or_tilt_estimated(prior));
   prior.velocity_sd_m_per_s = 0;
   prior.yaw_rate_sd_rad_per_s = 0.01;
-  EXPECT_TRUE(may_move(prior) && is_free(prior));
+  EXPECT_TRUE(is_motion_estimated(prior) && is_motion_or_tilt_estimated(prior));
   prior.yaw_rate_sd_rad_per_s = 0;
   prior.inclination_sd_rad = 0.01;
-  EXPECT_TRUE(!may_move(prior) && is_free(prior));
+  EXPECT_TRUE(!is_motion_estimated(prior) && is_motion_or_tilt_estimated(prior));
 }
 
 /// Four or five lamps of a ceiling, tilt of up to 80 degrees known from the image alone: errors at
 /// most 1.5 times the bound of six states.
-TEST(BodyLimit, FixErrorsStayNearBoundForAnyTilt) {
+TEST(BodyPoseBound, FixErrorsStayNearBoundForAnyTilt) {
   Random random(81);
   Sensors in_hand;
   in_hand.inclination_sigma_rad = 1.6;
@@ -93,7 +93,7 @@ TEST(BodyLimit, FixErrorsStayNearBoundForAnyTilt) {
 
 /// A camera at rest with a prior of up to 2 m/s: its errors are 0.9 to 1.1 of the reported standard
 /// deviations, with four lamps and with eight.
-TEST(BodyLimit, FixErrorsMatchReportedWithFreeMotion) {
+TEST(BodyPoseBound, FixErrorsMatchReportedWithFreeMotion) {
   Random random(82);
   Sensors might_drive;
   might_drive.motion = KnownMotion::up_to(2, rad_from_deg(180));

@@ -77,7 +77,7 @@ Sensors sensors_for(const BodyState& state, const Estimated& estimated) {
 void expect_state(const Fix& fix, const BodyState& state, double tolerance) {
   ASSERT_TRUE(fix.ok()) << to_string(fix.status);
   EXPECT_THAT(fix.estimate.pose.position_m, IsNear(state.pose.position_m, tolerance));
-  EXPECT_NEAR(wrap_rad(fix.estimate.pose.yaw_rad - state.pose.yaw_rad), 0, tolerance);
+  EXPECT_NEAR(wrap_angle_rad(fix.estimate.pose.yaw_rad - state.pose.yaw_rad), 0, tolerance);
   ASSERT_TRUE(fix.body.has_value());
   const Eigen::Vector2d velocity =
       Eigen::Rotation2Dd(state.pose.yaw_rad) * state.motion.velocity_m_per_s;
@@ -85,8 +85,8 @@ void expect_state(const Fix& fix, const BodyState& state, double tolerance) {
   EXPECT_THAT(fix.body->velocity_m_per_s, IsNear(velocity, 100 * tolerance));
   EXPECT_NEAR(fix.body->yaw_rate_rad_per_s, state.motion.yaw_rate_rad_per_s, 100 * tolerance);
   const Inclination& lean = state.motion.inclination;
-  EXPECT_NEAR(wrap_rad(fix.body->inclination.roll_rad - lean.roll_rad), 0, tolerance);
-  EXPECT_NEAR(wrap_rad(fix.body->inclination.pitch_rad - lean.pitch_rad), 0, tolerance);
+  EXPECT_NEAR(wrap_angle_rad(fix.body->inclination.roll_rad - lean.roll_rad), 0, tolerance);
+  EXPECT_NEAR(wrap_angle_rad(fix.body->inclination.pitch_rad - lean.pitch_rad), 0, tolerance);
 }
 
 class PositionerNoiselessBody : public testing::TestWithParam<Estimated> {
@@ -179,7 +179,7 @@ TEST(EvaluatedState, DerivativesMatchFiniteDifferences) {
     const BodyState state = random_state(random, 1.4);
     const Eigen::Vector3d lamp_m(1.1, 0.4, 2.5);
     const double time_s = random.uniform(-0.2, 0.2);
-    const auto derivative = EvaluatedState(state).d_lamp_in_body(lamp_m, time_s);
+    const auto derivative = EvaluatedState(state).d_lamp_in_body_d_state(lamp_m, time_s);
     for (int index = 0; index < kBodyStates; ++index) {
       const auto q = [&](double change) {
         BodyState at = state;

@@ -29,7 +29,7 @@ Fix fix_with(double chi_squared, double common_chi_squared, double degrees_of_fr
 
 TEST(SumResiduals, IgnoresFixesWithoutRedundancy) {
   const std::vector<Fix> fixes{fix_with(12, 2, 8), Fix(), fix_with(5, 1, 0), fix_with(6, 0, 4)};
-  const ResidualSums sums = sum_squared_residuals(fixes);
+  const ResidualSums sums = sum_squared_residuals_of_fixes(fixes);
   EXPECT_EQ(sums.degrees_of_freedom, 12);
   EXPECT_EQ(sums.chi_squared, 18);
   EXPECT_EQ(sums.common_chi_squared, 2);
@@ -40,21 +40,22 @@ TEST(SumResiduals, ExcludesFixWithWrongLamp) {
   // The median of 1, 1.25 and the third one's ratio is 1.25, and 25 times that is 31.25.
   for (const auto& [chi_squared, sum] : {std::pair(124.0, 133.0), {126.0, 9.0}, {3000.0, 9.0}}) {
     const std::vector<Fix> fixes{fix_with(5, 0, 4), fix_with(4, 0, 4), fix_with(chi_squared, 0, 4)};
-    EXPECT_EQ(sum_squared_residuals(fixes).chi_squared, sum);
+    EXPECT_EQ(sum_squared_residuals_of_fixes(fixes).chi_squared, sum);
   }
 }
 
-TEST(EstimateNoiseFactor, SubtractsCommonErrors) {
-  EXPECT_DOUBLE_EQ(estimate_noise_factor({.chi_squared = 36, .degrees_of_freedom = 9}).value(), 2);
+TEST(EstimateNoiseScaleFactor, SubtractsCommonErrors) {
   EXPECT_DOUBLE_EQ(
-      estimate_noise_factor({.chi_squared = 36, .common_chi_squared = 27, .degrees_of_freedom = 9})
-          .value(),
-      1);
-  EXPECT_EQ(
-      estimate_noise_factor({.chi_squared = 36, .common_chi_squared = 35, .degrees_of_freedom = 9})
-          .value(),
-      1);
-  EXPECT_FALSE(estimate_noise_factor({}));
+      estimate_noise_scale_factor({.chi_squared = 36, .degrees_of_freedom = 9}).value(), 2);
+  EXPECT_DOUBLE_EQ(estimate_noise_scale_factor(
+                       {.chi_squared = 36, .common_chi_squared = 27, .degrees_of_freedom = 9})
+                       .value(),
+                   1);
+  EXPECT_EQ(estimate_noise_scale_factor(
+                {.chi_squared = 36, .common_chi_squared = 35, .degrees_of_freedom = 9})
+                .value(),
+            1);
+  EXPECT_FALSE(estimate_noise_scale_factor({}));
 }
 
 TEST(EstimateBirgeRatio, ReturnsOneWhenResidualsAreNotLarger) {
@@ -67,7 +68,7 @@ TEST(EstimateBirgeRatio, ReturnsOneWhenResidualsAreNotLarger) {
 }
 
 /// Mean of chi_squared over fixes of a rig whose lamps have random offsets from the map.
-class ExpectedChiSquared : public testing::Test {
+class ComputeExpectedChiSquared : public testing::Test {
  protected:
   void SetUp() override {
     rig.map = synthetic_lamps();
@@ -103,15 +104,15 @@ class ExpectedChiSquared : public testing::Test {
   Random random{5};
 };
 
-TEST_F(ExpectedChiSquared, MatchesMeanOfStandingCamera) { expect_mean({}); }
+TEST_F(ComputeExpectedChiSquared, MatchesMeanOfStandingCamera) { expect_mean({}); }
 
-TEST_F(ExpectedChiSquared, MatchesMeanWithEstimatedTilt) {
+TEST_F(ComputeExpectedChiSquared, MatchesMeanWithEstimatedTilt) {
   Sensors sensors;
   sensors.inclination_sigma_rad = 0.01;
   expect_mean(sensors);
 }
 
-TEST_F(ExpectedChiSquared, ReturnsZeroUnlessRequested) {
+TEST_F(ComputeExpectedChiSquared, ReturnsZeroUnlessRequested) {
   const Fix fix = Positioner(rig.map, rig.calibration).locate(seen_from(rig, kPixelSd_px));
   ASSERT_TRUE(fix.ok());
   EXPECT_EQ(fix.common_chi_squared, 0);

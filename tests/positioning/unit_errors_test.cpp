@@ -43,7 +43,7 @@ std::vector<std::size_t> all_lamps() {
 }
 
 UnitBudget compute_budget(const StatedRig& rig) {
-  return *UnitErrors(rig.map, rig.calibration).budget(rig.camera, all_lamps(), kNoise_px);
+  return *UnitErrors(rig.map, rig.calibration).compute_budget(rig.camera, all_lamps(), kNoise_px);
 }
 
 /// seen_from() does not apply the dispersion.
@@ -62,7 +62,7 @@ std::vector<Detection> make_detections(const StatedRig& rig) {
 
 class UnitErrorsParts : public testing::TestWithParam<StatedRig> {};
 
-TEST_P(UnitErrorsParts, BudgetMatchesReportedCovarianceOfFix) {
+TEST_P(UnitErrorsParts, BudgetEqualsCovarianceOfFix) {
   const StatedRig& rig = GetParam();
   const Fix fix = Positioner(rig.map, rig.calibration).locate(make_detections(rig));
   ASSERT_TRUE(fix.ok());
@@ -76,11 +76,11 @@ TEST_P(UnitErrorsParts, BudgetMatchesReportedCovarianceOfFix) {
   EXPECT_LT((budget.common() - common).cwiseQuotient(scale).cwiseAbs().maxCoeff(), stopped);
   EXPECT_LT((budget.noise - fix.noise_covariance).cwiseQuotient(scale).cwiseAbs().maxCoeff(),
             stopped);
-  EXPECT_EQ(budget.total(), Matrix4(budget.noise + budget.common()));
+  EXPECT_EQ(budget.total_covariance(), Matrix4(budget.noise + budget.common()));
 }
 
 /// The same for a camera that may move and be tilted.
-TEST_P(UnitErrorsParts, BudgetMatchesReportedCovarianceWithFreeMotion) {
+TEST_P(UnitErrorsParts, BudgetEqualsCovarianceWithFreeMotion) {
   StatedRig rig = GetParam();
   rig.calibration.camera.row_time_s = 55e-6;
   rig.calibration.camera.readout = Readout::rows;
@@ -94,8 +94,8 @@ TEST_P(UnitErrorsParts, BudgetMatchesReportedCovarianceWithFreeMotion) {
   prior.velocity_sd_m_per_s = 1;
   prior.yaw_rate_sd_rad_per_s = 0.5;
   prior.inclination_sd_rad = 0.1;
-  const auto budget =
-      UnitErrors(rig.map, rig.calibration).budget(rig.camera, all_lamps(), kNoise_px, prior);
+  const auto budget = UnitErrors(rig.map, rig.calibration)
+                          .compute_budget(rig.camera, all_lamps(), kNoise_px, prior);
   ASSERT_TRUE(budget);
   const Eigen::Vector4d sd = fix.estimate.covariance.diagonal().cwiseSqrt();
   const Eigen::Matrix4d scale = sd * sd.transpose();
@@ -106,17 +106,18 @@ TEST_P(UnitErrorsParts, BudgetMatchesReportedCovarianceWithFreeMotion) {
   EXPECT_LT(differ(budget->noise + budget->motion + budget->roll_pitch, fix.noise_covariance),
             stopped);
   EXPECT_LT(differ(budget->common(), fix.estimate.covariance - fix.noise_covariance), stopped);
-  EXPECT_LT(differ(budget->total(), fix.estimate.covariance), stopped);
+  EXPECT_LT(differ(budget->total_covariance(), fix.estimate.covariance), stopped);
   EXPECT_GT(budget->roll_pitch(0, 0), budget->noise(0, 0)) << "unknown roll and pitch cost much";
 }
 
 TEST_P(UnitErrorsParts, SumToJointCovariance) {
   const StatedRig& rig = GetParam();
   const UnitErrors unit(rig.map, rig.calibration);
-  const Eigen::MatrixXd& whole = unit.common().joint();
+  const Eigen::MatrixXd& whole = unit.common().joint_covariance();
   ASSERT_GT(whole.rows(), 0);
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(whole.rows(), whole.cols());
-  for (const CommonErrorSource part : kCommonErrorSources) sum += unit.common().only(part).joint();
+  for (const CommonErrorSource part : kCommonErrorSources)
+    sum += unit.common().extract_error_source(part).joint_covariance();
   const Eigen::VectorXd inverse_sd = whole.diagonal().cwiseSqrt().cwiseInverse();
   EXPECT_THAT(inverse_sd.asDiagonal() * (sum - whole) * inverse_sd.asDiagonal(),
               IsNear(Eigen::MatrixXd::Zero(whole.rows(), whole.cols()), 1e-13));
@@ -126,9 +127,9 @@ TEST_P(UnitErrorsParts, ArePositiveSemidefinite) {
   const UnitBudget budget = compute_budget(GetParam());
   for (const Matrix4& part :
        {budget.noise, budget.lens, budget.zenith, budget.offset, budget.lamp_map}) {
-    const Eigen::Vector4d sd = budget.total().diagonal().cwiseSqrt().cwiseInverse();
+    const Eigen::Vector4d sd = budget.total_covariance().diagonal().cwiseSqrt().cwiseInverse();
     const Eigen::MatrixXd scaled = sd.asDiagonal() * part * sd.asDiagonal();
-    EXPECT_GT(decompose_symmetric(scaled).values.minCoeff(), -1e-9);
+    EXPECT_GT(eigendecompose_symmetric(scaled).values.minCoeff(), -1e-9);
   }
 }
 
@@ -199,11 +200,11 @@ TEST(UnitErrors, BudgetMatchesErrorsOfDrawnCalibrations) {
     ASSERT_TRUE(fix.ok());
     const Eigen::Vector4d off = compute_pose_error(fix, rig.camera);
     scatter += off * off.transpose() / trials;
-    nees.add(off, budget.total());
+    nees.add(off, budget.total_covariance());
   }
   // 2000 draws determine a variance to 3.2 %, its root to half of that.
   for (int i = 0; i < 4; ++i) {
-    EXPECT_NEAR(std::sqrt(scatter(i, i) / budget.total()(i, i)), 1, 0.06) << i;
+    EXPECT_NEAR(std::sqrt(scatter(i, i) / budget.total_covariance()(i, i)), 1, 0.06) << i;
   }
   EXPECT_NEAR(nees.mean(), 1, 0.06);
   EXPECT_NEAR(nees.fraction(), 0.95, 0.02);
@@ -219,9 +220,9 @@ TEST(ComputeFixSds, ReturnsZeroForNegativeVariances) {
 TEST(UnitErrors, StatedReportsKnownParts) {
   StatedRig rig;
   const auto stated = [&](CommonErrorSource part) {
-    return UnitErrors(rig.map, rig.calibration).common().stated(part);
+    return UnitErrors(rig.map, rig.calibration).common().are_errors_known(part);
   };
-  EXPECT_FALSE(UnitErrors(rig.map, rig.calibration).common().stated());
+  EXPECT_FALSE(UnitErrors(rig.map, rig.calibration).common().are_errors_known());
   EXPECT_FALSE(stated(CommonErrorSource::lens) || stated(CommonErrorSource::zenith) ||
                stated(CommonErrorSource::lamps));
   EXPECT_TRUE(stated(CommonErrorSource::offset));  // there is none
@@ -247,8 +248,9 @@ TEST(UnitErrors, BudgetReturnsNulloptForTooFewOrTooManyLamps) {
   for (const std::size_t count : {1u, 2u, 256u, 257u, 300u}) {
     const std::span<const std::size_t> some(lamps.data(), count);
     const bool possible = count == 2 || count == 256;
-    EXPECT_EQ(unit.budget(rig.camera, some, kNoise_px).has_value(), possible) << count;
-    EXPECT_EQ(unit.budget(rig.camera, some, kNoise_px, prior).has_value(), possible) << count;
+    EXPECT_EQ(unit.compute_budget(rig.camera, some, kNoise_px).has_value(), possible) << count;
+    EXPECT_EQ(unit.compute_budget(rig.camera, some, kNoise_px, prior).has_value(), possible)
+        << count;
   }
 }
 
@@ -266,21 +268,21 @@ TEST(FloorSummary, LargestReturnsDominantSource) {
   StatedRig rig = in_a_row();
   const auto summary_of = [&](double map_sd_m, double noise_px) {
     for (Lamp& lamp : rig.map.lamps) lamp.sd_m = map_sd_m;
-    const FloorLimits limits = compute_floor_limits(UnitErrors(rig.map, rig.calibration),
-                                                    {-0.2, 0.2, -0.1, 0.1, 0.1}, 0, 0.4, noise_px);
+    const FloorLimits limits = compute_accuracy_limits_on_floor(
+        UnitErrors(rig.map, rig.calibration), {-0.2, 0.2, -0.1, 0.1, 0.1}, 0, 0.4, noise_px);
     EXPECT_EQ(limits.sources.size(), 5U);
     EXPECT_EQ(limits.places.size(), 15U);
-    return summarize(limits).value();
+    return summarize_floor_limits(limits).value();
   };
-  EXPECT_EQ(summary_of(0.01, 0.1).largest().source.key, "lamp_map");
-  EXPECT_EQ(summary_of(1e-5, 5).largest().source.key, "noise");
+  EXPECT_EQ(summary_of(0.01, 0.1).largest_error_source().source.key, "lamp_map");
+  EXPECT_EQ(summary_of(1e-5, 5).largest_error_source().source.key, "noise");
   const FloorSummary summary = summary_of(0.001, 0.1);
   double sum_of_fractions = 0;
   for (const auto& source : summary.sources) sum_of_fractions += source.fraction;
   EXPECT_NEAR(sum_of_fractions, 1, 1e-12);
   rig.calibration.dispersion.reset();
-  const FloorLimits without =
-      compute_floor_limits(UnitErrors(rig.map, rig.calibration), {0, 0, 0, 0, 0.1}, 0, 0.4, 0.1);
+  const FloorLimits without = compute_accuracy_limits_on_floor(UnitErrors(rig.map, rig.calibration),
+                                                               {0, 0, 0, 0, 0.1}, 0, 0.4, 0.1);
   EXPECT_EQ(without.sources.size(), 4U);
 }
 

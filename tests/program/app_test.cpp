@@ -55,7 +55,7 @@ std::string said_of(std::vector<std::string> arguments) {
   std::string method, digest;
   app.add_option("--roll-pitch-sd-deg", sd_deg);
   app.add_option("--method", method)
-      ->check(present_value())
+      ->check(make_former_value_validator())
       ->check(CLI::IsMember({"camera", "chen-guan"}));
   app.add_subcommand("verify", "Verifies")->add_option("--expected-digest", digest);
   testing::internal::CaptureStderr();
@@ -103,37 +103,38 @@ TEST(RunApp, ReportsErrorIfStdoutIsFull) {
   }
 }
 
-TEST(CheckOutput, RejectsInputFile) {
+TEST(CheckOutputFile, RejectsInputFile) {
   const TemporaryFolder folder;
   const std::string lamps = folder.file("lamps.yaml", "x").string();
   const std::string again = (folder / ".").string() + "/lamps.yaml";
   EXPECT_THAT(rejection_message<std::invalid_argument>([&] {
-                check_output(again, {"", lamps});
+                check_output_file(again, {"", lamps});
               }),
               HasSubstr("is also an input"));
-  check_output((folder / "other.yaml").string(), {lamps});
+  check_output_file((folder / "other.yaml").string(), {lamps});
 }
 
-TEST(CheckOutputs, RejectsSameFileTwice) {
+TEST(CheckOutputFiles, RejectsSameFileTwice) {
   const TemporaryFolder folder;
   const std::string file = (folder / "a").string(), same = (folder / "b/../a").string();
-  check_outputs({{"--output", file}, {"--ros", ""}, {"--plot", ""}}, {});
+  check_output_files({{"--output", file}, {"--ros", ""}, {"--plot", ""}}, {});
   EXPECT_EQ(rejection_message<std::invalid_argument>([&] {
-              check_outputs({{"--output", file}, {"--ros", ""}, {"--plot", same}}, {});
+              check_output_files({{"--output", file}, {"--ros", ""}, {"--plot", same}}, {});
             }),
             "--output and --plot name one file");
 }
 
 TEST(Validators, CheckNumbersAndNames) {
-  EXPECT_EQ(finite()("-1e3"), "");
-  EXPECT_NE(finite()("inf"), "");
-  EXPECT_NE(finite()("1 m"), "");
-  EXPECT_EQ(finite_not_negative()("0"), "");
+  EXPECT_EQ(make_finite_validator()("-1e3"), "");
+  EXPECT_NE(make_finite_validator()("inf"), "");
+  EXPECT_NE(make_finite_validator()("1 m"), "");
+  EXPECT_EQ(make_finite_non_negative_validator()("0"), "");
   EXPECT_NE(make_finite_positive_validator()("0"), "");
-  EXPECT_EQ(is_plot_file()("a.svg"), "");
-  EXPECT_NE(is_plot_file()("a.pdf"), "");
-  EXPECT_EQ(make_ending_validator(".csv")("corners.csv"), "");
-  EXPECT_EQ(make_ending_validator(".csv")("corners.vnl"), "the file's name should end in .csv");
+  EXPECT_EQ(make_plot_file_validator()("a.svg"), "");
+  EXPECT_NE(make_plot_file_validator()("a.pdf"), "");
+  EXPECT_EQ(make_file_extension_validator(".csv")("corners.csv"), "");
+  EXPECT_EQ(make_file_extension_validator(".csv")("corners.vnl"),
+            "the file's name should end in .csv");
 }
 
 }  // namespace

@@ -16,10 +16,10 @@ using testing::Not;
 
 TEST(ReadReportPlot, RecognizesPlotsByTitle) {
   const TemporaryFolder folder;
-  draw(folder / "a.svg", make_drawing(RotationPlot{"", {}, {203, 198}, {210, 190}}));
+  write_plot(folder / "a.svg", make_gnuplot_drawing(RotationPlot{"", {}, {203, 198}, {210, 190}}));
   EXPECT_EQ(read_report_plot(folder / "a.svg").part, ReportPart::rotation);
-  draw(folder / "b.svg",
-       make_drawing(DispersionPlot{"", {{{0.01, 0}}, {{0, 0}, 0.01}}, {{}, {}}, {}}));
+  write_plot(folder / "b.svg",
+             make_gnuplot_drawing(DispersionPlot{"", {{{0.01, 0}}, {{0, 0}, 0.01}}, {{}, {}}, {}}));
   const ReportPlot picture = read_report_plot(folder / "b.svg");
   EXPECT_EQ(picture.part, ReportPart::dispersion);
   EXPECT_EQ(picture.image, TemporaryFolder::read_content(folder / "b.svg"));

@@ -29,9 +29,9 @@ TEST(ListBoardTags, PlacesMarkersInWhiteSquares) {
   EXPECT_NEAR(markers[0].corners_m[3].x(), 0.005, 1e-12);
   EXPECT_NEAR(markers[0].corners_m[3].y(), -0.015, 1e-12);
   EXPECT_NEAR(markers[0].corners_m[1].y() - markers[0].corners_m[2].y(), 0.01, 1e-12);
-  EXPECT_TRUE(is_black(board, 0, 0));
-  EXPECT_EQ(tag_field_m(board), Eigen::Vector2d(0.06, 0.04));
-  EXPECT_EQ(square_corners_m(board).back(), Eigen::Vector2d(0.06, 0.04));
+  EXPECT_TRUE(is_square_black(board, 0, 0));
+  EXPECT_EQ(compute_tag_field_size_m(board), Eigen::Vector2d(0.06, 0.04));
+  EXPECT_EQ(list_chessboard_corners_m(board).back(), Eigen::Vector2d(0.06, 0.04));
   board.top_left_white = true;
   EXPECT_NEAR(list_board_tags(board)[0].corners_m[3].x(), -0.015, 1e-12);
 }
@@ -51,7 +51,7 @@ TEST(ListBoardTags, AssignsIdsByIdOrderOfBoard) {
 TEST(ListBoardTags, PlacesTagsAtPitch) {
   const Board board = board_with({false, BoardCorner::top_left});
   EXPECT_DOUBLE_EQ(compute_tag_pitch_m(board), 0.03);
-  EXPECT_TRUE(tag_field_m(board).isApprox(Eigen::Vector2d(0.08, 0.05)));
+  EXPECT_TRUE(compute_tag_field_size_m(board).isApprox(Eigen::Vector2d(0.08, 0.05)));
   const BoardTag last = list_board_tags(board).back();
   const auto [bottom_left, bottom_right, top_right, top_left] = last.corners_m;
   EXPECT_TRUE(bottom_left.isApprox(Eigen::Vector2d(0.06, 0.05)));

@@ -19,13 +19,14 @@ Calibration whole_calibration() {
   return calibration;
 }
 
-TEST(WithCamera, RemovesOtherParts) {
+TEST(MakeCalibrationWithCamera, RemovesOtherParts) {
   const Calibration sample = sample_calibration();
   Calibration expected = sample;
   expected.rotation_center.reset();
   expected.dispersion.reset();
   expected.history = {{"camera", "vlp-intrinsics", "1.2.3", "", {}}};
-  expect_same(with_camera(sample.camera, sample.intrinsics_report, entry_of("vlp-intrinsics")),
+  expect_same(make_calibration_with_camera(sample.camera, sample.intrinsics_report,
+                                           entry_of("vlp-intrinsics")),
               expected);
 }
 

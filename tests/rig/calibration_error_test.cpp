@@ -36,7 +36,8 @@ TEST(WithLensError, KeepsZenithAndMovesItsPixel) {
 TEST(WithZenithError, MovesNormalizedPoint) {
   const Calibration moved = with_zenith_error(leaning(), {0.001, 0.002});
   ASSERT_TRUE(moved.rotation_center);
-  EXPECT_THAT(zenith_point(*moved.rotation_center), IsNear(Eigen::Vector2d(0.021, -0.008), 1e-15));
+  EXPECT_THAT(normalized_zenith_point(*moved.rotation_center),
+              IsNear(Eigen::Vector2d(0.021, -0.008), 1e-15));
   EXPECT_NEAR(moved.rotation_center->zenith_in_camera.norm(), 1, 1e-15);
   EXPECT_THAT(moved.rotation_center->center_px,
               IsNear(Eigen::Vector2d(400 + 0.021 * 500, 300 - 0.008 * 510), 1e-9));

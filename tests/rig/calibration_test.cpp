@@ -38,7 +38,7 @@ TEST(WriteCalibration, MatchesFormatByteForByte) {
   const TemporaryFolder folder;
   write_calibration(folder / "calibration.yaml", sample_calibration());
   EXPECT_EQ(folder.read_content(folder / "calibration.yaml"), kCalibrationYaml);
-  EXPECT_EQ(calibration_text(sample_calibration()), kCalibrationYaml);
+  EXPECT_EQ(format_calibration_yaml(sample_calibration()), kCalibrationYaml);
 }
 
 TEST(ReadCalibration, AcceptsPartsInAnyOrder) {
@@ -123,7 +123,7 @@ TEST(WriteCalibration, KeepsEachPartWithoutOptionalKeys) {
   }
 }
 
-TEST(WriteCalibration, KeepsEachEnumerator) {
+TEST(WriteCalibration, RoundTripsRotationModelAndReadout) {
   for (const RotationModel model : {RotationModel::shift, RotationModel::tilt}) {
     for (const Readout readout : {Readout::rows, Readout::columns}) {
       Calibration calibration = sample_calibration();
@@ -142,7 +142,7 @@ TEST(WriteCalibration, KeepsEachLensModelWithParameters) {
                                           {LensModel::opencv8, 12},
                                           {LensModel::opencv12, 16},
                                           {LensModel::fisheye, 8},
-                                          {lens_model_for({3, 4, 5, 90}), 44}}) {
+                                          {lens_model_for_spline_grid({3, 4, 5, 90}), 44}}) {
     Calibration calibration = bare_calibration();
     calibration.camera.lens_model = model;
     for (int i = 4; i < parameters; ++i) calibration.camera.intrinsics.push_back(i * -1e-3);
@@ -165,7 +165,7 @@ TEST(WriteCalibration, KeepsErrorsOfSplinedLensCore) {
   }
   calibration.adjustment.reset();
   std::erase_if(calibration.history, [](const auto& entry) { return entry.part == "adjustment"; });
-  calibration.camera.lens_model = lens_model_for({2, 3, 3, 120});
+  calibration.camera.lens_model = lens_model_for_spline_grid({2, 3, 3, 120});
   calibration.camera.intrinsics.resize(parameter_count(calibration.camera.lens_model), 0.25);
   expect_kept(calibration);
 }

@@ -53,8 +53,9 @@ lamps:
   ASSERT_EQ(hall.lamps.size(), 1U);
   EXPECT_EQ(hall.lamps[0].id, 1);
   EXPECT_EQ(read_lamp_map(file).lamps.size(), 2U);
-  EXPECT_EQ(read_lamps_with_rooms(file, "").rooms, (std::vector<std::string>{"hall", "office"}));
-  EXPECT_EQ(read_lamps_with_rooms(file, "office").rooms, std::vector<std::string>{"office"});
+  EXPECT_EQ(read_lamps_and_room_names(file, "").rooms,
+            (std::vector<std::string>{"hall", "office"}));
+  EXPECT_EQ(read_lamps_and_room_names(file, "office").rooms, std::vector<std::string>{"office"});
   EXPECT_THAT(rejection_message([&] { read_lamps_of_room(file, "attic"); }),
               HasSubstr("has no lamp with 'room: attic'"));
 }
@@ -82,13 +83,13 @@ lamps:
   expect_same(read_as("2.1], diameter_m", "2.1], shape: disc, diameter_m"), map);
 }
 
-TEST(FindLamp, ReturnsLampWithId) {
+TEST(FindLampById, ReturnsLampWithId) {
   LampMap map;
   for (const int id : {7, 2, 40}) map.lamps.push_back({id, {0, 0.1 * id, 2}, {}, {}, {}});
-  EXPECT_EQ(find_lamp(map.lamps, 2), &map.lamps[1]);
-  EXPECT_EQ(find_lamp(map.lamps, 40), &map.lamps[2]);
-  EXPECT_EQ(find_lamp(map.lamps, 3), nullptr);
-  EXPECT_EQ(find_lamp({}, 7), nullptr);
+  EXPECT_EQ(find_lamp_by_id(map.lamps, 2), &map.lamps[1]);
+  EXPECT_EQ(find_lamp_by_id(map.lamps, 40), &map.lamps[2]);
+  EXPECT_EQ(find_lamp_by_id(map.lamps, 3), nullptr);
+  EXPECT_EQ(find_lamp_by_id({}, 7), nullptr);
 }
 
 TEST(WriteLampMap, KeepsEveryDoubleExactly) {

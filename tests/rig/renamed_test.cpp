@@ -38,8 +38,8 @@ std::string message_on(const std::string& content, const std::string& present) {
   return refusal(
       [&](const std::filesystem::path& path) {
         YamlMap map = read_yaml(path);
-        map.optional(present);
-        map.finish();
+        map.get_optional(present);
+        map.check_all_keys_read();
       },
       file);
 }
@@ -57,8 +57,9 @@ TEST(YamlMap, NamesThePresentKey) {
   const TemporaryFolder folder;
   const auto file = folder.file("some.yaml", "keep: 1\n");
   const std::string problem = "some.yaml:1: key 'keep' is now called 'retention'";
-  EXPECT_EQ(refusal([](const auto& path) { read_yaml(path).required("retention"); }, file),
-            problem);
+  EXPECT_EQ(
+      refusal([](const auto& path) { read_yaml(path).get_required_column("retention"); }, file),
+      problem);
   EXPECT_EQ(refusal([](const auto& path) { read_yaml(path).has("retention"); }, file), problem);
 }
 

@@ -10,12 +10,12 @@ namespace {
 
 TEST(NameApart, UsesPathsForEqualNames) {
   std::vector<AdjustSet> sets{{"check", {}, {}}, {"rotation", {}, {}}, {"check", {}, {}}};
-  make_set_names_unique(sets, {"a/check", "a/rotation", "b/check"});
+  make_adjust_set_names_unique(sets, {"a/check", "a/rotation", "b/check"});
   EXPECT_EQ(sets[0].name, "a/check");
   EXPECT_EQ(sets[1].name, "rotation");
   EXPECT_EQ(sets[2].name, "b/check");
   EXPECT_THAT(rejection_message<std::invalid_argument>([&] {
-                make_set_names_unique(sets, {"a/check", "a/rotation", "a/check"});
+                make_adjust_set_names_unique(sets, {"a/check", "a/rotation", "a/check"});
               }),
               testing::StartsWith("a/check is named twice"));
 }

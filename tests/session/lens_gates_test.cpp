@@ -11,15 +11,15 @@ TEST(LensGates, PassUpToLimits) {
   const std::vector<Metric> good{{"rms_px", 1},        {"expected_max_error_px", 2},
                                  {"split_half_px", 1}, {"coverage", 0.4},
                                  {"views", 6},         {"board_tilt_deg", 20}};
-  EXPECT_EQ(describe_failed_gates(check_gates(default_lens_gates(), good)), "");
+  EXPECT_EQ(describe_failed_gates(check_gates(make_default_lens_gates(), good)), "");
   const std::vector<Metric> bad{{"rms_px", 1.01},
                                 {"expected_max_error_px", 2.01},
                                 {"split_half_px", 1.01},
                                 {"coverage", 0.39},
                                 {"views", 5},
                                 {"board_tilt_deg", 19}};
-  for (const CheckedMetric& gate : check_gates(default_lens_gates(), bad))
-    EXPECT_FALSE(gate.passed());
+  for (const CheckedMetric& gate : check_gates(make_default_lens_gates(), bad))
+    EXPECT_FALSE(gate.has_passed());
 }
 
 TEST(LensGates, FailWithoutSplitHalfDifference) {
@@ -28,7 +28,7 @@ TEST(LensGates, FailWithoutSplitHalfDifference) {
                                     {"coverage", 1},
                                     {"views", 36},
                                     {"board_tilt_deg", 60}};
-  EXPECT_EQ(describe_failed_gates(check_gates(default_lens_gates(), metrics)),
+  EXPECT_EQ(describe_failed_gates(check_gates(make_default_lens_gates(), metrics)),
             "split_half_px is not known, at most 1 px is asked for");
 }
 

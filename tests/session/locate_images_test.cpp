@@ -60,7 +60,7 @@ class LeaningRig {
 };
 
 double error_m(const LocateInput& input) {
-  const LocateResult found = locate_frames(input);
+  const LocateResult found = locate_camera_in_frames(input);
   return found.ok() ? found.rows[0].fix->pose.position_m.norm() : 1;
 }
 

@@ -26,7 +26,7 @@ struct Case {
 /// Prints a case as its name, in place of its bytes.
 void PrintTo(const Case& one, std::ostream* out) { *out << one.name; }
 
-class LocateFramesNoise : public testing::TestWithParam<Case> {
+class LocateCameraInFramesNoise : public testing::TestWithParam<Case> {
  protected:
   /// Draws three captures, under lamps at drawn distances from the map.
   LocateInput draw_captures() {
@@ -62,12 +62,12 @@ class LocateFramesNoise : public testing::TestWithParam<Case> {
   std::vector<Pose> truth;
 };
 
-TEST_P(LocateFramesNoise, StandardDeviationsMatchErrors) {
+TEST_P(LocateCameraInFramesNoise, StandardDeviationsMatchErrors) {
   constexpr int draws = 500;
   Eigen::Vector4d squares = Eigen::Vector4d::Zero();
   int fixes = 0, within = 0;
   for (int i = 0; i < draws; ++i) {
-    const LocateResult found = locate_frames(draw_captures());
+    const LocateResult found = locate_camera_in_frames(draw_captures());
     ASSERT_TRUE(found.ok());
     for (std::size_t k = 0; k < truth.size(); ++k) {
       const auto& fix = found.rows[k].fix;
@@ -91,7 +91,7 @@ TEST_P(LocateFramesNoise, StandardDeviationsMatchErrors) {
   EXPECT_LT(coverage, 0.97);
 }
 
-INSTANTIATE_TEST_SUITE_P(Rooms, LocateFramesNoise,
+INSTANTIATE_TEST_SUITE_P(Rooms, LocateCameraInFramesNoise,
                          testing::Values(Case{"Stated", 0, Noise::stated},
                                          Case{"NotStated", 0, Noise::not_stated},
                                          Case{"TooSmall", 0, Noise::too_small},
@@ -100,7 +100,7 @@ INSTANTIATE_TEST_SUITE_P(Rooms, LocateFramesNoise,
                                          Case{"MapErrorsNotStated", 0.002, Noise::not_stated}),
                          [](const auto& one) { return one.param.name; });
 
-TEST(LocateFrames, ReportsResidualsAboveGivenNoise) {
+TEST(LocateCameraInFrames, ReportsResidualsAboveGivenNoise) {
   SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
   Random random(3);
   LocateInput input{{}, rig.map, rig.calibration};
@@ -109,7 +109,7 @@ TEST(LocateFrames, ReportsResidualsAboveGivenNoise) {
     input.frames.push_back({std::to_string(k), with_noise(seen_from(rig, kNoise_px), random)});
     for (Detection& detection : input.frames.back().detections) detection.sigma_px = kNoise_px / 2;
   }
-  const LocateResult found = locate_frames(input);
+  const LocateResult found = locate_camera_in_frames(input);
   ASSERT_TRUE(found.ok());
   ASSERT_EQ(found.notes.size(), 1U);
   EXPECT_NE(found.notes[0].find("times the stated noise: sd follows the residuals"),

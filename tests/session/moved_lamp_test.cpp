@@ -47,21 +47,23 @@ class MovedLamp : public testing::Test {
     }
   }
 
-  StepResult rotate() const { return solve_rotation(rotation, RotationMethod::axis, {}); }
+  StepResult rotate() const { return run_rotation_step(rotation, RotationMethod::axis, {}); }
   StepResult disperse() const {
-    KnownPlaces places;
+    KnownPositions places;
     for (const Frame& frame : dispersion.frames) {
       places.captures.push_back({frame.detections, {0, 0}});
       places.of.push_back(PlaceOf::camera);
     }
-    return solve_dispersion(dispersion, places, DispersionMethod::camera, DispersionCircle::mean,
-                            {});
+    return run_dispersion_step(dispersion, places, DispersionMethod::camera, DispersionCircle::mean,
+                               {});
   }
-  StepResult level() const { return solve_leveling({check, map, kFile, camera}, false, {}); }
-  StepResult locate() const { return locate_frames({check, map, dispersion.calibration}); }
+  StepResult level() const { return run_tilt_step({check, map, kFile, camera}, false, {}); }
+  StepResult locate() const {
+    return locate_camera_in_frames({check, map, dispersion.calibration});
+  }
   StepResult adjust() const {
-    return solve_adjustment({{{"check", check, {}}}, map, kFile, camera, "camera.yaml", 1e-3, {}},
-                            {});
+    return run_adjustment_step(
+        {{{"check", check, {}}}, map, kFile, camera, "camera.yaml", 1e-3, {}}, {});
   }
 
   static constexpr const char* kFile = "lamps.yaml";
@@ -84,7 +86,7 @@ class MovedLamp : public testing::Test {
 /// Returns the warnings and, of a step that failed, the reason.
 std::vector<std::string> collect_lines(const StepResult& result) {
   std::vector<std::string> lines = result.warnings;
-  if (!result.ok()) lines.push_back(message_of(result));
+  if (!result.ok()) lines.push_back(format_failure_message(result));
   return lines;
 }
 
@@ -108,7 +110,7 @@ TEST_F(MovedLamp, IsReportedAsCauseOfFailedDispersion) {
   take_captures({0.03, 0});
   const StepResult result = disperse();
   EXPECT_EQ(result.failure, StepFailure::wrong_map);
-  EXPECT_THAT(message_of(result),
+  EXPECT_THAT(format_failure_message(result),
               testing::StartsWith("lamps.yaml: lamp 2 hangs 30 mm from where the map has it"));
 }
 
@@ -122,7 +124,7 @@ TEST_F(MovedLamp, IsNotReportedForCorrectMap) {
 
 /// Captures of a large room tie few of its lamps together. The captures that fit a mirrored map by
 /// chance must not pass for all.
-TEST(SolveLeveling, FailsWhenMostCapturesContradictMap) {
+TEST(RunTiltStep, FailsWhenMostCapturesContradictMap) {
   constexpr int rows = 10;
   constexpr double distance_m = 1.2, height_m = 2.5, focal_px = 520, noise_px = 0.05;
   LampCaptures input{{}, {}, "lamps.yaml", {}};
@@ -151,9 +153,9 @@ TEST(SolveLeveling, FailsWhenMostCapturesContradictMap) {
     }
     input.frames.push_back(frame);
   }
-  EXPECT_TRUE(solve_leveling(input, false, {}).ok());
+  EXPECT_TRUE(run_tilt_step(input, false, {}).ok());
   for (Lamp& lamp : input.lamps.lamps) lamp.position_m.y() *= -1;
-  const LevelingResult result = solve_leveling(input, false, {});
+  const TiltResult result = run_tilt_step(input, false, {});
   EXPECT_EQ(result.failure, StepFailure::wrong_map) << result.why;
 }
 

@@ -20,17 +20,17 @@ LensResult solve_with_grid(const SplineGrid& grid) {
   const SyntheticViews views = wide_views(false);
   const BoardLattice lattice(views.board);
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::off};
-  input.camera.lens_model = lens_model_for(grid);
+  input.camera.lens_model = lens_model_for_spline_grid(grid);
   while (input.seen.images.size() < count) {
     const BoardDetection seen = wide_view(views, random, noise_px);
     if (!has_enough_tags(seen, lattice)) continue;
     input.seen.images.push_back(
         observed({std::to_string(input.seen.images.size()) + ".png", kWideImager, seen}));
   }
-  return solve_lens(input, {});
+  return run_lens_step(input, {});
 }
 
-TEST(SolveLensNarrowGrid, ProposesWiderSplineGrid) {
+TEST(RunLensStepNarrowGrid, ProposesWiderSplineGrid) {
   const LensResult result = solve_with_grid({3, 12, 12, 100});
   ASSERT_FALSE(result.ok());
   EXPECT_THAT(
@@ -42,7 +42,7 @@ TEST(SolveLensNarrowGrid, ProposesWiderSplineGrid) {
               HasSubstr(": use --lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny="));
 }
 
-TEST(SolveLensNarrowGrid, ProposesMoreRowsForVerticalField) {
+TEST(RunLensStepNarrowGrid, ProposesMoreRowsForVerticalField) {
   const LensResult result = solve_with_grid({3, 12, 5, 230});
   ASSERT_FALSE(result.ok());
   EXPECT_THAT(result.why,
@@ -50,7 +50,7 @@ TEST(SolveLensNarrowGrid, ProposesMoreRowsForVerticalField) {
                   "use --lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny=10_fov_x_deg=230"));
 }
 
-TEST(SolveLensWideGrid, FailsWithProposedGrid) {
+TEST(RunLensStepWideGrid, FailsWithProposedGrid) {
   constexpr std::size_t count = 12;
   constexpr double noise_px = 0.02;
   Random random(62);
@@ -60,12 +60,12 @@ TEST(SolveLensWideGrid, FailsWithProposedGrid) {
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::off};
   while (input.seen.images.size() < count) {
     const BoardDetection seen = views.random_view(random, noise_px);
-    if (!lattice.sufficient(seen)) continue;
+    if (!lattice.has_sufficient_corners(seen)) continue;
     input.seen.images.push_back(
         observed({std::to_string(input.seen.images.size()) + ".png", views.imager_px, seen}));
   }
-  input.camera.lens_model = lens_model_for({3, 10, 10, 350});
-  const LensResult result = solve_lens(input, {});
+  input.camera.lens_model = lens_model_for_spline_grid({3, 10, 10, 350});
+  const LensResult result = run_lens_step(input, {});
   ASSERT_FALSE(result.ok());
   const std::string take =
       " do not cover the field of view, 5 degrees off axis horizontally and 4 vertically: use "
@@ -75,7 +75,7 @@ TEST(SolveLensWideGrid, FailsWithProposedGrid) {
   const auto model = lens_model_from_name(result.why.substr(result.why.find(take) + take.size()));
   ASSERT_TRUE(model) << result.why;
   input.camera.lens_model = *model;
-  EXPECT_TRUE(solve_lens(input, {}).ok());
+  EXPECT_TRUE(run_lens_step(input, {}).ok());
 }
 
 }  // namespace

@@ -62,7 +62,7 @@ TEST(CheckRowTime, ReportsRowTimeErrorOf5Percent) {
   EXPECT_NEAR(check.measured->row_time_s, kTrueRowTime_s, 1e-9);
   EXPECT_THAT(check.error, StartsWith("row time is 19 us in camera_type.yaml, but the stripes of 5 "
                                       "lamps measure 20.00 +- 0.01 us; correct it"));
-  const auto metrics = row_time_metrics(check);
+  const auto metrics = make_row_time_metrics(check);
   ASSERT_TRUE(find_metric_value(metrics, "row_time_us"));
   EXPECT_NEAR(*find_metric_value(metrics, "row_time_us"), 20, 1e-3);
   ASSERT_TRUE(find_metric_value(metrics, "row_time_sd_us"));
@@ -96,13 +96,13 @@ TEST(CheckRowTime, ReturnsNulloptForTwoLamps) {
   EXPECT_EQ(check.error, "");
 }
 
-TEST(FindRowTimeError, ReportsRowTimeThatIdentifiesNoLamp) {
+TEST(DescribeOtherRowTime, ReportsRowTimeThatIdentifiesNoLamp) {
   const LampMap map = make_map();
   const std::vector<Observation> images(4, observe(map, {0, 0, 0, 0, 0}, false));
-  EXPECT_THAT(find_row_time_error(images, map, std::nullopt, {2.2e-5, "camera.yaml"}),
+  EXPECT_THAT(describe_other_row_time(images, map, std::nullopt, {2.2e-5, "camera.yaml"}),
               HasSubstr("row time is 22 us in camera.yaml, but the stripes of 5 lamps measure"));
-  EXPECT_EQ(find_row_time_error(images, map, std::nullopt, {2e-5, "camera.yaml"}), "");
-  EXPECT_EQ(find_row_time_error({}, map, std::nullopt, {2.2e-5, "camera.yaml"}), "");
+  EXPECT_EQ(describe_other_row_time(images, map, std::nullopt, {2e-5, "camera.yaml"}), "");
+  EXPECT_EQ(describe_other_row_time({}, map, std::nullopt, {2.2e-5, "camera.yaml"}), "");
 }
 
 }  // namespace

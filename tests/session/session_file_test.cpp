@@ -23,7 +23,7 @@ StepResult sample() {
   result.skipped = {{"a.png", "is empty"}};
   result.rejected_lamps = {{2, 12}};
   result.lamp_offsets = {{3, 12, {-0.6, 0.3}, {1e-3, -2e-3}, {1e-4, 2e-4}}};
-  result.fail(StepFailure::wrong_map, "seem to be swapped", "lamps.yaml");
+  result.set_failure(StepFailure::wrong_map, "seem to be swapped", "lamps.yaml");
   return result;
 }
 
@@ -48,7 +48,7 @@ TEST(StepFile, RoundTripIsExact) {
   EXPECT_LT((offset.offset_m - Eigen::Vector2d(1e-3, -2e-3)).norm(), 1e-15);
   EXPECT_LT((offset.sd_m - Eigen::Vector2d(1e-4, 2e-4)).norm(), 1e-15);
   EXPECT_EQ(result.failure, StepFailure::wrong_map);
-  EXPECT_EQ(message_of(result), "lamps.yaml: seem to be swapped");
+  EXPECT_EQ(format_failure_message(result), "lamps.yaml: seem to be swapped");
 }
 
 TEST(StepFile, MatchesSchema) {

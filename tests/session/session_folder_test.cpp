@@ -53,12 +53,12 @@ TEST(TruthFile, ReturnsTruthOrCapturesWithPlaces) {
 TEST(TruthIn, ReadsPlacesOfCaptures) {
   const TemporaryFolder folder;
   folder.file("captures.csv", "image,x_m,y_m\nb.png,3,4\na.png,1,2\nc.png,,\n");
-  const auto places = read_truth_places(folder / "");
+  const auto places = read_truth_positions(folder / "");
   ASSERT_THAT(places, SizeIs(2));
   EXPECT_EQ(places[0].image, "a.png");
   EXPECT_EQ(places[1].xy_m.y(), 4);
   folder.file("truth.csv", "image,x_m,y_m\nd.png,5,6\n");
-  EXPECT_EQ(read_truth_places(folder / "")[0].image, "d.png");
+  EXPECT_EQ(read_truth_positions(folder / "")[0].image, "d.png");
 }
 
 TEST(SessionFolder, NamesMissingFile) {
@@ -75,7 +75,7 @@ TEST(SessionFolder, NamesMissingFile) {
   EXPECT_THAT(refusal(), HasSubstr("unit/board.yaml: is missing"));
   folder.file("unit/camera.yaml", "\n");
   const SessionFolder known(folder / "unit");
-  EXPECT_TRUE(known.camera());
+  EXPECT_TRUE(known.camera_file());
   EXPECT_FALSE(known.check());
 }
 
@@ -89,7 +89,7 @@ TEST(SessionFolder, FindsDrivesWithPlaces) {
   folder.file("unit/line-x/truth.csv", "image,x_m,y_m\na.png,1,2\n");
   folder.file("unit/line-y/captures.csv", "image,x_m,y_m\na.png,1,2\n");
   folder.file("unit/line-z/captures.csv", "image,time_s\na.png,1\n");
-  const auto lines = SessionFolder(folder / "unit").lines();
+  const auto lines = SessionFolder(folder / "unit").line_drive_folders();
   ASSERT_THAT(lines, SizeIs(2));
   EXPECT_EQ(lines[0].filename(), "line-x");
   EXPECT_EQ(lines[1].filename(), "line-y");
@@ -101,9 +101,9 @@ TEST(SessionFolder, FindsDrivesWithPlaces) {
 TEST(EndsOf, ReturnsFirstAndLastPlace) {
   const std::vector<TruthRow> drive{
       {"a", {0, 1}, {}, {}}, {"b", {2, 1}, {}, {}}, {"c", {3, 1}, {}, {}}};
-  EXPECT_EQ(find_drive_ends("t.csv", drive)[1].x(), 3);
+  EXPECT_EQ(find_end_points_of_drive("t.csv", drive)[1].x(), 3);
   EXPECT_THAT(rejection_message([&] {
-                find_drive_ends("t.csv", {drive[0], drive[0]});
+                find_end_points_of_drive("t.csv", {drive[0], drive[0]});
               }),
               HasSubstr("t.csv: start and end of the drive are equal"));
 }

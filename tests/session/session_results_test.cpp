@@ -18,7 +18,7 @@ class SessionResultsTest : public testing::Test {
  protected:
   /// A folder in which lens and rotation have ended, with an output each.
   void keep_two_steps(SessionResults& cached_result) const {
-    cached_result.plan(kPlan);
+    cached_result.plan_steps(kPlan);
     folder.file("results/lens.yaml", "lens");
     cached_result.store_result("lens", "key of the lens", StepResult());
     folder.file("results/rotated.yaml", "rotated");
@@ -31,28 +31,28 @@ class SessionResultsTest : public testing::Test {
 
 TEST_F(SessionResultsTest, KeepsStepsWithUnchangedInputsAndOutputs) {
   SessionResults cached_result(results, session);
-  EXPECT_FALSE(cached_result.cached_result("lens", "key of the lens"));
+  EXPECT_FALSE(cached_result.find_cached_result("lens", "key of the lens"));
   keep_two_steps(cached_result);
-  EXPECT_TRUE(cached_result.cached_result("lens", "key of the lens"));
-  EXPECT_FALSE(cached_result.cached_result("lens", "another key"));
+  EXPECT_TRUE(cached_result.find_cached_result("lens", "key of the lens"));
+  EXPECT_FALSE(cached_result.find_cached_result("lens", "another key"));
   folder.file("results/lens.yaml", "changed");
-  EXPECT_FALSE(cached_result.cached_result("lens", "key of the lens"));
-  EXPECT_TRUE(cached_result.cached_result("rotation", "key of the rotation"));
+  EXPECT_FALSE(cached_result.find_cached_result("lens", "key of the lens"));
+  EXPECT_TRUE(cached_result.find_cached_result("rotation", "key of the rotation"));
   fs::remove(results / "rotated.yaml");
-  EXPECT_FALSE(cached_result.cached_result("rotation", "key of the rotation"));
+  EXPECT_FALSE(cached_result.find_cached_result("rotation", "key of the rotation"));
 }
 
 TEST_F(SessionResultsTest, RepeatsStepAfterBadInput) {
   SessionResults cached_result(results, session);
-  cached_result.plan(kPlan);
+  cached_result.plan_steps(kPlan);
   StepResult bad, undetermined;
-  bad.fail(StepFailure::bad_input, "cut");
-  undetermined.fail(StepFailure::undetermined, "too few");
+  bad.set_failure(StepFailure::bad_input, "cut");
+  undetermined.set_failure(StepFailure::undetermined, "too few");
   cached_result.store_result("lens", "key", bad);
-  EXPECT_FALSE(cached_result.cached_result("lens", "key"));
+  EXPECT_FALSE(cached_result.find_cached_result("lens", "key"));
   cached_result.store_result("lens", "key", undetermined);
-  ASSERT_TRUE(cached_result.cached_result("lens", "key"));
-  EXPECT_EQ(cached_result.cached_result("lens", "key")->why, "too few");
+  ASSERT_TRUE(cached_result.find_cached_result("lens", "key"));
+  EXPECT_EQ(cached_result.find_cached_result("lens", "key")->why, "too few");
 }
 
 TEST_F(SessionResultsTest, RemovesOutputsOfEarlierRuns) {
@@ -61,14 +61,14 @@ TEST_F(SessionResultsTest, RemovesOutputsOfEarlierRuns) {
     keep_two_steps(before);
     std::vector<StepOutputs> with_drive = kPlan;
     with_drive.push_back({"line-x", {"line-x-fixes.csv"}});
-    before.plan(with_drive);
+    before.plan_steps(with_drive);
     folder.file("results/line-x-fixes.csv", "of a drive");
     before.store_result("line-x", "key", StepResult());
     folder.file("results/mine.txt", "of somebody");
   }
   SessionResults now(results, session);
-  now.plan({{"lens", {"lens.yaml"}}});
-  EXPECT_TRUE(now.cached_result("lens", "key of the lens"));
+  now.plan_steps({{"lens", {"lens.yaml"}}});
+  EXPECT_TRUE(now.find_cached_result("lens", "key of the lens"));
   EXPECT_FALSE(fs::exists(results / "rotated.yaml"));
   EXPECT_FALSE(fs::exists(results / "steps/rotation.json"));
   EXPECT_FALSE(fs::exists(results / "line-x-fixes.csv"));
@@ -82,11 +82,11 @@ TEST_F(SessionResultsTest, KeepsForeignFiles) {
   for (const std::string& name : mine) folder.file("results/" + name, "mine");
   {
     SessionResults first(results, session);
-    first.plan(kPlan);
+    first.plan_steps(kPlan);
     folder.file("results/lens.svg", "mine, beside results");
-    first.plan(kPlan);
-    first.remove_evaluation();
-    first.remove_all_steps();
+    first.plan_steps(kPlan);
+    first.remove_evaluation_outputs();
+    first.remove_outputs_of_all_steps();
   }
   for (const std::string& name : mine) {
     EXPECT_EQ(TemporaryFolder::read_content(results / name), "mine") << name;
@@ -95,7 +95,7 @@ TEST_F(SessionResultsTest, KeepsForeignFiles) {
   SessionResults next(results, session);
   EXPECT_THAT(
       [&] {
-        next.plan({{"lens", {"lens.yaml", "lens.svg"}}});
+        next.plan_steps({{"lens", {"lens.yaml", "lens.svg"}}});
       },
       ThrowsMessage<InputError>(HasSubstr("holds lens.svg, which is not of vlp-calibrate")));
 }
@@ -106,8 +106,8 @@ TEST_F(SessionResultsTest, ForgedListRemovesNothingOutside) {
   folder.file("results/steps/outputs", "../outside.txt\nsteps/../../outside.txt\n" +
                                            (folder / "outside.txt").string() + "\n..\n");
   SessionResults taken(results, session);
-  taken.plan(kPlan);
-  taken.remove_all_steps();
+  taken.plan_steps(kPlan);
+  taken.remove_outputs_of_all_steps();
   EXPECT_TRUE(fs::exists(folder / "outside.txt"));
 }
 
@@ -121,7 +121,7 @@ TEST_F(SessionResultsTest, RemovesOnlyOutputsOfRunsByForeignList) {
               "steps/lock\nsteps/session\nsteps/outputs\nmine.txt\nline-x\nreport.html\nline-x" +
                   end_of_name);
   const SessionResults taken(results, session);
-  taken.remove_all_steps();
+  taken.remove_outputs_of_all_steps();
   EXPECT_FALSE(fs::exists(results / "report.html"));
   for (const char* name : {"steps/lock", "steps/session", "steps/outputs", "mine.txt", "line-x"}) {
     EXPECT_TRUE(fs::exists(results / name)) << name;
@@ -132,16 +132,16 @@ TEST_F(SessionResultsTest, KeepsOutputsThatCannotBeRemovedInList) {
   const std::vector<StepOutputs> with_picture{{"lens", {"lens.yaml", "lens.svg"}}};
   {
     SessionResults before(results, session);
-    before.plan(with_picture);
+    before.plan_steps(with_picture);
     fs::create_directories(results / "lens.svg/full");  // cannot be removed, even by root
-    before.plan(kPlan);
+    before.plan_steps(kPlan);
   }
   fs::remove_all(results / "lens.svg");
   folder.file("results/lens.svg", "of a run");
   SessionResults now(results, session);
-  EXPECT_NO_THROW(now.plan(with_picture));
+  EXPECT_NO_THROW(now.plan_steps(with_picture));
   EXPECT_TRUE(fs::exists(results / "lens.svg"));
-  now.plan(kPlan);
+  now.plan_steps(kPlan);
   EXPECT_FALSE(fs::exists(results / "lens.svg"));
 }
 
@@ -152,7 +152,7 @@ TEST_F(SessionResultsTest, ResumesInterruptedResultsOfEarlierVersion) {
   folder.file("results/steps/line-x.json", "cannot be read");
   folder.file("results/line-y-fixes.csv", "of no drive of the session");
   SessionResults now(results, session);
-  EXPECT_NO_THROW(now.plan({{"line-x", {"line-x-fixes.csv"}}}));
+  EXPECT_NO_THROW(now.plan_steps({{"line-x", {"line-x-fixes.csv"}}}));
   EXPECT_TRUE(fs::exists(results / "line-x-fixes.csv"));
   EXPECT_TRUE(fs::exists(results / "line-y-fixes.csv"));
 }
@@ -161,12 +161,12 @@ TEST_F(SessionResultsTest, AcceptsDrivesWithLongestNames) {
   const std::string drive = "line-" + std::string(195, 'x'), fixes = drive + "-fixes.csv";
   {
     SessionResults before(results, session);
-    before.plan({{drive, {fixes}}});
+    before.plan_steps({{drive, {fixes}}});
     folder.file("results/" + fixes, "of a drive");
   }
   SessionResults now(results, session);
-  EXPECT_NO_THROW(now.plan({{drive, {fixes}}}));
-  now.plan(kPlan);
+  EXPECT_NO_THROW(now.plan_steps({{drive, {fixes}}}));
+  now.plan_steps(kPlan);
   EXPECT_FALSE(fs::exists(results / fixes));
 }
 
@@ -174,7 +174,7 @@ TEST_F(SessionResultsTest, RejectsLinkedOutputs) {
   { const SessionResults taken(results, session); }
   fs::create_symlink(folder.file("mine.txt", "mine"), results / "lens.yaml");
   SessionResults taken(results, session);
-  EXPECT_THAT([&] { taken.plan(kPlan); },
+  EXPECT_THAT([&] { taken.plan_steps(kPlan); },
               ThrowsMessage<InputError>(HasSubstr("holds lens.yaml, which is not of")));
   EXPECT_EQ(TemporaryFolder::read_content(folder / "mine.txt"), "mine");
 }
@@ -184,17 +184,17 @@ TEST_F(SessionResultsTest, AdoptsResultsOfEarlierVersion) {
     SessionResults before(results, session);
     std::vector<StepOutputs> with_drive = kPlan;
     with_drive.push_back({"line-x", {"line-x-fixes.csv"}});
-    before.plan(with_drive);
+    before.plan_steps(with_drive);
     keep_two_steps(before);
-    before.plan(with_drive);
+    before.plan_steps(with_drive);
     folder.file("results/line-x-fixes.csv", "of a drive");
     before.store_result("line-x", "key", StepResult());
   }
   fs::remove(results / "steps/outputs");
   folder.file("results/line-y-fixes.csv", "mine");
   SessionResults now(results, session);
-  now.plan(kPlan);
-  EXPECT_TRUE(now.cached_result("lens", "key of the lens"));
+  now.plan_steps(kPlan);
+  EXPECT_TRUE(now.find_cached_result("lens", "key of the lens"));
   EXPECT_FALSE(fs::exists(results / "line-x-fixes.csv"));
   EXPECT_TRUE(fs::exists(results / "line-y-fixes.csv"));
 }
@@ -202,12 +202,12 @@ TEST_F(SessionResultsTest, AdoptsResultsOfEarlierVersion) {
 TEST_F(SessionResultsTest, RemovesStepsAfterFailedStep) {
   SessionResults cached_result(results, session);
   keep_two_steps(cached_result);
-  cached_result.remove_later_steps("lens");
-  EXPECT_TRUE(cached_result.cached_result("lens", "key of the lens"));
+  cached_result.remove_outputs_of_later_steps("lens");
+  EXPECT_TRUE(cached_result.find_cached_result("lens", "key of the lens"));
   EXPECT_FALSE(fs::exists(results / "rotated.yaml"));
-  cached_result.remove_step("lens");
+  cached_result.remove_outputs_of_step("lens");
   EXPECT_FALSE(fs::exists(results / "lens.yaml"));
-  EXPECT_FALSE(cached_result.cached_result("lens", "key of the lens"));
+  EXPECT_FALSE(cached_result.find_cached_result("lens", "key of the lens"));
 }
 
 TEST_F(SessionResultsTest, AllowsOneSessionAndOneRun) {

@@ -11,7 +11,7 @@ using testing::ElementsAre;
 
 Observation rejected(const char* file, RejectionReason reason, const char* message) {
   Observation image{file};
-  image.reject(reason, message);
+  image.set_rejection(reason, message);
   return image;
 }
 
@@ -21,20 +21,22 @@ std::vector<std::string> lines(const std::vector<SkippedImage>& skipped) {
   return lines;
 }
 
-TEST(SkippedImages, OmitsFolderFromNamesInSingleFolder) {
-  EXPECT_THAT(lines(skipped_images({Observation{"f/a.png"},
-                                    rejected("f/b.png", RejectionReason::unreadable, "is empty"),
-                                    rejected("f/c.png", RejectionReason::blurred, "is 3: large")})),
-              ElementsAre("b.png: is empty", "c.png: is 3: large"));
+TEST(ListSkippedImages, OmitsFolderFromNamesInSingleFolder) {
+  EXPECT_THAT(
+      lines(list_skipped_images({Observation{"f/a.png"},
+                                 rejected("f/b.png", RejectionReason::unreadable, "is empty"),
+                                 rejected("f/c.png", RejectionReason::blurred, "is 3: large")})),
+      ElementsAre("b.png: is empty", "c.png: is 3: large"));
 }
 
-TEST(SkippedImages, NamesFoldersWhenSeveral) {
-  EXPECT_THAT(lines(skipped_images({Observation{"f/a.png"},
-                                    rejected("g/a.png", RejectionReason::unreadable, "is empty")})),
-              ElementsAre("g/a.png: is empty"));
+TEST(ListSkippedImages, NamesFoldersWhenSeveral) {
+  EXPECT_THAT(
+      lines(list_skipped_images(
+          {Observation{"f/a.png"}, rejected("g/a.png", RejectionReason::unreadable, "is empty")})),
+      ElementsAre("g/a.png: is empty"));
 }
 
-TEST(AddRemarks, CombinesFramesOfVideo) {
+TEST(AddIntakeRemarks, CombinesFramesOfVideo) {
   Observations seen;
   seen.images = {rejected("a.png", RejectionReason::too_few_corners, "shows 1 tag"),
                  rejected("b.avi#000000", RejectionReason::too_few_corners, "shows 2 tags"),
@@ -42,7 +44,7 @@ TEST(AddRemarks, CombinesFramesOfVideo) {
                  rejected("c.avi#000000", RejectionReason::too_few_corners, "shows 2 tags"),
                  rejected("b.avi#000004", RejectionReason::same_view, "is as #000003")};
   StepResult result;
-  add_remarks(seen, result);
+  add_intake_remarks(seen, result);
   EXPECT_TRUE(result.ok());
   EXPECT_THAT(
       lines(result.skipped),
@@ -54,13 +56,13 @@ TEST(AddRemarks, CombinesFramesOfVideo) {
                           "c.avi#000000: shows 2 tags", "b.avi#000004: is as #000003"));
 }
 
-TEST(AddRemarks, FailsWithoutUsableImage) {
+TEST(AddIntakeRemarks, CopiesFailureAndPrependsWarnings) {
   Observations seen;
   seen.warnings = {"dark"};
   seen.failure = {true, "shows another board", "board.yaml"};
   StepResult result;
   result.warnings = {"later"};
-  add_remarks(seen, result);
+  add_intake_remarks(seen, result);
   EXPECT_EQ(result.failure, StepFailure::wrong_board);
   EXPECT_EQ(result.subject, "board.yaml");
   EXPECT_THAT(result.warnings, ElementsAre("dark", "later"));

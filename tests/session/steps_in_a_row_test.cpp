@@ -25,7 +25,7 @@ constexpr double kExactMap_m = 1e-9;
 struct CalibrationChain {
   Survey survey{kExactMap_m};
   LampCaptures turns;
-  KnownPlaces known;
+  KnownPositions known;
 
   CalibrationChain(Random& random, double lens_px, PlaceOf of = PlaceOf::camera) {
     for (const double z_m : {0.0, 0.4}) survey.turn({0.1, -0.05, z_m}, 9);
@@ -59,12 +59,12 @@ struct CalibrationChain {
   }
 
   Calibration calibrated() const {
-    const RotationResult rotation = solve_rotation(turns, RotationMethod::axis, {});
+    const RotationResult rotation = run_rotation_step(turns, RotationMethod::axis, {});
     EXPECT_TRUE(rotation.ok()) << rotation.why;
     LampCaptures leveled = turns;
     leveled.calibration = rotation.calibration;
     const DispersionResult dispersion =
-        solve_dispersion(leveled, known, DispersionMethod::camera, DispersionCircle::mean, {});
+        run_dispersion_step(leveled, known, DispersionMethod::camera, DispersionCircle::mean, {});
     EXPECT_TRUE(dispersion.ok());
     return dispersion.calibration;
   }
@@ -92,8 +92,8 @@ TEST(SequentialCalibration, LensJacobianPredictsChange) {
     error[i] = calibration.camera.intrinsics[k] - camera.intrinsics[k];
   }
   const Calibration moved = row.calibrated();
-  const Eigen::Vector2d zenith =
-      zenith_point(*moved.rotation_center) - zenith_point(*exact.rotation_center);
+  const Eigen::Vector2d zenith = normalized_zenith_point(*moved.rotation_center) -
+                                 normalized_zenith_point(*exact.rotation_center);
   const Eigen::Vector2d zenith_said = *exact.rotation_center->by_intrinsics * error;
   EXPECT_GT(zenith.norm(), 1e-6);
   EXPECT_LT((zenith - zenith_said).norm(), 0.02 * zenith.norm());
@@ -109,7 +109,7 @@ TEST(SequentialCalibration, LensJacobianPredictsChange) {
 
 /// Rotations at yaws that barely determine the circles. A lens error changes the set of determined
 /// circles, which moves their mean by up to 14 times the effect of the error itself.
-TEST(SolveRotation, CircleLensJacobianMatchesJointFit) {
+TEST(RunRotationStep, CircleLensJacobianMatchesJointFit) {
   constexpr double spread_rad = 6e-4;  // a few times what the noise turns a lamp by
   for (const unsigned seed : {44U, 127U, 144U, 223U, 227U}) {
     Random random(seed);
@@ -125,8 +125,8 @@ TEST(SolveRotation, CircleLensJacobianMatchesJointFit) {
     for (const auto& capture : survey.input.captures) {
       turn.frames.push_back({capture.name, capture.detections});
     }
-    const RotationResult circle = solve_rotation(turn, RotationMethod::circle, {});
-    const RotationResult joint = solve_rotation(turn, RotationMethod::joint, {});
+    const RotationResult circle = run_rotation_step(turn, RotationMethod::circle, {});
+    const RotationResult joint = run_rotation_step(turn, RotationMethod::joint, {});
     ASSERT_TRUE(joint.ok());
     ASSERT_TRUE(circle.ok());
     ASSERT_TRUE(joint.fit.center.by_intrinsics);
@@ -141,7 +141,7 @@ TEST(SolveRotation, CircleLensJacobianMatchesJointFit) {
 }
 
 /// Tilt calibration from the lamps of a drive.
-TEST(SolveLeveling, LensJacobianPredictsChange) {
+TEST(RunTiltStep, LensJacobianPredictsChange) {
   Random random(4);
   Survey survey(kExactMap_m);
   for (int k = 0; k < 40; ++k) {
@@ -155,7 +155,7 @@ TEST(SolveLeveling, LensJacobianPredictsChange) {
     for (const auto& capture : survey.input.captures) {
       drive.frames.push_back({capture.name, capture.detections});
     }
-    const LevelingResult result = solve_leveling(drive, false, {});
+    const TiltResult result = run_tilt_step(drive, false, {});
     EXPECT_TRUE(result.ok()) << result.why;
     return *result.calibration.rotation_center;
   };
@@ -170,7 +170,7 @@ TEST(SolveLeveling, LensJacobianPredictsChange) {
   const Eigen::VectorXd error =
       Eigen::Map<const Eigen::VectorXd>(calibration.camera.intrinsics.data(), covariance.rows()) -
       before;
-  const Eigen::Vector2d moved = zenith_point(leveled()) - zenith_point(exact);
+  const Eigen::Vector2d moved = normalized_zenith_point(leveled()) - normalized_zenith_point(exact);
   EXPECT_GT(moved.norm(), 1e-6);
   EXPECT_LT((moved - *exact.by_intrinsics * error).norm(), 0.05 * moved.norm());
 }
@@ -186,8 +186,8 @@ TEST_P(SequentialCalibrationFixes, FixCovarianceMatchesErrors) {
     CalibrationChain row(random, 0.1, GetParam());
     const Calibration calibration = row.calibrated();
     const Eigen::Vector2d zenith_error =
-        zenith_point(*calibration.rotation_center) -
-        zenith_point(*row.survey.truth.calibration.rotation_center);
+        normalized_zenith_point(*calibration.rotation_center) -
+        normalized_zenith_point(*row.survey.truth.calibration.rotation_center);
     const Eigen::Vector2d& offset_px = calibration.dispersion->offset_px;
     const auto squared = [](const Eigen::Vector2d& error, const Eigen::Matrix2d& covariance) {
       return error.dot(covariance.inverse() * error) / (2 * trials);

@@ -89,7 +89,8 @@ inline ThinSet thin_set(const Thin& thin, bool kalibr, bool shrinks, Random& ran
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::automatic};
   input.camera.lens_model = LensModel::opencv8;
   const BoardLattice lattice(views.board);
-  const double fill_m = lens.focal_px().x() * tag_field_m(views.board).x() / views.imager_px[0];
+  const double fill_m =
+      lens.focal_px().x() * compute_tag_field_size_m(views.board).x() / views.imager_px[0];
   const auto places = static_cast<std::size_t>(thin.min_places) +
                       random.index(static_cast<std::size_t>(thin.max_places - thin.min_places + 1));
   for (std::size_t place = 0; place < places;) {
@@ -110,7 +111,7 @@ inline ThinSet thin_set(const Thin& thin, bool kalibr, bool shrinks, Random& ran
       const Eigen::Vector3d middle((u + du) * views.imager_px[0], (v + dv) * views.imager_px[1],
                                    lens.focal_px().x());
       BoardDetection seen = views.view(rotation, middle * (z_m / middle.z()), random, noise_px);
-      if (!lattice.sufficient(seen)) continue;
+      if (!lattice.has_sufficient_corners(seen)) continue;
       any = true;
       for (TagDetection& tag : seen.tags) tag = shrunk(tag, shift_px);
       std::string name = std::to_string(place);
@@ -119,16 +120,16 @@ inline ThinSet thin_set(const Thin& thin, bool kalibr, bool shrinks, Random& ran
     }
     if (any) ++place;
   }
-  reject_repeated(input.seen.images, ImageUse::boards, {});
+  reject_repeated_images(input.seen.images, ImageUse::boards, {});
   return {std::move(input), lens};
 }
 
 /// Returns the largest error in the calibrated region divided by the largest reported one. Returns
 /// std::nullopt if no lens is found or a gate fails.
 inline std::optional<double> error_over_stated(const ThinSet& set) {
-  const LensResult result = solve_lens(set.input, {});
+  const LensResult result = run_lens_step(set.input, {});
   if (!result.ok() ||
-      !describe_failed_gates(check_gates(default_lens_gates(), result.metrics)).empty()) {
+      !describe_failed_gates(check_gates(make_default_lens_gates(), result.metrics)).empty()) {
     return {};
   }
   const auto difference = compute_projection_difference(

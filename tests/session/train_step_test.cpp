@@ -46,7 +46,7 @@ TEST(TrainLamps, ReportsCrossValidatedConfusion) {
   EXPECT_EQ(result.classifier.lamps.size(), 6U);
   EXPECT_EQ(result.labeled.labels, 12 * kMinExamples);
   EXPECT_EQ(result.confusion.counts.sum(), 12 * kMinExamples);
-  EXPECT_EQ(result.confusion.wrong(), 0);
+  EXPECT_EQ(result.confusion.count_wrongly_identified(), 0);
 }
 
 TEST(TrainLamps, ThrowsForUnknownImageOrLamp) {

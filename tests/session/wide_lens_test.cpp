@@ -37,10 +37,10 @@ LensInput make_wide_set(double reach_deg, LensModel model) {
   return input;
 }
 
-class SolveLensWideField : public testing::TestWithParam<LensModel> {};
+class RunLensStepWideField : public testing::TestWithParam<LensModel> {};
 
-TEST_P(SolveLensWideField, FailsWhereModelHasNoRays) {
-  const LensResult result = solve_lens(make_wide_set(180, GetParam()), {});
+TEST_P(RunLensStepWideField, FailsWhereModelHasNoRays) {
+  const LensResult result = run_lens_step(make_wide_set(180, GetParam()), {});
   EXPECT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.why,
               AllOf(HasSubstr("30 views with the board: it is visible up to 10"),
@@ -51,11 +51,11 @@ TEST_P(SolveLensWideField, FailsWhereModelHasNoRays) {
 
 /// Up to 87 degrees: the errors of a lens that passes match the reported ones in the calibrated
 /// region.
-TEST_P(SolveLensWideField, WarnsAndCoversErrorsNearLimitOfModel) {
+TEST_P(RunLensStepWideField, WarnsAndCoversErrorsNearLimitOfModel) {
   constexpr double sigmas = 3;
   int compared = 0;
   for (const double reach_deg : {60, 75, 87}) {
-    const LensResult result = solve_lens(make_wide_set(reach_deg, GetParam()), {});
+    const LensResult result = run_lens_step(make_wide_set(reach_deg, GetParam()), {});
     if (!result.ok()) {
       EXPECT_THAT(result.why, HasSubstr("use --lens OPENCV_FISHEYE"));
       continue;
@@ -64,7 +64,8 @@ TEST_P(SolveLensWideField, WarnsAndCoversErrorsNearLimitOfModel) {
       EXPECT_THAT(result.warnings, Contains(HasSubstr("use --lens OPENCV_FISHEYE")));
       EXPECT_EQ(result.lens.better_model, LensModel::fisheye);
     }
-    if (!describe_failed_gates(check_gates(default_lens_gates(), result.metrics)).empty()) continue;
+    if (!describe_failed_gates(check_gates(make_default_lens_gates(), result.metrics)).empty())
+      continue;
     const auto difference = compute_projection_difference(
         wide_lens(), result.lens.solution.lens(), kWideImager, [&](const Eigen::Vector2d& pixel) {
           return polygon_contains(result.lens.report.region, pixel) ? 1.0 : INFINITY;
@@ -78,22 +79,22 @@ TEST_P(SolveLensWideField, WarnsAndCoversErrorsNearLimitOfModel) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Models, SolveLensWideField,
+INSTANTIATE_TEST_SUITE_P(Models, RunLensStepWideField,
                          testing::Values(LensModel::opencv8, LensModel::opencv12),
                          [](const auto& instance) {
                            return instance.param == LensModel::opencv8 ? "Opencv8" : "Opencv12";
                          });
 
 /// OPENCV5 does not fit a lens of this width; detecting this takes seconds.
-TEST(SolveLens, DoesNotBlameBoardForUnsuitableModel) {
-  const LensResult result = solve_lens(make_wide_set(87, LensModel::opencv5), {});
+TEST(RunLensStep, DoesNotBlameBoardForUnsuitableModel) {
+  const LensResult result = run_lens_step(make_wide_set(87, LensModel::opencv5), {});
   ASSERT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.why, AllOf(HasSubstr("OPENCV_FISHEYE fits to 0.05 px"),
                                 HasSubstr("use --lens OPENCV_FISHEYE"),
                                 Not(HasSubstr("board.yaml")), Not(HasSubstr("cannot be"))));
 }
 
-TEST(SolveLens, KeepsMarginAroundCornersForOwnModel) {
+TEST(RunLensStep, KeepsMarginAroundCornersForOwnModel) {
   constexpr int count = 30;
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::automatic};
@@ -103,7 +104,7 @@ TEST(SolveLens, KeepsMarginAroundCornersForOwnModel) {
     input.seen.images.push_back(
         observed({std::to_string(i), views.imager_px, views.random_view(random, 0.05)}));
   }
-  const LensResult result = solve_lens(input, {});
+  const LensResult result = run_lens_step(input, {});
   ASSERT_TRUE(result.ok()) << result.why;
   EXPECT_FALSE(result.lens.solution.other_model_fits);
   EXPECT_FALSE(result.lens.better_model);

@@ -71,7 +71,7 @@ TEST(ArchiveSession, DamagesGivenFractionOfSessions) {
   EXPECT_EQ(faults.size(), 4U);
 }
 
-TEST(ArchiveSession, VariesCamerasWithinLimitsAndKeepsThemAcrossSessions) {
+TEST(MakeArchiveSession, KeepsCameraAcrossItsSessions) {
   const Scene scene = archive_scene();
   std::set<double> focal_lengths;
   std::set<std::uint64_t> seeds;

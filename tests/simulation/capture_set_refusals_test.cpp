@@ -30,7 +30,7 @@ TEST(ReadCaptureSet, RejectsSpotOutsideRoom) {
             "scene.yaml:26: captures[1].heights_m[0]: " + problem);
 }
 
-TEST(ReadCaptureSet, RejectsLeverArmOutsideRoomAtAnyYaw) {
+TEST(ReadCaptureSet, RejectsPositionWhenLeverArmCanLeaveRoom) {
   const std::string problem = "moves the camera outside the room";
   EXPECT_EQ(refusal_with("[-0.2, 0.3]", "[0.949, -0.449]"), "");
   EXPECT_EQ(refusal_with("[-0.2, 0.3]", "[0.951, -0.449]"),

@@ -20,11 +20,13 @@ class FrameRendererClutter : public testing::Test {
     const FrameRenderer renderer(scene_);
     LampShot shot = shot_at(scene_, {0, 0, 0.1}, 0);
     for (SquareWave& wave : shot.waves) wave.duty = duty;
-    return renderer.lamp_electrons(shot);
+    return renderer.render_lamp_electrons(shot);
   }
   double in_view() {
     const FrameRenderer renderer(scene_);
-    return find_true_lamps(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0)).at(0).in_view;
+    return find_true_lamps_in_image(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0))
+        .at(0)
+        .in_view;
   }
   Scene scene_ = plain_scene();
 };

@@ -26,7 +26,7 @@ int times_read_when_cut(const std::string& whole, std::size_t step) {
 }
 
 // The format does not declare the number of captures or the presence of a picture.
-TEST(ReadScene, AcceptsTruncationOnlyAfterCompleteCaptures) {
+TEST(ReadScene, RejectsFileTruncatedWithinCapture) {
   EXPECT_EQ(times_read_when_cut(kSceneYaml, 1), 4);
 }
 

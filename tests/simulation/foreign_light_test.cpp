@@ -23,7 +23,7 @@ class FrameRendererForeignLight : public testing::Test {
 
   LampShot shot() const { return shot_at(scene_, {0, 0, 0.1}, 0); }
   cv::Mat1f rendered(const LampShot& shot) const {
-    return FrameRenderer(scene_).lamp_electrons(shot);
+    return FrameRenderer(scene_).render_lamp_electrons(shot);
   }
   cv::Mat1f rendered() const { return rendered(shot()); }
   Scene scene_ = plain_scene();
@@ -53,7 +53,7 @@ TEST(RectifiedSine, MeanMatchesNumericalIntegral) {
     return sum / samples;
   };
   for (const double end_s : {-0.0039, 0.002, 0.013, 0.1}) {
-    EXPECT_NEAR(wave.lit_fraction(-0.004, end_s), mean_until(end_s), 1e-7);
+    EXPECT_NEAR(wave.compute_lit_fraction(-0.004, end_s), mean_until(end_s), 1e-7);
   }
 }
 
@@ -148,7 +148,7 @@ TEST_F(FrameRendererForeignLight, SlantedBlindRendersBarsAlongFirstEdge) {
 TEST_F(FrameRendererForeignLight, SignRendersSeededLettersOfItsRadiance) {
   scene_.ambient_e_per_s = 1e6;
   scene_.clutter.signs = {{{{-0.3, -0.15, 1.6}, {0.6, 0, 0}, {0, 0.3, 0}, 6e7}, 2, 5, {}}};
-  draw_random_parts(scene_);
+  draw_random_scene_parts(scene_);
   const auto& strokes = scene_.clutter.signs[0].strokes;
   ASSERT_GE(strokes.size(), 10U) << "each of ten letters has one or more";
   const cv::Mat1f image = rendered();
@@ -162,11 +162,11 @@ TEST_F(FrameRendererForeignLight, SignRendersSeededLettersOfItsRadiance) {
   EXPECT_GT(lit, 0.05);
   EXPECT_LT(lit, 0.6) << "dark between the strokes";
   const auto first = strokes;
-  draw_random_parts(scene_);
+  draw_random_scene_parts(scene_);
   ASSERT_EQ(strokes.size(), first.size());
   EXPECT_EQ(strokes.back().min(), first.back().min());
   scene_.seed = 2;
-  draw_random_parts(scene_);
+  draw_random_scene_parts(scene_);
   const bool same = strokes.size() == first.size() && strokes.back().min() == first.back().min() &&
                     strokes.front().min() == first.front().min();
   EXPECT_FALSE(same) << "another seed";
@@ -178,18 +178,18 @@ TEST_F(FrameRendererForeignLight, IsListedInTrueOtherLightsOnly) {
       {{{-0.3, 0, 1.6}, make_disc(0.12), 1e9, 1}, RectifiedSine{100, 1, 0}, {}},
       {{{5, 0, 1.6}, make_disc(0.12), 1e9, 1}, RectifiedSine{100, 1, 0}, {}}};
   const FrameRenderer renderer(scene_);
-  const auto lights = find_true_other_lights(scene_, renderer, shot());
+  const auto lights = find_other_lights_in_image(scene_, renderer, shot());
   ASSERT_EQ(lights.size(), 2U) << "the third is out of view";
   EXPECT_EQ(lights[0].kind, "pwm");
   EXPECT_EQ(lights[1].kind, "mains");
   EXPECT_FALSE(lights[0].lamp);
   EXPECT_NEAR(lights[0].pixel.x(), 499.5, 1e-6);
   EXPECT_EQ(lights[0].in_view, 1);
-  EXPECT_EQ(find_true_lamps(scene_, renderer, shot()).size(), 1U);
+  EXPECT_EQ(find_true_lamps_in_image(scene_, renderer, shot()).size(), 1U);
   EXPECT_EQ(make_lamp_map(scene_, true).lamps.size(), 1U);
 }
 
-TEST_F(FrameRendererForeignLight, WriteTruthListsItInTrueOtherLightsTable) {
+TEST_F(FrameRendererForeignLight, WriteTruthTablesListsItInTrueOtherLightsTable) {
   CaptureSet set{"check", 5e-5, LampShots{}, {}};
   set.lamps->heights_m = {0.1};
   set.lamps->spots_m = {Eigen::Vector2d::Zero()};
@@ -199,12 +199,12 @@ TEST_F(FrameRendererForeignLight, WriteTruthListsItInTrueOtherLightsTable) {
   set.lamps->interval_s = 1;
   set.lamps->known = false;
   const TemporaryFolder folder;
-  write_truth(scene_, FrameRenderer(scene_), set, folder / "");
+  write_truth_tables(scene_, FrameRenderer(scene_), set, folder / "");
   EXPECT_FALSE(std::filesystem::exists(folder / "true_other_lights.csv")) << "there are none";
   scene_.clutter.foreign_lights = {
       {{{0.3, 0, 1.6}, make_disc(0.12), 1e9, 1}, SquareWave{500, 0.3, 0}, {}}};
   scene_.clutter.mirrors = {{{{0.4, -1, 0}, {0, 2, 0}, {0, 0, 1.7}, 0}, 0.2}};
-  write_truth(scene_, FrameRenderer(scene_), set, folder / "");
+  write_truth_tables(scene_, FrameRenderer(scene_), set, folder / "");
   const std::string table = TemporaryFolder::read_content(folder / "true_other_lights.csv");
   EXPECT_EQ(table,
             "image,kind,lamp,u_px,v_px,in_view\n"

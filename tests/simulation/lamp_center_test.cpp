@@ -42,7 +42,7 @@ class FrameRendererDisc : public testing::TestWithParam<LensCase> {
 
   /// Returns the image of a capture, with blur and quantization.
   cv::Mat1f render_image(const FrameRenderer& renderer, const LampShot& shot) const {
-    const cv::Mat image = expose(scene_.sensor, renderer.lamp_electrons(shot), 1);
+    const cv::Mat image = simulate_sensor(scene_.sensor, renderer.render_lamp_electrons(shot), 1);
     return cv::Mat1f(image);
   }
   std::vector<Eigen::Vector2d> projected(const LampShot& shot,
@@ -61,7 +61,7 @@ class FrameRendererDisc : public testing::TestWithParam<LensCase> {
     for (const double x_m : {-0.7, -0.31, 0.003, 0.45, 0.8}) {
       for (const double y_m : {-0.6, 0.0, 0.37}) {
         const LampShot shot = shot_at(scene_, {x_m, y_m, 0.1}, 0.3 + x_m);
-        const auto lamps = find_true_lamps(scene_, renderer, shot);
+        const auto lamps = find_true_lamps_in_image(scene_, renderer, shot);
         constexpr double radius_px = 40;
         const Eigen::AlignedBox2d inside(Eigen::Vector2d(radius_px, radius_px),
                                          Eigen::Vector2d(800 - radius_px, 600 - radius_px));
@@ -92,8 +92,8 @@ TEST_P(FrameRendererDisc, CentroidMatchesProjectedOutline) {
     Eigen::Vector2d moment(0, 0);
     for (std::size_t i = 0; i < outline.size(); ++i) {
       const Eigen::Vector2d &p = outline[i], &q = outline[(i + 1) % outline.size()];
-      twice_area += cross(p, q);
-      moment += cross(p, q) * (p + q) / 3;
+      twice_area += cross_product_2d(p, q);
+      moment += cross_product_2d(p, q) * (p + q) / 3;
     }
     const Brightness rendered = measure_brightness(render_image(renderer, shot));
     EXPECT_LT((rendered.centroid_px - moment / twice_area).norm(), 0.001);
@@ -107,14 +107,14 @@ TEST_P(FrameRendererDisc, CentroidOnCeilingMatchesLampPosition) {
   const Eigen::Vector3d lamp_m = scene_.lamps[0].glow.position_m;
   for (const LampShot& shot : shots(renderer)) {
     const Eigen::Vector2d truth = projected(shot, {lamp_m})[0];
-    EXPECT_LT((find_true_lamps(scene_, renderer, shot)[0].pixel - truth).norm(), 1e-6);
+    EXPECT_LT((find_true_lamps_in_image(scene_, renderer, shot)[0].pixel - truth).norm(), 1e-6);
 
     // The weight of a pixel is the area of the ceiling that it covers.
     const cv::Mat1f image = render_image(renderer, shot);
     const Eigen::Isometry3d world_from_camera = shot.motion.world_from_camera(0);
     const auto ceiling_m = [&](double u, double v) {
-      const Eigen::Vector3d ray =
-          world_from_camera.linear() * renderer.rays().lens().unproject({u, v}).value().direction;
+      const Eigen::Vector3d ray = world_from_camera.linear() *
+                                  renderer.pixel_rays().lens().unproject({u, v}).value().direction;
       return Eigen::Vector2d(world_from_camera.translation().head<2>() +
                              (lamp_m.z() - world_from_camera.translation().z()) / ray.z() *
                                  ray.head<2>());
@@ -126,7 +126,7 @@ TEST_P(FrameRendererDisc, CentroidOnCeilingMatchesLampPosition) {
         if (image(v, u) == 0) continue;
         const Eigen::Vector2d du = ceiling_m(u + 0.5, v) - ceiling_m(u - 0.5, v);
         const Eigen::Vector2d dv = ceiling_m(u, v + 0.5) - ceiling_m(u, v - 0.5);
-        const double light = image(v, u) * std::abs(cross(du, dv));
+        const double light = image(v, u) * std::abs(cross_product_2d(du, dv));
         sum += light;
         moment_m += light * ceiling_m(u, v);
       }

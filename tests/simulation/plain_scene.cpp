@@ -43,7 +43,7 @@ LampShot shot_at(const Scene& scene, const Eigen::Vector3d& position_m, double y
     shot.waves.push_back({lamp.frequency_hz, lamp.duty, lamp.phase.value_or(0)});
   }
   for (const ForeignLight& light : scene.clutter.foreign_lights) {
-    shot.foreign_waves.push_back(with_phase(light.wave, light.phase.value_or(0)));
+    shot.foreign_waves.push_back(with_wave_phase(light.wave, light.phase.value_or(0)));
   }
   return shot;
 }

@@ -65,10 +65,10 @@ TEST_P(FrameRendererRectangle, CoversProjectedOutline) {
     for (std::size_t i = 0; i < outline.size(); ++i) {
       const Eigen::Vector2d &p = outline[i], &q = outline[(i + 1) % outline.size()];
       ASSERT_TRUE(p.minCoeff() > 0 && p.x() < 799 && p.y() < 599) << "wholly in the image";
-      twice_area += cross(p, q);
-      moment += cross(p, q) * (p + q) / 3;
+      twice_area += cross_product_2d(p, q);
+      moment += cross_product_2d(p, q) * (p + q) / 3;
     }
-    const cv::Mat1f image(expose(scene_.sensor, renderer.lamp_electrons(shot), 1));
+    const cv::Mat1f image(simulate_sensor(scene_.sensor, renderer.render_lamp_electrons(shot), 1));
     const Brightness rendered = measure_brightness(image);
     EXPECT_LT((rendered.centroid_px - moment / twice_area).norm(), 0.001);
     const double level = glow.electron_rate_e_per_s * shot.exposure_s;
@@ -93,7 +93,7 @@ TEST_P(FrameRendererRectangle, CoversProjectedOutline) {
 TEST_P(FrameRendererRectangle, TrueLampIsImageOfCenter) {
   const FrameRenderer renderer(scene_);
   const LampShot shot = shot_at(scene_, {0.35, -0.2, 0.1}, 0.4);
-  const auto truth = find_true_lamps(scene_, renderer, shot);
+  const auto truth = find_true_lamps_in_image(scene_, renderer, shot);
   ASSERT_EQ(truth.size(), 1U);
   EXPECT_EQ(truth[0].in_view, 1);
   const auto center = projected(shot, {scene_.lamps[0].glow.position_m})[0];
@@ -103,7 +103,7 @@ TEST_P(FrameRendererRectangle, TrueLampIsImageOfCenter) {
 TEST_P(FrameRendererRectangle, TrueLampIsPartlyInViewAtImageEdge) {
   const FrameRenderer renderer(scene_);
   const LampShot shot = shot_at(scene_, {1.2, 0, 0.1}, 0);
-  const auto truth = find_true_lamps(scene_, renderer, shot);
+  const auto truth = find_true_lamps_in_image(scene_, renderer, shot);
   ASSERT_EQ(truth.size(), 1U);
   EXPECT_GT(truth[0].in_view, 0);
   EXPECT_LT(truth[0].in_view, 1);

@@ -244,7 +244,7 @@ TEST(ReadScene, RectangleLampTakesKeysOfLampMapOnly) {
   EXPECT_THAT(with("shape: rectangle, yaw_rad: 0"), testing::HasSubstr("size_m"));
 }
 
-TEST(ReadScene, RejectsEdgeShareWithRecess) {
+TEST(ReadScene, RejectsRimToCenterRatioWithRecess) {
   EXPECT_EQ(
       refusal_with("recess: {", "rim_to_center_ratio: 1, recess: {"),
       "scene.yaml:13: clutter.steady_lamps[1]: key 'rim_to_center_ratio' is unknown; the keys are: "

@@ -15,7 +15,7 @@ template <typename Shape>
 double integral_over(const Shape& shape, const std::array<Eigen::Vector2d, 3>& triangle) {
   double sum = 0;
   for (std::size_t i = 0; i < 3; ++i) {
-    sum += shape.integrate_edge(triangle[i], triangle[(i + 1) % 3]);
+    sum += shape.integrate_shape_along_edge(triangle[i], triangle[(i + 1) % 3]);
   }
   return sum;
 }
@@ -33,7 +33,7 @@ double sampled_integral(const Value& value, const std::array<Eigen::Vector2d, 3>
                                    b * (triangle[2] - triangle[0])));
     }
   }
-  const double area = cross(triangle[1] - triangle[0], triangle[2] - triangle[0]) / 2;
+  const double area = cross_product_2d(triangle[1] - triangle[0], triangle[2] - triangle[0]) / 2;
   return area * sum / (side * side);
 }
 

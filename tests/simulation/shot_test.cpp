@@ -22,7 +22,7 @@ CaptureSet turning() {
 TEST(LampShot, IteratesRepeatsFastestAndHeightsSlowest) {
   const Scene scene = plain_scene();
   const CaptureSet set = turning();
-  ASSERT_EQ(count_shots(set), 2 * 2 * 3 * 2);
+  ASSERT_EQ(count_captures_of_set(set), 2 * 2 * 3 * 2);
   const auto axis = [&](std::size_t index) {
     return make_lamp_shot(scene, set, index).motion.axis_m;
   };
@@ -41,7 +41,7 @@ TEST(LampShot, IteratesRepeatsFastestAndHeightsSlowest) {
   EXPECT_EQ(make_lamp_shot(scene, set, 7).image, "0007.png");
 }
 
-TEST(LampShot, DependsOnSeedFolderAndIndexOnly) {
+TEST(LampShot, DependsOnSeedFolderAndIndex) {
   Scene scene = plain_scene();
   CaptureSet set = turning();
   std::set<double> yaws{make_lamp_shot(scene, set, 3).motion.yaw_rad};
@@ -83,7 +83,7 @@ TEST(LampShot, ContinuesMotionOfPreviousCaptureOnDrive) {
   LampShots captures{{0, 0.3}, {}, drive, {0, 2}, 0, 0.4, 2, 0.5, false};
   for (int i = 0; i <= 10; ++i) captures.spots_m.emplace_back(0.03 * i, 0.04 * i);
   const CaptureSet set{"drive", 5e-5, captures, {}};
-  ASSERT_EQ(count_shots(set), 88);
+  ASSERT_EQ(count_captures_of_set(set), 88);
   for (std::size_t i = 0; i + 1 < 88; ++i) {
     if (i % 11 == 10) continue;  // the next pass begins
     const LampShot before = make_lamp_shot(scene, set, i),
@@ -116,7 +116,7 @@ TEST(BoardShot, StaysWithinLimitsOfViews) {
     const Eigen::Isometry3d camera_from_board = make_board_shot(scene, set, i).camera_from_board(0);
     EXPECT_NEAR(camera_from_board.linear().determinant(), 1, 1e-12);
     Eigen::Vector3d middle_m(0, 0, 0);
-    middle_m.head<2>() = tag_field_m(scene.board->print) / 2;
+    middle_m.head<2>() = compute_tag_field_size_m(scene.board->print) / 2;
     const Eigen::Vector3d middle = camera_from_board * middle_m;
     const double tilt =
         std::acos(std::min(1.0, middle.normalized().dot(camera_from_board.linear().col(2))));
@@ -147,7 +147,7 @@ TEST(BoardShot, UsesLastRayWhereLensHasNone) {
   int at_the_rim = 0;
   for (std::size_t i = 0; i < 300; ++i) {
     Eigen::Vector3d middle_m(0, 0, 0);
-    middle_m.head<2>() = tag_field_m(scene.board->print) / 2;
+    middle_m.head<2>() = compute_tag_field_size_m(scene.board->print) / 2;
     const Eigen::Vector3d sight = make_board_shot(scene, set, i).camera_from_board(0) * middle_m;
     const double off_axis_rad = std::atan2(sight.head<2>().norm(), sight.z());
     EXPECT_LE(off_axis_rad, last_rad + 1e-6);
@@ -170,7 +170,7 @@ TEST(BaseMotion, AddsRollPitchAndVibration) {
   EXPECT_TRUE(pose.translation().isApprox(motion.pose(0).position_m));
   // Two thousandths of a radian at 25 Hz: a period is 0.04 s, roll and pitch a quarter of it apart.
   motion.vibration = {0.002, 25};
-  EXPECT_FALSE(motion.at_rest());
+  EXPECT_FALSE(motion.is_at_rest());
   EXPECT_NEAR(motion.inclination(0).roll_rad, 0.2, 1e-15);
   EXPECT_NEAR(motion.inclination(0).pitch_rad, -0.1 + 0.002, 1e-15);
   EXPECT_NEAR(motion.inclination(0.01).roll_rad, 0.2 + 0.002, 1e-15);

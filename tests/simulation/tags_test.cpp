@@ -44,8 +44,9 @@ void expect_all_read(const Scene& scene, apriltag_family_t* family) {
   const CaptureSet views = board_views(4, 0.28, rad_from_deg(35), rad_from_deg(180), 0);
   for (std::size_t index = 0; index < 4; ++index) {
     const BoardShot shot = make_board_shot(scene, views, index);
-    const Corners found = detected(expose(scene.sensor, renderer.board_electrons(shot), 1), family);
-    const auto truth = find_true_corners(scene, renderer, shot);
+    const Corners found =
+        detected(simulate_sensor(scene.sensor, renderer.render_board_electrons(shot), 1), family);
+    const auto truth = find_true_corners_in_image(scene, renderer, shot);
     ASSERT_FALSE(truth.empty());
     EXPECT_EQ(found.size(), truth.size());
     for (const auto& [tag, corner, pixel] : truth) {

@@ -34,12 +34,12 @@ struct DatabaseIdentity : testing::Test {
 };
 
 TEST_F(DatabaseIdentity, ReturnsMachineAndAbsolutePathForFile) {
-  EXPECT_EQ(make_records_database_id("/var/lib/vlp/records.db"), here + "/var/lib/vlp/records.db");
-  EXPECT_EQ(make_records_database_id("/var/lib/../lib/records.db"), here + "/var/lib/records.db");
+  EXPECT_EQ(derive_database_identity("/var/lib/vlp/records.db"), here + "/var/lib/vlp/records.db");
+  EXPECT_EQ(derive_database_identity("/var/lib/../lib/records.db"), here + "/var/lib/records.db");
 }
 
 TEST_F(DatabaseIdentity, DiffersBetweenServers) {
-  const auto of = [](const std::string& where) { return make_records_database_id(where); };
+  const auto of = [](const std::string& where) { return derive_database_identity(where); };
   EXPECT_EQ(of("postgresql://u@db/vlp"), "postgresql://db/vlp");
   EXPECT_EQ(of("postgres://other:secret@db:5432/vlp?connect_timeout=2"), of("postgresql://db/vlp"));
   EXPECT_NE(of("postgresql://db:5433/vlp"), of("postgresql://db/vlp"));
@@ -58,17 +58,17 @@ TEST_F(DatabaseIdentity, IncludesMachineForLocalServer) {
   for (const char* where :
        {"postgresql:///vlp", "postgresql://localhost/vlp", "postgresql://127.0.0.1:5544/vlp",
         "postgresql:///vlp?host=/run/postgresql", "postgresql://db/vlp?hostaddr=127.0.0.1"}) {
-    EXPECT_THAT(make_records_database_id(where), StartsWith(here + "postgresql://")) << where;
+    EXPECT_THAT(derive_database_identity(where), StartsWith(here + "postgresql://")) << where;
   }
-  EXPECT_THAT(make_records_database_id("postgresql:///vlp?hostaddr=10.0.0.1"),
+  EXPECT_THAT(derive_database_identity("postgresql:///vlp?hostaddr=10.0.0.1"),
               Not(StartsWith(here)));
 }
 
 TEST_F(DatabaseIdentity, OmitsPassword) {
   for (const char* where : {"postgresql://u:secret@db", "postgresql://u@db/vlp?password=secret"}) {
-    EXPECT_THAT(make_records_database_id(where), Not(HasSubstr("secret")));
+    EXPECT_THAT(derive_database_identity(where), Not(HasSubstr("secret")));
   }
-  EXPECT_THAT(rejection_message([] { make_records_database_id("postgresql://u:a@secret@/db"); }),
+  EXPECT_THAT(rejection_message([] { derive_database_identity("postgresql://u:a@secret@/db"); }),
               testing::AllOf(HasSubstr("is not of the form"), Not(HasSubstr("secret"))));
 }
 

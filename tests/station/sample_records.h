@@ -21,7 +21,7 @@ inline RunRecord make_sample_record(const std::string& run, const std::string& c
   record.kind = "unit";
   record.station = "station-1";
   record.camera = camera;
-  record.begun_utc = begun_utc(run);
+  record.begun_utc = start_utc_of_run_id(run);
   record.ended_utc = "2026-11-21T13:45:0" + run.substr(14, 1) + "Z";
   record.verdict = rms_px < 1 ? "PASS" : "FAIL";
   record.causes = rms_px < 1 ? "" : "it's \"blurred\": 100 %, \xc3\xbc\nsecond\n";
@@ -29,8 +29,8 @@ inline RunRecord make_sample_record(const std::string& run, const std::string& c
   record.libraries = "none";
   record.config_sha256 = std::string(64, 'a');
   record.calibration = "format: vlp-calibration/1\ncamera: {id: \"it's\"}\n";
-  record.metrics = check_all({{"rms_px", 1, GuardBand{0.1 + 0.2, 1.5}}, {"tilt_deg", 2}},
-                             {{"rms_px", rms_px}, {"coverage", 0.75}}, unit_metrics());
+  record.metrics = check_all_metrics({{"rms_px", 1, GuardBand{0.1 + 0.2, 1.5}}, {"tilt_deg", 2}},
+                                     {{"rms_px", rms_px}, {"coverage", 0.75}}, list_unit_metrics());
   record.images = {{"boards", "0000.png", std::string(64, 'b'), ""},
                    {"check", "0000.png", std::string(64, 'c'), "too dark"}};
   return record;
@@ -44,7 +44,7 @@ inline std::string numbered_run_id(int number) {
 template <typename Runs>
 std::vector<std::string> list_ids(Runs& runs, const RunFilter& filter) {
   std::vector<std::string> ids;
-  for (const RunSummary& run : runs.list(filter)) ids.push_back(run.run);
+  for (const RunSummary& run : runs.list_runs(filter)) ids.push_back(run.run);
   return ids;
 }
 

@@ -17,9 +17,9 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::SizeIs;
 
-class ReadStation : public testing::Test {
+class ReadStationConfig : public testing::Test {
  protected:
-  ReadStation() {
+  ReadStationConfig() {
     for (const char* name : {"station.yaml", "camera_type.yaml", "board.yaml", "lamps.yaml"}) {
       folder.file(name, TemporaryFolder::read_content(std::filesystem::path(VLP_SOURCE_DIR) /
                                                       "datasets/station" / name));
@@ -32,13 +32,13 @@ class ReadStation : public testing::Test {
     folder.file(name, text.replace(at, from.size(), to));
   }
   std::string refusal() const {
-    return rejection_message([&] { read_station(folder / "station.yaml"); });
+    return rejection_message([&] { read_station_config(folder / "station.yaml"); });
   }
   TemporaryFolder folder;
 };
 
-TEST_F(ReadStation, ReadsReferencedFiles) {
-  const StationConfig config = read_station(folder / "station.yaml");
+TEST_F(ReadStationConfig, ReadsReferencedFiles) {
+  const StationConfig config = read_station_config(folder / "station.yaml");
   EXPECT_EQ(config.station, "station-1");
   EXPECT_EQ(config.type.imager_px[0], 800);
   EXPECT_THAT(config.lamps.lamps, SizeIs(6));
@@ -49,7 +49,7 @@ TEST_F(ReadStation, ReadsReferencedFiles) {
 }
 
 /// The keys commented out with '#' are valid.
-TEST_F(ReadStation, AcceptsOptionalKeysOfExample) {
+TEST_F(ReadStationConfig, AcceptsOptionalKeysOfExample) {
   folder.file("golden.yaml", TemporaryFolder::read_content(kExample + "calibration.yaml"));
   folder.file(
       "station.yaml",
@@ -58,41 +58,41 @@ TEST_F(ReadStation, AcceptsOptionalKeysOfExample) {
           std::regex(
               "\n# (golden:|verify_due:|serial_pattern:|void_operators:|hook:|retention:| {9})"),
           "\n$1"));
-  const StationConfig config = read_station(folder / "station.yaml");
+  const StationConfig config = read_station_config(folder / "station.yaml");
   ASSERT_TRUE(config.golden);
   EXPECT_THAT(config.golden->gates, SizeIs(7));
   ASSERT_TRUE(config.verify_due);
   EXPECT_EQ(config.verify_due->units, 200);
-  EXPECT_EQ(serial_problem(config, "0001"), "");
-  EXPECT_NE(serial_problem(config, "x1"), "");
+  EXPECT_EQ(describe_serial_problem(config, "0001"), "");
+  EXPECT_NE(describe_serial_problem(config, "x1"), "");
   EXPECT_EQ(config.void_operators, (std::vector<std::string>{"Ann", "Bea"}));
   ASSERT_TRUE(config.hook);
   EXPECT_THAT(config.hook->command, SizeIs(3));
   EXPECT_EQ(config.keep.images_days, 90);
 }
 
-TEST_F(ReadStation, RejectsUnknownGateWithLine) {
+TEST_F(ReadStationConfig, RejectsUnknownGateWithLine) {
   change("station.yaml", "  rms_px: 0.014", "  rms_mm: 0.014");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("station.yaml:"), HasSubstr("rms_mm")));
 }
 
-TEST_F(ReadStation, RejectsImplausibleValues) {
+TEST_F(ReadStationConfig, RejectsImplausibleValues) {
   change("station.yaml", "\n  coverage: 0.7", "\n  coverage: 7");
   EXPECT_THAT(refusal(), HasSubstr("gates.coverage: should be a fraction from 0 to 1, not 7"));
   change("station.yaml", "board_coverage: 0.7", "board_coverage: 70");
   EXPECT_THAT(refusal(), HasSubstr("completion.board_coverage"));
 }
 
-TEST_F(ReadStation, RejectsCameraTypeWithoutRowTime) {
+TEST_F(ReadStationConfig, RejectsCameraTypeWithoutRowTime) {
   change("camera_type.yaml", "  row_time_s: 3.0e-05\n", "");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("camera_type"), HasSubstr("row_time_s")));
 }
 
-TEST_F(ReadStation, ReadsGuardBands) {
+TEST_F(ReadStationConfig, ReadsGuardBands) {
   change("station.yaml", "\nrecords: records.db",
          "\nguard_bands: {k: 1.645, standard_uncertainties: {check_mean_mm: 0.02}}"
          "\nrecords: records.db");
-  for (const Gate& gate : read_station(folder / "station.yaml").gates) {
+  for (const Gate& gate : read_station_config(folder / "station.yaml").gates) {
     ASSERT_EQ(gate.guard.has_value(), gate.metric == "check_mean_mm") << gate.metric;
     if (!gate.guard) continue;
     EXPECT_EQ(gate.guard->standard_uncertainty, 0.02);
@@ -117,49 +117,51 @@ TEST_F(ReadStation, ReadsGuardBands) {
               HasSubstr("leaves no value within the gate"));
 }
 
-TEST_F(ReadStation, ReadsHook) {
-  EXPECT_FALSE(read_station(folder / "station.yaml").hook);
+TEST_F(ReadStationConfig, ReadsHook) {
+  EXPECT_FALSE(read_station_config(folder / "station.yaml").hook);
   change("station.yaml", "records: records.db",
          "records: records.db\nhook: {command: [./label, --to, it's]}");
-  const auto hook = read_station(folder / "station.yaml").hook;
+  const auto hook = read_station_config(folder / "station.yaml").hook;
   ASSERT_TRUE(hook);
   EXPECT_THAT(hook->command, testing::ElementsAre((folder / "./label").string(), "--to", "it's"));
   EXPECT_EQ(hook->time_limit_s, 30);
   change("station.yaml", "[./label, --to, it's]", "[label], time_limit_s: 0.5");
-  EXPECT_THAT(read_station(folder / "station.yaml").hook->command, testing::ElementsAre("label"));
-  EXPECT_EQ(read_station(folder / "station.yaml").hook->time_limit_s, 0.5);
+  EXPECT_THAT(read_station_config(folder / "station.yaml").hook->command,
+              testing::ElementsAre("label"));
+  EXPECT_EQ(read_station_config(folder / "station.yaml").hook->time_limit_s, 0.5);
   change("station.yaml", "time_limit_s: 0.5", "time_limit_s: 0");
   EXPECT_THAT(refusal(), HasSubstr("hook.time_limit_s: should be above 0"));
   change("station.yaml", "[label], time_limit_s: 0", "[]");
   EXPECT_THAT(refusal(), HasSubstr("hook.command: should be a program and its arguments"));
 }
 
-TEST_F(ReadStation, ReadsSerialPattern) {
-  StationConfig config = read_station(folder / "station.yaml");
-  EXPECT_EQ(serial_problem(config, "anything"), "");
-  EXPECT_THAT(serial_problem(config, "a/b"), HasSubstr("a camera's id has letters"));
+TEST_F(ReadStationConfig, ReadsSerialPattern) {
+  StationConfig config = read_station_config(folder / "station.yaml");
+  EXPECT_EQ(describe_serial_problem(config, "anything"), "");
+  EXPECT_THAT(describe_serial_problem(config, "a/b"), HasSubstr("a camera's id has letters"));
   change("station.yaml", "records: records.db",
          "records: records.db\nserial_pattern: 'SN-[0-9]{4}'");
-  config = read_station(folder / "station.yaml");
-  EXPECT_EQ(serial_problem(config, "SN-0123"), "");
-  EXPECT_EQ(serial_problem(config, "SN-01234"), "'SN-01234' is not of the form SN-[0-9]{4}");
-  EXPECT_THAT(serial_problem(config, ""), HasSubstr("a camera's id has letters"));
+  config = read_station_config(folder / "station.yaml");
+  EXPECT_EQ(describe_serial_problem(config, "SN-0123"), "");
+  EXPECT_EQ(describe_serial_problem(config, "SN-01234"),
+            "'SN-01234' is not of the form SN-[0-9]{4}");
+  EXPECT_THAT(describe_serial_problem(config, ""), HasSubstr("a camera's id has letters"));
   change("station.yaml", "'SN-[0-9]{4}'", "'SN-[0-9'");
   EXPECT_THAT(refusal(), HasSubstr("serial_pattern: is no regular expression"));
 }
 
 /// Nested repetitions can match in exponentially many combinations.
-TEST(SerialProblem, LimitsTimeOfPatternMatch) {
+TEST(DescribeSerialProblem, LimitsTimeOfPatternMatch) {
   StationConfig config{};
   config.serial_pattern = "(a+)+b";
-  EXPECT_EQ(serial_problem(config, "aaab"), "");
-  EXPECT_THAT(serial_problem(config, std::string(60, 'a')),
+  EXPECT_EQ(describe_serial_problem(config, "aaab"), "");
+  EXPECT_THAT(describe_serial_problem(config, std::string(60, 'a')),
               HasSubstr("serial_pattern: the comparison is too slow for"));
   config.serial_pattern = "[A-Za-z0-9_.-]{1,64}";
-  EXPECT_EQ(serial_problem(config, std::string(64, 'a')), "");
+  EXPECT_EQ(describe_serial_problem(config, std::string(64, 'a')), "");
 }
 
-TEST_F(ReadStation, ReadsVerifyDueAndRetention) {
+TEST_F(ReadStationConfig, ReadsVerifyDueAndRetention) {
   change("station.yaml", "records: records.db",
          "records: records.db\nretention: {images_days: 90}\nverify_due: {hours: 24, units: 200}");
   EXPECT_THAT(refusal(), HasSubstr("verify_due: needs a golden unit"));
@@ -167,7 +169,7 @@ TEST_F(ReadStation, ReadsVerifyDueAndRetention) {
   change("station.yaml", "records: records.db",
          "records: records.db\n"
          "golden: {camera_id: g, calibration: golden.yaml, gates: {tilt_deg: 1}}");
-  const StationConfig config = read_station(folder / "station.yaml");
+  const StationConfig config = read_station_config(folder / "station.yaml");
   EXPECT_EQ(config.verify_due->hours, 24);
   EXPECT_EQ(config.verify_due->units, 200);
   EXPECT_EQ(config.keep.images_days, 90);
@@ -183,26 +185,26 @@ TEST_F(ReadStation, ReadsVerifyDueAndRetention) {
   EXPECT_THAT(refusal(), HasSubstr("retention.images_days"));
 }
 
-TEST_F(ReadStation, RejectsGoldenUnitWithoutRowTime) {
+TEST_F(ReadStationConfig, RejectsGoldenUnitWithoutRowTime) {
   folder.file("golden.yaml", TemporaryFolder::read_content(kExample + "calibration.yaml"));
   change("station.yaml", "records: records.db",
          "records: records.db\n"
          "golden: {camera_id: g, calibration: golden.yaml, gates: {tilt_deg: 1}}");
-  EXPECT_TRUE(read_station(folder / "station.yaml").golden);
+  EXPECT_TRUE(read_station_config(folder / "station.yaml").golden);
   change("golden.yaml", "  row_time_s: 0.00003\n", "");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("golden.calibration"), HasSubstr("row_time_s")));
 }
 
-TEST_F(ReadStation, RejectsUnknownDatabase) {
+TEST_F(ReadStationConfig, RejectsUnknownDatabase) {
   change("station.yaml", "records: records.db", "records: mysql://server/records");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("records"), HasSubstr("postgresql://")));
 }
 
-TEST_F(ReadStation, ChangesDigestWithReferencedFiles) {
-  const std::string before = read_station(folder / "station.yaml").sha256;
-  EXPECT_EQ(read_station(folder / "station.yaml").sha256, before);
+TEST_F(ReadStationConfig, ChangesDigestWithReferencedFiles) {
+  const std::string before = read_station_config(folder / "station.yaml").sha256;
+  EXPECT_EQ(read_station_config(folder / "station.yaml").sha256, before);
   change("lamps.yaml", "-0.32", "-0.33");
-  EXPECT_NE(read_station(folder / "station.yaml").sha256, before);
+  EXPECT_NE(read_station_config(folder / "station.yaml").sha256, before);
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ std::vector<Frame> turn(SyntheticRig rig, Random& random) {
   for (int i = 0; i < 24; ++i) {
     const double yaw_rad = rad_from_deg(30 * i + random.uniform(-8, 8));
     const Eigen::Vector3d at_m(axis_m.x(), axis_m.y(), i < 12 ? 0 : 0.3);
-    rig.camera = {at_m + rotation_about_z(yaw_rad) * lever_arm_m, wrap_rad(yaw_rad)};
+    rig.camera = {at_m + rotation_about_z(yaw_rad) * lever_arm_m, wrap_angle_rad(yaw_rad)};
     frames.push_back(make_frame(rig, "turn", i, random));
   }
   return frames;
@@ -60,7 +60,7 @@ std::vector<Frame> turn(SyntheticRig rig, Random& random) {
 std::vector<Frame> at_station(SyntheticRig rig, Random& random) {
   std::vector<Frame> frames;
   for (int i = 0; i < 12; ++i) {
-    rig.camera = {{0.1, 0, 0}, wrap_rad(rad_from_deg(30 * i + random.uniform(-8, 8)))};
+    rig.camera = {{0.1, 0, 0}, wrap_angle_rad(rad_from_deg(30 * i + random.uniform(-8, 8)))};
     frames.push_back(make_frame(rig, "station", i, random));
   }
   return frames;
@@ -79,16 +79,17 @@ void make_example(const std::filesystem::path& folder) {
   CsvWriter truth(folder / "truth.csv", {"image", "x_m", "y_m", "z_m", "yaw_rad"});
   for (int i = 0; i < 36; ++i) {
     rig.camera = {{-0.35 + 0.14 * (i % 6), -0.35 + 0.14 * (i / 6), 0.1 * (i % 4)},
-                  wrap_rad(rad_from_deg(100 * i))};
+                  wrap_angle_rad(rad_from_deg(100 * i))};
     frames.push_back(make_frame(rig, "spot", i, random));
     const Eigen::Vector3d& p = rig.camera.position_m;
-    truth.row({frames.back().image, fixed(p.x(), 6), fixed(p.y(), 6), fixed(p.z(), 6),
-               fixed(rig.camera.yaw_rad, 9)});
+    truth.row({frames.back().image, format_fixed_decimals(p.x(), 6),
+               format_fixed_decimals(p.y(), 6), format_fixed_decimals(p.z(), 6),
+               format_fixed_decimals(rig.camera.yaw_rad, 9)});
   }
   write_lamp_map(folder / "lamps.yaml", rig.map);
   write_calibration(folder / "calibration.yaml", rig.calibration);
   write_detections(folder / "detections.csv", frames);
-  truth.save();
+  truth.save_file();
   write_detections(folder / "turning.csv", turn(rig, random));
   write_detections(folder / "station.csv", at_station(rig, random));
 }

@@ -19,7 +19,7 @@ class Scatter {
 
   void add(const Pose& pose) {
     Eigen::Vector4d error;
-    error << pose.position_m - truth_.position_m, wrap_rad(pose.yaw_rad - truth_.yaw_rad);
+    error << pose.position_m - truth_.position_m, wrap_angle_rad(pose.yaw_rad - truth_.yaw_rad);
     sum_ += error;
     squares_ += error.cwiseAbs2();
     // 95 % quantile of chi-square with four degrees of freedom.

@@ -32,7 +32,7 @@ struct NeesStatistics {
 inline Eigen::Vector4d compute_pose_error(const Fix& fix, const Pose& truth) {
   Eigen::Vector4d error;
   error << fix.estimate.pose.position_m - truth.position_m,
-      wrap_rad(fix.estimate.pose.yaw_rad - truth.yaw_rad);
+      wrap_angle_rad(fix.estimate.pose.yaw_rad - truth.yaw_rad);
   return error;
 }
 

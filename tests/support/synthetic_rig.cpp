@@ -21,7 +21,7 @@ Camera synthetic_camera() {
 
 Camera splined_camera() {
   Camera camera = synthetic_camera();
-  camera.lens_model = lens_model_for({3, 12, 10, 130});
+  camera.lens_model = lens_model_for_spline_grid({3, 12, 10, 130});
   camera.intrinsics.resize(4);
   camera.intrinsics.resize(parameter_count(camera.lens_model));
   for (std::size_t i = 4; i < camera.intrinsics.size(); ++i) {
@@ -62,8 +62,9 @@ RotationCenter tilted_by(const Camera& camera, double tilt_rad, double azimuth_r
   center.zenith_in_camera = {std::sin(tilt_rad) * std::cos(azimuth_rad),
                              std::sin(tilt_rad) * std::sin(azimuth_rad), std::cos(tilt_rad)};
   const Eigen::Vector2d focal_px = camera.focal_px();
-  center.center_px = camera.center_px() + focal_px.cwiseProduct(center.zenith_in_camera.head<2>() /
-                                                                center.zenith_in_camera.z());
+  center.center_px =
+      camera.principal_point_px() +
+      focal_px.cwiseProduct(center.zenith_in_camera.head<2>() / center.zenith_in_camera.z());
   return center;
 }
 

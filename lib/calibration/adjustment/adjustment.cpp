@@ -80,7 +80,7 @@ std::optional<Pose> estimate_rough_pose(const std::vector<Sighting>& sightings,
     const auto [status, fix] = estimate_pose_robust(frame, max_residual_fraction);
     if (status == FixStatus::ok) return fix.pose;
   }
-  const auto [status, fix] = estimate_pose_checked(sightings, kInfinite);
+  const auto [status, fix] = estimate_and_check_pose(sightings, kInfinite);
   return status == FixStatus::ok ? std::optional(fix.pose) : std::nullopt;
 }
 
@@ -108,7 +108,7 @@ Eigen::MatrixXd make_gauge(const std::vector<Eigen::Vector3d>& lamps_m,
 }
 
 /// Returns the derivative of a pixel of the undistorted image with respect to the pixel of the ray.
-Eigen::Matrix2d undistorted_from_pixel(const Lens& lens, const Lens::Ray& ray) {
+Eigen::Matrix2d d_undistorted_pixel_d_pixel(const Lens& lens, const Lens::Ray& ray) {
   const Eigen::Vector2d z = ray.direction.hnormalized();
   return lens.focal_px().asDiagonal() *
          (ray.d_direction_d_pixel.topRows<2>() - z * ray.d_direction_d_pixel.row(2)) /
@@ -118,7 +118,7 @@ Eigen::Matrix2d undistorted_from_pixel(const Lens& lens, const Lens::Ray& ray) {
 /// Key of a known position that captures have in common: their spot, or the position itself.
 using PlaceKey = std::tuple<std::string, double, double, double, PlaceOf>;
 
-AssembledProblem assemble(const AdjustmentInput& input) {
+AssembledProblem assemble_adjustment_problem(const AdjustmentInput& input) {
   const Camera& camera = input.calibration.camera;
   const auto& report = input.calibration.intrinsics_report;
   const auto& center = input.calibration.rotation_center;
@@ -132,29 +132,29 @@ AssembledProblem assemble(const AdjustmentInput& input) {
                         input.lamps.lamps.size(), spots.size()),
       compute_mean_position(input.lamps)};
   AdjustmentProblem& problem = all.problem;
-  const AdjustmentLayout& layout = problem.layout();
+  const AdjustmentLayout& layout = problem.parameter_layout();
   const Lens lens(camera.lens_model, camera.intrinsics);
   const auto row_clock = make_row_clock(camera);
   std::vector<Eigen::Vector3d> lamps_m;
   for (const Lamp& lamp : input.lamps.lamps) {
     lamps_m.emplace_back(lamp.position_m - all.origin_m);
-    problem.state().segment<3>(layout.lamp(lamps_m.size() - 1)) = lamps_m.back();
+    problem.state_vector().segment<3>(layout.lamp_state_index(lamps_m.size() - 1)) = lamps_m.back();
     problem.lamps.push_back(
         {lamps_m.back(), input.frees_map_shape ? kInfinite : lamp.sd_m.value_or(0)});
   }
   all.lamp_seen.resize(lamps_m.size());
   Eigen::Vector2d zenith(0, 0), arm_m(0, 0);
   if (center) {
-    zenith = zenith_point(*center);
+    zenith = normalized_zenith_point(*center);
     arm_m = center->lever_arm_m.value_or(arm_m);
   }
-  problem.state().segment<2>(layout.zenith) = zenith;
-  problem.state().segment<2>(layout.lever_arm) = arm_m;
+  problem.state_vector().segment<2>(layout.zenith) = zenith;
+  problem.state_vector().segment<2>(layout.lever_arm) = arm_m;
   const Eigen::Matrix3d base_from_camera =
-      rotate_by_zenith(zenith, Eigen::Vector3d::UnitZ()).camera_from_level.transpose();
+      rotate_level_point_to_camera(zenith, Eigen::Vector3d::UnitZ()).camera_from_level.transpose();
 
   std::vector<Eigen::Vector3d> axes_m(spots.size(), Eigen::Vector3d::Zero());
-  std::vector<int> find_rotation_captures(spots.size(), 0);
+  std::vector<int> num_captures_per_pivot(spots.size(), 0);
   std::map<PlaceKey, std::size_t> place_of_key;
   std::vector<AdjustmentProblem::Sighting> seen;
   std::vector<Sighting> sightings;
@@ -167,7 +167,7 @@ AssembledProblem assemble(const AdjustmentInput& input) {
     sightings.clear();
     lamps.clear();
     for (const Detection& detection : capture.detections) {
-      const Lamp* lamp = find_lamp(input.lamps.lamps, detection.lamp);
+      const Lamp* lamp = find_lamp_by_id(input.lamps.lamps, detection.lamp);
       if (lamp == nullptr || sightings.size() == kMaxSightings) continue;
       const auto index = static_cast<std::size_t>(lamp - input.lamps.lamps.data());
       const auto ray = lens.unproject(detection.pixel);
@@ -178,10 +178,10 @@ AssembledProblem assemble(const AdjustmentInput& input) {
       if (!detection.sigma_px) all.noise_is_stated = false;
       Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity() / sigma_px;
       if (input.weighs_in_undistorted_image && !detection.sigma_px && ray->direction.z() > 0) {
-        whitening = undistorted_from_pixel(lens, *ray);
+        whitening = d_undistorted_pixel_d_pixel(lens, *ray);
       }
       seen.push_back({problem.captures.size(), index, detection.pixel, sigma_px, whitening,
-                      row_clock ? row_clock->time_s(detection.pixel) : 0});
+                      row_clock ? row_clock->compute_time_from_middle_row_s(detection.pixel) : 0});
       lamps.push_back(index);
       sightings.push_back(
           {lamps_m[index], level.hnormalized(), Eigen::Matrix2d(lens.focal_px().asDiagonal()), 1});
@@ -197,7 +197,7 @@ AssembledProblem assemble(const AdjustmentInput& input) {
       const Eigen::Matrix2d turn = rotation_about_z(pose->yaw_rad).topLeftCorner<2, 2>();
       axes_m[*spot] += pose->position_m;
       axes_m[*spot].head<2>() -= turn * arm_m;
-      ++find_rotation_captures[*spot];
+      ++num_captures_per_pivot[*spot];
       problem.has_lever_arm = true;
     }
     const std::size_t index = problem.captures.size();
@@ -207,7 +207,7 @@ AssembledProblem assemble(const AdjustmentInput& input) {
       all.lamp_seen[sighting.lamp] = true;
     }
     if (!capture.place) continue;
-    const KnownPlace& place = *capture.place;
+    const KnownPosition& place = *capture.place;
     const PlaceKey key = capture.spot.empty() ? PlaceKey{"", place.xy_m.x(), place.xy_m.y(),
                                                          place.z_m.value_or(kInfinite), place.of}
                                               : PlaceKey{capture.spot, 0, 0, 0, place.of};
@@ -230,7 +230,8 @@ AssembledProblem assemble(const AdjustmentInput& input) {
   problem.place_used.assign(all.places.size(), true);
   if (input.frees_map_shape) problem.gauge = make_gauge(lamps_m, all.lamp_seen);
   for (std::size_t i = 0; i < axes_m.size(); ++i) {
-    problem.state().segment<3>(layout.spot(i)) = axes_m[i] / std::max(1, find_rotation_captures[i]);
+    problem.state_vector().segment<3>(layout.pivot_state_index(i)) =
+        axes_m[i] / std::max(1, num_captures_per_pivot[i]);
   }
   return all;
 }
@@ -258,8 +259,8 @@ bool update_inliers(AdjustmentProblem& problem, bool noise_is_stated, double deg
   }
   if (squares.empty()) return false;
   const double scatter =
-      std::sqrt(robust_planar_variance(std::move(squares), degrees_of_freedom) *
-                planar_outlier_bound(kDetectionOutlierSigmas, degrees_of_freedom));
+      std::sqrt(estimate_robust_variance_2d(std::move(squares), degrees_of_freedom) *
+                compute_squared_outlier_bound_2d(kDetectionOutlierSigmas, degrees_of_freedom));
   const double limit =
       std::max(scatter, kDetectionOutlierSigmas * (noise_is_stated ? 1 : rounding));
   bool changed = false;
@@ -273,12 +274,13 @@ bool update_inliers(AdjustmentProblem& problem, bool noise_is_stated, double deg
 
 /// Computes the residuals of the known positions, adjusted minus measured, as means over their
 /// captures.
-void measure_places(AssembledProblem& all) {
+void compute_reference_position_residuals(AssembledProblem& all) {
   for (auto& place : all.places) place.residual_m.setZero();
   for (const auto& seen : all.problem.places) {
     auto& place = all.places[seen.place];
     place.residual_m.head(seen.size) +=
-        (all.problem.predict_position(seen) - seen.stated_m).head(seen.size) / place.captures;
+        (all.problem.predict_reference_position(seen) - seen.stated_m).head(seen.size) /
+        place.captures;
   }
 }
 
@@ -288,10 +290,12 @@ double compute_normalized_residual(const AssembledProblem& all, std::size_t plac
 
 /// Returns the squared correction r of a lamp, adjusted minus surveyed, normalized by its expected
 /// covariance: r' (sd^2 - C)^-1 r if the survey is used, r' (sd^2 + C)^-1 r if it is not.
-double moved_chi_squared(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
-                         std::size_t lamp, double sd_m, bool counts) {
-  const Eigen::Index at = problem.layout().lamp(lamp);
-  const Eigen::Vector3d r_m = problem.state().segment<3>(at) - problem.lamps[lamp].surveyed_m;
+double compute_normalized_survey_correction(const AdjustmentProblem& problem,
+                                            const Eigen::MatrixXd& covariance, std::size_t lamp,
+                                            double sd_m, bool counts) {
+  const Eigen::Index at = problem.parameter_layout().lamp_state_index(lamp);
+  const Eigen::Vector3d r_m =
+      problem.state_vector().segment<3>(at) - problem.lamps[lamp].surveyed_m;
   const Eigen::Matrix3d found = covariance.block<3, 3>(at, at);
   const Eigen::Matrix3d survey = sd_m * sd_m * Eigen::Matrix3d::Identity();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(
@@ -317,24 +321,24 @@ class Contradictions {
     moved_.resize(sd_m_.size());
   }
 
-  const std::vector<bool>& moved() const { return moved_; }
+  const std::vector<bool>& is_lamp_moved() const { return moved_; }
   /// Returns true if most lamps contradict their survey, so that the moved ones cannot be
   /// identified.
   bool has_contradicting_majority() const { return has_contradicting_majority_; }
-  double sd_m(std::size_t lamp) const { return sd_m_[lamp]; }
+  double expected_lamp_sd_m(std::size_t lamp) const { return sd_m_[lamp]; }
 
   /// Rejects everything far from the robust solution, which outliers do not bias.
   void reject_far_observations() {
     constexpr double max_sigmas = 8;  // standard deviations
     for (std::size_t i = 0; i < sd_m_.size(); ++i) {
       const auto& [surveyed_m, sd_m] = all_.problem.lamps[i];
-      const Eigen::Vector3d found_m =
-          all_.problem.state().segment<3>(all_.problem.layout().lamp(i));
+      const Eigen::Vector3d found_m = all_.problem.state_vector().segment<3>(
+          all_.problem.parameter_layout().lamp_state_index(i));
       if (all_.lamp_seen[i] && sd_m > 0 && (found_m - surveyed_m).norm() > max_sigmas * sd_m) {
-        release(i);
+        stop_using_surveyed_position(i);
       }
     }
-    measure_places(all_);
+    compute_reference_position_residuals(all_);
     for (std::size_t i = 0; i < all_.places.size(); ++i) {
       all_.problem.place_used[i] = compute_normalized_residual(all_, i) <= kMaxPlaceSigmas;
     }
@@ -343,7 +347,7 @@ class Contradictions {
   /// Rejects the worst lamp or known position, or reinstates one that no longer contradicts the
   /// solution. Returns true if anything changes.
   bool refine(const Eigen::MatrixXd& covariance) {
-    measure_places(all_);
+    compute_reference_position_residuals(all_);
     for (std::size_t i = 0; i < all_.places.size(); ++i) {
       if (reinstated_places_.contains(i) || all_.problem.place_used[i]) continue;
       if (compute_normalized_residual(all_, i) > kMaxPlaceSigmas) continue;
@@ -366,7 +370,8 @@ class Contradictions {
     double worst_chi = kMovedChiSquared;
     for (std::size_t i = 0; i < sd_m_.size(); ++i) {
       if (!all_.lamp_seen[i] || !(sd_m_[i] > 0) || std::isinf(sd_m_[i])) continue;
-      const double chi = moved_chi_squared(all_.problem, covariance, i, sd_m_[i], !moved_[i]);
+      const double chi =
+          compute_normalized_survey_correction(all_.problem, covariance, i, sd_m_[i], !moved_[i]);
       if (moved_[i] && chi < kMovedChiSquared && !reinstated_.contains(i)) {
         reinstated_.insert(i);
         moved_[i] = false;
@@ -386,12 +391,12 @@ class Contradictions {
       moved_.assign(moved_.size(), false);
       return true;
     }
-    release(worst_lamp);
+    stop_using_surveyed_position(worst_lamp);
     return true;
   }
 
  private:
-  void release(std::size_t lamp) {
+  void stop_using_surveyed_position(std::size_t lamp) {
     moved_[lamp] = true;
     all_.problem.lamps[lamp].sd_m = kInfinite;
   }
@@ -421,7 +426,7 @@ std::optional<AdjustmentProblem::GlobalCovariance> refine(AssembledProblem& all,
   constexpr int max_iterations = 40;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     if (!problem.solve(false)) return std::nullopt;
-    const auto found = problem.global_covariance();
+    const auto found = problem.compute_global_covariance();
     const double ratio = compute_noise_ratio(problem, found.freedom);
     bool changed = update_inliers(problem, all.noise_is_stated, found.freedom);
     if (!changed) changed = contradictions.refine(found.matrix);
@@ -438,7 +443,7 @@ std::optional<AdjustmentProblem::GlobalCovariance> refine(AssembledProblem& all,
     if (!changed) return found;
   }
   if (!problem.solve(false)) return std::nullopt;
-  return problem.global_covariance();
+  return problem.compute_global_covariance();
 }
 
 /// Returns the covariance for equal noise in the image, and estimates that noise. The estimates
@@ -448,18 +453,18 @@ Eigen::MatrixXd compute_covariance_for_image_noise(AssembledProblem& all) {
   for (auto& sighting : problem.sightings) {
     sighting.whitening = Eigen::Matrix2d::Identity() / sighting.sigma_px;
   }
-  const double ratio = compute_noise_ratio(problem, problem.global_covariance().freedom);
+  const double ratio = compute_noise_ratio(problem, problem.compute_global_covariance().freedom);
   problem.noise_scale = std::max(problem.noise_scale * ratio, kMinNoise_px);
-  return problem.global_covariance().matrix;
+  return problem.compute_global_covariance().matrix;
 }
 
 std::string explain_undetermined(const AdjustmentProblem& problem,
                                  const Eigen::MatrixXd& covariance, double height_m,
                                  const AdjustmentLimits& limits, bool& has_lever_arm) {
-  const AdjustmentLayout& at = problem.layout();
+  const AdjustmentLayout& at = problem.parameter_layout();
   const auto compute_max_sd = [&](Eigen::Index first) {
     const Eigen::Matrix2d block = covariance.block<2, 2>(first, first);
-    return std::sqrt(decompose_symmetric(block).values.maxCoeff());
+    return std::sqrt(eigendecompose_symmetric(block).values.maxCoeff());
   };
   const bool zenith = compute_max_sd(at.zenith) <= limits.zenith_rad;
   has_lever_arm =
@@ -479,15 +484,14 @@ bool solve_robustly(AssembledProblem& all, Contradictions& contradictions) {
   AdjustmentProblem& problem = all.problem;
   if (!problem.solve(true) || !problem.solve(true)) return false;
   contradictions.reject_far_observations();
-  update_inliers(problem, all.noise_is_stated, problem.global_covariance().freedom);
+  update_inliers(problem, all.noise_is_stated, problem.compute_global_covariance().freedom);
   return true;
 }
 
 /// Solves the problem, starting with a robust solution unless the captures are checked. Returns
 /// std::nullopt if it does not converge.
-std::optional<AdjustmentProblem::GlobalCovariance> solve_all(const AdjustmentInput& input,
-                                                             AssembledProblem& all,
-                                                             Contradictions& contradictions) {
+std::optional<AdjustmentProblem::GlobalCovariance> solve_all_stages(
+    const AdjustmentInput& input, AssembledProblem& all, Contradictions& contradictions) {
   // A misidentified lamp may be at a point that the lens cannot project.
   const std::vector<double> initial_norms = compute_residual_norms(all.problem);
   for (std::size_t i = 0; i < initial_norms.size(); ++i) {
@@ -502,24 +506,24 @@ std::optional<AdjustmentProblem::GlobalCovariance> solve_all(const AdjustmentInp
 }
 
 /// Returns the mean height above the camera of the lamps used.
-double mean_height_m(const AdjustmentProblem& problem) {
-  const AdjustmentLayout& at = problem.layout();
-  const Eigen::VectorXd& state = problem.state();
+double compute_mean_height_m(const AdjustmentProblem& problem) {
+  const AdjustmentLayout& at = problem.parameter_layout();
+  const Eigen::VectorXd& state = problem.state_vector();
   double sum_m = 0;
   int count = 0;
   for (const auto& sighting : problem.sightings) {
     if (!sighting.used) continue;
     const auto& capture = problem.captures[sighting.capture];
-    sum_m += state[at.lamp(sighting.lamp) + 2] -
-             state[(capture.spot ? at.spot(*capture.spot) : capture.local) + 2];
+    sum_m += state[at.lamp_state_index(sighting.lamp) + 2] -
+             state[(capture.spot ? at.pivot_state_index(*capture.spot) : capture.local) + 2];
     ++count;
   }
   return sum_m / std::max(1, count);
 }
 
 /// Sets the counts of captures and detections, and their residuals.
-void set_detections(const AdjustmentProblem& problem, bool noise_is_stated, double freedom,
-                    AdjustmentResult& result) {
+void set_detection_residuals(const AdjustmentProblem& problem, bool noise_is_stated, double freedom,
+                             AdjustmentResult& result) {
   double squares_px = 0;
   std::vector<bool> capture_used(problem.captures.size());
   const std::vector<double> lengths = compute_residual_norms(problem);
@@ -540,16 +544,17 @@ void set_detections(const AdjustmentProblem& problem, bool noise_is_stated, doub
 }
 
 /// Sets lens, zenith and lever arm with their covariances.
-void set_center(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
-                bool has_lever_arm, AdjustmentResult& result) {
-  const AdjustmentLayout& at = problem.layout();
-  const Eigen::VectorXd& state = problem.state();
+void set_adjusted_rotation_center(const AdjustmentProblem& problem,
+                                  const Eigen::MatrixXd& covariance, bool has_lever_arm,
+                                  AdjustmentResult& result) {
+  const AdjustmentLayout& at = problem.parameter_layout();
+  const Eigen::VectorXd& state = problem.state_vector();
   result.camera.intrinsics = problem.intrinsics();
   const Eigen::Vector2d focal_px = result.camera.focal_px();
   const Eigen::Vector2d zenith = state.segment<2>(at.zenith);
   result.center.model = RotationModel::tilt;
   result.center.zenith_in_camera = zenith.homogeneous().normalized();
-  result.center.center_px = result.camera.center_px() + focal_px.cwiseProduct(zenith);
+  result.center.center_px = result.camera.principal_point_px() + focal_px.cwiseProduct(zenith);
   Matrix2 center_covariance =
       focal_px.asDiagonal() * covariance.block<2, 2>(at.zenith, at.zenith) * focal_px.asDiagonal();
   center_covariance(1, 0) = center_covariance(0, 1);
@@ -564,13 +569,15 @@ void set_center(const AdjustmentProblem& problem, const Eigen::MatrixXd& covaria
 
 /// Sets the joint covariance of intrinsics (from the directions of the lens), zenith, lever arm and
 /// lamps, without the spots. The one for the surveyed map excludes the lamps.
-void set_joint_covariance(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
-                          bool has_lever_arm, AdjustmentResult& result) {
-  const AdjustmentLayout& at = problem.layout();
-  const Eigen::Index intrinsics = count_reported_intrinsics(result.camera);
+void set_adjusted_joint_covariance(const AdjustmentProblem& problem,
+                                   const Eigen::MatrixXd& covariance, bool has_lever_arm,
+                                   AdjustmentResult& result) {
+  const AdjustmentLayout& at = problem.parameter_layout();
+  const Eigen::Index intrinsics = count_intrinsics_with_covariance(result.camera);
   const Eigen::Index rows = intrinsics + at.spots - at.zenith;
   Eigen::MatrixXd from_state = Eigen::MatrixXd::Zero(rows, at.global);
-  from_state.block(0, at.lens, intrinsics, at.lens_size) = problem.freedom().directions;
+  from_state.block(0, at.lens, intrinsics, at.lens_size) =
+      problem.lens_parametrization().directions;
   from_state.block(intrinsics, at.zenith, at.spots - at.zenith, at.spots - at.zenith).setIdentity();
   if (!has_lever_arm) from_state.middleRows<2>(intrinsics + 2).setZero();
   result.refined_covariance = from_state * covariance * from_state.transpose();
@@ -582,19 +589,20 @@ void set_joint_covariance(const AdjustmentProblem& problem, const Eigen::MatrixX
 }
 
 /// Sets the lamps with their covariances, in both joint covariances.
-void set_map(const AssembledProblem& all, const Contradictions& contradictions,
-             AdjustmentResult& result) {
+void set_adjusted_map(const AssembledProblem& all, const Contradictions& contradictions,
+                      AdjustmentResult& result) {
   const AdjustmentProblem& problem = all.problem;
-  const AdjustmentLayout& at = problem.layout();
-  const Eigen::VectorXd& state = problem.state();
-  const Eigen::Index first_lamp = count_reported_intrinsics(result.camera) + 4;
+  const AdjustmentLayout& at = problem.parameter_layout();
+  const Eigen::VectorXd& state = problem.state_vector();
+  const Eigen::Index first_lamp = count_intrinsics_with_covariance(result.camera) + 4;
   for (std::size_t i = 0; i < problem.lamps.size(); ++i) {
     Lamp& lamp = result.refined.lamps[i];
     const Eigen::Index row = first_lamp + 3 * static_cast<Eigen::Index>(i);
-    const double surveyed_sd_m = contradictions.sd_m(i);
-    const Eigen::Vector3d correction_m = state.segment<3>(at.lamp(i)) - problem.lamps[i].surveyed_m;
+    const double surveyed_sd_m = contradictions.expected_lamp_sd_m(i);
+    const Eigen::Vector3d correction_m =
+        state.segment<3>(at.lamp_state_index(i)) - problem.lamps[i].surveyed_m;
     const Eigen::Matrix3d found = result.refined_covariance.block<3, 3>(row, row);
-    const bool moved = contradictions.moved()[i];
+    const bool moved = contradictions.is_lamp_moved()[i];
     if (moved) {
       // The error of its survey is independent of the errors of other lamps.
       result.surveyed_covariance.middleRows<3>(row).setZero();
@@ -621,8 +629,8 @@ void set_map(const AssembledProblem& all, const Contradictions& contradictions,
 }
 
 /// Sets the known positions, and the properties of the map that only the survey determines.
-void set_places(AssembledProblem& all, AdjustmentResult& result) {
-  measure_places(all);
+void set_position_residuals(AssembledProblem& all, AdjustmentResult& result) {
+  compute_reference_position_residuals(all);
   result.places = all.places;
   std::size_t places_used = 0;
   for (std::size_t i = 0; i < all.places.size(); ++i) {
@@ -642,13 +650,13 @@ void set_places(AssembledProblem& all, AdjustmentResult& result) {
 }
 
 /// Tests the correction of the lens against its covariance.
-void set_lens(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
-              AdjustmentResult& result) {
-  const AdjustmentLayout& at = problem.layout();
-  const Eigen::VectorXd& state = problem.state();
+void set_adjusted_lens(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
+                       AdjustmentResult& result) {
+  const AdjustmentLayout& at = problem.parameter_layout();
+  const Eigen::VectorXd& state = problem.state_vector();
   const Eigen::VectorXd u = state.segment(at.lens, at.lens_size);
   if (at.lens_size > 0) {
-    const auto determined = decompose_symmetric(
+    const auto determined = eigendecompose_symmetric(
         Eigen::MatrixXd(Eigen::MatrixXd::Identity(at.lens_size, at.lens_size) -
                         covariance.block(at.lens, at.lens, at.lens_size, at.lens_size)));
     for (Eigen::Index i = 0; i < at.lens_size; ++i) {
@@ -660,16 +668,17 @@ void set_lens(const AdjustmentProblem& problem, const Eigen::MatrixXd& covarianc
     }
     result.lens_contradicted =
         result.lens_freedom > 0 &&
-        result.lens_chi_squared > chi_squared_bound(kSigmasOfOneInTenThousand, result.lens_freedom);
+        result.lens_chi_squared >
+            compute_chi_squared_bound(kSigmasOfOneInTenThousand, result.lens_freedom);
   }
 }
 
 }  // namespace
 
-MatrixX make_lens_covariance(const Camera& camera, double sd_px) {
+MatrixX make_nominal_intrinsics_covariance(const Camera& camera, double sd_px) {
   const Lens lens(camera.lens_model, camera.intrinsics);
   constexpr int across = 16;
-  Eigen::VectorXd squares = Eigen::VectorXd::Zero(count_reported_intrinsics(camera));
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(count_intrinsics_with_covariance(camera));
   int rays = 0;
   for (int row = 0; row < across; ++row) {
     for (int column = 0; column < across; ++column) {
@@ -688,9 +697,10 @@ MatrixX make_lens_covariance(const Camera& camera, double sd_px) {
   return Eigen::MatrixXd((squares.array() > 0).select(variances, 0).matrix().asDiagonal());
 }
 
-AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentLimits& limits) {
+AdjustmentResult run_bundle_adjustment(const AdjustmentInput& input,
+                                       const AdjustmentLimits& limits) {
   AdjustmentResult result;
-  AssembledProblem all = assemble(input);
+  AssembledProblem all = assemble_adjustment_problem(input);
   const AdjustmentProblem& problem = all.problem;
   result.rejected_captures = all.rejected_captures;
   result.rejected_detections = static_cast<int>(problem.sightings.size());
@@ -701,7 +711,7 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
     return result;
   }
   Contradictions contradictions(all);
-  const auto adjusted = solve_all(input, all, contradictions);
+  const auto adjusted = solve_all_stages(input, all, contradictions);
   if (!adjusted) {
     result.undetermined =
         "no zenith and no lamp positions fit the captures: is it the map of this room, and the "
@@ -709,15 +719,15 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
     return result;
   }
   const Eigen::MatrixXd& covariance = adjusted->matrix;
-  set_detections(problem, all.noise_is_stated, adjusted->freedom, result);
+  set_detection_residuals(problem, all.noise_is_stated, adjusted->freedom, result);
   bool has_lever_arm = false;
-  result.undetermined =
-      explain_undetermined(problem, covariance, mean_height_m(problem), limits, has_lever_arm);
-  set_center(problem, covariance, has_lever_arm, result);
-  set_joint_covariance(problem, covariance, has_lever_arm, result);
-  set_map(all, contradictions, result);
-  set_places(all, result);
-  set_lens(problem, covariance, result);
+  result.undetermined = explain_undetermined(problem, covariance, compute_mean_height_m(problem),
+                                             limits, has_lever_arm);
+  set_adjusted_rotation_center(problem, covariance, has_lever_arm, result);
+  set_adjusted_joint_covariance(problem, covariance, has_lever_arm, result);
+  set_adjusted_map(all, contradictions, result);
+  set_position_residuals(all, result);
+  set_adjusted_lens(problem, covariance, result);
   return result;
 }
 

@@ -37,7 +37,7 @@
 namespace vlp {
 
 /// Measured position of the camera or of the rotation axis.
-struct KnownPlace {
+struct KnownPosition {
   PlaceOf of;
   Eigen::Vector2d xy_m;
   std::optional<double> z_m;
@@ -55,13 +55,13 @@ struct AdjustmentCapture {
   /// Name of the spot. Captures of one spot rotate about one axis at one height; empty: the capture
   /// has a position of its own.
   std::string spot = {};
-  std::optional<KnownPlace> place = {};
+  std::optional<KnownPosition> place = {};
   /// Motion of the camera; on a spot only the yaw rate is used. Requires row time and readout
   /// direction of the camera.
   KnownMotion motion = {};
 };
 
-/// Input of adjust_captures().
+/// Input of run_bundle_adjustment().
 struct AdjustmentInput {
   std::vector<AdjustmentCapture> captures;
   /// Surveyed lamps with their sd_m. A lamp with sd_m 0 is fixed.
@@ -93,7 +93,7 @@ struct AdjustmentLimits {
   double lever_arm_fraction = 0.005;
 };
 
-/// Result of adjust_captures().
+/// Result of run_bundle_adjustment().
 struct AdjustmentResult {
   /// Reason why there is no result, and the captures that would determine it, human-readable. Empty
   /// if there is a result.
@@ -166,7 +166,7 @@ struct AdjustmentResult {
 /// each intrinsic, taken alone, displaces the pixels of a grid over the image by `sd_px` (RMS per
 /// axis). Errors of different intrinsics are independent.
 /// @pre sd_px is positive
-MatrixX make_lens_covariance(const Camera& camera, double sd_px);
+MatrixX make_nominal_intrinsics_covariance(const Camera& camera, double sd_px);
 
 /// Estimates lens, zenith, lever arm and lamp map from all captures.
 ///
@@ -177,6 +177,7 @@ MatrixX make_lens_covariance(const Camera& camera, double sd_px);
 /// its survey contradicts all other data (test of Baarda, chi-squared with 3 degrees of freedom at
 /// 1e-4). Lamps are tested one at a time, the worst first, so that the error of one lamp does not
 /// spread over other lamps. The result is deterministic.
-AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentLimits& limits = {});
+AdjustmentResult run_bundle_adjustment(const AdjustmentInput& input,
+                                       const AdjustmentLimits& limits = {});
 
 }  // namespace vlp

@@ -28,7 +28,8 @@ struct CapturePose {
 
 }  // namespace
 
-ZenithRotation rotate_by_zenith(const Eigen::Vector2d& zenith, const Eigen::Vector3d& x) {
+ZenithRotation rotate_level_point_to_camera(const Eigen::Vector2d& zenith,
+                                            const Eigen::Vector3d& x) {
   // Transpose of level_from_zenith(), the smallest rotation of n to +Z.
   const double nz = 1 / std::sqrt(1 + zenith.squaredNorm());
   const Eigen::Vector2d n = zenith * nz;
@@ -51,13 +52,13 @@ LensParametrization::LensParametrization(const Camera& camera,
                                          const std::optional<MatrixX>& covariance)
     : start(Eigen::Map<const Eigen::VectorXd>(camera.intrinsics.data(),
                                               std::ssize(camera.intrinsics))),
-      directions(count_reported_intrinsics(camera), 0) {
+      directions(count_intrinsics_with_covariance(camera), 0) {
   if (!covariance) return;
   // Scales pixels and coefficients by their standard deviations to make them comparable.
   const Eigen::VectorXd sd = covariance->diagonal().cwiseSqrt();
   const Eigen::VectorXd inverse_sd =
       (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(sd.size()));
-  const auto eigen = decompose_symmetric(
+  const auto eigen = eigendecompose_symmetric(
       Eigen::MatrixXd(inverse_sd.asDiagonal() * *covariance * inverse_sd.asDiagonal()));
   constexpr double rounding = 1e-12;
   const Eigen::VectorXd& values = eigen.values;
@@ -76,8 +77,8 @@ AdjustmentProblem::AdjustmentProblem(LensModel model, LensParametrization freedo
   layout_.zenith = layout_.lens_size;
   layout_.lever_arm = layout_.zenith + 2;
   layout_.lamps = layout_.lever_arm + 2;
-  layout_.spots = layout_.lamp(lamp_count);
-  layout_.global = layout_.spot(spot_count);
+  layout_.spots = layout_.lamp_state_index(lamp_count);
+  layout_.global = layout_.pivot_state_index(spot_count);
   state_ = Eigen::VectorXd::Zero(layout_.global);
 }
 
@@ -87,13 +88,13 @@ void AdjustmentProblem::add_capture(const Capture& capture, const Pose& start) {
   captures.push_back(added);
   state_.conservativeResize(state_.size() + capture.size());
   if (!capture.spot) state_.segment<3>(added.local) = start.position_m;
-  Eigen::Index next = added.local + capture.pose_size();
+  Eigen::Index next = added.local + capture.num_pose_unknowns();
   state_[next - 1] = start.yaw_rad;
-  if (capture.velocity_is_free()) {
+  if (capture.is_velocity_estimated()) {
     state_.segment<2>(next) = capture.motion.velocity_m_per_s;
     next += 2;
   }
-  if (capture.yaw_rate_is_free()) state_[next] = capture.motion.yaw_rate_rad_per_s;
+  if (capture.is_yaw_rate_estimated()) state_[next] = capture.motion.yaw_rate_rad_per_s;
 }
 
 std::vector<double> AdjustmentProblem::intrinsics() const {
@@ -118,15 +119,16 @@ namespace {
 
 CapturePose compute_capture_pose(const Eigen::VectorXd& state, const AdjustmentLayout& layout,
                                  const AdjustmentProblem::Capture& capture) {
-  const Eigen::Index motion = capture.local + capture.pose_size();
+  const Eigen::Index motion = capture.local + capture.num_pose_unknowns();
   const double yaw_rad = state[motion - 1];
-  const Eigen::Index position = capture.spot ? layout.spot(*capture.spot) : capture.local;
+  const Eigen::Index position =
+      capture.spot ? layout.pivot_state_index(*capture.spot) : capture.local;
   CapturePose camera{state.segment<3>(position), rotation_about_z(-yaw_rad),
                      capture.motion.velocity_m_per_s, capture.motion.yaw_rate_rad_per_s};
   // The axis is stationary.
   if (capture.spot) camera.velocity_m_per_s.setZero();
-  if (capture.velocity_is_free()) camera.velocity_m_per_s = state.segment<2>(motion);
-  if (capture.yaw_rate_is_free()) {
+  if (capture.is_velocity_estimated()) camera.velocity_m_per_s = state.segment<2>(motion);
+  if (capture.is_yaw_rate_estimated()) {
     camera.yaw_rate_rad_per_s = state[capture.local + capture.size() - 1];
   }
   return camera;
@@ -134,7 +136,7 @@ CapturePose compute_capture_pose(const Eigen::VectorXd& state, const AdjustmentL
 
 /// Returns the factor of the lever arm in a known position. On a spot the position of the capture
 /// is the axis', elsewhere the camera's.
-double arm_factor(const AdjustmentProblem::PlaceObservation& place,
+double arm_factor(const AdjustmentProblem::PositionObservation& place,
                   const AdjustmentProblem::Capture& capture) {
   return (place.of_axis ? 0 : 1) - (capture.spot ? 0 : 1);
 }
@@ -145,7 +147,7 @@ std::optional<AdjustmentResidual> AdjustmentProblem::linearize(const Sighting& s
                                                                const Lens& lens) const {
   const Capture& capture = captures[sighting.capture];
   const CapturePose camera = compute_capture_pose(state_, layout_, capture);
-  const Eigen::Index lamp = layout_.lamp(sighting.lamp);
+  const Eigen::Index lamp = layout_.lamp_state_index(sighting.lamp);
   const double time_s = sighting.time_s;
   const Eigen::Vector3d lamp_at_mid_exposure =
       camera.level_from_world * (state_.segment<3>(lamp) - camera.position_m);
@@ -155,8 +157,8 @@ std::optional<AdjustmentResidual> AdjustmentProblem::linearize(const Sighting& s
   rotated = (readout_from_middle * rotated).eval();
   Eigen::Vector3d level = rotated;
   if (capture.spot) level.head<2>() -= state_.segment<2>(layout_.lever_arm);
-  const ZenithRotation turn =
-      rotate_by_zenith(state_.segment<2>(layout_.zenith), capture.base_from_level * level);
+  const ZenithRotation turn = rotate_level_point_to_camera(state_.segment<2>(layout_.zenith),
+                                                           capture.base_from_level * level);
   const auto seen = lens.project_with_jacobians(turn.x_in_camera);
   if (!seen) return std::nullopt;
   const Eigen::Matrix2d weight = sighting.whitening / noise_scale;
@@ -165,20 +167,20 @@ std::optional<AdjustmentResidual> AdjustmentProblem::linearize(const Sighting& s
   const Matrix23 by_lamp_in_level = by_level * readout_from_middle;
   const Matrix23 by_lamp = by_lamp_in_level * camera.level_from_world;
   Eigen::MatrixXd by_local(2, capture.size());
-  Eigen::Index next = capture.pose_size();
+  Eigen::Index next = capture.num_pose_unknowns();
   if (!capture.spot) by_local.leftCols<3>() = -by_lamp;
   by_local.col(next - 1) =
       by_lamp_in_level * Eigen::Vector3d(lamp_at_mid_exposure.y(), -lamp_at_mid_exposure.x(), 0);
-  if (capture.velocity_is_free()) {
+  if (capture.is_velocity_estimated()) {
     by_local.middleCols<2>(next) = -time_s * by_lamp_in_level.leftCols<2>();
     next += 2;
   }
-  if (capture.yaw_rate_is_free()) {
+  if (capture.is_yaw_rate_estimated()) {
     by_local.col(next) = time_s * (by_level * Eigen::Vector3d(rotated.y(), -rotated.x(), 0));
   }
   AdjustmentResidual at{weight * (sighting.pixel - seen->pixel), {{capture.local, by_local}}};
   if (capture.spot) {
-    at.parts.push_back({layout_.spot(*capture.spot), -by_lamp});
+    at.parts.push_back({layout_.pivot_state_index(*capture.spot), -by_lamp});
     at.parts.push_back({layout_.lever_arm, -by_level.leftCols<2>()});
   }
   at.parts.push_back({layout_.zenith, by_camera * turn.jacobian_wrt_zenith});
@@ -189,7 +191,8 @@ std::optional<AdjustmentResidual> AdjustmentProblem::linearize(const Sighting& s
   return at;
 }
 
-Eigen::Vector3d AdjustmentProblem::predict_position(const PlaceObservation& place) const {
+Eigen::Vector3d AdjustmentProblem::predict_reference_position(
+    const PositionObservation& place) const {
   const Capture& capture = captures[place.capture];
   const CapturePose camera = compute_capture_pose(state_, layout_, capture);
   Eigen::Vector3d arm_m = Eigen::Vector3d::Zero();
@@ -198,17 +201,18 @@ Eigen::Vector3d AdjustmentProblem::predict_position(const PlaceObservation& plac
          arm_factor(place, capture) * (camera.level_from_world.transpose() * arm_m);
 }
 
-AdjustmentResidual AdjustmentProblem::linearize(const PlaceObservation& place) const {
+AdjustmentResidual AdjustmentProblem::linearize(const PositionObservation& place) const {
   const Capture& capture = captures[place.capture];
   const CapturePose camera = compute_capture_pose(state_, layout_, capture);
   const double factor = arm_factor(place, capture);
-  const Eigen::Vector3d position_m = predict_position(place);
+  const Eigen::Vector3d position_m = predict_reference_position(place);
   const Eigen::Vector3d arm_m = position_m - camera.position_m;
   Eigen::MatrixXd by_local = Eigen::MatrixXd::Zero(3, capture.size());
   if (!capture.spot) by_local.leftCols<3>().setIdentity();
-  by_local.col(capture.pose_size() - 1) << -arm_m.y(), arm_m.x(), 0;
+  by_local.col(capture.num_pose_unknowns() - 1) << -arm_m.y(), arm_m.x(), 0;
   AdjustmentResidual at{position_m - place.stated_m, {{capture.local, by_local}}};
-  if (capture.spot) at.parts.push_back({layout_.spot(*capture.spot), Eigen::Matrix3d::Identity()});
+  if (capture.spot)
+    at.parts.push_back({layout_.pivot_state_index(*capture.spot), Eigen::Matrix3d::Identity()});
   if (factor != 0) {
     at.parts.push_back(
         {layout_.lever_arm, factor * camera.level_from_world.transpose().leftCols<2>()});
@@ -220,17 +224,17 @@ AdjustmentResidual AdjustmentProblem::linearize(const PlaceObservation& place) c
   return at;
 }
 
-AdjustmentResidual AdjustmentProblem::linearize_motion(const Capture& capture) const {
-  const Eigen::Index size = capture.motion_size();
-  AdjustmentResidual at{state_.segment(capture.local + capture.pose_size(), size),
+AdjustmentResidual AdjustmentProblem::linearize_motion_prior(const Capture& capture) const {
+  const Eigen::Index size = capture.num_motion_unknowns();
+  AdjustmentResidual at{state_.segment(capture.local + capture.num_pose_unknowns(), size),
                         {{capture.local, Eigen::MatrixXd::Zero(size, capture.size())}}};
   Eigen::VectorXd weights(size);
   const KnownMotion& known = capture.motion;
-  if (capture.velocity_is_free()) {
+  if (capture.is_velocity_estimated()) {
     at.value.head<2>() -= known.velocity_m_per_s;
     weights.head<2>().setConstant(1 / known.velocity_sd_m_per_s);
   }
-  if (capture.yaw_rate_is_free()) {
+  if (capture.is_yaw_rate_estimated()) {
     at.value[size - 1] -= known.yaw_rate_rad_per_s;
     weights[size - 1] = 1 / known.yaw_rate_sd_rad_per_s;
   }
@@ -245,8 +249,8 @@ AdjustmentResidual AdjustmentProblem::linearize_gauge() const {
     const Eigen::MatrixXd by_lamp =
         gauge.middleRows<3>(3 * static_cast<Eigen::Index>(i)).transpose();
     if (by_lamp.isZero(0)) continue;  // not detected
-    at.value += by_lamp * (state_.segment<3>(layout_.lamp(i)) - lamps[i].surveyed_m);
-    at.parts.push_back({layout_.lamp(i), by_lamp});
+    at.value += by_lamp * (state_.segment<3>(layout_.lamp_state_index(i)) - lamps[i].surveyed_m);
+    at.parts.push_back({layout_.lamp_state_index(i), by_lamp});
   }
   return at;
 }
@@ -279,19 +283,19 @@ std::vector<AdjustmentProblem::Term> AdjustmentProblem::make_terms(
     terms.push_back({[this, i] {
                        const auto& [surveyed_m, sd_m] = lamps[i];
                        return AdjustmentResidual{
-                           (state_.segment<3>(layout_.lamp(i)) - surveyed_m) / sd_m,
-                           {{layout_.lamp(i), Eigen::Matrix3d::Identity() / sd_m}}};
+                           (state_.segment<3>(layout_.lamp_state_index(i)) - surveyed_m) / sd_m,
+                           {{layout_.lamp_state_index(i), Eigen::Matrix3d::Identity() / sd_m}}};
                      },
                      true});
   }
   if (gauge.cols() > 0) terms.push_back({[this] { return linearize_gauge(); }});
-  for (const PlaceObservation& place : places) {
+  for (const PositionObservation& place : places) {
     if (!place_used[place.place] || !capture_used[place.capture]) continue;
     terms.push_back({[this, &place] { return linearize(place); }, true, false, place.capture});
   }
   for (std::size_t k = 0; k < captures.size(); ++k) {
-    if (captures[k].motion_size() == 0 || !capture_used[k]) continue;
-    terms.push_back({[this, k] { return linearize_motion(captures[k]); }, false, false, k});
+    if (captures[k].num_motion_unknowns() == 0 || !capture_used[k]) continue;
+    terms.push_back({[this, k] { return linearize_motion_prior(captures[k]); }, false, false, k});
   }
   return terms;
 }
@@ -387,9 +391,9 @@ Eigen::MatrixXd AdjustmentProblem::guess_information() const {
   information.tail(layout_.global - layout_.spots).setConstant(1 / (guess_m * guess_m));
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     if (std::isinf(lamps[i].sd_m)) {
-      information.segment<3>(layout_.lamp(i)).setConstant(1 / (guess_m * guess_m));
+      information.segment<3>(layout_.lamp_state_index(i)).setConstant(1 / (guess_m * guess_m));
     }
-    if (lamps[i].sd_m == 0) information.segment<3>(layout_.lamp(i)).setOnes();
+    if (lamps[i].sd_m == 0) information.segment<3>(layout_.lamp_state_index(i)).setOnes();
   }
   return information.asDiagonal();
 }
@@ -420,7 +424,8 @@ struct CaptureRows {
   }
 
   /// Computes the marginalization, and subtracts it from the information of the global unknowns.
-  void marginalize(const AdjustmentProblem::Capture& capture, Eigen::MatrixXd& information) {
+  void marginalize_local_unknowns(const AdjustmentProblem::Capture& capture,
+                                  Eigen::MatrixXd& information) {
     columns.assign(unknowns.begin(), unknowns.end());
     by_global = Eigen::MatrixXd::Zero(rows, std::ssize(columns));
     by_local = Eigen::MatrixXd::Zero(rows, capture.size());
@@ -437,7 +442,7 @@ struct CaptureRows {
     // A guess determines local unknowns that no observation does.
     constexpr double guess_information = 1e-2;
     Eigen::MatrixXd local = by_local.transpose() * by_local;
-    local.diagonal().head(capture.pose_size()).array() += guess_information;
+    local.diagonal().head(capture.num_pose_unknowns()).array() += guess_information;
     local_covariance =
         solve_symmetric(local, Eigen::MatrixXd::Identity(capture.size(), capture.size()));
     const Eigen::MatrixXd cross = by_local.transpose() * by_global;
@@ -450,7 +455,7 @@ struct CaptureRows {
   ///   tr(B N^-1 B' + (A - B N^-1 M) C (A - B N^-1 M)')
   /// with their derivatives B with respect to the local and A with respect to the global unknowns.
   /// C is the covariance of the global unknowns.
-  double predicted_variance(const Eigen::MatrixXd& global_covariance) const {
+  double compute_predicted_variance(const Eigen::MatrixXd& global_covariance) const {
     const auto of_local = by_local.topRows(detection_rows);
     const Eigen::MatrixXd of_global =
         by_global.topRows(detection_rows) - of_local * local_from_global;
@@ -461,7 +466,7 @@ struct CaptureRows {
 
 }  // namespace
 
-AdjustmentProblem::GlobalCovariance AdjustmentProblem::global_covariance() const {
+AdjustmentProblem::GlobalCovariance AdjustmentProblem::compute_global_covariance() const {
   Eigen::MatrixXd information = guess_information();
   std::vector<CaptureRows> rows(captures.size());
   const auto lens = this->lens();
@@ -479,7 +484,8 @@ AdjustmentProblem::GlobalCovariance AdjustmentProblem::global_covariance() const
       }
     }
   }
-  for (std::size_t k = 0; k < captures.size(); ++k) rows[k].marginalize(captures[k], information);
+  for (std::size_t k = 0; k < captures.size(); ++k)
+    rows[k].marginalize_local_unknowns(captures[k], information);
   const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd covariance =
       solve_symmetric(scale.asDiagonal() * information * scale.asDiagonal(),
@@ -487,11 +493,13 @@ AdjustmentProblem::GlobalCovariance AdjustmentProblem::global_covariance() const
   covariance = (scale.asDiagonal() * covariance * scale.asDiagonal()).eval();
   covariance = 0.5 * (covariance + covariance.transpose()).eval();
   for (std::size_t i = 0; i < lamps.size(); ++i) {
-    if (is_exact(layout_.lamp(i))) covariance.diagonal().segment<3>(layout_.lamp(i)).setZero();
+    if (is_exact(layout_.lamp_state_index(i)))
+      covariance.diagonal().segment<3>(layout_.lamp_state_index(i)).setZero();
   }
   double freedom = 0;
   for (const CaptureRows& capture : rows) {
-    freedom += static_cast<double>(capture.detection_rows) - capture.predicted_variance(covariance);
+    freedom += static_cast<double>(capture.detection_rows) -
+               capture.compute_predicted_variance(covariance);
   }
   return {covariance, freedom};
 }

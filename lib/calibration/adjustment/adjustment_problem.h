@@ -13,8 +13,8 @@
 #include "positioning/positioner.h"
 #include "rig/calibration.h"
 
-/// Least-squares problem of adjust_captures(): unknowns in one vector, residuals with derivatives,
-/// solution by Ceres, covariance.
+/// Least-squares problem of run_bundle_adjustment(): unknowns in one vector, residuals with
+/// derivatives, solution by Ceres, covariance.
 namespace vlp {
 
 /// Positions of the unknowns in the vector: first the global ones, then those of each capture. An
@@ -30,13 +30,17 @@ struct AdjustmentLayout {
   /// Number of global unknowns.
   Eigen::Index global = 0;
 
-  Eigen::Index lamp(std::size_t i) const { return lamps + 3 * static_cast<Eigen::Index>(i); }
-  Eigen::Index spot(std::size_t i) const { return spots + 3 * static_cast<Eigen::Index>(i); }
+  Eigen::Index lamp_state_index(std::size_t i) const {
+    return lamps + 3 * static_cast<Eigen::Index>(i);
+  }
+  Eigen::Index pivot_state_index(std::size_t i) const {
+    return spots + 3 * static_cast<Eigen::Index>(i);
+  }
 };
 
 /// Whitened parametrization of the lens: intrinsics = start + directions u, where u has unit
-/// covariance. Comprises the intrinsics that have errors (count_reported_intrinsics()). Omits
-/// directions in which the covariance is numeric noise.
+/// covariance. Comprises the intrinsics that have errors (count_intrinsics_with_covariance()).
+/// Omits directions in which the covariance is numeric noise.
 struct LensParametrization {
   Eigen::VectorXd start;
   Eigen::MatrixXd directions;
@@ -81,13 +85,13 @@ class AdjustmentProblem {
     /// spot, followed by velocity and yaw rate if these are not known exactly.
     Eigen::Index local = 0;
 
-    bool velocity_is_free() const { return !spot && motion.velocity_sd_m_per_s > 0; }
-    bool yaw_rate_is_free() const { return motion.yaw_rate_sd_rad_per_s > 0; }
-    Eigen::Index pose_size() const { return spot ? 1 : 4; }
-    Eigen::Index motion_size() const {
-      return (velocity_is_free() ? 2 : 0) + (yaw_rate_is_free() ? 1 : 0);
+    bool is_velocity_estimated() const { return !spot && motion.velocity_sd_m_per_s > 0; }
+    bool is_yaw_rate_estimated() const { return motion.yaw_rate_sd_rad_per_s > 0; }
+    Eigen::Index num_pose_unknowns() const { return spot ? 1 : 4; }
+    Eigen::Index num_motion_unknowns() const {
+      return (is_velocity_estimated() ? 2 : 0) + (is_yaw_rate_estimated() ? 1 : 0);
     }
-    Eigen::Index size() const { return pose_size() + motion_size(); }
+    Eigen::Index size() const { return num_pose_unknowns() + num_motion_unknowns(); }
   };
   /// Surveyed position of a lamp.
   struct LampPrior {
@@ -96,7 +100,7 @@ class AdjustmentProblem {
     double sd_m;
   };
   /// Observation of a known position by one capture.
-  struct PlaceObservation {
+  struct PositionObservation {
     std::size_t capture, place;
     bool of_axis;
     Eigen::Vector3d stated_m;
@@ -113,9 +117,9 @@ class AdjustmentProblem {
   /// Adds a capture and its local unknowns, with the initial pose `start`.
   void add_capture(const Capture& capture, const Pose& start);
 
-  const AdjustmentLayout& layout() const { return layout_; }
-  Eigen::VectorXd& state() { return state_; }
-  const Eigen::VectorXd& state() const { return state_; }
+  const AdjustmentLayout& parameter_layout() const { return layout_; }
+  Eigen::VectorXd& state_vector() { return state_; }
+  const Eigen::VectorXd& state_vector() const { return state_; }
 
   std::vector<Capture> captures;
   std::vector<Sighting> sightings;
@@ -123,7 +127,7 @@ class AdjustmentProblem {
   /// Directions of the lamps' coordinates that stay as surveyed, one column each, divided by the
   /// standard deviation of this constraint. Without columns there is no constraint.
   Eigen::MatrixXd gauge;
-  std::vector<PlaceObservation> places;
+  std::vector<PositionObservation> places;
   std::vector<bool> place_used;
   /// True if some residual depends on the lever arm.
   bool has_lever_arm = false;
@@ -140,13 +144,13 @@ class AdjustmentProblem {
   std::optional<AdjustmentResidual> linearize(const Sighting& sighting, const Lens& lens) const;
 
   /// Returns the position of the camera (or of the axis) in the capture, from the current state.
-  Eigen::Vector3d predict_position(const PlaceObservation& place) const;
+  Eigen::Vector3d predict_reference_position(const PositionObservation& place) const;
 
   /// Returns the lens of the current state; std::nullopt if its intrinsics are invalid.
   std::optional<Lens> lens() const;
   std::vector<double> intrinsics() const;
 
-  /// Result of global_covariance().
+  /// Result of compute_global_covariance().
   struct GlobalCovariance {
     /// Covariance of the global unknowns, zero for exact ones. Unknowns without any residual have
     /// the standard deviation of a guess: 1 rad, 10 m.
@@ -157,9 +161,9 @@ class AdjustmentProblem {
   };
   /// Computes the covariance of the global unknowns at the current state, after marginalization of
   /// the local ones.
-  GlobalCovariance global_covariance() const;
+  GlobalCovariance compute_global_covariance() const;
 
-  const LensParametrization& freedom() const { return freedom_; }
+  const LensParametrization& lens_parametrization() const { return freedom_; }
 
  private:
   /// Residual of the least-squares problem: a detection, another observation, or a prior.
@@ -174,8 +178,8 @@ class AdjustmentProblem {
   /// Returns all terms, those of the detections first. They refer to this object and to `lens`, the
   /// lens of the current state.
   std::vector<Term> make_terms(const std::optional<Lens>& lens) const;
-  AdjustmentResidual linearize(const PlaceObservation& place) const;
-  AdjustmentResidual linearize_motion(const Capture& capture) const;
+  AdjustmentResidual linearize(const PositionObservation& place) const;
+  AdjustmentResidual linearize_motion_prior(const Capture& capture) const;
   AdjustmentResidual linearize_gauge() const;
   /// Returns true if the block of the state is a lamp with an exact position.
   bool is_exact(Eigen::Index first) const;
@@ -197,6 +201,7 @@ struct ZenithRotation {
 };
 /// Rotates a point of the level frame into the camera by camera_from_level of a zenith, given as a
 /// normalized point.
-ZenithRotation rotate_by_zenith(const Eigen::Vector2d& zenith, const Eigen::Vector3d& x_in_level);
+ZenithRotation rotate_level_point_to_camera(const Eigen::Vector2d& zenith,
+                                            const Eigen::Vector3d& x_in_level);
 
 }  // namespace vlp

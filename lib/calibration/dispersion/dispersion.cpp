@@ -12,9 +12,10 @@ namespace vlp {
 namespace {
 
 /// Sets the fixes and circles before and after the correction.
-void set_fixes(DispersionFit& fit, const ReferencePointFixes& station,
-               const std::vector<bool>& used, DispersionCircle kind) {
-  const OptionalFixes before = station.at({0, 0}), after = station.at(fit.dispersion.offset_px);
+void set_fixes_before_and_after(DispersionFit& fit, const ReferencePointFixes& station,
+                                const std::vector<bool>& used, DispersionCircle kind) {
+  const OptionalFixes before = station.locate_captures_at_offset({0, 0}),
+                      after = station.locate_captures_at_offset(fit.dispersion.offset_px);
   std::vector<Eigen::Vector2d> before_m, after_m;
   for (std::size_t i = 0; i < before.size(); ++i) {
     if (!before[i] || !after[i]) continue;
@@ -23,8 +24,8 @@ void set_fixes(DispersionFit& fit, const ReferencePointFixes& station,
     before_m.push_back(before[i]->error_m);
     after_m.push_back(after[i]->error_m);
   }
-  fit.before = fit_dispersion_circle(before_m, kind);
-  fit.after = fit_dispersion_circle(after_m, kind);
+  fit.before = fit_circle_to_dispersed_fixes(before_m, kind);
+  fit.after = fit_circle_to_dispersed_fixes(after_m, kind);
   fit.dispersion.radius_m = fit.before.radius;
   fit.dispersion.center_m = fit.before.center;
   fit.dispersion.captures = static_cast<int>(before_m.size());
@@ -52,30 +53,31 @@ std::vector<Dispersion::UncertainLamp> make_uncertain_lamps(const LampDerivative
   return lamps;
 }
 
-void fit_chen_guan(DispersionFit& fit, const ReferencePointFixes& station,
-                   const Eigen::Vector2d& focal_px, DispersionCircle kind) {
-  const ChenGuanOffset found = find_chen_guan_offset(station, focal_px, kind, fit.noise_is_stated);
+void fit_chen_guan_offset(DispersionFit& fit, const ReferencePointFixes& station,
+                          const Eigen::Vector2d& focal_px, DispersionCircle kind) {
+  const ChenGuanOffset found =
+      estimate_chen_guan_offset(station, focal_px, kind, fit.noise_is_stated);
   fit.status = found.status;
   if (found.status != DispersionStatus::ok) return;
   fit.dispersion.offset_px = found.offset_px;
   fit.dispersion.covariance = found.covariance;
   fit.dispersion.by_lamps = make_uncertain_lamps(found.by_lamps, focal_px);
-  set_fixes(fit, station, found.used, kind);
+  set_fixes_before_and_after(fit, station, found.used, kind);
 }
 
-void fit_camera(DispersionFit& fit, const ReferencePointFixes& station,
-                const Eigen::Vector2d& focal_px, DispersionCircle kind) {
+void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& station,
+                       const Eigen::Vector2d& focal_px, DispersionCircle kind) {
   const auto separation = separate_camera_and_world_offsets(station);
   if (!separation) {
     fit.status = DispersionStatus::diverged;
     return;
   }
-  const OptionalFixes fixes = station.at({0, 0});
+  const OptionalFixes fixes = station.locate_captures_at_offset({0, 0});
   if (compute_mean_fix(fixes, separation->used).count < 3) {
     fit.status = DispersionStatus::too_few_captures;
     return;
   }
-  if (is_at_one_yaw_without_one(fixes, separation->used)) {
+  if (has_single_yaw_without_one_fix(fixes, separation->used)) {
     fit.status = DispersionStatus::one_yaw;
     return;
   }
@@ -83,49 +85,50 @@ void fit_camera(DispersionFit& fit, const ReferencePointFixes& station,
     fit.status = DispersionStatus::too_few_captures;
     return;
   }
-  const double factor = compute_variance_factor(separation->variance_factor, separation->freedom,
-                                                fit.noise_is_stated);
+  const double factor = compute_small_sample_variance_factor(
+      separation->variance_factor, separation->freedom, fit.noise_is_stated);
   fit.dispersion.offset_px = separation->offset_px;
   Matrix2 covariance = factor * separation->covariance.topLeftCorner<2, 2>();
   covariance(1, 0) = covariance(0, 1);
   fit.dispersion.covariance = covariance;
   fit.dispersion.by_lamps = make_uncertain_lamps(separation->by_lamps, focal_px);
-  const Eigen::MatrixXd world_changes_m = separation->by_lamps.compute_changes().bottomRows<2>();
+  const Eigen::MatrixXd world_changes_m =
+      separation->by_lamps.compute_changes_per_lamp_sd().bottomRows<2>();
   fit.world_offset_m = separation->world_m;
   fit.world_covariance = factor * separation->covariance.bottomRightCorner<2, 2>() +
                          world_changes_m * world_changes_m.transpose();
-  set_fixes(fit, station, separation->used, kind);
+  set_fixes_before_and_after(fit, station, separation->used, kind);
 }
 
 }  // namespace
 
-DispersionFit fit_dispersion(std::span<const ReferencePointCapture> captures, const LampMap& map,
-                             const Calibration& calibration, DispersionMethod method,
-                             DispersionCircle circle) {
+DispersionFit estimate_heading_dependent_offset(std::span<const ReferencePointCapture> captures,
+                                                const LampMap& map, const Calibration& calibration,
+                                                DispersionMethod method, DispersionCircle circle) {
   const ReferencePointFixes station(captures, map, calibration);
-  const OptionalFixes fixes = station.at({0, 0});
+  const OptionalFixes fixes = station.locate_captures_at_offset({0, 0});
   const auto count =
       std::count_if(fixes.begin(), fixes.end(), [](const auto& fix) { return fix.has_value(); });
   DispersionFit fit;
   fit.captures_without_fix = static_cast<int>(std::ssize(fixes) - count);
-  fit.no_fix_status = station.first_failure();
+  fit.no_fix_status = station.first_failed_status();
   fit.noise_is_stated = all_have_sigma(captures);
   if (count == 0) return fit;
   const bool paper = method == DispersionMethod::paper;
   const std::vector<bool> all(fixes.size(), true);
-  if (are_all_fixes_far(fixes)) {
+  if (are_all_fixes_far_from_reference(fixes)) {
     fit.status = DispersionStatus::station_far;
   } else if (count < (paper ? 2 : 3)) {
     fit.status = DispersionStatus::too_few_captures;
-  } else if (!paper && compute_mean_fix(fixes, all).is_at_one_yaw()) {
+  } else if (!paper && compute_mean_fix(fixes, all).has_single_yaw()) {
     fit.status = DispersionStatus::one_yaw;
   } else {
     fit.status = DispersionStatus::ok;
     const Eigen::Vector2d focal_px = calibration.camera.focal_px();
     if (paper) {
-      fit_chen_guan(fit, station, focal_px, circle);
+      fit_chen_guan_offset(fit, station, focal_px, circle);
     } else {
-      fit_camera(fit, station, focal_px, circle);
+      fit_camera_offset(fit, station, focal_px, circle);
     }
   }
   return fit;

@@ -25,7 +25,7 @@ struct ReferencePointCapture {
   std::optional<Inclination> inclination = {};
 };
 
-/// Method of fit_dispersion().
+/// Method of estimate_heading_dependent_offset().
 enum class DispersionMethod {
   /// Separates errors that rotate with the camera from errors that are fixed in the world. Requires
   /// captures at various yaws.
@@ -53,8 +53,8 @@ enum class DispersionStatus {
 /// Describes the status and the remedy, human-readable.
 std::string_view describe(DispersionStatus status);
 
-/// Result of fit_dispersion(). Members after `noise_is_stated` are valid only if the status is
-/// `ok`.
+/// Result of estimate_heading_dependent_offset(). Members after `noise_is_stated` are valid only if
+/// the status is `ok`.
 struct DispersionFit {
   DispersionStatus status = DispersionStatus::no_fix;
   /// Number of captures without a fix.
@@ -65,8 +65,8 @@ struct DispersionFit {
   bool noise_is_stated = false;
 
   /// Offset with its uncertainty; the circle is that of `before`. The covariance follows from the
-  /// scatter of the fixes and their noise (compute_variance_factor()), `by_lamps` from the map's
-  /// sd_m. Both are absent for the enclosing circle.
+  /// scatter of the fixes and their noise (compute_small_sample_variance_factor()), `by_lamps` from
+  /// the map's sd_m. Both are absent for the enclosing circle.
   Dispersion dispersion = {{0, 0}, 0, {0, 0}, 0, {}};
   /// Mean error of the corrected fixes, fixed in the world: fix minus reference point. Caused by
   /// errors of the reference point or the lamp map. Absent for method `paper`, which assumes that
@@ -98,8 +98,8 @@ struct DispersionFit {
 ///
 /// Method `paper` assumes m = 0. The center D of the circle gives offset_px = -f e^{-jg} D / H. The
 /// offset is corrected until the circle of the recomputed fixes is centered at the reference point
-/// (find_chen_guan_offset()). These are eq. 10 to 13, with the scale f / H and the rotation by the
-/// yaw, which the paper omits.
+/// (estimate_chen_guan_offset()). These are eq. 10 to 13, with the scale f / H and the rotation by
+/// the yaw, which the paper omits.
 ///
 /// Method `camera` estimates offset_px = f delta and m. The fixes are recomputed with the offset as
 /// in level_from_camera(), so that the model is exact. Each fix is weighted by its covariance.
@@ -108,8 +108,9 @@ struct DispersionFit {
 /// existing dispersion of `calibration` is ignored.
 ///
 /// Source: Chen and Guan, section 3.2.
-DispersionFit fit_dispersion(std::span<const ReferencePointCapture> captures, const LampMap& map,
-                             const Calibration& calibration, DispersionMethod method,
-                             DispersionCircle circle = DispersionCircle::mean);
+DispersionFit estimate_heading_dependent_offset(std::span<const ReferencePointCapture> captures,
+                                                const LampMap& map, const Calibration& calibration,
+                                                DispersionMethod method,
+                                                DispersionCircle circle = DispersionCircle::mean);
 
 }  // namespace vlp

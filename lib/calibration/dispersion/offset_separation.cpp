@@ -32,9 +32,11 @@ std::vector<Equation> linearize(const ReferencePointFixes& fixes, const OffsetSe
   constexpr double step_px =
       0.25;  // fixes are smooth over this step, which is far above their rounding
   const Eigen::Vector2d along_u(step_px, 0), along_v(0, step_px);
-  const Fixes here = fixes.at(at.offset_px);
-  const Fixes right = fixes.at(at.offset_px + along_u), left = fixes.at(at.offset_px - along_u);
-  const Fixes down = fixes.at(at.offset_px + along_v), up = fixes.at(at.offset_px - along_v);
+  const Fixes here = fixes.locate_captures_at_offset(at.offset_px);
+  const Fixes right = fixes.locate_captures_at_offset(at.offset_px + along_u),
+              left = fixes.locate_captures_at_offset(at.offset_px - along_u);
+  const Fixes down = fixes.locate_captures_at_offset(at.offset_px + along_v),
+              up = fixes.locate_captures_at_offset(at.offset_px - along_v);
   std::vector<Equation> equations;
   equations.reserve(here.size());
   for (std::size_t i = 0; i < here.size(); ++i) {
@@ -50,7 +52,7 @@ std::vector<Equation> linearize(const ReferencePointFixes& fixes, const OffsetSe
   return equations;
 }
 
-std::vector<double> compute_squares(const std::vector<Equation>& equations) {
+std::vector<double> compute_squared_residuals(const std::vector<Equation>& equations) {
   std::vector<double> squares;
   squares.reserve(equations.size());
   for (const Equation& equation : equations) squares.push_back(equation.residual.squaredNorm());
@@ -59,9 +61,9 @@ std::vector<double> compute_squares(const std::vector<Equation>& equations) {
 
 /// Applies one step of weighted least squares to `at` and returns it. Returns std::nullopt if the
 /// equations do not determine it.
-std::optional<Eigen::Vector4d> apply_step(const std::vector<Equation>& equations,
-                                          const std::vector<double>& weights,
-                                          OffsetSeparation& at) {
+std::optional<Eigen::Vector4d> apply_least_squares_step(const std::vector<Equation>& equations,
+                                                        const std::vector<double>& weights,
+                                                        OffsetSeparation& at) {
   Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
   Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
   double chi_squared = 0;
@@ -91,24 +93,24 @@ double count_degrees_of_freedom(const std::vector<double>& squares) {
 
 /// Estimates the variance per axis. Returns a value above zero, so that it can be a divisor.
 double estimate_variance(const std::vector<double>& squares) {
-  return std::max(robust_planar_variance(squares, count_degrees_of_freedom(squares)),
+  return std::max(estimate_robust_variance_2d(squares, count_degrees_of_freedom(squares)),
                   kFixRoundingVariance);
 }
 
 /// Approaches the solution closely enough to recognize outliers. Returns false if the fixes do not
 /// determine it.
-bool approach(const ReferencePointFixes& fixes, OffsetSeparation& at) {
+bool solve_approximately(const ReferencePointFixes& fixes, OffsetSeparation& at) {
   constexpr int iterations = 6;
   constexpr double width_squared = 2.385 * 2.385;  // 95 % efficiency for normal noise
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const auto equations = linearize(fixes, at);
     if (equations.empty()) return false;
-    std::vector<double> weights = compute_squares(equations);
+    std::vector<double> weights = compute_squared_residuals(equations);
     const double variance = iteration == 0 ? 0 : estimate_variance(weights);
     for (double& one : weights) {
       one = iteration == 0 ? 1 : 1 / (1 + one / (width_squared * variance));
     }
-    if (!apply_step(equations, weights, at)) return false;
+    if (!apply_least_squares_step(equations, weights, at)) return false;
   }
   return true;
 }
@@ -120,9 +122,10 @@ std::optional<bool> solve_without_outliers(const ReferencePointFixes& fixes, Off
   constexpr double tolerance_px = 1e-7, tolerance_m = 1e-10;
   auto equations = linearize(fixes, at);
   if (equations.empty()) return std::nullopt;
-  const auto squares = compute_squares(equations);
-  const double limit = planar_outlier_bound(kFixOutlierSigmas, count_degrees_of_freedom(squares)) *
-                       estimate_variance(squares);
+  const auto squares = compute_squared_residuals(equations);
+  const double limit =
+      compute_squared_outlier_bound_2d(kFixOutlierSigmas, count_degrees_of_freedom(squares)) *
+      estimate_variance(squares);
   std::vector<bool> used(at.used.size());
   for (std::size_t i = 0; i < squares.size(); ++i) {
     used[equations[i].capture] = squares[i] <= limit;
@@ -133,7 +136,7 @@ std::optional<bool> solve_without_outliers(const ReferencePointFixes& fixes, Off
     std::vector<double> weights;
     weights.reserve(equations.size());
     for (const Equation& equation : equations) weights.push_back(at.used[equation.capture] ? 1 : 0);
-    const auto step = apply_step(equations, weights, at);
+    const auto step = apply_least_squares_step(equations, weights, at);
     if (!step) return std::nullopt;
     if (step->head<2>().norm() < tolerance_px && step->tail<2>().norm() < tolerance_m)
       return changed;
@@ -144,8 +147,8 @@ std::optional<bool> solve_without_outliers(const ReferencePointFixes& fixes, Off
 
 /// Propagates errors of the map. The solution changes by -(J'WJ)^-1 J'W d, where d are the changes
 /// of the fixes.
-LampDerivatives propagate_map(const ReferencePointFixes& fixes, const OffsetSeparation& at) {
-  LampDerivatives derivatives = fixes.compute_lamp_derivatives(at.offset_px);
+LampDerivatives propagate_map_errors(const ReferencePointFixes& fixes, const OffsetSeparation& at) {
+  LampDerivatives derivatives = fixes.compute_jacobian_wrt_lamps(at.offset_px);
   if (derivatives.lamps.empty()) return derivatives;
   const Eigen::MatrixXd& d_fixes = derivatives.by_positions;
   Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(4, d_fixes.cols());
@@ -163,15 +166,15 @@ LampDerivatives propagate_map(const ReferencePointFixes& fixes, const OffsetSepa
 std::optional<OffsetSeparation> separate_camera_and_world_offsets(
     const ReferencePointFixes& fixes) {
   OffsetSeparation result;
-  result.used.resize(fixes.at(result.offset_px).size());
-  if (!approach(fixes, result)) return std::nullopt;
+  result.used.resize(fixes.locate_captures_at_offset(result.offset_px).size());
+  if (!solve_approximately(fixes, result)) return std::nullopt;
   constexpr int max_iterations = 10;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     const auto changed = solve_without_outliers(fixes, result);
     if (!changed) return std::nullopt;
     if (!*changed) break;
   }
-  result.by_lamps = propagate_map(fixes, result);
+  result.by_lamps = propagate_map_errors(fixes, result);
   return result;
 }
 
@@ -180,7 +183,7 @@ namespace {
 std::vector<Eigen::Vector2d> compute_errors(const ReferencePointFixes& station,
                                             const Eigen::Vector2d& offset_px,
                                             const std::vector<bool>& used) {
-  const OptionalFixes fixes = station.at(offset_px);
+  const OptionalFixes fixes = station.locate_captures_at_offset(offset_px);
   std::vector<Eigen::Vector2d> errors_m;
   for (std::size_t i = 0; i < fixes.size(); ++i) {
     if (fixes[i] && used[i]) errors_m.push_back(fixes[i]->error_m);
@@ -196,9 +199,9 @@ Eigen::Vector2d compute_mean_point(const std::vector<Eigen::Vector2d>& points) {
 
 /// Differentiates the mean fix with respect to the offset, numerically. The result is not finite if
 /// there is no fix.
-Eigen::Matrix2d differentiate_mean_fix(const ReferencePointFixes& station,
-                                       const Eigen::Vector2d& at_px,
-                                       const std::vector<bool>& used) {
+Eigen::Matrix2d differentiate_mean_fix_by_offset(const ReferencePointFixes& station,
+                                                 const Eigen::Vector2d& at_px,
+                                                 const std::vector<bool>& used) {
   constexpr double step_px =
       0.25;  // fixes are smooth over this step, which is far above their rounding
   Eigen::Matrix2d derivative;
@@ -232,8 +235,8 @@ Eigen::Matrix2d compute_mean_noise(const OptionalFixes& fixes, const std::vector
 ///
 /// Few errors do not determine a covariance: two errors give one of rank 1. The sample covariance
 /// therefore has weight n - 1 and its isotropic mean has isotropic_weight.
-/// compute_variance_factor() scales the variance along each axis of the result, in coordinates in
-/// which the noise is the unit matrix.
+/// compute_small_sample_variance_factor() scales the variance along each axis of the result, in
+/// coordinates in which the noise is the unit matrix.
 Eigen::Matrix2d estimate_covariance_of_mean(const std::vector<Eigen::Vector2d>& errors,
                                             const Eigen::Matrix2d& noise) {
   constexpr double isotropic_weight = 2;  // as three errors
@@ -248,12 +251,13 @@ Eigen::Matrix2d estimate_covariance_of_mean(const std::vector<Eigen::Vector2d>& 
       (n - 1 + isotropic_weight);
   const Eigen::LLT<Eigen::Matrix2d> root(noise);
   if (root.info() != Eigen::Success)
-    return compute_variance_factor(1, freedom, false) * scatter / n;
+    return compute_small_sample_variance_factor(1, freedom, false) * scatter / n;
   const Eigen::Matrix2d l = root.matrixL(), l_inverse = l.inverse();
   auto [values, axes] =
-      decompose_symmetric(Eigen::Matrix2d(l_inverse * scatter * l_inverse.transpose()));
+      eigendecompose_symmetric(Eigen::Matrix2d(l_inverse * scatter * l_inverse.transpose()));
   const double ratio = (l_inverse * squares * l_inverse.transpose()).trace() / freedom;
-  for (double& value : values) value = compute_variance_factor(value, freedom, true, ratio);
+  for (double& value : values)
+    value = compute_small_sample_variance_factor(value, freedom, true, ratio);
   return l * axes * values.asDiagonal() * axes.transpose() * l.transpose() / n;
 }
 
@@ -262,7 +266,7 @@ Eigen::Matrix2d estimate_covariance_of_mean(const std::vector<Eigen::Vector2d>& 
 LampDerivatives compute_offset_derivatives(const ReferencePointFixes& station,
                                            const ChenGuanOffset& found,
                                            const Eigen::Matrix2d& image_from_floor) {
-  LampDerivatives derivatives = station.compute_lamp_derivatives(found.offset_px);
+  LampDerivatives derivatives = station.compute_jacobian_wrt_lamps(found.offset_px);
   Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(2, derivatives.by_positions.cols());
   double count = 0;
   for (std::size_t i = 0; i < found.used.size(); ++i) {
@@ -276,7 +280,8 @@ LampDerivatives compute_offset_derivatives(const ReferencePointFixes& station,
 
 }  // namespace
 
-Circle fit_dispersion_circle(const std::vector<Eigen::Vector2d>& points, DispersionCircle kind) {
+Circle fit_circle_to_dispersed_fixes(const std::vector<Eigen::Vector2d>& points,
+                                     DispersionCircle kind) {
   if (kind == DispersionCircle::enclosing) return compute_enclosing_circle(points);
   Circle circle{compute_mean_point(points), 0};
   for (const auto& point : points) {
@@ -285,16 +290,16 @@ Circle fit_dispersion_circle(const std::vector<Eigen::Vector2d>& points, Dispers
   return circle;
 }
 
-ChenGuanOffset find_chen_guan_offset(const ReferencePointFixes& station,
-                                     const Eigen::Vector2d& focal_px, DispersionCircle kind,
-                                     bool noise_is_stated) {
-  const OptionalFixes fixes = station.at({0, 0});
-  const std::vector<bool> used = find_near_median(fixes);
+ChenGuanOffset estimate_chen_guan_offset(const ReferencePointFixes& station,
+                                         const Eigen::Vector2d& focal_px, DispersionCircle kind,
+                                         bool noise_is_stated) {
+  const OptionalFixes fixes = station.locate_captures_at_offset({0, 0});
+  const std::vector<bool> used = find_fixes_near_median(fixes);
   const MeanFix mean_fix = compute_mean_fix(fixes, used);
-  if (!mean_fix.is_at_one_yaw()) return {.status = DispersionStatus::many_yaws};
+  if (!mean_fix.has_single_yaw()) return {.status = DispersionStatus::many_yaws};
   Eigen::Matrix2d image_from_floor =
       focal_px.asDiagonal() *
-      Eigen::Matrix2d(product_matrix(mean_fix.heading.normalized()).transpose() /
+      Eigen::Matrix2d(complex_product_matrix(mean_fix.heading.normalized()).transpose() /
                       mean_fix.height_m);
   constexpr int max_iterations = 30;
   constexpr double tolerance_m = 1e-10;  // far below any noise
@@ -302,9 +307,9 @@ ChenGuanOffset find_chen_guan_offset(const ReferencePointFixes& station,
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     const auto errors_m = compute_errors(station, offset_px, used);
     if (errors_m.size() < 2) break;
-    const Eigen::Vector2d center_m = fit_dispersion_circle(errors_m, kind).center;
+    const Eigen::Vector2d center_m = fit_circle_to_dispersed_fixes(errors_m, kind).center;
     if (iteration > 0) {
-      image_from_floor = differentiate_mean_fix(station, offset_px, used).inverse();
+      image_from_floor = differentiate_mean_fix_by_offset(station, offset_px, used).inverse();
       if (!image_from_floor.allFinite()) break;
     }
     if (center_m.norm() > tolerance_m) {
@@ -314,7 +319,7 @@ ChenGuanOffset find_chen_guan_offset(const ReferencePointFixes& station,
     ChenGuanOffset found{.status = DispersionStatus::ok, .offset_px = offset_px, .used = used};
     if (kind == DispersionCircle::mean) {
       const Eigen::Matrix2d noise_m2 =
-          compute_mean_noise(station.at(offset_px), used, noise_is_stated);
+          compute_mean_noise(station.locate_captures_at_offset(offset_px), used, noise_is_stated);
       const Eigen::Matrix2d mean_covariance_m2 = estimate_covariance_of_mean(errors_m, noise_m2);
       Matrix2 covariance = image_from_floor * mean_covariance_m2 * image_from_floor.transpose();
       covariance(1, 0) = covariance(0, 1);

@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-/// Errors of camera and world from fit_dispersion(), method `camera`.
+/// Errors of camera and world from estimate_heading_dependent_offset(), method `camera`.
 struct OffsetSeparation {
   /// Offset in the undistorted image, which rotates with the camera.
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
@@ -40,7 +40,7 @@ struct OffsetSeparation {
 std::optional<OffsetSeparation> separate_camera_and_world_offsets(const ReferencePointFixes& fixes);
 
 /// Number of standard deviations beyond which a fix is an outlier, for a known variance
-/// (planar_outlier_bound()).
+/// (compute_squared_outlier_bound_2d()).
 inline constexpr double kFixOutlierSigmas = 5;
 /// Smallest variance of residuals, in m^2 or relative to their covariance. Smaller ones are numeric
 /// noise.
@@ -48,9 +48,10 @@ inline constexpr double kFixRoundingVariance = 1e-24;
 
 /// Returns the dispersion circle of the points.
 /// @pre there is at least one point
-Circle fit_dispersion_circle(const std::vector<Eigen::Vector2d>& points, DispersionCircle kind);
+Circle fit_circle_to_dispersed_fixes(const std::vector<Eigen::Vector2d>& points,
+                                     DispersionCircle kind);
 
-/// Result of find_chen_guan_offset(). Members other than `status` are valid only if it is `ok`.
+/// Result of estimate_chen_guan_offset(). Members other than `status` are valid only if it is `ok`.
 struct ChenGuanOffset {
   /// Status `ok`, `many_yaws` or `diverged`.
   DispersionStatus status;
@@ -76,8 +77,8 @@ struct ChenGuanOffset {
 /// is applied as a shift and all lamps have one height. After a rotation center of model `tilt` the
 /// offset is applied as a rotation, which moves fixes by more. The offset is therefore corrected by
 /// the remaining D until it vanishes.
-ChenGuanOffset find_chen_guan_offset(const ReferencePointFixes& station,
-                                     const Eigen::Vector2d& focal_px, DispersionCircle kind,
-                                     bool noise_is_stated);
+ChenGuanOffset estimate_chen_guan_offset(const ReferencePointFixes& station,
+                                         const Eigen::Vector2d& focal_px, DispersionCircle kind,
+                                         bool noise_is_stated);
 
 }  // namespace vlp

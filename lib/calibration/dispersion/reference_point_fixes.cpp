@@ -20,11 +20,11 @@ namespace vlp {
 namespace {
 
 /// Returns the mean height of the detected lamps, in the world.
-double compute_lamp_height(const ReferencePointCapture& capture, const LampMap& map) {
+double compute_lamp_height_above_camera(const ReferencePointCapture& capture, const LampMap& map) {
   double sum_m = 0;
   int count = 0;
   for (const Detection& detection : capture.detections) {
-    const Lamp* lamp = find_lamp(map.lamps, detection.lamp);
+    const Lamp* lamp = find_lamp_by_id(map.lamps, detection.lamp);
     if (lamp == nullptr) continue;
     sum_m += lamp->position_m.z();
     ++count;
@@ -32,7 +32,7 @@ double compute_lamp_height(const ReferencePointCapture& capture, const LampMap& 
   return sum_m / count;
 }
 
-Fix locate_camera(const Positioner& positioner, const ReferencePointCapture& capture) {
+Fix locate_camera_of_capture(const Positioner& positioner, const ReferencePointCapture& capture) {
   Sensors sensors;
   sensors.inclination = capture.inclination;
   return positioner.locate(capture.detections, sensors);
@@ -40,7 +40,7 @@ Fix locate_camera(const Positioner& positioner, const ReferencePointCapture& cap
 
 }  // namespace
 
-Eigen::MatrixXd LampDerivatives::compute_changes() const {
+Eigen::MatrixXd LampDerivatives::compute_changes_per_lamp_sd() const {
   Eigen::MatrixXd moves = by_positions;
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     moves.middleCols<3>(3 * static_cast<Eigen::Index>(i)) *= *lamps[i].sd_m;
@@ -54,37 +54,38 @@ ReferencePointFixes::ReferencePointFixes(std::span<const ReferencePointCapture> 
   calibration_.dispersion.reset();
   const Positioner positioner(map_, calibration_);
   for (const ReferencePointCapture& capture : captures_) {
-    const Fix fix = locate_camera(positioner, capture);
+    const Fix fix = locate_camera_of_capture(positioner, capture);
     if (!fix.ok() && first_failure_ == FixStatus::ok) first_failure_ = fix.status;
   }
 }
 
-std::vector<std::optional<ReferencePointFixes::Estimate>> ReferencePointFixes::at(
-    const Eigen::Vector2d& offset_px) const {
-  return at(offset_px, map_);
+std::vector<std::optional<ReferencePointFixes::Estimate>>
+ReferencePointFixes::locate_captures_at_offset(const Eigen::Vector2d& offset_px) const {
+  return locate_captures_at_offset(offset_px, map_);
 }
 
-std::vector<std::optional<ReferencePointFixes::Estimate>> ReferencePointFixes::at(
-    const Eigen::Vector2d& offset_px, const LampMap& map) const {
+std::vector<std::optional<ReferencePointFixes::Estimate>>
+ReferencePointFixes::locate_captures_at_offset(const Eigen::Vector2d& offset_px,
+                                               const LampMap& map) const {
   Calibration calibration = calibration_;
   calibration.dispersion = Dispersion{offset_px, 0, {0, 0}, 1, {}};
   const Positioner positioner(map, calibration);
   std::vector<std::optional<Estimate>> fixes(captures_.size());
   for (std::size_t i = 0; i < captures_.size(); ++i) {
-    const Fix fix = locate_camera(positioner, captures_[i]);
+    const Fix fix = locate_camera_of_capture(positioner, captures_[i]);
     if (!fix.ok()) continue;
     const Pose& pose = fix.estimate.pose;
     fixes[i] = Estimate{pose.position_m.head<2>() - captures_[i].reference_point_m,
                         fix.noise_covariance.topLeftCorner<2, 2>(),
                         pose.yaw_rad,
-                        compute_lamp_height(captures_[i], map) - pose.position_m.z(),
+                        compute_lamp_height_above_camera(captures_[i], map) - pose.position_m.z(),
                         fix.residual_px * fix.residual_px * fix.lamps,
                         2 * fix.lamps - 4};
   }
   return fixes;
 }
 
-LampDerivatives ReferencePointFixes::compute_lamp_derivatives(
+LampDerivatives ReferencePointFixes::compute_jacobian_wrt_lamps(
     const Eigen::Vector2d& offset_px) const {
   std::set<int> detected;
   for (const ReferencePointCapture& capture : captures_) {
@@ -101,7 +102,7 @@ LampDerivatives ReferencePointFixes::compute_lamp_derivatives(
   Eigen::MatrixXd& by_positions = derivatives.by_positions;
   by_positions = Eigen::MatrixXd::Zero(2 * std::ssize(captures_), 3 * std::ssize(uncertain));
   if (uncertain.empty()) return derivatives;
-  const auto here = at(offset_px);
+  const auto here = locate_captures_at_offset(offset_px);
   LampMap moved = map_;
   for (Eigen::Index column = 0; column < by_positions.cols(); ++column) {
     const std::size_t lamp = uncertain[static_cast<std::size_t>(column / 3)];
@@ -110,7 +111,7 @@ LampDerivatives ReferencePointFixes::compute_lamp_derivatives(
     constexpr double max_step_m = 1e-4;
     const double step_m = std::min(*map_.lamps[lamp].sd_m, max_step_m);
     coordinate_m += step_m;
-    const auto there = at(offset_px, moved);
+    const auto there = locate_captures_at_offset(offset_px, moved);
     coordinate_m = map_.lamps[lamp].position_m[column % 3];
     for (std::size_t i = 0; i < here.size(); ++i) {
       if (!here[i] || !there[i]) continue;
@@ -125,7 +126,7 @@ namespace {
 
 constexpr double kMaxErrorFraction = 0.2;  // of the lamps' height
 
-/// Computes q of compute_variance_factor().
+/// Computes q of compute_small_sample_variance_factor().
 double compute_student_factor(double degrees_of_freedom) {
   constexpr double sigmas_of_95_percent = 1.96;
   return compute_t_squared_bound(sigmas_of_95_percent, degrees_of_freedom) /
@@ -134,24 +135,24 @@ double compute_student_factor(double degrees_of_freedom) {
 
 /// Computes the weight of residuals that contradict given noise: 0 up to the ratio that 20 % of
 /// all residuals exceed, 1 from that of 5 %, linear in between.
-double compute_contradiction(double ratio, double degrees_of_freedom) {
+double compute_yaw_contradiction(double ratio, double degrees_of_freedom) {
   constexpr double sigmas_of_20_percent = 0.8416, sigmas_of_5_percent = 1.6449;
   const double first =
-      chi_squared_bound(sigmas_of_20_percent, degrees_of_freedom) / degrees_of_freedom;
+      compute_chi_squared_bound(sigmas_of_20_percent, degrees_of_freedom) / degrees_of_freedom;
   const double last =
-      chi_squared_bound(sigmas_of_5_percent, degrees_of_freedom) / degrees_of_freedom;
+      compute_chi_squared_bound(sigmas_of_5_percent, degrees_of_freedom) / degrees_of_freedom;
   return std::clamp((ratio - first) / (last - first), 0.0, 1.0);
 }
 
 }  // namespace
 
-double MeanFix::yaw_variation() const {
+double MeanFix::compute_yaw_variation() const {
   return std::sqrt(std::max(0.0, 1 - heading.squaredNorm()));
 }
 
-bool MeanFix::is_at_one_yaw() const {
+bool MeanFix::has_single_yaw() const {
   constexpr double one_yaw_rad = rad_from_deg(10);
-  return yaw_variation() < std::sin(one_yaw_rad);
+  return compute_yaw_variation() < std::sin(one_yaw_rad);
 }
 
 MeanFix compute_mean_fix(const OptionalFixes& fixes, const std::vector<bool>& used) {
@@ -167,24 +168,25 @@ MeanFix compute_mean_fix(const OptionalFixes& fixes, const std::vector<bool>& us
   return mean_fix;
 }
 
-bool is_at_one_yaw_without_one(const OptionalFixes& fixes, std::vector<bool> used) {
+bool has_single_yaw_without_one_fix(const OptionalFixes& fixes, std::vector<bool> used) {
   for (std::size_t i = 0; i < used.size(); ++i) {
     if (!fixes[i] || !used[i]) continue;
     used[i] = false;
-    if (compute_mean_fix(fixes, used).is_at_one_yaw()) return true;
+    if (compute_mean_fix(fixes, used).has_single_yaw()) return true;
     used[i] = true;
   }
   return false;
 }
 
-bool are_all_fixes_far(const OptionalFixes& fixes) {
+bool are_all_fixes_far_from_reference(const OptionalFixes& fixes) {
   return std::all_of(fixes.begin(), fixes.end(), [](const auto& fix) {
     return !fix || fix->error_m.norm() > kMaxErrorFraction * fix->height_m;
   });
 }
 
-double compute_variance_factor(double ratio, double degrees_of_freedom, bool noise_is_stated,
-                               std::optional<double> pooled_ratio) {
+double compute_small_sample_variance_factor(double ratio, double degrees_of_freedom,
+                                            bool noise_is_stated,
+                                            std::optional<double> pooled_ratio) {
   assert(degrees_of_freedom > 0);
   const double from_residuals = ratio * compute_student_factor(degrees_of_freedom);
   if (!noise_is_stated) return from_residuals;
@@ -192,11 +194,11 @@ double compute_variance_factor(double ratio, double degrees_of_freedom, bool noi
   const double combined = (kStatedFreedom + degrees_of_freedom * ratio) / total_freedom *
                           compute_student_factor(total_freedom);
   const double factor = std::max(1.0, combined);
-  const double weight = compute_contradiction(pooled_ratio.value_or(ratio), degrees_of_freedom);
+  const double weight = compute_yaw_contradiction(pooled_ratio.value_or(ratio), degrees_of_freedom);
   return factor * std::pow(std::max(1.0, from_residuals / factor), weight);
 }
 
-std::vector<bool> find_near_median(const OptionalFixes& fixes) {
+std::vector<bool> find_fixes_near_median(const OptionalFixes& fixes) {
   std::vector<double> x, y, squares;
   for (const auto& fix : fixes) {
     if (!fix) continue;
@@ -208,8 +210,9 @@ std::vector<bool> find_near_median(const OptionalFixes& fixes) {
     if (fix) squares.push_back((fix->error_m - middle_m).squaredNorm());
   }
   const double freedom = 2 * static_cast<double>(squares.size()) - 2;
-  const double variance = std::max(robust_planar_variance(squares, freedom), kFixRoundingVariance);
-  const double limit = planar_outlier_bound(kFixOutlierSigmas, freedom) * variance;
+  const double variance =
+      std::max(estimate_robust_variance_2d(squares, freedom), kFixRoundingVariance);
+  const double limit = compute_squared_outlier_bound_2d(kFixOutlierSigmas, freedom) * variance;
   std::vector<bool> near;
   near.reserve(fixes.size());
   for (const auto& fix : fixes) {

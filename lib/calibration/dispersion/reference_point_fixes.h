@@ -21,7 +21,7 @@ struct LampDerivatives {
 
   /// Returns the changes of the quantities for errors of one standard deviation, one column per
   /// lamp coordinate.
-  Eigen::MatrixXd compute_changes() const;
+  Eigen::MatrixXd compute_changes_per_lamp_sd() const;
 };
 
 /// Position fixes of captures at a reference point, as functions of the dispersion's offset.
@@ -47,17 +47,18 @@ class ReferencePointFixes {
                       const Calibration& calibration);
 
   /// Returns the fix of each capture; std::nullopt for captures without a fix.
-  std::vector<std::optional<Estimate>> at(const Eigen::Vector2d& offset_px) const;
+  std::vector<std::optional<Estimate>> locate_captures_at_offset(
+      const Eigen::Vector2d& offset_px) const;
   /// Computes the derivatives of the fixes, in m, with respect to the positions of the lamps that
   /// are detected and have an sd_m above zero. Differentiates numerically, one coordinate at a
   /// time. The result has two rows for each capture, which are zero without a fix.
-  LampDerivatives compute_lamp_derivatives(const Eigen::Vector2d& offset_px) const;
+  LampDerivatives compute_jacobian_wrt_lamps(const Eigen::Vector2d& offset_px) const;
   /// Returns the status of the first capture without a fix; `ok` if there is none.
-  FixStatus first_failure() const { return first_failure_; }
+  FixStatus first_failed_status() const { return first_failure_; }
 
  private:
-  std::vector<std::optional<Estimate>> at(const Eigen::Vector2d& offset_px,
-                                          const LampMap& map) const;
+  std::vector<std::optional<Estimate>> locate_captures_at_offset(const Eigen::Vector2d& offset_px,
+                                                                 const LampMap& map) const;
 
   std::span<const ReferencePointCapture> captures_;
   const LampMap& map_;
@@ -78,9 +79,9 @@ struct MeanFix {
   int count = 0;
 
   /// Returns the approximate RMS sine of the yaws relative to their mean.
-  double yaw_variation() const;
+  double compute_yaw_variation() const;
   /// Returns true if the yaws vary by less than about 10 degrees.
-  bool is_at_one_yaw() const;
+  bool has_single_yaw() const;
 };
 
 /// Computes the means over the fixes that are used.
@@ -88,11 +89,11 @@ MeanFix compute_mean_fix(const OptionalFixes& fixes, const std::vector<bool>& us
 
 /// Returns true if the removal of a single fix leaves one yaw. One fix alone is not sufficient to
 /// separate errors of camera and world.
-bool is_at_one_yaw_without_one(const OptionalFixes& fixes, std::vector<bool> used);
+bool has_single_yaw_without_one_fix(const OptionalFixes& fixes, std::vector<bool> used);
 
 /// Returns true if every fix is farther from the reference point than a camera tilted by 11 degrees
 /// would be.
-bool are_all_fixes_far(const OptionalFixes& fixes);
+bool are_all_fixes_far_from_reference(const OptionalFixes& fixes);
 
 /// Degrees of freedom assigned to given noise: its standard deviation is accurate to 29 %, 1 /
 /// sqrt(12).
@@ -110,12 +111,13 @@ inline constexpr double kStatedFreedom = 6;
 /// to 1 with chi-squared between its bounds of 20 % and 5 %, so that the factor is continuous.
 /// @param pooled_ratio  ratio of all axes, which determines w; `ratio` without it
 /// @pre degrees_of_freedom > 0
-double compute_variance_factor(double ratio, double degrees_of_freedom, bool noise_is_stated,
-                               std::optional<double> pooled_ratio = {});
+double compute_small_sample_variance_factor(double ratio, double degrees_of_freedom,
+                                            bool noise_is_stated,
+                                            std::optional<double> pooled_ratio = {});
 
 /// Returns true for each fix within five standard deviations of the median fix, for fixes at one
 /// yaw.
 /// @pre there is at least one fix
-std::vector<bool> find_near_median(const OptionalFixes& fixes);
+std::vector<bool> find_fixes_near_median(const OptionalFixes& fixes);
 
 }  // namespace vlp

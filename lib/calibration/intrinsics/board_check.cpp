@@ -51,8 +51,8 @@ double compute_mean_edge_px(const TagDetection& tag) {
 
 /// Returns the steps from every tag to its four nearest neighbors, including tags that the board
 /// does not have. `shift_px`: inward displacement of the tag edges.
-std::vector<Step> collect_steps(std::span<const BoardView> views, const std::optional<Lens>& lens,
-                                double shift_px) {
+std::vector<Step> collect_tag_center_steps(std::span<const BoardView> views,
+                                           const std::optional<Lens>& lens, double shift_px) {
   constexpr std::size_t nearest = 4;
   std::vector<Step> steps;
   for (const BoardView& view : views) {
@@ -126,7 +126,7 @@ std::optional<LayoutFit::Line> fit_pitch_line(
                          (mean.y() / slope - mean.x()) / 2};
 }
 
-LayoutFit fit_layout(const Board& board, const std::vector<Step>& steps) {
+LayoutFit fit_board_layout(const Board& board, const std::vector<Step>& steps) {
   constexpr double straight = 0.25;       // off the way, of its length
   std::map<int, Eigen::Vector2d> places;  // in pitches
   for (const BoardTag& tag : list_board_tags(board)) {
@@ -196,7 +196,7 @@ int estimate_id_increment(int axis, const std::vector<Step>& steps) {
 
 /// Returns the layout that explains the steps; std::nullopt if none does. Ids that increase by one
 /// along rows increase by the number of columns from row to row, and vice versa.
-std::optional<Board> find_layout(Board board, const std::vector<Step>& steps) {
+std::optional<Board> find_matching_layout(Board board, const std::vector<Step>& steps) {
   constexpr double min_fraction = 0.8;
   constexpr int max_tags = 1000;
   const int right = estimate_id_increment(0, steps), down = estimate_id_increment(1, steps);
@@ -231,7 +231,7 @@ std::optional<Board> find_layout(Board board, const std::vector<Step>& steps) {
             ? std::max(lines, stated)
             : lines;
     if (candidate.cols > max_tags || candidate.rows > max_tags) return;
-    const double fraction = fit_layout(candidate, steps).fraction;
+    const double fraction = fit_board_layout(candidate, steps).fraction;
     if (fraction < min_fraction || fraction <= best_fraction) return;
     best = candidate;
     best_fraction = fraction;
@@ -248,16 +248,17 @@ std::string describe_layout_problem(const Board& board, const std::vector<Step>&
   const auto has = [&](int id) { return id >= board.first_id && id <= last_id; };
   std::copy_if(steps.begin(), steps.end(), std::back_inserter(known),
                [&](const Step& step) { return has(step.from) && has(step.to); });
-  const bool fits = known.empty() || fit_layout(board, known).fraction >= min_fraction;
-  const auto found = find_layout(board, steps);
+  const bool fits = known.empty() || fit_board_layout(board, known).fraction >= min_fraction;
+  const auto found = find_matching_layout(board, steps);
   if (fits && !known.empty()) {
     // Unknown tags may belong to another board next to this one, unless they continue its layout.
     std::vector<Step> across;
     std::copy_if(steps.begin(), steps.end(), std::back_inserter(across),
                  [&](const Step& step) { return has(step.from) != has(step.to); });
     constexpr std::size_t few = 10;
-    if (!found || across.size() < few || fit_layout(*found, across).num_counted < across.size() ||
-        fit_layout(*found, across).fraction < min_fraction) {
+    if (!found || across.size() < few ||
+        fit_board_layout(*found, across).num_counted < across.size() ||
+        fit_board_layout(*found, across).fraction < min_fraction) {
       return "";
     }
   }
@@ -297,7 +298,7 @@ bool is_pitch_consistent(const LayoutFit& fit, double expected, double tolerance
 std::string describe_charuco_problem(const Board& board, const std::vector<Step>& steps) {
   constexpr double min_fraction = 0.8;
   constexpr int minimum = 4, limit = 60;
-  const LayoutFit stated = fit_layout(board, steps);
+  const LayoutFit stated = fit_board_layout(board, steps);
   // Unknown markers may belong to another board next to this one.
   if (stated.fraction >= min_fraction && 2 * stated.num_counted > steps.size()) return "";
   int largest = 0;
@@ -314,7 +315,7 @@ std::string describe_charuco_problem(const Board& board, const std::vector<Step>
       candidate.rows = std::max(minimum, (2 * markers + cols - 1) / cols);
       if (candidate.rows > limit) continue;
       if (cols == board.cols) candidate.rows = std::max(candidate.rows, board.rows);
-      const LayoutFit fit = fit_layout(candidate, steps);
+      const LayoutFit fit = fit_board_layout(candidate, steps);
       const double fraction =
           fit.fraction * static_cast<double>(fit.num_counted) / static_cast<double>(steps.size());
       if (fraction < min_fraction || fraction <= best_fraction) continue;
@@ -332,38 +333,40 @@ std::string describe_charuco_problem(const Board& board, const std::vector<Step>
          std::to_string(best->rows) + ", top_left " + (best->top_left_white ? "white" : "black");
 }
 
-BoardCheck check_charuco(const Board& board, const std::vector<Step>& steps) {
-  BoardCheck check{describe_charuco_problem(board, steps), fit_layout(board, steps).pitch};
+BoardCheck check_charuco_layout(const Board& board, const std::vector<Step>& steps) {
+  BoardCheck check{describe_charuco_problem(board, steps), fit_board_layout(board, steps).pitch};
   if (!check.problem.empty() || !check.pitch) return check;
   // The outlines of markers are accurate to one or two pixels.
   constexpr double tolerance = 0.15, hundreds = 100;
   const double stated = board.square_size_m / board.tag_size_m;
   if (std::abs(*check.pitch / stated - 1) <= tolerance) return check;
-  check.problem = "a square is " + shortest(std::round(hundreds * stated) / hundreds) +
+  check.problem = "a square is " + format_shortest(std::round(hundreds * stated) / hundreds) +
                   " markers wide by board.yaml, but " +
-                  shortest(std::round(hundreds * *check.pitch) / hundreds) + " in the images";
+                  format_shortest(std::round(hundreds * *check.pitch) / hundreds) +
+                  " in the images";
   return check;
 }
 
 }  // namespace
 
-BoardCheck check_board(const Board& board, std::span<const BoardView> views,
-                       const std::optional<Lens>& lens, double shift_px) {
+BoardCheck check_board_layout(const Board& board, std::span<const BoardView> views,
+                              const std::optional<Lens>& lens, double shift_px) {
   // A larger displacement is caused by another spacing, not by a tone curve.
-  const auto steps = collect_steps(views, lens, std::clamp(shift_px, -kMaxShift_px, kMaxShift_px));
+  const auto steps =
+      collect_tag_center_steps(views, lens, std::clamp(shift_px, -kMaxShift_px, kMaxShift_px));
   constexpr std::size_t min_steps = 10;
   if (steps.size() < min_steps) return {};
-  if (board.has_squares()) return check_charuco(board, steps);
+  if (board.has_chessboard_squares()) return check_charuco_layout(board, steps);
   BoardCheck check{describe_layout_problem(board, steps), {}};
-  const LayoutFit fit = fit_layout(board, steps);
+  const LayoutFit fit = fit_board_layout(board, steps);
   check.pitch = fit.pitch;
   if (!check.problem.empty() || !fit.pitch) return check;
   const double tolerance = lens ? 0.01 : 0.05;
   if (!is_pitch_consistent(fit, 1 + board.tag_spacing, tolerance)) {
     const double hundreds = 100;
     const double seen = std::round((*fit.pitch - 1) * hundreds) / hundreds;
-    check.problem = "tag_spacing is " + shortest(board.tag_spacing) +
-                    ", but the images show gaps of " + shortest(seen) + " tags";
+    check.problem = "tag_spacing is " + format_shortest(board.tag_spacing) +
+                    ", but the images show gaps of " + format_shortest(seen) + " tags";
   }
   return check;
 }

@@ -30,7 +30,7 @@ struct BoardCheck {
 ///     % (ChArUco: always 15 %)
 /// @param shift_px  inward displacement of the tag edges (edge_displacement.h), px, clamped to
 /// +-1.5 px
-BoardCheck check_board(const Board& board, std::span<const BoardView> views,
-                       const std::optional<Lens>& lens, double shift_px = 0);
+BoardCheck check_board_layout(const Board& board, std::span<const BoardView> views,
+                              const std::optional<Lens>& lens, double shift_px = 0);
 
 }  // namespace vlp

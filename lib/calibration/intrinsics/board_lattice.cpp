@@ -38,9 +38,9 @@ Eigen::Vector2d compute_inward_displacement(const TagDetection& tag, std::size_t
 }  // namespace
 
 BoardLattice::BoardLattice(const Board& board)
-    : has_squares_(board.has_squares()), is_touching_(board.corner_squares) {
+    : has_squares_(board.has_chessboard_squares()), is_touching_(board.corner_squares) {
   constexpr double numeric_tolerance = 1e-9;
-  field_m_ = tag_field_m(board);
+  field_m_ = compute_tag_field_size_m(board);
   if (has_squares_) {
     parts_ = 1;
     cols_ = board.cols - 1;
@@ -69,13 +69,14 @@ BoardLattice::BoardLattice(const Board& board)
   board_warp_ratio_ = (field_m_.array() / part_m).square();
 }
 
-std::vector<BoardLattice::Corner> BoardLattice::corners(const BoardDetection& seen) const {
+std::vector<BoardLattice::Corner> BoardLattice::match_corners_to_flat_board(
+    const BoardDetection& seen) const {
   constexpr int right[] = {0, 1, 1, 0}, down[] = {1, 1, 0, 0};  // bottom left, bottom right, ...
   std::vector<Corner> all;
   if (has_squares_ || !seen.points.empty()) {
     all.reserve(seen.points.size());
     for (const auto& [index, pixel, weight] : seen.points) {
-      const std::size_t part = index / points(), point = index % points();
+      const std::size_t part = index / num_points(), point = index % num_points();
       const auto cols = static_cast<std::size_t>(cols_);
       const std::size_t row = point / cols;
       const Eigen::Vector2d node(static_cast<double>(point % cols), static_cast<double>(row));
@@ -103,7 +104,7 @@ std::vector<BoardLattice::Corner> BoardLattice::corners(const BoardDetection& se
   return all;
 }
 
-std::vector<BoardLattice::Corner> BoardLattice::with_warp(
+std::vector<BoardLattice::Corner> BoardLattice::apply_board_warp(
     std::vector<Corner> corners, const Eigen::Vector2d& warp_of_part_m) const {
   const Eigen::Vector2d warp_m = warp_of_part_m.cwiseProduct(board_warp_ratio_);
   for (Corner& corner : corners) {
@@ -114,8 +115,8 @@ std::vector<BoardLattice::Corner> BoardLattice::with_warp(
   return corners;
 }
 
-BoardPose BoardLattice::compute_part_pose(const BoardPose& camera_from_board,
-                                          std::size_t part) const {
+BoardPose BoardLattice::compute_board_part_pose(const BoardPose& camera_from_board,
+                                                std::size_t part) const {
   return {camera_from_board.rotation, camera_from_board.translation_m +
                                           rotate_into_camera(camera_from_board, origins_m_[part])};
 }
@@ -125,22 +126,22 @@ bool BoardLattice::has_sufficient_points(const std::vector<PointDetection>& seen
   std::vector<std::map<std::size_t, int>> in_row(parts_);
   std::vector<std::size_t> count(parts_);
   for (const PointDetection& point : seen) {
-    const std::size_t part = point.index / points();
+    const std::size_t part = point.index / num_points();
     ++count[part];
-    ++in_row[part][point.index % points() / static_cast<std::size_t>(cols_)];
+    ++in_row[part][point.index % num_points() / static_cast<std::size_t>(cols_)];
   }
   for (std::size_t part = 0; part < parts_; ++part) {
     const auto rows = std::count_if(in_row[part].begin(), in_row[part].end(),
                                     [](const auto& row) { return row.second > 1; });
     if (rows < 2) return false;
     // A small board may have no more.
-    if (count[part] < std::min(points(), parts_ == 1 ? min_count : min_count_per_part))
+    if (count[part] < std::min(num_points(), parts_ == 1 ? min_count : min_count_per_part))
       return false;
   }
   return true;
 }
 
-bool BoardLattice::sufficient(const BoardDetection& seen) const {
+bool BoardLattice::has_sufficient_corners(const BoardDetection& seen) const {
   if (has_squares_ || !seen.points.empty()) return has_sufficient_points(seen.points);
   constexpr std::size_t min_count = 3, min_count_per_part = 6;
   std::set<int> cols, rows;

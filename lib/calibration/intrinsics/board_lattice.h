@@ -18,22 +18,22 @@ namespace vlp {
 /// tags. Otherwise corner k of all tags forms a lattice with its own pose, called a part.
 class BoardLattice {
  public:
-  /// @throws std::invalid_argument if the parts would be lines: one row or column of tags whose
-  ///     gaps are not as wide as the tags
+  /// @throws std::invalid_argument for a board of tags if tag_spacing is not 1 and the board has
+  ///     one row or column
   explicit BoardLattice(const Board& board);
 
   /// Number of parts of the board: 1 or 4.
-  std::size_t parts() const { return parts_; }
+  std::size_t num_parts() const { return parts_; }
   /// Number of points along the width and the height of a part.
   int cols() const { return cols_; }
   int rows() const { return rows_; }
   /// Distance between adjacent points of a part, m.
-  double spacing_m() const { return spacing_m_; }
-  std::size_t points() const {
+  double point_spacing_m() const { return spacing_m_; }
+  std::size_t num_points() const {
     return static_cast<std::size_t>(cols_) * static_cast<std::size_t>(rows_);
   }
   /// Ratio of the warp of the whole board to that of a part, along x and y; a part is smaller.
-  const Eigen::Vector2d& board_warp_ratio() const { return board_warp_ratio_; }
+  const Eigen::Vector2d& part_to_board_warp_ratio() const { return board_warp_ratio_; }
 
   /// Corner of the board and its measurement in a view.
   struct Corner {
@@ -48,15 +48,15 @@ class BoardLattice {
     double weight = 1;
     /// Curvature of the tag's edge from this corner to the tag's next corner.
     EdgeCurvature bow = {};
-    /// Standard deviation from pixel noise (TagDetection::Deviations), px; 0 if unknown.
+    /// Standard deviation from pixel noise (TagDetection::corner_sds_px), px; 0 if unknown.
     double sd_px = 0;
   };
   /// Returns all corners of a detection on a flat board, in the order of `seen`: its points, or
   /// four corners of each tag.
-  std::vector<Corner> corners(const BoardDetection& seen) const;
+  std::vector<Corner> match_corners_to_flat_board(const BoardDetection& seen) const;
   /// Returns the PointDetection::index of a point: part by part, row by row.
   std::size_t point_index(std::size_t part, std::size_t point) const {
-    return part * points() + point;
+    return part * num_points() + point;
   }
   /// Returns the index of the tag of a point. The corners of a tag share its edges and therefore
   /// have correlated errors. On a board of squares each point is a group of its own.
@@ -66,17 +66,17 @@ class BoardLattice {
     return point / cols / 2 * (cols / 2) + point % cols / 2;
   }
   /// Returns the corners of a board whose parts have the warp `warp_of_part_m`, along x and y.
-  std::vector<Corner> with_warp(std::vector<Corner> corners,
-                                const Eigen::Vector2d& warp_of_part_m) const;
+  std::vector<Corner> apply_board_warp(std::vector<Corner> corners,
+                                       const Eigen::Vector2d& warp_of_part_m) const;
 
   /// Computes the pose of a part from that of the board.
-  BoardPose compute_part_pose(const BoardPose& camera_from_board, std::size_t part) const;
+  BoardPose compute_board_part_pose(const BoardPose& camera_from_board, std::size_t part) const;
   /// Returns true if the corners determine the pose of every part:
   /// - points: at least 12 of a board in one part, 6 in each of four parts, or all points of a
   ///   smaller board; at least two points in each of two rows
   /// - tags: at least 3 of a board in one part; at least 6 of a board in four parts, in at least
   ///   two columns and two rows
-  bool sufficient(const BoardDetection& seen) const;
+  bool has_sufficient_corners(const BoardDetection& seen) const;
 
  private:
   bool has_sufficient_points(const std::vector<PointDetection>& seen) const;

@@ -32,8 +32,9 @@ std::vector<Eigen::Vector3d> make_board_points(const BoardProblem& problem) {
 
 }  // namespace
 
-std::optional<PrintEffect> compute_aspect_error_effect(const IntrinsicsSolution& solution,
-                                                       double print_sd, const ImageRegion& region) {
+std::optional<PrintEffect> compute_board_aspect_error_effect(const IntrinsicsSolution& solution,
+                                                             double print_sd,
+                                                             const ImageRegion& region) {
   const double aspect_error = std::numbers::sqrt2 * print_sd;
   const Lens lens = solution.lens();
   BoardProblem problem = solution.problem;
@@ -52,7 +53,7 @@ std::optional<PrintEffect> compute_aspect_error_effect(const IntrinsicsSolution&
       measured.head<2>() += *stated - *printed;
     }
   }
-  if (!solve_for_lens(problem, solution.solved_for)) return {};
+  if (!solve_lens_parameters(problem, solution.solved_for)) return {};
   const Lens printed(problem.lens_model, problem.intrinsics);
   const auto everywhere = compute_projection_difference(lens, printed, problem.imager_px,
                                                         [](const Eigen::Vector2d&) { return 1.0; });

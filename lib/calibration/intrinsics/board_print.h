@@ -13,7 +13,7 @@ namespace vlp {
 /// Effect of an aspect error of the printed board on a lens: the change if the board is wider than
 /// stated, at the stated height.
 struct PrintEffect {
-  /// Change of the intrinsics.
+  /// Change of the intrinsics for one standard deviation of the aspect.
   Eigen::VectorXd intrinsics;
   /// Change of projections over the image, rms per axis, in px.
   double rms_px;
@@ -32,8 +32,8 @@ struct PrintEffect {
 /// @param print_sd  Board::print_sd, > 0
 /// @param region    region where the lens is known (CalibrationReport::region)
 /// @return std::nullopt if that solve fails
-std::optional<PrintEffect> compute_aspect_error_effect(const IntrinsicsSolution& solution,
-                                                       double print_sd,
-                                                       const ImageRegion& region = {});
+std::optional<PrintEffect> compute_board_aspect_error_effect(const IntrinsicsSolution& solution,
+                                                             double print_sd,
+                                                             const ImageRegion& region = {});
 
 }  // namespace vlp

@@ -49,7 +49,7 @@ std::optional<PointProjection> project_point(const Lens& lens, const LatticePoin
   const auto projection = lens.project_with_jacobians(rotated + pose.translation_m);
   if (!projection) return {};
   PointProjection result{projection->pixel, *projection, {}, {}};
-  result.d_pixel_d_pose << -projection->d_pixel_d_point * cross_matrix(rotated) * left,
+  result.d_pixel_d_pose << -projection->d_pixel_d_point * skew_symmetric_matrix(rotated) * left,
       projection->d_pixel_d_point;
   result.d_pixel_d_warp =
       projection->d_pixel_d_point * rotation.col(2) * point.d_z_d_warp.transpose();
@@ -81,8 +81,8 @@ class BoardCost : public ceres::CostFunction {
     }
     const Lens lens(problem_.lens_model, intrinsics);
     const BoardPose pose{Eigen::Vector3d(parameters[1]), Eigen::Vector3d(parameters[1] + 3)};
-    const Eigen::Matrix3d rotation = rotation_by(pose.rotation),
-                          left = left_jacobian(pose.rotation);
+    const Eigen::Matrix3d rotation = rotation_matrix_from_vector(pose.rotation),
+                          left = so3_left_jacobian(pose.rotation);
     const Eigen::Vector2d warp_m(parameters[2]);
     const auto columns = static_cast<Eigen::Index>(intrinsics.size());
     const std::size_t count = problem_.points_per_board();
@@ -116,7 +116,7 @@ class BoardCost : public ceres::CostFunction {
   std::vector<std::size_t> inliers_;
 };
 
-bool solve_once(BoardProblem& problem, const SolveOptions& what) {
+bool solve_without_reweighting(BoardProblem& problem, const SolveOptions& what) {
   std::vector<std::array<double, 6>> poses;
   for (const BoardPose& pose : problem.poses) {
     poses.push_back({pose.rotation.x(), pose.rotation.y(), pose.rotation.z(),
@@ -168,9 +168,9 @@ bool solve_once(BoardProblem& problem, const SolveOptions& what) {
 }
 
 /// Marks corners with a residual beyond 5 sigma on either axis. Returns true if there are any.
-bool mark_outliers(BoardProblem& problem) {
+bool mark_outlier_points(BoardProblem& problem) {
   constexpr double sigmas = 5;
-  auto residuals = compute_residuals(problem);
+  auto residuals = compute_reprojection_residuals(problem);
   double squares = 0, count = 0;
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     if (!(problem.points[i].z() > 0) || !residuals[i].allFinite()) continue;
@@ -198,7 +198,7 @@ bool is_valid_lens(const BoardProblem& problem) {
 /// Fit of a lens to the points that are not outliers.
 struct InlierFit {
   explicit InlierFit(const BoardProblem& problem) {
-    const auto residuals = compute_residuals(problem);
+    const auto residuals = compute_reprojection_residuals(problem);
     double squares = 0, count = 0;
     for (std::size_t i = 0; i < residuals.size(); ++i) {
       const double weight = problem.points[i].z();
@@ -227,16 +227,17 @@ std::vector<Eigen::Vector2d> collect_inlier_pixels(const BoardProblem& problem) 
   return pixels;
 }
 
-bool has_mrcal(LensModel model) { return to_string(model).starts_with("LENSMODEL_"); }
+bool is_supported_by_mrcal(LensModel model) { return to_string(model).starts_with("LENSMODEL_"); }
 
 bool solve(BoardProblem& problem, const SolveOptions& what) {
-  if (!has_mrcal(problem.lens_model))
+  if (!is_supported_by_mrcal(problem.lens_model))
     return solve_by_ceres(problem, what) && is_valid_lens(problem);
   constexpr double max_rms_ratio = 1.05;
   const BoardProblem start = problem;
   if (!solve_by_mrcal(problem, what) || !is_valid_lens(problem)) return false;
   const InlierFit left(problem);
-  if (left.projects_all || is_splined(problem.lens_model) || !InlierFit(start).projects_all)
+  if (left.projects_all || is_splined_lens_model(problem.lens_model) ||
+      !InlierFit(start).projects_all)
     return true;
   BoardProblem without_poles = start;
   if (solve_by_ceres(without_poles, what) &&
@@ -247,16 +248,17 @@ bool solve(BoardProblem& problem, const SolveOptions& what) {
 }
 
 Linearization linearize(const BoardProblem& problem, const SolveOptions& what) {
-  return has_mrcal(problem.lens_model) ? linearize_by_mrcal(problem, what)
-                                       : linearize_analytically(problem, what);
+  return is_supported_by_mrcal(problem.lens_model) ? linearize_by_mrcal(problem, what)
+                                                   : linearize_analytically(problem, what);
 }
 
 bool solve_by_ceres(BoardProblem& problem, const SolveOptions& what) {
-  if (!solve_once(problem, what)) return false;
+  if (!solve_without_reweighting(problem, what)) return false;
   constexpr int max_iterations = 10;
   for (int iteration = 0;
-       what.without_outliers && iteration < max_iterations && mark_outliers(problem); ++iteration) {
-    if (!solve_once(problem, what)) return false;
+       what.without_outliers && iteration < max_iterations && mark_outlier_points(problem);
+       ++iteration) {
+    if (!solve_without_reweighting(problem, what)) return false;
   }
   return true;
 }
@@ -277,9 +279,9 @@ Linearization linearize_analytically(const BoardProblem& problem, const SolveOpt
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     if (!(problem.points[i].z() > 0)) continue;
     const BoardPose& pose = problem.poses[i / count];
-    const auto point =
-        project_point(lens, make_lattice_point(problem, i % count), rotation_by(pose.rotation),
-                      left_jacobian(pose.rotation), pose, problem.warp_m);
+    const auto point = project_point(lens, make_lattice_point(problem, i % count),
+                                     rotation_matrix_from_vector(pose.rotation),
+                                     so3_left_jacobian(pose.rotation), pose, problem.warp_m);
     if (!point) continue;
     const auto row = static_cast<Eigen::Index>(2 * i);
     const double weight = problem.points[i].z();

@@ -97,7 +97,7 @@ struct Linearization {
 Linearization linearize(const BoardProblem& problem, const SolveOptions& what);
 
 /// Returns true if mrcal has the lens model.
-bool has_mrcal(LensModel model);
+bool is_supported_by_mrcal(LensModel model);
 /// Implementations of solve() and linearize().
 bool solve_by_mrcal(BoardProblem& problem, const SolveOptions& what);
 bool solve_by_ceres(BoardProblem& problem, const SolveOptions& what);

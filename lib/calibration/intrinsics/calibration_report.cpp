@@ -27,11 +27,12 @@ namespace {
 void add_uncertainty_over_image(const ProjectionUncertainty& uncertainty, const Lens& lens,
                                 const std::array<int, 2>& imager_px, CalibrationReport& report) {
   double inside = 0;
-  for (const Eigen::Vector2d& pixel : make_pixel_grid(imager_px)) {
+  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(imager_px)) {
     // A fisheye or a spline may end beyond the farthest corner and has no rays there.
-    const bool can_end = lens.model() == LensModel::fisheye || is_splined(lens.model());
+    const bool can_end =
+        lens.lens_model() == LensModel::fisheye || is_splined_lens_model(lens.lens_model());
     if (can_end && !lens.unproject(pixel)) continue;
-    const double sigma_px = uncertainty.worst_px(pixel);
+    const double sigma_px = uncertainty.max_direction_sd_px(pixel);
     if (!polygon_contains(report.region, pixel)) {
       report.uncertainty_beyond_px = std::max(report.uncertainty_beyond_px, sigma_px);
       continue;
@@ -45,24 +46,24 @@ void add_uncertainty_over_image(const ProjectionUncertainty& uncertainty, const 
 
 /// Compares the lenses of the even and the odd views; std::nullopt if one of them is not
 /// determined.
-std::optional<ProjectionDifference> compare_halves(const IntrinsicsSolution& solution,
-                                                   const IntrinsicsInput& input,
-                                                   const ProjectionUncertainty& uncertainty,
-                                                   const ImageRegion& region) {
-  const IntrinsicsSolution even = solve_every_second_view(solution, 0);
-  const IntrinsicsSolution odd = solve_every_second_view(solution, 1);
+std::optional<ProjectionDifference> compare_lenses_of_view_halves(
+    const IntrinsicsSolution& solution, const IntrinsicsInput& input,
+    const ProjectionUncertainty& uncertainty, const ImageRegion& region) {
+  const IntrinsicsSolution even = solve_intrinsics_from_half_of_views(solution, 0);
+  const IntrinsicsSolution odd = solve_intrinsics_from_half_of_views(solution, 1);
   if (!even.ok() || !odd.ok()) return std::nullopt;
   // Half of the views may not determine all parts of a splined lens.
   std::vector<ProjectionUncertainty> halves;
-  if (is_splined(solution.lens().model())) halves = {{even, input.lattice}, {odd, input.lattice}};
+  if (is_splined_lens_model(solution.lens().lens_model()))
+    halves = {{even, input.lattice}, {odd, input.lattice}};
   constexpr double max_ratio = 3;  // typically sqrt(2)
   return compute_projection_difference(
       even.lens(), odd.lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
-        const double sigma_px = uncertainty.worst_px(pixel);
+        const double sigma_px = uncertainty.max_direction_sd_px(pixel);
         const bool is_determined =
             polygon_contains(region, pixel) &&
             std::ranges::none_of(halves, [&](const ProjectionUncertainty& half) {
-              return half.worst_px(pixel) > max_ratio * sigma_px;
+              return half.max_direction_sd_px(pixel) > max_ratio * sigma_px;
             });
         return is_determined ? sigma_px : std::numeric_limits<double>::infinity();
       });
@@ -70,67 +71,69 @@ std::optional<ProjectionDifference> compare_halves(const IntrinsicsSolution& sol
 
 }  // namespace
 
-CalibrationReport compute_report(const IntrinsicsSolution& solution, const IntrinsicsInput& input) {
+CalibrationReport compute_calibration_report(const IntrinsicsSolution& solution,
+                                             const IntrinsicsInput& input) {
   const ProjectionUncertainty uncertainty(solution, input.lattice);
   const Lens lens = solution.lens();
-  const Eigen::MatrixXd by_views = estimate_covariance_by_views(solution);
+  const Eigen::MatrixXd by_views = estimate_jackknife_covariance(solution);
   ImageRegion region =
-      compute_known_region(collect_inlier_pixels(solution.problem), input.imager_px, lens.model(),
-                           solution.other_model_fits);
+      compute_valid_lens_region(collect_inlier_pixels(solution.problem), input.imager_px,
+                                lens.lens_model(), solution.other_model_fits);
   // Splines are undetermined outside the region.
-  const ImageRegion compared = is_splined(lens.model()) ? region : ImageRegion();
-  const auto expected = compute_expected_difference(lens, input.imager_px,
-                                                    uncertainty.intrinsics_covariance(), compared);
-  const double region_fraction = compute_image_fraction(region, input.imager_px);
+  const ImageRegion compared = is_splined_lens_model(lens.lens_model()) ? region : ImageRegion();
+  const auto expected = compute_expected_projection_difference(
+      lens, input.imager_px, uncertainty.intrinsics_covariance(), compared);
+  const double region_fraction = compute_fraction_of_image_area(region, input.imager_px);
   CalibrationReport report{
       std::move(region),
       region_fraction,
       0,
       0,
       0,
-      uncertainty.focal_sd_px(),
+      uncertainty.focal_x_sd_px(),
       std::sqrt(by_views(0, 0)),
       expected.rms_px,
-      compute_expected_difference(lens, input.imager_px, by_views, compared).rms_px,
+      compute_expected_projection_difference(lens, input.imager_px, by_views, compared).rms_px,
       {}};
   add_uncertainty_over_image(uncertainty, lens, input.imager_px, report);
-  if (!is_splined(lens.model())) {
+  if (!is_splined_lens_model(lens.lens_model())) {
     // With few views each of these covariances may be too small by chance.
     const ProjectionUncertainty independent(solution);
     for (const Eigen::MatrixXd& covariance :
          {uncertainty.intrinsics_covariance(), independent.intrinsics_covariance(), by_views}) {
       if (!covariance.allFinite()) continue;
-      report.uncertainty_worst_px =
-          std::max(report.uncertainty_worst_px,
-                   estimate_expected_worst_px(lens, input.imager_px, covariance, report.region));
+      report.uncertainty_worst_px = std::max(
+          report.uncertainty_worst_px,
+          estimate_max_expected_difference_px(lens, input.imager_px, covariance, report.region));
     }
   }
-  report.halves = compare_halves(solution, input, uncertainty, report.region);
+  report.halves = compare_lenses_of_view_halves(solution, input, uncertainty, report.region);
   return report;
 }
 
-std::vector<double> compute_held_out_rms_px(const IntrinsicsSolution& solution,
-                                            const IntrinsicsInput& held_out) {
+std::vector<double> compute_held_out_view_rms_px(const IntrinsicsSolution& solution,
+                                                 const IntrinsicsInput& held_out) {
   const Lens lens = solution.lens();
   auto views = held_out.views;
   for (auto& view : views) {
-    apply_lens_edge_curvature(view, lens);
-    view = held_out.lattice.with_warp(std::move(view), solution.problem.warp_m);
+    correct_corners_for_curved_edges(view, lens);
+    view = held_out.lattice.apply_board_warp(std::move(view), solution.problem.warp_m);
   }
-  const auto shifts = estimate_tag_edge_shifts(views, lens);
+  const auto shifts = estimate_tag_edge_displacements(views, lens);
   std::vector<double> rms_px;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    correct_edge_shift(views[i], shifts[i]);
-    const auto pose = estimate_view_pose(views[i], lens);
+    correct_edge_displacement(views[i], shifts[i]);
+    const auto pose = estimate_board_view_pose(views[i], lens);
     rms_px.push_back(pose ? pose->rms_px : std::numeric_limits<double>::infinity());
   }
   return rms_px;
 }
 
-HeldOut compute_held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& held_out) {
-  HeldOut fit;
+HeldOutFit evaluate_held_out_views(const IntrinsicsSolution& solution,
+                                   const IntrinsicsInput& held_out) {
+  HeldOutFit fit;
   double squares = 0;
-  const auto rms_px = compute_held_out_rms_px(solution, held_out);
+  const auto rms_px = compute_held_out_view_rms_px(solution, held_out);
   for (std::size_t i = 0; i < rms_px.size(); ++i) {
     if (!std::isfinite(rms_px[i])) continue;
     const std::size_t corners = held_out.views[i].size();
@@ -142,8 +145,8 @@ HeldOut compute_held_out_fit(const IntrinsicsSolution& solution, const Intrinsic
   return fit;
 }
 
-ViewCoverage compute_view_coverage(const IntrinsicsSolution& solution,
-                                   const IntrinsicsInput& input) {
+ViewCoverage compute_board_view_coverage(const IntrinsicsSolution& solution,
+                                         const IntrinsicsInput& input) {
   const auto [width, height] = input.imager_px;
   ViewCoverage coverage;
   ImageCoverage parts(input.imager_px);
@@ -155,7 +158,7 @@ ViewCoverage compute_view_coverage(const IntrinsicsSolution& solution,
       parts.add(corner.pixel);
     }
   }
-  coverage.covered_fraction = parts.fraction();
+  coverage.covered_fraction = parts.covered_fraction();
   std::vector<Eigen::Vector3d> normals;
   for (const BoardPose& pose : solution.problem.poses) {
     // Points away from the camera; the board is nearer on the side to which it is tilted.
@@ -178,7 +181,7 @@ ViewCoverage compute_view_coverage(const IntrinsicsSolution& solution,
   return coverage;
 }
 
-std::string recommend_next_view(const ViewCoverage& coverage) {
+std::string recommend_next_board_view(const ViewCoverage& coverage) {
   constexpr std::array places{"top left",    "top middle",    "top right",
                               "left middle", "middle",        "right middle",
                               "bottom left", "bottom middle", "bottom right"};

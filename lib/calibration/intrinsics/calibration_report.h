@@ -16,53 +16,58 @@ namespace vlp {
 
 /// Uncertainty of a solution.
 struct CalibrationReport {
-  /// Region of the image where the lens is calibrated (compute_known_region()), and its fraction of
-  /// the image.
+  /// Region of the image where the lens is calibrated (compute_valid_lens_region()), and its
+  /// fraction of the image.
   ImageRegion region;
   double region_fraction;
-  /// Mean and maximum of ProjectionUncertainty::worst_px() by tags, px, over the make_pixel_grid()
-  /// of the region.
+  /// Mean and maximum of ProjectionUncertainty::max_direction_sd_px() by tags, px, over the
+  /// make_regular_pixel_grid() of the region.
   ///
-  /// The maximum is at least estimate_expected_worst_px() over the region for each of three
-  /// covariances: by tags, by independent corners and by views. Splined lenses are excluded from
-  /// this rule. If another lens model fits equally well, estimate_lens() raises the maximum to the
-  /// largest difference between the two lenses.
+  /// The maximum is at least estimate_max_expected_difference_px() over the region for each of
+  /// three covariances: by tags, by independent corners and by views. Splined lenses are excluded
+  /// from this rule. If another lens model fits equally well, estimate_lens() raises the maximum to
+  /// the largest difference between the two lenses.
   double uncertainty_mean_px, uncertainty_worst_px;
-  /// Maximum of ProjectionUncertainty::worst_px() outside the region, px.
+  /// Maximum of ProjectionUncertainty::max_direction_sd_px() outside the region, px.
   double uncertainty_beyond_px;
   /// Standard deviation of fx, px: from the noise of the tags, and from
-  /// estimate_covariance_by_views().
+  /// estimate_jackknife_covariance().
   double focal_sd_px, focal_sd_by_views_px;
   /// Expected compute_projection_difference() from the true lens, RMS per axis, px: from the noise
-  /// of the tags, and from estimate_covariance_by_views(). For splined lenses over the region only.
+  /// of the tags, and from estimate_jackknife_covariance(). For splined lenses over the region
+  /// only.
   double expected_rms_px, expected_by_views_rms_px;
   /// Difference over the region between the lens of every second view and that of the other views
-  /// (solve_every_second_view()). It is about twice expected_rms_px if the lens model fits and the
-  /// errors of tags are independent, and larger otherwise. For splined lenses only pixels that both
-  /// halves determine are compared. std::nullopt if a half does not determine a lens.
+  /// (solve_intrinsics_from_half_of_views()). It is about twice expected_rms_px if the lens model
+  /// fits and the errors of tags are independent, and larger otherwise. For splined lenses only
+  /// pixels that both halves determine are compared. std::nullopt if a half does not determine a
+  /// lens.
   std::optional<ProjectionDifference> halves;
 };
 /// Computes the report of a solution; solves twice for `halves`. `input`: input of its solve.
 /// @pre solution.ok()
-CalibrationReport compute_report(const IntrinsicsSolution& solution, const IntrinsicsInput& input);
+CalibrationReport compute_calibration_report(const IntrinsicsSolution& solution,
+                                             const IntrinsicsInput& input);
 
 /// Returns the RMS residual of each held-out view, per axis, px; infinity for a view without a
 /// pose.
 ///
-/// Fits only the poses of the views and the shifts of their edges. All corners keep their given
-/// weights, so that lens models can be compared.
-std::vector<double> compute_held_out_rms_px(const IntrinsicsSolution& solution,
-                                            const IntrinsicsInput& held_out);
+/// Lens and board warp are those of the solution. Edges get the curvature of the lens
+/// (correct_corners_for_curved_edges()); pose and edge shifts of each view are fitted. All corners
+/// keep their given weights, so that lens models can be compared.
+std::vector<double> compute_held_out_view_rms_px(const IntrinsicsSolution& solution,
+                                                 const IntrinsicsInput& held_out);
 
 /// Fit of all held-out views together.
-struct HeldOut {
+struct HeldOutFit {
   int views = 0, corners = 0;
   /// RMS residual per axis, px.
   double rms_px = 0;
 };
-/// Computes the fit of the held-out views as compute_held_out_rms_px(), without views that have no
-/// pose.
-HeldOut compute_held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& held_out);
+/// Computes the fit of the held-out views as compute_held_out_view_rms_px(), without views that
+/// have no pose.
+HeldOutFit evaluate_held_out_views(const IntrinsicsSolution& solution,
+                                   const IntrinsicsInput& held_out);
 
 /// Distribution of the corners over the image, and tilts of the boards.
 struct ViewCoverage {
@@ -77,11 +82,11 @@ struct ViewCoverage {
   double tilt_rad = 0;
 };
 /// Computes the coverage of the views in a solution. `input`: input of its solve.
-ViewCoverage compute_view_coverage(const IntrinsicsSolution& solution,
-                                   const IntrinsicsInput& input);
+ViewCoverage compute_board_view_coverage(const IntrinsicsSolution& solution,
+                                         const IntrinsicsInput& input);
 
 /// Recommends the next view in one line: the board in the part of the image with the fewest
 /// corners, tilted towards the side that was tilted least.
-std::string recommend_next_view(const ViewCoverage& coverage);
+std::string recommend_next_board_view(const ViewCoverage& coverage);
 
 }  // namespace vlp

@@ -14,7 +14,7 @@ namespace {
 std::string format_list(const std::vector<double>& values) {
   std::string text = "[";
   for (const double value : values) {
-    text.append(text.size() > 1 ? ", " : "").append(shortest(value));
+    text.append(text.size() > 1 ? ", " : "").append(format_shortest(value));
   }
   return text + "]";
 }
@@ -60,7 +60,7 @@ std::string quoted_name(const std::string& name) {
   std::string quoted = "'";
   for (const char character : name) {
     const auto byte = static_cast<unsigned char>(character);
-    if (byte < first_printable || byte == del || utf8_length(name) < name.size()) {
+    if (byte < first_printable || byte == del || count_utf8_characters(name) < name.size()) {
       throw std::invalid_argument(
           "the camera id contains control characters or is not UTF-8; give another one with "
           "--camera-id");
@@ -130,7 +130,7 @@ std::string format_opencv_camera(const Camera& camera) {
   return text;
 }
 
-std::string format_mrcal_region(const ImageRegion& region) {
+std::string format_mrcal_valid_region(const ImageRegion& region) {
   if (region.empty()) return "";
   std::string text = "    'valid_intrinsics_region': [";
   for (std::size_t i = 0; i <= region.size(); ++i) {  // closed
@@ -141,10 +141,13 @@ std::string format_mrcal_region(const ImageRegion& region) {
 }
 
 std::string format_mrcal_cameramodel(const Camera& camera, const ImageRegion& region) {
-  if (!has_mrcal(camera.lens_model)) throw_unsupported(camera, "mrcal", "LENSMODEL_OPENCV8");
+  if (!is_supported_by_mrcal(camera.lens_model))
+    throw_unsupported(camera, "mrcal", "LENSMODEL_OPENCV8");
   std::string text = "{\n    'lensmodel':  '";
   text.append(to_string(camera.lens_model)).append("',\n    'intrinsics': ");
-  text.append(format_list(camera.intrinsics)).append(",\n").append(format_mrcal_region(region));
+  text.append(format_list(camera.intrinsics))
+      .append(",\n")
+      .append(format_mrcal_valid_region(region));
   text.append("    'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n    'imagersize': [ ");
   text.append(std::to_string(camera.imager_px[0])).append(", ");
   text.append(std::to_string(camera.imager_px[1])).append(" ]\n}\n");

@@ -28,6 +28,6 @@ std::string format_opencv_camera(const Camera& camera);
 /// valid_intrinsics_region, left out if empty.
 std::string format_mrcal_cameramodel(const Camera& camera, const ImageRegion& region = {});
 /// Formats the line valid_intrinsics_region of a .cameramodel; "" if the region is empty.
-std::string format_mrcal_region(const ImageRegion& region);
+std::string format_mrcal_valid_region(const ImageRegion& region);
 
 }  // namespace vlp

@@ -84,7 +84,8 @@ std::optional<std::string> find_python_value(const std::string& text, const std:
   return std::nullopt;
 }
 
-std::string required_value(const fs::path& file, const std::string& text, const std::string& key) {
+std::string get_required_value(const fs::path& file, const std::string& text,
+                               const std::string& key) {
   const auto value = find_python_value(text, key);
   if (!value) throw InputError(file, "lacks '" + key + "'");
   return *value;
@@ -105,7 +106,7 @@ std::vector<double> parse_numbers(const fs::path& file, std::string list, const 
 
 std::vector<double> parse_python_numbers(const fs::path& file, const std::string& text,
                                          const std::string& key) {
-  return parse_numbers(file, required_value(file, text, key), key);
+  return parse_numbers(file, get_required_value(file, text, key), key);
 }
 
 /// Reads the valid region. mrcal closes the contour; an empty contour means that the lens is
@@ -134,7 +135,7 @@ AnyCamera parse_mrcal_camera(const fs::path& file, const std::string& text) {
   // The inputs of the optimization are long and not needed.
   const std::string literal = strip_comments(text);
   const std::string head = literal.substr(0, literal.find("'optimization_inputs'"));
-  const std::string name = required_value(file, head, "lensmodel");
+  const std::string name = get_required_value(file, head, "lensmodel");
   const auto model = lens_model_from_name(name);
   if (!model) {
     throw InputError(file, "has lens model " + name + "; the models are: " + lens_model_names());
@@ -230,11 +231,11 @@ struct LensFit {
   Eigen::VectorXd right;
 };
 
-LensFit evaluate_lens_fit(const std::vector<double>& parameters, LensModel model,
-                          const std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>>& rays) {
+LensFit measure_lens_fit(const std::vector<double>& parameters, LensModel model,
+                         const std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>>& rays) {
   const Lens lens(model, parameters);
   constexpr Eigen::Index core = 4;
-  const Eigen::Index size = is_splined(model) ? core : std::ssize(parameters);
+  const Eigen::Index size = is_splined_lens_model(model) ? core : std::ssize(parameters);
   LensFit step;
   step.normal = Eigen::MatrixXd::Zero(size, size);
   step.right = Eigen::VectorXd::Zero(size);
@@ -253,24 +254,24 @@ LensFit evaluate_lens_fit(const std::vector<double>& parameters, LensModel model
 /// Fits the parameters of a lens model to the rays of another lens by the method of Levenberg and
 /// Marquardt. Parameters of a splined lens are kept. Throws std::invalid_argument if the model has
 /// no lens close to the other one.
-void fit_parameters(const Camera& camera, const Lens& from, LensModel model,
-                    std::vector<double>& parameters) {
+void fit_lens_parameters(const Camera& camera, const Lens& from, LensModel model,
+                         std::vector<double>& parameters) {
   constexpr int max_iterations = 200;
   constexpr double function_tolerance = 1e-12, min_damping = 1e-12, max_damping = 1e12;
   std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>> rays;
-  for (const Eigen::Vector2d& pixel : make_pixel_grid(camera.imager_px)) {
+  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(camera.imager_px)) {
     if (const auto ray = from.unproject(pixel)) rays.emplace_back(pixel, ray->direction);
   }
   double damping = 1e-3;
-  LensFit fit = evaluate_lens_fit(parameters, model, rays);
-  for (int i = 0; i < max_iterations && fit.count > 0 && !is_splined(model); ++i) {
+  LensFit fit = measure_lens_fit(parameters, model, rays);
+  for (int i = 0; i < max_iterations && fit.count > 0 && !is_splined_lens_model(model); ++i) {
     Eigen::MatrixXd damped = fit.normal;
     damped.diagonal() *= 1 + damping;
     const Eigen::VectorXd change = solve_symmetric(damped, fit.right);
     std::vector<double> next = parameters;
     for (std::size_t k = 0; k < next.size(); ++k) next[k] += change[static_cast<Eigen::Index>(k)];
     const bool is_possible = change.allFinite() && next[0] > 0 && next[1] > 0;
-    LensFit trial = is_possible ? evaluate_lens_fit(next, model, rays) : LensFit{};
+    LensFit trial = is_possible ? measure_lens_fit(next, model, rays) : LensFit{};
     const bool is_better = trial.count > 0 && trial.count >= fit.count &&
                            (trial.count > fit.count || trial.squares < fit.squares);
     if (!is_better) {
@@ -293,10 +294,10 @@ void fit_parameters(const Camera& camera, const Lens& from, LensModel model,
 
 /// Measures the largest difference between two lenses on a finer grid than that of the fit, and the
 /// fraction of the image that both project to.
-void compare_lenses(const Lens& from, const Lens& to, const std::array<int, 2>& imager_px,
-                    FittedCamera& fitted) {
+void set_lens_differences(const Lens& from, const Lens& to, const std::array<int, 2>& imager_px,
+                          FittedCamera& fitted) {
   constexpr int points_per_row = 201;
-  const auto pixels = make_pixel_grid(imager_px, points_per_row);
+  const auto pixels = make_regular_pixel_grid(imager_px, points_per_row);
   std::size_t num_common = 0;
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto ray = from.unproject(pixel);
@@ -310,7 +311,7 @@ void compare_lenses(const Lens& from, const Lens& to, const std::array<int, 2>& 
 
 }  // namespace
 
-AnyCamera read_any_camera(const fs::path& file) {
+AnyCamera read_camera_of_any_format(const fs::path& file) {
   std::string text = read_file(file, kMaxCameraBytes);
   AnyCamera found;
   Camera& camera = found.camera;
@@ -355,27 +356,28 @@ AnyCamera read_any_camera(const fs::path& file) {
   return found;
 }
 
-FittedCamera fit_lens_model(const Camera& camera, LensModel model) {
+FittedCamera convert_to_lens_model(const Camera& camera, LensModel model) {
   if (camera.lens_model == model) return {camera, 0, 1};
   const Lens from(camera.lens_model, camera.intrinsics);
   FittedCamera fitted{camera, 0, 0};
   fitted.camera.lens_model = model;
   auto& parameters = fitted.camera.intrinsics;
   parameters.resize(4);
-  parameters.resize(parameter_count(is_splined(model) ? LensModel::stereographic : model), 0);
-  if (is_splined(model)) {
+  parameters.resize(
+      parameter_count(is_splined_lens_model(model) ? LensModel::stereographic : model), 0);
+  if (is_splined_lens_model(model)) {
     if (camera.lens_model != LensModel::stereographic) {
-      parameters = fit_lens_model(camera, LensModel::stereographic).camera.intrinsics;
+      parameters = convert_to_lens_model(camera, LensModel::stereographic).camera.intrinsics;
     }
-    const auto splined = fit_splined_lens(from, camera.imager_px, model, parameters);
+    const auto splined = fit_splined_lens_to_lens(from, camera.imager_px, model, parameters);
     if (!splined) {
       throw std::invalid_argument(
-          describe_too_coarse_grid(from, camera.imager_px, model, parameters));
+          describe_too_coarse_spline_grid(from, camera.imager_px, model, parameters));
     }
     parameters = *splined;
   }
-  fit_parameters(camera, from, model, parameters);
-  compare_lenses(from, Lens(model, parameters), camera.imager_px, fitted);
+  fit_lens_parameters(camera, from, model, parameters);
+  set_lens_differences(from, Lens(model, parameters), camera.imager_px, fitted);
   return fitted;
 }
 

@@ -24,7 +24,7 @@ struct AnyCamera {
 ///   ROS camera_info: plumb_bob, rational_polynomial, equidistant
 ///   Kalibr's camchain, its cam0: pinhole with radtan, equidistant or none
 /// @throws InputError, also for skewed camera matrices and for an empty valid_intrinsics_region
-AnyCamera read_any_camera(const std::filesystem::path& file);
+AnyCamera read_camera_of_any_format(const std::filesystem::path& file);
 
 /// Camera whose lens was replaced by one of another model.
 struct FittedCamera {
@@ -34,10 +34,10 @@ struct FittedCamera {
   double worst_px, common_fraction;
 };
 /// Fits a lens of another model to the rays of a camera over the image, by least squares in pixels
-/// (make_pixel_grid(); splined lenses: fit_splined_lens()). Returns a camera that already has the
-/// model unchanged.
+/// (make_regular_pixel_grid(); splined lenses: fit_splined_lens_to_lens()). Returns a camera that
+/// already has the model unchanged.
 /// @throws std::invalid_argument if the model has no lens close to the camera's, or if a splined
 ///     model has too few control points in the field of view
-FittedCamera fit_lens_model(const Camera& camera, LensModel model);
+FittedCamera convert_to_lens_model(const Camera& camera, LensModel model);
 
 }  // namespace vlp

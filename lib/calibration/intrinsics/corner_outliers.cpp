@@ -17,8 +17,9 @@ constexpr std::size_t kNeighbors = 8;
 using Corners = std::vector<BoardLattice::Corner>;
 
 /// Returns the nearest corners on the board, without those in `is_outlier`.
-std::vector<std::size_t> find_nearest(const Corners& corners, const std::vector<bool>& is_outlier,
-                                      std::size_t middle) {
+std::vector<std::size_t> find_nearest_corners(const Corners& corners,
+                                              const std::vector<bool>& is_outlier,
+                                              std::size_t middle) {
   std::vector<std::pair<double, std::size_t>> away;
   for (std::size_t i = 0; i < corners.size(); ++i) {
     if (i == middle || is_outlier[i]) continue;
@@ -63,7 +64,7 @@ std::vector<std::size_t> find_corner_outliers(const Corners& corners) {
   std::vector<std::vector<std::size_t>> nearest(corners.size());
   std::vector<double> ratios(corners.size());
   const auto test_corner = [&](std::size_t i) {
-    nearest[i] = find_nearest(corners, is_outlier, i);
+    nearest[i] = find_nearest_corners(corners, is_outlier, i);
     ratios[i] = compute_displacement_ratio(corners, nearest[i], i);
   };
   for (std::size_t i = 0; i < corners.size(); ++i) test_corner(i);

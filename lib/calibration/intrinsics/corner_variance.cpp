@@ -17,7 +17,7 @@ constexpr double kMaxSigmas = 3;
 
 /// Returns the median of a property of the corners, or its mean if the median is 0.
 template <typename Property>
-double compute_typical(std::span<const CornerError> errors, const Property& property) {
+double compute_typical_variance(std::span<const CornerError> errors, const Property& property) {
   std::vector<double> values;
   double sum = 0;
   for (const CornerError& error : errors) {
@@ -36,9 +36,9 @@ CornerVariance estimate_variance_components(std::span<const CornerError> errors)
   // Starts with half of the variance from pixel noise. Started with the floor alone, one corner
   // with a large deviation by chance would reduce the scale to 0.
   const double typical_px2 =
-      compute_typical(errors, [](const auto& error) { return error.square_px2; });
+      compute_typical_variance(errors, [](const auto& error) { return error.square_px2; });
   const double typical_sd_px =
-      compute_typical(errors, [](const auto& error) { return error.sd_px; });
+      compute_typical_variance(errors, [](const auto& error) { return error.sd_px; });
   CornerVariance variance{typical_px2 / 2, 0};
   if (typical_sd_px > 0) variance.scale2 = typical_px2 / 2 / (typical_sd_px * typical_sd_px);
   for (int iteration = 0; iteration < max_iterations; ++iteration) {

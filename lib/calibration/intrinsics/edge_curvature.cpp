@@ -24,9 +24,10 @@ struct Chord {
 
 /// Returns the distance, px, outside of a chord at which the lens projects the straight line
 /// between its ends, at w.
-std::optional<double> compute_lens_offset(const Chord& chord, const Eigen::Vector3d& from_ray,
-                                          const Eigen::Vector3d& to_ray, const Lens& lens,
-                                          double w) {
+std::optional<double> compute_edge_sagitta_by_lens(const Chord& chord,
+                                                   const Eigen::Vector3d& from_ray,
+                                                   const Eigen::Vector3d& to_ray, const Lens& lens,
+                                                   double w) {
   constexpr int max_iterations = 3;
   const Eigen::Vector2d length = chord.to - chord.from;
   double fraction = (1 + w) / 2;
@@ -40,17 +41,17 @@ std::optional<double> compute_lens_offset(const Chord& chord, const Eigen::Vecto
 }
 
 /// Outward displacements of the ends of an edge, and the curvature by the lens.
-struct MovedEdge {
+struct DisplacedEdge {
   std::array<double, 2> outwards_px;
   EdgeCurvature bow;
 };
 
-std::optional<MovedEdge> compute_moved_edge(const Chord& chord, const EdgeCurvature& seen,
-                                            const Lens& lens) {
+std::optional<DisplacedEdge> compute_displaced_edge(const Chord& chord, const EdgeCurvature& seen,
+                                                    const Lens& lens) {
   const auto from_ray = lens.unproject(chord.from), to_ray = lens.unproject(chord.to);
   if (!from_ray || !to_ray) return {};
   const auto lens_at = [&](double w) {
-    return compute_lens_offset(chord, from_ray->direction, to_ray->direction, lens, w);
+    return compute_edge_sagitta_by_lens(chord, from_ray->direction, to_ray->direction, lens, w);
   };
   // Nodes and weights of Gauss-Legendre quadrature.
   constexpr std::array<std::array<double, 2>, 4> rule{{{-0.8611363115940526, 0.3478548451374538},
@@ -68,12 +69,14 @@ std::optional<MovedEdge> compute_moved_edge(const Chord& chord, const EdgeCurvat
   }
   const auto middle = lens_at(0), before = lens_at(-0.5), after = lens_at(0.5);
   if (!middle || !before || !after) return {};
-  return MovedEdge{{mean - slope, mean + slope}, {-*middle, (*before - *after) / 0.75, seen.reach}};
+  return DisplacedEdge{{mean - slope, mean + slope},
+                       {-*middle, (*before - *after) / 0.75, seen.reach}};
 }
 
 }  // namespace
 
-double apply_lens_edge_curvature(std::vector<BoardLattice::Corner>& corners, const Lens& lens) {
+double correct_corners_for_curved_edges(std::vector<BoardLattice::Corner>& corners,
+                                        const Lens& lens) {
   constexpr double max_fraction = 0.25;  // of an edge; beyond it the corner or the edges are wrong
   double max_displacement_px = 0;
   for (std::size_t first = 0; first + 4 <= corners.size(); first += 4) {
@@ -82,14 +85,14 @@ double apply_lens_edge_curvature(std::vector<BoardLattice::Corner>& corners, con
       continue;
     }
     const Eigen::Vector2d inside = (tag[0].pixel + tag[1].pixel + tag[2].pixel + tag[3].pixel) / 4;
-    std::array<std::optional<MovedEdge>, 4> edges;
+    std::array<std::optional<DisplacedEdge>, 4> edges;
     std::array<Eigen::Vector2d, 4> outwards;
     for (std::size_t k = 0; k < 4; ++k) {
       const auto at = static_cast<std::ptrdiff_t>(k),
                  next = static_cast<std::ptrdiff_t>((k + 1) % 4);
       const Chord chord(tag[at].pixel, tag[next].pixel, inside);
       outwards[k] = chord.outwards;
-      edges[k] = compute_moved_edge(chord, tag[at].bow, lens);
+      edges[k] = compute_displaced_edge(chord, tag[at].bow, lens);
     }
     if (!std::all_of(edges.begin(), edges.end(), [](const auto& edge) { return edge; })) continue;
     std::array<Eigen::Vector2d, 4> steps;

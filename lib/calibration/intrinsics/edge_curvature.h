@@ -9,9 +9,9 @@
 
 namespace vlp {
 
-/// Moves the corners of a view's tags to the intersections of edges with the curvature of the lens,
-/// instead of the measured curvature. The curvature of the lens is that of straight lines between
-/// the corners. Afterwards the corners have this curvature.
+/// Replaces the measured edge curvature by the lens's and shifts the corners accordingly, to the
+/// intersections of the edges with the lens's curvature. The curvature of the lens is that of the
+/// projections of straight lines between the corners.
 ///
 /// The lens determines the curvature of an edge a hundred times more accurately than the edge
 /// itself. A curvature fitted together with the ends makes the ends uncertain. With pixels all
@@ -21,9 +21,11 @@ namespace vlp {
 /// The correction is a linear regression, with the measured curve b(w) and that of the lens l(w):
 ///   end += (straight line fitted to b - l over the pixels) at the end, outwards.
 ///
-/// Corners without a measured curvature are kept: those of touching squares, and of files without
-/// it. Tags are also kept if a corner would move by a quarter of an edge or more.
+/// A whole tag is kept if an edge has no measured curvature (touching squares, files without it),
+/// if the lens does not describe one of its edges, or if a corner would move by a quarter of an
+/// edge or more.
 /// @return largest displacement of a corner, px
-double apply_lens_edge_curvature(std::vector<BoardLattice::Corner>& corners, const Lens& lens);
+double correct_corners_for_curved_edges(std::vector<BoardLattice::Corner>& corners,
+                                        const Lens& lens);
 
 }  // namespace vlp

@@ -14,7 +14,7 @@ namespace vlp {
 /// Displacement of the tag edges in a view inwards, towards the dark, as a function of the pixel:
 ///   shift = coefficients . (1, x, y, x^2 + y^2),  (x, y) = (pixel - middle) / radius_px,  px.
 /// It varies over the view like the illumination if white is overexposed.
-struct EdgeShift {
+struct EdgeDisplacement {
   Eigen::Vector4d coefficients = Eigen::Vector4d::Zero();
   Eigen::Vector2d middle{0, 0};
   double radius_px = 1;
@@ -26,8 +26,8 @@ struct EdgeShift {
   }
 };
 
-/// Variation of the shift within a view: constant, or as in EdgeShift.
-enum class ShiftForm { constant, varying };
+/// Variation of the shift within a view: constant, or as in EdgeDisplacement.
+enum class DisplacementForm { constant, varying };
 
 /// Estimates the edge shift in each view.
 ///
@@ -41,13 +41,14 @@ enum class ShiftForm { constant, varying };
 /// and the other terms near 0. Views with fewer than 12 corners get the median. The shift is 0 if
 /// touching squares make the corners, which cannot move.
 ///
-/// Use ShiftForm::constant as long as the warp of the board is unknown: a varying shift would
-/// absorb it.
-std::vector<EdgeShift> estimate_tag_edge_shifts(
+/// Use DisplacementForm::constant as long as the warp of the board is unknown: a varying shift
+/// would absorb it.
+std::vector<EdgeDisplacement> estimate_tag_edge_displacements(
     std::span<const std::vector<BoardLattice::Corner>> views, const Lens& lens,
-    ShiftForm form = ShiftForm::varying);
+    DisplacementForm form = DisplacementForm::varying);
 
 /// Moves the edges back by a shift. Returns the mean displacement, px.
-double correct_edge_shift(std::vector<BoardLattice::Corner>& corners, const EdgeShift& shift);
+double correct_edge_displacement(std::vector<BoardLattice::Corner>& corners,
+                                 const EdgeDisplacement& shift);
 
 }  // namespace vlp

@@ -29,15 +29,15 @@ std::vector<PixelDerivatives> compute_pixel_derivatives(const Lens& lens,
                                                         const std::array<int, 2>& imager_px,
                                                         const ImageRegion& region) {
   std::vector<PixelDerivatives> derivatives;
-  for (const Eigen::Vector2d& pixel : make_pixel_grid(imager_px)) {
+  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(imager_px)) {
     if (!region.empty() && !polygon_contains(region, pixel)) continue;
     const auto seen = lens.unproject(pixel);
     if (!seen) continue;
     const Eigen::Vector3d ray = seen->direction.normalized();
     const auto projection = lens.project_with_jacobians(ray);
     if (!projection) continue;
-    derivatives.push_back(
-        {-projection->d_pixel_d_point * cross_matrix(ray), *lens.compute_parameter_jacobian(ray)});
+    derivatives.push_back({-projection->d_pixel_d_point * skew_symmetric_matrix(ray),
+                           *lens.compute_intrinsics_jacobian(ray)});
   }
   return derivatives;
 }
@@ -83,10 +83,10 @@ Eigen::MatrixXd draw_samples(const Eigen::MatrixXd& covariance) {
 
 }  // namespace
 
-ExpectedDifference compute_expected_difference(const Lens& lens,
-                                               const std::array<int, 2>& imager_px,
-                                               const Eigen::MatrixXd& covariance,
-                                               const ImageRegion& region) {
+ExpectedDifference compute_expected_projection_difference(const Lens& lens,
+                                                          const std::array<int, 2>& imager_px,
+                                                          const Eigen::MatrixXd& covariance,
+                                                          const ImageRegion& region) {
   constexpr double inf = std::numeric_limits<double>::infinity();
   if (!covariance.allFinite()) return {inf, 1};
   const auto derivatives = compute_pixel_derivatives(lens, imager_px, region);
@@ -101,8 +101,9 @@ ExpectedDifference compute_expected_difference(const Lens& lens,
   return {std::sqrt(mean), mean * mean / (terms * terms).trace()};
 }
 
-double estimate_expected_worst_px(const Lens& lens, const std::array<int, 2>& imager_px,
-                                  const Eigen::MatrixXd& covariance, const ImageRegion& region) {
+double estimate_max_expected_difference_px(const Lens& lens, const std::array<int, 2>& imager_px,
+                                           const Eigen::MatrixXd& covariance,
+                                           const ImageRegion& region) {
   if (!covariance.allFinite()) return std::numeric_limits<double>::infinity();
   const Eigen::MatrixXd samples = draw_samples(covariance);
   Eigen::RowVectorXd largest = Eigen::RowVectorXd::Zero(samples.cols());

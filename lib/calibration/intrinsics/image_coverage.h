@@ -17,12 +17,13 @@ class ImageCoverage {
   explicit ImageCoverage(const std::array<int, 2>& imager_px) : imager_px_(imager_px) {}
 
   void add(const Eigen::Vector2d& pixel) {
-    ++corners_[index(part(pixel.x(), imager_px_[0], kCols), part(pixel.y(), imager_px_[1], kRows))];
+    ++corners_[flat_index(part(pixel.x(), imager_px_[0], kCols),
+                          part(pixel.y(), imager_px_[1], kRows))];
   }
-  int corners(int col, int row) const { return corners_[index(col, row)]; }
+  int count_corners_in_cell(int col, int row) const { return corners_[flat_index(col, row)]; }
 
   /// Returns the fraction of the parts that have corners.
-  double fraction() const {
+  double covered_fraction() const {
     const auto covered =
         std::count_if(corners_.begin(), corners_.end(), [](int corners) { return corners > 0; });
     return static_cast<double>(covered) / static_cast<double>(corners_.size());
@@ -34,7 +35,9 @@ class ImageCoverage {
   }
 
  private:
-  static std::size_t index(int col, int row) { return static_cast<std::size_t>(row * kCols + col); }
+  static std::size_t flat_index(int col, int row) {
+    return static_cast<std::size_t>(row * kCols + col);
+  }
 
   std::array<int, 2> imager_px_;
   std::array<int, kCols * kRows> corners_{};

@@ -26,8 +26,8 @@ struct ViewFit {
   double outlier_fraction;
 };
 
-ViewFit measure_fit(const BoardProblem& problem, const std::vector<Eigen::Vector2d>& residuals,
-                    std::size_t begin, std::size_t end) {
+ViewFit measure_view_fit(const BoardProblem& problem, const std::vector<Eigen::Vector2d>& residuals,
+                         std::size_t begin, std::size_t end) {
   std::vector<double> sizes_px;
   std::size_t outliers = 0;
   for (std::size_t i = begin; i < end; ++i) {
@@ -43,14 +43,15 @@ ViewFit measure_fit(const BoardProblem& problem, const std::vector<Eigen::Vector
 
 }  // namespace
 
-InconsistentViews find_inconsistent_views(const IntrinsicsSolution& solution) {
+InconsistentViews find_views_inconsistent_with_lens(const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
-  const auto residuals = compute_residuals(problem);
+  const auto residuals = compute_reprojection_residuals(problem);
   const std::size_t points_of_view = problem.points.size() / solution.views.size();
   std::vector<ViewFit> fits;
   std::vector<double> medians_px;
   for (std::size_t i = 0; i < solution.views.size(); ++i) {
-    fits.push_back(measure_fit(problem, residuals, i * points_of_view, (i + 1) * points_of_view));
+    fits.push_back(
+        measure_view_fit(problem, residuals, i * points_of_view, (i + 1) * points_of_view));
     medians_px.push_back(fits.back().median_px);
   }
   InconsistentViews found;

@@ -28,31 +28,33 @@ IntrinsicsInput select_views(const IntrinsicsInput& input) {
 
 }  // namespace
 
-InitialPoses estimate_poses(const IntrinsicsInput& input, const Lens& lens) {
+InitialPoses estimate_initial_board_poses(const IntrinsicsInput& input, const Lens& lens) {
   InitialPoses initial_poses;
   for (const auto& corners : input.views) {
-    const auto pose = estimate_view_pose(corners, lens);
+    const auto pose = estimate_board_view_pose(corners, lens);
     initial_poses.poses.push_back(pose ? pose->camera_from_board : BoardPose{});
     initial_poses.rms_px.push_back(pose ? pose->rms_px : std::numeric_limits<double>::infinity());
   }
   return initial_poses;
 }
 
-Lens stereographic(const IntrinsicsInput& input, double focal_px) {
+Lens make_stereographic_lens(const IntrinsicsInput& input, double focal_px) {
   const auto [width, height] = input.imager_px;
   const std::array parameters{focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0};
   return Lens(LensModel::stereographic, parameters);
 }
 
-std::vector<double> rank_focal_lengths(const IntrinsicsInput& input) {
+std::vector<double> rank_initial_focal_lengths(const IntrinsicsInput& input) {
   const IntrinsicsInput selected = select_views(input);
   std::vector<std::pair<double, double>> tried;
   constexpr int min_half_octaves = -5,
                 max_half_octaves = 6;  // relative to the width of the image: 0.18 to 8
   for (int half_octaves = min_half_octaves; half_octaves <= max_half_octaves; ++half_octaves) {
     const double focal_px = input.imager_px[0] * std::exp2(half_octaves / 2.0);
-    tried.emplace_back(
-        upper_median(estimate_poses(selected, stereographic(input, focal_px)).rms_px), focal_px);
+    tried.emplace_back(upper_median(estimate_initial_board_poses(
+                                        selected, make_stereographic_lens(input, focal_px))
+                                        .rms_px),
+                       focal_px);
   }
   std::sort(tried.begin(), tried.end());
   std::vector<double> order;

@@ -15,13 +15,13 @@ struct InitialPoses {
   std::vector<double> rms_px;
 };
 /// Estimates the poses of all views with a lens.
-InitialPoses estimate_poses(const IntrinsicsInput& input, const Lens& lens);
+InitialPoses estimate_initial_board_poses(const IntrinsicsInput& input, const Lens& lens);
 
 /// Returns LENSMODEL_STEREOGRAPHIC with its principal point in the middle of the image.
-Lens stereographic(const IntrinsicsInput& input, double focal_px);
+Lens make_stereographic_lens(const IntrinsicsInput& input, double focal_px);
 
 /// Returns focal lengths of a geometric series, px, in ascending order of the median RMS residual
 /// of the poses with them.
-std::vector<double> rank_focal_lengths(const IntrinsicsInput& input);
+std::vector<double> rank_initial_focal_lengths(const IntrinsicsInput& input);
 
 }  // namespace vlp

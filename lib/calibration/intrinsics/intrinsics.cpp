@@ -36,10 +36,10 @@ std::string_view describe(IntrinsicsStatus status) {
   return "";
 }
 
-void IntrinsicsSolution::compute_fit() {
+void IntrinsicsSolution::update_fit_statistics() {
   double squares = 0;
   corners = outliers = 0;
-  const auto residuals = compute_residuals(problem);
+  const auto residuals = compute_reprojection_residuals(problem);
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     const double weight = problem.points[i].z();
     if (weight > 0) {
@@ -56,28 +56,33 @@ IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input) {
   constexpr std::size_t max_starts = 4;
   if (input.views.size() < IntrinsicsSolver::kMinViews)
     return make_failure(IntrinsicsStatus::too_few_views);
-  auto initial_focal_lengths_px = rank_focal_lengths(input);
+  auto initial_focal_lengths_px = rank_initial_focal_lengths(input);
   initial_focal_lengths_px.resize(std::min(initial_focal_lengths_px.size(), max_starts));
   for (const double focal_px : initial_focal_lengths_px) {
     IntrinsicsSolver solver(input);
-    if (!solver.start(focal_px)) continue;
-    solver.initialize_symmetric();
-    if (!solver.refine() || !solver.scale_regularization() || !solver.apply_edge_curvature() ||
-        !solver.correct_tag_edge_shifts(ShiftForm::constant) || !solver.solve_board_warp() ||
-        !solver.reweight_corners() || !solver.apply_edge_curvature() ||
-        !solver.correct_tag_edge_shifts(ShiftForm::varying) || !solver.reweight_corners() ||
-        !solver.scale_regularization() || !solver.reject_outliers() ||
-        !solver.scale_regularization() || !solver.align_frame_to_optical_axis()) {
+    if (!solver.solve_from_focal_length(focal_px)) continue;
+    solver.initialize_with_symmetric_lens();
+    if (!solver.refine_intrinsics() || !solver.scale_spline_regularization() ||
+        !solver.correct_corners_and_solve_again() ||
+        !solver.correct_tag_edge_displacements(DisplacementForm::constant) ||
+        !solver.solve_board_warp() || !solver.reweight_corners() ||
+        !solver.correct_corners_and_solve_again() ||
+        !solver.correct_tag_edge_displacements(DisplacementForm::varying) ||
+        !solver.reweight_corners() || !solver.scale_spline_regularization() ||
+        !solver.reject_outliers() || !solver.scale_spline_regularization() ||
+        !solver.rotate_camera_frame_to_optical_axis()) {
       continue;
     }
-    IntrinsicsSolution solution = solver.solution();
-    if (all_parallel(solution.problem)) return make_failure(IntrinsicsStatus::all_parallel);
+    IntrinsicsSolution solution = solver.make_solution();
+    if (are_all_boards_parallel(solution.problem))
+      return make_failure(IntrinsicsStatus::all_parallel);
     if (2 * solution.views.size() > input.views.size()) return solution;
   }
   return make_failure(IntrinsicsStatus::no_solution);
 }
 
-IntrinsicsSolution solve_every_second_view(const IntrinsicsSolution& whole, std::size_t first) {
+IntrinsicsSolution solve_intrinsics_from_half_of_views(const IntrinsicsSolution& whole,
+                                                       std::size_t first) {
   const BoardProblem& all = whole.problem;
   const std::size_t parts = all.poses.size() / whole.views.size();
   const std::size_t points = parts * all.points_per_board();
@@ -99,15 +104,15 @@ IntrinsicsSolution solve_every_second_view(const IntrinsicsSolution& whole, std:
   if (half.views.size() < IntrinsicsSolver::kMinViews) {
     return make_failure(IntrinsicsStatus::too_few_views);
   }
-  if (!solve_for_lens(half.problem, half.solved_for)) {
+  if (!solve_lens_parameters(half.problem, half.solved_for)) {
     return make_failure(IntrinsicsStatus::no_solution);
   }
-  if (all_parallel(half.problem)) return make_failure(IntrinsicsStatus::all_parallel);
-  half.compute_fit();
+  if (are_all_boards_parallel(half.problem)) return make_failure(IntrinsicsStatus::all_parallel);
+  half.update_fit_statistics();
   return half;
 }
 
-std::vector<Eigen::Vector2d> compute_residuals(const BoardProblem& problem) {
+std::vector<Eigen::Vector2d> compute_reprojection_residuals(const BoardProblem& problem) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   const Lens lens(problem.lens_model, problem.intrinsics);
   std::vector<Eigen::Vector2d> residuals(problem.points.size(), Eigen::Vector2d::Constant(nan));

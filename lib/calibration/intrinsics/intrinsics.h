@@ -51,7 +51,7 @@ struct IntrinsicsSolution {
   };
   std::vector<Dropped> dropped;
   /// Mean shift of the tag edges towards the dark in each of `views`, px. The corners are corrected
-  /// for it (estimate_tag_edge_shifts()).
+  /// for it (estimate_tag_edge_displacements()).
   std::vector<double> edge_shifts_px;
   /// RMS of the weighted residuals per axis, without outliers: sqrt(sum of squares / (2 corners)),
   /// px.
@@ -61,7 +61,7 @@ struct IntrinsicsSolution {
 
   bool ok() const { return status == IntrinsicsStatus::ok; }
   /// Computes rms_px, corners and outliers from `problem`.
-  void compute_fit();
+  void update_fit_statistics();
   Lens lens() const { return Lens(problem.lens_model, problem.intrinsics); }
   /// Estimated parameters: the intrinsics (splined lenses: without the core), and the warp if
   /// selected.
@@ -80,9 +80,9 @@ struct IntrinsicsSolution {
 /// 3. Solves the requested model, regularized as in mrcal, and re-estimates the poses. Drops views
 ///   that fit no pose. Splined lenses: see below.
 /// 4. Corrects the corners of the tags for the edge curvature of this lens
-/// (apply_lens_edge_curvature()).
-/// 5. Corrects the shift of the tag edges, constant over a view (estimate_tag_edge_shifts()), and
-/// solves again,
+/// (correct_corners_for_curved_edges()).
+/// 5. Corrects the shift of the tag edges, constant over a view
+/// (estimate_tag_edge_displacements()), and solves again,
 ///   at most twice.
 /// 6. Estimates the warp of the board (WarpChoice).
 /// 7. Weights the corners by their variances if the images provide them (CornerWeights). Repeats
@@ -106,17 +106,18 @@ struct IntrinsicsSolution {
 /// points.
 ///
 /// Both poses of each view are tried with each lens, to resolve the planar pose ambiguity
-/// (estimate_view_pose()). The result depends on the input only, not on threads.
+/// (estimate_board_view_pose()). The result depends on the input only, not on threads.
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input);
 
 /// Solves for every second view of a solution, beginning with view `first`, starting from that
 /// solution. Estimates lens, poses and warp. Keeps from `whole` the edge shifts, the weights, the
 /// outliers, and whether the warp is estimated.
 /// @pre whole.ok()
-IntrinsicsSolution solve_every_second_view(const IntrinsicsSolution& whole, std::size_t first);
+IntrinsicsSolution solve_intrinsics_from_half_of_views(const IntrinsicsSolution& whole,
+                                                       std::size_t first);
 
 /// Returns the residuals of the points of a problem, measured minus projected, px, including
 /// outliers. NaN for points that were not seen or cannot be projected.
-std::vector<Eigen::Vector2d> compute_residuals(const BoardProblem& problem);
+std::vector<Eigen::Vector2d> compute_reprojection_residuals(const BoardProblem& problem);
 
 }  // namespace vlp

@@ -26,14 +26,14 @@ namespace vlp {
 
 namespace {
 
-Eigen::Vector3d compute_normal(const BoardPose& pose) {
+Eigen::Vector3d compute_board_normal(const BoardPose& pose) {
   return Eigen::AngleAxisd(pose.rotation.norm(), pose.rotation.normalized()) *
          Eigen::Vector3d::UnitZ();
 }
 
-void rotate_poses(std::vector<BoardPose>& poses, const Eigen::Matrix3d& new_from_old) {
+void rotate_all_board_poses(std::vector<BoardPose>& poses, const Eigen::Matrix3d& new_from_old) {
   for (BoardPose& pose : poses) {
-    const Eigen::AngleAxisd rotation(new_from_old * rotation_by(pose.rotation));
+    const Eigen::AngleAxisd rotation(new_from_old * rotation_matrix_from_vector(pose.rotation));
     pose = {rotation.angle() * rotation.axis(), new_from_old * pose.translation_m};
   }
 }
@@ -45,15 +45,15 @@ IntrinsicsSolver::IntrinsicsSolver(const IntrinsicsInput& input) : input_(input)
   edge_shifts_px_.assign(input.views.size(), 0);
 }
 
-bool IntrinsicsSolver::start(double focal_px) {
+bool IntrinsicsSolver::solve_from_focal_length(double focal_px) {
   constexpr int max_iterations = 4;
   constexpr double convergence = 1e-3;
-  Lens lens = stereographic(input_, focal_px);
+  Lens lens = make_stereographic_lens(input_, focal_px);
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     const double before_px = lens.focal_px().x();
-    initialize_poses(lens);
+    initialize_board_poses(lens);
     if (used_.size() < kMinViews) return false;
-    assemble(lens);
+    assemble_board_problem(lens);
     if (!solve({true, false, false, false})) return false;
     lens = this->lens();
     if (std::abs(lens.focal_px().x() / before_px - 1) < convergence) break;
@@ -61,37 +61,37 @@ bool IntrinsicsSolver::start(double focal_px) {
   return true;
 }
 
-void IntrinsicsSolver::initialize_symmetric() {
-  if (!is_splined(input_.lens_model)) return;
+void IntrinsicsSolver::initialize_with_symmetric_lens() {
+  if (!is_splined_lens_model(input_.lens_model)) return;
   IntrinsicsSolver symmetric = *this;
   symmetric.input_.lens_model = LensModel::fisheye;
-  if (!symmetric.refine()) return;  // keeps STEREOGRAPHIC
+  if (!symmetric.refine_intrinsics()) return;  // keeps STEREOGRAPHIC
   symmetric_ = symmetric.problem_.intrinsics;
-  displaced_corners_ = symmetric.find_displaced_corners();
+  displaced_corners_ = symmetric.find_corners_of_outlier_tags();
   const Lens fisheye = symmetric.lens();
   for (const std::size_t view : used_) {
-    if (const auto pose = estimate_view_pose(input_.views[view], fisheye)) {
+    if (const auto pose = estimate_board_view_pose(input_.views[view], fisheye)) {
       initial_poses_.poses[view] = pose->camera_from_board;
     }
   }
   const std::vector<double> core =
-      fit_spline_core(fisheye, collect_inlier_pixels(symmetric.problem_));
+      fit_splined_lens_core(fisheye, collect_inlier_pixels(symmetric.problem_));
   // With too few control points, STEREOGRAPHIC with that core is used.
   problem_.intrinsics =
-      fit_splined_lens(fisheye, input_.imager_px, input_.lens_model, core).value_or(core);
+      fit_splined_lens_to_lens(fisheye, input_.imager_px, input_.lens_model, core).value_or(core);
   problem_.lens_model = input_.lens_model;
   problem_.intrinsics.resize(parameter_count(input_.lens_model), 0);
   // The axis, and two rays next to it that prevent a rotation about it.
   for (const double beside : {0.0, -0.25, 0.25}) {
     const Eigen::Vector2d pixel =
-        fisheye.center_px() + Eigen::Vector2d(beside * input_.imager_px[0], 0);
+        fisheye.principal_point_px() + Eigen::Vector2d(beside * input_.imager_px[0], 0);
     if (const auto ray = fisheye.unproject(pixel))
       problem_.fixed_rays.push_back({pixel, ray->direction});
   }
-  assemble(lens());
+  assemble_board_problem(lens());
 }
 
-bool IntrinsicsSolver::align_frame_to_optical_axis() {
+bool IntrinsicsSolver::rotate_camera_frame_to_optical_axis() {
   constexpr int max_iterations = 4;
   constexpr double tolerance_rad = 1e-4;  // 0.006 degrees
   if (symmetric_.empty()) return true;
@@ -100,59 +100,60 @@ bool IntrinsicsSolver::align_frame_to_optical_axis() {
     BoardProblem symmetric = problem_;
     symmetric.lens_model = LensModel::fisheye;
     symmetric.intrinsics = symmetric_;
-    const auto start = fit_rotation(lens(), Lens(LensModel::fisheye, symmetric_), pixels);
+    const auto start =
+        fit_rotation_between_lenses(lens(), Lens(LensModel::fisheye, symmetric_), pixels);
     if (!start) return true;
-    rotate_poses(symmetric.poses, *start);
+    rotate_all_board_poses(symmetric.poses, *start);
     if (!vlp::solve(symmetric, {true, true, solved_for_.warp, false})) return true;
     const Lens fisheye(LensModel::fisheye, symmetric.intrinsics);
     symmetric_ = symmetric.intrinsics;
-    const auto new_from_old = fit_rotation(lens(), fisheye, pixels);
+    const auto new_from_old = fit_rotation_between_lenses(lens(), fisheye, pixels);
     if (!new_from_old) return true;
     const double turned_rad = Eigen::AngleAxisd(*new_from_old).angle();
     if (turned_rad < tolerance_rad) return true;
     for (auto& [pixel, ray] : problem_.fixed_rays) {
       if (const auto seen = lens().project(new_from_old->transpose() * ray)) pixel = *seen;
     }
-    rotate_poses(problem_.poses, *new_from_old);
+    rotate_all_board_poses(problem_.poses, *new_from_old);
     if (!solve(solved_for_)) return false;
   }
   return true;
 }
 
-bool IntrinsicsSolver::refine() {
+bool IntrinsicsSolver::refine_intrinsics() {
   constexpr int max_iterations = 6;
   constexpr std::size_t core = 4;
   problem_.lens_model = input_.lens_model;
   // The core of a splined lens would only compensate the control points; mrcal fixes it, too.
-  if (is_splined(input_.lens_model)) solved_for_.core = false;
+  if (is_splined_lens_model(input_.lens_model)) solved_for_.core = false;
   const std::size_t given = problem_.intrinsics.size();
   problem_.intrinsics.resize(parameter_count(input_.lens_model), 0);
-  const auto distortions = distortions_of(input_.lens_model);
+  const auto distortions = list_distortion_names_and_start_values(input_.lens_model);
   for (std::size_t i = given; i < core + distortions.size(); ++i) {
     problem_.intrinsics[i] = distortions[i - core].start;
   }
   bool convergence = false;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     if (!solve(solved_for_)) return false;
-    convergence = !reestimate_poses();
+    convergence = !reestimate_board_poses();
     if (convergence) break;
     if (used_.size() < kMinViews) return false;
-    assemble(lens());
+    assemble_board_problem(lens());
   }
-  if (reinstate_views()) {
-    assemble(lens());
+  if (reinstate_dropped_views()) {
+    assemble_board_problem(lens());
   } else if (convergence) {
-    return projects_most_views();
+    return can_project_most_views();
   }
-  return solve(solved_for_) && projects_most_views();
+  return solve(solved_for_) && can_project_most_views();
 }
 
-bool IntrinsicsSolver::scale_regularization() {
+bool IntrinsicsSolver::scale_spline_regularization() {
   constexpr int max_iterations = 3;
   constexpr double min_px = 0.01, convergence = 0.1;
-  if (!is_splined(problem_.lens_model)) return true;
+  if (!is_splined_lens_model(problem_.lens_model)) return true;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    const double noise_px = std::clamp(solution().rms_px, min_px, 1.0);
+    const double noise_px = std::clamp(make_solution().rms_px, min_px, 1.0);
     if (std::abs(noise_px / problem_.noise_px - 1) < convergence) break;
     problem_.noise_px = noise_px;
     if (!solve(solved_for_)) return false;
@@ -160,46 +161,49 @@ bool IntrinsicsSolver::scale_regularization() {
   return true;
 }
 
-std::size_t IntrinsicsSolver::problem_index(std::size_t used,
-                                            const BoardLattice::Corner& corner) const {
-  return (used * input_.lattice.parts() + corner.part) * input_.lattice.points() + corner.point;
+std::size_t IntrinsicsSolver::find_problem_point_index(std::size_t used,
+                                                       const BoardLattice::Corner& corner) const {
+  return (used * input_.lattice.num_parts() + corner.part) * input_.lattice.num_points() +
+         corner.point;
 }
 
-void IntrinsicsSolver::update_points() {
+void IntrinsicsSolver::update_problem_points() {
   for (std::size_t i = 0; i < used_.size(); ++i) {
     for (const auto& corner : input_.views[used_[i]]) {
-      Eigen::Vector3d& point = problem_.points[problem_index(i, corner)];
+      Eigen::Vector3d& point = problem_.points[find_problem_point_index(i, corner)];
       point << corner.pixel, std::copysign(corner.weight, point.z());
     }
   }
 }
 
-bool IntrinsicsSolver::apply_edge_curvature() {
+bool IntrinsicsSolver::correct_corners_and_solve_again() {
   constexpr double tolerance_px = 0.002;
   double max_px = 0;
   const Lens lens = this->lens();
-  for (auto& view : input_.views) max_px = std::max(max_px, apply_lens_edge_curvature(view, lens));
+  for (auto& view : input_.views)
+    max_px = std::max(max_px, correct_corners_for_curved_edges(view, lens));
   if (max_px < tolerance_px) return true;
-  update_points();
+  update_problem_points();
   return solve(solved_for_);
 }
 
-bool IntrinsicsSolver::correct_tag_edge_shifts(ShiftForm form) {
+bool IntrinsicsSolver::correct_tag_edge_displacements(DisplacementForm form) {
   constexpr int max_iterations = 2;
   constexpr double tolerance_px = 0.002;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     auto views = input_.views;
-    for (auto& view : views) view = input_.lattice.with_warp(std::move(view), problem_.warp_m);
-    const auto shifts = estimate_tag_edge_shifts(views, lens(), form);
-    if (std::all_of(shifts.begin(), shifts.end(), [](const EdgeShift& shift) {
+    for (auto& view : views)
+      view = input_.lattice.apply_board_warp(std::move(view), problem_.warp_m);
+    const auto shifts = estimate_tag_edge_displacements(views, lens(), form);
+    if (std::all_of(shifts.begin(), shifts.end(), [](const EdgeDisplacement& shift) {
           return shift.coefficients.lpNorm<Eigen::Infinity>() < tolerance_px;
         })) {
       return true;
     }
     for (std::size_t view = 0; view < input_.views.size(); ++view) {
-      edge_shifts_px_[view] += correct_edge_shift(input_.views[view], shifts[view]);
+      edge_shifts_px_[view] += correct_edge_displacement(input_.views[view], shifts[view]);
     }
-    update_points();
+    update_problem_points();
     if (!solve(solved_for_)) return false;
   }
   return true;
@@ -211,10 +215,10 @@ bool IntrinsicsSolver::solve_board_warp() {
   const auto squares = [](const IntrinsicsSolution& solution) {
     return solution.rms_px * solution.rms_px * 2 * solution.corners;
   };
-  const IntrinsicsSolution flat = solution();
+  const IntrinsicsSolution flat = make_solution();
   solved_for_.warp = true;
   if (!solve(solved_for_)) return false;
-  const IntrinsicsSolution with_warp = solution();
+  const IntrinsicsSolution with_warp = make_solution();
   if (input_.warp == WarpChoice::automatic &&
       squares(flat) - squares(with_warp) <= min_reduction * with_warp.rms_px * with_warp.rms_px) {
     problem_ = flat.problem;
@@ -224,11 +228,11 @@ bool IntrinsicsSolver::solve_board_warp() {
 }
 
 bool IntrinsicsSolver::reweight_corners() {
-  const auto residuals = compute_residuals(problem_);
+  const auto residuals = compute_reprojection_residuals(problem_);
   std::vector<CornerError> known, unknown;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     for (const auto& corner : input_.views[used_[i]]) {
-      const Eigen::Vector2d& residual = residuals[problem_index(i, corner)];
+      const Eigen::Vector2d& residual = residuals[find_problem_point_index(i, corner)];
       if (!residual.allFinite()) continue;
       (corner.sd_px > 0 ? known : unknown).push_back({residual.squaredNorm() / 2, corner.sd_px});
     }
@@ -240,80 +244,82 @@ bool IntrinsicsSolver::reweight_corners() {
   for (auto& view : input_.views) {
     for (auto& corner : view) corner.weight = weights.at(corner.sd_px);
   }
-  update_points();
+  update_problem_points();
   return solve(solved_for_);
 }
 
 bool IntrinsicsSolver::reject_outliers() {
   // Without noise, residuals are caused by the regularization and are not outliers.
   constexpr double exact_px = 0.005;
-  if (solution().rms_px < exact_px) return true;
+  if (make_solution().rms_px < exact_px) return true;
   SolveOptions without_outliers = solved_for_;
   without_outliers.without_outliers = true;
-  return solve(without_outliers) && std::isfinite(solution().rms_px);
+  return solve(without_outliers) && std::isfinite(make_solution().rms_px);
 }
 
-IntrinsicsSolution IntrinsicsSolver::solution() const {
+IntrinsicsSolution IntrinsicsSolver::make_solution() const {
   IntrinsicsSolution result{IntrinsicsStatus::ok, problem_, used_, dropped_, {}, 0, 0, 0};
   result.solved_for = solved_for_;
   for (const std::size_t view : used_) result.edge_shifts_px.push_back(edge_shifts_px_[view]);
-  result.compute_fit();
+  result.update_fit_statistics();
   return result;
 }
 
-bool IntrinsicsSolver::solve(SolveOptions what) { return solve_for_lens(problem_, what); }
+bool IntrinsicsSolver::solve(SolveOptions what) { return solve_lens_parameters(problem_, what); }
 
 namespace {
 
 /// Returns the limit of the RMS residual of a view, px, given those of all views.
-double compute_rms_limit(const std::vector<double>& rms) {
+double compute_max_view_rms(const std::vector<double>& rms) {
   constexpr double fair_px = 1, fair = 4;
   return std::max(fair_px, fair * upper_median(rms));
 }
 
 }  // namespace
 
-void IntrinsicsSolver::initialize_poses(const Lens& lens) {
-  initial_poses_ = estimate_poses(input_, lens);
+void IntrinsicsSolver::initialize_board_poses(const Lens& lens) {
+  initial_poses_ = estimate_initial_board_poses(input_, lens);
   used_.clear();
   for (std::size_t i = 0; i < input_.views.size(); ++i) {
     if (std::isfinite(initial_poses_.rms_px[i])) used_.push_back(i);
   }
 }
 
-void IntrinsicsSolver::assemble(const Lens& lens) {
+void IntrinsicsSolver::assemble_board_problem(const Lens& lens) {
   const BoardLattice& lattice = input_.lattice;
-  problem_.lens_model = lens.model();
-  if (problem_.intrinsics.empty() || lens.model() == LensModel::stereographic) {
-    problem_.intrinsics = {lens.focal_px().x(), lens.focal_px().y(), lens.center_px().x(),
-                           lens.center_px().y()};
+  problem_.lens_model = lens.lens_model();
+  if (problem_.intrinsics.empty() || lens.lens_model() == LensModel::stereographic) {
+    problem_.intrinsics = {lens.focal_px().x(), lens.focal_px().y(), lens.principal_point_px().x(),
+                           lens.principal_point_px().y()};
   }
   problem_.imager_px = input_.imager_px;
   problem_.cols = lattice.cols();
   problem_.rows = lattice.rows();
-  problem_.spacing_m = lattice.spacing_m();
+  problem_.spacing_m = lattice.point_spacing_m();
   problem_.poses.clear();
-  problem_.points.assign(used_.size() * lattice.parts() * lattice.points(),
+  problem_.points.assign(used_.size() * lattice.num_parts() * lattice.num_points(),
                          {-1, -1, BoardProblem::kUnseen});
   for (std::size_t i = 0; i < used_.size(); ++i) {
-    for (std::size_t part = 0; part < lattice.parts(); ++part) {
-      problem_.poses.push_back(lattice.compute_part_pose(initial_poses_.poses[used_[i]], part));
+    for (std::size_t part = 0; part < lattice.num_parts(); ++part) {
+      problem_.poses.push_back(
+          lattice.compute_board_part_pose(initial_poses_.poses[used_[i]], part));
     }
     const auto& corners = input_.views[used_[i]];
     for (std::size_t k = 0; k < corners.size(); ++k) {
       const double sign = displaced_corners_.contains({used_[i], k}) ? -1 : 1;
-      problem_.points[problem_index(i, corners[k])] << corners[k].pixel, sign * corners[k].weight;
+      problem_.points[find_problem_point_index(i, corners[k])] << corners[k].pixel,
+          sign * corners[k].weight;
     }
   }
 }
 
-bool IntrinsicsSolver::projects_most_views() const {
-  return std::isfinite(upper_median(compute_view_rms()));
+bool IntrinsicsSolver::can_project_most_views() const {
+  return std::isfinite(upper_median(compute_view_rms_px()));
 }
 
-std::vector<double> IntrinsicsSolver::compute_view_rms() const {
-  const auto residuals = compute_residuals(problem_);
-  const std::size_t count = input_.lattice.parts() * input_.lattice.points();
+std::vector<double> IntrinsicsSolver::compute_view_rms_px() const {
+  const auto residuals = compute_reprojection_residuals(problem_);
+  const std::size_t count = input_.lattice.num_parts() * input_.lattice.num_points();
   std::vector<double> rms;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     double squares = 0;
@@ -328,19 +334,19 @@ std::vector<double> IntrinsicsSolver::compute_view_rms() const {
   return rms;
 }
 
-std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::find_displaced_corners() const {
+std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::find_corners_of_outlier_tags() const {
   constexpr std::size_t neighbors = 8;
   constexpr double sigmas = 8, min_px = 0.1, median_of_normal = 0.6745;
   // If OPENCV_FISHEYE does not fit the lens, the residuals of neighbors also differ from each
   // other.
   constexpr double beside_sigmas = 5;
-  const auto residuals = compute_residuals(problem_);
+  const auto residuals = compute_reprojection_residuals(problem_);
   std::map<CornerOfView, double> deviations_px;
   std::vector<double> all_px;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     const auto& corners = input_.views[used_[i]];
     const auto residual = [&](std::size_t k) -> const Eigen::Vector2d& {
-      return residuals[problem_index(i, corners[k])];
+      return residuals[find_problem_point_index(i, corners[k])];
     };
     for (std::size_t k = 0; k < corners.size(); ++k) {
       std::vector<std::pair<double, std::size_t>> near;
@@ -388,16 +394,16 @@ std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::find_displaced_corner
   return found;
 }
 
-bool IntrinsicsSolver::reestimate_poses() {
+bool IntrinsicsSolver::reestimate_board_poses() {
   constexpr double max_ratio = 0.7;
-  const auto rms = compute_view_rms();
-  const double limit_px = compute_rms_limit(rms);
+  const auto rms = compute_view_rms_px();
+  const double limit_px = compute_max_view_rms(rms);
   const double worst_px = *std::max_element(rms.begin(), rms.end());
   if (worst_px <= limit_px) return false;
   const Lens lens = this->lens();
   std::vector<std::size_t> kept;
   for (std::size_t i = 0; i < used_.size(); ++i) {
-    const auto pose = estimate_view_pose(input_.views[used_[i]], lens);
+    const auto pose = estimate_board_view_pose(input_.views[used_[i]], lens);
     const bool helps = pose && pose->rms_px < max_ratio * rms[i];
     const bool bad = rms[i] > limit_px && rms[i] > worst_px / 2 && !helps;
     if (bad || !pose) {
@@ -411,12 +417,12 @@ bool IntrinsicsSolver::reestimate_poses() {
   return true;
 }
 
-bool IntrinsicsSolver::reinstate_views() {
-  const double limit_px = compute_rms_limit(compute_view_rms());
+bool IntrinsicsSolver::reinstate_dropped_views() {
+  const double limit_px = compute_max_view_rms(compute_view_rms_px());
   const Lens lens = this->lens();
   const std::size_t before = dropped_.size();
   std::erase_if(dropped_, [&](const auto& dropped) {
-    const auto pose = estimate_view_pose(input_.views[dropped.view], lens);
+    const auto pose = estimate_board_view_pose(input_.views[dropped.view], lens);
     if (!pose || pose->rms_px > limit_px) return false;
     initial_poses_.poses[dropped.view] = pose->camera_from_board;
     used_.push_back(dropped.view);
@@ -424,26 +430,26 @@ bool IntrinsicsSolver::reinstate_views() {
   });
   std::sort(used_.begin(), used_.end());
   for (std::size_t i = 0; i < used_.size() && dropped_.size() < before; ++i) {
-    if (const auto pose = estimate_view_pose(input_.views[used_[i]], lens)) {
+    if (const auto pose = estimate_board_view_pose(input_.views[used_[i]], lens)) {
       initial_poses_.poses[used_[i]] = pose->camera_from_board;
     }
   }
   return dropped_.size() < before;
 }
 
-bool all_parallel(const BoardProblem& problem) {
+bool are_all_boards_parallel(const BoardProblem& problem) {
   constexpr double min_rad = 0.09;  // five degrees
   double widest_rad = 0;
   for (const BoardPose& a : problem.poses) {
     for (const BoardPose& b : problem.poses) {
-      const double cosine = compute_normal(a).dot(compute_normal(b));
+      const double cosine = compute_board_normal(a).dot(compute_board_normal(b));
       widest_rad = std::max(widest_rad, std::acos(std::clamp(cosine, -1.0, 1.0)));
     }
   }
   return widest_rad < min_rad;
 }
 
-bool solve_for_lens(BoardProblem& problem, SolveOptions what) {
+bool solve_lens_parameters(BoardProblem& problem, SolveOptions what) {
   what.distortions = what.distortions && problem.intrinsics.size() > 4;
   return solve(problem, what);
 }

@@ -20,20 +20,20 @@ class IntrinsicsSolver {
   explicit IntrinsicsSolver(const IntrinsicsInput& input);
 
   /// Stage 2, from an initial focal length.
-  bool start(double focal_px);
+  bool solve_from_focal_length(double focal_px);
   /// Splined lenses only: initializes stage 3 with the rotationally symmetric lens OPENCV_FISHEYE.
   /// Keeps the initial lens STEREOGRAPHIC if that fails.
-  void initialize_symmetric();
+  void initialize_with_symmetric_lens();
   /// Stage 3.
-  bool refine();
+  bool refine_intrinsics();
   /// Splined lenses only: scales the regularization to the noise of the corners.
-  bool scale_regularization();
-  /// Stages 4 and 7: applies apply_lens_edge_curvature() to all views and solves again.
-  bool apply_edge_curvature();
-  /// Stages 5 (ShiftForm::constant) and 7 (ShiftForm::varying): corrects the corners for
-  /// estimate_tag_edge_shifts() and solves again, at most twice, until the terms of the shifts are
-  /// below 0.002 px.
-  bool correct_tag_edge_shifts(ShiftForm form);
+  bool scale_spline_regularization();
+  /// Stages 4 and 7: applies correct_corners_for_curved_edges() to all views and solves again.
+  bool correct_corners_and_solve_again();
+  /// Stages 5 (DisplacementForm::constant) and 7 (DisplacementForm::varying): corrects the corners
+  /// for estimate_tag_edge_displacements() and solves again, at most twice, until the terms of the
+  /// shifts are below 0.002 px.
+  bool correct_tag_edge_displacements(DisplacementForm form);
   /// Stage 6: estimates the warp of the board if WarpChoice permits it.
   bool solve_board_warp();
   /// Stage 7: weights the corners by their variances (CornerWeights) if standard deviations of some
@@ -42,10 +42,10 @@ class IntrinsicsSolver {
   /// Stage 8.
   bool reject_outliers();
   /// Stage 9, splined lenses only. Returns true also if the rotation has not converged.
-  bool align_frame_to_optical_axis();
+  bool rotate_camera_frame_to_optical_axis();
 
   /// Returns the current solution.
-  IntrinsicsSolution solution() const;
+  IntrinsicsSolution make_solution() const;
 
  private:
   /// A view of the input and a corner of it.
@@ -55,28 +55,28 @@ class IntrinsicsSolver {
   bool solve(SolveOptions what);
   /// Estimates the pose of every view with a lens. Views without a pose are unused until the next
   /// call.
-  void initialize_poses(const Lens& lens);
+  void initialize_board_poses(const Lens& lens);
   /// Sets up the problem of the views used, at their initial poses.
-  void assemble(const Lens& lens);
+  void assemble_board_problem(const Lens& lens);
   /// Returns the index of a corner in the points of the problem; `used` is the index of its view in
   /// used_.
-  std::size_t problem_index(std::size_t used, const BoardLattice::Corner& corner) const;
+  std::size_t find_problem_point_index(std::size_t used, const BoardLattice::Corner& corner) const;
   /// Copies pixels and weights of the corners from the input to the problem; outliers are kept.
-  void update_points();
+  void update_problem_points();
   /// Returns the RMS residual of each view used, px, in the order of used_; infinity if not finite.
-  std::vector<double> compute_view_rms() const;
+  std::vector<double> compute_view_rms_px() const;
   /// Returns true if the lens projects all corners of most views. mrcal also solves for points
   /// behind the camera, and takes long.
-  bool projects_most_views() const;
+  bool can_project_most_views() const;
   /// Returns the corners of tags with a corner whose residual differs from those of its neighbors.
   /// Skips views in which these would be more than a quarter of the corners.
-  std::set<CornerOfView> find_displaced_corners() const;
+  std::set<CornerOfView> find_corners_of_outlier_tags() const;
   /// If a view fits badly, re-estimates the poses of all views used and drops the worst of the
   /// views that still fit badly. Returns true if the problem has to be solved again.
-  bool reestimate_poses();
+  bool reestimate_board_poses();
   /// Reinstates dropped views that fit the current lens: a worse view had distorted the earlier
   /// lens. Returns true if there are any.
-  bool reinstate_views();
+  bool reinstate_dropped_views();
 
   IntrinsicsInput input_;
   /// Mean shift by which the corners of each view of the input were corrected, px.
@@ -96,9 +96,9 @@ class IntrinsicsSolver {
 };
 
 /// Returns true if all board normals lie within five degrees of each other.
-bool all_parallel(const BoardProblem& problem);
+bool are_all_boards_parallel(const BoardProblem& problem);
 
 /// Calls solve(), without the distortions if the model has none.
-bool solve_for_lens(BoardProblem& problem, SolveOptions what);
+bool solve_lens_parameters(BoardProblem& problem, SolveOptions what);
 
 }  // namespace vlp

@@ -39,7 +39,7 @@ std::optional<Squares> cross_validate(const IntrinsicsInput& input) {
     }
     const IntrinsicsSolution solution = solve_intrinsics(solved);
     if (!solution.ok()) return {};
-    for (const double rms_px : compute_held_out_rms_px(solution, held_out)) {
+    for (const double rms_px : compute_held_out_view_rms_px(solution, held_out)) {
       squares.push_back(rms_px * rms_px);
     }
   }
@@ -55,7 +55,7 @@ struct MeanLogRatio {
   double mean, error;
 };
 
-MeanLogRatio compare_residuals(const Squares& a, const Squares& b) {
+MeanLogRatio compute_mean_log_residual_ratio(const Squares& a, const Squares& b) {
   const auto n = static_cast<double>(a.size());
   double sum = 0, sum_of_squares = 0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += std::log(a[i] / b[i]);
@@ -67,7 +67,7 @@ MeanLogRatio compare_residuals(const Squares& a, const Squares& b) {
 
 /// Removes the views that no model fits from all models: the lens is not the cause of their
 /// residuals.
-void remove_bad_views(std::vector<std::optional<Squares>>& model_squares) {
+void remove_views_no_model_fits(std::vector<std::optional<Squares>>& model_squares) {
   constexpr double max_ratio = 9;
   constexpr double inf = std::numeric_limits<double>::infinity();
   double typical = inf;
@@ -96,7 +96,7 @@ void remove_bad_views(std::vector<std::optional<Squares>>& model_squares) {
 
 }  // namespace
 
-std::optional<FisheyeFit> fit_fisheye(IntrinsicsInput input) {
+std::optional<FisheyeFit> fit_fisheye_lens(IntrinsicsInput input) {
   constexpr double max_rms_px = 2;
   input.lens_model = LensModel::fisheye;
   IntrinsicsSolution solution = solve_intrinsics(input);
@@ -111,23 +111,23 @@ std::optional<FisheyeFit> fit_fisheye(IntrinsicsInput input) {
   return FisheyeFit{std::move(solution), std::acos(smallest)};
 }
 
-bool may_be_wide(const IntrinsicsInput& input) {
+bool may_be_wide_angle_lens(const IntrinsicsInput& input) {
   constexpr double wide_rad = 0.7;
   if (input.views.empty()) return false;
-  const Lens lens = stereographic(input, rank_focal_lengths(input).front());
+  const Lens lens = make_stereographic_lens(input, rank_initial_focal_lengths(input).front());
   double farthest_px = 0;
   for (const auto& corners : input.views) {
     for (const auto& corner : corners) {
-      farthest_px = std::max(farthest_px, (corner.pixel - lens.center_px()).norm());
+      farthest_px = std::max(farthest_px, (corner.pixel - lens.principal_point_px()).norm());
     }
   }
   return 2 * std::atan(farthest_px / lens.focal_px().x() / 2) > wide_rad;
 }
 
-std::optional<LensChoice> choose_lens(const IntrinsicsInput& input) {
+std::optional<LensChoice> select_lens_model(const IntrinsicsInput& input) {
   if (input.views.size() < kMinViewsToChoose) return {};
   LensChoice choice{};
-  choice.fisheye = fit_fisheye(input);
+  choice.fisheye = fit_fisheye_lens(input);
   if (choice.fisheye && choice.fisheye->farthest_rad >= kRightAngle_rad) {
     choice.beyond_rad = choice.fisheye->farthest_rad;
   }
@@ -138,19 +138,20 @@ std::optional<LensChoice> choose_lens(const IntrinsicsInput& input) {
     const bool is_candidate = model == LensModel::fisheye || choice.beyond_rad == 0;
     squares.push_back(is_candidate ? cross_validate(with_model) : std::nullopt);
   }
-  remove_bad_views(squares);
+  remove_views_no_model_fits(squares);
   constexpr double errors = 2;
   const Squares* best = nullptr;
   for (std::size_t i = 0; i < kModels.size(); ++i) {
     choice.tried.push_back({kModels[i]});
     if (!squares[i]) continue;
     choice.tried.back().rms_px = std::sqrt(mean_square(*squares[i]));
-    if (best == nullptr || compare_residuals(*squares[i], *best).mean < 0) best = &*squares[i];
+    if (best == nullptr || compute_mean_log_residual_ratio(*squares[i], *best).mean < 0)
+      best = &*squares[i];
   }
   if (best == nullptr) return {};
   for (std::size_t i = 0; i < kModels.size(); ++i) {
     if (!squares[i]) continue;
-    const auto [mean, error] = compare_residuals(*squares[i], *best);
+    const auto [mean, error] = compute_mean_log_residual_ratio(*squares[i], *best);
     if (mean > errors * error) continue;
     choice.model = kModels[i];
     break;

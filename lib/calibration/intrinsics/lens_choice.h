@@ -21,7 +21,7 @@ struct LensCandidate {
   double rms_px = std::numeric_limits<double>::infinity();
 };
 
-/// Minimum number of views for choose_lens().
+/// Minimum number of views for select_lens_model().
 constexpr std::size_t kMinViewsToChoose = 6;
 
 /// Fit of OPENCV_FISHEYE, and the largest angle of a corner off its axis.
@@ -47,17 +47,17 @@ inline constexpr double kRightAngle_rad = std::numbers::pi / 2;
 
 /// Fits OPENCV_FISHEYE. Returns std::nullopt if no lens fits the views with an RMS residual of at
 /// most 2 px. Ignores input.lens_model.
-std::optional<FisheyeFit> fit_fisheye(IntrinsicsInput input);
+std::optional<FisheyeFit> fit_fisheye_lens(IntrinsicsInput input);
 
 /// Returns true if corners may be more than 40 degrees off the axis, given the focal length with
 /// which the poses of the views fit best. Takes a small fraction of the time of a solve.
-bool may_be_wide(const IntrinsicsInput& input);
+bool may_be_wide_angle_lens(const IntrinsicsInput& input);
 
 /// Selects a lens model by three-fold cross-validation. Every third view is in the same part.
 ///
 /// Each model with distortion is solved with two parts (solve_intrinsics()) and evaluated with the
 /// third, so that each view is evaluated once. The evaluation fits only poses and edge shifts
-/// (compute_held_out_rms_px()). Two models are compared by the mean, over the views, of the
+/// (compute_held_out_view_rms_px()). Two models are compared by the mean, over the views, of the
 /// logarithm of the ratio of their squared residuals. The views of a few positions do not dominate
 /// this mean.
 ///
@@ -70,7 +70,7 @@ bool may_be_wide(const IntrinsicsInput& input);
 /// count. OPENCVn models are skipped if OPENCV_FISHEYE fits and has corners at 90 degrees off the
 /// axis or more. Ignores input.lens_model.
 /// @return std::nullopt if no model fits the views, or with fewer than kMinViewsToChoose views
-std::optional<LensChoice> choose_lens(const IntrinsicsInput& input);
+std::optional<LensChoice> select_lens_model(const IntrinsicsInput& input);
 
 /// Describes the candidates with their residuals, the selected one first.
 std::string describe(const LensChoice& choice);

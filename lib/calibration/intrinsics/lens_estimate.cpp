@@ -33,19 +33,19 @@ struct SplitViews {
   IntrinsicsInput solved, held_out;
 };
 
-SplitViews split_views(const LensViews& input, LensEstimate& result) {
+SplitViews split_off_held_out_views(const LensViews& input, LensEstimate& result) {
   const IntrinsicsInput empty{BoardLattice(input.board),
                               {},
                               input.views.front().imager_px,
                               input.lens_model,
-                              select_warp(input.board, input.warp)};
+                              select_board_warp_model(input.board, input.warp)};
   SplitViews split{empty, empty};
   int count = 0;
   for (const BoardView& view : result.views) {
     ++count;
     const bool is_held_out = input.held_out > 0 && count % input.held_out == 0;
     auto& part = is_held_out ? split.held_out : split.solved;
-    part.views.push_back(empty.lattice.corners(view.seen));
+    part.views.push_back(empty.lattice.match_corners_to_flat_board(view.seen));
     if (!is_held_out) result.images.push_back(view.image);
   }
   if (input.held_out > 0 && split.held_out.views.empty()) {
@@ -66,17 +66,18 @@ void fail_undetermined(LensEstimate& result, const SplitViews& views, const std:
 }
 
 /// Distance from the axis, in the stereographic plane of OPENCV_FISHEYE, at which boards are seen.
-struct BoardReach {
+struct BoardExtent {
   Eigen::Vector2d farthest{0, 0};
   /// Number of boards that lie within the grid with all of their corners; number of boards.
   std::size_t boards_within = 0, boards = 0;
 };
 
-BoardReach measure_reach(const IntrinsicsSolution& fisheye, const Eigen::Vector2d& grid_reach) {
+BoardExtent measure_board_extent(const IntrinsicsSolution& fisheye,
+                                 const Eigen::Vector2d& grid_reach) {
   const Lens lens = fisheye.lens();
   const BoardProblem& problem = fisheye.problem;
   const std::size_t points = problem.points_per_board();
-  BoardReach reach;
+  BoardExtent reach;
   for (std::size_t board = 0; board < problem.poses.size(); ++board) {
     Eigen::Vector2d board_reach(0, 0);
     for (std::size_t i = board * points; i < (board + 1) * points; ++i) {
@@ -100,19 +101,19 @@ BoardReach measure_reach(const IntrinsicsSolution& fisheye, const Eigen::Vector2
 std::string explain_unsuitable_grid(IntrinsicsInput input) {
   constexpr double margin = 1.05;
   const LensModel splined = input.lens_model;
-  const SplineGrid grid = grid_of(input.lens_model);
+  const SplineGrid grid = spline_grid_of_model(input.lens_model);
   input.lens_model = LensModel::fisheye;
   const IntrinsicsSolution solution = solve_intrinsics(input);
   if (!solution.ok() || solution.rms_px > kMaxFit_px) return "";
   const Eigen::Vector2d grid_reach =
-      SplineSurface(grid, std::vector<double>(2 * grid.control_points())).reach();
-  const BoardReach reach = measure_reach(solution, grid_reach);
+      SplineSurface(grid, std::vector<double>(2 * grid.num_control_points())).half_extent();
+  const BoardExtent reach = measure_board_extent(solution, grid_reach);
   if (10 * reach.boards_within >= 9 * reach.boards) {
     const Lens lens = solution.lens();
-    const auto core = fit_spline_core(lens, collect_inlier_pixels(solution.problem));
-    return fit_splined_lens(lens, input.imager_px, splined, core)
+    const auto core = fit_splined_lens_core(lens, collect_inlier_pixels(solution.problem));
+    return fit_splined_lens_to_lens(lens, input.imager_px, splined, core)
                ? ""
-               : describe_too_coarse_grid(lens, input.imager_px, splined, core);
+               : describe_too_coarse_spline_grid(lens, input.imager_px, splined, core);
   }
   const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
   return fmt::format(
@@ -120,7 +121,7 @@ std::string explain_unsuitable_grid(IntrinsicsInput input) {
       "vertically, but the board is visible to {:.0f} and {:.0f} degrees: use --lens {}",
       to_string(grid), angle_deg(grid_reach.x()), angle_deg(grid_reach.y()),
       angle_deg(reach.farthest.x()), angle_deg(reach.farthest.y()),
-      to_string(extend_grid(grid, grid_reach.cwiseMax(margin * reach.farthest))));
+      to_string(extend_spline_grid(grid, grid_reach.cwiseMax(margin * reach.farthest))));
 }
 
 std::string recommend_model(LensModel requested, const IntrinsicsSolution& other) {
@@ -130,7 +131,8 @@ std::string recommend_model(LensModel requested, const IntrinsicsSolution& other
 }
 
 /// Recommends another model that fits if the requested one does not; empty if there is none.
-std::string explain_no_fit(IntrinsicsInput input, const std::optional<FisheyeFit>& fisheye) {
+std::string explain_why_no_lens_fits(IntrinsicsInput input,
+                                     const std::optional<FisheyeFit>& fisheye) {
   const LensModel requested = input.lens_model;
   std::string problem = fisheye ? recommend_model(requested, fisheye->solution) : "";
   double best_px = fisheye ? fisheye->solution.rms_px : kMaxFit_px;
@@ -145,14 +147,14 @@ std::string explain_no_fit(IntrinsicsInput input, const std::optional<FisheyeFit
   return problem;
 }
 
-bool is_opencv(LensModel model) {
+bool is_opencv_model(LensModel model) {
   return model == LensModel::opencv4 || model == LensModel::opencv5 ||
          model == LensModel::opencv8 || model == LensModel::opencv12;
 }
 
 /// Returns true if the residuals of a lens are as small as those of another, up to 20 times their
 /// mean square, as for the warp.
-bool fits_as_well(const IntrinsicsSolution& lens, const IntrinsicsSolution& other) {
+bool fits_equally_well(const IntrinsicsSolution& lens, const IntrinsicsSolution& other) {
   constexpr double max_excess = 20;
   const double ratio = lens.rms_px / other.rms_px;
   return ratio * ratio <= 1 + max_excess / (2.0 * other.corners);
@@ -160,11 +162,12 @@ bool fits_as_well(const IntrinsicsSolution& lens, const IntrinsicsSolution& othe
 
 /// Raises the largest uncertainty to the difference between two lenses that fit equally well, where
 /// the lens is known.
-void include_difference(const Lens& lens, const Lens& other, const std::array<int, 2>& imager_px,
-                        CalibrationReport& report) {
-  std::vector<Eigen::Vector2d> pixels = make_pixel_grid(imager_px);
+void raise_uncertainty_to_difference(const Lens& lens, const Lens& other,
+                                     const std::array<int, 2>& imager_px,
+                                     CalibrationReport& report) {
+  std::vector<Eigen::Vector2d> pixels = make_regular_pixel_grid(imager_px);
   std::erase_if(pixels, [&](const auto& pixel) { return !polygon_contains(report.region, pixel); });
-  const auto lens_from_other = fit_rotation(other, lens, pixels);
+  const auto lens_from_other = fit_rotation_between_lenses(other, lens, pixels);
   if (!lens_from_other) return;
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto ray = other.unproject(pixel);
@@ -197,7 +200,7 @@ void recommend_fisheye(const FisheyeFit& fisheye, LensEstimate& result) {
 }
 
 /// Warns of a displacement of the edges that a wrong gap between the tags causes, not a camera.
-void warn_of_edge_shift(const IntrinsicsSolution& solution, LensEstimate& result) {
+void warn_about_edge_displacement(const IntrinsicsSolution& solution, LensEstimate& result) {
   constexpr double max_shift_px = 0.4;  // cameras, sharpened and at three times white: 0.25
   const double shift_px = upper_median(solution.edge_shifts_px);
   if (std::abs(shift_px) <= max_shift_px) return;
@@ -207,10 +210,10 @@ void warn_of_edge_shift(const IntrinsicsSolution& solution, LensEstimate& result
       std::abs(shift_px), shift_px < 0 ? "light" : "dark"));
 }
 
-void warn_of_dropped_views(LensEstimate& result) {
+void warn_about_dropped_views(LensEstimate& result) {
   const LensModel model = result.solution.problem.lens_model;
   for (const auto& [view, rms_px] : result.solution.dropped) {
-    if (!std::isfinite(rms_px) && is_splined(model)) {
+    if (!std::isfinite(rms_px) && is_splined_lens_model(model)) {
       result.warnings.push_back(
           fmt::format("{}: dropped, as the board is where {} has no control points; use a larger "
                       "fov_x_deg or Ny",
@@ -223,16 +226,16 @@ void warn_of_dropped_views(LensEstimate& result) {
   }
 }
 
-void warn_of_inconsistent_views(LensEstimate& result) {
-  const InconsistentViews found = find_inconsistent_views(result.solution);
+void warn_about_inconsistent_views(LensEstimate& result) {
+  const InconsistentViews found = find_views_inconsistent_with_lens(result.solution);
   if (found.views.empty()) return;
   result.inconsistent_views = describe(found, result.images);
   result.warnings.push_back(result.inconsistent_views);
 }
 
 /// Selects the lens model of the views. Returns false if there are too few.
-bool choose_model(SplitViews& views, LensEstimate& result) {
-  result.choice = choose_lens(views.solved);
+bool select_lens_model_for_views(SplitViews& views, LensEstimate& result) {
+  result.choice = select_lens_model(views.solved);
   if (views.solved.views.size() < kMinViewsToChoose) {
     fail(result, LensStatus::too_few_views,
          fmt::format("{} views of the board do not determine the lens model, which needs {}; add "
@@ -246,10 +249,12 @@ bool choose_model(SplitViews& views, LensEstimate& result) {
 }
 
 /// Returns the reason why the solver found no lens.
-std::string explain_no_lens(const SplitViews& views, const std::optional<FisheyeFit>& fisheye,
-                            IntrinsicsStatus status) {
+std::string explain_why_lens_not_found(const SplitViews& views,
+                                       const std::optional<FisheyeFit>& fisheye,
+                                       IntrinsicsStatus status) {
   std::string problem;
-  if (status == IntrinsicsStatus::no_solution) problem = explain_no_fit(views.solved, fisheye);
+  if (status == IntrinsicsStatus::no_solution)
+    problem = explain_why_no_lens_fits(views.solved, fisheye);
   return problem.empty() ? std::string(describe(status)) : problem;
 }
 
@@ -257,19 +262,20 @@ std::string explain_no_lens(const SplitViews& views, const std::optional<Fisheye
 void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& fisheye,
                      bool is_chosen, double print_sd, LensEstimate& result) {
   IntrinsicsSolution& solution = result.solution;
-  solution.other_model_fits = fisheye && fits_as_well(fisheye->solution, solution);
-  result.report = compute_report(solution, views.solved);
+  solution.other_model_fits = fisheye && fits_equally_well(fisheye->solution, solution);
+  result.report = compute_calibration_report(solution, views.solved);
   if (solution.other_model_fits) {
-    include_difference(solution.lens(), fisheye->solution.lens(), views.solved.imager_px,
-                       result.report);
+    raise_uncertainty_to_difference(solution.lens(), fisheye->solution.lens(),
+                                    views.solved.imager_px, result.report);
     if (!is_chosen) recommend_fisheye(*fisheye, result);
   }
-  result.coverage = compute_view_coverage(solution, views.solved);
-  result.held_out = compute_held_out_fit(solution, views.held_out);
+  result.coverage = compute_board_view_coverage(solution, views.solved);
+  result.held_out = evaluate_held_out_views(solution, views.held_out);
   result.lattice = views.solved.lattice;
-  result.sharpness = measure_sharpness(result.views, views.solved.imager_px);
+  result.sharpness = measure_lens_sharpness(result.views, views.solved.imager_px);
   std::optional<PrintEffect> print;
-  if (print_sd > 0) print = compute_aspect_error_effect(solution, print_sd, result.report.region);
+  if (print_sd > 0)
+    print = compute_board_aspect_error_effect(solution, print_sd, result.report.region);
   if (print) {
     CalibrationReport& report = result.report;
     result.print_px = print->rms_px;
@@ -283,7 +289,7 @@ void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& f
         "it");
   }
   // The covariance of hundreds of control points would fill the file, without use for fixes.
-  if (is_splined(solution.problem.lens_model)) return;
+  if (is_splined_lens_model(solution.problem.lens_model)) return;
   const ProjectionUncertainty uncertainty(solution, views.solved.lattice);
   const Eigen::VectorXd& bias = uncertainty.regularization_bias();
   MatrixX covariance = uncertainty.intrinsics_covariance() + bias * bias.transpose();
@@ -293,7 +299,7 @@ void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& f
 
 }  // namespace
 
-WarpChoice select_warp(const Board& board, WarpChoice warp) {
+WarpChoice select_board_warp_model(const Board& board, WarpChoice warp) {
   if (board.kind != BoardKind::chessboard || board.cols != board.rows) return warp;
   if (warp == WarpChoice::on) {
     throw std::invalid_argument(
@@ -308,15 +314,15 @@ LensEstimate estimate_lens(LensViews input) {
   result.views = std::move(input.views);
   input.views = {result.views.front()};
   result.gamma = estimate_and_apply_tone_curve(result.views, input.board);
-  const BoardCheck layout = check_board(input.board, result.views, {});
+  const BoardCheck layout = check_board_layout(input.board, result.views, {});
   if (!layout.problem.empty()) {
     fail(result, LensStatus::wrong_board, layout.problem);
     return result;
   }
-  SplitViews views = split_views(input, result);
-  if (input.choose_lens_model && !choose_model(views, result)) return result;
+  SplitViews views = split_off_held_out_views(input, result);
+  if (input.choose_lens_model && !select_lens_model_for_views(views, result)) return result;
   const LensModel model = views.solved.lens_model;
-  if (is_splined(model)) {
+  if (is_splined_lens_model(model)) {
     const std::string problem = explain_unsuitable_grid(views.solved);
     if (!problem.empty()) {
       fail_undetermined(result, views, problem);
@@ -324,8 +330,8 @@ LensEstimate estimate_lens(LensViews input) {
     }
   }
   std::optional<FisheyeFit> fisheye;
-  if (is_opencv(model) && may_be_wide(views.solved)) {
-    fisheye = result.choice ? result.choice->fisheye : fit_fisheye(views.solved);
+  if (is_opencv_model(model) && may_be_wide_angle_lens(views.solved)) {
+    fisheye = result.choice ? result.choice->fisheye : fit_fisheye_lens(views.solved);
     if (fisheye && fisheye->farthest_rad >= kRightAngle_rad) {
       fail_undetermined(
           result, views,
@@ -338,21 +344,22 @@ LensEstimate estimate_lens(LensViews input) {
   }
   result.solution = solve_intrinsics(views.solved);
   if (!result.solution.ok()) {
-    fail_undetermined(result, views, explain_no_lens(views, fisheye, result.solution.status));
+    fail_undetermined(result, views,
+                      explain_why_lens_not_found(views, fisheye, result.solution.status));
     if (result.solution.status == IntrinsicsStatus::too_few_views) {
       result.status = LensStatus::too_few_views;
     }
     return result;
   }
-  warn_of_dropped_views(result);
-  const BoardCheck exact = check_board(input.board, result.views, result.solution.lens(),
-                                       upper_median(result.solution.edge_shifts_px));
+  warn_about_dropped_views(result);
+  const BoardCheck exact = check_board_layout(input.board, result.views, result.solution.lens(),
+                                              upper_median(result.solution.edge_shifts_px));
   if (!exact.problem.empty()) {
     fail(result, LensStatus::wrong_board, exact.problem);
     return result;
   }
-  warn_of_inconsistent_views(result);
-  warn_of_edge_shift(result.solution, result);
+  warn_about_inconsistent_views(result);
+  warn_about_edge_displacement(result.solution, result);
   add_uncertainty(views, fisheye, input.choose_lens_model, input.board.print_sd, result);
   return result;
 }

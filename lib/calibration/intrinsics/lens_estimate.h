@@ -17,14 +17,15 @@ namespace vlp {
 
 /// Views of a board from which a lens is estimated.
 struct LensViews {
-  /// Views that differ, each with enough corners (BoardLattice::enough()); one or more.
+  /// Views that differ, each with enough corners (BoardLattice::has_sufficient_corners()); one or
+  /// more.
   std::vector<BoardView> views;
   Board board;
   LensModel lens_model = LensModel::opencv8;
   /// Every n-th view is held out of the solve for validation; 0: none.
   int held_out = 0;
   WarpChoice warp = WarpChoice::automatic;
-  /// Selects the lens model by cross-validation (choose_lens()) instead of `lens_model`.
+  /// Selects the lens model by cross-validation (select_lens_model()) instead of `lens_model`.
   bool choose_lens_model = false;
 };
 
@@ -45,7 +46,7 @@ struct LensEstimate {
   /// With the board's print in `uncertainty_mean_px` and `uncertainty_worst_px`.
   CalibrationReport report{};
   ViewCoverage coverage{};
-  HeldOut held_out{};
+  HeldOutFit held_out{};
   /// Sharpness of all views; std::nullopt if the board's edges are not measured.
   std::optional<LensSharpness> sharpness = {};
   /// Result of the selection of the lens model, if it was requested.
@@ -54,8 +55,8 @@ struct LensEstimate {
   /// near a right angle off the axis.
   std::optional<LensModel> better_model = {};
   /// Change of projections by one standard deviation of the board's print
-  /// (compute_aspect_error_effect()), RMS over the image, px; std::nullopt if Board::print_sd is 0
-  /// or the solve fails.
+  /// (compute_board_aspect_error_effect()), RMS over the image, px; std::nullopt if Board::print_sd
+  /// is 0 or the solve fails.
   std::optional<double> print_px = {};
   /// Lattice of the corners in `solution`. Covariance of the intrinsics including the bias of the
   /// regularization and the print of the board; std::nullopt for splined lenses and if not finite.
@@ -67,8 +68,8 @@ struct LensEstimate {
   std::vector<BoardView> views = {};
   /// Images of the views in the solve, in the order of IntrinsicsSolution.
   std::vector<std::string> images = {};
-  /// Describes views that do not fit the lens of the others (find_inconsistent_views()); empty if
-  /// all fit. Also one of the warnings.
+  /// Describes views that do not fit the lens of the others (find_views_inconsistent_with_lens());
+  /// empty if all fit. Also one of the warnings.
   std::string inconsistent_views = {};
   std::vector<std::string> warnings = {}, details = {};
 
@@ -78,11 +79,11 @@ struct LensEstimate {
 /// Returns `warp`, or WarpChoice::off for a square chessboard. Such a board looks the same after a
 /// quarter turn, so that the direction of its warp cannot be determined.
 /// @throws std::invalid_argument if the warp of such a board is requested
-WarpChoice select_warp(const Board& board, WarpChoice warp);
+WarpChoice select_board_warp_model(const Board& board, WarpChoice warp);
 
 /// Estimates a lens from views of a board in these stages: tone curve of the camera
-/// (estimate_and_apply_tone_curve()), layout of the board (check_board()), lens model, solve
-/// (solve_intrinsics()), board again with the lens, uncertainty (compute_report()).
+/// (estimate_and_apply_tone_curve()), layout of the board (check_board_layout()), lens model, solve
+/// (solve_intrinsics()), board again with the lens, uncertainty (compute_calibration_report()).
 /// @throws std::invalid_argument as BoardLattice
 LensEstimate estimate_lens(LensViews input);
 

@@ -115,7 +115,7 @@ double lower_quartile(std::vector<double> values) {
   return (1 - fraction) * values[below] + fraction * values[below + 1];
 }
 
-std::vector<double> known_values(const Map& map) {
+std::vector<double> collect_known_values(const Map& map) {
   std::vector<double> known;
   known.reserve(map.values.size());
   std::copy_if(map.values.begin(), map.values.end(), std::back_inserter(known),
@@ -123,8 +123,8 @@ std::vector<double> known_values(const Map& map) {
   return known;
 }
 
-Eigen::Vector2d middle_of_part(const Map& map, int col, int row,
-                               const std::array<int, 2>& imager_px) {
+Eigen::Vector2d compute_cell_center(const Map& map, int col, int row,
+                                    const std::array<int, 2>& imager_px) {
   return {(col + 0.5) * imager_px[0] / map.cols - 0.5, (row + 0.5) * imager_px[1] / map.rows - 0.5};
 }
 
@@ -142,7 +142,7 @@ double compute_asymmetry(const Map& mtf50, double mean, const std::array<int, 2>
     for (int col = 0; col < mtf50.cols; ++col) {
       if (!std::isfinite(mtf50.at(col, row))) continue;
       const Eigen::Vector2d at =
-          (middle_of_part(mtf50, col, row, imager_px) - middle_px) / radius_px;
+          (compute_cell_center(mtf50, col, row, imager_px) - middle_px) / radius_px;
       const double x = at.x(), y = at.y();
       rows.row(count) << 1, x, y, x * x - y * y, 2 * x * y, x * x + y * y;
       values[count++] = mtf50.at(col, row) / mean;
@@ -154,7 +154,7 @@ double compute_asymmetry(const Map& mtf50, double mean, const std::array<int, 2>
 
 /// Returns the median over pairs of opposite parts of the mean of the pair. A linear change over
 /// the image does not affect it. NaN without a pair, as in a corner.
-double expect_from_neighbors(const Map& map, int col, int row) {
+double predict_from_opposite_neighbors(const Map& map, int col, int row) {
   const int reach = map.cols / 6;  // a sixth of the image is larger than a speck
   const auto value = [&](int c, int r) {
     const bool inside = c >= 0 && r >= 0 && c < map.cols && r < map.rows;
@@ -182,23 +182,23 @@ LocalLoss find_local_loss(const Map& map, const std::array<int, 2>& imager_px) {
   LocalLoss largest;
   for (int row = 0; row < map.rows; ++row) {
     for (int col = 0; col < map.cols; ++col) {
-      const double loss = 1 - map.at(col, row) / expect_from_neighbors(map, col, row);
+      const double loss = 1 - map.at(col, row) / predict_from_opposite_neighbors(map, col, row);
       if (!std::isfinite(loss) || loss <= largest.fraction) continue;  // not if that is NaN
-      largest = {loss, middle_of_part(map, col, row, imager_px)};
+      largest = {loss, compute_cell_center(map, col, row, imager_px)};
     }
   }
   return largest;
 }
 
 /// Computes the Michelson contrast (white - black) / (white + black).
-Map compute_contrasts(Map black_to_white) {
+Map compute_contrast_to_neighbors(Map black_to_white) {
   for (double& ratio : black_to_white.values) ratio = (1 - ratio) / (1 + ratio);
   return black_to_white;
 }
 
 /// Fills the maps from the edges of all views.
-void fill_maps(std::span<const BoardView> views, const std::array<int, 2>& imager_px,
-               LensSharpness& result) {
+void fill_sharpness_maps(std::span<const BoardView> views, const std::array<int, 2>& imager_px,
+                         LensSharpness& result) {
   ViewValues blurs(result.mtf50, imager_px), ratios(result.black_to_white, imager_px);
   ViewValues lights(result.light, imager_px);
   for (const BoardView& view : views) {
@@ -230,7 +230,7 @@ double compute_mtf50(double sigma_px) {
   return std::sqrt(std::numbers::ln2 / 2) / (std::numbers::pi * sigma_px);
 }
 
-std::optional<double> compute_view_mtf50(const BoardDetection& seen) {
+std::optional<double> compute_median_edge_mtf50(const BoardDetection& seen) {
   std::vector<double> blurs_px;
   blurs_px.reserve(4 * seen.tags.size());
   for (const MeasuredEdge& edge : collect_edges(seen)) blurs_px.push_back(edge.step.blur_px);
@@ -238,17 +238,17 @@ std::optional<double> compute_view_mtf50(const BoardDetection& seen) {
   return compute_mtf50(upper_median(std::move(blurs_px)));
 }
 
-std::optional<LensSharpness> measure_sharpness(std::span<const BoardView> views,
-                                               const std::array<int, 2>& imager_px) {
+std::optional<LensSharpness> measure_lens_sharpness(std::span<const BoardView> views,
+                                                    const std::array<int, 2>& imager_px) {
   LensSharpness result;
-  fill_maps(views, imager_px, result);
-  const std::vector<double> known = known_values(result.mtf50);
+  fill_sharpness_maps(views, imager_px, result);
+  const std::vector<double> known = collect_known_values(result.mtf50);
   if (2 * known.size() < result.mtf50.values.size()) return std::nullopt;
   result.mean_mtf50 = compute_mean(known);
   result.worst_ratio = *std::min_element(known.begin(), known.end()) / result.mean_mtf50;
   result.asymmetry = compute_asymmetry(result.mtf50, result.mean_mtf50, imager_px);
-  result.black_level = upper_median(known_values(result.black_to_white));
-  const Map contrasts = compute_contrasts(result.black_to_white);
+  result.black_level = upper_median(collect_known_values(result.black_to_white));
+  const Map contrasts = compute_contrast_to_neighbors(result.black_to_white);
   result.local_loss = std::max(find_local_loss(result.mtf50, imager_px).fraction,
                                find_local_loss(contrasts, imager_px).fraction);
   const LocalLoss shadow = find_local_loss(result.light, imager_px);

@@ -20,8 +20,9 @@ namespace vlp {
 /// `sigma_px` is positive. It includes the pixel's own aperture, about 0.29 px.
 double compute_mtf50(double sigma_px);
 
-/// Returns the median MTF50 of the edges of a view; std::nullopt if no edge has a known blur.
-std::optional<double> compute_view_mtf50(const BoardDetection& seen);
+/// Returns the MTF50, in cycles per pixel, of the upper median of the edges' blurs in a view;
+/// std::nullopt if no edge has a known blur.
+std::optional<double> compute_median_edge_mtf50(const BoardDetection& seen);
 
 /// Sharpness and contrast of lens and pixel together over the image, from the light profiles across
 /// tag edges (slanted edges as in ISO 12233). The line spread is a Gaussian with an excess
@@ -56,7 +57,7 @@ struct LensSharpness {
   /// the middle. A centered lens is equally sharp in all directions. A tilted or decentered one is
   /// sharper on one side, or along one axis.
   double asymmetry = kUnknown;
-  /// Median of black_to_white. Veiling glare raises it.
+  /// Upper median of black_to_white. Veiling glare raises it.
   double black_level = kUnknown;
   /// Largest fraction by which MTF50 or contrast of a part is below that of the surrounding parts.
   /// A smear raises it.
@@ -71,7 +72,7 @@ struct LensSharpness {
 /// the tone curve (estimate_and_apply_tone_curve()). Returns std::nullopt if fewer than half of the
 /// parts of the image are known, from at least five views each. This is always so for boards with
 /// corner squares and for boards of squares.
-std::optional<LensSharpness> measure_sharpness(std::span<const BoardView> views,
-                                               const std::array<int, 2>& imager_px);
+std::optional<LensSharpness> measure_lens_sharpness(std::span<const BoardView> views,
+                                                    const std::array<int, 2>& imager_px);
 
 }  // namespace vlp

@@ -76,7 +76,7 @@ struct Arguments {
 int bytes(Eigen::Index doubles) { return static_cast<int>(doubles) * int(sizeof(double)); }
 
 /// Returns the points with weights for which the noise of the corners is one pixel.
-std::vector<Eigen::Vector3d> weighted_points(const BoardProblem& problem) {
+std::vector<Eigen::Vector3d> make_weighted_points(const BoardProblem& problem) {
   auto points = problem.points;
   for (Eigen::Vector3d& point : points) {
     if (point.z() != BoardProblem::kUnseen) point.z() *= 1 / problem.noise_px;
@@ -86,7 +86,7 @@ std::vector<Eigen::Vector3d> weighted_points(const BoardProblem& problem) {
 
 /// Calls an unpack function of mrcal, which has one more argument since version 2.4.
 template <typename Unpack>
-void unpack(Unpack* function, double* state, const Arguments& args) {
+void unpack_mrcal_state(Unpack* function, double* state, const Arguments& args) {
   if constexpr (std::is_invocable_v<Unpack*, double*, int, int, int, int, int, int,
                                     mrcal_problem_selections_t, const mrcal_lensmodel_t*>) {
     function(state, 1, 0, args.frames, 0, 0, args.frames, args.selections, &args.lens);
@@ -125,7 +125,7 @@ bool solve_with_mrcal(BoardProblem& problem, const SolveOptions& what) {
   Arguments args(problem, what, problem.fixed_rays);
   if (args.measurements < args.states) return false;
   Eigen::VectorXd state(args.states), residuals(args.measurements);
-  auto points = weighted_points(problem);
+  auto points = make_weighted_points(problem);
   mrcal_stats_t stats{};
   with_suppressed_output([&] {
     stats = mrcal_optimize(
@@ -154,7 +154,7 @@ Linearization linearize_with_mrcal(const BoardProblem& problem, const SolveOptio
   std::vector<int> column_pointers(static_cast<std::size_t>(args.measurements) + 1);
   std::vector<int> rows(static_cast<std::size_t>(entries));
   std::vector<double> values(static_cast<std::size_t>(entries));
-  const auto points = weighted_points(problem);
+  const auto points = make_weighted_points(problem);
   cholmod_sparse jacobian{};
   jacobian.nrow = static_cast<std::size_t>(args.states);
   jacobian.ncol = static_cast<std::size_t>(args.measurements);
@@ -191,7 +191,7 @@ Linearization linearize_with_mrcal(const BoardProblem& problem, const SolveOptio
       args.states, args.measurements, column_pointers.back(), column_pointers.data(), rows.data(),
       values.data());
   result.scale.setOnes(args.states);
-  unpack(mrcal_unpack_solver_state_vector, result.scale.data(), args);
+  unpack_mrcal_state(mrcal_unpack_solver_state_vector, result.scale.data(), args);
   constexpr Eigen::Index core = 4;
   result.first_intrinsic = what.core ? 0 : core;
   result.poses = mrcal_state_index_frames(0, 1, 0, args.frames, 0, 0, args.frames, args.selections,

@@ -53,7 +53,7 @@ class CornerTable {
       from = end + 1;
     }
     if (rows.empty()) throw InputError(file, "contains no corner");
-    if (too_many_outside(num_outside_, num_seen_)) throw InputError(*first_outside_);
+    if (are_too_many_corners_outside(num_outside_, num_seen_)) throw InputError(*first_outside_);
   }
 
   InputError error(std::size_t line, const std::string& problem) const {
@@ -82,7 +82,7 @@ class CornerTable {
     if (words.size() == 4) row.weight = parse_weight(line, fourth);
     if (x && y && *x >= 0 && *y >= 0 && row.weight > 0) {
       row.pixel = {*x, *y};
-      const std::string outside = describe_outside_corner(*row.pixel, imager_px_);
+      const std::string outside = describe_corner_outside_image(*row.pixel, imager_px_);
       ++num_seen_;
       if (!outside.empty() && num_outside_++ == 0) first_outside_ = error(line, outside);
     }
@@ -95,7 +95,8 @@ class CornerTable {
     double value = 0;
     const auto [end, problem] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (problem != std::errc() || end != word.data() + word.size() || !std::isfinite(value)) {
-      throw error(line, in_quotes(truncate_text(word, 40)) + " should be a finite number, or -");
+      throw error(line,
+                  quote_for_message(truncate_text(word, 40)) + " should be a finite number, or -");
     }
     return value;
   }
@@ -124,14 +125,15 @@ class CornerTable {
 /// Describes the numbers of corners of a board, for messages.
 std::string describe_size(const Board& board, const BoardLattice& lattice) {
   return fmt::format("a board of {} x {} {} has {} x {} corners", board.cols, board.rows,
-                     board.has_squares() ? "squares" : "tags", lattice.cols(), lattice.rows());
+                     board.has_chessboard_squares() ? "squares" : "tags", lattice.cols(),
+                     lattice.rows());
 }
 
 std::string describe_wrong_count(const Board& board, const BoardLattice& lattice,
                                  std::size_t rows) {
   std::string words = fmt::format("{} rows, but {}", rows, describe_size(board, lattice));
-  if (lattice.parts() > 1) words += " of each kind";
-  if (board.has_squares() && rows == static_cast<std::size_t>(board.cols * board.rows)) {
+  if (lattice.num_parts() > 1) words += " of each kind";
+  if (board.has_chessboard_squares() && rows == static_cast<std::size_t>(board.cols * board.rows)) {
     words += fmt::format(
         "; cols and rows of board.yaml count squares, not the corners between them: cols {}, rows "
         "{}",
@@ -150,10 +152,10 @@ struct PartOfImage {
   std::size_t part;
 };
 
-PartOfImage parse_part(const BoardLattice& lattice, const CornerTable& table, std::size_t line,
-                       std::string_view name) {
+PartOfImage parse_part_of_image_name(const BoardLattice& lattice, const CornerTable& table,
+                                     std::size_t line, std::string_view name) {
   PartOfImage found{std::string(name), 0};
-  if (lattice.parts() == 1) return found;
+  if (lattice.num_parts() == 1) return found;
   const auto ending = name.rfind("-corner");
   if (ending == name.npos || ending + 8 != name.size() || name.back() < '0' || name.back() > '3') {
     throw table.error(line,
@@ -169,7 +171,7 @@ PartOfImage parse_part(const BoardLattice& lattice, const CornerTable& table, st
 void check_row_length(const Board& board, const BoardLattice& lattice, const CornerTable& table,
                       const std::vector<LatticePixels>& images, std::size_t first_line) {
   const auto stated = static_cast<std::size_t>(lattice.cols());
-  const std::size_t found_cols = estimate_row_length(images, stated);
+  const std::size_t found_cols = estimate_lattice_row_length(images, stated);
   if (found_cols == stated) return;
   const bool is_swapped = found_cols == static_cast<std::size_t>(lattice.rows());
   throw table.error(first_line, fmt::format("the corners lie in rows of {}, but {}{}", found_cols,
@@ -180,8 +182,8 @@ void check_row_length(const Board& board, const BoardLattice& lattice, const Cor
 
 }  // namespace
 
-std::vector<BoardView> read_corners(const std::filesystem::path& file, const Board& board,
-                                    const std::array<int, 2>& imager_px) {
+std::vector<BoardView> read_mrcal_corners(const std::filesystem::path& file, const Board& board,
+                                          const std::array<int, 2>& imager_px) {
   const BoardLattice lattice(board);
   const CornerTable table(file, imager_px);
   std::vector<BoardView> views;
@@ -196,12 +198,12 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, const Boa
     if (!known.insert(name).second) {
       throw table.error(line, fmt::format("image '{}' occurs twice", name));
     }
-    const auto [image, part] = parse_part(lattice, table, line, name);
+    const auto [image, part] = parse_part_of_image_name(lattice, table, line, name);
     const auto [entry, is_new] = view_of_image.try_emplace(image, views.size());
     if (is_new) views.push_back({image, imager_px, {}});
     BoardView& view = views[entry->second];
     const bool none = end == from + 1 && !first_pixel;
-    if (!none && end - from != lattice.points()) {
+    if (!none && end - from != lattice.num_points()) {
       throw table.error(line, fmt::format("image '{}' has {}", name,
                                           describe_wrong_count(board, lattice, end - from)));
     }
@@ -223,10 +225,10 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, const Boa
               [](const PointDetection& a, const PointDetection& b) { return a.index < b.index; });
   }
   check_row_length(board, lattice, table, images, first_line);
-  if (lattice.parts() == 1) {
+  if (lattice.num_parts() == 1) {
     for (BoardView& view : views) {
-      order_lattice(view.seen.points, lattice.cols(), lattice.rows(),
-                    board.kind == BoardKind::chessboard);
+      order_lattice_points(view.seen.points, lattice.cols(), lattice.rows(),
+                           board.kind == BoardKind::chessboard);
     }
   }
   return views;

@@ -21,7 +21,7 @@ namespace {
 constexpr int kDigits = 17;
 
 /// Formats all arguments of mrcal.optimize(), at the solution.
-std::string format_optimization_inputs(const IntrinsicsSolution& solution) {
+std::string format_mrcal_optimization_inputs(const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
   const std::size_t boards = problem.poses.size();
   const auto rows = static_cast<std::size_t>(problem.rows);
@@ -42,46 +42,48 @@ std::string format_optimization_inputs(const IntrinsicsSolution& solution) {
   const std::array<std::int32_t, 2> imager{problem.imager_px[0], problem.imager_px[1]};
 
   NumpyArchive archive;
-  archive.add("lensmodel", to_string(problem.lens_model));
-  archive.add("intrinsics", {1, problem.intrinsics.size()}, problem.intrinsics);
-  archive.add("extrinsics_rt_fromref", {0, 6}, std::span<const double>{});
-  archive.add("frames_rt_toref", {boards, 6}, poses);
-  archive.add("observations_board", {boards, rows, cols, 3}, points);
-  archive.add("indices_frame_camintrinsics_camextrinsics", {boards, 3}, indices);
-  archive.add("calobject_warp", {2}, std::span(problem.warp_m.data(), 2));
-  archive.add("imagersizes", {1, 2}, imager);
-  archive.add("calibration_object_spacing", problem.spacing_m);
-  archive.add("do_optimize_intrinsics_core", solution.solved_for.core);
-  archive.add("do_optimize_intrinsics_distortions", problem.intrinsics.size() > 4);
-  archive.add("do_optimize_extrinsics", true);
-  archive.add("do_optimize_frames", true);
-  archive.add("do_optimize_calobject_warp", solution.solved_for.warp);
-  archive.add("do_apply_regularization", problem.intrinsics.size() > 4);
-  archive.add("do_apply_outlier_rejection", true);
-  archive.add("verbose", false);
+  archive.add_entry("lensmodel", to_string(problem.lens_model));
+  archive.add_entry("intrinsics", {1, problem.intrinsics.size()}, problem.intrinsics);
+  archive.add_entry("extrinsics_rt_fromref", {0, 6}, std::span<const double>{});
+  archive.add_entry("frames_rt_toref", {boards, 6}, poses);
+  archive.add_entry("observations_board", {boards, rows, cols, 3}, points);
+  archive.add_entry("indices_frame_camintrinsics_camextrinsics", {boards, 3}, indices);
+  archive.add_entry("calobject_warp", {2}, std::span(problem.warp_m.data(), 2));
+  archive.add_entry("imagersizes", {1, 2}, imager);
+  archive.add_entry("calibration_object_spacing", problem.spacing_m);
+  archive.add_entry("do_optimize_intrinsics_core", solution.solved_for.core);
+  archive.add_entry("do_optimize_intrinsics_distortions", problem.intrinsics.size() > 4);
+  archive.add_entry("do_optimize_extrinsics", true);
+  archive.add_entry("do_optimize_frames", true);
+  archive.add_entry("do_optimize_calobject_warp", solution.solved_for.warp);
+  archive.add_entry("do_apply_regularization", problem.intrinsics.size() > 4);
+  archive.add_entry("do_apply_outlier_rejection", true);
+  archive.add_entry("verbose", false);
   for (const char* none :
        {"points", "observations_point", "indices_point_camintrinsics_camextrinsics"}) {
-    archive.add(none, std::string_view());
+    archive.add_entry(none, std::string_view());
   }
-  return encode_base85(archive.bytes());
+  return encode_base85(archive.serialize());
 }
 
 }  // namespace
 
-void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution) {
+void write_mrcal_cameramodel(const std::filesystem::path& file,
+                             const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
-  const ImageRegion region = compute_known_region(collect_inlier_pixels(problem), problem.imager_px,
-                                                  problem.lens_model, solution.other_model_fits);
+  const ImageRegion region =
+      compute_valid_lens_region(collect_inlier_pixels(problem), problem.imager_px,
+                                problem.lens_model, solution.other_model_fits);
   std::string text = "{\n    'lensmodel':  '";
   text.append(to_string(problem.lens_model)).append("',\n    'intrinsics': [");
   for (const double value : problem.intrinsics) {
-    text.append(" ").append(significant(value, kDigits)).append(",");
+    text.append(" ").append(format_significant_digits(value, kDigits)).append(",");
   }
   text += "],\n    'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n    'imagersize': [ ";
   text.append(std::to_string(problem.imager_px[0])).append(", ");
   text.append(std::to_string(problem.imager_px[1])).append(" ],\n    'icam_intrinsics': 0,\n");
-  text.append(format_mrcal_region(region)).append("    'optimization_inputs': b'");
-  text.append(format_optimization_inputs(solution)).append("',\n}\n");
+  text.append(format_mrcal_valid_region(region)).append("    'optimization_inputs': b'");
+  text.append(format_mrcal_optimization_inputs(solution)).append("',\n}\n");
   write_file(file, text);
 }
 
@@ -105,8 +107,8 @@ std::vector<std::string> make_image_names_unique(const IntrinsicsSolution& solut
 
 }  // namespace
 
-void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& solution,
-                   std::span<const std::string> images) {
+void write_mrcal_corners(const std::filesystem::path& file, const IntrinsicsSolution& solution,
+                         std::span<const std::string> images) {
   const BoardProblem& problem = solution.problem;
   const std::size_t parts = problem.poses.size() / solution.views.size();
   const std::size_t count = problem.points_per_board();
@@ -124,9 +126,9 @@ void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& 
       const Eigen::Vector3d& point = problem.points[i];
       text += name;
       if (point.z() > 0) {
-        text.append(" ").append(significant(point.x(), kDigits));
-        text.append(" ").append(significant(point.y(), kDigits)).append(" ");
-        text.append(shortest(weights ? point.z() : 0 - std::log2(point.z()))).append("\n");
+        text.append(" ").append(format_significant_digits(point.x(), kDigits));
+        text.append(" ").append(format_significant_digits(point.y(), kDigits)).append(" ");
+        text.append(format_shortest(weights ? point.z() : 0 - std::log2(point.z()))).append("\n");
       } else {
         text += " -1 -1 -\n";
       }
@@ -135,6 +137,6 @@ void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& 
   write_file(file, text);
 }
 
-std::string mrcal_version() { return VLP_MRCAL_VERSION; }
+std::string get_mrcal_version() { return VLP_MRCAL_VERSION; }
 
 }  // namespace vlp

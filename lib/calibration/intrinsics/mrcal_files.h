@@ -15,7 +15,7 @@
 namespace vlp {
 
 /// Writes mrcal's .cameramodel: the lens with 17 digits, its calibrated region
-/// (valid_intrinsics_region, compute_known_region()), and the solved problem
+/// (valid_intrinsics_region, compute_valid_lens_region()), and the solved problem
 /// (format_optimization_inputs).
 ///
 /// mrcal's tools use the problem, such as mrcal-show-projection-uncertainty and
@@ -23,8 +23,8 @@ namespace vlp {
 /// it shows less than IntrinsicsReport::expected_max_error_px, which is by tags
 /// (ProjectionUncertainty).
 /// @throws InputError
-/// @pre has_mrcal() of the lens model, also for write_corners()
-void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution);
+/// @pre is_supported_by_mrcal() of the lens model, also for write_mrcal_corners()
+void write_mrcal_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution);
 
 /// Writes the corners of a solution in the format of mrcal-calibrate-cameras (--corners-cache), row
 /// by row of the lattice. A corner that was not seen, or is an outlier, has the level "-".
@@ -36,23 +36,23 @@ void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSoluti
 /// @param images  names of the views of the input. The table identifies views by name: a second
 ///     image of the same name becomes NAME-2.
 /// @throws InputError
-void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& solution,
-                   std::span<const std::string> images);
+void write_mrcal_corners(const std::filesystem::path& file, const IntrinsicsSolution& solution,
+                         std::span<const std::string> images);
 
 /// Reads the corners of a board in the format of mrcal's tools (--corners-cache), from mrgingham or
-/// write_corners(): `filename x y level`, every point of the lattice of the board, row by row,
-/// image after image.
+/// write_mrcal_corners(): `filename x y level`, every point of the lattice of the board, row by
+/// row, image after image.
 ///
 /// The residual of a point is weighted by 2^-level, with the level rounded down and at most 30. A
 /// fourth column named `weight` gives the weight itself, at most 1000. Without a fourth column the
 /// weight is 1. A point with "-" or a negative x, y, level or weight was not seen. A single row
 /// with "-" is an image without the board.
 /// @throws InputError with file and line
-std::vector<BoardView> read_corners(const std::filesystem::path& file, const Board& board,
-                                    const std::array<int, 2>& imager_px);
+std::vector<BoardView> read_mrcal_corners(const std::filesystem::path& file, const Board& board,
+                                          const std::array<int, 2>& imager_px);
 
 /// Returns the version of mrcal that the toolbox was built with, from Debian's package; "unknown"
 /// without a package.
-std::string mrcal_version();
+std::string get_mrcal_version();
 
 }  // namespace vlp

@@ -13,7 +13,8 @@ const MrcalFunctions& mrcal_functions() {
   using Get = const MrcalFunctions* (*)();
   // POSIX allows the conversion of a symbol's address to a function pointer.
   static const auto get = reinterpret_cast<Get>(  // NOLINT
-      load_function(VLP_MRCAL_LIBRARY, "vlp_mrcal_functions", "lenses cannot be solved", RTLD_NOW));
+      load_library_function(VLP_MRCAL_LIBRARY, "vlp_mrcal_functions", "lenses cannot be solved",
+                            RTLD_NOW));
   return *get();
 }
 

@@ -39,20 +39,21 @@ std::string_view view_bytes(std::span<const Number> values) {
 
 }  // namespace
 
-void NumpyArchive::add(std::string_view name, const Shape& shape, std::span<const double> values) {
+void NumpyArchive::add_entry(std::string_view name, const Shape& shape,
+                             std::span<const double> values) {
   add_array(name, "<f8", shape, view_bytes(values));
 }
 
-void NumpyArchive::add(std::string_view name, const Shape& shape,
-                       std::span<const std::int32_t> values) {
+void NumpyArchive::add_entry(std::string_view name, const Shape& shape,
+                             std::span<const std::int32_t> values) {
   add_array(name, "<i4", shape, view_bytes(values));
 }
 
-void NumpyArchive::add(std::string_view name, bool value) {
+void NumpyArchive::add_entry(std::string_view name, bool value) {
   add_array(name, "|b1", {}, std::string(1, value ? '\1' : '\0'));
 }
 
-void NumpyArchive::add(std::string_view name, std::string_view text) {
+void NumpyArchive::add_entry(std::string_view name, std::string_view text) {
   std::string wide;
   for (const char c : text) wide += uint32_bytes(static_cast<unsigned char>(c));
   if (text.empty()) wide = uint32_bytes(0);
@@ -94,7 +95,7 @@ void NumpyArchive::add_file(const std::string& name, const std::string& content)
   ++count_;
 }
 
-std::string NumpyArchive::bytes() const {
+std::string NumpyArchive::serialize() const {
   std::string end = "PK\x05\x06";
   end.append(uint16_bytes(0))
       .append(uint16_bytes(0))

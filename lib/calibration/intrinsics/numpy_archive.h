@@ -20,15 +20,15 @@ class NumpyArchive {
 
   /// Adds an array. Values are in C order; their number is the product of `shape`, which is {} for
   /// a scalar.
-  void add(std::string_view name, const Shape& shape, std::span<const double> values);
-  void add(std::string_view name, const Shape& shape, std::span<const std::int32_t> values);
-  void add(std::string_view name, double value) { add(name, {}, std::span(&value, 1)); }
-  void add(std::string_view name, bool value);
+  void add_entry(std::string_view name, const Shape& shape, std::span<const double> values);
+  void add_entry(std::string_view name, const Shape& shape, std::span<const std::int32_t> values);
+  void add_entry(std::string_view name, double value) { add_entry(name, {}, std::span(&value, 1)); }
+  void add_entry(std::string_view name, bool value);
   /// Adds an ASCII string.
-  void add(std::string_view name, std::string_view text);
+  void add_entry(std::string_view name, std::string_view text);
 
   /// Returns the complete archive.
-  std::string bytes() const;
+  std::string serialize() const;
 
  private:
   void add_array(std::string_view name, std::string_view type, const Shape& shape,

@@ -17,7 +17,7 @@ struct Pair {
 };
 
 /// Fits the rotation of a to b by weighted least squares (Kabsch, 1976).
-Eigen::Matrix3d fit_rotation(const std::vector<Pair>& pairs) {
+Eigen::Matrix3d fit_rotation_between_lenses(const std::vector<Pair>& pairs) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (const Pair& pair : pairs) sum += pair.weight * pair.b * pair.a.transpose();
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -27,8 +27,8 @@ Eigen::Matrix3d fit_rotation(const std::vector<Pair>& pairs) {
 
 }  // namespace
 
-std::optional<Eigen::Matrix3d> fit_rotation(const Lens& a, const Lens& b,
-                                            std::span<const Eigen::Vector2d> pixels) {
+std::optional<Eigen::Matrix3d> fit_rotation_between_lenses(
+    const Lens& a, const Lens& b, std::span<const Eigen::Vector2d> pixels) {
   std::vector<Pair> pairs;
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto from_a = a.unproject(pixel), from_b = b.unproject(pixel);
@@ -36,10 +36,11 @@ std::optional<Eigen::Matrix3d> fit_rotation(const Lens& a, const Lens& b,
     pairs.push_back({pixel, from_a->direction.normalized(), from_b->direction.normalized(), 1});
   }
   if (pairs.size() < 3) return {};
-  return fit_rotation(pairs);
+  return fit_rotation_between_lenses(pairs);
 }
 
-std::vector<Eigen::Vector2d> make_pixel_grid(const std::array<int, 2>& imager_px, int cols) {
+std::vector<Eigen::Vector2d> make_regular_pixel_grid(const std::array<int, 2>& imager_px,
+                                                     int cols) {
   const int rows =
       std::max(2, static_cast<int>(std::lround(cols * double(imager_px[1]) / imager_px[0])));
   std::vector<Eigen::Vector2d> pixels;
@@ -56,7 +57,7 @@ std::optional<ProjectionDifference> compute_projection_difference(
     const Lens& a, const Lens& b, const std::array<int, 2>& imager_px,
     const std::function<double(const Eigen::Vector2d&)>& sigma_px) {
   std::vector<Pair> pairs;
-  for (const Eigen::Vector2d& pixel : make_pixel_grid(imager_px)) {
+  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(imager_px)) {
     const auto from_a = a.unproject(pixel), from_b = b.unproject(pixel);
     const double sigma = sigma_px(pixel);
     if (!from_a || !from_b || !(sigma > 0) || !std::isfinite(sigma)) continue;
@@ -64,7 +65,7 @@ std::optional<ProjectionDifference> compute_projection_difference(
                      1 / (sigma * sigma)});
   }
   if (pairs.size() < 3) return {};
-  const Eigen::Matrix3d rotation = fit_rotation(pairs);
+  const Eigen::Matrix3d rotation = fit_rotation_between_lenses(pairs);
   ProjectionDifference difference{0, 0, 0};
   double count = 0;
   for (const Pair& pair : pairs) {

@@ -15,12 +15,13 @@ namespace vlp {
 
 /// Returns a grid of pixels over the image including its edges: `cols` columns, and rows about
 /// equally far apart.
-std::vector<Eigen::Vector2d> make_pixel_grid(const std::array<int, 2>& imager_px, int cols = 41);
+std::vector<Eigen::Vector2d> make_regular_pixel_grid(const std::array<int, 2>& imager_px,
+                                                     int cols = 41);
 
 /// Fits the rotation of the rays of `a` at the pixels to those of `b`, by least squares over the
 /// pixels at which both have a ray; std::nullopt for fewer than three.
-std::optional<Eigen::Matrix3d> fit_rotation(const Lens& a, const Lens& b,
-                                            std::span<const Eigen::Vector2d> pixels);
+std::optional<Eigen::Matrix3d> fit_rotation_between_lenses(const Lens& a, const Lens& b,
+                                                           std::span<const Eigen::Vector2d> pixels);
 
 /// Difference of two lenses over the image.
 struct ProjectionDifference {
@@ -30,9 +31,9 @@ struct ProjectionDifference {
   double rms_px;
 };
 
-/// Compares the projections of two lenses over the image. Every pixel of make_pixel_grid() is
-/// unprojected by `a`, rotated by the best-fitting rotation of the rays and projected by `b`. The
-/// rotation is removed because the frame of a lens is a convention (mrcal, "Projection
+/// Compares the projections of two lenses over the image. Every pixel of make_regular_pixel_grid()
+/// is unprojected by `a`, rotated by the best-fitting rotation of the rays and projected by `b`.
+/// The rotation is removed because the frame of a lens is a convention (mrcal, "Projection
 /// differences").
 ///
 /// @param sigma_px  standard deviation at a pixel, for the weights of the rotation; pixels with an

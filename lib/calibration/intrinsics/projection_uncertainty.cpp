@@ -28,9 +28,9 @@ double compute_residual_sd(const BoardProblem& problem, const Eigen::VectorXd& r
 
 /// Sums the rows over the residuals of each tag, weighted by the residuals: a row for each tag of
 /// each view, from a row for each residual.
-Eigen::MatrixXd sum_by_tags(const Eigen::MatrixXd& by_residual, const Eigen::VectorXd& residuals_px,
-                            const BoardLattice& lattice) {
-  const std::size_t points = lattice.points(), points_per_view = lattice.parts() * points;
+Eigen::MatrixXd sum_rows_by_tag(const Eigen::MatrixXd& by_residual,
+                                const Eigen::VectorXd& residuals_px, const BoardLattice& lattice) {
+  const std::size_t points = lattice.num_points(), points_per_view = lattice.num_parts() * points;
   const Eigen::Index corners = residuals_px.size() / 2;
   const auto views = static_cast<std::size_t>(corners) / points_per_view;
   Eigen::MatrixXd sums =
@@ -100,7 +100,7 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
   const double ratio = 1 / static_cast<double>(problem.poses.size());
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
     wanted.block<3, 3>(at.poses + 6 * static_cast<Eigen::Index>(i), intrinsics) =
-        ratio * left_jacobian(problem.poses[i].rotation).transpose();
+        ratio * so3_left_jacobian(problem.poses[i].rotation).transpose();
   }
   wanted = at.scale.asDiagonal() * wanted;
   const Eigen::MatrixXd by_residual =
@@ -109,7 +109,7 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
   if (lattice == nullptr) {
     covariance_ = sigma_px * sigma_px * by_residual.transpose() * by_residual;
   } else {
-    const Eigen::MatrixXd sums = sum_by_tags(by_residual, at.residuals_px, *lattice);
+    const Eigen::MatrixXd sums = sum_rows_by_tag(by_residual, at.residuals_px, *lattice);
     covariance_ = compute_degrees_of_freedom_factor(problem, jt.rows()) * sums.transpose() * sums;
   }
   regularization_bias_ = wanted.leftCols(intrinsics).transpose() *
@@ -117,36 +117,37 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
   is_determined_ = covariance_.allFinite();
 }
 
-Eigen::Matrix2d ProjectionUncertainty::covariance(const Eigen::Vector2d& pixel) const {
+Eigen::Matrix2d ProjectionUncertainty::projection_covariance(const Eigen::Vector2d& pixel) const {
   const auto ray = lens_.unproject(pixel);
   const auto projection = ray ? lens_.project_with_jacobians(ray->direction) : std::nullopt;
   const auto derivatives =
-      projection ? lens_.compute_parameter_jacobian(ray->direction) : std::nullopt;
+      projection ? lens_.compute_intrinsics_jacobian(ray->direction) : std::nullopt;
   if (!is_determined_ || !derivatives) {
     return Eigen::Matrix2d::Identity() * std::numeric_limits<double>::infinity();
   }
   std::vector<Eigen::Index> states = derivatives->parameters;
   for (Eigen::Index i = covariance_.rows() - 3; i < covariance_.rows(); ++i) states.push_back(i);
   Eigen::Matrix2Xd gradient(2, std::ssize(states));
-  gradient << derivatives->d_pixel, -projection->d_pixel_d_point * cross_matrix(ray->direction);
+  gradient << derivatives->d_pixel,
+      -projection->d_pixel_d_point * skew_symmetric_matrix(ray->direction);
   const Eigen::MatrixXd state_covariance = covariance_(states, states);
   return gradient * state_covariance * gradient.transpose();
 }
 
-double ProjectionUncertainty::worst_px(const Eigen::Vector2d& pixel) const {
-  const Eigen::Matrix2d c = covariance(pixel);
+double ProjectionUncertainty::max_direction_sd_px(const Eigen::Vector2d& pixel) const {
+  const Eigen::Matrix2d c = projection_covariance(pixel);
   if (!c.allFinite()) return std::numeric_limits<double>::infinity();
   const double mean = c.trace() / 2, half = (c(0, 0) - c(1, 1)) / 2;
   return std::sqrt(mean + std::hypot(half, c(0, 1)));
 }
 
 Eigen::MatrixXd ProjectionUncertainty::intrinsics_covariance() const {
-  const auto count = static_cast<Eigen::Index>(parameter_count(lens_.model()));
+  const auto count = static_cast<Eigen::Index>(parameter_count(lens_.lens_model()));
   if (is_determined_) return covariance_.topLeftCorner(count, count);
   return Eigen::MatrixXd::Constant(count, count, std::numeric_limits<double>::infinity());
 }
 
-double ProjectionUncertainty::focal_sd_px() const {
+double ProjectionUncertainty::focal_x_sd_px() const {
   return is_determined_ && covariance_(0, 0) > 0 ? std::sqrt(covariance_(0, 0))
                                                  : std::numeric_limits<double>::infinity();
 }

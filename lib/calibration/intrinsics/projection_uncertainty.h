@@ -38,14 +38,14 @@ class ProjectionUncertainty {
   ProjectionUncertainty(const IntrinsicsSolution& solution, const BoardLattice& lattice);
 
   /// Returns false if the views do not determine all parameters.
-  bool is_determined() const { return is_determined_; }
+  bool are_intrinsics_determined() const { return is_determined_; }
 
   /// Returns the covariance of the projection of the ray at `pixel`, px^2. Infinite if the lens has
   /// no ray there, or if the views do not determine all parameters.
-  Eigen::Matrix2d covariance(const Eigen::Vector2d& pixel) const;
+  Eigen::Matrix2d projection_covariance(const Eigen::Vector2d& pixel) const;
 
   /// Returns the standard deviation in the direction in which it is largest, px.
-  double worst_px(const Eigen::Vector2d& pixel) const;
+  double max_direction_sd_px(const Eigen::Vector2d& pixel) const;
 
   /// Returns the covariance of the intrinsics; 0 for the core of splined lenses, which is not
   /// estimated.
@@ -65,7 +65,7 @@ class ProjectionUncertainty {
   /// Returns the standard deviation of the focal length along x, px. Infinite if the views do not
   /// determine all parameters, and for splined lenses, whose control points compensate the focal
   /// length.
-  double focal_sd_px() const;
+  double focal_x_sd_px() const;
 
  private:
   ProjectionUncertainty(const IntrinsicsSolution& solution, const BoardLattice* lattice);

@@ -68,15 +68,13 @@ bool determine_bilinear_surface(const std::vector<Eigen::Vector2d>& positions) {
 
 }  // namespace
 
-std::optional<std::vector<double>> fit_splined_lens(const Lens& lens,
-                                                    const std::array<int, 2>& imager_px,
-                                                    LensModel model,
-                                                    const std::vector<double>& core,
-                                                    const Eigen::Matrix3d& lens_from_splined) {
+std::optional<std::vector<double>> fit_splined_lens_to_lens(
+    const Lens& lens, const std::array<int, 2>& imager_px, LensModel model,
+    const std::vector<double>& core, const Eigen::Matrix3d& lens_from_splined) {
   constexpr int rays_per_piece = 4;
   constexpr double margin = 0.05;  // of the image, around it
-  const SplineGrid grid = grid_of(model);
-  const SplineSurface straight(grid, std::vector<double>(2 * grid.control_points()));
+  const SplineGrid grid = spline_grid_of_model(model);
+  const SplineSurface straight(grid, std::vector<double>(2 * grid.num_control_points()));
   const Eigen::Array2d focal_px(core[0], core[1]), center_px(core[2], core[3]);
   const Eigen::Array2d size_px(imager_px[0], imager_px[1]);
   Equations equations;
@@ -87,7 +85,7 @@ std::optional<std::vector<double>> fit_splined_lens(const Lens& lens,
   for (int row = 0; row <= rows; ++row) {
     for (int column = 0; column <= columns; ++column) {
       const Eigen::Array2d fraction(double(column) / columns, double(row) / rows);
-      const Eigen::Vector2d u = straight.reach().array() * (2 * fraction - 1);
+      const Eigen::Vector2d u = straight.half_extent().array() * (2 * fraction - 1);
       const Eigen::Vector3d ray(u.x(), u.y(), 1 - u.squaredNorm() / 4);
       const auto pixel = lens.project(lens_from_splined * ray);
       if (!pixel || (pixel->array() < -margin * size_px).any() ||
@@ -95,7 +93,7 @@ std::optional<std::vector<double>> fit_splined_lens(const Lens& lens,
         continue;
       }
       positions.push_back(u);
-      const SplineSurface::Weights at = straight.weights(u);
+      const SplineSurface::Weights at = straight.spline_weights(u);
       for (int j = 0; j <= grid.order; ++j) {
         for (int i = 0; i <= grid.order; ++i) {
           equations.entries.emplace_back(
@@ -107,7 +105,7 @@ std::optional<std::vector<double>> fit_splined_lens(const Lens& lens,
     }
   }
   if (!determine_bilinear_surface(positions)) return {};
-  const auto points = static_cast<Eigen::Index>(grid.control_points());
+  const auto points = static_cast<Eigen::Index>(grid.num_control_points());
   Eigen::SparseMatrix<double> left(equations.next(), points);
   left.setFromTriplets(equations.entries.begin(), equations.entries.end());
   Eigen::MatrixX2d right(equations.next(), 2);
@@ -126,23 +124,24 @@ std::optional<std::vector<double>> fit_splined_lens(const Lens& lens,
   return parameters;
 }
 
-std::string describe_too_coarse_grid(const Lens& lens, const std::array<int, 2>& imager_px,
-                                     LensModel model, const std::vector<double>& core) {
+std::string describe_too_coarse_spline_grid(const Lens& lens, const std::array<int, 2>& imager_px,
+                                            LensModel model, const std::vector<double>& core) {
   constexpr double extension = 1.05;
   Eigen::Vector2d farthest(0, 0);
-  for (const Eigen::Vector2d& pixel : make_pixel_grid(imager_px)) {
+  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(imager_px)) {
     const auto ray = lens.unproject(pixel);
     if (!ray) continue;
     const Eigen::Vector3d& x = ray->direction;
     farthest = farthest.cwiseMax(x.head<2>().cwiseAbs() * (2 / (x.norm() + x.z())));
   }
-  SplineGrid finer = grid_of(model);
-  LensModel other = lens_model_for(extend_grid(finer, extension * farthest));
-  while (!fit_splined_lens(lens, imager_px, other, core) && 2 * finer.nx <= SplineGrid::kMaxKnots) {
+  SplineGrid finer = spline_grid_of_model(model);
+  LensModel other = lens_model_for_spline_grid(extend_spline_grid(finer, extension * farthest));
+  while (!fit_splined_lens_to_lens(lens, imager_px, other, core) &&
+         2 * finer.nx <= SplineGrid::kMaxKnots) {
     finer.nx *= 2;
-    other = lens_model_for(extend_grid(finer, extension * farthest));
+    other = lens_model_for_spline_grid(extend_spline_grid(finer, extension * farthest));
   }
-  const bool helps = fit_splined_lens(lens, imager_px, other, core).has_value();
+  const bool helps = fit_splined_lens_to_lens(lens, imager_px, other, core).has_value();
   const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
   return fmt::format(
       "the control points of {} do not cover the field of view, {:.0f} degrees off axis "
@@ -151,7 +150,7 @@ std::string describe_too_coarse_grid(const Lens& lens, const std::array<int, 2>&
       helps ? fmt::format("--lens {}", to_string(other)) : "another model");
 }
 
-SplineGrid extend_grid(const SplineGrid& grid, const Eigen::Vector2d& u) {
+SplineGrid extend_spline_grid(const SplineGrid& grid, const Eigen::Vector2d& u) {
   constexpr double numeric_tolerance = 1e-9;  // keeps a grid that is wide enough
   const auto ceil_and_clamp = [](double min_value, double value, double max_value) {
     return static_cast<int>(std::clamp(std::ceil(value - numeric_tolerance), min_value, max_value));
@@ -166,18 +165,19 @@ SplineGrid extend_grid(const SplineGrid& grid, const Eigen::Vector2d& u) {
   return wide;
 }
 
-std::vector<double> fit_spline_core(const Lens& lens, std::span<const Eigen::Vector2d> pixels) {
+std::vector<double> fit_splined_lens_core(const Lens& lens,
+                                          std::span<const Eigen::Vector2d> pixels) {
   Eigen::Array2d products(0, 0), squares(0, 0);
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto ray = lens.unproject(pixel);
     if (!ray) continue;
     const Eigen::Vector3d& x = ray->direction;
     const Eigen::Array2d u = x.head<2>() * (2 / (x.norm() + x.z()));
-    products += u * (pixel - lens.center_px()).array();
+    products += u * (pixel - lens.principal_point_px()).array();
     squares += u.square();
   }
   const Eigen::Array2d focal_px = products / squares;
-  return {focal_px.x(), focal_px.y(), lens.center_px().x(), lens.center_px().y()};
+  return {focal_px.x(), focal_px.y(), lens.principal_point_px().x(), lens.principal_point_px().y()};
 }
 
 }  // namespace vlp

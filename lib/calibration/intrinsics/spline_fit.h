@@ -22,25 +22,26 @@ namespace vlp {
 /// @param lens_from_splined  rotation from the frame of the splined lens to that of `lens`
 /// @return std::nullopt if the rays do not determine a + b ux + c uy + d ux uy: the pieces are
 ///     about as large as the image, or outside it
-/// @pre is_splined(model); the core is fx, fy, cx, cy
-std::optional<std::vector<double>> fit_splined_lens(
+/// @pre is_splined_lens_model(model); the core is fx, fy, cx, cy
+std::optional<std::vector<double>> fit_splined_lens_to_lens(
     const Lens& lens, const std::array<int, 2>& imager_px, LensModel model,
     const std::vector<double>& core,
     const Eigen::Matrix3d& lens_from_splined = Eigen::Matrix3d::Identity());
 
-/// Describes in one line why fit_splined_lens() fails: the field of view of the lens, and a splined
-/// model with which it succeeds, if there is one.
-std::string describe_too_coarse_grid(const Lens& lens, const std::array<int, 2>& imager_px,
-                                     LensModel model, const std::vector<double>& core);
+/// Describes in one line why fit_splined_lens_to_lens() fails: the field of view of the lens, and a
+/// splined model with which it succeeds, if there is one.
+std::string describe_too_coarse_spline_grid(const Lens& lens, const std::array<int, 2>& imager_px,
+                                            LensModel model, const std::vector<double>& core);
 
 /// Returns a grid that extends to `u` off the axis along x and y, in the stereographic plane,
 /// within the bounds of grids. Its order and number of control points along x are those of `grid`.
-SplineGrid extend_grid(const SplineGrid& grid, const Eigen::Vector2d& u);
+SplineGrid extend_spline_grid(const SplineGrid& grid, const Eigen::Vector2d& u);
 
 /// Computes the core of a splined lens in the frame of a lens that minimizes the control points, by
 /// least squares over the pixels. The core has the center of the lens, and the focal lengths of the
 /// stereographic lens around it.
 /// @pre the lens has rays at some of the pixels
-std::vector<double> fit_spline_core(const Lens& lens, std::span<const Eigen::Vector2d> pixels);
+std::vector<double> fit_splined_lens_core(const Lens& lens,
+                                          std::span<const Eigen::Vector2d> pixels);
 
 }  // namespace vlp

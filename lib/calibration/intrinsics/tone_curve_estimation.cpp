@@ -19,7 +19,7 @@ namespace vlp {
 namespace {
 
 /// Returns the detection with corners corrected for one of kGammas.
-BoardDetection correct_for_curve(const BoardDetection& seen, std::size_t curve) {
+BoardDetection correct_corners_for_tone_curve(const BoardDetection& seen, std::size_t curve) {
   BoardDetection corrected;
   for (const TagDetection& tag : seen.tags) {
     if (curve == 0 || tag.tone_curve_fits.empty()) {
@@ -39,7 +39,7 @@ std::vector<const BoardDetection*> select_detections(const std::vector<BoardView
   constexpr std::size_t max_views = 24;
   std::vector<const BoardDetection*> sufficient;
   for (const BoardView& view : views) {
-    if (lattice.sufficient(view.seen)) sufficient.push_back(&view.seen);
+    if (lattice.has_sufficient_corners(view.seen)) sufficient.push_back(&view.seen);
   }
   if (sufficient.size() <= max_views) return sufficient;
   std::vector<const BoardDetection*> selected;
@@ -49,8 +49,8 @@ std::vector<const BoardDetection*> select_detections(const std::vector<BoardView
 }
 
 /// Solves OPENCV8 and OPENCV_FISHEYE and returns the solution with the smaller residuals.
-IntrinsicsSolution solve_better_model(IntrinsicsInput input) {
-  auto fisheye = may_be_wide(input) ? fit_fisheye(input) : std::nullopt;
+IntrinsicsSolution solve_better_fitting_model(IntrinsicsInput input) {
+  auto fisheye = may_be_wide_angle_lens(input) ? fit_fisheye_lens(input) : std::nullopt;
   if (fisheye && fisheye->farthest_rad >= kRightAngle_rad) return std::move(fisheye->solution);
   input.lens_model = LensModel::opencv8;
   IntrinsicsSolution solution = solve_intrinsics(input);
@@ -72,8 +72,8 @@ std::optional<double> compute_median_sd_px(const IntrinsicsInput& input) {
 
 /// Returns the RMS residual of the lens for each curve, divided by the noise of the corners;
 /// std::nullopt if no lens is found.
-std::optional<PerCurve> compute_noise_ratios(const std::vector<BoardView>& views,
-                                             const Board& board) {
+std::optional<PerCurve> compute_residual_noise_ratios(const std::vector<BoardView>& views,
+                                                      const Board& board) {
   constexpr double exact_px = 1e-6;
   IntrinsicsInput input{BoardLattice(board), {}, views.front().imager_px, LensModel::opencv8};
   auto selected = select_detections(views, input.lattice);
@@ -81,10 +81,11 @@ std::optional<PerCurve> compute_noise_ratios(const std::vector<BoardView>& views
   for (std::size_t curve = 0; curve < ratios.size(); ++curve) {
     input.views.clear();
     for (const BoardDetection* seen : selected) {
-      input.views.push_back(input.lattice.corners(correct_for_curve(*seen, curve)));
+      input.views.push_back(
+          input.lattice.match_corners_to_flat_board(correct_corners_for_tone_curve(*seen, curve)));
     }
     const IntrinsicsSolution solution =
-        curve == 0 ? solve_better_model(input) : solve_intrinsics(input);
+        curve == 0 ? solve_better_fitting_model(input) : solve_intrinsics(input);
     const auto noise_px = compute_median_sd_px(input);
     if (!solution.ok() || !noise_px) return {};
     ratios[curve] = std::max(solution.rms_px, exact_px) / *noise_px;
@@ -100,9 +101,9 @@ std::optional<PerCurve> compute_noise_ratios(const std::vector<BoardView>& views
   return ratios;
 }
 
-bool has_level_costs(const BoardView& view) { return !view.seen.curve_costs.empty(); }
+bool has_gray_level_costs(const BoardView& view) { return !view.seen.curve_costs.empty(); }
 
-bool may_have_curve(const BoardView& view) {
+bool may_have_tone_curve(const BoardView& view) {
   return std::ranges::any_of(view.seen.tags,
                              [](const TagDetection& tag) { return !tag.tone_curve_fits.empty(); });
 }
@@ -112,20 +113,20 @@ bool may_have_curve(const BoardView& view) {
 double estimate_and_apply_tone_curve(std::vector<BoardView>& views, const Board& board) {
   constexpr double levels_sd = 0.2, residuals = 50;
   const PerCurve level_costs = sum_tone_curve_costs(views);
-  const bool has_no_curve = 2 * std::ranges::count_if(views, may_have_curve) <=
-                            std::ranges::count_if(views, has_level_costs);
-  if (has_no_curve || !check_board(board, views, {}).problem.empty())
-    return apply_tone_curve(views, level_costs);
-  const auto ratios = compute_noise_ratios(views, board);
-  if (!ratios) return apply_tone_curve(views, level_costs);
-  const double levels_gamma = estimate_gamma(level_costs);
+  const bool has_no_curve = 2 * std::ranges::count_if(views, may_have_tone_curve) <=
+                            std::ranges::count_if(views, has_gray_level_costs);
+  if (has_no_curve || !check_board_layout(board, views, {}).problem.empty())
+    return correct_views_for_tone_curve(views, level_costs);
+  const auto ratios = compute_residual_noise_ratios(views, board);
+  if (!ratios) return correct_views_for_tone_curve(views, level_costs);
+  const double levels_gamma = estimate_tone_curve_gamma(level_costs);
   const double n = residuals / *std::ranges::min_element(*ratios);
   PerCurve costs{};
   for (std::size_t i = 0; i < costs.size(); ++i) {
     const double off = std::log(kGammas[i] / levels_gamma) / levels_sd;
     costs[i] = n * std::log((*ratios)[i]) + off * off / 2;
   }
-  return apply_tone_curve(views, costs);
+  return correct_views_for_tone_curve(views, costs);
 }
 
 }  // namespace vlp

@@ -13,7 +13,7 @@ namespace vlp {
 /// `views` for it. Returns gamma; 1 if there is no tone curve.
 ///
 /// Minimizes over kGammas
-///   cost(gamma) = n log ratio(gamma) + (log(gamma / gamma_levels) / 0.2)^2 / 2
+///   compute_cost(gamma) = n log ratio(gamma) + (log(gamma / gamma_levels) / 0.2)^2 / 2
 /// with
 ///   ratio         RMS residual of the lens fit for corners corrected with gamma, divided by the
 ///                 median standard deviation of the corners from pixel noise; OPENCV8 or
@@ -21,13 +21,13 @@ namespace vlp {
 ///   n             50 / min(ratio), an effective number of residuals
 ///   gamma_levels  estimate from the gray values next to the edges (sum_tone_curve_costs())
 ///
-/// Uses gamma_levels alone if no lens is found, if check_board() reports another board, or if at
-/// least half of the views with usable gray values show no curve. Uses at most 24 views.
+/// Uses gamma_levels alone if no lens is found, if check_board_layout() reports another board, or
+/// if at least half of the views with usable gray values show no curve. Uses at most 24 views.
 ///
 /// Reason for both terms: gray values are precise but biased by JPEG and sharpening (20 % RMS of
 /// gamma). A wrong curve displaces edges by fractions of their blur, which differ from tag to tag
-/// with its width. No lens and no smooth edge shift of a view (estimate_tag_edge_shifts()) absorbs
-/// such displacements.
+/// with its width. No lens and no smooth edge shift of a view (estimate_tag_edge_displacements())
+/// absorbs such displacements.
 ///
 /// Reason for n: thousands of residuals do not determine gamma as precisely as exact ratios would.
 /// With n, a ratio of 2 % weighs as much as the gray values, and less if the noise explains few of

@@ -11,7 +11,8 @@ namespace vlp {
 namespace {
 
 /// Returns a positive value if c lies clockwise of the line from a to b in the image (y down).
-double side(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
+double compute_side_of_line(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
+                            const Eigen::Vector2d& c) {
   const Eigen::Vector2d u = b - a, v = c - a;
   return u.x() * v.y() - u.y() * v.x();
 }
@@ -24,7 +25,8 @@ ImageRegion compute_convex_hull(std::vector<Eigen::Vector2d> points) {
   const auto chain = [](auto first, auto last) {
     ImageRegion part;
     for (; first != last; ++first) {
-      while (part.size() > 1 && side(part[part.size() - 2], part.back(), *first) <= 0) {
+      while (part.size() > 1 &&
+             compute_side_of_line(part[part.size() - 2], part.back(), *first) <= 0) {
         part.pop_back();
       }
       part.push_back(*first);
@@ -57,10 +59,10 @@ ImageRegion clip_polygon(const ImageRegion& region, int axis, double limit, doub
 
 }  // namespace
 
-ImageRegion compute_known_region(const std::vector<Eigen::Vector2d>& corners_px,
-                                 const std::array<int, 2>& imager_px, LensModel model,
-                                 bool other_model_fits) {
-  const double margin = is_splined(model) || other_model_fits ? 0 : 0.04;
+ImageRegion compute_valid_lens_region(const std::vector<Eigen::Vector2d>& corners_px,
+                                      const std::array<int, 2>& imager_px, LensModel model,
+                                      bool other_model_fits) {
+  const double margin = is_splined_lens_model(model) || other_model_fits ? 0 : 0.04;
   const Eigen::Vector2d last(imager_px[0] - 1, imager_px[1] - 1);
   const double margin_px = margin * last.norm();
   // Extends the hull by a square: near a corner of the image it reaches both edges.
@@ -77,11 +79,12 @@ ImageRegion compute_known_region(const std::vector<Eigen::Vector2d>& corners_px,
     region = clip_polygon(region, axis, last[axis], 1);
   }
   constexpr double whole = 0.985;
-  if (compute_image_fraction(region, imager_px) < whole) return region;
+  if (compute_fraction_of_image_area(region, imager_px) < whole) return region;
   return {{0, 0}, {last.x(), 0}, last, {0, last.y()}};
 }
 
-double compute_image_fraction(const ImageRegion& region, const std::array<int, 2>& imager_px) {
+double compute_fraction_of_image_area(const ImageRegion& region,
+                                      const std::array<int, 2>& imager_px) {
   return compute_polygon_area(region) / ((imager_px[0] - 1.0) * (imager_px[1] - 1.0));
 }
 

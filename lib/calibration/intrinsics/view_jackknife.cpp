@@ -24,8 +24,9 @@ struct Layout {
 
 /// Computes the equations of `count` columns of the transposed Jacobian, with the boards from
 /// `pose` on.
-ReducedEquations reduce_equations(const Linearization& at, const Layout& layout, Eigen::Index first,
-                                  Eigen::Index count, Eigen::Index pose, Eigen::Index boards) {
+ReducedEquations compute_reduced_equations(const Linearization& at, const Layout& layout,
+                                           Eigen::Index first, Eigen::Index count,
+                                           Eigen::Index pose, Eigen::Index boards) {
   const Eigen::Index shared = layout.shared(), num_pose_states = 6 * boards;
   Eigen::MatrixXd normal =
       Eigen::MatrixXd::Zero(shared + num_pose_states, shared + num_pose_states);
@@ -55,7 +56,7 @@ ReducedEquations reduce_equations(const Linearization& at, const Layout& layout,
 
 }  // namespace
 
-Eigen::MatrixXd estimate_covariance_by_views(const IntrinsicsSolution& solution) {
+Eigen::MatrixXd estimate_jackknife_covariance(const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
   const Linearization at = linearize(problem, solution.solved_for);
   const auto views = static_cast<Eigen::Index>(solution.views.size());
@@ -67,11 +68,12 @@ Eigen::MatrixXd estimate_covariance_by_views(const IntrinsicsSolution& solution)
   std::vector<ReducedEquations> all_equations;
   all_equations.reserve(solution.views.size());
   for (Eigen::Index view = 0; view < views; ++view) {
-    all_equations.push_back(reduce_equations(at, layout, view * rows_of_view, rows_of_view,
-                                             view * boards / views, boards / views));
+    all_equations.push_back(compute_reduced_equations(at, layout, view * rows_of_view, rows_of_view,
+                                                      view * boards / views, boards / views));
   }
   Eigen::MatrixXd normal =
-      reduce_equations(at, layout, rows, at.jacobian_transposed.cols() - rows, 0, 0).normal;
+      compute_reduced_equations(at, layout, rows, at.jacobian_transposed.cols() - rows, 0, 0)
+          .normal;
   for (const ReducedEquations& view_equations : all_equations) normal += view_equations.normal;
 
   Eigen::MatrixXd changes = Eigen::MatrixXd::Zero(intrinsics, views);

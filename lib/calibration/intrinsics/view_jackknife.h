@@ -19,6 +19,6 @@ namespace vlp {
 /// by a relative 1 / sqrt(2 (n - 1)), and often too large. Infinite if the remaining views do not
 /// determine a lens.
 /// @pre solution.ok()
-Eigen::MatrixXd estimate_covariance_by_views(const IntrinsicsSolution& solution);
+Eigen::MatrixXd estimate_jackknife_covariance(const IntrinsicsSolution& solution);
 
 }  // namespace vlp

@@ -21,15 +21,15 @@ struct RigidPose {
   Eigen::Matrix3d rotation;
   Eigen::Vector3d translation_m;
 
-  Eigen::Vector3d in_camera(const Eigen::Vector3d& in_board_m) const {
+  Eigen::Vector3d transform_to_camera(const Eigen::Vector3d& in_board_m) const {
     return rotation * in_board_m + translation_m;
   }
 };
 
-double compute_squares(Corners corners, const Lens& lens, const RigidPose& pose) {
+double compute_squared_residuals(Corners corners, const Lens& lens, const RigidPose& pose) {
   double squares = 0;
   for (const auto& corner : corners) {
-    const auto pixel = lens.project(pose.in_camera(corner.in_board_m));
+    const auto pixel = lens.project(pose.transform_to_camera(corner.in_board_m));
     if (!pixel) return INFINITY;
     squares += corner.weight * corner.weight * (*pixel - corner.pixel).squaredNorm();
   }
@@ -38,17 +38,18 @@ double compute_squares(Corners corners, const Lens& lens, const RigidPose& pose)
 
 /// Returns the pose after a step that minimizes the linearized residuals; the rotation is updated
 /// from the left.
-std::optional<RigidPose> compute_step(Corners corners, const Lens& lens, const RigidPose& pose,
-                                      double damping) {
+std::optional<RigidPose> compute_pose_step(Corners corners, const Lens& lens, const RigidPose& pose,
+                                           double damping) {
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
   for (const auto& corner : corners) {
-    const Eigen::Vector3d point = pose.in_camera(corner.in_board_m);
+    const Eigen::Vector3d point = pose.transform_to_camera(corner.in_board_m);
     const auto projection = lens.project_with_jacobians(point);
     if (!projection) return {};
     const Eigen::Vector3d rotated = point - pose.translation_m;
     Eigen::Matrix<double, 2, 6> jacobian;
-    jacobian << -projection->d_pixel_d_point * cross_matrix(rotated), projection->d_pixel_d_point;
+    jacobian << -projection->d_pixel_d_point * skew_symmetric_matrix(rotated),
+        projection->d_pixel_d_point;
     jacobian *= corner.weight;
     normal += jacobian.transpose() * jacobian;
     right += jacobian.transpose() * (corner.weight * (corner.pixel - projection->pixel));
@@ -67,11 +68,11 @@ std::optional<ViewPose> refine_pose(Corners corners, const Lens& lens, RigidPose
   constexpr int max_iterations = 20;
   constexpr double tolerance = 1e-4;  // relative reduction of the squares by a step
   double damping = 1e-4;
-  double squares = compute_squares(corners, lens, pose);
+  double squares = compute_squared_residuals(corners, lens, pose);
   if (!std::isfinite(squares)) return {};
   for (int step = 0; step < max_iterations; ++step) {
-    const auto next = compute_step(corners, lens, pose, damping);
-    const double next_squares = next ? compute_squares(corners, lens, *next) : INFINITY;
+    const auto next = compute_pose_step(corners, lens, pose, damping);
+    const double next_squares = next ? compute_squared_residuals(corners, lens, *next) : INFINITY;
     if (next_squares < squares) {
       const bool has_converged = squares - next_squares < tolerance * squares;
       pose = *next;
@@ -88,7 +89,7 @@ std::optional<ViewPose> refine_pose(Corners corners, const Lens& lens, RigidPose
                   std::sqrt(squares / (2 * static_cast<double>(corners.size())))};
 }
 
-RigidPose make_pose(const cv::Mat& rotation, const cv::Mat& translation) {
+RigidPose make_rigid_pose(const cv::Mat& rotation, const cv::Mat& translation) {
   const Eigen::Vector3d r(rotation.ptr<double>()), t(translation.ptr<double>());
   const double angle = r.norm();
   const Eigen::Vector3d axis = angle > 0 ? (r / angle).eval() : Eigen::Vector3d::UnitX();
@@ -97,7 +98,7 @@ RigidPose make_pose(const cv::Mat& rotation, const cv::Mat& translation) {
 
 }  // namespace
 
-std::optional<ViewPose> estimate_view_pose(Corners corners, const Lens& lens) {
+std::optional<ViewPose> estimate_board_view_pose(Corners corners, const Lens& lens) {
   // Rotates the camera towards the board, which may be 90 degrees off the axis.
   std::vector<std::pair<const BoardLattice::Corner*, Eigen::Vector3d>> rays;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
@@ -123,7 +124,7 @@ std::optional<ViewPose> estimate_view_pose(Corners corners, const Lens& lens) {
                       translations, false, cv::SOLVEPNP_IPPE);
   std::optional<ViewPose> best;
   for (std::size_t i = 0; i < rotations.size(); ++i) {
-    const RigidPose rotated = make_pose(rotations[i], translations[i]);
+    const RigidPose rotated = make_rigid_pose(rotations[i], translations[i]);
     const auto pose = refine_pose(corners, lens,
                                   {turned_from_camera.transpose() * rotated.rotation,
                                    turned_from_camera.transpose() * rotated.translation_m});

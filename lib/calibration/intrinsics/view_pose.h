@@ -25,7 +25,7 @@ struct ViewPose {
 /// plane-based pose estimation", 2014). They are refined in pixels by the method of Levenberg and
 /// Marquardt, and compared.
 /// @return std::nullopt for fewer than four corners, or if neither pose can be projected
-std::optional<ViewPose> estimate_view_pose(std::span<const BoardLattice::Corner> corners,
-                                           const Lens& lens);
+std::optional<ViewPose> estimate_board_view_pose(std::span<const BoardLattice::Corner> corners,
+                                                 const Lens& lens);
 
 }  // namespace vlp

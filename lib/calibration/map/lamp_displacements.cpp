@@ -26,7 +26,7 @@ std::size_t count_detections(const std::vector<CeilingView>& views) {
 }
 
 /// Removes detections that do not connect a lamp to other lamps.
-void remove_unconnected(std::vector<CeilingView>& views) {
+void remove_unconnected_detections(std::vector<CeilingView>& views) {
   constexpr std::size_t min_lamps = 3;
   constexpr int min_captures = 2;
   for (std::size_t removed = 1; removed > 0;) {
@@ -56,7 +56,7 @@ Eigen::MatrixXd make_similarity_basis(const std::vector<Eigen::Vector2d>& points
     moves.block<2, 1>(2 * i, 3) = point * scales[static_cast<std::size_t>(i)];
   }
   const auto [squares, directions] =
-      decompose_symmetric(Eigen::MatrixXd(moves.transpose() * moves));
+      eigendecompose_symmetric(Eigen::MatrixXd(moves.transpose() * moves));
   constexpr double numeric_tolerance = 1e-12;
   const auto rank = (squares.array() > numeric_tolerance * squares.maxCoeff()).count();
   return moves * directions.rightCols(rank) *
@@ -126,7 +126,7 @@ std::optional<LampDisplacements> solve(const LampMap& map, const std::vector<Cei
     column[lamp] = 2 * std::ssize(found.lamps);
     found.lamps.push_back(lamp);
     found.captures.push_back(count);
-    found.map_m.emplace_back(find_lamp(map.lamps, lamp)->position_m.head<2>());
+    found.map_m.emplace_back(find_lamp_by_id(map.lamps, lamp)->position_m.head<2>());
   }
   const Eigen::Index size = 2 * std::ssize(found.lamps), unknowns = size + (tilt_is_free ? 2 : 0);
   const Eigen::MatrixXd gauge = make_gauge_basis(found.map_m);
@@ -154,7 +154,7 @@ std::optional<LampDisplacements> solve(const LampMap& map, const std::vector<Cei
   }
   normal = (projector * normal * projector).eval();
   normal.topLeftCorner(size, size) += gauge * gauge.transpose();
-  const auto [weights, directions] = decompose_symmetric(normal);
+  const auto [weights, directions] = eigendecompose_symmetric(normal);
   constexpr double numeric_tolerance = 1e-12;
   if (!(weights.minCoeff() > numeric_tolerance * weights.maxCoeff())) return std::nullopt;
   const Eigen::MatrixXd inverse =
@@ -187,10 +187,11 @@ bool reject_outliers(std::vector<CeilingView>& views, const LampDisplacements& f
   }
   const double largest_m = std::sqrt(*std::max_element(squares_m2.begin(), squares_m2.end()));
   const double variance_m2 =
-      robust_planar_variance(std::move(squares_m2), found.degrees_of_freedom);
+      estimate_robust_variance_2d(std::move(squares_m2), found.degrees_of_freedom);
   const double limit_m =
       std::max({numeric_tolerance_m,
-                std::sqrt(planar_outlier_bound(max_sigmas, found.degrees_of_freedom) * variance_m2),
+                std::sqrt(compute_squared_outlier_bound_2d(max_sigmas, found.degrees_of_freedom) *
+                          variance_m2),
                 largest_m / 2});
   bool any = false;
   for (std::size_t c = 0; c < views.size(); ++c) {
@@ -214,11 +215,11 @@ std::optional<LampDisplacements> estimate_lamp_displacements(const LampMap& map,
                                                              std::vector<CeilingView> views,
                                                              bool tilt_is_free) {
   std::map<int, std::vector<double>> outliers_m;
-  remove_unconnected(views);
+  remove_unconnected_detections(views);
   const std::size_t detections = count_detections(views);
   std::optional<LampDisplacements> found = solve(map, views, tilt_is_free);
   while (found && reject_outliers(views, *found, outliers_m)) {
-    remove_unconnected(views);
+    remove_unconnected_detections(views);
     found = solve(map, views, tilt_is_free);
   }
   if (!found) return std::nullopt;
@@ -229,29 +230,29 @@ std::optional<LampDisplacements> estimate_lamp_displacements(const LampMap& map,
   return found;
 }
 
-std::optional<Eigen::Vector2d> compute_offset_from_others(
+std::optional<Eigen::Vector2d> compute_lamp_offset_relative_to_others(
     const LampDisplacements& found, std::size_t lamp, const std::vector<std::size_t>& excluded) {
   std::vector<Eigen::Vector2d> from_m, to_m;
   for (std::size_t i = 0; i < found.lamps.size(); ++i) {
     if (std::find(excluded.begin(), excluded.end(), i) != excluded.end()) continue;
-    from_m.push_back(found.displaced_m(i));
+    from_m.push_back(found.displaced_position_m(i));
     to_m.push_back(found.map_m[i]);
   }
-  const auto to_map = fit_similarity(
+  const auto to_map = fit_similarity_transform(
       from_m.size(), [&](std::size_t i) { return from_m[i]; },
       [&](std::size_t i) { return to_m[i]; });
   if (!to_map) return std::nullopt;
-  return to_map->offset + complex_product(to_map->factor, found.displaced_m(lamp)) -
+  return to_map->offset + complex_product(to_map->factor, found.displaced_position_m(lamp)) -
          found.map_m[lamp];
 }
 
-std::vector<LampOffset> compute_offsets_from_others(const LampDisplacements& found) {
+std::vector<LampOffset> compute_offsets_from_other_lamps(const LampDisplacements& found) {
   constexpr double min_own_fraction = 1e-3;
   std::vector<LampOffset> offsets;
   for (std::size_t i = 0; i < found.lamps.size(); ++i) {
     const auto row = 2 * static_cast<Eigen::Index>(i);
     const double own_fraction = found.projector(row, row);
-    const auto offset_m = compute_offset_from_others(found, i, {i});
+    const auto offset_m = compute_lamp_offset_relative_to_others(found, i, {i});
     if (own_fraction < min_own_fraction || !offset_m) continue;
     const Eigen::Vector2d sd_m =
         found.covariance_m2.diagonal().segment<2>(row).cwiseMax(0).cwiseSqrt() / own_fraction;

@@ -65,7 +65,7 @@ struct LampDisplacements {
   double inlier_fraction = 1;
 
   /// Returns the displaced position of a lamp, up to a similarity of all lamps.
-  Eigen::Vector2d displaced_m(std::size_t lamp) const {
+  Eigen::Vector2d displaced_position_m(std::size_t lamp) const {
     return map_m[lamp] + displacement_m.segment<2>(2 * static_cast<Eigen::Index>(lamp));
   }
 };
@@ -88,12 +88,11 @@ std::optional<LampDisplacements> estimate_lamp_displacements(const LampMap& map,
 
 /// Returns the offset of a lamp after the similarity that maps the lamps without `excluded` to the
 /// map. Returns std::nullopt if there is no such similarity.
-std::optional<Eigen::Vector2d> compute_offset_from_others(const LampDisplacements& found,
-                                                          std::size_t lamp,
-                                                          const std::vector<std::size_t>& excluded);
+std::optional<Eigen::Vector2d> compute_lamp_offset_relative_to_others(
+    const LampDisplacements& found, std::size_t lamp, const std::vector<std::size_t>& excluded);
 
 /// Computes the offset of each lamp from the similarity that fits the other lamps best. Omits lamps
 /// whose offset the other lamps do not determine.
-std::vector<LampOffset> compute_offsets_from_others(const LampDisplacements& found);
+std::vector<LampOffset> compute_offsets_from_other_lamps(const LampDisplacements& found);
 
 }  // namespace vlp

@@ -40,7 +40,7 @@ std::vector<LevelRay> compute_level_rays(const Frame& frame, const LampMap& map,
   std::map<int, int> counts;
   for (const Detection& detection : frame.detections) ++counts[detection.lamp];
   for (const Detection& detection : frame.detections) {
-    const Lamp* lamp = find_lamp(map.lamps, detection.lamp);
+    const Lamp* lamp = find_lamp_by_id(map.lamps, detection.lamp);
     if (lamp == nullptr || counts[lamp->id] > 1) continue;
     const auto ray = lens.unproject(detection.pixel);
     if (!ray) continue;
@@ -68,7 +68,7 @@ std::vector<Eigen::Vector2d> compute_displaced_positions(const LampDisplacements
   Eigen::Vector2d mean_m(0, 0);
   std::vector<Eigen::Vector2d> positions_m;
   for (std::size_t i = 0; i < found.lamps.size(); ++i) {
-    positions_m.push_back(found.displaced_m(i));
+    positions_m.push_back(found.displaced_position_m(i));
     mean_m += positions_m.back() / static_cast<double>(found.lamps.size());
   }
   const double scale = rms_radius(found.map_m) / rms_radius(positions_m);
@@ -96,7 +96,7 @@ std::optional<CeilingView> project(const std::vector<LevelRay>& rays,
   constexpr int iterations = 3;
   constexpr double max_factor = 1.25;  // beyond it the fit is meaningless
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    const auto fit = fit_similarity(
+    const auto fit = fit_similarity_transform(
         z.size(), [&](std::size_t i) -> Eigen::Vector2d { return above_m(i) * z[i]; },
         [&](std::size_t i) { return lamps_m[i]; });
     if (!fit) break;
@@ -122,8 +122,9 @@ struct MapCaptures {
   const MapErrorOptions& options;
   const Lens lens{calibration.camera.lens_model, calibration.camera.intrinsics};
   /// Projects the captures with three lamps or more.
-  std::vector<CeilingView> views(const LampMap& map, const Eigen::Matrix3d& base_from_camera,
-                                 const LampPositions& positions_m) const {
+  std::vector<CeilingView> make_ceiling_views(const LampMap& map,
+                                              const Eigen::Matrix3d& base_from_camera,
+                                              const LampPositions& positions_m) const {
     constexpr std::size_t min_lamps = 3;
     std::vector<CeilingView> views;
     const auto& inclinations = options.inclinations;
@@ -143,7 +144,7 @@ struct MapCaptures {
 
   /// Estimates the displacements. Iterates, because the equations are linearized at the pose of
   /// each capture with respect to the tilt and to differences of height.
-  std::optional<LampDisplacements> displacements(const LampMap& map) const {
+  std::optional<LampDisplacements> estimate_displacements(const LampMap& map) const {
     constexpr int max_iterations = 8;
     constexpr double tolerance_m = 1e-6;
     const bool tilt_is_free = !calibration.rotation_center;
@@ -154,8 +155,8 @@ struct MapCaptures {
     for (const Lamp& lamp : map.lamps) positions_m[lamp.id] = lamp.position_m.head<2>();
     std::optional<LampDisplacements> found;
     for (int iteration = 0; iteration < max_iterations; ++iteration) {
-      found =
-          estimate_lamp_displacements(map, views(map, base_from_camera, positions_m), tilt_is_free);
+      found = estimate_lamp_displacements(
+          map, make_ceiling_views(map, base_from_camera, positions_m), tilt_is_free);
       if (!found) return std::nullopt;
       double change_m = found->tilt.norm() * rms_radius(found->map_m);
       const std::vector<Eigen::Vector2d> displaced_m = compute_displaced_positions(*found);
@@ -189,27 +190,28 @@ class DisplacementTest {
     const Eigen::Index size = found.displacement_m.size();
     Eigen::MatrixXd covariance = found.covariance_m2;
     for (Eigen::Index i = 0; i < size; ++i) {
-      const auto sd_m = find_lamp(map.lamps, found.lamps[static_cast<std::size_t>(i / 2)])->sd_m;
+      const auto sd_m =
+          find_lamp_by_id(map.lamps, found.lamps[static_cast<std::size_t>(i / 2)])->sd_m;
       variance_is_known_ = variance_is_known_ && sd_m;
       covariance(i, i) += sd_m.value_or(0) * sd_m.value_or(0) + kNumericVariance_m2;
     }
-    const auto range = decompose_symmetric(found.projector);
+    const auto range = eigendecompose_symmetric(found.projector);
     const Eigen::Index rank = (range.values.array() > 0.5).count();
     const Eigen::MatrixXd basis = range.vectors.rightCols(rank);
     const auto [values, vectors] =
-        decompose_symmetric(Eigen::MatrixXd(basis.transpose() * covariance * basis));
+        eigendecompose_symmetric(Eigen::MatrixXd(basis.transpose() * covariance * basis));
     variances_m2_ = values.cwiseMax(kNumericVariance_m2);
     basis_ = basis * vectors;
     coordinates_ = basis_.transpose() * found.displacement_m;
   }
 
-  Eigen::Index rank() const { return basis_.cols(); }
+  Eigen::Index count_determined_unknowns() const { return basis_.cols(); }
 
   /// Fits offsets of the free lamps to the coordinates, with the variance of the other lamps.
-  Fit fit(const std::vector<std::size_t>& free, double added_m2) const {
+  Fit fit_map_errors(const std::vector<std::size_t>& free, double added_m2) const {
     const auto size = 2 * std::ssize(free);
     const Eigen::ArrayXd weights = (variances_m2_.array() + added_m2).inverse();
-    Eigen::MatrixXd jacobian(size, rank());
+    Eigen::MatrixXd jacobian(size, count_determined_unknowns());
     for (Eigen::Index k = 0; k < size; k += 2) {
       const auto lamp = static_cast<Eigen::Index>(free[static_cast<std::size_t>(k / 2)]);
       jacobian.middleRows<2>(k) = basis_.middleRows<2>(2 * lamp);
@@ -225,30 +227,31 @@ class DisplacementTest {
   }
 
   /// Returns the variance to add to the known ones, so that chi^2 equals its degrees of freedom.
-  double added_variance_m2(const std::vector<std::size_t>& free) const {
-    const double freedom = static_cast<double>(rank() - 2 * std::ssize(free));
+  double compute_added_variance_m2(const std::vector<std::size_t>& free) const {
+    const double freedom = static_cast<double>(count_determined_unknowns() - 2 * std::ssize(free));
     double low = 0, high = coordinates_.squaredNorm() / freedom;
-    if (fit(free, 0).chi_squared <= freedom) return 0;
+    if (fit_map_errors(free, 0).chi_squared <= freedom) return 0;
     constexpr int iterations = 60;
     for (int iteration = 0; iteration < iterations; ++iteration) {
       const double middle = low + (high - low) / 2;
-      (fit(free, middle).chi_squared > freedom ? low : high) = middle;
+      (fit_map_errors(free, middle).chi_squared > freedom ? low : high) = middle;
     }
     return high;
   }
 
   /// Returns the bound of a drop of chi^2 if `tests` sets of `free` lamps are tested together.
-  double bound(std::size_t free, double tests) const {
+  double compute_displacement_bound(std::size_t free, double tests) const {
     const double exponent = -2 * std::log(kFalseAlarm / tests);
     if (variance_is_known_) return exponent;
-    const double freedom = static_cast<double>(rank()) - 2 * static_cast<double>(free);
+    const double freedom =
+        static_cast<double>(count_determined_unknowns()) - 2 * static_cast<double>(free);
     return freedom * std::expm1(exponent / freedom);
   }
 
   /// Adds the lamp, other than `excluded`, that reduces chi^2 most together with the free ones.
   /// Returns chi^2.
-  double add_best(std::vector<std::size_t>& free, double added_m2,
-                  std::optional<std::size_t> excluded = {}) const {
+  double add_best_explaining_error(std::vector<std::size_t>& free, double added_m2,
+                                   std::optional<std::size_t> excluded = {}) const {
     std::size_t best = 0;
     double smallest = std::numeric_limits<double>::infinity();
     free.push_back(0);
@@ -257,7 +260,7 @@ class DisplacementTest {
         continue;
       }
       free.back() = lamp;
-      const double chi_squared = fit(free, added_m2).chi_squared;
+      const double chi_squared = fit_map_errors(free, added_m2).chi_squared;
       if (chi_squared < smallest) std::tie(smallest, best) = std::pair(chi_squared, lamp);
     }
     free.back() = best;
@@ -271,11 +274,12 @@ class DisplacementTest {
     for (std::size_t k = 0; k < free.size(); ++k) {
       sets *= static_cast<double>(lamps_ - k) / static_cast<double>(k + 1);
     }
-    const double limit = fit(free, added_m2).chi_squared + bound(free.size(), sets);
+    const double limit =
+        fit_map_errors(free, added_m2).chi_squared + compute_displacement_bound(free.size(), sets);
     return std::all_of(free.begin(), free.end(), [&](std::size_t lamp) {
       std::vector<std::size_t> other = free;
       std::erase(other, lamp);
-      return add_best(other, added_m2, lamp) > limit;
+      return add_best_explaining_error(other, added_m2, lamp) > limit;
     });
   }
 
@@ -295,7 +299,7 @@ struct OtherMap {
   LampMap map;
   std::optional<LampDisplacements> found = {};
 
-  double size_m() const {
+  double compute_room_size_m() const {
     return found ? found->displacement_m.norm() : std::numeric_limits<double>::infinity();
   }
 };
@@ -332,8 +336,8 @@ std::vector<OtherMap> make_swapped_maps(const LampDisplacements& found, const La
     const int second = found.lamps[static_cast<std::size_t>(i)];
     LampMap swapped = map;
     for (Lamp& lamp : swapped.lamps) {
-      if (lamp.id == first) lamp.position_m = find_lamp(map.lamps, second)->position_m;
-      if (lamp.id == second) lamp.position_m = find_lamp(map.lamps, first)->position_m;
+      if (lamp.id == first) lamp.position_m = find_lamp_by_id(map.lamps, second)->position_m;
+      if (lamp.id == second) lamp.position_m = find_lamp_by_id(map.lamps, first)->position_m;
     }
     maps.push_back({{MapErrorKind::swapped, {first, second}}, std::move(swapped)});
     if (maps.size() == 2) break;
@@ -342,14 +346,14 @@ std::vector<OtherMap> make_swapped_maps(const LampDisplacements& found, const La
 }
 
 /// Returns true if most detections are outliers, so that the remaining lamps prove nothing.
-bool is_contradicted(const std::optional<LampDisplacements>& found) {
+bool is_map_contradicted(const std::optional<LampDisplacements>& found) {
   constexpr double min_inlier_fraction = 0.5;
   return !found || found->inlier_fraction < min_inlier_fraction;
 }
 
 /// Returns true if the RMS displacement of the lamps exceeds the tolerance of Positioner, relative
 /// to the size of the map.
-bool is_other_room(const LampDisplacements& found) {
+bool is_map_of_other_room(const LampDisplacements& found) {
   constexpr double max_residual_fraction = 0.1;  // PositionerOptions::max_residual_share
   const double rms_m =
       found.displacement_m.norm() / std::sqrt(static_cast<double>(found.lamps.size()));
@@ -359,35 +363,36 @@ bool is_other_room(const LampDisplacements& found) {
 /// Returns true if a map explains the captures: most detections agree, and the displacement of the
 /// lamps is small. Survey errors stay far below this limit.
 bool explains_captures(const OtherMap& other) {
-  return !is_contradicted(other.found) && !is_other_room(*other.found);
+  return !is_map_contradicted(other.found) && !is_map_of_other_room(*other.found);
 }
 
 /// Finds two lamps that are swapped, or a mirrored map. The captures have to fit the alternative
 /// map far better than the original map, and two swapped lamps better than any other pair.
-std::optional<MapError> find_exchange(const MapCaptures& captures, const LampMap& map,
-                                      const std::optional<LampDisplacements>& found) {
+std::optional<MapError> find_swapped_lamps(const MapCaptures& captures, const LampMap& map,
+                                           const std::optional<LampDisplacements>& found) {
   std::vector<OtherMap> others;
   if (found) others = make_swapped_maps(*found, map);
-  if (!is_contradicted(found) && others.empty()) return std::nullopt;
+  if (!is_map_contradicted(found) && others.empty()) return std::nullopt;
   LampMap mirrored = map;
   for (Lamp& lamp : mirrored.lamps) lamp.position_m.y() *= -1;
   others.push_back({{MapErrorKind::mirrored}, std::move(mirrored)});
-  for (OtherMap& other : others) other.found = captures.displacements(other.map);
-  if (is_contradicted(found)) {
+  for (OtherMap& other : others) other.found = captures.estimate_displacements(other.map);
+  if (is_map_contradicted(found)) {
     const auto fits = std::ranges::find_if(others, explains_captures);
     return fits == others.end() ? std::nullopt : std::optional(fits->error);
   }
   // The mirror image of a square equals a square with two corners swapped.
-  const bool is_mirrored = others.back().size_m() <= 2 * others.front().size_m();
+  const bool is_mirrored =
+      others.back().compute_room_size_m() <= 2 * others.front().compute_room_size_m();
   const std::size_t best = is_mirrored ? others.size() - 1 : 0;
   if (!explains_captures(others[best])) return std::nullopt;
   const DisplacementTest test(*others[best].found, map);
-  const double added_m2 = test.added_variance_m2({});
+  const double added_m2 = test.compute_added_variance_m2({});
   const auto count = static_cast<double>(map.lamps.size());
-  const double limit =
-      test.fit({}, added_m2).chi_squared + test.bound(0, 1 + count * (count - 1) / 2);
+  const double limit = test.fit_map_errors({}, added_m2).chi_squared +
+                       test.compute_displacement_bound(0, 1 + count * (count - 1) / 2);
   const auto is_worse = [&](const std::optional<LampDisplacements>& other) {
-    return !other || DisplacementTest(*other, map).fit({}, added_m2).chi_squared > limit;
+    return !other || DisplacementTest(*other, map).fit_map_errors({}, added_m2).chi_squared > limit;
   };
   if (!is_worse(found)) return std::nullopt;
   if (!is_mirrored && others.size() > 2 && !is_worse(others[1].found)) return std::nullopt;
@@ -395,26 +400,27 @@ std::optional<MapError> find_exchange(const MapCaptures& captures, const LampMap
 }
 
 /// Finds the displaced lamps: the largest set in which each lamp is significant.
-std::vector<MapError> find_moved(const LampDisplacements& found, const DisplacementTest& test) {
+std::vector<MapError> find_moved_lamps(const LampDisplacements& found,
+                                       const DisplacementTest& test) {
   constexpr std::size_t max_lamps = 8;  // more lamps indicate an error of the whole map
   std::vector<std::size_t> free, moved;
   while (free.size() < max_lamps && 2 * (free.size() + 1) < found.lamps.size() &&
-         test.rank() > 2 * std::ssize(free) + 2) {
-    test.add_best(free, test.added_variance_m2(free));
-    if (test.is_significant(free, test.added_variance_m2(free))) {
+         test.count_determined_unknowns() > 2 * std::ssize(free) + 2) {
+    test.add_best_explaining_error(free, test.compute_added_variance_m2(free));
+    if (test.is_significant(free, test.compute_added_variance_m2(free))) {
       moved = free;
     }
   }
   std::vector<MapError> errors;
   if (moved.empty()) return errors;
-  const auto fit = test.fit(moved, test.added_variance_m2(moved));
+  const auto fit = test.fit_map_errors(moved, test.compute_added_variance_m2(moved));
   for (std::size_t k = 0; k < moved.size(); ++k) {
     const auto row = 2 * static_cast<Eigen::Index>(k);
     errors.push_back({MapErrorKind::moved, {found.lamps[moved[k]]}});
     MapError& error = errors.back();
     // Exact offset; the one in d is linearized.
-    error.offset_m.head<2>() =
-        compute_offset_from_others(found, moved[k], moved).value_or(fit.offsets_m.segment<2>(row));
+    error.offset_m.head<2>() = compute_lamp_offset_relative_to_others(found, moved[k], moved)
+                                   .value_or(fit.offsets_m.segment<2>(row));
     error.sd_m.head<2>() = fit.covariance_m2.diagonal().segment<2>(row).cwiseSqrt();
   }
   return errors;
@@ -422,8 +428,8 @@ std::vector<MapError> find_moved(const LampDisplacements& found, const Displacem
 
 /// Finds the lamp with most of the outliers: at least two, in more than 10 % of its captures. Their
 /// median has to exceed `min_outlier_m` and three standard deviations of the lamp's survey.
-std::optional<MapError> find_unsteady(const LampDisplacements& found, const LampMap& map,
-                                      double min_outlier_m) {
+std::optional<MapError> find_lamp_at_varying_position(const LampDisplacements& found,
+                                                      const LampMap& map, double min_outlier_m) {
   constexpr std::size_t min_outliers = 2;
   constexpr double min_fraction = 0.1, max_survey_sigmas = 3;
   std::size_t all = 0;
@@ -435,7 +441,7 @@ std::optional<MapError> find_unsteady(const LampDisplacements& found, const Lamp
                             ? 0
                             : found.captures[static_cast<std::size_t>(at - found.lamps.begin())];
     const std::size_t captures = count + static_cast<std::size_t>(others);
-    const double survey_m = max_survey_sigmas * find_lamp(map.lamps, lamp)->sd_m.value_or(0);
+    const double survey_m = max_survey_sigmas * find_lamp_by_id(map.lamps, lamp)->sd_m.value_or(0);
     if (count < min_outliers || 2 * count <= all ||
         static_cast<double>(count) <= min_fraction * static_cast<double>(captures) ||
         upper_median(outliers_m) < std::max(min_outlier_m, survey_m)) {
@@ -500,54 +506,55 @@ std::string describe(std::span<const MapError> errors) {
   return text;
 }
 
-std::string describe_lamps_elsewhere(int lamps) {
+std::string describe_lamps_moved_since_calibration(int lamps) {
   return fmt::format(
       "{} lamps have other positions than in the adjustment of the calibration, and sd lacks their "
       "uncertainty: give the map that vlp-adjust --refine-map wrote with it",
       lamps);
 }
 
-bool MapErrors::is_unusable() const {
+bool MapErrors::is_map_unusable() const {
   return std::any_of(errors.begin(), errors.end(), [](const MapError& error) {
     return error.kind == MapErrorKind::swapped || error.kind == MapErrorKind::mirrored;
   });
 }
 
-MapErrors find_map_errors(std::span<const Frame> frames, const LampMap& map,
-                          const Calibration& calibration, const MapErrorOptions& options) {
+MapErrors detect_misplaced_or_swapped_lamps(std::span<const Frame> frames, const LampMap& map,
+                                            const Calibration& calibration,
+                                            const MapErrorOptions& options) {
   const MapCaptures captures{frames, calibration, options};
-  const auto found = captures.displacements(map);
+  const auto found = captures.estimate_displacements(map);
   MapErrors result;
-  if (found) result.offsets = compute_offsets_from_others(*found);
-  if (auto exchange = find_exchange(captures, map, found)) {
+  if (found) result.offsets = compute_offsets_from_other_lamps(*found);
+  if (auto exchange = find_swapped_lamps(captures, map, found)) {
     result.errors.push_back(std::move(*exchange));
     return result;
   }
   if (!found) return result;
-  if (is_contradicted(found)) {
+  if (is_map_contradicted(found)) {
     result.offsets.clear();
     result.errors.push_back({MapErrorKind::other_room});
     return result;
   }
   const DisplacementTest test(*found, map);
-  result.errors = find_moved(*found, test);
+  result.errors = find_moved_lamps(*found, test);
   const double min_offset_m =
       options.min_offset_px * found->height_m / calibration.camera.focal_px().mean();
   std::erase_if(result.errors,
                 [&](const MapError& error) { return error.offset_m.norm() < min_offset_m; });
   constexpr double min_outlier_ratio = 5;
-  auto unsteady = find_unsteady(*found, map, min_outlier_ratio * min_offset_m);
+  auto unsteady = find_lamp_at_varying_position(*found, map, min_outlier_ratio * min_offset_m);
   const bool is_named = unsteady && std::ranges::any_of(result.errors, [&](const MapError& error) {
                           return error.lamps == unsteady->lamps;
                         });
   if (unsteady && !is_named) result.errors.push_back(std::move(*unsteady));
-  if (result.errors.empty() && is_other_room(*found)) {
+  if (result.errors.empty() && is_map_of_other_room(*found)) {
     result.errors.push_back({MapErrorKind::other_room});
   }
   return result;
 }
 
-std::vector<MapError> find_unseen_lamps(std::span<const Frame> frames, const LampMap& map) {
+std::vector<MapError> find_undetected_lamps(std::span<const Frame> frames, const LampMap& map) {
   std::set<int> seen;
   for (const Frame& frame : frames) {
     for (const Detection& detection : frame.detections) seen.insert(detection.lamp);

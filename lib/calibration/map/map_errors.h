@@ -47,22 +47,22 @@ std::string describe(const MapError& error);
 /// Describes the number of lamps whose map position differs from that in an adjusted calibration
 /// (Positioner::lamps_elsewhere()).
 /// @pre lamps >= 1
-std::string describe_lamps_elsewhere(int lamps);
+std::string describe_lamps_moved_since_calibration(int lamps);
 
 /// Describes all errors in one line.
 std::string describe(std::span<const MapError> errors);
 
-/// Result of find_map_errors().
+/// Result of detect_misplaced_or_swapped_lamps().
 struct MapErrors {
   std::vector<MapError> errors;
   /// Offset of every lamp, including insignificant ones.
   std::vector<LampOffset> offsets;
 
   /// Returns true if the map cannot be used: two lamps are swapped, or it is mirrored.
-  bool is_unusable() const;
+  bool is_map_unusable() const;
 };
 
-/// Options of find_map_errors().
+/// Options of detect_misplaced_or_swapped_lamps().
 struct MapErrorOptions {
   /// Inclination of the base in each frame; empty: level.
   std::vector<std::optional<Inclination>> inclinations = {};
@@ -87,7 +87,7 @@ struct MapErrorOptions {
 ///   m  survey errors: variance sd_m^2 of the lamp plus tau^2, common to all lamps
 ///   e  noise of the captures
 /// tau^2 >= 0 is the smallest value for which the weighted squares chi^2 of x - P d do not exceed
-/// their degrees of freedom f = rank(P) - 2 k.
+/// their degrees of freedom f = count_determined_unknowns(P) - 2 k.
 ///
 /// Lamps enter d one by one, by the largest drop of chi^2. The result is the largest set in which
 /// no lamp can be replaced by another one with an increase of chi^2 below
@@ -110,10 +110,11 @@ struct MapErrorOptions {
 ///   - Several lamps that are displaced equally can mask each other.
 ///   - If sd_m is smaller than the true errors of the survey, false alarms are more frequent (3 to
 ///     5 % if the errors are twice as large).
-MapErrors find_map_errors(std::span<const Frame> frames, const LampMap& map,
-                          const Calibration& calibration, const MapErrorOptions& options = {});
+MapErrors detect_misplaced_or_swapped_lamps(std::span<const Frame> frames, const LampMap& map,
+                                            const Calibration& calibration,
+                                            const MapErrorOptions& options = {});
 
 /// Finds the lamps of the map that no frame contains. In a large room this is no error.
-std::vector<MapError> find_unseen_lamps(std::span<const Frame> frames, const LampMap& map);
+std::vector<MapError> find_undetected_lamps(std::span<const Frame> frames, const LampMap& map);
 
 }  // namespace vlp

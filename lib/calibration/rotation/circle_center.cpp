@@ -25,7 +25,7 @@ struct Trace {
   std::vector<Eigen::Vector2d> points;
 };
 
-Trace collect_trace(const RotationCaptures& rotation, std::size_t lamp, std::size_t height) {
+Trace collect_lamp_trace(const RotationCaptures& rotation, std::size_t lamp, std::size_t height) {
   Trace trace;
   for (std::size_t i = 0; i < rotation.observations.size(); ++i) {
     const RotationObservation& observation = rotation.observations[i];
@@ -94,7 +94,7 @@ void reject_gross_outliers(Trace& trace, double focal_px, std::vector<RotationOu
     squares.reserve(off.size());
     for (const double one : off) squares.push_back(one * one);
     const double variance =
-        std::max(robust_linear_variance(std::move(squares), freedom), rounding * rounding);
+        std::max(estimate_robust_variance_1d(std::move(squares), freedom), rounding * rounding);
     limit = std::sqrt(compute_squared_outlier_bound_1d(kOutlierSigmas, freedom) * variance);
     std::vector<Eigen::Vector2d> near;
     near.reserve(off.size());
@@ -112,8 +112,8 @@ void reject_gross_outliers(Trace& trace, double focal_px, std::vector<RotationOu
 
 /// Rejects the point that is farthest from the circle if the circle through the other points
 /// contradicts it (Student's t of the deleted residual). Returns true if a point was rejected.
-bool reject_worst(Trace& trace, const Circle& circle, double focal_px,
-                  std::vector<RotationOutlier>& outliers) {
+bool reject_worst_trace(Trace& trace, const Circle& circle, double focal_px,
+                        std::vector<RotationOutlier>& outliers) {
   constexpr double rounding = 1e-9;
   const std::vector<double> off = compute_distances(circle, trace.points);
   const auto worst =
@@ -140,7 +140,7 @@ std::optional<CircleFit> fit_trimmed_circle(Trace& trace, double focal_px,
   if (trace.points.size() >= kMinPointsToTest) reject_gross_outliers(trace, focal_px, outliers);
   auto fit = fit_circle(trace.points);
   while (fit && trace.points.size() >= kMinPointsToTest &&
-         reject_worst(trace, fit->circle, focal_px, outliers)) {
+         reject_worst_trace(trace, fit->circle, focal_px, outliers)) {
     fit = fit_circle(trace.points);
   }
   return fit;
@@ -168,7 +168,7 @@ bool is_determined(const Circle& circle, const std::vector<Eigen::Vector2d>& poi
     information += (radial - mean) * (radial - mean).transpose();
     tangents += tangent * tangent.transpose();
   }
-  const auto [values, axes] = decompose_symmetric(information);
+  const auto [values, axes] = eigendecompose_symmetric(information);
   const double variance = noise * noise / (circle.radius * circle.radius);
   for (Eigen::Index i = 0; i < 2; ++i) {
     const double from_noise = variance * axes.col(i).dot(tangents * axes.col(i));
@@ -192,7 +192,7 @@ struct HeightCircles {
 HeightCircles fit_circles(const RotationCaptures& rotation, std::size_t height, double focal_px) {
   HeightCircles result;
   for (std::size_t lamp = 0; lamp < rotation.lamps.size(); ++lamp) {
-    Trace trace = collect_trace(rotation, lamp, height);
+    Trace trace = collect_lamp_trace(rotation, lamp, height);
     const auto fit = fit_trimmed_circle(trace, focal_px, result.outliers);
     if (trace.points.size() < 3) continue;
     if (!fit || !fit->converged) {
@@ -222,7 +222,8 @@ std::optional<double> estimate_noise(const std::vector<HeightCircles>& heights,
   std::optional<double> noise;
   if (freedom > 0) {
     noise = std::sqrt(squares / freedom);
-  } else if (const RotationFit joint = fit_joint_center(rotation, camera); joint.converged) {
+  } else if (const RotationFit joint = fit_joint_rotation_center(rotation, camera);
+             joint.converged) {
     noise = joint.residual_px / focal_px;
   }
   if (rotation.median_sigma_px)
@@ -232,7 +233,7 @@ std::optional<double> estimate_noise(const std::vector<HeightCircles>& heights,
 
 }  // namespace
 
-CircleCenters fit_circle_centers(const RotationCaptures& rotation, const Camera& camera) {
+CircleCenters fit_centers_of_lamp_circles(const RotationCaptures& rotation, const Camera& camera) {
   assert(rotation.status == RotationStatus::ok);
   CircleCenters result;
   const double focal_px = camera.focal_px().x();
@@ -282,7 +283,7 @@ CircleCenters fit_circle_centers(const RotationCaptures& rotation, const Camera&
   result.mean.converged = true;
   result.mean.center = make_rotation_center(mean, RotationModel::shift, camera, measured);
   result.mean.residual_px = freedom > 0 ? focal_px * std::sqrt(squares / freedom) : 0;
-  result.mean.yaws_rad = collect_yaws(rotation);
+  result.mean.yaws_rad = collect_capture_yaws_rad(rotation);
   return result;
 }
 

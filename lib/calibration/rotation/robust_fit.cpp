@@ -15,7 +15,7 @@ namespace {
 /// Residuals below this many sigmas are numeric noise.
 constexpr double kRounding = 1e-6;
 
-int free_parameters(const ceres::Problem& problem) {
+int count_free_parameters(const ceres::Problem& problem) {
   std::vector<double*> parameters;
   problem.GetParameterBlocks(&parameters);
   int count = 0;
@@ -29,12 +29,13 @@ int free_parameters(const ceres::Problem& problem) {
 
 }  // namespace
 
-void RobustFit::add(std::unique_ptr<ceres::CostFunction> cost, std::vector<double*> parameters) {
+void RobustFit::add_residual(std::unique_ptr<ceres::CostFunction> cost,
+                             std::vector<double*> parameters) {
   blocks_.push_back({std::move(cost), std::move(parameters)});
   used_.push_back(true);
 }
 
-std::unique_ptr<ceres::Problem> RobustFit::problem(double loss_width) const {
+std::unique_ptr<ceres::Problem> RobustFit::make_ceres_problem(double loss_width) const {
   ceres::Problem::Options options;
   options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   auto problem = std::make_unique<ceres::Problem>(options);
@@ -52,7 +53,7 @@ std::unique_ptr<ceres::Problem> RobustFit::problem(double loss_width) const {
   return problem;
 }
 
-bool RobustFit::minimize(double loss_width) {
+bool RobustFit::minimize_with_cauchy_loss(double loss_width) {
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_SCHUR;
   options.max_num_iterations = 100;
@@ -62,12 +63,12 @@ bool RobustFit::minimize(double loss_width) {
   options.num_threads = 1;  // keeps the order of sums and so their rounding
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
-  ceres::Solve(options, problem(loss_width).get(), &summary);
-  update_lengths();
+  ceres::Solve(options, make_ceres_problem(loss_width).get(), &summary);
+  update_residual_norms();
   return summary.IsSolutionUsable();
 }
 
-void RobustFit::update_lengths() {
+void RobustFit::update_residual_norms() {
   lengths_.clear();
   lengths_.reserve(blocks_.size());
   for (const Block& block : blocks_) {
@@ -77,44 +78,45 @@ void RobustFit::update_lengths() {
   }
 }
 
-double RobustFit::estimate_variance() const {
+double RobustFit::estimate_residual_variance() const {
   std::vector<double> squares;
   for (std::size_t i = 0; i < lengths_.size(); ++i) {
     if (used_[i]) squares.push_back(lengths_[i] * lengths_[i]);
   }
-  return std::max(robust_planar_variance(std::move(squares), degrees_of_freedom()),
+  return std::max(estimate_robust_variance_2d(std::move(squares), degrees_of_freedom()),
                   kRounding * kRounding);
 }
 
 bool RobustFit::solve() {
   used_.assign(blocks_.size(), true);
-  update_lengths();
+  update_residual_norms();
   constexpr int num_loss_iterations = 4;
   for (int iteration = 0; iteration < num_loss_iterations; ++iteration) {
-    if (!minimize(2 * std::sqrt(estimate_variance()))) return false;
+    if (!minimize_with_cauchy_loss(2 * std::sqrt(estimate_residual_variance()))) return false;
   }
   return refine();
 }
 
 bool RobustFit::refine() {
-  update_lengths();
+  update_residual_norms();
   constexpr int max_iterations = 6;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     constexpr double sigmas = 4.5;
-    const double limit = std::max(
-        std::sqrt(planar_outlier_bound(sigmas, degrees_of_freedom()) * estimate_variance()),
-        noise_is_stated_ ? sigmas : 0);
+    const double limit =
+        std::max(std::sqrt(compute_squared_outlier_bound_2d(sigmas, degrees_of_freedom()) *
+                           estimate_residual_variance()),
+                 noise_is_stated_ ? sigmas : 0);
     const std::vector<bool> before = used_;
     for (std::size_t i = 0; i < used_.size(); ++i) used_[i] = lengths_[i] <= limit;
     if (iteration > 0 && used_ == before) break;
-    if (!minimize(0)) return false;
+    if (!minimize_with_cauchy_loss(0)) return false;
   }
   return true;
 }
 
 int RobustFit::degrees_of_freedom() const {
-  const auto all = problem(0);
-  return all->NumResiduals() - free_parameters(*all);
+  const auto all = make_ceres_problem(0);
+  return all->NumResiduals() - count_free_parameters(*all);
 }
 
 std::optional<RobustFit::Linearization> RobustFit::linearize() const {
@@ -151,7 +153,7 @@ std::optional<RobustFit::Linearization> RobustFit::linearize() const {
     normal(unknowns, unknowns) += jacobian.transpose() * jacobian;
   }
   // A fixed unknown is replaced by one that nothing depends on.
-  const auto all = problem(0);
+  const auto all = make_ceres_problem(0);
   Eigen::VectorXd is_free = Eigen::VectorXd::Ones(num_unknowns);
   for (const auto& [parameter, first] : at.first_unknown) {
     if (!all->IsParameterBlockConstant(parameter)) continue;

@@ -20,7 +20,7 @@ namespace vlp {
 ///
 /// A Cauchy loss, whose width follows from the median of the residuals, identifies outliers. The
 /// final fit is plain least squares without outliers. Outliers are residuals beyond 4.5 standard
-/// deviations; the limit is raised for few degrees of freedom (planar_outlier_bound()).
+/// deviations; the limit is raised for few degrees of freedom (compute_squared_outlier_bound_2d()).
 ///
 /// For internal use in this folder, because the header includes Ceres.
 class RobustFit {
@@ -30,12 +30,12 @@ class RobustFit {
   explicit RobustFit(bool noise_is_stated) : noise_is_stated_(noise_is_stated) {}
 
   /// Adds a residual of two rows. The caller owns `parameters`, which must outlive the fit.
-  void add(std::unique_ptr<ceres::CostFunction> cost, std::vector<double*> parameters);
+  void add_residual(std::unique_ptr<ceres::CostFunction> cost, std::vector<double*> parameters);
   /// Fixes a parameter at its value.
-  void fix_parameter(const double* parameter) { fixed_.push_back({parameter}); }
+  void set_parameter_constant(const double* parameter) { fixed_.push_back({parameter}); }
   /// Fixes the first of `parameters` on which a used residual depends. Removes a degree of freedom
   /// that these parameters have in common and that no residual determines.
-  void fix_one_of(std::vector<const double*> parameters) {
+  void set_first_used_parameter_constant(std::vector<const double*> parameters) {
     fixed_.push_back(std::move(parameters));
   }
 
@@ -47,7 +47,7 @@ class RobustFit {
   /// Returns false for each rejected residual, in the order of add().
   const std::vector<bool>& used() const { return used_; }
   /// Returns the norm of each residual, including outliers, in the order of add().
-  const std::vector<double>& lengths() const { return lengths_; }
+  const std::vector<double>& residual_norms() const { return lengths_; }
   /// Returns the number of rows of the used residuals minus the number of free parameters.
   int degrees_of_freedom() const;
 
@@ -83,12 +83,12 @@ class RobustFit {
     std::unique_ptr<ceres::CostFunction> cost;
     std::vector<double*> parameters;
   };
-  std::unique_ptr<ceres::Problem> problem(double loss_width) const;
-  bool minimize(double loss_width);
-  void update_lengths();
+  std::unique_ptr<ceres::Problem> make_ceres_problem(double loss_width) const;
+  bool minimize_with_cauchy_loss(double loss_width);
+  void update_residual_norms();
   /// Estimates the variance of the used residuals per axis from their median. Never returns less
   /// than the numeric noise.
-  double estimate_variance() const;
+  double estimate_residual_variance() const;
 
   bool noise_is_stated_;
   std::vector<Block> blocks_;

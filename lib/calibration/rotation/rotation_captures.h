@@ -112,7 +112,7 @@ inline constexpr double kMinArc_rad = 1.5707963267948966;
 /// Finds the rotation in place in the captures: yaws, heights, axes, and approximate tilt and lever
 /// arm. Members other than `status` are valid only if the status is `ok`.
 /// @pre the number of intrinsics matches the lens model
-RotationCaptures find_rotation_captures(const std::vector<Frame>& frames, const LampMap& map,
-                                        const Camera& camera);
+RotationCaptures find_in_place_rotation_captures(const std::vector<Frame>& frames,
+                                                 const LampMap& map, const Camera& camera);
 
 }  // namespace vlp

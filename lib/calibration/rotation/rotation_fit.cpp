@@ -76,12 +76,12 @@ struct State {
   std::vector<double> yaws_rad;
 };
 
-State initialize_state(const RotationCaptures& rotation) {
+State initialize_axis_state(const RotationCaptures& rotation) {
   State state{rotation.zenith_in_camera.hnormalized(),
               rotation.lever_arm_m,
               {},
               {},
-              collect_yaws(rotation)};
+              collect_capture_yaws_rad(rotation)};
   for (const Lamp& lamp : rotation.lamps) state.lamps_m.emplace_back(lamp.position_m.head<2>());
   for (const RotationHeight& height : rotation.heights) {
     state.axes_m.emplace_back(height.axis_m.x(), height.axis_m.y(), height.z_m);
@@ -89,25 +89,27 @@ State initialize_state(const RotationCaptures& rotation) {
   return state;
 }
 
-void add_residuals(RobustFit& fit, const RotationCaptures& rotation, bool lever_arm, State& state) {
+void add_residual_blocks(RobustFit& fit, const RotationCaptures& rotation, bool lever_arm,
+                         State& state) {
   for (const RotationObservation& observation : rotation.observations) {
     const std::size_t height = rotation.captures[observation.capture].height;
-    fit.add(RotationResidual::create(observation, rotation.lamps[observation.lamp].position_m.z()),
-            {state.zenith.data(), state.lever_arm_m.data(), state.lamps_m[observation.lamp].data(),
-             state.axes_m[height].data(), &state.yaws_rad[observation.capture]});
+    fit.add_residual(
+        RotationResidual::create(observation, rotation.lamps[observation.lamp].position_m.z()),
+        {state.zenith.data(), state.lever_arm_m.data(), state.lamps_m[observation.lamp].data(),
+         state.axes_m[height].data(), &state.yaws_rad[observation.capture]});
   }
   // Residuals do not determine position and yaw of the world, nor its scale if all lamps have one
   // height.
-  fit.fix_parameter(state.axes_m.front().data());
+  fit.set_parameter_constant(state.axes_m.front().data());
   std::vector<const double*> yaws;
   for (const double& yaw_rad : state.yaws_rad) yaws.push_back(&yaw_rad);
-  fit.fix_one_of(std::move(yaws));
-  if (!lever_arm) fit.fix_parameter(state.lever_arm_m.data());
+  fit.set_first_used_parameter_constant(std::move(yaws));
+  if (!lever_arm) fit.set_parameter_constant(state.lever_arm_m.data());
 }
 
 /// Scales the state to the size of the map. Returns true if the scale was already equal.
-bool scale_to_map(const RotationCaptures& rotation, State& state) {
-  const auto similarity = fit_similarity(
+bool scale_state_to_map(const RotationCaptures& rotation, State& state) {
+  const auto similarity = fit_similarity_transform(
       rotation.lamps.size(), [&](std::size_t i) { return state.lamps_m[i]; },
       [&](std::size_t i) { return Eigen::Vector2d(rotation.lamps[i].position_m.head<2>()); });
   if (!similarity) return true;
@@ -142,7 +144,7 @@ bool determines_lever_arm(const RotationCenter& center, const RotationCaptures& 
 
 /// Effect of errors of the map, by its sd_m, on the fit: errors of the lamps' heights, and of the
 /// size of the lamp pattern along the ceiling.
-struct MapEffect {
+struct MapErrorPropagation {
   /// Covariance of (zenith, lever arm).
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
   /// Fraction of the squared residuals that is not from the map.
@@ -152,10 +154,10 @@ struct MapEffect {
 /// Propagates the errors of the map to the unknowns x of the fit. For errors dZ of the heights of
 /// the lamps and dz_1 of the height of the first axis, which is fixed in the fit,
 ///   dx = -(J'J)^-1 J' (r_Z dZ + r_z1 dz_1)
-/// scale_to_map() chooses z_1 such that sum q . dp = sum q . dP for errors dP of the map, where q
-/// are the positions of the lamps relative to their mean.
-MapEffect propagate_map(const RobustFit& fit, const RobustFit::Linearization& at,
-                        const RotationCaptures& rotation, const State& state) {
+/// scale_state_to_map() chooses z_1 such that sum q . dp = sum q . dP for errors dP of the map,
+/// where q are the positions of the lamps relative to their mean.
+MapErrorPropagation propagate_map_errors(const RobustFit& fit, const RobustFit::Linearization& at,
+                                         const RotationCaptures& rotation, const State& state) {
   const auto z_1 = static_cast<Eigen::Index>(rotation.lamps.size());
   Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(at.inverse.rows(), z_1 + 1);
   // Quadratic form: the sum of the squared residuals grows by d' squares d.
@@ -186,7 +188,7 @@ MapEffect propagate_map(const RobustFit& fit, const RobustFit::Linearization& at
   Eigen::MatrixXd center_by_heights(4, z_1 + 1);
   center_by_heights << rows_of(state.zenith), rows_of(state.lever_arm_m);
   // Errors of (heights, z_1) that one lamp causes by its error in height and along the ceiling.
-  MapEffect effect;
+  MapErrorPropagation effect;
   double of_map = 0;
   for (std::size_t i = 0; i < rotation.lamps.size(); ++i) {
     const auto lamp = static_cast<Eigen::Index>(i);
@@ -206,10 +208,11 @@ MapEffect propagate_map(const RobustFit& fit, const RobustFit::Linearization& at
 
 /// Sets residual_px, outliers and used_observations of `result` from a fit.
 /// @pre the residuals of `fit` are the observations of `rotation`, in the same order
-void set_statistics(RotationFit& result, const RobustFit& fit, const RotationCaptures& rotation) {
+void set_residual_statistics(RotationFit& result, const RobustFit& fit,
+                             const RotationCaptures& rotation) {
   double squares_px2 = 0;
   for (std::size_t i = 0; i < rotation.observations.size(); ++i) {
-    const double distance_px = fit.lengths()[i] * rotation.observations[i].sigma_px;
+    const double distance_px = fit.residual_norms()[i] * rotation.observations[i].sigma_px;
     if (fit.used()[i]) {
       result.used_observations.push_back(i);
       squares_px2 += distance_px * distance_px;
@@ -223,21 +226,22 @@ void set_statistics(RotationFit& result, const RobustFit& fit, const RotationCap
 
 /// Fits the axis with an estimated lever arm, or with a lever arm of zero.
 RotationFit fit_axis(const RotationCaptures& rotation, const Camera& camera, bool lever_arm) {
-  State state = initialize_state(rotation);
+  State state = initialize_axis_state(rotation);
   if (!lever_arm) state.lever_arm_m.setZero();
   RobustFit fit(rotation.median_sigma_px.has_value());
-  add_residuals(fit, rotation, lever_arm, state);
+  add_residual_blocks(fit, rotation, lever_arm, state);
   RotationFit result;
   constexpr int max_iterations = 10;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     result.converged = iteration == 0 ? fit.solve() : fit.refine();
     if (!result.converged) return result;
-    if (!lever_arm || scale_to_map(rotation, state)) break;
+    if (!lever_arm || scale_state_to_map(rotation, state)) break;
   }
   std::optional<Matrix2> zenith_covariance, arm_covariance, arm_by_zenith;
   if (const auto at = fit.linearize()) {
     // Without a lever arm, any height of a lamp explains its observations.
-    const MapEffect map = lever_arm ? propagate_map(fit, *at, rotation, state) : MapEffect();
+    const MapErrorPropagation map =
+        lever_arm ? propagate_map_errors(fit, *at, rotation, state) : MapErrorPropagation();
     const double *const zenith = state.zenith.data(), *const arm = state.lever_arm_m.data();
     zenith_covariance =
         map.noise_fraction * at->covariance(zenith, zenith) + map.covariance.topLeftCorner<2, 2>();
@@ -254,19 +258,20 @@ RotationFit fit_axis(const RotationCaptures& rotation, const Camera& camera, boo
   if (lever_arm) result.center.lever_arm_m = state.lever_arm_m;
   result.center.lever_arm_covariance = arm_covariance;
   result.center.lever_arm_by_zenith = arm_by_zenith;
-  set_statistics(result, fit, rotation);
+  set_residual_statistics(result, fit, rotation);
   result.yaws_rad = std::move(state.yaws_rad);
   return result;
 }
 
 }  // namespace
 
-Tilt compute_tilt(const RotationCenter& center) {
+Tilt compute_camera_tilt(const RotationCenter& center) {
   const Eigen::Vector3d& up = center.zenith_in_camera;
   return {std::atan2(up.head<2>().norm(), up.z()), std::atan2(up.y(), up.x())};
 }
 
-std::optional<double> axis_sd_rad(const RotationCenter& center, const Camera& camera) {
+std::optional<double> compute_rotation_axis_sd_rad(const RotationCenter& center,
+                                                   const Camera& camera) {
   if (!center.covariance) return std::nullopt;
   const Eigen::Vector2d focal_px = camera.focal_px();
   const Eigen::Vector2d variances =
@@ -274,9 +279,9 @@ std::optional<double> axis_sd_rad(const RotationCenter& center, const Camera& ca
   return std::sqrt(variances.mean());
 }
 
-Eigen::Vector2d undistorted_pixel(const Camera& camera, const Eigen::Vector2d& z) {
+Eigen::Vector2d undistorted_pixel_from_normalized(const Camera& camera, const Eigen::Vector2d& z) {
   const Eigen::Vector2d focal_px = camera.focal_px();
-  return focal_px.cwiseProduct(z) + camera.center_px();
+  return focal_px.cwiseProduct(z) + camera.principal_point_px();
 }
 
 RotationCenter make_rotation_center(const Eigen::Vector2d& z, RotationModel model,
@@ -285,7 +290,7 @@ RotationCenter make_rotation_center(const Eigen::Vector2d& z, RotationModel mode
   const Eigen::Vector2d focal_px = camera.focal_px();
   RotationCenter center;
   center.model = model;
-  center.center_px = undistorted_pixel(camera, z);
+  center.center_px = undistorted_pixel_from_normalized(camera, z);
   center.zenith_in_camera = z.homogeneous().normalized();
   if (covariance) {
     center.covariance = covariance->cwiseProduct((focal_px * focal_px.transpose()).eval());
@@ -293,19 +298,22 @@ RotationCenter make_rotation_center(const Eigen::Vector2d& z, RotationModel mode
   return center;
 }
 
-std::vector<double> collect_yaws(const RotationCaptures& rotation) {
+std::vector<double> collect_capture_yaws_rad(const RotationCaptures& rotation) {
   std::vector<double> yaws_rad;
   yaws_rad.reserve(rotation.captures.size());
   for (const RotationCapture& capture : rotation.captures) yaws_rad.push_back(capture.yaw_rad);
   return yaws_rad;
 }
 
-RotationFit fit_joint_center(const RotationCaptures& rotation, const Camera& camera) {
+RotationFit fit_joint_rotation_center(const RotationCaptures& rotation, const Camera& camera) {
   assert(rotation.status == RotationStatus::ok);
   // The model of the axis fit, with an exactly level camera, the axis at the origin, lamps at
   // height 1, and the center as minus the lever arm. Each height has its own lamps.
-  State state{
-      {0, 0}, -rotation.zenith_in_camera.hnormalized(), {}, {{0, 0, 0}}, collect_yaws(rotation)};
+  State state{{0, 0},
+              -rotation.zenith_in_camera.hnormalized(),
+              {},
+              {{0, 0, 0}},
+              collect_capture_yaws_rad(rotation)};
   for (const RotationHeight& height : rotation.heights) {
     for (const Lamp& lamp : rotation.lamps) {
       state.lamps_m.emplace_back((lamp.position_m.head<2>() - height.axis_m) /
@@ -320,13 +328,13 @@ RotationFit fit_joint_center(const RotationCaptures& rotation, const Camera& cam
   for (const RotationObservation& observation : rotation.observations) {
     const std::size_t height = rotation.captures[observation.capture].height;
     const std::size_t lamp = height * rotation.lamps.size() + observation.lamp;
-    fit.add(RotationResidual::create(observation, 1),
-            {state.zenith.data(), state.lever_arm_m.data(), state.lamps_m[lamp].data(),
-             state.axes_m.front().data(), &state.yaws_rad[observation.capture]});
+    fit.add_residual(RotationResidual::create(observation, 1),
+                     {state.zenith.data(), state.lever_arm_m.data(), state.lamps_m[lamp].data(),
+                      state.axes_m.front().data(), &state.yaws_rad[observation.capture]});
   }
-  fit.fix_parameter(state.zenith.data());
-  fit.fix_parameter(state.axes_m.front().data());
-  for (auto& yaws : yaws_at) fit.fix_one_of(std::move(yaws));
+  fit.set_parameter_constant(state.zenith.data());
+  fit.set_parameter_constant(state.axes_m.front().data());
+  for (auto& yaws : yaws_at) fit.set_first_used_parameter_constant(std::move(yaws));
   RotationFit result;
   result.converged = fit.solve();
   if (!result.converged) return result;
@@ -336,7 +344,7 @@ RotationFit fit_joint_center(const RotationCaptures& rotation, const Camera& cam
   }
   result.center =
       make_rotation_center(-state.lever_arm_m, RotationModel::shift, camera, covariance);
-  set_statistics(result, fit, rotation);
+  set_residual_statistics(result, fit, rotation);
   result.yaws_rad = std::move(state.yaws_rad);
   return result;
 }

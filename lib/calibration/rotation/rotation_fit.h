@@ -14,7 +14,7 @@ namespace vlp {
 
 /// Observation that contradicts the other observations and is rejected.
 struct RotationOutlier {
-  /// Index in RotationCaptures::sightings.
+  /// Index in RotationCaptures::observations.
   std::size_t observation;
   /// Distance from the position that the fit predicts, in px.
   double distance_px;
@@ -35,7 +35,7 @@ struct RotationFit {
   /// unknowns.
   double residual_px = 0;
   std::vector<RotationOutlier> outliers = {};
-  /// Observations that determine the center, as indices in RotationCaptures::sightings.
+  /// Observations that determine the center, as indices in RotationCaptures::observations.
   std::vector<std::size_t> used_observations = {};
 };
 
@@ -45,14 +45,15 @@ struct Tilt {
   double azimuth_rad;
 };
 /// Returns the tilt that the zenith of `center` corresponds to.
-Tilt compute_tilt(const RotationCenter& center);
+Tilt compute_camera_tilt(const RotationCenter& center);
 
 /// Returns the standard deviation of the axis direction, rad: the RMS over the two directions
 /// across it. Returns std::nullopt if `center` has no covariance.
-std::optional<double> axis_sd_rad(const RotationCenter& center, const Camera& camera);
+std::optional<double> compute_rotation_axis_sd_rad(const RotationCenter& center,
+                                                   const Camera& camera);
 
 /// Returns the pixel f * z + c of a normalized point in the undistorted image.
-Eigen::Vector2d undistorted_pixel(const Camera& camera, const Eigen::Vector2d& z);
+Eigen::Vector2d undistorted_pixel_from_normalized(const Camera& camera, const Eigen::Vector2d& z);
 
 /// Returns the rotation center whose axis appears at normalized point z in the camera. `covariance`
 /// is the covariance of z.
@@ -60,7 +61,7 @@ RotationCenter make_rotation_center(const Eigen::Vector2d& z, RotationModel mode
                                     const Camera& camera, const std::optional<Matrix2>& covariance);
 
 /// Returns the yaws of the captures, rad, in the order of RotationCaptures::captures.
-std::vector<double> collect_yaws(const RotationCaptures& rotation);
+std::vector<double> collect_capture_yaws_rad(const RotationCaptures& rotation);
 
 /// Fits one rotation center for all lamps in the undistorted image (lib/THEORY.md, "Rotation
 /// center", method `joint`). The model is that of eq. 9 with one angle per capture that all lamps
@@ -75,8 +76,8 @@ std::vector<double> collect_yaws(const RotationCaptures& rotation);
 ///   q_ih  position of lamp i about the center, at height h and yaw 0
 ///
 /// Exact for a level camera and captures at one height. If the camera is tilted, c is biased
-/// outwards as in fit_circle_centers(). The model of the result is RotationModel::shift.
-RotationFit fit_joint_center(const RotationCaptures& rotation, const Camera& camera);
+/// outwards as in fit_centers_of_lamp_circles(). The model of the result is RotationModel::shift.
+RotationFit fit_joint_rotation_center(const RotationCaptures& rotation, const Camera& camera);
 
 /// Largest standard deviation of a lever arm that lamps at several heights determine, as a fraction
 /// of the lamps' height above the camera. It corresponds to 0.3 degrees of tilt.

@@ -12,8 +12,8 @@
 
 namespace vlp {
 
-RotationModelFit fit_rotation_model(std::span<const RotationFix> fixes, std::size_t num_pivots,
-                                    bool lever_arm) {
+RotationModelFit fit_rotation_model_to_fixes(std::span<const RotationFix> fixes,
+                                             std::size_t num_pivots, bool lever_arm) {
   const auto rows = static_cast<Eigen::Index>(2 * fixes.size());
   const auto tilt_column = static_cast<Eigen::Index>(2 * num_pivots);
   Eigen::MatrixXd design = Eigen::MatrixXd::Zero(rows, tilt_column + (lever_arm ? 4 : 2));
@@ -21,7 +21,8 @@ RotationModelFit fit_rotation_model(std::span<const RotationFix> fixes, std::siz
   for (std::size_t k = 0; k < fixes.size(); ++k) {
     const auto& [pose, height_m, pivot] = fixes[k];
     const auto row = static_cast<Eigen::Index>(2 * k);
-    const Eigen::Matrix2d turn = product_matrix({std::cos(pose.yaw_rad), std::sin(pose.yaw_rad)});
+    const Eigen::Matrix2d turn =
+        complex_product_matrix({std::cos(pose.yaw_rad), std::sin(pose.yaw_rad)});
     design.block<2, 2>(row, static_cast<Eigen::Index>(2 * pivot)).setIdentity();
     design.block<2, 2>(row, tilt_column) = height_m * turn;
     if (lever_arm) design.block<2, 2>(row, tilt_column + 2) = turn;

@@ -33,10 +33,12 @@ struct Placement {
   /// Sum of the squared residuals of the captures in the undistorted image.
   double squares_px2 = 0;
 
-  int detections() const {
+  int count_detections() const {
     return std::accumulate(detection_counts.begin(), detection_counts.end(), 0);
   }
-  int degrees_of_freedom() const { return 2 * detections() - 4 * static_cast<int>(poses.size()); }
+  int degrees_of_freedom() const {
+    return 2 * count_detections() - 4 * static_cast<int>(poses.size());
+  }
 };
 
 /// Returns the captures of three lamps of the map or more, without detections of other lamps.
@@ -48,7 +50,7 @@ std::vector<AdjustmentCapture> select_captures(std::span<const Frame> frames, co
   for (std::size_t i = 0; i < frames.size(); ++i) {
     AdjustmentCapture capture{frames[i].image, frames[i].detections};
     std::erase_if(capture.detections, [&](const Detection& detection) {
-      return find_lamp(map.lamps, detection.lamp) == nullptr;
+      return find_lamp_by_id(map.lamps, detection.lamp) == nullptr;
     });
     if (capture.detections.size() < 3) {
       ++result.captures_of_few_lamps;
@@ -63,8 +65,8 @@ std::vector<AdjustmentCapture> select_captures(std::span<const Frame> frames, co
 
 /// Locates each capture separately, as a stationary camera. Rejects lamps and captures that
 /// contradict the map.
-Placement place(const std::vector<AdjustmentCapture>& captures, LampMap map,
-                const Calibration& calibration) {
+Placement locate_captures_separately(const std::vector<AdjustmentCapture>& captures, LampMap map,
+                                     const Calibration& calibration) {
   for (Lamp& lamp : map.lamps) lamp.sd_m.reset();
   const Positioner positioner(map, calibration);
   Placement placement;
@@ -85,7 +87,7 @@ Placement place(const std::vector<AdjustmentCapture>& captures, LampMap map,
       return std::find(fix.rejected_ids.begin(), rejected_end, detection.lamp) != rejected_end;
     });
     for (const Detection& detection : placed.detections) {
-      const Lamp* lamp = find_lamp(map.lamps, detection.lamp);
+      const Lamp* lamp = find_lamp_by_id(map.lamps, detection.lamp);
       ++placement.detection_counts[static_cast<std::size_t>(lamp - map.lamps.data())];
       placement.height_m += lamp->position_m.z() - fix.estimate.pose.position_m.z();
     }
@@ -93,7 +95,7 @@ Placement place(const std::vector<AdjustmentCapture>& captures, LampMap map,
     placement.poses.push_back(fix.estimate.pose);
     placement.captures.push_back(std::move(placed));
   }
-  placement.height_m /= std::max(1, placement.detections());
+  placement.height_m /= std::max(1, placement.count_detections());
   return placement;
 }
 
@@ -105,7 +107,7 @@ struct PoseVariation {
   double place;
 };
 
-PoseVariation compute_variation(const Placement& placement) {
+PoseVariation compute_pose_variation(const Placement& placement) {
   Eigen::Vector3d mean_m = Eigen::Vector3d::Zero();
   Eigen::Vector2d mean_heading = Eigen::Vector2d::Zero();
   const double n = static_cast<double>(placement.poses.size());
@@ -130,7 +132,7 @@ std::string explain_undetermined(const Placement& placement, const LampMap& map,
            std::string(placement.captures.empty() ? "is none" : "is one") +
            ": add captures with more lamps, or correct lamp map and camera";
   }
-  const PoseVariation variation = compute_variation(placement);
+  const PoseVariation variation = compute_pose_variation(placement);
   const bool one_yaw = variation.yaw < std::sin(kOneYaw_rad),
              one_place = variation.place < kOnePlace;
   if (one_yaw && one_place) {
@@ -163,14 +165,14 @@ std::string explain_uncertainty(const TiltCalibration& result, const Eigen::Vect
       result.center.covariance->diagonal().cwiseSqrt().cwiseQuotient(focal_px).maxCoeff();
   if (!(sd_rad <= options.max_sd_rad)) {
     return "the standard deviation of the tilt would be " +
-           significant(deg_from_rad(sd_rad), kDigits) +
+           format_significant_digits(deg_from_rad(sd_rad), kDigits) +
            " degrees: add captures with more lamps, at other positions and yaws";
   }
   for (const auto& lamp : result.corrections) {
     const double sd_m = lamp.sd_m.maxCoeff();
     if (!(sd_m <= options.max_lamp_sd_m)) {
       return "lamp " + std::to_string(lamp.id) + " would have a standard deviation of " +
-             significant(1e3 * sd_m, kDigits) +
+             format_significant_digits(1e3 * sd_m, kDigits) +
              " mm: add captures with it, at other positions and yaws, or leave out --refine-map";
     }
   }
@@ -187,21 +189,21 @@ bool all_have_sigma(std::span<const Frame> frames) {
 /// Adjusts the captures that agree with the map. A capture that contradicts the map for a level
 /// camera may agree with it at the zenith that the other captures determine, and is then used.
 /// Iterates until the number of detections is unchanged, at most six times.
-AdjustmentResult adjust_iteratively(const std::vector<AdjustmentCapture>& captures,
-                                    AdjustmentInput& input, TiltCalibration& result) {
+AdjustmentResult adjust_until_detections_agree(const std::vector<AdjustmentCapture>& captures,
+                                               AdjustmentInput& input, TiltCalibration& result) {
   constexpr int max_iterations = 6;
   constexpr double no_limit = std::numeric_limits<double>::infinity();
   AdjustmentResult found;
   for (int iteration = 0, detections = 0; iteration < max_iterations; ++iteration) {
-    Placement placement = place(captures, input.lamps, input.calibration);
+    Placement placement = locate_captures_separately(captures, input.lamps, input.calibration);
     result.undetermined = explain_undetermined(placement, input.lamps, input.frees_map_shape);
-    if (!result.undetermined.empty() || placement.detections() == detections) break;
-    detections = placement.detections();
+    if (!result.undetermined.empty() || placement.count_detections() == detections) break;
+    detections = placement.count_detections();
     if (iteration == 0) {
       result.residual_before_px = std::sqrt(placement.squares_px2 / placement.degrees_of_freedom());
     }
     input.captures = std::move(placement.captures);
-    found = adjust_captures(input, {no_limit, no_limit});
+    found = run_bundle_adjustment(input, {no_limit, no_limit});
     if (!found.ok()) {
       result.undetermined = kUndeterminedMessage;
       break;
@@ -224,7 +226,7 @@ TiltCalibration estimate_tilt_from_lamps(std::span<const Frame> frames, const La
   input.frees_map_shape = options.refine_map;
   input.captures_are_checked = true;
   input.weighs_in_undistorted_image = true;
-  const AdjustmentResult found = adjust_iteratively(captures, input, result);
+  const AdjustmentResult found = adjust_until_detections_agree(captures, input, result);
   result.captures = found.captures;
   result.captures_rejected = static_cast<int>(captures.size()) - found.captures;
   result.detections = found.detections;

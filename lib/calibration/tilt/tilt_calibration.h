@@ -68,8 +68,9 @@ struct TiltCalibration {
 ///
 /// @return  tilt and optionally map; `undetermined` states the reason if there is none
 ///
-/// Calls adjust_captures() with an exact lens and without known positions. The map is weighted by
-/// its sd_m, and exact without one. Detections without sigma_px are weighted as in positioning.
+/// Calls run_bundle_adjustment() with an exact lens and without known positions. The map is
+/// weighted by its sd_m, and exact without one. Detections without sigma_px are weighted as in
+/// positioning.
 ///
 /// The lamps of each capture first have to agree with the map (Positioner). Captures that do not
 /// agree for a level camera, but do at the estimated zenith, are reinstated. Outliers beyond 4.5

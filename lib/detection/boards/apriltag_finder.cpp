@@ -31,7 +31,7 @@ class DecodingTable {
     apriltag_detector_add_family_bits(maker_.get(), family_.get(), family_->ncodes > large ? 1 : 2);
     if (family_->impl == nullptr) throw std::bad_alloc();
   }
-  void* table() const { return family_->impl; }
+  void* decoding_table() const { return family_->impl; }
 
  private:
   TagFamily family_;  // outlives the detector
@@ -44,12 +44,12 @@ void* get_decoding_table(const std::string& family) {
   static std::mutex mutex;
   static std::map<std::string, DecodingTable> tables;
   const std::lock_guard lock(mutex);
-  return tables.try_emplace(family, family).first->second.table();
+  return tables.try_emplace(family, family).first->second.decoding_table();
 }
 
 struct Detector {
   explicit Detector(const Board& board) : family(make_tag_family(board.family)) {
-    for (int extra = 1; extra < board.border_bits; ++extra) widen_border();
+    for (int extra = 1; extra < board.border_bits; ++extra) widen_tag_border();
     family->impl = get_decoding_table(board.family);
     apriltag_detector_add_family(detector.get(), family.get());
     detector->nthreads = 1;
@@ -59,7 +59,7 @@ struct Detector {
   ~Detector() { family->impl = nullptr; }  // not this detector's to free
   Detector(const Detector&) = delete;
   Detector& operator=(const Detector&) = delete;
-  void widen_border() const {
+  void widen_tag_border() const {
     family->width_at_border += 2;
     family->total_width += 2;
     for (uint32_t bit = 0; bit < family->nbits; ++bit) {
@@ -74,10 +74,12 @@ struct Detector {
 
 class ApriltagFinder : public TagFinder {
  public:
-  explicit ApriltagFinder(Board board) : board_(std::move(board)) { release(acquire()); }
+  explicit ApriltagFinder(Board board) : board_(std::move(board)) {
+    return_detector(acquire_idle_detector());
+  }
 
   std::vector<TagDetection> find(const cv::Mat1b& image) const override {
-    std::unique_ptr<Detector> detector = acquire();
+    std::unique_ptr<Detector> detector = acquire_idle_detector();
     detector->detector->quad_decimate = image.cols * image.rows >= kLargePixels ? 2 : 1;
     // The detector does not write to the image, but its interface lacks const.
     image_u8_t view{image.cols, image.rows, static_cast<int>(image.step), image.data};
@@ -93,14 +95,14 @@ class ApriltagFinder : public TagFinder {
                                  detection->p[k][1] - kPixelCenter};
       }
     }
-    release(std::move(detector));
+    return_detector(std::move(detector));
     return tags;
   }
 
  private:
   /// Returns an idle detector, or a new one. A detector serves one thread at a time and is
   /// expensive to create.
-  std::unique_ptr<Detector> acquire() const {
+  std::unique_ptr<Detector> acquire_idle_detector() const {
     {
       const std::lock_guard lock(mutex_);
       if (!idle_.empty()) {
@@ -111,7 +113,7 @@ class ApriltagFinder : public TagFinder {
     }
     return std::make_unique<Detector>(board_);
   }
-  void release(std::unique_ptr<Detector> detector) const {
+  void return_detector(std::unique_ptr<Detector> detector) const {
     const std::lock_guard lock(mutex_);
     idle_.push_back(std::move(detector));
   }
@@ -123,9 +125,9 @@ class ApriltagFinder : public TagFinder {
 
 }  // namespace
 
-void prepare_tag_family(const std::string& name) { get_decoding_table(name); }
+void load_tag_family(const std::string& name) { get_decoding_table(name); }
 
-std::unique_ptr<TagFinder> make_apriltag_finder(const Board& board) {
+std::unique_ptr<TagFinder> make_apriltag_detector(const Board& board) {
   return std::make_unique<ApriltagFinder>(board);
 }
 

@@ -19,7 +19,7 @@ namespace vlp {
 namespace {
 
 /// Returns OpenCV's dictionaries by name, including those of the AprilTag families.
-const std::map<std::string, int>& dictionaries() {
+const std::map<std::string, int>& list_aruco_dictionaries() {
   using namespace cv::aruco;
   static const std::map<std::string, int> all{
       {"DICT_4X4_50", DICT_4X4_50},
@@ -48,10 +48,10 @@ const std::map<std::string, int>& dictionaries() {
 }
 
 int find_dictionary(const std::string& name) {
-  const auto found = dictionaries().find(name);
-  if (found != dictionaries().end()) return found->second;
+  const auto found = list_aruco_dictionaries().find(name);
+  if (found != list_aruco_dictionaries().end()) return found->second;
   std::string names;
-  for (const auto& [known, number] : dictionaries()) {
+  for (const auto& [known, number] : list_aruco_dictionaries()) {
     names += (names.empty() ? "" : ", ") + known;
   }
   throw std::invalid_argument("OpenCV has no dictionary '" + name + "', but " + names);
@@ -59,10 +59,14 @@ int find_dictionary(const std::string& name) {
 
 #ifdef VLP_ARUCO_IS_A_CLASS
 using Dictionary = cv::aruco::Dictionary;
-const cv::aruco::Dictionary& contents(const Dictionary& dictionary) { return dictionary; }
+const cv::aruco::Dictionary& get_aruco_dictionary(const Dictionary& dictionary) {
+  return dictionary;
+}
 #else
 using Dictionary = cv::Ptr<cv::aruco::Dictionary>;
-const cv::aruco::Dictionary& contents(const Dictionary& dictionary) { return *dictionary; }
+const cv::aruco::Dictionary& get_aruco_dictionary(const Dictionary& dictionary) {
+  return *dictionary;
+}
 #endif
 
 int find_tag_dictionary(const std::string& family) {
@@ -121,8 +125,8 @@ class ArucoFinder : public TagFinder {
 
 ArucoMarker make_aruco_marker(const std::string& name, int id) {
   const Dictionary dictionary = cv::aruco::getPredefinedDictionary(find_dictionary(name));
-  const cv::Mat& codes = contents(dictionary).bytesList;
-  const int width = contents(dictionary).markerSize;
+  const cv::Mat& codes = get_aruco_dictionary(dictionary).bytesList;
+  const int width = get_aruco_dictionary(dictionary).markerSize;
   if (id < 0 || id >= codes.rows) {
     throw std::invalid_argument(name + " has no marker " + std::to_string(id) + ", only 0 to " +
                                 std::to_string(codes.rows - 1));
@@ -134,7 +138,7 @@ ArucoMarker make_aruco_marker(const std::string& name, int id) {
   return marker;
 }
 
-std::unique_ptr<TagFinder> make_aruco_finder(const Board& board) {
+std::unique_ptr<TagFinder> make_aruco_detector(const Board& board) {
   return std::make_unique<ArucoFinder>(board);
 }
 

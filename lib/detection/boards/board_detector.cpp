@@ -36,7 +36,7 @@ bool is_inside(const TagDetection& tag, const cv::Mat& image) {
 
 /// Returns true if more than 10 % of the pixels in the bounding box of a tag are white. The box
 /// extends into the white around the tag.
-bool overexposed(const TagDetection& tag, const cv::Mat1b& levels) {
+bool is_tag_overexposed(const TagDetection& tag, const cv::Mat1b& levels) {
   constexpr double white = 254, min_white_fraction = 0.1;
   std::vector<cv::Point2f> corners;
   for (const auto& corner : tag.corners_px) {
@@ -48,7 +48,7 @@ bool overexposed(const TagDetection& tag, const cv::Mat1b& levels) {
 
 }  // namespace
 
-std::vector<PointDetection> collect_corners(const BoardDetection& seen) {
+std::vector<PointDetection> collect_detected_corners(const BoardDetection& seen) {
   if (!seen.points.empty()) return seen.points;
   std::vector<PointDetection> corners;
   for (const TagDetection& tag : seen.tags) {
@@ -62,10 +62,10 @@ std::vector<PointDetection> collect_corners(const BoardDetection& seen) {
 BoardDetector::BoardDetector(const Board& board) {
   for (const BoardTag& tag : list_board_tags(board)) ids_.insert(tag.id);
   if (board.kind != BoardKind::chessboard) {
-    const bool aruco = board.corner_squares || board.has_squares();
-    finder_ = aruco ? make_aruco_finder(board) : make_apriltag_finder(board);
+    const bool aruco = board.corner_squares || board.has_chessboard_squares();
+    finder_ = aruco ? make_aruco_detector(board) : make_apriltag_detector(board);
   }
-  if (board.has_squares()) {
+  if (board.has_chessboard_squares()) {
     squares_ = std::make_unique<SquareCorners>(board);
   } else if (board.corner_squares) {
     touching_ = std::make_unique<TouchingTags>(board);
@@ -76,7 +76,7 @@ BoardDetector::BoardDetector(const Board& board) {
 
 BoardDetector::~BoardDetector() = default;
 
-cv::Mat1b convert_to_8_bits(const cv::Mat& image) {
+cv::Mat1b scale_to_8_bits(const cv::Mat& image) {
   if (image.depth() == CV_8U) return image;
   double brightest = 0;
   cv::minMaxLoc(image, nullptr, &brightest);
@@ -85,15 +85,15 @@ cv::Mat1b convert_to_8_bits(const cv::Mat& image) {
   return levels;
 }
 
-BoardDetection BoardDetector::detect(const cv::Mat& image) const {
+BoardDetection BoardDetector::detect_board(const cv::Mat& image) const {
   // Tags are wider, and libapriltag reads out of bounds for images of one or two rows.
   constexpr int min_px = 10;
   if (std::min(image.cols, image.rows) < min_px) return {};
-  const cv::Mat1b levels = convert_to_8_bits(image);
+  const cv::Mat1b levels = scale_to_8_bits(image);
   const GrayLevels gray{levels, print_ ? cv::Mat1f() : smooth_image(levels)};
   BoardDetection seen;
   if (!finder_) {
-    seen.points = squares_->detect_chessboard(gray);
+    seen.points = squares_->detect_chessboard_corners(gray);
     return seen;
   }
   std::map<int, std::vector<TagDetection>> found;
@@ -111,13 +111,13 @@ BoardDetection BoardDetector::detect(const cv::Mat& image) const {
     return seen;
   }
   if (print_) {
-    seen.curve_costs = refine_tag_edges(once, levels, *print_);
+    seen.curve_costs = refine_tags_by_edge_fits(once, levels, *print_);
     seen.tags = once;
   } else {
     for (const TagDetection& tag : once) {
-      if (const auto exact = touching_->exact(tag, gray)) seen.tags.push_back(*exact);
+      if (const auto exact = touching_->refine_tag_corners(tag, gray)) seen.tags.push_back(*exact);
     }
-    for (const TagDetection& tag : touching_->find_missing(seen.tags, gray)) {
+    for (const TagDetection& tag : touching_->find_missing_tags(seen.tags, gray)) {
       if (found[tag.id].size() <= 1) seen.tags.push_back(tag);
     }
   }
@@ -131,7 +131,7 @@ BoardDetection BoardDetector::detect(const cv::Mat& image) const {
                                   [id = id](const TagDetection& tag) { return tag.id == id; });
     if (used) continue;
     ++seen.unusable;
-    seen.overexposed += overexposed(same.front(), levels) ? 1 : 0;
+    seen.overexposed += is_tag_overexposed(same.front(), levels) ? 1 : 0;
   }
   return seen;
 }

@@ -70,8 +70,8 @@ struct TagDetection {
   Corners corners_px;
   Curvatures curvatures = {};
   CornerSds corner_sds_px = {};
-  /// Fits for the tone curves of kGammas above 1, one each, until apply_tone_curve() applies a
-  /// curve. Empty for an image that certainly has no tone curve.
+  /// Fits for the tone curves of kGammas above 1, one each, until correct_views_for_tone_curve()
+  /// applies a curve. Empty for an image that certainly has no tone curve.
   std::vector<Outline> tone_curve_fits = {};
   Steps steps = {};
 };
@@ -104,11 +104,11 @@ struct BoardDetection {
   std::vector<PointDetection> points = {};
   /// Negative log-likelihood of the edges of tags for the tone curves of kGammas, up to a constant.
   /// Only the first two if the image certainly has no tone curve. Empty if no edges are fitted, or
-  /// after apply_tone_curve().
+  /// after correct_views_for_tone_curve().
   std::vector<double> curve_costs = {};
 
   /// Returns true if there are corners for a calibration.
-  bool any() const { return !tags.empty() || !points.empty(); }
+  bool has_corners() const { return !tags.empty() || !points.empty(); }
 };
 
 /// Image with the detection of a board.
@@ -121,23 +121,23 @@ struct BoardView {
 
 /// Returns the corners that a calibration uses: the points, or else the corners of the tags. Their
 /// indices ascend and are the same in every view.
-std::vector<PointDetection> collect_corners(const BoardDetection& seen);
+std::vector<PointDetection> collect_detected_corners(const BoardDetection& seen);
 
 /// Converts an image to gray levels of 8 bits. 16-bit images are scaled so that their brightest
 /// pixel has level 255.
-cv::Mat1b convert_to_8_bits(const cv::Mat& image);
+cv::Mat1b scale_to_8_bits(const cv::Mat& image);
 
 /// Creates the decoding table of a tag family, which every detection of its tags needs (20 ms for
 /// tag36h11). A process that calls it before it forks shares the table with its children.
 /// @throws std::invalid_argument if there is no such family
-void prepare_tag_family(const std::string& name);
+void load_tag_family(const std::string& name);
 
 /// Detector of a board's tags, or of the corners of its squares (SquareCorners). Safe to share
 /// between threads.
 ///
 /// AprilTags without corner squares are detected by libapriltag. The gap between tags has to be
-/// white. Corners are the intersections of the tag's edges (refine_tag_edges()), or libapriltag's
-/// if their fit fails.
+/// white. Corners are the intersections of the tag's edges (refine_tags_by_edge_fits()), or
+/// libapriltag's if their fit fails.
 ///
 /// AprilTags with corner squares, which touch each other, are detected by OpenCV's ArUco module.
 /// Missing tags are then predicted from their neighbors. Corners are the intersections of the
@@ -152,7 +152,7 @@ class BoardDetector {
   BoardDetector& operator=(const BoardDetector&) = delete;
 
   /// Detects the board in an image of 8 or 16 bits. The result depends on the image only.
-  BoardDetection detect(const cv::Mat& image) const;
+  BoardDetection detect_board(const cv::Mat& image) const;
 
  private:
   /// Tag detector; nullptr for chessboards.

@@ -49,27 +49,28 @@ constexpr std::array kBowColumns{"edge_quadratic_px", "edge_cubic_px", "edge_hal
 /// Reads the curvature of an edge; unknown if the table does not have the columns.
 EdgeCurvature read_curvature(const CsvTable& csv, std::size_t row) {
   constexpr double min_reach = 0.01, max_reach = 2;
-  if (std::ranges::none_of(kBowColumns, [&](auto name) { return csv.optional(name).has_value(); }))
+  if (std::ranges::none_of(kBowColumns,
+                           [&](auto name) { return csv.get_optional(name).has_value(); }))
     return {};
-  const auto reach_at = csv.required(kBowColumns[2]);
-  const double reach = csv.number(row, reach_at);
+  const auto reach_at = csv.get_required_column(kBowColumns[2]);
+  const double reach = csv.get_number(row, reach_at);
   if (reach != 0 && !(reach >= min_reach && reach <= max_reach)) {
-    throw csv.error(
+    throw csv.make_error(
         row, reach_at,
         "should be the half extent of the edge pixels, 0.01 to 2, or 0 if there are none");
   }
-  return {csv.number(row, csv.required(kBowColumns[0])),
-          csv.number(row, csv.required(kBowColumns[1])), reach};
+  return {csv.get_number(row, csv.get_required_column(kBowColumns[0])),
+          csv.get_number(row, csv.get_required_column(kBowColumns[1])), reach};
 }
 
 constexpr const char* kDeviationColumn = "sd_px";
 
 double read_sd_px(const CsvTable& csv, std::size_t row) {
-  const auto column = csv.optional(kDeviationColumn);
+  const auto column = csv.get_optional(kDeviationColumn);
   if (!column) return 0;
-  const double sd_px = csv.number(row, *column);
+  const double sd_px = csv.get_number(row, *column);
   if (sd_px < 0) {
-    throw csv.error(row, *column, "should be a standard deviation, or 0 if unknown");
+    throw csv.make_error(row, *column, "should be a standard deviation, or 0 if unknown");
   }
   return sd_px;
 }
@@ -83,7 +84,7 @@ std::string describe_wrong_rows(const Board& board, std::span<const BoardView> v
     pixels.emplace_back(cols * rows);
     for (const PointDetection& point : view.seen.points) pixels.back()[point.index] = point.pixel;
   }
-  const std::size_t row_length = estimate_row_length(pixels, cols);
+  const std::size_t row_length = estimate_lattice_row_length(pixels, cols);
   if (row_length == cols) return "";
   return fmt::format(
       "the corners lie in rows of {}, but a board of {} x {} squares has {} x {} corners; {}",
@@ -93,8 +94,8 @@ std::string describe_wrong_rows(const Board& board, std::span<const BoardView> v
 
 }  // namespace
 
-std::string describe_outside_corner(const Eigen::Vector2d& pixel,
-                                    const std::array<int, 2>& imager_px) {
+std::string describe_corner_outside_image(const Eigen::Vector2d& pixel,
+                                          const std::array<int, 2>& imager_px) {
   constexpr double edge = 0.5;  // half a pixel
   const auto [width, height] = imager_px;
   if (pixel.x() >= -edge && pixel.y() >= -edge && pixel.x() <= width - edge &&
@@ -103,10 +104,10 @@ std::string describe_outside_corner(const Eigen::Vector2d& pixel,
   }
   return fmt::format(
       "a corner at ({}, {}) is outside an image of {} x {} px; is it of this camera?",
-      shortest(pixel.x()), shortest(pixel.y()), width, height);
+      format_shortest(pixel.x()), format_shortest(pixel.y()), width, height);
 }
 
-bool too_many_outside(std::size_t outside, std::size_t corners) {
+bool are_too_many_corners_outside(std::size_t outside, std::size_t corners) {
   constexpr std::size_t one_of = 50;
   return one_of * outside > corners;
 }
@@ -122,66 +123,68 @@ class CornerTableReader {
         csv_(file),
         board_(board),
         imager_px_(imager_px),
-        image_(csv_.required("image")),
-        number_(csv_.required("corner")),
-        u_px_(csv_.required("u_px")),
-        v_px_(csv_.required("v_px")),
-        tag_id_(board.has_squares() ? number_ : csv_.required("tag")) {}
+        image_(csv_.get_required_column("image")),
+        number_(csv_.get_required_column("corner")),
+        u_px_(csv_.get_required_column("u_px")),
+        v_px_(csv_.get_required_column("v_px")),
+        tag_id_(board.has_chessboard_squares() ? number_ : csv_.get_required_column("tag")) {}
 
   /// Returns the corners of all images. Throws InputError if there are none, or if too many of them
   /// are outside the image.
   std::vector<BoardView> read() {
     for (std::size_t row = 0; row < csv_.rows(); ++row) read_row(row);
     if (views_.empty()) throw InputError(file_, "contains no corner");
-    if (too_many_outside(outside_, corners_)) throw InputError(*first_outside_);
+    if (are_too_many_corners_outside(outside_, corners_)) throw InputError(*first_outside_);
     return std::move(views_);
   }
 
  private:
   void read_row(std::size_t row) {
-    const std::string name(csv_.text(row, image_));
-    if (name.empty()) throw csv_.error(row, image_, "is empty");
+    const std::string name(csv_.get_text(row, image_));
+    if (name.empty()) throw csv_.make_error(row, image_, "is empty");
     const auto [entry, is_new] = index_by_name_.try_emplace(name, views_.size());
     if (is_new) views_.push_back({name, imager_px_, {}});
     const auto cells = {tag_id_, number_, u_px_, v_px_};
     if (std::all_of(cells.begin(), cells.end(),
-                    [&](auto cell) { return csv_.text(row, cell).empty(); })) {
+                    [&](auto cell) { return csv_.get_text(row, cell).empty(); })) {
       return;  // an image without a corner
     }
-    const Eigen::Vector2d pixel(csv_.number(row, u_px_), csv_.number(row, v_px_));
+    const Eigen::Vector2d pixel(csv_.get_number(row, u_px_), csv_.get_number(row, v_px_));
     ++corners_;
-    if (const auto words = describe_outside_corner(pixel, imager_px_); !words.empty()) {
-      if (outside_++ == 0) first_outside_ = csv_.error(row, u_px_, words);
+    if (const auto words = describe_corner_outside_image(pixel, imager_px_); !words.empty()) {
+      if (outside_++ == 0) first_outside_ = csv_.make_error(row, u_px_, words);
     }
     const int corner = read_number(row);
     if (!add(row, corner, pixel, views_[entry->second].seen)) {
-      throw csv_.error(row, number_, fmt::format("{} occurs twice in image '{}'", corner, name));
+      throw csv_.make_error(row, number_,
+                            fmt::format("{} occurs twice in image '{}'", corner, name));
     }
   }
 
   /// Reads the number of a corner in its tag, or on its board of squares.
   int read_number(std::size_t row) const {
-    const int last = board_.has_squares() ? (board_.cols - 1) * (board_.rows - 1) - 1 : 3;
-    const int corner = csv_.integer(row, number_);
+    const int last =
+        board_.has_chessboard_squares() ? (board_.cols - 1) * (board_.rows - 1) - 1 : 3;
+    const int corner = csv_.get_integer(row, number_);
     if (corner >= 0 && corner <= last) return corner;
-    throw csv_.error(row, number_,
-                     board_.has_squares()
-                         ? fmt::format("should be within 0 and {}, as on a board of {} x {} "
-                                       "squares; is board.yaml that of the board?",
-                                       last, board_.cols, board_.rows)
-                         : "should be within 0 and 3");
+    throw csv_.make_error(row, number_,
+                          board_.has_chessboard_squares()
+                              ? fmt::format("should be within 0 and {}, as on a board of {} x {} "
+                                            "squares; is board.yaml that of the board?",
+                                            last, board_.cols, board_.rows)
+                              : "should be within 0 and 3");
   }
 
   /// Adds a corner to those of its image. Returns false if the image has it already.
   bool add(std::size_t row, int corner, const Eigen::Vector2d& pixel, BoardDetection& seen) {
-    if (board_.has_squares()) {
+    if (board_.has_chessboard_squares()) {
       const auto index = static_cast<std::size_t>(corner);
       const bool is_new =
           std::ranges::find(seen.points, index, &PointDetection::index) == seen.points.end();
       if (is_new) seen.points.push_back({index, pixel});
       return is_new;
     }
-    const int id = csv_.integer(row, tag_id_);
+    const int id = csv_.get_integer(row, tag_id_);
     auto tag = std::ranges::find(seen.tags, id, &TagDetection::id);
     if (tag == seen.tags.end()) tag = seen.tags.insert(tag, make_empty_tag(id));
     const auto k = static_cast<std::size_t>(corner);
@@ -208,7 +211,7 @@ class CornerTableReader {
 std::vector<BoardView> read_corner_table(const std::filesystem::path& file, const Board& board,
                                          const std::array<int, 2>& imager_px) {
   std::vector<BoardView> views = CornerTableReader(file, board, imager_px).read();
-  if (board.has_squares()) {
+  if (board.has_chessboard_squares()) {
     if (const auto words = describe_wrong_rows(board, views); !words.empty())
       throw InputError(file, words);
   }
@@ -216,16 +219,16 @@ std::vector<BoardView> read_corner_table(const std::filesystem::path& file, cons
   for (const BoardTag& tag : list_board_tags(board)) ids.insert(tag.id);
   for (BoardView& view : views) {
     complete_detection(view.seen, ids);
-    if (!board.has_squares()) continue;
-    order_lattice(view.seen.points, board.cols - 1, board.rows - 1,
-                  board.kind == BoardKind::chessboard);
+    if (!board.has_chessboard_squares()) continue;
+    order_lattice_points(view.seen.points, board.cols - 1, board.rows - 1,
+                         board.kind == BoardKind::chessboard);
   }
   return views;
 }
 
 void write_corner_table(const std::filesystem::path& file, std::span<const BoardView> views,
                         const Board& board) {
-  const bool squares = board.has_squares();
+  const bool squares = board.has_chessboard_squares();
   std::vector<std::string> header{"image", "tag", "corner", "u_px", "v_px"};
   if (squares) {
     header.erase(header.begin() + 1);
@@ -243,8 +246,8 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
     }
     if (squares) {
       for (const PointDetection& point : seen.points) {
-        csv.row({view.image, std::to_string(point.index), shortest(point.pixel.x()),
-                 shortest(point.pixel.y())});
+        csv.row({view.image, std::to_string(point.index), format_shortest(point.pixel.x()),
+                 format_shortest(point.pixel.y())});
       }
       continue;
     }
@@ -252,14 +255,16 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
       for (const TagDetection& tag : *each) {
         for (std::size_t k = 0; k < 4; ++k) {
           csv.row({view.image, std::to_string(tag.id), std::to_string(k),
-                   shortest(tag.corners_px[k].x()), shortest(tag.corners_px[k].y()),
-                   shortest(tag.curvatures[k].quadratic_px), shortest(tag.curvatures[k].cubic_px),
-                   shortest(tag.curvatures[k].reach), shortest(tag.corner_sds_px[k])});
+                   format_shortest(tag.corners_px[k].x()), format_shortest(tag.corners_px[k].y()),
+                   format_shortest(tag.curvatures[k].quadratic_px),
+                   format_shortest(tag.curvatures[k].cubic_px),
+                   format_shortest(tag.curvatures[k].reach),
+                   format_shortest(tag.corner_sds_px[k])});
         }
       }
     }
   }
-  csv.save();
+  csv.save_file();
 }
 
 }  // namespace vlp

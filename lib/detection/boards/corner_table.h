@@ -18,16 +18,15 @@ namespace vlp {
 ///   image, tag, corner, u_px, v_px         corner 0 to 3 as in BoardTag::corners_m
 ///   edge_quadratic_px, edge_cubic_px,
 ///   edge_half_extent                       optional: EdgeCurvature from this corner to the next
-///   sd_px                                  optional: TagDetection::Deviations
+///   sd_px                                  optional: TagDetection::corner_sds_px
 /// Columns for boards of squares:
-///   image, corner, u_px, v_px              corner as in PointDetection::index; rows may also be
-///   counted
-///                                          upwards (order_lattice())
+///   image, corner, u_px, v_px              corner as in PointDetection::index; rows may also
+///                                          be counted upwards (order_lattice_points())
 /// An image without corners has one row with its name only. Tags without all four corners are
 /// rejected. Tags that the board does not have are BoardDetection::foreign.
 ///
-/// @throws InputError with file and line, also for a repeated corner, and if too_many_outside()
-///         the image
+/// @throws InputError with file and line, also for a repeated corner, and if too many corners are
+///         outside the image (are_too_many_corners_outside())
 std::vector<BoardView> read_corner_table(const std::filesystem::path& file, const Board& board,
                                          const std::array<int, 2>& imager_px);
 
@@ -37,11 +36,11 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
                         const Board& board);
 
 /// Describes that a corner is outside the image; empty if it is inside.
-std::string describe_outside_corner(const Eigen::Vector2d& pixel,
-                                    const std::array<int, 2>& imager_px);
+std::string describe_corner_outside_image(const Eigen::Vector2d& pixel,
+                                          const std::array<int, 2>& imager_px);
 
 /// Returns true if more than 2 % of the corners are outside the image. Fewer may be outliers; more
 /// indicate an image of another size.
-bool too_many_outside(std::size_t outside, std::size_t corners);
+bool are_too_many_corners_outside(std::size_t outside, std::size_t corners);
 
 }  // namespace vlp

@@ -17,7 +17,7 @@ namespace {
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-bool has_room(const cv::Mat1f& image, const Eigen::Vector2i& at, int radius) {
+bool is_inside_margin(const cv::Mat1f& image, const Eigen::Vector2i& at, int radius) {
   return at.x() >= radius && at.y() >= radius && at.x() + radius < image.cols &&
          at.y() + radius < image.rows;
 }
@@ -41,7 +41,7 @@ std::optional<Eigen::Vector2i> find_strongest_saddle(const cv::Mat1f& image,
   for (int y = -reach; y <= reach; ++y) {
     for (int x = -reach; x <= reach; ++x) {
       const Eigen::Vector2i at = middle + Eigen::Vector2i(x, y);
-      if (x * x + y * y > reach * reach || !has_room(image, at, room)) continue;
+      if (x * x + y * y > reach * reach || !is_inside_margin(image, at, room)) continue;
       const float value = compute_saddle_strength(image, at.x(), at.y());
       if (value <= max_strength) continue;
       max_strength = value;
@@ -121,8 +121,9 @@ struct Crossing {
   }
 };
 
-std::vector<CrossingPixel> collect_pixels(const cv::Mat1b& image, const Eigen::Vector2d& guess_px,
-                                          double radius_px) {
+std::vector<CrossingPixel> collect_pixels_near_edge(const cv::Mat1b& image,
+                                                    const Eigen::Vector2d& guess_px,
+                                                    double radius_px) {
   const Eigen::Vector2i roi_min = (guess_px.array() - radius_px).ceil().cast<int>().max(0);
   const Eigen::Vector2i roi_max = (guess_px.array() + radius_px)
                                       .floor()
@@ -164,7 +165,7 @@ std::optional<Eigen::Vector2d> find_saddle_point(const cv::Mat1f& smoothed,
   if (!initial_pixel) return {};
   Eigen::Vector2i middle = *initial_pixel;
   for (int step = 0; step < max_iterations; ++step) {
-    if (!has_room(smoothed, middle, radius_px)) return {};
+    if (!is_inside_margin(smoothed, middle, radius_px)) return {};
     const auto offset = fit_saddle_offset(smoothed, middle, radius_px);
     if (!offset) return {};
     const Eigen::Vector2d point = middle.cast<double>() + *offset;
@@ -185,7 +186,7 @@ std::optional<Eigen::Vector2d> fit_edge_crossing(const cv::Mat1b& image,
   constexpr double initial_blur_px = 0.8, min_blur_px = 0.05, max_displacement_px = 1.5;
   constexpr double function_tolerance = 1e-3;  // gray levels squared
   constexpr double min_contrast = 3, max_relative_rms = 0.35;
-  const auto pixels = collect_pixels(image, guess_px, radius_px);
+  const auto pixels = collect_pixels_near_edge(image, guess_px, radius_px);
   if (pixels.size() < min_pixels) return {};
   Crossing::Parameters p = Crossing::Parameters::Zero();
   p[2] = std::atan2(along[0].y(), along[0].x());

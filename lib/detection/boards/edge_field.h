@@ -33,7 +33,7 @@ class EdgeField {
   double value(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
   /// Relative standard deviation of the edges from the model that exceeds their own standard
   /// deviations.
-  double excess_sd() const { return excess_sd_; }
+  double excess_edge_sd() const { return excess_sd_; }
 
  private:
   static constexpr Eigen::Index kMaxTerms = 8;

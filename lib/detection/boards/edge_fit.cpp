@@ -65,7 +65,7 @@ class Edge {
     return true;
   }
 
-  double squares_of_priors(const Parameters& p) const {
+  double sum_squared_prior_residuals(const Parameters& p) const {
     if (p != at_) evaluate(p);
     return residuals_.template tail<kPriors>().squaredNorm();
   }
@@ -79,7 +79,7 @@ class Edge {
   /// Returns the sigma of the Gaussian with the MTF50 of the step. One Gauss-Newton step first
   /// estimates the excess kurtosis of the line spread (BlurredStep). That of a disc is -1, that of
   /// a Gaussian 0; it stays near 0 if the pixels do not determine it.
-  double equivalent_blur(const Parameters& p) const {
+  double compute_equivalent_blur(const Parameters& p) const {
     constexpr double kurtosis_sd = 0.5, min_noise = 0.3;  // in levels: that of rounding
     constexpr double min_kurtosis = -1.5, max_kurtosis = 3;
     // A larger change of the blur, as a fraction of it, is not linear: the Gaussian's blur remains.
@@ -112,7 +112,7 @@ class Edge {
     return blur * gaussian / s;
   }
   /// Returns EdgeFit::end_variance: the mean variance of both ends with a known curvature.
-  double end_variance(const Parameters& p) const {
+  double compute_variance_at_edge_end(const Parameters& p) const {
     constexpr int straight = 7;
     using Square = Eigen::Matrix<double, straight, straight>;
     if (p != at_) evaluate(p);
@@ -180,7 +180,7 @@ struct EdgeSides {
     constexpr double white = 254;
     double ins = 0, outs = 0, whites_in = 0, whites_out = 0;
     for (const EdgePixel& pixel : pixels) {
-      const bool inside = pixel.across_px < edge.value_at(pixel.along);
+      const bool inside = pixel.across_px < edge.curve_displacement_px(pixel.along);
       (inside ? in : out) += linearize(pixel.level, gamma);
       (inside ? ins : outs) += 1;
       if (pixel.level >= white) (inside ? whites_in : whites_out) += 1;
@@ -217,7 +217,7 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
   edge.coefficients.head<terms>() = p.template tail<terms>();
   edge.blur_px = p[0];
   const double outside = p[2] < 0 ? -1 : 1;
-  const double squares = 2 * solver.summary.final_cost - step.squares_of_priors(p);
+  const double squares = 2 * solver.summary.final_cost - step.sum_squared_prior_residuals(p);
   EdgeFit result{squares, pixels.size(), is_saturated, p[1] + outside * p[2],
                  p[1] - outside * p[2]};
   const double rms = std::sqrt(result.squares / static_cast<double>(pixels.size()));
@@ -226,8 +226,8 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
   const bool is_accepted = p.allFinite() && p[0] > min_blur_px && p[0] < max_blur_px &&
                            contrast > min_contrast && rms < max_relative_rms * contrast;
   if (!is_accepted) return {};
-  result.end_variance = step.end_variance(p);
-  result.equivalent_blur_px = step.equivalent_blur(p);
+  result.end_variance = step.compute_variance_at_edge_end(p);
+  result.equivalent_blur_px = step.compute_equivalent_blur(p);
   if (is_saturated || prior.gamma != 1) {
     typename Step::Parameters brighter = Step::Parameters::Zero();
     brighter.template segment<2>(1) << 1, outside;
@@ -239,25 +239,29 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
 
 }  // namespace
 
-Eigen::Vector2d EdgeCurve::gradient(const Eigen::Vector2d& x) const {
+Eigen::Vector2d EdgeCurve::compute_distance_gradient(const Eigen::Vector2d& x) const {
   const double w = along.dot(x - middle) / half_px;
   const Coefficients& c = coefficients;
   const double slope = c[1] + w * (2 * c[2] + w * 3 * c[3]);
   return across - slope / half_px * along;
 }
 
-Eigen::Vector2d find_intersection(const EdgeCurve& a, const EdgeCurve& b, Eigen::Vector2d point) {
+Eigen::Vector2d find_edge_intersection(const EdgeCurve& a, const EdgeCurve& b,
+                                       Eigen::Vector2d point) {
   constexpr int steps = 4;
   for (int i = 0; i < steps; ++i) {
     Eigen::Matrix2d gradients;
-    gradients << a.gradient(point).transpose(), b.gradient(point).transpose();
-    point -= gradients.inverse() * Eigen::Vector2d(a.offset_px(point), b.offset_px(point));
+    gradients << a.compute_distance_gradient(point).transpose(),
+        b.compute_distance_gradient(point).transpose();
+    point -= gradients.inverse() *
+             Eigen::Vector2d(a.distance_from_curve_px(point), b.distance_from_curve_px(point));
   }
   return point;
 }
 
-std::optional<EdgeFit> fit_edge(EdgeCurve& edge, const std::vector<EdgePixel>& pixels,
-                                const EdgePrior& prior) {
+std::optional<EdgeFit> fit_edge_curve_and_blur(EdgeCurve& edge,
+                                               const std::vector<EdgePixel>& pixels,
+                                               const EdgePrior& prior) {
   constexpr std::size_t min_pixels = 24;
   if (pixels.size() < min_pixels) return {};
   return edge.cubic ? fit<EdgeCurve::kMaxTerms>(edge, pixels, prior)

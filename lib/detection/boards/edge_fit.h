@@ -31,20 +31,21 @@ struct EdgeCurve {
   bool cubic = false;
   double blur_px = 0.8;
 
-  double value_at(double w) const {
+  double curve_displacement_px(double w) const {
     const Coefficients& c = coefficients;
     return c[0] + w * (c[1] + w * (c[2] + w * c[3]));
   }
   /// Returns the distance of a point from the curve in px along v, positive outwards.
-  double offset_px(const Eigen::Vector2d& x) const {
-    return across.dot(x - middle) - value_at(along.dot(x - middle) / half_px);
+  double distance_from_curve_px(const Eigen::Vector2d& x) const {
+    return across.dot(x - middle) - curve_displacement_px(along.dot(x - middle) / half_px);
   }
   /// Returns the gradient of the distance from the curve.
-  Eigen::Vector2d gradient(const Eigen::Vector2d& x) const;
+  Eigen::Vector2d compute_distance_gradient(const Eigen::Vector2d& x) const;
 };
 
 /// Computes the intersection of two curves by Newton's method from a nearby point.
-Eigen::Vector2d find_intersection(const EdgeCurve& a, const EdgeCurve& b, Eigen::Vector2d point);
+Eigen::Vector2d find_edge_intersection(const EdgeCurve& a, const EdgeCurve& b,
+                                       Eigen::Vector2d point);
 
 /// Prior of the edges of an image.
 struct EdgePrior {
@@ -56,7 +57,7 @@ struct EdgePrior {
   double bright_light = 0, bright_weight = 0;
 };
 
-/// Result of fit_edge().
+/// Result of fit_edge_curve_and_blur().
 struct EdgeFit {
   /// Sum of the squared residuals, in gray levels squared.
   double squares;
@@ -90,7 +91,8 @@ struct EdgeFit {
 /// The edge is saturated if at least 25 % of the pixels on the brighter side are white. Levels
 /// above 250 are then censored: residuals use min(level, 250), because the processing of a camera
 /// leaves some saturated pixels below 255.
-std::optional<EdgeFit> fit_edge(EdgeCurve& edge, const std::vector<EdgePixel>& pixels,
-                                const EdgePrior& prior);
+std::optional<EdgeFit> fit_edge_curve_and_blur(EdgeCurve& edge,
+                                               const std::vector<EdgePixel>& pixels,
+                                               const EdgePrior& prior);
 
 }  // namespace vlp

@@ -14,12 +14,12 @@ namespace {
 constexpr int kMinTags = 4;
 
 /// Returns the number of usable tags, including those of other ids.
-int count_tags(const BoardDetection& seen) {
+int count_detected_tags(const BoardDetection& seen) {
   return static_cast<int>(seen.tags.size() + seen.foreign.size());
 }
 
 BoardDetection detect_board(const cv::Mat& image, const Board& board) {
-  return BoardDetector(board).detect(image);
+  return BoardDetector(board).detect_board(image);
 }
 
 /// Returns boards with the largest dictionary of each number of bits.
@@ -73,11 +73,11 @@ std::string describe_tags(const Board& board) {
 
 }  // namespace
 
-std::string describe_other_tags(const Board& board, const cv::Mat& image) {
+std::string describe_tags_of_other_kinds(const Board& board, const cv::Mat& image) {
   if (board.kind == BoardKind::chessboard) return "";  // it has none
   cv::Mat mirrored;
   cv::flip(image, mirrored, 1);
-  if (count_tags(detect_board(mirrored, board)) >= kMinTags) {
+  if (count_detected_tags(detect_board(mirrored, board)) >= kMinTags) {
     return "the image is mirrored: mirror it back, or turn mirroring off in the camera";
   }
   const bool charuco = board.kind == BoardKind::charuco;
@@ -85,12 +85,12 @@ std::string describe_other_tags(const Board& board, const cv::Mat& image) {
   // at least as many tags as the board's family has with unusable ones, and more than without them.
   const BoardDetection stated = detect_board(image, board);
   const int num_unusable = charuco ? 0 : std::max(0, stated.unusable - 1);
-  int max_count = std::max(kMinTags - 1, count_tags(stated) + num_unusable);
+  int max_count = std::max(kMinTags - 1, count_detected_tags(stated) + num_unusable);
   std::string found;
   for (const Board& other : charuco ? list_other_markers(board) : list_other_tags(board)) {
     const BoardDetection seen = detect_board(image, other);
-    if (count_tags(seen) <= max_count) continue;
-    max_count = count_tags(seen);
+    if (count_detected_tags(seen) <= max_count) continue;
+    max_count = count_detected_tags(seen);
     found = charuco ? describe_markers(other.family, seen) : describe_tags(other);
   }
   return found;

@@ -12,6 +12,6 @@ namespace vlp {
 /// Describes in one line another pattern that an image without tags of `board` shows: a mirrored
 /// board, tags of another family or with another border, or markers of another dictionary. Returns
 /// an empty string if none of them is detected. Takes about a second per image.
-std::string describe_other_tags(const Board& board, const cv::Mat& image);
+std::string describe_tags_of_other_kinds(const Board& board, const cv::Mat& image);
 
 }  // namespace vlp

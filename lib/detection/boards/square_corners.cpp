@@ -19,13 +19,13 @@ namespace {
 constexpr int kFlags = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE;
 
 /// Returns true if the pixel lies in the image; false if it is not finite.
-bool in_image(const Eigen::Vector2d& pixel, const cv::Mat& image) {
+bool is_in_image(const Eigen::Vector2d& pixel, const cv::Mat& image) {
   return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < image.cols && pixel.y() < image.rows;
 }
 
 /// Returns the factor by which a large image is reduced for OpenCV's search, which then needs a
 /// fraction of the memory. Corners are refined in the full image.
-int choose_reduction(const cv::Mat& image) {
+int choose_reduction_factor(const cv::Mat& image) {
   constexpr double large_px = 8e6;
   return static_cast<int>(std::ceil(std::sqrt(static_cast<double>(image.total()) / large_px)));
 }
@@ -38,7 +38,7 @@ cv::Mat reduce_image(const cv::Mat& image, int times) {
 }
 
 /// Converts a coordinate in the reduced image to the full image. Their sizes need not be multiples.
-double enlarge_coordinate(float at, int large, int small) {
+double scale_to_full_resolution(float at, int large, int small) {
   return (static_cast<double>(at) + 0.5) * large / small - 0.5;
 }
 
@@ -61,7 +61,7 @@ std::vector<PointDetection> SquareCorners::refine(const std::vector<Guess>& gues
   constexpr double edge_px = 2;  // a corner nearer to the image's edge is cut short
   std::vector<PointDetection> points;
   for (const auto& [index, pixel, next, free_px] : guesses) {
-    if (!in_image(pixel, image.sharp)) continue;
+    if (!is_in_image(pixel, image.sharp)) continue;
     const int radius_px = std::clamp(static_cast<int>(free_px / 2), min_px, max_px);
     const int reach_px = std::clamp(static_cast<int>(free_px * 0.8), min_px, 2 * max_px);
     const auto saddle = find_saddle_point(image.smoothed, pixel, reach_px, radius_px);
@@ -79,9 +79,10 @@ std::vector<PointDetection> SquareCorners::refine(const std::vector<Guess>& gues
   return points;
 }
 
-std::vector<PointDetection> SquareCorners::detect_chessboard(const GrayLevels& image) const {
+std::vector<PointDetection> SquareCorners::detect_chessboard_corners(
+    const GrayLevels& image) const {
   std::vector<cv::Point2f> found;
-  const cv::Mat searched = reduce_image(image.sharp, choose_reduction(image.sharp));
+  const cv::Mat searched = reduce_image(image.sharp, choose_reduction_factor(image.sharp));
   seed_random_generator();
   if (!cv::findChessboardCornersSB(searched, {cols_, rows_}, found, kFlags)) return {};
   std::vector<PointDetection> points;
@@ -90,10 +91,10 @@ std::vector<PointDetection> SquareCorners::detect_chessboard(const GrayLevels& i
     const auto [x, y] = found[i];
     points.push_back({i, {x, y}});
     if (whole) continue;
-    points.back().pixel = {enlarge_coordinate(x, image.sharp.cols, searched.cols),
-                           enlarge_coordinate(y, image.sharp.rows, searched.rows)};
+    points.back().pixel = {scale_to_full_resolution(x, image.sharp.cols, searched.cols),
+                           scale_to_full_resolution(y, image.sharp.rows, searched.rows)};
   }
-  order_lattice(points, cols_, rows_, true);
+  order_lattice_points(points, cols_, rows_, true);
   const auto at = [&](int col, int row) {
     return points[static_cast<std::size_t>(row * cols_ + col)].pixel;
   };
@@ -153,7 +154,7 @@ std::vector<PointDetection> SquareCorners::detect_corners_near_markers(
 std::array<int, 2> count_chessboard_squares(const cv::Mat& image) {
   constexpr int min_px = 10;
   if (std::min(image.cols, image.rows) < min_px) return {0, 0};
-  const cv::Mat1b levels = reduce_image(convert_to_8_bits(image), choose_reduction(image));
+  const cv::Mat1b levels = reduce_image(scale_to_8_bits(image), choose_reduction_factor(image));
   std::vector<cv::Point2f> corners;
   cv::Mat squares;
   seed_random_generator();
@@ -167,7 +168,7 @@ std::array<int, 2> count_chessboard_squares(const cv::Mat& image) {
 
 namespace {
 
-double shortest_edge_px(const TagDetection& tag) {
+double compute_shortest_edge_px(const TagDetection& tag) {
   double shortest = INFINITY;
   for (std::size_t k = 0; k < 4; ++k) {
     shortest = std::min(shortest, (tag.corners_px[k] - tag.corners_px[(k + 1) % 4]).norm());
@@ -182,14 +183,15 @@ TouchingTags::TouchingTags(const Board& board)
       family_(make_tag_family(board.family)),
       border_bits_(board.border_bits),
       tag_size_m_(board.tag_size_m) {
-  const double width = width_in_bits(*family_, border_bits_);
+  const double width = tag_width_in_bits(*family_, border_bits_);
   free_fraction_ = std::min(board.tag_spacing, border_bits_ / width);
 }
 
-std::optional<TagDetection> TouchingTags::exact(TagDetection tag, const GrayLevels& image) const {
+std::optional<TagDetection> TouchingTags::refine_tag_corners(TagDetection tag,
+                                                             const GrayLevels& image) const {
   constexpr int min_px = 2, max_px = 5;
   constexpr double min_fit_px = 2.5, max_fit_px = 8, fit_fraction = 0.75;
-  const double free_px = shortest_edge_px(tag) * free_fraction_;
+  const double free_px = compute_shortest_edge_px(tag) * free_fraction_;
   const int radius_px = std::clamp(static_cast<int>(free_px / 2), min_px, max_px);
   const int reach_px = std::max(min_px, static_cast<int>(free_px * 0.8));
   for (auto& corner : tag.corners_px) {
@@ -205,7 +207,7 @@ std::optional<TagDetection> TouchingTags::exact(TagDetection tag, const GrayLeve
         {saddles[(k + 1) % 4] - saddles[k], saddles[(k + 3) % 4] - saddles[k]}, fit_px);
     if (found) tag.corners_px[k] = *found;
   }
-  if (!matches_tag_bits(tag, image.smoothed, *family_, border_bits_)) return {};
+  if (!image_matches_tag_bits(tag, image.smoothed, *family_, border_bits_)) return {};
   return tag;
 }
 
@@ -224,8 +226,8 @@ std::optional<TagDetection> TouchingTags::predict(const BoardTag& missing,
   return tag;
 }
 
-std::vector<TagDetection> TouchingTags::find_missing(const std::vector<TagDetection>& tags,
-                                                     const GrayLevels& image) const {
+std::vector<TagDetection> TouchingTags::find_missing_tags(const std::vector<TagDetection>& tags,
+                                                          const GrayLevels& image) const {
   std::vector<TagDetection> all = tags;
   for (bool more = true; more;) {
     more = false;
@@ -234,7 +236,7 @@ std::vector<TagDetection> TouchingTags::find_missing(const std::vector<TagDetect
                                      [&](const TagDetection& tag) { return tag.id == place.id; });
       if (known) continue;
       const auto guess = predict(place, all);
-      const auto tag = guess ? exact(*guess, image) : std::nullopt;
+      const auto tag = guess ? refine_tag_corners(*guess, image) : std::nullopt;
       if (!tag) continue;
       all.push_back(*tag);
       more = true;

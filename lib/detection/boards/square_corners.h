@@ -24,8 +24,8 @@ class SquareCorners {
 
   /// Detects the corners of a chessboard by OpenCV's findChessboardCornersSB(). Returns all
   /// corners, or none if the board is not completely in view. The two ends of the board cannot be
-  /// distinguished (order_lattice()).
-  std::vector<PointDetection> detect_chessboard(const GrayLevels& image) const;
+  /// distinguished (order_lattice_points()).
+  std::vector<PointDetection> detect_chessboard_corners(const GrayLevels& image) const;
 
   /// Detects the corners next to markers whose own corners are accurate to 1 to 2 px.
   std::vector<PointDetection> detect_corners_near_markers(const std::vector<TagDetection>& markers,
@@ -61,12 +61,12 @@ class TouchingTags {
   /// Returns the tag with refined corners: the intersections of the edges next to the saddle points
   /// at its corners, or the saddle points. Returns std::nullopt if a saddle point is not found, or
   /// if the bits between the corners are not those of the tag.
-  std::optional<TagDetection> exact(TagDetection tag, const GrayLevels& image) const;
+  std::optional<TagDetection> refine_tag_corners(TagDetection tag, const GrayLevels& image) const;
 
   /// Finds tags of the board that are missing in `tags`, which are refined. Predicts their position
-  /// by a homography of the nearest tags. Returns those that exact() accepts.
-  std::vector<TagDetection> find_missing(const std::vector<TagDetection>& tags,
-                                         const GrayLevels& image) const;
+  /// by a homography of the nearest tags. Returns those that refine_tag_corners() accepts.
+  std::vector<TagDetection> find_missing_tags(const std::vector<TagDetection>& tags,
+                                              const GrayLevels& image) const;
 
  private:
   std::optional<TagDetection> predict(const BoardTag& missing,

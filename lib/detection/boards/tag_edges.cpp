@@ -33,9 +33,9 @@ struct AdjoiningPattern {
   double start_px = 0, by_along_px = 0;
   std::vector<std::array<double, 2>> white;
 
-  double stripe_px(double w) const { return start_px + by_along_px * w; }
+  double stripe_width_px(double w) const { return start_px + by_along_px * w; }
 
-  double white_at(double w, double half_px, double blur_px) const {
+  double predict_white_level(double w, double half_px, double blur_px) const {
     const Blur along_edge(blur_px);  // approximate; not estimated
     double sum = 0;
     for (const auto& [from, to] : white) {
@@ -47,10 +47,10 @@ struct AdjoiningPattern {
 };
 
 /// Returns the pixels along edge k of a tag, from approximate edges and blur.
-std::vector<EdgePixel> collect_pixels(const cv::Mat1b& image,
-                                      const std::array<EdgeCurve, 4>& approximate, std::size_t k,
-                                      const AdjoiningPattern& pattern, const Band& band,
-                                      double blur_px) {
+std::vector<EdgePixel> collect_pixels_near_edge(const cv::Mat1b& image,
+                                                const std::array<EdgeCurve, 4>& approximate,
+                                                std::size_t k, const AdjoiningPattern& pattern,
+                                                const Band& band, double blur_px) {
   // Distance from the two adjacent edges, in blurs. It excludes the corners, which the blur rounds.
   constexpr double free_blurs = 3.125, max_free_fraction = 0.3;
   const EdgeCurve &edge = approximate[k], &next = approximate[(k + 1) % 4],
@@ -69,11 +69,14 @@ std::vector<EdgePixel> collect_pixels(const cv::Mat1b& image,
     for (int column = roi_min.x(); column <= roi_max.x(); ++column) {
       const Eigen::Vector2d at(column, row);
       const double w = edge.along.dot(at - edge.middle) / edge.half_px;
-      const double v = edge.across.dot(at - edge.middle), offset_px = v - edge.value_at(w);
+      const double v = edge.across.dot(at - edge.middle),
+                   offset_px = v - edge.curve_displacement_px(w);
       if (offset_px < -band.inside_px || offset_px > band.outside_px) continue;
-      if (next.offset_px(at) > -free_px || previous.offset_px(at) > -free_px) continue;
-      pixels.push_back({w, v, static_cast<double>(image(row, column)), pattern.stripe_px(w),
-                        pattern.white_at(w, edge.half_px, blur_px)});
+      if (next.distance_from_curve_px(at) > -free_px ||
+          previous.distance_from_curve_px(at) > -free_px)
+        continue;
+      pixels.push_back({w, v, static_cast<double>(image(row, column)), pattern.stripe_width_px(w),
+                        pattern.predict_white_level(w, edge.half_px, blur_px)});
     }
   }
   return pixels;
@@ -85,10 +88,10 @@ class TagEdges {
   TagEdges(const TagDetection& tag, const cv::Mat1b& image, const TagGeometry& print);
 
   /// Returns true if the fits of all edges succeeded.
-  bool found() const { return found_; }
-  double width_px() const { return width_px_; }
-  const std::array<EdgeCurve, 4>& edges() const { return edges_; }
-  const std::array<EdgeFit, 4>& fits() const { return fits_; }
+  bool are_all_edges_fitted() const { return found_; }
+  double tag_width_px() const { return width_px_; }
+  const std::array<EdgeCurve, 4>& edge_curves() const { return edges_; }
+  const std::array<EdgeFit, 4>& edge_fits() const { return fits_; }
 
   /// Fits all edges to the same pixels again, from the approximate edges.
   void fit(const std::function<EdgePrior(const EdgeCurve& edge)>& prior_of);
@@ -96,16 +99,16 @@ class TagEdges {
   /// Returns the intersections of the edges, with the curvatures of the edges and the standard
   /// deviations of the corners. Returns std::nullopt if the fit of an edge failed or a corner moved
   /// too far.
-  std::optional<TagDetection::Outline> intersected() const;
+  std::optional<TagDetection::Outline> intersect_edges() const;
 
   /// Returns the steps across the edges for a tone curve; unknown ones if the fit of an edge failed
   /// or the edge is saturated. Edges with a larger blur than the initial one are fitted again for
   /// the steps. These fits exclude pixels near corners and bits, which are blurred as well. Corners
   /// remain as fitted, because fewer pixels would make them less precise.
-  TagDetection::Steps steps(const cv::Mat1b& image, double gamma) const;
+  TagDetection::Steps measure_edge_steps(const cv::Mat1b& image, double gamma) const;
 
  private:
-  void predict_patterns(const TagGeometry& print);
+  void predict_neighbor_patterns(const TagGeometry& print);
   void collect_all_pixels(const cv::Mat1b& image, double blur_px);
 
   const TagDetection& tag_;
@@ -129,8 +132,8 @@ EdgeCurvature compute_curvature(const EdgeCurve& edge, const Eigen::Vector2d& fr
                end = edge.along.dot(to - edge.middle) / edge.half_px;
   const auto off_px = [&](double w) {
     const double at = (begin + end + w * (end - begin)) / 2;
-    const Eigen::Vector2d x =
-        edge.middle + edge.along * (at * edge.half_px) + edge.across * edge.value_at(at);
+    const Eigen::Vector2d x = edge.middle + edge.along * (at * edge.half_px) +
+                              edge.across * edge.curve_displacement_px(at);
     return across.dot(x - from);
   };
   // Half extent of evenly distributed pixels with the same mean square.
@@ -152,7 +155,8 @@ double compute_intersection_sd_px(const EdgeCurve& a, const EdgeFit& fit_a, cons
   return std::sqrt((variance(fit_a) + variance(fit_b)) / 2) / std::abs(sine);
 }
 
-double difference_px(const std::array<EdgeCurve, 4>& a, const std::array<EdgeCurve, 4>& b) {
+double compute_max_difference_px(const std::array<EdgeCurve, 4>& a,
+                                 const std::array<EdgeCurve, 4>& b) {
   double max_px = 0;
   for (std::size_t k = 0; k < 4; ++k) {
     max_px = std::max(max_px, (a[k].coefficients - b[k].coefficients).lpNorm<Eigen::Infinity>());
@@ -182,10 +186,10 @@ TagEdges::TagEdges(const TagDetection& tag, const cv::Mat1b& image, const TagGeo
     }
   }
   edges_ = approximate_;
-  predict_patterns(print);
+  predict_neighbor_patterns(print);
   const double bit_px = width_px_ / print.width();
-  band_ = {std::clamp(print.inside() * bit_px - away_px, min_px, max_px),
-           std::clamp(print.outside() * bit_px - away_px, min_px, max_px)};
+  band_ = {std::clamp(print.inner_stripe_width() * bit_px - away_px, min_px, max_px),
+           std::clamp(print.outer_stripe_width() * bit_px - away_px, min_px, max_px)};
   const auto fit_without_curve = [&] {
     collect_all_pixels(image, kRoughBlur_px);
     fit([](const EdgeCurve&) { return EdgePrior(); });
@@ -195,7 +199,7 @@ TagEdges::TagEdges(const TagDetection& tag, const cv::Mat1b& image, const TagGeo
   for (int iteration = 0;
        iteration < max_iterations && found_ && max_curvature_px_ > refit_threshold_px;
        ++iteration) {
-    if (iteration > 0 && difference_px(edges_, approximate_) < tolerance_px) break;
+    if (iteration > 0 && compute_max_difference_px(edges_, approximate_) < tolerance_px) break;
     for (EdgeCurve& edge : edges_) {
       edge.cubic = edge.cubic || std::abs(edge.coefficients[2]) > cubic_threshold_px;
     }
@@ -204,10 +208,10 @@ TagEdges::TagEdges(const TagDetection& tag, const cv::Mat1b& image, const TagGeo
   }
 }
 
-void TagEdges::predict_patterns(const TagGeometry& print) {
-  const double width = print.width(), deep = print.inside();
+void TagEdges::predict_neighbor_patterns(const TagGeometry& print) {
+  const double width = print.width(), deep = print.inner_stripe_width();
   const std::array<Eigen::Vector2d, 4> square{{{0, 0}, {width, 0}, {width, width}, {0, width}}};
-  const TagGeometry::Sides white = print.find_white_segments(tag_.id);
+  const TagGeometry::Sides white = print.find_white_bit_segments(tag_.id);
   for (std::size_t k = 0; k < 4; ++k) {
     std::array<PlanePair, 4> pairs;
     for (std::size_t i = 0; i < 4; ++i) pairs[i] = {square[i], tag_.corners_px[(k + i) % 4]};
@@ -229,7 +233,7 @@ void TagEdges::predict_patterns(const TagGeometry& print) {
 
 void TagEdges::collect_all_pixels(const cv::Mat1b& image, double blur_px) {
   for (std::size_t k = 0; k < 4; ++k) {
-    pixels_[k] = collect_pixels(image, approximate_, k, patterns_[k], band_, blur_px);
+    pixels_[k] = collect_pixels_near_edge(image, approximate_, k, patterns_[k], band_, blur_px);
   }
 }
 
@@ -241,7 +245,7 @@ void TagEdges::fit(const std::function<EdgePrior(const EdgeCurve& edge)>& prior_
   for (std::size_t k = 0; k < 4; ++k) {
     edges_[k].coefficients = approximate_[k].coefficients;
     edges_[k].blur_px = approximate_[k].blur_px;
-    const auto fitted = fit_edge(edges_[k], pixels_[k], prior_of(approximate_[k]));
+    const auto fitted = fit_edge_curve_and_blur(edges_[k], pixels_[k], prior_of(approximate_[k]));
     if (!fitted) return;
     fits_[k] = *fitted;
     max_curvature_px_ = std::max(max_curvature_px_, std::abs(edges_[k].coefficients[2]));
@@ -249,7 +253,7 @@ void TagEdges::fit(const std::function<EdgePrior(const EdgeCurve& edge)>& prior_
   found_ = max_curvature_px_ <= max_curvature_fraction * width_px_;
 }
 
-std::optional<TagDetection::Outline> TagEdges::intersected() const {
+std::optional<TagDetection::Outline> TagEdges::intersect_edges() const {
   constexpr double moved_px = 1.5, moved_fraction = 0.03;
   if (!found_) return {};
   // A straight line fitted to an edge misses its ends by two thirds of the curvature. Two such
@@ -260,7 +264,7 @@ std::optional<TagDetection::Outline> TagEdges::intersected() const {
   TagDetection::Corners& corners = outline.corners_px;
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Vector2d& from = tag_.corners_px[k];
-    corners[k] = find_intersection(edges_[(k + 3) % 4], edges_[k], from);
+    corners[k] = find_edge_intersection(edges_[(k + 3) % 4], edges_[k], from);
     if (!((corners[k] - from).norm() < max_displacement_px)) return {};
   }
   for (std::size_t k = 0; k < 4; ++k) {
@@ -273,7 +277,7 @@ std::optional<TagDetection::Outline> TagEdges::intersected() const {
   return outline;
 }
 
-TagDetection::Steps TagEdges::steps(const cv::Mat1b& image, double gamma) const {
+TagDetection::Steps TagEdges::measure_edge_steps(const cv::Mat1b& image, double gamma) const {
   TagDetection::Steps steps;
   if (!found_) return steps;
   double blur_px = 0;
@@ -302,8 +306,8 @@ struct TagSelection {
   template <typename Edge>
   void for_each_edge(Edge edge) const {
     for (const std::size_t i : which) {
-      for (std::size_t k = 0; all[i].found() && k < 4; ++k)
-        edge(all[i].edges()[k], all[i].fits()[k]);
+      for (std::size_t k = 0; all[i].are_all_edges_fitted() && k < 4; ++k)
+        edge(all[i].edge_curves()[k], all[i].edge_fits()[k]);
     }
   }
   /// Returns the sum of the squared residuals of these edges, and the number of their pixels.
@@ -315,7 +319,7 @@ struct TagSelection {
     });
     return {squares, pixels};
   }
-  bool any_saturated() const {
+  bool is_any_edge_saturated() const {
     bool any = false;
     for_each_edge([&](const EdgeCurve&, const EdgeFit& fit) { any = any || fit.is_saturated; });
     return any;
@@ -326,7 +330,8 @@ struct TagSelection {
 /// eliminated; a very large value if the fit of a tag failed.
 double compute_cost(const TagSelection& tags) {
   constexpr double min_rms = 0.1, failure_cost = 1e9;
-  if (!std::ranges::all_of(tags.which, [&](std::size_t i) { return tags.all[i].found(); })) {
+  if (!std::ranges::all_of(tags.which,
+                           [&](std::size_t i) { return tags.all[i].are_all_edges_fitted(); })) {
     return failure_cost;
   }
   const auto [squares, pixels] = tags.sum_squares();
@@ -342,7 +347,7 @@ class EdgeModels {
   void fit_light(const TagSelection& tags);
 
   /// Returns the prior of an edge for a tone curve: of its blur, and of its light after
-  /// fit_light().
+  /// fit_light_to_outline().
   EdgePrior make_prior(const EdgeCurve& edge, double gamma) const;
 
  private:
@@ -352,7 +357,7 @@ class EdgeModels {
 };
 
 /// Fits a model to the valid samples; std::nullopt if there are none.
-std::optional<EdgeField> fit_field(std::vector<EdgeSample> samples, EdgeField::Terms terms) {
+std::optional<EdgeField> fit_edge_field(std::vector<EdgeSample> samples, EdgeField::Terms terms) {
   std::erase_if(samples, [](const EdgeSample& sample) {
     return !(sample.value > 0 && sample.sd >= 0 && std::isfinite(sample.value + sample.sd));
   });
@@ -369,7 +374,7 @@ EdgeModels::EdgeModels(const TagSelection& tags) {
     blurs.push_back({edge.middle, edge.along, edge.blur_px,
                      noise_ * std::sqrt(fit.blur_variance) / edge.blur_px});
   });
-  blur_ = fit_field(std::move(blurs), EdgeField::Terms::place_and_direction);
+  blur_ = fit_edge_field(std::move(blurs), EdgeField::Terms::place_and_direction);
 }
 
 void EdgeModels::fit_light(const TagSelection& tags) {
@@ -378,26 +383,26 @@ void EdgeModels::fit_light(const TagSelection& tags) {
     lights.push_back({edge.middle, edge.along, fit.bright_light,
                       noise_ * std::sqrt(fit.bright_variance) / fit.bright_light});
   });
-  light_ = fit_field(std::move(lights), EdgeField::Terms::place);
+  light_ = fit_edge_field(std::move(lights), EdgeField::Terms::place);
 }
 
 EdgePrior EdgeModels::make_prior(const EdgeCurve& edge, double gamma) const {
   EdgePrior prior{gamma};
   if (blur_) {
     prior.blur_px = blur_->value(edge.middle, edge.along);
-    prior.blur_weight = noise_ / (blur_->excess_sd() * prior.blur_px);
+    prior.blur_weight = noise_ / (blur_->excess_edge_sd() * prior.blur_px);
   }
   if (light_) {
     prior.bright_light = light_->value(edge.middle, edge.along);
-    prior.bright_weight = noise_ / (light_->excess_sd() * prior.bright_light);
+    prior.bright_weight = noise_ / (light_->excess_edge_sd() * prior.bright_light);
   }
   return prior;
 }
 
 }  // namespace
 
-std::vector<double> refine_tag_edges(std::span<TagDetection> tags, const cv::Mat1b& image,
-                                     const TagGeometry& print) {
+std::vector<double> refine_tags_by_edge_fits(std::span<TagDetection> tags, const cv::Mat1b& image,
+                                             const TagGeometry& print) {
   constexpr std::size_t max_selected = 8;
   constexpr double min_log_likelihood_ratio = 10;  // e^10 times more likely
   std::vector<TagEdges> edges;
@@ -405,13 +410,13 @@ std::vector<double> refine_tag_edges(std::span<TagDetection> tags, const cv::Mat
   std::vector<std::size_t> widest;              // of those that are found, the widest first
   for (std::size_t i = 0; i < tags.size(); ++i) {
     edges.emplace_back(tags[i], image, print);
-    const auto intersected = edges[i].intersected();
+    const auto intersected = edges[i].intersect_edges();
     outlines.push_back(intersected.value_or(TagDetection::Outline{tags[i].corners_px}));
     if (intersected) widest.push_back(i);
   }
   if (widest.empty()) return {};
   std::stable_sort(widest.begin(), widest.end(), [&](std::size_t a, std::size_t b) {
-    return edges[a].width_px() > edges[b].width_px();
+    return edges[a].tag_width_px() > edges[b].tag_width_px();
   });
   const auto selected = std::span(widest).first(std::min(widest.size(), max_selected));
   const auto remaining = std::span(widest).subspan(selected.size());
@@ -429,15 +434,16 @@ std::vector<double> refine_tag_edges(std::span<TagDetection> tags, const cv::Mat
     const auto update_outlines = [&] {
       for (const std::size_t i : widest) {
         const TagDetection::Steps steps = outlines[i].steps;
-        outlines[i] = edges[i].intersected().value_or(outlines[i]);
+        outlines[i] = edges[i].intersect_edges().value_or(outlines[i]);
         outlines[i].steps = steps;
       }
     };
     update_outlines();
     // The fits below use a common model of the blur, which would hide a blurred part of the image.
-    for (const std::size_t i : widest) outlines[i].steps = edges[i].steps(image, gamma);
+    for (const std::size_t i : widest)
+      outlines[i].steps = edges[i].measure_edge_steps(image, gamma);
     const TagSelection found{edges, widest};
-    const bool any_saturated = found.any_saturated();
+    const bool any_saturated = found.is_any_edge_saturated();
     if (any_saturated || gamma != 1) {
       EdgeModels models(found);
       const auto prior_of = [&](const EdgeCurve& edge) { return models.make_prior(edge, gamma); };

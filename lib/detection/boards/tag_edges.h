@@ -18,10 +18,10 @@ namespace vlp {
 /// @return       BoardDetection::curve_costs, from the eight widest tags
 ///
 /// Edges. Each edge is fitted to the pixels next to it, from corner to corner, as a parabola,
-/// because the lens bends it (fit_edge()). The pixels are first those next to libapriltag's
-/// straight lines. At the rim of a wide lens these lines miss the corners by up to 4 px. If the
-/// sagitta of an edge exceeds 0.5 px, all four edges are therefore fitted again to the pixels next
-/// to the fitted curve. Above 1 px the curve has a cubic term.
+/// because the lens bends it (fit_edge_curve_and_blur()). The pixels are first those next to
+/// libapriltag's straight lines. At the rim of a wide lens these lines miss the corners by up to 4
+/// px. If the sagitta of an edge exceeds 0.5 px, all four edges are therefore fitted again to the
+/// pixels next to the fitted curve. Above 1 px the curve has a cubic term.
 ///
 /// Limits. On rendered boards corners are accurate to 0.02 px, also for tags of 16 px and at the
 /// rim of a lens of 190 degrees. A tag keeps its corners if the fit of an edge fails. It also keeps
@@ -39,7 +39,7 @@ namespace vlp {
 /// are therefore fitted again with the blur of the neighboring edges as a prior, and in saturated
 /// images once more with their light. The prior allows for the differences between edges that
 /// exceed their noise.
-std::vector<double> refine_tag_edges(std::span<TagDetection> tags, const cv::Mat1b& image,
-                                     const TagGeometry& print);
+std::vector<double> refine_tags_by_edge_fits(std::span<TagDetection> tags, const cv::Mat1b& image,
+                                             const TagGeometry& print);
 
 }  // namespace vlp

@@ -22,12 +22,12 @@ class TagFinder {
 
 /// Creates a detector by libapriltag, for tags surrounded by white. Corners are accurate to 0.05
 /// px.
-std::unique_ptr<TagFinder> make_apriltag_finder(const Board& board);
+std::unique_ptr<TagFinder> make_apriltag_detector(const Board& board);
 
 /// Creates a detector by OpenCV's ArUco module, for tags whose corners touch black squares and for
 /// the markers of ChArUco boards. Corners are accurate to 1 to 2 px.
 /// @throws std::invalid_argument if OpenCV does not have the family or dictionary
-std::unique_ptr<TagFinder> make_aruco_finder(const Board& board);
+std::unique_ptr<TagFinder> make_aruco_detector(const Board& board);
 
 /// Marker of one of OpenCV's dictionaries as printed by its ArUco module, without the black border.
 struct ArucoMarker {

@@ -32,18 +32,18 @@ TagFamily make_tag_family(const std::string& name) {
   throw std::invalid_argument("there is no tag family " + name);
 }
 
-int width_in_bits(const apriltag_family_t& family, int border_bits) {
+int tag_width_in_bits(const apriltag_family_t& family, int border_bits) {
   return family.width_at_border + 2 * (border_bits - 1);
 }
 
-bool is_white(const apriltag_family_t& family, int id, uint32_t bit) {
+bool is_tag_bit_white(const apriltag_family_t& family, int id, uint32_t bit) {
   return ((family.codes[id] >> (family.nbits - 1 - bit)) & 1) != 0;
 }
 
-bool matches_tag_bits(const TagDetection& tag, const cv::Mat1f& levels,
-                      const apriltag_family_t& family, int border_bits) {
+bool image_matches_tag_bits(const TagDetection& tag, const cv::Mat1f& levels,
+                            const apriltag_family_t& family, int border_bits) {
   constexpr int max_wrong = 2;
-  const double width = width_in_bits(family, border_bits);
+  const double width = tag_width_in_bits(family, border_bits);
   const std::array<Eigen::Vector2d, 4> square{{{0, width}, {width, width}, {width, 0}, {0, 0}}};
   std::array<PlanePair, 4> pairs;
   for (std::size_t k = 0; k < 4; ++k) pairs[k] = {square[k], tag.corners_px[k]};
@@ -63,23 +63,23 @@ bool matches_tag_bits(const TagDetection& tag, const cv::Mat1f& levels,
   const float threshold = (*darkest + *brightest) / 2;
   int wrong = 0;
   for (uint32_t bit = 0; bit < family.nbits; ++bit) {
-    wrong += is_white(family, tag.id, bit) != (seen[bit] > threshold);
+    wrong += is_tag_bit_white(family, tag.id, bit) != (seen[bit] > threshold);
   }
   return wrong <= max_wrong;
 }
 
 TagGeometry::TagGeometry(const Board& board)
     : family_(make_tag_family(board.family)),
-      width_(width_in_bits(*family_, board.border_bits)),
+      width_(tag_width_in_bits(*family_, board.border_bits)),
       inside_(board.border_bits),
       outside_(family_->reversed_border ? 1 : board.tag_spacing * width_) {}
 
-TagGeometry::Sides TagGeometry::find_white_segments(int id) const {
+TagGeometry::Sides TagGeometry::find_white_bit_segments(int id) const {
   Sides sides;
   if (family_->reversed_border) return sides;
   const int last = static_cast<int>(width_) - 1, border = static_cast<int>(inside_);
   for (uint32_t bit = 0; bit < family_->nbits; ++bit) {
-    if (!is_white(*family_, id, bit)) continue;
+    if (!is_tag_bit_white(*family_, id, bit)) continue;
     const int x = static_cast<int>(family_->bit_x[bit]) + border - 1;  // from the top left
     const int y = static_cast<int>(family_->bit_y[bit]) + border - 1;
     const std::array<int, 4> along{x, last - y, last - x, y}, deep{last - y, last - x, y, x};

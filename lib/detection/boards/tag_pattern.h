@@ -26,10 +26,10 @@ TagFamily make_tag_family(const std::string& name);
 
 /// Returns the width of a tag in bits if its border is `border_bits` wide, instead of one bit as in
 /// the family.
-int width_in_bits(const apriltag_family_t& family, int border_bits);
+int tag_width_in_bits(const apriltag_family_t& family, int border_bits);
 
 /// Returns true if bit `bit` (below family.nbits) of the tag `id` is white.
-bool is_white(const apriltag_family_t& family, int id, uint32_t bit);
+bool is_tag_bit_white(const apriltag_family_t& family, int id, uint32_t bit);
 
 /// Returns true if the image shows the bits of the tag's id between the corners of `tag`. Bits are
 /// sampled at their centers. A bit is white above the mean of the brightest and the darkest sample.
@@ -37,8 +37,8 @@ bool is_white(const apriltag_family_t& family, int id, uint32_t bit);
 ///
 /// @param levels       gray levels of the image
 /// @param border_bits  width of the printed border, in bits
-bool matches_tag_bits(const TagDetection& tag, const cv::Mat1f& levels,
-                      const apriltag_family_t& family, int border_bits);
+bool image_matches_tag_bits(const TagDetection& tag, const cv::Mat1f& levels,
+                            const apriltag_family_t& family, int border_bits);
 
 /// Printed pattern next to the edges of a board's tags, in bits.
 class TagGeometry {
@@ -56,11 +56,11 @@ class TagGeometry {
   /// Width of a tag, with its border.
   double width() const { return width_; }
   /// Width of the uniform stripe along an edge, inside and outside the tag.
-  double inside() const { return inside_; }
-  double outside() const { return outside_; }
+  double inner_stripe_width() const { return inside_; }
+  double outer_stripe_width() const { return outside_; }
   /// Returns the segments in which white bits adjoin the black stripe inside the edge. Empty for
   /// families with a white border.
-  Sides find_white_segments(int id) const;
+  Sides find_white_bit_segments(int id) const;
 
  private:
   TagFamily family_;

@@ -74,9 +74,11 @@ PerCurve sum_tone_curve_costs(const std::vector<BoardView>& views) {
   return sums;
 }
 
-double estimate_gamma(const PerCurve& costs) { return std::exp(estimate_log_gamma(costs)); }
+double estimate_tone_curve_gamma(const PerCurve& costs) {
+  return std::exp(estimate_log_gamma(costs));
+}
 
-double apply_tone_curve(std::vector<BoardView>& views, const PerCurve& costs) {
+double correct_views_for_tone_curve(std::vector<BoardView>& views, const PerCurve& costs) {
   constexpr double min_gamma = 1.2;
   const Parabola parabola = make_parabola_at_minimum(costs);
   const double log_gamma = estimate_log_gamma(costs);

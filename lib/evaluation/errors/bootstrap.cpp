@@ -19,7 +19,7 @@ constexpr std::size_t kDraws = 2000, kMaxGroups = 1000, kRanks = 256;
 
 /// Draws a number in [0, count).
 /// @pre count < 2^32
-std::size_t draw_below(std::size_t count, SplitMix& random) {
+std::size_t draw_index_below(std::size_t count, SplitMix& random) {
   return static_cast<std::size_t>(((random() >> 32) * count) >> 32);
 }
 
@@ -44,7 +44,7 @@ Groups assign_groups(std::span<const std::size_t> clusters) {
   if (groups.clusters > kMaxGroups) {
     SplitMix random(1);
     for (std::size_t i = group_order.size(); i > 1; --i)
-      std::swap(group_order[i - 1], group_order[draw_below(i, random)]);
+      std::swap(group_order[i - 1], group_order[draw_index_below(i, random)]);
   }
   groups.of_error.reserve(clusters.size());
   for (const std::size_t cluster : clusters) {
@@ -84,7 +84,7 @@ class Resampler {
   Statistics draw(std::uint64_t seed) const {
     SplitMix random(seed);
     std::vector<std::uint32_t> weights(groups_);
-    for (std::size_t i = 0; i < groups_; ++i) ++weights[draw_below(groups_, random)];
+    for (std::size_t i = 0; i < groups_; ++i) ++weights[draw_index_below(groups_, random)];
     Totals all;
     for (std::size_t group = 0; group < groups_; ++group) {
       all.count += weights[group] * totals_[group].count;
@@ -105,7 +105,7 @@ class Resampler {
   };
 
   /// Returns the sum of the weights of all errors before rank * step_.
-  double weight_below(const std::vector<std::uint32_t>& weights, std::size_t rank) const {
+  double sum_weights_below(const std::vector<std::uint32_t>& weights, std::size_t rank) const {
     const auto counts = counts_below_.begin() + static_cast<std::ptrdiff_t>(rank * groups_);
     return static_cast<double>(
         std::inner_product(weights.begin(), weights.end(), counts, std::uint64_t{0}));
@@ -118,9 +118,9 @@ class Resampler {
     std::size_t low = 0, high = counts_below_.size() / groups_;
     while (high - low > 1) {
       const std::size_t middle = (low + high) / 2;
-      (weight_below(weights, middle) < wanted ? low : high) = middle;
+      (sum_weights_below(weights, middle) < wanted ? low : high) = middle;
     }
-    double weight = weight_below(weights, low);
+    double weight = sum_weights_below(weights, low);
     for (std::size_t i = low * step_; i < sorted_.size(); ++i) {
       weight += weights[sorted_[i].group];
       if (weight >= wanted) return sorted_[i].value;
@@ -142,9 +142,9 @@ Interval make_percentile_interval(std::vector<double> resampled) {
 
 }  // namespace
 
-std::optional<ErrorIntervals> compute_error_intervals(std::span<const double> errors,
-                                                      std::span<const std::size_t> clusters,
-                                                      int threads) {
+std::optional<ErrorIntervals> bootstrap_error_intervals(std::span<const double> errors,
+                                                        std::span<const std::size_t> clusters,
+                                                        int threads) {
   if (errors.empty()) return std::nullopt;
   const Groups groups = assign_groups(clusters);
   if (groups.clusters < kMinClusters) return std::nullopt;

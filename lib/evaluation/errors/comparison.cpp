@@ -19,26 +19,27 @@ std::size_t count_distinct(std::vector<std::size_t> clusters) {
 
 }  // namespace
 
-std::string_view Comparison::verdict() const {
-  if (too_few() || !interval_m) return "no evidence";
+std::string_view Comparison::comparison_verdict() const {
+  if (has_too_few_clusters() || !interval_m) return "no evidence";
   if (interval_m->high < -min_relevant_m) return "better";
   if (interval_m->low > min_relevant_m) return "worse";
   const bool within = interval_m->low >= -min_relevant_m && interval_m->high <= min_relevant_m;
   return within ? "the same" : "no evidence";
 }
 
-std::string Comparison::words() const {
+std::string Comparison::describe_result() const {
   constexpr int digits = 2;
-  const std::string threshold = significant(1e3 * min_relevant_m, digits) + " mm";
-  std::string words(verdict());
+  const std::string threshold = format_significant_digits(1e3 * min_relevant_m, digits) + " mm";
+  std::string words(comparison_verdict());
   if (words == "the same") return words.append(" within ").append(threshold);
-  if (words == "no evidence") return words.append(too_few() ? ", too few" : "");
+  if (words == "no evidence") return words.append(has_too_few_clusters() ? ", too few" : "");
   return words.append(" by more than ").append(threshold);
 }
 
-Comparison compare(const std::vector<FixRow>& fixes, const std::vector<FixError>& errors,
-                   const std::vector<FixRow>& other_fixes,
-                   const std::vector<FixError>& other_errors, int threads) {
+Comparison compare_horizontal_errors(const std::vector<FixRow>& fixes,
+                                     const std::vector<FixError>& errors,
+                                     const std::vector<FixRow>& other_fixes,
+                                     const std::vector<FixError>& other_errors, int threads) {
   NameIndex images(other_errors.size());
   for (const FixError& other : other_errors) images.insert(other_fixes[other.fix].image);
   Comparison comparison;
@@ -67,7 +68,7 @@ Comparison compare(const std::vector<FixRow>& fixes, const std::vector<FixError>
     comparison.mean_difference_m /= pairs;
     comparison.min_relevant_m =
         std::max(kMinDifference_m, kMinDifferenceFraction * others_m / pairs);
-    const auto intervals = compute_error_intervals(differences_m, clusters, threads);
+    const auto intervals = bootstrap_error_intervals(differences_m, clusters, threads);
     if (intervals) comparison.interval_m = intervals->mean;
     comparison.clusters = count_distinct(std::move(clusters));
   }

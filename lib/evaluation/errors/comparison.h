@@ -32,29 +32,30 @@ struct Comparison {
   std::size_t smaller = 0, larger = 0;
   /// Number of clusters (FixError::cluster) of the pairs.
   std::size_t clusters = 0;
-  /// Mean of (first error - second error) and its confidence interval (compute_error_intervals() of
-  /// the differences, resampled by the clusters of the first).
+  /// Mean of (first error - second error) and its confidence interval (bootstrap_error_intervals()
+  /// of the differences, resampled by the clusters of the first).
   double mean_difference_m = 0;
   std::optional<Interval> interval_m;
   /// Smallest difference that matters in this comparison.
   double min_relevant_m = kMinDifference_m;
 
-  bool too_few() const { return clusters < kMinClustersCompared; }
+  bool has_too_few_clusters() const { return clusters < kMinClustersCompared; }
   /// Returns the verdict on the pairs, which ignores missing fixes:
   ///   "better"       the whole interval is below -min_relevant_m
   ///   "worse"        the whole interval is above min_relevant_m
   ///   "the same"     the whole interval is in between
   ///   "no evidence"  otherwise, and always if there are too few clusters
-  std::string_view verdict() const;
+  std::string_view comparison_verdict() const;
   /// Returns, for example, "worse by more than 0.004 mm", with min_relevant_m if the verdict
   /// depends on it.
-  std::string words() const;
+  std::string describe_result() const;
 };
 
 /// Compares fixes, paired by image. `other_errors` are against the same ground truth or path.
 /// Without pairs the statistics keep their defaults.
-Comparison compare(const std::vector<FixRow>& fixes, const std::vector<FixError>& errors,
-                   const std::vector<FixRow>& other_fixes,
-                   const std::vector<FixError>& other_errors, int threads);
+Comparison compare_horizontal_errors(const std::vector<FixRow>& fixes,
+                                     const std::vector<FixError>& errors,
+                                     const std::vector<FixRow>& other_fixes,
+                                     const std::vector<FixError>& other_errors, int threads);
 
 }  // namespace vlp

@@ -16,7 +16,7 @@ std::size_t quantile_index(double fraction, std::size_t count) {
   return static_cast<std::size_t>(std::max(below, 1.0)) - 1;
 }
 
-double nth(std::vector<double>& values, std::size_t rank) {
+double select_nth_smallest(std::vector<double>& values, std::size_t rank) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(rank);
   std::nth_element(values.begin(), at, values.end());
   return *at;
@@ -31,7 +31,7 @@ struct Sums {
 
 }  // namespace
 
-double quantile(std::span<const double> sorted, double fraction) {
+double find_quantile(std::span<const double> sorted, double fraction) {
   return sorted[quantile_index(fraction, sorted.size())];
 }
 
@@ -46,8 +46,8 @@ ErrorStatistics compute_error_statistics(std::vector<double> errors) {
   const auto count = static_cast<double>(errors.size());
   statistics.mean /= count;
   statistics.rms = std::sqrt(squares / count);
-  statistics.median = nth(errors, quantile_index(0.5, errors.size()));
-  statistics.p90 = nth(errors, quantile_index(0.9, errors.size()));
+  statistics.median = select_nth_smallest(errors, quantile_index(0.5, errors.size()));
+  statistics.p90 = select_nth_smallest(errors, quantile_index(0.9, errors.size()));
   return statistics;
 }
 
@@ -61,18 +61,18 @@ SignedErrorStatistics compute_signed_error_statistics(std::vector<double> errors
   return {bias, compute_error_statistics(std::move(errors))};
 }
 
-std::vector<std::pair<double, double>> compute_distribution(std::vector<double> errors) {
+std::vector<std::pair<double, double>> compute_percentiles(std::vector<double> errors) {
   std::sort(errors.begin(), errors.end());
   std::vector<std::pair<double, double>> points;
   points.reserve(100);
   for (int percent = 1; percent <= 100; ++percent) {
-    points.emplace_back(percent / 100.0, quantile(errors, percent / 100.0));
+    points.emplace_back(percent / 100.0, find_quantile(errors, percent / 100.0));
   }
   return points;
 }
 
-std::optional<BiasAndScatter> compute_bias_and_scatter(const std::vector<FixError>& errors,
-                                                       const std::vector<TruthRow>& truth) {
+std::optional<BiasAndRepeatability> compute_bias_and_repeatability(
+    const std::vector<FixError>& errors, const std::vector<TruthRow>& truth) {
   std::vector<Sums> sums;
   for (const FixError& error : errors) {
     if (error.cluster >= sums.size()) sums.resize(error.cluster + 1);
@@ -87,7 +87,7 @@ std::optional<BiasAndScatter> compute_bias_and_scatter(const std::vector<FixErro
     const Eigen::Vector2d bias_m = station.errors_m / static_cast<double>(station.fixes);
     station.squared_deviations_m2 += (error.horizontal_m - bias_m).squaredNorm();
   }
-  BiasAndScatter statistics{{}, 0, 0, 0};
+  BiasAndRepeatability statistics{{}, 0, 0, 0};
   double squared_deviations_m2 = 0, squared_biases_m2 = 0;
   for (const Sums& station : sums) {
     if (station.fixes < 2) continue;

@@ -22,7 +22,7 @@ struct ErrorStatistics {
 
 /// Returns the smallest of the sorted values that the given fraction of all does not exceed.
 /// @pre not empty, 0 < fraction <= 1
-double quantile(std::span<const double> sorted, double fraction);
+double find_quantile(std::span<const double> sorted, double fraction);
 
 /// Computes the statistics of errors without sign.
 /// @pre not empty
@@ -36,12 +36,12 @@ struct SignedErrorStatistics {
 };
 SignedErrorStatistics compute_signed_error_statistics(std::vector<double> errors);
 
-/// Returns the cumulative distribution as pairs of fraction and quantile, at 1 %, 2 %, ..., 100 %.
+/// Returns the percentiles of the errors, 1 % to 100 %, as pairs of fraction and quantile.
 /// @pre not empty
-std::vector<std::pair<double, double>> compute_distribution(std::vector<double> errors);
+std::vector<std::pair<double, double>> compute_percentiles(std::vector<double> errors);
 
 /// Bias and repeatability over the reference points with two fixes or more.
-struct BiasAndScatter {
+struct BiasAndRepeatability {
   /// Reference point and the statistics of its fixes.
   struct Station {
     /// True position of its first capture.
@@ -64,9 +64,9 @@ struct BiasAndScatter {
   double bias_m;
 };
 
-/// Computes bias and scatter from the errors of errors_against_truth(). Returns std::nullopt if no
-/// reference point has two fixes.
-std::optional<BiasAndScatter> compute_bias_and_scatter(const std::vector<FixError>& errors,
-                                                       const std::vector<TruthRow>& truth);
+/// Computes bias and scatter from the errors of compute_errors_against_truth(). Returns
+/// std::nullopt if no reference point has two fixes.
+std::optional<BiasAndRepeatability> compute_bias_and_repeatability(
+    const std::vector<FixError>& errors, const std::vector<TruthRow>& truth);
 
 }  // namespace vlp

@@ -24,7 +24,7 @@ class Ratios {
     return count_ > 0 ? std::optional(std::sqrt(squares_ / static_cast<double>(count_)))
                       : std::nullopt;
   }
-  std::optional<double> within_95() const {
+  std::optional<double> fraction_within_95_percent() const {
     return count_ > 0 ? std::optional(static_cast<double>(within_) / static_cast<double>(count_))
                       : std::nullopt;
   }
@@ -50,11 +50,16 @@ std::optional<NormalizedErrors> compute_normalized_errors(const std::vector<FixR
     if (error.yaw_rad) yaw.add(*error.yaw_rad / (*sd)[3]);
   }
   if (fixes_with_sd == 0) return std::nullopt;
-  return NormalizedErrors{*horizontal.value(),     fixes_with_sd,      height.value(), yaw.value(),
-                          *horizontal.within_95(), height.within_95(), yaw.within_95()};
+  return NormalizedErrors{*horizontal.value(),
+                          fixes_with_sd,
+                          height.value(),
+                          yaw.value(),
+                          *horizontal.fraction_within_95_percent(),
+                          height.fraction_within_95_percent(),
+                          yaw.fraction_within_95_percent()};
 }
 
-bool CrlbRatio::is_below_limit() const {
+bool CrlbRatio::is_below_crlb() const {
   constexpr double num_sds = 3;
   return horizontal < 1 - num_sds * sd;
 }

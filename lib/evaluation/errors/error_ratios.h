@@ -50,7 +50,7 @@ struct CrlbRatio {
 
   /// Returns true if the errors are below the limit by more than three sd, by chance in 1 of 700
   /// cases. Systematic errors only increase the ratio.
-  bool is_below_limit() const;
+  bool is_below_crlb() const;
 };
 /// Computes the ratio to the limit at the true pose of each fix: ErrorBudget::noise, for a level
 /// camera and all lamps of the map that are wholly in its image.

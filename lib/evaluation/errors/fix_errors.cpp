@@ -48,8 +48,8 @@ std::vector<std::size_t> group_captures(const std::vector<TruthRow>& truth, doub
 
 }  // namespace
 
-FixErrors errors_against_truth(const FromFile<FixRow>& fixes, const FromFile<TruthRow>& truth,
-                               double station_m) {
+FixErrors compute_errors_against_truth(const FromFile<FixRow>& fixes,
+                                       const FromFile<TruthRow>& truth, double station_m) {
   const std::string hint =
       truth.rows.empty() ? "" : ", whose first is '" + truth.rows.front().image + "'";
   const std::vector<std::size_t> truth_rows =
@@ -73,7 +73,7 @@ FixErrors errors_against_truth(const FromFile<FixRow>& fixes, const FromFile<Tru
                    stations[truth_rows[i]],
                    truth_rows[i]};
     if (true_row.z_m) error.height_m = pose.position_m.z() - *true_row.z_m;
-    if (true_row.yaw_rad) error.yaw_rad = wrap_rad(pose.yaw_rad - *true_row.yaw_rad);
+    if (true_row.yaw_rad) error.yaw_rad = wrap_angle_rad(pose.yaw_rad - *true_row.yaw_rad);
     result.errors.push_back(error);
   }
   if (truth.rows.size() > fixes.rows.size()) {
@@ -82,7 +82,7 @@ FixErrors errors_against_truth(const FromFile<FixRow>& fixes, const FromFile<Tru
   return result;
 }
 
-FixErrors errors_against_path(const std::vector<FixRow>& fixes, const Path& path) {
+FixErrors compute_errors_against_path(const std::vector<FixRow>& fixes, const Path& path) {
   FixErrors result;
   result.captures = fixes.size();
   for (std::size_t i = 0; i < fixes.size(); ++i) {
@@ -91,7 +91,7 @@ FixErrors errors_against_path(const std::vector<FixRow>& fixes, const Path& path
       continue;
     }
     const Eigen::Vector3d& place_m = fixes[i].fix->pose.position_m;
-    const NearestOnPath nearest = find_nearest_on_path(path, place_m.head<2>());
+    const NearestOnPath nearest = find_nearest_point_on_path(path, place_m.head<2>());
     FixError error{i, place_m.head<2>() - nearest.xy_m, {}, {}, 0};
     if (nearest.z_m) error.height_m = place_m.z() - *nearest.z_m;
     result.errors.push_back(error);
@@ -101,7 +101,7 @@ FixErrors errors_against_path(const std::vector<FixRow>& fixes, const Path& path
   return result;
 }
 
-void check_same_images(const FromFile<FixRow>& fixes, const FromFile<FixRow>& others) {
+void check_same_images_in_fixes(const FromFile<FixRow>& fixes, const FromFile<FixRow>& others) {
   const std::string question = "are both of the same captures?";
   match_rows(others, fixes, "", question);
   match_rows(fixes, others, "", question);

@@ -71,10 +71,10 @@ struct FromFile {
 /// `station_m`.
 /// @throws InputError if images of the fixes are not in the ground truth, with the count and the
 /// line of the first
-FixErrors errors_against_truth(const FromFile<FixRow>& fixes, const FromFile<TruthRow>& truth,
-                               double station_m);
+FixErrors compute_errors_against_truth(const FromFile<FixRow>& fixes,
+                                       const FromFile<TruthRow>& truth, double station_m);
 
-/// Maximum number of clusters along a path, see errors_against_path().
+/// Maximum number of clusters along a path, see compute_errors_against_path().
 inline constexpr std::size_t kPathRuns = 30;
 /// Computes errors against the nearest point of a path, seen from above. Errors along the path are
 /// not visible.
@@ -83,10 +83,10 @@ inline constexpr std::size_t kPathRuns = 30;
 /// fixes, because successive errors on a drive are correlated. If there are no more than kPathRuns
 /// fixes, each is a cluster. Source: non-overlapping batch means; Schmeiser, "Batch Size Effects in
 /// the Analysis of Simulation Output", 1982, recommends 10 to 30 batches.
-FixErrors errors_against_path(const std::vector<FixRow>& fixes, const Path& path);
+FixErrors compute_errors_against_path(const std::vector<FixRow>& fixes, const Path& path);
 
 /// @throws InputError if the two files do not have rows of the same images, with the count and the
 /// line of the first
-void check_same_images(const FromFile<FixRow>& fixes, const FromFile<FixRow>& others);
+void check_same_images_in_fixes(const FromFile<FixRow>& fixes, const FromFile<FixRow>& others);
 
 }  // namespace vlp

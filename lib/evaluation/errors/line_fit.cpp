@@ -28,8 +28,8 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 
 }  // namespace
 
-std::optional<LineFit> fit_line(const std::vector<FixRow>& fixes,
-                                const CommandedLine& commanded_m) {
+std::optional<LineFit> fit_line_to_fixes(const std::vector<FixRow>& fixes,
+                                         const CommandedLine& commanded_m) {
   const Eigen::Matrix2Xd points_m = collect_points_m(fixes);
   if (points_m.cols() < 2) return std::nullopt;
   const Eigen::Vector2d mean_m = points_m.rowwise().mean();
@@ -51,11 +51,11 @@ std::optional<LineFit> fit_line(const std::vector<FixRow>& fixes,
   for (int i = 0; i < kLineSamples; ++i) {
     const Eigen::Vector2d point_m =
         line_m[0] + i / double{kLineSamples - 1} * (line_m[1] - line_m[0]);
-    distances_m.push_back((point_m - find_nearest_on_path(path, point_m).xy_m).norm());
+    distances_m.push_back((point_m - find_nearest_point_on_path(path, point_m).xy_m).norm());
   }
   return LineFit{line_m, std::atan2(cross(commanded, direction), commanded.dot(direction)),
                  std::sqrt(across_m2 / static_cast<double>(points_m.cols())),
-                 compute_error_statistics(distances_m), compute_distribution(distances_m)};
+                 compute_error_statistics(distances_m), compute_percentiles(distances_m)};
 }
 
 }  // namespace vlp

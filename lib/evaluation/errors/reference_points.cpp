@@ -16,9 +16,9 @@ using Cell = Eigen::Array3d;  // whole numbers
 
 /// First positions of the reference points, by the hash of their cell in a cubic grid. Cells of one
 /// hash differ by the distance.
-class StationTable {
+class ReferencePointTable {
  public:
-  StationTable(std::size_t max_stations, double radius_m)
+  ReferencePointTable(std::size_t max_stations, double radius_m)
       : radius_m_(radius_m), cell_m_(4 * radius_m) {
     stations_.reserve(max_stations);
   }
@@ -51,7 +51,7 @@ class StationTable {
     std::uint64_t hash = 0;
     for (const double number : cell) {
       // + 0.0 turns a negative zero, which has other bits, into a positive one.
-      hash = mix(hash ^ std::bit_cast<std::uint64_t>(number + 0.0));
+      hash = hash_with_splitmix64(hash ^ std::bit_cast<std::uint64_t>(number + 0.0));
     }
     return hash;
   }
@@ -65,7 +65,7 @@ class StationTable {
 
 std::vector<std::size_t> assign_reference_points(std::span<const Eigen::Vector3d> places_m,
                                                  double radius_m) {
-  StationTable table(places_m.size(), radius_m);
+  ReferencePointTable table(places_m.size(), radius_m);
   std::vector<std::size_t> stations;
   stations.reserve(places_m.size());
   for (const Eigen::Vector3d& place_m : places_m) stations.push_back(table.find_or_insert(place_m));

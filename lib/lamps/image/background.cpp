@@ -21,8 +21,8 @@ class Histogram {
     ++count_;
     highest_ = std::max(highest_, level);
   }
-  int count() const { return count_; }
-  int count_within(double low, double high) const {
+  int count_samples() const { return count_; }
+  int count_levels_within(double low, double high) const {
     int sum = 0;
     for_each([&](int level, int count) { sum += level >= low && level <= high ? count : 0; });
     return sum;
@@ -52,13 +52,13 @@ Histogram sample_histogram(const ImageView& image) {
   const double pixels = static_cast<double>(image.height) * image.width;
   // An odd step that shifts from row to row samples all rows and columns of a periodic pattern.
   const int step = static_cast<int>(std::sqrt(pixels / sufficient_count)) | 1;
-  Histogram sample(image.max_level() + 1);
+  Histogram sample(image.get_max_gray_level() + 1);
   for (int row = std::min(step / 2, image.height / 2); row < image.height; row += step) {
     for (int column = row / step % step; column < image.width; column += step) {
       sample.add(image.level_at(column, row));
     }
   }
-  if (sample.count() == 0) sample.add(image.level_at(0, 0));
+  if (sample.count_samples() == 0) sample.add(image.level_at(0, 0));
   return sample;
 }
 
@@ -78,22 +78,23 @@ double find_level_step(const Histogram& sample) {
 /// smallest level, and noise fills the levels next to it more than those that 10 % of the pixels
 /// exceed. Lit pixels do not have this distribution, and a noiseless dark level has nothing below
 /// it either.
-bool clipped(const Histogram& sample, int median, double step) {
-  const int tenth = sample.level_at(static_cast<int>(std::int64_t{sample.count()} * 9 / 10));
+bool is_noise_clipped(const Histogram& sample, int median, double step) {
+  const int tenth =
+      sample.level_at(static_cast<int>(std::int64_t{sample.count_samples()} * 9 / 10));
   const double next = median + std::max(step, (tenth - median) / 2.0);
   const double max_level = std::numeric_limits<int>::max();
-  const int below = sample.count_within(0, median - 1);
-  const int above = sample.count_within(median + 1, max_level);
-  const int near = sample.count_within(median + 1, next);
+  const int below = sample.count_levels_within(0, median - 1);
+  const int above = sample.count_levels_within(median + 1, max_level);
+  const int near = sample.count_levels_within(median + 1, next);
   return 4 * below < above && 10 * near >= above;
 }
 
 /// Estimates the noise from the pixels above the median. 20 % of them are brighter than 0.84
 /// standard deviations, and 10 % than 1.28. If this many pixels are lit, the estimate is too large,
 /// so the smaller one is used.
-double noise_above(const Histogram& sample, int median) {
+double estimate_noise_above_median(const Histogram& sample, int median) {
   const auto above = [&](int per_cent) {
-    const auto rank = std::int64_t{sample.count()} * per_cent / 100;
+    const auto rank = std::int64_t{sample.count_samples()} * per_cent / 100;
     return double(sample.level_at(static_cast<int>(rank)) - median);
   };
   return std::min(above(80) / 0.8416, above(90) / 1.2816);
@@ -104,15 +105,15 @@ double noise_above(const Histogram& sample, int median) {
 Background estimate_background(const ImageView& image) {
   const Histogram sample = sample_histogram(image);
   const double step = find_level_step(sample);
-  const int half = sample.count() / 2, median = sample.level_at(half);
+  const int half = sample.count_samples() / 2, median = sample.level_at(half);
   // Lit pixels are above the median; the pixels below contain only noise.
   double squares = 0;
   sample.for_each([&](int level, int count) {
     if (level < median) squares += count * std::pow(median - level, 2);
   });
   double noise = std::sqrt(squares / std::max(1, half));
-  const bool no_noise_below = clipped(sample, median, step);
-  if (no_noise_below) noise = std::max(noise, noise_above(sample, median));
+  const bool no_noise_below = is_noise_clipped(sample, median, step);
+  if (no_noise_below) noise = std::max(noise, estimate_noise_above_median(sample, median));
   // Gray levels are coarse: mean and scatter of the surrounding levels are more precise.
   constexpr double around = 3;
   const double min_noise = 0.3 * step;

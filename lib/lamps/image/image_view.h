@@ -23,7 +23,7 @@ struct ImageView {
   bool empty() const { return data == nullptr || width <= 0 || height <= 0; }
   ImageSize size() const { return {width, height}; }
   /// Returns the largest level: 255 or 65535.
-  int max_level() const { return (1 << bits) - 1; }
+  int get_max_gray_level() const { return (1 << bits) - 1; }
 
   /// Returns the first pixel of row y. `Level` is std::uint8_t or std::uint16_t, according to
   /// `bits`.

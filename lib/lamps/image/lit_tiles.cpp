@@ -17,7 +17,7 @@ using Rows = std::array<const Level*, kRowsAtOnce>;
 
 /// Returns every `step`-th row from `first` on; rows below the image are replaced by its last row.
 template <typename Level, int step>
-Rows<Level> rows_from(const ImageView& image, int first) {
+Rows<Level> get_rows_from(const ImageView& image, int first) {
   Rows<Level> rows;
   for (int i = 0; i < kRowsAtOnce; ++i) {
     rows[std::size_t(i)] = image.row<Level>(std::min(first + step * i, image.height - 1));
@@ -28,7 +28,7 @@ Rows<Level> rows_from(const ImageView& image, int first) {
 /// Returns the brightest level in a range of columns. Has no branches, so that it is compiled to
 /// vector instructions.
 template <typename Level>
-Level brightest_in(const Rows<Level>& rows, int begin, int count) {
+Level find_brightest_level(const Rows<Level>& rows, int begin, int count) {
   const auto [a, b, c, d, e, f, g, h, l] = rows;
   Level brightest = 0;
   for (int i = begin; i < begin + count; ++i) {
@@ -45,13 +45,14 @@ void search(const ImageView& image, Level threshold, TileMask& found) {
   constexpr int span = 2 * (kRowsAtOnce - 1);  // rows from 0 to 16, from 15 to 31, and so on
   const int whole = image.width / kTile_px;
   for (int top = 0; top < image.height; top += span) {
-    const Rows<Level> rows = rows_from<Level, 2>(image, top - top / span % 2);
+    const Rows<Level> rows = get_rows_from<Level, 2>(image, top - top / span % 2);
     auto* marks = found.row(top / kTile_px);
     for (int tile = 0; tile < whole; ++tile) {
-      if (brightest_in(rows, tile * kTile_px, kTile_px) > threshold) marks[tile] = 1;
+      if (find_brightest_level(rows, tile * kTile_px, kTile_px) > threshold) marks[tile] = 1;
     }
     const int begin = whole * kTile_px, remaining_px = image.width - begin;
-    if (remaining_px > 0 && brightest_in(rows, begin, remaining_px) > threshold) marks[whole] = 1;
+    if (remaining_px > 0 && find_brightest_level(rows, begin, remaining_px) > threshold)
+      marks[whole] = 1;
   }
 }
 
@@ -60,8 +61,8 @@ template <typename Level>
 std::uint8_t count_above(const ImageView& image, const PixelBox& box, Level threshold) {
   std::ptrdiff_t count = 0;
   for (int top = box.y; top < box.bottom() && count < 2; top += kRowsAtOnce) {
-    const auto rows = rows_from<Level, 1>(image, top);
-    if (brightest_in(rows, box.x, box.width) <= threshold) continue;
+    const auto rows = get_rows_from<Level, 1>(image, top);
+    if (find_brightest_level(rows, box.x, box.width) <= threshold) continue;
     for (int y = top; y < std::min(top + kRowsAtOnce, box.bottom()); ++y) {
       const Level* row = image.row<Level>(y);
       count += std::count_if(row + box.x, row + box.right(),
@@ -73,8 +74,8 @@ std::uint8_t count_above(const ImageView& image, const PixelBox& box, Level thre
 
 /// Calls `function` with the column and row of a tile and of each of its neighbors.
 template <typename Function>
-void for_each_around(const TileMask& mask, int column, int row, Function&& function) {
-  const PixelBox box = grow({column, row, 1, 1}, 1, {mask.columns, mask.rows});
+void for_each_neighbor_tile(const TileMask& mask, int column, int row, Function&& function) {
+  const PixelBox box = expand_and_clip_box({column, row, 1, 1}, 1, {mask.columns, mask.rows});
   for (int y = box.y; y < box.bottom(); ++y) {
     for (int x = box.x; x < box.right(); ++x) function(x, y);
   }
@@ -82,7 +83,7 @@ void for_each_around(const TileMask& mask, int column, int row, Function&& funct
 
 /// Calls `function` with the column and row of each nonzero tile.
 template <typename Function>
-void for_each_set(const TileMask& mask, Function&& function) {
+void for_each_nonzero_tile(const TileMask& mask, Function&& function) {
   for (int row = 0; row < mask.rows; ++row) {
     for (int column = 0; column < mask.columns; ++column) {
       if (mask.row(row)[column] != 0) function(column, row);
@@ -90,51 +91,52 @@ void for_each_set(const TileMask& mask, Function&& function) {
   }
 }
 
-int tiles_in(int pixels) { return (pixels + kTile_px - 1) / kTile_px; }
+int count_tiles_for(int pixels) { return (pixels + kTile_px - 1) / kTile_px; }
 
 }  // namespace
 
-PixelBox to_pixel_box(const PixelBox& tiles, const ImageSize& size) {
+PixelBox pixel_box_from_tile_box(const PixelBox& tiles, const ImageSize& size) {
   return intersection(
       {tiles.x * kTile_px, tiles.y * kTile_px, tiles.width * kTile_px, tiles.height * kTile_px},
       {0, 0, size.width, size.height});
 }
 
-TileMask find_lit_tiles(const ImageView& image, double threshold) {
-  TileMask found(tiles_in(image.width), tiles_in(image.height));
-  if (threshold >= image.max_level()) return found;
+TileMask find_bright_tiles(const ImageView& image, double threshold) {
+  TileMask found(count_tiles_for(image.width), count_tiles_for(image.height));
+  if (threshold >= image.get_max_gray_level()) return found;
   TileMask counts = found, lit = found;
   visit_levels(image, [&](auto type) {
     const auto level = static_cast<decltype(type)>(threshold);
     search(image, level, found);
-    for_each_set(dilate(found), [&](int column, int row) {
-      const PixelBox box = to_pixel_box({column, row, 1, 1}, image.size());
+    for_each_nonzero_tile(dilate_tile_mask(found), [&](int column, int row) {
+      const PixelBox box = pixel_box_from_tile_box({column, row, 1, 1}, image.size());
       counts.row(row)[column] = count_above(image, box, level);
     });
   });
-  for_each_set(counts, [&](int column, int row) {
+  for_each_nonzero_tile(counts, [&](int column, int row) {
     int around = 0;
-    for_each_around(counts, column, row, [&](int x, int y) { around += counts.row(y)[x]; });
+    for_each_neighbor_tile(counts, column, row, [&](int x, int y) { around += counts.row(y)[x]; });
     lit.row(row)[column] = around > 1 ? 1 : 0;
   });
   return lit;
 }
 
-TileMask dilate(const TileMask& mask) {
+TileMask dilate_tile_mask(const TileMask& mask) {
   TileMask result(mask.columns, mask.rows);
-  for_each_set(mask, [&](int column, int row) {
-    for_each_around(mask, column, row, [&](int x, int y) { result.row(y)[x] = 1; });
+  for_each_nonzero_tile(mask, [&](int column, int row) {
+    for_each_neighbor_tile(mask, column, row, [&](int x, int y) { result.row(y)[x] = 1; });
   });
   return result;
 }
 
 TileMask transpose_mask(const TileMask& mask) {
   TileMask result(mask.rows, mask.columns);
-  for_each_set(mask, [&](int column, int row) { result.row(column)[row] = mask.row(row)[column]; });
+  for_each_nonzero_tile(
+      mask, [&](int column, int row) { result.row(column)[row] = mask.row(row)[column]; });
   return result;
 }
 
-std::vector<PixelBox> find_group_boxes(TileMask mask) {
+std::vector<PixelBox> find_tile_group_boxes(TileMask mask) {
   std::vector<PixelBox> boxes;
   std::vector<std::pair<int, int>> open;
   const auto visit_tile = [&](int x, int y) {
@@ -151,7 +153,7 @@ std::vector<PixelBox> find_group_boxes(TileMask mask) {
         const auto [x, y] = open.back();
         open.pop_back();
         box = around(box, {x, y, 1, 1});
-        for_each_around(mask, x, y, visit_tile);
+        for_each_neighbor_tile(mask, x, y, visit_tile);
       }
       boxes.push_back(box);
     }

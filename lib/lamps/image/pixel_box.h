@@ -39,7 +39,7 @@ inline PixelBox around(const PixelBox& a, const PixelBox& b) {
 }
 
 /// Returns the box extended by `margin_px` on each side and clipped to an image of `size`.
-inline PixelBox grow(const PixelBox& box, int margin_px, const ImageSize& size) {
+inline PixelBox expand_and_clip_box(const PixelBox& box, int margin_px, const ImageSize& size) {
   return intersection(
       {box.x - margin_px, box.y - margin_px, box.width + 2 * margin_px, box.height + 2 * margin_px},
       {0, 0, size.width, size.height});

@@ -11,7 +11,7 @@ namespace {
 /// Returns true if a pixel of a tile's row is lit. The loop has no branches, so that it is compiled
 /// to vector instructions.
 template <typename Level>
-bool any_above(const Level* pixels, int count, Level threshold) {
+bool has_pixel_above(const Level* pixels, int count, Level threshold) {
   Level brightest = 0;
   if (count == kTile_px) {
     for (int i = 0; i < kTile_px; ++i) brightest = std::max(brightest, pixels[i]);
@@ -32,7 +32,7 @@ void add_runs_of_row(const Level* pixels, int columns, int row, Level threshold,
   };
   for (const int tile : tiles) {
     const int begin = tile * kTile_px, end = std::min(begin + kTile_px, columns);
-    if (!any_above(pixels + begin, end - begin, threshold)) continue;
+    if (!has_pixel_above(pixels + begin, end - begin, threshold)) continue;
     for (int column = begin; column < end; ++column) {
       if (pixels[column] <= threshold) continue;
       if (run.end >= 0 && column - run.end > max_gap) finish();
@@ -44,8 +44,8 @@ void add_runs_of_row(const Level* pixels, int columns, int row, Level threshold,
 }
 
 template <typename Level>
-std::vector<PixelRun> find_pixel_runs_in(const ImageView& image, Level threshold,
-                                         const TileMask& lit) {
+std::vector<PixelRun> find_pixel_runs_above(const ImageView& image, Level threshold,
+                                            const TileMask& lit) {
   std::vector<PixelRun> runs;
   std::vector<int> tiles;
   for (int top = 0; top < image.height; top += kTile_px) {
@@ -65,7 +65,7 @@ std::vector<PixelRun> find_pixel_runs_in(const ImageView& image, Level threshold
 struct Growing {
   Growing(const PixelRun& run) : blob{{run}}, last_row(run.row), last(run), before(run) {}
 
-  bool meets(const PixelRun& run) const {
+  bool touches_run(const PixelRun& run) const {
     return run.begin < std::max(last.end, before.end) &&
            run.end > std::min(last.begin, before.begin);
   }
@@ -75,7 +75,7 @@ struct Growing {
     last = {run.row, std::min(last.begin, run.begin), std::max(last.end, run.end)};
     last_row = run.row;
   }
-  void absorb(Growing& other) {
+  void merge_blob(Growing& other) {
     blob.runs.insert(blob.runs.end(), other.blob.runs.begin(), other.blob.runs.end());
     last.begin = std::min(last.begin, other.last.begin);
     last.end = std::max(last.end, other.last.end);
@@ -90,13 +90,13 @@ struct Growing {
 
 }  // namespace
 
-PixelBox Blob::box() const {
+PixelBox Blob::bounding_box() const {
   int begin = runs[0].begin, end = runs[0].end;
   for (const PixelRun& run : runs) {
     begin = std::min(begin, run.begin);
     end = std::max(end, run.end);
   }
-  return {begin, top(), end - begin, bottom() + 1 - top()};
+  return {begin, first_row(), end - begin, bottom() + 1 - first_row()};
 }
 
 double mean_level(const ImageView& image, const PixelRun& run) {
@@ -108,13 +108,14 @@ double mean_level(const ImageView& image, const PixelRun& run) {
 
 std::vector<PixelRun> find_pixel_runs(const ImageView& image, double threshold,
                                       const TileMask& lit) {
-  if (threshold >= image.max_level()) return {};
+  if (threshold >= image.get_max_gray_level()) return {};
   return visit_levels(image, [&](auto level) {
-    return find_pixel_runs_in(image, static_cast<decltype(level)>(threshold), lit);
+    return find_pixel_runs_above(image, static_cast<decltype(level)>(threshold), lit);
   });
 }
 
-std::vector<Blob> group_pixel_runs(const std::vector<PixelRun>& runs, int max_dark_rows) {
+std::vector<Blob> group_pixel_runs_into_blobs(const std::vector<PixelRun>& runs,
+                                              int max_dark_rows) {
   std::vector<Growing> growing;
   std::vector<Blob> done;
   const auto retire = [&](int row) {
@@ -132,11 +133,11 @@ std::vector<Blob> group_pixel_runs(const std::vector<PixelRun>& runs, int max_da
     retire(run.row);
     Growing* home = nullptr;
     for (Growing& each : growing) {
-      if (!each.alive || !each.meets(run)) continue;
+      if (!each.alive || !each.touches_run(run)) continue;
       if (home == nullptr) {
         home = &each;
       } else {
-        home->absorb(each);  // the run joins two blobs
+        home->merge_blob(each);  // the run joins two blobs
       }
     }
     if (home == nullptr) {

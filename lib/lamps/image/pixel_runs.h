@@ -31,11 +31,11 @@ std::vector<PixelRun> find_pixel_runs(const ImageView& image, double threshold,
 struct Blob {
   std::vector<PixelRun> runs;  // ordered by row
 
-  int top() const { return runs.front().row; }
+  int first_row() const { return runs.front().row; }
   int bottom() const { return runs.back().row; }
-  PixelBox box() const;
+  PixelBox bounding_box() const;
 };
 
-std::vector<Blob> group_pixel_runs(const std::vector<PixelRun>& runs, int max_dark_rows);
+std::vector<Blob> group_pixel_runs_into_blobs(const std::vector<PixelRun>& runs, int max_dark_rows);
 
 }  // namespace vlp

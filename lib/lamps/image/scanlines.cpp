@@ -26,7 +26,7 @@ struct Pixels {
 
 /// Allocates a black image. The system provides such memory page by page at its first use. Large
 /// pages are requested, because getting a small page takes longer than transposing its pixels.
-std::shared_ptr<void> black_pixels(const ImageSize& size, int bits) {
+std::shared_ptr<void> allocate_black_image(const ImageSize& size, int bits) {
   const std::size_t bytes =
       std::size_t(size.width) * std::size_t(size.height) * std::size_t(bits / 8);
   void* memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -38,12 +38,12 @@ std::shared_ptr<void> black_pixels(const ImageSize& size, int bits) {
 /// Fills a margin around each group of lit tiles with the background level. The margin is the size
 /// of the group.
 template <typename Level>
-void fill_around(const TileMask& lit, Level level, const Pixels<Level>& pixels) {
-  for (const PixelBox& tiles : find_group_boxes(lit)) {
+void fill_around_lit_tiles(const TileMask& lit, Level level, const Pixels<Level>& pixels) {
+  for (const PixelBox& tiles : find_tile_group_boxes(lit)) {
     const int size = std::max(tiles.width, tiles.height);
     if (size == 1) continue;  // the tiles around it are transposed
-    const PixelBox box =
-        to_pixel_box(grow(tiles, size, {lit.columns, lit.rows}), {pixels.width, pixels.height});
+    const PixelBox box = pixel_box_from_tile_box(
+        expand_and_clip_box(tiles, size, {lit.columns, lit.rows}), {pixels.width, pixels.height});
     for (int y = box.y; y < box.bottom(); ++y) std::fill_n(pixels.row(y) + box.x, box.width, level);
   }
 }
@@ -62,14 +62,15 @@ void transpose(const ImageView& image, const PixelBox& box, const Pixels<Level>&
 }
 
 template <typename Level>
-void fill_lines(const ImageView& image, const TileMask& lit, double dark, ScanlineImage& lines) {
+void fill_scanlines(const ImageView& image, const TileMask& lit, double dark,
+                    ScanlineImage& lines) {
   const Pixels<Level> pixels{static_cast<Level*>(lines.memory.get()), image.height, image.width};
-  fill_around(lines.lit, static_cast<Level>(std::lround(dark)), pixels);
-  const TileMask turned = dilate(lit);
+  fill_around_lit_tiles(lines.lit, static_cast<Level>(std::lround(dark)), pixels);
+  const TileMask turned = dilate_tile_mask(lit);
   for (int row = 0; row < turned.rows; ++row) {
     for (int column = 0; column < turned.columns; ++column) {
       if (turned.row(row)[column] == 0) continue;
-      transpose(image, to_pixel_box({column, row, 1, 1}, image.size()), pixels);
+      transpose(image, pixel_box_from_tile_box({column, row, 1, 1}, image.size()), pixels);
     }
   }
 }
@@ -78,15 +79,16 @@ void fill_lines(const ImageView& image, const TileMask& lit, double dark, Scanli
 
 ScanlineImage make_scanline_image(const ImageView& image, Readout readout,
                                   const Background& background) {
-  TileMask lit = find_lit_tiles(image, background.threshold);
+  TileMask lit = find_bright_tiles(image, background.threshold);
   if (readout == Readout::rows) return {image, std::move(lit), {}};
   ScanlineImage lines;
-  lines.memory = black_pixels({image.height, image.width}, image.bits);
+  lines.memory = allocate_black_image({image.height, image.width}, image.bits);
   lines.pixels = {lines.memory.get(), image.height, image.width,
                   std::ptrdiff_t(image.height) * (image.bits / 8), image.bits};
   lines.lit = transpose_mask(lit);
-  visit_levels(
-      image, [&](auto level) { fill_lines<decltype(level)>(image, lit, background.level, lines); });
+  visit_levels(image, [&](auto level) {
+    fill_scanlines<decltype(level)>(image, lit, background.level, lines);
+  });
   return lines;
 }
 

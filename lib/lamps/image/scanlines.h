@@ -14,7 +14,7 @@ namespace vlp {
 /// Image whose rows are the scanlines, that is the rows or columns that the shutter reads.
 struct ScanlineImage {
   ImageView pixels;
-  /// Tiles that may contain runs, see find_lit_tiles().
+  /// Tiles that may contain runs, see find_bright_tiles().
   TileMask lit;
   /// Memory of `pixels` if it is not that of the input image.
   std::shared_ptr<void> memory;

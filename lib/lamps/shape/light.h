@@ -22,14 +22,15 @@ enum class LightKind {
   formless  ///< bright, but neither modulated nor with a known outline
 };
 
-/// Reason why a light is not a lamp; the first one that applies.
+/// Reason why a light is not a lamp: that of the check that rejected it. The order of the checks is
+/// not that of the enumerators (LightDetector::identify_lights()).
 enum class LightReason {
   identified,       ///< a lamp, possibly cut by the image border
   overexposed,      ///< steady: contrast below kMinContrast, most pixels at full scale
   steady,           ///< steady: contrast below kMinContrast
   too_few_periods,  ///< below kMinPeriods, or no lamp of the image has kMinReliablePeriods
   no_clear_period,  ///< no period fits, its parts differ, or its stripes are irregular
-  unknown_period,   ///< no lamp has its period, or several have
+  unknown_period,   ///< no lamp or several have its period, or other lamps contradict it
   reflection,       ///< blurrier, dimmer or smaller than another light, or its mirror image
   wrong_shape,      ///< its outline differs from that of its lamp, or cannot be fitted
   incomplete        ///< cut by the image border, or too small for an outline
@@ -44,8 +45,8 @@ struct Light {
   std::optional<int> lamp;
   /// Image of the center of the outline, (u, v).
   Eigen::Vector2d pixel;
-  /// Standard deviation of `pixel` per axis. Includes compute_unknown_lens_sd_px() if the lens is
-  /// unknown.
+  /// Standard deviation of `pixel` per axis. Includes predict_center_sd_without_lens_px() if
+  /// the lens is unknown.
   double sigma_px;
   /// Shape of the outline; a disc if the light has no outline.
   ShapeKind shape;
@@ -57,8 +58,8 @@ struct Light {
   /// Top left and bottom right corner of the bounding box of the outline, (u, v).
   Eigen::Vector2d low, high;
   Stripes stripes;
-  /// Result of compute_coherence(), or ModulatedLight::phase_coherence if `by_modulation`. 0 if the
-  /// stripes have no period.
+  /// Result of compute_stripe_coherence(), or ModulatedLight::phase_coherence if `by_modulation`. 0
+  /// if the stripes have no period.
   double coherence;
   /// Steady lights only: fraction of the pixels in the middle that have the level of the light's
   /// brightest pixel. 0 if this level is not full scale.
@@ -72,8 +73,8 @@ struct Light {
   /// True if the outline may differ from the outline of the lamp: blurred, partly visible, or that
   /// of a source in a reflector, much brighter inside than next to its outline.
   bool is_doubtful;
-  /// True if the light is lit unevenly and its outline is a rim, see fit_rim(). Its roundness is
-  /// then the fraction of the ends of its lit scanlines that show the rim.
+  /// True if the light is lit unevenly and its outline is a rim, see fit_rim_of_light(). Its
+  /// roundness is then the fraction of the ends of its lit scanlines that show the rim.
   bool is_uneven;
   /// Width of the edge from 25 % to 75 % of the level, in pixels.
   double rise_px;

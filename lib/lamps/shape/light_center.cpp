@@ -82,16 +82,18 @@ double estimate_correlated_points(const std::vector<Eigen::Vector2d>& points,
 
 }  // namespace
 
-Eigen::Vector2d LightShape::turned(const Eigen::Vector2d& at) const {
+Eigen::Vector2d LightShape::swap_image_and_scanline_axes(const Eigen::Vector2d& at) const {
   return camera_.readout == Readout::rows ? at : Eigen::Vector2d(at.reverse());
 }
 
-std::vector<Eigen::Vector2d> LightShape::turned(std::vector<Eigen::Vector2d> points) const {
-  for (Eigen::Vector2d& point : points) point = turned(point);
+std::vector<Eigen::Vector2d> LightShape::swap_image_and_scanline_axes(
+    std::vector<Eigen::Vector2d> points) const {
+  for (Eigen::Vector2d& point : points) point = swap_image_and_scanline_axes(point);
   return points;
 }
 
-std::optional<Eigen::Vector2d> LightShape::pixel_to_plane(const Eigen::Vector2d& pixel) const {
+std::optional<Eigen::Vector2d> LightShape::level_plane_from_pixel(
+    const Eigen::Vector2d& pixel) const {
   if (!camera_.lens) return pixel;
   const auto ray = camera_.lens->unproject(pixel);
   if (!ray) return std::nullopt;
@@ -100,17 +102,19 @@ std::optional<Eigen::Vector2d> LightShape::pixel_to_plane(const Eigen::Vector2d&
   return level.head<2>() / level.z();
 }
 
-std::optional<Eigen::Vector2d> LightShape::plane_to_pixel(const Eigen::Vector2d& plane) const {
+std::optional<Eigen::Vector2d> LightShape::pixel_from_level_plane(
+    const Eigen::Vector2d& plane) const {
   if (!camera_.lens) return plane;
   return camera_.lens->project(camera_.level_from_camera.transpose() * plane.homogeneous());
 }
 
-std::optional<Light> LightShape::fit_light(std::vector<EdgePoint> outline,
-                                           const Background& background, bool is_mottled) const {
+std::optional<Light> LightShape::fit_light_to_outline(std::vector<EdgePoint> outline,
+                                                      const Background& background,
+                                                      bool is_mottled) const {
   std::vector<Eigen::Vector2d> points, pixels;
   double brightest = 0;
   std::erase_if(outline, [&](const EdgePoint& edge) {
-    const auto plane = pixel_to_plane(turned(edge.pixel));
+    const auto plane = level_plane_from_pixel(swap_image_and_scanline_axes(edge.pixel));
     if (plane) {
       points.push_back(*plane);
       pixels.push_back(edge.pixel);
@@ -122,7 +126,7 @@ std::optional<Light> LightShape::fit_light(std::vector<EdgePoint> outline,
   std::vector<double> weights;
   weights.reserve(outline.size());
   for (const EdgePoint& edge : outline) weights.push_back(std::pow(edge.level / brightest, 2));
-  const double per_px = compute_extent(points) / compute_extent(pixels);
+  const double per_px = compute_outline_extent(points) / compute_outline_extent(pixels);
   if (!(per_px > 0)) return std::nullopt;
   // The half-level position is accurate to about half a pixel; noise and a soft edge increase its
   // error.
@@ -140,13 +144,13 @@ std::optional<Light> LightShape::fit_light(std::vector<EdgePoint> outline,
     return std::nullopt;
 
   Light light{};
-  const auto pixel = plane_to_pixel(fit->center);
+  const auto pixel = pixel_from_level_plane(fit->center);
   if (!pixel) return std::nullopt;
   light.pixel = light.low = light.high = *pixel;
   for (int i = 0; i < 16; ++i) {
     const double angle = std::numbers::pi / 8 * i;
     const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
-    const auto rim = plane_to_pixel(fit->center + fit->rim_from_circle * direction);
+    const auto rim = pixel_from_level_plane(fit->center + fit->rim_from_circle * direction);
     if (!rim) return std::nullopt;
     light.low = light.low.cwiseMin(*rim);
     light.high = light.high.cwiseMax(*rim);
@@ -166,43 +170,47 @@ std::optional<Light> LightShape::fit_light(std::vector<EdgePoint> outline,
   }
   if (camera_.lens) {
     const Circle circle = fit->circle();
-    light.sums = {points, weights, selected, circle, compute_line_slope(circle), num_correlated};
+    light.sums = {points,        weights, selected, circle, compute_scanline_gradient(circle),
+                  num_correlated};
   }
   light.rise_px = compute_median_rise_px(light.outline);
   return light;
 }
 
-Eigen::Vector2d LightShape::compute_line_slope(const Circle& circle) const {
+Eigen::Vector2d LightShape::compute_scanline_gradient(const Circle& circle) const {
   const auto line = [&](double x, double y) {
-    const auto pixel = plane_to_pixel(circle.center + circle.radius / 2 * Eigen::Vector2d(x, y));
-    return pixel ? turned(*pixel).y() : std::numeric_limits<double>::quiet_NaN();
+    const auto pixel =
+        pixel_from_level_plane(circle.center + circle.radius / 2 * Eigen::Vector2d(x, y));
+    return pixel ? swap_image_and_scanline_axes(*pixel).y()
+                 : std::numeric_limits<double>::quiet_NaN();
   };
   return Eigen::Vector2d(line(1, 0) - line(-1, 0), line(0, 1) - line(0, -1)) / circle.radius;
 }
 
-Eigen::Vector2d LightShape::compute_readout_offset(const Circle& circle,
-                                                   const Eigen::Vector2d& motion_per_line) const {
+Eigen::Vector2d LightShape::compute_readout_center_offset(
+    const Circle& circle, const Eigen::Vector2d& motion_per_line) const {
   constexpr int directions = 16;
-  const auto center = plane_to_pixel(circle.center);
+  const auto center = pixel_from_level_plane(circle.center);
   Eigen::Vector2d off = Eigen::Vector2d::Zero();
   for (int i = 0; i < directions; ++i) {
     const double angle = 2 * std::numbers::pi / directions * i;
     const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
-    const auto rim = plane_to_pixel(circle.center + circle.radius * direction);
+    const auto rim = pixel_from_level_plane(circle.center + circle.radius * direction);
     if (!center || !rim) return Eigen::Vector2d::Zero();
-    const double later = turned(*rim).y() - turned(*center).y();
+    const double later =
+        swap_image_and_scanline_axes(*rim).y() - swap_image_and_scanline_axes(*center).y();
     off += 2.0 / directions * motion_per_line.dot(direction) * later * direction;
   }
   return off;
 }
 
-void LightShape::apply_shear(const Oval& oval, const Eigen::Vector2d& motion_per_line,
-                             Light& light) const {
-  const auto estimate = light.sums.solve_with_prior(oval);
+void LightShape::correct_light_for_motion(const Oval& oval, const Eigen::Vector2d& motion_per_line,
+                                          Light& light) const {
+  const auto estimate = light.sums.solve_with_oval_prior(oval);
   if (!estimate) return;
-  const Circle& circle = light.sums.circle();
-  const auto pixel = plane_to_pixel(circle.center + circle.radius * estimate->p.head<2>() -
-                                    compute_readout_offset(circle, motion_per_line));
+  const Circle& circle = light.sums.fitted_circle();
+  const auto pixel = pixel_from_level_plane(circle.center + circle.radius * estimate->p.head<2>() -
+                                            compute_readout_center_offset(circle, motion_per_line));
   if (!pixel) return;
   light.pixel = *pixel;
   const double sigma_px =
@@ -218,10 +226,10 @@ std::vector<EdgePoint> LightShape::outside(const Light& light,
   const Eigen::Vector2d half =
       clear * (light.high - light.low) / 2 + Eigen::Vector2d(clear_px, clear_px);
   std::vector<EdgePoint> result;
-  std::copy_if(outline.begin(), outline.end(), std::back_inserter(result),
-               [&](const EdgePoint& edge) {
-                 return (turned(edge.pixel) - center).cwiseQuotient(half).norm() > 1;
-               });
+  std::copy_if(
+      outline.begin(), outline.end(), std::back_inserter(result), [&](const EdgePoint& edge) {
+        return (swap_image_and_scanline_axes(edge.pixel) - center).cwiseQuotient(half).norm() > 1;
+      });
   return result;
 }
 

@@ -44,41 +44,44 @@ class LightShape {
   /// @param background  dark level and noise of the image
   /// @param is_mottled  RefinedOutline::is_mottled: sigma then allows for correlated errors of
   ///        neighboring points
-  std::optional<Light> fit_light(std::vector<EdgePoint> outline, const Background& background,
-                                 bool is_mottled = false) const;
+  std::optional<Light> fit_light_to_outline(std::vector<EdgePoint> outline,
+                                            const Background& background,
+                                            bool is_mottled = false) const;
 
   /// Corrects center and sigma_px of a light for camera motion.
   ///
   /// @param oval             ovality of its outline
   /// @param motion_per_line  motion of the light in the level plane per scanline
-  void apply_shear(const Oval& oval, const Eigen::Vector2d& motion_per_line, Light& light) const;
+  void correct_light_for_motion(const Oval& oval, const Eigen::Vector2d& motion_per_line,
+                                Light& light) const;
 
   /// Returns the outline points outside a light, beyond a margin of 10 % and 1.5 px.
   std::vector<EdgePoint> outside(const Light& light, const std::vector<EdgePoint>& outline) const;
 
   /// Converts (u, v) of the image to (column, line), and back.
-  Eigen::Vector2d turned(const Eigen::Vector2d& at) const;
-  std::vector<Eigen::Vector2d> turned(std::vector<Eigen::Vector2d> points) const;
+  Eigen::Vector2d swap_image_and_scanline_axes(const Eigen::Vector2d& at) const;
+  std::vector<Eigen::Vector2d> swap_image_and_scanline_axes(
+      std::vector<Eigen::Vector2d> points) const;
 
   bool has_lens() const { return camera_.lens.has_value(); }
   bool has_tilt() const { return !camera_.level_from_camera.isIdentity(0); }
   /// Converts (u, v) to a point of the level plane at height 1, and back. Without a lens both are
   /// equal. Return std::nullopt if the lens or the plane does not cover the point.
-  std::optional<Eigen::Vector2d> pixel_to_plane(const Eigen::Vector2d& pixel) const;
-  std::optional<Eigen::Vector2d> plane_to_pixel(const Eigen::Vector2d& plane) const;
+  std::optional<Eigen::Vector2d> level_plane_from_pixel(const Eigen::Vector2d& pixel) const;
+  std::optional<Eigen::Vector2d> pixel_from_level_plane(const Eigen::Vector2d& plane) const;
 
  private:
   /// Returns the derivative of the scanline at which a point near the circle is read with respect
   /// to its x, y.
-  Eigen::Vector2d compute_line_slope(const Circle& circle) const;
+  Eigen::Vector2d compute_scanline_gradient(const Circle& circle) const;
 
   /// Returns the center error of a circle's outline that lens distortion of the scanlines causes:
   /// on average the outline is read later, or earlier, than the center. The outline in direction a
   /// is displaced by m (l(a) - l), where m is the motion per scanline, l(a) the scanline of the
   /// outline and l that of the center. The error is the component along a that varies as cos a and
   /// sin a. Partly visible outlines are treated as complete ones.
-  Eigen::Vector2d compute_readout_offset(const Circle& circle,
-                                         const Eigen::Vector2d& motion_per_line) const;
+  Eigen::Vector2d compute_readout_center_offset(const Circle& circle,
+                                                const Eigen::Vector2d& motion_per_line) const;
 
   DetectorCamera camera_;
 };

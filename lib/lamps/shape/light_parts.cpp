@@ -22,7 +22,7 @@ bool may_belong_together(const PixelBox& a, const PixelBox& b) {
 }
 
 /// Returns true if a part is not a piece of a light that an occluder splits.
-bool whole(const LightPart& part) {
+bool make_whole_light(const LightPart& part) {
   return part.light && (part.light->is_glow || part.light->is_uneven || !is_disc(*part.light));
 }
 
@@ -32,8 +32,8 @@ std::size_t count_points(const LightPart& part) {
 
 /// Returns true if a light consists of both parts. Two lamps side by side have more of their points
 /// on a circle each than on a common one. `points` is the number of all points.
-bool consists_of_both_parts(const Light& whole, const LightPart& a, const LightPart& b,
-                            std::size_t points) {
+bool consists_of_two_parts(const Light& whole, const LightPart& a, const LightPart& b,
+                           std::size_t points) {
   constexpr double min_fraction = 0.6, min_gain = 1.25, min_joined_fraction = 0.8, max_hidden = 1.5;
   const PixelBox box = around(a.box, b.box);
   if (2 * whole.radius_px > max_hidden * std::max(box.width, box.height)) return false;
@@ -55,7 +55,7 @@ LightReason find_formless_reason(const LightPart& part, const ImageSize& size) {
   return small ? LightReason::incomplete : LightReason::wrong_shape;
 }
 
-bool do_overlap(const Light& a, const Light& b) {
+bool do_lights_overlap(const Light& a, const Light& b) {
   if (is_disc(a) && is_disc(b)) {
     return (a.pixel - b.pixel).norm() < std::max(a.radius_px, b.radius_px);
   }
@@ -63,14 +63,15 @@ bool do_overlap(const Light& a, const Light& b) {
 }
 
 /// Removes lights that overlap one with more outline points, because they are pieces of it.
-std::vector<Light> without_pieces(std::vector<Light> found) {
+std::vector<Light> remove_lights_inside_others(std::vector<Light> found) {
   std::stable_sort(found.begin(), found.end(), [](const Light& a, const Light& b) {
     return a.outline.size() > b.outline.size();
   });
   std::vector<Light> lights;
   for (Light& light : found) {
-    const bool piece = std::any_of(lights.begin(), lights.end(),
-                                   [&](const Light& other) { return do_overlap(light, other); });
+    const bool piece = std::any_of(lights.begin(), lights.end(), [&](const Light& other) {
+      return do_lights_overlap(light, other);
+    });
     if (!piece) lights.push_back(std::move(light));
   }
   return lights;
@@ -78,22 +79,23 @@ std::vector<Light> without_pieces(std::vector<Light> found) {
 
 }  // namespace
 
-std::vector<Light> join_parts(std::vector<LightPart>& parts, const LightShape& shape,
-                              const Background& background) {
+std::vector<Light> join_parts_of_one_light(std::vector<LightPart>& parts, const LightShape& shape,
+                                           const Background& background) {
   // A lamp has few pieces; an image with thousands of pieces contains other objects.
   constexpr int max_tries = 2000;
   int tries = 0;
   for (std::size_t i = 0; i < parts.size() && tries < max_tries; ++i) {
     for (std::size_t j = i + 1; j < parts.size() && tries < max_tries; ++j) {
-      if (whole(parts[i]) || whole(parts[j]) || !may_belong_together(parts[i].box, parts[j].box))
+      if (make_whole_light(parts[i]) || make_whole_light(parts[j]) ||
+          !may_belong_together(parts[i].box, parts[j].box))
         continue;
       ++tries;
       std::vector<EdgePoint> joined_outline = parts[i].outline;
       joined_outline.insert(joined_outline.end(), parts[j].outline.begin(), parts[j].outline.end());
-      joined_outline = select_outermost(std::move(joined_outline));
-      auto joined_light = shape.fit_light(joined_outline, background);
+      joined_outline = select_outermost_edge_points(std::move(joined_outline));
+      auto joined_light = shape.fit_light_to_outline(joined_outline, background);
       if (!joined_light ||
-          !consists_of_both_parts(*joined_light, parts[i], parts[j], joined_outline.size()))
+          !consists_of_two_parts(*joined_light, parts[i], parts[j], joined_outline.size()))
         continue;
       parts[i] = {std::move(joined_light), std::move(joined_outline),
                   around(parts[i].box, parts[j].box)};
@@ -106,12 +108,12 @@ std::vector<Light> join_parts(std::vector<LightPart>& parts, const LightShape& s
     if (part.light) found.push_back(std::move(*part.light));
   }
   std::erase_if(parts, [](const LightPart& part) { return part.light.has_value(); });
-  return without_pieces(std::move(found));
+  return remove_lights_inside_others(std::move(found));
 }
 
-std::vector<Light> make_formless_lights(std::vector<LightPart> parts,
-                                        const std::vector<Light>& lights, const LightShape& shape,
-                                        const ImageSize& size) {
+std::vector<Light> make_lights_without_outline(std::vector<LightPart> parts,
+                                               const std::vector<Light>& lights,
+                                               const LightShape& shape, const ImageSize& size) {
   constexpr int min_px = 5;
   std::vector<Light> formless;
   for (LightPart& part : parts) {
@@ -120,8 +122,8 @@ std::vector<Light> make_formless_lights(std::vector<LightPart> parts,
     Light light{};
     light.kind = LightKind::formless;
     light.reason = find_formless_reason(part, size);
-    light.low = shape.turned({box.x - 0.5, box.y - 0.5});
-    light.high = shape.turned({box.right() - 0.5, box.bottom() - 0.5});
+    light.low = shape.swap_image_and_scanline_axes({box.x - 0.5, box.y - 0.5});
+    light.high = shape.swap_image_and_scanline_axes({box.right() - 0.5, box.bottom() - 0.5});
     light.pixel = (light.low + light.high) / 2;
     light.radius_px = (light.high - light.low).mean() / 2;
     const bool inside = std::any_of(lights.begin(), lights.end(), [&](const Light& other) {

@@ -22,15 +22,15 @@ struct LightPart {
 /// Joins parts of one light: an occluder splits a lamp, but all parts lie on one circle. Of lights
 /// that overlap, keeps the one with more outline points. Returns the lights; removes parts with a
 /// light from `parts`, so that only parts without a fitted outline remain.
-std::vector<Light> join_parts(std::vector<LightPart>& parts, const LightShape& shape,
-                              const Background& background);
+std::vector<Light> join_parts_of_one_light(std::vector<LightPart>& parts, const LightShape& shape,
+                                           const Background& background);
 
-/// Converts parts without a fitted outline to lights of kind `no_outline` and sets their reason.
+/// Converts parts without a fitted outline to lights of kind `formless` and sets their reason.
 /// Skips parts inside one of `lights` and parts less than five pixels wide or high.
 ///
 /// @param size  size of the image whose rows are the scanlines
-std::vector<Light> make_formless_lights(std::vector<LightPart> parts,
-                                        const std::vector<Light>& lights, const LightShape& shape,
-                                        const ImageSize& size);
+std::vector<Light> make_lights_without_outline(std::vector<LightPart> parts,
+                                               const std::vector<Light>& lights,
+                                               const LightShape& shape, const ImageSize& size);
 
 }  // namespace vlp

@@ -17,7 +17,7 @@ struct ChordSums {
   double middle, mean, moment, spread;
 };
 
-ChordSums sum_chord(const ImageView& lines, const PixelRun& chord, double dark) {
+ChordSums sum_chord_levels(const ImageView& lines, const PixelRun& chord, double dark) {
   const double count = chord.width(), middle = (chord.begin + chord.end - 1) / 2.0;
   double sum = 0, moment = 0;
   for (int column = chord.begin; column < chord.end; ++column) {
@@ -38,7 +38,7 @@ LineLevels::LineLevels(const ImageView& lines, const std::vector<PixelRun>& chor
   sums.reserve(chords.size());
   double moment = 0, spread = 0;
   for (const PixelRun& chord : chords) {
-    sums.push_back(sum_chord(lines, chord, background.level));
+    sums.push_back(sum_chord_levels(lines, chord, background.level));
     middle_ += sums.back().middle / double(chords.size());
     moment += sums.back().moment;
     spread += std::max(0.0, sums.back().mean) * sums.back().spread;
@@ -47,7 +47,7 @@ LineLevels::LineLevels(const ImageView& lines, const std::vector<PixelRun>& chor
   std::vector<double> signal;
   signal.reserve(sums.size());
   for (const ChordSums& line : sums) {
-    signal.push_back(std::max(0.0, line.mean / relative_level_at(line.middle)));
+    signal.push_back(std::max(0.0, line.mean / relative_level_at_column(line.middle)));
     brightest_ = std::max(brightest_, signal.back());
   }
   if (!(brightest_ > 0)) brightest_ = 1;

@@ -30,12 +30,12 @@ class LineLevels {
              const Background& background);
 
   /// Returns the brightest level above the dark level, in gray levels.
-  double brightest() const { return brightest_; }
+  double max_level_above_dark() const { return brightest_; }
   std::optional<LineLevel> at(int line) const;
   /// Returns the period of the stripes; 0 for steady light.
   double period_lines() const { return period_lines_; }
   /// Returns the ratio of the level at a column to that at the middle column.
-  double relative_level_at(double column) const {
+  double relative_level_at_column(double column) const {
     return std::max(0.1, 1 + slope_ * (column - middle_));
   }
 

@@ -94,7 +94,7 @@ std::optional<MEstimateStep<N>> compute_m_estimate_step(std::span<const double> 
   result.variance =
       psi_squares * all / (slopes * slopes) * result.sum_of_weights / (result.count - N);
   for (int i = 0; i < N; ++i) {
-    const auto column = factor.inverse_column(std::size_t(i));
+    const auto column = factor.compute_inverse_column(std::size_t(i));
     std::copy(column.begin(), column.end(), result.inverse.col(i).begin());
   }
   return result;

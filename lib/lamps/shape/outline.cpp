@@ -27,7 +27,7 @@ struct Profile {
 
   /// Returns the first position from `begin` to before `end` where the profile rises through
   /// `level`; std::nullopt if there is none.
-  std::optional<double> crossing(double level, int begin, int end) const {
+  std::optional<double> find_level_crossing(double level, int begin, int end) const {
     for (int i = begin; i < end && has(i) && has(i + 1); ++i) {
       const double below = (*this)(i), above = (*this)(i + 1);
       if (below < level && above >= level) return i + (level - below) / (above - below);
@@ -47,13 +47,13 @@ void add_edge(const Profile& profile, int width, double dark, std::vector<EdgePo
     return sum / samples - dark;
   };
   const int reach = width / 2;
-  const auto rough = profile.crossing(dark + level_at(inside) / 2, outside, reach);
+  const auto rough = profile.find_level_crossing(dark + level_at(inside) / 2, outside, reach);
   if (!rough) return;
   const int first = std::min(static_cast<int>(*rough) + inside, width - samples);
   const double level = level_at(first);
-  const auto at = profile.crossing(dark + level / 2, outside, reach);
-  const auto low = profile.crossing(dark + level / 4, outside, reach);
-  const auto high = profile.crossing(dark + 3 * level / 4, outside, reach);
+  const auto at = profile.find_level_crossing(dark + level / 2, outside, reach);
+  const auto low = profile.find_level_crossing(dark + level / 4, outside, reach);
+  const auto high = profile.find_level_crossing(dark + 3 * level / 4, outside, reach);
   if (!at || level <= 0) return;
   const double rise_px = low && high ? *high - *low : reach;
   points.push_back({{profile.edge + profile.direction * *at, profile.row},
@@ -69,23 +69,23 @@ class RimEllipse {
       : disc_(disc), center_((disc.low + disc.high) / 2), half_((disc.high - disc.low) / 2) {}
 
   /// Returns the outward normal of the rim. @pre The point is near the rim.
-  Eigen::Vector2d normal_at(const Eigen::Vector2d& point) const {
+  Eigen::Vector2d compute_outline_normal(const Eigen::Vector2d& point) const {
     return (point - center_).cwiseQuotient(half_.cwiseAbs2()).normalized();
   }
   /// Returns the radius of curvature at the point with this normal.
   double radius_px(const Eigen::Vector2d& normal) const {
     return std::pow(half_.prod(), 2) / std::pow(half_.cwiseProduct(normal).norm(), 3);
   }
-  double chord_px(double row) const {
+  double chord_length_px(double row) const {
     const double up = (row - center_.y()) / half_.y();
     return 2 * half_.x() * std::sqrt(std::max(0.0, 1 - up * up));
   }
   /// Returns the distance from the image of the disc's center to the rim's first or last column.
-  double half_width_px(bool begins) const {
+  double compute_half_width_px(bool begins) const {
     return begins ? disc_.center.x() - disc_.low.x() : disc_.high.x() - disc_.center.x();
   }
   /// Returns the outward distance from the image of the disc's center.
-  double outwards_px(double column, bool begins) const {
+  double distance_outwards_px(double column, bool begins) const {
     return begins ? disc_.center.x() - column : column - disc_.center.x();
   }
 
@@ -102,7 +102,8 @@ double blur_px(const std::vector<EdgePoint>& points, const RimEllipse& rim) {
   std::vector<double> blurs;
   blurs.reserve(points.size());
   for (const EdgePoint& point : points) {
-    blurs.push_back(point.rise_px * std::abs(rim.normal_at(point.pixel).x()) / quarters);
+    blurs.push_back(point.rise_px * std::abs(rim.compute_outline_normal(point.pixel).x()) /
+                    quarters);
   }
   return std::min(upper_median(std::move(blurs)), maximum);
 }
@@ -120,9 +121,9 @@ struct InnerLevel {
   /// Level at the middle above the dark level, and its change per pixel inwards.
   double level, slope;
 
-  int direction() const { return point.begins ? 1 : -1; }
-  double cosine() const { return std::abs(normal.x()); }
-  double column(double i) const { return origin + direction() * i; }
+  int edge_direction() const { return point.begins ? 1 : -1; }
+  double normal_cosine() const { return std::abs(normal.x()); }
+  double edge_column(double i) const { return origin + edge_direction() * i; }
 };
 
 constexpr int kBefore = 8, kSamples = 8;
@@ -130,11 +131,12 @@ constexpr int kBefore = 8, kSamples = 8;
 constexpr double kVariance = (kSamples * kSamples - 1) / 12.0;
 
 Profile make_profile(const ImageView& image, const InnerLevel& inner) {
-  return {image, static_cast<int>(inner.point.pixel.y()), inner.origin, inner.direction()};
+  return {image, static_cast<int>(inner.point.pixel.y()), inner.origin, inner.edge_direction()};
 }
 
-std::vector<InnerLevel> inner_levels(const ImageView& image, const std::vector<EdgePoint>& points,
-                                     const RimEllipse& rim, double dark) {
+std::vector<InnerLevel> measure_inner_levels(const ImageView& image,
+                                             const std::vector<EdgePoint>& points,
+                                             const RimEllipse& rim, double dark) {
   constexpr double flattest = 0.35, depth_px = 3, max_relative_change = 0.35;
   constexpr double square = kSamples * (kSamples * kSamples - 1) / 12.0;
   std::vector<InnerLevel> result;
@@ -143,11 +145,12 @@ std::vector<InnerLevel> inner_levels(const ImageView& image, const std::vector<E
     // Skips rows that cut the outline at a flat angle.
     InnerLevel inner{};
     inner.point = point;
-    inner.normal = rim.normal_at(point.pixel);
-    if (inner.cosine() < flattest) continue;
-    const double depth = depth_px / inner.cosine();
-    if (2 * depth + kSamples > rim.chord_px(point.pixel.y())) continue;
-    inner.origin = static_cast<int>(std::lround(point.pixel.x())) - inner.direction() * kBefore;
+    inner.normal = rim.compute_outline_normal(point.pixel);
+    if (inner.normal_cosine() < flattest) continue;
+    const double depth = depth_px / inner.normal_cosine();
+    if (2 * depth + kSamples > rim.chord_length_px(point.pixel.y())) continue;
+    inner.origin =
+        static_cast<int>(std::lround(point.pixel.x())) - inner.edge_direction() * kBefore;
     inner.first = kBefore + static_cast<int>(std::lround(depth));
     inner.middle = inner.first + (kSamples - 1) / 2.0;
     const auto profile = make_profile(image, inner);
@@ -168,8 +171,8 @@ std::vector<InnerLevel> inner_levels(const ImageView& image, const std::vector<E
 
 /// Fits the edge of a profile near `at` to all pixels there; `width` is the standard deviation of
 /// the blur along the profile. See refine_outline().
-std::optional<double> blurred_edge(const Profile& profile, double at, double width, double level,
-                                   double dark) {
+std::optional<double> find_blurred_edge(const Profile& profile, double at, double width,
+                                        double level, double dark) {
   constexpr int num_iterations = 4;
   constexpr double reach = 3, min_reach_px = 2, further_in_px = 1, far = 2;
   const double reach_px =
@@ -209,8 +212,9 @@ double estimate_curvature(const std::vector<InnerLevel>& levels, const RimEllips
   std::array<std::vector<double>, 2> curvatures;
   for (const InnerLevel& inner : levels) {
     const bool begins = inner.point.begins;
-    const double width_px = rim.half_width_px(begins);
-    const double fraction = rim.outwards_px(inner.column(inner.middle), begins) / width_px;
+    const double width_px = rim.compute_half_width_px(begins);
+    const double fraction =
+        rim.distance_outwards_px(inner.edge_column(inner.middle), begins) / width_px;
     if (fraction < min_u) continue;
     curvatures[begins ? 0 : 1].push_back(-inner.slope * width_px / (2 * fraction * inner.level));
   }
@@ -226,15 +230,15 @@ double estimate_curvature(const std::vector<InnerLevel>& levels, const RimEllips
 /// beyond chance and enough to move the outline. For pure noise the mean product of neighbors is
 /// -1/4 of the mean square, because a line was fitted. With the n = 6 degrees of freedom of 8
 /// pixels per line, its standard deviation is 1 / sqrt(n).
-bool is_mottled(const ImageView& image, const std::vector<InnerLevel>& levels,
-                const RimEllipse& rim, double curvature, double dark) {
+bool has_uneven_inner_levels(const ImageView& image, const std::vector<InnerLevel>& levels,
+                             const RimEllipse& rim, double curvature, double dark) {
   constexpr double expected_correlation = -0.25, beyond_chance = 3.5, min_fraction = 0.003;
   constexpr int left = kSamples - 2;
   double squares = 0, products = 0, level_squares = 0;
   for (const InnerLevel& inner : levels) {
     const auto profile = make_profile(image, inner);
     const double quadratic =
-        inner.level * curvature / std::pow(rim.half_width_px(inner.point.begins), 2);
+        inner.level * curvature / std::pow(rim.compute_half_width_px(inner.point.begins), 2);
     double before = 0;
     for (int i = inner.first; i < inner.first + kSamples; ++i) {
       const double away = i - inner.middle;
@@ -266,45 +270,46 @@ RefinedOutline refine_outline(const ImageView& image, const std::vector<EdgePoin
   const RimEllipse rim(disc);
   const double blur = blur_px(points, rim), square = blur * blur;
   const double square_across = std::max(0.0, square - between_pixels);
-  const auto levels = inner_levels(image, points, rim, dark);
+  const auto levels = measure_inner_levels(image, points, rim, dark);
   const bool inside_only = blur < max_blur_to_bend_px;
   const double curvature = inside_only ? estimate_curvature(levels, rim) : 0;
-  RefinedOutline result{{}, inside_only && is_mottled(image, levels, rim, curvature, dark)};
+  RefinedOutline result{
+      {}, inside_only && has_uneven_inner_levels(image, levels, rim, curvature, dark)};
   result.points.reserve(levels.size());
   for (const InnerLevel& inner : levels) {
     const bool begins = inner.point.begins;
-    const double back = inner.middle - kBefore, width_px = rim.half_width_px(begins);
+    const double back = inner.middle - kBefore, width_px = rim.compute_half_width_px(begins);
     const double quadratic = curvature * (back * back - kVariance) / (width_px * width_px);
     const double level = inner.level * (1 + quadratic) - inner.slope * back;
     if (level <= 0) continue;
     const auto profile = make_profile(image, inner);
-    const auto at = profile.crossing(dark + level / 2, 0, inner.first);
+    const auto at = profile.find_level_crossing(dark + level / 2, 0, inner.first);
     if (!at) continue;
     // Slope of the lamp's own profile at its rim, inwards. Vignetting acts on levels that are
     // already blurred.
-    const double rim_px = rim.outwards_px(inner.column(kBefore), begins);
+    const double rim_px = rim.distance_outwards_px(inner.edge_column(kBefore), begins);
     const double slope = -2 * curvature * inner.level * rim_px / (width_px * width_px);
     // Blur moves the half-level point outwards if the level increases inwards, and inwards at a
     // curved rim. For a standard deviation s of the blur across it and a radius r of the rim, the
     // displacements are s^2 slope / level and s^2 / (2 r), to first order.
-    const double cosine = inner.cosine();
+    const double cosine = inner.normal_cosine();
     const double behind_bend = square_across / (2 * rim.radius_px(inner.normal) * cosine);
     double edge = *at + square * slope / (level * cosine * cosine) - behind_bend;
     if (result.is_mottled) {
       const double width = std::max(std::sqrt(square_across), min_width_px) / cosine;
-      const auto fitted = blurred_edge(profile, *at, width, level, dark);
+      const auto fitted = find_blurred_edge(profile, *at, width, level, dark);
       if (!fitted) continue;
       edge = *fitted - behind_bend;
     }
     EdgePoint better = inner.point;
-    better.pixel.x() = inner.column(edge);
+    better.pixel.x() = inner.edge_column(edge);
     better.level = level;
     result.points.push_back(better);
   }
   return result;
 }
 
-std::vector<EdgePoint> select_outermost(std::vector<EdgePoint> points) {
+std::vector<EdgePoint> select_outermost_edge_points(std::vector<EdgePoint> points) {
   const auto further_out = [](const EdgePoint& a, const EdgePoint& b) {
     if (a.pixel.y() != b.pixel.y()) return a.pixel.y() < b.pixel.y();
     if (a.begins != b.begins) return a.begins;

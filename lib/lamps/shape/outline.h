@@ -63,7 +63,7 @@ RefinedOutline refine_outline(const ImageView& image, const std::vector<EdgePoin
 
 /// Returns the first begin and the last end of each row: the outline of a light that an occluder
 /// splits.
-std::vector<EdgePoint> select_outermost(std::vector<EdgePoint> points);
+std::vector<EdgePoint> select_outermost_edge_points(std::vector<EdgePoint> points);
 
 /// Returns the two ends of each run. Excludes ends at the image border and ends of runs that are
 /// too short.

@@ -30,7 +30,7 @@ double cross_product(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 
 std::optional<Eigen::Vector2d> find_intersection(const Side& a, const Side& b) {
   constexpr double flattest = 0.05;
-  const Eigen::Vector2d along = a.direction(), other = b.direction();
+  const Eigen::Vector2d along = a.edge_direction(), other = b.edge_direction();
   const double sine = cross_product(along, other);
   if (!(std::abs(sine) > flattest)) return std::nullopt;
   return a.from + cross_product(b.from - a.from, other) / sine * along;
@@ -65,7 +65,8 @@ std::optional<Eigen::Vector2d> find_center(const Sides& sides) {
 bool is_rectangular(const Sides& sides) {
   const double max_off = std::sin(rad_from_deg(20));
   for (std::size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector2d direction = sides[i].direction(), next = sides[(i + 1) % 4].direction();
+    const Eigen::Vector2d direction = sides[i].edge_direction(),
+                          next = sides[(i + 1) % 4].edge_direction();
     if (!(std::abs(direction.dot(next)) < max_off && cross_product(direction, next) > 0))
       return false;
   }
@@ -92,8 +93,8 @@ double get_tilt_sd(const LightShape& shape) {
 double compute_middle_variance(const StraightEdge& edge) { return edge.covariance_px.sum() / 4; }
 
 /// Returns the distance of the middle of side `to` from side `from`.
-double compute_distance(const Side& from, const Side& to) {
-  return std::abs(((to.from + to.to) / 2 - (from.from + from.to) / 2).dot(from.inwards()));
+double compute_distance_from_line(const Side& from, const Side& to) {
+  return std::abs(((to.from + to.to) / 2 - (from.from + from.to) / 2).dot(from.inward_normal()));
 }
 
 /// Returns the standard deviation of the logarithm of compute_aspect().
@@ -102,7 +103,7 @@ double compute_aspect_sd(const std::array<StraightEdge, 4>& edges, double per_px
   double variance = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     const StraightEdge &edge = edges[i], &opposite = edges[(i + 2) % 4];
-    const double apart_px = compute_distance(edge.side, opposite.side) / per_px;
+    const double apart_px = compute_distance_from_line(edge.side, opposite.side) / per_px;
     variance += (compute_middle_variance(edge) + square(blur_sd_fraction * edge.blur_px)) /
                 square(apart_px);
   }
@@ -111,7 +112,7 @@ double compute_aspect_sd(const std::array<StraightEdge, 4>& edges, double per_px
 
 /// Computes the minimum-area rectangle around the points, with the light on the left of its sides:
 /// tries directions 3 degrees apart, and then halves this step.
-Corners rectangle_around(const std::vector<Eigen::Vector2d>& points) {
+Corners fit_min_area_rectangle(const std::vector<Eigen::Vector2d>& points) {
   constexpr double coarse_rad = rad_from_deg(3), fine_rad = 1e-4;
   const auto box_at = [&](double angle_rad) {
     const Eigen::Rotation2Dd turn(-angle_rad);
@@ -138,12 +139,14 @@ Corners rectangle_around(const std::vector<Eigen::Vector2d>& points) {
           turn * box.corner(box.TopRight), turn * box.corner(box.TopLeft)};
 }
 
-double off(const Side& side, const Eigen::Vector2d& point) {
-  return std::abs((point - side.from).dot(side.inwards()));
+double distance_outside_px(const Side& side, const Eigen::Vector2d& point) {
+  return std::abs((point - side.from).dot(side.inward_normal()));
 }
 
 std::size_t find_nearest_side(const Sides& sides, const Eigen::Vector2d& point) {
-  const auto closer = [&](const Side& a, const Side& b) { return off(a, point) < off(b, point); };
+  const auto closer = [&](const Side& a, const Side& b) {
+    return distance_outside_px(a, point) < distance_outside_px(b, point);
+  };
   return static_cast<std::size_t>(std::min_element(sides.begin(), sides.end(), closer) -
                                   sides.begin());
 }
@@ -157,7 +160,7 @@ Sides fit_sides(const std::vector<Eigen::Vector2d>& points, Sides sides, double 
   std::array<std::vector<Eigen::Vector2d>, 4> side_points;
   for (const Eigen::Vector2d& point : points) {
     const std::size_t i = find_nearest_side(before, point);
-    if (off(before[i], point) < within) side_points[i].push_back(point);
+    if (distance_outside_px(before[i], point) < within) side_points[i].push_back(point);
   }
   for (std::size_t i = 0; i < 4; ++i) {
     if (side_points[i].size() < min_points) continue;
@@ -168,11 +171,11 @@ Sides fit_sides(const std::vector<Eigen::Vector2d>& points, Sides sides, double 
     for (const Eigen::Vector2d& point : side_points[i]) {
       spread += (point - mean) * (point - mean).transpose();
     }
-    const auto axes = decompose_symmetric(spread);
+    const auto axes = eigendecompose_symmetric(spread);
     Eigen::Vector2d direction = axes.vectors.col(1);
     const double length = std::sqrt(axes.values[1] / double(side_points[i].size()) * 12);
     if (length < min_spread * (sides[i].to - sides[i].from).norm()) continue;
-    if (direction.dot(before[i].direction()) < 0) direction = -direction;
+    if (direction.dot(before[i].edge_direction()) < 0) direction = -direction;
     sides[i] = {mean - direction * length / 2, mean + direction * length / 2};
   }
   return sides;
@@ -189,7 +192,7 @@ std::optional<FirstCorners> find_first_corners(const std::vector<Eigen::Vector2d
                                                double per_px) {
   constexpr double near_px = 2, min_fraction = 0.7;
   constexpr double coarse_fraction = 0.08;
-  Corners corners = rectangle_around(points);
+  Corners corners = fit_min_area_rectangle(points);
   const double size = std::min((corners[1] - corners[0]).norm(), (corners[2] - corners[1]).norm());
   double within = std::max(4 * per_px, coarse_fraction * size);
   for (int iteration = 0; iteration < 3; ++iteration) {
@@ -201,7 +204,7 @@ std::optional<FirstCorners> find_first_corners(const std::vector<Eigen::Vector2d
   const Sides sides = make_sides(corners);
   if (!is_rectangular(sides)) return std::nullopt;
   const auto near = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& point) {
-    return off(sides[find_nearest_side(sides, point)], point) < near_px * per_px;
+    return distance_outside_px(sides[find_nearest_side(sides, point)], point) < near_px * per_px;
   });
   if (double(near) < min_fraction * double(points.size())) return std::nullopt;
   return FirstCorners{corners, double(near) / double(points.size())};
@@ -213,7 +216,7 @@ std::optional<FirstCorners> find_first_corners(const std::vector<Eigen::Vector2d
 std::optional<FirstCorners> find_corners_of_curved_sides(
     const std::vector<Eigen::Vector2d>& points) {
   constexpr double max_px = 6, step_px = 0.5, min_aspect = 3;
-  const Sides around = make_sides(rectangle_around(points));
+  const Sides around = make_sides(fit_min_area_rectangle(points));
   if (compute_aspect(around) < min_aspect) return std::nullopt;
   const bool first =
       (around[0].to - around[0].from).norm() > (around[1].to - around[1].from).norm();
@@ -223,8 +226,8 @@ std::optional<FirstCorners> find_corners_of_curved_sides(
   std::vector<Eigen::Vector2d> straight = points;
   for (double bow_px = -max_px; bow_px <= max_px; bow_px += step_px) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const double along = 2 * (points[i] - side.from).dot(side.direction()) / length - 1;
-      straight[i] = points[i] - bow_px * (1 - along * along) * side.inwards();
+      const double along = 2 * (points[i] - side.from).dot(side.edge_direction()) / length - 1;
+      straight[i] = points[i] - bow_px * (1 - along * along) * side.inward_normal();
     }
     const auto corners = find_first_corners(straight, 1);
     if (corners && (!best || corners->near > best->near)) best = corners;
@@ -252,7 +255,7 @@ CenterOffset estimate_center_offset(const std::array<StraightEdge, 4>& edges,
   double information = 1 / (known_sd * known_sd), moment = 0;
   Eigen::Vector2d d_shift_d_k = Eigen::Vector2d::Zero();
   for (const StraightEdge& edge : edges) {
-    const Eigen::Vector2d direction = edge.side.to - edge.side.from, in = edge.side.inwards();
+    const Eigen::Vector2d direction = edge.side.to - edge.side.from, in = edge.side.inward_normal();
     const double half_square = direction.squaredNorm() / 4;
     const Eigen::Vector2d at = (edge.side.from + edge.side.to) / 2 - middle;
     const double slope = -half_square * at.dot(in);
@@ -275,7 +278,7 @@ std::vector<Eigen::Vector2d> make_polygon(const Sides& sides, double inset,
   constexpr int pieces = 8;
   Sides inside = sides;
   for (Side& side : inside) {
-    const Eigen::Vector2d in = inset * side.inwards();
+    const Eigen::Vector2d in = inset * side.inward_normal();
     side.from += in;
     side.to += in;
   }
@@ -285,7 +288,7 @@ std::vector<Eigen::Vector2d> make_polygon(const Sides& sides, double inset,
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Vector2d &from = (*corners)[i], &to = (*corners)[(i + 1) % 4];
     for (int piece = 0; piece < pieces; ++piece) {
-      const auto pixel = shape.plane_to_pixel(from + (to - from) * piece / pieces);
+      const auto pixel = shape.pixel_from_level_plane(from + (to - from) * piece / pieces);
       if (!pixel) return {};
       face.push_back(*pixel);
     }
@@ -317,10 +320,11 @@ bool apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
     const auto [a, b] = pairs[std::size_t(i)];
     const Side &side = sides[a], &other = sides[b];
     const bool opposite = b - a == 2;
-    const Eigen::Vector2d expected = opposite ? -side.direction() : side.inwards();
-    angles[i] =
-        std::atan2(cross_product(expected, other.direction()), expected.dot(other.direction()));
-    sds[i] = get_tilt_sd(shape) * (opposite ? per_lean * compute_distance(side, other) : 1);
+    const Eigen::Vector2d expected = opposite ? -side.edge_direction() : side.inward_normal();
+    angles[i] = std::atan2(cross_product(expected, other.edge_direction()),
+                           expected.dot(other.edge_direction()));
+    sds[i] =
+        get_tilt_sd(shape) * (opposite ? per_lean * compute_distance_from_line(side, other) : 1);
     const double length_px = (side.to - side.from).norm() / per_px;
     const double other_px = (other.to - other.from).norm() / per_px;
     slope.block<1, 2>(i, 2 * Eigen::Index(a)) << 1 / length_px, -1 / length_px;
@@ -334,7 +338,7 @@ bool apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
   const Eigen::Matrix<double, 8, 1> moved_px = -gain * angles;
   covariance -= gain * slope * covariance;
   for (std::size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector2d inwards = sides[i].inwards() * per_px;
+    const Eigen::Vector2d inwards = sides[i].inward_normal() * per_px;
     sides[i].from += moved_px[2 * Eigen::Index(i)] * inwards;
     sides[i].to += moved_px[2 * Eigen::Index(i) + 1] * inwards;
   }
@@ -347,14 +351,14 @@ std::optional<Matrix2> center_covariance(const Sides& sides, const EndsCovarianc
   constexpr double moved_px = 0.05;
   const auto pixel_with = [&](const Sides& moved) -> std::optional<Eigen::Vector2d> {
     const auto center = find_center(moved);
-    return center ? shape.plane_to_pixel(*center) : std::nullopt;
+    return center ? shape.pixel_from_level_plane(*center) : std::nullopt;
   };
   const auto here = pixel_with(sides);
   Eigen::Matrix<double, 2, 8> slope;
   for (int end = 0; end < 8; ++end) {
     Sides moved = sides;
     Side& side = moved[std::size_t(end / 2)];
-    (end % 2 == 0 ? side.from : side.to) += moved_px * per_px * side.inwards();
+    (end % 2 == 0 ? side.from : side.to) += moved_px * per_px * side.inward_normal();
     const auto there = pixel_with(moved);
     if (!here || !there) return std::nullopt;
     slope.col(end) = (*there - *here) / moved_px;
@@ -369,7 +373,7 @@ bool has_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
   constexpr double beyond = 1.35, min_fraction = 0.1;
   const auto off_middle = [&](const Eigen::Vector2d& at, std::size_t i) {
     const double length = (sides[i].to - sides[i].from).norm();
-    return std::pow(2 * (at - center).dot(sides[i].direction()) / length, 2);
+    return std::pow(2 * (at - center).dot(sides[i].edge_direction()) / length, 2);
   };
   const auto far = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& at) {
     return off_middle(at, 0) + off_middle(at, 1) > beyond;
@@ -395,13 +399,14 @@ std::optional<Light> fit_light(std::array<StraightEdge, 4>& edges, double per_px
   if (!center || !has_corners(points, sides, *center)) return std::nullopt;
   const auto covariance = center_covariance(sides, ends, per_px, shape);
   sides = make_sides(*corners);
-  auto pixel = shape.plane_to_pixel(*center);
+  auto pixel = shape.pixel_from_level_plane(*center);
   const auto around = make_polygon(sides, 0, shape);
   if (!pixel || !covariance || around.empty()) return std::nullopt;
   Light light{};
   double lens_sd_px = 0;
   if (!shape.has_lens()) {
-    const CenterOffset behind = estimate_center_offset(edges, *center, shape.turned(middle));
+    const CenterOffset behind =
+        estimate_center_offset(edges, *center, shape.swap_image_and_scanline_axes(middle));
     *pixel += behind.shift;
     lens_sd_px = behind.sd_px;
   }
@@ -427,7 +432,7 @@ std::optional<Light> fit_light(std::array<StraightEdge, 4>& edges, double per_px
   light.sigma_px = std::max(kMinSigma_px, sigma_px);
   const auto outliers = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& at) {
     return std::any_of(sides.begin(), sides.end(), [&](const Side& side) {
-      return (at - side.from).dot(side.inwards()) < -(outlier_px + bow_px) * per_px;
+      return (at - side.from).dot(side.inward_normal()) < -(outlier_px + bow_px) * per_px;
     });
   });
   light.outside = double(outliers) / double(points.size());
@@ -441,7 +446,7 @@ std::optional<Light> fit_light(std::array<StraightEdge, 4>& edges, double per_px
 using FoundEdges = std::array<std::optional<StraightEdge>, 4>;
 
 /// Returns the blur of the edge with the smallest variance. @pre At least one edge exists.
-double find_surest_blur_px(const FoundEdges& edges) {
+double find_most_certain_blur_px(const FoundEdges& edges) {
   const StraightEdge* surest = nullptr;
   for (const auto& edge : edges) {
     if (!edge) continue;
@@ -458,15 +463,16 @@ struct Place {
 
 /// Predicts the position of edge i from the other three by the aspect ratio of the only size that
 /// agrees with its fitted position. Returns std::nullopt if several sizes or none agree.
-std::optional<Place> predict_place(const EdgeImage& image, const FoundEdges& edges, std::size_t i,
-                                   const std::vector<Eigen::Vector2d>& sizes_m) {
+std::optional<Place> predict_edge_position(const EdgeImage& image, const FoundEdges& edges,
+                                           std::size_t i,
+                                           const std::vector<Eigen::Vector2d>& sizes_m) {
   constexpr double size_sd_m = 0.001;  // sizes are given to the millimeter
   constexpr double bounds = 2,
                    clear = 3;  // standard deviations: a uniform distribution ends at sqrt(3)
   const StraightEdge &edge = *edges[i], &opposite = *edges[(i + 2) % 4];
   const StraightEdge &left = *edges[(i + 1) % 4], &right = *edges[(i + 3) % 4];
-  const double length_px = compute_distance(left.side, right.side) / image.per_px;
-  const double depth_px = compute_distance(opposite.side, edge.side) / image.per_px;
+  const double length_px = compute_distance_from_line(left.side, right.side) / image.per_px;
+  const double depth_px = compute_distance_from_line(opposite.side, edge.side) / image.per_px;
   std::optional<Place> place;
   // The variance of the opposite edge counts three times. Edges are assumed to be independent,
   // but its error moves both edges.
@@ -500,7 +506,7 @@ bool add_hidden_edges(const EdgeImage& image, const Sides& sides, EdgeSearch sea
     if (!visible[i] && !visible[(i + 1) % 4]) return false;
     min_side = std::min(min_side, (sides[i].to - sides[i].from).norm());
   }
-  search.blur_px = find_surest_blur_px(visible);
+  search.blur_px = find_most_certain_blur_px(visible);
   // The window extends to the next stripe, but not to the opposite edge.
   search.reach_px = std::max(search.reach_px, std::min(image.levels.period_lines() + ramp_lines,
                                                        min_side / image.per_px / 2));
@@ -522,16 +528,18 @@ bool add_hidden_edges(const EdgeImage& image, const Sides& sides, EdgeSearch sea
     // Twice the sd, because apply_right_angles() uses the angles again.
     const double slant_sd_px = std::sqrt(difference.dot(get_block(ends, i) * difference));
     const auto find = [&](double offset_px, double offset_sd_px) {
-      return estimate_hidden_edge(image, side, search, {offset_px, offset_sd_px, slant_sd_px});
+      return estimate_edge_hidden_by_dark_stripe(image, side, search,
+                                                 {offset_px, offset_sd_px, slant_sd_px});
     };
     edges[i] = find(0, std::numeric_limits<double>::infinity());
     if (!edges[i]) return false;
     if (!visible[(i + 2) % 4]) continue;
-    const auto place = predict_place(image, edges, i, sizes_m);
+    const auto place = predict_edge_position(image, edges, i, sizes_m);
     if (!place) continue;
     const Eigen::Vector2d moved =
         (edges[i]->side.from + edges[i]->side.to) / 2 - (side.from + side.to) / 2;
-    edges[i] = find(place->offset_px + moved.dot(side.inwards()) / image.per_px, place->sd_px);
+    edges[i] =
+        find(place->offset_px + moved.dot(side.inward_normal()) / image.per_px, place->sd_px);
     if (!edges[i]) return false;
   }
   return true;
@@ -572,13 +580,13 @@ std::optional<Light> fit_rectangle(const ImageView& lines, const Blob& blob,
                                    const std::vector<Eigen::Vector2d>& sizes_m) {
   constexpr double min_px = 10, max_aspect = 40;
   constexpr std::size_t min_lines = 8;
-  const PixelBox box = blob.box();
+  const PixelBox box = blob.bounding_box();
   if (outline.size() < kMinOutlinePoints || std::min(box.width, box.height) < min_px) return {};
   std::vector<Eigen::Vector2d> points;
   points.reserve(outline.size());
   Eigen::AlignedBox2d in_plane, in_image;
   for (const EdgePoint& edge : outline) {
-    const auto point = shape.pixel_to_plane(shape.turned(edge.pixel));
+    const auto point = shape.level_plane_from_pixel(shape.swap_image_and_scanline_axes(edge.pixel));
     if (!point) return std::nullopt;
     points.push_back(*point);
     in_plane.extend(*point);
@@ -597,7 +605,7 @@ std::optional<Light> fit_rectangle(const ImageView& lines, const Blob& blob,
   constexpr double min_aspect = 3;
   const auto is_rather_round = [&](const Sides& sides) {
     if (compute_aspect(sides) > min_aspect) return false;
-    const auto disc = shape.fit_light(outline, background);
+    const auto disc = shape.fit_light_to_outline(outline, background);
     return disc && disc->roundness >= first->near;
   };
   double bow_px = 0, blur_px = 0;
@@ -612,8 +620,8 @@ std::optional<Light> fit_rectangle(const ImageView& lines, const Blob& blob,
         std::min((sides[0].to - sides[0].from).norm(), (sides[1].to - sides[1].from).norm());
     if (!(min_side > min_px * per_px) || compute_aspect(sides) > max_aspect) return std::nullopt;
     const double inset = std::min((inset_px + bow_px) * per_px, min_side / 3);
-    const auto chords =
-        find_chords_in_polygon(shape.turned(make_polygon(sides, inset, shape)), lines.size());
+    const auto chords = find_chords_in_polygon(
+        shape.swap_image_and_scanline_axes(make_polygon(sides, inset, shape)), lines.size());
     if (chords.size() < min_lines) return std::nullopt;
     // The chords have to be on consecutive scanlines, because LineLevels assigns levels by index.
     const int rows = chords.back().row - chords.front().row + 1;
@@ -632,7 +640,7 @@ std::optional<Light> fit_rectangle(const ImageView& lines, const Blob& blob,
         return std::nullopt;
       }
     }
-    blur_px = find_surest_blur_px(found_edges);
+    blur_px = find_most_certain_blur_px(found_edges);
     bow_px = 0;
     Sides found;
     for (std::size_t i = 0; i < 4; ++i) {

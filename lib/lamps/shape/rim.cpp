@@ -40,7 +40,7 @@ struct Ellipse {
   }
 
   /// Returns the cosine of the angle between the outline's normal at a point and the scanlines.
-  double cosine_at(const Eigen::Vector2d& pixel) const {
+  double compute_normal_cosine(const Eigen::Vector2d& pixel) const {
     const Eigen::Vector2d normal =
         unit_from_pixel.transpose() * (unit_from_pixel * (pixel - center));
     return std::abs(normal.x()) / normal.norm();
@@ -54,10 +54,10 @@ struct Ellipse {
 Matrix2 compute_unit_plane_from_pixel(const LightShape& shape, const Eigen::Vector2d& pixel) {
   constexpr double step_px = 1;
   Matrix2 derivative = Matrix2::Identity();
-  const auto at = shape.pixel_to_plane(shape.turned(pixel));
+  const auto at = shape.level_plane_from_pixel(shape.swap_image_and_scanline_axes(pixel));
   for (int i = 0; i < 2; ++i) {
-    const auto beside =
-        shape.pixel_to_plane(shape.turned(pixel + step_px * Eigen::Vector2d::Unit(i)));
+    const auto beside = shape.level_plane_from_pixel(
+        shape.swap_image_and_scanline_axes(pixel + step_px * Eigen::Vector2d::Unit(i)));
     if (!at || !beside) return Matrix2::Identity();
     derivative.col(i) = *beside - *at;
   }
@@ -87,13 +87,13 @@ class Face {
     }
     const double brightest = *std::max_element(levels_.begin(), levels_.end());
     soft_ = std::max(fraction * brightest, (background.threshold - background.level) / 2);
-    find_means();
-    find_lit_lines(background.threshold - background.level);
+    compute_moving_means();
+    find_scanlines_of_bright_stripes(background.threshold - background.level);
   }
 
   const PixelBox& box() const { return box_; }
   /// Returns the scanlines of bright stripes.
-  const std::vector<int>& lit_lines() const { return lit_; }
+  const std::vector<int>& bright_stripe_scanlines() const { return lit_; }
   bool has(int column) const {
     return column >= box_.x + window_ && column + window_ <= box_.right();
   }
@@ -118,7 +118,7 @@ class Face {
 
   /// Returns the column next to a border where the level of a scanline crosses the given fraction
   /// between the levels on both sides.
-  std::optional<double> passage(int line, int column, double fraction) const {
+  std::optional<double> find_level_passage(int line, int column, double fraction) const {
     const auto [before, after] = around(line, column);
     const auto [dark, bright] = std::minmax(before, after);
     const double middle = dark + fraction * (bright - dark), sign = after > before ? 1 : -1;
@@ -143,7 +143,7 @@ class Face {
 
   /// Computes the mean over a window that ends with each pixel. Before the first pixel the level of
   /// the first pixel is used.
-  void find_means() {
+  void compute_moving_means() {
     means_.reserve(levels_.size());
     for (int row = box_.y; row < box_.bottom(); ++row) {
       const float* line = levels_.data() + index(row, box_.x);
@@ -155,7 +155,7 @@ class Face {
     }
   }
 
-  void find_lit_lines(double min_level) {
+  void find_scanlines_of_bright_stripes(double min_level) {
     constexpr double min_lit = 0.55;
     std::vector<double> brightest(static_cast<std::size_t>(box_.height));
     std::vector<float> line;
@@ -190,7 +190,7 @@ class Steps {
  public:
   explicit Steps(const Face& face) : left_(face.box().x), width_(face.box().width) {
     constexpr std::size_t max_lines = 48;
-    const std::vector<int>& lit = face.lit_lines();
+    const std::vector<int>& lit = face.bright_stripe_scanlines();
     every_ = (lit.size() + max_lines - 1) / max_lines;
     for (std::size_t i = 0; i < lit.size(); i += every_) {
       lines_.push_back(lit[i]);
@@ -204,7 +204,7 @@ class Steps {
 
   /// Returns the sum of e over the crossings of an ellipse with the lit scanlines, scaled to all of
   /// them.
-  double sum_steps(const Ellipse& ellipse) const {
+  double sum_steps_along_ellipse(const Ellipse& ellipse) const {
     constexpr double max_height = 0.94;  // scanlines are nearly tangent above it
     double sum = 0;
     for (std::size_t i = 0; i < lines_.size(); ++i) {
@@ -242,7 +242,7 @@ Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_
     for (double dv = -max_shift * size; dv <= max_shift * size; dv += step) {
       for (double du = -max_shift * size; du <= max_shift * size; du += step) {
         const Ellipse ellipse{middle + Eigen::Vector2d(du, dv), unit_from_pixel};
-        const double sum = steps.sum_steps(ellipse);
+        const double sum = steps.sum_steps_along_ellipse(ellipse);
         if (sum > best.sum) best = {ellipse, sum};
       }
     }
@@ -252,17 +252,18 @@ Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_
 
 /// Returns the ellipse of a light's outline, linearized at its center.
 Ellipse make_ellipse(const Light& light, const LightShape& shape) {
-  const Eigen::Vector2d low = shape.turned(light.low), high = shape.turned(light.high);
+  const Eigen::Vector2d low = shape.swap_image_and_scanline_axes(light.low),
+                        high = shape.swap_image_and_scanline_axes(light.high);
   const Eigen::Vector2d center = (low + high) / 2;
   Matrix2 unit_from_pixel;
-  const auto at = shape.pixel_to_plane(shape.turned(center));
+  const auto at = shape.level_plane_from_pixel(shape.swap_image_and_scanline_axes(center));
   for (int i = 0; i < 2; ++i) {
     // The difference spans the whole outline, because of lens distortion.
     const double reach_px = (high - low)[i] / 2;
-    const auto beside =
-        shape.pixel_to_plane(shape.turned(center + reach_px * Eigen::Vector2d::Unit(i)));
-    const auto before =
-        shape.pixel_to_plane(shape.turned(center - reach_px * Eigen::Vector2d::Unit(i)));
+    const auto beside = shape.level_plane_from_pixel(
+        shape.swap_image_and_scanline_axes(center + reach_px * Eigen::Vector2d::Unit(i)));
+    const auto before = shape.level_plane_from_pixel(
+        shape.swap_image_and_scanline_axes(center - reach_px * Eigen::Vector2d::Unit(i)));
     if (!at || !beside || !before) return {center, Matrix2::Identity() / light.radius_px};
     unit_from_pixel.col(i) = light.unit_from_plane * (*beside - *before) / (2 * reach_px);
   }
@@ -270,16 +271,17 @@ Ellipse make_ellipse(const Light& light, const LightShape& shape) {
 }
 
 /// Returns the clearest steps within `reach_px` of an ellipse in the image.
-std::vector<EdgePoint> find_steps_near(const Face& face, const Ellipse& ellipse, double reach_px) {
+std::vector<EdgePoint> find_steps_near_ring(const Face& face, const Ellipse& ellipse,
+                                            double reach_px) {
   constexpr double min_step = 0.35, min_cosine = 0.3;
   std::vector<EdgePoint> points;
   std::vector<double> levels;
-  for (const int line : face.lit_lines()) {
+  for (const int line : face.bright_stripe_scanlines()) {
     const auto crossing = ellipse.intersect(line);
     if (!crossing) continue;
     for (const bool begins : {true, false}) {
       const double column = begins ? crossing->begin : crossing->end;
-      const double cosine = ellipse.cosine_at({column, double(line)});
+      const double cosine = ellipse.compute_normal_cosine({column, double(line)});
       if (cosine < min_cosine) continue;
       const double at = column + 0.5;
       const double reach = reach_px / std::max(cosine, 0.5);
@@ -290,9 +292,9 @@ std::vector<EdgePoint> find_steps_near(const Face& face, const Ellipse& ellipse,
         if (step > best) best = step, border = i;
       }
       if (!border) continue;
-      const auto at_half = face.passage(line, *border, 0.5);
-      const auto low_end = face.passage(line, *border, 0.25);
-      const auto high_end = face.passage(line, *border, 0.75);
+      const auto at_half = face.find_level_passage(line, *border, 0.5);
+      const auto low_end = face.find_level_passage(line, *border, 0.25);
+      const auto high_end = face.find_level_passage(line, *border, 0.75);
       if (!at_half || !low_end || !high_end) continue;
       const auto [before, after] = face.around(line, *border);
       levels.push_back(std::max(before, after));
@@ -308,13 +310,14 @@ std::vector<EdgePoint> find_steps_near(const Face& face, const Ellipse& ellipse,
 }
 
 /// Fits a light to the steps near a ring.
-std::optional<Light> fit_near(const Ring& ring, const Face& face, const Background& background,
-                              const LightShape& shape) {
+std::optional<Light> fit_light_near_ring(const Ring& ring, const Face& face,
+                                         const Background& background, const LightShape& shape) {
   Ellipse ellipse = ring.ellipse;
   std::optional<Light> light;
   for (const double reach : {0.16, 0.12, 0.08, 0.08}) {
     const double reach_px = reach * ring.ellipse.mean_radius_px();
-    auto better = shape.fit_light(find_steps_near(face, ellipse, reach_px), background);
+    auto better =
+        shape.fit_light_to_outline(find_steps_near_ring(face, ellipse, reach_px), background);
     if (!better) return std::nullopt;
     light = std::move(better);
     ellipse = make_ellipse(*light, shape);
@@ -330,7 +333,7 @@ std::optional<Light> fit_near(const Ring& ring, const Face& face, const Backgrou
 std::optional<double> estimate_jackknife_sd_px(const Light& light, const Background& background,
                                                const LightShape& shape) {
   constexpr std::size_t pieces = 8;
-  const Eigen::Vector2d center = shape.turned(light.pixel);
+  const Eigen::Vector2d center = shape.swap_image_and_scanline_axes(light.pixel);
   std::vector<EdgePoint> outline = light.outline;
   const auto angle = [&](const EdgePoint& point) {
     return std::atan2(point.pixel.y() - center.y(), point.pixel.x() - center.x());
@@ -345,7 +348,7 @@ std::optional<double> estimate_jackknife_sd_px(const Light& light, const Backgro
       return others.begin() + std::ptrdiff_t(piece * outline.size() / pieces);
     };
     others.erase(at(i), at(i + 1));
-    const auto without = shape.fit_light(std::move(others), background);
+    const auto without = shape.fit_light_to_outline(std::move(others), background);
     if (!without) return std::nullopt;
     centers[i] = without->pixel;
     mean += centers[i] / double(pieces);
@@ -357,7 +360,7 @@ std::optional<double> estimate_jackknife_sd_px(const Light& light, const Backgro
 
 /// Returns the level above the dark level that one line of ten exceeds at the middle or the
 /// quarters of its runs.
-double bright_level(const ImageView& image, const Blob& blob, double dark) {
+double measure_bright_level(const ImageView& image, const Blob& blob, double dark) {
   std::vector<int> levels;
   levels.reserve(blob.runs.size());
   for (const PixelRun& run : blob.runs) {
@@ -373,7 +376,7 @@ double bright_level(const ImageView& image, const Blob& blob, double dark) {
 }
 
 /// Returns the number of points with a common error: those of a stripe, on consecutive scanlines.
-double points_of_a_stripe(const std::vector<EdgePoint>& outline) {
+double count_points_per_stripe(const std::vector<EdgePoint>& outline) {
   constexpr double next = 2.5;
   std::array<double, 2> last{-1e9, -1e9};
   double stripes = 0;
@@ -388,9 +391,9 @@ double points_of_a_stripe(const std::vector<EdgePoint>& outline) {
 /// Fits a light and the sigma of its center to the steps next to its outline. These have no bias if
 /// the contrast of the sides differs. Returns std::nullopt unless most pieces of the outline show a
 /// step.
-std::optional<Light> fit_to_steps(const ImageView& image, const std::vector<int>& lit_lines,
-                                  const Background& background, const LightShape& shape,
-                                  Light light) {
+std::optional<Light> fit_light_to_steps(const ImageView& image, const std::vector<int>& lit_lines,
+                                        const Background& background, const LightShape& shape,
+                                        Light light) {
   constexpr int num_iterations = 3;
   constexpr double first_blur_px = 0.9, min_inlier_fraction = 0.6;
   // Consumer cameras code approximately light^(1 / 2.2); others barely have the bit depth to record
@@ -399,23 +402,23 @@ std::optional<Light> fit_to_steps(const ImageView& image, const std::vector<int>
   StepImageModel picture{first_blur_px, gamma};
   for (int iteration = 1; iteration < num_iterations; ++iteration) {
     auto steps = fit_rim_steps(image, light, lit_lines, background, picture, iteration > 1, shape);
-    if (!estimate_outline_shift(steps.pieces, shape.has_lens())) return std::nullopt;
+    if (!estimate_outline_offset(steps.pieces, shape.has_lens())) return std::nullopt;
     picture.blur_px = steps.blur_px;
-    auto better = shape.fit_light(std::move(steps.points), background);
+    auto better = shape.fit_light_to_outline(std::move(steps.points), background);
     if (!better || 2 * better->outline.size() < light.outline.size()) return std::nullopt;
     light = std::move(*better);
   }
   const auto steps = fit_rim_steps(image, light, lit_lines, background, picture, true, shape);
-  const auto shift = estimate_outline_shift(steps.pieces, shape.has_lens());
+  const auto shift = estimate_outline_offset(steps.pieces, shape.has_lens());
   picture.gamma = other_gamma;
-  const auto other = estimate_outline_shift(
+  const auto other = estimate_outline_offset(
       fit_rim_steps(image, light, lit_lines, background, picture, true, shape).pieces,
       shape.has_lens());
   if (!shift || !other ||
       !(shift->num_inliers > min_inlier_fraction * double(steps.num_examined))) {
     return std::nullopt;
   }
-  light.pixel += shape.turned(shift->px);
+  light.pixel += shape.swap_image_and_scanline_axes(shift->px);
   light.sigma_px =
       std::sqrt(shift->covariance.trace() / 2 + (shift->px - other->px).squaredNorm() / 2);
   return light;
@@ -423,8 +426,8 @@ std::optional<Light> fit_to_steps(const ImageView& image, const std::vector<int>
 
 }  // namespace
 
-bool is_unevenly_lit(const ImageView& image, const Blob& blob,
-                     const std::vector<EdgePoint>& outline, const Background& background) {
+bool is_blob_unevenly_lit(const ImageView& image, const Blob& blob,
+                          const std::vector<EdgePoint>& outline, const Background& background) {
   constexpr double much = 3, min_ends = 0.2;
   constexpr int min_width = 8;
   if (outline.empty()) return false;
@@ -434,40 +437,43 @@ bool is_unevenly_lit(const ImageView& image, const Blob& blob,
   std::vector<double> levels;
   levels.reserve(outline.size());
   for (const EdgePoint& point : outline) levels.push_back(point.level);
-  return bright_level(image, blob, background.level) > much * upper_median(std::move(levels));
+  return measure_bright_level(image, blob, background.level) >
+         much * upper_median(std::move(levels));
 }
 
-std::optional<Rim> fit_rim(const ImageView& image, const Blob& blob, const Background& background,
-                           const LightShape& shape) {
+std::optional<Rim> fit_rim_of_light(const ImageView& image, const Blob& blob,
+                                    const Background& background, const LightShape& shape) {
   constexpr int min_size = 20, min_lines = 10;
   constexpr double margin = 0.2, min_step = 0.28;
-  const PixelBox box = blob.box();
+  const PixelBox box = blob.bounding_box();
   if (std::min(box.width, box.height) < min_size) return std::nullopt;
   const int margin_px = static_cast<int>(margin * std::max(box.width, box.height));
-  const PixelBox wide = grow(box, margin_px, image.size());
+  const PixelBox wide = expand_and_clip_box(box, margin_px, image.size());
   // Window sizes for the search of the ring and for the rim.
   const int size = std::max(wide.width, wide.height);
   const int fine = std::clamp(size / 30, 2, 6), coarse = std::max(fine, size / 50);
   const Face blurred(image, wide, background, coarse);
   const Face face = fine == coarse ? blurred : Face(image, wide, background, fine);
-  if (face.lit_lines().size() < min_lines) return std::nullopt;
+  if (face.bright_stripe_scanlines().size() < min_lines) return std::nullopt;
   const Eigen::Vector2d middle(box.x + box.width / 2.0, box.y + box.height / 2.0);
   const Ring best = find_best_ring(blurred, box, compute_unit_plane_from_pixel(shape, middle));
-  const auto crossings =
-      2 * std::count_if(face.lit_lines().begin(), face.lit_lines().end(),
-                        [&](int line) { return best.ellipse.intersect(line).has_value(); });
+  const auto crossings = 2 * std::count_if(face.bright_stripe_scanlines().begin(),
+                                           face.bright_stripe_scanlines().end(), [&](int line) {
+                                             return best.ellipse.intersect(line).has_value();
+                                           });
   if (!(best.sum > min_step * double(crossings))) return std::nullopt;
 
-  auto light = fit_near(best, face, background, shape);
+  auto light = fit_light_near_ring(best, face, background, shape);
   if (!light) return std::nullopt;
-  // The fraction counts the clearest steps, before fit_to_steps() replaces them.
+  // The fraction counts the clearest steps, before fit_light_to_steps() replaces them.
   const double rim_fraction = std::min(1.0, double(light->outline.size()) / double(crossings));
-  auto fitted = fit_to_steps(image, face.lit_lines(), background, shape, *light);
+  auto fitted =
+      fit_light_to_steps(image, face.bright_stripe_scanlines(), background, shape, *light);
   bool is_clear = fitted.has_value();
   if (fitted) {
     light = std::move(fitted);
   } else {
-    const double scatter_px = light->sigma_px * std::sqrt(points_of_a_stripe(light->outline));
+    const double scatter_px = light->sigma_px * std::sqrt(count_points_per_stripe(light->outline));
     const auto jackknife_px = estimate_jackknife_sd_px(*light, background, shape);
     light->sigma_px = std::max(scatter_px, jackknife_px.value_or(0));
     is_clear = jackknife_px.has_value();

@@ -16,8 +16,8 @@ namespace vlp {
 /// Returns true if a blob is three times as bright inside as next to its outline, in at least one
 /// line of ten. Also returns true if less than 20 % of the ends of its runs have an outline
 /// point. Returns false if `outline` is empty.
-bool is_unevenly_lit(const ImageView& image, const Blob& blob,
-                     const std::vector<EdgePoint>& outline, const Background& background);
+bool is_blob_unevenly_lit(const ImageView& image, const Blob& blob,
+                          const std::vector<EdgePoint>& outline, const Background& background);
 
 /// Light fitted to its rim. The rim is clear if most of its pieces show a step, or if the outline
 /// without any one of eight pieces still has a center.
@@ -49,7 +49,7 @@ struct Rim {
 ///
 /// Returns std::nullopt if the blob is smaller than 20 px or has less than 10 lit scanlines. Also
 /// returns std::nullopt if no circle has such steps, or if the steps determine no circle.
-std::optional<Rim> fit_rim(const ImageView& image, const Blob& blob, const Background& background,
-                           const LightShape& shape);
+std::optional<Rim> fit_rim_of_light(const ImageView& image, const Blob& blob,
+                                    const Background& background, const LightShape& shape);
 
 }  // namespace vlp

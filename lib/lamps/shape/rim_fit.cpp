@@ -37,8 +37,8 @@ class Levels {
   }
 
   int columns() const { return image_.width; }
-  double scale_level(double level) const { return scale_ * level; }
-  double at(int row, int column) const { return scale_level(image_.level_at(column, row)); }
+  double to_relative_level(double level) const { return scale_ * level; }
+  double at(int row, int column) const { return to_relative_level(image_.level_at(column, row)); }
 
  private:
   ImageView image_;
@@ -127,25 +127,27 @@ class CrossedOutline {
   CrossedOutline(const Light& light, const LightShape& shape)
       : light_(light),
         shape_(shape),
-        low_(shape.turned(light.low)),
-        high_(shape.turned(light.high)) {}
+        low_(shape.swap_image_and_scanline_axes(light.low)),
+        high_(shape.swap_image_and_scanline_axes(light.high)) {}
 
   /// Returns the depth of a pixel behind the outline.
-  double depth_px(double column, double line) const {
+  double depth_behind_outline_px(double column, double line) const {
     constexpr double half = 0.5;
-    const double radii = radii_at(column, line);
-    const Eigen::Vector2d slope(radii_at(column + half, line) - radii_at(column - half, line),
-                                radii_at(column, line + half) - radii_at(column, line - half));
+    const double radii = relative_radius_at(column, line);
+    const Eigen::Vector2d slope(
+        relative_radius_at(column + half, line) - relative_radius_at(column - half, line),
+        relative_radius_at(column, line + half) - relative_radius_at(column, line - half));
     return (1 - radii) / slope.norm();
   }
 
-  Eigen::Vector2d inwards(const Crossing& at) const {
-    const double per_line =
-        (depth_px(at.column, at.line + 1) - depth_px(at.column, at.line - 1)) / 2;
+  Eigen::Vector2d inward_normal(const Crossing& at) const {
+    const double per_line = (depth_behind_outline_px(at.column, at.line + 1) -
+                             depth_behind_outline_px(at.column, at.line - 1)) /
+                            2;
     return Eigen::Vector2d(at.per_column, per_line).normalized();
   }
 
-  std::optional<Crossing> crossing(int line, bool begins) const {
+  std::optional<Crossing> find_level_crossing(int line, bool begins) const {
     constexpr double flattest = 0.3;
     const Eigen::Vector2d center = (low_ + high_) / 2, half = (high_ - low_) / 2;
     const double up = (line - center.y()) / half.y();
@@ -153,19 +155,21 @@ class CrossedOutline {
     const double sign = begins ? 1 : -1;
     Crossing result{line, center.x() - sign * half.x() * std::sqrt(1 - up * up), 0};
     for (int round = 0; round < 3; ++round) {
-      result.per_column =
-          (depth_px(result.column + 1, line) - depth_px(result.column - 1, line)) / 2;
+      result.per_column = (depth_behind_outline_px(result.column + 1, line) -
+                           depth_behind_outline_px(result.column - 1, line)) /
+                          2;
       if (!(sign * result.per_column > flattest)) return std::nullopt;
-      result.column -= depth_px(result.column, line) / result.per_column;
+      result.column -= depth_behind_outline_px(result.column, line) / result.per_column;
     }
     return std::isfinite(result.column) ? std::optional(result) : std::nullopt;
   }
 
  private:
   /// Returns the distance from the center as a fraction of that of the outline.
-  double radii_at(double column, double line) const {
+  double relative_radius_at(double column, double line) const {
     constexpr double far = 10;
-    const auto plane = shape_.pixel_to_plane(shape_.turned(Eigen::Vector2d(column, line)));
+    const auto plane = shape_.level_plane_from_pixel(
+        shape_.swap_image_and_scanline_axes(Eigen::Vector2d(column, line)));
     return plane ? (light_.unit_from_plane * (*plane - light_.plane_center)).norm() : far;
   }
 
@@ -174,13 +178,13 @@ class CrossedOutline {
   Eigen::Vector2d low_, high_;
 };
 
-Piece sample_piece(const Levels& levels, const std::vector<int>& lines, bool begins,
-                   const CrossedOutline& outline, double reach_px) {
+Piece sample_outline_piece(const Levels& levels, const std::vector<int>& lines, bool begins,
+                           const CrossedOutline& outline, double reach_px) {
   constexpr double straight = 0.7;
   Piece piece;
   const int middle_line = lines[lines.size() / 2];
   for (const int line : lines) {
-    const auto crossing = outline.crossing(line, begins);
+    const auto crossing = outline.find_level_crossing(line, begins);
     if (!crossing) continue;
     piece.crossings.push_back(*crossing);
     const int middle = static_cast<int>(std::lround(crossing->column));
@@ -189,7 +193,7 @@ Piece sample_piece(const Levels& levels, const std::vector<int>& lines, bool beg
          column <= std::min(levels.columns() - 1, middle + reach); ++column) {
       const double depth_px = std::abs(crossing->per_column) > straight
                                   ? crossing->per_column * (column - crossing->column)
-                                  : outline.depth_px(column, line);
+                                  : outline.depth_behind_outline_px(column, line);
       if (std::abs(depth_px) > reach_px) continue;
       piece.samples.push_back({depth_px, double(line - middle_line), levels.at(line, column)});
     }
@@ -202,8 +206,8 @@ struct Step {
   double log_blur, log_blur_sd;
 };
 
-std::optional<Step> fit_step(const Piece& piece, double dark, const StepImageModel& picture,
-                             bool blur_known) {
+std::optional<Step> fit_step_of_piece(const Piece& piece, double dark,
+                                      const StepImageModel& picture, bool blur_known) {
   constexpr std::size_t min_samples = 30;
   constexpr int num_iterations = 12;
   constexpr double clear_px = 2, farthest_px = 3;
@@ -271,22 +275,24 @@ RimSteps fit_rim_steps(const ImageView& image, const Light& light,
   constexpr std::size_t min_crossings = 3;
   const double reach_px = std::max(min_reach_px, reach_blur_ratio * picture.blur_px);
   const CrossedOutline outline(light, shape);
-  const Levels levels(image, shape.turned(light.low), shape.turned(light.high));
+  const Levels levels(image, shape.swap_image_and_scanline_axes(light.low),
+                      shape.swap_image_and_scanline_axes(light.high));
   const int limit = static_cast<int>(std::max(min_lines, piece_radius_fraction * light.radius_px));
   RimSteps result{{}, 0, {}, picture.blur_px};
   double log_blur = 0, weight = 0;
   for (const std::vector<int>& lines : split_into_pieces(lit_lines, limit)) {
     for (const bool begins : {true, false}) {
-      const Piece piece = sample_piece(levels, lines, begins, outline, reach_px);
+      const Piece piece = sample_outline_piece(levels, lines, begins, outline, reach_px);
       if (piece.crossings.size() < min_crossings) continue;
       ++result.num_examined;
-      const auto step = fit_step(piece, levels.scale_level(background.level), picture, blur_known);
+      const auto step =
+          fit_step_of_piece(piece, levels.to_relative_level(background.level), picture, blur_known);
       if (!step || !(step->sd_px < max_sd_px)) continue;
       log_blur += step->log_blur / std::pow(step->log_blur_sd, 2);
       weight += 1 / std::pow(step->log_blur_sd, 2);
       const double sd_px = std::hypot(step->sd_px, blur_sd_fraction * picture.blur_px);
       const Crossing& middle = piece.crossings[piece.crossings.size() / 2];
-      result.pieces.push_back({outline.inwards(middle), step->at_px, sd_px});
+      result.pieces.push_back({outline.inward_normal(middle), step->at_px, sd_px});
       for (const Crossing& crossing : piece.crossings) {
         result.points.push_back(
             {{crossing.column + step->at_px / crossing.per_column, crossing.line},
@@ -329,8 +335,8 @@ std::optional<OutlineShift> estimate_shift(const std::vector<RimPiece>& pieces) 
 
 }  // namespace
 
-std::optional<OutlineShift> estimate_outline_shift(const std::vector<RimPiece>& pieces,
-                                                   bool round) {
+std::optional<OutlineShift> estimate_outline_offset(const std::vector<RimPiece>& pieces,
+                                                    bool round) {
   return round ? estimate_shift<3>(pieces) : estimate_shift<5>(pieces);
 }
 

@@ -65,6 +65,7 @@ struct OutlineShift {
 /// its change of size, and its ovality unless the outline is `round` in the plane of LightShape. If
 /// the scatter of the pieces exceeds their standard deviations, these are scaled. Returns
 /// std::nullopt if there are too few pieces.
-std::optional<OutlineShift> estimate_outline_shift(const std::vector<RimPiece>& pieces, bool round);
+std::optional<OutlineShift> estimate_outline_offset(const std::vector<RimPiece>& pieces,
+                                                    bool round);
 
 }  // namespace vlp

@@ -32,12 +32,13 @@ std::optional<Circle> make_circle_through(const Eigen::Vector2d& a, const Eigen:
 
 /// Returns the circle through three of the points that has most points close to it and few outside.
 /// Points inside may be the edge of an occluder; points outside are not possible for a light.
-std::optional<Circle> best_supported(std::span<const Eigen::Vector2d> points, double tolerance) {
+std::optional<Circle> find_best_supported_circle(std::span<const Eigen::Vector2d> points,
+                                                 double tolerance) {
   constexpr int triples = 40;
   std::optional<Circle> best;
   double max_score = kMinCirclePoints - 1;
   const std::size_t n = points.size();
-  const double largest = compute_extent(points);
+  const double largest = compute_outline_extent(points);
   std::uint32_t state = 1;
   const auto next = [&] {
     state = state * 1664525 + 1013904223;
@@ -84,7 +85,7 @@ struct Conic {
 
 }  // namespace
 
-double compute_extent(std::span<const Eigen::Vector2d> points) {
+double compute_outline_extent(std::span<const Eigen::Vector2d> points) {
   Eigen::AlignedBox2d box;
   for (const Eigen::Vector2d& point : points) box.extend(point);
   return box.isEmpty() ? 0 : box.diagonal().norm();
@@ -93,7 +94,7 @@ double compute_extent(std::span<const Eigen::Vector2d> points) {
 std::optional<RobustEllipse> fit_robust_circle(std::span<const Eigen::Vector2d> points,
                                                std::span<const double> weights, double tolerance) {
   if (points.size() < kMinCirclePoints) return std::nullopt;
-  const auto begin = best_supported(points, tolerance);
+  const auto begin = find_best_supported_circle(points, tolerance);
   if (!begin) return std::nullopt;
   auto [center, radius] = *begin;
   RobustEllipse fit{};
@@ -121,7 +122,7 @@ std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d>
                                                 std::span<const double> weights, double tolerance) {
   constexpr double max_oval = 1.0 / 8, max_axis_ratio = 3;
   constexpr int num_iterations = 10;
-  const double oval = std::max(tolerance, max_oval * compute_extent(points) / 2);
+  const double oval = std::max(tolerance, max_oval * compute_outline_extent(points) / 2);
   const auto circle = fit_robust_circle(points, weights, oval);
   if (!circle) return std::nullopt;
   // Computed in units of the circle, so that center and conic have similar scales.
@@ -144,7 +145,7 @@ std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d>
     fit.inliers = std::move(better->inliers);
     fit.count = better->count;
   }
-  const auto axes = decompose_symmetric(Eigen::Matrix2d(ellipse.conic));
+  const auto axes = eigendecompose_symmetric(Eigen::Matrix2d(ellipse.conic));
   const double min_eigenvalue = axes.values[0], max_eigenvalue = axes.values[1];
   if (!(min_eigenvalue * max_axis_ratio * max_axis_ratio > max_eigenvalue)) return std::nullopt;
   fit.center = circle->center + unit * ellipse.center;
@@ -166,7 +167,7 @@ std::optional<RobustEllipse> fit_slender_ellipse(std::span<const Eigen::Vector2d
     scatter += (point - middle) * (point - middle).transpose() / count;
   }
   const auto compute_square_root = [](const Matrix2& square) -> Matrix2 {
-    const auto axes = decompose_symmetric(Eigen::Matrix2d(square));
+    const auto axes = eigendecompose_symmetric(Eigen::Matrix2d(square));
     return axes.vectors * axes.values.cwiseMax(0).cwiseSqrt().asDiagonal() *
            axes.vectors.transpose();
   };

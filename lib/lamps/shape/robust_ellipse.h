@@ -28,7 +28,7 @@ struct RobustEllipse {
 };
 
 /// Returns the diagonal of the bounding box of the points; 0 if there are none.
-double compute_extent(std::span<const Eigen::Vector2d> points);
+double compute_outline_extent(std::span<const Eigen::Vector2d> points);
 
 /// Fits the circle that most of the points support. Selects the best of many circles through three
 /// points each (RANSAC, Fischler and Bolles 1981, with a fixed choice of triples). Then applies

@@ -15,7 +15,7 @@ constexpr double kModelDeviation = 0.15;
 
 /// Returns the derivative of the oval with respect to the motion (v, w) / 2.
 Eigen::Matrix<double, 2, 3> compute_d_oval_d_motion(const OutlineSums& light) {
-  const Eigen::Vector2d &slope = light.line_slope(), &at = light.circle().center;
+  const Eigen::Vector2d &slope = light.scanline_gradient(), &at = light.fitted_circle().center;
   const Eigen::Matrix2d times_slope{{slope.x(), -slope.y()}, {slope.y(), slope.x()}};
   Eigen::Matrix<double, 2, 3> result;
   result << times_slope, times_slope * Eigen::Vector2d(-at.y(), at.x());
@@ -31,7 +31,7 @@ struct MeasuredOval {
   Eigen::Vector2d oval;
   Matrix2 information;
 
-  double chi_square(const Eigen::Vector3d& motion) const {
+  double compute_chi_square(const Eigen::Vector3d& motion) const {
     const Eigen::Vector2d left = oval - from_motion * motion;
     return left.dot(information * left);
   }
@@ -42,7 +42,7 @@ struct Motion {
   Eigen::Matrix3d information;
 };
 
-Motion estimate_motion(const std::vector<MeasuredOval>& lights) {
+Motion estimate_camera_motion(const std::vector<MeasuredOval>& lights) {
   // Prior of the rotation: a camera that observes lamps rotates by less than a radian or two in
   // 10,000 scanlines.
   constexpr double max_turn = 1e-4;
@@ -78,7 +78,7 @@ OutlineSums::OutlineSums(std::span<const Eigen::Vector2d> points, std::span<cons
   }
 }
 
-std::optional<OutlineSums::Estimate> OutlineSums::solve_with_prior(
+std::optional<OutlineSums::Estimate> OutlineSums::solve_with_oval_prior(
     const std::optional<Oval>& known) const {
   constexpr int unknowns = 5, min_points = 2 * unknowns;
   if (count_ < min_points) return std::nullopt;
@@ -104,13 +104,13 @@ std::optional<OutlineSums::Estimate> OutlineSums::solve_with_prior(
   return estimate;
 }
 
-std::optional<Shear> Shear::estimate(std::span<const OutlineSums> lights) {
+std::optional<Shear> Shear::estimate_shear_from_outlines(std::span<const OutlineSums> lights) {
   constexpr double max_sd = 0.01;      // of the radius; of lights that are used
   constexpr double beyond_doubt = 30;  // a chi-square of 2
   constexpr double contradicts = 14;   // a chi-square of 2
   std::vector<MeasuredOval> ovals;
   for (const OutlineSums& light : lights) {
-    const auto estimate = light.solve_with_prior(std::nullopt);
+    const auto estimate = light.solve_with_oval_prior(std::nullopt);
     if (!estimate) continue;
     const Matrix2 covariance = estimate->covariance.bottomRightCorner<2, 2>();
     if (covariance.trace() > 2 * max_sd * max_sd) continue;
@@ -120,12 +120,12 @@ std::optional<Shear> Shear::estimate(std::span<const OutlineSums> lights) {
   }
   const std::size_t all = ovals.size();
   while (!ovals.empty() && 2 * ovals.size() >= all) {
-    const Motion motion = estimate_motion(ovals);
+    const Motion motion = estimate_camera_motion(ovals);
     const auto worst = std::max_element(
         ovals.begin(), ovals.end(), [&](const MeasuredOval& a, const MeasuredOval& b) {
-          return a.chi_square(motion.value) < b.chi_square(motion.value);
+          return a.compute_chi_square(motion.value) < b.compute_chi_square(motion.value);
         });
-    if (worst->chi_square(motion.value) > contradicts) {
+    if (worst->compute_chi_square(motion.value) > contradicts) {
       ovals.erase(worst);
       continue;
     }
@@ -135,15 +135,15 @@ std::optional<Shear> Shear::estimate(std::span<const OutlineSums> lights) {
   return std::nullopt;
 }
 
-Oval Shear::predict_oval(const OutlineSums& light) const {
+Oval Shear::predict_oval_from_motion(const OutlineSums& light) const {
   const auto from_motion = compute_d_oval_d_motion(light);
   const Eigen::Vector2d oval = from_motion * motion_;
   return {oval,
           from_motion * covariance_ * from_motion.transpose() + compute_model_covariance(oval)};
 }
 
-Eigen::Vector2d Shear::motion_at(const OutlineSums& light) const {
-  const Eigen::Vector2d& at = light.circle().center;
+Eigen::Vector2d Shear::motion_per_scanline_of(const OutlineSums& light) const {
+  const Eigen::Vector2d& at = light.fitted_circle().center;
   return 2 * (motion_.head<2>() + motion_[2] * Eigen::Vector2d(-at.y(), at.x()));
 }
 

@@ -47,11 +47,11 @@ class OutlineSums {
   /// Solves for p, with the oval as a prior if it is known. The variance is that of the residuals
   /// times the number of points with a common error. Returns std::nullopt if the points do not
   /// determine p.
-  std::optional<Estimate> solve_with_prior(const std::optional<Oval>& known) const;
+  std::optional<Estimate> solve_with_oval_prior(const std::optional<Oval>& known) const;
 
   bool empty() const { return count_ == 0; }
-  const Circle& circle() const { return circle_; }
-  const Eigen::Vector2d& line_slope() const { return line_slope_; }
+  const Circle& fitted_circle() const { return circle_; }
+  const Eigen::Vector2d& scanline_gradient() const { return line_slope_; }
 
  private:
   Circle circle_{Eigen::Vector2d::Zero(), 1};
@@ -74,12 +74,12 @@ class Shear {
   /// Estimates the motion from lights with a sufficiently visible outline. Rejects lights that
   /// contradict the majority. Returns std::nullopt if less than half of the lights agree, or if the
   /// motion is not significant.
-  static std::optional<Shear> estimate(std::span<const OutlineSums> lights);
+  static std::optional<Shear> estimate_shear_from_outlines(std::span<const OutlineSums> lights);
 
   /// Returns the oval of a light's outline that the motion causes, with its covariance.
-  Oval predict_oval(const OutlineSums& light) const;
+  Oval predict_oval_from_motion(const OutlineSums& light) const;
   /// Returns the motion of a light in the level plane per scanline.
-  Eigen::Vector2d motion_at(const OutlineSums& light) const;
+  Eigen::Vector2d motion_per_scanline_of(const OutlineSums& light) const;
 
  private:
   Shear(const Eigen::Vector3d& motion, const Eigen::Matrix3d& covariance)

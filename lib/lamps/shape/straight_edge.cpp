@@ -85,7 +85,7 @@ class Samples {
     for (int i = 0; i <= count; ++i) {
       const auto place = find_pixel(margin + used * i / count);
       if (!place) return;
-      if (along == 0 || is_lit(static_cast<int>(place->y()))) places.push_back(*place);
+      if (along == 0 || is_scanline_lit(static_cast<int>(place->y()))) places.push_back(*place);
     }
     const std::size_t every = (places.size() + search.positions - 1) / search.positions;
     for (std::size_t i = 0; i < places.size(); i += every) {
@@ -102,7 +102,7 @@ class Samples {
 
  private:
   /// Returns true if a scanline is not dark.
-  bool is_lit(int line) const {
+  bool is_scanline_lit(int line) const {
     constexpr double minimum = 0.1;
     const auto lit = image_.levels.at(line);
     return lit && lit->level > minimum;
@@ -110,9 +110,10 @@ class Samples {
 
   /// Returns the pixel, (column, row), on the side; std::nullopt if it is outside the image.
   std::optional<Eigen::Vector2d> find_pixel(double t) const {
-    const auto pixel = image_.shape.plane_to_pixel(side_.from + t * (side_.to - side_.from));
+    const auto pixel =
+        image_.shape.pixel_from_level_plane(side_.from + t * (side_.to - side_.from));
     if (!pixel) return std::nullopt;
-    const Eigen::Vector2d at = image_.shape.turned(*pixel).array().round();
+    const Eigen::Vector2d at = image_.shape.swap_image_and_scanline_axes(*pixel).array().round();
     const ImageSize size = image_.lines.size();
     const bool is_inside = at.minCoeff() >= 0 && at.x() < size.width && at.y() < size.height;
     return is_inside ? std::optional(at) : std::nullopt;
@@ -123,7 +124,7 @@ class Samples {
   bool add_place(const Eigen::Vector2d& middle, int across, double reach_px) {
     constexpr double apart_px = 2;
     const auto plane = [&](const Eigen::Vector2d& pixel) {
-      return image_.shape.pixel_to_plane(image_.shape.turned(pixel));
+      return image_.shape.level_plane_from_pixel(image_.shape.swap_image_and_scanline_axes(pixel));
     };
     const auto here = plane(middle);
     const auto right = plane(middle + Eigen::Vector2d(apart_px, 0));
@@ -131,7 +132,7 @@ class Samples {
     if (!here || !right || !below) return false;
     Matrix2 plane_from_pixel;
     plane_from_pixel << (*right - *here) / apart_px, (*below - *here) / apart_px;
-    const Eigen::Vector2d inwards = side_.inwards();
+    const Eigen::Vector2d inwards = side_.inward_normal();
     const Eigen::Vector2d gradient = plane_from_pixel.transpose() * inwards;
     const double px = gradient.norm();  // size of a pixel in the plane, across the side
     const double length = (side_.to - side_.from).norm();
@@ -149,14 +150,14 @@ class Samples {
       const auto lit = image_.levels.at(row);
       if (!lit) continue;
       const Eigen::Vector2d away = *here + plane_from_pixel * (pixel - middle) - side_.from;
-      const double fraction = image_.levels.relative_level_at(column);
-      samples.push_back(
-          {row,
-           {fraction * lit->level, fraction * lit->sd},
-           (image_.lines.level_at(column, row) - image_.dark) / image_.levels.brightest(),
-           away.dot(side_.direction()) / length,
-           away.dot(inwards) / px,
-           image_.per_px / px});
+      const double fraction = image_.levels.relative_level_at_column(column);
+      samples.push_back({row,
+                         {fraction * lit->level, fraction * lit->sd},
+                         (image_.lines.level_at(column, row) - image_.dark) /
+                             image_.levels.max_level_above_dark(),
+                         away.dot(side_.edge_direction()) / length,
+                         away.dot(inwards) / px,
+                         image_.per_px / px});
     }
     return true;
   }
@@ -225,7 +226,7 @@ std::optional<Matrix2> compute_ends_covariance(const Model& model,
   }
   const Cholesky<kUnknowns> factor(normal);
   if (!factor.has_full_rank(1e-12) || !(count > kUnknowns)) return std::nullopt;
-  const auto from = factor.inverse_column(kFrom), to = factor.inverse_column(kTo);
+  const auto from = factor.compute_inverse_column(kFrom), to = factor.compute_inverse_column(kTo);
   const auto ends_moved_by = [&](const Unknowns& pull) {
     Eigen::Vector2d moved(0, 0);
     for (std::size_t i = 0; i < kUnknowns; ++i) {
@@ -294,7 +295,7 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
   const auto covariance = compute_ends_covariance(model, samples, weights, last->inliers, priors);
   if (!covariance) return std::nullopt;
 
-  const Eigen::Vector2d inwards = side.inwards() * per_px;
+  const Eigen::Vector2d inwards = side.inward_normal() * per_px;
   StraightEdge edge;
   edge.side = {side.from + x[kFrom] * inwards, side.to + x[kTo] * inwards};
   edge.covariance_px = *covariance;
@@ -323,7 +324,7 @@ class HiddenEdge {
 
   /// Returns -2 log likelihood, up to a constant, for the given distances of the ends. The level of
   /// each scanline is the most probable one within its standard deviation.
-  double cost(const Eigen::Vector2d& ends_px) const {
+  double compute_cost(const Eigen::Vector2d& ends_px) const {
     constexpr double noise = 2 * kNoise, line_sd = 0.02;  // uniform level, no light outside
     double sum = 0;
     for (auto sample = samples_.begin(); sample != samples_.end();) {
@@ -375,7 +376,7 @@ struct Ends {
   Matrix2 covariance_px;
 };
 
-Ends average_ends(const HiddenEdge& edge, const HiddenEdgePrior& prior, double reach_px) {
+Ends average_edge_ends(const HiddenEdge& edge, const HiddenEdgePrior& prior, double reach_px) {
   constexpr int num_iterations = 4, offsets = 21, slants = 9;
   constexpr double deviations = 3.5;
   Matrix2 ends_from_node;  // a node is an offset and a slant
@@ -391,7 +392,7 @@ Ends average_ends(const HiddenEdge& edge, const HiddenEdgePrior& prior, double r
     for (int i = 0; i < offsets; ++i) {
       for (int j = 0; j < slants; ++j) {
         const Eigen::Vector2d node = mean - range + step.cwiseProduct(Eigen::Vector2d(i, j));
-        nodes.emplace_back(node, edge.cost(ends_from_node * node) +
+        nodes.emplace_back(node, edge.compute_cost(ends_from_node * node) +
                                      std::pow((node[0] - prior.offset_px) / prior.offset_sd_px, 2) +
                                      std::pow(node[1] / prior.slant_sd_px, 2));
         minimum = std::min(minimum, nodes.back().second);
@@ -433,28 +434,29 @@ std::optional<StraightEdge> fit_straight_edge(const EdgeImage& image, const Side
   const auto points = static_cast<int>(length_px);
   for (int i = 0; i < points; ++i) {
     const double t = (i + 0.5) / points;
-    const auto pixel = shape.plane_to_pixel(found.from + t * (found.to - found.from));
+    const auto pixel = shape.pixel_from_level_plane(found.from + t * (found.to - found.from));
     if (!pixel) continue;
-    const Eigen::Vector2d at = shape.turned(*pixel);
+    const Eigen::Vector2d at = shape.swap_image_and_scanline_axes(*pixel);
     const auto lit = levels.at(static_cast<int>(std::lround(at.y())));
     if (!lit || lit->level < min_lit) continue;
     edge->points.push_back(
-        {at, lit->level * levels.brightest(), rise_of_blur * edge->blur_px, false});
+        {at, lit->level * levels.max_level_above_dark(), rise_of_blur * edge->blur_px, false});
   }
   return edge;
 }
 
-std::optional<StraightEdge> estimate_hidden_edge(const EdgeImage& image, const Side& side,
-                                                 const EdgeSearch& search,
-                                                 const HiddenEdgePrior& prior) {
+std::optional<StraightEdge> estimate_edge_hidden_by_dark_stripe(const EdgeImage& image,
+                                                                const Side& side,
+                                                                const EdgeSearch& search,
+                                                                const HiddenEdgePrior& prior) {
   constexpr double min_fraction = 0.8;
   const Samples all(image, side, search, true);
   if (all.samples.empty()) return std::nullopt;
   const HiddenEdge hidden(all.samples, search.blur_px);
-  const auto [ends_px, covariance_px] = average_ends(hidden, prior, search.reach_px);
+  const auto [ends_px, covariance_px] = average_edge_ends(hidden, prior, search.reach_px);
   const double fraction = hidden.compute_explained_fraction(ends_px);
   if (fraction < min_fraction) return std::nullopt;
-  const Eigen::Vector2d inwards = side.inwards() * image.per_px;
+  const Eigen::Vector2d inwards = side.inward_normal() * image.per_px;
   const Side found{side.from + ends_px[0] * inwards, side.to + ends_px[1] * inwards};
   return StraightEdge{found, covariance_px, search.blur_px, 0, fraction, {}};
 }

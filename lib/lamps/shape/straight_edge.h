@@ -19,14 +19,14 @@ namespace vlp {
 struct Side {
   Eigen::Vector2d from, to;
 
-  Eigen::Vector2d direction() const { return (to - from).normalized(); }
-  Eigen::Vector2d inwards() const {
-    const Eigen::Vector2d along = direction();
+  Eigen::Vector2d edge_direction() const { return (to - from).normalized(); }
+  Eigen::Vector2d inward_normal() const {
+    const Eigen::Vector2d along = edge_direction();
     return {-along.y(), along.x()};
   }
 };
 
-/// Image of a light and the plane in which its edges are straight.
+/// Image of a light, and the scale of LightShape's plane, in which its edges are straight.
 struct EdgeImage {
   const ImageView& lines;
   const LineLevels& levels;
@@ -103,8 +103,9 @@ std::optional<StraightEdge> fit_straight_edge(const EdgeImage& image, const Side
 /// on lit scanlines. The edge may lie outside the image; it has no `points`.
 ///
 /// @pre search.blur_px > 0
-std::optional<StraightEdge> estimate_hidden_edge(const EdgeImage& image, const Side& side,
-                                                 const EdgeSearch& search,
-                                                 const HiddenEdgePrior& prior);
+std::optional<StraightEdge> estimate_edge_hidden_by_dark_stripe(const EdgeImage& image,
+                                                                const Side& side,
+                                                                const EdgeSearch& search,
+                                                                const HiddenEdgePrior& prior);
 
 }  // namespace vlp

@@ -9,7 +9,7 @@
 
 namespace vlp {
 
-double compute_unknown_lens_sd_px(const Light& light, const ImageSize& image) {
+double predict_center_sd_without_lens_px(const Light& light, const ImageSize& image) {
   constexpr double max_lean_rad = rad_from_deg(10);
   if (light.shape == ShapeKind::rectangle) return 0;
   const double focal_px = std::hypot(image.width, image.height) / 2;

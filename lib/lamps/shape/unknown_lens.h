@@ -26,6 +26,6 @@ namespace vlp {
 /// the image's diagonal, on a camera tilted by 10 degrees. It is used as one standard deviation of
 /// the shift. Lenses of consumer cameras distort less, a fisheye of 180 degrees up to 2.5 times as
 /// much.
-double compute_unknown_lens_sd_px(const Light& light, const ImageSize& image);
+double predict_center_sd_without_lens_px(const Light& light, const ImageSize& image);
 
 }  // namespace vlp

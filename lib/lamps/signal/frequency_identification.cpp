@@ -31,8 +31,8 @@ std::optional<int> identify_lamp_by_frequency(const LampMap& lamps, double row_t
                                               const Stripes& stripes) {
   // Lamps keep their frequency to a few per cent. Few or unclear stripes, for example of partly
   // hidden lamps, require a smaller deviation.
-  const double max_off = is_reliable(stripes) ? 0.06 : kMaxUnclearDrift;
-  if (!is_readable(stripes) || !(stripes.period_lines > 0)) return std::nullopt;
+  const double max_off = are_stripes_reliable(stripes) ? 0.06 : kMaxUnclearDrift;
+  if (!are_stripes_readable(stripes) || !(stripes.period_lines > 0)) return std::nullopt;
   const double frequency_hz = 1 / (stripes.period_lines * row_time_s);
   std::vector<Candidate> candidates;
   candidates.reserve(lamps.lamps.size());

@@ -26,18 +26,19 @@ double compute_distance_squared(const Eigen::Matrix4d& covariance, const LampFea
   return difference.dot(covariance.llt().solve(difference));
 }
 
-LampFeatures standardized(const LampClassifier& classifier, const LampFeatures& features) {
+LampFeatures standardize_features(const LampClassifier& classifier, const LampFeatures& features) {
   return (features - classifier.mean).cwiseQuotient(classifier.scale);
 }
 
-void standardize(std::span<const LabeledLight> lights, LampClassifier& classifier) {
+void standardize_classes(std::span<const LabeledLight> lights, LampClassifier& classifier) {
   classifier.mean.setZero();
   classifier.scale.setZero();
   const auto n = static_cast<double>(lights.size());
   for (const LabeledLight& light : lights)
-    classifier.mean += compute_lamp_features(light.stripes) / n;
+    classifier.mean += compute_classifier_features(light.stripes) / n;
   for (const LabeledLight& light : lights) {
-    classifier.scale += (compute_lamp_features(light.stripes) - classifier.mean).cwiseAbs2() / n;
+    classifier.scale +=
+        (compute_classifier_features(light.stripes) - classifier.mean).cwiseAbs2() / n;
   }
   constexpr double minimum = 1e-6;  // for a constant feature
   classifier.scale = classifier.scale.cwiseSqrt().cwiseMax(minimum);
@@ -52,15 +53,16 @@ void fit(std::span<const LabeledLight> lights, const std::vector<bool>& used,
     auto& lamp = lamps.try_emplace(lights[i].lamp, none).first->second;
     if (!used[i]) continue;
     ++lamp.examples;
-    lamp.center += standardized(classifier, compute_lamp_features(lights[i].stripes));
+    lamp.center += standardize_features(classifier, compute_classifier_features(lights[i].stripes));
   }
   for (auto& [id, lamp] : lamps) lamp.center /= std::max(1, lamp.examples);
   classifier.covariance.setZero();
   double count = 0;
   for (std::size_t i = 0; i < lights.size(); ++i) {
     if (!used[i]) continue;
-    const LampFeatures off = standardized(classifier, compute_lamp_features(lights[i].stripes)) -
-                             lamps.at(lights[i].lamp).center;
+    const LampFeatures off =
+        standardize_features(classifier, compute_classifier_features(lights[i].stripes)) -
+        lamps.at(lights[i].lamp).center;
     classifier.covariance += off * off.transpose();
     ++count;
   }
@@ -77,14 +79,14 @@ void fit(std::span<const LabeledLight> lights, const std::vector<bool>& used,
 
 }  // namespace
 
-LampFeatures compute_lamp_features(const Stripes& stripes) {
+LampFeatures compute_classifier_features(const Stripes& stripes) {
   assert(stripes.period_lines > 0);
   return {std::log(stripes.period_lines), stripes.duty, stripes.count_per_line, stripes.lit_area};
 }
 
-LampClassifier train_classifier(std::span<const LabeledLight> lights) {
+LampClassifier fit_lamp_classifier(std::span<const LabeledLight> lights) {
   LampClassifier classifier;
-  standardize(lights, classifier);
+  standardize_classes(lights, classifier);
   std::vector<bool> used(lights.size(), true);
   constexpr int passes = 8;
   for (int pass = 0; pass < passes; ++pass) {
@@ -92,8 +94,9 @@ LampClassifier train_classifier(std::span<const LabeledLight> lights) {
     std::map<int, LampFeatures> centers;
     for (const auto& lamp : classifier.lamps) centers[lamp.lamp] = lamp.center;
     for (std::size_t i = 0; i < lights.size(); ++i) {
-      const LampFeatures off = standardized(classifier, compute_lamp_features(lights[i].stripes)) -
-                               centers.at(lights[i].lamp);
+      const LampFeatures off =
+          standardize_features(classifier, compute_classifier_features(lights[i].stripes)) -
+          centers.at(lights[i].lamp);
       constexpr double trimmed = 9;  // stricter than in use: outliers widen the covariance
       used[i] = compute_distance_squared(classifier.covariance, off) < trimmed;
     }
@@ -103,10 +106,10 @@ LampClassifier train_classifier(std::span<const LabeledLight> lights) {
 
 std::optional<int> identify_lamp(const LampClassifier& classifier, const Stripes& stripes) {
   constexpr double min_probability = 0.99, farthest = 6, farthest_unclear = 3;
-  const LampFeatures z = standardized(classifier, compute_lamp_features(stripes));
+  const LampFeatures z = standardize_features(classifier, compute_classifier_features(stripes));
   const Eigen::LLT<Eigen::Matrix4d> factor(classifier.covariance);
-  if (!is_readable(stripes)) return std::nullopt;
-  double nearest = std::pow(is_reliable(stripes) ? farthest : farthest_unclear, 2);
+  if (!are_stripes_readable(stripes)) return std::nullopt;
+  double nearest = std::pow(are_stripes_reliable(stripes) ? farthest : farthest_unclear, 2);
   const LampClassifier::Class* lamp = nullptr;
   std::vector<double> distances;
   distances.reserve(classifier.lamps.size());
@@ -136,7 +139,8 @@ std::vector<LampDistance> find_inseparable_lamps(const LampClassifier& classifie
   return pairs;
 }
 
-Confusion cross_validate(std::span<const LabeledLight> lights, const TrainClassifier& train) {
+Confusion cross_validate_lamp_classifier(std::span<const LabeledLight> lights,
+                                         const TrainClassifier& train) {
   std::set<int> lamps;
   for (const LabeledLight& light : lights) lamps.insert(light.lamp);
   const auto unknown = static_cast<Eigen::Index>(lamps.size());
@@ -164,29 +168,31 @@ namespace {
 constexpr const char* kFormat = "vlp-classifier/1";
 
 LampFeatures read_features(const YamlValue& value) {
-  return LampFeatures(value.numbers(kLampFeatures.size()).data());
+  return LampFeatures(value.get_numbers(kLampFeatures.size()).data());
 }
 
 void check_features(const YamlValue& value) {
-  const auto names = value.list();
+  const auto names = value.get_list();
   std::string known;
   for (const std::string_view name : kLampFeatures) {
     known.append(known.empty() ? "" : ", ").append(name);
   }
   bool same = names.size() == kLampFeatures.size();
-  for (std::size_t i = 0; same && i < names.size(); ++i) same = names[i].text() == kLampFeatures[i];
-  if (!same) throw value.error("should be [" + known + "]: train the classifier again");
+  for (std::size_t i = 0; same && i < names.size(); ++i)
+    same = names[i].get_text() == kLampFeatures[i];
+  if (!same) throw value.make_error("should be [" + known + "]: train the classifier again");
 }
 
 Eigen::Matrix4d read_covariance(const YamlValue& value) {
-  const auto rows = value.list();
-  if (rows.size() != kLampFeatures.size()) throw value.error("should be four rows of four numbers");
+  const auto rows = value.get_list();
+  if (rows.size() != kLampFeatures.size())
+    throw value.make_error("should be four rows of four numbers");
   Eigen::Matrix4d covariance;
   for (int row = 0; row < 4; ++row) {
     covariance.row(row) = read_features(rows[static_cast<std::size_t>(row)]).transpose();
   }
   if (covariance != covariance.transpose() || !invert_positive_definite(covariance)) {
-    throw value.error("is not a covariance: it should be symmetric and positive");
+    throw value.make_error("is not a covariance: it should be symmetric and positive");
   }
   return covariance;
 }
@@ -194,10 +200,10 @@ Eigen::Matrix4d read_covariance(const YamlValue& value) {
 LampClassifier::Class read_class(YamlMap map) {
   constexpr int largest = std::numeric_limits<int>::max();
   LampClassifier::Class lamp;
-  lamp.lamp = map.required("id").integer_within(0, largest);
-  lamp.examples = map.required("examples").integer_within(1, largest);
-  lamp.center = read_features(map.required("center"));
-  map.finish();
+  lamp.lamp = map.get_required_column("id").get_integer_within(0, largest);
+  lamp.examples = map.get_required_column("examples").get_integer_within(1, largest);
+  lamp.center = read_features(map.get_required_column("center"));
+  map.check_all_keys_read();
   return lamp;
 }
 
@@ -206,34 +212,34 @@ LampClassifier::Class read_class(YamlMap map) {
 LampClassifier read_lamp_classifier(const std::filesystem::path& file) {
   YamlMap document = read_yaml(file, kFormat);
   LampClassifier classifier;
-  if (const auto value = document.optional("row_time_s")) {
-    classifier.row_time_s = value->number_within(1e-8, 1e-3, "s");
+  if (const auto value = document.get_optional("row_time_s")) {
+    classifier.row_time_s = value->get_number_within(1e-8, 1e-3, "s");
   }
-  check_features(document.required("features"));
-  classifier.mean = read_features(document.required("mean"));
-  const YamlValue scale = document.required("scale");
+  check_features(document.get_required_column("features"));
+  classifier.mean = read_features(document.get_required_column("mean"));
+  const YamlValue scale = document.get_required_column("scale");
   classifier.scale = read_features(scale);
-  if (!(classifier.scale.minCoeff() > 0)) throw scale.error("should be positive");
-  const auto lamps = document.required("lamps");
-  classifier.covariance = read_covariance(document.required("covariance"));
-  document.finish();
-  for (const YamlValue& item : lamps.list()) {
-    const auto lamp = read_class(item.map());
+  if (!(classifier.scale.minCoeff() > 0)) throw scale.make_error("should be positive");
+  const auto lamps = document.get_required_column("lamps");
+  classifier.covariance = read_covariance(document.get_required_column("covariance"));
+  document.check_all_keys_read();
+  for (const YamlValue& item : lamps.get_list()) {
+    const auto lamp = read_class(item.get_mapping());
     for (const auto& other : classifier.lamps) {
       if (other.lamp == lamp.lamp) {
-        throw item.error("id " + std::to_string(lamp.lamp) + " occurs twice");
+        throw item.make_error("id " + std::to_string(lamp.lamp) + " occurs twice");
       }
     }
     classifier.lamps.push_back(lamp);
   }
-  if (classifier.lamps.empty()) throw lamps.error("contains no lamp");
+  if (classifier.lamps.empty()) throw lamps.make_error("contains no lamp");
   return classifier;
 }
 
 void write_lamp_classifier(const std::filesystem::path& file, const LampClassifier& classifier) {
   YAML::Emitter out;
   out << YAML::BeginMap;
-  emit_word(out, "format", kFormat);
+  emit_plain_word(out, "format", kFormat);
   if (classifier.row_time_s) emit_number(out, "row_time_s", *classifier.row_time_s);
   out << YAML::Key << "features" << YAML::Value << YAML::Flow << YAML::BeginSeq;
   for (const std::string_view name : kLampFeatures) out << std::string(name);
@@ -253,7 +259,7 @@ void write_lamp_classifier(const std::filesystem::path& file, const LampClassifi
   out << YAML::Key << "covariance" << YAML::Value << YAML::BeginSeq;
   for (int row = 0; row < 4; ++row) {
     const LampFeatures values = classifier.covariance.row(row).transpose();
-    emit_row(out, {values.data(), 4});
+    emit_inline_list(out, {values.data(), 4});
   }
   out << YAML::EndSeq << YAML::EndMap << YAML::Newline;
   write_file(file, out.c_str());

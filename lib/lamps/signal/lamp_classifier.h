@@ -32,7 +32,7 @@ inline constexpr std::array<std::string_view, 4> kLampFeatures{"log_period_lines
                                                                "count_per_line", "lit_area"};
 
 /// Returns the features of a light's stripes. @pre The stripes have a period.
-LampFeatures compute_lamp_features(const Stripes& stripes);
+LampFeatures compute_classifier_features(const Stripes& stripes);
 
 /// Light with the id of its lamp.
 struct LabeledLight {
@@ -76,15 +76,15 @@ inline constexpr int kMinExamples = 6;
 /// Excludes lights that are far from the others of their lamp, such as partly hidden ones. Shrinks
 /// C towards its diagonal with the weight of ten lights, and allows for a drift of the lamps by
 /// kLampDrift.
-LampClassifier train_classifier(std::span<const LabeledLight> lights);
+LampClassifier fit_lamp_classifier(std::span<const LabeledLight> lights);
 
 /// Returns the id of the lamp with these stripes. @pre The stripes have a period.
 ///
 /// Returns std::nullopt in these cases:
 /// - Another lamp is possible: the probability is below 99 %.
 /// - (z - c_k)^T C^-1 (z - c_k) exceeds 36 (3e-7 of normal lights), or 9 if the stripes are not
-///   is_reliable().
-/// - The stripes are not is_readable().
+///   are_stripes_reliable().
+/// - The stripes are not are_stripes_readable().
 std::optional<int> identify_lamp(const LampClassifier& classifier, const Stripes& stripes);
 
 /// Two lamps and their Mahalanobis distance, the square root of (c_j - c_k)^T C^-1 (c_j - c_k).
@@ -106,7 +106,7 @@ struct Confusion {
 
   int right() const { return counts.diagonal().sum(); }
   /// Returns the number of lights that are identified as another lamp.
-  int wrong() const { return counts.sum() - right() - unknown(); }
+  int count_wrongly_identified() const { return counts.sum() - right() - unknown(); }
   int unknown() const { return counts.rightCols<1>().sum(); }
 };
 
@@ -117,8 +117,9 @@ using TrainClassifier = std::function<LampClassifier(std::span<const LabeledLigh
 
 /// Computes the confusion matrix by cross-validation. `train` makes a classifier of all images but
 /// every fifth one; this classifier is applied to the lights of the held-out images. The folds are
-/// deterministic. `lights` as for train_classifier().
-Confusion cross_validate(std::span<const LabeledLight> lights, const TrainClassifier& train);
+/// deterministic. `lights` as for fit_lamp_classifier().
+Confusion cross_validate_lamp_classifier(std::span<const LabeledLight> lights,
+                                         const TrainClassifier& train);
 
 /// Reads a file of format `vlp-classifier/1`. Its keys are the names of the fields above, and
 /// `features`, which has to be kLampFeatures.

@@ -14,17 +14,17 @@
 namespace vlp {
 namespace {
 
-double exposure_lines(const StripeConditions& conditions) {
+double compute_exposure_lines(const StripeConditions& conditions) {
   return conditions.exposure_s.value_or(0) / conditions.row_time_s;
 }
 
 /// Returns the relative standard deviation of a lamp's period; 0 if the size of the lamp is
 /// unknown.
 double predict_lamp_period_sd(const Lamp& lamp, const StripeConditions& conditions) {
-  const auto lines = compute_lines_on_lamp(lamp, conditions);
+  const auto lines = compute_scanlines_on_lamp(lamp, conditions);
   if (!lines) return 0;
   const double period = 1 / (*lamp.frequency_hz * conditions.row_time_s);
-  return predict_relative_period_sd(period, *lines, exposure_lines(conditions));
+  return predict_relative_period_sd(period, *lines, compute_exposure_lines(conditions));
 }
 
 bool have_similar_duties(const Lamp& a, const Lamp& b) {
@@ -49,18 +49,18 @@ std::string list_rooms(const std::vector<std::string>& rooms) {
 
 }  // namespace
 
-bool share_frequency(const Lamp& a, const Lamp& b) {
+bool are_lamps_indistinguishable(const Lamp& a, const Lamp& b) {
   return a.frequency_hz && b.frequency_hz &&
          std::abs(std::log(*a.frequency_hz / *b.frequency_hz)) < kLampDrift &&
          have_similar_duties(a, b);
 }
 
-std::string explain_missing_room(const LampMapFile& lamps, const std::string& argument) {
+std::string explain_why_room_is_needed(const LampMapFile& lamps, const std::string& argument) {
   const auto& [file, map, rooms] = lamps;
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     for (std::size_t j = i + 1; j < map.lamps.size(); ++j) {
       if (rooms[i].empty() || rooms[j].empty() || rooms[i] == rooms[j]) continue;
-      if (!share_frequency(map.lamps[i], map.lamps[j])) continue;
+      if (!are_lamps_indistinguishable(map.lamps[i], map.lamps[j])) continue;
       return "lamps " + std::to_string(map.lamps[i].id) + " and " +
              std::to_string(map.lamps[j].id) +
              " share a frequency in two rooms: choose a room with " + argument +
@@ -70,7 +70,8 @@ std::string explain_missing_room(const LampMapFile& lamps, const std::string& ar
   return "";
 }
 
-std::optional<double> compute_lines_on_lamp(const Lamp& lamp, const StripeConditions& conditions) {
+std::optional<double> compute_scanlines_on_lamp(const Lamp& lamp,
+                                                const StripeConditions& conditions) {
   const double above_m = lamp.position_m.z() - conditions.camera_height_m;
   const auto& size_m = lamp.shape.size_m;
   if (!size_m || !conditions.focal_px || !(above_m > 0)) return std::nullopt;
@@ -98,7 +99,7 @@ std::vector<AmbiguousLamps> find_ambiguous_lamps(const LampMap& lamps,
       const double sd =
           std::max(predict_lamp_period_sd(a, conditions), predict_lamp_period_sd(b, conditions));
       const double needed = kLampDrift + 4 * sd;
-      // find_unreadable_lamps() reports lamps without a measurable period.
+      // find_lamps_with_unreadable_period() reports lamps without a measurable period.
       if (gap >= needed || !std::isfinite(needed)) continue;
       pairs.push_back({a.id, b.id, std::expm1(gap), std::expm1(needed)});
     }
@@ -106,14 +107,14 @@ std::vector<AmbiguousLamps> find_ambiguous_lamps(const LampMap& lamps,
   return pairs;
 }
 
-std::vector<UnreadableLamp> find_unreadable_lamps(const LampMap& lamps,
-                                                  const StripeConditions& conditions) {
+std::vector<UnreadableLamp> find_lamps_with_unreadable_period(const LampMap& lamps,
+                                                              const StripeConditions& conditions) {
   std::vector<UnreadableLamp> unreadable;
   for (const Lamp& lamp : lamps.lamps) {
     if (!lamp.frequency_hz) continue;
     const double phase = std::numbers::pi * *lamp.frequency_hz * conditions.exposure_s.value_or(0);
     const double contrast = phase > 0 ? std::abs(std::sin(phase) / phase) : 1;
-    const auto lines = compute_lines_on_lamp(lamp, conditions);
+    const auto lines = compute_scanlines_on_lamp(lamp, conditions);
     const double periods = lines ? kUsedHeight * *lines * *lamp.frequency_hz * conditions.row_time_s
                                  : std::numeric_limits<double>::infinity();
     const double period_lines = 1 / (*lamp.frequency_hz * conditions.row_time_s);

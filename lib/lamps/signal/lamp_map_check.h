@@ -26,7 +26,8 @@ struct StripeConditions {
 /// size is the shorter axis of the lamp, which is across the scanlines in the worst case. Only the
 /// fraction kUsedHeight of the scanlines is used. Returns std::nullopt without a size or a focal
 /// length, or if the lamp is not above the camera.
-std::optional<double> compute_lines_on_lamp(const Lamp& lamp, const StripeConditions& conditions);
+std::optional<double> compute_scanlines_on_lamp(const Lamp& lamp,
+                                                const StripeConditions& conditions);
 
 /// Predicts the relative standard deviation of the period that measure_stripes() measures on
 /// `lines` scanlines. A period is the slope of least-squares lines through the numbered begins and
@@ -47,13 +48,13 @@ double predict_relative_period_sd(double period_lines, double lines, double expo
 /// Returns whether two lamps cannot be distinguished: their frequencies differ by less than
 /// kLampDrift, and their duties are unknown or differ by less than twice kDutyMargin. Returns false
 /// if a lamp has no frequency.
-bool share_frequency(const Lamp& a, const Lamp& b);
+bool are_lamps_indistinguishable(const Lamp& a, const Lamp& b);
 
 /// Explains that a room has to be chosen, because two rooms have lamps with one frequency.
 ///
 /// @param argument  where the room is chosen, such as "the argument room of vlp_open_room()"
 /// @return          the message with the names of the rooms; empty if no room is needed
-std::string explain_missing_room(const LampMapFile& lamps, const std::string& argument);
+std::string explain_why_room_is_needed(const LampMapFile& lamps, const std::string& argument);
 
 /// Two lamps that cannot be distinguished reliably.
 struct AmbiguousLamps {
@@ -84,7 +85,7 @@ struct UnreadableLamp {
 
 /// Returns the lamps with a period below kMinPeriod_lines, less than kMinPeriods periods, or a
 /// contrast below kMinContrast.
-std::vector<UnreadableLamp> find_unreadable_lamps(const LampMap& lamps,
-                                                  const StripeConditions& conditions);
+std::vector<UnreadableLamp> find_lamps_with_unreadable_period(const LampMap& lamps,
+                                                              const StripeConditions& conditions);
 
 }  // namespace vlp

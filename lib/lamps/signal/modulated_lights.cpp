@@ -86,12 +86,12 @@ LineProfile compute_profile(const CellLevels& cells, const ModulationMap& map,
 }
 
 /// Fits a lamp's period within its drift.
-PeriodFit fit_lamp(const LineProfile& profile, double period_lines) {
+PeriodFit fit_period_of_lamp(const LineProfile& profile, double period_lines) {
   constexpr double finest = kLampDrift / 16;
-  PeriodFit best = fit_period(profile, period_lines);
+  PeriodFit best = fit_periodic_signal(profile, period_lines);
   const auto improve = [&](double drift) {
     if (std::abs(drift) > kLampDrift) return;
-    const PeriodFit fit = fit_period(profile, period_lines * (1 + drift));
+    const PeriodFit fit = fit_periodic_signal(profile, period_lines * (1 + drift));
     if (fit.unexplained < best.unexplained) best = fit;
   };
   for (double step = kLampDrift; step > finest; step /= 2) {
@@ -102,7 +102,7 @@ PeriodFit fit_lamp(const LineProfile& profile, double period_lines) {
   return best;
 }
 
-std::size_t find_best_lamp(const RegionCandidate& candidate) {
+std::size_t find_best_matching_lamp(const RegionCandidate& candidate) {
   const auto best = std::min_element(
       candidate.lamp_fits.begin(), candidate.lamp_fits.end(),
       [](const PeriodFit& a, const PeriodFit& b) { return a.unexplained < b.unexplained; });
@@ -131,7 +131,7 @@ using Claims = std::vector<const RegionCandidate*>;
 /// is a part or a mirror image of it.
 void assign_lamp(const Claims& claims, RegionCandidate& candidate) {
   if (candidate.lamp_fits.empty() || !candidate.is_modulated || candidate.is_other_period) return;
-  const std::size_t best = find_best_lamp(candidate);
+  const std::size_t best = find_best_matching_lamp(candidate);
   const PeriodFit& fit = candidate.lamp_fits[best];
   if (fit.unexplained > kMaxUnexplained) return;
   for (std::size_t i = 0; i < candidate.lamp_fits.size(); ++i) {
@@ -175,20 +175,21 @@ double count_periods(const RegionCandidate& candidate) {
   return std::max(0.0, candidate.region.box.height / candidate.fit.period_lines - 1);
 }
 
-RegionCandidate examine(const CellLevels& cells, const ModulationMap& map, ModulatedRegion region,
-                        std::span<const double> lamp_periods_lines, double min_period_lines) {
+RegionCandidate examine_region(const CellLevels& cells, const ModulationMap& map,
+                               ModulatedRegion region, std::span<const double> lamp_periods_lines,
+                               double min_period_lines) {
   RegionCandidate candidate{std::move(region), {}, {}, {}, {}, 0, false, false};
   double margin = min_period_lines;
   for (const double period : lamp_periods_lines) margin = std::max(margin, period);
   candidate.profile = compute_profile(cells, map, candidate.region, margin);
   const LineProfile& profile = candidate.profile;
-  candidate.fit = find_period(profile, min_period_lines);
+  candidate.fit = find_best_fitting_period(profile, min_period_lines);
   for (const double period : lamp_periods_lines) {
     candidate.lamp_fits.push_back(period < kMinPeriod_lines ? PeriodFit{period}
-                                                            : fit_lamp(profile, period));
+                                                            : fit_period_of_lamp(profile, period));
   }
   if (!lamp_periods_lines.empty()) {
-    const PeriodFit& lamp = candidate.lamp_fits[find_best_lamp(candidate)];
+    const PeriodFit& lamp = candidate.lamp_fits[find_best_matching_lamp(candidate)];
     candidate.is_other_period = compute_log_ratio(candidate.fit, lamp) > kMinLogRatio;
     if (!candidate.is_other_period) candidate.fit = lamp;
   }
@@ -225,8 +226,8 @@ struct LitArea {
 
 /// Adds the cells of a region that are above each fraction of `peak`.
 template <std::size_t n>
-void add_area(const ModulationMap& map, const ModulatedRegion& region, double peak,
-              const std::array<double, n>& fractions, std::array<LitArea, n>& areas) {
+void add_region_area(const ModulationMap& map, const ModulatedRegion& region, double peak,
+                     const std::array<double, n>& fractions, std::array<LitArea, n>& areas) {
   for (const auto& [step, begin, end] : region.spans) {
     const double line = map.line(step);
     for (int x = begin; x < end; x += kCellWidth_px) {
@@ -245,7 +246,8 @@ void add_area(const ModulationMap& map, const ModulatedRegion& region, double pe
 /// measure_stripes() if it agrees with the fitted period, and the fitted period otherwise.
 Stripes measure_candidate_stripes(const RegionCandidate& candidate) {
   const PeriodFit& fit = candidate.fit;
-  Stripes stripes = measure_stripes(divide_by_envelope(candidate.profile, fit.period_lines));
+  Stripes stripes =
+      measure_stripes(divide_profile_by_envelope(candidate.profile, fit.period_lines));
   if (!(std::abs(stripes.period_lines / fit.period_lines - 1) < 2 * kLampDrift)) {
     stripes.period_lines = fit.period_lines;
   }
@@ -280,7 +282,7 @@ ModulatedLight make_light(const ModulationMap& map,
     // Darker parts are light that the lamp casts on its surroundings.
     if (part->region.peak < double(kBorderFraction) * brightest.region.peak) continue;
     light.box = around(light.box, part->region.box);
-    add_area(map, part->region, brightest.region.peak, fractions, areas);
+    add_region_area(map, part->region, brightest.region.peak, fractions, areas);
   }
   light.energy = areas[0].energy;
   light.center = areas[0].center();
@@ -327,7 +329,7 @@ std::vector<ModulatedLight> join_candidates(const ModulationMap& map,
 
 /// Returns the periods for demodulation: those of the lamps, or a bank of overlapping filters if
 /// these are unknown.
-std::vector<double> choose_periods(std::span<const double> lamp_periods_lines, int lines) {
+std::vector<double> choose_search_periods(std::span<const double> lamp_periods_lines, int lines) {
   constexpr double bank_ratio = 1.15, min_bank_lines = 4;
   std::vector<double> periods;
   for (const double period : lamp_periods_lines) {
@@ -346,23 +348,24 @@ struct BoxSearch {
   std::vector<RegionCandidate> candidates;
 };
 
-std::optional<BoxSearch> search_box(const ImageView& lines, const PixelBox& box,
-                                    const Background& background,
-                                    std::span<const double> lamp_periods_lines) {
+std::optional<BoxSearch> search_box_for_stripes(const ImageView& lines, const PixelBox& box,
+                                                const Background& background,
+                                                std::span<const double> lamp_periods_lines) {
   // Noise of at least one gray level is assumed.
   constexpr double min_noise = 1;
-  const auto periods = choose_periods(lamp_periods_lines, box.height);
+  const auto periods = choose_search_periods(lamp_periods_lines, box.height);
   if (periods.empty()) return std::nullopt;
   const double shortest = *std::min_element(periods.begin(), periods.end());
   const int lines_per_bin = std::max(1, static_cast<int>(shortest / kBinsPerPeriod));
-  const CellLevels cells = average_cells(lines, box, background.level, lines_per_bin);
-  BoxSearch result{map_modulation(cells, periods), {}};
+  const CellLevels cells = average_pixels_over_cells(lines, box, background.level, lines_per_bin);
+  BoxSearch result{compute_modulation_map(cells, periods), {}};
   const double noise = std::max(min_noise, background.noise);
   for (ModulatedRegion& region :
-       find_modulated_regions(result.map, min_significant_amplitude(noise, shortest))) {
+       find_modulated_regions(result.map, compute_min_significant_amplitude(noise, shortest))) {
     if (region.cells < kMinCells) continue;
-    result.candidates.push_back(examine(cells, result.map, std::move(region), lamp_periods_lines,
-                                        std::max(kMinPeriod_lines, shortest / 2)));
+    result.candidates.push_back(examine_region(cells, result.map, std::move(region),
+                                               lamp_periods_lines,
+                                               std::max(kMinPeriod_lines, shortest / 2)));
   }
   return result;
 }
@@ -375,7 +378,7 @@ std::vector<ModulatedLight> find_modulated_lights(const ImageView& lines,
                                                   std::span<const double> lamp_periods_lines) {
   std::vector<BoxSearch> searches;
   for (const PixelBox& box : boxes) {
-    if (auto found = search_box(lines, box, background, lamp_periods_lines)) {
+    if (auto found = search_box_for_stripes(lines, box, background, lamp_periods_lines)) {
       searches.push_back(std::move(*found));
     }
   }

@@ -25,7 +25,7 @@ constexpr float kSaddleFraction = 0.6F;
 using CellArray = Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 template <typename Level>
-void sum_line(const Level* pixels, int width, float* sums, int cells) {
+void sum_scanline(const Level* pixels, int width, float* sums, int cells) {
   const int whole = width / kCellWidth_px;
   for (int c = 0; c < whole; ++c) {
     int sum = 0;
@@ -88,17 +88,17 @@ class Watershed {
   }
 
   /// Returns the basin of a cell; negative if it has none.
-  int find_basin(std::size_t cell) {
-    return labels_[cell] < 0 ? labels_[cell] : root(labels_[cell]);
+  int find_basin_of_cell(std::size_t cell) {
+    return labels_[cell] < 0 ? labels_[cell] : find_root(labels_[cell]);
   }
-  int peak_cell(int basin) const { return peaks_[std::size_t(basin)]; }
+  int find_peak_cell(int basin) const { return peaks_[std::size_t(basin)]; }
   std::size_t size() const { return parents_.size(); }
 
  private:
   static constexpr int kNone = -1, kBorder = -2;
 
   float peak(int basin) const { return map_.amplitude[std::size_t(peaks_[std::size_t(basin)])]; }
-  int root(int label) {
+  int find_root(int label) {
     while (parents_[std::size_t(label)] != label) label = parents_[std::size_t(label)];
     return label;
   }
@@ -114,7 +114,7 @@ class Watershed {
         const int label = labels_[map_.index(v, u)];
         beside_border = beside_border || label == kBorder;
         if (label < 0) continue;
-        const int other = root(label);
+        const int other = find_root(label);
         if (basin < 0 || other == basin) {
           basin = other;
           continue;
@@ -147,8 +147,8 @@ void add_cell(const ModulationMap& map, int step, int cell, ModulatedRegion& reg
 
 }  // namespace
 
-CellLevels average_cells(const ImageView& lines, const PixelBox& box, double dark_level,
-                         int lines_per_bin) {
+CellLevels average_pixels_over_cells(const ImageView& lines, const PixelBox& box, double dark_level,
+                                     int lines_per_bin) {
   CellLevels result{box,
                     (box.width + kCellWidth_px - 1) / kCellWidth_px,
                     (box.height + lines_per_bin - 1) / lines_per_bin,
@@ -160,7 +160,8 @@ CellLevels average_cells(const ImageView& lines, const PixelBox& box, double dar
     const int begin = bin * lines_per_bin, end = std::min(begin + lines_per_bin, box.height);
     for (int line = begin; line < end; ++line) {
       visit_levels(lines, [&](auto level) {
-        sum_line(lines.row<decltype(level)>(box.y + line) + box.x, box.width, sums, result.cells);
+        sum_scanline(lines.row<decltype(level)>(box.y + line) + box.x, box.width, sums,
+                     result.cells);
       });
     }
     const float scale = 1 / float((end - begin) * kCellWidth_px);
@@ -170,7 +171,8 @@ CellLevels average_cells(const ImageView& lines, const PixelBox& box, double dar
   return result;
 }
 
-ModulationMap map_modulation(const CellLevels& cells, std::span<const double> periods_lines) {
+ModulationMap compute_modulation_map(const CellLevels& cells,
+                                     std::span<const double> periods_lines) {
   ModulationMap map{cells.box,
                     cells.cells,
                     (cells.bins + kBinsPerStep - 1) / kBinsPerStep,
@@ -200,7 +202,7 @@ ModulationMap map_modulation(const CellLevels& cells, std::span<const double> pe
   return map;
 }
 
-double min_significant_amplitude(double noise, double period_lines) {
+double compute_min_significant_amplitude(double noise, double period_lines) {
   const double mean_square = 4 * noise * noise / kCellWidth_px * 2 / (3 * period_lines);
   return std::sqrt(-std::log(kFalseAlarmRate) * mean_square);
 }
@@ -225,12 +227,12 @@ std::vector<ModulatedRegion> find_modulated_regions(const ModulationMap& map,
   std::vector<ModulatedRegion> regions;
   for (int step = 0; step < map.steps; ++step) {
     for (int cell = 0; cell < map.cells; ++cell) {
-      const int basin = watershed.find_basin(map.index(step, cell));
+      const int basin = watershed.find_basin_of_cell(map.index(step, cell));
       if (basin < 0) continue;
       int& region = region_indices[std::size_t(basin)];
       if (region < 0) {
         region = static_cast<int>(regions.size());
-        const auto peak = std::size_t(watershed.peak_cell(basin));
+        const auto peak = std::size_t(watershed.find_peak_cell(basin));
         regions.push_back({{}, map.amplitude[peak], {}, 0});
       }
       add_cell(map, step, cell, regions[std::size_t(region)]);

@@ -26,8 +26,8 @@ struct CellLevels {
 };
 
 /// Averages the pixels of `box` over cells. Subtracts `dark_level`; darker cells are 0.
-CellLevels average_cells(const ImageView& lines, const PixelBox& box, double dark_level,
-                         int lines_per_bin);
+CellLevels average_pixels_over_cells(const ImageView& lines, const PixelBox& box, double dark_level,
+                                     int lines_per_bin);
 
 /// Amplitude of the modulation in a part of an image, for each cell and every second bin.
 struct ModulationMap {
@@ -52,13 +52,14 @@ struct ModulationMap {
 /// constant level and all harmonics of the period, the second a linear change of the level. `mean`
 /// is the same filter without the carrier, so that amplitude / mean is the modulation depth: 4 / pi
 /// for a square wave of duty 0.5. Scanlines outside the box count as dark.
-ModulationMap map_modulation(const CellLevels& cells, std::span<const double> periods_lines);
+ModulationMap compute_modulation_map(const CellLevels& cells,
+                                     std::span<const double> periods_lines);
 
 /// Returns the amplitude that noise of the dark level exceeds with the probability 1e-9 in one
 /// cell, at one period, in gray levels. The squared amplitude of white noise with the standard
 /// deviation `noise` per pixel is exponentially distributed. Its mean is 4 noise^2 sum w^2 /
 /// kCellWidth_px, with sum w^2 = 2 / (3 P).
-double min_significant_amplitude(double noise, double period_lines);
+double compute_min_significant_amplitude(double noise, double period_lines);
 
 /// Minimum amplitude of a cell of a region, as a fraction of the region's maximum.
 inline constexpr float kBorderFraction = 0.12F;

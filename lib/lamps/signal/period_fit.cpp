@@ -49,7 +49,7 @@ HarmonicCoefficients compute_harmonics(double angle_rad) {
   return basis;
 }
 
-double multiply(const HarmonicCoefficients& a, const HarmonicCoefficients& b) {
+double multiply_harmonics(const HarmonicCoefficients& a, const HarmonicCoefficients& b) {
   double sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
   return sum;
@@ -65,7 +65,7 @@ struct Envelope {
         largest(*std::max_element(levels.begin(), levels.end())) {}
 
   /// Returns the weight of a bin, up to 1; 0 if it has too little light.
-  double weight(std::size_t bin) const {
+  double compute_envelope_weight(std::size_t bin) const {
     const double fraction = levels[bin] / largest;
     return fraction < kMinEnvelope ? 0 : fraction;
   }
@@ -73,7 +73,7 @@ struct Envelope {
 
 }  // namespace
 
-PeriodFit fit_period(const LineProfile& profile, double period_lines) {
+PeriodFit fit_periodic_signal(const LineProfile& profile, double period_lines) {
   PeriodFit fit{period_lines};
   const double period = period_lines / profile.lines_per_bin;
   if (profile.levels.empty() || !(period > 1)) return fit;
@@ -85,7 +85,7 @@ PeriodFit fit_period(const LineProfile& profile, double period_lines) {
   double squares = 0;
   int lit = 0;
   for (std::size_t i = 0; i < profile.levels.size(); ++i) {
-    const double weight = envelope.weight(i);
+    const double weight = envelope.compute_envelope_weight(i);
     if (weight == 0) continue;
     ++lit;
     const double value = profile.levels[i] / envelope.levels[i] - 1;
@@ -97,26 +97,27 @@ PeriodFit fit_period(const LineProfile& profile, double period_lines) {
   const Cholesky<2 * kHarmonics> factor(normal);
   if (!factor.has_full_rank(1e-9)) return fit;
   const HarmonicCoefficients coefficients = factor.solve(normal.gradient);
-  fit.unexplained = std::clamp(1 - multiply(coefficients, normal.gradient) / squares, 0.0, 1.0);
+  fit.unexplained =
+      std::clamp(1 - multiply_harmonics(coefficients, normal.gradient) / squares, 0.0, 1.0);
   fit.depth = std::hypot(coefficients[0], coefficients[1]);
   fit.phase_rad = std::atan2(coefficients[1], coefficients[0]);
   return fit;
 }
 
-std::vector<double> divide_by_envelope(const LineProfile& profile, double period_lines) {
+std::vector<double> divide_profile_by_envelope(const LineProfile& profile, double period_lines) {
   std::vector<double> signal;
   if (profile.levels.empty()) return signal;
   const Envelope envelope(profile, period_lines / profile.lines_per_bin);
   if (!(envelope.largest > 0)) return signal;
   for (std::size_t i = 0; i < profile.levels.size(); ++i) {
-    if (envelope.weight(i) == 0) continue;
+    if (envelope.compute_envelope_weight(i) == 0) continue;
     const double value = profile.levels[i] / envelope.levels[i];
     signal.insert(signal.end(), std::size_t(profile.lines_per_bin), value);
   }
   return signal;
 }
 
-PeriodFit find_period(const LineProfile& profile, double min_period_lines) {
+PeriodFit find_best_fitting_period(const LineProfile& profile, double min_period_lines) {
   constexpr double min_periods = 1.3;
   // A fit over N periods loses half of the signal if the period has a relative error of 0.6 / N.
   constexpr double step_fraction = 0.15;
@@ -126,7 +127,7 @@ PeriodFit find_period(const LineProfile& profile, double min_period_lines) {
   if (profile.levels.empty()) return best;
   constexpr double max_periods = 100;
   const auto improve = [&](double period_lines) {
-    const PeriodFit fit = fit_period(profile, period_lines);
+    const PeriodFit fit = fit_periodic_signal(profile, period_lines);
     if (fit.unexplained < best.unexplained) best = fit;
   };
   for (double period = std::max(min_period_lines, lines / max_periods);

@@ -38,14 +38,14 @@ struct PeriodFit {
 /// E(l), over scanlines where E exceeds 8 % of its maximum. A period longer than the lit scanlines
 /// fits most signals and cannot be excluded. Returns a fit with `unexplained` 1 if the scanlines do
 /// not determine the coefficients.
-PeriodFit fit_period(const LineProfile& profile, double period_lines);
+PeriodFit fit_periodic_signal(const LineProfile& profile, double period_lines);
 
-/// Divides a profile by its envelope for this period, see fit_period(). Returns one value for each
-/// scanline with sufficient light; the brightest are about 1 / duty.
-std::vector<double> divide_by_envelope(const LineProfile& profile, double period_lines);
+/// Divides a profile by its envelope for this period, see fit_periodic_signal(). Returns one value
+/// for each scanline with sufficient light; the brightest are about 1 / duty.
+std::vector<double> divide_profile_by_envelope(const LineProfile& profile, double period_lines);
 
 /// Fits all periods from `min_period_lines` up to that of which the profile shows 1.3 periods, and
 /// returns the best fit. Skips periods of less than a hundredth of the profile.
-PeriodFit find_period(const LineProfile& profile, double min_period_lines);
+PeriodFit find_best_fitting_period(const LineProfile& profile, double min_period_lines);
 
 }  // namespace vlp

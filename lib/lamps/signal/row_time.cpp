@@ -16,8 +16,8 @@
 namespace vlp {
 namespace {
 
-PeriodGroup make_group(std::span<const MeasuredPeriod> lights, std::vector<std::size_t> members,
-                       std::optional<int> lamp) {
+PeriodGroup make_period_group(std::span<const MeasuredPeriod> lights,
+                              std::vector<std::size_t> members, std::optional<int> lamp) {
   std::vector<double> log_periods, duties;
   log_periods.reserve(members.size());
   for (const std::size_t member : members) {
@@ -75,7 +75,7 @@ double compute_weight(const PeriodGroup& group, double residual) {
 /// Assignment of period groups to the lamps of a map under one row time.
 struct PeriodMatch {
   double log_row_time;
-  /// Cost of the assignment, see estimate_row_time().
+  /// Cost of the assignment, see estimate_row_time_candidates().
   double cost;
   /// Residual of each group in log period; std::nullopt if no lamp is assigned.
   std::vector<std::optional<double>> residuals;
@@ -100,14 +100,14 @@ class PeriodMatching {
 
   /// Returns a refined match for every row time that maps the frequency of a lamp to the period of
   /// a group.
-  std::vector<PeriodMatch> matches() const {
+  std::vector<PeriodMatch> find_row_time_matches() const {
     std::vector<PeriodMatch> all;
     for (const PeriodGroup& group : groups_) {
       for (const auto& [log_frequency, lamps] : lamps_) {
         if (group.lamp && std::ranges::find(lamps, *group.lamp) == lamps.end()) continue;
         const double start = -group.log_period - log_frequency;
         if (start < std::log(kMinRowTime_s) || start > std::log(kMaxRowTime_s)) continue;
-        all.push_back(refine_match(start));
+        all.push_back(refine_row_time_match(start));
       }
     }
     return all;
@@ -116,9 +116,9 @@ class PeriodMatching {
  private:
   using LampsByLogFrequency = std::map<double, std::vector<int>>;
 
-  PeriodMatch refine_match(double log_row_time) const {
+  PeriodMatch refine_row_time_match(double log_row_time) const {
     constexpr int steps = 20;
-    PeriodMatch match = evaluate_match(log_row_time);
+    PeriodMatch match = evaluate_row_time_match(log_row_time);
     for (int step = 0; step < steps; ++step) {
       double weights = 0, sum = 0;
       for (std::size_t i = 0; i < groups_.size(); ++i) {
@@ -128,19 +128,19 @@ class PeriodMatching {
         sum += weight * *match.residuals[i];
       }
       if (!(weights > 0)) break;
-      match = evaluate_match(match.log_row_time + sum / weights);
+      match = evaluate_row_time_match(match.log_row_time + sum / weights);
     }
     return match;
   }
 
-  PeriodMatch evaluate_match(double log_row_time) const {
+  PeriodMatch evaluate_row_time_match(double log_row_time) const {
     PeriodMatch match{log_row_time, 0, {}, {}};
     match.residuals.resize(groups_.size());
     match.lamps.resize(groups_.size());
     std::map<double, std::size_t> taken;  // frequency -> group
     std::vector<LampsByLogFrequency::const_iterator> nearest(groups_.size(), lamps_.end());
     for (std::size_t i = 0; i < groups_.size(); ++i) {
-      nearest[i] = find_nearest_frequency(groups_[i], log_row_time);
+      nearest[i] = find_lamps_of_nearest_frequency(groups_[i], log_row_time);
       if (nearest[i] == lamps_.end()) continue;
       const double residual = -groups_[i].log_period - nearest[i]->first - log_row_time;
       if (std::abs(residual) > kFarthest) continue;
@@ -159,13 +159,13 @@ class PeriodMatching {
       match.cost += compute_cost(groups_[i], match.residuals[i].value_or(kFarthest));
       if (!match.residuals[i]) continue;
       match.lamps[i] = groups_[i].lamp ? std::vector{*groups_[i].lamp} : nearest[i]->second;
-      match.cost += compute_duty_cost(groups_[i], match.lamps[i]);
+      match.cost += compute_duty_cycle_cost(groups_[i], match.lamps[i]);
     }
     return match;
   }
 
-  LampsByLogFrequency::const_iterator find_nearest_frequency(const PeriodGroup& group,
-                                                             double log_row_time) const {
+  LampsByLogFrequency::const_iterator find_lamps_of_nearest_frequency(const PeriodGroup& group,
+                                                                      double log_row_time) const {
     if (group.lamp) {
       const auto known = log_frequency_.find(*group.lamp);
       return known == log_frequency_.end() ? lamps_.end() : lamps_.find(known->second);
@@ -180,7 +180,7 @@ class PeriodMatching {
   }
 
   /// Returns the cost of the group's duty if the group is one of these lamps.
-  double compute_duty_cost(const PeriodGroup& group, const std::vector<int>& lamps) const {
+  double compute_duty_cycle_cost(const PeriodGroup& group, const std::vector<int>& lamps) const {
     if (duty_.empty() || !group.duty) return 0;
     double min_difference = std::numeric_limits<double>::infinity();
     for (const int lamp : lamps)
@@ -222,7 +222,7 @@ std::string format_microseconds(double row_time_s) {
 
 }  // namespace
 
-std::vector<PeriodGroup> group_periods(std::span<const MeasuredPeriod> lights) {
+std::vector<PeriodGroup> group_lights_by_period(std::span<const MeasuredPeriod> lights) {
   std::map<int, std::vector<std::size_t>> labeled;
   std::vector<std::size_t> others;
   for (std::size_t i = 0; i < lights.size(); ++i) {
@@ -231,7 +231,7 @@ std::vector<PeriodGroup> group_periods(std::span<const MeasuredPeriod> lights) {
   std::vector<PeriodGroup> groups;
   groups.reserve(labeled.size());
   for (auto& [lamp, members] : labeled) {
-    groups.push_back(make_group(lights, std::move(members), lamp));
+    groups.push_back(make_period_group(lights, std::move(members), lamp));
   }
   std::sort(others.begin(), others.end(), [&](std::size_t a, std::size_t b) {
     return lights[a].period_lines < lights[b].period_lines;
@@ -242,20 +242,21 @@ std::vector<PeriodGroup> group_periods(std::span<const MeasuredPeriod> lights) {
     std::vector<std::size_t> group = remove_densest_group(lights, others);
     largest = std::max(largest, group.size());
     if (10 * group.size() < largest || 50 * group.size() < all) break;
-    groups.push_back(make_group(lights, std::move(group), std::nullopt));
+    groups.push_back(make_period_group(lights, std::move(group), std::nullopt));
   }
   return groups;
 }
 
-RowTimeCandidates estimate_row_time(std::span<const MeasuredPeriod> lights, const LampMap& lamps) {
-  RowTimeCandidates found{group_periods(lights), {}, {}};
+RowTimeCandidates estimate_row_time_candidates(std::span<const MeasuredPeriod> lights,
+                                               const LampMap& lamps) {
+  RowTimeCandidates found{group_lights_by_period(lights), {}, {}};
   if (found.groups.empty()) {
     found.problem =
         "no light has clear stripes: add captures with lamps nearer, larger or sharper, and with a "
         "short exposure";
     return found;
   }
-  std::vector<PeriodMatch> matches = PeriodMatching(found.groups, lamps).matches();
+  std::vector<PeriodMatch> matches = PeriodMatching(found.groups, lamps).find_row_time_matches();
   if (matches.empty()) {
     found.problem =
         "no lamp of the map has one of the measured periods: are its frequencies right?";
@@ -276,8 +277,8 @@ RowTimeCandidates estimate_row_time(std::span<const MeasuredPeriod> lights, cons
   return found;
 }
 
-RowTimeResult choose_row_time(const RowTimeCandidates& found,
-                              std::span<const double> position_costs) {
+RowTimeResult select_row_time_candidate(const RowTimeCandidates& found,
+                                        std::span<const double> position_costs) {
   if (found.candidates.empty()) return {{}, found.problem};
   assert(position_costs.empty() || position_costs.size() == found.candidates.size());
   std::vector<std::pair<double, const RowTimeCandidate*>> ranked;

@@ -37,7 +37,7 @@ struct PeriodGroup {
 /// 1.5 % of the period with most neighbors. Discards groups with less than a tenth of the lights of
 /// the largest group, or with less than one in fifty of these lights, because they are partly
 /// hidden lights.
-std::vector<PeriodGroup> group_periods(std::span<const MeasuredPeriod> lights);
+std::vector<PeriodGroup> group_lights_by_period(std::span<const MeasuredPeriod> lights);
 
 struct RowTime {
   double row_time_s;
@@ -52,7 +52,7 @@ struct RowTime {
 /// Row time that explains the measured periods, with the assignment of groups to lamps.
 struct RowTimeCandidate {
   RowTime row_time;
-  /// Cost, see estimate_row_time().
+  /// Cost, see estimate_row_time_candidates().
   double cost;
   /// Possible lamps of each group, by the index of the group: those with the resulting frequency;
   /// empty if no lamp has it.
@@ -102,7 +102,8 @@ inline constexpr double kMaxResidualSds = 20;
 ///
 /// @return  the row times that differ by 2 % or more and cost less than the best one plus
 ///        kClearCost; a problem if there is none
-RowTimeCandidates estimate_row_time(std::span<const MeasuredPeriod> lights, const LampMap& lamps);
+RowTimeCandidates estimate_row_time_candidates(std::span<const MeasuredPeriod> lights,
+                                               const LampMap& lamps);
 
 /// Selects the candidate with the smallest cost.
 ///
@@ -110,7 +111,7 @@ RowTimeCandidates estimate_row_time(std::span<const MeasuredPeriod> lights, cons
 ///        empty if unknown
 /// @return  a problem if another candidate costs less than kClearCost more, for example if all
 ///        ratios of frequencies are equal, or if less than half of the groups have a lamp
-RowTimeResult choose_row_time(const RowTimeCandidates& found,
-                              std::span<const double> position_costs = {});
+RowTimeResult select_row_time_candidate(const RowTimeCandidates& found,
+                                        std::span<const double> position_costs = {});
 
 }  // namespace vlp

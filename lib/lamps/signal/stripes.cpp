@@ -98,7 +98,7 @@ std::optional<double> fit_period_to_crossings(const std::vector<double>& signal,
 
 /// Returns the fraction of the disc's area on scanlines brighter than `middle`, for chords in the
 /// middle of the disc.
-double lit_area(const std::vector<double>& signal, double middle) {
+double compute_lit_area_fraction(const std::vector<double>& signal, double middle) {
   const auto n = static_cast<double>(signal.size());
   double lit = 0, all = 0;
   for (std::size_t i = 0; i < signal.size(); ++i) {
@@ -112,11 +112,11 @@ double lit_area(const std::vector<double>& signal, double middle) {
 
 }  // namespace
 
-bool is_reliable(const Stripes& stripes) {
+bool are_stripes_reliable(const Stripes& stripes) {
   return stripes.periodicity_r2 > kMinPeriodicity && stripes.periods > kMinReliablePeriods;
 }
 
-bool is_readable(const Stripes& stripes) {
+bool are_stripes_readable(const Stripes& stripes) {
   return stripes.is_regular || stripes.periodicity_r2 > kMinPeriodicity;
 }
 
@@ -167,7 +167,7 @@ Stripes measure_stripes(const std::vector<double>& signal) {
   const std::size_t edges =
       find_crossings(signal, middle, true).size() + find_crossings(signal, middle, false).size();
   stripes.count_per_line = static_cast<double>(edges) / (2 * n);
-  stripes.lit_area = lit_area(signal, middle);
+  stripes.lit_area = compute_lit_area_fraction(signal, middle);
   return stripes;
 }
 
@@ -213,8 +213,8 @@ std::vector<PixelRun> find_chords_in_ellipse(const Eigen::Vector2d& low,
   return chords;
 }
 
-std::vector<double> compute_line_signal(const ImageView& image, const std::vector<PixelRun>& chords,
-                                        double dark) {
+std::vector<double> compute_scanline_signal(const ImageView& image,
+                                            const std::vector<PixelRun>& chords, double dark) {
   std::vector<double> signal;
   signal.reserve(chords.size());
   for (PartLevels& parts : measure_parts(image, chords, dark)) {
@@ -224,8 +224,8 @@ std::vector<double> compute_line_signal(const ImageView& image, const std::vecto
   return signal;
 }
 
-double compute_coherence(const ImageView& lines, const std::vector<PixelRun>& chords,
-                         const Background& background, double period_lines) {
+double compute_stripe_coherence(const ImageView& lines, const std::vector<PixelRun>& chords,
+                                const Background& background, double period_lines) {
   constexpr double fraction = 0.05;
   constexpr std::size_t min_values = 3;
   const std::vector<PartLevels> levels = measure_parts(lines, chords, background.level);

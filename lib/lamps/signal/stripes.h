@@ -15,7 +15,8 @@ namespace vlp {
 /// Minimum period of stripes, in scanlines; the theoretical limit is two scanlines.
 inline constexpr double kMinPeriod_lines = 2.2;
 
-/// Minimum contrast of a modulated light, and minimum number of periods of an identified one.
+/// Minimum contrast (bright - dark) / bright of a modulated light, and minimum number of periods of
+/// an identified one.
 inline constexpr double kMinContrast = 0.2, kMinPeriods = 1.3;
 
 /// Number of periods below which patterns without stripes may match a lamp by chance.
@@ -31,8 +32,8 @@ std::vector<PixelRun> find_chords_in_ellipse(const Eigen::Vector2d& low,
 
 /// Computes the level of each chord of a light above `dark`. Suppresses partial occlusion and
 /// specks: the level is that of the second brightest of five parts.
-std::vector<double> compute_line_signal(const ImageView& image, const std::vector<PixelRun>& chords,
-                                        double dark);
+std::vector<double> compute_scanline_signal(const ImageView& image,
+                                            const std::vector<PixelRun>& chords, double dark);
 
 /// Stripes of a light and their statistics.
 struct Stripes {
@@ -56,13 +57,13 @@ struct Stripes {
 
 /// Returns true if the stripes are clear and numerous: periodicity above 0.7 and more than
 /// kMinReliablePeriods periods. Stripes of a partly hidden lamp are not.
-bool is_reliable(const Stripes& stripes);
+bool are_stripes_reliable(const Stripes& stripes);
 
 /// Returns true if the period is meaningful: the stripes are regular, or their periodicity exceeds
 /// 0.7. An object that hides a part of a lamp creates stripes that match another lamp by chance.
-bool is_readable(const Stripes& stripes);
+bool are_stripes_readable(const Stripes& stripes);
 
-/// Measures the stripes of a signal, the result of compute_line_signal(). For a disc it covers
+/// Measures the stripes of a signal, the result of compute_scanline_signal(). For a disc it covers
 /// `kUsedHeight` of the radius above and below the middle. The period is first that of the
 /// best-fitting sine with a constant (least squares, Lomb 1976), between kMinPeriod_lines and
 /// the length of the signal. If the begins and ends of the stripes agree with it, they determine
@@ -95,7 +96,7 @@ inline constexpr double kMinCoherence = 0.85;
 /// Independent parts with three independent scanlines, as in one and a half periods, each reach
 /// kMinCoherence with a probability of (1 - 0.85) / 2, and four of five together with 1.5e-4.
 /// Tilted bars reach it within 7 degrees if a light shows two of them.
-double compute_coherence(const ImageView& lines, const std::vector<PixelRun>& chords,
-                         const Background& background, double period_lines);
+double compute_stripe_coherence(const ImageView& lines, const std::vector<PixelRun>& chords,
+                                const Background& background, double period_lines);
 
 }  // namespace vlp

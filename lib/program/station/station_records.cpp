@@ -35,7 +35,7 @@ constexpr const char* kAny = "any";
 
 /// Prints a line to stdout. Escapes control characters, so that names in records can neither add a
 /// line nor control the terminal.
-void print_line(const std::string& text) { fmt::print("{}\n", printable_line(text)); }
+void print_line(const std::string& text) { fmt::print("{}\n", escape_for_single_line(text)); }
 
 /// Opens the runs of a station, or of records alone. Reports the state of the spool. If the records
 /// are unavailable, commands that continue without them report it (warn_if_unavailable()).
@@ -45,28 +45,28 @@ std::unique_ptr<KnownRuns> open_runs(const StationRecordsOptions& options) {
   }
   try {
     if (options.station.empty()) return std::make_unique<KnownRuns>(options.records);
-    auto known = std::make_unique<KnownRuns>(read_station(options.station));
+    auto known = std::make_unique<KnownRuns>(read_station_config(options.station));
     const std::string state = known->spool()->state();
     if (!state.empty()) {
-      spdlog::log(known->are_offline() ? spdlog::level::debug : spdlog::level::warn, "{}",
-                  printable(state));
+      spdlog::log(known->are_records_offline() ? spdlog::level::debug : spdlog::level::warn, "{}",
+                  escape_for_terminal(state));
     }
     return known;
   } catch (const RecordsUnavailable& error) {
-    if (error.details != error.what()) spdlog::debug("{}", printable(error.details));
+    if (error.details != error.what()) spdlog::debug("{}", escape_for_terminal(error.details));
     throw;
   }
 }
 
 /// Reports that a command used the runs in the spool because the records are unavailable.
 void warn_if_unavailable(KnownRuns& known) {
-  if (known.spool() != nullptr && known.are_offline()) {
-    spdlog::warn("{}", printable(known.spool()->notice()));
+  if (known.spool() != nullptr && known.are_records_offline()) {
+    spdlog::warn("{}", escape_for_terminal(known.spool()->make_operator_notice()));
   }
 }
 
 /// Returns the filter with "any" replaced by no condition.
-RunFilter replace_any(RunFilter filter) {
+RunFilter remove_conditions_any(RunFilter filter) {
   for (std::string* text : {&filter.station, &filter.verdict, &filter.kind}) {
     if (*text == kAny) text->clear();
   }
@@ -74,33 +74,35 @@ RunFilter replace_any(RunFilter filter) {
 }
 
 /// Returns the filter of the options: runs of --station, unless --of-station is given.
-RunFilter requested_runs(const StationRecordsOptions& options, const KnownRuns& known) {
+RunFilter make_filter_of_options(const StationRecordsOptions& options, const KnownRuns& known) {
   RunFilter filter = options.filter;
   if (filter.station.empty() && known.station() != nullptr) {
     filter.station = known.station()->station;
   }
-  return replace_any(std::move(filter));
+  return remove_conditions_any(std::move(filter));
 }
 
 /// Returns the named run, or the last that the filter accepts.
 RunRecord load_archive_run(KnownRuns& known, const StationRecordsOptions& options) {
-  RunRecord run =
-      options.run.empty() ? known.last(requested_runs(options, known)) : known.find(options.run);
+  RunRecord run = options.run.empty() ? known.find_last_run(make_filter_of_options(options, known))
+                                      : known.find(options.run);
   warn_if_unavailable(known);
   return run;
 }
 
-/// Returns requested_runs() restricted to units, unless --kind is given.
-RunFilter comparable_runs(const StationRecordsOptions& options, const KnownRuns& known) {
-  RunFilter filter = requested_runs(options, known);
+/// Returns make_filter_of_options() restricted to units, unless --kind is given.
+RunFilter make_filter_of_comparable_runs(const StationRecordsOptions& options,
+                                         const KnownRuns& known) {
+  RunFilter filter = make_filter_of_options(options, known);
   if (options.filter.kind.empty()) filter.kind = "unit";
   return filter;
 }
 
 /// Checks that all points are from one station, if neither options nor filter name a station.
-void check_one_station(const std::vector<TrendPoint>& points,
-                       const StationRecordsOptions& options) {
-  if (options.station.empty() && options.filter.station.empty()) check_one_station(points);
+void check_points_of_one_station(const std::vector<TrendPoint>& points,
+                                 const StationRecordsOptions& options) {
+  if (options.station.empty() && options.filter.station.empty())
+    check_points_of_one_station(points);
 }
 
 /// Checks that --output is not an input of the command: the records, station.yaml, or a file named
@@ -112,13 +114,13 @@ void check_output_option(const StationRecordsOptions& options, const KnownRuns& 
     inputs.push_back(station->records);
     for (const auto& file : station->inputs) inputs.push_back(file.string());
   }
-  check_output(options.output, inputs);
+  check_output_file(options.output, inputs);
 }
 
 /// Returns the folder for the files of a run.
 std::filesystem::path find_results_folder(const StationRecordsOptions& options) {
   if (!options.output.empty()) return options.output;
-  if (!options.station.empty()) return read_station(options.station).results;
+  if (!options.station.empty()) return read_station_config(options.station).results;
   throw std::invalid_argument("the output folder is not specified; give --station or --output");
 }
 
@@ -160,16 +162,16 @@ void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
   const auto references = parse_references(options.references);
   const auto known = open_runs(options);
   check_output_option(options, *known);
-  const auto points =
-      load_judged_values(known->records(), options.metric, comparable_runs(options, *known));
-  check_one_station(points, options);
+  const auto points = load_judged_values(known->records(), options.metric,
+                                         make_filter_of_comparable_runs(options, *known));
+  check_points_of_one_station(points, options);
   const auto values = select_reference_values(points, references);
   std::vector<std::string> units;
   units.reserve(references.size());
   for (const auto& [unit, reference] : references) units.push_back(unit);
   const BiasStudy study = run_study([&] {
     check_runs_share_no_images(known->records(), points, select_study_values(points, units));
-    return analyze_bias(values);
+    return analyze_bias_and_linearity(values);
   });
   constexpr const char* head = "{:<20}{:>10}{:>6}{:>12}{:>12}{:>9}{:>9}   {}";
   print_line(fmt::format("{}: bias against {} reference units, {}", options.metric,
@@ -194,17 +196,18 @@ void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
     fmt::print("residual sd {:.4g}, R^2 {:.1f} %\n\n{:<20}{:>10}{:>18}   95 % band\n",
                linearity.residual_sd, 100 * linearity.r_squared, "", "reference", "line");
     for (const UnitBias& unit : study.units) {
-      const double at = linearity.bias_at(unit.reference), half = linearity.band_at(unit.reference);
+      const double at = linearity.predict_bias_at(unit.reference),
+                   half = linearity.confidence_band_at(unit.reference);
       print_line(fmt::format("{:<20}{:>10.4g}{:>18.4g}   {:.4g} to {:.4g}{}", unit.unit,
                              unit.reference, at, at - half, at + half,
                              std::abs(at) > half ? "   without 0" : ""));
     }
   }
-  if (!options.output.empty()) draw_bias(options.output, options.metric, values, study);
+  if (!options.output.empty()) write_bias_plot(options.output, options.metric, values, study);
 }
 
 /// Returns true if the filter keeps all runs of a camera, so that its first one is known.
-bool has_all_runs(const RunFilter& filter) {
+bool includes_all_runs_of_camera(const RunFilter& filter) {
   return filter.verdict.empty() && filter.operator_name.empty() && filter.shift.empty() &&
          filter.since.empty() && filter.until.empty() && filter.last == 0;
 }
@@ -213,8 +216,8 @@ bool has_all_runs(const RunFilter& filter) {
 
 void print_runs(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
-  RunFilter filter = requested_runs(options, *known);
-  const auto runs = known->list(filter);
+  RunFilter filter = make_filter_of_options(options, *known);
+  const auto runs = known->list_runs(filter);
   constexpr const char* line = "{:<34} {:<20} {:<8} {:<7} {:<12} {:<16} {}";
   print_line(
       fmt::format(line, "run", "ended (UTC)", "verdict", "kind", "station", "camera", "cause"));
@@ -230,16 +233,17 @@ void print_runs(const StationRecordsOptions& options) {
              counts.failed, counts.invalid);
   if (counts.voided > 0) fmt::print(", {} voided", counts.voided);
   constexpr double percent = 100;
-  if (const auto yield = counts.yield()) {
+  if (const auto yield = counts.compute_yield()) {
     fmt::print(": yield {:.1f} % of {}", percent * *yield, counts.units_judged);
   }
   fmt::print("\n");
-  if (const auto yield = counts.first_pass_yield(); yield && has_all_runs(options.filter)) {
+  if (const auto yield = counts.compute_first_pass_yield();
+      yield && includes_all_runs_of_camera(options.filter)) {
     fmt::print("{} cameras, {} with more than one judged run: first-pass yield {:.1f} %\n",
                counts.cameras, counts.cameras_reworked, percent * *yield);
   }
   filter.has_open_hook = true;
-  const auto open = known->list(filter);
+  const auto open = known->list_runs(filter);
   const auto without = std::ranges::count_if(runs, [&](const RunSummary& run) {
     return std::ranges::find(open, run.run, &RunSummary::run) != open.end();
   });
@@ -260,14 +264,14 @@ void print_run(const StationRecordsOptions& options) {
     print_line(fmt::format("{:<28}{:>12.4g} {}", metric.name, *metric.value, metric.unit));
   }
   fmt::print("\n");
-  for (const RunField& field : run_fields()) {
+  for (const RunField& field : list_run_text_fields()) {
     if (field.label == nullptr || (record.*field.text).empty()) continue;
     print_line(fmt::format("{:<11}{}", field.label, record.*field.text));
   }
   fmt::print("images     {}, {} used\n", record.images.size(), record.count_used_images());
   for (const RunEvent& event : record.events) {
     const std::string who = event.who.empty() ? "" : event.who + ": ";
-    print_line(fmt::format("{:<11} {} {}{}", event.what, event.utc(), who, event.text));
+    print_line(fmt::format("{:<11} {} {}{}", event.what, event.utc_text(), who, event.text));
   }
 }
 
@@ -280,30 +284,30 @@ void restore_run(const StationRecordsOptions& options) {
   print_line(publish_run(record, {}, results, ExistingReport::replace).string());
 }
 
-void write_certificate(const StationRecordsOptions& options) {
+void write_calibration_certificate(const StationRecordsOptions& options) {
   const std::filesystem::path results = find_results_folder(options);
   const auto known = open_runs(options);
   const RunRecord record = load_archive_run(*known, options);
-  print_line(write_certificate(record, results).string());
+  print_line(write_calibration_certificate(record, results).string());
 }
 
-void clean_expired_folders(const StationRecordsOptions& options) {
+void list_or_delete_expired_folders(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
   const StationConfig& config = *known->station();
   if (!config.keep.images_days && !config.keep.results_days) {
     throw InputError(options.station, "nothing expires; add the key 'retention'");
   }
-  check_clock(config, known->records());
-  const RetentionResult found = find_expired(config, known->records());
+  check_clock_is_not_behind(config, known->records());
+  const RetentionResult found = find_expired_folders(config, known->records());
   constexpr double megabyte = 1e6;
   double all_mb = 0;
   std::size_t done = 0;
   for (const ExpiredFolder& expired : found.expired) {
     const double mb = double(expired.bytes) / megabyte;
     try {
-      if (options.remove) delete_expired(expired, config, *known->spool());
+      if (options.remove) delete_expired_folder(expired, config, *known->spool());
     } catch (const InputError& error) {
-      spdlog::warn("{}", printable(error.what()));
+      spdlog::warn("{}", escape_for_terminal(error.what()));
       continue;
     }
     ++done;
@@ -321,7 +325,7 @@ void clean_expired_folders(const StationRecordsOptions& options) {
   }
   fmt::print("{} folders, {:.1f} MB{}\n", done, all_mb,
              options.remove ? " deleted" : ": --delete deletes them");
-  known->spool()->deliver();
+  known->spool()->deliver_waiting_runs();
   if (done == found.expired.size()) return;
   throw std::runtime_error(fmt::format("{} of {} folders could not be deleted",
                                        found.expired.size() - done, found.expired.size()));
@@ -331,14 +335,14 @@ void void_run(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
   const auto [record, problem, files_problem] =
       void_run(*known, options.run, options.operator_name, options.reason);
-  if (!problem.empty()) spdlog::error("{}", printable(problem));
-  if (!files_problem.empty()) spdlog::warn("{}", printable(files_problem));
+  if (!problem.empty()) spdlog::error("{}", escape_for_terminal(problem));
+  if (!files_problem.empty()) spdlog::warn("{}", escape_for_terminal(files_problem));
   warn_if_unavailable(*known);
   print_line(fmt::format("{} {} {}: voided", record.run, record.camera, record.verdict));
   for (const ScreenLine& line : make_hook_lines(record)) print_line(line.text);
 }
 
-void verify_records(const StationRecordsOptions& options) {
+void print_audit_trail_check(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
   const TrailCheck found = known->records().check(options.expected_digest);
   for (const std::string& problem : found.problems) print_line(problem);
@@ -353,8 +357,8 @@ void verify_records(const StationRecordsOptions& options) {
 void export_runs(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
   check_output_option(options, *known);
-  const auto runs = known->load_all(requested_runs(options, *known));
-  write_runs(options.output, runs);
+  const auto runs = known->load_all_runs(make_filter_of_options(options, *known));
+  export_runs_to_file(options.output, runs);
   fmt::print("{} runs\n", runs.size());
 }
 
@@ -383,10 +387,10 @@ void import_archive(const StationRecordsOptions& options) {
       } catch (const InputError& error) {
         refused.emplace_back(error.what());
       }
-      if (read) records.keep(*read);
+      if (read) records.store_run(*read);
       ++(read ? taken : unread);
     }
-    progress.update(i + 1, sessions.size());
+    progress.update_display(i + 1, sessions.size());
   }
   if (!sessions.empty()) {
     print_line(fmt::format("station {}: {} runs added, {} existed", sessions.front().run.station,
@@ -402,25 +406,26 @@ void import_archive(const StationRecordsOptions& options) {
       other.size(), other.front()));
 }
 
-void print_trend(const StationRecordsOptions& options) {
+void print_metric_trend(const StationRecordsOptions& options) {
   const MetricKind kind = find_run_metric(options.metric);
   const auto known = open_runs(options);
   check_output_option(options, *known);
   Records& records = known->records();
-  RunFilter filter = comparable_runs(options, *known);
+  RunFilter filter = make_filter_of_comparable_runs(options, *known);
   if (options.filter.verdict.empty()) filter.verdict = to_string(Verdict::pass);
-  const auto points = records.trend(options.metric, filter);
-  check_one_station(points, options);
+  const auto points = records.load_trend(options.metric, filter);
+  check_points_of_one_station(points, options);
   constexpr std::size_t min_points = 2;
   if (points.size() < min_points) {
     throw Undetermined(
         fmt::format("{} of the runs have {}: a trend needs two", points.size(), options.metric));
   }
-  const std::vector<double> values = extract_values(points);
-  const auto alarms = find_alarms(values, options.rules);
+  const std::vector<double> values = extract_trend_values(points);
+  const auto alarms = find_control_chart_alarms(values, options.rules);
   const ControlChart chart = compute_control_chart(values);
-  const auto gate = find_gate(options.metric, known->station(), records, points);
-  if (!options.output.empty()) draw_trend(options.output, options.metric, points, alarms, gate);
+  const auto gate = find_gate_limit(options.metric, known->station(), records, points);
+  if (!options.output.empty())
+    write_trend_plot(options.output, options.metric, points, alarms, gate);
   print_line(fmt::format("{} of {} runs, {} to {}", options.metric, points.size(),
                          points.front().ended_utc, points.back().ended_utc));
   fmt::print("mean      {:.4g} {}\nlimits    {:.4g} to {:.4g}\n", chart.mean, kind.unit,
@@ -436,21 +441,21 @@ void print_trend(const StationRecordsOptions& options) {
                                alarms.back().rule, points[alarms.back().index].run));
 }
 
-void print_capability(const StationRecordsOptions& options) {
+void print_process_capability(const StationRecordsOptions& options) {
   std::vector<MetricKind> kinds = list_run_metrics();
   if (!options.metric.empty()) kinds = {find_run_metric(options.metric)};
   const auto known = open_runs(options);
   Records& records = known->records();
-  const RunFilter filter = comparable_runs(options, *known);
+  const RunFilter filter = make_filter_of_comparable_runs(options, *known);
   constexpr const char* head = "{:<27}{:>5}{:>10}{:>10}{:>10}{:>10}   {:<25}{}";
   std::vector<std::string> rows;
   rows.reserve(kinds.size());
   for (const MetricKind& kind : kinds) {
     const auto points = load_judged_values(records, kind.name, filter);
-    check_one_station(points, options);
-    const auto gate = find_gate(kind.name, known->station(), records, points);
+    check_points_of_one_station(points, options);
+    const auto gate = find_gate_limit(kind.name, known->station(), records, points);
     const auto found =
-        compute_capability(extract_values(points), make_tolerance_limits(kind, gate));
+        compute_capability(extract_trend_values(points), make_tolerance_limits(kind, gate));
     if (!found) continue;
     const auto index = [](const CapabilityIndex& of) {
       return fmt::format("{:.2f} ({:.2f} to {:.2f})", of.value, of.low, of.high);
@@ -470,20 +475,20 @@ void print_capability(const StationRecordsOptions& options) {
   for (const std::string& row : rows) print_line(row);
 }
 
-void print_study(const StationRecordsOptions& options) {
+void print_measurement_study(const StationRecordsOptions& options) {
   const MetricKind kind = find_run_metric(options.metric);
   if (!options.references.empty()) return print_bias(kind, options);
   const auto known = open_runs(options);
   Records& records = known->records();
   RunFilter filter = options.filter;
   if (filter.kind.empty()) filter.kind = "unit";
-  const auto points = load_judged_values(records, options.metric, replace_any(filter));
+  const auto points = load_judged_values(records, options.metric, remove_conditions_any(filter));
   const auto values = select_study_values(points, options.units);
   const MeasurementStudy study = run_study([&] {
     check_runs_share_no_images(records, points, values);
     return analyze_measurements(values);
   });
-  const auto gate = find_gate(options.metric, known->station(), records, points);
+  const auto gate = find_gate_limit(options.metric, known->station(), records, points);
   print_line(fmt::format("{}: {} units, {} stations, {} runs each, mean {:.4g} {}", options.metric,
                          study.units, study.stations, study.repeats, study.mean, kind.unit));
   fmt::print("\n");
@@ -512,11 +517,11 @@ void print_study(const StationRecordsOptions& options) {
   part("measurement, total (GRR)", study.grr);
   part("units (PV)", study.of_unit);
   part("total (TV)", study.total);
-  if (const auto categories = study.distinct_categories()) {
+  if (const auto categories = study.compute_distinct_categories()) {
     fmt::print("distinct categories (ndc){:>21}\n", *categories);
   }
   if (const auto percent_of_tolerance =
-          study.percent_of_tolerance(make_tolerance_limits(kind, gate))) {
+          study.compute_percent_of_tolerance(make_tolerance_limits(kind, gate))) {
     fmt::print("measurement / tolerance (P/T){:>17.1f} %\n", *percent_of_tolerance);
   } else if (gate) {
     fmt::print("no P/T: the mean is not within the gate, {} {:.4g}\n", describe(kind.direction),

@@ -40,15 +40,15 @@ void print_run(const StationRecordsOptions& options);
 void restore_run(const StationRecordsOptions& options);
 /// Writes a certificate for the recipient of the unit next to the files of its run (vlp-station
 /// certificate).
-void write_certificate(const StationRecordsOptions& options);
+void write_calibration_certificate(const StationRecordsOptions& options);
 /// Lists the folders of runs whose retention time has expired, or deletes them and adds an event to
 /// each run (vlp-station clean). Records are kept.
-void clean_expired_folders(const StationRecordsOptions& options);
+void list_or_delete_expired_folders(const StationRecordsOptions& options);
 /// Voids a run (vlp-station void): yield, trends and studies ignore it. Adds an event to the run.
 void void_run(const StationRecordsOptions& options);
 /// Verifies by the audit trail that all records are unchanged (vlp-station verify-records). Throws
 /// GateNotMet if one was changed.
-void verify_records(const StationRecordsOptions& options);
+void print_audit_trail_check(const StationRecordsOptions& options);
 /// Exports runs as CSV, a line per run, or as JSON with all data (vlp-station export).
 void export_runs(const StationRecordsOptions& options);
 /// Imports the reprocessed sessions of an archive as runs of a station with the name of the results
@@ -57,13 +57,13 @@ void import_archive(const StationRecordsOptions& options);
 /// Prints a metric over the runs, with limits and alarms of a control chart, and optionally draws a
 /// plot (vlp-station trend). Default of the filter: units of the station that passed. Throws
 /// GateNotMet if there is an alarm.
-void print_trend(const StationRecordsOptions& options);
+void print_metric_trend(const StationRecordsOptions& options);
 /// Prints the capability indices Cpk and Ppk of the metrics that have gates (vlp-station
 /// capability).
-void print_capability(const StationRecordsOptions& options);
+void print_process_capability(const StationRecordsOptions& options);
 /// Prints a gauge study of a metric (vlp-station study): contribution of the measurement to its
 /// variation, from units measured several times on each station, or bias and linearity, from
 /// reference units.
-void print_study(const StationRecordsOptions& options);
+void print_measurement_study(const StationRecordsOptions& options);
 
 }  // namespace vlp

@@ -35,19 +35,19 @@ namespace fs = std::filesystem;
 const ProgramVersion kProgram{"vlp-station", VLP_VERSION};
 
 /// Updates the state of the golden unit. Reports errors only: the verdict is valid without it.
-void update_golden_state(const StationConfig& config, const RunRecord& record) {
+void update_golden_unit_state(const StationConfig& config, const RunRecord& record) {
   try {
-    update_golden_note(config, record);
+    update_golden_unit_note(config, record);
   } catch (const InputError& error) {
     spdlog::error("the due time of the golden unit is unknown: {}", error.what());
   }
 }
 
-/// Returns Spool::notice() and logs its details.
-std::string spool_notice(Spool& spool) {
-  std::string notice = spool.notice();
+/// Returns Spool::make_operator_notice() and logs its details.
+std::string make_spool_notice(Spool& spool) {
+  std::string notice = spool.make_operator_notice();
   if (const std::string state = spool.state(); state != notice) {
-    spdlog::debug("{}", printable(state));
+    spdlog::debug("{}", escape_for_terminal(state));
   }
   return notice;
 }
@@ -59,14 +59,15 @@ void log_arrivals(const Unit& unit, const std::vector<WatchedRun::Arrival>& arri
   for (const auto& [step, image, gone] : arrivals) {
     if (!gone) spdlog::info("{}", make_last_image_line(unit, step, image));
   }
-  for (; num_done < kStationSteps.size() && unit.step(kStationSteps[num_done]).done(); ++num_done) {
+  for (; num_done < kStationSteps.size() && unit.step(kStationSteps[num_done]).is_done();
+       ++num_done) {
     spdlog::info("{} is done", to_string(kStationSteps[num_done]));
   }
 }
 
 /// Returns true if an image arrived. Of the frames of a source, only used ones are considered.
-bool has_arrived(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals,
-                 bool of_source) {
+bool has_image_arrived(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals,
+                       bool of_source) {
   return std::ranges::any_of(arrivals, [&](const WatchedRun::Arrival& arrival) {
     const auto& images = unit.step(arrival.step).images;
     const auto image = images.find(arrival.image);
@@ -77,68 +78,69 @@ bool has_arrived(const Unit& unit, const std::vector<WatchedRun::Arrival>& arriv
 /// Checks whether the golden unit is due. Called at the first image of a unit, which may arrive
 /// long after its serial number was scanned.
 void check_golden_unit(Unit& unit, const Terminal& terminal) {
-  std::string why = golden_problem(unit.config());
-  if (!why.empty() && why != unit.invalid_reason() && !terminal.interactive()) {
+  std::string why = describe_golden_unit_problem(unit.config());
+  if (!why.empty() && why != unit.invalid_reason() && !terminal.is_interactive()) {
     spdlog::warn("{}; no unit passes", why);
   }
-  unit.invalidate(std::move(why));
+  unit.invalidate_verdict(std::move(why));
 }
 
 /// Processes the images of a unit as they arrive and guides the operator. Returns when the unit is
 /// complete or cannot pass any more, the frames end, no image arrives for options.idle_s, or the
 /// operator requests the verdict. Throws std::runtime_error if the operator leaves.
-void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watched,
-                StepSources& sources, Spool& spool, Terminal& terminal) {
+void guide_operator(const StationRunOptions& options, Unit& unit, WatchedRun& watched,
+                    StepSources& sources, Spool& spool, Terminal& terminal) {
   using Clock = std::chrono::steady_clock;
   constexpr int poll_interval_ms = 50;
   Clock::time_point last = Clock::now();
   std::size_t num_done = 0;
   bool changed = true, has_begun = false;
-  while (unit.current() && !unit.is_hopeless()) {
-    const auto arrivals = watched.poll_changes(static_cast<std::size_t>(options.threads));
+  while (unit.current_step() && !unit.cannot_pass_any_more()) {
+    const auto arrivals = watched.poll_folder_changes(static_cast<std::size_t>(options.threads));
     if (!has_begun && !arrivals.empty()) {
       has_begun = true;
       check_golden_unit(unit, terminal);
     }
-    if (!terminal.interactive()) log_arrivals(unit, arrivals, num_done);
+    if (!terminal.is_interactive()) log_arrivals(unit, arrivals, num_done);
     changed = changed || !arrivals.empty();
-    if (changed && terminal.interactive()) {
+    if (changed && terminal.is_interactive()) {
       auto lines = make_station_screen(unit);
-      for (ScreenLine& line : make_spool_lines(spool.notice())) lines.push_back(std::move(line));
+      for (ScreenLine& line : make_spool_lines(spool.make_operator_notice()))
+        lines.push_back(std::move(line));
       lines.push_back({"q: verdict now   Ctrl-C: leave, to go on later"});
-      terminal.draw(lines);
+      terminal.draw_screen(lines);
     }
     changed = false;
-    if (has_arrived(unit, arrivals, sources.any())) last = Clock::now();
-    sources.feed(unit, watched);
+    if (has_image_arrived(unit, arrivals, sources.has_sources())) last = Clock::now();
+    sources.write_next_frame(unit, watched);
     if (sources.ended(unit)) {
-      unit.end_early("the frames ended");
+      unit.end_unit_early("the frames ended");
       break;
     }
     const std::chrono::duration<double> idle = Clock::now() - last;
     if (options.idle_s && idle.count() > *options.idle_s) {
-      unit.end_early(fmt::format("no image came for {:g} s", *options.idle_s));
+      unit.end_unit_early(fmt::format("no image came for {:g} s", *options.idle_s));
       break;
     }
-    if (terminal.key(arrivals.empty() ? poll_interval_ms : 0) == 'q') {
-      unit.end_early("the operator ended the run");
+    if (terminal.wait_for_key(arrivals.empty() ? poll_interval_ms : 0) == 'q') {
+      unit.end_unit_early("the operator ended the run");
       break;
     }
-    if (interrupted()) {
+    if (was_interrupted()) {
       throw std::runtime_error("left before the verdict; the same command continues");
     }
-    changed = terminal.resized();
+    changed = terminal.was_resized();
   }
 }
 
 /// Stores the run in the spool, prints the verdict, writes the files, delivers to the records,
 /// which may be unavailable, and calls the hook.
-void finish_run(
+void store_and_report_run(
     RunRecord measured, const std::vector<ReportPlot>& pictures, Spool& spool,
     const StationConfig& config, Terminal& terminal,
-    const std::function<void()>& mark_stored = [] {},
-    const std::function<void()>& move_away = [] {}) {
-  RunRecord record = printable_run(std::move(measured));  // in the form of the records
+    const std::function<void()>& mark_run_stored = [] {},
+    const std::function<void()>& rename_finished_folder = [] {}) {
+  RunRecord record = escape_run_texts(std::move(measured));  // in the form of the records
   auto lines = make_verdict_screen(record);
   std::optional<HookLock> lock;
   if (config.hook) {
@@ -146,18 +148,18 @@ void finish_run(
     record.events.push_back(make_hook_requested_event(*config.hook, record.operator_name));
   }
   // After a kill in between, the golden unit is due too early, not too late.
-  const bool golden_passed = record.kind == "golden" && record.passed();
-  if (!golden_passed) update_golden_state(config, record);
+  const bool golden_passed = record.kind == "golden" && record.has_passed();
+  if (!golden_passed) update_golden_unit_state(config, record);
   try {
-    spool.keep(record);
+    spool.store_run(record);
   } catch (const InputError&) {
     lines.push_back({"NOT RECORDED: repeat the run when it can be stored", Tone::bad});
-    terminal.print(lines);
+    terminal.print_lines(lines);
     throw;
   }
-  mark_stored();
-  terminal.print(lines);
-  if (golden_passed) update_golden_state(config, record);
+  mark_run_stored();
+  terminal.print_lines(lines);
+  if (golden_passed) update_golden_unit_state(config, record);
   std::string file_error, remedy;
   try {
     remedy = fmt::format("'vlp-station restore {} --station {}' writes the files", record.run,
@@ -165,47 +167,48 @@ void finish_run(
     const fs::path folder = publish_run(record, pictures, config.results);
     spdlog::info("run {}: {}", record.run, folder.string());
     remedy = "move the folder there before the next run";
-    move_away();
+    rename_finished_folder();
   } catch (const InputError& error) {
     file_error = error.what();
   }
-  spool.deliver();
+  spool.deliver_waiting_runs();
   if (config.hook) {
-    const std::string problem = call_hook(*config.hook, record, *lock, spool);
+    const std::string problem = run_hook_and_record_result(*config.hook, record, *lock, spool);
     if (!problem.empty()) spdlog::error("{}", problem);
-    terminal.print(make_hook_lines(record));
+    terminal.print_lines(make_hook_lines(record));
   }
-  terminal.print(make_spool_lines(spool_notice(spool)));
+  terminal.print_lines(make_spool_lines(make_spool_notice(spool)));
   if (file_error.empty()) return;
   throw std::runtime_error(
       fmt::format("{}; the verdict {} is recorded: {}", file_error, record.verdict, remedy));
 }
 
 void warn_of_spool(Spool& spool) {
-  if (const auto notice = spool_notice(spool); !notice.empty()) {
-    spdlog::warn("{}", printable(notice));
+  if (const auto notice = make_spool_notice(spool); !notice.empty()) {
+    spdlog::warn("{}", escape_for_terminal(notice));
   }
 }
 
 /// Checks the conditions that are known before the first image.
 void prepare(Spool& spool, const StationConfig& config, const std::string& camera) {
-  check_results(config.results, camera);
-  spool.prepare();
+  check_results_folder(config.results, camera);
+  spool.check_storage();
   warn_of_spool(spool);
 }
 
 void prepare(Unit& unit, Spool& spool, const StationConfig& config) {
   prepare(spool, config, unit.camera_id());
-  unit.reject_images_of_others([&spool, camera = unit.camera_id()](const std::string& sha256) {
-    return spool.find_owner(sha256, camera);
-  });
-  unit.invalidate(golden_problem(config));
+  unit.reject_images_of_other_cameras(
+      [&spool, camera = unit.camera_id()](const std::string& sha256) {
+        return spool.find_other_camera_using_image(sha256, camera);
+      });
+  unit.invalidate_verdict(describe_golden_unit_problem(config));
 }
 
 /// Throws GateNotMet if the run failed, Undetermined if it is invalid.
 void throw_unless_passed(const RunRecord& record) {
-  if (record.passed()) return;
-  if (record.invalid()) {
+  if (record.has_passed()) return;
+  if (record.is_invalid()) {
     throw Undetermined(
         fmt::format("camera {} is not judged: {}", record.camera, record.first_cause()));
   }
@@ -214,7 +217,7 @@ void throw_unless_passed(const RunRecord& record) {
                    record.first_cause());
 }
 
-void add_folders(Unit& unit, const fs::path& folder) {
+void add_step_folders(Unit& unit, const fs::path& folder) {
   bool any = false;
   for (const StationStep step : kStationSteps) {
     if (!fs::is_directory(folder / to_string(step))) continue;
@@ -229,8 +232,8 @@ void add_folders(Unit& unit, const fs::path& folder) {
 RunRecord make_final_record(Unit& unit, const std::string& run, const StationRunOptions& options,
                             Spool& spool) {
   if (unit.invalid_reason().empty()) {
-    unit.invalidate(golden_problem(unit.config(), GoldenCheckTime::verdict));
-    const std::string due = golden_problem(unit.config());
+    unit.invalidate_verdict(describe_golden_unit_problem(unit.config(), GoldenCheckTime::verdict));
+    const std::string due = describe_golden_unit_problem(unit.config());
     if (unit.invalid_reason().empty() && !due.empty()) {
       spdlog::warn("{} before the next unit; this unit was started before", due);
     }
@@ -238,72 +241,74 @@ RunRecord make_final_record(Unit& unit, const std::string& run, const StationRun
   RunRecord record = make_unit_record(unit, run, kProgram);
   record.operator_name = options.operator_name;
   record.shift = options.shift;
-  if (record.invalid()) return record;  // images of an invalid run may be used again
+  if (record.is_invalid()) return record;  // images of an invalid run may be used again
   const auto earlier = spool.find_repeated_run(record);
   if (earlier && !earlier->empty()) {
     reject_reused_images(record, *earlier, options.station);
   } else if (!earlier) {
     const std::string unchecked =
         "the records are offline: whether an earlier run used the same images was not checked";
-    record.events.push_back(make_event(kUnchecked, unchecked));
+    record.events.push_back(make_run_event_now(kUnchecked, unchecked));
     spdlog::warn("{}", unchecked);
   }
   return record;
 }
 
-RunRecord run_batch(const StationRunOptions& options, const StationConfig& config, Spool& spool) {
+RunRecord run_with_given_folder(const StationRunOptions& options, const StationConfig& config,
+                                Spool& spool) {
   const std::string run = make_run_id();
   Unit unit(config, options.camera_id, kProgram, options.threads);
   prepare(unit, spool, config);
   if (!unit.invalid_reason().empty()) spdlog::warn("{}; no unit passes", unit.invalid_reason());
-  add_folders(unit, options.batch);
-  unit.advance(true);
+  add_step_folders(unit, options.batch);
+  unit.solve_complete_steps(true);
   RunRecord record = make_final_record(unit, run, options, spool);
   Terminal terminal;
-  finish_run(record, unit.pictures(), spool, config, terminal);
+  store_and_report_run(record, unit.report_plots(), spool, config, terminal);
   return record;
 }
 
-RunRecord run_watched(const StationRunOptions& options, const StationConfig& config, Spool& spool) {
+RunRecord run_with_watched_folders(const StationRunOptions& options, const StationConfig& config,
+                                   Spool& spool) {
   StepSources sources(options.sources, config.type.imager_px);
   Unit unit(config, options.camera_id, kProgram, options.threads);
   prepare(unit, spool, config);
   WatchedRun watched(unit, spool);
   Terminal terminal;
-  if (const auto& finished = watched.finished()) {
-    terminal.print(make_verdict_screen(*finished));
-    terminal.print(make_hook_lines(*finished));
+  if (const auto& finished = watched.finished_record()) {
+    terminal.print_lines(make_verdict_screen(*finished));
+    terminal.print_lines(make_hook_lines(*finished));
     spdlog::info("run {} has its verdict already; the same command starts another run",
                  finished->run);
     return *finished;
   }
   spdlog::info("run {}; images go to {}/STEP", watched.run(), watched.folder().string());
-  if (!unit.invalid_reason().empty() && !terminal.interactive()) {
+  if (!unit.invalid_reason().empty() && !terminal.is_interactive()) {
     spdlog::warn("{}; no unit passes", unit.invalid_reason());
   }
-  guide_unit(options, unit, watched, sources, spool, terminal);
-  unit.advance(true);
+  guide_operator(options, unit, watched, sources, spool, terminal);
+  unit.solve_complete_steps(true);
   RunRecord record = make_final_record(unit, watched.run(), options, spool);
-  finish_run(
-      record, unit.pictures(), spool, config, terminal, [&] { watched.mark_stored(); },
-      [&] { watched.move_away(); });
+  store_and_report_run(
+      record, unit.report_plots(), spool, config, terminal, [&] { watched.mark_run_stored(); },
+      [&] { watched.rename_finished_folder(); });
   return record;
 }
 
 }  // namespace
 
-void run_unit(const StationRunOptions& options) {
-  const StationConfig config = read_station(options.station);
-  if (const std::string why = serial_problem(config, options.camera_id); !why.empty()) {
+void measure_unit(const StationRunOptions& options) {
+  const StationConfig config = read_station_config(options.station);
+  if (const std::string why = describe_serial_problem(config, options.camera_id); !why.empty()) {
     throw std::invalid_argument("--camera-id: " + why);
   }
   Spool spool(config.spool, config.records);
-  throw_unless_passed(options.batch.empty() ? run_watched(options, config, spool)
-                                            : run_batch(options, config, spool));
+  throw_unless_passed(options.batch.empty() ? run_with_watched_folders(options, config, spool)
+                                            : run_with_given_folder(options, config, spool));
 }
 
-void run_verify(const StationRunOptions& options) {
-  const StationConfig config = read_station(options.station);
+void verify_station_with_golden_unit(const StationRunOptions& options) {
+  const StationConfig config = read_station_config(options.station);
   if (!config.golden) throw InputError(options.station, "has no golden unit: add the key 'golden'");
   Spool spool(config.spool, config.records);
   prepare(spool, config, config.golden->camera_id);
@@ -312,42 +317,43 @@ void run_verify(const StationRunOptions& options) {
   auto [record, pictures] = verify_station(config, batch ? fs::path(options.batch) : arrived,
                                            make_run_id(), kProgram, options.threads);
   if (config.verify_due) {
-    reject_used_images(record,
-                       [&](const std::string& sha256) { return spool.find_golden_run(sha256); });
+    invalidate_if_images_were_used(record, [&](const std::string& sha256) {
+      return spool.find_golden_run_using_image(sha256);
+    });
   }
   record.operator_name = options.operator_name;
   record.shift = options.shift;
   Terminal terminal;
-  finish_run(
+  store_and_report_run(
       record, pictures, spool, config, terminal, [] {},
       [&, run = record.run] {
-        if (!batch) move_away(arrived, run);
+        if (!batch) rename_finished_folder(arrived, run);
       });
   throw_unless_passed(record);
 }
 
 void run_hooks(const StationRunOptions& options) {
-  const StationConfig config = read_station(options.station);
+  const StationConfig config = read_station_config(options.station);
   if (!config.hook) throw InputError(options.station, "has no hook: add the key 'hook'");
   Spool spool(config.spool, config.records);
-  spool.deliver();
-  const auto runs = spool.list({.station = config.station, .has_open_hook = true});
+  spool.deliver_waiting_runs();
+  const auto runs = spool.list_runs({.station = config.station, .has_open_hook = true});
   std::size_t failed = 0;
   for (const RunSummary& run : runs) {
     const auto report = [&](const std::string& outcome) {
-      fmt::print("{}\n", printable_line(fmt::format("{} {} {}: {}", run.run, run.camera,
-                                                    run.verdict, outcome)));
+      fmt::print("{}\n", escape_for_single_line(fmt::format("{} {} {}: {}", run.run, run.camera,
+                                                            run.verdict, outcome)));
     };
     const HookLock lock(spool.folder(), run.run);
     auto record = spool.find(run.run);
     // Another program can have called it.
-    if (!record || !is_hook_open(*record)) continue;
-    if (!lock.held()) {
+    if (!record || !is_hook_pending(*record)) continue;
+    if (!lock.is_lock_held()) {
       report("is being run");
       continue;
     }
-    const std::string unrecorded = call_hook(*config.hook, *record, lock, spool);
-    const std::string problem = hook_problem(*record);
+    const std::string unrecorded = run_hook_and_record_result(*config.hook, *record, lock, spool);
+    const std::string problem = describe_pending_hook(*record);
     if (!problem.empty()) ++failed;
     report(problem.empty() ? "done" : problem);
     if (!unrecorded.empty()) report(unrecorded);

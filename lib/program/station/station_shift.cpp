@@ -33,12 +33,12 @@ constexpr const char* kQuit = "q";
 std::optional<std::string> read_word(const std::string& label, Terminal& terminal) {
   constexpr std::size_t longest = 64;
   const auto line = terminal.line({{label}});
-  return line ? std::optional(printable(truncate_utf8(*line, longest))) : std::nullopt;
+  return line ? std::optional(escape_for_terminal(truncate_utf8(*line, longest))) : std::nullopt;
 }
 
 /// Reads the names of operator and shift if they are empty. Returns false if the input ended or the
 /// operator quit.
-bool begin_shift(std::string& operator_name, std::string& shift, Terminal& terminal) {
+bool begin_work_shift(std::string& operator_name, std::string& shift, Terminal& terminal) {
   while (operator_name.empty()) {
     const auto name = read_word("Operator ", terminal);
     if (!name || *name == kQuit) return false;
@@ -53,7 +53,7 @@ bool begin_shift(std::string& operator_name, std::string& shift, Terminal& termi
 /// Reads the id of the next unit, or of the golden unit, until it is one that the station accepts.
 /// Returns std::nullopt for `q` and at the end of the input.
 std::optional<std::string> read_serial(const StationConfig& config, Terminal& terminal) {
-  const std::string golden = golden_problem(config);
+  const std::string golden = describe_golden_unit_problem(config);
   std::string problem;
   for (;;) {
     std::vector<ScreenLine> prompt;
@@ -65,10 +65,10 @@ std::optional<std::string> read_serial(const StationConfig& config, Terminal& te
     if (!line || *line == kQuit) return std::nullopt;
     if (line->empty()) continue;
     const bool is_golden = config.golden && *line == config.golden->camera_id;
-    problem = is_golden ? "" : serial_problem(config, *line);
+    problem = is_golden ? "" : describe_serial_problem(config, *line);
     if (problem.empty()) return line;
     // Without a screen, the prompt does not print the problem.
-    if (!terminal.interactive()) spdlog::error("{}", problem);
+    if (!terminal.is_interactive()) spdlog::error("{}", problem);
   }
 }
 
@@ -112,7 +112,7 @@ int run_process(const std::vector<std::string>& command) {
       return kBadInput;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    if (interrupted() && !is_signaled) is_signaled = ::kill(process, SIGTERM) == 0;
+    if (was_interrupted() && !is_signaled) is_signaled = ::kill(process, SIGTERM) == 0;
   }
   if (WIFEXITED(status)) return WEXITSTATUS(status);
   spdlog::error("the unit's process was ended by signal {}", WTERMSIG(status));
@@ -121,29 +121,29 @@ int run_process(const std::vector<std::string>& command) {
 
 }  // namespace
 
-void run_shift(StationRunOptions options) {
-  StationConfig config = read_station(options.station);
+void measure_scanned_units(StationRunOptions options) {
+  StationConfig config = read_station_config(options.station);
   Terminal terminal;
   std::map<int, int> exit_counts;  // number of units by exit code
   int units = 0;
-  const bool has_begun = begin_shift(options.operator_name, options.shift, terminal);
+  const bool has_begun = begin_work_shift(options.operator_name, options.shift, terminal);
   while (has_begun) {
     try {
-      config = read_station(options.station);  // as the process of each unit does
-    } catch (const InputError&) {              // the process of the unit reports the error
+      config = read_station_config(options.station);  // as the process of each unit does
+    } catch (const InputError&) {                     // the process of the unit reports the error
     }
     const auto serial = read_serial(config, terminal);
     if (!serial) break;
     options.camera_id = *serial;
     const bool golden = config.golden && *serial == config.golden->camera_id;
     const int code = run_process(make_command(options, golden));
-    terminal.discard_keys();
+    terminal.discard_typed_keys();
     if (!golden) {
       ++units;
       ++exit_counts[code];
     }
     const bool judged = code == kDone || code == kGateNotMet || code == kUndetermined;
-    if (interrupted() && !judged) {
+    if (was_interrupted() && !judged) {
       throw std::runtime_error("the shift was left in the middle of a unit");
     }
   }

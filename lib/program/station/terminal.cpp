@@ -97,13 +97,13 @@ Terminal::Size Terminal::size() {
   return {known.ws_col, known.ws_row};
 }
 
-bool Terminal::resized() const {
+bool Terminal::was_resized() const {
   return interactive_ && num_drawn_lines_ > 0 && (size() != size_ || resumed);
 }
 
 /// Replaces the drawn text. Clears the screen after a change of size or a stop, because the
 /// position of the drawn text is unknown then.
-void Terminal::replace_text(const std::string& text, std::size_t lines) {
+void Terminal::replace_drawn_text(const std::string& text, std::size_t lines) {
   const Size current_size = size();
   const bool moved = num_drawn_lines_ > 0 && (resumed.exchange(false) || current_size != size_);
   if (text == last_text_ && !moved) return;
@@ -117,7 +117,7 @@ void Terminal::replace_text(const std::string& text, std::size_t lines) {
   size_ = current_size;
 }
 
-void Terminal::draw(const std::vector<ScreenLine>& lines) {
+void Terminal::draw_screen(const std::vector<ScreenLine>& lines) {
   if (!interactive_) return;
   const auto [columns, rows] = size();
   const std::size_t num_lines = std::min(lines.size(), rows - 1);
@@ -125,22 +125,22 @@ void Terminal::draw(const std::vector<ScreenLine>& lines) {
   for (std::size_t i = 0; i < num_lines; ++i) {
     // The last line lists the keys and is always drawn.
     const auto& [line, tone] = i + 1 == num_lines ? lines.back() : lines[i];
-    text += colorize(truncate_utf8(printable_line(line), columns), tone) + "\x1b[K\n";
+    text += colorize(truncate_utf8(escape_for_single_line(line), columns), tone) + "\x1b[K\n";
   }
-  replace_text(text, num_lines);
+  replace_drawn_text(text, num_lines);
 }
 
-void Terminal::print(const std::vector<ScreenLine>& lines) {
+void Terminal::print_lines(const std::vector<ScreenLine>& lines) {
   std::string text;
   for (const auto& [line, tone] : lines) {
-    text += colorize(printable_line(line), tone) + (interactive_ ? "\x1b[K\n" : "\n");
+    text += colorize(escape_for_single_line(line), tone) + (interactive_ ? "\x1b[K\n" : "\n");
   }
   if (!interactive_) {
     fmt::print("{}", text);
     std::fflush(stdout);  // the next output may be delayed
     return;
   }
-  replace_text(text, lines.size());
+  replace_drawn_text(text, lines.size());
   num_drawn_lines_ = 0;
   last_text_.clear();
 }
@@ -149,7 +149,7 @@ std::string Terminal::colorize(const std::string& text, Tone tone) const {
   return has_color_ ? fmt::format("{}{}\x1b[0m", color_code(tone), text) : text;
 }
 
-std::optional<char> Terminal::key(int wait_ms) const {
+std::optional<char> Terminal::wait_for_key(int wait_ms) const {
   if (!reads_keys_) {
     std::this_thread::sleep_for(std::chrono::milliseconds(wait_ms));
     return std::nullopt;
@@ -157,13 +157,13 @@ std::optional<char> Terminal::key(int wait_ms) const {
   char first = 0, key = 0;
   if (!read_key(first, wait_ms)) return std::nullopt;
   bool alone = true;
-  while (!interrupted() && read_key(key, kMaxScannerPause_ms)) alone = alone && key == first;
+  while (!was_interrupted() && read_key(key, kMaxScannerPause_ms)) alone = alone && key == first;
   return alone ? std::optional(first) : std::nullopt;
 }
 
-void Terminal::discard_keys() const {
+void Terminal::discard_typed_keys() const {
   char key = 0;
-  while (reads_keys_ && !interrupted() && read_key(key, kMaxScannerPause_ms)) continue;
+  while (reads_keys_ && !was_interrupted() && read_key(key, kMaxScannerPause_ms)) continue;
 }
 
 std::optional<std::string> Terminal::line(std::vector<ScreenLine> prompt) {
@@ -173,14 +173,14 @@ std::optional<std::string> Terminal::line(std::vector<ScreenLine> prompt) {
   const std::string prompt_text = prompt.back().text;
   std::string typed;
   if (!interactive_ && ::isatty(STDIN_FILENO) == 1) {
-    fmt::print(stderr, "{}\n", printable(prompt_text));
+    fmt::print(stderr, "{}\n", escape_for_terminal(prompt_text));
   }
   for (;;) {
     prompt.back().text = prompt_text + typed;
-    draw(prompt);
+    draw_screen(prompt);
     pollfd input{STDIN_FILENO, POLLIN, 0};
     char key = 0;
-    if (interrupted()) return std::nullopt;
+    if (was_interrupted()) return std::nullopt;
     if (::poll(&input, 1, poll_interval_ms) < 1) continue;
     const bool ended = ::read(STDIN_FILENO, &key, 1) != 1 || key == end;
     if (ended && typed.empty()) return std::nullopt;
@@ -194,13 +194,13 @@ std::optional<std::string> Terminal::line(std::vector<ScreenLine> prompt) {
       typed += key;
     }
   }
-  if (interactive_) print(prompt);  // keeps the line on the screen
+  if (interactive_) print_lines(prompt);  // keeps the line on the screen
   typed = truncate_utf8(typed, max_bytes);
   const auto first = typed.find_first_not_of(' ');
   return first == std::string::npos ? ""
                                     : typed.substr(first, typed.find_last_not_of(' ') + 1 - first);
 }
 
-bool interrupted() { return stop_requested; }
+bool was_interrupted() { return stop_requested; }
 
 }  // namespace vlp

@@ -12,7 +12,7 @@
 namespace vlp {
 
 /// Display for the operator: on a terminal one screen that is redrawn in place, in color unless
-/// NO_COLOR is set. Without a terminal, only print() writes.
+/// NO_COLOR is set. Without a terminal, only print_lines() writes.
 class Terminal {
  public:
   /// Switches a terminal on stdin to reading single keys until destruction.
@@ -21,21 +21,21 @@ class Terminal {
   Terminal(const Terminal&) = delete;
   Terminal& operator=(const Terminal&) = delete;
 
-  bool interactive() const { return interactive_; }
+  bool is_interactive() const { return interactive_; }
   /// Redraws the screen in place if the lines have changed; only on a terminal. Crops lines to the
   /// size of the terminal, but keeps the last one.
-  void draw(const std::vector<ScreenLine>& lines);
+  void draw_screen(const std::vector<ScreenLine>& lines);
   /// Replaces the drawn screen by lines that stay.
-  void print(const std::vector<ScreenLine>& lines);
-  /// Returns true if the size of the terminal has changed since the last draw(), or if the process
-  /// was stopped (Ctrl-Z) since then.
-  bool resized() const;
+  void print_lines(const std::vector<ScreenLine>& lines);
+  /// Returns true if the size of the terminal has changed since the last draw_screen(), or if the
+  /// process was stopped (Ctrl-Z) since then.
+  bool was_resized() const;
   /// Returns the key pressed within `wait_ms`; std::nullopt if there is none. Several different
   /// keys in quick succession come from a scanner and are ignored; repetitions of one key count as
   /// one.
-  std::optional<char> key(int wait_ms) const;
+  std::optional<char> wait_for_key(int wait_ms) const;
   /// Discards the keys typed so far on a terminal, up to a pause longer than a scanner's.
-  void discard_keys() const;
+  void discard_typed_keys() const;
   /// Reads a line from the keyboard, a scanner or a file, without surrounding blanks. Longer lines
   /// are cut to 200 bytes, in whole UTF-8 characters.
   ///
@@ -50,7 +50,7 @@ class Terminal {
     bool operator==(const Size&) const = default;
   };
   static Size size();
-  void replace_text(const std::string& text, std::size_t lines);
+  void replace_drawn_text(const std::string& text, std::size_t lines);
   std::string colorize(const std::string& text, Tone tone) const;
 
   bool interactive_, has_color_, reads_keys_ = false;
@@ -61,6 +61,6 @@ class Terminal {
 
 /// Returns true if SIGINT or SIGTERM arrived while a Terminal existed. The program should end; its
 /// work is on disk.
-bool interrupted();
+bool was_interrupted();
 
 }  // namespace vlp

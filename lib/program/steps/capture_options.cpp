@@ -24,9 +24,9 @@
 
 namespace vlp {
 
-FrontendOptions make_default_frontend() {
+FrontendOptions make_default_frontend_options() {
   FrontendOptions options;
-  options.threads = count_cores();
+  options.threads = count_cpu_cores();
   return options;
 }
 
@@ -59,14 +59,14 @@ void add_readout_option(CLI::App& app, std::optional<Readout>& readout) {
       ->option_text("rows|columns");
 }
 
-void add_every_option(CLI::App& app, int& every) {
+void add_frame_step_option(CLI::App& app, int& every) {
   app.add_option("--every", every, "Use every Nth frame of a video (default: 1)")
       ->check(CLI::Range(1, 1000000))
       ->option_text("N");
 }
 
-void check_every(int every, const std::vector<std::string>& files) {
-  if (every == 1 || std::any_of(files.begin(), files.end(), is_video_name)) return;
+void check_frame_step_needs_video(int every, const std::vector<std::string>& files) {
+  if (every == 1 || std::any_of(files.begin(), files.end(), is_video_file_name)) return;
   throw std::invalid_argument("--every: there is no video; leave it out");
 }
 
@@ -80,7 +80,7 @@ void write_refined_map(const std::filesystem::path& file, const LampMap& map,
   write_lamp_map(file, map);
   if (room.empty()) return;
   fmt::print("{} contains the lamps of room {} only: use it without --room\n",
-             printable(file.string()), printable(room));
+             escape_for_terminal(file.string()), escape_for_terminal(room));
 }
 
 void add_max_mpx_option(CLI::App& app, double& max_mpx) {
@@ -118,7 +118,7 @@ void add_detect_options(CLI::App& app, CaptureOptions& options) {
   add_threads_option(app, options.frontend.threads);
 }
 
-std::optional<KnownMotion> MotionOptions::motion() const {
+std::optional<KnownMotion> MotionOptions::make_known_motion() const {
   constexpr double fastest_deg_per_s = 180;  // maximum yaw rate of robots
   if (!max_speed_m_per_s) return std::nullopt;
   return KnownMotion::up_to(*max_speed_m_per_s,
@@ -131,7 +131,7 @@ void add_motion_options(CLI::App& app, MotionOptions& options, const char* help)
   app.add_option(
          "--max-yaw-rate-deg-per-s", options.max_yaw_rate_deg_per_s,
          "Maximum yaw rate with --max-speed-m-per-s, in degrees/s (default: 180); 0: no rotation")
-      ->check(finite_not_negative())
+      ->check(make_finite_non_negative_validator())
       ->needs("--max-speed-m-per-s");
 }
 
@@ -139,49 +139,50 @@ void add_yaw_rate_sd_option(CLI::App& app, std::optional<double>& yaw_rate_sd_de
   app.add_option("--yaw-rate-sd-deg-per-s", yaw_rate_sd_deg_per_s,
                  "Standard deviation of yaw_rate_rad_per_s in captures.csv, in degrees/s (default: "
                  "0, exact)")
-      ->check(finite_not_negative());
+      ->check(make_finite_non_negative_validator());
 }
 
-std::vector<std::string> list_inputs(const CaptureOptions& options) {
+std::vector<std::string> list_capture_input_files(const CaptureOptions& options) {
   return {options.images, options.lamps, options.calibration, options.frontend.classifier.string()};
 }
 
-LampImages make_lamp_images(const CaptureOptions& options, const LampMap& lamps,
-                            const std::optional<Calibration>& calibration) {
+LampImages make_lamp_image_inputs(const CaptureOptions& options, const LampMap& lamps,
+                                  const std::optional<Calibration>& calibration) {
   return {options.images,          lamps,
           options.lamps,           calibration,
           options.calibration,     options.captures,
           options.yaw_in_robot_rad};
 }
 
-void check_image_outputs(const CaptureOptions& options) {
-  if (is_video_name(options.images)) return;
+void check_image_output_options(const CaptureOptions& options) {
+  if (is_video_file_name(options.images)) return;
   for (const auto& image : list_images(options.images)) {
-    check_output(options.output, {image.string()});
-    if (!options.lights.empty()) check_output(options.lights, {image.string()});
+    check_output_file(options.output, {image.string()});
+    if (!options.lights.empty()) check_output_file(options.lights, {image.string()});
   }
 }
 
-void print_lights(const Observations& seen) {
+void print_each_light(const Observations& seen) {
   if (!spdlog::should_log(spdlog::level::debug)) return;
   for (const Observation& image : seen.images) {
     for (const Light& light : image.lights)
-      spdlog::debug("{}: {}", image.name(), describe_light(light));
+      spdlog::debug("{}: {}", image.file_name(), describe_light(light));
   }
 }
 
-Observations observe_captures(const CaptureOptions& options, ImageUse use, const LampMap& lamps,
-                              const std::optional<Calibration>& calibration) {
-  check_image_outputs(options);
+Observations detect_lamps_in_captures(const CaptureOptions& options, ImageUse use,
+                                      const LampMap& lamps,
+                                      const std::optional<Calibration>& calibration) {
+  check_image_output_options(options);
   Observations seen;
   {
     Progress progress("images");
-    seen =
-        observe_lamps(make_lamp_images(options, lamps, calibration), use, options.frontend,
-                      [&](std::size_t done, std::size_t total) { progress.update(done, total); });
+    seen = detect_lamps_in_images(
+        make_lamp_image_inputs(options, lamps, calibration), use, options.frontend,
+        [&](std::size_t done, std::size_t total) { progress.update_display(done, total); });
   }
   StepResult remarks;
-  add_remarks(seen, remarks);
+  add_intake_remarks(seen, remarks);
   // A classifier identifies lamps without the row time.
   if (options.frontend.classifier.empty() || remarks.ok()) {
     const auto camera = calibration
@@ -191,10 +192,10 @@ Observations observe_captures(const CaptureOptions& options, ImageUse use, const
     explain_by_row_time(seen.images, lamps, camera, calibration ? file.string() : "--row-time-s",
                         remarks);
   }
-  print_remarks(remarks);
-  print_lights(seen);
-  if (!options.lights.empty()) write_lights(options.lights, seen.images);
-  throw_if_failed(remarks);
+  print_step_remarks(remarks);
+  print_each_light(seen);
+  if (!options.lights.empty()) write_lights_table(options.lights, seen.images);
+  throw_if_step_failed(remarks);
   return seen;
 }
 
@@ -208,13 +209,13 @@ LampCaptures read_lamp_captures(const CaptureOptions& options, ImageUse use) {
   captures.frames =
       std::filesystem::is_directory(options.images)
           ? collect_kept_frames(
-                observe_captures(options, use, captures.lamps, captures.calibration).images)
+                detect_lamps_in_captures(options, use, captures.lamps, captures.calibration).images)
           : read_detection_captures(options);
   return captures;
 }
 
 std::vector<Frame> read_detection_captures(const CaptureOptions& options) {
-  if (is_video_name(options.images)) {
+  if (is_video_file_name(options.images)) {
     throw std::invalid_argument(options.images +
                                 " is a video; use vlp-detect, with --captures for the frame times");
   }

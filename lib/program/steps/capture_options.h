@@ -15,7 +15,7 @@
 namespace vlp {
 
 /// Returns the default options of a program, with one thread per core.
-FrontendOptions make_default_frontend();
+FrontendOptions make_default_frontend_options();
 
 /// Captures of lamps as given on the command line. File names are also used in messages.
 struct CaptureOptions {
@@ -24,7 +24,7 @@ struct CaptureOptions {
   std::string lamps, calibration, output;
   /// File for lights.csv; empty: none.
   std::string lights;
-  FrontendOptions frontend = make_default_frontend();
+  FrontendOptions frontend = make_default_frontend_options();
   /// Table of the captures, and yaw of the camera on the robot (LampImages).
   std::optional<CapturesTable> captures;
   double yaw_in_robot_rad = 0;
@@ -50,10 +50,10 @@ inline constexpr const char* kAutomaticLens = "auto";
 void add_lens_option(CLI::App& app, std::string& lens);
 
 /// Adds --every, for programs that take videos.
-void add_every_option(CLI::App& app, int& every);
+void add_frame_step_option(CLI::App& app, int& every);
 
 /// Throws std::invalid_argument if `every` is not 1 and none of the files is a video.
-void check_every(int every, const std::vector<std::string>& files);
+void check_frame_step_needs_video(int every, const std::vector<std::string>& files);
 
 /// Adds --room.
 void add_room_option(CLI::App& app, std::string& room);
@@ -76,7 +76,7 @@ struct MotionOptions {
   std::optional<double> max_speed_m_per_s, max_yaw_rate_deg_per_s;
 
   /// Returns the prior of the motion; std::nullopt if the camera stands.
-  std::optional<KnownMotion> motion() const;
+  std::optional<KnownMotion> make_known_motion() const;
 };
 
 /// Adds --max-speed-m-per-s, with the text `help`, and --max-yaw-rate-deg-per-s.
@@ -87,27 +87,28 @@ void add_yaw_rate_sd_option(CLI::App& app, std::optional<double>& yaw_rate_sd_de
 
 /// Returns the inputs of the result: captures, lamp map, calibration, classifier; an empty name is
 /// an input that was not given.
-std::vector<std::string> list_inputs(const CaptureOptions& options);
+std::vector<std::string> list_capture_input_files(const CaptureOptions& options);
 
-/// Returns the images with lamp map and calibration for observe_lamps().
-LampImages make_lamp_images(const CaptureOptions& options, const LampMap& lamps,
-                            const std::optional<Calibration>& calibration);
+/// Returns the images with lamp map and calibration for detect_lamps_in_images().
+LampImages make_lamp_image_inputs(const CaptureOptions& options, const LampMap& lamps,
+                                  const std::optional<Calibration>& calibration);
 
 /// Throws std::invalid_argument if `output` or `lights` is one of the images.
-void check_image_outputs(const CaptureOptions& options);
+void check_image_output_options(const CaptureOptions& options);
 
 /// Prints each light if --verbose is given.
-void print_lights(const Observations& seen);
+void print_each_light(const Observations& seen);
 
 /// Detects the lamps in a folder of images or a video, with a progress display, and prints the
 /// remarks, including a contradiction between the lamps and the given row time. Throws as
-/// observe_lamps() does, and if no lamp is identified.
-Observations observe_captures(const CaptureOptions& options, ImageUse use, const LampMap& lamps,
-                              const std::optional<Calibration>& calibration);
+/// detect_lamps_in_images() does, and if no lamp is identified.
+Observations detect_lamps_in_captures(const CaptureOptions& options, ImageUse use,
+                                      const LampMap& lamps,
+                                      const std::optional<Calibration>& calibration);
 
 /// Reads lamp map, calibration, and the captures of a detections.csv or of a folder of images.
-/// Throws as observe_captures() and the readers of the files do, and std::invalid_argument if
-/// options for images are given with a table.
+/// Throws as detect_lamps_in_captures() and the readers of the files do, and std::invalid_argument
+/// if options for images are given with a table.
 LampCaptures read_lamp_captures(const CaptureOptions& options, ImageUse use);
 
 /// Reads the captures of a detections.csv. Throws std::invalid_argument for a video, and if options

@@ -43,7 +43,7 @@ void print_residuals(const RotationFit& fit, const RotationCaptures& spot) {
   for (const auto& [index, distance_px] : fit.outliers) {
     const RotationObservation& observation = spot.observations[index];
     fmt::print("  outlier   {} lamp {}: {:.2f} px off\n",
-               printable_line(spot.captures[observation.capture].image),
+               escape_for_single_line(spot.captures[observation.capture].image),
                spot.lamps[observation.lamp].id, distance_px);
   }
 }
@@ -55,8 +55,8 @@ void print_circle(const char* name, const Circle& circle) {
 
 }  // namespace
 
-void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& report,
-                   const ViewCoverage& coverage, const HeldOut& held_out) {
+void print_calibration_summary(const IntrinsicsSolution& solution, const CalibrationReport& report,
+                               const ViewCoverage& coverage, const HeldOutFit& held_out) {
   const auto& parameters = solution.problem.intrinsics;
   fmt::print("views         {} used, {} dropped\n", solution.views.size(), solution.dropped.size());
   fmt::print("corners       {}, {} outliers\n", solution.corners, solution.outliers);
@@ -68,9 +68,9 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
                std::abs(shift_px), shift_px < 0 ? "light" : "dark");
   }
   fmt::print("focal length  {:.2f}, {:.2f} px", parameters[0], parameters[1]);
-  if (is_splined(solution.problem.lens_model)) {
+  if (is_splined_lens_model(solution.problem.lens_model)) {
     fmt::print(", which {} control points make up for\n",
-               grid_of(solution.problem.lens_model).control_points());
+               spline_grid_of_model(solution.problem.lens_model).num_control_points());
   } else {
     fmt::print(", sd {:.2f} by noise, {:.2f} by views\n", report.focal_sd_px,
                report.focal_sd_by_views_px);
@@ -101,23 +101,23 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
   fmt::print("coverage      {:.0f} % of the image\n", 100 * coverage.covered_fraction);
   fmt::print("tilts         left {:.0f}, right {:.0f}, upper {:.0f}, lower {:.0f} degrees\n",
              deg_from_rad(left), deg_from_rad(right), deg_from_rad(upper), deg_from_rad(lower));
-  fmt::print("next view     {}\n", recommend_next_view(coverage));
+  fmt::print("next view     {}\n", recommend_next_board_view(coverage));
 }
 
-void print_center(const RotationCenter& center, const Camera& camera) {
+void print_rotation_center(const RotationCenter& center, const Camera& camera) {
   fmt::print("center      {:.3f} {:.3f} px in the undistorted image{}\n", center.center_px.x(),
              center.center_px.y(), format_sd(center.covariance, 1, "px"));
   const Eigen::Vector3d& up = center.zenith_in_camera;
   fmt::print("zenith      {:.6f} {:.6f} {:.6f} in the camera\n", up.x(), up.y(), up.z());
-  const auto [angle_rad, azimuth_rad] = compute_tilt(center);
-  const auto sd_rad = axis_sd_rad(center, camera);
+  const auto [angle_rad, azimuth_rad] = compute_camera_tilt(center);
+  const auto sd_rad = compute_rotation_axis_sd_rad(center, camera);
   fmt::print("tilt        {:.4f} deg towards {:.1f} deg in the image{}\n", deg_from_rad(angle_rad),
              deg_from_rad(azimuth_rad),
              sd_rad ? fmt::format(", sd {:.4f} deg", deg_from_rad(*sd_rad)) : "");
 }
 
-void print_summary(const RotationFit& fit, const RotationCaptures& spot,
-                   const CircleCenters& circles, const Camera& camera) {
+void print_calibration_summary(const RotationFit& fit, const RotationCaptures& spot,
+                               const CircleCenters& circles, const Camera& camera) {
   fmt::print("captures    {} of {}\n", spot.captures.size(),
              spot.captures.size() + spot.rejected.size());
   for (const RotationHeight& height : spot.heights) {
@@ -125,7 +125,7 @@ void print_summary(const RotationFit& fit, const RotationCaptures& spot,
                height.captures, deg_from_rad(height.arc_rad));
   }
   fmt::print("lamps       {}\n", spot.lamps.size());
-  print_center(fit.center, camera);
+  print_rotation_center(fit.center, camera);
   print_lever_arm(fit.center);
   if (circles.circles.empty()) {
     fmt::print("circles     none determined\n");
@@ -138,7 +138,8 @@ void print_summary(const RotationFit& fit, const RotationCaptures& spot,
   for (std::size_t i = 0; i < spot.captures.size(); ++i) {
     const RotationCapture& capture = spot.captures[i];
     fmt::print("{:>10} {:10.3f}  {}\n", format_height_m(spot.heights[capture.height].z_m),
-               deg_from_rad(wrap_rad(fit.yaws_rad[i])), printable_line(capture.image));
+               deg_from_rad(wrap_angle_rad(fit.yaws_rad[i])),
+               escape_for_single_line(capture.image));
   }
 }
 
@@ -151,7 +152,7 @@ void print_dispersion(const DispersionFit& fit, const Eigen::Vector2d& focal_px,
   print_circle("before", fit.before);
   print_circle("after", fit.after);
   fmt::print("offset      {:.4f} {:.4f} px", found.offset_px.x(), found.offset_px.y());
-  if (const auto covariance_px2 = offset_covariance_with_map(found, focal_px)) {
+  if (const auto covariance_px2 = compute_offset_covariance_with_map(found, focal_px)) {
     fmt::print(", sd {:.4f} {:.4f} px", std::sqrt((*covariance_px2)(0, 0)),
                std::sqrt((*covariance_px2)(1, 1)));
   }

@@ -14,16 +14,16 @@
 namespace vlp {
 
 /// Prints the solved lens and its uncertainty to stdout.
-void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& report,
-                   const ViewCoverage& coverage, const HeldOut& held_out);
+void print_calibration_summary(const IntrinsicsSolution& solution, const CalibrationReport& report,
+                               const ViewCoverage& coverage, const HeldOutFit& held_out);
 
 /// Prints center, zenith and tilt with their standard deviations to stdout.
-void print_center(const RotationCenter& center, const Camera& camera);
+void print_rotation_center(const RotationCenter& center, const Camera& camera);
 
 /// Prints the result of a rotation in place to stdout, and a note if the lever arm is not
 /// observable.
-void print_summary(const RotationFit& fit, const RotationCaptures& spot,
-                   const CircleCenters& circles, const Camera& camera);
+void print_calibration_summary(const RotationFit& fit, const RotationCaptures& spot,
+                               const CircleCenters& circles, const Camera& camera);
 
 /// Prints the circles of the fixes before and after the correction, and the errors of camera and
 /// world, to stdout.

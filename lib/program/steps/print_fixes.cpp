@@ -17,7 +17,7 @@ namespace {
 
 double mm(double value_m) { return 1e3 * value_m; }
 
-void print_figure(const char* name, double value_m, const Interval* interval_m) {
+void print_statistic(const char* name, double value_m, const Interval* interval_m) {
   fmt::print("{:10} {:>10.3f} mm", name, mm(value_m));
   if (interval_m != nullptr) {
     fmt::print("   {:.3f} to {:.3f}", mm(interval_m->low), mm(interval_m->high));
@@ -34,11 +34,11 @@ void print_horizontal(const Evaluation& evaluation) {
   } else {
     fmt::print("   too few {} for an interval\n", evaluation.resampling_unit);
   }
-  print_figure("mean", statistics.mean, intervals ? &intervals->mean : nullptr);
-  print_figure("median", statistics.median, intervals ? &intervals->median : nullptr);
-  print_figure("p90", statistics.p90, intervals && intervals->p90 ? &*intervals->p90 : nullptr);
-  print_figure("rms", statistics.rms, intervals ? &intervals->rms : nullptr);
-  print_figure("max", statistics.max, nullptr);
+  print_statistic("mean", statistics.mean, intervals ? &intervals->mean : nullptr);
+  print_statistic("median", statistics.median, intervals ? &intervals->median : nullptr);
+  print_statistic("p90", statistics.p90, intervals && intervals->p90 ? &*intervals->p90 : nullptr);
+  print_statistic("rms", statistics.rms, intervals ? &intervals->rms : nullptr);
+  print_statistic("max", statistics.max, nullptr);
   fmt::print("\nshare of the fixes, and the error in mm that it does not exceed\n");
   const auto& distribution_m = evaluation.distribution_m;
   const std::initializer_list<std::size_t> percents{10, 25, 50, 68, 75, 90, 95, 99, 100};
@@ -62,7 +62,7 @@ void print_height_and_yaw(const Evaluation& evaluation) {
   }
 }
 
-void print_stations(const BiasAndScatter& statistics) {
+void print_bias_and_repeatability(const BiasAndRepeatability& statistics) {
   const auto& stations = statistics.stations;
   const auto worst_bias = std::max_element(
       stations.begin(), stations.end(),
@@ -78,7 +78,7 @@ void print_stations(const BiasAndScatter& statistics) {
       worst_sd->xy_m.x(), worst_sd->xy_m.y());
 }
 
-void print_fit(const LineFit& fit) {
+void print_line_fit(const LineFit& fit) {
   const ErrorStatistics& statistics = fit.distances_m;
   fmt::print(
       "line fit    mean {:.3f} mm, median {:.3f}, p90 {:.3f}, rms {:.3f}, max {:.3f}\n"
@@ -88,7 +88,7 @@ void print_fit(const LineFit& fit) {
       mm(statistics.max), mm(fit.jitter_m), deg_from_rad(fit.angle_rad));
 }
 
-void print_ratios(const Evaluation& evaluation) {
+void print_normalized_errors_and_crlb(const Evaluation& evaluation) {
   if (const auto& normalized_errors = evaluation.normalized_errors) {
     fmt::print("error / sd  horizontal {:.3f}", normalized_errors->horizontal);
     if (normalized_errors->height) fmt::print(", height {:.3f}", *normalized_errors->height);
@@ -106,13 +106,13 @@ void print_ratios(const Evaluation& evaluation) {
   if (const auto& limit = evaluation.limit) {
     fmt::print("limit       {:.3f} mm rms, error / limit {:.3f} ({})\n", mm(limit->limit_m),
                limit->horizontal,
-               limit->is_below_limit() ? "below the limit: see the warning"
-                                       : "1: the best of one level image");
+               limit->is_below_crlb() ? "below the limit: see the warning"
+                                      : "1: the best of one level image");
   }
 }
 
 void print_comparison(const Comparison& comparison) {
-  fmt::print("compared    {}", comparison.words());
+  fmt::print("compared    {}", comparison.describe_result());
   if (comparison.pairs > 0) {
     fmt::print(": mean error differs by {:+.3f} mm", mm(comparison.mean_difference_m));
   }
@@ -166,19 +166,19 @@ void print_evaluation(const Evaluation& evaluation, const std::vector<CheckedMet
   }
   print_horizontal(evaluation);
   print_height_and_yaw(evaluation);
-  if (evaluation.stations) print_stations(*evaluation.stations);
-  if (evaluation.fit) print_fit(*evaluation.fit);
-  print_ratios(evaluation);
+  if (evaluation.stations) print_bias_and_repeatability(*evaluation.stations);
+  if (evaluation.fit) print_line_fit(*evaluation.fit);
+  print_normalized_errors_and_crlb(evaluation);
   if (evaluation.comparison) print_comparison(*evaluation.comparison);
   if (!gates.empty()) fmt::print("\n");
   for (const CheckedMetric& gate : gates) {
-    fmt::print("{:6} gate {:20} {:>10.4g} {:3} {} {:.4g}\n", gate.passed() ? "met" : "NOT MET",
+    fmt::print("{:6} gate {:20} {:>10.4g} {:3} {} {:.4g}\n", gate.has_passed() ? "met" : "NOT MET",
                gate.name, gate.value.value(), gate.unit, describe(gate.direction),
                gate.limit.value());
   }
 }
 
-void print_limits(const FloorSummary& summary, const FloorLimits& limits, bool is_free) {
+void print_floor_limits(const FloorSummary& summary, const FloorLimits& limits, bool is_free) {
   const auto in_view =
       std::count_if(limits.places.begin(), limits.places.end(),
                     [](const FloorLimits::Place& place) { return place.lamps > 1; });
@@ -199,10 +199,10 @@ void print_limits(const FloorSummary& summary, const FloorLimits& limits, bool i
   print(summary.together);
 }
 
-void print_advice(const FloorSummary& summary) {
-  const auto& [name, key] = summary.largest().source;
+void print_largest_error_source(const FloorSummary& summary) {
+  const auto& [name, key] = summary.largest_error_source().source;
   fmt::print("\nimprove     {} first, {:.0f} % of the horizontal variance: {}\n", name,
-             100 * summary.largest().fraction, find_remedy(key));
+             100 * summary.largest_error_source().fraction, find_remedy(key));
 }
 
 }  // namespace vlp

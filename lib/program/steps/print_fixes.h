@@ -21,9 +21,9 @@ void print_evaluation(const Evaluation& evaluation, const std::vector<CheckedMet
 /// Prints the error budget of a floor to stdout: the median over the floor and the worst place of
 /// each source. `is_free`: the camera may move or tilt, which two lamps do not determine
 /// everywhere.
-void print_limits(const FloorSummary& summary, const FloorLimits& limits, bool is_free);
+void print_floor_limits(const FloorSummary& summary, const FloorLimits& limits, bool is_free);
 
 /// Prints the largest error source and its remedy to stdout.
-void print_advice(const FloorSummary& summary);
+void print_largest_error_source(const FloorSummary& summary);
 
 }  // namespace vlp

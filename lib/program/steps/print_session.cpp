@@ -23,11 +23,11 @@ std::optional<double> find(const SessionResult& result, const std::string& name)
 
 }  // namespace
 
-SessionObserver SessionLog::observer() {
+SessionObserver SessionLog::make_session_observer() {
   return {[this](const std::string&) { step_start_ = Clock::now(); },
           [this](std::size_t done, std::size_t total) {
             if (!progress_) progress_ = std::make_unique<Progress>("images");
-            progress_->update(done, total);
+            progress_->update_display(done, total);
           },
           [this](const SessionStep& step) { on_step_finished(step); }};
 }
@@ -40,10 +40,10 @@ void SessionLog::on_step_finished(const SessionStep& step) {
              step.is_up_to_date ? "as before" : fmt::format("{:5.1f} s", seconds),
              step.result.ok() ? missed ? ", a gate is not met" : "" : ", failed");
   std::fflush(stdout);
-  print_remarks(step.result);
+  print_step_remarks(step.result);
 }
 
-void print_session(const SessionResult& result, const std::string& results) {
+void print_session_result(const SessionResult& result, const std::string& results) {
   struct MetricRow {
     const char *label, *metric, *unit;
   };
@@ -62,7 +62,7 @@ void print_session(const SessionResult& result, const std::string& results) {
     if (const auto value = find(result, name)) fmt::print("{:11} {:.4g} {}\n", label, *value, unit);
   }
   for (const CheckedMetric& gate : result.gates) {
-    if (!gate.passed()) fmt::print("NOT MET     {}\n", describe(gate));
+    if (!gate.has_passed()) fmt::print("NOT MET     {}\n", describe(gate));
   }
   fmt::print("verdict     {}; results are in {}\n", to_string(result.verdict), results);
 }

@@ -16,7 +16,7 @@ namespace vlp {
 class SessionLog {
  public:
   /// Returns the callbacks for one run. The log must outlive the run.
-  SessionObserver observer();
+  SessionObserver make_session_observer();
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -28,6 +28,6 @@ class SessionLog {
 };
 
 /// Prints the main metrics of a session, its failed gates and the verdict to stdout.
-void print_session(const SessionResult& result, const std::string& results);
+void print_session_result(const SessionResult& result, const std::string& results);
 
 }  // namespace vlp

@@ -7,7 +7,7 @@
 namespace vlp {
 namespace {
 
-void print_labeled(const LabeledLights& labeled, const LampClassifier& classifier) {
+void print_labeled_lights(const LabeledLights& labeled, const LampClassifier& classifier) {
   int used = 0;
   for (const auto& lamp : classifier.lamps) used += lamp.examples;
   const auto lights = static_cast<int>(labeled.lights.size());
@@ -30,13 +30,14 @@ void print_confusion(const Confusion& confusion) {
   }
   const int all = confusion.counts.sum();
   fmt::print("right       {:.2f} %\n  wrong     {}\n  unknown   {}\n",
-             100.0 * confusion.right() / all, confusion.wrong(), confusion.unknown());
+             100.0 * confusion.right() / all, confusion.count_wrongly_identified(),
+             confusion.unknown());
 }
 
 }  // namespace
 
-void print_training(const TrainStepResult& result) {
-  print_labeled(result.labeled, result.classifier);
+void print_classifier_training(const TrainStepResult& result) {
+  print_labeled_lights(result.labeled, result.classifier);
   print_confusion(result.confusion);
 }
 

@@ -9,7 +9,7 @@
 namespace vlp {
 
 /// Prints the training data of a classifier and its cross-validated answers to stdout.
-void print_training(const TrainStepResult& result);
+void print_classifier_training(const TrainStepResult& result);
 
 /// Prints the estimated row time and its data to stdout.
 void print_row_time(const RowTime& row_time, Readout readout);

@@ -34,7 +34,7 @@ void report(const TiltCalibration& result, const Camera& camera) {
   fmt::print("captures    {} used, {} of fewer than three lamps, {} left out\n", result.captures,
              result.captures_of_few_lamps, result.captures_rejected);
   fmt::print("detections  {} used, {} left out\n", result.detections, result.detections_rejected);
-  print_center(result.center, camera);
+  print_rotation_center(result.center, camera);
   fmt::print(
       "residual    {:.4f} px per axis; for a level camera{} {:.4f} px in the undistorted image\n",
       result.residual_px, result.corrections.empty() ? "" : " and the original map",
@@ -51,21 +51,21 @@ void report(const TiltCalibration& result, const Camera& camera) {
 void run_rotation_by_lamps(const CLI::App& app, CaptureOptions images, const TiltOptions& options) {
   const std::string& refined_map = options.refined_map;
   const fs::path captures = captures_file(images, options);
-  std::vector<std::string> inputs = list_inputs(images);
+  std::vector<std::string> inputs = list_capture_input_files(images);
   inputs.push_back(captures.string());
-  check_outputs({{"--output", images.output}, {"--refine-map", refined_map}}, inputs);
+  check_output_files({{"--output", images.output}, {"--refine-map", refined_map}}, inputs);
   images.captures.emplace();  // inclinations are ignored: the level direction is estimated
   LampCaptures input = read_lamp_captures(images, ImageUse::fixes);
-  check_lamps(input.frames, input.lamps, input.lamps_file);
-  input.motions = find_motions(
-      input.frames, captures.empty() ? CapturesTable() : read_captures(captures),
-      options.motion.motion(), rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0)));
+  check_lamps_in_map(input.frames, input.lamps, input.lamps_file);
+  input.motions = find_capture_motions(
+      input.frames, captures.empty() ? CapturesTable() : read_captures_csv(captures),
+      options.motion.make_known_motion(), rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0)));
   // A table without motion does not affect the result and is not recorded.
   if (input.motions.empty()) inputs.pop_back();
-  const LevelingResult result =
-      solve_leveling(input, !refined_map.empty(), make_program_history_entry(app, inputs));
-  print_remarks(result);
-  throw_if_failed(result);
+  const TiltResult result =
+      run_tilt_step(input, !refined_map.empty(), make_program_history_entry(app, inputs));
+  print_step_remarks(result);
+  throw_if_step_failed(result);
   if (!refined_map.empty()) {
     write_refined_map(refined_map, result.leveling.map, images.frontend.room);
   }
@@ -75,19 +75,19 @@ void run_rotation_by_lamps(const CLI::App& app, CaptureOptions images, const Til
 
 void run_rotation_in_place(const CLI::App& app, CaptureOptions images, const std::string& method,
                            const std::string& plot) {
-  const std::vector<std::string> inputs = list_inputs(images);
-  check_outputs({{"--output", images.output}, {"--plot", plot}}, inputs);
+  const std::vector<std::string> inputs = list_capture_input_files(images);
+  check_output_files({{"--output", images.output}, {"--plot", plot}}, inputs);
   images.captures.emplace();  // inclinations are ignored: the axis defines the level direction
   const LampCaptures input = read_lamp_captures(images, ImageUse::turn);
   const auto* const named = std::ranges::find(kRotationMethods, method,
                                               &std::pair<std::string_view, RotationMethod>::first);
   const RotationResult found =
-      solve_rotation(input, named->second, make_program_history_entry(app, inputs));
-  print_remarks(found);
-  throw_if_failed(found);
-  if (!plot.empty()) draw(plot, found.drawing());
+      run_rotation_step(input, named->second, make_program_history_entry(app, inputs));
+  print_step_remarks(found);
+  throw_if_step_failed(found);
+  if (!plot.empty()) write_plot(plot, found.drawing());
   write_calibration(images.output, found.calibration);
-  print_summary(found.fit, found.spot, found.circles, input.calibration.camera);
+  print_calibration_summary(found.fit, found.spot, found.circles, input.calibration.camera);
 }
 
 }  // namespace vlp

@@ -17,23 +17,24 @@ namespace vlp {
 
 namespace {
 
-bool affects_result(const CLI::Option& option) {
-  const auto excluded = options_without_history();
+bool does_option_affect_result(const CLI::Option& option) {
+  const auto excluded = list_options_not_in_history();
   return std::find(excluded.begin(), excluded.end(), option.get_name()) == excluded.end();
 }
 
 /// Returns true if the value of the option is the name of an output file.
-bool names_output(const CLI::Option& option) { return option.get_name() == "--refine-map"; }
+bool is_output_option(const CLI::Option& option) { return option.get_name() == "--refine-map"; }
 
 std::string format_options(const CLI::App& app, const std::vector<std::string>& inputs) {
   std::string text;
   for (const CLI::Option* option : app.get_options()) {
-    if (option->count() == 0 || option->get_positional() || !affects_result(*option)) continue;
+    if (option->count() == 0 || option->get_positional() || !does_option_affect_result(*option))
+      continue;
     text += (text.empty() ? "" : " ") + option->get_name();
     if (option->get_items_expected_max() == 0) continue;  // a flag
     for (const std::string& value : option->results()) {
-      const bool file =
-          names_output(*option) || std::find(inputs.begin(), inputs.end(), value) != inputs.end();
+      const bool file = is_output_option(*option) ||
+                        std::find(inputs.begin(), inputs.end(), value) != inputs.end();
       text += " " + (file ? last_path_component(value) : value);
     }
   }
@@ -42,7 +43,7 @@ std::string format_options(const CLI::App& app, const std::vector<std::string>& 
 
 }  // namespace
 
-void print_remarks(const StepResult& result) {
+void print_step_remarks(const StepResult& result) {
   for (const std::string& note : result.notes) spdlog::info("{}", note);
   for (const auto& [image, reason] : result.skipped) {
     spdlog::warn("{}{}{}; skipped", image, image.empty() ? "" : ": ", reason);
@@ -51,13 +52,14 @@ void print_remarks(const StepResult& result) {
   for (const std::string& detail : result.details) spdlog::debug("{}", detail);
 }
 
-void throw_if_failed(const StepResult& result) {
+void throw_if_step_failed(const StepResult& result) {
   if (result.ok()) return;
-  if (result.failure == StepFailure::undetermined) throw Undetermined(message_of(result));
-  throw std::invalid_argument(message_of(result));
+  if (result.failure == StepFailure::undetermined)
+    throw Undetermined(format_failure_message(result));
+  throw std::invalid_argument(format_failure_message(result));
 }
 
-std::span<const std::string_view> options_without_history() {
+std::span<const std::string_view> list_options_not_in_history() {
   static constexpr std::array<std::string_view, 15> excluded = {
       "--output",  "--plot",   "--annotate", "--threads", "--quiet",
       "--verbose", "--cache",  "--ros",      "--corners", "--kalibr",

@@ -17,22 +17,22 @@ class App;
 namespace vlp {
 
 /// Prints the remarks of a step to stderr: skipped images, warnings, notes, details.
-void print_remarks(const StepResult& result);
+void print_step_remarks(const StepResult& result);
 
 /// Throws if the step failed: Undetermined for StepFailure::undetermined, std::invalid_argument for
 /// all other failures.
-void throw_if_failed(const StepResult& result);
+void throw_if_step_failed(const StepResult& result);
 
 /// Returns the options that do not affect the recorded result: --output, other outputs, a cache,
 /// and options of the display.
-std::span<const std::string_view> options_without_history();
+std::span<const std::string_view> list_options_not_in_history();
 
 /// Makes the history entry of a part of a calibration, without the name of the part
 /// (rig/calibration_builder.h). Holds program and version, the given options in the order of
 /// --help, and a digest of each input.
 ///
 /// The entry is the same on every machine: paths are reduced to their last component, and
-/// options_without_history() are omitted.
+/// list_options_not_in_history() are omitted.
 ///
 /// @param inputs  files and folders of images; an empty name is an input that was not given
 /// @throws InputError if an input cannot be read

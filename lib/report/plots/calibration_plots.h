@@ -30,8 +30,8 @@ struct DispersionPlot {
   std::vector<Eigen::Vector2d> outliers_m;
 };
 
-/// Makes the plot, in millimeters, for draw().
-Drawing make_drawing(const DispersionPlot& plot);
+/// Makes the plot, in millimeters, for write_plot().
+Drawing make_gnuplot_drawing(const DispersionPlot& plot);
 
 /// Lamps in the undistorted image while the camera rotates in place: figure 4 of Chen and Guan.
 struct RotationPlot {
@@ -48,9 +48,9 @@ struct RotationPlot {
   Eigen::Vector2d principal_point_px;
 };
 
-/// Makes the plot for draw(): the traces, and next to them, enlarged, the centers of the ellipses,
-/// the rotation center and the principal point.
-Drawing make_drawing(const RotationPlot& plot);
+/// Makes the plot for write_plot(): the traces, and next to them, enlarged, the centers of the
+/// ellipses, the rotation center and the principal point.
+Drawing make_gnuplot_drawing(const RotationPlot& plot);
 
 /// Residuals and uncertainty of a lens calibration over the image.
 struct IntrinsicsPlot {
@@ -80,24 +80,25 @@ struct IntrinsicsPlot {
 ///
 /// The factor is a round number (1, 2 or 5 times a power of ten) that makes the RMS 1/100 to 1/40
 /// of the width. 1 if there are no residuals.
-double residual_magnification(double rms_px, int width_px);
+double choose_residual_magnification(double rms_px, int width_px);
 
-/// Makes the plot for draw(): maps of the corners, of their enlarged residuals, of the standard
-/// deviation of the projection, and of the MTF50 if it was measured.
-Drawing make_drawing(const IntrinsicsPlot& plot);
+/// Makes the plot for write_plot(): maps of the corners, of their enlarged residuals, of the
+/// standard deviation of the projection, and of the MTF50 if it was measured.
+Drawing make_gnuplot_drawing(const IntrinsicsPlot& plot);
 
 /// Collects corners and residuals of a solution, and the uncertainty of its projection. Includes
 /// the sharpness if it was measured. `lattice` is that of the solution's boards.
 /// @pre solution.ok()
-IntrinsicsPlot make_plot(const std::string& title, const IntrinsicsSolution& solution,
-                         const BoardLattice& lattice,
-                         const std::optional<LensSharpness>& sharpness);
+IntrinsicsPlot collect_plot_data(const std::string& title, const IntrinsicsSolution& solution,
+                                 const BoardLattice& lattice,
+                                 const std::optional<LensSharpness>& sharpness);
 
 /// Collects the lamps of a rotation in place with their circles, and the rotation center.
-RotationPlot make_plot(const std::string& title, const RotationCaptures& spot,
-                       const CircleCenters& circles, const RotationFit& fit, const Camera& camera);
+RotationPlot collect_plot_data(const std::string& title, const RotationCaptures& spot,
+                               const CircleCenters& circles, const RotationFit& fit,
+                               const Camera& camera);
 
 /// Collects the fixes at a known reference point, before and after the correction.
-DispersionPlot make_plot(const std::string& title, const DispersionFit& fit);
+DispersionPlot collect_plot_data(const std::string& title, const DispersionFit& fit);
 
 }  // namespace vlp

@@ -29,7 +29,7 @@ std::vector<double> compute_lengths_m(const ErrorPlot& plot) {
 }
 
 /// Makes the table of the largest errors, in descending order.
-std::vector<std::vector<std::string>> make_table(const ErrorPlot& plot) {
+std::vector<std::vector<std::string>> make_error_table(const ErrorPlot& plot) {
   constexpr std::size_t max_rows = 10;
   constexpr int place_digits = 3, error_digits = 2;
   constexpr double millimeters = 1e3;
@@ -46,11 +46,12 @@ std::vector<std::vector<std::string>> make_table(const ErrorPlot& plot) {
   for (std::size_t i = 0; i < count; ++i) {
     const ErrorPlot::Fix& fix = fixes[i];
     const Eigen::Vector2d error_mm = millimeters * (fix.fix_m - fix.truth_m);
-    table.push_back(
-        {fix.image,
-         fixed(fix.truth_m.x(), place_digits) + ", " + fixed(fix.truth_m.y(), place_digits),
-         fixed(error_mm.x(), error_digits) + ", " + fixed(error_mm.y(), error_digits),
-         fixed(error_mm.norm(), error_digits)});
+    table.push_back({fix.image,
+                     format_fixed_decimals(fix.truth_m.x(), place_digits) + ", " +
+                         format_fixed_decimals(fix.truth_m.y(), place_digits),
+                     format_fixed_decimals(error_mm.x(), error_digits) + ", " +
+                         format_fixed_decimals(error_mm.y(), error_digits),
+                     format_fixed_decimals(error_mm.norm(), error_digits)});
   }
   return table;
 }
@@ -75,9 +76,9 @@ struct Scale {
     if (extent.isEmpty()) extent.extend(Eigen::Vector2d::Zero());
     constexpr double min_m = 1e-3;
     width_m = std::max(extent.sizes().maxCoeff(), min_m);
-    magnification = error_magnification(p90_m, width_m);
+    magnification = choose_error_magnification(p90_m, width_m);
   }
-  double longest_m() const { return kLongestShare * width_m / magnification; }
+  double find_longest_arrow_m() const { return kLongestShare * width_m / magnification; }
 };
 
 /// Data blocks of the plot. The constructor extends `scale.paper` by the arrows.
@@ -88,34 +89,35 @@ struct Blocks {
     for (const std::size_t i :
          select_every_nth_and_largest(compute_lengths_m(plot), step, step > 1 ? kFurthest : 0)) {
       const Eigen::Vector2d& from_m = plot.fixes[i].truth_m;
-      const double length_m = error_m(plot.fixes[i]), longest_m = scale.longest_m();
+      const double length_m = error_m(plot.fixes[i]), longest_m = scale.find_longest_arrow_m();
       Eigen::Vector2d arrow_m = scale.magnification * (plot.fixes[i].fix_m - from_m);
       if (length_m > longest_m) arrow_m *= longest_m / length_m;
       (length_m > longest_m ? cut : arrows) +=
-          format_data_row({from_m.x(), from_m.y(), arrow_m.x(), arrow_m.y()});
-      places += format_data_row({from_m.x(), from_m.y()});
+          format_gnuplot_data_row({from_m.x(), from_m.y(), arrow_m.x(), arrow_m.y()});
+      places += format_gnuplot_data_row({from_m.x(), from_m.y()});
       scale.extent.extend(from_m + arrow_m);
     }
-    const std::size_t missing_step = thinning_step(plot.missing_m.size(), kMaxMissing);
+    const std::size_t missing_step = compute_thinning_step(plot.missing_m.size(), kMaxMissing);
     for (std::size_t i = 0; i < plot.missing_m.size(); i += missing_step) {
-      missing += format_data_row({plot.missing_m[i].x(), plot.missing_m[i].y()});
+      missing += format_gnuplot_data_row({plot.missing_m[i].x(), plot.missing_m[i].y()});
     }
     for (const Lamp& lamp : plot.lamps.lamps) {
-      lamps += format_data_row({lamp.position_m.x(), lamp.position_m.y(), double(lamp.id)});
+      lamps += format_gnuplot_data_row({lamp.position_m.x(), lamp.position_m.y(), double(lamp.id)});
     }
   }
   std::string text() const {
-    return data_block("arrows", arrows) + data_block("cut", cut) + data_block("places", places) +
-           data_block("missing", missing) + data_block("lamps", lamps);
+    return make_gnuplot_data_block("arrows", arrows) + make_gnuplot_data_block("cut", cut) +
+           make_gnuplot_data_block("places", places) + make_gnuplot_data_block("missing", missing) +
+           make_gnuplot_data_block("lamps", lamps);
   }
 };
 
 /// Returns a scale bar at the lower left, in the space below the plan.
 std::string make_scale_bar(const Scale& scale, const Eigen::Vector2d& from_m) {
   if (!(scale.p90_m > 0)) return "";
-  const double length_m = round_below(1.5 * scale.p90_m);
+  const double length_m = round_down_to_1_2_5_series(1.5 * scale.p90_m);
   const auto at = [&](double x_m) {
-    return significant(x_m, 7) + "," + significant(from_m.y(), 7);
+    return format_significant_digits(x_m, 7) + "," + format_significant_digits(from_m.y(), 7);
   };
   const double end_m = from_m.x() + scale.magnification * length_m;
   return "set arrow from " + at(from_m.x()) + " to " + at(end_m) +
@@ -123,11 +125,12 @@ std::string make_scale_bar(const Scale& scale, const Eigen::Vector2d& from_m) {
          format_mm_with_unit(length_m) + "' at " + at(end_m) + " offset 1,0 front\n";
 }
 
-std::string layers(const ErrorPlot& plot, const Blocks& blocks, const Scale& scale) {
+std::string format_plot_commands(const ErrorPlot& plot, const Blocks& blocks, const Scale& scale) {
   const std::string arrow =
       " using 1:2:3:4 with vectors filled head size graph 0.012,20 linewidth ";
-  const auto cut = std::count_if(plot.fixes.begin(), plot.fixes.end(),
-                                 [&](const auto& fix) { return error_m(fix) > scale.longest_m(); });
+  const auto cut = std::count_if(plot.fixes.begin(), plot.fixes.end(), [&](const auto& fix) {
+    return error_m(fix) > scale.find_longest_arrow_m();
+  });
   std::vector<std::string> layers;
   if (!blocks.arrows.empty()) {
     layers.push_back("$arrows" + arrow + "1.3" + line_color(plot_colors::blue) +
@@ -141,13 +144,14 @@ std::string layers(const ErrorPlot& plot, const Blocks& blocks, const Scale& sca
   if (cut > 0) {
     layers.push_back("$cut" + arrow + "1.5 dashtype 2" + line_color(plot_colors::vermilion) +
                      "title '" + std::to_string(cut) + " beyond " +
-                     format_mm_with_unit(scale.longest_m()) + ", cut short'");
+                     format_mm_with_unit(scale.find_longest_arrow_m()) + ", cut short'");
   }
   if (!blocks.missing.empty()) {
-    const std::size_t count = plot.missing_m.size(), step = thinning_step(count, kMaxMissing);
+    const std::size_t count = plot.missing_m.size(),
+                      step = compute_thinning_step(count, kMaxMissing);
     layers.push_back("$missing using 1:2 with points pointtype 2 linewidth 2" +
                      line_color(plot_colors::vermilion) + "title 'no fix: " +
-                     (step == 1 ? std::to_string(count) : thinning_note(count, step)) + "'");
+                     (step == 1 ? std::to_string(count) : describe_thinning(count, step)) + "'");
   }
   if (!blocks.lamps.empty()) {
     layers.push_back("$lamps using 1:2 with points pointtype 6 pointsize 1.6 linewidth 2" +
@@ -168,19 +172,20 @@ constexpr std::array<const char*, 4> kColors = {plot_colors::blue, plot_colors::
 std::string format_steps(std::vector<double> errors_m) {
   std::sort(errors_m.begin(), errors_m.end());
   const std::size_t count = errors_m.size(), steps = std::min(count, kMaxSteps);
-  std::string rows = format_data_row({0, 0});
+  std::string rows = format_gnuplot_data_row({0, 0});
   for (std::size_t i = 1; i <= steps; ++i) {
     const std::size_t rank = count * i / steps;
-    rows += format_data_row({1e3 * errors_m[rank - 1], 100 * double(rank) / double(count)});
+    rows += format_gnuplot_data_row({1e3 * errors_m[rank - 1], 100 * double(rank) / double(count)});
   }
   return rows;
 }
 
 /// Returns the data blocks of a curve: its steps and its two marks.
 std::string format_blocks(const CdfPlot::Curve& curve, const std::string& number) {
-  return data_block("curve" + number, format_steps(curve.errors_m)) +
-         data_block("marks" + number, format_data_row({1e3 * curve.p50_m, 50}) +
-                                          format_data_row({1e3 * curve.p90_m, 90}));
+  return make_gnuplot_data_block("curve" + number, format_steps(curve.errors_m)) +
+         make_gnuplot_data_block("marks" + number,
+                                 format_gnuplot_data_row({1e3 * curve.p50_m, 50}) +
+                                     format_gnuplot_data_row({1e3 * curve.p90_m, 90}));
 }
 
 std::string format_layer(const CdfPlot::Curve& curve, std::size_t i) {
@@ -189,7 +194,7 @@ std::string format_layer(const CdfPlot::Curve& curve, std::size_t i) {
                     label = curve.label + ": p50 " + format_mm(curve.p50_m) + " mm, p90 " +
                             format_mm(curve.p90_m) + " mm";
   return "$curve" + number + " using 1:2 with steps linewidth 2.5" + style + "title " +
-         gnuplot_quoted(label) + " noenhanced, $marks" + number +
+         quote_for_gnuplot(label) + " noenhanced, $marks" + number +
          " using 1:2 with points pointtype " + std::to_string(5 + 2 * (i % kColors.size())) +
          " pointsize 1.3" + color + "notitle";
 }
@@ -212,11 +217,11 @@ struct LineFrame {
 /// Returns x and y in the world, meters along the commanded line, and millimeters to its left.
 std::string format_row(const LineFrame& frame, const Eigen::Vector2d& point_m) {
   const Eigen::Vector2d in_line_m = frame.to_line_frame(point_m);
-  return format_data_row({point_m.x(), point_m.y(), in_line_m.x(), 1e3 * in_line_m.y()});
+  return format_gnuplot_data_row({point_m.x(), point_m.y(), in_line_m.x(), 1e3 * in_line_m.y()});
 }
 
 /// Returns the plot command of commanded line, fixes and fitted line for these data columns.
-std::string layers(const std::string& columns) {
+std::string format_plot_commands(const std::string& columns) {
   return "plot $commanded using " + columns + " with lines linewidth 2 linecolor rgb 'black' " +
          "title 'commanded', $fixes using " + columns + " with points pointtype 7 pointsize 0.35" +
          line_color(plot_colors::blue) + "title 'fixes', $fitted using " + columns +
@@ -264,20 +269,21 @@ constexpr std::array<const char*, 5> kPartColors{plot_colors::gray, plot_colors:
                                                  plot_colors::green, plot_colors::purple,
                                                  plot_colors::vermilion};
 
-double compute_sum(const std::vector<double>& values) {
+double compute_total_variance(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
 /// Returns one line per column: the variances in mm^2.
 std::string format_columns(const BudgetPlot& plot) {
   auto fixes = plot.variances_m2;
-  std::stable_sort(fixes.begin(), fixes.end(),
-                   [](const auto& a, const auto& b) { return compute_sum(a) < compute_sum(b); });
+  std::stable_sort(fixes.begin(), fixes.end(), [](const auto& a, const auto& b) {
+    return compute_total_variance(a) < compute_total_variance(b);
+  });
   const std::size_t columns = std::min(fixes.size(), kMaxColumns);
   std::string rows;
   for (std::size_t i = 1; i <= columns; ++i) {
     for (const double variance_m2 : fixes[fixes.size() * i / columns - 1]) {
-      rows.append(significant(1e6 * variance_m2, kPlotDigits)).append(" ");
+      rows.append(format_significant_digits(1e6 * variance_m2, kPlotDigits)).append(" ");
     }
     rows.append("\n");
   }
@@ -286,21 +292,21 @@ std::string format_columns(const BudgetPlot& plot) {
 
 }  // namespace
 
-double error_magnification(double p90_m, double width_m) {
+double choose_error_magnification(double p90_m, double width_m) {
   constexpr double largest_share = 0.1;
-  return p90_m > 0 ? std::max(1.0, round_below(largest_share * width_m / p90_m)) : 1;
+  return p90_m > 0 ? std::max(1.0, round_down_to_1_2_5_series(largest_share * width_m / p90_m)) : 1;
 }
 
-Drawing make_drawing(const ErrorPlot& plot) {
+Drawing make_gnuplot_drawing(const ErrorPlot& plot) {
   Scale scale(plot);
-  const std::size_t step = thinning_step(plot.fixes.size(), kMaxArrows);
+  const std::size_t step = compute_thinning_step(plot.fixes.size(), kMaxArrows);
   const Blocks blocks(plot, step, scale);
   const double margin_m = 0.06 * scale.width_m;
   const Eigen::Vector2d lower = scale.extent.min() - Eigen::Vector2d(margin_m, 2 * margin_m),
                         upper = scale.extent.max() + Eigen::Vector2d(margin_m, margin_m);
-  std::string title =
-      plot.title + "\nerrors drawn " + significant(scale.magnification, 6) + " times as long";
-  const std::string note = thinning_note(plot.fixes.size(), step);
+  std::string title = plot.title + "\nerrors drawn " +
+                      format_significant_digits(scale.magnification, 6) + " times as long";
+  const std::string note = describe_thinning(plot.fixes.size(), step);
   if (!note.empty()) title += "; " + note + ", and the 20 largest";
   constexpr int width_px = 720, beside_px = 90, around_px = 180, smallest_px = 400,
                 largest_px = 900;
@@ -308,15 +314,16 @@ Drawing make_drawing(const ErrorPlot& plot) {
   return {
       "errors", width_px,
       static_cast<int>(std::clamp<double>(plan_px + around_px, smallest_px, largest_px)),
-      blocks.text() + plot_settings() + set_title(title) +
+      blocks.text() + make_common_plot_settings() + set_title(title) +
           make_scale_bar(scale, {scale.extent.min().x(), scale.extent.min().y() - 1.2 * margin_m}) +
           "set xlabel 'x (m)'\nset ylabel 'y (m)'\nset size ratio -1\nset xrange " +
-          plot_range(lower.x(), upper.x()) + "\nset yrange " + plot_range(lower.y(), upper.y()) +
-          "\n" + layers(plot, blocks, scale),
-      make_table(plot)};
+          format_gnuplot_range(lower.x(), upper.x()) + "\nset yrange " +
+          format_gnuplot_range(lower.y(), upper.y()) + "\n" +
+          format_plot_commands(plot, blocks, scale),
+      make_error_table(plot)};
 }
 
-Drawing make_drawing(const CdfPlot& plot) {
+Drawing make_gnuplot_drawing(const CdfPlot& plot) {
   assert(!plot.curves.empty());
   constexpr double off_the_picture = 4, margin = 1.05;
   double largest_m = 0, largest_p90_m = 0;
@@ -336,80 +343,88 @@ Drawing make_drawing(const CdfPlot& plot) {
   const std::string beyond =
       cut ? "; the largest, " + format_mm(largest_m) + " mm, is outside the plot" : "";
   return {"cdf", 720, 460 + 24 * static_cast<int>(plot.curves.size()),
-          blocks + plot_settings() + set_title(plot.title) + "set xlabel 'horizontal error (mm)" +
-              beyond +
+          blocks + make_common_plot_settings() + set_title(plot.title) +
+              "set xlabel 'horizontal error (mm)" + beyond +
               "'\n"
               "set ylabel 'share of fixes no further off (%)'\n"
               "set key vertical maxrows " +
               std::to_string(plot.curves.size()) + "\nset xrange " +
-              plot_range(0, 1e3 * margin * range_m) +
+              format_gnuplot_range(0, 1e3 * margin * range_m) +
               "\nset yrange [0:102]\nset ytics (0, 25, 50, 75, 90, 100)\n" + layers + "\n"};
 }
 
-Drawing make_drawing(const TrackPlot& plot) {
+Drawing make_gnuplot_drawing(const TrackPlot& plot) {
   assert(plot.commanded_m[0] != plot.commanded_m[1] && plot.fitted_m[0] != plot.fitted_m[1]);
   assert(!plot.fixes_m.empty());
-  const std::size_t step = thinning_step(plot.fixes_m.size(), kMaxFixes);
+  const std::size_t step = compute_thinning_step(plot.fixes_m.size(), kMaxFixes);
   const auto [commanded, fixes, fitted, floor, along] = TrackData(plot, step);
   constexpr double margin = 0.1;
   const double around_m = margin * floor.sizes().maxCoeff();
   const Eigen::Vector2d low = floor.min().array() - around_m, high = floor.max().array() + around_m;
   const Eigen::Vector2d sizes_m = high - low;
-  const std::string tics = significant(round_below(sizes_m.maxCoeff() / 4), 7);
+  const std::string tics =
+      format_significant_digits(round_down_to_1_2_5_series(sizes_m.maxCoeff() / 4), 7);
   constexpr double width_px = 620, around_px = 60, below_px = 430;
   constexpr double smallest_px = 60, largest_px = 420;
   const double plan_px = std::clamp(width_px * sizes_m.y() / sizes_m.x(), smallest_px, largest_px),
                height_px = around_px + plan_px + below_px;
-  const auto from_bottom = [&](double y_px) { return significant(y_px / height_px, 4); };
+  const auto from_bottom = [&](double y_px) {
+    return format_significant_digits(y_px / height_px, 4);
+  };
   const double aside_mm = 1e3 * (along.sizes().y() * 0.15 + 1e-6);
-  const std::string note = thinning_note(plot.fixes_m.size(), step);
-  return {"track", 720, static_cast<int>(height_px),
-          data_block("commanded", commanded) + data_block("fixes", fixes) +
-              data_block("fitted", fitted) + plot_settings() + "set multiplot title " +
-              gnuplot_quoted(note.empty() ? plot.title : plot.title + "\n" + note) +
-              " noenhanced\n"
-              "set lmargin at screen 0.12\nset rmargin at screen 0.98\nset bmargin at screen " +
-              from_bottom(below_px) + "\nset tmargin at screen " + from_bottom(below_px + plan_px) +
-              "\nset size ratio -1\nset xtics " + tics + "\nset ytics " + tics +
-              "\nset xlabel 'x (m)'\nset ylabel 'y (m)'\nunset key\nset xrange " +
-              plot_range(low.x(), high.x()) + "\nset yrange " + plot_range(low.y(), high.y()) +
-              "\n" + layers("1:2") + "set bmargin at screen " + from_bottom(100) +
-              "\nset tmargin at screen " + from_bottom(below_px - 85) +
-              "\nset size noratio\nset xtics autofreq\nset ytics autofreq\nset key horizontal Left "
-              "reverse center at screen 0.54, screen " +
-              from_bottom(22) +
-              " maxrows 1\nset "
-              "xlabel 'along the commanded line (m)'\n"
-              "set ylabel 'to its left (mm)'\nset xrange " +
-              plot_range(along.min().x() - around_m, along.max().x() + around_m) + "\nset yrange " +
-              plot_range(1e3 * along.min().y() - aside_mm, 1e3 * along.max().y() + aside_mm) +
-              "\n" + layers("3:4") + "unset multiplot\n"};
+  const std::string note = describe_thinning(plot.fixes_m.size(), step);
+  return {
+      "track", 720, static_cast<int>(height_px),
+      make_gnuplot_data_block("commanded", commanded) + make_gnuplot_data_block("fixes", fixes) +
+          make_gnuplot_data_block("fitted", fitted) + make_common_plot_settings() +
+          "set multiplot title " +
+          quote_for_gnuplot(note.empty() ? plot.title : plot.title + "\n" + note) +
+          " noenhanced\n"
+          "set lmargin at screen 0.12\nset rmargin at screen 0.98\nset bmargin at screen " +
+          from_bottom(below_px) + "\nset tmargin at screen " + from_bottom(below_px + plan_px) +
+          "\nset size ratio -1\nset xtics " + tics + "\nset ytics " + tics +
+          "\nset xlabel 'x (m)'\nset ylabel 'y (m)'\nunset key\nset xrange " +
+          format_gnuplot_range(low.x(), high.x()) + "\nset yrange " +
+          format_gnuplot_range(low.y(), high.y()) + "\n" + format_plot_commands("1:2") +
+          "set bmargin at screen " + from_bottom(100) + "\nset tmargin at screen " +
+          from_bottom(below_px - 85) +
+          "\nset size noratio\nset xtics autofreq\nset ytics autofreq\nset key horizontal Left "
+          "reverse center at screen 0.54, screen " +
+          from_bottom(22) +
+          " maxrows 1\nset "
+          "xlabel 'along the commanded line (m)'\n"
+          "set ylabel 'to its left (mm)'\nset xrange " +
+          format_gnuplot_range(along.min().x() - around_m, along.max().x() + around_m) +
+          "\nset yrange " +
+          format_gnuplot_range(1e3 * along.min().y() - aside_mm, 1e3 * along.max().y() + aside_mm) +
+          "\n" + format_plot_commands("3:4") + "unset multiplot\n"};
 }
 
-std::vector<double> BudgetPlot::fractions() const {
+std::vector<double> BudgetPlot::compute_contribution_fractions() const {
   std::vector<double> fractions(parts.size());
   double whole = 0;
   for (const auto& fix : variances_m2) {
     for (std::size_t i = 0; i < fix.size(); ++i) fractions[i] += fix[i];
-    whole += compute_sum(fix);
+    whole += compute_total_variance(fix);
   }
   for (double& fraction : fractions) fraction /= whole;
   return fractions;
 }
 
-Drawing make_drawing(const BudgetPlot& plot) {
+Drawing make_gnuplot_drawing(const BudgetPlot& plot) {
   assert(!plot.variances_m2.empty() && plot.parts.size() <= kPartColors.size());
-  const std::vector<double> fractions = plot.fractions();
+  const std::vector<double> fractions = plot.compute_contribution_fractions();
   std::string layers;
   for (std::size_t i = 0; i < plot.parts.size(); ++i) {
     if (!(fractions[i] > 0)) continue;
     const std::string label = fmt::format("{}, {:.0f} %", plot.parts[i], 100 * fractions[i]);
-    layers +=
-        fmt::format("{}$budget using {} linecolor rgb '{}' title {} noenhanced",
-                    layers.empty() ? "plot " : ", ", i + 1, kPartColors[i], gnuplot_quoted(label));
+    layers += fmt::format("{}$budget using {} linecolor rgb '{}' title {} noenhanced",
+                          layers.empty() ? "plot " : ", ", i + 1, kPartColors[i],
+                          quote_for_gnuplot(label));
   }
   return {"budget", 720, 520,
-          data_block("budget", format_columns(plot)) + plot_settings() + set_title(plot.title) +
+          make_gnuplot_data_block("budget", format_columns(plot)) + make_common_plot_settings() +
+              set_title(plot.title) +
               "set xlabel 'fixes, the most certain first'\n"
               "set ylabel 'horizontal variance (mm²)'\n"
               "set style data histograms\n"

@@ -9,29 +9,32 @@
 
 namespace vlp {
 
-FloorPlot make_plot(const FloorLimits& limits, const std::string& title, double step_m) {
+FloorPlot collect_plot_data(const FloorLimits& limits, const std::string& title, double step_m) {
   FloorPlot plot{title, "horizontal standard deviation (mm)", step_m, {}};
   for (const FloorLimits::Place& place : limits.places) {
     plot.places.push_back({place.camera.position_m.head<2>(), {}});
     if (place.parts.empty()) continue;
-    plot.places.back().value = 1e3 * compute_fix_sds(place.total()).horizontal_m;
+    plot.places.back().value = 1e3 * compute_fix_sds(place.total_covariance()).horizontal_m;
   }
   return plot;
 }
 
-void draw_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot,
-                     const LampMap& lamps) {
+void write_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot,
+                      const LampMap& lamps) {
   std::string places, on_floor;
   for (const auto& place : plot.places) {
-    if (place.value) places += format_data_row({place.xy_m.x(), place.xy_m.y(), *place.value});
+    if (place.value)
+      places += format_gnuplot_data_row({place.xy_m.x(), place.xy_m.y(), *place.value});
   }
   for (const Lamp& lamp : lamps.lamps) {
-    on_floor += format_data_row({lamp.position_m.x(), lamp.position_m.y(), double(lamp.id)});
+    on_floor +=
+        format_gnuplot_data_row({lamp.position_m.x(), lamp.position_m.y(), double(lamp.id)});
   }
-  const std::string half = significant(plot.step_m / 2, kPlotDigits);
+  const std::string half = format_significant_digits(plot.step_m / 2, kPlotDigits);
   const std::string commands =
-      data_block("places", places) + data_block("lamps", on_floor) + plot_settings() +
-      set_title(plot.title) + "set cblabel " + gnuplot_quoted(plot.label) +
+      make_gnuplot_data_block("places", places) + make_gnuplot_data_block("lamps", on_floor) +
+      make_common_plot_settings() + set_title(plot.title) + "set cblabel " +
+      quote_for_gnuplot(plot.label) +
       " noenhanced\n"
       "set xlabel 'x (m)'\n"
       "set ylabel 'y (m)'\n"
@@ -48,7 +51,7 @@ void draw_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot
       "$lamps using 1:2 with points pointtype 6 pointsize 1.2 linewidth 2 linecolor rgb 'black' "
       "title 'lamps', "
       "$lamps using 1:2:(sprintf('%d', int($3))) with labels boxed offset 0,1.2 notitle\n";
-  draw(picture, {"limits", 900, 700, commands});
+  write_plot(picture, {"limits", 900, 700, commands});
 }
 
 }  // namespace vlp

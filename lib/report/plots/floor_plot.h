@@ -17,7 +17,7 @@ namespace vlp {
 struct FloorPlot {
   struct Place {
     Eigen::Vector2d xy_m;
-    /// Value; std::nullopt is left blank.
+    /// Plotted quantity at xy_m, in the unit of `label`; blank if std::nullopt.
     std::optional<double> value;
   };
   std::string title;
@@ -30,11 +30,11 @@ struct FloorPlot {
 
 /// Collects the horizontal standard deviation from all sources, in mm; blank where no fix is
 /// possible.
-FloorPlot make_plot(const FloorLimits& limits, const std::string& title, double step_m);
+FloorPlot collect_plot_data(const FloorLimits& limits, const std::string& title, double step_m);
 
 /// Writes the plot as .png or .svg, by the extension of `picture`.
-/// @throws InputError as draw()
-void draw_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot,
-                     const LampMap& lamps);
+/// @throws InputError as write_plot()
+void write_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot,
+                      const LampMap& lamps);
 
 }  // namespace vlp

@@ -75,7 +75,7 @@ std::optional<pid_t> start_gnuplot(int script, int output) {
   return failure == 0 ? std::optional(process) : std::nullopt;
 }
 
-std::string read_all(const Descriptor& pipe) {
+std::string read_all_output(const Descriptor& pipe) {
   std::string content;
   char block[65536];
   for (;;) {
@@ -86,7 +86,7 @@ std::string read_all(const Descriptor& pipe) {
   }
 }
 
-bool has_succeeded(pid_t process) {
+bool has_gnuplot_succeeded(pid_t process) {
   int status = 0;
   while (::waitpid(process, &status, 0) < 0) {
     if (errno != EINTR) return false;
@@ -95,7 +95,8 @@ bool has_succeeded(pid_t process) {
 }
 
 /// Renders a drawing with a gnuplot terminal. `picture` appears in messages only.
-std::string render(const std::string& terminal, const Drawing& drawing, const fs::path& picture) {
+std::string render_with_terminal(const std::string& terminal, const Drawing& drawing,
+                                 const fs::path& picture) {
   const Descriptor script(::memfd_create("vlp-plot", MFD_CLOEXEC));
   int ends[2] = {-1, -1};
   if (script.number() < 0 || ::pipe2(ends, O_CLOEXEC) != 0) fail_without_script(picture);
@@ -108,33 +109,33 @@ std::string render(const std::string& terminal, const Drawing& drawing, const fs
   const auto process = start_gnuplot(script.number(), input.number());
   if (!process) throw InputError(picture, "cannot be drawn: gnuplot cannot be started");
   input.close();  // leaves gnuplot's end as the only one
-  std::string image = read_all(output);
-  if (!has_succeeded(*process) || image.empty()) {
+  std::string image = read_all_output(output);
+  if (!has_gnuplot_succeeded(*process) || image.empty()) {
     throw InputError(picture, "cannot be drawn: gnuplot failed; is it installed?");
   }
   return image;
 }
 
 /// Returns the SVG terminal. Two fallback fonts follow, for machines without the first.
-std::string svg_terminal(const Drawing& drawing) {
+std::string make_svg_terminal(const Drawing& drawing) {
   return "svg background 'white' name '" + drawing.name +
          "' font 'DejaVu Sans,Verdana,sans-serif,13'";
 }
 
 }  // namespace
 
-void draw(const fs::path& picture, const Drawing& drawing) {
+void write_plot(const fs::path& picture, const Drawing& drawing) {
   if (picture.extension() == ".png") {
-    write_file(picture, render("pngcairo font 'DejaVu Sans,13'", drawing, picture));
+    write_file(picture, render_with_terminal("pngcairo font 'DejaVu Sans,13'", drawing, picture));
   } else if (picture.extension() == ".svg") {
-    write_file(picture, render(svg_terminal(drawing), drawing, picture));
+    write_file(picture, render_with_terminal(make_svg_terminal(drawing), drawing, picture));
   } else {
     throw InputError(picture, "a picture's name should end in .png or .svg");
   }
 }
 
 std::string render_svg(const Drawing& drawing) {
-  return render(svg_terminal(drawing), drawing, drawing.name);
+  return render_with_terminal(make_svg_terminal(drawing), drawing, drawing.name);
 }
 
 }  // namespace vlp

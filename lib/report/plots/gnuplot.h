@@ -23,7 +23,7 @@ struct Drawing {
 /// The same commands yield the same bytes.
 /// @throws InputError if the extension is another one, gnuplot is missing or fails, or the file
 /// cannot be written
-void draw(const std::filesystem::path& picture, const Drawing& drawing);
+void write_plot(const std::filesystem::path& picture, const Drawing& drawing);
 
 /// Renders as SVG text.
 /// @throws InputError if gnuplot is missing or fails

@@ -14,7 +14,7 @@ namespace vlp {
 namespace {
 
 /// Returns "2nd", "11th".
-std::string ordinal(std::size_t number) {
+std::string format_ordinal(std::size_t number) {
   const bool teen = number / 10 % 10 == 1;
   const std::size_t last = teen ? 0 : number % 10;
   return std::to_string(number) + (last == 1 ? "st" : last == 2 ? "nd" : last == 3 ? "rd" : "th");
@@ -22,7 +22,7 @@ std::string ordinal(std::size_t number) {
 
 }  // namespace
 
-double round_below(double value) {
+double round_down_to_1_2_5_series(double value) {
   const double power = std::pow(10, std::floor(std::log10(value) + 1e-9));
   for (const double digit : {5, 2}) {
     if (digit * power <= value * (1 + 1e-9)) return digit * power;
@@ -30,24 +30,27 @@ double round_below(double value) {
   return power;
 }
 
-std::vector<double> round_numbers(double lowest, double highest) {
-  std::vector<double> numbers{round_below(lowest)};
+std::vector<double> list_1_2_5_series(double lowest, double highest) {
+  std::vector<double> numbers{round_down_to_1_2_5_series(lowest)};
   while (numbers.back() < highest * (1 - 1e-9)) {
-    numbers.push_back(round_below(numbers.back() * 2.5));
+    numbers.push_back(round_down_to_1_2_5_series(numbers.back() * 2.5));
   }
-  if (numbers.size() == 1) numbers.push_back(round_below(numbers.back() * 2.5));
+  if (numbers.size() == 1) numbers.push_back(round_down_to_1_2_5_series(numbers.back() * 2.5));
   return numbers;
 }
 
-std::string readable(double value, int digits) {
-  return std::abs(value) >= std::pow(10, digits) ? fixed(value, 0) : significant(value, digits);
+std::string format_for_humans(double value, int digits) {
+  return std::abs(value) >= std::pow(10, digits) ? format_fixed_decimals(value, 0)
+                                                 : format_significant_digits(value, digits);
 }
 
-std::string format_mm(double length_m) { return readable(1e3 * length_m, 3); }
+std::string format_mm(double length_m) { return format_for_humans(1e3 * length_m, 3); }
 
-std::string format_mm_with_unit(double length_m) { return significant(1e3 * length_m, 3) + " mm"; }
+std::string format_mm_with_unit(double length_m) {
+  return format_significant_digits(1e3 * length_m, 3) + " mm";
+}
 
-std::string gnuplot_quoted(const std::string& text) {
+std::string quote_for_gnuplot(const std::string& text) {
   std::string quoted = "'";
   for (const char c : text) {
     if (c == '\'') {
@@ -61,17 +64,18 @@ std::string gnuplot_quoted(const std::string& text) {
   return quoted + "'";
 }
 
-std::string format_data_row(std::initializer_list<double> values) {
+std::string format_gnuplot_data_row(std::initializer_list<double> values) {
   std::string row;
-  for (const double value : values) row.append(significant(value, kPlotDigits)).append(" ");
+  for (const double value : values)
+    row.append(format_significant_digits(value, kPlotDigits)).append(" ");
   return row + "\n";
 }
 
-std::string data_block(const std::string& name, const std::string& rows) {
+std::string make_gnuplot_data_block(const std::string& name, const std::string& rows) {
   return "$" + name + " << END\n" + rows + "END\n";
 }
 
-std::string plot_settings() {
+std::string make_common_plot_settings() {
   return "set encoding utf8\n"
          "set tics out nomirror\n"
          "set key below Left reverse height 1\n"
@@ -81,23 +85,24 @@ std::string plot_settings() {
 }
 
 std::string set_title(const std::string& title) {
-  return "set title " + gnuplot_quoted(title) + " noenhanced\n";
+  return "set title " + quote_for_gnuplot(title) + " noenhanced\n";
 }
 
 std::string line_color(const std::string& color) { return " linecolor rgb '" + color + "' "; }
 
-std::string plot_range(double from, double to) {
-  return "[" + significant(from, kPlotDigits) + ":" + significant(to, kPlotDigits) + "]";
+std::string format_gnuplot_range(double from, double to) {
+  return "[" + format_significant_digits(from, kPlotDigits) + ":" +
+         format_significant_digits(to, kPlotDigits) + "]";
 }
 
-std::size_t thinning_step(std::size_t count, std::size_t max_count) {
+std::size_t compute_thinning_step(std::size_t count, std::size_t max_count) {
   assert(max_count > 0);
   return count <= max_count ? 1 : (count + max_count - 1) / max_count;
 }
 
-std::string thinning_note(std::size_t count, std::size_t step) {
+std::string describe_thinning(std::size_t count, std::size_t step) {
   if (step == 1) return "";
-  return "every " + ordinal(step) + " of " + std::to_string(count) + " drawn";
+  return "every " + format_ordinal(step) + " of " + std::to_string(count) + " drawn";
 }
 
 std::vector<std::size_t> select_every_nth_and_largest(std::span<const double> values,

@@ -13,20 +13,20 @@ namespace vlp {
 /// Returns the largest of ..., 0.1, 0.2, 0.5, 1, 2, 5, ... that does not exceed `value`, except for
 /// rounding.
 /// @pre value > 0
-double round_below(double value);
+double round_down_to_1_2_5_series(double value);
 
-/// Returns consecutive numbers of that series, at least two. The first is the last one that does
-/// not exceed `lowest`, the last is the first one that is not below `highest`.
-/// @pre 0 < least <= most
-std::vector<double> round_numbers(double lowest, double highest);
+/// Returns consecutive numbers of the series 1, 2, 5, 10, ..., at least two. The first is the last
+/// one that does not exceed `lowest`, the last is the first one that is not below `highest`.
+/// @pre 0 < lowest <= highest
+std::vector<double> list_1_2_5_series(double lowest, double highest);
 
 /// Formats a number for humans with `digits` significant digits. Integer digits are all kept, so
 /// that large numbers have no exponent.
-std::string readable(double value, int digits);
+std::string format_for_humans(double value, int digits);
 
 /// Format a length in millimeters with three significant digits. format_mm() has no unit and
-/// keeps all integer digits, as readable(). format_mm_with_unit() appends the unit and is for
-/// columns.
+/// keeps all integer digits, as format_for_humans(). format_mm_with_unit() appends the unit and is
+/// for columns.
 std::string format_mm(double length_m);
 std::string format_mm_with_unit(double length_m);
 
@@ -41,20 +41,20 @@ constexpr const char* gray = "#666666";
 }  // namespace plot_colors
 
 /// Returns `text` as a gnuplot string without interpretation of its content; line breaks are kept.
-std::string gnuplot_quoted(const std::string& text);
+std::string quote_for_gnuplot(const std::string& text);
 
 /// Significant digits of the numbers in a plot.
 constexpr int kPlotDigits = 7;
 
 /// Returns a line of numbers.
-std::string format_data_row(std::initializer_list<double> values);
+std::string format_gnuplot_data_row(std::initializer_list<double> values);
 
 /// Returns rows as the data block `$name`.
-std::string data_block(const std::string& name, const std::string& rows);
+std::string make_gnuplot_data_block(const std::string& name, const std::string& rows);
 
 /// Returns the settings common to all plots: encoding, tics, grid, key below, label boxes, and the
 /// palette viridis. Viridis is even in lightness, and readable in gray and for the color-blind.
-std::string plot_settings();
+std::string make_common_plot_settings();
 
 /// Returns the command that sets the title, without interpretation of its content.
 std::string set_title(const std::string& title);
@@ -63,15 +63,15 @@ std::string set_title(const std::string& title);
 std::string line_color(const std::string& color);
 
 /// Returns the range `[from:to]`.
-std::string plot_range(double from, double to);
+std::string format_gnuplot_range(double from, double to);
 
 /// Returns the step, at least 1, for which every step-th of `count` items are no more than
 /// `max_count` items.
 /// @pre max_count > 0
-std::size_t thinning_step(std::size_t count, std::size_t max_count);
+std::size_t compute_thinning_step(std::size_t count, std::size_t max_count);
 
 /// Returns "every 3rd of 250 drawn"; empty for a step of 1.
-std::string thinning_note(std::size_t count, std::size_t step);
+std::string describe_thinning(std::size_t count, std::size_t step);
 
 /// Returns the ascending indices of every step-th value and of the `largest` largest values.
 std::vector<std::size_t> select_every_nth_and_largest(std::span<const double> values,

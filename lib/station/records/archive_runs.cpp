@@ -35,7 +35,7 @@ std::string parse_date(const std::string& date) {
 std::string make_session_run_id(std::string utc, const std::string& text) {
   constexpr std::size_t digits = 16;
   std::erase_if(utc, [](char c) { return c == '-' || c == ':'; });
-  return utc + "-" + sha256_of_text(text).substr(0, digits);
+  return utc + "-" + compute_text_sha256(text).substr(0, digits);
 }
 
 std::optional<double> find_number(const nlohmann::json& object, const char* key) {
@@ -51,12 +51,12 @@ void add_metrics(const nlohmann::json& entries, std::vector<CheckedMetric>& metr
   metrics.reserve(metrics.size() + entries.size());
   for (const nlohmann::json& entry : entries) {
     CheckedMetric metric;
-    metric.name = present_metric_name(entry.at("name"));
+    metric.name = find_present_metric_name(entry.at("name"));
     if (!names.insert(metric.name).second) continue;
     metric.unit = entry.value("unit", "");
     metric.value = find_number(entry, "value");
     metric.limit = find_number(entry, "limit");
-    const auto kind = metric_kind(metric.name);
+    const auto kind = find_metric_kind(metric.name);
     metric.direction = kind ? kind->direction : Direction::at_most;
     metrics.push_back(std::move(metric));
   }
@@ -66,11 +66,12 @@ void add_metrics(const nlohmann::json& entries, std::vector<CheckedMetric>& metr
 std::optional<SharedFolder> open_session(const fs::path& folder) {
   const fs::path camera = folder.parent_path(), kind = camera.parent_path();
   const SharedFolder results(kind.parent_path());
-  const auto kinds = results.find_folder({kind.filename().string(), folder, "folder"});
+  const auto kinds = results.open_subfolder_if_exists({kind.filename().string(), folder, "folder"});
   if (!kinds) return std::nullopt;
-  const auto cameras = kinds->find_folder({camera.filename().string(), folder, "camera"});
+  const auto cameras =
+      kinds->open_subfolder_if_exists({camera.filename().string(), folder, "camera"});
   if (!cameras) return std::nullopt;
-  return cameras->find_folder({folder.filename().string(), folder, "session"});
+  return cameras->open_subfolder_if_exists({folder.filename().string(), folder, "session"});
 }
 
 }  // namespace
@@ -78,7 +79,7 @@ std::optional<SharedFolder> open_session(const fs::path& folder) {
 ReprocessedArchive read_archive_sessions(const fs::path& results) {
   const CsvTable summary(results / "summary.csv");
   const auto text = [&](std::size_t row, const char* column) {
-    return std::string(summary.text(row, summary.required(column)));
+    return std::string(summary.get_text(row, summary.get_required_column(column)));
   };
   const fs::path named = fs::absolute(results).lexically_normal();
   const fs::path last = named.has_filename() ? named.filename() : named.parent_path().filename();
@@ -97,8 +98,8 @@ ReprocessedArchive read_archive_sessions(const fs::path& results) {
         (results / "summary.csv").string() + ":" + std::to_string(summary.line(row));
     std::string session;
     try {
-      run.camera = Id(text(row, "camera"), line, "camera").text();
-      session = run.camera + "/" + Id(text(row, "session"), line, "session").text();
+      run.camera = Id(text(row, "camera"), line, "camera").get_text();
+      session = run.camera + "/" + Id(text(row, "session"), line, "session").get_text();
     } catch (const InputError& error) {
       archive.refused.emplace_back(error.what());
       continue;
@@ -124,7 +125,7 @@ RunRecord load_archive_run(const ReprocessedSession& session) {
   const auto text = folder ? folder->read("session.json", kMaxSessionFileBytes) : std::nullopt;
   if (!text) throw InputError(file, "cannot be opened: there is none");
   try {
-    check_json_bounds(*text);
+    check_json_size_and_depth(*text);
     const auto document = nlohmann::json::parse(*text);
     for (const char* part : {"metrics", "gates"}) {
       if (document.contains(part)) add_metrics(document[part], run.metrics);

@@ -22,7 +22,7 @@ class DigestInput {
   void add(std::string_view text) { text_ += fmt::format("{} {}\n", text.size(), text); }
   /// Adds a number with all bits, in the same digits for every program.
   void add(double number) { add(fmt::format("{:.17g}", number)); }
-  std::string sha256() const { return sha256_of_text(text_); }
+  std::string compute_sha256() const { return compute_text_sha256(text_); }
 
  private:
   std::string text_;
@@ -32,7 +32,7 @@ class DigestInput {
 /// texts, so that texts added by later versions of the tables do not change it.
 std::string compute_digest(const RunRecord& run) {
   DigestInput content;
-  for (const RunField& field : run_fields()) {
+  for (const RunField& field : list_run_text_fields()) {
     if ((run.*field.text).empty()) continue;
     content.add(field.name);
     content.add(run.*field.text);
@@ -59,7 +59,7 @@ std::string compute_digest(const RunRecord& run) {
     content.add("image");
     for (const std::string* text : {&step, &name, &sha256, &refused}) content.add(*text);
   }
-  return content.sha256();
+  return content.compute_sha256();
 }
 
 std::string compute_digest(const std::string& run, const RunEvent& event) {
@@ -67,7 +67,7 @@ std::string compute_digest(const std::string& run, const RunEvent& event) {
   for (const std::string* text : {&run, &event.event, &event.what, &event.who, &event.text}) {
     content.add(*text);
   }
-  return content.sha256();
+  return content.compute_sha256();
 }
 
 struct Entry {
@@ -82,7 +82,7 @@ std::string compute_digest(const Entry& entry, const std::string& before) {
   for (const std::string* text : {&entry.run, &entry.event, &entry.content, &before}) {
     digest.add(*text);
   }
-  return digest.sha256();
+  return digest.compute_sha256();
 }
 
 std::vector<Entry> load_entries(soci::session& sql) {
@@ -133,10 +133,10 @@ void check_chain(const std::vector<Entry>& entries, std::vector<std::string>& pr
 
 }  // namespace
 
-void lock_trail(soci::session& sql) { sql << "UPDATE vlp_schema SET version = version"; }
+void lock_audit_trail(soci::session& sql) { sql << "UPDATE vlp_schema SET version = version"; }
 
-void append_to_trail(soci::session& sql, const std::string& run, bool is_new_run,
-                     const std::vector<RunEvent>& new_events) {
+void append_to_audit_trail(soci::session& sql, const std::string& run, bool is_new_run,
+                           const std::vector<RunEvent>& new_events) {
   std::vector<Entry> added;
   // As read from the database, which can store a number differently than given.
   if (is_new_run) added.push_back({0, run, "", compute_digest(load_run(sql, run).value()), ""});
@@ -144,7 +144,7 @@ void append_to_trail(soci::session& sql, const std::string& run, bool is_new_run
     added.push_back({0, run, event.event, compute_digest(run, event), ""});
   }
   if (added.empty()) return;
-  lock_trail(sql);
+  lock_audit_trail(sql);
   Entry last;
   sql << "SELECT number, digest FROM trail ORDER BY number DESC LIMIT 1", soci::into(last.number),
       soci::into(last.digest);
@@ -159,14 +159,14 @@ void append_to_trail(soci::session& sql, const std::string& run, bool is_new_run
   }
 }
 
-void append_all_runs(soci::session& sql) {
+void append_all_runs_to_audit_trail(soci::session& sql) {
   for (const std::string& run : load_run_ids(sql)) {
-    append_to_trail(sql, run, true, load_run(sql, run).value().events);
+    append_to_audit_trail(sql, run, true, load_run(sql, run).value().events);
   }
 }
 
-TrailCheck check_trail(soci::session& sql, const std::string& expected_digest,
-                       const std::function<void()>& on_progress) {
+TrailCheck check_audit_trail(soci::session& sql, const std::string& expected_digest,
+                             const std::function<void()>& on_progress) {
   TrailCheck check;
   const auto entries = load_entries(sql);
   check.entries = entries.size();

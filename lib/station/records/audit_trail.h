@@ -28,13 +28,13 @@ namespace vlp {
 
 /// Locks the trail for this program until the end of its transaction. Slow work should be done
 /// before.
-void lock_trail(soci::session& sql);
+void lock_audit_trail(soci::session& sql);
 /// Locks the trail and appends the entries of new events of a run, after that of the run itself if
 /// `is_new_run`.
-void append_to_trail(soci::session& sql, const std::string& run, bool is_new_run,
-                     const std::vector<RunEvent>& new_events);
+void append_to_audit_trail(soci::session& sql, const std::string& run, bool is_new_run,
+                           const std::vector<RunEvent>& new_events);
 /// Appends entries of all runs, for records of an earlier version without a trail.
-void append_all_runs(soci::session& sql);
+void append_all_runs_to_audit_trail(soci::session& sql);
 
 /// Result of comparing the records with their trail.
 struct TrailCheck {
@@ -47,7 +47,7 @@ struct TrailCheck {
 
 /// Checks all records in the current transaction. `expected_digest` is the last digest of an
 /// earlier check, or empty. `on_progress` is called repeatedly during the check.
-TrailCheck check_trail(soci::session& sql, const std::string& expected_digest,
-                       const std::function<void()>& on_progress);
+TrailCheck check_audit_trail(soci::session& sql, const std::string& expected_digest,
+                             const std::function<void()>& on_progress);
 
 }  // namespace vlp

@@ -27,9 +27,9 @@ using Values = std::vector<CertifiedValue>;
 
 /// Adds x and y with the standard deviations of a covariance.
 template <typename Covariance>
-void add_pair(Values& values, const std::string& name, const std::string& unit,
-              const Eigen::Vector2d& pair, const std::optional<Covariance>& covariance,
-              double scale = 1, Eigen::Index first = 0) {
+void add_two_values(Values& values, const std::string& name, const std::string& unit,
+                    const Eigen::Vector2d& pair, const std::optional<Covariance>& covariance,
+                    double scale = 1, Eigen::Index first = 0) {
   for (const Eigen::Index i : {0, 1}) {
     std::optional<double> sd;
     if (covariance) sd = scale * std::sqrt((*covariance)(first + i, first + i));
@@ -41,32 +41,34 @@ std::string with_unit(const std::string& text, const std::string& unit) {
   return unit.empty() ? text : text + "\u00a0" + unit;
 }
 
-std::string verdict_part(const RunRecord& record) {
-  const bool conforms = record.passed();
+std::string make_verdict_section(const RunRecord& record) {
+  const bool conforms = record.has_passed();
   const std::string words = conforms ? "The unit conforms with all requirements below."
                                      : "The unit does not conform: " + record.first_cause() + ".";
   return std::string("<div class=\"verdict ") + (conforms ? "pass" : "fail") + "\"><strong>" +
-         html_text(record.verdict) + "</strong>" + html_element("p", words) + "</div>\n";
+         escape_html_text(record.verdict) + "</strong>" + make_html_element("p", words) +
+         "</div>\n";
 }
 
-std::string subject_part(const RunRecord& record, const Calibration& calibration) {
+std::string make_subject_section(const RunRecord& record, const Calibration& calibration) {
   const auto& [width_px, height_px] = calibration.camera.imager_px;
-  return html_table({"",
-                     {},
-                     {{"certificate number", record.run},
-                      {"unit", "camera " + record.camera},
-                      {"image", fmt::format("{} x {} px", width_px, height_px)},
-                      {"measured at", record.station},
-                      {"operator", record.operator_name.empty() ? "\u00a0" : record.operator_name},
-                      {"begun (UTC)", record.begun_utc},
-                      {"ended (UTC)", record.ended_utc},
-                      {"procedure",
-                       "lens from views of a board; rotation center and tilt from a rotation in "
-                       "place; dispersion at one reference point; check at known points"},
-                      {"program", record.program},
-                      {"libraries", record.libraries},
-                      {"images", fmt::format("{} taken, {} used", record.images.size(),
-                                             record.count_used_images())}}});
+  return make_html_table(
+      {"",
+       {},
+       {{"certificate number", record.run},
+        {"unit", "camera " + record.camera},
+        {"image", fmt::format("{} x {} px", width_px, height_px)},
+        {"measured at", record.station},
+        {"operator", record.operator_name.empty() ? "\u00a0" : record.operator_name},
+        {"begun (UTC)", record.begun_utc},
+        {"ended (UTC)", record.ended_utc},
+        {"procedure",
+         "lens from views of a board; rotation center and tilt from a rotation in "
+         "place; dispersion at one reference point; check at known points"},
+        {"program", record.program},
+        {"libraries", record.libraries},
+        {"images",
+         fmt::format("{} taken, {} used", record.images.size(), record.count_used_images())}}});
 }
 
 /// Describes the inputs that the uncertainty includes, and those that are assumed exact.
@@ -83,14 +85,14 @@ std::string describe_inputs(const RunRecord& record, const Calibration& calibrat
       *print->value);
 }
 
-std::string results_part(const RunRecord& record, const Calibration& calibration) {
+std::string make_results_section(const RunRecord& record, const Calibration& calibration) {
   HtmlTable table{"", {"quantity", "value and expanded uncertainty"}, {}};
   for (const CertifiedValue& value : collect_certified_values(calibration)) {
     table.rows.push_back({value.name, describe(value)});
   }
   const std::string lens(to_string(calibration.camera.lens_model));
-  return html_table(table) +
-         html_element(
+  return make_html_table(table) +
+         make_html_element(
              "p", "Lens model " + lens +
                       "; all its parameters are in the unit's calibration.yaml. The "
                       "expanded uncertainty is the standard uncertainty times k = 2, for "
@@ -102,7 +104,7 @@ std::string results_part(const RunRecord& record, const Calibration& calibration
 
 /// Returns "rms_px: residuals of the board's corners, ..." for readers of the certificate only.
 std::string describe_requirement(const std::string& metric) {
-  const auto kind = metric_kind(metric);
+  const auto kind = find_metric_kind(metric);
   return kind ? metric + ": " + kind->meaning : metric;
 }
 
@@ -112,8 +114,8 @@ std::string make_conformity_table(const RunRecord& record) {
   constexpr int digits = 4, probability_digits = 3;
   for (const CheckedMetric& metric : record.metrics) {
     if (!metric.limit) continue;
-    std::string measured = metric.value ? significant(*metric.value, digits) : "none";
-    std::string rule = "simple", outcome = metric.passed() ? "yes" : "no";
+    std::string measured = metric.value ? format_significant_digits(*metric.value, digits) : "none";
+    std::string rule = "simple", outcome = metric.has_passed() ? "yes" : "no";
     if (const auto& guard = metric.guard) {
       if (metric.value) {
         measured =
@@ -121,20 +123,21 @@ std::string make_conformity_table(const RunRecord& record) {
       }
       rule = fmt::format("guard band of {:.4g} u", guard->k);
       if (const auto sure = metric.conformance_probability()) {
-        outcome += ", p = " + significant(*sure, probability_digits);
+        outcome += ", p = " + format_significant_digits(*sure, probability_digits);
       }
     } else if (metric.value) {
       measured = with_unit(measured, metric.unit);
     }
-    if (!metric.passed()) table.marked.push_back(table.rows.size());
-    table.rows.push_back({describe_requirement(metric.name), measured,
-                          describe(metric.direction) + " " +
-                              with_unit(significant(*metric.limit, digits), metric.unit),
-                          with_unit(significant(metric.acceptance_limit(), digits), metric.unit),
-                          outcome, rule});
+    if (!metric.has_passed()) table.marked.push_back(table.rows.size());
+    table.rows.push_back(
+        {describe_requirement(metric.name), measured,
+         describe(metric.direction) + " " +
+             with_unit(format_significant_digits(*metric.limit, digits), metric.unit),
+         with_unit(format_significant_digits(metric.acceptance_limit(), digits), metric.unit),
+         outcome, rule});
   }
-  return html_table(table) +
-         html_element(
+  return make_html_table(table) +
+         make_html_element(
              "p",
              "Decision rules: \"simple\" compares the value with the limit without its "
              "uncertainty, so that half of the units exactly at the limit are accepted; a guard "
@@ -148,32 +151,33 @@ std::string digest_images(const RunRecord& record, const std::string& step) {
   for (const RunRecord::Image& image : record.images) {
     if (image.step == step && image.refused.empty()) text += image.name + " " + image.sha256 + "\n";
   }
-  return text.empty() ? "" : sha256_of_text(text);
+  return text.empty() ? "" : compute_text_sha256(text);
 }
 
-std::string traceability_part(const RunRecord& record, const Calibration& calibration) {
+std::string make_traceability_section(const RunRecord& record, const Calibration& calibration) {
   const std::string check = digest_images(record, "check");
-  return html_element("p",
-                      "Digests (SHA-256) of what the results rest on. \"station\" is the "
-                      "configuration with the camera's type, the board and the lamp map, whose own "
-                      "certificates belong to this one: " +
-                          record.config_sha256 + "." +
-                          (check.empty() ? ""
-                                         : " \"check\", the list of names and digests of the "
-                                           "images at the known points: " +
-                                               check + ".")) +
-         history_list(calibration.history);
+  return make_html_element(
+             "p",
+             "Digests (SHA-256) of what the results rest on. \"station\" is the "
+             "configuration with the camera's type, the board and the lamp map, whose own "
+             "certificates belong to this one: " +
+                 record.config_sha256 + "." +
+                 (check.empty() ? ""
+                                : " \"check\", the list of names and digests of the "
+                                  "images at the known points: " +
+                                      check + ".")) +
+         make_history_html_list(calibration.history);
 }
 
 /// Makes the part with the data that a record does not contain.
-std::string make_blank_part() {
+std::string make_section_of_missing_data() {
   HtmlTable table{"", {}, {}};
   for (const char* line : {"laboratory, address", "customer", "temperature, humidity",
                            "certificates of board and lamp map", "issued by, date"}) {
     table.rows.push_back({line, "\u00a0"});
   }
-  return html_table(table) + "<div class=\"signature\">signature</div>\n" +
-         html_element("p", "The results relate only to this unit as measured.");
+  return make_html_table(table) + "<div class=\"signature\">signature</div>\n" +
+         make_html_element("p", "The results relate only to this unit as measured.");
 }
 
 }  // namespace
@@ -184,21 +188,22 @@ std::vector<CertifiedValue> collect_certified_values(const Calibration& calibrat
   const auto& lens = calibration.intrinsics_report;
   const std::optional<MatrixX> lens_covariance = lens ? lens->covariance : std::nullopt;
   Values values;
-  add_pair(values, "focal length", "px", {k[0], k[1]}, lens_covariance);
-  add_pair(values, "principal point", "px", {k[2], k[3]}, lens_covariance, 1, 2);
+  add_two_values(values, "focal length", "px", {k[0], k[1]}, lens_covariance);
+  add_two_values(values, "principal point", "px", {k[2], k[3]}, lens_covariance, 1, 2);
   if (const auto& center = calibration.rotation_center) {
-    add_pair(values, "rotation center, undistorted image", "px", center->center_px,
-             center->covariance);
-    add_pair(values, "zenith from the optical axis, 180/pi times its normalized point", "deg",
-             zenith_point(*center), compute_zenith_covariance(calibration), degrees);
+    add_two_values(values, "rotation center, undistorted image", "px", center->center_px,
+                   center->covariance);
+    add_two_values(values, "zenith from the optical axis, 180/pi times its normalized point", "deg",
+                   normalized_zenith_point(*center), compute_zenith_covariance(calibration),
+                   degrees);
     if (center->lever_arm_m) {
-      add_pair(values, "lever arm", "mm", *center->lever_arm_m, center->lever_arm_covariance,
-               millimeters);
+      add_two_values(values, "lever arm", "mm", *center->lever_arm_m, center->lever_arm_covariance,
+                     millimeters);
     }
   }
   if (const auto& dispersion = calibration.dispersion) {
-    add_pair(values, "dispersion offset", "px", dispersion->offset_px,
-             compute_offset_covariance(calibration));
+    add_two_values(values, "dispersion offset", "px", dispersion->offset_px,
+                   compute_offset_covariance(calibration));
   }
   return values;
 }
@@ -206,7 +211,8 @@ std::vector<CertifiedValue> collect_certified_values(const Calibration& calibrat
 std::string describe(const CertifiedValue& value) {
   const double expanded = kCoverage * value.standard_uncertainty.value_or(0);
   if (!(expanded > 0) || !std::isfinite(expanded)) {
-    return with_unit(significant(value.value, kSixDigits), value.unit) + ", uncertainty not stated";
+    return with_unit(format_significant_digits(value.value, kSixDigits), value.unit) +
+           ", uncertainty not stated";
   }
   constexpr double ten = 10, two_digits = 100;
   constexpr int max_places = 12;
@@ -214,39 +220,42 @@ std::string describe(const CertifiedValue& value) {
   // 0.0996 is 0.10.
   if (std::round(expanded * std::pow(ten, 1 - exponent)) >= two_digits) ++exponent;
   const int places = std::clamp(1 - exponent, 0, max_places);
-  return with_unit(fixed(value.value, places) + " \u00b1 " + fixed(expanded, places), value.unit);
+  return with_unit(format_fixed_decimals(value.value, places) + " \u00b1 " +
+                       format_fixed_decimals(expanded, places),
+                   value.unit);
 }
 
-void check_certifiable(const RunRecord& record) {
+void check_run_is_certifiable(const RunRecord& record) {
   const auto none = [&](const std::string& why) {
     return InputError(record.run, why + ": it has no certificate");
   };
   if (record.kind != "unit") throw none("is a run of the golden unit, which measures the station");
   const std::string no_verdict = find_verdict_problem(record);
   if (!no_verdict.empty()) throw none(no_verdict);
-  if (record.invalid()) throw none("was not judged (" + record.first_cause() + ")");
+  if (record.is_invalid()) throw none("was not judged (" + record.first_cause() + ")");
   if (record.calibration.empty()) throw none("has no calibration");
 }
 
-std::string make_certificate(const RunRecord& record, const Calibration& calibration) {
-  check_certifiable(record);
-  return html_page("Calibration certificate: camera " + record.camera,
-                   verdict_part(record) +
-                       html_section("Unit and calibration", subject_part(record, calibration)) +
-                       html_section("Results", results_part(record, calibration)) +
-                       html_section("Statement of conformity", make_conformity_table(record)) +
-                       html_section("Traceability", traceability_part(record, calibration)) +
-                       html_section("To be filled in by who issues it", make_blank_part()));
+std::string make_calibration_certificate(const RunRecord& record, const Calibration& calibration) {
+  check_run_is_certifiable(record);
+  return make_html_page(
+      "Calibration certificate: camera " + record.camera,
+      make_verdict_section(record) +
+          make_html_section("Unit and calibration", make_subject_section(record, calibration)) +
+          make_html_section("Results", make_results_section(record, calibration)) +
+          make_html_section("Statement of conformity", make_conformity_table(record)) +
+          make_html_section("Traceability", make_traceability_section(record, calibration)) +
+          make_html_section("To be filled in by who issues it", make_section_of_missing_data()));
 }
 
-std::filesystem::path write_certificate(const RunRecord& record,
-                                        const std::filesystem::path& results) {
-  check_certifiable(record);
+std::filesystem::path write_calibration_certificate(const RunRecord& record,
+                                                    const std::filesystem::path& results) {
+  check_run_is_certifiable(record);
   const std::filesystem::path calibration =
-      publish_run(record, {}, results) / calibration_name(record);
+      publish_run(record, {}, results) / calibration_file_name(record);
   const SharedFolder folder = open_run_folder(record, results);
   constexpr const char* name = "certificate.html";
-  folder.replace(name, make_certificate(record, read_calibration(calibration)));
+  folder.replace_file(name, make_calibration_certificate(record, read_calibration(calibration)));
   return folder.path() / name;
 }
 

@@ -35,10 +35,11 @@ std::string describe(const CertifiedValue& value);
 /// - a run of a golden unit,
 /// - a run that was not judged or has no calibration,
 /// - a record that was edited manually.
-void check_certifiable(const RunRecord& record);
+void check_run_is_certifiable(const RunRecord& record);
 
 /// Returns the certificate of a unit's run as a self-contained HTML page. Equal records give
-/// identical bytes. `calibration` is the calibration of the record. Throws as check_certifiable().
+/// identical bytes. `calibration` is the calibration of the record. Throws as
+/// check_run_is_certifiable().
 ///
 /// Contents, according to ISO/IEC 17025:2017 (7.8.2, 7.8.4, 7.8.6) as far as a record contains
 /// them:
@@ -48,11 +49,11 @@ void check_certifiable(const RunRecord& record);
 /// - digests of all inputs.
 ///
 /// Issuer and conditions are not recorded; the page has blanks for them.
-std::string make_certificate(const RunRecord& record, const Calibration& calibration);
+std::string make_calibration_certificate(const RunRecord& record, const Calibration& calibration);
 
 /// Writes the certificate to certificate.html next to the files of the run, and returns its path.
 /// Writes missing files of the run, too (publish_run()). Throws InputError.
-std::filesystem::path write_certificate(const RunRecord& record,
-                                        const std::filesystem::path& results);
+std::filesystem::path write_calibration_certificate(const RunRecord& record,
+                                                    const std::filesystem::path& results);
 
 }  // namespace vlp

@@ -30,7 +30,7 @@ constexpr std::size_t kMaxBytes = 1 << 24;
 
 std::string make_note_name(const StationConfig& config) {
   constexpr std::size_t digits = 16;
-  return ".golden-" + sha256_of_text(config.station).substr(0, digits);
+  return ".golden-" + compute_text_sha256(config.station).substr(0, digits);
 }
 
 /// Returns the message about an incomplete note.
@@ -46,7 +46,8 @@ void delete_note(const StationConfig& config) {
 }
 
 /// Adds a line to the note if it exists. Throws InputError if it cannot be written.
-void append(const SharedFolder& spool, const std::string& note, std::string_view line) {
+void append_line_to_note(const SharedFolder& spool, const std::string& note,
+                         std::string_view line) {
   const int file = spool.open(note, O_WRONLY | O_APPEND);
   if (file < 0 && errno == ENOENT) return;
   const bool is_written =
@@ -122,11 +123,11 @@ void add_gates(const std::vector<Gate>& gates, Lines& lines) {
 
 }  // namespace
 
-std::string measuring_digest(const StationConfig& config) {
+std::string compute_measurement_settings_digest(const StationConfig& config) {
   Lines lines;
   Calibration type;
   type.camera = config.type;
-  lines.add("camera_type", calibration_text(type));
+  lines.add("camera_type", format_calibration_yaml(type));
   add_board(config.board, lines);
   add_lamps(config.lamps, lines);
   if (const auto& place_m = config.dispersion_station_m) {
@@ -152,13 +153,13 @@ std::string measuring_digest(const StationConfig& config) {
   add_gates(config.gates, lines);
   if (const auto& golden = config.golden) {
     lines.add("golden", golden->camera_id);
-    lines.add("calibration", calibration_text(golden->calibration));
+    lines.add("calibration", format_calibration_yaml(golden->calibration));
     add_gates(golden->gates, lines);
   }
-  return sha256_of_text(lines.text());
+  return compute_text_sha256(lines.text());
 }
 
-std::string golden_problem(const StationConfig& config, GoldenCheckTime at) {
+std::string describe_golden_unit_problem(const StationConfig& config, GoldenCheckTime at) {
   constexpr const char* verify = "'vlp-station verify' is due";
   if (!config.verify_due) return "";
   const fs::path file = config.spool / make_note_name(config);
@@ -189,7 +190,7 @@ std::string golden_problem(const StationConfig& config, GoldenCheckTime at) {
         "the lamp map with which the golden unit was measured is unknown (run {}): {}", run,
         verify);
   }
-  if (measured_with != measuring_digest(config)) {
+  if (measured_with != compute_measurement_settings_digest(config)) {
     return fmt::format(
         "station.yaml or a file that it names was changed in a way that affects measurements after "
         "the golden unit was measured (run {}): {}",
@@ -211,17 +212,18 @@ std::string golden_problem(const StationConfig& config, GoldenCheckTime at) {
   return "";
 }
 
-void update_golden_note(const StationConfig& config, const RunRecord& record) {
-  if (!config.verify_due || record.invalid()) return;
+void update_golden_unit_note(const StationConfig& config, const RunRecord& record) {
+  if (!config.verify_due || record.is_invalid()) return;
   make_folder(config.spool);
   const SharedFolder spool(config.spool);
   const std::string note = make_note_name(config);
   try {
     if (record.kind == "golden") {
-      spool.replace(note, fmt::format("{} {} {} {}\n", record.run, record.verdict, record.ended_utc,
-                                      measuring_digest(config)));
+      spool.replace_file(note,
+                         fmt::format("{} {} {} {}\n", record.run, record.verdict, record.ended_utc,
+                                     compute_measurement_settings_digest(config)));
     } else {
-      append(spool, note, kUnitLine);  // never measured: nothing to count from
+      append_line_to_note(spool, note, kUnitLine);  // never measured: nothing to count from
     }
   } catch (const InputError&) {
     delete_note(config);
@@ -229,11 +231,11 @@ void update_golden_note(const StationConfig& config, const RunRecord& record) {
   }
 }
 
-bool invalidate_golden_note(const StationConfig& config, const std::string& run) {
+bool invalidate_golden_unit_note(const StationConfig& config, const std::string& run) {
   try {
     const auto note = SharedFolder(config.spool).read(make_note_name(config), kMaxBytes);
     if (!note || note->substr(0, note->find(' ')) != run) return false;
-  } catch (const InputError&) {  // no spool, or no valid note (golden_problem())
+  } catch (const InputError&) {  // no spool, or no valid note (describe_golden_unit_problem())
     return false;
   }
   delete_note(config);

@@ -16,9 +16,9 @@ namespace vlp {
 ///   excluded  name of the station, `verify_due`, serials, folders, records, spool, hook, retention
 ///
 /// Format, comments, order and names of files do not change it.
-std::string measuring_digest(const StationConfig& config);
+std::string compute_measurement_settings_digest(const StationConfig& config);
 
-/// Time at which golden_problem() is called.
+/// Time at which describe_golden_unit_problem() is called.
 enum class GoldenCheckTime { first_image, verdict };
 
 /// Returns the human-readable reason why no unit may pass now; empty if units may. Always empty
@@ -27,29 +27,30 @@ enum class GoldenCheckTime { first_image, verdict };
 /// Reasons: the golden unit
 /// - failed,
 /// - is due (StationConfig::verify_due),
-/// - was measured with another measuring setup (measuring_digest()),
+/// - was measured with another measuring setup (compute_measurement_settings_digest()),
 /// - was never measured here.
 ///
-/// The function uses only the note of update_golden_note() in the station's spool, because the
+/// The function uses only the note of update_golden_unit_note() in the station's spool, because the
 /// records may be offline. The golden unit is due, too, if the clock was set back or the note is
 /// damaged.
 ///
 /// GoldenCheckTime::verdict ignores limits of hours and units that expired after the unit was
 /// started. At its start the golden unit met `verify_due`, and a repetition would give no further
 /// information. A failed golden unit and a changed setup count at both times.
-std::string golden_problem(const StationConfig& config,
-                           GoldenCheckTime at = GoldenCheckTime::first_image);
+std::string describe_golden_unit_problem(const StationConfig& config,
+                                         GoldenCheckTime at = GoldenCheckTime::first_image);
 
 /// Notes a run in the spool: the result of a golden unit, or one more judged unit. Ignores INVALID
 /// runs, and all runs without `verify_due`.
 ///
 /// File .golden-DIGEST, with a digest of the station's name: run, verdict and end of the golden run
-/// and the measuring_digest(), then a line for each later unit. Throws InputError if the file
-/// cannot be written. The note is then deleted, so that the golden unit is due.
-void update_golden_note(const StationConfig& config, const RunRecord& record);
+/// and the compute_measurement_settings_digest(), then a line for each later unit. Throws
+/// InputError if the file cannot be written. The note is then deleted, so that the golden unit is
+/// due.
+void update_golden_unit_note(const StationConfig& config, const RunRecord& record);
 
 /// Deletes the note if it is of the golden run `run`, which is no longer valid; the golden unit is
 /// then due. Returns true if it was.
-bool invalidate_golden_note(const StationConfig& config, const std::string& run);
+bool invalidate_golden_unit_note(const StationConfig& config, const std::string& run);
 
 }  // namespace vlp

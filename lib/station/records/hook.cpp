@@ -83,7 +83,7 @@ class Subreaper {
   Subreaper& operator=(const Subreaper&) = delete;
 
   /// Kills the new children, and the orphans that they leave.
-  void kill_all() const {
+  void kill_process_and_children() const {
     constexpr int tries = 100;
     for (int i = 0; i < tries; ++i) {
       bool any = false;
@@ -126,7 +126,7 @@ struct Process {
   }
   /// Waits for the process. Returns its status; std::nullopt if it was killed at the time limit.
   /// Throws std::system_error if the status is not available.
-  std::optional<int> wait(double time_limit_s) {
+  std::optional<int> wait_for_process(double time_limit_s) {
     constexpr int interval_ms = 10;
     const auto start = Clock::now();
     int status = 0;
@@ -206,12 +206,14 @@ std::string find_last_line(std::string text) {
     text.pop_back();
   }
   text.erase(0, text.rfind('\n') + 1);  // npos + 1 is 0
-  text = printable(text);
+  text = escape_for_terminal(text);
   std::replace(text.begin(), text.end(), '\t', ' ');
-  return printable(text.substr(0, max_bytes));
+  return escape_for_terminal(text.substr(0, max_bytes));
 }
 
-RunEvent failed(const std::string& why) { return make_event(kHookFailed, why); }
+RunEvent make_hook_failed_event(const std::string& why) {
+  return make_run_event_now(kHookFailed, why);
+}
 
 /// Returns true if the open file is still the one of this name.
 bool is_same_file(int descriptor, const std::filesystem::path& file) {
@@ -224,15 +226,16 @@ bool is_same_file(int descriptor, const std::filesystem::path& file) {
 }  // namespace
 
 RunEvent make_hook_requested_event(const Hook& hook, const std::string& operator_name) {
-  return make_event(kHookRequested, printable_line(fmt::format("{}", fmt::join(hook.command, " "))),
-                    operator_name);
+  return make_run_event_now(kHookRequested,
+                            escape_for_single_line(fmt::format("{}", fmt::join(hook.command, " "))),
+                            operator_name);
 }
 
 RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& lock) {
   std::array<int, 2> pipe{};
   const Descriptor input(make_memory_file(format_hook_json(record)));
   if (input.get() < 0 || ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
-    return failed("cannot be started: " + std::generic_category().message(errno));
+    return make_hook_failed_event("cannot be started: " + std::generic_category().message(errno));
   }
   const Descriptor from(pipe[0]);
   Descriptor to(pipe[1]);
@@ -240,21 +243,23 @@ RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& loc
   Process process{0, from.get()};
   std::signal(SIGCHLD, SIG_DFL);  // if SIGCHLD is ignored, no status is available
   const Subreaper subreaper;
-  if (const int error = start_process(hook, input.get(), to.get(), lock.descriptor(), process.id);
+  if (const int error =
+          start_process(hook, input.get(), to.get(), lock.lock_file_descriptor(), process.id);
       error != 0) {
-    return failed(hook.command.front() +
-                  " cannot be started: " + std::generic_category().message(error));
+    return make_hook_failed_event(hook.command.front() +
+                                  " cannot be started: " + std::generic_category().message(error));
   }
   to.close();
   std::optional<int> status;
   try {
-    status = process.wait(hook.time_limit_s);
+    status = process.wait_for_process(hook.time_limit_s);
   } catch (const std::system_error& error) {
-    return failed("its exit code is unknown: " + error.code().message());
+    return make_hook_failed_event("its exit code is unknown: " + error.code().message());
   }
-  if (!status) subreaper.kill_all();
+  if (!status) subreaper.kill_process_and_children();
   const std::string line = find_last_line(process.written);
-  if (status && WIFEXITED(*status) && WEXITSTATUS(*status) == 0) return make_event(kHookDone, line);
+  if (status && WIFEXITED(*status) && WEXITSTATUS(*status) == 0)
+    return make_run_event_now(kHookDone, line);
   std::string why;
   if (!status) {
     why = fmt::format("no end within {:g} s, killed", hook.time_limit_s);
@@ -263,29 +268,30 @@ RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& loc
   } else {
     why = fmt::format("ended by signal {}", WTERMSIG(*status));
   }
-  return failed(line.empty() ? why : why.append(": ").append(line));
+  return make_hook_failed_event(line.empty() ? why : why.append(": ").append(line));
 }
 
-bool is_hook_open(const RunRecord& record) {
+bool is_hook_pending(const RunRecord& record) {
   return find_last_event(record, kHookRequested) > find_last_event(record, kHookDone);
 }
 
-std::string hook_problem(const RunRecord& record) {
-  if (!is_hook_open(record)) return "";
+std::string describe_pending_hook(const RunRecord& record) {
+  if (!is_hook_pending(record)) return "";
   const std::ptrdiff_t failed = find_last_event(record, kHookFailed);
   if (failed < find_last_event(record, kHookRequested)) return "was not run to its end";
   return "failed: " + record.events[static_cast<std::size_t>(failed)].text;
 }
 
-std::string call_hook(const Hook& hook, RunRecord& record, const HookLock& lock, Spool& spool) {
+std::string run_hook_and_record_result(const Hook& hook, RunRecord& record, const HookLock& lock,
+                                       Spool& spool) {
   std::string problem;
   record.events.push_back(run_hook(hook, record, lock));
   try {
-    spool.keep(record);
+    spool.store_run(record);
   } catch (const InputError& error) {
     problem = std::string("the result of the hook is not recorded: ") + error.what();
   }
-  spool.deliver();
+  spool.deliver_waiting_runs();
   return problem;
 }
 

@@ -17,9 +17,9 @@ RunEvent make_hook_requested_event(const Hook& hook, const std::string& operator
 
 /// Returns true if a hook was requested for a run, at its verdict or when it was voided, and has
 /// not succeeded since.
-bool is_hook_open(const RunRecord& record);
+bool is_hook_pending(const RunRecord& record);
 /// Returns the human-readable reason why a hook is open, in one line; empty if it is not open.
-std::string hook_problem(const RunRecord& record);
+std::string describe_pending_hook(const RunRecord& record);
 
 /// Lock for the hook of a run among the programs that share a spool: file .hook-RUN in the spool.
 /// If the file cannot be written, no lock is needed, because the spool is not shared.
@@ -31,10 +31,10 @@ class HookLock {
   HookLock& operator=(const HookLock&) = delete;
 
   /// Returns true unless another program is running the hook.
-  bool held() const { return held_; }
+  bool is_lock_held() const { return held_; }
   /// Returns the file descriptor of the lock; negative if there is no lock file. A process that has
   /// the descriptor holds the lock.
-  int descriptor() const { return descriptor_; }
+  int lock_file_descriptor() const { return descriptor_; }
 
  private:
   std::filesystem::path file_;
@@ -56,6 +56,7 @@ RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& loc
 
 /// Runs the hook of a stored run and records the result as another event of the run. Returns the
 /// reason why the event is not recorded; empty if it is. The verdict is valid without the event.
-std::string call_hook(const Hook& hook, RunRecord& record, const HookLock& lock, Spool& spool);
+std::string run_hook_and_record_result(const Hook& hook, RunRecord& record, const HookLock& lock,
+                                       Spool& spool);
 
 }  // namespace vlp

@@ -29,17 +29,17 @@ void check_void_permission(const StationConfig& station, const std::string& oper
   throw std::invalid_argument(
       fmt::format("operator {} may not void runs of station {}: void_operators in station.yaml has "
                   "those who may",
-                  printable_line(operator_name), station.station));
+                  escape_for_single_line(operator_name), station.station));
 }
 
 }  // namespace
 
 KnownRuns::KnownRuns(StationConfig station) : station_(std::move(station)) {
   spool_.emplace(station_->spool, station_->records);
-  spool_->deliver();
+  spool_->deliver_waiting_runs();
   offline_reason_ = spool_->last_offline_reason();  // not waited for twice
   if (offline_reason_.empty()) open(station_->records);
-  if (!offline_reason_.empty() && waiting().empty()) throw_unavailable();
+  if (!offline_reason_.empty() && list_waiting_runs().empty()) throw_unavailable();
 }
 
 KnownRuns::KnownRuns(const std::string& records) {
@@ -55,7 +55,7 @@ void KnownRuns::open(const std::string& where) {
     records_.emplace(where);
   } catch (const RecordsOffline& error) {
     offline_reason_ = error.what();
-    if (spool_) spool_->suspend_access(error);
+    if (spool_) spool_->suspend_database_access(error);
   } catch (const InputError& error) {
     offline_reason_ = error.what();
   }
@@ -63,11 +63,12 @@ void KnownRuns::open(const std::string& where) {
 
 void KnownRuns::throw_unavailable() {
   const bool has_notice = spool_ && !spool_->last_offline_reason().empty();
-  throw RecordsUnavailable(has_notice ? spool_->notice() : offline_reason_, offline_reason_);
+  throw RecordsUnavailable(has_notice ? spool_->make_operator_notice() : offline_reason_,
+                           offline_reason_);
 }
 
-std::vector<RunRecord> KnownRuns::waiting() {
-  return spool_ ? spool_->waiting() : std::vector<RunRecord>();
+std::vector<RunRecord> KnownRuns::list_waiting_runs() {
+  return spool_ ? spool_->list_waiting_runs() : std::vector<RunRecord>();
 }
 
 Records& KnownRuns::records() {
@@ -75,14 +76,15 @@ Records& KnownRuns::records() {
   return *records_;
 }
 
-std::vector<RunSummary> KnownRuns::list(const RunFilter& filter) {
+std::vector<RunSummary> KnownRuns::list_runs(const RunFilter& filter) {
   // First, so that a run that another program delivers at this time is in one of the two.
-  const std::vector<RunRecord> waiting = this->waiting();
-  return merge_runs(records_ ? records_->list(filter) : std::vector<RunSummary>(), waiting, filter);
+  const std::vector<RunRecord> waiting = this->list_waiting_runs();
+  return merge_runs(records_ ? records_->list_runs(filter) : std::vector<RunSummary>(), waiting,
+                    filter);
 }
 
 RunRecord KnownRuns::find(const std::string& run) {
-  for (const RunRecord& waiting : this->waiting()) {
+  for (const RunRecord& waiting : this->list_waiting_runs()) {
     if (waiting.run == run) return waiting;
   }
   auto record = records().find(run);
@@ -90,26 +92,26 @@ RunRecord KnownRuns::find(const std::string& run) {
   return *record;
 }
 
-RunRecord KnownRuns::last(const RunFilter& filter) {
-  const auto runs = list(filter);
+RunRecord KnownRuns::find_last_run(const RunFilter& filter) {
+  const auto runs = list_runs(filter);
   if (runs.empty()) throw std::invalid_argument("there is no such run");
   return find(runs.back().run);
 }
 
-std::vector<RunRecord> KnownRuns::load_all(const RunFilter& filter) {
+std::vector<RunRecord> KnownRuns::load_all_runs(const RunFilter& filter) {
   std::vector<RunRecord> runs;
-  for (const RunSummary& run : records().list(filter)) {
+  for (const RunSummary& run : records().list_runs(filter)) {
     if (auto record = records().find(run.run)) runs.push_back(std::move(*record));
   }
   return runs;
 }
 
-std::optional<double> RunCounts::yield() const {
+std::optional<double> RunCounts::compute_yield() const {
   if (units_judged == 0) return std::nullopt;
   return static_cast<double>(units_passed) / static_cast<double>(units_judged);
 }
 
-std::optional<double> RunCounts::first_pass_yield() const {
+std::optional<double> RunCounts::compute_first_pass_yield() const {
   if (cameras == 0) return std::nullopt;
   return static_cast<double>(cameras_passed_first) / static_cast<double>(cameras);
 }
@@ -167,14 +169,14 @@ VoidedRun void_run(KnownRuns& known, const std::string& run, const std::string& 
                    const std::string& reason) {
   VoidedRun result{known.find(run)};
   RunRecord& record = result.run;
-  const std::string who = printable_line(operator_name);
+  const std::string who = escape_for_single_line(operator_name);
   const StationConfig* station = known.station();
   if (station != nullptr && record.station != station->station) station = nullptr;
   std::optional<HookLock> lock;
   if (station != nullptr && station->hook) {
     lock.emplace(known.spool()->folder(), record.run);
     // The result of that hook would be mistaken for that of the hook about the voiding.
-    if (!lock->held()) {
+    if (!lock->is_lock_held()) {
       throw InputError(record.run, "its hook is being run: void it when that has ended");
     }
     record = known.find(run);  // it can have been voided before the lock was acquired
@@ -183,25 +185,26 @@ VoidedRun void_run(KnownRuns& known, const std::string& run, const std::string& 
   // Each step is done unless it was done before: a voiding by the records alone (--records) lacks
   // those of the station.
   std::string repeated;
-  if (const RunEvent* event = voided(record)) {
+  if (const RunEvent* event = find_voiding_event(record)) {
     repeated =
         fmt::format("run {} was voided before, by {}: {}", record.run, event->who, event->text);
   } else {
-    record.events.push_back(make_event(kVoided, printable_line(reason), who));
+    record.events.push_back(make_run_event_now(kVoided, escape_for_single_line(reason), who));
   }
   const bool calls_hook =
       lock && find_last_event(record, kHookRequested) < find_last_event(record, kVoided);
   if (calls_hook) record.events.push_back(make_hook_requested_event(*station->hook, who));
   bool is_any_done = repeated.empty() || calls_hook;
   Spool* spool = known.spool();
-  if (is_any_done) spool != nullptr ? spool->keep(record) : known.records().keep(record);
+  if (is_any_done) spool != nullptr ? spool->store_run(record) : known.records().store_run(record);
   if (station != nullptr && record.kind == "golden") {
-    is_any_done = invalidate_golden_note(*station, record.run) || is_any_done;
+    is_any_done = invalidate_golden_unit_note(*station, record.run) || is_any_done;
   }
   is_any_done = rename_files(station, record, result.files_problem) || is_any_done;
   if (!is_any_done) throw std::invalid_argument(repeated);
-  if (spool != nullptr) spool->deliver();
-  if (calls_hook) result.problem = call_hook(*station->hook, record, *lock, *spool);
+  if (spool != nullptr) spool->deliver_waiting_runs();
+  if (calls_hook)
+    result.problem = run_hook_and_record_result(*station->hook, record, *lock, *spool);
   return result;
 }
 

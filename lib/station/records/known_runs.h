@@ -43,22 +43,22 @@ class KnownRuns {
   /// Returns the records. Throws RecordsUnavailable if they are offline.
   Records& records();
   /// Returns true if the records are offline. Only the waiting runs are known then.
-  bool are_offline() const { return !records_; }
+  bool are_records_offline() const { return !records_; }
 
   /// Returns the runs of the records, if online, and the waiting runs (merge_runs()).
-  std::vector<RunSummary> list(const RunFilter& filter);
+  std::vector<RunSummary> list_runs(const RunFilter& filter);
   /// Returns a run that waits or that the records contain. Throws std::invalid_argument if no run
   /// has this id, otherwise as records().
   RunRecord find(const std::string& run);
   /// Returns the last run that matches the filter. Throws as find().
-  RunRecord last(const RunFilter& filter);
+  RunRecord find_last_run(const RunFilter& filter);
   /// Returns the complete runs that the records contain.
-  std::vector<RunRecord> load_all(const RunFilter& filter);
+  std::vector<RunRecord> load_all_runs(const RunFilter& filter);
 
  private:
   void open(const std::string& where);
   [[noreturn]] void throw_unavailable();
-  std::vector<RunRecord> waiting();
+  std::vector<RunRecord> list_waiting_runs();
 
   std::optional<StationConfig> station_ = {};
   std::optional<Spool> spool_ = {};
@@ -77,9 +77,9 @@ struct RunCounts {
   std::size_t cameras = 0, cameras_passed_first = 0, cameras_reworked = 0;
 
   /// Returns the fraction of runs of units that passed, std::nullopt if no unit was judged.
-  std::optional<double> yield() const;
+  std::optional<double> compute_yield() const;
   /// Returns the fraction of cameras whose first run passed, std::nullopt if no unit was judged.
-  std::optional<double> first_pass_yield() const;
+  std::optional<double> compute_first_pass_yield() const;
 };
 
 /// Counts runs. `runs` are in chronological order.
@@ -96,8 +96,8 @@ struct VoidedRun {
 /// reason. A voided golden run makes the golden unit due.
 ///
 /// At the station of the run its files are renamed (mark_files_voided()), and its hook is called
-/// (call_hook()). These steps are completed there for a run that was voided before with records
-/// alone.
+/// (run_hook_and_record_result()). These steps are completed there for a run that was voided before
+/// with records alone.
 ///
 /// Throws std::invalid_argument if the operator is not among StationConfig::void_operators of that
 /// station. Throws it, too, if the run was voided before and no step is missing. Throws InputError

@@ -27,7 +27,8 @@ Id describe_camera(const RunRecord& record) {
 Id describe_run(const RunRecord& record) { return {record.run, "the record of a run", "run"}; }
 
 /// Returns true if a file has this content. A longer one, a link and a pipe do not.
-bool holds(const SharedFolder& folder, const std::string& name, const std::string& content) {
+bool has_file_content(const SharedFolder& folder, const std::string& name,
+                      const std::string& content) {
   try {
     return folder.read(name, content.size()) == content;
   } catch (const InputError&) {
@@ -37,11 +38,11 @@ bool holds(const SharedFolder& folder, const std::string& name, const std::strin
 
 /// Writes the calibration of a record, or checks the existing one. Returns its path.
 fs::path write_calibration(const RunRecord& record, const SharedFolder& folder) {
-  const char* name = calibration_name(record);
+  const char* name = calibration_file_name(record);
   fs::path file = folder.path() / name;
-  if (!folder.has(name)) {
-    folder.replace(name, record.calibration);
-  } else if (!holds(folder, name, record.calibration)) {
+  if (!folder.contains_entry(name)) {
+    folder.replace_file(name, record.calibration);
+  } else if (!has_file_content(folder, name, record.calibration)) {
     throw InputError(file, "differs from the record: move it away");
   }
   return file;
@@ -51,9 +52,9 @@ ReportVerdict make_verdict_box(const RunRecord& record) {
   using Look = ReportVerdict::Look;
   const std::string no_verdict = find_verdict_problem(record);
   ReportVerdict verdict{record.verdict,
-                        record.passed()    ? Look::pass
-                        : record.invalid() ? Look::none
-                                           : Look::fail,
+                        record.has_passed()   ? Look::pass
+                        : record.is_invalid() ? Look::none
+                                              : Look::fail,
                         {}};
   if (!no_verdict.empty()) verdict = {"NO VERDICT", Look::none, {no_verdict}};
   std::istringstream causes(record.causes);
@@ -62,22 +63,22 @@ ReportVerdict make_verdict_box(const RunRecord& record) {
 }
 
 std::string describe_meaning(const CheckedMetric& metric) {
-  const auto kind = metric_kind(metric.name);
+  const auto kind = find_metric_kind(metric.name);
   return kind ? kind->meaning : "a metric of another version of the program";
 }
 
 }  // namespace
 
-void check_results(const fs::path& results, const std::string& camera) {
+void check_results_folder(const fs::path& results, const std::string& camera) {
   constexpr std::uintmax_t room_bytes = 8'000'000;
   make_folder(results);
-  check_free_space(SharedFolder(results).make_folder({camera, results, "camera"}), room_bytes);
+  check_free_space(SharedFolder(results).make_subfolder({camera, results, "camera"}), room_bytes);
 }
 
-const char* calibration_name(const RunRecord& record) {
-  if (voided(record) != nullptr) return "voided-calibration.yaml";
-  if (record.passed()) return "calibration.yaml";
-  return record.invalid() ? "invalid-calibration.yaml" : "failed-calibration.yaml";
+const char* calibration_file_name(const RunRecord& record) {
+  if (find_voiding_event(record) != nullptr) return "voided-calibration.yaml";
+  if (record.has_passed()) return "calibration.yaml";
+  return record.is_invalid() ? "invalid-calibration.yaml" : "failed-calibration.yaml";
 }
 
 bool mark_files_voided(const RunRecord& record, const fs::path& results) {
@@ -89,12 +90,13 @@ bool mark_files_voided(const RunRecord& record, const fs::path& results) {
                              std::pair("replaced-report.html", "voided-replaced-report.html")};
   std::error_code missing;
   if (!fs::is_directory(results, missing)) return false;
-  const auto camera = SharedFolder(results).find_folder(describe_camera(record));
-  const auto folder = camera ? camera->find_folder(describe_run(record)) : std::nullopt;
+  const auto camera = SharedFolder(results).open_subfolder_if_exists(describe_camera(record));
+  const auto folder =
+      camera ? camera->open_subfolder_if_exists(describe_run(record)) : std::nullopt;
   if (!folder) return false;
   bool is_any_renamed = false;
   for (const auto& [name, voided_name] : names) {
-    is_any_renamed = folder->rename(name, voided_name) || is_any_renamed;
+    is_any_renamed = folder->rename_file(name, voided_name) || is_any_renamed;
   }
   return is_any_renamed;
 }
@@ -102,7 +104,7 @@ bool mark_files_voided(const RunRecord& record, const fs::path& results) {
 SharedFolder open_run_folder(const RunRecord& record, const fs::path& results) {
   const Id camera = describe_camera(record), run = describe_run(record);
   make_folder(results);
-  return SharedFolder(results).make_folder(camera).make_folder(run);
+  return SharedFolder(results).make_subfolder(camera).make_subfolder(run);
 }
 
 std::string make_unit_report(const RunRecord& record, const std::filesystem::path& calibration,
@@ -117,7 +119,8 @@ std::string make_unit_report(const RunRecord& record, const std::filesystem::pat
       report.gates.push_back(metric);
       report.gates.back().name = name;
     } else if (metric.value) {
-      report.metrics.push_back({name, significant(*metric.value, digits), metric.unit, ""});
+      report.metrics.push_back(
+          {name, format_significant_digits(*metric.value, digits), metric.unit, ""});
     }
   }
   for (const auto& [step, image, sha256, refused] : record.images) {
@@ -136,7 +139,7 @@ std::string make_unit_report(const RunRecord& record, const std::filesystem::pat
                          record.config_sha256 + ".");
   if (!calibration.empty()) report.calibration = read_calibration(calibration);
   report.pictures = pictures;
-  return report_html(report);
+  return render_report_html(report);
 }
 
 fs::path publish_run(const RunRecord& record, const std::vector<ReportPlot>& pictures,
@@ -144,15 +147,15 @@ fs::path publish_run(const RunRecord& record, const std::vector<ReportPlot>& pic
   const SharedFolder folder = open_run_folder(record, results);
   fs::path calibration;
   if (!record.calibration.empty()) calibration = write_calibration(record, folder);
-  const std::string name = voided(record) ? "voided-report.html" : "report.html";
-  const bool is_there = folder.has(name);
+  const std::string name = find_voiding_event(record) ? "voided-report.html" : "report.html";
+  const bool is_there = folder.contains_entry(name);
   if (is_there && existing == ExistingReport::keep) return folder.path();
   const std::string report = make_unit_report(record, calibration, pictures);
-  if (is_there && holds(folder, name, report)) return folder.path();
+  if (is_there && has_file_content(folder, name, report)) return folder.path();
   // The first one is kept: those that a restoring has drawn can be drawn again.
   const std::string replaced = "replaced-" + name;
-  if (is_there && !folder.has(replaced)) folder.rename(name, replaced);
-  folder.replace(name, report);
+  if (is_there && !folder.contains_entry(replaced)) folder.rename_file(name, replaced);
+  folder.replace_file(name, report);
   return folder.path();
 }
 

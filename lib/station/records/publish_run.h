@@ -14,11 +14,11 @@ namespace vlp {
 
 /// Checks, before a camera's run is started, that its results can be written: creates the folder,
 /// writes a file, and checks the free space. Throws InputError.
-void check_results(const std::filesystem::path& results, const std::string& camera);
+void check_results_folder(const std::filesystem::path& results, const std::string& camera);
 
 /// Returns the file name of a run's calibration, by its verdict: calibration.yaml,
 /// failed-calibration.yaml, invalid-calibration.yaml, or voided-calibration.yaml.
-const char* calibration_name(const RunRecord& record);
+const char* calibration_file_name(const RunRecord& record);
 
 /// Renames calibration, report and certificate in RESULTS/CAMERA/RUN/ to voided-calibration.yaml,
 /// voided-report.html and voided-certificate.html, so that they cannot be mistaken for valid files.
@@ -40,9 +40,9 @@ enum class ExistingReport { keep, replace };
 SharedFolder open_run_folder(const RunRecord& record, const std::filesystem::path& results);
 
 /// Writes the missing files of RESULTS/CAMERA/RUN/, and returns the folder. The files are the
-/// calibration, if the run has one, as calibration_name(), and then report.html with `pictures`.
-/// Can be repeated at any time. Throws InputError, also if the existing calibration differs from
-/// the record's.
+/// calibration, if the run has one, as calibration_file_name(), and then report.html with
+/// `pictures`. Can be repeated at any time. Throws InputError, also if the existing calibration
+/// differs from the record's.
 std::filesystem::path publish_run(const RunRecord& record, const std::vector<ReportPlot>& pictures,
                                   const std::filesystem::path& results,
                                   ExistingReport existing = ExistingReport::keep);

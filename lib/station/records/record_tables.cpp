@@ -40,9 +40,9 @@ constexpr const char* kTrail =
     "CREATE TABLE IF NOT EXISTS trail (number BIGINT PRIMARY KEY, run VARCHAR(64) NOT NULL, "
     "event VARCHAR(64) NOT NULL, content TEXT NOT NULL, digest TEXT NOT NULL)";
 
-std::vector<std::string> tables() {
+std::vector<std::string> list_table_statements() {
   std::string runs = "CREATE TABLE IF NOT EXISTS runs (run VARCHAR(64) PRIMARY KEY";
-  for (const RunField& field : run_fields().subspan(1)) {
+  for (const RunField& field : list_run_text_fields().subspan(1)) {
     runs.append(", ").append(field.name).append(" TEXT NOT NULL");
   }
   runs += ")";
@@ -69,17 +69,17 @@ constexpr const char* kUnitsOfVersion1 =
     "WHEN name = 'tilt_deg' THEN 'deg' WHEN name = 'focal_percent' THEN '%' ELSE '' END";
 
 /// Adds the units of figures.
-void from_1_to_2(soci::session& sql) {
+void migrate_tables_1_to_2(soci::session& sql) {
   sql << "ALTER TABLE figures ADD COLUMN unit VARCHAR(16) NOT NULL DEFAULT ''";
   sql << kUnitsOfVersion1;
 }
 
 /// Adds the index of images by their digest, and refuses older programs, which count INVALID as
 /// failed.
-void from_2_to_3(soci::session& sql) { sql << kImagesByDigest; }
+void migrate_tables_2_to_3(soci::session& sql) { sql << kImagesByDigest; }
 
 /// Adds guard bands, which older programs cannot evaluate.
-void from_3_to_4(soci::session& sql) {
+void migrate_tables_3_to_4(soci::session& sql) {
   sql << "ALTER TABLE figures ADD COLUMN uncertainty DOUBLE PRECISION";
   sql << "ALTER TABLE figures ADD COLUMN guard_k DOUBLE PRECISION";
 }
@@ -91,7 +91,7 @@ constexpr const char* kEventsOfVersion5 =
 
 /// Adds events, operator and shift. An older program would store runs without their events, and
 /// remove them from the spool.
-void from_4_to_5(soci::session& sql) {
+void migrate_tables_4_to_5(soci::session& sql) {
   sql << kEventsOfVersion5;
   sql << kEventsByRun;
   sql << "ALTER TABLE runs ADD COLUMN operator_name TEXT NOT NULL DEFAULT ''";
@@ -100,14 +100,16 @@ void from_4_to_5(soci::session& sql) {
 
 /// Adds the authors of events, and the trail. Older programs would store runs without entries in
 /// it.
-void from_5_to_6(soci::session& sql) {
+void migrate_tables_5_to_6(soci::session& sql) {
   sql << "ALTER TABLE events ADD COLUMN who TEXT NOT NULL DEFAULT ''";
   sql << kTrail;
 }
 constexpr int kFirstWithTrail = 6;
 
 /// Migrations from each version to the next, starting with version 1.
-constexpr std::array kMigrations{from_1_to_2, from_2_to_3, from_3_to_4, from_4_to_5, from_5_to_6};
+constexpr std::array kMigrations{migrate_tables_1_to_2, migrate_tables_2_to_3,
+                                 migrate_tables_3_to_4, migrate_tables_4_to_5,
+                                 migrate_tables_5_to_6};
 
 bool is_sqlite(soci::session& sql) { return sql.get_backend_name() == "sqlite3"; }
 
@@ -132,7 +134,7 @@ int load_table_version(soci::session& sql) {
                            ": use the newer vlp-station that wrote them");
 }
 
-void read_figures(soci::session& sql, RunRecord& record) {
+void read_run_metrics(soci::session& sql, RunRecord& record) {
   CheckedMetric metric;
   double value = 0, gate = 0;
   GuardBand guard{};
@@ -160,12 +162,12 @@ void read_figures(soci::session& sql, RunRecord& record) {
 
 const int kSchemaVersion = static_cast<int>(kMigrations.size()) + 1;
 
-bool has_current_tables(soci::session& sql) {
+bool has_current_schema_version(soci::session& sql) {
   // Versions only increase. Takes no lock, so that read-only users can call it.
   return load_table_version(sql) == kSchemaVersion;
 }
 
-void make_record_tables(soci::session& sql) {
+void create_record_tables(soci::session& sql) {
   soci::transaction transaction(sql);
   // Serialized: a waiting program sees the changes of the other.
   if (is_sqlite(sql)) {
@@ -178,19 +180,19 @@ void make_record_tables(soci::session& sql) {
     sql << "SELECT pg_advisory_xact_lock(" + std::to_string(kTableLockId) + ")";
   }
   if (load_table_version(sql) == 0) {
-    for (const std::string& table : tables()) sql << table;
+    for (const std::string& table : list_table_statements()) sql << table;
     sql << "INSERT INTO vlp_schema (version) SELECT CAST(:version AS INTEGER) WHERE NOT EXISTS "
            "(SELECT 1 FROM vlp_schema)",
         soci::use(kSchemaVersion);
   }
   // Waits for current writers.
-  lock_trail(sql);
+  lock_audit_trail(sql);
   const int found = load_table_version(sql);
   for (int version = found; version < kSchemaVersion; ++version) {
     kMigrations.at(static_cast<std::size_t>(version) - 1)(sql);
   }
   // Requires all columns.
-  if (found < kFirstWithTrail) append_all_runs(sql);
+  if (found < kFirstWithTrail) append_all_runs_to_audit_trail(sql);
   if (found < kSchemaVersion) {
     sql << "UPDATE vlp_schema SET version = :version", soci::use(kSchemaVersion);
   }
@@ -201,7 +203,7 @@ std::optional<RunRecord> load_run_header(soci::session& sql, const std::string& 
   RunRecord record;
   soci::statement select(sql);
   std::string columns;
-  for (const auto& [name, text, label, in_csv] : run_fields()) {
+  for (const auto& [name, text, label, in_csv] : list_run_text_fields()) {
     columns.append(columns.empty() ? "" : ", ").append(name);
     select.exchange(soci::into(record.*text));
   }
@@ -216,7 +218,7 @@ std::optional<RunRecord> load_run_header(soci::session& sql, const std::string& 
 std::optional<RunRecord> load_run(soci::session& sql, const std::string& run) {
   std::optional<RunRecord> found = load_run_header(sql, run);
   if (!found) return found;
-  read_figures(sql, *found);
+  read_run_metrics(sql, *found);
   RunRecord::Image image;
   soci::statement images =
       (sql.prepare << "SELECT step, image, sha256, refused FROM images WHERE run = :run ORDER "

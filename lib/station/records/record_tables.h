@@ -14,9 +14,9 @@ namespace vlp {
 /// Current version of the tables, the number of migrations plus one, stored in vlp_schema.
 extern const int kSchemaVersion;
 
-/// Returns true if the tables have the current version. Takes no lock. Throws as
-/// make_record_tables().
-bool has_current_tables(soci::session& sql);
+/// Returns true if the tables have the version kSchemaVersion. Takes no lock. Throws as
+/// create_record_tables().
+bool has_current_schema_version(soci::session& sql);
 
 /// Advisory lock of PostgreSQL for creating and migrating tables ("vlp"). Older programs do not
 /// take it. If two programs start with an empty database at the same time, one of them can
@@ -26,10 +26,10 @@ inline constexpr int kTableLockId = 0x766c70;
 /// Creates the tables of the records, identical in SQLite and PostgreSQL, or migrates tables of an
 /// earlier version. Runs in one transaction and in one program at a time. Throws soci::soci_error,
 /// and std::runtime_error for tables of a later version.
-void make_record_tables(soci::session& sql);
+void create_record_tables(soci::session& sql);
 
-/// Loads the texts of a run (run_fields()) from tables of the current version; std::nullopt if no
-/// run has this id. Throws soci::soci_error.
+/// Loads the texts of a run (list_run_text_fields()) from tables of the current version;
+/// std::nullopt if no run has this id. Throws soci::soci_error.
 std::optional<RunRecord> load_run_header(soci::session& sql, const std::string& run);
 /// Loads a run with its metrics, images and events, with the names of metrics as they were stored;
 /// std::nullopt if no run has this id.

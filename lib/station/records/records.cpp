@@ -58,13 +58,14 @@ void open(soci::session& sql, const std::string& where) {
     if (where.find('"') != std::string::npos) {
       throw InputError(where, "the name of a database cannot have a quote (\"): rename its folder");
     }
-    sql.open(soci::sqlite3, "dbname=\"" + where + "\" timeout=" + std::to_string(timeout_s(where)));
+    sql.open(soci::sqlite3,
+             "dbname=\"" + where + "\" timeout=" + std::to_string(get_database_timeout_s(where)));
   }
 }
 
 /// Returns true if a later attempt can succeed: another program holds a lock, or the file cannot be
 /// opened or read.
-bool is_transient(const soci::soci_error& error) {
+bool is_transient_database_error(const soci::soci_error& error) {
   if (const auto* file = dynamic_cast<const soci::sqlite3_soci_error*>(&error)) {
     constexpr int without_extension = 0xff;
     const int result = file->result() & without_extension;
@@ -84,8 +85,8 @@ bool lacks_privilege(const soci::soci_error& error) {
   return server != nullptr && server->sqlstate() == insufficient_privilege;
 }
 
-/// Closes a connection without progress for timeout_s(). libpq waits forever for a frozen server,
-/// which does not apply its own limits either.
+/// Closes a connection without progress for get_database_timeout_s(). libpq waits forever for a
+/// frozen server, which does not apply its own limits either.
 class ConnectionWatchdog {
  public:
   ConnectionWatchdog(soci::session& sql, int timeout_s) : timeout_(timeout_s) {
@@ -94,7 +95,8 @@ class ConnectionWatchdog {
     // Own descriptor: libpq closes its socket when the connection is lost, and its number can be
     // reused.
     socket_ = ::fcntl(PQsocket(server->conn_), F_DUPFD_CLOEXEC, 0);
-    if (socket_ >= 0) thread_ = std::jthread([this](const std::stop_token& stop) { wait(stop); });
+    if (socket_ >= 0)
+      thread_ = std::jthread([this](const std::stop_token& stop) { wait_before_retry(stop); });
   }
   ~ConnectionWatchdog() {
     if (socket_ < 0) return;
@@ -111,7 +113,7 @@ class ConnectionWatchdog {
  private:
   using Clock = std::chrono::steady_clock;
 
-  void wait(const std::stop_token& stop) {
+  void wait_before_retry(const std::stop_token& stop) {
     std::mutex mutex;
     std::unique_lock lock(mutex);
     std::condition_variable_any stopped;
@@ -161,7 +163,7 @@ struct Records::Database {
 
   /// Runs an action; its errors name the database.
   template <typename Action>
-  auto with_database_name(const Action& action) {
+  auto add_database_name_to_error(const Action& action) {
     const auto begun = std::chrono::steady_clock::now();
     try {
       return action();
@@ -176,7 +178,7 @@ struct Records::Database {
       if (lacks_privilege(error)) {
         throw RecordsRefused(name, "the user of the records lacks a right: " + what);
       }
-      if (is_transient(error)) throw RecordsOffline(name, "the records: " + what);
+      if (is_transient_database_error(error)) throw RecordsOffline(name, "the records: " + what);
       throw InputError(name, "the records: " + what);
     } catch (const std::exception& error) {
       throw InputError(name, error.what());
@@ -187,23 +189,23 @@ struct Records::Database {
   /// watch.
   template <typename Action>
   auto run(const Action& action, int timeout_factor = 1) {
-    return with_database_name([&] {
+    return add_database_name_to_error([&] {
       try {
-        return run_watched(action, timeout_factor);
+        return run_with_timeout(action, timeout_factor);
       } catch (const soci::soci_error&) {
         if (!ready || sql.is_connected()) throw;
       }
       // A unit takes minutes, in which the server can restart or the network can fail.
       sql.reconnect();
-      run_watched([&](ConnectionWatchdog&) { configure_connection(sql, timeout_s); },
-                  timeout_factor);
-      return run_watched(action, timeout_factor);
+      run_with_timeout([&](ConnectionWatchdog&) { configure_connection(sql, timeout_s); },
+                       timeout_factor);
+      return run_with_timeout(action, timeout_factor);
     });
   }
 
  private:
   template <typename Action>
-  auto run_watched(const Action& action, int timeout_factor) {
+  auto run_with_timeout(const Action& action, int timeout_factor) {
     ConnectionWatchdog watch(sql, timeout_factor * timeout_s);
     try {
       return action(watch);
@@ -222,8 +224,8 @@ constexpr int kManyRowsTimeoutFactor = 10;
 /// Factor of the time limit for tables: an hour by default, for an index of all images.
 constexpr int kMigrationTimeoutFactor = 360;
 
-bool same_texts(const RunRecord& a, const RunRecord& b) {
-  return std::ranges::all_of(run_fields(),
+bool have_same_texts(const RunRecord& a, const RunRecord& b) {
+  return std::ranges::all_of(list_run_text_fields(),
                              [&](const RunField& field) { return a.*field.text == b.*field.text; });
 }
 
@@ -236,7 +238,7 @@ void insert_metrics(soci::session& sql, const RunRecord& record, ConnectionWatch
     const auto [uncertainty, guard_k] = metric.guard.value_or(GuardBand{});
     soci::indicator has_guard = metric.guard ? soci::i_ok : soci::i_null;
     const int at_least = metric.direction == Direction::at_least ? 1 : 0,
-              passed = metric.passed() ? 1 : 0;
+              passed = metric.has_passed() ? 1 : 0;
     ++place;
     sql << "INSERT INTO figures (run, place, name, value, gate, at_least, met, unit, uncertainty, "
            "guard_k) VALUES (:run, :place, :name, :value, :gate, :at_least, :met, :unit, "
@@ -279,7 +281,7 @@ std::vector<RunEvent> insert_events(soci::session& sql, const RunRecord& record,
 /// Conditions for a run in a query.
 const std::string kNotVoided =
     "NOT EXISTS (SELECT 1 FROM events WHERE events.run = runs.run AND events.what = 'voided')";
-/// As is_hook_open().
+/// As is_hook_pending().
 const std::string kHookOpen = fmt::format(
     "EXISTS (SELECT 1 FROM events WHERE events.run = runs.run AND events.what = '{}' AND "
     "NOT EXISTS (SELECT 1 FROM events ended WHERE ended.run = events.run AND ended.what = '{}' "
@@ -332,12 +334,12 @@ std::vector<Row> query_rows(soci::session& sql, const std::string& select, const
   statement.define_and_bind();
   statement.execute();
   while (statement.fetch()) rows.push_back(row);
-  return keep_last(std::move(rows), filter.last);
+  return keep_last_rows(std::move(rows), filter.last);
 }
 
 }  // namespace
 
-std::vector<double> extract_values(std::span<const TrendPoint> points) {
+std::vector<double> extract_trend_values(std::span<const TrendPoint> points) {
   std::vector<double> values;
   values.reserve(points.size());
   for (const TrendPoint& point : points) values.push_back(point.value);
@@ -347,30 +349,31 @@ std::vector<double> extract_values(std::span<const TrendPoint> points) {
 Records::Records(const std::string& where) : database_(std::make_unique<Database>()) {
   database_->where = where;
   database_->name = describe_database(where);
-  database_->timeout_s = timeout_s(where);
+  database_->timeout_s = get_database_timeout_s(where);
   soci::session& sql = database_->sql;
-  database_->with_database_name([&] { open(sql, where); });
+  database_->add_database_name_to_error([&] { open(sql, where); });
   const bool are_there = database_->run([&](ConnectionWatchdog& watch) {
     configure_connection(sql, database_->timeout_s);
     watch.on_progress();
-    return has_current_tables(sql);
+    return has_current_schema_version(sql);
   });
   if (!are_there) {
-    database_->run([&](ConnectionWatchdog&) { make_record_tables(sql); }, kMigrationTimeoutFactor);
+    database_->run([&](ConnectionWatchdog&) { create_record_tables(sql); },
+                   kMigrationTimeoutFactor);
   }
   database_->ready = true;
 }
 
 Records::~Records() = default;
 
-void Records::keep(const RunRecord& record) {
+void Records::store_run(const RunRecord& record) {
   database_->run([&](ConnectionWatchdog& watch) {
     soci::session& sql = database_->sql;
     soci::transaction transaction(sql);
     // Writes first, so that the transaction waits for others before it reads.
     soci::statement insert(sql);
     std::string columns, places;
-    for (const auto& [name, text, label, in_csv] : run_fields()) {
+    for (const auto& [name, text, label, in_csv] : list_run_text_fields()) {
       columns.append(columns.empty() ? "" : ", ").append(name);
       places.append(places.empty() ? ":" : ", :").append(name);
       insert.exchange(soci::use(record.*text, name));
@@ -386,25 +389,25 @@ void Records::keep(const RunRecord& record) {
       insert_metrics(sql, record, watch);
       insert_images(sql, record, watch);
     } else if (const auto kept = load_run_header(sql, record.run);
-               !kept || !same_texts(*kept, record)) {
+               !kept || !have_same_texts(*kept, record)) {
       throw InputError(database_->name, "has another run " + record.run);
     }
     const auto new_events = insert_events(sql, record, watch);
     // Last, because all stations that share the records wait for it.
-    append_to_trail(sql, record.run, is_new, new_events);
+    append_to_audit_trail(sql, record.run, is_new, new_events);
     transaction.commit();
   });
 }
 
-void Records::check_writable() {
+void Records::check_database_writable() {
   database_->run([&](ConnectionWatchdog&) {
     soci::transaction transaction(database_->sql);
-    lock_trail(database_->sql);
+    lock_audit_trail(database_->sql);
     transaction.rollback();
   });
 }
 
-std::vector<RunSummary> Records::list(const RunFilter& filter) {
+std::vector<RunSummary> Records::list_runs(const RunFilter& filter) {
   using Line = RunSummary;
   constexpr const char* select =
       "SELECT run, kind, station, camera, ended_utc, verdict, causes, COALESCE((SELECT "
@@ -419,7 +422,7 @@ std::vector<RunSummary> Records::list(const RunFilter& filter) {
       filter.image_sha256.empty() ? kManyRowsTimeoutFactor : 1);
 }
 
-std::vector<TrendPoint> Records::trend(const std::string& metric, const RunFilter& filter) {
+std::vector<TrendPoint> Records::load_trend(const std::string& metric, const RunFilter& filter) {
   using Point = TrendPoint;
   constexpr const char* select =
       "SELECT runs.run, runs.station, runs.camera, runs.verdict, runs.ended_utc, figures.value "
@@ -440,7 +443,7 @@ std::vector<TrendPoint> Records::trend(const std::string& metric, const RunFilte
 std::optional<RunRecord> Records::find(const std::string& run) {
   auto found = database_->run([&](ConnectionWatchdog&) { return load_run(database_->sql, run); });
   if (!found) return found;
-  for (CheckedMetric& metric : found->metrics) metric.name = present_metric_name(metric.name);
+  for (CheckedMetric& metric : found->metrics) metric.name = find_present_metric_name(metric.name);
   return found;
 }
 
@@ -453,7 +456,7 @@ TrailCheck Records::check(const std::string& expected_digest) {
         if (sql.get_backend_name() == "postgresql") {
           sql << "SET TRANSACTION ISOLATION LEVEL REPEATABLE READ";
         }
-        TrailCheck found = check_trail(sql, expected_digest, [&] { watch.on_progress(); });
+        TrailCheck found = check_audit_trail(sql, expected_digest, [&] { watch.on_progress(); });
         transaction.rollback();
         return found;
       },

@@ -18,14 +18,14 @@ namespace vlp {
 /// Selection of runs. Empty members do not restrict it.
 struct RunFilter {
   std::string camera = {}, station = {}, verdict = {}, kind = {};
-  /// Operator and shift of the run.
+  /// Required operator and shift; empty: any.
   std::string operator_name = {}, shift = {};
   /// End of the run: at or after `since`, and before `until`, UTC, as 2026-11-21 or
   /// 2026-11-21T13:45.
   std::string since = {}, until = {};
   /// Digest of an image that the run uses.
   std::string image_sha256 = {};
-  /// True for runs with an open hook only (is_hook_open()).
+  /// True for runs with an open hook only (is_hook_pending()).
   bool has_open_hook = false;
   /// Maximum number of runs, the latest ones; 0 for all.
   int last = 0;
@@ -44,11 +44,11 @@ struct TrendPoint {
   double value;
 };
 
-std::vector<double> extract_values(std::span<const TrendPoint> points);
+std::vector<double> extract_trend_values(std::span<const TrendPoint> points);
 
 /// Returns the last `last` elements of `rows`; all of them if `last` is 0.
 template <typename Row>
-std::vector<Row> keep_last(std::vector<Row> rows, int last) {
+std::vector<Row> keep_last_rows(std::vector<Row> rows, int last) {
   const auto kept = static_cast<std::size_t>(last);
   if (last > 0 && rows.size() > kept) {
     rows.erase(rows.begin(), rows.end() - static_cast<std::ptrdiff_t>(kept));
@@ -84,7 +84,8 @@ class RecordsRefused : public RecordsOffline {
 ///   message states,
 /// - the file cannot be opened,
 /// - another program holds a lock, or
-/// - the time limit expired: timeout_s(), 10 times that for queries of many runs (without
+/// - the time limit expired: get_database_timeout_s(), 10 times that for queries of many runs
+/// (without
 ///   RunFilter::image_sha256), 360 times that for creating or migrating tables.
 class Records {
  public:
@@ -95,15 +96,15 @@ class Records {
 
   /// Stores a run atomically. A stored run is not changed but gets the events that it lacks. A
   /// different run of the same id is an error.
-  void keep(const RunRecord& record);
+  void store_run(const RunRecord& record);
   /// Returns a complete run; std::nullopt if no run has this id.
   std::optional<RunRecord> find(const std::string& run);
   /// Throws InputError if runs cannot be stored now.
-  void check_writable();
+  void check_database_writable();
   /// Returns the runs that match the filter, in chronological order.
-  std::vector<RunSummary> list(const RunFilter& filter);
+  std::vector<RunSummary> list_runs(const RunFilter& filter);
   /// Returns the values of a metric in the runs that match the filter, without voided runs.
-  std::vector<TrendPoint> trend(const std::string& metric, const RunFilter& filter);
+  std::vector<TrendPoint> load_trend(const std::string& metric, const RunFilter& filter);
   /// Checks by the trail (audit_trail.h) that the records are unchanged. `expected_digest` is the
   /// last digest of an earlier check, which the trail must still contain, or empty.
   TrailCheck check(const std::string& expected_digest);

@@ -30,7 +30,7 @@ bool is_older(const std::string& utc, int days) {
   return seconds_since(utc) > days * seconds_per_day;  // false for an invalid time
 }
 
-std::vector<fs::path> folders_in(const fs::path& folder) {
+std::vector<fs::path> list_folders_in(const fs::path& folder) {
   std::vector<fs::path> folders;
   std::error_code error;
   for (fs::directory_iterator entry(folder, error); !error && entry != fs::directory_iterator();
@@ -42,7 +42,7 @@ std::vector<fs::path> folders_in(const fs::path& folder) {
   return folders;
 }
 
-std::uintmax_t bytes_in(const fs::path& folder) {
+std::uintmax_t count_bytes_in_folder(const fs::path& folder) {
   std::uintmax_t bytes = 0;
   std::error_code error;
   for (fs::recursive_directory_iterator entry(folder, error);
@@ -57,7 +57,7 @@ std::uintmax_t bytes_in(const fs::path& folder) {
 
 /// Returns true if a file is opened through a folder: by its name, or by a link on the way. Returns
 /// true as well if a link cannot be followed, so that a folder in doubt is kept.
-bool leads_through(const fs::path& file, const fs::path& folder) {
+bool is_path_through_folder(const fs::path& file, const fs::path& folder) {
   constexpr int max_links = 40;  // as in the kernel
   std::error_code error;
   const fs::path absolute = fs::absolute(file, error);
@@ -100,7 +100,7 @@ bool is_in_use(const fs::path& folder, const StationConfig& config) {
     }
   }
   return std::any_of(needed.begin(), needed.end(), [&](const fs::path& file) {
-    return !file.empty() && leads_through(file, folder);
+    return !file.empty() && is_path_through_folder(file, folder);
   });
 }
 
@@ -108,7 +108,7 @@ bool is_in_use(const fs::path& folder, const StationConfig& config) {
 void add_if_expired(RetentionResult& found, Records& records, const StationConfig& config,
                     const fs::path& folder, const std::string& camera, const std::string& run,
                     const char* what, int days) {
-  if (run.size() != kRunLength || !is_older(begun_utc(run), days)) return;
+  if (run.size() != kRunLength || !is_older(start_utc_of_run_id(run), days)) return;
   auto record = records.find(run);
   if (!record || record->camera != camera) {
     found.without_record.push_back(folder);
@@ -117,13 +117,15 @@ void add_if_expired(RetentionResult& found, Records& records, const StationConfi
       found.in_use.push_back(folder);
       return;
     }
-    found.expired.push_back({folder, what, days, bytes_in(folder), std::move(*record)});
+    found.expired.push_back(
+        {folder, what, days, count_bytes_in_folder(folder), std::move(*record)});
   }
 }
 
 SharedFolder open_existing(const SharedFolder& parent, const Id& name) {
-  auto found = parent.find_folder(name);
-  if (!found) throw InputError(parent.path() / name.text(), "cannot be deleted: it is not there");
+  auto found = parent.open_subfolder_if_exists(name);
+  if (!found)
+    throw InputError(parent.path() / name.get_text(), "cannot be deleted: it is not there");
   return std::move(*found);
 }
 
@@ -137,10 +139,10 @@ SharedFolder open_parent(const ExpiredFolder& expired, const StationConfig& conf
 
 }  // namespace
 
-RetentionResult find_expired(const StationConfig& config, Records& records) {
+RetentionResult find_expired_folders(const StationConfig& config, Records& records) {
   RetentionResult found;
   if (const auto& days = config.keep.images_days) {
-    for (const fs::path& folder : folders_in(config.captures)) {
+    for (const fs::path& folder : list_folders_in(config.captures)) {
       const std::string name = folder.filename().string();
       if (name.size() < kRunLength + 2) continue;
       const std::size_t dot = name.size() - kRunLength - 1;
@@ -150,8 +152,8 @@ RetentionResult find_expired(const StationConfig& config, Records& records) {
     }
   }
   if (const auto& days = config.keep.results_days) {
-    for (const fs::path& camera : folders_in(config.results)) {
-      for (const fs::path& folder : folders_in(camera)) {
+    for (const fs::path& camera : list_folders_in(config.results)) {
+      for (const fs::path& folder : list_folders_in(camera)) {
         add_if_expired(found, records, config, folder, camera.filename().string(),
                        folder.filename().string(), kResultsDeleted, *days);
       }
@@ -160,13 +162,13 @@ RetentionResult find_expired(const StationConfig& config, Records& records) {
   return found;
 }
 
-void check_clock(const StationConfig& config, Records& records) {
+void check_clock_is_not_behind(const StationConfig& config, Records& records) {
   constexpr double day_s = 86'400;
   constexpr double max_idle_s = 366 * day_s;  // longer than a plant is shut
   constexpr double max_ahead_s = day_s;       // between computers that share records
   constexpr int trusted_days = 7;             // within them a wrong clock is noticed
   std::vector<std::string> ended;
-  for (const RunSummary& run : records.list({.station = config.station})) {
+  for (const RunSummary& run : records.list_runs({.station = config.station})) {
     const bool is_time = !std::isnan(seconds_since(run.ended_utc));
     if (run.voided.empty() && is_time) ended.push_back(run.ended_utc);
   }
@@ -177,14 +179,14 @@ void check_clock(const StationConfig& config, Records& records) {
     throw InputError(config.file,
                      fmt::format("the newest run ended {}, after the clock, {}: set the clock, or, "
                                  "if it is right, void the runs with wrong dates",
-                                 newest, now_utc()));
+                                 newest, get_current_utc()));
   }
   if (seconds_since(newest) > max_idle_s) {
     throw InputError(
         config.file,
         fmt::format("the newest run ended {}, more than a year before the clock, {}: set "
                     "the clock, or, if it is right, measure a unit first",
-                    newest, now_utc()));
+                    newest, get_current_utc()));
   }
   for (std::size_t i = ended.size() - 1; i > 0; --i) {
     const double age_s = seconds_since(ended[i]);
@@ -198,19 +200,20 @@ void check_clock(const StationConfig& config, Records& records) {
   }
 }
 
-void delete_expired(const ExpiredFolder& expired, const StationConfig& config, Spool& spool) {
+void delete_expired_folder(const ExpiredFolder& expired, const StationConfig& config,
+                           Spool& spool) {
   const SharedFolder parent = open_parent(expired, config);
   const Id name(expired.folder.filename().string(), expired.folder, "run");
-  open_existing(parent, name).remove_content();
+  open_existing(parent, name).remove_all_entries();
   if (find_last_event(expired.run, expired.what) < 0) {
     constexpr double megabyte = 1e6;
     RunRecord run = expired.run;
-    run.events.push_back(make_event(
+    run.events.push_back(make_run_event_now(
         expired.what,
         fmt::format("kept {} days, {:.1f} MB", expired.days, double(expired.bytes) / megabyte)));
-    spool.keep(run);
+    spool.store_run(run);
   }
-  parent.remove_folder(name);
+  parent.remove_subfolder(name);
 }
 
 }  // namespace vlp

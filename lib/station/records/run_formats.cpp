@@ -31,10 +31,10 @@ std::string join_lines(std::string text) {
   return joined;
 }
 
-/// Returns unit_metrics() and the other metrics of these runs.
+/// Returns list_unit_metrics() and the other metrics of these runs.
 std::vector<MetricKind> list_columns(const std::vector<RunRecord>& runs) {
-  auto kinds = unit_metrics();
-  for (const MetricKind& kind : metric_kinds({MetricSource::evaluation})) {
+  auto kinds = list_unit_metrics();
+  for (const MetricKind& kind : list_metric_kinds({MetricSource::evaluation})) {
     const auto has_kind = [&](const RunRecord& run) {
       return run.find_metric(kind.name) != nullptr;
     };
@@ -46,27 +46,29 @@ std::vector<MetricKind> list_columns(const std::vector<RunRecord>& runs) {
 void write_csv(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
   const auto kinds = list_columns(runs);
   std::vector<std::string> header;
-  for (const RunField& field : run_fields()) {
+  for (const RunField& field : list_run_text_fields()) {
     if (field.in_csv) header.emplace_back(field.name);
   }
   for (const MetricKind& kind : kinds) header.emplace_back(kind.name);
   CsvWriter csv(file, header);
   for (const RunRecord& run : runs) {
     std::vector<std::string> row;
-    for (const RunField& field : run_fields()) {
+    for (const RunField& field : list_run_text_fields()) {
       if (field.in_csv) row.push_back(join_lines(run.*field.text));
     }
     for (const MetricKind& kind : kinds) {
       const CheckedMetric* metric = run.find_metric(kind.name);
       const bool has_value = metric != nullptr && metric->value;
-      row.push_back(has_value ? significant(*metric->value, kDigits) : "");
+      row.push_back(has_value ? format_significant_digits(*metric->value, kDigits) : "");
     }
     csv.row(row);
   }
-  csv.save();
+  csv.save_file();
 }
 
-Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+Json json_number_or_null(const std::optional<double>& value) {
+  return value ? Json(*value) : Json();
+}
 
 void add_guard_band(const CheckedMetric& metric, Json& json) {
   if (!metric.guard) return;
@@ -90,20 +92,20 @@ void add_images_and_events(const RunRecord& run, Json& json) {
 
 Json to_json(const RunRecord& run) {
   Json json;
-  for (const RunField& field : run_fields()) {
+  for (const RunField& field : list_run_text_fields()) {
     json[field.name] = field.in_csv ? join_lines(run.*field.text) : run.*field.text;
   }
   json["figures"] = Json::object();
   for (const CheckedMetric& metric : run.metrics) {
     Json& figure = json["figures"][metric.name];
-    figure = {{"value", number_or_null(metric.value)},
+    figure = {{"value", json_number_or_null(metric.value)},
               {"unit", metric.unit},
-              {"gate", number_or_null(metric.limit)},
+              {"gate", json_number_or_null(metric.limit)},
               {"at_least", metric.direction == Direction::at_least},
-              {"passed", metric.passed()}};
+              {"passed", metric.has_passed()}};
     add_guard_band(metric, figure);
     if (metric.guard) {
-      figure["conformance_probability"] = number_or_null(metric.conformance_probability());
+      figure["conformance_probability"] = json_number_or_null(metric.conformance_probability());
     }
   }
   add_images_and_events(run, json);
@@ -125,17 +127,17 @@ SpooledRun parse_run(const Json& json) {
   SpooledRun spooled;
   json.at("records").get_to(spooled.records);
   RunRecord& run = spooled.run;
-  for (const RunField& field : run_fields()) {
+  for (const RunField& field : list_run_text_fields()) {
     run.*field.text = json.value(field.name, std::string());
   }
   if (run.run.empty() || run.verdict.empty()) throw std::runtime_error("no run, or no verdict");
   // Both name folders and files.
   for (const std::string& id : {run.run, run.camera}) {
-    if (!Id::accepts(id)) throw std::runtime_error("its run or camera is no id");
+    if (!Id::is_valid_id(id)) throw std::runtime_error("its run or camera is no id");
   }
   for (const Json& metric : json.at("figures")) {
     run.metrics.push_back(
-        {present_metric_name(metric.at("name")), metric.at("unit"),
+        {find_present_metric_name(metric.at("name")), metric.at("unit"),
          read_optional_number(metric.at("value")), read_optional_number(metric.at("gate")),
          metric.at("at_least").get<bool>() ? Direction::at_least : Direction::at_most,
          read_guard_band(metric)});
@@ -147,7 +149,7 @@ SpooledRun parse_run(const Json& json) {
   for (const Json& event : json.value("events", Json::array())) {
     run.events.push_back(
         {event.at("event"), event.at("what"), event.at("text"), event.value("who", "")});
-    if (!Id::accepts(run.events.back().event)) throw std::runtime_error("an event is no id");
+    if (!Id::is_valid_id(run.events.back().event)) throw std::runtime_error("an event is no id");
   }
   return spooled;
 }
@@ -161,17 +163,17 @@ std::string serialize(const Json& json) {
 }  // namespace
 
 std::string serialize_run(const SpooledRun& spooled) {
-  const RunRecord run = printable_run(spooled.run);
+  const RunRecord run = escape_run_texts(spooled.run);
   Json json;
   json["format"] = kRunFormat;
-  json["records"] = printable_line(spooled.records);
-  for (const RunField& field : run_fields()) json[field.name] = run.*field.text;
+  json["records"] = escape_for_single_line(spooled.records);
+  for (const RunField& field : list_run_text_fields()) json[field.name] = run.*field.text;
   json["figures"] = Json::array();
   for (const CheckedMetric& metric : run.metrics) {
     json["figures"].push_back({{"name", metric.name},
                                {"unit", metric.unit},
-                               {"value", number_or_null(metric.value)},
-                               {"gate", number_or_null(metric.limit)},
+                               {"value", json_number_or_null(metric.value)},
+                               {"gate", json_number_or_null(metric.limit)},
                                {"at_least", metric.direction == Direction::at_least}});
     add_guard_band(metric, json["figures"].back());
   }
@@ -179,12 +181,12 @@ std::string serialize_run(const SpooledRun& spooled) {
   return serialize(json);
 }
 
-SpooledRun read_run(const std::filesystem::path& file) {
+SpooledRun read_spooled_run(const std::filesystem::path& file) {
   const auto text =
       SharedFolder(file.parent_path()).read(file.filename().string(), kMaxRunFileBytes);
   if (!text) throw InputError(file, "cannot be opened: it was removed");
   try {
-    check_json_bounds(*text);
+    check_json_size_and_depth(*text);
     return parse_run(Json::parse(*text));
   } catch (const std::exception& error) {
     throw InputError(file, std::string("is no run of a station: ") + error.what());
@@ -193,12 +195,12 @@ SpooledRun read_run(const std::filesystem::path& file) {
 
 std::string format_hook_json(const RunRecord& run) {
   Json json;
-  json["event"] = voided(run) != nullptr ? "voided" : "verdict";
+  json["event"] = find_voiding_event(run) != nullptr ? "voided" : "verdict";
   json.update(to_json(run));
   return serialize(json);
 }
 
-void write_runs(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
+void export_runs_to_file(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
   if (file.extension() == ".csv") return write_csv(file, runs);
   if (file.extension() != ".json") throw InputError(file, "should end in .csv or .json");
   Json all = Json::array();

@@ -61,7 +61,7 @@ std::string describe_account() {
 }  // namespace
 
 void RunRecord::set_verdict(std::vector<Cause> why) {
-  if (std::string problem = clock_problem(*this); !problem.empty()) {
+  if (std::string problem = describe_clock_problem(*this); !problem.empty()) {
     why.insert(why.begin(), {std::move(problem), false});
   }
   verdict = to_string(decide_verdict(why));
@@ -69,7 +69,7 @@ void RunRecord::set_verdict(std::vector<Cause> why) {
   for (const Cause& cause : why) causes.append(cause.text).append("\n");
 }
 
-void RunRecord::invalidate(const std::string& why) {
+void RunRecord::invalidate_verdict(const std::string& why) {
   verdict = to_string(Verdict::invalid);
   causes = why + "\n" + causes;
 }
@@ -83,7 +83,7 @@ std::ptrdiff_t RunRecord::count_used_images() const {
   return std::ranges::count_if(images, &Image::is_used);
 }
 
-const RunEvent* voided(const RunRecord& record) {
+const RunEvent* find_voiding_event(const RunRecord& record) {
   const auto event = std::ranges::find(record.events, kVoided, &RunEvent::what);
   return event == record.events.end() ? nullptr : &*event;
 }
@@ -98,12 +98,13 @@ std::string format_void_command(const std::string& run, const std::filesystem::p
                      station_file.string());
 }
 
-std::string describe_owner(const ImageOwner& owner, const std::filesystem::path& station_file) {
+std::string describe_run_using_image(const ImageUser& owner,
+                                     const std::filesystem::path& station_file) {
   return fmt::format("camera {}, run {}: if its serial was wrong, '{}' frees its images",
                      owner.camera, owner.run, format_void_command(owner.run, station_file));
 }
 
-bool repeats_images(const RunRecord& run, const RunRecord& earlier) {
+bool uses_images_of_earlier_run(const RunRecord& run, const RunRecord& earlier) {
   if (run.camera != earlier.camera || run.run == earlier.run) return false;
   std::set<std::string> earlier_digests;
   for (const RunRecord::Image& image : earlier.images) {
@@ -116,14 +117,14 @@ bool repeats_images(const RunRecord& run, const RunRecord& earlier) {
 }
 
 std::string find_verdict_problem(const RunRecord& record) {
-  if (const RunEvent* event = voided(record)) {
+  if (const RunEvent* event = find_voiding_event(record)) {
     return fmt::format("was voided by {}: {}", event->who, event->text);
   }
-  if (!record.passed()) return "";
+  if (!record.has_passed()) return "";
   constexpr const char* words = "the record has PASS, but {}: it was changed by hand";
   if (!record.causes.empty()) return fmt::format(words, "names a cause");
   for (const CheckedMetric& metric : record.metrics) {
-    if (metric.limit && !metric.passed()) return fmt::format(words, describe(metric));
+    if (metric.limit && !metric.has_passed()) return fmt::format(words, describe(metric));
   }
   return "";
 }
@@ -137,17 +138,19 @@ bool is_run_id(const std::string& text) {
   return std::regex_match(text, std::regex("[0-9]{8}T[0-9]{6}Z-[0-9a-f]{16}"));
 }
 
-std::string begun_utc(const std::string& run) {
+std::string start_utc_of_run_id(const std::string& run) {
   constexpr std::size_t length = 16;  // 20261121T134501Z
   if (run.size() < length || run[8] != 'T' || run[15] != 'Z') return "";
   return run.substr(0, 4) + "-" + run.substr(4, 2) + "-" + run.substr(6, 5) + ":" +
          run.substr(11, 2) + ":" + run.substr(13, 3);
 }
 
-std::string RunEvent::utc() const { return begun_utc(event.substr(0, event.find('.')) + "Z"); }
+std::string RunEvent::utc_text() const {
+  return start_utc_of_run_id(event.substr(0, event.find('.')) + "Z");
+}
 
-RunEvent make_event(const std::string& what, const std::string& text,
-                    const std::string& operator_name) {
+RunEvent make_run_event_now(const std::string& what, const std::string& text,
+                            const std::string& operator_name) {
   std::random_device random;
   using std::chrono::microseconds;
   const auto now = std::chrono::time_point_cast<microseconds>(std::chrono::system_clock::now());
@@ -165,9 +168,9 @@ double seconds_since(const std::string& utc) {
   return time ? std::difftime(current_time_s(), *time) : std::numeric_limits<double>::quiet_NaN();
 }
 
-std::string now_utc() { return utc(kUtcFormat); }
+std::string get_current_utc() { return utc(kUtcFormat); }
 
-std::string utc_problem(const std::string& text) {
+std::string describe_utc_problem(const std::string& text) {
   constexpr std::array<std::size_t, 4> lengths{10, 16, 19, 20};
   if (std::ranges::find(lengths, text.size()) != lengths.end()) {
     const std::string whole = text + std::string("2026-11-21T00:00:00Z").substr(text.size());
@@ -178,14 +181,14 @@ std::string utc_problem(const std::string& text) {
   return "should be a UTC as 2026-11-21 or 2026-11-21T13:45, not " + text;
 }
 
-std::string library_versions() {
+std::string list_library_versions() {
   return fmt::format("OpenCV {}, AprilTag {}, mrcal {}, Ceres {}, Eigen {}.{}.{}",
-                     cv::getVersionString(), VLP_APRILTAG_VERSION, mrcal_version(),
+                     cv::getVersionString(), VLP_APRILTAG_VERSION, get_mrcal_version(),
                      CERES_VERSION_STRING, EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION,
                      EIGEN_MINOR_VERSION);
 }
 
-std::span<const RunField> run_fields() {
+std::span<const RunField> list_run_text_fields() {
   static constexpr std::array fields{
       RunField{"run", &RunRecord::run, "run"},
       RunField{"kind", &RunRecord::kind},
@@ -204,42 +207,42 @@ std::span<const RunField> run_fields() {
   return fields;
 }
 
-RunRecord printable_run(RunRecord run) {
-  for (const RunField& field : run_fields()) {
+RunRecord escape_run_texts(RunRecord run) {
+  for (const RunField& field : list_run_text_fields()) {
     const bool has_lines =
         field.text == &RunRecord::causes || field.text == &RunRecord::calibration;
     std::string& text = run.*field.text;
-    text = has_lines ? printable(text) : printable_line(text);
+    text = has_lines ? escape_for_terminal(text) : escape_for_single_line(text);
   }
   for (RunRecord::Image& image : run.images) {
-    image.name = printable_line(image.name);
-    image.refused = printable_line(image.refused);
+    image.name = escape_for_single_line(image.name);
+    image.refused = escape_for_single_line(image.refused);
   }
   for (RunEvent& event : run.events) {
-    event.text = printable_line(event.text);
-    event.who = printable_line(event.who);
+    event.text = escape_for_single_line(event.text);
+    event.who = escape_for_single_line(event.who);
   }
   return run;
 }
 
-std::string clock_problem(const RunRecord& run) {
+std::string describe_clock_problem(const RunRecord& run) {
   if (run.begun_utc <= run.ended_utc) return "";
   return fmt::format(
       "the clock went back: the run ended {}, before it began {}: set the clock, and measure again",
       run.ended_utc, run.begun_utc);
 }
 
-RunRecord make_record(const char* kind, const StationConfig& config, const std::string& camera,
-                      const std::string& run, const ProgramVersion& program) {
+RunRecord make_run_record(const char* kind, const StationConfig& config, const std::string& camera,
+                          const std::string& run, const ProgramVersion& program) {
   RunRecord record;
   record.run = run;
   record.kind = kind;
   record.station = config.station;
   record.camera = camera;
-  record.begun_utc = begun_utc(run);
-  record.ended_utc = now_utc();
+  record.begun_utc = start_utc_of_run_id(run);
+  record.ended_utc = get_current_utc();
   record.program = program.program + " " + program.version;
-  record.libraries = library_versions();
+  record.libraries = list_library_versions();
   record.config_sha256 = config.sha256;
   return record;
 }

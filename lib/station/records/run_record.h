@@ -59,7 +59,7 @@ struct RunEvent {
   std::string who = {};
 
   /// Returns the time of the event, as 2026-11-21T13:45:01Z.
-  std::string utc() const;
+  std::string utc_text() const;
 };
 inline constexpr const char *kHookRequested = "hook wanted", *kHookDone = "hook done",
                             *kHookFailed = "hook failed", *kImagesDeleted = "images deleted",
@@ -68,8 +68,8 @@ inline constexpr const char *kHookRequested = "hook wanted", *kHookDone = "hook 
 
 /// Makes an event of the current time. RunEvent::who is this program's account, or "Ann
 /// (vlp@station-7)" with an operator.
-RunEvent make_event(const std::string& what, const std::string& text,
-                    const std::string& operator_name = "");
+RunEvent make_run_event_now(const std::string& what, const std::string& text,
+                            const std::string& operator_name = "");
 
 /// Record of a run.
 struct RunRecord {
@@ -105,36 +105,37 @@ struct RunRecord {
   const CheckedMetric* find_metric(std::string_view name) const;
   /// Returns the number of images that were used.
   std::ptrdiff_t count_used_images() const;
-  bool passed() const { return verdict == to_string(Verdict::pass); }
-  bool invalid() const { return verdict == to_string(Verdict::invalid); }
+  bool has_passed() const { return verdict == to_string(Verdict::pass); }
+  bool is_invalid() const { return verdict == to_string(Verdict::invalid); }
   /// Returns the first cause, in one line; empty if the run passed.
   std::string first_cause() const { return causes.substr(0, causes.find('\n')); }
   /// Sets verdict and causes from `why`, the most important cause first. A wrong clock
-  /// (clock_problem()) precedes all.
+  /// (describe_clock_problem()) precedes all.
   void set_verdict(std::vector<Cause> why);
   /// Makes the run INVALID for another reason, which precedes the others.
-  void invalidate(const std::string& why);
+  void invalidate_verdict(const std::string& why);
 };
 
 /// Run that used an image; empty if none did.
-struct ImageOwner {
+struct ImageUser {
   std::string camera = {}, run = {};
 
   bool empty() const { return run.empty(); }
-  friend bool operator==(const ImageOwner&, const ImageOwner&) = default;
+  friend bool operator==(const ImageUser&, const ImageUser&) = default;
 };
 
 /// Returns the command that voids a run of the station of this file, with all its options.
 std::string format_void_command(const std::string& run, const std::filesystem::path& station_file);
 
 /// Describes the owner of an image, and how to free it if the owner's serial was wrong.
-std::string describe_owner(const ImageOwner& owner, const std::filesystem::path& station_file);
+std::string describe_run_using_image(const ImageUser& owner,
+                                     const std::filesystem::path& station_file);
 
 /// Returns true if `run` uses images, and `earlier` used all of them; both of one camera.
-bool repeats_images(const RunRecord& run, const RunRecord& earlier);
+bool uses_images_of_earlier_run(const RunRecord& run, const RunRecord& earlier);
 
 /// Returns the event that voided a run; null if it is not voided.
-const RunEvent* voided(const RunRecord& record);
+const RunEvent* find_voiding_event(const RunRecord& record);
 
 /// Returns the index of the last event of a kind; -1 if there is none.
 std::ptrdiff_t find_last_event(const RunRecord& record, const char* what);
@@ -155,9 +156,9 @@ struct RunField {
 };
 
 /// Returns all text members of a record, in order. A new text requires a member of RunRecord, an
-/// entry in run_fields(), code that sets it (make_record() or the program), and a migration in
-/// record_tables.cpp.
-std::span<const RunField> run_fields();
+/// entry in list_run_text_fields(), code that sets it (make_run_record() or the program), and a
+/// migration in record_tables.cpp.
+std::span<const RunField> list_run_text_fields();
 
 /// Returns the id of a run that starts now, 20261121T134501Z-0123456789abcdef: UTC and 16 random
 /// hexadecimal digits.
@@ -165,29 +166,30 @@ std::string make_run_id();
 /// Returns true if a text has the form of make_run_id().
 bool is_run_id(const std::string& text);
 /// Returns the UTC of the start of a run, as 2026-11-21T13:45:01Z; empty if `run` is no run id.
-std::string begun_utc(const std::string& run);
-std::string now_utc();
+std::string start_utc_of_run_id(const std::string& run);
+std::string get_current_utc();
 /// Returns the problem of a UTC of a filter: 2026-11-21T13:45:01Z, or a prefix that includes the
 /// day. Empty if it is valid.
-std::string utc_problem(const std::string& text);
+std::string describe_utc_problem(const std::string& text);
 /// Returns the time since a UTC as 2026-11-21T13:45:01Z, s: negative for a future time, NaN for an
 /// invalid text.
 double seconds_since(const std::string& utc);
 
-/// Returns the run with texts that are safe for terminals, reports and the spool: printable(), and
-/// printable_line() for operators and for names of images and events.
-RunRecord printable_run(RunRecord run);
+/// Returns the run with texts that are safe for terminals, reports and the spool:
+/// escape_for_terminal(), and escape_for_single_line() for operators and for names of images and
+/// events.
+RunRecord escape_run_texts(RunRecord run);
 
 /// Returns the cause INVALID of a run whose end is before its start, because the clock was set
 /// back; empty if there is none.
-std::string clock_problem(const RunRecord& run);
+std::string describe_clock_problem(const RunRecord& run);
 
 /// Makes the common part of the records of units and golden units for a run that ends now: all
 /// members except verdict, inputs and operator.
-RunRecord make_record(const char* kind, const StationConfig& config, const std::string& camera,
-                      const std::string& run, const ProgramVersion& program);
+RunRecord make_run_record(const char* kind, const StationConfig& config, const std::string& camera,
+                          const std::string& run, const ProgramVersion& program);
 
 /// Returns OpenCV, Ceres, mrcal and other libraries with their versions.
-std::string library_versions();
+std::string list_library_versions();
 
 }  // namespace vlp

@@ -36,7 +36,7 @@ std::string file_name(const RunRecord& run) {
 }
 
 /// Adds a run, merging the events of its files.
-void merge_run(std::vector<RunRecord>& runs, const RunRecord& run) {
+void merge_run_events(std::vector<RunRecord>& runs, const RunRecord& run) {
   if (runs.empty() || runs.back().run != run.run) {
     runs.push_back(run);
     return;
@@ -81,12 +81,12 @@ bool matches_filter(const RunRecord& run, const RunFilter& filter) {
          is(run.operator_name, filter.operator_name) && is(run.shift, filter.shift) &&
          run.ended_utc >= filter.since && (filter.until.empty() || run.ended_utc < filter.until) &&
          (filter.image_sha256.empty() || std::ranges::any_of(run.images, has_image)) &&
-         (!filter.has_open_hook || is_hook_open(run));
+         (!filter.has_open_hook || is_hook_pending(run));
 }
 
 /// Returns the operator's message about offline records; empty if only the error contains the
 /// remedy.
-std::string make_notice(const InputError& error) {
+std::string make_offline_notice(const InputError& error) {
   if (dynamic_cast<const RecordsRefused*>(&error) != nullptr) {
     return "records are offline (access refused)";
   }
@@ -98,7 +98,7 @@ std::string make_notice(const InputError& error) {
 Spool::Spool(fs::path folder, std::string records)
     : folder_(std::move(folder)),
       where_(std::move(records)),
-      name_(printable_line(make_records_database_id(where_))) {}
+      name_(escape_for_single_line(derive_database_identity(where_))) {}
 
 Spool::~Spool() = default;
 
@@ -112,18 +112,18 @@ void Spool::open() {
 }
 
 /// Runs an action on the records. Returns the reason if it failed; empty on success.
-std::string Spool::try_on_records(const std::function<void(Records&)>& action) {
+std::string Spool::try_database_action(const std::function<void(Records&)>& action) {
   try {
     open();
     action(*records_);
     offline_reason_.clear();
     return "";
   } catch (const RecordsOffline& error) {
-    suspend_access(error);
+    suspend_database_access(error);
     return error.what();
   } catch (const InputError& error) {
     if (!records_) {
-      suspend_access(error);
+      suspend_database_access(error);
     } else {
       offline_reason_.clear();
     }
@@ -133,39 +133,40 @@ std::string Spool::try_on_records(const std::function<void(Records&)>& action) {
 
 /// Returns false if the records did not answer, now or within the last minute.
 bool Spool::query_records(const std::function<void(Records&)>& query) {
-  return may_access_records() && try_on_records(query).empty();
+  return may_access_database() && try_database_action(query).empty();
 }
 
-bool Spool::may_access_records() const { return Clock::now() >= next_access_; }
+bool Spool::may_access_database() const { return Clock::now() >= next_access_; }
 
-void Spool::suspend_access(const InputError& error) {
+void Spool::suspend_database_access(const InputError& error) {
   constexpr std::chrono::minutes a_while(1);
   next_access_ = Clock::now() + a_while;
   offline_reason_ = error.what();
-  offline_notice_ = make_notice(error);
+  offline_notice_ = make_offline_notice(error);
 }
 
-void Spool::prepare() {
+void Spool::check_storage() {
   make_folder(folder_);
   check_free_space(SharedFolder(folder_), kRequiredSpace_bytes);
   remove_stale_files(folder_);
   try {
     if (!records_) records_ = std::make_unique<Records>(where_);
   } catch (const RecordsOffline& error) {
-    return suspend_access(error);
+    return suspend_database_access(error);
   }
-  problem_ = try_on_records([](Records& records) { records.check_writable(); });
-  if (problem_.empty()) deliver();
+  problem_ = try_database_action([](Records& records) { records.check_database_writable(); });
+  if (problem_.empty()) deliver_waiting_runs();
 }
 
-void Spool::keep(const RunRecord& run) {
+void Spool::store_run(const RunRecord& run) {
   try {
     make_folder(folder_);
     const std::string name = file_name(run);
     known_.erase(folder_ / name);  // possibly a different run of the same name
-    SharedFolder(folder_).replace(name, serialize_run({run, name_}));
+    SharedFolder(folder_).replace_file(name, serialize_run({run, name_}));
   } catch (const InputError& error) {
-    const std::string refused = try_on_records([&](Records& records) { records.keep(run); });
+    const std::string refused =
+        try_database_action([&](Records& records) { records.store_run(run); });
     if (refused.empty()) return;
     throw InputError(
         folder_,
@@ -174,12 +175,12 @@ void Spool::keep(const RunRecord& run) {
   }
 }
 
-void Spool::deliver() {
+void Spool::deliver_waiting_runs() {
   constexpr std::chrono::seconds max_duration(10);
   const auto begun = Clock::now();
-  if (!may_access_records()) return;
+  if (!may_access_database()) return;
   problem_.clear();
-  for (const fs::path& file : files()) {
+  for (const fs::path& file : list_spooled_files()) {
     if (Clock::now() - begun > max_duration) {
       if (problem_.empty()) problem_ = "there are many; the next run delivers the others";
       return;
@@ -187,13 +188,13 @@ void Spool::deliver() {
     std::error_code gone;
     SpooledRun spooled;
     try {
-      spooled = read_run(file);
+      spooled = read_spooled_run(file);
     } catch (const InputError&) {  // reported by state()
       continue;
     }
     if (spooled.records != name_) continue;
     const std::string refused =
-        try_on_records([&](Records& records) { records.keep(spooled.run); });
+        try_database_action([&](Records& records) { records.store_run(spooled.run); });
     if (!offline_reason_.empty()) return;
     if (refused.empty()) {
       fs::remove(file, gone);
@@ -204,7 +205,7 @@ void Spool::deliver() {
   }
 }
 
-std::string Spool::with_remarks(const std::string& first) const {
+std::string Spool::append_spool_remarks(const std::string& first) const {
   std::set<std::string> other_runs;
   std::string other_records;
   for (const auto& [file, spooled] : known_) {
@@ -226,25 +227,26 @@ std::string Spool::with_remarks(const std::string& first) const {
 }
 
 std::string Spool::state() {
-  const std::size_t waiting = this->waiting().size();
+  const std::size_t waiting = this->list_waiting_runs().size();
   const std::string& why = offline_reason_.empty() ? problem_ : offline_reason_;
   if (waiting > 0) {
-    return with_remarks(fmt::format("runs are queued in the spool, {} waiting{}{}", waiting,
-                                    why.empty() ? "" : ": ", why));
+    return append_spool_remarks(fmt::format("runs are queued in the spool, {} waiting{}{}", waiting,
+                                            why.empty() ? "" : ": ", why));
   }
-  return with_remarks(why.empty() ? "" : "runs are queued in the spool: " + why);
+  return append_spool_remarks(why.empty() ? "" : "runs are queued in the spool: " + why);
 }
 
-std::string Spool::notice() {
+std::string Spool::make_operator_notice() {
   if (offline_reason_.empty() || offline_notice_.empty()) return state();
-  const std::size_t waiting = this->waiting().size();
+  const std::size_t waiting = this->list_waiting_runs().size();
   const std::string runs = waiting == 0   ? "runs are"
                            : waiting == 1 ? "1 run"
                                           : fmt::format("{} runs", waiting);
-  return with_remarks(fmt::format("{}; {} kept, delivered automatically", offline_notice_, runs));
+  return append_spool_remarks(
+      fmt::format("{}; {} kept, delivered automatically", offline_notice_, runs));
 }
 
-std::vector<fs::path> Spool::files() {
+std::vector<fs::path> Spool::list_spooled_files() {
   std::error_code error;
   std::vector<fs::path> files = list_entries(folder_, error);
   if (error && error != std::errc::no_such_file_or_directory) {
@@ -260,7 +262,7 @@ std::vector<fs::path> Spool::files() {
 
 /// Reads the new files of the spool, and returns the selected runs in chronological order.
 std::vector<RunRecord> Spool::collect(const std::function<bool(const SpooledRun&)>& is_selected) {
-  const auto files = this->files();
+  const auto files = this->list_spooled_files();
   std::erase_if(known_, [&](const auto& known) {
     return !std::binary_search(files.begin(), files.end(), known.first);
   });
@@ -268,7 +270,7 @@ std::vector<RunRecord> Spool::collect(const std::function<bool(const SpooledRun&
   for (const fs::path& file : files) {
     if (known_.contains(file)) continue;
     try {
-      known_.emplace(file, read_run(file));
+      known_.emplace(file, read_spooled_run(file));
     } catch (const InputError& error) {
       // Another program can have delivered it.
       std::error_code gone;
@@ -277,12 +279,12 @@ std::vector<RunRecord> Spool::collect(const std::function<bool(const SpooledRun&
   }
   std::vector<RunRecord> runs;
   for (const auto& [file, spooled] : known_) {
-    if (is_selected(spooled)) merge_run(runs, spooled.run);
+    if (is_selected(spooled)) merge_run_events(runs, spooled.run);
   }
   return runs;
 }
 
-std::vector<RunRecord> Spool::waiting() {
+std::vector<RunRecord> Spool::list_waiting_runs() {
   return collect([&](const SpooledRun& spooled) { return spooled.records == name_; });
 }
 
@@ -294,19 +296,20 @@ std::optional<RunRecord> Spool::find(const std::string& run) {
   return found;
 }
 
-std::vector<RunSummary> Spool::list(const RunFilter& filter) {
+std::vector<RunSummary> Spool::list_runs(const RunFilter& filter) {
   std::vector<RunSummary> stored;
-  query_records([&](Records& records) { stored = records.list(filter); });
-  return merge_runs(std::move(stored), waiting(), filter);
+  query_records([&](Records& records) { stored = records.list_runs(filter); });
+  return merge_runs(std::move(stored), list_waiting_runs(), filter);
 }
 
 /// Returns the first run that uses an image of this digest, of all runs of the spool and the
 /// records. Counts images that were not compared with the records.
-std::optional<RunSummary> Spool::find_user_of_image(
+std::optional<RunSummary> Spool::find_run_that_used_image(
     const std::string& sha256, const std::function<bool(const RunSummary&)>& is_searched) {
   const RunFilter filter{.image_sha256 = sha256};
   std::vector<RunSummary> stored;
-  const bool has_answer = query_records([&](Records& records) { stored = records.list(filter); });
+  const bool has_answer =
+      query_records([&](Records& records) { stored = records.list_runs(filter); });
   const auto spooled = collect([](const SpooledRun&) { return true; });
   for (RunSummary& run : merge_runs(std::move(stored), spooled, filter)) {
     if (is_searched(run)) return std::move(run);
@@ -315,15 +318,16 @@ std::optional<RunSummary> Spool::find_user_of_image(
   return std::nullopt;
 }
 
-ImageOwner Spool::find_owner(const std::string& sha256, const std::string& other_than_camera) {
-  const auto run = find_user_of_image(sha256, [&](const RunSummary& user) {
+ImageUser Spool::find_other_camera_using_image(const std::string& sha256,
+                                               const std::string& other_than_camera) {
+  const auto run = find_run_that_used_image(sha256, [&](const RunSummary& user) {
     return user.camera != other_than_camera && user.voided.empty();
   });
-  return run ? ImageOwner{run->camera, run->run} : ImageOwner{};
+  return run ? ImageUser{run->camera, run->run} : ImageUser{};
 }
 
-std::string Spool::find_golden_run(const std::string& sha256) {
-  const auto run = find_user_of_image(sha256, [](const RunSummary& user) {
+std::string Spool::find_golden_run_using_image(const std::string& sha256) {
+  const auto run = find_run_that_used_image(sha256, [](const RunSummary& user) {
     return user.kind == "golden" && user.verdict != to_string(Verdict::invalid);
   });
   return run ? run->run : "";
@@ -334,11 +338,11 @@ std::optional<std::string> Spool::find_repeated_run(const RunRecord& run) {
   if (first == run.images.end()) return "";
   const RunFilter filter{.camera = run.camera, .kind = "unit", .image_sha256 = first->sha256};
   std::vector<RunSummary> stored;
-  bool has_answer = query_records([&](Records& records) { stored = records.list(filter); });
-  for (const RunSummary& earlier : merge_runs(std::move(stored), waiting(), filter)) {
+  bool has_answer = query_records([&](Records& records) { stored = records.list_runs(filter); });
+  for (const RunSummary& earlier : merge_runs(std::move(stored), list_waiting_runs(), filter)) {
     if (earlier.verdict == to_string(Verdict::invalid) || !earlier.voided.empty()) continue;
     const auto record = find(earlier.run);
-    if (record && repeats_images(run, *record)) return earlier.run;
+    if (record && uses_images_of_earlier_run(run, *record)) return earlier.run;
     has_answer = has_answer && record;
   }
   return has_answer ? std::optional<std::string>("") : std::nullopt;
@@ -348,7 +352,7 @@ std::vector<RunSummary> merge_runs(std::vector<RunSummary> stored,
                                    const std::vector<RunRecord>& waiting, const RunFilter& filter) {
   std::vector<RunSummary> runs = std::move(stored);
   for (const RunRecord& run : waiting) {
-    const RunEvent* event = voided(run);
+    const RunEvent* event = find_voiding_event(run);
     const bool matches = matches_filter(run, filter);
     const auto known = std::ranges::find(runs, run.run, &RunSummary::run);
     if (known == runs.end()) {
@@ -363,7 +367,7 @@ std::vector<RunSummary> merge_runs(std::vector<RunSummary> stored,
   }
   std::ranges::stable_sort(runs, {},
                            [](const RunSummary& run) { return std::tie(run.ended_utc, run.run); });
-  return keep_last(std::move(runs), filter.last);
+  return keep_last_rows(std::move(runs), filter.last);
 }
 
 }  // namespace vlp

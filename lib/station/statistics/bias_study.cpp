@@ -33,7 +33,7 @@ EstimateTest test_estimate(double value, double standard_error, double dof) {
   if (standard_error > 0) {
     estimate.t = value / standard_error;
     estimate.p = compute_two_tailed_p(estimate.t, dof);
-    const double half = t_quantile(kLevel, dof) * standard_error;
+    const double half = compute_two_tailed_t_quantile(kLevel, dof) * standard_error;
     estimate.low = value - half;
     estimate.high = value + half;
   } else if (value != 0) {
@@ -71,17 +71,17 @@ Linearity fit_line(const std::vector<double>& references, const std::vector<doub
 
 bool EstimateTest::is_significant() const { return p < kLevel; }
 
-double Linearity::bias_at(double reference) const {
+double Linearity::predict_bias_at(double reference) const {
   return intercept.value + slope.value * reference;
 }
 
-double Linearity::band_at(double reference) const {
+double Linearity::confidence_band_at(double reference) const {
   const double offset = reference - mean_reference;
-  return t_quantile(kLevel, slope.dof) * residual_sd *
+  return compute_two_tailed_t_quantile(kLevel, slope.dof) * residual_sd *
          std::sqrt(1 / count + offset * offset / reference_squares);
 }
 
-BiasStudy analyze_bias(const std::vector<ReferenceValue>& values) {
+BiasStudy analyze_bias_and_linearity(const std::vector<ReferenceValue>& values) {
   if (values.empty()) throw std::invalid_argument("a bias study needs runs of reference units");
   std::map<std::pair<double, std::string>, std::vector<double>> by_unit;
   std::vector<double> references, differences;
@@ -114,30 +114,31 @@ BiasStudy analyze_bias(const std::vector<ReferenceValue>& values) {
   return study;
 }
 
-void draw_bias(const std::filesystem::path& picture, const std::string& title,
-               const std::vector<ReferenceValue>& values, const BiasStudy& study) {
+void write_bias_plot(const std::filesystem::path& picture, const std::string& title,
+                     const std::vector<ReferenceValue>& values, const BiasStudy& study) {
   std::string data, means, line;
   for (const auto& [unit, reference, value] : values) {
-    data += format_data_row({reference, value - reference});
+    data += format_gnuplot_data_row({reference, value - reference});
   }
   for (const UnitBias& unit : study.units) {
-    means += format_data_row({unit.reference, unit.bias.value});
+    means += format_gnuplot_data_row({unit.reference, unit.bias.value});
   }
   using namespace plot_colors;
   std::string commands = fmt::format(
       "{}{}{}set xlabel 'reference'\nset ylabel {} noenhanced\n"
       "set offsets graph 0.05, graph 0.05, graph 0.1, graph 0.1\n",
-      data_block("data", data), data_block("means", means), plot_settings(),
-      gnuplot_quoted(title + ", measured - reference"));
+      make_gnuplot_data_block("data", data), make_gnuplot_data_block("means", means),
+      make_common_plot_settings(), quote_for_gnuplot(title + ", measured - reference"));
   if (study.linearity) {
     const double first = study.units.front().reference, last = study.units.back().reference;
     constexpr int parts = 50;
     for (int i = 0; i <= parts; ++i) {
       const double at = first + (last - first) * i / parts;
-      const double bias = study.linearity->bias_at(at), band = study.linearity->band_at(at);
-      line += format_data_row({at, bias, bias - band, bias + band});
+      const double bias = study.linearity->predict_bias_at(at),
+                   band = study.linearity->confidence_band_at(at);
+      line += format_gnuplot_data_row({at, bias, bias - band, bias + band});
     }
-    commands += data_block("line", line);
+    commands += make_gnuplot_data_block("line", line);
   }
   commands += fmt::format(
       "plot 0 with lines dashtype 3 linecolor rgb '{}' title 'no bias', "
@@ -151,7 +152,7 @@ void draw_bias(const std::filesystem::path& picture, const std::string& title,
         "$line using 1:4 with lines dashtype 2 linecolor rgb '{}' notitle",
         green, vermilion, vermilion);
   }
-  draw(picture, {"bias", 1000, 480, commands + "\n"});
+  write_plot(picture, {"bias", 1000, 480, commands + "\n"});
 }
 
 }  // namespace vlp

@@ -46,10 +46,10 @@ struct Linearity {
   double residual_sd = 0, r_squared = 0;
   double count = 0, mean_reference = 0, reference_squares = 0;
 
-  double bias_at(double reference) const;
+  double predict_bias_at(double reference) const;
   /// Returns half of the 95 % confidence band of the line at a reference x: t s sqrt(1 / n + (x -
   /// mean)^2 / S_xx).
-  double band_at(double reference) const;
+  double confidence_band_at(double reference) const;
 };
 
 /// Bias and linearity of a measurement system against reference units (AIAG MSA, 4th ed., chapter
@@ -68,11 +68,11 @@ struct BiasStudy {
 
 /// Computes bias and linearity. Throws std::invalid_argument if there is no value, or a unit with a
 /// single value; the message names what is missing.
-BiasStudy analyze_bias(const std::vector<ReferenceValue>& values);
+BiasStudy analyze_bias_and_linearity(const std::vector<ReferenceValue>& values);
 
 /// Plots the differences over the references, the mean of each unit, the line and its band, as .png
 /// or .svg. Throws InputError.
-void draw_bias(const std::filesystem::path& picture, const std::string& title,
-               const std::vector<ReferenceValue>& values, const BiasStudy& study);
+void write_bias_plot(const std::filesystem::path& picture, const std::string& title,
+                     const std::vector<ReferenceValue>& values, const BiasStudy& study);
 
 }  // namespace vlp

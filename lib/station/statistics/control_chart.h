@@ -34,7 +34,7 @@ struct ChartRule {
   /// Returns true if the pattern ends at the last value.
   bool (*matches)(std::span<const double> sigmas);
 };
-std::span<const ChartRule> chart_rules();
+std::span<const ChartRule> list_control_chart_rules();
 
 /// Exponentially weighted moving average (NIST/SEMATECH e-Handbook 6.3.2.4):
 ///
@@ -56,13 +56,13 @@ struct ChartAlarm {
 /// Finds alarms, in the order of the values, by rules of these names. "western-electric" and
 /// "nelson" select all of their rules, "ewma" the moving average with weight 0.3. Equal values have
 /// no alarms. Throws std::invalid_argument for an unknown name.
-std::vector<ChartAlarm> find_alarms(std::span<const double> values,
-                                    const std::vector<std::string>& rules);
+std::vector<ChartAlarm> find_control_chart_alarms(std::span<const double> values,
+                                                  const std::vector<std::string>& rules);
 
 /// Plots values in their order with mean, limits, alarms and the gate, if any, as .png or .svg.
-/// Throws InputError (draw()).
-void draw_trend(const std::filesystem::path& picture, const std::string& title,
-                std::span<const TrendPoint> points, std::span<const ChartAlarm> alarms,
-                std::optional<double> gate);
+/// Throws InputError as write_plot().
+void write_trend_plot(const std::filesystem::path& picture, const std::string& title,
+                      std::span<const TrendPoint> points, std::span<const ChartAlarm> alarms,
+                      std::optional<double> gate);
 
 }  // namespace vlp

@@ -29,7 +29,7 @@ double compute_two_tailed_p(double t, double dof) {
   return 2 * cdf(complement(boost::math::students_t(dof), std::abs(t)));
 }
 
-double t_quantile(double both_tails, double dof) {
+double compute_two_tailed_t_quantile(double both_tails, double dof) {
   return quantile(complement(boost::math::students_t(dof), both_tails / 2));
 }
 

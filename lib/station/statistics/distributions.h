@@ -19,6 +19,6 @@ double f_upper_tail(double x, double dof_above, double dof_below);
 double compute_two_tailed_p(double t, double dof);
 /// Returns the quantile t > 0 with compute_two_tailed_p(t, dof) = `both_tails`. Precondition: 0 <
 /// both_tails < 1, dof > 0.
-double t_quantile(double both_tails, double dof);
+double compute_two_tailed_t_quantile(double both_tails, double dof);
 
 }  // namespace vlp

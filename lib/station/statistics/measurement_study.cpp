@@ -126,13 +126,14 @@ MeasurementStudy analyze_measurements(const std::vector<StudyValue>& values) {
   return study;
 }
 
-std::optional<int> MeasurementStudy::distinct_categories() const {
+std::optional<int> MeasurementStudy::compute_distinct_categories() const {
   if (grr <= 0) return std::nullopt;
   constexpr double per_ratio = 1.41, max_categories = 1e6;
   return std::max(1, static_cast<int>(std::min(max_categories, per_ratio * of_unit / grr)));
 }
 
-std::optional<double> MeasurementStudy::percent_of_tolerance(const ToleranceLimits& limits) const {
+std::optional<double> MeasurementStudy::compute_percent_of_tolerance(
+    const ToleranceLimits& limits) const {
   constexpr double percent = 100;
   if (limits.lower && limits.upper) {
     return percent * 6 * grr / (*limits.upper - *limits.lower);

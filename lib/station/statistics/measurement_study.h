@@ -50,11 +50,11 @@ struct MeasurementStudy {
   double grr = 0, of_unit = 0, total = 0;
   /// Returns AIAG's ndc = 1.41 PV / GRR, truncated and at least 1; the manual requires 5. Returns
   /// std::nullopt if GRR is 0.
-  std::optional<int> distinct_categories() const;
+  std::optional<int> compute_distinct_categories() const;
   /// Returns the precision-to-tolerance ratio P/T in percent: 600 GRR / (U - L). With a single
   /// limit it is 300 GRR / (U - mean) or 300 GRR / (mean - L). Returns std::nullopt without a
   /// limit, and if the mean is at or beyond the single limit.
-  std::optional<double> percent_of_tolerance(const ToleranceLimits& limits) const;
+  std::optional<double> compute_percent_of_tolerance(const ToleranceLimits& limits) const;
 };
 
 /// Value of a unit on a station.

@@ -13,8 +13,8 @@
 namespace vlp {
 
 std::vector<MetricKind> list_run_metrics() {
-  auto kinds = unit_metrics();
-  const auto fix_metrics = metric_kinds({MetricSource::evaluation});
+  auto kinds = list_unit_metrics();
+  const auto fix_metrics = list_metric_kinds({MetricSource::evaluation});
   kinds.insert(kinds.end(), fix_metrics.begin(), fix_metrics.end());
   return kinds;
 }
@@ -32,15 +32,15 @@ MetricKind find_run_metric(const std::string& name) {
 
 std::vector<TrendPoint> load_judged_values(Records& records, const std::string& metric,
                                            RunFilter filter) {
-  if (!filter.verdict.empty()) return records.trend(metric, filter);
+  if (!filter.verdict.empty()) return records.load_trend(metric, filter);
   const int last = std::exchange(filter.last, 0);
-  auto points = records.trend(metric, filter);
+  auto points = records.load_trend(metric, filter);
   std::erase_if(
       points, [](const TrendPoint& point) { return point.verdict == to_string(Verdict::invalid); });
-  return keep_last(std::move(points), last);
+  return keep_last_rows(std::move(points), last);
 }
 
-void check_one_station(const std::vector<TrendPoint>& points) {
+void check_points_of_one_station(const std::vector<TrendPoint>& points) {
   for (const TrendPoint& point : points) {
     if (point.station == points.front().station) continue;
     throw std::invalid_argument(
@@ -50,8 +50,8 @@ void check_one_station(const std::vector<TrendPoint>& points) {
   }
 }
 
-std::optional<double> find_gate(const std::string& metric, const StationConfig* station,
-                                Records& records, const std::vector<TrendPoint>& points) {
+std::optional<double> find_gate_limit(const std::string& metric, const StationConfig* station,
+                                      Records& records, const std::vector<TrendPoint>& points) {
   if (station != nullptr) {
     for (const Gate& gate : station->gates) {
       if (gate.metric == metric) return gate.limit;
@@ -99,7 +99,8 @@ void check_runs_share_no_images(Records& records, const std::vector<TrendPoint>&
     auto run = records.find(point.run);
     if (!run) continue;
     for (const RunRecord& earlier : runs->second) {
-      if (!repeats_images(*run, earlier) && !repeats_images(earlier, *run)) continue;
+      if (!uses_images_of_earlier_run(*run, earlier) && !uses_images_of_earlier_run(earlier, *run))
+        continue;
       throw std::invalid_argument(
           fmt::format("runs {} and {} of camera {} have the same images, which is no repetition: "
                       "use new images, or void one of them",

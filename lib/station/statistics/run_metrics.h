@@ -17,8 +17,8 @@
 /// Input of trends, capability and studies: a metric over runs, with its gate.
 namespace vlp {
 
-/// Returns the metrics of runs: unit_metrics(), and the metrics of errors of fixes in sessions of
-/// archives (archive_runs.h).
+/// Returns the metrics of runs: list_unit_metrics(), and the metrics of errors of fixes in sessions
+/// of archives (archive_runs.h).
 std::vector<MetricKind> list_run_metrics();
 /// Returns the metric of this name. Throws std::invalid_argument that lists the valid names.
 MetricKind find_run_metric(const std::string& name);
@@ -30,12 +30,12 @@ std::vector<TrendPoint> load_judged_values(Records& records, const std::string& 
 
 /// Throws std::invalid_argument if the values are of two stations. They are compared only on
 /// request.
-void check_one_station(const std::vector<TrendPoint>& points);
+void check_points_of_one_station(const std::vector<TrendPoint>& points);
 
 /// Returns the gate of a metric in the station's configuration or, without a station, in the last
 /// run. Returns std::nullopt if there is none.
-std::optional<double> find_gate(const std::string& metric, const StationConfig* station,
-                                Records& records, const std::vector<TrendPoint>& points);
+std::optional<double> find_gate_limit(const std::string& metric, const StationConfig* station,
+                                      Records& records, const std::vector<TrendPoint>& points);
 ToleranceLimits make_tolerance_limits(const MetricKind& kind, std::optional<double> gate);
 
 /// Returns the values of the named units; those of all units with two runs or more if `units` is

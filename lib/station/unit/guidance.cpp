@@ -25,16 +25,16 @@ ViewCoverage compute_coverage(const Unit& unit) {
   IntrinsicsInput input{
       BoardLattice(config.board), {}, config.type.imager_px, config.type.lens_model};
   IntrinsicsSolution poses{};
-  for (const UnitImage* image : used_images(unit.step(StationStep::boards))) {
+  for (const UnitImage* image : list_used_images(unit.step(StationStep::boards))) {
     poses.views.push_back(input.views.size());
-    input.views.push_back(input.lattice.corners(image->seen.board->seen));
-    const auto pose = estimate_view_pose(input.views.back(), nominal);
+    input.views.push_back(input.lattice.match_corners_to_flat_board(image->seen.board->seen));
+    const auto pose = estimate_board_view_pose(input.views.back(), nominal);
     if (pose) poses.problem.poses.push_back(pose->camera_from_board);
   }
-  return compute_view_coverage(poses, input);
+  return compute_board_view_coverage(poses, input);
 }
 
-std::string missing_angles(const TurnMap::Height& height) {
+std::string describe_missing_angles(const YawCoverage::Height& height) {
   std::string angles;
   for (std::size_t part = 0; part < height.parts.size(); ++part) {
     if (height.parts[part]) continue;
@@ -46,7 +46,7 @@ std::string missing_angles(const TurnMap::Height& height) {
 /// Returns a map of the corners over the image: '#' many, '+' some, '.' none.
 std::vector<std::string> draw_board_map(const Unit& unit) {
   const ImageCoverage coverage =
-      board_coverage(unit.step(StationStep::boards), unit.config().type.imager_px);
+      compute_board_coverage(unit.step(StationStep::boards), unit.config().type.imager_px);
   constexpr int many = 20;
   std::vector<std::string> lines;
   const std::string edge = "  +-----------------+";
@@ -54,42 +54,43 @@ std::vector<std::string> draw_board_map(const Unit& unit) {
   for (int row = 0; row < ImageCoverage::kRows; ++row) {
     std::string line = "  |";
     for (int col = 0; col < ImageCoverage::kCols; ++col) {
-      const int corners = coverage.corners(col, row);
+      const int corners = coverage.count_corners_in_cell(col, row);
       line += corners == 0 ? " ." : corners < many ? " +" : " #";
     }
     lines.push_back(line + " |");
   }
   lines.push_back(edge);
-  lines[1] += fmt::format("   {:.0f} % of the image have corners, {:.0f} % wanted",
-                          100 * coverage.fraction(), 100 * unit.config().sufficient.board_coverage);
+  lines[1] +=
+      fmt::format("   {:.0f} % of the image have corners, {:.0f} % wanted",
+                  100 * coverage.covered_fraction(), 100 * unit.config().sufficient.board_coverage);
   lines[3] += "   # many corners   + some   . none";
   const UnitStep& boards = unit.step(StationStep::boards);
   const auto last = boards.images.find(boards.last);
   if (last == boards.images.end() || !last->second.seen.board) return lines;
-  if (const auto mtf50 = compute_view_mtf50(last->second.seen.board->seen)) {
+  if (const auto mtf50 = compute_median_edge_mtf50(last->second.seen.board->seen)) {
     lines[5] += fmt::format("   sharpness of the last image: MTF50 {:.3f} cycles/px", *mtf50);
   }
   return lines;
 }
 
 /// Returns the covered angles of the rotation in place; empty before the lens is known.
-TurnMap compute_unit_turn_map(const Unit& unit) {
+YawCoverage compute_yaw_coverage_of_unit(const Unit& unit) {
   const auto& lens = unit.step(StationStep::boards).result;
   if (!lens || !lens->ok()) return {};
-  return compute_turn_map(collect_frames(unit.step(StationStep::rotation)), unit.config(),
-                          lens->calibration);
+  return compute_yaw_coverage(collect_frames(unit.step(StationStep::rotation)), unit.config(),
+                              lens->calibration);
 }
 
 /// Returns the heights of the rotation with covered and missing angles, as lines.
-std::vector<std::string> describe_turn(const Unit& unit) {
+std::vector<std::string> describe_rotation_coverage(const Unit& unit) {
   std::vector<std::string> lines;
-  for (const TurnMap::Height& height : compute_unit_turn_map(unit).heights) {
+  for (const YawCoverage::Height& height : compute_yaw_coverage_of_unit(unit).heights) {
     std::string parts;
     for (const bool there : height.parts) parts += there ? '#' : '.';
     const double z_m = std::round(100 * height.z_m) / 100 + 0.0;  // without negative zero
     lines.push_back(fmt::format("  height {:5.2f} m  [{}]  {} captures over {:.0f} degrees", z_m,
                                 parts, height.captures, deg_from_rad(height.arc_rad)));
-    const std::string missing = missing_angles(height);
+    const std::string missing = describe_missing_angles(height);
     if (!missing.empty()) lines.push_back("    missing, degrees from the first:" + missing);
   }
   return lines;
@@ -98,8 +99,8 @@ std::vector<std::string> describe_turn(const Unit& unit) {
 /// Returns a line with the lamps that the captures of a step contain, and the missing ones.
 std::string describe_lamps(const Unit& unit, const UnitStep& step) {
   std::map<int, int> seen;
-  for (const UnitImage* image : used_images(step)) {
-    for (const Detection& lamp : collect_lamps(image->seen)) ++seen[lamp.lamp];
+  for (const UnitImage* image : list_used_images(step)) {
+    for (const Detection& lamp : collect_identified_lamps(image->seen)) ++seen[lamp.lamp];
   }
   std::string there, missing;
   for (const Lamp& lamp : unit.config().lamps.lamps) {
@@ -116,13 +117,14 @@ std::string format_count(const Unit& unit, StationStep step) {
   const std::array wanted{sufficient.board_views,
                           sufficient.turn_captures * sufficient.turn_heights,
                           sufficient.dispersion_captures, sufficient.check_captures};
-  return fmt::format("{}/{}", unit.step(step).used(), wanted[static_cast<std::size_t>(step)]);
+  return fmt::format("{}/{}", unit.step(step).count_used_images(),
+                     wanted[static_cast<std::size_t>(step)]);
 }
 
 std::vector<std::string> describe_progress(const Unit& unit, StationStep step) {
   if (step == StationStep::boards) return draw_board_map(unit);
   std::vector<std::string> lines;
-  if (step == StationStep::rotation) lines = describe_turn(unit);
+  if (step == StationStep::rotation) lines = describe_rotation_coverage(unit);
   lines.push_back(describe_lamps(unit, unit.step(step)));
   return lines;
 }
@@ -134,10 +136,10 @@ std::string describe_next_action(const Unit& unit, StationStep step) {
   }
   switch (step) {
     case StationStep::boards:
-      return "show " + recommend_next_view(compute_coverage(unit));
+      return "show " + recommend_next_board_view(compute_coverage(unit));
     case StationStep::rotation: {
-      const TurnMap turn = compute_unit_turn_map(unit);
-      if (!std::ranges::all_of(turn.heights, &TurnMap::Height::is_complete)) {
+      const YawCoverage turn = compute_yaw_coverage_of_unit(unit);
+      if (!std::ranges::all_of(turn.heights, &YawCoverage::Height::is_complete)) {
         return "turn the camera in place to the next missing angle";
       }
       return turn.heights.empty() ? "take captures at one position, turning the camera once around"

@@ -9,10 +9,10 @@
 
 namespace vlp {
 
-/// Returns the progress of a step as text of at most 78 columns.
+/// Returns the progress of a step as lines, which are not wrapped.
 std::vector<std::string> describe_progress(const Unit& unit, StationStep step);
 
-/// Returns the next instruction for the operator, in one or two lines of at most 70 columns.
+/// Returns the next instruction for the operator as one line of any length.
 std::string describe_next_action(const Unit& unit, StationStep step);
 
 /// Returns the number of images and the required number: "12/36".

@@ -26,7 +26,7 @@ constexpr std::size_t kMinFrames = 3;
 /// Fewer fixes at known points do not show what is typical of them.
 constexpr std::size_t kMinErrors = 5;
 /// Fix of a capture minus its known point.
-struct PlaceError {
+struct PositionError {
   std::string image;
   Eigen::Vector2d horizontal_m;
   double yaw_rad;
@@ -53,9 +53,11 @@ std::vector<FrameFix> locate_by_three_lamps(std::span<const Frame> frames, const
 }
 
 /// Returns the errors of fixes at known points, in the order of the frames.
-std::vector<PlaceError> place_errors(std::span<const Frame> frames, const LampMap& map,
-                                     const Calibration& calibration, const CapturesTable& places) {
-  std::vector<PlaceError> errors;
+std::vector<PositionError> compute_position_errors(std::span<const Frame> frames,
+                                                   const LampMap& map,
+                                                   const Calibration& calibration,
+                                                   const CapturesTable& places) {
+  std::vector<PositionError> errors;
   for (const auto& [i, fix] : locate_by_three_lamps(frames, map, calibration)) {
     const auto entry = places.find(frames[i].image);
     if (entry == places.end() || entry->second.place == PlaceOf::axis) continue;
@@ -81,19 +83,19 @@ Calibration with_free_focal_length(Calibration calibration) {
   if (!report) report.emplace();
   auto& covariance = report->covariance;
   if (!covariance) {
-    const Eigen::Index n = count_reported_intrinsics(calibration.camera);
+    const Eigen::Index n = count_intrinsics_with_covariance(calibration.camera);
     covariance = Eigen::MatrixXd(Eigen::MatrixXd::Zero(n, n));
   }
   for (Eigen::Index i = 0; i < kFocalAndCenter; ++i) (*covariance)(i, i) += sd_px * sd_px;
   return calibration;
 }
 
-AdjustmentResult adjust_frames(std::span<const Frame> frames, const LampMap& map,
-                               Calibration calibration) {
+AdjustmentResult adjust_frames_without_positions(std::span<const Frame> frames, const LampMap& map,
+                                                 Calibration calibration) {
   AdjustmentInput input{{}, map, std::move(calibration)};
   for (Lamp& lamp : input.lamps.lamps) lamp.sd_m = 0;
   for (const Frame& frame : frames) input.captures.push_back({frame.image, frame.detections});
-  return adjust_captures(input);
+  return run_bundle_adjustment(input);
 }
 
 /// Errors of the heights of fixes at known points.
@@ -104,8 +106,9 @@ struct HeightErrors {
 };
 
 /// Returns the errors of fixes of three lamps or more; std::nullopt for fewer than five.
-std::optional<HeightErrors> find_height_errors(const PlacedCaptures& captures, const LampMap& map,
-                                               const Calibration& calibration) {
+std::optional<HeightErrors> compute_height_errors(const CapturesWithPositions& captures,
+                                                  const LampMap& map,
+                                                  const Calibration& calibration) {
   constexpr std::size_t min_heights = 5;  // fewer make the median unreliable
   std::vector<double> errors_m, sds_m;
   for (const auto& [i, fix] : locate_by_three_lamps(captures.frames, map, calibration)) {
@@ -125,9 +128,9 @@ double max_corner_displacement_px(const Camera& a, const Camera& b) {
     for (const double v : {0., double(a.imager_px[1])}) {
       // Ray of the corner; the distortion is the same in both lenses.
       const Eigen::Vector2d corner(u, v);
-      const Eigen::Vector2d ray = (corner - a.center_px()).cwiseQuotient(a.focal_px());
-      worst_px =
-          std::max(worst_px, (b.focal_px().cwiseProduct(ray) + b.center_px() - corner).norm());
+      const Eigen::Vector2d ray = (corner - a.principal_point_px()).cwiseQuotient(a.focal_px());
+      worst_px = std::max(
+          worst_px, (b.focal_px().cwiseProduct(ray) + b.principal_point_px() - corner).norm());
     }
   }
   return worst_px;
@@ -142,7 +145,8 @@ std::vector<std::string> describe_lamp_faults(std::span<const Frame> frames, con
   if (frames.size() < kMinFrames) return faults;
   MapErrorOptions options;
   options.min_offset_px = min_offset_px;
-  for (const MapError& error : find_map_errors(frames, map, calibration, options).errors) {
+  for (const MapError& error :
+       detect_misplaced_or_swapped_lamps(frames, map, calibration, options).errors) {
     if (!error.lamps.empty() || error.kind == MapErrorKind::mirrored) {
       faults.push_back(describe(error));
     }
@@ -153,21 +157,24 @@ std::vector<std::string> describe_lamp_faults(std::span<const Frame> frames, con
 std::vector<std::string> describe_missing_lamps(std::span<const Frame> frames, const LampMap& map) {
   std::vector<std::string> faults;
   if (frames.size() < kMinFrames) return faults;
-  for (const MapError& error : find_unseen_lamps(frames, map)) faults.push_back(describe(error));
+  for (const MapError& error : find_undetected_lamps(frames, map))
+    faults.push_back(describe(error));
   return faults;
 }
 
-std::string describe_place_fault(std::span<const Frame> frames, const LampMap& map,
-                                 const Calibration& calibration, const CapturesTable& places) {
+std::string describe_wrong_reference_positions(std::span<const Frame> frames, const LampMap& map,
+                                               const Calibration& calibration,
+                                               const CapturesTable& places) {
   std::vector<CaptureError> errors;
-  for (const PlaceError& error : place_errors(frames, map, calibration, places)) {
+  for (const PositionError& error : compute_position_errors(frames, map, calibration, places)) {
     errors.push_back({error.image, error.horizontal_m.norm(), error.frame});
   }
-  return describe_check_outliers(errors);
+  return describe_position_error_outliers(errors);
 }
 
-std::string describe_capture_fault(std::span<const Frame> frames, const LampMap& map,
-                                   const Calibration& calibration) {
+std::string describe_captures_with_large_residuals(std::span<const Frame> frames,
+                                                   const LampMap& map,
+                                                   const Calibration& calibration) {
   std::vector<CaptureError> residuals;
   for (const auto& [i, fix] : locate_by_three_lamps(frames, map, calibration)) {
     residuals.push_back({frames[i].image, fix.residual_px, i});
@@ -175,23 +182,25 @@ std::string describe_capture_fault(std::span<const Frame> frames, const LampMap&
   return describe_residual_outliers(residuals);
 }
 
-std::optional<CommonOffset> find_common_offset(std::span<const Frame> frames, const LampMap& map,
-                                               const Calibration& calibration,
-                                               const CapturesTable& places) {
+std::optional<CommonOffset> find_common_position_offset(std::span<const Frame> frames,
+                                                        const LampMap& map,
+                                                        const Calibration& calibration,
+                                                        const CapturesTable& places) {
   constexpr double max_ratio = 1.0 / 3;
-  const std::vector<PlaceError> errors = place_errors(frames, map, calibration, places);
+  const std::vector<PositionError> errors =
+      compute_position_errors(frames, map, calibration, places);
   if (errors.size() < kMinErrors) return std::nullopt;
   const auto count = static_cast<double>(errors.size());
-  const auto in_camera = [](const PlaceError& error) -> Eigen::Vector2d {
+  const auto in_camera = [](const PositionError& error) -> Eigen::Vector2d {
     return Eigen::Rotation2Dd(-error.yaw_rad) * error.horizontal_m;
   };
   Eigen::Vector2d camera_offset_m(0, 0), world_offset_m(0, 0);
-  for (const PlaceError& error : errors) {
+  for (const PositionError& error : errors) {
     camera_offset_m += in_camera(error) / count;
     world_offset_m += error.horizontal_m / count;
   }
   double squares = 0, camera_squares = 0, world_squares = 0;
-  for (const PlaceError& error : errors) {
+  for (const PositionError& error : errors) {
     squares += error.horizontal_m.squaredNorm();
     camera_squares += (in_camera(error) - camera_offset_m).squaredNorm();
     world_squares += (error.horizontal_m - world_offset_m).squaredNorm();
@@ -223,14 +232,14 @@ std::string describe(const CommonOffset& offset) {
           : "the known points or the lamps have moved");
 }
 
-std::string describe_lens_fault(std::span<const Frame> frames, const LampMap& map,
-                                const Calibration& calibration) {
+std::string describe_contradiction_to_lens(std::span<const Frame> frames, const LampMap& map,
+                                           const Calibration& calibration) {
   constexpr std::size_t min_captures =
       10;  // with fewer a free lens absorbs residuals of other faults
   if (frames.size() < min_captures) return "";
-  const AdjustmentResult constrained = adjust_frames(frames, map, calibration);
+  const AdjustmentResult constrained = adjust_frames_without_positions(frames, map, calibration);
   const AdjustmentResult unconstrained =
-      adjust_frames(frames, map, with_free_focal_length(calibration));
+      adjust_frames_without_positions(frames, map, with_free_focal_length(calibration));
   if (!constrained.ok() || !unconstrained.ok()) return "";
   constexpr double max_residual_ratio = 1.0 / 3, min_displacement_px = 1;
   if (unconstrained.residual_px >= max_residual_ratio * constrained.residual_px) return "";
@@ -238,8 +247,8 @@ std::string describe_lens_fault(std::span<const Frame> frames, const LampMap& ma
     return "";
   const auto words = [](const Camera& camera) {
     return fmt::format("a focal length of {:.1f} px and the center ({:.1f}, {:.1f})",
-                       std::sqrt(camera.focal_px().prod()), camera.center_px().x(),
-                       camera.center_px().y());
+                       std::sqrt(camera.focal_px().prod()), camera.principal_point_px().x(),
+                       camera.principal_point_px().y());
   };
   return fmt::format(
       "lamps and boards are imaged by different lenses: the lamps fit {}, the boards {}; are all "
@@ -247,10 +256,11 @@ std::string describe_lens_fault(std::span<const Frame> frames, const LampMap& ma
       words(unconstrained.camera), words(calibration.camera));
 }
 
-std::string find_other_focal_length(const PlacedCaptures& captures, const PlacedCaptures& reference,
-                                    const LampMap& map, const Calibration& calibration) {
-  const auto heights = find_height_errors(captures, map, calibration);
-  const auto reference_heights = find_height_errors(reference, map, calibration);
+std::string describe_focal_length_difference(const CapturesWithPositions& captures,
+                                             const CapturesWithPositions& reference,
+                                             const LampMap& map, const Calibration& calibration) {
+  const auto heights = compute_height_errors(captures, map, calibration);
+  const auto reference_heights = compute_height_errors(reference, map, calibration);
   if (!heights || !reference_heights) return "";
   // A unit that is loose sideways can have moved by the same amount along its axis.
   constexpr double min_difference_m = kMinOutlierError_m, sigmas = 3, mm_per_m = 1e3;
@@ -262,13 +272,15 @@ std::string find_other_focal_length(const PlacedCaptures& captures, const Placed
       mm_per_m * heights->median_m, mm_per_m * reference_heights->median_m);
 }
 
-std::string find_other_lens(std::span<const Frame> frames, std::span<const Frame> reference,
-                            const LampMap& map, const Calibration& calibration) {
-  const AdjustmentResult result = adjust_frames(frames, map, calibration);
-  const AdjustmentResult reference_result = adjust_frames(reference, map, calibration);
+std::string describe_lens_difference(std::span<const Frame> frames,
+                                     std::span<const Frame> reference, const LampMap& map,
+                                     const Calibration& calibration) {
+  const AdjustmentResult result = adjust_frames_without_positions(frames, map, calibration);
+  const AdjustmentResult reference_result =
+      adjust_frames_without_positions(reference, map, calibration);
   if (!result.ok() || !reference_result.ok()) return "";
-  // The same ratio as in describe_lens_fault(); 0.1 px is 0.3 mm at lamps 1.6 m above a lens of 520
-  // px.
+  // The same ratio as in describe_contradiction_to_lens(); 0.1 px is 0.3 mm at lamps 1.6 m above a
+  // lens of 520 px.
   constexpr double min_ratio = 3, min_residual_px = 0.1;
   if (result.residual_px < std::max(min_residual_px, min_ratio * reference_result.residual_px))
     return "";

@@ -24,19 +24,22 @@ std::vector<std::string> describe_lamp_faults(std::span<const Frame> frames, con
                                               const Calibration& calibration,
                                               double min_offset_px = 2.5);
 
-/// Describes the lamps of the map that no capture contains, one line each. Requires three captures.
+/// Describes the lamps of the map that no capture contains, one line each. Returns an empty list
+/// for fewer than three captures.
 std::vector<std::string> describe_missing_lamps(std::span<const Frame> frames, const LampMap& map);
 
 /// Describes captures at other places than in their table, or by another camera
-/// (describe_check_outliers()), from fixes of three lamps or more. Returns an empty string if there
-/// are none.
-std::string describe_place_fault(std::span<const Frame> frames, const LampMap& map,
-                                 const Calibration& calibration, const CapturesTable& places);
+/// (describe_position_error_outliers()), from fixes of three lamps or more. Returns an empty string
+/// if there are none.
+std::string describe_wrong_reference_positions(std::span<const Frame> frames, const LampMap& map,
+                                               const Calibration& calibration,
+                                               const CapturesTable& places);
 
 /// Describes captures whose residuals are outliers (describe_residual_outliers()), from fixes of
 /// three lamps or more. Returns an empty string if there are none.
-std::string describe_capture_fault(std::span<const Frame> frames, const LampMap& map,
-                                   const Calibration& calibration);
+std::string describe_captures_with_large_residuals(std::span<const Frame> frames,
+                                                   const LampMap& map,
+                                                   const Calibration& calibration);
 
 /// Common offset of all captures at known points.
 struct CommonOffset {
@@ -56,9 +59,10 @@ struct CommonOffset {
 /// Returns std::nullopt if there is none, and for fewer than five fixes. Returns std::nullopt, too,
 /// if the camera did not rotate between the captures, because the two frames cannot be separated
 /// then.
-std::optional<CommonOffset> find_common_offset(std::span<const Frame> frames, const LampMap& map,
-                                               const Calibration& calibration,
-                                               const CapturesTable& places);
+std::optional<CommonOffset> find_common_position_offset(std::span<const Frame> frames,
+                                                        const LampMap& map,
+                                                        const Calibration& calibration,
+                                                        const CapturesTable& places);
 
 /// Describes an offset with its size and direction, and its possible reasons, in one line.
 std::string describe(const CommonOffset& offset);
@@ -72,11 +76,11 @@ std::string describe(const CommonOffset& offset);
 /// third of the first, and a corner of the image moves by 1 px or more.
 ///
 /// Returns an empty string if an adjustment is undetermined, and for fewer than ten captures.
-std::string describe_lens_fault(std::span<const Frame> frames, const LampMap& map,
-                                const Calibration& calibration);
+std::string describe_contradiction_to_lens(std::span<const Frame> frames, const LampMap& map,
+                                           const Calibration& calibration);
 
 /// Captures of lamps with their known heights.
-struct PlacedCaptures {
+struct CapturesWithPositions {
   std::vector<Frame> frames;
   CapturesTable places;
 };
@@ -87,14 +91,16 @@ struct PlacedCaptures {
 ///
 /// Returns an empty string for a difference below 5 mm or three standard deviations of a height.
 /// Returns an empty string, too, if a set has fewer than five captures of known height.
-std::string find_other_focal_length(const PlacedCaptures& captures, const PlacedCaptures& reference,
-                                    const LampMap& map, const Calibration& calibration);
+std::string describe_focal_length_difference(const CapturesWithPositions& captures,
+                                             const CapturesWithPositions& reference,
+                                             const LampMap& map, const Calibration& calibration);
 
 /// Describes in one line that the residuals of `frames` are larger than those of `reference`, by 3
 /// times and above 0.1 px. Each set is adjusted with its own tilt, so that another center or
 /// distortion raises the residuals, and a camera that moved or tilted does not. Returns an empty
 /// string without such a difference, and if an adjustment is undetermined.
-std::string find_other_lens(std::span<const Frame> frames, std::span<const Frame> reference,
-                            const LampMap& map, const Calibration& calibration);
+std::string describe_lens_difference(std::span<const Frame> frames,
+                                     std::span<const Frame> reference, const LampMap& map,
+                                     const Calibration& calibration);
 
 }  // namespace vlp

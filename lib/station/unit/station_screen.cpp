@@ -21,8 +21,8 @@ namespace {
 constexpr std::size_t kColumns = 80;
 
 /// Adds a text in lines of the screen's width, the first one with a label.
-void add_wrapped(std::vector<ScreenLine>& lines, const std::string& label, const std::string& text,
-                 Tone tone) {
+void add_wrapped_lines(std::vector<ScreenLine>& lines, const std::string& label,
+                       const std::string& text, Tone tone) {
   std::istringstream words(text);
   std::string line = fmt::format("{:<9}", label), word;
   const std::size_t indent = line.size();
@@ -39,7 +39,7 @@ void add_wrapped(std::vector<ScreenLine>& lines, const std::string& label, const
 /// Returns a problem as lines; no line if it is empty.
 std::vector<ScreenLine> make_problem_lines(const std::string& label, const std::string& problem) {
   std::vector<ScreenLine> lines;
-  if (!problem.empty()) add_wrapped(lines, label, problem, Tone::bad);
+  if (!problem.empty()) add_wrapped_lines(lines, label, problem, Tone::bad);
   return lines;
 }
 
@@ -48,8 +48,8 @@ std::string describe_outcome(const UnitImage& image) {
 }
 
 /// Returns the step of a unit's run that did not finish, with which its causes begin
-/// (find_causes()); std::nullopt if all did, and for golden units, whose steps are optional.
-/// Metrics do not show it, because a failed step can have some.
+/// (find_causes_of_failure()); std::nullopt if all did, and for golden units, whose steps are
+/// optional. Metrics do not show it, because a failed step can have some.
 std::optional<StationStep> find_unfinished_step(const RunRecord& record) {
   if (record.kind != "unit") return std::nullopt;
   std::istringstream causes(record.causes);
@@ -76,18 +76,18 @@ std::string describe_unmeasured_gates(const RunRecord& record) {
                      names.size() == 1 ? "gate" : "gates", to_string(*step));
 }
 
-ScreenLine gate_line(const CheckedMetric& metric) {
+ScreenLine make_gate_line(const CheckedMetric& metric) {
   const std::string value = metric.value ? fmt::format("{:.4g}", *metric.value) : "-";
   const std::string limit =
       fmt::format("{} {:.4g}",
                   metric.direction == Direction::at_least ? ">=" : "<=", metric.acceptance_limit());
-  std::string outcome = metric.passed() ? "met" : "NOT MET";
+  std::string outcome = metric.has_passed() ? "met" : "NOT MET";
   if (const auto sure = metric.conformance_probability()) {
     outcome += fmt::format(", p {:.3f}", *sure);
   }
   return {
       fmt::format("{:<28}{:>12}{:>14} {:<4} {}", metric.name, value, limit, metric.unit, outcome),
-      metric.passed() ? Tone::plain : Tone::bad};
+      metric.has_passed() ? Tone::plain : Tone::bad};
 }
 
 const std::array kPass{"  ####     #     ####    #### ", "  #   #   # #   #       #     ",
@@ -110,15 +110,15 @@ std::vector<ScreenLine> make_station_screen(const Unit& unit) {
   lines.push_back(
       {fmt::format("{}   camera {}", unit.config().station, unit.camera_id()).substr(0, kColumns),
        Tone::heading});
-  const auto current = unit.current();
+  const auto current = unit.current_step();
   std::string steps;
   for (const StationStep step : kStationSteps) {
-    const char* mark = unit.step(step).done() ? "x" : step == current ? ">" : " ";
+    const char* mark = unit.step(step).is_done() ? "x" : step == current ? ">" : " ";
     steps += fmt::format("[{}] {} {}   ", mark, to_string(step), format_count(unit, step));
   }
   lines.push_back({steps.substr(0, kColumns)});
   if (!unit.invalid_reason().empty()) {
-    add_wrapped(lines, "Station", unit.invalid_reason() + "; no unit passes", Tone::bad);
+    add_wrapped_lines(lines, "Station", unit.invalid_reason() + "; no unit passes", Tone::bad);
   }
   lines.push_back({""});
   if (!current) return lines;
@@ -127,21 +127,23 @@ std::vector<ScreenLine> make_station_screen(const Unit& unit) {
   for (std::string& line : describe_progress(unit, *current)) {
     lines.push_back({line.substr(0, kColumns)});
   }
-  add_wrapped(lines, "Next", describe_next_action(unit, *current), Tone::plain);
+  add_wrapped_lines(lines, "Next", describe_next_action(unit, *current), Tone::plain);
   if (const auto image = state.images.find(state.last); image != state.images.end()) {
-    add_wrapped(lines, "Last", image->first + ": " + describe_outcome(image->second),
-                image->second.is_used() ? Tone::good : Tone::bad);
+    add_wrapped_lines(lines, "Last", image->first + ": " + describe_outcome(image->second),
+                      image->second.is_used() ? Tone::good : Tone::bad);
   }
   for (const CheckedMetric& metric : unit.metrics()) {
     // Blur of all current views: a few views can be misleading.
     const bool known = metric.value && metric.name != "blur_px";
-    if (known && !metric.passed()) add_wrapped(lines, "Fails", describe_failure(metric), Tone::bad);
+    if (known && !metric.has_passed())
+      add_wrapped_lines(lines, "Fails", describe_failed_gate(metric), Tone::bad);
   }
   if (state.num_consecutive_rejections > 1) {
-    add_wrapped(lines, "Refused",
-                fmt::format("{} in a row; after {} the run ends", state.num_consecutive_rejections,
-                            unit.config().max_consecutive_rejections),
-                Tone::bad);
+    add_wrapped_lines(
+        lines, "Refused",
+        fmt::format("{} in a row; after {} the run ends", state.num_consecutive_rejections,
+                    unit.config().max_consecutive_rejections),
+        Tone::bad);
   }
   return lines;
 }
@@ -155,38 +157,38 @@ std::string make_last_image_line(const Unit& unit, StationStep step, const std::
 }
 
 std::vector<ScreenLine> make_spool_lines(const std::string& notice) {
-  return make_problem_lines("Records", printable(notice));
+  return make_problem_lines("Records", escape_for_terminal(notice));
 }
 
 std::vector<ScreenLine> make_hook_lines(const RunRecord& record) {
-  const std::string problem = hook_problem(record);
+  const std::string problem = describe_pending_hook(record);
   return make_problem_lines("Hook",
                             problem.empty() ? "" : problem + "; 'vlp-station hook' runs it again");
 }
 
 std::vector<ScreenLine> make_verdict_screen(const RunRecord& record) {
   const std::string no_verdict = find_verdict_problem(record);
-  const bool passed = record.passed() && no_verdict.empty();
+  const bool passed = record.has_passed() && no_verdict.empty();
   const Tone tone = passed ? Tone::good : Tone::bad;
   std::vector<ScreenLine> lines{
       {fmt::format("{:<28}{:>12}{:>14}", "gate", "figure", "limit"), Tone::heading}};
   for (const CheckedMetric& metric : record.metrics) {
-    if (metric.limit && metric.value) lines.push_back(gate_line(metric));
+    if (metric.limit && metric.value) lines.push_back(make_gate_line(metric));
   }
   if (const std::string gates = describe_unmeasured_gates(record); !gates.empty()) {
-    add_wrapped(lines, "Gates", "not measured: " + gates, Tone::plain);
+    add_wrapped_lines(lines, "Gates", "not measured: " + gates, Tone::plain);
   }
   std::istringstream causes(record.causes);
   if (!record.causes.empty()) lines.push_back({""});
   for (std::string cause; std::getline(causes, cause);) {
-    add_wrapped(lines, "Cause", cause, Tone::bad);
+    add_wrapped_lines(lines, "Cause", cause, Tone::bad);
   }
-  if (!no_verdict.empty()) add_wrapped(lines, "Cause", no_verdict, Tone::bad);
+  if (!no_verdict.empty()) add_wrapped_lines(lines, "Cause", no_verdict, Tone::bad);
   // Last, so that it is visible on a terminal of 24 lines.
   lines.push_back({""});
-  const std::span<const char* const> banner = passed             ? std::span(kPass)
-                                              : record.invalid() ? std::span(kInvalid)
-                                                                 : std::span(kFail);
+  const std::span<const char* const> banner = passed                ? std::span(kPass)
+                                              : record.is_invalid() ? std::span(kInvalid)
+                                                                    : std::span(kFail);
   if (no_verdict.empty()) {
     for (const char* row : banner) lines.push_back({row, tone});
   }

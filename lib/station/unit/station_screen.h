@@ -26,10 +26,10 @@ std::vector<ScreenLine> make_station_screen(const Unit& unit);
 /// Returns the result of an image of a step, in one line.
 std::string make_last_image_line(const Unit& unit, StationStep step, const std::string& image);
 
-/// Returns hook_problem() with its remedy as lines; no line if it is empty.
+/// Returns describe_pending_hook() with its remedy as lines; no line if it is empty.
 std::vector<ScreenLine> make_hook_lines(const RunRecord& record);
 
-/// Returns Spool::notice() as lines; no line if it is empty.
+/// Returns Spool::make_operator_notice() as lines; no line if it is empty.
 std::vector<ScreenLine> make_spool_lines(const std::string& notice);
 
 /// Returns the screen of a verdict: gates with value and limit, causes, the primary one first, and

@@ -25,7 +25,7 @@ namespace {
 constexpr double kMillimetersPerMeter = 1e3;
 
 /// Prepends the failed part to the reason.
-StepResult with_step_name(const char* what, StepResult result) {
+StepResult add_step_name(const char* what, StepResult result) {
   if (!result.ok()) result.why = fmt::format("{}: {}", what, result.why);
   return result;
 }
@@ -58,7 +58,7 @@ LampCaptures make_lamp_captures(const StationConfig& config, const Calibration& 
 
 /// Returns the reason if too few captures have known positions; empty if at least `wanted`, or all,
 /// have one.
-std::string places_problem(std::size_t known, std::size_t captures, int wanted) {
+std::string describe_positions_problem(std::size_t known, std::size_t captures, int wanted) {
   if (known > 0 && known >= std::min(captures, static_cast<std::size_t>(wanted))) return "";
   return fmt::format(
       "{} of the {} captures have no position: add x_m and y_m to captures.csv or truth.csv of the "
@@ -71,8 +71,9 @@ std::string places_problem(std::size_t known, std::size_t captures, int wanted) 
 StepResult fail_if_inconsistent(const StationConfig& config, const std::vector<Frame>& frames,
                                 StepResult result) {
   if (!result.ok()) return result;
-  std::string fault = describe_capture_fault(frames, config.lamps, result.calibration);
-  if (!fault.empty()) result.fail(StepFailure::undetermined, std::move(fault));
+  std::string fault =
+      describe_captures_with_large_residuals(frames, config.lamps, result.calibration);
+  if (!fault.empty()) result.set_failure(StepFailure::undetermined, std::move(fault));
   return result;
 }
 
@@ -114,11 +115,12 @@ void add_check_fractions(const LocateResult& located, const std::vector<Frame>& 
                     {"check_lamps_seen", ratio(seen.size(), map.lamps.size())}};
 }
 
-void add_errors(const EvaluationInput& input, const Evaluation& evaluation, StepResult& result) {
+void add_position_error_metrics(const EvaluationInput& input, const Evaluation& evaluation,
+                                StepResult& result) {
   result.metrics.push_back({"check_mean_mm", kMillimetersPerMeter * evaluation.horizontal_m.mean});
   result.metrics.push_back({"check_worst_mm", kMillimetersPerMeter * evaluation.horizontal_m.max});
   Eigen::Vector2d sum_m = Eigen::Vector2d::Zero();
-  for (const FixError& error : compute_errors(input, input.fixes).errors)
+  for (const FixError& error : compute_fix_errors(input, input.fixes).errors)
     sum_m += error.horizontal_m;
   const double offset_m = sum_m.norm() / static_cast<double>(evaluation.fixes);
   result.metrics.push_back({"check_offset_mm", kMillimetersPerMeter * offset_m});
@@ -129,61 +131,64 @@ void add_errors(const EvaluationInput& input, const Evaluation& evaluation, Step
 
 }  // namespace
 
-StepResult solve_boards(const StationConfig& config, const std::string& camera_id,
-                        Observations seen) {
+StepResult run_board_step(const StationConfig& config, const std::string& camera_id,
+                          Observations seen) {
   LensInput input{std::move(seen), config.board, {}, config.type};
   input.camera.id = camera_id;
-  LensResult result = solve_lens(std::move(input), {});
+  LensResult result = run_lens_step(std::move(input), {});
   result.skipped.clear();  // the station reports images itself
   if (result.failure == StepFailure::wrong_board)
-    return with_step_name("wrong board", std::move(result));
+    return add_step_name("wrong board", std::move(result));
   if (result.ok()) add_nominal_differences(config.type, result);
   // A lens from images of two cameras fits neither of them. The operator has to remove the wrong
   // images.
   if (result.ok() && !result.lens.inconsistent_views.empty()) {
-    result.fail(StepFailure::undetermined, result.lens.inconsistent_views);
+    result.set_failure(StepFailure::undetermined, result.lens.inconsistent_views);
   }
   return result;
 }
 
-StepResult solve_rotation(const StationConfig& config, const Calibration& calibration,
-                          const std::vector<Frame>& frames) {
-  return with_step_name(
+StepResult run_rotation_step(const StationConfig& config, const Calibration& calibration,
+                             const std::vector<Frame>& frames) {
+  return add_step_name(
       "the rotation in place",
       fail_if_inconsistent(config, frames,
-                           solve_rotation(make_lamp_captures(config, calibration, frames),
-                                          RotationMethod::axis, {})));
+                           run_rotation_step(make_lamp_captures(config, calibration, frames),
+                                             RotationMethod::axis, {})));
 }
 
-StepResult solve_dispersion(const StationConfig& config, const Calibration& calibration,
-                            const std::vector<Frame>& frames, const CapturesTable& places) {
-  const KnownPlaces known = collect_known_places(frames, places, config.dispersion_station_m);
-  std::string problem =
-      places_problem(known.captures.size(), frames.size(), config.sufficient.dispersion_captures);
+StepResult run_dispersion_step(const StationConfig& config, const Calibration& calibration,
+                               const std::vector<Frame>& frames, const CapturesTable& places) {
+  const KnownPositions known =
+      collect_reference_positions(frames, places, config.dispersion_station_m);
+  std::string problem = describe_positions_problem(known.captures.size(), frames.size(),
+                                                   config.sufficient.dispersion_captures);
   if (!problem.empty()) {
     StepResult result;
-    result.fail(StepFailure::wrong_place, std::move(problem));
+    result.set_failure(StepFailure::wrong_place, std::move(problem));
     return result;
   }
-  return with_step_name(
+  return add_step_name(
       "the fixes at the station",
-      fail_if_inconsistent(config, frames,
-                           solve_dispersion(make_lamp_captures(config, calibration, frames), known,
-                                            DispersionMethod::camera, DispersionCircle::mean, {})));
+      fail_if_inconsistent(
+          config, frames,
+          run_dispersion_step(make_lamp_captures(config, calibration, frames), known,
+                              DispersionMethod::camera, DispersionCircle::mean, {})));
 }
 
-StepResult check_fixes(const StationConfig& config, const Calibration& calibration,
-                       const std::vector<Frame>& frames, const CapturesTable& places) {
+StepResult run_check_step(const StationConfig& config, const Calibration& calibration,
+                          const std::vector<Frame>& frames, const CapturesTable& places) {
   StepResult result;
   KnownPoints known = select_known_points(frames, places);
-  std::string problem =
-      places_problem(known.frames.size(), frames.size(), config.sufficient.check_captures);
+  std::string problem = describe_positions_problem(known.frames.size(), frames.size(),
+                                                   config.sufficient.check_captures);
   if (!problem.empty()) {
-    result.fail(StepFailure::wrong_place, std::move(problem));
+    result.set_failure(StepFailure::wrong_place, std::move(problem));
     return result;
   }
   result.calibration = calibration;
-  const LocateResult located = locate_frames({known.frames, config.lamps, calibration, places});
+  const LocateResult located =
+      locate_camera_in_frames({known.frames, config.lamps, calibration, places});
   add_check_fractions(located, known.frames, config.lamps, result);
   result.rejected_lamps = located.rejected_lamps;
   result.warnings = located.warnings;
@@ -192,10 +197,10 @@ StepResult check_fixes(const StationConfig& config, const Calibration& calibrati
   EvaluationInput input;
   input.fixes = {"check", located.rows};
   input.truth = {"check", std::move(known.truth)};
-  input.station_m = compute_place_radius_m(calibration);
+  input.station_m = compute_same_position_radius_m(calibration);
   const EvaluateResult errors = evaluate_fixes(input, {});
   result.drawing = [input, lamps = config.lamps] { return make_floor_plan_drawing(input, lamps); };
-  add_errors(input, errors.evaluation, result);
+  add_position_error_metrics(input, errors.evaluation, result);
   if (const auto& typical = located.summary.typical; typical && typical->median_residual_px) {
     result.metrics.push_back({"check_residual_px", *typical->median_residual_px});
   }

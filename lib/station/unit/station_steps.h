@@ -18,20 +18,20 @@ namespace vlp {
 
 /// Calibrates the lens. Further metrics: focal_percent, principal_point_px and
 /// nominal_difference_px against the nominal lens, and board_warp_mm.
-StepResult solve_boards(const StationConfig& config, const std::string& camera_id,
-                        Observations seen);
+StepResult run_board_step(const StationConfig& config, const std::string& camera_id,
+                          Observations seen);
 
-StepResult solve_rotation(const StationConfig& config, const Calibration& calibration,
-                          const std::vector<Frame>& frames);
+StepResult run_rotation_step(const StationConfig& config, const Calibration& calibration,
+                             const std::vector<Frame>& frames);
 
 /// Calibrates the dispersion. Positions are those of the table, or else that of the configuration.
 /// Fails with wrong_place if fewer captures than the station requires have a position.
-StepResult solve_dispersion(const StationConfig& config, const Calibration& calibration,
-                            const std::vector<Frame>& frames, const CapturesTable& places);
+StepResult run_dispersion_step(const StationConfig& config, const Calibration& calibration,
+                               const std::vector<Frame>& frames, const CapturesTable& places);
 
 /// Locates captures at known points; the errors are the metrics check_*. Ignores captures without a
 /// position. Fails with wrong_place if fewer than the station requires have one.
-StepResult check_fixes(const StationConfig& config, const Calibration& calibration,
-                       const std::vector<Frame>& frames, const CapturesTable& places);
+StepResult run_check_step(const StationConfig& config, const Calibration& calibration,
+                          const std::vector<Frame>& frames, const CapturesTable& places);
 
 }  // namespace vlp

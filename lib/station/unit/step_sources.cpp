@@ -26,41 +26,41 @@ StepSources::StepSources(const std::vector<std::string>& sources,
   for (const StationStep step : kStationSteps) by_step_.emplace(step, default_source);
 }
 
-void StepSources::feed(const Unit& unit, WatchedRun& run) {
+void StepSources::write_next_frame(const Unit& unit, WatchedRun& run) {
   if (!last_.empty() && std::filesystem::exists(last_)) {
     const std::string name = last_.filename().string();
     const auto& images = unit.step(last_step_).images;
     const auto image = images.find(name);
     if (image == images.end()) return;
-    if (!image->second.is_used()) run.discard(last_step_, name);
+    if (!image->second.is_used()) run.discard_image(last_step_, name);
   }
   last_.clear();
-  const auto step = unit.current();
+  const auto step = unit.current_step();
   if (!step || !by_step_.contains(*step)) return;
-  last_ = by_step_.at(*step)->save_next(run.step_folder(*step));
+  last_ = by_step_.at(*step)->save_next_frame(run.step_folder(*step));
   last_step_ = *step;
 }
 
 bool StepSources::ended(const Unit& unit) const {
-  const auto step = unit.current();
+  const auto step = unit.current_step();
   return step && last_.empty() && by_step_.contains(*step) && by_step_.at(*step)->ended();
 }
 
-std::filesystem::path FrameSource::save_next(const SharedFolder& folder) {
-  folder.check_place();
-  const auto frame = ended_ ? std::nullopt : video_.next();
+std::filesystem::path FrameSource::save_next_frame(const SharedFolder& folder) {
+  folder.check_folder_not_replaced();
+  const auto frame = ended_ ? std::nullopt : video_.read_next();
   if (!frame) {
-    if (video_.is_camera()) throw InputError(source_, "the camera gives no frame");
+    if (video_.is_live_camera()) throw InputError(source_, "the camera gives no frame");
     ended_ = true;
     return {};
   }
-  const std::string content = codecs().encode(".png", frame->image, {});
+  const std::string content = get_codecs().encode_image_file(".png", frame->image, {});
   // A continued run does not overwrite its frames.
   std::string name;
   do {
     name = fmt::format("frame-{:06}.png", frames_++);
-  } while (folder.has(name));
-  folder.replace(name, content);
+  } while (folder.contains_entry(name));
+  folder.replace_file(name, content);
   return folder.path() / name;
 }
 

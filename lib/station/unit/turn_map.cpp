@@ -20,9 +20,9 @@ struct LocatedFrame {
   std::size_t number;
 };
 
-std::vector<LocatedFrame> locate_frames(const std::vector<Frame>& frames,
-                                        const StationConfig& config,
-                                        const Calibration& calibration) {
+std::vector<LocatedFrame> locate_camera_in_frames(const std::vector<Frame>& frames,
+                                                  const StationConfig& config,
+                                                  const Calibration& calibration) {
   PositionerOptions options;
   options.correction = Correction::none;
   const Positioner positioner(config.lamps, calibration, options);
@@ -41,14 +41,14 @@ std::vector<LocatedFrame> locate_frames(const std::vector<Frame>& frames,
 
 }  // namespace
 
-TurnMap compute_turn_map(const std::vector<Frame>& frames, const StationConfig& config,
-                         const Calibration& calibration) {
-  constexpr double same_height = 0.06;  // find_rotation_captures() decides
+YawCoverage compute_yaw_coverage(const std::vector<Frame>& frames, const StationConfig& config,
+                                 const Calibration& calibration) {
+  constexpr double same_height = 0.06;  // find_in_place_rotation_captures() decides
   const auto parts = static_cast<std::size_t>(config.sufficient.turn_captures);
-  const auto located = locate_frames(frames, config, calibration);
-  TurnMap map;
+  const auto located = locate_camera_in_frames(frames, config, calibration);
+  YawCoverage map;
   for (std::size_t begin = 0, end = 0; begin < located.size(); begin = end) {
-    TurnMap::Height height{located[begin].z_m, 0, 0, std::vector<bool>(parts)};
+    YawCoverage::Height height{located[begin].z_m, 0, 0, std::vector<bool>(parts)};
     while (end < located.size() &&
            located[end].z_m - located[begin].z_m < same_height * located[begin].lamps_above_m) {
       ++end;
@@ -69,7 +69,7 @@ TurnMap compute_turn_map(const std::vector<Frame>& frames, const StationConfig& 
                          height.arc_rad >= config.sufficient.turn_arc_rad;
     map.heights.push_back(std::move(height));
   }
-  map.sufficient = std::ranges::count_if(map.heights, &TurnMap::Height::is_complete) >=
+  map.sufficient = std::ranges::count_if(map.heights, &YawCoverage::Height::is_complete) >=
                    config.sufficient.turn_heights;
   return map;
 }

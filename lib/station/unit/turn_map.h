@@ -12,13 +12,13 @@
 namespace vlp {
 
 /// Angles of a rotation in place that captures cover, from fixes without rotation center.
-struct TurnMap {
+struct YawCoverage {
   struct Height {
     double z_m;
     int captures;
     double arc_rad;
-    /// Cells of the rotation with a capture: `turn_captures` equal cells, starting at the yaw of
-    /// the first capture.
+    /// Cells of the rotation with a capture: `turn_captures` equal cells. The first one is centered
+    /// at the yaw of the first capture.
     std::vector<bool> parts;
     /// True if captures and angular range meet the station's criteria.
     bool is_complete = false;
@@ -29,7 +29,7 @@ struct TurnMap {
   bool sufficient = false;
 };
 
-TurnMap compute_turn_map(const std::vector<Frame>& frames, const StationConfig& config,
-                         const Calibration& calibration);
+YawCoverage compute_yaw_coverage(const std::vector<Frame>& frames, const StationConfig& config,
+                                 const Calibration& calibration);
 
 }  // namespace vlp

@@ -23,13 +23,13 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Returns UnitImage::level for an image.
-Eigen::Matrix3d find_level(const LevelRotations& levels, const std::string& image) {
+Eigen::Matrix3d find_level_rotation(const LevelRotations& levels, const std::string& image) {
   const auto level = levels.find(image);
   return level == levels.end() ? Eigen::Matrix3d::Zero().eval() : level->second.value();
 }
 
 /// Returns the use of the images of a step.
-ImageUse image_use_for(StationStep step) {
+ImageUse find_image_use(StationStep step) {
   if (step == StationStep::boards) return ImageUse::boards;
   return step == StationStep::rotation ? ImageUse::turn : ImageUse::places;
 }
@@ -43,23 +43,23 @@ Unit::Unit(const StationConfig& config, std::string camera_id, ProgramVersion pr
       threads_(threads),
       boards_(config.board, config.frontend, config.type.imager_px) {}
 
-void Unit::reread(StationStep step) {
+void Unit::reread_capture_tables(StationStep step) {
   if (step != StationStep::dispersion && step != StationStep::check) return;
-  process_again(step);
+  reprocess_images_of_step(step);
   at(step).result.reset();
-  reset_after(step);
+  reset_steps_after(step);
 }
 
 /// Processes the images again whose inclination changed. They are not counted again.
-void Unit::process_again(StationStep step) {
+void Unit::reprocess_images_of_step(StationStep step) {
   const LevelRotations levels = find_level_rotations(step);
   UnitStep& state = at(step);
   std::vector<fs::path> again;
   for (const auto& [name, image] : state.images) {
-    if (!image.discarded && find_level(levels, name) != image.level)
+    if (!image.discarded && find_level_rotation(levels, name) != image.level)
       again.push_back(image.seen.file);
   }
-  if (again.empty() || !calibration_before(step)) return;
+  if (again.empty() || !calibration_before_step(step)) return;
   const int refused = state.num_rejected_in_batch;
   const bool used = state.is_any_used_in_batch;
   process_files(step, again);
@@ -67,44 +67,45 @@ void Unit::process_again(StationStep step) {
   state.is_any_used_in_batch = used;
 }
 
-void Unit::advance(bool all_in) {
+void Unit::solve_complete_steps(bool all_in) {
   solve_steps(all_in);
-  row_time_ = check_row_time(lamp_observations(*this), config_.lamps, stated_row_time(config_));
+  row_time_ =
+      check_row_time(collect_lamp_observations(*this), config_.lamps, make_given_row_time(config_));
 }
 
 void Unit::solve_steps(bool all_in) {
   for (const StationStep step : kStationSteps) {
     UnitStep& state = at(step);
-    if (!calibration_before(step)) return;
+    if (!calibration_before_step(step)) return;
     const auto waiting = std::exchange(state.waiting, {});
     if (!waiting.empty()) {
       process_files(step, waiting);
-      count_rejections(step);
+      count_consecutive_rejections(step);
     }
     if (state.result && (state.result->ok() || !all_in)) continue;
     state.sufficient = has_sufficient_images(step);
     if (!state.sufficient && !all_in) return;
     state.result = solve(step, all_in);
-    state.picture = state.result->drawing ? render_async(state.result->drawing) : StepPlot{};
+    state.picture = state.result->drawing ? render_plot_async(state.result->drawing) : StepPlot{};
     if (!state.result->ok()) return;
   }
 }
 
-std::optional<Calibration> Unit::calibration_before(StationStep step) const {
+std::optional<Calibration> Unit::calibration_before_step(StationStep step) const {
   if (step == StationStep::boards) return Calibration{};
   const UnitStep& before = steps_[index(step) - 1];
   if (!before.result || !before.result->ok()) return std::nullopt;
   return before.result->calibration;
 }
 
-std::optional<StationStep> Unit::current() const {
+std::optional<StationStep> Unit::current_step() const {
   for (const StationStep step : kStationSteps) {
-    if (!this->step(step).done()) return step;
+    if (!this->step(step).is_done()) return step;
   }
   return std::nullopt;
 }
 
-std::vector<ReportPlot> Unit::pictures() const {
+std::vector<ReportPlot> Unit::report_plots() const {
   std::vector<ReportPlot> pictures;
   for (const UnitStep& state : steps_) {
     if (!state.result || !state.picture.valid()) continue;
@@ -113,15 +114,15 @@ std::vector<ReportPlot> Unit::pictures() const {
   return pictures;
 }
 
-bool Unit::is_hopeless() const {
-  const auto step = current();
+bool Unit::cannot_pass_any_more() const {
+  const auto step = current_step();
   if (!step) return false;
   const UnitStep& state = this->step(*step);
   if (state.num_consecutive_rejections >= config_.max_consecutive_rejections) return true;
   const bool stuck = state.sufficient && state.result && !state.result->ok();
   if (!stuck || *step == StationStep::boards) return false;
   const auto frames = collect_frames(state);
-  return !describe_lamp_faults(frames, config_.lamps, *calibration_before(*step)).empty() ||
+  return !describe_lamp_faults(frames, config_.lamps, *calibration_before_step(*step)).empty() ||
          !describe_missing_lamps(frames, config_.lamps).empty();
 }
 
@@ -129,16 +130,16 @@ void Unit::add(StationStep step, const std::vector<fs::path>& files, bool more_t
   UnitStep& state = at(step);
   if (files.empty()) return;
   state.folder = files.front().parent_path();
-  if (!calibration_before(step)) {
+  if (!calibration_before_step(step)) {
     state.waiting.insert(state.waiting.end(), files.begin(), files.end());
     return;
   }
   process_files(step, files);
-  if (!more_to_come) count_rejections(step);
+  if (!more_to_come) count_consecutive_rejections(step);
 }
 
 /// Updates the number of consecutive rejections after a batch.
-void Unit::count_rejections(StationStep step) {
+void Unit::count_consecutive_rejections(StationStep step) {
   UnitStep& state = at(step);
   const int refused = std::exchange(state.num_rejected_in_batch, 0);
   const bool used = std::exchange(state.is_any_used_in_batch, false);
@@ -149,11 +150,11 @@ void Unit::count_rejections(StationStep step) {
 /// because its axis is vertical.
 LevelRotations Unit::find_level_rotations(StationStep step) const {
   if (step != StationStep::dispersion && step != StationStep::check) return {};
-  const auto calibration = calibration_before(step);
+  const auto calibration = calibration_before_step(step);
   if (!calibration) return {};
   try {
-    return compute_level_rotations(read_captures_of_folder(this->step(step).folder), *calibration,
-                                   0);
+    return compute_level_rotations(read_captures_csv_of_folder(this->step(step).folder),
+                                   *calibration, 0);
   } catch (const InputError&) {  // reported by the step
     return {};
   }
@@ -164,56 +165,57 @@ void Unit::process_files(StationStep step, const std::vector<fs::path>& files) {
   const LevelRotations levels = find_level_rotations(step);
   std::optional<LampIntake> lamps;
   if (step != StationStep::boards) {
-    lamps.emplace(LightDetector(config_.lamps, make_detector_camera(*calibration_before(step))),
-                  image_use_for(step), config_.frontend, config_.type.imager_px, levels);
+    lamps.emplace(
+        LightDetector(config_.lamps, make_detector_camera(*calibration_before_step(step))),
+        find_image_use(step), config_.frontend, config_.type.imager_px, levels);
   }
-  images_in_parallel(files.size(), threads_, [&](std::size_t i) {
+  process_images_in_parallel(files.size(), threads_, [&](std::size_t i) {
     images[i] = observe_unit_image(files[i], [&](const SourceImage& source) {
-      return lamps ? lamps->observe(source) : boards_.observe(source);
+      return lamps ? lamps->detect_in_image(source) : boards_.detect_in_image(source);
     });
-    images[i].level = find_level(levels, images[i].seen.name());
+    images[i].level = find_level_rotation(levels, images[i].seen.file_name());
   });
   for (UnitImage& image : images) {
-    const ImageOwner owner = owner_ && !image.sha256.empty() ? owner_(image.sha256) : ImageOwner();
+    const ImageUser owner = owner_ && !image.sha256.empty() ? owner_(image.sha256) : ImageUser();
     if (!owner.empty()) {
-      image.seen.reject(RejectionReason::used_elsewhere,
-                        "already of " + describe_owner(owner, config_.file));
+      image.seen.set_rejection(RejectionReason::used_elsewhere,
+                               "already of " + describe_run_using_image(owner, config_.file));
     }
-    at(step).last = image.seen.name();
+    at(step).last = image.seen.file_name();
     add_image(step, std::move(image));
   }
 }
 
 void Unit::add_image(StationStep step, UnitImage image) {
   UnitStep& state = at(step);
-  const std::string name = image.seen.name();
+  const std::string name = image.seen.file_name();
   forget_image(step, name);  // it was overwritten
-  if (image.is_used()) reject_redundant(step, image);
+  if (image.is_used()) reject_redundant_image(step, image);
   const bool used = image.is_used();
-  const bool fault = !used && !image.is_redundant() && !state.done();
+  const bool fault = !used && !image.is_redundant() && !state.is_done();
   state.num_rejected_in_batch += fault ? 1 : 0;
   state.is_any_used_in_batch = state.is_any_used_in_batch || used;
   state.images.emplace(name, std::move(image));
   if (!used) return;
   state.result.reset();
-  reset_after(step);
+  reset_steps_after(step);
 }
 
 /// Rejects an image without a fault that is redundant. It has the content of an image of any step,
 /// shows the same as an image of this step, or the step is complete.
-void Unit::reject_redundant(StationStep step, UnitImage& image) const {
+void Unit::reject_redundant_image(StationStep step, UnitImage& image) const {
   for (const UnitStep& any : steps_) {
-    for (const UnitImage* other : used_images(any)) {
+    for (const UnitImage* other : list_used_images(any)) {
       if (image.sha256.empty() || other->sha256 != image.sha256) continue;
-      return image.seen.reject(RejectionReason::same_image,
-                               "is the same image as " + other->seen.name());
+      return image.seen.set_rejection(RejectionReason::same_image,
+                                      "is the same image as " + other->seen.file_name());
     }
   }
-  Selection selection(image_use_for(step), config_.frontend);
-  for (const UnitImage* other : used_images(this->step(step))) selection.keep(other->seen);
+  Selection selection(find_image_use(step), config_.frontend);
+  for (const UnitImage* other : list_used_images(this->step(step))) selection.keep(other->seen);
   selection.add(image.seen);
-  if (!image.is_used() || !this->step(step).done()) return;
-  image.seen.reject(RejectionReason::not_needed, "not needed: the step has enough");
+  if (!image.is_used() || !this->step(step).is_done()) return;
+  image.seen.set_rejection(RejectionReason::not_needed, "not needed: the step has enough");
 }
 
 /// Removes an image and the results that depend on it. Images that were redundant because of it are
@@ -226,7 +228,7 @@ void Unit::forget_image(StationStep step, const std::string& name) {
   state.images.erase(image);
   if (!used) return;
   state.result.reset();
-  reset_after(step);
+  reset_steps_after(step);
   std::vector<UnitImage> again;
   for (const auto& [other, known] : state.images) {
     if (known.is_redundant()) again.push_back(known);
@@ -238,14 +240,14 @@ void Unit::forget_image(StationStep step, const std::string& name) {
   }
 }
 
-void Unit::remove(StationStep step, const std::string& name) {
+void Unit::remove_file(StationStep step, const std::string& name) {
   UnitStep& state = at(step);
   std::erase_if(state.waiting, [&](const fs::path& file) { return file.filename() == name; });
   if (state.images.contains(name)) state.num_consecutive_rejections = 0;
   forget_image(step, name);
 }
 
-void Unit::discard(StationStep step, const std::string& name) {
+void Unit::discard_image(StationStep step, const std::string& name) {
   UnitStep& state = at(step);
   const auto image = state.images.find(name);
   if (image == state.images.end() || image->second.is_used()) return;
@@ -258,7 +260,7 @@ void Unit::discard(StationStep step, const std::string& name) {
 }
 
 /// Resets the later steps; their images are processed again with the new result.
-void Unit::reset_after(StationStep step) {
+void Unit::reset_steps_after(StationStep step) {
   for (const StationStep later : kStationSteps) {
     if (later <= step) continue;
     UnitStep& state = at(later);
@@ -276,14 +278,16 @@ bool Unit::has_sufficient_images(StationStep step) const {
   const CompletionCriteria& sufficient = config_.sufficient;
   switch (step) {
     case StationStep::boards:
-      return state.used() >= sufficient.board_views &&
-             board_coverage(state, config_.type.imager_px).fraction() >= sufficient.board_coverage;
+      return state.count_used_images() >= sufficient.board_views &&
+             compute_board_coverage(state, config_.type.imager_px).covered_fraction() >=
+                 sufficient.board_coverage;
     case StationStep::rotation:
-      return compute_turn_map(collect_frames(state), config_, *calibration_before(step)).sufficient;
+      return compute_yaw_coverage(collect_frames(state), config_, *calibration_before_step(step))
+          .sufficient;
     case StationStep::dispersion:
-      return state.used() >= sufficient.dispersion_captures;
+      return state.count_used_images() >= sufficient.dispersion_captures;
     case StationStep::check:
-      return state.used() >= sufficient.check_captures;
+      return state.count_used_images() >= sufficient.check_captures;
   }
   return false;
 }
@@ -291,30 +295,30 @@ bool Unit::has_sufficient_images(StationStep step) const {
 StepResult Unit::solve(StationStep step, bool all_in) const {
   const UnitStep& state = this->step(step);
   StepResult result;
-  if (state.used() == 0) {
-    result.fail(StepFailure::undetermined, "no image can be used");
+  if (state.count_used_images() == 0) {
+    result.set_failure(StepFailure::undetermined, "no image can be used");
     return result;
   }
-  const Calibration before = *calibration_before(step);
+  const Calibration before = *calibration_before_step(step);
   try {
     switch (step) {
       case StationStep::boards:
-        result = solve_boards(config_, camera_id_, collect_observations(state));
+        result = run_board_step(config_, camera_id_, collect_observations(state));
         break;
       case StationStep::rotation:
-        result = solve_rotation(config_, before, collect_frames(state));
+        result = run_rotation_step(config_, before, collect_frames(state));
         break;
       case StationStep::dispersion:
-        result = solve_dispersion(config_, before, collect_frames(state),
-                                  read_captures_with_truth(state.folder));
+        result = run_dispersion_step(config_, before, collect_frames(state),
+                                     read_captures_with_truth(state.folder));
         break;
       case StationStep::check:
-        return check_fixes(config_, before, collect_frames(state),
-                           read_captures_with_truth(state.folder));
+        return run_check_step(config_, before, collect_frames(state),
+                              read_captures_with_truth(state.folder));
     }
   } catch (const InputError& error) {  // the table may be incomplete
     if (all_in) throw;
-    result.fail(StepFailure::bad_input, error.what());
+    result.set_failure(StepFailure::bad_input, error.what());
     return result;
   }
   if (result.ok()) {
@@ -335,10 +339,10 @@ HistoryEntry Unit::make_history_entry(StationStep step) const {
           program_.program,
           program_.version,
           "",
-          {{"station", config_.sha256}, {to_string(step), sha256_of_text(digests)}}};
+          {{"station", config_.sha256}, {to_string(step), compute_text_sha256(digests)}}};
 }
 
-std::vector<Observation> lamp_observations(const Unit& unit) {
+std::vector<Observation> collect_lamp_observations(const Unit& unit) {
   std::vector<Observation> images;
   for (const StationStep step : kStationSteps) {
     if (step == StationStep::boards) continue;
@@ -347,7 +351,7 @@ std::vector<Observation> lamp_observations(const Unit& unit) {
   return images;
 }
 
-GivenRowTime stated_row_time(const StationConfig& config) {
+GivenRowTime make_given_row_time(const StationConfig& config) {
   return {config.type.row_time_s.value(), config.type_file};
 }
 
@@ -361,16 +365,16 @@ std::optional<Calibration> Unit::calibration() const {
 
 std::vector<CheckedMetric> Unit::metrics() const {
   std::vector<Metric> values;
-  if (const auto blur_px = typical_blur_px(step(StationStep::boards))) {
+  if (const auto blur_px = compute_median_blur_px(step(StationStep::boards))) {
     values.push_back({"blur_px", *blur_px});
   }
   for (const UnitStep& state : steps_) {
     if (!state.result) continue;
     values.insert(values.end(), state.result->metrics.begin(), state.result->metrics.end());
   }
-  const auto row_time = row_time_metrics(row_time_);
+  const auto row_time = make_row_time_metrics(row_time_);
   values.insert(values.end(), row_time.begin(), row_time.end());
-  return check_all(config_.gates, values, unit_metrics());
+  return check_all_metrics(config_.gates, values, list_unit_metrics());
 }
 
 }  // namespace vlp

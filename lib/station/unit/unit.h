@@ -41,41 +41,41 @@ class Unit {
            bool more_to_come = false);
   /// Removes an image whose file was deleted. Images that are redundant only because of it are used
   /// instead.
-  void remove(StationStep step, const std::string& name);
+  void remove_file(StationStep step, const std::string& name);
   /// Marks the file of a rejected image as deleted. The rejection remains, but does not count as
   /// consecutive, because a moving camera blurs images. A redundant image is removed.
-  void discard(StationStep step, const std::string& name);
+  void discard_image(StationStep step, const std::string& name);
   /// Handles a change of the step's captures.csv or truth.csv.
-  void reread(StationStep step);
+  void reread_capture_tables(StationStep step);
   /// Solves the steps that are complete. If `all_in`, no more images arrive, and incomplete steps
   /// are solved, too. An unreadable captures.csv then throws InputError; otherwise it is the step's
   /// problem.
-  void advance(bool all_in);
+  void solve_complete_steps(bool all_in);
   /// Sets the function that finds another camera's run by the SHA-256 of an image. Such images are
   /// rejected.
-  void reject_images_of_others(std::function<ImageOwner(const std::string& sha256)> owner) {
+  void reject_images_of_other_cameras(std::function<ImageUser(const std::string& sha256)> owner) {
     owner_ = std::move(owner);
   }
   /// Ends an incomplete unit: no more images arrive. `why` is human-readable, as "the operator
   /// ended the run".
-  void end_early(std::string why) { ended_ = std::move(why); }
-  /// The reason given to end_early(); empty if the unit was not ended early.
+  void end_unit_early(std::string why) { ended_ = std::move(why); }
+  /// The reason given to end_unit_early(); empty if the unit was not ended early.
   const std::string& ended() const { return ended_; }
 
   /// Makes the verdict of this unit not count, because of the station. `why`, human-readable,
   /// becomes the first of its causes; empty if the verdict counts.
-  void invalidate(std::string why) { invalid_reason_ = std::move(why); }
+  void invalidate_verdict(std::string why) { invalid_reason_ = std::move(why); }
   const std::string& invalid_reason() const { return invalid_reason_; }
 
   const UnitStep& step(StationStep step) const { return steps_[index(step)]; }
   /// Returns the comparison of the type's row time with that of the lamps of all steps, as of the
-  /// last advance().
+  /// last solve_complete_steps().
   const RowTimeCheck& row_time() const { return row_time_; }
   /// Returns the first step that is not completed; std::nullopt if all are.
-  std::optional<StationStep> current() const;
+  std::optional<StationStep> current_step() const;
   /// Returns true if continuing is useless. A step then has too many consecutive rejected images,
   /// or it is complete but fails because of the lamps.
-  bool is_hopeless() const;
+  bool cannot_pass_any_more() const;
 
   /// Returns the calibration of the last completed step; std::nullopt before the lens is known.
   std::optional<Calibration> calibration() const;
@@ -83,7 +83,7 @@ class Unit {
   std::vector<CheckedMetric> metrics() const;
   /// Returns the plots of lens, rotation center and dispersion for the report, of the solved steps.
   /// Waits for their rendering.
-  std::vector<ReportPlot> pictures() const;
+  std::vector<ReportPlot> report_plots() const;
   const StationConfig& config() const { return config_; }
   const std::string& camera_id() const { return camera_id_; }
 
@@ -93,15 +93,15 @@ class Unit {
   void solve_steps(bool all_in);
   void process_files(StationStep step, const std::vector<std::filesystem::path>& files);
   LevelRotations find_level_rotations(StationStep step) const;
-  void process_again(StationStep step);
+  void reprocess_images_of_step(StationStep step);
   void add_image(StationStep step, UnitImage image);
-  void count_rejections(StationStep step);
-  void reject_redundant(StationStep step, UnitImage& image) const;
+  void count_consecutive_rejections(StationStep step);
+  void reject_redundant_image(StationStep step, UnitImage& image) const;
   void forget_image(StationStep step, const std::string& name);
-  void reset_after(StationStep step);
+  void reset_steps_after(StationStep step);
   bool has_sufficient_images(StationStep step) const;
   StepResult solve(StationStep step, bool all_in) const;
-  std::optional<Calibration> calibration_before(StationStep step) const;
+  std::optional<Calibration> calibration_before_step(StationStep step) const;
   HistoryEntry make_history_entry(StationStep step) const;
 
   const StationConfig& config_;
@@ -109,16 +109,16 @@ class Unit {
   ProgramVersion program_;
   int threads_;
   std::string ended_ = {}, invalid_reason_ = {};
-  std::function<ImageOwner(const std::string&)> owner_ = {};
+  std::function<ImageUser(const std::string&)> owner_ = {};
   BoardIntake boards_;
   std::array<UnitStep, 4> steps_;
   RowTimeCheck row_time_ = {};
 };
 
 /// Returns the observations of the images with lamps, rejected ones too.
-std::vector<Observation> lamp_observations(const Unit& unit);
+std::vector<Observation> collect_lamp_observations(const Unit& unit);
 
 /// Returns the row time of the station's type of camera.
-GivenRowTime stated_row_time(const StationConfig& config);
+GivenRowTime make_given_row_time(const StationConfig& config);
 
 }  // namespace vlp

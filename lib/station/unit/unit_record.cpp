@@ -40,7 +40,7 @@ struct RejectionSummary {
 };
 
 /// Returns the minimum number of images for a fault of the camera; fewer can be accidental.
-int min_images_to_blame(const StationConfig& config) {
+int min_images_to_blame_camera(const StationConfig& config) {
   return std::min(config.max_consecutive_rejections, (config.sufficient.board_views + 1) / 2);
 }
 
@@ -51,19 +51,19 @@ RejectionSummary summarize_refusals(const UnitStep& state, const StationConfig& 
     rejected.push_back({image.seen.file});
     rejected.back().rejection = image.seen.rejection;
   }
-  if (rejected.empty() || std::cmp_less(rejected.size(), state.used())) return {};
+  if (rejected.empty() || std::cmp_less(rejected.size(), state.count_used_images())) return {};
   const auto blurred = std::ranges::count_if(rejected, [](const Observation& image) {
     return image.rejection->reason == RejectionReason::blurred;
   });
   return {fmt::format("{} of {} images refused: {}", rejected.size(), state.images.size(),
-                      summarize_rejections(rejected)),
-          2 * blurred > std::ssize(rejected) && blurred >= min_images_to_blame(config)};
+                      summarize_image_rejections(rejected)),
+          2 * blurred > std::ssize(rejected) && blurred >= min_images_to_blame_camera(config)};
 }
 
 /// Returns the reasons why a step did not finish.
-std::vector<Cause> find_problems(const Unit& unit, StationStep step) {
+std::vector<Cause> find_step_problems(const Unit& unit, StationStep step) {
   const UnitStep& state = unit.step(step);
-  if (state.done()) return {};
+  if (state.is_done()) return {};
   std::vector<Cause> causes;
   const std::string count = format_count(unit, step);
   const RejectionSummary refused = summarize_refusals(state, unit.config());
@@ -71,7 +71,7 @@ std::vector<Cause> find_problems(const Unit& unit, StationStep step) {
     causes.push_back(
         {fmt::format("{} ({}): {}", to_string(step), count, refused.text), refused.are_blurred});
   }
-  const bool failed = state.result && !state.result->ok() && state.used() > 0;
+  const bool failed = state.result && !state.result->ok() && state.count_used_images() > 0;
   if (failed) causes.push_back({fmt::format("{}: {}", to_string(step), state.result->why)});
   const bool is_explained = failed || !refused.text.empty();
   if (state.sufficient || (is_explained && unit.ended().empty())) return causes;
@@ -88,25 +88,25 @@ std::vector<Cause> describe_failures(const std::vector<CheckedMetric>& metrics, 
                                      const Selects& is_selected) {
   std::vector<Cause> causes;
   for (const CheckedMetric& metric : metrics) {
-    if (is_selected(metric)) causes.push_back({describe_failure(metric), of_camera});
+    if (is_selected(metric)) causes.push_back({describe_failed_gate(metric), of_camera});
   }
   return causes;
 }
 
 /// Returns true if a gate is not passed by a measured value.
-bool is_missed(const CheckedMetric& metric) { return metric.value && !metric.passed(); }
+bool is_missed(const CheckedMetric& metric) { return metric.value && !metric.has_passed(); }
 
 /// Returns the problems of a step and its failed gates, those of the station before those of the
 /// camera.
 std::vector<Cause> find_step_causes(const Unit& unit, StationStep step,
                                     const std::vector<CheckedMetric>& metrics) {
-  std::vector<Cause> causes = find_problems(unit, step);
+  std::vector<Cause> causes = find_step_problems(unit, step);
   const UnitStep& state = unit.step(step);
   if (!is_solved(state)) return causes;
   for (const bool of_camera : {false, true}) {
     append(causes, describe_failures(metrics, of_camera, [&](const CheckedMetric& metric) {
-             return find_metric_value(state.result->metrics, metric.name) && !metric.passed() &&
-                    metric_kind(metric.name)->of_camera == of_camera;
+             return find_metric_value(state.result->metrics, metric.name) && !metric.has_passed() &&
+                    find_metric_kind(metric.name)->of_camera == of_camera;
            }));
   }
   return causes;
@@ -125,7 +125,7 @@ bool is_blur_known(const UnitStep& boards, const StationConfig& config) {
   return boards.sufficient ||
          std::ranges::count_if(std::views::values(boards.images), [](const UnitImage& image) {
            return image.seen.blur_px.has_value();
-         }) >= min_images_to_blame(config);
+         }) >= min_images_to_blame_camera(config);
 }
 
 /// Returns the causes visible in the board images: another board, blur, and faults of the lens.
@@ -159,21 +159,24 @@ std::vector<Cause> find_check_faults(const Unit& unit, const Calibration& calibr
   const UnitStep& check = unit.step(StationStep::check);
   if (!is_solved(check)) return {};
   const LampMap& lamps = unit.config().lamps;
-  const PlacedCaptures captures{collect_frames(check), read_captures_with_truth(check.folder)};
+  const CapturesWithPositions captures{collect_frames(check),
+                                       read_captures_with_truth(check.folder)};
   // A common offset is no fault of single captures; one that rotates is a fault of the camera.
-  const auto offset = find_common_offset(captures.frames, lamps, calibration, captures.places);
+  const auto offset =
+      find_common_position_offset(captures.frames, lamps, calibration, captures.places);
   if (offset && !offset->in_camera) return {{describe(*offset)}};
   if (!offset) {
-    std::string fault = describe_place_fault(captures.frames, lamps, calibration, captures.places);
+    std::string fault =
+        describe_wrong_reference_positions(captures.frames, lamps, calibration, captures.places);
     if (!fault.empty()) return {{std::move(fault)}};
   }
   const UnitStep& dispersion = unit.step(StationStep::dispersion);
-  const PlacedCaptures reference{collect_frames(dispersion),
-                                 read_captures_with_truth(dispersion.folder)};
-  std::string other = find_other_focal_length(captures, reference, lamps, calibration);
+  const CapturesWithPositions reference{collect_frames(dispersion),
+                                        read_captures_with_truth(dispersion.folder)};
+  std::string other = describe_focal_length_difference(captures, reference, lamps, calibration);
   // Without an offset, residuals can be caused by a lens that is inaccurate near the corners.
   if (other.empty() && offset) {
-    other = find_other_lens(captures.frames, reference.frames, lamps, calibration);
+    other = describe_lens_difference(captures.frames, reference.frames, lamps, calibration);
   }
   if (!other.empty()) {
     return {{"the images of check are of another camera: " + other + "; take them with this unit"}};
@@ -189,8 +192,9 @@ std::vector<Cause> find_station_faults(const Unit& unit) {
   if (!known) return {};
   // Tested first, because a wrong row time confuses or removes lamps.
   const Lens lens(known->camera.lens_model, known->camera.intrinsics);
-  std::string row_time = find_row_time_error(lamp_observations(unit), unit.config().lamps, lens,
-                                             stated_row_time(unit.config()));
+  std::string row_time =
+      describe_other_row_time(collect_lamp_observations(unit), unit.config().lamps, lens,
+                              make_given_row_time(unit.config()));
   if (!row_time.empty()) return {{std::move(row_time)}};
   std::vector<Frame> frames;
   for (const StationStep step : kLampSteps) {
@@ -202,7 +206,7 @@ std::vector<Cause> find_station_faults(const Unit& unit) {
     for (const std::string& fault : faults) causes.push_back({fault});
   }
   if (!causes.empty()) return causes;
-  if (std::string fault = describe_lens_fault(frames, unit.config().lamps, *known);
+  if (std::string fault = describe_contradiction_to_lens(frames, unit.config().lamps, *known);
       !fault.empty()) {
     return {{std::move(fault)}};
   }
@@ -213,12 +217,12 @@ std::vector<Cause> find_station_faults(const Unit& unit) {
 
 RunRecord make_unit_record(const Unit& unit, const std::string& run,
                            const ProgramVersion& program) {
-  RunRecord record = make_record("unit", unit.config(), unit.camera_id(), run, program);
+  RunRecord record = make_run_record("unit", unit.config(), unit.camera_id(), run, program);
   if (const auto calibration = unit.calibration()) {
-    record.calibration = calibration_text(*calibration);
+    record.calibration = format_calibration_yaml(*calibration);
   }
   record.metrics = unit.metrics();
-  record.set_verdict(find_causes(unit));
+  record.set_verdict(find_causes_of_failure(unit));
   for (const StationStep step : kStationSteps) {
     for (const auto& [name, image] : unit.step(step).images) {
       std::string refused = image.refusal();
@@ -231,7 +235,7 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run,
     for (const auto& file : unit.step(step).waiting) {
       record.images.push_back({.step = to_string(step),
                                .name = file.filename().string(),
-                               .sha256 = sha256_of_file(file),
+                               .sha256 = compute_file_sha256(file),
                                .refused = "not looked at: a step before is not done"});
     }
   }
@@ -240,17 +244,17 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run,
 
 void reject_reused_images(RunRecord& record, const std::string& earlier,
                           const std::filesystem::path& station_file) {
-  record.invalidate(fmt::format(
+  record.invalidate_verdict(fmt::format(
       "all images are those of run {}, which is no repetition: take new ones, or '{}' if that run "
       "should not count",
       earlier, format_void_command(earlier, station_file)));
 }
 
-std::vector<Cause> find_causes(const Unit& unit) {
+std::vector<Cause> find_causes_of_failure(const Unit& unit) {
   const std::vector<CheckedMetric> metrics = unit.metrics();
   const std::vector<Cause> board_causes = find_board_causes(unit, metrics);
   std::vector<Cause> lamp_causes = find_lamp_step_causes(unit, metrics);
-  if (!unit.current()) {
+  if (!unit.current_step()) {
     append(lamp_causes, describe_failures(metrics, false, [](const CheckedMetric& metric) {
              return !metric.value;
            }));
@@ -265,7 +269,7 @@ std::vector<Cause> find_causes(const Unit& unit) {
     append(causes, find_station_faults(unit));
   }
   append(causes, std::move(lamp_causes));
-  // Gates of row_time_metrics(), which refer to all steps together.
+  // Gates of make_row_time_metrics(), which refer to all steps together.
   append(causes, describe_failures(metrics, false, [](const CheckedMetric& metric) {
            return metric.name.starts_with("row_time_") && is_missed(metric);
          }));

@@ -22,6 +22,6 @@ void reject_reused_images(RunRecord& record, const std::string& earlier,
 /// Returns the reasons why a unit does not pass, the most important one first; empty if it passes.
 /// Faults of the station and of the operator precede results that depend on them. The camera
 /// therefore fails by decide_verdict() only for its own errors.
-std::vector<Cause> find_causes(const Unit& unit);
+std::vector<Cause> find_causes_of_failure(const Unit& unit);
 
 }  // namespace vlp

@@ -16,16 +16,16 @@ UnitImage observe_unit_image(const std::filesystem::path& file,
                              const std::function<Observation(const SourceImage&)>& observe) {
   UnitImage image;
   try {
-    image.sha256 = sha256_of_file(file);
+    image.sha256 = compute_file_sha256(file);
     image.seen = observe(SourceImage(file));
   } catch (const InputError&) {
     image.seen = {file};
-    image.seen.reject(RejectionReason::unreadable, "cannot be read as an image");
+    image.seen.set_rejection(RejectionReason::unreadable, "cannot be read as an image");
   }
   return image;
 }
 
-int UnitStep::used() const {
+int UnitStep::count_used_images() const {
   return static_cast<int>(std::ranges::count_if(std::views::values(images), &UnitImage::is_used));
 }
 
@@ -37,13 +37,13 @@ Observations collect_observations(const UnitStep& step) {
 
 std::vector<Frame> collect_frames(const UnitStep& step) {
   std::vector<Frame> frames;
-  for (const UnitImage* image : used_images(step)) {
-    frames.push_back({image->seen.name(), collect_lamps(image->seen)});
+  for (const UnitImage* image : list_used_images(step)) {
+    frames.push_back({image->seen.file_name(), collect_identified_lamps(image->seen)});
   }
   return frames;
 }
 
-std::vector<const UnitImage*> used_images(const UnitStep& step) {
+std::vector<const UnitImage*> list_used_images(const UnitStep& step) {
   std::vector<const UnitImage*> used;
   for (const auto& [name, image] : step.images) {
     if (image.is_used()) used.push_back(&image);
@@ -51,17 +51,17 @@ std::vector<const UnitImage*> used_images(const UnitStep& step) {
   return used;
 }
 
-ImageCoverage board_coverage(const UnitStep& step, const std::array<int, 2>& imager_px) {
+ImageCoverage compute_board_coverage(const UnitStep& step, const std::array<int, 2>& imager_px) {
   ImageCoverage coverage(imager_px);
-  for (const UnitImage* image : used_images(step)) {
+  for (const UnitImage* image : list_used_images(step)) {
     if (!image->seen.board) continue;
-    for (const PointDetection& corner : collect_corners(image->seen.board->seen))
+    for (const PointDetection& corner : collect_detected_corners(image->seen.board->seen))
       coverage.add(corner.pixel);
   }
   return coverage;
 }
 
-std::optional<double> typical_blur_px(const UnitStep& boards) {
+std::optional<double> compute_median_blur_px(const UnitStep& boards) {
   std::vector<double> blurs_px;
   for (const auto& [name, image] : boards.images) {
     const bool counts = image.is_used() || !boards.sufficient;
@@ -71,7 +71,7 @@ std::optional<double> typical_blur_px(const UnitStep& boards) {
   return upper_median(std::move(blurs_px));
 }
 
-StepPlot render_async(std::function<Drawing()> drawing) {
+StepPlot render_plot_async(std::function<Drawing()> drawing) {
   const auto draw = [drawing = std::move(drawing)]() -> std::optional<ReportPlot> {
     try {
       return make_report_plot(drawing());

@@ -37,7 +37,7 @@ using StepPlot = std::shared_future<std::optional<ReportPlot>>;
 
 /// Makes and renders a drawing on its own thread, while the unit continues, because gnuplot would
 /// delay the verdict. Destroying the last copy of the result waits for the thread.
-StepPlot render_async(std::function<Drawing()> drawing);
+StepPlot render_plot_async(std::function<Drawing()> drawing);
 
 /// Image of a unit, with its observation.
 struct UnitImage {
@@ -82,8 +82,8 @@ struct UnitStep {
   /// Name of the last image.
   std::string last = {};
 
-  bool done() const { return sufficient && result && result->ok(); }
-  int used() const;
+  bool is_done() const { return sufficient && result && result->ok(); }
+  int count_used_images() const;
 };
 
 /// Returns the observations of the images, by name.
@@ -91,13 +91,13 @@ Observations collect_observations(const UnitStep& step);
 /// Returns the frames of the images that are used, by name.
 std::vector<Frame> collect_frames(const UnitStep& step);
 /// Returns the images that are used, by name.
-std::vector<const UnitImage*> used_images(const UnitStep& step);
+std::vector<const UnitImage*> list_used_images(const UnitStep& step);
 
 /// Counts the corners of the used views in the cells of the image.
-ImageCoverage board_coverage(const UnitStep& step, const std::array<int, 2>& imager_px);
+ImageCoverage compute_board_coverage(const UnitStep& step, const std::array<int, 2>& imager_px);
 
 /// Returns the median blur of the used views, once the step is complete. Before that it includes
 /// rejected views, because all views of a blurred lens are rejected.
-std::optional<double> typical_blur_px(const UnitStep& boards);
+std::optional<double> compute_median_blur_px(const UnitStep& boards);
 
 }  // namespace vlp

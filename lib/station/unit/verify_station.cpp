@@ -35,8 +35,8 @@ class Verification {
   void boards() {
     const BoardIntake intake(config_.board, config_.frontend, config_.type.imager_px);
     const UnitStep step = observe_folder(folder_ / "boards", ImageUse::boards, intake);
-    if (step.used() > 0)
-      add("boards", solve_boards(config_, golden_.camera_id, collect_observations(step)));
+    if (step.count_used_images() > 0)
+      add("boards", run_board_step(config_, golden_.camera_id, collect_observations(step)));
     add_images(StationStep::boards, step);
   }
 
@@ -45,33 +45,36 @@ class Verification {
     const LampIntake intake(
         LightDetector(config_.lamps, make_detector_camera(golden_.calibration)), ImageUse::places,
         config_.frontend, config_.type.imager_px,
-        compute_level_rotations(read_captures_of_folder(folder), golden_.calibration, 0));
+        compute_level_rotations(read_captures_csv_of_folder(folder), golden_.calibration, 0));
     const UnitStep step = observe_folder(folder, ImageUse::places, intake);
     std::ranges::move(collect_observations(step).images, std::back_inserter(lamp_images_));
     const auto frames = collect_frames(step);
     frames_.insert(frames_.end(), frames.begin(), frames.end());
     const auto places = read_captures_with_truth(step.folder);
     if (station_step == StationStep::check) {
-      common_offset_ = find_common_offset(frames, config_.lamps, golden_.calibration, places);
-      place_fault_ = describe_place_fault(frames, config_.lamps, golden_.calibration, places);
+      common_offset_ =
+          find_common_position_offset(frames, config_.lamps, golden_.calibration, places);
+      place_fault_ =
+          describe_wrong_reference_positions(frames, config_.lamps, golden_.calibration, places);
     }
     add(to_string(station_step),
         station_step == StationStep::check
-            ? check_fixes(config_, golden_.calibration, frames, places)
-            : solve_dispersion(config_, golden_.calibration, frames, places));
+            ? run_check_step(config_, golden_.calibration, frames, places)
+            : run_dispersion_step(config_, golden_.calibration, frames, places));
     add_images(station_step, step);
   }
 
-  RunRecord record(const std::string& run, const ProgramVersion& program) {
+  RunRecord make_verification_record(const std::string& run, const ProgramVersion& program) {
     const GivenRowTime stated{*config_.type.row_time_s, "the calibration of the golden unit"};
     const RowTimeCheck row_time = check_row_time(lamp_images_, config_.lamps, stated);
-    for (const Metric& metric : row_time_metrics(row_time)) values_.push_back(metric);
-    RunRecord record = make_record("golden", config_, golden_.camera_id, run, program);
-    record.metrics = check_all(golden_.gates, values_, unit_metrics());
+    for (const Metric& metric : make_row_time_metrics(row_time)) values_.push_back(metric);
+    RunRecord record = make_run_record("golden", config_, golden_.camera_id, run, program);
+    record.metrics = check_all_metrics(golden_.gates, values_, list_unit_metrics());
     record.images = images_;
     for (const CheckedMetric& metric : record.metrics) {
       // The station is under test, and fails by its metrics.
-      if (!metric.passed()) causes_.push_back({describe_failure(metric), metric.value.has_value()});
+      if (!metric.has_passed())
+        causes_.push_back({describe_failed_gate(metric), metric.value.has_value()});
     }
     std::vector<Cause> causes = find_station_causes(row_time, stated);
     causes.insert(causes.end(), causes_.begin(), causes_.end());
@@ -79,7 +82,7 @@ class Verification {
     return record;
   }
 
-  std::vector<ReportPlot> pictures() const {
+  std::vector<ReportPlot> report_plots() const {
     std::vector<ReportPlot> pictures;
     for (const StepPlot& plot : plots_) {
       if (const auto& picture = plot.get()) pictures.push_back(*picture);
@@ -93,8 +96,8 @@ class Verification {
     std::string row_time_error = row_time.error;
     if (row_time_error.empty() && !causes_.empty()) {
       const Camera& camera = golden_.calibration.camera;
-      row_time_error = find_row_time_error(lamp_images_, config_.lamps,
-                                           Lens(camera.lens_model, camera.intrinsics), stated);
+      row_time_error = describe_other_row_time(lamp_images_, config_.lamps,
+                                               Lens(camera.lens_model, camera.intrinsics), stated);
     }
     // Independent of the gates: this camera is known.
     constexpr double min_offset_px = 0.6;
@@ -120,16 +123,16 @@ class Verification {
   UnitStep observe_folder(const fs::path& folder, ImageUse use, const Intake& intake) const {
     const auto files = list_images(folder);
     std::vector<UnitImage> images(files.size());
-    images_in_parallel(files.size(), threads_, [&](std::size_t i) {
+    process_images_in_parallel(files.size(), threads_, [&](std::size_t i) {
       images[i] = observe_unit_image(
-          files[i], [&](const SourceImage& image) { return intake.observe(image); });
+          files[i], [&](const SourceImage& image) { return intake.detect_in_image(image); });
     });
     UnitStep step;
     step.folder = folder;
     Selection selection(use, config_.frontend);
     for (UnitImage& image : images) {
       selection.add(image.seen);
-      std::string name = image.seen.name();
+      std::string name = image.seen.file_name();
       step.images.emplace(std::move(name), std::move(image));
     }
     return step;
@@ -141,7 +144,7 @@ class Verification {
       causes_.push_back({fmt::format("{}: {}", step, result.why), is_station_fault});
     }
     values_.insert(values_.end(), result.metrics.begin(), result.metrics.end());
-    if (result.drawing) plots_.push_back(render_async(result.drawing));
+    if (result.drawing) plots_.push_back(render_plot_async(result.drawing));
   }
   void add_images(StationStep station_step, const UnitStep& step) {
     for (const auto& [name, image] : step.images) {
@@ -176,18 +179,18 @@ VerificationResult verify_station(const StationConfig& config, const fs::path& f
   if (fs::is_directory(folder / "boards")) verification.boards();
   if (fs::is_directory(folder / "dispersion")) verification.lamps(StationStep::dispersion);
   verification.lamps(StationStep::check);
-  return {verification.record(run, program), verification.pictures()};
+  return {verification.make_verification_record(run, program), verification.report_plots()};
 }
 
-void reject_used_images(
+void invalidate_if_images_were_used(
     RunRecord& record,
-    const std::function<std::string(const std::string& sha256)>& find_golden_run) {
+    const std::function<std::string(const std::string& sha256)>& find_golden_run_using_image) {
   for (const RunRecord::Image& image : record.images) {
     if (!image.refused.empty()) continue;
-    const std::string run = find_golden_run(image.sha256);
+    const std::string run = find_golden_run_using_image(image.sha256);
     if (run.empty()) continue;
-    record.invalidate(fmt::format("image {}/{} was used in golden run {}: measure it again",
-                                  image.step, image.name, run));
+    record.invalidate_verdict(fmt::format("image {}/{} was used in golden run {}: measure it again",
+                                          image.step, image.name, run));
     return;
   }
 }

@@ -34,10 +34,10 @@ VerificationResult verify_station(const StationConfig& config, const std::filesy
                                   int threads);
 
 /// Makes the record INVALID if an earlier run used one of its images, because the image does not
-/// show the current state of the station. `find_golden_run` returns the earlier run that used an
-/// image of this digest; empty if there is none.
-void reject_used_images(
+/// show the current state of the station. `find_golden_run_using_image` returns the earlier run
+/// that used an image of this digest; empty if there is none.
+void invalidate_if_images_were_used(
     RunRecord& record,
-    const std::function<std::string(const std::string& sha256)>& find_golden_run);
+    const std::function<std::string(const std::string& sha256)>& find_golden_run_using_image);
 
 }  // namespace vlp

@@ -36,7 +36,7 @@ std::string make_table_state(const fs::path& folder) {
 
 SharedFolder open_captures(const fs::path& captures, const std::string& camera) {
   make_folder(captures);
-  return SharedFolder(captures).make_folder({camera, captures, "camera"});
+  return SharedFolder(captures).make_subfolder({camera, captures, "camera"});
 }
 
 }  // namespace
@@ -49,7 +49,7 @@ WatchedRun::WatchedRun(Unit& unit, Spool& spool)
   if (finished_) return;
   steps_.reserve(kStationSteps.size());
   for (const StationStep step : kStationSteps) {
-    SharedFolder folder = files_.make_folder({to_string(step), folder_, "step"});
+    SharedFolder folder = files_.make_subfolder({to_string(step), folder_, "step"});
     const fs::path path = folder.path();
     steps_.push_back({std::move(folder), WatchedFolder(path)});
   }
@@ -60,7 +60,7 @@ WatchedRun::~WatchedRun() {
 }
 
 /// Reads the run id from `.run`. Returns true if the run is stored.
-bool WatchedRun::read_state() {
+bool WatchedRun::read_run_state() {
   constexpr std::size_t max_bytes = 100;
   const auto state = files_.read(kState, max_bytes);
   if (!state) return false;
@@ -79,10 +79,10 @@ void WatchedRun::begin(Spool& spool) {
   if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
     throw InputError(folder_, "another vlp-station works on this camera");
   }
-  const bool is_stored = read_state();
+  const bool is_stored = read_run_state();
   if (run_.empty()) {
     run_ = make_run_id();
-    files_.replace(kState, run_ + "\n");
+    files_.replace_file(kState, run_ + "\n");
     return;
   }
   finished_ = spool.find(run_);
@@ -102,10 +102,10 @@ void WatchedRun::begin(Spool& spool) {
   }
   if (!finished_) return;  // the run continues
   publish_run(*finished_, {}, unit_.config().results);
-  move_away();
+  rename_finished_folder();
 }
 
-std::vector<WatchedRun::Arrival> WatchedRun::poll_changes(std::size_t max_images) {
+std::vector<WatchedRun::Arrival> WatchedRun::poll_folder_changes(std::size_t max_images) {
   std::vector<Arrival> arrivals;
   bool reread = false;
   for (const StationStep step : kStationSteps) {
@@ -113,13 +113,13 @@ std::vector<WatchedRun::Arrival> WatchedRun::poll_changes(std::size_t max_images
     std::string tables = make_table_state(images.folder());
     if (tables != known_tables) {
       known_tables = std::move(tables);
-      unit_.reread(step);
+      unit_.reread_capture_tables(step);
       reread = true;
     }
-    const auto changes = images.poll_changes();
+    const auto changes = images.poll_folder_changes();
     for (const std::string& name : changes.gone) {
       std::erase_if(waiting, [&](const fs::path& file) { return file.filename() == name; });
-      unit_.remove(step, name);
+      unit_.remove_file(step, name);
       arrivals.push_back({step, name, true});
     }
     waiting.insert(waiting.end(), changes.added.begin(), changes.added.end());
@@ -131,29 +131,30 @@ std::vector<WatchedRun::Arrival> WatchedRun::poll_changes(std::size_t max_images
     unit_.add(step, now, !waiting.empty());
     for (const fs::path& file : now) arrivals.push_back({step, file.filename().string(), false});
   }
-  if (!arrivals.empty() || reread) unit_.advance(false);
+  if (!arrivals.empty() || reread) unit_.solve_complete_steps(false);
   return arrivals;
 }
 
-void WatchedRun::mark_stored() const {
+void WatchedRun::mark_run_stored() const {
   try {
-    files_.replace(kState, fmt::format("{}\n{}\n", run_, kKept));
-  } catch (const InputError&) {  // move_away() reports it; records reject a second verdict
+    files_.replace_file(kState, fmt::format("{}\n{}\n", run_, kKept));
+  } catch (
+      const InputError&) {  // rename_finished_folder() reports it; records reject a second verdict
   }
 }
 
-void WatchedRun::discard(StationStep step, const std::string& image) {
-  step_folder(step).remove(image);
-  steps_[static_cast<std::size_t>(step)].images.forget(image);
-  unit_.discard(step, image);
+void WatchedRun::discard_image(StationStep step, const std::string& image) {
+  step_folder(step).remove_file(image);
+  steps_[static_cast<std::size_t>(step)].images.ignore_removed_file(image);
+  unit_.discard_image(step, image);
 }
 
-void WatchedRun::move_away() const {
-  files_.check_place();
-  vlp::move_away(folder_, run_);
+void WatchedRun::rename_finished_folder() const {
+  files_.check_folder_not_replaced();
+  vlp::rename_finished_folder(folder_, run_);
 }
 
-void move_away(const fs::path& folder, const std::string& run) {
+void rename_finished_folder(const fs::path& folder, const std::string& run) {
   const fs::path kept = folder.string() + "." + run;
   std::error_code error;
   fs::rename(folder, kept, error);
@@ -162,13 +163,13 @@ void move_away(const fs::path& folder, const std::string& run) {
   }
 }
 
-WatchedFolder::Changes WatchedFolder::poll_changes() {
+WatchedFolder::Changes WatchedFolder::poll_folder_changes() {
   std::map<std::string, File> now;
   std::error_code error;
   for (fs::directory_iterator entry(folder_, error), end; !error && entry != end;
        entry.increment(error)) {
     const std::string name = entry->path().filename().string();
-    if (name.starts_with('.') || !is_image_name(entry->path())) continue;
+    if (name.starts_with('.') || !is_image_file_name(entry->path())) continue;
     std::error_code gone;  // the file was removed
     const bool file = entry->is_regular_file(gone);
     const File found{entry->file_size(gone), entry->last_write_time(gone), false};

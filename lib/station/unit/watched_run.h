@@ -29,9 +29,9 @@ class WatchedFolder {
   /// Returns the changes since the last call. An image is new if file, size and time are the same
   /// in two successive calls, so that it is no longer being written. Ignores names that begin with
   /// a dot, which are incomplete files.
-  Changes poll_changes();
+  Changes poll_folder_changes();
   /// Ignores the removal of a file that the caller is about to delete.
-  void forget(const std::string& name) { files_.erase(name); }
+  void ignore_removed_file(const std::string& name) { files_.erase(name); }
 
   const std::filesystem::path& folder() const { return folder_; }
 
@@ -47,7 +47,7 @@ class WatchedFolder {
 
 /// Renames the folder of a finished run, CAPTURES/CAMERA, to CAPTURES/CAMERA.RUN, with its images.
 /// Throws InputError.
-void move_away(const std::filesystem::path& folder, const std::string& run);
+void rename_finished_folder(const std::filesystem::path& folder, const std::string& run);
 
 /// Run of a unit whose images arrive in CAPTURES/CAMERA/STEP/. One program at a time processes a
 /// camera.
@@ -70,7 +70,7 @@ class WatchedRun {
 
   /// Returns the record of a run whose program was killed after the verdict. The run is already
   /// published and moved away, and no images are left to process.
-  const std::optional<RunRecord>& finished() const { return finished_; }
+  const std::optional<RunRecord>& finished_record() const { return finished_; }
 
   struct Arrival {
     StationStep step;
@@ -79,11 +79,11 @@ class WatchedRun {
   };
   /// Processes changes, at most `max_images` images, and solves the steps that are complete.
   /// Returns the changes.
-  std::vector<Arrival> poll_changes(std::size_t max_images);
+  std::vector<Arrival> poll_folder_changes(std::size_t max_images);
 
-  /// Deletes the file of a rejected image; its rejection remains (Unit::discard). Throws InputError
-  /// if it cannot be deleted.
-  void discard(StationStep step, const std::string& image);
+  /// Deletes the file of a rejected image; its rejection remains (Unit::discard_image()). Throws
+  /// InputError if it cannot be deleted.
+  void discard_image(StationStep step, const std::string& image);
 
   const std::string& run() const { return run_; }
   const std::filesystem::path& folder() const { return folder_; }
@@ -92,9 +92,10 @@ class WatchedRun {
   }
 
   /// Marks the run as stored. It is not judged again afterwards, even if the records are offline.
-  void mark_stored() const;
-  /// Renames the folder by move_away(). Throws InputError also if its path leads elsewhere by now.
-  void move_away() const;
+  void mark_run_stored() const;
+  /// Renames the folder by rename_finished_folder(). Throws InputError also if its path leads
+  /// elsewhere by now.
+  void rename_finished_folder() const;
 
  private:
   struct Step {
@@ -106,7 +107,7 @@ class WatchedRun {
     std::string tables = {};
   };
   void begin(Spool& spool);
-  bool read_state();
+  bool read_run_state();
 
   Unit& unit_;
   std::filesystem::path folder_;

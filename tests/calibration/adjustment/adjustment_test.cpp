@@ -20,11 +20,11 @@ std::vector<int> moved_lamps(const AdjustmentResult& result) {
   return ids;
 }
 
-TEST(AdjustCaptures, ReturnsExactResultWithoutNoise) {
+TEST(RunBundleAdjustment, ReturnsExactResultWithoutNoise) {
   Survey survey;
   survey.five_places(1e-4);
   survey.stand({{0.2, -0.1, 0}, 2.0});
-  const AdjustmentResult found = adjust_captures(survey.input);
+  const AdjustmentResult found = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(found.ok()) << found.undetermined;
   EXPECT_EQ(found.captures, 61);
   EXPECT_THAT(found.center.zenith_in_camera,
@@ -41,13 +41,13 @@ TEST(AdjustCaptures, ReturnsExactResultWithoutNoise) {
   EXPECT_TRUE(moved_lamps(found).empty());
 }
 
-TEST(AdjustCaptures, RefinesMapWithMillimeterOrCentimeterErrors) {
+TEST(RunBundleAdjustment, RefinesMapWithMillimeterOrCentimeterErrors) {
   for (const double sd_m : {0.002, 0.02}) {
     Random random(3);
     Survey survey(sd_m);
     survey.five_places(1e-4);
     survey.add_noise(random, true, true, true);
-    const AdjustmentResult found = adjust_captures(survey.input);
+    const AdjustmentResult found = run_bundle_adjustment(survey.input);
     ASSERT_TRUE(found.ok()) << found.undetermined;
     ASSERT_EQ(found.refined.lamps.size(), 8U);
     ASSERT_EQ(found.lamps.size(), 8U);
@@ -65,14 +65,14 @@ TEST(AdjustCaptures, RefinesMapWithMillimeterOrCentimeterErrors) {
   }
 }
 
-TEST(AdjustCaptures, DetectsLampMovedByCentimeters) {
+TEST(RunBundleAdjustment, DetectsLampMovedByCentimeters) {
   for (const double by_m : {0.01, 0.03}) {
     Random random(4);
     Survey survey(0.001);
     survey.five_places(1e-4);
     survey.add_noise(random, true, true, true);
     survey.input.lamps.lamps[1].position_m.x() += by_m;
-    const AdjustmentResult found = adjust_captures(survey.input);
+    const AdjustmentResult found = run_bundle_adjustment(survey.input);
     ASSERT_TRUE(found.ok());
     EXPECT_EQ(moved_lamps(found), std::vector<int>{2});
     EXPECT_THAT(survey.misplaced(1, found.refined), IsNear(Eigen::Vector3d(0, 0, 0), 5e-4));
@@ -80,7 +80,7 @@ TEST(AdjustCaptures, DetectsLampMovedByCentimeters) {
 }
 
 /// Survey with sd 0.5 mm, pixel noise as in real captures.
-TEST(AdjustCaptures, DetectsAnyLampMovedByThreeMillimeters) {
+TEST(RunBundleAdjustment, DetectsAnyLampMovedByThreeMillimeters) {
   for (std::size_t moved = 0; moved < 8; ++moved) {
     Random random(50 + moved);
     Survey survey(0.0005);
@@ -89,19 +89,19 @@ TEST(AdjustCaptures, DetectsAnyLampMovedByThreeMillimeters) {
     survey.add_noise(random, true, true, true);
     survey.input.lamps.lamps[moved].position_m.head<2>() =
         survey.truth.map.lamps[moved].position_m.head<2>() + Eigen::Vector2d(0.0024, -0.0018);
-    const AdjustmentResult found = adjust_captures(survey.input);
+    const AdjustmentResult found = run_bundle_adjustment(survey.input);
     ASSERT_TRUE(found.ok());
     EXPECT_EQ(moved_lamps(found), std::vector<int>{static_cast<int>(moved) + 1});
     EXPECT_THAT(survey.misplaced(moved, found.refined), IsNear(Eigen::Vector3d(0, 0, 0), 5e-4));
   }
 }
 
-TEST(AdjustCaptures, KeepsOtherLampsExactWhenOneMoved) {
+TEST(RunBundleAdjustment, KeepsOtherLampsExactWhenOneMoved) {
   Survey survey(0.001);
   survey.turn({0, 0, 0}, 12);
   survey.turn({0.3, 0.1, 0.3}, 12);
   survey.input.lamps.lamps[4].position_m += Eigen::Vector3d(0.02, -0.02, 0);
-  const AdjustmentResult found = adjust_captures(survey.input);
+  const AdjustmentResult found = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(found.ok()) << found.undetermined;
   ASSERT_EQ(found.refined.lamps.size(), 8U);
   EXPECT_EQ(moved_lamps(found), std::vector<int>{5});
@@ -112,51 +112,51 @@ TEST(AdjustCaptures, KeepsOtherLampsExactWhenOneMoved) {
   EXPECT_THAT(found.notes, testing::Contains(HasSubstr("0 known positions")));
 }
 
-TEST(AdjustCaptures, ReportsMissingSecondHeight) {
+TEST(RunBundleAdjustment, ReportsMissingSecondHeight) {
   Survey survey;
   survey.turn({0, 0, 0}, 1);
   survey.input.captures[0].detections.resize(2);
-  EXPECT_THAT(adjust_captures(survey.input).undetermined, HasSubstr("a second height"));
+  EXPECT_THAT(run_bundle_adjustment(survey.input).undetermined, HasSubstr("a second height"));
   survey.turn({0, 0, 0.3}, 12);
-  const AdjustmentResult found = adjust_captures(survey.input);
+  const AdjustmentResult found = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(found.ok()) << found.undetermined;
   ASSERT_TRUE(found.center.lever_arm_m);
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-6));
 }
 
-TEST(AdjustCaptures, DetectsWrongKnownPosition) {
+TEST(RunBundleAdjustment, DetectsWrongKnownPosition) {
   Survey survey;
   survey.five_places(1e-4);
   for (auto& capture : survey.input.captures) {
     if (capture.spot == "spot-24") capture.place->xy_m.x() += 0.02;
   }
-  const AdjustmentResult found = adjust_captures(survey.input);
+  const AdjustmentResult found = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(found.ok());
   ASSERT_EQ(found.places.size(), 5U);
   for (const auto& place : found.places) EXPECT_EQ(place.wrong, place.name == "spot-24");
   EXPECT_THAT(found.places[2].residual_m, IsNear(Eigen::Vector3d(-0.02, 0, 0), 1e-6));
 }
 
-TEST(AdjustCaptures, DetectsLensContradictingItsCovariance) {
+TEST(RunBundleAdjustment, DetectsLensContradictingItsCovariance) {
   Survey survey(0.001);
   Camera& camera = survey.input.calibration.camera;
   const Eigen::MatrixXd covariance = lens_covariance(camera, 0.2, 6);
   survey.input.calibration.intrinsics_report =
       IntrinsicsReport{40, 1000, 0, 0.2, {}, {}, covariance};
   survey.five_places(1e-4);
-  const AdjustmentResult right = adjust_captures(survey.input);
+  const AdjustmentResult right = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(right.ok());
   EXPECT_FALSE(right.lens_contradicted);
   EXPECT_LT(right.lens_chi_squared, 1e-3);
   camera.intrinsics[0] += 30 * std::sqrt(covariance(0, 0));
-  const AdjustmentResult wrong = adjust_captures(survey.input);
+  const AdjustmentResult wrong = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(wrong.ok());
   EXPECT_TRUE(wrong.lens_contradicted) << wrong.lens_chi_squared << " of " << wrong.lens_freedom;
 }
 
-TEST(MakeLensCovariance, MatchesImageDisplacement) {
+TEST(MakeNominalIntrinsicsCovariance, MatchesImageDisplacement) {
   const Camera camera{"", {800, 600}, LensModel::pinhole, {500, 400, 399.5, 299.5}, {}, {}, {}};
-  const MatrixX covariance = make_lens_covariance(camera, 3);
+  const MatrixX covariance = make_nominal_intrinsics_covariance(camera, 3);
   // Rays evenly over the image: (u - cx) / fx has the mean square (800^2 - 50^2) / 12 / 500^2.
   const double x = (640000 - 2500) / 12.0 / 250000, y = (360000 - 37.5 * 37.5) / 12.0 / 160000;
   // An error that displaces one axis alone has half the mean square over both axes.
@@ -168,7 +168,7 @@ TEST(MakeLensCovariance, MatchesImageDisplacement) {
 }
 
 /// Lens of another camera: focal lengths 4 % too small, different distortion.
-TEST(AdjustCaptures, EstimatesLensOfUnknownUncertainty) {
+TEST(RunBundleAdjustment, EstimatesLensOfUnknownUncertainty) {
   Random random(8);
   Survey survey(0.002);
   Camera& camera = survey.input.calibration.camera;
@@ -180,8 +180,9 @@ TEST(AdjustCaptures, EstimatesLensOfUnknownUncertainty) {
   camera.intrinsics[2] += 5;
   camera.intrinsics[4] += 0.03;
   survey.input.calibration.intrinsics_report.emplace();
-  survey.input.calibration.intrinsics_report->covariance = make_lens_covariance(camera, 10);
-  const AdjustmentResult found = adjust_captures(survey.input);
+  survey.input.calibration.intrinsics_report->covariance =
+      make_nominal_intrinsics_covariance(camera, 10);
+  const AdjustmentResult found = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(found.ok()) << found.undetermined;
   ASSERT_TRUE(found.center.lever_arm_m);
   ASSERT_EQ(found.lamps.size(), 8U);
@@ -196,35 +197,35 @@ TEST(AdjustCaptures, EstimatesLensOfUnknownUncertainty) {
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 2e-4));
 }
 
-TEST(AdjustCaptures, RejectsMisidentifiedDetections) {
+TEST(RunBundleAdjustment, RejectsMisidentifiedDetections) {
   Survey survey;
   survey.five_places(1e-4);
   std::swap(survey.input.captures[7].detections[0].lamp,
             survey.input.captures[7].detections[3].lamp);
-  const AdjustmentResult found = adjust_captures(survey.input);
+  const AdjustmentResult found = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(found.ok());
   ASSERT_TRUE(found.center.lever_arm_m);
   EXPECT_EQ(found.rejected_detections, 2);
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-7));
 }
 
-TEST(AdjustCaptures, ReturnsIdenticalResultWhenRepeated) {
+TEST(RunBundleAdjustment, ReturnsIdenticalResultWhenRepeated) {
   Random random(5);
   Survey survey(0.002);
   survey.five_places(1e-4);
   survey.add_noise(random, true, true, true);
-  const AdjustmentResult once = adjust_captures(survey.input);
+  const AdjustmentResult once = run_bundle_adjustment(survey.input);
   const std::vector<double> elsewhere(12345);  // other addresses
-  const AdjustmentResult again = adjust_captures(survey.input);
+  const AdjustmentResult again = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(once.ok()) << once.undetermined;
   EXPECT_EQ(once.refined_covariance, again.refined_covariance);
   EXPECT_EQ(once.center.zenith_in_camera, again.center.zenith_in_camera);
 }
 
-TEST(AdjustCaptures, ReportsNoUsableCapture) {
+TEST(RunBundleAdjustment, ReportsNoUsableCapture) {
   Survey survey;
   survey.input.captures.push_back({"alone", {{1, {400, 300}, 0.1}}});
-  const AdjustmentResult found = adjust_captures(survey.input);
+  const AdjustmentResult found = run_bundle_adjustment(survey.input);
   EXPECT_THAT(found.undetermined, HasSubstr("two lamps"));
   EXPECT_EQ(found.rejected_captures, 1);
 }

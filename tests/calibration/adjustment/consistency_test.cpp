@@ -23,7 +23,7 @@ struct Case {
   bool refined;
 };
 
-class AdjustCapturesCovariance : public testing::TestWithParam<Case> {};
+class RunBundleAdjustmentCovariance : public testing::TestWithParam<Case> {};
 
 /// Calibration and the map that belongs to it, from one survey.
 struct Unit {
@@ -36,10 +36,10 @@ Unit calibrated(Survey& survey, const Case& the, Random& random) {
   if (the.lens == Case::boards) {
     draw_lens(calibration, lens_covariance(calibration.camera, 0.1, 8), random);
   } else if (the.lens == Case::elsewhere) {
-    draw_lens(calibration, make_lens_covariance(calibration.camera, 3), random);
+    draw_lens(calibration, make_nominal_intrinsics_covariance(calibration.camera, 3), random);
   }
   survey.add_noise(random, true, true, true);
-  const AdjustmentResult found = adjust_captures(survey.input);
+  const AdjustmentResult found = run_bundle_adjustment(survey.input);
   EXPECT_TRUE(found.ok()) << found.undetermined;
   const LampMap map = the.refined ? found.refined : survey.input.lamps;
   Adjustment adjustment{{},
@@ -54,7 +54,7 @@ Unit calibrated(Survey& survey, const Case& the, Random& random) {
   return {with_adjustment(result, found.center, adjustment, {}), map};
 }
 
-TEST_P(AdjustCapturesCovariance, YieldsConsistentFixCovariances) {
+TEST_P(RunBundleAdjustmentCovariance, YieldsConsistentFixCovariances) {
   const Case& the = GetParam();
   constexpr int trials = 200;
   Random random(20 + static_cast<std::uint64_t>(the.places));
@@ -93,7 +93,7 @@ TEST_P(AdjustCapturesCovariance, YieldsConsistentFixCovariances) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Adjustment, AdjustCapturesCovariance,
+    Adjustment, RunBundleAdjustmentCovariance,
     testing::Values(Case{"GoodMapOnePlace", 1e-4, 1, Case::exact, true},
                     Case{"TapedMapThreePlaces", 2e-3, 3, Case::exact, true},
                     Case{"TapedMapOnePlaceAndLens", 2e-3, 1, Case::boards, true},

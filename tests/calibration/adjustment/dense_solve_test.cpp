@@ -25,7 +25,7 @@ Survey small_survey(double map_sd_m, bool lens, Random& random) {
   survey.turn({-0.4, -0.2, 0}, 4, 2e-4);
   survey.turn({0.4, 0.2, 0.2}, 5);
   survey.stand({{0.1, -0.2, 0.1}, 1.2});
-  survey.input.captures.back().place = KnownPlace{PlaceOf::camera, {0.1, -0.2}, 0.1, 3e-4};
+  survey.input.captures.back().place = KnownPosition{PlaceOf::camera, {0.1, -0.2}, 0.1, 3e-4};
   survey.truth.inclination = Inclination{0.03, -0.02};
   survey.stand({{-0.2, 0.1, 0}, -2});
   survey.input.captures.back().inclination = survey.truth.inclination;
@@ -211,12 +211,12 @@ struct Known {
   double map_sd_m;
   bool lens;
 };
-class AdjustCapturesReference : public testing::TestWithParam<Known> {};
+class RunBundleAdjustmentReference : public testing::TestWithParam<Known> {};
 
-TEST_P(AdjustCapturesReference, MatchesDenseLeastSquares) {
+TEST_P(RunBundleAdjustmentReference, MatchesDenseLeastSquares) {
   Random random(31);
   const Survey survey = small_survey(GetParam().map_sd_m, GetParam().lens, random);
-  const AdjustmentResult found = adjust_captures(survey.input);
+  const AdjustmentResult found = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(found.ok()) << found.undetermined;
   ASSERT_EQ(found.rejected_detections, 0);
   ASSERT_EQ(found.noise_scale, 1);
@@ -250,7 +250,7 @@ TEST_P(AdjustCapturesReference, MatchesDenseLeastSquares) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Adjustment, AdjustCapturesReference,
+INSTANTIATE_TEST_SUITE_P(Adjustment, RunBundleAdjustmentReference,
                          testing::Values(Known{"ExactMap", 0, false},
                                          Known{"RefinedMap", 2e-3, false},
                                          Known{"ExactMapAndLens", 0, true},
@@ -266,7 +266,7 @@ class AdjustmentDerivatives : public testing::Test {
                             LensParametrization(camera, lens_covariance(camera, 0.1, 6)), 2, 1};
 
   AdjustmentDerivatives() {
-    const AdjustmentLayout& at = problem.layout();
+    const AdjustmentLayout& at = problem.parameter_layout();
     problem.lamps = {{{0.4, 0.3, 1.6}, 0.001}, {{-0.5, 0.2, 1.5}, 0.001}};
     KnownMotion motion;
     motion.yaw_rate_rad_per_s = 1.5;
@@ -276,12 +276,13 @@ class AdjustmentDerivatives : public testing::Test {
     motion.velocity_sd_m_per_s = 0.2;
     problem.add_capture({{}, level_from_inclination({0.05, -0.04}).transpose(), motion},
                         {{0.1, -0.2, 0.1}, -2});
-    Eigen::VectorXd& state = problem.state();
+    Eigen::VectorXd& state = problem.state_vector();
     for (Eigen::Index i = 0; i < at.lens_size; ++i) state[i] = 0.1 * static_cast<double>(i % 3);
     state.segment<2>(at.zenith) << 0.03, -0.02;
     state.segment<2>(at.lever_arm) << 0.009, -0.004;
-    for (std::size_t i = 0; i < 2; ++i) state.segment<3>(at.lamp(i)) = problem.lamps[i].surveyed_m;
-    state.segment<3>(at.spot(0)) << -0.1, 0.1, 0.05;
+    for (std::size_t i = 0; i < 2; ++i)
+      state.segment<3>(at.lamp_state_index(i)) = problem.lamps[i].surveyed_m;
+    state.segment<3>(at.pivot_state_index(0)) << -0.1, 0.1, 0.05;
   }
 
   /// Differentiates `value` numerically with respect to the unknowns [first, first + size).
@@ -291,7 +292,7 @@ class AdjustmentDerivatives : public testing::Test {
     Eigen::MatrixXd result(value().size(), size);
     for (Eigen::Index i = 0; i < size; ++i) {
       constexpr double step = 1e-6;
-      double& unknown = problem.state()[first + i];
+      double& unknown = problem.state_vector()[first + i];
       const double start = unknown;
       unknown = start + step;
       const Eigen::VectorXd more = value();
@@ -304,7 +305,7 @@ class AdjustmentDerivatives : public testing::Test {
 };
 
 TEST_F(AdjustmentDerivatives, LinearizeMatchesFiniteDifferences) {
-  const AdjustmentLayout& at = problem.layout();
+  const AdjustmentLayout& at = problem.parameter_layout();
   for (const std::size_t capture : {0U, 1U}) {
     for (const std::size_t lamp : {0U, 1U}) {
       const AdjustmentProblem::Sighting sighting{
@@ -315,8 +316,8 @@ TEST_F(AdjustmentDerivatives, LinearizeMatchesFiniteDifferences) {
       const auto found = problem.linearize(sighting, problem.lens().value());
       ASSERT_TRUE(found);
       const Eigen::Index local = problem.captures[capture].local;
-      std::vector<Eigen::Index> blocks{local, at.zenith, at.lamp(lamp), at.lens};
-      if (capture == 0) blocks.insert(blocks.begin() + 1, {at.spot(0), at.lever_arm});
+      std::vector<Eigen::Index> blocks{local, at.zenith, at.lamp_state_index(lamp), at.lens};
+      if (capture == 0) blocks.insert(blocks.begin() + 1, {at.pivot_state_index(0), at.lever_arm});
       ASSERT_EQ(found->parts.size(), blocks.size());
       for (std::size_t i = 0; i < blocks.size(); ++i) {
         const auto& [first, jacobian] = found->parts[i];
@@ -328,18 +329,19 @@ TEST_F(AdjustmentDerivatives, LinearizeMatchesFiniteDifferences) {
   }
 }
 
-TEST_F(AdjustmentDerivatives, RotateByZenithMatchesFiniteDifferences) {
+TEST_F(AdjustmentDerivatives, RotateLevelPointToCameraMatchesFiniteDifferences) {
   const Eigen::Vector3d x(0.3, -0.5, 1.2);
   Eigen::Vector2d zenith(0.2, -0.1);
-  const ZenithRotation turn = rotate_by_zenith(zenith, x);
+  const ZenithRotation turn = rotate_level_point_to_camera(zenith, x);
   EXPECT_THAT(turn.x_in_camera,
               IsNear(level_from_zenith(zenith.homogeneous()).transpose() * x, 1e-15));
   EXPECT_THAT(turn.camera_from_level * x, IsNear(turn.x_in_camera, 1e-15));
   for (int i = 0; i < 2; ++i) {
     const Eigen::Vector2d step = 1e-6 * Eigen::Vector2d::Unit(i);
-    const Eigen::Vector3d difference = (rotate_by_zenith(zenith + step, x).x_in_camera -
-                                        rotate_by_zenith(zenith - step, x).x_in_camera) /
-                                       2e-6;
+    const Eigen::Vector3d difference =
+        (rotate_level_point_to_camera(zenith + step, x).x_in_camera -
+         rotate_level_point_to_camera(zenith - step, x).x_in_camera) /
+        2e-6;
     EXPECT_THAT(turn.jacobian_wrt_zenith.col(i), IsNear(difference, 1e-9));
   }
 }

@@ -28,7 +28,7 @@ AdjustmentInput tracked_drive(const BodyRig& rig, const MovingCaptures& captures
     AdjustmentCapture capture{captures.frames[i].image, captures.frames[i].detections};
     Eigen::Vector3d arm_m(kArm_m.x(), kArm_m.y(), 0);
     const Eigen::Vector3d axis_m = camera.position_m - rotation_about_z(camera.yaw_rad) * arm_m;
-    capture.place = KnownPlace{PlaceOf::axis, axis_m.head<2>(), axis_m.z(), kPlaceSd_m};
+    capture.place = KnownPosition{PlaceOf::axis, axis_m.head<2>(), axis_m.z(), kPlaceSd_m};
     if (!motions.empty()) capture.motion = motions[i];
     input.captures.push_back(capture);
   }
@@ -38,28 +38,30 @@ AdjustmentInput tracked_drive(const BodyRig& rig, const MovingCaptures& captures
 /// Returns the errors of zenith point and lever arm.
 Eigen::Vector4d compute_error(const AdjustmentResult& found, const BodyRig& rig) {
   Eigen::Vector4d error;
-  error << zenith_point(found.center) - zenith_point(*rig.calibration.rotation_center),
+  error << normalized_zenith_point(found.center) -
+               normalized_zenith_point(*rig.calibration.rotation_center),
       found.center.lever_arm_m.value() - kArm_m;
   return error;
 }
 
-TEST(AdjustCaptures, ReturnsExactResultForMovingCamera) {
+TEST(RunBundleAdjustment, ReturnsExactResultForMovingCamera) {
   Random random(1);
   const BodyRig rig = make_tilted_body();
   const MovingCaptures captures = make_moving_captures(rig, 16, 2, random, 1e-3);
-  const AdjustmentResult known = adjust_captures(tracked_drive(rig, captures, captures.motions));
+  const AdjustmentResult known =
+      run_bundle_adjustment(tracked_drive(rig, captures, captures.motions));
   ASSERT_TRUE(known.ok()) << known.undetermined;
   ASSERT_TRUE(known.center.lever_arm_m);
   EXPECT_THAT(compute_error(known, rig), IsNear(Eigen::Vector4d(0, 0, 0, 0), 1e-9));
   EXPECT_LT(known.residual_px, 1e-8);
   const std::vector<KnownMotion> unknown(16, KnownMotion::up_to(1e3, 1e3));
-  const AdjustmentResult found = adjust_captures(tracked_drive(rig, captures, unknown));
+  const AdjustmentResult found = run_bundle_adjustment(tracked_drive(rig, captures, unknown));
   ASSERT_TRUE(found.ok()) << found.undetermined;
   EXPECT_THAT(compute_error(found, rig), IsNear(Eigen::Vector4d(0, 0, 0, 0), 1e-8));
 }
 
 /// Rotation in place without stops.
-TEST(AdjustCaptures, ReturnsAccurateResultForRotatingCamera) {
+TEST(RunBundleAdjustment, ReturnsAccurateResultForRotatingCamera) {
   BodyRig rig = make_tilted_body();
   const double rate_rad_per_s = 2;
   const auto turned = [&](double stated_rad_per_s) {
@@ -80,7 +82,7 @@ TEST(AdjustCaptures, ReturnsAccurateResultForRotatingCamera) {
         input.captures.push_back(capture);
       }
     }
-    const AdjustmentResult found = adjust_captures(input);
+    const AdjustmentResult found = run_bundle_adjustment(input);
     EXPECT_TRUE(found.ok()) << found.undetermined;
     return found;
   };
@@ -90,13 +92,14 @@ TEST(AdjustCaptures, ReturnsAccurateResultForRotatingCamera) {
   EXPECT_GT(turned(0).residual_px, 1) << "two degrees from the first row to the last";
 }
 
-TEST(AdjustCaptures, CountsIgnoredMotionAsNoise) {
+TEST(RunBundleAdjustment, CountsIgnoredMotionAsNoise) {
   Random random(2);
   const BodyRig rig = make_tilted_body();
   MovingCaptures captures = make_moving_captures(rig, 16, 1, random, 0.05);
   for (Frame& frame : captures.frames) frame.detections = with_noise(frame.detections, random);
-  const AdjustmentResult known = adjust_captures(tracked_drive(rig, captures, captures.motions));
-  const AdjustmentResult left_out = adjust_captures(tracked_drive(rig, captures, {}));
+  const AdjustmentResult known =
+      run_bundle_adjustment(tracked_drive(rig, captures, captures.motions));
+  const AdjustmentResult left_out = run_bundle_adjustment(tracked_drive(rig, captures, {}));
   ASSERT_TRUE(known.ok() && left_out.ok());
   EXPECT_FALSE(known.noise_is_contradicted);
   EXPECT_GT(left_out.noise_scale, 5);
@@ -106,7 +109,7 @@ TEST(AdjustCaptures, CountsIgnoredMotionAsNoise) {
 
 /// Mean normalized squared error e' cov^-1 e of zenith and lever arm per unknown; 60 draws
 /// determine it to 10 %.
-TEST(AdjustCaptures, ReportsConsistentCovarianceForMovingCamera) {
+TEST(RunBundleAdjustment, ReportsConsistentCovarianceForMovingCamera) {
   constexpr int draws = 60;
   const BodyRig rig = make_tilted_body();
   for (const bool odometry : {true, false}) {
@@ -126,7 +129,7 @@ TEST(AdjustCaptures, ReportsConsistentCovarianceForMovingCamera) {
           for (double& one : capture.place->xy_m) one += kPlaceSd_m * random.normal();
           *capture.place->z_m += kPlaceSd_m * random.normal();
         }
-        const AdjustmentResult found = adjust_captures(input);
+        const AdjustmentResult found = run_bundle_adjustment(input);
         EXPECT_TRUE(found.ok() && found.center.lever_arm_m) << found.undetermined;
         const Eigen::Index zenith = std::ssize(rig.calibration.camera.intrinsics);
         const Eigen::Matrix4d covariance = found.refined_covariance.block<4, 4>(zenith, zenith);

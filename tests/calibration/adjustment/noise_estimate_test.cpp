@@ -34,7 +34,7 @@ std::ostream& operator<<(std::ostream& out, const PlaceCase& variant) {
   return out << variant.name;
 }
 
-class AdjustCapturesNoise : public testing::TestWithParam<PlaceCase> {};
+class RunBundleAdjustmentNoise : public testing::TestWithParam<PlaceCase> {};
 
 /// Returns 30 captures of four lamps each: residuals have few degrees of freedom, and known
 /// positions many.
@@ -52,7 +52,7 @@ Survey make_survey(const PlaceCase& variant, Random& random) {
     survey.stand({position_m, random.uniform(-3, 3)});
     if (variant.place_sd_m > 0) {
       survey.input.captures.back().place =
-          KnownPlace{PlaceOf::camera, position_m.head<2>(), position_m.z(), variant.place_sd_m};
+          KnownPosition{PlaceOf::camera, position_m.head<2>(), position_m.z(), variant.place_sd_m};
     }
   }
   for (auto& capture : survey.input.captures) {
@@ -73,7 +73,7 @@ Survey make_survey(const PlaceCase& variant, Random& random) {
 
 /// 150 runs determine the rms of 2 x 150 zenith coordinates to 4 %; the noise of one run is
 /// determined to 9 % by 60 degrees of freedom, its mean to 0.7 %.
-TEST_P(AdjustCapturesNoise, MatchesTrueNoiseForAnyKnownPositions) {
+TEST_P(RunBundleAdjustmentNoise, MatchesTrueNoiseForAnyKnownPositions) {
   const PlaceCase& variant = GetParam();
   constexpr int runs = 150;
   Random random(61);
@@ -81,7 +81,7 @@ TEST_P(AdjustCapturesNoise, MatchesTrueNoiseForAnyKnownPositions) {
   int count = 0;
   for (int run = 0; run < runs; ++run) {
     const Survey survey = make_survey(variant, random);
-    const AdjustmentResult found = adjust_captures(survey.input);
+    const AdjustmentResult found = run_bundle_adjustment(survey.input);
     ASSERT_TRUE(found.ok()) << found.undetermined;
     const auto& truth = *survey.truth.calibration.rotation_center;
     ASSERT_TRUE(found.center.covariance);
@@ -99,7 +99,7 @@ TEST_P(AdjustCapturesNoise, MatchesTrueNoiseForAnyKnownPositions) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Places, AdjustCapturesNoise,
+    Places, RunBundleAdjustmentNoise,
     testing::Values(PlaceCase{"None", 0, false, false, PlaceOf::camera, {}},
                     PlaceCase{"Coarse", 0.05, false, false, PlaceOf::camera, {}},
                     PlaceCase{"CoarseWithHeight", 0.05, true, false, PlaceOf::camera, {}},

@@ -55,9 +55,10 @@ class RenderedDriveCalibration : public testing::Test {
       motion.velocity_m_per_s =
           speed_m_per_s * Eigen::Vector2d(std::cos(direction_rad), std::sin(direction_rad));
       motion.turn_rate_rad_per_s = speed_m_per_s > 0 ? rate_rad_per_s : 0;
-      const cv::Mat image = expose(scene.sensor, renderer.lamp_electrons(shot), shot.noise_seed);
+      const cv::Mat image =
+          simulate_sensor(scene.sensor, renderer.render_lamp_electrons(shot), shot.noise_seed);
       Frame frame{std::to_string(i), {}};
-      for (const Light& light : detector.detect(image_view(image))) {
+      for (const Light& light : detector.detect(to_image_view(image))) {
         if (light.kind != LightKind::lamp) continue;
         frame.detections.push_back({*light.lamp, light.pixel, light.sigma_px});
       }
@@ -101,11 +102,11 @@ class RenderedDriveCalibration : public testing::Test {
     for (std::size_t i = 0; i < drive.frames.size(); ++i) {
       const Eigen::Vector3d& place_m = drive.places_m[i];
       AdjustmentCapture capture{drive.frames[i].image, drive.frames[i].detections};
-      capture.place = KnownPlace{PlaceOf::axis, place_m.head<2>(), place_m.z(), kPlaceSd_m};
+      capture.place = KnownPosition{PlaceOf::axis, place_m.head<2>(), place_m.z(), kPlaceSd_m};
       if (!motions.empty()) capture.motion = motions[i];
       input.captures.push_back(capture);
     }
-    const AdjustmentResult found = adjust_captures(input);
+    const AdjustmentResult found = run_bundle_adjustment(input);
     EXPECT_TRUE(found.ok() && found.center.lever_arm_m) << found.undetermined;
     if (!found.center.lever_arm_m) return {};
     return {zenith_error(found.center), zenith_sd(found.center),

@@ -39,7 +39,7 @@ void Survey::turn(const Eigen::Vector3d& axis_m, int captures, double place_sd_m
     capture.spot = spot;
     if (place_sd_m > 0) {
       const Eigen::Vector3d stated_m = of == PlaceOf::axis ? axis_m : truth.camera.position_m;
-      capture.place = KnownPlace{of, stated_m.head<2>(), stated_m.z(), place_sd_m};
+      capture.place = KnownPosition{of, stated_m.head<2>(), stated_m.z(), place_sd_m};
     }
     input.captures.push_back(capture);
   }

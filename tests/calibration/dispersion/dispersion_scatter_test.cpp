@@ -23,7 +23,8 @@ constexpr double kStationTolerance = 0.09;
 void expect_consistent(const Station& station, const std::vector<ReferencePointCapture>& exact,
                        DispersionMethod method, bool stated) {
   Random random(41);
-  const auto reference = fit_dispersion(exact, station.rig.map, station.believed, method);
+  const auto reference =
+      estimate_heading_dependent_offset(exact, station.rig.map, station.believed, method);
   ASSERT_EQ(reference.status, DispersionStatus::ok);
   Eigen::Array4d scatter = Eigen::Array4d::Zero(), reported = scatter;
   const bool world = method == DispersionMethod::camera;
@@ -35,7 +36,8 @@ void expect_consistent(const Station& station, const std::vector<ReferencePointC
         if (!stated) detection.sigma_px.reset();
       }
     }
-    const auto fit = fit_dispersion(captures, station.rig.map, station.believed, method);
+    const auto fit =
+        estimate_heading_dependent_offset(captures, station.rig.map, station.believed, method);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     Eigen::Array4d error = Eigen::Array4d::Zero(), variance = error;
     error.head<2>() = fit.dispersion.offset_px - reference.dispersion.offset_px;
@@ -54,26 +56,26 @@ void expect_consistent(const Station& station, const std::vector<ReferencePointC
   }
 }
 
-TEST(FitDispersion, CovarianceMatchesScatter) {
+TEST(EstimateHeadingDependentOffset, CovarianceMatchesScatter) {
   Station station(0.01);
   const auto exact = station.captures(16, true, {0.003, 0.001}, 0.1);
   expect_consistent(station, exact, DispersionMethod::camera, true);
 }
 
-TEST(FitDispersion, CovarianceMatchesScatterWithoutGivenNoise) {
+TEST(EstimateHeadingDependentOffset, CovarianceMatchesScatterWithoutGivenNoise) {
   Station station(0.01);
   const auto exact = station.captures(16, true, {0.003, 0.001}, 0.1);
   expect_consistent(station, exact, DispersionMethod::camera, false);
 }
 
-TEST(FitDispersion, CovarianceMatchesScatterFor135Degrees) {
+TEST(EstimateHeadingDependentOffset, CovarianceMatchesScatterFor135Degrees) {
   Station station(0.01);
   auto exact = station.captures(24, true, {0.003, 0.001}, 0.1);
   exact.resize(10);
   expect_consistent(station, exact, DispersionMethod::camera, true);
 }
 
-TEST(FitDispersion, PaperMethodCovarianceMatchesScatter) {
+TEST(EstimateHeadingDependentOffset, PaperMethodCovarianceMatchesScatter) {
   Station station(0.01);
   expect_consistent(station, station.captures_at(0.7, 30), DispersionMethod::paper, true);
 }
@@ -88,17 +90,17 @@ struct FewCaptures {
   double placement_sd_m;
 };
 
-class FitDispersionWithFewCaptures : public testing::TestWithParam<FewCaptures> {};
+class EstimateHeadingDependentOffsetWithFewCaptures : public testing::TestWithParam<FewCaptures> {};
 
 /// 600 draws of two axes determine an RMS to 3 % and the fraction of 5 % to 0.6 %. Few captures do
 /// not determine their scatter. The test therefore checks the 95 % interval, and that standard
 /// deviations are not too small.
-TEST_P(FitDispersionWithFewCaptures, PaperMethodCoversErrorAtReportedRate) {
+TEST_P(EstimateHeadingDependentOffsetWithFewCaptures, PaperMethodCoversErrorAtReportedRate) {
   const FewCaptures& few = GetParam();
   Station station(0.01);
   const auto exact = station.captures_at(0.7, few.count);
-  const auto reference =
-      fit_dispersion(exact, station.rig.map, station.believed, DispersionMethod::paper);
+  const auto reference = estimate_heading_dependent_offset(exact, station.rig.map, station.believed,
+                                                           DispersionMethod::paper);
   ASSERT_EQ(reference.status, DispersionStatus::ok);
   Random random(43);
   double squares = 0;
@@ -113,8 +115,8 @@ TEST_P(FitDispersionWithFewCaptures, PaperMethodCoversErrorAtReportedRate) {
         if (!few.noise_is_stated) detection.sigma_px.reset();
       }
     }
-    const auto fit =
-        fit_dispersion(captures, station.rig.map, station.believed, DispersionMethod::paper);
+    const auto fit = estimate_heading_dependent_offset(captures, station.rig.map, station.believed,
+                                                       DispersionMethod::paper);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     ASSERT_TRUE(fit.dispersion.covariance);
     EXPECT_EQ(fit.dispersion.captures, few.count);
@@ -135,7 +137,7 @@ TEST_P(FitDispersionWithFewCaptures, PaperMethodCoversErrorAtReportedRate) {
   EXPECT_LT(fraction, 0.07);
 }
 
-INSTANTIATE_TEST_SUITE_P(Paper, FitDispersionWithFewCaptures,
+INSTANTIATE_TEST_SUITE_P(Paper, EstimateHeadingDependentOffsetWithFewCaptures,
                          testing::Values(FewCaptures{"Two", 2, true, 0},
                                          FewCaptures{"Three", 3, true, 0},
                                          FewCaptures{"Eight", 8, true, 0},
@@ -174,14 +176,15 @@ std::vector<ReferencePointCapture> make_captures(Station& station, const Capture
   return made;
 }
 
-class FitDispersionUncertainty : public testing::TestWithParam<Captures> {};
+class EstimateHeadingDependentOffsetUncertainty : public testing::TestWithParam<Captures> {};
 
 /// 600 draws of two axes determine an RMS to 3 % and the fraction of 5 % to 0.6 %.
-TEST_P(FitDispersionUncertainty, CoversErrorAtReportedRate) {
+TEST_P(EstimateHeadingDependentOffsetUncertainty, CoversErrorAtReportedRate) {
   const Captures& cell = GetParam();
   Station station(0.01);
   const auto exact = make_captures(station, cell);
-  const auto truth = fit_dispersion(exact, station.rig.map, station.believed, cell.method);
+  const auto truth =
+      estimate_heading_dependent_offset(exact, station.rig.map, station.believed, cell.method);
   ASSERT_EQ(truth.status, DispersionStatus::ok);
   Random random(44);
   double squares = 0, world_squares = 0;
@@ -201,10 +204,11 @@ TEST_P(FitDispersionUncertainty, CoversErrorAtReportedRate) {
                                  : std::nullopt;
       }
     }
-    const auto fit = fit_dispersion(captures, surveyed, station.believed, cell.method);
+    const auto fit =
+        estimate_heading_dependent_offset(captures, surveyed, station.believed, cell.method);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     const auto covariance_px2 =
-        offset_covariance_with_map(fit.dispersion, station.believed.camera.focal_px());
+        compute_offset_covariance_with_map(fit.dispersion, station.believed.camera.focal_px());
     ASSERT_TRUE(covariance_px2);
     for (Eigen::Index axis = 0; axis < 2; ++axis) {
       const double error = fit.dispersion.offset_px[axis] - truth.dispersion.offset_px[axis];
@@ -238,7 +242,7 @@ TEST_P(FitDispersionUncertainty, CoversErrorAtReportedRate) {
 
 constexpr DispersionMethod kCamera = DispersionMethod::camera, kPaper = DispersionMethod::paper;
 INSTANTIATE_TEST_SUITE_P(
-    Captures, FitDispersionUncertainty,
+    Captures, EstimateHeadingDependentOffsetUncertainty,
     testing::Values(Captures{"PaperThreeUnderMapErrors", kPaper, 3, 2e-3, 1},
                     Captures{"PaperTwelveUnderMapErrors", kPaper, 12, 2e-3, 1},
                     Captures{"PaperTwelveUnderMapErrorsNoiseNotStated", kPaper, 12, 2e-3, {}},
@@ -327,7 +331,8 @@ TEST_P(PositionerAfterDispersion, ReportsConsistentCovariance) {
   for (int draw = 0; draw < draws; ++draw) {
     const LampMap surveyed = draw_survey(rig.map, random);
     const auto captures = draw_captures(rig, GetParam(), random);
-    const auto fit = fit_dispersion(captures, surveyed, station.believed, GetParam());
+    const auto fit =
+        estimate_heading_dependent_offset(captures, surveyed, station.believed, GetParam());
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     ASSERT_EQ(fit.dispersion.by_lamps.size(), 8U);
     Calibration calibration = station.believed;
@@ -368,12 +373,12 @@ INSTANTIATE_TEST_SUITE_P(Methods, PositionerAfterDispersion,
                            return method.param == DispersionMethod::camera ? "Camera" : "Paper";
                          });
 
-TEST(ComputeVarianceFactor, IncreasesContinuouslyWithResiduals) {
+TEST(ComputeSmallSampleVarianceFactor, IncreasesContinuouslyWithResiduals) {
   for (const double freedom : {2.0, 4.0, 8.0, 40.0}) {
     constexpr double step = 1.01;
-    double former = compute_variance_factor(0.1, freedom, true);
+    double former = compute_small_sample_variance_factor(0.1, freedom, true);
     for (double ratio = 0.1 * step; ratio < 20; ratio *= step) {
-      const double factor = compute_variance_factor(ratio, freedom, true);
+      const double factor = compute_small_sample_variance_factor(ratio, freedom, true);
       EXPECT_GE(factor, former);
       // At its steepest, the factor grows about with the sixth power of the ratio.
       EXPECT_LT(factor, 1.08 * former) << ratio;
@@ -382,17 +387,17 @@ TEST(ComputeVarianceFactor, IncreasesContinuouslyWithResiduals) {
   }
 }
 
-TEST(ComputeVarianceFactor, ReturnsResidualOrGivenVarianceForManyDegreesOfFreedom) {
+TEST(ComputeSmallSampleVarianceFactor, ReturnsResidualOrGivenVarianceForManyDegreesOfFreedom) {
   constexpr double many = 1e5;
-  EXPECT_NEAR(compute_variance_factor(0.5, many, false), 0.5, 1e-3);
-  EXPECT_NEAR(compute_variance_factor(2, many, false), 2, 1e-3);
-  EXPECT_DOUBLE_EQ(compute_variance_factor(0.5, many, true), 1);
-  EXPECT_NEAR(compute_variance_factor(2, many, true), 2, 1e-3);
+  EXPECT_NEAR(compute_small_sample_variance_factor(0.5, many, false), 0.5, 1e-3);
+  EXPECT_NEAR(compute_small_sample_variance_factor(2, many, false), 2, 1e-3);
+  EXPECT_DOUBLE_EQ(compute_small_sample_variance_factor(0.5, many, true), 1);
+  EXPECT_NEAR(compute_small_sample_variance_factor(2, many, true), 2, 1e-3);
 }
 
 /// Given noise equal to the true noise, 1.4 times too small, and absent. 20,000 draws determine the
 /// coverage to 0.15 %.
-TEST(ComputeVarianceFactor, CoversErrorsAtNominalRate) {
+TEST(ComputeSmallSampleVarianceFactor, CoversErrorsAtNominalRate) {
   struct FactorCase {
     double freedom, noise_ratio;
     bool is_stated;
@@ -414,7 +419,7 @@ TEST(ComputeVarianceFactor, CoversErrorsAtNominalRate) {
       }
       const double error = one.noise_ratio * random.normal();
       const double factor =
-          compute_variance_factor(squares / one.freedom, one.freedom, one.is_stated);
+          compute_small_sample_variance_factor(squares / one.freedom, one.freedom, one.is_stated);
       within += error * error <= 1.96 * 1.96 * factor ? 1 : 0;
     }
     const double coverage = static_cast<double>(within) / draws;

@@ -14,14 +14,14 @@
 namespace vlp {
 namespace {
 
-TEST(FitDispersion, SeparatesCameraAndWorldErrorsExactly) {
+TEST(EstimateHeadingDependentOffset, SeparatesCameraAndWorldErrorsExactly) {
   Random random(1);
   for (const double error_rad : {0.0, 0.005, 0.05}) {
     Station station(error_rad);
     const Eigen::Vector2d wrong_m(0.004, -0.003);
     const auto captures = station.captures(12, true, wrong_m);
-    const auto fit =
-        fit_dispersion(captures, station.rig.map, station.believed, DispersionMethod::camera);
+    const auto fit = estimate_heading_dependent_offset(captures, station.rig.map, station.believed,
+                                                       DispersionMethod::camera);
     ASSERT_EQ(fit.status, DispersionStatus::ok) << describe(fit.status);
     ASSERT_TRUE(fit.world_offset_m);
     EXPECT_THAT(*fit.world_offset_m, IsNear(wrong_m, 1e-9));
@@ -43,14 +43,14 @@ TEST(FitDispersion, SeparatesCameraAndWorldErrorsExactly) {
   }
 }
 
-TEST(FitDispersion, ReturnsOffsetOfShiftedCenter) {
+TEST(EstimateHeadingDependentOffset, ReturnsOffsetOfShiftedCenter) {
   Station station(0);
   station.believed.rotation_center.reset();
   station.rig.calibration.rotation_center.reset();
   station.rig.calibration.dispersion = vlp::Dispersion{{6, -4}, 0, {0, 0}, 1, {}};
   const auto captures = station.captures(12, true, {0, 0});
-  const auto fit =
-      fit_dispersion(captures, station.rig.map, station.believed, DispersionMethod::camera);
+  const auto fit = estimate_heading_dependent_offset(captures, station.rig.map, station.believed,
+                                                     DispersionMethod::camera);
   ASSERT_EQ(fit.status, DispersionStatus::ok);
   EXPECT_THAT(fit.dispersion.offset_px, IsNear(Eigen::Vector2d(6, -4), 1e-6));
   const double radius_m = 1.6 * std::hypot(6 / 520., 4 / 522.);
@@ -58,7 +58,7 @@ TEST(FitDispersion, ReturnsOffsetOfShiftedCenter) {
 }
 
 /// The paper's equations are exact for a shift and lamps of one height, at any yaw.
-TEST(FitDispersion, PaperMethodReturnsShiftAtOneYaw) {
+TEST(EstimateHeadingDependentOffset, PaperMethodReturnsShiftAtOneYaw) {
   for (const DispersionCircle circle : {DispersionCircle::mean, DispersionCircle::enclosing}) {
     Station station(0);
     station.believed.rotation_center.reset();
@@ -66,8 +66,8 @@ TEST(FitDispersion, PaperMethodReturnsShiftAtOneYaw) {
     station.rig.calibration.dispersion = vlp::Dispersion{{6, -4}, 0, {0, 0}, 1, {}};
     for (const double yaw_rad : {0.0, 2.0, -1.0}) {
       const auto captures = station.captures_at(yaw_rad, 5);
-      const auto fit = fit_dispersion(captures, station.rig.map, station.believed,
-                                      DispersionMethod::paper, circle);
+      const auto fit = estimate_heading_dependent_offset(
+          captures, station.rig.map, station.believed, DispersionMethod::paper, circle);
       ASSERT_EQ(fit.status, DispersionStatus::ok);
       EXPECT_FALSE(fit.world_offset_m.has_value());
       // Fixes of many lamps have weights by the lens, which depend on the shift.
@@ -79,15 +79,15 @@ TEST(FitDispersion, PaperMethodReturnsShiftAtOneYaw) {
 
 /// After a rotation center of model `tilt` the offset is applied as a rotation. The factor f / H
 /// and the yaw alone would leave 10 % of 16 mm.
-TEST(FitDispersion, PaperMethodCentersCircleForTiltedCamera) {
+TEST(EstimateHeadingDependentOffset, PaperMethodCentersCircleForTiltedCamera) {
   for (const DispersionCircle circle : {DispersionCircle::mean, DispersionCircle::enclosing}) {
     Station station(0.01);
     Random random(3);
     for (const double yaw_rad : {0.0, 2.0, -1.0}) {
       auto captures = station.captures_at(yaw_rad, 6);
       for (auto& capture : captures) capture.detections = with_noise(capture.detections, random);
-      const auto fit = fit_dispersion(captures, station.rig.map, station.believed,
-                                      DispersionMethod::paper, circle);
+      const auto fit = estimate_heading_dependent_offset(
+          captures, station.rig.map, station.believed, DispersionMethod::paper, circle);
       ASSERT_EQ(fit.status, DispersionStatus::ok);
       EXPECT_GT(fit.before.center.norm(), 0.01);
       EXPECT_LT(fit.after.center.norm(), 1e-9);
@@ -95,34 +95,36 @@ TEST(FitDispersion, PaperMethodCentersCircleForTiltedCamera) {
   }
 }
 
-TEST(FitDispersion, PaperMethodAttributesReferencePointErrorToCamera) {
+TEST(EstimateHeadingDependentOffset, PaperMethodAttributesReferencePointErrorToCamera) {
   Station station(0);
   station.believed.rotation_center.reset();
   station.rig.calibration.rotation_center.reset();
   for (const auto& [yaw_rad, sign] : {std::pair(0.0, 1.0), std::pair(M_PI, -1.0)}) {
     auto captures = station.captures_at(yaw_rad, 5);
     for (auto& capture : captures) capture.reference_point_m.x() -= 0.008;
-    const auto fit =
-        fit_dispersion(captures, station.rig.map, station.believed, DispersionMethod::paper);
+    const auto fit = estimate_heading_dependent_offset(captures, station.rig.map, station.believed,
+                                                       DispersionMethod::paper);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     EXPECT_NEAR(fit.dispersion.offset_px.x(), -sign * 520 * 0.008 / 1.6, 0.01);
   }
 }
 
-TEST(FitDispersion, RejectsWrongFixes) {
+TEST(EstimateHeadingDependentOffset, RejectsWrongFixes) {
   Station station(0.01);
   Random random(2);
   for (const auto method : {DispersionMethod::camera, DispersionMethod::paper}) {
     auto captures = method == DispersionMethod::camera ? station.captures(40, true, {0, 0})
                                                        : station.captures_at(0.5, 40);
-    const auto clean = fit_dispersion(captures, station.rig.map, station.believed, method);
+    const auto clean =
+        estimate_heading_dependent_offset(captures, station.rig.map, station.believed, method);
     ASSERT_EQ(clean.status, DispersionStatus::ok);
     for (std::size_t i = 0; i < 40; ++i) {
       captures[i].detections = with_noise(captures[i].detections, random);
       if (i % 4 == 0)
         captures[i].reference_point_m += Eigen::Vector2d(0.05 + 5e-4 * double(i), -0.05);
     }
-    const auto fit = fit_dispersion(captures, station.rig.map, station.believed, method);
+    const auto fit =
+        estimate_heading_dependent_offset(captures, station.rig.map, station.believed, method);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     ASSERT_TRUE(fit.dispersion.covariance);
     EXPECT_EQ(fit.dispersion.captures, 30);
@@ -131,22 +133,23 @@ TEST(FitDispersion, RejectsWrongFixes) {
   }
 }
 
-TEST(FitDispersion, UsesInclinationSensor) {
+TEST(EstimateHeadingDependentOffset, UsesInclinationSensor) {
   Station station(0.01);
   station.rig.inclination = Inclination{0.04, -0.03};
   auto captures = station.captures(12, true, {0, 0});
   for (auto& capture : captures) capture.inclination = station.rig.inclination;
-  const auto fit =
-      fit_dispersion(captures, station.rig.map, station.believed, DispersionMethod::camera);
+  const auto fit = estimate_heading_dependent_offset(captures, station.rig.map, station.believed,
+                                                     DispersionMethod::camera);
   ASSERT_EQ(fit.status, DispersionStatus::ok);
   EXPECT_LT(fit.after.radius, 1e-9);
 }
 
-TEST(FitDispersion, ReportsStatusForInsufficientCaptures) {
+TEST(EstimateHeadingDependentOffset, ReportsStatusForInsufficientCaptures) {
   Station station(0.01);
   const auto find_status = [&](const std::vector<ReferencePointCapture>& captures,
                                DispersionMethod method = DispersionMethod::camera) {
-    return fit_dispersion(captures, station.rig.map, station.believed, method).status;
+    return estimate_heading_dependent_offset(captures, station.rig.map, station.believed, method)
+        .status;
   };
   const auto turned = station.captures(12, true, {0, 0});
   EXPECT_EQ(find_status({}), DispersionStatus::no_fix);
@@ -166,8 +169,8 @@ TEST(FitDispersion, ReportsStatusForInsufficientCaptures) {
   for (auto& capture : other_map) {
     for (auto& detection : capture.detections) detection.lamp += 50;
   }
-  const auto fit =
-      fit_dispersion(other_map, station.rig.map, station.believed, DispersionMethod::camera);
+  const auto fit = estimate_heading_dependent_offset(other_map, station.rig.map, station.believed,
+                                                     DispersionMethod::camera);
   EXPECT_EQ(fit.status, DispersionStatus::no_fix);
   EXPECT_EQ(fit.captures_without_fix, 12);
   EXPECT_EQ(fit.no_fix_status, FixStatus::too_few_lamps);

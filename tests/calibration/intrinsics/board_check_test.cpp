@@ -15,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-class CheckBoard : public testing::TestWithParam<bool> {
+class CheckBoardLayout : public testing::TestWithParam<bool> {
  protected:
   const SyntheticViews views_{synthetic_board(GetParam()), synthetic_lens()};
   std::vector<BoardView> seen_;
@@ -27,24 +27,24 @@ class CheckBoard : public testing::TestWithParam<bool> {
     }
   }
   std::string problem(const Board& board, const std::optional<Lens>& lens = {}) const {
-    return check_board(board, seen_, lens).problem;
+    return check_board_layout(board, seen_, lens).problem;
   }
 };
 
-TEST_P(CheckBoard, ReportsNoProblemForCorrectBoard) {
+TEST_P(CheckBoardLayout, ReportsNoProblemForCorrectBoard) {
   EXPECT_THAT(problem(views_.board), IsEmpty());
   EXPECT_THAT(problem(views_.board, views_.lens), IsEmpty());
-  EXPECT_NEAR(check_board(views_.board, seen_, views_.lens).pitch.value(),
+  EXPECT_NEAR(check_board_layout(views_.board, seen_, views_.lens).pitch.value(),
               1 + views_.board.tag_spacing, 0.005);
 }
 
-TEST_P(CheckBoard, IgnoresTagSize) {
+TEST_P(CheckBoardLayout, IgnoresTagSize) {
   Board board = views_.board;
   board.tag_size_m *= 2;
   EXPECT_THAT(problem(board, views_.lens), IsEmpty());
 }
 
-TEST_P(CheckBoard, ReportsOtherTagSpacing) {
+TEST_P(CheckBoardLayout, ReportsOtherTagSpacing) {
   Board board = views_.board;
   board.tag_spacing += 0.2;
   EXPECT_THAT(problem(board), HasSubstr("but the images show gaps of"));
@@ -53,7 +53,7 @@ TEST_P(CheckBoard, ReportsOtherTagSpacing) {
   EXPECT_THAT(problem(board, views_.lens), HasSubstr(GetParam() ? "gaps of 0.3 " : "gaps of 1 "));
 }
 
-TEST_P(CheckBoard, ReportsOtherIdOrder) {
+TEST_P(CheckBoardLayout, ReportsOtherIdOrder) {
   for (const bool column_major : {false, true}) {
     for (const auto from : {BoardCorner::bottom_right, BoardCorner::top_left}) {
       Board board = views_.board;
@@ -66,7 +66,7 @@ TEST_P(CheckBoard, ReportsOtherIdOrder) {
   EXPECT_THAT(problem(board), HasSubstr("cols 6, rows 5"));
 }
 
-TEST_P(CheckBoard, ReportsOtherIdOrderOfSquareBoard) {
+TEST_P(CheckBoardLayout, ReportsOtherIdOrderOfSquareBoard) {
   Board truth = views_.board;
   truth.rows = truth.cols;
   const SyntheticViews views{truth, views_.lens};
@@ -75,18 +75,18 @@ TEST_P(CheckBoard, ReportsOtherIdOrderOfSquareBoard) {
   for (int i = 0; i < 8; ++i) {
     seen.push_back({"", views.imager_px, views.random_view(random, 0.05)});
   }
-  EXPECT_THAT(check_board(truth, seen, {}).problem, IsEmpty());
+  EXPECT_THAT(check_board_layout(truth, seen, {}).problem, IsEmpty());
   for (const bool column_major : {false, true}) {
     for (const auto from : {BoardCorner::bottom_right, BoardCorner::top_left}) {
       Board board = truth;
       board.id_order = {column_major, from};
-      EXPECT_THAT(check_board(board, seen, {}).problem,
+      EXPECT_THAT(check_board_layout(board, seen, {}).problem,
                   HasSubstr("cols 6, rows 6, id_order row-major-from-bottom-left"));
     }
   }
 }
 
-TEST_P(CheckBoard, ReportsOtherNumberOfTags) {
+TEST_P(CheckBoardLayout, ReportsOtherNumberOfTags) {
   for (const int cols : {4, 5, 7}) {
     Board board = views_.board;
     board.cols = cols;
@@ -97,7 +97,7 @@ TEST_P(CheckBoard, ReportsOtherNumberOfTags) {
 }
 
 /// As in the detector: tags with ids that the board does not have are foreign.
-TEST_P(CheckBoard, ReportsLargerBoardFromForeignTags) {
+TEST_P(CheckBoardLayout, ReportsLargerBoardFromForeignTags) {
   Board board = views_.board;
   board.rows = 4;
   for (BoardView& view : seen_) {
@@ -113,7 +113,7 @@ TEST_P(CheckBoard, ReportsLargerBoardFromForeignTags) {
                                         "first_id 0"));
 }
 
-TEST_P(CheckBoard, IgnoresSingleForeignTags) {
+TEST_P(CheckBoardLayout, IgnoresSingleForeignTags) {
   for (const int id : {100, 31}) {
     auto views = seen_;
     for (BoardView& view : views) {
@@ -122,11 +122,11 @@ TEST_P(CheckBoard, IgnoresSingleForeignTags) {
       for (auto& corner : stray.corners_px) corner += Eigen::Vector2d(-150, 40);
       view.seen.foreign.push_back(stray);
     }
-    EXPECT_THAT(check_board(views_.board, views, {}).problem, IsEmpty()) << id;
+    EXPECT_THAT(check_board_layout(views_.board, views, {}).problem, IsEmpty()) << id;
   }
 }
 
-TEST_P(CheckBoard, IgnoresAdjacentBoard) {
+TEST_P(CheckBoardLayout, IgnoresTagsOfSecondBoard) {
   for (BoardView& view : seen_) {
     Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
     for (const TagDetection& tag : view.seen.tags) {
@@ -144,14 +144,14 @@ TEST_P(CheckBoard, IgnoresAdjacentBoard) {
   EXPECT_THAT(problem(views_.board), IsEmpty());
 }
 
-TEST_P(CheckBoard, ReportsOtherBoardForPermutedIds) {
+TEST_P(CheckBoardLayout, ReportsOtherBoardForPermutedIds) {
   for (BoardView& view : seen_) {
     for (TagDetection& tag : view.seen.tags) tag.id = tag.id * 7 % 30;
   }
   EXPECT_THAT(problem(views_.board), HasSubstr("is it another board?"));
 }
 
-INSTANTIATE_TEST_SUITE_P(Boards, CheckBoard, testing::Bool(),
+INSTANTIATE_TEST_SUITE_P(Boards, CheckBoardLayout, testing::Bool(),
                          [](const auto& board) { return board.param ? "Kalibr" : "Plain"; });
 
 }  // namespace

@@ -33,7 +33,7 @@ TEST_P(ComputePrintEffect, MatchesSolveOfWiderBoard) {
   const IntrinsicsSolution stated = solve_stretched(GetParam(), 1);
   const IntrinsicsSolution wider = solve_stretched(GetParam(), 1 + std::sqrt(2) * kPrintSd);
   ASSERT_TRUE(stated.ok() && wider.ok());
-  const auto effect = compute_aspect_error_effect(stated, kPrintSd);
+  const auto effect = compute_board_aspect_error_effect(stated, kPrintSd);
   ASSERT_TRUE(effect);
   const auto expected =
       compute_projection_difference(stated.lens(), wider.lens(), {800, 600}, even);
@@ -52,8 +52,8 @@ TEST_P(ComputePrintEffect, MatchesSolveOfWiderBoard) {
 TEST_P(ComputePrintEffect, IsProportionalToStandardDeviation) {
   const IntrinsicsSolution stated = solve_stretched(GetParam(), 1);
   ASSERT_TRUE(stated.ok());
-  const auto one = compute_aspect_error_effect(stated, kPrintSd);
-  const auto two = compute_aspect_error_effect(stated, 2 * kPrintSd);
+  const auto one = compute_board_aspect_error_effect(stated, kPrintSd);
+  const auto two = compute_board_aspect_error_effect(stated, 2 * kPrintSd);
   ASSERT_TRUE(one && two);
   EXPECT_NEAR(two->rms_px / one->rms_px, 2, 0.05);
 }
@@ -64,8 +64,8 @@ TEST(PrintEffect, IsNegligibleForExactBoardAndPinholeLens) {
   Random random(4);
   const IntrinsicsSolution solution = solve_intrinsics(views.input(20, random, 0.05));
   ASSERT_TRUE(solution.ok());
-  const auto exact = compute_aspect_error_effect(solution, 1e-9);
-  const auto printed = compute_aspect_error_effect(solution, kPrintSd);
+  const auto exact = compute_board_aspect_error_effect(solution, 1e-9);
+  const auto printed = compute_board_aspect_error_effect(solution, kPrintSd);
   ASSERT_TRUE(exact && printed);
   EXPECT_LT(exact->rms_px, 0.01 * printed->rms_px);
   EXPECT_GT(printed->rms_px, 0.01);

@@ -19,7 +19,7 @@ const Camera kFour = camera_with(LensModel::opencv4, {500, 501, 400, 300, 0.1, -
 const Camera kEight = camera_with(
     LensModel::opencv8, {500, 501, 400, 300, 0.1, -0.2, 0.003, 0.004, 0.05, 0.06, 0.07, 0.08});
 
-TEST(OpencvCamera, IsReadableByOpencv) {
+TEST(OpencvCamera, AreStripesReadableByOpencv) {
   const cv::FileStorage file(format_opencv_camera(kEight),
                              cv::FileStorage::READ | cv::FileStorage::MEMORY);
   cv::Mat matrix, distortions;

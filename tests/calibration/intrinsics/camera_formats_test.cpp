@@ -136,7 +136,7 @@ TEST(OpencvCamera, MatchesProjectionOfOpencv) {
 class ReadCameraFormats : public testing::Test {
  protected:
   AnyCamera read(const std::string& text) const {
-    return read_any_camera(folder_.file("camera.txt", text));
+    return read_camera_of_any_format(folder_.file("camera.txt", text));
   }
   std::string refusal(const std::string& text) const {
     return rejection_message([&] { read(text); });
@@ -361,7 +361,7 @@ class MrcalCameramodel : public ReadCameraFormats {
   AnyCamera written_by_mrcal(const std::string& text) const {
     printed(folder_.file("ours.cameramodel", text),
             "m.write(at('theirs.cameramodel'), note = \"of 'lensmodel': 'LENSMODEL_CAHVOR'\")\n");
-    return read_any_camera(folder_ / "theirs.cameramodel");
+    return read_camera_of_any_format(folder_ / "theirs.cameramodel");
   }
 };
 
@@ -398,11 +398,11 @@ TEST_F(MrcalCameramodel, ContainsRegionOfCalibration) {
   const IntrinsicsSolution solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.ok());
   const auto file = folder_ / "camera.cameramodel";
-  write_cameramodel(file, solution);
-  const ImageRegion expected = compute_known_region(collect_inlier_pixels(solution.problem),
-                                                    input.imager_px, input.lens_model);
+  write_mrcal_cameramodel(file, solution);
+  const ImageRegion expected = compute_valid_lens_region(collect_inlier_pixels(solution.problem),
+                                                         input.imager_px, input.lens_model);
   ASSERT_GT(expected.size(), 4U);
-  EXPECT_LT(compute_image_fraction(expected, input.imager_px), 0.8);
+  EXPECT_LT(compute_fraction_of_image_area(expected, input.imager_px), 0.8);
 
   ImageRegion mrcals;
   std::istringstream numbers(printed(
@@ -413,7 +413,7 @@ TEST_F(MrcalCameramodel, ContainsRegionOfCalibration) {
   mrcals.pop_back();
   EXPECT_EQ(mrcals, expected);
 
-  const AnyCamera ours = read_any_camera(file);
+  const AnyCamera ours = read_camera_of_any_format(file);
   EXPECT_EQ(ours.region, expected);
   const AnyCamera theirs = written_by_mrcal(format_mrcal_cameramodel(ours.camera, ours.region));
   ASSERT_EQ(theirs.region.size(), expected.size());
@@ -440,7 +440,7 @@ TEST_F(ReadCameraFormats, ReturnsValidRegionOfCameramodel) {
 
 /// The lens has 130,000 parameters.
 TEST_F(ReadCameraFormats, ReturnsLargestSplinedLens) {
-  const LensModel model = lens_model_for({3, 255, 255, 150});
+  const LensModel model = lens_model_for_spline_grid({3, 255, 255, 150});
   Camera camera = make_camera(LensModel::stereographic);
   camera.lens_model = model;
   for (std::size_t i = 4; i < parameter_count(model); ++i) {
@@ -452,20 +452,21 @@ TEST_F(ReadCameraFormats, ReturnsLargestSplinedLens) {
 
 // Fits
 
-TEST(FitLensModel, ReportsLargestDifference) {
+TEST(ConvertToLensModel, ReportsLargestDifference) {
   struct Fit {
     Camera from;
     LensModel to;
   };
-  const Fit fits[] = {{make_camera(LensModel::opencv8), LensModel::fisheye},
-                      {make_camera(LensModel::opencv12), LensModel::opencv4},
-                      {make_camera(LensModel::opencv5), LensModel::pinhole},
-                      {make_camera(LensModel::fisheye), lens_model_for({3, 20, 16, 190})},
-                      {make_camera(LensModel::fisheye), lens_model_for({2, 12, 10, 170})},
-                      {splined_camera(), LensModel::fisheye}};
+  const Fit fits[] = {
+      {make_camera(LensModel::opencv8), LensModel::fisheye},
+      {make_camera(LensModel::opencv12), LensModel::opencv4},
+      {make_camera(LensModel::opencv5), LensModel::pinhole},
+      {make_camera(LensModel::fisheye), lens_model_for_spline_grid({3, 20, 16, 190})},
+      {make_camera(LensModel::fisheye), lens_model_for_spline_grid({2, 12, 10, 170})},
+      {splined_camera(), LensModel::fisheye}};
   for (const auto& [from, to] : fits) {
     SCOPED_TRACE(testing::Message() << to_string(from.lens_model) << " " << to_string(to));
-    const FittedCamera fitted = fit_lens_model(from, to);
+    const FittedCamera fitted = convert_to_lens_model(from, to);
     const Lens lens = make_lens(fitted.camera), was = make_lens(from);
     Random random(6);
     double worst = 0;

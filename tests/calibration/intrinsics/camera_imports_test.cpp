@@ -14,12 +14,12 @@
 namespace vlp {
 namespace {
 
-class ReadAnyCamera : public testing::Test {
+class ReadCameraOfAnyFormat : public testing::Test {
  protected:
   const TemporaryFolder folder_;
 
   void comes_back(const Camera& camera, const std::string& text, LensModel as) const {
-    const Camera back = read_any_camera(folder_.file("camera.txt", text)).camera;
+    const Camera back = read_camera_of_any_format(folder_.file("camera.txt", text)).camera;
     EXPECT_EQ(back.lens_model, as);
     EXPECT_EQ(back.imager_px, camera.imager_px);
     std::vector<double> expected = camera.intrinsics;
@@ -28,7 +28,7 @@ class ReadAnyCamera : public testing::Test {
   }
   std::string refusal(const std::string& text) const {
     try {
-      read_any_camera(folder_.file("camera.txt", text));
+      read_camera_of_any_format(folder_.file("camera.txt", text));
     } catch (const InputError& error) {
       return error.what();
     }
@@ -36,7 +36,7 @@ class ReadAnyCamera : public testing::Test {
   }
 };
 
-TEST_F(ReadAnyCamera, ReturnsExportedCameraExactly) {
+TEST_F(ReadCameraOfAnyFormat, ReturnsExportedCameraExactly) {
   for (const LensModel model : {LensModel::pinhole, LensModel::opencv4, LensModel::opencv5,
                                 LensModel::opencv8, LensModel::opencv12, LensModel::fisheye}) {
     const Camera camera = make_camera(model);
@@ -50,7 +50,7 @@ TEST_F(ReadAnyCamera, ReturnsExportedCameraExactly) {
   }
 }
 
-TEST_F(ReadAnyCamera, ReturnsExportedSplinedLensExactly) {
+TEST_F(ReadCameraOfAnyFormat, ReturnsExportedSplinedLensExactly) {
   const Camera camera = splined_camera();
   comes_back(camera, format_mrcal_cameramodel(camera), camera.lens_model);
   for (const auto& format_camera :
@@ -62,42 +62,42 @@ TEST_F(ReadAnyCamera, ReturnsExportedSplinedLensExactly) {
   EXPECT_THAT(refusal(short_one), testing::HasSubstr("takes 312 parameters, not 290"));
 }
 
-TEST(FitLensModel, ConvertsToSplinedLensAndBack) {
-  const auto wide =
-      fit_lens_model(make_camera(LensModel::fisheye), lens_model_for({3, 20, 16, 190}));
+TEST(ConvertToLensModel, ConvertsToSplinedLensAndBack) {
+  const auto wide = convert_to_lens_model(make_camera(LensModel::fisheye),
+                                          lens_model_for_spline_grid({3, 20, 16, 190}));
   EXPECT_LT(wide.worst_px, 0.002);
   EXPECT_EQ(wide.common_fraction, 1);
   // The rays outside the grid do not count.
-  const auto part =
-      fit_lens_model(make_camera(LensModel::fisheye), lens_model_for({3, 14, 12, 100}));
+  const auto part = convert_to_lens_model(make_camera(LensModel::fisheye),
+                                          lens_model_for_spline_grid({3, 14, 12, 100}));
   EXPECT_LT(part.worst_px, 0.01);
   EXPECT_LT(part.common_fraction, 0.8);
-  const auto back = fit_lens_model(wide.camera, LensModel::fisheye);
+  const auto back = convert_to_lens_model(wide.camera, LensModel::fisheye);
   EXPECT_LT(back.worst_px, 0.005);
   for (std::size_t i = 0; i < 4; ++i) {
     EXPECT_NEAR(back.camera.intrinsics[i], make_camera(LensModel::fisheye).intrinsics[i], 0.01);
   }
-  const auto near =
-      fit_lens_model(make_camera(LensModel::opencv8), lens_model_for({2, 20, 16, 100}));
+  const auto near = convert_to_lens_model(make_camera(LensModel::opencv8),
+                                          lens_model_for_spline_grid({2, 20, 16, 100}));
   EXPECT_LT(near.worst_px, 0.2);  // quadratic pieces
 }
 
 /// Lenses of 10 degrees, with no, one or a few rays of a piece in the image, and of a strip with
 /// one row of pieces. The recommended model has to fit.
-TEST(FitLensModel, RecommendsFinerGridWhenGridIsTooWide) {
+TEST(ConvertToLensModel, RecommendsFinerGridWhenGridIsTooWide) {
   const auto expect_other = [](const Camera& camera, const SplineGrid& grid) {
     const std::string words =
         "the control points of " + to_string(grid) + " do not cover the field of view, ";
     std::string said;
     try {
-      fit_lens_model(camera, lens_model_for(grid));
+      convert_to_lens_model(camera, lens_model_for_spline_grid(grid));
     } catch (const std::invalid_argument& error) {
       said = error.what();
     }
     ASSERT_THAT(said, testing::StartsWith(words)) << camera.intrinsics[2];
     const auto model = lens_model_from_name(said.substr(said.find("LENSMODEL", words.size())));
     ASSERT_TRUE(model) << said;
-    const FittedCamera fitted = fit_lens_model(camera, *model);
+    const FittedCamera fitted = convert_to_lens_model(camera, *model);
     EXPECT_LT(fitted.worst_px, 0.01) << said;
     EXPECT_EQ(fitted.common_fraction, 1) << said;
   };
@@ -113,7 +113,7 @@ TEST(FitLensModel, RecommendsFinerGridWhenGridIsTooWide) {
   expect_other(strip, {3, 4, 4, 30});
 }
 
-TEST_F(ReadAnyCamera, RejectsUnknownFormatsAndModels) {
+TEST_F(ReadCameraOfAnyFormat, RejectsUnknownFormatsAndModels) {
   EXPECT_THAT(refusal("a: 1\n"), testing::HasSubstr("camera.txt: "));
   EXPECT_THAT(refusal("[1, 2]\n"), testing::HasSubstr("contains no camera"));
   EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL_CAHVOR', 'imagersize': [1, 2] }"),
@@ -128,7 +128,7 @@ TEST_F(ReadAnyCamera, RejectsUnknownFormatsAndModels) {
 }
 
 /// Comments as in Python: from a # outside strings to the end of the line.
-TEST_F(ReadAnyCamera, IgnoresCommentsInCameramodel) {
+TEST_F(ReadCameraOfAnyFormat, IgnoresCommentsInCameramodel) {
   const std::string text =
       "# 'lensmodel': 'LENSMODEL_OPENCV4'\n"
       "{ 'made_by': 'camera #3, \\'left\\'', 'lensmodel': 'LENSMODEL_PINHOLE', # isn't \"wide\"\n"
@@ -140,18 +140,18 @@ TEST_F(ReadAnyCamera, IgnoresCommentsInCameramodel) {
              text, LensModel::pinhole);
 }
 
-TEST(FitLensModel, ReportsDifferenceAndCommonFraction) {
+TEST(ConvertToLensModel, ReportsDifferenceAndCommonFraction) {
   // A model that includes the other fits exactly, another one approximately.
-  const auto exact = fit_lens_model(make_camera(LensModel::opencv4), LensModel::opencv8);
+  const auto exact = convert_to_lens_model(make_camera(LensModel::opencv4), LensModel::opencv8);
   EXPECT_LT(exact.worst_px, 1e-6);
   EXPECT_EQ(exact.common_fraction, 1);
-  const auto near = fit_lens_model(make_camera(LensModel::opencv8), LensModel::fisheye);
+  const auto near = convert_to_lens_model(make_camera(LensModel::opencv8), LensModel::fisheye);
   EXPECT_LT(near.worst_px, 1);
   EXPECT_GT(near.worst_px, 1e-6);
-  const auto same = fit_lens_model(make_camera(LensModel::opencv8), LensModel::opencv8);
+  const auto same = convert_to_lens_model(make_camera(LensModel::opencv8), LensModel::opencv8);
   EXPECT_EQ(same.camera.intrinsics, make_camera(LensModel::opencv8).intrinsics);
   // Perspective models have no rays beyond 90 degrees.
-  const auto half = fit_lens_model(make_camera(LensModel::fisheye), LensModel::opencv4);
+  const auto half = convert_to_lens_model(make_camera(LensModel::fisheye), LensModel::opencv4);
   EXPECT_LT(half.common_fraction, 1);
 }
 

@@ -21,7 +21,7 @@ TEST(FindCornerOutliers, ReturnsSingleDisplacedCorner) {
     Random random(11);
     int compared = 0;
     for (int view = 0; view < 40; ++view) {
-      const auto seen = lattice.corners(views.random_view(random, noise_px));
+      const auto seen = lattice.match_corners_to_flat_board(views.random_view(random, noise_px));
       ASSERT_THAT(find_corner_outliers(seen), IsEmpty());
       auto spoilt = seen;
       const std::size_t wrong = random.index(seen.size());
@@ -39,7 +39,8 @@ TEST(FindCornerOutliers, ReturnsSingleDisplacedCorner) {
 TEST(FindCornerOutliers, ReturnsNoneForRandomCorners) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(12);
-  auto corners = BoardLattice(views.board).corners(views.random_view(random, 0));
+  auto corners =
+      BoardLattice(views.board).match_corners_to_flat_board(views.random_view(random, 0));
   for (auto& corner : corners) corner.pixel = {random.uniform(0, 800), random.uniform(0, 600)};
   EXPECT_THAT(find_corner_outliers(corners), IsEmpty());
   EXPECT_THAT(find_corner_outliers({}), IsEmpty());

@@ -88,7 +88,7 @@ IntrinsicsInput uneven_input(const SyntheticViews& views, Random& random) {
 /// Returns the unweighted RMS residual per axis of the corners that are not outliers.
 double unweighted_rms_px(const IntrinsicsSolution& solution) {
   double squares = 0, count = 0;
-  const auto residuals = compute_residuals(solution.problem);
+  const auto residuals = compute_reprojection_residuals(solution.problem);
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     if (!(solution.problem.points[i].z() > 0)) continue;
     squares += residuals[i].squaredNorm();
@@ -121,7 +121,7 @@ TEST(CornerWeights, ReducesProjectionErrorOfSolve) {
   RecordProperty("told_over_untold", std::to_string(std::sqrt(known_px2 / unknown_px2)));
 }
 
-TEST(CornerWeights, KeepsRmsOfSolveInPixels) {
+TEST(CornerWeights, WeightedRmsEqualsUnweightedRms) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(3);
   const IntrinsicsSolution solution = solve_intrinsics(uneven_input(views, random));

@@ -82,30 +82,30 @@ Tag tag_with_errors(const std::array<double, 4>& error_px) {
   return tag;
 }
 
-TEST(ApplyLensEdgeCurvature, MovesCornersToTruePositions) {
+TEST(CorrectCornersForCurvedEdges, MovesCornersToTruePositions) {
   for (const std::array<double, 4> errors_px :
        {std::array{0.0, 0.0, 0.0, 0.0}, {0.1, 0.0, 0.0, 0.0}, {0.06, -0.1, 0.03, 0.08}}) {
     Tag tag = tag_with_errors(errors_px);
-    apply_lens_edge_curvature(tag.seen, synthetic_lens());
+    correct_corners_for_curved_edges(tag.seen, synthetic_lens());
     for (std::size_t k = 0; k < 4; ++k) {
       // The errors rotate the chords.
       EXPECT_LT((tag.seen[k].pixel - tag.truth[k]).norm(), 1e-3);
     }
     // The corners now have the curvature of the lens.
-    EXPECT_LT(apply_lens_edge_curvature(tag.seen, synthetic_lens()), 1e-3);
+    EXPECT_LT(correct_corners_for_curved_edges(tag.seen, synthetic_lens()), 1e-3);
   }
 }
 
-TEST(ApplyLensEdgeCurvature, KeepsTagsWithoutMeasuredCurvature) {
+TEST(CorrectCornersForCurvedEdges, KeepsTagsWithoutMeasuredCurvature) {
   Tag tag = tag_with_errors({0.1, 0.1, 0.1, 0.1});
   tag.seen[2].bow.reach = 0;
   const auto before = tag.seen;
-  EXPECT_EQ(apply_lens_edge_curvature(tag.seen, synthetic_lens()), 0);
+  EXPECT_EQ(correct_corners_for_curved_edges(tag.seen, synthetic_lens()), 0);
   for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(tag.seen[k].pixel, before[k].pixel);
 }
 
 /// Above all the noise of the position of a tag as a whole.
-TEST(ApplyLensEdgeCurvature, ReducesCornerNoise) {
+TEST(CorrectCornersForCurvedEdges, ReducesCornerNoise) {
   const Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
   const CaptureSet views = *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
   const FrameRenderer renderer(scene);
@@ -118,12 +118,12 @@ TEST(ApplyLensEdgeCurvature, ReducesCornerNoise) {
   for (std::size_t index = 0; index < 8; ++index) {
     const BoardShot shot = make_board_shot(scene, views, index);
     std::map<int, TagDetection::Corners> truth;
-    for (const auto& [tag, corner, pixel] : find_true_corners(scene, renderer, shot)) {
+    for (const auto& [tag, corner, pixel] : find_true_corners_in_image(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
     }
-    const BoardDetection seen =
-        detector.detect(expose(scene.sensor, renderer.board_electrons(shot), index));
-    auto all = lattice.corners(seen);
+    const BoardDetection seen = detector.detect_board(
+        simulate_sensor(scene.sensor, renderer.render_board_electrons(shot), index));
+    auto all = lattice.match_corners_to_flat_board(seen);
     for (const std::size_t pass : {0U, 1U}) {
       for (std::size_t i = 0; i < seen.tags.size(); ++i) {
         Eigen::Vector2d sum(0, 0);
@@ -134,7 +134,7 @@ TEST(ApplyLensEdgeCurvature, ReducesCornerNoise) {
         }
         of_tags[pass] += sum.squaredNorm();
       }
-      apply_lens_edge_curvature(all, lens);
+      correct_corners_for_curved_edges(all, lens);
     }
     for (const auto& corner : all) stated += 2 * corner.sd_px * corner.sd_px;
     corners += all.size();

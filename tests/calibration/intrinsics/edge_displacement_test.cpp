@@ -28,7 +28,7 @@ class EstimateEdgeShifts : public testing::TestWithParam<double> {
     std::vector<BoardView> seen;
     while (static_cast<int>(seen.size()) < count) {
       BoardDetection view = views.random_view(random, noise_px);
-      if (!lattice.sufficient(view)) continue;
+      if (!lattice.has_sufficient_corners(view)) continue;
       for (TagDetection& tag : view.tags) tag = shrunk(tag, shift_px);
       seen.push_back({"", views.imager_px, view});
     }
@@ -36,20 +36,21 @@ class EstimateEdgeShifts : public testing::TestWithParam<double> {
   }
   IntrinsicsInput make_input(const std::vector<BoardView>& seen) const {
     IntrinsicsInput input{BoardLattice(board()), {}, {800, 600}, LensModel::opencv8};
-    for (const BoardView& view : seen) input.views.push_back(input.lattice.corners(view.seen));
+    for (const BoardView& view : seen)
+      input.views.push_back(input.lattice.match_corners_to_flat_board(view.seen));
     return input;
   }
 };
 
 TEST_P(EstimateEdgeShifts, ReturnsShiftOfEachView) {
   const auto input = make_input(shrunk_views(6, 0, 0.3));
-  const auto shifts = estimate_tag_edge_shifts(input.views, synthetic_lens());
+  const auto shifts = estimate_tag_edge_displacements(input.views, synthetic_lens());
   ASSERT_EQ(shifts.size(), 6U);
-  for (const EdgeShift& shift : shifts) EXPECT_NEAR(shift.at(shift.middle), 0.3, 0.005);
+  for (const EdgeDisplacement& shift : shifts) EXPECT_NEAR(shift.at(shift.middle), 0.3, 0.005);
   const auto none =
-      estimate_tag_edge_shifts(make_input(shrunk_views(6, 0, 0)).views, synthetic_lens());
+      estimate_tag_edge_displacements(make_input(shrunk_views(6, 0, 0)).views, synthetic_lens());
   ASSERT_EQ(none.size(), 6U);
-  for (const EdgeShift& shift : none) EXPECT_NEAR(shift.at(shift.middle), 0, 1e-6);
+  for (const EdgeDisplacement& shift : none) EXPECT_NEAR(shift.at(shift.middle), 0, 1e-6);
 }
 
 TEST_P(EstimateEdgeShifts, CorrectsLensOfSolve) {
@@ -84,18 +85,18 @@ TEST_P(EstimateEdgeShifts, DistinguishesVaryingShiftFromWarp) {
 
 TEST_P(EstimateEdgeShifts, KeepsSpacingAcceptedByCheckBoard) {
   const auto seen = shrunk_views(10, 0.03, 0.4);
-  EXPECT_EQ(check_board(board(), seen, {}).problem, "");
-  EXPECT_EQ(check_board(board(), seen, synthetic_lens()).problem, "");
+  EXPECT_EQ(check_board_layout(board(), seen, {}).problem, "");
+  EXPECT_EQ(check_board_layout(board(), seen, synthetic_lens()).problem, "");
   Board other = board();
   other.tag_spacing += 0.06;
-  EXPECT_NE(check_board(other, seen, synthetic_lens()).problem, "");
+  EXPECT_NE(check_board_layout(other, seen, synthetic_lens()).problem, "");
 }
 
 INSTANTIATE_TEST_SUITE_P(Spacings, EstimateEdgeShifts, testing::Values(1.0, 0.4),
                          [](const auto& gap) { return gap.param == 1 ? "OneTag" : "Narrow"; });
 
 /// A warped board that is assumed flat looks as if edges shifted inwards here and outwards there.
-TEST(EdgeShift, DoesNotAbsorbBoardWarp) {
+TEST(EdgeDisplacement, DoesNotAbsorbBoardWarp) {
   constexpr double noise_px = 0.017;
   Random random(12);
   const WideBoards boards{0.1, 0.2};
@@ -110,13 +111,13 @@ TEST(EdgeShift, DoesNotAbsorbBoardWarp) {
   EXPECT_LT(difference->rms_px, 0.006);  // 0.0144
 }
 
-TEST(EdgeShift, IsZeroForTouchingSquares) {
+TEST(EdgeDisplacement, IsZeroForTouchingSquares) {
   const SyntheticViews views{synthetic_board(true), synthetic_lens()};
   Random random(3);
   const auto input = views.input(4, random, 0.1);
-  const auto shifts = estimate_tag_edge_shifts(input.views, views.lens);
+  const auto shifts = estimate_tag_edge_displacements(input.views, views.lens);
   ASSERT_EQ(shifts.size(), 4U);
-  for (const EdgeShift& shift : shifts) EXPECT_TRUE(shift.coefficients.isZero(0));
+  for (const EdgeDisplacement& shift : shifts) EXPECT_TRUE(shift.coefficients.isZero(0));
 }
 
 }  // namespace

@@ -39,15 +39,15 @@ Scatter scatter(double bent_m) {
         compute_projection_difference(views.lens, lens, views.imager_px, [](const auto&) {
           return 1;
         }).value();
-    const auto noise = compute_expected_difference(
+    const auto noise = compute_expected_projection_difference(
         lens, views.imager_px, ProjectionUncertainty(solution).intrinsics_covariance());
-    const auto by_views =
-        compute_expected_difference(lens, views.imager_px, estimate_covariance_by_views(solution));
+    const auto by_views = compute_expected_projection_difference(
+        lens, views.imager_px, estimate_jackknife_covariance(solution));
     sum.found += difference.rms_px * difference.rms_px / kSeeds;
     sum.by_noise += noise.rms_px * noise.rms_px / kSeeds;
     sum.by_views += by_views.rms_px * by_views.rms_px / kSeeds;
     sum.degrees_of_freedom += noise.degrees_of_freedom;
-    const double worst_px = estimate_expected_worst_px(
+    const double worst_px = estimate_max_expected_difference_px(
         lens, views.imager_px, ProjectionUncertainty(solution).intrinsics_covariance());
     sum.worst_found += difference.worst_px * difference.worst_px / kSeeds;
     sum.worst_by_noise += worst_px * worst_px / kSeeds;
@@ -70,7 +70,7 @@ TEST(ExpectedDifference, MatchesDifferenceFromTruth) {
   EXPECT_LT(of.by_views / of.by_noise, 2.5);
 }
 
-TEST(EstimateCovarianceByViews, IncludesErrorsCommonToView) {
+TEST(EstimateJackknifeCovariance, IncludesErrorsCommonToView) {
   const Scatter of = scatter(0.0005);
   const double sd = std::sqrt(2 / of.degrees_of_freedom);
   EXPECT_GT(of.found / of.by_noise, 1 + 3 * sd);  // noise alone does not explain it

@@ -24,7 +24,7 @@ TEST_P(SolveWideLens, MatchesTruthForExactCorners) {
   EXPECT_LT(solution.rms_px, GetParam() ? 1e-3 : 0.02);
   EXPECT_LT(up_to(94, solution.lens()).worst_px, GetParam() ? 1e-3 : 0.03);
   const Eigen::Vector2d warp_m =
-      solution.problem.warp_m.cwiseProduct(input.lattice.board_warp_ratio());
+      solution.problem.warp_m.cwiseProduct(input.lattice.part_to_board_warp_ratio());
   EXPECT_LT((warp_m - Eigen::Vector2d(0.0004, -0.0003)).norm(), 1e-5);
 }
 
@@ -36,7 +36,7 @@ TEST_P(SolveWideLens, MatchesTruthBeyondNinetyDegrees) {
   EXPECT_NEAR(solution.rms_px, 0.05, 0.005);
   EXPECT_LT(up_to(90, solution.lens()).mean_px, 0.03);
   EXPECT_LT(up_to(94, solution.lens()).worst_px, 0.1);
-  const CalibrationReport report = compute_report(solution, input);
+  const CalibrationReport report = compute_calibration_report(solution, input);
   EXPECT_LT(report.uncertainty_worst_px, 0.4);  // at the rim, beyond 94 degrees
   ASSERT_TRUE(report.halves);
   EXPECT_LT(report.halves->rms_px, 0.1);

@@ -33,7 +33,7 @@ std::vector<std::string> image_names() {
   return names;
 }
 
-TEST(FindInconsistentViews, ReturnsViewsOfOtherCamera) {
+TEST(FindViewsInconsistentWithLens, ReturnsViewsOfOtherCamera) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   const SyntheticViews others{synthetic_board(false), other_lens()};
   Random random(3);
@@ -44,7 +44,7 @@ TEST(FindInconsistentViews, ReturnsViewsOfOtherCamera) {
     for (const std::size_t view : foreign) input.views[view] = other.views[view];
     const IntrinsicsSolution solution = solve_intrinsics(input);
     ASSERT_TRUE(solution.ok());
-    const InconsistentViews found = find_inconsistent_views(solution);
+    const InconsistentViews found = find_views_inconsistent_with_lens(solution);
     EXPECT_THAT(found.views, ElementsAreArray(foreign));
     EXPECT_EQ(found.others, kViews - foreign.size());
     EXPECT_GT(found.worst_px, 3 * found.typical_px);
@@ -54,19 +54,20 @@ TEST(FindInconsistentViews, ReturnsViewsOfOtherCamera) {
   }
 }
 
-TEST(FindInconsistentViews, ReturnsNoneForOneCamera) {
+TEST(FindViewsInconsistentWithLens, ReturnsNoneForOneCamera) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(4);
   for (int set = 0; set < 10; ++set) {
     for (const double noise_px : {0.02, 0.3}) {
       const auto solution = solve_intrinsics(views.input(12 + 2 * set, random, noise_px));
       ASSERT_TRUE(solution.ok()) << set;
-      EXPECT_THAT(find_inconsistent_views(solution).views, IsEmpty()) << set << ' ' << noise_px;
+      EXPECT_THAT(find_views_inconsistent_with_lens(solution).views, IsEmpty())
+          << set << ' ' << noise_px;
     }
   }
 }
 
-TEST(FindInconsistentViews, ReturnsViewsWithoutPoseIfSeveral) {
+TEST(FindViewsInconsistentWithLens, ReturnsViewsWithoutPoseIfSeveral) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(5);
   IntrinsicsInput input = views.input(12, random, 0.05);
@@ -74,11 +75,11 @@ TEST(FindInconsistentViews, ReturnsViewsWithoutPoseIfSeveral) {
   const IntrinsicsSolution one = solve_intrinsics(input);
   ASSERT_TRUE(one.ok());
   ASSERT_EQ(one.dropped.size(), 1U);
-  EXPECT_THAT(find_inconsistent_views(one).views, testing::IsEmpty());
+  EXPECT_THAT(find_views_inconsistent_with_lens(one).views, testing::IsEmpty());
   for (auto& corner : input.views[7]) corner.pixel.x() += 60 * std::sin(corner.pixel.y() / 15);
   const IntrinsicsSolution two = solve_intrinsics(input);
   ASSERT_TRUE(two.ok());
-  const InconsistentViews found = find_inconsistent_views(two);
+  const InconsistentViews found = find_views_inconsistent_with_lens(two);
   ASSERT_THAT(found.views, testing::ElementsAre(4, 7));
   EXPECT_EQ(describe(found, image_names()),
             "2 board images do not fit the other 10: 104.png, 107.png; were they taken by another "

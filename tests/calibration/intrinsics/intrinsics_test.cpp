@@ -31,7 +31,7 @@ TEST_P(SolveIntrinsics, MatchesTruthForExactCorners) {
   EXPECT_LT(difference(solution, views_).mean_px, 0.002);
   EXPECT_LT(difference(solution, views_).worst_px, 0.05);
   const Eigen::Vector2d warp_m =
-      solution.problem.warp_m.cwiseProduct(input.lattice.board_warp_ratio());
+      solution.problem.warp_m.cwiseProduct(input.lattice.part_to_board_warp_ratio());
   EXPECT_LT((warp_m - views_.warp_m).norm(), 2e-6);
 }
 

@@ -47,65 +47,65 @@ double find_rms(const LensChoice& choice, LensModel model) {
 
 void expect_chosen(const Lens& lens) {
   constexpr int count = 30;
-  const auto choice = choose_lens(seen_through(lens, count));
+  const auto choice = select_lens_model(seen_through(lens, count));
   ASSERT_TRUE(choice);
-  EXPECT_EQ(to_string(choice->model), to_string(lens.model())) << describe(*choice);
+  EXPECT_EQ(to_string(choice->model), to_string(lens.lens_model())) << describe(*choice);
   // Noise, and errors outside the region of the other views.
   EXPECT_NEAR(find_rms(*choice, choice->model), kNoise_px, 0.25 * kNoise_px);
   EXPECT_EQ(choice->tried.size(), 5U);
-  EXPECT_TRUE(describe(*choice).starts_with(to_string(lens.model()))) << describe(*choice);
+  EXPECT_TRUE(describe(*choice).starts_with(to_string(lens.lens_model()))) << describe(*choice);
 }
 
-TEST(ChooseLens, ReturnsOpencv4ForRadialLens) { expect_chosen(radial_lens()); }
+TEST(SelectLensModel, ReturnsOpencv4ForRadialLens) { expect_chosen(radial_lens()); }
 
-TEST(ChooseLens, ReturnsOpencv8ForRationalLens) { expect_chosen(rational_lens()); }
+TEST(SelectLensModel, ReturnsOpencv8ForRationalLens) { expect_chosen(rational_lens()); }
 
-TEST(ChooseLens, ReturnsFisheyeForFisheyeLens) { expect_chosen(fisheye_lens()); }
+TEST(SelectLensModel, ReturnsFisheyeForFisheyeLens) { expect_chosen(fisheye_lens()); }
 
-TEST(ChooseLens, IgnoresBadView) {
+TEST(SelectLensModel, IgnoresBadView) {
   constexpr int count = 24;
   IntrinsicsInput input = seen_through(rational_lens(), count);
   for (auto& corner : input.views[5]) {
     corner.pixel += Eigen::Vector2d(corner.point % 2 == 0 ? 2 : -2, 0);
   }
-  const auto choice = choose_lens(input);
+  const auto choice = select_lens_model(input);
   ASSERT_TRUE(choice);
   EXPECT_EQ(to_string(choice->model), to_string(LensModel::opencv8)) << describe(*choice);
   EXPECT_NEAR(find_rms(*choice, choice->model), kNoise_px, 0.4 * kNoise_px);
 }
 
-TEST(ChooseLens, UsesFewViewsFarFromCenter) {
+TEST(SelectLensModel, UsesFewViewsFarFromCenter) {
   constexpr std::size_t all = 30, far = 6;
   constexpr double inner_px = 220;
   SyntheticViews views{synthetic_board(false), rational_lens()};
   views.farthest = 4;
   Random random(43);
   IntrinsicsInput input = views.input(0, random, kNoise_px);
-  const Eigen::Vector2d middle = rational_lens().center_px();
+  const Eigen::Vector2d middle = rational_lens().principal_point_px();
   while (input.views.size() < all) {
     const BoardDetection seen = views.random_view(random, kNoise_px);
-    if (!input.lattice.sufficient(seen)) continue;
-    auto corners = input.lattice.corners(seen);
+    if (!input.lattice.has_sufficient_corners(seen)) continue;
+    auto corners = input.lattice.match_corners_to_flat_board(seen);
     const bool inner = std::all_of(corners.begin(), corners.end(), [&](const auto& corner) {
       return (corner.pixel - middle).norm() < inner_px;
     });
     // Every fifth view shows the board farther from the center.
     if (inner == (input.views.size() % (all / far) != 0)) input.views.push_back(std::move(corners));
   }
-  const auto choice = choose_lens(input);
+  const auto choice = select_lens_model(input);
   ASSERT_TRUE(choice);
   EXPECT_NE(to_string(choice->model), to_string(LensModel::opencv4)) << describe(*choice);
   EXPECT_LT(find_rms(*choice, choice->model), 2 * kNoise_px);
 }
 
-TEST(ChooseLens, ReturnsNulloptForFewerThanSixViews) {
-  EXPECT_FALSE(choose_lens(seen_through(radial_lens(), 5)));
-  EXPECT_TRUE(choose_lens(seen_through(radial_lens(), 6)));
+TEST(SelectLensModel, ReturnsNulloptForFewerThanSixViews) {
+  EXPECT_FALSE(select_lens_model(seen_through(radial_lens(), 5)));
+  EXPECT_TRUE(select_lens_model(seen_through(radial_lens(), 6)));
 }
 
-TEST(ChooseLens, SkipsOpencvModelsBeyondRightAngle) {
+TEST(SelectLensModel, SkipsOpencvModelsBeyondRightAngle) {
   Random random(44);
-  const auto choice = choose_lens(wide_input(false, 24, random, kNoise_px));
+  const auto choice = select_lens_model(wide_input(false, 24, random, kNoise_px));
   ASSERT_TRUE(choice);
   EXPECT_EQ(choice->model, LensModel::fisheye);
   EXPECT_GT(choice->beyond_rad, 1.58);
@@ -114,7 +114,7 @@ TEST(ChooseLens, SkipsOpencvModelsBeyondRightAngle) {
   for (const LensCandidate& tried : choice->tried) {
     EXPECT_EQ(std::isfinite(tried.rms_px), tried.model == LensModel::fisheye);
   }
-  EXPECT_EQ(choose_lens(seen_through(fisheye_lens(), 8)).value().beyond_rad, 0);
+  EXPECT_EQ(select_lens_model(seen_through(fisheye_lens(), 8)).value().beyond_rad, 0);
 }
 
 TEST(DescribeLensChoice, ExplainsFisheyeBeyondRightAngle) {

@@ -44,10 +44,10 @@ std::vector<BoardView> make_views(const StepAt& step_at, int count = 24) {
 }
 
 LensSharpness measured(const StepAt& step_at) {
-  return measure_sharpness(make_views(step_at), kSharpnessImager_px).value();
+  return measure_lens_sharpness(make_views(step_at), kSharpnessImager_px).value();
 }
 
-TEST(MeasureSharpness, ReturnsMtf50OfEvenLens) {
+TEST(MeasureLensSharpness, ReturnsMtf50OfEvenLens) {
   const LensSharpness even = measured(even_step);
   EXPECT_NEAR(even.mean_mtf50, compute_mtf50(kLensBlur_px), 0.02 * even.mean_mtf50);
   EXPECT_GT(even.worst_ratio, 0.97);
@@ -57,7 +57,7 @@ TEST(MeasureSharpness, ReturnsMtf50OfEvenLens) {
   EXPECT_NEAR(even.black_level, 14.0 / 190, 1e-6);
 }
 
-TEST(MeasureSharpness, IgnoresShakenViews) {
+TEST(MeasureLensSharpness, IgnoresShakenViews) {
   const LensSharpness still = measured(even_step);
   const LensSharpness shaken = measured([](const Eigen::Vector2d& at_px, int view) {
     EdgeStep step = even_step(at_px, view);
@@ -67,7 +67,7 @@ TEST(MeasureSharpness, IgnoresShakenViews) {
   EXPECT_NEAR(shaken.mean_mtf50, still.mean_mtf50, 0.02 * still.mean_mtf50);
 }
 
-TEST(MeasureSharpness, ReportsAsymmetryOfTiltedFocalPlane) {
+TEST(MeasureLensSharpness, ReportsAsymmetryOfTiltedFocalPlane) {
   const LensSharpness tilted = measured([](const Eigen::Vector2d& at_px, int view) {
     EdgeStep step = even_step(at_px, view);
     step.blur_px = std::hypot(step.blur_px, 1.0 * (at_px.x() / 400 - 1));
@@ -77,7 +77,7 @@ TEST(MeasureSharpness, ReportsAsymmetryOfTiltedFocalPlane) {
   EXPECT_LT(tilted.worst_ratio, 0.9);
 }
 
-TEST(MeasureSharpness, ReportsNoAsymmetryOfSymmetricLens) {
+TEST(MeasureLensSharpness, ReportsNoAsymmetryOfSymmetricLens) {
   const LensSharpness symmetric = measured([](const Eigen::Vector2d& at_px, int view) {
     EdgeStep step = even_step(at_px, view);
     step.blur_px *= 1 + 0.5 * (at_px - Eigen::Vector2d(400, 300)).squaredNorm() / 250000;
@@ -88,7 +88,7 @@ TEST(MeasureSharpness, ReportsNoAsymmetryOfSymmetricLens) {
   EXPECT_LT(symmetric.local_loss, 0.05);
 }
 
-TEST(MeasureSharpness, LocatesShadowOfDust) {
+TEST(MeasureLensSharpness, LocatesShadowOfDust) {
   const Eigen::Vector2d dust_px(500, 200);
   const LensSharpness dusty = measured([&](const Eigen::Vector2d& at_px, int view) {
     EdgeStep step = even_step(at_px, view);
@@ -102,7 +102,7 @@ TEST(MeasureSharpness, LocatesShadowOfDust) {
   EXPECT_LT(dusty.local_loss, 0.05);
 }
 
-TEST(MeasureSharpness, ReportsLossOfSmear) {
+TEST(MeasureLensSharpness, ReportsLossOfSmear) {
   const Eigen::Vector2d smear_px(300, 350);
   const LensSharpness smeared = measured([&](const Eigen::Vector2d& at_px, int view) {
     EdgeStep step = even_step(at_px, view);
@@ -115,7 +115,7 @@ TEST(MeasureSharpness, ReportsLossOfSmear) {
 }
 
 /// A part of the image with few views is not sharper than the others.
-TEST(MeasureSharpness, IsIndependentOfNumberOfViews) {
+TEST(MeasureLensSharpness, IsIndependentOfNumberOfViews) {
   std::mt19937 random(3);
   std::normal_distribution<double> of_view(0, 0.1);
   std::vector<double> ratios;
@@ -123,13 +123,14 @@ TEST(MeasureSharpness, IsIndependentOfNumberOfViews) {
     std::array<double, 24> factors{};
     for (double& factor : factors) factor = 1 + of_view(random);
     const LensSharpness uneven =
-        measure_sharpness(make_views([&](const Eigen::Vector2d& at_px, int view) {
-                            EdgeStep step = even_step(at_px, view);
-                            step.blur_px *= factors[static_cast<std::size_t>(view)];
-                            if (at_px.x() < 200 && view >= 6) step.blur_px = 0;  // not measured
-                            return step;
-                          }),
-                          kSharpnessImager_px)
+        measure_lens_sharpness(make_views([&](const Eigen::Vector2d& at_px, int view) {
+                                 EdgeStep step = even_step(at_px, view);
+                                 step.blur_px *= factors[static_cast<std::size_t>(view)];
+                                 if (at_px.x() < 200 && view >= 6)
+                                   step.blur_px = 0;  // not measured
+                                 return step;
+                               }),
+                               kSharpnessImager_px)
             .value();
     ratios.push_back(uneven.mtf50.at(1, 4) / uneven.mtf50.at(8, 4));
   }
@@ -138,7 +139,7 @@ TEST(MeasureSharpness, IsIndependentOfNumberOfViews) {
   EXPECT_NEAR(mean, 1, 0.03);
 }
 
-TEST(MeasureSharpness, ReportsUnknownShadowForFewTagsPerView) {
+TEST(MeasureLensSharpness, ReportsUnknownShadowForFewTagsPerView) {
   // Seven tags in a view are 28 edges, too few for a field of the light; all views cover the image.
   const auto dense = make_views(even_step, 140);
   std::vector<BoardView> views;
@@ -149,23 +150,23 @@ TEST(MeasureSharpness, ReportsUnknownShadowForFewTagsPerView) {
     });
     ASSERT_LT(view.seen.tags.size(), 8U);
   }
-  const auto found = measure_sharpness(views, kSharpnessImager_px);
+  const auto found = measure_lens_sharpness(views, kSharpnessImager_px);
   ASSERT_TRUE(found);
   EXPECT_TRUE(std::isfinite(found->local_loss));
   EXPECT_TRUE(std::isnan(found->local_shadow));
 }
 
-TEST(MeasureSharpness, ReturnsNulloptWithoutEdges) {
+TEST(MeasureLensSharpness, ReturnsNulloptWithoutEdges) {
   auto views = make_views(even_step, 6);
   for (BoardView& view : views) {
     for (TagDetection& tag : view.seen.tags) tag.steps = {};
   }
-  EXPECT_FALSE(measure_sharpness(views, kSharpnessImager_px));
+  EXPECT_FALSE(measure_lens_sharpness(views, kSharpnessImager_px));
 }
 
 TEST(Mtf50OfView, ReturnsMedianOfEdges) {
   const auto views = make_views(even_step, 1);
-  const auto found = compute_view_mtf50(views[0].seen);
+  const auto found = compute_median_edge_mtf50(views[0].seen);
   ASSERT_TRUE(found);
   EXPECT_NEAR(*found, compute_mtf50(kLensBlur_px), 0.01 * *found);
 }

@@ -16,26 +16,27 @@ constexpr std::array kImager_px{800, 600};
 IntrinsicsInput make_input(const Board& board, const std::vector<BoardView>& views,
                            LensModel model) {
   IntrinsicsInput input{BoardLattice(board), {}, kImager_px, model};
-  for (const BoardView& view : views) input.views.push_back(input.lattice.corners(view.seen));
+  for (const BoardView& view : views)
+    input.views.push_back(input.lattice.match_corners_to_flat_board(view.seen));
   return input;
 }
 
-class WriteCorners : public testing::TestWithParam<bool> {
+class WriteMrcalCorners : public testing::TestWithParam<bool> {
  protected:
   const TemporaryFolder folder;
   const SyntheticViews views{synthetic_board(GetParam()), synthetic_lens()};
 };
 
 /// Tests a plain board, and a Kalibr board, which is four lattices for mrcal.
-TEST_P(WriteCorners, KeepsSolutionAfterRoundTrip) {
+TEST_P(WriteMrcalCorners, KeepsSolutionAfterRoundTrip) {
   constexpr int count = 12;
   Random random(3);
   const IntrinsicsSolution solution = solve_intrinsics(views.input(count, random, 0.05));
   ASSERT_TRUE(solution.ok());
   std::vector<std::string> names;
   for (int i = 0; i < count; ++i) names.push_back(std::to_string(i) + ".png");
-  write_corners(folder / "corners.vnl", solution, names);
-  const auto read = read_corners(folder / "corners.vnl", views.board, kImager_px);
+  write_mrcal_corners(folder / "corners.vnl", solution, names);
+  const auto read = read_mrcal_corners(folder / "corners.vnl", views.board, kImager_px);
   ASSERT_FALSE(read.empty());
   ASSERT_EQ(read.size(), solution.views.size());
   std::size_t corners = 0;
@@ -55,7 +56,7 @@ TEST_P(WriteCorners, KeepsSolutionAfterRoundTrip) {
 }
 
 /// Images of two folders with the same names.
-TEST_P(WriteCorners, MakesImageNamesUnique) {
+TEST_P(WriteMrcalCorners, MakesImageNamesUnique) {
   constexpr std::size_t count = 8;
   Random random(3);
   const IntrinsicsSolution solution = solve_intrinsics(views.input(count, random, 0.05));
@@ -63,17 +64,18 @@ TEST_P(WriteCorners, MakesImageNamesUnique) {
   ASSERT_EQ(solution.views.size(), count);
   const std::vector<std::string> names{"0.png",   "1.png", "0.png", "1.png",
                                        "1.png-2", "a b",   "a_b",   "0.png"};
-  write_corners(folder / "corners.vnl", solution, names);
+  write_mrcal_corners(folder / "corners.vnl", solution, names);
   std::vector<std::string> found;
-  for (const BoardView& view : read_corners(folder / "corners.vnl", views.board, kImager_px)) {
-    EXPECT_TRUE(view.seen.any());
+  for (const BoardView& view :
+       read_mrcal_corners(folder / "corners.vnl", views.board, kImager_px)) {
+    EXPECT_TRUE(view.seen.has_corners());
     found.push_back(view.image);
   }
   EXPECT_EQ(found, (std::vector<std::string>{"0.png", "1.png", "0.png-2", "1.png-2", "1.png-2-2",
                                              "a_b", "a_b-2", "0.png-3"}));
 }
 
-INSTANTIATE_TEST_SUITE_P(Boards, WriteCorners, testing::Values(false, true));
+INSTANTIATE_TEST_SUITE_P(Boards, WriteMrcalCorners, testing::Values(false, true));
 
 Board chessboard() {
   Board board{"", 4, 5, 0, 1, 1, false, 0, {false, BoardCorner::top_left}};
@@ -86,7 +88,7 @@ std::string row(const std::string& x_and_y, const std::string& fourth) {
   return "0.png " + x_and_y + " " + fourth + "\n";
 }
 
-TEST(ReadCorners, ComputesWeightsFromLevels) {
+TEST(ReadMrcalCorners, ComputesWeightsFromLevels) {
   const TemporaryFolder folder;
   std::string rows;
   for (int i = 0; i < 12; ++i) {
@@ -97,12 +99,12 @@ TEST(ReadCorners, ComputesWeightsFromLevels) {
   }
   rows += "none.png - -\n";
   const auto read = [&](const std::string& legend) {
-    return read_corners(folder.file("corners.vnl", "## a comment\n" + legend + rows), chessboard(),
-                        kImager_px);
+    return read_mrcal_corners(folder.file("corners.vnl", "## a comment\n" + legend + rows),
+                              chessboard(), kImager_px);
   };
   const auto by_level = read("# filename x y level\n");
   ASSERT_EQ(by_level.size(), 2U);
-  EXPECT_FALSE(by_level[1].seen.any());
+  EXPECT_FALSE(by_level[1].seen.has_corners());
   ASSERT_EQ(by_level[0].seen.points.size(), 11U);
   EXPECT_EQ(by_level[0].seen.points[0].index, 1U);
   EXPECT_EQ(by_level[0].seen.points[0].weight, 1);  // mrcal takes the whole part
@@ -114,15 +116,15 @@ TEST(ReadCorners, ComputesWeightsFromLevels) {
   EXPECT_EQ(by_weight[0].seen.points[1].weight, 1);
 }
 
-TEST(ReadCorners, ThrowsForExcessiveWeight) {
+TEST(ReadMrcalCorners, ThrowsForExcessiveWeight) {
   const TemporaryFolder folder;
   const auto file = folder.file("corners.vnl", "# filename x y weight\n" + row("100 100", "1e7"));
-  EXPECT_EQ(rejection_message([&] { read_corners(file, chessboard(), kImager_px); }),
+  EXPECT_EQ(rejection_message([&] { read_mrcal_corners(file, chessboard(), kImager_px); }),
             file.string() + ":2: a weight of 1e+07: weights go up to 1000");
 }
 
 /// Levels start at 0, so that weights above 1 are written as weights, also powers of two.
-TEST(ReadCorners, ReturnsWrittenWeights) {
+TEST(ReadMrcalCorners, ReturnsWrittenWeights) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(6);
   IntrinsicsInput input = views.input(6, random, 0.05);
@@ -136,9 +138,9 @@ TEST(ReadCorners, ReturnsWrittenWeights) {
     const TemporaryFolder folder;
     const auto file = folder / "corners.vnl";
     const std::vector<std::string> names{"0", "1", "2", "3", "4", "5"};
-    write_corners(file, solution, names);
+    write_mrcal_corners(file, solution, names);
     std::size_t corners = 0;
-    for (const BoardView& view : read_corners(file, views.board, kImager_px)) {
+    for (const BoardView& view : read_mrcal_corners(file, views.board, kImager_px)) {
       for (const PointDetection& point : view.seen.points) {
         EXPECT_TRUE(point.weight == most || point.weight == most / 4) << point.weight;
         ++corners;
@@ -152,7 +154,7 @@ TEST(ReadCorners, ReturnsWrittenWeights) {
 TEST(CornerWeight, ScalesInfluenceOnSolve) {
   const std::array fisheye{450.0, 451.0, 402.0, 297.0, 0.02, -0.01, 0.003, -0.0004};
   for (const Lens& lens : {synthetic_lens(), Lens(LensModel::fisheye, fisheye)}) {
-    SCOPED_TRACE(to_string(lens.model()));
+    SCOPED_TRACE(to_string(lens.lens_model()));
     const SyntheticViews views{synthetic_board(false), lens};
     Random random(5);
     IntrinsicsInput input = views.input(16, random, 0.05);

@@ -25,10 +25,10 @@ TEST(NumpyArchive, IsValidZipArchive) {
   const TemporaryFolder folder;
   NumpyArchive archive;
   const std::array values{1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
-  archive.add("matrix", {2, 3}, values);
-  archive.add("text", "LENSMODEL_OPENCV8");
-  archive.add("flag", true);
-  const auto file = folder.file("a.npz", archive.bytes());
+  archive.add_entry("matrix", {2, 3}, values);
+  archive.add_entry("text", "LENSMODEL_OPENCV8");
+  archive.add_entry("flag", true);
+  const auto file = folder.file("a.npz", archive.serialize());
   const auto checked = run_program("unzip -t '" + file.string() + "'");
   EXPECT_EQ(checked.exit_code, 0) << checked.output << checked.errors;
   const auto matrix = run_program("unzip -p '" + file.string() + "' matrix.npy | head -c 80");

@@ -23,8 +23,8 @@ TEST(ProjectionUncertainty, IsLargeForFrontalViews) {
   ASSERT_TRUE(tilted.ok());
   ASSERT_TRUE(frontal.ok());
   const Eigen::Vector2d place(700, 80);
-  EXPECT_GT(ProjectionUncertainty(frontal).worst_px(place),
-            5 * ProjectionUncertainty(tilted).worst_px(place));
+  EXPECT_GT(ProjectionUncertainty(frontal).max_direction_sd_px(place),
+            5 * ProjectionUncertainty(tilted).max_direction_sd_px(place));
 }
 
 TEST(ProjectionUncertainty, ReportsRegularizationBias) {
@@ -64,7 +64,7 @@ TEST(ProjectionUncertainty, MatchesMrcalForIndependentCorners) {
     Random random(8);
     const auto solution = solve_intrinsics(views.input(20, random, 0.05));
     ASSERT_TRUE(solution.ok());
-    write_cameramodel(folder / "camera.cameramodel", solution);
+    write_mrcal_cameramodel(folder / "camera.cameramodel", solution);
     const auto mrcals =
         run_program("/usr/bin/python3 -c \"import mrcal, numpy as np; m = mrcal.cameramodel('" +
                     (folder / "camera.cameramodel").string() +
@@ -72,7 +72,7 @@ TEST(ProjectionUncertainty, MatchesMrcalForIndependentCorners) {
                     "float), *m.intrinsics()), m, atinfinity = True, "
                     "what = 'worstdirection-stdev'))\"");
     ASSERT_EQ(mrcals.exit_code, 0) << mrcals.errors;
-    const double ours = ProjectionUncertainty(solution).worst_px({790, 10});
+    const double ours = ProjectionUncertainty(solution).max_direction_sd_px({790, 10});
     EXPECT_NEAR(std::stod(mrcals.output), ours, 1e-6 * ours);
   }
 }
@@ -86,7 +86,8 @@ TEST(ProjectionUncertainty, ByTagsMatchesByCornersForIndependentErrors) {
     ASSERT_TRUE(solution.ok());
     const ProjectionUncertainty by_corners(solution), by_tags(solution, input.lattice);
     for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(400, 300), Eigen::Vector2d(40, 80)}) {
-      EXPECT_NEAR(by_tags.worst_px(pixel) / by_corners.worst_px(pixel), 1, 0.2);
+      EXPECT_NEAR(by_tags.max_direction_sd_px(pixel) / by_corners.max_direction_sd_px(pixel), 1,
+                  0.2);
     }
   }
 }
@@ -97,34 +98,34 @@ TEST(CalibrationReport, HalvesAgreeWithReportedUncertainty) {
   const IntrinsicsInput input = views.input(24, random, 0.1);
   const IntrinsicsSolution solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.ok());
-  const CalibrationReport report = compute_report(solution, input);
+  const CalibrationReport report = compute_calibration_report(solution, input);
   ASSERT_TRUE(report.halves);
   // Twice the difference from the truth, within a factor for the few degrees of freedom.
   EXPECT_LT(report.halves->rms_px, 2.5 * 2 * report.expected_rms_px);
   EXPECT_GT(report.halves->rms_px, 0.3 * 2 * report.expected_rms_px);
 }
 
-TEST(ComputeHeldOutFit, MatchesNoiseOfSolvedViews) {
+TEST(EvaluateHeldOutViews, MatchesNoiseOfSolvedViews) {
   SyntheticViews views{synthetic_board(true), synthetic_lens()};
   views.warp_m = {0.0006, 0.0004};
   Random random(6);
   const IntrinsicsSolution solution = solve_intrinsics(views.input(20, random, 0.05));
   ASSERT_TRUE(solution.ok());
-  const HeldOut held_out = compute_held_out_fit(solution, views.input(6, random, 0.05));
+  const HeldOutFit held_out = evaluate_held_out_views(solution, views.input(6, random, 0.05));
   EXPECT_EQ(held_out.views, 6);
   EXPECT_NEAR(held_out.rms_px, 0.05, 0.006);
 }
 
-TEST(RecommendNextView, ReturnsEmptiestPartAndLeastTiltedSide) {
+TEST(RecommendNextBoardView, ReturnsEmptiestPartAndLeastTiltedSide) {
   ViewCoverage coverage;
   coverage.corners = {9, 9, 9, 9, 9, 2, 9, 9, 9};
   coverage.tilts_rad = {0.5, 0.6, 0.1, 0.5};
-  EXPECT_EQ(recommend_next_view(coverage),
+  EXPECT_EQ(recommend_next_board_view(coverage),
             "the board in the right middle of the image, its upper side 30 to 40 degrees nearer to "
             "the camera");
 }
 
-TEST(ComputeViewCoverage, ReportsTiltOfNearerSide) {
+TEST(ComputeBoardViewCoverage, ReportsTiltOfNearerSide) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(9);
   const IntrinsicsInput input = views.input(12, random, 0);
@@ -132,7 +133,7 @@ TEST(ComputeViewCoverage, ReportsTiltOfNearerSide) {
   ASSERT_TRUE(solution.ok());
   solution.problem.poses.resize(1);
   solution.problem.poses[0].rotation = {0, 0.3, 0};  // its right comes nearer
-  const auto [left, right, upper, lower] = compute_view_coverage(solution, input).tilts_rad;
+  const auto [left, right, upper, lower] = compute_board_view_coverage(solution, input).tilts_rad;
   EXPECT_EQ(left, 0);
   EXPECT_NEAR(right, 0.3, 1e-9);
   EXPECT_NEAR(upper, 0, 1e-9);

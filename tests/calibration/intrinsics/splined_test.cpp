@@ -17,7 +17,7 @@
 namespace vlp {
 namespace {
 
-constexpr LensModel kSplined = lens_model_for({3, 14, 14, 205});
+constexpr LensModel kSplined = lens_model_for_spline_grid({3, 14, 14, 205});
 
 /// Returns boards all over the image of a lens with rays up to 100 degrees off its axis.
 IntrinsicsInput splined_input(int count, Random& random, double noise_px) {
@@ -39,17 +39,17 @@ TEST(SolveSplinedLens, MatchesTruthBeyondNinetyDegrees) {
   EXPECT_NEAR(solution.problem.noise_px, noise_px, 0.005);
   EXPECT_LT(up_to(90, solution.lens()).mean_px, 0.03);
   EXPECT_LT(up_to(94, solution.lens()).worst_px, 0.1);
-  const CalibrationReport report = compute_report(solution, input);
+  const CalibrationReport report = compute_calibration_report(solution, input);
   EXPECT_LT(report.uncertainty_mean_px, 0.05);
   ASSERT_TRUE(report.halves);
   EXPECT_LT(report.halves->mean_px, 0.1);
   // The frame is that of the true lens, which is symmetric.
-  const auto turn =
-      fit_rotation(wide_lens(), solution.lens(), collect_inlier_pixels(solution.problem));
+  const auto turn = fit_rotation_between_lenses(wide_lens(), solution.lens(),
+                                                collect_inlier_pixels(solution.problem));
   ASSERT_TRUE(turn);
   EXPECT_LT(Eigen::AngleAxisd(*turn).angle() * 180 / std::numbers::pi, 0.02);
-  EXPECT_NEAR(solution.lens().center_px().x(), 501, 0.2);
-  EXPECT_NEAR(solution.lens().center_px().y(), 498, 0.2);
+  EXPECT_NEAR(solution.lens().principal_point_px().x(), 501, 0.2);
+  EXPECT_NEAR(solution.lens().principal_point_px().y(), 498, 0.2);
   const ProjectionUncertainty uncertainty(solution);
   EXPECT_EQ(uncertainty.intrinsics_covariance().topRows<4>().norm(), 0);
 }
@@ -66,7 +66,7 @@ TEST(SolveSplinedLens, RejectsTagsWithDisplacedEdge) {
     auto& corners = input.views[view];
     std::size_t farthest = 0;
     const auto off_axis_px = [&](std::size_t k) {
-      return (corners[k].pixel - wide_lens().center_px()).norm();
+      return (corners[k].pixel - wide_lens().principal_point_px()).norm();
     };
     for (std::size_t k = 0; k < corners.size(); k += corners_per_tag) {
       if (off_axis_px(k) > off_axis_px(farthest)) farthest = k;
@@ -84,7 +84,7 @@ TEST(SolveSplinedLens, RejectsTagsWithDisplacedEdge) {
 TEST(SolveSplinedLens, FailsWhenGridIsTooNarrow) {
   Random random(19);
   IntrinsicsInput input = splined_input(12, random, 0.05);
-  input.lens_model = lens_model_for({3, 10, 10, 120});
+  input.lens_model = lens_model_for_spline_grid({3, 10, 10, 120});
   const IntrinsicsSolution solution = solve_intrinsics(input);
   EXPECT_FALSE(solution.ok());
 }
@@ -97,14 +97,14 @@ TEST(SolveSplinedLens, KeepsTagsThatFisheyeFitsPoorly) {
   Random random(18);
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   IntrinsicsInput input = views.input(count, random, noise_px);
-  input.lens_model = lens_model_for({3, 14, 11, 90});
+  input.lens_model = lens_model_for_spline_grid({3, 14, 11, 90});
   const IntrinsicsSolution good = solve_intrinsics(input);
   ASSERT_TRUE(good.ok()) << describe(good.status);
   EXPECT_EQ(good.outliers, 0);
   for (std::size_t view = 0; view < count; view += 8) {
     auto& corners = input.views[view];
     const auto off_axis_px = [&](std::size_t k) {
-      return (corners[k].pixel - views.lens.center_px()).norm();
+      return (corners[k].pixel - views.lens.principal_point_px()).norm();
     };
     std::size_t farthest = 0;
     for (std::size_t k = 0; k < corners.size(); k += corners_per_tag) {
@@ -116,8 +116,8 @@ TEST(SolveSplinedLens, KeepsTagsThatFisheyeFitsPoorly) {
   const IntrinsicsSolution slipped = solve_intrinsics(input);
   ASSERT_TRUE(slipped.ok()) << describe(slipped.status);
   EXPECT_GE(slipped.outliers, 20);  // the tags whole
-  const ImageRegion region = compute_known_region(collect_inlier_pixels(slipped.problem),
-                                                  input.imager_px, input.lens_model);
+  const ImageRegion region = compute_valid_lens_region(collect_inlier_pixels(slipped.problem),
+                                                       input.imager_px, input.lens_model);
   const auto difference = compute_projection_difference(
       views.lens, slipped.lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
         return polygon_contains(region, pixel) ? 1.0 : INFINITY;
@@ -131,8 +131,9 @@ TEST(SolveSplinedLens, KeepsTagsThatFisheyeFitsPoorly) {
 Eigen::Vector3d mean_turn(const IntrinsicsSolution& from, const IntrinsicsSolution& to) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < from.problem.poses.size(); ++i) {
-    const Eigen::AngleAxisd turn(rotation_by(to.problem.poses[i].rotation) *
-                                 rotation_by(from.problem.poses[i].rotation).transpose());
+    const Eigen::AngleAxisd turn(
+        rotation_matrix_from_vector(to.problem.poses[i].rotation) *
+        rotation_matrix_from_vector(from.problem.poses[i].rotation).transpose());
     sum += turn.angle() * turn.axis();
   }
   return sum / static_cast<double>(from.problem.poses.size());
@@ -144,7 +145,7 @@ TEST(ProjectionUncertainty, MatchesScatterOfSplinedLens) {
   constexpr double noise_px = 0.1;
   Random of_boards(41);
   IntrinsicsInput exact = splined_input(16, of_boards, 0);
-  exact.lens_model = lens_model_for({3, 10, 10, 205});
+  exact.lens_model = lens_model_for_spline_grid({3, 10, 10, 205});
   exact.warp = WarpChoice::off;
   const auto solved = [&](std::uint64_t seed) {
     IntrinsicsInput input = exact;
@@ -167,17 +168,18 @@ TEST(ProjectionUncertainty, MatchesScatterOfSplinedLens) {
   const ProjectionUncertainty uncertainty(first);
   const Lens lens = first.lens();
   double squares = 0, freedoms = 0;
-  for (const Eigen::Vector2d& pixel : make_pixel_grid(kWideImager)) {
+  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(kWideImager)) {
     const auto ray = lens.unproject(pixel);
     if (!ray || ray->direction.normalized().z() < 0) continue;
     std::vector<Eigen::Vector2d> seen;
     Eigen::Vector2d mean(0, 0);
     for (const IntrinsicsSolution& solution : solutions) {
-      const Eigen::Vector3d turned = rotation_by(mean_turn(first, solution)) * ray->direction;
+      const Eigen::Vector3d turned =
+          rotation_matrix_from_vector(mean_turn(first, solution)) * ray->direction;
       seen.push_back(solution.lens().project(turned).value());
       mean += seen.back() / seeds;
     }
-    const Eigen::Matrix2d information = uncertainty.covariance(pixel).inverse();
+    const Eigen::Matrix2d information = uncertainty.projection_covariance(pixel).inverse();
     for (const Eigen::Vector2d& one : seen) squares += (one - mean).dot(information * (one - mean));
     freedoms += 2 * (seeds - 1);
   }

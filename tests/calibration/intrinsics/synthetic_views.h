@@ -70,7 +70,7 @@ struct SyntheticViews {
 
   /// Returns the tags completely in the image of a board at a random pose in front of the camera.
   BoardDetection random_view(Random& random, double noise_px) const {
-    const Eigen::Vector2d field_m = tag_field_m(board);
+    const Eigen::Vector2d field_m = compute_tag_field_size_m(board);
     const double fill_m = lens.focal_px().x() * field_m.x() / imager_px[0];
     for (;;) {
       const double azimuth = random.uniform(-3.2, 3.2), tilt = random.uniform(0, tilt_rad);
@@ -88,7 +88,7 @@ struct SyntheticViews {
   /// `rotation`: camera from board; `middle_m`: middle of the board in the camera frame.
   BoardDetection view(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& middle_m,
                       Random& random, double noise_px) const {
-    const Eigen::Vector2d field_m = tag_field_m(board);
+    const Eigen::Vector2d field_m = compute_tag_field_size_m(board);
     BoardDetection seen;
     for (const BoardTag& place : list_board_tags(board)) {
       TagDetection tag{place.id, {}};
@@ -112,10 +112,11 @@ struct SyntheticViews {
   }
 
   IntrinsicsInput input(int views, Random& random, double noise_px) const {
-    IntrinsicsInput input{BoardLattice(board), {}, imager_px, lens.model()};
+    IntrinsicsInput input{BoardLattice(board), {}, imager_px, lens.lens_model()};
     while (static_cast<int>(input.views.size()) < views) {
       const BoardDetection seen = random_view(random, noise_px);
-      if (input.lattice.sufficient(seen)) input.views.push_back(input.lattice.corners(seen));
+      if (input.lattice.has_sufficient_corners(seen))
+        input.views.push_back(input.lattice.match_corners_to_flat_board(seen));
     }
     return input;
   }

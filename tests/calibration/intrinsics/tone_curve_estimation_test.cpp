@@ -144,7 +144,7 @@ TEST(EstimateToneCurve, MatchesLevelsWhenHalfOfViewsHaveNoCurve) {
     views.back().seen.curve_costs = {0, 40};
     for (TagDetection& tag : views.back().seen.tags) tag.tone_curve_fits.clear();
   }
-  const double by_levels = estimate_gamma(sum_tone_curve_costs(views));
+  const double by_levels = estimate_tone_curve_gamma(sum_tone_curve_costs(views));
   EXPECT_GT(by_levels, 1.2);
   EXPECT_NEAR(estimate_and_apply_tone_curve(views, synthetic_board(false)), by_levels, 1e-9);
 }
@@ -157,7 +157,7 @@ TEST(EstimateToneCurve, ReturnsOneForCorrectedViews) {
   EXPECT_EQ(views[0].seen.tags[0].corners_px, once);
 }
 
-TEST(EstimateLens, AppliesToneCurveToAllViews) {
+TEST(EstimateLens, CorrectsAllViewsForToneCurve) {
   const Board board = synthetic_board(false);
   const std::vector<BoardView> views = CodedCamera{1.8, 1.8}.views(12, 3);
   std::vector<BoardView> expected = views;

@@ -13,10 +13,10 @@ constexpr std::array kImager{801, 601};
 constexpr double kMargin = 40;  // 4 % of 1000 px
 
 TEST(KnownRegion, IsConvexHullWithMargin) {
-  const ImageRegion region = compute_known_region(
+  const ImageRegion region = compute_valid_lens_region(
       {{200, 100}, {600, 100}, {400, 250}, {600, 500}, {200, 500}}, kImager, LensModel::opencv8);
   EXPECT_EQ(region.size(), 4U);
-  EXPECT_NEAR(compute_image_fraction(region, kImager),
+  EXPECT_NEAR(compute_fraction_of_image_area(region, kImager),
               (400 + 2 * kMargin) * (400 + 2 * kMargin) / (800 * 600), 1e-12);
   EXPECT_TRUE(polygon_contains(region, {161, 61}));
   EXPECT_TRUE(polygon_contains(region, {160, 300}));
@@ -25,9 +25,9 @@ TEST(KnownRegion, IsConvexHullWithMargin) {
 }
 
 TEST(KnownRegion, IsClippedToImage) {
-  const ImageRegion region =
-      compute_known_region({{5, 5}, {790, 5}, {790, 590}, {5, 590}}, kImager, LensModel::opencv8);
-  EXPECT_NEAR(compute_image_fraction(region, kImager), 1, 1e-12);
+  const ImageRegion region = compute_valid_lens_region({{5, 5}, {790, 5}, {790, 590}, {5, 590}},
+                                                       kImager, LensModel::opencv8);
+  EXPECT_NEAR(compute_fraction_of_image_area(region, kImager), 1, 1e-12);
   for (const Eigen::Vector2d& corner : region) {
     EXPECT_TRUE(corner.x() == 0 || corner.x() == 800);
     EXPECT_TRUE(corner.y() == 0 || corner.y() == 600);
@@ -36,18 +36,19 @@ TEST(KnownRegion, IsClippedToImage) {
 }
 
 TEST(KnownRegion, FollowsSlantedHull) {
-  const ImageRegion region = compute_known_region({{100, 100}, {700, 500}, {690, 510}, {90, 110}},
-                                                  kImager, LensModel::opencv8);
+  const ImageRegion region = compute_valid_lens_region(
+      {{100, 100}, {700, 500}, {690, 510}, {90, 110}}, kImager, LensModel::opencv8);
   EXPECT_TRUE(polygon_contains(region, {400, 300}));
   EXPECT_FALSE(polygon_contains(region, {700, 100}));
-  EXPECT_LT(compute_image_fraction(region, kImager), 0.3);
+  EXPECT_LT(compute_fraction_of_image_area(region, kImager), 0.3);
 }
 
 TEST(KnownRegion, IsEmptyForCollinearCorners) {
-  EXPECT_TRUE(compute_known_region({}, kImager, LensModel::opencv8).empty());
+  EXPECT_TRUE(compute_valid_lens_region({}, kImager, LensModel::opencv8).empty());
   EXPECT_TRUE(
-      compute_known_region({{1, 1}, {2, 2}, {3, 3}, {9, 9}}, kImager, LensModel::opencv8).empty());
-  EXPECT_EQ(compute_image_fraction({}, kImager), 0);
+      compute_valid_lens_region({{1, 1}, {2, 2}, {3, 3}, {9, 9}}, kImager, LensModel::opencv8)
+          .empty());
+  EXPECT_EQ(compute_fraction_of_image_area({}, kImager), 0);
 }
 
 }  // namespace

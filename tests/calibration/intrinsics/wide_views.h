@@ -59,7 +59,7 @@ inline BoardDetection wide_view(const SyntheticViews& views, Random& random, dou
 }
 
 inline bool has_enough_tags(const BoardDetection& seen, const BoardLattice& lattice) {
-  return seen.tags.size() > 5 && lattice.sufficient(seen);
+  return seen.tags.size() > 5 && lattice.has_sufficient_corners(seen);
 }
 
 inline IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double noise_px,
@@ -69,7 +69,8 @@ inline IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double
   IntrinsicsInput input{BoardLattice(views.board), {}, kWideImager, LensModel::fisheye};
   while (static_cast<int>(input.views.size()) < count) {
     const BoardDetection seen = wide_view(views, random, noise_px, boards);
-    if (has_enough_tags(seen, input.lattice)) input.views.push_back(input.lattice.corners(seen));
+    if (has_enough_tags(seen, input.lattice))
+      input.views.push_back(input.lattice.match_corners_to_flat_board(seen));
   }
   return input;
 }

@@ -15,7 +15,7 @@ namespace {
 
 std::vector<LampOffset> compute_offsets(const LampMap& map, const std::vector<CeilingView>& views) {
   const auto found = estimate_lamp_displacements(map, views);
-  return found ? compute_offsets_from_others(*found) : std::vector<LampOffset>();
+  return found ? compute_offsets_from_other_lamps(*found) : std::vector<LampOffset>();
 }
 
 /// Captures of eight lamps from twelve positions, with wrong fixes: position, yaw and height have

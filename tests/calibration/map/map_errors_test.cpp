@@ -17,7 +17,7 @@ using testing::IsEmpty;
 using testing::SizeIs;
 
 /// Camera that is tilted by 3 degrees, which its calibration does not contain.
-class FindMapErrors : public testing::Test {
+class FindLampMapErrors : public testing::Test {
  protected:
   Random random{41};
   SyntheticRig rig = make_tilted_rig(0.05, 1);
@@ -30,7 +30,7 @@ class FindMapErrors : public testing::Test {
     return camera;
   }
   std::vector<MapError> errors() const {
-    return find_map_errors(frames, map, extract_camera()).errors;
+    return detect_misplaced_or_swapped_lamps(frames, map, extract_camera()).errors;
   }
   std::string found() const { return describe(errors()); }
   std::vector<Frame> noisy_drive() {
@@ -53,14 +53,15 @@ class FindMapErrors : public testing::Test {
   Eigen::Vector3d& place(std::size_t lamp) { return map.lamps[lamp].position_m; }
 };
 
-TEST_F(FindMapErrors, ReturnsNoneForCorrectMap) {
-  ASSERT_THAT(find_map_errors(frames, map, extract_camera()).offsets, SizeIs(map.lamps.size()));
+TEST_F(FindLampMapErrors, ReturnsNoneForCorrectMap) {
+  ASSERT_THAT(detect_misplaced_or_swapped_lamps(frames, map, extract_camera()).offsets,
+              SizeIs(map.lamps.size()));
   EXPECT_EQ(found(), "");
   for (Lamp& lamp : map.lamps) lamp.position_m.x() += random.uniform(-0.005, 0.005);
   EXPECT_EQ(found(), "") << "5 mm are for --refine-map";
 }
 
-TEST_F(FindMapErrors, ReturnsOffsetOfOneLampForAnyTilt) {
+TEST_F(FindLampMapErrors, ReturnsOffsetOfOneLampForAnyTilt) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     map = rig.map;
     place(i).head<2>() += Eigen::Vector2d(-0.03, 0.004);
@@ -69,7 +70,7 @@ TEST_F(FindMapErrors, ReturnsOffsetOfOneLampForAnyTilt) {
     EXPECT_EQ(one[0].kind, MapErrorKind::moved);
     EXPECT_EQ(one[0].lamps, std::vector<int>{map.lamps[i].id});
     EXPECT_LT((one[0].offset_m - Eigen::Vector3d(0.03, -0.004, 0)).norm(), 1e-3);
-    const MapErrors leveled = find_map_errors(frames, map, rig.calibration);
+    const MapErrors leveled = detect_misplaced_or_swapped_lamps(frames, map, rig.calibration);
     EXPECT_EQ(describe(leveled.errors), found()) << "with the tilt in the calibration";
     EXPECT_THAT(leveled.offsets, SizeIs(map.lamps.size()));
   }
@@ -77,7 +78,7 @@ TEST_F(FindMapErrors, ReturnsOffsetOfOneLampForAnyTilt) {
               testing::StartsWith("lamp 8 hangs 30 mm from where the map has it (x +30 mm"));
 }
 
-TEST_F(FindMapErrors, ReturnsThreeDisplacedLampsOfEight) {
+TEST_F(FindLampMapErrors, ReturnsThreeDisplacedLampsOfEight) {
   survey(1e-3);
   place(0).x() += 0.05;
   place(3).y() -= 0.07;
@@ -91,7 +92,7 @@ TEST_F(FindMapErrors, ReturnsThreeDisplacedLampsOfEight) {
 
 /// With three lamps any of them may be displaced. With four, the other lamps determine the scatter
 /// of the map poorly.
-TEST_F(FindMapErrors, RequiresLargerOffsetsForFewLamps) {
+TEST_F(FindLampMapErrors, RequiresLargerOffsetsForFewLamps) {
   use_lamps(3);
   place(0).x() += 0.05;
   EXPECT_THAT(errors(), IsEmpty());
@@ -108,7 +109,7 @@ TEST_F(FindMapErrors, RequiresLargerOffsetsForFewLamps) {
 
 /// Its detections contradict the other lamps in all directions. They are rejected, but the lamp is
 /// still reported.
-TEST_F(FindMapErrors, DetectsLampOfWrongHeight) {
+TEST_F(FindLampMapErrors, DetectsLampOfWrongHeight) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     map = rig.map;
     place(i).z() -= 0.1;
@@ -119,7 +120,7 @@ TEST_F(FindMapErrors, DetectsLampOfWrongHeight) {
 }
 
 /// In a large room each capture contains few of the lamps.
-TEST_F(FindMapErrors, DetectsMirroredMapOfLargeRoom) {
+TEST_F(FindLampMapErrors, DetectsMirroredMapOfLargeRoom) {
   constexpr int rows = 10;
   constexpr double distance_m = 1.2, height_m = 2.5, reach_m = 1.9;
   map.lamps.clear();
@@ -152,7 +153,7 @@ TEST_F(FindMapErrors, DetectsMirroredMapOfLargeRoom) {
   EXPECT_THAT(found(), HasSubstr("most captures contradict the lamp map"));
 }
 
-TEST_F(FindMapErrors, KeepsFalseAlarmRateBelowLimit) {
+TEST_F(FindLampMapErrors, KeepsFalseAlarmRateBelowLimit) {
   constexpr int maps = 400, max_alarms = 10;  // p = 0.01: 4 are expected
   for (const std::size_t lamps : {5U, 8U}) {
     rig = make_tilted_rig(0.05, 1);
@@ -164,7 +165,7 @@ TEST_F(FindMapErrors, KeepsFalseAlarmRateBelowLimit) {
         for (Lamp& lamp : map.lamps) {
           if (is_stated) lamp.sd_m = 2e-3;
         }
-        const MapErrors judged = find_map_errors(frames, map, extract_camera());
+        const MapErrors judged = detect_misplaced_or_swapped_lamps(frames, map, extract_camera());
         // Without offsets and errors, the captures would be too few for an alarm.
         ASSERT_FALSE(judged.offsets.empty() && judged.errors.empty());
         alarms += judged.errors.empty() ? 0 : 1;
@@ -175,7 +176,7 @@ TEST_F(FindMapErrors, KeepsFalseAlarmRateBelowLimit) {
   }
 }
 
-TEST_F(FindMapErrors, ReportsStandardDeviationOfOffsets) {
+TEST_F(FindLampMapErrors, ReportsStandardDeviationOfOffsets) {
   constexpr int maps = 200;
   double squares = 0;
   int count = 0;
@@ -195,12 +196,12 @@ TEST_F(FindMapErrors, ReportsStandardDeviationOfOffsets) {
   EXPECT_NEAR(std::sqrt(squares / count), 1, 0.15);
 }
 
-TEST_F(FindMapErrors, DetectsMirroredMap) {
+TEST_F(FindLampMapErrors, DetectsMirroredMap) {
   for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;
   EXPECT_THAT(found(), HasSubstr("looks mirrored"));
 }
 
-TEST_F(FindMapErrors, DetectsSwappedLamps) {
+TEST_F(FindLampMapErrors, DetectsSwappedLamps) {
   for (const auto& [first, second] : {std::pair(2, 4), std::pair(0, 7)}) {
     map = rig.map;
     std::swap(place(static_cast<std::size_t>(first)), place(static_cast<std::size_t>(second)));
@@ -209,7 +210,7 @@ TEST_F(FindMapErrors, DetectsSwappedLamps) {
   }
 }
 
-TEST_F(FindMapErrors, DetectsSwappedLampsOfFour) {
+TEST_F(FindLampMapErrors, DetectsSwappedLampsOfFour) {
   use_lamps(4);
   rig.map.lamps[1].position_m.x() =
       0.5;  // a rectangle's mirror image is an exchange of its corners
@@ -219,7 +220,7 @@ TEST_F(FindMapErrors, DetectsSwappedLampsOfFour) {
 }
 
 /// No similarity takes a square to its mirror image.
-TEST_F(FindMapErrors, DetectsMirroredSquare) {
+TEST_F(FindLampMapErrors, DetectsMirroredSquare) {
   for (std::size_t i = 0; i < 4; ++i) {
     Eigen::Vector3d& corner_m = rig.map.lamps[i].position_m;
     corner_m.x() = std::copysign(corner_m.y(), corner_m.x());
@@ -230,7 +231,7 @@ TEST_F(FindMapErrors, DetectsMirroredSquare) {
   EXPECT_THAT(found(), HasSubstr("looks mirrored"));
 }
 
-TEST_F(FindMapErrors, ReportsLampWithMostOutliers) {
+TEST_F(FindLampMapErrors, ReportsLampWithMostOutliers) {
   for (std::size_t i = 0; i < 6; ++i) {
     std::swap(frames[i].detections[0], frames[i].detections.back());
     frames[i].detections.back().pixel += Eigen::Vector2d(i % 2 == 0 ? 60 : -40, 30);
@@ -238,14 +239,14 @@ TEST_F(FindMapErrors, ReportsLampWithMostOutliers) {
   EXPECT_THAT(found(), HasSubstr("lamp 1 contradicts the other lamps in 6 of "));
 }
 
-TEST_F(FindMapErrors, ReportsOtherRoomWithoutLamps) {
+TEST_F(FindLampMapErrors, ReportsOtherRoomWithoutLamps) {
   for (Lamp& lamp : map.lamps) {
     lamp.position_m.head<2>() = Eigen::Vector2d(random.uniform(-1, 1), random.uniform(-1, 1));
   }
   EXPECT_THAT(found(), HasSubstr("most captures contradict the lamp map"));
   for (Lamp& lamp : map.lamps) lamp.id += 100;
   EXPECT_EQ(found(), "");
-  EXPECT_THAT(find_unseen_lamps(frames, map), SizeIs(map.lamps.size()));
+  EXPECT_THAT(find_undetected_lamps(frames, map), SizeIs(map.lamps.size()));
   frames.clear();
   EXPECT_EQ(found(), "");
 }

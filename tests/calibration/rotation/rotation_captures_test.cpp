@@ -21,9 +21,10 @@ void expect_axis(const RotationFit& found, const RotationScene& scene, double wi
       within_deg);
 }
 
-TEST(FindRotationCaptures, EstimatesHeightsYawsAndAxes) {
+TEST(NumCapturesPerPivot, EstimatesHeightsYawsAndAxes) {
   const RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
-  const RotationCaptures rotation = find_rotation_captures(scene.frames(), scene.map, scene.camera);
+  const RotationCaptures rotation =
+      find_in_place_rotation_captures(scene.frames(), scene.map, scene.camera);
   ASSERT_EQ(rotation.status, RotationStatus::ok);
   ASSERT_EQ(rotation.captures.size(), 24U);
   ASSERT_EQ(rotation.heights.size(), 2U);
@@ -40,7 +41,7 @@ TEST(FindRotationCaptures, EstimatesHeightsYawsAndAxes) {
   EXPECT_TRUE(rotation.rejected.empty());
 }
 
-TEST(FindRotationCaptures, AcceptsTwoLampsAndThreeCaptures) {
+TEST(NumCapturesPerPivot, AcceptsTwoLampsAndThreeCaptures) {
   RotationScene scene;
   scene.tilt_rad = rad_from_deg(10);
   scene.map = make_lamp_map({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}});
@@ -49,24 +50,25 @@ TEST(FindRotationCaptures, AcceptsTwoLampsAndThreeCaptures) {
   expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
 }
 
-TEST(FindRotationCaptures, AcceptsLampsAtSeveralHeights) {
+TEST(NumCapturesPerPivot, AcceptsLampsAtSeveralHeights) {
   RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.map =
       make_lamp_map({{-0.5, -0.35, 1.6}, {0.5, 0.2, 1.4}, {-0.4, 0.3, 1.8}, {0.1, -0.4, 1.5}});
   expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
 }
 
-TEST(FindRotationCaptures, AcceptsQuarterRotation) {
+TEST(NumCapturesPerPivot, AcceptsQuarterRotation) {
   RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.arc_rad = rad_from_deg(105);  // minus the uneven steps at the ends
   expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
 }
 
-TEST(FindRotationCaptures, RejectsHeightWithTooFewCaptures) {
+TEST(NumCapturesPerPivot, RejectsHeightWithTooFewCaptures) {
   const RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   auto frames = scene.frames();
   frames.resize(14);
-  const RotationCaptures rotation = find_rotation_captures(frames, scene.map, scene.camera);
+  const RotationCaptures rotation =
+      find_in_place_rotation_captures(frames, scene.map, scene.camera);
   ASSERT_EQ(rotation.status, RotationStatus::ok);
   EXPECT_EQ(rotation.heights.size(), 1U);
   ASSERT_EQ(rotation.rejected.size(), 2U);
@@ -74,7 +76,7 @@ TEST(FindRotationCaptures, RejectsHeightWithTooFewCaptures) {
 }
 
 /// One third of the captures with a large error of one lamp and the noise of a poor detector.
-TEST(FitRotationAxis, RejectsOutliers) {
+TEST(FitRotationBetweenLensesAxis, RejectsOutliers) {
   const RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   Random random(5);
   auto frames = with_noise(scene.frames(0.05), random);
@@ -84,7 +86,8 @@ TEST(FitRotationAxis, RejectsOutliers) {
     one.pixel += Eigen::Vector2d(random.uniform(2, 60), random.uniform(-60, -2));
     wrong.emplace_back(frames[i].image, one.lamp);
   }
-  const RotationCaptures rotation = find_rotation_captures(frames, scene.map, scene.camera);
+  const RotationCaptures rotation =
+      find_in_place_rotation_captures(frames, scene.map, scene.camera);
   ASSERT_EQ(rotation.status, RotationStatus::ok);
   EXPECT_TRUE(rotation.rejected.empty());
   const RotationFit found = fit_rotation_axis(rotation, scene.camera);
@@ -99,14 +102,15 @@ TEST(FitRotationAxis, RejectsOutliers) {
   EXPECT_LE(named.size(), wrong.size() + 1);
 }
 
-TEST(FindRotationCaptures, RejectsCaptureWithMisidentifiedLamp) {
+TEST(NumCapturesPerPivot, RejectsCaptureWithMisidentifiedLamp) {
   RotationScene scene;
   scene.tilt_rad = rad_from_deg(1.5);
   scene.map = make_lamp_map({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}, {0.1, 0.4, 1.6}});
   auto frames = scene.frames();
   for (Frame& frame : frames) frame.detections.resize(2);
   frames[4].detections[1].lamp = 3;
-  const RotationCaptures rotation = find_rotation_captures(frames, scene.map, scene.camera);
+  const RotationCaptures rotation =
+      find_in_place_rotation_captures(frames, scene.map, scene.camera);
   ASSERT_EQ(rotation.status, RotationStatus::ok);
   ASSERT_EQ(rotation.rejected.size(), 1U);
   EXPECT_EQ(rotation.rejected[0].image, "4.png");
@@ -114,7 +118,7 @@ TEST(FindRotationCaptures, RejectsCaptureWithMisidentifiedLamp) {
 }
 
 /// The fit uses the heights of the map, but not its horizontal positions.
-TEST(FitRotationAxis, ToleratesHorizontalMapErrors) {
+TEST(FitRotationBetweenLensesAxis, ToleratesHorizontalMapErrors) {
   RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.arc_rad = 2.5;
   const auto frames = scene.frames();

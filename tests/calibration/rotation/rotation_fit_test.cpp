@@ -29,7 +29,7 @@ void expect_exact(const RotationScene& scene) {
   }
 }
 
-TEST(FitRotationAxis, ReturnsExactAxisAtOneHeightWithoutLeverArm) {
+TEST(FitRotationBetweenLensesAxis, ReturnsExactAxisAtOneHeightWithoutLeverArm) {
   for (const double tilt_deg : {0.0, 0.5, 2.0, 5.0, 10.0}) {
     SCOPED_TRACE(tilt_deg);
     RotationScene scene;
@@ -38,18 +38,19 @@ TEST(FitRotationAxis, ReturnsExactAxisAtOneHeightWithoutLeverArm) {
   }
 }
 
-TEST(FitRotationAxis, RejectsCapturesAboutTwoAxes) {
+TEST(FitRotationBetweenLensesAxis, RejectsCapturesAboutTwoAxes) {
   RotationScene scene, elsewhere;
   elsewhere.axis_m.x() += 0.07;
   auto frames = scene.frames(0.1);
   const auto others = elsewhere.frames(0.1);
   for (std::size_t i = 0; i < frames.size(); i += 2) frames[i].detections = others[i].detections;
-  const RotationCaptures rotation = find_rotation_captures(frames, scene.map, scene.camera);
+  const RotationCaptures rotation =
+      find_in_place_rotation_captures(frames, scene.map, scene.camera);
   EXPECT_TRUE(rotation.status != RotationStatus::ok ||
               !fit_rotation_axis(rotation, scene.camera).converged);
 }
 
-TEST(FitRotationAxis, ReturnsExactLeverArmAtTwoHeights) {
+TEST(FitRotationBetweenLensesAxis, ReturnsExactLeverArmAtTwoHeights) {
   for (const double tilt_deg : {0.0, 0.5, 2.0, 5.0, 10.0}) {
     for (const Eigen::Vector2d& lever_arm_m :
          {Eigen::Vector2d(0, 0), Eigen::Vector2d(0.002, -0.001), Eigen::Vector2d(0.012, -0.009),
@@ -65,7 +66,7 @@ TEST(FitRotationAxis, ReturnsExactLeverArmAtTwoHeights) {
 }
 
 /// Lamps anywhere in view, few captures, small arcs: the closed-form initial values suffice.
-TEST(FitRotationAxis, ConvergesForRandomScenes) {
+TEST(FitRotationBetweenLensesAxis, ConvergesForRandomScenes) {
   Random random(11);
   for (int i = 0; i < 150; ++i) {
     SCOPED_TRACE(i);

@@ -24,12 +24,12 @@ RotationScene high_scene() {
 }
 
 RotationCaptures find_captures(const RotationScene& scene, const std::vector<Frame>& frames) {
-  RotationCaptures rotation = find_rotation_captures(frames, scene.map, scene.camera);
+  RotationCaptures rotation = find_in_place_rotation_captures(frames, scene.map, scene.camera);
   EXPECT_EQ(rotation.status, RotationStatus::ok) << describe(rotation.status);
   return rotation;
 }
 
-TEST(FindRotationCaptures, SeparatesHeightsTenCentimetersApart) {
+TEST(NumCapturesPerPivot, SeparatesHeightsTenCentimetersApart) {
   RotationScene scene = high_scene();
   scene.heights_m = {0, 0.1};
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -40,7 +40,7 @@ TEST(FindRotationCaptures, SeparatesHeightsTenCentimetersApart) {
     EXPECT_EQ(rotation.captures.size(), 24U);
     const RotationFit found = fit_rotation_axis(rotation, scene.camera);
     ASSERT_TRUE(found.converged && found.center.covariance);
-    const auto sd_rad = axis_sd_rad(found.center, scene.camera);
+    const auto sd_rad = compute_rotation_axis_sd_rad(found.center, scene.camera);
     ASSERT_TRUE(sd_rad);
     EXPECT_LT(*sd_rad, rad_from_deg(0.1));
     // For 20 draws of a planar normal distribution, none exceeds five standard deviations.
@@ -49,7 +49,7 @@ TEST(FindRotationCaptures, SeparatesHeightsTenCentimetersApart) {
   }
 }
 
-TEST(FindRotationCaptures, SeparatesFourHeights) {
+TEST(NumCapturesPerPivot, SeparatesFourHeights) {
   RotationScene scene = high_scene();
   scene.heights_m = {0, 0.05, 0.15, 0.2};
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -62,7 +62,7 @@ TEST(FindRotationCaptures, SeparatesFourHeights) {
 }
 
 /// Noise of 1 px causes height errors of 1 % of the distance for fixes of two lamps.
-TEST(FindRotationCaptures, KeepsOneHeightUnderNoise) {
+TEST(NumCapturesPerPivot, KeepsOneHeightUnderNoise) {
   for (const std::size_t lamps : {std::size_t{2}, std::size_t{8}}) {
     RotationScene scene = tilted_scene();
     scene.map.lamps.resize(lamps);
@@ -78,7 +78,7 @@ TEST(FindRotationCaptures, KeepsOneHeightUnderNoise) {
   }
 }
 
-TEST(FitRotationAxis, EstimatesLeverArmFromLampsAtSeveralHeights) {
+TEST(FitRotationBetweenLensesAxis, EstimatesLeverArmFromLampsAtSeveralHeights) {
   RotationScene scene = tilted_scene();
   scene.map =
       make_lamp_map({{-0.5, -0.35, 1.6}, {0.5, 0.2, 1.4}, {-0.4, 0.3, 1.8}, {0.1, -0.4, 1.5}});
@@ -90,7 +90,7 @@ TEST(FitRotationAxis, EstimatesLeverArmFromLampsAtSeveralHeights) {
 }
 
 /// Lamps whose heights differ by 2 mm determine a lever arm of 15 mm only to several centimeters.
-TEST(FitRotationAxis, OmitsLeverArmForLampsAtNearlyOneHeight) {
+TEST(FitRotationBetweenLensesAxis, OmitsLeverArmForLampsAtNearlyOneHeight) {
   RotationScene scene = tilted_scene();
   for (std::size_t i = 0; i < scene.map.lamps.size(); i += 2) {
     scene.map.lamps[i].position_m.z() += 0.002;
@@ -103,7 +103,7 @@ TEST(FitRotationAxis, OmitsLeverArmForLampsAtNearlyOneHeight) {
 }
 
 /// With a lever arm and a single height, fixes are those of the axis at that height.
-TEST(FitRotationAxis, YieldsFixesOfAxisAtOneHeight) {
+TEST(FitRotationBetweenLensesAxis, YieldsFixesOfAxisAtOneHeight) {
   const RotationScene scene = tilted_scene();
   const RotationFit found = fit_rotation_axis(find_captures(scene, scene.frames()), scene.camera);
   ASSERT_TRUE(found.converged);

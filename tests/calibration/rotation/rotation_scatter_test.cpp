@@ -22,7 +22,7 @@ constexpr int kDraws = 300;
 constexpr double kNoise_px = 0.3;
 
 RotationFit mean_circle(const RotationCaptures& rotation, const Camera& camera) {
-  return fit_circle_centers(rotation, camera).mean;
+  return fit_centers_of_lamp_circles(rotation, camera).mean;
 }
 
 using Method = RotationFit (*)(const RotationCaptures&, const Camera&);
@@ -35,7 +35,7 @@ RotationFit draw_fit(const RotationScene& scene, const std::vector<Frame>& frame
       if (!noise_is_stated) detection.sigma_px.reset();
     }
   }
-  const RotationCaptures rotation = find_rotation_captures(noisy, scene.map, scene.camera);
+  const RotationCaptures rotation = find_in_place_rotation_captures(noisy, scene.map, scene.camera);
   EXPECT_EQ(rotation.status, RotationStatus::ok);
   const RotationFit fit = method(rotation, scene.camera);
   EXPECT_TRUE(fit.converged && fit.center.covariance);
@@ -51,7 +51,7 @@ void expect_consistent(const PlanarScatter& scatter) {
 void expect_consistent(const RotationScene& scene, Method method, bool unbiased) {
   Random random(7);
   const auto frames = scene.frames(kNoise_px);
-  const RotationCaptures exact = find_rotation_captures(frames, scene.map, scene.camera);
+  const RotationCaptures exact = find_in_place_rotation_captures(frames, scene.map, scene.camera);
   ASSERT_EQ(exact.status, RotationStatus::ok);
   PlanarScatter scatter(method(exact, scene.camera).center.center_px);
   for (int i = 0; i < kDraws; ++i) {
@@ -80,7 +80,7 @@ TEST(RotationFit, ResidualMatchesNoisePerAxis) {
   scene.captures = 5;           // few, so that degrees of freedom count
   scene.only_in_image = false;  // or some circle has three points
   scene.arc_rad = 5;
-  for (const Method method : {&mean_circle, &fit_joint_center, &fit_rotation_axis}) {
+  for (const Method method : {&mean_circle, &fit_joint_rotation_center, &fit_rotation_axis}) {
     Random random(9);
     const auto frames = scene.frames(kNoise_px);
     double squares = 0;
@@ -103,10 +103,10 @@ struct TurnUnderMap {
   double step_m;
 };
 
-class FitRotationAxisWithMapErrors : public testing::TestWithParam<TurnUnderMap> {};
+class FitRotationBetweenLensesAxisWithMapErrors : public testing::TestWithParam<TurnUnderMap> {};
 
 /// 300 maps of two axes determine a standard deviation to 4 %.
-TEST_P(FitRotationAxisWithMapErrors, ReportsConsistentCovariances) {
+TEST_P(FitRotationBetweenLensesAxisWithMapErrors, ReportsConsistentCovariances) {
   constexpr int maps = 300;
   const TurnUnderMap& turn = GetParam();
   RotationScene scene = tilted_scene(turn.lever_arm_m, turn.heights_m);
@@ -124,7 +124,7 @@ TEST_P(FitRotationAxisWithMapErrors, ReportsConsistentCovariances) {
       for (double& coordinate : lamp.position_m) coordinate += turn.map_sd_m * random.normal();
     }
     const RotationCaptures rotation =
-        find_rotation_captures(with_noise(frames, random), surveyed, scene.camera);
+        find_in_place_rotation_captures(with_noise(frames, random), surveyed, scene.camera);
     ASSERT_EQ(rotation.status, RotationStatus::ok);
     const RotationFit fit = fit_rotation_axis(rotation, scene.camera);
     ASSERT_TRUE(fit.converged && fit.center.covariance);
@@ -144,7 +144,7 @@ TEST_P(FitRotationAxisWithMapErrors, ReportsConsistentCovariances) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    RotationScatter, FitRotationAxisWithMapErrors,
+    RotationScatter, FitRotationBetweenLensesAxisWithMapErrors,
     testing::Values(TurnUnderMap{"ExactMap", 0, {0.25, -0.2}, {0, 0.3}, 0},
                     TurnUnderMap{"LongArm", 2e-3, {0.25, -0.2}, {0, 0.3}, 0},
                     TurnUnderMap{"ShortArm", 2e-3, {0.016, -0.012}, {0, 0.3}, 0},
@@ -163,13 +163,14 @@ class RotationFitWithFewCaptures : public testing::TestWithParam<SmallTurn> {};
 
 TEST_P(RotationFitWithFewCaptures, KeepsInliersAndConsistentCovariance) {
   constexpr int runs = 400;
-  for (const Method method : {&fit_joint_center, &fit_rotation_axis}) {
-    RotationScene scene = method == &fit_joint_center ? level_scene() : tilted_scene({0, 0});
+  for (const Method method : {&fit_joint_rotation_center, &fit_rotation_axis}) {
+    RotationScene scene =
+        method == &fit_joint_rotation_center ? level_scene() : tilted_scene({0, 0});
     scene.map.lamps.resize(static_cast<std::size_t>(GetParam().lamps));
     scene.captures = GetParam().captures;
     scene.only_in_image = false;
     const auto frames = scene.frames(kNoise_px);
-    const RotationCaptures exact = find_rotation_captures(frames, scene.map, scene.camera);
+    const RotationCaptures exact = find_in_place_rotation_captures(frames, scene.map, scene.camera);
     ASSERT_EQ(exact.status, RotationStatus::ok);
     const Eigen::Vector2d truth = method(exact, scene.camera).center.center_px;
     const double unknowns = 2 + 2 * GetParam().lamps + GetParam().captures - 1;
@@ -201,7 +202,7 @@ INSTANTIATE_TEST_SUITE_P(RotationScatter, RotationFitWithFewCaptures,
                                   std::to_string(turn.param.lamps) + "Lamps";
                          });
 
-TEST(FitCircleCenters, KeepsInliersOfFewCaptures) {
+TEST(FitCentersOfLampCircles, KeepsInliersOfFewCaptures) {
   constexpr int runs = 200;
   for (const int captures : {8, 9, 12, 24}) {
     RotationScene scene = level_scene();
@@ -226,7 +227,7 @@ TEST(RotationFit, RejectsOutlierAmongFewCaptures) {
     int captures;
   };
   for (const auto& [method, captures] :
-       {Case{mean_circle, 12}, Case{fit_joint_center, 4}, Case{fit_rotation_axis, 4}}) {
+       {Case{mean_circle, 12}, Case{fit_joint_rotation_center, 4}, Case{fit_rotation_axis, 4}}) {
     RotationScene scene = method == &fit_rotation_axis ? tilted_scene({0, 0}) : level_scene();
     scene.map.lamps.resize(5);
     scene.captures = captures;
@@ -234,12 +235,12 @@ TEST(RotationFit, RejectsOutlierAmongFewCaptures) {
     auto frames = scene.frames(kNoise_px);
     // Away from the rotation center.
     Eigen::Vector2d& pixel = frames[1].detections[2].pixel;
-    pixel += 6 * (pixel - scene.camera.center_px()).normalized();
+    pixel += 6 * (pixel - scene.camera.principal_point_px()).normalized();
     Random random(12);
     int found = 0, others = 0;
     for (int i = 0; i < runs; ++i) {
       const RotationCaptures rotation =
-          find_rotation_captures(with_noise(frames, random), scene.map, scene.camera);
+          find_in_place_rotation_captures(with_noise(frames, random), scene.map, scene.camera);
       ASSERT_EQ(rotation.status, RotationStatus::ok);
       const RotationFit fit = method(rotation, scene.camera);
       for (const RotationOutlier& outlier : fit.outliers) {
@@ -255,32 +256,32 @@ TEST(RotationFit, RejectsOutlierAmongFewCaptures) {
   }
 }
 
-TEST(FitCircleCenters, CovarianceMatchesScatter) {
+TEST(FitCentersOfLampCircles, CovarianceMatchesScatter) {
   expect_consistent(level_scene(), mean_circle, false);
 }
 
-TEST(FitJointCenter, CovarianceMatchesScatter) {
-  expect_consistent(level_scene(), fit_joint_center, true);
+TEST(FitJointRotationCenter, CovarianceMatchesScatter) {
+  expect_consistent(level_scene(), fit_joint_rotation_center, true);
 }
 
-TEST(FitRotationAxis, CovarianceMatchesScatter) {
+TEST(FitRotationBetweenLensesAxis, CovarianceMatchesScatter) {
   expect_consistent(tilted_scene({0, 0}), fit_rotation_axis, true);
 }
 
-TEST(FitRotationAxis, CovarianceMatchesScatterFor135Degrees) {
+TEST(FitRotationBetweenLensesAxis, CovarianceMatchesScatterFor135Degrees) {
   RotationScene scene = tilted_scene({0, 0});
   scene.arc_rad = 3;
   expect_consistent(scene, fit_rotation_axis, true);
 }
 
-TEST(FitRotationAxis, CovarianceMatchesScatterForTwoLamps) {
+TEST(FitRotationBetweenLensesAxis, CovarianceMatchesScatterForTwoLamps) {
   RotationScene scene = tilted_scene({0, 0});
   scene.map.lamps.resize(2);
   scene.map.lamps[1].position_m = {0.5, 0.4, 1.6};
   expect_consistent(scene, fit_rotation_axis, true);
 }
 
-TEST(FitRotationAxis, CovariancesMatchScatterForTwoHeights) {
+TEST(FitRotationBetweenLensesAxis, CovariancesMatchScatterForTwoHeights) {
   RotationScene scene = tilted_scene({0, 0});
   scene.heights_m = {0, 0.3};
   scene.lever_arm_m = {0.012, -0.009};

@@ -47,7 +47,8 @@ RotationScene tilted_scene(const Eigen::Vector2d& lever_arm_m,
 }
 
 RotationFit fit_axis(const RotationScene& scene, const std::vector<Frame>& frames) {
-  const RotationCaptures rotation = find_rotation_captures(frames, scene.map, scene.camera);
+  const RotationCaptures rotation =
+      find_in_place_rotation_captures(frames, scene.map, scene.camera);
   EXPECT_EQ(rotation.status, RotationStatus::ok) << describe(rotation.status);
   return rotation.status == RotationStatus::ok ? fit_rotation_axis(rotation, scene.camera)
                                                : RotationFit();

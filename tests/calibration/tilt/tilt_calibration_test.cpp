@@ -30,7 +30,7 @@ LampMap perturb_lamps(LampMap map, double size_m, Random& random) {
 double compute_shape_error_m(const LampMap& found, const LampMap& truth) {
   const auto lamp = [](const LampMap& map, std::size_t i) { return map.lamps[i].position_m; };
   const Similarity fit =
-      fit_similarity(
+      fit_similarity_transform(
           truth.lamps.size(),
           [&](std::size_t i) { return Eigen::Vector2d(lamp(found, i).head<2>()); },
           [&](std::size_t i) { return Eigen::Vector2d(lamp(truth, i).head<2>()); })

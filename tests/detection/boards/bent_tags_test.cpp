@@ -58,12 +58,12 @@ TEST(BoardDetector, RefinesCornersOfCurvedTags) {
     const BoardShot shot = make_board_shot(scene, views, index);
     std::map<int, Corners> truth;
     std::map<int, int> seen_corners;
-    for (const auto& [tag, corner, pixel] : find_true_corners(scene, renderer, shot)) {
+    for (const auto& [tag, corner, pixel] : find_true_corners_in_image(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
       ++seen_corners[*tag];
     }
-    const cv::Mat image = expose(scene.sensor, renderer.board_electrons(shot), 1);
-    for (const TagDetection& tag : detector.detect(image).tags) {
+    const cv::Mat image = simulate_sensor(scene.sensor, renderer.render_board_electrons(shot), 1);
+    for (const TagDetection& tag : detector.detect_board(image).tags) {
       if (seen_corners[tag.id] < 4) continue;
       Errors& errors = longest_px(truth[tag.id]) > long_px ? of_long : of_others;
       ++errors.tags;

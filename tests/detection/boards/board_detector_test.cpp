@@ -31,10 +31,11 @@ class BoardDetectorOnRenderedBoard : public testing::TestWithParam<const char*> 
     const CsvTable table(rig / "sample-boards/true_corners.csv");
     std::map<int, std::array<Eigen::Vector2d, 4>> corners;
     for (std::size_t row = 0; row < static_cast<std::size_t>(table.rows()); ++row) {
-      const int tag = static_cast<int>(table.number(row, table.required("tag")));
-      const auto k = static_cast<std::size_t>(table.number(row, table.required("corner")));
-      corners[tag][k] = {table.number(row, table.required("u_px")),
-                         table.number(row, table.required("v_px"))};
+      const int tag = static_cast<int>(table.get_number(row, table.get_required_column("tag")));
+      const auto k =
+          static_cast<std::size_t>(table.get_number(row, table.get_required_column("corner")));
+      corners[tag][k] = {table.get_number(row, table.get_required_column("u_px")),
+                         table.get_number(row, table.get_required_column("v_px"))};
     }
     return corners;
   }
@@ -52,7 +53,7 @@ class BoardDetectorOnRenderedBoard : public testing::TestWithParam<const char*> 
 };
 
 TEST_P(BoardDetectorOnRenderedBoard, DetectsAllTagsWithAccurateCorners) {
-  const BoardDetection seen = BoardDetector(board).detect(image);
+  const BoardDetection seen = BoardDetector(board).detect_board(image);
   EXPECT_EQ(seen.tags.size(), find_true_corners().size());
   EXPECT_TRUE(seen.foreign.empty());
   EXPECT_EQ(seen.unusable, 0);
@@ -62,14 +63,14 @@ TEST_P(BoardDetectorOnRenderedBoard, DetectsAllTagsWithAccurateCorners) {
 TEST_P(BoardDetectorOnRenderedBoard, DetectsTagsIn16BitImage) {
   cv::Mat deep;
   image.convertTo(deep, CV_16U, 16);  // as a camera of 12 bits has it
-  const BoardDetection seen = BoardDetector(board).detect(deep);
+  const BoardDetection seen = BoardDetector(board).detect_board(deep);
   EXPECT_EQ(seen.tags.size(), find_true_corners().size());
   EXPECT_LT(rms_px(seen), 0.03);
 }
 
 TEST_P(BoardDetectorOnRenderedBoard, KeepsWholeTagsOfTruncatedBoard) {
   const cv::Mat part = image(cv::Rect(0, 0, image.cols / 2, image.rows)).clone();
-  const BoardDetection seen = BoardDetector(board).detect(part);
+  const BoardDetection seen = BoardDetector(board).detect_board(part);
   EXPECT_GT(seen.tags.size(), 3U);
   EXPECT_LT(seen.tags.size(), find_true_corners().size());
   EXPECT_LT(rms_px(seen), 0.03);
@@ -78,8 +79,8 @@ TEST_P(BoardDetectorOnRenderedBoard, KeepsWholeTagsOfTruncatedBoard) {
 TEST_P(BoardDetectorOnRenderedBoard, ReturnsSameCornersForUpsideDownImage) {
   cv::Mat turned;
   cv::rotate(image, turned, cv::ROTATE_180);
-  const BoardDetection upright = BoardDetector(board).detect(image);
-  const BoardDetection upside_down = BoardDetector(board).detect(turned);
+  const BoardDetection upright = BoardDetector(board).detect_board(image);
+  const BoardDetection upside_down = BoardDetector(board).detect_board(turned);
   ASSERT_FALSE(upright.tags.empty());
   ASSERT_EQ(upside_down.tags.size(), upright.tags.size());
   const Eigen::Vector2d last(image.cols - 1, image.rows - 1);
@@ -95,7 +96,7 @@ TEST_P(BoardDetectorOnRenderedBoard, ReturnsSameCornersForUpsideDownImage) {
 TEST_P(BoardDetectorOnRenderedBoard, ReportsTagsWithOtherIdsAsForeign) {
   Board other = board;
   other.first_id = 100;
-  const BoardDetection seen = BoardDetector(other).detect(image);
+  const BoardDetection seen = BoardDetector(other).detect_board(image);
   EXPECT_TRUE(seen.tags.empty());
   EXPECT_GT(seen.foreign.size(), 10U);
 }
@@ -103,7 +104,7 @@ TEST_P(BoardDetectorOnRenderedBoard, ReportsTagsWithOtherIdsAsForeign) {
 TEST_P(BoardDetectorOnRenderedBoard, RejectsTagsDetectedTwice) {
   cv::Mat twice;
   cv::hconcat(image, image, twice);
-  const BoardDetection seen = BoardDetector(board).detect(twice);
+  const BoardDetection seen = BoardDetector(board).detect_board(twice);
   EXPECT_TRUE(seen.tags.empty()) << seen.tags.size();
   EXPECT_GT(seen.unusable, 20);
 }
@@ -113,7 +114,7 @@ TEST_P(BoardDetectorOnRenderedBoard, ReturnsNoTagsForTinyImages) {
   for (const auto& [width, height] : {std::pair{1, 1}, {2, 100}, {800, 1}, {800, 2}, {3, 9}}) {
     cv::Mat part;
     cv::resize(image, part, {width, height});
-    EXPECT_TRUE(detector.detect(part).tags.empty());
+    EXPECT_TRUE(detector.detect_board(part).tags.empty());
   }
 }
 
@@ -131,7 +132,7 @@ std::map<std::size_t, int> images_by_tags(const fs::path& folder, const fs::path
   std::map<std::size_t, int> counts;
   const BoardDetector detector(read_board(board));
   for (const fs::path& image : list_images(folder)) {
-    ++counts[detector.detect(read_image(image)).tags.size()];
+    ++counts[detector.detect_board(read_image(image)).tags.size()];
   }
   return counts;
 }

@@ -43,12 +43,12 @@ TEST(EdgeField, IsExactWithoutNoise) {
 TEST(EdgeField, ReportsExcessStandardDeviation) {
   for (const double excess_sd : {0.05, 0.2}) {
     const EdgeField field(make_samples(300, excess_sd), EdgeField::Terms::place_and_direction);
-    EXPECT_NEAR(field.excess_sd() / excess_sd, 1, 0.15);
+    EXPECT_NEAR(field.excess_edge_sd() / excess_sd, 1, 0.15);
   }
   const EdgeField alike(make_samples(300, 0), EdgeField::Terms::place_and_direction);
-  EXPECT_LE(alike.excess_sd(), 0.012);
+  EXPECT_LE(alike.excess_edge_sd(), 0.012);
   const EdgeField without_direction(make_samples(300, 0), EdgeField::Terms::place);
-  EXPECT_GT(without_direction.excess_sd(), 0.05);
+  EXPECT_GT(without_direction.excess_edge_sd(), 0.05);
 }
 
 TEST(EdgeField, IsRobustToOutliers) {
@@ -66,7 +66,7 @@ TEST(EdgeField, ReturnsMedianForFewSamples) {
   const EdgeField field(few, EdgeField::Terms::place);
   EXPECT_EQ(field.value({0, 0}, {1, 0}), field.value({500, 700}, {0, 1}));
   EXPECT_NEAR(field.value({0, 0}, {1, 0}), 0.9, 0.2);
-  EXPECT_GT(field.excess_sd(), 0.3);
+  EXPECT_GT(field.excess_edge_sd(), 0.3);
 }
 
 }  // namespace

@@ -60,43 +60,43 @@ struct Step {
   }
 };
 
-TEST(FitEdge, IsExactWithoutNoise) {
+TEST(FitEdgeCurve, IsExactWithoutNoise) {
   const Step step;
   EdgeCurve edge = step.start();
-  const auto fit = fit_edge(edge, step.pixels(), {});
+  const auto fit = fit_edge_curve_and_blur(edge, step.pixels(), {});
   ASSERT_TRUE(fit);
   step.expect_found(edge, 1e-3);
   EXPECT_LT(fit->squares, 1e-3);
   EXPECT_FALSE(fit->is_saturated);
 }
 
-TEST(FitEdge, IsExactWithToneCurve) {
+TEST(FitEdgeCurve, IsExactWithToneCurve) {
   for (const double gamma : {1.3, 2.4}) {
     const Step step{.gamma = gamma};
     EdgeCurve edge = step.start();
-    ASSERT_TRUE(fit_edge(edge, step.pixels(), {gamma}));
+    ASSERT_TRUE(fit_edge_curve_and_blur(edge, step.pixels(), {gamma}));
     step.expect_found(edge, 1e-3);
     EdgeCurve without = step.start();
-    const auto wrong = fit_edge(without, step.pixels(), {});
+    const auto wrong = fit_edge_curve_and_blur(without, step.pixels(), {});
     ASSERT_TRUE(wrong);
     EXPECT_GT(wrong->squares, 100);
   }
 }
 
-TEST(FitEdge, IsBiasedOutwardsByUnmodeledWhiteBits) {
+TEST(FitEdgeCurve, IsBiasedOutwardsByUnmodeledWhiteBits) {
   const Step step;
   auto pixels = step.pixels();
   for (EdgePixel& pixel : pixels) pixel.white_behind = 0;
   EdgeCurve edge = step.start();
-  ASSERT_TRUE(fit_edge(edge, pixels, {}));
+  ASSERT_TRUE(fit_edge_curve_and_blur(edge, pixels, {}));
   EXPECT_GT(edge.coefficients[0], step.off_px + 0.02);
 }
 
-TEST(FitEdge, IsExactForSaturatedOuterSide) {
+TEST(FitEdgeCurve, IsExactForSaturatedOuterSide) {
   for (const double gamma : {1.0, 2.2}) {
     const Step step{.white = 380, .gamma = gamma, .clipped_at = 255};
     EdgeCurve edge = step.start();
-    const auto fit = fit_edge(edge, step.pixels(), {gamma});
+    const auto fit = fit_edge_curve_and_blur(edge, step.pixels(), {gamma});
     ASSERT_TRUE(fit);
     EXPECT_TRUE(fit->is_saturated);
     EXPECT_GT(fit->blur_variance, 0);
@@ -105,12 +105,12 @@ TEST(FitEdge, IsExactForSaturatedOuterSide) {
 }
 
 /// Tags of some families are white inside.
-TEST(FitEdge, IsExactForSaturatedInnerSide) {
+TEST(FitEdgeCurve, IsExactForSaturatedInnerSide) {
   const Step step{.black = 380, .white = 16, .stripe_px = 100};
   auto pixels = step.pixels();
   for (EdgePixel& pixel : pixels) pixel.white_behind = 0;
   EdgeCurve edge = step.start();
-  const auto fit = fit_edge(edge, pixels, {});
+  const auto fit = fit_edge_curve_and_blur(edge, pixels, {});
   ASSERT_TRUE(fit);
   EXPECT_TRUE(fit->is_saturated);
   step.expect_found(edge, 2e-3);
@@ -122,20 +122,20 @@ double scatter_px(const Step& step, const EdgePrior& prior) {
   double squares = 0;
   for (unsigned seed = 1; seed <= sets; ++seed) {
     EdgeCurve edge = step.start();
-    const auto fit = fit_edge(edge, step.pixels(seed), prior);
+    const auto fit = fit_edge_curve_and_blur(edge, step.pixels(seed), prior);
     EXPECT_TRUE(fit);
     squares += std::pow(edge.coefficients[0] - step.off_px, 2) / sets;
   }
   return std::sqrt(squares);
 }
 
-TEST(FitEdge, KeepsPrecisionForNearlySaturatedPaper) {
+TEST(FitEdgeCurve, KeepsPrecisionForNearlySaturatedPaper) {
   const double other_px = scatter_px({.white = 240, .noise = 1.5}, {});
   const double bright_px = scatter_px({.white = 252, .noise = 1.5}, {});
   EXPECT_LT(bright_px, 1.2 * other_px);
 }
 
-TEST(FitEdge, PriorsImprovePrecisionOfSaturatedEdge) {
+TEST(FitEdgeCurve, PriorsImprovePrecisionOfSaturatedEdge) {
   const Step step{.white = 380, .gamma = 2.2, .noise = 1};
   const double alone_px = scatter_px(step, {step.gamma});
   const double held_px = scatter_px(step, {step.gamma, step.blur_px, 60});
@@ -145,18 +145,19 @@ TEST(FitEdge, PriorsImprovePrecisionOfSaturatedEdge) {
   EXPECT_LT(lit_px, 0.6 * held_px);
 }
 
-TEST(FitEdge, ReportedVariancesOfLightAndBlurMatchErrors) {
+TEST(FitEdgeCurve, ReportedVariancesOfLightAndBlurMatchErrors) {
   const Step step{.white = 380, .gamma = 2.2, .noise = 1}, seen{.gamma = 2.2, .noise = 1};
   constexpr unsigned sets = 100;
   double lights = 0, blurs = 0;
   for (unsigned seed = 1; seed <= sets; ++seed) {
     EdgeCurve edge = step.start();
     // Together they are known too badly for a linear theory.
-    const auto lit = fit_edge(edge, step.pixels(seed), {step.gamma, step.blur_px, 100});
+    const auto lit =
+        fit_edge_curve_and_blur(edge, step.pixels(seed), {step.gamma, step.blur_px, 100});
     ASSERT_TRUE(lit);
     lights += std::pow(lit->bright_light - step.white, 2) / lit->bright_variance / sets;
     edge = seen.start();
-    const auto blurred = fit_edge(edge, seen.pixels(seed), {seen.gamma});
+    const auto blurred = fit_edge_curve_and_blur(edge, seen.pixels(seed), {seen.gamma});
     ASSERT_TRUE(blurred);
     blurs += std::pow(edge.blur_px - seen.blur_px, 2) / blurred->blur_variance / sets;
   }
@@ -164,20 +165,20 @@ TEST(FitEdge, ReportedVariancesOfLightAndBlurMatchErrors) {
   EXPECT_NEAR(blurs, 1, 0.35);
 }
 
-TEST(FitEdge, FitsDimEdgeWithSteepestToneCurve) {
+TEST(FitEdgeCurve, FitsDimEdgeWithSteepestToneCurve) {
   const Step step{.black = 0.3, .white = 5, .gamma = 2.4};  // levels of 15 and 49
   EdgeCurve edge = step.start();
-  ASSERT_TRUE(fit_edge(edge, step.pixels(), {step.gamma}));
+  ASSERT_TRUE(fit_edge_curve_and_blur(edge, step.pixels(), {step.gamma}));
   step.expect_found(edge, 5e-3);
 }
 
-TEST(FitEdge, ReturnsNulloptForNoiseOrFewPixels) {
+TEST(FitEdgeCurve, ReturnsNulloptForNoiseOrFewPixels) {
   Step step{.black = 99, .white = 101, .noise = 30};
   EdgeCurve edge = step.start();
-  EXPECT_FALSE(fit_edge(edge, step.pixels(), {}));
+  EXPECT_FALSE(fit_edge_curve_and_blur(edge, step.pixels(), {}));
   auto few = Step().pixels();
   few.resize(20);
-  EXPECT_FALSE(fit_edge(edge, few, {}));
+  EXPECT_FALSE(fit_edge_curve_and_blur(edge, few, {}));
 }
 
 TEST(EdgeCurveIntersection, LiesOnBothCurves) {
@@ -186,9 +187,9 @@ TEST(EdgeCurveIntersection, LiesOnBothCurves) {
   upright.along = {0, 1};
   upright.across = {-1, 0};
   upright.coefficients << -0.2, 0.3, 0.2, 0;
-  const Eigen::Vector2d at = find_intersection(flat, upright, {101, 99});
-  EXPECT_LT(std::abs(flat.offset_px(at)), 1e-12);
-  EXPECT_LT(std::abs(upright.offset_px(at)), 1e-12);
+  const Eigen::Vector2d at = find_edge_intersection(flat, upright, {101, 99});
+  EXPECT_LT(std::abs(flat.distance_from_curve_px(at)), 1e-12);
+  EXPECT_LT(std::abs(upright.distance_from_curve_px(at)), 1e-12);
 }
 
 }  // namespace

@@ -58,10 +58,11 @@ Found measure(const Scene& scene, std::size_t count, double min_side_px = 0) {
   views.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     const BoardShot shot = make_board_shot(scene, set, i);
-    const cv::Mat image = expose(scene.sensor, renderer.board_electrons(shot), i, scene.picture);
-    views.push_back({shot.image, scene.camera.imager_px, detector.detect(image)});
+    const cv::Mat image =
+        simulate_sensor(scene.sensor, renderer.render_board_electrons(shot), i, scene.picture);
+    views.push_back({shot.image, scene.camera.imager_px, detector.detect_board(image)});
   }
-  apply_tone_curve(views, sum_tone_curve_costs(views));
+  correct_views_for_tone_curve(views, sum_tone_curve_costs(views));
   std::vector<double> blurs_px, ratios;
   for (const BoardView& view : views) {
     for (const TagDetection& tag : view.seen.tags) {

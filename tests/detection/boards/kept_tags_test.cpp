@@ -40,8 +40,8 @@ class BoardDetectorYield : public testing::TestWithParam<Pictures> {
   cv::Mat image(const FrameRenderer& renderer, const CaptureSet& set, std::size_t index) const {
     const BoardShot shot = make_board_shot(scene, set, index);
     const auto& picture = GetParam().picture;
-    const cv::Mat exposed =
-        expose(scene.sensor, renderer.board_electrons(shot), shot.noise_seed, picture);
+    const cv::Mat exposed = simulate_sensor(scene.sensor, renderer.render_board_electrons(shot),
+                                            shot.noise_seed, picture);
     return cv::imdecode(encode_image(exposed, picture), cv::IMREAD_GRAYSCALE);
   }
   std::set<int> detect_ids(const TagFinder& finder, const cv::Mat& image) const {
@@ -60,17 +60,18 @@ TEST_P(BoardDetectorYield, KeepsNearlyAllTagsOfTagFinder) {
   CaptureSet set = *std::find_if(scene.sets.begin(), scene.sets.end(),
                                  [](const CaptureSet& each) { return each.folder == "boards"; });
   const double white_e =
-      (white_dn(scene.sensor) - scene.sensor.black_level_dn) / scene.sensor.gain_dn_per_e;
+      (white_level_dn(scene.sensor) - scene.sensor.black_level_dn) / scene.sensor.gain_dn_per_e;
   set.exposure_s = GetParam().white * white_e / scene.board->white_e_per_s;
   const FrameRenderer renderer(scene);
   const BoardDetector detector(board);
-  const auto finder = board.corner_squares ? make_aruco_finder(board) : make_apriltag_finder(board);
+  const auto finder =
+      board.corner_squares ? make_aruco_detector(board) : make_apriltag_detector(board);
   double all = 0, kept = 0;
   for (std::size_t index = 0; index < views; index += apart) {
     const cv::Mat picture = image(renderer, set, index);
     const std::set<int> ids = detect_ids(*finder, picture);
     all += static_cast<double>(ids.size());
-    for (const TagDetection& tag : detector.detect(picture).tags)
+    for (const TagDetection& tag : detector.detect_board(picture).tags)
       kept += ids.contains(tag.id) ? 1 : 0;
   }
   RecordProperty("told", std::to_string(all));

@@ -67,7 +67,7 @@ cv::Mat drawn_chessboard(const Board& board) {
                 CV_8U, cv::Scalar(255));
   for (int row = 0; row < board.rows; ++row) {
     for (int col = 0; col < board.cols; ++col) {
-      if (!is_black(board, col, row)) continue;
+      if (!is_square_black(board, col, row)) continue;
       image(cv::Rect(kMargin_px + col * kSquare_px, kMargin_px + row * kSquare_px, kSquare_px,
                      kSquare_px)) = 0;
     }
@@ -94,7 +94,7 @@ TEST(SquareCorners, DetectsAllCornersOfOpencvCharucoBoard) {
   for (const Board& board : boards) {
     SCOPED_TRACE(board.rows);
     const cv::Mat image = drawn_by_opencv(board);
-    const BoardDetection seen = BoardDetector(board).detect(image);
+    const BoardDetection seen = BoardDetector(board).detect_board(image);
     EXPECT_EQ(seen.tags.size(), list_board_tags(board).size());
     EXPECT_TRUE(seen.foreign.empty());
     expect_all_corners(board, seen);
@@ -105,7 +105,7 @@ TEST(SquareCorners, DetectsVisibleCornersOfTruncatedCharucoBoard) {
   const Board board = squares(BoardKind::charuco, 7, 5);
   const cv::Mat image = drawn_by_opencv(board);
   const cv::Mat part = image(cv::Rect(0, 0, image.cols / 2, image.rows)).clone();
-  const BoardDetection seen = BoardDetector(board).detect(part);
+  const BoardDetection seen = BoardDetector(board).detect_board(part);
   EXPECT_GE(seen.points.size(), 8U);
   for (const PointDetection& point : seen.points) {
     EXPECT_LT((point.pixel - corner_position(board, point.index)).norm(), 0.05);
@@ -120,7 +120,7 @@ TEST(SquareCorners, RejectsCornersNextToMisreadMarker) {
   image.convertTo(smoothed, CV_32F);
   cv::GaussianBlur(smoothed, smoothed, {}, 1);
   const GrayLevels gray{image, smoothed};
-  BoardDetection seen = BoardDetector(board).detect(image);
+  BoardDetection seen = BoardDetector(board).detect_board(image);
   ASSERT_EQ(seen.tags.size(), list_board_tags(board).size());
   for (const double off_px : {30.0, 1e12}) {
     for (auto& corner_px : seen.tags[7].corners_px) corner_px.x() += off_px;
@@ -139,11 +139,11 @@ TEST(SquareCorners, CountsChessboardCornersFromTopLeftOfImage) {
     const Board board = squares(BoardKind::chessboard, cols, rows);
     const cv::Mat image = drawn_chessboard(board);
     const BoardDetector detector(board);
-    expect_all_corners(board, detector.detect(image));
+    expect_all_corners(board, detector.detect_board(image));
     // Upside down what is up is counted first.
     cv::Mat turned;
     cv::rotate(image, turned, cv::ROTATE_180);
-    expect_all_corners(board, detector.detect(turned));
+    expect_all_corners(board, detector.detect_board(turned));
   }
 }
 
@@ -154,7 +154,7 @@ TEST(SquareCorners, DetectsChessboardAccuratelyInLargeImage) {
   cv::Mat image(3001, 4002, CV_8U, cv::Scalar(255));
   const cv::Point at(1703, 1201);
   drawn.copyTo(image(cv::Rect(at, drawn.size())));
-  BoardDetection seen = BoardDetector(board).detect(image);
+  BoardDetection seen = BoardDetector(board).detect_board(image);
   for (PointDetection& point : seen.points) point.pixel -= Eigen::Vector2d(at.x, at.y);
   expect_all_corners(board, seen);
   auto shown = count_chessboard_squares(image);  // either way around
@@ -166,10 +166,10 @@ TEST(SquareCorners, ReturnsNoCornersForIncompleteChessboard) {
   const Board board = squares(BoardKind::chessboard, 9, 6);
   cv::Mat image = drawn_chessboard(board);
   EXPECT_TRUE(BoardDetector(board)
-                  .detect(image(cv::Rect(80, 0, image.cols - 80, image.rows)))
+                  .detect_board(image(cv::Rect(80, 0, image.cols - 80, image.rows)))
                   .points.empty());
   image(cv::Rect(100, 100, 60, 60)) = 128;
-  EXPECT_TRUE(BoardDetector(board).detect(image).points.empty());
+  EXPECT_TRUE(BoardDetector(board).detect_board(image).points.empty());
 }
 
 TEST(OtherTags, ReportsChessboardSizeAndMarkerDictionary) {
@@ -180,16 +180,16 @@ TEST(OtherTags, ReportsChessboardSizeAndMarkerDictionary) {
   Board charuco = squares(BoardKind::charuco, 7, 5);
   const cv::Mat markers = drawn_by_opencv(charuco);
   charuco.family = "DICT_4X4_50";
-  EXPECT_EQ(describe_other_tags(charuco, markers),
+  EXPECT_EQ(describe_tags_of_other_kinds(charuco, markers),
             "the image shows markers of DICT_5X5, the largest of id 16");
 }
 
-TEST(OrderLattice, ReversesRowsCountedUpwards) {
+TEST(OrderLatticePoints, ReversesRowsCountedUpwards) {
   std::vector<PointDetection> points;
   for (std::size_t i = 0; i < 12; ++i) {
     points.push_back({i, {10.0 * static_cast<double>(i % 4), -10.0 * static_cast<double>(i / 4)}});
   }
-  order_lattice(points, 4, 3, false);
+  order_lattice_points(points, 4, 3, false);
   EXPECT_EQ(points[0].pixel, Eigen::Vector2d(0, -20));
   EXPECT_EQ(points[11].pixel, Eigen::Vector2d(30, 0));
 }

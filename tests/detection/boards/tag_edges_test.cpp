@@ -57,12 +57,12 @@ CornerErrors measure_errors(const Scene& scene, const CaptureSet& views, std::si
   for (std::size_t index = 0; index < images; ++index) {
     const BoardShot shot = make_board_shot(scene, views, index);
     std::map<int, TagDetection::Corners> truth;
-    for (const auto& [tag, corner, pixel] : find_true_corners(scene, renderer, shot)) {
+    for (const auto& [tag, corner, pixel] : find_true_corners_in_image(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
     }
     const cv::Mat image =
-        expose(scene.sensor, renderer.board_electrons(shot), index, scene.picture);
-    for (const TagDetection& tag : detector.detect(image).tags) {
+        simulate_sensor(scene.sensor, renderer.render_board_electrons(shot), index, scene.picture);
+    for (const TagDetection& tag : detector.detect_board(image).tags) {
       if (wanted(truth[tag.id])) errors.add(tag.corners_px, truth[tag.id]);
     }
   }

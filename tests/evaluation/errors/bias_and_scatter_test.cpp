@@ -13,7 +13,7 @@ namespace vlp {
 namespace {
 
 /// Two stations with biases of 3 mm and -3 mm along x and fixes 4 mm to either side along y.
-TEST(BiasAndScatter, SeparatesBiasFromScatter) {
+TEST(BiasAndRepeatability, SeparatesBiasFromScatter) {
   std::vector<FixError> errors;
   for (const std::size_t station : {0U, 1U}) {
     for (const double side : {-4e-3, 4e-3}) {
@@ -21,7 +21,7 @@ TEST(BiasAndScatter, SeparatesBiasFromScatter) {
     }
   }
   errors.push_back({4, {1, 1}, {}, {}, 2, 0});  // alone at its station
-  const auto statistics = compute_bias_and_scatter(errors, {{"a", {5, 6}, {}, {}}});
+  const auto statistics = compute_bias_and_repeatability(errors, {{"a", {5, 6}, {}, {}}});
   ASSERT_TRUE(statistics);
   ASSERT_EQ(statistics->stations.size(), 2);
   EXPECT_EQ(statistics->fixes, 4);
@@ -32,14 +32,14 @@ TEST(BiasAndScatter, SeparatesBiasFromScatter) {
   EXPECT_EQ(statistics->bias_m, 0);  // 9 of bias^2, and 16 that chance puts there
 }
 
-TEST(BiasAndScatter, IsUnbiasedUnderLargeScatter) {
+TEST(BiasAndRepeatability, IsUnbiasedUnderLargeScatter) {
   Random random(1);
   std::vector<FixError> errors;
   for (std::size_t i = 0; i < 20000; ++i) {
     errors.push_back(
         {i, {1e-3 + 2e-3 * random.normal(), 2e-3 * random.normal()}, {}, {}, i / 4, 0});
   }
-  const auto statistics = compute_bias_and_scatter(errors, {{"a", {0, 0}, {}, {}}});
+  const auto statistics = compute_bias_and_repeatability(errors, {{"a", {0, 0}, {}, {}}});
   ASSERT_TRUE(statistics);
   // Means of four scatter by as much as the bias is; standard errors are 0.02 and 0.03 mm.
   EXPECT_NEAR(statistics->scatter_m, 2e-3 * std::sqrt(2), 0.06e-3);

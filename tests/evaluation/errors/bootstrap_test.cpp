@@ -50,7 +50,7 @@ std::array<int, 4> count_covered(std::size_t stations, std::size_t captures, dou
   for (int i = 0; i < 300; ++i) {
     const Errors errors = draw(stations, captures, bias, scatter, random);
     const ErrorIntervals intervals =
-        compute_error_intervals(errors.values, errors.clusters, 1).value();
+        bootstrap_error_intervals(errors.values, errors.clusters, 1).value();
     const auto holds = [](const Interval& interval, double truth) {
       return interval.low <= truth && truth <= interval.high ? 1 : 0;
     };
@@ -82,9 +82,10 @@ TEST(ErrorIntervals, CoversTrueValuesWithPerStationBias) {
 TEST(ErrorIntervals, SingleCapturesAsUnitsAreTooNarrow) {
   Random random(2);
   Errors errors = draw(40, 12, 1, 0.1, random);
-  const Interval together = compute_error_intervals(errors.values, errors.clusters, 1).value().mean;
+  const Interval together =
+      bootstrap_error_intervals(errors.values, errors.clusters, 1).value().mean;
   std::iota(errors.clusters.begin(), errors.clusters.end(), std::size_t{0});
-  const Interval singly = compute_error_intervals(errors.values, errors.clusters, 1).value().mean;
+  const Interval singly = bootstrap_error_intervals(errors.values, errors.clusters, 1).value().mean;
   EXPECT_LT(2 * (singly.high - singly.low), together.high - together.low);
 }
 
@@ -94,7 +95,7 @@ TEST(ErrorIntervals, WidthMatchesTheoryForManyErrors) {
   Random random(3);
   const std::size_t count = 50000;
   const Errors errors = draw(count, 1, 0, 1, random);
-  const auto intervals = compute_error_intervals(errors.values, errors.clusters, 2);
+  const auto intervals = bootstrap_error_intervals(errors.values, errors.clusters, 2);
   ASSERT_TRUE(intervals);
   EXPECT_EQ(intervals->clusters, count);
   const double root = std::sqrt(static_cast<double>(count));
@@ -113,8 +114,8 @@ TEST(ErrorIntervals, WidthMatchesTheoryForManyErrors) {
 TEST(ErrorIntervals, IsIndependentOfThreadCount) {
   Random random(4);
   const Errors errors = draw(3000, 2, 1, 1, random);
-  const auto one = compute_error_intervals(errors.values, errors.clusters, 1);
-  const auto four = compute_error_intervals(errors.values, errors.clusters, 4);
+  const auto one = bootstrap_error_intervals(errors.values, errors.clusters, 1);
+  const auto four = bootstrap_error_intervals(errors.values, errors.clusters, 4);
   ASSERT_TRUE(one && four);
   ASSERT_TRUE(one->p90 && four->p90);
   for (const auto figure : {&ErrorIntervals::mean, &ErrorIntervals::median, &ErrorIntervals::rms}) {
@@ -127,9 +128,9 @@ TEST(ErrorIntervals, IsIndependentOfThreadCount) {
 
 TEST(ErrorIntervals, ReturnsNulloptForFewUnits) {
   const std::vector<double> errors{1, 2, 3, 4, 5, 6};
-  EXPECT_FALSE(compute_error_intervals(errors, std::vector<std::size_t>{0, 0, 1, 1, 2, 3}, 1));
+  EXPECT_FALSE(bootstrap_error_intervals(errors, std::vector<std::size_t>{0, 0, 1, 1, 2, 3}, 1));
   const auto intervals =
-      compute_error_intervals(errors, std::vector<std::size_t>{0, 0, 1, 4, 2, 3}, 1);
+      bootstrap_error_intervals(errors, std::vector<std::size_t>{0, 0, 1, 4, 2, 3}, 1);
   ASSERT_TRUE(intervals);
   EXPECT_EQ(intervals->clusters, 5);
 }
@@ -137,16 +138,16 @@ TEST(ErrorIntervals, ReturnsNulloptForFewUnits) {
 TEST(ErrorIntervals, OmitsP90ForFewUnits) {
   Random random(5);
   const Errors few = draw(kMinClustersForP90 - 1, 3, 1, 1, random);
-  EXPECT_FALSE(compute_error_intervals(few.values, few.clusters, 1).value().p90);
+  EXPECT_FALSE(bootstrap_error_intervals(few.values, few.clusters, 1).value().p90);
   const Errors sufficient = draw(kMinClustersForP90, 3, 1, 1, random);
-  EXPECT_TRUE(compute_error_intervals(sufficient.values, sufficient.clusters, 1).value().p90);
+  EXPECT_TRUE(bootstrap_error_intervals(sufficient.values, sufficient.clusters, 1).value().p90);
 }
 
 TEST(ErrorIntervals, HasZeroWidthForEqualErrors) {
   const std::vector<double> errors(20, 2.5);
   std::vector<std::size_t> clusters(20);
   std::iota(clusters.begin(), clusters.end(), std::size_t{0});
-  const auto intervals = compute_error_intervals(errors, clusters, 1);
+  const auto intervals = bootstrap_error_intervals(errors, clusters, 1);
   ASSERT_TRUE(intervals && intervals->p90);
   EXPECT_EQ(intervals->median.low, 2.5);
   EXPECT_EQ(intervals->p90->high, 2.5);

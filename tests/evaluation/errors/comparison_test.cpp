@@ -32,72 +32,80 @@ Pairs pairs(std::size_t count, double difference_m) {
   return all;
 }
 std::string_view compare_pairs(const Pairs& all) {
-  return compare(all.fixes, all.errors, all.others, all.other_errors, 1).verdict();
+  return compare_horizontal_errors(all.fixes, all.errors, all.others, all.other_errors, 1)
+      .comparison_verdict();
 }
 
-TEST(Compare, DetectsSmallPairedDifferences) {
+TEST(CompareFixes, DetectsSmallPairedDifferences) {
   EXPECT_EQ(compare_pairs(pairs(100, 3e-4)), "worse");
   EXPECT_EQ(compare_pairs(pairs(100, -3e-4)), "better");
   EXPECT_EQ(compare_pairs(pairs(kMinClustersCompared, 1e-2)), "worse");
   EXPECT_EQ(compare_pairs(pairs(kMinClustersCompared - 1, 1e-2)), "no evidence");  // too few
   EXPECT_EQ(compare_pairs(pairs(4, 1)), "no evidence");
   const Pairs same = pairs(100, 0);
-  EXPECT_EQ(compare(same.fixes, same.errors, same.fixes, same.errors, 1).verdict(), "the same");
+  EXPECT_EQ(compare_horizontal_errors(same.fixes, same.errors, same.fixes, same.errors, 1)
+                .comparison_verdict(),
+            "the same");
 }
 
-TEST(Compare, ReportsInsignificantDifferenceAsTheSame) {
+TEST(CompareFixes, ReportsInsignificantDifferenceAsTheSame) {
   // For errors of 15 mm on average 1 % is 0.15 mm; the mean difference has an uncertainty of 0.01
   // mm.
   EXPECT_EQ(compare_pairs(pairs(100, 1e-4)), "the same");
   EXPECT_EQ(compare_pairs(pairs(100, -1e-4)), "the same");
   EXPECT_EQ(compare_pairs(pairs(100, 1.5e-4)), "no evidence");
   const Pairs tenth = pairs(100, 1e-4);
-  EXPECT_EQ(compare(tenth.fixes, tenth.errors, tenth.others, tenth.other_errors, 1).words(),
-            "the same within 0.15 mm");
+  EXPECT_EQ(
+      compare_horizontal_errors(tenth.fixes, tenth.errors, tenth.others, tenth.other_errors, 1)
+          .describe_result(),
+      "the same within 0.15 mm");
   // For small errors the smallest relevant difference is a micrometer.
   Pairs small = pairs(100, 0);
   for (FixError& error : small.errors) error.horizontal_m = {1e-5 + 1.7e-7, 0};
   for (FixError& error : small.other_errors) error.horizontal_m = {1e-5, 0};
-  Comparison comparison = compare(small.fixes, small.errors, small.others, small.other_errors, 1);
-  EXPECT_EQ(comparison.words(), "the same within 0.001 mm");
+  Comparison comparison =
+      compare_horizontal_errors(small.fixes, small.errors, small.others, small.other_errors, 1);
+  EXPECT_EQ(comparison.describe_result(), "the same within 0.001 mm");
   ASSERT_TRUE(comparison.interval_m);
   EXPECT_GT(comparison.interval_m->low, 0);
   comparison.min_relevant_m = 1e-7;
-  EXPECT_EQ(comparison.words(), "worse by more than 0.0001 mm");
+  EXPECT_EQ(comparison.describe_result(), "worse by more than 0.0001 mm");
   comparison.clusters = 1;
-  EXPECT_EQ(comparison.words(), "no evidence, too few");
+  EXPECT_EQ(comparison.describe_result(), "no evidence, too few");
 }
 
-TEST(Compare, RequiresUnitsNotPairs) {
+TEST(CompareFixes, RequiresUnitsNotPairs) {
   Pairs all = pairs(100, 1e-2);
   for (FixError& error : all.errors) error.cluster = 3 * (error.cluster % 19);
-  const Comparison comparison = compare(all.fixes, all.errors, all.others, all.other_errors, 1);
+  const Comparison comparison =
+      compare_horizontal_errors(all.fixes, all.errors, all.others, all.other_errors, 1);
   EXPECT_EQ(comparison.clusters, 19);
-  EXPECT_EQ(comparison.verdict(), "no evidence");
+  EXPECT_EQ(comparison.comparison_verdict(), "no evidence");
   ASSERT_TRUE(comparison.interval_m);
   EXPECT_GT(comparison.interval_m->low, 0);
 }
 
 TEST(Comparison, VerdictRequiresWholeIntervalOnOneSide) {
   Comparison comparison;
-  EXPECT_EQ(comparison.verdict(), "no evidence");
+  EXPECT_EQ(comparison.comparison_verdict(), "no evidence");
   comparison.clusters = kMinClustersCompared;
-  EXPECT_EQ(comparison.verdict(), "no evidence");
+  EXPECT_EQ(comparison.comparison_verdict(), "no evidence");
   comparison.interval_m = {-1, 0.1};
-  EXPECT_EQ(comparison.verdict(), "no evidence");
+  EXPECT_EQ(comparison.comparison_verdict(), "no evidence");
   comparison.interval_m = {-0.1, 1};
-  EXPECT_EQ(comparison.verdict(), "no evidence");
+  EXPECT_EQ(comparison.comparison_verdict(), "no evidence");
   comparison.interval_m = {-1, -0.1};
-  EXPECT_EQ(comparison.verdict(), "better");
+  EXPECT_EQ(comparison.comparison_verdict(), "better");
   comparison.interval_m = {0.1, 1};
-  EXPECT_EQ(comparison.verdict(), "worse");
+  EXPECT_EQ(comparison.comparison_verdict(), "worse");
 }
 
-TEST(Compare, CountsPairsAndMissingFixes) {
+TEST(CompareFixes, CountsPairsAndMissingFixes) {
   Pairs all = pairs(10, 1e-2);
   all.errors.erase(all.errors.begin(), all.errors.begin() + 3);
   all.other_errors.erase(all.other_errors.begin() + 9);
-  const Comparison comparison = compare(all.fixes, all.errors, all.others, all.other_errors, 1);
+  const Comparison comparison =
+      compare_horizontal_errors(all.fixes, all.errors, all.others, all.other_errors, 1);
   EXPECT_EQ(comparison.pairs, 6);
   EXPECT_EQ(comparison.clusters, 6);
   EXPECT_EQ(comparison.larger, 6);
@@ -106,12 +114,12 @@ TEST(Compare, CountsPairsAndMissingFixes) {
   EXPECT_NEAR(comparison.mean_difference_m, 1e-2, 2e-4);
 }
 
-TEST(CheckSameImages, RejectsFixesOfOtherCaptures) {
+TEST(CheckSameImagesInFixes, RejectsFixesOfOtherCaptures) {
   const FromFile<FixRow> fixes{"a.csv", {fix_at("a", 0, 0)}};
   const FromFile<FixRow> others{"b.csv", {fix_at("a", 0, 0), fix_at("b", 0, 0)}};
-  EXPECT_THAT(rejection_message([&] { check_same_images(fixes, others); }),
+  EXPECT_THAT(rejection_message([&] { check_same_images_in_fixes(fixes, others); }),
               HasSubstr("b.csv:1: image: 'b' is not in a.csv; 1 of 2"));
-  EXPECT_EQ(rejection_message([&] { check_same_images(fixes, fixes); }), "");
+  EXPECT_EQ(rejection_message([&] { check_same_images_in_fixes(fixes, fixes); }), "");
 }
 
 }  // namespace

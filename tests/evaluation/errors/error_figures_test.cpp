@@ -34,10 +34,10 @@ TEST(SignedErrorStatistics, ReturnsBias) {
   EXPECT_EQ(statistics.sizes.max, 3);
 }
 
-TEST(ComputeDistribution, ContainsQuantilesOfFigures) {
+TEST(ComputePercentiles, MatchesP90OfErrorStatistics) {
   std::vector<double> errors(200);
   for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = static_cast<double>(200 - i);
-  const auto distribution = compute_distribution(errors);
+  const auto distribution = compute_percentiles(errors);
   ASSERT_EQ(distribution.size(), 100);
   EXPECT_EQ(distribution[0], std::pair(0.01, 2.0));
   EXPECT_EQ(distribution[6], std::pair(0.07, 14.0));  // 0.07 * 200 is a little more than 14

@@ -80,7 +80,7 @@ TEST(CrlbRatio, BeatenIgnoresChanceAndDetectsSmallErrors) {
       double squares = 0;
       for (int i = 0; i < 2 * fixes; ++i) squares += std::pow(random.normal(), 2);
       const double ratio = std::sqrt(squares / (2 * fixes)) / stated;
-      count += CrlbRatio{ratio, 1, fixes, 1 / std::sqrt(4.0 * fixes)}.is_below_limit() ? 1 : 0;
+      count += CrlbRatio{ratio, 1, fixes, 1 / std::sqrt(4.0 * fixes)}.is_below_crlb() ? 1 : 0;
     }
     return count;
   };
@@ -112,7 +112,7 @@ TEST(CrlbRatio, FalseAlarmRateHoldsForUnequalLimits) {
     ASSERT_TRUE(ratio);
     sd = ratio->sd;
     square += std::pow(ratio->horizontal - 1, 2) / trials;
-    is_below_limit += ratio->is_below_limit() ? 1 : 0;
+    is_below_limit += ratio->is_below_crlb() ? 1 : 0;
     as_if_equal += ratio->horizontal < 1 - 3 / std::sqrt(4.0 * fixes) ? 1 : 0;
   }
   EXPECT_NEAR(std::sqrt(square) / sd, 1, 0.13);  // three standard errors

@@ -11,12 +11,12 @@
 namespace vlp {
 namespace {
 
-TEST(FitLine, AveragesOutJitter) {
+TEST(FitLineToFixes, AveragesOutJitter) {
   std::vector<FixRow> fixes;
   for (int i = 0; i <= 100; ++i) {  // along x = 1 - 0.01 + ..., upwards, jitter of 2 mm across
     fixes.push_back(fix_at("", 0.01 + (i % 2 == 0 ? 2e-3 : -2e-3), i / 100.0));
   }
-  const auto fit = fit_line(fixes, {Eigen::Vector2d(0, 1), Eigen::Vector2d(0, 0)});
+  const auto fit = fit_line_to_fixes(fixes, {Eigen::Vector2d(0, 1), Eigen::Vector2d(0, 0)});
   ASSERT_TRUE(fit);
   EXPECT_NEAR(fit->jitter_m, 2e-3, 1e-6);
   EXPECT_NEAR(fit->distances_m.mean, 10e-3, 1e-4);  // the jitter is gone
@@ -29,10 +29,10 @@ TEST(FitLine, AveragesOutJitter) {
 
 /// Line through the center of the commanded one, rotated by 0.1: errors grow linearly from 0 to
 /// 0.1.
-TEST(FitLine, SamplesLineEvenly) {
+TEST(FitLineToFixes, ReturnsErrorStatisticsWhenLineIsRotated) {
   std::vector<FixRow> fixes;
   for (int i = -10; i <= 10; ++i) fixes.push_back(fix_at("", i / 10.0, i / 100.0));
-  const auto fit = fit_line(fixes, {Eigen::Vector2d(-1, 0), Eigen::Vector2d(1, 0)});
+  const auto fit = fit_line_to_fixes(fixes, {Eigen::Vector2d(-1, 0), Eigen::Vector2d(1, 0)});
   ASSERT_TRUE(fit);
   EXPECT_NEAR(fit->angle_rad, std::atan(0.1), 1e-9);
   EXPECT_NEAR(fit->distances_m.max, 0.1, 1e-9);
@@ -41,24 +41,24 @@ TEST(FitLine, SamplesLineEvenly) {
   EXPECT_NEAR(fit->jitter_m, 0, 1e-7);  // the root of rounding
 }
 
-TEST(FitLine, HasDirectionOfCommandedLine) {
+TEST(FitLineToFixes, HasDirectionOfCommandedLine) {
   const std::vector<FixRow> fixes{fix_at("", 0, 0), fix_at("", 1, 0)};
   const Eigen::Vector2d begin(0, 0), end(1, 0);
   for (const CommandedLine& line : {CommandedLine{begin, end}, CommandedLine{end, begin}}) {
-    const auto fit = fit_line(fixes, line);
+    const auto fit = fit_line_to_fixes(fixes, line);
     ASSERT_TRUE(fit);
     EXPECT_NEAR((fit->line_m[0] - line[0]).norm(), 0, 1e-12);
     EXPECT_NEAR(fit->angle_rad, 0, 1e-12);
   }
 }
 
-TEST(FitLine, ReturnsNulloptWithoutDirection) {
+TEST(FitLineToFixes, ReturnsNulloptWithoutDirection) {
   const CommandedLine line{Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0)};
-  EXPECT_FALSE(fit_line({fix_at("", 0, 0)}, line));
-  EXPECT_FALSE(fit_line({fix_at("", 1, 1), fix_at("", 1, 1)}, line));
-  EXPECT_FALSE(
-      fit_line({fix_at("", 0, 0), fix_at("", 1, 1), fix_at("", 0, 1), fix_at("", 1, 0)}, line));
-  EXPECT_TRUE(fit_line({fix_at("", 0, 0), fix_at("", 0, 1)}, line));
+  EXPECT_FALSE(fit_line_to_fixes({fix_at("", 0, 0)}, line));
+  EXPECT_FALSE(fit_line_to_fixes({fix_at("", 1, 1), fix_at("", 1, 1)}, line));
+  EXPECT_FALSE(fit_line_to_fixes(
+      {fix_at("", 0, 0), fix_at("", 1, 1), fix_at("", 0, 1), fix_at("", 1, 0)}, line));
+  EXPECT_TRUE(fit_line_to_fixes({fix_at("", 0, 0), fix_at("", 0, 1)}, line));
 }
 
 }  // namespace

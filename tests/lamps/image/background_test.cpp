@@ -27,14 +27,14 @@ cv::Mat noisy(cv::Size size, double level, double noise, std::size_t bright_ever
 }
 
 void expect_dark(const cv::Mat& image, double level, double noise) {
-  const Background background = estimate_background(image_view(image));
+  const Background background = estimate_background(to_image_view(image));
   EXPECT_NEAR(background.level, level, 0.15 * noise + 0.5);
   EXPECT_NEAR(background.noise, noise, 0.1 * noise);
   EXPECT_DOUBLE_EQ(background.threshold, background.level + 4.5 * background.noise);
 }
 
 void expect_flat(const cv::Mat& image, double level) {
-  const Background background = estimate_background(image_view(image));
+  const Background background = estimate_background(to_image_view(image));
   EXPECT_EQ(background.level, level);
   EXPECT_LT(background.noise, 0.5);
   EXPECT_EQ(background.threshold, level + 1.6);
@@ -64,7 +64,7 @@ TEST(EstimateBackground, IsUnbiasedWhenFivePercentOfPixelsAreLit) {
 TEST(EstimateBackground, ThresholdExceedsNearlyAllPixelsOfFlatImages) {
   for (const double noise : {0.5, 2.0, 8.0}) {
     const cv::Mat image = noisy<std::uint8_t>({800, 600}, 60, noise, 0, 0);
-    EXPECT_LT(cv::countNonZero(image > estimate_background(image_view(image)).threshold), 20)
+    EXPECT_LT(cv::countNonZero(image > estimate_background(to_image_view(image)).threshold), 20)
         << noise;
   }
 }
@@ -86,7 +86,7 @@ TEST(EstimateBackground, ReturnsLevelOfBlackAndWhiteImages) {
 TEST(EstimateBackground, MatchesNoiseWhenDarkLevelIsClipped) {
   // Models a brightened image that was black in most places.
   const cv::Mat image = cv::max(noisy<std::uint8_t>({800, 600}, 1, 1.2, 0, 0), 1);
-  const Background background = estimate_background(image_view(image));
+  const Background background = estimate_background(to_image_view(image));
   EXPECT_NEAR(background.noise, 1.2, 0.3);
   EXPECT_LT(cv::countNonZero(image > background.threshold), 20);
 }
@@ -105,7 +105,7 @@ TEST(EstimateBackground, DetectsNoClippingInNoiselessImagesWithLargeLights) {
   }
 }
 
-TEST(EstimateBackground, IgnoresPixelsOutsideImageView) {
+TEST(EstimateBackground, IgnoresParentPixelsOfSubimage) {
   cv::Mat image(600, 800, CV_8U, cv::Scalar(200));
   cv::Mat part = image(cv::Rect(100, 50, 33, 41));
   part = 30;
@@ -123,10 +123,10 @@ TEST(EstimateBackground, ScalesWithLevelStepIn16BitImages) {
             cv::saturate_cast<std::uint8_t>(dark + lamp + 0.8 * random.normal());
       }
     }
-    const Background expected = estimate_background(image_view(eight));
+    const Background expected = estimate_background(to_image_view(eight));
     for (const int step : {16, 257}) {
       eight.convertTo(sixteen, CV_16U, step);
-      const Background found = estimate_background(image_view(sixteen));
+      const Background found = estimate_background(to_image_view(sixteen));
       EXPECT_NEAR(found.level / step, expected.level, 1e-9);
       EXPECT_NEAR(found.noise / step, expected.noise, 1e-9);
       EXPECT_NEAR(found.threshold / step, expected.threshold, 1e-9);
@@ -137,7 +137,7 @@ TEST(EstimateBackground, ScalesWithLevelStepIn16BitImages) {
 TEST(EstimateBackground, IgnoresLevelStepWhenFewLevelsOccur) {
   cv::Mat image = cv::Mat::zeros(600, 800, CV_16U);
   image(cv::Rect(100, 50, 200, 200)) = 400;
-  EXPECT_LT(estimate_background(image_view(image)).threshold, 2);
+  EXPECT_LT(estimate_background(to_image_view(image)).threshold, 2);
 }
 
 TEST(EstimateBackground, SamplesAllColumnsOfColorFilterPattern) {
@@ -146,7 +146,7 @@ TEST(EstimateBackground, SamplesAllColumnsOfColorFilterPattern) {
     for (int darker = 0; darker < 4; ++darker) {
       cv::Mat image(size, CV_8U, cv::Scalar(30));
       for (int column = darker; column < size.width; column += 4) image.col(column) = 20;
-      EXPECT_NEAR(estimate_background(image_view(image)).level, 27.5, 0.1)
+      EXPECT_NEAR(estimate_background(to_image_view(image)).level, 27.5, 0.1)
           << size << ", " << darker;
     }
   }

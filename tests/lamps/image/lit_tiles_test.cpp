@@ -31,12 +31,12 @@ int count(const TileMask& tiles) {
   return count;
 }
 
-TEST(FindLitTiles, DetectsLightsOfTwoConsecutiveRows) {
+TEST(FindBrightTiles, DetectsLightsOfTwoConsecutiveRows) {
   for (const int depth : {CV_8U, CV_16U}) {
     for (int y = 0; y + 2 <= 200; ++y) {
       for (const int x : {0, 63, 64, 130, 255, 256, 299}) {
         const cv::Mat image = with_light({{x, y, 1, 2}}, depth);
-        const TileMask tiles = find_lit_tiles(image_view(image), kThreshold);
+        const TileMask tiles = find_bright_tiles(to_image_view(image), kThreshold);
         ASSERT_EQ(tiles.columns, 5);
         ASSERT_EQ(tiles.rows, 4);
         EXPECT_TRUE(is_lit(tiles, x, y) && is_lit(tiles, x, y + 1)) << x << ", " << y;
@@ -46,12 +46,12 @@ TEST(FindLitTiles, DetectsLightsOfTwoConsecutiveRows) {
   }
 }
 
-TEST(FindLitTiles, DetectsSingleRowStripesOverMoreThan16Rows) {
+TEST(FindBrightTiles, DetectsSingleRowStripesOverMoreThan16Rows) {
   for (const int period : {2, 3, 4, 5, 6, 8}) {
     for (int y = 0; y < 128; ++y) {
       std::vector<cv::Rect> stripes;
       for (int row = y; row <= y + 16 + period; row += period) stripes.emplace_back(100, row, 9, 1);
-      const TileMask tiles = find_lit_tiles(image_view(with_light(stripes)), kThreshold);
+      const TileMask tiles = find_bright_tiles(to_image_view(with_light(stripes)), kThreshold);
       for (const cv::Rect& stripe : stripes) {
         EXPECT_TRUE(is_lit(tiles, 100, stripe.y)) << period << ", " << y << ", " << stripe.y;
       }
@@ -59,22 +59,23 @@ TEST(FindLitTiles, DetectsSingleRowStripesOverMoreThan16Rows) {
   }
 }
 
-TEST(FindLitTiles, IgnoresSinglePixels) {
+TEST(FindBrightTiles, IgnoresSinglePixels) {
   for (int y = 0; y < 200; ++y) {
-    EXPECT_EQ(count(find_lit_tiles(image_view(with_light({{130, y, 1, 1}})), kThreshold)), 0) << y;
+    EXPECT_EQ(count(find_bright_tiles(to_image_view(with_light({{130, y, 1, 1}})), kThreshold)), 0)
+        << y;
   }
 }
 
-TEST(FindLitTiles, ReturnsNoTilesWhenThresholdIsWhiteOrHigher) {
-  EXPECT_EQ(count(find_lit_tiles(image_view(with_light({{130, 80, 40, 40}})), 255)), 0);
-  EXPECT_EQ(count(find_lit_tiles(image_view(with_light({{130, 80, 40, 40}})), 199.5)), 1);
-  EXPECT_EQ(count(find_lit_tiles(image_view(with_light({{130, 80, 40, 40}})), 200)), 0);
+TEST(FindBrightTiles, ReturnsNoTilesWhenThresholdIsWhiteOrHigher) {
+  EXPECT_EQ(count(find_bright_tiles(to_image_view(with_light({{130, 80, 40, 40}})), 255)), 0);
+  EXPECT_EQ(count(find_bright_tiles(to_image_view(with_light({{130, 80, 40, 40}})), 199.5)), 1);
+  EXPECT_EQ(count(find_bright_tiles(to_image_view(with_light({{130, 80, 40, 40}})), 200)), 0);
 }
 
-TEST(FindGroupBoxes, JoinsTilesThatTouchAtCorners) {
+TEST(FindTileGroupBoxes, JoinsTilesThatTouchAtCorners) {
   TileMask tiles(6, 5);
   for (const auto& [x, y] : {std::pair(1, 0), {2, 1}, {1, 2}, {5, 4}, {4, 4}}) tiles.row(y)[x] = 1;
-  const auto boxes = find_group_boxes(tiles);
+  const auto boxes = find_tile_group_boxes(tiles);
   ASSERT_EQ(boxes.size(), 2U);
   EXPECT_EQ(boxes[0], (PixelBox{1, 0, 2, 3}));
   EXPECT_EQ(boxes[1], (PixelBox{4, 4, 2, 1}));

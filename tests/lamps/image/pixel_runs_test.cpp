@@ -36,23 +36,24 @@ TEST(FindPixelRuns, ReturnsLitPixelsOfEachRowInOrder) {
   cv::Mat image;
   cv::vconcat(std::vector{row_with({{20, 30}, {50, 53}}), row_with({}), row_with({{5, 8}})}, image);
   EXPECT_THAT(
-      find_pixel_runs(image_view(image), 100),
+      find_pixel_runs(to_image_view(image), 100),
       ElementsAre(vlp::PixelRun{0, 20, 30}, vlp::PixelRun{0, 50, 53}, vlp::PixelRun{2, 5, 8}));
 }
 
 TEST(FindPixelRuns, BridgesGapsOfUpToTwoPixels) {
-  EXPECT_THAT(find_pixel_runs(image_view(row_with({{20, 25}, {26, 30}})), 100),
+  EXPECT_THAT(find_pixel_runs(to_image_view(row_with({{20, 25}, {26, 30}})), 100),
               ElementsAre(vlp::PixelRun{0, 20, 30}));
-  EXPECT_THAT(find_pixel_runs(image_view(row_with({{20, 25}, {27, 30}})), 100),
+  EXPECT_THAT(find_pixel_runs(to_image_view(row_with({{20, 25}, {27, 30}})), 100),
               ElementsAre(vlp::PixelRun{0, 20, 30}));
-  EXPECT_THAT(find_pixel_runs(image_view(row_with({{20, 25}, {28, 31}})), 100),
+  EXPECT_THAT(find_pixel_runs(to_image_view(row_with({{20, 25}, {28, 31}})), 100),
               ElementsAre(vlp::PixelRun{0, 20, 25}, vlp::PixelRun{0, 28, 31}));
 }
 
 TEST(FindPixelRuns, RejectsRunsOfOneOrTwoPixels) {
-  EXPECT_THAT(find_pixel_runs(image_view(row_with({{0, 1}, {20, 21}, {40, 42}, {198, 200}})), 100),
-              IsEmpty());
-  EXPECT_THAT(find_pixel_runs(image_view(row_with({{20, 23}, {40, 42}})), 100),
+  EXPECT_THAT(
+      find_pixel_runs(to_image_view(row_with({{0, 1}, {20, 21}, {40, 42}, {198, 200}})), 100),
+      IsEmpty());
+  EXPECT_THAT(find_pixel_runs(to_image_view(row_with({{20, 23}, {40, 42}})), 100),
               ElementsAre(vlp::PixelRun{0, 20, 23}));
 }
 
@@ -61,7 +62,7 @@ TEST(FindPixelRuns, DetectsRunsAtAllPositions) {
   for (int begin = 0; begin < 197; ++begin) {
     for (const int width : {3, 64, 65, 130}) {
       const int end = std::min(begin + width, 200);
-      EXPECT_THAT(find_pixel_runs(image_view(row_with({{begin, end}})), 100),
+      EXPECT_THAT(find_pixel_runs(to_image_view(row_with({{begin, end}})), 100),
                   ElementsAre(vlp::PixelRun{0, begin, end}));
     }
   }
@@ -69,41 +70,41 @@ TEST(FindPixelRuns, DetectsRunsAtAllPositions) {
 
 TEST(FindPixelRuns, BridgesGapsAtTileBorders) {
   for (int gap = 60; gap < 68; ++gap) {
-    EXPECT_THAT(find_pixel_runs(image_view(row_with({{50, gap}, {gap + 2, 90}})), 100),
+    EXPECT_THAT(find_pixel_runs(to_image_view(row_with({{50, gap}, {gap + 2, 90}})), 100),
                 ElementsAre(vlp::PixelRun{0, 50, 90}));
-    EXPECT_THAT(find_pixel_runs(image_view(row_with({{50, gap}, {gap + 3, 90}})), 100),
+    EXPECT_THAT(find_pixel_runs(to_image_view(row_with({{50, gap}, {gap + 3, 90}})), 100),
                 ElementsAre(vlp::PixelRun{0, 50, gap}, vlp::PixelRun{0, gap + 3, 90}));
   }
 }
 
 TEST(FindPixelRuns, SeparatesRunsWithDarkTileBetween) {
-  EXPECT_THAT(find_pixel_runs(image_view(row_with({{60, 64}, {128, 131}})), 100),
+  EXPECT_THAT(find_pixel_runs(to_image_view(row_with({{60, 64}, {128, 131}})), 100),
               ElementsAre(vlp::PixelRun{0, 60, 64}, vlp::PixelRun{0, 128, 131}));
 }
 
 TEST(FindPixelRuns, RejectsPixelsAtThreshold) {
   const cv::Mat row = row_with({{20, 30}}, CV_8U, 10, 100);
-  EXPECT_THAT(find_pixel_runs(image_view(row), 99.9), ElementsAre(vlp::PixelRun{0, 20, 30}));
-  EXPECT_THAT(find_pixel_runs(image_view(row), 100), IsEmpty());
-  EXPECT_THAT(find_pixel_runs(image_view(row), 100.1), IsEmpty());
+  EXPECT_THAT(find_pixel_runs(to_image_view(row), 99.9), ElementsAre(vlp::PixelRun{0, 20, 30}));
+  EXPECT_THAT(find_pixel_runs(to_image_view(row), 100), IsEmpty());
+  EXPECT_THAT(find_pixel_runs(to_image_view(row), 100.1), IsEmpty());
 }
 
 TEST(FindPixelRuns, DetectsRunsIn16BitImages) {
   const cv::Mat row = row_with({{20, 30}}, CV_16U, 3000, 40000);
-  EXPECT_THAT(find_pixel_runs(image_view(row), 39999.5), ElementsAre(vlp::PixelRun{0, 20, 30}));
-  EXPECT_THAT(find_pixel_runs(image_view(row), 40000), IsEmpty());
-  EXPECT_THAT(find_pixel_runs(image_view(row), 300), ElementsAre(vlp::PixelRun{0, 0, 200}));
+  EXPECT_THAT(find_pixel_runs(to_image_view(row), 39999.5), ElementsAre(vlp::PixelRun{0, 20, 30}));
+  EXPECT_THAT(find_pixel_runs(to_image_view(row), 40000), IsEmpty());
+  EXPECT_THAT(find_pixel_runs(to_image_view(row), 300), ElementsAre(vlp::PixelRun{0, 0, 200}));
 }
 
 TEST(FindPixelRuns, ReturnsNoRunsWhenThresholdIsWhiteOrHigher) {
   for (const double threshold : {255.0, 257.5, 1e9}) {
-    EXPECT_THAT(find_pixel_runs(image_view(row_with({{20, 30}}, CV_8U, 10, 255)), threshold),
+    EXPECT_THAT(find_pixel_runs(to_image_view(row_with({{20, 30}}, CV_8U, 10, 255)), threshold),
                 IsEmpty());
   }
-  EXPECT_THAT(find_pixel_runs(image_view(row_with({{20, 30}}, CV_8U, 10, 255)), 254.9),
+  EXPECT_THAT(find_pixel_runs(to_image_view(row_with({{20, 30}}, CV_8U, 10, 255)), 254.9),
               ElementsAre(vlp::PixelRun{0, 20, 30}));
   for (const double threshold : {65535.0, 65540.0, 1e9}) {
-    EXPECT_THAT(find_pixel_runs(image_view(row_with({{20, 30}}, CV_16U, 10, 65535)), threshold),
+    EXPECT_THAT(find_pixel_runs(to_image_view(row_with({{20, 30}}, CV_16U, 10, 65535)), threshold),
                 IsEmpty());
   }
 }

@@ -39,7 +39,7 @@ cv::Mat spots_on_dark(const cv::Size& size, int depth, int spots) {
 
 void expect_turned(const cv::Mat& image, double threshold) {
   const ScanlineImage found =
-      make_scanline_image(image_view(image), Readout::columns, {0, 1, threshold});
+      make_scanline_image(to_image_view(image), Readout::columns, {0, 1, threshold});
   const cv::Mat lines = to_mat(found.pixels), all = image.t();
   ASSERT_EQ(lines.size(), all.size());
   ASSERT_EQ(lines.type(), all.type());
@@ -59,7 +59,7 @@ void expect_turned(const cv::Mat& image, double threshold) {
   EXPECT_EQ(cv::countNonZero(differs & bright), 0);
   // Only lit tiles are searched, and no run is missed.
   const auto runs_in_lit_tiles = find_pixel_runs(found.pixels, threshold, found.lit);
-  const auto all_runs = find_pixel_runs(image_view(all), threshold);
+  const auto all_runs = find_pixel_runs(to_image_view(all), threshold);
   EXPECT_TRUE(std::equal(runs_in_lit_tiles.begin(), runs_in_lit_tiles.end(), all_runs.begin(),
                          all_runs.end(), [](const PixelRun& a, const PixelRun& b) {
                            return a.row == b.row && a.begin == b.begin && a.end == b.end;
@@ -68,7 +68,7 @@ void expect_turned(const cv::Mat& image, double threshold) {
 
 TEST(MakeScanlineImage, ReturnsSameImageForRowReadout) {
   const cv::Mat image = spots_on_dark({100, 70}, CV_8U, 3);
-  EXPECT_EQ(make_scanline_image(image_view(image), Readout::rows, {0, 1, 100}).pixels.data,
+  EXPECT_EQ(make_scanline_image(to_image_view(image), Readout::rows, {0, 1, 100}).pixels.data,
             image.data);
 }
 
@@ -90,7 +90,7 @@ TEST(MakeScanlineImage, FillsSurroundingsOfLightsWithBackgroundLevel) {
     const cv::Rect light(900, 700, 200, 150);
     image(light).setTo(white);
     const ScanlineImage found =
-        make_scanline_image(image_view(image), Readout::columns, {7.4, 1, white - 1});
+        make_scanline_image(to_image_view(image), Readout::columns, {7.4, 1, white - 1});
     const cv::Mat lines = to_mat(found.pixels);
     EXPECT_EQ(lines.size(), cv::Size(1500, 2000));
     EXPECT_EQ(lines.type(), image.type());
@@ -108,7 +108,7 @@ TEST(MakeScanlineImage, ReturnsBlackImageWhenNoTileIsLit) {
   cv::Mat dark = spots_on_dark({601, 333}, CV_8U, 0);
   dark.at<std::uint8_t>(100, 200) = dark.at<std::uint8_t>(300, 500) = 200;  // no run of three
   const ScanlineImage lines =
-      make_scanline_image(image_view(dark), Readout::columns, {7.4, 1, 100});
+      make_scanline_image(to_image_view(dark), Readout::columns, {7.4, 1, 100});
   EXPECT_EQ(lines.pixels.size(), (ImageSize{333, 601}));
   EXPECT_EQ(cv::countNonZero(to_mat(lines.pixels)), 0);
   EXPECT_TRUE(find_pixel_runs(lines.pixels, 100, lines.lit).empty());
@@ -117,7 +117,8 @@ TEST(MakeScanlineImage, ReturnsBlackImageWhenNoTileIsLit) {
 TEST(MakeScanlineImage, KeepsRunAcrossTileBorder) {
   cv::Mat image(200, 200, CV_8U, cv::Scalar(0));
   image.at<std::uint8_t>(63, 10) = image.at<std::uint8_t>(65, 10) = 200;
-  const ScanlineImage lines = make_scanline_image(image_view(image), Readout::columns, {0, 1, 100});
+  const ScanlineImage lines =
+      make_scanline_image(to_image_view(image), Readout::columns, {0, 1, 100});
   const auto runs = find_pixel_runs(lines.pixels, 100, lines.lit);
   ASSERT_EQ(runs.size(), 1U);
   EXPECT_EQ(runs[0].row, 10);
@@ -147,9 +148,10 @@ TEST(MakeScanlineImage, YieldsSameLightsForTransposedImage) {
                     [](const CaptureSet& any) { return any.folder == "check"; });
   for (std::size_t i = 0; i < 3; ++i) {
     const LampShot shot = make_lamp_shot(scene, set, i * 7);
-    const cv::Mat image = expose(scene.sensor, renderer.lamp_electrons(shot), shot.noise_seed);
-    const auto upright = by_rows.detect(image_view(image));
-    auto turned = by_columns.detect(image_view(image.t()));
+    const cv::Mat image =
+        simulate_sensor(scene.sensor, renderer.render_lamp_electrons(shot), shot.noise_seed);
+    const auto upright = by_rows.detect(to_image_view(image));
+    auto turned = by_columns.detect(to_image_view(image.t()));
     std::sort(turned.begin(), turned.end(), before);
     EXPECT_GE(upright.size(), 4U);
     ASSERT_EQ(upright.size(), turned.size());

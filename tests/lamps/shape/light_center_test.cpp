@@ -20,7 +20,7 @@ using Eigen::Vector2d;
 class LightShapeOfMovingDisc : public testing::Test {
  protected:
   LightShapeOfMovingDisc()
-      : shape(camera), center_px(shape.plane_to_pixel(circle.center).value()) {}
+      : shape(camera), center_px(shape.pixel_from_level_plane(circle.center).value()) {}
 
   /// Returns the rim with each point at its position when its scanline is read: at d + m (l - l_c).
   std::vector<EdgePoint> outline(const Vector2d& motion_per_line) const {
@@ -30,9 +30,10 @@ class LightShapeOfMovingDisc : public testing::Test {
       const double angle = 2 * std::numbers::pi * i / count;
       const Vector2d rim =
           circle.center + circle.radius * Vector2d(std::cos(angle), std::sin(angle));
-      Vector2d pixel = shape.plane_to_pixel(rim).value();
+      Vector2d pixel = shape.pixel_from_level_plane(rim).value();
       for (int iteration = 0; iteration < 20; ++iteration) {
-        pixel = shape.plane_to_pixel(rim + (pixel.y() - center_px.y()) * motion_per_line).value();
+        pixel = shape.pixel_from_level_plane(rim + (pixel.y() - center_px.y()) * motion_per_line)
+                    .value();
       }
       points.push_back({pixel, 100, 1, pixel.x() < center_px.x()});
     }
@@ -51,21 +52,23 @@ TEST_F(LightShapeOfMovingDisc, CenterMatchesPositionAtReadoutOfCenterRow) {
   // A lamp 2.5 m above a camera that moves at 2 m/s, with a row time of 30 us.
   for (const Vector2d& motion :
        {Vector2d(2.4e-5, 0), Vector2d(0, 2.4e-5), Vector2d(-1.5e-5, 2e-5)}) {
-    auto light = shape.fit_light(outline(motion), dark);
+    auto light = shape.fit_light_to_outline(outline(motion), dark);
     ASSERT_TRUE(light);
-    const Vector2d oval = complex_product(light->sums.line_slope(), motion) / 2;
+    const Vector2d oval = complex_product(light->sums.scanline_gradient(), motion) / 2;
     Light unshifted = *light;
-    shape.apply_shear({oval, 1e-12 * Matrix2::Identity()}, motion, *light);
-    shape.apply_shear({oval, 1e-12 * Matrix2::Identity()}, Vector2d::Zero(), unshifted);
+    shape.correct_light_for_motion({oval, 1e-12 * Matrix2::Identity()}, motion, *light);
+    shape.correct_light_for_motion({oval, 1e-12 * Matrix2::Identity()}, Vector2d::Zero(),
+                                   unshifted);
     EXPECT_THAT(light->pixel, IsNear(center_px, 2e-3));
     EXPECT_GT((unshifted.pixel - center_px).norm(), 8e-3) << "read sooner than its center";
   }
 }
 
 TEST_F(LightShapeOfMovingDisc, KeepsCenterForStationaryCamera) {
-  auto light = shape.fit_light(outline(Vector2d::Zero()), dark);
+  auto light = shape.fit_light_to_outline(outline(Vector2d::Zero()), dark);
   ASSERT_TRUE(light);
-  shape.apply_shear({Vector2d::Zero(), 1e-12 * Matrix2::Identity()}, Vector2d::Zero(), *light);
+  shape.correct_light_for_motion({Vector2d::Zero(), 1e-12 * Matrix2::Identity()}, Vector2d::Zero(),
+                                 *light);
   EXPECT_THAT(light->pixel, IsNear(center_px, 1e-6));
 }
 

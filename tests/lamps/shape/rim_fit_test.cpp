@@ -30,24 +30,24 @@ std::vector<RimPiece> pieces_of_circle(int count, double noise, Random& random) 
   return pieces;
 }
 
-TEST(EstimateOutlineShift, IsExactWithoutNoise) {
+TEST(EstimateOutlineOffset, IsExactWithoutNoise) {
   Random random(1);
   for (const bool round : {true, false}) {
-    const auto shift = estimate_outline_shift(pieces_of_circle(12, 0, random), round);
+    const auto shift = estimate_outline_offset(pieces_of_circle(12, 0, random), round);
     ASSERT_TRUE(shift);
     EXPECT_LT((shift->px - kShift).norm(), 1e-9);
     EXPECT_NEAR(shift->num_inliers, 12, 1e-6);
   }
 }
 
-TEST(EstimateOutlineShift, CovarianceMatchesScatter) {
+TEST(EstimateOutlineOffset, CovarianceMatchesScatter) {
   constexpr int draws = 4000;
   Random random(2);
   for (const bool round : {true, false}) {
     for (const double noise : {1.0, 3.0}) {
       double squares = 0, stated = 0;
       for (int i = 0; i < draws; ++i) {
-        const auto shift = estimate_outline_shift(pieces_of_circle(24, noise, random), round);
+        const auto shift = estimate_outline_offset(pieces_of_circle(24, noise, random), round);
         ASSERT_TRUE(shift);
         squares += (shift->px - kShift).squaredNorm();
         stated += shift->covariance.trace();
@@ -58,21 +58,21 @@ TEST(EstimateOutlineShift, CovarianceMatchesScatter) {
   }
 }
 
-TEST(EstimateOutlineShift, RejectsOutlierPiece) {
+TEST(EstimateOutlineOffset, RejectsOutlierPiece) {
   Random random(3);
   auto pieces = pieces_of_circle(14, 1, random);
   pieces[3].behind_px += 2;
-  const auto shift = estimate_outline_shift(pieces, true);
+  const auto shift = estimate_outline_offset(pieces, true);
   ASSERT_TRUE(shift);
   EXPECT_LT((shift->px - kShift).norm(), 4 * std::sqrt(shift->covariance.trace()));
   EXPECT_LT(shift->num_inliers, 13);
 }
 
-TEST(EstimateOutlineShift, ReturnsNulloptForTooFewPieces) {
+TEST(EstimateOutlineOffset, ReturnsNulloptForTooFewPieces) {
   Random random(4);
-  EXPECT_FALSE(estimate_outline_shift(pieces_of_circle(4, 1, random), true));
-  EXPECT_FALSE(estimate_outline_shift(pieces_of_circle(6, 1, random), false));
-  EXPECT_FALSE(estimate_outline_shift({}, true));
+  EXPECT_FALSE(estimate_outline_offset(pieces_of_circle(4, 1, random), true));
+  EXPECT_FALSE(estimate_outline_offset(pieces_of_circle(6, 1, random), false));
+  EXPECT_FALSE(estimate_outline_offset({}, true));
 }
 
 }  // namespace

@@ -22,18 +22,18 @@ using Eigen::Vector2d;
 const cv::Size kSize(300, 280);
 
 Blob largest_blob(const ImageView& image, const Background& background) {
-  const auto blobs = group_pixel_runs(find_pixel_runs(image, background.threshold), 24);
+  const auto blobs = group_pixel_runs_into_blobs(find_pixel_runs(image, background.threshold), 24);
   if (blobs.empty()) throw std::runtime_error("the image has no blob");
   return *std::max_element(blobs.begin(), blobs.end(), [](const Blob& a, const Blob& b) {
-    return a.box().area() < b.box().area();
+    return a.bounding_box().area() < b.bounding_box().area();
   });
 }
 
 std::optional<Rim> rim_in(const cv::Mat& pixels) {
-  const ImageView image = image_view(pixels);
+  const ImageView image = to_image_view(pixels);
   const Background background = estimate_background(image);
-  return fit_rim(image, largest_blob(image, background), background,
-                 LightShape(drawn_camera(kSize)));
+  return fit_rim_of_light(image, largest_blob(image, background), background,
+                          LightShape(drawn_camera(kSize)));
 }
 
 /// Returns a downlight with a core off the middle in this direction.
@@ -62,7 +62,7 @@ void for_each_downlight(const Test& test) {
   }
 }
 
-TEST(FitRim, MatchesDownlightForAllCorePositions) {
+TEST(FitRimOfLight, MatchesDownlightForAllCorePositions) {
   double chi_square = 0, worst_px = 0, count = 0;
   for_each_downlight([&](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
     const auto rim = rim_in(render_lamps({lamp}, kSize, depth, noise, seed));
@@ -91,7 +91,7 @@ cv::Mat coded(const cv::Mat& image) {
   return result;
 }
 
-TEST(FitRim, IsUnbiasedUnderToneCurve) {
+TEST(FitRimOfLight, IsUnbiasedUnderToneCurve) {
   double towards_px = 0, squares = 0, chi_square = 0, worst = 0;
   int count = 0;
   for (const double period : {12.0, 17.0, 26.0, 33.0}) {
@@ -126,7 +126,7 @@ cv::Mat1b coded_and_clipped(const DrawnLamp& lamp, double noise, Random& random)
   return image;
 }
 
-TEST(FitRim, IsUnbiasedBesideSaturatedWalls) {
+TEST(FitRimOfLight, IsUnbiasedBesideSaturatedWalls) {
   Random random(1);
   for (const double white : {0.8, 1.5, 2.0, 4.0}) {
     double towards_px = 0, chi_square = 0, worst = 0;
@@ -154,17 +154,17 @@ TEST(FitRim, IsUnbiasedBesideSaturatedWalls) {
   }
 }
 
-TEST(FitRim, DetectsClearRimOfLargeDownlights) {
+TEST(FitRimOfLight, DetectsClearRimOfLargeDownlights) {
   for (const double scale : {3.0, 7.0}) {
     DrawnLamp lamp = downlight(0.7, 40);
     lamp.center *= scale, lamp.radius_px *= scale;
     lamp.recess->core_off_px *= scale, lamp.recess->core_px *= scale, lamp.recess->halo_px *= scale;
     const cv::Size size(int(scale * kSize.width), int(scale * kSize.height));
     const cv::Mat pixels = render_lamps({lamp}, size, CV_8U, 1);
-    const ImageView image = image_view(pixels);
+    const ImageView image = to_image_view(pixels);
     const Background background = estimate_background(image);
-    const auto rim =
-        fit_rim(image, largest_blob(image, background), background, LightShape(drawn_camera(size)));
+    const auto rim = fit_rim_of_light(image, largest_blob(image, background), background,
+                                      LightShape(drawn_camera(size)));
     ASSERT_TRUE(rim) << scale;
     EXPECT_TRUE(rim->is_clear) << scale;
     EXPECT_LT((rim->light.pixel - lamp.center).norm(), 0.5) << scale;
@@ -176,7 +176,7 @@ TEST(LightDetector, IdentifiesDownlights) {
   for_each_downlight([&](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
     const LampMap map{{drawn_lamp(7, lamp.stripes.period_lines), drawn_lamp(8, 14.5)}};
     const auto lights = LightDetector(map, drawn_camera(kSize))
-                            .detect(image_view(render_lamps({lamp}, kSize, depth, noise, seed)));
+                            .detect(to_image_view(render_lamps({lamp}, kSize, depth, noise, seed)));
     ASSERT_EQ(lights.size(), 1U);
     if (lights[0].stripes.periods < kMinReliablePeriods) {
       EXPECT_EQ(lights[0].reason, LightReason::too_few_periods);
@@ -192,7 +192,7 @@ TEST(LightDetector, IdentifiesDownlights) {
   EXPECT_GT(identified, 0);
 }
 
-TEST(FitRim, ReportsNoClearRimForGlows) {
+TEST(FitRimOfLight, ReportsNoClearRimForGlows) {
   for (const double period : {9.0, 14.5, 22.0}) {
     for (const double noise : {0.0, 0.5, 1.5}) {
       const DrawnLamp glow{
@@ -203,7 +203,7 @@ TEST(FitRim, ReportsNoClearRimForGlows) {
   }
 }
 
-TEST(FitRim, MatchesEdgeOfDisc) {
+TEST(FitRimOfLight, MatchesEdgeOfDisc) {
   const DrawnLamp disc{.center = {151.3, 139.6}, .radius_px = 50.7};
   const auto rim = rim_in(render_lamps({disc}, kSize, CV_8U, 1));
   ASSERT_TRUE(rim);
@@ -211,25 +211,25 @@ TEST(FitRim, MatchesEdgeOfDisc) {
   EXPECT_LT((rim->light.pixel - disc.center).norm(), 0.2);
 }
 
-TEST(FitRim, ReturnsNulloptForSmallBlob) {
+TEST(FitRimOfLight, ReturnsNulloptForSmallBlob) {
   const DrawnLamp speck{.center = {151.3, 139.6}, .radius_px = 8};
   EXPECT_FALSE(rim_in(render_lamps({speck}, kSize, CV_8U)));
 }
 
-TEST(IsUnevenlyLit, DistinguishesDownlightsFromDiscs) {
+TEST(IsBlobUnevenlyLit, DistinguishesDownlightsFromDiscs) {
   const auto is_uneven = [](const DrawnLamp& lamp, int depth) {
     const cv::Mat pixels = render_lamps({lamp}, kSize, depth, 1);
-    const ImageView image = image_view(pixels);
+    const ImageView image = to_image_view(pixels);
     const Background background = estimate_background(image);
     const Blob blob = largest_blob(image, background);
-    return is_unevenly_lit(image, blob, find_outline(image, blob, background), background);
+    return is_blob_unevenly_lit(image, blob, find_outline(image, blob, background), background);
   };
   for (const int depth : {CV_8U, CV_16U}) {
     EXPECT_TRUE(is_uneven(downlight(0.2, 17), depth));
     EXPECT_FALSE(is_uneven({.center = {151.3, 139.6}, .radius_px = 50.7}, depth));
   }
-  EXPECT_FALSE(
-      is_unevenly_lit(image_view(cv::Mat1b(20, 20)), Blob{{{3, 2, 9}}}, {}, Background{0, 1, 5}));
+  EXPECT_FALSE(is_blob_unevenly_lit(to_image_view(cv::Mat1b(20, 20)), Blob{{{3, 2, 9}}}, {},
+                                    Background{0, 1, 5}));
 }
 
 }  // namespace

@@ -59,16 +59,16 @@ TEST(Shear, MatchesMotionOfTranslatingAndRotatingCamera) {
   Random random(1);
   const MovingCamera moving_camera;
   const auto lights = three_whole(moving_camera, random);
-  const auto shear = Shear::estimate(lights);
+  const auto shear = Shear::estimate_shear_from_outlines(lights);
   ASSERT_TRUE(shear);
   const Vector2d at(-0.3, -0.3);
-  const Oval oval = shear->predict_oval(moving_camera.make_outline(at, 2 * pi, random));
+  const Oval oval = shear->predict_oval_from_motion(moving_camera.make_outline(at, 2 * pi, random));
   // With s along y alone, s (v_x + i v_y) / 2 is |s| (-v_y + i v_x) / 2.
   const Vector2d motion = moving_camera.motion_at(at),
                  expected = 300 * Vector2d(-motion.y(), motion.x());
   EXPECT_GT(expected.norm(), 0.005);
   EXPECT_THAT(oval.oval, IsNear(expected, 3e-4));
-  EXPECT_THAT(shear->motion_at(moving_camera.make_outline(at, 2 * pi, random)),
+  EXPECT_THAT(shear->motion_per_scanline_of(moving_camera.make_outline(at, 2 * pi, random)),
               IsNear(motion, 1e-6));
 }
 
@@ -82,11 +82,11 @@ TEST(Shear, CorrectsCenterOfPartialOutline) {
     auto lights = three_whole(moving_camera, random);
     lights.push_back(moving_camera.make_outline(center, 1.1 * pi, random));
     const OutlineSums& part = lights.back();
-    const auto shear = Shear::estimate(lights);
+    const auto shear = Shear::estimate_shear_from_outlines(lights);
     ASSERT_TRUE(shear);
-    const auto found = part.solve_with_prior(shear->predict_oval(part));
+    const auto found = part.solve_with_oval_prior(shear->predict_oval_from_motion(part));
     ASSERT_TRUE(found);
-    const Vector2d by_circle = part.circle().center - center;
+    const Vector2d by_circle = part.fitted_circle().center - center;
     const Vector2d error = (by_circle + kRadius * found->p.head<2>()) / kRadius;
     squared += error.squaredNorm() / trials;
     circle_squared += by_circle.squaredNorm() / (kRadius * kRadius) / trials;
@@ -106,7 +106,7 @@ TEST(Shear, ReturnsNulloptForStationaryCamera) {
   moving_camera.w = 0;
   int found = 0;
   for (int trial = 0; trial < 300; ++trial) {
-    found += Shear::estimate(three_whole(moving_camera, random)).has_value();
+    found += Shear::estimate_shear_from_outlines(three_whole(moving_camera, random)).has_value();
   }
   EXPECT_EQ(found, 0);
 }
@@ -118,21 +118,21 @@ TEST(Shear, RejectsContradictingLight) {
   MovingCamera other;
   other.v = -3 * moving_camera.v;
   lights.push_back(other.make_outline({0.4, -0.3}, 2 * pi, random));
-  const auto shear = Shear::estimate(lights);
+  const auto shear = Shear::estimate_shear_from_outlines(lights);
   ASSERT_TRUE(shear);
   const Vector2d motion = moving_camera.motion_at({-0.4, 0.2});
-  EXPECT_THAT(shear->predict_oval(lights[1]).oval,
+  EXPECT_THAT(shear->predict_oval_from_motion(lights[1]).oval,
               IsNear(300 * Vector2d(-motion.y(), motion.x()), 5e-4));
 }
 
 TEST(Shear, ReturnsNulloptWithoutUsableLights) {
-  EXPECT_FALSE(Shear::estimate({}));
+  EXPECT_FALSE(Shear::estimate_shear_from_outlines({}));
   // Three points of an outline do not determine the motion.
   const Points points{{1, 0}, {0, 1}, {-1, 0}};
   const OutlineSums few(points, std::vector<double>{1, 1, 1}, {true, true, true}, {{0, 0}, 1},
                         kLineSlope);
-  EXPECT_FALSE(few.solve_with_prior(std::nullopt));
-  EXPECT_FALSE(Shear::estimate(std::vector{few}));
+  EXPECT_FALSE(few.solve_with_oval_prior(std::nullopt));
+  EXPECT_FALSE(Shear::estimate_shear_from_outlines(std::vector{few}));
 }
 
 }  // namespace

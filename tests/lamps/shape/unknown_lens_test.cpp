@@ -54,7 +54,7 @@ double bound_px(const DiscProjection& disc) {
   Light light{};
   light.pixel = disc.pixel;
   light.radius_px = disc.radius_px;
-  return std::numbers::sqrt2 * compute_unknown_lens_sd_px(light, kUnknownLensImage);
+  return std::numbers::sqrt2 * predict_center_sd_without_lens_px(light, kUnknownLensImage);
 }
 
 Lens make_lens(LensModel model, double focal_px, std::vector<double> coefficients) {
@@ -99,14 +99,14 @@ TEST(UnknownLensSd, IncreasesWithRadiusAndDistanceFromImageCenter) {
   Light light{};
   light.pixel = {399.5, 299.5};
   light.radius_px = 30;
-  const double in_the_middle = compute_unknown_lens_sd_px(light, kUnknownLensImage);
+  const double in_the_middle = predict_center_sd_without_lens_px(light, kUnknownLensImage);
   light.pixel.x() += 300;
-  const double off_axis = compute_unknown_lens_sd_px(light, kUnknownLensImage);
+  const double off_axis = predict_center_sd_without_lens_px(light, kUnknownLensImage);
   EXPECT_GT(off_axis, 3 * in_the_middle);
   light.radius_px = 60;
-  EXPECT_DOUBLE_EQ(compute_unknown_lens_sd_px(light, kUnknownLensImage), 4 * off_axis);
+  EXPECT_DOUBLE_EQ(predict_center_sd_without_lens_px(light, kUnknownLensImage), 4 * off_axis);
   light.shape = ShapeKind::rectangle;
-  EXPECT_EQ(compute_unknown_lens_sd_px(light, kUnknownLensImage), 0)
+  EXPECT_EQ(predict_center_sd_without_lens_px(light, kUnknownLensImage), 0)
       << "a rectangle's edges say it";
 }
 

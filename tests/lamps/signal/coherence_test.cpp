@@ -17,9 +17,9 @@ namespace {
 const cv::Size kPictureSize(200, 160);
 
 double coherence_in(const cv::Mat& pixels, const DrawnLamp& lamp) {
-  const ImageView image = image_view(pixels);
+  const ImageView image = to_image_view(pixels);
   const Eigen::Vector2d half(lamp.radius_px, lamp.radius_px);
-  return compute_coherence(
+  return compute_stripe_coherence(
       image, find_chords_in_ellipse(lamp.center - half, lamp.center + half, image.size()),
       estimate_background(image), lamp.stripes.period_lines);
 }
@@ -28,7 +28,7 @@ double coherence_of_drawn(const DrawnLamp& lamp) {
   return coherence_in(render_lamps({lamp}, kPictureSize, CV_16U, 0.5), lamp);
 }
 
-TEST(ComputeCoherence, ReturnsNearlyOneForLampsOfAnyShape) {
+TEST(ComputeStripeCoherence, ReturnsNearlyOneForLampsOfAnyShape) {
   for (const double period : {3.7, 11.0, 40.0}) {
     EXPECT_GT(coherence_of_drawn(DrawnLamp{.stripes = {.period_lines = period}}), 0.99) << period;
   }
@@ -36,12 +36,12 @@ TEST(ComputeCoherence, ReturnsNearlyOneForLampsOfAnyShape) {
   EXPECT_GT(coherence_of_drawn(DrawnLamp{.recess = DrawnRecess{}}), 0.97);
 }
 
-TEST(ComputeCoherence, IgnoresOneHiddenPart) {
+TEST(ComputeStripeCoherence, IgnoresOneHiddenPart) {
   const DrawnBar bar{std::numbers::pi / 2, 20, 14};
   EXPECT_GT(coherence_of_drawn(DrawnLamp{.bar = bar}), 0.9);
 }
 
-TEST(ComputeCoherence, RejectsTiltedBars) {
+TEST(ComputeStripeCoherence, RejectsTiltedBars) {
   const auto coherence_of_tilted_bars = [](double degrees) {
     DrawnLamp lamp;
     lamp.stripes.period_lines = 0.9 * lamp.radius_px;  // two periods
@@ -62,7 +62,7 @@ TEST(ComputeCoherence, RejectsTiltedBars) {
   EXPECT_LT(coherence_of_tilted_bars(12), kMinCoherence);
 }
 
-TEST(ComputeCoherence, RejectsIndependentParts) {
+TEST(ComputeStripeCoherence, RejectsIndependentParts) {
   // Patches with the height of a quarter of a period and the width of a part.
   constexpr int trials = 2000, patch = 6;
   Random random(5);
@@ -74,21 +74,23 @@ TEST(ComputeCoherence, RejectsIndependentParts) {
         pixels(cv::Rect(column, row, 7, patch)) = random.uniform(10, 200);
       }
     }
-    const ImageView image = image_view(pixels);
-    coherent += compute_coherence(image, find_chords_in_ellipse({40, 40}, {80, 80}, image.size()),
-                                  {10, 1, 14.5}, 4 * patch) > kMinCoherence;
+    const ImageView image = to_image_view(pixels);
+    coherent +=
+        compute_stripe_coherence(image, find_chords_in_ellipse({40, 40}, {80, 80}, image.size()),
+                                 {10, 1, 14.5}, 4 * patch) > kMinCoherence;
   }
   EXPECT_LE(coherent, 10);
 }
 
-TEST(ComputeCoherence, ReturnsZeroForTooFewLines) {
+TEST(ComputeStripeCoherence, ReturnsZeroForTooFewLines) {
   const DrawnLamp lamp{.stripes = {.period_lines = 170}};
   EXPECT_EQ(coherence_of_drawn(lamp), 0);
   const cv::Mat pixels(120, 120, CV_8U, cv::Scalar(10));
-  const ImageView image = image_view(pixels);
-  EXPECT_EQ(compute_coherence(image, find_chords_in_ellipse({200, 20}, {240, 60}, image.size()),
-                              {10, 1, 14.5}, 8),
-            0);
+  const ImageView image = to_image_view(pixels);
+  EXPECT_EQ(
+      compute_stripe_coherence(image, find_chords_in_ellipse({200, 20}, {240, 60}, image.size()),
+                               {10, 1, 14.5}, 8),
+      0);
 }
 
 }  // namespace

@@ -35,9 +35,10 @@ std::vector<LabeledLight> make_lights(const std::vector<LampSpec>& lamps, std::s
 }
 
 /// Returns the confusion matrix of a classifier for lights of lamps that may differ from its own.
-Confusion compute_confusion(const LampClassifier& classifier,
-                            std::span<const LabeledLight> lights) {
-  return cross_validate(lights, [&](std::span<const LabeledLight>) { return classifier; });
+Confusion compute_confusion_matrix(const LampClassifier& classifier,
+                                   std::span<const LabeledLight> lights) {
+  return cross_validate_lamp_classifier(lights,
+                                        [&](std::span<const LabeledLight>) { return classifier; });
 }
 
 const std::vector<LampSpec> kLamps{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 10.8, 0.5}};
@@ -45,36 +46,37 @@ const std::vector<LampSpec> kLamps{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 10.8, 0.5
 const std::vector<LampSpec> kTwins{{1, 12, 0.35}, {2, 12, 0.7}};
 
 TEST(LampClassifier, IdentifiesTrainedLamps) {
-  const LampClassifier classifier = train_classifier(make_lights(kLamps, 30, 1));
+  const LampClassifier classifier = fit_lamp_classifier(make_lights(kLamps, 30, 1));
   ASSERT_EQ(classifier.lamps.size(), 3);
   EXPECT_EQ(classifier.lamps[0].lamp, 4);
-  const Confusion confusion = compute_confusion(classifier, make_lights(kLamps, 100, 2));
+  const Confusion confusion = compute_confusion_matrix(classifier, make_lights(kLamps, 100, 2));
   EXPECT_EQ(confusion.lamps, (std::vector<int>{4, 7, 9}));
-  EXPECT_EQ(confusion.wrong(), 0);
+  EXPECT_EQ(confusion.count_wrongly_identified(), 0);
   EXPECT_GE(confusion.right(), 297);
   EXPECT_EQ(confusion.right() + confusion.unknown(), 300);
   EXPECT_TRUE(find_inseparable_lamps(classifier).empty());
 }
 
 TEST(LampClassifier, SeparatesLampsOfEqualPeriodByDuty) {
-  const LampClassifier classifier = train_classifier(make_lights(kTwins, 40, 1));
-  const Confusion confusion = compute_confusion(classifier, make_lights(kTwins, 100, 2));
-  EXPECT_EQ(confusion.wrong(), 0);
+  const LampClassifier classifier = fit_lamp_classifier(make_lights(kTwins, 40, 1));
+  const Confusion confusion = compute_confusion_matrix(classifier, make_lights(kTwins, 100, 2));
+  EXPECT_EQ(confusion.count_wrongly_identified(), 0);
   EXPECT_GE(confusion.right(), 150) << confusion.counts;
 }
 
 TEST(LampClassifier, ReportsUnknownForUntrainedLamps) {
-  const LampClassifier classifier = train_classifier(make_lights(kLamps, 30, 1));
+  const LampClassifier classifier = fit_lamp_classifier(make_lights(kLamps, 30, 1));
   ASSERT_EQ(classifier.lamps.size(), 3);
   const Confusion confusion =
-      compute_confusion(classifier, make_lights({{5, 11.9, 0.5}, {6, 6, 0.5}}, 50, 2));
+      compute_confusion_matrix(classifier, make_lights({{5, 11.9, 0.5}, {6, 6, 0.5}}, 50, 2));
   EXPECT_EQ(confusion.unknown(), 100);
 }
 
 TEST(LampClassifier, ReportsUnknownForInseparableLamps) {
   const std::vector<LampSpec> similar_lamps{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 13.35, 0.5}};
-  const LampClassifier classifier = train_classifier(make_lights(similar_lamps, 30, 1));
-  const Confusion confusion = compute_confusion(classifier, make_lights(similar_lamps, 100, 2));
+  const LampClassifier classifier = fit_lamp_classifier(make_lights(similar_lamps, 30, 1));
+  const Confusion confusion =
+      compute_confusion_matrix(classifier, make_lights(similar_lamps, 100, 2));
   EXPECT_EQ(confusion.counts(0, 0), 100);
   EXPECT_GE(confusion.unknown(), 190);
   const auto pairs = find_inseparable_lamps(classifier);
@@ -83,21 +85,21 @@ TEST(LampClassifier, ReportsUnknownForInseparableLamps) {
   EXPECT_EQ(pairs[0].second, 9);
 }
 
-TEST(TrainClassifier, RejectsWrongLabels) {
+TEST(FitLampClassifier, RejectsWrongLabels) {
   auto lights = make_lights(kLamps, 30, 1);
   lights[0].lamp = 9, lights[4].lamp = 4, lights[8].lamp = 7;
-  const LampClassifier classifier = train_classifier(lights);
+  const LampClassifier classifier = fit_lamp_classifier(lights);
   int used = 0;
   for (const auto& lamp : classifier.lamps) used += lamp.examples;
   EXPECT_LE(used, 87);
   EXPECT_GE(used, 80);
-  const Confusion confusion = compute_confusion(classifier, make_lights(kLamps, 100, 2));
-  EXPECT_EQ(confusion.wrong(), 0);
+  const Confusion confusion = compute_confusion_matrix(classifier, make_lights(kLamps, 100, 2));
+  EXPECT_EQ(confusion.count_wrongly_identified(), 0);
   EXPECT_GE(confusion.right(), 297);
 }
 
 TEST(LampClassifier, AcceptsUnclearStripesOnlyCloseToLamp) {
-  const LampClassifier classifier = train_classifier(make_lights(kLamps, 30, 1));
+  const LampClassifier classifier = fit_lamp_classifier(make_lights(kLamps, 30, 1));
   Stripes stripes = make_lights(kLamps, 1, 3)[1].stripes;
   ASSERT_EQ(identify_lamp(classifier, stripes), 7);
   stripes.period_lines *= 1.025;
@@ -106,11 +108,11 @@ TEST(LampClassifier, AcceptsUnclearStripesOnlyCloseToLamp) {
   EXPECT_EQ(identify_lamp(classifier, stripes), std::nullopt);
 }
 
-TEST(TrainClassifier, IsIndependentOfOrderOfLights) {
+TEST(FitLampClassifier, IsIndependentOfOrderOfLights) {
   auto lights = make_lights(kLamps, 20, 1);
-  const LampClassifier a = train_classifier(lights);
+  const LampClassifier a = fit_lamp_classifier(lights);
   std::reverse(lights.begin(), lights.end());
-  const LampClassifier b = train_classifier(lights);
+  const LampClassifier b = fit_lamp_classifier(lights);
   ASSERT_EQ(a.lamps.size(), 3);
   ASSERT_EQ(b.lamps.size(), 3);
   EXPECT_TRUE(a.covariance.isApprox(b.covariance, 1e-9));
@@ -120,52 +122,53 @@ TEST(TrainClassifier, IsIndependentOfOrderOfLights) {
   }
 }
 
-TEST(CrossValidate, CountsEachLightOnce) {
-  const Confusion confusion = cross_validate(make_lights(kLamps, 40, 1), train_classifier);
+TEST(CrossValidateLampClassifier, CountsEachLightOnce) {
+  const Confusion confusion =
+      cross_validate_lamp_classifier(make_lights(kLamps, 40, 1), fit_lamp_classifier);
   EXPECT_EQ(confusion.counts.sum(), 120);
-  EXPECT_EQ(confusion.wrong(), 0);
+  EXPECT_EQ(confusion.count_wrongly_identified(), 0);
   EXPECT_GE(confusion.right(), 117);
 }
 
-TEST(CrossValidate, ExcludesHeldOutImagesFromTraining) {
+TEST(CrossValidateLampClassifier, ExcludesHeldOutImagesFromTraining) {
   // All lights of lamp 9 are in one fifth of the images: the classifier for this fold was not
   // trained on lamp 9.
   auto lights = make_lights(kLamps, 40, 1);
   std::erase_if(lights,
                 [](const LabeledLight& light) { return light.lamp == 9 && light.image % 5 != 0; });
-  const Confusion confusion = cross_validate(lights, train_classifier);
+  const Confusion confusion = cross_validate_lamp_classifier(lights, fit_lamp_classifier);
   EXPECT_EQ(confusion.counts(2, 2), 0);
   EXPECT_EQ(confusion.counts(2, 3), 8);
 }
 
-TEST(CrossValidate, UsesGivenTrainingFunction) {
+TEST(CrossValidateLampClassifier, UsesGivenTrainingFunction) {
   const auto mistaken = [](std::span<const LabeledLight> lights) {
-    LampClassifier classifier = train_classifier(lights);
+    LampClassifier classifier = fit_lamp_classifier(lights);
     std::swap(classifier.lamps.front().lamp, classifier.lamps.back().lamp);
     return classifier;
   };
-  const Confusion confusion = cross_validate(make_lights(kLamps, 40, 1), mistaken);
-  EXPECT_GE(confusion.wrong(), 78);
+  const Confusion confusion = cross_validate_lamp_classifier(make_lights(kLamps, 40, 1), mistaken);
+  EXPECT_GE(confusion.count_wrongly_identified(), 78);
 }
 
-TEST(ComputeLampFeatures, ReturnsFeaturesOfStripes) {
+TEST(ComputeStripeFeatures, ReturnsFeaturesOfStripes) {
   Stripes stripes{};
   stripes.period_lines = 12;
   stripes.duty = 0.4;
   stripes.count_per_line = 0.08;
   stripes.lit_area = 0.45;
-  EXPECT_EQ(compute_lamp_features(stripes), LampFeatures(std::log(12), 0.4, 0.08, 0.45));
+  EXPECT_EQ(compute_classifier_features(stripes), LampFeatures(std::log(12), 0.4, 0.08, 0.45));
   EXPECT_EQ(kLampFeatures[0], "log_period_lines");
 }
 
-TEST(ComputeLampFeatures, IsIndependentOfDistance) {
+TEST(ComputeStripeFeatures, IsIndependentOfDistance) {
   Random random(7);
   for (const int lines : {60, 90, 120, 180}) {
     for (const double duty : {0.35, 0.6}) {
       LampFeatures mean = LampFeatures::Zero();
       constexpr int draws = 100;
       for (int draw = 0; draw < draws; ++draw) {
-        mean += compute_lamp_features(
+        mean += compute_classifier_features(
                     measure_stripes(noisy_square_wave(lines, 10.3, duty, 1, 0, random))) /
                 draws;
       }

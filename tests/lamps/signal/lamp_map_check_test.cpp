@@ -56,14 +56,14 @@ TEST(PredictPeriodSd, ReturnsInfinityForTooFewPeriods) {
   EXPECT_EQ(predict_relative_period_sd(40, 50, 1), std::numeric_limits<double>::infinity());
 }
 
-TEST(ComputeLinesOnLamp, ComputesNumberOfLines) {
-  EXPECT_NEAR(compute_lines_on_lamp(lamp(1, 2000), kConditions).value(), 58.5, 1e-9);
+TEST(ComputeScanlinesOnLamp, ComputesNumberOfLines) {
+  EXPECT_NEAR(compute_scanlines_on_lamp(lamp(1, 2000), kConditions).value(), 58.5, 1e-9);
   Lamp unknown = lamp(1, 2000);
   unknown.shape.size_m.reset();
-  EXPECT_FALSE(compute_lines_on_lamp(unknown, kConditions));
+  EXPECT_FALSE(compute_scanlines_on_lamp(unknown, kConditions));
   StripeConditions above = kConditions;
   above.camera_height_m = 2;
-  EXPECT_FALSE(compute_lines_on_lamp(lamp(1, 2000), above));
+  EXPECT_FALSE(compute_scanlines_on_lamp(lamp(1, 2000), above));
 }
 
 TEST(FindAmbiguousLamps, ReportsLampsOfNearlyEqualFrequency) {
@@ -94,31 +94,32 @@ TEST(FindAmbiguousLamps, RequiresLargerDifferenceForFewerLines) {
   EXPECT_EQ(find_ambiguous_lamps(map, far).size(), 1);
 }
 
-TEST(ExplainMissingRoom, NamesTheRoomsOfLampsWithOneFrequency) {
+TEST(ExplainWhyRoomIsNeeded, NamesTheRoomsOfLampsWithOneFrequency) {
   LampMapFile lamps{"lamps.yaml", {{lamp(1, 2000), lamp(2, 2500), lamp(7, 2010)}}, {"b", "b", "a"}};
-  const std::string message = explain_missing_room(lamps, "--room");
+  const std::string message = explain_why_room_is_needed(lamps, "--room");
   EXPECT_EQ(
       message,
       "lamps 1 and 7 share a frequency in two rooms: choose a room with --room; the map has: a, b");
   lamps.map.lamps[2].frequency_hz = 3000;
-  EXPECT_EQ(explain_missing_room(lamps, "--room"), "");
+  EXPECT_EQ(explain_why_room_is_needed(lamps, "--room"), "");
 }
 
-TEST(ExplainMissingRoom, IsEmptyWhereARoomWouldNotHelp) {
+TEST(ExplainWhyRoomIsNeeded, IsEmptyWhereARoomWouldNotHelp) {
   const LampMap map{{lamp(1, 2000), lamp(2, 2000)}};
-  EXPECT_EQ(explain_missing_room({"lamps.yaml", map, {"hall", "hall"}}, "--room"), "");
-  EXPECT_EQ(explain_missing_room({"lamps.yaml", map, {"", ""}}, "--room"), "");
+  EXPECT_EQ(explain_why_room_is_needed({"lamps.yaml", map, {"hall", "hall"}}, "--room"), "");
+  EXPECT_EQ(explain_why_room_is_needed({"lamps.yaml", map, {"", ""}}, "--room"), "");
   const LampMap duties{{lamp(1, 2000, 0.3), lamp(2, 2000, 0.7)}};
-  EXPECT_EQ(explain_missing_room({"lamps.yaml", duties, {"hall", "office"}}, "--room"), "");
+  EXPECT_EQ(explain_why_room_is_needed({"lamps.yaml", duties, {"hall", "office"}}, "--room"), "");
 }
 
-TEST(ExplainMissingRoom, ListsTenRoomsAtMost) {
+TEST(ExplainWhyRoomIsNeeded, ListsTenRoomsAtMost) {
   LampMapFile lamps;
   for (int i = 0; i < 12; ++i) {
     lamps.map.lamps.push_back(lamp(i, 2000));
     lamps.rooms.push_back("r" + std::to_string(10 + i));
   }
-  EXPECT_THAT(explain_missing_room(lamps, "--room"), testing::EndsWith("r18, r19 and 2 more"));
+  EXPECT_THAT(explain_why_room_is_needed(lamps, "--room"),
+              testing::EndsWith("r18, r19 and 2 more"));
 }
 
 /// Nearly all lamps just above the reported limit are identified.
@@ -134,7 +135,7 @@ TEST(FindAmbiguousLamps, NeededDifferenceSufficesForIdentification) {
   for (int draw = 0; draw < 400; ++draw) {
     const double period = 1 / (2500 * conditions.row_time_s);
     const auto lines =
-        static_cast<int>(kUsedHeight * compute_lines_on_lamp(map.lamps[0], conditions).value());
+        static_cast<int>(kUsedHeight * compute_scanlines_on_lamp(map.lamps[0], conditions).value());
     const auto id = identify_lamp_by_frequency(
         map, conditions.row_time_s,
         measure_stripes(noisy_square_wave(lines, period, 0.5, 0.02, 0.02, random)));
@@ -145,9 +146,9 @@ TEST(FindAmbiguousLamps, NeededDifferenceSufficesForIdentification) {
   EXPECT_EQ(wrong, 0);
 }
 
-TEST(FindUnreadableLamps, ReportsLampsWithoutReadableStripes) {
+TEST(FindLampsWithUnreadablePeriod, ReportsLampsWithoutReadableStripes) {
   const LampMap map{{lamp(1, 600), lamp(2, 2500), lamp(3, 19000)}};
-  const auto unreadable = find_unreadable_lamps(map, kConditions);
+  const auto unreadable = find_lamps_with_unreadable_period(map, kConditions);
   ASSERT_EQ(unreadable.size(), 2);
   EXPECT_EQ(unreadable[0].lamp, 1);
   EXPECT_LT(unreadable[0].periods, kMinPeriods);

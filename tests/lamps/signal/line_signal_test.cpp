@@ -8,13 +8,13 @@
 namespace vlp {
 namespace {
 
-TEST(ComputeLineSignal, ReturnsMeanOfEachLineAboveDark) {
+TEST(ComputeScanlineSignal, ReturnsMeanOfEachLineAboveDark) {
   for (const int depth : {CV_8U, CV_16U}) {
     cv::Mat pixels(100, 120, depth, cv::Scalar(10));
     for (int row = 31; row <= 69; ++row) pixels(cv::Rect(40, row, 41, 1)) = 2 * row;
-    const ImageView image = image_view(pixels);
-    const auto signal =
-        compute_line_signal(image, find_chords_in_ellipse({40, 30}, {80, 70}, image.size()), 10);
+    const ImageView image = to_image_view(pixels);
+    const auto signal = compute_scanline_signal(
+        image, find_chords_in_ellipse({40, 30}, {80, 70}, image.size()), 10);
     ASSERT_EQ(signal.size(), 37U);  // nine tenths of the height: lines 32 to 68
     for (std::size_t i = 0; i < signal.size(); ++i) {
       EXPECT_DOUBLE_EQ(signal[i], 2.0 * (32 + double(i)) - 10);
@@ -22,21 +22,21 @@ TEST(ComputeLineSignal, ReturnsMeanOfEachLineAboveDark) {
   }
 }
 
-TEST(ComputeLineSignal, IgnoresScanlinesOutsideImage) {
+TEST(ComputeScanlineSignal, IgnoresScanlinesOutsideImage) {
   const cv::Mat pixels(100, 120, CV_8U, cv::Scalar(50));
-  const ImageView image = image_view(pixels);
+  const ImageView image = to_image_view(pixels);
   EXPECT_EQ(
-      compute_line_signal(image, find_chords_in_ellipse({40, -20}, {80, 20}, image.size()), 10)
+      compute_scanline_signal(image, find_chords_in_ellipse({40, -20}, {80, 20}, image.size()), 10)
           .size(),
       19U);
   EXPECT_TRUE(
-      compute_line_signal(image, find_chords_in_ellipse({40, 200}, {80, 240}, image.size()), 10)
+      compute_scanline_signal(image, find_chords_in_ellipse({40, 200}, {80, 240}, image.size()), 10)
           .empty());
   EXPECT_TRUE(
-      compute_line_signal(image, find_chords_in_ellipse({200, 20}, {240, 60}, image.size()), 10)
+      compute_scanline_signal(image, find_chords_in_ellipse({200, 20}, {240, 60}, image.size()), 10)
           .empty());
-  const auto values =
-      compute_line_signal(image, find_chords_in_ellipse({-10, 80}, {30, 120}, image.size()), 10);
+  const auto values = compute_scanline_signal(
+      image, find_chords_in_ellipse({-10, 80}, {30, 120}, image.size()), 10);
   ASSERT_EQ(values.size(), 18U);
   for (const double value : values) EXPECT_EQ(value, 40);
 }

@@ -19,7 +19,7 @@ const cv::Size kSearchSize(420, 260);
 constexpr std::array kLampPeriods_lines{9.0, 11.0, 14.5, 18.0, 24.0};
 
 std::vector<ModulatedLight> find_lights(const cv::Mat& image, std::span<const double> periods) {
-  const ImageView view = image_view(image);
+  const ImageView view = to_image_view(image);
   const std::array boxes{PixelBox{0, 0, view.width, view.height}};
   return find_modulated_lights(view, boxes, estimate_background(view), periods);
 }

@@ -21,8 +21,8 @@ constexpr std::array kMapPeriods_lines{12.0, 16.0};
 
 ModulationMap make_map(const cv::Mat& image, int lines_per_bin = 1, double dark = 0) {
   const PixelBox box{0, 0, image.cols, image.rows};
-  return map_modulation(average_cells(image_view(image), box, dark, lines_per_bin),
-                        kMapPeriods_lines);
+  return compute_modulation_map(
+      average_pixels_over_cells(to_image_view(image), box, dark, lines_per_bin), kMapPeriods_lines);
 }
 
 cv::Mat square_wave(double period_lines, double low, double high) {
@@ -34,11 +34,11 @@ cv::Mat square_wave(double period_lines, double low, double high) {
   return image;
 }
 
-TEST(AverageCells, AveragesPixelsAndScanlines) {
+TEST(AveragePixelsOverCells, AveragesPixelsAndScanlines) {
   cv::Mat1b image(4, 19, std::uint8_t(10));
   image(0, 0) = 26;
   image(3, 18) = 40;
-  const CellLevels cells = average_cells(image_view(image), {0, 0, 19, 4}, 3, 2);
+  const CellLevels cells = average_pixels_over_cells(to_image_view(image), {0, 0, 19, 4}, 3, 2);
   ASSERT_EQ(cells.cells, 3);
   ASSERT_EQ(cells.bins, 2);
   EXPECT_FLOAT_EQ(cells.row(0)[0], 7 + 1);  // 16 more in 16 pixels
@@ -46,7 +46,7 @@ TEST(AverageCells, AveragesPixelsAndScanlines) {
   EXPECT_FLOAT_EQ(cells.row(1)[2], 7 + 5);  // 30 more in the 6 pixels that the last cell has
 }
 
-TEST(MapModulation, ReturnsAmplitudeOfFundamental) {
+TEST(ComputeModulationMap, ReturnsAmplitudeOfFundamental) {
   for (const int lines_per_bin : {1, 2}) {
     const ModulationMap map = make_map(square_wave(12, 20, 100), lines_per_bin);
     const std::size_t middle = map.index(map.steps / 2, map.cells / 2);
@@ -55,14 +55,14 @@ TEST(MapModulation, ReturnsAmplitudeOfFundamental) {
   }
 }
 
-TEST(MapModulation, ReturnsZeroForSteadyLightAndRamps) {
+TEST(ComputeModulationMap, ReturnsZeroForSteadyLightAndRamps) {
   cv::Mat1b image(160, 64);
   for (int row = 0; row < image.rows; ++row) image.row(row).setTo(20 + row);
   const ModulationMap map = make_map(image);
   EXPECT_LT(map.amplitude[map.index(map.steps / 2, map.cells / 2)], 0.5);
 }
 
-TEST(MinSignificantAmplitude, MatchesFalseAlarmRateOfNoise) {
+TEST(ComputeMinSignificantAmplitude, MatchesFalseAlarmRateOfNoise) {
   // The squared amplitude is exponentially distributed: a threshold lower by a factor has the
   // probability 1e-9 to the power of its square.
   constexpr double noise = 3, fraction = 0.4;
@@ -75,12 +75,12 @@ TEST(MinSignificantAmplitude, MatchesFalseAlarmRateOfNoise) {
       cells.levels.push_back(float(noise / std::sqrt(double(kCellWidth_px)) * random.normal()));
     }
     const std::array period{12.0};
-    const ModulationMap map = map_modulation(cells, period);
+    const ModulationMap map = compute_modulation_map(cells, period);
     // Steps a window apart are independent; ends are not whole.
     for (int step = 12; step < map.steps - 12; step += 12) {
       for (int cell = 0; cell < map.cells; ++cell) {
-        above +=
-            map.amplitude[map.index(step, cell)] > fraction * min_significant_amplitude(noise, 12);
+        above += map.amplitude[map.index(step, cell)] >
+                 fraction * compute_min_significant_amplitude(noise, 12);
         ++count;
       }
     }
@@ -96,7 +96,7 @@ TEST(FindModulatedRegions, SeparatesLampsAndExcludesSteadyLight) {
   const DrawnLamp steady{.center = {195, 100}, .radius_px = 30, .stripes = {.duty = 1}};
   const cv::Mat image = render_lamps({one, other, steady}, size, CV_8U, 1);
   const ModulationMap map = make_map(image, 1, 255 * kDark);
-  auto regions = find_modulated_regions(map, min_significant_amplitude(2, 12));
+  auto regions = find_modulated_regions(map, compute_min_significant_amplitude(2, 12));
   std::erase_if(regions, [](const ModulatedRegion& region) { return region.cells < 100; });
   ASSERT_EQ(regions.size(), 2U);
   std::sort(regions.begin(), regions.end(), [](auto& a, auto& b) { return a.box.x < b.box.x; });
@@ -106,9 +106,9 @@ TEST(FindModulatedRegions, SeparatesLampsAndExcludesSteadyLight) {
 
 TEST(FindModulatedRegions, ReturnsNoneForNoise) {
   const cv::Mat image = render_lamps({}, {400, 300}, CV_8U, 3);
-  EXPECT_TRUE(
-      find_modulated_regions(make_map(image, 1, 255 * kDark), min_significant_amplitude(3, 12))
-          .empty());
+  EXPECT_TRUE(find_modulated_regions(make_map(image, 1, 255 * kDark),
+                                     compute_min_significant_amplitude(3, 12))
+                  .empty());
 }
 
 }  // namespace

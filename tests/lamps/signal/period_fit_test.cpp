@@ -29,48 +29,49 @@ LineProfile make_profile(double period_lines, double sigma_lines, double noise =
   return profile;
 }
 
-TEST(FitPeriod, ExplainsSquareWaveWithEnvelope) {
+TEST(FitPeriodicSignal, ExplainsSquareWaveWithEnvelope) {
   for (const double period : {9.0, 15.0, 26.5}) {
-    const PeriodFit fit = fit_period(make_profile(period, 2 * period), period);
+    const PeriodFit fit = fit_periodic_signal(make_profile(period, 2 * period), period);
     EXPECT_LT(fit.unexplained, 0.12) << period;
     EXPECT_NEAR(fit.depth, 4 / std::numbers::pi, 0.2) << period;
     EXPECT_GT(fit.periods, 4) << period;
   }
 }
 
-TEST(FitPeriod, LeavesVarianceOfOtherPeriodUnexplained) {
+TEST(FitPeriodicSignal, LeavesVarianceOfOtherPeriodUnexplained) {
   const LineProfile profile = make_profile(20, 40);
-  EXPECT_GT(fit_period(profile, 25).unexplained, 0.6);
-  EXPECT_GT(fit_period(profile, 16).unexplained, 0.6);
+  EXPECT_GT(fit_periodic_signal(profile, 25).unexplained, 0.6);
+  EXPECT_GT(fit_periodic_signal(profile, 16).unexplained, 0.6);
 }
 
-TEST(FitPeriod, ReturnsUnexplainedOneWithoutSignal) {
-  EXPECT_EQ(fit_period({0, 1, {}}, 10).unexplained, 1);
-  EXPECT_EQ(fit_period({0, 1, std::vector<double>(50, 0)}, 10).unexplained, 1);
-  EXPECT_EQ(fit_period({0, 1, std::vector<double>(50, 3)}, 100).unexplained, 1) << "half a period";
+TEST(FitPeriodicSignal, ReturnsUnexplainedOneWithoutSignal) {
+  EXPECT_EQ(fit_periodic_signal({0, 1, {}}, 10).unexplained, 1);
+  EXPECT_EQ(fit_periodic_signal({0, 1, std::vector<double>(50, 0)}, 10).unexplained, 1);
+  EXPECT_EQ(fit_periodic_signal({0, 1, std::vector<double>(50, 3)}, 100).unexplained, 1)
+      << "half a period";
 }
 
-TEST(FindPeriod, ReturnsPeriodInNoise) {
+TEST(FindBestFittingPeriod, ReturnsPeriodInNoise) {
   for (const double period : {9.0, 15.0, 26.5}) {
-    const PeriodFit fit = find_period(make_profile(period, 2 * period, 5), 4);
+    const PeriodFit fit = find_best_fitting_period(make_profile(period, 2 * period, 5), 4);
     EXPECT_NEAR(fit.period_lines / period, 1, 0.01) << period;
     EXPECT_LT(fit.unexplained, 0.3) << period;
   }
 }
 
-TEST(FindPeriod, LeavesNoiseUnexplained) {
+TEST(FindBestFittingPeriod, LeavesNoiseUnexplained) {
   Random random(3);
   int explained = 0;
   for (int i = 0; i < 50; ++i) {
     LineProfile profile{0, 1, {}};
     for (int k = 0; k < 200; ++k) profile.levels.push_back(50 + 5 * random.normal());
-    explained += find_period(profile, 4).unexplained < 0.45;
+    explained += find_best_fitting_period(profile, 4).unexplained < 0.45;
   }
   EXPECT_EQ(explained, 0);
 }
 
-TEST(DivideByEnvelope, KeepsStripes) {
-  const auto signal = divide_by_envelope(make_profile(15, 40), 15);
+TEST(DivideProfileByEnvelope, KeepsStripes) {
+  const auto signal = divide_profile_by_envelope(make_profile(15, 40), 15);
   ASSERT_GT(signal.size(), 100U);
   // Away from the ends the brightest lines are at 1 / duty.
   for (std::size_t i = signal.size() / 4; i < 3 * signal.size() / 4; ++i) {

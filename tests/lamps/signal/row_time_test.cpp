@@ -33,12 +33,12 @@ void add(std::vector<MeasuredPeriod>& lights, double frequency_hz, int count, do
 }
 
 RowTimeResult find_row_time(const std::vector<MeasuredPeriod>& lights, const LampMap& map) {
-  return choose_row_time(estimate_row_time(lights, map));
+  return select_row_time_candidate(estimate_row_time_candidates(lights, map));
 }
 
 const LampMap kMap = make_lamp_map({2000, 2500, 3000, 3500, 4000});
 
-TEST(EstimateRowTime, IsExactWithoutNoise) {
+TEST(EstimateRowTimeCandidates, IsExactWithoutNoise) {
   Random random(1);
   std::vector<MeasuredPeriod> lights;
   for (const Lamp& lamp : kMap.lamps) add(lights, *lamp.frequency_hz, 1, 0, random);
@@ -49,7 +49,7 @@ TEST(EstimateRowTime, IsExactWithoutNoise) {
   EXPECT_EQ(result.found->lights, 5);
 }
 
-TEST(EstimateRowTime, SdMatchesScatter) {
+TEST(EstimateRowTimeCandidates, SdMatchesScatter) {
   Random random(2);
   double chi_square = 0;
   constexpr int draws = 300;
@@ -68,7 +68,7 @@ TEST(EstimateRowTime, SdMatchesScatter) {
   EXPECT_LT(chi_square / draws, 3);
 }
 
-TEST(EstimateRowTime, IsRobustAgainstWrongLampFrequency) {
+TEST(EstimateRowTimeCandidates, IsRobustAgainstWrongLampFrequency) {
   // Periods measured in a photograph of real lamps: the first has an error of 4.4 %.
   std::vector<MeasuredPeriod> lights;
   for (const double frequency_hz : {2089.0, 2511.0, 3006.0, 3533.0, 4014.0}) {
@@ -80,7 +80,7 @@ TEST(EstimateRowTime, IsRobustAgainstWrongLampFrequency) {
   EXPECT_LT(std::abs(result.found->row_time_s - kTrue_s), 3 * result.found->sd_s);
 }
 
-TEST(EstimateRowTime, IsRobustAgainstOtherLights) {
+TEST(EstimateRowTimeCandidates, IsRobustAgainstOtherLights) {
   Random random(3);
   std::vector<MeasuredPeriod> lights;
   for (const Lamp& lamp : kMap.lamps) add(lights, *lamp.frequency_hz, 20, 0.002, random);
@@ -92,7 +92,7 @@ TEST(EstimateRowTime, IsRobustAgainstOtherLights) {
   EXPECT_EQ(result.found->lamps, 5);
 }
 
-TEST(EstimateRowTime, NeedsNoLabelsForSingleFrequency) {
+TEST(EstimateRowTimeCandidates, NeedsNoLabelsForSingleFrequency) {
   const auto result = find_row_time(std::vector<MeasuredPeriod>{{1 / (2500 * kTrue_s), {}}},
                                     make_lamp_map({2500, 2500}));
   ASSERT_TRUE(result.found) << result.problem;
@@ -108,7 +108,7 @@ void expect_ambiguous(const std::vector<double>& seen_hz, const LampMap& map) {
   EXPECT_THAT(result.problem, HasSubstr("add captures with more lamps, or a table"));
 }
 
-TEST(ChooseRowTime, ReturnsProblemWhenAmbiguous) {
+TEST(SelectRowTimeCandidate, ReturnsProblemWhenAmbiguous) {
   expect_ambiguous({2500}, kMap);
   // All ratios are equal, and one lamp is not detected.
   const LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
@@ -127,9 +127,9 @@ std::vector<MeasuredPeriod> with_duties(const LampMap& map,
   return lights;
 }
 
-TEST(EstimateRowTime, ReturnsAllCandidatesWithTheirLamps) {
+TEST(EstimateRowTimeCandidates, ReturnsAllCandidatesWithTheirLamps) {
   const LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
-  const auto result = estimate_row_time(with_duties(even, {1, 2, 3}), even);
+  const auto result = estimate_row_time_candidates(with_duties(even, {1, 2, 3}), even);
   ASSERT_EQ(result.groups.size(), 3);
   ASSERT_EQ(result.candidates.size(), 2) << result.problem;
   EXPECT_LE(result.candidates[0].cost, result.candidates[1].cost);
@@ -148,7 +148,7 @@ TEST(EstimateRowTime, ReturnsAllCandidatesWithTheirLamps) {
   }
 }
 
-TEST(EstimateRowTime, ResolvesAmbiguityByDuties) {
+TEST(EstimateRowTimeCandidates, ResolvesAmbiguityByDuties) {
   LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
   const std::vector duties{0.3, 0.7, 0.4, 0.7};
   for (std::size_t i = 0; i < 4; ++i) even.lamps[i].duty = duties[i];
@@ -166,23 +166,23 @@ TEST(EstimateRowTime, ResolvesAmbiguityByDuties) {
   EXPECT_FALSE(find_row_time(with_duties(even, {1, 2, 3}), even).found);
 }
 
-TEST(ChooseRowTime, AddsPositionCosts) {
+TEST(SelectRowTimeCandidate, AddsPositionCosts) {
   const LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
-  const auto found = estimate_row_time(with_duties(even, {1, 2, 3}), even);
+  const auto found = estimate_row_time_candidates(with_duties(even, {1, 2, 3}), even);
   ASSERT_EQ(found.candidates.size(), 2);
   for (const std::size_t right : {0U, 1U}) {
     std::vector<double> costs{30, 30};
     costs[right] = 2;
-    const auto result = choose_row_time(found, costs);
+    const auto result = select_row_time_candidate(found, costs);
     ASSERT_TRUE(result.found) << result.problem;
     EXPECT_EQ(result.found->row_time_s, found.candidates[right].row_time.row_time_s);
   }
-  const auto undecided = choose_row_time(found, std::vector<double>{2, 5});
+  const auto undecided = select_row_time_candidate(found, std::vector<double>{2, 5});
   EXPECT_FALSE(undecided.found);
   EXPECT_THAT(undecided.problem, HasSubstr("fit a row time of"));
 }
 
-TEST(EstimateRowTime, ResolvesAmbiguityByLabels) {
+TEST(EstimateRowTimeCandidates, ResolvesAmbiguityByLabels) {
   const LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
   const std::vector<MeasuredPeriod> lights{{1 / (2000 * kTrue_s), 2}, {1 / (2500 * kTrue_s), 3}};
   const auto result = find_row_time(lights, even);
@@ -190,7 +190,7 @@ TEST(EstimateRowTime, ResolvesAmbiguityByLabels) {
   EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-12);
 }
 
-TEST(ChooseRowTime, ReportsReasonWithoutRowTime) {
+TEST(SelectRowTimeCandidate, ReportsReasonWithoutRowTime) {
   EXPECT_THAT(find_row_time({}, kMap).problem, HasSubstr("no light has clear stripes"));
   EXPECT_THAT(find_row_time(std::vector<MeasuredPeriod>{{10, 77}}, kMap).problem,
               HasSubstr("no lamp of the map"));
@@ -202,13 +202,13 @@ TEST(ChooseRowTime, ReportsReasonWithoutRowTime) {
   EXPECT_NE(result.problem, "");
 }
 
-TEST(GroupPeriods, GroupsRepeatedPeriodsAndIgnoresSingleOnes) {
+TEST(GroupLightsByPeriod, GroupsRepeatedPeriodsAndIgnoresSingleOnes) {
   Random random(4);
   std::vector<MeasuredPeriod> lights;
   add(lights, 2000, 40, 0.003, random);
   add(lights, 2500, 30, 0.003, random);
   for (int i = 0; i < 5; ++i) lights.push_back({random.uniform(30, 60), {}});
-  const auto groups = group_periods(lights);
+  const auto groups = group_lights_by_period(lights);
   ASSERT_EQ(groups.size(), 2);
   EXPECT_EQ(groups[0].lights.size(), 40);
   EXPECT_NEAR(std::exp(groups[0].log_period) * 2000 * kTrue_s, 1, 0.002);

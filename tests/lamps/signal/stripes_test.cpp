@@ -81,7 +81,7 @@ TEST_P(MeasureStripesOfSquareWave, ReturnsPeriodUnderExposure) {
 INSTANTIATE_TEST_SUITE_P(Periods, MeasureStripesOfSquareWave,
                          testing::Values(5, 6.3, 8, 10.7, 13.3, 17.9, 25));
 
-TEST(MeasureStripes, ReturnsPeriodAndClarityOfSine) {
+TEST(MeasureStripes, ReturnsPeriodAndPeriodicityOfSine) {
   for (const double period : {2.5, 4.0, 7.3, 20.0}) {
     std::vector<double> signal;
     for (int line = 0; line < 50; ++line) {
@@ -104,7 +104,7 @@ TEST(MeasureStripes, ReturnsPeriodAndDutyInNoise) {
   }
 }
 
-TEST(MeasureStripes, ReturnsLowContrastAndClarityForSteadyLight) {
+TEST(MeasureStripes, ReturnsLowContrastAndPeriodicityForSteadyLight) {
   Random random(8);
   for (int draw = 0; draw < 100; ++draw) {
     std::vector<double> signal(60);
@@ -158,7 +158,7 @@ TEST(MeasureStripes, CountsStripesInStepsOfHalf) {
   EXPECT_NEAR(measure_stripes(signal).count_per_line, 11.0 / 2 / 60, 1e-12);
 }
 
-TEST(MeasureStripes, ComputesLitAreaOfDisc) {
+TEST(MeasureStripes, ReturnsLitFractionOfDiscArea) {
   // The upper half is lit, then the half in the middle, where the chords are longer.
   std::vector<double> half(80, 0), middle(80, 0);
   for (std::size_t i = 0; i < 80; ++i) {

@@ -11,19 +11,21 @@ namespace vlp {
 namespace {
 
 TEST(MotionOptions, ReturnNulloptWithoutSpeed) {
-  EXPECT_FALSE(MotionOptions{}.motion());
+  EXPECT_FALSE(MotionOptions{}.make_known_motion());
   const MotionOptions drives{2.0, {}}, straight{2.0, 0.0};
-  ASSERT_TRUE(drives.motion());
-  EXPECT_GT(drives.motion()->yaw_rate_sd_rad_per_s, rad_from_deg(45));
-  EXPECT_EQ(straight.motion()->yaw_rate_sd_rad_per_s, 0);
-  EXPECT_EQ(straight.motion()->velocity_sd_m_per_s, drives.motion()->velocity_sd_m_per_s);
+  ASSERT_TRUE(drives.make_known_motion());
+  EXPECT_GT(drives.make_known_motion()->yaw_rate_sd_rad_per_s, rad_from_deg(45));
+  EXPECT_EQ(straight.make_known_motion()->yaw_rate_sd_rad_per_s, 0);
+  EXPECT_EQ(straight.make_known_motion()->velocity_sd_m_per_s,
+            drives.make_known_motion()->velocity_sd_m_per_s);
 }
 
-TEST(CheckEvery, ThrowsWithoutVideo) {
-  check_every(1, {"boards"});
-  check_every(5, {"boards", "boards.mp4"});
-  EXPECT_EQ(rejection_message<std::invalid_argument>([] { check_every(5, {"boards"}); }),
-            "--every: there is no video; leave it out");
+TEST(CheckFrameStepNeedsVideo, ThrowsWithoutVideo) {
+  check_frame_step_needs_video(1, {"boards"});
+  check_frame_step_needs_video(5, {"boards", "boards.mp4"});
+  EXPECT_EQ(
+      rejection_message<std::invalid_argument>([] { check_frame_step_needs_video(5, {"boards"}); }),
+      "--every: there is no video; leave it out");
 }
 
 }  // namespace

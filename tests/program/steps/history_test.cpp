@@ -26,7 +26,7 @@ HistoryEntry make_entry(const std::string& arguments, const std::vector<std::str
   app.add_option("--lamps", lamps);
   app.add_option("-o,--output", output);
   app.add_option("--method", method);
-  app.add_option("--numbers", numbers)->expected(2);
+  app.add_option("--numbers", numbers)->expected_image_count(2);
   app.add_option("--threads", threads);
   app.add_flag("--refine-map", flag);
   app.add_flag("-q,--quiet", quiet);
@@ -36,9 +36,9 @@ HistoryEntry make_entry(const std::string& arguments, const std::vector<std::str
 
 TEST(Sha256, MatchesFips180Examples) {  // FIPS 180-2, appendix B
   const TemporaryFolder folder;
-  EXPECT_EQ(sha256_of_file(folder.file("abc", "abc")),
+  EXPECT_EQ(compute_file_sha256(folder.file("abc", "abc")),
             "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
-  EXPECT_EQ(sha256_of_file(folder.file("million", std::string(1000000, 'a'))),
+  EXPECT_EQ(compute_file_sha256(folder.file("million", std::string(1000000, 'a'))),
             "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
@@ -49,7 +49,7 @@ TEST(InputDigests, MatchSha256sumForFolder) {
   folder.file("notes.txt", "no image");
   const auto oracle =
       run_program("cd '" + (folder / "").string() + "' && sha256sum *.png | sha256sum");
-  EXPECT_EQ(InputDigests().digest_images(folder / ""), oracle.output.substr(0, 64));
+  EXPECT_EQ(InputDigests().compute_image_folder_digest(folder / ""), oracle.output.substr(0, 64));
 }
 
 TEST(HistoryEntry, IsIndependentOfMachine) {
@@ -67,9 +67,9 @@ TEST(HistoryEntry, IsIndependentOfMachine) {
   EXPECT_EQ(entry.options, "--lamps lamps.yaml --method axis --numbers 1.5 -2 --refine-map");
   ASSERT_EQ(entry.inputs.size(), 2U);
   EXPECT_EQ(entry.inputs[0].file, "spot");
-  EXPECT_EQ(entry.inputs[0].sha256, InputDigests().digest_images(images));
+  EXPECT_EQ(entry.inputs[0].sha256, InputDigests().compute_image_folder_digest(images));
   EXPECT_EQ(entry.inputs[1].file, "lamps.yaml");
-  EXPECT_EQ(entry.inputs[1].sha256, sha256_of_file(lamps));
+  EXPECT_EQ(entry.inputs[1].sha256, compute_file_sha256(lamps));
 }
 
 TEST(HistoryEntry, IsEmptyWithoutOptionsAndThrowsForUnreadableInput) {

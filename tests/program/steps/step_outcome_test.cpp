@@ -12,11 +12,11 @@ namespace {
 
 TEST(Require, ThrowsUndeterminedOnlyForUndeterminedStep) {
   StepResult result;
-  throw_if_failed(result);
-  result.fail(StepFailure::undetermined, "add captures");
-  EXPECT_EQ(rejection_message<Undetermined>([&] { throw_if_failed(result); }), "add captures");
-  result.fail(StepFailure::wrong_map, "contradicts the captures", "lamps.yaml");
-  EXPECT_EQ(rejection_message<std::invalid_argument>([&] { throw_if_failed(result); }),
+  throw_if_step_failed(result);
+  result.set_failure(StepFailure::undetermined, "add captures");
+  EXPECT_EQ(rejection_message<Undetermined>([&] { throw_if_step_failed(result); }), "add captures");
+  result.set_failure(StepFailure::wrong_map, "contradicts the captures", "lamps.yaml");
+  EXPECT_EQ(rejection_message<std::invalid_argument>([&] { throw_if_step_failed(result); }),
             "lamps.yaml: contradicts the captures");
 }
 

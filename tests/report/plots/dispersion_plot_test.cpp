@@ -23,7 +23,7 @@ class DispersionPlotTest : public testing::Test {
                       {}};
 
   std::string rendered(const char* name) {
-    draw(folder / name, make_drawing(plot));
+    write_plot(folder / name, make_gnuplot_drawing(plot));
     return TemporaryFolder::read_content(folder / name);
   }
 };
@@ -32,7 +32,7 @@ TEST_F(DispersionPlotTest, RendersReproduciblePngOrSvgByExtension) {
   EXPECT_THAT(rendered("a.png"), StartsWith("\x89PNG"));
   EXPECT_EQ(rendered("a.png"), rendered("a.png"));
   EXPECT_THAT(rendered("a.svg"), HasSubstr("a 'title'"));
-  EXPECT_THAT(rejection_message([&] { draw(folder / "a.gif", make_drawing(plot)); }),
+  EXPECT_THAT(rejection_message([&] { write_plot(folder / "a.gif", make_gnuplot_drawing(plot)); }),
               HasSubstr("a.gif: a picture's name should end in"));
 }
 

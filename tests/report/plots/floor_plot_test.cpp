@@ -24,9 +24,9 @@ class FloorPlotTest : public testing::Test {
 };
 
 TEST_F(FloorPlotTest, RendersPngOrSvgByExtension) {
-  draw_floor_plot(folder / "a.png", plot, lamps);
+  write_floor_plot(folder / "a.png", plot, lamps);
   EXPECT_THAT(TemporaryFolder::read_content(folder / "a.png"), StartsWith("\x89PNG"));
-  draw_floor_plot(folder / "a.svg", plot, lamps);
+  write_floor_plot(folder / "a.svg", plot, lamps);
   const std::string svg = TemporaryFolder::read_content(folder / "a.svg");
   EXPECT_THAT(svg, HasSubstr("<svg"));
   EXPECT_THAT(svg, HasSubstr("a 'title'"));
@@ -35,23 +35,23 @@ TEST_F(FloorPlotTest, RendersPngOrSvgByExtension) {
 
 TEST_F(FloorPlotTest, IsReproducible) {
   for (const char* name : {"a.png", "a.svg"}) {
-    draw_floor_plot(folder / name, plot, lamps);
+    write_floor_plot(folder / name, plot, lamps);
     const std::string first = TemporaryFolder::read_content(folder / name);
     ASSERT_FALSE(first.empty()) << name;
-    draw_floor_plot(folder / name, plot, lamps);
+    write_floor_plot(folder / name, plot, lamps);
     EXPECT_EQ(TemporaryFolder::read_content(folder / name), first);
   }
 }
 
 TEST_F(FloorPlotTest, RejectsOtherExtension) {
-  EXPECT_THAT(rejection_message([&] { draw_floor_plot(folder / "a.gif", plot, lamps); }),
+  EXPECT_THAT(rejection_message([&] { write_floor_plot(folder / "a.gif", plot, lamps); }),
               HasSubstr("a.gif: a picture's name should end in .png or .svg"));
 }
 
 TEST_F(FloorPlotTest, KeepsExistingFileWhenGnuplotFails) {
   const auto file = folder.file("a.png", "old");
   EXPECT_THAT(rejection_message([&] {
-                draw(file, {"a", 100, 100, "plot nonsense\n"});
+                write_plot(file, {"a", 100, 100, "plot nonsense\n"});
               }),
               HasSubstr("a.png: cannot be drawn"));
   EXPECT_EQ(TemporaryFolder::read_content(file), "old");
@@ -64,14 +64,14 @@ TEST_F(FloorPlotTest, ReportsWhyScriptCannotBeMade) {
   none.rlim_cur = 0;
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
   const std::string refusal =
-      rejection_message([&] { draw_floor_plot(folder / "a.png", plot, lamps); });
+      rejection_message([&] { write_floor_plot(folder / "a.png", plot, lamps); });
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
   EXPECT_THAT(refusal, HasSubstr("a.png: cannot be drawn: gnuplot's script cannot be made: "
                                  "Too many open files"));
 }
 
-TEST(GnuplotQuoted, PreventsInterpretation) {
-  EXPECT_EQ(gnuplot_quoted("it's `ls` $x"), "'it''s `ls` $x'");
+TEST(QuoteForGnuplot, PreventsInterpretation) {
+  EXPECT_EQ(quote_for_gnuplot("it's `ls` $x"), "'it''s `ls` $x'");
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ class IntrinsicsPlotTest : public testing::Test {
   /// gnuplot's stderr is passed through to the user; it has to be empty.
   std::string render_svg(const IntrinsicsPlot& intrinsics_plot) const {
     testing::internal::CaptureStderr();
-    draw(folder / "a.svg", make_drawing(intrinsics_plot));
+    write_plot(folder / "a.svg", make_gnuplot_drawing(intrinsics_plot));
     EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
     return TemporaryFolder::read_content(folder / "a.svg");
   }
@@ -39,7 +39,7 @@ class IntrinsicsPlotTest : public testing::Test {
                       {0.4, 0.3, 0.4, 0.2, 0.03, 0.2, 0.4, 0.3, 0.4}};
 };
 
-TEST_F(IntrinsicsPlotTest, ReportsCountsAndMagnification) {
+TEST_F(IntrinsicsPlotTest, ShowsCornerCountsAndArrowScale) {
   const std::string svg = render_svg(plot);
   for (const char* text : {"a 'title'", "2 corners", "1 outliers", "200 times as long",
                            "standard deviation (px)", "0.05", "0.1", "0.2", "0.5"}) {
@@ -51,15 +51,15 @@ TEST_F(IntrinsicsPlotTest, ReportsCountsAndMagnification) {
 }
 
 TEST_F(IntrinsicsPlotTest, RendersReproduciblePngOrSvgByExtension) {
-  draw(folder / "a.png", make_drawing(plot));
+  write_plot(folder / "a.png", make_gnuplot_drawing(plot));
   const std::string first = TemporaryFolder::read_content(folder / "a.png");
   EXPECT_THAT(first, StartsWith("\x89PNG"));
-  draw(folder / "a.png", make_drawing(plot));
+  write_plot(folder / "a.png", make_gnuplot_drawing(plot));
   EXPECT_EQ(TemporaryFolder::read_content(folder / "a.png"), first);
   const std::string svg = render_svg(plot);
   ASSERT_FALSE(svg.empty());
   EXPECT_EQ(render_svg(plot), svg);
-  EXPECT_THAT(rejection_message([&] { draw(folder / "a.gif", make_drawing(plot)); }),
+  EXPECT_THAT(rejection_message([&] { write_plot(folder / "a.gif", make_gnuplot_drawing(plot)); }),
               HasSubstr("a.gif: a picture's name should end in .png or .svg"));
 }
 
@@ -79,14 +79,14 @@ TEST_F(IntrinsicsPlotTest, RendersConstantMapAndZeroResiduals) {
   EXPECT_THAT(render_svg(plot), AllOf(HasSubstr("3 corners"), HasSubstr("1 times as long")));
 }
 
-TEST(ResidualMagnification, ReturnsRoundNumberWithinBounds) {
-  EXPECT_DOUBLE_EQ(residual_magnification(0.1, 800), 200);
-  EXPECT_DOUBLE_EQ(residual_magnification(0.11, 800), 100);
-  EXPECT_DOUBLE_EQ(residual_magnification(1, 4000), 100);
-  EXPECT_DOUBLE_EQ(residual_magnification(40, 800), 0.5);
-  EXPECT_DOUBLE_EQ(residual_magnification(0, 800), 1);
+TEST(ChooseResidualMagnification, ReturnsRoundNumberWithinBounds) {
+  EXPECT_DOUBLE_EQ(choose_residual_magnification(0.1, 800), 200);
+  EXPECT_DOUBLE_EQ(choose_residual_magnification(0.11, 800), 100);
+  EXPECT_DOUBLE_EQ(choose_residual_magnification(1, 4000), 100);
+  EXPECT_DOUBLE_EQ(choose_residual_magnification(40, 800), 0.5);
+  EXPECT_DOUBLE_EQ(choose_residual_magnification(0, 800), 1);
   for (const double rms_px : {0.013, 0.05, 0.17, 0.48, 1.3}) {
-    const double length_px = rms_px * residual_magnification(rms_px, 800);
+    const double length_px = rms_px * choose_residual_magnification(rms_px, 800);
     EXPECT_LE(length_px, 800 / 40.0);
     EXPECT_GE(length_px, 800 / 100.0);
   }

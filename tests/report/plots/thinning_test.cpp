@@ -9,18 +9,18 @@ namespace {
 
 using testing::ElementsAre;
 
-TEST(ThinningStep, LimitsCountAndReportsStep) {
-  EXPECT_EQ(thinning_step(0, 10), 1u);
-  EXPECT_EQ(thinning_step(10, 10), 1u);
-  EXPECT_EQ(thinning_step(11, 10), 2u);
-  EXPECT_EQ(thinning_step(101, 10), 11u);
-  EXPECT_EQ(thinning_note(10, 1), "");
-  EXPECT_EQ(thinning_note(20, 2), "every 2nd of 20 drawn");
-  EXPECT_EQ(thinning_note(101, 11), "every 11th of 101 drawn");
-  EXPECT_EQ(thinning_note(230, 23), "every 23rd of 230 drawn");
+TEST(ComputeThinningStep, LimitsCountAndReportsStep) {
+  EXPECT_EQ(compute_thinning_step(0, 10), 1u);
+  EXPECT_EQ(compute_thinning_step(10, 10), 1u);
+  EXPECT_EQ(compute_thinning_step(11, 10), 2u);
+  EXPECT_EQ(compute_thinning_step(101, 10), 11u);
+  EXPECT_EQ(describe_thinning(10, 1), "");
+  EXPECT_EQ(describe_thinning(20, 2), "every 2nd of 20 drawn");
+  EXPECT_EQ(describe_thinning(101, 11), "every 11th of 101 drawn");
+  EXPECT_EQ(describe_thinning(230, 23), "every 23rd of 230 drawn");
 }
 
-TEST(Thinned, KeepsLargestValuesInOrder) {
+TEST(SelectEveryNthAndLargest, ReturnsAscendingIndices) {
   const std::vector<double> values = {1, 9, 2, 3, 9, 8, 0};
   EXPECT_THAT(select_every_nth_and_largest(values, 3, 2), ElementsAre(0, 1, 3, 4, 6));
   EXPECT_THAT(select_every_nth_and_largest(values, 3, 0), ElementsAre(0, 3, 6));

@@ -79,7 +79,7 @@ TEST_F(ArchiveRuns, ReturnsDatedSessionsInChronologicalOrder) {
   const auto runs = this->runs();
   ASSERT_THAT(runs, SizeIs(4));
   EXPECT_EQ(runs[0].ended_utc, "2026-03-14T09:30:00Z");
-  EXPECT_EQ(begun_utc(runs[0].run), runs[0].ended_utc);
+  EXPECT_EQ(start_utc_of_run_id(runs[0].run), runs[0].ended_utc);
   EXPECT_EQ(runs[1].ended_utc, "2026-03-15T00:00:00Z");
   EXPECT_THAT((std::vector{runs[0].verdict, runs[1].verdict, runs[2].verdict, runs[3].verdict}),
               ElementsAre("PASS", "PASS", "FAIL", "INVALID"));
@@ -91,7 +91,7 @@ TEST_F(ArchiveRuns, ReturnsDatedSessionsInChronologicalOrder) {
   EXPECT_EQ(runs[3].program, "vlp-calibrate 1.2.3");
   ASSERT_THAT(runs[2].metrics, SizeIs(5));
   EXPECT_EQ(runs[2].metrics[0].value, 2);
-  EXPECT_FALSE(runs[2].metrics[0].passed());
+  EXPECT_FALSE(runs[2].metrics[0].has_passed());
   EXPECT_EQ(runs[2].metrics[0].direction, Direction::at_most);
   EXPECT_EQ(runs[2].metrics[2].name, "residual_ratio");
   EXPECT_FALSE(runs[2].metrics[2].limit);
@@ -103,13 +103,15 @@ TEST_F(ArchiveRuns, ReturnsDatedSessionsInChronologicalOrder) {
 TEST_F(ArchiveRuns, AreStoredOnceIfReadTwice) {
   Records records((folder / "records.db").string());
   for (int time = 0; time < 2; ++time) {
-    for (const RunRecord& run : runs()) records.keep(run);
+    for (const RunRecord& run : runs()) records.store_run(run);
   }
-  EXPECT_THAT(records.list({}), SizeIs(4));
-  EXPECT_THAT(extract_values(load_judged_values(records, "rms_px", {})), ElementsAre(0.3, 0.1, 2));
-  EXPECT_THAT(extract_values(load_judged_values(records, "mean_mm", {})),
+  EXPECT_THAT(records.list_runs({}), SizeIs(4));
+  EXPECT_THAT(extract_trend_values(load_judged_values(records, "rms_px", {})),
+              ElementsAre(0.3, 0.1, 2));
+  EXPECT_THAT(extract_trend_values(load_judged_values(records, "mean_mm", {})),
               ElementsAre(0.5, 0.5, 0.5));
-  EXPECT_EQ(find_gate("rms_px", nullptr, records, load_judged_values(records, "rms_px", {})), 1);
+  EXPECT_EQ(find_gate_limit("rms_px", nullptr, records, load_judged_values(records, "rms_px", {})),
+            1);
   EXPECT_STREQ(find_run_metric("mean_mm").unit, "mm");
   EXPECT_TRUE(records.check("").problems.empty());
 }

@@ -34,7 +34,7 @@ void keep_three(const std::string& where) {
             third = make_sample_record(kRun3, "c", 1.5);
   second.events = {{kLabel, kHookDone, "label 7", "Ann (vlp@station-1)"}};
   third.events = {{kDeleted, kImagesDeleted, "kept 90 days", "vlp@station-1"}};
-  for (const RunRecord& run : {first, second, third, second}) records.keep(run);
+  for (const RunRecord& run : {first, second, third, second}) records.store_run(run);
 }
 
 struct Forgery {
@@ -108,13 +108,13 @@ void check_forgeries(const std::function<std::string()>& new_database) {
   }
 }
 
-TEST(CheckTrail, DetectsChangesInFile) {
+TEST(CheckAuditTrail, DetectsChangesInFile) {
   const TemporaryFolder folder;
   int count = 0;
   check_forgeries([&] { return (folder / (std::to_string(++count) + ".db")).string(); });
 }
 
-TEST(CheckTrail, DetectsChangesInPostgres) {
+TEST(CheckAuditTrail, DetectsChangesInPostgres) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
@@ -125,14 +125,14 @@ TEST(CheckTrail, DetectsChangesInPostgres) {
 }
 
 /// An earlier last digest remains in the trail unless it is removed.
-TEST(CheckTrail, AcceptsEarlierDigestAfterNewRuns) {
+TEST(CheckAuditTrail, AcceptsEarlierDigestAfterNewRuns) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   keep_three(where);
   Records records(where);
   const std::string expected_digest = records.check("").last_digest;
   EXPECT_THAT(expected_digest, SizeIs(64));
-  records.keep(make_sample_record(numbered_run_id(4), "d", 0.5));
+  records.store_run(make_sample_record(numbered_run_id(4), "d", 0.5));
   const TrailCheck later = records.check(expected_digest);
   EXPECT_THAT(later.problems, IsEmpty());
   EXPECT_EQ(later.entries, 6U);
@@ -140,7 +140,7 @@ TEST(CheckTrail, AcceptsEarlierDigestAfterNewRuns) {
 }
 
 /// Equal runs have equal digests in every database.
-TEST(CheckTrail, ReturnsSameDigestInPostgresAndFile) {
+TEST(CheckAuditTrail, ReturnsSameDigestInPostgresAndFile) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
@@ -196,8 +196,8 @@ void check_sealing(const std::string& where) {
   ASSERT_THAT(run.events, SizeIs(2));
   EXPECT_EQ(run.events[1].text, "exit code 3");
   EXPECT_EQ(run.events[1].who, "");
-  run.events.push_back(make_event(kHookDone, "", "Bob"));
-  records.keep(run);
+  run.events.push_back(make_run_event_now(kHookDone, "", "Bob"));
+  records.store_run(run);
   EXPECT_THAT(records.find(run.run)->events[2].who, StartsWith("Bob ("));
   EXPECT_EQ(records.check(sealed.last_digest).entries, 4U);
   EXPECT_THAT(records.check(sealed.last_digest).problems, IsEmpty());
@@ -207,7 +207,7 @@ void check_sealing(const std::string& where) {
                           "changed"));
 }
 
-TEST(CheckTrail, IncludesRunsOfVersion5) {
+TEST(CheckAuditTrail, IncludesRunsOfVersion5) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   run_database_client(file, kVersion5);

@@ -45,8 +45,9 @@ RunRecord certified_run() {
   record.config_sha256 = std::string(64, 'a');
   record.calibration = "format: vlp-calibration/1\n";
   record.verdict = to_string(Verdict::pass);
-  record.metrics = check_all({{"rms_px", 0.3}, {"check_mean_mm", 1, GuardBand{0.02, 1.645}}},
-                             {{"rms_px", 0.123456}, {"check_mean_mm", 0.9600001}}, unit_metrics());
+  record.metrics =
+      check_all_metrics({{"rms_px", 0.3}, {"check_mean_mm", 1, GuardBand{0.02, 1.645}}},
+                        {{"rms_px", 0.123456}, {"check_mean_mm", 0.9600001}}, list_unit_metrics());
   return record;
 }
 
@@ -95,8 +96,8 @@ TEST(CertifiedValues, ReturnsUncertaintiesOfCalibration) {
 }
 
 TEST(Certificate, ContainsDataOfRecord) {
-  const std::string page = make_certificate(certified_run(), measured());
-  EXPECT_EQ(make_certificate(certified_run(), measured()), page);
+  const std::string page = make_calibration_certificate(certified_run(), measured());
+  EXPECT_EQ(make_calibration_certificate(certified_run(), measured()), page);
   EXPECT_THAT(
       page, AllOf(HasSubstr("Calibration certificate: camera &lt;0001&gt;"), HasSubstr("conforms"),
                   HasSubstr("20261121T134501Z-0001"), HasSubstr("2026-11-21T13:50:01Z"),
@@ -113,11 +114,11 @@ TEST(Certificate, ContainsDataOfRecord) {
 }
 
 TEST(Certificate, ContainsPrintErrorOfBoard) {
-  EXPECT_THAT(make_certificate(certified_run(), measured()),
+  EXPECT_THAT(make_calibration_certificate(certified_run(), measured()),
               HasSubstr("The board and the known points are assumed to be exact"));
   RunRecord record = certified_run();
   record.metrics.push_back({"board_print_px", "px", 0.0625, {}, Direction::at_most});
-  EXPECT_THAT(make_certificate(record, measured()),
+  EXPECT_THAT(make_calibration_certificate(record, measured()),
               AllOf(HasSubstr("includes the print of the board"), HasSubstr("0.0625 px, rms"),
                     Not(HasSubstr("The board and"))));
 }
@@ -126,14 +127,14 @@ TEST(Certificate, StatesNonconformityOfFailedUnit) {
   RunRecord record = certified_run();
   record.metrics[0].value = 0.4;
   record.set_verdict({{"the lens is poor", true}});
-  EXPECT_THAT(make_certificate(record, measured()),
+  EXPECT_THAT(make_calibration_certificate(record, measured()),
               AllOf(HasSubstr("FAIL"), HasSubstr("does not conform: the lens is poor."),
                     HasSubstr("<td>no</td>"), Not(HasSubstr("conforms with all"))));
 }
 
 TEST(Certificate, ThrowsForGoldenInvalidOrEditedRuns) {
   const auto refusal = [](const RunRecord& record) {
-    return rejection_message([&] { make_certificate(record, measured()); });
+    return rejection_message([&] { make_calibration_certificate(record, measured()); });
   };
   RunRecord golden = certified_run();
   golden.kind = "golden";

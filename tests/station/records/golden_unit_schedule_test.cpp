@@ -39,9 +39,9 @@ class FullDisk {
   void (*handler_)(int) = std::signal(SIGXFSZ, SIG_IGN);
 };
 
-class GoldenProblem : public testing::Test {
+class DescribeGoldenUnitProblem : public testing::Test {
  protected:
-  GoldenProblem() {
+  DescribeGoldenUnitProblem() {
     config.station = "a/station";
     config.spool = folder / "spool";
     config.type.imager_px = {800, 600};
@@ -50,21 +50,21 @@ class GoldenProblem : public testing::Test {
     config.verify_due = VerificationInterval{24, 2};
   }
   void note(const std::string& kind, const std::string& verdict,
-            const std::string& ended_utc = now_utc()) const {
+            const std::string& ended_utc = get_current_utc()) const {
     RunRecord run;
     run.run = "RUN";
     run.kind = kind;
     run.verdict = verdict;
     run.ended_utc = ended_utc;
-    update_golden_note(config, run);
+    update_golden_unit_note(config, run);
   }
-  std::string problem() const { return golden_problem(config); }
+  std::string problem() const { return describe_golden_unit_problem(config); }
 
   TemporaryFolder folder;
   StationConfig config{};
 };
 
-TEST_F(GoldenProblem, ReportsUnmeasuredGoldenUnit) {
+TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnit) {
   note("unit", "PASS");
   EXPECT_THAT(problem(), StartsWith("the golden unit was not measured here yet: "));
   note("golden", "INVALID");
@@ -75,7 +75,7 @@ TEST_F(GoldenProblem, ReportsUnmeasuredGoldenUnit) {
   EXPECT_THAT(problem(), HasSubstr("not measured"));
 }
 
-TEST_F(GoldenProblem, ReportsExpiredNumberOfUnits) {
+TEST_F(DescribeGoldenUnitProblem, ReportsExpiredNumberOfUnits) {
   note("golden", "PASS");
   note("unit", "FAIL");
   note("unit", "INVALID");
@@ -88,7 +88,7 @@ TEST_F(GoldenProblem, ReportsExpiredNumberOfUnits) {
   EXPECT_EQ(problem(), "");
 }
 
-TEST_F(GoldenProblem, ReportsExpiredHours) {
+TEST_F(DescribeGoldenUnitProblem, ReportsExpiredHours) {
   note("golden", "PASS", "2026-01-01T00:00:00Z");
   EXPECT_THAT(problem(), HasSubstr("measured 2026-01-01T00:00:00Z (run RUN), not within 24 h"));
   note("golden", "PASS", "9999-01-01T00:00:00Z");  // with a clock that was set back later
@@ -98,8 +98,10 @@ TEST_F(GoldenProblem, ReportsExpiredHours) {
 }
 
 /// The unit was started before the limits expired.
-TEST_F(GoldenProblem, IgnoresLimitsExpiredBeforeVerdict) {
-  const auto at_verdict = [&] { return golden_problem(config, GoldenCheckTime::verdict); };
+TEST_F(DescribeGoldenUnitProblem, IgnoresLimitsExpiredBeforeVerdict) {
+  const auto at_verdict = [&] {
+    return describe_golden_unit_problem(config, GoldenCheckTime::verdict);
+  };
   EXPECT_THAT(at_verdict(), HasSubstr("not measured"));
   note("golden", "PASS", "2026-01-01T00:00:00Z");
   EXPECT_THAT(problem(), HasSubstr("not within 24 h"));
@@ -115,7 +117,7 @@ TEST_F(GoldenProblem, IgnoresLimitsExpiredBeforeVerdict) {
   EXPECT_THAT(at_verdict(), StartsWith("the golden unit failed"));
 }
 
-TEST_F(GoldenProblem, ReportsFailedGoldenUnit) {
+TEST_F(DescribeGoldenUnitProblem, ReportsFailedGoldenUnit) {
   note("golden", "PASS");
   note("golden", "FAIL");
   EXPECT_THAT(problem(), StartsWith("the golden unit failed (run RUN): repair the station"));
@@ -124,7 +126,7 @@ TEST_F(GoldenProblem, ReportsFailedGoldenUnit) {
 }
 
 /// A golden run with another lamp map does not qualify the station.
-TEST_F(GoldenProblem, ReportsChangedMeasuringSetup) {
+TEST_F(DescribeGoldenUnitProblem, ReportsChangedMeasuringSetup) {
   note("golden", "PASS");
   ASSERT_EQ(problem(), "");
   config.sha256 = "of other comments";
@@ -143,7 +145,7 @@ TEST_F(GoldenProblem, ReportsChangedMeasuringSetup) {
 }
 
 /// An earlier PASS is not valid after a run that could not be noted.
-TEST_F(GoldenProblem, ReportsMissingNoteAfterWriteError) {
+TEST_F(DescribeGoldenUnitProblem, ReportsMissingNoteAfterWriteError) {
   for (const std::string kind : {"golden", "unit"}) {
     note("golden", "PASS");
     ASSERT_EQ(problem(), "");
@@ -155,7 +157,7 @@ TEST_F(GoldenProblem, ReportsMissingNoteAfterWriteError) {
   }
 }
 
-TEST_F(GoldenProblem, ReportsDamagedNote) {
+TEST_F(DescribeGoldenUnitProblem, ReportsDamagedNote) {
   note("golden", "PASS");
   ASSERT_EQ(problem(), "");
   const auto file = std::filesystem::directory_iterator(config.spool)->path();
@@ -165,18 +167,18 @@ TEST_F(GoldenProblem, ReportsDamagedNote) {
     folder.file(name, text);
     EXPECT_THAT(problem(), StartsWith("the result of the golden unit is unknown")) << text;
   }
-  folder.file(name, "RUN PASS " + now_utc() + "\n");  // note of an older program
+  folder.file(name, "RUN PASS " + get_current_utc() + "\n");  // note of an older program
   EXPECT_EQ(problem(),
             "the lamp map with which the golden unit was measured is unknown (run RUN): "
             "'vlp-station verify' is due");
-  folder.file(name, "RUN PASS " + now_utc() + " aa\nunit\nun");
+  folder.file(name, "RUN PASS " + get_current_utc() + " aa\nunit\nun");
   EXPECT_THAT(problem(), HasSubstr("is the file cut short?"));
   std::filesystem::remove(file);
   std::filesystem::create_directory(file);
   EXPECT_THAT(problem(), HasSubstr("the result of the golden unit is unknown"));
 }
 
-TEST_F(GoldenProblem, RejectsSymbolicLinkAsNote) {
+TEST_F(DescribeGoldenUnitProblem, RejectsSymbolicLinkAsNote) {
   note("golden", "PASS");
   const auto file = std::filesystem::directory_iterator(config.spool)->path();
   std::filesystem::remove(file);
@@ -185,22 +187,22 @@ TEST_F(GoldenProblem, RejectsSymbolicLinkAsNote) {
   EXPECT_THAT(problem(), HasSubstr("is a symbolic link"));
   EXPECT_THROW(note("unit", "PASS"), InputError);
   std::filesystem::create_symlink(mine, file);
-  EXPECT_FALSE(invalidate_golden_note(config, "RUN"));
+  EXPECT_FALSE(invalidate_golden_unit_note(config, "RUN"));
   note("golden", "PASS");
   EXPECT_EQ(problem(), "");
   EXPECT_EQ(TemporaryFolder::read_content(mine), "mine\n");
 }
 
-TEST_F(GoldenProblem, ReportsUnmeasuredGoldenUnitAfterVoiding) {
+TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnitAfterVoiding) {
   note("golden", "PASS");
-  invalidate_golden_note(config, "another");
+  invalidate_golden_unit_note(config, "another");
   EXPECT_EQ(problem(), "");
-  invalidate_golden_note(config, "RUN");
+  invalidate_golden_unit_note(config, "RUN");
   EXPECT_THAT(problem(), HasSubstr("not measured here yet"));
-  invalidate_golden_note(config, "RUN");
+  invalidate_golden_unit_note(config, "RUN");
 }
 
-TEST_F(GoldenProblem, ReturnsEmptyWithoutVerifyDue) {
+TEST_F(DescribeGoldenUnitProblem, ReturnsEmptyWithoutVerifyDue) {
   config.verify_due.reset();
   note("golden", "FAIL");
   EXPECT_EQ(problem(), "");
@@ -208,9 +210,9 @@ TEST_F(GoldenProblem, ReturnsEmptyWithoutVerifyDue) {
 }
 
 /// The station in datasets/station, with a golden unit.
-class MeasuringDigest : public testing::Test {
+class ComputeMeasurementSettingsDigest : public testing::Test {
  protected:
-  MeasuringDigest() {
+  ComputeMeasurementSettingsDigest() {
     for (const char* name : {"station.yaml", "camera_type.yaml", "board.yaml", "lamps.yaml"}) {
       fs::copy_file(fs::path(VLP_SOURCE_DIR) / "datasets/station" / name, folder / name);
     }
@@ -226,7 +228,9 @@ class MeasuringDigest : public testing::Test {
     ASSERT_NE(at, std::string::npos) << from;
     folder.file(file, text.replace(at, from.size(), to));
   }
-  std::string digest() const { return measuring_digest(read_station(folder / "station.yaml")); }
+  std::string digest() const {
+    return compute_measurement_settings_digest(read_station_config(folder / "station.yaml"));
+  }
   /// Returns the digest with a temporary change.
   std::string digest_with(const std::string& file, const std::string& from, const std::string& to) {
     const std::string before = TemporaryFolder::read_content(folder / file);
@@ -239,7 +243,7 @@ class MeasuringDigest : public testing::Test {
   TemporaryFolder folder;
 };
 
-TEST_F(MeasuringDigest, ChangesWithMeasuringSetup) {
+TEST_F(ComputeMeasurementSettingsDigest, ChangesWithMeasuringSetup) {
   std::set<std::string> digests{digest()};
   const auto is_new = [&](const char* file, const char* from, const char* to) {
     EXPECT_TRUE(digests.insert(digest_with(file, from, to)).second) << from << " -> " << to;
@@ -267,9 +271,9 @@ TEST_F(MeasuringDigest, ChangesWithMeasuringSetup) {
   is_new("golden.yaml", "403, 296", "403, 297");
 }
 
-TEST_F(MeasuringDigest, IgnoresOtherSettings) {
+TEST_F(ComputeMeasurementSettingsDigest, IgnoresOtherSettings) {
   const std::string before = digest();
-  const std::string config_sha256 = read_station(folder / "station.yaml").sha256;
+  const std::string config_sha256 = read_station_config(folder / "station.yaml").sha256;
   const auto is_same = [&](const char* file, const std::string& from, const std::string& to) {
     EXPECT_EQ(digest_with(file, from, to), before) << from << " -> " << to;
   };
@@ -292,7 +296,7 @@ TEST_F(MeasuringDigest, IgnoresOtherSettings) {
   is_same("camera_type.yaml", "3.0e-05", "0.00003");
   change("station.yaml", "captures: captures", "captures: captures  # a comment");
   EXPECT_EQ(digest(), before);
-  EXPECT_NE(read_station(folder / "station.yaml").sha256, config_sha256)
+  EXPECT_NE(read_station_config(folder / "station.yaml").sha256, config_sha256)
       << "records have the files as they are";
   // Another name of a file with the same content.
   fs::rename(folder / "lamps.yaml", folder / "ceiling.yaml");

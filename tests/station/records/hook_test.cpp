@@ -134,9 +134,9 @@ TEST_F(RunHook, KeepsLockWhenStationIsKilled) {
   };
   ASSERT_TRUE(wait_for([&] { return std::filesystem::exists(folder / "begun"); }));
   kill_child(station);
-  EXPECT_FALSE(HookLock(folder / ".", name).held());
+  EXPECT_FALSE(HookLock(folder / ".", name).is_lock_held());
   folder.file("end", "");
-  EXPECT_TRUE(wait_for([&] { return HookLock(folder / ".", name).held(); }));
+  EXPECT_TRUE(wait_for([&] { return HookLock(folder / ".", name).is_lock_held(); }));
 }
 
 /// The parent of this program can ignore signals and leave files open.
@@ -156,35 +156,35 @@ TEST_F(RunHook, InheritsNoSignalsOrDescriptors) {
 
 TEST_F(RunHook, IsOpenUntilHookSucceeds) {
   RunRecord run = judged_run();
-  EXPECT_FALSE(is_hook_open(run));
-  EXPECT_EQ(hook_problem(run), "");
+  EXPECT_FALSE(is_hook_pending(run));
+  EXPECT_EQ(describe_pending_hook(run), "");
   run.events.push_back(make_hook_requested_event({{"label", "it"}, {}, 1}, "Ann"));
   EXPECT_EQ(run.events.back().text, "label it");
   EXPECT_THAT(run.events.back().who, testing::MatchesRegex("Ann [(][^@]+@[^@]*[)]"));
-  EXPECT_TRUE(is_hook_open(run));
-  EXPECT_EQ(hook_problem(run), "was not run to its end");
-  run.events.push_back(make_event(kHookFailed, "exit code 3"));
-  EXPECT_EQ(hook_problem(run), "failed: exit code 3");
-  run.events.push_back(make_event(kHookDone, ""));
-  EXPECT_FALSE(is_hook_open(run));
-  EXPECT_EQ(hook_problem(run), "");
+  EXPECT_TRUE(is_hook_pending(run));
+  EXPECT_EQ(describe_pending_hook(run), "was not run to its end");
+  run.events.push_back(make_run_event_now(kHookFailed, "exit code 3"));
+  EXPECT_EQ(describe_pending_hook(run), "failed: exit code 3");
+  run.events.push_back(make_run_event_now(kHookDone, ""));
+  EXPECT_FALSE(is_hook_pending(run));
+  EXPECT_EQ(describe_pending_hook(run), "");
   // Requested again for a voided run.
-  run.events.push_back(make_event(kHookRequested, "label it"));
-  EXPECT_TRUE(is_hook_open(run));
-  EXPECT_EQ(hook_problem(run), "was not run to its end");
-  run.events.push_back(make_event(kHookDone, ""));
-  EXPECT_FALSE(is_hook_open(run));
+  run.events.push_back(make_run_event_now(kHookRequested, "label it"));
+  EXPECT_TRUE(is_hook_pending(run));
+  EXPECT_EQ(describe_pending_hook(run), "was not run to its end");
+  run.events.push_back(make_run_event_now(kHookDone, ""));
+  EXPECT_FALSE(is_hook_pending(run));
 }
 
-TEST_F(RunHook, IsCalledByOneProgramAtATime) {
+TEST_F(RunHook, RefusesSecondLockOfRun) {
   const std::string name = judged_run().run;
   {
     const HookLock first_lock(folder / ".", name), other(folder / ".", name);
-    EXPECT_TRUE(first_lock.held());
-    EXPECT_FALSE(other.held());
-    EXPECT_TRUE(HookLock(folder / ".", "another").held());
+    EXPECT_TRUE(first_lock.is_lock_held());
+    EXPECT_FALSE(other.is_lock_held());
+    EXPECT_TRUE(HookLock(folder / ".", "another").is_lock_held());
   }
-  EXPECT_TRUE(HookLock(folder / ".", name).held());
+  EXPECT_TRUE(HookLock(folder / ".", name).is_lock_held());
   EXPECT_TRUE(std::filesystem::is_empty(folder / "."));
 }
 
@@ -192,8 +192,8 @@ TEST(HookLock, CreatesNoFileThroughSymbolicLink) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "spool");
   std::filesystem::create_symlink(folder / "elsewhere", folder / "spool/.hook-run");
-  EXPECT_LT(HookLock(folder / "spool", "run").descriptor(), 0);
-  EXPECT_LT(HookLock(folder / "spool", "/../../elsewhere").descriptor(), 0);
+  EXPECT_LT(HookLock(folder / "spool", "run").lock_file_descriptor(), 0);
+  EXPECT_LT(HookLock(folder / "spool", "/../../elsewhere").lock_file_descriptor(), 0);
   EXPECT_FALSE(std::filesystem::exists(folder / "elsewhere"));
 }
 

@@ -32,13 +32,13 @@ class KnownRunsTest : public testing::Test {
   }
   std::string keep(int number, double rms_px = 0.1) const {
     const RunRecord run = make_sample_record(numbered_run_id(number), "a", rms_px);
-    Records(config.records).keep(run);
+    Records(config.records).store_run(run);
     return run.run;
   }
   /// Makes the records unavailable.
   std::string keep_waiting(int number) const {
     const RunRecord run = make_sample_record(numbered_run_id(number), "b", 0.1);
-    Spool(config.spool, config.records).keep(run);
+    Spool(config.spool, config.records).store_run(run);
     return run.run;
   }
   static RunFilter only(std::string RunFilter::*text, const std::string& value) {
@@ -56,30 +56,30 @@ class KnownRunsTest : public testing::Test {
 
 TEST_F(KnownRunsTest, ReturnsStoredAndWaitingRuns) {
   const std::string kept = keep(1);
-  EXPECT_THAT(KnownRuns(config.records).list({}), ElementsAre(Field(&RunSummary::run, kept)));
+  EXPECT_THAT(KnownRuns(config.records).list_runs({}), ElementsAre(Field(&RunSummary::run, kept)));
   const std::string waits = keep_waiting(2);
   {
     KnownRuns known(config);  // brings it there
-    EXPECT_THAT(known.list({}),
+    EXPECT_THAT(known.list_runs({}),
                 ElementsAre(Field(&RunSummary::run, kept),
                             AllOf(Field(&RunSummary::run, waits), Field(&RunSummary::causes, ""))));
-    EXPECT_THAT(known.load_all({}), SizeIs(2));
-    EXPECT_EQ(known.last({}).run, waits);
-    EXPECT_EQ(known.last(only(&RunFilter::camera, "a")).run, kept);
+    EXPECT_THAT(known.load_all_runs({}), SizeIs(2));
+    EXPECT_EQ(known.find_last_run({}).run, waits);
+    EXPECT_EQ(known.find_last_run(only(&RunFilter::camera, "a")).run, kept);
     EXPECT_EQ(known.find(kept).camera, "a");
     EXPECT_THROW(known.find("none"), std::invalid_argument);
-    EXPECT_THROW(known.last(only(&RunFilter::camera, "c")), std::invalid_argument);
+    EXPECT_THROW(known.find_last_run(only(&RunFilter::camera, "c")), std::invalid_argument);
   }
   make_records_unavailable();
   const std::string alone = keep_waiting(3);
   KnownRuns known(config);
-  EXPECT_THAT(known.list({}), ElementsAre(AllOf(Field(&RunSummary::run, alone),
-                                                Field(&RunSummary::causes, "(waits here) "))));
-  EXPECT_THAT(known.list(only(&RunFilter::verdict, "FAIL")), IsEmpty());
-  EXPECT_THAT(known.list(only(&RunFilter::until, "2026")), IsEmpty());
+  EXPECT_THAT(known.list_runs({}), ElementsAre(AllOf(Field(&RunSummary::run, alone),
+                                                     Field(&RunSummary::causes, "(waits here) "))));
+  EXPECT_THAT(known.list_runs(only(&RunFilter::verdict, "FAIL")), IsEmpty());
+  EXPECT_THAT(known.list_runs(only(&RunFilter::until, "2026")), IsEmpty());
   EXPECT_EQ(known.find(alone).camera, "b");
   EXPECT_THROW(known.records(), std::runtime_error) << "these are not all";
-  EXPECT_THROW(known.load_all({}), std::runtime_error);
+  EXPECT_THROW(known.load_all_runs({}), std::runtime_error);
 }
 
 TEST_F(KnownRunsTest, ThrowsWithoutRecords) {
@@ -101,8 +101,8 @@ TEST(CountRuns, ExcludesVoidedRunsFromYield) {
   EXPECT_EQ(counts.invalid, 1U);
   EXPECT_EQ(counts.voided, 1U);
   EXPECT_EQ(counts.units_judged, 3U);
-  EXPECT_DOUBLE_EQ(counts.yield().value(), 2.0 / 3);
-  EXPECT_FALSE(count_runs({}).yield());
+  EXPECT_DOUBLE_EQ(counts.compute_yield().value(), 2.0 / 3);
+  EXPECT_FALSE(count_runs({}).compute_yield());
 }
 
 TEST(CountRuns, ComputesFirstPassYieldAndRework) {
@@ -116,8 +116,8 @@ TEST(CountRuns, ComputesFirstPassYieldAndRework) {
   const RunCounts counts = count_runs(runs);
   EXPECT_EQ(counts.cameras, 3U);
   EXPECT_EQ(counts.cameras_reworked, 1U);
-  EXPECT_DOUBLE_EQ(counts.first_pass_yield().value(), 2.0 / 3);
-  EXPECT_FALSE(count_runs({}).first_pass_yield());
+  EXPECT_DOUBLE_EQ(counts.compute_first_pass_yield().value(), 2.0 / 3);
+  EXPECT_FALSE(count_runs({}).compute_first_pass_yield());
 }
 
 TEST_F(KnownRunsTest, FiltersByOperatorAndShift) {
@@ -126,18 +126,18 @@ TEST_F(KnownRunsTest, FiltersByOperatorAndShift) {
   night.operator_name = "Ann";
   night.shift = "night";
   day.operator_name = "Bea";
-  for (const RunRecord* run : {&night, &day}) Records(config.records).keep(*run);
+  for (const RunRecord* run : {&night, &day}) Records(config.records).store_run(*run);
   const auto expect_only_the_night = [&] {
     KnownRuns known(config);
     const auto is_night = ElementsAre(Field(&RunSummary::run, night.run));
-    EXPECT_THAT(known.list({}), SizeIs(2));
-    EXPECT_THAT(known.list(only(&RunFilter::operator_name, "Ann")), is_night);
-    EXPECT_THAT(known.list(only(&RunFilter::shift, "night")), is_night);
-    EXPECT_THAT(known.list(only(&RunFilter::operator_name, "Cat")), IsEmpty());
+    EXPECT_THAT(known.list_runs({}), SizeIs(2));
+    EXPECT_THAT(known.list_runs(only(&RunFilter::operator_name, "Ann")), is_night);
+    EXPECT_THAT(known.list_runs(only(&RunFilter::shift, "night")), is_night);
+    EXPECT_THAT(known.list_runs(only(&RunFilter::operator_name, "Cat")), IsEmpty());
   };
   expect_only_the_night();
   make_records_unavailable();
-  for (const RunRecord* run : {&night, &day}) Spool(config.spool, config.records).keep(*run);
+  for (const RunRecord* run : {&night, &day}) Spool(config.spool, config.records).store_run(*run);
   expect_only_the_night();
 }
 
@@ -157,7 +157,7 @@ TEST_F(KnownRunsTest, VoidRunRecordsOperatorAndReasonOnce) {
   {
     KnownRuns known(config.records);
     void_run(known, run, "Ann", "wrong serial");
-    EXPECT_THAT(known.list({}), ElementsAre(Field(&RunSummary::voided, "wrong serial")));
+    EXPECT_THAT(known.list_runs({}), ElementsAre(Field(&RunSummary::voided, "wrong serial")));
     EXPECT_THROW(void_run(known, run, "Ann", "again"), std::invalid_argument);
     EXPECT_THROW(void_run(known, "none", "Ann", "again"), std::invalid_argument);
   }
@@ -168,8 +168,8 @@ TEST_F(KnownRunsTest, VoidRunRecordsOperatorAndReasonOnce) {
 
 TEST_F(KnownRunsTest, VoidRunRenamesCalibrationOfPassedRun) {
   const RunRecord run = make_sample_record(numbered_run_id(1), "a", 0.1);
-  ASSERT_TRUE(run.passed());
-  Records(config.records).keep(run);
+  ASSERT_TRUE(run.has_passed());
+  Records(config.records).store_run(run);
   const auto results = config.results / "a" / run.run;
   std::filesystem::create_directories(results);
   folder.file((results / "calibration.yaml").string(), run.calibration);
@@ -223,11 +223,12 @@ TEST_F(KnownRunsTest, VoidRunCallsHook) {
   // A hook that succeeded at the verdict is open again if it fails now.
   config.hook = Hook{{"false"}, folder / ".", 20};
   RunRecord second = make_sample_record(numbered_run_id(2), "a", 0.1);
-  second.events = {make_event(kHookRequested, "label"), make_event(kHookDone, "")};
-  Records(config.records).keep(second);
+  second.events = {make_run_event_now(kHookRequested, "label"), make_run_event_now(kHookDone, "")};
+  Records(config.records).store_run(second);
   KnownRuns known(config);
   EXPECT_THAT(list_open_hooks(known, config.station), IsEmpty());
-  EXPECT_EQ(hook_problem(void_run(known, second.run, "Ann", "again").run), "failed: exit code 1");
+  EXPECT_EQ(describe_pending_hook(void_run(known, second.run, "Ann", "again").run),
+            "failed: exit code 1");
   EXPECT_THAT(list_open_hooks(known, config.station), ElementsAre(second.run));
 }
 

@@ -27,7 +27,7 @@ RunRecord passed() {
   return record;
 }
 
-TEST(PublishRun, WritesMissingFiles) {
+TEST(PublishRun, RestoresOnlyMissingFiles) {
   const TemporaryFolder folder;
   const RunRecord record = passed();
   const fs::path results = publish_run(record, {}, folder / "results");
@@ -84,16 +84,16 @@ TEST(PublishRun, WritesNothingOutsideResults) {
   };
   expect_link([&] { publish_run(record, {}, folder / "results"); });
   expect_link([&] { mark_files_voided(record, folder / "results"); });
-  expect_link([&] { check_results(folder / "results", "0001"); });
+  expect_link([&] { check_results_folder(folder / "results", "0001"); });
   EXPECT_TRUE(fs::is_empty(folder / "elsewhere"));
 }
 
-TEST(CheckResults, ReplacesSymbolicLinkAndKeepsItsTarget) {
+TEST(CheckResultsFolder, ReplacesSymbolicLinkAndKeepsItsTarget) {
   const TemporaryFolder folder;
   const fs::path mine = folder.file("mine.txt", "mine");
   fs::create_directories(folder / "results/0001");
   fs::create_symlink(mine, folder / "results/0001/.writable");
-  EXPECT_EQ(rejection_message([&] { check_results(folder / "results", "0001"); }), "");
+  EXPECT_EQ(rejection_message([&] { check_results_folder(folder / "results", "0001"); }), "");
   EXPECT_EQ(TemporaryFolder::read_content(mine), "mine");
   EXPECT_FALSE(fs::is_symlink(folder / "results/0001/.writable"));
 }
@@ -144,16 +144,16 @@ TEST(MarkFilesVoided, RenamesAllFiles) {
   mark_files_voided(record, folder / "results");
   mark_files_voided(record, folder / "none");
   // A run that is published after it was voided.
-  record.events.push_back(make_event(kVoided, "wrong serial", "Ann"));
+  record.events.push_back(make_run_event_now(kVoided, "wrong serial", "Ann"));
   EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "a") / "voided-calibration.yaml"));
   EXPECT_FALSE(fs::exists(folder / "a" / record.camera / record.run / "report.html"));
 }
 
-TEST(CheckResults, ThrowsIfFolderCannotBeCreated) {
+TEST(CheckResultsFolder, ThrowsIfFolderCannotBeCreated) {
   const TemporaryFolder folder;
-  EXPECT_EQ(rejection_message([&] { check_results(folder / "results", "0001"); }), "");
+  EXPECT_EQ(rejection_message([&] { check_results_folder(folder / "results", "0001"); }), "");
   EXPECT_TRUE(fs::is_empty(folder / "results/0001"));
-  EXPECT_THAT(rejection_message([&] { check_results(folder.file("file", ""), "0001"); }),
+  EXPECT_THAT(rejection_message([&] { check_results_folder(folder.file("file", ""), "0001"); }),
               HasSubstr("file: cannot be made"));
 }
 

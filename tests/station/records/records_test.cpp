@@ -36,7 +36,7 @@ using testing::StartsWith;
 /// Returns a record with a different text in each of its fields.
 RunRecord with_all_texts() {
   RunRecord record = make_sample_record(numbered_run_id(7), "a", 0.5);
-  for (const RunField& field : run_fields()) {
+  for (const RunField& field : list_run_text_fields()) {
     record.*field.text = std::string("the '") + field.name + "' of \"it\"\n";
   }
   return record;
@@ -44,10 +44,10 @@ RunRecord with_all_texts() {
 
 void check_all_texts(Records& records) {
   const RunRecord kept = with_all_texts();
-  records.keep(kept);
+  records.store_run(kept);
   const auto found = records.find(kept.run);
   ASSERT_TRUE(found);
-  for (const RunField& field : run_fields()) {
+  for (const RunField& field : list_run_text_fields()) {
     EXPECT_EQ((*found).*field.text, kept.*field.text) << field.name;
   }
 }
@@ -56,18 +56,18 @@ void check_all_texts(Records& records) {
 void check_events(Records& records) {
   RunRecord run = make_sample_record(numbered_run_id(8), "e", 0.5),
             other = make_sample_record(numbered_run_id(6), "e", 0.5);
-  run.events = {make_event(kHookRequested, "label 'x'")};
-  other.events = {make_event(kHookRequested, "label"), make_event(kHookDone, "")};
-  for (const RunRecord& each : {run, other, run}) records.keep(each);
+  run.events = {make_run_event_now(kHookRequested, "label 'x'")};
+  other.events = {make_run_event_now(kHookRequested, "label"), make_run_event_now(kHookDone, "")};
+  for (const RunRecord& each : {run, other, run}) records.store_run(each);
   EXPECT_THAT(list_open_hooks(records, "station-1"), ElementsAre(run.run));
   EXPECT_THAT(list_open_hooks(records), ElementsAre(run.run));
   EXPECT_THAT(list_open_hooks(records, "another"), IsEmpty());
   const RunEvent wanted = run.events.front();
-  run.events.push_back(make_event(kHookFailed, "exit code 3"));
-  records.keep(run);
+  run.events.push_back(make_run_event_now(kHookFailed, "exit code 3"));
+  records.store_run(run);
   EXPECT_THAT(list_open_hooks(records, "station-1"), ElementsAre(run.run));
-  run.events = {make_event(kHookDone, "")};  // by a program without the other events
-  records.keep(run);
+  run.events = {make_run_event_now(kHookDone, "")};  // by a program without the other events
+  records.store_run(run);
   EXPECT_THAT(list_open_hooks(records, "station-1"), IsEmpty());
   const auto found = records.find(run.run);
   ASSERT_TRUE(found);
@@ -82,34 +82,34 @@ void check_events(Records& records) {
 
 /// Part of check_records(): a voided run remains, but is not counted.
 void check_voided(Records& records) {
-  const std::size_t before = records.trend("rms_px", {}).size();
+  const std::size_t before = records.load_trend("rms_px", {}).size();
   RunRecord run = make_sample_record(numbered_run_id(0), "a", 0);
-  run.events = {make_event(kVoided, "wrong serial", "Ann")};
-  records.keep(run);
+  run.events = {make_run_event_now(kVoided, "wrong serial", "Ann")};
+  records.store_run(run);
   const auto found = records.find(run.run);
   ASSERT_TRUE(found);
   EXPECT_THAT(find_verdict_problem(*found),
               testing::MatchesRegex("was voided by Ann [(].*@.*: wrong serial"));
-  EXPECT_THAT(records.trend("rms_px", {}), SizeIs(before - 1));
-  EXPECT_EQ(records.list({})[0].run, run.run);
-  EXPECT_EQ(records.list({})[0].voided, "wrong serial");
-  EXPECT_EQ(records.list({})[1].voided, "");
-  EXPECT_EQ(records.list({.image_sha256 = std::string(64, 'b')})[0].voided, "wrong serial");
+  EXPECT_THAT(records.load_trend("rms_px", {}), SizeIs(before - 1));
+  EXPECT_EQ(records.list_runs({})[0].run, run.run);
+  EXPECT_EQ(records.list_runs({})[0].voided, "wrong serial");
+  EXPECT_EQ(records.list_runs({})[1].voided, "");
+  EXPECT_EQ(records.list_runs({.image_sha256 = std::string(64, 'b')})[0].voided, "wrong serial");
 }
 
 /// Checks the properties of records in every database.
 void check_records(const std::string& where) {
   Records records(where);
   for (int i = 0; i < 4; ++i) {
-    records.keep(
+    records.store_run(
         make_sample_record(numbered_run_id(i), i == 2 ? "b" : "a", i == 3 ? 1.5 : 0.1 * i));
   }
   // Stored once; a different run of its id is rejected.
-  records.keep(make_sample_record(numbered_run_id(0), "a", 0));
+  records.store_run(make_sample_record(numbered_run_id(0), "a", 0));
   EXPECT_THAT(rejection_message(
-                  [&] { records.keep(make_sample_record(numbered_run_id(0), "other", 0.7)); }),
+                  [&] { records.store_run(make_sample_record(numbered_run_id(0), "other", 0.7)); }),
               HasSubstr("has another run " + numbered_run_id(0)));
-  const auto all = records.list({});
+  const auto all = records.list_runs({});
   ASSERT_THAT(all, SizeIs(4));
   EXPECT_EQ(all[0].camera, "a");
   EXPECT_EQ(all[3].verdict, "FAIL");
@@ -122,14 +122,14 @@ void check_records(const std::string& where) {
               ElementsAre(numbered_run_id(2)));
   EXPECT_THAT(list_ids(records, {.image_sha256 = std::string(64, 'c')}), IsEmpty())
       << "it was refused there";
-  EXPECT_EQ(rejection_message([&] { records.check_writable(); }), "");
+  EXPECT_EQ(rejection_message([&] { records.check_database_writable(); }), "");
   RunFilter filter;
   filter.camera = "a";
-  EXPECT_THAT(records.list(filter), SizeIs(3));
+  EXPECT_THAT(records.list_runs(filter), SizeIs(3));
   filter.verdict = "PASS";
   filter.last = 1;
-  ASSERT_THAT(records.list(filter), SizeIs(1));
-  EXPECT_EQ(records.list(filter)[0].run, numbered_run_id(1));
+  ASSERT_THAT(records.list_runs(filter), SizeIs(1));
+  EXPECT_EQ(records.list_runs(filter)[0].run, numbered_run_id(1));
 
   EXPECT_FALSE(records.find("another"));
   const auto found = records.find(numbered_run_id(3));
@@ -139,7 +139,7 @@ void check_records(const std::string& where) {
   EXPECT_EQ(found->calibration, expected.calibration);
   ASSERT_THAT(found->metrics, SizeIs(3));
   EXPECT_EQ(found->metrics[0].value, 1.5);
-  EXPECT_FALSE(found->metrics[0].passed());
+  EXPECT_FALSE(found->metrics[0].has_passed());
   EXPECT_EQ(found->metrics[0].unit, "px");
   ASSERT_TRUE(found->metrics[0].guard);
   EXPECT_EQ(found->metrics[0].guard->standard_uncertainty, 0.1 + 0.2);  // to the last bit
@@ -153,10 +153,10 @@ void check_records(const std::string& where) {
 
   RunFilter of_a;
   of_a.camera = "a";
-  const auto trend = records.trend("rms_px", of_a);
+  const auto trend = records.load_trend("rms_px", of_a);
   ASSERT_THAT(trend, SizeIs(3));
   EXPECT_DOUBLE_EQ(trend[2].value, 1.5);
-  EXPECT_THAT(records.trend("tilt_deg", {}), IsEmpty());
+  EXPECT_THAT(records.load_trend("tilt_deg", {}), IsEmpty());
   check_all_texts(records);
   check_events(records);
   check_voided(records);
@@ -174,14 +174,14 @@ void check_two_writers(const std::string& where) {
     children.push_back(start_child([&] {
       Records records(where);
       for (int i = 0; i < each; ++i) {
-        records.keep(make_sample_record(numbered_run_id(100 * (writer + 1) + i),
-                                        writer == 0 ? "a" : "b", 0.1));
+        records.store_run(make_sample_record(numbered_run_id(100 * (writer + 1) + i),
+                                             writer == 0 ? "a" : "b", 0.1));
       }
     }));
   }
   EXPECT_TRUE(end_well(children));
   Records records(where);
-  const auto runs = records.list({});
+  const auto runs = records.list_runs({});
   EXPECT_THAT(runs, SizeIs(2 * each));
   const TrailCheck trail = records.check("");
   EXPECT_THAT(trail.problems, IsEmpty());
@@ -241,13 +241,13 @@ void check_migration(const std::string& where) {
   EXPECT_EQ(found->metrics[2].unit, "deg");
   EXPECT_EQ(found->metrics[3].name, "world_offset_mm");  // the present name of world_mm
   EXPECT_EQ(found->metrics[3].unit, "mm");
-  EXPECT_THAT(records.trend("world_offset_mm", {}), SizeIs(1));
-  EXPECT_THAT(records.trend("world_mm", {}), SizeIs(1));
+  EXPECT_THAT(records.load_trend("world_offset_mm", {}), SizeIs(1));
+  EXPECT_THAT(records.load_trend("world_mm", {}), SizeIs(1));
   EXPECT_EQ(found->metrics[4].unit, "%");
   EXPECT_FALSE(found->metrics[0].guard);
   EXPECT_THAT(found->images, SizeIs(1));
-  records.keep(make_sample_record(numbered_run_id(5), "b", 0.1));
-  EXPECT_THAT(records.list({}), SizeIs(2));
+  records.store_run(make_sample_record(numbered_run_id(5), "b", 0.1));
+  EXPECT_THAT(records.list_runs({}), SizeIs(2));
   EXPECT_EQ(records.find(numbered_run_id(5))->metrics[0].unit, "px");
   EXPECT_TRUE(records.find(numbered_run_id(5))->metrics[0].guard);
   EXPECT_THAT(found->events, IsEmpty());
@@ -297,14 +297,14 @@ void check_later_version(const std::string& where) {
   EXPECT_EQ(read_state(where), before);
 }
 
-TEST(UtcProblem, AcceptsOnlyExistingDaysAndTimes) {
+TEST(DescribeUtcProblem, AcceptsOnlyExistingDaysAndTimes) {
   for (const char* valid_text : {"2026-11-21", "2024-02-29", "2026-11-21T13:45",
                                  "2026-11-21T13:45:01", "2026-11-21T13:45:01Z"}) {
-    EXPECT_EQ(utc_problem(valid_text), "");
+    EXPECT_EQ(describe_utc_problem(valid_text), "");
   }
   for (const char* bad : {"", "2026", "2026-02-29", "2026-13-01", "2026-11-21T24:00",
                           "2026-11-21T13:60", "2026-11-21T13:45:60", "2026-11-21 13:45"}) {
-    EXPECT_THAT(utc_problem(bad), StartsWith("should be a UTC as ")) << bad;
+    EXPECT_THAT(describe_utc_problem(bad), StartsWith("should be a UTC as ")) << bad;
   }
 }
 
@@ -322,7 +322,7 @@ TEST(Records, MigratesVersion1InFileOnce) {
   check_migration_by_another(file);
 }
 
-TEST(Records, CheckWritableThrowsForReadOnlyTables) {
+TEST(Records, CheckDatabaseWritableThrowsForReadOnlyTables) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   { const Records made(file); }
@@ -331,7 +331,7 @@ TEST(Records, CheckWritableThrowsForReadOnlyTables) {
       "CREATE TRIGGER stop BEFORE UPDATE ON vlp_schema BEGIN SELECT RAISE(ABORT, 'stopped'); "
       "END;\n");
   Records records(file);
-  EXPECT_THAT(rejection_message([&] { records.check_writable(); }), HasSubstr("stopped"));
+  EXPECT_THAT(rejection_message([&] { records.check_database_writable(); }), HasSubstr("stopped"));
 }
 
 TEST(Records, KeepsVersion1InFileWhenMigrationFails) {
@@ -386,7 +386,7 @@ TEST(Records, StoresRunsInPostgres) {
   ASSERT_NE(server.uri(), "");
   check_two_writers(server.uri());
   // A connection string without a parameter, as for psql.
-  EXPECT_THAT(Records(server.plain_uri()).list({}), SizeIs(50));
+  EXPECT_THAT(Records(server.plain_uri()).list_runs({}), SizeIs(50));
   run_database_client(server.uri(), kDropAll);
   check_records(server.uri());
 
@@ -395,7 +395,7 @@ TEST(Records, StoresRunsInPostgres) {
   run_database_client(server.uri(),
                       "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> "
                       "pg_backend_pid() AND backend_type = 'client backend';\n");
-  records.keep(make_sample_record(numbered_run_id(9), "c", 0.1));
+  records.store_run(make_sample_record(numbered_run_id(9), "c", 0.1));
   EXPECT_TRUE(records.find(numbered_run_id(9)));
 }
 
@@ -421,7 +421,8 @@ TEST(Records, CreatesTablesInPostgresUnderLock) {
   while (!std::filesystem::exists(begun) && std::chrono::steady_clock::now() < until) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  auto made = std::async(std::launch::async, [&] { return Records(server.uri()).list({}).size(); });
+  auto made =
+      std::async(std::launch::async, [&] { return Records(server.uri()).list_runs({}).size(); });
   EXPECT_EQ(made.wait_for(std::chrono::milliseconds(500)), std::future_status::timeout);
   folder.file("go_on", "");
   another.get();
@@ -468,11 +469,11 @@ TEST(Records, OmitsPasswordOfKeywordsFromErrors) {
 /// Returns the first line of a text.
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-TEST(WriteRuns, WritesCsv) {
+TEST(ExportRunsToFile, WritesCsv) {
   const TemporaryFolder folder;
   const auto file = folder / "runs.csv";
-  write_runs(file, {make_sample_record(numbered_run_id(1), "a", 0.25),
-                    make_sample_record(numbered_run_id(2), "b", 1.5), with_all_texts()});
+  export_runs_to_file(file, {make_sample_record(numbered_run_id(1), "a", 0.25),
+                             make_sample_record(numbered_run_id(2), "b", 1.5), with_all_texts()});
   const std::string csv = TemporaryFolder::read_content(file);
   EXPECT_EQ(
       first_line(csv),
@@ -490,11 +491,12 @@ TEST(WriteRuns, WritesCsv) {
       "check_worst_mm,check_offset_mm,check_height_mm,check_residual_px");
   EXPECT_THAT(csv, HasSubstr("2026-11-21T13:45:01Z,2026-11-21T13:45:01Z,PASS"));
   EXPECT_THAT(csv, HasSubstr("; second"));
-  for (const RunField& field : run_fields()) {
+  for (const RunField& field : list_run_text_fields()) {
     const std::string text = std::string("the '") + field.name + "' of ";
     EXPECT_EQ(csv.find(text) != std::string::npos, field.in_csv) << field.name;
   }
-  EXPECT_THAT(rejection_message([&] { write_runs(folder / "runs.txt", {}); }), HasSubstr(".csv"));
+  EXPECT_THAT(rejection_message([&] { export_runs_to_file(folder / "runs.txt", {}); }),
+              HasSubstr(".csv"));
 }
 
 std::vector<std::string> list_keys(const nlohmann::ordered_json& json) {
@@ -503,11 +505,11 @@ std::vector<std::string> list_keys(const nlohmann::ordered_json& json) {
   return keys;
 }
 
-TEST(WriteRuns, WritesJson) {
+TEST(ExportRunsToFile, WritesJson) {
   const TemporaryFolder folder;
   const auto file = folder / "runs.json";
   const RunRecord all = with_all_texts();
-  write_runs(file, {make_sample_record(numbered_run_id(1), "a", 0.25), all});
+  export_runs_to_file(file, {make_sample_record(numbered_run_id(1), "a", 0.25), all});
   const auto runs = nlohmann::ordered_json::parse(TemporaryFolder::read_content(file));
   ASSERT_THAT(runs, SizeIs(2));
   EXPECT_THAT(list_keys(runs[0]),
@@ -528,20 +530,20 @@ TEST(WriteRuns, WritesJson) {
   EXPECT_TRUE(metrics["coverage"]["gate"].is_null());
   EXPECT_THAT(list_keys(runs[0]["images"][1]), ElementsAre("step", "image", "sha256", "refused"));
   EXPECT_EQ(runs[0]["images"][1]["refused"], "too dark");
-  for (const RunField& field : run_fields()) {
+  for (const RunField& field : list_run_text_fields()) {
     EXPECT_THAT(runs[1][field.name].get<std::string>(),
                 StartsWith(std::string("the '") + field.name + "' of "));
   }
 }
 
-TEST(WriteRuns, MatchesJsonSchemasOfRunsAndSpool) {
+TEST(ExportRunsToFile, MatchesJsonSchemasOfRunsAndSpool) {
   const TemporaryFolder folder;
   const auto file = folder / "runs.json";
   RunRecord golden = make_sample_record(numbered_run_id(2), "b", 1.5);
   golden.kind = "golden";
   RunRecord invalid = make_sample_record(numbered_run_id(3), "c", 1.5);
   invalid.verdict = to_string(Verdict::invalid);
-  write_runs(file, {make_sample_record(numbered_run_id(1), "a", 0.25), golden, invalid});
+  export_runs_to_file(file, {make_sample_record(numbered_run_id(1), "a", 0.25), golden, invalid});
   EXPECT_EQ(problems_by_schema("runs", {file}), "");
   std::vector<std::filesystem::path> waiting;
   for (const RunRecord& run :

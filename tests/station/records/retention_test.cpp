@@ -44,7 +44,7 @@ class RetentionTest : public testing::Test {
     record.camera = camera;
     record.verdict = "PASS";
     record.ended_utc = ended_utc;
-    records.keep(record);
+    records.store_run(record);
   }
   fs::path with_file(const std::string& name) const {
     fs::create_directories(folder / name / "check");
@@ -59,8 +59,8 @@ class RetentionTest : public testing::Test {
 TEST_F(RetentionTest, FindsExpiredFolders) {
   keep(kOld, "a.b", "2020-01-01T01:00:00Z");
   const std::string now = make_run_id(), resumed = "20200101T000000Z-fedcba9876543210";
-  keep(now, "a.b", now_utc());
-  keep(resumed, "c", now_utc());  // begun long ago, ended now
+  keep(now, "a.b", get_current_utc());
+  keep(resumed, "c", get_current_utc());  // begun long ago, ended now
   const fs::path images = with_file("captures/a.b." + kOld),
                  results = with_file("results/a.b/" + kOld);
   for (const std::string& left :
@@ -71,7 +71,7 @@ TEST_F(RetentionTest, FindsExpiredFolders) {
   }
   const fs::path without_record =
       with_file("captures/d." + kOld);  // the record is of another camera
-  const RetentionResult found = find_expired(config, records);
+  const RetentionResult found = find_expired_folders(config, records);
   ASSERT_THAT(found.expired, SizeIs(2));
   EXPECT_EQ(found.expired[0].folder, images);
   EXPECT_STREQ(found.expired[0].what, kImagesDeleted);
@@ -80,7 +80,7 @@ TEST_F(RetentionTest, FindsExpiredFolders) {
   EXPECT_STREQ(found.expired[1].what, kResultsDeleted);
   EXPECT_THAT(found.without_record, ElementsAre(without_record));
   config.keep = {std::nullopt, 30'000};
-  EXPECT_THAT(find_expired(config, records).expired, IsEmpty());
+  EXPECT_THAT(find_expired_folders(config, records).expired, IsEmpty());
 }
 
 /// Stations can share folders and records.
@@ -92,7 +92,7 @@ TEST_F(RetentionTest, IgnoresOtherStationsAndLinks) {
   with_file("results/a/" + other);
   fs::create_directory_symlink(with_file("elsewhere"), folder / "captures" / ("a." + kOld));
   fs::create_directory_symlink(folder / "nowhere", folder / "results" / "a" / kOld);
-  const RetentionResult found = find_expired(config, records);
+  const RetentionResult found = find_expired_folders(config, records);
   EXPECT_THAT(found.expired, IsEmpty());
   EXPECT_THAT(found.without_record, IsEmpty());
 }
@@ -101,20 +101,21 @@ TEST_F(RetentionTest, DeletesFolderWithoutFollowingLinks) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path images = with_file("captures/a." + kOld), elsewhere = with_file("elsewhere");
   fs::create_directory_symlink(elsewhere, images / "link");
-  const RetentionResult found = find_expired(config, records);
+  const RetentionResult found = find_expired_folders(config, records);
   ASSERT_THAT(found.expired, SizeIs(1));
   EXPECT_EQ(found.expired[0].bytes, 1000U);
   Spool spool(folder / "spool", (folder / "records.db").string());
-  delete_expired(found.expired[0], config, spool);
+  delete_expired_folder(found.expired[0], config, spool);
   EXPECT_FALSE(fs::exists(images));
   EXPECT_TRUE(fs::exists(elsewhere / "check/0.png"));
-  spool.deliver();
+  spool.deliver_waiting_runs();
   const auto record = records.find(kOld);
   ASSERT_TRUE(record);
   ASSERT_THAT(record->events, SizeIs(1));
   EXPECT_EQ(record->events[0].what, kImagesDeleted);
   EXPECT_EQ(record->events[0].text, "kept 90 days, 0.0 MB");
-  EXPECT_THROW(delete_expired(found.expired[0], config, spool), InputError) << "it is not there";
+  EXPECT_THROW(delete_expired_folder(found.expired[0], config, spool), InputError)
+      << "it is not there";
 }
 
 /// The golden unit's calibration can be among the results of the run that measured it.
@@ -123,24 +124,24 @@ TEST_F(RetentionTest, KeepsFolderUsedByStation) {
   const fs::path results = with_file("results/a/" + kOld), images = with_file("captures/a." + kOld);
   config.inputs = {folder.file("station.yaml", ""),
                    folder.file("results/a/" + kOld + "/calibration.yaml", "")};
-  const RetentionResult found = find_expired(config, records);
+  const RetentionResult found = find_expired_folders(config, records);
   EXPECT_THAT(found.in_use, ElementsAre(results));
   ASSERT_THAT(found.expired, SizeIs(1));
   EXPECT_EQ(found.expired[0].folder, images);
   // Through a link, and by another name.
   fs::create_symlink(config.inputs[1], folder / "golden.yaml");
   config.inputs[1] = folder / "golden.yaml";
-  EXPECT_THAT(find_expired(config, records).in_use, ElementsAre(results));
+  EXPECT_THAT(find_expired_folders(config, records).in_use, ElementsAre(results));
   config.inputs = {};
   config.spool = images / "spool";
-  EXPECT_THAT(find_expired(config, records).in_use, ElementsAre(images));
+  EXPECT_THAT(find_expired_folders(config, records).in_use, ElementsAre(images));
 }
 
 TEST_F(RetentionTest, KeepsFolderUsedThroughLink) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path results = with_file("results/a/" + kOld);
   const auto expect_in_use = [&](const std::string& why) {
-    EXPECT_THAT(find_expired(config, records).in_use, ElementsAre(results)) << why;
+    EXPECT_THAT(find_expired_folders(config, records).in_use, ElementsAre(results)) << why;
   };
   fs::create_symlink(folder.file("elsewhere.yaml", ""), results / "golden.yaml");
   config.inputs = {results / "golden.yaml"};
@@ -152,7 +153,7 @@ TEST_F(RetentionTest, KeepsFolderUsedThroughLink) {
   config.inputs = {folder / "loop"};
   expect_in_use("cannot be followed");
   config.inputs = {folder / "elsewhere.yaml", folder / "none"};
-  ASSERT_THAT(find_expired(config, records).in_use, IsEmpty());
+  ASSERT_THAT(find_expired_folders(config, records).in_use, IsEmpty());
   const std::string script = "results/a/" + kOld + "/hook.py";
   config.hook = Hook{{"python3", script, std::string(5000, 'x')}, folder / ""};
   folder.file(script, "");
@@ -163,25 +164,27 @@ TEST_F(RetentionTest, DeletesNothingIfCameraFolderBecameLink) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   with_file("results/a/" + kOld);
   const fs::path kept = with_file("elsewhere/" + kOld);
-  const RetentionResult found = find_expired(config, records);
+  const RetentionResult found = find_expired_folders(config, records);
   ASSERT_THAT(found.expired, SizeIs(1));
   fs::remove_all(folder / "results/a");
   fs::create_directory_symlink(folder / "elsewhere", folder / "results/a");
   Spool spool(folder / "spool", (folder / "records.db").string());
-  EXPECT_THAT(rejection_message([&] { delete_expired(found.expired[0], config, spool); }),
+  EXPECT_THAT(rejection_message([&] { delete_expired_folder(found.expired[0], config, spool); }),
               HasSubstr("results/a: is a symbolic link"));
   EXPECT_TRUE(fs::exists(kept / "check/0.png"));
 }
 
-TEST_F(RetentionTest, CheckClockThrowsForClockYearsAhead) {
-  const auto refusal = [&] { return rejection_message([&] { check_clock(config, records); }); };
+TEST_F(RetentionTest, CheckClockIsNotBehindThrowsForClockYearsAhead) {
+  const auto refusal = [&] {
+    return rejection_message([&] { check_clock_is_not_behind(config, records); });
+  };
   EXPECT_EQ(refusal(), "") << "no run";
   keep(kOld, "a", "2020-01-01T01:00:00Z");
-  keep(make_run_id(), "a", now_utc(), "another");
+  keep(make_run_id(), "a", get_current_utc(), "another");
   EXPECT_THAT(refusal(),
               HasSubstr("the newest run ended 2020-01-01T01:00:00Z, more than a year before"));
   // The first run by such a clock does not make it right.
-  const std::string today = now_utc();
+  const std::string today = get_current_utc();
   keep(make_run_id(), "a", today);
   EXPECT_THAT(refusal(), HasSubstr("the runs since " + today + " ended more than a year after"));
   keep(make_run_id(), "a", utc_days_ago(6));
@@ -190,17 +193,17 @@ TEST_F(RetentionTest, CheckClockThrowsForClockYearsAhead) {
   EXPECT_EQ(refusal(), "");
 }
 
-TEST_F(RetentionTest, CheckClockThrowsForClockBehindRun) {
+TEST_F(RetentionTest, CheckClockIsNotBehindThrowsForClockBehindRun) {
   keep(make_run_id(), "a", utc_days_ago(0));
-  EXPECT_EQ(rejection_message([&] { check_clock(config, records); }), "");
+  EXPECT_EQ(rejection_message([&] { check_clock_is_not_behind(config, records); }), "");
   const std::string run = make_run_id(), coming = utc_days_ago(-20 * 366);
   keep(run, "a", coming);
-  EXPECT_THAT(rejection_message([&] { check_clock(config, records); }),
+  EXPECT_THAT(rejection_message([&] { check_clock_is_not_behind(config, records); }),
               HasSubstr("the newest run ended " + coming + ", after the clock"));
   RunRecord voided_run = *records.find(run);
-  voided_run.events.push_back(make_event(kVoided, "wrong clock", "Ann"));
-  records.keep(voided_run);
-  EXPECT_EQ(rejection_message([&] { check_clock(config, records); }), "");
+  voided_run.events.push_back(make_run_event_now(kVoided, "wrong clock", "Ann"));
+  records.store_run(voided_run);
+  EXPECT_EQ(rejection_message([&] { check_clock_is_not_behind(config, records); }), "");
 }
 
 }  // namespace

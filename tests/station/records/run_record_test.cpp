@@ -9,28 +9,28 @@ namespace {
 
 using testing::SizeIs;
 
-TEST(LibraryVersions, ReturnsLibrariesThatAffectResults) {
+TEST(ListLibraryVersions, ReturnsLibrariesThatAffectResults) {
   for (const char* library : {"OpenCV ", "AprilTag ", "mrcal ", "Ceres ", "Eigen "}) {
-    EXPECT_THAT(library_versions(),
+    EXPECT_THAT(list_library_versions(),
                 testing::ContainsRegex(std::string(library) + "[0-9]+\\.[0-9]"));
   }
 }
 
 /// At the start of a second, two clocks can differ by a tick.
 TEST(SecondsSince, IsNotNegativeForNow) {
-  const std::string begin = now_utc();
+  const std::string begin = get_current_utc();
   while (seconds_since(begin) < 1) {
-    const std::string now = now_utc();
+    const std::string now = get_current_utc();
     ASSERT_GE(seconds_since(now), 0) << now;
   }
 }
 
 TEST(RunName, ContainsStartTime) {
-  EXPECT_EQ(begun_utc("20261121T134501Z-0123456789abcdef"), "2026-11-21T13:45:01Z");
-  EXPECT_EQ(begun_utc("run"), "");
+  EXPECT_EQ(start_utc_of_run_id("20261121T134501Z-0123456789abcdef"), "2026-11-21T13:45:01Z");
+  EXPECT_EQ(start_utc_of_run_id("run"), "");
   const std::string run = make_run_id();
   EXPECT_THAT(run, SizeIs(33));
-  EXPECT_LE(begun_utc(run), now_utc());
+  EXPECT_LE(start_utc_of_run_id(run), get_current_utc());
   EXPECT_NE(run, make_run_id());
   EXPECT_TRUE(is_run_id(run));
   for (const std::string& other : {std::string(), run + "0", "../../../" + run, "x" + run.substr(1),
@@ -39,14 +39,14 @@ TEST(RunName, ContainsStartTime) {
   }
 }
 
-TEST(PrintableRun, KeepsLineBreaksInCausesAndCalibrationOnly) {
+TEST(EscapeRunTexts, KeepsLineBreaksInCausesAndCalibrationOnly) {
   RunRecord run;
   run.operator_name = "J\xf6rg\n";
   run.causes = "first\nsecond\n";
   run.calibration = "camera:\n  id: 1\n";
   run.images = {{"boards", "a\n.png", "", "\x1b"}};
   run.events = {{"", "", "why\n", "who\n"}};
-  const RunRecord printed = printable_run(run);
+  const RunRecord printed = escape_run_texts(run);
   EXPECT_EQ(printed.operator_name, "J\\xf6rg\\x0a");
   EXPECT_EQ(printed.causes, run.causes);
   EXPECT_EQ(printed.calibration, run.calibration);
@@ -56,12 +56,12 @@ TEST(PrintableRun, KeepsLineBreaksInCausesAndCalibrationOnly) {
   EXPECT_EQ(printed.events[0].who, "who\\x0a");
 }
 
-TEST(ClockProblem, ReportsEndBeforeStart) {
+TEST(DescribeClockProblem, ReportsEndBeforeStart) {
   RunRecord run;
   run.begun_utc = run.ended_utc = "2026-11-21T13:45:01Z";
-  EXPECT_EQ(clock_problem(run), "");
+  EXPECT_EQ(describe_clock_problem(run), "");
   run.ended_utc = "2026-11-21T13:45:00Z";
-  EXPECT_EQ(clock_problem(run),
+  EXPECT_EQ(describe_clock_problem(run),
             "the clock went back: the run ended 2026-11-21T13:45:00Z, before it began "
             "2026-11-21T13:45:01Z: set the clock, and measure again");
 }

@@ -54,13 +54,13 @@ TEST(Spool, LimitsWaitForLockedFile) {
   }
   EXPECT_TRUE(fs::exists(locked));
   Spool spool(folder / "spool", where);
-  spool.keep(numbered_run(1));
-  EXPECT_LT(measure_seconds([&] { spool.deliver(); }), 15);
+  spool.store_run(numbered_run(1));
+  EXPECT_LT(measure_seconds([&] { spool.deliver_waiting_runs(); }), 15);
   EXPECT_THAT(spool.state(),
               AllOf(StartsWith("runs are queued in the spool, 1 waiting"), HasSubstr("locked")));
   folder.file("done", "");
   other.join();
-  Spool(folder / "spool", where).deliver();
+  Spool(folder / "spool", where).deliver_waiting_runs();
   EXPECT_THAT(whole_runs(where), SizeIs(1));
 }
 
@@ -81,18 +81,19 @@ TEST(Spool, KeepsRunsOnFullDisk) {
   const std::string where = (small / "records.db").string();
   {
     Spool spool(folder / "spool", where);
-    spool.prepare();
-    for (int i = 0; i < 40; ++i) spool.keep(numbered_run(i));
-    spool.deliver();
+    spool.check_storage();
+    for (int i = 0; i < 40; ++i) spool.store_run(numbered_run(i));
+    spool.deliver_waiting_runs();
     const std::size_t num_stored = whole_runs(where).size();
     EXPECT_LT(num_stored, 40u);
-    EXPECT_THAT(spool.waiting(), SizeIs(40 - num_stored));
+    EXPECT_THAT(spool.list_waiting_runs(), SizeIs(40 - num_stored));
     EXPECT_THAT(spool.state(), HasSubstr("full"));
     // Full records are readable.
-    EXPECT_EQ(spool.find_owner("digest-0-1", "b"), (ImageOwner{"camera-0", numbered_run(0).run}));
+    EXPECT_EQ(spool.find_other_camera_using_image("digest-0-1", "b"),
+              (ImageUser{"camera-0", numbered_run(0).run}));
   }
   ASSERT_EQ(::mount("none", small.c_str(), "tmpfs", MS_REMOUNT, "size=8m"), 0);
-  Spool(folder / "spool", where).deliver();
+  Spool(folder / "spool", where).deliver_waiting_runs();
   EXPECT_THAT(whole_runs(where), SizeIs(40));
 }
 
@@ -104,13 +105,13 @@ void kill_while_keeping(const TemporaryFolder& folder, const std::string& where,
   for (int i = 0; i < kills; ++i) {
     const pid_t child = start_child([&] {
       Spool spool(folder / "spool", where);
-      spool.prepare();
+      spool.check_storage();
       const int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
       for (int run = 1000 * i; run < 1000 * i + 1000; ++run) {
-        spool.keep(numbered_run(run));
+        spool.store_run(numbered_run(run));
         const std::string line = numbered_run(run).run + "\n";  // reported as kept
         if (::write(file, line.data(), line.size()) < 0) std::abort();
-        spool.deliver();
+        spool.deliver_waiting_runs();
       }
     });
     const int wait_us = static_cast<int>(1e6 * random.uniform(0, 0.25));
@@ -118,7 +119,7 @@ void kill_while_keeping(const TemporaryFolder& folder, const std::string& where,
     kill_child(child);
   }
   Spool spool(folder / "spool", where);
-  spool.prepare();
+  spool.check_storage();
   EXPECT_EQ(spool.state(), "");
   const auto runs = whole_runs(where);
   std::istringstream kept(TemporaryFolder::read_content(log));
@@ -143,9 +144,9 @@ TEST(Spool, DistinguishesRefusedFromUnreachableServer) {
   const auto state_with = [&](const std::string& password, const std::string& database, int run) {
     Spool spool(folder / "spool",
                 "postgresql://vlp:" + password + "@" + server.address() + "/" + database);
-    spool.prepare();
-    spool.keep(numbered_run(run));
-    spool.deliver();
+    spool.check_storage();
+    spool.store_run(numbered_run(run));
+    spool.deliver_waiting_runs();
     return spool.state();
   };
   const std::string refuses =
@@ -186,20 +187,21 @@ TEST(Spool, OmitsSqlFromNotice) {
   };
   // Its user has no right to the tables.
   Spool guest = open_spool("guest:guest", "guest");
-  guest.prepare();
-  EXPECT_EQ(guest.notice(),
+  guest.check_storage();
+  EXPECT_EQ(guest.make_operator_notice(),
             "records are offline (access refused); runs are kept, delivered automatically");
-  guest.keep(numbered_run(1));
-  guest.deliver();
-  EXPECT_EQ(guest.notice(),
+  guest.store_run(numbered_run(1));
+  guest.deliver_waiting_runs();
+  EXPECT_EQ(guest.make_operator_notice(),
             "records are offline (access refused); 1 run kept, delivered automatically");
   EXPECT_THAT(guest.state(), AllOf(HasSubstr("permission denied"), Not(HasSubstr("SELECT")),
                                    Not(HasSubstr("UPDATE")), Not(HasSubstr("while"))));
   server.stop();
   Spool offline = open_spool("vlp:right", "offline");
-  offline.prepare();
-  for (int run = 1; run <= 2; ++run) offline.keep(numbered_run(run));
-  EXPECT_EQ(offline.notice(), "records are offline; 2 runs kept, delivered automatically");
+  offline.check_storage();
+  for (int run = 1; run <= 2; ++run) offline.store_run(numbered_run(run));
+  EXPECT_EQ(offline.make_operator_notice(),
+            "records are offline; 2 runs kept, delivered automatically");
   EXPECT_THAT(offline.state(), HasSubstr("cannot be reached"));
 }
 
@@ -213,9 +215,9 @@ TEST(Spool, DeliversThroughTls) {
   const auto state_with = [&](const std::string& options) {
     Spool spool(folder / "spool",
                 "postgresql://vlp:right@localhost:" + server.port() + "/postgres?" + options);
-    spool.prepare();
-    spool.keep(numbered_run(++run));
-    spool.deliver();
+    spool.check_storage();
+    spool.store_run(numbered_run(++run));
+    spool.deliver_waiting_runs();
     return spool.state();
   };
   EXPECT_EQ(state_with("sslmode=require"), "");
@@ -254,16 +256,16 @@ TEST(Spool, KeepsRunsOfEightStationsOnOneServer) {
   for (int station = 0; station < stations; ++station) {
     children.push_back(start_child([&, station] {
       Spool spool = open_spool(station);
-      spool.prepare();  // one of them makes the tables
+      spool.check_storage();  // one of them makes the tables
       for (int i = 0; i < each; ++i) {
         RunRecord run = numbered_run(1000 * station + i);
         run.station = "station-" + std::to_string(station);
-        run.events = {make_event(kHookRequested, "label")};
-        spool.keep(run);
-        spool.deliver();
-        run.events.push_back(make_event(kHookDone, ""));
-        spool.keep(run);
-        spool.deliver();
+        run.events = {make_run_event_now(kHookRequested, "label")};
+        spool.store_run(run);
+        spool.deliver_waiting_runs();
+        run.events.push_back(make_run_event_now(kHookDone, ""));
+        spool.store_run(run);
+        spool.deliver_waiting_runs();
       }
     }));
   }
@@ -271,11 +273,11 @@ TEST(Spool, KeepsRunsOfEightStationsOnOneServer) {
   for (int station = 0; station < stations; ++station) {
     // No station waited longer than allowed, unless this machine is busy.
     Spool spool = open_spool(station);
-    std::cout << "station-" << station << ": " << spool.waiting().size() << " waited\n";
-    spool.deliver();
+    std::cout << "station-" << station << ": " << spool.list_waiting_runs().size() << " waited\n";
+    spool.deliver_waiting_runs();
     EXPECT_EQ(spool.state(), "");
   }
-  EXPECT_THAT(Records(server.uri()).list({.has_open_hook = true}), IsEmpty());
+  EXPECT_THAT(Records(server.uri()).list_runs({.has_open_hook = true}), IsEmpty());
   const auto count = static_cast<std::size_t>(stations * each);
   EXPECT_THAT(whole_runs(server.uri()), SizeIs(count));
   const TrailCheck trail = Records(server.uri()).check("");
@@ -294,68 +296,70 @@ TEST(Spool, KeepsRunsWhenServerStops) {
   kill_while_keeping(folder, where, 5);
   const std::size_t before = whole_runs(where).size();
   const auto deliver_to = [&](std::size_t count) {
-    Spool(spool()).deliver();
+    Spool(spool()).deliver_waiting_runs();
     EXPECT_THAT(whole_runs(where), SizeIs(before + count));
   };
 
   // Stopped before the record; new units begin.
   Spool running = spool();
-  running.prepare();
+  running.check_storage();
   server.stop();
-  running.keep(numbered_run(-1));
-  running.deliver();
+  running.store_run(numbered_run(-1));
+  running.deliver_waiting_runs();
   EXPECT_THAT(running.state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
                                      HasSubstr("server of the records cannot be reached")));
   Spool begun = spool();
-  begun.prepare();
-  begun.keep(numbered_run(-2));
-  begun.deliver();
+  begun.check_storage();
+  begun.store_run(numbered_run(-2));
+  begun.deliver_waiting_runs();
   EXPECT_THAT(begun.state(), StartsWith("runs are queued in the spool, 2 waiting: "));
   server.start();
   deliver_to(2);
 
   // Frozen, with and without a connection: programs wait once, and report it.
   Spool connected = spool();
-  connected.prepare();
+  connected.check_storage();
   EXPECT_EQ(connected.state(), "");
   server.freeze();
-  EXPECT_LT(
-      measure_seconds([&] { EXPECT_EQ(connected.find_owner("digest-1-1", "b"), ImageOwner{}); }),
-      8);
-  connected.keep(numbered_run(-3));
-  EXPECT_LT(measure_seconds([&] { connected.deliver(); }), 1);
+  EXPECT_LT(measure_seconds([&] {
+              EXPECT_EQ(connected.find_other_camera_using_image("digest-1-1", "b"), ImageUser{});
+            }),
+            8);
+  connected.store_run(numbered_run(-3));
+  EXPECT_LT(measure_seconds([&] { connected.deliver_waiting_runs(); }), 1);
   EXPECT_FALSE(connected.find("another"));
   EXPECT_THAT(connected.last_offline_reason(), HasSubstr("has not answered for 2 s"));
   EXPECT_THAT(connected.state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
                                        HasSubstr("has not answered for 2 s")));
   Spool fresh = spool();
-  EXPECT_LT(measure_seconds([&] { fresh.prepare(); }), 8);
+  EXPECT_LT(measure_seconds([&] { fresh.check_storage(); }), 8);
   EXPECT_THAT(fresh.state(), StartsWith("runs are queued in the spool, 1 waiting: "));
   server.thaw();
   deliver_to(3);
   // Once, even if several programs wait.
   Spool several = spool();
-  several.prepare();
+  several.check_storage();
   server.freeze();
-  for (int i = 4; i < 10; ++i) several.keep(numbered_run(-i));
-  EXPECT_LT(measure_seconds([&] { several.deliver(); }), 5);
+  for (int i = 4; i < 10; ++i) several.store_run(numbered_run(-i));
+  EXPECT_LT(measure_seconds([&] { several.deliver_waiting_runs(); }), 5);
   EXPECT_THAT(several.state(), AllOf(StartsWith("runs are queued in the spool, 6 waiting: "),
                                      HasSubstr("has not answered for 2 s")));
   server.thaw();
   deliver_to(9);
 
   // Killed in the middle of many.
-  for (int i = 0; i < 200; ++i) fresh.keep(numbered_run(1'000'000 + i));
+  for (int i = 0; i < 200; ++i) fresh.store_run(numbered_run(1'000'000 + i));
   std::thread power([&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(150));
     server.stop();
   });
-  Spool(spool()).deliver();
+  Spool(spool()).deliver_waiting_runs();
   power.join();
-  const std::size_t waiting = fresh.waiting().size();
+  const std::size_t waiting = fresh.list_waiting_runs().size();
   server.start();
   EXPECT_GT(waiting, 0u) << "the server was stopped too late for this machine";
-  for (int i = 0; i < 5 && !fresh.waiting().empty(); ++i) Spool(spool()).deliver();
+  for (int i = 0; i < 5 && !fresh.list_waiting_runs().empty(); ++i)
+    Spool(spool()).deliver_waiting_runs();
   EXPECT_THAT(whole_runs(where), SizeIs(before + 209));
 }
 

@@ -38,16 +38,16 @@ using testing::Not;
 using testing::SizeIs;
 using testing::StartsWith;
 
-TEST(ReadRun, ReturnsWrittenRun) {
+TEST(ReadSpooledRun, ReturnsWrittenRun) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
-  for (const RunField& field : run_fields()) run.*field.text += "\"\\ \xc3\xbc{}";
+  for (const RunField& field : list_run_text_fields()) run.*field.text += "\"\\ \xc3\xbc{}";
   for (std::string* lines : {&run.causes, &run.calibration}) lines->append("\n\tof lines\n");
   run.images[1].refused = "too dark";
   const auto [read, records] =
-      read_run(folder.file("run.json", serialize_run({run, "records.db"})));
+      read_spooled_run(folder.file("run.json", serialize_run({run, "records.db"})));
   EXPECT_EQ(records, "records.db");
-  for (const RunField& field : run_fields()) EXPECT_EQ(read.*field.text, run.*field.text);
+  for (const RunField& field : list_run_text_fields()) EXPECT_EQ(read.*field.text, run.*field.text);
   ASSERT_THAT(read.metrics, SizeIs(run.metrics.size()));
   for (std::size_t i = 0; i < run.metrics.size(); ++i) {
     EXPECT_EQ(read.metrics[i].name, run.metrics[i].name);
@@ -65,43 +65,44 @@ TEST(ReadRun, ReturnsWrittenRun) {
   EXPECT_EQ(read.images[29].sha256, run.images[29].sha256);
 }
 
-TEST(ReadRun, ReturnsPresentNamesOfMetrics) {
+TEST(ReadSpooledRun, ReturnsPresentNamesOfMetrics) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
   run.metrics = {{"check_lamps", "", 1, 0.95, Direction::at_least}};
-  const auto read = read_run(folder.file("run.json", serialize_run({run, "records.db"})));
+  const auto read = read_spooled_run(folder.file("run.json", serialize_run({run, "records.db"})));
   ASSERT_THAT(read.run.metrics, SizeIs(1));
   EXPECT_EQ(read.run.metrics[0].name, "check_lamp_inlier_fraction");
 }
 
-TEST(ReadRun, AcceptsNamesThatAreInvalidText) {
+TEST(ReadSpooledRun, AcceptsNamesThatAreInvalidText) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
   run.images[0].name = "\xff\x1b[31m.png";
-  EXPECT_EQ(
-      read_run(folder.file("run.json", serialize_run({run, "records.db"}))).run.images[0].name,
-      "\\xff\\x1b[31m.png");
+  EXPECT_EQ(read_spooled_run(folder.file("run.json", serialize_run({run, "records.db"})))
+                .run.images[0]
+                .name,
+            "\\xff\\x1b[31m.png");
 }
 
-TEST(ReadRun, ThrowsWithFileForInvalidRun) {
+TEST(ReadSpooledRun, ThrowsWithFileForInvalidRun) {
   const TemporaryFolder folder;
   const std::string text = serialize_run({numbered_run(1), "records.db"});
   for (const std::string& bad :
        {std::string("{}\n"), std::string("[]\n"), text.substr(0, text.size() / 2) + "\n",
         std::string(text).replace(text.find("vlp-run/1"), 9, "vlp-run/2"),
         std::string(text).replace(text.find("\"figures\""), 9, "\"figurer\"")}) {
-    EXPECT_THAT(rejection_message([&] { read_run(folder.file("bad.json", bad)); }),
+    EXPECT_THAT(rejection_message([&] { read_spooled_run(folder.file("bad.json", bad)); }),
                 HasSubstr("bad.json: is no run of a station"));
   }
 }
 
-TEST(ReadRun, RejectsIdsOfOtherFolders) {
+TEST(ReadSpooledRun, RejectsIdsOfOtherFolders) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
   run.camera = "../..";
   const auto refusal = [&] {
     return rejection_message([&] {
-      read_run(folder.file("bad.json", serialize_run({run, "records.db"})));
+      read_spooled_run(folder.file("bad.json", serialize_run({run, "records.db"})));
     });
   };
   EXPECT_THAT(refusal(), HasSubstr("its run or camera is no id"));
@@ -113,70 +114,70 @@ TEST(ReadRun, RejectsIdsOfOtherFolders) {
   EXPECT_THAT(refusal(), HasSubstr("an event is no id"));
 }
 
-TEST(ReadRun, RejectsSpecialFilesAndDeepNesting) {
+TEST(ReadSpooledRun, RejectsSpecialFilesAndDeepNesting) {
   const TemporaryFolder folder;
   ASSERT_EQ(::mkfifo((folder / "pipe.json").c_str(), 0600), 0);
-  EXPECT_THAT(rejection_message([&] { read_run(folder / "pipe.json"); }),
+  EXPECT_THAT(rejection_message([&] { read_spooled_run(folder / "pipe.json"); }),
               HasSubstr("pipe.json: is no regular file"));
   std::filesystem::create_symlink("/dev/zero", folder / "link.json");
-  EXPECT_THAT(rejection_message([&] { read_run(folder / "link.json"); }),
+  EXPECT_THAT(rejection_message([&] { read_spooled_run(folder / "link.json"); }),
               HasSubstr("link.json: is a symbolic link"));
-  EXPECT_THAT(
-      rejection_message([&] { read_run(folder.file("deep.json", std::string(1'000'000, '['))); }),
-      HasSubstr("it has more than 16 levels"));
+  EXPECT_THAT(rejection_message(
+                  [&] { read_spooled_run(folder.file("deep.json", std::string(1'000'000, '['))); }),
+              HasSubstr("it has more than 16 levels"));
 }
 
 TEST(Spool, KeepsRunsUntilRecordsAreOnline) {
   const TemporaryFolder folder;
   const std::string where = (folder / "away/records.db").string();
   Spool spool(folder / "spool", where);
-  spool.prepare();
+  spool.check_storage();
   EXPECT_THAT(spool.state(),
               AllOf(StartsWith("runs are queued in the spool: "), HasSubstr("records.db")));
-  for (int i = 0; i < 3; ++i) spool.keep(numbered_run(i));
-  spool.deliver();
+  for (int i = 0; i < 3; ++i) spool.store_run(numbered_run(i));
+  spool.deliver_waiting_runs();
   EXPECT_THAT(spool.state(), AllOf(StartsWith("runs are queued in the spool, 3 waiting: "),
                                    HasSubstr("records.db")));
   EXPECT_EQ(spool.find(numbered_run(1).run)->camera, "camera-1");
   EXPECT_FALSE(spool.find("another"));
   // Checks continue with the locally known runs.
-  EXPECT_EQ(spool.find_owner("digest-2-7", "camera-1"),
-            (ImageOwner{"camera-2", numbered_run(2).run}));
-  EXPECT_EQ(spool.find_owner("digest-2-7", "camera-2"), ImageOwner{});
+  EXPECT_EQ(spool.find_other_camera_using_image("digest-2-7", "camera-1"),
+            (ImageUser{"camera-2", numbered_run(2).run}));
+  EXPECT_EQ(spool.find_other_camera_using_image("digest-2-7", "camera-2"), ImageUser{});
   EXPECT_THAT(spool.state(), HasSubstr("; 1 images were not looked up in the records"));
 
   fs::create_directory(folder / "away");
   Spool later(folder / "spool", where);
-  later.prepare();
+  later.check_storage();
   EXPECT_EQ(later.state(), "");
-  EXPECT_THAT(later.waiting(), IsEmpty());
+  EXPECT_THAT(later.list_waiting_runs(), IsEmpty());
   EXPECT_THAT(whole_runs(where), SizeIs(3));
   EXPECT_EQ(Records(where).find(numbered_run(1).run)->metrics[0].value, 0.1 + 0.2);
-  EXPECT_EQ(later.find_owner("digest-2-7", "camera-1"),
-            (ImageOwner{"camera-2", numbered_run(2).run}));
+  EXPECT_EQ(later.find_other_camera_using_image("digest-2-7", "camera-1"),
+            (ImageUser{"camera-2", numbered_run(2).run}));
   // A voided run owns no image, also while its event waits.
   RunRecord voided_run = numbered_run(2);
-  voided_run.events = {make_event(kVoided, "wrong serial", "Ann")};
-  later.keep(voided_run);
-  EXPECT_EQ(later.find_owner("digest-2-7", "camera-1"), ImageOwner{});
-  later.deliver();
-  EXPECT_EQ(later.find_owner("digest-2-7", "camera-1"), ImageOwner{});
+  voided_run.events = {make_run_event_now(kVoided, "wrong serial", "Ann")};
+  later.store_run(voided_run);
+  EXPECT_EQ(later.find_other_camera_using_image("digest-2-7", "camera-1"), ImageUser{});
+  later.deliver_waiting_runs();
+  EXPECT_EQ(later.find_other_camera_using_image("digest-2-7", "camera-1"), ImageUser{});
 }
 
 TEST(Spool, FindsGoldenRunOfImage) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.prepare();
+  spool.check_storage();
   RunRecord golden = numbered_run(1), invalid = numbered_run(2);
   golden.kind = invalid.kind = "golden";
   invalid.verdict = "INVALID";
-  for (const RunRecord& run : {numbered_run(0), golden, invalid}) spool.keep(run);
+  for (const RunRecord& run : {numbered_run(0), golden, invalid}) spool.store_run(run);
   for (const std::string state : {"here", "in the records"}) {
-    EXPECT_EQ(spool.find_golden_run("digest-1-7"), golden.run) << state;
-    EXPECT_EQ(spool.find_golden_run("digest-0-7"), "") << "of a unit, " << state;
-    EXPECT_EQ(spool.find_golden_run("digest-2-7"), "") << "not judged, " << state;
-    spool.deliver();
+    EXPECT_EQ(spool.find_golden_run_using_image("digest-1-7"), golden.run) << state;
+    EXPECT_EQ(spool.find_golden_run_using_image("digest-0-7"), "") << "of a unit, " << state;
+    EXPECT_EQ(spool.find_golden_run_using_image("digest-2-7"), "") << "not judged, " << state;
+    spool.deliver_waiting_runs();
   }
   EXPECT_TRUE(fs::is_empty(folder / "spool"));
 }
@@ -186,14 +187,14 @@ TEST(Spool, FindsRunThatUsedAllImages) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.prepare();
+  spool.check_storage();
   const RunRecord earlier = numbered_run(1);
-  ASSERT_FALSE(earlier.invalid());
+  ASSERT_FALSE(earlier.is_invalid());
   RunRecord again = earlier;
   again.run = numbered_run(2).run;
   for (const std::string state : {"here", "in the records"}) {
-    spool.keep(earlier);
-    if (state != "here") spool.deliver();
+    spool.store_run(earlier);
+    if (state != "here") spool.deliver_waiting_runs();
     EXPECT_EQ(spool.find_repeated_run(again), earlier.run) << state;
     EXPECT_EQ(spool.find_repeated_run(earlier), "") << "itself, " << state;
     RunRecord fewer = again, other = again, camera = again, none = again;
@@ -210,15 +211,15 @@ TEST(Spool, FindsRunThatUsedAllImages) {
   }
   // Images of a run that did not count can be used again.
   RunRecord voided_run = earlier;
-  voided_run.events = {make_event(kVoided, "wrong lamps", "Ann")};
-  spool.keep(voided_run);
+  voided_run.events = {make_run_event_now(kVoided, "wrong lamps", "Ann")};
+  spool.store_run(voided_run);
   EXPECT_EQ(spool.find_repeated_run(again), "");
   RunRecord invalid = numbered_run(3), invalid_again = numbered_run(3);
   invalid.set_verdict({{"no captures.csv"}});
   invalid_again.run = numbered_run(4).run;
-  spool.keep(invalid);
+  spool.store_run(invalid);
   EXPECT_EQ(spool.find_repeated_run(invalid_again), "");
-  spool.deliver();
+  spool.deliver_waiting_runs();
   EXPECT_EQ(spool.find_repeated_run(again), "");
   EXPECT_EQ(spool.find_repeated_run(invalid_again), "");
 }
@@ -229,25 +230,25 @@ TEST(Spool, KeepsEventsOfRun) {
   const std::string where = (folder / "away/records.db").string();
   Spool spool(folder / "spool", where);
   RunRecord run = numbered_run(1);
-  run.events = {make_event(kHookRequested, "label")};
-  spool.keep(run);
+  run.events = {make_run_event_now(kHookRequested, "label")};
+  spool.store_run(run);
   EXPECT_THAT(list_open_hooks(spool, "station-1"), testing::ElementsAre(run.run));
   EXPECT_THAT(list_open_hooks(spool, "another"), IsEmpty());
   const RunRecord before = run;
-  run.events.push_back(make_event(kHookFailed, "\"exit\" code 3"));
-  spool.keep(run);
-  run.events = {before.events[0], make_event(kHookDone, "")};
-  spool.keep(run);
+  run.events.push_back(make_run_event_now(kHookFailed, "\"exit\" code 3"));
+  spool.store_run(run);
+  run.events = {before.events[0], make_run_event_now(kHookDone, "")};
+  spool.store_run(run);
   EXPECT_THAT(list_open_hooks(spool, "station-1"), IsEmpty());
-  spool.deliver();
+  spool.deliver_waiting_runs();
   EXPECT_THAT(spool.state(), StartsWith("runs are queued in the spool, 1 waiting"));
-  ASSERT_THAT(spool.waiting(), SizeIs(1));
-  EXPECT_THAT(spool.waiting()[0].events, SizeIs(3));
+  ASSERT_THAT(spool.list_waiting_runs(), SizeIs(1));
+  EXPECT_THAT(spool.list_waiting_runs()[0].events, SizeIs(3));
   EXPECT_THAT(spool.find(run.run)->events, SizeIs(3));
 
   fs::create_directory(folder / "away");
   Spool later(folder / "spool", where);
-  later.prepare();
+  later.check_storage();
   EXPECT_EQ(later.state(), "");
   EXPECT_TRUE(fs::is_empty(folder / "spool"));
   EXPECT_THAT(whole_runs(where), SizeIs(1));
@@ -261,17 +262,17 @@ TEST(Spool, DeliversDespiteInvalidFiles) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.prepare();
-  spool.keep(numbered_run(1));
+  spool.check_storage();
+  spool.store_run(numbered_run(1));
   folder.file("spool/0.json", "{}\n");
   folder.file("spool/.1.json.tmp-1-0", "{");
-  spool.deliver();
+  spool.deliver_waiting_runs();
   EXPECT_THAT(whole_runs(where), SizeIs(1));
   EXPECT_THAT(spool.state(), AllOf(HasSubstr("0.json: is no run"), Not(HasSubstr("waiting"))));
   fs::remove(where);  // offline
   Spool other(folder / "spool", where);
-  other.keep(numbered_run(2));
-  other.deliver();
+  other.store_run(numbered_run(2));
+  other.deliver_waiting_runs();
   EXPECT_THAT(other.state(),
               AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
                     HasSubstr("records.db"), HasSubstr("; "), HasSubstr("0.json: is no run")));
@@ -281,14 +282,15 @@ TEST(Spool, RetriesUnreadableFile) {
   const TemporaryFolder folder;
   const std::string where = (folder / "away/records.db").string();
   Spool spool(folder / "spool", where);
-  const std::string text = serialize_run({numbered_run(1), make_records_database_id(where)});
+  const std::string text = serialize_run({numbered_run(1), derive_database_identity(where)});
   fs::create_directory(folder / "spool");
   folder.file("spool/1.json", text.substr(0, text.size() / 2));
-  EXPECT_THAT(spool.waiting(), IsEmpty());
+  EXPECT_THAT(spool.list_waiting_runs(), IsEmpty());
   EXPECT_THAT(spool.state(), AllOf(HasSubstr("1.json"), Not(HasSubstr("waiting"))));
   folder.file("spool/1.json", text);
-  EXPECT_THAT(spool.waiting(), SizeIs(1));
-  EXPECT_EQ(spool.find_owner("digest-1-7", "b"), (ImageOwner{"camera-1", numbered_run(1).run}));
+  EXPECT_THAT(spool.list_waiting_runs(), SizeIs(1));
+  EXPECT_EQ(spool.find_other_camera_using_image("digest-1-7", "b"),
+            (ImageUser{"camera-1", numbered_run(1).run}));
   EXPECT_THAT(spool.state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting"),
                                    Not(HasSubstr("1.json"))));
 }
@@ -297,12 +299,13 @@ TEST(Spool, StoresRunsInRecordsIfFolderCannotBeWritten) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder.file("spool", ""), where);
-  EXPECT_THAT(rejection_message([&] { spool.prepare(); }), HasSubstr("spool: cannot be made"));
+  EXPECT_THAT(rejection_message([&] { spool.check_storage(); }),
+              HasSubstr("spool: cannot be made"));
   { const Records made(where); }
-  spool.keep(numbered_run(1));
+  spool.store_run(numbered_run(1));
   EXPECT_THAT(whole_runs(where), SizeIs(1));
   Spool neither(folder / "spool", (folder / "away/records.db").string());
-  EXPECT_THAT(rejection_message([&] { neither.keep(numbered_run(2)); }),
+  EXPECT_THAT(rejection_message([&] { neither.store_run(numbered_run(2)); }),
               AllOf(HasSubstr("spool: a run can be stored neither in the spool"),
                     HasSubstr("away/records.db")));
 }
@@ -312,18 +315,19 @@ TEST(Spool, DeliversRunsToTheirRecords) {
   const std::string a = (folder / "a.db").string(), b = (folder / "b.db").string();
   { const Records made_a(a), made_b(b); }
   Spool of_a(folder / "spool", a), of_b(folder / "spool", b);
-  of_a.keep(numbered_run(1));
-  of_b.prepare();
+  of_a.store_run(numbered_run(1));
+  of_b.check_storage();
   EXPECT_THAT(whole_runs(b), IsEmpty());
   EXPECT_THAT(of_b.state(), AllOf(StartsWith("1 queued for another database"), HasSubstr("a.db")));
-  EXPECT_THAT(of_b.waiting(), IsEmpty());
+  EXPECT_THAT(of_b.list_waiting_runs(), IsEmpty());
   EXPECT_TRUE(of_b.find(numbered_run(1).run)) << "a run is not judged twice for that";
-  EXPECT_EQ(of_b.find_owner("digest-1-7", "b"), (ImageOwner{"camera-1", numbered_run(1).run}));
-  of_b.keep(numbered_run(2));
-  of_b.deliver();
+  EXPECT_EQ(of_b.find_other_camera_using_image("digest-1-7", "b"),
+            (ImageUser{"camera-1", numbered_run(1).run}));
+  of_b.store_run(numbered_run(2));
+  of_b.deliver_waiting_runs();
   EXPECT_THAT(whole_runs(b), SizeIs(1));
   // The same records, by another name of the file.
-  Spool(folder / "spool", (folder / "spool/../a.db").string()).deliver();
+  Spool(folder / "spool", (folder / "spool/../a.db").string()).deliver_waiting_runs();
   EXPECT_EQ(whole_runs(a), std::set<std::string>{numbered_run(1).run});
   EXPECT_EQ(of_b.state(), "");
 }
@@ -351,13 +355,13 @@ TEST(Spool, DoesNotDeliverToOtherMachinesDatabase) {
   const std::string where = (folder / "records.db").string();
   { const Records made(where); }
   const bool permitted =
-      on_another_machine([&] { Spool(folder / "spool", where).keep(numbered_run(1)); });
+      on_another_machine([&] { Spool(folder / "spool", where).store_run(numbered_run(1)); });
   if (!permitted) GTEST_SKIP() << "a process cannot have a machine's name of its own here";
   Spool here(folder / "spool", where);
-  here.prepare();
+  here.check_storage();
   EXPECT_THAT(whole_runs(where), IsEmpty());
   EXPECT_EQ(here.state(), "1 queued for another database, such as another:" + where);
-  on_another_machine([&] { Spool(folder / "spool", where).deliver(); });
+  on_another_machine([&] { Spool(folder / "spool", where).deliver_waiting_runs(); });
   EXPECT_THAT(whole_runs(where), SizeIs(1));
   EXPECT_EQ(here.state(), "");
 }
@@ -366,17 +370,17 @@ TEST(Spool, KeepsSecondVerdictOfRun) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.prepare();
-  spool.keep(numbered_run(1));
-  spool.deliver();
-  spool.keep(numbered_run(1));  // the same, as after a kill before its file was removed
-  spool.deliver();
+  spool.check_storage();
+  spool.store_run(numbered_run(1));
+  spool.deliver_waiting_runs();
+  spool.store_run(numbered_run(1));  // the same, as after a kill before its file was removed
+  spool.deliver_waiting_runs();
   EXPECT_EQ(spool.state(), "");
   RunRecord again = numbered_run(1);
   again.ended_utc = "2026-11-21T14:50:01Z";
-  spool.keep(again);
-  spool.keep(numbered_run(2));
-  spool.deliver();
+  spool.store_run(again);
+  spool.store_run(numbered_run(2));
+  spool.deliver_waiting_runs();
   EXPECT_THAT(spool.state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
                                    HasSubstr("has another run " + again.run)));
   EXPECT_THAT(whole_runs(where), SizeIs(2));
@@ -388,13 +392,13 @@ TEST(Spool, CreatesDatabaseOnlyInPrepare) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.keep(numbered_run(1));
-  spool.deliver();
+  spool.store_run(numbered_run(1));
+  spool.deliver_waiting_runs();
   EXPECT_FALSE(spool.find("another"));
   EXPECT_THAT(spool.state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
                                    HasSubstr("records.db: there are no records")));
   EXPECT_FALSE(fs::exists(where));
-  Spool(folder / "spool", where).prepare();
+  Spool(folder / "spool", where).check_storage();
   EXPECT_THAT(whole_runs(where), SizeIs(1));
 }
 
@@ -407,20 +411,20 @@ TEST(Spool, KeepsRunsOfConcurrentPrograms) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.prepare();
-  for (int i = 0; i < 25; ++i) spool.keep(numbered_run(i));
+  spool.check_storage();
+  for (int i = 0; i < 25; ++i) spool.store_run(numbered_run(i));
   std::vector<pid_t> children;
   for (int program = 1; program <= 3; ++program) {
     children.push_back(start_child([&, program] {
       Spool own_spool(folder / "spool", where);
       for (int i = 0; i < 5; ++i) {
-        own_spool.keep(numbered_run(100 * program + i));
-        own_spool.deliver();
+        own_spool.store_run(numbered_run(100 * program + i));
+        own_spool.deliver_waiting_runs();
       }
     }));
   }
   EXPECT_TRUE(end_well(children));
-  spool.deliver();
+  spool.deliver_waiting_runs();
   EXPECT_EQ(spool.state(), "");
   EXPECT_THAT(whole_runs(where), SizeIs(40));
 }

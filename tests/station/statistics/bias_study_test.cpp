@@ -50,7 +50,7 @@ std::vector<ReferenceValue> linearity_example() {
 /// The regression of the manual and of SPC for Excel's worked example of it ("Linearity and Bias
 /// Study", its biases with the sample's standard deviation), to their printed digits.
 TEST(BiasStudy, MatchesLinearityOfAiagManual) {
-  const BiasStudy study = analyze_bias(linearity_example());
+  const BiasStudy study = analyze_bias_and_linearity(linearity_example());
   ASSERT_TRUE(study.linearity);
   const Linearity& line = *study.linearity;
   EXPECT_NEAR(line.slope.value, -0.131667, 5e-7);
@@ -98,16 +98,16 @@ TEST(BiasStudy, MatchesLinearityOfAiagManual) {
   EXPECT_NEAR(study.all.high, 0.0085, 1e-4);
   EXPECT_FALSE(study.all.is_significant());
   // Narrowest at the mean. At both ends 0 is outside the band, as in the manual's figure.
-  EXPECT_LT(line.band_at(6), line.band_at(2));
-  EXPECT_NEAR(line.band_at(2), line.band_at(10), 1e-12);
-  EXPECT_GT(line.bias_at(2), line.band_at(2));
-  EXPECT_LT(line.bias_at(10), -line.band_at(10));
+  EXPECT_LT(line.confidence_band_at(6), line.confidence_band_at(2));
+  EXPECT_NEAR(line.confidence_band_at(2), line.confidence_band_at(10), 1e-12);
+  EXPECT_GT(line.predict_bias_at(2), line.confidence_band_at(2));
+  EXPECT_LT(line.predict_bias_at(10), -line.confidence_band_at(10));
 }
 
 /// AIAG, Measurement Systems Analysis, 4th ed., the independent sample method: 15 readings of a
 /// part of 6.00.
 TEST(BiasStudy, MatchesBiasOfAiagManual) {
-  const BiasStudy study = analyze_bias(values_of_unit(
+  const BiasStudy study = analyze_bias_and_linearity(values_of_unit(
       "part", 6, {5.8, 5.7, 5.9, 5.9, 6.0, 6.1, 6.0, 6.1, 6.4, 6.3, 6.0, 6.1, 6.2, 5.6, 6.0}));
   ASSERT_THAT(study.units, SizeIs(1));
   const UnitBias& part = study.units[0];
@@ -139,11 +139,11 @@ TEST(BiasStudy, MatchesCertifiedLineOfNist) {
   for (std::size_t i = 0; i < reference.size(); ++i) {
     values.push_back({"unit", reference[i], measured[i]});
   }
-  EXPECT_THAT(rejection_message<std::invalid_argument>([&] { analyze_bias(values); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>([&] { analyze_bias_and_linearity(values); }),
               HasSubstr("unit unit has one run"));
   auto twice = values;
   twice.insert(twice.end(), values.begin(), values.end());
-  const BiasStudy study = analyze_bias(twice);
+  const BiasStudy study = analyze_bias_and_linearity(twice);
   // The same line for twice the values: errors are smaller by sqrt(2 (n - 2) / (2 n - 2)).
   const Linearity& line = study.linearity.value();
   constexpr double n = 36;
@@ -172,12 +172,15 @@ TEST(BiasStudy, IntervalsAndTestsHaveNominalRates) {
                         reference + 0.3 - 0.2 * reference + 0.1 * random.normal()});
       }
     }
-    const BiasStudy none = analyze_bias(without), with_bias = analyze_bias(with);
+    const BiasStudy none = analyze_bias_and_linearity(without),
+                    with_bias = analyze_bias_and_linearity(with);
     num_significant += none.all.is_significant() ? 1 : 0;
     sloped += none.linearity->slope.is_significant() ? 1 : 0;
     held += with_bias.linearity->slope.low < -0.2 && with_bias.linearity->slope.high > -0.2 ? 1 : 0;
-    in_band +=
-        std::abs(with_bias.linearity->bias_at(3) + 0.3) < with_bias.linearity->band_at(3) ? 1 : 0;
+    in_band += std::abs(with_bias.linearity->predict_bias_at(3) + 0.3) <
+                       with_bias.linearity->confidence_band_at(3)
+                   ? 1
+                   : 0;
   }
   // Standard error of each fraction: 0.5 %.
   EXPECT_NEAR(double(num_significant) / studies, 0.05, 0.02);
@@ -187,36 +190,37 @@ TEST(BiasStudy, IntervalsAndTestsHaveNominalRates) {
 }
 
 TEST(BiasStudy, ReturnsZeroPForValuesWithoutScatter) {
-  const BiasStudy study = analyze_bias(values_of_unit("a", 1, {1.5, 1.5, 1.5}));
+  const BiasStudy study = analyze_bias_and_linearity(values_of_unit("a", 1, {1.5, 1.5, 1.5}));
   EXPECT_EQ(study.all.p, 0);
   EXPECT_EQ(study.all.t, std::numeric_limits<double>::infinity());
   EXPECT_EQ(study.all.low, 0.5);
   EXPECT_TRUE(study.all.is_significant());
   // Ten times 0.9 does not add up to 9.
-  const BiasStudy none = analyze_bias(values_of_unit("a", 0.9, std::vector<double>(10, 0.9)));
+  const BiasStudy none =
+      analyze_bias_and_linearity(values_of_unit("a", 0.9, std::vector<double>(10, 0.9)));
   EXPECT_EQ(none.units[0].bias.value, 0);
   EXPECT_EQ(none.units[0].bias.p, 1);
   EXPECT_EQ(none.all.p, 1);
 }
 
 TEST(BiasStudy, ThrowsForMissingValues) {
-  EXPECT_THAT(rejection_message<std::invalid_argument>([] { analyze_bias({}); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>([] { analyze_bias_and_linearity({}); }),
               HasSubstr("needs runs of reference units"));
   EXPECT_THAT(rejection_message<std::invalid_argument>([] {
-                analyze_bias({{"a", 1, 1}, {"a", 1, 2}, {"b", 2, 2}});
+                analyze_bias_and_linearity({{"a", 1, 1}, {"a", 1, 2}, {"b", 2, 2}});
               }),
               HasSubstr("unit b has one run: a bias study needs two or more of each"));
 }
 
-TEST(DrawBias, WritesPlot) {
+TEST(WriteBiasPlot, WritesPlot) {
   const TemporaryFolder folder;
   const auto values = linearity_example();
-  draw_bias(folder / "bias.svg", "tilt_deg", values, analyze_bias(values));
+  write_bias_plot(folder / "bias.svg", "tilt_deg", values, analyze_bias_and_linearity(values));
   EXPECT_THAT(TemporaryFolder::read_content(folder / "bias.svg"),
               AllOf(HasSubstr("<svg"), HasSubstr("95 % band"), HasSubstr("no bias"),
                     HasSubstr("tilt_deg, measured - reference")));
   const auto one = values_of_unit("a", 1, {1.5, 1.4});
-  draw_bias(folder / "one.svg", "tilt_deg", one, analyze_bias(one));
+  write_bias_plot(folder / "one.svg", "tilt_deg", one, analyze_bias_and_linearity(one));
   EXPECT_THAT(TemporaryFolder::read_content(folder / "one.svg"), testing::Not(HasSubstr("band")));
 }
 

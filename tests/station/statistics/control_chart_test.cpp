@@ -27,7 +27,7 @@ std::vector<std::size_t> find_indices(const std::vector<ChartAlarm>& alarms) {
 }
 
 bool matches(const std::string& name, const std::vector<double>& sigmas) {
-  for (const ChartRule& rule : chart_rules()) {
+  for (const ChartRule& rule : list_control_chart_rules()) {
     if (rule.name == name) return rule.matches(sigmas);
   }
   ADD_FAILURE() << "no rule " << name;
@@ -66,7 +66,7 @@ TEST(ControlChart, MatchesPublishedIndividualsChart) {
   EXPECT_NEAR(chart.sigma * 1.128, 1.8778, printed);
   EXPECT_NEAR(chart.upper, 55.8041, printed);
   EXPECT_NEAR(chart.lower, 45.8159, printed);
-  EXPECT_THAT(find_alarms(flow, {"western-electric-1"}), IsEmpty());
+  EXPECT_THAT(find_control_chart_alarms(flow, {"western-electric-1"}), IsEmpty());
 }
 
 /// NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.4.
@@ -90,7 +90,7 @@ struct RuleCase {
   std::vector<double> matches, fails;
 };
 
-TEST(ChartRules, DetectPatternsUpToLastValue) {
+TEST(ListControlChartRules, DetectPatternsUpToLastValue) {
   const std::vector<double> up{-0.4, -0.2, 0, 0.1, 0.2, 0.3};
   const std::vector<RuleCase> cases{
       {"western-electric-1", {3.01}, {3}},
@@ -124,14 +124,14 @@ TEST(ChartRules, DetectPatternsUpToLastValue) {
 
 /// Mean values until the first false alarm, of known mean and sigma: Champ and Woodall 1987,
 /// Technometrics 29, 393-399, table 1.
-TEST(ChartRules, MatchPublishedRunLengths) {
+TEST(ListControlChartRules, MatchPublishedRunLengths) {
   const std::vector<std::pair<std::string, double>> published{
       {"1", 370.40}, {"12", 225.44}, {"13", 166.05}, {"14", 152.73}, {"1234", 91.75}};
   Random random(5);
   for (const auto& [numbers, expected] : published) {
     std::vector<ChartRule> rules;
     for (const char number : numbers) {
-      rules.push_back(chart_rules()[static_cast<std::size_t>(number - '1')]);
+      rules.push_back(list_control_chart_rules()[static_cast<std::size_t>(number - '1')]);
     }
     constexpr int trials = 3000;
     double total = 0;
@@ -152,18 +152,19 @@ TEST(ChartAlarms, ReportsValueOutsideLimits) {
   std::vector<double> values;
   for (int i = 0; i < 20; ++i) values.push_back(i % 2 == 0 ? 1.0 : 1.1);
   values[13] = 3;
-  EXPECT_THAT(find_indices(find_alarms(values, {"western-electric-1"})), ElementsAre(13));
-  EXPECT_THAT(find_indices(find_alarms(values, {"nelson-1"})), ElementsAre(13));
+  EXPECT_THAT(find_indices(find_control_chart_alarms(values, {"western-electric-1"})),
+              ElementsAre(13));
+  EXPECT_THAT(find_indices(find_control_chart_alarms(values, {"nelson-1"})), ElementsAre(13));
 }
 
 TEST(ChartAlarms, ReportsDriftInsideLimits) {
   std::vector<double> values;
   for (int i = 0; i < 24; ++i) values.push_back((i % 2 == 0 ? 1.0 : 1.1) + (i < 12 ? 0 : 0.3));
-  EXPECT_THAT(find_alarms(values, {"western-electric-1"}), IsEmpty());
+  EXPECT_THAT(find_control_chart_alarms(values, {"western-electric-1"}), IsEmpty());
   // From the eighth on, the first twelve values are also eight in a row below the mean.
-  EXPECT_THAT(find_indices(find_alarms(values, {"western-electric-4"})),
+  EXPECT_THAT(find_indices(find_control_chart_alarms(values, {"western-electric-4"})),
               ElementsAre(7, 8, 9, 10, 11, 19, 20, 21, 22, 23));
-  const auto by_average = find_alarms(values, {"ewma"});
+  const auto by_average = find_control_chart_alarms(values, {"ewma"});
   ASSERT_FALSE(by_average.empty());
   EXPECT_EQ(by_average.back().index, 23u);
 }
@@ -171,11 +172,13 @@ TEST(ChartAlarms, ReportsDriftInsideLimits) {
 TEST(ChartAlarms, AppliesAllRulesOfSet) {
   const std::vector<double> values{0, 0.1, 0, 0.1, 0, 0.1, 0, 0.1, 5};
   std::vector<std::string> names;
-  for (const ChartAlarm& alarm : find_alarms(values, {"western-electric", "nelson-1", "ewma"})) {
+  for (const ChartAlarm& alarm :
+       find_control_chart_alarms(values, {"western-electric", "nelson-1", "ewma"})) {
     if (alarm.index == 8) names.push_back(alarm.rule);
   }
   EXPECT_THAT(names, ElementsAre("western-electric-1", "nelson-1", "ewma"));
-  EXPECT_THAT(rejection_message<std::invalid_argument>([&] { find_alarms(values, {"western"}); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>(
+                  [&] { find_control_chart_alarms(values, {"western"}); }),
               HasSubstr("there is no rule western; the rules are western-electric-1 to -4"));
 }
 
@@ -183,7 +186,8 @@ TEST(ChartAlarms, ReturnsNoneForEqualValues) {
   for (const double value : {1.0, 0.1, 0.3, 1e-7}) {
     const std::vector<double> values(20, value);  // more than any rule uses
     EXPECT_EQ(compute_control_chart(values).mean, value);
-    EXPECT_THAT(find_alarms(values, {"western-electric", "nelson", "ewma"}), IsEmpty());
+    EXPECT_THAT(find_control_chart_alarms(values, {"western-electric", "nelson", "ewma"}),
+                IsEmpty());
   }
 }
 
@@ -193,10 +197,10 @@ TEST(ChartAlarms, CountsValueAtMeanOnNeitherSide) {
   values.push_back(1);
   values.insert(values.end(), 7, 1.5);
   EXPECT_EQ(compute_control_chart(values).mean, 1);
-  EXPECT_THAT(find_alarms(values, {"western-electric-4"}), IsEmpty());
+  EXPECT_THAT(find_control_chart_alarms(values, {"western-electric-4"}), IsEmpty());
 }
 
-TEST(DrawTrend, WritesPlot) {
+TEST(WriteTrendPlot, WritesPlot) {
   const TemporaryFolder folder;
   std::vector<TrendPoint> points;
   std::vector<double> values;
@@ -205,10 +209,10 @@ TEST(DrawTrend, WritesPlot) {
     points.push_back({"run", "station", "camera", "PASS", "2026-11-21T13:45:01Z", values.back()});
   }
   const std::vector<ChartAlarm> alarms{{"nelson-1", "far", 5}};
-  draw_trend(folder / "trend.svg", "rms_px", points, alarms, 4.0);
+  write_trend_plot(folder / "trend.svg", "rms_px", points, alarms, 4.0);
   const std::string svg = TemporaryFolder::read_content(folder / "trend.svg");
   EXPECT_THAT(svg, testing::AllOf(HasSubstr("alarms"), HasSubstr("gate"), HasSubstr("rms_px")));
-  draw_trend(folder / "plain.svg", "rms_px", points, {}, std::nullopt);
+  write_trend_plot(folder / "plain.svg", "rms_px", points, {}, std::nullopt);
   EXPECT_THAT(TemporaryFolder::read_content(folder / "plain.svg"),
               testing::Not(testing::AnyOf(HasSubstr("alarms"), HasSubstr("gate"))));
 }

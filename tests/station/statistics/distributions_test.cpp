@@ -10,7 +10,7 @@ namespace vlp {
 namespace {
 
 /// The table of NIST/SEMATECH e-Handbook of Statistical Methods, 1.3.6.7.4.
-TEST(ChiSquareQuantile, MatchesPublishedTables) {
+TEST(ComputeChiSquareQuantile, MatchesPublishedTables) {
   constexpr double printed = 5e-4;
   EXPECT_NEAR(chi_square_quantile(0.95, 1), 3.841, printed);
   EXPECT_NEAR(chi_square_quantile(0.95, 10), 18.307, printed);
@@ -20,7 +20,7 @@ TEST(ChiSquareQuantile, MatchesPublishedTables) {
 }
 
 /// Values of SciPy 1.10, computed by Cephes and Boost.
-TEST(ChiSquareQuantile, MatchesOtherImplementation) {
+TEST(ComputeChiSquareQuantile, MatchesOtherImplementation) {
   const auto expect = [](double probability, double dof, double quantile) {
     EXPECT_NEAR(chi_square_quantile(probability, dof) / quantile, 1, 1e-11);
   };
@@ -33,7 +33,7 @@ TEST(ChiSquareQuantile, MatchesOtherImplementation) {
 }
 
 /// With two degrees of freedom P(X <= x) is 1 - exp(-x / 2).
-TEST(ChiSquareQuantile, MatchesClosedFormForTwoDegreesOfFreedom) {
+TEST(ComputeChiSquareQuantile, MatchesClosedFormForTwoDegreesOfFreedom) {
   for (const double probability : {1e-3, 0.5, 0.975, 0.999999}) {
     EXPECT_NEAR(chi_square_quantile(probability, 2), -2 * std::log1p(-probability), 1e-13);
   }
@@ -55,12 +55,12 @@ TEST(FUpperTail, MatchesOtherImplementation) {
 /// freedom AIAG's MSA, 4th ed.
 TEST(TQuantile, MatchesPublishedTables) {
   constexpr double printed = 5e-4;
-  EXPECT_NEAR(t_quantile(0.05, 1), 12.706, printed);
-  EXPECT_NEAR(t_quantile(0.05, 10), 2.228, printed);
-  EXPECT_NEAR(t_quantile(0.01, 10), 3.169, printed);
-  EXPECT_NEAR(t_quantile(0.05, 14), 2.145, printed);
-  EXPECT_NEAR(t_quantile(0.05, 58), 2.00172, 5e-6);
-  EXPECT_NEAR(t_quantile(0.05, 100), 1.984, printed);
+  EXPECT_NEAR(compute_two_tailed_t_quantile(0.05, 1), 12.706, printed);
+  EXPECT_NEAR(compute_two_tailed_t_quantile(0.05, 10), 2.228, printed);
+  EXPECT_NEAR(compute_two_tailed_t_quantile(0.01, 10), 3.169, printed);
+  EXPECT_NEAR(compute_two_tailed_t_quantile(0.05, 14), 2.145, printed);
+  EXPECT_NEAR(compute_two_tailed_t_quantile(0.05, 58), 2.00172, 5e-6);
+  EXPECT_NEAR(compute_two_tailed_t_quantile(0.05, 100), 1.984, printed);
 }
 
 /// With one degree of freedom it is the Cauchy distribution.
@@ -69,7 +69,7 @@ TEST(TTwoTails, MatchesClosedForm) {
   for (const double t : {0.0, 1e-3, 0.5, -2.0, 40.0}) {
     EXPECT_NEAR(compute_two_tailed_p(t, 1), 1 - 2 / pi * std::atan(std::abs(t)), 1e-13);
   }
-  EXPECT_NEAR(compute_two_tailed_p(t_quantile(0.3, 7.5), 7.5), 0.3, 1e-13);
+  EXPECT_NEAR(compute_two_tailed_p(compute_two_tailed_t_quantile(0.3, 7.5), 7.5), 0.3, 1e-13);
 }
 
 }  // namespace

@@ -66,7 +66,7 @@ TEST(MeasurementStudy, MatchesAiagManual) {
   EXPECT_NEAR(100 * study.repeatability / study.total, 18.4, 0.05);
   EXPECT_NEAR(100 * study.of_station / study.total, 20.9, 0.05);
   EXPECT_NEAR(100 * study.of_unit / study.total, 96.0, 0.05);
-  EXPECT_EQ(study.distinct_categories(), 4);
+  EXPECT_EQ(study.compute_distinct_categories(), 4);
 }
 
 /// Montgomery, Design and Analysis of Experiments, gauge study of 20 parts, 3 operators, 2
@@ -116,17 +116,17 @@ TEST(MeasurementStudy, ComputesRepeatabilityForOneStation) {
   EXPECT_DOUBLE_EQ(study.repeatability, std::sqrt(0.5));
   EXPECT_EQ(study.of_station, 0);
   EXPECT_DOUBLE_EQ(study.of_unit, std::sqrt((100 - 0.5) / 2));
-  EXPECT_EQ(study.distinct_categories(), static_cast<int>(1.41 * std::sqrt(99.5)));
+  EXPECT_EQ(study.compute_distinct_categories(), static_cast<int>(1.41 * std::sqrt(99.5)));
   const double sd = std::sqrt(0.5);
-  EXPECT_FALSE(study.percent_of_tolerance({}));
-  EXPECT_DOUBLE_EQ(*study.percent_of_tolerance({0, 20}), 100 * 6 * sd / 20);
-  EXPECT_DOUBLE_EQ(*study.percent_of_tolerance({std::nullopt, 11}), 100 * 3 * sd / 6);
-  EXPECT_DOUBLE_EQ(*study.percent_of_tolerance({1, std::nullopt}), 100 * 3 * sd / 4);
+  EXPECT_FALSE(study.compute_percent_of_tolerance({}));
+  EXPECT_DOUBLE_EQ(*study.compute_percent_of_tolerance({0, 20}), 100 * 6 * sd / 20);
+  EXPECT_DOUBLE_EQ(*study.compute_percent_of_tolerance({std::nullopt, 11}), 100 * 3 * sd / 6);
+  EXPECT_DOUBLE_EQ(*study.compute_percent_of_tolerance({1, std::nullopt}), 100 * 3 * sd / 4);
   // The mean, 5, is at the one limit or beyond it.
-  EXPECT_FALSE(study.percent_of_tolerance({std::nullopt, 5}));
-  EXPECT_FALSE(study.percent_of_tolerance({std::nullopt, 1}));
-  EXPECT_FALSE(study.percent_of_tolerance({5, std::nullopt}));
-  EXPECT_FALSE(study.percent_of_tolerance({11, std::nullopt}));
+  EXPECT_FALSE(study.compute_percent_of_tolerance({std::nullopt, 5}));
+  EXPECT_FALSE(study.compute_percent_of_tolerance({std::nullopt, 1}));
+  EXPECT_FALSE(study.compute_percent_of_tolerance({5, std::nullopt}));
+  EXPECT_FALSE(study.compute_percent_of_tolerance({11, std::nullopt}));
 }
 
 TEST(MeasurementStudy, RecoversSimulatedVarianceComponents) {

@@ -30,7 +30,7 @@ class RunMetrics : public testing::Test {
   void keep(int number, const std::string& camera, double rms_px, const std::string& verdict = "") {
     RunRecord run = make_sample_record(numbered_run_id(number), camera, rms_px);
     if (!verdict.empty()) run.verdict = verdict;
-    records.keep(run);
+    records.store_run(run);
   }
   std::vector<TrendPoint> judged(const RunFilter& filter = {}) {
     return load_judged_values(records, "rms_px", filter);
@@ -41,33 +41,36 @@ class RunMetrics : public testing::Test {
 };
 
 TEST_F(RunMetrics, JudgedValuesExcludesInvalidRuns) {
-  EXPECT_THAT(extract_values(judged()), ElementsAre(0.1, 2, 0.3));
+  EXPECT_THAT(extract_trend_values(judged()), ElementsAre(0.1, 2, 0.3));
   RunFilter two, invalid;
   two.last = 2;
   invalid.verdict = "INVALID";
-  EXPECT_THAT(extract_values(judged(two)), ElementsAre(2, 0.3)) << "of those, the last";
-  EXPECT_THAT(extract_values(judged(invalid)), ElementsAre(0.4));
+  EXPECT_THAT(extract_trend_values(judged(two)), ElementsAre(2, 0.3)) << "of those, the last";
+  EXPECT_THAT(extract_trend_values(judged(invalid)), ElementsAre(0.4));
 }
 
-TEST_F(RunMetrics, FindGateReturnsGateOfStationOrLastRun) {
-  EXPECT_EQ(find_gate("rms_px", nullptr, records, judged()), 1);
-  EXPECT_FALSE(find_gate("coverage", nullptr, records, judged())) << "a figure without a gate";
-  EXPECT_FALSE(find_gate("rms_px", nullptr, records, {}));
+TEST_F(RunMetrics, FindGateLimitReturnsGateOfStationOrLastRun) {
+  EXPECT_EQ(find_gate_limit("rms_px", nullptr, records, judged()), 1);
+  EXPECT_FALSE(find_gate_limit("coverage", nullptr, records, judged()))
+      << "a figure without a gate";
+  EXPECT_FALSE(find_gate_limit("rms_px", nullptr, records, {}));
   StationConfig station;
   station.gates = {{"rms_px", 0.7}};
-  EXPECT_EQ(find_gate("rms_px", &station, records, judged()), 0.7);
-  EXPECT_FALSE(find_gate("tilt_deg", &station, records, judged()));
+  EXPECT_EQ(find_gate_limit("rms_px", &station, records, judged()), 0.7);
+  EXPECT_FALSE(find_gate_limit("tilt_deg", &station, records, judged()));
   EXPECT_EQ(make_tolerance_limits(find_run_metric("rms_px"), 0.7).upper, 0.7);
   EXPECT_FALSE(make_tolerance_limits(find_run_metric("rms_px"), 0.7).lower);
   EXPECT_EQ(make_tolerance_limits(find_run_metric("coverage"), 0.7).lower, 0.7);
 }
 
-TEST_F(RunMetrics, CheckOneStationThrowsForTwoStations) {
+using CheckPointsOfOneStation = RunMetrics;
+
+TEST_F(CheckPointsOfOneStation, ThrowsForTwoStations) {
   auto points = judged();
-  EXPECT_NO_THROW(check_one_station(points));
-  EXPECT_NO_THROW(check_one_station({}));
+  EXPECT_NO_THROW(check_points_of_one_station(points));
+  EXPECT_NO_THROW(check_points_of_one_station({}));
   points[1].station = "station-2";
-  EXPECT_THROW(check_one_station(points), std::invalid_argument);
+  EXPECT_THROW(check_points_of_one_station(points), std::invalid_argument);
 }
 
 TEST_F(RunMetrics, StudyValuesSelectsUnitsWithRepeatedRuns) {

@@ -119,11 +119,11 @@ struct PlaceFault : LampFaults {
 };
 
 TEST_F(PlaceFault, ReportsSingleWrongPosition) {
-  EXPECT_EQ(describe_place_fault(frames, map, calibration, places), "");
+  EXPECT_EQ(describe_wrong_reference_positions(frames, map, calibration, places), "");
   for (const std::size_t which : {std::size_t{0}, std::size_t{17}, frames.size() - 1}) {
     CapturesTable wrong = places;
     wrong.at(frames[which].image).y_m.value() += 0.02;
-    EXPECT_THAT(describe_place_fault(frames, map, calibration, wrong),
+    EXPECT_THAT(describe_wrong_reference_positions(frames, map, calibration, wrong),
                 testing::AllOf(testing::StartsWith(frames[which].image + " was not taken"),
                                HasSubstr("20.0 mm, that of others 0.3 mm")));
   }
@@ -134,7 +134,7 @@ TEST_F(PlaceFault, ReportsSeveralWrongPositions) {
   CapturesTable wrong = places;
   for (std::size_t i = 0; i < 5; ++i) wrong.at(frames[i].image).y_m.value() += 0.052;
   wrong.at(frames[9].image).x_m.value() += 0.03;
-  EXPECT_THAT(describe_place_fault(frames, map, calibration, wrong),
+  EXPECT_THAT(describe_wrong_reference_positions(frames, map, calibration, wrong),
               testing::Eq("captures " + frames[0].image + " to " + frames[4].image + ", " +
                           frames[9].image +
                           " have errors up to 52.0 mm, the others 0.3 mm: taken at other positions "
@@ -147,12 +147,12 @@ TEST_F(PlaceFault, ReturnsEmptyIfMostPositionsAreWrong) {
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (i % 4 != 0) wrong.at(frames[i].image).y_m.value() += 0.02;
   }
-  EXPECT_EQ(describe_place_fault(frames, map, calibration, wrong), "");
+  EXPECT_EQ(describe_wrong_reference_positions(frames, map, calibration, wrong), "");
 }
 
 /// The zenith of another camera displaces all fixes by one offset in the frame of the camera.
-TEST_F(PlaceFault, FindCommonOffsetReturnsFrame) {
-  EXPECT_FALSE(find_common_offset(frames, map, calibration, places));
+TEST_F(PlaceFault, FindCommonPositionOffsetReturnsFrame) {
+  EXPECT_FALSE(find_common_position_offset(frames, map, calibration, places));
   const Positioner positioner(map, calibration);
   CapturesTable rotating = places, constant = places, scattered = places;
   for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -164,27 +164,27 @@ TEST_F(PlaceFault, FindCommonOffsetReturnsFrame) {
     constant.at(frames[i].image).x_m.value() += 0.03;
     scattered.at(frames[i].image).x_m.value() += i % 2 == 0 ? 0.03 : -0.03;
   }
-  const auto camera_offset = find_common_offset(frames, map, calibration, rotating);
+  const auto camera_offset = find_common_position_offset(frames, map, calibration, rotating);
   ASSERT_TRUE(camera_offset);
   EXPECT_TRUE(camera_offset->in_camera);
   EXPECT_THAT(describe(*camera_offset),
               HasSubstr("are off by 30.0 mm in one direction of the camera (x -30.0 mm, y "));
-  const auto world_offset = find_common_offset(frames, map, calibration, constant);
+  const auto world_offset = find_common_position_offset(frames, map, calibration, constant);
   ASSERT_TRUE(world_offset);
   EXPECT_FALSE(world_offset->in_camera);
   EXPECT_THAT(describe(*world_offset),
               HasSubstr("in one direction of the room (x -30.3 mm, y +0.0 mm): the known points"));
-  EXPECT_FALSE(find_common_offset(frames, map, calibration, scattered));
+  EXPECT_FALSE(find_common_position_offset(frames, map, calibration, scattered));
 }
 
 struct LensFault : ExampleRig {};
 
 TEST_F(LensFault, ReturnsEmptyForCorrectLens) {
-  EXPECT_EQ(describe_lens_fault(frames, map, calibration), "");
+  EXPECT_EQ(describe_contradiction_to_lens(frames, map, calibration), "");
   // A slightly different lens is not another lens.
   calibration.camera.intrinsics[0] *= 1.0005;
   calibration.camera.intrinsics[2] += 0.3;
-  EXPECT_EQ(describe_lens_fault(frames, map, calibration), "");
+  EXPECT_EQ(describe_contradiction_to_lens(frames, map, calibration), "");
 }
 
 /// As if the boards were of another unit.
@@ -198,7 +198,7 @@ TEST_F(LensFault, ReportsLensEstimatedFromLamps) {
       lens[1] *= focal;
       lens[2] += off_px;
       lens[3] -= off_px;
-      const std::string fault = describe_lens_fault(frames, map, calibration);
+      const std::string fault = describe_contradiction_to_lens(frames, map, calibration);
       EXPECT_THAT(fault, AllOf(StartsWith("lamps and boards are imaged by different lenses"),
                                HasSubstr(fmt::format("the boards a focal length of {:.1f} px",
                                                      std::sqrt(lens[0] * lens[1])))))
@@ -217,15 +217,15 @@ TEST_F(LensFault, ReturnsEmptyForDisplacedLamp) {
   for (Lamp& lamp : map.lamps) {
     const Eigen::Vector3d kept_m = lamp.position_m;
     lamp.position_m += Eigen::Vector3d(0.02, -0.01, 0);
-    EXPECT_EQ(describe_lens_fault(frames, map, calibration), "") << lamp.id;
+    EXPECT_EQ(describe_contradiction_to_lens(frames, map, calibration), "") << lamp.id;
     lamp.position_m = kept_m;
   }
 }
 
 TEST_F(LensFault, ReturnsEmptyForTooFewCaptures) {
   calibration.camera.intrinsics[0] *= 1.02;
-  EXPECT_EQ(describe_lens_fault({}, map, calibration), "");
-  EXPECT_EQ(describe_lens_fault(std::span(frames).first(1), map, calibration), "");
+  EXPECT_EQ(describe_contradiction_to_lens({}, map, calibration), "");
+  EXPECT_EQ(describe_contradiction_to_lens(std::span(frames).first(1), map, calibration), "");
 }
 
 /// Captures at known heights, equal to the fixes of the true camera.
@@ -235,7 +235,7 @@ struct OtherCamera : LensFault {
     for (std::size_t i = 0; i < frames.size(); ++i) {
       const Fix fix = positioner.locate(frames[i].detections);
       if (!fix.ok()) continue;
-      PlacedCaptures& captures = i % 2 == 0 ? reference : check;
+      CapturesWithPositions& captures = i % 2 == 0 ? reference : check;
       captures.places[frames[i].image].z_m = fix.estimate.pose.position_m.z();
       captures.frames.push_back(frames[i]);
     }
@@ -253,15 +253,15 @@ struct OtherCamera : LensFault {
       }
     }
   }
-  PlacedCaptures reference, check;
+  CapturesWithPositions reference, check;
 };
 
 TEST_F(OtherCamera, IsEmptyForTiltedUnit) {
   ASSERT_GT(check.frames.size(), 10U);
   set_camera(Lens(calibration.camera.lens_model, calibration.camera.intrinsics),
              Eigen::AngleAxisd(0.005, Eigen::Vector3d(1, 2, 0).normalized()).toRotationMatrix());
-  EXPECT_EQ(find_other_focal_length(check, reference, map, calibration), "");
-  EXPECT_EQ(find_other_lens(check.frames, reference.frames, map, calibration), "");
+  EXPECT_EQ(describe_focal_length_difference(check, reference, map, calibration), "");
+  EXPECT_EQ(describe_lens_difference(check.frames, reference.frames, map, calibration), "");
 }
 
 TEST_F(OtherCamera, IsReportedForDifferentFocalLength) {
@@ -269,10 +269,10 @@ TEST_F(OtherCamera, IsReportedForDifferentFocalLength) {
   intrinsics[0] *= 0.99;
   intrinsics[1] *= 0.99;
   set_camera(Lens(calibration.camera.lens_model, intrinsics), Eigen::Matrix3d::Identity());
-  EXPECT_THAT(find_other_focal_length(check, reference, map, calibration),
+  EXPECT_THAT(describe_focal_length_difference(check, reference, map, calibration),
               HasSubstr("its focal length differs: the heights have an error of "));
   reference.places.clear();
-  EXPECT_EQ(find_other_focal_length(check, reference, map, calibration), "")
+  EXPECT_EQ(describe_focal_length_difference(check, reference, map, calibration), "")
       << "no heights to compare";
 }
 
@@ -281,9 +281,10 @@ TEST_F(OtherCamera, IsReportedForDifferentCenter) {
   intrinsics[2] += 12;
   intrinsics[3] -= 8;
   set_camera(Lens(calibration.camera.lens_model, intrinsics), Eigen::Matrix3d::Identity());
-  EXPECT_THAT(find_other_lens(check.frames, reference.frames, map, calibration),
+  EXPECT_THAT(describe_lens_difference(check.frames, reference.frames, map, calibration),
               HasSubstr("its lens differs, by residuals of the lamps of "));
-  EXPECT_EQ(find_other_lens(check.frames, {}, map, calibration), "") << "nothing to compare";
+  EXPECT_EQ(describe_lens_difference(check.frames, {}, map, calibration), "")
+      << "nothing to compare";
 }
 
 }  // namespace

@@ -20,11 +20,11 @@ struct StationSteps : testing::Test {
   StationConfig config{};
   Calibration calibration = read_calibration(kExample + "calibration.yaml");
   std::vector<Frame> frames = read_detections(kExample + "detections.csv");
-  CapturesTable places = read_captures(kExample + "truth.csv");
+  CapturesTable places = read_captures_csv(kExample + "truth.csv");
 };
 
-TEST_F(StationSteps, CheckFixesLocatesAllKnownPoints) {
-  const StepResult result = check_fixes(config, calibration, frames, places);
+TEST_F(StationSteps, RunCheckStepLocatesAllKnownPoints) {
+  const StepResult result = run_check_step(config, calibration, frames, places);
   EXPECT_TRUE(result.ok()) << result.why;
   EXPECT_EQ(result.metrics[0].name, "check_fix_fraction");
   EXPECT_EQ(result.metrics[0].value, 1);
@@ -32,19 +32,19 @@ TEST_F(StationSteps, CheckFixesLocatesAllKnownPoints) {
 
 TEST_F(StationSteps, FailForTooFewKnownPositions) {
   places.erase(places.begin());
-  EXPECT_THAT(check_fixes(config, calibration, frames, places).why,
+  EXPECT_THAT(run_check_step(config, calibration, frames, places).why,
               HasSubstr("1 of the 36 captures"));
-  EXPECT_THAT(solve_dispersion(config, calibration, frames, places).why,
+  EXPECT_THAT(run_dispersion_step(config, calibration, frames, places).why,
               HasSubstr("1 of the 36 captures"));
   config.sufficient.check_captures = 35;
-  EXPECT_TRUE(check_fixes(config, calibration, frames, places).ok());
-  EXPECT_THAT(check_fixes(config, calibration, {}, places).why, HasSubstr("have no position"));
+  EXPECT_TRUE(run_check_step(config, calibration, frames, places).ok());
+  EXPECT_THAT(run_check_step(config, calibration, {}, places).why, HasSubstr("have no position"));
 }
 
 /// Lamps below their heights in the map: horizontal positions are right, heights are wrong.
-TEST_F(StationSteps, CheckFixesComputesHeightError) {
+TEST_F(StationSteps, RunCheckStepComputesHeightError) {
   const auto height_mm = [&] {
-    const StepResult result = check_fixes(config, calibration, frames, places);
+    const StepResult result = run_check_step(config, calibration, frames, places);
     for (const auto& [name, value] : result.metrics) {
       if (name == "check_height_mm") return value;
     }

@@ -16,8 +16,8 @@ using testing::Each;
 using testing::SizeIs;
 
 /// The example's rotation: 12 captures at each of two heights, 30 degrees apart.
-struct TurnMapTest : testing::Test {
-  TurnMapTest() {
+struct YawCoverageTest : testing::Test {
+  YawCoverageTest() {
     config.lamps = read_lamp_map(kExample + "lamps.yaml");
     config.sufficient.turn_captures = 12;
     config.sufficient.turn_heights = 2;
@@ -27,8 +27,8 @@ struct TurnMapTest : testing::Test {
   std::vector<Frame> frames = read_detections(kExample + "turning.csv");
 };
 
-TEST_F(TurnMapTest, IsCompleteForAllCaptures) {
-  const TurnMap map = compute_turn_map(frames, config, calibration);
+TEST_F(YawCoverageTest, IsCompleteForAllCaptures) {
+  const YawCoverage map = compute_yaw_coverage(frames, config, calibration);
   ASSERT_THAT(map.heights, SizeIs(2));
   for (const auto& height : map.heights) {
     EXPECT_EQ(height.captures, 12);
@@ -38,9 +38,9 @@ TEST_F(TurnMapTest, IsCompleteForAllCaptures) {
   EXPECT_TRUE(map.sufficient);
 }
 
-TEST_F(TurnMapTest, ReportsMissingAngles) {
+TEST_F(YawCoverageTest, ReportsMissingAngles) {
   frames.erase(frames.begin() + 4, frames.begin() + 7);
-  const TurnMap map = compute_turn_map(frames, config, calibration);
+  const YawCoverage map = compute_yaw_coverage(frames, config, calibration);
   ASSERT_THAT(map.heights, SizeIs(2));
   const auto& parts = map.heights[0].captures == 9 ? map.heights[0].parts : map.heights[1].parts;
   EXPECT_EQ(std::count(parts.begin(), parts.end(), false), 3);
@@ -48,24 +48,24 @@ TEST_F(TurnMapTest, ReportsMissingAngles) {
 }
 
 // Not from the lowest capture, which depends on the last micrometers of the fixes.
-TEST_F(TurnMapTest, StartsAtYawOfFirstCapture) {
+TEST_F(YawCoverageTest, StartsAtYawOfFirstCapture) {
   frames.resize(3);
-  const auto forwards = compute_turn_map(frames, config, calibration).heights.at(0).parts;
+  const auto forwards = compute_yaw_coverage(frames, config, calibration).heights.at(0).parts;
   std::reverse(frames.begin(), frames.end());
-  const auto backwards = compute_turn_map(frames, config, calibration).heights.at(0).parts;
+  const auto backwards = compute_yaw_coverage(frames, config, calibration).heights.at(0).parts;
   EXPECT_EQ(std::count(forwards.begin(), forwards.end(), true), 3);
   EXPECT_TRUE(forwards[0] && backwards[0]);
   EXPECT_NE(forwards[1], backwards[1]);
   EXPECT_NE(forwards[11], backwards[11]);
 }
 
-TEST_F(TurnMapTest, ReturnsAllHeights) {
+TEST_F(YawCoverageTest, ReturnsAllHeights) {
   frames.erase(frames.begin() + 12, frames.end());
-  EXPECT_THAT(compute_turn_map(frames, config, calibration).heights, SizeIs(1));
-  EXPECT_FALSE(compute_turn_map(frames, config, calibration).sufficient);
+  EXPECT_THAT(compute_yaw_coverage(frames, config, calibration).heights, SizeIs(1));
+  EXPECT_FALSE(compute_yaw_coverage(frames, config, calibration).sufficient);
   config.sufficient.turn_heights = 1;
-  EXPECT_TRUE(compute_turn_map(frames, config, calibration).sufficient);
-  EXPECT_THAT(compute_turn_map({}, config, calibration).heights, SizeIs(0));
+  EXPECT_TRUE(compute_yaw_coverage(frames, config, calibration).sufficient);
+  EXPECT_THAT(compute_yaw_coverage({}, config, calibration).heights, SizeIs(0));
 }
 
 }  // namespace

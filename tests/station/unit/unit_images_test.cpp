@@ -35,7 +35,7 @@ struct UnitImages : testing::Test {
   const UnitStep& boards() const { return unit.step(StationStep::boards); }
   std::string refusal(const std::string& name) const { return boards().images.at(name).refusal(); }
 
-  StationConfig config = read_station(VLP_SOURCE_DIR "/datasets/station/station.yaml");
+  StationConfig config = read_station_config(VLP_SOURCE_DIR "/datasets/station/station.yaml");
   TemporaryFolder folder;
   Unit unit{config, "unit", {"test", "0"}, 1};
 };
@@ -45,7 +45,7 @@ TEST_F(UnitImages, DuplicateIsUsedWhenFirstIsRemoved) {
   add_image("b.png", true);
   EXPECT_EQ(refusal("a.png"), "");
   EXPECT_EQ(refusal("b.png"), "is the same image as a.png");
-  unit.remove(StationStep::boards, "a.png");
+  unit.remove_file(StationStep::boards, "a.png");
   EXPECT_EQ(refusal("b.png"), "");
   add_image("a.png", true);
   EXPECT_EQ(refusal("a.png"), "is the same image as b.png");
@@ -53,7 +53,7 @@ TEST_F(UnitImages, DuplicateIsUsedWhenFirstIsRemoved) {
 
 TEST_F(UnitImages, OverwrittenImageIsReplaced) {
   add_image("a.png", true);
-  unit.advance(false);
+  unit.solve_complete_steps(false);
   ASSERT_TRUE(boards().result);  // a problem: one view makes no lens
   add_image("b.png", true);
   EXPECT_TRUE(boards().result) << "an image that is not used changes nothing";
@@ -63,20 +63,20 @@ TEST_F(UnitImages, OverwrittenImageIsReplaced) {
   EXPECT_EQ(refusal("b.png"), "");
 }
 
-TEST_F(UnitImages, DiscardedImageStaysRejected) {
+TEST_F(UnitImages, RejectionRemainsWhenFileIsDiscarded) {
   add_image("a.png", true);
   for (const char* name : {"b.png", "c.png"}) {
     add_image(name, false);
     fs::remove(folder / name);
-    unit.discard(StationStep::boards, name);
+    unit.discard_image(StationStep::boards, name);
   }
   EXPECT_EQ(boards().num_consecutive_rejections, 0);
   add_image("d.png", true);
-  unit.discard(StationStep::boards, "d.png");  // same pose: no fault
+  unit.discard_image(StationStep::boards, "d.png");  // same pose: no fault
   EXPECT_FALSE(boards().images.contains("d.png"));
-  unit.remove(StationStep::boards, "a.png");
-  unit.advance(true);
-  EXPECT_THAT(find_causes(unit),
+  unit.remove_file(StationStep::boards, "a.png");
+  unit.solve_complete_steps(true);
+  EXPECT_THAT(find_causes_of_failure(unit),
               ElementsAre(testing::Field(&Cause::text, AllOf(HasSubstr("boards (0/1)"),
                                                              HasSubstr("2 of 2 images refused")))));
 }

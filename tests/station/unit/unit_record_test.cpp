@@ -14,14 +14,14 @@ using testing::Field;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-TEST(FindCauses, OrdersStationBeforeImagesBeforeMissingImages) {
-  const StationConfig config = read_station(VLP_SOURCE_DIR "/datasets/station/station.yaml");
+TEST(FindCausesOfFailure, OrdersStationBeforeImagesBeforeMissingImages) {
+  const StationConfig config = read_station_config(VLP_SOURCE_DIR "/datasets/station/station.yaml");
   const TemporaryFolder folder;
   Unit unit(config, "camera", {"test", "0"}, 1);
   unit.add(StationStep::boards, {folder.file("0.png", "no image")});
-  unit.end_early("the operator ended the run");
-  unit.invalidate("the golden unit failed");
-  EXPECT_THAT(find_causes(unit),
+  unit.end_unit_early("the operator ended the run");
+  unit.invalidate_verdict("the golden unit failed");
+  EXPECT_THAT(find_causes_of_failure(unit),
               ElementsAre(Field(&Cause::text, "the golden unit failed"),
                           Field(&Cause::text, HasSubstr("1 of 1 images refused")),
                           Field(&Cause::text, StartsWith("boards: the operator ended the run"))));

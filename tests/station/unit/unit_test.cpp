@@ -23,7 +23,7 @@ constexpr const char* kView = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sampl
 
 /// Unit of the station in datasets/station, initially without images.
 struct UnitTest : testing::Test {
-  StationConfig config = read_station(VLP_SOURCE_DIR "/datasets/station/station.yaml");
+  StationConfig config = read_station_config(VLP_SOURCE_DIR "/datasets/station/station.yaml");
   TemporaryFolder folder;
   Unit unit{config, std::string(64, 'x'), {"test", "0"}, 1};
 
@@ -34,28 +34,28 @@ struct UnitTest : testing::Test {
 };
 
 TEST_F(UnitTest, StartsWithBoards) {
-  EXPECT_EQ(unit.current(), StationStep::boards);
+  EXPECT_EQ(unit.current_step(), StationStep::boards);
   EXPECT_FALSE(unit.calibration());
-  EXPECT_THAT(find_causes(unit),
+  EXPECT_THAT(find_causes_of_failure(unit),
               ElementsAre(Field(&Cause::text, HasSubstr("boards: too few images"))));
-  EXPECT_EQ(decide_verdict(find_causes(unit)), Verdict::invalid);
+  EXPECT_EQ(decide_verdict(find_causes_of_failure(unit)), Verdict::invalid);
 }
 
-TEST_F(UnitTest, IsHopelessAfterMaxConsecutiveRejections) {
+TEST_F(UnitTest, CannotPassAnyMoreAfterMaxConsecutiveRejections) {
   for (int i = 0; i < config.max_consecutive_rejections; ++i) {
-    EXPECT_FALSE(unit.is_hopeless()) << i;
+    EXPECT_FALSE(unit.cannot_pass_any_more()) << i;
     add_bad(i);
   }
-  EXPECT_TRUE(unit.is_hopeless());
-  EXPECT_EQ(unit.step(StationStep::boards).used(), 0);
-  unit.advance(true);
+  EXPECT_TRUE(unit.cannot_pass_any_more());
+  EXPECT_EQ(unit.step(StationStep::boards).count_used_images(), 0);
+  unit.solve_complete_steps(true);
   EXPECT_THAT(
-      find_causes(unit),
+      find_causes_of_failure(unit),
       ElementsAre(Field(&Cause::text, HasSubstr("12 of 12 images refused: 12 cannot be read"))));
-  EXPECT_EQ(decide_verdict(find_causes(unit)), Verdict::invalid)
+  EXPECT_EQ(decide_verdict(find_causes_of_failure(unit)), Verdict::invalid)
       << "images that cannot be read are no fault";
-  unit.remove(StationStep::boards, "100.png");
-  EXPECT_FALSE(unit.is_hopeless());
+  unit.remove_file(StationStep::boards, "100.png");
+  EXPECT_FALSE(unit.cannot_pass_any_more());
 }
 
 /// As after a restart of a killed program: all images arrive at once, by name.
@@ -68,33 +68,33 @@ TEST_F(UnitTest, IsNotHopelessIfOneImageOfBatchIsUsed) {
   }
   // In two batches, as at the station.
   unit.add(StationStep::boards, std::vector<fs::path>(together.begin(), together.end() - 1), true);
-  EXPECT_FALSE(unit.is_hopeless());
+  EXPECT_FALSE(unit.cannot_pass_any_more());
   unit.add(StationStep::boards, {together.back()});
-  EXPECT_FALSE(unit.is_hopeless());
+  EXPECT_FALSE(unit.cannot_pass_any_more());
   EXPECT_EQ(unit.step(StationStep::boards).num_consecutive_rejections, 0);
   // Added one by one, their order is known.
   for (int i = 0; i < config.max_consecutive_rejections; ++i) add_bad(100 + i);
-  EXPECT_TRUE(unit.is_hopeless());
+  EXPECT_TRUE(unit.cannot_pass_any_more());
 }
 
-TEST_F(UnitTest, IsHopelessIfAllImagesOfBatchAreRejected) {
+TEST_F(UnitTest, CannotPassAnyMoreIfAllImagesOfBatchAreRejected) {
   std::vector<fs::path> together;
   for (int i = 0; i < config.max_consecutive_rejections; ++i) {
     together.push_back(folder.file(std::to_string(100 + i) + ".png", "no image"));
   }
   unit.add(StationStep::boards, together);
-  EXPECT_TRUE(unit.is_hopeless());
+  EXPECT_TRUE(unit.cannot_pass_any_more());
 }
 
 TEST_F(UnitTest, IsInvalidIfEndedEarly) {
-  unit.end_early("the operator ended the run");
+  unit.end_unit_early("the operator ended the run");
   EXPECT_THAT(
-      find_causes(unit),
+      find_causes_of_failure(unit),
       ElementsAre(Field(&Cause::text,
                         "boards: the operator ended the run before there was enough (0/36)")));
   const RunRecord record = make_unit_record(unit, make_run_id(), {"test", "0"});
   EXPECT_EQ(record.verdict, "INVALID");
-  EXPECT_TRUE(record.invalid());
+  EXPECT_TRUE(record.is_invalid());
   std::string screen;
   for (const ScreenLine& line : make_verdict_screen(record)) screen += line.text + "\n";
   EXPECT_THAT(screen,
@@ -104,7 +104,7 @@ TEST_F(UnitTest, IsInvalidIfEndedEarly) {
 }
 
 /// Missing gates are described by the unfinished step, or by their names.
-TEST(VerdictScreen, ReturnsReasonForUnmeasuredGates) {
+TEST(VerdictScreen, NamesUnfinishedStepWhenGatesAreUnmeasured) {
   const auto gates_line = [](const RunRecord& record) {
     for (const ScreenLine& line : make_verdict_screen(record)) {
       if (line.text.starts_with("Gates")) return line.text;
@@ -150,27 +150,27 @@ TEST(VerdictScreen, ReturnsReasonForUnmeasuredGates) {
 }
 
 TEST_F(UnitTest, RejectsImageOfAnotherUnit) {
-  unit.reject_images_of_others([](const std::string&) { return ImageOwner{"0001", "R"}; });
+  unit.reject_images_of_other_cameras([](const std::string&) { return ImageUser{"0001", "R"}; });
   fs::copy_file(kView, folder / "0.png");
   unit.add(StationStep::boards, {folder / "0.png"});
   EXPECT_EQ(
       unit.step(StationStep::boards).images.at("0.png").refusal(),
       "already of camera 0001, run R: if its serial was wrong, 'vlp-station void R --station " +
           config.file.string() + " --operator NAME --reason WHY' frees its images");
-  unit.advance(true);
-  EXPECT_THAT(find_causes(unit),
+  unit.solve_complete_steps(true);
+  EXPECT_THAT(find_causes_of_failure(unit),
               ElementsAre(Field(&Cause::text,
                                 HasSubstr("1 already of camera 0001, run R: if its serial was "
                                           "wrong, 'vlp-station void R --station "))));
-  EXPECT_EQ(decide_verdict(find_causes(unit)), Verdict::invalid);
+  EXPECT_EQ(decide_verdict(find_causes_of_failure(unit)), Verdict::invalid);
 }
 
 TEST(RejectRepetition, ReportsEarlierRun) {
   RunRecord record;
   record.set_verdict({});
-  ASSERT_TRUE(record.passed());
+  ASSERT_TRUE(record.has_passed());
   reject_reused_images(record, "R1", "station.yaml");
-  EXPECT_TRUE(record.invalid());
+  EXPECT_TRUE(record.is_invalid());
   EXPECT_EQ(record.first_cause(),
             "all images are those of run R1, which is no repetition: take new ones, or "
             "'vlp-station void R1 --station station.yaml --operator NAME --reason WHY' if that run "
@@ -186,9 +186,9 @@ TEST(DecideVerdict, ReturnsVerdictOfFirstCause) {
 TEST_F(UnitTest, QueuesImagesUntilPreviousStepIsComplete) {
   const auto file = folder.file("0.png", "no image");
   unit.add(StationStep::check, {file});
-  unit.advance(false);
+  unit.solve_complete_steps(false);
   EXPECT_EQ(unit.step(StationStep::check).waiting.size(), 1u);
-  unit.remove(StationStep::check, "0.png");
+  unit.remove_file(StationStep::check, "0.png");
   EXPECT_TRUE(unit.step(StationStep::check).waiting.empty());
 }
 
@@ -198,7 +198,7 @@ TEST_F(UnitTest, ScreenFits80Columns) {
   for (const ScreenLine& line : make_station_screen(unit))
     EXPECT_LE(line.text.size(), 80u) << line.text;
   const RunRecord record = make_unit_record(unit, make_run_id(), {"test", "0"});
-  EXPECT_FALSE(record.passed());
+  EXPECT_FALSE(record.has_passed());
   for (const ScreenLine& line : make_verdict_screen(record)) {
     EXPECT_LE(line.text.size(), 80u) << line.text;
   }

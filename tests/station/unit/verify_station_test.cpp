@@ -18,11 +18,11 @@ TEST(VerifyStation, StartsAtTimeOfRunName) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "check");
   folder.file("check/0000.png", "no image");
-  StationConfig config = read_station(VLP_SOURCE_DIR "/datasets/station/station.yaml");
+  StationConfig config = read_station_config(VLP_SOURCE_DIR "/datasets/station/station.yaml");
   config.golden = {.camera_id = "golden",
                    .calibration = read_calibration(kExample + "calibration.yaml"),
                    .gates = {{"check_fix_fraction", 0.9}}};
-  const std::string run = "20200102T030405Z-0123456789abcdef", before = now_utc();
+  const std::string run = "20200102T030405Z-0123456789abcdef", before = get_current_utc();
   const RunRecord record = verify_station(config, folder / "", run, {"test", "0"}, 1).record;
   EXPECT_EQ(record.run, run);
   EXPECT_EQ(record.begun_utc, "2020-01-02T03:04:05Z");

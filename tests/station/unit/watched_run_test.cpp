@@ -24,7 +24,7 @@ class WatchedRunTest : public testing::Test {
   WatchedRunTest() { fs::create_directory(folder / "elsewhere"); }
 
   StationConfig make_config() const {
-    StationConfig made = read_station(VLP_SOURCE_DIR "/datasets/station/station.yaml");
+    StationConfig made = read_station_config(VLP_SOURCE_DIR "/datasets/station/station.yaml");
     made.captures = folder / "captures";
     made.results = folder / "results";
     return made;
@@ -47,10 +47,10 @@ TEST_F(WatchedRunTest, WritesNoFrameThroughALinkThatCameLater) {
   if (!write_video(video, {frame, frame})) GTEST_SKIP() << "OpenCV writes no video here";
   StepSources sources({video.string()}, {800, 600});
   WatchedRun run(unit, spool);
-  sources.feed(unit, run);
+  sources.write_next_frame(unit, run);
   ASSERT_TRUE(fs::exists(run.folder() / "boards/frame-000000.png"));
   replace_by_link("captures/0001/boards");
-  EXPECT_THAT(rejection_message([&] { sources.feed(unit, run); }),
+  EXPECT_THAT(rejection_message([&] { sources.write_next_frame(unit, run); }),
               HasSubstr("boards: was moved or replaced while it was in use"));
   EXPECT_TRUE(fs::is_empty(folder / "elsewhere"));
 }
@@ -59,7 +59,7 @@ TEST_F(WatchedRunTest, RemovesNoFileThroughALinkThatCameLater) {
   WatchedRun run(unit, spool);
   for (const char* name : {"captures/0001/boards/a.png", "elsewhere/a.png"}) folder.file(name, "a");
   replace_by_link("captures/0001/boards");
-  run.discard(StationStep::boards, "a.png");
+  run.discard_image(StationStep::boards, "a.png");
   EXPECT_FALSE(fs::exists(folder / "moved/a.png"));
   EXPECT_TRUE(fs::exists(folder / "elsewhere/a.png"));
 }
@@ -68,14 +68,14 @@ TEST_F(WatchedRunTest, PutsAwayItsOwnFolderOnly) {
   {
     const WatchedRun run(unit, spool);
     replace_by_link("captures/0001");
-    EXPECT_THAT(rejection_message([&] { run.move_away(); }),
+    EXPECT_THAT(rejection_message([&] { run.rename_finished_folder(); }),
                 HasSubstr("0001: was moved or replaced while it was in use"));
     EXPECT_TRUE(fs::is_symlink(run.folder()));
   }
   fs::remove(folder / "captures/0001");
   fs::rename(folder / "moved", folder / "captures/0001");
   const WatchedRun again(unit, spool);
-  again.move_away();
+  again.rename_finished_folder();
   EXPECT_TRUE(fs::exists(folder / ("captures/0001." + again.run())));
 }
 
@@ -88,13 +88,13 @@ std::vector<std::string> names(const std::vector<std::filesystem::path>& files) 
 TEST(WatchedFolder, ReportsImageAfterWritingEnds) {
   const TemporaryFolder folder;
   WatchedFolder watched(folder / "");
-  EXPECT_THAT(watched.poll_changes().added, IsEmpty());
+  EXPECT_THAT(watched.poll_folder_changes().added, IsEmpty());
   folder.file("a.png", "half");
-  EXPECT_THAT(watched.poll_changes().added, IsEmpty());
+  EXPECT_THAT(watched.poll_folder_changes().added, IsEmpty());
   folder.file("a.png", "the whole");
-  EXPECT_THAT(watched.poll_changes().added, IsEmpty());
-  EXPECT_THAT(names(watched.poll_changes().added), ElementsAre("a.png"));
-  EXPECT_THAT(watched.poll_changes().added, IsEmpty());
+  EXPECT_THAT(watched.poll_folder_changes().added, IsEmpty());
+  EXPECT_THAT(names(watched.poll_folder_changes().added), ElementsAre("a.png"));
+  EXPECT_THAT(watched.poll_folder_changes().added, IsEmpty());
 }
 
 TEST(WatchedFolder, ReportsOverwrittenAndRemovedImages) {
@@ -102,12 +102,12 @@ TEST(WatchedFolder, ReportsOverwrittenAndRemovedImages) {
   WatchedFolder watched(folder / "");
   folder.file("a.png", "one");
   folder.file("b.png", "two");
-  watched.poll_changes();
-  EXPECT_THAT(names(watched.poll_changes().added), ElementsAre("a.png", "b.png"));
+  watched.poll_folder_changes();
+  EXPECT_THAT(names(watched.poll_folder_changes().added), ElementsAre("a.png", "b.png"));
   folder.file("a.png", "another");
   std::filesystem::remove(folder / "b.png");
-  EXPECT_THAT(watched.poll_changes().gone, ElementsAre("b.png"));
-  EXPECT_THAT(names(watched.poll_changes().added), ElementsAre("a.png"));
+  EXPECT_THAT(watched.poll_folder_changes().gone, ElementsAre("b.png"));
+  EXPECT_THAT(names(watched.poll_folder_changes().added), ElementsAre("a.png"));
 }
 
 TEST(WatchedFolder, IgnoresOtherFiles) {
@@ -117,18 +117,18 @@ TEST(WatchedFolder, IgnoresOtherFiles) {
   folder.file("empty.png", "");
   std::filesystem::create_directory(folder / "folder.png");
   WatchedFolder watched(folder / "");
-  watched.poll_changes();
-  EXPECT_THAT(watched.poll_changes().added, IsEmpty());
+  watched.poll_folder_changes();
+  EXPECT_THAT(watched.poll_folder_changes().added, IsEmpty());
 }
 
 TEST(WatchedFolder, AcceptsMissingFolder) {
   const TemporaryFolder folder;
   WatchedFolder watched(folder / "later");
-  EXPECT_THAT(watched.poll_changes().added, IsEmpty());
+  EXPECT_THAT(watched.poll_folder_changes().added, IsEmpty());
   std::filesystem::create_directory(folder / "later");
   folder.file("later/a.png", "image");
-  watched.poll_changes();
-  EXPECT_THAT(names(watched.poll_changes().added), ElementsAre("a.png"));
+  watched.poll_folder_changes();
+  EXPECT_THAT(names(watched.poll_folder_changes().added), ElementsAre("a.png"));
 }
 
 }  // namespace
