@@ -199,7 +199,7 @@ const ImageFormat* find_format(std::string_view bytes) {
                                       ImageFormat{"II+\0"sv, big_tiff},
                                       ImageFormat{"MM\0+"sv, big_tiff},
                                       ImageFormat{"P1"sv, read_pnm_size},
-                                      ImageFormat{"P2"sv, pnm_size},
+                                      ImageFormat{"P2"sv, read_pnm_size},
                                       ImageFormat{"P3"sv, pnm_size},
                                       ImageFormat{"P4"sv, pnm_size},
                                       ImageFormat{"P5"sv, pnm_size},

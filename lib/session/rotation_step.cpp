@@ -257,7 +257,7 @@ TiltResult run_tilt_step(const LampCaptures& input, bool refine_map, HistoryEntr
   TiltCalibrationOptions options;
   options.refine_map = refine_map;
   options.motions = input.motions;
-  if (std::any_of(input.motions.begin(), input.motions.end(), moves)) {
+  if (std::any_of(input.motions.begin(), input.motions.end(), may_camera_move_during_readout)) {
     check_row_time(input.calibration.camera);
   }
   const auto leveled = [&](const Camera& camera) {

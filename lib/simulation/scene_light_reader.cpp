@@ -254,7 +254,7 @@ Clutter read_clutter(YamlMap& map, const std::vector<SceneLamp>& lamps, const Ro
   clutter.foreign_lights = map.optional_maps(
       "foreign_lights", [&](YamlMap& keys) { return read_foreign_light(keys, room); });
   clutter.mirrors = map.optional_maps("mirrors", read_mirror);
-  clutter.blinds = map.optional_maps("blinds", read_blind);
+  clutter.blinds = map.optional_maps("blinds", read_venetian_blind);
   clutter.signs = map.optional_maps("signs", read_sign);
   clutter.ambient_flicker = map.optional_map("ambient_flicker", read_mains);
   const double lowest_m = find_lowest_light_m(lamps, clutter);

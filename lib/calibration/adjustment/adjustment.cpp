@@ -118,122 +118,189 @@ Eigen::Matrix2d d_undistorted_pixel_d_pixel(const Lens& lens, const Lens::Ray& r
 /// Key of a known position that captures have in common: their spot, or the position itself.
 using PlaceKey = std::tuple<std::string, double, double, double, PlaceOf>;
 
-AssembledProblem assemble_adjustment_problem(const AdjustmentInput& input) {
-  const Camera& camera = input.calibration.camera;
-  const auto& report = input.calibration.intrinsics_report;
-  const auto& center = input.calibration.rotation_center;
-  std::map<std::string, std::size_t> spots;
-  for (const AdjustmentCapture& capture : input.captures) {
-    if (!capture.spot.empty()) spots.emplace(capture.spot, spots.size());
-  }
-  AssembledProblem all{
-      AdjustmentProblem(camera.lens_model,
-                        LensParametrization(camera, report ? report->covariance : std::nullopt),
-                        input.lamps.lamps.size(), spots.size()),
-      compute_mean_position(input.lamps)};
-  AdjustmentProblem& problem = all.problem;
-  const AdjustmentLayout& layout = problem.parameter_layout();
-  const Lens lens(camera.lens_model, camera.intrinsics);
-  const auto row_clock = make_row_clock(camera);
-  std::vector<Eigen::Vector3d> lamps_m;
-  for (const Lamp& lamp : input.lamps.lamps) {
-    lamps_m.emplace_back(lamp.position_m - all.origin_m);
-    problem.state_vector().segment<3>(layout.lamp_state_index(lamps_m.size() - 1)) = lamps_m.back();
-    problem.lamps.push_back(
-        {lamps_m.back(), input.frees_map_shape ? kInfinite : lamp.sd_m.value_or(0)});
-  }
-  all.lamp_seen.resize(lamps_m.size());
-  Eigen::Vector2d zenith(0, 0), arm_m(0, 0);
-  if (center) {
-    zenith = normalized_zenith_point(*center);
-    arm_m = center->lever_arm_m.value_or(arm_m);
-  }
-  problem.state_vector().segment<2>(layout.zenith) = zenith;
-  problem.state_vector().segment<2>(layout.lever_arm) = arm_m;
-  const Eigen::Matrix3d base_from_camera =
-      rotate_level_point_to_camera(zenith, Eigen::Vector3d::UnitZ()).camera_from_level.transpose();
-
-  std::vector<Eigen::Vector3d> axes_m(spots.size(), Eigen::Vector3d::Zero());
-  std::vector<int> num_captures_per_pivot(spots.size(), 0);
-  std::map<PlaceKey, std::size_t> place_of_key;
-  std::vector<AdjustmentProblem::Sighting> seen;
+/// Lamps of a capture that the map has, in the order of their detections.
+struct CaptureLamps {
+  std::vector<std::size_t> indices;
+  /// For the rough pose.
   std::vector<Sighting> sightings;
-  std::vector<std::size_t> lamps;
-  for (const AdjustmentCapture& capture : input.captures) {
+  /// For the adjustment; their capture is set with its pose.
+  std::vector<AdjustmentProblem::Sighting> terms;
+};
+
+/// Builds the problem of the adjustment with its initial values, capture by capture.
+class ProblemAssembler {
+ public:
+  explicit ProblemAssembler(const AdjustmentInput& input)
+      : input_(input),
+        lens_(input.calibration.camera.lens_model, input.calibration.camera.intrinsics),
+        row_clock_(make_row_clock(input.calibration.camera)),
+        pivots_(list_pivots(input)),
+        all_(make_empty_problem(input, pivots_.size())),
+        sums_m_(pivots_.size(), Eigen::Vector3d::Zero()),
+        num_captures_(pivots_.size(), 0) {
+    set_lamps();
+    set_tilt_and_lever_arm();
+  }
+
+  /// Adds a capture with its known position; counts it as rejected if it determines no pose.
+  void add_capture(const AdjustmentCapture& capture) {
     const InclinationRotation inclination =
         capture.inclination ? compute_inclination_rotation(*capture.inclination, 0)
                             : InclinationRotation();
-    seen.clear();
-    sightings.clear();
-    lamps.clear();
+    CaptureLamps lamps = find_lamps(capture, inclination.level_from_base);
+    const auto pose = estimate_rough_pose(lamps.sightings, lamps.indices, lamps_m_);
+    if (!pose) {
+      ++all_.rejected_captures;
+      return;
+    }
+    const std::size_t index = problem_.captures.size();
+    problem_.add_capture(
+        {add_to_pivot(capture, *pose), inclination.level_from_base.transpose(), capture.motion},
+        *pose);
+    for (auto& term : lamps.terms) {
+      term.capture = index;
+      problem_.sightings.push_back(term);
+      all_.lamp_seen[term.lamp] = true;
+    }
+    if (capture.place) add_known_position(capture, *capture.place, index);
+  }
+
+  /// Returns the problem; the standard deviation of a position is that of all its captures
+  /// together.
+  AssembledProblem finish() && {
+    for (auto& place : problem_.places) {
+      place.sd_m *= std::sqrt(static_cast<double>(all_.places[place.place].captures));
+    }
+    problem_.place_used.assign(all_.places.size(), true);
+    if (input_.frees_map_shape) problem_.gauge = make_gauge(lamps_m_, all_.lamp_seen);
+    for (std::size_t i = 0; i < sums_m_.size(); ++i) {
+      problem_.state_vector().segment<3>(problem_.parameter_layout().pivot_state_index(i)) =
+          sums_m_[i] / std::max(1, num_captures_[i]);
+    }
+    return std::move(all_);
+  }
+
+ private:
+  static std::map<std::string, std::size_t> list_pivots(const AdjustmentInput& input) {
+    std::map<std::string, std::size_t> pivots;
+    for (const AdjustmentCapture& capture : input.captures) {
+      if (!capture.spot.empty()) pivots.emplace(capture.spot, pivots.size());
+    }
+    return pivots;
+  }
+
+  static AssembledProblem make_empty_problem(const AdjustmentInput& input, std::size_t pivots) {
+    const Camera& camera = input.calibration.camera;
+    const auto& report = input.calibration.intrinsics_report;
+    return {
+        AdjustmentProblem(camera.lens_model,
+                          LensParametrization(camera, report ? report->covariance : std::nullopt),
+                          input.lamps.lamps.size(), pivots),
+        compute_mean_position(input.lamps)};
+  }
+
+  void set_lamps() {
+    for (const Lamp& lamp : input_.lamps.lamps) {
+      lamps_m_.emplace_back(lamp.position_m - all_.origin_m);
+      problem_.state_vector().segment<3>(
+          problem_.parameter_layout().lamp_state_index(lamps_m_.size() - 1)) = lamps_m_.back();
+      problem_.lamps.push_back(
+          {lamps_m_.back(), input_.frees_map_shape ? kInfinite : lamp.sd_m.value_or(0)});
+    }
+    all_.lamp_seen.resize(lamps_m_.size());
+  }
+
+  void set_tilt_and_lever_arm() {
+    Eigen::Vector2d zenith(0, 0);
+    if (const auto& center = input_.calibration.rotation_center) {
+      zenith = normalized_zenith_point(*center);
+      lever_arm_m_ = center->lever_arm_m.value_or(lever_arm_m_);
+    }
+    problem_.state_vector().segment<2>(problem_.parameter_layout().zenith) = zenith;
+    problem_.state_vector().segment<2>(problem_.parameter_layout().lever_arm) = lever_arm_m_;
+    base_from_camera_ = rotate_level_point_to_camera(zenith, Eigen::Vector3d::UnitZ())
+                            .camera_from_level.transpose();
+  }
+
+  /// Returns the first detection of each lamp above the camera, at most kMaxSightings.
+  CaptureLamps find_lamps(const AdjustmentCapture& capture,
+                          const Eigen::Matrix3d& level_from_base) {
+    CaptureLamps found;
     for (const Detection& detection : capture.detections) {
-      const Lamp* lamp = find_lamp_by_id(input.lamps.lamps, detection.lamp);
-      if (lamp == nullptr || sightings.size() == kMaxSightings) continue;
-      const auto index = static_cast<std::size_t>(lamp - input.lamps.lamps.data());
-      const auto ray = lens.unproject(detection.pixel);
-      if (!ray || std::find(lamps.begin(), lamps.end(), index) != lamps.end()) continue;
-      const Eigen::Vector3d level = inclination.level_from_base * base_from_camera * ray->direction;
+      const Lamp* lamp = find_lamp_by_id(input_.lamps.lamps, detection.lamp);
+      if (lamp == nullptr || found.sightings.size() == kMaxSightings) continue;
+      const auto index = static_cast<std::size_t>(lamp - input_.lamps.lamps.data());
+      const auto ray = lens_.unproject(detection.pixel);
+      if (!ray || std::ranges::find(found.indices, index) != found.indices.end()) continue;
+      const Eigen::Vector3d level = level_from_base * base_from_camera_ * ray->direction;
       if (!(level.z() > 0)) continue;
       const double sigma_px = detection.sigma_px.value_or(1);
-      if (!detection.sigma_px) all.noise_is_stated = false;
+      if (!detection.sigma_px) all_.noise_is_stated = false;
       Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity() / sigma_px;
-      if (input.weighs_in_undistorted_image && !detection.sigma_px && ray->direction.z() > 0) {
-        whitening = d_undistorted_pixel_d_pixel(lens, *ray);
+      if (input_.weighs_in_undistorted_image && !detection.sigma_px && ray->direction.z() > 0) {
+        whitening = d_undistorted_pixel_d_pixel(lens_, *ray);
       }
-      seen.push_back({problem.captures.size(), index, detection.pixel, sigma_px, whitening,
-                      row_clock ? row_clock->compute_time_from_middle_row_s(detection.pixel) : 0});
-      lamps.push_back(index);
-      sightings.push_back(
-          {lamps_m[index], level.hnormalized(), Eigen::Matrix2d(lens.focal_px().asDiagonal()), 1});
+      found.terms.push_back(
+          {0, index, detection.pixel, sigma_px, whitening,
+           row_clock_ ? row_clock_->compute_time_from_middle_row_s(detection.pixel) : 0});
+      found.indices.push_back(index);
+      found.sightings.push_back({lamps_m_[index], level.hnormalized(),
+                                 Eigen::Matrix2d(lens_.focal_px().asDiagonal()), 1});
     }
-    const auto pose = estimate_rough_pose(sightings, lamps, lamps_m);
-    if (!pose) {
-      ++all.rejected_captures;
-      continue;
-    }
-    std::optional<std::size_t> spot;
-    if (!capture.spot.empty()) {
-      spot = spots.at(capture.spot);
-      const Eigen::Matrix2d turn = rotation_about_z(pose->yaw_rad).topLeftCorner<2, 2>();
-      axes_m[*spot] += pose->position_m;
-      axes_m[*spot].head<2>() -= turn * arm_m;
-      ++num_captures_per_pivot[*spot];
-      problem.has_lever_arm = true;
-    }
-    const std::size_t index = problem.captures.size();
-    problem.add_capture({spot, inclination.level_from_base.transpose(), capture.motion}, *pose);
-    for (const auto& sighting : seen) {
-      problem.sightings.push_back(sighting);
-      all.lamp_seen[sighting.lamp] = true;
-    }
-    if (!capture.place) continue;
-    const KnownPosition& place = *capture.place;
+    return found;
+  }
+
+  /// Adds the axis of a pose to the mean of its pivot. Returns the index of the pivot, if there is
+  /// one.
+  std::optional<std::size_t> add_to_pivot(const AdjustmentCapture& capture, const Pose& pose) {
+    if (capture.spot.empty()) return std::nullopt;
+    const std::size_t pivot = pivots_.at(capture.spot);
+    const Eigen::Matrix2d turn = rotation_about_z(pose.yaw_rad).topLeftCorner<2, 2>();
+    sums_m_[pivot] += pose.position_m;
+    sums_m_[pivot].head<2>() -= turn * lever_arm_m_;
+    ++num_captures_[pivot];
+    problem_.has_lever_arm = true;
+    return pivot;
+  }
+
+  void add_known_position(const AdjustmentCapture& capture, const KnownPosition& place,
+                          std::size_t capture_index) {
     const PlaceKey key = capture.spot.empty() ? PlaceKey{"", place.xy_m.x(), place.xy_m.y(),
                                                          place.z_m.value_or(kInfinite), place.of}
                                               : PlaceKey{capture.spot, 0, 0, 0, place.of};
-    const auto [entry, is_new] = place_of_key.emplace(key, all.places.size());
+    const auto [entry, is_new] = place_of_key_.emplace(key, all_.places.size());
     if (is_new) {
-      all.places.push_back({capture.spot.empty() ? capture.name : capture.spot, place.of, 0,
-                            Eigen::Vector3d::Zero(), false});
-      all.place_sd_m.push_back(place.sd_m);
+      all_.places.push_back({capture.spot.empty() ? capture.name : capture.spot, place.of, 0,
+                             Eigen::Vector3d::Zero(), false});
+      all_.place_sd_m.push_back(place.sd_m);
     }
-    ++all.places[entry->second].captures;
+    ++all_.places[entry->second].captures;
     Eigen::Vector3d stated_m(place.xy_m.x(), place.xy_m.y(), place.z_m.value_or(0));
-    stated_m -= all.origin_m;
-    problem.has_lever_arm |= place.of == PlaceOf::axis;
-    problem.places.push_back(
-        {index, entry->second, place.of == PlaceOf::axis, stated_m, place.z_m ? 3 : 2, place.sd_m});
+    stated_m -= all_.origin_m;
+    problem_.has_lever_arm |= place.of == PlaceOf::axis;
+    problem_.places.push_back({capture_index, entry->second, place.of == PlaceOf::axis, stated_m,
+                               place.z_m ? 3 : 2, place.sd_m});
   }
-  for (auto& place : problem.places) {
-    place.sd_m *= std::sqrt(static_cast<double>(all.places[place.place].captures));
-  }
-  problem.place_used.assign(all.places.size(), true);
-  if (input.frees_map_shape) problem.gauge = make_gauge(lamps_m, all.lamp_seen);
-  for (std::size_t i = 0; i < axes_m.size(); ++i) {
-    problem.state_vector().segment<3>(layout.pivot_state_index(i)) =
-        axes_m[i] / std::max(1, num_captures_per_pivot[i]);
-  }
-  return all;
+
+  const AdjustmentInput& input_;
+  Lens lens_;
+  std::optional<RowClock> row_clock_;
+  std::map<std::string, std::size_t> pivots_;
+  AssembledProblem all_;
+  AdjustmentProblem& problem_ = all_.problem;
+  std::vector<Eigen::Vector3d> lamps_m_;
+  Eigen::Vector2d lever_arm_m_{0, 0};
+  Eigen::Matrix3d base_from_camera_;
+  /// Sums of the axes of each pivot's captures, and their numbers.
+  std::vector<Eigen::Vector3d> sums_m_;
+  std::vector<int> num_captures_;
+  std::map<PlaceKey, std::size_t> place_of_key_;
+};
+
+AssembledProblem assemble_adjustment_problem(const AdjustmentInput& input) {
+  ProblemAssembler assembler(input);
+  for (const AdjustmentCapture& capture : input.captures) assembler.add_capture(capture);
+  return std::move(assembler).finish();
 }
 
 /// Returns the norms of the whitened residuals; infinite if the lens cannot project the point.

@@ -26,7 +26,7 @@ HistoryEntry make_entry(const std::string& arguments, const std::vector<std::str
   app.add_option("--lamps", lamps);
   app.add_option("-o,--output", output);
   app.add_option("--method", method);
-  app.add_option("--numbers", numbers)->expected_image_count(2);
+  app.add_option("--numbers", numbers)->expected(2);
   app.add_option("--threads", threads);
   app.add_flag("--refine-map", flag);
   app.add_flag("-q,--quiet", quiet);
