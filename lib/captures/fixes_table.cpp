@@ -202,7 +202,7 @@ std::vector<FixRow> read_fixes(const std::filesystem::path& file) {
                                             lamps ? csv.get_integer(row, *lamps) : 0,
                                             csv.line(row)});
     if (read.status.empty()) throw csv.make_error(row, status, "is empty");
-    if (count_utf8_characters(read.status) != read.status.size()) {
+    if (count_bytes_of_utf8_prefix(read.status) != read.status.size()) {
       throw csv.make_error(row, status, "should be UTF-8");
     }
     if (read.status == "ok") read.fix = read_fix(csv, row, columns);

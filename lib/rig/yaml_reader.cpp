@@ -84,7 +84,7 @@ class TreeBuilder : public YAML::EventHandler {
 };
 
 YamlNode build_tree(const std::filesystem::path& file, const std::string& text) {
-  const std::size_t valid = count_utf8_characters(text);
+  const std::size_t valid = count_bytes_of_utf8_prefix(text);
   if (valid < text.size()) {
     const auto line = std::count(text.begin(), text.begin() + std::ptrdiff_t(valid), '\n') + 1;
     throw InputError(file, std::size_t(line), "", "is not UTF-8 text: save it in that encoding");

@@ -36,7 +36,7 @@ std::string format_shortest(double value) {
 
 std::string truncate_text(std::string_view text, std::size_t max_bytes) {
   if (text.size() <= max_bytes) return std::string(text);
-  return std::string(text.substr(0, count_utf8_characters(text.substr(0, max_bytes)))) + "...";
+  return std::string(text.substr(0, count_bytes_of_utf8_prefix(text.substr(0, max_bytes)))) + "...";
 }
 
 std::string quote_for_message(std::string_view text) { return "'" + truncate_text(text, 40) + "'"; }
@@ -45,7 +45,7 @@ std::size_t line_of_yaml_mark(const YAML::Mark& mark) {
   return mark.is_null() ? 0 : static_cast<std::size_t>(mark.line) + 1;
 }
 
-std::size_t count_utf8_characters(std::string_view text) {
+std::size_t count_bytes_of_utf8_prefix(std::string_view text) {
   std::size_t valid = 0;
   while (valid < text.size()) {
     const std::size_t length = count_bytes_of_utf8_character(text.substr(valid));

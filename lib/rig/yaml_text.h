@@ -29,7 +29,7 @@ std::size_t line_of_yaml_mark(const YAML::Mark& mark);
 /// @pre `text` is not empty
 std::size_t count_bytes_of_utf8_character(std::string_view text);
 /// Returns the length in bytes of the longest prefix of `text` that is UTF-8.
-std::size_t count_utf8_characters(std::string_view text);
+std::size_t count_bytes_of_utf8_prefix(std::string_view text);
 
 }  // namespace vlp
 #pragma GCC visibility pop

@@ -60,7 +60,7 @@ std::string quoted_name(const std::string& name) {
   std::string quoted = "'";
   for (const char character : name) {
     const auto byte = static_cast<unsigned char>(character);
-    if (byte < first_printable || byte == del || count_utf8_characters(name) < name.size()) {
+    if (byte < first_printable || byte == del || count_bytes_of_utf8_prefix(name) < name.size()) {
       throw std::invalid_argument(
           "the camera id contains control characters or is not UTF-8; give another one with "
           "--camera-id");
