@@ -74,7 +74,7 @@ TEST(CrlbRatio, MatchesAnalyticLimit) {
 TEST(CrlbRatio, BeatenIgnoresChanceAndDetectsSmallErrors) {
   Random random(3);
   constexpr int trials = 2000, fixes = 50;
-  const auto is_below_limit = [&](double stated) {
+  const auto count_below_limit = [&](double stated) {
     int count = 0;
     for (int trial = 0; trial < trials; ++trial) {
       double squares = 0;
@@ -84,8 +84,8 @@ TEST(CrlbRatio, BeatenIgnoresChanceAndDetectsSmallErrors) {
     }
     return count;
   };
-  EXPECT_LE(is_below_limit(1), 10);  // 2.7 are expected
-  EXPECT_EQ(is_below_limit(1.0 / 0.609), trials);
+  EXPECT_LE(count_below_limit(1), 10);  // 2.7 are expected
+  EXPECT_EQ(count_below_limit(1.0 / 0.609), trials);
 }
 
 /// Every sixth camera is 10 m below the lamps, the others 2 m: their limit is five times as large,
@@ -99,7 +99,7 @@ TEST(CrlbRatio, FalseAlarmRateHoldsForUnequalLimits) {
   constexpr double sd_per_m = 0.1 / 500 / 2;  // see above
   std::vector<TruthRow> truth;
   for (std::size_t i = 0; i < fixes; ++i) truth.push_back({"", {0, 0}, i % 6 == 0 ? -8.0 : 0, 0});
-  int is_below_limit = 0, as_if_equal = 0;
+  int num_below_limit = 0, as_if_equal = 0;
   double square = 0, sd = 0;
   for (int trial = 0; trial < trials; ++trial) {
     std::vector<FixError> errors;
@@ -112,11 +112,11 @@ TEST(CrlbRatio, FalseAlarmRateHoldsForUnequalLimits) {
     ASSERT_TRUE(ratio);
     sd = ratio->sd;
     square += std::pow(ratio->horizontal - 1, 2) / trials;
-    is_below_limit += ratio->is_below_crlb() ? 1 : 0;
+    num_below_limit += ratio->is_below_crlb() ? 1 : 0;
     as_if_equal += ratio->horizontal < 1 - 3 / std::sqrt(4.0 * fixes) ? 1 : 0;
   }
   EXPECT_NEAR(std::sqrt(square) / sd, 1, 0.13);  // three standard errors
-  EXPECT_LE(is_below_limit, 3);                  // 0.1 are expected
+  EXPECT_LE(num_below_limit, 3);                 // 0.1 are expected
   EXPECT_GE(as_if_equal, 8);                     // 22 are expected: unequal limits matter here
 }
 
