@@ -2,7 +2,8 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Runs vlp-calibrate again over an archive of captures, and says what changed.
+# Runs vlp-calibrate on all sessions of an archive and compares the results with
+# earlier ones.
 #
 #   scripts/reprocess.sh ARCHIVE RESULTS [--gates FILE] [--previous RESULTS]
 #                        [--cores N] [--profile slurm] [--session-gates FILE]
@@ -11,49 +12,47 @@
 #                        [--rebuild-catalogue]
 #   scripts/reprocess.sh --diff RESULTS CAMERA/SESSION [KEY | OTHER_RESULTS]
 #
-# ARCHIVE/CAMERA/SESSION/ is laid out as vlp-calibrate has it, and only read.
-# RESULTS gets
-#   summary.csv            a row per session: verdict, figures, what to look at,
-#                          reason, version, cost
-#   fleet.csv, lamps.csv   what was calibrated, and where each lamp was seen,
-#                          over time
-#   overview.html          the same for people, with what changed since
-#                          --previous
-#   changes.json           that comparison for programs, and the gates
-#   sessions/, failed/     per session its results, or why there are none:
-#                          session.json
-# Results that are up to date are not computed again; an interrupted run
-# continues. A session without a result does not stop the others.
+# The folders ARCHIVE/CAMERA/SESSION/ have the contents that vlp-calibrate --help
+# lists. They are not modified. RESULTS contains:
+#   summary.csv            one row per session: verdict, metrics, remarks, reason,
+#                          version, processor time
+#   fleet.csv, lamps.csv   calibrated parameters and lamp offsets per session
+#   overview.html          report of the run and of changes since --previous
+#   changes.json           the same in machine-readable form, with the gates
+#   sessions/, failed/     results of each session; session.json has the reason
+#                          if there is no result
+# Results that are up to date are not computed again. After an interruption the
+# same command continues. A session without a result does not stop the others.
 #
-# --cores N        shards at a time on this machine (default: one more than it
-#                  has cores, so that none is idle while one waits)
-# --profile NAME   a profile of scripts/reprocess/profiles or a folder: slurm
+# --cores N        number of shards that run in parallel on this machine
+#                  (default: number of cores plus one)
+# --profile NAME   profile of scripts/reprocess/profiles, or a folder; slurm
 #                  submits shards to a cluster
 # --previous       results of an earlier run to compare with
-# --gates          what the archive as a whole has to keep to,
-#                  vlp-archive-gates/1
-# --session-gates  gates (vlp-gates/1) for sessions that have no gates.yaml of
-#                  their own; other ones need no other calibration
-# --row-time-s     from one row of the read-out to the next (default: found)
-# --readout        along which the shutter reads (default: found)
-# --shard-size N   sessions in a job at most (default 50)
-# --keep N         results that a session had before, of which so many stay in
-#                  former/ (default 1)
-# --scan           at what, to see that a session changed: at its files, or at
-#                  its folders, tables and YAML files, to which an image that
-#                  is written over in place looks the same. Default: files; in
-#                  an archive of more than 10,000 sessions folders, and files
-#                  once a week
-# --rebuild-catalogue  forgets what was seen: all contents are looked at again
-# --diff           says what differs between a session's result and a former
-#                  one, by its key's first letters (default: the last one), or
-#                  that of other results
+# --gates          file of gates for the whole archive, vlp-archive-gates/1
+# --session-gates  file of gates, vlp-gates/1, for sessions without gates.yaml;
+#                  a change of this file requires no new calibration
+# --row-time-s     row time: time between the readout of successive rows, in s
+#                  (default: estimated)
+# --readout        readout direction, rows or columns (default: estimated)
+# --shard-size N   maximum number of sessions per job (default: 50)
+# --keep N         number of former results of each session to keep in former/
+#                  (default: 1)
+# --scan           detection of changed sessions. files: checks all files.
+#                  folders: checks folders, tables and YAML files; it does not
+#                  detect an image that is overwritten in place. Default: files;
+#                  for more than 10,000 sessions folders, and files once a week
+# --rebuild-catalogue  discard the catalogue and compute all digests again
+# --diff           print differences between the result of a session and a former
+#                  one, given by the first characters of its key (default: the
+#                  last), or the result in OTHER_RESULTS
 #
 # Exit code: 0 done; 1 done, but a gate of the archive is not met, or a gate of
 # a session if the archive has no gate_fraction. By default the archive has one
-# gate, vanished: 0: each session of RESULTS and of --previous is still there.
-# 2 bad input; 3 incomplete: the run could not finish, no session has a result,
-# or more than no_result or no_result_fraction of --gates allow have none.
+# gate, vanished: 0: no session of RESULTS or --previous is missing in ARCHIVE.
+# 2 invalid input; 3 incomplete: the run could not finish, no session has a
+# result, or more sessions have none than no_result or no_result_fraction of
+# --gates allow.
 set -euo pipefail
 scripts=$(cd "$(dirname "$0")" && pwd)/reprocess
 bin=${VLP_PROGRAMS_DIR:-}
@@ -100,13 +99,13 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-[ ${#folders[@]} = 2 ] || usage "ARCHIVE and RESULTS are missing, or something more is there"
+[ ${#folders[@]} = 2 ] || usage "ARCHIVE and RESULTS are missing, or there are additional arguments"
 results=${folders[1]}
 snakemake=$("$python" -c 'from importlib.metadata import version; print(version("snakemake"))' 2>/dev/null) ||
   refuse "snakemake is missing; scripts/setup.sh --batch or apt install snakemake installs it"
 if [[ $profile == "$scripts/profiles/slurm" && $snakemake != 7.* ]] &&
   ! "$python" -c 'import snakemake_executor_plugin_slurm' 2>/dev/null; then
-  refuse "Snakemake $snakemake submits by snakemake-executor-plugin-slurm, which is missing beside it: install it by pip"
+  refuse "Snakemake $snakemake needs snakemake-executor-plugin-slurm, which is missing: install it with pip"
 fi
 if [ -n "$profile" ]; then
   how=(--profile "$profile")
@@ -116,7 +115,7 @@ fi
 
 export PYTHONDONTWRITEBYTECODE=1
 case $(realpath -m "$results")/ in
-  "$(realpath -m "${folders[0]}")"/*) usage "$results: is in the archive, which is only read" ;;
+  "$(realpath -m "${folders[0]}")"/*) usage "$results: is in the archive, which must not be modified" ;;
 esac
 [ -d "${folders[0]}" ] || usage "${folders[0]}: is not a folder"
 # A .state that something else made is never written into or deleted: ours says so in "owner" and, once planned, in
@@ -129,7 +128,7 @@ case $(ls -A "$state" 2>/dev/null) in
   '' | lock) made=1 ;;
   *)
     [ -e "$state/owner" ] || grep -qs '^ "archive": ' "$state/run.json" ||
-      refuse "$results: holds a .state that is not of reprocess.sh; give the results a folder of their own"
+      refuse "$results: contains a .state that is not of reprocess.sh; give the results a folder of their own"
     ;;
 esac
 mkdir -p "$state" 2>/dev/null && : 2>/dev/null >>"$state/lock" ||
@@ -162,7 +161,7 @@ stop() {
   while level=$(pgrep --parent "$level" | paste -sd,) && [ -n "$level" ]; do started+=(${level//,/ }); done
   kill -TERM "${started[@]}" 2>/dev/null || true
   wait "$run" || true
-  echo "reprocess.sh: error: interrupted; the same command goes on" >&2
+  echo "reprocess.sh: error: interrupted; the same command continues" >&2
   exit 3
 }
 trap stop HUP INT TERM
@@ -174,9 +173,9 @@ if [ "$code" != 0 ]; then
   [ ${#failed[@]} -gt 0 ] || tail -n 20 "$log" >&2
   for said in "${failed[@]}"; do
     words=$(tail -n 1 "$results/$said")
-    echo "$results/$said: ${words:-holds nothing; is the disk full?}" >&2
+    echo "$results/$said: ${words:-is empty; is the disk full?}" >&2
   done
-  echo "reprocess.sh: error: not all could be done; see $log; the same command goes on" >&2
+  echo "reprocess.sh: error: not all could be processed; see $log; the same command continues" >&2
   exit 3
 fi
 exec "$python" "$scripts/verdict.py" "$results"

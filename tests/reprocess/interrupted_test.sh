@@ -48,7 +48,7 @@ for signal in TERM HUP; do
   kill -$signal "$run"
   code=0
   wait "$run" || code=$?
-  [ $code = 3 ] && grep -q 'interrupted; the same command goes on' "$said" || fail "$signal: $code: $(cat "$said")"
+  [ $code = 3 ] && grep -q 'interrupted; the same command continues' "$said" || fail "$signal: $code: $(cat "$said")"
   patiently 5 flock --nonblock "$results-signal/.state/lock" true
   patiently 5 gone
 done

@@ -28,7 +28,7 @@ mkdir -p "$results/.state"
 echo precious >"$results/.state/notes"
 before=$(find "$results" | sort)
 for folder in "$scratch/layout-empty" "$archive"; do
-  incomplete 2 'holds a .state that is not of reprocess.sh; give the results a folder of their own' "$folder" "$results"
+  incomplete 2 'contains a .state that is not of reprocess.sh; give the results a folder of their own' "$folder" "$results"
   [ "$(find "$results" | sort)" = "$before" ] || fail "another program's .state was changed"
 done
 rm -r "$results"

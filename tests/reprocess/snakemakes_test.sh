@@ -21,7 +21,7 @@ for python in /usr/bin/python3 $(other_snakemakes); do
   for shard in 000000 000001; do
     grep -q "/.state/logs/$shard.txt: .*Error: .*sessions" "$said.errors" || fail "$version: $(cat "$said.errors")"
   done
-  grep -q 'not all could be done; see .*; the same command goes on' "$said.errors" || fail "$version: no summary"
+  grep -q 'not all could be processed; see .*; the same command continues' "$said.errors" || fail "$version: no summary"
   rm "$results/sessions"
   reprocess "$results" --shard-size 1 >"$said" || fail "$version: exit code $?"
   grep -q '^this run    ran 2, of them 0 without a result; reused 0; ' "$said" || fail "$version: $(cat "$said")"
