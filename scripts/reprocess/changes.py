@@ -22,7 +22,7 @@ import yaml
 
 HAVE_RESULT = ("pass", "look", "gate")
 FEWEST_CAMERAS = 20  # as vlp-evaluate asks for 20 stations
-SAME_MM = 0.001  # nobody measures less
+SAME_MM = 0.001  # below every measurement uncertainty
 
 
 def name_of(row):
@@ -104,7 +104,7 @@ def changes_of(rows, before_rows):
             better, worse = interval[1] < 0, interval[0] > 0
             changes["verdict"] = "better" if better else "worse" if worse else "no evidence"
         else:
-            changes["verdict"] = f"fewer than {FEWEST_CAMERAS} cameras cannot tell"
+            changes["verdict"] = f"no comparison with fewer than {FEWEST_CAMERAS} cameras"
     pairs.sort(key=lambda pair: (-abs(pair[2]), name_of(pair[0])))
     return changes, pairs
 
@@ -157,7 +157,7 @@ def vanished_sessions(rows, known, before_rows):
 
 
 def lost_results(rows, before_rows, had_result):
-    """Returns the sessions that lost their result. had_result: tells if a session has a former result in RESULTS."""
+    """Returns the sessions that lost their result. had_result(name): true if RESULTS has a former result."""
     before = {name_of(row) for row in before_rows if row["verdict"] in HAVE_RESULT}
     names = [name_of(row) for row in rows if row["verdict"] not in HAVE_RESULT]
     return [name for name in names if name in before or had_result(name)]

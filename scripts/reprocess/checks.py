@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether what scripts/reprocess.sh is told is right."""
+"""Checks the options of scripts/reprocess.sh."""
 import subprocess
 import sys
 
@@ -26,7 +26,7 @@ def check_programs(folder):
 def check_previous(previous, results):
     table = previous / "summary.csv"
     if not table.is_file():
-        fail(f"{previous}: holds no summary.csv of an earlier run")
+        fail(f"{previous}: contains no summary.csv of an earlier run")
     if previous.resolve() == results.resolve():
         fail(f"{previous}: this run writes there; --previous is another folder, e.g. a copy")
     rows = read_table(table)
@@ -44,7 +44,7 @@ def check_session_gates(options):
 
 
 def check(options):
-    """What is wrong is said before anything is run."""
+    """Reports invalid options before anything is run."""
     check_programs(options.bin)
     for file in (options.gates, options.session_gates):
         if file and not file.is_file():

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Says what differs between two results of a session: reprocess.sh --diff."""
+"""Prints the differences between two results of a session: reprocess.sh --diff."""
 import json
 import sys
 from pathlib import Path
@@ -13,7 +13,7 @@ def result_in(results, name):
     for place in ("sessions", "failed"):
         if (results / place / name / "row.json").is_file():
             return results / place / name
-    fail(f"{results}: holds no result of {name}")
+    fail(f"{results}: contains no result of {name}")
 
 
 def former_of(results, name, key):
@@ -22,7 +22,7 @@ def former_of(results, name, key):
     if not found:
         there = ", ".join(sorted(former.name for former in folder.iterdir())) if folder.is_dir() else "none"
         which = f"former result {key}" if key else "former result"
-        fail(f"{results}: keeps no {which} of {name}; there are: {there}; --keep N keeps so many")
+        fail(f"{results}: has no {which} of {name}; there are: {there}; --keep N sets how many are kept")
     return max(found, key=lambda former: (former / "row.json").stat().st_mtime_ns)
 
 
@@ -47,10 +47,10 @@ def words(value):
 
 
 def changed_inputs(old_row, row):
-    """The files and folders that differ; rows of an earlier version do not tell."""
+    """The files and folders that differ; unknown for rows of earlier versions."""
     parts, old_parts = row.get("parts"), old_row.get("parts")
     if parts is None or old_parts is None:
-        return "the same" if row["inputs"] == old_row["inputs"] else "others, not known which"
+        return "the same" if row["inputs"] == old_row["inputs"] else "changed, not known which"
     changed = sorted(part for part in {*parts, *old_parts} if parts.get(part) != old_parts.get(part))
     return ", ".join(changed) or "the same"
 
@@ -64,7 +64,7 @@ def lines_of(before, now):
     yield f"version     {old['version'] or 'none'} -> {new['version'] or 'none'}{same}"
     figures, old_figures = figures_of(new), figures_of(old)
     differing = [name for name in {**old_figures, **figures} if figures.get(name) != old_figures.get(name)]
-    yield f"figures     {len(differing)} of {len({**old_figures, **figures})} differ"
+    yield f"metrics     {len(differing)} of {len({**old_figures, **figures})} differ"
     for name in differing:
         a, b = old_figures.get(name), figures.get(name)
         by = f" ({b - a:+.3g})" if a is not None and b is not None else ""
@@ -78,7 +78,7 @@ def lines_of(before, now):
 
 def main():
     if len(sys.argv) not in (3, 4):
-        fail("--diff wants RESULTS CAMERA/SESSION and, if not the last former result, its KEY or OTHER_RESULTS")
+        fail("--diff needs RESULTS CAMERA/SESSION and, if not the last former result, its KEY or OTHER_RESULTS")
     results, name, other = Path(sys.argv[1]), sys.argv[2].strip("/"), (sys.argv[3:] or [""])[0]
     now = result_in(results, name)
     before = result_in(Path(other), name) if other and Path(other).is_dir() else former_of(results, name, other)

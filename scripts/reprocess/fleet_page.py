@@ -34,7 +34,7 @@ def cameras(fleet, fleet_rows):
         for change in alarm["changes"]:
             by = f"{change['change']:+.4g} ± {change['sd']:.2g}"
             rows.append((alarm["camera"], words_of(change["figure"]), by, describe_date(change), chance(change["p"])))
-    html += table(["camera", "figure", "change", "step or drift", "chance in this fleet"], rows, "changes.json")
+    html += table(["camera", "parameter", "change", "step or drift", "false alarm probability"], rows, "changes.json")
     pictured = {alarm["camera"] for alarm in fleet["cameras"][:MOST_PICTURES]}
     series = camera_series([row for row in fleet_rows if row["camera"] in pictured])
     for alarm in fleet["cameras"][:MOST_PICTURES]:
@@ -59,10 +59,10 @@ def lamps(fleet, lamp_rows):
     html, rows = '<h2 id="lamps">Lamps that were moved</h2>\n', []
     for lamp in fleet["lamps"]:
         by = f"{abs(complex(*lamp['moved_mm'])):.2f} mm: x {lamp['moved_mm'][0]:+.2f}, y {lamp['moved_mm'][1]:+.2f}"
-        sure = "other cameras saw it before than after: it may be they" if lamp["other_cameras"] else ""
+        sure = "different cameras before and after: they may be the cause" if lamp["other_cameras"] else ""
         ends = when(lamp["before"]), when(lamp["since"])
         rows.append((room_of(lamp), lamp["lamp"], by, *ends, chance(lamp["p"]), sure))
-    columns = ["room", "lamp", "moved by", "after", "not later than", "chance in this fleet", ""]
+    columns = ["room", "lamp", "moved by", "after", "not later than", "false alarm probability", ""]
     html += table(columns, rows, "changes.json")
     pictured = {(lamp["room"], lamp["map"]) for lamp in fleet["lamps"][:MOST_PICTURES]}
     rooms = {room.name: room for room in rooms_of([row for row in lamp_rows if (row["room"], row["map"]) in pictured])}
@@ -74,7 +74,7 @@ def lamps(fleet, lamp_rows):
             for axis, series in zip("xy", room.along(lamp["lamp"], fleet["between_sessions"]["lamps"]))
         }
         is_since = [all(row[key] == lamp["since"][key] for key in ("camera", "session")) for row in room.sessions]
-        what = f"lamp {lamp['lamp']} as the others see it, from its place in the map (mm)"
+        what = f"lamp {lamp['lamp']}: position relative to the other lamps minus the map (mm)"
         dated = all(row["date"] for row in room.sessions)
         drawn = pictures.over_time(points, "offset (mm)", dated, times[is_since.index(True)])
         html += picture(drawn, f"{room_of(lamp)}: {what}")
@@ -91,12 +91,12 @@ def own_scatter(fleet):
             words = f"{name.replace('_', ' ')} ({TWO[name]})"
             rows.append((camera, words, f"{tau:.2g}", f"{fleet['between_sessions'][name]:.2g}"))
     html = "<h2>Cameras whose sessions scatter more than those of the fleet</h2>\n"
-    columns = ["camera", "figure", "standard deviation between sessions", "that of the fleet"]
+    columns = ["camera", "parameter", "standard deviation between sessions", "fleet"]
     return html + table(columns, rows, "changes.json")
 
 
 def least_found(fleet):
-    html = "<p>What sessions like these show: a change of so much is called in 95 of 100 cases.</p>\n"
+    html = "<p>Smallest changes that are detected in 95 % of cases:</p>\n"
     rows = []
     for name, sizes in fleet["least_found"].items():
         words = f"{name.replace('_', ' ')} ({TWO.get(name, 'mm')})"
@@ -109,15 +109,16 @@ def page(fleet, fleet_rows, lamp_rows):
     html += lamps(fleet, lamp_rows) if fleet["lamps"] else ""
     tested = {name: tau for name, tau in fleet["between_sessions"].items() if tau is not None}
     if not tested:
-        return html + "<p>Too few sessions of a camera, or of a room, to tell whether cameras or lamps change.</p>\n"
+        return html + "<p>Too few sessions of a camera or of a room to test for changes of cameras or lamps.</p>\n"
     if not html:
         html = "<h2>Cameras and lamps over time</h2>\n"
-        html += "<p>No camera changed, and no lamp was moved, as far as can be seen.</p>\n"
+        html += "<p>No change of a camera or lamp was detected.</p>\n"
     wide = ", ".join(f"{name.replace('_', ' ')} {tau:.2g} {TWO.get(name, 'mm')}" for name, tau in tested.items() if tau)
     rate = f"{100 * fleet['false_alarm_rate']:.0f} %"
     drifts, steps = fleet["tests"]["drift"], fleet["tests"]["step"]
-    html += f"<p>{drifts} figures were tried for drifts, {steps} sessions of figures and lamps for steps; the chance of any "
-    html += f"false alarm in all of it is {rate} at most."
+    html += f"<p>{drifts} parameters were tested for drifts, {steps} sessions of parameters and lamps for steps; the "
+    html += f"probability of any false alarm is at most {rate}."
     if wide:
-        html += f" Sessions differ by more than they state; this standard deviation between sessions counts, too: {wide}."
-    return html + " All figures: fleet.csv, lamps.csv.</p>\n" + own_scatter(fleet) + least_found(fleet)
+        html += " Sessions differ by more than the reported uncertainties. "
+        html += f"The tests include an additional standard deviation between sessions: {wide}."
+    return html + " All values: fleet.csv, lamps.csv.</p>\n" + own_scatter(fleet) + least_found(fleet)

@@ -66,7 +66,7 @@ def differing(run, previous, pairs):
             continue
         data, scale = pictures.floor(truth, *fixes)
         if data:
-            html += picture(data, f"{name_of(row)}: errors over the floor, before and now, {scale} times as large")
+            html += picture(data, f"{name_of(row)}: errors over the floor, before and now, magnified {scale} times")
     return html
 
 
@@ -80,7 +80,7 @@ def parts_of(results, name):
 
 
 def changed_inputs(previous, rows, before, changes):
-    html = "<h2>Of other inputs than before</h2>\n"
+    html = "<h2>Sessions with changed inputs</h2>\n"
     by_name, listed = {name_of(row): row for row in rows}, []
     rows_before = {name_of(row): row for row in before}
     lost = changes["lost_with_other_inputs"]
@@ -91,13 +91,13 @@ def changed_inputs(previous, rows, before, changes):
         figures = [one.get(key, "") for key in COMPARED for one in (rows_before[name], by_name[name])]
         listed.append((name, ", ".join(files) if parts_before else "not known", what, *figures))
     columns = [f"{key.replace('_', ' ')} {when}" for key in COMPARED for when in ("before", "now")]
-    html += table(["session", "what of it is another", "now", *columns], listed)
+    html += table(["session", "changed inputs", "now", *columns], listed)
     more = changes["other_inputs"] - len(listed)
     return html + (f"<p>and {more} more, in changes.json</p>\n" if more else "")
 
 
 def comparison(run, previous, rows, before, changes, pairs):
-    html = "<h2>What changed</h2>\n"
+    html = "<h2>Comparison with earlier results</h2>\n"
     html += table(
         ["", "sessions"],
         [(words, len(changes[key]) if isinstance(changes[key], list) else changes[key]) for words, key in COUNTED],
@@ -114,7 +114,7 @@ def comparison(run, previous, rows, before, changes, pairs):
     if changes["other_inputs"]:
         html += changed_inputs(previous, rows, before, changes)
     if changes["newly_failed"]:
-        html += "<h2>Had a result before, and have none now</h2>\n"
+        html += "<h2>Newly without a result</h2>\n"
         by_name = {name_of(row): row["reason"] for row in rows}
         html += table(["session", "reason"], [(name, by_name[name]) for name in changes["newly_failed"]])
     return html
@@ -126,12 +126,12 @@ COUNTED = [
     ("better", "better"),
     ("worse", "worse"),
     ("the same", "same"),
-    ("without a result, had one", "newly_failed"),
-    ("with a result, had none", "newly_good"),
-    ("of other inputs than before", "other_inputs"),
-    ("of them without a result, had one", "lost_with_other_inputs"),
+    ("newly without a result", "newly_failed"),
+    ("newly with a result", "newly_good"),
+    ("with changed inputs", "other_inputs"),
+    ("with changed inputs, newly without a result", "lost_with_other_inputs"),
     ("new", "only_now"),
-    ("no longer there", "only_before"),
+    ("no longer in the archive", "only_before"),
 ]
 
 
@@ -139,8 +139,8 @@ def look_here(rows):
     look = [row for row in rows if row["verdict"] == "look"]
     if not look:
         return ""
-    words = '<h2 id="look">Passed, but look here</h2>\n'
-    columns = ["session", "mean (mm)", "images skipped", "lamps left out (captures)", "what to look at"]
+    words = '<h2 id="look">Passed with remarks</h2>\n'
+    columns = ["session", "mean (mm)", "images skipped", "rejected lamps (captures)", "remarks"]
     keys = ("mean_mm", "images_skipped", "rejected_lamps", "remarks")
     return words + table(columns, [(name_of(row), *(row[key] for key in keys)) for row in look])
 
@@ -155,25 +155,25 @@ def list_actions(document, items, rows):
     counts, actions = document["counts"], []
     if is_incomplete(counts, document["gates"]):
         reason, count = count_reasons(rows)[0]
-        words = f"{count} of {counts['sessions']} sessions have no result, for: {reason}"
-        actions.append((f"Mend the archive: {words}", "failed"))
+        words = f"{count} of {counts['sessions']} sessions have no result: {reason}"
+        actions.append((f"Correct the archive: {words}", "failed"))
     if items["vanished"]:
-        words = "Restore these sessions, or delete their results if they are meant to be gone"
+        words = "Restore these sessions, or delete their results if they were removed on purpose"
         actions.append((f"{words}: {shorten(items['vanished'])}", "vanished"))
     if items["lost_results"]:
-        actions.append((f"Look why these sessions lost their result: {shorten(items['lost_results'])}", "failed"))
+        actions.append((f"Find out why these sessions lost their result: {shorten(items['lost_results'])}", "failed"))
     if items["cameras_changed"]:
         actions.append((f"Examine these cameras: {shorten(items['cameras_changed'])}", "cameras"))
     if items["lamps_moved"]:
         actions.append((f"Survey these lamps: {shorten(items['lamps_moved'])}", "lamps"))
     missed = [gate["name"] for gate in document["gates"] if not gate["passed"] and not items.get(gate["name"])]
     if missed:
-        actions.append((f"Look at the gates that are not met: {', '.join(missed)}", "gates"))
+        actions.append((f"Check the gates that are not met: {', '.join(missed)}", "gates"))
     without_result = counts["no_result"] + counts["crashed"]
     for number, words, section in (
         (without_result, "have no result", "failed"),
         (counts["gate"], "miss a gate of their own", "session-gates"),
-        (counts["look"], "passed with something to look at", "look"),
+        (counts["look"], "passed with remarks", "look"),
     ):
         if number and section not in [known for _, known in actions]:
             actions.append((f"{number} of {counts['sessions']} sessions {words}", section))
@@ -189,7 +189,7 @@ def verdict_part(document, items, rows):
     if not actions:
         return html + "<p>Nothing to do.</p>\n"
     lines = "".join(f'<li><a href="#{section}">{escape(words)}</a></li>' for words, section in actions)
-    return html + f"<h2>What to do, the most urgent first</h2><ol>{lines}</ol>\n"
+    return html + f"<h2>Actions, most urgent first</h2><ol>{lines}</ol>\n"
 
 
 def page(run, rows, document, items, fleet, parts):
@@ -208,12 +208,12 @@ def page(run, rows, document, items, fleet, parts):
     html += table(["gate", "value", "at most", ""], words)
     html += f"<p>Version {escape(run['version'])}, toolbox {run['toolbox'][:12]}.</p>\n<h2>Sessions</h2>\n"
     figures = [(name.replace("_", " "), number(value)) for name, value in document["counts"].items()]
-    html += table(["figure", "value"], figures)
+    html += table(["metric", "value"], figures)
     failed = [row for row in rows if row["verdict"] not in HAVE_RESULT]
     if failed:
         lost = set(items["lost_results"])
         html += '<h2 id="failed">Without a result</h2>\n' + table(["reason", "sessions"], count_reasons(failed))
-        columns = [(name_of(row), "had one before" if name_of(row) in lost else "", row["reason"]) for row in failed]
+        columns = [(name_of(row), "had one earlier" if name_of(row) in lost else "", row["reason"]) for row in failed]
         html += table(["session", "", "reason"], sorted(columns, key=lambda one: not one[1]))
     missing = [row for row in rows if row["verdict"] == "gate"]
     if missing:

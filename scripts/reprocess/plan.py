@@ -98,11 +98,11 @@ def write_shards(archive, sessions, state, options):
 
 def looked_at(catalogue, look):
     if look == "files":
-        return "looked at all files"
+        return "checked all files"
     if not catalogue.all_files_at_ns():
-        return "looked at folders and tables, never yet at all files"
+        return "checked folders and tables, never all files"
     day = time.strftime("%Y-%m-%d", time.localtime(catalogue.all_files_at_ns() / 1e9))
-    return f"looked at folders and tables, at all files last on {day}"
+    return f"checked folders and tables, all files last on {day}"
 
 
 def changed_at(file):

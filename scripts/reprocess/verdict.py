@@ -57,7 +57,7 @@ def main():
     cost_s = sum(float(row["cpu_s"] or 0) for row in rows)
     print(f"this run    {this_run(results / '.state', counts['sessions'])}")
     print(f"passed      {counts['pass']}")
-    print(f"look        {counts['look']} that passed with something to look at; the overview lists them")
+    print(f"look        {counts['look']} passed with remarks; see the overview")
     print(f"gates       {counts['gate']} with a result that misses a gate")
     print(f"no result   {counts['no_result']}, and {counts['crashed']} that crashed; see failed/")
     for reason, count in count_reasons(rows)[:MAX_REASONS]:
@@ -75,7 +75,7 @@ def main():
         print(f"{len(changes['newly_failed'])} newly without a result: {changes.get('verdict', 'nothing to compare')}")
         if changes["other_inputs"]:
             lost = len(changes["lost_with_other_inputs"])
-            print(f"inputs      {changes['other_inputs']} of other inputs than before, {lost} lost their result with them")
+            print(f"inputs      {changes['other_inputs']} with changed inputs, {lost} of them lost their result")
     print(f"overview    {results / 'overview.html'}")
     for gate in document["gates"]:
         if not gate["passed"]:

@@ -645,7 +645,7 @@ const std::string kClearParts =
     "occurs twice|stdin: a line|"
     "string of keywords|has four|the board's white|the brightest lamp|"
     "their place|there are no|there is no|too small for|rotation in place|"
-    "two black bits|views with the board|wants a value|wants RESULTS|was not judged|"
+    "two black bits|views with the board|wants a value|was not judged|"
     "weights go up to|of the drive are equal|without the other|works on this camera";
 
 /// Returns true if a message asks a question that names the likely cause, or if it has the form

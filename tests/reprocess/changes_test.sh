@@ -61,14 +61,14 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   code=0
   reprocess "$looked" --previous "$baseline" --gates "$scratch/gates.yaml" >"$said" 2>"$scratch/errors" || code=$?
   [ "$code" = 1 ] && grep -q 'gate newly_failed: is 1, at most 0' "$scratch/errors" || fail "$code $(cat "$scratch/errors")"
-  for words in '^this run    ran 2, of them 1 without a result; reused 0; ' '^passed      0' '^look        1 that passed' \
-    '1 newly without a result' '^inputs      2 of other inputs than before, 1 lost their result'; do
+  for words in '^this run    ran 2, of them 1 without a result; reused 0; ' '^passed      0' '^look        1 passed with remarks' \
+    '1 newly without a result' '^inputs      2 with changed inputs, 1 of them lost their result'; do
     grep -q "$words" "$said" || fail "no '$words' in $(cat "$said")"
   done
   as_its_schema_says row "$looked"/*/*/*/row.json
   as_its_schema_says changes "$looked/changes.json"
   page=$looked/overview.html
-  head -n 20 "$page" | grep -q '<h2 id="look">Passed, but look here</h2>' || fail "the overview does not begin with it"
+  head -n 20 "$page" | grep -q '<h2 id="look">Passed with remarks</h2>' || fail "the overview does not begin with it"
   grep -q 'assumed to be zero' "$page" || fail "the warning is not in the overview"
   grep -q '6 images skipped; the first, 0006.png: cannot be read as an image: it is cut short' "$page" || fail "no skipped images"
   grep -q "$lost</td><td>lamps.yaml</td><td>lost its result" "$page" || fail "no inputs that changed"
@@ -153,10 +153,10 @@ refused 'neither of ours nor a folder' "$archive" "$scratch/refused" --profile o
 refused '--scan: should be files or folders' "$archive" "$scratch/refused" --scan everywhere
 refused "option '--look' is now called '--scan'" "$archive" "$scratch/refused" --look files
 refused '--keep: should be a number' "$archive" "$scratch/refused" --keep all
-refused 'keeps no former result' --diff "$results" camera-00001/session-01
-refused 'holds no result of' --diff "$results" camera-00001/session-77
-refused 'wants RESULTS CAMERA/SESSION' --diff "$results"
-refused 'holds no summary.csv' "$archive" "$scratch/refused" --previous "$scratch"
+refused 'has no former result' --diff "$results" camera-00001/session-01
+refused 'contains no result of' --diff "$results" camera-00001/session-77
+refused 'needs RESULTS CAMERA/SESSION' --diff "$results"
+refused 'contains no summary.csv' "$archive" "$scratch/refused" --previous "$scratch"
 refused 'this run writes there' "$archive" "$previous" --previous "$previous"
 refused 'cannot be written to' "$archive" /dev/null/results
 printf 'format: vlp-gates/1\ngates: {odd_mm: 3}\n' >"$scratch/gates.yaml"

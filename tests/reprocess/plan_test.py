@@ -43,10 +43,10 @@ class Plan(unittest.TestCase):
 
     def test_says_what_was_looked_at(self):
         known = unittest.mock.Mock(all_files_at_ns=lambda: 1_773_489_600 * 10**9)  # at noon in UTC
-        self.assertEqual(plan.looked_at(known, "files"), "looked at all files")
-        self.assertEqual(plan.looked_at(known, "folders"), "looked at folders and tables, at all files last on 2026-03-14")
+        self.assertEqual(plan.looked_at(known, "files"), "checked all files")
+        self.assertEqual(plan.looked_at(known, "folders"), "checked folders and tables, all files last on 2026-03-14")
         known.all_files_at_ns = lambda: 0
-        self.assertEqual(plan.looked_at(known, "folders"), "looked at folders and tables, never yet at all files")
+        self.assertEqual(plan.looked_at(known, "folders"), "checked folders and tables, never all files")
 
     def test_only_shards_that_are_not_done_and_summed_up_are_to_do(self):
         with tempfile.TemporaryDirectory() as folder:

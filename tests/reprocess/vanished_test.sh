@@ -23,7 +23,7 @@ for _ in 1 2; do  # the second run has no row of it in the summary before
   grep -q "gate vanished: is 1, at most 0 is allowed: $gone\$" "$errors" && [ "$(wc -l <"$errors")" = 1 ] || fail "$(cat "$errors")"
 done
 grep -q '>FAIL<' "$results/overview.html" || fail "the overview passes"
-sed -n '/^<h2>What to do/p' "$results/overview.html" | grep -q "$gone" || fail "it is not what to do"
+sed -n '/^<h2>Actions/p' "$results/overview.html" | grep -q "$gone" || fail "it is not what to do"
 as_its_schema_says changes "$results/changes.json"
 as_its_schema_says plan "$results"/.state/{run,compare}.json
 printf 'format: vlp-archive-gates/1\ngates: {vanished: 1}\n' >"$gates"
