@@ -2,9 +2,9 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Sets up, builds, renders what a camera sees of a room like that of Chen and Guan, calibrates the
-# camera from those images, locates it in 432 others, and says how far off the fixes are. Results go
-# to out/demo; what is there already is not made again.
+# Sets up, builds, renders images of a camera in a room like that of Chen and Guan, calibrates the
+# camera from them, computes its position in 432 other images, and prints the errors of the fixes.
+# Results are in out/demo; existing ones are not computed again.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -22,11 +22,11 @@ then
 fi
 
 rig=datasets/paper-rig session=out/demo/paper-rig
-echo "Rendering a camera's captures to $session ..."
+echo "Rendering captures of a camera to $session ..."
 build/bin/vlp-simulate --quiet $rig/scene.yaml \
   --only boards,rotation,dispersion,check,line-x,line-y -o $session
 cp $rig/gates.yaml $session/
-echo "Calibrating it, as vlp-calibrate does with any folder of captures:"
+echo "Calibrating the camera with vlp-calibrate:"
 code=0
 build/bin/vlp-calibrate $session -o out/demo/results --camera-id paper-rig --row-time-s 3e-5 \
   --readout rows || code=$?
@@ -35,6 +35,6 @@ report=out/demo/results/report.html calibration=out/demo/results/calibration.yam
 if [ -e $report ] && [ -e $calibration ]; then
   echo "Open $report; the calibration is $calibration"
 else
-  echo "demo.sh: no report was made; see above" >&2
+  echo "demo.sh: there is no report; see above" >&2
 fi
 exit $code

@@ -37,8 +37,8 @@ done
 trap 'cmake "${before[@]}" "$project/build" >/dev/null' EXIT
 installed=(-DCMAKE_INSTALL_PREFIX=/usr
            -DCMAKE_INSTALL_LIBDIR="lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH)")
-# The preset is for a build that is not there yet; it would set what else was chosen for one that is. What the
-# tests need is not there then either.
+# A new build uses the preset, without tests, because their requirements may be missing. For an existing build the
+# preset would overwrite its other settings.
 if [ -e build/CMakeCache.txt ]; then
   cmake "${installed[@]}" build
 else

@@ -7,8 +7,8 @@
 # of 432 stationary fixes without calibration, with the rotation center, and with the dispersion on
 # top of it; by the paper's own methods, and by the exact ones. The lens is taken as known. A fix is of
 # the first two, or three, of the lamps in its image, or of all; the last row is of a lamp map that is
-# refined from the rotation captures. Below the table a line per difference says what it comes from,
-# with figures of this run.
+# refined from the rotation captures. Below the table one line for each difference gives its
+# cause, with values of this run.
 #
 #   scripts/reproduce_paper.sh [SCENE [OUT]]     default: datasets/paper-rig-faulty out/reproduce-SCENE
 #
@@ -170,9 +170,9 @@ awk -v height="$(awk -v a="$lamps_height" -v b="$height" 'BEGIN { print a - b }'
     degrees = 57.29577951
     lean = atan2(length_of(u - cu, v - cv), focal)
     off = length_of(circle_u - u, circle_v - v)
-    print "\nWhat the differences to the paper come from, two and three lamps; mm"
-    printf "none        ours %s, theirs 19.9 and 21.4: our camera leans by %.2f degrees, which is " \
-           "%.1f\n            at %.2f m under the lamps; theirs would be a lean of %.2f degrees.\n",
+    print "\nCauses of the differences from the paper, two and three lamps; mm"
+    printf "none        ours %s, theirs 19.9 and 21.4: our camera is tilted by %.2f degrees, which is " \
+           "%.1f\n            at %.2f m under the lamps; theirs would be a tilt of %.2f degrees.\n",
            none, lean * degrees, 1e3 * height * lean, height, atan2(0.0199, height) * degrees
     printf "rotation    ours %s, theirs 15.4 and 10.8: the center of our circles is %.2f px off, " \
            "%.1f\n            at that height, since the camera sits %.1f beside its axis of rotation " \

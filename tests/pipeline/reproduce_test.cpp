@@ -81,7 +81,7 @@ TEST_F(ReproducePaper, ComparesWithTableOfPaper) {
   const auto refined = row(result.output, "refined map");
   ASSERT_EQ(refined.size(), 3U) << result.output;
   EXPECT_LT(refined[0], all[6]);
-  for (const char* line : {"none        ours", "our camera leans by 1.50 degrees",
+  for (const char* line : {"none        ours", "our camera is tilted by 1.50 degrees",
                            "rotation    ours", "dispersion  ours", "exact       what"}) {
     EXPECT_THAT(result.output, HasSubstr(line));
   }
