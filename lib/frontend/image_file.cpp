@@ -200,10 +200,10 @@ const ImageFormat* find_format(std::string_view bytes) {
                                       ImageFormat{"MM\0+"sv, big_tiff},
                                       ImageFormat{"P1"sv, read_pnm_size},
                                       ImageFormat{"P2"sv, read_pnm_size},
-                                      ImageFormat{"P3"sv, pnm_size},
-                                      ImageFormat{"P4"sv, pnm_size},
-                                      ImageFormat{"P5"sv, pnm_size},
-                                      ImageFormat{"P6"sv, pnm_size}};
+                                      ImageFormat{"P3"sv, read_pnm_size},
+                                      ImageFormat{"P4"sv, read_pnm_size},
+                                      ImageFormat{"P5"sv, read_pnm_size},
+                                      ImageFormat{"P6"sv, read_pnm_size}};
   const auto* const found = std::ranges::find_if(
       formats, [&](const ImageFormat& format) { return bytes.starts_with(format.signature); });
   return found == formats.end() ? nullptr : found;
