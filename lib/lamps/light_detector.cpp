@@ -339,6 +339,12 @@ void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
   }
   for (const ModulatedLight& found : find_modulated_lights(
            lines, merge_overlapping_boxes(std::move(boxes)), background, lamp_periods_)) {
+    const auto is_at_found = [&](const Light& other) {
+      return (other.pixel - shape_.swap_image_and_scanline_axes(found.center)).norm() <
+             std::max(other.radius_px, found.radius_px);
+    };
+    // Without a lamp the light would be dropped below; this avoids the fit of its rim.
+    if (!found.lamp && std::any_of(lights.begin(), lights.end(), is_at_found)) continue;
     Light light = make_light_from_modulation(lines, found, blobs, background, shape_);
     if (found.lamp) light.lamp = lamps_by_period_[*found.lamp];
     // Lamps with the same period differ in duty; without known periods a classifier decides.

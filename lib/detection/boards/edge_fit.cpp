@@ -24,7 +24,8 @@ struct EncodedLevel {
     if (gamma == 1) return;
     constexpr double min_light = 1e-3;  // the curve is vertical at 0
     const double clamped_light = std::max(light, min_light);
-    level = kWhite * std::pow(clamped_light / kWhite, 1 / gamma);
+    // Faster than std::pow, whose last digits are not needed.
+    level = kWhite * std::exp(std::log(clamped_light / kWhite) / gamma);
     slope = level / (gamma * clamped_light);
   }
 
@@ -194,18 +195,39 @@ struct EdgeSides {
   double white_fraction;
 };
 
+EdgeLight make_initial_light(const EdgeSides& sides, double gamma) {
+  return {gamma, (sides.in + sides.out) / 2, (sides.out - sides.in) / 2};
+}
+
+/// Returns the light with nearly the same levels for another tone curve.
+EdgeLight convert_light(const EdgeLight& light, double gamma) {
+  if (gamma == light.gamma) return light;
+  const auto convert = [&](double side) {
+    return linearize(EncodedLevel(side, light.gamma).level, gamma);
+  };
+  const double in = convert(light.middle - light.contrast),
+               out = convert(light.middle + light.contrast);
+  return {gamma, (in + out) / 2, (out - in) / 2, light.slope * (gamma / light.gamma)};
+}
+
 template <int terms>
 std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels,
-                           const EdgePrior& prior) {
+                           const EdgePrior& prior, const EdgeFit* previous) {
   constexpr double min_blur_px = 0.05, max_blur_px = 6;
   constexpr double min_contrast = 3, max_relative_rms = 0.35;  // in levels
   constexpr double min_white_fraction = 0.25, censoring_level = 250;
   using Step = Edge<terms>;
-  const EdgeSides sides(pixels, edge, prior.gamma);
-  typename Step::Parameters p = Step::Parameters::Zero();
-  p.template head<3>() << edge.blur_px, (sides.in + sides.out) / 2, (sides.out - sides.in) / 2;
-  p.template tail<terms>() = edge.coefficients.head<terms>();
-  const bool is_saturated = sides.white_fraction >= min_white_fraction;
+  EdgeLight light;
+  bool is_saturated = false;
+  if (previous) {
+    light = convert_light(previous->light, prior.gamma);
+  } else {
+    const EdgeSides sides(pixels, edge, prior.gamma);
+    light = make_initial_light(sides, prior.gamma);
+    is_saturated = sides.white_fraction >= min_white_fraction;
+  }
+  typename Step::Parameters p;
+  p << edge.blur_px, light.middle, light.contrast, light.slope, edge.coefficients.head<terms>();
   const double max_level = is_saturated ? censoring_level : std::numeric_limits<double>::infinity();
   const Step step(pixels, prior, max_level);
   ceres::TinySolver<Step> solver;
@@ -218,8 +240,12 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
   edge.blur_px = p[0];
   const double outside = p[2] < 0 ? -1 : 1;
   const double squares = 2 * solver.summary.final_cost - step.sum_squared_prior_residuals(p);
-  EdgeFit result{squares, pixels.size(), is_saturated, p[1] + outside * p[2],
-                 p[1] - outside * p[2]};
+  EdgeFit result{squares,
+                 pixels.size(),
+                 is_saturated,
+                 p[1] + outside * p[2],
+                 p[1] - outside * p[2],
+                 {prior.gamma, p[1], p[2], p.template segment<2>(3)}};
   const double rms = std::sqrt(result.squares / static_cast<double>(pixels.size()));
   const double bright = EncodedLevel(p[1] + p[2], prior.gamma).level;
   const double contrast = std::abs(bright - EncodedLevel(p[1] - p[2], prior.gamma).level) / 2;
@@ -261,11 +287,11 @@ Eigen::Vector2d find_edge_intersection(const EdgeCurve& a, const EdgeCurve& b,
 
 std::optional<EdgeFit> fit_edge_curve_and_blur(EdgeCurve& edge,
                                                const std::vector<EdgePixel>& pixels,
-                                               const EdgePrior& prior) {
+                                               const EdgePrior& prior, const EdgeFit* previous) {
   constexpr std::size_t min_pixels = 24;
   if (pixels.size() < min_pixels) return {};
-  return edge.cubic ? fit<EdgeCurve::kMaxTerms>(edge, pixels, prior)
-                    : fit<EdgeCurve::kTerms>(edge, pixels, prior);
+  return edge.cubic ? fit<EdgeCurve::kMaxTerms>(edge, pixels, prior, previous)
+                    : fit<EdgeCurve::kTerms>(edge, pixels, prior, previous);
 }
 
 }  // namespace vlp

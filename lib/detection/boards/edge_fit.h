@@ -57,6 +57,12 @@ struct EdgePrior {
   double bright_light = 0, bright_weight = 0;
 };
 
+/// Light of an edge for a tone curve: (middle + contrast step) (1 + slope . (w, v)).
+struct EdgeLight {
+  double gamma = 1, middle = 0, contrast = 0;
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();
+};
+
 /// Result of fit_edge_curve_and_blur().
 struct EdgeFit {
   /// Sum of the squared residuals, in gray levels squared.
@@ -67,6 +73,7 @@ struct EdgeFit {
   /// Light on the brighter and on the darker side in the middle of the edge, in gray levels without
   /// tone curve.
   double bright_light, dark_light;
+  EdgeLight light;
   /// Variance of the position of the ends across the edge (mean of both), in px^2. It applies to a
   /// noise of one gray level and a known curvature.
   double end_variance = 0;
@@ -81,8 +88,10 @@ struct EdgeFit {
 /// Fits an edge to pixels by nonlinear least squares of their gray levels, with the tone curve and
 /// the priors of `prior`.
 ///
-/// @param edge  initial curve and blur; overwritten by the fit
-/// @return      std::nullopt for fewer than 24 pixels, or if the pixels do not match the model
+/// @param edge      initial curve and blur; overwritten by the fit
+/// @param previous  fit of the same pixels with another prior that found no saturation, if any.
+///                  Its light is the initial one; otherwise the mean levels of both sides are.
+/// @return          std::nullopt for fewer than 24 pixels, or if the pixels do not match the model
 ///
 ///   light = (middle + contrast step) (1 + slope . (w, v)),
 ///   step = s(e) + white_behind (1 + s(-e - stripe_px)),     e = v - a - b w - c w^2 - d w^3,
@@ -93,6 +102,7 @@ struct EdgeFit {
 /// leaves some saturated pixels below 255.
 std::optional<EdgeFit> fit_edge_curve_and_blur(EdgeCurve& edge,
                                                const std::vector<EdgePixel>& pixels,
-                                               const EdgePrior& prior);
+                                               const EdgePrior& prior,
+                                               const EdgeFit* previous = nullptr);
 
 }  // namespace vlp

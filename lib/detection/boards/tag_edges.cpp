@@ -93,7 +93,9 @@ class TagEdges {
   const std::array<EdgeCurve, 4>& edge_curves() const { return edges_; }
   const std::array<EdgeFit, 4>& edge_fits() const { return fits_; }
 
-  /// Fits all edges to the same pixels again, from the approximate edges.
+  /// Fits all edges to the same pixels again, from the previous fit if it succeeded. Saturated
+  /// edges always start from the approximate edges: along the narrow valley of their cost, a fit
+  /// from the optimum of another prior ends too early.
   void fit(const std::function<EdgePrior(const EdgeCurve& edge)>& prior_of);
 
   /// Returns the intersections of the edges, with the curvatures of the edges and the standard
@@ -235,17 +237,22 @@ void TagEdges::collect_all_pixels(const cv::Mat1b& image, double blur_px) {
   for (std::size_t k = 0; k < 4; ++k) {
     pixels_[k] = collect_pixels_near_edge(image, approximate_, k, patterns_[k], band_, blur_px);
   }
+  found_ = false;
 }
 
 void TagEdges::fit(const std::function<EdgePrior(const EdgeCurve& edge)>& prior_of) {
   constexpr double max_curvature_fraction =
       0.25;  // fraction of the tag; the fit of a larger one is an outlier
   max_curvature_px_ = 0;
-  found_ = false;
+  const bool is_again = std::exchange(found_, false);
   for (std::size_t k = 0; k < 4; ++k) {
-    edges_[k].coefficients = approximate_[k].coefficients;
-    edges_[k].blur_px = approximate_[k].blur_px;
-    const auto fitted = fit_edge_curve_and_blur(edges_[k], pixels_[k], prior_of(approximate_[k]));
+    const bool is_known = is_again && !fits_[k].is_saturated;
+    if (!is_known) {
+      edges_[k].coefficients = approximate_[k].coefficients;
+      edges_[k].blur_px = approximate_[k].blur_px;
+    }
+    const auto fitted = fit_edge_curve_and_blur(edges_[k], pixels_[k], prior_of(approximate_[k]),
+                                                is_known ? &fits_[k] : nullptr);
     if (!fitted) return;
     fits_[k] = *fitted;
     max_curvature_px_ = std::max(max_curvature_px_, std::abs(edges_[k].coefficients[2]));
@@ -429,7 +436,12 @@ std::vector<double> refine_tags_by_edge_fits(std::span<TagDetection> tags, const
     const auto prior_of_gamma = [&](const EdgeCurve&) { return EdgePrior{gamma}; };
     if (gamma != 1) fit(selected, prior_of_gamma);
     costs.push_back(compute_cost({edges, selected}));
-    if (costs.size() == 2 && costs[1] > costs[0] + min_log_likelihood_ratio) break;
+    // Gamma 1 is the best so far, and larger gammas than the last one are even less likely.
+    if (*std::ranges::min_element(costs) == costs[0] &&
+        costs.back() > costs[0] + min_log_likelihood_ratio) {
+      for (TagDetection& tag : tags) tag.tone_curve_fits.clear();
+      break;
+    }
     if (gamma != 1) fit(remaining, prior_of_gamma);
     const auto update_outlines = [&] {
       for (const std::size_t i : widest) {

@@ -200,14 +200,17 @@ class Steps {
         }
       }
     }
+    compute_limits_below_lines();
   }
 
   /// Returns the sum of e over the crossings of an ellipse with the lit scanlines, scaled to all of
-  /// them.
-  double sum_steps_along_ellipse(const Ellipse& ellipse) const {
+  /// them; -infinity if it cannot be above `best`.
+  double sum_steps_along_ellipse(const Ellipse& ellipse, double best) const {
     constexpr double max_height = 0.94;  // scanlines are nearly tangent above it
+    const double min_sum = best / double(every_);
     double sum = 0;
     for (std::size_t i = 0; i < lines_.size(); ++i) {
+      if (sum + limits_[i] < min_sum) return -std::numeric_limits<double>::infinity();
       const auto crossing = ellipse.intersect(lines_[i]);
       if (!crossing || crossing->height > max_height) continue;
       sum += at(i, crossing->begin, 0) + at(i, crossing->end, 1);
@@ -223,10 +226,23 @@ class Steps {
               end];
   }
 
+  /// Computes the largest possible sums of e over each line and the lines below it.
+  void compute_limits_below_lines() {
+    limits_.assign(lines_.size() + 1, 0);
+    for (std::size_t line = lines_.size(); line-- > 0;) {
+      std::array<double, 2> largest{};
+      for (std::size_t i = 0; i < 2 * static_cast<std::size_t>(width_); ++i) {
+        double& e = largest[i % 2];
+        e = std::max(e, e_[2 * line * static_cast<std::size_t>(width_) + i]);
+      }
+      limits_[line] = limits_[line + 1] + largest[0] + largest[1];
+    }
+  }
+
   int left_, width_;
   std::size_t every_;
   std::vector<int> lines_;
-  std::vector<double> e_;
+  std::vector<double> e_, limits_;
 };
 
 /// Returns the ring with the largest sum. Rings are circles in the level plane, whose derivative is
@@ -242,7 +258,7 @@ Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_
     for (double dv = -max_shift * size; dv <= max_shift * size; dv += step) {
       for (double du = -max_shift * size; du <= max_shift * size; du += step) {
         const Ellipse ellipse{middle + Eigen::Vector2d(du, dv), unit_from_pixel};
-        const double sum = steps.sum_steps_along_ellipse(ellipse);
+        const double sum = steps.sum_steps_along_ellipse(ellipse, best.sum);
         if (sum > best.sum) best = {ellipse, sum};
       }
     }

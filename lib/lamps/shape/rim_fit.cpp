@@ -70,23 +70,24 @@ using StepVector = Eigen::Matrix<double, kStepUnknowns, 1>;
 struct StepModel {
   StepVector x;
   double gamma;
-  /// Level without light.
-  double floor;
+  /// Light without the lamp.
+  double floor_light;
 
-  CurveDistance<kStepUnknowns> residual(const StepSample& sample) const {
+  /// Returns the residual of a sample for the blur s = exp(x[kLogBlur]).
+  CurveDistance<kStepUnknowns> residual(const StepSample& sample, double s) const {
     const auto fraction = [](double v) { return std::erfc(-v / std::numbers::sqrt2) / 2; };
     const auto density = [](double v) {
       return std::exp(-v * v / 2) / std::sqrt(2 * std::numbers::pi);
     };
-    const double u = sample.depth_px - x[kAt], s = std::exp(x[kLogBlur]);
+    const double u = sample.depth_px - x[kAt];
     const double p = x[kOutSlope], q = x[kInSlope];
     const double outer = std::exp(x[kAlong] * sample.along + x[kOut] + p * u + p * p * s * s / 2);
     const double inner = std::exp(x[kAlong] * sample.along + x[kIn] + q * u + q * q * s * s / 2);
     const double before = -u / s - p * s, behind = u / s + q * s;
     const double out = outer * fraction(before), in = inner * fraction(behind);
     const double at_out = outer * density(before), at_in = inner * density(behind);
-    const double light = out + in + std::pow(floor, gamma);
-    const double modeled_level = std::pow(light, 1 / gamma),
+    const double light = out + in + floor_light;
+    const double modeled_level = std::exp(std::log(light) / gamma),
                  d_level_d_light = modeled_level / light / gamma;
     CurveDistance<kStepUnknowns> result;
     result.error = modeled_level - std::min(sample.level, kClipped);
@@ -209,7 +210,8 @@ struct Step {
 std::optional<Step> fit_step_of_piece(const Piece& piece, double dark,
                                       const StepImageModel& picture, bool blur_known) {
   constexpr std::size_t min_samples = 30;
-  constexpr int num_iterations = 12;
+  constexpr int max_iterations = 12;
+  constexpr double min_step_sds = 1e-4;  // a smaller step, in standard deviations, is the last one
   constexpr double clear_px = 2, farthest_px = 3;
   // Prior standard deviations of the slopes, of the change along the rim and of the log blur,
   // weighted relative to the noise in gray levels.
@@ -224,7 +226,7 @@ std::optional<Step> fit_step_of_piece(const Piece& piece, double dark,
   }
   if (counts[0] == 0 || counts[1] == 0) return std::nullopt;
   const double out = std::max(1.0, sums[0] / counts[0]), in = std::max(1.0, sums[1] / counts[1]);
-  StepModel model{{}, picture.gamma, std::max(0.5, dark)};
+  StepModel model{{}, picture.gamma, std::pow(std::max(0.5, dark), picture.gamma)};
   model.x << 0, picture.gamma * std::log(out), 0, picture.gamma * std::log(in), 0, 0,
       std::log(picture.blur_px);
   const double known_blur = model.x[kLogBlur];
@@ -237,11 +239,13 @@ std::optional<Step> fit_step_of_piece(const Piece& piece, double dark,
                           Prior{kLogBlur, known_blur, blur_known ? 1e-3 : log_blur_sd}};
   const double tolerance = std::max({4.0, 0.2 * std::abs(in - out), 0.1 * in});
   std::optional<MEstimateStep<kStepUnknowns>> last;
-  for (int round = 0; round < num_iterations; ++round) {
+  for (int round = 0; round < max_iterations; ++round) {
     // A clipped pixel does not constrain a model in which it is clipped (Tobin 1958).
     std::vector<CurveDistance<kStepUnknowns>> residuals;
+    residuals.reserve(piece.samples.size());
+    const double blur_px = std::exp(model.x[kLogBlur]);
     for (const StepSample& sample : piece.samples) {
-      residuals.push_back(model.residual(sample));
+      residuals.push_back(model.residual(sample, blur_px));
       if (sample.clipped() && residuals.back().error >= 0) residuals.pop_back();
     }
     if (residuals.size() < min_samples) return std::nullopt;
@@ -258,6 +262,8 @@ std::optional<Step> fit_step_of_piece(const Piece& piece, double dark,
     const StepVector limit{0.7, 0.5, 0.1, 0.5, 0.1, 0.05, 0.3};
     model.x -= last->step.cwiseMin(limit).cwiseMax(-limit);
     if (!(std::abs(model.x[kAt]) < farthest_px)) return std::nullopt;
+    const StepVector sds = last->covariance().diagonal().cwiseSqrt();
+    if ((last->step.array().abs() < min_step_sds * sds.array()).all()) break;
   }
   const auto covariance = last->covariance();
   return Step{model.x[kAt], std::sqrt(covariance(kAt, kAt)), model.x[kLogBlur],

@@ -17,13 +17,13 @@ RotationStatus find_status(const RotationScene& scene) {
   return find_status(scene, scene.frames());
 }
 
-TEST(NumCapturesPerPivot, ReportsTooSmallArc) {
+TEST(FindRotationCaptures, ReportsTooSmallArc) {
   RotationScene scene;
   scene.arc_rad = rad_from_deg(80);
   EXPECT_EQ(find_status(scene), RotationStatus::short_arc);
 }
 
-TEST(NumCapturesPerPivot, ReportsCapturesAtOneYaw) {
+TEST(FindRotationCaptures, ReportsCapturesAtOneYaw) {
   RotationScene scene;
   scene.arc_rad = 1e-3;
   EXPECT_EQ(find_status(scene), RotationStatus::alike);
@@ -31,7 +31,7 @@ TEST(NumCapturesPerPivot, ReportsCapturesAtOneYaw) {
   EXPECT_EQ(find_status(scene, with_noise(scene.frames(0.3), random)), RotationStatus::alike);
 }
 
-TEST(NumCapturesPerPivot, ReportsTooFewCaptures) {
+TEST(FindRotationCaptures, ReportsTooFewCaptures) {
   RotationScene scene;
   for (const int captures : {1, 2}) {
     scene.captures = captures;
@@ -40,7 +40,7 @@ TEST(NumCapturesPerPivot, ReportsTooFewCaptures) {
   EXPECT_EQ(find_status(scene, {}), RotationStatus::other_map);
 }
 
-TEST(NumCapturesPerPivot, ReportsTooFewLamps) {
+TEST(FindRotationCaptures, ReportsTooFewLamps) {
   RotationScene scene;
   auto frames = scene.frames();
   for (Frame& frame : frames) {
@@ -59,7 +59,7 @@ TEST(NumCapturesPerPivot, ReportsTooFewLamps) {
   EXPECT_EQ(find_status(in_turn, frames), RotationStatus::too_few_lamps);
 }
 
-TEST(NumCapturesPerPivot, ReportsLampsOfAnotherMap) {
+TEST(FindRotationCaptures, ReportsLampsOfAnotherMap) {
   RotationScene scene;
   const auto frames = scene.frames();
   for (Lamp& lamp : scene.map.lamps) lamp.id += 100;
@@ -74,7 +74,7 @@ TEST(NumCapturesPerPivot, ReportsLampsOfAnotherMap) {
   EXPECT_EQ(find_status(scene, frames), RotationStatus::other_map);
 }
 
-TEST(NumCapturesPerPivot, ReportsMovingAxis) {
+TEST(FindRotationCaptures, ReportsMovingAxis) {
   RotationScene scene;
   std::vector<Frame> frames;
   for (int k = 0; k < 12; ++k) {

@@ -21,7 +21,7 @@ void expect_axis(const RotationFit& found, const RotationScene& scene, double wi
       within_deg);
 }
 
-TEST(NumCapturesPerPivot, EstimatesHeightsYawsAndAxes) {
+TEST(FindRotationCaptures, EstimatesHeightsYawsAndAxes) {
   const RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   const RotationCaptures rotation =
       find_in_place_rotation_captures(scene.frames(), scene.map, scene.camera);
@@ -41,7 +41,7 @@ TEST(NumCapturesPerPivot, EstimatesHeightsYawsAndAxes) {
   EXPECT_TRUE(rotation.rejected.empty());
 }
 
-TEST(NumCapturesPerPivot, AcceptsTwoLampsAndThreeCaptures) {
+TEST(FindRotationCaptures, AcceptsTwoLampsAndThreeCaptures) {
   RotationScene scene;
   scene.tilt_rad = rad_from_deg(10);
   scene.map = make_lamp_map({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}});
@@ -50,20 +50,20 @@ TEST(NumCapturesPerPivot, AcceptsTwoLampsAndThreeCaptures) {
   expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
 }
 
-TEST(NumCapturesPerPivot, AcceptsLampsAtSeveralHeights) {
+TEST(FindRotationCaptures, AcceptsLampsAtSeveralHeights) {
   RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.map =
       make_lamp_map({{-0.5, -0.35, 1.6}, {0.5, 0.2, 1.4}, {-0.4, 0.3, 1.8}, {0.1, -0.4, 1.5}});
   expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
 }
 
-TEST(NumCapturesPerPivot, AcceptsQuarterRotation) {
+TEST(FindRotationCaptures, AcceptsQuarterRotation) {
   RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.arc_rad = rad_from_deg(105);  // minus the uneven steps at the ends
   expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
 }
 
-TEST(NumCapturesPerPivot, RejectsHeightWithTooFewCaptures) {
+TEST(FindRotationCaptures, RejectsHeightWithTooFewCaptures) {
   const RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   auto frames = scene.frames();
   frames.resize(14);
@@ -102,7 +102,7 @@ TEST(FitRotationBetweenLensesAxis, RejectsOutliers) {
   EXPECT_LE(named.size(), wrong.size() + 1);
 }
 
-TEST(NumCapturesPerPivot, RejectsCaptureWithMisidentifiedLamp) {
+TEST(FindRotationCaptures, RejectsCaptureWithMisidentifiedLamp) {
   RotationScene scene;
   scene.tilt_rad = rad_from_deg(1.5);
   scene.map = make_lamp_map({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}, {0.1, 0.4, 1.6}});

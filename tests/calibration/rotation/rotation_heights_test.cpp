@@ -29,7 +29,7 @@ RotationCaptures find_captures(const RotationScene& scene, const std::vector<Fra
   return rotation;
 }
 
-TEST(NumCapturesPerPivot, SeparatesHeightsTenCentimetersApart) {
+TEST(FindRotationCaptures, SeparatesHeightsTenCentimetersApart) {
   RotationScene scene = high_scene();
   scene.heights_m = {0, 0.1};
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -49,7 +49,7 @@ TEST(NumCapturesPerPivot, SeparatesHeightsTenCentimetersApart) {
   }
 }
 
-TEST(NumCapturesPerPivot, SeparatesFourHeights) {
+TEST(FindRotationCaptures, SeparatesFourHeights) {
   RotationScene scene = high_scene();
   scene.heights_m = {0, 0.05, 0.15, 0.2};
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -62,7 +62,7 @@ TEST(NumCapturesPerPivot, SeparatesFourHeights) {
 }
 
 /// Noise of 1 px causes height errors of 1 % of the distance for fixes of two lamps.
-TEST(NumCapturesPerPivot, KeepsOneHeightUnderNoise) {
+TEST(FindRotationCaptures, KeepsOneHeightUnderNoise) {
   for (const std::size_t lamps : {std::size_t{2}, std::size_t{8}}) {
     RotationScene scene = tilted_scene();
     scene.map.lamps.resize(lamps);
