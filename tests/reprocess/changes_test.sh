@@ -73,7 +73,7 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   grep -q '6 images skipped; the first, 0006.png: cannot be read as an image: it is cut short' "$page" || fail "no skipped images"
   grep -q "$lost</td><td>lamps.yaml</td><td>lost its result" "$page" || fail "no inputs that changed"
   grep -q '^camera-00001,session-01,look,.*,6,,.*,2026-03-14,' "$looked/summary.csv" || fail "$(cat "$looked/summary.csv")"
-  for runs in '1 runs taken, 0 were there' '0 runs taken, 1 were there'; do
+  for runs in '1 runs added, 0 existed' '0 runs added, 1 existed'; do
     "$bin/vlp-station" import "$looked" --records "$scratch/looked.db" >"$said" 2>"$scratch/errors" || fail "$(cat "$scratch/errors")"
     grep -q "^station looked-results: $runs" "$said" || fail "$(cat "$said")"
     grep -q ' 1 sessions are ignored: neither archive.csv' "$scratch/errors" || fail "$(cat "$scratch/errors")"

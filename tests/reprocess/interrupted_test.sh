@@ -14,7 +14,7 @@ take "$results-archive" "${sessions[@]}"
 # end.
 count() { { find "$results" -path "$1" 2>/dev/null || true; } | wc -l; }
 another() { [ "$(count "$1")" -gt "$before" ]; }
-for moment in '*/work/*/steps/corners/*.csv' '*/work/*/rotated.yaml' '*/sessions/*/row.json'; do
+for moment in '*/work/*/steps/corners/*.txt' '*/work/*/rotated.yaml' '*/sessions/*/row.json'; do
   before=$(count "$moment")
   start_reprocess "$results" --shard-size 3 --cores 1
   patiently 60 another "$moment"

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lamps/shape/light_center.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>

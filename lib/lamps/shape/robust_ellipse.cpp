@@ -96,7 +96,8 @@ std::optional<RobustEllipse> fit_robust_circle(std::span<const Eigen::Vector2d> 
   if (points.size() < kMinCirclePoints) return std::nullopt;
   const auto begin = find_best_supported_circle(points, tolerance);
   if (!begin) return std::nullopt;
-  auto [center, radius] = *begin;
+  Eigen::Vector2d center = begin->center;
+  double radius = begin->radius;
   RobustEllipse fit{};
   for (int iteration = 0; iteration < 5; ++iteration) {
     auto better = compute_m_estimate_step<3>(weights, tolerance, [&](std::size_t i) {

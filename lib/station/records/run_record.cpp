@@ -16,7 +16,6 @@
 #include <opencv2/core/utility.hpp>
 #include <optional>
 #include <random>
-#include <ranges>
 #include <regex>
 #include <set>
 #include <utility>
@@ -89,8 +88,9 @@ const RunEvent* find_voiding_event(const RunRecord& record) {
 }
 
 std::ptrdiff_t find_last_event(const RunRecord& record, const char* what) {
-  const auto latest_first = std::views::reverse(record.events);
-  return latest_first.end() - std::ranges::find(latest_first, what, &RunEvent::what) - 1;
+  const auto event = std::find_if(record.events.rbegin(), record.events.rend(),
+                                  [&](const RunEvent& each) { return each.what == what; });
+  return record.events.rend() - event - 1;
 }
 
 std::string format_void_command(const std::string& run, const std::filesystem::path& station_file) {

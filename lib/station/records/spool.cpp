@@ -297,9 +297,11 @@ std::optional<RunRecord> Spool::find(const std::string& run) {
 }
 
 std::vector<RunSummary> Spool::list_runs(const RunFilter& filter) {
+  // The spool first: a run that is delivered meanwhile is then found in both.
+  const std::vector<RunRecord> waiting = list_waiting_runs();
   std::vector<RunSummary> stored;
   query_records([&](Records& records) { stored = records.list_runs(filter); });
-  return merge_runs(std::move(stored), list_waiting_runs(), filter);
+  return merge_runs(std::move(stored), waiting, filter);
 }
 
 /// Returns the first run that uses an image of this digest, of all runs of the spool and the
@@ -307,10 +309,13 @@ std::vector<RunSummary> Spool::list_runs(const RunFilter& filter) {
 std::optional<RunSummary> Spool::find_run_that_used_image(
     const std::string& sha256, const std::function<bool(const RunSummary&)>& is_searched) {
   const RunFilter filter{.image_sha256 = sha256};
+  const auto spooled = collect([&](const SpooledRun& each) {
+    return std::ranges::find(each.run.images, sha256, &RunRecord::Image::sha256) !=
+           each.run.images.end();
+  });
   std::vector<RunSummary> stored;
   const bool has_answer =
       query_records([&](Records& records) { stored = records.list_runs(filter); });
-  const auto spooled = collect([](const SpooledRun&) { return true; });
   for (RunSummary& run : merge_runs(std::move(stored), spooled, filter)) {
     if (is_searched(run)) return std::move(run);
   }
@@ -337,9 +342,10 @@ std::optional<std::string> Spool::find_repeated_run(const RunRecord& run) {
   const auto first = std::ranges::find_if(run.images, &RunRecord::Image::is_used);
   if (first == run.images.end()) return "";
   const RunFilter filter{.camera = run.camera, .kind = "unit", .image_sha256 = first->sha256};
+  const std::vector<RunRecord> waiting = list_waiting_runs();
   std::vector<RunSummary> stored;
   bool has_answer = query_records([&](Records& records) { stored = records.list_runs(filter); });
-  for (const RunSummary& earlier : merge_runs(std::move(stored), list_waiting_runs(), filter)) {
+  for (const RunSummary& earlier : merge_runs(std::move(stored), waiting, filter)) {
     if (earlier.verdict == to_string(Verdict::invalid) || !earlier.voided.empty()) continue;
     const auto record = find(earlier.run);
     if (record && uses_images_of_earlier_run(run, *record)) return earlier.run;

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
-#include <ranges>
 #include <string>
 #include <utility>
 #include <vector>
@@ -114,18 +113,18 @@ std::vector<Cause> find_step_causes(const Unit& unit, StationStep step,
 
 /// Returns true if most of the board images show another board.
 bool is_other_board(const UnitStep& boards) {
-  const auto other = std::ranges::count_if(std::views::values(boards.images), [](const auto& i) {
-    return i.seen.board && !i.seen.board->seen.foreign.empty();
+  const auto other = std::ranges::count_if(boards.images, [](const auto& entry) {
+    const auto& board = entry.second.seen.board;
+    return board && !board->seen.foreign.empty();
   });
   return 2 * other > static_cast<std::ptrdiff_t>(boards.images.size());
 }
 
 /// Returns true if there are enough views to distinguish blur from a shaky hand.
 bool is_blur_known(const UnitStep& boards, const StationConfig& config) {
-  return boards.sufficient ||
-         std::ranges::count_if(std::views::values(boards.images), [](const UnitImage& image) {
-           return image.seen.blur_px.has_value();
-         }) >= min_images_to_blame_camera(config);
+  return boards.sufficient || std::ranges::count_if(boards.images, [](const auto& entry) {
+                                return entry.second.seen.blur_px.has_value();
+                              }) >= min_images_to_blame_camera(config);
 }
 
 /// Returns the causes visible in the board images: another board, blur, and faults of the lens.

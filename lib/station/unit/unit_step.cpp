@@ -3,7 +3,6 @@
 #include "station/unit/unit_step.h"
 
 #include <algorithm>
-#include <ranges>
 #include <utility>
 
 #include "captures/digest.h"
@@ -26,7 +25,8 @@ UnitImage observe_unit_image(const std::filesystem::path& file,
 }
 
 int UnitStep::count_used_images() const {
-  return static_cast<int>(std::ranges::count_if(std::views::values(images), &UnitImage::is_used));
+  return static_cast<int>(
+      std::ranges::count_if(images, [](const auto& entry) { return entry.second.is_used(); }));
 }
 
 Observations collect_observations(const UnitStep& step) {
