@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 std::string describe_settings(const Board& board) {
   std::string settings = fmt::format(
-      "12 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols, board.rows,
+      "13 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols, board.rows,
       format_shortest(board.tag_size_m), format_shortest(board.tag_spacing), board.border_bits,
       board.corner_squares, board.first_id, to_string(board.id_order));
   if (board.has_chessboard_squares()) {

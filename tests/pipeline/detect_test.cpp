@@ -183,8 +183,8 @@ TEST_F(VlpDetect, DoesNotOverwriteOtherFilesWithLights) {
     EXPECT_THAT(result.errors, HasSubstr(message));
     EXPECT_FALSE(fs::exists(folder / "found.csv"));
   };
-  refused(folder / "found.csv", "--output and --lights name one file");
-  refused(folder / "." / "found.csv", "--output and --lights name one file");
+  refused(folder / "found.csv", "--output and --lights are the same file");
+  refused(folder / "." / "found.csv", "--output and --lights are the same file");
   refused(kRig + "/lamps.yaml", "lamps.yaml: is also an input");
   refused(kRig + "/sample/0000.png", "0000.png: is also an input");
   refused(folder / "none" / "lights.csv", "lights.csv");

@@ -57,11 +57,11 @@ TEST_F(VlpIntrinsicsErrors, RejectsTwoOutputsInOneFile) {
     return result.errors;
   };
   EXPECT_THAT(rejection_message("a.yaml", "./a.yaml"),
-              HasSubstr("--ros and --kalibr name one file"));
+              HasSubstr("--ros and --kalibr are the same file"));
   EXPECT_THAT(rejection_message("images/../camera.yaml", "a.yaml"),
-              HasSubstr("--output and --ros name one file"));
+              HasSubstr("--output and --ros are the same file"));
   EXPECT_THAT(rejection_message("a.yaml", "camera.cameramodel"),
-              HasSubstr("--output's .cameramodel and --kalibr name one file"));
+              HasSubstr("--output's .cameramodel and --kalibr are the same file"));
 }
 
 TEST_F(VlpIntrinsicsErrors, ReportsCauseOfMissingTags) {
@@ -167,7 +167,7 @@ TEST_F(VlpIntrinsicsErrors, SkipsTinyAndHugeImages) {
   cv::imwrite((folder / "tiny/0.png").string(), cv::Mat(1, 800, CV_8UC1, cv::Scalar(7)));
   const auto tiny = calibrate((folder / "tiny").string(), kRig + "/board.yaml");
   EXPECT_EQ(tiny.exit_code, 3) << tiny.errors;
-  EXPECT_THAT(tiny.errors, HasSubstr("no tag of tag36h11 is seen in 1 images"));
+  EXPECT_THAT(tiny.errors, HasSubstr("no tag of tag36h11 is visible in 1 images"));
 }
 
 TEST_F(VlpIntrinsicsErrors, ReportsOverexposedTags) {

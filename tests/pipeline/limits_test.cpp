@@ -231,7 +231,7 @@ TEST(VlpLimits, RejectsTwoOutputsInOneFile) {
   const auto result = run_program("cd '" + (folder / "").string() + "' && " + kLimits +
                                   "--map a.svg --picture ./a.svg");
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.errors, HasSubstr("--map and --picture name one file"));
+  EXPECT_THAT(result.errors, HasSubstr("--map and --picture are the same file"));
   EXPECT_FALSE(std::filesystem::exists(folder / "a.svg"));
 }
 

@@ -102,7 +102,7 @@ TEST_F(VlpEvaluateReport, RejectsInvalidContent) {
   EXPECT_THAT(refusal(" --track" + in("track.csv") + " 1 0 1 0"),
               HasSubstr("start and end of the line are equal"));
   EXPECT_THAT(refusal(" --json" + in("report.html")),
-              HasSubstr("--json and --report name one file"));
+              HasSubstr("--json and --report are the same file"));
 }
 
 /// A page that passes, small enough to be broken in many ways.

@@ -205,7 +205,7 @@ TEST_F(VlpTrain, ReportsAmbiguousRowTime) {
   EXPECT_EQ(labeled.exit_code, 0) << labeled.errors;
   const auto nowhere = train("--row-time " + kRig + "/sample" + kLamps);
   EXPECT_EQ(nowhere.exit_code, 2);
-  EXPECT_THAT(nowhere.errors, HasSubstr("needs --calibration"));
+  EXPECT_THAT(nowhere.errors, HasSubstr("add --calibration"));
 }
 
 TEST_F(VlpTrain, EstimatesColumnReadoutForVlpDetect) {

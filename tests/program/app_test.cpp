@@ -121,7 +121,7 @@ TEST(CheckOutputFiles, RejectsSameFileTwice) {
   EXPECT_EQ(rejection_message<std::invalid_argument>([&] {
               check_output_files({{"--output", file}, {"--ros", ""}, {"--plot", same}}, {});
             }),
-            "--output and --plot name one file");
+            "--output and --plot are the same file; use another name");
 }
 
 TEST(Validators, CheckNumbersAndNames) {

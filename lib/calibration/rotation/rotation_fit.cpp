@@ -191,12 +191,14 @@ MapErrorPropagation propagate_map_errors(const RobustFit& fit, const RobustFit::
   MapErrorPropagation effect;
   double of_map = 0;
   for (std::size_t i = 0; i < rotation.lamps.size(); ++i) {
+    const double sd_m = rotation.lamps[i].sd_m.value_or(0);
+    if (sd_m == 0) continue;
     const auto lamp = static_cast<Eigen::Index>(i);
     Eigen::MatrixXd errors = Eigen::MatrixXd::Zero(size.size(), 2);
     errors(lamp, 0) = 1;
     errors(z_1, 0) = -size[lamp] / size[z_1];
     errors(z_1, 1) = (state.lamps_m[i] - middle_m).norm() / size[z_1];
-    errors *= rotation.lamps[i].sd_m.value_or(0);
+    errors *= sd_m;
     const Eigen::MatrixXd changes = center_by_heights * errors;
     effect.covariance += changes * changes.transpose();
     of_map += errors.cwiseProduct(squares * errors).sum();

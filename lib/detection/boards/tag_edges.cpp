@@ -436,8 +436,8 @@ std::vector<double> refine_tags_by_edge_fits(std::span<TagDetection> tags, const
     const auto prior_of_gamma = [&](const EdgeCurve&) { return EdgePrior{gamma}; };
     if (gamma != 1) fit(selected, prior_of_gamma);
     costs.push_back(compute_cost({edges, selected}));
-    // Gamma 1 is the best so far, and larger gammas than the last one are even less likely.
-    if (*std::ranges::min_element(costs) == costs[0] &&
+    // Gamma 1.3 is clearly worse than 1, and gammas from the last one on are excluded.
+    if (costs.size() > 1 && costs[1] > costs[0] + min_log_likelihood_ratio / 2 &&
         costs.back() > costs[0] + min_log_likelihood_ratio) {
       for (TagDetection& tag : tags) tag.tone_curve_fits.clear();
       break;
