@@ -221,7 +221,7 @@ TEST_F(VlpCalibrateSmallSession, RepeatsVerdictOfGates) {
   folder.file("a session/gates.yaml", "format: vlp-gates/1\ngates:\n  coverage: 7\n");
   const auto refused = calibrate();
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.errors, HasSubstr("gates.yaml:3: gates.coverage: should be a share"));
+  EXPECT_THAT(refused.errors, HasSubstr("gates.yaml:3: gates.coverage: should be a fraction"));
 }
 
 TEST_F(VlpCalibrateSmallSession, GivesSameResultInForkedProcess) {
@@ -270,7 +270,7 @@ TEST_F(VlpCalibrateSmallSession, FollowsChangesOfSessionFolder) {
       HasSubstr(
           "camera.yaml takes precedence over options of the camera; ignored: row time, read-out"));
   EXPECT_THAT(calibrate("--camera-id other --lens LENSMODEL_OPENCV5").errors,
-              HasSubstr("stated of its name, lens model"));
+              HasSubstr("ignored: name, lens model"));
   EXPECT_THAT(calibrate("").errors, Not(HasSubstr("camera.yaml takes precedence")));
   EXPECT_THAT(result("calibration.yaml"), HasSubstr("id: \"archive\""));
   EXPECT_FALSE(fs::exists(folder / "results/lens.yaml"));

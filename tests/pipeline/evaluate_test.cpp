@@ -227,7 +227,7 @@ TEST_F(VlpEvaluate, ReturnsThreeWithoutFix) {
   folder.file("fixes.csv", kFixes + "a.png,degenerate,,,,,,,,,1,\n");
   const auto result = with_truth("--json none.json");
   EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.errors, HasSubstr("not one of 6 captures has a fix"));
+  EXPECT_THAT(result.errors, HasSubstr("none of 6 captures has a fix"));
   EXPECT_FALSE(std::filesystem::exists(folder / "none.json"));
 }
 

@@ -68,7 +68,7 @@ TEST_F(VlpIntrinsicsErrors, ReportsCauseOfMissingTags) {
   const std::string board = kRig + "/board.yaml";
   const auto lamps = calibrate(kRig + "/sample", board);
   EXPECT_EQ(lamps.exit_code, 3);
-  EXPECT_THAT(lamps.errors, HasSubstr("no tag of tag36h11 is seen in 2 images"));
+  EXPECT_THAT(lamps.errors, HasSubstr("no tag of tag36h11 is visible in 2 images"));
 
   const auto other = calibrate(kFaulty + "/sample-boards", board);
   EXPECT_EQ(other.exit_code, 2);

@@ -213,7 +213,7 @@ TEST_F(VlpStationRecords, TrendReportsAlarm) {
   const auto shared =
       run_program("vlp-station trend rms_px --records " + (folder / "station/records.db").string());
   EXPECT_EQ(shared.exit_code, 2);
-  EXPECT_THAT(shared.errors, HasSubstr("of station-1 and of station-2: say of which"));
+  EXPECT_THAT(shared.errors, HasSubstr("of station-1 and of station-2: select a station"));
   add(500, "station-1", "unit", "PASS", {7});
   const auto alarm = records("trend rms_px");
   EXPECT_EQ(alarm.exit_code, 1);

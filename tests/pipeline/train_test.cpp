@@ -105,7 +105,8 @@ TEST_F(VlpTrain, RequiresLabels) {
   folder.file("bare/mine.csv", "image,lamp,u_px,v_px\n0000.png,77,174.7,302.1\n");
   const auto unknown = train((folder / "bare").string() + kLamps + " --labels mine.csv");
   EXPECT_EQ(unknown.exit_code, 2);
-  EXPECT_THAT(unknown.errors, HasSubstr("the labels name lamp 77, which is not in the lamp map"));
+  EXPECT_THAT(unknown.errors,
+              HasSubstr("the labels contain lamp 77, which is not in the lamp map"));
   EXPECT_EQ(run_program("vlp-train " + kRig + "/sample" + kLamps).exit_code, 2) << "no output";
 }
 

@@ -253,7 +253,7 @@ TEST_F(PositionerLocateBody, ReturnsInconsistentForUnmodeledTilt) {
   rig.body.motion = {{0, 0}, 0, {0.7, -0.5}};
   rig.map = draw_lamps_in_view(rig, 6, true, 0.3, random);
   EXPECT_EQ(locate(seen(), {}).status, FixStatus::inconsistent);
-  EXPECT_NE(describe(FixStatus::inconsistent).find("lean"), std::string_view::npos);
+  EXPECT_NE(describe(FixStatus::inconsistent).find("tilt"), std::string_view::npos);
   expect_truth(locate(seen(), leaning()));
 }
 

@@ -114,7 +114,7 @@ TEST(ReadCalibration, ReportsLineAndKeyOfInvalidDispersion) {
        {"radius_m: 0.0031", "radius_m: 3.1 mm", "dispersion.radius_m: should be a finite number"},
        {"[0.002, -0.001]", "[0.002, .inf]", "dispersion.center_m[1]: should be a finite number"},
        {"captures: 12", "captures: 0", "dispersion.captures: should be a whole number within 1"},
-       {"captures: 12", "note: x\n  captures: 12", "dispersion: key 'note' is unknown here"}});
+       {"captures: 12", "note: x\n  captures: 12", "dispersion: key 'note' is unknown; "}});
 }
 
 TEST(ReadCalibration, ReportsLineAndKeyOfInvalidHistory) {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Every step names a lamp that is not where the map has it, in the same words.
 #include <gmock/gmock.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <array>

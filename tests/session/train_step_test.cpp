@@ -53,7 +53,7 @@ TEST(TrainLamps, ThrowsForUnknownImageOrLamp) {
   Training training(1);
   training.lamps.lamps.pop_back();
   EXPECT_THAT(rejection_message<std::invalid_argument>([&] { training.trained(); }),
-              HasSubstr("the labels name lamp 6, which is not in the lamp map"));
+              HasSubstr("the labels contain lamp 6, which is not in the lamp map"));
   for (Frame& frame : training.labels[0]) frame.image += ".png";
   EXPECT_THAT(rejection_message([&] { training.trained(); }),
               HasSubstr("sample: the table names none of the images"));

@@ -212,7 +212,7 @@ TEST(ReadScene, RejectsInvalidMirrorBlindOrSign) {
   EXPECT_THAT(with("mirrors: [{" + panel + "reflectance: 10}]"),
               testing::StartsWith("scene.yaml:13: clutter.mirrors[0].reflectance: 10"));
   EXPECT_THAT(with("mirrors: [{" + panel + "reflectance: 0.1, electron_rate_e_per_s: 1}]"),
-              testing::HasSubstr("key 'electron_rate_e_per_s' is unknown here"));
+              testing::HasSubstr("key 'electron_rate_e_per_s' is unknown"));
   const std::string lit = panel + "electron_rate_e_per_s: 1.0e+8, ";
   EXPECT_EQ(with("blinds: [{" + lit + "slats: 9, open_fraction: 0.5}]"), "");
   EXPECT_THAT(with("blinds: [{" + lit + "slats: 0, open_fraction: 0.5}]"),
@@ -235,9 +235,9 @@ TEST(ReadScene, RectangleLampTakesKeysOfLampMapOnly) {
   EXPECT_EQ(with(shape), "");
   EXPECT_THAT(
       with(shape + ", rim_to_center_ratio: 1"),
-      testing::StartsWith("scene.yaml:10: lamps[0]: key 'rim_to_center_ratio' is unknown here"));
+      testing::StartsWith("scene.yaml:10: lamps[0]: key 'rim_to_center_ratio' is unknown"));
   EXPECT_THAT(with(shape + ", chips: {fraction: 0.3, pitch_m: 0.03, width_m: 0.02}"),
-              testing::StartsWith("scene.yaml:10: lamps[0]: key 'chips' is unknown here"));
+              testing::StartsWith("scene.yaml:10: lamps[0]: key 'chips' is unknown"));
   EXPECT_EQ(with(shape + ", diameter_m: 0.2"),
             "scene.yaml:10: lamps[0].diameter_m: is of a disc, and this is a rectangle: it has "
             "a size_m");

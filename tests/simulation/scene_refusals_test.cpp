@@ -45,9 +45,9 @@ TEST(ReadScene, RejectsUnknownKeyInEachSection) {
   unknown("from_m", "27: captures[2].drive");
   unknown("count: 5", "28: captures[3].views");
   EXPECT_THAT(refusal_with("  margin_m", "  nonsense: 1\n  margin_m"),
-              HasSubstr("scene.yaml:19: board: key 'nonsense' is unknown here"));
+              HasSubstr("scene.yaml:19: board: key 'nonsense' is unknown"));
   EXPECT_THAT(refusal_with("  windows", "  nonsense: []\n  windows"),
-              HasSubstr("scene.yaml:14: clutter: key 'nonsense' is unknown here"));
+              HasSubstr("scene.yaml:14: clutter: key 'nonsense' is unknown"));
 }
 
 TEST(ReadScene, RejectsMissingKey) {

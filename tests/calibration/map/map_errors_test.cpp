@@ -198,7 +198,7 @@ TEST_F(FindLampMapErrors, ReportsStandardDeviationOfOffsets) {
 
 TEST_F(FindLampMapErrors, DetectsMirroredMap) {
   for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;
-  EXPECT_THAT(found(), HasSubstr("looks mirrored"));
+  EXPECT_THAT(found(), HasSubstr("seems to be mirrored"));
 }
 
 TEST_F(FindLampMapErrors, DetectsSwappedLamps) {
@@ -228,7 +228,7 @@ TEST_F(FindLampMapErrors, DetectsMirroredSquare) {
   use_lamps(4);
   EXPECT_THAT(errors(), IsEmpty());
   for (Lamp& lamp : map.lamps) lamp.position_m.x() *= -1;
-  EXPECT_THAT(found(), HasSubstr("looks mirrored"));
+  EXPECT_THAT(found(), HasSubstr("seems to be mirrored"));
 }
 
 TEST_F(FindLampMapErrors, ReportsLampWithMostOutliers) {

@@ -207,7 +207,7 @@ TEST_F(UnitTest, ScreenFits80Columns) {
 TEST_F(UnitTest, ReportContainsVerdict) {
   RunRecord record = make_unit_record(unit, make_run_id(), {"test", "0"});
   EXPECT_THAT(make_unit_report(record, "", {}),
-              AllOf(HasSubstr("<strong>INVALID</strong><p>boards: not enough"),
+              AllOf(HasSubstr("<strong>INVALID</strong><p>boards: too few images"),
                     HasSubstr("not\u00a0reached"), Not(HasSubstr("NOT\u00a0MET"))));
   record.images = {{"boards", "7.png", "", "too dark"}};
   EXPECT_THAT(make_unit_report(record, "", {}),
