@@ -430,13 +430,16 @@ sharpness() {
 timing() {
   scene_of "$1" 514.8 525.2 5 0.7
   render
-  local TIMEFORMAT='%U %S' processor step image arriving=$work/station/captures/timing
+  # A station of its own: the records of the first would refuse the same images.
+  rm -rf "$work/second"
+  cp -r "$work/station" "$work/second"
+  local TIMEFORMAT='%U %S' processor step image arriving=$work/second/captures/timing
   processor=$({ time vlp-station run -q --station "$work/station/station.yaml" \
     --camera-id timing --batch "$work/unit"; } 2>&1)
   mkdir -p "$arriving"/{boards,rotation,dispersion,check}
   cp "$work"/unit/dispersion/captures.csv "$arriving/dispersion/"
   cp "$work"/unit/check/captures.csv "$arriving/check/"
-  { time vlp-station run -q --station "$work/station/station.yaml" --camera-id timing \
+  { time vlp-station run -q --station "$work/second/station.yaml" --camera-id timing \
     --idle-s 60; } 2>"$work/time" &
   local station=$!
   for step in boards rotation dispersion check; do
