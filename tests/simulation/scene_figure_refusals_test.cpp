@@ -233,9 +233,8 @@ TEST(ReadScene, RectangleLampTakesKeysOfLampMapOnly) {
   };
   const std::string shape = "shape: rectangle, size_m: [0.6, 0.3], yaw_rad: 0.1";
   EXPECT_EQ(with(shape), "");
-  EXPECT_THAT(
-      with(shape + ", rim_to_center_ratio: 1"),
-      testing::StartsWith("scene.yaml:10: lamps[0]: key 'rim_to_center_ratio' is unknown"));
+  EXPECT_THAT(with(shape + ", rim_to_center_ratio: 1"),
+              testing::StartsWith("scene.yaml:10: lamps[0]: key 'rim_to_center_ratio' is unknown"));
   EXPECT_THAT(with(shape + ", chips: {fraction: 0.3, pitch_m: 0.03, width_m: 0.02}"),
               testing::StartsWith("scene.yaml:10: lamps[0]: key 'chips' is unknown"));
   EXPECT_EQ(with(shape + ", diameter_m: 0.2"),
