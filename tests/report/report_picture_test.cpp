@@ -23,7 +23,7 @@ TEST(ReadReportPlot, RecognizesPlotsByTitle) {
   const ReportPlot picture = read_report_plot(folder / "b.svg");
   EXPECT_EQ(picture.part, ReportPart::dispersion);
   EXPECT_EQ(picture.image, TemporaryFolder::read_content(folder / "b.svg"));
-  EXPECT_THAT(picture.caption, HasSubstr("station"));
+  EXPECT_THAT(picture.caption, HasSubstr("reference point"));
   EXPECT_THAT(picture.alt, HasSubstr("dispersion"));
 }
 

@@ -29,7 +29,7 @@ TEST(DescribePositionErrorOutliers, NamesRangesOfCaptures) {
             "0.05 mm");
   const std::string many =
       describe_position_error_outliers(errors_with({0, 2, 3, 5, 7, 9, 11, 12, 13}));
-  EXPECT_EQ(many.substr(0, many.find(" are")),
+  EXPECT_EQ(many.substr(0, many.find(" have")),
             "captures 100, 102, 103, 105, 107, 109 and 1 more groups");
 }
 
@@ -37,7 +37,7 @@ TEST(DescribePositionErrorOutliers, EndsRangeAtCaptureWithoutError) {
   auto errors = errors_with({0, 1, 2, 3, 4, 5});
   errors.erase(errors.begin() + 3);
   const std::string outliers = describe_position_error_outliers(errors);
-  EXPECT_EQ(outliers.substr(0, outliers.find(" are")), "captures 100 to 102, 104, 105");
+  EXPECT_EQ(outliers.substr(0, outliers.find(" have")), "captures 100 to 102, 104, 105");
 }
 
 TEST(DescribePositionErrorOutliers, ReturnsEmptyWithoutGrossOutliers) {

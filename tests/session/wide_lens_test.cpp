@@ -89,7 +89,7 @@ INSTANTIATE_TEST_SUITE_P(Models, RunLensStepWideField,
 TEST(RunLensStep, DoesNotBlameBoardForUnsuitableModel) {
   const LensResult result = run_lens_step(make_wide_set(87, LensModel::opencv5), {});
   ASSERT_EQ(result.failure, StepFailure::undetermined);
-  EXPECT_THAT(result.why, AllOf(HasSubstr("OPENCV_FISHEYE fits to 0.05 px"),
+  EXPECT_THAT(result.why, AllOf(HasSubstr("OPENCV_FISHEYE fits with 0.05 px"),
                                 HasSubstr("use --lens OPENCV_FISHEYE"),
                                 Not(HasSubstr("board.yaml")), Not(HasSubstr("cannot be"))));
 }

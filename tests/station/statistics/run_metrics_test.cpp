@@ -91,7 +91,7 @@ TEST_F(RunMetrics, StudyValuesSelectsUnitsWithRepeatedRuns) {
 TEST(RunMetric, ThrowsWithListOfMetricsForUnknownName) {
   EXPECT_STREQ(find_run_metric("check_mean_mm").unit, "mm");
   EXPECT_EQ(rejection_message<std::invalid_argument>([] { find_run_metric("halves_px"); }),
-            "figure 'halves_px' is now called 'split_half_px'");
+            "metric 'halves_px' is now called 'split_half_px'");
   EXPECT_THAT([] { find_run_metric("rms_um"); },
               testing::ThrowsMessage<std::invalid_argument>(
                   AllOf(HasSubstr("there is no metric rms_um"), HasSubstr("rms_px"))));

@@ -203,7 +203,7 @@ TEST_F(LensFault, ReportsLensEstimatedFromLamps) {
                                HasSubstr(fmt::format("the boards a focal length of {:.1f} px",
                                                      std::sqrt(lens[0] * lens[1])))))
           << focal << " " << off_px;
-      const std::string before = "they show a focal length of ";
+      const std::string before = "the lamps fit a focal length of ";
       const auto at = fault.find(before);
       ASSERT_NE(at, std::string::npos);
       EXPECT_NEAR(std::stod(fault.substr(at + before.size())), shown_px, 0.002 * shown_px);
