@@ -121,7 +121,7 @@ TEST_F(ReadCameraOfAnyFormat, RejectsUnknownFormatsAndModels) {
   EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL_PINHOLE', 'imagersize': [10, 20], "
                       "'intrinsics': [ 1, 2, 3 ] }"),
               testing::HasSubstr("takes 4 parameters, not 3"));
-  EXPECT_THAT(refusal("cam0: {camera_model: omni}\n"), testing::HasSubstr("omni is not known"));
+  EXPECT_THAT(refusal("cam0: {camera_model: omni}\n"), testing::HasSubstr("omni is not supported"));
   std::string skewed = format_opencv_camera(make_camera(LensModel::opencv5));
   skewed.replace(skewed.find("[520.25, 0,"), 11, "[520.25, 3,");
   EXPECT_THAT(refusal(skewed), testing::HasSubstr("camera_matrix is skewed"));
