@@ -183,7 +183,7 @@ class Module(unittest.TestCase):
             whole = vlp.LampMap(file)
             self.assertEqual(len(whole), 12)
             with self.assertRaisesRegex(
-                vlp.InputError, "lamps.yaml: .* by the argument room of LampMap; the map has: hall, office"
+                vlp.InputError, "lamps.yaml: .* with the argument room of LampMap; the map has: hall, office"
             ):
                 vlp.LampDetector(whole, calibration)
             vlp.Positioner(whole, calibration)  # whose lamps are identified elsewhere
