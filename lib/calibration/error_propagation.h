@@ -12,8 +12,8 @@
 /// result. Used for by_intrinsics, by_zenith and similar members of RotationCenter and Dispersion.
 namespace vlp {
 
-/// Function that returns the solution if the assumed inputs have the errors `error`; std::nullopt
-/// if there is no solution.
+/// Function that solves for a vector of unknowns with the errors `error` added to the assumed
+/// inputs, in the units of the inputs. Returns the solution; std::nullopt if there is none.
 using PerturbedSolve = std::function<std::optional<Eigen::VectorXd>(const Eigen::VectorXd& error)>;
 
 /// Estimates the derivative of a solution with respect to errors of its inputs, one column per

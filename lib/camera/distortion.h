@@ -15,14 +15,16 @@ namespace vlp {
 /// mrcal's OPENCV4 to OPENCV12 are this model with the missing coefficients set to 0.
 /// Source: OpenCV's calib3d documentation, "Detailed Description".
 struct Distortion {
-  /// Coefficients in the order k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
+  /// Coefficients k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 of the equation above, in this order (that of
+  /// OpenCV). Dimensionless; 0 by default.
   std::array<double, 12> k{};
 
   struct Value {
     Eigen::Vector2d distorted;
     Eigen::Matrix2d d_distorted_d_z;
   };
-  /// Computes the distorted point and its derivative.
+  /// Computes the distorted point (x', y') of z in the normalized plane and its derivative with
+  /// respect to z.
   Value operator()(const Eigen::Vector2d& z) const;
 
   /// Returns the radial factor L.

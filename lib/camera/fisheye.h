@@ -12,10 +12,12 @@ namespace vlp {
 /// Source: Kannala and Brandt, "A generic camera model and calibration method for conventional,
 /// wide-angle, and fish-eye lenses", 2006; OpenCV's fisheye module; Kalibr's "equidistant".
 struct Fisheye {
-  /// Coefficients in the order k1 k2 k3 k4.
+  /// Coefficients k1 k2 k3 k4 of the polynomial d(a), in this order. Dimensionless; 0 by default,
+  /// which is the equidistant lens.
   std::array<double, 4> k{};
 
-  /// Returns d(a).
+  /// Returns d(a): the distance from the principal point, in focal lengths, of a ray at `angle_rad`
+  /// to the optical axis.
   double radius_from_angle(double angle_rad) const {
     const double t = angle_rad * angle_rad;
     return angle_rad * (1 + t * (k[0] + t * (k[1] + t * (k[2] + t * k[3]))));

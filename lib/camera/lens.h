@@ -18,9 +18,10 @@ class LensFamily;  // camera/lens_family.h
 /// lens_model.h. Const and safe to share between threads.
 class Lens {
  public:
-  /// Creates a lens from parameters in mrcal's order.
+  /// Creates a lens from its parameters in the order of mrcal: fx fy cx cy, px, followed by the
+  /// distortions of the model (lens_model.h).
   /// @throws std::invalid_argument if their number is not parameter_count(model), a parameter is
-  ///         not finite or a focal length is not positive
+  ///     not finite or a focal length is not positive
   Lens(LensModel model, std::span<const double> parameters);
 
   LensModel lens_model() const { return model_; }

@@ -15,8 +15,9 @@ class LensFamily {
  public:
   virtual ~LensFamily() = default;
 
-  /// Projects a point, in any unit, to the plane. Returns std::nullopt or a position that is not
-  /// finite for a point that the model does not describe.
+  /// Projects a point of the camera frame, in any unit, to the image plane of focal length 1.
+  /// @return position in focal lengths from the principal point; std::nullopt or not finite for a
+  ///     point that the model does not describe
   virtual std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x_in_camera) const = 0;
 
   struct Jacobians {
@@ -48,8 +49,8 @@ class LensFamily {
     Eigen::Vector3d direction;
     Eigen::Matrix<double, 3, 2> d_direction_d_plane;
   };
-  /// Computes the ray of a finite position in the plane. Returns std::nullopt if project() maps no
-  /// point to it.
+  /// Computes the ray in the camera frame, not of unit length, of a finite position in the image
+  /// plane. Returns std::nullopt if project() maps no point to it.
   virtual std::optional<Ray> unproject(const Eigen::Vector2d& plane) const = 0;
 };
 

@@ -31,8 +31,8 @@ namespace vlp {
 /// class in make_lens_family() of lens.cpp.
 enum class LensModel { pinhole, stereographic, opencv4, opencv5, opencv8, opencv12, fisheye };
 
-/// Returns mrcal's name, for example "LENSMODEL_OPENCV8", or "OPENCV_FISHEYE". The view stays valid
-/// until the program ends.
+/// Returns the name of a lens model: mrcal's name, for example "LENSMODEL_OPENCV8", or
+/// "OPENCV_FISHEYE" for `fisheye`. The view stays valid until the program ends.
 std::string_view to_string(LensModel model);
 
 /// Returns the model with a name; std::nullopt for other names. A splined lens must be within the

@@ -12,8 +12,8 @@ namespace vlp {
 /// Distortion parameter of a lens model, which follows fx fy cx cy.
 struct LensDistortion {
   std::string_view name;
-  /// Initial value for a solve. With the initial values the lens is nearly STEREOGRAPHIC. The value
-  /// is not 0 if 0 is a stationary point.
+  /// Initial value of the distortion parameter for a solve. With all initial values the lens is
+  /// nearly STEREOGRAPHIC. The value is not 0 if 0 is a stationary point of the solve.
   double start = 1e-6;
 };
 

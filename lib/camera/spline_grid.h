@@ -14,7 +14,7 @@ namespace vlp {
 /// Grid of the control points of a splined lens, which mrcal's name of the model contains:
 ///   LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14_fov_x_deg=190
 struct SplineGrid {
-  /// Degree of the polynomials, 2 or 3.
+  /// Degree of the B-spline polynomials: 2 (quadratic) or 3 (cubic). mrcal calls it the order.
   int order;
   /// Number of control points along x and y, more than `order` and at most kMaxKnots.
   int nx, ny;

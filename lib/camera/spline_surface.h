@@ -24,8 +24,9 @@ namespace vlp {
 /// Splines", 1978.
 class SplineSurface {
  public:
-  /// Creates the surface from control points row by row, the x and then the y component of each.
-  /// @pre There are two numbers for each control point of the grid.
+  /// Creates the surface from its control points, row by row, each as x, y. Values are
+  /// displacements in the stereographic plane, in focal lengths.
+  /// @pre `control_points` has two numbers for each control point of the grid.
   SplineSurface(const SplineGrid& grid, std::span<const double> control_points);
 
   const SplineGrid& spline_grid() const { return grid_; }

@@ -36,7 +36,8 @@
 ///   - positions of the camera or of the axis with their standard deviation
 namespace vlp {
 
-/// Measured position of the camera or of the rotation axis.
+/// Measured position of the camera or of the rotation axis (`of`), in the world frame. `xy_m` is
+/// horizontal, in m. `z_m` is the height of the camera; std::nullopt if it was not measured.
 struct KnownPosition {
   PlaceOf of;
   Eigen::Vector2d xy_m;

@@ -17,15 +17,18 @@
 /// derivatives, solution by Ceres, covariance.
 namespace vlp {
 
-/// Positions of the unknowns in the vector: first the global ones, then those of each capture. An
-/// absent part has size 0.
+/// Index of the first unknown of each kind in the state vector. Global unknowns come first, in the
+/// order of the members; those of each capture follow. A kind without unknowns has size 0.
 struct AdjustmentLayout {
-  /// Correction of the lens, in units of its standard deviations (LensParametrization).
+  /// Index and number of the unknowns of the lens, in units of its standard deviations
+  /// (LensParametrization).
   Eigen::Index lens = 0, lens_size = 0;
-  /// Point (x/z, y/z) of the zenith in the camera.
+  /// Index of the normalized point (x/z, y/z) of the zenith in the camera frame.
   Eigen::Index zenith = 0;
+  /// Index of the lever arm (x, y) in the level frame, m.
   Eigen::Index lever_arm = 0;
-  /// Three per lamp; three (x, y of the axis, z of the camera) per spot.
+  /// Indices of the positions of the lamps and of the spots, in the world, m. Each has three
+  /// coordinates; those of a spot are x, y of the axis and z of the camera.
   Eigen::Index lamps = 0, spots = 0;
   /// Number of global unknowns.
   Eigen::Index global = 0;

@@ -20,7 +20,7 @@ namespace vlp {
 /// Capture at a reference point, that is, at a known position of the camera.
 struct ReferencePointCapture {
   std::vector<Detection> detections;
-  /// Position of the camera in the world: the reference point.
+  /// Known horizontal position (x, y) of the camera in the world frame, m: the reference point.
   Eigen::Vector2d reference_point_m;
   std::optional<Inclination> inclination = {};
 };

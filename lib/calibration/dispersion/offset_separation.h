@@ -13,9 +13,10 @@ namespace vlp {
 
 /// Errors of camera and world from estimate_heading_dependent_offset(), method `camera`.
 struct OffsetSeparation {
-  /// Offset in the undistorted image, which rotates with the camera.
+  /// Offset (u, v) of the dispersion in the undistorted image, px. It rotates with the camera,
+  /// unlike `world_m`.
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
-  /// Mean error of the corrected fixes, fixed in the world.
+  /// Mean error (x, y) of the corrected fixes, fix minus reference point, in the world frame, m.
   Eigen::Vector2d world_m = Eigen::Vector2d::Zero();
   /// Covariance of (offset_px, world_m) for fixes that scatter according to their covariances and
   /// an exact map.

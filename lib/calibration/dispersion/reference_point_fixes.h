@@ -12,8 +12,8 @@
 /// Statistics of all fixes at a reference point. Captures without a fix are ignored.
 namespace vlp {
 
-/// Derivatives of several quantities with respect to the positions of the lamps that have an sd_m
-/// in the map.
+/// Derivatives of a vector of quantities with respect to the positions of lamps. Unit: that of the
+/// quantity, per m. `lamps` are those with an sd_m in the map.
 struct LampDerivatives {
   std::vector<Lamp> lamps;
   /// One row for each quantity, three columns for each lamp.

@@ -17,7 +17,8 @@ namespace vlp {
 /// Order of ids and spacing can therefore be checked without a lens. The size of a tag cannot: a
 /// larger board at a larger distance looks the same.
 struct BoardCheck {
-  /// Difference from board.yaml with the values that the images show, in one line; empty if none.
+  /// Contradiction between board.yaml and the images, as one line of text with the values measured
+  /// in the images. Empty if they agree.
   std::string problem;
   /// Median distance of neighboring tags, in tag widths (ChArUco: size of a square in marker
   /// widths). std::nullopt with fewer than ten pairs of tags, or if no pair lies as on the board.

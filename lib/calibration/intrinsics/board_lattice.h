@@ -18,6 +18,7 @@ namespace vlp {
 /// tags. Otherwise corner k of all tags forms a lattice with its own pose, called a part.
 class BoardLattice {
  public:
+  /// Creates the lattice of a board.
   /// @throws std::invalid_argument for a board of tags if tag_spacing is not 1 and the board has
   ///     one row or column
   explicit BoardLattice(const Board& board);

@@ -13,7 +13,9 @@ namespace vlp {
 /// Effect of an aspect error of the printed board on a lens: the change if the board is wider than
 /// stated, at the stated height.
 struct PrintEffect {
-  /// Change of the intrinsics for one standard deviation of the aspect.
+  /// Change of each intrinsic, in the order of the lens model, due to an error of the board's
+  /// aspect. The error is one standard deviation: the board is wider than stated by the fraction
+  /// sqrt(2) print_sd.
   Eigen::VectorXd intrinsics;
   /// Change of projections over the image, rms per axis, in px.
   double rms_px;

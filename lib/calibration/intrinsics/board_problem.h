@@ -18,9 +18,11 @@ struct BoardPose {
   Eigen::Vector3d translation_m;
 };
 
-/// Camera and board views in the formulation of mrcal (mrcal documentation, "Formulation"). Boards
-/// are uniform lattices of cols x rows points, spacing_m apart, with the warp
-///   z = warp_m.x (1 - (2 i / (cols - 1) - 1)^2) + warp_m.y (1 - (2 j / (rows - 1) - 1)^2).
+/// Lens, board and poses of the board in all views, with the measured points, in the formulation of
+/// mrcal (mrcal documentation, "Formulation"). The board is a lattice of cols x rows points at
+/// spacing_m in x and y. Its warp, in m, is
+///   z = warp_m.x (1 - (2 i / (cols - 1) - 1)^2) + warp_m.y (1 - (2 j / (rows - 1) - 1)^2)
+/// at column i and row j.
 struct BoardProblem {
   LensModel lens_model;
   std::vector<double> intrinsics;

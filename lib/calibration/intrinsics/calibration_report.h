@@ -16,8 +16,8 @@ namespace vlp {
 
 /// Uncertainty of a solution.
 struct CalibrationReport {
-  /// Region of the image where the lens is calibrated (compute_valid_lens_region()), and its
-  /// fraction of the image.
+  /// Region of the image where the lens is calibrated (compute_valid_lens_region()): polygon, px.
+  /// `region_fraction` is its area as a fraction of the image, 0 to 1.
   ImageRegion region;
   double region_fraction;
   /// Mean and maximum of ProjectionUncertainty::max_direction_sd_px() by tags, px, over the

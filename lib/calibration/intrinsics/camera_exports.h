@@ -17,8 +17,9 @@ namespace vlp {
 /// OPENCV8, equidistant for OPENCV_FISHEYE. Throws std::invalid_argument also if the name of the
 /// camera has control characters or is not UTF-8.
 std::string format_ros_camera_info(const Camera& camera);
-/// Formats Kalibr's camchain: pinhole with radtan for PINHOLE and OPENCV4, or with equidistant for
-/// OPENCV_FISHEYE.
+/// Returns the camera as the text of a camchain.yaml of Kalibr: model pinhole, with distortion
+/// radtan for PINHOLE and OPENCV4, and equidistant for OPENCV_FISHEYE.
+/// @throws std::invalid_argument for other lens models
 std::string format_kalibr_camchain(const Camera& camera);
 /// Formats OpenCV's FileStorage with camera_matrix and distortion_coefficients, for all models but
 /// STEREOGRAPHIC and splined lenses. The coefficients of OPENCV_FISHEYE are those of cv::fisheye,

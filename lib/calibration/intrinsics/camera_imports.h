@@ -12,8 +12,8 @@ namespace vlp {
 /// Camera from a file of any supported format.
 struct AnyCamera {
   Camera camera;
-  /// Region where the lens is calibrated, from region_px of a calibration or
-  /// valid_intrinsics_region of mrcal; empty if the file has none.
+  /// Polygon of the image region where the lens is calibrated, px: region_px of a calibration, or
+  /// valid_intrinsics_region of mrcal. Empty if the file has none.
   ImageRegion region;
 };
 /// Reads a camera. The format is detected from the content:

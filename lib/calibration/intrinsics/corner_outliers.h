@@ -9,15 +9,19 @@
 
 namespace vlp {
 
-/// Returns the indices, ascending, of outliers among the corners of a view: corners more than max(3
-/// px, a quarter of the distance to the nearest neighbor) from their predicted position.
+/// Finds outliers among the corners of one view: corners farther from their predicted pixel than
+/// max(3 px, 25 % of the distance between predicted neighbors).
 ///
-/// Noise is smaller: such a corner belongs to something else or is a mistake in a file. Least
-/// squares would distort the view or the lens to fit it.
+/// @return indices in `corners`, ascending; empty for fewer than nine corners, or if more than 10 %
+///     would be outliers
+///
+/// More outliers indicate another board or another order of the corners.
+///
+/// Noise is smaller than this limit. Outliers are misidentified points or errors in a file; least
+/// squares would distort the view or the lens to fit them.
 ///
 /// Each corner is predicted by the homography of its nearest eight corners on the board, which
-/// holds for any lens. The worst corner is removed and its neighbors are tested again. Returns no
-/// corner if more than a tenth would be outliers: then the board or the order is another one.
+/// approximates any lens. The worst corner is removed and its neighbors are tested again.
 std::vector<std::size_t> find_corner_outliers(const std::vector<BoardLattice::Corner>& corners);
 
 }  // namespace vlp

@@ -12,11 +12,11 @@ struct CornerError {
   double square_px2, sd_px;
 };
 
-/// Variance model of a corner position, per axis:
-///   variance = floor_px2 + scale2 sd_px^2.
-/// `sd_px` is the standard deviation predicted from pixel noise. `scale2` allows for correlated
-/// noise. `floor_px2` covers errors that the pixels do not show, such as printing errors of the
-/// board.
+/// Variance model of a corner position, per axis, px^2:
+///   variance = floor_px2 + scale2 sd_px^2
+///   sd_px      standard deviation of the corner predicted from pixel noise, px
+///   scale2     factor that allows for correlated noise
+///   floor_px2  variance of errors that pixels do not show, such as printing errors of the board
 ///
 /// A least-squares solve has to weight residuals by their variances (Gauss and Markov). Behind
 /// JPEG, corners in the dark corners of an image are five times as uncertain as those in the

@@ -19,7 +19,7 @@ struct EdgeDisplacement {
   Eigen::Vector2d middle{0, 0};
   double radius_px = 1;
 
-  /// Returns the displacement at a pixel, px.
+  /// Returns the inward displacement of a tag edge at a pixel of the image, px. Negative: outwards.
   double at(const Eigen::Vector2d& pixel) const {
     const Eigen::Vector2d x = (pixel - middle) / radius_px;
     return coefficients.dot(Eigen::Vector4d(1, x.x(), x.y(), x.squaredNorm()));

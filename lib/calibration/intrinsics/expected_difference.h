@@ -12,7 +12,7 @@ namespace vlp {
 
 /// Expected compute_projection_difference() between a lens and the true one.
 struct ExpectedDifference {
-  /// Root of the expected mean square over the image, per axis, px.
+  /// Expected RMS distance between the projections of the two lenses over the image, per axis, px.
   double rms_px;
   /// Effective number of independent terms of similar size in the mean square, whose relative
   /// standard deviation is sqrt(2 / degrees_of_freedom).

@@ -22,7 +22,8 @@ class ImageCoverage {
   }
   int count_corners_in_cell(int col, int row) const { return corners_[flat_index(col, row)]; }
 
-  /// Returns the fraction of the parts that have corners.
+  /// Returns the fraction, 0 to 1, of the 8 x 6 equal parts of the image that contain at least one
+  /// corner.
   double covered_fraction() const {
     const auto covered =
         std::count_if(corners_.begin(), corners_.end(), [](int corners) { return corners > 0; });

@@ -12,7 +12,8 @@ namespace vlp {
 
 /// Views that do not fit the lens of the other views, such as images of another camera.
 struct InconsistentViews {
-  /// Indices of the views in the input of the solve, ascending.
+  /// Indices of the inconsistent views in IntrinsicsInput::views, ascending. Empty if all views
+  /// fit.
   std::vector<std::size_t> views;
   /// Number of the other views.
   std::size_t others = 0;

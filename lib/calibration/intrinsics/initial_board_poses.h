@@ -8,10 +8,12 @@
 
 namespace vlp {
 
-/// Initial poses of all views, estimated with one lens.
+/// Initial poses of the board in all views, estimated with one lens. `poses` are camera_from_board,
+/// in the order of IntrinsicsInput::views.
 struct InitialPoses {
   std::vector<BoardPose> poses;
-  /// RMS residual of each view, px; infinity if it has no pose.
+  /// RMS reprojection residual of each view at its pose, per axis, px, in the order of
+  /// IntrinsicsInput::views. Infinity for a view without a pose.
   std::vector<double> rms_px;
 };
 /// Estimates the poses of all views with a lens.

@@ -17,7 +17,8 @@ namespace vlp {
 /// 20,000.
 enum class WarpChoice { automatic, on, off };
 
-/// Input of a solve: the corners of each view, from one camera.
+/// Input of solve_intrinsics(): corners of a board in images of one camera, and the lens model.
+/// `views` has the corners of each image; `imager_px` is (width, height).
 struct IntrinsicsInput {
   BoardLattice lattice;
   std::vector<std::vector<BoardLattice::Corner>> views;

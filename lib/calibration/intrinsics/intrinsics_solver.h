@@ -19,12 +19,14 @@ class IntrinsicsSolver {
 
   explicit IntrinsicsSolver(const IntrinsicsInput& input);
 
-  /// Stage 2, from an initial focal length.
+  /// Stage 2: estimates the poses of all views and a STEREOGRAPHIC lens, from an initial focal
+  /// length in px. Returns false if the solve fails.
   bool solve_from_focal_length(double focal_px);
   /// Splined lenses only: initializes stage 3 with the rotationally symmetric lens OPENCV_FISHEYE.
   /// Keeps the initial lens STEREOGRAPHIC if that fails.
   void initialize_with_symmetric_lens();
-  /// Stage 3.
+  /// Stage 3: solves the requested lens model with all poses and drops views that fit no pose.
+  /// Returns false if the solve fails.
   bool refine_intrinsics();
   /// Splined lenses only: scales the regularization to the noise of the corners.
   bool scale_spline_regularization();
@@ -39,9 +41,11 @@ class IntrinsicsSolver {
   /// Stage 7: weights the corners by their variances (CornerWeights) if standard deviations of some
   /// corners are known.
   bool reweight_corners();
-  /// Stage 8.
+  /// Stage 8: solves again without the outliers among the corners. Returns false if the solve
+  /// fails.
   bool reject_outliers();
-  /// Stage 9, splined lenses only. Returns true also if the rotation has not converged.
+  /// Stage 9, splined lenses only: rotates the camera frame so that +Z is the optical axis. Returns
+  /// true also if the rotation has not converged.
   bool rotate_camera_frame_to_optical_axis();
 
   /// Returns the current solution.

@@ -16,8 +16,8 @@ namespace vlp {
 /// Residuals of one lens model in views that took no part in its solves.
 struct LensCandidate {
   LensModel model;
-  /// RMS per axis, px, over the views that count; infinity if no lens of the model fits all of
-  /// them.
+  /// RMS residual of the held-out views per axis, px, over the views that count
+  /// (select_lens_model()). Infinity if no lens of the model fits all of them.
   double rms_px = std::numeric_limits<double>::infinity();
 };
 

@@ -17,8 +17,8 @@ namespace vlp {
 
 /// Views of a board from which a lens is estimated.
 struct LensViews {
-  /// Views that differ, each with enough corners (BoardLattice::has_sufficient_corners()); one or
-  /// more.
+  /// Detections of the board, one per image, in different poses; at least one. Each has enough
+  /// corners to determine a pose (BoardLattice::has_sufficient_corners()).
   std::vector<BoardView> views;
   Board board;
   LensModel lens_model = LensModel::opencv8;

@@ -20,8 +20,8 @@ namespace vlp {
 /// `sigma_px` is positive. It includes the pixel's own aperture, about 0.29 px.
 double compute_mtf50(double sigma_px);
 
-/// Returns the MTF50, in cycles per pixel, of the upper median of the edges' blurs in a view;
-/// std::nullopt if no edge has a known blur.
+/// Computes the sharpness of one view, in cycles per pixel: the MTF50 of the median blur of its tag
+/// edges. The median is the upper one. Returns std::nullopt if the blur of no edge is known.
 std::optional<double> compute_median_edge_mtf50(const BoardDetection& seen);
 
 /// Sharpness and contrast of lens and pixel together over the image, from the light profiles across

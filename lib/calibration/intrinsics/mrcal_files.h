@@ -26,16 +26,18 @@ namespace vlp {
 /// @pre is_supported_by_mrcal() of the lens model, also for write_mrcal_corners()
 void write_mrcal_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution);
 
-/// Writes the corners of a solution in the format of mrcal-calibrate-cameras (--corners-cache), row
-/// by row of the lattice. A corner that was not seen, or is an outlier, has the level "-".
+/// Writes the corners of a solution in the format of mrcal-calibrate-cameras (--corners-cache),
+/// image by image and row by row of the lattice. Pixels are in px.
 ///
-/// The columns are `filename x y level` with level = -log2(weight). If weights do not correspond to
-/// whole levels from 0 on, they are `filename x y weight` (--corners-cache-has-weights). An image
-/// of a board in four parts occurs four times, as NAME-corner0 to NAME-corner3.
+/// @param images  file names of the views of the input, before views were dropped. A second image
+///     of the same name becomes NAME-2, because the table identifies views by name.
+/// @throws InputError if the file cannot be written
+/// @pre is_supported_by_mrcal() of the lens model
 ///
-/// @param images  names of the views of the input. The table identifies views by name: a second
-///     image of the same name becomes NAME-2.
-/// @throws InputError
+/// The columns are `filename x y level` with level = -log2(weight). If a weight does not correspond
+/// to a whole level from 0 on, they are `filename x y weight` (--corners-cache-has-weights). A
+/// corner that was not detected, or is an outlier, has the row `NAME -1 -1 -`. An image of a board
+/// in four parts occurs four times, as NAME-corner0 to NAME-corner3.
 void write_mrcal_corners(const std::filesystem::path& file, const IntrinsicsSolution& solution,
                          std::span<const std::string> images);
 

@@ -18,8 +18,8 @@ class NumpyArchive {
  public:
   using Shape = std::vector<std::size_t>;
 
-  /// Adds an array. Values are in C order; their number is the product of `shape`, which is {} for
-  /// a scalar.
+  /// Adds an array of doubles with a name. `values` are in C order (last index fastest). Their
+  /// number is the product of `shape`; an empty shape is a scalar.
   void add_entry(std::string_view name, const Shape& shape, std::span<const double> values);
   void add_entry(std::string_view name, const Shape& shape, std::span<const std::int32_t> values);
   void add_entry(std::string_view name, double value) { add_entry(name, {}, std::span(&value, 1)); }

@@ -18,8 +18,9 @@ namespace vlp {
 std::vector<Eigen::Vector2d> make_regular_pixel_grid(const std::array<int, 2>& imager_px,
                                                      int cols = 41);
 
-/// Fits the rotation of the rays of `a` at the pixels to those of `b`, by least squares over the
-/// pixels at which both have a ray; std::nullopt for fewer than three.
+/// Fits the rotation R from the camera frame of `a` to that of `b`: unit rays of the same pixels
+/// satisfy ray_b = R ray_a. Least squares over the pixels for which both lenses have a ray.
+/// @return std::nullopt for fewer than three such pixels
 std::optional<Eigen::Matrix3d> fit_rotation_between_lenses(const Lens& a, const Lens& b,
                                                            std::span<const Eigen::Vector2d> pixels);
 

@@ -30,10 +30,12 @@ namespace vlp {
 /// own group.
 class ProjectionUncertainty {
  public:
-  /// Assumes independent corners, as mrcal.
+  /// Computes the covariances of a solution, assuming that the errors of all corners are
+  /// independent, as mrcal does.
   /// @pre solution.ok()
   explicit ProjectionUncertainty(const IntrinsicsSolution& solution);
-  /// Allows for correlated errors within tags.
+  /// Computes the covariances of a solution, allowing for correlated errors of the corners of a
+  /// tag.
   /// @pre solution.ok(), with boards of that lattice
   ProjectionUncertainty(const IntrinsicsSolution& solution, const BoardLattice& lattice);
 

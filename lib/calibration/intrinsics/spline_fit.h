@@ -28,8 +28,12 @@ std::optional<std::vector<double>> fit_splined_lens_to_lens(
     const std::vector<double>& core,
     const Eigen::Matrix3d& lens_from_splined = Eigen::Matrix3d::Identity());
 
-/// Describes in one line why fit_splined_lens_to_lens() fails: the field of view of the lens, and a
-/// splined model with which it succeeds, if there is one.
+/// Returns one line for an error message when fit_splined_lens_to_lens() fails. It states the field
+/// of view of `lens` over the image, in degrees. It also names a splined model that can be fitted,
+/// if one is found.
+/// @param imager_px  width and height of the image
+/// @param model      splined model for which the fit failed
+/// @param core       fx, fy, cx, cy, px
 std::string describe_too_coarse_spline_grid(const Lens& lens, const std::array<int, 2>& imager_px,
                                             LensModel model, const std::vector<double>& core);
 

@@ -9,11 +9,13 @@
 
 namespace vlp {
 
-/// Estimates one gamma of the tone curve for all images of a camera and corrects the corners in
-/// `views` for it. Returns gamma; 1 if there is no tone curve.
+/// Estimates one tone curve for all images of a camera and corrects the corners in `views` for it.
+/// The curve is level = 255 (light / 255)^(1 / gamma).
+/// @return gamma, at least 1; 1 if there is no tone curve, and the corners are unchanged
+/// @throws std::invalid_argument as BoardLattice
 ///
 /// Minimizes over kGammas
-///   compute_cost(gamma) = n log ratio(gamma) + (log(gamma / gamma_levels) / 0.2)^2 / 2
+///   cost(gamma) = n log ratio(gamma) + (log(gamma / gamma_levels) / 0.2)^2 / 2
 /// with
 ///   ratio         RMS residual of the lens fit for corners corrected with gamma, divided by the
 ///                 median standard deviation of the corners from pixel noise; OPENCV8 or
@@ -21,8 +23,9 @@ namespace vlp {
 ///   n             50 / min(ratio), an effective number of residuals
 ///   gamma_levels  estimate from the gray values next to the edges (sum_tone_curve_costs())
 ///
-/// Uses gamma_levels alone if no lens is found, if check_board_layout() reports another board, or
-/// if at least half of the views with usable gray values show no curve. Uses at most 24 views.
+/// Uses gamma_levels alone if no lens is found or if check_board_layout() reports another board. It
+/// does the same if at least half of the views with usable gray values show no curve. Uses at most
+/// 24 views.
 ///
 /// Reason for both terms: gray values are precise but biased by JPEG and sharpening (20 % RMS of
 /// gamma). A wrong curve displaces edges by fractions of their blur, which differ from tag to tag
@@ -32,8 +35,6 @@ namespace vlp {
 /// Reason for n: thousands of residuals do not determine gamma as precisely as exact ratios would.
 /// With n, a ratio of 2 % weighs as much as the gray values, and less if the noise explains few of
 /// the residuals.
-///
-/// @throws std::invalid_argument as BoardLattice
 double estimate_and_apply_tone_curve(std::vector<BoardView>& views, const Board& board);
 
 }  // namespace vlp

@@ -13,15 +13,19 @@ namespace vlp {
 /// Polygon in an image: its vertices in order, px.
 using ImageRegion = std::vector<Eigen::Vector2d>;
 
-/// Returns the region of the image where a lens is calibrated: the convex hull of the corners used,
-/// extended along each axis by 4 % of the image diagonal and clipped to the image.
+/// Computes the region of the image where a lens is calibrated. It is the convex hull of the
+/// corners used, extended by a margin and clipped to the image.
 ///
-/// Returns the whole image if the region covers at least 98.5 % of it, and an empty region without
-/// three corners that are not on a line. The polygon is convex and clockwise in the image. Outside
-/// it no corner contradicts a wrong lens model.
+/// @param corners_px        corners used by the solve, px
+/// @param imager_px         width and height of the image
+/// @param other_model_fits  true if the corners do not distinguish the lens model from another one
+/// @return                  convex polygon, px, clockwise in the image; empty if all corners are on
+///     one line
 ///
-/// There is no margin for splined lenses, which are undetermined outside the corners, and if the
-/// corners do not distinguish the model from another one (other_model_fits).
+/// The margin is 4 % of the image diagonal along each axis. It is 0 with `other_model_fits`, and
+/// for splined lenses, which are undetermined outside the corners. If the region covers at least
+/// 98.5 % of the image, it is the whole image. Outside the region no corner contradicts a wrong
+/// lens model.
 ImageRegion compute_valid_lens_region(const std::vector<Eigen::Vector2d>& corners_px,
                                       const std::array<int, 2>& imager_px, LensModel model,
                                       bool other_model_fits = false);

@@ -18,13 +18,16 @@ struct ViewPose {
   double rms_px;
 };
 
-/// Estimates the pose of a board in a view with the smallest reprojection error.
+/// Estimates camera_from_board of one view by minimizing the reprojection residuals of its corners,
+/// px.
+///
+/// @return pose and RMS residual; std::nullopt if fewer than four corners have a ray within 90
+///     degrees of their mean ray, or if neither pose can be projected
 ///
 /// A plane has two poses that look almost the same: tilted to one side or to the other. Both are
 /// estimated in the undistorted image for a flat board (Collins and Bartoli, "Infinitesimal
-/// plane-based pose estimation", 2014). They are refined in pixels by the method of Levenberg and
-/// Marquardt, and compared.
-/// @return std::nullopt for fewer than four corners, or if neither pose can be projected
+/// plane-based pose estimation", 2014). Both are refined in pixels by the method of Levenberg and
+/// Marquardt. The one with the smaller residual is returned.
 std::optional<ViewPose> estimate_board_view_pose(std::span<const BoardLattice::Corner> corners,
                                                  const Lens& lens);
 

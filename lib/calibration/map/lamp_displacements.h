@@ -14,7 +14,8 @@ namespace vlp {
 
 /// Detections of one capture, projected onto the ceiling with an approximate camera pose.
 struct CeilingView {
-  /// Projection of one detection: position on the ceiling, and height of the lamp above the camera.
+  /// Horizontal position of a detected lamp projected onto the ceiling, in the world frame, m, and
+  /// height of the lamp above the camera, m. `lamp` is its id.
   struct ProjectedLamp {
     int lamp;
     Eigen::Vector2d projected_m;

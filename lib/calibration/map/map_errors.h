@@ -19,7 +19,7 @@
 /// error.
 namespace vlp {
 
-/// Kind of a map error.
+/// Kind of error of a lamp map, found by comparing the map with captures.
 enum class MapErrorKind {
   moved,       // the position of a lamp is wrong
   unsteady,    // a lamp contradicts the others in some captures, in varying directions

@@ -15,9 +15,9 @@ namespace vlp {
 /// Circle that a lamp traces at one height in the plane of normalized points (x/z, y/z). This plane
 /// is the undistorted image in units of the focal length.
 struct LampCircle {
-  /// Index in RotationCaptures::lamps.
+  /// Index in RotationCaptures::lamps of the lamp that traces the circle.
   std::size_t lamp;
-  /// Index in RotationCaptures::heights.
+  /// Index in RotationCaptures::heights of the camera height of the circle.
   std::size_t height;
   CircleFit fit;
 };

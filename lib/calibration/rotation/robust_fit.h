@@ -25,11 +25,13 @@ namespace vlp {
 /// For internal use in this folder, because the header includes Ceres.
 class RobustFit {
  public:
-  /// @param noise_is_stated  true if the residuals are in units of a given sigma; residuals within
+  /// Creates an empty problem.
+  /// @param noise_is_stated  true if the residuals are divided by a given sigma; residuals within
   ///     4.5 are then inliers even if the other residuals scatter less
   explicit RobustFit(bool noise_is_stated) : noise_is_stated_(noise_is_stated) {}
 
-  /// Adds a residual of two rows. The caller owns `parameters`, which must outlive the fit.
+  /// Adds a residual with two components, a function of `parameters`. The caller owns `parameters`,
+  /// which must outlive the fit.
   void add_residual(std::unique_ptr<ceres::CostFunction> cost, std::vector<double*> parameters);
   /// Fixes a parameter at its value.
   void set_parameter_constant(const double* parameter) { fixed_.push_back({parameter}); }

@@ -18,9 +18,9 @@ namespace vlp {
 
 /// Observation of one lamp in one capture.
 struct RotationObservation {
-  /// Index in RotationCaptures::captures.
+  /// Index in RotationCaptures::captures of the capture with this observation.
   std::size_t capture;
-  /// Index in RotationCaptures::lamps.
+  /// Index in RotationCaptures::lamps of the observed lamp.
   std::size_t lamp;
   Eigen::Vector2d pixel;
   double sigma_px;
@@ -33,9 +33,9 @@ struct RotationObservation {
 /// Capture of a rotation in place.
 struct RotationCapture {
   std::string image;
-  /// Index in RotationCaptures::heights.
+  /// Index in RotationCaptures::heights of the camera height of this capture.
   std::size_t height;
-  /// Yaw of the camera's position fix.
+  /// Yaw of the camera in the world from its position fix, rad.
   double yaw_rad;
 };
 

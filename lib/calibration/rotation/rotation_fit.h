@@ -14,7 +14,7 @@ namespace vlp {
 
 /// Observation that contradicts the other observations and is rejected.
 struct RotationOutlier {
-  /// Index in RotationCaptures::observations.
+  /// Index in RotationCaptures::observations of the rejected observation.
   std::size_t observation;
   /// Distance from the position that the fit predicts, in px.
   double distance_px;

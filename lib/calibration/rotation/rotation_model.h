@@ -14,7 +14,7 @@ namespace vlp {
 /// Position fix of a camera that rotates in place.
 struct RotationFix {
   Pose pose;
-  /// Mean height of the lamps of the map above the camera.
+  /// Mean height of the detected lamps above the camera, m. Only lamps of the map count.
   double height_m;
   /// Index of the spot.
   std::size_t pivot;

@@ -17,10 +17,10 @@ namespace vlp {
 
 /// Options of estimate_tilt_from_lamps().
 struct TiltCalibrationOptions {
-  /// Also estimates corrections of the lamp map (AdjustmentInput::frees_map_shape). Captures at
-  /// different yaws separate a tilt of all lamps from that of the camera. Captures at different
-  /// positions determine the distances of the lamps. Lamps that are not detected keep their
-  /// positions.
+  /// If true, also estimates corrections of the lamp map (AdjustmentInput::frees_map_shape).
+  /// Captures at different yaws separate a tilt of all lamps from that of the camera. Captures at
+  /// different positions determine the distances of the lamps. Lamps that are not detected keep
+  /// their positions.
   bool refine_map = false;
   /// Motion of the camera in each frame; empty: stationary. Components with a standard deviation
   /// are estimated together with the pose of the capture. Requires row time and readout direction
