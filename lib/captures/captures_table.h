@@ -16,11 +16,12 @@ namespace vlp {
 /// position minus the lever arm.
 enum class PlaceOf { camera, axis };
 
-/// Known properties of a capture besides its image.
+/// Row of captures.csv: sensor data of one capture and the known pose of the camera. All values are
+/// std::nullopt if the field is empty or the column is missing.
 struct Capture {
   std::optional<double> time_s;
-  /// Known position of the camera or of the axis of rotation (`reference_point`); the yaw is the
-  /// camera's.
+  /// Known position in the world, m, of the point `place`: the camera or the axis of rotation.
+  /// `yaw_rad` is the yaw of the camera.
   std::optional<double> x_m, y_m, z_m, yaw_rad;
   PlaceOf place = PlaceOf::camera;
   /// Standard deviation of the position per axis, if known.

@@ -17,9 +17,10 @@ namespace vlp {
 /// Maximum coordinate. Larger values are mistakes, and their squares may overflow.
 inline constexpr double kMaxCoordinate_m = 1e6;
 
-/// A CSV file with a header line, read into memory. RFC 4180 quoting, LF or CRLF, optional UTF-8
-/// byte order mark. Columns are found by name in any order; other columns are ignored. Removes the
-/// apostrophe that CsvWriter inserts before a formula. Errors have file, line and column.
+/// CSV file with a header line, read into memory. Accepts quoting by RFC 4180, LF or CRLF, and an
+/// optional UTF-8 byte order mark. Columns are found by name in any order; other columns are
+/// ignored. Removes the apostrophe that CsvWriter inserts before a formula. Errors have file, line
+/// and column.
 class CsvTable {
  public:
   /// @throws InputError if the file cannot be read, is longer than 2 GiB, is not CSV, has a column

@@ -23,10 +23,10 @@ constexpr bool begins_like_spreadsheet_formula(std::string_view field) {
   return std::string_view("=+-@\t\r").find(field[first]) != std::string_view::npos;
 }
 
-/// Writer of a CSV file. Rows are buffered and written to a temporary file; save_file() puts it in
-/// place atomically. Fields are quoted if necessary. Text that a spreadsheet would evaluate gets a
-/// leading apostrophe (begins_like_spreadsheet_formula()). All functions throw InputError if the
-/// file cannot be written.
+/// Writer of a CSV file. Rows are buffered and written to a temporary file; save_file() renames it
+/// atomically to the given path. Fields are quoted if necessary. Text that a spreadsheet would
+/// evaluate gets a leading apostrophe (begins_like_spreadsheet_formula()). All functions throw
+/// InputError if the file cannot be written.
 class CsvWriter {
  public:
   CsvWriter(const std::filesystem::path& file, std::initializer_list<std::string_view> header)

@@ -11,8 +11,8 @@ namespace vlp {
 /// Computes the SHA-256 of a text, in hexadecimal digits.
 std::string compute_text_sha256(std::string_view text);
 
-/// Computes the SHA-256 of a file's content, in hexadecimal digits. Throws InputError if it cannot
-/// be read.
+/// Computes the SHA-256 of a file's content. Returns 64 lower-case hexadecimal digits.
+/// @throws InputError if the file cannot be read
 std::string compute_file_sha256(const std::filesystem::path& file);
 
 }  // namespace vlp

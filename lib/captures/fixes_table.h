@@ -16,7 +16,8 @@ namespace vlp {
 /// A row of `fixes.csv`.
 struct FixRow {
   std::string image;
-  /// "ok", or the reason of failure.
+  /// Status of the fix in the file: "ok", or the reason of failure as a word, for example
+  /// "too_few_lamps" (to_string(FixStatus)).
   std::string status;
   struct Fix {
     Pose pose;

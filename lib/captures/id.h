@@ -13,9 +13,10 @@ namespace vlp {
 /// '/', control characters, marks of direction, and '.' as its first character.
 class Id {
  public:
+  /// Checks a text and stores it as an id.
   /// @param source  file or database from which the text was read, for the message
-  /// @param kind    "camera", "run", ...
-  /// @throws InputError if the text is not an id
+  /// @param kind    type of the named object for the message: "camera", "run", ...
+  /// @throws InputError if the text is not an id (is_valid_id())
   Id(std::string text, const std::filesystem::path& source, std::string_view kind);
 
   /// Returns true if a text is an id.

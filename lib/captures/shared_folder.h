@@ -18,7 +18,9 @@ namespace vlp {
 /// InputError.
 class SharedFolder {
  public:
-  /// Opens an existing folder. Symbolic links in `path` are followed: the user specified it.
+  /// Opens an existing folder. Symbolic links in `path` are followed, because the user specified
+  /// it.
+  /// @throws InputError if the folder does not exist or cannot be opened
   explicit SharedFolder(const std::filesystem::path& path);
   SharedFolder(SharedFolder&& other) noexcept;
   SharedFolder& operator=(SharedFolder&&) = delete;

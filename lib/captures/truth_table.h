@@ -16,7 +16,7 @@ struct TruthRow {
   std::string image;
   Eigen::Vector2d xy_m;
   std::optional<double> z_m, yaw_rad;
-  /// Line of the row in the file.
+  /// Number of the row's line in the file, from 1; 0 if the row was not read from a file.
   std::size_t line = 0;
 };
 

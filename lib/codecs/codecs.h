@@ -12,8 +12,9 @@
 /// library is therefore linked to them and loaded at the first image.
 namespace vlp {
 
-/// Interface of cv::VideoCapture, which reads the frames of a video. Members, backends (`api`, for
-/// example cv::CAP_FFMPEG) and properties (cv::CAP_PROP_FPS) are those of OpenCV.
+/// Reader of the frames of a video or a camera: interface of cv::VideoCapture. Members, backends
+/// (`api`, for example cv::CAP_FFMPEG) and properties (for example cv::CAP_PROP_FPS) are those of
+/// OpenCV.
 class VideoReader {
  public:
   VideoReader() = default;

@@ -6,14 +6,15 @@
 
 namespace vlp {
 
-/// Loads a library of the programs, which is never unloaded, and returns the address of one of its
-/// functions. The library is found by the run path of the program.
+/// Loads a shared library and returns the address of one of its functions. The library is searched
+/// in the run path of the program and is never unloaded.
 ///
-/// @param library   name of the file
+/// @param library   file name of the library
 /// @param function  name of an extern "C" function
-/// @param problem   beginning of the message, such as "images cannot be read or written"
+/// @param problem   beginning of the error message, such as "images cannot be read or written"
 /// @param binding   RTLD_NOW; or RTLD_LAZY to bind functions when they are called, which starts
-///                  faster, but ends the process if one is missing
+///     faster, but ends the process if one is missing
+/// @return          address of the function, not null
 /// @throws std::runtime_error if the library cannot be loaded or lacks the function
 void* load_library_function(const char* library, const char* function, const std::string& problem,
                             int binding);

@@ -25,7 +25,8 @@ struct EvaluationInput {
   std::optional<FromFile<TruthRow>> truth;
   std::optional<Path> path;
   std::optional<CommandedLine> line_m;
-  /// Captures whose true positions are within this distance belong to one reference point.
+  /// Radius of a reference point, m: captures whose true positions are within this distance of its
+  /// first capture belong to it.
   double station_m = 1e-3;
   /// Other fixes to compare with.
   std::optional<FromFile<FixRow>> others;

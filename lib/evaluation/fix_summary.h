@@ -15,7 +15,8 @@ namespace vlp {
 struct FixSummary {
   std::size_t frames = 0;
   std::size_t fixes = 0;
-  /// Number of frames without a fix, by status.
+  /// Number of frames without a fix, by the word of their status, for example "too_few_lamps"
+  /// (to_string(FixStatus)). Statuses that do not occur are missing.
   std::map<std::string, std::size_t> refused;
   /// Statistics over the frames with a fix; std::nullopt if there are none.
   struct Typical {

@@ -20,7 +20,8 @@ class [[gnu::visibility("hidden")]] YamlValue;
 /// Metrics whose true value is at the limit are accepted with the probability 1 - Phi(k): 0.05 for
 /// k = 1.645 (ISO 14253-1), 0.023 for k = 2.
 struct GuardBand {
-  /// Standard uncertainty u, in the metric's unit.
+  /// Standard uncertainty u of the measured metric (one standard deviation), in the unit of the
+  /// metric.
   double standard_uncertainty;
   double k;
 

@@ -20,7 +20,7 @@ struct JUnitTest {
 
   std::string name;
   Result result = Result::passed;
-  /// Cause and remedy if the test did not pass.
+  /// Cause of the failure or error and its remedy, human-readable. Empty if the test passed.
   std::string message = {};
   /// Kind of an error, for example "wrong_map"; empty for the other results.
   std::string error_type = {};

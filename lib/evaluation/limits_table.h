@@ -8,11 +8,15 @@
 
 namespace vlp {
 
-/// Writes the achievable accuracy at each position of a floor as CSV. Columns:
-///   x_m, y_m, z_m, yaw_rad, lamps, x_sd_m, y_sd_m, z_sd_m, yaw_sd_rad
-///   for each source its horizontal standard deviation, named by its key and _m
-///   horizontal_m, the standard deviation of all sources together
-/// Cells of positions without a fix are empty.
+/// Writes the predicted standard deviations of fixes (Cramer-Rao bound) at each position of a floor
+/// as CSV, one row per position. Columns:
+///   x_m, y_m, z_m, yaw_rad        pose of the camera in the world
+///   lamps                         number of fully visible lamps
+///   x_sd_m, y_sd_m, z_sd_m, yaw_sd_rad
+///                                 standard deviations from all sources together
+///   KEY_m                         for each source its horizontal standard deviation, by its key
+///   horizontal_m                  horizontal standard deviation from all sources together
+/// Standard deviations of positions without a fix are empty.
 /// @throws InputError if the file cannot be written
 void write_floor_limits(const std::filesystem::path& file, const FloorLimits& limits);
 

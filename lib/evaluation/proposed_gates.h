@@ -24,7 +24,8 @@ namespace vlp {
 std::vector<Gate> propose_gates_from_evaluation(const EvaluationInput& input,
                                                 const Evaluation& evaluation);
 
-/// Formats gates as a file `vlp-gates/1`, with the value each is derived from as a comment.
+/// Formats gates as the text of a gates file, format `vlp-gates/1` (YAML). A comment after each
+/// gate states the measured value from which its limit is derived.
 std::string format_gates(const std::vector<Gate>& gates, const Evaluation& evaluation);
 
 }  // namespace vlp

@@ -19,7 +19,9 @@ namespace vlp {
 /// Safe to share between threads.
 class BoardIntake {
  public:
-  /// Creates the detector of a board. `imager_px` is the size of the camera's images, if known.
+  /// Creates the detector of a board, which accepts or rejects images by `options`.
+  /// @param imager_px  width and height of the camera's images; std::nullopt: images of any size
+  ///     are accepted
   /// @throws std::invalid_argument if BoardDetector or BoardLattice reject the board
   BoardIntake(const Board& board, const FrontendOptions& options,
               const std::optional<std::array<int, 2>>& imager_px = std::nullopt);

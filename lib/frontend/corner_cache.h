@@ -15,7 +15,8 @@ namespace vlp {
 /// Detection of a board in an image with the values by which the image is accepted or rejected.
 struct CachedView {
   BoardView view;
-  /// Sigma of the blur; std::nullopt without contrast.
+  /// Blur of the sharpest edges of the image (ImageBlur::sigma_px): sigma of a Gaussian, px.
+  /// std::nullopt for an image without contrast.
   std::optional<double> blur_px;
   /// ImageBlur::bright_fraction; fraction of the board's pixels at full scale.
   double bright_fraction, white_fraction;

@@ -8,10 +8,12 @@ namespace vlp {
 
 /// Brightness of an image and sharpness of its sharpest edges.
 struct ImageBlur {
-  /// Sigma of the blur of the sharpest edges; infinite for an image without contrast. A step of
-  /// height A with blur s has a maximum gradient of A / (s sqrt(2 pi)) per pixel. A is the range of
-  /// the gray levels (1 % to 99 %), the maximum gradient their 99.9 % quantile. The variances of
-  /// smoothing and difference are subtracted.
+  /// Blur of the sharpest edges of the image: sigma of a Gaussian, px. Infinite for an image
+  /// without contrast.
+  ///
+  /// A step of height A with blur s has a maximum gradient of A / (s sqrt(2 pi)) per pixel. A is
+  /// the range of the gray levels (1 % to 99 % quantile), the maximum gradient their 99.9 %
+  /// quantile. The variances of smoothing and difference are subtracted.
   double sigma_px;
   /// Level that 1 % of the pixels exceed, as a fraction of the full scale.
   double bright_fraction;

@@ -25,7 +25,8 @@ class Video;
 struct SourceImage {
   explicit SourceImage(std::filesystem::path image_file) : file(std::move(image_file)) {}
 
-  /// Image file, or make_video_frame_name() (VIDEO#000123) for a frame.
+  /// Path of the image file, or for a frame of a video its name by make_video_frame_name():
+  /// VIDEO#000123.
   std::filesystem::path file;
   /// Pixels of a video's frame; empty for an image file.
   cv::Mat frame = {};

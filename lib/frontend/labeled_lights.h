@@ -18,7 +18,8 @@ namespace vlp {
 /// center is within half its radius of `pixel`. Returns nullptr if there is none.
 const Light* find_light_at_pixel(const Observation& image, const Eigen::Vector2d& pixel);
 
-/// Lights whose lamps are given by a table.
+/// Lights of all images with the lamp ids that a table of labels gives for their positions
+/// (add_labeled_lights()).
 struct LabeledLights {
   std::vector<LabeledLight> lights;
   /// Number of labels in images that are used, and number of these labels without a light.

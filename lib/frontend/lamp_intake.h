@@ -25,8 +25,13 @@ namespace vlp {
 /// (LightDetector::with_tilt()).
 using LevelRotations = std::map<std::string, std::optional<Eigen::Matrix3d>>;
 
-/// Computes level_from_camera from the inclination of a robot. Its yaw is arbitrary; a detector
-/// uses only the direction of the zenith.
+/// Computes the rotation level_from_camera from the inclination of a robot.
+///
+/// @param inclination       roll and pitch about the axes of the robot
+/// @param yaw_in_robot_rad  yaw of the camera relative to the robot
+/// @param base_from_camera  rotation by the calibrated tilt of the camera
+/// @return                  rotation with an arbitrary yaw; a detector uses only its zenith
+///     direction
 Eigen::Matrix3d compute_level_rotation(const Inclination& inclination, double yaw_in_robot_rad,
                                        const Eigen::Matrix3d& base_from_camera);
 

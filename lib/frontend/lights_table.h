@@ -18,7 +18,7 @@ namespace vlp {
 /// Returns the number of lights of a kind.
 int count_lights_of_kind(std::span<const Observation> images, LightKind kind);
 
-/// Number of lights with the same kind and reason.
+/// Number of lights, over all images, that have this kind and this reason.
 struct CountedReason {
   LightKind kind;
   LightReason reason;

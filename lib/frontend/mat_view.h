@@ -8,8 +8,8 @@
 
 namespace vlp {
 
-/// Returns a view of an image's pixels, which is valid as long as the image. Empty for an empty
-/// image.
+/// Returns a non-owning view of an image's pixels, valid as long as the pixels of `image`. Returns
+/// an empty view for an empty image.
 /// @pre The image has one channel of 8 or 16 bits, or is empty.
 inline ImageView to_image_view(const cv::Mat& image) {
   if (image.empty()) return {};

@@ -40,7 +40,8 @@ enum class RejectionReason {
   used_elsewhere    // of another camera or run
 };
 
-/// Returns a phrase that follows a number of images, for example "blurred" or "cannot be read".
+/// Returns a phrase for a message that follows a number of images: "blurred" for "10 blurred",
+/// "cannot be read", ...
 std::string_view to_string(RejectionReason reason);
 
 /// Returns true if the image has no fault, but other images make it unnecessary.

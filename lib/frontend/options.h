@@ -13,7 +13,7 @@ namespace vlp {
 /// Options for reading images, for detection and for rejection, shared by programs, sessions and
 /// the station.
 struct FrontendOptions {
-  /// Number of images processed at the same time.
+  /// Maximum number of threads, each of which processes one image at a time. At least 1.
   int threads = 1;
   /// Images of more megapixels are rejected before they are decoded.
   double max_mpx = 200;

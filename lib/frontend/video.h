@@ -14,8 +14,9 @@ namespace vlp {
 /// Returns true if the extension is that of a video: AVI, MP4, M4V, MOV, MKV, WebM, MPG, MPEG.
 bool is_video_file_name(const std::filesystem::path& file);
 
-/// Returns the name of a frame, VIDEO#000123, which replaces the name of an image file. Frames are
-/// numbered from 0; only those that can be decoded count.
+/// Returns the name of a video frame, which replaces the name of an image file: VIDEO#000123.
+/// @param video   name of the video
+/// @param number  index of the frame from 0, among the frames that can be decoded
 std::string make_video_frame_name(const std::string& video, std::size_t number);
 
 /// Parses the name of a frame, VIDEO#000123, and returns VIDEO; std::nullopt for other names.

@@ -16,7 +16,8 @@ struct Circle {
   double radius;
 };
 
-/// Result of fit_circle().
+/// Circle fitted to points by fit_circle(), with RMS distance and covariance. Lengths are in the
+/// unit of the points.
 struct CircleFit {
   Circle circle;
   /// RMS distance of the points from the circle.

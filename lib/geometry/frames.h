@@ -12,7 +12,8 @@
 /// A rotation is named b_from_a, a vector x_in_a, and x_in_b = b_from_a * x_in_a.
 namespace vlp {
 
-/// Pose of a level frame in the world. Yaw is counter-clockwise seen from above.
+/// Pose of a level frame in the world: position of its origin, m, and yaw, rad. x_in_world =
+/// position_m + Rz(yaw_rad) x_in_level. Yaw is counter-clockwise seen from above.
 struct Pose {
   Eigen::Vector3d position_m;
   double yaw_rad;

@@ -19,7 +19,8 @@ inline double upper_median(std::vector<double> values) {
   return *middle;
 }
 
-/// Returns the median of `values`; for an even number the lower one of the two middle values.
+/// Returns the median of `values`. For an even number of values it is the lower one of the two
+/// middle values, so that the result is always one of them.
 /// @pre `values` is not empty.
 inline double lower_median(std::vector<double> values) {
   assert(!values.empty());

@@ -11,7 +11,8 @@
 /// products and decompositions of 9 x 9 matrices are no faster and take minutes to compile.
 namespace vlp {
 
-/// Normal equations of n unknowns: information matrix J^T W J and gradient J^T W r.
+/// Normal equations of linear least squares with n unknowns, accumulated row by row: information
+/// matrix J^T W J and gradient J^T W r. J are the derivatives, W the weights and r the residuals.
 template <std::size_t n>
 struct Normal {
   std::array<std::array<double, n>, n> information{};  // lower triangle only

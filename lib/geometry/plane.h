@@ -8,7 +8,8 @@
 /// std::complex is not used because it checks every product for infinities.
 namespace vlp {
 
-/// Returns the complex product a b: `b` rotated by the angle of `a` and scaled by its length.
+/// Returns the complex product a b of two vectors x + j y: `b` rotated by the angle of `a` and
+/// multiplied by |a|.
 inline Eigen::Vector2d complex_product(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return {a.x() * b.x() - a.y() * b.y(), a.x() * b.y() + a.y() * b.x()};
 }

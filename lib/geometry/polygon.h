@@ -10,10 +10,11 @@ namespace vlp {
 /// Computes the area of a polygon from its corners, listed in either direction.
 double compute_polygon_area(const std::vector<Eigen::Vector2d>& polygon);
 
-/// Returns true if a point lies in a polygon or on its edge, to 1e-8 of the unit of its corners.
-/// The polygon may be concave. Returns false for fewer than three corners.
+/// Returns true if a point lies inside a polygon or within 1e-8 of an edge, in the unit of the
+/// corners. The corners are in either direction; the polygon may be concave. Returns false for
+/// fewer than three corners.
 ///
-/// A ray from the point crosses an odd number of edges (Shimrat 1962).
+/// A ray from a point inside crosses an odd number of edges (Shimrat 1962).
 bool polygon_contains(const std::vector<Eigen::Vector2d>& polygon, const Eigen::Vector2d& point);
 
 }  // namespace vlp

@@ -23,10 +23,13 @@
 /// m = 2 n (2 q phi(q))^2 (linear), 2 n ln^2 2 (planar), where n is nu or nu / 2.
 namespace vlp {
 
-/// Estimates the variance of the errors from the median of the squares of linear residuals.
+/// Estimates the variance of the errors from the median of the squared residuals, for residuals of
+/// one coordinate. Outliers barely affect it.
 ///
-/// @param squares             squared residuals, not empty
-/// @param degrees_of_freedom  of the residuals; at least one is assumed
+/// @param squares             squared residuals, not empty, in any unit squared
+/// @param degrees_of_freedom  number of residuals minus number of unknowns; at least 1 is assumed
+/// @return                    variance, in the unit of `squares`; exact on average for normal
+///     errors
 inline double estimate_robust_variance_1d(std::vector<double> squares, double degrees_of_freedom) {
   assert(!squares.empty());
   constexpr double median_of_unit_variance = 0.454936;  // 0.67449^2
@@ -35,11 +38,12 @@ inline double estimate_robust_variance_1d(std::vector<double> squares, double de
          std::max(degrees_of_freedom, 1.0);
 }
 
-/// Estimates the variance per axis of the errors from the median of the squared lengths of planar
-/// residuals.
+/// Estimates the variance of the errors per axis from the median of the squared lengths of
+/// residuals in the plane. Outliers barely affect it.
 ///
-/// @param squares             squared lengths of the residuals, not empty
-/// @param degrees_of_freedom  of the residuals; at least one is assumed
+/// @param squares             squared lengths of the residuals, not empty, in any unit squared
+/// @param degrees_of_freedom  number of coordinates minus number of unknowns; at least 1 is assumed
+/// @return                    variance per axis, in the unit of `squares`
 inline double estimate_robust_variance_2d(std::vector<double> squares, double degrees_of_freedom) {
   assert(!squares.empty());
   constexpr double median_of_unit_variance = 2 * std::numbers::ln2;

@@ -18,13 +18,13 @@ struct Similarity {
   Eigen::Vector2d factor;
 };
 
-/// Fits the similarity that maps from(i) to to(i), by minimizing the sum of the squared distances
-/// in the `to` plane. Two pairs are fitted exactly.
+/// Fits the similarity p = offset + factor * z that maps from(i) to to(i), i < count. Minimizes the
+/// sum of the squared distances in the `to` plane, with equal weights. Two pairs are fitted
+/// exactly.
 ///
-/// @param count     number of pairs; i < count
-/// @param from, to  callables that return an Eigen::Vector2d, in any units
-/// @return          std::nullopt for fewer than two pairs, or if within rounding all `from` or all
-///                  `to` coincide or the best factor is 0 (regular polygon and its mirror image)
+/// @param from, to  callables that return point i as an Eigen::Vector2d, in any units
+/// @return          std::nullopt for fewer than two pairs; also if within rounding all `from` or
+///     all `to` coincide or the best factor is 0 (regular polygon and its mirror image)
 ///
 /// Closed form, with primes for means:
 ///   factor = sum conj(from_i - from')(to_i - to') / sum |from_i - from'|^2,

@@ -13,7 +13,8 @@
 /// false alarms.
 namespace vlp {
 
-/// Number of standard deviations that a normal variable exceeds with probability 1e-4 (one side).
+/// Number of standard deviations that a normal variable exceeds with probability 1e-4 on one side:
+/// the `sigmas` of tests with a false alarm rate of one in ten thousand.
 inline constexpr double kSigmasOfOneInTenThousand = 3.719;
 
 /// Computes the bound of t^2 (Student's t with m degrees of freedom) for `sigmas`, see above.

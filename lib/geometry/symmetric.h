@@ -9,8 +9,9 @@
 /// decompositions takes several seconds of compile time.
 namespace vlp {
 
-/// Eigendecomposition A = V diag(values) V^T with ascending values and columns of V of unit length.
-/// All are NaN if the iteration does not converge.
+/// Eigendecomposition A = V diag(values) V^T of a symmetric matrix A. Eigenvalues are ascending;
+/// column i of `vectors` (V) is the eigenvector of values[i], of unit length. All are NaN if the
+/// iteration does not converge.
 template <int N>
 struct SymmetricEigen {
   Eigen::Matrix<double, N, 1> values;

@@ -11,7 +11,8 @@ namespace vlp {
 /// -march=native would lay them out differently from the installed library.
 using Matrix2 = Eigen::Matrix<double, 2, 2, Eigen::DontAlign>;
 using Matrix4 = Eigen::Matrix<double, 4, 4, Eigen::DontAlign>;
-/// Matrix of any size. Its memory is allocated and freed in the same way for all compiler options.
+/// Matrix of doubles of any size. Unlike with Eigen::MatrixXd, its memory is allocated and freed in
+/// the same way for all compiler options, so that programs and library can exchange it.
 using MatrixX = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::DontAlign>;
 
 }  // namespace vlp

@@ -15,8 +15,8 @@ struct ErrorFunction {
   double value, slope;
 };
 
-/// Gaussian point spread: inverse of its standard deviation (`per_px`) and of sqrt(2) times the
-/// standard deviation (`per_scale`), in 1/px.
+/// Gaussian point spread with the standard deviation `px` > 0, stored as reciprocals in 1/px:
+/// `per_px` = 1 / px, `per_scale` = 1 / (sqrt(2) px).
 struct Blur {
   explicit Blur(double px) : per_px(1 / px), per_scale(per_px / std::numbers::sqrt2) {}
 

@@ -31,13 +31,13 @@ struct EdgeCurvature {
   bool operator==(const EdgeCurvature&) const = default;
 };
 
-/// Step of the light across an edge of a tag: blur, and light on the dark and the bright side in
-/// the middle of the edge, in gray levels without tone curve.
+/// Blurred step of the light across an edge of a tag, measured in the middle of the edge. `dark`
+/// and `bright` are the light on both sides, in gray levels with the tone curve removed.
 ///
-/// The blur is that of lens and pixel together, as the sigma of the Gaussian with the same MTF50.
-/// It is 0 if unknown. It is accurate to 3 % from 0.5 to 2 px, also for the disc of a defocused
-/// lens. This requires that the stripe inside the edge is three blurs wide; in narrower stripes the
-/// blur is too small.
+/// `blur_px` is the blur of lens and pixel together, as the sigma of the Gaussian with the same
+/// MTF50, px. It is 0 if unknown. It is accurate to 3 % from 0.5 to 2 px, also for the disc of a
+/// defocused lens. This requires that the stripe inside the edge is three blurs wide; in narrower
+/// stripes blur_px is too small.
 struct EdgeStep {
   double blur_px = 0, dark = 0, bright = 0;
 

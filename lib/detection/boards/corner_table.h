@@ -30,7 +30,8 @@ namespace vlp {
 std::vector<BoardView> read_corner_table(const std::filesystem::path& file, const Board& board,
                                          const std::array<int, 2>& imager_px);
 
-/// Writes a table of corners atomically. read_corner_table() restores the same doubles.
+/// Writes the detected corners of `views` as a table (CSV) for read_corner_table(), atomically.
+/// read_corner_table() restores the same doubles.
 /// @throws InputError if the file cannot be written
 void write_corner_table(const std::filesystem::path& file, std::span<const BoardView> views,
                         const Board& board);

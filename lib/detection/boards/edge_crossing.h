@@ -17,14 +17,12 @@ struct GrayLevels {
 
 /// Finds the saddle point of the gray levels at a corner where two black squares touch.
 ///
-/// @param smoothed   gray levels, smoothed by about 1 px, because pixel noise and the sharp edges
-/// of
-///                   the squares would disturb the fit
-/// @param guess_px   approximate position of the corner
+/// @param smoothed   gray levels, smoothed by about 1 px against pixel noise and sharp edges
+/// @param guess_px   approximate pixel (u, v) of the corner
 /// @param reach_px   radius of the search for the initial pixel
 /// @param radius_px  radius of the window of the fit
-/// @return           std::nullopt if the fit is no saddle, its center moves more than 2 px from the
-///                   initial pixel, or a window reaches beyond the image
+/// @return           pixel (u, v) of the saddle; std::nullopt if the fit is no saddle, its center
+///     moves more than 2 px from the initial pixel, or a window reaches beyond the image
 ///
 /// The initial pixel has the most negative determinant of the Hessian. The saddle of
 ///   a x^2 + b x y + c y^2 + d x + e y + f
@@ -37,12 +35,11 @@ std::optional<Eigen::Vector2d> find_saddle_point(const cv::Mat1f& smoothed,
 /// Fits the intersection of the two edges at a corner where two black squares touch, by nonlinear
 /// least squares of the gray levels.
 ///
-/// @param guess_px   approximate position of the corner
-/// @param along      approximate directions of the edges, of any length
+/// @param guess_px   approximate pixel (u, v) of the corner
+/// @param along      approximate directions of the edges in the image, of any length
 /// @param radius_px  radius of the pixels around guess_px; they should show only the two squares
-/// @return           std::nullopt for fewer than 16 pixels, if the pixels do not match the model,
-/// or
-///                   if the corner is more than 1.5 px from the guess
+/// @return           pixel (u, v) of the corner; std::nullopt for fewer than 16 pixels, if the
+///     pixels do not match the model, or if the corner is more than 1.5 px from the guess
 ///
 ///   gray = (middle + contrast step(d1) step(d2)) (1 + light . (x - corner))
 ///   d1, d2  distances from two parabolas through the corner, because the lens bends the edges

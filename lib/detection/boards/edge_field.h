@@ -10,7 +10,7 @@ namespace vlp {
 /// Positive property of an edge in an image (blur or light), from a fit of this edge alone.
 struct EdgeSample {
   Eigen::Vector2d at_px;
-  /// Direction of the edge, of unit length.
+  /// Direction of the edge in the image (u, v), of unit length. The sign has no effect.
   Eigen::Vector2d along;
   double value;
   /// Relative standard deviation of `value`.

@@ -10,11 +10,13 @@ namespace vlp {
 
 /// Pixel next to an edge of a tag.
 struct EdgePixel {
-  /// Coordinates relative to the edge: w, -1 to 1 along it, and v, in px outwards.
+  /// Coordinates of the pixel relative to the edge: `along` is w, from -1 at one end to 1 at the
+  /// other; `across_px` is the distance v from the straight edge, px, positive outside the tag.
   double along, across_px;
+  /// Gray level of the pixel, 0 to 255, as in the image.
   double level;
-  /// Width of the stripe inside the edge at this w, and white fraction (0 to 1) of the pattern that
-  /// adjoins the stripe.
+  /// Width of the black stripe inside the edge at this w, px, and white fraction (0 to 1) of the
+  /// pattern behind the stripe.
   double stripe_px, white_behind;
 };
 

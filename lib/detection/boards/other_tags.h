@@ -9,9 +9,10 @@
 
 namespace vlp {
 
-/// Describes in one line another pattern that an image without tags of `board` shows: a mirrored
-/// board, tags of another family or with another border, or markers of another dictionary. Returns
-/// an empty string if none of them is detected. Takes about a second per image.
+/// Searches an image without tags of `board` for another pattern: the mirrored board, tags of
+/// another family or border width, or markers of another dictionary. Takes about a second per
+/// image.
+/// @return the pattern in one line for a message; empty if none is detected, and for chessboards
 std::string describe_tags_of_other_kinds(const Board& board, const cv::Mat& image);
 
 }  // namespace vlp

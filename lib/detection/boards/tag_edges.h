@@ -12,9 +12,10 @@
 namespace vlp {
 
 /// Refines the corners of tags in an image: moves them to the intersections of the four edges of
-/// each tag. Sets their curvature, standard deviation and steps.
+/// each tag. Sets curvatures, standard deviations of the corners, and steps.
 ///
 /// @param tags   tags with the corners of libapriltag; corrected in place
+/// @param image  gray levels of 8 bits
 /// @return       BoardDetection::curve_costs, from the eight widest tags
 ///
 /// Edges. Each edge is fitted to the pixels next to it, from corner to corner, as a parabola,

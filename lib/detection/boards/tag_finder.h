@@ -20,8 +20,9 @@ class TagFinder {
   virtual std::vector<TagDetection> find(const cv::Mat1b& image) const = 0;
 };
 
-/// Creates a detector by libapriltag, for tags surrounded by white. Corners are accurate to 0.05
-/// px.
+/// Creates a detector (libapriltag) of the tags of the board's family, for tags surrounded by
+/// white. Corners are accurate to 0.05 px.
+/// @throws std::invalid_argument if libapriltag does not have the family
 std::unique_ptr<TagFinder> make_apriltag_detector(const Board& board);
 
 /// Creates a detector by OpenCV's ArUco module, for tags whose corners touch black squares and for

@@ -24,8 +24,8 @@ using TagFamily = std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t*
 /// @throws std::invalid_argument if there is no such family
 TagFamily make_tag_family(const std::string& name);
 
-/// Returns the width of a tag in bits if its border is `border_bits` wide, instead of one bit as in
-/// the family.
+/// Returns the edge length of a tag's square, with its border, in bits. The border is `border_bits`
+/// wide on each side instead of one bit as in the family.
 int tag_width_in_bits(const apriltag_family_t& family, int border_bits);
 
 /// Returns true if bit `bit` (below family.nbits) of the tag `id` is white.

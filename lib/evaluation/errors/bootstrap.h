@@ -13,7 +13,8 @@ struct Interval {
   double low, high;
 };
 
-/// Confidence intervals of error statistics.
+/// 95 % confidence intervals of the mean, median, 90th percentile and RMS of a set of errors, in
+/// the unit of the errors.
 struct ErrorIntervals {
   Interval mean, median;
   /// std::nullopt for fewer than kMinClustersForP90 clusters.

@@ -19,8 +19,9 @@ namespace vlp {
 /// horizontal error each; 5 % would be nominal.
 inline constexpr std::size_t kMinClustersCompared = 20;
 
-/// Smallest change of a mean error that matters, being neither measurable nor useful below: this
-/// length, or this fraction of the others' mean error, whichever is larger.
+/// Smallest relevant change of a mean horizontal error; a smaller change is neither measurable nor
+/// useful. The larger one of two limits applies: this length, m, or this fraction of the mean error
+/// of the other fixes.
 inline constexpr double kMinDifference_m = 1e-6;
 inline constexpr double kMinDifferenceFraction = 0.01;
 

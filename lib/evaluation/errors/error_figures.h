@@ -20,8 +20,10 @@ struct ErrorStatistics {
   double mean, median, p90, max, rms;
 };
 
-/// Returns the smallest of the sorted values that the given fraction of all does not exceed.
-/// @pre not empty, 0 < fraction <= 1
+/// Returns a quantile of sorted values: the smallest of them that at least the given fraction of
+/// all values does not exceed. It is never interpolated.
+/// @param sorted    values in ascending order, not empty
+/// @param fraction  0 < fraction <= 1
 double find_quantile(std::span<const double> sorted, double fraction);
 
 /// Computes the statistics of errors without sign.

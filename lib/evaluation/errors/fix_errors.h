@@ -19,7 +19,8 @@ namespace vlp {
 struct FixError {
   std::size_t fix;  // index into the rows of fixes
   Eigen::Vector2d horizontal_m;
-  /// Only if the ground truth has the height, or the yaw.
+  /// Errors of height, m, and yaw, rad: fix minus ground truth. std::nullopt if the ground truth
+  /// lacks the quantity.
   std::optional<double> height_m, yaw_rad;
   /// Cluster of correlated errors; errors of different clusters are assumed independent. It is a
   /// reference point, or a run of fixes along a path.

@@ -16,7 +16,8 @@ namespace vlp {
 /// Commanded straight line: start and end.
 using CommandedLine = std::array<Eigen::Vector2d, 2>;
 
-/// Straight line through fixes, and its distances from the commanded one.
+/// Straight line fitted to the horizontal positions of fixes, with its angle and distances from the
+/// commanded line. Result of fit_line_to_fixes().
 struct LineFit {
   /// First and last perpendicular foot of the fixes on the line, in the direction of the commanded
   /// line.

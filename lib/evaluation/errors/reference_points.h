@@ -9,11 +9,15 @@
 
 namespace vlp {
 
-/// Returns the reference point of each position, numbered from 0 in the order of the positions.
+/// Groups positions into reference points, by their distance in space.
+///
+/// @param places_m  positions in the world, m
+/// @param radius_m  > 0
+/// @return          number of the reference point of each position, from 0 in the order of
+///     appearance
 ///
 /// A position belongs to the first reference point whose first position is within `radius_m` of it,
 /// or else begins a new one. The time is proportional to the number of positions.
-/// @pre radius_m > 0
 std::vector<std::size_t> assign_reference_points(std::span<const Eigen::Vector3d> places_m,
                                                  double radius_m);
 

@@ -14,7 +14,8 @@ constexpr std::uint64_t hash_with_splitmix64(std::uint64_t value) {
   return value ^ (value >> 31);
 }
 
-/// SplitMix64: random generator with negligible seeding cost and the same numbers on every machine.
+/// Pseudorandom generator of 64-bit integers (SplitMix64). Seeding costs almost nothing, and a seed
+/// gives the same numbers on every machine.
 class SplitMix {
  public:
   explicit SplitMix(std::uint64_t seed) : state_(hash_with_splitmix64(seed)) {}
