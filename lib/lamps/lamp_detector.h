@@ -22,8 +22,10 @@ class LightDetector;  // light_detector.h: reports all lights with their measure
 /// row_time) scanlines. Equations and sources: lib/THEORY.md, "Lamp centroid".
 class LampDetector {
  public:
+  /// Creates a detector of the lamps of a map for one camera. Lens, tilt, row time and readout
+  /// direction are those of the calibration. Copies what it needs.
   /// @throws std::invalid_argument if the calibration has no row time, which identification needs,
-  ///        or has an invalid lens
+  ///     or has an invalid lens
   LampDetector(const LampMap& lamps, const Calibration& calibration);
 
   /// Detects the lamps that are fully inside the image, ordered from the top. Lamps that the image

@@ -21,8 +21,9 @@ namespace vlp {
 /// Returns true if the image border cuts no part of the light.
 bool is_fully_in_view(const Light& light, const ImageSize& size);
 
-/// Returns the camera of a calibration. The readout direction defaults to rows if the calibration
-/// has none.
+/// Returns the camera parameters of a calibration for a detector: row time, lens, readout direction
+/// (rows if unknown). level_from_camera is the calibrated tilt (level_from_zenith()); identity
+/// without a rotation center.
 DetectorCamera make_detector_camera(const Calibration& calibration);
 
 /// Detects and identifies the lamps of a map in images of a rolling-shutter camera. All methods are

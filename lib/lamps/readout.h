@@ -16,8 +16,9 @@ namespace vlp {
 
 /// Evidence of images for each readout direction.
 struct ReadoutDirectionEvidence {
-  /// Sum over the modulated lights detected with readout along rows, and along columns, of
-  /// periodicity times contrast times roundness, each from 0 to 1.
+  /// Evidence that the shutter reads rows, and that it reads columns; dimensionless, larger is
+  /// stronger. Each is the sum, over the modulated lights detected with this direction, of
+  /// periodicity times contrast times roundness. These factors are 0 to 1.
   double rows = 0, columns = 0;
 
   /// Returns the readout direction with the larger evidence. Returns std::nullopt if this evidence

@@ -8,9 +8,11 @@ namespace vlp {
 
 /// Dark level and noise of an image of lamps, estimated from a sample of its pixels.
 struct Background {
-  /// Mean and standard deviation of the pixels around the median, in gray levels. If the dark level
-  /// is clipped, at black or above, the standard deviation is derived from the pixels brighter than
-  /// the median.
+  /// Dark level of the image, in gray levels: mean of the pixels around the median. `noise` is
+  /// their standard deviation.
+  ///
+  /// If noise below the dark level is clipped at black, the standard deviation is derived from the
+  /// pixels brighter than the median.
   double level;
   double noise;
   /// Level above which pixels are lit: level + 4.5 noise, and at least level + 1.6 times the

@@ -12,8 +12,8 @@ namespace vlp {
 
 /// Non-owning view of a gray image. The memory has to stay valid as long as the view is used.
 struct ImageView {
-  /// First pixel of the first row. Pixels are std::uint8_t if `bits` is 8. If `bits` is 16, pixels
-  /// are aligned std::uint16_t in native byte order.
+  /// Pointer to the first pixel of the first row. Pixels are std::uint8_t if `bits` is 8. If `bits`
+  /// is 16, they are aligned std::uint16_t in native byte order. Null: empty view.
   const void* data = nullptr;
   int width = 0, height = 0;  ///< pixels
   /// Bytes from the start of a row to the start of the next one.

@@ -13,7 +13,8 @@ struct ImageSize {
   bool operator==(const ImageSize&) const = default;
 };
 
-/// Pixel box of columns x to x + width - 1 and rows y to y + height - 1.
+/// Axis-aligned box of pixels: columns x to x + width - 1, rows y to y + height - 1. Empty if width
+/// or height is 0.
 struct PixelBox {
   int x = 0, y = 0, width = 0, height = 0;
 

@@ -17,7 +17,8 @@ struct PixelRun {
   int width() const { return end - begin; }
 };
 
-/// Returns the mean level of the pixels of a run.
+/// Returns the mean gray level of the pixels of a run. The dark level is not subtracted.
+/// @pre The run is not empty and lies in the image.
 double mean_level(const ImageView& image, const PixelRun& run);
 
 /// Finds the runs of pixels above `threshold`, row by row. Gaps of up to two pixels do not end a

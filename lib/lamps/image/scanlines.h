@@ -14,7 +14,8 @@ namespace vlp {
 /// Image whose rows are the scanlines, that is the rows or columns that the shutter reads.
 struct ScanlineImage {
   ImageView pixels;
-  /// Tiles that may contain runs, see find_bright_tiles().
+  /// Tiles of `pixels` that contain lit pixels (find_bright_tiles()); a search for runs can skip
+  /// the others.
   TileMask lit;
   /// Memory of `pixels` if it is not that of the input image.
   std::shared_ptr<void> memory;

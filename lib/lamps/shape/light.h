@@ -22,8 +22,8 @@ enum class LightKind {
   formless  ///< bright, but neither modulated nor with a known outline
 };
 
-/// Reason why a light is not a lamp: that of the check that rejected it. The order of the checks is
-/// not that of the enumerators (LightDetector::identify_lights()).
+/// Reason for the class of a light: the check that rejected it as a lamp, or `identified`. The
+/// checks run in another order than that of the enumerators (LightDetector::identify_lights()).
 enum class LightReason {
   identified,       ///< a lamp, possibly cut by the image border
   overexposed,      ///< steady: contrast below kMinContrast, most pixels at full scale

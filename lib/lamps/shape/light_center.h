@@ -16,7 +16,7 @@ namespace vlp {
 /// Minimum number of outline points on a circle or an ellipse.
 inline constexpr std::size_t kMinOutlinePoints = 10;
 
-/// Camera parameters of a detector. Identification needs the row time.
+/// Camera parameters that a light detector needs. The row time is needed only for identification.
 struct DetectorCamera {
   Readout readout;
   std::optional<double> row_time_s;

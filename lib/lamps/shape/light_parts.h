@@ -19,9 +19,11 @@ struct LightPart {
   PixelBox box;
 };
 
-/// Joins parts of one light: an occluder splits a lamp, but all parts lie on one circle. Of lights
-/// that overlap, keeps the one with more outline points. Returns the lights; removes parts with a
-/// light from `parts`, so that only parts without a fitted outline remain.
+/// Joins the parts of lights that an occluder splits, because all parts of a disc lie on one
+/// circle. Then removes lights that overlap a light with more outline points.
+///
+/// @param parts  parts of the image; on return only those without a fitted outline
+/// @return       the lights, in the order of their number of outline points, largest first
 std::vector<Light> join_parts_of_one_light(std::vector<LightPart>& parts, const LightShape& shape,
                                            const Background& background);
 

@@ -18,11 +18,13 @@ struct LineLevel {
   double level, sd;
 };
 
-/// Predicts the level of a light on each scanline, at its middle column. Along a scanline the level
-/// changes linearly, because of vignetting. Scanlines next to the edge of the light have no pixels
-/// inside it. For modulated light their level is the mean of the scanlines whole periods away. Its
-/// standard deviation combines the scatter of these, the interpolation between scanlines and the
-/// uncertainty of the period. For steady light it is the mean of the neighboring scanlines.
+/// Levels of a light on its scanlines, at its middle column, as the ratio to its brightest
+/// scanline. Along a scanline the level changes linearly, because of vignetting.
+///
+/// Scanlines next to the edge of the light have no pixels inside it; their level is predicted. For
+/// modulated light it is the mean of the scanlines whole periods away. Its standard deviation
+/// combines the scatter of these, the interpolation between scanlines and the uncertainty of the
+/// period. For steady light it is the mean of the neighboring scanlines.
 class LineLevels {
  public:
   /// @pre `chords` are those of at least eight consecutive lines.

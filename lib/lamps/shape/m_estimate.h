@@ -23,7 +23,8 @@ struct CurveDistance {
   Eigen::Matrix<double, N, 1> slope;
 };
 
-/// Gauss-Newton step for Tukey's biweight of the distances (Huber 1981).
+/// Result of one Gauss-Newton step that fits a curve with N parameters to points. The loss of the
+/// distances is Tukey's biweight (Huber 1981).
 template <int N>
 struct MEstimateStep {
   /// Step to subtract from the parameters.

@@ -14,7 +14,8 @@ namespace vlp {
 /// Point of a light's outline: subpixel position along a row at which the level passes half of that
 /// inside the edge.
 struct EdgePoint {
-  /// Position, (column, row).
+  /// Position (column, row) in the image whose rows are the scanlines, px. The column is
+  /// fractional; the row is an integer.
   Eigen::Vector2d pixel;
   /// Level of the light inside the edge, above the dark level.
   double level;

@@ -22,10 +22,11 @@ inline constexpr double kUnknownTiltSd = 0.06;
 /// Fits a rectangular light, a panel or a tube, by its four edges.
 ///
 /// @param lines    image whose rows are the scanlines
-/// @param outline  result of find_outline() for the blob
-/// @param sizes_m  sizes of the map's rectangles, used only for hidden edges
+/// @param blob     lit pixels of the light
+/// @param outline  result of find_outline() for the blob, (column, row)
+/// @param sizes_m  lengths of both axes of the map's rectangles, used only for hidden edges
 /// @return  the light; its sigma is propagated from the eight ends of the sides, and `low` and
-///        `high` include two standard deviations of the sides
+///     `high` include two standard deviations of the sides
 ///
 /// Starts from the minimum-area rectangle around the outline, aligned by line fits to its sides.
 /// Then fits each side to its edge, see fit_straight_edge(). The center is the intersection of the
@@ -42,11 +43,11 @@ inline constexpr double kUnknownTiltSd = 0.06;
 /// tilt.
 ///
 /// Returns std::nullopt in these cases:
-/// - Four edges do not form a rectangle to 20 degrees, since an unknown tilt deforms it.
-/// - The rectangle is less than 10 px wide, has less than about 18 scanlines, or has an aspect
-///   ratio above 40.
-/// - An edge that is not hidden is outside the image or not found.
-/// - Edges are hidden and a circle explains more of the outline.
+///   - Four edges do not form a rectangle to 20 degrees, since an unknown tilt deforms it.
+///   - The rectangle is less than 10 px wide, has less than about 18 scanlines, or has an aspect
+///     ratio above 40.
+///   - An edge that is not hidden is outside the image or not found.
+///   - Edges are hidden and a circle explains more of the outline.
 std::optional<Light> fit_rectangle(const ImageView& lines, const Blob& blob,
                                    const std::vector<EdgePoint>& outline,
                                    const Background& background, const LightShape& shape,

@@ -19,8 +19,9 @@ namespace vlp {
 bool is_blob_unevenly_lit(const ImageView& image, const Blob& blob,
                           const std::vector<EdgePoint>& outline, const Background& background);
 
-/// Light fitted to its rim. The rim is clear if most of its pieces show a step, or if the outline
-/// without any one of eight pieces still has a center.
+/// Result of fit_rim_of_light(): a light whose outline is its rim. `is_clear` is true if most
+/// pieces of the rim show a step. It is also true if the outline without any one of eight pieces
+/// still has a center.
 struct Rim {
   Light light;
   bool is_clear;

@@ -19,8 +19,9 @@ struct StepImageModel {
   double blur_px, gamma;
 };
 
-/// Piece of a rim that neighboring lit scanlines cross: inward direction, (column, line), and its
-/// distance behind the outline with standard deviation.
+/// Piece of a rim that neighboring scanlines cross, with the step of light found there. `inwards`
+/// is the unit normal (column, line) towards the center. `behind_px` is the distance of the step
+/// from the outline, px, positive inwards; `sd_px` is its standard deviation.
 struct RimPiece {
   Eigen::Vector2d inwards;
   double behind_px, sd_px;

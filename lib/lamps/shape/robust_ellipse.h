@@ -15,7 +15,8 @@ namespace vlp {
 /// Circle or ellipse that fits most of the points.
 struct RobustEllipse {
   Eigen::Vector2d center;
-  /// Points of the ellipse: center + rim_from_circle * (cos a, sin a). Symmetric.
+  /// Symmetric 2x2 matrix of the ellipse, in the unit of the points: a point of the ellipse is
+  /// center + rim_from_circle * (cos a, sin a). For a circle it is the radius times the identity.
   Matrix2 rim_from_circle;
   /// Covariance of the center, from the scatter of the inliers.
   Matrix2 center_covariance;

@@ -19,9 +19,10 @@ struct Oval {
   Matrix2 covariance;
 };
 
-/// Normal equations for the residuals of an outline with respect to its fitted circle, in the level
-/// plane and in units of the radius. The unknowns are p = (center x, y, radius, oval): a point in
-/// direction a is p_0 cos a + p_1 sin a + p_2 + p_3 cos 2a + p_4 sin 2a further out.
+/// Normal equations of the residuals of an outline with respect to its fitted circle, in the level
+/// plane and in units of the radius. The unknowns p_0 to p_4 are center x, center y, radius, and
+/// both components of the ovality. They move the point in direction a outwards by
+///   p_0 cos a + p_1 sin a + p_2 + p_3 cos 2a + p_4 sin 2a.
 class OutlineSums {
  public:
   using Vector5 = Eigen::Matrix<double, 5, 1>;

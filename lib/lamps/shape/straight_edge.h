@@ -26,12 +26,14 @@ struct Side {
   }
 };
 
-/// Image of a light, and the scale of LightShape's plane, in which its edges are straight.
+/// Image data for the fit of an edge of a light. `lines` is an image whose rows are the scanlines,
+/// and `levels` are the light's levels on them. `dark` is the dark level of the image, in gray
+/// levels. Edges are straight in the plane of `shape`.
 struct EdgeImage {
   const ImageView& lines;
   const LineLevels& levels;
   double dark;
-  /// Size of a pixel in the plane.
+  /// Size of a pixel in the plane of `shape`, in the unit of that plane.
   double per_px;
   const LightShape& shape;
 };

@@ -7,12 +7,12 @@
 
 namespace vlp {
 
-/// Returns the standard deviation per axis, in pixels, of the center of a disc's outline that an
-/// unknown lens causes. Returns 0 for rectangles, because the curvature of their edges determines
-/// the effect.
+/// Predicts the error of a lamp's center if the lens is unknown, as a standard deviation per axis,
+/// px. The cause is that the center of an outline is not the image of the lamp's center. Returns 0
+/// for rectangles, because the curvature of their edges determines the error.
 ///
-/// The center of the ellipse through the outline of a disc is not the image of the disc's center. A
-/// lens that images a ray of slope r at the distance f g(r) from its axis separates the two by
+/// A lens that images a ray of slope r at the distance f g(r) from its axis separates the two
+/// points by
 ///
 ///     f q^2 (3/8 g'' + 1/8 (g' / r - g / r^2) + 1/4 g' (g' / g - 1 / r)),
 ///

@@ -13,8 +13,9 @@ namespace vlp {
 /// lamp is possible.
 inline constexpr double kLampDrift = 0.015;
 
-/// Maximum relative deviation of a light with few or unclear stripes from a lamp's frequency;
-/// lights with clear stripes may deviate more.
+/// Maximum relative deviation of a light's measured frequency from that of its lamp, as a fraction,
+/// if its stripes are few or unclear. Lights with clear stripes (are_stripes_reliable()) may
+/// deviate by 0.06.
 inline constexpr double kMaxUnclearDrift = 0.025;
 
 /// Minimum difference between the duty errors of two lamps for a decision between them. Saturation

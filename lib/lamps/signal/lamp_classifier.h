@@ -27,7 +27,7 @@ namespace vlp {
 /// - lit_area: fraction of the disc's area that is lit, 0 to 1
 using LampFeatures = Eigen::Vector4d;
 
-/// Names of the features.
+/// Names of the features in classifier files, in the order of LampFeatures.
 inline constexpr std::array<std::string_view, 4> kLampFeatures{"log_period_lines", "duty",
                                                                "count_per_line", "lit_area"};
 

@@ -14,7 +14,8 @@ namespace vlp {
 /// Conditions that determine how accurately a stripe period can be measured.
 struct StripeConditions {
   double row_time_s;
-  /// Focal length in pixels, across the scanlines.
+  /// Focal length of the camera along the readout direction, that is, across the scanlines, px.
+  /// std::nullopt if unknown.
   std::optional<double> focal_px;
   /// Height of the camera above the world origin.
   double camera_height_m;

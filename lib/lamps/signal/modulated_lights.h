@@ -19,7 +19,8 @@ namespace vlp {
 /// Light that was found by its modulation, whatever its shape.
 struct ModulatedLight {
   PixelBox box;  ///< bounding box of its cells
-  /// Centroid of the lit area, (column, line), and the radius of the disc of equal area, in pixels.
+  /// Centroid (column, line) of the lit area in the image whose rows are the scanlines, px.
+  /// `radius_px` is the radius of the disc of equal area.
   Eigen::Vector2d center;
   double radius_px;
   /// Largest distance per axis between `center` and the centroid of the brighter part of the area,

@@ -14,8 +14,9 @@ namespace vlp {
 /// pixels of a scanline are exposed at the same time.
 inline constexpr int kCellWidth_px = 8;
 
-/// Mean levels of the cells of an image, which are kCellWidth_px wide and `lines_per_bin` scanlines
-/// high.
+/// Mean gray levels of the cells of an image whose rows are the scanlines. A cell is kCellWidth_px
+/// wide and `lines_per_bin` scanlines (a bin) high. There are `cells` columns of them and `bins`
+/// rows.
 struct CellLevels {
   PixelBox box;  ///< part of the image; cells begin at its corner
   int cells, bins, lines_per_bin;

@@ -13,7 +13,8 @@ struct LineProfile {
   std::vector<double> levels;  ///< levels above the dark level, in any unit
 };
 
-/// Fit of a periodic signal to a profile.
+/// Fit of a periodic signal (three harmonics) to a LineProfile, by fit_periodic_signal().
+/// `period_lines` is the period in scanlines.
 struct PeriodFit {
   double period_lines;
   /// Fraction of the variance of the normalized profile that the fit does not explain, 0 to 1.

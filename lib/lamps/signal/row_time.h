@@ -15,7 +15,8 @@ namespace vlp {
 /// Light with a measured stripe period.
 struct MeasuredPeriod {
   double period_lines;
-  /// Lamp of the light, if a table labels it.
+  /// Id of the lamp that makes the light, from a table of labels; std::nullopt if the light has no
+  /// label.
   std::optional<int> lamp;
   /// Lit fraction of a period, if it was measured.
   std::optional<double> duty = {};

@@ -15,8 +15,8 @@ namespace vlp {
 /// Minimum period of stripes, in scanlines; the theoretical limit is two scanlines.
 inline constexpr double kMinPeriod_lines = 2.2;
 
-/// Minimum contrast (bright - dark) / bright of a modulated light, and minimum number of periods of
-/// an identified one.
+/// Limits for stripes: minimum contrast (bright - dark) / bright of a modulated light, 0 to 1, and
+/// minimum number of stripe periods across an identified light.
 inline constexpr double kMinContrast = 0.2, kMinPeriods = 1.3;
 
 /// Number of periods below which patterns without stripes may match a lamp by chance.
