@@ -14,11 +14,13 @@
 
 namespace vlp {
 
-/// The poses from two lamps: none, one or two.
+/// Poses of a level camera that explain two lamps exactly: `count` of them, 0 to 2, at the
+/// beginning of `poses`.
 struct TwoLampPoses {
   int count = 0;
   std::array<Pose, 2> poses;
-  /// True if a pose would exist with a lamp at or below the camera's height.
+  /// True if there is no pose, but one would exist with a lamp at or below the height of the
+  /// camera.
   bool lamp_below_camera = false;
 };
 

@@ -29,9 +29,12 @@ inline constexpr std::array kCommonErrorSources{CommonErrorSource::lens, CommonE
                                                 CommonErrorSource::offset,
                                                 CommonErrorSource::lamps};
 
-/// Errors of calibration and lamp map, which are common to all fixes of a camera:
+/// Errors of calibration and lamp map, which are common to all fixes of a camera, with their joint
+/// covariance C. The total covariance of a fix is
 ///   cov = (J' W J)^-1 + G C G',    G = (J' W J)^-1 J' W J_c
 /// with
+///   J    derivative of the predicted normalized points by the states of the fix
+///   W    inverse covariance of the measured points from pixel noise
 ///   J_c  derivative of (normalized points z - predictions) by the errors of calibrated quantities
 ///   C    joint covariance of these errors
 /// Calibrated quantities: lens, zenith, offset of the dispersion calibration, positions of the
@@ -118,8 +121,8 @@ class CommonErrors {
   Gain compute_gain_of_fix_errors(std::span<const Sighting> sightings,
                                   std::span<const std::size_t> lamps, const PoseEstimate& camera,
                                   const Lens& lens, const Eigen::Matrix3d& level_from_base) const;
-  /// Returns the gain of a body with the camera at `arm_m`. The gain of the pixels, in standard
-  /// deviations, is that of the least-squares fix (estimate_body).
+  /// Returns the gain of a body with the camera at `arm_m` in the body frame, m. The gain of the
+  /// pixels, in standard deviations, is that of the least-squares fix (estimate_body_state()).
   BodyGain compute_gain_of_fix_errors(std::span<const BodyObservation> sightings,
                                       std::span<const std::size_t> lamps,
                                       const Eigen::Vector3d& arm_m, const BodyFix& fix,

@@ -17,7 +17,8 @@ namespace vlp {
 
 /// Returns true if velocity, yaw rate or roll and pitch are estimated together with the pose.
 bool is_motion_or_tilt_estimated(const BodyPrior& prior);
-/// Returns true if velocity or yaw rate are estimated.
+/// Returns true if the prior leaves velocity or yaw rate free (standard deviation > 0), so that
+/// they are estimated together with the pose.
 bool is_motion_estimated(const BodyPrior& prior);
 
 /// Cramer-Rao lower bound of a camera that may move and be tilted, predicted from the pixel noise.
@@ -87,8 +88,8 @@ std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d>
 
 /// Computes the error budget of a camera that may move and be tilted, with the prior `prior`. Its
 /// mean is at rest and level. Returns std::nullopt also if lamps and prior do not determine a fix
-/// (estimate_body_robust). If the tilt is estimated, an error of the calibrated tilt has almost no
-/// effect.
+/// (estimate_body_state_robust()). If the tilt is estimated, an error of the calibrated tilt has
+/// almost no effect.
 /// @pre `row_clock` has a value if the prior leaves the motion free
 std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d> lamps_m,
                                                 const Lens& lens, const Pose& level,

@@ -29,7 +29,8 @@ enum class FixStatus {
   row_time_unknown    // motion compensation requires the row time
 };
 
-/// Returns the enumerator as a word, for example "too_few_lamps".
+/// Returns the name of a status as in fixes.csv: that of the enumerator, for example
+/// "too_few_lamps".
 std::string_view to_string(FixStatus status);
 
 /// Returns a human-readable explanation with the remedy.

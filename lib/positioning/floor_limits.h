@@ -24,7 +24,8 @@ struct FloorGrid {
   double step_m;
 };
 
-/// Returns the smallest grid around the lamps.
+/// Returns a grid over the bounding rectangle of all lamp positions, parallel to the axes of the
+/// world, with the step `step_m`.
 /// @pre the map has lamps
 FloorGrid make_grid_of_floor_positions(const LampMap& map, double step_m);
 

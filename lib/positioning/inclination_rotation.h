@@ -12,9 +12,11 @@ namespace vlp {
 
 /// Rotation of the camera due to the robot's inclination.
 struct InclinationRotation {
-  /// Rotation from the tilt-corrected camera frame (base) to the level frame.
+  /// Rotation to the level frame from the base: the camera frame after correction of its calibrated
+  /// tilt. The identity for a robot that is level.
   Eigen::Matrix3d level_from_base = Eigen::Matrix3d::Identity();
-  /// Rotation axes in the level frame of an error of the roll and of an error of the pitch.
+  /// Unit axes in the level frame about which the camera rotates for an error of the roll (column
+  /// 0) and of the pitch (column 1).
   Eigen::Matrix<double, 3, 2> error_axes = Eigen::Matrix<double, 3, 2>::Zero();
 };
 

@@ -14,8 +14,9 @@ namespace vlp {
 /// Least-squares pose with covariance and statistics of the residuals.
 struct LeastSquaresFix {
   Pose pose;
-  /// Covariance of (X, Y, Zs, g), with the camera's height Zs and yaw g, in meters and radians:
-  /// (J^T W J)^-1 for the pixels' sigma_px.
+  /// Covariance of (X, Y, Zs, g), in m and rad: position of the camera in the world, with its
+  /// height Zs, and yaw g. It is (J^T W J)^-1 for the sigma_px of the pixels, not scaled by the
+  /// residuals.
   Matrix4 covariance;
   /// Sum of the squared pixel residuals over sigma_px^2; 2n - 4 degrees of freedom.
   double chi_squared;

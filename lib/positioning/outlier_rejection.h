@@ -18,7 +18,8 @@ namespace vlp {
 /// Maximum number of observations in a frame.
 inline constexpr std::size_t kMaxSightings = 256;
 
-/// Observations that agree with a pose.
+/// Result of find_largest_consistent_set(): a pose and the observations that agree with it.
+/// `agreeing` has a bit per observation, by its index; `count` is the number of set bits.
 struct Consensus {
   Pose pose;
   std::bitset<kMaxSightings> agreeing;
@@ -85,7 +86,8 @@ struct FrameObservations : LampObservations<Sighting> {
 ///   which excludes confusion of neighbors.
 /// On a contradiction, with
 ///   three or more  that fit the mirror image of the map, the status is `mirrored_map`;
-///   four or more   the agreeing majority makes the fix (find_consensus); the others are rejected;
+///   four or more   the agreeing majority makes the fix (find_largest_consistent_set()); the others
+///                  are rejected;
 ///   others         the status is `inconsistent`.
 ///
 /// Lamps below these limits are tested again if their residuals exceed five standard deviations. If

@@ -30,9 +30,10 @@
 /// lamps determine all three.
 namespace vlp {
 
-/// Unknowns of a body besides R and g, which are always estimated.
+/// Motion, roll and pitch of a body: the states that may be estimated in addition to its position R
+/// and yaw g.
 struct BodyMotion {
-  /// u, in the body's level frame.
+  /// Horizontal velocity u along the axes of the body's level frame.
   Eigen::Vector2d velocity_m_per_s{0, 0};
   double yaw_rate_rad_per_s = 0;
   Inclination inclination{0, 0};

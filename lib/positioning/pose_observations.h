@@ -12,8 +12,8 @@ namespace vlp {
 
 /// Lamps observed in one frame, or in several consecutive frames.
 struct BodyObservations : LampObservations<BodyObservation> {
-  /// Number of observations, at the start of the arrays, from the frame of the fix. The others are
-  /// from earlier frames.
+  /// Number of observations from the frame of the fix; they are at the start of the arrays. All
+  /// other observations are from earlier frames.
   std::size_t num_current = 0;
 };
 

@@ -27,7 +27,8 @@ static_assert(
 /// Options of a Positioner.
 struct PositionerOptions {
   Correction correction = Correction::all;
-  /// With a mount, fixes are of the robot's center; without one, of the camera.
+  /// Pose of the camera on the robot. With a mount, fixes are of the robot's center and yaw;
+  /// without one (std::nullopt), of the camera.
   std::optional<CameraMount> mount;
   /// Residual limit as a fraction of the RMS radius of all lamps in the image. Lamps are
   /// inconsistent if the residual of one exceeds it, or if it is too close to another lamp

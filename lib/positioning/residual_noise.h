@@ -12,7 +12,8 @@ namespace vlp {
 /// Sums over the residuals of all fixes that have redundancy. Excludes fixes with a reduced
 /// chi-squared above 25 times the median.
 struct ResidualSums {
-  /// Sums of the squared residuals in px^2 and of those divided by their variances.
+  /// Sum of the squared residuals of the pixels over both axes, px^2, and sum of these squares
+  /// divided by their variances.
   double squares_px2 = 0, chi_squared = 0;
   /// Expected contribution of the errors of calibration and lamp map to chi_squared.
   double common_chi_squared = 0;

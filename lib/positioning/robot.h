@@ -7,8 +7,9 @@
 /// Data that a robot has from other sources than images.
 namespace vlp {
 
-/// Pose of the camera on the robot. The robot's frame has its origin at the center and z up.
-/// `yaw_in_robot_rad` is the yaw of the camera relative to the robot.
+/// Pose of the camera on the robot: position in the robot's frame, m, and yaw relative to the
+/// robot, rad, counter-clockwise seen from above. The robot's frame has its origin at the center
+/// and z up.
 struct CameraMount {
   Eigen::Vector3d position_in_robot_m;
   double yaw_in_robot_rad;

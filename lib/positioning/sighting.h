@@ -14,11 +14,12 @@
 ///   p = s + H e^{jg} z      so      z = e^{-jg} (p - s) / H.
 namespace vlp {
 
-/// Observation of a lamp of the map by a level camera.
+/// Observation of a lamp of the map by a level camera, for the positioning equation p = s + H
+/// e^{jg} z: known position P of the lamp, measured normalized point z, and its noise.
 struct Sighting {
-  /// P, in the world.
+  /// Position P of the lamp in the world, m.
   Eigen::Vector3d lamp_m;
-  /// z, measured.
+  /// Measured point z = (x/z, y/z) in the level frame of the camera.
   Eigen::Vector2d z;
   /// Derivative of the pixel by z. Converts residuals of z to pixels, in which the noise is given.
   Matrix2 d_pixel_d_z;
@@ -41,7 +42,7 @@ struct LevelPose {
 /// z of a lamp predicted from a pose, and its derivatives.
 struct Prediction {
   Eigen::Vector2d z;
-  /// Derivative by (X, Y, Zs, g).
+  /// Derivative of z with respect to the state (X, Y, Zs, g), in m and rad.
   Eigen::Matrix<double, 2, 4> d_z_d_state;
 };
 

@@ -13,7 +13,8 @@ struct FreePose {
   Eigen::Vector3d position_m;
 };
 
-/// Up to four poses from three lamps.
+/// Poses of a camera with any rotation that explain three lamps: `count` of them, 0 to 4, at the
+/// beginning of `poses`.
 struct ThreeLampPoses {
   int count = 0;
   std::array<FreePose, 4> poses;

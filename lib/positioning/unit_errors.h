@@ -27,9 +27,9 @@ std::vector<std::size_t> find_lamps_in_view(const LampMap& map, const Lens& lens
                                             const Eigen::Matrix3d& camera_from_level,
                                             const Pose& level);
 
-/// Covariances of (X, Y, Z, yaw) in meters and radians. `noise` is independent between images.
-/// `lens`, `zenith`, `offset` and `lamp_map` are the parts common to all fixes of a camera
-/// (CommonErrors::extract_error_source()).
+/// Predicted covariances of the fix (X, Y, Z, yaw) of a calibrated camera, one per error source, in
+/// m and rad. `noise` is independent between images. `lens`, `zenith`, `offset` and `lamp_map` are
+/// common to all fixes of a camera (CommonErrors::extract_error_source()).
 struct UnitBudget {
   Matrix4 noise, lens, zenith, offset, lamp_map;
   /// Increase of `noise` due to unknown motion, and the further increase due to unknown roll and
