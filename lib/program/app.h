@@ -19,7 +19,8 @@ namespace vlp {
 /// Exit codes of every program.
 enum ExitCode : int { kDone = 0, kGateNotMet = 1, kBadInput = 2, kUndetermined = 3 };
 
-/// Exception for data that cannot determine the answer; what() names the remedy. Exit code 3.
+/// Exception for data that cannot determine the answer; what() is one line with the remedy.
+/// run_app() prints it and returns the exit code 3.
 class Undetermined : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };

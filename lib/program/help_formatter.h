@@ -7,10 +7,11 @@
 
 namespace vlp {
 
-/// Formatter of --help in 80 columns. Descriptions of options wrap within their column. In the
-/// description of a program, lines that begin with a space (examples, lists) are kept unchanged and
-/// have to fit. The other lines form paragraphs, separated by blank lines, and wrap. In the footer,
-/// each line wraps at its second column.
+/// Formatter of --help for CLI11, in 80 columns. Descriptions of options wrap within their column.
+///
+/// In the description of a program, lines that begin with a space (examples, lists) are kept
+/// unchanged and have to fit. The other lines form paragraphs, separated by blank lines, and wrap.
+/// In the footer, each line wraps at its second column.
 class HelpFormatter : public CLI::Formatter {
  public:
   std::string make_description(const CLI::App* app) const override;

@@ -12,7 +12,8 @@ namespace vlp {
 /// occasional plain line. Silent under --quiet.
 class Progress {
  public:
-  /// `things` names the counted items, for example "captures".
+  /// Creates a display without output; update_display() prints.
+  /// @param things  plural name of the counted items, for example "captures"
   explicit Progress(std::string things);
   /// Ends the line.
   ~Progress();

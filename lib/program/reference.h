@@ -13,7 +13,7 @@ class App;
 /// build prints them with `PROGRAM --reference man|bash|zsh` and installs them.
 namespace vlp {
 
-/// Returns the manual page for section 1, in roff.
+/// Returns the manual page (section 1) of a program, generated from its options, as roff text.
 std::string format_manual_page(const CLI::App& app);
 
 /// Return the completion scripts: options, subcommands, the choices of an option, and files for

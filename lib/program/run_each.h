@@ -6,16 +6,16 @@
 
 namespace vlp {
 
-/// Runs a program for each line of stdin, sequentially, each time in a forked process. Forking
-/// avoids loading the shared libraries, which takes 20 % of the time of a session.
+/// Runs a program once for each line of stdin, sequentially, each time in a forked process. Forking
+/// avoids loading the shared libraries, which takes 20 % of the time of a session. Returns at the
+/// end of stdin.
 ///
 /// A line is JSON: {"arguments": ["SESSION", "-o", "RESULTS"], "limit_s": 3600}. The answer is a
 /// line on stdout: {"exit_code": 0, "cpu_s": 0.61, "said": "..."} with
 ///
 ///   exit_code  exit code, or the negative number of the signal that killed the process (SIGALRM:
-///   the
-///              time limit)
-///   cpu_s      processor time of the process
+///              the time limit)
+///   cpu_s      processor time of the process, s
 ///   said       last 4096 bytes of its stdout and stderr
 ///
 /// @param name     argv[0] of the program

@@ -11,7 +11,8 @@ namespace vlp {
 
 /// Options of the commands on records.
 struct StationRecordsOptions {
-  /// File station.yaml, or a database; exactly one is not empty.
+  /// Location of the records: file station.yaml, or the database itself (SQLite file or
+  /// postgresql:// address). Exactly one of the two is not empty.
   std::string station, records;
   RunFilter filter;
   std::string run, metric, output;

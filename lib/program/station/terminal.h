@@ -15,7 +15,8 @@ namespace vlp {
 /// NO_COLOR is set. Without a terminal, only print_lines() writes.
 class Terminal {
  public:
-  /// Switches a terminal on stdin to reading single keys until destruction.
+  /// Switches a terminal on stdin to single keys without echo, until destruction; only if stdout is
+  /// a terminal, too. From then on, SIGINT and SIGTERM do not end the process (was_interrupted()).
   Terminal();
   ~Terminal();
   Terminal(const Terminal&) = delete;

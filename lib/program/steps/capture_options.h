@@ -17,7 +17,8 @@ namespace vlp {
 /// Returns the default options of a program, with one thread per core.
 FrontendOptions make_default_frontend_options();
 
-/// Captures of lamps as given on the command line. File names are also used in messages.
+/// Command-line options of programs that take captures of lamps: input and output files, and the
+/// options of the detection. File names are also used in messages.
 struct CaptureOptions {
   /// Folder of images, video, or detections.csv.
   std::string images;

@@ -17,7 +17,8 @@ namespace vlp {
 void print_calibration_summary(const IntrinsicsSolution& solution, const CalibrationReport& report,
                                const ViewCoverage& coverage, const HeldOutFit& held_out);
 
-/// Prints center, zenith and tilt with their standard deviations to stdout.
+/// Prints a rotation center to stdout: center in px, zenith in the camera frame, and tilt in
+/// degrees. Center and tilt are followed by their standard deviations if these are known.
 void print_rotation_center(const RotationCenter& center, const Camera& camera);
 
 /// Prints the result of a rotation in place to stdout, and a note if the lever arm is not

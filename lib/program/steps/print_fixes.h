@@ -15,7 +15,8 @@ namespace vlp {
 /// fixes to stdout.
 void print_fixes(const FixSummary& summary);
 
-/// Prints an evaluation and its gates to stdout, human-readable, in millimeters and degrees.
+/// Prints an evaluation and its gates to stdout, human-readable: errors in mm and degrees, gates
+/// with limit and result.
 void print_evaluation(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates);
 
 /// Prints the error budget of a floor to stdout: the median over the floor and the worst place of

@@ -15,7 +15,8 @@ namespace vlp {
 /// a progress display while it runs.
 class SessionLog {
  public:
-  /// Returns the callbacks for one run. The log must outlive the run.
+  /// Returns the callbacks that write the log during one call of run_session(). They refer to this
+  /// log, which must outlive the run.
   SessionObserver make_session_observer();
 
  private:

@@ -11,7 +11,7 @@ namespace vlp {
 
 /// Options of --method lamps besides the captures.
 struct TiltOptions {
-  /// File for the refined lamp map; empty: the map is not refined.
+  /// Path of the file for the refined lamp map. If empty, the map is not refined.
   std::string refined_map;
   /// File captures.csv; empty: the one in the folder, if it exists.
   std::string captures;
@@ -19,13 +19,12 @@ struct TiltOptions {
   std::optional<double> yaw_rate_sd_deg_per_s;
 };
 
-/// Estimates the tilt of the camera from captures taken anywhere (calibration/leveling), for
+/// Estimates the tilt of the camera from captures taken anywhere (calibration/tilt/), for
 /// vlp-rotation --method lamps.
 void run_rotation_by_lamps(const CLI::App& app, CaptureOptions images, const TiltOptions& options);
 
-/// Estimates the rotation center from captures of a rotation in place
-/// (calibration/rotation/find_rotation_captures.h), for vlp-rotation --method axis|joint|circle.
-/// `plot` is the file of the plot; empty: none.
+/// Estimates the rotation center from captures of a rotation in place (calibration/rotation/), for
+/// vlp-rotation --method axis|joint|circle. `plot` is the file of the plot; empty: none.
 void run_rotation_in_place(const CLI::App& app, CaptureOptions images, const std::string& method,
                            const std::string& plot);
 

@@ -19,8 +19,9 @@ namespace vlp {
 /// Prints the remarks of a step to stderr: skipped images, warnings, notes, details.
 void print_step_remarks(const StepResult& result);
 
-/// Throws if the step failed: Undetermined for StepFailure::undetermined, std::invalid_argument for
-/// all other failures.
+/// Throws an exception with the message of the result if the step failed, otherwise does nothing.
+/// @throws Undetermined for StepFailure::undetermined
+/// @throws std::invalid_argument for all other failures
 void throw_if_step_failed(const StepResult& result);
 
 /// Returns the options that do not affect the recorded result: --output, other outputs, a cache,
