@@ -16,8 +16,8 @@ std::string make_rotation_html_table(const RotationCenter& center);
 std::string make_dispersion_html_table(const Dispersion& dispersion,
                                        const Eigen::Vector2d& focal_px);
 
-/// Returns a foldable list in HTML: program, version and options of each part, and the digests of
-/// its inputs.
+/// Returns the history of a calibration as HTML, one foldable entry per part: program, version and
+/// options, and a table of the inputs with their SHA-256.
 std::string make_history_html_list(const std::vector<HistoryEntry>& entries);
 
 }  // namespace vlp

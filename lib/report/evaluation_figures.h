@@ -14,8 +14,9 @@ namespace vlp {
 /// @pre there is at least one fix
 std::vector<ReportStatistic> make_report_statistics(const Evaluation& evaluation);
 
-/// Returns sentences on the statistics: reference of the errors, captures without a fix, resampling
-/// unit of the intervals, comparison, and warnings about small samples.
+/// Returns sentences that explain the statistics of a report, one per element. Subjects: reference
+/// of the errors, captures without a fix, resampling unit of the intervals, comparison, and
+/// warnings about small samples.
 std::vector<std::string> make_report_notes(const Evaluation& evaluation);
 
 /// Returns the statistics of a drive: distances of the fitted line, and jitter. Each label begins

@@ -18,8 +18,8 @@ namespace vlp {
 /// @throws InputError if image names do not match
 Drawing make_floor_plan_drawing(const EvaluationInput& input, const LampMap& lamps);
 
-/// Returns plots of the errors on the floor and of their distribution. With a commanded line, the
-/// drive along it takes the place of the floor.
+/// Returns the plots of an evaluation, rendered: the errors on the floor plan, and their
+/// distribution. With a commanded line, the drive along it takes the place of the floor plan.
 /// @pre there is at least one fix
 /// @throws InputError if image names do not match, and as render_svg()
 std::vector<ReportPlot> make_evaluation_plots(const EvaluationInput& input,

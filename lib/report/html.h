@@ -15,7 +15,8 @@ namespace vlp {
 /// characters U+FFFD.
 std::string escape_html_text(std::string_view text);
 
-/// Returns `<name>text</name>` with escaped text, and a newline.
+/// Returns the HTML element `<name>text</name>` with a newline at the end. `text` is plain text and
+/// is escaped.
 std::string make_html_element(std::string_view name, std::string_view text);
 
 /// Returns a self-contained page with the report's style. `content` is HTML.

@@ -15,7 +15,8 @@ namespace vlp {
 
 /// Row of the table of statistics, formatted.
 struct ReportStatistic {
-  /// Example: "mean horizontal error", "0.0137", "mm", "0.0131 to 0.0143".
+  /// Texts of the row, for example "mean horizontal error", "0.0137", "mm". `value` is formatted in
+  /// the unit `unit`.
   std::string label, value, unit;
   /// Confidence interval; empty if there is none.
   std::string interval;

@@ -13,7 +13,7 @@ namespace vlp {
 /// Part of the report that a plot belongs to.
 enum class ReportPart { camera, rotation, dispersion, floor, distribution, tracks, other };
 
-/// Plot or image with its texts.
+/// Rendered plot or image of the report with its caption, alternative text and table.
 struct ReportPlot {
   ReportPart part;
   /// Complete content of an SVG or PNG file.

@@ -6,7 +6,7 @@
 
 namespace vlp {
 
-/// Style sheet of the report. Verdicts differ not only in color but also in words and borders.
+/// CSS style sheet of report.html. Verdicts differ not only in color but also in words and borders.
 constexpr std::string_view kReportStyle = R"css(
 :root { color-scheme: light; }
 * { box-sizing: border-box; }

@@ -20,7 +20,8 @@ namespace vlp {
 /// Fixes about a known reference point, in the world: Chen and Guan, figure 6.
 struct DispersionPlot {
   std::string title;
-  /// Errors (fix minus reference point), m, and the smallest circle around them.
+  /// Horizontal errors of fixes at the reference point (fix minus reference point), in the world,
+  /// m. `circle` is their dispersion circle (DispersionFit), m.
   struct Fixes {
     std::vector<Eigen::Vector2d> errors_m;
     Circle circle;

@@ -15,7 +15,7 @@ namespace vlp {
 /// Errors of fixes on the floor plan, enlarged: figures 8 and 9 of Chen and Guan.
 struct ErrorPlot {
   std::string title;
-  /// Capture with a fix: true position and fix, in the world.
+  /// Capture with a fix: true horizontal position and position of the fix, in the world, m.
   struct Fix {
     Eigen::Vector2d truth_m, fix_m;
     /// Image name of the capture, for the table.

@@ -17,7 +17,8 @@ namespace vlp {
 struct FloorPlot {
   struct Place {
     Eigen::Vector2d xy_m;
-    /// Plotted quantity at xy_m, in the unit of `label`; blank if std::nullopt.
+    /// Value of the plotted quantity at the floor position xy_m, in the unit that FloorPlot::label
+    /// names. std::nullopt leaves the position blank.
     std::optional<double> value;
   };
   std::string title;

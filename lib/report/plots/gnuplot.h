@@ -10,7 +10,8 @@ namespace vlp {
 
 /// Plot as a gnuplot script.
 struct Drawing {
-  /// Name of letters, digits and underscores. It becomes the title of an SVG.
+  /// Name of the plot, which consists of letters, digits and underscores. It becomes the title
+  /// element of an SVG.
   std::string name;
   int width_px, height_px;
   /// gnuplot commands without `set terminal` and `set output`.
