@@ -10,8 +10,9 @@ namespace vlp {
 /// Corner of a board at which the ids begin, with the board as printed and upright.
 enum class BoardCorner { bottom_left, bottom_right, top_left, top_right };
 
-/// Order of the ids on a board: along rows or columns, from a corner. In YAML:
-/// "row-major-from-bottom-left" (Kalibr), "column-major-from-top-left", ...
+/// Order in which the tag ids count up on a board: along rows, or columns if `column_major`,
+/// beginning at the corner `from`. In YAML: "row-major-from-bottom-left" (Kalibr),
+/// "column-major-from-top-left", ...
 struct IdOrder {
   bool column_major;
   BoardCorner from;

@@ -15,8 +15,8 @@ namespace vlp {
 /// Boards of squares: the corner at which the top left square touches the diagonally adjacent one.
 struct BoardTag {
   int id;
-  /// Corners of the black border in libapriltag's order: bottom left, bottom right, top right, top
-  /// left.
+  /// Corners of the tag's black border in the board frame (x right, y down), m. They are in
+  /// libapriltag's order: bottom left, bottom right, top right, top left.
   std::array<Eigen::Vector2d, 4> corners_m;
 };
 

@@ -18,10 +18,11 @@ namespace vlp {
 /// Stripes of a modulated lamp are along these rows or columns.
 enum class Readout { rows, columns };
 
-/// Imager and lens of a camera.
+/// Camera with its intrinsic calibration: size of the imager, lens, and timing of the rolling
+/// shutter.
 struct Camera {
   std::string id;
-  /// Width and height.
+  /// Width and height of the image, px.
   std::array<int, 2> imager_px;
   LensModel lens_model;
   /// Parameters in mrcal's order, see LensModel.

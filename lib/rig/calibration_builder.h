@@ -13,8 +13,9 @@
 /// The history changes with the parts. The functions set `entry.part`.
 namespace vlp {
 
-/// Returns a calibration with this camera alone. All other parts depend on the camera and are
-/// removed.
+/// Returns a calibration that consists of this camera and its report, with `entry` as its only
+/// history. There is no rotation center, dispersion or adjustment, because these depend on the
+/// camera.
 Calibration make_calibration_with_camera(Camera camera, std::optional<IntrinsicsReport> report,
                                          HistoryEntry entry);
 

@@ -11,9 +11,9 @@
 /// covariances: intrinsics, and normalized points (x/z, y/z).
 namespace vlp {
 
-/// Returns the number of intrinsics with reported errors, which later steps propagate: all
-/// intrinsics. Splined lenses: 4, for fx, fy, cx, cy, since few corners determine each control
-/// point. Errors of the control points are only included in
+/// Returns the number of intrinsics, counted from fx, whose errors later steps propagate. It is the
+/// number of all intrinsics, but 4 (fx, fy, cx, cy) for splined lenses, since few corners determine
+/// each control point. Errors of the control points are only included in
 /// IntrinsicsReport::expected_max_error_px.
 Eigen::Index count_intrinsics_with_covariance(const Camera& camera);
 

@@ -10,7 +10,8 @@
 #pragma GCC visibility push(hidden)
 namespace vlp {
 
-/// Returns the text that write_calibration() writes.
+/// Formats a calibration as YAML text, format `vlp-calibration/1`: the content of the file of
+/// write_calibration().
 std::string format_calibration_yaml(const Calibration& calibration);
 
 }  // namespace vlp

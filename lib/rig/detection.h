@@ -11,7 +11,7 @@ namespace vlp {
 inline constexpr double kMinSigma_px = 1e-4;
 inline constexpr double kMaxSigma_px = 1e3;
 
-/// One identified lamp in a frame.
+/// Lamp that was detected and identified in one image.
 struct Detection {
   /// Id in the lamp map.
   int lamp;

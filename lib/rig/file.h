@@ -13,9 +13,10 @@ namespace vlp {
 /// File that is read in blocks, or a stream that this process was given (/dev/stdin, /dev/fd/N).
 class InputFile {
  public:
-  /// Opens the file. Never waits for the writer of a pipe.
-  /// @throws InputError if it cannot be opened, is a folder, a device or a pipe other than this
-  /// process's streams, or has more than `max_bytes`
+  /// Opens a file for reading. Does not wait if `path` is a pipe without a writer.
+  /// @param max_bytes  largest accepted size in bytes
+  /// @throws InputError if the file cannot be opened or has more than `max_bytes`; also if it is a
+  ///     folder, a device or a pipe other than this process's streams
   [[gnu::visibility("hidden")]] InputFile(const std::filesystem::path& path, std::size_t max_bytes);
   /// Reads an open regular file, whose descriptor it closes. `path` is its name in messages.
   [[gnu::visibility("hidden")]] InputFile(const std::filesystem::path& path, int descriptor,

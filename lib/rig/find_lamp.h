@@ -8,7 +8,7 @@
 
 namespace vlp {
 
-/// Returns the lamp with this id; nullptr if there is none.
+/// Returns a pointer to the lamp with this id in `lamps`; nullptr if there is none.
 const Lamp* find_lamp_by_id(std::span<const Lamp> lamps, int id);
 
 }  // namespace vlp

@@ -13,9 +13,11 @@ namespace vlp {
 class InputError : public std::runtime_error {
  public:
   InputError(const std::filesystem::path& file, const std::string& problem);
-  /// @param line  from 1; 0 if unknown
-  /// @param key   YAML key with its path, such as "lamps[3].position_m", or CSV column; may be
-  /// empty
+  /// Creates an error about a place in a file; what() is "file:line: key: problem".
+  /// @param line     line in the file, from 1; 0 if unknown
+  /// @param key      YAML key with its path, such as "lamps[3].position_m", or CSV column; may be
+  ///     empty
+  /// @param problem  problem and remedy, human-readable
   InputError(const std::filesystem::path& file, std::size_t line, const std::string& key,
              const std::string& problem);
 };

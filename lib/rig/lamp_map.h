@@ -15,12 +15,12 @@ namespace vlp {
 /// A lamp of the map with its reported properties.
 struct Lamp {
   int id;
-  /// Center of the lamp in the world frame (Z up).
+  /// Center of the lamp in the world frame (Z up), m.
   Eigen::Vector3d position_m;
   LampShape shape;
-  /// Frequency of the square wave that modulates the lamp.
+  /// Frequency of the square wave that modulates the lamp; std::nullopt if unknown.
   std::optional<double> frequency_hz;
-  /// Duty cycle: lit fraction of a period.
+  /// Duty cycle: lit fraction of a period, 0 to 1; std::nullopt if unknown.
   std::optional<double> duty;
   /// Standard deviation of position_m per axis, if the survey reports it.
   std::optional<double> sd_m = {};

@@ -14,7 +14,8 @@ namespace vlp {
 struct LampMapFile {
   std::filesystem::path file;
   LampMap map;
-  /// Room of each lamp of `map`; empty if it is not stated.
+  /// Name of the room of each lamp, in the order of map.lamps. An element is empty if the file
+  /// states no room for the lamp.
   std::vector<std::string> rooms;
 };
 

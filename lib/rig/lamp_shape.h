@@ -14,7 +14,7 @@ namespace vlp {
 /// Shape of a lamp: a plane figure with two perpendicular axes, in a horizontal plane.
 enum class ShapeKind { disc, rectangle };
 
-/// Properties of a shape.
+/// Properties of a ShapeKind: its name in files, its outline, and its keys in lamps.yaml.
 struct ShapeTraits {
   ShapeKind kind;
   /// Name in lamps.yaml and lights.csv.

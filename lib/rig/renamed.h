@@ -18,7 +18,8 @@ enum class NameKind {
   value,   ///< value of an option
 };
 
-/// Returns the present name for a former one; empty if no name of this kind was renamed so.
+/// Returns the present name of a key, column, metric, option or value that was called `former` in
+/// earlier versions. Empty if nothing of this kind had that name.
 std::string_view find_present_name(NameKind kind, std::string_view former);
 
 /// Returns the former name for a present one; empty if there is none.

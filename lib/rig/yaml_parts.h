@@ -18,7 +18,9 @@ namespace vlp {
 /// are the fields of its result. The caller reads its own keys and calls check_all_keys_read(). All
 /// throw InputError if a value is invalid.
 Lamp read_lamp(YamlMap& map);
-/// Reads a shape. Its size is unknown for a disc without diameter_m.
+/// Reads the shape of a lamp (kind, axis lengths in m, yaw in rad) from the keys of a lamp. The
+/// size is std::nullopt for a disc without diameter_m.
+/// @throws InputError if a value is invalid
 LampShape read_lamp_shape(YamlMap& map);
 Board read_board(YamlMap& map);
 Camera read_camera(YamlMap& map);

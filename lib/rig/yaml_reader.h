@@ -24,7 +24,7 @@ class YamlMap;
 struct YamlNode {
   enum class Kind { null, scalar, list, map };
   Kind kind = Kind::null;
-  /// Line in the file, counted from 1; 0 if unknown.
+  /// Line of the file at which the node begins, counted from 1; 0 if unknown.
   std::size_t line = 0;
   /// Text of a scalar.
   std::string text;
@@ -54,10 +54,12 @@ class YamlValue {
                                      std::string_view unit) const;
   std::vector<YamlValue> get_list() const;
   YamlMap get_mapping() const;
-  /// Returns what `read`, a function of a YamlMap&, makes of a mapping; it reads all valid keys.
+  /// Applies `read`, a function of a YamlMap&, to a mapping and returns its result. Throws
+  /// InputError if the mapping has a key that `read` has not read.
   template <typename Read>
   auto read_map(const Read& read) const;
-  /// Returns what `read` makes of each item of a list of mappings.
+  /// Applies `read` as read_map() does to each item of a list of mappings. Returns the results in
+  /// the order of the list.
   template <typename Read>
   auto read_maps(const Read& read) const;
 

@@ -16,8 +16,8 @@ namespace vlp {
 /// point, too ("1.0e-07"): without a point, YAML 1.1 readers such as PyYAML parse it as text.
 std::string format_shortest(double value);
 
-/// Returns a text for a message. A text of more than `max_bytes` bytes is cut there or before,
-/// after a whole character, and "..." is appended.
+/// Shortens a text for a message. A text of more than `max_bytes` bytes is cut after the last
+/// complete UTF-8 character within them, and "..." is appended. Other texts are returned unchanged.
 std::string truncate_text(std::string_view text, std::size_t max_bytes);
 /// Returns a text in quotes for a message, cut by truncate_text() to 40 bytes.
 std::string quote_for_message(std::string_view text);

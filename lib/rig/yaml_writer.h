@@ -20,7 +20,8 @@ void emit_number(YAML::Emitter& out, std::string_view key, double value);
 void emit_integer(YAML::Emitter& out, std::string_view key, int value);
 void emit_integers(YAML::Emitter& out, std::string_view key, std::span<const int> values);
 void emit_quoted(YAML::Emitter& out, std::string_view key, const std::string& value);
-/// Writes a word that needs no quotes: a format, a model, an enumerator.
+/// Writes `key: value` to the current map, with a word as value that needs no quotes: a format, a
+/// model, an enumerator.
 void emit_plain_word(YAML::Emitter& out, std::string_view key, std::string_view value);
 void emit_numbers(YAML::Emitter& out, std::string_view key, std::span<const double> values);
 void emit_numbers(YAML::Emitter& out, std::string_view key,
