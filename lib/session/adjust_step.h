@@ -19,8 +19,9 @@ struct AdjustSet {
   std::string name;
   std::vector<Frame> frames;
   CapturesTable captures;
-  /// True if captures without a pivot (Capture::spot) are one rotation in place, grouped by height
-  /// as in RotationCaptures.
+  /// True if the captures that name no pivot (Capture::spot) were taken during one rotation in
+  /// place. They are then grouped by height, as in RotationCaptures. False: each of them has a
+  /// position of its own.
   bool is_in_place_rotation = false;
 };
 

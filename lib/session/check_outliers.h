@@ -11,8 +11,8 @@ namespace vlp {
 /// Smaller horizontal errors at known points are no fault of the captures: a camera may have them.
 inline constexpr double kMinOutlierError_m = 0.005;
 
-/// Error of the fix of a capture: horizontally at a known point, m, or the RMS distance of the
-/// lamps in the image from where the fix sees them, px.
+/// Error of one capture. `size` is the horizontal error of its fix at a known point, m, or the RMS
+/// residual of its lamps in the image, px. The function that takes it determines which.
 struct CaptureError {
   std::string image;
   double size;

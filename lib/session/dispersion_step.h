@@ -16,7 +16,8 @@ namespace vlp {
 /// Captures at known places.
 struct KnownPositions {
   std::vector<ReferencePointCapture> captures;
-  /// Point to which each place refers, in the order of `captures`: camera or axis.
+  /// Point whose position is known, for each capture in the order of `captures`: the camera or the
+  /// axis of rotation.
   std::vector<PlaceOf> of = {};
   /// Number of captures without a place.
   std::size_t without = 0;

@@ -16,7 +16,8 @@ namespace vlp {
 /// Result of evaluate_fixes().
 struct EvaluateResult : StepResult {
   Evaluation evaluation;
-  /// Caution for the verdict: captures without a fix that no gate limits; may be empty.
+  /// Caution to be shown with the verdict, one sentence: captures have no fix, and no gate limits
+  /// their fraction. Empty if there is none.
   std::string caution;
 };
 

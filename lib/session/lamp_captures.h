@@ -22,7 +22,8 @@ struct LampCaptures {
   LampMap lamps;
   std::filesystem::path lamps_file;
   Calibration calibration;
-  /// Motion of the camera in each frame; empty: the camera stands.
+  /// Motion of the camera in each frame, in the order of `frames`. Empty: the camera is at rest in
+  /// all frames.
   std::vector<KnownMotion> motions = {};
 };
 

@@ -15,7 +15,8 @@ namespace vlp {
 
 /// Images of a board and the known properties of the camera.
 struct LensInput {
-  /// Observations of the board; rejected images are ignored.
+  /// Observations of the board in the images, one per image. Rejected images are not used but
+  /// reported as skipped.
   Observations seen;
   Board board;
   std::filesystem::path board_file;

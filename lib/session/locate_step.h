@@ -25,8 +25,8 @@ struct LocateInput {
   std::vector<Frame> frames;
   LampMap lamps;
   Calibration calibration;
-  /// Table of the captures. Its times, motions and inclinations are always used, its heights and
-  /// yaws only with `one_lamp` or `height_sd_m`.
+  /// Rows of captures.csv, by image name. Times, motions and inclinations are always used. Heights
+  /// and yaws are used only with `one_lamp` or `height_sd_m`.
   CapturesTable captures = {};
   PositionerOptions how = {};
   /// Standard deviation of the lamp positions in the image, per axis; overrides that of the

@@ -17,7 +17,7 @@ namespace vlp {
 
 /// Light of a period group in an image.
 struct GroupedLight {
-  /// Index of the light's period group in RowTimeCandidates::groups.
+  /// Index in RowTimeCandidates::groups of the period group to which the light belongs.
   std::size_t group;
   Eigen::Vector2d pixel;
   double sigma_px;

@@ -18,9 +18,10 @@ namespace vlp {
 /// Returns the camera part of a calibration, without rotation center and dispersion.
 Calibration extract_camera_calibration(const Calibration& calibration);
 
-/// Checks the map with the captures of a stationary camera or, if these show no error, with all
-/// captures (calibration/map/map_errors.h). Warns in `result` of each error that names lamps. Fails
-/// with wrong_map if the map is unusable.
+/// Checks the lamp map with the captures of a stationary camera or, if these show no error, with
+/// all captures (calibration/map/map_errors.h). Adds a warning to `result` for each error that
+/// names lamps. If the map is unusable, sets the failure of `result` to wrong_map.
+/// @return all errors found, and the offsets of all lamps
 MapErrors check_lamp_map(const LampCaptures& input, const Calibration& calibration,
                          StepResult& result);
 
@@ -63,7 +64,7 @@ struct TiltResult : StepResult {
   TiltCalibration leveling;
 };
 
-/// Estimates the tilt from captures taken anywhere (calibration/leveling), and the lamp map if
+/// Estimates the tilt from captures taken anywhere (calibration/tilt/), and the lamp map if
 /// `refine_map` is set. Metrics: tilt_deg. Failures: wrong_map, undetermined. Throws
 /// std::invalid_argument if the camera moves and its calibration lacks row_time_s or readout.
 TiltResult run_tilt_step(const LampCaptures& input, bool refine_map, HistoryEntry entry);

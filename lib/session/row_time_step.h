@@ -22,7 +22,8 @@ namespace vlp {
 
 /// Lights in folders of images, not identified as lamps.
 struct DetectedLights {
-  /// Observations of the images of all folders.
+  /// Observations of all images, folder after folder, with their lights. `folder_sizes` has the
+  /// number of images of each folder.
   Observations seen;
   /// Number of images in each folder.
   std::vector<std::size_t> folder_sizes;

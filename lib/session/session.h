@@ -33,7 +33,8 @@ struct SessionOptions {
   ProgramVersion program;
   std::string camera_id = "camera";
   LensModel lens_model = LensModel::opencv8;
-  /// Uses the model selected by cross-validation instead (calibration/intrinsics/lens_choice.h).
+  /// If true, selects the lens model by cross-validation (calibration/intrinsics/lens_choice.h)
+  /// instead of using `lens_model`.
   bool choose_lens_model = false;
   /// Threads, limits for images, row time and readout direction of the camera.
   FrontendOptions frontend = {};

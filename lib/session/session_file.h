@@ -14,7 +14,8 @@ namespace vlp {
 /// Millimeters per meter, for the lengths in JSON.
 inline constexpr double kMillimetersPerMeter = 1e3;
 
-/// Record of a step, stored with its outputs so that an unchanged step is not run again.
+/// Stored result of a step, with digests of its inputs and outputs. A later run reuses the result
+/// if the digests are unchanged.
 struct StepRecord {
   /// Digests of all inputs of the step and of its outputs.
   std::string key, outputs;
@@ -35,19 +36,15 @@ nlohmann::ordered_json to_json(const StepResult& result);
 nlohmann::ordered_json to_json(const CheckedMetric& gate);
 
 /// Returns the content of `session.json`, the machine-readable result in format "vlp-session/1":
-///
 ///   verdict      "pass", "gate" or "no result"
 ///   reason, failure ("none", "bad_input", "undetermined", ...), camera, version
-///   metrics      each with step, name, value; unit, if the metric has a MetricKind; limit, asked
-///   and
-///                met, if a gate limits it
+///   metrics      each with step, name, value; unit, if the metric has a MetricKind; limit,
+///                direction and passed, if a gate limits it
 ///   steps        each with name, warnings, notes, skipped images with reasons, rejected lamps with
 ///                their numbers of captures, offset of each lamp from the prediction by the others
 ///   calibration  focal length, principal point, tilt, lever arm, dispersion, in the unit at the
-///   end
-///                of the key; zenith_deg is x/z and y/z of the zenith
+///                end of the key; zenith_deg is x/z and y/z of the zenith
 ///   history      inputs with their digests
-///
 /// Standard deviations (_sd_) cover the captures of the step alone; that of the zenith includes the
 /// contribution of the lens. The file is written last: without it the results are those of a run
 /// that was killed. The same run gives the same bytes.

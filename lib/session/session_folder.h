@@ -21,7 +21,9 @@ namespace vlp {
 ///
 /// All functions throw InputError if a table cannot be read.
 
-/// Returns captures.csv with the places of truth.csv; empty if neither file exists.
+/// Reads the captures.csv of a folder and replaces positions, heights and yaws by those of
+/// truth.csv, if it has them. Returns rows by image name; an empty table if neither file exists.
+/// @throws InputError if a table cannot be read
 CapturesTable read_captures_with_truth(const std::filesystem::path& folder);
 /// Returns the table with the ground truth of the folder: truth.csv, or captures.csv if it has
 /// places of the camera. Returns std::nullopt if neither exists.

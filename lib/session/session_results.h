@@ -18,8 +18,8 @@ struct StepOutputs {
   std::vector<std::string> files;
 };
 
-/// Folder with the results of a session, and the records by which steps of an earlier run are
-/// reused:
+/// Folder with the results of a session, which one run at a time may use. Results of an earlier run
+/// are reused for steps whose inputs have not changed. Content:
 ///
 ///   lens.yaml, report.html, ...   the outputs of the steps
 ///   session.json                  outcome of the last run

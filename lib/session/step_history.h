@@ -16,7 +16,8 @@ struct ProgramVersion {
   std::string program, version;
 };
 
-/// SHA-256 digests of files and folders; each file is read once.
+/// Cache of SHA-256 digests of input files and folders, in hexadecimal digits. Each file is read
+/// only once.
 class InputDigests {
  public:
   /// Returns the digest of a file's content. Throws InputError if the file cannot be read.

@@ -28,7 +28,7 @@ enum class StepFailure {
   wrong_place    // the captures were taken elsewhere than given
 };
 
-/// Image that was not used, with the reason.
+/// Image that a step did not use: its name, and the reason in one human-readable line.
 struct SkippedImage {
   std::string image;
   std::string reason;

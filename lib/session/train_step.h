@@ -15,7 +15,8 @@ namespace vlp {
 struct TrainStepResult : StepResult {
   LabeledLights labeled;
   LampClassifier classifier;
-  /// Cross-validated confusion matrix: answers of classifiers to lights held out of their training.
+  /// Confusion matrix by cross-validation: identified lamp against labeled lamp. Each light is
+  /// identified by a classifier that was trained without its image.
   Confusion confusion;
 };
 
