@@ -20,8 +20,8 @@ enum class ArchiveFault {
   cut_image      // the first image of the last lamp folder is truncated
 };
 
-/// Damage to the captures of a session that prevents a calibration. ArchiveSession::damaged names
-/// the affected folder or file.
+/// Damage to the files of a session that makes its calibration impossible. ArchiveSession::damaged
+/// names the affected folder or file.
 enum class ArchiveDamage {
   none,
   cut_images,   // all images of a folder are truncated

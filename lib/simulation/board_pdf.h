@@ -14,7 +14,7 @@ namespace vlp {
 /// Page size of a printer.
 struct PageSize {
   std::string name;
-  /// Width and height in portrait orientation.
+  /// Width and height of the page in portrait orientation, m.
   Eigen::Vector2d size_m;
 };
 

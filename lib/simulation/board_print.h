@@ -15,7 +15,8 @@ namespace vlp {
 
 /// Printed bits of one AprilTag, in the orientation in which libapriltag renders it.
 struct TagPattern {
-  /// Number of bits along an edge of the black border's square, which is tag_size_m wide.
+  /// Edge length of the tag's square with its black border, in bits. This square is
+  /// Board::tag_size_m wide.
   int border_width;
   /// Number of bits outside that square on each side (families whose border is white inside).
   int outside;

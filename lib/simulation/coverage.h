@@ -16,7 +16,8 @@ namespace vlp {
 /// Pose of the camera in the frame of a rendered target while a line is exposed.
 using TargetFromCamera = std::function<Eigen::Isometry3d(int line)>;
 
-/// Returns the intersection of a ray with the plane z = 0 of the target; NaN if there is none.
+/// Returns the point (x, y) at which a ray meets the plane z = 0, in the frame of the target and
+/// the unit of `origin`. NaN if the ray does not meet the plane in its direction.
 inline Eigen::Vector2d intersect_ray_with_plane(const Eigen::Vector3d& origin,
                                                 const Eigen::Vector3d& direction) {
   const double distance = -origin.z() / direction.z();
@@ -39,8 +40,8 @@ inline double cross_product_2d(const Eigen::Vector2d& a, const Eigen::Vector2d& 
 /// means instead would displace an edge by 0.01 px. Rays within a pixel are interpolated linearly
 /// between those of its corners.
 ///
-/// A shape has hit(origin, direction) in its frame and integrate_shape_along_edge(p, q). Its
-/// find_constant_value(corners) is the value of the pattern if it is constant over a whole
+/// A shape has intersect_ray(origin, direction) in its frame and integrate_shape_along_edge(p, q).
+/// Its find_constant_value(corners) is the value of the pattern if it is constant over a whole
 /// quadrilateral.
 template <typename Shape>
 void add_shape_to_image(const PixelRays& rays, const PixelWindow& window,

@@ -10,12 +10,13 @@ namespace vlp {
 /// Returns the radius up to which a glow emits light, its halo included, m.
 double compute_light_radius_m(const Glow& glow);
 
-/// Returns the radiance on a ray inside the rim, as a fraction of the source's radiance; see
-/// Recess. 0 for an eye above the rim's plane.
+/// Returns the radiance that an eye sees through a point inside the rim of a downlight, as a
+/// fraction of the source's radiance (equation: see Recess). 0 for an eye at or above the plane of
+/// the rim.
 ///
 /// @param radius_m  radius of the rim, m
-/// @param eye_m  start of the ray, from the rim's center, m
-/// @param at_m  intersection of the ray with the rim's plane, from the rim's center, m
+/// @param eye_m     position of the eye relative to the rim's center, m, z up
+/// @param at_m      point of the rim's plane on the ray, relative to the rim's center, m
 double compute_relative_radiance(const Recess& recess, double radius_m,
                                  const Eigen::Vector3d& eye_m, const Eigen::Vector2d& at_m);
 

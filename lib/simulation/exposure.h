@@ -15,7 +15,8 @@ namespace vlp {
 /// Returns the white level of the sensor, 255 or 65535.
 double white_level_dn(const Sensor& sensor);
 
-/// Returns the Bayer filter of a pixel: 0 blue, 1 green, 2 red, as in color images.
+/// Returns the color of a pixel's Bayer filter (RGGB): 0 blue, 1 green, 2 red, the channel order of
+/// OpenCV. The pixel is in readout order (line, place), both from 0 and possibly negative.
 int bayer_filter_at(int line, int place);
 
 /// Returns the fraction of a pixel's light that its filter passes, relative to green.
@@ -24,12 +25,12 @@ double bayer_filter_transmission(const Bayer& bayer, int line, int place);
 /// Demosaics the gray levels behind a mosaic of filters and balances the three colors.
 std::vector<cv::Mat1f> demosaic(const Bayer& bayer, const Sensor& sensor, const cv::Mat1f& levels);
 
-/// Applies the tone curve of Picture to one gray level, DN.
+/// Applies the tone curve of ImageProcessing to one gray level, DN.
 double correct_views_for_tone_curve(const ImageProcessing& picture, const Sensor& sensor,
                                     double level_dn);
 
-/// Applies tone curve and sharpening of Picture to gray levels before rounding. Border pixels are
-/// replicated.
+/// Applies tone curve and sharpening of ImageProcessing to gray levels before rounding. Border
+/// pixels are replicated.
 void apply_tone_curve_and_sharpening(const ImageProcessing& picture, const Sensor& sensor,
                                      cv::Mat1f& levels);
 

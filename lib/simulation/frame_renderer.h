@@ -24,7 +24,8 @@ namespace vlp {
 /// Const; may be shared between threads.
 class FrameRenderer {
  public:
-  /// The scene must outlive the renderer.
+  /// Creates a renderer of the camera of `scene`, which must outlive the renderer. Computes the
+  /// rays of all pixels.
   /// @throws std::invalid_argument if make_board_pattern() rejects the board
   explicit FrameRenderer(const Scene& scene);
 

@@ -22,15 +22,16 @@ class PixelRays {
 
   const Lens& lens() const { return lens_; }
   Readout readout() const { return readout_; }
-  /// Size of the image in readout order, without the margin.
+  /// Number of lines of the image, without the margin: its height in pixels for Readout::rows, its
+  /// width for Readout::columns.
   int lines() const { return lines_; }
   int pixels_per_line() const { return places_; }
   /// Width of the margin on each side.
   int margin_px() const { return margin_px_; }
 
-  /// Returns the ray through the corner between the pixels (line - 1, place - 1) and (line, place),
-  /// in the camera frame, not normalized. Valid for line and place from -margin to count + margin.
-  /// NaN where the lens has no ray.
+  /// Returns the ray through the common corner of the pixels (line - 1, place - 1) and (line,
+  /// place), in the camera frame, not normalized. Valid for line and place from -margin to count +
+  /// margin. NaN if the lens has no ray there.
   const Eigen::Vector3d& pixel_corner_ray(int line, int place) const {
     return corners_[static_cast<std::size_t>(line + margin_px_) * stride_ +
                     static_cast<std::size_t>(place + margin_px_)];

@@ -20,7 +20,8 @@ struct PixelWindow {
   cv::Mat1f make_constant_image(float value) const {
     return cv::Mat1f(line_end - line_begin, place_end - place_begin, value);
   }
-  /// Returns the window's part of an image that has a margin of margin_px
+  /// Returns the part of `image` inside this window; it shares the pixels. `image` covers the whole
+  /// image of the camera with a margin of margin_px on each side
   /// (PixelRays::make_constant_image()).
   cv::Mat1f crop_to_window(const cv::Mat1f& image, int margin_px) const {
     return image(cv::Rect(place_begin + margin_px, line_begin + margin_px, place_end - place_begin,

@@ -13,7 +13,8 @@ namespace vlp {
 /// outside. The veil is not included, as it extends over the whole image.
 int compute_blur_radius_px(const Optics& optics);
 
-/// Position and resolution of a part of an image, lines x places, to be blurred.
+/// Position and resolution of a part of the camera's image that is to be blurred. The part is in
+/// readout order: lines x places.
 struct SpreadWindow {
   /// Line and place of its first pixel.
   int line_begin, place_begin;

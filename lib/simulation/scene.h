@@ -26,7 +26,7 @@ namespace vlp {
 /// machine.
 cv::RNG make_seeded_generator(std::uint64_t seed, std::string_view name, std::size_t index);
 
-/// Draws a seed of 64 bits.
+/// Draws a random number of 64 bits from `random`, for use as the seed of another generator.
 std::uint64_t draw_random_seed(cv::RNG& random);
 
 /// Square wave that switches a lamp: lit while frac(frequency t + phase) < duty.

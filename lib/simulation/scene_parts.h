@@ -13,14 +13,15 @@
 /// Readers of the parts of a scene file. Each throws InputError.
 namespace vlp {
 
-/// Bounds of the room in the world.
+/// Axis-aligned bounds of the room: smallest and largest x, y, z in the world, m.
 struct Room {
   Eigen::Vector3d min_m, max_m;
 };
 
 Eigen::Vector3d read_yaml_point(const YamlValue& value);
 double read_electron_rate(YamlMap& map, const std::string& key);
-/// Reads two ascending numbers [least, most] within min and max.
+/// Reads a list of two ascending numbers [min, max]. Throws InputError if one of them is outside
+/// `min` to `max`.
 std::pair<double, double> read_yaml_range(const YamlValue& value, double min, double max,
                                           std::string_view unit);
 /// Read lamps, or other objects; lights are checked to be inside the room.

@@ -17,7 +17,7 @@ struct Rectangle {
   double value;
 };
 
-/// Piecewise constant function of rectangles; 0 outside.
+/// Flat pattern of rectangles with constant values, in m; the value is 0 outside all rectangles.
 class Mosaic {
  public:
   /// Later rectangles cover earlier ones. Edges closer than 1 nm are merged.

@@ -19,8 +19,10 @@ struct Shutter {
   int lines;
   int index = 0, count = 1;
 
-  /// Returns the middle of the whole exposure. Lines may be fractional or outside the image.
+  /// Returns the time of the middle of a line's exposure, s, relative to that of the middle line.
+  /// `line` counts from 0 and may be fractional or outside the image.
   double exposure_center_s(double line) const { return (line - (lines - 1) / 2.0) * row_time_s; }
+  /// Returns the begin of part `index` of a line's exposure, s, on the same time scale.
   double begin_s(int line) const {
     return exposure_center_s(line) + (double(index) / count - 0.5) * exposure_s;
   }

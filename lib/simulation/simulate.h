@@ -15,7 +15,7 @@ namespace vlp {
 
 /// Options of simulate().
 struct SimulationOptions {
-  /// Folders to render; all folders of the scene if empty.
+  /// Names of the folders of the scene to render. Empty: all folders of the scene.
   std::vector<std::string> folders;
   int threads = 1;
   /// Provenance of the output, written as its scene.yaml. It has to be identical when an
@@ -33,8 +33,8 @@ std::string make_simulation_provenance(const std::filesystem::path& scene,
 
 /// Counts and warnings of a simulation.
 struct SimulationSummary {
-  /// Warnings about useless captures: find_scene_warnings() each folder, and captures without a
-  /// lamp or corner in view.
+  /// Warnings about useless captures, one line each: find_scene_warnings() for each folder, and
+  /// captures without a lamp or corner in view.
   std::vector<std::string> warnings;
   std::size_t rendered = 0;
   /// Number of complete images that existed from an earlier execution.

@@ -16,7 +16,8 @@ namespace vlp {
 /// Lamp as it appears in a capture.
 struct TrueLamp {
   int id;
-  /// Pixel of the lamp's center when that pixel's line is exposed.
+  /// Pixel (u, v) of the lamp's center, with the camera at its pose when the line of that pixel is
+  /// exposed.
   Eigen::Vector2d pixel;
   /// Fraction of the lamp that is inside the image and not hidden, from some 200 points spread over
   /// it.
@@ -69,8 +70,8 @@ LampMap make_lamp_map(const Scene& scene, bool surveyed);
 
 /// Writes the ground truth of a set into `folder`.
 ///   Lamps: truth.csv, true_detections.csv (with the fraction in view), captures.csv and, for a
-///   scene with mirrors or foreign lights, find_true_other_lights.csv.
-///   Boards: find_true_corners.csv and true_boards.csv (camera_from_board as a position in meters
+///   scene with mirrors or foreign lights, true_other_lights.csv.
+///   Boards: true_corners.csv and true_boards.csv (camera_from_board as a position in meters
 ///   and a rotation vector in radians).
 /// Returns the number of captures without a lamp, or without a corner, in view.
 /// @throws InputError if a file cannot be written
