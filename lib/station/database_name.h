@@ -10,8 +10,9 @@ namespace vlp {
 /// file.
 bool is_server_address(const std::string& where);
 
-/// Returns true if the address of a server contains a password. Returns false for a file, for a
-/// connection string of keywords, and for an address that libpq cannot parse.
+/// Returns true if `where` is a server address (postgresql://...) that contains a password. Returns
+/// false for a file, for a connection string of keywords, and for an address that libpq cannot
+/// parse.
 bool contains_password(const std::string& where);
 
 /// Returns the name of a database for messages. A server is named without user and passwords,

@@ -18,7 +18,8 @@ namespace vlp {
 /// Completion criteria of the steps.
 struct CompletionCriteria {
   int board_views = 36;
-  /// Fraction of the 8 x 6 cells of the image in which the views have corners.
+  /// Required fraction, 0 to 1, of 8 x 6 equal cells of the image that contain corners of the board
+  /// in at least one view.
   double board_coverage = 0.6;
   /// Number of captures at each height of the rotation, number of heights, and angular range
   /// covered at each height.

@@ -12,8 +12,8 @@ namespace vlp {
 /// Creates a folder of a station if it does not exist. Throws InputError.
 void make_folder(const std::filesystem::path& folder);
 
-/// Checks that a folder is writable and has `bytes` of free space, before a unit is started. Throws
-/// InputError.
+/// Checks, before a unit is started, that a folder is writable and has `bytes` bytes of free space.
+/// @throws InputError if it is not writable or has less space
 void check_free_space(const SharedFolder& folder, std::uintmax_t bytes);
 
 }  // namespace vlp

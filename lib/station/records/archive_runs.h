@@ -12,7 +12,8 @@ namespace vlp {
 
 /// Session of an archive as a run, so that trends, capability and studies can use archives.
 struct ReprocessedSession {
-  /// The run without its metrics and its calibration.
+  /// Record of the session as a run: ids, dates, program, verdict and causes. It has no metrics and
+  /// no calibration; load_archive_run() adds these.
   RunRecord run;
   /// Folder of the files that vlp-calibrate wrote.
   std::filesystem::path folder;

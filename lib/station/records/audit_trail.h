@@ -26,8 +26,8 @@ namespace vlp {
 /// existing digest: removing the last entries with their runs, and rewriting all entries. They are
 /// detected by a last digest that was stored elsewhere.
 
-/// Locks the trail for this program until the end of its transaction. Slow work should be done
-/// before.
+/// Locks the audit trail against writing by other programs, until the current transaction of `sql`
+/// ends. Waits for a lock of another program. Do slow work before the call.
 void lock_audit_trail(soci::session& sql);
 /// Locks the trail and appends the entries of new events of a run, after that of the run itself if
 /// `is_new_run`.

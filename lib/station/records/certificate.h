@@ -18,8 +18,10 @@ struct CertifiedValue {
   std::optional<double> standard_uncertainty;
 };
 
-/// Returns the values that a calibration contains, each along x and y: focal length, principal
-/// point, rotation center, zenith, lever arm, dispersion offset.
+/// Returns the values of a calibration for a certificate, with standard uncertainties if known. The
+/// values are focal length, principal point, rotation center, zenith, lever arm and dispersion
+/// offset. Each has two entries, along x and y. Lengths in the image are in px, the zenith is in
+/// degrees, the lever arm in mm.
 ///
 /// The uncertainties are estimated from the scatter of the captures. Those of zenith and dispersion
 /// include the contributions of the earlier steps. The board is assumed exact unless it has

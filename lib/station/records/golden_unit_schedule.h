@@ -18,7 +18,8 @@ namespace vlp {
 /// Format, comments, order and names of files do not change it.
 std::string compute_measurement_settings_digest(const StationConfig& config);
 
-/// Time at which describe_golden_unit_problem() is called.
+/// Time at which the state of the golden unit is checked (describe_golden_unit_problem()): at the
+/// first image of a unit, or at its verdict.
 enum class GoldenCheckTime { first_image, verdict };
 
 /// Returns the human-readable reason why no unit may pass now; empty if units may. Always empty

@@ -15,8 +15,8 @@ namespace vlp {
 /// hooks that did not finish.
 RunEvent make_hook_requested_event(const Hook& hook, const std::string& operator_name);
 
-/// Returns true if a hook was requested for a run, at its verdict or when it was voided, and has
-/// not succeeded since.
+/// Returns true if a hook of the run still has to run: it was requested at the verdict or at the
+/// voiding, and has not succeeded since. Decided from the events of the record.
 bool is_hook_pending(const RunRecord& record);
 /// Returns the human-readable reason why a hook is open, in one line; empty if it is not open.
 std::string describe_pending_hook(const RunRecord& record);

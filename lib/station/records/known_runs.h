@@ -25,8 +25,8 @@ class RecordsUnavailable : public std::runtime_error {
   std::string details;
 };
 
-/// Runs of the records and, for a station, runs that wait in its spool. The constructor of a
-/// station delivers waiting runs first.
+/// All runs that are known: those of the records (database) and, for a station, those that wait in
+/// its spool. The constructor for a station first delivers waiting runs to the records.
 class KnownRuns {
  public:
   /// Opens the runs of a station. Throws RecordsUnavailable if its records are offline and no run

@@ -16,8 +16,9 @@ namespace vlp {
 /// writes a file, and checks the free space. Throws InputError.
 void check_results_folder(const std::filesystem::path& results, const std::string& camera);
 
-/// Returns the file name of a run's calibration, by its verdict: calibration.yaml,
-/// failed-calibration.yaml, invalid-calibration.yaml, or voided-calibration.yaml.
+/// Returns the file name under which the calibration of a run is published. By its verdict it is
+/// calibration.yaml (PASS), failed-calibration.yaml (FAIL) or invalid-calibration.yaml (INVALID). A
+/// voided run has voided-calibration.yaml.
 const char* calibration_file_name(const RunRecord& record);
 
 /// Renames calibration, report and certificate in RESULTS/CAMERA/RUN/ to voided-calibration.yaml,

@@ -14,7 +14,8 @@ namespace vlp {
 /// Current version of the tables, the number of migrations plus one, stored in vlp_schema.
 extern const int kSchemaVersion;
 
-/// Returns true if the tables have the version kSchemaVersion. Takes no lock. Throws as
+/// Returns true if the tables in the database have the version kSchemaVersion of this program.
+/// Takes no lock, so that users without write permission can call it. Throws as
 /// create_record_tables().
 bool has_current_schema_version(soci::session& sql);
 

@@ -18,7 +18,7 @@ namespace vlp {
 /// Selection of runs. Empty members do not restrict it.
 struct RunFilter {
   std::string camera = {}, station = {}, verdict = {}, kind = {};
-  /// Required operator and shift; empty: any.
+  /// Exact names of the operator and of the shift of a selected run; empty: any.
   std::string operator_name = {}, shift = {};
   /// End of the run: at or after `since`, and before `until`, UTC, as 2026-11-21 or
   /// 2026-11-21T13:45.

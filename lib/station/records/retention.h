@@ -15,7 +15,8 @@ namespace vlp {
 /// Folder of a run whose retention time has expired.
 struct ExpiredFolder {
   std::filesystem::path folder;
-  /// Event after its deletion: kImagesDeleted or kResultsDeleted.
+  /// Kind of the event that is added to the run after the deletion of the folder: kImagesDeleted or
+  /// kResultsDeleted.
   const char* what;
   /// Retention time, days.
   int days;

@@ -16,10 +16,10 @@ struct SpooledRun {
   std::string records;
 };
 
-/// Serializes a run as `vlp-run/1`: a JSON object with "records", the texts of
-/// list_run_text_fields(), "figures", "images" and "events". Figures with a guard band have
-/// "uncertainty" and "guard_k". Control characters and bytes that are not UTF-8 are escaped
-/// (escape_run_texts()).
+/// Serializes a run as JSON text in format `vlp-run/1`. The object has "records" (identity of its
+/// database), the texts of list_run_text_fields(), "figures" (metrics), "images" and "events".
+/// Figures with a guard band have "uncertainty" and "guard_k". Control characters and bytes that
+/// are not UTF-8 are escaped (escape_run_texts()).
 std::string serialize_run(const SpooledRun& spooled);
 /// Reads a run in the format of serialize_run(). A missing text of list_run_text_fields() is empty,
 /// as in files of older programs. Throws InputError with the file, also if it has no verdict, or if

@@ -18,8 +18,9 @@ namespace vlp {
 
 /// Result of a run.
 enum class Verdict {
+  /// The camera was measured and meets all limits.
   pass,
-  /// The camera was measured and does not meet the limits.
+  /// The camera was measured and fails at least one limit of its own.
   fail,
   /// The camera was not evaluated, because of the station, the operator or an aborted run. The run
   /// counts neither for the yield nor for trends and has to be repeated.

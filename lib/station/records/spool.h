@@ -29,8 +29,10 @@ namespace vlp {
 /// contacted for a minute, so that a unit waits for them once.
 class Spool {
  public:
-  /// Opens a spool. The folder is created when needed, and nothing is contacted yet. `records` is
-  /// as in Records. Throws InputError if it is no connection string.
+  /// Opens a spool, without access to folder or records.
+  /// @param folder   folder of the waiting runs; created when the first run is stored
+  /// @param records  database of the runs: SQLite file or postgresql:// address
+  /// @throws InputError if `records` is an invalid connection string
   Spool(std::filesystem::path folder, std::string records);
   ~Spool();
   Spool(const Spool&) = delete;

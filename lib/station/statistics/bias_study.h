@@ -16,11 +16,12 @@ struct ReferenceValue {
   double reference, value;
 };
 
-/// Estimate with a t-test against 0.
+/// Estimated value with its standard error and t-test against 0. All but `dof`, `t` and `p` are in
+/// the unit of the value.
 ///
 ///   t = value / standard_error,   p = P(|T| > |t|) with `dof` degrees of freedom
 ///
-/// `low` to `high` is the 95 % interval. Without scatter p is 0, or 1 for a value of 0.
+/// `low` to `high` is the 95 % confidence interval. Without scatter p is 0, or 1 for a value of 0.
 struct EstimateTest {
   double value = 0, standard_error = 0, dof = 0, t = 0, p = 1, low = 0, high = 0;
 

@@ -13,7 +13,7 @@ struct ToleranceLimits {
   std::optional<double> lower, upper;
 };
 
-/// Capability index with its 95 % interval.
+/// Capability index such as Cpk, dimensionless, with its 95 % confidence interval `low` to `high`.
 struct CapabilityIndex {
   double value, low, high;
 };

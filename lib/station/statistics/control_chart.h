@@ -20,7 +20,8 @@ struct ControlChart {
   double mean = 0, sigma = 0, lower = 0, upper = 0;
 };
 
-/// Computes the chart of `values`. The limits equal the mean for fewer than two values.
+/// Computes mean, sigma and limits of an individuals chart (ControlChart) of `values`, in
+/// chronological order. Sigma is 0 for fewer than two values, so that the limits equal the mean.
 ControlChart compute_control_chart(std::span<const double> values);
 
 /// Pattern that is improbable for values with random variation only. It refers to a value and its

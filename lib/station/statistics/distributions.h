@@ -9,7 +9,8 @@ namespace vlp {
 /// Computes the mean; exactly the common value if all values are equal. Precondition: not empty.
 double compute_mean(std::span<const double> values);
 
-/// Returns the quantile of chi squared. Precondition: 0 < probability < 1, dof > 0.
+/// Returns the quantile of the chi-squared distribution: the x with P(X <= x) = `probability` for
+/// `dof` degrees of freedom. Precondition: 0 < probability < 1, dof > 0.
 double chi_square_quantile(double probability, double dof);
 
 /// Returns P(X > x) of Fisher's F. Precondition: x >= 0 and finite, both degrees of freedom > 0.

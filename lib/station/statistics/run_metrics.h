@@ -17,8 +17,9 @@
 /// Input of trends, capability and studies: a metric over runs, with its gate.
 namespace vlp {
 
-/// Returns the metrics of runs: list_unit_metrics(), and the metrics of errors of fixes in sessions
-/// of archives (archive_runs.h).
+/// Returns the kinds of all metrics that runs can have: those of units at a station
+/// (list_unit_metrics()), followed by the errors of fixes, which sessions of archives have
+/// (archive_runs.h).
 std::vector<MetricKind> list_run_metrics();
 /// Returns the metric of this name. Throws std::invalid_argument that lists the valid names.
 MetricKind find_run_metric(const std::string& name);

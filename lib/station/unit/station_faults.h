@@ -24,8 +24,8 @@ std::vector<std::string> describe_lamp_faults(std::span<const Frame> frames, con
                                               const Calibration& calibration,
                                               double min_offset_px = 2.5);
 
-/// Describes the lamps of the map that no capture contains, one line each. Returns an empty list
-/// for fewer than three captures.
+/// Returns a message for each lamp of the map that no frame contains, one line each. Empty if all
+/// lamps were detected, and for fewer than three frames.
 std::vector<std::string> describe_missing_lamps(std::span<const Frame> frames, const LampMap& map);
 
 /// Describes captures at other places than in their table, or by another camera

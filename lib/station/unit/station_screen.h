@@ -13,7 +13,7 @@ namespace vlp {
 /// Style of a line on terminals with color.
 enum class Tone { plain, heading, good, bad };
 
-/// A line of at most 80 columns of ASCII.
+/// Line of the operator's screen: text of at most 80 ASCII characters, and style.
 struct ScreenLine {
   std::string text;
   Tone tone = Tone::plain;

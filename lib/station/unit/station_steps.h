@@ -16,8 +16,11 @@
 /// of the station. Each step uses the calibration of the step before; the caller adds the history.
 namespace vlp {
 
-/// Calibrates the lens. Further metrics: focal_percent, principal_point_px and
-/// nominal_difference_px against the nominal lens, and board_warp_mm.
+/// Calibrates the lens from the observations of the board (run_lens_step()), with the board and
+/// lens model of the station.
+///
+/// Adds the metrics focal_percent, principal_point_px and nominal_difference_px (differences from
+/// the nominal lens of the camera type), and board_warp_mm.
 StepResult run_board_step(const StationConfig& config, const std::string& camera_id,
                           Observations seen);
 

@@ -18,8 +18,9 @@ namespace vlp {
 /// Frames of a camera or a video, written as images to a folder.
 class FrameSource {
  public:
-  /// Opens a camera or a video. Frames of `imager_px` are requested from a camera. Throws
-  /// InputError if it cannot be opened.
+  /// Opens a source of frames: a camera (/dev/video0), a video file or a URL. Frames of `imager_px`
+  /// (width, height) are requested from a camera.
+  /// @throws InputError if it cannot be opened
   FrameSource(const std::string& source, const std::array<int, 2>& imager_px)
       : source_(source), video_(source, imager_px) {}
 

@@ -28,7 +28,10 @@ namespace vlp {
 /// images are used: more images than required, and two redundant images.
 class Unit {
  public:
-  /// Precondition: `config` outlives the unit.
+  /// Starts the processing of a unit without images.
+  /// @param config   configuration of the station; must outlive the unit
+  /// @param program  program and version for the history of the calibration
+  /// @param threads  maximum number of threads
   Unit(const StationConfig& config, std::string camera_id, ProgramVersion program, int threads);
   Unit(const Unit&) = delete;
   Unit& operator=(const Unit&) = delete;

@@ -14,8 +14,10 @@ namespace vlp {
 /// Makes the record of a unit's run that ends now, under the run's name `run`.
 RunRecord make_unit_record(const Unit& unit, const std::string& run, const ProgramVersion& program);
 
-/// Makes a judged run of a unit INVALID because `earlier`, another judged run of the unit, used all
-/// of its images: it would count twice. The caller has compared the images.
+/// Makes the verdict of a run INVALID because its images are those of an earlier judged run of the
+/// unit. The run would otherwise count twice. The caller has compared the images.
+/// @param earlier       id of the earlier run, for the message
+/// @param station_file  path of station.yaml, for the command in the message
 void reject_reused_images(RunRecord& record, const std::string& earlier,
                           const std::filesystem::path& station_file);
 

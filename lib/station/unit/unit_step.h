@@ -32,7 +32,8 @@ constexpr const char* to_string(StationStep step) {
   return names[static_cast<std::size_t>(step)];
 }
 
-/// Plot for the unit's report, rendered asynchronously; std::nullopt if it could not be rendered.
+/// Plot of a step for the unit's report, which another thread renders. get() waits for it and
+/// returns std::nullopt if it could not be rendered.
 using StepPlot = std::shared_future<std::optional<ReportPlot>>;
 
 /// Makes and renders a drawing on its own thread, while the unit continues, because gnuplot would

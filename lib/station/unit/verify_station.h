@@ -19,16 +19,20 @@ struct VerificationResult {
   std::vector<ReportPlot> pictures;
 };
 
-/// Verifies the station with its golden unit, a camera of known calibration, from the images in
-/// FOLDER/check/ and, if they exist, FOLDER/dispersion/ and FOLDER/boards/.
+/// Verifies the station with its golden unit, a camera of known calibration, and returns record and
+/// plots. Images are read from FOLDER/check/ and, if they exist, FOLDER/dispersion/ and
+/// FOLDER/boards/.
 ///
-/// The lens that the boards give is compared with the known one (principal_point_px,
-/// focal_percent, nominal_difference_px). A difference shows that the board has changed. Fixes use
-/// the known calibration; their errors show that lamps or known points have moved. FAIL here refers
-/// to the station, and INVALID means that the golden unit was not measured.
+/// @param folder   FOLDER
+/// @param run      id of the run, from make_run_id() before the measurement
+/// @param threads  maximum number of threads
+/// @throws InputError without images
+/// @pre the configuration has a golden unit
 ///
-/// `run` is a make_run_id() from before the measurement. Throws InputError without images.
-/// Precondition: the configuration has a golden unit.
+/// The lens that the boards give is compared with the known one (principal_point_px, focal_percent,
+/// nominal_difference_px). A difference shows that the board has changed. Fixes use the known
+/// calibration; their errors show that lamps or known points have moved. FAIL here refers to the
+/// station, and INVALID means that the golden unit was not measured.
 VerificationResult verify_station(const StationConfig& config, const std::filesystem::path& folder,
                                   const std::string& run, const ProgramVersion& program,
                                   int threads);

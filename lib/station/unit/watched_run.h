@@ -22,8 +22,10 @@ class WatchedFolder {
   explicit WatchedFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   struct Changes {
-    /// New images, by name. An overwritten image is new again.
+    /// Paths of the images that are new since the last call, sorted by name. An image that was
+    /// overwritten is new again.
     std::vector<std::filesystem::path> added;
+    /// Names of the images that were deleted since the last call.
     std::vector<std::string> gone;
   };
   /// Returns the changes since the last call. An image is new if file, size and time are the same
