@@ -20,7 +20,8 @@ struct BoardPose {
 
 /// Lens, board and poses of the board in all views, with the measured points, in the formulation of
 /// mrcal (mrcal documentation, "Formulation"). The board is a lattice of cols x rows points at
-/// spacing_m in x and y. Its warp, in m, is
+/// spacing_m in x and y. A board in four parts (BoardLattice) counts as four boards, each with
+/// poses of its own. The warp, in m, is
 ///   z = warp_m.x (1 - (2 i / (cols - 1) - 1)^2) + warp_m.y (1 - (2 j / (rows - 1) - 1)^2)
 /// at column i and row j.
 struct BoardProblem {

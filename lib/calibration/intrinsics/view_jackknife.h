@@ -9,10 +9,11 @@
 namespace vlp {
 
 /// Estimates the covariance of the intrinsics, in the order of the lens model, by leaving out one
-/// view at a time (Efron, "The Jackknife, the Bootstrap and Other Resampling Plans", 1982):
+/// view at a time:
 ///   (n - 1) / n sum over views (d_v - mean d) (d_v - mean d)'
 ///   n    number of views
 ///   d_v  change of the intrinsics without view v, to first order; poses and warp change with them
+/// Source: Efron, "The Jackknife, the Bootstrap and Other Resampling Plans", 1982.
 ///
 /// @return infinite elements if the remaining views do not determine a lens
 /// @pre solution.ok()
