@@ -39,7 +39,7 @@ std::optional<Eigen::Vector2d> find_saddle_point(const cv::Mat1f& smoothed,
 /// @param along      approximate directions of the edges in the image, of any length
 /// @param radius_px  radius of the pixels around guess_px; they should show only the two squares
 /// @return           pixel (u, v) of the corner; std::nullopt for fewer than 16 pixels, if the
-///     pixels do not match the model, or if the corner is more than 1.5 px from the guess
+///     pixels do not match the model, or if the corner is over 1.5 px from the guess
 ///
 ///   gray = (middle + contrast step(d1) step(d2)) (1 + light . (x - corner))
 ///   d1, d2  distances from two parabolas through the corner, because the lens bends the edges
