@@ -28,8 +28,7 @@ namespace vlp {
 ///
 /// @param squares             squared residuals, not empty, in any unit squared
 /// @param degrees_of_freedom  number of residuals minus number of unknowns; at least 1 is assumed
-/// @return                    variance, in the unit of `squares`; exact on average for normal
-///     errors
+/// @return                    variance, in the unit of `squares`; consistent for normal errors
 inline double estimate_robust_variance_1d(std::vector<double> squares, double degrees_of_freedom) {
   assert(!squares.empty());
   constexpr double median_of_unit_variance = 0.454936;  // 0.67449^2
