@@ -18,14 +18,15 @@ struct IdOrder {
   BoardCorner from;
 };
 
-/// Returns the name of an order in YAML.
+/// Returns the name of an order in YAML, for example "row-major-from-bottom-left".
 std::string to_string(const IdOrder& order);
 
 /// Pattern of a board: AprilTags in rows; black and white squares; squares with an ArUco marker in
 /// each white square, as OpenCV's CharucoBoard. In YAML: "apriltags", "chessboard", "charuco".
 enum class BoardKind { apriltags, chessboard, charuco };
 
-/// A printed board, flat and upright.
+/// Printed calibration board: its pattern and dimensions, seen flat and upright. Boards of squares
+/// use square_size_m instead of tag_spacing, border_bits and corner_squares.
 struct Board {
   /// AprilTag family, for example "tag36h11". ChArUco boards: OpenCV's dictionary, for example
   /// "DICT_5X5_100".
@@ -33,14 +34,15 @@ struct Board {
   /// Number of tags, or of squares, along the board's width and height.
   int cols;
   int rows;
-  /// Edge length of a tag's black border, or of a ChArUco board's marker.
+  /// Edge length of a tag's square with its black border, or of a ChArUco board's marker.
   double tag_size_m;
-  /// Gap between tags / tag size.
+  /// Ratio of the gap between neighboring tags to tag_size_m.
   double tag_spacing;
-  /// 1, or 2 for Kalibr's boards.
+  /// Width of a tag's black border, in bits: 1, or 2 for the boards of Kalibr.
   int border_bits;
   /// True if black squares touch the corners of the tags (Kalibr's boards).
   bool corner_squares;
+  /// Smallest tag id of the board; the others follow without gaps.
   int first_id;
   IdOrder id_order;
   BoardKind kind = BoardKind::apriltags;

@@ -25,11 +25,14 @@ struct Camera {
   /// Width and height of the image, px.
   std::array<int, 2> imager_px;
   LensModel lens_model;
-  /// Parameters in mrcal's order, see LensModel.
+  /// Parameters of the lens model in mrcal's order: fx fy cx cy, px, then the distortions
+  /// (LensModel).
   std::vector<double> intrinsics;
+  /// Distance between the centers of neighboring pixels on the imager.
   std::optional<double> pixel_pitch_m;
   /// Time from the readout of a row (or column) to that of the next; also called line delay.
   std::optional<double> row_time_s;
+  /// Readout direction of the rolling shutter; std::nullopt if unknown.
   std::optional<Readout> readout;
 
   /// fx, fy and cx, cy: the first four intrinsics of every lens model.
@@ -37,8 +40,8 @@ struct Camera {
   Eigen::Vector2d principal_point_px() const { return {intrinsics[2], intrinsics[3]}; }
 };
 
-/// Quality of the intrinsic calibration. A lens from another program has no views, and only the
-/// region is known.
+/// Quality of the intrinsic calibration: numbers of views, used corners and outliers, residual,
+/// covariance. A lens from another program has no views, and only the region is known.
 struct IntrinsicsReport {
   int views;
   int corners;
@@ -47,10 +50,11 @@ struct IntrinsicsReport {
   /// solver normalizes its weights (CornerWeights) so that the result is the residual in px. The
   /// weights of a table of corners are used unchanged and determine the scale of the result.
   double rms_px;
-  /// Deflection of the board's center from flat along x and y (mrcal's calobject_warp).
+  /// Deflection of the board's center from flat along x and y of the board, m (mrcal's
+  /// calobject_warp); std::nullopt if it was not estimated.
   std::optional<std::array<double, 2>> board_warp_m;
-  /// Expected maximum error of a projection over the region. Infinite if the lens has no ray there;
-  /// infinity is not written to files.
+  /// Expected maximum error of a projection over the region (CalibrationReport). Infinite if the
+  /// lens has no ray there; infinity is not written to files.
   std::optional<double> expected_max_error_px;
   /// Covariance of the intrinsics, in their order. Splined lenses: none, or only fx, fy, cx, cy.
   /// The same applies to all derivatives by the intrinsics below.
@@ -66,13 +70,14 @@ enum class RotationModel { shift, tilt };
 
 /// Result of the calibration of tilt and axis of rotation.
 struct RotationCenter {
-  /// Model that applies the center.
+  /// Model by which fixes apply the rotation center.
   RotationModel model;
-  /// Intersection of the axis of rotation with the undistorted image: f * (x/z, y/z) + c.
+  /// Intersection of the axis of rotation with the undistorted image, px: f * (x/z, y/z) + c for
+  /// the zenith (x, y, z).
   Eigen::Vector2d center_px;
   /// Up direction in the camera frame, unit length.
   Eigen::Vector3d zenith_in_camera;
-  /// Covariance of center_px in px^2.
+  /// Covariance of center_px in px^2, from the captures alone; std::nullopt if unknown.
   std::optional<Matrix2> covariance = {};
   /// Vector from the axis of rotation to the camera, x and y in the level frame, and its covariance
   /// in m^2. Fixes are of the camera with or without it. If the robot's center is on the axis and
@@ -89,7 +94,8 @@ struct RotationCenter {
   std::optional<MatrixX> lever_arm_by_intrinsics = {};
 };
 
-/// The dispersion calibration (Chen and Guan, section 3.2).
+/// Result of the dispersion calibration (Chen and Guan, section 3.2): remaining error of fixes that
+/// rotates with the camera.
 struct Dispersion {
   /// Residual error of the principal point after the rotation center is applied. f * (x/z, y/z) in
   /// the undistorted image of the level camera is too large by this offset.
@@ -105,7 +111,7 @@ struct Dispersion {
   /// Derivatives of offset_px / f by the intrinsics and by the zenith's normalized point.
   std::optional<MatrixX> by_intrinsics = {};
   std::optional<Matrix2> by_zenith = {};
-  /// A lamp whose surveyed position affects the offset.
+  /// Lamp whose surveyed position affects the offset, with the derivative.
   struct UncertainLamp {
     int id;
     /// Position and standard deviation per axis in the map of the calibration.
@@ -133,7 +139,7 @@ struct Adjustment {
   std::vector<std::string> sets;
   int captures;
   int detections;
-  /// RMS residual of the detections, per axis.
+  /// RMS residual of the detections per image axis.
   double residual_px;
 };
 
@@ -141,7 +147,7 @@ struct Adjustment {
 /// zenith_y, lever_arm_x_m, lever_arm_y_m, lamp_ID_x_m ...
 std::vector<std::string> parameter_names(const Camera& camera, const Adjustment& adjustment);
 
-/// Provenance of a part of a calibration.
+/// Provenance of a part of a calibration: program, options and digests of the input files.
 struct HistoryEntry {
   /// Key of the part: "camera", "rotation_center", "dispersion", "adjustment".
   std::string part;
@@ -155,7 +161,8 @@ struct HistoryEntry {
   std::vector<Input> inputs;
 };
 
-/// Calibration of a camera; each step adds a part.
+/// Calibration of a camera: content of calibration.yaml. Each calibration step adds or replaces a
+/// part; missing parts are std::nullopt.
 struct Calibration {
   Camera camera;
   std::optional<IntrinsicsReport> intrinsics_report;

@@ -19,16 +19,17 @@ namespace vlp {
 Calibration make_calibration_with_camera(Camera camera, std::optional<IntrinsicsReport> report,
                                          HistoryEntry entry);
 
-/// Sets the rotation center, and removes dispersion and adjustment.
+/// Returns the calibration with this rotation center and `entry` in its history. Dispersion and
+/// adjustment are removed, because they depend on the old one.
 Calibration with_rotation_center(Calibration calibration, const RotationCenter& rotation_center,
                                  HistoryEntry entry);
 
-/// Sets rotation center and adjustment, and removes the dispersion. `calibration` has the adjusted
-/// camera and keeps its intrinsics_report.
+/// Returns the calibration with this rotation center, adjustment and history entry. The dispersion
+/// is removed. `calibration` has the adjusted camera and keeps its intrinsics_report.
 Calibration with_adjustment(Calibration calibration, const RotationCenter& rotation_center,
                             Adjustment adjustment, HistoryEntry entry);
 
-/// Sets the dispersion.
+/// Returns the calibration with this dispersion and `entry` in its history.
 Calibration with_dispersion(Calibration calibration, const Dispersion& dispersion,
                             HistoryEntry entry);
 

@@ -17,20 +17,21 @@ namespace vlp {
 /// IntrinsicsReport::expected_max_error_px.
 Eigen::Index count_intrinsics_with_covariance(const Camera& camera);
 
-/// Returns the normalized point of the zenith.
+/// Returns the normalized point (x/z, y/z) of the zenith in the camera frame.
 Eigen::Vector2d normalized_zenith_point(const RotationCenter& center);
 
-/// Adds an error to the count_intrinsics_with_covariance(). The zenith does not change; center_px
-/// is updated. The lever arm changes by its derivative by the intrinsics, without the part through
-/// the zenith.
+/// Returns the calibration with `error` added to its first count_intrinsics_with_covariance()
+/// intrinsics. The zenith does not change; center_px is updated. The lever arm changes by its
+/// derivative by the intrinsics, without the part through the zenith.
 Calibration with_lens_error(Calibration calibration, const Eigen::VectorXd& error);
 
-/// Adds an error to the zenith's normalized point. center_px and the correlated lever arm are
-/// updated.
+/// Returns the calibration with `error` added to the zenith's normalized point (x/z, y/z).
+/// center_px and the correlated lever arm are updated.
 /// @pre there is a rotation center
 Calibration with_zenith_error(Calibration calibration, const Eigen::Vector2d& error);
 
-/// Adds an error to offset_px / f.
+/// Returns the calibration with `error` added to offset_px / f, the dispersion offset in focal
+/// lengths.
 /// @pre there is a dispersion
 Calibration with_offset_error(Calibration calibration, const Eigen::Vector2d& error);
 

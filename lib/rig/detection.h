@@ -13,9 +13,9 @@ inline constexpr double kMaxSigma_px = 1e3;
 
 /// Lamp that was detected and identified in one image.
 struct Detection {
-  /// Id in the lamp map.
+  /// Id of the lamp in the lamp map.
   int lamp;
-  /// Image of the lamp's center; the center of the top left pixel is (0, 0).
+  /// Pixel (u, v) of the lamp's center; the center of the top left pixel is (0, 0).
   Eigen::Vector2d pixel;
   /// Standard deviation of `pixel` per axis, from kMinSigma_px to kMaxSigma_px; std::nullopt if the
   /// detector does not report it.

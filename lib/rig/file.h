@@ -18,7 +18,7 @@ class InputFile {
   /// @throws InputError if the file cannot be opened or has more than `max_bytes`; also if it is a
   ///     folder, a device or a pipe other than this process's streams
   [[gnu::visibility("hidden")]] InputFile(const std::filesystem::path& path, std::size_t max_bytes);
-  /// Reads an open regular file, whose descriptor it closes. `path` is its name in messages.
+  /// Takes an open regular file, whose descriptor it closes. `path` is its name in messages.
   [[gnu::visibility("hidden")]] InputFile(const std::filesystem::path& path, int descriptor,
                                           std::size_t max_bytes);
   [[gnu::visibility("hidden")]] ~InputFile();
@@ -37,11 +37,11 @@ class InputFile {
   int descriptor_;
 };
 
-/// Reads an entire file. Throws InputError as InputFile.
+/// Returns the content of a file. Throws InputError as InputFile.
 [[gnu::visibility("hidden")]] std::string read_file(const std::filesystem::path& path,
                                                     std::size_t max_bytes);
 
-/// Reads the rest of an open file.
+/// Returns the content of an open file from the current position to the end.
 [[gnu::visibility("hidden")]] std::string read_file(InputFile& file);
 
 /// Reads a text file by read_file(). Throws InputError also if it is empty or has control
@@ -73,7 +73,7 @@ class AtomicFileWriter {
   /// failure the file may be truncated, which its reader must detect.
   [[gnu::visibility("hidden")]] void save_without_fsync();
 
-  /// Without save_file(), `path` is unchanged.
+  /// Removes the temporary file. Without save_file() or save_without_fsync(), `path` is unchanged.
   [[gnu::visibility("hidden")]] ~AtomicFileWriter();
   AtomicFileWriter(const AtomicFileWriter&) = delete;
   AtomicFileWriter& operator=(const AtomicFileWriter&) = delete;

@@ -12,7 +12,7 @@
 
 namespace vlp {
 
-/// A lamp of the map with its reported properties.
+/// Lamp of the map: id, position, shape and modulation, as surveyed.
 struct Lamp {
   int id;
   /// Center of the lamp in the world frame (Z up), m.
@@ -22,7 +22,7 @@ struct Lamp {
   std::optional<double> frequency_hz;
   /// Duty cycle: lit fraction of a period, 0 to 1; std::nullopt if unknown.
   std::optional<double> duty;
-  /// Standard deviation of position_m per axis, if the survey reports it.
+  /// Standard deviation of position_m per axis; std::nullopt if the survey does not report it.
   std::optional<double> sd_m = {};
 };
 

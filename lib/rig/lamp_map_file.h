@@ -10,7 +10,7 @@
 
 namespace vlp {
 
-/// Lamp map with the rooms that its file states.
+/// Lamp map with its file and the room of each lamp.
 struct LampMapFile {
   std::filesystem::path file;
   LampMap map;

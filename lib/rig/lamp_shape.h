@@ -17,7 +17,7 @@ enum class ShapeKind { disc, rectangle };
 /// Properties of a ShapeKind: its name in files, its outline, and its keys in lamps.yaml.
 struct ShapeTraits {
   ShapeKind kind;
-  /// Name in lamps.yaml and lights.csv.
+  /// Name of the shape in lamps.yaml and lights.csv.
   std::string_view name;
   /// True if the outline is the ellipse with these axes; false if it is the box around that
   /// ellipse.
@@ -39,12 +39,12 @@ static_assert([] {
   return true;
 }());
 
-/// Returns the properties of a shape.
+/// Returns the properties of a kind of shapes from kShapeTraits.
 inline const ShapeTraits& traits_of(ShapeKind kind) {
   return kShapeTraits[static_cast<std::size_t>(kind)];
 }
 
-/// Shape of a lamp with size and direction.
+/// Shape of a lamp with the lengths of its axes and its yaw.
 struct LampShape {
   ShapeKind kind = ShapeKind::disc;
   /// Lengths of the two axes; std::nullopt for a disc of unknown diameter.
@@ -53,19 +53,20 @@ struct LampShape {
   double yaw_rad = 0;
 };
 
-/// Returns a disc.
+/// Returns a disc with this diameter, m.
 inline LampShape make_disc(double diameter_m) {
   return {ShapeKind::disc, Eigen::Vector2d::Constant(diameter_m)};
 }
 
-/// Converts a point from units of the half axes of a shape to the world frame.
+/// Converts a point (x, y) of a shape to the world frame, m. The point is in units of the half
+/// axes: (1, 0) is the end of the first half axis.
 /// @pre The shape has a size.
 Eigen::Vector3d world_from_shape(const LampShape& shape, const Eigen::Vector3d& center_m,
                                  const Eigen::Vector2d& point);
 
-/// Computes points of the outline in the world frame, counter-clockwise seen from above. Returns
-/// none if the size is unknown. The points of a box include its corners if `count` is a multiple of
-/// 8.
+/// Computes `count` points of the outline in the world frame, m, counter-clockwise seen from above.
+/// Returns none if the size is unknown. The points of a box include its corners if `count` is a
+/// multiple of 8.
 std::vector<Eigen::Vector3d> outline_of(const LampShape& shape, const Eigen::Vector3d& center_m,
                                         int count = 16);
 

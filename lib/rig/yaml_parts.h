@@ -25,13 +25,13 @@ LampShape read_lamp_shape(YamlMap& map);
 Board read_board(YamlMap& map);
 Camera read_camera(YamlMap& map);
 
-/// Writes the keys for read_lamp_shape().
+/// Writes the keys of a shape to the current YAML map, as read by read_lamp_shape().
 void emit_lamp_shape(YAML::Emitter& out, const LampShape& shape);
 
-/// Lamps that were already read, by id and position.
+/// Index of the lamps that were already read from a file, to find duplicates by id and position.
 class UniqueLamps {
  public:
-  /// Throws InputError at `item` if an earlier lamp has the same id or position.
+  /// Throws InputError at `item` if an added lamp has the same id or is within 1 mm.
   void check_id_and_position_unique(const Lamp& lamp, const YamlValue& item) const;
   void add(const Lamp& lamp);
 

@@ -26,7 +26,7 @@ struct YamlNode {
   Kind kind = Kind::null;
   /// Line of the file at which the node begins, counted from 1; 0 if unknown.
   std::size_t line = 0;
-  /// Text of a scalar.
+  /// Text of a scalar; empty for other nodes.
   std::string text;
   /// Items of a list; keys and values of a map, alternating.
   std::vector<YamlNode> children;
@@ -48,7 +48,8 @@ class YamlValue {
   int get_integer_within(int min, int max) const;
   bool get_boolean() const;
   std::string get_text() const;
-  /// Returns exactly `count` numbers. numbers_within() checks them as get_number_within().
+  /// Returns a list of exactly `count` finite numbers. numbers_within() also checks each one as
+  /// get_number_within() does.
   std::vector<double> get_numbers(std::size_t count) const;
   std::vector<double> numbers_within(std::size_t count, double min, double max,
                                      std::string_view unit) const;
@@ -84,7 +85,8 @@ class YamlMap {
   bool has(const std::string& key) const;
   YamlValue get_required_column(const std::string& key);
   std::optional<YamlValue> get_optional(const std::string& key);
-  /// Return std::nullopt without the key, otherwise YamlValue::get_number_within() or read_map().
+  /// Return the value of a key by YamlValue::get_number_within() or read_map(); std::nullopt if the
+  /// mapping lacks the key.
   std::optional<double> get_optional_number(const std::string& key, double min, double max,
                                             std::string_view unit);
   template <typename Read>
@@ -92,7 +94,8 @@ class YamlMap {
     const auto value = get_optional(key);
     return value ? std::optional(value->read_map(read)) : std::nullopt;
   }
-  /// Returns YamlValue::read_maps(); an empty list without the key.
+  /// Returns the list of a key by YamlValue::read_maps(); an empty list if the mapping lacks the
+  /// key.
   template <typename Read>
   auto optional_maps(const std::string& key, const Read& read) {
     const auto value = get_optional(key);
@@ -101,7 +104,7 @@ class YamlMap {
   /// Throws InputError for the first key that was not read.
   void check_all_keys_read() const;
 
-  /// Returns an error of the entire mapping.
+  /// Returns an error with `problem`, file, line and key of the mapping, to be thrown.
   InputError make_error(const std::string& problem) const;
 
  private:

@@ -26,7 +26,7 @@ void emit_plain_word(YAML::Emitter& out, std::string_view key, std::string_view 
 void emit_numbers(YAML::Emitter& out, std::string_view key, std::span<const double> values);
 void emit_numbers(YAML::Emitter& out, std::string_view key,
                   const Eigen::Ref<const Eigen::VectorXd>& values);
-/// Writes a list within a list.
+/// Writes a list of numbers as an element of the current list, on one line.
 void emit_inline_list(YAML::Emitter& out, std::span<const double> values);
 
 }  // namespace vlp
