@@ -27,13 +27,14 @@ struct Distortion {
   /// respect to z.
   Value operator()(const Eigen::Vector2d& z) const;
 
-  /// Returns the radial factor L.
+  /// Returns the radial factor L of the equation above at r2 = |z|^2.
   double radial_distortion_factor(double r2) const {
     return (1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) /
            (1 + r2 * (k[5] + r2 * (k[6] + r2 * k[7])));
   }
 
-  /// Computes the derivative of the distorted point with respect to the twelve coefficients.
+  /// Computes the derivative of the distorted point (x', y') of z with respect to the twelve
+  /// coefficients, one column each in the order of `k`.
   Eigen::Matrix<double, 2, 12> distortion_coefficient_jacobian(const Eigen::Vector2d& z) const;
 
   /// Computes the radius r = |z| up to which the model is one to one. It is the smallest r at which

@@ -22,7 +22,7 @@ struct Fisheye {
     const double t = angle_rad * angle_rad;
     return angle_rad * (1 + t * (k[0] + t * (k[1] + t * (k[2] + t * k[3]))));
   }
-  /// Returns the derivative of d at a.
+  /// Returns the derivative of d with respect to the angle, in focal lengths per rad.
   double radius_derivative(double angle_rad) const {
     const double t = angle_rad * angle_rad;
     return 1 + t * (3 * k[0] + t * (5 * k[1] + t * (7 * k[2] + t * 9 * k[3])));
@@ -49,7 +49,8 @@ class FisheyeAngles {
   explicit FisheyeAngles(const Fisheye& fisheye);
 
   double max_valid_angle_rad() const { return valid_rad_; }
-  /// Returns the angle of a distance as Fisheye::angle_from_radius_rad() does.
+  /// Returns the angle, rad, of a ray whose image is at `distance` focal lengths from the principal
+  /// point. NaN beyond the valid range (Fisheye::angle_from_radius_rad()).
   double operator()(double distance) const {
     return fisheye_.angle_from_radius_rad(distance, valid_rad_,
                                           look_up_initial_angle_rad(distance));

@@ -30,7 +30,7 @@ class Lens {
   /// Principal point cx, cy in pixels.
   const Eigen::Vector2d& principal_point_px() const { return center_px_; }
 
-  /// Projects a point to a pixel.
+  /// Projects a point of the camera frame to a pixel (u, v), px.
   ///
   /// @param x_in_camera  point in the camera frame, in any unit, not the origin
   /// @return             std::nullopt if the lens model does not describe the point
@@ -57,7 +57,7 @@ class Lens {
   struct SparseJacobian {
     /// Indices of the parameters that the pixel depends on, in mrcal's order, ascending.
     std::vector<Eigen::Index> parameters;
-    /// One column per entry of `parameters`.
+    /// Derivative of the pixel, px, with one column per entry of `parameters`.
     Eigen::Matrix2Xd d_pixel;
   };
   /// Computes the Jacobian of a point's pixel with respect to all parameters, including the control
@@ -71,8 +71,8 @@ class Lens {
     Eigen::Vector3d direction;
     Eigen::Matrix<double, 3, 2> d_direction_d_pixel;
   };
-  /// Computes the ray of a pixel. Returns std::nullopt if the pixel is not finite or no ray that
-  /// project() accepts is found for it.
+  /// Computes the ray of a pixel (u, v) in the camera frame. Returns std::nullopt if the pixel is
+  /// not finite or no ray that project() accepts is found for it.
   ///
   /// OPENCVn and splined lenses use Newton's method with step halving, until the last step reduces
   /// the error below 1e-12. The Jacobian is evaluated before that step and is accurate to 1e-6

@@ -36,10 +36,10 @@ constexpr LensModel lens_model_for_spline_grid(const SplineGrid& grid) {
   return static_cast<LensModel>(1 << 30 | (grid.order - 2) << 29 | grid.fov_x_deg << 20 |
                                 grid.nx << 10 | grid.ny);
 }
-/// Returns true for a splined lens of any grid.
+/// Returns true if the model is a splined lens, with any grid.
 constexpr bool is_splined_lens_model(LensModel model) { return static_cast<int>(model) >= 1 << 30; }
 
-/// Returns the grid of a splined lens.
+/// Returns the grid that is stored in the value of a splined lens model.
 /// @pre is_splined_lens_model(model)
 constexpr SplineGrid spline_grid_of_model(LensModel model) {
   const int bits = static_cast<int>(model);

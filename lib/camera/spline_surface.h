@@ -42,7 +42,8 @@ class SplineSurface {
     Eigen::Vector2d distorted;
     Eigen::Matrix2d d_distorted_d_u;
   };
-  /// Computes the distorted point and its derivative.
+  /// Computes the distorted point of u, in the stereographic plane, and its derivative with respect
+  /// to u.
   /// @pre is_defined_at(u), also for distort_point() and spline_weights()
   Value operator()(const Eigen::Vector2d& u) const;
   Eigen::Vector2d distort_point(const Eigen::Vector2d& u) const { return (*this)(u).distorted; }
