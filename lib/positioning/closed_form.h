@@ -39,7 +39,7 @@ TwoLampPoses compute_two_lamp_poses(const Sighting& first, const Sighting& secon
 /// @pre the lamps have equal heights; their mean is used
 std::optional<Pose> compute_pose_from_coplanar_lamps(std::span<const Sighting> sightings);
 
-/// A pose in closed form and its status.
+/// Result of compute_initial_pose(): pose of the camera, valid if the status is `ok`.
 struct InitialPose {
   /// `ok`, or the reason of failure.
   FixStatus status;
@@ -53,9 +53,10 @@ InitialPose compute_initial_pose(std::span<const Sighting> sightings);
 
 /// Motion of the camera at the readout time of the lamp's row.
 struct MotionAtReadout {
-  /// Motion along the axes of the camera's level frame.
+  /// Velocity and yaw rate of the camera's base, along the axes of the camera's level frame.
   KnownMotion motion = {};
-  /// Position of the camera relative to the center of rotation, along the same axes.
+  /// Position of the camera relative to the center of rotation (x, y), along the axes of the level
+  /// frame.
   Eigen::Vector2d arm_m{0, 0};
   /// Time from the middle of the image to the readout of the row.
   double time_s = 0;
@@ -69,18 +70,19 @@ std::optional<Pose> compute_pose_at_known_height_and_yaw(const Sighting& sightin
                                                          const HeightAndYaw& known,
                                                          const MotionAtReadout& readout = {});
 
-/// Returns the covariance of (X, Y, Zs, g) from the pixel noise alone.
+/// Returns the covariance of (X, Y, Zs, g), in m and rad, from the pixel noise alone.
 /// @pre compute_pose_at_known_height_and_yaw() computed `pose`
 Matrix4 compute_one_lamp_covariance(const Sighting& sighting, const Pose& pose);
 
-/// Returns the covariance of (X, Y, Zs, g) from the errors of height, yaw and motion.
+/// Returns the covariance of (X, Y, Zs, g), in m and rad, from the errors of height, yaw and
+/// motion.
 /// @pre compute_pose_at_known_height_and_yaw() computed `pose`
 Matrix4 compute_one_lamp_sensor_covariance(const Sighting& sighting, const Pose& pose,
                                            const HeightAndYaw& known,
                                            const MotionAtReadout& readout);
 
-/// Returns the derivative of (X, Y, Zs, g) by a small rotation of the level frame about each of its
-/// axes.
+/// Returns the derivative of (X, Y, Zs, g), in m and rad, with respect to a small rotation of the
+/// level frame, in rad. The columns are the x, y and z axis of the rotation.
 /// @pre compute_pose_at_known_height_and_yaw() computed `pose`
 Eigen::Matrix<double, 4, 3> compute_one_lamp_rotation_jacobian(const Sighting& sighting,
                                                                const Pose& pose);

@@ -54,7 +54,7 @@ class CommonErrors {
   /// um. The errors of other lamps of a dispersion are independent of the map.
   CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration, Correction correction);
 
-  /// Returns true if any of the errors is known.
+  /// Returns true if the error of any calibrated quantity or lamp is known.
   bool are_errors_known() const { return stated_; }
   /// Returns true if the errors of lens, zenith and every lamp of the map are known. Only then can
   /// a wrong lamp be identified by them.
@@ -142,11 +142,13 @@ class CommonErrors {
                                       const Eigen::Vector3d& arm_m, const BodyFix& fix,
                                       const BodyCovariance& common, const Lens& lens,
                                       const Eigen::Matrix3d& body_from_base) const;
-  /// Returns G C G' of a gain.
+  /// Returns G C G', the covariance of the states of a fix from the common errors, in the units of
+  /// the states.
   template <int States>
   Eigen::Matrix<double, States, States, Eigen::DontAlign> compute_covariance(
       const GainMatrix<States>& gain) const;
-  /// Returns the covariance of z of one observation.
+  /// Returns the covariance of the normalized point z of one observation from the common errors.
+  /// `lamp` is the index of the lamp in the map.
   Matrix2 compute_covariance(const Effect& effect, std::size_t lamp) const;
 
   /// Returns the joint covariance: intrinsics, zenith and offset, as far as they exist. Lamps with
@@ -179,9 +181,9 @@ class CommonErrors {
   /// Gives rows to the lamps that are correlated with other errors, and sets the size of the joint
   /// covariance.
   void assign_covariance_rows_to_lamps(std::span<const Lamp> lamps, const Calibration& calibration);
-  /// Returns the covariance of a lamp's position.
+  /// Returns the covariance of a lamp's position, m^2; `lamp` is its index in the map.
   Eigen::Matrix3d lamp_position_covariance(std::size_t lamp) const;
-  /// Returns the covariance of two lamps of the map.
+  /// Returns the covariance between the positions of two lamps, m^2, by their indices in the map.
   Eigen::Matrix3d lamp_cross_covariance(std::size_t lamp, std::size_t other) const;
   /// Sets which parts are stated, and the covariances of lens and zenith without an adjustment.
   void set_lens_and_zenith_covariances(const Calibration& calibration);

@@ -48,7 +48,7 @@ std::optional<BodyPoseBound> compute_pose_crlb(std::span<const Eigen::Vector3d> 
 /// Standard deviations of the error sources of a fix. Errors are normal and independent of each
 /// other.
 struct ErrorSources {
-  /// Pixel noise of each lamp, per axis. Positive.
+  /// Standard deviation of a lamp's pixel per axis. Positive.
   double noise_px;
   /// Error of the principal point, per axis; common to all lamps.
   double center_px;

@@ -33,7 +33,7 @@ enum class FixStatus {
 /// "too_few_lamps".
 std::string_view to_string(FixStatus status);
 
-/// Returns a human-readable explanation with the remedy.
+/// Returns an explanation of a status with the remedy, human-readable, in one line.
 std::string_view describe(FixStatus status);
 
 /// A pose and the covariance of its (X, Y, Z, yaw) in meters and radians.
@@ -49,7 +49,7 @@ using BodyCovariance = Eigen::Matrix<double, kBodyStates, kBodyStates, Eigen::Do
 
 /// Estimated motion, roll and pitch of the robot, or, without a mount, of the camera.
 struct BodyEstimate {
-  /// Velocity in the world.
+  /// Velocity (x, y) in the world frame.
   Eigen::Vector2d velocity_m_per_s{0, 0};
   double yaw_rate_rad_per_s = 0;
   Inclination inclination{0, 0};
@@ -70,10 +70,10 @@ struct Fix {
   /// Part of the covariance due to pixel noise and inclination, and, for one lamp, height, yaw and
   /// motion. It averages out over frames as far as these errors are independent between frames.
   Matrix4 noise_covariance = Matrix4::Zero();
-  /// RMS distance in the image between the observed and the predicted lamps. Zero, to rounding,
-  /// with one or two lamps.
+  /// RMS distance in the image between the observed and the predicted lamps, over both axes
+  /// together. Zero, to rounding, with one or two lamps.
   double residual_px = 0;
-  /// Number of lamps used for the fix.
+  /// Number of lamps of this frame used for the fix.
   int lamps = 0;
   /// Number of observations in residual_px: those of `lamps` and those of earlier frames.
   int sightings = 0;

@@ -29,7 +29,7 @@ struct FloorGrid {
 /// @pre the map has lamps
 FloorGrid make_grid_of_floor_positions(const LampMap& map, double step_m);
 
-/// Error budget of each position on a floor.
+/// Error budget of fixes at each position of a floor grid, by error source.
 struct FloorLimits {
   /// Name of an error source, such as "lamp map", and its machine-readable key, such as "lamp_map".
   struct Source {
@@ -37,7 +37,7 @@ struct FloorLimits {
   };
   std::vector<Source> sources;
 
-  /// Predicted covariance at one position.
+  /// Predicted covariance of a fix at one position.
   struct Place {
     Pose camera;
     /// Number of lamps that are fully visible.
@@ -91,14 +91,14 @@ FixSds compute_fix_sds(const Matrix4& covariance);
 /// statistic separately.
 struct FloorSummary {
   struct Row {
-    /// As in FloorLimits.
+    /// Source of the row (FloorLimits::sources).
     FloorLimits::Source source;
     FixSds median;
     FixSds worst;
     /// Fraction of the sum of the horizontal variances that is due to this source.
     double fraction;
   };
-  /// In the order of the sources.
+  /// One row per source, in the order of FloorLimits::sources.
   std::vector<Row> sources;
   Row together;
   std::size_t places_with_fix;

@@ -35,7 +35,7 @@ struct Consensus {
 std::optional<Consensus> find_largest_consistent_set(std::span<const Sighting> sightings,
                                                      double max_residual);
 
-/// A least-squares fix and its status.
+/// Least-squares fix of a frame, valid if the status is `ok`.
 struct ConsistentFix {
   /// `ok`, or the reason of failure.
   FixStatus status;
@@ -48,7 +48,8 @@ struct ConsistentFix {
 ///   inconsistent  of three lamps or more, one has a residual of z above `max_residual`
 ConsistentFix estimate_and_check_pose(std::span<const Sighting> sightings, double max_residual);
 
-/// Computes the RMS distance of the observations from their mean, in z.
+/// Computes the RMS distance of the normalized points z of the observations from their mean;
+/// dimensionless.
 double compute_rms_observation_radius(std::span<const Sighting> sightings);
 
 /// Lamps observed in one frame or in several. The arrays have a fixed size, so that no memory is
@@ -57,10 +58,10 @@ template <typename Observation>
 struct LampObservations {
   std::array<Observation, kMaxSightings> sightings;
   std::array<int, kMaxSightings> ids;
-  /// Horizontal distance from each lamp to the nearest other lamp of the map.
+  /// Horizontal distance from each lamp to the nearest other lamp of the map, m.
   std::array<double, kMaxSightings> nearest_m;
   std::size_t size = 0;
-  /// True if a detector reported every sigma_px.
+  /// True if every detection has a sigma_px.
   bool noise_is_stated = true;
   int unknown_lamps = 0;
   int rejected_lamps = 0;

@@ -52,20 +52,20 @@ struct BodyPrior {
   double velocity_sd_m_per_s = 0;
   double yaw_rate_sd_rad_per_s = 0;
   double inclination_sd_rad = 0;
-  /// Prior of the height of R.
+  /// Prior of the height of the body; std::nullopt: unknown.
   std::optional<KnownHeight> height = {};
 };
 
-/// Observation of a lamp of the map.
+/// Observation of a lamp of the map by a body that may move and be tilted.
 struct BodyObservation {
-  /// P, in the world.
+  /// Position P of the lamp in the world, m.
   Eigen::Vector3d lamp_m;
   /// Direction to the lamp along the axes of the body, unit length.
   Eigen::Vector3d ray;
   /// M: the pixel residual is M q / (ray . q), in standard deviations. M ray = 0.
   Eigen::Matrix<double, 2, 3, Eigen::DontAlign> whitened_pixel_from_ray;
   double sigma_px;
-  /// Readout time of the lamp's center.
+  /// Readout time of the lamp's center, s, relative to time 0 of the body.
   double time_s;
 };
 
@@ -82,28 +82,32 @@ struct BodyFix {
   /// Sum of the squared residuals of pixels and priors over their variances. Its expectation is 2n
   /// - 4, or 2n - 3 with a known height.
   double chi_squared = 0;
-  /// Contribution of the pixels to chi_squared.
+  /// Contribution of the pixel residuals to chi_squared, without the priors.
   double pixels_chi_squared = 0;
   /// Expectation of pixels_chi_squared, computed from the covariance.
   double redundancy = 0;
-  /// RMS distance in the image between the observed and the predicted lamps.
+  /// RMS distance in the image between the observed and the predicted lamps, over both axes
+  /// together.
   double residual_px = 0;
 };
 
-/// A state with the trigonometric terms that predictions use.
+/// State of a body with the trigonometric terms of its angles, which predictions use repeatedly.
 class EvaluatedState {
  public:
   explicit EvaluatedState(const BodyState& state);
 
-  /// Returns q + arm of a lamp.
+  /// Returns the position of a lamp relative to the body, q + arm, along the axes of the body, m.
+  /// `time_s` is the readout time.
   Eigen::Vector3d lamp_in_body(const Eigen::Vector3d& lamp_m, double time_s) const;
-  /// Returns the derivative of q by the states X, Y, Z, yaw, u, w, roll, pitch.
+  /// Returns the derivative of q, m, with respect to the states X, Y, Z, yaw, u, w, roll, pitch
+  /// (BodyIndex), in m, rad and s.
   Eigen::Matrix<double, 3, kBodyStates> d_lamp_in_body_d_state(const Eigen::Vector3d& lamp_m,
                                                                double time_s) const;
 
   BodyState state;
+  /// Unit vector (cos g, sin g) of the yaw g.
   Eigen::Vector2d heading;
-  /// L^T.
+  /// Rotation L^T from the level frame of the body to its tilted frame.
   Eigen::Matrix<double, 3, 3, Eigen::DontAlign> body_from_level;
   /// Axis of the pitch rotation, along the axes of the body.
   Eigen::Vector3d pitch_axis;

@@ -17,7 +17,7 @@ struct BodyObservations : LampObservations<BodyObservation> {
   std::size_t num_current = 0;
 };
 
-/// Status of a fix and the fix.
+/// Fix of a body, valid if the status is `ok`.
 struct BodySolution {
   FixStatus status;
   BodyFix fix;

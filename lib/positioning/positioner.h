@@ -24,7 +24,7 @@ static_assert(
     "and EIGEN_MAX_STATIC_ALIGN_BYTES away");
 #endif
 
-/// Options of a Positioner.
+/// Options of a Positioner: applied corrections, mount of the camera, limits.
 struct PositionerOptions {
   Correction correction = Correction::all;
   /// Pose of the camera on the robot. With a mount, fixes are of the robot's center and yaw;
@@ -50,7 +50,8 @@ struct PositionerOptions {
 /// Motion of a robot, or, without a mount, of a camera, while an image is read. Normally
 /// distributed about these values, with these standard deviations per component. 0: exact.
 struct KnownMotion {
-  /// Velocity in the level frame.
+  /// Velocity (x, y) along the axes of the level frame of the robot, or, without a mount, of the
+  /// camera.
   Eigen::Vector2d velocity_m_per_s{0, 0};
   double yaw_rate_rad_per_s = 0;
   double velocity_sd_m_per_s = 0;
@@ -74,11 +75,11 @@ struct Sensors {
   double inclination_sigma_rad = 0;
   /// Height and yaw of the camera. Allows a fix of a single lamp; not used with two lamps or more.
   std::optional<HeightAndYaw> height_and_yaw;
-  /// Motion; at rest if std::nullopt.
+  /// Motion during the readout of the image; std::nullopt: at rest.
   std::optional<KnownMotion> motion = {};
   /// Height of the robot's center, or, without a mount, of the camera. Not used for a single lamp.
   std::optional<KnownHeight> height = {};
-  /// Time of the capture, copied to Fix::time_s.
+  /// Time of the capture in any time scale, copied to Fix::time_s.
   std::optional<double> time_s = {};
 };
 

@@ -20,7 +20,8 @@ struct ResidualSums {
   double degrees_of_freedom = 0;
 };
 
-/// Computes the sums.
+/// Sums the residuals of fixes. Ignores fixes without redundancy, and those whose reduced
+/// chi-squared exceeds 25 times the median.
 ResidualSums sum_squared_residuals_of_fixes(std::span<const Fix> fixes);
 
 /// Estimates the standard deviation of a pixel per axis from the residuals:

@@ -24,10 +24,10 @@ struct HeightAndYaw {
   double yaw_sd_rad = 0;
 };
 
-/// A height and its standard deviation.
+/// Height in the world with its standard deviation, measured independently of the image.
 struct KnownHeight {
   double z_m;
-  /// Positive.
+  /// Standard deviation of z_m. Positive.
   double sd_m;
 };
 

@@ -23,7 +23,7 @@ struct Sighting {
   Eigen::Vector2d z;
   /// Derivative of the pixel by z. Converts residuals of z to pixels, in which the noise is given.
   Matrix2 d_pixel_d_z;
-  /// Standard deviation of the pixel per axis.
+  /// Standard deviation of the lamp's pixel per axis.
   double sigma_px;
 };
 
@@ -39,7 +39,7 @@ struct LevelPose {
   Pose pose() const { return {position_m, std::atan2(heading.y(), heading.x())}; }
 };
 
-/// z of a lamp predicted from a pose, and its derivatives.
+/// Normalized point z of a lamp, predicted from a pose, with its derivative.
 struct Prediction {
   Eigen::Vector2d z;
   /// Derivative of z with respect to the state (X, Y, Zs, g), in m and rad.
