@@ -80,7 +80,7 @@ class LightDetector {
   LightShape shape_;
   std::optional<LampClassifier> classifier_;
   int max_dark_rows_;
-  /// Sizes of the map's lamps by shape, in m.
+  /// Lengths of both axes of the map's lamps, by shape.
   std::map<ShapeKind, std::vector<Eigen::Vector2d>> sizes_m_;
   /// Distinct periods of the map's lamps, in scanlines, and the lamp of each period. The lamp is
   /// std::nullopt if several lamps share the period. Empty if the row time is unknown or a

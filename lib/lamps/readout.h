@@ -14,7 +14,7 @@
 
 namespace vlp {
 
-/// Evidence of images for each readout direction.
+/// Evidence for each readout direction of a camera, summed over images.
 struct ReadoutDirectionEvidence {
   /// Evidence that the shutter reads rows, and that it reads columns; dimensionless, larger is
   /// stronger. Each is the sum, over the modulated lights detected with this direction, of

@@ -43,14 +43,14 @@ struct Light {
   LightReason reason;
   /// Id of the lamp; also set for a lamp that the image border cuts.
   std::optional<int> lamp;
-  /// Image of the center of the outline, (u, v).
+  /// Pixel (u, v) of the lamp's center, estimated from the outline.
   Eigen::Vector2d pixel;
-  /// Standard deviation of `pixel` per axis. Includes predict_center_sd_without_lens_px() if
-  /// the lens is unknown.
+  /// Standard deviation of `pixel` per axis. Includes predict_center_sd_without_lens_px() if the
+  /// lens is unknown.
   double sigma_px;
   /// Shape of the outline; a disc if the light has no outline.
   ShapeKind shape;
-  /// Radius; for other shapes than discs the radius of the disc of equal area.
+  /// Radius in the image; for other shapes than discs the radius of the disc of equal area.
   double radius_px;
   /// Outline of a round light in the plane of LightShape: |unit_from_plane (p - plane_center)| = 1.
   Eigen::Vector2d plane_center;
@@ -78,7 +78,7 @@ struct Light {
   bool is_uneven;
   /// Width of the edge from 25 % to 75 % of the level, in pixels.
   double rise_px;
-  /// Polygon inside the edges, (u, v); empty for discs.
+  /// Polygon inside the edges of the light, as pixels (u, v); empty for discs.
   std::vector<Eigen::Vector2d> face;
   /// Ratio of the long to the short axis in the plane of LightShape, and the standard deviation of
   /// its logarithm; 1 and 0 for discs.

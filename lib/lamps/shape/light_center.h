@@ -20,7 +20,7 @@ inline constexpr std::size_t kMinOutlinePoints = 10;
 struct DetectorCamera {
   Readout readout;
   std::optional<double> row_time_s;
-  /// Lens; if unknown, ellipses are fitted in the image.
+  /// Lens of the camera; std::nullopt: ellipses are fitted in the distorted image.
   std::optional<Lens> lens;
   /// Rotation from the camera frame to the level frame; identity if the tilt is not calibrated.
   Eigen::Matrix3d level_from_camera = Eigen::Matrix3d::Identity();

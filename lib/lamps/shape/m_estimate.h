@@ -33,7 +33,7 @@ struct MEstimateStep {
   /// the points on the curve.
   Eigen::Matrix<double, N, N> inverse;
   double variance;
-  /// Inliers, by the index of the point, and their number.
+  /// True for each point that is an inlier, by its index, and number of inliers.
   std::vector<bool> inliers;
   int count;
   /// Sum of the weights, including those of the biweight.

@@ -17,7 +17,7 @@ struct EdgePoint {
   /// Position (column, row) in the image whose rows are the scanlines, px. The column is
   /// fractional; the row is an integer.
   Eigen::Vector2d pixel;
-  /// Level of the light inside the edge, above the dark level.
+  /// Level of the light inside the edge, above the dark level, in gray levels.
   double level;
   /// Width of the edge from 25 % to 75 % of the level, in pixels along the row.
   double rise_px;
@@ -30,7 +30,7 @@ struct DiscImage {
   Eigen::Vector2d low, high, center;
 };
 
-/// Outline with refined points.
+/// Result of refine_outline(): the outline of a light with refined points.
 struct RefinedOutline {
   std::vector<EdgePoint> points;
   /// True if the level inside the light varies locally, as with LED chips behind a diffuser. Errors

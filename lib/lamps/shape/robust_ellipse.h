@@ -12,7 +12,7 @@
 
 namespace vlp {
 
-/// Circle or ellipse that fits most of the points.
+/// Circle or ellipse that fits most of the points, in their unit.
 struct RobustEllipse {
   Eigen::Vector2d center;
   /// Symmetric 2x2 matrix of the ellipse, in the unit of the points: a point of the ellipse is
@@ -20,7 +20,7 @@ struct RobustEllipse {
   Matrix2 rim_from_circle;
   /// Covariance of the center, from the scatter of the inliers.
   Matrix2 center_covariance;
-  /// Inliers, by the index of the point, and their number.
+  /// True for each point that is an inlier, by its index, and number of inliers.
   std::vector<bool> inliers;
   int count;
 

@@ -86,7 +86,7 @@ class Shear {
   Shear(const Eigen::Vector3d& motion, const Eigen::Matrix3d& covariance)
       : motion_(motion), covariance_(covariance) {}
 
-  /// Motion (v, w) / 2.
+  /// Half of the motion per scanline (v_x, v_y, w) in the level plane.
   Eigen::Vector3d motion_;
   Eigen::Matrix3d covariance_;
 };

@@ -40,7 +40,7 @@ struct EdgeImage {
 
 /// Edge of a light that was fitted along a side.
 struct StraightEdge {
-  /// Side moved to the fitted edge.
+  /// Line segment on the fitted edge, in the plane of LightShape.
   Side side;
   /// Covariance of the distances of both ends from the edge, in square pixels.
   Matrix2 covariance_px;
@@ -50,11 +50,11 @@ struct StraightEdge {
   double bow_px;
   /// Fraction of the pixels next to the edge that the model explains.
   double fraction;
-  /// Points on the edge, on lit scanlines.
+  /// Points (column, row) where lit scanlines cross the edge.
   std::vector<EdgePoint> points;
 };
 
-/// Pixels to use, and the expected blur.
+/// Search window around a side, and the expected blur.
 struct EdgeSearch {
   /// Half-width of the search window across the side.
   double reach_px;

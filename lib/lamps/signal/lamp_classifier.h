@@ -34,7 +34,7 @@ inline constexpr std::array<std::string_view, 4> kLampFeatures{"log_period_lines
 /// Returns the features of a light's stripes. @pre The stripes have a period.
 LampFeatures compute_classifier_features(const Stripes& stripes);
 
-/// Light with the id of its lamp.
+/// Training example: stripes of a light and the id of its lamp.
 struct LabeledLight {
   int lamp;
   Stripes stripes;
@@ -53,11 +53,11 @@ struct LampClassifier {
   /// Mean and standard deviation of the features of all training lights, which standardize
   /// features.
   LampFeatures mean, scale;
-  /// Covariance C of standardized features.
+  /// Covariance C of the standardized features within a lamp, common to all lamps.
   Eigen::Matrix4d covariance;
   struct Class {
     int lamp;
-    /// Number of training lights.
+    /// Number of training lights of this lamp.
     int examples;
     /// Mean c_k of the standardized features of the training lights.
     LampFeatures center;

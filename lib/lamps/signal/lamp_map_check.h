@@ -77,7 +77,7 @@ std::vector<AmbiguousLamps> find_ambiguous_lamps(const LampMap& lamps,
 struct UnreadableLamp {
   int lamp;
   double period_lines;
-  /// Number of periods on the lamp.
+  /// Number of stripe periods across the image of the lamp.
   double periods;
   /// Stripe contrast that remains after the exposure, |sinc(frequency exposure)| (lib/THEORY.md,
   /// "Identity").

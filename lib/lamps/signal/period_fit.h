@@ -6,7 +6,7 @@
 
 namespace vlp {
 
-/// Brightness of a light along the readout direction.
+/// Brightness of a light as a function of the scanline, in bins of `lines_per_bin` scanlines.
 struct LineProfile {
   double first_line;  ///< middle of the first bin, as a scanline of the image
   int lines_per_bin;

@@ -12,7 +12,7 @@
 
 namespace vlp {
 
-/// Light with a measured stripe period.
+/// Stripe period of a light, in scanlines, with its lamp and duty cycle if known.
 struct MeasuredPeriod {
   double period_lines;
   /// Id of the lamp that makes the light, from a table of labels; std::nullopt if the light has no
@@ -24,10 +24,11 @@ struct MeasuredPeriod {
 
 /// Lights with the same period, which are assumed to be one lamp.
 struct PeriodGroup {
-  /// Median of log period_lines, and its standard deviation.
+  /// Median of the natural logarithm of period_lines, and its standard deviation (relative error of
+  /// the period).
   double log_period;
   double sd;
-  /// Indices of the lights of the group.
+  /// Indices of the lights of the group in the input of group_lights_by_period().
   std::vector<std::size_t> lights;
   std::optional<int> lamp;
   /// Median of the measured duties; std::nullopt if there is none.
