@@ -18,7 +18,9 @@ struct CachedView {
   /// Blur of the sharpest edges of the image (ImageBlur::sigma_px): sigma of a Gaussian, px.
   /// std::nullopt for an image without contrast.
   std::optional<double> blur_px;
-  /// ImageBlur::bright_fraction; fraction of the board's pixels at full scale.
+  /// Level that 1 % of the image's pixels exceed, as a fraction of full scale
+  /// (ImageBlur::bright_fraction). `white_fraction` is the fraction of the board's pixels that are
+  /// at full scale.
   double bright_fraction, white_fraction;
 };
 
@@ -33,9 +35,9 @@ class CornerCache {
   /// Creates the folder if it is missing. Without a folder name there is no cache.
   CornerCache(std::filesystem::path folder, const Board& board);
 
-  /// Returns an earlier detection; std::nullopt if there is none.
+  /// Returns the stored detection of an image with the same content; std::nullopt if there is none.
   std::optional<CachedView> find(const SourceImage& image) const;
-  /// Stores a detection.
+  /// Stores the detection of an image in its file. A file that cannot be written is skipped.
   void keep(const SourceImage& image, CachedView view) const;
 
  private:

@@ -16,8 +16,8 @@ namespace vlp {
 void check_image_size(const std::filesystem::path& file, std::int64_t width, std::int64_t height,
                       double max_mpx);
 
-/// Returns true if `bytes`, the beginning of a file or all of it, starts with the signature of PNG,
-/// JPEG, BMP, TIFF, PBM, PGM or PPM.
+/// Returns true if `bytes` starts with the signature of PNG, JPEG, BMP, TIFF, PBM, PGM or PPM.
+/// `bytes` is a file or its beginning.
 bool has_image_signature(std::string_view bytes);
 
 /// Parses width and height in pixels from the header of a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM

@@ -22,7 +22,7 @@ struct ImageBlur {
 /// Measures the blur of an image of 8 or 16 bits.
 ImageBlur measure_image_blur(const cv::Mat& image);
 
-/// Signal of an image relative to its noise.
+/// Range of the gray levels of an image, relative to full scale and to its pixel noise.
 struct ImageSignal {
   /// Darkest level, as a fraction of the full scale. Levels are medians of three pixels along a row
   /// or a column, which ignore a defective pixel but not a stripe of one scanline.

@@ -32,10 +32,10 @@ struct SourceImage {
   cv::Mat frame = {};
   /// Time of a video's frame since the start of the video; std::nullopt for an image file.
   std::optional<double> time_s = {};
-  /// Index of the image in its source.
+  /// Index of the image in the order of its source, from 0.
   std::size_t index = 0;
 
-  /// Returns the gray levels.
+  /// Returns the gray levels of the image, 8 or 16 bits; reads the file if it is no video frame.
   /// @throws InputError as read_image()
   cv::Mat read(const FrontendOptions& options) const {
     return frame.empty() ? read_image(file, options.max_mpx) : frame;

@@ -14,8 +14,9 @@
 
 namespace vlp {
 
-/// Finds the light of a label: the nearest modulated light that is completely in view and whose
-/// center is within half its radius of `pixel`. Returns nullptr if there is none.
+/// Finds the light at the pixel (u, v) of a label. It is the nearest modulated light that is
+/// completely in view and whose center is within half its radius of `pixel`. Returns nullptr if
+/// there is none.
 const Light* find_light_at_pixel(const Observation& image, const Eigen::Vector2d& pixel);
 
 /// Lights of all images with the lamp ids that a table of labels gives for their positions
@@ -30,9 +31,9 @@ struct LabeledLights {
 void add_labeled_lights(std::span<const Observation> images, const std::vector<Frame>& labels,
                         LabeledLights& labeled);
 
-/// Measured period of a light, with its position.
+/// Measured stripe period of a light, with its image and position.
 struct LightPeriod : MeasuredPeriod {
-  /// Index of the image.
+  /// Index of the image in the input of collect_light_periods().
   std::size_t image;
   Eigen::Vector2d pixel;
   double sigma_px;

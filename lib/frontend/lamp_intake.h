@@ -41,7 +41,7 @@ LevelRotations compute_level_rotations(const CapturesTable& captures,
 
 /// Images of lamps with the lamp map and the camera.
 struct LampImages {
-  /// A folder of images, or a video.
+  /// Path of a folder of images, or of a video.
   std::filesystem::path images;
   LampMap lamps;
   std::filesystem::path lamps_file;
@@ -68,9 +68,8 @@ class LampIntake {
 
   /// Creates the intake of a set of images: reads the classifier and estimates the readout
   /// direction if it is not known. detect_in_all_images() returns its notes and warnings, too.
-  /// @throws InputError if the row time, the frequencies or images are missing, if the classifier
-  /// is
-  ///         for other lamps or another row time, or if captures.csv cannot be read
+  /// @throws InputError if the row time, the frequencies or images are missing, or if captures.csv
+  ///     cannot be read; also if the classifier is for other lamps or another row time
   LampIntake(const LampImages& images, ImageUse use, const FrontendOptions& options);
 
   /// Detects the lamps of an image. Rejects the image if it is unreadable, of another size, too
@@ -85,7 +84,8 @@ class LampIntake {
   /// Returns the same intake with annotated images in `folder`; without them if it is empty.
   LampIntake with_annotation_folder(const std::filesystem::path& folder) const;
 
-  /// Applies detect_in_image() to images and videos.
+  /// Applies detect_in_image() to all images and video frames. Returns one observation per image,
+  /// in order.
   Observations detect_in_all_images(const std::vector<std::filesystem::path>& files,
                                     const IntakeProgress& progress = {}) const;
 

@@ -15,7 +15,7 @@
 
 namespace vlp {
 
-/// Returns the number of lights of a kind.
+/// Returns the number of lights of this kind in all images.
 int count_lights_of_kind(std::span<const Observation> images, LightKind kind);
 
 /// Number of lights, over all images, that have this kind and this reason.

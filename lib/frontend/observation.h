@@ -58,9 +58,9 @@ struct Rejection {
 struct Observation {
   /// Image file, or make_video_frame_name() (VIDEO#000123) for a frame of a video.
   std::filesystem::path file;
-  /// Time of a video's frame since the start of the video.
+  /// Time of a video's frame since the start of the video; std::nullopt for image files.
   std::optional<double> time_s = {};
-  /// Width and height; 0 for an image that cannot be read.
+  /// Width and height of the image; 0 for an image that cannot be read.
   std::array<int, 2> size_px = {0, 0};
   /// Rejection; std::nullopt if the image is used.
   std::optional<Rejection> rejection = {};
@@ -86,7 +86,7 @@ struct IntakeFailure {
   /// True if the images contradict `file`; false if the images themselves are unusable.
   bool is_wrong_file;
   std::string message;
-  /// File to correct; empty if it is the images.
+  /// File to correct; empty if the images are the cause.
   std::filesystem::path file = {};
 };
 
@@ -101,10 +101,11 @@ struct Observations {
 /// Inserts the messages of `remarks` before those of `result`.
 void prepend_remarks(const Observations& remarks, Observations& result);
 
-/// Returns the lamps among the lights, with their centers.
+/// Returns a detection for each light of kind `lamp`: id, pixel of the center, and its standard
+/// deviation.
 std::vector<Detection> collect_identified_lamps(const Observation& image);
 
-/// Returns the views of the boards in the images that are used.
+/// Returns the detections of the board in the images that are used, in their order.
 std::vector<BoardView> collect_kept_views(std::span<const Observation> images);
 
 /// Returns the lamps in the images that are used, one frame per image.
@@ -158,7 +159,7 @@ class Selection {
   /// are already rejected or have no corners or lamps.
   void add(Observation& image);
 
-  /// Adds an image that is used, without a check.
+  /// Adds an image that is used anyway. Later images that repeat it are rejected.
   void keep(const Observation& image);
 
  private:
@@ -171,7 +172,7 @@ class Selection {
   std::vector<Kept> kept_;
 };
 
-/// Applies a Selection to images in their order.
+/// Rejects images that repeat an earlier one, by a Selection, in the order of `images`.
 void reject_repeated_images(std::vector<Observation>& images, ImageUse use,
                             const FrontendOptions& options);
 

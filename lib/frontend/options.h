@@ -17,7 +17,7 @@ struct FrontendOptions {
   int threads = 1;
   /// Images of more megapixels are rejected before they are decoded.
   double max_mpx = 200;
-  /// Every n-th frame of a video is used.
+  /// Step between the frames of a video that are used: every n-th frame, beginning with the first.
   int every = 1;
 
   /// Board images: largest sigma of the blur of the sharpest edges (measure_image_blur()).
@@ -40,7 +40,7 @@ struct FrontendOptions {
   /// Readout direction; overrides that of the calibration. Without either it is estimated from the
   /// images.
   std::optional<Readout> readout = {};
-  /// Row time of a camera without a calibration.
+  /// Time from the readout of a row to that of the next, for a camera without a calibration.
   std::optional<double> row_time_s = {};
   /// Room of the lamp map whose lamps are identified (read_lamps_of_room()); empty: all.
   std::string room = {};

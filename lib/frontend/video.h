@@ -24,8 +24,9 @@ std::optional<std::string> parse_video_of_frame_name(const std::string& name);
 
 /// Decoded frame of a video.
 struct VideoFrame {
-  /// Gray levels of 8 bits.
+  /// Gray levels of the frame, 8 bits.
   cv::Mat1b image;
+  /// Index of the frame in the video, from 0, among the frames that can be decoded.
   std::size_t number;
   /// Time since the start of the video, from the time stamp of the frame.
   double time_s;
