@@ -14,7 +14,7 @@
 
 namespace vlp {
 
-/// Captures that were taken together, with their table.
+/// Captures of one folder, with the rows of their captures.csv.
 struct AdjustSet {
   std::string name;
   std::vector<Frame> frames;
@@ -38,7 +38,8 @@ struct AdjustStepInput {
   std::filesystem::path lamps_file;
   Calibration calibration;
   std::filesystem::path calibration_file;
-  /// Standard deviations, per axis, of lamps and of places without one of their own.
+  /// Standard deviations per axis, m, for lamps and for known positions without one of their own;
+  /// std::nullopt: none.
   std::optional<double> map_sd_m, place_sd_m;
   /// Standard deviation of a lens without a covariance (make_nominal_intrinsics_covariance()).
   /// std::nullopt: such a lens is exact.

@@ -13,13 +13,13 @@
 
 namespace vlp {
 
-/// Captures at known places.
+/// Captures with a known position, as input of run_dispersion_step().
 struct KnownPositions {
   std::vector<ReferencePointCapture> captures;
   /// Point whose position is known, for each capture in the order of `captures`: the camera or the
   /// axis of rotation.
   std::vector<PlaceOf> of = {};
-  /// Number of captures without a place.
+  /// Number of captures without a known position; they are not in `captures`.
   std::size_t without = 0;
 };
 

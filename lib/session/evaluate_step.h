@@ -30,7 +30,7 @@ double compute_same_position_radius_m(const Calibration& calibration);
 /// InputError if the image names do not match.
 EvaluateResult evaluate_fixes(const EvaluationInput& input, const std::vector<Gate>& gates);
 
-/// Fixes of a drive along a commanded straight line.
+/// Fixes of a drive along a commanded straight line, and the ends of this line in the world, m.
 struct Drive {
   FromFile<FixRow> fixes;
   CommandedLine commanded_m;

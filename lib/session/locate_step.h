@@ -20,7 +20,8 @@
 
 namespace vlp {
 
-/// Captures to locate, with the options of the positioner.
+/// Input of locate_camera_in_frames(): captures, lamp map, calibration, and options of the
+/// positioner.
 struct LocateInput {
   std::vector<Frame> frames;
   LampMap lamps;
@@ -48,7 +49,8 @@ struct LocateInput {
   double roll_pitch_sd_rad = 0;
   /// Standard deviation of z_m of `captures`. std::nullopt: z_m is not used as a measurement.
   std::optional<double> height_sd_m = {};
-  /// Computes the offsets of all lamps (StepResult::lamp_offsets).
+  /// If true, computes the offset of each lamp from its position in the map
+  /// (StepResult::lamp_offsets).
   bool lamp_offsets = false;
   /// Number of captures in a joint fix with a common velocity: the capture and those up to 0.2 s
   /// before it.
@@ -67,6 +69,7 @@ std::size_t count_detections_outside_image(std::span<const Frame> frames,
 struct LocateResult : StepResult {
   /// Fix of each frame, in the order of LocateInput::frames.
   std::vector<Fix> fixes;
+  /// Rows of fixes.csv, in the order of `fixes`.
   std::vector<FixRow> rows;
   FixSummary summary;
   /// Observations of the images in which the lamps were detected (locate_camera_in_images()).

@@ -15,7 +15,7 @@
 
 namespace vlp {
 
-/// Light of a period group in an image.
+/// Light in an image, with the group of equal stripe periods to which it belongs.
 struct GroupedLight {
   /// Index in RowTimeCandidates::groups of the period group to which the light belongs.
   std::size_t group;
@@ -25,7 +25,7 @@ struct GroupedLight {
 
 /// Lights of one image, at most one of each period group.
 struct GroupedLights {
-  /// Width and height.
+  /// Width and height of the image.
   std::array<int, 2> size_px;
   std::vector<GroupedLight> lights;
 };

@@ -15,7 +15,8 @@
 
 namespace vlp {
 
-/// Returns the camera part of a calibration, without rotation center and dispersion.
+/// Returns a calibration with the camera of `calibration` only, without rotation center and
+/// dispersion.
 Calibration extract_camera_calibration(const Calibration& calibration);
 
 /// Checks the lamp map with the captures of a stationary camera or, if these show no error, with

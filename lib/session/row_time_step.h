@@ -25,7 +25,7 @@ struct DetectedLights {
   /// Observations of all images, folder after folder, with their lights. `folder_sizes` has the
   /// number of images of each folder.
   Observations seen;
-  /// Number of images in each folder.
+  /// Number of images of each folder, in the order of `seen`.
   std::vector<std::size_t> folder_sizes;
   DetectorCamera camera;
 
@@ -69,15 +69,15 @@ RowTimeStepResult estimate_row_time_from_lights(const DetectedLights& seen,
 /// Row time given by a file or an option.
 struct GivenRowTime {
   double row_time_s;
-  /// Name of the file or of the option.
+  /// Name of the file or of the option that gives the row time, for messages.
   std::string source;
 };
 
 /// Row time measured from identified lamps, compared with the given one.
 struct RowTimeCheck {
-  /// std::nullopt: fewer than three lamps show trustworthy stripes.
+  /// Measured row time; std::nullopt if fewer than three lamps show reliable stripes.
   std::optional<RowTime> measured = {};
-  /// Contradiction in one line; empty if there is none.
+  /// Contradiction between measured and given row time, in one line; empty if they agree.
   std::string error = {};
 };
 

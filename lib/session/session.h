@@ -44,7 +44,7 @@ struct SessionOptions {
   std::filesystem::path gates_file = {};
   /// Makes plots, drives along lines and report.html, which take longer than all other results.
   bool report = true;
-  /// Steps to run even if nothing has changed.
+  /// Names of steps that are run even if their inputs have not changed.
   std::vector<std::string> redo = {};
 };
 
@@ -100,10 +100,9 @@ std::vector<MetricKind> list_session_metrics();
 ///
 /// Errors in the session, such as a bad file or a step that fails, are part of the result.
 /// @throws std::invalid_argument if the options are invalid
-/// @throws InputError if `session` is not a folder, the file of gates is invalid, or `results`
-/// holds
-///         captures or the results of another session, is in use by another run, or cannot be
-///         written
+/// @throws InputError if `session` is not a folder or the file of gates is invalid; if `results`
+///     holds captures or the results of another session, is in use by another run, or cannot be
+///     written
 SessionResult run_session(const std::filesystem::path& session,
                           const std::filesystem::path& results, const SessionOptions& options,
                           const SessionObserver& observer = {});

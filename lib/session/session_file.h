@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-/// Millimeters per meter, for the lengths in JSON.
+/// Millimeters per meter: factor of the lengths in JSON documents, which are in mm.
 inline constexpr double kMillimetersPerMeter = 1e3;
 
 /// Stored result of a step, with digests of its inputs and outputs. A later run reuses the result

@@ -61,7 +61,7 @@ class SessionResults {
 
   /// Removes the outputs and the record of a step.
   void remove_outputs_of_step(const std::string& step) const;
-  /// Removes outputs and records of all later steps.
+  /// Removes outputs and records of all steps after `step`.
   void remove_outputs_of_later_steps(const std::string& step) const;
   /// Removes outputs and record of the step evaluate, which depend on the gates. Does not require
   /// plan_steps().

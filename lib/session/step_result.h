@@ -43,7 +43,7 @@ struct RejectedLamp {
 /// Outcome common to all steps of the calibration. Texts are human-readable, one line each.
 struct StepResult {
   StepFailure failure = StepFailure::none;
-  /// Reason why there is no result, and the remedy.
+  /// Reason of the failure and the remedy, in one line; empty if the step succeeded.
   std::string why = {};
   /// File to correct; empty if the captures are the cause.
   std::filesystem::path subject = {};
@@ -70,7 +70,8 @@ struct StepResult {
   }
 };
 
-/// Returns the name of the enumerator, for example "wrong_map".
+/// Returns the name of a failure as in session.json: that of the enumerator, for example
+/// "wrong_map".
 std::string_view to_string(StepFailure failure);
 /// Returns the failure with this name; std::nullopt if there is none.
 std::optional<StepFailure> step_failure_from_name(std::string_view name);
