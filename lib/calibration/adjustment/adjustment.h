@@ -49,7 +49,7 @@ struct KnownPosition {
 
 /// One capture with its detections and sensor data.
 struct AdjustmentCapture {
-  /// For messages.
+  /// Name of the capture for messages.
   std::string name;
   std::vector<Detection> detections;
   std::optional<Inclination> inclination = {};
@@ -87,7 +87,7 @@ struct AdjustmentInput {
 
 /// Largest standard deviations of a quantity that counts as determined.
 struct AdjustmentLimits {
-  /// Limit of the zenith, in its worst direction.
+  /// Largest standard deviation of the zenith direction, in the direction in which it is largest.
   double zenith_rad = 0.005;
   /// Limit of the lever arm, in its worst direction, as a fraction of the lamps' height above the
   /// camera.
@@ -108,7 +108,8 @@ struct AdjustmentResult {
   /// Adjusted lamp map. Lamps that are not detected, or that are exact, keep their positions. sd_m
   /// is the RMS over the axes.
   LampMap refined;
-  /// Correction of one lamp and its standard deviation.
+  /// Correction of one lamp, adjusted minus surveyed position, in the world, and its standard
+  /// deviation per axis.
   struct LampCorrection {
     int id;
     Eigen::Vector3d correction_m, sd_m;
@@ -138,7 +139,7 @@ struct AdjustmentResult {
   /// Squared correction of the lens, normalized by its covariance, over the directions that
   /// captures determine.
   double lens_chi_squared = 0;
-  /// Number of these directions: the expectation of `lens_chi_squared`.
+  /// Number of directions of the lens in `lens_chi_squared`, which is its expectation.
   int lens_freedom = 0;
   /// True if `lens_chi_squared` exceeds its bound of one in ten thousand.
   bool lens_contradicted = false;
@@ -163,9 +164,9 @@ struct AdjustmentResult {
   bool ok() const { return undetermined.empty(); }
 };
 
-/// Returns a covariance for a lens whose calibration has none, for AdjustmentInput. An error of
-/// each intrinsic, taken alone, displaces the pixels of a grid over the image by `sd_px` (RMS per
-/// axis). Errors of different intrinsics are independent.
+/// Returns a nominal covariance of the intrinsics, in their order, for a lens whose calibration has
+/// none. An error of each intrinsic, taken alone, displaces the pixels of a grid over the image by
+/// `sd_px` (RMS per axis). Errors of different intrinsics are independent.
 /// @pre sd_px is positive
 MatrixX make_nominal_intrinsics_covariance(const Camera& camera, double sd_px);
 

@@ -30,7 +30,7 @@ struct AdjustmentLayout {
   /// Indices of the positions of the lamps and of the spots, in the world, m. Each has three
   /// coordinates; those of a spot are x, y of the axis and z of the camera.
   Eigen::Index lamps = 0, spots = 0;
-  /// Number of global unknowns.
+  /// Number of global unknowns, and index of the first local unknown.
   Eigen::Index global = 0;
 
   Eigen::Index lamp_state_index(std::size_t i) const {
@@ -65,14 +65,15 @@ struct AdjustmentResidual {
 /// Unknowns, observations and priors of an adjustment.
 class AdjustmentProblem {
  public:
-  /// Observation of a lamp in a capture.
+  /// Detection of a lamp in a capture. `capture` and `lamp` are indices in the lists of the
+  /// problem.
   struct Sighting {
     std::size_t capture, lamp;
     Eigen::Vector2d pixel;
     double sigma_px;
-    /// Maps residuals in pixels to standard deviations.
+    /// Matrix that converts a residual in px to one in units of its standard deviation.
     Eigen::Matrix2d whitening;
-    /// Readout time relative to the middle of the image.
+    /// Readout time of the pixel, s, relative to that of the middle of the image.
     double time_s;
     bool used = true;
   };
@@ -134,7 +135,7 @@ class AdjustmentProblem {
   std::vector<bool> place_used;
   /// True if some residual depends on the lever arm.
   bool has_lever_arm = false;
-  /// Factor of sigma_px.
+  /// Factor by which all sigma_px are multiplied.
   double noise_scale = 1;
 
   /// Solves by least squares from the current state and updates it. With `robust`, applies a Cauchy

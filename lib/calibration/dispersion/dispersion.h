@@ -57,9 +57,9 @@ std::string_view describe(DispersionStatus status);
 /// the status is `ok`.
 struct DispersionFit {
   DispersionStatus status = DispersionStatus::no_fix;
-  /// Number of captures without a fix.
+  /// Number of captures for which no position fix exists.
   int captures_without_fix = 0;
-  /// Reason why the first of them has none.
+  /// Status of the first capture without a fix; `ok` if all have one.
   FixStatus no_fix_status = FixStatus::ok;
   /// True if all detections state their sigma_px.
   bool noise_is_stated = false;
@@ -72,20 +72,22 @@ struct DispersionFit {
   /// errors of the reference point or the lamp map. Absent for method `paper`, which assumes that
   /// it is zero.
   std::optional<Eigen::Vector2d> world_offset_m = {};
-  /// Covariance of `world_offset_m` from noise and map.
+  /// Covariance of `world_offset_m`, m^2, from noise and lamp map.
   Matrix2 world_covariance = Matrix2::Zero();
 
   /// Position fix of one capture.
   struct ReferencePointFix {
-    /// Index of the capture.
+    /// Index of the capture in the input.
     std::size_t capture;
-    /// Fix minus reference point, without any dispersion correction and with the estimated one.
+    /// Fix minus reference point, horizontally in the world, without any dispersion correction and
+    /// with the estimated one.
     Eigen::Vector2d before_m, after_m;
     /// False if the fix contradicts the other fixes and is rejected.
     bool used;
   };
   std::vector<ReferencePointFix> fixes = {};
-  /// Dispersion circles of the fixes that are used.
+  /// Dispersion circles, m, of the used fixes' errors without and with the dispersion correction,
+  /// in the world.
   Circle before = {{0, 0}, 0}, after = {{0, 0}, 0};
 };
 

@@ -29,15 +29,15 @@ class ReferencePointFixes {
  public:
   /// Position fix of one capture for a given offset.
   struct Estimate {
-    /// Fix minus reference point.
+    /// Fix minus reference point (x, y), in the world.
     Eigen::Vector2d error_m;
-    /// Covariance from the noise of this capture alone. Errors that all captures have in common do
-    /// not scatter the fixes.
+    /// Covariance of the fix, m^2, from the noise of this capture alone. Errors that all captures
+    /// have in common do not scatter the fixes.
     Eigen::Matrix2d covariance;
     double yaw_rad;
     /// Mean height above the camera of the detected lamps of the map.
     double height_m;
-    /// Sum of the squared residuals of the lamps.
+    /// Sum of the squared residuals of the lamps' pixels, over both axes.
     double squared_residuals_px2;
     /// Degrees of freedom of `squared_residuals_px2`.
     int degrees_of_freedom;
@@ -66,12 +66,12 @@ class ReferencePointFixes {
   FixStatus first_failure_ = FixStatus::ok;
 };
 
-/// Fix of each capture.
+/// Fix of each capture, in their order; std::nullopt for captures without a fix.
 using OptionalFixes = std::vector<std::optional<ReferencePointFixes::Estimate>>;
 
 /// Means over the fixes that are used.
 struct MeanFix {
-  /// Mean of the unit vectors along the yaws.
+  /// Mean of the unit vectors (cos yaw, sin yaw); shorter than 1 if the yaws differ.
   Eigen::Vector2d heading = Eigen::Vector2d::Zero();
   /// Mean height of the lamps above the camera.
   double height_m = 0;

@@ -23,7 +23,7 @@ class BoardLattice {
   ///     one row or column
   explicit BoardLattice(const Board& board);
 
-  /// Number of parts of the board: 1 or 4.
+  /// Number of parts into which the board is divided: 1 or 4.
   std::size_t num_parts() const { return parts_; }
   /// Number of points along the width and the height of a part.
   int cols() const { return cols_; }
@@ -45,7 +45,7 @@ class BoardLattice {
     /// Displacement of the corner, px, per px by which the edges of its tag move inwards. 0 for
     /// corners between touching squares, which do not move.
     Eigen::Vector2d inward{0, 0};
-    /// Factor by which the residual is multiplied.
+    /// Factor by which a solve multiplies the residual of the corner.
     double weight = 1;
     /// Curvature of the tag's edge from this corner to the tag's next corner.
     EdgeCurvature bow = {};

@@ -90,7 +90,7 @@ struct Linearization {
   /// Transposed Jacobian with a column per residual: those of the points first, then the
   /// regularization.
   Eigen::SparseMatrix<double> jacobian_transposed;
-  /// State divided by packed state.
+  /// Ratio of the state to the packed state, element by element.
   Eigen::VectorXd scale;
   /// First intrinsic parameter in the state, which begins with the intrinsics; index of the poses
   /// in the state (6 entries each). The warp follows the poses.
@@ -101,7 +101,7 @@ Linearization linearize(const BoardProblem& problem, const SolveOptions& what);
 
 /// Returns true if mrcal has the lens model.
 bool is_supported_by_mrcal(LensModel model);
-/// Implementations of solve() and linearize().
+/// Implementations of solve() and linearize() by mrcal and by Ceres.
 bool solve_by_mrcal(BoardProblem& problem, const SolveOptions& what);
 bool solve_by_ceres(BoardProblem& problem, const SolveOptions& what);
 Linearization linearize_by_mrcal(const BoardProblem& problem, const SolveOptions& what);

@@ -14,7 +14,7 @@
 
 namespace vlp {
 
-/// Uncertainty of a solution.
+/// Uncertainty of the lens of a solution, over the image.
 struct CalibrationReport {
   /// Region of the image where the lens is calibrated (compute_valid_lens_region()): polygon, px.
   /// `region_fraction` is its area as a fraction of the image, 0 to 1.
@@ -58,7 +58,7 @@ CalibrationReport compute_calibration_report(const IntrinsicsSolution& solution,
 std::vector<double> compute_held_out_view_rms_px(const IntrinsicsSolution& solution,
                                                  const IntrinsicsInput& held_out);
 
-/// Fit of all held-out views together.
+/// Residuals of all held-out views together, for the lens of the other views.
 struct HeldOutFit {
   int views = 0, corners = 0;
   /// RMS residual per axis, px.
@@ -78,7 +78,7 @@ struct ViewCoverage {
   /// Largest angle over the views by which the left, right, upper and lower side of the board, as
   /// in the image, is nearer to the camera; rad.
   std::array<double, 4> tilts_rad{};
-  /// Largest angle between two of the boards, rad.
+  /// Largest angle between the boards of two views, rad.
   double tilt_rad = 0;
 };
 /// Computes the coverage of the views in a solution. `input`: input of its solve.

@@ -24,7 +24,8 @@ struct CornerError {
 struct CornerVariance {
   double floor_px2 = 0, scale2 = 0;
 
-  /// Returns the variance of a corner, px^2.
+  /// Returns the variance of a corner per axis, px^2. `sd_px` is its standard deviation from pixel
+  /// noise.
   double at(double sd_px) const { return floor_px2 + scale2 * sd_px * sd_px; }
 };
 

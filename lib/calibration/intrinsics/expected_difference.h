@@ -10,7 +10,8 @@
 
 namespace vlp {
 
-/// Expected compute_projection_difference() between a lens and the true one.
+/// Expected difference between the projections of an estimated lens and the true one
+/// (compute_projection_difference()).
 struct ExpectedDifference {
   /// Expected RMS distance between the projections of the two lenses over the image, per axis, px.
   double rms_px;

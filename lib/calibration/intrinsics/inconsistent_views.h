@@ -15,7 +15,7 @@ struct InconsistentViews {
   /// Indices of the inconsistent views in IntrinsicsInput::views, ascending. Empty if all views
   /// fit.
   std::vector<std::size_t> views;
-  /// Number of the other views.
+  /// Number of the other views, which fit.
   std::size_t others = 0;
   /// Median residual of a corner, px: in the worst of the views, and in the typical view. The worst
   /// is infinite for a view that fits no pose.
@@ -23,11 +23,12 @@ struct InconsistentViews {
 };
 
 /// Finds views that do not fit the lens of the other views:
-/// - views that fit no pose (IntrinsicsSolution::dropped), unless a single view is all that is
-///   found
+/// - views that fit no pose (IntrinsicsSolution::dropped), unless only a single view is found
 /// - views with a median residual of at least three times that of the typical view, if at least 10
-///   % of their corners are outliers of the solve Returns no view if half of all views or more are
-///   found: then the views of the camera cannot be identified.
+///   % of their corners are outliers
+///
+/// Returns no view if half of all views or more are found: then the views of the camera cannot be
+/// identified.
 ///
 /// Reason for both conditions: a view of a bent board or of a shaken camera has large residuals
 /// without outliers of the solve. Single misdetected tags are outliers in a view whose median is

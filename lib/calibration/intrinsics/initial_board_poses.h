@@ -16,10 +16,11 @@ struct InitialPoses {
   /// IntrinsicsInput::views. Infinity for a view without a pose.
   std::vector<double> rms_px;
 };
-/// Estimates the poses of all views with a lens.
+/// Estimates camera_from_board of each view with a lens (estimate_board_view_pose()).
 InitialPoses estimate_initial_board_poses(const IntrinsicsInput& input, const Lens& lens);
 
-/// Returns LENSMODEL_STEREOGRAPHIC with its principal point in the middle of the image.
+/// Returns a lens of model STEREOGRAPHIC with this focal length, px, and its principal point in the
+/// middle of the image.
 Lens make_stereographic_lens(const IntrinsicsInput& input, double focal_px);
 
 /// Returns focal lengths of a geometric series, px, in ascending order of the median RMS residual

@@ -37,13 +37,13 @@ enum class IntrinsicsStatus {
 /// Describes a status in one line, with the remedy.
 std::string_view describe(IntrinsicsStatus status);
 
-/// Solution and its fit.
+/// Result of solve_intrinsics(): lens, poses and board warp with their fit.
 struct IntrinsicsSolution {
   IntrinsicsStatus status;
   /// Problem at the solution; like all members below, valid with status ok only. The poses are
   /// those of the parts of views[0], then of views[1] and so on; each has its points.
   BoardProblem problem;
-  /// Views in the solution, as indices of the input.
+  /// Indices in IntrinsicsInput::views of the views in the solution.
   std::vector<std::size_t> views;
   /// View that fits no pose, although the other views do, and its RMS residual.
   struct Dropped {
@@ -57,7 +57,7 @@ struct IntrinsicsSolution {
   /// RMS of the weighted residuals per axis, without outliers: sqrt(sum of squares / (2 corners)),
   /// px.
   double rms_px;
-  /// Number of corners without outliers, and number of outliers.
+  /// Number of used corners, and number of corners that are outliers.
   int corners, outliers;
 
   bool ok() const { return status == IntrinsicsStatus::ok; }
@@ -81,10 +81,9 @@ struct IntrinsicsSolution {
 /// 3. Solves the requested model, regularized as in mrcal, and re-estimates the poses. Drops views
 ///   that fit no pose. Splined lenses: see below.
 /// 4. Corrects the corners of the tags for the edge curvature of this lens
-/// (correct_corners_for_curved_edges()).
+///   (correct_corners_for_curved_edges()).
 /// 5. Corrects the shift of the tag edges, constant over a view
-/// (estimate_tag_edge_displacements()), and solves again,
-///   at most twice.
+///   (estimate_tag_edge_displacements()), and solves again, at most twice.
 /// 6. Estimates the warp of the board (WarpChoice).
 /// 7. Weights the corners by their variances if the images provide them (CornerWeights). Repeats
 ///   stage 4, then stage 5 with shifts that vary over a view, then the weights.

@@ -48,7 +48,7 @@ class IntrinsicsSolver {
   /// true also if the rotation has not converged.
   bool rotate_camera_frame_to_optical_axis();
 
-  /// Returns the current solution.
+  /// Returns the current state as a solution.
   IntrinsicsSolution make_solution() const;
 
  private:

@@ -43,7 +43,8 @@ struct LensEstimate {
   std::string problem = {};
 
   IntrinsicsSolution solution{};
-  /// With the board's print in `uncertainty_mean_px` and `uncertainty_worst_px`.
+  /// Uncertainty of the lens. `uncertainty_mean_px` and `uncertainty_worst_px` include the error of
+  /// the printed board.
   CalibrationReport report{};
   ViewCoverage coverage{};
   HeldOutFit held_out{};

@@ -50,7 +50,7 @@ struct LensSharpness {
   Map light{24, 18};
 
   double mean_mtf50 = kUnknown;
-  /// Smallest MTF50 of a part divided by the mean.
+  /// Smallest MTF50 of a part of the image divided by the mean.
   double worst_ratio = kUnknown;
   /// Upper bound of the difference of the MTF50 between directions from the middle of the image,
   /// divided by the mean: 2 (|c1| + |c2|) of the terms c1 cos(t - t1) + c2 cos(2 (t - t2)) around

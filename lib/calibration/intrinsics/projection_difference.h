@@ -13,8 +13,8 @@
 
 namespace vlp {
 
-/// Returns a grid of pixels over the image including its edges: `cols` columns, and rows about
-/// equally far apart.
+/// Returns a regular grid of pixels (u, v) over the image including its edges, row by row. It has
+/// `cols` columns, and rows about equally far apart.
 std::vector<Eigen::Vector2d> make_regular_pixel_grid(const std::array<int, 2>& imager_px,
                                                      int cols = 41);
 
@@ -24,7 +24,7 @@ std::vector<Eigen::Vector2d> make_regular_pixel_grid(const std::array<int, 2>& i
 std::optional<Eigen::Matrix3d> fit_rotation_between_lenses(const Lens& a, const Lens& b,
                                                            std::span<const Eigen::Vector2d> pixels);
 
-/// Difference of two lenses over the image.
+/// Difference between the projections of two lenses over the image.
 struct ProjectionDifference {
   /// Mean and maximum distance between the projections, px.
   double mean_px, worst_px;

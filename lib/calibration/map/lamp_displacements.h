@@ -21,9 +21,9 @@ struct CeilingView {
     Eigen::Vector2d projected_m;
     double above_camera_m;
   };
-  /// Position of the camera.
+  /// Horizontal position of the camera in the world.
   Eigen::Vector2d camera_m;
-  /// Each lamp at most once.
+  /// Projected detections; each lamp occurs at most once.
   std::vector<ProjectedLamp> lamps;
   /// Rotation about the vertical from the level camera to the world; required for an unknown tilt.
   double yaw_rad = 0;
@@ -33,7 +33,7 @@ struct CeilingView {
 /// map, horizontal, in the world. If a single lamp moved by d, its displacement is d.
 struct LampOffset {
   int lamp;
-  /// Number of captures that contribute.
+  /// Number of captures that contribute to the displacement.
   int captures;
   Eigen::Vector2d map_m, offset_m, sd_m;
 };
@@ -47,7 +47,7 @@ struct LampDisplacements {
   /// Residuals of the detections rejected as outliers, by lamp. Includes lamps that are absent from
   /// `lamps` because too few of their detections are left.
   std::map<int, std::vector<double>> outliers_m = {};
-  /// Displacements, two rows per lamp.
+  /// Displacement (x, y) of each lamp in the world, two rows per lamp, in the order of `lamps`.
   Eigen::VectorXd displacement_m;
   /// Covariance of the displacements; projector onto the displacements that are no similarity of
   /// the map.
@@ -57,7 +57,8 @@ struct LampDisplacements {
   Eigen::MatrixXd information;
   /// Rotation about x and y of the level frame, as the displacement (a, b) of a point straight up.
   Eigen::Vector2d tilt{0, 0};
-  /// Residuals of each view, two rows per lamp.
+  /// Residuals of each view on the ceiling, two rows per detection in the order of
+  /// CeilingView::lamps.
   std::vector<Eigen::VectorXd> residuals_m = {};
   double degrees_of_freedom = 0;
   /// Height of a lamp above the camera, in the first capture.

@@ -55,7 +55,7 @@ std::string describe(std::span<const MapError> errors);
 /// Result of detect_misplaced_or_swapped_lamps().
 struct MapErrors {
   std::vector<MapError> errors;
-  /// Offset of every lamp, including insignificant ones.
+  /// Horizontal offset of every lamp from its position in the map, including insignificant ones.
   std::vector<LampOffset> offsets;
 
   /// Returns true if the map cannot be used: two lamps are swapped, or it is mirrored.

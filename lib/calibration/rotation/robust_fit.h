@@ -46,16 +46,17 @@ class RobustFit {
   /// Repeats the final fit without outliers, from the current parameters. Returns false if Ceres
   /// finds no usable solution.
   bool refine();
-  /// Returns false for each rejected residual, in the order of add().
+  /// Returns, for each residual in the order of add_residual(), true if it is used and false if it
+  /// is rejected.
   const std::vector<bool>& used() const { return used_; }
-  /// Returns the norm of each residual, including outliers, in the order of add().
+  /// Returns the norm of each residual, including outliers, in the order of add_residual().
   const std::vector<double>& residual_norms() const { return lengths_; }
   /// Returns the number of rows of the used residuals minus the number of free parameters.
   int degrees_of_freedom() const;
 
   /// Used residuals and unknowns at the solution.
   struct Linearization {
-    /// Used residual: its index in the order of add(), and its derivatives with respect to
+    /// Used residual: its index in the order of add_residual(), and its derivatives with respect to
     /// `unknowns`, including fixed ones.
     struct Residual {
       std::size_t index;
@@ -65,9 +66,9 @@ class RobustFit {
     std::vector<Residual> residuals;
     /// Index of the first unknown of each parameter, in the order in which residuals refer to them.
     std::map<const double*, Eigen::Index> first_unknown;
-    /// (J^T J)^-1; zero for fixed unknowns.
+    /// Inverse (J^T J)^-1 of the normal equations; zero for fixed unknowns.
     Eigen::MatrixXd inverse;
-    /// Variance of the residuals found.
+    /// Variance of the used residuals per component, in the units of the residuals squared.
     double variance;
 
     /// Returns the covariance s^2 (J^T J)^-1 of two parameters of size two. Its rows belong to

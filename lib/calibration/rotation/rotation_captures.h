@@ -39,11 +39,11 @@ struct RotationCapture {
   double yaw_rad;
 };
 
-/// Captures at one height.
+/// Captures of a rotation in place that were taken at one height of the camera.
 struct RotationHeight {
   /// Height of the camera in the world.
   double z_m;
-  /// Position of the rotation axis in the world.
+  /// Horizontal position of the rotation axis in the world.
   Eigen::Vector2d axis_m;
   /// Angular range of the yaws: 2 pi minus the largest gap between neighboring yaws.
   double arc_rad;
@@ -106,7 +106,7 @@ struct RotationCaptures {
 /// captures at one height differ by less than this, because floors are uneven and lamp maps have
 /// errors.
 inline constexpr double kMinHeightGapFraction = 0.01;
-/// Smallest angular range that determines a rotation center.
+/// Smallest angular range of the yaws that determines a rotation center: 90 degrees, in rad.
 inline constexpr double kMinArc_rad = 1.5707963267948966;
 
 /// Finds the rotation in place in the captures: yaws, heights, axes, and approximate tilt and lever

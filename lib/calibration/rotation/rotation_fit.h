@@ -20,9 +20,9 @@ struct RotationOutlier {
   double distance_px;
 };
 
-/// Rotation center that one of the methods found.
+/// Rotation center estimated by one of the methods, with residuals and outliers.
 struct RotationFit {
-  /// If false, the other members are not valid.
+  /// True if the fit succeeded; otherwise the other members are not valid.
   bool converged = false;
   /// Rotation center with its covariances. They are scaled by the residuals of the fit; sigma_px of
   /// the detections only sets relative weights. They include the map's sd_m if the method depends

@@ -16,7 +16,7 @@ struct RotationFix {
   Pose pose;
   /// Mean height of the detected lamps above the camera, m. Only lamps of the map count.
   double height_m;
-  /// Index of the spot.
+  /// Index of the spot, at which the rotation axis stays at one position.
   std::size_t pivot;
 };
 
@@ -24,9 +24,10 @@ struct RotationFix {
 struct RotationModelFit {
   std::vector<Eigen::Vector2d> axes_m;
   Eigen::Vector2d lever_arm_m;
-  /// Error of the normalized points: the true zenith is seen at -delta.
+  /// Tilt error as an offset of the normalized points (x/z, y/z): the true zenith is seen at
+  /// -delta.
   Eigen::Vector2d delta;
-  /// Distance of each fix from its predicted position.
+  /// Horizontal distance of each fix from its predicted position.
   std::vector<double> residuals_m;
 };
 
