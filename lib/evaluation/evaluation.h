@@ -43,15 +43,16 @@ struct EvaluationInput {
 
 /// Accuracy of fixes. Without any fix, only the members up to `missing` are valid.
 struct Evaluation {
-  /// Reference: "truth", "path" or "line".
+  /// Kind of the reference of the errors: "truth", "path" or "line".
   std::string reference;
   std::size_t captures = 0, fixes = 0;
-  /// Number of captures without a fix, by status.
+  /// Number of captures without a fix, by the word of their status.
   std::map<std::string, std::size_t> missing;
   double missing_fraction() const {
     return static_cast<double>(captures - fixes) / static_cast<double>(captures);
   }
 
+  /// Statistics of the horizontal errors (lengths), m.
   ErrorStatistics horizontal_m{};
   std::vector<std::pair<double, double>> distribution_m;
   std::optional<ErrorIntervals> intervals_m;

@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-/// Summary of a run of fixes.
+/// Summary of the fixes of a set of frames: counts, lamps, residuals, reported standard deviations.
 struct FixSummary {
   std::size_t frames = 0;
   std::size_t fixes = 0;
@@ -34,7 +34,7 @@ struct FixSummary {
   std::optional<Spread> median_sd;
 };
 
-/// Summarizes fixes.
+/// Counts fixes and failures, and computes the medians over the fixes.
 FixSummary summarize_fixes(std::span<const FixRow> rows);
 
 }  // namespace vlp

@@ -23,7 +23,7 @@ enum class MetricSource {
   reference
 };
 
-/// Direction of a limit.
+/// Direction of a limit: the metric has to be at most, or at least, the limit.
 enum class Direction { at_most, at_least };
 
 /// Returns "at most" or "at least".
@@ -35,12 +35,12 @@ struct MetricKind {
   /// Unit of values and limits: "mm", "px", "deg", "%"; empty for a fraction (0 to 1) or a ratio.
   const char* unit;
   MetricSource source;
-  /// Description, and what the metric requires.
+  /// Description of the metric, and the data that it requires, human-readable.
   const char* meaning;
   /// Probable cause of a failed gate, for humans: "the lens is decentered".
   const char* cause;
   Direction direction = Direction::at_most;
-  /// Largest valid limit: 1 for a fraction.
+  /// Largest limit that a gate of this metric may have; 1 for a fraction.
   double largest = 1e6;
   /// True for a property of the camera; false for one of the equipment or the procedure.
   bool of_camera = true;

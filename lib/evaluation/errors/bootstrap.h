@@ -8,7 +8,7 @@
 
 namespace vlp {
 
-/// 95 % confidence interval.
+/// 95 % confidence interval from `low` to `high`, in the unit of the statistic.
 struct Interval {
   double low, high;
 };
@@ -17,7 +17,7 @@ struct Interval {
 /// the unit of the errors.
 struct ErrorIntervals {
   Interval mean, median;
-  /// std::nullopt for fewer than kMinClustersForP90 clusters.
+  /// Interval of the 90th percentile; std::nullopt for fewer than kMinClustersForP90 clusters.
   std::optional<Interval> p90;
   Interval rms;
   /// Number of clusters that were resampled.

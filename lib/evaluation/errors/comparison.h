@@ -29,7 +29,8 @@ inline constexpr double kMinDifferenceFraction = 0.01;
 struct Comparison {
   /// Number of captures with a fix in both, in the first only, in the second only.
   std::size_t pairs = 0, only_these = 0, only_others = 0;
-  /// Number of pairs in which the first error is smaller, or larger.
+  /// Number of pairs in which the first error is smaller, and in which it is larger, than the
+  /// second.
   std::size_t smaller = 0, larger = 0;
   /// Number of clusters (FixError::cluster) of the pairs.
   std::size_t clusters = 0;
@@ -37,7 +38,7 @@ struct Comparison {
   /// of the differences, resampled by the clusters of the first).
   double mean_difference_m = 0;
   std::optional<Interval> interval_m;
-  /// Smallest difference that matters in this comparison.
+  /// Smallest relevant difference of the mean errors in this comparison (kMinDifference_m).
   double min_relevant_m = kMinDifference_m;
 
   bool has_too_few_clusters() const { return clusters < kMinClustersCompared; }

@@ -46,15 +46,15 @@ std::vector<std::pair<double, double>> compute_percentiles(std::vector<double> e
 struct BiasAndRepeatability {
   /// Reference point and the statistics of its fixes.
   struct Station {
-    /// True position of its first capture.
+    /// True position (x, y) of its first capture, in the world.
     Eigen::Vector2d xy_m;
     std::size_t fixes;
-    /// Mean of its horizontal errors e.
+    /// Mean of its horizontal errors e (x, y), in the world.
     Eigen::Vector2d bias_m;
     /// Horizontal standard deviation of x and y together, sqrt(sum |e - bias|^2 / (fixes - 1)).
     double sd_m;
   };
-  /// Reference points in the order of the ground truth.
+  /// Reference points with two fixes or more, in the order of the ground truth.
   std::vector<Station> stations;
   std::size_t fixes;
   /// Repeatability within reference points, sqrt(sum |e - bias of its station|^2 / (fixes -

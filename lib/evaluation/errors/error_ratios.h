@@ -39,7 +39,7 @@ struct CrlbRatio {
   /// can reach with this noise from one image of a level camera. Other frames, a known height, or
   /// partly visible lamps are additional information and not included.
   double horizontal;
-  /// RMS limit of those fixes, x and y together.
+  /// RMS of the horizontal limit over those fixes, x and y together: sqrt(mean (var x + var y)).
   double limit_m;
   /// Number of fixes at whose true pose there is a limit.
   std::size_t fixes;

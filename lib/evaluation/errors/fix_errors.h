@@ -52,7 +52,7 @@ ErrorComponent collect_component(const std::vector<FixError>& errors, const Valu
 struct FixErrors {
   /// Number of captures that should have a fix.
   std::size_t captures = 0;
-  /// Number of captures without a fix, by status.
+  /// Number of captures without a fix, by the word of their status.
   std::map<std::string, std::size_t> missing;
   /// Errors in the order of the fixes.
   std::vector<FixError> errors;

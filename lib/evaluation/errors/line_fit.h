@@ -13,7 +13,7 @@
 
 namespace vlp {
 
-/// Commanded straight line: start and end.
+/// Commanded straight line: its start and end (x, y) in the world, m.
 using CommandedLine = std::array<Eigen::Vector2d, 2>;
 
 /// Straight line fitted to the horizontal positions of fixes, with its angle and distances from the
@@ -22,7 +22,8 @@ struct LineFit {
   /// First and last perpendicular foot of the fixes on the line, in the direction of the commanded
   /// line.
   CommandedLine line_m;
-  /// Angle from the commanded line's direction, counter-clockwise, within 90 degrees.
+  /// Angle from the commanded line's direction to the fitted line, counter-clockwise seen from
+  /// above, within 90 degrees.
   double angle_rad;
   /// RMS distance of the fixes from the fitted line: the jitter that the fit averages out.
   double jitter_m;
