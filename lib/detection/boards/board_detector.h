@@ -83,7 +83,7 @@ struct PointDetection {
   /// BoardLattice::point_index().
   std::size_t index;
   Eigen::Vector2d pixel;
-  /// Factor of its residual.
+  /// Factor by which a solve multiplies the residual of the point.
   double weight = 1;
 };
 
@@ -107,7 +107,7 @@ struct BoardDetection {
   /// after correct_views_for_tone_curve().
   std::vector<double> curve_costs = {};
 
-  /// Returns true if there are corners for a calibration.
+  /// Returns true if a tag or a point was detected.
   bool has_corners() const { return !tags.empty() || !points.empty(); }
 };
 

@@ -13,7 +13,7 @@ struct EdgeSample {
   /// Direction of the edge in the image (u, v), of unit length. The sign has no effect.
   Eigen::Vector2d along;
   double value;
-  /// Relative standard deviation of `value`.
+  /// Standard deviation of `value` divided by `value`.
   double sd;
 };
 

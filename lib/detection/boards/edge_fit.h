@@ -41,7 +41,8 @@ struct EdgeCurve {
   double distance_from_curve_px(const Eigen::Vector2d& x) const {
     return across.dot(x - middle) - curve_displacement_px(along.dot(x - middle) / half_px);
   }
-  /// Returns the gradient of the distance from the curve.
+  /// Returns the gradient of distance_from_curve_px() with respect to the pixel (u, v);
+  /// dimensionless.
   Eigen::Vector2d compute_distance_gradient(const Eigen::Vector2d& x) const;
 };
 
@@ -49,7 +50,7 @@ struct EdgeCurve {
 Eigen::Vector2d find_edge_intersection(const EdgeCurve& a, const EdgeCurve& b,
                                        Eigen::Vector2d point);
 
-/// Prior of the edges of an image.
+/// Prior for the fit of an edge: tone curve, and expected blur and light.
 struct EdgePrior {
   /// Tone curve, level = 255 (light / 255)^(1 / gamma).
   double gamma = 1;

@@ -32,7 +32,7 @@ std::unique_ptr<TagFinder> make_aruco_detector(const Board& board);
 
 /// Marker of one of OpenCV's dictionaries as printed by its ArUco module, without the black border.
 struct ArucoMarker {
-  /// Number of bits along an edge.
+  /// Number of bits along an edge of the marker, without the border.
   int width;
   /// Bits row by row from the top left; true is white.
   std::vector<bool> white;

@@ -43,19 +43,20 @@ bool image_matches_tag_bits(const TagDetection& tag, const cv::Mat1f& levels,
 /// Printed pattern next to the edges of a board's tags, in bits.
 class TagGeometry {
  public:
-  /// Segment along a side; distances from the first corner of the side.
+  /// Segment along a side; distances from the first corner of the side, in bits.
   struct Segment {
     double from, to;
   };
   /// Segments of each side, from corner k to k + 1 in the order of TagDetection.
   using Sides = std::array<std::vector<Segment>, 4>;
 
+  /// Computes the geometry of the tags of a board.
   /// @throws std::invalid_argument if libapriltag does not have the family
   explicit TagGeometry(const Board& board);
 
-  /// Width of a tag, with its border.
+  /// Width of a tag with its border, in bits.
   double width() const { return width_; }
-  /// Width of the uniform stripe along an edge, inside and outside the tag.
+  /// Width of the uniform stripe along an edge, inside and outside the tag, in bits.
   double inner_stripe_width() const { return inside_; }
   double outer_stripe_width() const { return outside_; }
   /// Returns the segments in which white bits adjoin the black stripe inside the edge. Empty for
