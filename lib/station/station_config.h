@@ -40,9 +40,9 @@ struct GoldenUnit {
 /// Command of the factory that runs after each verdict, for example to print labels, to update the
 /// factory's system, or to write to the device.
 struct Hook {
-  /// Program and its arguments, passed without a shell.
+  /// Path of the program and its arguments, passed without a shell.
   std::vector<std::string> command;
-  /// Working directory.
+  /// Working directory of the command.
   std::filesystem::path folder;
   /// Time limit, s. The command and all processes of its group are killed when it is exceeded.
   double time_limit_s = 30;
@@ -74,7 +74,8 @@ struct StationConfig {
   std::string type_file;
   Board board;
   LampMap lamps;
-  /// Position of the camera in the step `dispersion`, unless its captures.csv contains positions.
+  /// Position (x, y) of the camera in the world in the step `dispersion`, unless its captures.csv
+  /// contains positions.
   std::optional<Eigen::Vector2d> dispersion_station_m;
   CompletionCriteria sufficient;
   /// Acceptance limits of images.
@@ -84,7 +85,8 @@ struct StationConfig {
   /// Gates, with guard bands if `guard_bands` contains standard uncertainties.
   std::vector<Gate> gates;
   std::optional<GoldenUnit> golden;
-  /// Requires a golden unit.
+  /// Limits after which the golden unit has to be measured again; std::nullopt: none. Requires a
+  /// golden unit.
   std::optional<VerificationInterval> verify_due;
   /// ECMAScript regular expression that the whole serial of a unit must match; empty if every
   /// serial is valid.
@@ -94,7 +96,7 @@ struct StationConfig {
   /// Folder in which the images of a unit arrive, as CAPTURES/CAMERA/STEP/, and folder of the
   /// results.
   std::filesystem::path captures, results;
-  /// SQLite file, or postgresql://...
+  /// Database of the records: SQLite file, or postgresql:// address.
   std::string records;
   /// Input files: station.yaml, then the files named in it.
   std::vector<std::filesystem::path> inputs = {};

@@ -36,7 +36,7 @@ void append_to_audit_trail(soci::session& sql, const std::string& run, bool is_n
 /// Appends entries of all runs, for records of an earlier version without a trail.
 void append_all_runs_to_audit_trail(soci::session& sql);
 
-/// Result of comparing the records with their trail.
+/// Result of check_audit_trail(): numbers of runs and entries, and differences.
 struct TrailCheck {
   std::size_t runs = 0, entries = 0;
   /// Digest of the last entry; empty if there is none.

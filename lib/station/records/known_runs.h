@@ -70,7 +70,7 @@ class KnownRuns {
 /// Numbers of runs by result; voided runs are counted separately.
 struct RunCounts {
   std::size_t passed = 0, failed = 0, invalid = 0, voided = 0;
-  /// Judged runs of units, and those that passed.
+  /// Number of judged runs of units that passed, and number of all judged runs of units.
   std::size_t units_passed = 0, units_judged = 0;
   /// Cameras with judged runs as units: all, those whose first run passed, and those with two runs
   /// or more.

@@ -23,7 +23,7 @@ struct RunFilter {
   /// End of the run: at or after `since`, and before `until`, UTC, as 2026-11-21 or
   /// 2026-11-21T13:45.
   std::string since = {}, until = {};
-  /// Digest of an image that the run uses.
+  /// SHA-256 of an image that a selected run uses.
   std::string image_sha256 = {};
   /// True for runs with an open hook only (is_hook_pending()).
   bool has_open_hook = false;
@@ -31,14 +31,14 @@ struct RunFilter {
   int last = 0;
 };
 
-/// Run in a list.
+/// Texts of a run for a list of runs.
 struct RunSummary {
   std::string run, kind, station, camera, ended_utc, verdict, causes;
   /// Reason for voiding it; empty if it is not voided.
   std::string voided = {};
 };
 
-/// Metric of one run.
+/// Value of a metric in one run, in the unit of the metric.
 struct TrendPoint {
   std::string run, station, camera, verdict, ended_utc;
   double value;
@@ -85,8 +85,7 @@ class RecordsRefused : public RecordsOffline {
 /// - the file cannot be opened,
 /// - another program holds a lock, or
 /// - the time limit expired: get_database_timeout_s(), 10 times that for queries of many runs
-/// (without
-///   RunFilter::image_sha256), 360 times that for creating or migrating tables.
+///   (without RunFilter::image_sha256), 360 times that for creating or migrating tables.
 class Records {
  public:
   explicit Records(const std::string& where);

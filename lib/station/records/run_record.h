@@ -16,7 +16,7 @@
 
 namespace vlp {
 
-/// Result of a run.
+/// Result of a station run for a unit.
 enum class Verdict {
   /// The camera was measured and meets all limits.
   pass,
@@ -76,12 +76,12 @@ RunEvent make_run_event_now(const std::string& what, const std::string& text,
 struct RunRecord {
   /// Unique id over all stations (make_run_id()).
   std::string run;
-  /// "unit", or "golden" for the station's reference camera.
+  /// Kind of the run: "unit", or "golden" for the station's reference camera.
   std::string kind;
   std::string station, camera;
   /// Operator and shift, if given.
   std::string operator_name, shift;
-  /// As 2026-11-21T13:45:01Z.
+  /// Start and end of the run in UTC, as 2026-11-21T13:45:01Z.
   std::string begun_utc, ended_utc;
   /// Verdict (to_string()), and its causes, one per line, the primary cause first.
   std::string verdict, causes;

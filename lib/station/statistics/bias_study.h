@@ -29,7 +29,7 @@ struct EstimateTest {
   bool is_significant() const;
 };
 
-/// Bias of one unit.
+/// Bias of the measured values of one reference unit. `mean` and `sd` are those of its values.
 struct UnitBias {
   std::string unit;
   double reference = 0;

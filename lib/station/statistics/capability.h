@@ -43,7 +43,7 @@ struct CapabilityIndex {
 struct Capability {
   std::size_t count = 0;
   double mean = 0, within_sd = 0, overall_sd = 0;
-  /// Requires two limits.
+  /// Indices Cp and Pp; std::nullopt with a single limit.
   std::optional<CapabilityIndex> cp = {}, pp = {};
   CapabilityIndex cpk{}, ppk{};
 };

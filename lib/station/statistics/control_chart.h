@@ -48,7 +48,7 @@ struct Ewma {
 Ewma compute_ewma(std::span<const double> values, double target, double sigma, double weight,
                   double width = 3);
 
-/// Value at which a pattern ends.
+/// Alarm of a control chart. `index` is the value at which the pattern of the rule ends.
 struct ChartAlarm {
   std::string rule, meaning;
   std::size_t index;

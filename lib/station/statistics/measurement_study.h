@@ -57,7 +57,7 @@ struct MeasurementStudy {
   std::optional<double> compute_percent_of_tolerance(const ToleranceLimits& limits) const;
 };
 
-/// Value of a unit on a station.
+/// Measured value of a unit on a station.
 struct StudyValue {
   std::string unit, station;
   double value;

@@ -49,7 +49,7 @@ struct CommonOffset {
   /// True if it rotates with the camera: the camera moved since it was calibrated. Otherwise the
   /// known points or the lamps moved.
   bool in_camera;
-  /// Number of captures.
+  /// Number of captures with a fix.
   std::size_t captures;
 };
 

@@ -69,9 +69,9 @@ struct UnitStep {
   std::map<std::string, UnitImage> images = {};
   /// Images that wait for the previous step.
   std::vector<std::filesystem::path> waiting = {};
-  /// True if the images meet the station's completion criterion.
+  /// True if the images meet the station's completion criterion for this step.
   bool sufficient = false;
-  /// Result of the images, after the step is complete.
+  /// Result of the step, once it was solved; std::nullopt before.
   std::optional<StepResult> result = {};
   /// Plot of the result, if it has one.
   StepPlot picture = {};
@@ -80,7 +80,7 @@ struct UnitStep {
   /// Number of rejected images of an incomplete batch.
   int num_rejected_in_batch = 0;
   bool is_any_used_in_batch = false;
-  /// Name of the last image.
+  /// Name of the last image that was processed.
   std::string last = {};
 
   bool is_done() const { return sufficient && result && result->ok(); }
