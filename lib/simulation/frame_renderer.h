@@ -13,14 +13,15 @@
 namespace vlp {
 
 /// Renders the light that a scene's camera collects: the mean number of electrons of each pixel.
-///   - A pixel integrates over its area (add_shape_to_image()) and over its exposure. Line i is
-///   exposed
-///     around Shutter::exposure_center_s(i), from the pose of the camera at that time. Exposures
-///     during which something in view moves by more than 0.1 px are sums of several shorter ones.
-///   - A board is blurred at twice the resolution, before pixels integrate (add_shape_to_image()).
-///   - Mirrors (Clutter::mirrors) show lights by rays that are reflected at the plane of the pane.
-///   - The light of a lamp is first blurred by the lens, then switched at each line's exposure
-///     time, as with a rolling shutter.
+/// - A pixel integrates over its area (add_shape_to_image()) and over its exposure. Line i is
+///   exposed around Shutter::exposure_center_s(i), from the pose of the camera at that time.
+///   Exposures during which something in view moves by more than 0.1 px are sums of several shorter
+///   ones.
+/// - A board is blurred at twice the resolution, before pixels integrate (add_shape_to_image()).
+/// - Mirrors (Clutter::mirrors) show lights by rays that are reflected at the plane of the pane.
+/// - The light of a lamp is first blurred by the lens, then switched at each line's exposure time,
+///   as with a rolling shutter.
+///
 /// Const; may be shared between threads.
 class FrameRenderer {
  public:
