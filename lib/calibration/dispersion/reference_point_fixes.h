@@ -13,7 +13,7 @@
 namespace vlp {
 
 /// Derivatives of a vector of quantities with respect to the positions of lamps. Unit: that of the
-/// quantity, per m. `lamps` are those with an sd_m in the map.
+/// quantity, per m. `lamps` are the detected ones with an sd_m in the map.
 struct LampDerivatives {
   std::vector<Lamp> lamps;
   /// One row for each quantity, three columns for each lamp.

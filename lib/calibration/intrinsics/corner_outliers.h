@@ -10,10 +10,10 @@
 namespace vlp {
 
 /// Finds outliers among the corners of one view: corners farther from their predicted pixel than
-/// max(3 px, 25 % of the distance between predicted neighbors).
+/// max(3 px, 25 % of the predicted distance to the nearest neighbor).
 ///
-/// @return indices in `corners`, ascending; empty for fewer than nine corners, or if more than 10 %
-///     would be outliers
+/// @return indices in `corners`, ascending; empty if more than 10 % of the corners would be
+///     outliers, and thus for fewer than ten corners
 ///
 /// More outliers indicate another board or another order of the corners.
 ///
