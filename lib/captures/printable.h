@@ -12,9 +12,9 @@ namespace vlp {
 /// not UTF-8 become \xNN per byte. Line ends and tabulators stay.
 std::string escape_for_terminal(std::string_view text);
 
-/// Escapes a text with untrusted names for one line of a list. Replaces as escape_for_terminal(),
-/// and line ends and tabulators, too, by \xNN per byte. An untrusted name therefore cannot add a
-/// line.
+/// Escapes a text with untrusted names for one line of a list. Replaces line ends, tabulators and
+/// all that escape_for_terminal() replaces by \xNN per byte. An untrusted name therefore cannot add
+/// a line.
 std::string escape_for_single_line(std::string_view text);
 
 /// Returns the longest prefix of a UTF-8 text with at most `max_bytes` bytes and no truncated
