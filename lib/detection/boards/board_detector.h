@@ -32,7 +32,7 @@ struct EdgeCurvature {
 };
 
 /// Blurred step of the light across an edge of a tag, measured in the middle of the edge. `dark`
-/// and `bright` are the light on both sides, in gray levels with the tone curve removed.
+/// and `bright` are the light on both sides, in gray levels (0 to 255) with the tone curve removed.
 ///
 /// `blur_px` is the blur of lens and pixel together, as the sigma of the Gaussian with the same
 /// MTF50, px. It is 0 if unknown. It is accurate to 3 % from 0.5 to 2 px, also for the disc of a

@@ -23,8 +23,9 @@ class SquareCorners {
   explicit SquareCorners(const Board& board);
 
   /// Detects the inner corners of a chessboard (findChessboardCornersSB() of OpenCV, then a
-  /// sub-pixel fit). Returns all corners by index, or none if the board is not completely in view.
-  /// The two ends of the board cannot be distinguished (order_lattice_points()).
+  /// sub-pixel fit). Returns all corners, row by row of the board, or none if the board is not
+  /// completely in view. The two ends of the board cannot be distinguished
+  /// (order_lattice_points()).
   std::vector<PointDetection> detect_chessboard_corners(const GrayLevels& image) const;
 
   /// Detects the corners next to markers whose own corners are accurate to 1 to 2 px.

@@ -14,8 +14,8 @@ namespace vlp {
 /// no curve to the steepest curve of consumer cameras.
 inline constexpr std::array kGammas{1.0, 1.3, 1.6, 2.0, 2.4};
 
-/// One cost per tone curve, in the order of kGammas: negative log-likelihood up to a constant,
-/// dimensionless. Smaller is more likely.
+/// One value per tone curve, in the order of kGammas: a cost (negative log-likelihood up to a
+/// constant, smaller is more likely) or a ratio of residuals.
 using PerCurve = std::array<double, kGammas.size()>;
 
 /// Sums the costs of the tone curves (BoardDetection::curve_costs) over all images. The costs of an
