@@ -8,8 +8,8 @@
 
 namespace vlp {
 
-/// Writes the predicted standard deviations of fixes (Cramer-Rao bound) at each position of a floor
-/// as CSV, one row per position. Columns:
+/// Writes the predicted standard deviations of fixes (error budget) at each position of a floor as
+/// CSV, one row per position. Columns:
 ///   x_m, y_m, z_m, yaw_rad        pose of the camera in the world
 ///   lamps                         number of fully visible lamps
 ///   x_sd_m, y_sd_m, z_sd_m, yaw_sd_rad

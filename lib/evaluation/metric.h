@@ -11,13 +11,14 @@ namespace vlp {
 
 /// Origin of a metric.
 enum class MetricSource {
-  /// Images of a unit at the station, against the camera's type and the known points.
+  /// Metrics of the station alone: blur, differences from the nominal lens of the camera type, and
+  /// errors at the known points.
   station,
-  /// Steps of the procedure.
+  /// Metrics of the calibration steps lens, rotation and dispersion.
   lens,
   rotation,
   dispersion,
-  /// Errors of fixes.
+  /// Errors of fixes against ground truth.
   evaluation,
   /// Errors of fixes against a line, the theoretical limit or other fixes.
   reference
@@ -32,7 +33,8 @@ std::string describe(Direction direction);
 /// Metric that can be measured and that a gate may limit.
 struct MetricKind {
   const char* name;
-  /// Unit of values and limits: "mm", "px", "deg", "%"; empty for a fraction (0 to 1) or a ratio.
+  /// Unit of values and limits, for example "mm", "px", "deg", "%", "cycles/px"; empty for a
+  /// fraction (0 to 1), a ratio or a number.
   const char* unit;
   MetricSource source;
   /// Description of the metric, and the data that it requires, human-readable.
