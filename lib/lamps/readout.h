@@ -22,7 +22,7 @@ struct ReadoutDirectionEvidence {
   double rows = 0, columns = 0;
 
   /// Returns the readout direction with the larger evidence. Returns std::nullopt if this evidence
-  /// is below 1, that of one perfect light, or below three times the other.
+  /// is below 1, that of one perfect light, or below three times that of the other direction.
   std::optional<Readout> readout() const;
 };
 
