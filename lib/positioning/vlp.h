@@ -154,10 +154,9 @@ const char* vlp_version(void);
 int32_t vlp_open(const char* lamps_yaml, const char* calibration_yaml, const vlp_options* options,
                  vlp_positioner** positioner);
 
-/* Does what vlp_open() does, with the lamps of one room of a map whose lamps state a `room`. Null
- * or
- * "" takes all lamps, as vlp_open() does. If lamps of two rooms then share a frequency,
- * vlp_detect() returns VLP_BAD_FILE, and the names of the rooms are in vlp_last_error(). */
+/* Creates a positioner as vlp_open() does, from the lamps of one room of a map whose lamps state a
+ * `room`. Null or "" takes all lamps. If lamps of two rooms then share a frequency, vlp_detect()
+ * returns VLP_BAD_FILE, and the names of the rooms are in vlp_last_error(). */
 int32_t vlp_open_room(const char* lamps_yaml, const char* room, const char* calibration_yaml,
                       const vlp_options* options, vlp_positioner** positioner);
 
