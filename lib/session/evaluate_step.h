@@ -16,8 +16,8 @@ namespace vlp {
 /// Result of evaluate_fixes().
 struct EvaluateResult : StepResult {
   Evaluation evaluation;
-  /// Caution to be shown with the verdict, one sentence: captures have no fix, and no gate limits
-  /// their fraction. Empty if there is none.
+  /// Caution to be shown with the verdict, one line: captures have no fix, and no gate limits their
+  /// fraction. Empty if there is none.
   std::string caution;
 };
 
