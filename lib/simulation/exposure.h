@@ -43,10 +43,11 @@ std::vector<unsigned char> encode_image(const cv::Mat& image,
 
 /// Simulates a sensor (see Sensor) from the mean number of electrons of each pixel.
 ///
-/// Steps: color filters, shot noise (Poisson), overflow with bloom, read noise (normal), gain,
-/// black level, demosaicing, tone curve and sharpening of a picture, rounding, limits of 8 or 16
-/// bits. The result has 8 or 16 bits; behind color filters it has three colors, blue first. The
-/// same seed yields the same image.
+/// Steps: color filters, shot noise (Poisson), overflow with bloom, read noise (normal), gain and
+/// black level. With `picture` also demosaicing, tone curve and sharpening; levels behind color
+/// filters are rounded before demosaicing. Last, rounding and the limits of 8 or 16 bits. The
+/// result has 8 or 16 bits; behind color filters it has three colors, blue first. The same seed
+/// yields the same image.
 cv::Mat simulate_sensor(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint64_t seed,
                         const std::optional<ImageProcessing>& picture = {});
 

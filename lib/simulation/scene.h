@@ -365,11 +365,11 @@ struct Bayer {
   double red_to_green_ratio, blue_to_green_ratio;
 };
 
-/// In-camera processing of the sensor's levels before they are rounded, in this order:
-///   demosaicing, if there are color filters
+/// In-camera processing of the sensor's levels, in this order:
+///   demosaicing of rounded levels, if there are color filters
 ///   tone curve v = white ((level - black level) / (white - black level))^(1 / gamma), 0 to white
 ///   sharpening, rounding, JPEG
-/// Without a picture, the levels are those of the sensor.
+/// A scene without it has the levels of the sensor.
 struct ImageProcessing {
   double gamma;
   std::optional<Sharpening> sharpening;

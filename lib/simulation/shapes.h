@@ -17,7 +17,8 @@ struct Rectangle {
   double value;
 };
 
-/// Flat pattern of rectangles with constant values, in m; the value is 0 outside all rectangles.
+/// Flat pattern of rectangles, each with a constant value; positions are in m. The value is 0
+/// outside all rectangles.
 class Mosaic {
  public:
   /// Later rectangles cover earlier ones. Edges closer than 1 nm are merged.
