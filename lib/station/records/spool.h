@@ -30,7 +30,7 @@ namespace vlp {
 class Spool {
  public:
   /// Opens a spool, without access to folder or records.
-  /// @param folder   folder of the waiting runs; created when the first run is stored
+  /// @param folder   folder of the waiting runs; created when it is needed
   /// @param records  database of the runs: SQLite file or postgresql:// address
   /// @throws InputError if `records` is an invalid connection string
   Spool(std::filesystem::path folder, std::string records);

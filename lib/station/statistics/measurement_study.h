@@ -32,7 +32,7 @@ struct AnovaRow {
 ///
 /// or 0 if negative. The interaction is not significant if chance exceeds F = MS_i / MS_e in more
 /// than 5 % of studies. It is then pooled with the error: MS_e = (SS_i + SS_e) / (dof_i + dof_e),
-/// which also replaces MS_i. All results below are standard deviations.
+/// which also replaces MS_i. The members from `repeatability` to `total` are standard deviations.
 struct MeasurementStudy {
   std::size_t units = 0, stations = 0, repeats = 0;
   AnovaRow unit, station, interaction, error;

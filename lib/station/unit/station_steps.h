@@ -17,7 +17,8 @@
 namespace vlp {
 
 /// Calibrates the lens from the observations of the board (run_lens_step()), with the board and
-/// lens model of the station.
+/// lens model of the station. Fails with `undetermined` also if some views do not fit the lens of
+/// the others, as with images of two cameras.
 ///
 /// Adds the metrics focal_percent, principal_point_px and nominal_difference_px (differences from
 /// the nominal lens of the camera type), and board_warp_mm.
