@@ -28,7 +28,7 @@ using PerturbedSolve = std::function<std::optional<Eigen::VectorXd>(const Eigen:
 ///   J = (f(L_1) - f(0), f(L_2) - f(0), ...) L^-1
 /// The trial errors so have their actual size. Correlated errors, such as those of lens
 /// coefficients, change together. If a column has no solution, it is tried once more at 1/16 of its
-/// size, because a solve may select other data at a larger error. Noise of the solve is then
+/// size. Reason: a solve may select other data at a larger error. Noise of the solve is then
 /// amplified 16 times, which is still far below the result.
 std::optional<MatrixX> estimate_numeric_jacobian(const PerturbedSolve& solve,
                                                  const Eigen::VectorXd& nominal,

@@ -18,8 +18,9 @@
 ///
 /// A capture k with its camera at S with yaw g sees lamp P at
 ///   project(camera_from_level(zenith) (Rz(-g) (P - S)); intrinsics)
-/// If the base rotates in place about the axis A, S = A + Rz(g) e. If the camera moves with
-/// velocity u and yaw rate w, a lamp that is read out at time t after the middle of the image is at
+/// If the base rotates in place about the axis A, S = A + Rz(g) e. Let the camera move with
+/// velocity u and yaw rate w. A lamp that is read out at time t after the middle of the image is
+/// then at
 ///   Rz(-w t) (Rz(-g) (P - S) - u t)
 /// in place of Rz(-g) (P - S). On a spot, the yaw rate applies in the same way.
 ///

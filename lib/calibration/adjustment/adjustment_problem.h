@@ -85,8 +85,8 @@ class AdjustmentProblem {
     Eigen::Matrix3d base_from_level;
     /// Motion of the camera; on a spot only the yaw rate is used.
     KnownMotion motion = {};
-    /// Index of its first local unknown. The local unknowns are (X, Y, Z, yaw), or the yaw on a
-    /// spot, followed by velocity and yaw rate if these are not known exactly.
+    /// Index of its first local unknown. The local unknowns are (X, Y, Z, yaw), or only the yaw on
+    /// a spot. Velocity and yaw rate follow if these are not known exactly.
     Eigen::Index local = 0;
 
     bool is_velocity_estimated() const { return !spot && motion.velocity_sd_m_per_s > 0; }

@@ -75,8 +75,8 @@ struct ViewCoverage {
   std::array<int, 9> corners{};
   /// Fraction of 8 x 6 parts of the image that contain corners.
   double covered_fraction = 0;
-  /// Largest angle over the views by which the left, right, upper and lower side of the board, as
-  /// in the image, is nearer to the camera; rad.
+  /// Largest angle over the views, rad, by which a side of the board is nearer to the camera. Order
+  /// of the sides, as in the image: left, right, upper, lower.
   std::array<double, 4> tilts_rad{};
   /// Largest angle between the boards of two views, rad.
   double tilt_rad = 0;

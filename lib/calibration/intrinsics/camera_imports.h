@@ -36,7 +36,7 @@ struct FittedCamera {
 /// Fits a lens of another model to the rays of a camera over the image, by least squares in pixels
 /// (make_regular_pixel_grid(); splined lenses: fit_splined_lens_to_lens()). Returns a camera that
 /// already has the model unchanged.
-/// @throws std::invalid_argument if the model has no lens close to the camera's, or if a splined
+/// @throws std::invalid_argument if no lens of the model is close to the camera's; if a splined
 ///     model has too few control points in the field of view
 FittedCamera convert_to_lens_model(const Camera& camera, LensModel model);
 

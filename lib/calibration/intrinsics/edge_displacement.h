@@ -31,9 +31,9 @@ enum class DisplacementForm { constant, varying };
 
 /// Estimates the edge shift in each view.
 ///
-/// A tone curve, sharpening or overexposure moves an edge by a fraction of its blur, because half
-/// of the coded level is not half of the light. Isolated tags therefore shrink on all sides. The
-/// shift is solved together with the pose of the board, by least squares of
+/// A tone curve, sharpening or overexposure moves an edge by a fraction of its blur. The cause is
+/// that half of the coded level is not half of the light. Isolated tags therefore shrink on all
+/// sides. The shift is solved together with the pose of the board, by least squares of
 ///   measured - projected - shift inward
 /// (BoardLattice::Corner). The gaps between the tags determine it.
 ///

@@ -20,8 +20,8 @@ struct ExpectedDifference {
   double degrees_of_freedom;
 };
 
-/// Computes the expected difference from the covariance of the intrinsics, to first order, with
-/// uniform weights over the image, or over `region` if it is not empty.
+/// Computes the expected difference from the covariance of the intrinsics, to first order. Weights
+/// are uniform over the image, or over `region` if it is not empty.
 ///
 /// The difference is smaller than the projection uncertainty, which includes rotations of the
 /// camera relative to the boards. Aligning two lenses removes such rotations. Infinite if the

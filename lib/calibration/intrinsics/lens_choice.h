@@ -49,7 +49,7 @@ inline constexpr double kRightAngle_rad = std::numbers::pi / 2;
 /// most 2 px. Ignores input.lens_model.
 std::optional<FisheyeFit> fit_fisheye_lens(IntrinsicsInput input);
 
-/// Returns true if corners may be more than 40 degrees off the axis, given the focal length with
+/// Returns true if corners may be more than 40 degrees off the axis. Assumes the focal length with
 /// which the poses of the views fit best. Takes a small fraction of the time of a solve.
 bool may_be_wide_angle_lens(const IntrinsicsInput& input);
 

@@ -56,9 +56,9 @@ class ProjectionUncertainty {
   /// Returns the bias of the intrinsics by mrcal's regularization, to first order.
   ///
   /// The regularization pulls coefficients to zero and the principal point to the middle of the
-  /// imager. The bias is the change of the intrinsics if the regularization were scaled to the
-  /// noise s of these corners instead of BoardProblem::noise_px, here 1 px. With the residuals r of
-  /// the regularization it is
+  /// imager. The regularization is scaled to BoardProblem::noise_px, here 1 px. The bias is the
+  /// change of the intrinsics if it were scaled to the noise s of these corners. With the residuals
+  /// r of the regularization it is
   ///   (Jo' Jo + s^2 Jr' Jr)^-1 (1 - s^2) Jr' r,  s at least 0.01 and at most 1.
   /// 0 without regularization. Use it as a standard deviation of the intrinsics in addition to that
   /// from noise.

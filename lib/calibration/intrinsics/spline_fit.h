@@ -28,9 +28,9 @@ std::optional<std::vector<double>> fit_splined_lens_to_lens(
     const std::vector<double>& core,
     const Eigen::Matrix3d& lens_from_splined = Eigen::Matrix3d::Identity());
 
-/// Returns one line for an error message when fit_splined_lens_to_lens() fails. It states the field
-/// of view of `lens` over the image, in degrees. It also names a splined model that can be fitted,
-/// if one is found.
+/// Returns one line for an error message when fit_splined_lens_to_lens() fails. It states the
+/// largest angles off the axis over the image, horizontally and vertically, in degrees. It also
+/// names a splined model that can be fitted, if one is found.
 /// @param imager_px  width and height of the image
 /// @param model      splined model for which the fit failed
 /// @param core       fx, fy, cx, cy, px

@@ -30,8 +30,8 @@ ImageRegion compute_valid_lens_region(const std::vector<Eigen::Vector2d>& corner
                                       const std::array<int, 2>& imager_px, LensModel model,
                                       bool other_model_fits = false);
 
-/// Computes the area of a region as a fraction of the image, which extends from the center of its
-/// first pixel to that of its last.
+/// Computes the area of a region as a fraction of the image. The image extends from the center of
+/// its first pixel to that of its last.
 double compute_fraction_of_image_area(const ImageRegion& region,
                                       const std::array<int, 2>& imager_px);
 

@@ -87,7 +87,7 @@ struct MapErrorOptions {
 ///   m  survey errors: variance sd_m^2 of the lamp plus tau^2, common to all lamps
 ///   e  noise of the captures
 /// tau^2 >= 0 is the smallest value for which the weighted squares chi^2 of x - P d do not exceed
-/// their degrees of freedom f = count_determined_unknowns(P) - 2 k.
+/// f. Their degrees of freedom are f = count_determined_unknowns(P) - 2 k.
 ///
 /// Lamps enter d one by one, by the largest drop of chi^2. The result is the largest set in which
 /// no lamp can be replaced by another one with an increase of chi^2 below
@@ -99,9 +99,9 @@ struct MapErrorOptions {
 /// with sd_m. For three lamps no displaced lamp can be identified. For n lamps fewer than n / 2 can
 /// be, and at most eight.
 ///
-/// Two lamps are reported as swapped, or the map as mirrored, if chi^2 with such a map is smaller
-/// by the bound with k = 0 and N = all pairs. For two lamps it also has to be smaller than for any
-/// other pair.
+/// Two lamps are reported as swapped, or the map as mirrored, if such a map reduces chi^2 by the
+/// bound. The bound is that with k = 0 and N = all pairs. For two lamps it also has to be smaller
+/// than for any other pair.
 ///
 /// Limits:
 ///   - Only horizontal errors are estimated.

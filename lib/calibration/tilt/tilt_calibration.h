@@ -47,8 +47,8 @@ struct TiltCalibration {
   /// Corrections of the detected lamps, with `refine_map` only.
   std::vector<AdjustmentResult::LampCorrection> corrections;
 
-  /// Number of captures that are used, that contain fewer than three lamps of the map, and that are
-  /// rejected because they contradict the map or the other captures.
+  /// Number of captures that are used, and of captures with fewer than three lamps of the map.
+  /// `captures_rejected`: number of captures that contradict the map or the other captures.
   int captures = 0, captures_of_few_lamps = 0, captures_rejected = 0;
   /// Number of detections that are used, and of other detections in captures of three lamps or
   /// more.
