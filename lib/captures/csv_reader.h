@@ -23,8 +23,8 @@ inline constexpr double kMaxCoordinate_m = 1e6;
 /// and column.
 class CsvTable {
  public:
-  /// @throws InputError if the file cannot be read, is longer than 2 GiB, is not CSV, has a column
-  /// twice, or has a row with more or fewer fields than the header (a truncated row)
+  /// @throws InputError if the file cannot be read, is longer than 2 GiB or is not CSV; if it has a
+  ///     column twice, or a row with more or fewer fields than the header
   explicit CsvTable(const std::filesystem::path& file);
 
   struct Column {
