@@ -30,9 +30,9 @@ inline constexpr std::size_t kMinClusters = 5;
 /// bootstrap_error_intervals().
 inline constexpr std::size_t kMinClustersForP90 = 20;
 
-/// Computes confidence intervals of error statistics (see ErrorStatistics) by the percentile
-/// bootstrap with 2,000 resamples (Efron and Tibshirani, "An Introduction to the Bootstrap", 1993,
-/// chapter 13).
+/// Computes confidence intervals of error statistics (ErrorStatistics) by the percentile bootstrap
+/// with 2,000 resamples. Source: Efron and Tibshirani, "An Introduction to the Bootstrap", 1993,
+/// chapter 13.
 ///
 /// Clusters are resampled with replacement, each with all of its errors. Errors within a cluster
 /// are correlated: captures at one reference point share its bias. Resampling single errors would
