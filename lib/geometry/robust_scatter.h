@@ -16,11 +16,11 @@
 /// residual is an outlier. Valid for samples of any size. "Linear" residuals have one coordinate,
 /// "planar" residuals two.
 ///
-/// For normal residuals with variance sigma^2 per coordinate the median of the squares is q^2
-/// sigma^2 with q = 0.6745 (linear), 2 ln 2 sigma^2 (planar). Least squares with nu degrees of
-/// freedom reduce the variance of the residuals by the factor nu / (number of coordinates). The
-/// variance estimated from the median is as uncertain as a variance of m degrees of freedom:
-/// m = 2 n (2 q phi(q))^2 (linear), 2 n ln^2 2 (planar), where n is nu or nu / 2.
+/// Let residuals be normal with variance sigma^2 per coordinate. The median of the squares is then
+/// q^2 sigma^2 with q = 0.6745 (linear), or 2 ln 2 sigma^2 (planar). Least squares with nu degrees
+/// of freedom reduce the variance of the residuals by the factor nu / (number of coordinates). The
+/// variance estimated from the median is as uncertain as a variance of m degrees of freedom: m = 2
+/// n (2 q phi(q))^2 (linear), 2 n ln^2 2 (planar), where n is nu or nu / 2.
 namespace vlp {
 
 /// Estimates the variance of the errors from the median of the squared residuals, for residuals of
