@@ -22,10 +22,10 @@ struct ScanlineImage {
 };
 
 /// Returns an image whose rows are the scanlines. An image that is read along columns is
-/// transposed, but only in the tiles with more than one pixel above the background's threshold and
-/// in their neighbors. Transposing a large image completely takes longer than detecting its lamps.
-/// The tiles next to the transposed ones are filled with the background level. All other tiles are
-/// black; their memory is not touched.
+/// transposed, but only in lit tiles and their neighbors. Lit tiles have more than one pixel above
+/// the background's threshold. Transposing a large image completely takes longer than detecting its
+/// lamps. The tiles next to the transposed ones are filled with the background level. All other
+/// tiles are black; their memory is not touched.
 ScanlineImage make_scanline_image(const ImageView& image, Readout readout,
                                   const Background& background);
 

@@ -30,7 +30,7 @@ struct DetectorCamera {
 
 /// Estimates the shape of lights from their outline. Edge points are projected through the lens
 /// into the level plane, where a circle is fitted robustly. The center of the circle is projected
-/// back to the image, because the center of an outline in the image is not the image of the center
+/// back to the image. Reason: the center of an outline in the image is not the image of the center
 /// (lib/THEORY.md, "Lamp centroid"). Without a lens an ellipse is fitted in the image.
 class LightShape {
  public:
@@ -77,9 +77,9 @@ class LightShape {
 
   /// Returns the center error of a circle's outline that lens distortion of the scanlines causes:
   /// on average the outline is read later, or earlier, than the center. The outline in direction a
-  /// is displaced by m (l(a) - l), where m is the motion per scanline, l(a) the scanline of the
-  /// outline and l that of the center. The error is the component along a that varies as cos a and
-  /// sin a. Partly visible outlines are treated as complete ones.
+  /// is displaced by m (l(a) - l). m is the motion per scanline, l(a) the scanline of the outline,
+  /// and l that of the center. The error is the component along a that varies as cos a and sin a.
+  /// Partly visible outlines are treated as complete ones.
   Eigen::Vector2d compute_readout_center_offset(const Circle& circle,
                                                 const Eigen::Vector2d& motion_per_line) const;
 

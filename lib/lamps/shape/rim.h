@@ -44,9 +44,9 @@ struct Rim {
 /// 2. Fits a circle, or an ellipse without a lens, to the clearest steps near it.
 ///
 /// 3. Fits steps to the pixels next to it, see fit_rim_steps(). If 60 % of the pieces show a step,
-/// the steps define the rim and the sigma of its center, including the shift that another tone
-/// curve causes. Otherwise sigma is the larger one of the scatter of the points and the jackknife
-/// over eight pieces of the outline.
+///   the steps define the rim and the sigma of its center. Sigma includes the shift that another
+///   tone curve causes. Otherwise sigma is the larger one of the scatter of the points and the
+///   jackknife over eight pieces of the outline.
 ///
 /// Returns std::nullopt if the blob is smaller than 20 px or has less than 10 lit scanlines. Also
 /// returns std::nullopt if no circle has such steps, or if the steps determine no circle.

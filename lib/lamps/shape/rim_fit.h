@@ -44,8 +44,8 @@ struct RimSteps {
 ///     exp(c t) (exp(o + p u + p^2 s^2 / 2) F(-u / s - p s) + exp(i + q u + q^2 s^2 / 2)
 ///               F(u / s + q s)) + floor^gamma.
 ///
-/// The levels exp(o + p u) outside and exp(i + q u) inside may rise on both sides, for example with
-/// a halo and a source deep in a reflector. Between them is a step at x, up or down, blurred by s,
+/// The levels exp(o + p u) outside and exp(i + q u) inside may rise on both sides. Examples are a
+/// halo and a source deep in a reflector. Between them is a step at x, up or down, blurred by s,
 /// above the dark floor; F is the normal distribution. StepImageModel converts light to levels,
 /// because half of a coded level is not half of the light: the larger the step, the further out it
 /// appears (lib/THEORY.md). A clipped pixel is a lower bound of its light. The blur is also fitted

@@ -41,8 +41,8 @@ std::optional<RobustEllipse> fit_robust_circle(std::span<const Eigen::Vector2d> 
 
 /// Fits the nearly circular ellipse that most of the points support. Starts from the circle of
 /// fit_robust_circle() with a tolerance of an eighth of its size. Then applies Gauss-Newton with
-/// Tukey's biweight to the distance q from the ellipse (x - c)^T M (x - c) = 1, to first order
-/// (Sampson 1982):
+/// Tukey's biweight to the distance q from the ellipse (x - c)^T M (x - c) = 1. To first order
+/// (Sampson 1982) it is
 ///
 ///     q = (s - 1) s / |M (x - c)|,   s^2 = (x - c)^T M (x - c).
 ///

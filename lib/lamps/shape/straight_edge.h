@@ -89,20 +89,20 @@ struct HiddenEdgePrior {
 /// with an uncertain level have less weight.
 ///
 /// The covariance includes the scatter of the pixels and the standard deviations of the scanline
-/// levels, see LineLevels. Returns std::nullopt if an end has a standard deviation above half a
-/// pixel, or if less than 80 % of the pixels match the edge model.
+/// levels, see LineLevels. Returns std::nullopt if the standard deviation of an end exceeds 0.5 px,
+/// or if less than 80 % of the pixels match the edge model.
 std::optional<StraightEdge> fit_straight_edge(const EdgeImage& image, const Side& side,
                                               const EdgeSearch& search);
 
 /// Estimates an edge that a dark stripe hides partly or completely: the mean and the covariance of
 /// its ends, from the likelihood of all pixels near the side.
 ///
-/// An edge in a dark stripe lies between the last lit scanline and the next scanline that would be
-/// lit if the light extended to it. The pixels are those of fit_straight_edge() with L = 1 and h =
-/// 0; the level of each scanline may vary within its standard deviation. The probability, times the
-/// prior, is summed on a grid of offsets and slants that is refined four times. Returns
-/// std::nullopt if the side is not in the image, or if the mean contradicts a fifth of the pixels
-/// on lit scanlines. The edge may lie outside the image; it has no `points`.
+/// An edge in a dark stripe lies beyond the last lit scanline. It lies before the next scanline
+/// that would be lit if the light extended to it. The pixels are those of fit_straight_edge() with
+/// L = 1 and h = 0; the level of each scanline may vary within its standard deviation. The
+/// probability, times the prior, is summed on a grid of offsets and slants that is refined four
+/// times. Returns std::nullopt if the side is not in the image, or if the mean contradicts a fifth
+/// of the pixels on lit scanlines. The edge may lie outside the image; it has no `points`.
 ///
 /// @pre search.blur_px > 0
 std::optional<StraightEdge> estimate_edge_hidden_by_dark_stripe(const EdgeImage& image,

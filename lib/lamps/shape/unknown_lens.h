@@ -17,15 +17,15 @@ namespace vlp {
 ///     f q^2 (3/8 g'' + 1/8 (g' / r - g / r^2) + 1/4 g' (g' / g - 1 / r)),
 ///
 /// with q the disc's radius as a slope. This is the first harmonic of the effect of the second
-/// order of g on the outline. For g = r - k r^3 it is 3 k a^2 R / f^2, with a the outline's radius
-/// and R its distance from the axis, both in pixels. For the equidistant lens, g = atan r and k =
-/// 1/3, it is at most a^2 R / f^2 at any distance from the axis. A camera tilt t shifts the center
-/// by a^2 tan(t) / f (Heikkila and Silven 1997).
+/// order of g on the outline. Let a be the outline's radius and R its distance from the axis, both
+/// in pixels. For g = r - k r^3 the shift is 3 k a^2 R / f^2. For the equidistant lens (g = atan r,
+/// k = 1/3) it is at most a^2 R / f^2 at any R. A camera tilt t shifts the center by a^2 tan(t) / f
+/// (Heikkila and Silven 1997).
 ///
-/// The bound assumes an equidistant lens of 115 degrees from corner to corner, so that f is half of
-/// the image's diagonal, on a camera tilted by 10 degrees. It is used as one standard deviation of
-/// the shift. Lenses of consumer cameras distort less, a fisheye of 180 degrees up to 2.5 times as
-/// much.
+/// The bound assumes an equidistant lens of 115 degrees from corner to corner; f is then half of
+/// the image's diagonal. The camera is assumed to be tilted by 10 degrees. It is used as one
+/// standard deviation of the shift. Lenses of consumer cameras distort less, a fisheye of 180
+/// degrees up to 2.5 times as much.
 double predict_center_sd_without_lens_px(const Light& light, const ImageSize& image);
 
 }  // namespace vlp

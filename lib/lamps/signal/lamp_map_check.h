@@ -32,13 +32,13 @@ std::optional<double> compute_scanlines_on_lamp(const Lamp& lamp,
 
 /// Predicts the relative standard deviation of the period that measure_stripes() measures on
 /// `lines` scanlines. A period is the slope of least-squares lines through the numbered begins and
-/// through the numbered ends of stripes, with M = kUsedHeight lines / period of each:
+/// ends of stripes. There are M = kUsedHeight lines / period of each:
 ///
 ///     sd(period) / period = (e / period) sqrt(6 / (M (M^2 - 1))).
 ///
 /// e is the standard deviation of the position of one begin or end. In sharp stripes the position
 /// is uniform between two scanlines, e = 1 / sqrt(12). An exposure of x scanlines turns the edge
-/// into a ramp, on which noise of 2 % of the brightness of a scanline has an effect:
+/// into a ramp. Noise of 2 % of the brightness of a scanline then has an effect:
 ///
 ///     e^2 = max(0, 1 - x / 1.2)^2 / 12 + (0.02 x)^2.
 ///

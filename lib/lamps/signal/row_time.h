@@ -36,9 +36,8 @@ struct PeriodGroup {
 };
 
 /// Groups lights with a label by their lamp. Groups the others by density of their periods: within
-/// 1.5 % of the period with most neighbors. Discards groups with less than a tenth of the lights of
-/// the largest group, or with less than one in fifty of these lights, because they are partly
-/// hidden lights.
+/// 1.5 % of the period with most neighbors. Discards groups with less than 10 % of the lights of
+/// the largest group, or with less than 2 % of these lights. These are partly hidden lights.
 std::vector<PeriodGroup> group_lights_by_period(std::span<const MeasuredPeriod> lights);
 
 struct RowTime {
@@ -111,8 +110,8 @@ RowTimeCandidates estimate_row_time_candidates(std::span<const MeasuredPeriod> l
 ///
 /// @param position_costs  cost of the lamps' positions for each candidate, added to its own cost;
 ///        empty if unknown
-/// @return  a problem if another candidate costs less than kClearCost more, for example if all
-///        ratios of frequencies are equal, or if less than half of the groups have a lamp
+/// @return a problem if another candidate costs less than kClearCost more, as with equal ratios of
+///     all frequencies; also if less than half of the groups have a lamp
 RowTimeResult select_row_time_candidate(const RowTimeCandidates& found,
                                         std::span<const double> position_costs = {});
 

@@ -93,8 +93,8 @@ inline constexpr double kMinCoherence = 0.85;
 /// the coherence of part k is the correlation of d_k with the sum of the other parts. The coherence
 /// of the light is the second smallest of these, because an object may hide a part.
 ///
-/// Independent parts with three independent scanlines, as in one and a half periods, each reach
-/// kMinCoherence with a probability of (1 - 0.85) / 2, and four of five together with 1.5e-4.
+/// Consider independent parts with three independent scanlines, as in one and a half periods. Each
+/// reaches kMinCoherence with a probability of (1 - 0.85) / 2, four of five together with 1.5e-4.
 /// Tilted bars reach it within 7 degrees if a light shows two of them.
 double compute_stripe_coherence(const ImageView& lines, const std::vector<PixelRun>& chords,
                                 const Background& background, double period_lines);
