@@ -24,8 +24,8 @@ struct TwoLampPoses {
   bool lamp_below_camera = false;
 };
 
-/// Computes position and yaw from two lamps in closed form. With D = p_2 - p_1, h = Z_2 - Z_1 and H
-/// = Z_1 - Zs, the positioning equation gives D = e^{jg} (H (z_2 - z_1) + h z_2), so
+/// Computes position and yaw from two lamps in closed form. Let D = p_2 - p_1, h = Z_2 - Z_1 and H
+/// = Z_1 - Zs. The positioning equation gives D = e^{jg} (H (z_2 - z_1) + h z_2), so
 ///   |z_2 - z_1|^2 H^2 + 2 h Re(conj(z_2 - z_1) z_2) H + h^2 |z_2|^2 - |D|^2 = 0.
 /// At equal heights (h = 0): H = |D| / |z_2 - z_1|, g = arg(D / (z_2 - z_1)), eq. 5 with eq. 7.
 ///

@@ -66,10 +66,10 @@ class CommonErrors {
   /// Returns one part of C, with the others taken as exact. The parts add up to C, and no part
   /// makes a variance negative.
   ///
-  /// A part is the reduction of C if its errors become known exactly, given that all earlier parts
-  /// in the order of kCommonErrorSources already are (block Cholesky). For sequential steps a part
-  /// holds the errors of its own step. The part of the lens includes its effects on later steps.
-  /// The part of the lamps excludes errors that an offset found with the same map compensates.
+  /// A part is the reduction of C if its errors become known exactly (block Cholesky). All earlier
+  /// parts, in the order of kCommonErrorSources, already are. For sequential steps a part holds the
+  /// errors of its own step. The part of the lens includes its effects on later steps. The part of
+  /// the lamps excludes errors that an offset found with the same map compensates.
   CommonErrors extract_error_source(CommonErrorSource part) const;
   /// Returns the number of lamps of the adjustment that the map has at another position. Their
   /// correlation with the calibration is lost.

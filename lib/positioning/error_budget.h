@@ -61,8 +61,8 @@ struct ErrorSources {
 /// Covariances of (X, Y, Z, yaw) in meters and radians, one for each source.
 struct ErrorBudget {
   /// Cramer-Rao lower bound of unbiased estimators at this pixel noise (Chen and Guan, section
-  /// 2.2). For n lamps at one height H above a camera of focal length f px, with S = sum |P_i -
-  /// P'|^2 about their center P' and d = |P' - position|:
+  /// 2.2). Let n lamps be at one height H above a camera of focal length f px. With their center
+  /// P', S = sum |P_i - P'|^2 and d = |P' - position|:
   ///   sd(X) = sd(Y) = (H/f) noise_px sqrt(1/n + d^2/S)
   ///   sd(yaw) = (H/f) noise_px / sqrt(S),   sd(Z) = H (H/f) noise_px / sqrt(S)
   Matrix4 noise;

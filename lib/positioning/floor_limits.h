@@ -60,8 +60,8 @@ std::vector<Eigen::Vector3d> find_visible_lamps(const LampMap& map, const Camera
 /// Computes the error budget at every position of the grid, for a level camera at height `z_m` and
 /// yaw `yaw_rad`. Sources: noise, center, tilt, lamp map. Motion, then roll and pitch follow the
 /// noise if the prior leaves them free; its mean is at rest and level.
-/// @throws std::invalid_argument if the step is not positive, if the grid has no extent or more
-/// than ten million positions, or if the intrinsics do not match the lens model
+/// @throws std::invalid_argument if the step is not positive; if the grid has no extent or more
+///     than ten million positions; if the intrinsics do not match the lens model
 /// @pre the camera has row time and readout direction if it may move
 FloorLimits compute_accuracy_limits_on_floor(const LampMap& map, const Camera& camera,
                                              const FloorGrid& grid, double z_m, double yaw_rad,

@@ -125,8 +125,8 @@ std::optional<double> compute_chi_squared(std::span<const BodyObservation> sight
 
 /// Estimates the state by least squares over pixels and priors. Gauss-Newton from `start`; a step
 /// that does not reduce the sum of squares is halved. Returns std::nullopt if a lamp is behind its
-/// ray at `start`, if lamps and priors do not determine the state, or without convergence in 50
-/// steps.
+/// ray at `start` or if lamps and priors do not determine the state. Also returns it without
+/// convergence in 50 steps.
 /// @pre `start` has the values of the states that the prior fixes
 std::optional<BodyFix> estimate_body_state(std::span<const BodyObservation> sightings,
                                            const Eigen::Vector3d& arm_in_body_m,

@@ -8,9 +8,9 @@
 #include "../geometry/plane.h"
 #include "../geometry/types.h"
 
-/// The positioning equation (Chen and Guan, eq. 1, 3, 6, 7). A level camera at S = (X, Y, Zs) with
-/// yaw g observes a lamp at P = (p, Z) at the normalized point z = (x/z, y/z) of its level frame.
-/// With points of the floor plane as complex numbers, s = X + jY and H = Z - Zs:
+/// The positioning equation (Chen and Guan, eq. 1, 3, 6, 7). A level camera is at S = (X, Y, Zs)
+/// with yaw g. It observes a lamp at P = (p, Z) at the normalized point z = (x/z, y/z) of its level
+/// frame. With points of the floor plane as complex numbers, s = X + jY and H = Z - Zs:
 ///   p = s + H e^{jg} z      so      z = e^{-jg} (p - s) / H.
 namespace vlp {
 

@@ -58,8 +58,8 @@ class UnitErrors {
 
   /// Computes the budget of a fix from these lamps, with noise `noise_px` per axis. Agrees with the
   /// covariance of Positioner::locate(). Returns std::nullopt for fewer than two lamps or more than
-  /// kMaxSightings, for lamps that the lens does not image, or for lamps that do not determine a
-  /// fix.
+  /// kMaxSightings. Also returns it for lamps that the lens does not image or that do not determine
+  /// a fix.
   std::optional<UnitBudget> compute_budget(const Pose& level, std::span<const std::size_t> lamps,
                                            double noise_px) const;
   /// Computes the budget of a camera that may move and be tilted, as compute_error_budget().
