@@ -100,8 +100,8 @@ void check_image_output_options(const CaptureOptions& options);
 /// Prints each light if --verbose is given.
 void print_each_light(const Observations& seen);
 
-/// Detects the lamps in a folder of images or a video, with a progress display, and prints the
-/// remarks, including a contradiction between the lamps and the given row time. Throws as
+/// Detects the lamps in a folder of images or a video, with a progress display. Prints the remarks,
+/// including a contradiction between the lamps and the given row time. Throws as
 /// detect_lamps_in_images() does, and if no lamp is identified.
 Observations detect_lamps_in_captures(const CaptureOptions& options, ImageUse use,
                                       const LampMap& lamps,
