@@ -28,7 +28,7 @@ std::vector<ReportPlot> make_evaluation_plots(const EvaluationInput& input,
 /// Returns a plot of the contributions to the reported horizontal variance of each fix.
 ///
 /// The noise is that of the fix. The common part of calibration and map is divided in proportion to
-/// the error budget of a level camera (UnitErrors) that sees all lamps in view there, without
+/// an error budget (UnitErrors). It is that of a level camera with all lamps in view there, without
 /// rejected ones. Fixes with an estimated roll and pitch are omitted, as this does not hold for
 /// them.
 ///

@@ -31,8 +31,8 @@ struct ErrorPlot {
 /// Returns the factor by which errors are enlarged on a floor of the width `width_m`, given their
 /// 90th percentile.
 ///
-/// The factor is a round number (1, 2 or 5 times a power of ten, at least 1) that makes the 90th
-/// percentile 1/25 to 1/10 of the width. 1 if there are no errors.
+/// The factor is 1, 2 or 5 times a power of ten, at least 1. It makes the 90th percentile 1/25 to
+/// 1/10 of the width. 1 if there are no errors.
 double choose_error_magnification(double p90_m, double width_m);
 
 /// Plots an arrow from each true position towards its fix.
