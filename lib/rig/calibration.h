@@ -173,9 +173,9 @@ struct Calibration {
 };
 
 /// Reads `vlp-calibration/1`; keys are the names of the fields above.
-/// @throws InputError if a key is unknown or missing, if the parameters do not match the lens
-/// model, if the zenith is no unit vector or is not in front of the camera, or if a part in the
-/// history is missing (truncated file)
+/// @throws InputError if a key is unknown or missing; if the parameters do not match the lens
+///     model; if the zenith is no unit vector or is not in front of the camera; if a part in the
+///     history is missing (truncated file)
 Calibration read_calibration(const std::filesystem::path& file);
 
 /// Writes a file for read_calibration(), atomically. The order of the keys ensures that

@@ -39,8 +39,8 @@ struct LampMap {
 ///     - {id: 2, position_m: [0, 1, 2.1], shape: rectangle, size_m: [1.2, 0.1], yaw_rad: 0.3}
 /// The default shape is disc, with a diameter_m. Other shapes have a size_m and a yaw_rad, by
 /// default 0, see ShapeTraits.
-/// @throws InputError if a key is unknown or missing, if an id occurs twice, if two lamps are
-/// within 1 mm, or if the unit of a value is implausible
+/// @throws InputError if a key is unknown or missing; if an id occurs twice; if two lamps are
+///     within 1 mm; if the unit of a value is implausible
 LampMap read_lamp_map(const std::filesystem::path& file);
 
 /// Reads the lamps of one room, from a map whose lamps have a `room`, such as

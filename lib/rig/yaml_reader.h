@@ -147,8 +147,8 @@ YAML::Node parse_yaml(const std::filesystem::path& file, const std::string& text
 inline constexpr std::size_t kMaxYamlBytes = std::size_t{1} << 20;
 
 /// Reads a YAML file that is a mapping.
-/// @throws InputError if it cannot be read or parsed, is longer than 1 MiB, is not UTF-8, contains
-/// aliases or a second document, or is nested more than 20 levels deep
+/// @throws InputError if it cannot be read or parsed, is longer than 1 MiB or is not UTF-8; if it
+///     contains aliases or a second document, or is nested more than 20 levels deep
 YamlMap read_yaml(const std::filesystem::path& file);
 /// Reads a YAML file with the first key `format: NAME/VERSION`. Throws InputError for other
 /// formats, too.
