@@ -64,8 +64,9 @@ struct AdjustStepResult : StepResult {
 /// residuals larger than sigma_px explains. Places without a standard deviation are ignored with a
 /// warning.
 ///
-/// @throws InputError if a lamp has no standard deviation, a place has a standard deviation of 0,
-///         lens_sd_px is given for a lens with a covariance, or the calibration is adjusted already
+/// @throws InputError if a lamp has no standard deviation; if a place has a standard deviation of
+///     0; if lens_sd_px is given for a lens with a covariance; if the calibration is adjusted
+///     already
 /// @throws std::invalid_argument if the camera moves and its calibration lacks row_time_s or
 /// readout
 AdjustStepResult run_adjustment_step(const AdjustStepInput& input, HistoryEntry entry);
