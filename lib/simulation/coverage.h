@@ -16,8 +16,8 @@ namespace vlp {
 /// Pose of the camera in the frame of a rendered target while a line is exposed.
 using TargetFromCamera = std::function<Eigen::Isometry3d(int line)>;
 
-/// Returns the point (x, y) at which a ray meets the plane z = 0, in the frame of the target and
-/// the unit of `origin`. NaN if the ray does not meet the plane in its direction.
+/// Returns the point (x, y) at which a ray meets the plane z = 0 of the target's frame, in the unit
+/// of `origin`. NaN if the ray does not meet the plane in its direction.
 inline Eigen::Vector2d intersect_ray_with_plane(const Eigen::Vector3d& origin,
                                                 const Eigen::Vector3d& direction) {
   const double distance = -origin.z() / direction.z();

@@ -20,8 +20,8 @@ double compute_light_radius_m(const Glow& glow);
 double compute_relative_radiance(const Recess& recess, double radius_m,
                                  const Eigen::Vector3d& eye_m, const Eigen::Vector2d& at_m);
 
-/// Adds to each pixel of the window, which is all of `image`, the radiance of a glow with a recess,
-/// chips, hot spots or a halo.
+/// Adds the radiance of a glow with a recess, chips, hot spots or a halo to each pixel of `image`,
+/// which shows the window.
 ///
 /// The fraction of a pixel inside the rim is exact (add_shape_to_image()). Radiances are evaluated
 /// at the pixel's center, so they should vary little within a pixel.

@@ -380,9 +380,9 @@ struct ImageProcessing {
 
 /// Mounting of the camera on a base that rotates about a vertical axis.
 ///
-/// The camera is tilted without yaw (level_from_zenith()). The up direction in the camera frame is
-/// (sin t cos a, sin t sin a, cos t), with the tilt t and its azimuth a from the image's x to its
-/// y.
+/// The camera is tilted without yaw (level_from_zenith()). Let t be the tilt and a its azimuth,
+/// from the image's x to its y. The up direction in the camera frame is then (sin t cos a, sin t
+/// sin a, cos t).
 struct Mount {
   Eigen::Matrix3d level_from_camera;
   /// Vector from the rotation axis to the camera, in the level frame.
