@@ -41,8 +41,9 @@ RetentionResult find_expired_folders(const StationConfig& config, Records& recor
 
 /// Checks the clock, because all runs appear expired if it is years ahead. Ignores voided runs.
 /// Throws InputError if the newest run of the station ended after the clock's time or more than a
-/// year before it, or if the runs of the last seven days ended more than a year after the previous
-/// ones. A wrong clock with which runs were recorded for more than seven days is not detected.
+/// year before it. Also throws it if the runs of the last seven days ended more than a year after
+/// the previous ones. A wrong clock with which runs were recorded for more than seven days is not
+/// detected.
 void check_clock_is_not_behind(const StationConfig& config, Records& records);
 
 /// Deletes the folder of a run, without following links below `config.captures` and

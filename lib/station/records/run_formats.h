@@ -22,8 +22,8 @@ struct SpooledRun {
 /// are not UTF-8 are escaped (escape_run_texts()).
 std::string serialize_run(const SpooledRun& spooled);
 /// Reads a run in the format of serialize_run(). A missing text of list_run_text_fields() is empty,
-/// as in files of older programs. Throws InputError with the file, also if it has no verdict, or if
-/// the name of the run, of its camera or of an event is not a valid Id.
+/// as in files of older programs. Throws InputError with the file. Also throws it for a run without
+/// a verdict, or if the name of run, camera or event is not a valid Id.
 SpooledRun read_spooled_run(const std::filesystem::path& file);
 
 /// Returns a run as a JSON object for the hook: "event" ("verdict", or "voided" for a voided run),

@@ -38,8 +38,8 @@ struct CapabilityIndex {
 ///   Cpk -+ 1.960 sqrt(1 / (9 n) + Cpk^2 / (2 v))
 ///
 /// v = n - 1 for the standard deviation of all values. For the moving range v = (n - 1) / (2 *
-/// 0.826), because its variance is 0.826 s^2 / (n - 1) (Cryer and Ryan 1990, J. Quality Technology
-/// 22, 187-192).
+/// 0.826): its variance is 0.826 s^2 / (n - 1) (Cryer and Ryan 1990, J. Quality Technology 22,
+/// 187-192).
 struct Capability {
   std::size_t count = 0;
   double mean = 0, within_sd = 0, overall_sd = 0;

@@ -96,8 +96,8 @@ std::string describe_focal_length_difference(const CapturesWithPositions& captur
                                              const LampMap& map, const Calibration& calibration);
 
 /// Describes in one line that the residuals of `frames` are larger than those of `reference`, by 3
-/// times and above 0.1 px. Each set is adjusted with its own tilt, so that another center or
-/// distortion raises the residuals, and a camera that moved or tilted does not. Returns an empty
+/// times and above 0.1 px. Each set is adjusted with its own tilt. Another center or distortion
+/// therefore raises the residuals, and a camera that moved or tilted does not. Returns an empty
 /// string without such a difference, and if an adjustment is undetermined.
 std::string describe_lens_difference(std::span<const Frame> frames,
                                      std::span<const Frame> reference, const LampMap& map,
