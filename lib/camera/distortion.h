@@ -15,8 +15,8 @@ namespace vlp {
 /// mrcal's OPENCV4 to OPENCV12 are this model with the missing coefficients set to 0.
 /// Source: OpenCV's calib3d documentation, "Detailed Description".
 struct Distortion {
-  /// Coefficients k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 of the equation above, in this order (that of
-  /// OpenCV). Dimensionless; 0 by default.
+  /// Coefficients k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 in OpenCV's order: radial (k), tangential (p)
+  /// and thin prism (s). Dimensionless; 0 by default.
   std::array<double, 12> k{};
 
   struct Value {
@@ -27,7 +27,7 @@ struct Distortion {
   /// respect to z.
   Value operator()(const Eigen::Vector2d& z) const;
 
-  /// Returns the radial factor L of the equation above at r2 = |z|^2.
+  /// Returns the radial factor L of Distortion at r2 = |z|^2.
   double radial_distortion_factor(double r2) const {
     return (1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) /
            (1 + r2 * (k[5] + r2 * (k[6] + r2 * k[7])));

@@ -12,8 +12,8 @@ namespace vlp {
 /// Source: Kannala and Brandt, "A generic camera model and calibration method for conventional,
 /// wide-angle, and fish-eye lenses", 2006; OpenCV's fisheye module; Kalibr's "equidistant".
 struct Fisheye {
-  /// Coefficients k1 k2 k3 k4 of the polynomial d(a), in this order. Dimensionless; 0 by default,
-  /// which is the equidistant lens.
+  /// Coefficients k1 k2 k3 k4 of d(a) = a (1 + k1 a^2 + k2 a^4 + k3 a^6 + k4 a^8). Dimensionless; 0
+  /// by default, which is the equidistant lens.
   std::array<double, 4> k{};
 
   /// Returns d(a): the distance from the principal point, in focal lengths, of a ray at `angle_rad`

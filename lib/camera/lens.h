@@ -46,8 +46,8 @@ class Lens {
   struct Projection {
     Eigen::Vector2d pixel;
     Eigen::Matrix<double, 2, 3> d_pixel_d_point;
-    /// One column per parameter, in mrcal's order. Splined lenses have hundreds of parameters;
-    /// their columns are those of fx, fy, cx, cy only.
+    /// Derivative of the pixel with one column per parameter, in mrcal's order. Splined lenses have
+    /// hundreds of parameters; their columns are those of fx, fy, cx, cy only.
     Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::DontAlign, 2, 16> d_pixel_d_parameters;
   };
   /// Projects a point as project() does and computes both Jacobians. Does not allocate.

@@ -22,8 +22,8 @@ class LensFamily {
 
   struct Jacobians {
     Eigen::Matrix<double, 2, 3> d_plane_d_point;
-    /// One column per distortion. Empty for models with more than twelve, see
-    /// compute_distortion_derivatives().
+    /// Derivative of the position in the plane with one column per distortion. Empty for models
+    /// with more than twelve, see compute_distortion_derivatives().
     Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::DontAlign, 2, 12> d_plane_d_distortions;
   };
   /// Computes the Jacobians of project(). Does not allocate.

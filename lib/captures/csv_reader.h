@@ -23,6 +23,7 @@ inline constexpr double kMaxCoordinate_m = 1e6;
 /// and column.
 class CsvTable {
  public:
+  /// Reads and parses a CSV file.
   /// @throws InputError if the file cannot be read, is longer than 2 GiB or is not CSV; if it has a
   ///     column twice, or a row with more or fewer fields than the header
   explicit CsvTable(const std::filesystem::path& file);

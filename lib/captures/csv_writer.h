@@ -42,7 +42,7 @@ class CsvWriter {
   void row(std::initializer_list<std::string_view> fields);
   void row(const std::vector<std::string>& fields);
   void save_file();
-  /// See AtomicFileWriter::save_without_fsync().
+  /// Saves the file without waiting for the disk (AtomicFileWriter::save_without_fsync()).
   void save_without_fsync();
 
  private:

@@ -25,7 +25,8 @@ struct FixRow {
     /// noise is unknown.
     std::optional<Eigen::Vector4d> sd;
     double residual_px;
-    /// Part of sd due to this image alone; std::nullopt if the common errors are unknown.
+    /// Part of `sd` that is independent between images; std::nullopt if the common errors are
+    /// unknown.
     std::optional<Eigen::Vector4d> noise_sd = {};
     /// Velocity in the world, and roll and pitch, if they were estimated.
     std::optional<Eigen::Vector2d> velocity_m_per_s = {};

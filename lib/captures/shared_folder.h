@@ -31,9 +31,9 @@ class SharedFolder {
   /// a link.
   void check_folder_not_replaced() const;
 
-  /// Opens a folder in this one. Returns std::nullopt if it does not exist.
+  /// Opens a subfolder. Returns std::nullopt if it does not exist.
   std::optional<SharedFolder> open_subfolder_if_exists(const Id& name) const;
-  /// Opens a folder in this one, and creates it first if it does not exist.
+  /// Opens a subfolder, and creates it first if it does not exist.
   SharedFolder make_subfolder(const Id& name) const;
 
   /// Returns true if an entry of this name exists, including a symbolic link.
@@ -53,7 +53,7 @@ class SharedFolder {
   void remove_file(const std::string& name) const;
   /// Removes all entries of the folder, including its folders. Of a link, only the link is removed.
   void remove_all_entries() const;
-  /// Removes an empty folder in this one.
+  /// Removes an empty subfolder.
   void remove_subfolder(const Id& name) const;
 
  private:

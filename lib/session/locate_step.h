@@ -37,7 +37,8 @@ struct LocateInput {
   double inclination_sigma_rad = 0;
   /// Uses height and yaw of `captures` if only one lamp is detected.
   bool one_lamp = false;
-  /// Standard deviation of this yaw; 0: exact. The standard deviation of the height is height_sd_m.
+  /// Standard deviation of the yaw of `captures` for fixes of one lamp; 0: exact. That of the
+  /// height is height_sd_m.
   double yaw_sd_rad = 0;
   /// Prior of the motion of captures without velocity and yaw rate in `captures`: speed and yaw
   /// rate of the camera or robot. std::nullopt: the camera stands. Velocities and yaw rates in

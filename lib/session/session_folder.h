@@ -51,7 +51,7 @@ std::vector<TruthRow> read_truth_positions(const std::filesystem::path& folder);
 // clang-format on
 class SessionFolder {
  public:
-  /// Throws InputError if a required file or folder is missing.
+  /// Opens the folder of a session. Throws InputError if a required file or folder is missing.
   explicit SessionFolder(const std::filesystem::path& folder);
 
   const std::filesystem::path& path() const { return folder_; }

@@ -25,8 +25,8 @@ class InputDigests {
   /// Returns the digest of the images in a folder: that of a text with a line "SHA-256  NAME" per
   /// image, by name. Throws InputError if an image cannot be read.
   std::string compute_image_folder_digest(const std::filesystem::path& folder);
-  /// Returns the digest of all files in a folder and its subfolders, likewise. A file that cannot
-  /// be read enters as "cannot be read".
+  /// Returns the digest of all files in a folder and its subfolders, in the form of
+  /// compute_image_folder_digest(). A file that cannot be read enters as "cannot be read".
   std::string compute_folder_digest(const std::filesystem::path& folder);
 
  private:

@@ -73,6 +73,7 @@ class BoardWarp {
 /// the surroundings.
 class BoardPattern {
  public:
+  /// Creates the pattern of a board.
   /// @throws std::invalid_argument if make_board_pattern() rejects the board
   explicit BoardPattern(const SceneBoard& board);
 

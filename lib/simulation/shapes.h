@@ -21,7 +21,7 @@ struct Rectangle {
 /// outside all rectangles.
 class Mosaic {
  public:
-  /// Later rectangles cover earlier ones. Edges closer than 1 nm are merged.
+  /// Creates the pattern; later rectangles cover earlier ones. Edges closer than 1 nm are merged.
   explicit Mosaic(const std::vector<Rectangle>& rectangles);
 
   Eigen::Vector2d intersect_ray(const Eigen::Vector3d& origin,

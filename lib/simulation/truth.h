@@ -36,7 +36,7 @@ struct TrueOtherLight {
   std::string kind;
   /// Lamp id of a mirror image.
   std::optional<int> lamp;
-  /// Image of its center; see TrueLamp.
+  /// Pixel (u, v) of the light's center, as in TrueLamp.
   Eigen::Vector2d pixel;
   /// Fraction of the light that is inside the image, not hidden and, for a mirror image, within the
   /// pane.

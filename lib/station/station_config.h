@@ -51,7 +51,7 @@ struct Hook {
 /// Limits after which the golden unit has to be measured again.
 struct VerificationInterval {
   std::optional<double> hours;
-  /// Number of judged units since its last measurement.
+  /// Number of units judged since the last measurement of the golden unit.
   std::optional<int> units;
 };
 

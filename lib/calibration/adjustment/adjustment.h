@@ -90,8 +90,8 @@ struct AdjustmentInput {
 struct AdjustmentLimits {
   /// Largest standard deviation of the zenith direction, in the direction in which it is largest.
   double zenith_rad = 0.005;
-  /// Limit of the lever arm, in its worst direction, as a fraction of the lamps' height above the
-  /// camera.
+  /// Largest standard deviation of the lever arm, in the direction in which it is largest, as a
+  /// fraction of the lamps' height above the camera.
   double lever_arm_fraction = 0.005;
 };
 
@@ -114,8 +114,8 @@ struct AdjustmentResult {
   struct LampCorrection {
     int id;
     Eigen::Vector3d correction_m, sd_m;
-    /// True if the lamp contradicts its survey by more than all uncertainties explain. Its survey
-    /// is then ignored.
+    /// True if the difference between adjusted and surveyed position exceeds all uncertainties. The
+    /// survey of this lamp is then ignored.
     bool moved;
   };
   /// Corrections of the detected lamps.
@@ -124,7 +124,7 @@ struct AdjustmentResult {
   /// has the same estimates with the errors of the survey in the positions of the lamps.
   Eigen::MatrixXd refined_covariance, surveyed_covariance;
 
-  /// Known position and its residual.
+  /// Known position of the camera or of the axis, with its residual after the adjustment.
   struct Place {
     /// Name of the spot, or of the first capture with this position.
     std::string name;

@@ -79,7 +79,7 @@ class AdjustmentProblem {
   };
   /// Capture with the location of its local unknowns.
   struct Capture {
-    /// Index of the spot; std::nullopt if the capture has a position of its own.
+    /// Index of the spot of the capture; std::nullopt if the capture has a position of its own.
     std::optional<std::size_t> spot;
     /// Rotation from the level frame to the frame of the base.
     Eigen::Matrix3d base_from_level;
@@ -196,8 +196,8 @@ class AdjustmentProblem {
   Eigen::VectorXd state_;
 };
 
-/// Point in the camera, its derivative with respect to the zenith's normalized point, and the
-/// rotation.
+/// Result of rotate_level_point_to_camera(): point in the camera frame, its derivative with respect
+/// to the zenith's normalized point, and the rotation.
 struct ZenithRotation {
   Eigen::Vector3d x_in_camera;
   Eigen::Matrix<double, 3, 2> jacobian_wrt_zenith;

@@ -16,7 +16,7 @@ namespace vlp {
 /// quantity, per m. `lamps` are the detected ones with an sd_m in the map.
 struct LampDerivatives {
   std::vector<Lamp> lamps;
-  /// One row for each quantity, three columns for each lamp.
+  /// Matrix of the derivatives: one row for each quantity, three columns (x, y, z) for each lamp.
   Eigen::MatrixXd by_positions;
 
   /// Returns the changes of the quantities for errors of one standard deviation, one column per

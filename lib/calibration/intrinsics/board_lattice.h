@@ -42,7 +42,7 @@ class BoardLattice {
     Eigen::Vector3d in_board_m;
     Eigen::Vector2d pixel;
     std::size_t part, point;
-    /// Displacement of the corner, px, per px by which the edges of its tag move inwards. 0 for
+    /// Displacement (u, v) of the corner, px, if all edges of its tag move inwards by 1 px. 0 for
     /// corners between touching squares, which do not move.
     Eigen::Vector2d inward{0, 0};
     /// Factor by which a solve multiplies the residual of the corner.

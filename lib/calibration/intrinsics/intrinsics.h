@@ -45,7 +45,7 @@ struct IntrinsicsSolution {
   BoardProblem problem;
   /// Indices in IntrinsicsInput::views of the views in the solution.
   std::vector<std::size_t> views;
-  /// View that fits no pose, although the other views do, and its RMS residual.
+  /// View of the input that fits no pose with the lens of the other views, and its RMS residual.
   struct Dropped {
     std::size_t view;
     double rms_px;

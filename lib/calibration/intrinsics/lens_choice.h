@@ -13,7 +13,7 @@
 
 namespace vlp {
 
-/// Residuals of one lens model in views that took no part in its solves.
+/// Lens model with its residuals in views that were held out of its solves.
 struct LensCandidate {
   LensModel model;
   /// RMS residual of the held-out views per axis, px, over the views that count

@@ -36,7 +36,7 @@ enum class LensStatus {
   undetermined    // the views do not determine a lens of the model
 };
 
-/// An estimated lens with its uncertainty.
+/// Result of estimate_lens(): the lens with its uncertainty, or the reason why there is none.
 struct LensEstimate {
   LensStatus status = LensStatus::ok;
   /// Reason for another status than ok, with what to add or correct.

@@ -144,8 +144,9 @@ void load_tag_family(const std::string& name);
 /// squares' edges (fit_edge_crossing()).
 class BoardDetector {
  public:
-  /// @throws std::invalid_argument if the detector for the board does not have its family or
-  ///         dictionary
+  /// Creates the detector of a board.
+  /// @throws std::invalid_argument if the library that detects this kind of board does not have its
+  ///     family or dictionary
   explicit BoardDetector(const Board& board);
   ~BoardDetector();
   BoardDetector(const BoardDetector&) = delete;

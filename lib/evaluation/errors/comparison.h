@@ -25,7 +25,7 @@ inline constexpr std::size_t kMinClustersCompared = 20;
 inline constexpr double kMinDifference_m = 1e-6;
 inline constexpr double kMinDifferenceFraction = 0.01;
 
-/// Comparison of fixes with others of the same captures, by horizontal errors.
+/// Comparison of two sets of fixes of the same captures, by horizontal errors.
 struct Comparison {
   /// Number of captures with a fix in both, in the first only, in the second only.
   std::size_t pairs = 0, only_these = 0, only_others = 0;

@@ -46,10 +46,10 @@ std::vector<std::pair<double, double>> compute_percentiles(std::vector<double> e
 struct BiasAndRepeatability {
   /// Reference point and the statistics of its fixes.
   struct Station {
-    /// True position (x, y) of its first capture, in the world.
+    /// True position (x, y) of the reference point's first capture, in the world.
     Eigen::Vector2d xy_m;
     std::size_t fixes;
-    /// Mean of its horizontal errors e (x, y), in the world.
+    /// Mean of the horizontal errors (x, y) at the reference point, in the world.
     Eigen::Vector2d bias_m;
     /// Horizontal standard deviation of x and y together, sqrt(sum |e - bias|^2 / (fixes - 1)).
     double sd_m;

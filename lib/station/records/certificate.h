@@ -33,7 +33,7 @@ std::vector<CertifiedValue> collect_certified_values(const Calibration& calibrat
 /// value has six digits and a note that none is stated.
 std::string describe(const CertifiedValue& value);
 
-/// Throws InputError for a run that cannot have a certificate:
+/// Checks that a run may have a certificate. Throws InputError for
 /// - a run of a golden unit,
 /// - a run that was not judged or has no calibration,
 /// - a record that was edited manually.

@@ -98,7 +98,7 @@ class Records {
   void store_run(const RunRecord& record);
   /// Returns a complete run; std::nullopt if no run has this id.
   std::optional<RunRecord> find(const std::string& run);
-  /// Throws InputError if runs cannot be stored now.
+  /// Checks that runs can be stored now. Throws InputError otherwise.
   void check_database_writable();
   /// Returns the runs that match the filter, in chronological order.
   std::vector<RunSummary> list_runs(const RunFilter& filter);

@@ -29,8 +29,8 @@ MetricKind find_run_metric(const std::string& name);
 std::vector<TrendPoint> load_judged_values(Records& records, const std::string& metric,
                                            RunFilter filter);
 
-/// Throws std::invalid_argument if the values are of two stations. They are compared only on
-/// request.
+/// Checks that all values are of one station. Throws std::invalid_argument otherwise; several
+/// stations are compared only on request.
 void check_points_of_one_station(const std::vector<TrendPoint>& points);
 
 /// Returns the gate of a metric in the station's configuration or, without a station, in the last
@@ -43,8 +43,9 @@ ToleranceLimits make_tolerance_limits(const MetricKind& kind, std::optional<doub
 /// empty. Throws std::invalid_argument for units without a value.
 std::vector<StudyValue> select_study_values(const std::vector<TrendPoint>& points,
                                             const std::vector<std::string>& units);
-/// Throws std::invalid_argument that names two runs of one of the units that use the same images,
-/// because such runs do not show repeatability. Ignores runs without images.
+/// Checks that no two runs of a unit use the same images, because such runs do not show
+/// repeatability. Throws std::invalid_argument that names two such runs. Ignores runs without
+/// images.
 void check_runs_share_no_images(Records& records, const std::vector<TrendPoint>& points,
                                 const std::vector<StudyValue>& values);
 /// Returns the values of reference units with their known values. Throws as select_study_values().

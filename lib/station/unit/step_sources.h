@@ -56,7 +56,7 @@ class StepSources {
 
  private:
   std::map<StationStep, std::shared_ptr<FrameSource>> by_step_;
-  /// Last frame, and its step.
+  /// Path of the last frame that was written, and its step.
   std::filesystem::path last_;
   StationStep last_step_ = StationStep::boards;
 };
