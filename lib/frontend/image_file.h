@@ -12,7 +12,7 @@
 
 namespace vlp {
 
-/// Throws InputError if an image has more than `max_mpx` megapixels.
+/// Checks that an image has at most `max_mpx` megapixels. Throws InputError otherwise.
 void check_image_size(const std::filesystem::path& file, std::int64_t width, std::int64_t height,
                       double max_mpx);
 

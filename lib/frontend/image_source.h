@@ -90,7 +90,8 @@ void for_each_image(ImageSource& source, int threads,
 std::string describe_wrong_size(const std::array<int, 2>& size_px,
                                 const std::array<int, 2>& imager_px);
 
-/// Throws InputError if the size of an image is not `imager_px`.
+/// Checks that the size of an image is `imager_px` (width, height), if given. Throws InputError
+/// otherwise.
 void check_image_matches_imager(const std::filesystem::path& file,
                                 const std::array<int, 2>& size_px,
                                 const std::optional<std::array<int, 2>>& imager_px);

@@ -33,9 +33,9 @@ inline constexpr std::array kCommonErrorSources{CommonErrorSource::lens, CommonE
 /// covariance C. The total covariance of a fix is
 ///   cov = (J' W J)^-1 + G C G',    G = (J' W J)^-1 J' W J_c
 /// with
-///   J    derivative of the predicted normalized points by the states of the fix
+///   J    derivative of the predicted normalized points w.r.t. the states of the fix
 ///   W    inverse covariance of the measured points from pixel noise
-///   J_c  derivative of (normalized points z - predictions) by the errors of calibrated quantities
+///   J_c  derivative of (normalized points z - predictions) w.r.t. errors of calibrated quantities
 ///   C    joint covariance of these errors
 /// Calibrated quantities: lens, zenith, offset of the dispersion calibration, positions of the
 /// lamps.
@@ -75,13 +75,14 @@ class CommonErrors {
   /// correlation with the calibration is lost.
   int lamps_elsewhere() const { return lamps_elsewhere_; }
 
-  /// Derivative of the ray of a pixel by the shared errors, along the axes of the base, which are
-  /// those of the level camera.
+  /// Derivative of the ray of a pixel with respect to the shared errors, one column each. The ray
+  /// is along the axes of the base, the camera frame after correction of its tilt.
   using RayJacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 20>;
   RayJacobian compute_ray_error_jacobian(const Eigen::Vector3d& ray_in_base,
                                          const Lens& lens) const;
 
-  /// Derivatives of z of one lamp by the errors: 2 rows each.
+  /// Derivatives of the normalized point z of one lamp with respect to the shared errors and to the
+  /// error of the lamp's position, m. Two rows each.
   struct Effect {
     Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 20> jacobian_wrt_shared;
     Eigen::Matrix<double, 2, 3> jacobian_wrt_lamp;
@@ -93,14 +94,15 @@ class CommonErrors {
                                              const Eigen::Matrix3d& level_from_base) const;
 
   template <int States>
-  /// G: derivatives of the states of a fix by the shared errors and by the errors of each lamp.
+  /// G: derivatives of the states of a fix with respect to the shared errors and to the errors of
+  /// each lamp.
   struct GainMatrix {
     using SharedGain = Eigen::Matrix<double, States, Eigen::Dynamic, Eigen::ColMajor, States, 20>;
     using LampGain = Eigen::Matrix<double, States, 3>;
 
     SharedGain jacobian_wrt_shared;
-    /// Derivatives by the lamps of the fix, and the indices of these lamps in the map. The first
-    /// `size` elements are valid.
+    /// Derivatives with respect to the positions of the lamps of the fix, and the indices of these
+    /// lamps in the map. The first `size` elements are valid.
     std::array<LampGain, kMaxSightings> jacobian_wrt_lamp;
     std::array<std::size_t, kMaxSightings> lamps;
     std::size_t size = 0;
@@ -168,8 +170,8 @@ class CommonErrors {
     /// Variance per axis of a lamp without rows; 0 if unknown.
     double variance_m2 = 0;
   };
-  /// Derivatives of the pixel of a body's observation, in standard deviations, by the states and by
-  /// the errors.
+  /// Derivatives of the pixel of a body's observation, in standard deviations, with respect to the
+  /// states and to the errors.
   struct BodyEffect {
     Eigen::Matrix<double, 2, kBodyStates> jacobian_wrt_state;
     Effect by_errors;
@@ -201,7 +203,7 @@ class CommonErrors {
   /// Number of intrinsics, and index of the first row of the offset.
   Eigen::Index intrinsics_, offset_ = 0;
   Eigen::Matrix3d base_from_camera_, camera_from_base_;
-  /// Derivatives of base_from_camera by the coordinates of zenith and offset.
+  /// Derivatives of base_from_camera with respect to the coordinates of zenith and offset.
   std::vector<Eigen::Matrix3d> turns_;
   MatrixX covariance_;
   std::vector<LampErrors> lamps_;
@@ -228,7 +230,7 @@ OutlierLamps find_outlier_lamps(std::span<const Sighting> sightings,
 
 /// Computes the covariance of the zenith's normalized point from all its sources: its captures and
 /// the lens, or the adjustment if there is one. Returns std::nullopt if a source is not reported,
-/// or if the derivative by the lens is unknown.
+/// or if the derivative with respect to the lens is unknown.
 /// @pre there is a rotation center
 std::optional<Matrix2> compute_zenith_covariance(const Calibration& calibration);
 

@@ -28,7 +28,8 @@ struct InclinationRotation {
 InclinationRotation compute_inclination_rotation(const Inclination& inclination,
                                                  double yaw_in_robot_rad);
 
-/// Derivatives of (X, Y, Z, yaw) by the errors of roll and pitch of the inclination, a column each.
+/// Derivatives of (X, Y, Z, yaw), in m and rad, with respect to the errors of roll and pitch of the
+/// inclination, in rad. One column each.
 using InclinationJacobian = Eigen::Matrix<double, 4, 2>;
 
 /// Computes center and yaw of the robot from the camera pose. With m the position of the mount
@@ -36,8 +37,8 @@ using InclinationJacobian = Eigen::Matrix<double, 4, 2>;
 ///   robot = S - Rz(g) m,   yaw = g - yaw_in_robot
 ///
 /// @param camera   pose of the camera with the covariance from pixel noise
-/// @param d_pose_d_inclination  derivative of the camera pose by the inclination; m depends on the
-/// inclination, too
+/// @param d_pose_d_inclination derivative of the camera pose with respect to the inclination; m
+///     depends on the inclination, too
 PoseEstimate compute_robot_pose_from_camera_pose(const PoseEstimate& camera,
                                                  const InclinationJacobian& d_pose_d_inclination,
                                                  double inclination_sigma_rad,

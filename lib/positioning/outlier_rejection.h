@@ -75,7 +75,8 @@ struct FrameObservations : LampObservations<Sighting> {
   /// False if observations are weighted in the undistorted image, where the noise differs.
   bool is_weighed_by_noise = true;
 
-  /// Removes all observations except those in `kept`. The removed ones count as rejected.
+  /// Removes all observations except those whose bit is set in `kept`, by their index. The removed
+  /// ones count as rejected.
   void keep_only(const std::bitset<kMaxSightings>& kept);
 };
 

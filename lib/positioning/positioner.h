@@ -83,10 +83,11 @@ struct Sensors {
   std::optional<double> time_s = {};
 };
 
-/// An earlier frame of the same body with the same velocity and yaw rate.
+/// Detections of an earlier frame of the same body, whose velocity, yaw rate, roll and pitch are
+/// assumed to be the same.
 struct EarlierFrame {
   std::span<const Detection> detections;
-  /// Time from this frame to the frame of the fix.
+  /// Time from the earlier frame to the frame of the fix.
   double before_s;
 };
 

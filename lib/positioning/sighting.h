@@ -21,7 +21,8 @@ struct Sighting {
   Eigen::Vector3d lamp_m;
   /// Measured point z = (x/z, y/z) in the level frame of the camera.
   Eigen::Vector2d z;
-  /// Derivative of the pixel by z. Converts residuals of z to pixels, in which the noise is given.
+  /// Derivative of the pixel, px, with respect to z. Converts residuals of z to pixels, in which
+  /// the noise is given.
   Matrix2 d_pixel_d_z;
   /// Standard deviation of the lamp's pixel per axis.
   double sigma_px;
@@ -71,7 +72,8 @@ inline Prediction predict_normalized_point(const LevelPose& camera, const Eigen:
   return prediction;
 }
 
-/// Returns the derivative of z by a small rotation of the level frame about its x and y axes.
+/// Returns the derivative of z with respect to a small rotation of the level frame about its x and
+/// y axes, rad.
 inline Eigen::Matrix2d compute_point_jacobian_wrt_level_tilt(const Eigen::Vector2d& z) {
   Eigen::Matrix2d jacobian;
   jacobian << -z.x() * z.y(), 1 + z.x() * z.x(), -(1 + z.y() * z.y()), z.x() * z.y();

@@ -57,7 +57,7 @@ struct IntrinsicsReport {
   /// lens has no ray there; infinity is not written to files.
   std::optional<double> expected_max_error_px;
   /// Covariance of the intrinsics, in their order. Splined lenses: none, or only fx, fy, cx, cy.
-  /// The same applies to all derivatives by the intrinsics below.
+  /// The same applies to all derivatives with respect to the intrinsics below.
   std::optional<MatrixX> covariance = {};
   /// Polygon of the calibrated region, as its consecutive corners; empty: the entire image.
   std::vector<Eigen::Vector2d> region_px = {};
@@ -84,12 +84,13 @@ struct RotationCenter {
   /// the camera's yaw on the robot is zero, it equals x and y of CameraMount::position_in_robot_m.
   std::optional<Eigen::Vector2d> lever_arm_m = {};
   std::optional<Matrix2> lever_arm_covariance = {};
-  /// Derivative of the zenith's normalized point (x/z, y/z) by the intrinsics, a column each.
-  /// `covariance` is from the captures alone, with the lens taken as exact.
+  /// Derivative of the zenith's normalized point (x/z, y/z) with respect to the intrinsics, one
+  /// column each. `covariance` is from the captures alone, with the lens taken as exact.
   std::optional<MatrixX> by_intrinsics = {};
   /// Regression of the lever arm, in m, on the error of the zenith's normalized point, if the same
-  /// captures determine both. lever_arm_by_intrinsics: derivative of the lever arm by the
-  /// intrinsics, a column each. The remainder of lever_arm_covariance is independent of both.
+  /// captures determine both. lever_arm_by_intrinsics: derivative of the lever arm, m, with respect
+  /// to the intrinsics, one column each. The remainder of lever_arm_covariance is independent of
+  /// both.
   std::optional<Matrix2> lever_arm_by_zenith = {};
   std::optional<MatrixX> lever_arm_by_intrinsics = {};
 };
@@ -108,7 +109,8 @@ struct Dispersion {
   /// Covariance of offset_px in px^2 from captures and lever arm, with lens, zenith and lamp map
   /// taken as exact. The contribution of the lever arm may depend on the lamp map.
   std::optional<Matrix2> covariance = {};
-  /// Derivatives of offset_px / f by the intrinsics and by the zenith's normalized point.
+  /// Derivatives of offset_px / f with respect to the intrinsics and to the zenith's normalized
+  /// point.
   std::optional<MatrixX> by_intrinsics = {};
   std::optional<Matrix2> by_zenith = {};
   /// Lamp whose surveyed position affects the offset, with the derivative.
@@ -117,7 +119,7 @@ struct Dispersion {
     /// Position and standard deviation per axis in the map of the calibration.
     Eigen::Vector3d position_m;
     double sd_m;
-    /// Derivative of offset_px / f by the position, per meter.
+    /// Derivative of offset_px / f with respect to the position, per meter.
     Eigen::Matrix<double, 2, 3, Eigen::DontAlign> by_position;
   };
   /// Lamps of the map with a positive sd_m that appear in the captures.

@@ -22,7 +22,7 @@ Eigen::Vector2d normalized_zenith_point(const RotationCenter& center);
 
 /// Returns the calibration with `error` added to its first count_intrinsics_with_covariance()
 /// intrinsics. The zenith does not change; center_px is updated. The lever arm changes by its
-/// derivative by the intrinsics, without the part through the zenith.
+/// derivative with respect to the intrinsics, without the part through the zenith.
 Calibration with_lens_error(Calibration calibration, const Eigen::VectorXd& error);
 
 /// Returns the calibration with `error` added to the zenith's normalized point (x/z, y/z).

@@ -101,7 +101,8 @@ class YamlMap {
     const auto value = get_optional(key);
     return value ? value->read_maps(read) : decltype(value->read_maps(read))();
   }
-  /// Throws InputError for the first key that was not read.
+  /// Checks that all keys of the mapping were read. Throws InputError for the first one that was
+  /// not.
   void check_all_keys_read() const;
 
   /// Returns an error with `problem`, file, line and key of the mapping, to be thrown.
@@ -153,7 +154,7 @@ YamlMap read_yaml(const std::filesystem::path& file);
 /// Reads a YAML file with the first key `format: NAME/VERSION`. Throws InputError for other
 /// formats, too.
 YamlMap read_yaml(const std::filesystem::path& file, const std::string& format);
-/// Throws InputError if the key `format` is missing or has another value.
+/// Checks that the key `format` of a mapping has this value. Throws InputError otherwise.
 void check_file_format(YamlMap& map, const std::string& format);
 
 }  // namespace vlp

@@ -44,8 +44,8 @@ std::vector<KnownMotion> find_capture_motions(std::span<const Frame> frames,
                                               const std::optional<KnownMotion>& otherwise,
                                               double yaw_rate_sd_rad_per_s);
 
-/// Throws std::invalid_argument if the camera lacks row_time_s or readout, which motion
-/// compensation requires.
+/// Checks that the camera has row_time_s and readout, which motion compensation requires. Throws
+/// std::invalid_argument otherwise.
 void check_row_time(const Camera& camera);
 
 }  // namespace vlp

@@ -27,7 +27,8 @@ struct LineLevel {
 /// period. For steady light it is the mean of the neighboring scanlines.
 class LineLevels {
  public:
-  /// @pre `chords` are those of at least eight consecutive lines.
+  /// Measures the levels of a light. `chords` are its pixels on each scanline of the image `lines`.
+  /// @pre `chords` are those of at least eight consecutive scanlines
   LineLevels(const ImageView& lines, const std::vector<PixelRun>& chords,
              const Background& background);
 

@@ -46,7 +46,7 @@ struct StraightEdge {
   Matrix2 covariance_px;
   /// Standard deviation of the blur across the edge.
   double blur_px;
-  /// Distance of the middle of the edge from the line through its ends; 0 with a lens.
+  /// Sagitta of the edge: distance of its middle from the line through its ends, px; 0 with a lens.
   double bow_px;
   /// Fraction of the pixels next to the edge that the model explains.
   double fraction;

@@ -31,7 +31,8 @@ struct ModulatedLight {
   /// area.
   double center_sd_px;
   PeriodFit fit;
-  /// Index of its lamp period; std::nullopt if it has none or several are possible.
+  /// Index in `lamp_periods_lines` of the light's period; std::nullopt if none or several are
+  /// possible.
   std::optional<std::size_t> lamp;
   Stripes stripes;  ///< stripes of its brightest part, divided by the envelope
   /// Phase coherence |sum z| / sum |z| over the cells of its brightest part, see

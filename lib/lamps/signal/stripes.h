@@ -51,7 +51,8 @@ struct Stripes {
   /// Number of stripes per scanline: half of the number of begins and ends divided by the number of
   /// scanlines. The signal crosses the middle between dark and bright there.
   double count_per_line;
-  /// Fraction of the disc's area on scanlines brighter than this middle level.
+  /// Fraction of the disc's area that is on scanlines brighter than the middle between dark and
+  /// bright.
   double lit_area;
 };
 
