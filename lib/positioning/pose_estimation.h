@@ -113,8 +113,8 @@ class EvaluatedState {
   Eigen::Vector3d pitch_axis;
 };
 
-/// Returns the derivative of a lamp's pixel, in standard deviations, with respect to its position q
-/// relative to the camera, m, along the axes of the body.
+/// Returns the derivative of a lamp's pixel, in standard deviations, with respect to q, m. q is its
+/// position relative to the camera, along the axes of the body.
 Eigen::Matrix<double, 2, 3> d_whitened_pixel_d_lamp(const BodyObservation& sighting,
                                                     const Eigen::Vector3d& lamp_from_camera_m);
 
