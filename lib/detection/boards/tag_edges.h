@@ -26,8 +26,8 @@ namespace vlp {
 ///
 /// Limits. On rendered boards corners are accurate to 0.02 px, also for tags of 16 px and at the
 /// rim of a lens of 190 degrees. A tag keeps its corners if the fit of an edge fails. It also keeps
-/// them if a corner would move by more than max(1.5 px, 3 % of the width) plus the largest
-/// curvature of its edges.
+/// them if a corner would move by more than max(1.5 px, 3 % of the width) plus the largest edge
+/// curvature.
 ///
 /// Tone curve. A tone curve makes an edge steeper on its dark side, which biases the fit towards
 /// that side. The bias grows as the stripes get narrower. Edges are therefore fitted for each of
