@@ -265,7 +265,7 @@ void add_report_options(CLI::App& app, ReportOption& option) {
 
 void add_options(CLI::App& app, Options& options) {
   app.add_option("fixes", options.fixes, "Fixes to evaluate, fixes.csv of vlp-locate")
-      ->get_required();
+      ->required();
   app.add_option("--truth", options.truth,
                  "Ground truth, truth.csv: image, x_m, y_m [, z_m, yaw_rad]. Captures without a "
                  "fix count as missing");
