@@ -109,6 +109,46 @@ void run(const CLI::App& app, const Options& options) {
   print_adjustment(result.found, input.calibration, lens_stated);
 }
 
+void add_options(CLI::App& app, Options& options) {
+  app.add_option("sets", options.sets,
+                 "Folders of images, or tables with columns image, lamp, u_px, v_px [, sigma_px]")
+      ->option_text("SET...");
+  app.add_option("--turn", options.turns, "Further sets, each a rotation in place")
+      ->option_text("SET...");
+  app.add_option("--lamps", options.images.lamps,
+                 "Lamp map, lamps.yaml. Without sd_m it needs --map-sd-m")
+      ->required();
+  app.add_option("--calibration", options.images.calibration,
+                 "Calibration of the camera. Its rotation center, if any, is the initial value")
+      ->required();
+  app.add_option("-o,--output", options.images.output,
+                 "Output file of the calibration with its adjustment, YAML")
+      ->required();
+  app.add_option("--refine-map", options.refined_map,
+                 "Output file of the lamp map with the estimated positions, YAML. The covariance "
+                 "of the output calibration then refers to this map")
+      ->option_text("FILE");
+  app.add_option("--map-sd-m", options.map_sd_m,
+                 "Standard deviation per axis of lamp positions without sd_m, in m")
+      ->check(make_finite_non_negative_validator());
+  app.add_option("--position-sd-m", options.place_sd_m,
+                 "Standard deviation per axis of known positions without position_sd_m, in m. Also "
+                 "uses truth.csv in folders of images (default: such positions are ignored)")
+      ->check(make_finite_positive_validator());
+  app.add_option(
+         "--lens-sd-px", options.lens_sd_px,
+         "Standard deviation of each lens parameter, as RMS displacement of the image, in px. For "
+         "calibrations without lens covariance; the lens is then estimated (default: exact lens)")
+      ->check(make_finite_positive_validator())
+      ->check(CLI::Range(1e-3, 1e3));  // px; smaller: exact lens, larger: unusable lens
+  add_motion_options(
+      app, options.motion,
+      "Maximum speed of the camera, in m/s. Estimates the motion of each capture unless "
+      "captures.csv has it (default: motion of captures.csv, or 0)");
+  add_yaw_rate_sd_option(app, options.yaw_rate_sd_deg_per_s);
+  add_detect_options(app, options.images);
+}
+
 }  // namespace
 }  // namespace vlp
 
@@ -135,43 +175,7 @@ int main(int argc, char** argv) {
       "    --refine-map refined.yaml\n",
       "vlp-adjust");
   vlp::Options options;
-  app.add_option("sets", options.sets,
-                 "Folders of images, or tables with columns image, lamp, u_px, v_px [, sigma_px]")
-      ->option_text("SET...");
-  app.add_option("--turn", options.turns, "Further sets, each a rotation in place")
-      ->option_text("SET...");
-  app.add_option("--lamps", options.images.lamps,
-                 "Lamp map, lamps.yaml. Without sd_m it needs --map-sd-m")
-      ->required();
-  app.add_option("--calibration", options.images.calibration,
-                 "Calibration of the camera. Its rotation center, if any, is the initial value")
-      ->required();
-  app.add_option("-o,--output", options.images.output,
-                 "Output file of the calibration with its adjustment, YAML")
-      ->required();
-  app.add_option("--refine-map", options.refined_map,
-                 "Output file of the lamp map with the estimated positions, YAML. The covariance "
-                 "of the output calibration then refers to this map")
-      ->option_text("FILE");
-  app.add_option("--map-sd-m", options.map_sd_m,
-                 "Standard deviation per axis of lamp positions without sd_m, in m")
-      ->check(vlp::make_finite_non_negative_validator());
-  app.add_option("--position-sd-m", options.place_sd_m,
-                 "Standard deviation per axis of known positions without position_sd_m, in m. Also "
-                 "uses truth.csv in folders of images (default: such positions are ignored)")
-      ->check(vlp::make_finite_positive_validator());
-  app.add_option(
-         "--lens-sd-px", options.lens_sd_px,
-         "Standard deviation of each lens parameter, as RMS displacement of the image, in px. For "
-         "calibrations without lens covariance; the lens is then estimated (default: exact lens)")
-      ->check(vlp::make_finite_positive_validator())
-      ->check(CLI::Range(1e-3, 1e3));  // px; smaller: exact lens, larger: unusable lens
-  vlp::add_motion_options(
-      app, options.motion,
-      "Maximum speed of the camera, in m/s. Estimates the motion of each capture unless "
-      "captures.csv has it (default: motion of captures.csv, or 0)");
-  vlp::add_yaw_rate_sd_option(app, options.yaw_rate_sd_deg_per_s);
-  vlp::add_detect_options(app, options.images);
+  vlp::add_options(app, options);
   return vlp::run_app(app, argc, argv, [&] {
     if (options.sets.empty() && options.turns.empty()) {
       throw std::invalid_argument("SET: missing; give a folder of images or a table of detections");

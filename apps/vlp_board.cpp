@@ -99,25 +99,12 @@ void run(const Options& options) {
   fmt::print("{}: for vlp-intrinsics; measure the ruler on the print first\n", yaml);
 }
 
-}  // namespace
-}  // namespace vlp
-
-int main(int argc, char** argv) {
-  CLI::App app(
-      "Creates a printable calibration board of AprilTags, squares (chessboard) or both (ChArUco, "
-      "with markers of an OpenCV dictionary). Also writes its description, board.yaml, for "
-      "vlp-intrinsics. Print the board at 100 %, measure the ruler on the print, and mount it on a "
-      "flat surface.\n\n"
-      "Examples:\n"
-      "  build/bin/vlp-board -o board.pdf\n"
-      "  build/bin/vlp-board --kalibr --cols 6 --rows 6 --paper A3 -o board.pdf\n",
-      "vlp-board");
-  vlp::Options options;
+void add_options(CLI::App& app, Options& options) {
   app.add_option("-o,--output", options.output,
                  "Output file of the board, PDF. The board description has the same name with "
                  "extension .yaml")
       ->required()
-      ->check(vlp::make_file_extension_validator(".pdf"));
+      ->check(make_file_extension_validator(".pdf"));
   app.add_option("--paper", options.paper, "Paper size, A0 to A4 or Letter (default: A4)");
   app.add_option("--cols", options.cols,
                  "Number of tags or squares along the width (default: 6 tags or 10 squares)")
@@ -165,5 +152,22 @@ int main(int argc, char** argv) {
                  "Marker width as a fraction of the square width (default: 0.75)")
       ->check(CLI::Range(0.3, 0.9))
       ->needs(charuco);
+}
+
+}  // namespace
+}  // namespace vlp
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Creates a printable calibration board of AprilTags, squares (chessboard) or both (ChArUco, "
+      "with markers of an OpenCV dictionary). Also writes its description, board.yaml, for "
+      "vlp-intrinsics. Print the board at 100 %, measure the ruler on the print, and mount it on a "
+      "flat surface.\n\n"
+      "Examples:\n"
+      "  build/bin/vlp-board -o board.pdf\n"
+      "  build/bin/vlp-board --kalibr --cols 6 --rows 6 --paper A3 -o board.pdf\n",
+      "vlp-board");
+  vlp::Options options;
+  vlp::add_options(app, options);
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
 }

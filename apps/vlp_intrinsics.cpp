@@ -145,6 +145,41 @@ bool has_failed_lens_gate(const std::vector<CheckedMetric>& gates) {
   });
 }
 
+/// Writes calibration, corners, exports and plot.
+void write_results(const Options& options, const LensResult& result) {
+  const LensEstimate& lens = result.lens;
+  write_calibration(options.output, result.calibration);
+  if (is_supported_by_mrcal(result.calibration.camera.lens_model)) {
+    write_mrcal_cameramodel(replace_extension(options.output, ".cameramodel"), lens.solution);
+  } else {
+    // A file of an earlier run would belong to another lens.
+    std::filesystem::remove(replace_extension(options.output, ".cameramodel"));
+  }
+  write_mrcal_corners(replace_extension(options.output, ".corners.vnl"), lens.solution,
+                      lens.images);
+  write_exports(options, result.calibration.camera);
+  if (!options.plot.empty()) write_plot(options.plot, result.drawing());
+}
+
+/// Throws GateNotMet with a remedy if a gate fails.
+void throw_if_gate_failed(const std::vector<Gate>& gates, const LensResult& result) {
+  const LensEstimate& lens = result.lens;
+  const auto checked = check_gates(gates, result.metrics);
+  const std::string failed = describe_failed_gates(checked);
+  if (failed.empty()) return;
+  if (lens.better_model && has_failed_lens_gate(checked)) {
+    throw GateNotMet(fmt::format("{}; use --lens {}", failed, to_string(*lens.better_model)));
+  }
+  if (std::isfinite(lens.report.uncertainty_worst_px)) {
+    throw GateNotMet(
+        fmt::format("{}; add views, next {}", failed, recommend_next_board_view(lens.coverage)));
+  }
+  throw GateNotMet(
+      fmt::format("{}; the estimated lens has no rays in part of the image: use another lens "
+                  "model, for a wide lens --lens OPENCV_FISHEYE",
+                  failed));
+}
+
 void run(const CLI::App& app, const Options& options) {
   const std::vector<Gate> gates = parse_gates(options);
   if (!chooses_lens(options)) check_exports(options, known_camera(options));
@@ -184,37 +219,14 @@ void run(const CLI::App& app, const Options& options) {
   }
   throw_if_step_failed(result);
   check_exports(options, result.calibration.camera);  // the selected lens model
-  write_calibration(options.output, result.calibration);
-  if (is_supported_by_mrcal(result.calibration.camera.lens_model)) {
-    write_mrcal_cameramodel(replace_extension(options.output, ".cameramodel"), lens.solution);
-  } else {
-    // A file of an earlier run would belong to another lens.
-    std::filesystem::remove(replace_extension(options.output, ".cameramodel"));
-  }
-  write_mrcal_corners(replace_extension(options.output, ".corners.vnl"), lens.solution,
-                      lens.images);
-  write_exports(options, result.calibration.camera);
-  if (!options.plot.empty()) write_plot(options.plot, result.drawing());
+  write_results(options, result);
   if (lens.choice) fmt::print("lens model    {}\n", describe(*lens.choice));
   print_calibration_summary(lens.solution, lens.report, lens.coverage, lens.held_out);
   if (lens.print_px) {
     fmt::print("board print   {:.3f} px, in the covariance and not in the uncertainty above\n",
                *lens.print_px);
   }
-  const auto checked = check_gates(gates, result.metrics);
-  const std::string failed = describe_failed_gates(checked);
-  if (failed.empty()) return;
-  if (lens.better_model && has_failed_lens_gate(checked)) {
-    throw GateNotMet(fmt::format("{}; use --lens {}", failed, to_string(*lens.better_model)));
-  }
-  if (std::isfinite(lens.report.uncertainty_worst_px)) {
-    throw GateNotMet(
-        fmt::format("{}; add views, next {}", failed, recommend_next_board_view(lens.coverage)));
-  }
-  throw GateNotMet(
-      fmt::format("{}; the estimated lens has no rays in part of the image: use another lens "
-                  "model, for a wide lens --lens OPENCV_FISHEYE",
-                  failed));
+  throw_if_gate_failed(gates, result);
 }
 
 void add_input_options(CLI::App& app, Options& options) {

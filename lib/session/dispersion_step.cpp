@@ -176,6 +176,33 @@ void warn_about_few_captures(DispersionResult& result, DispersionMethod method) 
       "be wrong by a factor of several: add captures, or state sigma_px");
 }
 
+/// Fails the step with the reason why there is no offset, and explains it by errors of the lamp map
+/// if the captures are sufficient.
+void set_dispersion_failure(DispersionResult& result, const LampCaptures& input,
+                            const Calibration& leveled) {
+  const DispersionFit& fit = result.fit;
+  std::string why(describe(fit.status));
+  if (fit.status == DispersionStatus::no_fix) {
+    why += fmt::format("; the first: {}", describe(fit.no_fix_status));
+  }
+  const bool is_far = fit.status == DispersionStatus::station_far;
+  result.set_failure(is_far ? StepFailure::wrong_place : StepFailure::undetermined, std::move(why));
+  const bool is_of_captures = fit.status == DispersionStatus::too_few_captures ||
+                              fit.status == DispersionStatus::one_yaw ||
+                              fit.status == DispersionStatus::many_yaws;
+  if (!is_far && !is_of_captures) explain_failure_by_map_errors(input, leveled, result);
+}
+
+std::vector<Metric> make_dispersion_metrics(const DispersionFit& fit) {
+  constexpr double millimeters = 1e3;
+  std::vector<Metric> metrics{{"dispersion_mm", millimeters * fit.dispersion.radius_m},
+                              {"dispersion_offset_px", fit.dispersion.offset_px.norm()}};
+  if (const auto& world_m = fit.world_offset_m) {
+    metrics.push_back({"world_offset_mm", millimeters * world_m->norm()});
+  }
+  return metrics;
+}
+
 }  // namespace
 
 DispersionResult run_dispersion_step(const LampCaptures& input, const KnownPositions& places,
@@ -206,18 +233,8 @@ DispersionResult run_dispersion_step(const LampCaptures& input, const KnownPosit
   result.fit =
       estimate_heading_dependent_offset(captures, input.lamps, input.calibration, method, circle);
   const DispersionFit& fit = result.fit;
-  std::string why(describe(fit.status));
-  if (fit.status == DispersionStatus::no_fix) {
-    why += fmt::format("; the first: {}", describe(fit.no_fix_status));
-  }
   if (fit.status != DispersionStatus::ok) {
-    const bool is_far = fit.status == DispersionStatus::station_far;
-    result.set_failure(is_far ? StepFailure::wrong_place : StepFailure::undetermined,
-                       std::move(why));
-    const bool is_of_captures = fit.status == DispersionStatus::too_few_captures ||
-                                fit.status == DispersionStatus::one_yaw ||
-                                fit.status == DispersionStatus::many_yaws;
-    if (!is_far && !is_of_captures) explain_failure_by_map_errors(input, leveled, result);
+    set_dispersion_failure(result, input, leveled);
     return result;
   }
   if (!input.calibration.rotation_center) {
@@ -225,12 +242,7 @@ DispersionResult run_dispersion_step(const LampCaptures& input, const KnownPosit
   }
   warn_about_few_captures(result, method);
   if (!of_axis) warn_about_lever_arm(result, places, input.lamps, leveled);
-  constexpr double millimeters = 1e3;
-  result.metrics = {{"dispersion_mm", millimeters * fit.dispersion.radius_m},
-                    {"dispersion_offset_px", fit.dispersion.offset_px.norm()}};
-  if (const auto& world_m = fit.world_offset_m) {
-    result.metrics.push_back({"world_offset_mm", millimeters * world_m->norm()});
-  }
+  result.metrics = make_dispersion_metrics(fit);
   if (of_axis) {
     add_lever_arm_covariance(result.fit.dispersion, input,
                              compute_mean_height_m(places, input.lamps, leveled));

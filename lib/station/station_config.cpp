@@ -257,6 +257,69 @@ std::string read_records(const YamlValue& value, const fs::path& file) {
   return resolve_path(value, file).string();
 }
 
+/// Reads the camera type and the targets that it observes: board, lamps and known position.
+void read_camera_and_targets(YamlMap& document, Files& files, StationConfig& config) {
+  const YamlValue type = document.get_required_column("camera_type");
+  config.type = read_row_time_and_readout(type, files).camera;
+  config.type_file = fs::path(type.get_text()).filename().string();
+  const YamlValue board = document.get_required_column("board");
+  config.board = read_board(files(board));
+  if (config.board.has_chessboard_squares()) {
+    throw board.make_error("is a board of squares: the station looks for one of AprilTags");
+  }
+  const auto room = document.get_optional("room");
+  config.lamps = read_lamps_of_room(files(document.get_required_column("lamps")),
+                                    room ? room->get_text() : std::string());
+  if (const auto place = document.get_optional("dispersion_station_m")) {
+    config.dispersion_station_m = Eigen::Vector2d(place->get_numbers(2).data());
+  }
+}
+
+/// Reads the conditions of a verdict: completion, rejection of images, gates and golden unit.
+void read_verdict_conditions(YamlMap& document, Files& files, StationConfig& config) {
+  if (const auto sufficient = document.get_optional("completion"))
+    config.sufficient = read_completion_criteria(sufficient->get_mapping());
+  if (const auto refuse = document.get_optional("rejection"))
+    read_rejection_limits(refuse->get_mapping(), config);
+  config.gates = read_gates(document.get_required_column("gates"), list_unit_metrics());
+  if (const auto guard = document.get_optional("guard_bands")) {
+    read_guard_bands(guard->get_mapping(), config.gates);
+  }
+  if (const auto golden = document.get_optional("golden")) {
+    config.golden = read_golden(golden->get_mapping(), files);
+  }
+  if (const auto due = document.get_optional("verify_due")) {
+    if (!config.golden) throw due->make_error("needs a golden unit: add the key 'golden'");
+    config.verify_due = read_verification_interval(due->get_mapping());
+  }
+}
+
+/// Reads the valid serials, and the operators who may void runs.
+void read_serials_and_operators(YamlMap& document, StationConfig& config) {
+  if (const auto pattern = document.get_optional("serial_pattern")) {
+    config.serial_pattern = read_pattern(*pattern);
+  }
+  if (const auto operators = document.get_optional("void_operators")) {
+    const std::vector<YamlValue> names = operators->get_list();
+    if (names.empty())
+      throw operators->make_error("names nobody; leave it out if all may void runs");
+    std::ranges::transform(names, std::back_inserter(config.void_operators),
+                           [](const YamlValue& name) { return name.get_text(); });
+  }
+}
+
+/// Reads the folders of images and results, and where and how long runs are kept.
+void read_storage(YamlMap& document, StationConfig& config) {
+  const fs::path& file = config.file;
+  config.captures = resolve_path(document.get_required_column("captures"), file);
+  config.results = resolve_path(document.get_required_column("results"), file);
+  config.records = read_records(document.get_required_column("records"), file);
+  const auto spool = document.get_optional("spool");
+  config.spool = spool ? resolve_path(*spool, file) : file.parent_path() / "spool";
+  if (const auto keep = document.get_optional("retention"))
+    config.keep = read_retention(keep->get_mapping());
+}
+
 }  // namespace
 
 std::string describe_camera_id_problem(const std::string& camera_id) {
@@ -281,52 +344,10 @@ StationConfig read_station_config(const fs::path& file) {
   StationConfig config;
   config.file = file;
   config.station = document.get_required_column("station").get_text();
-  const YamlValue type = document.get_required_column("camera_type");
-  config.type = read_row_time_and_readout(type, files).camera;
-  config.type_file = fs::path(type.get_text()).filename().string();
-  const YamlValue board = document.get_required_column("board");
-  config.board = read_board(files(board));
-  if (config.board.has_chessboard_squares()) {
-    throw board.make_error("is a board of squares: the station looks for one of AprilTags");
-  }
-  const auto room = document.get_optional("room");
-  config.lamps = read_lamps_of_room(files(document.get_required_column("lamps")),
-                                    room ? room->get_text() : std::string());
-  if (const auto place = document.get_optional("dispersion_station_m")) {
-    config.dispersion_station_m = Eigen::Vector2d(place->get_numbers(2).data());
-  }
-  if (const auto sufficient = document.get_optional("completion"))
-    config.sufficient = read_completion_criteria(sufficient->get_mapping());
-  if (const auto refuse = document.get_optional("rejection"))
-    read_rejection_limits(refuse->get_mapping(), config);
-  config.gates = read_gates(document.get_required_column("gates"), list_unit_metrics());
-  if (const auto guard = document.get_optional("guard_bands")) {
-    read_guard_bands(guard->get_mapping(), config.gates);
-  }
-  if (const auto golden = document.get_optional("golden")) {
-    config.golden = read_golden(golden->get_mapping(), files);
-  }
-  if (const auto due = document.get_optional("verify_due")) {
-    if (!config.golden) throw due->make_error("needs a golden unit: add the key 'golden'");
-    config.verify_due = read_verification_interval(due->get_mapping());
-  }
-  if (const auto pattern = document.get_optional("serial_pattern")) {
-    config.serial_pattern = read_pattern(*pattern);
-  }
-  if (const auto operators = document.get_optional("void_operators")) {
-    const std::vector<YamlValue> names = operators->get_list();
-    if (names.empty())
-      throw operators->make_error("names nobody; leave it out if all may void runs");
-    std::ranges::transform(names, std::back_inserter(config.void_operators),
-                           [](const YamlValue& name) { return name.get_text(); });
-  }
-  config.captures = resolve_path(document.get_required_column("captures"), file);
-  config.results = resolve_path(document.get_required_column("results"), file);
-  config.records = read_records(document.get_required_column("records"), file);
-  const auto spool = document.get_optional("spool");
-  config.spool = spool ? resolve_path(*spool, file) : file.parent_path() / "spool";
-  if (const auto keep = document.get_optional("retention"))
-    config.keep = read_retention(keep->get_mapping());
+  read_camera_and_targets(document, files, config);
+  read_verdict_conditions(document, files, config);
+  read_serials_and_operators(document, config);
+  read_storage(document, config);
   if (const auto hook = document.get_optional("hook"))
     config.hook = read_hook(hook->get_mapping(), file);
   document.check_all_keys_read();

@@ -406,72 +406,106 @@ EdgePrior EdgeModels::make_prior(const EdgeCurve& edge, double gamma) const {
   return prior;
 }
 
+/// Edges and outlines of all tags of an image.
+class ImageEdges {
+ public:
+  ImageEdges(std::span<const TagDetection> tags, const cv::Mat1b& image, const TagGeometry& print);
+
+  /// Indices of the tags whose edges were fitted, the widest first.
+  std::span<const std::size_t> found_tags() const { return found_; }
+  /// Latest outline of each tag.
+  const std::vector<TagDetection::Outline>& outlines() const { return outlines_; }
+
+  double compute_cost_of_tags(std::span<const std::size_t> which) const {
+    return compute_cost({edges_, which});
+  }
+  void fit(std::span<const std::size_t> which,
+           const std::function<EdgePrior(const EdgeCurve& edge)>& prior_of) {
+    for (const std::size_t i : which) edges_[i].fit(prior_of);
+  }
+  /// Updates the outlines of the found tags from edges that were fitted for a tone curve. With a
+  /// tone curve or saturated edges, fits all edges again with priors that are common to the image.
+  void refine_outlines(const cv::Mat1b& image, double gamma);
+
+ private:
+  void intersect_edges();
+
+  std::vector<TagEdges> edges_;
+  std::vector<TagDetection::Outline> outlines_;
+  std::vector<std::size_t> found_;
+};
+
+ImageEdges::ImageEdges(std::span<const TagDetection> tags, const cv::Mat1b& image,
+                       const TagGeometry& print) {
+  for (std::size_t i = 0; i < tags.size(); ++i) {
+    edges_.emplace_back(tags[i], image, print);
+    const auto intersected = edges_[i].intersect_edges();
+    outlines_.push_back(intersected.value_or(TagDetection::Outline{tags[i].corners_px}));
+    if (intersected) found_.push_back(i);
+  }
+  std::stable_sort(found_.begin(), found_.end(), [&](std::size_t a, std::size_t b) {
+    return edges_[a].tag_width_px() > edges_[b].tag_width_px();
+  });
+}
+
+/// Sets the outlines of the found tags, except their steps.
+void ImageEdges::intersect_edges() {
+  for (const std::size_t i : found_) {
+    const TagDetection::Steps steps = outlines_[i].steps;
+    outlines_[i] = edges_[i].intersect_edges().value_or(outlines_[i]);
+    outlines_[i].steps = steps;
+  }
+}
+
+void ImageEdges::refine_outlines(const cv::Mat1b& image, double gamma) {
+  intersect_edges();
+  // The fits below use a common model of the blur, which would hide a blurred part of the image.
+  for (const std::size_t i : found_) {
+    outlines_[i].steps = edges_[i].measure_edge_steps(image, gamma);
+  }
+  const TagSelection found{edges_, found_};
+  const bool any_saturated = found.is_any_edge_saturated();
+  if (!any_saturated && gamma == 1) return;
+  EdgeModels models(found);
+  const auto prior_of = [&](const EdgeCurve& edge) { return models.make_prior(edge, gamma); };
+  fit(found_, prior_of);
+  intersect_edges();
+  if (!any_saturated) return;
+  models.fit_light(found);
+  fit(found_, prior_of);
+  intersect_edges();
+}
+
 }  // namespace
 
 std::vector<double> refine_tags_by_edge_fits(std::span<TagDetection> tags, const cv::Mat1b& image,
                                              const TagGeometry& print) {
   constexpr std::size_t max_selected = 8;
   constexpr double min_log_likelihood_ratio = 10;  // e^10 times more likely
-  std::vector<TagEdges> edges;
-  std::vector<TagDetection::Outline> outlines;  // as they were found last
-  std::vector<std::size_t> widest;              // of those that are found, the widest first
-  for (std::size_t i = 0; i < tags.size(); ++i) {
-    edges.emplace_back(tags[i], image, print);
-    const auto intersected = edges[i].intersect_edges();
-    outlines.push_back(intersected.value_or(TagDetection::Outline{tags[i].corners_px}));
-    if (intersected) widest.push_back(i);
-  }
-  if (widest.empty()) return {};
-  std::stable_sort(widest.begin(), widest.end(), [&](std::size_t a, std::size_t b) {
-    return edges[a].tag_width_px() > edges[b].tag_width_px();
-  });
-  const auto selected = std::span(widest).first(std::min(widest.size(), max_selected));
-  const auto remaining = std::span(widest).subspan(selected.size());
-  const auto fit = [&](std::span<const std::size_t> indices, const auto& prior_of) {
-    for (const std::size_t i : indices) edges[i].fit(prior_of);
-  };
+  ImageEdges edges(tags, image, print);
+  const auto found = edges.found_tags();
+  if (found.empty()) return {};
+  const auto selected = found.first(std::min(found.size(), max_selected));
+  const auto remaining = found.subspan(selected.size());
   std::vector<double> costs;
   std::vector<TagDetection::Outline> linear_outlines;
   for (const double gamma : kGammas) {
     const auto prior_of_gamma = [&](const EdgeCurve&) { return EdgePrior{gamma}; };
-    if (gamma != 1) fit(selected, prior_of_gamma);
-    costs.push_back(compute_cost({edges, selected}));
+    if (gamma != 1) edges.fit(selected, prior_of_gamma);
+    costs.push_back(edges.compute_cost_of_tags(selected));
     // Gamma 1.3 is clearly worse than 1, and gammas from the last one on are excluded.
     if (costs.size() > 1 && costs[1] > costs[0] + min_log_likelihood_ratio / 2 &&
         costs.back() > costs[0] + min_log_likelihood_ratio) {
       for (TagDetection& tag : tags) tag.tone_curve_fits.clear();
       break;
     }
-    if (gamma != 1) fit(remaining, prior_of_gamma);
-    const auto update_outlines = [&] {
-      for (const std::size_t i : widest) {
-        const TagDetection::Steps steps = outlines[i].steps;
-        outlines[i] = edges[i].intersect_edges().value_or(outlines[i]);
-        outlines[i].steps = steps;
-      }
-    };
-    update_outlines();
-    // The fits below use a common model of the blur, which would hide a blurred part of the image.
-    for (const std::size_t i : widest)
-      outlines[i].steps = edges[i].measure_edge_steps(image, gamma);
-    const TagSelection found{edges, widest};
-    const bool any_saturated = found.is_any_edge_saturated();
-    if (any_saturated || gamma != 1) {
-      EdgeModels models(found);
-      const auto prior_of = [&](const EdgeCurve& edge) { return models.make_prior(edge, gamma); };
-      fit(widest, prior_of);
-      update_outlines();
-      if (any_saturated) {
-        models.fit_light(found);
-        fit(widest, prior_of);
-        update_outlines();
-      }
-    }
+    if (gamma != 1) edges.fit(remaining, prior_of_gamma);
+    edges.refine_outlines(image, gamma);
     if (gamma == 1) {
-      linear_outlines = outlines;
+      linear_outlines = edges.outlines();
     } else {
       for (std::size_t i = 0; i < tags.size(); ++i) {
-        tags[i].tone_curve_fits.push_back(outlines[i]);
+        tags[i].tone_curve_fits.push_back(edges.outlines()[i]);
       }
     }
   }

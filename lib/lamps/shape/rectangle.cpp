@@ -545,6 +545,76 @@ bool add_hidden_edges(const EdgeImage& image, const Sides& sides, EdgeSearch sea
   return true;
 }
 
+/// Outline of a light in the plane of LightShape, and the size of a pixel there.
+struct PlaneOutline {
+  std::vector<Eigen::Vector2d> points;
+  double per_px;
+};
+
+/// Returns std::nullopt if the plane does not cover a point of the outline.
+std::optional<PlaneOutline> project_outline_to_plane(const std::vector<EdgePoint>& outline,
+                                                     const LightShape& shape) {
+  PlaneOutline result;
+  result.points.reserve(outline.size());
+  Eigen::AlignedBox2d in_plane, in_image;
+  for (const EdgePoint& edge : outline) {
+    const auto point = shape.level_plane_from_pixel(shape.swap_image_and_scanline_axes(edge.pixel));
+    if (!point) return std::nullopt;
+    result.points.push_back(*point);
+    in_plane.extend(*point);
+    in_image.extend(edge.pixel);
+  }
+  result.per_px = in_plane.diagonal().norm() / in_image.diagonal().norm();
+  return result;
+}
+
+/// Finds the corners from which the edges are searched. Without a lens the sides may be curved.
+std::optional<FirstCorners> find_initial_corners(const PlaneOutline& outline, bool has_lens) {
+  auto first = find_first_corners(outline.points, outline.per_px);
+  if (has_lens) return first;
+  const auto curved = find_corners_of_curved_sides(outline.points);
+  if (curved && (!first || curved->near > first->near)) first = curved;
+  return first;
+}
+
+/// Returns the chords of the face at the depth `inset` inside the sides. Returns an empty vector if
+/// there are too few, or if they are not on consecutive scanlines, because LineLevels assigns
+/// levels by index.
+std::vector<PixelRun> find_chords_inside_sides(const Sides& sides, double inset,
+                                               const ImageSize& size, const LightShape& shape) {
+  constexpr std::size_t min_lines = 8;
+  auto chords = find_chords_in_polygon(
+      shape.swap_image_and_scanline_axes(make_polygon(sides, inset, shape)), size);
+  if (chords.size() < min_lines) return {};
+  const int rows = chords.back().row - chords.front().row + 1;
+  if (rows != static_cast<int>(chords.size())) return {};
+  return chords;
+}
+
+/// Rectangle with the edges of a pass, from which the next pass starts.
+struct FittedRectangle {
+  std::array<StraightEdge, 4> edges;
+  Corners corners;
+  /// Largest curvature of an edge, and the blur of the most certain edge.
+  double bow_px, blur_px;
+};
+
+/// Returns std::nullopt if the edges do not form a rectangle.
+/// @pre all edges were found
+std::optional<FittedRectangle> assemble_rectangle(FoundEdges found) {
+  FittedRectangle result{{}, {}, 0, find_most_certain_blur_px(found)};
+  Sides sides;
+  for (std::size_t i = 0; i < 4; ++i) {
+    result.edges[i] = std::move(*found[i]);
+    sides[i] = result.edges[i].side;
+    result.bow_px = std::max(result.bow_px, std::abs(result.edges[i].bow_px));
+  }
+  const auto corners = is_rectangular(sides) ? find_corners(sides) : std::nullopt;
+  if (!corners) return std::nullopt;
+  result.corners = *corners;
+  return result;
+}
+
 }  // namespace
 
 std::vector<PixelRun> find_chords_in_polygon(const std::vector<Eigen::Vector2d>& polygon,
@@ -579,27 +649,13 @@ std::optional<Light> fit_rectangle(const ImageView& lines, const Blob& blob,
                                    const Background& background, const LightShape& shape,
                                    const std::vector<Eigen::Vector2d>& sizes_m) {
   constexpr double min_px = 10, max_aspect = 40;
-  constexpr std::size_t min_lines = 8;
   const PixelBox box = blob.bounding_box();
   if (outline.size() < kMinOutlinePoints || std::min(box.width, box.height) < min_px) return {};
-  std::vector<Eigen::Vector2d> points;
-  points.reserve(outline.size());
-  Eigen::AlignedBox2d in_plane, in_image;
-  for (const EdgePoint& edge : outline) {
-    const auto point = shape.level_plane_from_pixel(shape.swap_image_and_scanline_axes(edge.pixel));
-    if (!point) return std::nullopt;
-    points.push_back(*point);
-    in_plane.extend(*point);
-    in_image.extend(edge.pixel);
-  }
-  const double per_px = in_plane.diagonal().norm() / in_image.diagonal().norm();
-  auto first = find_first_corners(points, per_px);
-  if (!shape.has_lens()) {
-    const auto curved = find_corners_of_curved_sides(points);
-    if (curved && (!first || curved->near > first->near)) first = curved;
-  }
+  const auto in_plane = project_outline_to_plane(outline, shape);
+  if (!in_plane) return std::nullopt;
+  const double per_px = in_plane->per_px;
+  const auto first = find_initial_corners(*in_plane, shape.has_lens());
   if (!first) return std::nullopt;
-  std::optional<Corners> corners = first->corners;
 
   // A disc that stripes partly hide is less slender than this.
   constexpr double min_aspect = 3;
@@ -608,27 +664,22 @@ std::optional<Light> fit_rectangle(const ImageView& lines, const Blob& blob,
     const auto disc = shape.fit_light_to_outline(outline, background);
     return disc && disc->roundness >= first->near;
   };
-  double bow_px = 0, blur_px = 0;
-  std::array<StraightEdge, 4> edges;
+  FittedRectangle rectangle{{}, first->corners, 0, 0};
   struct Pass {
     double inset_px;
     EdgeSearch search;
   };
   for (auto [inset_px, search] : {Pass{5, {7, 48}}, Pass{3.5, {5, 48}}, Pass{3.5, {4, 96}}}) {
-    const Sides sides = make_sides(*corners);
+    const Sides sides = make_sides(rectangle.corners);
     const double min_side =
         std::min((sides[0].to - sides[0].from).norm(), (sides[1].to - sides[1].from).norm());
     if (!(min_side > min_px * per_px) || compute_aspect(sides) > max_aspect) return std::nullopt;
-    const double inset = std::min((inset_px + bow_px) * per_px, min_side / 3);
-    const auto chords = find_chords_in_polygon(
-        shape.swap_image_and_scanline_axes(make_polygon(sides, inset, shape)), lines.size());
-    if (chords.size() < min_lines) return std::nullopt;
-    // The chords have to be on consecutive scanlines, because LineLevels assigns levels by index.
-    const int rows = chords.back().row - chords.front().row + 1;
-    if (rows != static_cast<int>(chords.size())) return std::nullopt;
+    const double inset = std::min((inset_px + rectangle.bow_px) * per_px, min_side / 3);
+    const auto chords = find_chords_inside_sides(sides, inset, lines.size(), shape);
+    if (chords.empty()) return std::nullopt;
     const LineLevels levels(lines, chords, background);
-    search.reach_px = std::min(search.reach_px + bow_px, min_side / per_px / 2);
-    search.blur_px = blur_px;
+    search.reach_px = std::min(search.reach_px + rectangle.bow_px, min_side / per_px / 2);
+    search.blur_px = rectangle.blur_px;
     const EdgeImage image{lines, levels, background.level, per_px, shape};
     FoundEdges found_edges;
     for (std::size_t i = 0; i < 4; ++i) {
@@ -640,19 +691,12 @@ std::optional<Light> fit_rectangle(const ImageView& lines, const Blob& blob,
         return std::nullopt;
       }
     }
-    blur_px = find_most_certain_blur_px(found_edges);
-    bow_px = 0;
-    Sides found;
-    for (std::size_t i = 0; i < 4; ++i) {
-      edges[i] = std::move(*found_edges[i]);
-      found[i] = edges[i].side;
-      bow_px = std::max(bow_px, std::abs(edges[i].bow_px));
-    }
-    corners = is_rectangular(found) ? find_corners(found) : std::nullopt;
-    if (!corners) return std::nullopt;
+    auto fitted = assemble_rectangle(std::move(found_edges));
+    if (!fitted) return std::nullopt;
+    rectangle = std::move(*fitted);
   }
   const Eigen::Vector2d middle((lines.width - 1) / 2.0, (lines.height - 1) / 2.0);
-  return fit_light(edges, per_px, points, middle, shape);
+  return fit_light(rectangle.edges, per_px, in_plane->points, middle, shape);
 }
 
 }  // namespace vlp

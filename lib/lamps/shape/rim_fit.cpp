@@ -207,25 +207,53 @@ struct Step {
   double log_blur, log_blur_sd;
 };
 
-std::optional<Step> fit_step_of_piece(const Piece& piece, double dark,
-                                      const StepImageModel& picture, bool blur_known) {
-  constexpr std::size_t min_samples = 30;
-  constexpr int max_iterations = 12;
-  constexpr double min_step_sds = 1e-4;  // a smaller step, in standard deviations, is the last one
-  constexpr double clear_px = 2, farthest_px = 3;
-  // Prior standard deviations of the slopes, of the change along the rim and of the log blur,
-  // weighted relative to the noise in gray levels.
-  constexpr double noise = 1.5, slope_sd = 0.3, along_sd = 0.05, log_blur_sd = 0.4;
-  if (piece.samples.size() < min_samples) return std::nullopt;
+constexpr std::size_t kMinStepSamples = 30;
+
+/// Mean levels of the samples clearly outside and inside the rim, at least 1.
+struct SideLevels {
+  double out, in;
+};
+
+/// Returns std::nullopt if one side has no samples.
+std::optional<SideLevels> measure_side_levels(const std::vector<StepSample>& samples) {
+  constexpr double clear_px = 2;
   std::array<double, 2> sums{}, counts{};
-  for (const StepSample& sample : piece.samples) {
+  for (const StepSample& sample : samples) {
     if (std::abs(sample.depth_px) < clear_px) continue;
     const std::size_t side = sample.depth_px > 0 ? 1 : 0;
     sums[side] += sample.level;
     ++counts[side];
   }
   if (counts[0] == 0 || counts[1] == 0) return std::nullopt;
-  const double out = std::max(1.0, sums[0] / counts[0]), in = std::max(1.0, sums[1] / counts[1]);
+  return SideLevels{std::max(1.0, sums[0] / counts[0]), std::max(1.0, sums[1] / counts[1])};
+}
+
+/// Computes the residuals of the samples. A clipped pixel does not constrain a model in which it is
+/// clipped (Tobin 1958).
+std::vector<CurveDistance<kStepUnknowns>> compute_step_residuals(
+    const std::vector<StepSample>& samples, const StepModel& model) {
+  std::vector<CurveDistance<kStepUnknowns>> residuals;
+  residuals.reserve(samples.size());
+  const double blur_px = std::exp(model.x[kLogBlur]);
+  for (const StepSample& sample : samples) {
+    residuals.push_back(model.residual(sample, blur_px));
+    if (sample.clipped() && residuals.back().error >= 0) residuals.pop_back();
+  }
+  return residuals;
+}
+
+std::optional<Step> fit_step_of_piece(const Piece& piece, double dark,
+                                      const StepImageModel& picture, bool blur_known) {
+  constexpr int max_iterations = 12;
+  constexpr double min_step_sds = 1e-4;  // a smaller step, in standard deviations, is the last one
+  constexpr double farthest_px = 3;
+  // Prior standard deviations of the slopes, of the change along the rim and of the log blur,
+  // weighted relative to the noise in gray levels.
+  constexpr double noise = 1.5, slope_sd = 0.3, along_sd = 0.05, log_blur_sd = 0.4;
+  if (piece.samples.size() < kMinStepSamples) return std::nullopt;
+  const auto levels = measure_side_levels(piece.samples);
+  if (!levels) return std::nullopt;
+  const auto [out, in] = *levels;
   StepModel model{{}, picture.gamma, std::pow(std::max(0.5, dark), picture.gamma)};
   model.x << 0, picture.gamma * std::log(out), 0, picture.gamma * std::log(in), 0, 0,
       std::log(picture.blur_px);
@@ -240,15 +268,8 @@ std::optional<Step> fit_step_of_piece(const Piece& piece, double dark,
   const double tolerance = std::max({4.0, 0.2 * std::abs(in - out), 0.1 * in});
   std::optional<MEstimateStep<kStepUnknowns>> last;
   for (int round = 0; round < max_iterations; ++round) {
-    // A clipped pixel does not constrain a model in which it is clipped (Tobin 1958).
-    std::vector<CurveDistance<kStepUnknowns>> residuals;
-    residuals.reserve(piece.samples.size());
-    const double blur_px = std::exp(model.x[kLogBlur]);
-    for (const StepSample& sample : piece.samples) {
-      residuals.push_back(model.residual(sample, blur_px));
-      if (sample.clipped() && residuals.back().error >= 0) residuals.pop_back();
-    }
-    if (residuals.size() < min_samples) return std::nullopt;
+    const auto residuals = compute_step_residuals(piece.samples, model);
+    if (residuals.size() < kMinStepSamples) return std::nullopt;
     const std::vector<double> weights(residuals.size() + priors.size(), 1);
     last = compute_m_estimate_step<kStepUnknowns>(weights, tolerance, [&](std::size_t i) {
       if (i < residuals.size()) return residuals[i];
