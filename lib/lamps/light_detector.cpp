@@ -16,9 +16,9 @@
 #include "lamps/image/background.h"
 #include "lamps/image/pixel_runs.h"
 #include "lamps/image/scanlines.h"
+#include "lamps/shape/light_center_noise.h"
 #include "lamps/shape/rectangle.h"
 #include "lamps/shape/rim.h"
-#include "lamps/shape/unknown_lens.h"
 #include "lamps/signal/frequency_identification.h"
 #include "lamps/signal/modulated_lights.h"
 #include "rig/detection.h"
@@ -89,9 +89,7 @@ double clipped_fraction(const ImageView& lines, const Eigen::Vector2d& low,
 void add_error_of_unknown_lens(const ImageSize& size, std::vector<Light>& lights) {
   for (Light& light : lights) {
     if (light.kind == LightKind::formless) continue;
-    const double sigma_px =
-        std::hypot(light.sigma_px, predict_center_sd_without_lens_px(light, size));
-    light.sigma_px = std::min(sigma_px, kMaxSigma_px);
+    add_center_error(predict_center_sd_without_lens_px(light, size), light);
   }
 }
 
@@ -192,7 +190,7 @@ Light make_light_from_modulation(const ImageView& lines, const ModulatedLight& f
         rim->is_clear ? 0 : (rim->light.pixel - light.pixel).norm() / std::numbers::sqrt2;
     const bool is_round = found.asymmetry_px < kMaxEccentricity * found.radius_px;
     if (rim->is_clear || !is_round) light = std::move(rim->light);
-    light.sigma_px = std::min(std::hypot(light.sigma_px, apart_px), kMaxSigma_px);
+    add_center_error(apart_px, light);
   }
   light.by_modulation = true;
   light.stripes = found.stripes;
@@ -436,17 +434,6 @@ std::vector<Light> LightDetector::detect(const ImageView& image) const {
 }
 
 namespace {
-
-/// Adds the error of a partly hidden light to its sigma. If the aspect ratio differs from that of
-/// the lamp, an object may hide one end: the center of the visible part is offset by half of the
-/// hidden length.
-void add_error_of_hidden_end(double off, double tilt_sd, Light& light) {
-  constexpr double clear = 3;
-  if (!(off > tilt_sd + clear * light.aspect_sd)) return;
-  const double length_px =
-      std::sqrt(std::numbers::pi * light.aspect) * light.radius_px;  // its area has that radius
-  light.sigma_px = std::hypot(light.sigma_px, off * length_px / 2 / std::numbers::sqrt2);
-}
 
 void reject(Light& light, LightReason reason) {
   light.lamp.reset();

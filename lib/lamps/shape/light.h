@@ -45,8 +45,8 @@ struct Light {
   std::optional<int> lamp;
   /// Pixel (u, v) of the lamp's center, estimated from the outline.
   Eigen::Vector2d pixel;
-  /// Standard deviation of `pixel` per axis. Includes predict_center_sd_without_lens_px() if the
-  /// lens is unknown.
+  /// Standard deviation of `pixel` per axis, by the noise model in light_center_noise.h. Includes
+  /// predict_center_sd_without_lens_px() if the lens is unknown.
   double sigma_px;
   /// Shape of the outline; a disc if the light has no outline.
   ShapeKind shape;

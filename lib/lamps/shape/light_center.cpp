@@ -11,6 +11,7 @@
 #include <numbers>
 
 #include "geometry/median.h"
+#include "lamps/shape/light_center_noise.h"
 #include "lamps/shape/robust_ellipse.h"
 #include "rig/detection.h"
 
@@ -53,32 +54,75 @@ double compute_axis_ratio(const Matrix2& rim_from_circle) {
   return (half_square + difference) / area;
 }
 
-/// Returns the number of points with a common error. It is the sum of the products of the errors of
-/// neighboring points, including their own squares, divided by the sum of squares. For independent
-/// errors the fit, which removes three degrees of freedom, causes products of -3 / n of the mean
-/// square; this is corrected.
-double estimate_correlated_points(const std::vector<Eigen::Vector2d>& points,
-                                  const std::vector<EdgePoint>& outline,
-                                  const std::vector<bool>& counted, const RobustEllipse& fit) {
-  constexpr double neighbors_px = 4, unknowns = 3;
-  const Matrix2 circle_from_rim = fit.rim_from_circle.inverse();
-  std::vector<double> errors(points.size(), 0);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (counted[i]) errors[i] = (circle_from_rim * (points[i] - fit.center)).norm() - 1;
-  }
-  double squares = 0, products = 0, pairs = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    squares += errors[i] * errors[i];
-    for (std::size_t j = 0; j < i && counted[i]; ++j) {
-      if (!counted[j] || (outline[i].pixel - outline[j].pixel).norm() >= neighbors_px) continue;
-      products += 2 * errors[i] * errors[j];
-      pairs += 2;
+/// Outline of a light in the plane of LightShape.
+struct WeightedOutline {
+  /// Edge points that the plane covers, their positions in it, and their weights.
+  std::vector<EdgePoint> edges;
+  std::vector<Eigen::Vector2d> points;
+  std::vector<double> weights;
+  /// Level of the brightest edge point.
+  double brightest;
+  /// Size of a pixel in the plane.
+  double per_px;
+};
+
+WeightedOutline make_weighted_outline(std::vector<EdgePoint> edges, const LightShape& shape) {
+  WeightedOutline result{{}, {}, {}, 0, 0};
+  std::vector<Eigen::Vector2d> pixels;
+  std::erase_if(edges, [&](const EdgePoint& edge) {
+    const auto plane = shape.level_plane_from_pixel(shape.swap_image_and_scanline_axes(edge.pixel));
+    if (plane) {
+      result.points.push_back(*plane);
+      pixels.push_back(edge.pixel);
     }
+    result.brightest = std::max(result.brightest, edge.level);
+    return !plane;
+  });
+  result.weights.reserve(edges.size());
+  for (const EdgePoint& edge : edges) {
+    result.weights.push_back(std::pow(edge.level / result.brightest, 2));
   }
-  if (!(squares > 0)) return 1;
-  const auto count = double(std::count(counted.begin(), counted.end(), true));
-  const double taken = unknowns / count * pairs / count;
-  return std::max(1.0, 1 + products / squares + taken);
+  result.per_px = compute_outline_extent(result.points) / compute_outline_extent(pixels);
+  result.edges = std::move(edges);
+  return result;
+}
+
+/// Fits a circle; without a lens an ellipse. Returns std::nullopt if too few points are on it or if
+/// it is too slender.
+std::optional<RobustEllipse> fit_circle_or_ellipse(const WeightedOutline& outline, double noise,
+                                                   const DetectorCamera& camera) {
+  // The half-level position is accurate to about half a pixel; noise and a soft edge increase its
+  // error.
+  const double tolerance_px =
+      std::max({0.35, 8 * noise / outline.brightest, 0.4 * compute_median_rise_px(outline.edges)});
+  const double tolerance = tolerance_px * outline.per_px;
+  constexpr double nearly_round = 3;
+  auto fit = camera.lens ? fit_robust_circle(outline.points, outline.weights, tolerance)
+                         : fit_robust_ellipse(outline.points, outline.weights, tolerance);
+  if (!fit && !camera.lens && camera.max_axis_ratio > nearly_round) {
+    fit = fit_slender_ellipse(outline.points, outline.weights, tolerance);
+  }
+  if (!fit || fit->count < static_cast<int>(kMinOutlinePoints)) return std::nullopt;
+  if (!camera.lens && compute_axis_ratio(fit->rim_from_circle) > camera.max_axis_ratio)
+    return std::nullopt;
+  return fit;
+}
+
+/// Sets the center of a light and its bounding box. Returns false if the lens does not cover its
+/// rim.
+bool set_center_and_box(const RobustEllipse& fit, const LightShape& shape, Light& light) {
+  const auto pixel = shape.pixel_from_level_plane(fit.center);
+  if (!pixel) return false;
+  light.pixel = light.low = light.high = *pixel;
+  for (int i = 0; i < 16; ++i) {
+    const double angle = std::numbers::pi / 8 * i;
+    const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
+    const auto rim = shape.pixel_from_level_plane(fit.center + fit.rim_from_circle * direction);
+    if (!rim) return false;
+    light.low = light.low.cwiseMin(*rim);
+    light.high = light.high.cwiseMax(*rim);
+  }
+  return true;
 }
 
 }  // namespace
@@ -112,67 +156,31 @@ std::optional<Eigen::Vector2d> LightShape::pixel_from_level_plane(
 std::optional<Light> LightShape::fit_light_to_outline(std::vector<EdgePoint> outline,
                                                       const Background& background,
                                                       bool is_mottled) const {
-  std::vector<Eigen::Vector2d> points, pixels;
-  double brightest = 0;
-  std::erase_if(outline, [&](const EdgePoint& edge) {
-    const auto plane = level_plane_from_pixel(swap_image_and_scanline_axes(edge.pixel));
-    if (plane) {
-      points.push_back(*plane);
-      pixels.push_back(edge.pixel);
-    }
-    brightest = std::max(brightest, edge.level);
-    return !plane;
-  });
-  if (points.size() < kMinOutlinePoints) return std::nullopt;
-  std::vector<double> weights;
-  weights.reserve(outline.size());
-  for (const EdgePoint& edge : outline) weights.push_back(std::pow(edge.level / brightest, 2));
-  const double per_px = compute_outline_extent(points) / compute_outline_extent(pixels);
-  if (!(per_px > 0)) return std::nullopt;
-  // The half-level position is accurate to about half a pixel; noise and a soft edge increase its
-  // error.
-  const double tolerance_px =
-      std::max({0.35, 8 * background.noise / brightest, 0.4 * compute_median_rise_px(outline)});
-  const double tolerance = tolerance_px * per_px;
-  constexpr double nearly_round = 3;
-  auto fit = camera_.lens ? fit_robust_circle(points, weights, tolerance)
-                          : fit_robust_ellipse(points, weights, tolerance);
-  if (!fit && !camera_.lens && camera_.max_axis_ratio > nearly_round) {
-    fit = fit_slender_ellipse(points, weights, tolerance);
-  }
-  if (!fit || fit->count < static_cast<int>(kMinOutlinePoints)) return std::nullopt;
-  if (!camera_.lens && compute_axis_ratio(fit->rim_from_circle) > camera_.max_axis_ratio)
-    return std::nullopt;
-
+  const WeightedOutline weighted = make_weighted_outline(std::move(outline), *this);
+  if (weighted.points.size() < kMinOutlinePoints || !(weighted.per_px > 0)) return std::nullopt;
+  const auto fit = fit_circle_or_ellipse(weighted, background.noise, camera_);
   Light light{};
-  const auto pixel = pixel_from_level_plane(fit->center);
-  if (!pixel) return std::nullopt;
-  light.pixel = light.low = light.high = *pixel;
-  for (int i = 0; i < 16; ++i) {
-    const double angle = std::numbers::pi / 8 * i;
-    const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
-    const auto rim = pixel_from_level_plane(fit->center + fit->rim_from_circle * direction);
-    if (!rim) return std::nullopt;
-    light.low = light.low.cwiseMin(*rim);
-    light.high = light.high.cwiseMax(*rim);
-  }
+  if (!fit || !set_center_and_box(*fit, *this, light)) return std::nullopt;
   light.plane_center = fit->center;
   light.unit_from_plane = fit->rim_from_circle.inverse();
-  light.radius_px = std::sqrt(fit->rim_from_circle.determinant()) / per_px;
-  const std::vector<bool> selected = select_points_on_circle(outline, fit->inliers);
+  light.radius_px = std::sqrt(fit->rim_from_circle.determinant()) / weighted.per_px;
+  const std::vector<EdgePoint>& edges = weighted.edges;
+  const std::vector<bool> selected = select_points_on_circle(edges, fit->inliers);
   const double num_correlated =
-      is_mottled ? estimate_correlated_points(points, outline, selected, *fit) : 1;
-  const double sigma_px = std::sqrt(num_correlated * fit->center_covariance.trace() / 2) / per_px;
-  if (!(sigma_px <= kMaxSigma_px)) return std::nullopt;
-  light.sigma_px = std::max(kMinSigma_px, sigma_px);
-  light.roundness = double(fit->count) / double(outline.size());
-  for (std::size_t i = 0; i < outline.size(); ++i) {
-    if (selected[i]) light.outline.push_back(outline[i]);
+      is_mottled ? estimate_correlated_points(weighted.points, edges, selected, *fit) : 1;
+  const auto sigma_px =
+      limit_center_sd(compute_center_sd(fit->center_covariance, num_correlated) / weighted.per_px);
+  if (!sigma_px) return std::nullopt;
+  light.sigma_px = *sigma_px;
+  light.roundness = double(fit->count) / double(edges.size());
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    if (selected[i]) light.outline.push_back(edges[i]);
   }
   if (camera_.lens) {
     const Circle circle = fit->circle();
-    light.sums = {points,        weights, selected, circle, compute_scanline_gradient(circle),
-                  num_correlated};
+    light.sums = {
+        weighted.points, weighted.weights, selected, circle, compute_scanline_gradient(circle),
+        num_correlated};
   }
   light.rise_px = compute_median_rise_px(light.outline);
   return light;
@@ -215,7 +223,7 @@ void LightShape::correct_light_for_motion(const Oval& oval, const Eigen::Vector2
   if (!pixel) return;
   light.pixel = *pixel;
   const double sigma_px =
-      light.radius_px * std::sqrt(estimate->covariance.topLeftCorner<2, 2>().trace() / 2);
+      light.radius_px * compute_center_sd(estimate->covariance.topLeftCorner<2, 2>());
   light.sigma_px = std::clamp(sigma_px, kMinSigma_px, kMaxSigma_px);
 }
 

@@ -15,8 +15,8 @@
 #include "geometry/angles.h"
 #include "geometry/polygon.h"
 #include "geometry/symmetric.h"
+#include "lamps/shape/light_center_noise.h"
 #include "lamps/shape/straight_edge.h"
-#include "rig/detection.h"
 
 namespace vlp {
 namespace {
@@ -427,9 +427,9 @@ std::optional<Light> fit_light(std::array<StraightEdge, 4>& edges, double per_px
   }
   light.low.array() -= 2 * end_sd_px;
   light.high.array() += 2 * end_sd_px;
-  const double sigma_px = std::hypot(std::sqrt(covariance->trace() / 2), lens_sd_px);
-  if (!(sigma_px <= kMaxSigma_px)) return std::nullopt;
-  light.sigma_px = std::max(kMinSigma_px, sigma_px);
+  const auto sigma_px = limit_center_sd(std::hypot(compute_center_sd(*covariance), lens_sd_px));
+  if (!sigma_px) return std::nullopt;
+  light.sigma_px = *sigma_px;
   const auto outliers = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& at) {
     return std::any_of(sides.begin(), sides.end(), [&](const Side& side) {
       return (at - side.from).dot(side.inward_normal()) < -(outlier_px + bow_px) * per_px;

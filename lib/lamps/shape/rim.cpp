@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "geometry/median.h"
+#include "lamps/shape/light_center_noise.h"
 #include "lamps/shape/rim_fit.h"
 
 namespace vlp {
@@ -341,39 +342,6 @@ std::optional<Light> fit_light_near_ring(const Ring& ring, const Face& face,
   return light;
 }
 
-/// Returns the standard deviation per axis of a light's center by the delete-a-group jackknife
-/// (Efron and Tibshirani 1993, section 11.5): its outline is fitted again without each of its
-/// pieces. A piece on another edge than the others moves the center by more than the scatter of its
-/// points. Outliers of the fit are excluded beforehand. Returns std::nullopt if the outline without
-/// one of the pieces has no center.
-std::optional<double> estimate_jackknife_sd_px(const Light& light, const Background& background,
-                                               const LightShape& shape) {
-  constexpr std::size_t pieces = 8;
-  const Eigen::Vector2d center = shape.swap_image_and_scanline_axes(light.pixel);
-  std::vector<EdgePoint> outline = light.outline;
-  const auto angle = [&](const EdgePoint& point) {
-    return std::atan2(point.pixel.y() - center.y(), point.pixel.x() - center.x());
-  };
-  std::sort(outline.begin(), outline.end(),
-            [&](const EdgePoint& a, const EdgePoint& b) { return angle(a) < angle(b); });
-  std::array<Eigen::Vector2d, pieces> centers;
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  for (std::size_t i = 0; i < pieces; ++i) {
-    std::vector<EdgePoint> others = outline;
-    const auto at = [&](std::size_t piece) {
-      return others.begin() + std::ptrdiff_t(piece * outline.size() / pieces);
-    };
-    others.erase(at(i), at(i + 1));
-    const auto without = shape.fit_light_to_outline(std::move(others), background);
-    if (!without) return std::nullopt;
-    centers[i] = without->pixel;
-    mean += centers[i] / double(pieces);
-  }
-  double squares = 0;
-  for (const Eigen::Vector2d& each : centers) squares += (each - mean).squaredNorm();
-  return std::sqrt(double(pieces - 1) / double(pieces) * squares / 2);
-}
-
 /// Returns the level above the dark level that one line of ten exceeds at the middle or the
 /// quarters of its runs.
 double measure_bright_level(const ImageView& image, const Blob& blob, double dark) {
@@ -389,19 +357,6 @@ double measure_bright_level(const ImageView& image, const Blob& blob, double dar
   const auto tenth = levels.begin() + std::ptrdiff_t(levels.size() * 9 / 10);
   std::nth_element(levels.begin(), tenth, levels.end());
   return *tenth - dark;
-}
-
-/// Returns the number of points with a common error: those of a stripe, on consecutive scanlines.
-double count_points_per_stripe(const std::vector<EdgePoint>& outline) {
-  constexpr double next = 2.5;
-  std::array<double, 2> last{-1e9, -1e9};
-  double stripes = 0;
-  for (const EdgePoint& point : outline) {
-    double& row = last[point.begins ? 0 : 1];
-    if (point.pixel.y() - row > next) ++stripes;
-    row = point.pixel.y();
-  }
-  return double(outline.size()) / std::max(1.0, stripes);
 }
 
 /// Fits a light and the sigma of its center to the steps next to its outline. These have no bias if
@@ -435,8 +390,7 @@ std::optional<Light> fit_light_to_steps(const ImageView& image, const std::vecto
     return std::nullopt;
   }
   light.pixel += shape.swap_image_and_scanline_axes(shift->px);
-  light.sigma_px =
-      std::sqrt(shift->covariance.trace() / 2 + (shift->px - other->px).squaredNorm() / 2);
+  light.sigma_px = compute_center_sd(shift->covariance, 1, shift->px - other->px);
   return light;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// Centers of ellipses in the image compared with the images of discs' centers.
-#include "lamps/shape/unknown_lens.h"
+#include "lamps/shape/light_center_noise.h"
 
 #include <gtest/gtest.h>
 
