@@ -33,12 +33,12 @@ void run(Options options) {
   SessionLog log;
   const SessionResult result =
       run_session(options.session, options.results, options.how, log.make_session_observer());
-  if (result.verdict == SessionVerdict::no_result) {
+  if (result.verdict == Verdict::invalid) {
     if (result.failure == StepFailure::undetermined) throw Undetermined(result.reason);
     throw std::invalid_argument(result.reason);
   }
   print_session_result(result, options.results);
-  if (result.verdict == SessionVerdict::gate) throw GateNotMet(result.reason);
+  if (result.verdict == Verdict::fail) throw GateNotMet(result.reason);
 }
 
 int calibrate(int argc, char** argv) {

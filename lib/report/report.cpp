@@ -46,23 +46,23 @@ std::string make_gates_table(const Report& report) {
   return table.rows.empty() ? "" : make_html_table(table);
 }
 
-std::string make_verdict_box(const char* look, const std::string& word,
-                             const std::string& content) {
+std::string make_verdict_box(Verdict style, const std::string& word, const std::string& content) {
+  constexpr std::array looks{"pass", "fail", "none"};
+  const char* look = looks[static_cast<std::size_t>(style)];
   return std::string("<div class=\"verdict ") + look + "\"><strong>" + escape_html_text(word) +
          "</strong>" + content + "</div>\n";
 }
 
 std::string format_verdict(const ReportVerdict& verdict) {
-  constexpr std::array looks{"pass", "fail", "none"};
   std::string causes;
   for (const std::string& cause : verdict.causes) causes += make_html_element("p", cause);
-  return make_verdict_box(looks.at(static_cast<std::size_t>(verdict.look)), verdict.word, causes);
+  return make_verdict_box(verdict.style, verdict.word, causes);
 }
 
 std::string format_gate_verdict(const std::vector<CheckedMetric>& gates,
                                 const std::string& caution) {
   if (gates.empty()) {
-    return make_verdict_box("none", "NO VERDICT", "No gates were set.");
+    return make_verdict_box(Verdict::invalid, "NO VERDICT", "No gates were set.");
   }
   const auto missed = std::count_if(gates.begin(), gates.end(),
                                     [](const auto& gate) { return !gate.has_passed(); });
@@ -72,7 +72,8 @@ std::string format_gate_verdict(const std::vector<CheckedMetric>& gates,
                                  ? "Every metric is within its limit (" + count + of_gates + ")."
                                  : std::to_string(missed) + " of " + count + of_gates +
                                        (missed == 1 ? " is" : " are") + " not met.";
-  return make_verdict_box(missed == 0 ? "pass" : "fail", missed == 0 ? "PASS" : "FAIL",
+  const Verdict verdict = missed == 0 ? Verdict::pass : Verdict::fail;
+  return make_verdict_box(verdict, to_string(verdict),
                           reason + (caution.empty() ? "" : make_html_element("p", caution)));
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "evaluation/gate.h"
+#include "evaluation/verdict.h"
 #include "report/report_picture.h"
 #include "rig/calibration.h"
 
@@ -25,8 +26,8 @@ struct ReportStatistic {
 /// Verdict of another program, with its causes.
 struct ReportVerdict {
   std::string word;
-  /// Style of the verdict box.
-  enum class Look { pass, fail, none } look = Look::none;
+  /// Determines the style of the verdict box; `invalid` also for a verdict that is not valid.
+  Verdict style = Verdict::invalid;
   /// Causes, the root cause first; may be empty.
   std::vector<std::string> causes;
 };

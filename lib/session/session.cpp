@@ -624,14 +624,14 @@ class SessionRun {
   void finish_session() {
     const SessionStep& last = result_.steps.back();
     if (!last.result.ok()) {
-      result_.verdict = SessionVerdict::no_result;
+      result_.verdict = Verdict::invalid;
       result_.failure = last.result.failure;
       result_.reason = last.name + ": " + last.result.why;
       results_.remove_outputs_of_later_steps(last.name);
     }
     const std::string missed = describe_failed_gates(result_.gates);
     if (!missed.empty() && last.result.ok()) {
-      result_.verdict = SessionVerdict::gate;
+      result_.verdict = Verdict::fail;
       result_.reason = missed;
     }
     write_summaries(results_, result_, options_);
@@ -648,18 +648,6 @@ class SessionRun {
 };
 
 }  // namespace
-
-std::string to_string(SessionVerdict verdict) {
-  switch (verdict) {
-    case SessionVerdict::pass:
-      return "pass";
-    case SessionVerdict::gate:
-      return "gate";
-    case SessionVerdict::no_result:
-      return "no result";
-  }
-  return "";
-}
 
 std::vector<MetricKind> list_session_metrics() {
   return list_metric_kinds({MetricSource::lens, MetricSource::rotation, MetricSource::dispersion,
@@ -681,7 +669,7 @@ SessionResult run_session(const fs::path& session, const fs::path& results,
     gates = select_gates_of_step(*folder, options);
   } catch (const InputError& error) {
     SessionResult result;
-    result.verdict = SessionVerdict::no_result;
+    result.verdict = Verdict::invalid;
     result.failure = StepFailure::bad_input;
     result.reason = remove_folder(error.what(), session);
     if (folder) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "evaluation/gate.h"
+#include "evaluation/verdict.h"
 #include "frontend/observation.h"
 #include "frontend/options.h"
 #include "session/session_folder.h"
@@ -56,19 +57,10 @@ struct SessionStep {
   StepResult result;
 };
 
-/// Verdict of a session.
-enum class SessionVerdict {
-  pass,
-  gate,      // a result exists, but fails a gate
-  no_result  // a step failed
-};
-
-/// Returns the word in session.json: "pass", "gate" or "no result".
-std::string to_string(SessionVerdict verdict);
-
 /// Result of run_session().
 struct SessionResult {
-  SessionVerdict verdict = SessionVerdict::pass;
+  /// `fail` if a gate fails, `invalid` if a step failed.
+  Verdict verdict = Verdict::pass;
   /// Reason why there is no result, or the failed gates; empty if the session passes.
   std::string reason;
   /// Failure of the step that failed; bad_input if the session is incomplete.

@@ -213,7 +213,7 @@ void write_step_record(const std::filesystem::path& file, const StepRecord& step
 std::string format_session_json(const SessionResult& result, const SessionOptions& options) {
   const bool known = result.calibration.has_value();
   Json json{{"format", "vlp-session/1"},
-            {"verdict", to_string(result.verdict)},
+            {"verdict", session_verdict_name(result.verdict)},
             {"reason", result.reason},
             {"failure", to_string(result.failure)},
             {"camera", known ? result.calibration->camera.id : options.camera_id},

@@ -22,8 +22,8 @@
 #include "station/records/hook.h"
 #include "station/records/publish_run.h"
 #include "station/records/spool.h"
+#include "station/unit/camera_source.h"
 #include "station/unit/station_screen.h"
-#include "station/unit/step_sources.h"
 #include "station/unit/unit_record.h"
 #include "station/unit/verify_station.h"
 

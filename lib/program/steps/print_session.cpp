@@ -64,7 +64,7 @@ void print_session_result(const SessionResult& result, const std::string& result
   for (const CheckedMetric& gate : result.gates) {
     if (!gate.has_passed()) fmt::print("NOT MET     {}\n", describe(gate));
   }
-  fmt::print("verdict     {}; results are in {}\n", to_string(result.verdict), results);
+  fmt::print("verdict     {}; results are in {}\n", session_verdict_name(result.verdict), results);
 }
 
 }  // namespace vlp

@@ -49,14 +49,13 @@ fs::path write_calibration(const RunRecord& record, const SharedFolder& folder) 
 }
 
 ReportVerdict make_verdict_box(const RunRecord& record) {
-  using Look = ReportVerdict::Look;
   const std::string no_verdict = find_verdict_problem(record);
   ReportVerdict verdict{record.verdict,
-                        record.has_passed()   ? Look::pass
-                        : record.is_invalid() ? Look::none
-                                              : Look::fail,
+                        record.has_passed()   ? Verdict::pass
+                        : record.is_invalid() ? Verdict::invalid
+                                              : Verdict::fail,
                         {}};
-  if (!no_verdict.empty()) verdict = {"NO VERDICT", Look::none, {no_verdict}};
+  if (!no_verdict.empty()) verdict = {"NO VERDICT", Verdict::invalid, {no_verdict}};
   std::istringstream causes(record.causes);
   for (std::string cause; std::getline(causes, cause);) verdict.causes.push_back(cause);
   return verdict;

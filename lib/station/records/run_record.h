@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <filesystem>
 #include <span>
@@ -11,42 +10,11 @@
 #include <vector>
 
 #include "evaluation/gate.h"
+#include "evaluation/verdict.h"
 #include "session/step_history.h"
 #include "station/station_config.h"
 
 namespace vlp {
-
-/// Result of a station run for a unit.
-enum class Verdict {
-  /// The camera was measured and meets all limits.
-  pass,
-  /// The camera was measured and fails at least one limit of its own.
-  fail,
-  /// The camera was not evaluated, because of the station, the operator or an aborted run. The run
-  /// counts neither for the yield nor for trends and has to be repeated.
-  invalid
-};
-
-/// Returns PASS, FAIL or INVALID.
-constexpr const char* to_string(Verdict verdict) {
-  constexpr std::array names{"PASS", "FAIL", "INVALID"};
-  return names[static_cast<std::size_t>(verdict)];
-}
-
-/// Reason why a unit does not pass.
-struct Cause {
-  std::string text;
-  /// True if the camera itself is the reason: a metric outside its gate, or blur. False for the
-  /// measuring equipment and its use.
-  bool of_camera = false;
-};
-
-/// Returns the verdict of the first cause, because later causes can follow from it; PASS without
-/// causes.
-inline Verdict decide_verdict(const std::vector<Cause>& causes) {
-  if (causes.empty()) return Verdict::pass;
-  return causes.front().of_camera ? Verdict::fail : Verdict::invalid;
-}
 
 /// Event of a run after its verdict. Events are only added, never changed or removed.
 struct RunEvent {

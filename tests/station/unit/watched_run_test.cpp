@@ -4,7 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "station/unit/step_sources.h"
+#include "station/unit/camera_source.h"
 #include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 #include "support/write_video.h"

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "station/unit/step_sources.h"
+#include "station/unit/camera_source.h"
 
 #include <fmt/core.h>
 
