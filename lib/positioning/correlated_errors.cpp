@@ -5,12 +5,10 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
-#include <bitset>
 #include <cmath>
 #include <utility>
 
 #include "geometry/plane.h"
-#include "geometry/statistical_bounds.h"
 #include "geometry/symmetric.h"
 #include "rig/calibration_error.h"
 #include "rig/find_lamp.h"
@@ -425,57 +423,6 @@ Matrix2 CommonErrors::compute_covariance(const Effect& effect, std::size_t lamp)
   gain.jacobian_wrt_shared = effect.jacobian_wrt_shared;
   gain.add(lamp, effect.jacobian_wrt_lamp);
   return compute_covariance(gain);
-}
-
-OutlierLamps find_outlier_lamps(std::span<const Sighting> sightings,
-                                std::span<const Matrix2> common, const LeastSquaresFix& fix) {
-  OutlierLamps found;
-  if (sightings.size() < 4) return found;
-  const LevelPose pose(fix.pose);
-  std::bitset<kMaxSightings> rejected;
-  for (std::size_t left = sightings.size(); left >= 3; --left) {
-    Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
-    Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
-    const auto each = [&](auto&& use) {
-      for (std::size_t i = 0; i < sightings.size(); ++i) {
-        if (rejected[i]) continue;
-        const Sighting& one = sightings[i];
-        const Eigen::Matrix2d by_pixel = one.d_pixel_d_z.inverse() * one.sigma_px;
-        const Eigen::Matrix2d covariance = by_pixel * by_pixel.transpose() + common[i];
-        const Prediction prediction = predict_normalized_point(pose, one.lamp_m);
-        use(i, covariance, prediction.d_z_d_state, Eigen::Vector2d(one.z - prediction.z));
-      }
-    };
-    each([&](std::size_t, const Eigen::Matrix2d& covariance, const auto& jacobian,
-             const Eigen::Vector2d& residual) {
-      const Eigen::Matrix<double, 4, 2> weighted = jacobian.transpose() * covariance.inverse();
-      information += weighted * jacobian;
-      gradient += weighted * residual;
-    });
-    const auto state_covariance = invert_positive_definite(information);
-    if (!state_covariance) return {};
-    const Eigen::Vector4d step = *state_covariance * gradient;
-    double chi_squared = 0, worst = 0;
-    std::size_t worst_lamp = 0;
-    each([&](std::size_t i, const Eigen::Matrix2d& covariance, const auto& jacobian,
-             const Eigen::Vector2d& residual) {
-      const Eigen::Vector2d r = residual - jacobian * step;
-      chi_squared += r.dot(covariance.inverse() * r);
-      const Eigen::Matrix2d of_residual =
-          covariance - jacobian * *state_covariance * jacobian.transpose();
-      const double drop = r.dot(of_residual.inverse() * r);
-      if (!(of_residual.determinant() > 0) || drop <= worst) return;
-      worst = drop;
-      worst_lamp = i;
-    });
-    const double freedom = 2 * static_cast<double>(left) - 4;
-    if (chi_squared <= compute_chi_squared_bound(kSigmasOfOneInTenThousand, freedom)) return found;
-    // Three contradicting lamps do not determine which is wrong; nor does a minority.
-    if (!(worst > 0) || left == 3 || 2 * (left - 1) <= sightings.size()) return {};
-    rejected.set(worst_lamp);
-    found.lamps[found.count++] = worst_lamp;
-  }
-  return {};
 }
 
 namespace {

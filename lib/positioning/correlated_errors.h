@@ -17,8 +17,8 @@
 #include "fix.h"
 #include "inclination_rotation.h"
 #include "least_squares_fix.h"
-#include "outlier_rejection.h"
 #include "pose_estimation.h"
+#include "pose_observations.h"
 
 namespace vlp {
 
@@ -211,22 +211,6 @@ class CommonErrors {
   std::array<bool, kCommonErrorSources.size()> part_stated_ = {};
   int lamps_elsewhere_ = 0;
 };
-
-/// Lamps that are rejected, as indices in the frame: none, one or several.
-struct OutlierLamps {
-  std::array<std::size_t, kMaxSightings> lamps;
-  std::size_t count = 0;
-};
-/// Finds the lamps that contradict the others by more than noise and common errors explain. Assumes
-/// that the errors of different lamps are independent.
-///
-/// While chi-squared exceeds its 1e-4 bound, rejects the lamp whose removal reduces chi-squared
-/// most. Returns none if chi-squared exceeds the bound with only three lamps left, or without a
-/// majority.
-///
-/// @param common  covariance of z of each observation from the common errors
-OutlierLamps find_outlier_lamps(std::span<const Sighting> sightings,
-                                std::span<const Matrix2> common, const LeastSquaresFix& fix);
 
 /// Computes the covariance of the zenith's normalized point from all its sources: its captures and
 /// the lens, or the adjustment if there is one. Returns std::nullopt if a source is not reported,

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "geometry/symmetric.h"
+#include "positioning/outlier_rejection.h"
 #include "positioning/sighting.h"
 
 namespace vlp {

@@ -9,17 +9,16 @@
 #include <span>
 
 #include "../geometry/frames.h"
+#include "../geometry/types.h"
+#include "body_solution.h"
 #include "fix.h"
 #include "least_squares_fix.h"
+#include "pose_observations.h"
 #include "sighting.h"
 
 namespace vlp {
 
-/// Maximum number of observations in a frame.
-inline constexpr std::size_t kMaxSightings = 256;
-
-/// Result of find_largest_consistent_set(): a pose and the observations that agree with it.
-/// `agreeing` has a bit per observation, by its index; `count` is the number of set bits.
+/// Observations that agree with a pose.
 struct Consensus {
   Pose pose;
   std::bitset<kMaxSightings> agreeing;
@@ -48,38 +47,6 @@ struct ConsistentFix {
 ///   inconsistent  of three lamps or more, one has a residual of z above `max_residual`
 ConsistentFix estimate_and_check_pose(std::span<const Sighting> sightings, double max_residual);
 
-/// Computes the RMS distance of the normalized points z of the observations from their mean;
-/// dimensionless.
-double compute_rms_observation_radius(std::span<const Sighting> sightings);
-
-/// Lamps observed in one frame or in several. The arrays have a fixed size, so that no memory is
-/// allocated.
-template <typename Observation>
-struct LampObservations {
-  std::array<Observation, kMaxSightings> sightings;
-  std::array<int, kMaxSightings> ids;
-  /// Horizontal distance from each lamp to the nearest other lamp of the map, m.
-  std::array<double, kMaxSightings> nearest_m;
-  std::size_t size = 0;
-  /// True if every detection has a sigma_px.
-  bool noise_is_stated = true;
-  int unknown_lamps = 0;
-  int rejected_lamps = 0;
-  std::array<int, kMaxSightings> rejected_ids = {};
-
-  std::span<const Observation> as_span() const { return {sightings.data(), size}; }
-};
-
-/// Lamps observed in one frame by a level camera.
-struct FrameObservations : LampObservations<Sighting> {
-  /// False if observations are weighted in the undistorted image, where the noise differs.
-  bool is_weighed_by_noise = true;
-
-  /// Removes all observations except those whose bit is set in `kept`, by their index. The removed
-  /// ones count as rejected.
-  void keep_only(const std::bitset<kMaxSightings>& kept);
-};
-
 /// Computes the fix of a frame with two lamps or more whose identities may be wrong.
 ///
 /// A lamp contradicts the fix if its residual exceeds one of two limits:
@@ -97,5 +64,44 @@ struct FrameObservations : LampObservations<Sighting> {
 /// reported, and explains the residuals of a majority a hundred times better, the other lamps are
 /// rejected.
 ConsistentFix estimate_pose_robust(FrameObservations& frame, double max_residual_share);
+
+/// Estimates the state of a body that moves or is tilted, from a frame with at least two lamps. The
+/// identities of lamps may be wrong.
+///
+/// Initial state: if the standard deviation of roll and pitch is at most 0.15 rad, the fix of a
+/// level camera (compute_initial_pose). Otherwise the poses from the three lamps that are farthest
+/// apart (compute_three_lamp_poses). Only poses below the lamps are accepted.
+///
+/// Checks residuals, mirrored maps and majorities as estimate_pose_robust() does for level cameras.
+/// The residual limits apply to distances in meters across the rays; estimate_pose_robust() applies
+/// them to z. If the noise does not explain the residuals, a lamp is rejected if only its removal
+/// does.
+///
+/// Additional statuses:
+///   undetermined  lamps and priors leave the position uncertain by more than a quarter of the
+///                 distance to the lamps: two lamps, or three collinear ones, with free roll and
+///                 pitch
+///   ambiguous     another solution is nearly as likely: by a factor of exp(-6) or more
+///   inconsistent  velocity, yaw rate or roll and pitch differ from the prior by more than five
+///                 standard deviations
+BodySolution estimate_body_state_robust(BodyObservations& frame,
+                                        const Eigen::Vector3d& arm_in_body_m,
+                                        const BodyPrior& prior, double max_residual_share);
+
+/// Lamps that are rejected, as indices in the frame: none, one or several.
+struct OutlierLamps {
+  std::array<std::size_t, kMaxSightings> lamps;
+  std::size_t count = 0;
+};
+/// Finds the lamps that contradict the others by more than noise and common errors explain. Assumes
+/// that the errors of different lamps are independent.
+///
+/// While chi-squared exceeds its 1e-4 bound, rejects the lamp whose removal reduces chi-squared
+/// most. Returns none if chi-squared exceeds the bound with only three lamps left, or without a
+/// majority.
+///
+/// @param common  covariance of z of each observation from the common errors
+OutlierLamps find_outlier_lamps(std::span<const Sighting> sightings,
+                                std::span<const Matrix2> common, const LeastSquaresFix& fix);
 
 }  // namespace vlp

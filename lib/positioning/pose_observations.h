@@ -2,48 +2,73 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <bitset>
 #include <cstddef>
+#include <span>
 
-#include "fix.h"
-#include "outlier_rejection.h"
 #include "pose_estimation.h"
+#include "sighting.h"
 
 namespace vlp {
+
+/// Maximum number of observations in a frame.
+inline constexpr std::size_t kMaxSightings = 256;
+
+/// Lamps observed in one frame or in several. The arrays have a fixed size, so that no memory is
+/// allocated.
+template <typename Observation>
+struct LampObservations {
+  std::array<Observation, kMaxSightings> sightings;
+  std::array<int, kMaxSightings> ids;
+  /// Horizontal distance from each lamp to the nearest other lamp of the map.
+  std::array<double, kMaxSightings> nearest_m;
+  std::size_t size = 0;
+  /// True if a detector reported every sigma_px.
+  bool noise_is_stated = true;
+  int unknown_lamps = 0;
+  int rejected_lamps = 0;
+  std::array<int, kMaxSightings> rejected_ids = {};
+
+  std::span<const Observation> as_span() const { return {sightings.data(), size}; }
+
+  /// Removes all observations except those in `kept`. The removed ones among the first
+  /// `num_reported` count as rejected.
+  void keep_only(const std::bitset<kMaxSightings>& kept, std::size_t num_reported = kMaxSightings) {
+    std::size_t next = 0;
+    for (std::size_t i = 0; i < size; ++i) {
+      if (kept[i]) {
+        sightings[next] = sightings[i];
+        ids[next] = ids[i];
+        nearest_m[next++] = nearest_m[i];
+      } else if (i < num_reported) {
+        rejected_ids[static_cast<std::size_t>(rejected_lamps++)] = ids[i];
+      }
+    }
+    size = next;
+  }
+};
+
+/// Lamps observed in one frame by a level camera.
+struct FrameObservations : LampObservations<Sighting> {
+  /// False if observations are weighted in the undistorted image, where the noise differs.
+  bool is_weighed_by_noise = true;
+};
 
 /// Lamps observed in one frame, or in several consecutive frames.
 struct BodyObservations : LampObservations<BodyObservation> {
   /// Number of observations from the frame of the fix; they are at the start of the arrays. All
   /// other observations are from earlier frames.
   std::size_t num_current = 0;
-};
 
-/// Fix of a body, valid if the status is `ok`.
-struct BodySolution {
-  FixStatus status;
-  BodyFix fix;
+  /// Removes all observations except those in `kept`. The removed ones of the current frame count
+  /// as rejected.
+  void keep_only(const std::bitset<kMaxSightings>& kept) {
+    std::size_t kept_current = 0;
+    for (std::size_t i = 0; i < num_current; ++i) kept_current += kept[i];
+    LampObservations::keep_only(kept, num_current);
+    num_current = kept_current;
+  }
 };
-
-/// Estimates the state of a body that moves or is tilted, from a frame with at least two lamps. The
-/// identities of lamps may be wrong.
-///
-/// Initial state: if the standard deviation of roll and pitch is at most 0.15 rad, the fix of a
-/// level camera (compute_initial_pose). Otherwise the poses from the three lamps that are farthest
-/// apart (compute_three_lamp_poses). Only poses below the lamps are accepted.
-///
-/// Checks residuals, mirrored maps and majorities as estimate_pose_robust() does for level cameras.
-/// The residual limits apply to distances in meters across the rays; estimate_pose_robust() applies
-/// them to z. If the noise does not explain the residuals, a lamp is rejected if only its removal
-/// does.
-///
-/// Additional statuses:
-///   undetermined  lamps and priors leave the position uncertain by more than a quarter of the
-///                 distance to the lamps: two lamps, or three collinear ones, with free roll and
-///                 pitch
-///   ambiguous     another solution is nearly as likely: by a factor of exp(-6) or more
-///   inconsistent  velocity, yaw rate or roll and pitch differ from the prior by more than five
-///                 standard deviations
-BodySolution estimate_body_state_robust(BodyObservations& frame,
-                                        const Eigen::Vector3d& arm_in_body_m,
-                                        const BodyPrior& prior, double max_residual_share);
 
 }  // namespace vlp

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "geometry/median.h"
-#include "positioning/pose_observations.h"
+#include "positioning/outlier_rejection.h"
 #include "rig/find_lamp.h"
 
 namespace vlp {

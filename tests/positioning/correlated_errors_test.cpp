@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "geometry/statistical_bounds.h"
+#include "positioning/outlier_rejection.h"
 #include "positioning/positioner.h"
 #include "positioning/stated_rig.h"
 #include "rig/calibration_error.h"

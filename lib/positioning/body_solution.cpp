@@ -1,0 +1,219 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/body_solution.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "positioning/closed_form.h"
+#include "positioning/three_lamp_poses.h"
+
+namespace vlp {
+
+namespace {
+
+BodyState make_body_state(const FreePose& camera, const BodyProblem& problem) {
+  const Eigen::Matrix3d world_from_body = camera.camera_from_world.transpose();
+  BodyState state{{camera.position_m - world_from_body * problem.arm_m,
+                   std::atan2(world_from_body(1, 0), world_from_body(0, 0))},
+                  problem.prior.mean};
+  state.motion.inclination = {std::atan2(world_from_body(2, 1), world_from_body(2, 2)),
+                              -std::asin(std::clamp(world_from_body(2, 0), -1.0, 1.0))};
+  return state;
+}
+
+bool is_below_lamps(const FreePose& camera, const std::array<Eigen::Vector3d, 3>& lamps_m) {
+  return std::all_of(lamps_m.begin(), lamps_m.end(), [&](const Eigen::Vector3d& lamp_m) {
+    return lamp_m.z() > camera.position_m.z();
+  });
+}
+
+double compute_mean_lamp_distance_m(const BodyObservations& frame, const BodyState& state) {
+  double sum = 0;
+  for (const BodyObservation& seen : frame.as_span()) {
+    sum += (seen.lamp_m - state.pose.position_m).norm();
+  }
+  return sum / static_cast<double>(frame.size);
+}
+
+}  // namespace
+
+bool has_fix(const BodySolution& solution) {
+  return solution.status == FixStatus::ok || solution.status == FixStatus::ambiguous ||
+         solution.status == FixStatus::undetermined;
+}
+
+bool LevelSightings::fill(const BodyObservations& frame, const Eigen::Matrix3d& level_from_body) {
+  for (; size < frame.num_current; ++size) {
+    const BodyObservation& seen = frame.sightings[size];
+    const Eigen::Vector3d ray = level_from_body * seen.ray;
+    if (!(ray.z() > 0)) return false;
+    sightings[size] = {seen.lamp_m, ray.head<2>() / ray.z(), Matrix2::Identity(), seen.sigma_px};
+  }
+  return true;
+}
+
+BodyState make_body_state(const Pose& camera, const BodyProblem& problem,
+                          const Eigen::Matrix3d& lean) {
+  BodyState state{camera, problem.prior.mean};
+  state.pose.position_m -= rotation_about_z(camera.yaw_rad) * lean * problem.arm_m;
+  return state;
+}
+
+InitialStates compute_initial_states(const BodyObservations& frame,
+                                     const std::array<std::size_t, 3>& lamps,
+                                     const BodyProblem& problem) {
+  std::array<Eigen::Vector3d, 3> points_m, rays;
+  for (std::size_t i = 0; i < 3; ++i) {
+    points_m[i] = frame.sightings[lamps[i]].lamp_m;
+    rays[i] = frame.sightings[lamps[i]].ray;
+  }
+  const ThreeLampPoses found = compute_three_lamp_poses(points_m, rays);
+  InitialStates initial_states;
+  for (int i = 0; i < found.count; ++i) {
+    const FreePose& pose = found.poses[static_cast<std::size_t>(i)];
+    if (!is_below_lamps(pose, points_m)) continue;
+    initial_states.states[static_cast<std::size_t>(initial_states.count++)] =
+        make_body_state(pose, problem);
+  }
+  initial_states.status = initial_states.count > 0 ? FixStatus::ok
+                          : found.count > 0        ? FixStatus::lamp_below_camera
+                                                   : FixStatus::degenerate;
+  return initial_states;
+}
+
+bool is_determined(const BodyObservations& frame, const BodyFix& fix) {
+  constexpr double max_sd_fraction = 0.25;
+  const double limit_m = max_sd_fraction * compute_mean_lamp_distance_m(frame, fix.state);
+  return fix.covariance.diagonal().head<3>().maxCoeff() < limit_m * limit_m;
+}
+
+namespace {
+
+InitialStates compute_level_state(const BodyObservations& frame, const BodyProblem& problem) {
+  const Eigen::Matrix3d lean = level_from_inclination(problem.prior.mean.inclination);
+  LevelSightings level;
+  if (!level.fill(frame, lean)) return {FixStatus::lamp_below_camera, 0, {}};
+  const InitialPose start = compute_initial_pose(level.as_span());
+  if (start.status != FixStatus::ok) return {start.status, 0, {}};
+  return {FixStatus::ok, 1, {make_body_state(start.pose, problem, lean)}};
+}
+
+/// Returns three lamps of the current frame that are far apart and far from collinear.
+std::array<std::size_t, 3> find_widest_lamps(const BodyObservations& frame) {
+  const auto best = [&](const auto& value) {
+    std::size_t found = 0;
+    for (std::size_t i = 1; i < frame.num_current; ++i) {
+      if (value(i) > value(found)) found = i;
+    }
+    return found;
+  };
+  const auto lamp_m = [&](std::size_t i) -> const Eigen::Vector3d& {
+    return frame.sightings[i].lamp_m;
+  };
+  const auto first = best([&](std::size_t i) { return (lamp_m(i) - lamp_m(0)).squaredNorm(); });
+  const auto second =
+      best([&](std::size_t i) { return (lamp_m(i) - lamp_m(first)).squaredNorm(); });
+  const Eigen::Vector3d side_m = lamp_m(second) - lamp_m(first);
+  const auto third =
+      best([&](std::size_t i) { return side_m.cross(lamp_m(i) - lamp_m(first)).squaredNorm(); });
+  return {first, second, third};
+}
+
+bool are_below_lamps(const BodyObservations& frame, const BodyProblem& problem,
+                     const BodyState& state) {
+  const double z_m = state.pose.position_m.z() +
+                     (level_from_inclination(state.motion.inclination) * problem.arm_m).z();
+  return std::all_of(frame.sightings.begin(),
+                     frame.sightings.begin() + static_cast<std::ptrdiff_t>(frame.size),
+                     [&](const BodyObservation& seen) { return seen.lamp_m.z() > z_m; });
+}
+
+/// Returns the fix with the smallest chi-squared from several initial states; `ambiguous` if
+/// another fix explains the frame nearly as well.
+BodySolution find_best_body_solution(const InitialStates& initial_states,
+                                     const BodyObservations& frame, const BodyProblem& problem) {
+  constexpr double hopeless = 100, small = 100, unlikely = 12, same_m = 1e-4;
+  std::array<double, 4> at_start;
+  at_start.fill(std::numeric_limits<double>::infinity());
+  if (initial_states.count == 1) at_start[0] = 0;
+  for (std::size_t i = 0; initial_states.count > 1 && static_cast<int>(i) < initial_states.count;
+       ++i) {
+    const auto chi_squared = compute_chi_squared(frame.as_span(), problem.arm_m, problem.prior,
+                                                 initial_states.states[i]);
+    if (chi_squared) at_start[i] = *chi_squared;
+  }
+  const double min_chi_squared = *std::min_element(at_start.begin(), at_start.end());
+  std::optional<BodyFix> best;
+  double second = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; static_cast<int>(i) < initial_states.count; ++i) {
+    if (!(at_start[i] <= hopeless * (min_chi_squared + small))) continue;
+    const auto fix = estimate_body_state(frame.as_span(), problem.arm_m, problem.prior,
+                                         initial_states.states[i]);
+    if (!fix || !are_below_lamps(frame, problem, fix->state)) continue;
+    if (!best) {
+      best = fix;
+      continue;
+    }
+    const bool same = (fix->state.pose.position_m - best->state.pose.position_m).norm() < same_m;
+    if (same) continue;
+    second = std::min(second, std::max(fix->chi_squared, best->chi_squared));
+    if (fix->chi_squared < best->chi_squared) best = fix;
+  }
+  if (!best) return {FixStatus::degenerate, {}};
+  if (!is_determined(frame, *best)) return {FixStatus::undetermined, *best};
+  const double freedom = std::max(1.0, 2 * static_cast<double>(frame.size) - 4);
+  const double scale = std::max(1.0, best->chi_squared / freedom);
+  const bool ambiguous = second - best->chi_squared < unlikely * scale;
+  return {ambiguous ? FixStatus::ambiguous : FixStatus::ok, *best};
+}
+
+/// Computes the fix with free roll and pitch from the three lamps that are farthest apart. If
+/// motion or noise hides their pose, tries other lamps in place of the third. Returns std::nullopt
+/// if all lamps are collinear.
+std::optional<BodySolution> estimate_body_with_free_tilt(const BodyObservations& frame,
+                                                         const BodyProblem& problem) {
+  constexpr std::size_t max_tries = 8;
+  if (frame.num_current < 3) return std::nullopt;
+  const auto [first, second, widest] = find_widest_lamps(frame);
+  if (widest == first || widest == second) return std::nullopt;
+  std::optional<BodySolution> best;
+  std::size_t third = widest;
+  for (std::size_t i = 0; i < std::min(frame.num_current, max_tries);
+       ++i, third = (third + 1) % frame.num_current) {
+    if (third == first || third == second) continue;
+    const InitialStates initial_states =
+        compute_initial_states(frame, {first, second, third}, problem);
+    const BodySolution solution = initial_states.count > 0
+                                      ? find_best_body_solution(initial_states, frame, problem)
+                                      : BodySolution{initial_states.status, {}};
+    const bool better =
+        !best || (has_fix(solution) &&
+                  (!has_fix(*best) || solution.fix.chi_squared < best->fix.chi_squared));
+    if (better) best = solution;
+    if (has_fix(*best) &&
+        compute_reduced_chi_squared(best->fix.chi_squared, frame.size) <= kMaxReducedChiSquared)
+      break;
+  }
+  return best;
+}
+
+}  // namespace
+
+BodySolution estimate_body_from_all_lamps(const BodyObservations& frame,
+                                          const BodyProblem& problem) {
+  if (problem.is_roll_pitch_estimated()) {
+    if (const auto solution = estimate_body_with_free_tilt(frame, problem);
+        solution && has_fix(*solution)) {
+      return *solution;
+    }
+  }
+  const InitialStates start = compute_level_state(frame, problem);
+  if (start.count == 0) return {start.status, {}};
+  return find_best_body_solution(start, frame, problem);
+}
+
+}  // namespace vlp
