@@ -21,7 +21,7 @@
 #include "detection/boards/corner_table.h"
 #include "evaluation/gate.h"
 #include "frontend/board_intake.h"
-#include "frontend/image_folder.h"
+#include "frontend/image_file.h"
 #include "program/app.h"
 #include "program/progress.h"
 #include "program/steps/capture_options.h"

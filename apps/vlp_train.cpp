@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "captures/detections_table.h"
-#include "frontend/image_folder.h"
+#include "frontend/image_file.h"
 #include "program/app.h"
 #include "program/progress.h"
 #include "program/steps/capture_options.h"

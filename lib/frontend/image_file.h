@@ -5,10 +5,13 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <initializer_list>
 #include <limits>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace vlp {
 
@@ -33,5 +36,20 @@ std::optional<std::array<std::int64_t, 2>> read_image_size_from_header(std::stri
 ///         than `max_mpx` megapixels, and for files longer than such an image can be or than 2 GiB
 cv::Mat read_image(const std::filesystem::path& file,
                    double max_mpx = std::numeric_limits<double>::infinity());
+
+/// Returns true if the file has one of the extensions, which are in lower case, as ".png".
+bool has_extension(const std::filesystem::path& file,
+                   std::initializer_list<std::string_view> extensions);
+
+/// Returns true if the extension is that of an image: PNG, JPEG, BMP, TIFF or PGM.
+bool is_image_file_name(const std::filesystem::path& file);
+
+/// Lists the images in a folder, sorted by name.
+/// @throws InputError if it is no folder or contains no image
+std::vector<std::filesystem::path> list_images(const std::filesystem::path& folder);
+
+/// Replaces each folder among the names by the images in it.
+/// @throws InputError as list_images()
+std::vector<std::filesystem::path> replace_folders_by_images(const std::vector<std::string>& names);
 
 }  // namespace vlp

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-#include "frontend/image_folder.h"
+#include "frontend/image_file.h"
 #include "frontend/image_quality.h"
 #include "frontend/lights_table.h"
 #include "frontend/mat_view.h"

@@ -12,7 +12,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "codecs/codecs.h"
-#include "frontend/image_folder.h"
+#include "frontend/image_file.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 

@@ -9,7 +9,7 @@
 #include <map>
 #include <utility>
 
-#include "frontend/image_folder.h"
+#include "frontend/image_file.h"
 #include "frontend/lamp_intake.h"
 #include "lamps/signal/frequency_identification.h"
 #include "session/position_cost.h"

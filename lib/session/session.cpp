@@ -15,7 +15,7 @@
 #include "captures/digest.h"
 #include "evaluation/evaluation_files.h"
 #include "frontend/board_intake.h"
-#include "frontend/image_folder.h"
+#include "frontend/image_file.h"
 #include "frontend/lamp_intake.h"
 #include "rig/file.h"
 #include "rig/input_error.h"

@@ -5,7 +5,7 @@
 #include <fmt/core.h>
 
 #include "captures/digest.h"
-#include "frontend/image_folder.h"
+#include "frontend/image_file.h"
 #include "rig/input_error.h"
 
 namespace vlp {

@@ -9,7 +9,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include "frontend/image_file.h"
-#include "frontend/image_folder.h"
 #include "support/datasets.h"
 #include "support/rejection_message.h"
 #include "support/temporary_folder.h"

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "frontend/image_folder.h"
+#include "frontend/image_file.h"
 #include "frontend/lamp_intake.h"
 
 namespace vlp {

@@ -9,7 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "frontend/board_intake.h"
-#include "frontend/image_folder.h"
+#include "frontend/image_file.h"
 #include "frontend/lamp_intake.h"
 #include "rig/lamp_map.h"
 #include "support/datasets.h"

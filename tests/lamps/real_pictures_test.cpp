@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "frontend/image_file.h"
-#include "frontend/image_folder.h"
 #include "frontend/mat_view.h"
 #include "lamps/light_detector.h"
 #include "support/real_data.h"

@@ -9,7 +9,6 @@
 
 #include "captures/captures_table.h"
 #include "frontend/image_file.h"
-#include "frontend/image_folder.h"
 #include "pipeline/intrinsics_program.h"
 #include "support/datasets.h"
 #include "support/write_video.h"

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "captures/printable.h"
-#include "frontend/image_folder.h"
+#include "frontend/image_file.h"
 #include "program/app.h"
 #include "program/station/terminal.h"
 #include "rig/input_error.h"

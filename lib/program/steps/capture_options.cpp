@@ -14,7 +14,7 @@
 
 #include "camera/lens_model.h"
 #include "captures/printable.h"
-#include "frontend/image_folder.h"
+#include "frontend/image_file.h"
 #include "frontend/lights_table.h"
 #include "frontend/video.h"
 #include "geometry/angles.h"

@@ -9,7 +9,7 @@
 #include <iterator>
 
 #include "frontend/board_intake.h"
-#include "frontend/image_folder.h"
+#include "frontend/image_file.h"
 #include "frontend/image_source.h"
 #include "frontend/lamp_intake.h"
 #include "frontend/observation.h"

@@ -10,7 +10,7 @@
 #include <algorithm>
 
 #include "captures/id.h"
-#include "frontend/image_folder.h"
+#include "frontend/image_file.h"
 #include "rig/input_error.h"
 #include "station/records/publish_run.h"
 #include "station/station_folders.h"

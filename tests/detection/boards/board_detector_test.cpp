@@ -13,7 +13,6 @@
 
 #include "captures/csv_reader.h"
 #include "frontend/image_file.h"
-#include "frontend/image_folder.h"
 #include "support/real_data.h"
 
 namespace vlp {
