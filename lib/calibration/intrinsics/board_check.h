@@ -29,7 +29,7 @@ struct BoardCheck {
 ///
 /// @param lens  undistorts the tags, if given; the tolerance of the pitch is then 1 % instead of 5
 ///     % (ChArUco: always 15 %)
-/// @param shift_px  inward displacement of the tag edges (edge_displacement.h), px, clamped to
+/// @param shift_px  inward displacement of the tag edges (edge_corrections.h), px, clamped to
 /// +-1.5 px
 BoardCheck check_board_layout(const Board& board, std::span<const BoardView> views,
                               const std::optional<Lens>& lens, double shift_px = 0);

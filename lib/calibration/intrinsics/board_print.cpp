@@ -8,7 +8,7 @@
 #include <numbers>
 #include <vector>
 
-#include "calibration/intrinsics/intrinsics_solver.h"
+#include "calibration/intrinsics/intrinsics.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "geometry/polygon.h"
 

@@ -9,13 +9,12 @@
 
 #include <Eigen/Geometry>
 
-#include "calibration/intrinsics/edge_curvature.h"
-#include "calibration/intrinsics/edge_displacement.h"
-#include "calibration/intrinsics/expected_difference.h"
+#include "calibration/intrinsics/board_poses.h"
+#include "calibration/intrinsics/edge_corrections.h"
 #include "calibration/intrinsics/image_coverage.h"
+#include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
 #include "calibration/intrinsics/view_jackknife.h"
-#include "calibration/intrinsics/view_pose.h"
 #include "camera/spline_grid.h"
 #include "geometry/polygon.h"
 

@@ -2,22 +2,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/intrinsics/intrinsics.h"
 
-#include <algorithm>
-#include <limits>
-
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <utility>
+#include <vector>
 
-#include "calibration/intrinsics/intrinsics_solver.h"
+#include "calibration/intrinsics/board_poses.h"
+#include "calibration/intrinsics/corner_variance.h"
+#include "calibration/intrinsics/edge_corrections.h"
+#include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/rotation_vector.h"
+#include "calibration/intrinsics/spline_fit.h"
+#include "camera/lens_table.h"
+#include "camera/spline_grid.h"
+#include "geometry/median.h"
 
 namespace vlp {
-
-namespace {
-
-IntrinsicsSolution make_failure(IntrinsicsStatus status) {
-  return {status, {}, {}, {}, {}, 0, 0, 0};
-}
-
-}  // namespace
 
 std::string_view describe(IntrinsicsStatus status) {
   switch (status) {
@@ -51,6 +56,546 @@ void IntrinsicsSolution::update_fit_statistics() {
   }
   rms_px = std::sqrt(squares / (2 * std::max(1, corners)));
 }
+
+std::vector<Eigen::Vector2d> compute_reprojection_residuals(const BoardProblem& problem) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const Lens lens(problem.lens_model, problem.intrinsics);
+  std::vector<Eigen::Vector2d> residuals(problem.points.size(), Eigen::Vector2d::Constant(nan));
+  const std::size_t cols = static_cast<std::size_t>(problem.cols),
+                    count = problem.points_per_board();
+  const Eigen::Array2d last(problem.cols - 1, problem.rows - 1);
+  for (std::size_t pose = 0; pose < problem.poses.size(); ++pose) {
+    const Eigen::Vector3d& r = problem.poses[pose].rotation;
+    const Eigen::Matrix3d rotation = Eigen::AngleAxisd(r.norm(), r.normalized()).toRotationMatrix();
+    for (std::size_t i = 0; i < count; ++i) {
+      const Eigen::Vector3d& seen = problem.points[pose * count + i];
+      if (seen.z() == BoardProblem::kUnseen) continue;
+      const std::size_t col = i % cols, row = i / cols;
+      const Eigen::Array2d node(static_cast<double>(col), static_cast<double>(row));
+      const Eigen::Array2d normalized_position = 2 * node / last - 1;
+      Eigen::Vector3d point;
+      point << problem.spacing_m * node.matrix(),
+          problem.warp_m.dot((1 - normalized_position.square()).matrix());
+      const auto pixel = lens.project(rotation * point + problem.poses[pose].translation_m);
+      if (pixel) residuals[pose * count + i] = seen.head<2>() - *pixel;
+    }
+  }
+  return residuals;
+}
+
+bool solve_lens_parameters(BoardProblem& problem, SolveOptions what) {
+  what.distortions = what.distortions && problem.intrinsics.size() > 4;
+  return solve(problem, what);
+}
+
+namespace {
+
+IntrinsicsSolution make_failure(IntrinsicsStatus status) {
+  return {status, {}, {}, {}, {}, 0, 0, 0};
+}
+
+Eigen::Vector3d compute_board_normal(const BoardPose& pose) {
+  return Eigen::AngleAxisd(pose.rotation.norm(), pose.rotation.normalized()) *
+         Eigen::Vector3d::UnitZ();
+}
+
+void rotate_all_board_poses(std::vector<BoardPose>& poses, const Eigen::Matrix3d& new_from_old) {
+  for (BoardPose& pose : poses) {
+    const Eigen::AngleAxisd rotation(new_from_old * rotation_matrix_from_vector(pose.rotation));
+    pose = {rotation.angle() * rotation.axis(), new_from_old * pose.translation_m};
+  }
+}
+
+/// Returns true if all board normals lie within five degrees of each other.
+bool are_all_boards_parallel(const BoardProblem& problem) {
+  constexpr double min_rad = 0.09;  // five degrees
+  double widest_rad = 0;
+  for (const BoardPose& a : problem.poses) {
+    for (const BoardPose& b : problem.poses) {
+      const double cosine = compute_board_normal(a).dot(compute_board_normal(b));
+      widest_rad = std::max(widest_rad, std::acos(std::clamp(cosine, -1.0, 1.0)));
+    }
+  }
+  return widest_rad < min_rad;
+}
+
+/// Returns the limit of the RMS residual of a view, px, given those of all views.
+double compute_max_view_rms(const std::vector<double>& rms) {
+  constexpr double fair_px = 1, fair = 4;
+  return std::max(fair_px, fair * upper_median(rms));
+}
+
+/// Stages of solve_intrinsics(), in their order. Each returns false if it fails.
+class IntrinsicsSolver {
+ public:
+  static constexpr std::size_t kMinViews = 3;
+
+  explicit IntrinsicsSolver(const IntrinsicsInput& input);
+
+  /// Stage 2, from an initial focal length.
+  bool solve_from_focal_length(double focal_px);
+  /// Splined lenses only: initializes stage 3 with the rotationally symmetric lens OPENCV_FISHEYE.
+  /// Keeps the initial lens STEREOGRAPHIC if that fails.
+  void initialize_with_symmetric_lens();
+  /// Stage 3.
+  bool refine_intrinsics();
+  /// Splined lenses only: scales the regularization to the noise of the corners.
+  bool scale_spline_regularization();
+  /// Stages 4 and 7: applies correct_corners_for_curved_edges() to all views and solves again.
+  bool correct_corners_and_solve_again();
+  /// Stages 5 (DisplacementForm::constant) and 7 (DisplacementForm::varying): corrects the corners
+  /// for estimate_tag_edge_displacements() and solves again, at most twice, until the terms of the
+  /// shifts are below 0.002 px.
+  bool correct_tag_edge_displacements(DisplacementForm form);
+  /// Stage 6: estimates the warp of the board if WarpChoice permits it.
+  bool solve_board_warp();
+  /// Stage 7: weights the corners by their variances (CornerWeights) if standard deviations of some
+  /// corners are known.
+  bool reweight_corners();
+  /// Stage 8.
+  bool reject_outliers();
+  /// Stage 9, splined lenses only. Returns true also if the rotation has not converged.
+  bool rotate_camera_frame_to_optical_axis();
+
+  /// Returns the current solution.
+  IntrinsicsSolution make_solution() const;
+
+ private:
+  /// A view of the input and a corner of it.
+  using CornerOfView = std::pair<std::size_t, std::size_t>;
+
+  Lens lens() const { return Lens(problem_.lens_model, problem_.intrinsics); }
+  bool solve(SolveOptions what);
+  /// Estimates the pose of every view with a lens. Views without a pose are unused until the next
+  /// call.
+  void initialize_board_poses(const Lens& lens);
+  /// Sets up the problem of the views used, at their initial poses.
+  void assemble_board_problem(const Lens& lens);
+  /// Returns the index of a corner in the points of the problem; `used` is the index of its view in
+  /// used_.
+  std::size_t find_problem_point_index(std::size_t used, const BoardLattice::Corner& corner) const;
+  /// Copies pixels and weights of the corners from the input to the problem; outliers are kept.
+  void update_problem_points();
+  /// Returns the RMS residual of each view used, px, in the order of used_; infinity if not finite.
+  std::vector<double> compute_view_rms_px() const;
+  /// Returns true if the lens projects all corners of most views. mrcal also solves for points
+  /// behind the camera, and takes long.
+  bool can_project_most_views() const;
+  /// Returns the corners of tags with a corner whose residual differs from those of its neighbors.
+  /// Skips views in which these would be more than a quarter of the corners.
+  std::set<CornerOfView> find_corners_of_outlier_tags() const;
+  /// If a view fits badly, re-estimates the poses of all views used and drops the worst of the
+  /// views that still fit badly. Returns true if the problem has to be solved again.
+  bool reestimate_board_poses();
+  /// Reinstates dropped views that fit the current lens: a worse view had distorted the earlier
+  /// lens. Returns true if there are any.
+  bool reinstate_dropped_views();
+
+  IntrinsicsInput input_;
+  /// Mean shift by which the corners of each view of the input were corrected, px.
+  std::vector<double> edge_shifts_px_;
+  /// Parameters to estimate; the warp only after solve_board_warp().
+  SolveOptions solved_for_{true, true, false, false};
+  InitialPoses initial_poses_;
+  std::vector<std::size_t> used_;
+  std::vector<IntrinsicsSolution::Dropped> dropped_;
+  BoardProblem problem_{};
+  /// Splined lenses only: parameters of OPENCV_FISHEYE fitted to the same corners, regardless of
+  /// the quality of its fit; empty if it was not fitted.
+  std::vector<double> symmetric_;
+  /// Splined lenses only: corners that the lens would overfit where corners are sparse. Outliers
+  /// from the start.
+  std::set<CornerOfView> displaced_corners_;
+};
+
+IntrinsicsSolver::IntrinsicsSolver(const IntrinsicsInput& input) : input_(input) {
+  for (std::size_t i = 0; i < input.views.size(); ++i) used_.push_back(i);
+  edge_shifts_px_.assign(input.views.size(), 0);
+}
+
+bool IntrinsicsSolver::solve_from_focal_length(double focal_px) {
+  constexpr int max_iterations = 4;
+  constexpr double convergence = 1e-3;
+  Lens lens = make_stereographic_lens(input_, focal_px);
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    const double before_px = lens.focal_px().x();
+    initialize_board_poses(lens);
+    if (used_.size() < kMinViews) return false;
+    assemble_board_problem(lens);
+    if (!solve({true, false, false, false})) return false;
+    lens = this->lens();
+    if (std::abs(lens.focal_px().x() / before_px - 1) < convergence) break;
+  }
+  return true;
+}
+
+void IntrinsicsSolver::initialize_with_symmetric_lens() {
+  if (!is_splined_lens_model(input_.lens_model)) return;
+  IntrinsicsSolver symmetric = *this;
+  symmetric.input_.lens_model = LensModel::fisheye;
+  if (!symmetric.refine_intrinsics()) return;  // keeps STEREOGRAPHIC
+  symmetric_ = symmetric.problem_.intrinsics;
+  displaced_corners_ = symmetric.find_corners_of_outlier_tags();
+  const Lens fisheye = symmetric.lens();
+  for (const std::size_t view : used_) {
+    if (const auto pose = estimate_board_view_pose(input_.views[view], fisheye)) {
+      initial_poses_.poses[view] = pose->camera_from_board;
+    }
+  }
+  const std::vector<double> core =
+      fit_splined_lens_core(fisheye, collect_inlier_pixels(symmetric.problem_));
+  // With too few control points, STEREOGRAPHIC with that core is used.
+  problem_.intrinsics =
+      fit_splined_lens_to_lens(fisheye, input_.imager_px, input_.lens_model, core).value_or(core);
+  problem_.lens_model = input_.lens_model;
+  problem_.intrinsics.resize(parameter_count(input_.lens_model), 0);
+  // The axis, and two rays next to it that prevent a rotation about it.
+  for (const double beside : {0.0, -0.25, 0.25}) {
+    const Eigen::Vector2d pixel =
+        fisheye.principal_point_px() + Eigen::Vector2d(beside * input_.imager_px[0], 0);
+    if (const auto ray = fisheye.unproject(pixel))
+      problem_.fixed_rays.push_back({pixel, ray->direction});
+  }
+  assemble_board_problem(lens());
+}
+
+bool IntrinsicsSolver::rotate_camera_frame_to_optical_axis() {
+  constexpr int max_iterations = 4;
+  constexpr double tolerance_rad = 1e-4;  // 0.006 degrees
+  if (symmetric_.empty()) return true;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    const auto pixels = collect_inlier_pixels(problem_);
+    BoardProblem symmetric = problem_;
+    symmetric.lens_model = LensModel::fisheye;
+    symmetric.intrinsics = symmetric_;
+    const auto start =
+        fit_rotation_between_lenses(lens(), Lens(LensModel::fisheye, symmetric_), pixels);
+    if (!start) return true;
+    rotate_all_board_poses(symmetric.poses, *start);
+    if (!vlp::solve(symmetric, {true, true, solved_for_.warp, false})) return true;
+    const Lens fisheye(LensModel::fisheye, symmetric.intrinsics);
+    symmetric_ = symmetric.intrinsics;
+    const auto new_from_old = fit_rotation_between_lenses(lens(), fisheye, pixels);
+    if (!new_from_old) return true;
+    const double turned_rad = Eigen::AngleAxisd(*new_from_old).angle();
+    if (turned_rad < tolerance_rad) return true;
+    for (auto& [pixel, ray] : problem_.fixed_rays) {
+      if (const auto seen = lens().project(new_from_old->transpose() * ray)) pixel = *seen;
+    }
+    rotate_all_board_poses(problem_.poses, *new_from_old);
+    if (!solve(solved_for_)) return false;
+  }
+  return true;
+}
+
+bool IntrinsicsSolver::refine_intrinsics() {
+  constexpr int max_iterations = 6;
+  constexpr std::size_t core = 4;
+  problem_.lens_model = input_.lens_model;
+  // The core of a splined lens would only compensate the control points; mrcal fixes it, too.
+  if (is_splined_lens_model(input_.lens_model)) solved_for_.core = false;
+  const std::size_t given = problem_.intrinsics.size();
+  problem_.intrinsics.resize(parameter_count(input_.lens_model), 0);
+  const auto distortions = list_distortion_names_and_start_values(input_.lens_model);
+  for (std::size_t i = given; i < core + distortions.size(); ++i) {
+    problem_.intrinsics[i] = distortions[i - core].start;
+  }
+  bool convergence = false;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    if (!solve(solved_for_)) return false;
+    convergence = !reestimate_board_poses();
+    if (convergence) break;
+    if (used_.size() < kMinViews) return false;
+    assemble_board_problem(lens());
+  }
+  if (reinstate_dropped_views()) {
+    assemble_board_problem(lens());
+  } else if (convergence) {
+    return can_project_most_views();
+  }
+  return solve(solved_for_) && can_project_most_views();
+}
+
+bool IntrinsicsSolver::scale_spline_regularization() {
+  constexpr int max_iterations = 3;
+  constexpr double min_px = 0.01, convergence = 0.1;
+  if (!is_splined_lens_model(problem_.lens_model)) return true;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    const double noise_px = std::clamp(make_solution().rms_px, min_px, 1.0);
+    if (std::abs(noise_px / problem_.noise_px - 1) < convergence) break;
+    problem_.noise_px = noise_px;
+    if (!solve(solved_for_)) return false;
+  }
+  return true;
+}
+
+std::size_t IntrinsicsSolver::find_problem_point_index(std::size_t used,
+                                                       const BoardLattice::Corner& corner) const {
+  return (used * input_.lattice.num_parts() + corner.part) * input_.lattice.num_points() +
+         corner.point;
+}
+
+void IntrinsicsSolver::update_problem_points() {
+  for (std::size_t i = 0; i < used_.size(); ++i) {
+    for (const auto& corner : input_.views[used_[i]]) {
+      Eigen::Vector3d& point = problem_.points[find_problem_point_index(i, corner)];
+      point << corner.pixel, std::copysign(corner.weight, point.z());
+    }
+  }
+}
+
+bool IntrinsicsSolver::correct_corners_and_solve_again() {
+  constexpr double tolerance_px = 0.002;
+  double max_px = 0;
+  const Lens lens = this->lens();
+  for (auto& view : input_.views)
+    max_px = std::max(max_px, correct_corners_for_curved_edges(view, lens));
+  if (max_px < tolerance_px) return true;
+  update_problem_points();
+  return solve(solved_for_);
+}
+
+bool IntrinsicsSolver::correct_tag_edge_displacements(DisplacementForm form) {
+  constexpr int max_iterations = 2;
+  constexpr double tolerance_px = 0.002;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    auto views = input_.views;
+    for (auto& view : views)
+      view = input_.lattice.apply_board_warp(std::move(view), problem_.warp_m);
+    const auto shifts = estimate_tag_edge_displacements(views, lens(), form);
+    if (std::all_of(shifts.begin(), shifts.end(), [](const EdgeDisplacement& shift) {
+          return shift.coefficients.lpNorm<Eigen::Infinity>() < tolerance_px;
+        })) {
+      return true;
+    }
+    for (std::size_t view = 0; view < input_.views.size(); ++view) {
+      edge_shifts_px_[view] += correct_edge_displacement(input_.views[view], shifts[view]);
+    }
+    update_problem_points();
+    if (!solve(solved_for_)) return false;
+  }
+  return true;
+}
+
+bool IntrinsicsSolver::solve_board_warp() {
+  constexpr double min_reduction = 20;
+  if (input_.warp == WarpChoice::off) return true;
+  const auto squares = [](const IntrinsicsSolution& solution) {
+    return solution.rms_px * solution.rms_px * 2 * solution.corners;
+  };
+  const IntrinsicsSolution flat = make_solution();
+  solved_for_.warp = true;
+  if (!solve(solved_for_)) return false;
+  const IntrinsicsSolution with_warp = make_solution();
+  if (input_.warp == WarpChoice::automatic &&
+      squares(flat) - squares(with_warp) <= min_reduction * with_warp.rms_px * with_warp.rms_px) {
+    problem_ = flat.problem;
+    solved_for_.warp = false;
+  }
+  return true;
+}
+
+bool IntrinsicsSolver::reweight_corners() {
+  const auto residuals = compute_reprojection_residuals(problem_);
+  std::vector<CornerError> known, unknown;
+  for (std::size_t i = 0; i < used_.size(); ++i) {
+    for (const auto& corner : input_.views[used_[i]]) {
+      const Eigen::Vector2d& residual = residuals[find_problem_point_index(i, corner)];
+      if (!residual.allFinite()) continue;
+      (corner.sd_px > 0 ? known : unknown).push_back({residual.squaredNorm() / 2, corner.sd_px});
+    }
+  }
+  if (std::ranges::all_of(known, [](const auto& error) { return error.square_px2 == 0; })) {
+    return true;
+  }
+  const CornerWeights weights(known, unknown);
+  for (auto& view : input_.views) {
+    for (auto& corner : view) corner.weight = weights.at(corner.sd_px);
+  }
+  update_problem_points();
+  return solve(solved_for_);
+}
+
+bool IntrinsicsSolver::reject_outliers() {
+  // Without noise, residuals are caused by the regularization and are not outliers.
+  constexpr double exact_px = 0.005;
+  if (make_solution().rms_px < exact_px) return true;
+  SolveOptions without_outliers = solved_for_;
+  without_outliers.without_outliers = true;
+  return solve(without_outliers) && std::isfinite(make_solution().rms_px);
+}
+
+IntrinsicsSolution IntrinsicsSolver::make_solution() const {
+  IntrinsicsSolution result{IntrinsicsStatus::ok, problem_, used_, dropped_, {}, 0, 0, 0};
+  result.solved_for = solved_for_;
+  for (const std::size_t view : used_) result.edge_shifts_px.push_back(edge_shifts_px_[view]);
+  result.update_fit_statistics();
+  return result;
+}
+
+bool IntrinsicsSolver::solve(SolveOptions what) { return solve_lens_parameters(problem_, what); }
+
+void IntrinsicsSolver::initialize_board_poses(const Lens& lens) {
+  initial_poses_ = estimate_initial_board_poses(input_, lens);
+  used_.clear();
+  for (std::size_t i = 0; i < input_.views.size(); ++i) {
+    if (std::isfinite(initial_poses_.rms_px[i])) used_.push_back(i);
+  }
+}
+
+void IntrinsicsSolver::assemble_board_problem(const Lens& lens) {
+  const BoardLattice& lattice = input_.lattice;
+  problem_.lens_model = lens.lens_model();
+  if (problem_.intrinsics.empty() || lens.lens_model() == LensModel::stereographic) {
+    problem_.intrinsics = {lens.focal_px().x(), lens.focal_px().y(), lens.principal_point_px().x(),
+                           lens.principal_point_px().y()};
+  }
+  problem_.imager_px = input_.imager_px;
+  problem_.cols = lattice.cols();
+  problem_.rows = lattice.rows();
+  problem_.spacing_m = lattice.point_spacing_m();
+  problem_.poses.clear();
+  problem_.points.assign(used_.size() * lattice.num_parts() * lattice.num_points(),
+                         {-1, -1, BoardProblem::kUnseen});
+  for (std::size_t i = 0; i < used_.size(); ++i) {
+    for (std::size_t part = 0; part < lattice.num_parts(); ++part) {
+      problem_.poses.push_back(
+          lattice.compute_board_part_pose(initial_poses_.poses[used_[i]], part));
+    }
+    const auto& corners = input_.views[used_[i]];
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      const double sign = displaced_corners_.contains({used_[i], k}) ? -1 : 1;
+      problem_.points[find_problem_point_index(i, corners[k])] << corners[k].pixel,
+          sign * corners[k].weight;
+    }
+  }
+}
+
+bool IntrinsicsSolver::can_project_most_views() const {
+  return std::isfinite(upper_median(compute_view_rms_px()));
+}
+
+std::vector<double> IntrinsicsSolver::compute_view_rms_px() const {
+  const auto residuals = compute_reprojection_residuals(problem_);
+  const std::size_t count = input_.lattice.num_parts() * input_.lattice.num_points();
+  std::vector<double> rms;
+  for (std::size_t i = 0; i < used_.size(); ++i) {
+    double squares = 0;
+    for (std::size_t k = i * count; k < (i + 1) * count; ++k) {
+      const double weight = problem_.points[k].z();
+      if (weight > 0) squares += weight * weight * residuals[k].squaredNorm();
+    }
+    const double value =
+        std::sqrt(squares / (2 * static_cast<double>(input_.views[used_[i]].size())));
+    rms.push_back(std::isfinite(value) ? value : std::numeric_limits<double>::infinity());
+  }
+  return rms;
+}
+
+std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::find_corners_of_outlier_tags() const {
+  constexpr std::size_t neighbors = 8;
+  constexpr double sigmas = 8, min_px = 0.1, median_of_normal = 0.6745;
+  // If OPENCV_FISHEYE does not fit the lens, the residuals of neighbors also differ from each
+  // other.
+  constexpr double beside_sigmas = 5;
+  const auto residuals = compute_reprojection_residuals(problem_);
+  std::map<CornerOfView, double> deviations_px;
+  std::vector<double> all_px;
+  for (std::size_t i = 0; i < used_.size(); ++i) {
+    const auto& corners = input_.views[used_[i]];
+    const auto residual = [&](std::size_t k) -> const Eigen::Vector2d& {
+      return residuals[find_problem_point_index(i, corners[k])];
+    };
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      std::vector<std::pair<double, std::size_t>> near;
+      for (std::size_t other = 0; other < corners.size(); ++other) {
+        if (other == k || !residual(other).allFinite()) continue;
+        near.emplace_back((corners[other].in_board_m - corners[k].in_board_m).squaredNorm(), other);
+      }
+      if (near.size() < neighbors || !residual(k).allFinite()) continue;
+      std::partial_sort(near.begin(), near.begin() + neighbors, near.end());
+      double max_px = 0;
+      for (Eigen::Index axis = 0; axis < 2; ++axis) {
+        std::vector<double> beside;
+        for (std::size_t n = 0; n < neighbors; ++n) {
+          beside.push_back(residual(near[n].second)[axis]);
+        }
+        const double middle = upper_median(beside);
+        for (double& value : beside) value = std::abs(value - middle);
+        const double robust_sd = upper_median(beside) / median_of_normal;
+        const double off = std::abs(residual(k)[axis] - middle);
+        const double weighted_deviation_px = off * corners[k].weight;
+        all_px.push_back(weighted_deviation_px);
+        if (off > beside_sigmas * robust_sd) max_px = std::max(max_px, weighted_deviation_px);
+      }
+      deviations_px[{used_[i], k}] = max_px;
+    }
+  }
+  std::set<CornerOfView> found;
+  if (all_px.empty()) return found;
+  const double limit_px = std::max(min_px, sigmas * upper_median(all_px) / median_of_normal);
+  for (const auto& [outlier, px] : deviations_px) {
+    if (px <= limit_px) continue;
+    const auto& corners = input_.views[outlier.first];
+    const std::size_t tag = input_.lattice.find_tag_of_point(corners[outlier.second].point);
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      if (input_.lattice.find_tag_of_point(corners[k].point) == tag)
+        found.insert({outlier.first, k});
+    }
+  }
+  // A view with many such corners is not improved by its other corners.
+  std::map<std::size_t, std::size_t> count_per_view;
+  for (const auto& [view, corner] : found) ++count_per_view[view];
+  std::erase_if(found, [&](const CornerOfView& outlier) {
+    return 4 * count_per_view[outlier.first] > input_.views[outlier.first].size();
+  });
+  return found;
+}
+
+bool IntrinsicsSolver::reestimate_board_poses() {
+  constexpr double max_ratio = 0.7;
+  const auto rms = compute_view_rms_px();
+  const double limit_px = compute_max_view_rms(rms);
+  const double worst_px = *std::max_element(rms.begin(), rms.end());
+  if (worst_px <= limit_px) return false;
+  const Lens lens = this->lens();
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < used_.size(); ++i) {
+    const auto pose = estimate_board_view_pose(input_.views[used_[i]], lens);
+    const bool helps = pose && pose->rms_px < max_ratio * rms[i];
+    const bool bad = rms[i] > limit_px && rms[i] > worst_px / 2 && !helps;
+    if (bad || !pose) {
+      dropped_.push_back({used_[i], rms[i]});
+      continue;
+    }
+    initial_poses_.poses[used_[i]] = pose->camera_from_board;
+    kept.push_back(used_[i]);
+  }
+  used_ = kept;
+  return true;
+}
+
+bool IntrinsicsSolver::reinstate_dropped_views() {
+  const double limit_px = compute_max_view_rms(compute_view_rms_px());
+  const Lens lens = this->lens();
+  const std::size_t before = dropped_.size();
+  std::erase_if(dropped_, [&](const auto& dropped) {
+    const auto pose = estimate_board_view_pose(input_.views[dropped.view], lens);
+    if (!pose || pose->rms_px > limit_px) return false;
+    initial_poses_.poses[dropped.view] = pose->camera_from_board;
+    used_.push_back(dropped.view);
+    return true;
+  });
+  std::sort(used_.begin(), used_.end());
+  for (std::size_t i = 0; i < used_.size() && dropped_.size() < before; ++i) {
+    if (const auto pose = estimate_board_view_pose(input_.views[used_[i]], lens)) {
+      initial_poses_.poses[used_[i]] = pose->camera_from_board;
+    }
+  }
+  return dropped_.size() < before;
+}
+
+}  // namespace
 
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input) {
   constexpr std::size_t max_starts = 4;
@@ -110,32 +655,6 @@ IntrinsicsSolution solve_intrinsics_from_half_of_views(const IntrinsicsSolution&
   if (are_all_boards_parallel(half.problem)) return make_failure(IntrinsicsStatus::all_parallel);
   half.update_fit_statistics();
   return half;
-}
-
-std::vector<Eigen::Vector2d> compute_reprojection_residuals(const BoardProblem& problem) {
-  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  const Lens lens(problem.lens_model, problem.intrinsics);
-  std::vector<Eigen::Vector2d> residuals(problem.points.size(), Eigen::Vector2d::Constant(nan));
-  const std::size_t cols = static_cast<std::size_t>(problem.cols),
-                    count = problem.points_per_board();
-  const Eigen::Array2d last(problem.cols - 1, problem.rows - 1);
-  for (std::size_t pose = 0; pose < problem.poses.size(); ++pose) {
-    const Eigen::Vector3d& r = problem.poses[pose].rotation;
-    const Eigen::Matrix3d rotation = Eigen::AngleAxisd(r.norm(), r.normalized()).toRotationMatrix();
-    for (std::size_t i = 0; i < count; ++i) {
-      const Eigen::Vector3d& seen = problem.points[pose * count + i];
-      if (seen.z() == BoardProblem::kUnseen) continue;
-      const std::size_t col = i % cols, row = i / cols;
-      const Eigen::Array2d node(static_cast<double>(col), static_cast<double>(row));
-      const Eigen::Array2d normalized_position = 2 * node / last - 1;
-      Eigen::Vector3d point;
-      point << problem.spacing_m * node.matrix(),
-          problem.warp_m.dot((1 - normalized_position.square()).matrix());
-      const auto pixel = lens.project(rotation * point + problem.poses[pose].translation_m);
-      if (pixel) residuals[pose * count + i] = seen.head<2>() - *pixel;
-    }
-  }
-  return residuals;
 }
 
 }  // namespace vlp

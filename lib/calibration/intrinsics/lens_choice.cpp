@@ -11,8 +11,8 @@
 #include <numeric>
 #include <utility>
 
+#include "calibration/intrinsics/board_poses.h"
 #include "calibration/intrinsics/calibration_report.h"
-#include "calibration/intrinsics/initial_board_poses.h"
 #include "geometry/angles.h"
 #include "geometry/median.h"
 

@@ -9,9 +9,9 @@
 #include <cmath>
 #include <map>
 
+#include "calibration/intrinsics/board_poses.h"
 #include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/lens_sharpness.h"
-#include "calibration/intrinsics/view_pose.h"
 #include "geometry/angles.h"
 #include "station/unit/turn_map.h"
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// Corners of tags whose edges are detected with a wrong curvature.
-#include "calibration/intrinsics/edge_curvature.h"
+#include "calibration/intrinsics/edge_corrections.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// Tags shrunk by a tone curve.
-#include "calibration/intrinsics/edge_displacement.h"
+#include "calibration/intrinsics/edge_corrections.h"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,9 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "calibration/intrinsics/expected_difference.h"
+#include "calibration/intrinsics/projection_difference.h"
 
 #include <gtest/gtest.h>
 
-#include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
 #include "calibration/intrinsics/synthetic_views.h"
 #include "calibration/intrinsics/view_jackknife.h"

@@ -8,6 +8,7 @@
 
 #include "calibration/intrinsics/board_lattice.h"
 #include "calibration/intrinsics/board_problem.h"
+#include "calibration/intrinsics/intrinsics.h"
 #include "camera/lens.h"
 
 namespace vlp {
@@ -30,5 +31,21 @@ struct ViewPose {
 /// Marquardt. The one with the smaller residual is returned.
 std::optional<ViewPose> estimate_board_view_pose(std::span<const BoardLattice::Corner> corners,
                                                  const Lens& lens);
+
+/// Initial poses of all views, estimated with one lens.
+struct InitialPoses {
+  std::vector<BoardPose> poses;
+  /// RMS residual of each view, px; infinity if it has no pose.
+  std::vector<double> rms_px;
+};
+/// Estimates the poses of all views with a lens.
+InitialPoses estimate_initial_board_poses(const IntrinsicsInput& input, const Lens& lens);
+
+/// Returns LENSMODEL_STEREOGRAPHIC with its principal point in the middle of the image.
+Lens make_stereographic_lens(const IntrinsicsInput& input, double focal_px);
+
+/// Returns focal lengths of a geometric series, px, in ascending order of the median RMS residual
+/// of the poses with them.
+std::vector<double> rank_initial_focal_lengths(const IntrinsicsInput& input);
 
 }  // namespace vlp
