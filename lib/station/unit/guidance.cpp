@@ -13,7 +13,6 @@
 #include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/lens_sharpness.h"
 #include "geometry/angles.h"
-#include "station/unit/turn_map.h"
 
 namespace vlp {
 namespace {

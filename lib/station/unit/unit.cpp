@@ -14,7 +14,6 @@
 #include "session/session_folder.h"
 #include "station/unit/station_faults.h"
 #include "station/unit/station_steps.h"
-#include "station/unit/turn_map.h"
 
 namespace vlp {
 

@@ -17,7 +17,9 @@
 #include "captures/detections_table.h"
 #include "frontend/observation.h"
 #include "report/report_picture.h"
+#include "rig/calibration.h"
 #include "session/step_result.h"
+#include "station/station_config.h"
 
 namespace vlp {
 
@@ -96,6 +98,27 @@ std::vector<const UnitImage*> list_used_images(const UnitStep& step);
 
 /// Counts the corners of the used views in the cells of the image.
 ImageCoverage compute_board_coverage(const UnitStep& step, const std::array<int, 2>& imager_px);
+
+/// Angles of a rotation in place that captures cover, from fixes without rotation center.
+struct YawCoverage {
+  struct Height {
+    double z_m;
+    int captures;
+    double arc_rad;
+    /// Cells of the rotation with a capture: `turn_captures` equal cells. The first one is centered
+    /// at the yaw of the first capture.
+    std::vector<bool> parts;
+    /// True if captures and angular range meet the station's criteria.
+    bool is_complete = false;
+  };
+  /// Heights, in increasing order.
+  std::vector<Height> heights;
+  /// True if heights, captures at each and angular range meet the station's criteria.
+  bool sufficient = false;
+};
+
+YawCoverage compute_yaw_coverage(const std::vector<Frame>& frames, const StationConfig& config,
+                                 const Calibration& calibration);
 
 /// Returns the median blur of the used views, once the step is complete. Before that it includes
 /// rejected views, because all views of a blurred lens are rejected.

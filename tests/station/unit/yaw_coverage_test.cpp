@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "station/unit/turn_map.h"
+#include "station/unit/unit_step.h"
 
 #include <gmock/gmock.h>
 
