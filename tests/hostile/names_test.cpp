@@ -22,7 +22,7 @@
 #include "rig/input_error.h"
 #include "station/records/publish_run.h"
 #include "station/records/records.h"
-#include "station/records/run_formats.h"
+#include "station/records/run_record.h"
 #include "station/records/spool.h"
 #include "support/program.h"
 #include "support/random.h"

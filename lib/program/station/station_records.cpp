@@ -23,7 +23,7 @@
 #include "station/records/known_runs.h"
 #include "station/records/publish_run.h"
 #include "station/records/retention.h"
-#include "station/records/run_formats.h"
+#include "station/records/run_record.h"
 #include "station/statistics/control_chart.h"
 #include "station/statistics/run_metrics.h"
 #include "station/unit/station_screen.h"

@@ -31,7 +31,7 @@
 #include "captures/printable.h"
 #include "captures/shared_folder.h"
 #include "rig/input_error.h"
-#include "station/records/run_formats.h"
+#include "station/records/run_record.h"
 
 namespace vlp {
 namespace {

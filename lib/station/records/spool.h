@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "station/records/records.h"
-#include "station/records/run_formats.h"
+#include "station/records/run_record.h"
 
 namespace vlp {
 

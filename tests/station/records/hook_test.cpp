@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "station/records/run_formats.h"
+#include "station/records/run_record.h"
 #include "support/child_process.h"
 #include "support/temporary_folder.h"
 

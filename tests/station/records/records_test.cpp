@@ -13,7 +13,7 @@
 #include <thread>
 
 #include "station/records/record_tables.h"
-#include "station/records/run_formats.h"
+#include "station/records/run_record.h"
 #include "station/sample_records.h"
 #include "station/station_config.h"
 #include "support/child_process.h"
