@@ -41,7 +41,8 @@ cv::Mat read_image(const std::filesystem::path& file,
 bool has_extension(const std::filesystem::path& file,
                    std::initializer_list<std::string_view> extensions);
 
-/// Returns true if the extension is that of an image: PNG, JPEG, BMP, TIFF or PGM.
+/// Returns true if the extension of the file name, in upper or lower case, is that of an image:
+/// PNG, JPEG, BMP, TIFF or PGM. The file is not opened.
 bool is_image_file_name(const std::filesystem::path& file);
 
 /// Lists the images in a folder, sorted by name.

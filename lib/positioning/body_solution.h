@@ -33,7 +33,7 @@ struct BodyProblem {
   }
 };
 
-/// Status of a fix and the fix.
+/// Fix of a body, valid if the status is `ok`.
 struct BodySolution {
   FixStatus status;
   BodyFix fix;

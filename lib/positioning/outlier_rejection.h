@@ -18,7 +18,8 @@
 
 namespace vlp {
 
-/// Observations that agree with a pose.
+/// Result of find_largest_consistent_set(): a pose and the observations that agree with it.
+/// `agreeing` has a bit per observation, by its index; `count` is the number of set bits.
 struct Consensus {
   Pose pose;
   std::bitset<kMaxSightings> agreeing;

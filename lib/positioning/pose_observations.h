@@ -21,10 +21,10 @@ template <typename Observation>
 struct LampObservations {
   std::array<Observation, kMaxSightings> sightings;
   std::array<int, kMaxSightings> ids;
-  /// Horizontal distance from each lamp to the nearest other lamp of the map.
+  /// Horizontal distance from each lamp to the nearest other lamp of the map, m.
   std::array<double, kMaxSightings> nearest_m;
   std::size_t size = 0;
-  /// True if a detector reported every sigma_px.
+  /// True if every detection has a sigma_px.
   bool noise_is_stated = true;
   int unknown_lamps = 0;
   int rejected_lamps = 0;

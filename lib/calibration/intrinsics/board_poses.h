@@ -32,16 +32,19 @@ struct ViewPose {
 std::optional<ViewPose> estimate_board_view_pose(std::span<const BoardLattice::Corner> corners,
                                                  const Lens& lens);
 
-/// Initial poses of all views, estimated with one lens.
+/// Initial poses of the board in all views, estimated with one lens. `poses` are camera_from_board,
+/// in the order of IntrinsicsInput::views.
 struct InitialPoses {
   std::vector<BoardPose> poses;
-  /// RMS residual of each view, px; infinity if it has no pose.
+  /// RMS reprojection residual of each view at its pose, per axis, px, in the order of
+  /// IntrinsicsInput::views. Infinity for a view without a pose.
   std::vector<double> rms_px;
 };
-/// Estimates the poses of all views with a lens.
+/// Estimates camera_from_board of each view with a lens (estimate_board_view_pose()).
 InitialPoses estimate_initial_board_poses(const IntrinsicsInput& input, const Lens& lens);
 
-/// Returns LENSMODEL_STEREOGRAPHIC with its principal point in the middle of the image.
+/// Returns a lens of model STEREOGRAPHIC with this focal length, px, and its principal point in the
+/// middle of the image.
 Lens make_stereographic_lens(const IntrinsicsInput& input, double focal_px);
 
 /// Returns focal lengths of a geometric series, px, in ascending order of the median RMS residual

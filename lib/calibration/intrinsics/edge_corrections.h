@@ -11,22 +11,24 @@
 
 namespace vlp {
 
-/// Replaces the measured edge curvature by the lens's and shifts the corners accordingly, to the
-/// intersections of the edges with the lens's curvature. The curvature of the lens is that of the
-/// projections of straight lines between the corners.
+/// Corrects the corners of tags in one view for the measured curvature of their edges. Replaces the
+/// curvature by that of the lens, which projects straight edges, and moves each corner accordingly.
+///
+/// @param corners  four corners per tag, in the order of BoardLattice::Corner; pixel and bow are
+///     changed
+/// @return         largest displacement of a corner, px; 0 if none is corrected
 ///
 /// The lens determines the curvature of an edge a hundred times more accurately than the edge
 /// itself. A curvature fitted together with the ends makes the ends uncertain. With pixels all
-/// along an edge the middle of a parabola has 9/4 of the variance of a straight line, and the
-/// errors of both ends are correlated. A whole tag is then half as accurate.
+/// along an edge the middle of a parabola has 9/4 of the variance of a straight line. The errors of
+/// both ends are then correlated. The corners of a whole tag are then half as accurate.
 ///
 /// The correction is a linear regression, with the measured curve b(w) and that of the lens l(w):
 ///   end += (straight line fitted to b - l over the pixels) at the end, outwards.
 ///
-/// A whole tag is kept if an edge has no measured curvature (touching squares, files without it),
-/// if the lens does not describe one of its edges, or if a corner would move by a quarter of an
-/// edge or more.
-/// @return largest displacement of a corner, px
+/// A tag is not changed if the curvature of an edge is unknown (touching squares, files without
+/// it). It is not changed if the lens does not describe one of its edges. It is also not changed if
+/// a corner would move by 25 % of an edge or more.
 double correct_corners_for_curved_edges(std::vector<BoardLattice::Corner>& corners,
                                         const Lens& lens);
 

@@ -45,17 +45,18 @@ std::optional<ProjectionDifference> compute_projection_difference(
     const Lens& a, const Lens& b, const std::array<int, 2>& imager_px,
     const std::function<double(const Eigen::Vector2d&)>& sigma_px);
 
-/// Expected compute_projection_difference() between a lens and the true one.
+/// Expected difference between the projections of an estimated lens and the true one
+/// (compute_projection_difference()).
 struct ExpectedDifference {
-  /// Root of the expected mean square over the image, per axis, px.
+  /// Expected RMS distance between the projections of the two lenses over the image, per axis, px.
   double rms_px;
   /// Effective number of independent terms of similar size in the mean square, whose relative
   /// standard deviation is sqrt(2 / degrees_of_freedom).
   double degrees_of_freedom;
 };
 
-/// Computes the expected difference from the covariance of the intrinsics, to first order, with
-/// uniform weights over the image, or over `region` if it is not empty.
+/// Computes the expected difference from the covariance of the intrinsics, to first order. Weights
+/// are uniform over the image, or over `region` if it is not empty.
 ///
 /// The difference is smaller than the projection uncertainty, which includes rotations of the
 /// camera relative to the boards. Aligning two lenses removes such rotations. Infinite if the

@@ -167,14 +167,14 @@ struct SpooledRun {
   std::string records;
 };
 
-/// Serializes a run as `vlp-run/1`: a JSON object with "records", the texts of
-/// list_run_text_fields(), "figures", "images" and "events". Figures with a guard band have
-/// "uncertainty" and "guard_k". Control characters and bytes that are not UTF-8 are escaped
-/// (escape_run_texts()).
+/// Serializes a run as JSON text in format `vlp-run/1`. The object has "records" (identity of its
+/// database), the texts of list_run_text_fields(), "figures" (metrics), "images" and "events".
+/// Figures with a guard band have "uncertainty" and "guard_k". Control characters and bytes that
+/// are not UTF-8 are escaped (escape_run_texts()).
 std::string serialize_run(const SpooledRun& spooled);
 /// Reads a run in the format of serialize_run(). A missing text of list_run_text_fields() is empty,
-/// as in files of older programs. Throws InputError with the file, also if it has no verdict, or if
-/// the name of the run, of its camera or of an event is not a valid Id.
+/// as in files of older programs. Throws InputError with the file. Also throws it for a run without
+/// a verdict, or if the name of run, camera or event is not a valid Id.
 SpooledRun read_spooled_run(const std::filesystem::path& file);
 
 /// Returns a run as a JSON object for the hook: "event" ("verdict", or "voided" for a voided run),

@@ -105,8 +105,9 @@ struct YawCoverage {
     double z_m;
     int captures;
     double arc_rad;
-    /// Cells of the rotation with a capture: `turn_captures` equal cells. The first one is centered
-    /// at the yaw of the first capture.
+    /// Yaw sectors with at least one capture at this height: `turn_captures` sectors of equal size
+    /// over the full rotation, in order of increasing yaw. The first one is centered at the yaw of
+    /// the first capture.
     std::vector<bool> parts;
     /// True if captures and angular range meet the station's criteria.
     bool is_complete = false;
