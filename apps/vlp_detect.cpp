@@ -58,7 +58,7 @@ void run(const CaptureOptions& options, const std::string& captures) {
   fmt::print("images      {}\n  skipped   {}\n  no lamp   {}\n", found.images.size(),
              found.images.size() - frames.size(), empty);
   fmt::print("lamps       {}\n", count(LightKind::lamp));
-  fmt::print("left out    {} cut by the image's edge, {} unknown, {} steady, {} without form\n",
+  fmt::print("no lamps    {} cut by the image border, {} unknown, {} steady, {} without outline\n",
              count(LightKind::cut), count(LightKind::unknown), count(LightKind::steady),
              count(LightKind::formless));
   for (const auto& [kind, reason, lights] : count_light_reasons(found.images)) {

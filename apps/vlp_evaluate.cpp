@@ -49,7 +49,7 @@ struct Options {
   std::vector<double> line_m;  // X0 Y0 X1 Y1
   std::vector<std::string> gates;
   double noise_px = 0;
-  std::optional<double> station_mm;
+  std::optional<double> same_point_mm;
   int threads = count_cpu_cores();
   ReportOption report;
 };
@@ -123,7 +123,7 @@ void check_options(const Options& options, const std::vector<Gate>& gates) {
 }
 
 double station_m(const Options& options) {
-  if (options.station_mm) return 1e-3 * *options.station_mm;
+  if (options.same_point_mm) return 1e-3 * *options.same_point_mm;
   return compute_same_position_radius_m(
       options.calibration.empty() ? Calibration{} : read_calibration(options.calibration));
 }
@@ -174,6 +174,7 @@ std::string render_report(const CLI::App& app, const Options& options, const Eva
 std::string make_proposed_gates(const EvaluationInput& input, const Evaluation& evaluation) {
   const std::vector<Gate> gates = propose_gates_from_evaluation(input, evaluation);
   if (gates.empty()) {
+    // [GATE-2] `to propose gates`
     throw Undetermined(
         fmt::format("--propose-gates: too few reference points or captures to propose gates; at "
                     "least {} are needed, add captures",
@@ -190,6 +191,7 @@ std::vector<JUnitTest> make_evaluation_tests(const EvaluateResult& found) {
   if (!comparison || !comparison->has_too_few_clusters()) return tests;
   for (JUnitTest& test : tests) {
     if (test.name != "worse_mm") continue;
+    // [GATE-2] `a change from chance`
     test.warnings.emplace_back(
         "too few reference points or captures to distinguish a change from chance");
   }
@@ -278,13 +280,13 @@ void add_options(CLI::App& app, Options& options) {
       ->expected(4)
       ->check(make_finite_validator())
       ->option_text("X0_M Y0_M X1_M Y1_M");
-  app.add_option("--station-mm", options.station_mm,
-                 "Maximum distance between true positions of one reference point (station), in mm "
+  app.add_option("--same-point-mm", options.same_point_mm,
+                 "Maximum distance between true positions of one reference point, in mm "
                  "(default: 1 plus twice the lever arm of --calibration)")
       ->check(make_finite_positive_validator());
   app.add_option("--compare", options.compare,
-                 "Other fixes of the same captures, fixes.csv. Reports better, worse, the same "
-                 "(within 1 um or 1 % of their mean error, whichever is larger) or no evidence");
+                 "Other fixes of the same captures, fixes.csv. Reports better, worse, equivalent "
+                 "(within 1 um or 1 % of their mean error, whichever is larger) or inconclusive");
   app.add_option("--gate", options.gates,
                  "Limit of a metric. Repeat, or separate by commas, for several")
       ->delimiter(',')
@@ -304,7 +306,7 @@ void add_options(CLI::App& app, Options& options) {
   add_room_option(app, options.room);
   auto* calibration = app.add_option("--calibration", options.calibration,
                                      "Calibration of the camera, for the report, for the CRLB (of "
-                                     "a level camera), and for the lever arm in --station-mm");
+                                     "a level camera), and for the lever arm in --same-point-mm");
   auto* noise = app.add_option("--noise-px", options.noise_px,
                                "Standard deviation of lamp positions in the image, per axis, in "
                                "px. Computes the CRLB")

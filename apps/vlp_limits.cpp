@@ -65,6 +65,8 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
     unstated.append(unstated.empty() ? "" : ", ").append(names[i]);
   }
   if (!unstated.empty()) {
+    // [GATE-4] `count as zero` | calibration without covariances, map without `sd_m`: order of
+    //   `vlp-limits --from-calibration` may be wrong | state them
     spdlog::warn("{}: the uncertainties are missing and count as zero", unstated);
   }
   if (const int elsewhere = unit.common().lamps_elsewhere(); elsewhere > 0) {

@@ -53,7 +53,7 @@ void run(const Options& options) {
                               : simulate(scene, options.output, how, show);
   }
   for (const std::string& warning : summary.warnings) spdlog::warn("{}", warning);
-  fmt::print("rendered {} {}, {} were there; in {}\n", summary.rendered, what, summary.found,
+  fmt::print("rendered {} {}, {} existed; in {}\n", summary.rendered, what, summary.found,
              options.output);
 }
 

@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Sets up, builds, renders images of a camera in a room like that of Chen and Guan, calibrates the
+# Installs packages, builds, renders images of a camera in a room like that of Chen and Guan, calibrates the
 # camera from them, computes its position in 432 other images, and prints the errors of the fixes.
 # Results are in out/demo; existing ones are not computed again.
 set -euo pipefail
@@ -13,7 +13,7 @@ mkdir -p out/demo
 : >out/demo/build.log
 echo "Building (some minutes the first time; the log is out/demo/build.log) ..."
 tests=()
-[ -e build/CMakeCache.txt ] || tests=(-DBUILD_TESTING=OFF)  # their packages are not there
+[ -e build/CMakeCache.txt ] || tests=(-DBUILD_TESTING=OFF)  # the packages of the tests may be missing
 if ! { cmake --preset release -DVLP_TOOLBOX=ON "${tests[@]}" &&
        cmake --build --preset release --target vlp_programs; } >out/demo/build.log 2>&1
 then

@@ -7,8 +7,8 @@
 
 Each mutant changes one operator, constant, sign, statement or pair of arguments. It is compiled to an object of its own
 and linked before the folder's library; neither the sources nor the build folder change. Mutants that do not compile are
-drawn again. A mutant is detected if a test of tests/FOLDER fails or crashes, or if the tests take three times the
-processor time; the slow tests run only if the others pass, with --quick never. Prints each survivor as FILE:LINE with
+replaced by others. A mutant is detected if a test of tests/FOLDER fails or crashes, or if the tests take three times
+the processor time; the slow tests run only if the others pass, with --quick never. Prints each survivor as FILE:LINE with
 both lines, then the score. Exit code 0; 1 if the tests are missing or fail without a mutant; 2 for bad usage.
 
 Changes that rarely have an effect are not made:
@@ -46,18 +46,18 @@ ARGUMENTS = re.compile(r"\b[a-z]\w*\(([\w.]+), ([\w.]+)\)")
 MINUS = re.compile(r"(?<=[(=,] )-(?=[a-z(])|(?<=\()-(?=[a-z(])|(?<=return )-(?=[a-z(])")
 # Lines that compare integers: only these get < for <=.
 COUNTS = re.compile(r"\+\+|size|count|rows\(\)|cols\(\)|\bnum_|\bn\b|\b(?:width|height)\b|static_cast<(?:int|std::)")
-# Constants of which one more makes no difference.
+# Constants that may increase by one without effect.
 LATITUDE = re.compile(r"\bmax_(?:iterations|halvings|steps|rounds)\b|std::array<[^<>;]*$")
 CONDITION = re.compile(r"\bif \((?=[^;{}]*\))")
 
 
 def is_boundary(old, new):
-    """Whether the change only concerns equal values: < for <=, >= for > and the like."""
+    """Returns true if the change only affects equal values: < for <=, >= for > and the like."""
     return old.strip().rstrip("=") == new.strip().rstrip("=") and old.strip()[0] in "<>"
 
 
 def find_mutations(text):
-    """(begin, end, replacement) of each place outside comments, text and preprocessor lines."""
+    """Returns (begin, end, replacement) for each change outside comments, literals and preprocessor lines."""
     masked = SKIPPED.sub(lambda m: re.sub(r"[^\n]", "\0", m[0]), text)
     found = []
     for old, news in OPERATORS.items():
@@ -90,7 +90,7 @@ def find_mutations(text):
     return found
 
 
-MEMORY_KIB = 4 << 20  # a mutant that fills a vector without end crashes there
+MEMORY_KIB = 4 << 20  # limit for mutants that allocate without end
 
 
 class Folder:
@@ -115,7 +115,7 @@ class Folder:
         self.quick = quick
 
     def run(self, program, pattern, limit_s):
-        """Whether the tests pass within a limit of processor time."""
+        """Returns true if the tests pass within a limit of processor time."""
         limits = f"ulimit -v {MEMORY_KIB}; ulimit -t {limit_s}"
         with tempfile.TemporaryDirectory() as scratch:
             try:
@@ -131,7 +131,7 @@ class Folder:
                 and (self.quick or not self.slow or self.run(program, self.slow, limits_s[1])))
 
     def measure(self):
-        """Limits of the quick and of the slow tests in seconds; exits if one fails."""
+        """Returns the time limits of the quick and of the slow tests in seconds. Exits if a test fails."""
         limits = []
         for pattern in ("-" + self.slow, "-*" if self.quick else self.slow or "-*"):
             before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -143,7 +143,7 @@ class Folder:
         return limits
 
     def judge(self, file, text, limits_s):
-        """None if the text does not compile; else whether the tests pass."""
+        """Returns whether the tests pass; None if the text does not compile."""
         with tempfile.TemporaryDirectory() as scratch:
             source, mutant = pathlib.Path(scratch, file.name), pathlib.Path(scratch, "mutant.o")
             source.write_text(text)

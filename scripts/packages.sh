@@ -2,12 +2,12 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Builds the Debian packages vlp-tools, libvlp-positioning0 and libvlp-positioning-dev, and python3-vlp where
-# pybind11 is there, for the release of Debian that it runs on.
+# Builds the Debian packages vlp-tools, libvlp-positioning0 and libvlp-positioning-dev, and, if pybind11 is
+# installed, python3-vlp, for the Debian release on which it runs.
 #
 #   scripts/packages.sh [-o FOLDER] [COMPONENT...]
 #
-#   -o FOLDER   where to write them (default: build/packages of the project)
+#   -o FOLDER   output folder (default: build/packages of the project)
 #   COMPONENT   positioning, development, tools or python (default: all)
 set -euo pipefail
 project=$(cd "$(dirname "$0")/.." && pwd)
@@ -19,7 +19,7 @@ refuse() {
 }
 while [[ ${1:-} == -* ]]; do
   case $1 in
-    -o) [ $# -gt 1 ] || refuse "-o wants a folder"
+    -o) [ $# -gt 1 ] || refuse "-o needs a folder"
         folder=$(realpath -m "$2"); shift 2 ;;
     -h | --help) sed -n '5,/^set/p' "$0" | sed '$d; s/^# \{0,1\}//'; exit ;;
     *) refuse "unknown option $1" ;;
@@ -27,8 +27,8 @@ while [[ ${1:-} == -* ]]; do
 done
 cd "$project"
 
-# Folders of libraries and zsh completions on Debian; nothing is recompiled. The build is left as
-# it was: cmake --install goes where it went before.
+# Folders of libraries and zsh completions on Debian; nothing is recompiled. The previous settings of the build are
+# restored at the end.
 before=()
 for name in CMAKE_INSTALL_PREFIX CMAKE_INSTALL_LIBDIR; do
   value=$(sed -n "s/^$name:[A-Z]*=//p" build/CMakeCache.txt 2>/dev/null || true)

@@ -56,11 +56,11 @@
 set -euo pipefail
 scripts=$(cd "$(dirname "$0")" && pwd)/reprocess
 bin=${VLP_PROGRAMS_DIR:-}
-if [ -z "$bin" ]; then  # those of the build that this belongs to, or else those that are installed
+if [ -z "$bin" ]; then  # programs of the build of this source tree, or else the installed ones
   bin=$(cd "$scripts/../.." && pwd)/build/bin
   [ -x "$bin/vlp-calibrate" ] || bin=$(dirname "$(command -v vlp-calibrate || echo "$bin/vlp-calibrate")")
 fi
-python=${VLP_PYTHON:-/usr/bin/python3}  # the one that Debian's snakemake is for; that of an environment
+python=${VLP_PYTHON:-/usr/bin/python3}  # default: the interpreter of Debian's snakemake
 
 refuse() {
   echo "reprocess.sh: error: $1" >&2
@@ -76,7 +76,7 @@ cores=$(($(nproc) + 1))
 while [ $# -gt 0 ]; do
   case $1 in
     --gates | --session-gates | --previous | --shard-size | --keep | --scan | --cores | --profile | --row-time-s | --readout)
-      [ $# -gt 1 ] || usage "$1 wants a value"
+      [ $# -gt 1 ] || usage "$1 needs a value"
       case $1 in
         --cores | --shard-size) [[ $2 =~ ^[1-9][0-9]*$ ]] || usage "$1: should be a number from 1" ;;
         --keep) [[ $2 =~ ^[0-9]+$ ]] || usage "$1: should be a number" ;;
@@ -90,7 +90,7 @@ while [ $# -gt 0 ]; do
     --cores) cores=$2; shift ;;
     --profile)
       if [ -d "$scripts/profiles/$2" ]; then profile=$scripts/profiles/$2; else profile=$2; fi
-      [ -e "$profile/config.yaml" ] || usage "--profile $2: neither of ours nor a folder with config.yaml"
+      [ -e "$profile/config.yaml" ] || usage "--profile $2: no such profile, nor a folder with config.yaml"
       shift ;;
     -h | --help) sed -n '5,/^set/p' "$0" | sed '$d; s/^# \{0,1\}//'; exit ;;
     --look | --look=*) usage "option '--look' is now called '--scan'" ;;
@@ -118,8 +118,8 @@ case $(realpath -m "$results")/ in
   "$(realpath -m "${folders[0]}")"/*) usage "$results: is in the archive, which must not be modified" ;;
 esac
 [ -d "${folders[0]}" ] || usage "${folders[0]}: is not a folder"
-# A .state that something else made is never written into or deleted: ours says so in "owner" and, once planned, in
-# run.json. A run that was killed at its very start leaves it empty, or with the lock alone.
+# A .state of another program is never changed or deleted: that of this script has the file "owner" and, after planning,
+# run.json. A run that was killed at its start leaves it empty, or only with the lock.
 state=$results/.state made=''
 for file in "$state/lock" "$state/owner"; do
   [ ! -L "$file" ] || refuse "$file: is a symbolic link, which is not followed: remove it"
@@ -131,11 +131,12 @@ case $(ls -A "$state" 2>/dev/null) in
       refuse "$results: contains a .state that is not of reprocess.sh; give the results a folder of their own"
     ;;
 esac
+# [FILE-1]
 mkdir -p "$state" 2>/dev/null && : 2>/dev/null >>"$state/lock" ||
   refuse "$results: cannot be written to"
 exec 9>>"$state/lock"
 flock --nonblock 9 || refuse "$results: another run is at work there"
-# noclobber (-C): a link that came meanwhile is not followed.
+# noclobber (-C) does not follow a link that was created in the meantime.
 [ -e "$state/owner" ] || (set -C; echo 'scripts/reprocess.sh' >"$state/owner") 2>/dev/null ||
   refuse "$results: cannot be written to"
 code=0
@@ -148,19 +149,20 @@ fi
 log=$results/.state/reprocess.log
 mapfile -t again <"$results/.state/again.txt"
 [ ${#again[@]} = 0 ] || how+=(--forcerun "${again[@]}")
-# A run that was killed leaves Snakemake's own lock, which the one above stands for: Snakemake holds it to
-# its end, should this shell end before, and its jobs do not.
+# --nolock: a killed run would leave the lock of Snakemake. The lock above replaces it: Snakemake inherits it and
+# holds it until it ends, even if this shell ends earlier; its jobs do not.
 "$python" -m snakemake --snakefile "$scripts/Snakefile" --directory "$results" --nolock \
   --rerun-incomplete --rerun-triggers mtime --keep-going --scheduler greedy "${how[@]}" \
   >"$log" 2>&1 &
 run=$!
-# Snakemake would finish its shards first: what it has started on this machine is ended with it.
+# Snakemake would finish its shards first: its child processes on this machine are terminated, too.
 stop() {
   trap '' HUP INT TERM
   local started=("$run") level=$run
   while level=$(pgrep --parent "$level" | paste -sd,) && [ -n "$level" ]; do started+=(${level//,/ }); done
   kill -TERM "${started[@]}" 2>/dev/null || true
   wait "$run" || true
+  # [ARCHIVE-3] `interrupted;`
   echo "reprocess.sh: error: interrupted; the same command continues" >&2
   exit 3
 }
@@ -171,10 +173,11 @@ trap - HUP INT TERM
 if [ "$code" != 0 ]; then
   mapfile -t failed < <(grep -A 12 '^Error in rule' "$log" | sed -n 's/^ *log: \([^ ]*\).*/\1/p' | sort -u | head -n 5)
   [ ${#failed[@]} -gt 0 ] || tail -n 20 "$log" >&2
-  for said in "${failed[@]}"; do
-    words=$(tail -n 1 "$results/$said")
-    echo "$results/$said: ${words:-is empty; is the disk full?}" >&2
+  for file in "${failed[@]}"; do
+    last_line=$(tail -n 1 "$results/$file")
+    echo "$results/$file: ${last_line:-is empty; is the disk full?}" >&2
   done
+  # [ARCHIVE-3] `not all could` | job ended early: disk, memory, or SIGTERM, SIGINT, SIGHUP | same command continues
   echo "reprocess.sh: error: not all could be processed; see $log; the same command continues" >&2
   exit 3
 fi

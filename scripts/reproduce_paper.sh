@@ -2,18 +2,18 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# The table of Chen and Guan, "High Accuracy VLP based on Image Sensor using Error Calibration
-# Method", on rendered images of a rig like theirs, with their numbers beside ours: horizontal errors
-# of 432 stationary fixes without calibration, with the rotation center, and with the dispersion on
-# top of it; by the paper's own methods, and by the exact ones. The lens is taken as known. A fix is of
-# the first two, or three, of the lamps in its image, or of all; the last row is of a lamp map that is
-# refined from the rotation captures. Below the table one line for each difference gives its
-# cause, with values of this run.
+# Reproduces the table of Chen and Guan, "High Accuracy VLP based on Image Sensor using Error Calibration
+# Method", with rendered images of a similar rig. Prints their results and ours: horizontal errors of
+# 432 stationary fixes without calibration, with the rotation center, and with rotation center and
+# dispersion, for the methods of the paper and for the exact ones. The lens is treated as known. Fixes use
+# the first two or three lamps of an image, or all. The last row uses a lamp map that is refined from the
+# rotation captures. Below the table one line states the cause of each difference, with values of this
+# run.
 #
 #   scripts/reproduce_paper.sh [SCENE [OUT]]     default: datasets/paper-rig-faulty out/reproduce-SCENE
 #
-# Build first (scripts/test.sh); the programs are those in VLP_PROGRAMS_DIR, by default build/bin. Images
-# that are in OUT are used again. Exit code 1 when a capture has no fix.
+# Build first (scripts/test.sh); the programs are those in VLP_PROGRAMS_DIR, by default build/bin. Existing
+# images in OUT are reused. Exit code 1 if a capture has no fix.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -41,8 +41,8 @@ vlp simulate "$scene/scene.yaml" --only "$(IFS=,; echo "${folders[*]}")" -o "$ou
 # Extracts the camera from the true calibration.
 awk '/^[a-z]/ { part = $1 } part != "rotation_center:"' "$out/true_calibration.yaml" \
   >"$out/camera.yaml"
-# Centers as far off as those of bounding boxes, 1.7 px rms: normal noise of 1.2 px per axis.
-blurred() {  # DETECTIONS
+# Adds the errors of bounding-box centers, 1.7 px rms: normal noise of 1.2 px per axis.
+noisy() {  # DETECTIONS
   awk -F, -v OFS=, 'function uniform() {
                       state = (state * 16807) % 2147483647
                       return state / 2147483647
@@ -58,16 +58,16 @@ blurred() {  # DETECTIONS
 for folder in "${folders[@]}"; do
   vlp detect "$out/$folder" --lamps "$out/lamps.yaml" --calibration "$out/camera.yaml" \
     -o "$out/$folder.csv"
-  blurred "$out/$folder.csv" >"$out/$folder-blurred.csv"
+  noisy "$out/$folder.csv" >"$out/$folder-noisy.csv"
   for lamps in 2 3; do
-    for kind in "" -blurred; do
+    for kind in "" -noisy; do
       awk -F, -v lamps=$lamps 'NR == 1 || seen[$1]++ < lamps' "$out/$folder$kind.csv" \
         >"$out/$folder$kind-$lamps.csv"
     done
   done
 done
 
-# Mean error, that which 90 % stay below, and the largest, in mm.
+# Prints mean, 90 % quantile and maximum of the errors in mm.
 errors_of() {  # FIXES
   awk -F, 'FNR == 1 { for (i = 1; i <= NF; ++i) column[$i] = i; next }
            NR == FNR { x[$1] = $2; y[$1] = $3; ++captures; next }
@@ -90,10 +90,10 @@ locate() {  # DETECTIONS CALIBRATION CORRECTION [LAMPS]
   errors_of "$out/fixes.csv"
 }
 
-# Every capture has to have a fix, before all else.
+# Fails early if a capture has no fix.
 locate "$out/check.csv" "$out/camera.yaml" none >/dev/null
 
-# Rotation center and dispersion by some methods, to $out/$1.yaml.
+# Calibrates rotation center and dispersion with the given methods; writes $out/$1.yaml.
 calibrate() {  # NAME LAMPS ROTATION-METHOD DISPERSION-METHOD DISPERSION-CAPTURES [KIND]
   vlp rotation "$out/rotation${6:-}.csv" --lamps "$out/lamps.yaml" \
     --calibration "$out/camera.yaml" --method "$3" -o "$out/$1-rotated.yaml"
@@ -107,7 +107,7 @@ row() {  # LABEL NONE ROTATION DISPERSION
 mean_of() {  # ERRORS
   awk '{ print $1 }' <<<"$1"
 }
-# A row of the table; the means go to none, rotation and dispersion.
+# Prints a row of the table and sets none, rotation and dispersion to the means.
 measured() {  # LABEL NAME CHECK
   none=$(locate "$out/check$3.csv" "$out/camera.yaml" none)
   rotation=$(locate "$out/check$3.csv" "$out/$2.yaml" rotation)
@@ -119,7 +119,7 @@ measured() {  # LABEL NAME CHECK
 for lamps in 2 3; do
   calibrate paper-$lamps -$lamps circle chen-guan dispersion-one-yaw
   calibrate exact-$lamps -$lamps axis camera dispersion
-  calibrate blurred-$lamps -$lamps circle chen-guan dispersion-one-yaw -blurred
+  calibrate noisy-$lamps -$lamps circle chen-guan dispersion-one-yaw -noisy
 done
 calibrate exact "" axis camera dispersion
 vlp rotation "$out/rotation.csv" --method lamps --lamps "$out/lamps.yaml" \
@@ -142,11 +142,11 @@ measured "all lamps    exact methods" exact ""
 exact_all=$dispersion
 refined=$(locate "$out/check" "$out/leveled.yaml" rotation "$out/refined-lamps.yaml")
 row "             refined map" "" "$refined" "-"
-blurred_2=$(mean_of "$(locate "$out/check-blurred-2.csv" "$out/blurred-2.yaml" all)")
-blurred_3=$(mean_of "$(locate "$out/check-blurred-3.csv" "$out/blurred-3.yaml" all)")
+noisy_2=$(mean_of "$(locate "$out/check-noisy-2.csv" "$out/noisy-2.yaml" all)")
+noisy_3=$(mean_of "$(locate "$out/check-noisy-3.csv" "$out/noisy-3.yaml" all)")
 true_map=$(mean_of "$(locate "$out/check.csv" "$out/exact.yaml" all "$out/true_lamps.yaml")")
 
-# Numbers of a list in a calibration, with spaces between them.
+# Prints the numbers of a list in a calibration, separated by spaces.
 numbers() {  # FILE KEY
   awk -v key="$2:" '$1 == key { gsub(/[][,]/, " "); $1 = ""; print; exit }' "$1"
 }
@@ -164,25 +164,26 @@ awk -v height="$(awk -v a="$lamps_height" -v b="$height" 'BEGIN { print a - b }'
   -v none="$none_2 and $none_3" -v rotation="$rotation_2 and $rotation_3" \
   -v turned="$turned_2 and $turned_3" \
   -v dispersion="$dispersion_2 and $dispersion_3" -v exact="$exact_2, $exact_3 and $exact_all" \
-  -v blurred="$blurred_2 and $blurred_3" -v true_map="$true_map" '
+  -v noisy="$noisy_2 and $noisy_3" -v true_map="$true_map" '
   function length_of(x, y) { return sqrt(x * x + y * y) }
   BEGIN {
     degrees = 57.29577951
-    lean = atan2(length_of(u - cu, v - cv), focal)
+    tilt = atan2(length_of(u - cu, v - cv), focal)
     off = length_of(circle_u - u, circle_v - v)
     print "\nCauses of the differences from the paper, two and three lamps; mm"
     printf "none        ours %s, theirs 19.9 and 21.4: our camera is tilted by %.2f degrees, which is " \
            "%.1f\n            at %.2f m under the lamps; theirs would be a tilt of %.2f degrees.\n",
-           none, lean * degrees, 1e3 * height * lean, height, atan2(0.0199, height) * degrees
-    printf "rotation    ours %s, theirs 15.4 and 10.8: the center of our circles is %.2f px off, " \
-           "%.1f\n            at that height, since the camera sits %.1f beside its axis of rotation " \
-           "and what it sees\n            of a turn are ellipses. The exact method knows both: " \
-           "%s.\n", rotation, off, 1e3 * height * off / focal,
+           none, tilt * degrees, 1e3 * height * tilt, height, atan2(0.0199, height) * degrees
+    printf "rotation    ours %s, theirs 15.4 and 10.8: the center of our circles has an error of " \
+           "%.2f px, %.1f\n            at that height, because the camera is %.1f from its axis of " \
+           "rotation and the lamps\n            move on ellipses. The exact method models both: %s.\n",
+           rotation, off, 1e3 * height * off / focal,
            1e3 * length_of(arm_x, arm_y), turned
-    printf "dispersion  ours %s, theirs 8.2 and 8.8: we find lamps by their outlines. With centers " \
-           "as far\n            off as those of bounding boxes, 1.7 px rms, it is %s. A shift is right " \
-           "at the\n            place, height and yaw of the station alone; the exact methods leave " \
-           "%s of\n            two, three and all lamps.\n", dispersion, blurred, exact
-    printf "exact       what they leave is the lamp map: with the true one all lamps leave %s.\n",
+    printf "dispersion  ours %s, theirs 8.2 and 8.8: we detect lamps by their outlines. With the " \
+           "errors\n            of bounding-box centers, 1.7 px rms, it is %s. An offset is correct " \
+           "only at\n            the position, height and yaw of the reference point; the errors of the " \
+           "exact\n            methods are %s for two, three and all lamps.\n", dispersion, noisy, exact
+    printf "exact       the remaining error is that of the lamp map: with the true map and all lamps it " \
+           "is %s.\n",
            true_map
   }'

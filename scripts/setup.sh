@@ -2,13 +2,13 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Installs the Debian packages that the toolbox needs. As root or through sudo; again and again;
-# silent when nothing is missing.
+# Installs the Debian packages that the toolbox needs, as root or through sudo. Prints nothing if no
+# package is missing.
 #
 #   scripts/setup.sh --build    to build the programs and run them
-#   scripts/setup.sh [--tests]  also what the tests, the benchmarks and the checks of the code need
-#   scripts/setup.sh --batch    also what scripts/reprocess.sh and its tests need
-#   scripts/setup.sh --root     only what tests/bare_root.sh needs
+#   scripts/setup.sh [--tests]  also for tests, benchmarks and code checks
+#   scripts/setup.sh --batch    also for scripts/reprocess.sh and its tests
+#   scripts/setup.sh --root     only for tests/bare_root.sh
 set -euo pipefail
 
 build=(
@@ -27,11 +27,11 @@ tests=(
   libgtest-dev libgmock-dev libbenchmark-dev mrcal python3-mrcal poppler-utils unzip
   postgresql postgresql-client tmux util-linux  # of the station
   pybind11-dev python3-dev python3-numpy python3-pil  # of the Python module
-  chromium-headless-shell python3  # the report is opened in a browser
+  chromium-headless-shell python3  # to open the report in a browser
   lintian  # of tests/packages.sh
-  groff zsh  # manual pages and completions are checked by them
-  abigail-tools  # the library's ABI is
-  python3-jsonschema  # documents of JSON are held against datasets/schemas
+  groff zsh  # to check manual pages and completions
+  abigail-tools  # to check the ABI of the library
+  python3-jsonschema  # to validate JSON documents against datasets/schemas
   python3-yaml  # tests/ci/run_action.py
 )
 root=(debootstrap)
@@ -42,7 +42,7 @@ case ${1:---tests} in
   --tests) packages=("${build[@]}" "${tests[@]}" "${root[@]}") ;;
   --batch) packages=("${build[@]}" "${tests[@]}" "${root[@]}" "${batch[@]}") ;;
   --root) packages=("${root[@]}") ;;
-  *) echo "setup.sh: unknown option $1; there are --build, --tests, --batch and --root" >&2; exit 2 ;;
+  *) echo "setup.sh: unknown option $1; use --build, --tests, --batch and --root" >&2; exit 2 ;;
 esac
 
 missing=()

@@ -6,11 +6,11 @@
 #
 #   scripts/test.sh                      sets up, builds and runs every test
 #   scripts/test.sh FOLDER...            builds and runs the tests of these folders of tests/
-#   scripts/test.sh --quick [FOLDER...]  leaves out slow tests; without folders: the tests of lib/ alone
+#   scripts/test.sh --quick [FOLDER...]  skips slow tests; without folders: only the tests of lib/
 #
 # FOLDER is, for example, positioning. With --quick or folders, the variable PRESET chooses a preset
-# (dev: a changed file is compiled alone). In CI (the variable CI is set) warnings are errors, and a
-# process runs a share of a folder's tests.
+# (dev: compiles each file separately). In CI (the variable CI is set) warnings are errors, and a
+# process runs a part of the tests of a folder.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -25,7 +25,7 @@ for argument; do
     --quick) quick=yes ;;
     *)
       if [ ! -f "tests/$argument/CMakeLists.txt" ]; then
-        echo "test.sh: tests/$argument is no folder of tests; there are:" tests/*/CMakeLists.txt |
+        echo "test.sh: tests/$argument is not a folder of tests; choose one of:" tests/*/CMakeLists.txt |
           sed 's#tests/\([a-z]*\)/CMakeLists.txt#\1#g' >&2
         exit 2
       fi
@@ -40,7 +40,7 @@ configure() { cmake --preset "$preset" -DVLP_TOOLBOX=ON -DBUILD_TESTING=ON "$@";
 run_tests() {
   local code=0
   ctest --test-dir "$1" --output-on-failure --no-tests=error \
-    --parallel $(($(nproc) + 1)) "${@:2}" || code=$?  # some tests wait for others
+    --parallel $(($(nproc) + 1)) "${@:2}" || code=$?  # some tests wait for other processes
   grep --no-filename --after-context=1 ': Skipped$' "$1/Testing/Temporary/LastTest.log" || true
   return "$code"
 }
@@ -57,7 +57,7 @@ fi
 preset=${PRESET:-release}
 build=build
 [ "$preset" = release ] || build=build-$preset
-# A process for each test, so that slow ones can be left out; Ninja configures again when that is due.
+# Each test runs in its own process, so that slow ones can be skipped. Ninja configures again if required.
 if ! grep -qs '^VLP_TESTS_IN_SHARDS:BOOL=OFF' "$build/CMakeCache.txt" || [ ! -f "$build/tests/CTestTestfile.cmake" ]; then
   configure -DVLP_TESTS_IN_SHARDS=OFF
 fi

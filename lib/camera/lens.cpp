@@ -274,6 +274,8 @@ Lens::Lens(LensModel model, std::span<const double> parameters) : model_(model) 
                                 std::to_string(parameters.size()));
   }
   if (!std::all_of(parameters.begin(), parameters.end(), finite)) {
+    // [FILE-5] `not finite`, `is not positive` | calibration edited, damaged or of another program
+    //   | calibrate again
     throw std::invalid_argument("a lens parameter is not finite");
   }
   if (parameters[0] <= 0 || parameters[1] <= 0) {

@@ -65,6 +65,8 @@ struct CsvParsing {
   void row() {
     if (!in_header) table.lines_.push_back(row_line);
     if (row_fields != table.header_.size() && !error) {
+      // [FILE-4] `cut short` | file written incompletely or edited; decimal comma in a table |
+      //   write or copy it again
       error = InputError(table.file_, row_line, "",
                          "has " + std::to_string(row_fields) + " fields, the header has " +
                              std::to_string(table.header_.size()) + ": is the row cut short?");
@@ -144,6 +146,7 @@ double CsvTable::get_number(std::size_t row, Column column) const {
 double CsvTable::get_coordinate_m(std::size_t row, Column column) const {
   const double value_m = get_number(row, column);
   if (std::abs(value_m) > kMaxCoordinate_m) {
+    // [FILE-3] `within 1,000 km, in meters`
     throw make_error(
         row, column,
         "should be within 1,000 km, in meters, not '" + std::string(get_text(row, column)) + "'");

@@ -21,6 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kFolderFlags = O_RDONLY | O_DIRECTORY | O_CLOEXEC;
+// [STATION-13] `is not followed` | link, pipe or device in `captures`, `results`, `spool` or
+//   `.state`, where others can write; folders of `station.yaml` and `-o` may be links | remove it
 constexpr const char* kLink =
     "is a symbolic link, which is not followed in a folder that others can write to: remove it if "
     "it is not yours, otherwise use a bind mount";
@@ -113,6 +115,7 @@ int SharedFolder::open(const std::string& name, int flags) const {
     const int reason = errno;
     const auto there = read_status(descriptor_, name);
     if (there && S_ISLNK(there->st_mode)) throw InputError(path, kLink);
+    // [STATION-13] `no regular file`
     if (there && S_ISFIFO(there->st_mode)) throw InputError(path, "is no regular file");
     errno = reason;
     return -1;
@@ -146,6 +149,7 @@ bool SharedFolder::rename_file(const std::string& from, const std::string& to) c
   checked_entry_path(to);
   if (::renameat(descriptor_, from.c_str(), descriptor_, to.c_str()) == 0) return true;
   if (errno == ENOENT) return false;
+  // [FILE-1] `cannot be renamed`, `cannot be removed`
   fail(path, "cannot be renamed");
 }
 
@@ -190,6 +194,7 @@ void check_json_size_and_depth(std::string_view text) {
     if (c == '[' || c == '{') ++levels;
     if ((c == ']' || c == '}') && levels > 0) --levels;
     if (c == '[' || c == '{' || c == ',') ++values;
+    // [STATION-12] `it has more than`
     if (levels > max_levels) throw std::runtime_error("it has more than 16 levels");
     if (values > max_values) throw std::runtime_error("it has more than a million values");
   }

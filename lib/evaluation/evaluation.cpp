@@ -68,7 +68,7 @@ Evaluation evaluate(const EvaluationInput& input) {
   evaluation.resampling_unit = "runs of fixes";
   if (input.truth) {
     evaluation.stations = compute_bias_and_repeatability(errors, input.truth->rows);
-    evaluation.resampling_unit = evaluation.stations ? "stations" : "captures";
+    evaluation.resampling_unit = evaluation.stations ? "reference points" : "captures";
     evaluation.normalized_errors = compute_normalized_errors(input.fixes.rows, errors);
   }
   if (input.truth && input.limit) {

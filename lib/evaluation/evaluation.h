@@ -56,7 +56,7 @@ struct Evaluation {
   ErrorStatistics horizontal_m{};
   std::vector<std::pair<double, double>> distribution_m;
   std::optional<ErrorIntervals> intervals_m;
-  /// Resampling unit of the intervals: "stations", "captures" or "runs of fixes".
+  /// Resampling unit of the intervals: "reference points", "captures" or "runs of fixes".
   std::string resampling_unit;
   std::optional<SignedErrorStatistics> height_m, yaw_rad;
   /// Only with a ground truth, if reference points have two fixes or more.

@@ -45,7 +45,7 @@ Json to_json(const Interval& interval_m) {
 Json to_json(const std::vector<std::pair<double, double>>& distribution_m) {
   Json points = Json::array();
   for (const auto& [fraction, error_m] : distribution_m) {
-    points.push_back({{"share", fraction}, {"error_mm", kMmKeys.factor * error_m}});
+    points.push_back({{"fraction", fraction}, {"error_mm", kMmKeys.factor * error_m}});
   }
   return points;
 }
@@ -60,7 +60,7 @@ Json to_json(const BiasAndRepeatability& statistics) {
                     {"bias_y_mm", kMmKeys.factor * station.bias_m.y()},
                     {"sd_mm", kMmKeys.factor * station.sd_m}});
   }
-  return {{"stations", statistics.stations.size()},
+  return {{"reference_points", statistics.stations.size()},
           {"fixes", statistics.fixes},
           {"bias_mm", kMmKeys.factor * statistics.bias_m},
           {"repeatability_mm", kMmKeys.factor * statistics.scatter_m},
@@ -93,8 +93,8 @@ Json to_json(const Comparison& comparison) {
   Json json{{"verdict", comparison.comparison_verdict()},
             {"pairs", comparison.pairs},
             {"clusters", comparison.clusters},
-            {"only_these", comparison.only_these},
-            {"only_others", comparison.only_others},
+            {"only_in_fixes", comparison.only_these},
+            {"only_in_compared", comparison.only_others},
             {"smaller_errors", comparison.smaller},
             {"larger_errors", comparison.larger}};
   if (comparison.pairs > 0) {
@@ -124,15 +124,15 @@ bool is_gate_failed(const CheckedMetric& gate) { return !gate.has_passed(); }
 }  // namespace
 
 std::string to_json(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates) {
-  Json json{{"format", "vlp-evaluation/2"},
-            {"against", evaluation.reference},
+  Json json{{"format", "vlp-evaluation/3"},
+            {"reference", evaluation.reference},
             {"captures", evaluation.captures},
             {"fixes", evaluation.fixes},
             {"missing_fraction", evaluation.missing_fraction()},
             {"missing", evaluation.missing},
             {"horizontal", to_json(evaluation.horizontal_m, kMmKeys)}};
   if (const auto& intervals = evaluation.intervals_m) {
-    json["horizontal"]["intervals_95"] = {{"drawn", evaluation.resampling_unit},
+    json["horizontal"]["intervals_95"] = {{"resampling_unit", evaluation.resampling_unit},
                                           {"clusters", intervals->clusters},
                                           {"mean_mm", to_json(intervals->mean)},
                                           {"median_mm", to_json(intervals->median)}};
@@ -143,15 +143,15 @@ std::string to_json(const Evaluation& evaluation, const std::vector<CheckedMetri
   json["horizontal"]["cdf"] = to_json(evaluation.distribution_m);
   if (evaluation.height_m) json["height"] = to_json(*evaluation.height_m, kMmKeys);
   if (evaluation.yaw_rad) json["yaw"] = to_json(*evaluation.yaw_rad, kDegKeys);
-  if (evaluation.stations) json["repeated"] = to_json(*evaluation.stations);
+  if (evaluation.stations) json["bias_and_repeatability"] = to_json(*evaluation.stations);
   if (evaluation.fit) json["fitted_line"] = to_json(*evaluation.fit);
   if (evaluation.normalized_errors)
     json["normalized_error_rms"] = to_json(*evaluation.normalized_errors);
   if (evaluation.limit) {
-    json["limit"] = {{"ratio", evaluation.limit->horizontal},
-                     {"limit_rms_mm", kMmKeys.factor * evaluation.limit->limit_m},
-                     {"beaten", evaluation.limit->is_below_crlb()},
-                     {"fixes", evaluation.limit->fixes}};
+    json["crlb"] = {{"ratio", evaluation.limit->horizontal},
+                    {"rms_mm", kMmKeys.factor * evaluation.limit->limit_m},
+                    {"errors_below_crlb", evaluation.limit->is_below_crlb()},
+                    {"fixes", evaluation.limit->fixes}};
   }
   if (evaluation.comparison) json["comparison"] = to_json(*evaluation.comparison);
   json["gates"] = to_json(gates);

@@ -11,7 +11,7 @@
 namespace vlp {
 
 /// Formats an evaluation as machine-readable JSON: the content of `evaluation.json`, format
-/// "vlp-evaluation/2".
+/// "vlp-evaluation/3".
 ///
 /// Every key ends in the unit of its value (_mm, _deg, _m). Fractions and ratios have no unit.
 /// Counts are named after what they count. Missing parts are omitted. Errors have mean, median,

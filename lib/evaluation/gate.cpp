@@ -186,7 +186,7 @@ std::vector<CheckedMetric> check_all_metrics(const std::vector<Gate>& gates,
 std::string describe(const CheckedMetric& gate) {
   return gate.name + " is " + (gate.value ? with_unit(*gate.value, gate.unit) : "not known") +
          ", " + describe(gate.direction) + " " + with_unit(gate.limit.value(), gate.unit) +
-         describe_guard_band(gate) + " is asked for";
+         describe_guard_band(gate) + " is required";
 }
 
 std::string describe_guard_band(const CheckedMetric& gate) {

@@ -95,7 +95,7 @@ std::vector<CheckedMetric> check_all_metrics(const std::vector<Gate>& gates,
                                              const std::vector<Metric>& metrics,
                                              const std::vector<MetricKind>& known);
 
-/// Describes a gate, for example "mean_mm is 1.25 mm, at most 1 mm is asked for". With a guard
+/// Describes a gate, for example "mean_mm is 1.25 mm, at most 1 mm is required". With a guard
 /// band, "less a guard band of 0.04 mm" follows the limit.
 /// @pre there is a gate
 std::string describe(const CheckedMetric& gate);

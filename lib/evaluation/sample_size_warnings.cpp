@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kSufficientClusters = 50;
 
 std::string describe_small_sample(std::size_t clusters, const std::string& resampling_unit) {
-  return "of so few as " + std::to_string(clusters) + " " + resampling_unit + " ";
+  return "with only " + std::to_string(clusters) + " " + resampling_unit + " ";
 }
 
 }  // namespace
@@ -26,6 +26,8 @@ std::string make_missing_fixes_warning(const Evaluation& evaluation,
     return gate.name == "missing_fraction";
   });
   if (gates.empty() || missing == 0 || has_gate) return "";
+  // [GATE-1] `no gate 'missing_fraction'` | verdict ignores captures without fix | add gate
+  //   `missing_fraction`
   return std::to_string(missing) + " of " + std::to_string(evaluation.captures) +
          (missing == 1 ? " captures has" : " captures have") +
          " no fix, and there is no gate 'missing_fraction'";
@@ -35,6 +37,8 @@ std::string make_crlb_warning(const Evaluation& evaluation) {
   const auto& limit = evaluation.limit;
   if (!limit || !limit->is_below_crlb()) return "";
   constexpr int digits = 3;
+  // [GATE-3] `limit: either` | smaller noise than `--noise-px`, or fixes from more than one level
+  //   image | check `--noise-px`
   return "the errors are " + format_significant_digits(limit->horizontal, digits) +
          " times the theoretical limit: either the stated pixel noise is too large, or the fixes "
          "use more information than one image of a level camera with completely visible lamps "
@@ -45,6 +49,8 @@ std::vector<std::string> make_sample_size_warnings(const Evaluation& evaluation)
   std::vector<std::string> warnings;
   const std::string& resampling_unit = evaluation.resampling_unit;
   if (const auto& intervals = evaluation.intervals_m; !intervals) {
+    // [GATE-2] `for intervals`, `too narrow` | fewer than 20 independent reference points or
+    //   captures | measure more
     warnings.push_back("there are too few " + resampling_unit + " with a fix for intervals");
   } else if (intervals->clusters <
              (evaluation.reference == "truth" ? kSufficientClusters : kPathRuns)) {
@@ -57,8 +63,9 @@ std::vector<std::string> make_sample_size_warnings(const Evaluation& evaluation)
   if (const auto& comparison = evaluation.comparison; !comparison) {
     return warnings;
   } else if (comparison->has_too_few_clusters()) {
+    // [GATE-2] `is inconclusive`
     warnings.push_back(describe_small_sample(comparison->clusters, resampling_unit) +
-                       "with a fix in both files a comparison is no evidence, which needs " +
+                       "with a fix in both files the comparison is inconclusive; it needs " +
                        std::to_string(kMinClustersCompared));
   } else if (comparison->clusters < kSufficientClusters) {
     warnings.push_back(describe_small_sample(comparison->clusters, resampling_unit) +

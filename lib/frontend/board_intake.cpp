@@ -55,6 +55,7 @@ std::string describe_too_few_corners(const Board& board, const BoardDetection& s
   }
   std::string message = fmt::format("only {} tags of the board can be used", seen.tags.size());
   if (are_tags_overexposed(seen)) {
+    // [LENS-1] `runs over the`
     message += fmt::format(", around {} more white is overexposed and runs over the corners",
                            seen.overexposed);
   } else if (seen.unusable > 0) {
@@ -236,6 +237,8 @@ void remove_corner_outliers(const BoardLattice& lattice, BoardView& view,
   if (blunders.empty()) return;
   const auto corners = collect_detected_corners(view.seen);
   const Eigen::Vector2d first = corners[blunders.front()].pixel;
+  // [LENS-5] `neighbors predict them` | outliers: corners (for tags, the whole tag) or image
+  //   rejected | check the image
   warnings.push_back(
       fmt::format("{}: {} of its {} corners are not where their neighbors predict them, the first "
                   "at ({:.1f}, {:.1f}); rejected",
@@ -259,6 +262,8 @@ void reject_few_corners(const Board& board, const BoardLattice& lattice, Observa
   const BoardDetection& seen = image.board->seen;
   if (lattice.has_sufficient_corners(seen)) return;
   if (!seen.has_corners() && !seen.foreign.empty()) {
+    // [LENS-3] `the board does not have`, `not show the board` | other board, or wrong `first_id`,
+    //   `cols`, `rows`, `id_order` | correct `board.yaml`
     return image.set_rejection(RejectionReason::other_board,
                                "shows tags that the board does not have");
   }
@@ -315,12 +320,15 @@ void BoardIntake::reject_unusable(Observation& image, double bright_fraction,
                     100 * options_.max_white_fraction));
   }
   if (!lattice_.has_sufficient_corners(seen) && bright_fraction < options_.min_bright_fraction) {
+    // [LENS-1] `too dark:` | corners not measurable, or displaced | change exposure or light;
+    //   limit: `--max-white-fraction`
     return image.set_rejection(
         RejectionReason::too_dark,
         fmt::format("too dark: the brightest 1 % reach {:.0f} % of the full scale, "
                     "{:.0f} % at least",
                     100 * bright_fraction, 100 * options_.min_bright_fraction));
   }
+  // [LENS-2] `blurred:`, `no contrast` | no sharp edges | focus, hold still; limit: `--max-blur-px`
   if (!image.blur_px) return image.set_rejection(RejectionReason::no_contrast, "no contrast");
   if (*image.blur_px > options_.max_blur_px) {
     return image.set_rejection(

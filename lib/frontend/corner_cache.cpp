@@ -54,6 +54,7 @@ class NumberFile {
     const char* const end = text_.data() + text_.size();
     const auto [stop, failure] = std::from_chars(text_.data() + position_, end, value);
     if (failure != std::errc() || stop == end || !std::isfinite(value)) {
+      // [FILE-4]
       throw std::runtime_error("is cut short");
     }
     position_ = static_cast<std::size_t>(stop - text_.data()) + 1;
@@ -144,6 +145,7 @@ CornerCache::CornerCache(fs::path folder, const Board& board)
   if (folder_.empty()) return;
   std::error_code error;
   fs::create_directories(folder_, error);
+  // [FILE-1]
   if (error) throw InputError(folder_, "cannot be made: " + error.message());
 }
 

@@ -237,6 +237,8 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
   // Other formats are rejected, because the memory that they need is unknown before decoding.
   const auto size = read_image_size_from_header(bytes);
   if (!size) {
+    // [FILE-7] `cannot be read as an image` | damaged, raw, or of another format; the content
+    //   counts, not the name. Other images are used. | save in a listed format
     throw InputError(
         file, has_image_signature(bytes)
                   ? "cannot be read as an image: it is cut short or damaged"
@@ -280,8 +282,10 @@ std::vector<fs::path> list_images(const fs::path& folder) {
     if (entry->is_regular_file(no_file) && is_image_file_name(entry->path()))
       images.push_back(entry->path());
   }
+  // [FILE-1]
   if (error) throw InputError(folder, "cannot be read: " + error.message());
   if (images.empty()) {
+    // [FILE-7] `contains no image`
     throw InputError(folder, "contains no image (.png, .jpg, .bmp, .tif or .pgm)");
   }
   std::sort(images.begin(), images.end());

@@ -27,6 +27,7 @@ ImageSource::ImageSource(std::vector<std::filesystem::path> files, const Fronten
     const auto [width, height] = video.size_px();
     check_image_size(file, width, height, options.max_mpx);
     check_image_matches_imager(file, {width, height}, imager_px);
+    // [FILE-8] `no frame that can be decoded`
     if (!video.read_next()) throw InputError(file, "contains no frame that can be decoded");
     const auto every = static_cast<std::size_t>(every_);
     expected_ += (std::max<std::size_t>(video.reported_frame_count(), 1) + every - 1) / every;

@@ -102,6 +102,8 @@ LampClassifier read_classifier(const LampImages& images, const fs::path& file,
   LampClassifier classifier = read_lamp_classifier(file);
   for (const auto& lamp : classifier.lamps) {
     if (find_lamp_by_id(images.lamps.lamps, lamp.lamp) != nullptr) continue;
+    // [FILE-6] `is not in`, `is unknown to` | files of different rooms or captures | give files of
+    //   the same room and captures
     throw InputError(file,
                      fmt::format("lamp {} is not in {}", lamp.lamp, images.lamps_file.string()));
   }
@@ -147,6 +149,8 @@ void warn_about_map(const LampImages& images, const DetectorCamera& camera,
         "{:.1f} % are needed; change one of the frequencies, or a duty by 0.3",
         first, second, 100 * gap, 100 * needed));
   }
+  // [LAMP-11] `too near`, `too fine to be seen` | frequencies too close, too high or too low for
+  //   row time and exposure | see [frequencies](ROOM.md#lamps)
   warn_about_other_findings(alike.size(), "pairs of lamps with frequencies that are too near",
                             warnings);
   const auto unreadable = find_lamps_with_unreadable_period(images.lamps, conditions);
@@ -192,6 +196,8 @@ std::string explain_no_lamp(const std::vector<Observation>& images, const LampMa
   const auto count = [&](LightKind kind) { return count_lights_of_kind(images, kind); };
   const auto skipped = std::count_if(images.begin(), images.end(),
                                      [](const Observation& image) { return !image.is_kept(); });
+  // [LAMP-1] `no lamp was identified wholly in view` | lights unlike any lamp: wrong row time,
+  //   readout or map; steady or cut lamps | see the most frequent reason below
   std::string message = fmt::format(
       "no lamp was identified wholly in view in {} images ({} skipped; {} lamps are cut by the "
       "image's edge, {} lights flicker unlike any lamp of the map, {} are steady, {} have no form)",
@@ -215,6 +221,7 @@ std::string explain_no_lamp(const std::vector<Observation>& images, const LampMa
 void create_annotate_folder(const fs::path& folder, const fs::path& images) {
   std::error_code error;
   fs::create_directories(folder, error);
+  // [FILE-1]
   if (error) throw InputError(folder, "cannot be made: " + error.message());
   if (fs::equivalent(folder, images, error)) {
     throw InputError(folder, "contains the images: choose another folder for --annotate");
@@ -405,12 +412,14 @@ Readout estimate_readout_direction(const std::vector<fs::path>& images,
     return to_image_view(pixels);
   });
   if (!found) {
+    // [LAMP-12] `readout is not stated` | readout estimated, or rows assumed; some images rotated,
+    //   as of a phone. A wrong readout identifies no lamp. | `--readout`
     result.warnings.emplace_back(
-        "the read-out is not stated and not visible in the images: rows are assumed; give "
+        "the readout is not stated and not visible in the images: rows are assumed; give "
         "--readout");
     return Readout::rows;
   }
-  result.notes.push_back(fmt::format("the read-out is not stated: the images show stripes along {}",
+  result.notes.push_back(fmt::format("the readout is not stated: the images show stripes along {}",
                                      *found == Readout::rows ? "rows" : "columns"));
   return *found;
 }
@@ -431,6 +440,7 @@ void check_lamps_in_map(std::span<const Frame> frames, const LampMap& lamps,
       if (find_lamp_by_id(lamps.lamps, detection.lamp) != nullptr) return;
     }
   }
+  // [FILE-6] `has none of the lamps`
   throw InputError(lamps_file, "has none of the lamps in the captures");
 }
 

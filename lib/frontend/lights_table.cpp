@@ -76,13 +76,27 @@ std::string_view to_string(LightKind kind) {
 std::string_view to_string(LightReason reason) {
   constexpr std::array<std::pair<LightReason, std::string_view>, 9> names{
       {{LightReason::identified, "identified"},
+       // [LAMP-2] `overexposed` | most pixels of the light at full scale | expose shorter
        {LightReason::overexposed, "overexposed"},
+       // [LAMP-3] `steady` | not modulated, or exposure too long for the frequency | expose shorter
        {LightReason::steady, "steady"},
+       // [LAMP-4] `too_few_periods` | too small, too far or too slow; few periods suffice only next
+       //   to a lamp with more | go nearer, or raise the frequency
        {LightReason::too_few_periods, "too_few_periods"},
+       // [LAMP-5] `no_clear_period` | object, letters or pattern in front, or wrong readout |
+       //   `--readout`
        {LightReason::no_clear_period, "no_clear_period"},
+       // [LAMP-6] `unknown_period` | wrong frequency, row time, readout or classifier; or a light
+       //   outside the map, such as one dimmed by PWM | correct the wrong value
        {LightReason::unknown_period, "unknown_period"},
+       // [LAMP-7] `reflection` | mirror image; lamp out of focus, or less than twice as large and
+       //   bright as its mirror image; two lamps of one frequency | focus, cover the mirror,
+       //   separate the frequencies
        {LightReason::reflection, "reflection"},
+       // [LAMP-8] `wrong_shape` | lamp partly covered or touched by another light; other shape or
+       //   size in the map | uncover it, or correct the map
        {LightReason::wrong_shape, "wrong_shape"},
+       // [LAMP-9] `incomplete` | not wholly in view, or too small | aim at it, or go nearer
        {LightReason::incomplete, "incomplete"}}};
   return find_name(names, reason);
 }

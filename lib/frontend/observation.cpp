@@ -218,6 +218,8 @@ void Selection::add(Observation& image) {
   if (points.empty()) return;
   for (const Kept& kept : kept_) {
     if (!are_points_equal(points, kept.points)) continue;
+    // [FILE-10] `the same image`, `the same view` | copy, or view within 1 % of the image width of
+    //   another; counts once | move the board, or rotate the camera
     return image.set_rejection(RejectionReason::same_image, "is the same image as " + kept.name);
   }
   if (use_ != ImageUse::places) {

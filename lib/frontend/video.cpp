@@ -57,6 +57,9 @@ Video::Video(const std::string& source, const std::optional<std::array<int, 2>>&
   const int file_api = !is_url && has_ffmpeg ? cv::CAP_FFMPEG : cv::CAP_ANY;
   VideoReader& video = *capture_->reader;
   if (!video.open(source, is_live_camera() ? cv::CAP_V4L2 : file_api)) {
+    // [FILE-1]
+    // [FILE-8] `cannot be opened as a video` | codec missing in OpenCV, or end missing (an MP4 that
+    //   was not closed) | record or convert again
     throw InputError(source, is_live_camera()
                                  ? "cannot be opened as a camera"
                                  : "cannot be opened as a video: is it cut short, or none?");

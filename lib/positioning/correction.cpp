@@ -31,6 +31,7 @@ Eigen::Matrix3d level_from_camera(const Calibration& calibration, Correction cor
   const Eigen::Vector2d center_px = calibration.camera.principal_point_px();
   if (rotation && !(rotation->zenith_in_camera.allFinite() && rotation->center_px.allFinite() &&
                     rotation->zenith_in_camera.z() > 0)) {
+    // [FILE-5]
     throw std::invalid_argument("the rotation_center is not finite or its zenith not in front");
   }
   if (dispersion && !dispersion->offset_px.allFinite()) {

@@ -105,7 +105,8 @@ FloorLimits compute_accuracy_limits_on_floor(const LampMap& map, const Camera& c
   const Lens lens(camera.lens_model, camera.intrinsics);
   const auto row_clock = make_row_clock(camera);
   FloorLimits limits{list_image_error_sources(prior), make_positions_on(grid, z_m, yaw_rad)};
-  for (const auto& source : {Source{"center", "center"}, {"tilt", "tilt"}, kLampMap}) {
+  for (const auto& source :
+       {Source{"principal point", "principal_point"}, {"tilt", "tilt"}, kLampMap}) {
     limits.sources.push_back(source);
   }
   for (FloorLimits::Place& place : limits.places) {
@@ -200,7 +201,7 @@ std::optional<FloorSummary> summarize_floor_limits(const FloorLimits& limits) {
   using Place = FloorLimits::Place;
   FloorSummary summary{
       {},
-      summarize_source({"together", "horizontal"}, limits,
+      summarize_source({"total", "horizontal"}, limits,
                        [](const Place& place) { return place.total_covariance(); }),
       static_cast<std::size_t>(with_fix)};
   for (std::size_t i = 0; i < limits.sources.size(); ++i) {

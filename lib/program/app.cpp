@@ -126,6 +126,7 @@ bool redirect_stdout_to_null() {
 /// Returns `exit_code`; reports an error and returns kBadInput if stdout could not be written.
 int check_stdout_written(int exit_code) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
+  // [FILE-1]
   spdlog::error("stdout cannot be written");
   return kBadInput;
 }

@@ -86,10 +86,11 @@ double to_seconds(const timeval& time) {
 
 std::string run_request(const char* name, const Request& request,
                         const std::function<int(int, char**)>& program) {
-  const int memory = ::memfd_create("said", MFD_CLOEXEC);
+  const int memory = ::memfd_create("output", MFD_CLOEXEC);
   const File output(memory < 0 ? nullptr : ::fdopen(memory, "w+"), &std::fclose);
   if (!output) throw std::runtime_error("there is not enough memory for the output of a process");
   const pid_t parent = ::getpid(), process = ::fork();
+  // [STATION-10]
   if (process < 0) throw std::runtime_error("a process cannot be started");
   if (process == 0) run_in_child(name, request, output.get(), parent, program);
   int status = 0;
@@ -100,7 +101,7 @@ std::string run_request(const char* name, const Request& request,
   const nlohmann::json answer{
       {"exit_code", WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status)},
       {"cpu_s", to_seconds(used.ru_utime) + to_seconds(used.ru_stime)},
-      {"said", read_end_of_file(output.get())}};
+      {"output", read_end_of_file(output.get())}};
   return answer.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 

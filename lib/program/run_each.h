@@ -11,12 +11,12 @@ namespace vlp {
 /// end of stdin.
 ///
 /// A line is JSON: {"arguments": ["SESSION", "-o", "RESULTS"], "limit_s": 3600}. The answer is a
-/// line on stdout: {"exit_code": 0, "cpu_s": 0.61, "said": "..."} with
+/// line on stdout: {"exit_code": 0, "cpu_s": 0.61, "output": "..."} with
 ///
 ///   exit_code  exit code, or the negative number of the signal that killed the process (SIGALRM:
 ///              the time limit)
 ///   cpu_s      processor time of the process, s
-///   said       last 4096 bytes of its stdout and stderr
+///   output     last 4096 bytes of its stdout and stderr
 ///
 /// @param name     argv[0] of the program
 /// @param program  function called in place of main()

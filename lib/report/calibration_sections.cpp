@@ -51,7 +51,7 @@ std::string make_camera_html_table(const Camera& camera) {
   if (camera.pixel_pitch_m)
     add_row("pixel pitch", format_six_digits(1e6 * *camera.pixel_pitch_m) + " um");
   if (camera.row_time_s) add_row("row time", format_six_digits(1e6 * *camera.row_time_s) + " us");
-  if (camera.readout) add_row("read-out", *camera.readout == Readout::rows ? "rows" : "columns");
+  if (camera.readout) add_row("readout", *camera.readout == Readout::rows ? "rows" : "columns");
   return make_html_table(table);
 }
 
@@ -103,9 +103,9 @@ std::string make_dispersion_html_table(const Dispersion& dispersion,
   return make_html_table(
       {"",
        {},
-       {{"captures at the station", std::to_string(dispersion.captures)},
+       {{"captures at the reference point", std::to_string(dispersion.captures)},
         {"radius of the circle before", mm(dispersion.radius_m) + " mm"},
-        {"its center from the station",
+        {"its center from the reference point",
          mm(dispersion.center_m.x()) + ", " + mm(dispersion.center_m.y()) + " mm"},
         {"offset subtracted from the image",
          format_pair(dispersion.offset_px, "px") +

@@ -50,8 +50,8 @@ std::string describe_comparison(const Comparison& comparison) {
             " mm)";
   }
   return note + (comparison.pairs > 0 ? "; " : "") + std::to_string(comparison.pairs) +
-         " captures have a fix in both, " + std::to_string(comparison.only_these) + " only here, " +
-         std::to_string(comparison.only_others) + " only there.";
+         " captures have a fix in both, " + std::to_string(comparison.only_these) +
+         " only in these fixes, " + std::to_string(comparison.only_others) + " only in the others.";
 }
 
 }  // namespace
@@ -70,19 +70,20 @@ std::vector<ReportStatistic> make_report_statistics(const Evaluation& evaluation
                        format_number(deg_from_rad(yaw_rad->sizes.rms)), "degrees", ""});
   }
   if (const auto& stations = evaluation.stations) {
-    const std::string of = " (" + std::to_string(stations->stations.size()) + " stations with " +
-                           std::to_string(stations->fixes) + " fixes)";
+    const std::string of = " (" + std::to_string(stations->stations.size()) +
+                           " reference points with " + std::to_string(stations->fixes) + " fixes)";
+    figures.push_back(make_length_statistic("bias of the reference points, root mean square" + of,
+                                            stations->bias_m));
     figures.push_back(
-        make_length_statistic("bias of the stations, root mean square" + of, stations->bias_m));
-    figures.push_back(make_length_statistic("scatter at a station" + of, stations->scatter_m));
+        make_length_statistic("repeatability at a reference point" + of, stations->scatter_m));
   }
   if (evaluation.normalized_errors) {
-    figures.push_back({"error over its stated deviation (1: right)",
+    figures.push_back({"error / reported standard deviation (1: correct)",
                        format_number(evaluation.normalized_errors->horizontal), "", ""});
   }
   if (evaluation.limit) {
     figures.push_back(make_length_statistic("theoretical limit", evaluation.limit->limit_m));
-    figures.push_back({"error over the limit (1: the best)",
+    figures.push_back({"error / theoretical limit (1: optimal)",
                        format_number(evaluation.limit->horizontal), "", ""});
   }
   if (evaluation.fit) {

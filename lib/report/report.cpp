@@ -37,7 +37,7 @@ std::vector<std::string> make_row(const CheckedMetric& gate, bool may_be_out_of_
 }
 
 std::string make_gates_table(const Report& report) {
-  HtmlTable table{"", {"gate", "figure", "limit", "result"}, {}};
+  HtmlTable table{"", {"gate", "value", "limit", "result"}, {}};
   for (const auto& gate : report.gates) {
     const bool given = report.verdict.has_value();
     if (!gate.has_passed() && (gate.value || !given)) table.marked.push_back(table.rows.size());
@@ -100,7 +100,7 @@ std::string format_statistics(const Report& report) {
   if (!report.metrics.empty()) {
     const bool intervals = std::any_of(report.metrics.begin(), report.metrics.end(),
                                        [](const auto& figure) { return !figure.interval.empty(); });
-    HtmlTable table{"", {"figure", "value"}, {}};
+    HtmlTable table{"", {"metric", "value"}, {}};
     if (intervals) table.header.emplace_back("95 % confidence interval");
     for (const auto& [label, value, unit, interval] : report.metrics) {
       table.rows.push_back({label, with_unit(value, unit)});

@@ -41,7 +41,7 @@ constexpr std::array<Kind, 8> kKinds = {
      {"dispersion", ReportPart::dispersion,
       "Fixes minus reference point, before and after the dispersion calibration, each with the "
       "smallest enclosing circle. The circle after it should be smaller.",
-      "Errors of fixes about the station with their dispersion circles, before and after."},
+      "Errors of fixes about the reference point with their dispersion circles, before and after."},
      {"errors", ReportPart::floor,
       "Arrows from the true position of each capture towards its fix, enlarged as the title "
       "states; the bar below the plan is the scale.",
@@ -102,6 +102,7 @@ ReportPlot read_report_plot(const std::filesystem::path& file) {
     throw InputError(file, "is neither an SVG nor a PNG");
   }
   if (png ? !is_complete_png(image) : !is_complete_svg(image)) {
+    // [FILE-4]
     throw InputError(file, "is cut short, or holds no picture");
   }
   return classify_image(std::move(image), file.filename().string());

@@ -26,7 +26,7 @@ LensModel read_lens_model(const YamlValue& value) {
 Readout read_readout(const YamlValue& value) {
   if (value.get_text() == "rows") return Readout::rows;
   if (value.get_text() == "columns") return Readout::columns;
-  throw value.make_unknown_word_error("the read-out is along rows or columns");
+  throw value.make_unknown_word_error("the readout is along rows or columns");
 }
 
 std::vector<double> read_intrinsics(const YamlValue& value, LensModel model) {
@@ -112,6 +112,7 @@ Matrix2 read_covariance(const YamlValue& value) {
   constexpr double rounding = 1e-12;  // of a full correlation
   if (covariance(0, 1) != covariance(1, 0) || covariance(0, 0) < 0 || covariance(1, 1) < 0 ||
       covariance(0, 1) * covariance(0, 1) > product * (1 + rounding)) {
+    // [FILE-5] `is not a covariance`
     throw value.make_error("is not a covariance: it should be symmetric and not negative");
   }
   check_variances(value, covariance);
@@ -240,6 +241,7 @@ Adjustment read_adjustment(YamlMap& map, const Camera& camera) {
   const auto names = parameter_names(camera, adjustment);
   for (std::size_t i = 0; i < std::max(found.size(), names.size()); ++i) {
     if (i >= found.size() || i >= names.size() || found[i].get_text() != names[i]) {
+      // [FILE-4] `is missing in its place`, `there are more than these`
       throw parameters.make_error(
           "should be the lens model's, the zenith, the lever arm, the lamps: " +
           (i < names.size() ? names[i] + " is missing in its place" : "there are more than these"));

@@ -21,6 +21,7 @@ namespace fs = std::filesystem;
 
 /// Errors name the file that the user specified.
 [[noreturn]] void fail(const fs::path& wanted) {
+  // [FILE-1] `cannot be written`
   throw InputError(wanted, std::string("cannot be written: ") + std::strerror(errno));
 }
 
@@ -82,6 +83,8 @@ std::string describe_bytes(std::size_t bytes) {
 }
 
 [[noreturn]] void throw_file_too_long(const fs::path& path, std::size_t max_bytes) {
+  // [FILE-2] `is it the right file?` | other kind of file (line `format`), newer version, or above
+  //   the [limits](security.md) | name the right file
   throw InputError(path, "is longer than " + describe_bytes(max_bytes) + ": is it the right file?");
 }
 
@@ -89,6 +92,8 @@ std::string describe_bytes(std::size_t bytes) {
 /// size; 0 for a stream.
 std::size_t check_file_kind(const fs::path& path, int descriptor, std::size_t max_bytes) {
   struct stat status {};
+  // [FILE-1] `cannot be read` | system error, stated at the end; stdout: its reader ended | correct
+  //   path or permission, free space
   if (::fstat(descriptor, &status) != 0) throw InputError(path, "cannot be read");
   if (S_ISDIR(status.st_mode)) throw InputError(path, "is a folder, not a file");
   if (!S_ISREG(status.st_mode)) {
@@ -167,6 +172,7 @@ InputFile::InputFile(const fs::path& path, std::size_t max_bytes)
 InputFile::InputFile(const fs::path& path, int descriptor, std::size_t max_bytes)
     : path_(path), max_bytes_(max_bytes), descriptor_(descriptor) {
   if (descriptor_ < 0) {
+    // [FILE-1] `cannot be opened`
     throw InputError(path, std::string("cannot be opened: ") + std::strerror(errno));
   }
   try {

@@ -83,6 +83,7 @@ LampMapFile read_lamps_and_room_names(const std::filesystem::path& file, const s
     Lamp lamp = read_lamp(keys);
     const auto lamp_room = keys.get_optional("room");
     if (!room.empty() && !lamp_room) {
+      // [LAMP-10] `no key room`
       throw item.make_error("has no key room, and lamps of room " + room +
                             " are selected: state the room of each lamp");
     }

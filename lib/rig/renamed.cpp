@@ -31,6 +31,7 @@ constexpr std::array kRenamings{
     Renaming{NameKind::key, "print", "pattern"},
     Renaming{NameKind::key, "lean", "roll_pitch"},
     Renaming{NameKind::key, "spread", "field_coverage"},
+    Renaming{NameKind::key, "spots_m", "pivots_m"},
     // station.yaml
     Renaming{NameKind::key, "enough", "completion"},
     Renaming{NameKind::key, "refuse", "rejection"},
@@ -39,6 +40,7 @@ constexpr std::array kRenamings{
     Renaming{NameKind::key, "dark_share", "dark_fraction"},
     Renaming{NameKind::key, "white_share", "white_fraction"},
     Renaming{NameKind::key, "same_pose_share", "same_pose_fraction"},
+    Renaming{NameKind::key, "dispersion_station_m", "dispersion_position_m"},
     // calibration.yaml
     Renaming{NameKind::key, "uncertainty_px", "expected_max_error_px"},
     Renaming{NameKind::key, "region_px", "valid_region_px"},
@@ -86,6 +88,7 @@ constexpr std::array kRenamings{
     Renaming{NameKind::option, "--center-px", "--principal-point-px"},
     Renaming{NameKind::option, "--station", "--reference-point"},
     Renaming{NameKind::option, "--place-sd-m", "--position-sd-m"},
+    Renaming{NameKind::option, "--station-mm", "--same-point-mm"},
     Renaming{NameKind::option, "--marker-share", "--marker-to-square-ratio"},
     Renaming{NameKind::value, "paper", "chen-guan"},
 };

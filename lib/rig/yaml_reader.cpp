@@ -260,6 +260,8 @@ double YamlValue::get_number() const {
 double YamlValue::get_number_within(double min, double max, std::string_view unit) const {
   const double value = get_number();
   if (value < min || value > max) {
+    // [FILE-3] `is it in the right unit?` | mm, us or degrees in place of m, s or rad; national
+    //   coordinates with too many digits | convert
     throw make_error(format_shortest(value) + " " + std::string(unit) + " is not within " +
                      format_shortest(min) + " and " + format_shortest(max) + " " +
                      std::string(unit) + ": is it in the right unit?");

@@ -139,6 +139,7 @@ void add_warnings(AdjustStepResult& result, const MapErrors& map_errors) {
                     found.lens_chi_squared, found.lens_freedom));
   }
   if (found.noise_is_contradicted) {
+    // [ROTATION-1]
     result.warnings.push_back(
         fmt::format("the residuals are {:.2f} times those expected from sigma_px; standard "
                     "deviations follow the residuals",

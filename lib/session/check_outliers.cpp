@@ -72,6 +72,7 @@ std::string describe_position_error_outliers(const std::vector<CaptureError>& er
   if (outliers.captures.empty()) return "";
   const double max_mm = kMmPerM * outliers.max, others_mm = kMmPerM * upper_median(outliers.others);
   if (outliers.captures.size() == 1) {
+    // [STATION-19] `in its table`, `in their table`
     return fmt::format(
         "{} was not taken at the position in its table: its error is {:.1f} mm, that of others "
         "{:.2g} mm",

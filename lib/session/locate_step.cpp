@@ -196,6 +196,8 @@ bool warn_about_noise(LocateResult& result, const std::vector<Frame>& frames, do
     result.metrics.push_back({"residual_ratio", *estimated_px / stated_px});
   }
   if (!estimated_px || *estimated_px <= max_noise_ratio * stated_px) return false;
+  // [FIX-11] `sd follows`, `sd is too small` | residuals above the stated noise; several times
+  //   larger: error of calibration or map | check both
   result.warnings.push_back(fmt::format(
       "the residuals correspond to {:.2g} px of noise, {:.2g} px are stated: {}; are calibration "
       "and lamp map right and complete?",
@@ -326,6 +328,8 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
       result.notes.push_back(fmt::format(
           "sigma_px is not stated: {:.3g} px estimated from the residuals", how.unstated_sigma_px));
     } else {
+      // [FIX-12] `sd columns are empty` | no `sigma_px`, and no image with three lamps | state
+      //   `sigma_px`
       result.warnings.emplace_back(
           "sigma_px is neither stated nor determined by residuals: sd columns are empty");
     }
@@ -415,7 +419,7 @@ void warn_about_rejected_lamps(LocateResult& result, const LocateInput& input,
     rejected += result.fixes[i].rejected_lamps;
     for (const int id : result.rows[i].rejected) {
       ++captures[id];
-      result.details.push_back(fmt::format("{}: lamp {} contradicts the others and is left out",
+      result.details.push_back(fmt::format("{}: lamp {} contradicts the others and is rejected",
                                            input.frames[i].image, id));
     }
   }
@@ -432,6 +436,8 @@ void warn_about_rejected_lamps(LocateResult& result, const LocateInput& input,
     }
   }
   if (rejected > 0) {
+    // [FIX-10] `the others, rejected`, `is rejected in` | lamps misidentified. Displaced lamps are
+    //   listed with their offset instead. | check these lamps
     result.warnings.push_back(
         fmt::format("{} detections that contradict the others, rejected", rejected));
   }
@@ -468,6 +474,8 @@ LocateResult locate_camera_in_frames(const LocateInput& input) {
   if (input.lamp_offsets) {
     result.lamp_offsets = std::move(map_errors.offsets);
     if (input.frames.size() > 1 && result.lamp_offsets.empty()) {
+      // [FIX-13] `not tie all lamps` | note: lamps never visible next to two others; their
+      //   displacement is undetectable | captures between them
       result.notes.push_back(
           "relative lamp positions are not checked: captures do not tie all lamps together");
     }

@@ -121,6 +121,8 @@ void add_warnings(RotationResult& result) {
   constexpr double max_noise_ratio = 3;
   const auto& median_sigma_px = result.spot.median_sigma_px;
   if (median_sigma_px && result.fit.residual_px > max_noise_ratio * *median_sigma_px) {
+    // [ROTATION-1] `the residuals ` | above the stated noise: lens or map inaccurate, camera beside
+    //   the axis, or `sigma_px` too small | check lens, map and `sigma_px`
     result.warnings.push_back(
         fmt::format("the residuals correspond to {:.2g} px of noise, {:.2g} px are stated: is the "
                     "lens calibrated, the camera off the axis, the method exact?",
@@ -213,7 +215,7 @@ RotationResult run_rotation_step(const LampCaptures& input, RotationMethod metho
   const Camera& camera = input.calibration.camera;
   result.spot = find_in_place_rotation_captures(input.frames, input.lamps, camera);
   for (const auto& [image, reason] : result.spot.rejected) {
-    result.warnings.push_back(fmt::format("{}: left out: {}", image, reason));
+    result.warnings.push_back(fmt::format("{}: rejected: {}", image, reason));
   }
   if (result.spot.status != RotationStatus::ok) {
     const bool map = result.spot.status == RotationStatus::other_map;
@@ -283,6 +285,7 @@ TiltResult run_tilt_step(const LampCaptures& input, bool refine_map, HistoryEntr
   result.metrics = {{"tilt_deg", deg_from_rad(compute_camera_tilt(leveling.center).angle_rad)}};
   constexpr double max_noise_scale = 3;
   if (leveling.noise_scale > max_noise_scale) {
+    // [ROTATION-1] `--refine-map may help`
     result.warnings.push_back(
         fmt::format("the residuals are {:.1f} times those expected from sigma_px: lamp map or lens "
                     "is slightly wrong, and the error of the tilt may exceed its sd{}",

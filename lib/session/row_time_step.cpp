@@ -131,6 +131,8 @@ std::string compare_row_times(const RowTime& measured, const GivenRowTime& given
   const double max_deviation = kLampDrift + max_sds * measured.sd_s / measured.row_time_s;
   const double deviation = std::abs(std::log(measured.row_time_s / given.row_time_s));
   if (measured.lamps < kMinRowTimeLamps || deviation <= max_deviation) return "";
+  // [LAMP-13] `row time is ... us in` | contradicts the frequencies of the map by more than 1.5 %
+  //   and three standard deviations | use the measured one, if the frequencies are right
   return fmt::format(
       "row time is {:.6g} us in {}, but the stripes of {} lamps measure {:.2f} +- {:.2f} us; "
       "correct it, or, if it is right, all frequencies of the lamp map by this ratio",

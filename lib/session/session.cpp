@@ -512,7 +512,7 @@ class SessionRun {
     add(options_.camera_id != unstated.camera_id, "name");
     add(options_.choose_lens_model || options_.lens_model != unstated.lens_model, "lens model");
     add(options_.frontend.row_time_s.has_value(), "row time");
-    add(options_.frontend.readout.has_value(), "read-out");
+    add(options_.frontend.readout.has_value(), "readout");
     const FrontendOptions &limits = options_.frontend, &defaults = unstated.frontend;
     add(limits.max_blur_px != defaults.max_blur_px ||
             limits.max_white_fraction != defaults.max_white_fraction,

@@ -33,12 +33,12 @@ Json make_calibration_json(const Calibration& calibration) {
   const auto& in = calibration.camera.intrinsics;
   Json json{{"lens_model", to_string(calibration.camera.lens_model)},
             {"focal_px", {in[0], in[1]}},
-            {"center_px", {in[2], in[3]}}};
+            {"principal_point_px", {in[2], in[3]}}};
   const auto& lens = calibration.intrinsics_report;
   if (lens && lens->covariance) {
     const auto sd_px = [&](Eigen::Index i) { return std::sqrt((*lens->covariance)(i, i)); };
     json["focal_sd_px"] = {sd_px(0), sd_px(1)};
-    json["center_sd_px"] = {sd_px(2), sd_px(3)};
+    json["principal_point_sd_px"] = {sd_px(2), sd_px(3)};
   }
   if (const auto& row_time_s = calibration.camera.row_time_s) json["row_time_s"] = *row_time_s;
   if (const auto& center = calibration.rotation_center) {
@@ -212,7 +212,7 @@ void write_step_record(const std::filesystem::path& file, const StepRecord& step
 
 std::string format_session_json(const SessionResult& result, const SessionOptions& options) {
   const bool known = result.calibration.has_value();
-  Json json{{"format", "vlp-session/1"},
+  Json json{{"format", "vlp-session/2"},
             {"verdict", session_verdict_name(result.verdict)},
             {"reason", result.reason},
             {"failure", to_string(result.failure)},

@@ -35,7 +35,7 @@ nlohmann::ordered_json to_json(const StepResult& result);
 /// Returns a checked gate in the form of session.json.
 nlohmann::ordered_json to_json(const CheckedMetric& gate);
 
-/// Returns the content of `session.json`, the machine-readable result in format "vlp-session/1":
+/// Returns the content of `session.json`, the machine-readable result in format "vlp-session/2":
 ///   verdict      "pass", "gate" or "no result"
 ///   reason, failure ("none", "bad_input", "undetermined", ...), camera, version
 ///   metrics      each with step, name, value; unit, if the metric has a MetricKind; limit,

@@ -135,6 +135,7 @@ SessionResults::SessionResults(fs::path folder, const fs::path& session)
   check_owner(folder_, session);
   std::error_code not_made;
   fs::create_directories(folder_, not_made);
+  // [FILE-1] `cannot be made`
   if (not_made) throw InputError(folder_, "cannot be made: " + not_made.message());
   const SharedFolder steps = make_steps_folder(folder_);
   lock_ = lock_folder(steps, folder_);

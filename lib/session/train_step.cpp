@@ -68,6 +68,7 @@ void warn_about_inseparable_lamps(const LampClassifier& classifier, TrainStepRes
   constexpr std::size_t max_lines = 10;
   const auto pairs = find_inseparable_lamps(classifier);
   for (std::size_t i = 0; i < std::min(pairs.size(), max_lines); ++i) {
+    // [LAMP-11] `look alike`
     result.warnings.push_back(
         fmt::format("lamps {} and {} look alike ({:.1f} standard deviations apart) and may remain "
                     "unidentified: change a frequency or a duty",

@@ -90,7 +90,7 @@ void draw_camera(Scene& scene, const ArchiveVariation& variation, cv::RNG random
   std::vector<double>& intrinsics = scene.camera.intrinsics;
   const double focal = 1 + variation.focal_fraction * fraction();
   for (std::size_t i = 0; i < 2; ++i) intrinsics[i] *= focal;
-  for (std::size_t i = 2; i < 4; ++i) intrinsics[i] += variation.center_px * fraction();
+  for (std::size_t i = 2; i < 4; ++i) intrinsics[i] += variation.principal_point_px * fraction();
   for (std::size_t i = 4; i < intrinsics.size(); ++i) {
     intrinsics[i] *= 1 + variation.distortion_fraction * fraction();
   }
@@ -237,6 +237,7 @@ SimulationSummary simulate_archive(const Scene& scene, std::size_t sessions, con
       progress(summary, sessions);
     });
   } catch (const fs::filesystem_error& failure) {
+    // [FILE-1]
     throw InputError(failure.path1(), "cannot be made: " + failure.code().message());
   }
   fs::remove(output / ".unfinished");  // empty, as all sessions have been moved

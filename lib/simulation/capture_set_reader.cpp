@@ -92,26 +92,26 @@ std::vector<Eigen::Vector2d> compute_positions_along(const StraightDrive& drive,
   return places;
 }
 
-/// Reads the position of the rotation axis at each capture: spots, a grid or a drive, all inside
+/// Reads the position of the rotation axis at each capture: pivots, a grid or a drive, all inside
 /// the room.
 void read_capture_positions(YamlMap& map, const Scene& scene, const Room& room,
                             LampShots& captures) {
   const double lever_arm_m = scene.mount.lever_arm_m.norm();
-  const auto spots = map.get_optional("spots_m"), grid = map.get_optional("grid");
+  const auto spots = map.get_optional("pivots_m"), grid = map.get_optional("grid");
   const auto drive = map.get_optional("drive");
   if (spots.has_value() + grid.has_value() + drive.has_value() != 1) {
-    throw map.make_error("needs one of the keys spots_m, grid, drive, views");
+    throw map.make_error("needs one of the keys pivots_m, grid, drive, views");
   }
   if (spots) {
     for (const YamlValue& spot : spots->get_list()) {
-      captures.spots_m.push_back(read_pivot(spot, room, lever_arm_m));
+      captures.pivots_m.push_back(read_pivot(spot, room, lever_arm_m));
     }
-    if (captures.spots_m.empty()) throw spots->make_error("contains no spot");
+    if (captures.pivots_m.empty()) throw spots->make_error("contains no pivot");
   } else if (grid) {
-    captures.spots_m = read_grid(*grid, room, lever_arm_m);
+    captures.pivots_m = read_grid(*grid, room, lever_arm_m);
   } else {
     captures.drive = read_straight_drive(*drive, room, lever_arm_m);
-    captures.spots_m = compute_positions_along(*captures.drive, captures.interval_s, *drive);
+    captures.pivots_m = compute_positions_along(*captures.drive, captures.interval_s, *drive);
   }
 }
 
@@ -183,7 +183,7 @@ LampShots read_lamp_captures(YamlMap& map, const Scene& scene, const Room& room)
   captures.repeat = repeat ? repeat->get_integer_within(1, kMaxCaptures) : 1;
   const auto known = map.get_optional("known");
   captures.known = known && known->get_boolean();
-  check_capture_count(double(captures.spots_m.size()) * double(captures.heights_m.size()) *
+  check_capture_count(double(captures.pivots_m.size()) * double(captures.heights_m.size()) *
                           double(captures.yaws_rad.size()) * captures.repeat,
                       map);
   if (captures.drive && captures.yaw_jitter_rad > 0) {

@@ -67,13 +67,13 @@ struct Vibration {
   double amplitude_rad, frequency_hz;
 };
 
-/// Captures of the lamps, on spots or on a drive; the last-named index changes fastest.
-///   On spots: at each height, at each spot, at each yaw, `repeat` captures.
+/// Captures of the lamps, at pivots or on a drive; the last-named index changes fastest.
+///   At pivots: at each height, at each pivot, at each yaw, `repeat` captures.
 ///   On a drive: at each height, at each yaw, `repeat` passes, with a capture every interval_s.
 struct LampShots {
   std::vector<double> heights_m;
   /// Position of the rotation axis in the world; on a drive, at each capture of a pass.
-  std::vector<Eigen::Vector2d> spots_m;
+  std::vector<Eigen::Vector2d> pivots_m;
   std::optional<StraightDrive> drive;
   std::vector<double> yaws_rad;
   /// Amplitude of the uniform random error of each yaw.
@@ -406,7 +406,7 @@ struct ArchiveVariation {
   int sessions_per_camera;
   /// Variation of a camera: relative of both focal lengths together, of each coordinate of the
   /// center, and relative of each distortion coefficient.
-  double focal_fraction, center_px, distortion_fraction;
+  double focal_fraction, principal_point_px, distortion_fraction;
   /// Variation of a camera: additional tilt in a random direction, and each component of the lever
   /// arm.
   double tilt_rad, lever_arm_m;

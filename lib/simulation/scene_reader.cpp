@@ -177,7 +177,7 @@ ArchiveVariation read_archive_variation(YamlMap& map) {
   };
   return {map.get_required_column("sessions_per_camera").get_integer_within(1, 10'000),
           fraction("focal_fraction", 0.5),
-          map.get_required_column("center_px").get_number_within(0, 1e4, "px"),
+          map.get_required_column("principal_point_px").get_number_within(0, 1e4, "px"),
           fraction("distortion_fraction", 0.5),
           rad_from_deg(map.get_required_column("tilt_deg").get_number_within(0, 20, "degrees")),
           map.get_required_column("lever_arm_m").get_number_within(0, 1, "m"),

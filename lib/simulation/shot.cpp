@@ -33,7 +33,7 @@ struct CaptureIndices {
 };
 
 CaptureIndices find_capture_indices(const LampShots& captures, std::size_t index) {
-  const std::size_t spots = captures.spots_m.size(), yaws = captures.yaws_rad.size();
+  const std::size_t spots = captures.pivots_m.size(), yaws = captures.yaws_rad.size();
   const auto repeat = static_cast<std::size_t>(captures.repeat);
   if (captures.drive) {
     const std::size_t turned = index / spots / repeat;
@@ -96,7 +96,7 @@ Eigen::Isometry3d BoardShot::camera_from_board(double time_s) const {
 std::size_t count_captures_of_set(const CaptureSet& set) {
   if (set.board) return static_cast<std::size_t>(set.board->count);
   const LampShots& lamps = *set.lamps;
-  return lamps.heights_m.size() * lamps.spots_m.size() * lamps.yaws_rad.size() *
+  return lamps.heights_m.size() * lamps.pivots_m.size() * lamps.yaws_rad.size() *
          static_cast<std::size_t>(lamps.repeat);
 }
 
@@ -110,7 +110,7 @@ LampShot make_lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t i
   shot.image = make_image_name(scene, index, count_captures_of_set(set));
   shot.time_s = static_cast<double>(index) * captures.interval_s;
   shot.exposure_s = set.exposure_s;
-  shot.motion.axis_m << captures.spots_m[indices.spot], captures.heights_m[indices.height];
+  shot.motion.axis_m << captures.pivots_m[indices.spot], captures.heights_m[indices.height];
   shot.motion.velocity_m_per_s.setZero();
   if (const auto& drive = captures.drive) {
     shot.motion.velocity_m_per_s =

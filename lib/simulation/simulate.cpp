@@ -39,6 +39,7 @@ std::vector<CaptureSet> select_sets(const Scene& scene, const std::vector<std::s
 void make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
+  // [FILE-1]
   if (error) throw InputError(folder, "cannot be made: " + error.message());
 }
 
@@ -98,6 +99,8 @@ void add_brightness_warnings(const Scene& scene, const CaptureSet& set, const st
   const double high = compute_level(scene, set, bright_e_per_s);
   const double low = compute_level(scene, set, dark_e_per_s);
   if (high - low < too_dark * white) {
+    // [GATE-5] `gray levels` | `vlp-simulate`: images too dark, too bright or empty; rendered
+    //   anyway | change light or exposure
     warnings.push_back(set.folder + ": " + bright + " is only " + whole(high - low) + " of " +
                        whole(white) + " gray levels above " + dark + fit);
   }
@@ -113,6 +116,7 @@ void add_stripe_warnings(const Scene& scene, const CaptureSet& set,
   for (const SceneLamp& lamp : scene.lamps) {
     const std::string name = set.folder + ": lamp " + std::to_string(lamp.id);
     if (set.exposure_s * lamp.frequency_hz >= 1) {
+      // [GATE-5] `than its period`, `stripes of less`
       warnings.push_back(name + " has no clear stripes: the exposure is longer than its period");
     } else if (lamp.frequency_hz * *scene.camera.row_time_s * min_period_lines > 1) {
       warnings.push_back(name + " has stripes of less than " +
@@ -178,6 +182,7 @@ SimulationSummary simulate(const Scene& scene, const fs::path& output,
     const auto warnings = find_scene_warnings(scene, set);
     summary.warnings.insert(summary.warnings.end(), warnings.begin(), warnings.end());
     if (const std::size_t empty = write_truth_tables(scene, renderer, set, folder); empty > 0) {
+      // [GATE-5] `is in view in`
       summary.warnings.push_back(set.folder + ": nothing is in view in " + std::to_string(empty) +
                                  " of " + std::to_string(count_captures_of_set(set)) + " captures");
     }

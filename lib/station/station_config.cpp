@@ -213,6 +213,8 @@ std::string describe_serial_pattern_mismatch(const std::string& serial,
     return "serial_pattern: the comparison is too slow for '" + serial +
            "': write it without a repetition in a repetition, such as (a+)+";
   }
+  // [STATION-5] `not of the form` | serial outside `serial_pattern`: other code scanned? | scan
+  //   again
   return "'" + serial + "' is not of the form " + pattern;
 }
 
@@ -270,8 +272,8 @@ void read_camera_and_targets(YamlMap& document, Files& files, StationConfig& con
   const auto room = document.get_optional("room");
   config.lamps = read_lamps_of_room(files(document.get_required_column("lamps")),
                                     room ? room->get_text() : std::string());
-  if (const auto place = document.get_optional("dispersion_station_m")) {
-    config.dispersion_station_m = Eigen::Vector2d(place->get_numbers(2).data());
+  if (const auto place = document.get_optional("dispersion_position_m")) {
+    config.dispersion_position_m = Eigen::Vector2d(place->get_numbers(2).data());
   }
 }
 

@@ -76,7 +76,7 @@ struct StationConfig {
   LampMap lamps;
   /// Position (x, y) of the camera in the world in the step `dispersion`, unless its captures.csv
   /// contains positions.
-  std::optional<Eigen::Vector2d> dispersion_station_m;
+  std::optional<Eigen::Vector2d> dispersion_position_m;
   CompletionCriteria sufficient;
   /// Acceptance limits of images.
   FrontendOptions frontend;

@@ -13,6 +13,7 @@ namespace fs = std::filesystem;
 void make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
+  // [FILE-1]
   if (error) throw InputError(folder, "cannot be made: " + error.message());
 }
 

@@ -1,23 +1,24 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""What was seen of each session's files when they were looked at last, and its shard: .state/catalogue.sqlite.
+"""Detects changes of the input files of sessions: .state/catalogue.sqlite, which also has the shard of each session.
 
-A glance is a digest of the names of a session's input files, and of the size, the times of content and of inode
-(st_mtime_ns, st_ctime_ns) and the number of the inode of each. While it is the same, so are the files: no program sets
-the time of an inode. Two ways to look:
+A fingerprint is a digest of the names of the input files of a session and, for each, of size, times of content and of
+inode (st_mtime_ns, st_ctime_ns), and inode number. Unchanged fingerprints imply unchanged files, because programs
+cannot set the time of an inode. There are two kinds of scans:
 
-  files    at each file: sees all changes that the file system shows.
-  folders  at the folders and at the files that people edit (*.yaml, captures.csv, truth.csv): sees files that come,
-           go, are renamed or replaced by others of their name. An image that is written over in place, or to which a
-           symbolic link leads, is not seen to change. Where something did, all files of the session are looked at.
+  files    checks each file. Detects all changes that the file system reports.
+  folders  checks the folders and the files that people edit (*.yaml, captures.csv, truth.csv). Detects files that are
+           added, removed, renamed or replaced by another file of the same name. Does not detect an image that is
+           overwritten in place, or that is a symbolic link to a changed file. All files of a session with a detected
+           change are checked.
 
-Unless one is asked for, an archive of FEW_SESSIONS, where it takes few seconds, is looked at by its files, and a
-larger one by its folders, once in ALL_FILES_AGAIN_NS by its files.
+By default, an archive of up to FEW_SESSIONS, which takes a few seconds, is scanned by files; a larger one by folders,
+and by files once in ALL_FILES_AGAIN_NS.
 
-A change within RACY_NS of a look may leave times as they were, since file systems count them in steps and clocks of
-machines differ: a glance at files that are so new is salted with the time, and is another one the next time.
-A catalogue that is new, is another archive's, or cannot be read has a salt of its own: all glances are others than
-before, and so all digests are taken again.
+A change within RACY_NS before a scan may leave the times unchanged, because time stamps have a finite resolution and
+clocks of machines differ. The fingerprint of such new files is salted with the time of the scan, so that it differs
+from the next one. A catalogue that is new, belongs to another archive or cannot be read gets a new salt: all
+fingerprints then differ from earlier ones, and all digests are computed again.
 """
 import os
 import resource
@@ -28,94 +29,95 @@ from concurrent.futures import ThreadPoolExecutor
 from hashlib import blake2b
 from urllib.parse import quote
 
-from files import INPUTS, MOST_FOLDERS, folder_id
+from files import INPUTS, MAX_FOLDERS, folder_id
 
-LOOKS = ("files", "folders")
+SCANS = ("files", "folders")
 FEW_SESSIONS = 10_000
-# A run once a week does it each time, and one a little early, too.
+# 6.5 days: each of weekly runs checks all files, even if it starts early.
 ALL_FILES_AGAIN_NS = 13 * 43200 * 1_000_000_000
-RACY_NS = 2_000_000_000  # FAT counts in 2 s
-CHUNK = 100  # sessions
-AT_A_TIME = 16  # looks, where the file system lets us wait
-FORMAT = 1
+RACY_NS = 2_000_000_000  # resolution of time stamps of FAT
+CHUNK = 100  # sessions per task of a thread
+NUM_THREADS = 16  # for file systems with latency, such as a network's
+FORMAT = 2  # of the database
 INPUT_NAMES = frozenset(INPUTS)
-POSITIVE = (1 << 63) - 1
-NOTHING = (0, 0, 0, 0)
+INT64_MAX = (1 << 63) - 1
+NO_ATTRIBUTES = (0, 0, 0, 0)
 
 
-def edited(name):
+def is_edited_by_hand(name):
     return name.endswith(".yaml") or name in ("captures.csv", "truth.csv")
 
 
-def numbers_of(status):
-    return status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino & POSITIVE
+def file_attributes(status):
+    return status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino & INT64_MAX
 
 
-def digest_of(salt, numbers, words=()):
+def compute_digest(salt, numbers, words=()):
     return blake2b("\n".join((salt, *words)).encode() + array("q", numbers).tobytes(), digest_size=16).hexdigest()
 
 
-def waits_of_this_thread():
+def count_waits():
     return resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw
 
 
-class Seen:
-    """Of a session: its input files and their numbers; the places to look at when only folders are, and theirs."""
+class SessionFiles:
+    """Input files of a session with their attributes, and the paths that a scan of folders checks with theirs."""
 
     def __init__(self, session, archive):
-        self.files, self.numbers, self.places, self.of_places = [], [], [], []
+        self.files, self.numbers, self.paths, self.path_attributes = [], [], [], []
         self.folders = 0
         self._below(session, archive, "", set())
 
     def _below(self, folder, archive, prefix, above):
-        """above: device and inode of the folders on the way to this one."""
-        self.places.append(prefix)
+        """Adds the files of a folder. above: device and inode of its parent folders."""
+        self.paths.append(prefix)
         self.folders += 1
         try:
             opened = os.open(folder, os.O_RDONLY, dir_fd=archive)
-        except OSError:  # it is for the programs to say so
-            self.of_places += NOTHING
+        except OSError:  # the programs report it
+            self.path_attributes += NO_ATTRIBUTES
             return
         try:
             status = os.fstat(opened)
-            self.of_places += numbers_of(status)  # before what is in it
+            self.path_attributes += file_attributes(status)  # read before its entries
             above = above | {(status.st_dev, status.st_ino)}
             with os.scandir(opened) as entries:
                 entries = sorted(entries, key=lambda entry: entry.name)
             for entry in entries:
                 if prefix or entry.name in INPUT_NAMES:
                     self._add(entry, opened, prefix + entry.name, above)
-        except OSError:  # in the middle of it
+        except OSError:  # the folder changed during the scan
             pass
         finally:
             os.close(opened)
 
     def _add(self, entry, folder, name, above):
-        if folder_id(entry, above) and self.folders < MOST_FOLDERS:
+        if folder_id(entry, above) and self.folders < MAX_FOLDERS:
             return self._below(entry.name, folder, name + "/", above)
         try:
-            numbers = numbers_of(entry.stat())
-        except OSError:  # a link to nowhere
-            numbers = NOTHING
+            numbers = file_attributes(entry.stat())
+        except OSError:  # a broken link
+            numbers = NO_ATTRIBUTES
         self.files.append(name)
         self.numbers += numbers
-        if edited(entry.name):
-            self.places.append(name)
-            self.of_places += numbers
+        if is_edited_by_hand(entry.name):
+            self.paths.append(name)
+            self.path_attributes += numbers
 
     def latest(self):
-        return max(max(self.numbers[2::4], default=0), max(self.of_places[2::4]))
+        return max(max(self.numbers[2::4], default=0), max(self.path_attributes[2::4]))
 
 
-def look_at(session, places, archive):
-    """The numbers of the places; archive: its descriptor, from which the way to the session is short."""
+def read_attributes(session, places, archive):
+    """Returns the attributes of the paths of a session. archive: file descriptor of the archive, which shortens
+    lookups."""
     numbers, stat, prefix = [], os.stat, session + "/"
     for place in places:
         try:
             seen = stat(prefix + place, dir_fd=archive)
-            numbers += (seen.st_size, seen.st_mtime_ns, seen.st_ctime_ns, seen.st_ino & POSITIVE)
+            numbers += (seen.st_size, seen.st_mtime_ns, seen.st_ctime_ns, seen.st_ino & INT64_MAX)
         except OSError:
-            numbers += NOTHING
+            numbers += NO_ATTRIBUTES
     return numbers
 
 
@@ -125,15 +127,15 @@ class Catalogue:
         try:
             if rebuild or not file.exists() or not self._load():
                 self._begin()
-        except sqlite3.DatabaseError:  # not one, or damaged
+        except sqlite3.DatabaseError:  # another file, or a damaged one
             self._begin()
 
     def _begin(self):
-        self.stated = {"archive": self.archive, "salt": str(time.time_ns())}
-        self.saved, self.sessions, self.places, self.new = {}, {}, [], True
+        self.settings = {"archive": self.archive, "salt": str(time.time_ns())}
+        self.saved, self.sessions, self.paths, self.new = {}, {}, [], True
 
     def _open(self, file):
-        # The run's lock keeps others away; locks of SQLite are not for every network's file system.
+        # The lock of the run excludes other runs; not all network file systems support the locks of SQLite.
         return sqlite3.connect(f"file:{quote(str(file))}?nolock=1", uri=True)
 
     def _load(self):
@@ -141,85 +143,89 @@ class Catalogue:
         try:
             if database.execute("PRAGMA user_version").fetchone()[0] != FORMAT:
                 return False
-            self.stated = dict(database.execute("SELECT name, value FROM stated"))
-            self.saved = dict(self.stated)
-            self.places = [paths.split("\n") for (paths,) in database.execute("SELECT paths FROM places ORDER BY id")]
-            rows = database.execute("SELECT session, shard, glance, at_folders, places FROM sessions")
+            self.settings = dict(database.execute("SELECT name, value FROM settings"))
+            self.saved = dict(self.settings)
+            self.paths = [
+                paths.split("\n") for (paths,) in database.execute("SELECT paths FROM path_lists ORDER BY id")
+            ]
+            rows = database.execute("SELECT session, shard, fingerprint, folders_fingerprint, path_list FROM sessions")
             self.sessions = {row[0]: row[1:] for row in rows}
         finally:
             database.close()
         self.new = False
-        return self.stated.get("archive") == self.archive
+        return self.settings.get("archive") == self.archive
 
-    def look_for(self, sessions):
-        """How to look at so many."""
+    def choose_scan(self, sessions):
+        """Returns the default scan for this number of sessions."""
         age_ns = time.time_ns() - self.all_files_at_ns()
         return "folders" if sessions > FEW_SESSIONS and 0 <= age_ns < ALL_FILES_AGAIN_NS else "files"
 
     def all_files_at_ns(self):
-        """When all files were looked at last."""
-        return int(self.stated.get("all_files_at_ns", 0))
+        """Returns the time of the last scan of all files; 0 if there was none."""
+        return int(self.settings.get("all_files_at_ns", 0))
 
-    def glances(self, names, how):
-        """Of each session, in this order."""
+    def fingerprints(self, names, how):
+        """Returns the fingerprint of each session, in this order."""
         began_ns = time.time_ns()
         archive = os.open(self.archive, os.O_RDONLY)
         try:
-            found = self._glances(names, how, archive, began_ns)
+            found = self._compute_fingerprints(names, how, archive, began_ns)
         finally:
             os.close(archive)
         if how == "files" or self.new:
-            self.stated["all_files_at_ns"] = str(began_ns)
+            self.settings["all_files_at_ns"] = str(began_ns)
         return found
 
-    def _glances(self, names, how, archive, began_ns):
-        salt = self.stated["salt"]
-        numbers_of_places = {"\n".join(paths): number for number, paths in enumerate(self.places)}
+    def _compute_fingerprints(self, names, how, archive, began_ns):
+        salt = self.settings["salt"]
+        ids_of_paths = {"\n".join(paths): number for number, paths in enumerate(self.paths)}
 
-        def look(name):
+        def scan(name):
             known = self.sessions.get(name)
             if known and known[2] and how == "folders":
-                if digest_of(salt, look_at(name, self.places[known[3]], archive)) == known[2]:
+                if compute_digest(salt, read_attributes(name, self.paths[known[3]], archive)) == known[2]:
                     return known[1:]
-            seen = Seen(name, archive)
+            seen = SessionFiles(name, archive)
             if seen.latest() >= began_ns - RACY_NS:
-                glance, at_folders = digest_of(f"{salt} {began_ns}", seen.numbers, seen.files), ""
+                fingerprint, folders_fingerprint = compute_digest(f"{salt} {began_ns}", seen.numbers, seen.files), ""
             else:
-                glance, at_folders = digest_of(salt, seen.numbers, seen.files), digest_of(salt, seen.of_places)
-            places = "\n".join(seen.places)
-            number = numbers_of_places.get(places)
-            return glance, at_folders, places if number is None else number
+                fingerprint, folders_fingerprint = compute_digest(salt, seen.numbers, seen.files), compute_digest(
+                    salt, seen.path_attributes
+                )
+            places = "\n".join(seen.paths)
+            number = ids_of_paths.get(places)
+            return fingerprint, folders_fingerprint, places if number is None else number
 
         chunks = [names[first : first + CHUNK] for first in range(0, len(names), CHUNK)]
-        waits = waits_of_this_thread()
-        found = [look(name) for name in chunks[0]]
-        if waits_of_this_thread() - waits >= len(found):  # for the file system
-            with ThreadPoolExecutor(AT_A_TIME) as threads:
-                for of_chunk in threads.map(lambda chunk: [look(name) for name in chunk], chunks[1:]):
+        waits = count_waits()
+        found = [scan(name) for name in chunks[0]]
+        if count_waits() - waits >= len(found):  # most scans waited for the file system
+            with ThreadPoolExecutor(NUM_THREADS) as threads:
+                for of_chunk in threads.map(lambda chunk: [scan(name) for name in chunk], chunks[1:]):
                     found += of_chunk
         else:
-            found += [look(name) for chunk in chunks[1:] for name in chunk]
+            found += [scan(name) for chunk in chunks[1:] for name in chunk]
         self.found = {}
-        for name, (glance, at_folders, places) in zip(names, found):
+        for name, (fingerprint, folders_fingerprint, places) in zip(names, found):
             if isinstance(places, str):
-                number = numbers_of_places.setdefault(places, len(self.places))
-                if number == len(self.places):
-                    self.places.append(places.split("\n"))
+                number = ids_of_paths.setdefault(places, len(self.paths))
+                if number == len(self.paths):
+                    self.paths.append(places.split("\n"))
                 places = number
-            self.found[name] = (glance, at_folders, places)
-        return [glance for glance, _, _ in found]
+            self.found[name] = (fingerprint, folders_fingerprint, places)
+        return [fingerprint for fingerprint, _, _ in found]
 
     def shard_of(self, name):
-        """That of the last time; None of a new session."""
+        """Returns the previous shard of a session; None for a new session."""
         return self.sessions[name][0] if name in self.sessions else None
 
     def save(self, shards, size):
-        """shards: {number: sessions}. What is no longer there is forgotten."""
+        """Stores the fingerprints. shards: {number: sessions}. Sessions without a shard are removed."""
         now = {name: (number, *self.found[name]) for number, names in shards.items() for name in names}
         changed = [(name, *row) for name, row in now.items() if self.new or self.sessions.get(name) != row]
         gone = [] if self.new else [(name,) for name in self.sessions.keys() - now.keys()]
-        self.stated["shard_size"] = str(size)
-        if not (self.new or changed or gone or self.stated != self.saved):
+        self.settings["shard_size"] = str(size)
+        if not (self.new or changed or gone or self.settings != self.saved):
             return
         file = self.file.with_suffix(".new") if self.new else self.file
         if self.new:
@@ -229,18 +235,19 @@ class Catalogue:
             with database:
                 if self.new:
                     database.execute(f"PRAGMA user_version = {FORMAT}")
-                    database.execute("CREATE TABLE stated (name TEXT PRIMARY KEY, value TEXT)")
-                    database.execute("CREATE TABLE places (id INTEGER PRIMARY KEY, paths TEXT)")
-                    columns = "session TEXT PRIMARY KEY, shard INTEGER, glance TEXT, at_folders TEXT, places INTEGER"
+                    database.execute("CREATE TABLE settings (name TEXT PRIMARY KEY, value TEXT)")
+                    database.execute("CREATE TABLE path_lists (id INTEGER PRIMARY KEY, paths TEXT)")
+                    columns = "session TEXT PRIMARY KEY, shard INTEGER, fingerprint TEXT, folders_fingerprint TEXT"
+                    columns += ", path_list INTEGER"
                     database.execute(f"CREATE TABLE sessions ({columns}) WITHOUT ROWID")
-                database.executemany("REPLACE INTO stated VALUES (?, ?)", self.stated.items())
-                texts = [(number, "\n".join(paths)) for number, paths in enumerate(self.places)]
-                database.executemany("INSERT OR IGNORE INTO places VALUES (?, ?)", texts)
+                database.executemany("REPLACE INTO settings VALUES (?, ?)", self.settings.items())
+                texts = [(number, "\n".join(paths)) for number, paths in enumerate(self.paths)]
+                database.executemany("INSERT OR IGNORE INTO path_lists VALUES (?, ?)", texts)
                 database.executemany("REPLACE INTO sessions VALUES (?, ?, ?, ?, ?)", changed)
                 database.executemany("DELETE FROM sessions WHERE session = ?", gone)
         finally:
             database.close()
         if self.new:
-            self.file.with_name(self.file.name + "-journal").unlink(missing_ok=True)  # of the one that was there
+            self.file.with_name(self.file.name + "-journal").unlink(missing_ok=True)  # of the replaced database
             os.replace(file, self.file)
-        self.sessions, self.saved, self.new = now, dict(self.stated), False
+        self.sessions, self.saved, self.new = now, dict(self.settings), False

@@ -35,12 +35,12 @@ def check_previous(previous, results):
 
 
 def check_session_gates(options):
-    """By vlp-calibrate, which comes to its session when the gates are right."""
+    """Checks the file of --session-gates with vlp-calibrate, which reports an invalid file before a missing session."""
     if options.session_gates:
         command = [options.bin / "vlp-calibrate", "/dev/null", "-o", "/dev/null", "--gates", options.session_gates]
-        said = subprocess.run(command, capture_output=True, text=True, check=False).stderr.strip()
-        if "error: /dev/null" not in said:
-            fail(said.split("error: ", 1)[-1])
+        errors = subprocess.run(command, capture_output=True, text=True, check=False).stderr.strip()
+        if "error: /dev/null" not in errors:
+            fail(errors.split("error: ", 1)[-1])
 
 
 def check(options):

@@ -6,17 +6,17 @@ import sys
 from pathlib import Path
 
 from checks import fail
-from outcome import told_by
+from outcome import collect_remarks
 
 
-def result_in(results, name):
+def find_result(results, name):
     for place in ("sessions", "failed"):
         if (results / place / name / "row.json").is_file():
             return results / place / name
     fail(f"{results}: contains no result of {name}")
 
 
-def former_of(results, name, key):
+def find_former_result(results, name, key):
     folder = results / "former" / name
     found = [former for former in folder.iterdir() if former.name.startswith(key)] if folder.is_dir() else []
     if not found:
@@ -33,13 +33,13 @@ def load(folder):
     return row, empty | (json.loads(file.read_text()) if file.is_file() else {})
 
 
-def figures_of(session):
-    figures = {f"{metric['step']} {metric['name']}": metric["value"] for metric in session["metrics"]}
+def collect_values(session):
+    values = {f"{metric['step']} {metric['name']}": metric["value"] for metric in session["metrics"]}
     for name, value in session["calibration"].items():
         for i, one in enumerate(value if isinstance(value, list) else [value]):
             if isinstance(one, (int, float)):
-                figures[f"calibration {name}" + (f" {'xy'[i]}" if isinstance(value, list) else "")] = one
-    return figures
+                values[f"calibration {name}" + (f" {'xy'[i]}" if isinstance(value, list) else "")] = one
+    return values
 
 
 def words(value):
@@ -50,28 +50,28 @@ def changed_inputs(old_row, row):
     """The files and folders that differ; unknown for rows of earlier versions."""
     parts, old_parts = row.get("parts"), old_row.get("parts")
     if parts is None or old_parts is None:
-        return "the same" if row["inputs"] == old_row["inputs"] else "changed, not known which"
+        return "the same" if row["inputs"] == old_row["inputs"] else "changed, unknown which"
     changed = sorted(part for part in {*parts, *old_parts} if parts.get(part) != old_parts.get(part))
     return ", ".join(changed) or "the same"
 
 
-def lines_of(before, now):
-    """(row.json, session.json) of each."""
+def list_differences(before, now):
+    """Yields the lines of the comparison. Each argument is (row.json, session.json)."""
     (old_row, old), (row, new) = before, now
     yield f"verdict     {old_row['verdict']} -> {row['verdict']}" + (f": {row['reason']}" if row["reason"] else "")
     yield f"inputs      {changed_inputs(old_row, row)}"
     same = " (the same)" if old["version"] == new["version"] else ""
     yield f"version     {old['version'] or 'none'} -> {new['version'] or 'none'}{same}"
-    figures, old_figures = figures_of(new), figures_of(old)
-    differing = [name for name in {**old_figures, **figures} if figures.get(name) != old_figures.get(name)]
-    yield f"metrics     {len(differing)} of {len({**old_figures, **figures})} differ"
+    values, old_values = collect_values(new), collect_values(old)
+    differing = [name for name in {**old_values, **values} if values.get(name) != old_values.get(name)]
+    yield f"metrics     {len(differing)} of {len({**old_values, **values})} differ"
     for name in differing:
-        a, b = old_figures.get(name), figures.get(name)
+        a, b = old_values.get(name), values.get(name)
         by = f" ({b - a:+.3g})" if a is not None and b is not None else ""
         yield f"  {name}: {words(a)} -> {words(b)}{by}"
-    looks = [told_by(session)["remarks"] for session in (old, new)]
-    for sign, some, others in (("-", *looks), ("+", *reversed(looks))):
-        for line in some:
+    remarks = [collect_remarks(session)["remarks"] for session in (old, new)]
+    for sign, lines, others in (("-", *remarks), ("+", *reversed(remarks))):
+        for line in lines:
             if line not in others:
                 yield f"  {sign} {line}"
 
@@ -80,10 +80,12 @@ def main():
     if len(sys.argv) not in (3, 4):
         fail("--diff needs RESULTS CAMERA/SESSION and, if not the last former result, its KEY or OTHER_RESULTS")
     results, name, other = Path(sys.argv[1]), sys.argv[2].strip("/"), (sys.argv[3:] or [""])[0]
-    now = result_in(results, name)
-    before = result_in(Path(other), name) if other and Path(other).is_dir() else former_of(results, name, other)
+    now = find_result(results, name)
+    before = (
+        find_result(Path(other), name) if other and Path(other).is_dir() else find_former_result(results, name, other)
+    )
     print(f"{before} -> {now}")
-    for line in lines_of(load(before), load(now)):
+    for line in list_differences(load(before), load(now)):
         print(line)
 
 

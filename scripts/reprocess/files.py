@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Files that appear whole or not at all, and digests."""
+"""Tables, files that are written atomically, and digests."""
 import csv
 import hashlib
 import io
@@ -13,11 +13,11 @@ from pathlib import Path
 INPUTS = ["board.yaml", "boards", "camera.yaml", "check", "classifier.yaml", "dispersion", "gates.yaml", "lamps.yaml"]
 INPUTS += ["rotation"]
 # Maximum number of folders examined per session: links between folders can make the number of paths unlimited.
-MOST_FOLDERS = 1000
+MAX_FOLDERS = 1000
 
 
-# Characters at the start of a field that a spreadsheet reads as a formula, and as text after an apostrophe: OWASP's
-# "CSV injection". lib/captures/csv_writer.cpp writes the same.
+# First characters of a field that a spreadsheet evaluates as a formula unless an apostrophe precedes it (OWASP, "CSV
+# injection"). lib/captures/csv_writer.cpp escapes in the same way.
 FIRST_CHARACTERS = tuple("'=+-@\t\r")
 FORMULA = re.compile(r"'*[=+\-@\t\r].", re.DOTALL)
 
@@ -30,20 +30,20 @@ def is_number(text):
     return True
 
 
-def as_text(field):
-    """Puts an apostrophe before a field that a spreadsheet would calculate; numbers stay."""
+def escape_formula(field):
+    """Returns the field with an apostrophe in front if a spreadsheet would evaluate it. Numbers are unchanged."""
     text = str(field)
     if text[:1] not in FIRST_CHARACTERS:
         return field
     return "'" + text if FORMULA.match(text) and not is_number(text) else field
 
 
-def without_apostrophe(field):
-    """The opposite of as_text()."""
+def unescape_formula(field):
+    """Reverses escape_formula()."""
     return field[1:] if field.startswith("'") and FORMULA.match(field) else field
 
 
-def write_whole(file, text):
+def write_atomically(file, text):
     file = Path(file)
     file.parent.mkdir(parents=True, exist_ok=True)
     unfinished = file.with_name(f".{file.name}.{os.getpid()}")
@@ -54,27 +54,27 @@ def write_whole(file, text):
     os.replace(unfinished, file)
 
 
-def write_if_other(file, text):
-    """Leaves a file alone that says the same already, so that nothing counts as changed."""
+def write_if_changed(file, text):
+    """Writes a file unless it has this content already, so that its modification time changes only with its content."""
     file = Path(file)
     if not file.exists() or file.read_text() != text:
-        write_whole(file, text)
+        write_atomically(file, text)
 
 
 def table(columns, rows):
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows([as_text(row.get(column, "")) for column in columns] for row in rows)
+    writer.writerows([escape_formula(row.get(column, "")) for column in columns] for row in rows)
     return text.getvalue()
 
 
 def read_table(file):
-    """Of each line that is not empty what its columns hold, by name; a short one lacks the last."""
+    """Returns a dictionary {column: text} for each line that is not empty. A short line lacks the last columns."""
     with open(file, newline="") as stream:
         lines = csv.reader(stream)
         columns = next(lines, [])
-        return [dict(zip(columns, map(without_apostrophe, line))) for line in lines if line]
+        return [dict(zip(columns, map(unescape_formula, line))) for line in lines if line]
 
 
 def json_text(value):
@@ -94,8 +94,8 @@ def file_digest(file):
 
 
 def folder_id(entry, above):
-    """Device and inode of a folder; None of what is no folder, and of one in `above`, the folders on the way to it: a
-    link that leads back to one of these would have no end."""
+    """Returns device and inode of a folder. Returns None for other files, and for a folder in `above`, its parent
+    folders, because a link to one of these would be followed without end."""
     try:
         if not entry.is_dir():
             return None
@@ -107,9 +107,8 @@ def folder_id(entry, above):
 
 
 def input_files(session):
-    """The files below a session that the stages read: (name, entry), in order. Folders that cannot be
-    read have none; it is for the programs to say so. A link to a folder on the way to it is a file that cannot be
-    read."""
+    """Yields the input files of a session in order: (name, entry). A folder that cannot be read has no files; the
+    programs report the error. A link to a parent folder is treated as a file that cannot be read."""
 
     folders = 0
 
@@ -124,7 +123,7 @@ def input_files(session):
             if wanted and entry.name not in wanted:
                 continue
             found = folder_id(entry, above)
-            if found and folders < MOST_FOLDERS:
+            if found and folders < MAX_FOLDERS:
                 yield from below(entry.path, prefix + entry.name + "/", above | {found})
             else:
                 yield prefix + entry.name, entry
@@ -144,9 +143,9 @@ def entry_digest(entry):
 
 
 def input_digests(session):
-    """Of all that the stages read, and of each file and folder of it, by name."""
+    """Returns the digest of all inputs of a session, and {name: digest} of its input files and folders."""
     lines = {}
     for name, entry in input_files(session):
         lines.setdefault(name.split("/")[0], []).append(f"{entry_digest(entry)}  {name}\n")
-    texts = {name: "".join(of_it) for name, of_it in lines.items()}
+    texts = {name: "".join(listed) for name, listed in lines.items()}
     return digest("".join(texts.values())), {name: digest(text) for name, text in texts.items()}

@@ -1,68 +1,70 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which cameras changed over their sessions, and which lamps were moved, from fleet.csv and lamps.csv.
+"""Detects cameras that changed and lamps that were moved, from fleet.csv and lamps.csv.
 
-A figure's sessions are tried for a step at each session and, of a camera, for a steady drift: the weighted means
-before and after, or the slope, in units of their standard deviations; the largest |z| is the change point. The
-chance of any false alarm in the whole fleet is FALSE_ALARM_RATE at most: half of it is for drifts and half for
-steps, of which there are more, and a p counts as many times as there are tests of its kind (Bonferroni), which
-holds however figures go together. Axes of a camera's figures are tested apart, as they do.
+Each parameter of a camera is tested for a step at each session and for a steady drift, each lamp for a step at each
+session. Test statistics are the difference of the weighted means before and after the step, and the slope, divided by
+their standard deviations; the step with the largest |z| is the change point. The probability of any false alarm in the
+whole fleet is at most FALSE_ALARM_RATE: half of it is for drifts and half for steps, which are more numerous. A p value
+is multiplied by the number of tests of its kind (Bonferroni), which holds for any correlation of the parameters. The
+axes of a parameter are tested separately.
 
-A change that is called is a step, a drift or undecided, by the marginal likelihoods of the two models. Both have a mean
-and a change with the same wide prior; a step also has a date, with equal prior probability for each of its K sessions:
+A detected change is a step, a drift or undecided, by the marginal likelihoods of the two models. Both have a mean and a
+change with the same wide prior; a step also has a date, with equal prior probability for each of its K sessions:
   step:   mean over k of exp(z_k^2 / 2) sd_k        drift:   exp(z^2 / 2) sd
 z and sd are those of the change at session k and of the slope over all sessions. The mean over k is the penalty for the
 date. The kind is decided if one likelihood is MIN_ODDS times the other, a posterior probability of 95 % if steps and
 drifts are equally frequent. Otherwise it is "undecided", and the change and its date are those of the step.
 
-Stated standard deviations leave out what differs between sessions and not within one (the lens, the map). What
-neighboring sessions of the whole fleet differ by more than is stated has a standard deviation between sessions of
-its own, tau, for each figure: the variance of a session is sd^2 + tau^2. A factor on the stated ones would take
-those that state little for too certain. tau is of the smaller 95 % of the differences, so that the few cameras and
-lamps that changed do not hide themselves, and makes deviates smaller by 20 / n for being known from n of them: of
-deviates z that are divided by a factor with a relative variance v, exp(z^4 v / 2) times as many are beyond z as of
-the true one, which z^2 v / 2 of it makes good, with z = 4.5. v = 2 / n is not derived but chosen on the safe side,
-since a few are left out and neighbors go together: of all of n independent ones it would be 1 / (2 n). Of too few
-differences nothing is tested.
+The reported standard deviations exclude variations between sessions (of lens or map). If neighboring sessions of the
+whole fleet differ by more than reported, each parameter has a standard deviation between sessions, tau: the variance of
+a session is sd^2 + tau^2. (A factor on the reported standard deviations would be too small for sessions that report
+small ones.) tau is estimated from the smallest 95 % of the differences, so that the few cameras and lamps that changed
+do not increase it. It is then increased so that deviates decrease by a factor of 1 + 20 / n, because n differences
+determine it only approximately: if deviates are divided by a scale with relative variance v, exp(z^4 v / 2) times as
+many are beyond z as with the true scale. A relative decrease of the deviates by z^2 v / 2 compensates for that, with z
+= 4.5 and v = 2 / n. This v is a conservative choice, because some differences are excluded and neighboring ones are
+correlated; n independent ones would give 1 / (2 n). Nothing is tested with fewer than MIN_DIFFERENCES differences.
 
-A camera whose sessions scatter more than those of the fleet has a tau of its own (own_between_sessions()). The test
-compares the squares of the differences between neighboring sessions, over all its figures, with those that the tau
-of the fleet explains; the largest OWN_REJECTED of a series are left out, so that a change is not taken for scatter. The
-own tau has the same safety factor for few differences. Cameras of fewer than MIN_OWN_SESSIONS sessions have the tau of
-the fleet, and one that scatters more is called.
+A camera whose sessions scatter more than those of the fleet has its own tau (estimate_camera_taus()). The test
+compares the squared differences between neighboring sessions, over all its parameters, with those that the tau of the
+fleet explains. The largest OWN_REJECTED of a series are excluded, so that a change does not count as scatter. The same
+factor allows for few differences. Cameras with fewer than MIN_OWN_SESSIONS sessions have the tau of the fleet; one of
+them that scatters more causes an alarm.
 
-`least_found` says what the archive can show: the change of a figure that is called in FOUND_SHARE of cases, as of the
-sessions of the median series, a drift or a step in its middle.
+`min_detectable` is the change of a parameter that is detected with DETECTION_PROBABILITY, for the sessions of the
+median series: a drift, or a step in the middle.
 
-A lamp that moves by d is seen d off by the others. As seen by fixes that rest on it, too, lamp i is then
-  P_ij d / P_ii,   P = I - 11'/n - q q^H / |q|^2,
-off: q are the map's places as complex numbers, less their mean, and what P takes off is the four unknowns of a fix,
-a similarity of the floor plan (level camera, lamps of about one height). The lamp with the largest change
-is called, its effect on the others is taken off, and they are tried again.
+A lamp displaced by d has an apparent offset d relative to the other lamps. The fixes use this lamp, too. Therefore the
+apparent offset of lamp i is
+  P_ij d / P_ii,   P = I - 11'/n - q q^H / |q|^2.
+q are the positions in the map as complex numbers, relative to their mean. P projects out the four unknowns of a fix, a
+similarity of the floor plan (level camera, lamps of about one height). The lamp with the largest change is reported,
+its effect on the other lamps is removed, and they are tested again.
 """
 import math
 import statistics
 from collections import defaultdict
 
-from dates import days_of
-from outcome import TWO, sd_of
+from dates import days_since_1970
+from outcome import TRACKED_UNITS, sd_column
 
 FALSE_ALARM_RATE = 0.05
-FOUND_SHARE = 0.95
+DETECTION_PROBABILITY = 0.95
 NORMAL = statistics.NormalDist()
-MIN_ODDS = 19  # of a step to a drift or of a drift to a step, to decide which it is
-FEWEST_DIFFERENCES = 20
-MOST_DIFFERENCES = 4000  # they determine tau to 1 %
+MIN_ODDS = 19  # likelihood ratio at which step or drift is decided
+MIN_DIFFERENCES = 20
+MAX_DIFFERENCES = 4000  # enough for 1 % of tau
 TOLERANCE = 0.01  # of tau^2
-KEPT_SHARE = 0.95
+KEPT_FRACTION = 0.95
 VARIANCE_OF_KEPT = 0.7588  # of a normal deviate within 1.96: 1 - 2 * 1.96 phi(1.96) / 0.95
-OWN_P = 0.01  # chance that a camera is given a tau of its own without need, which costs sensitivity only
+OWN_P = 0.01  # probability of an unnecessary own tau, which only reduces the sensitivity
 MIN_OWN_SESSIONS = 8
-OWN_REJECTED = 2  # largest differences of a series: a step has one, a session with an error two
-OWN_VARIANCE_FACTOR = 1.6  # of the sum of squares: neighboring differences share a session (simulated, 8 to 50)
-LEAST_SD_MM = 1e-3
+OWN_REJECTED = 2  # largest differences of a series: a step causes one, an outlier two
+OWN_VARIANCE_FACTOR = 1.6  # for the sum of squares, as neighboring differences share a session (simulated: 8 to 50)
+MIN_SD_MM = 1e-3
 WITH_LEVER_ARM = ("zenith", "rotation_center", "dispersion_offset")
-FEWEST_LAMPS = 4  # of three a lamp that moved cannot be told
+MIN_LAMPS = 4  # among three a moved lamp cannot be identified
 
 
 def truncated_variance(fraction):
@@ -93,14 +95,15 @@ def solve_tau(groups, expected):
     return math.sqrt(high)
 
 
-def between_sessions(differences):
-    """Returns the standard deviation between sessions, tau; None of too few. differences: (square, stated variance)."""
-    differences = [one for one in differences if one[0]]
-    if len(differences) < FEWEST_DIFFERENCES:
+def estimate_tau(differences):
+    """Returns the standard deviation between sessions, tau; None with too few differences. differences: (square,
+    reported variance)."""
+    differences = [difference for difference in differences if difference[0]]
+    if len(differences) < MIN_DIFFERENCES:
         return None
-    some = differences[:: 1 + len(differences) // MOST_DIFFERENCES]
-    kept = math.ceil(KEPT_SHARE * len(some))
-    return solve_tau([(some, kept)], kept * VARIANCE_OF_KEPT / (1 + 20 / len(some)) ** 2)
+    sample = differences[:: 1 + len(differences) // MAX_DIFFERENCES]
+    kept = math.ceil(KEPT_FRACTION * len(sample))
+    return solve_tau([(sample, kept)], kept * VARIANCE_OF_KEPT / (1 + 20 / len(sample)) ** 2)
 
 
 def chi2_quantile(p, freedoms):
@@ -109,18 +112,18 @@ def chi2_quantile(p, freedoms):
     return freedoms * (1 - variance + NORMAL.inv_cdf(p) * math.sqrt(variance)) ** 3
 
 
-def own_between_sessions(figures, between):
-    """Returns {kind of figure: tau} of a camera whose sessions scatter significantly more than those of the fleet, for
-    the kinds with a larger tau than the fleet's; {} for other cameras. figures: those of camera_series()."""
+def estimate_camera_taus(columns, between):
+    """Returns {parameter: tau} for a camera whose sessions scatter significantly more than those of the fleet, for
+    parameters with a larger tau than the fleet's; {} for other cameras. columns: those of collect_camera_series()."""
     groups, total, expected, count = defaultdict(list), 0.0, defaultdict(float), 0
-    for figure, (_, series) in figures.items():
-        tau, differences = between.get(kind_of(figure)), neighbors(series)
+    for column, (_, series) in columns.items():
+        tau, differences = between.get(parameter_of(column)), squared_differences(series)
         if tau is None or len(series) < MIN_OWN_SESSIONS:
             continue
         kept = len(differences) - OWN_REJECTED
-        groups[kind_of(figure)].append((differences, kept))
-        fraction = (kept + 0.5) / len(differences)  # the cut is between two of them
-        expected[kind_of(figure)] += kept * truncated_variance(fraction)
+        groups[parameter_of(column)].append((differences, kept))
+        fraction = (kept + 0.5) / len(differences)  # the limit is between two differences
+        expected[parameter_of(column)] += kept * truncated_variance(fraction)
         total += sum_of_smallest(differences, kept, tau**2)
         count += kept
     freedoms = count / OWN_VARIANCE_FACTOR
@@ -133,87 +136,90 @@ def own_between_sessions(figures, between):
     return {kind: tau for kind, tau in own.items() if tau > between[kind]}
 
 
-def widened(series, tau):
-    """The series with what differs between sessions in its standard deviations."""
+def with_added_sd(series, tau):
+    """Returns the series with tau added to its standard deviations."""
     return [(value, math.hypot(sd, tau)) for value, sd in series]
 
 
-def neighbors(series):
-    """series: (value, sd). Of neighbors the square of their difference and its stated variance."""
+def squared_differences(series):
+    """Returns (square, reported variance) of the difference between neighboring sessions. series: (value, sd)."""
     return [((b - a) ** 2, s**2 + t**2) for (a, s), (b, t) in zip(series, series[1:])]
 
 
-def steps(series):
-    """Of each session but the first: the change there and its sd."""
+def compute_steps(series):
+    """Yields the step at each session except the first, and its sd."""
     weights = [1 / sd**2 for _, sd in series]
     total = sum(weights)
-    total_of = sum(weight * value for weight, (value, _) in zip(weights, series))
-    before = before_of = 0.0
+    weighted_total = sum(weight * value for weight, (value, _) in zip(weights, series))
+    before = weighted_before = 0.0
     for weight, (value, _) in zip(weights[:-1], series):
         before += weight
-        before_of += weight * value
+        weighted_before += weight * value
         after = total - before
-        yield (total_of - before_of) / after - before_of / before, math.sqrt(1 / before + 1 / after)
+        yield (weighted_total - weighted_before) / after - weighted_before / before, math.sqrt(1 / before + 1 / after)
 
 
-def drift(times, series):
-    """By how much a straight line changes from the first session to the last, and the sd; None in no time."""
+def compute_drift(times, series):
+    """Returns the change of the fitted line from the first session to the last, and its sd; None if all times are
+    equal."""
     weights = [1 / sd**2 for _, sd in series]
     middle = sum(weight * time for weight, time in zip(weights, times)) / sum(weights)
-    spread = sum(weight * (time - middle) ** 2 for weight, time in zip(weights, times))
+    sum_of_squares = sum(weight * (time - middle) ** 2 for weight, time in zip(weights, times))
     span = times[-1] - times[0]
-    if not spread > 0:
+    if not sum_of_squares > 0:
         return None
-    slope = sum(weight * (time - middle) * value for weight, time, (value, _) in zip(weights, times, series)) / spread
-    return slope * span, span / math.sqrt(spread)
+    slope = sum(weight * (time - middle) * value for weight, time, (value, _) in zip(weights, times, series))
+    slope /= sum_of_squares
+    return slope * span, span / math.sqrt(sum_of_squares)
 
 
-def p_of(z):
-    """Of a normal deviate, both sides."""
+def two_sided_p(z):
+    """Returns the two-sided tail probability of a standard normal deviate."""
     return math.erfc(abs(z) / math.sqrt(2))
 
 
-def times_of(rows):
-    """Days, or, where not all have a date, the sessions' numbers."""
-    days = [days_of(row["date"]) for row in rows]
+def session_times(rows):
+    """Returns the days since 1970; the indices of the sessions if a date is missing."""
+    days = [days_since_1970(row["date"]) for row in rows]
     return list(range(len(rows))) if None in days else days
 
 
-def in_order(rows):
-    """By date, or, where not all have one, by the sessions' names."""
+def sort_by_date(rows):
+    """Sorts rows by date; by the names of the sessions if a date is missing."""
     dated = all(row["date"] for row in rows)
     return sorted(rows, key=lambda row: (row["date"] if dated else "", row["session"], row["camera"]))
 
 
-def named(row):
+def identify(row):
     return {"camera": row["camera"], "session": row["session"], "date": row["date"]}
 
 
-def camera_series(rows):
-    """Of each camera, by name: {figure: (rows, [(value, sd)])}, of the sessions that state it. Where a camera has a
-    lever arm, a session that found none took it as zero, and has another zenith for that: it does not count."""
+def collect_camera_series(rows):
+    """Returns {camera: {column: (rows, [(value, sd)])}} from the sessions with a value. If a camera has a lever arm, a
+    session without one assumed zero, which changes its zenith: it is excluded."""
     by_camera = defaultdict(list)
     for row in rows:
         by_camera[row["camera"]].append(row)
     found = {}
-    for camera, of_it in sorted(by_camera.items()):
+    for camera, camera_rows in sorted(by_camera.items()):
         found[camera] = {}
-        of_it = in_order(of_it)
-        with_arm = [row for row in of_it if row["lever_arm_x_mm"]]
-        for name, unit in TWO.items():
+        camera_rows = sort_by_date(camera_rows)
+        with_arm = [row for row in camera_rows if row["lever_arm_x_mm"]]
+        for name, unit in TRACKED_UNITS.items():
             for axis in "xy":
-                figure = f"{name}_{axis}_{unit}"
-                some = with_arm if with_arm and name in WITH_LEVER_ARM else of_it
-                some = [row for row in some if row[figure] and float(row[sd_of(figure)] or 0) > 0]
-                if not all(row["date"] for row in of_it):
-                    some = in_order(some)  # those without a date may be out
-                if len(some) > 1:
-                    found[camera][figure] = (some, [(float(row[figure]), float(row[sd_of(figure)])) for row in some])
+                column = f"{name}_{axis}_{unit}"
+                used = with_arm if with_arm and name in WITH_LEVER_ARM else camera_rows
+                used = [row for row in used if row[column] and float(row[sd_column(column)] or 0) > 0]
+                if not all(row["date"] for row in camera_rows):
+                    used = sort_by_date(used)  # the rows without a date may be excluded
+                if len(used) > 1:
+                    series = [(float(row[column]), float(row[sd_column(column)])) for row in used]
+                    found[camera][column] = (used, series)
     return found
 
 
-def kind_of(figure):
-    return figure.rsplit("_", 2)[0]
+def parameter_of(column):
+    return column.rsplit("_", 2)[0]
 
 
 def log_sum_exp(values):
@@ -237,187 +243,202 @@ def decide_kind(step_changes, drift_change):
     return "step" if log_odds > 0 else "drift"
 
 
-def change_of(rows, series, tests):
-    """Returns the change of a figure. p: chance of a false alarm as significant as the more significant of the largest
-    step and the drift, anywhere in the fleet. The kind is decided apart from that, by likelihood."""
-    step_changes, drift_change = list(steps(series)), drift(times_of(rows), series)
+def find_change(rows, series, tests):
+    """Returns the change of a parameter. p: probability of a false alarm in the whole fleet that is at least as
+    significant as the largest step or the drift, whichever is more significant. The kind follows from the likelihoods.
+    """
+    step_changes, drift_change = list(compute_steps(series)), compute_drift(session_times(rows), series)
     k, (change, sd) = max(enumerate(step_changes, 1), key=lambda one: abs(one[1][0] / one[1][1]))
-    p = 2 * tests["step"] * p_of(change / sd)
+    p = 2 * tests["step"] * two_sided_p(change / sd)
     if drift_change:
-        p = min(p, 2 * tests["drift"] * p_of(drift_change[0] / drift_change[1]))
+        p = min(p, 2 * tests["drift"] * two_sided_p(drift_change[0] / drift_change[1]))
     kind = decide_kind(step_changes, drift_change)
     before, since = rows[k - 1], rows[k]
     if kind == "drift":
         (change, sd), before, since = drift_change, rows[0], rows[-1]
-    return {"kind": kind, "change": change, "sd": sd, "p": min(1.0, p), "before": named(before), "since": named(since)}
+    return {
+        "kind": kind,
+        "change": change,
+        "sd": sd,
+        "p": min(1.0, p),
+        "before": identify(before),
+        "since": identify(since),
+    }
 
 
-def usual(sds):
-    """The median sd of a change, of as many series as are worth the time."""
-    some = [sd for sd in (of_one() for of_one in sds[:: 1 + len(sds) // 1000]) if sd]
-    return statistics.median(some) if some else None
+def median_sd(sds):
+    """Returns the median sd of a change over a sample of the series; None if there is none. sds: functions."""
+    sample = [sd for sd in (compute() for compute in sds[:: 1 + len(sds) // 1000]) if sd]
+    return statistics.median(sample) if sample else None
 
 
-def sd_in_the_middle(series):
-    """Of a step."""
+def sd_of_middle_step(series):
+    """Returns the sd of a step in the middle of a series."""
     half = len(series) // 2
     return math.sqrt(sum(1 / sum(1 / sd**2 for _, sd in part) for part in (series[:half], series[half:])))
 
 
-def least_found_of(of_figures, between, tests):
-    """Of each kind of figure that is tried: {"drift", "step"}, in its unit. of_figures: (kind, times, series)."""
-    z = {kind: NORMAL.inv_cdf(FOUND_SHARE) - NORMAL.inv_cdf(FALSE_ALARM_RATE / 4 / max(1, tests[kind])) for kind in tests}
+def compute_min_detectable(all_series, between, tests):
+    """Returns {parameter: {"drift", "step"}} in the unit of the parameter. all_series: (parameter, times, series)."""
+    z = {
+        kind: NORMAL.inv_cdf(DETECTION_PROBABILITY) - NORMAL.inv_cdf(FALSE_ALARM_RATE / 4 / max(1, tests[kind]))
+        for kind in tests
+    }
     found = {}
-    for name in (name for name in TWO if between[name] is not None):
-        of_kind = [(times, widened(series, between[name])) for kind, times, series in of_figures if kind == name]
-        sds = {"drift": usual([lambda of=of: (drift(*of) or (0, None))[1] for of in of_kind])}
-        sds["step"] = usual([lambda of=of: sd_in_the_middle(of[1]) for of in of_kind])
+    for name in (name for name in TRACKED_UNITS if between[name] is not None):
+        of_kind = [(times, with_added_sd(series, between[name])) for kind, times, series in all_series if kind == name]
+        sds = {"drift": median_sd([lambda of=of: (compute_drift(*of) or (0, None))[1] for of in of_kind])}
+        sds["step"] = median_sd([lambda of=of: sd_of_middle_step(of[1]) for of in of_kind])
         found[name] = {kind: z[kind] * sd for kind, sd in sds.items() if sd}
     return found
 
 
-def least_found_of_lamps(rooms, tau, tests):
-    """In mm: a step in the middle, whatever its direction."""
-    series = [one for room in rooms for lamp in room.series for one in room.along(lamp, tau) if len(one) > 1]
-    z = math.sqrt(-2 * math.log(FALSE_ALARM_RATE / 2 / tests["step"])) + NORMAL.inv_cdf(FOUND_SHARE)
-    return {"step": z * usual([lambda one=one: sd_in_the_middle(one) for one in series])}
+def compute_min_detectable_of_lamps(rooms, tau, tests):
+    """Returns the smallest detectable step of a lamp in mm, in the middle of its sessions and in any direction."""
+    series = [axis for room in rooms for lamp in room.series for axis in room.axis_series(lamp, tau) if len(axis) > 1]
+    z = math.sqrt(-2 * math.log(FALSE_ALARM_RATE / 2 / tests["step"])) + NORMAL.inv_cdf(DETECTION_PROBABILITY)
+    return {"step": z * median_sd([lambda axis=axis: sd_of_middle_step(axis) for axis in series])}
 
 
-def smallness(change):
+def negative_significance(change):
     return -abs(change["change"] / change["sd"])
 
 
-def changed_cameras(cameras, between, own, tests):
+def find_changed_cameras(cameras, between, own, tests):
     alarms = []
-    for camera, figures in cameras.items():
+    for camera, columns in cameras.items():
         changes = []
         taus = between | own.get(camera, {})
-        for figure, (rows, series) in figures.items():
-            tau = taus.get(kind_of(figure))
+        for column, (rows, series) in columns.items():
+            tau = taus.get(parameter_of(column))
             if tau is not None:
-                changes.append({"figure": figure, **change_of(rows, widened(series, tau), tests)})
-        changes = sorted((one for one in changes if one["p"] < FALSE_ALARM_RATE), key=smallness)
+                changes.append({"column": column, **find_change(rows, with_added_sd(series, tau), tests)})
+        changes = sorted((change for change in changes if change["p"] < FALSE_ALARM_RATE), key=negative_significance)
         if changes:
             alarms.append({"camera": camera, "changes": changes})
-    return sorted(alarms, key=lambda alarm: smallness(alarm["changes"][0]))
+    return sorted(alarms, key=lambda alarm: negative_significance(alarm["changes"][0]))
 
 
 class Room:
-    """The lamps of a map over the sessions that were taken under them."""
+    """Lamps of a map over the sessions that detected them."""
 
     def __init__(self, name, rows):
         self.name = name
         by_session = defaultdict(dict)
         for row in rows:
             by_session[row["camera"], row["session"]][int(row["lamp"])] = row
-        by_session = [lamps for lamps in by_session.values() if len(lamps) >= FEWEST_LAMPS]
-        self.sessions = in_order([next(iter(lamps.values())) | {"lamps": lamps} for lamps in by_session])
-        self.series = defaultdict(list)  # of a lamp: [session, place off as a complex number, sd_x, sd_y]
+        by_session = [lamps for lamps in by_session.values() if len(lamps) >= MIN_LAMPS]
+        self.sessions = sort_by_date([next(iter(lamps.values())) | {"lamps": lamps} for lamps in by_session])
+        self.series = defaultdict(list)  # {lamp: [session, offset as a complex number, sd_x, sd_y]}
         for i, session in enumerate(self.sessions):
             for lamp, row in session["lamps"].items():
-                off = complex(float(row["offset_x_mm"]), float(row["offset_y_mm"]))
-                self.series[lamp].append([i, off, float(row["offset_x_sd_mm"]), float(row["offset_y_sd_mm"])])
-        for series in self.series.values():  # of few captures a scatter is small by chance
+                offset = complex(float(row["offset_x_mm"]), float(row["offset_y_mm"]))
+                self.series[lamp].append([i, offset, float(row["offset_x_sd_mm"]), float(row["offset_y_sd_mm"])])
+        for series in self.series.values():  # the scatter of few captures can be small by chance
             for axis in (2, 3):
-                usual = max(LEAST_SD_MM, statistics.median(one[axis] for one in series))
-                for one in series:
-                    one[axis] = max(one[axis], usual)
-        self.shares = {}
+                smallest = max(MIN_SD_MM, statistics.median(entry[axis] for entry in series))
+                for entry in series:
+                    entry[axis] = max(entry[axis], smallest)
+        self.influences = {}
 
-    def along(self, lamp, tau=0.0):
-        """Of x and of y: [(value, sd)]."""
+    def axis_series(self, lamp, tau=0.0):
+        """Returns the series of x and of y: [(value, sd)]."""
         series = self.series[lamp]
-        x = [(one[1].real, one[2]) for one in series]
-        return [widened(x, tau), widened([(one[1].imag, one[3]) for one in series], tau)]
+        x = [(offset.real, sd) for _, offset, sd, _ in series]
+        y = [(offset.imag, sd) for _, offset, _, sd in series]
+        return [with_added_sd(x, tau), with_added_sd(y, tau)]
 
-    def differences(self):
-        return [one for lamp in self.series for series in self.along(lamp) for one in neighbors(series)]
+    def squared_differences(self):
+        all_series = [series for lamp in self.series for series in self.axis_series(lamp)]
+        return [difference for series in all_series for difference in squared_differences(series)]
 
-    def tests(self):
+    def count_tests(self):
         return sum(len(series) - 1 for series in self.series.values())
 
-    def share(self, session, of, moved):
-        """By how much of a lamp's movement the fixes of a session see another one off."""
+    def influence(self, session, of, moved):
+        """Returns the ratio of the apparent offset of lamp `of` to the displacement of lamp `moved` in a session."""
         lamps = self.sessions[session]["lamps"]
         key = (frozenset(lamps), of, moved)
-        if key not in self.shares:
+        if key not in self.influences:
             place = {lamp: complex(float(row["map_x_m"]), float(row["map_y_m"])) for lamp, row in lamps.items()}
             middle = sum(place.values()) / len(place)
             q = {lamp: at - middle for lamp, at in place.items()}
             square = sum(abs(at) ** 2 for at in q.values())
             own = 1 - 1 / len(q) - abs(q[of]) ** 2 / square
-            self.shares[key] = (-1 / len(q) - q[of] * q[moved].conjugate() / square) / own if own > 1e-6 else 0
-        return self.shares[key]
+            self.influences[key] = (-1 / len(q) - q[of] * q[moved].conjugate() / square) / own if own > 1e-6 else 0
+        return self.influences[key]
 
-    def largest(self, tau):
-        """(chi-squared of 2 degrees, lamp, number in its series, change in x and y, their sd) of the change point."""
+    def find_largest_step(self, tau):
+        """Returns (chi-squared with 2 degrees of freedom, lamp, index in its series, change of x and y, their sds) of
+        the most significant step."""
         best = None
         for lamp in sorted(self.series):
-            x, y = (steps(series) for series in self.along(lamp, tau))
+            x, y = (compute_steps(series) for series in self.axis_series(lamp, tau))
             for k, ((dx, sx), (dy, sy)) in enumerate(zip(x, y), 1):
                 chi2 = (dx / sx) ** 2 + (dy / sy) ** 2
                 if best is None or chi2 > best[0]:
                     best = (chi2, lamp, k, complex(dx, dy), (sx, sy))
         return best
 
-    def take_off(self, moved, since, change):
+    def remove_displacement(self, moved, since, change):
         for lamp, series in self.series.items():
-            for one in series:
-                if one[0] >= since and moved in self.sessions[one[0]]["lamps"]:
-                    one[1] -= change if lamp == moved else self.share(one[0], lamp, moved) * change
+            for entry in series:
+                session = entry[0]
+                if session >= since and moved in self.sessions[session]["lamps"]:
+                    entry[1] -= change if lamp == moved else self.influence(session, lamp, moved) * change
 
-    def moved(self, tau, tests):
+    def find_moved_lamps(self, tau, tests):
         found = []
         for _ in range(2 * len(self.series)):
-            best = self.largest(tau)
+            best = self.find_largest_step(tau)
             if best is None or 2 * tests["step"] * math.exp(-best[0] / 2) >= FALSE_ALARM_RATE:
                 break
             chi2, lamp, k, change, sd = best
             before, since = self.series[lamp][k - 1][0], self.series[lamp][k][0]
-            alike = {row["camera"] for row in self.sessions[:since]} & {row["camera"] for row in self.sessions[since:]}
-            ends = {"before": named(self.sessions[before]), "since": named(self.sessions[since])}
-            figures = {"moved_mm": [change.real, change.imag], "sd_mm": list(sd)}
-            figures |= {"p": 2 * tests["step"] * math.exp(-chi2 / 2), "other_cameras": not alike}
-            found.append({"room": self.name[0], "map": self.name[1], "lamp": lamp, **figures, **ends})
-            self.take_off(lamp, since, change)
+            common = {row["camera"] for row in self.sessions[:since]} & {row["camera"] for row in self.sessions[since:]}
+            ends = {"before": identify(self.sessions[before]), "since": identify(self.sessions[since])}
+            values = {"displacement_mm": [change.real, change.imag], "sd_mm": list(sd)}
+            values |= {"p": 2 * tests["step"] * math.exp(-chi2 / 2), "other_cameras": not common}
+            found.append({"room": self.name[0], "map": self.name[1], "lamp": lamp, **values, **ends})
+            self.remove_displacement(lamp, since, change)
         return found
 
 
-def rooms_of(rows):
+def make_rooms(rows):
     by_room = defaultdict(list)
     for row in rows:
         by_room[row["room"], row["map"]].append(row)
-    return [Room(name, of_it) for name, of_it in sorted(by_room.items())]
+    return [Room(name, room_rows) for name, room_rows in sorted(by_room.items())]
 
 
-def fleet_of(rows, lamp_rows):
-    """What changed, for changes.json: rows of fleet.csv and of lamps.csv."""
-    cameras, rooms = camera_series(rows), rooms_of(lamp_rows)
-    of_figures = [
-        (kind_of(figure), times_of(of_it), series)
-        for figures in cameras.values()
-        for figure, (of_it, series) in figures.items()
+def analyze_fleet(rows, lamp_rows):
+    """Returns the section `fleet` of changes.json. rows: of fleet.csv; lamp_rows: of lamps.csv."""
+    cameras, rooms = collect_camera_series(rows), make_rooms(lamp_rows)
+    all_series = [
+        (parameter_of(column), session_times(used), series)
+        for columns in cameras.values()
+        for column, (used, series) in columns.items()
     ]
     between = {}
-    for name in TWO:
-        of_name = [one for kind, _, series in of_figures if kind == name for one in neighbors(series)]
-        between[name] = between_sessions(of_name)
-    pairs = sum(max(0, len(room.sessions) - 1) for room in rooms)  # the lamps of a session go together
-    enough = 2 * pairs >= FEWEST_DIFFERENCES
-    tau_mm = between_sessions([one for room in rooms for one in room.differences()]) if enough else None
+    for name in TRACKED_UNITS:
+        of_parameter = [series for parameter, _, series in all_series if parameter == name]
+        between[name] = estimate_tau([one for series in of_parameter for one in squared_differences(series)])
+    pairs = sum(max(0, len(room.sessions) - 1) for room in rooms)  # the lamps of a session are correlated
+    has_enough_pairs = 2 * pairs >= MIN_DIFFERENCES
+    tau_mm = estimate_tau([one for room in rooms for one in room.squared_differences()]) if has_enough_pairs else None
     between["lamps"] = tau_mm
-    tried = [series for kind, _, series in of_figures if between[kind] is not None]
+    tried = [series for kind, _, series in all_series if between[kind] is not None]
     tests = {"drift": len(tried), "step": sum(len(series) - 1 for series in tried)}
     if tau_mm is not None:
-        tests["step"] += sum(room.tests() for room in rooms)
-    least_found = least_found_of(of_figures, between, tests)
+        tests["step"] += sum(room.count_tests() for room in rooms)
+    min_detectable = compute_min_detectable(all_series, between, tests)
     moved = []
     if tau_mm is not None:
-        least_found["lamps"] = least_found_of_lamps(rooms, tau_mm, tests)
-        moved = [lamp for room in rooms for lamp in room.moved(tau_mm, tests)]
-    own = {camera: own_between_sessions(figures, between) for camera, figures in cameras.items()}
+        min_detectable["lamps"] = compute_min_detectable_of_lamps(rooms, tau_mm, tests)
+        moved = [lamp for room in rooms for lamp in room.find_moved_lamps(tau_mm, tests)]
+    own = {camera: estimate_camera_taus(columns, between) for camera, columns in cameras.items()}
     own = {camera: taus for camera, taus in own.items() if taus}
-    alarms = changed_cameras(cameras, between, own, tests)
-    found = {"between_sessions": between, "own_between_sessions": own, "least_found": least_found}
+    alarms = find_changed_cameras(cameras, between, own, tests)
+    found = {"between_sessions": between, "between_sessions_of_camera": own, "min_detectable": min_detectable}
     found |= {"cameras": alarms, "lamps": moved}
     return {"false_alarm_rate": FALSE_ALARM_RATE, "tests": tests, **found}

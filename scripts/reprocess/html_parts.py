@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Parts of the overview."""
+"""HTML elements of the overview."""
 from html import escape
 
-MOST_ROWS = 200  # of a table
+MAX_ROWS = 200  # of a table
 
 
 def table(columns, rows, where="summary.csv"):
     head = "".join(f'<th scope="col">{escape(column)}</th>' if column else "<td></td>" for column in columns)
-    cells = ["".join(f"<td>{escape(str(cell))}</td>" for cell in row) for row in rows[:MOST_ROWS]]
+    cells = ["".join(f"<td>{escape(str(cell))}</td>" for cell in row) for row in rows[:MAX_ROWS]]
     body = "".join(f"<tr>{row}</tr>\n" for row in cells)
-    more = f"<p>and {len(rows) - MOST_ROWS} more, in {where}</p>" if len(rows) > MOST_ROWS else ""
+    more = f"<p>and {len(rows) - MAX_ROWS} more, in {where}</p>" if len(rows) > MAX_ROWS else ""
     scrolled = '<div class="wide" tabindex="0" role="region" aria-label="Table">'
     return f"{scrolled}<table><thead><tr>{head}</tr></thead><tbody>\n{body}</tbody></table></div>{more}\n"
 

@@ -9,20 +9,20 @@ INPUTS = ("lamps.yaml", "rotation", "boards", "board.yaml", "camera.yaml")
 MIN_INPUTS = 2  # names that make a folder a session; one can be the name of a camera
 
 
-def folders_in(folder):
+def list_folders(folder):
     with os.scandir(folder) as entries:
         return sorted(entry.name for entry in entries if not entry.name.startswith(".") and entry.is_dir())
 
 
-def sessions_in(archive):
-    return [f"{camera}/{session}" for camera in folders_in(archive) for session in folders_in(archive / camera)]
+def list_sessions_in(archive):
+    return [f"{camera}/{session}" for camera in list_folders(archive) for session in list_folders(archive / camera)]
 
 
 def is_session(folder):
     return sum(os.path.exists(folder / name) for name in INPUTS) >= MIN_INPUTS
 
 
-def missing_inputs(session):
+def find_missing_inputs(session):
     """Returns the required inputs that the folder lacks."""
     names = ["lamps.yaml", "rotation"]
     if not os.path.exists(session / "camera.yaml"):
@@ -31,14 +31,15 @@ def missing_inputs(session):
 
 
 def describe_wrong_level(archive):
-    """Returns a line if ARCHIVE is another folder than the one that holds the cameras; "" if it is not."""
+    """Returns a line if ARCHIVE is another folder than the one that contains the cameras; "" otherwise."""
     if is_session(archive):
+        # [ARCHIVE-1] `too deep`, `too high`
         return f"{archive} is a session, two levels too deep: give {archive.parent.parent}"
-    cameras = folders_in(archive)
+    cameras = list_folders(archive)
     if any(is_session(archive / camera) for camera in cameras):
         return f"{archive} holds sessions in place of cameras, one level too deep: give {archive.parent}"
-    for name in sessions_in(archive):
-        if any(is_session(archive / name / below) for below in folders_in(archive / name)):
+    for name in list_sessions_in(archive):
+        if any(is_session(archive / name / below) for below in list_folders(archive / name)):
             return f"{archive} is one level too high: give {archive / name.split('/')[0]}"
     return ""
 
@@ -47,11 +48,13 @@ def check_layout(archive, names):
     """Returns a line if no session has any input; "" otherwise."""
     if any(os.path.exists(archive / name / file) for name in names for file in INPUTS):
         return ""
+    # [ARCHIVE-1] `has any input`
     return describe_wrong_level(archive) or f"{archive}: none of its {len(names)} sessions has any input; {LAYOUT}"
 
 
 def describe_missing_inputs(archive, names):
     """Returns for example "rotation is missing in 3 sessions"; "" if no session lacks an input."""
-    missing = Counter(input_name for name in names for input_name in missing_inputs(archive / name))
+    missing = Counter(input_name for name in names for input_name in find_missing_inputs(archive / name))
+    # [ARCHIVE-2] `missing in`
     words = [f"{name} is missing in {count} session{'s' * (count > 1)}" for name, count in missing.most_common()]
     return ", ".join(words) + f"; {LAYOUT}" if words else ""

@@ -1,51 +1,52 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of the overview, drawn by gnuplot, as data for <img>."""
+"""Plots of the overview, rendered by gnuplot, as data URLs for <img>."""
 import base64
 import subprocess
 
 from files import read_table
 
-BEFORE, NOW = "#E69F00", "#0072B2"  # of the palette of Okabe and Ito
-MOST_POINTS = 4000
+BEFORE, NOW = "#E69F00", "#0072B2"  # from the palette of Okabe and Ito
+MAX_POINTS = 4000
 BETWEEN = "(0.02, 0.05, 0.2, 0.5, 2, 5, 20, 50, 200, 500)"  # marks on logarithmic axes
 
 
-def drawn(script, size="640,420"):
+def render(script, size="640,420"):
     head = f"set terminal svg size {size} font 'sans,14' background 'white'\nset grid lc rgb '#cccccc'\n"
     run = subprocess.run(["gnuplot"], input=(head + script).encode(), capture_output=True, check=True)
     return "data:image/svg+xml;base64," + base64.b64encode(run.stdout).decode()
 
 
 def block(name, points):
-    """A table of numbers, thinned out evenly when it is long."""
-    step = max(1, -(-len(points) // MOST_POINTS))
+    """Formats a data block of gnuplot. A long one is thinned out evenly."""
+    step = max(1, -(-len(points) // MAX_POINTS))
     lines = [" ".join(f"{number:.6g}" for number in point) for point in points[::step]]
     return f"${name} << END\n" + "\n".join(lines) + "\nEND\n"
 
 
-def shares(values):
+def cumulative_fractions(values):
     values = sorted(values)
     return [(value, (i + 1) / len(values)) for i, value in enumerate(values)]
 
 
 def distribution(now, before):
-    script = block("now", shares(now)) + "set xlabel 'mean horizontal error of a session (mm)'\n"
-    script += "set ylabel 'share of the sessions'\nset yrange [0:1]\nset key bottom right\nset logscale x\n"
+    script = block("now", cumulative_fractions(now)) + "set xlabel 'mean horizontal error of a session (mm)'\n"
+    script += "set ylabel 'fraction of the sessions'\nset yrange [0:1]\nset key bottom right\nset logscale x\n"
     script += f"set xtics add {BETWEEN}\n"
     plots = [f"$now using 1:2 with lines lw 2 lc rgb '{NOW}' title 'now'"]
     if before:
-        script += block("before", shares(before))
+        script += block("before", cumulative_fractions(before))
         plots.insert(0, f"$before using 1:2 with lines lw 2 dt 2 lc rgb '{BEFORE}' title 'before'")
-    return drawn(script + "plot " + ", ".join(plots) + "\n")
+    return render(script + "plot " + ", ".join(plots) + "\n")
 
 
 def scatter(pairs):
     """pairs: (before, now)."""
     script = block("pairs", pairs) + "set xlabel 'before (mm)'\nset ylabel 'now (mm)'\nset logscale xy\n"
     script += f"set size square\nset key top left\nset xtics add {BETWEEN}\nset ytics add {BETWEEN}\n"
-    script += f"plot x with lines lc rgb '#888888' title 'the same', $pairs with points pt 7 ps 0.4 lc rgb '{NOW}' title 'a session'\n"
-    return drawn(script, "520,520")
+    script += "plot x with lines lc rgb '#888888' title 'equal', "
+    script += f"$pairs with points pt 7 ps 0.4 lc rgb '{NOW}' title 'a session'\n"
+    return render(script, "520,520")
 
 
 def over_time(series, words, dated, since=None):
@@ -66,7 +67,7 @@ def over_time(series, words, dated, since=None):
         script += f"$series{number} << END\n{lines}\nEND\n"
         style = f"with yerrorbars pt 7 ps 0.5 lc rgb '{(NOW, BEFORE)[number % 2]}' title '{name}'"
         plots.append(f"$series{number} using 1:2:3 {style}")
-    return drawn(script + "plot " + ", ".join(plots) + "\n", "640,320")
+    return render(script + "plot " + ", ".join(plots) + "\n", "640,320")
 
 
 def errors(truth_file, fixes_file):
@@ -81,7 +82,7 @@ def errors(truth_file, fixes_file):
 
 
 def floor(truth_file, before_file, now_file):
-    """Error vectors over the floor, before and now, so much larger that the largest is well seen."""
+    """Returns a plot of the error vectors over the floor, before and now, and the factor by which they are enlarged."""
     before, now = errors(truth_file, before_file), errors(truth_file, now_file)
     if not before or not now:
         return None, 0
@@ -94,4 +95,4 @@ def floor(truth_file, before_file, now_file):
     script += "set size ratio -1\nset xlabel 'x (m)'\nset ylabel 'y (m)'\nset offsets graph 0.1, 0.1, 0.1, 0.1\n"
     script += f"plot $before with vectors lw 2 dt 2 lc rgb '{BEFORE}' title 'before', "
     script += f"$now with vectors lw 2 lc rgb '{NOW}' title 'now'\n"
-    return drawn(script, "520,380"), scale
+    return render(script, "520,380"), scale

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Applies --session-gates (vlp-gates/1) to the rows of sessions that have no gates.yaml of their own.
 
-vlp-calibrate runs without these gates, so that other gates need no other calibration: a row has the metrics and the
-gates of session.json (`gate_metrics`), and the verdict follows from them as in lib/session/session.cpp. A gate of the
+vlp-calibrate runs without these gates, so that a change of the gates requires no new calibration. A row has the metrics
+and gates of session.json (`gate_metrics`), from which the verdict follows as in lib/session/session.cpp. A gate of the
 file replaces the gate of the lens with the same name.
 """
 import json
@@ -12,7 +12,7 @@ import yaml
 
 # Metrics with a lower limit; all others have an upper limit.
 AT_LEAST = ("mtf50", "mtf50_worst_ratio", "coverage", "views", "board_tilt_deg")
-UNITS = ("px", "mm", "deg")  # suffixes of the metrics' names
+UNITS = ("px", "mm", "deg")  # suffixes of the names of metrics
 
 
 def read_limits(file):
@@ -27,10 +27,10 @@ def is_met(name, value, limit):
 
 
 def describe_missed(name, value, limit):
-    """Returns the words of vlp-calibrate, for example "mean_mm is 1.25 mm, at most 1 mm is asked for"."""
+    """Returns the text of vlp-calibrate, for example "mean_mm is 1.25 mm, at most 1 mm is required"."""
     unit = next((f" {unit}" for unit in UNITS if name.endswith(f"_{unit}")), "")
     measured = "not known" if value is None else f"{value:.4g}{unit}"
-    return f"{name} is {measured}, {'at least' if name in AT_LEAST else 'at most'} {limit:.4g}{unit} is asked for"
+    return f"{name} is {measured}, {'at least' if name in AT_LEAST else 'at most'} {limit:.4g}{unit} is required"
 
 
 def apply_session_gates(row, limits):
@@ -41,5 +41,5 @@ def apply_session_gates(row, limits):
     gates = known["gates"] | limits
     checked = [(name, known["metrics"].get(name), limit) for name, limit in gates.items()]
     missed = [describe_missed(*gate) for gate in checked if not is_met(*gate)]
-    passed = "look" if row["remarks"] or row["rejected_lamps"] else "pass"
+    passed = "review" if row["remarks"] or row["rejected_lamps"] else "pass"
     row["verdict"], row["reason"] = ("gate", "; ".join(missed)) if missed else (passed, "")

@@ -1,34 +1,37 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 """Joins the rows of the shards, in RESULTS, applies --session-gates, and writes summary.csv (a row per session),
-fleet.csv (a row per session with a calibration: its metrics over time) and lamps.csv (a row per session and lamp: its
-position according to the other lamps)."""
+fleet.csv (a row per session with a calibration) and lamps.csv (a row per session and lamp: its position relative to
+the other lamps)."""
 import gc
 import json
 import re
 from pathlib import Path
 
-from files import read_table, table, write_whole
-from outcome import COLUMNS, FLEET, LAMPS
+from files import read_table, table, write_atomically
+from outcome import SUMMARY_COLUMNS, FLEET_COLUMNS, LAMP_COLUMNS
 from session_gates import apply_session_gates
 
 
-def lamps_of(row):
+def make_lamp_rows(row):
     for lamp in json.loads(row["lamps"]) if row["lamps"] else []:
-        figures = {"lamp": lamp["lamp"], "captures": lamp["captures"]}
+        offsets = {"lamp": lamp["lamp"], "captures": lamp["captures"]}
         for i, axis in enumerate("xy"):
-            figures[f"map_{axis}_m"] = f"{lamp['map_m'][i]:.6g}"
-            figures[f"offset_{axis}_mm"] = f"{lamp['offset_mm'][i]:.6g}"
-            figures[f"offset_{axis}_sd_mm"] = f"{lamp['offset_sd_mm'][i]:.6g}"
-        yield row | figures
+            offsets[f"map_{axis}_m"] = f"{lamp['map_m'][i]:.6g}"
+            offsets[f"offset_{axis}_mm"] = f"{lamp['offset_mm'][i]:.6g}"
+            offsets[f"offset_{axis}_sd_mm"] = f"{lamp['offset_sd_mm'][i]:.6g}"
+        yield row | offsets
 
 
-def costs_in(folder):
-    """Of each session the processor time of its last result, as text; of none when .state was taken away since."""
+def read_costs(folder):
+    """Returns the processor time of the last result of each session as text. Sessions are missing if .state was removed
+    since."""
     costs = {}
     for file in filter(Path.is_file, folder.glob("*")):
         for line in file.read_text().splitlines():
-            if whole := re.fullmatch(r"([^\t]+)\t([\d.]+)\t(\d+\.\d{3})", line):  # some may be cut off by a kill
+            if whole := re.fullmatch(
+                r"([^\t]+)\t([\d.]+)\t(\d+\.\d{3})", line
+            ):  # a killed process may leave an incomplete line
                 name, cost, at = whole.groups()
                 costs[name] = max(costs.get(name, (0, "")), (float(at), cost))
     return {name: cost for name, (_, cost) in costs.items()}
@@ -38,7 +41,7 @@ def main():
     shards = sorted(file.stem for file in Path(".state/shards").glob("*.list"))
     stated = {(row["camera"], row["session"]): row for row in read_table(".state/dates.csv")}
     rows = [row for shard in shards for row in read_table(f".state/rows/{shard}.csv")]
-    costs = costs_in(Path(".state/costs"))
+    costs = read_costs(Path(".state/costs"))
     limits = json.loads(Path(".state/session_gates.json").read_text())
     rows.sort(key=lambda row: (row["camera"], row["session"]))
     for row in rows:
@@ -47,11 +50,11 @@ def main():
         row |= {"date": known["date"], "room": known["room"]}
         row["cpu_s"] = costs.get(f"{row['camera']}/{row['session']}", "")
     calibrated = [row for row in rows if row["focal_x_px"]]
-    write_whole("lamps.csv", table(LAMPS, (lamp for row in calibrated for lamp in lamps_of(row))))
-    write_whole("fleet.csv", table(FLEET, calibrated))
-    write_whole("summary.csv", table(COLUMNS, rows))
+    write_atomically("lamps.csv", table(LAMP_COLUMNS, (lamp for row in calibrated for lamp in make_lamp_rows(row))))
+    write_atomically("fleet.csv", table(FLEET_COLUMNS, calibrated))
+    write_atomically("summary.csv", table(SUMMARY_COLUMNS, rows))
 
 
 if __name__ == "__main__":
-    gc.disable()  # of an archive's many rows none go in circles
+    gc.disable()  # saves time: the many rows of an archive have no reference cycles
     main()

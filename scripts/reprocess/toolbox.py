@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""What sessions are reprocessed with."""
+"""Version and digest of the programs with which sessions are reprocessed."""
 import subprocess
 from pathlib import Path
 
@@ -10,9 +10,9 @@ PROGRAMS = ["vlp-calibrate", "vlp-evaluate"]  # the second compares captures for
 
 
 def toolbox(folder):
-    """The version that vlp-calibrate states, and a digest of it and of what reads its results."""
+    """Returns the version of vlp-calibrate, and a digest of it and of the script that reads its results."""
     program = folder / PROGRAMS[0]
-    # At the same time: a start takes a fifth of a second, of which the libraries are most.
+    # Both run in parallel, because a start takes 0.2 s, mostly to load libraries.
     nothing = subprocess.DEVNULL
     with subprocess.Popen([program, "--batch-stdin"], stdin=nothing, stdout=nothing, stderr=nothing) as each:
         stated = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout

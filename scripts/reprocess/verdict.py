@@ -6,7 +6,15 @@ import sys
 import time
 from pathlib import Path
 
-from changes import HAVE_RESULT, count_reasons, is_incomplete, listed_items, load, name_of, sessions_beyond_gates
+from changes import (
+    VERDICTS_WITH_RESULT,
+    count_reasons,
+    is_incomplete,
+    collect_gate_items,
+    load_json,
+    session_name,
+    count_failed_sessions,
+)
 from checks import INCOMPLETE
 from files import read_table
 from layout import describe_missing_inputs
@@ -15,12 +23,12 @@ MAX_NAMES = 20  # in a line on stdout; changes.json has all
 MAX_REASONS = 3
 
 
-def this_run(state, sessions):
-    ran = {}  # a session may come twice, when a job is submitted again
+def describe_run(state, sessions):
+    ran = {}  # a session may occur twice if its job was submitted again
     for file in sorted((state / "ran").glob("*")):
         for line in file.read_text().splitlines():
-            name, *told = line.split("\t")
-            ran[name] = told
+            name, *columns = line.split("\t")
+            ran[name] = columns
     failed = sum(verdict in ("no result", "crashed") for verdict, _, _ in ran.values())
     cpu_s = sum(float(cost) for _, cost, _ in ran.values())
     size = sum(int(size) for _, _, size in ran.values())
@@ -36,8 +44,10 @@ def join_items(items, separator=", "):
 
 def describe_incomplete(archive, rows):
     """Returns a line: how many sessions have no result, and the most frequent reason."""
-    failed = [name_of(row) for row in rows if row["verdict"] not in HAVE_RESULT]
+    failed = [session_name(row) for row in rows if row["verdict"] not in VERDICTS_WITH_RESULT]
     reason, count = count_reasons(rows)[0]
+    # [ARCHIVE-2] `have no result` | exit code 3: no result, or above `no_result` or `no_result_fraction` of `--gates`
+    #   | reasons and missing inputs follow
     words = f"{len(failed)} of {len(rows)} sessions have no result; {count} of them: {reason}"
     missing = describe_missing_inputs(archive, failed)
     return words + (f"; {missing}" if missing else "")
@@ -45,19 +55,21 @@ def describe_incomplete(archive, rows):
 
 def describe_missed_gate(gate, items):
     value = "has no value" if gate["value"] is None else f"is {gate['value']:.4g}"
+    # [ARCHIVE-4] `is allowed` | exit code 1 (3: `no_result`, `no_result_fraction`); `vanished`: session no longer in
+    #   the archive | see the message
     words = f"reprocess.sh: gate {gate['name']}: {value}, at most {gate['limit']} is allowed"
     return words + (f": {join_items(items[gate['name']], '; ')}" if items.get(gate["name"]) else "")
 
 
 def main():
     results = Path(sys.argv[1])
-    document, rows = load(results / "changes.json"), read_table(results / "summary.csv")
+    document, rows = load_json(results / "changes.json"), read_table(results / "summary.csv")
     counts, changes, fleet = document["counts"], document["changes"], document["fleet"]
-    items = listed_items(document["vanished"], document["lost_results"], fleet)
+    items = collect_gate_items(document["vanished"], document["lost_results"], fleet)
     cost_s = sum(float(row["cpu_s"] or 0) for row in rows)
-    print(f"this run    {this_run(results / '.state', counts['sessions'])}")
+    print(f"this run    {describe_run(results / '.state', counts['sessions'])}")
     print(f"passed      {counts['pass']}")
-    print(f"look        {counts['look']} passed with remarks; see the overview")
+    print(f"review      {counts['review']} passed with remarks; see the overview")
     print(f"gates       {counts['gate']} with a result that misses a gate")
     print(f"no result   {counts['no_result']}, and {counts['crashed']} that crashed; see failed/")
     for reason, count in count_reasons(rows)[:MAX_REASONS]:
@@ -68,23 +80,26 @@ def main():
         print(f"vanished    {len(items['vanished'])} no longer in the archive: {join_items(items['vanished'])}")
     if "median_mm" in counts:
         print(f"error       {counts['median_mm']:.3f} mm in the median session, 90 % below {counts['p90_mm']:.3f} mm")
-    print(f"cost        {cost_s:.1f} s of processor time for all results, {cost_s / counts['sessions']:.2f} s a session")
+    print(
+        f"cost        {cost_s:.1f} s of processor time for all results, {cost_s / counts['sessions']:.2f} s a session"
+    )
     print(f"fleet       {len(fleet['cameras'])} cameras changed, {len(fleet['lamps'])} lamps were moved")
     if changes:
         print(f"changed     {changes['better']} better, {changes['worse']} worse, {changes['same']} the same,", end=" ")
         print(f"{len(changes['newly_failed'])} newly without a result: {changes.get('verdict', 'nothing to compare')}")
-        if changes["other_inputs"]:
-            lost = len(changes["lost_with_other_inputs"])
-            print(f"inputs      {changes['other_inputs']} with changed inputs, {lost} of them lost their result")
+        if changes["changed_inputs"]:
+            lost = len(changes["lost_with_changed_inputs"])
+            print(f"inputs      {changes['changed_inputs']} with changed inputs, {lost} of them lost their result")
     print(f"overview    {results / 'overview.html'}")
     for gate in document["gates"]:
         if not gate["passed"]:
             print(describe_missed_gate(gate, items), file=sys.stderr)
-    if beyond := sessions_beyond_gates(counts, document["gates"]):
+    if beyond := count_failed_sessions(counts, document["gates"]):
         many = f"{beyond} of {counts['sessions']} sessions"
+        # [ARCHIVE-4] `miss a gate`
         print(f"reprocess.sh: {many} miss a gate of their own; gate_fraction of --gates allows more", file=sys.stderr)
     if is_incomplete(counts, document["gates"]):
-        archive = Path(load(results / ".state/run.json")["archive"])
+        archive = Path(load_json(results / ".state/run.json")["archive"])
         print(f"reprocess.sh: error: {describe_incomplete(archive, rows)}", file=sys.stderr)
         return INCOMPLETE
     return 0 if document["passed"] else 1

@@ -308,7 +308,7 @@ class ForeignScene {
 
   LampShot draw_shot(int index) {
     random_ = make_seeded_generator(seed_, "foreign lights", static_cast<std::size_t>(index));
-    set_.lamps->spots_m = {{random_.uniform(-0.7, 0.7), random_.uniform(-0.3, 0.3)}};
+    set_.lamps->pivots_m = {{random_.uniform(-0.7, 0.7), random_.uniform(-0.3, 0.3)}};
     set_.lamps->heights_m = {random_.uniform(0.0, 0.7)};
     set_.lamps->yaws_rad = {random_.uniform(0.0, 2 * std::numbers::pi)};
     scene_.seed = draw_random_seed(random_);

@@ -1,19 +1,19 @@
 #!/usr/bin/python3
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""What scripts/reprocess.sh finds out about a rendered fleet of which it is known what happened to it.
+"""Tests the detection of changes by scripts/reprocess.sh with a rendered fleet of known truth.
 
     reprocess_fleet.py FOLDER [--programs BIN] [--seed N] [--quiet-year] [--only-figures]
 
-20 cameras with 10 sessions each, evenly over a year, in two rooms by turns: units and rooms of datasets/archive, with a
-map of each room that stays as it was surveyed, and 28 images of the board and 24 of the turn, for 20 and 12, which show
-a tilt of 0.02 degrees in 4 of 5 such fleets only. The focal length of one camera drifts by 0.1 % over the year, the tilt of
-another by 0.02 degrees, the image center of a third by 0.3 px; a lamp is moved by 1 mm on a day, in the other room one
-by 5 mm. --quiet-year: nothing of it happens. Rendered, calibrated by reprocess.sh, and printed: which cameras and lamps
-it calls, when and by how much, and for each figure how far it is from the truth in units of what its session states.
-What stands in FOLDER already is not made again, so that it goes on where it was interrupted; --only-figures renders and
-calibrates nothing. Exit code 1 when a change is missed, dated wrongly or by more than five standard deviations off, or
-something is called that did not happen.
+Renders 20 cameras with 10 sessions each, evenly over a year, alternately in two rooms, from datasets/archive. The maps
+of the rooms stay unchanged. Sessions have 28 images of the board and 24 of the rotation instead of 20 and 12, with
+which a tilt of 0.02 degrees is detected only in 4 of 5 such fleets. The focal length of one camera drifts by 0.1 % over
+the year, the tilt of another by 0.02 degrees, the principal point of a third by 0.3 px; a lamp of one room is moved by
+1 mm on one day, one of the other room by 5 mm. --quiet-year: no changes. Calibrates the sessions with reprocess.sh and
+prints the detected cameras and lamps with dates and sizes, and for each parameter its error divided by the reported
+standard deviation. Existing files in FOLDER are reused, so that an interrupted run continues; --only-figures neither
+renders nor calibrates. Exit code 1 if a change is missed, has a wrong date or an error of more than five standard
+deviations, or if an unchanged camera or lamp is reported.
 """
 import argparse
 import datetime
@@ -38,7 +38,7 @@ except ImportError:
     print("snakemake is missing: scripts/setup.sh --batch")
     sys.exit(77)
 import fleet
-from files import read_table, table, write_whole
+from files import read_table, table, write_atomically
 
 CAMERAS, SESSIONS, DAYS = 20, 10, 365
 BOARDS, YAWS = 28, 12
@@ -47,12 +47,12 @@ FOCAL, TILT, CENTER = (3, 0.001), (8, 0.02), (15, 0.3)
 MOVED = [(0, 2, 150, (0.0008, 0.0006)), (1, 5, 240, (-0.003, 0.004))]  # room, lamp, day, displacement in meters
 
 
-def name_of(camera):
+def camera_name(camera):
     return f"camera-{camera:02d}"
 
 
 class Year:
-    """What each session is of."""
+    """Camera, room, date and changes of each session."""
 
     def __init__(self, seed, quiet):
         self.seed, self.quiet = seed, quiet
@@ -70,7 +70,7 @@ class Year:
             intrinsics = list(self.scene["camera"]["intrinsics"])
             focal = 1 + spreads["focal_fraction"] * share()
             intrinsics[:2] = [focal * value for value in intrinsics[:2]]
-            intrinsics[2:4] = [value + spreads["center_px"] * share() for value in intrinsics[2:4]]
+            intrinsics[2:4] = [value + spreads["principal_point_px"] * share() for value in intrinsics[2:4]]
             intrinsics[4:] = [value * (1 + spreads["distortion_fraction"] * share()) for value in intrinsics[4:]]
             mount = self.scene["mount"]
             toward = math.radians(mount["tilt_azimuth_deg"])
@@ -111,7 +111,7 @@ class Year:
         day, room = self.day(camera, session), self.room(camera, session)
         intrinsics, (x, y), arm = self.unit(camera, day)
         scene["seed"] = 1 + ((self.seed * CAMERAS + camera) * SESSIONS + session)
-        scene["camera"] |= {"id": name_of(camera), "intrinsics": intrinsics}
+        scene["camera"] |= {"id": camera_name(camera), "intrinsics": intrinsics}
         azimuth = math.degrees(math.atan2(y, x))
         scene["mount"] = {"tilt_deg": math.hypot(x, y), "tilt_azimuth_deg": azimuth, "lever_arm_m": arm}
         moved = self.moved(room, day)
@@ -137,7 +137,7 @@ def render(year, archive, programs):
 
     def one(of_it):
         camera, session, name = of_it
-        place = archive / name_of(camera) / name
+        place = archive / camera_name(camera) / name
         if place.exists():
             return
         scene = scenes / f"{camera:02d}-{session:02d}.yaml"
@@ -154,12 +154,12 @@ def render(year, archive, programs):
     surveyed = {}  # position plus error of a moved lamp equals the surveyed position, except for the last digit
     for camera, session, name in year.sessions():
         room = year.room(camera, session)
-        lamps = archive / name_of(camera) / name / "lamps.yaml"
+        lamps = archive / camera_name(camera) / name / "lamps.yaml"
         first = surveyed.setdefault(room, lamps.read_text())
         if lamps.read_text() != first:
             lamps.write_text(first)
-        rows.append({"camera": name_of(camera), "session": name, "room": f"room {room}"})
-    write_whole(archive / "archive.csv", table(["camera", "session", "room"], rows))
+        rows.append({"camera": camera_name(camera), "session": name, "room": f"room {room}"})
+    write_atomically(archive / "archive.csv", table(["camera", "session", "room"], rows))
 
 
 def calibrate(archive, results, programs):
@@ -177,13 +177,13 @@ def deviations(year, results):
     for row in read_table(results / "fleet.csv"):
         camera, session = int(row["camera"][-2:]), int(row["session"][-2:])
         intrinsics, lean, arm = year.unit(camera, year.day(camera, session))
-        truth = {"focal_x_px": intrinsics[0], "focal_y_px": intrinsics[1], "center_x_px": intrinsics[2]}
+        truth = {"focal_x_px": intrinsics[0], "focal_y_px": intrinsics[1], "principal_point_x_px": intrinsics[2]}
         truth |= {"center_y_px": intrinsics[3], "lever_arm_x_mm": 1e3 * arm[0], "lever_arm_y_mm": 1e3 * arm[1]}
         for figure, value in truth.items():
-            if row[figure] and row[fleet.sd_of(figure)]:
-                kind = fleet.kind_of(figure)
+            if row[figure] and row[fleet.sd_column(figure)]:
+                kind = fleet.parameter_of(figure)
                 off.setdefault(kind, {}).setdefault((camera, figure), []).append(
-                    (float(row[figure]) - value, float(row[fleet.sd_of(figure)]))
+                    (float(row[figure]) - value, float(row[fleet.sd_column(figure)]))
                 )
     for kind, series in off.items():
         squares = freedoms = 0
@@ -204,17 +204,17 @@ def verdict(year, results):
     def ask(what, met, words):
         nonlocal missed
         missed += not met
-        print(f"{what:58} {words:44} {'as it was' if met else 'NOT AS IT WAS'}")
+        print(f"{what:58} {words:44} {'correct' if met else 'WRONG'}")
 
     quiet = year.quiet
-    expected = {} if quiet else {name_of(FOCAL[0]): "focal", name_of(TILT[0]): "tilt", name_of(CENTER[0]): "center"}
+    expected = {} if quiet else {camera_name(FOCAL[0]): "focal", camera_name(TILT[0]): "tilt", camera_name(CENTER[0]): "center"}
     called = {alarm["camera"]: alarm["changes"] for alarm in found["cameras"]}
     for camera, what in expected.items():
         changes = called.get(camera, [])
-        first = f"{changes[0]['figure']} {changes[0]['change']:+.3g} ± {changes[0]['sd']:.2g}" if changes else "not called"
+        first = f"{changes[0]['column']} {changes[0]['change']:+.3g} ± {changes[0]['sd']:.2g}" if changes else "not called"
         ask(f"{camera}: {what} drifts", bool(changes), first)
     for camera in sorted(called.keys() - expected.keys()):
-        ask(f"{camera}: nothing happened to it", False, called[camera][0]["figure"])
+        ask(f"{camera}: unchanged", False, called[camera][0]["column"])
     moves = [] if quiet else MOVED
     for room, lamp, day, by in moves:
         ones = [one for one in found["lamps"] if (one["room"], one["lamp"]) == (f"room {room}", lamp)]
@@ -223,13 +223,13 @@ def verdict(year, results):
             ask(what, False, "not called")
             continue
         one = ones[0]
-        off = [abs(moved - 1e3 * true) for moved, true in zip(one["moved_mm"], by)]
+        off = [abs(moved - 1e3 * true) for moved, true in zip(one["displacement_mm"], by)]
         dated = one["before"]["date"] < year.date(day) <= one["since"]["date"]
-        words = f"{math.hypot(*one['moved_mm']):.2f} mm, {one['before']['date']} to {one['since']['date']}"
+        words = f"{math.hypot(*one['displacement_mm']):.2f} mm, {one['before']['date']} to {one['since']['date']}"
         ask(what, dated and max(o / sd for o, sd in zip(off, one["sd_mm"])) < 5, words)
     for one in found["lamps"]:
         if (one["room"], one["lamp"]) not in [(f"room {room}", lamp) for room, lamp, _, _ in moves]:
-            ask(f"{one['room']}, lamp {one['lamp']}: nothing happened to it", False, f"{one['moved_mm']} mm")
+            ask(f"{one['room']}, lamp {one['lamp']}: unchanged", False, f"{one['displacement_mm']} mm")
     between = ", ".join(f"{name} {tau:.3g}" for name, tau in found["between_sessions"].items() if tau)
     print(f"standard deviations between sessions, besides the stated ones: {between}")
     return missed

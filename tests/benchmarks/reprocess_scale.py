@@ -1,15 +1,16 @@
 #!/usr/bin/python3
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""What scripts/reprocess.sh costs of an archive of 100,000 sessions beside the calibrations: plan, summary, overview.
+"""Measures the time and memory of scripts/reprocess.sh without the calibrations, for an archive of 100,000 sessions:
+plan, summary, overview.
 
     reprocess_scale.py [--sessions N] [--changed N] [--keep FOLDER] [--limits]
 
-The archive has the folders and files of one of datasets/archive, 63 of them inputs, all empty; its results are made up
-(tests/reprocess/made_up_fleet.py): fleets of 20 cameras with 10 sessions each in two rooms. In a temporary folder, in
-which 100,000 sessions take 4 GB for as long as it runs, on a file system with 7 million inodes to spare; --keep makes
-it in FOLDER and leaves it there. Times are of the processor, user and system, and of the clock, and say little of a
-network's file system. --limits: exit code 1 when one is not kept to.
+Sessions have the folders and files of datasets/archive, 63 of them inputs, all empty. Their results are simulated
+(tests/reprocess/made_up_fleet.py): fleets of 20 cameras with 10 sessions each in two rooms. Works in a temporary
+folder, in which 100,000 sessions need 4 GB and 7 million inodes; --keep FOLDER uses and keeps that folder. Prints
+processor time, user and system, and elapsed time, which are not representative for network file systems. --limits: exit
+code 1 if a limit is exceeded.
 """
 import argparse
 import json
@@ -74,7 +75,7 @@ def made_up(sessions):
         fleet = Fleet(number, drifts={3: {"focal": (0.26, 0.26)}} if number % 10 == 0 else {})
         chance = random.Random(number)
         for camera, session, result in list(fleet.all())[: sessions - number * IN_A_FLEET]:
-            row = outcome.calibration_of(result) | {"camera": f"{number:04d}-{camera}", "session": session}
+            row = outcome.read_calibration(result) | {"camera": f"{number:04d}-{camera}", "session": session}
             row |= {"verdict": "pass", "captures": 12, "fixes": 12, "missing_fraction": 0, "warnings": 0, "images_skipped": 0}
             row |= {name: f"{chance.lognormvariate(-1.4, 0.5):.6g}" for name in ("mean_mm", "median_mm", "p90_mm", "max_mm")}
             row["gate_metrics"] = made_up_metrics(chance, float(row["mean_mm"]))
@@ -100,9 +101,9 @@ def write_rows(state, rows):
     """As the shards' jobs leave them: a row for each session of a list."""
     for file in sorted((state / "shards").glob("*.list")):
         listed = [line.split("\t") for line in file.read_text().splitlines()]
-        of_it = [rows[line[0]] | {"glance": line[1]} for line in listed]
-        files.write_whole(state / "rows" / f"{file.stem}.csv", files.table(outcome.ALL, of_it))
-        files.write_whole(state / "costs" / file.stem, "".join(f"{line[0]}\t0.600\t1.000\n" for line in listed))
+        shard_rows = [rows[line[0]] | {"fingerprint": line[1]} for line in listed]
+        files.write_atomically(state / "rows" / f"{file.stem}.csv", files.table(outcome.SHARD_COLUMNS, shard_rows))
+        files.write_atomically(state / "costs" / file.stem, "".join(f"{line[0]}\t0.600\t1.000\n" for line in listed))
 
 
 def main():
@@ -120,7 +121,7 @@ def prepare(options, folder):
     rows = dict(made_up(options.sessions))
     if not (folder / "archive").exists():
         make_archive(folder / "archive", sorted(rows))
-    files.write_whole(folder / "rows.json", json.dumps(rows))
+    files.write_atomically(folder / "rows.json", json.dumps(rows))
 
 
 def reprocessed(folder):
@@ -148,7 +149,7 @@ def run(options, folder):
     time.sleep(SETTLED_S)
     measured("plan, the first", *plan)
     apart(reprocessed, folder)
-    files.write_whole(results / "summary.csv", "")  # as if the summary existed
+    files.write_atomically(results / "summary.csv", "")  # as if the summary existed
     measured("plan, unchanged, --scan files", *plan, "--scan", "files")
     took["plan, unchanged"] = measured("plan, unchanged", *plan)
     names = [f"{camera.name}/{session.name}" for camera in sorted(archive.iterdir()) for session in camera.iterdir()]
@@ -172,8 +173,8 @@ def run(options, folder):
     if left := Path(".state/to_do.txt").read_text().split():
         sys.exit(f"reprocess_scale.py: {len(left)} shards are to do, and nothing has changed")
     session_gates = folder / "session_gates.yaml"
-    files.write_whole(session_gates, "format: vlp-gates/1\ngates: {mean_mm: 0.25}\n")
-    files.write_whole(folder / "gates.yaml", "format: vlp-archive-gates/1\ngates: {gate_fraction: 1}\n")
+    files.write_atomically(session_gates, "format: vlp-gates/1\ngates: {mean_mm: 0.25}\n")
+    files.write_atomically(folder / "gates.yaml", "format: vlp-archive-gates/1\ngates: {gate_fraction: 1}\n")
     took["other session gates"] = measured("reprocess.sh, other session gates", *whole, "--session-gates", session_gates,
                                            "--gates", folder / "gates.yaml")
     counts = json.loads(Path("changes.json").read_text())["counts"]

@@ -46,7 +46,7 @@ TEST(CheckGates, PassesIfValueDoesNotExceedLimit) {
   ASSERT_EQ(passed, (std::vector<bool>{true, false, true, true, false, false}));
   EXPECT_NEAR(results[5].value.value(), 3, 1e-9);
   EXPECT_EQ(results[5].unit, "mm");
-  EXPECT_EQ(describe(results[5]), "height_rms_mm is 3 mm, at most 2.9 mm is asked for");
+  EXPECT_EQ(describe(results[5]), "height_rms_mm is 3 mm, at most 2.9 mm is required");
 }
 
 TEST(CheckGates, IncludesLimitInBothDirections) {
@@ -54,7 +54,7 @@ TEST(CheckGates, IncludesLimitInBothDirections) {
   EXPECT_FALSE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.31}})[0].has_passed());
   const auto coverage = check_gates({{"coverage", 0.7}}, {{"coverage", 0.69}});
   EXPECT_FALSE(coverage[0].has_passed());
-  EXPECT_EQ(describe(coverage[0]), "coverage is 0.69, at least 0.7 is asked for");
+  EXPECT_EQ(describe(coverage[0]), "coverage is 0.69, at least 0.7 is required");
   EXPECT_EQ(describe_failed_gate(coverage[0]),
             "the board views do not cover the image (" + describe(coverage[0]) + ")");
   EXPECT_TRUE(check_gates({{"coverage", 0.7}}, {{"coverage", 0.7}})[0].has_passed());
@@ -69,14 +69,14 @@ TEST(CheckGates, TightensLimitByGuardBand) {
   const CheckedMetric within = of("rms_px", 0.3, 0.286);
   EXPECT_FALSE(within.has_passed());
   EXPECT_EQ(describe(within),
-            "rms_px is 0.286 px, at most 0.3 px less a guard band of 0.015 px is asked for");
+            "rms_px is 0.286 px, at most 0.3 px less a guard band of 0.015 px is required");
   EXPECT_FALSE(
       check_gates({{"rms_px", 0.3, GuardBand{0.01, 1.5}}}, {{"rms_px", 0.286}})[0].has_passed());
   EXPECT_TRUE(of("coverage", 0.7, 0.7151).has_passed());
   const CheckedMetric below = of("coverage", 0.7, 0.714);
   EXPECT_FALSE(below.has_passed());
   EXPECT_EQ(describe(below),
-            "coverage is 0.714, at least 0.7 and a guard band of 0.015 is asked for");
+            "coverage is 0.714, at least 0.7 and a guard band of 0.015 is required");
   // Tables of the normal distribution.
   EXPECT_NEAR(of("rms_px", 0.3, 0.286).conformance_probability().value(), 0.91924, 5e-6);
   EXPECT_NEAR(of("coverage", 0.7, 0.714).conformance_probability().value(), 0.91924, 5e-6);
@@ -123,7 +123,7 @@ TEST(CheckAllMetrics, IncludesMetricsWithoutGateAndGatesWithoutValue) {
   EXPECT_EQ(all[0].name, "rms_px");
   EXPECT_FALSE(all[0].value);
   EXPECT_FALSE(all[0].has_passed());
-  EXPECT_EQ(describe_failed_gates(all), "rms_px is not known, at most 0.3 px is asked for");
+  EXPECT_EQ(describe_failed_gates(all), "rms_px is not known, at most 0.3 px is required");
   EXPECT_EQ(all[1].value, 1);
   EXPECT_FALSE(all[1].limit);
   EXPECT_TRUE(all[1].has_passed());
@@ -191,7 +191,7 @@ TEST(ParseGate, RejectsUnreachableLimits) {
 
 TEST(CheckGates, FailsGateWithoutValue) {
   const CheckedMetric gate = check_gates({{"split_half_px", 1}}, {{"rms_px", 0.1}})[0];
-  EXPECT_EQ(describe(gate), "split_half_px is not known, at most 1 px is asked for");
+  EXPECT_EQ(describe(gate), "split_half_px is not known, at most 1 px is required");
   const auto json = nlohmann::json::parse(to_json(evaluation(), {gate}));
   EXPECT_TRUE(json["gates"][0]["value"].is_null());
   EXPECT_EQ(json["passed"], false);
@@ -235,12 +235,12 @@ TEST(EvaluationJson, HasUnitsInKeys) {
   const auto json = nlohmann::json::parse(
       to_json(evaluation(), check_gates({{"max_mm", 5}, {"missing_fraction", 1}},
                                         collect_evaluation_metrics(evaluation()))));
-  EXPECT_EQ(json["format"], "vlp-evaluation/2");
+  EXPECT_EQ(json["format"], "vlp-evaluation/3");
   EXPECT_EQ(json["captures"], 4);
   EXPECT_EQ(json["missing"]["degenerate"], 1);
   EXPECT_NEAR(json["horizontal"]["mean_mm"].get<double>(), 3, 1e-9);
   EXPECT_NEAR(json["height"]["bias_mm"].get<double>(), 3, 1e-9);
-  EXPECT_EQ(json["repeated"]["stations"], 1);
+  EXPECT_EQ(json["bias_and_repeatability"]["reference_points"], 1);
   EXPECT_FALSE(json.contains("yaw"));
   EXPECT_EQ(json["gates"][0]["passed"], false);
   EXPECT_EQ(json["passed"], false);

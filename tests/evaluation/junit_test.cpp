@@ -19,7 +19,7 @@ TEST(MakeJUnitTests, FailsGatesThatAreNotPassed) {
   EXPECT_EQ(tests[0].result, JUnitTest::Result::failed);
   EXPECT_EQ(
       tests[0].message,
-      "the errors of the fixes exceed the limit (mean_mm is 1.25 mm, at most 1 mm is asked for)");
+      "the errors of the fixes exceed the limit (mean_mm is 1.25 mm, at most 1 mm is required)");
   EXPECT_EQ(tests[1].result, JUnitTest::Result::passed);
   EXPECT_EQ(tests[1].message, "");
   EXPECT_EQ(tests[2].result, JUnitTest::Result::failed);

@@ -20,7 +20,7 @@ Evaluation evaluation(std::size_t clusters) {
   evaluation.captures = 432;
   evaluation.fixes = 39;
   evaluation.reference = "truth";
-  evaluation.resampling_unit = "stations";
+  evaluation.resampling_unit = "reference points";
   const Interval interval{0, 1};
   evaluation.intervals_m = {interval, interval, {}, interval, clusters};
   if (clusters >= kMinClustersForP90) evaluation.intervals_m->p90 = interval;
@@ -44,9 +44,10 @@ TEST(MissingFixesWarning, WarnsIfNoGateLimitsMissingFixes) {
 
 TEST(SampleSizeWarnings, WarnsForFewUnits) {
   EXPECT_THAT(make_sample_size_warnings(evaluation(50)), IsEmpty());
-  EXPECT_THAT(make_sample_size_warnings(evaluation(49)),
-              ElementsAre("of so few as 49 stations intervals are somewhat too narrow, that of p90 "
-                          "most"));
+  EXPECT_THAT(
+      make_sample_size_warnings(evaluation(49)),
+      ElementsAre("with only 49 reference points intervals are somewhat too narrow, that of p90 "
+                  "most"));
   EXPECT_THAT(make_sample_size_warnings(evaluation(19)), ElementsAre(HasSubstr("p90 has none")));
   Evaluation path = evaluation(30);  // as many runs as a path ever has
   path.reference = "path";
@@ -54,7 +55,7 @@ TEST(SampleSizeWarnings, WarnsForFewUnits) {
   Evaluation none = evaluation(4);
   none.intervals_m = {};
   EXPECT_THAT(make_sample_size_warnings(none),
-              ElementsAre("there are too few stations with a fix for intervals"));
+              ElementsAre("there are too few reference points with a fix for intervals"));
 }
 
 TEST(LimitWarning, WarnsIfErrorsAreBelowCrlb) {
@@ -74,11 +75,11 @@ TEST(SampleSizeWarnings, CountsUnitsOfPairs) {
   compared.comparison = Comparison{};
   compared.comparison->clusters = 8;
   EXPECT_THAT(make_sample_size_warnings(compared),
-              ElementsAre("of so few as 8 stations with a fix in both files a comparison is no "
-                          "evidence, which needs 20"));
+              ElementsAre("with only 8 reference points with a fix in both files the comparison is "
+                          "inconclusive; it needs 20"));
   compared.comparison->clusters = 49;
   EXPECT_THAT(make_sample_size_warnings(compared),
-              ElementsAre(HasSubstr("49 stations with a fix in both")));
+              ElementsAre(HasSubstr("49 reference points with a fix in both")));
   compared.comparison->clusters = 50;
   EXPECT_THAT(make_sample_size_warnings(compared), IsEmpty());
 }

@@ -85,7 +85,7 @@ TEST_F(VlpAdjust, RefinesMapAndReportsUncertaintyOfFixes) {
   }
   const ProgramResult result = adjust(refined());
   ASSERT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.output, HasSubstr("captures    24 used, 0 left out"));
+  EXPECT_THAT(result.output, HasSubstr("captures    24 used, 0 rejected"));
   const LampMap map = read_lamp_map(folder / "refined.yaml");
   for (std::size_t i = 0; i < 8; ++i) {
     // The captures are exact; what is left is what the survey's 2 mm still weigh.

@@ -84,7 +84,7 @@ TEST_F(VlpIntrinsicsSimilarViews, DoNotPassGateByCopiedFiles) {
   render(5);
   const auto once = calibrate_images();
   EXPECT_EQ(once.exit_code, 1);
-  EXPECT_THAT(once.errors, HasSubstr("views is 5, at least 6 is asked for"));
+  EXPECT_THAT(once.errors, HasSubstr("views is 5, at least 6 is required"));
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(images())) files.push_back(entry.path());
   for (const fs::path& file : files) {
@@ -102,7 +102,7 @@ TEST_F(VlpIntrinsicsSimilarViews, DoNotPassGateByCopiedFiles) {
   // Two gates at once are both taken.
   const auto changed = calibrate_images("--gate rms_px=1e-4,views=3");
   EXPECT_EQ(changed.exit_code, 1);
-  EXPECT_THAT(changed.errors, HasSubstr("at most 0.0001 px is asked for"));
+  EXPECT_THAT(changed.errors, HasSubstr("at most 0.0001 px is required"));
   EXPECT_THAT(changed.errors, Not(HasSubstr("views is")));
 }
 

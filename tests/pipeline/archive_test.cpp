@@ -17,7 +17,7 @@ class VlpSimulateArchive : public SmallSimulation {
  protected:
   VlpSimulateArchive() {
     change_scene("captures:",
-                 "archive: {sessions_per_camera: 2, focal_fraction: 0.01, center_px: 1, "
+                 "archive: {sessions_per_camera: 2, focal_fraction: 0.01, principal_point_px: 1, "
                  "distortion_fraction: 0.05, tilt_deg: 1, lever_arm_m: 0.003, map_error_m: 0.001, "
                  "fault_fraction: 0.5, damage_fraction: 0.25}\ncaptures:");
     change_scene("folder: lamps", "folder: rotation");
@@ -55,7 +55,7 @@ TEST_F(VlpSimulateArchive, ResumesAfterInterruption) {
   }
   fs::remove(output / ".unfinished/camera-00001-session-01/boards/0001.png");
   EXPECT_EQ(simulate("--archive 10").output,
-            "rendered 2 sessions, 8 were there; in " + output.string() + "\n");
+            "rendered 2 sessions, 8 existed; in " + output.string() + "\n");
   EXPECT_TRUE(files_below(output) == expected);
 }
 

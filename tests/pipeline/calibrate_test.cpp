@@ -77,7 +77,7 @@ TEST_P(VlpCalibrateAccuracy, PassesGates) {
   fs::copy(rig + "/gates.yaml", folder / "a session/gates.yaml");
   const auto run = calibrate();
   EXPECT_EQ(run.exit_code, 0) << run.output << run.errors;
-  EXPECT_THAT(result("evaluation.json"), HasSubstr("vlp-evaluation/2"));
+  EXPECT_THAT(result("evaluation.json"), HasSubstr("vlp-evaluation/3"));
   EXPECT_THAT(result("report.html"), HasSubstr("PASS"));
 }
 
@@ -174,7 +174,7 @@ TEST_F(VlpCalibrate, RunsOnlyChangedSteps) {
   render(folder.file("scene.yaml", scene).string(), "boards,rotation,dispersion,check,line-x");
   const auto first = calibrate("--readout rows");  // and finds the row time
   ASSERT_EQ(first.exit_code, 0) << first.output << first.errors;
-  EXPECT_THAT(first.output, Not(HasSubstr("as before")));
+  EXPECT_THAT(first.output, Not(HasSubstr("up to date")));
   EXPECT_THAT(first.output, HasSubstr("row-time"));
   EXPECT_THAT(result("report.html"), HasSubstr("line-x-fixes.csv"));
   const std::string calibration = result("calibration.yaml"), report = result("report.html");
@@ -190,11 +190,11 @@ TEST_F(VlpCalibrate, RunsOnlyChangedSteps) {
   fs::remove(folder / "a session/check/0000.png");
   const auto changed = calibrate("--readout rows");
   EXPECT_EQ(changed.exit_code, 0) << changed.output << changed.errors;
-  EXPECT_THAT(changed.output, HasSubstr("lens          as before"));
-  EXPECT_THAT(changed.output, Not(HasSubstr("rotation      as before")));
+  EXPECT_THAT(changed.output, HasSubstr("lens          up to date"));
+  EXPECT_THAT(changed.output, Not(HasSubstr("rotation      up to date")));
   EXPECT_THAT(changed.output,
-              HasSubstr("dispersion    as before"));  // its input has the same bytes
-  EXPECT_THAT(changed.output, Not(HasSubstr("check         as before")));
+              HasSubstr("dispersion    up to date"));  // its input has the same bytes
+  EXPECT_THAT(changed.output, Not(HasSubstr("check         up to date")));
   EXPECT_EQ(result("calibration.yaml"), calibration);
   EXPECT_THAT(result("evaluation.json"), HasSubstr("\"missing\""));
 }
@@ -217,7 +217,7 @@ TEST_F(VlpCalibrateSmallSession, RepeatsVerdictOfGates) {
   folder.file("a session/gates.yaml", "format: vlp-gates/1\ngates:\n  tilt_deg: 90\n");
   const auto passed = calibrate();
   EXPECT_EQ(passed.exit_code, 0) << passed.output << passed.errors;
-  EXPECT_THAT(passed.output, HasSubstr("rotation      as before"));
+  EXPECT_THAT(passed.output, HasSubstr("rotation      up to date"));
   folder.file("a session/gates.yaml", "format: vlp-gates/1\ngates:\n  coverage: 7\n");
   const auto refused = calibrate();
   EXPECT_EQ(refused.exit_code, 2);
@@ -239,9 +239,9 @@ TEST_F(VlpCalibrateSmallSession, GivesSameResultInForkedProcess) {
     ASSERT_TRUE(std::getline(answers, answer));
     const auto json = nlohmann::json::parse(answer);
     EXPECT_EQ(json["exit_code"], 0) << answer;
-    const std::string said = json["said"];
+    const std::string said = json["output"];
     EXPECT_EQ(said.find("verdict     pass"), said.rfind("verdict")) << said;
-    EXPECT_EQ(said.find("lens          as before") != std::string::npos, as_before) << said;
+    EXPECT_EQ(said.find("lens          up to date") != std::string::npos, as_before) << said;
   }
   EXPECT_EQ(answers.get(), EOF);
   for (const char* file : {"calibration.yaml", "check-fixes.csv", "session.json"}) {
@@ -268,7 +268,7 @@ TEST_F(VlpCalibrateSmallSession, FollowsChangesOfSessionFolder) {
   EXPECT_THAT(
       known.errors,
       HasSubstr(
-          "camera.yaml takes precedence over options of the camera; ignored: row time, read-out"));
+          "camera.yaml takes precedence over options of the camera; ignored: row time, readout"));
   EXPECT_THAT(calibrate("--camera-id other --lens LENSMODEL_OPENCV5").errors,
               HasSubstr("ignored: name, lens model"));
   EXPECT_THAT(calibrate("").errors, Not(HasSubstr("camera.yaml takes precedence")));
@@ -279,7 +279,7 @@ TEST_F(VlpCalibrateSmallSession, FollowsChangesOfSessionFolder) {
   EXPECT_EQ(result("calibration.yaml"), calibration);
   // A result that somebody changed, or took away, is made again.
   folder.file("results/rotated.yaml", "changed\n");
-  EXPECT_THAT(calibrate().output, Not(HasSubstr("rotation      as before")));
+  EXPECT_THAT(calibrate().output, Not(HasSubstr("rotation      up to date")));
   EXPECT_EQ(result("calibration.yaml"), calibration);
   fs::remove(folder / "results/rotation.svg");
   fs::remove(folder / "results/evaluation.json");
@@ -302,8 +302,8 @@ TEST_F(VlpCalibrateSmallSession, SelectsLensModel) {
   EXPECT_THAT(run.errors, HasSubstr("lens model: LENSMODEL_OPENCV"));
   EXPECT_THAT(result("lens.yaml"), HasSubstr("--lens auto"));
   EXPECT_TRUE(fs::exists(folder / "results/lens.cameramodel"));
-  EXPECT_THAT(calibrate(chosen).output, HasSubstr("lens          as before"));
-  EXPECT_THAT(calibrate().output, Not(HasSubstr("lens          as before")));
+  EXPECT_THAT(calibrate(chosen).output, HasSubstr("lens          up to date"));
+  EXPECT_THAT(calibrate().output, Not(HasSubstr("lens          up to date")));
 }
 
 TEST_F(VlpCalibrateSmallSession, FailsWhenGateOfLensFails) {
@@ -429,9 +429,9 @@ TEST_F(VlpCalibrateSmallSession, RunsStepNamedByRedo) {
   const std::string session = result("session.json");
   const auto again = calibrate("--row-time-s 3e-5 --readout rows --redo check");
   EXPECT_EQ(again.exit_code, 0);
-  EXPECT_THAT(again.output, HasSubstr("dispersion    as before"));
-  EXPECT_THAT(again.output, Not(HasSubstr("check         as before")));
-  EXPECT_THAT(again.output, HasSubstr("evaluate      as before"));
+  EXPECT_THAT(again.output, HasSubstr("dispersion    up to date"));
+  EXPECT_THAT(again.output, Not(HasSubstr("check         up to date")));
+  EXPECT_THAT(again.output, HasSubstr("evaluate      up to date"));
   EXPECT_EQ(result("session.json"), session) << "whatever was as before";
   const auto unknown = calibrate("--redo checks");
   EXPECT_EQ(unknown.exit_code, 2);
@@ -457,7 +457,7 @@ TEST_F(VlpCalibrateSmallSession, ResumesAfterKill) {
     EXPECT_EQ(on.exit_code, 0) << moment << on.errors;
     // The lens may not have said yet that it ended.
     if (moment != std::string("lens.yaml")) {
-      EXPECT_THAT(on.output, HasSubstr("lens          as before")) << moment;
+      EXPECT_THAT(on.output, HasSubstr("lens          up to date")) << moment;
     }
     EXPECT_EQ(result("session.json"), session) << moment;
     EXPECT_EQ(result("report.html"), report) << moment;
@@ -519,7 +519,8 @@ TEST_F(VlpCalibrateSmallSession, ReportsUncertaintyOfCalibration) {
   ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows").exit_code, 0);
   const auto json = nlohmann::json::parse(result("session.json"));
   const auto& figures = json["calibration"];
-  for (const char* name : {"focal_sd_px", "center_sd_px", "zenith_sd_deg", "lever_arm_sd_mm"}) {
+  for (const char* name :
+       {"focal_sd_px", "principal_point_sd_px", "zenith_sd_deg", "lever_arm_sd_mm"}) {
     ASSERT_EQ(figures[name].size(), 2) << name;
     for (const auto& sd : figures[name]) {
       EXPECT_GT(sd.get<double>(), 1e-4) << name;

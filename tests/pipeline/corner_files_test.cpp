@@ -84,7 +84,7 @@ TEST_F(VlpIntrinsicsCornerFiles, TolerateOutlier) {
     EXPECT_LE(result.exit_code, 1) << result.errors;
     EXPECT_THAT(result.errors, HasSubstr("view3.png: 1 of its "));
     EXPECT_THAT(result.errors, HasSubstr("corners are not where their neighbors predict them"));
-    EXPECT_THAT(result.output, HasSubstr("views         10 used, 0 dropped"));
+    EXPECT_THAT(result.output, HasSubstr("views         10 used, 0 rejected"));
     return read_lens("camera.yaml");
   };
   for (const Eigen::Vector2d& wrong : {Eigen::Vector2d(2, 2), {-5, 20}, {1e6, 300}}) {

@@ -50,7 +50,7 @@ class VlpDispersion : public testing::Test {
 TEST_F(VlpDispersion, MakesFixesExactAtOtherPositions) {
   const auto result = dispersion(turn(12, 6.28), "--reference-point 0.102 -0.051");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.output, HasSubstr("captures    12, 12 used, 0 left out"));
+  EXPECT_THAT(result.output, HasSubstr("captures    12, 12 used, 0 rejected"));
   EXPECT_THAT(result.output, HasSubstr("world       -2.000 1.000 mm"));
   EXPECT_THAT(result.output, HasSubstr("after       radius 0.000 mm, center -2.000 1.000 mm"));
   const Calibration written = read_calibration(folder / "calibration.yaml");
@@ -102,7 +102,7 @@ TEST_F(VlpDispersion, RequiresSeveralYawsOrMethodPaper) {
     const auto paper =
         dispersion(turn(6, 0), "--reference-point 0.1 -0.05 --method chen-guan" + circle);
     EXPECT_EQ(paper.exit_code, 0) << paper.errors;
-    EXPECT_THAT(paper.output, HasSubstr("supposed right"));
+    EXPECT_THAT(paper.output, HasSubstr("assumed correct"));
   }
   EXPECT_EQ(dispersion(turn(6, 6.28), "--reference-point 0.1 -0.05 --method chen-guan").exit_code,
             3);

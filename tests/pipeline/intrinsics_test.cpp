@@ -27,7 +27,7 @@ TEST_P(VlpIntrinsicsRenderedImages, GiveTrueLensForAllThreadCounts) {
   const auto first = calibrate(rig + "/boards", board, "--threads 1 --cache " + cache);
   ASSERT_EQ(first.exit_code, 0) << first.errors;
   EXPECT_EQ(first.errors, "");
-  EXPECT_THAT(first.output, HasSubstr("views         36 used, 0 dropped"));
+  EXPECT_THAT(first.output, HasSubstr("views         36 used, 0 rejected"));
 
   const Camera truth = read_calibration(rig + "/true_calibration.yaml").camera;
   const Calibration found = read_calibration(folder / "camera.yaml");
@@ -72,7 +72,7 @@ TEST_P(VlpIntrinsicsRenderedImages, GiveTrueLensForAllThreadCounts) {
                                "--gate expected_max_error_px=0.001 --held-out 6 --cache " + cache);
   EXPECT_EQ(gated.exit_code, 1);
   EXPECT_THAT(gated.errors,
-              HasSubstr("at most 0.001 px is asked for; add views, next the board in the "));
+              HasSubstr("at most 0.001 px is required; add views, next the board in the "));
   EXPECT_THAT(gated.output, HasSubstr("held out      6 views"));
   EXPECT_EQ(read_calibration(folder / "camera.yaml").intrinsics_report->views, 30);
 

@@ -73,7 +73,7 @@ class TiltedCamera : public testing::Test {
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const double x_m = axis == 1 ? -aside_m : 0, y_m = axis == 0 ? aside_m : 0;
       captures += fmt::format(
-          "  - {{folder: {}{}, exposure_s: 5.0e-5, spots_m: [[{:.3f}, {:.3f}], [{:.3f}, {:.3f}]], "
+          "  - {{folder: {}{}, exposure_s: 5.0e-5, pivots_m: [[{:.3f}, {:.3f}], [{:.3f}, {:.3f}]], "
           "heights_m: [0.2, 0.4], yaws_deg: [{}], interval_s: 0.5, roll_pitch: {{{}_deg: [{}, "
           "{}]}}}}\n",
           axes[axis], tilt_deg, x_m + 0.1, y_m - 0.05, x_m - 0.1, y_m + 0.1, 0, axes[axis],
@@ -179,7 +179,7 @@ TEST_F(TiltedCamera, IsLocatedFromEllipsesUpTo80Degrees) {
     const double aside_m = 0.7 * std::tan(degrees * std::numbers::pi / 180);
     const bool rolls = std::string(axis) == "roll";
     captures += fmt::format(
-        "  - {{folder: {}{}, exposure_s: 1.7e-5, spots_m: [[{:.3f}, {:.3f}]], heights_m: [0.8, "
+        "  - {{folder: {}{}, exposure_s: 1.7e-5, pivots_m: [[{:.3f}, {:.3f}]], heights_m: [0.8, "
         "1.0], yaws_deg: [0], interval_s: 0.5, roll_pitch: {{{}_deg: [{}, {}]}}}}\n",
         axis, degrees, rolls ? 0.1 : 0.1 - aside_m, rolls ? aside_m - 0.05 : -0.05, axis, degrees,
         degrees);

@@ -27,7 +27,7 @@ TEST(VlpLimits, PrintsErrorBudget) {
   const auto result =
       run_program(kLimits + "--principal-point-px 1 --tilt-deg 0.5 --lamp-map-mm 1");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
-  for (const char* row : {"noise", "center", "tilt", "lamp map", "together"}) {
+  for (const char* row : {"noise", "principal point", "tilt", "lamp map", "total"}) {
     EXPECT_THAT(result.output, HasSubstr(std::string("\n") + row));
   }
 }
@@ -49,7 +49,7 @@ TEST(VlpLimits, WritesMapAsTableAndPlot) {
     EXPECT_NEAR(tilt_m, 40e-3, 8e-3);
     EXPECT_NEAR(map.get_number(row, map.get_required_column("horizontal_m")),
                 std::hypot(noise_m, tilt_m), 1e-6);
-    EXPECT_EQ(map.get_number(row, map.get_required_column("center_m")), 0);
+    EXPECT_EQ(map.get_number(row, map.get_required_column("principal_point_m")), 0);
   }
   EXPECT_THAT(TemporaryFolder::read_content(folder / "map.png"), StartsWith("\x89PNG"));
 }

@@ -113,7 +113,7 @@ TEST_F(VlpIntrinsics, YieldsCrlbOfPhoneUnderRealLamps) {
   const auto calibrated = calibrate(board.string(), (board / "board.yaml").string());
   EXPECT_EQ(calibrated.exit_code, 1);
   EXPECT_THAT(calibrated.errors, HasSubstr("add views, next the board in the bottom left"));
-  EXPECT_THAT(calibrated.output, HasSubstr("views         8 used, 0 dropped\n"));
+  EXPECT_THAT(calibrated.output, HasSubstr("views         8 used, 0 rejected\n"));
   const Calibration found = read_calibration(folder / "camera.yaml");
   const double rms_px = found.intrinsics_report->rms_px;
   EXPECT_GE(found.intrinsics_report->corners, 1270);  // of 8 x 40 tags

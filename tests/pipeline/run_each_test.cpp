@@ -53,7 +53,7 @@ TEST_F(RunForEachStdinLine, ReportsExitCodeAndErrorsOfSeparateRuns) {
   const auto alone = run_program(
       fmt::format("vlp-calibrate \"{0}\" -o \"{0}-results\"", (folder / "nowhere's").string()));
   EXPECT_EQ(all[0].at("exit_code"), alone.exit_code);
-  EXPECT_EQ(all[0].at("said"), alone.errors);
+  EXPECT_EQ(all[0].at("output"), alone.errors);
   EXPECT_EQ(all[1].at("exit_code"), alone.exit_code);
   EXPECT_GT(all[1].at("cpu_s"), 0);
 }

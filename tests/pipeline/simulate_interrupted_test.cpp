@@ -33,7 +33,7 @@ TEST_F(VlpSimulateInterrupted, RendersOnlyMissingFiles) {
   ASSERT_EQ(before.size(), 21U);
   const auto result = simulate();
   EXPECT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_EQ(result.output, "rendered 3 captures, 21 were there; in " + output.string() + "\n");
+  EXPECT_EQ(result.output, "rendered 3 captures, 21 existed; in " + output.string() + "\n");
   EXPECT_TRUE(files_below(output) == expected);
   for (const auto& [image, mark] : before) {
     EXPECT_EQ(file_number(output / image), mark.first) << image;
@@ -44,7 +44,7 @@ TEST_F(VlpSimulateInterrupted, RendersOnlyMissingFiles) {
 TEST_F(VlpSimulateInterrupted, RendersNothingWhenComplete) {
   ASSERT_EQ(simulate().exit_code, 0);
   const Files before = files_below(output);
-  EXPECT_EQ(simulate().output, "rendered 0 captures, 24 were there; in " + output.string() + "\n");
+  EXPECT_EQ(simulate().output, "rendered 0 captures, 24 existed; in " + output.string() + "\n");
   EXPECT_TRUE(files_below(output) == before);
 }
 

@@ -19,7 +19,7 @@ using VlpSimulate = SmallSimulation;
 TEST_F(VlpSimulate, WritesCapturesWithGroundTruth) {
   const auto result = simulate();
   ASSERT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_EQ(result.output, "rendered 24 captures, 0 were there; in " + output.string() + "\n");
+  EXPECT_EQ(result.output, "rendered 24 captures, 0 existed; in " + output.string() + "\n");
   const Files files = files_below(output);
   EXPECT_EQ(find_images(files).size(), 24U);
   std::set<std::string> others;
@@ -62,12 +62,12 @@ TEST_F(VlpSimulate, ChangesImagesButNotRigWithSeed) {
 TEST_F(VlpSimulate, RendersSingleFolderIdentically) {
   const Files all = undisturbed();
   const auto result = simulate("--only boards");
-  EXPECT_EQ(result.output, "rendered 8 captures, 0 were there; in " + output.string() + "\n");
+  EXPECT_EQ(result.output, "rendered 8 captures, 0 existed; in " + output.string() + "\n");
   const Files boards = files_below(output);
   EXPECT_EQ(find_images(boards).size(), 8U);
   for (const auto& [name, content] : boards) EXPECT_TRUE(all.at(name) == content) << name;
   EXPECT_EQ(simulate("--only lamps,boards").output,
-            "rendered 16 captures, 8 were there; in " + output.string() + "\n");
+            "rendered 16 captures, 8 existed; in " + output.string() + "\n");
   EXPECT_TRUE(files_below(output) == all);
 }
 

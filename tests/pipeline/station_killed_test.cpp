@@ -165,7 +165,8 @@ TEST_F(VlpStationKilled, ListsHookAsUnfinishedAfterKill) {
   run_program("(exec " + run("b", "-q --idle-s 0.2") + ") & until [ -s " + pid +
               " ]; do sleep 0.05; done; kill -9 $! $(cat " + pid + "); wait");
   EXPECT_EQ(kept().size(), 1u);
-  EXPECT_THAT(records("list").output, HasSubstr("1 of them with a hook that has not ended well"));
+  EXPECT_THAT(records("list").output,
+              HasSubstr("1 of them with a hook that failed or did not finish"));
   EXPECT_THAT(records("show").output,
               testing::AllOf(HasSubstr("hook wanted"), testing::Not(HasSubstr("hook failed"))));
   folder.file("station/hook.sh", "echo label 7\n");

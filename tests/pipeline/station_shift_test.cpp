@@ -181,7 +181,8 @@ TEST_F(VlpStationShift, CallsHookForEachVerdict) {
   EXPECT_EQ(seen["camera"], "0001");
   EXPECT_EQ(seen["verdict"], "INVALID");
   EXPECT_EQ(seen["images"].size(), 4U);
-  EXPECT_THAT(records("list").output, HasSubstr("1 of them with a hook that has not ended well"));
+  EXPECT_THAT(records("list").output,
+              HasSubstr("1 of them with a hook that failed or did not finish"));
   EXPECT_THAT(
       records("show").output,
       AllOf(ContainsRegex("hook wanted 20[0-9TZ:-]+ [^ ]+@[^ ]*: sh hook.sh\n"),

@@ -152,7 +152,7 @@ TEST_F(VlpStation, MatchesVlpCalibrate) {
   using Json = nlohmann::json;
   ASSERT_EQ(records("export -o " + (folder / "runs.json").string()).exit_code, 0);
   const Json figures =
-      Json::parse(TemporaryFolder::read_content(folder / "runs.json")).at(0).at("figures");
+      Json::parse(TemporaryFolder::read_content(folder / "runs.json")).at(0).at("metrics");
   const auto of_station = [&](const std::string& name) {
     return figures.at(name).at("value").get<double>();
   };

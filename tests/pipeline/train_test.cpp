@@ -47,7 +47,7 @@ class VlpTrain : public testing::Test {
 TEST_F(VlpTrain, MakesClassifierForVlpDetectAndVlpLocate) {
   const auto trained = train(captures() + kLamps + kCalibration);
   ASSERT_EQ(trained.exit_code, 0) << trained.errors;
-  EXPECT_THAT(trained.output, HasSubstr("right       100.00 %\n  wrong     0\n  unknown   0\n"));
+  EXPECT_THAT(trained.output, HasSubstr("correct     100.00 %\n  wrong     0\n  unknown   0\n"));
   // On captures that it has not seen, without the map's frequencies and the row time.
   std::string map = TemporaryFolder::read_content(kRig + "/lamps.yaml");
   for (auto at = map.find(", frequency_hz"); at != std::string::npos;
@@ -118,7 +118,7 @@ TEST_F(VlpTrain, EstimatesRowTimeAndReadoutDirection) {
   }
   const auto bare = run_program("vlp-train --row-time " + (folder / "images").string() + kLamps);
   ASSERT_EQ(bare.exit_code, 0) << bare.errors;
-  EXPECT_THAT(bare.output, HasSubstr("read-out    along rows"));
+  EXPECT_THAT(bare.output, HasSubstr("readout     along rows"));
   std::string calibration = TemporaryFolder::read_content(without("  row_time_s"));
   calibration.erase(calibration.find("  readout"), 16);
   const auto result = train("--row-time " + (folder / "images").string() + kLamps +

@@ -44,20 +44,21 @@ TEST(ReportStatistics, FormatsMillimetersAndOmitsMissingStatistics) {
 TEST(ReportStatistics, MatchesIntervalsToStatistics) {
   Evaluation full = evaluation();
   full.intervals_m = {{0.001, 0.002}, {0.003, 0.004}, Interval{0.005, 0.006}, {0.007, 0.008}, 5};
-  full.resampling_unit = "stations";
+  full.resampling_unit = "reference points";
   const auto lines = texts(make_report_statistics(full));
   EXPECT_THAT(lines, Contains("horizontal error, median | 2 | mm | 3 to 4"));
   EXPECT_THAT(lines, Contains("horizontal error, root mean square | 5 | mm | 7 to 8"));
   EXPECT_THAT(lines, Contains("horizontal error, 90th percentile | 3 | mm | 5 to 6"));
-  EXPECT_THAT(make_report_notes(full), Contains(HasSubstr("bootstrap over 5 stations")));
-  EXPECT_THAT(make_report_notes(full), Contains(HasSubstr("Caution: of so few as 5 stations")));
+  EXPECT_THAT(make_report_notes(full), Contains(HasSubstr("bootstrap over 5 reference points")));
+  EXPECT_THAT(make_report_notes(full),
+              Contains(HasSubstr("Caution: with only 5 reference points")));
   full.intervals_m->p90 = {};
   EXPECT_THAT(texts(make_report_statistics(full)),
               Contains("horizontal error, 90th percentile | 3 | mm | "));
   full.comparison = Comparison{};
   EXPECT_THAT(
       make_report_notes(full),
-      Contains(HasSubstr("other fixes: no evidence, too few; 0 captures have a fix in both")));
+      Contains(HasSubstr("other fixes: inconclusive, too few; 0 captures have a fix in both")));
 }
 
 TEST(ReportNotes, ReportsReferenceAndMissingFixes) {

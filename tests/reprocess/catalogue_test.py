@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the plan notices of what happens to files, and their digests."""
+"""Detection of changed files by the plan, and digests of files."""
 import hashlib
 import os
 import tempfile
@@ -16,9 +16,9 @@ import files
 
 
 class Tables(unittest.TestCase):
-    """Tables that people open with a spreadsheet."""
+    """Tables that are opened with a spreadsheet."""
 
-    def test_formulas_are_text_and_come_back(self):
+    def test_formulas_are_escaped_and_restored(self):
         rows = [{"name": name, "mm": "-0.5"} for name in ("=1+1", "+A1", "-A1", "@a", "\tx", "'=1", "plain", "-", "'a'")]
         text = files.table(["name", "mm"], rows)
         self.assertIn("\n'=1+1,-0.5\n", text)
@@ -29,8 +29,8 @@ class Tables(unittest.TestCase):
             self.assertEqual(files.read_table(file), rows)
 
 
-class Look(unittest.TestCase):
-    """What the plan notices of what happens to a session's files."""
+class Scan(unittest.TestCase):
+    """Detection of changes of the files of a session."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -42,181 +42,181 @@ class Look(unittest.TestCase):
             (self.session / name).parent.mkdir(parents=True, exist_ok=True)
             (self.session / name).write_text("one")
         (self.archive / "c/other").mkdir()
-        self.at_ns = 0  # that of the clock is later by so much than what is looked at
+        self.at_ns = 0  # offset of the clock, so that files are older than the scan
 
-    def glance(self, how="files", rebuild=False, archive=None):
-        """Of the session, as the plan finds it; it is kept for the next time."""
+    def fingerprint(self, how="files", rebuild=False, archive=None):
+        """Returns the fingerprint of the session, as the plan does, and stores it for the next scan."""
         self.at_ns += 10_000_000_000
         now = time.time_ns() + self.at_ns
         with unittest.mock.patch.object(catalogue.time, "time_ns", return_value=now):
             known = catalogue.Catalogue(self.file, archive or self.archive, rebuild)
-            glances = known.glances(["c/other", "c/s"], how)
+            fingerprints = known.fingerprints(["c/other", "c/s"], how)
             known.save({0: ["c/other", "c/s"]}, 50)
-        return glances[1]
+        return fingerprints[1]
 
-    def written_over(self, name, text):
-        """In place, by another content of the same length, and its time is set back."""
+    def overwrite(self, name, text):
+        """Overwrites a file in place with content of the same length and restores its time."""
         before = os.stat(self.session / name)
-        time.sleep(0.02)  # file systems count in ticks
+        time.sleep(0.02)  # time stamps have a finite resolution
         with open(self.session / name, "r+") as stream:
             stream.write(text)
         os.utime(self.session / name, ns=(before.st_atime_ns, before.st_mtime_ns))
         after = os.stat(self.session / name)
         self.assertEqual((before.st_size, before.st_ino, before.st_mtime_ns), (after.st_size, after.st_ino, after.st_mtime_ns))
 
-    def replaced(self, name):
+    def replace_file(self, name):
         before = os.stat(self.session / name)
         (self.session / "new").write_text("two")
         os.utime(self.session / "new", ns=(before.st_atime_ns, before.st_mtime_ns))
         (self.session / "new").replace(self.session / name)
 
-    def test_the_same_is_the_same_both_ways(self):
-        first = self.glance()
+    def test_unchanged_files_have_equal_fingerprints(self):
+        first = self.fingerprint()
         for how in ("files", "folders", "folders", "files"):
-            self.assertEqual(self.glance(how), first)
-        (self.session / "notes.txt").write_text("three")  # not read
+            self.assertEqual(self.fingerprint(how), first)
+        (self.session / "notes.txt").write_text("three")  # no input
         (self.session / "results").mkdir()
         for how in ("folders", "files"):
-            self.assertEqual(self.glance(how), first)
+            self.assertEqual(self.fingerprint(how), first)
 
-    def test_sees_each_change_of_each_file(self):
-        said = [self.glance()]
+    def test_scan_of_files_detects_each_change(self):
+        said = [self.fingerprint()]
         for change in (
-            lambda: self.written_over("boards/0.png", "two"),
-            lambda: self.written_over("check/more/2.png", "two"),
-            lambda: self.replaced("boards/1.png"),
+            lambda: self.overwrite("boards/0.png", "two"),
+            lambda: self.overwrite("check/more/2.png", "two"),
+            lambda: self.replace_file("boards/1.png"),
             lambda: (self.session / "boards/1.png").rename(self.session / "boards/3.png"),
             lambda: (self.session / "boards/3.png").unlink(),
             lambda: (self.session / "rotation").mkdir() or (self.session / "rotation/0.png").write_text("one"),
-            lambda: self.written_over("lamps.yaml", "two"),
+            lambda: self.overwrite("lamps.yaml", "two"),
             lambda: os.utime(self.session / "lamps.yaml"),
         ):
             change()
-            said.append(self.glance())
-            self.assertEqual(self.glance(), said[-1])
+            said.append(self.fingerprint())
+            self.assertEqual(self.fingerprint(), said[-1])
         self.assertEqual(len(set(said)), len(said))
 
-    def test_folders_show_all_but_images_that_are_written_over(self):
-        said = [self.glance("folders")]
+    def test_scan_of_folders_misses_only_overwritten_images(self):
+        said = [self.fingerprint("folders")]
         for change in (
-            lambda: self.replaced("boards/1.png"),
-            lambda: self.replaced("check/more/2.png"),
+            lambda: self.replace_file("boards/1.png"),
+            lambda: self.replace_file("check/more/2.png"),
             lambda: (self.session / "boards/2.png").write_text("one"),
-            lambda: self.written_over("lamps.yaml", "two"),
-            lambda: self.written_over("check/truth.csv", "two"),
+            lambda: self.overwrite("lamps.yaml", "two"),
+            lambda: self.overwrite("check/truth.csv", "two"),
             lambda: (self.session / "gates.yaml").write_text("one"),
         ):
             change()
-            said.append(self.glance("folders"))
-            self.assertEqual(self.glance("folders"), said[-1])
+            said.append(self.fingerprint("folders"))
+            self.assertEqual(self.fingerprint("folders"), said[-1])
         self.assertEqual(len(set(said)), len(said))
-        self.written_over("boards/0.png", "two")
-        self.assertEqual(self.glance("folders"), said[-1])  # as the page says
-        self.assertNotEqual(self.glance("files"), said[-1])
+        self.overwrite("boards/0.png", "two")
+        self.assertEqual(self.fingerprint("folders"), said[-1])  # as documented
+        self.assertNotEqual(self.fingerprint("files"), said[-1])
 
-    def test_links_that_lead_back_end_and_hide_nothing(self):
-        first, digest = self.glance(), files.input_digests(self.session)
+    def test_links_to_parent_folders_end(self):
+        first, digest = self.fingerprint(), files.input_digests(self.session)
         os.symlink("..", self.session / "boards/up")
         os.symlink(".", self.session / "check/here")
         os.symlink("itself", self.session / "check/itself")
         for folder in "boards", "check":
             os.symlink(self.session, self.session / folder / "session")
-        said = [first, self.glance()]
+        said = [first, self.fingerprint()]
         self.assertNotEqual(files.input_digests(self.session), digest)
-        self.written_over("check/more/2.png", "two")
-        said += [self.glance(), self.glance("folders")]
+        self.overwrite("check/more/2.png", "two")
+        said += [self.fingerprint(), self.fingerprint("folders")]
         self.assertEqual(len(set(said)), 3)
         names = [name for name, _ in files.input_files(self.session)]
         self.assertIn("check/more/2.png", names)
         self.assertIn("check/itself", names)
         self.assertLess(len(names), 20)
 
-    def test_links_to_each_other_have_an_end(self):
+    def test_mutual_links_end(self):
         for folder in range(9):
             (self.session / f"rotation/{folder}").mkdir(parents=True)
             for other in range(9):
                 os.symlink(f"../{other}", self.session / f"rotation/{folder}/to{other}")
         begun = time.monotonic()
-        self.glance()
-        self.assertLessEqual(len(list(files.input_files(self.session))), 20 * files.MOST_FOLDERS)
+        self.fingerprint()
+        self.assertLessEqual(len(list(files.input_files(self.session))), 20 * files.MAX_FOLDERS)
         self.assertLess(time.monotonic() - begun, 5)
 
-    def looked(self, days=0):
-        """How, where nothing is asked for and sessions are many, so many days later."""
+    def default_scan(self, days=0):
+        """Returns the default scan of a large archive after `days` days."""
         now = time.time_ns() + self.at_ns + days * 86400 * 10**9
         with unittest.mock.patch.multiple(catalogue, FEW_SESSIONS=1):
             with unittest.mock.patch.object(catalogue.time, "time_ns", return_value=now):
                 known = catalogue.Catalogue(self.file, self.archive)
-                how = known.look_for(2)
-                known.glances(["c/other", "c/s"], how)
+                how = known.choose_scan(2)
+                known.fingerprints(["c/other", "c/s"], how)
                 known.save({0: ["c/other", "c/s"]}, 50)
         return how
 
-    def test_many_sessions_are_looked_at_by_folders_and_once_a_week_by_files(self):
+    def test_scans_large_archive_by_folders_and_weekly_by_files(self):
         known = catalogue.Catalogue(self.file, self.archive)
-        self.assertEqual(known.look_for(catalogue.FEW_SESSIONS), "files")
-        said = [self.glance("folders")]  # the first look, which is at all
-        self.assertEqual([self.looked(days) for days in (0, 1, 6)], ["folders"] * 3)
-        self.written_over("boards/0.png", "two")
-        self.assertEqual(self.glance("folders"), said[0])
-        self.assertEqual([self.looked(days) for days in (8, 9, 14)], ["files", "folders", "folders"])
-        self.assertNotEqual(self.glance("folders"), said[0])  # noticed within the week
-        self.assertEqual([self.looked(days) for days in (21, 28, 35)], ["files"] * 3)  # a run once a week
-        self.assertEqual(self.looked(-1), "files")  # the clock was set back
+        self.assertEqual(known.choose_scan(catalogue.FEW_SESSIONS), "files")
+        said = [self.fingerprint("folders")]  # the first scan, of all files
+        self.assertEqual([self.default_scan(days) for days in (0, 1, 6)], ["folders"] * 3)
+        self.overwrite("boards/0.png", "two")
+        self.assertEqual(self.fingerprint("folders"), said[0])
+        self.assertEqual([self.default_scan(days) for days in (8, 9, 14)], ["files", "folders", "folders"])
+        self.assertNotEqual(self.fingerprint("folders"), said[0])  # detected within the week
+        self.assertEqual([self.default_scan(days) for days in (21, 28, 35)], ["files"] * 3)  # a run once a week
+        self.assertEqual(self.default_scan(-1), "files")  # the clock was set back
         known = catalogue.Catalogue(self.file, self.archive)
-        self.assertEqual(known.look_for(catalogue.FEW_SESSIONS), "files")
+        self.assertEqual(known.choose_scan(catalogue.FEW_SESSIONS), "files")
 
-    def test_what_is_as_new_as_the_look_is_looked_at_again(self):
+    def test_checks_new_files_again(self):
         for how in ("files", "folders"):
             self.at_ns = -10_000_000_000
-            new = self.glance(how, rebuild=True)
+            new = self.fingerprint(how, rebuild=True)
             self.at_ns = 0
-            settled = self.glance(how)
+            settled = self.fingerprint(how)
             self.assertNotEqual(settled, new)
-            self.assertEqual(self.glance(how), settled)
+            self.assertEqual(self.fingerprint(how), settled)
 
-    def test_a_catalogue_that_is_rebuilt_damaged_or_anothers_knows_nothing(self):
-        said = [self.glance(), self.glance(rebuild=True)]
+    def test_rebuilt_damaged_or_foreign_catalogue_has_new_fingerprints(self):
+        said = [self.fingerprint(), self.fingerprint(rebuild=True)]
         self.file.write_bytes(b"not a database, and longer than the head of one" * 50)
-        said.append(self.glance())
+        said.append(self.fingerprint())
         self.file.unlink()
-        said.append(self.glance())
+        said.append(self.fingerprint())
         whole = self.file.read_bytes()
         self.file.write_bytes(whole[:5000] + bytes(len(whole) - 5000))
-        said.append(self.glance())
+        said.append(self.fingerprint())
         moved = self.archive.rename(self.archive.with_name("moved"))
-        said.append(self.glance(archive=moved))
+        said.append(self.fingerprint(archive=moved))
         self.assertEqual(len(set(said)), len(said))
-        self.assertEqual(self.glance(archive=moved), said[-1])
+        self.assertEqual(self.fingerprint(archive=moved), said[-1])
 
-    def test_looks_at_the_files_of_which_the_digest_is(self):
+    def test_checks_files_of_the_digest(self):
         (self.session / "boards/nowhere.png").symlink_to("/nowhere")
         (self.session / "rotation").symlink_to(self.session / "boards")
         (self.session / "dispersion").write_text("a file")
         opened = os.open(self.archive, os.O_RDONLY)
         self.addCleanup(os.close, opened)
-        seen = catalogue.Seen("c/s", opened)
+        seen = catalogue.SessionFiles("c/s", opened)
         self.assertEqual(seen.files, [name for name, _ in files.input_files(self.session)])
-        self.assertEqual(seen.of_places, catalogue.look_at("c/s", seen.places, opened))
+        self.assertEqual(seen.path_attributes, catalogue.read_attributes("c/s", seen.paths, opened))
 
-    def test_only_sessions_that_changed_or_went_are_written(self):
-        self.glance()
+    def test_writes_only_changed_sessions(self):
+        self.fingerprint()
         later = unittest.mock.patch.object(catalogue.time, "time_ns", return_value=time.time_ns() + 10_000_000_000)
         later.start()
         self.addCleanup(later.stop)
         known = catalogue.Catalogue(self.file, self.archive)
-        known.glances(["c/s"], "files")
+        known.fingerprints(["c/s"], "files")
         known.save({3: ["c/s"]}, 50)
         known = catalogue.Catalogue(self.file, self.archive)
         self.assertEqual((known.shard_of("c/s"), known.shard_of("c/other")), (3, None))
         before = self.file.stat().st_mtime_ns
-        known.glances(["c/s"], "folders")
+        known.fingerprints(["c/s"], "folders")
         known.save({3: ["c/s"]}, 50)
         self.assertEqual(self.file.stat().st_mtime_ns, before)
 
 
 class Files(unittest.TestCase):
-    def test_digest_is_of_names_and_contents_of_what_is_read(self):
+    def test_digest_covers_names_and_contents_of_inputs(self):
         with tempfile.TemporaryDirectory() as folder:
             session = Path(folder)
             (session / "boards").mkdir()
@@ -233,7 +233,7 @@ class Files(unittest.TestCase):
             self.assertEqual(len({first, second, files.input_digests(session)[0]}), 3)
             self.assertEqual(list(files.input_digests(session)[1]), ["boards"])
 
-    def test_digest_of_all_inputs_is_that_of_earlier_versions(self):
+    def test_digest_of_inputs_is_stable(self):
         with tempfile.TemporaryDirectory() as folder:
             session, lines = Path(folder), ""
             for name in ("board.yaml", "boards/0.png", "boards/1.png", "lamps.yaml"):

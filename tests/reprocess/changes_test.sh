@@ -61,18 +61,18 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   code=0
   reprocess "$looked" --previous "$baseline" --gates "$scratch/gates.yaml" >"$said" 2>"$scratch/errors" || code=$?
   [ "$code" = 1 ] && grep -q 'gate newly_failed: is 1, at most 0' "$scratch/errors" || fail "$code $(cat "$scratch/errors")"
-  for words in '^this run    ran 2, of them 1 without a result; reused 0; ' '^passed      0' '^look        1 passed with remarks' \
+  for words in '^this run    ran 2, of them 1 without a result; reused 0; ' '^passed      0' '^review      1 passed with remarks' \
     '1 newly without a result' '^inputs      2 with changed inputs, 1 of them lost their result'; do
     grep -q "$words" "$said" || fail "no '$words' in $(cat "$said")"
   done
   as_its_schema_says row "$looked"/*/*/*/row.json
   as_its_schema_says changes "$looked/changes.json"
   page=$looked/overview.html
-  head -n 20 "$page" | grep -q '<h2 id="look">Passed with remarks</h2>' || fail "the overview does not begin with it"
+  head -n 20 "$page" | grep -q '<h2 id="review">Passed with remarks</h2>' || fail "the overview does not begin with it"
   grep -q 'assumed to be zero' "$page" || fail "the warning is not in the overview"
   grep -q '6 images skipped; the first, 0006.png: cannot be read as an image: it is cut short' "$page" || fail "no skipped images"
   grep -q "$lost</td><td>lamps.yaml</td><td>lost its result" "$page" || fail "no inputs that changed"
-  grep -q '^camera-00001,session-01,look,.*,6,,.*,2026-03-14,' "$looked/summary.csv" || fail "$(cat "$looked/summary.csv")"
+  grep -q '^camera-00001,session-01,review,.*,6,,.*,2026-03-14,' "$looked/summary.csv" || fail "$(cat "$looked/summary.csv")"
   for runs in '1 runs added, 0 existed' '0 runs added, 1 existed'; do
     "$bin/vlp-station" import "$looked" --records "$scratch/looked.db" >"$said" 2>"$scratch/errors" || fail "$(cat "$scratch/errors")"
     grep -q "^station looked-results: $runs" "$said" || fail "$(cat "$said")"
@@ -101,7 +101,7 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   "$source_dir/scripts/reprocess.sh" --diff "$looked" "$lost" >"$said"
   grep -q '^verdict     no result -> ' "$said" && grep -q '^inputs      lamps.yaml$' "$said" || fail "$(cat "$said")"
   "$source_dir/scripts/reprocess.sh" --diff "$looked" "$cut" "$baseline" >"$said"
-  grep -q '^verdict     pass -> look' "$said" && grep -q '^  calibration tilt_deg: ' "$said" || fail "$(cat "$said")"
+  grep -q '^verdict     pass -> review' "$said" && grep -q '^  calibration tilt_deg: ' "$said" || fail "$(cat "$said")"
   printf 'camera,session,date\ncamera-00001,session-01,14.3.2026\n' >"$archive/archive.csv"
   code=0
   reprocess "$looked" >/dev/null 2>"$scratch/errors" || code=$?
@@ -121,10 +121,10 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   moved=$scratch/moved-results
   rm -rf "$moved"
   reprocess "$moved" >"$said"
-  grep -q '^camera-00001,by-3-mm,look,.*the residuals correspond to' "$moved/summary.csv" || fail "$(cat "$moved/summary.csv")"
+  grep -q '^camera-00001,by-3-mm,review,.*the residuals correspond to' "$moved/summary.csv" || fail "$(cat "$moved/summary.csv")"
   # By 30 mm the others contradict it in each capture of the check, and in most of the six at the place of the dispersion.
   # Rejection of a lamp depends on tenths of a pixel: either the offset is found without it, or its absence is reported.
-  grep -q '^camera-00001,by-30-mm,look,.*lamp 2 hangs 3[0-2] mm from where the map has it' \
+  grep -q '^camera-00001,by-30-mm,review,.*lamp 2 hangs 3[0-2] mm from where the map has it' \
     "$moved/summary.csv" || fail "$(cat "$moved/summary.csv")"
   awk -F, '$5 == "by-3-mm" { off = sqrt($10 ^ 2 + $11 ^ 2); if (off > most) { most = off; lamp = $3 } }
     END { exit !(lamp == 2 && most > 2 && most < 4) }' "$moved/lamps.csv" || fail "$(cat "$moved/lamps.csv")"
@@ -149,7 +149,7 @@ refused 'is not a folder' "$scratch/nowhere" "$scratch/refused"
 refused 'unknown option' "$archive" "$scratch/refused" --odd
 refused '--shard-size: should be a number' "$archive" "$scratch/refused" --shard-size 0
 refused '--readout: should be rows or columns' "$archive" "$scratch/refused" --readout diagonals
-refused 'neither of ours nor a folder' "$archive" "$scratch/refused" --profile odd
+refused 'nor a folder with config.yaml' "$archive" "$scratch/refused" --profile odd
 refused '--scan: should be files or folders' "$archive" "$scratch/refused" --scan everywhere
 refused "option '--look' is now called '--scan'" "$archive" "$scratch/refused" --look files
 refused '--keep: should be a number' "$archive" "$scratch/refused" --keep all

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""What changed between two runs, its gates, and what differs between two results of a session."""
+"""Comparison of two runs, gates of the archive, and differences between two results of a session."""
 import random
 import tempfile
 import unittest
@@ -24,27 +24,27 @@ class Changes(unittest.TestCase):
         before += [row(4, "no result", None), row(5, "pass", 1), row(6, "pass", 1), row(9, "pass", 1)]
         now = [row(0, "pass", 0.5), row(1, "pass", 2), row(2, "gate", 1), row(3, "no result", None)]
         now += [row(4, "pass", 1), row(5, "crashed", None), row(6, "pass", 2, "other"), row(8, "pass", 1)]
-        found, pairs = changes.changes_of(now, before)
+        found, pairs = changes.compare_results(now, before)
         self.assertEqual([found[key] for key in ("better", "worse", "same", "pairs")], [1, 1, 1, 3])
         self.assertEqual(found["newly_failed"], ["c0001/s1", "c0002/s1"])
-        self.assertEqual(found["lost_with_other_inputs"], [])
-        self.assertEqual(found["newly_good"], ["c0002/s0"])
-        self.assertEqual([found[key] for key in ("other_inputs", "only_now", "only_before")], [1, 1, 1])
-        self.assertEqual(found["with_other_inputs"], ["c0003/s0"])
+        self.assertEqual(found["lost_with_changed_inputs"], [])
+        self.assertEqual(found["newly_succeeded"], ["c0002/s0"])
+        self.assertEqual([found[key] for key in ("changed_inputs", "only_now", "only_before")], [1, 1, 1])
+        self.assertEqual(found["sessions_with_changed_inputs"], ["c0003/s0"])
         self.assertEqual([change for _, _, change in pairs], [1, -0.5, 0])
         self.assertIn("no comparison with fewer than", found["verdict"])
 
-    def test_says_better_or_worse_only_with_evidence(self):
+    def test_verdict_is_inconclusive_without_evidence(self):
         def verdict(shift):
             chance = random.Random(1)
             before = [row(i, "pass", 1) for i in range(100)]
             now = [row(i, "pass", 1 + shift + chance.gauss(0, 0.05)) for i in range(100)]
-            return changes.changes_of(now, before)[0]["verdict"]
+            return changes.compare_results(now, before)[0]["verdict"]
 
-        self.assertEqual([verdict(shift) for shift in (-0.05, 0, 0.05)], ["better", "no evidence", "worse"])
+        self.assertEqual([verdict(shift) for shift in (-0.05, 0, 0.05)], ["better", "inconclusive", "worse"])
 
-    def test_interval_holds_the_truth_19_times_in_20(self):
-        # Sessions of a camera alike: were they counted alone, only 83 % of the intervals would.
+    def test_interval_covers_truth_in_95_percent(self):
+        # Sessions of a camera are correlated: intervals over sessions would cover only 83 %.
         chance = random.Random(2)
         held = 0
         for _ in range(1000):
@@ -52,89 +52,89 @@ class Changes(unittest.TestCase):
             for camera in range(40):
                 shift = chance.gauss(0.3, 1)
                 differences += [(camera, shift)] * 2
-            _, (low, high) = changes.interval_of(differences)
+            _, (low, high) = changes.compute_interval(differences)
             held += low <= 0.3 <= high
-        self.assertGreater(held, 920)  # 950 expected, less 4 sigma of 7
+        self.assertGreater(held, 920)  # 950 are expected, minus 4 sigma of 7
         self.assertLess(held, 975)
 
-    def test_gates_hold_what_they_say(self):
-        counts = changes.counts_of([row(0, "pass", 1), row(1, "gate", 3), row(2, "no result", None), row(3, "crashed", None)])
+    def test_gates_compare_their_values(self):
+        counts = changes.count_verdicts([row(0, "pass", 1), row(1, "gate", 3), row(2, "no result", None), row(3, "crashed", None)])
         gates = {"no_result": 2, "no_result_fraction": 0.4, "gate_fraction": 0.25, "mean_mm": 2, "p90_mm": 2, "newly_failed": 0}
         passed = [gate["passed"] for gate in changes.check_gates(gates, counts, None, {})]
         self.assertEqual(passed, [True, False, True, True, False, False])
 
     def test_gates_of_counts_limit_the_items_of_their_lists(self):
         end = {"camera": "c", "session": "s", "date": "2026-03-14"}
-        change = {"figure": "focal_x_px", "kind": "step", "change": 1.7, "sd": 0.1, "before": end, "since": end | {"date": "2026-04-01"}}
-        lamp = {"room": "hall", "map": "0123", "lamp": 2, "moved_mm": [3, -4], "before": end, "since": end}
+        change = {"column": "focal_x_px", "kind": "step", "change": 1.7, "sd": 0.1, "before": end, "since": end | {"date": "2026-04-01"}}
+        lamp = {"room": "hall", "map": "0123", "lamp": 2, "displacement_mm": [3, -4], "before": end, "since": end}
         found = {"between_sessions": {"focal": 0.1, "lamps": 0.1}, "cameras": [{"camera": "c", "changes": [change]}], "lamps": [lamp]}
-        items = changes.listed_items(["c/1", "c/2"], ["d/1"], found)
+        items = changes.collect_gate_items(["c/1", "c/2"], ["d/1"], found)
         self.assertEqual(items["cameras_changed"], ["c: focal_x_px +1.7, step between 2026-03-14 and 2026-04-01"])
         self.assertEqual(items["lamps_moved"], ["hall lamp 2 (map 0123): 5.00 mm, step between 2026-03-14 and 2026-03-14"])
-        counts = changes.counts_of([row(0, "pass", 1)])
+        counts = changes.count_verdicts([row(0, "pass", 1)])
         limits = {"vanished": 1, "lost_results": 1, "cameras_changed": 0, "lamps_moved": 1}
         checked = changes.check_gates(limits, counts, None, items)
         self.assertEqual([(gate["value"], gate["passed"]) for gate in checked], [(2, False), (1, True), (1, False), (1, True)])
-        untested = changes.listed_items([], [], {"between_sessions": {"focal": None, "lamps": None}, "cameras": [], "lamps": []})
+        untested = changes.collect_gate_items([], [], {"between_sessions": {"focal": None, "lamps": None}, "cameras": [], "lamps": []})
         checked = changes.check_gates(limits, counts, None, untested)
         self.assertEqual([gate["passed"] for gate in checked], [True, True, False, False])
         self.assertEqual(changes.DEFAULT_GATES, {"vanished": 0})
 
-    def test_vanished_sessions_and_lost_results_are_those_of_either_results(self):
+    def test_finds_vanished_sessions_and_lost_results(self):
         rows = [row(0, "pass", 1), row(1, "no result", None), row(2, "crashed", None), row(3, "no result", None)]
         before = [row(1, "pass", 1), row(3, "no result", None), row(4, "pass", 1)]
-        self.assertEqual(changes.vanished_sessions(rows, ["c0000/s0", "x/y"], before), ["c0002/s0", "x/y"])
-        self.assertEqual(changes.lost_results(rows, before, lambda name: name == "c0001/s0"), ["c0000/s1", "c0001/s0"])
+        self.assertEqual(changes.find_vanished_sessions(rows, ["c0000/s0", "x/y"], before), ["c0002/s0", "x/y"])
+        self.assertEqual(changes.find_lost_results(rows, before, lambda name: name == "c0001/s0"), ["c0000/s1", "c0001/s0"])
 
-    def test_is_incomplete_where_no_session_has_a_result_or_a_gate_on_them_is_missed(self):
+    def test_is_incomplete_without_results_or_if_a_gate_on_them_fails(self):
         for verdicts, limits, expected in (
             (["no result", "crashed"], {}, True),
             (["no result", "pass"], {}, False),
             (["no result", "gate"], {"no_result_fraction": 0.4}, True),
-            (["no result", "look"], {"no_result": 1, "mean_mm": 0}, False),
+            (["no result", "review"], {"no_result": 1, "mean_mm": 0}, False),
         ):
-            counts = changes.counts_of([row(i, verdict, None) for i, verdict in enumerate(verdicts)])
+            counts = changes.count_verdicts([row(i, verdict, None) for i, verdict in enumerate(verdicts)])
             checked = changes.check_gates(limits, counts, None, {})
             self.assertEqual(changes.is_incomplete(counts, checked), expected, (verdicts, limits))
 
-    def test_gates_without_a_pair_are_not_met(self):
+    def test_gates_without_pairs_fail(self):
         gates = {"newly_failed": 0, "worse_fraction": 1, "mean_difference_mm": 1}
 
         def passed(now, before):
-            found, _ = changes.changes_of(now, before)
-            return [gate["passed"] for gate in changes.check_gates(gates, changes.counts_of(now), found, {})]
+            found, _ = changes.compare_results(now, before)
+            return [gate["passed"] for gate in changes.check_gates(gates, changes.count_verdicts(now), found, {})]
 
         self.assertEqual(passed([row(0, "pass", 1, "new")], [row(0, "pass", 1, "old")]), [True, False, False])
         self.assertEqual(passed([row(0, "pass", 1)], [row(1, "pass", 1)]), [False, False, False])
 
-    def test_sessions_that_lost_their_result_with_other_inputs_are_counted(self):
+    def test_counts_lost_results_with_changed_inputs(self):
         before = [row(i, "pass", 1, "old") for i in range(3)]
-        now = [row(0, "no result", None, "new"), row(1, "look", 1, "new"), row(2, "no result", None, "old")]
-        found, pairs = changes.changes_of(now, before)
-        self.assertEqual((found["other_inputs"], found["with_other_inputs"]), (2, ["c0000/s0", "c0000/s1"]))
+        now = [row(0, "no result", None, "new"), row(1, "review", 1, "new"), row(2, "no result", None, "old")]
+        found, pairs = changes.compare_results(now, before)
+        self.assertEqual((found["changed_inputs"], found["sessions_with_changed_inputs"]), (2, ["c0000/s0", "c0000/s1"]))
         self.assertEqual(found["newly_failed"], ["c0000/s0", "c0001/s0"])
-        self.assertEqual(found["lost_with_other_inputs"], ["c0000/s0"])
+        self.assertEqual(found["lost_with_changed_inputs"], ["c0000/s0"])
         self.assertEqual(pairs, [])
-        gates = changes.check_gates({"newly_failed": 1}, changes.counts_of(now), found, {})
+        gates = changes.check_gates({"newly_failed": 1}, changes.count_verdicts(now), found, {})
         self.assertEqual([(gate["value"], gate["passed"]) for gate in gates], [(2, False)])
 
-    def test_sessions_that_miss_their_gates_count_where_no_gate_says_how_many_may(self):
-        counts = changes.counts_of([row(0, "pass", 1), row(1, "gate", 1), row(2, "look", 1)])
-        self.assertEqual((counts["pass"], counts["look"], counts["gate"]), (1, 1, 1))
-        self.assertEqual(changes.sessions_beyond_gates(counts, []), 1)
+    def test_failed_sessions_count_without_gate_fraction(self):
+        counts = changes.count_verdicts([row(0, "pass", 1), row(1, "gate", 1), row(2, "review", 1)])
+        self.assertEqual((counts["pass"], counts["review"], counts["gate"]), (1, 1, 1))
+        self.assertEqual(changes.count_failed_sessions(counts, []), 1)
         gates = changes.check_gates({"gate_fraction": 0.5}, counts, None, {})
-        self.assertEqual(changes.sessions_beyond_gates(counts, gates), 0)
+        self.assertEqual(changes.count_failed_sessions(counts, gates), 0)
 
-    def test_less_than_a_micrometer_is_the_same(self):
+    def test_changes_below_one_micrometer_are_equal(self):
         now = [row(0, "pass", 1.0005), row(1, "pass", 0.9995), row(2, "pass", 1.002)]
-        found, _ = changes.changes_of(now, [row(i, "pass", 1) for i in range(3)])
+        found, _ = changes.compare_results(now, [row(i, "pass", 1) for i in range(3)])
         self.assertEqual([found[key] for key in ("better", "worse", "same")], [0, 1, 2])
 
-    def test_students_quantile_is_that_of_tables(self):
+    def test_student_quantile_matches_tables(self):
         for freedoms, quantile in ((19, 2.093), (50, 2.0086), (100, 1.984)):
-            self.assertAlmostEqual(changes.student_975(freedoms), quantile, delta=0.001)
+            self.assertAlmostEqual(changes.student_quantile_975(freedoms), quantile, delta=0.001)
 
-    def test_refuses_gates_that_it_does_not_know(self):
+    def test_rejects_invalid_gates(self):
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "gates.yaml"
             for text, problem in (
@@ -142,10 +142,11 @@ class Changes(unittest.TestCase):
                 ("format: vlp-archive-gates/1\n", "should hold"),
                 ("format: vlp-archive-gates/1\ngates: {}\n", "should hold"),
                 ("format: vlp-archive-gates/1\ngates: {odd: 1}\n", "gate 'odd' is unknown; there are: no_result, .*cameras_changed, "),
-                ("format: vlp-archive-gates/1\ngates: {look_share: 0}\n", "gate 'look_share' is now called 'look_fraction'"),
+                ("format: vlp-archive-gates/1\ngates: {look_share: 0}\n", "gate 'look_share' is now called 'review_fraction'"),
+                ("format: vlp-archive-gates/1\ngates: {look_fraction: 0}\n", "'look_fraction' is now called 'review_fraction'"),
                 ("format: vlp-archive-gates/1\ngates: {mean_mm: .inf}\n", "should be a number"),
                 ("format: vlp-archive-gates/1\ngates: {mean_mm: true}\n", "should be a number"),
-                ("format: vlp-archive-gates/1\ngates: {worse_fraction: 7}\n", "a share from 0 to 1, not 7"),
+                ("format: vlp-archive-gates/1\ngates: {worse_fraction: 7}\n", "a fraction from 0 to 1, not 7"),
                 ("format: vlp-archive-gates/1\ngates: {mean_mm: -1}\n", "should be 0 or more, not -1"),
                 ("format: [", "is not YAML"),
             ):
@@ -155,7 +156,7 @@ class Changes(unittest.TestCase):
 
 
 class Diff(unittest.TestCase):
-    def test_names_what_differs_and_nothing_else(self):
+    def test_lists_only_differences(self):
         def result(verdict, focal, mean, warnings, parts):
             step = {"name": "check", "warnings": warnings}
             metrics = [{"name": "mean_mm", "step": "evaluate", "value": mean}]
@@ -165,19 +166,19 @@ class Diff(unittest.TestCase):
             return {"verdict": verdict, "reason": "", "parts": parts}, session
 
         before = result("pass", [260, 261], 0.2, [], {"lamps.yaml": "a", "check": "b"})
-        now = result("look", [260, 261.5], 0.3, ["the residuals; they show"], {"lamps.yaml": "c", "check": "b"})
-        said = "\n".join(diff.lines_of(before, now))
-        for words in ("verdict     pass -> look", "inputs      lamps.yaml\n", "1 -> 1 (the same)", "2 of 4 differ"):
+        now = result("review", [260, 261.5], 0.3, ["the residuals; they show"], {"lamps.yaml": "c", "check": "b"})
+        said = "\n".join(diff.list_differences(before, now))
+        for words in ("verdict     pass -> review", "inputs      lamps.yaml\n", "1 -> 1 (the same)", "2 of 4 differ"):
             self.assertIn(words, said)
         self.assertIn("  evaluate mean_mm: 0.2 -> 0.3 (+0.1)", said)
         self.assertIn("  calibration focal_px y: 261 -> 261.5 (+0.5)", said)
         self.assertIn("  + check: the residuals; they show", said)
         self.assertEqual(len(said.splitlines()), 7)
 
-    def test_of_a_row_without_parts_says_only_whether_inputs_are_the_same(self):
+    def test_row_without_parts_shows_only_if_inputs_differ(self):
         now = {"inputs": "a", "parts": {"lamps.yaml": "c", "check": "b"}}
         self.assertEqual(diff.changed_inputs({"inputs": "a"}, now), "the same")
-        self.assertEqual(diff.changed_inputs({"inputs": "b"}, now), "changed, not known which")
+        self.assertEqual(diff.changed_inputs({"inputs": "b"}, now), "changed, unknown which")
         self.assertEqual(diff.changed_inputs({"inputs": "b", "parts": {"check": "b"}}, now), "lamps.yaml")
 
 

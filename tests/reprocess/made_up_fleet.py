@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Results of a fleet that never was, with known truth: session.json as vlp-calibrate writes it."""
+"""Simulated results of a fleet with known truth, in the form of session.json of vlp-calibrate."""
 import datetime
 import math
 import random
 
 # Standard deviations reported by the sessions of datasets/archive, and the ratio of the actual scatter to them.
-SDS = {"focal": ("px", 0.025, 1.7), "center": ("px", 0.029, 1.7), "zenith": ("deg", 0.006, 1.5)}
+SDS = {"focal": ("px", 0.025, 1.7), "principal_point": ("px", 0.029, 1.7), "zenith": ("deg", 0.006, 1.5)}
 SDS |= {"rotation_center": ("px", 0.013, 1.2), "lever_arm": ("mm", 0.075, 1.1), "dispersion_offset": ("px", 0.003, 5)}
 NOISY = 3
 LAMP_SD_MM, LAMP_SCATTER = 0.06, 1.5
@@ -14,19 +14,26 @@ PLACES = {i + 1: complex(-0.6 + 0.6 * (i % 3), -0.3 + 0.6 * (i // 3)) for i in r
 
 
 class Fleet:
-    """cameras x sessions a camera, evenly over a year, in two rooms by turns. drifts: {camera: {figure: whole change
-    of x and y}}; broken: {camera: (session, {figure: (x, y)})} at once; moved: [(room, lamp, day, mm as complex)].
-    honest: sessions scatter by what they state. noisy: cameras whose sessions scatter three times as much. unequal: sessions state sds of 1 / unequal to unequal times SDS, and
-    scatter by these and by what differs between all sessions alike."""
+    """Fleet with `sessions` sessions per camera, evenly over a year, alternately in two rooms.
 
-    def __init__(self, seed, cameras=20, sessions=10, drifts=(), broken=(), moved=(), honest=False, unequal=1, noisy=()):
+    drifts   {camera: {parameter: total change of x and y}}
+    broken   {camera: (session, {parameter: (x, y)})}: a step at this session
+    moved    [(room, lamp, day, displacement in mm as a complex number)]
+    honest   sessions scatter by their reported standard deviations
+    unequal  sessions report 1 / unequal to unequal times SDS, and scatter by these and by the same sd between sessions
+    noisy    cameras whose sessions scatter three times as much
+    """
+
+    def __init__(
+        self, seed, cameras=20, sessions=10, drifts=(), broken=(), moved=(), honest=False, unequal=1, noisy=()
+    ):
         self.chance = random.Random(seed)
         self.cameras, self.sessions, self.honest, self.unequal = cameras, sessions, honest, unequal
         self.noisy = frozenset(noisy)
         self.drifts, self.broken, self.moved = dict(drifts), dict(broken), list(moved)
-        self.rooms = [self.errors_of_a_map() for _ in range(2)]
+        self.rooms = [self.draw_map_errors() for _ in range(2)]
 
-    def errors_of_a_map(self):
+    def draw_map_errors(self):
         return {lamp: complex(self.chance.gauss(0, 0.5), self.chance.gauss(0, 0.5)) for lamp in PLACES}
 
     def day(self, camera, session):
@@ -39,15 +46,15 @@ class Fleet:
         return (camera + session) % 2
 
     def all(self):
-        """Of each session: camera, session, and its session.json."""
+        """Yields (camera, session, session.json) of each session."""
         for camera in range(self.cameras):
-            usual = {name: (self.chance.gauss(0, 1), self.chance.gauss(0, 1)) for name in SDS}
-            usual["focal"] = (260 + usual["focal"][0], 260 + usual["focal"][1])
+            nominal = {name: (self.chance.gauss(0, 1), self.chance.gauss(0, 1)) for name in SDS}
+            nominal["focal"] = (260 + nominal["focal"][0], 260 + nominal["focal"][1])
             for session in range(self.sessions):
                 name = f"{self.date(self.day(camera, session))}-{session:02d}"
-                yield f"camera-{camera:02d}", name, self.result(camera, session, usual)
+                yield f"camera-{camera:02d}", name, self.result(camera, session, nominal)
 
-    def result(self, camera, session, usual):
+    def result(self, camera, session, nominal):
         calibration = {"tilt_deg": 0.5}
         for name, (unit, sd, factor) in SDS.items():
             between = 0 if self.honest else sd * math.sqrt(factor**2 - 1)
@@ -83,12 +90,12 @@ class Fleet:
         }
 
     def offsets(self, room, day):
-        """Where the others see each lamp: by solving for the similarity of the others, lamp by lamp."""
+        """Returns the offset of each lamp relative to the others, from the similarity that fits the others."""
         now = dict(self.rooms[room])
         for of_room, lamp, since, by in self.moved:
             if of_room == room and day >= since:
                 now[lamp] += by
-        sd = LAMP_SD_MM * (1 if self.honest else LAMP_SCATTER) / 1.4  # the others' noise adds to a lamp's own
+        sd = LAMP_SD_MM * (1 if self.honest else LAMP_SCATTER) / 1.4  # includes the noise of the other lamps
         now = {lamp: error + complex(self.chance.gauss(0, sd), self.chance.gauss(0, sd)) for lamp, error in now.items()}
         offsets = {}
         for lamp in PLACES:

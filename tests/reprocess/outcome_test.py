@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""What came of a session, its date, and what the runs cost."""
+"""Outcome of a session, its date, and its processor time."""
 import json
 import tempfile
 import unittest
@@ -23,10 +23,10 @@ class Outcome(unittest.TestCase):
         stated = {"verdict": verdict, "reason": reason, "metrics": list(metrics), "steps": list(steps)}
         (self.work / "session.json").write_text(json.dumps(stated | others))
 
-    def outcome(self, ended=0, said=""):
-        return outcome.outcome_of(self.work, "c/s", ended, said)
+    def outcome(self, exit_code=0, output=""):
+        return outcome.read_outcome(self.work, "c/s", exit_code, output)
 
-    def test_is_what_session_json_says(self):
+    def test_verdict_is_that_of_session_json(self):
         self.session("gate", "rms_px is 2 px", [{"name": "rms_px", "step": "lens", "value": 2.00000049}])
         evaluation = {"captures": 3, "fixes": 2, "missing_fraction": 1 / 3}
         evaluation["horizontal"] = {name: 0.25 for name in ("mean_mm", "median_mm", "p90_mm", "max_mm")}
@@ -36,26 +36,26 @@ class Outcome(unittest.TestCase):
         self.assertEqual((found["verdict"], found["reason"]), ("gate", "rms_px is 2 px"))
         self.assertEqual((found["fixes"], found["mean_mm"], found["rms_px"]), (2, "0.25", "2"))
 
-    def test_what_passed_with_something_to_look_at_says_so(self):
+    def test_passed_session_with_remarks_has_verdict_review(self):
         cut = [{"image": f"000{i}.png", "reason": "is cut short"} for i in range(6)]
         warning = "lever arm and tilt cannot be separated; the lever arm is assumed to be zero"
         steps = [{"name": "lens"}, {"name": "rotation", "warnings": [warning], "skipped": cut}]
         self.session("pass", steps=steps)
         found = self.outcome()
-        self.assertEqual((found["verdict"], found["reason"]), ("look", ""))
+        self.assertEqual((found["verdict"], found["reason"]), ("review", ""))
         self.assertEqual((found["warnings"], found["images_skipped"], found["rejected_lamps"]), (1, 6, ""))
         skipped = "rotation: 6 images skipped; the first, 0000.png: is cut short"
         self.assertEqual(found["remarks"], f"rotation: {warning}; {skipped}")
         left_out = [{"lamp": 4, "captures": 1}, {"lamp": 2, "captures": 12}]
         self.session("pass", steps=[{"name": "check", "rejected_lamps": left_out, "warnings": ["lamp 2 is left out"]}])
         found = self.outcome()
-        self.assertEqual((found["verdict"], found["rejected_lamps"]), ("look", "2 (12), 4 (1)"))
+        self.assertEqual((found["verdict"], found["rejected_lamps"]), ("review", "2 (12), 4 (1)"))
         self.session("gate", "rms_px is 2 px", steps=steps)
         self.assertEqual((self.outcome()["verdict"], self.outcome()["images_skipped"]), ("gate", 6))
         self.session("pass", steps=[{"name": "check", "notes": ["of so few as 12 captures"]}])
         self.assertEqual((self.outcome()["verdict"], self.outcome()["remarks"]), ("pass", ""))
 
-    def test_keeps_what_is_tracked_over_time(self):
+    def test_has_tracked_parameters(self):
         calibration = {"tilt_deg": 0.5, "focal_px": [260.5, 261], "focal_sd_px": [0.02, 0.03], "lever_arm_mm": [1, 2]}
         calibration |= {"lever_arm_sd_mm": None}
         history = [{"part": "camera", "inputs": []}]
@@ -65,52 +65,52 @@ class Outcome(unittest.TestCase):
         found = self.outcome()
         self.assertEqual(found["verdict"], "pass")
         self.assertEqual((found["focal_y_px"], found["focal_y_sd_px"], found["map"]), ("261", "0.03", "0123456789ab"))
-        self.assertEqual((found["lever_arm_x_mm"], found["lever_arm_x_sd_mm"], found["center_x_px"]), ("1", "", ""))
-        lamp = next(summary.lamps_of(found))
+        self.assertEqual((found["lever_arm_x_mm"], found["lever_arm_x_sd_mm"], found["principal_point_x_px"]), ("1", "", ""))
+        lamp = next(summary.make_lamp_rows(found))
         self.assertEqual((lamp["lamp"], lamp["offset_y_mm"], lamp["offset_y_sd_mm"], lamp["map_y_m"]), (2, "-1", "0.2", "1"))
 
-    def test_no_result_has_no_figures(self):
+    def test_session_without_result_has_no_metrics(self):
         self.session("no result", "lens: boards: contains no image")
         self.assertEqual(self.outcome(2)["verdict"], "no result")
         self.assertNotIn("rms_px", self.outcome(2))
 
-    def test_without_session_json_it_crashed(self):
+    def test_missing_session_json_means_crashed(self):
         found = self.outcome(-9)
         self.assertEqual((found["verdict"], found["reason"]), ("crashed", "vlp-calibrate ended with exit code -9"))
-        said = "vlp-calibrate: error: lens.yaml: cannot be written: No space left on device\n"
-        self.assertTrue(self.outcome(2, said)["reason"].endswith("No space left on device"))
+        output = "vlp-calibrate: error: lens.yaml: cannot be written: No space left on device\n"
+        self.assertTrue(self.outcome(2, output)["reason"].endswith("No space left on device"))
         self.assertIn("an hour", self.outcome(-14)["reason"])
         self.assertNotIn("an hour", self.outcome(-9)["reason"])
 
 
 class Summary(unittest.TestCase):
-    def test_cost_is_that_of_the_last_result_in_whatever_shard(self):
+    def test_cost_is_that_of_last_result_in_any_shard(self):
         with tempfile.TemporaryDirectory() as folder:
             folder = Path(folder)
             (folder / "000000").write_text("c/1\t0.5\t100.000\nc/2\t0.25\t101.000\nc/1\t0.75\t300.000\n")
             (folder / "000001").write_text("c/2\t0.125\t200.000\nc/3\t0.5\t100.000\nc/1\t0.1\t200.000\nc/3\t9\t\nc/3\t9\t40")
-            self.assertEqual(summary.costs_in(folder), {"c/1": "0.75", "c/2": "0.125", "c/3": "0.5"})
-            self.assertEqual(summary.costs_in(folder / "nowhere"), {})
+            self.assertEqual(summary.read_costs(folder), {"c/1": "0.75", "c/2": "0.125", "c/3": "0.5"})
+            self.assertEqual(summary.read_costs(folder / "nowhere"), {})
 
 
 class Dates(unittest.TestCase):
-    def test_are_those_of_the_table_or_of_the_name(self):
+    def test_come_from_table_or_name(self):
         for name, date in (("2026-03-14", "2026-03-14"), ("20260314-b", "2026-03-14"), ("x 2026-03-14T0930", "2026-03-14")):
-            self.assertEqual(dates.date_in(name), date)
+            self.assertEqual(dates.find_date(name), date)
         for name in ("session-01", "2026-13-14", "120260314", "20260314555"):
-            self.assertEqual(dates.date_in(name), "")
-        self.assertEqual(dates.days_of("1970-01-02T12:00"), 1.5)
+            self.assertEqual(dates.find_date(name), "")
+        self.assertEqual(dates.days_since_1970("1970-01-02T12:00"), 1.5)
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "archive.csv"
             file.write_text("camera,session,fault,date,room\na,1,,2026-03-14T09:30,hall\na,20260101,,,attic\n")
-            lines = dates.dates_of(Path(folder), ["a/1", "a/20260101", "b/1"])
+            lines = dates.read_dates(Path(folder), ["a/1", "a/20260101", "b/1"])
             expected = [("a", "1", "2026-03-14T09:30:00", "hall"), ("a", "20260101", "2026-01-01", "attic")]
             self.assertEqual([tuple(line.values()) for line in lines], expected)
             file.write_text("camera,session,date\na,1,2026-03-14T09:30+02:00\na,2,2026-03-14T23:30-05:00\n")
-            lines = dates.dates_of(Path(folder), ["a/1", "a/2"])
+            lines = dates.read_dates(Path(folder), ["a/1", "a/2"])
             self.assertEqual([line["date"] for line in lines], ["2026-03-14T07:30:00", "2026-03-15T04:30:00"])
             file.write_text("camera,session,date\na,1,14.3.2026\n")
-            self.assertRaisesRegex(ValueError, "archive.csv:2: date: should be as", dates.table_of, Path(folder))
+            self.assertRaisesRegex(ValueError, "archive.csv:2: date: should be as", dates.read_archive_table, Path(folder))
 
 
 if __name__ == "__main__":

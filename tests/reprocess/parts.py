@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the tests of scripts/reprocess find its parts; they are skipped where what these need is missing."""
+"""Import path of scripts/reprocess for its tests. Exits with 77, which skips a test, if a required module is
+missing."""
 import sys
 from pathlib import Path
 

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Shards, and which of them are to do."""
+"""Assignment of sessions to shards, and pending shards."""
 import os
 import tempfile
 import unittest
@@ -14,9 +14,9 @@ import summary
 
 
 class Plan(unittest.TestCase):
-    def test_shards_end_together(self):
+    def test_shards_have_equal_lengths(self):
         def lengths(*arguments):
-            ends = plan.shard_ends(*arguments)
+            ends = plan.compute_shard_ends(*arguments)
             return [end - start for start, end in zip([0, *ends], ends)]
 
         self.assertEqual(lengths(100, 50, 2), [50, 50])
@@ -25,30 +25,30 @@ class Plan(unittest.TestCase):
         self.assertEqual(lengths(10, 3, 1), [2, 3, 2, 3])
         self.assertEqual(lengths(810, 50, 2), [50] * 16 + [10])
 
-    def test_a_session_stays_in_its_shard_where_there_are_many(self):
+    def test_session_stays_in_its_shard_of_large_archive(self):
         sessions = [f"c/{i:03d}" for i in range(85)]
-        known = unittest.mock.Mock(stated={"shard_size": "10"}, shard_of=lambda name: numbers.get(name))
+        known = unittest.mock.Mock(settings={"shard_size": "10"}, shard_of=lambda name: numbers.get(name))
         numbers = {}
-        first = plan.shards_of(sessions, known, 10, 1)
+        first = plan.assign_shards(sessions, known, 10, 1)
         self.assertEqual([len(names) for names in first.values()], [10] * 8 + [5])
         numbers = {name: number for number, names in first.items() for name in names}
         del sessions[20:30]  # a whole shard
         sessions += [f"b/{i:03d}" for i in range(17)]
-        then = plan.shards_of(sorted(sessions), known, 10, 1)
+        then = plan.assign_shards(sorted(sessions), known, 10, 1)
         self.assertEqual([(number, len(names)) for number, names in then.items() if number not in (0, 1, 3, 4, 5, 6, 7)], [(8, 10), (9, 10), (10, 2)])
         for number in (0, 1, 3, 4, 5, 6, 7):
             self.assertEqual(then[number], first[number])
         self.assertEqual(sorted(name for names in then.values() for name in names), sorted(sessions))
-        self.assertEqual(plan.shards_of(sorted(sessions), known, 5, 1)[0], sorted(sessions)[:5])  # another size
+        self.assertEqual(plan.assign_shards(sorted(sessions), known, 5, 1)[0], sorted(sessions)[:5])  # another size
 
-    def test_says_what_was_looked_at(self):
+    def test_describes_scan(self):
         known = unittest.mock.Mock(all_files_at_ns=lambda: 1_773_489_600 * 10**9)  # at noon in UTC
-        self.assertEqual(plan.looked_at(known, "files"), "checked all files")
-        self.assertEqual(plan.looked_at(known, "folders"), "checked folders and tables, all files last on 2026-03-14")
+        self.assertEqual(plan.describe_scan(known, "files"), "checked all files")
+        self.assertEqual(plan.describe_scan(known, "folders"), "checked folders and tables, all files last on 2026-03-14")
         known.all_files_at_ns = lambda: 0
-        self.assertEqual(plan.looked_at(known, "folders"), "checked folders and tables, never all files")
+        self.assertEqual(plan.describe_scan(known, "folders"), "checked folders and tables, never all files")
 
-    def test_only_shards_that_are_not_done_and_summed_up_are_to_do(self):
+    def test_lists_shards_that_are_not_finished(self):
         with tempfile.TemporaryDirectory() as folder:
             state, summary_file = Path(folder) / ".state", Path(folder) / "summary.csv"
 
@@ -63,9 +63,9 @@ class Plan(unittest.TestCase):
                 write(f".state/shards/{number}.list", listed)
                 if made:
                     write(f".state/rows/{number}.csv", made, "c,s,crashed,\n" if number == 4 else "")
-            self.assertEqual(plan.to_do(state, summary_file), (list("012345"), ["4"]))
+            self.assertEqual(plan.list_pending_shards(state, summary_file), (list("012345"), ["4"]))
             write("summary.csv", 30)
-            self.assertEqual(plan.to_do(state, summary_file), (list("12345"), ["4", "5"]))
+            self.assertEqual(plan.list_pending_shards(state, summary_file), (list("12345"), ["4", "5"]))
 
 
 if __name__ == "__main__":

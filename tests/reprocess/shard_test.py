@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""A shard's job: keys, results that appear whole, former ones."""
+"""Job of a shard: keys, atomic results, former results."""
 import errno
 import json
 import os
@@ -25,32 +25,32 @@ def there_soon(file):
 
 
 class Shard(unittest.TestCase):
-    def test_key_is_of_inputs_programs_and_options(self):
+    def test_key_depends_on_inputs_programs_and_options(self):
         run = {"toolbox": "t", "camera": "", "bin": "/bin"}
-        keys = [shard.key_of("i", run), shard.key_of("j", run), shard.key_of("i", run | {"bin": "/other"})]
-        keys += [shard.key_of("i", run | {name: "x"}) for name in ("toolbox", "camera")]
+        keys = [shard.compute_key("i", run), shard.compute_key("j", run), shard.compute_key("i", run | {"bin": "/other"})]
+        keys += [shard.compute_key("i", run | {name: "x"}) for name in ("toolbox", "camera")]
         self.assertEqual(keys[0], keys[2])
         self.assertEqual(len(set(keys)), 4)
 
-    def test_a_session_whose_publishing_was_interrupted_is_whole_the_next_time(self):
+    def test_interrupted_publishing_is_completed_by_next_run(self):
         with tempfile.TemporaryDirectory() as folder:
             self.addCleanup(os.chdir, os.getcwd())
             os.chdir(folder)
             session = {"camera": "c", "session": "s", "verdict": "pass"}
             work = Path("work")
             (work / "c/s").mkdir(parents=True)
-            for file in outcome.KEPT:
+            for file in outcome.KEPT_FILES:
                 (work / "c/s" / file).write_text(file)
             former = Path("sessions/c/s")
             former.mkdir(parents=True)
-            for step in ("write_whole", "place_of"):  # fails there, then goes through
+            for step in ("write_atomically", "result_folder"):  # fails there, then succeeds
                 with unittest.mock.patch.object(shard, step, side_effect=KeyboardInterrupt):
                     self.assertRaises(KeyboardInterrupt, shard.publish, session, work)
             shard.publish(session, work)
             found = sorted(str(file.relative_to(former)) for file in former.rglob("*") if file.is_file())
-            self.assertEqual(found, sorted([*outcome.KEPT.values(), "row.json"]))
+            self.assertEqual(found, sorted([*outcome.KEPT_FILES.values(), "row.json"]))
 
-    def test_digests_of_what_looks_the_same_are_not_taken_again(self):
+    def test_unchanged_fingerprint_avoids_digests(self):
         with tempfile.TemporaryDirectory() as folder:
             self.addCleanup(os.chdir, os.getcwd())
             os.chdir(folder)
@@ -61,29 +61,29 @@ class Shard(unittest.TestCase):
                 (Path(name) / "boards/0.png").write_text(text)
             made = []
 
-            def begin(run, each, name, work):
+            def start_session(run, each, name, work):
                 (work / name).mkdir(parents=True)
                 made.append(name)
 
-            def outcome_of(folder, name, ended, said):
+            def read_outcome(folder, name, exit_code, output):
                 return {"camera": "c", "session": name[-1], "verdict": "pass"}
 
-            def reprocess(**glances):
+            def reprocess(**fingerprints):
                 digested, made[:] = [], []
                 digests = lambda session: digested.append(session.name) or files.input_digests(session)
-                glances = {f"c/{name[1:]}": glance for name, glance in glances.items()}
+                fingerprints = {f"c/{name[1:]}": fingerprint for name, fingerprint in fingerprints.items()}
                 with unittest.mock.patch.multiple(
-                    shard, begin=begin, outcome_of=outcome_of, input_digests=digests, EachProcess=unittest.mock.DEFAULT
+                    shard, start_session=start_session, read_outcome=read_outcome, input_digests=digests, BatchProcess=unittest.mock.DEFAULT
                 ) as mocks:
-                    mocks["EachProcess"]().answer.return_value = 0, 0.5, ""
-                    rows = shard.reprocess(run, "7", glances, None, 0)
-                files.write_whole(".state/rows/7.csv", files.table(outcome.ALL, rows))
-                self.assertEqual([row["glance"] for row in rows], list(glances.values()))
+                    mocks["BatchProcess"]().answer.return_value = 0, 0.5, ""
+                    rows = shard.reprocess(run, "7", fingerprints, None, 0)
+                files.write_atomically(".state/rows/7.csv", files.table(outcome.SHARD_COLUMNS, rows))
+                self.assertEqual([row["fingerprint"] for row in rows], list(fingerprints.values()))
                 return digested, [name[-1] for name in made]
 
             self.assertEqual(reprocess(s1="a", s2="b"), (["1", "2"], ["1", "2"]))
             self.assertEqual(reprocess(s1="a", s2="b"), ([], []))
-            self.assertEqual(reprocess(s1="a", s2="c"), (["2"], []))  # touched
+            self.assertEqual(reprocess(s1="a", s2="c"), (["2"], []))  # changed times only
             Path("c/2/boards/0.png").write_text("three")
             self.assertEqual(reprocess(s1="a", s2="d"), (["2"], ["2"]))
             (Path("sessions/c/1/row.json")).unlink()
@@ -91,19 +91,19 @@ class Shard(unittest.TestCase):
             run["toolbox"] = "u"
             self.assertEqual(reprocess(s1="a", s2="d"), (["1", "2"], ["1", "2"]))
 
-    def test_a_program_that_dies_is_started_again_for_the_next_session(self):
+    def test_restarts_program_that_died(self):
         with tempfile.TemporaryDirectory() as folder:
             program = Path(folder) / "vlp-calibrate"
             program.write_text("""#!/bin/bash
 [ "$*" = --batch-stdin ] || exit 7
 read -r line
 [[ $line != *dies* ]] || kill -9 $$
-while echo '{"exit_code": 3, "cpu_s": 0.25, "said": "'$BASHPID'"}' && read -r line; do true; done
+while echo '{"exit_code": 3, "cpu_s": 0.25, "output": "'$BASHPID'"}' && read -r line; do true; done
 exit 5
 """)
             program.chmod(0o755)
             with open(Path(folder) / "lock", "w") as lock:
-                each = shard.EachProcess(program, lock)
+                each = shard.BatchProcess(program, lock)
 
                 def answer(arguments):
                     each.ask(arguments)
@@ -113,10 +113,10 @@ exit 5
                 one, two = answer(["lives"]), answer([Path("lives")])
                 self.assertEqual(one[:2], (3, 0.25))
                 self.assertEqual(one, two)  # the same process
-                self.assertEqual(each.end(), 5)  # which had nothing more to read
+                self.assertEqual(each.end(), 5)  # it had no further input
 
     def run_of_two_sessions(self, program):
-        """What reprocess() is told for c/1 and c/2, in a folder of their own."""
+        """Returns the arguments of reprocess() for c/1 and c/2, in a separate folder."""
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.addCleanup(os.chdir, os.getcwd())
@@ -130,39 +130,39 @@ exit 5
         run |= {"archive": str(Path("archive").absolute()), "bin": folder.name}
         return run, "7", {"c/1": "a", "c/2": "b"}, lock, 0
 
-    def test_a_result_comes_to_its_place_while_the_next_session_is_at_work(self):
+    def test_publishes_result_while_next_session_runs(self):
         run = self.run_of_two_sessions("""#!/bin/bash
 while read -r line; do
   if [[ $line == *c/2* ]]; then
     touch begun
     for i in {1..200}; do [ -e failed/c/1/row.json ] && touch seen && break; sleep 0.05; done
   fi
-  echo '{"exit_code": 1, "cpu_s": 0.5, "said": "words"}'
+  echo '{"exit_code": 1, "cpu_s": 0.5, "output": "words"}'
 done
 """)
         publish, next_at_work = shard.publish, {}
 
-        def publish_when_the_next_has_begun(row, *of_it):
+        def publish_after_start_of_next(row, *others):
             next_at_work[row["session"]] = there_soon(Path("begun")) and not Path("seen").exists()
-            return publish(row, *of_it)
+            return publish(row, *others)
 
-        with unittest.mock.patch.object(shard, "publish", publish_when_the_next_has_begun):
+        with unittest.mock.patch.object(shard, "publish", publish_after_start_of_next):
             rows = shard.reprocess(*run)
         self.assertEqual(next_at_work, {"1": True, "2": False})
-        self.assertTrue(Path("seen").exists())  # it did not wait for the answer of c/2
+        self.assertTrue(Path("seen").exists())  # publishing did not wait for the answer of c/2
         self.assertEqual([row["verdict"] for row in rows], ["crashed", "crashed"])
         self.assertEqual([row["session"] for row in rows], ["1", "2"])
 
-    def test_what_is_at_work_ends_when_a_result_cannot_come_to_its_place(self):
+    def test_failed_publishing_ends_running_session(self):
         run = self.run_of_two_sessions("""#!/bin/bash
 read -r line
-echo '{"exit_code": 1, "cpu_s": 0.5, "said": "words"}'
+echo '{"exit_code": 1, "cpu_s": 0.5, "output": "words"}'
 read -r line
 echo $$ >.process && mv .process process
 exec sleep 60
 """)
 
-        def publish(*of_it):
+        def publish(*arguments):
             self.assertTrue(there_soon(Path("process")))
             raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -170,7 +170,7 @@ exec sleep 60
             self.assertRaisesRegex(OSError, "No space left", shard.reprocess, *run)
         self.assertRaises(ProcessLookupError, os.kill, int(Path("process").read_text()), 0)
 
-    def test_former_results_stay_by_their_keys_so_many(self):
+    def test_keeps_requested_number_of_former_results(self):
         with tempfile.TemporaryDirectory() as folder:
             self.addCleanup(os.chdir, os.getcwd())
             os.chdir(folder)
@@ -178,11 +178,11 @@ exec sleep 60
             (work / "c/s").mkdir(parents=True)
 
             def publish(key, keep, verdict="pass"):
-                (work / "c/s/session.json").unlink(missing_ok=True)  # another file, as programs write
+                (work / "c/s/session.json").unlink(missing_ok=True)  # a new file, as programs write it
                 (work / "c/s/session.json").write_text(key)
                 shard.publish({"camera": "c", "session": "s", "verdict": verdict, "key": key * 4}, work, keep)
                 for age, file in enumerate(sorted(Path(".").rglob("row.json"), key=lambda file: file.stat().st_mtime_ns)):
-                    os.utime(file, ns=(age, age))  # that of one tick are told apart
+                    os.utime(file, ns=(age, age))  # times within one tick of the clock differ
                 return sorted(path.name for path in Path("former").rglob("*") if path.is_dir() and path.name.endswith("key"))
 
             self.assertEqual(publish("1key", 2), [])
@@ -194,11 +194,11 @@ exec sleep 60
             self.assertEqual(Path("sessions/c/s/session.json").read_text(), "4key")
             self.assertEqual(publish("5key", 0), [])
             self.assertEqual(publish("6key", 1, "crashed"), ["5key5key5key"])
-            self.assertEqual(publish("7key", 1), ["5key5key5key"])  # a crash does not push it out
+            self.assertEqual(publish("7key", 1), ["5key5key5key"])  # a crash does not replace it
             self.assertEqual(publish("8key", 1), ["7key7key7key"])
-            self.assertEqual(publish("8key", 1), ["8key8key8key"])  # the same again
+            self.assertEqual(publish("8key", 1), ["8key8key8key"])  # unchanged
 
-    def test_a_former_result_is_kept_when_a_session_fails_twice(self):
+    def test_keeps_former_result_if_session_fails_twice(self):
         with tempfile.TemporaryDirectory() as folder:
             self.addCleanup(os.chdir, os.getcwd())
             os.chdir(folder)
@@ -210,7 +210,7 @@ exec sleep 60
                 shard.publish({"camera": "c", "session": "s", "verdict": verdict, "key": key}, work, 1)
             self.assertEqual([file.read_text() for file in Path("former").rglob("session.json")], ["good"])
 
-    def test_a_former_result_outlasts_a_kill_at_any_moment(self):
+    def test_former_result_survives_kill_at_any_time(self):
         with tempfile.TemporaryDirectory() as folder:
             self.addCleanup(os.chdir, os.getcwd())
             os.chdir(folder)
@@ -223,7 +223,7 @@ exec sleep 60
                 shard.publish({"camera": "c", "session": "s", "verdict": "pass", "key": key}, work, 1)
 
             def killed_after(moves):
-                """The process ends after so many renamings."""
+                """Ends the process after `moves` renamings."""
                 rename, left = Path.rename, [moves]
 
                 def once_more(path, target):
@@ -246,7 +246,7 @@ exec sleep 60
                     self.assertLessEqual(there, kept, moves)
                     for former in Path("former/c/s").glob("*"):
                         self.assertTrue((former / "row.json").exists(), moves)
-                    if shard.current("c/s", key) is None:
+                    if shard.find_current_row("c/s", key) is None:
                         publish(key)
                 kept = {file.read_text() for file in Path("former").rglob("session.json")}
                 self.assertLessEqual(there, kept, moves)
@@ -254,7 +254,7 @@ exec sleep 60
             publish("last")
             self.assertEqual([file.read_text() for file in Path("former").rglob("session.json")], [key])
 
-    def test_a_former_result_whose_row_cannot_be_read_is_replaced(self):
+    def test_replaces_former_result_with_unreadable_row(self):
         with tempfile.TemporaryDirectory() as folder:
             self.addCleanup(os.chdir, os.getcwd())
             os.chdir(folder)

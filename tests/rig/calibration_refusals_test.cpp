@@ -60,7 +60,7 @@ TEST(ReadCalibration, ReportsLineAndKeyOfInvalidCamera) {
        {"0.00001", "10", "camera.row_time_s: 10 s is not within 1.0e-08 and 0.001 s" + unit},
        {"0.00001", "0.01", "camera.row_time_s: 0.01 s is not within"},  // 10 us in ms
        {"0.00001", "1.0e-5 s", "camera.row_time_s: should be a finite number, not '1.0e-5 s'"},
-       {"columns", "cols", "camera.readout: 'cols' is unknown; the read-out is along rows or"},
+       {"columns", "cols", "camera.readout: 'cols' is unknown; the readout is along rows or"},
        {"readout:", "read_out:", "camera: key 'read_out' is unknown; the keys are: id, "}});
 }
 

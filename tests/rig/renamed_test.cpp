@@ -22,6 +22,9 @@ TEST(FindPresentName, DependsOnTheKind) {
   EXPECT_EQ(find_present_name(NameKind::option, "--of"), "--position-of");
   EXPECT_EQ(find_present_name(NameKind::option, "--marker-share"), "--marker-to-square-ratio");
   EXPECT_EQ(find_present_name(NameKind::value, "paper"), "chen-guan");
+  EXPECT_EQ(find_present_name(NameKind::key, "spots_m"), "pivots_m");
+  EXPECT_EQ(find_present_name(NameKind::key, "dispersion_station_m"), "dispersion_position_m");
+  EXPECT_EQ(find_present_name(NameKind::option, "--station-mm"), "--same-point-mm");
   EXPECT_EQ(find_present_name(NameKind::key, "spot"), "");
   EXPECT_EQ(find_present_name(NameKind::key, "rms_px"), "");
 }

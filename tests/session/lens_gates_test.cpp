@@ -29,7 +29,7 @@ TEST(LensGates, FailWithoutSplitHalfDifference) {
                                     {"views", 36},
                                     {"board_tilt_deg", 60}};
   EXPECT_EQ(describe_failed_gates(check_gates(make_default_lens_gates(), metrics)),
-            "split_half_px is not known, at most 1 px is asked for");
+            "split_half_px is not known, at most 1 px is required");
 }
 
 }  // namespace

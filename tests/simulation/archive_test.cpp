@@ -15,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 
 const std::string kSpreads =
-    "archive: {sessions_per_camera: 2, focal_fraction: 0.01, center_px: 3, "
+    "archive: {sessions_per_camera: 2, focal_fraction: 0.01, principal_point_px: 3, "
     "distortion_fraction: 0.05, tilt_deg: 1, lever_arm_m: 0.003, map_error_m: 0.001, "
     "fault_fraction: 0.1, damage_fraction: 0.05}\n";
 

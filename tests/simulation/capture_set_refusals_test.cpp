@@ -17,7 +17,7 @@ std::string without_board() {
 TEST(ReadCaptureSet, RejectsSpotOutsideRoom) {
   const std::string problem = "moves the camera outside the room";
   EXPECT_EQ(refusal_with("[-0.2, 0.3]", "[-0.2, 0.6]"),
-            "scene.yaml:25: captures[0].spots_m[1]: " + problem);
+            "scene.yaml:25: captures[0].pivots_m[1]: " + problem);
   EXPECT_EQ(refusal_with("x_m: [-0.6, 0.6], y", "x_m: [-1.6, 0.6], y"),
             "scene.yaml:26: captures[1].grid: " + problem);
   EXPECT_EQ(refusal_with("y_m: [0.3, -0.3]", "y_m: [0.7, -0.3]"),
@@ -34,9 +34,9 @@ TEST(ReadCaptureSet, RejectsPositionWhenLeverArmCanLeaveRoom) {
   const std::string problem = "moves the camera outside the room";
   EXPECT_EQ(refusal_with("[-0.2, 0.3]", "[0.949, -0.449]"), "");
   EXPECT_EQ(refusal_with("[-0.2, 0.3]", "[0.951, -0.449]"),
-            "scene.yaml:25: captures[0].spots_m[1]: " + problem);
+            "scene.yaml:25: captures[0].pivots_m[1]: " + problem);
   EXPECT_EQ(refusal_with("[-0.2, 0.3]", "[0.949, -0.451]"),
-            "scene.yaml:25: captures[0].spots_m[1]: " + problem);
+            "scene.yaml:25: captures[0].pivots_m[1]: " + problem);
   EXPECT_EQ(refusal_with("y_m: [0.3, -0.3]", "y_m: [0.451, -0.3]"),
             "scene.yaml:26: captures[1].grid: " + problem);
   EXPECT_EQ(refusal_with("to_m: [0.5, 0.4]", "to_m: [0.5, 0.451]"),
@@ -76,15 +76,15 @@ TEST(ReadCaptureSet, RejectsValuesOutOfRange) {
 }
 
 TEST(ReadCaptureSet, RequiresExactlyOneKeyForPositions) {
-  const std::string problem = "needs one of the keys spots_m, grid, drive, views";
-  EXPECT_EQ(refusal_with("spots_m: [[0.1, -0.05], [-0.2, 0.3]], ", ""),
+  const std::string problem = "needs one of the keys pivots_m, grid, drive, views";
+  EXPECT_EQ(refusal_with("pivots_m: [[0.1, -0.05], [-0.2, 0.3]], ", ""),
             "scene.yaml:25: captures[0]: " + problem);
-  EXPECT_EQ(refusal_with("folder: grid,", "folder: grid, spots_m: [[0, 0]],"),
+  EXPECT_EQ(refusal_with("folder: grid,", "folder: grid, pivots_m: [[0, 0]],"),
             "scene.yaml:26: captures[1]: " + problem);
-  EXPECT_EQ(refusal_with("folder: line,", "folder: line, spots_m: [[0, 0]],"),
+  EXPECT_EQ(refusal_with("folder: line,", "folder: line, pivots_m: [[0, 0]],"),
             "scene.yaml:27: captures[2]: " + problem);
-  EXPECT_EQ(refusal_with("folder: boards,", "folder: boards, spots_m: [[0, 0]],"),
-            "scene.yaml:28: captures[3]: key 'spots_m' is unknown; the keys are: folder, "
+  EXPECT_EQ(refusal_with("folder: boards,", "folder: boards, pivots_m: [[0, 0]],"),
+            "scene.yaml:28: captures[3]: key 'pivots_m' is unknown; the keys are: folder, "
             "exposure_s, views");
 }
 
@@ -97,7 +97,7 @@ TEST(ReadCaptureSet, RequiresExactlyOneKeyForYaws) {
 
 TEST(ReadCaptureSet, RejectsEmptyList) {
   EXPECT_EQ(refusal_with("[[0.1, -0.05], [-0.2, 0.3]]", "[]"),
-            "scene.yaml:25: captures[0].spots_m: contains no spot");
+            "scene.yaml:25: captures[0].pivots_m: contains no pivot");
   EXPECT_EQ(refusal_with("heights_m: [0, 0.2]", "heights_m: []"),
             "scene.yaml:25: captures[0].heights_m: contains no height");
   EXPECT_EQ(refusal_with("yaws_deg: [20, -90]", "yaws_deg: []"),

@@ -192,7 +192,7 @@ TEST_F(FrameRendererForeignLight, IsListedInTrueOtherLightsOnly) {
 TEST_F(FrameRendererForeignLight, WriteTruthTablesListsItInTrueOtherLightsTable) {
   CaptureSet set{"check", 5e-5, LampShots{}, {}};
   set.lamps->heights_m = {0.1};
-  set.lamps->spots_m = {Eigen::Vector2d::Zero()};
+  set.lamps->pivots_m = {Eigen::Vector2d::Zero()};
   set.lamps->yaws_rad = {0};
   set.lamps->yaw_jitter_rad = set.lamps->turn_rate_rad_per_s = 0;
   set.lamps->repeat = 1;
@@ -217,7 +217,7 @@ TEST(LampShot, ForeignLightPhasesDoNotChangeOtherRandomValues) {
   scene.lamps[0].phase.reset();
   CaptureSet set{"check", 5e-5, LampShots{}, {}};
   set.lamps->heights_m = {0.1};
-  set.lamps->spots_m = {Eigen::Vector2d::Zero()};
+  set.lamps->pivots_m = {Eigen::Vector2d::Zero()};
   set.lamps->yaws_rad = {0};
   set.lamps->yaw_jitter_rad = set.lamps->turn_rate_rad_per_s = 0;
   set.lamps->repeat = 3;

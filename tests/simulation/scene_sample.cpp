@@ -31,7 +31,7 @@ board:
   black_e_per_s: 1.5e+5
   surround_e_per_s: 6.0e+5
 captures:
-  - {folder: spots, exposure_s: 5.0e-5, spots_m: [[0.1, -0.05], [-0.2, 0.3]], heights_m: [0, 0.2], yaws_deg: [20, -90], interval_s: 0.5, repeat: 3, known: true}
+  - {folder: spots, exposure_s: 5.0e-5, pivots_m: [[0.1, -0.05], [-0.2, 0.3]], heights_m: [0, 0.2], yaws_deg: [20, -90], interval_s: 0.5, repeat: 3, known: true}
   - {folder: grid, exposure_s: 2.0e-5, grid: {x_m: [-0.6, 0.6], y_m: [0.3, -0.3], columns: 3, rows: 2}, heights_m: [0.1], turn: {count: 4, jitter_deg: 9}, turn_rate_deg_per_s: 90, interval_s: 2}
   - {folder: line, exposure_s: 5.0e-5, drive: {from_m: [-0.3, 0], to_m: [0.5, 0.4], speed_m_per_s: 0.5}, heights_m: [0], yaws_deg: [0], interval_s: 0.25}
   - {folder: boards, exposure_s: 0.004, views: {count: 5, distance_m: [0.2, 0.4], tilt_deg: 45, roll_deg: 180, field_coverage: 0.75, velocity_m_per_s: [0.1, 0, 0.2]}}

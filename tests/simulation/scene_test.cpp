@@ -128,7 +128,7 @@ TEST(ReadScene, ReadsSpotsInOrderOfFile) {
   EXPECT_EQ(set.exposure_s, 5e-5);
   EXPECT_FALSE(set.board);
   ASSERT_TRUE(set.lamps);
-  EXPECT_THAT(set.lamps->spots_m, ElementsAre(Vector2d(0.1, -0.05), Vector2d(-0.2, 0.3)));
+  EXPECT_THAT(set.lamps->pivots_m, ElementsAre(Vector2d(0.1, -0.05), Vector2d(-0.2, 0.3)));
   EXPECT_THAT(set.lamps->heights_m, ElementsAre(0, 0.2));
   EXPECT_THAT(set.lamps->yaws_rad,
               Pointwise(DoubleNear(kRounding), {std::numbers::pi / 9, -std::numbers::pi / 2}));
@@ -143,9 +143,9 @@ TEST(ReadScene, OrdersCaptureSpotsRowByRow) {
   const LampShots captures = read_scene_text(kSceneYaml).sets.at(1).lamps.value();
   const std::vector<Vector2d> expected{{-0.6, 0.3},  {0, 0.3},  {0.6, 0.3},
                                        {-0.6, -0.3}, {0, -0.3}, {0.6, -0.3}};
-  ASSERT_EQ(captures.spots_m.size(), expected.size());
+  ASSERT_EQ(captures.pivots_m.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
-    EXPECT_THAT(captures.spots_m[i], IsNear(expected[i], kRounding)) << i;
+    EXPECT_THAT(captures.pivots_m[i], IsNear(expected[i], kRounding)) << i;
   }
   const double quarter_rad = std::numbers::pi / 2;
   EXPECT_THAT(captures.yaws_rad, Pointwise(DoubleNear(kRounding),
@@ -161,14 +161,14 @@ TEST(ReadScene, ComputesPositionsAlongDriveUpToItsEnd) {
   ASSERT_TRUE(captures.drive);
   EXPECT_EQ(captures.drive->speed_m_per_s, 0.5);
   // 0.894 m in steps of 0.125 m.
-  ASSERT_EQ(captures.spots_m.size(), 8U);
+  ASSERT_EQ(captures.pivots_m.size(), 8U);
   const Vector2d step_m = Vector2d(0.8, 0.4).normalized() * 0.125;
   for (int i = 0; i < 8; ++i) {
-    EXPECT_THAT(captures.spots_m[std::size_t(i)],
+    EXPECT_THAT(captures.pivots_m[std::size_t(i)],
                 IsNear(Vector2d(-0.3, 0) + i * step_m, kRounding));
   }
   const std::string whole_steps = scene_with("to_m: [0.5, 0.4]", "to_m: [0.7, 0]");
-  EXPECT_THAT(read_scene_text(whole_steps).sets.at(2).lamps.value().spots_m.back(),
+  EXPECT_THAT(read_scene_text(whole_steps).sets.at(2).lamps.value().pivots_m.back(),
               IsNear(Vector2d(0.7, 0), kRounding));
 }
 

@@ -81,7 +81,7 @@ TEST(LampShot, ContinuesMotionOfPreviousCaptureOnDrive) {
   const Scene scene = plain_scene();
   const StraightDrive drive{{0, 0}, {0.3, 0.4}, 0.1};
   LampShots captures{{0, 0.3}, {}, drive, {0, 2}, 0, 0.4, 2, 0.5, false};
-  for (int i = 0; i <= 10; ++i) captures.spots_m.emplace_back(0.03 * i, 0.04 * i);
+  for (int i = 0; i <= 10; ++i) captures.pivots_m.emplace_back(0.03 * i, 0.04 * i);
   const CaptureSet set{"drive", 5e-5, captures, {}};
   ASSERT_EQ(count_captures_of_set(set), 88);
   for (std::size_t i = 0; i + 1 < 88; ++i) {

@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Opens HTML files in a headless Chromium and prints what is wrong with them, a line each.
+"""Opens HTML files in a headless Chromium and prints their problems, one per line.
 
     browser_check.py [--pictures FOLDER] FILE.html ...
 
-Errors and requests to elsewhere; empty pictures; basic accessibility (language, title, headings,
-alternative texts, table headers, contrast, sizes); a page wider than a phone's screen. Writes
-FILE.pdf beside each file, printed on the paper that the page asks for, and with --pictures what a
-desktop and a phone show. Exit code 0: nothing is wrong; 1: something is; 77: there is no browser.
+Checks for errors and external requests; empty pictures; basic accessibility (language, title, headings,
+alternative texts, table headers, contrast, sizes); pages wider than the screen of a phone. Writes FILE.pdf
+beside each file, in the paper size of the page, and with --pictures screenshots of a desktop and a phone.
+Exit code 0: no problems; 1: problems; 77: no browser is installed.
 
-It speaks Chromium's own protocol (https://chromedevtools.github.io/devtools-protocol/) over a pipe,
-so that nothing but the browser and Python is needed.
+Uses Chromium's DevTools protocol (https://chromedevtools.github.io/devtools-protocol/) over a pipe, so that
+only the browser and Python are required.
 """
 import argparse
 import base64
@@ -31,13 +31,13 @@ PATIENCE_S = 120
 
 
 class Browser:
-    """A browser with one page; calls wait for their answer, events are kept."""
+    """Browser with one page. Calls wait for their answer; events are stored."""
 
     def __init__(self, program, profile):
         from_us, self._write = os.pipe()
         self._read, to_us = os.pipe()
 
-        def in_child():  # it reads from 3 and writes to 4
+        def in_child():  # the browser reads from descriptor 3 and writes to 4
             high = [os.dup2(from_us, 50), os.dup2(to_us, 51)]
             os.dup2(high[0], 3)
             os.dup2(high[1], 4)
@@ -100,7 +100,7 @@ class Browser:
         return json.loads(message)
 
 
-def problems_of_events(events, address):
+def find_event_problems(events, address):
     for event in events:
         parameters = event.get("params", {})
         if event.get("method") == "Runtime.exceptionThrown":
@@ -134,8 +134,8 @@ def check(browser, file, pictures):
             (pictures / f"{file.stem}-{name}.png").write_bytes(base64.b64decode(shot["data"]))
     pdf = browser.call("Page.printToPDF", preferCSSPageSize=True, paperWidth=11, paperHeight=17)
     file.with_suffix(".pdf").write_bytes(base64.b64decode(pdf["data"]))
-    problems += problems_of_events(browser.events, address)
-    return list(dict.fromkeys(problems))  # each once
+    problems += find_event_problems(browser.events, address)
+    return list(dict.fromkeys(problems))  # without duplicates
 
 
 def main():

@@ -17,58 +17,58 @@ except ImportError:
 
 SCHEMAS = Path(__file__).resolve().parents[2] / "datasets/schemas"
 WRONG = {"no such key": None}
-ALIKE = 2  # number of elements of a list, which are alike, that are modified
+MAX_ELEMENTS = 2  # elements of a list that are modified; the others have the same schema
 
 
-def validator_of(name):
-    warnings.simplefilter("ignore", DeprecationWarning)  # RefResolver, since 4.18; 4.10 has nothing else
+def make_validator(name):
+    warnings.simplefilter("ignore", DeprecationWarning)  # RefResolver is deprecated since 4.18; 4.10 has no alternative
     schema = json.loads((SCHEMAS / f"{name}.schema.json").read_text())
     kind = jsonschema.Draft202012Validator
     kind.check_schema(schema)
     return kind(schema, resolver=jsonschema.RefResolver(f"{SCHEMAS.as_uri()}/", schema))
 
 
-def places(value, place=()):
+def list_paths(value, path=()):
     """Yields (path of keys and indices, value) for each value of a document."""
-    yield place, value
+    yield path, value
     inside = value.items() if isinstance(value, dict) else []
     if isinstance(value, list):
-        inside = list(enumerate(value))[:ALIKE]
+        inside = list(enumerate(value))[:MAX_ELEMENTS]
     for key, item in inside:
-        yield from places(item, (*place, key))
+        yield from list_paths(item, (*path, key))
 
 
-def with_wrong(document, place):
+def insert_error(document, path):
     """Returns the document with another value at a path, or, in an object, with another key."""
     wrong = copy.deepcopy(document)
     at = wrong
-    for key in place[:-1]:
+    for key in path[:-1]:
         at = at[key]
-    there = at[place[-1]] if place else at
-    if isinstance(there, dict):
-        there.update(WRONG)
-    elif place:
-        at[place[-1]] = WRONG
+    value = at[path[-1]] if path else at
+    if isinstance(value, dict):
+        value.update(WRONG)
+    elif path:
+        at[path[-1]] = WRONG
     else:
         wrong = WRONG
     return wrong
 
 
-def problems_of(validator, document):
+def find_problems(validator, document):
     problems = [f"{error.json_path}: {error.message}" for error in validator.iter_errors(document)]
     if problems:
         return problems
     return [
         f"{'/'.join(map(str, place))}: could be anything"
-        for place, _ in places(document)
-        if validator.is_valid(with_wrong(document, place))
+        for place, _ in list_paths(document)
+        if validator.is_valid(insert_error(document, place))
     ]
 
 
 def main():
     name, *files = sys.argv[1:]
-    validator = validator_of(name)
-    said = [f"{file}: {words}" for file in files for words in problems_of(validator, json.loads(Path(file).read_text()))]
+    validator = make_validator(name)
+    said = [f"{file}: {words}" for file in files for words in find_problems(validator, json.loads(Path(file).read_text()))]
     print("\n".join(said), end="\n" * bool(said))
     sys.exit(1 if said or not files else 0)
 

@@ -277,6 +277,7 @@ std::string describe_layout_problem(const Board& board, const std::vector<Step>&
     return text;
   }
   if (fits) return "";
+  // [LENS-3] `not lie as on a board`
   return "the tags in the images do not lie as on a board of " + std::to_string(board.cols) +
          " x " + std::to_string(board.rows) + " tags from id " + std::to_string(board.first_id) +
          " in any id_order; is it another board?";
@@ -365,6 +366,8 @@ BoardCheck check_board_layout(const Board& board, std::span<const BoardView> vie
   if (!is_pitch_consistent(fit, 1 + board.tag_spacing, tolerance)) {
     const double hundreds = 100;
     const double seen = std::round((*fit.pitch - 1) * hundreds) / hundreds;
+    // [LENS-4] `images show gaps` | wrong `tag_spacing`; strong tone curve or overexposure; far out
+    //   of focus | measure it; expose less; focus
     check.problem = "tag_spacing is " + format_shortest(board.tag_spacing) +
                     ", but the images show gaps of " + format_shortest(seen) + " tags";
   }

@@ -209,6 +209,7 @@ Camera parse_yaml_camera(const YAML::Node& document) {
   } else {
     const auto matrix = parse_yaml_numbers(document["camera_matrix"]);
     if (matrix.size() != 9) throw std::invalid_argument("camera_matrix should be 3 x 3");
+    // [LENS-7] `is skewed`
     if (matrix[1] != 0) throw std::invalid_argument("camera_matrix is skewed");
     camera.intrinsics = {matrix[0], matrix[4], matrix[2], matrix[5]};
     distortions = parse_yaml_numbers(document["distortion_coefficients"]);
@@ -287,6 +288,8 @@ void fit_lens_parameters(const Camera& camera, const Lens& from, LensModel model
     if (has_converged) break;
   }
   if (fit.count == 0 || !std::isfinite(fit.squares)) {
+    // [LENS-7] `has no lens near` | `vlp-convert`: unsupported model or value | fit another with
+    //   `--lens`
     throw std::invalid_argument(std::string(to_string(model)) + " has no lens near " +
                                 std::string(to_string(camera.lens_model)));
   }

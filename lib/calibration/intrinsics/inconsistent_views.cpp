@@ -89,6 +89,8 @@ std::string describe(const InconsistentViews& found, const std::vector<std::stri
                                                   found.worst_px, found.typical_px)
                                     : "";
   const bool is_one = found.views.size() == 1;
+  // [FILE-9] `taken by another camera?` | residuals three times those of the other images, or no
+  //   pose: other camera, or lens touched | remove these images
   return fmt::format("{} board image{} not fit the other {}: {}{}; {} taken by another camera?",
                      found.views.size(), is_one ? " does" : "s do", found.others, names, residuals,
                      is_one ? "was it" : "were they");

@@ -175,7 +175,7 @@ std::string describe(const LensChoice& choice) {
       others += fmt::format("{}{} {}", others.empty() ? "" : ", ", to_string(model), left);
     }
   }
-  return fmt::format("{} rms in views left out; {}", taken, others);
+  return fmt::format("{} rms in held-out views; {}", taken, others);
 }
 
 }  // namespace vlp

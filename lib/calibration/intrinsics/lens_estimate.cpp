@@ -204,6 +204,7 @@ void warn_about_edge_displacement(const IntrinsicsSolution& solution, LensEstima
   constexpr double max_shift_px = 0.4;  // cameras, sharpened and at three times white: 0.25
   const double shift_px = upper_median(solution.edge_shifts_px);
   if (std::abs(shift_px) <= max_shift_px) return;
+  // [LENS-4] `that is in focus makes`
   result.warnings.push_back(fmt::format(
       "the edges of the tags are {:.2f} px towards the {}, more than a camera that is in "
       "focus makes; is tag_spacing of board.yaml right?",
@@ -220,6 +221,7 @@ void warn_about_dropped_views(LensEstimate& result) {
                       result.images[view], to_string(model)));
       continue;
     }
+    // [LENS-5] `no pose that goes with`
     result.warnings.push_back(fmt::format(
         "{}: fits no pose that goes with the other views ({:.1f} px are left over); dropped",
         result.images[view], rms_px));

@@ -39,6 +39,7 @@ struct Arguments {
       : frames(static_cast<int>(problem.poses.size())), fixed(static_cast<int>(fixed_rays.size())) {
     const std::string name(to_string(problem.lens_model));
     if (!mrcal_lensmodel_from_name(&lens, name.c_str())) {
+      // [LENS-7] `mrcal does not support`
       throw std::runtime_error("mrcal does not support " + name);
     }
     selections.do_optimize_intrinsics_core = what.core;

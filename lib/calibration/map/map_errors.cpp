@@ -461,6 +461,8 @@ std::string describe_offset(int lamp, const Eigen::Vector3d& offset_m) {
   const double unit_mm = offset_m.norm() < 9.95e-3 ? 0.1 : 1;
   const int digits = unit_mm < 1 ? 1 : 0;
   const auto rounded_mm = [&](double m) { return unit_mm * std::round(1e3 * m / unit_mm) + 0.0; };
+  // [ROTATION-2] `from where the map has it` | lamp moved, or wrong position | add the offset to
+  //   `position_m`, or put the lamp back
   std::string text = fmt::format("lamp {} hangs {:.{}f} mm from where the map has it (", lamp,
                                  rounded_mm(offset_m.norm()), digits);
   text += fmt::format("x {:+.{}f} mm, y {:+.{}f} mm", rounded_mm(offset_m.x()), digits,
@@ -493,6 +495,7 @@ std::string describe(const MapError& error) {
     case MapErrorKind::other_room:
       return "most captures contradict the lamp map: is it the map of this room, and the "
              "calibration of this camera?";
+    // [STATION-19] `is never visible`
     case MapErrorKind::unseen:
       return fmt::format("lamp {} is never visible: is it lit, and not overexposed?",
                          error.lamps[0]);

@@ -20,19 +20,19 @@ std::size_t count_distinct(std::vector<std::size_t> clusters) {
 }  // namespace
 
 std::string_view Comparison::comparison_verdict() const {
-  if (has_too_few_clusters() || !interval_m) return "no evidence";
+  if (has_too_few_clusters() || !interval_m) return "inconclusive";
   if (interval_m->high < -min_relevant_m) return "better";
   if (interval_m->low > min_relevant_m) return "worse";
   const bool within = interval_m->low >= -min_relevant_m && interval_m->high <= min_relevant_m;
-  return within ? "the same" : "no evidence";
+  return within ? "equivalent" : "inconclusive";
 }
 
 std::string Comparison::describe_result() const {
   constexpr int digits = 2;
   const std::string threshold = format_significant_digits(1e3 * min_relevant_m, digits) + " mm";
   std::string words(comparison_verdict());
-  if (words == "the same") return words.append(" within ").append(threshold);
-  if (words == "no evidence") return words.append(has_too_few_clusters() ? ", too few" : "");
+  if (words == "equivalent") return words.append(" within ").append(threshold);
+  if (words == "inconclusive") return words.append(has_too_few_clusters() ? ", too few" : "");
   return words.append(" by more than ").append(threshold);
 }
 

@@ -13,7 +13,7 @@
 
 namespace vlp {
 
-/// Minimum number of clusters for a verdict other than "no evidence", since percentile intervals
+/// Minimum number of clusters for a verdict other than "inconclusive", since percentile intervals
 /// from few clusters are too narrow. Without any difference, "better" or "worse" would result in 17
 /// / 11 / 9 / 8 / 6 % of 2,000 cases. The cases had 5 / 8 / 10 / 20 / 50 clusters with one
 /// horizontal error each; 5 % would be nominal.
@@ -45,8 +45,8 @@ struct Comparison {
   /// Returns the verdict on the pairs, which ignores missing fixes:
   ///   "better"       the whole interval is below -min_relevant_m
   ///   "worse"        the whole interval is above min_relevant_m
-  ///   "the same"     the whole interval is in between
-  ///   "no evidence"  otherwise, and always if there are too few clusters
+  ///   "equivalent"   the whole interval is in between
+  ///   "inconclusive" otherwise, and always if there are too few clusters
   std::string_view comparison_verdict() const;
   /// Returns, for example, "worse by more than 0.004 mm", with min_relevant_m if the verdict
   /// depends on it.

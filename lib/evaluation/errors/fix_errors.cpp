@@ -31,6 +31,7 @@ std::vector<std::size_t> match_rows(const FromFile<FixRow>& fixes, const FromFil
     if (first == nullptr) first = &fix;
   }
   if (first == nullptr) return rows;
+  // [FILE-6]
   throw InputError(fixes.file, first->line, "image",
                    "'" + first->image + "' is not in " + table.file.string() + hint + "; " +
                        std::to_string(num_unmatched) + " of " + std::to_string(fixes.rows.size()) +

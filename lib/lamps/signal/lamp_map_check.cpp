@@ -61,6 +61,7 @@ std::string explain_why_room_is_needed(const LampMapFile& lamps, const std::stri
     for (std::size_t j = i + 1; j < map.lamps.size(); ++j) {
       if (rooms[i].empty() || rooms[j].empty() || rooms[i] == rooms[j]) continue;
       if (!are_lamps_indistinguishable(map.lamps[i], map.lamps[j])) continue;
+      // [LAMP-10] `share a frequency` | map of several rooms | [rooms](vlp-train.md#rooms)
       return "lamps " + std::to_string(map.lamps[i].id) + " and " +
              std::to_string(map.lamps[j].id) +
              " share a frequency in two rooms: choose a room with " + argument +

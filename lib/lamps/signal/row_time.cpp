@@ -291,6 +291,7 @@ RowTimeResult select_row_time_candidate(const RowTimeCandidates& found,
   const RowTimeCandidate& best = *ranked.front().second;
   const std::string groups = std::to_string(found.groups.size());
   if (ranked.size() > 1 && ranked[1].first < ranked[0].first + kClearCost) {
+    // [LAMP-14] `measured stripe periods fit`
     return {{},
             "the " + groups + " measured stripe periods fit a row time of " +
                 format_microseconds(best.row_time.row_time_s) + " and one of " +
@@ -301,6 +302,10 @@ RowTimeResult select_row_time_candidate(const RowTimeCandidates& found,
   const auto explained = std::count_if(best.lamps.begin(), best.lamps.end(),
                                        [](const auto& lamps) { return !lamps.empty(); });
   if (2 * explained < std::ptrdiff_t(found.groups.size())) {
+    // [LAMP-14] `measured stripe periods: are`, `no row time explains` | wrong or missing lamps in
+    //   the map, or map of another room; two row times: nearly equal ratios, symmetric map, or no
+    //   image with three lamps | correct the map, state the row time, or use
+    //   `vlp-train --row-time --labels`
     return {{},
             "no row time explains more than " + std::to_string(explained) + " of the " + groups +
                 " measured stripe periods: are the frequencies in the lamp map right, and all "

@@ -248,8 +248,9 @@ void print_runs(const StationRecordsOptions& options) {
     return std::ranges::find(open, run.run, &RunSummary::run) != open.end();
   });
   if (without > 0) {
-    fmt::print("{} of them with a hook that has not ended well: 'vlp-station hook' runs it again\n",
-               without);
+    fmt::print(
+        "{} of them with a hook that failed or did not finish: 'vlp-station hook' runs it again\n",
+        without);
   }
   known->records();  // throws if the records are unavailable, because the list is incomplete
 }
@@ -258,7 +259,7 @@ void print_run(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
   const RunRecord record = load_archive_run(*known, options);
   for (const ScreenLine& line : make_verdict_screen(record)) print_line(line.text);
-  fmt::print("\nfigures without a gate\n");
+  fmt::print("\nmetrics without a gate\n");
   for (const CheckedMetric& metric : record.metrics) {
     if (metric.limit || !metric.value) continue;
     print_line(fmt::format("{:<28}{:>12.4g} {}", metric.name, *metric.value, metric.unit));
@@ -317,6 +318,8 @@ void list_or_delete_expired_folders(const StationRecordsOptions& options) {
                            options.remove ? "(deleted)" : ""));
   }
   for (const auto& folder : found.without_record) {
+    // [STATION-11] `records: left`, `names: left` | `clean`: folder without a run, of other
+    //   records, or with a file that the station uses | move that file elsewhere, repeat
     spdlog::warn("{}: belongs to no run of the records: left", folder.string());
   }
   for (const auto& folder : found.in_use) {
@@ -327,6 +330,7 @@ void list_or_delete_expired_folders(const StationRecordsOptions& options) {
              options.remove ? " deleted" : ": --delete deletes them");
   known->spool()->deliver_waiting_runs();
   if (done == found.expired.size()) return;
+  // [FILE-1] `could not be deleted`
   throw std::runtime_error(fmt::format("{} of {} folders could not be deleted",
                                        found.expired.size() - done, found.expired.size()));
 }
@@ -349,6 +353,8 @@ void print_audit_trail_check(const StationRecordsOptions& options) {
   fmt::print("{} runs, {} entries in the trail\n", found.runs, found.entries);
   if (!found.last_digest.empty()) fmt::print("last digest {}\n", found.last_digest);
   if (found.problems.empty()) return;
+  // [STATION-8] `records were changed` | edited database, run of an older program, end of the trail
+  //   removed, or other records | compare with a backup
   throw GateNotMet(fmt::format(
       "the records were changed: {}{}", found.problems.front(),
       found.problems.size() == 1 ? "" : fmt::format(", and {} more", found.problems.size() - 1)));
@@ -365,6 +371,7 @@ void export_runs(const StationRecordsOptions& options) {
 void import_archive(const StationRecordsOptions& options) {
   auto [sessions, undated, crashed, refused] = read_archive_sessions(options.archive);
   if (undated > 0) {
+    // [STATION-14] `program crashed`, `neither archive.csv`, `session with a date`
     spdlog::warn("{} sessions are ignored: neither archive.csv nor their names have their date",
                  undated);
   }
@@ -397,6 +404,9 @@ void import_archive(const StationRecordsOptions& options) {
                            taken, sessions.size() - taken - unread - other.size()));
   }
   if (!refused.empty()) {
+    // [STATION-14] `are not imported` | `import`: sessions without result or time, or changed;
+    //   others are taken | dates in names or `archive.csv`; delete a changed session's folder;
+    //   reprocess (`--rebuild-catalogue`)
     throw std::invalid_argument(fmt::format("{} sessions are not imported, the first because of {}",
                                             refused.size(), refused.front()));
   }

@@ -39,6 +39,7 @@ void update_golden_unit_state(const StationConfig& config, const RunRecord& reco
   try {
     update_golden_unit_note(config, record);
   } catch (const InputError& error) {
+    // [STATION-3] `due time of the golden unit`
     spdlog::error("the due time of the golden unit is unknown: {}", error.what());
   }
 }
@@ -80,6 +81,8 @@ bool has_image_arrived(const Unit& unit, const std::vector<WatchedRun::Arrival>&
 void check_golden_unit(Unit& unit, const Terminal& terminal) {
   std::string why = describe_golden_unit_problem(unit.config());
   if (!why.empty() && why != unit.invalid_reason() && !terminal.is_interactive()) {
+    // [STATION-4] `no unit passes` | station changed, or golden unit due; units are INVALID until
+    //   it passes | `vlp-station show` of its run: cause
     spdlog::warn("{}; no unit passes", why);
   }
   unit.invalidate_verdict(std::move(why));
@@ -127,6 +130,7 @@ void guide_operator(const StationRunOptions& options, Unit& unit, WatchedRun& wa
       break;
     }
     if (was_interrupted()) {
+      // [STATION-10] `left before`
       throw std::runtime_error("left before the verdict; the same command continues");
     }
     changed = terminal.was_resized();
@@ -179,6 +183,7 @@ void store_and_report_run(
   }
   terminal.print_lines(make_spool_lines(make_spool_notice(spool)));
   if (file_error.empty()) return;
+  // [STATION-20] `the verdict` | recorded, its files not written | `restore RUN`
   throw std::runtime_error(
       fmt::format("{}; the verdict {} is recorded: {}", file_error, record.verdict, remedy));
 }
@@ -235,6 +240,7 @@ RunRecord make_final_record(Unit& unit, const std::string& run, const StationRun
     unit.invalidate_verdict(describe_golden_unit_problem(unit.config(), GoldenCheckTime::verdict));
     const std::string due = describe_golden_unit_problem(unit.config());
     if (unit.invalid_reason().empty() && !due.empty()) {
+      // [STATION-3] `before the next unit`
       spdlog::warn("{} before the next unit; this unit was started before", due);
     }
   }
@@ -246,6 +252,7 @@ RunRecord make_final_record(Unit& unit, const std::string& run, const StationRun
   if (earlier && !earlier->empty()) {
     reject_reused_images(record, *earlier, options.station);
   } else if (!earlier) {
+    // [STATION-1] `records are offline`
     const std::string unchecked =
         "the records are offline: whether an earlier run used the same images was not checked";
     record.events.push_back(make_run_event_now(kUnchecked, unchecked));
@@ -360,6 +367,7 @@ void run_hooks(const StationRunOptions& options) {
   }
   warn_of_spool(spool);
   if (failed > 0) {
+    // [STATION-9] `the hook failed for`
     throw std::runtime_error(fmt::format("the hook failed for {} of {} runs", failed, runs.size()));
   }
 }

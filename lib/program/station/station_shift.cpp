@@ -98,6 +98,8 @@ int run_process(const std::vector<std::string>& command) {
   std::signal(SIGCHLD, SIG_DFL);  // if inherited as ignored, waitpid() returns no status
   if (const int error =
           ::posix_spawn(&process, "/proc/self/exe", nullptr, nullptr, arguments.data(), environ)) {
+    // [STATION-10] `cannot be started` | interrupted, killed or out of memory (signal 9: often
+    //   memory); no data are lost | scan the unit again: it continues
     throw std::runtime_error("the unit's process cannot be started: " +
                              std::generic_category().message(error));
   }
@@ -115,6 +117,7 @@ int run_process(const std::vector<std::string>& command) {
     if (was_interrupted() && !is_signaled) is_signaled = ::kill(process, SIGTERM) == 0;
   }
   if (WIFEXITED(status)) return WEXITSTATUS(status);
+  // [STATION-10] `ended by signal`
   spdlog::error("the unit's process was ended by signal {}", WTERMSIG(status));
   return kBadInput;
 }
@@ -144,6 +147,7 @@ void measure_scanned_units(StationRunOptions options) {
     }
     const bool judged = code == kDone || code == kGateNotMet || code == kUndetermined;
     if (was_interrupted() && !judged) {
+      // [STATION-10] `left in the middle`
       throw std::runtime_error("the shift was left in the middle of a unit");
     }
   }

@@ -42,14 +42,14 @@ void print_residuals(const RotationFit& fit, const RotationCaptures& spot) {
   fmt::print("outliers    {}\n", fit.outliers.size());
   for (const auto& [index, distance_px] : fit.outliers) {
     const RotationObservation& observation = spot.observations[index];
-    fmt::print("  outlier   {} lamp {}: {:.2f} px off\n",
+    fmt::print("  outlier   {} lamp {}: residual {:.2f} px\n",
                escape_for_single_line(spot.captures[observation.capture].image),
                spot.lamps[observation.lamp].id, distance_px);
   }
 }
 
 void print_circle(const char* name, const Circle& circle) {
-  fmt::print("{:12}radius {:.3f} mm, center {:.3f} {:.3f} mm from the station\n", name,
+  fmt::print("{:12}radius {:.3f} mm, center {:.3f} {:.3f} mm from the reference point\n", name,
              1e3 * circle.radius, 1e3 * circle.center.x(), 1e3 * circle.center.y());
 }
 
@@ -58,7 +58,8 @@ void print_circle(const char* name, const Circle& circle) {
 void print_calibration_summary(const IntrinsicsSolution& solution, const CalibrationReport& report,
                                const ViewCoverage& coverage, const HeldOutFit& held_out) {
   const auto& parameters = solution.problem.intrinsics;
-  fmt::print("views         {} used, {} dropped\n", solution.views.size(), solution.dropped.size());
+  fmt::print("views         {} used, {} rejected\n", solution.views.size(),
+             solution.dropped.size());
   fmt::print("corners       {}, {} outliers\n", solution.corners, solution.outliers);
   fmt::print("rms           {:.3f} px per axis\n", solution.rms_px);
   if (std::any_of(solution.edge_shifts_px.begin(), solution.edge_shifts_px.end(),
@@ -69,7 +70,7 @@ void print_calibration_summary(const IntrinsicsSolution& solution, const Calibra
   }
   fmt::print("focal length  {:.2f}, {:.2f} px", parameters[0], parameters[1]);
   if (is_splined_lens_model(solution.problem.lens_model)) {
-    fmt::print(", which {} control points make up for\n",
+    fmt::print(", compensated by {} control points\n",
                spline_grid_of_model(solution.problem.lens_model).num_control_points());
   } else {
     fmt::print(", sd {:.2f} by noise, {:.2f} by views\n", report.focal_sd_px,
@@ -79,7 +80,7 @@ void print_calibration_summary(const IntrinsicsSolution& solution, const Calibra
   fmt::print("uncertainty   {:.3f} px mean, {:.3f} px worst\n", report.uncertainty_mean_px,
              report.uncertainty_worst_px);
   if (report.region_fraction > 0.999) {
-    fmt::print("valid region  all of the image\n");
+    fmt::print("valid region  whole image\n");
   } else {
     fmt::print(
         "valid region  {:.0f} % of the image, for which these values hold; uncertainty outside up "
@@ -146,7 +147,7 @@ void print_calibration_summary(const RotationFit& fit, const RotationCaptures& s
 void print_dispersion(const DispersionFit& fit, const Eigen::Vector2d& focal_px,
                       std::size_t captures) {
   const Dispersion& found = fit.dispersion;
-  fmt::print("captures    {}, {} used, {} left out as outliers, {} without a fix\n", captures,
+  fmt::print("captures    {}, {} used, {} rejected as outliers, {} without a fix\n", captures,
              found.captures, static_cast<int>(fit.fixes.size()) - found.captures,
              fit.captures_without_fix);
   print_circle("before", fit.before);
@@ -160,16 +161,18 @@ void print_dispersion(const DispersionFit& fit, const Eigen::Vector2d& focal_px,
   if (const auto& world_m = fit.world_offset_m) {
     fmt::print(
         "world       {:.3f} {:.3f} mm, sd {:.3f} {:.3f} mm, fixed in the world: lamp map or "
-        "station; not corrected\n",
+        "reference point; not corrected\n",
         1e3 * world_m->x(), 1e3 * world_m->y(), 1e3 * std::sqrt(fit.world_covariance(0, 0)),
         1e3 * std::sqrt(fit.world_covariance(1, 1)));
   } else {
-    fmt::print("world       supposed right: an error of lamp map or station is in the offset\n");
+    fmt::print(
+        "world       assumed correct: the offset includes errors of lamp map and reference "
+        "point\n");
   }
 }
 
 void print_corrections_header() {
-  fmt::print("\n{:>10} {:>28} {:>28}\n", "lamp", "moved by x y z (mm)", "sd (mm)");
+  fmt::print("\n{:>10} {:>28} {:>28}\n", "lamp", "correction x y z (mm)", "sd (mm)");
 }
 
 void print_correction(int lamp, const Eigen::Vector3d& correction_m, const Eigen::Vector3d& sd_m,
@@ -182,15 +185,15 @@ void print_correction(int lamp, const Eigen::Vector3d& correction_m, const Eigen
 void print_adjustment(const AdjustmentResult& found, const Calibration& before, bool lens_stated) {
   const RotationCenter& center = found.center;
   const double focal_px = std::sqrt(found.camera.focal_px().prod());
-  fmt::print("captures    {} used, {} left out\n", found.captures, found.rejected_captures);
-  fmt::print("detections  {} used, {} left out\n", found.detections, found.rejected_detections);
+  fmt::print("captures    {} used, {} rejected\n", found.captures, found.rejected_captures);
+  fmt::print("detections  {} used, {} rejected\n", found.detections, found.rejected_detections);
   const Eigen::Vector3d& up = center.zenith_in_camera;
   fmt::print("tilt        {:.4f} deg, sd {:.4f} deg\n",
              deg_from_rad(std::acos(std::min(1.0, up.z()))),
              deg_from_rad(std::sqrt(center.covariance->trace() / 2) / focal_px));
   if (before.rotation_center) {
     const double cosine = std::min(1.0, up.dot(before.rotation_center->zenith_in_camera));
-    fmt::print("            {:.4f} deg from that of the calibration before\n",
+    fmt::print("            {:.4f} deg from the previous calibration\n",
                deg_from_rad(std::acos(cosine)));
   }
   if (const auto& arm_m = center.lever_arm_m) {
@@ -219,11 +222,11 @@ void print_adjustment(const AdjustmentResult& found, const Calibration& before, 
   for (const auto& place : found.places) {
     fmt::print("position    {}: error {:.3f} {:.3f} {:.3f} mm{}\n", place.name,
                1e3 * place.residual_m.x(), 1e3 * place.residual_m.y(), 1e3 * place.residual_m.z(),
-               place.wrong ? ", left out" : "");
+               place.wrong ? ", rejected" : "");
   }
   print_corrections_header();
   for (const auto& [id, correction_m, sd_m, moved] : found.lamps) {
-    print_correction(id, correction_m, sd_m, moved ? "  elsewhere than in the map" : "");
+    print_correction(id, correction_m, sd_m, moved ? "  differs from the map" : "");
   }
 }
 

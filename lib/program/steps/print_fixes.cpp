@@ -39,7 +39,7 @@ void print_horizontal(const Evaluation& evaluation) {
   print_statistic("p90", statistics.p90, intervals && intervals->p90 ? &*intervals->p90 : nullptr);
   print_statistic("rms", statistics.rms, intervals ? &intervals->rms : nullptr);
   print_statistic("max", statistics.max, nullptr);
-  fmt::print("\nshare of the fixes, and the error in mm that it does not exceed\n");
+  fmt::print("\nfraction of the fixes, and the error in mm that it does not exceed\n");
   const auto& distribution_m = evaluation.distribution_m;
   const std::initializer_list<std::size_t> percents{10, 25, 50, 68, 75, 90, 95, 99, 100};
   for (const std::size_t percent : percents) fmt::print("{:>8} %", percent);
@@ -70,7 +70,7 @@ void print_bias_and_repeatability(const BiasAndRepeatability& statistics) {
   const auto worst_sd =
       std::max_element(stations.begin(), stations.end(),
                        [](const auto& a, const auto& b) { return a.sd_m < b.sd_m; });
-  fmt::print("stations    {} with {} fixes: bias {:.3f} mm rms, scatter {:.3f} mm\n",
+  fmt::print("ref. points {} with {} fixes: bias {:.3f} mm rms, repeatability {:.3f} mm\n",
              stations.size(), statistics.fixes, mm(statistics.bias_m), mm(statistics.scatter_m));
   fmt::print(
       "  worst     bias {:.3f} mm at ({:.3f}, {:.3f}) m; sd {:.3f} mm at ({:.3f}, {:.3f}) m\n",
@@ -82,7 +82,7 @@ void print_line_fit(const LineFit& fit) {
   const ErrorStatistics& statistics = fit.distances_m;
   fmt::print(
       "line fit    mean {:.3f} mm, median {:.3f}, p90 {:.3f}, rms {:.3f}, max {:.3f}\n"
-      "  hides     jitter of {:.3f} mm rms across the fitted line, which is turned by {:+.4f} "
+      "  jitter    {:.3f} mm rms across the fitted line, not included; line rotated by {:+.4f} "
       "deg\n",
       mm(statistics.mean), mm(statistics.median), mm(statistics.p90), mm(statistics.rms),
       mm(statistics.max), mm(fit.jitter_m), deg_from_rad(fit.angle_rad));
@@ -93,7 +93,7 @@ void print_normalized_errors_and_crlb(const Evaluation& evaluation) {
     fmt::print("error / sd  horizontal {:.3f}", normalized_errors->horizontal);
     if (normalized_errors->height) fmt::print(", height {:.3f}", *normalized_errors->height);
     if (normalized_errors->yaw) fmt::print(", yaw {:.3f}", *normalized_errors->yaw);
-    fmt::print(" (rms; 1: the stated sd are right)\n");
+    fmt::print(" (rms; 1 if the reported sd are correct)\n");
     constexpr double percent = 100;
     fmt::print("within 95 % horizontal {:.1f} %", percent * normalized_errors->within_95);
     if (const auto& fraction = normalized_errors->height_within_95) {
@@ -101,13 +101,13 @@ void print_normalized_errors_and_crlb(const Evaluation& evaluation) {
     }
     if (const auto& fraction = normalized_errors->yaw_within_95)
       fmt::print(", yaw {:.1f} %", percent * *fraction);
-    fmt::print(" (errors within 1.96 sd; those of one calibration go together)\n");
+    fmt::print(" (errors within 1.96 sd; correlated within one calibration)\n");
   }
   if (const auto& limit = evaluation.limit) {
     fmt::print("limit       {:.3f} mm rms, error / limit {:.3f} ({})\n", mm(limit->limit_m),
                limit->horizontal,
                limit->is_below_crlb() ? "below the limit: see the warning"
-                                      : "1: the best of one level image");
+                                      : "1: optimal for one level image");
   }
 }
 
@@ -120,15 +120,15 @@ void print_comparison(const Comparison& comparison) {
     fmt::print(" (95 %: {:+.3f} to {:+.3f})", mm(interval_m->low), mm(interval_m->high));
   }
   fmt::print(
-      "\n  captures  {} in both: {} with a smaller error, {} with a larger; {} only here, {} "
-      "only there\n",
+      "\n  captures  {} in both: {} with a smaller error, {} with a larger; {} only in the "
+      "fixes, {} only in --compare\n",
       comparison.pairs, comparison.smaller, comparison.larger, comparison.only_these,
       comparison.only_others);
 }
 
 /// Returns the remedy that reduces an error source.
 std::string_view find_remedy(std::string_view key) {
-  if (key == "motion") return "odometry, or a faster read-out";
+  if (key == "motion") return "odometry, or a faster readout";
   if (key == "roll_pitch") return "an inclination sensor, or a camera that is held level";
   if (key == "lens") return "more views of the board, or vlp-adjust, which corrects the lens";
   if (key == "zenith")
@@ -182,16 +182,16 @@ void print_floor_limits(const FloorSummary& summary, const FloorLimits& limits, 
   const auto in_view =
       std::count_if(limits.places.begin(), limits.places.end(),
                     [](const FloorLimits::Place& place) { return place.lamps > 1; });
-  fmt::print("places      {}, two lamps or more in view at {}{}\n\n", limits.places.size(), in_view,
+  fmt::print("positions   {}, two lamps or more visible at {}{}\n\n", limits.places.size(), in_view,
              is_free ? fmt::format(", a fix at {}", summary.places_with_fix) : "");
-  fmt::print("{:14} {:>21} {:>21} {:>21}\n", "one sigma", "horizontal (mm)", "height (mm)",
+  fmt::print("{:15} {:>21} {:>21} {:>21}\n", "one sigma", "horizontal (mm)", "height (mm)",
              "yaw (deg)");
-  fmt::print("{:14}", "source");
+  fmt::print("{:15}", "source");
   for (int i = 0; i < 3; ++i) fmt::print(" {:>10} {:>10}", "median", "worst");
   fmt::print("\n");
   const auto print = [](const FloorSummary::Row& row) {
     const auto& [median, worst] = std::tie(row.median, row.worst);
-    fmt::print("{:14} {:10.3f} {:10.3f} {:10.3f} {:10.3f} {:10.4f} {:10.4f}\n", row.source.name,
+    fmt::print("{:15} {:10.3f} {:10.3f} {:10.3f} {:10.3f} {:10.4f} {:10.4f}\n", row.source.name,
                1e3 * median.horizontal_m, 1e3 * worst.horizontal_m, 1e3 * median.height_m,
                1e3 * worst.height_m, deg_from_rad(median.yaw_rad), deg_from_rad(worst.yaw_rad));
   };

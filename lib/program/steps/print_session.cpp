@@ -37,7 +37,7 @@ void SessionLog::on_step_finished(const SessionStep& step) {
   const double seconds = std::chrono::duration<double>(Clock::now() - step_start_).count();
   const bool missed = !describe_failed_gates(step.result.gates).empty();
   fmt::print("{:13} {}{}\n", step.name,
-             step.is_up_to_date ? "as before" : fmt::format("{:5.1f} s", seconds),
+             step.is_up_to_date ? "up to date" : fmt::format("{:5.1f} s", seconds),
              step.result.ok() ? missed ? ", a gate is not met" : "" : ", failed");
   std::fflush(stdout);
   print_step_remarks(step.result);

@@ -11,13 +11,13 @@ void print_labeled_lights(const LabeledLights& labeled, const LampClassifier& cl
   int used = 0;
   for (const auto& lamp : classifier.lamps) used += lamp.examples;
   const auto lights = static_cast<int>(labeled.lights.size());
-  fmt::print("labels      {}\n  no light  {}\n  left out  {} unlike their lamp's others\n",
+  fmt::print("labels      {}\n  no light  {}\n  rejected  {} unlike the others of their lamp\n",
              labeled.labels, labeled.without_light, lights - used);
   fmt::print("trained on  {} lights of {} lamps\n", used, classifier.lamps.size());
 }
 
 void print_confusion(const Confusion& confusion) {
-  fmt::print("answers to lights that were held out, one fifth of the images at a time\n  {:>8}",
+  fmt::print("identification of held-out lights (5-fold cross-validation over the images)\n  {:>8}",
              "lamp");
   for (const int lamp : confusion.lamps) fmt::print(" {:>6}", lamp);
   fmt::print(" unknown\n");
@@ -29,7 +29,7 @@ void print_confusion(const Confusion& confusion) {
     fmt::print("\n");
   }
   const int all = confusion.counts.sum();
-  fmt::print("right       {:.2f} %\n  wrong     {}\n  unknown   {}\n",
+  fmt::print("correct     {:.2f} %\n  wrong     {}\n  unknown   {}\n",
              100.0 * confusion.right() / all, confusion.count_wrongly_identified(),
              confusion.unknown());
 }
@@ -45,7 +45,7 @@ void print_row_time(const RowTime& row_time, Readout readout) {
   fmt::print("row time    {:.5g} us\n  sd        {:.2g} us{}\n", 1e6 * row_time.row_time_s,
              1e6 * row_time.sd_s,
              row_time.lamps == 1 ? ", and the error of the one lamp's frequency" : "");
-  fmt::print("rests on    {} lights of {} lamps\nread-out    along {}\n", row_time.lights,
+  fmt::print("based on    {} lights of {} lamps\nreadout     along {}\n", row_time.lights,
              row_time.lamps, readout == Readout::rows ? "rows" : "columns");
 }
 

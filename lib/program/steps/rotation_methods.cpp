@@ -31,9 +31,9 @@ fs::path captures_file(const CaptureOptions& images, const TiltOptions& options)
 }
 
 void report(const TiltCalibration& result, const Camera& camera) {
-  fmt::print("captures    {} used, {} of fewer than three lamps, {} left out\n", result.captures,
+  fmt::print("captures    {} used, {} of fewer than three lamps, {} rejected\n", result.captures,
              result.captures_of_few_lamps, result.captures_rejected);
-  fmt::print("detections  {} used, {} left out\n", result.detections, result.detections_rejected);
+  fmt::print("detections  {} used, {} rejected\n", result.detections, result.detections_rejected);
   print_rotation_center(result.center, camera);
   fmt::print(
       "residual    {:.4f} px per axis; for a level camera{} {:.4f} px in the undistorted image\n",

@@ -191,7 +191,7 @@ Drawing make_gnuplot_drawing(const DispersionPlot& plot) {
       points("before", plot.before.errors_m) + circle("before_circle", plot.before.circle) +
       points("after", plot.after.errors_m) + circle("after_circle", plot.after.circle) +
       points("outliers", plot.outliers_m) + make_common_plot_settings() + set_title(plot.title) +
-      "set xlabel 'fix minus station, x (mm)'\n"
+      "set xlabel 'fix minus reference point, x (mm)'\n"
       "set ylabel 'y (mm)'\n"
       "set size ratio -1\n"
       // Contains the reference point always, and is never empty.
@@ -203,11 +203,11 @@ Drawing make_gnuplot_drawing(const DispersionPlot& plot) {
       layer("after", plot_colors::vermilion, "7", "1");
   if (!plot.outliers_m.empty()) {
     commands += ", $outliers using 1:2 with points pointtype 4 linecolor rgb '" +
-                std::string(plot_colors::gray) + "' title 'left out'";
+                std::string(plot_colors::gray) + "' title 'rejected'";
   }
   commands +=
       ", '+' using (0):(0) every ::0::0 with points pointtype 1 pointsize 2 linewidth 2 linecolor "
-      "rgb 'black' title 'station'\n";
+      "rgb 'black' title 'reference point'\n";
   return {"dispersion", 720, 720, commands};
 }
 

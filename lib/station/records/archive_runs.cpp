@@ -108,7 +108,9 @@ ReprocessedArchive read_archive_sessions(const fs::path& results) {
     run.run = make_session_run_id(run.ended_utc, run.station + "/" + session);
     run.program = "vlp-calibrate " + text(row, "version");
     run.config_sha256 = text(row, "key");
-    const bool passed = verdict == "pass" || verdict == "look", failed = verdict == "gate";
+    // "look" is the former name of "review".
+    const bool passed = verdict == "pass" || verdict == "review" || verdict == "look";
+    const bool failed = verdict == "gate";
     run.verdict = to_string(passed ? Verdict::pass : failed ? Verdict::fail : Verdict::invalid);
     if (!passed) run.causes = text(row, "reason") + "\n";
     archive.sessions.push_back(
@@ -131,6 +133,7 @@ RunRecord load_archive_run(const ReprocessedSession& session) {
       if (document.contains(part)) add_metrics(document[part], run.metrics);
     }
   } catch (const std::exception& error) {
+    // [STATION-14] `vlp-calibrate writes`
     throw InputError(file, fmt::format("is not as vlp-calibrate writes it: {}", error.what()));
   }
   run.calibration = folder->read("calibration.yaml", kMaxSessionFileBytes).value_or("");

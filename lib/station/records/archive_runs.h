@@ -34,7 +34,7 @@ struct ReprocessedArchive {
 ///
 ///   station        name of the folder of the results
 ///   kind           "unit"
-///   verdict        PASS for "pass" and "look", FAIL for "gate", INVALID without a result
+///   verdict        PASS for "pass" and "review", FAIL for "gate", INVALID without a result
 ///   config_sha256  key of the session: digest of its inputs, the toolbox and the options
 ///   run            date, and a digest of station, camera and session: the same each time
 ReprocessedArchive read_archive_sessions(const std::filesystem::path& results);

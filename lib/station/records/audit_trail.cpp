@@ -184,6 +184,7 @@ TrailCheck check_audit_trail(soci::session& sql, const std::string& expected_dig
                               const std::string& content) {
     const auto entry = contents.extract({run, event});
     if (entry.empty()) {
+      // [STATION-8] `no entry in the trail`
       check.problems.push_back(describe_item(run, event) +
                                " has no entry in the trail: it was added by hand");
     } else if (entry.mapped() != content) {
@@ -204,6 +205,7 @@ TrailCheck check_audit_trail(soci::session& sql, const std::string& expected_dig
   }
   if (!expected_digest.empty() &&
       std::ranges::find(entries, expected_digest, &Entry::digest) == entries.end()) {
+    // [STATION-8] `that was noted`
     check.problems.push_back("the entry that was noted, " + expected_digest +
                              ", is not in the trail: its end was removed, or all of it is another");
   }

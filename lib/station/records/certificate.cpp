@@ -60,7 +60,7 @@ std::string make_subject_section(const RunRecord& record, const Calibration& cal
         {"image", fmt::format("{} x {} px", width_px, height_px)},
         {"measured at", record.station},
         {"operator", record.operator_name.empty() ? "\u00a0" : record.operator_name},
-        {"begun (UTC)", record.begun_utc},
+        {"started (UTC)", record.begun_utc},
         {"ended (UTC)", record.ended_utc},
         {"procedure",
          "lens from views of a board; rotation center and tilt from a rotation in "
@@ -110,7 +110,7 @@ std::string describe_requirement(const std::string& metric) {
 
 /// Makes the table of the gates: metric, limit, and conformity with its decision rule.
 std::string make_conformity_table(const RunRecord& record) {
-  HtmlTable table{"", {"requirement", "figure", "limit", "accepted", "conforms", "rule"}, {}};
+  HtmlTable table{"", {"requirement", "value", "limit", "accepted", "conforms", "rule"}, {}};
   constexpr int digits = 4, probability_digits = 3;
   for (const CheckedMetric& metric : record.metrics) {
     if (!metric.limit) continue;
@@ -158,7 +158,7 @@ std::string make_traceability_section(const RunRecord& record, const Calibration
   const std::string check = digest_images(record, "check");
   return make_html_element(
              "p",
-             "Digests (SHA-256) of what the results rest on. \"station\" is the "
+             "Digests (SHA-256) of the data behind the results. \"station\" is the "
              "configuration with the camera's type, the board and the lamp map, whose own "
              "certificates belong to this one: " +
                  record.config_sha256 + "." +
@@ -245,7 +245,7 @@ std::string make_calibration_certificate(const RunRecord& record, const Calibrat
           make_html_section("Results", make_results_section(record, calibration)) +
           make_html_section("Statement of conformity", make_conformity_table(record)) +
           make_html_section("Traceability", make_traceability_section(record, calibration)) +
-          make_html_section("To be filled in by who issues it", make_section_of_missing_data()));
+          make_html_section("To be completed by the issuer", make_section_of_missing_data()));
 }
 
 std::filesystem::path write_calibration_certificate(const RunRecord& record,

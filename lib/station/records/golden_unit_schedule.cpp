@@ -35,6 +35,7 @@ std::string make_note_name(const StationConfig& config) {
 
 /// Returns the message about an incomplete note.
 std::string describe_damaged_note(const std::string& why) {
+  // [STATION-3] `result of the golden unit`
   return fmt::format("the result of the golden unit is unknown ({}): 'vlp-station verify' is due",
                      why);
 }
@@ -53,6 +54,7 @@ void append_line_to_note(const SharedFolder& spool, const std::string& note,
   const bool is_written =
       file >= 0 && ::write(file, line.data(), line.size()) == static_cast<ssize_t>(line.size());
   if (file >= 0) ::close(file);
+  // [FILE-1]
   if (!is_written) throw InputError(spool.path() / note, "cannot be written");
 }
 
@@ -130,7 +132,7 @@ std::string compute_measurement_settings_digest(const StationConfig& config) {
   lines.add("camera_type", format_calibration_yaml(type));
   add_board(config.board, lines);
   add_lamps(config.lamps, lines);
-  if (const auto& place_m = config.dispersion_station_m) {
+  if (const auto& place_m = config.dispersion_position_m) {
     lines.add({{"station_x_m", place_m->x()}, {"station_y_m", place_m->y()}});
   }
   const CompletionCriteria& sufficient = config.sufficient;
@@ -165,6 +167,9 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
   const fs::path file = config.spool / make_note_name(config);
   std::error_code none;
   if (fs::symlink_status(file, none).type() == fs::file_type::not_found) {
+    // [STATION-3] `was not measured here yet` | [golden unit](vlp-station.md#golden-unit) due, or
+    //   its note not readable or not written (disk full?). A unit in progress is judged. |
+    //   `vlp-station verify`
     return fmt::format("the golden unit was not measured here yet: {}", verify);
   }
   std::string text;
@@ -201,6 +206,7 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
   const double age_h = seconds_since(ended_utc) / second_per_hour;
   const auto& due = *config.verify_due;
   if (due.hours && !(age_h >= 0 && age_h <= *due.hours)) {
+    // [STATION-3] `golden unit was measured`
     return fmt::format("the golden unit was measured {} (run {}), not within {:g} h: {}", ended_utc,
                        run, *due.hours, verify);
   }

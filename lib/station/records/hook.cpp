@@ -262,6 +262,7 @@ RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& loc
     return make_run_event_now(kHookDone, line);
   std::string why;
   if (!status) {
+    // [STATION-9] `s, killed`
     why = fmt::format("no end within {:g} s, killed", hook.time_limit_s);
   } else if (WIFEXITED(*status)) {
     why = fmt::format("exit code {}", WEXITSTATUS(*status));
@@ -278,6 +279,8 @@ bool is_hook_pending(const RunRecord& record) {
 std::string describe_pending_hook(const RunRecord& record) {
   if (!is_hook_pending(record)) return "";
   const std::ptrdiff_t failed = find_last_event(record, kHookFailed);
+  // [STATION-9] `not run to its end` | station ended, error, or `time_limit_s` exceeded; output:
+  //   `vlp-station show RUN` | `vlp-station hook`
   if (failed < find_last_event(record, kHookRequested)) return "was not run to its end";
   return "failed: " + record.events[static_cast<std::size_t>(failed)].text;
 }
@@ -289,6 +292,7 @@ std::string run_hook_and_record_result(const Hook& hook, RunRecord& record, cons
   try {
     spool.store_run(record);
   } catch (const InputError& error) {
+    // [STATION-9] `hook is not recorded`
     problem = std::string("the result of the hook is not recorded: ") + error.what();
   }
   spool.deliver_waiting_runs();

@@ -155,8 +155,13 @@ struct Records::Database {
     constexpr std::chrono::seconds soon(2);
     const bool refused =
         std::chrono::steady_clock::now() - begun < soon && is_server_responding(where);
+    // [STATION-1] `records cannot be reached` | no data are lost, but repeated images are not
+    //   detected (event `unchecked`) | `--verbose` prints the server's message
     if (!refused)
       throw RecordsOffline(name, "the server of the records cannot be reached: " + what);
+    // [STATION-2] `answers, but refuses` | wrong user, password, database or TLS
+    //   (`sslmode=require`); runs wait for this database only | correct `records` in
+    //   `station.yaml`, or the server
     throw RecordsRefused(
         name, "the server of the records answers, but refuses 'records' of station.yaml: " + what);
   }
@@ -211,6 +216,7 @@ struct Records::Database {
       return action(watch);
     } catch (const soci::soci_error&) {
       if (!watch.has_timed_out()) throw;
+      // [STATION-1] `has not answered`
       throw RecordsOffline(name, "the server of the records has not answered for " +
                                      std::to_string(timeout_factor * timeout_s) + " s");
     }
@@ -390,6 +396,8 @@ void Records::store_run(const RunRecord& record) {
       insert_images(sql, record, watch);
     } else if (const auto kept = load_run_header(sql, record.run);
                !kept || !have_same_texts(*kept, record)) {
+      // [STATION-15] `has another run` | records or results edited, or two of one name; nothing is
+      //   overwritten | compare both
       throw InputError(database_->name, "has another run " + record.run);
     }
     const auto new_events = insert_events(sql, record, watch);

@@ -108,6 +108,7 @@ std::string format_void_command(const std::string& run, const std::filesystem::p
 
 std::string describe_run_using_image(const ImageUser& owner,
                                      const std::filesystem::path& station_file) {
+  // [STATION-6] `if its serial was`
   return fmt::format("camera {}, run {}: if its serial was wrong, '{}' frees its images",
                      owner.camera, owner.run, format_void_command(owner.run, station_file));
 }
@@ -129,6 +130,7 @@ std::string find_verdict_problem(const RunRecord& record) {
     return fmt::format("was voided by {}: {}", event->who, event->text);
   }
   if (!record.has_passed()) return "";
+  // [STATION-15] `changed by hand`
   constexpr const char* words = "the record has PASS, but {}: it was changed by hand";
   if (!record.causes.empty()) return fmt::format(words, "names a cause");
   for (const CheckedMetric& metric : record.metrics) {
@@ -260,7 +262,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr int kDigits = 9;
-constexpr const char* kRunFormat = "vlp-run/1";
+constexpr const char* kRunFormat = "vlp-run/2";
+constexpr const char* kFormerRunFormat = "vlp-run/1";  // runs queued by an older program
 constexpr std::size_t kMaxRunFileBytes = 64 << 20;
 
 std::string join_lines(std::string text) {
@@ -320,7 +323,7 @@ void add_images_and_events(const RunRecord& run, Json& json) {
   json["images"] = Json::array();
   for (const auto& [step, name, sha256, refused] : run.images) {
     json["images"].push_back(
-        {{"step", step}, {"image", name}, {"sha256", sha256}, {"refused", refused}});
+        {{"step", step}, {"image", name}, {"sha256", sha256}, {"rejection", refused}});
   }
   json["events"] = Json::array();
   for (const RunEvent& event : run.events) {
@@ -334,9 +337,9 @@ Json to_json(const RunRecord& run) {
   for (const RunField& field : list_run_text_fields()) {
     json[field.name] = field.in_csv ? join_lines(run.*field.text) : run.*field.text;
   }
-  json["figures"] = Json::object();
+  json["metrics"] = Json::object();
   for (const CheckedMetric& metric : run.metrics) {
-    Json& figure = json["figures"][metric.name];
+    Json& figure = json["metrics"][metric.name];
     figure = {{"value", json_number_or_null(metric.value)},
               {"unit", metric.unit},
               {"gate", json_number_or_null(metric.limit)},
@@ -361,20 +364,22 @@ std::optional<GuardBand> read_guard_band(const Json& metric) {
 }
 
 SpooledRun parse_run(const Json& json) {
-  if (json.at("format").get<std::string>() != kRunFormat)
-    throw std::runtime_error("another format");
+  const auto format = json.at("format").get<std::string>();
+  const bool is_former = format == kFormerRunFormat;
+  if (format != kRunFormat && !is_former) throw std::runtime_error("another format");
   SpooledRun spooled;
   json.at("records").get_to(spooled.records);
   RunRecord& run = spooled.run;
   for (const RunField& field : list_run_text_fields()) {
     run.*field.text = json.value(field.name, std::string());
   }
+  // [STATION-12] `no verdict`, `is no id`
   if (run.run.empty() || run.verdict.empty()) throw std::runtime_error("no run, or no verdict");
   // Both name folders and files.
   for (const std::string& id : {run.run, run.camera}) {
     if (!Id::is_valid_id(id)) throw std::runtime_error("its run or camera is no id");
   }
-  for (const Json& metric : json.at("figures")) {
+  for (const Json& metric : json.at(is_former ? "figures" : "metrics")) {
     run.metrics.push_back(
         {find_present_metric_name(metric.at("name")), metric.at("unit"),
          read_optional_number(metric.at("value")), read_optional_number(metric.at("gate")),
@@ -382,8 +387,8 @@ SpooledRun parse_run(const Json& json) {
          read_guard_band(metric)});
   }
   for (const Json& image : json.at("images")) {
-    run.images.push_back(
-        {image.at("step"), image.at("image"), image.at("sha256"), image.at("refused")});
+    run.images.push_back({image.at("step"), image.at("image"), image.at("sha256"),
+                          image.at(is_former ? "refused" : "rejection")});
   }
   for (const Json& event : json.value("events", Json::array())) {
     run.events.push_back(
@@ -407,14 +412,14 @@ std::string serialize_run(const SpooledRun& spooled) {
   json["format"] = kRunFormat;
   json["records"] = escape_for_single_line(spooled.records);
   for (const RunField& field : list_run_text_fields()) json[field.name] = run.*field.text;
-  json["figures"] = Json::array();
+  json["metrics"] = Json::array();
   for (const CheckedMetric& metric : run.metrics) {
-    json["figures"].push_back({{"name", metric.name},
+    json["metrics"].push_back({{"name", metric.name},
                                {"unit", metric.unit},
                                {"value", json_number_or_null(metric.value)},
                                {"gate", json_number_or_null(metric.limit)},
                                {"at_least", metric.direction == Direction::at_least}});
-    add_guard_band(metric, json["figures"].back());
+    add_guard_band(metric, json["metrics"].back());
   }
   add_images_and_events(run, json);
   return serialize(json);
@@ -423,11 +428,13 @@ std::string serialize_run(const SpooledRun& spooled) {
 SpooledRun read_spooled_run(const std::filesystem::path& file) {
   const auto text =
       SharedFolder(file.parent_path()).read(file.filename().string(), kMaxRunFileBytes);
+  // [FILE-1]
   if (!text) throw InputError(file, "cannot be opened: it was removed");
   try {
     check_json_size_and_depth(*text);
     return parse_run(Json::parse(*text));
   } catch (const std::exception& error) {
+    // [STATION-12] `no run of a station` | foreign or damaged file of the spool | move it away
     throw InputError(file, std::string("is no run of a station: ") + error.what());
   }
 }

@@ -167,9 +167,9 @@ struct SpooledRun {
   std::string records;
 };
 
-/// Serializes a run as JSON text in format `vlp-run/1`. The object has "records" (identity of its
-/// database), the texts of list_run_text_fields(), "figures" (metrics), "images" and "events".
-/// Figures with a guard band have "uncertainty" and "guard_k". Control characters and bytes that
+/// Serializes a run as JSON text in format `vlp-run/2`. The object has "records" (identity of its
+/// database), the texts of list_run_text_fields(), "metrics", "images" and "events".
+/// Metrics with a guard band have "uncertainty" and "guard_k". Control characters and bytes that
 /// are not UTF-8 are escaped (escape_run_texts()).
 std::string serialize_run(const SpooledRun& spooled);
 /// Reads a run in the format of serialize_run(). A missing text of list_run_text_fields() is empty,
@@ -186,8 +186,8 @@ std::string format_hook_json(const RunRecord& run);
 ///
 ///   .csv   one row per run: the texts of list_run_text_fields() with RunField::in_csv, and one
 ///          column per metric, empty if missing
-///   .json  list of objects: the texts of list_run_text_fields(), "figures", "images" and "events".
-///          "figures" has value, unit, gate and result of the gate of each metric by its name. With
+///   .json  list of objects: the texts of list_run_text_fields(), "metrics", "images" and "events".
+///          "metrics" has value, unit, gate and result of the gate of each metric by its name. With
 ///          a guard band it also has its uncertainty, factor and conformance probability.
 void export_runs_to_file(const std::filesystem::path& file, const std::vector<RunRecord>& runs);
 

@@ -20,7 +20,7 @@ namespace vlp {
 /// Queue of a station's runs that are to be delivered to its records, which may be offline.
 ///
 /// Each run waits as a complete file of the spool: RUN.json, or RUN.EVENT.json with later events
-/// (`vlp-run/1`). It is delivered only to the records that it belongs to
+/// (`vlp-run/2`). It is delivered only to the records that it belongs to
 /// (derive_database_identity()), so that stations with different records can share a folder.
 ///
 /// No run is lost if a program is killed at any time. Files are written atomically and removed

@@ -72,6 +72,8 @@ std::string describe_unmeasured_gates(const RunRecord& record) {
   if (names.empty()) return "";
   const auto step = find_unfinished_step(record);
   if (!step) return fmt::format("{}", fmt::join(names, ", "));
+  // [STATION-7] `did not finish` | step without result; its gates and later ones have no value |
+  //   see the causes below it
   return fmt::format("{} {}, because {} did not finish", names.size(),
                      names.size() == 1 ? "gate" : "gates", to_string(*step));
 }
@@ -171,7 +173,7 @@ std::vector<ScreenLine> make_verdict_screen(const RunRecord& record) {
   const bool passed = record.has_passed() && no_verdict.empty();
   const Tone tone = passed ? Tone::good : Tone::bad;
   std::vector<ScreenLine> lines{
-      {fmt::format("{:<28}{:>12}{:>14}", "gate", "figure", "limit"), Tone::heading}};
+      {fmt::format("{:<28}{:>12}{:>14}", "gate", "value", "limit"), Tone::heading}};
   for (const CheckedMetric& metric : record.metrics) {
     if (metric.limit && metric.value) lines.push_back(make_gate_line(metric));
   }

@@ -160,7 +160,7 @@ StepResult run_rotation_step(const StationConfig& config, const Calibration& cal
 StepResult run_dispersion_step(const StationConfig& config, const Calibration& calibration,
                                const std::vector<Frame>& frames, const CapturesTable& places) {
   const KnownPositions known =
-      collect_reference_positions(frames, places, config.dispersion_station_m);
+      collect_reference_positions(frames, places, config.dispersion_position_m);
   std::string problem = describe_positions_problem(known.captures.size(), frames.size(),
                                                    config.sufficient.dispersion_captures);
   if (!problem.empty()) {

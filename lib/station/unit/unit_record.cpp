@@ -74,6 +74,8 @@ std::vector<Cause> find_step_problems(const Unit& unit, StationStep step) {
   if (failed) causes.push_back({fmt::format("{}: {}", to_string(step), state.result->why)});
   const bool is_explained = failed || !refused.text.empty();
   if (state.sufficient || (is_explained && unit.ended().empty())) return causes;
+  // [STATION-16] `before there was`, `too much alike` | INVALID: step ended, or images refused, too
+  //   early | repeat it
   causes.push_back({unit.ended().empty() ? fmt::format("{}: too few images, or too much alike ({})",
                                                        to_string(step), count)
                                          : fmt::format("{}: {} before there was enough ({})",
@@ -131,6 +133,7 @@ bool is_blur_known(const UnitStep& boards, const StationConfig& config) {
 std::vector<Cause> find_board_causes(const Unit& unit, const std::vector<CheckedMetric>& metrics) {
   std::vector<Cause> causes;
   const UnitStep& boards = unit.step(StationStep::boards);
+  // [STATION-19] `wrong board:`
   if (is_other_board(boards)) causes.push_back({"wrong board: the tags have other ids"});
   if (is_blur_known(boards, unit.config())) {
     append(causes, describe_failures(metrics, true, [](const CheckedMetric& metric) {
@@ -232,6 +235,7 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run,
                                .refused = std::move(refused)});
     }
     for (const auto& file : unit.step(step).waiting) {
+      // [STATION-16] `not looked at:`
       record.images.push_back({.step = to_string(step),
                                .name = file.filename().string(),
                                .sha256 = compute_file_sha256(file),
@@ -243,6 +247,8 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run,
 
 void reject_reused_images(RunRecord& record, const std::string& earlier,
                           const std::filesystem::path& station_file) {
+  // [STATION-6] `no repetition` | images used in the stated run (INVALID and voided runs excepted)
+  //   | new images, or void that run if its serial was wrong
   record.invalidate_verdict(fmt::format(
       "all images are those of run {}, which is no repetition: take new ones, or '{}' if that run "
       "should not count",

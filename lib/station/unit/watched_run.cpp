@@ -159,6 +159,7 @@ void rename_finished_folder(const fs::path& folder, const std::string& run) {
   std::error_code error;
   fs::rename(folder, kept, error);
   if (error) {
+    // [FILE-1] `cannot be put away`
     throw InputError(folder, "cannot be put away as " + kept.string() + ": " + error.message());
   }
 }

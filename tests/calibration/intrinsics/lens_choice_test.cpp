@@ -121,14 +121,14 @@ TEST(DescribeLensChoice, ExplainsFisheyeBeyondRightAngle) {
   const LensChoice choice{
       LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}, 1.7};
   EXPECT_EQ(describe(choice),
-            "OPENCV_FISHEYE, 0.051 px rms in views left out; the board is visible up to 97 degrees "
+            "OPENCV_FISHEYE, 0.051 px rms in held-out views; the board is visible up to 97 degrees "
             "off axis, where no LENSMODEL_OPENCVn has rays");
 }
 
 TEST(DescribeLensChoice, ListsModelsWithoutLens) {
   const LensChoice choice{LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}};
   EXPECT_EQ(describe(choice),
-            "OPENCV_FISHEYE, 0.051 px rms in views left out; LENSMODEL_OPENCV4 no lens");
+            "OPENCV_FISHEYE, 0.051 px rms in held-out views; LENSMODEL_OPENCV4 no lens");
 }
 
 }  // namespace

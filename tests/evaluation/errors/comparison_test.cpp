@@ -40,38 +40,38 @@ TEST(CompareFixes, DetectsSmallPairedDifferences) {
   EXPECT_EQ(compare_pairs(pairs(100, 3e-4)), "worse");
   EXPECT_EQ(compare_pairs(pairs(100, -3e-4)), "better");
   EXPECT_EQ(compare_pairs(pairs(kMinClustersCompared, 1e-2)), "worse");
-  EXPECT_EQ(compare_pairs(pairs(kMinClustersCompared - 1, 1e-2)), "no evidence");  // too few
-  EXPECT_EQ(compare_pairs(pairs(4, 1)), "no evidence");
+  EXPECT_EQ(compare_pairs(pairs(kMinClustersCompared - 1, 1e-2)), "inconclusive");  // too few
+  EXPECT_EQ(compare_pairs(pairs(4, 1)), "inconclusive");
   const Pairs same = pairs(100, 0);
   EXPECT_EQ(compare_horizontal_errors(same.fixes, same.errors, same.fixes, same.errors, 1)
                 .comparison_verdict(),
-            "the same");
+            "equivalent");
 }
 
 TEST(CompareFixes, ReportsInsignificantDifferenceAsTheSame) {
   // For errors of 15 mm on average 1 % is 0.15 mm; the mean difference has an uncertainty of 0.01
   // mm.
-  EXPECT_EQ(compare_pairs(pairs(100, 1e-4)), "the same");
-  EXPECT_EQ(compare_pairs(pairs(100, -1e-4)), "the same");
-  EXPECT_EQ(compare_pairs(pairs(100, 1.5e-4)), "no evidence");
+  EXPECT_EQ(compare_pairs(pairs(100, 1e-4)), "equivalent");
+  EXPECT_EQ(compare_pairs(pairs(100, -1e-4)), "equivalent");
+  EXPECT_EQ(compare_pairs(pairs(100, 1.5e-4)), "inconclusive");
   const Pairs tenth = pairs(100, 1e-4);
   EXPECT_EQ(
       compare_horizontal_errors(tenth.fixes, tenth.errors, tenth.others, tenth.other_errors, 1)
           .describe_result(),
-      "the same within 0.15 mm");
+      "equivalent within 0.15 mm");
   // For small errors the smallest relevant difference is a micrometer.
   Pairs small = pairs(100, 0);
   for (FixError& error : small.errors) error.horizontal_m = {1e-5 + 1.7e-7, 0};
   for (FixError& error : small.other_errors) error.horizontal_m = {1e-5, 0};
   Comparison comparison =
       compare_horizontal_errors(small.fixes, small.errors, small.others, small.other_errors, 1);
-  EXPECT_EQ(comparison.describe_result(), "the same within 0.001 mm");
+  EXPECT_EQ(comparison.describe_result(), "equivalent within 0.001 mm");
   ASSERT_TRUE(comparison.interval_m);
   EXPECT_GT(comparison.interval_m->low, 0);
   comparison.min_relevant_m = 1e-7;
   EXPECT_EQ(comparison.describe_result(), "worse by more than 0.0001 mm");
   comparison.clusters = 1;
-  EXPECT_EQ(comparison.describe_result(), "no evidence, too few");
+  EXPECT_EQ(comparison.describe_result(), "inconclusive, too few");
 }
 
 TEST(CompareFixes, RequiresUnitsNotPairs) {
@@ -80,20 +80,20 @@ TEST(CompareFixes, RequiresUnitsNotPairs) {
   const Comparison comparison =
       compare_horizontal_errors(all.fixes, all.errors, all.others, all.other_errors, 1);
   EXPECT_EQ(comparison.clusters, 19);
-  EXPECT_EQ(comparison.comparison_verdict(), "no evidence");
+  EXPECT_EQ(comparison.comparison_verdict(), "inconclusive");
   ASSERT_TRUE(comparison.interval_m);
   EXPECT_GT(comparison.interval_m->low, 0);
 }
 
 TEST(Comparison, VerdictRequiresWholeIntervalOnOneSide) {
   Comparison comparison;
-  EXPECT_EQ(comparison.comparison_verdict(), "no evidence");
+  EXPECT_EQ(comparison.comparison_verdict(), "inconclusive");
   comparison.clusters = kMinClustersCompared;
-  EXPECT_EQ(comparison.comparison_verdict(), "no evidence");
+  EXPECT_EQ(comparison.comparison_verdict(), "inconclusive");
   comparison.interval_m = {-1, 0.1};
-  EXPECT_EQ(comparison.comparison_verdict(), "no evidence");
+  EXPECT_EQ(comparison.comparison_verdict(), "inconclusive");
   comparison.interval_m = {-0.1, 1};
-  EXPECT_EQ(comparison.comparison_verdict(), "no evidence");
+  EXPECT_EQ(comparison.comparison_verdict(), "inconclusive");
   comparison.interval_m = {-1, -0.1};
   EXPECT_EQ(comparison.comparison_verdict(), "better");
   comparison.interval_m = {0.1, 1};

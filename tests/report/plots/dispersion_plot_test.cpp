@@ -37,9 +37,9 @@ TEST_F(DispersionPlotTest, RendersReproduciblePngOrSvgByExtension) {
 }
 
 TEST_F(DispersionPlotTest, MarksOutliersIfAny) {
-  EXPECT_THAT(rendered("a.svg"), Not(HasSubstr("left out")));
+  EXPECT_THAT(rendered("a.svg"), Not(HasSubstr("rejected")));
   plot.outliers_m = {{0.05, 0.05}};
-  EXPECT_THAT(rendered("a.svg"), HasSubstr("left out"));
+  EXPECT_THAT(rendered("a.svg"), HasSubstr("rejected"));
 }
 
 TEST_F(DispersionPlotTest, RendersSingleFix) {

@@ -25,9 +25,9 @@ using testing::SizeIs;
 class ArchiveRuns : public testing::Test {
  protected:
   ArchiveRuns() {
-    row("a,s1,look,2026-03-15,,1.2.3,key");
-    row("a,s2,pass,2026-03-14T09:30:00,,1.2.3,key");
-    row("b,s1,gate,2026-03-16,\"rms_px is 2 px, at most 1 px is asked for\",1.2.3,key");
+    row("a,s1,review,2026-03-15,,1.2.3,key");
+    row("a,s2,look,2026-03-14T09:30:00,,1.2.3,key");  // former name of "review"
+    row("b,s1,gate,2026-03-16,\"rms_px is 2 px, at most 1 px is required\",1.2.3,key");
     row("b,s2,no result,2026-03-17,rotation: is missing,1.2.3,key");
     row("b,s3,pass,,,1.2.3,key");
     row("b,s4,crashed,2026-03-18,vlp-calibrate ended with exit code -9,1.2.3,key");
@@ -87,7 +87,7 @@ TEST_F(ArchiveRuns, ReturnsDatedSessionsInChronologicalOrder) {
   EXPECT_EQ(read_archive_sessions(folder / "archive/").sessions[0].run.station, "archive");
   EXPECT_EQ(runs[0].config_sha256, "key");
   EXPECT_EQ(runs[1].calibration, "format: vlp-calibration/1\n");
-  EXPECT_EQ(runs[2].first_cause(), "rms_px is 2 px, at most 1 px is asked for");
+  EXPECT_EQ(runs[2].first_cause(), "rms_px is 2 px, at most 1 px is required");
   EXPECT_EQ(runs[3].program, "vlp-calibrate 1.2.3");
   ASSERT_THAT(runs[2].metrics, SizeIs(5));
   EXPECT_EQ(runs[2].metrics[0].value, 2);

@@ -56,7 +56,7 @@ TEST_F(RunHook, PassesRunOnStdinInHookFolder) {
   EXPECT_EQ(seen, format_hook_json(judged_run()));
   const auto json = nlohmann::json::parse(seen);
   EXPECT_EQ(json["verdict"], "PASS");
-  EXPECT_EQ(json["figures"]["rms_px"]["passed"], true);
+  EXPECT_EQ(json["metrics"]["rms_px"]["passed"], true);
 }
 
 TEST_F(RunHook, SucceedsIfHookIgnoresInputOrLeavesChildren) {

@@ -236,8 +236,8 @@ void check_migration(const std::string& where) {
   EXPECT_EQ(found->begun_utc, "2026-11-21T13:45:01Z");
   EXPECT_EQ(found->calibration, "format: vlp-calibration/1");
   ASSERT_THAT(found->metrics, SizeIs(5));
-  EXPECT_EQ(describe(found->metrics[0]), "rms_px is 1.5 px, at most 1 px is asked for");
-  EXPECT_EQ(describe(found->metrics[1]), "coverage is not known, at least 0.7 is asked for");
+  EXPECT_EQ(describe(found->metrics[0]), "rms_px is 1.5 px, at most 1 px is required");
+  EXPECT_EQ(describe(found->metrics[1]), "coverage is not known, at least 0.7 is required");
   EXPECT_EQ(found->metrics[2].unit, "deg");
   EXPECT_EQ(found->metrics[3].name, "world_offset_mm");  // the present name of world_mm
   EXPECT_EQ(found->metrics[3].unit, "mm");
@@ -515,8 +515,8 @@ TEST(ExportRunsToFile, WritesJson) {
   EXPECT_THAT(list_keys(runs[0]),
               ElementsAre("run", "kind", "station", "camera", "operator_name", "shift", "begun_utc",
                           "ended_utc", "verdict", "causes", "program", "libraries", "config_sha256",
-                          "calibration", "figures", "images", "events"));
-  const auto& metrics = runs[0]["figures"];
+                          "calibration", "metrics", "images", "events"));
+  const auto& metrics = runs[0]["metrics"];
   EXPECT_THAT(list_keys(metrics), ElementsAre("rms_px", "coverage", "tilt_deg"));
   EXPECT_THAT(list_keys(metrics["tilt_deg"]),
               ElementsAre("value", "unit", "gate", "at_least", "passed"));
@@ -528,8 +528,8 @@ TEST(ExportRunsToFile, WritesJson) {
   EXPECT_EQ(metrics["rms_px"]["unit"], "px");
   EXPECT_TRUE(metrics["tilt_deg"]["value"].is_null());
   EXPECT_TRUE(metrics["coverage"]["gate"].is_null());
-  EXPECT_THAT(list_keys(runs[0]["images"][1]), ElementsAre("step", "image", "sha256", "refused"));
-  EXPECT_EQ(runs[0]["images"][1]["refused"], "too dark");
+  EXPECT_THAT(list_keys(runs[0]["images"][1]), ElementsAre("step", "image", "sha256", "rejection"));
+  EXPECT_EQ(runs[0]["images"][1]["rejection"], "too dark");
   for (const RunField& field : list_run_text_fields()) {
     EXPECT_THAT(runs[1][field.name].get<std::string>(),
                 StartsWith(std::string("the '") + field.name + "' of "));

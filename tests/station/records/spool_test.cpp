@@ -74,6 +74,24 @@ TEST(ReadSpooledRun, ReturnsPresentNamesOfMetrics) {
   EXPECT_EQ(read.run.metrics[0].name, "check_lamp_inlier_fraction");
 }
 
+TEST(ReadSpooledRun, ReadsFormerFormat) {
+  const TemporaryFolder folder;
+  const RunRecord run = numbered_run(1);
+  std::string text = serialize_run({run, "records.db"});
+  for (const auto& [present, former] : {std::pair("vlp-run/2", "vlp-run/1"),
+                                        {"\"metrics\"", "\"figures\""},
+                                        {"\"rejection\"", "\"refused\""}}) {
+    for (auto at = text.find(present); at != std::string::npos; at = text.find(present)) {
+      text.replace(at, std::string_view(present).size(), former);
+    }
+  }
+  const RunRecord read = read_spooled_run(folder.file("run.json", text)).run;
+  ASSERT_THAT(read.images, SizeIs(run.images.size()));
+  EXPECT_EQ(read.images[1].refused, run.images[1].refused);
+  ASSERT_THAT(read.metrics, SizeIs(run.metrics.size()));
+  EXPECT_EQ(read.metrics[0].name, run.metrics[0].name);
+}
+
 TEST(ReadSpooledRun, AcceptsNamesThatAreInvalidText) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
@@ -89,8 +107,8 @@ TEST(ReadSpooledRun, ThrowsWithFileForInvalidRun) {
   const std::string text = serialize_run({numbered_run(1), "records.db"});
   for (const std::string& bad :
        {std::string("{}\n"), std::string("[]\n"), text.substr(0, text.size() / 2) + "\n",
-        std::string(text).replace(text.find("vlp-run/1"), 9, "vlp-run/2"),
-        std::string(text).replace(text.find("\"figures\""), 9, "\"figurer\"")}) {
+        std::string(text).replace(text.find("vlp-run/2"), 9, "vlp-run/3"),
+        std::string(text).replace(text.find("\"metrics\""), 9, "\"metricz\"")}) {
     EXPECT_THAT(rejection_message([&] { read_spooled_run(folder.file("bad.json", bad)); }),
                 HasSubstr("bad.json: is no run of a station"));
   }

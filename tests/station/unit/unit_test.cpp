@@ -225,7 +225,7 @@ TEST_F(UnitTest, ReportContainsVerdict) {
   // Edited in the database.
   record.metrics[1].value = 0.5;
   EXPECT_THAT(find_verdict_problem(record),
-              HasSubstr("rms_px is 0.5 px, at most 0.3 px is asked for"));
+              HasSubstr("rms_px is 0.5 px, at most 0.3 px is required"));
   EXPECT_THAT(make_unit_report(record, "", {}),
               AllOf(HasSubstr("NO VERDICT</strong><p>the record has PASS, but rms_px"),
                     Not(HasSubstr("<strong>PASS"))));
