@@ -46,7 +46,7 @@ AdjustSet read_set(const Options& options, const std::string& set, bool is_in_pl
   if (folder) {
     CaptureOptions images = options.images;
     images.images = set;
-    read.frames = collect_kept_frames(
+    read.frames = collect_kept_lamp_frames(
         detect_lamps_in_captures(images, ImageUse::fixes, lamps, calibration).images);
     read.captures =
         options.place_sd_m ? read_captures_with_truth(path) : read_captures_csv_of_folder(path);
@@ -72,7 +72,8 @@ void run(const CLI::App& app, const Options& options) {
       }
     }
   }
-  check_output_files({{"--output", images.output}, {"--refine-map", options.refined_map}}, inputs);
+  check_output_files_are_distinct(
+      {{"--output", images.output}, {"--refine-map", options.refined_map}}, inputs);
   AdjustStepInput input;
   input.lamps = read_lamps_of_room(images.lamps, images.frontend.room);
   input.lamps_file = images.lamps;
@@ -82,7 +83,7 @@ void run(const CLI::App& app, const Options& options) {
   input.map_sd_m = options.map_sd_m;
   input.place_sd_m = options.place_sd_m;
   input.lens_sd_px = options.lens_sd_px;
-  input.motion = options.motion.make_known_motion();
+  input.motion = options.motion.make_motion_prior();
   input.yaw_rate_sd_rad_per_s = rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0));
   input.refine_map = !options.refined_map.empty();
   for (const std::string& set : options.sets) {
@@ -95,18 +96,18 @@ void run(const CLI::App& app, const Options& options) {
   paths.insert(paths.end(), options.turns.begin(), options.turns.end());
   make_adjust_set_names_unique(input.sets, paths);
   for (const AdjustSet& set : input.sets)
-    check_lamps_in_map(set.frames, input.lamps, input.lamps_file);
+    check_map_contains_captured_lamps(set.frames, input.lamps, input.lamps_file);
   const AdjustStepResult result =
-      run_adjustment_step(input, make_program_history_entry(app, inputs));
+      run_joint_adjustment_step(input, make_history_entry_from_command_line(app, inputs));
   print_step_remarks(result);
   throw_if_step_failed(result);
   if (input.refine_map) {
-    write_refined_map(options.refined_map, result.found.refined, images.frontend.room);
+    write_refined_lamp_map(options.refined_map, result.found.refined, images.frontend.room);
   }
   write_calibration(images.output, result.calibration);
   const auto& report = input.calibration.intrinsics_report;
   const bool lens_stated = input.lens_sd_px || (report && report->covariance);
-  print_adjustment(result.found, input.calibration, lens_stated);
+  print_joint_adjustment(result.found, input.calibration, lens_stated);
 }
 
 void add_options(CLI::App& app, Options& options) {
@@ -141,12 +142,12 @@ void add_options(CLI::App& app, Options& options) {
          "calibrations without lens covariance; the lens is then estimated (default: exact lens)")
       ->check(make_finite_positive_validator())
       ->check(CLI::Range(1e-3, 1e3));  // px; smaller: exact lens, larger: unusable lens
-  add_motion_options(
+  add_motion_limit_options(
       app, options.motion,
       "Maximum speed of the camera, in m/s. Estimates the motion of each capture unless "
       "captures.csv has it (default: motion of captures.csv, or 0)");
   add_yaw_rate_sd_option(app, options.yaw_rate_sd_deg_per_s);
-  add_detect_options(app, options.images);
+  add_lamp_detection_options(app, options.images);
 }
 
 }  // namespace
@@ -176,7 +177,7 @@ int main(int argc, char** argv) {
       "vlp-adjust");
   vlp::Options options;
   vlp::add_options(app, options);
-  return vlp::run_app(app, argc, argv, [&] {
+  return vlp::parse_arguments_and_run(app, argc, argv, [&] {
     if (options.sets.empty() && options.turns.empty()) {
       throw std::invalid_argument("SET: missing; give a folder of images or a table of detections");
     }

@@ -67,10 +67,10 @@ void run(const Options& options) {
   if (!squares && options.square_mm) {
     throw std::invalid_argument("--square-mm: only for --chessboard and --charuco; use --tag-mm");
   }
-  const PageSize& paper = find_paper_size_by_name(options.paper);
+  const PageSize& paper = find_page_size_by_name(options.paper);
   Board board = make_board(options);
   if (board.has_chessboard_squares() ? !options.square_mm : !options.tag_mm) {
-    const auto largest_m = find_largest_board_size_m(board, paper);
+    const auto largest_m = find_largest_tag_size_for_page_m(board, paper);
     if (!largest_m) {
       throw std::invalid_argument(fmt::format(
           "--cols, --rows: {} x {} {} do not fit on {}; use fewer or a larger --paper", board.cols,
@@ -169,5 +169,5 @@ int main(int argc, char** argv) {
       "vlp-board");
   vlp::Options options;
   vlp::add_options(app, options);
-  return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
+  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(options); });
 }

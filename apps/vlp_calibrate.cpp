@@ -31,8 +31,8 @@ void run(Options options) {
   if (const auto model = lens_model_from_name(options.lens)) options.how.lens_model = *model;
   options.how.program = {kName, VLP_VERSION};
   SessionLog log;
-  const SessionResult result =
-      run_session(options.session, options.results, options.how, log.make_session_observer());
+  const SessionResult result = run_calibration_session(options.session, options.results,
+                                                       options.how, log.make_session_observer());
   if (result.verdict == Verdict::invalid) {
     if (result.failure == StepFailure::undetermined) throw Undetermined(result.reason);
     throw std::invalid_argument(result.reason);
@@ -68,26 +68,26 @@ int calibrate(int argc, char** argv) {
       kName);
   Options options;
   auto& how = options.how;
-  how.frontend = make_default_frontend_options();
+  how.frontend = make_default_image_intake_options();
   app.add_option("session", options.session, "Input folder of the captures")->required();
   app.add_option("-o,--output", options.results,
                  "Output folder, created if missing: calibration.yaml, check-fixes.csv, "
                  "evaluation.json, report.html, session.json, junit.xml and the files of each step")
       ->required();
   app.add_option("--camera-id", how.camera_id, "Camera id in the calibration (default: camera)");
-  add_lens_option(app, options.lens);
+  add_lens_model_option(app, options.lens);
   app.add_option("--row-time-s", how.frontend.row_time_s,
                  "Row time: time between the readout of successive rows, in s (default: estimated "
                  "from rotation/)")
       ->check(CLI::Range(1e-8, 1e-3));
-  add_readout_option(app, how.frontend.readout);
+  add_readout_direction_option(app, how.frontend.readout);
   add_room_option(app, how.frontend.room);
-  add_board_limit_options(app, how.frontend);
+  add_board_image_limit_options(app, how.frontend);
   app.add_option("--gates", how.gates_file,
                  "File of gates, vlp-gates/1, for sessions without gates.yaml. Its gates are added "
                  "to the default gates of the lens, or replace them");
   app.add_flag("--report,!--no-report", how.report, "Write plots and report.html (default: yes)");
-  app.add_option("--redo", how.redo, "Steps to run even if nothing has changed")
+  app.add_option("--redo", how.steps_to_redo, "Steps to run even if nothing has changed")
       ->option_text("STEP ...");
   add_threads_option(app, how.frontend.threads);
   app.add_flag(
@@ -98,7 +98,7 @@ int calibrate(int argc, char** argv) {
       "Read requests from stdin, one line of JSON for each session; see apps/vlp-calibrate.md. "
       "Excludes all other arguments");
   app.footer("Gates:\n" + describe_available_gates(list_session_metrics()));
-  return run_app(app, argc, argv, [&] { run(options); });
+  return parse_arguments_and_run(app, argc, argv, [&] { run(options); });
 }
 
 }  // namespace
@@ -107,8 +107,8 @@ int calibrate(int argc, char** argv) {
 int main(int argc, char** argv) {
   if (argc != 2 || std::string_view(argv[1]) != "--batch-stdin") return vlp::calibrate(argc, argv);
   CLI::App app("", vlp::kName);
-  return vlp::run_app(app, 1, argv, [] {
-    vlp::load_tag_family("tag36h11");  // family of most boards
-    vlp::run_for_each_stdin_line(vlp::kName, vlp::calibrate);
+  return vlp::parse_arguments_and_run(app, 1, argv, [] {
+    vlp::load_tag_family_decoder("tag36h11");  // family of most boards
+    vlp::run_program_for_each_stdin_line(vlp::kName, vlp::calibrate);
   });
 }

@@ -42,38 +42,39 @@ void print_region(const Options& options, const Camera& camera, const ImageRegio
   if (region.empty()) return;
   const bool kept = options.to == "calibration" || options.to == "mrcal";
   fmt::print("known         in {:.1f} % of the image, which {}\n",
-             100 * compute_fraction_of_image_area(region, camera.imager_px),
+             100 * compute_region_fraction_of_image_area(region, camera.imager_px),
              kept ? "is kept" : "the format does not support");
 }
 
 void run(const CLI::App& app, const Options& options) {
-  check_output_file(options.output, {options.input});
+  check_output_is_not_input(options.output, {options.input});
   const auto [read, region] = read_camera_of_any_format(options.input);
   FittedCamera fitted{read, 0, 1};
-  const std::string was(to_string(fitted.camera.lens_model));
+  const std::string was(lens_model_name(fitted.camera.lens_model));
   if (!options.lens.empty()) {
-    fitted = convert_to_lens_model(fitted.camera, *lens_model_from_name(options.lens));
+    fitted = convert_camera_to_lens_model(fitted.camera, *lens_model_from_name(options.lens));
   }
   Camera& camera = fitted.camera;
   if (!options.camera_id.empty()) camera.id = options.camera_id;
   if (options.to == "calibration") {
-    write_calibration(options.output, make_calibration_with_camera(
-                                          camera, make_region_report(region),
-                                          make_program_history_entry(app, {options.input})));
+    write_calibration(
+        options.output,
+        make_camera_only_calibration(camera, make_region_report(region),
+                                     make_history_entry_from_command_line(app, {options.input})));
   } else {
     write_file(options.output, format_camera_file(options, camera, region));
   }
   if (options.to == "calibration") {
     fmt::print("kept          the camera alone; vlp-rotation and vlp-dispersion add the rest\n");
   }
-  fmt::print("camera        {}, {} x {} px\n", escape_for_single_line(camera.id),
+  fmt::print("camera        {}, {} x {} px\n", escape_text_for_single_line(camera.id),
              camera.imager_px[0], camera.imager_px[1]);
-  if (was == to_string(camera.lens_model)) {
+  if (was == lens_model_name(camera.lens_model)) {
     fmt::print("lens          {}, unchanged\n", was);
   } else {
     fmt::print(
         "lens          {}, fitted to {}: {:.3g} px apart at worst, over {:.1f} % of the image\n",
-        to_string(camera.lens_model), was, fitted.worst_px, 100 * fitted.common_fraction);
+        lens_model_name(camera.lens_model), was, fitted.worst_px, 100 * fitted.common_fraction);
   }
   print_region(options, camera, region);
 }
@@ -103,9 +104,9 @@ int main(int argc, char** argv) {
                  "(default: lens model of the input)")
       ->check([](const std::string& name) {
         return vlp::lens_model_from_name(name) ? std::string()
-                                               : "the models are: " + vlp::lens_model_names();
+                                               : "the models are: " + vlp::list_lens_model_names();
       });
   app.add_option("--camera-id", options.camera_id,
                  "Camera id in the output (default: that of the input)");
-  return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
+  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(app, options); });
 }

@@ -25,17 +25,18 @@ namespace {
 std::map<std::string, double> frame_times(const std::vector<Observation>& images) {
   std::map<std::string, double> times_s;
   for (const Observation& image : images) {
-    if (image.is_kept() && image.time_s) times_s.emplace(image.file_name(), *image.time_s);
+    if (image.is_image_kept() && image.time_s)
+      times_s.emplace(image.image_file_name(), *image.time_s);
   }
   return times_s;
 }
 
 void run(const CaptureOptions& options, const std::string& captures) {
   const std::vector<std::string> inputs = list_capture_input_files(options);
-  check_output_files(
+  check_output_files_are_distinct(
       {{"--output", options.output}, {"--lights", options.lights}, {"--captures", captures}},
       inputs);
-  check_frame_step_needs_video(options.frontend.every, {options.images});
+  reject_frame_step_without_video(options.frontend.every, {options.images});
   if (!captures.empty() && !is_video_file_name(options.images)) {
     throw std::invalid_argument("--captures: images have no frame times; use it for a video only");
   }
@@ -49,7 +50,7 @@ void run(const CaptureOptions& options, const std::string& captures) {
   const Observations found = detect_lamps_in_captures(
       options, ImageUse::fixes, read_lamps_of_room(options.lamps, options.frontend.room),
       calibration);
-  const std::vector<Frame> frames = collect_kept_frames(found.images);
+  const std::vector<Frame> frames = collect_kept_lamp_frames(found.images);
   write_detections(options.output, frames);
   if (!captures.empty()) write_capture_times(captures, frame_times(found.images));
   const auto empty = std::count_if(frames.begin(), frames.end(),
@@ -61,9 +62,9 @@ void run(const CaptureOptions& options, const std::string& captures) {
   fmt::print("no lamps    {} cut by the image border, {} unknown, {} steady, {} without outline\n",
              count(LightKind::cut), count(LightKind::unknown), count(LightKind::steady),
              count(LightKind::formless));
-  for (const auto& [kind, reason, lights] : count_light_reasons(found.images)) {
-    fmt::print("  {:<8}  {}, {}: {}\n", lights, to_string(kind), to_string(reason),
-               describe(reason));
+  for (const auto& [kind, reason, lights] : count_rejected_lights_by_reason(found.images)) {
+    fmt::print("  {:<8}  {}, {}: {}\n", lights, light_kind_name(kind), light_reason_name(reason),
+               describe_light_reason(reason));
   }
 }
 
@@ -101,6 +102,6 @@ int main(int argc, char** argv) {
   std::string captures;
   app.add_option("--captures", captures, "Output file of the frame times of a video, captures.csv");
   vlp::add_frame_step_option(app, options.frontend.every);
-  vlp::add_detect_options(app, options);
-  return vlp::run_app(app, argc, argv, [&] { vlp::run(options, captures); });
+  vlp::add_lamp_detection_options(app, options);
+  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(options, captures); });
 }

@@ -24,7 +24,7 @@ namespace vlp {
 namespace {
 
 const std::map<std::string, DispersionMethod> kMethods{{"camera", DispersionMethod::camera},
-                                                       {"chen-guan", DispersionMethod::paper}};
+                                                       {"chen-guan", DispersionMethod::chen_guan}};
 const std::map<std::string, DispersionCircle> kCircles{{"mean", DispersionCircle::mean},
                                                        {"enclosing", DispersionCircle::enclosing}};
 
@@ -54,7 +54,7 @@ KnownPositions find_places(const Options& options, const std::vector<Frame>& fra
                            const CapturesTable& captures) {
   std::optional<Eigen::Vector2d> station_m;
   if (options.station_m) station_m = Eigen::Vector2d(options.station_m->data());
-  KnownPositions places = collect_reference_positions(
+  KnownPositions places = collect_captures_at_known_positions(
       frames, captures, station_m, options.of == "axis" ? PlaceOf::axis : PlaceOf::camera);
   if (places.captures.empty() && captures.empty()) {
     throw std::invalid_argument(
@@ -80,20 +80,22 @@ void run(const CLI::App& app, Options options) {
     const auto beside = std::filesystem::path(options.images.images) / table;
     if (options.captures.empty() && std::filesystem::exists(beside)) inputs.push_back(beside);
   }
-  check_output_files({{"--output", options.images.output}, {"--plot", options.plot}}, inputs);
+  check_output_files_are_distinct({{"--output", options.images.output}, {"--plot", options.plot}},
+                                  inputs);
   const CapturesTable captures = read_captures_table(options);
   options.images.captures = captures;
   const LampCaptures input = read_lamp_captures(options.images, ImageUse::places);
-  check_lamps_in_map(input.frames, input.lamps, input.lamps_file);
+  check_map_contains_captured_lamps(input.frames, input.lamps, input.lamps_file);
   const KnownPositions places = find_places(options, input.frames, captures);
-  const DispersionResult found =
-      run_dispersion_step(input, places, kMethods.at(options.method), kCircles.at(options.circle),
-                          make_program_history_entry(app, inputs));
+  const DispersionResult found = run_dispersion_calibration_step(
+      input, places, kMethods.at(options.method), kCircles.at(options.circle),
+      make_history_entry_from_command_line(app, inputs));
   print_step_remarks(found);
   throw_if_step_failed(found);
   if (!options.plot.empty()) write_plot(options.plot, found.drawing());
   write_calibration(options.images.output, found.calibration);
-  print_dispersion(found.fit, input.calibration.camera.focal_px(), places.captures.size());
+  print_dispersion_calibration(found.fit, input.calibration.camera.focal_px(),
+                               places.captures.size());
 }
 
 }  // namespace
@@ -135,7 +137,7 @@ int main(int argc, char** argv) {
                  "Method. camera (default): separates errors that rotate with the camera from "
                  "errors in the world; needs several yaws. chen-guan: moves the circle center to "
                  "the reference point; needs one yaw and an exact lamp map and reference point")
-      ->check(vlp::make_former_value_validator())
+      ->check(vlp::make_renamed_option_value_validator())
       ->check(CLI::IsMember({"camera", "chen-guan"}))
       ->option_text("camera|chen-guan");
   app.add_option("--circle", options.circle,
@@ -145,5 +147,5 @@ int main(int argc, char** argv) {
       ->option_text("mean|enclosing");
   app.add_option("--plot", options.plot,
                  "Output file of a plot of fixes and circles, .png or .svg");
-  return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
+  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(app, options); });
 }

@@ -93,11 +93,11 @@ void check_files(const Options& options) {
     inputs.push_back(fixes);
     check_line("--track " + fixes, {x0_m, y0_m, x1_m, y1_m});
   }
-  check_output_files({{"--json", options.json},
-                      {"--junit", options.junit},
-                      {"--propose-gates", options.proposed_gates},
-                      {"--report", report.file}},
-                     inputs);
+  check_output_files_are_distinct({{"--json", options.json},
+                                   {"--junit", options.junit},
+                                   {"--propose-gates", options.proposed_gates},
+                                   {"--report", report.file}},
+                                  inputs);
 }
 
 void check_options(const Options& options, const std::vector<Gate>& gates) {
@@ -166,8 +166,8 @@ std::string render_report(const CLI::App& app, const Options& options, const Eva
     report.page.pictures.push_back(read_report_plot(picture));
     inputs.push_back(picture);
   }
-  report.page.evaluation = make_program_history_entry(app, inputs);
-  return render_report_page(std::move(report));
+  report.page.evaluation = make_history_entry_from_command_line(app, inputs);
+  return render_evaluation_report_html(std::move(report));
 }
 
 /// Returns the text of the file of proposed gates. Throws Undetermined if there are too few units.
@@ -186,7 +186,7 @@ std::string make_proposed_gates(const EvaluationInput& input, const Evaluation& 
 /// Returns the tests of the gates. A comparison with too few captures for evidence has a warning,
 /// because its gate passes.
 std::vector<JUnitTest> make_evaluation_tests(const EvaluateResult& found) {
-  std::vector<JUnitTest> tests = make_junit_tests(found.gates);
+  std::vector<JUnitTest> tests = make_junit_tests_from_gates(found.gates);
   const auto& comparison = found.evaluation.comparison;
   if (!comparison || !comparison->has_too_few_clusters()) return tests;
   for (JUnitTest& test : tests) {
@@ -200,7 +200,7 @@ std::vector<JUnitTest> make_evaluation_tests(const EvaluateResult& found) {
 
 void run_evaluation(const CLI::App& app, const Options& options, const std::vector<Gate>& gates) {
   const EvaluationInput input = read_input(options);
-  const EvaluateResult found = evaluate_fixes(input, gates);
+  const EvaluateResult found = evaluate_fixes_against_truth(input, gates);
   throw_if_step_failed(found);
   for (const CheckedMetric& gate : found.gates) {
     if (gate.value) continue;
@@ -212,14 +212,15 @@ void run_evaluation(const CLI::App& app, const Options& options, const std::vect
   std::string report, proposed;
   if (!options.report.file.empty()) report = render_report(app, options, input, found);
   if (!options.proposed_gates.empty()) proposed = make_proposed_gates(input, found.evaluation);
-  if (!options.json.empty()) write_file(options.json, to_json(found.evaluation, found.gates));
+  if (!options.json.empty())
+    write_file(options.json, format_evaluation_json(found.evaluation, found.gates));
   if (!options.junit.empty()) {
-    write_file(options.junit, format_junit(kName, make_evaluation_tests(found)));
+    write_file(options.junit, format_junit_xml(kName, make_evaluation_tests(found)));
   }
   if (!report.empty()) write_file(options.report.file, report);
   if (!proposed.empty()) write_file(options.proposed_gates, proposed);
   print_step_remarks(found);
-  print_evaluation(found.evaluation, found.gates);
+  print_fix_error_evaluation(found.evaluation, found.gates);
   const std::string failed = describe_failed_gates(found.gates);
   if (!failed.empty()) throw GateNotMet(failed);
 }
@@ -229,7 +230,7 @@ void run_evaluation(const CLI::App& app, const Options& options, const std::vect
 void write_junit_error(const std::string& file, const char* type, const char* message) {
   if (file.empty()) return;
   const JUnitTest test{"evaluation", JUnitTest::Result::error, message, type};
-  write_file(file, format_junit(kName, std::span(&test, 1)));
+  write_file(file, format_junit_xml(kName, std::span(&test, 1)));
 }
 
 void run(const CLI::App& app, const Options& options) {
@@ -266,8 +267,7 @@ void add_report_options(CLI::App& app, ReportOption& option) {
 }
 
 void add_options(CLI::App& app, Options& options) {
-  app.add_option("fixes", options.fixes, "Fixes to evaluate, fixes.csv of vlp-locate")
-      ->required();
+  app.add_option("fixes", options.fixes, "Fixes to evaluate, fixes.csv of vlp-locate")->required();
   app.add_option("--truth", options.truth,
                  "Ground truth, truth.csv: image, x_m, y_m [, z_m, yaw_rad]. Captures without a "
                  "fix count as missing");
@@ -337,5 +337,5 @@ int main(int argc, char** argv) {
   vlp::Options options;
   vlp::add_options(app, options);
   app.footer("Gates:\n" + vlp::describe_available_gates(vlp::known_metrics()));
-  return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
+  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(app, options); });
 }

@@ -38,7 +38,7 @@ struct Options {
   std::string board, output, corners, ros, kalibr, opencv, plot;
   std::optional<std::array<int, 2>> imager_px;
   std::string camera_id = "camera", lens = "LENSMODEL_OPENCV8";
-  FrontendOptions frontend = make_default_frontend_options();
+  FrontendOptions frontend = make_default_image_intake_options();
   std::optional<double> pixel_pitch_m;
   int held_out = 0;
   WarpChoice warp = WarpChoice::automatic;
@@ -94,7 +94,7 @@ Observations observe(const std::vector<std::filesystem::path>& images, const Boa
   Progress progress("images");
   return detect_boards_in_images(
       images, board, options.board, options.frontend,
-      [&](std::size_t done, std::size_t total) { progress.update_display(done, total); });
+      [&](std::size_t done, std::size_t total) { progress.update_progress_display(done, total); });
 }
 
 /// Replaces the extension: camera.yaml and ".cameramodel" give camera.cameramodel.
@@ -125,7 +125,7 @@ void check_names(const std::vector<std::filesystem::path>& images) {
 /// any output is written.
 void check_exports(const Options& options, Camera camera) {
   camera.imager_px = {1, 1};
-  camera.intrinsics.assign(parameter_count(camera.lens_model), 1);
+  camera.intrinsics.assign(num_lens_parameters(camera.lens_model), 1);
   if (!options.ros.empty()) format_ros_camera_info(camera);
   if (!options.kalibr.empty()) format_kalibr_camchain(camera);
   if (!options.opencv.empty()) format_opencv_camera(camera);
@@ -140,8 +140,9 @@ std::vector<Gate> parse_gates(const Options& options) {
 /// Returns true if a gate of the lens fails, not only gates of the views.
 bool has_failed_lens_gate(const std::vector<CheckedMetric>& gates) {
   return std::ranges::any_of(gates, [](const CheckedMetric& gate) {
-    return !gate.has_passed() && (gate.name == "rms_px" || gate.name == "expected_max_error_px" ||
-                                  gate.name == "split_half_px");
+    return !gate.has_passed_gate() &&
+           (gate.name == "rms_px" || gate.name == "expected_max_error_px" ||
+            gate.name == "split_half_px");
   });
 }
 
@@ -149,7 +150,7 @@ bool has_failed_lens_gate(const std::vector<CheckedMetric>& gates) {
 void write_results(const Options& options, const LensResult& result) {
   const LensEstimate& lens = result.lens;
   write_calibration(options.output, result.calibration);
-  if (is_supported_by_mrcal(result.calibration.camera.lens_model)) {
+  if (is_lens_model_supported_by_mrcal(result.calibration.camera.lens_model)) {
     write_mrcal_cameramodel(replace_extension(options.output, ".cameramodel"), lens.solution);
   } else {
     // A file of an earlier run would belong to another lens.
@@ -168,7 +169,7 @@ void throw_if_gate_failed(const std::vector<Gate>& gates, const LensResult& resu
   const std::string failed = describe_failed_gates(checked);
   if (failed.empty()) return;
   if (lens.better_model && has_failed_lens_gate(checked)) {
-    throw GateNotMet(fmt::format("{}; use --lens {}", failed, to_string(*lens.better_model)));
+    throw GateNotMet(fmt::format("{}; use --lens {}", failed, lens_model_name(*lens.better_model)));
   }
   if (std::isfinite(lens.report.uncertainty_worst_px)) {
     throw GateNotMet(
@@ -184,12 +185,12 @@ void run(const CLI::App& app, const Options& options) {
   const std::vector<Gate> gates = parse_gates(options);
   if (!chooses_lens(options)) check_exports(options, known_camera(options));
   const std::string corners = corner_file(app, options);
-  check_frame_step_needs_video(options.frontend.every, options.images);
+  reject_frame_step_without_video(options.frontend.every, options.images);
   const auto images = corners.empty() ? replace_folders_by_images(options.images)
                                       : std::vector<std::filesystem::path>{options.images.front()};
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
-  check_output_files(
+  check_output_files_are_distinct(
       {{"--output", options.output},
        {"--output's .cameramodel", replace_extension(options.output, ".cameramodel")},
        {"--output's .corners.vnl", replace_extension(options.output, ".corners.vnl")},
@@ -210,8 +211,8 @@ void run(const CLI::App& app, const Options& options) {
                   options.warp,
                   chooses_lens(options)};
   // After the images: unusable files are not read for their digests.
-  const LensResult result =
-      run_lens_step(std::move(input), make_program_history_entry(app, inputs));
+  const LensResult result = run_lens_calibration_step(
+      std::move(input), make_history_entry_from_command_line(app, inputs));
   print_step_remarks(result);
   const LensEstimate& lens = result.lens;
   if (!options.corners.empty() && !lens.views.empty()) {
@@ -220,8 +221,8 @@ void run(const CLI::App& app, const Options& options) {
   throw_if_step_failed(result);
   check_exports(options, result.calibration.camera);  // the selected lens model
   write_results(options, result);
-  if (lens.choice) fmt::print("lens model    {}\n", describe(*lens.choice));
-  print_calibration_summary(lens.solution, lens.report, lens.coverage, lens.held_out);
+  if (lens.choice) fmt::print("lens model    {}\n", describe_lens_model_choice(*lens.choice));
+  print_lens_calibration(lens.solution, lens.report, lens.coverage, lens.held_out);
   if (lens.print_px) {
     fmt::print("board print   {:.3f} px, in the covariance and not in the uncertainty above\n",
                *lens.print_px);
@@ -243,12 +244,12 @@ void add_input_options(CLI::App& app, Options& options) {
       ->required();
   app.add_option("--camera-id", options.camera_id,
                  "Camera id in the calibration (default: camera)");
-  add_lens_option(app, options.lens);
+  add_lens_model_option(app, options.lens);
   app.add_option("--row-time-s", options.frontend.row_time_s,
                  "Row time: time between the readout of successive rows, in s. Needed to identify "
                  "lamps by frequency; vlp-train --row-time estimates it")
       ->check(CLI::Range(1e-8, 1e-3));
-  add_readout_option(app, options.frontend.readout);
+  add_readout_direction_option(app, options.frontend.readout);
   app.add_option("--imager-px", options.imager_px,
                  "Width and height of the images of a corner file, in px")
       ->check(CLI::Range(16, 100000))
@@ -301,7 +302,7 @@ void add_output_options(CLI::App& app, Options& options) {
                  "Folder for the detected corners of each image, which later runs reuse");
   add_frame_step_option(app, options.frontend.every);
   add_max_mpx_option(app, options.frontend.max_mpx);
-  add_board_limit_options(app, options.frontend);
+  add_board_image_limit_options(app, options.frontend);
   add_threads_option(app, options.frontend.threads);
 }
 
@@ -322,5 +323,5 @@ int main(int argc, char** argv) {
   vlp::add_input_options(app, options);
   vlp::add_solve_options(app, options);
   vlp::add_output_options(app, options);
-  return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
+  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(app, options); });
 }

@@ -51,7 +51,7 @@ std::string make_title(const Options& options) {
 UnitErrors stated_errors(const Options& options, const LampMap& lamps,
                          const Calibration& calibration) {
   UnitErrors unit(lamps, calibration);
-  if (!unit.common().are_errors_known()) {
+  if (!unit.common_errors().are_any_errors_known()) {
     throw InputError(options.calibration,
                      "has no uncertainties, and " + options.lamps +
                          " has no sd_m; use --principal-point-px, --tilt-deg and --lamp-map-mm "
@@ -61,7 +61,7 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
                                                                       "lamp map"};
   std::string unstated;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (unit.common().are_errors_known(kCommonErrorSources[i])) continue;
+    if (unit.common_errors().is_error_source_known(kCommonErrorSources[i])) continue;
     unstated.append(unstated.empty() ? "" : ", ").append(names[i]);
   }
   if (!unstated.empty()) {
@@ -69,7 +69,8 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
     //   `vlp-limits --from-calibration` may be wrong | state them
     spdlog::warn("{}: the uncertainties are missing and count as zero", unstated);
   }
-  if (const int elsewhere = unit.common().lamps_elsewhere(); elsewhere > 0) {
+  if (const int elsewhere = unit.common_errors().num_lamps_moved_since_calibration();
+      elsewhere > 0) {
     spdlog::warn(describe_lamps_moved_since_calibration(elsewhere));
   }
   return unit;
@@ -78,8 +79,8 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
 /// Returns the prior of velocity, yaw rate, roll and pitch.
 BodyPrior make_body_prior(const Options& options, const Camera& camera) {
   BodyPrior prior;
-  if (const auto motion = options.motion.make_known_motion()) {
-    check_row_time(camera);
+  if (const auto motion = options.motion.make_motion_prior()) {
+    check_row_time_and_readout_known(camera);
     prior.velocity_sd_m_per_s = motion->velocity_sd_m_per_s;
     prior.yaw_rate_sd_rad_per_s = motion->yaw_rate_sd_rad_per_s;
   }
@@ -103,8 +104,8 @@ FloorLimits find_floor_limits(const Options& options, const LampMap& lamps, cons
 }
 
 void run(const Options& options) {
-  check_output_files({{"--map", options.map}, {"--picture", options.picture}},
-                     {options.lamps, options.calibration});
+  check_output_files_are_distinct({{"--map", options.map}, {"--picture", options.picture}},
+                                  {options.lamps, options.calibration});
   const LampMap lamps = read_lamps_of_room(options.lamps, options.room);
   FloorGrid grid = make_grid_of_floor_positions(lamps, options.step_m);
   if (const auto& floor = options.floor_m; !floor.empty()) {
@@ -126,12 +127,12 @@ void run(const Options& options) {
         "two lamps are visible from no position on this floor: is it under the lamps, and the "
         "camera below them? Otherwise lower the camera, widen the lens, or add lamps");
   }
-  if (!options.map.empty()) write_floor_limits(options.map, limits);
+  if (!options.map.empty()) write_floor_accuracy_limits(options.map, limits);
   if (!options.picture.empty()) {
     write_floor_plot(options.picture,
-                     collect_plot_data(limits, make_title(options), options.step_m), lamps);
+                     collect_floor_plot_data(limits, make_title(options), options.step_m), lamps);
   }
-  print_floor_limits(*summary, limits, is_free);
+  print_floor_error_budget(*summary, limits, is_free);
   if (options.stated) print_largest_error_source(*summary);
 }
 
@@ -168,7 +169,7 @@ void add_options(CLI::App& app, Options& options) {
       ->excludes(center)
       ->excludes(tilt)
       ->excludes(lamp_map);
-  add_motion_options(
+  add_motion_limit_options(
       app, options.motion,
       "Maximum speed of the camera, in m/s. Adds the contribution of estimating velocity and yaw "
       "rate (default: 0). With odometry of standard deviation S m/s, use 2 S");
@@ -208,5 +209,5 @@ int main(int argc, char** argv) {
       "vlp-limits");
   vlp::Options options;
   vlp::add_options(app, options);
-  return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
+  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(options); });
 }

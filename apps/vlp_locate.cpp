@@ -101,7 +101,7 @@ LocateInput make_input(const Options& options, const CapturesTable& captures) {
   input.inclination_sigma_rad = rad_from_deg(options.inclination_sigma_deg.value_or(0));
   input.one_lamp = options.one_lamp;
   input.yaw_sd_rad = rad_from_deg(options.yaw_sd_deg.value_or(0));
-  input.motion = options.motion.make_known_motion();
+  input.motion = options.motion.make_motion_prior();
   input.yaw_rate_sd_rad_per_s = rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0));
   input.roll_pitch_sd_rad = rad_from_deg(options.roll_pitch_sd_deg.value_or(0));
   input.height_sd_m = options.height_sd_m;
@@ -110,23 +110,26 @@ LocateInput make_input(const Options& options, const CapturesTable& captures) {
 }
 
 LocateResult locate_in_images(const Options& options, LocateInput input) {
-  check_image_output_options(options.images);
-  const LampImages images = make_lamp_image_inputs(options.images, input.lamps, input.calibration);
+  check_outputs_are_not_images(options.images);
+  const LampImages images =
+      make_lamp_detection_input(options.images, input.lamps, input.calibration);
   LocateResult found;
   {
     Progress progress("images");
-    found = locate_camera_in_images(
-        images, ImageUse::fixes, std::move(input), options.images.frontend,
-        [&](std::size_t done, std::size_t total) { progress.update_display(done, total); });
+    found = locate_camera_from_images(images, ImageUse::fixes, std::move(input),
+                                      options.images.frontend,
+                                      [&](std::size_t done, std::size_t total) {
+                                        progress.update_progress_display(done, total);
+                                      });
   }
-  print_each_light(found.seen);
+  print_detected_lights(found.seen);
   return found;
 }
 
 void run(Options options) {
   std::vector<std::string> inputs = list_capture_input_files(options.images);
   inputs.push_back(options.captures);
-  check_output_file(options.images.output, inputs);
+  check_output_is_not_input(options.images.output, inputs);
   const CapturesTable captures = read_captures_table(options);
   options.images.captures = captures;
   if (const auto& mount = options.camera_on_robot) {
@@ -137,13 +140,13 @@ void run(Options options) {
   if (std::filesystem::is_directory(options.images.images)) {
     found = locate_in_images(options, std::move(input));
   } else {
-    input.frames = read_detection_captures(options.images);
-    found = locate_camera_in_frames(input);
+    input.frames = read_captures_from_detections_file(options.images);
+    found = locate_camera_from_frames(input);
   }
   print_step_remarks(found);
   if (found.rows.empty()) throw_if_step_failed(found);
   write_fixes(options.images.output, found.rows);
-  print_fixes(found.summary);
+  print_position_fix_summary(found.summary);
   throw_if_step_failed(found);
 }
 
@@ -166,9 +169,10 @@ void add_sensor_options(CLI::App& app, Options& options) {
                  "(default: 0, exact). For z_m use --height-sd-m")
       ->check(make_finite_non_negative_validator())
       ->needs(one_lamp);
-  add_motion_options(app, options.motion,
-                     "Maximum speed of the camera or robot, in m/s. Estimates the motion of each "
-                     "capture unless captures.csv has it (default: motion of captures.csv, or 0)");
+  add_motion_limit_options(
+      app, options.motion,
+      "Maximum speed of the camera or robot, in m/s. Estimates the motion of each "
+      "capture unless captures.csv has it (default: motion of captures.csv, or 0)");
   add_yaw_rate_sd_option(app, options.yaw_rate_sd_deg_per_s);
   app.add_option("--roll-pitch-sd-deg", options.roll_pitch_sd_deg,
                  "Standard deviation of roll and pitch about level, in degrees, for captures "
@@ -223,5 +227,5 @@ int main(int argc, char** argv) {
       "vlp-locate");
   vlp::Options options;
   vlp::add_options(app, options);
-  return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
+  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(options); });
 }

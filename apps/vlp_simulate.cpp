@@ -29,9 +29,9 @@ struct Options {
 };
 
 void run(const Options& options) {
-  check_output_file((std::filesystem::path(options.output) / "scene.yaml").string(),
-                    {options.scene});
-  Scene scene = read_scene(options.scene);
+  check_output_is_not_input((std::filesystem::path(options.output) / "scene.yaml").string(),
+                            {options.scene});
+  Scene scene = read_scene_file(options.scene);
   std::optional<std::uint64_t> seed;
   if (options.seed) {
     seed = scene.seed = static_cast<std::uint64_t>(*options.seed);
@@ -46,11 +46,12 @@ void run(const Options& options) {
   {
     Progress progress(what);
     const auto show = [&](const SimulationSummary& so_far, std::size_t total) {
-      progress.update_display(so_far.rendered + so_far.found, total, so_far.found);
+      progress.update_progress_display(so_far.rendered + so_far.found, total, so_far.found);
     };
-    summary = options.archive ? simulate_archive(scene, static_cast<std::size_t>(*options.archive),
-                                                 options.output, how, show)
-                              : simulate(scene, options.output, how, show);
+    summary = options.archive
+                  ? simulate_session_archive(scene, static_cast<std::size_t>(*options.archive),
+                                             options.output, how, show)
+                  : render_scene_to_folder(scene, options.output, how, show);
   }
   for (const std::string& warning : summary.warnings) spdlog::warn("{}", warning);
   fmt::print("rendered {} {}, {} existed; in {}\n", summary.rendered, what, summary.found,
@@ -86,5 +87,5 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "Random seed (default: that of the scene)")
       ->check(CLI::Range(0, std::numeric_limits<int>::max()));
   vlp::add_threads_option(app, options.threads, "Number of captures to render in parallel");
-  return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
+  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(options); });
 }

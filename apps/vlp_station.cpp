@@ -71,9 +71,10 @@ void add_hook(CLI::App& app, StationRunOptions& options) {
 
 /// Refuses a password: all users of the machine see command lines.
 std::string find_password(const std::string& where) {
-  return contains_password(where) ? "a password on the command line is visible to all users of the "
-                                    "machine; set the variable PGPASSWORD, or PGPASSFILE to a file"
-                                  : "";
+  return contains_database_password(where)
+             ? "a password on the command line is visible to all users of the "
+               "machine; set the variable PGPASSWORD, or PGPASSFILE to a file"
+             : "";
 }
 
 /// Adds a command with the options for the location of records.
@@ -147,12 +148,12 @@ void add_upkeep(CLI::App& app, StationRecordsOptions& options) {
   clean->add_option("--station", options.station, "Station configuration, station.yaml")
       ->required();
   clean->add_flag("--delete", options.remove, "Delete the folders (default: only list them)");
-  CLI::App* print_audit_trail_check =
+  CLI::App* verify_records_by_audit_trail =
       add_records_location(app, "verify-records",
                            "Check that the records are unchanged. Lists runs that were changed, "
                            "removed or added by hand; exit code 1 if there are any",
                            options);
-  print_audit_trail_check->add_option(
+  verify_records_by_audit_trail->add_option(
       "--expected-digest", options.expected_digest,
       "Last digest printed by an earlier verify-records. The trail must still contain it");
   CLI::App* voided = add_records_location(
@@ -230,25 +231,25 @@ void run_command(const CLI::App& app, const StationRunOptions& run,
                  const StationRecordsOptions& records) {
   if (app.got_subcommand("run")) {
     if (run.camera_id.empty()) {
-      measure_scanned_units(run);
+      measure_units_with_scanned_ids(run);
     } else {
-      measure_unit(run);
+      measure_camera_unit(run);
     }
   }
   if (app.got_subcommand("verify")) verify_station_with_golden_unit(run);
-  if (app.got_subcommand("hook")) run_hooks(run);
-  if (app.got_subcommand("list")) print_runs(records);
-  if (app.got_subcommand("show")) print_run(records);
-  if (app.got_subcommand("restore")) restore_run(records);
+  if (app.got_subcommand("hook")) rerun_unfinished_hooks(run);
+  if (app.got_subcommand("list")) print_station_run_list(records);
+  if (app.got_subcommand("show")) print_station_run_details(records);
+  if (app.got_subcommand("restore")) restore_run_files(records);
   if (app.got_subcommand("certificate")) write_calibration_certificate(records);
-  if (app.got_subcommand("clean")) list_or_delete_expired_folders(records);
-  if (app.got_subcommand("void")) void_run(records);
-  if (app.got_subcommand("verify-records")) print_audit_trail_check(records);
-  if (app.got_subcommand("import")) import_archive(records);
-  if (app.got_subcommand("export")) export_runs(records);
+  if (app.got_subcommand("clean")) list_or_delete_expired_run_folders(records);
+  if (app.got_subcommand("void")) void_recorded_run(records);
+  if (app.got_subcommand("verify-records")) verify_records_by_audit_trail(records);
+  if (app.got_subcommand("import")) import_archive_sessions_as_runs(records);
+  if (app.got_subcommand("export")) export_selected_runs(records);
   if (app.got_subcommand("trend")) print_metric_trend(records);
   if (app.got_subcommand("capability")) print_process_capability(records);
-  if (app.got_subcommand("study")) print_measurement_study(records);
+  if (app.got_subcommand("study")) print_gauge_study(records);
 }
 
 }  // namespace
@@ -281,5 +282,6 @@ int main(int argc, char** argv) {
   vlp::add_upkeep(app, records);
   vlp::add_transfer(app, records);
   vlp::add_statistics(app, records);
-  return vlp::run_app(app, argc, argv, [&] { vlp::run_command(app, run, records); });
+  return vlp::parse_arguments_and_run(app, argc, argv,
+                                      [&] { vlp::run_command(app, run, records); });
 }

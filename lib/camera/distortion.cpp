@@ -63,7 +63,7 @@ Eigen::Matrix<double, 2, 12> Distortion::distortion_coefficient_jacobian(
   return jacobian;
 }
 
-double Distortion::compute_max_valid_radius() const {
+double Distortion::compute_max_valid_distortion_radius() const {
   // Rate at which the distorted point moves outwards along a line through the origin in direction
   // u:
   //   L + 2 r2 L' + r u.w,

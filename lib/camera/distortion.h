@@ -41,7 +41,7 @@ struct Distortion {
   /// the distorted point stops moving outwards in some direction while z moves outwards. Beyond it
   /// two rays share a pixel, and the model describes no lens. Without tangential and prism terms
   /// only r L(r^2) matters. Returns infinity if there is no such radius up to searched_radius.
-  double compute_max_valid_radius() const;
+  double compute_max_valid_distortion_radius() const;
   static constexpr double searched_radius = 10;  // tan 84 degrees
 };
 

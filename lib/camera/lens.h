@@ -20,7 +20,8 @@ class Lens {
  public:
   /// Creates a lens from its parameters in the order of mrcal: fx fy cx cy, px, followed by the
   /// distortions of the model (lens_model.h).
-  /// @throws std::invalid_argument if their number is not parameter_count(model), a parameter is
+  /// @throws std::invalid_argument if their number is not num_lens_parameters(model), a parameter
+  /// is
   ///     not finite or a focal length is not positive
   Lens(LensModel model, std::span<const double> parameters);
 
@@ -39,9 +40,10 @@ class Lens {
   ///   PINHOLE, OPENCVn  at or behind the plane z = 0
   ///   other models      straight behind the camera
   ///   OPENCVn, OPENCV_FISHEYE, splined
-  ///                     beyond Distortion::compute_max_valid_radius(),
-  ///                     Fisheye::max_valid_angle_rad() or SplineSurface::half_extent()
-  std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x_in_camera) const;
+  ///                     beyond Distortion::compute_max_valid_distortion_radius(),
+  ///                     Fisheye::max_valid_fisheye_angle_rad() or
+  ///                     SplineSurface::spline_half_extent()
+  std::optional<Eigen::Vector2d> project_point(const Eigen::Vector3d& x_in_camera) const;
 
   struct Projection {
     Eigen::Vector2d pixel;
@@ -50,8 +52,8 @@ class Lens {
     /// hundreds of parameters; their columns are those of fx, fy, cx, cy only.
     Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::DontAlign, 2, 16> d_pixel_d_parameters;
   };
-  /// Projects a point as project() does and computes both Jacobians. Does not allocate.
-  std::optional<Projection> project_with_jacobians(const Eigen::Vector3d& x_in_camera) const;
+  /// Projects a point as project_point() does and computes both Jacobians. Does not allocate.
+  std::optional<Projection> project_point_with_jacobians(const Eigen::Vector3d& x_in_camera) const;
 
   /// Sparse Jacobian of a pixel with respect to the parameters of the lens.
   struct SparseJacobian {
@@ -61,8 +63,8 @@ class Lens {
     Eigen::Matrix2Xd d_pixel;
   };
   /// Computes the Jacobian of a point's pixel with respect to all parameters, including the control
-  /// points of splined lenses. Returns std::nullopt for points that project() rejects.
-  std::optional<SparseJacobian> compute_intrinsics_jacobian(
+  /// points of splined lenses. Returns std::nullopt for points that project_point() rejects.
+  std::optional<SparseJacobian> compute_pixel_jacobian_wrt_intrinsics(
       const Eigen::Vector3d& x_in_camera) const;
 
   struct Ray {
@@ -72,12 +74,12 @@ class Lens {
     Eigen::Matrix<double, 3, 2> d_direction_d_pixel;
   };
   /// Computes the ray of a pixel (u, v) in the camera frame. Returns std::nullopt if the pixel is
-  /// not finite or no ray that project() accepts is found for it.
+  /// not finite or no ray that project_point() accepts is found for it.
   ///
   /// OPENCVn and splined lenses use Newton's method with step halving, until the last step reduces
   /// the error below 1e-12. The Jacobian is evaluated before that step and is accurate to 1e-6
   /// (relative).
-  std::optional<Ray> unproject(const Eigen::Vector2d& pixel) const;
+  std::optional<Ray> unproject_pixel(const Eigen::Vector2d& pixel) const;
 
  private:
   LensModel model_;

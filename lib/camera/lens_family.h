@@ -18,7 +18,8 @@ class LensFamily {
   /// Projects a point of the camera frame, in any unit, to the image plane of focal length 1.
   /// @return position in focal lengths from the principal point; std::nullopt or not finite for a
   ///     point that the model does not describe
-  virtual std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x_in_camera) const = 0;
+  virtual std::optional<Eigen::Vector2d> project_to_plane(
+      const Eigen::Vector3d& x_in_camera) const = 0;
 
   struct Jacobians {
     Eigen::Matrix<double, 2, 3> d_plane_d_point;
@@ -26,9 +27,9 @@ class LensFamily {
     /// with more than twelve, see compute_distortion_derivatives().
     Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::DontAlign, 2, 12> d_plane_d_distortions;
   };
-  /// Computes the Jacobians of project(). Does not allocate.
-  /// @pre project() returns a finite position.
-  virtual Jacobians jacobians(const Eigen::Vector3d& x_in_camera) const = 0;
+  /// Computes the Jacobians of project_to_plane(). Does not allocate.
+  /// @pre project_to_plane() returns a finite position.
+  virtual Jacobians compute_projection_jacobians(const Eigen::Vector3d& x_in_camera) const = 0;
 
   /// Derivative of one coordinate of the plane, x (axis 0) or y (axis 1), with respect to one
   /// distortion.
@@ -39,7 +40,7 @@ class LensFamily {
   };
   /// Computes the derivatives for models with more than twelve distortions: only those of
   /// distortions that the position depends on, in ascending order. Empty for other models.
-  /// @pre project() returns a finite position.
+  /// @pre project_to_plane() returns a finite position.
   virtual std::vector<DistortionDerivative> compute_distortion_derivatives(
       const Eigen::Vector3d&) const {
     return {};
@@ -50,8 +51,8 @@ class LensFamily {
     Eigen::Matrix<double, 3, 2> d_direction_d_plane;
   };
   /// Computes the ray in the camera frame, not of unit length, of a finite position in the image
-  /// plane. Returns std::nullopt if project() maps no point to it.
-  virtual std::optional<Ray> unproject(const Eigen::Vector2d& plane) const = 0;
+  /// plane. Returns std::nullopt if project_to_plane() maps no point to it.
+  virtual std::optional<Ray> unproject_plane_position(const Eigen::Vector2d& plane) const = 0;
 };
 
 }  // namespace vlp

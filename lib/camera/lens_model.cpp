@@ -17,13 +17,13 @@ std::string_view make_splined_name(LensModel model) {
   static std::map<LensModel, std::string> names;
   const std::lock_guard alone(mutex);
   const auto [entry, added] = names.try_emplace(model);
-  if (added) entry->second = to_string(spline_grid_of_model(model));
+  if (added) entry->second = splined_lens_model_name(spline_grid_of_lens_model(model));
   return entry->second;
 }
 
 }  // namespace
 
-std::string_view to_string(LensModel model) {
+std::string_view lens_model_name(LensModel model) {
   return is_splined_lens_model(model) ? make_splined_name(model)
                                       : list_lens_models()[static_cast<std::size_t>(model)].name;
 }
@@ -36,17 +36,17 @@ std::optional<LensModel> lens_model_from_name(std::string_view name) {
   return std::nullopt;
 }
 
-std::string lens_model_names() {
+std::string list_lens_model_names() {
   std::string names;
   for (const LensModelRow& row : list_lens_models()) names.append(row.name).append(", ");
   return names + "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14_fov_x_deg=190 and its like";
 }
 
-std::size_t parameter_count(LensModel model) {
+std::size_t num_lens_parameters(LensModel model) {
   constexpr std::size_t core = 4;
   return core + (is_splined_lens_model(model)
-                     ? 2 * spline_grid_of_model(model).num_control_points()
-                     : list_distortion_names_and_start_values(model).size());
+                     ? 2 * spline_grid_of_lens_model(model).num_control_points()
+                     : list_distortion_names_and_initial_values(model).size());
 }
 
 }  // namespace vlp

@@ -33,17 +33,17 @@ enum class LensModel { pinhole, stereographic, opencv4, opencv5, opencv8, opencv
 
 /// Returns the name of a lens model: mrcal's name, for example "LENSMODEL_OPENCV8", or
 /// "OPENCV_FISHEYE" for `fisheye`. The view stays valid until the program ends.
-std::string_view to_string(LensModel model);
+std::string_view lens_model_name(LensModel model);
 
 /// Returns the model with this name (to_string()); std::nullopt for other names. A splined lens
 /// must be within the bounds of SplineGrid, and its name written as mrcal writes it.
 std::optional<LensModel> lens_model_from_name(std::string_view name);
 
 /// Returns all names, separated by commas, for messages. One example stands for the splined lenses.
-std::string lens_model_names();
+std::string list_lens_model_names();
 
 /// Returns the number of parameters (focal lengths, principal point and distortions), in the order
 /// of LensModel: 4, 4, 8, 9, 12, 16, 8; 4 + 2 Nx Ny for a splined lens.
-std::size_t parameter_count(LensModel model);
+std::size_t num_lens_parameters(LensModel model);
 
 }  // namespace vlp

@@ -55,15 +55,15 @@ SplineSurface::SplineSurface(const SplineGrid& grid, std::span<const double> con
   pieces_per_u_ = (grid.nx - grid.order) / (2 * edge);
   reach_ = {edge, (grid.ny - grid.order) / (2 * pieces_per_u_)};
   if (grid.order == 2) {
-    fill_polynomial_pieces<2>(control_points);
+    fill_spline_polynomial_pieces<2>(control_points);
   } else {
-    fill_polynomial_pieces<3>(control_points);
+    fill_spline_polynomial_pieces<3>(control_points);
   }
-  fill_initial_point_table();
+  fill_initial_undistorted_point_table();
 }
 
 template <int Order>
-void SplineSurface::fill_polynomial_pieces(std::span<const double> control_points) {
+void SplineSurface::fill_spline_polynomial_pieces(std::span<const double> control_points) {
   constexpr int width = Order + 1;
   const Eigen::Matrix<double, width, width> by_power = compute_spline_basis<Order>().transpose();
   Eigen::Matrix<double, width, width> x, y;
@@ -118,7 +118,8 @@ SplineSurface::Value SplineSurface::operator()(const Eigen::Vector2d& u) const {
 }
 
 template <int Order>
-SplineSurface::Weights SplineSurface::compute_spline_weights(const Eigen::Vector2d& u) const {
+SplineSurface::Weights SplineSurface::compute_control_point_weights(
+    const Eigen::Vector2d& u) const {
   const Piece x = find_spline_piece<Order>(u.x() * pieces_per_u_ + (grid_.nx - 1) / 2.0, grid_.nx),
               y = find_spline_piece<Order>(u.y() * pieces_per_u_ + (grid_.ny - 1) / 2.0, grid_.ny);
   Weights weights{x.index, y.index, {}, {}};
@@ -133,8 +134,9 @@ SplineSurface::Weights SplineSurface::compute_spline_weights(const Eigen::Vector
   return weights;
 }
 
-SplineSurface::Weights SplineSurface::spline_weights(const Eigen::Vector2d& u) const {
-  return grid_.order == 2 ? compute_spline_weights<2>(u) : compute_spline_weights<3>(u);
+SplineSurface::Weights SplineSurface::control_point_weights(const Eigen::Vector2d& u) const {
+  return grid_.order == 2 ? compute_control_point_weights<2>(u)
+                          : compute_control_point_weights<3>(u);
 }
 
 template <int Order>
@@ -151,7 +153,7 @@ std::optional<Eigen::Vector2d> SplineSurface::search_undistorted_point(
     if (!(error.squaredNorm() < smallest)) {  // halve the step until the error decreases
       if (++halvings == max_halvings) return std::nullopt;
       step /= 2;
-      u = clamp_to_half_extent(from + step);
+      u = clamp_to_spline_half_extent(from + step);
       continue;
     }
     const Eigen::Matrix2d& j = at.d_distorted_d_u;
@@ -167,10 +169,10 @@ std::optional<Eigen::Vector2d> SplineSurface::search_undistorted_point(
         return std::nullopt;
       }
       d_distorted_d_u = j;
-      return clamp_to_half_extent(u);
+      return clamp_to_spline_half_extent(u);
     }
     from = u, smallest = error.squaredNorm(), halvings = 0, ++iterations;
-    u = clamp_to_half_extent(from + step);
+    u = clamp_to_spline_half_extent(from + step);
   }
   return std::nullopt;
 }
@@ -192,11 +194,11 @@ Eigen::Vector2d SplineSurface::compute_initial_undistorted_point(
   const double x = column - i, y = row - j;
   const Eigen::Vector2d* node =
       initial_points_.data() + static_cast<std::ptrdiff_t>(j) * kNodes + i;
-  return clamp_to_half_extent((1 - y) * ((1 - x) * node[0] + x * node[1]) +
-                              y * ((1 - x) * node[kNodes] + x * node[kNodes + 1]));
+  return clamp_to_spline_half_extent((1 - y) * ((1 - x) * node[0] + x * node[1]) +
+                                     y * ((1 - x) * node[kNodes] + x * node[kNodes + 1]));
 }
 
-void SplineSurface::fill_initial_point_table() {
+void SplineSurface::fill_initial_undistorted_point_table() {
   constexpr int num_samples = 2 * kNodes - 1;
   constexpr double inf = std::numeric_limits<double>::infinity();
   std::vector<std::pair<Eigen::Vector2d, Value>> places;
@@ -227,7 +229,7 @@ void SplineSurface::fill_initial_point_table() {
     const double distance = (node - whole).squaredNorm();
     if (!(distance < distances[index])) continue;
     distances[index] = distance;
-    initial_points_[index] = clamp_to_half_extent(start);
+    initial_points_[index] = clamp_to_spline_half_extent(start);
   }
   // Nodes without a sample take the initial point of a neighbor: right and down, then left and up.
   const auto copy_from = [&](std::size_t to, std::size_t from) {

@@ -17,16 +17,17 @@ struct Pair {
   Pair(const CsvTable& csv, std::string_view name, std::string_view other)
       : first_name(name),
         second_name(other),
-        first(csv.get_optional(name)),
-        second(csv.get_optional(other)) {}
+        first(csv.get_optional_column(name)),
+        second(csv.get_optional_column(other)) {}
 
   std::optional<Eigen::Vector2d> read(const CsvTable& csv, std::size_t row,
                                       CsvTable::Column image) const {
-    const auto a = csv.get_optional_number(row, first), b = csv.get_optional_number(row, second);
+    const auto a = csv.get_optional_cell_number(row, first),
+               b = csv.get_optional_cell_number(row, second);
     if (a.has_value() != b.has_value()) {
       std::string problem("has one of ");
       problem.append(first_name).append(" and ").append(second_name);
-      throw csv.make_error(row, image, problem.append(" without the other"));
+      throw csv.make_cell_error(row, image, problem.append(" without the other"));
     }
     if (!a) return std::nullopt;
     return Eigen::Vector2d(*a, *b);
@@ -38,53 +39,54 @@ struct Pair {
 CapturesTable read_captures_csv(const std::filesystem::path& file) {
   const CsvTable csv(file);
   const auto image = csv.get_required_column("image");
-  const auto place = csv.get_optional("reference_point"),
-             place_sd = csv.get_optional("position_sd_m"), spot = csv.get_optional("pivot");
+  const auto place = csv.get_optional_column("reference_point"),
+             place_sd = csv.get_optional_column("position_sd_m"),
+             spot = csv.get_optional_column("pivot");
   const Pair lean(csv, "roll_rad", "pitch_rad"), velocity(csv, "vx_m_per_s", "vy_m_per_s");
-  const auto velocity_sd = csv.get_optional("velocity_sd_m_per_s");
+  const auto velocity_sd = csv.get_optional_column("velocity_sd_m_per_s");
   CapturesTable table;
-  for (std::size_t row = 0; row < csv.rows(); ++row) {
+  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
     const auto field = [&](std::optional<CsvTable::Column> column) {
-      return csv.get_optional_number(row, column);
+      return csv.get_optional_cell_number(row, column);
     };
     Capture capture;
-    capture.time_s = field(csv.get_optional("time_s"));
-    capture.x_m = field(csv.get_optional("x_m"));
-    capture.y_m = field(csv.get_optional("y_m"));
-    capture.z_m = field(csv.get_optional("z_m"));
-    capture.yaw_rad = field(csv.get_optional("yaw_rad"));
-    if (place && !csv.get_text(row, *place).empty()) {
-      const std::string_view whose = csv.get_text(row, *place);
+    capture.time_s = field(csv.get_optional_column("time_s"));
+    capture.x_m = field(csv.get_optional_column("x_m"));
+    capture.y_m = field(csv.get_optional_column("y_m"));
+    capture.z_m = field(csv.get_optional_column("z_m"));
+    capture.yaw_rad = field(csv.get_optional_column("yaw_rad"));
+    if (place && !csv.get_cell_text(row, *place).empty()) {
+      const std::string_view whose = csv.get_cell_text(row, *place);
       if (whose != "camera" && whose != "axis") {
-        throw csv.make_error(row, *place,
-                             "should be camera or axis: the point whose position is given");
+        throw csv.make_cell_error(row, *place,
+                                  "should be camera or axis: the point whose position is given");
       }
       capture.place = whose == "axis" ? PlaceOf::axis : PlaceOf::camera;
     }
     capture.place_sd_m = field(place_sd);
     if (capture.place_sd_m && *capture.place_sd_m < 0) {
-      throw csv.make_error(row, *place_sd, "should not be negative");
+      throw csv.make_cell_error(row, *place_sd, "should not be negative");
     }
-    if (spot) capture.spot = csv.get_text(row, *spot);
+    if (spot) capture.spot = csv.get_cell_text(row, *spot);
     if (const auto angles = lean.read(csv, row, image)) {
       capture.inclination = Inclination{angles->x(), angles->y()};
     }
     capture.velocity_m_per_s = velocity.read(csv, row, image);
-    capture.yaw_rate_rad_per_s = field(csv.get_optional("yaw_rate_rad_per_s"));
+    capture.yaw_rate_rad_per_s = field(csv.get_optional_column("yaw_rate_rad_per_s"));
     capture.velocity_sd_m_per_s = field(velocity_sd);
     if (capture.velocity_sd_m_per_s) {
       if (*capture.velocity_sd_m_per_s < 0) {
-        throw csv.make_error(row, *velocity_sd, "should not be negative");
+        throw csv.make_cell_error(row, *velocity_sd, "should not be negative");
       }
       if (!capture.velocity_m_per_s) {
-        throw csv.make_error(row, *velocity_sd,
-                             "has no velocity: vx_m_per_s and vy_m_per_s are empty; add them");
+        throw csv.make_cell_error(row, *velocity_sd,
+                                  "has no velocity: vx_m_per_s and vy_m_per_s are empty; add them");
       }
     }
-    const std::string name(csv.get_text(row, image));
-    if (name.empty()) throw csv.make_error(row, image, "is empty");
+    const std::string name(csv.get_cell_text(row, image));
+    if (name.empty()) throw csv.make_cell_error(row, image, "is empty");
     if (!table.emplace(name, capture).second) {
-      throw csv.make_error(row, image, "'" + name + "' occurs twice");
+      throw csv.make_cell_error(row, image, "'" + name + "' occurs twice");
     }
   }
   return table;
@@ -100,7 +102,7 @@ void write_capture_times(const std::filesystem::path& file,
   constexpr int digits = 6;
   CsvWriter csv(file, {"image", "time_s"});
   for (const auto& [image, time_s] : times_s)
-    csv.row({image, format_fixed_decimals(time_s, digits)});
+    csv.write_csv_row({image, format_fixed_decimals(time_s, digits)});
   csv.save_file();
 }
 

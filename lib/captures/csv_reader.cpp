@@ -107,7 +107,7 @@ CsvTable::CsvTable(const std::filesystem::path& file) : file_(file) {
 }
 
 CsvTable::Column CsvTable::get_required_column(std::string_view name) const {
-  if (const auto column = get_optional(name)) return *column;
+  if (const auto column = get_optional_column(name)) return *column;
   constexpr std::size_t max_names_bytes = 500;  // all columns of the program's tables
   std::string names;
   for (const std::string& have : header_) names += (names.empty() ? "" : ", ") + have;
@@ -116,10 +116,10 @@ CsvTable::Column CsvTable::get_required_column(std::string_view name) const {
       "this column is missing; the columns are: " + truncate_text(names, max_names_bytes));
 }
 
-std::optional<CsvTable::Column> CsvTable::get_optional(std::string_view name) const {
+std::optional<CsvTable::Column> CsvTable::get_optional_column(std::string_view name) const {
   const auto found = std::find(header_.begin(), header_.end(), name);
   if (found == header_.end()) {
-    const std::string_view former = find_former_name(NameKind::column, name);
+    const std::string_view former = find_former_name_for_current(NameKind::column, name);
     if (!former.empty() && std::ranges::find(header_, former) != header_.end()) {
       throw InputError(file_, 1, "", "column " + describe_renaming(former, name));
     }
@@ -128,57 +128,60 @@ std::optional<CsvTable::Column> CsvTable::get_optional(std::string_view name) co
   return Column{static_cast<std::size_t>(found - header_.begin())};
 }
 
-std::string_view CsvTable::get_text(std::size_t row, Column column) const {
+std::string_view CsvTable::get_cell_text(std::size_t row, Column column) const {
   const std::size_t field = row * header_.size() + column.index;
   const std::size_t begin = field == 0 ? 0 : ends_[field - 1];
   return std::string_view(fields_).substr(begin, ends_[field] - begin);
 }
 
-double CsvTable::get_number(std::size_t row, Column column) const {
-  const auto value = parse_number<double>(get_text(row, column));
+double CsvTable::get_cell_number(std::size_t row, Column column) const {
+  const auto value = parse_number<double>(get_cell_text(row, column));
   if (!value || !std::isfinite(*value)) {
-    throw make_error(row, column,
-                     "should be a finite number, not '" + std::string(get_text(row, column)) + "'");
+    throw make_cell_error(
+        row, column,
+        "should be a finite number, not '" + std::string(get_cell_text(row, column)) + "'");
   }
   return *value;
 }
 
-double CsvTable::get_coordinate_m(std::size_t row, Column column) const {
-  const double value_m = get_number(row, column);
+double CsvTable::get_cell_coordinate_m(std::size_t row, Column column) const {
+  const double value_m = get_cell_number(row, column);
   if (std::abs(value_m) > kMaxCoordinate_m) {
     // [FILE-3] `within 1,000 km, in meters`
-    throw make_error(
-        row, column,
-        "should be within 1,000 km, in meters, not '" + std::string(get_text(row, column)) + "'");
+    throw make_cell_error(row, column,
+                          "should be within 1,000 km, in meters, not '" +
+                              std::string(get_cell_text(row, column)) + "'");
   }
   return value_m;
 }
 
-int CsvTable::get_integer(std::size_t row, Column column) const {
-  const auto value = parse_number<int>(get_text(row, column));
+int CsvTable::get_cell_integer(std::size_t row, Column column) const {
+  const auto value = parse_number<int>(get_cell_text(row, column));
   if (!value) {
-    throw make_error(row, column,
-                     "should be a whole number, not '" + std::string(get_text(row, column)) + "'");
+    throw make_cell_error(
+        row, column,
+        "should be a whole number, not '" + std::string(get_cell_text(row, column)) + "'");
   }
   return *value;
 }
 
-std::optional<double> CsvTable::get_optional_number(std::size_t row,
-                                                    std::optional<Column> column) const {
-  if (!column || get_text(row, *column).empty()) return std::nullopt;
-  return get_number(row, *column);
+std::optional<double> CsvTable::get_optional_cell_number(std::size_t row,
+                                                         std::optional<Column> column) const {
+  if (!column || get_cell_text(row, *column).empty()) return std::nullopt;
+  return get_cell_number(row, *column);
 }
 
-InputError CsvTable::make_error(std::size_t row, Column column, const std::string& problem) const {
+InputError CsvTable::make_cell_error(std::size_t row, Column column,
+                                     const std::string& problem) const {
   return {file_, lines_[row], header_[column.index], problem};
 }
 
 std::string_view read_unique_name_of_row(const CsvTable& csv, std::size_t row,
                                          CsvTable::Column column, NameIndex& names) {
-  const std::string_view name = csv.get_text(row, column);
-  if (name.empty()) throw csv.make_error(row, column, "is empty");
-  if (!names.insert(name)) {
-    throw csv.make_error(row, column, "'" + std::string(name) + "' occurs twice");
+  const std::string_view name = csv.get_cell_text(row, column);
+  if (name.empty()) throw csv.make_cell_error(row, column, "is empty");
+  if (!names.insert_unique_name(name)) {
+    throw csv.make_cell_error(row, column, "'" + std::string(name) + "' occurs twice");
   }
   return name;
 }

@@ -34,22 +34,23 @@ class CsvTable {
   /// Returns a column. Throws InputError if it is missing, or, also if it is optional, if the table
   /// has it under its former name.
   Column get_required_column(std::string_view name) const;
-  std::optional<Column> get_optional(std::string_view name) const;
+  std::optional<Column> get_optional_column(std::string_view name) const;
 
-  std::size_t rows() const { return lines_.size(); }
-  std::string_view get_text(std::size_t row, Column column) const;
+  std::size_t num_rows() const { return lines_.size(); }
+  std::string_view get_cell_text(std::size_t row, Column column) const;
   /// Returns a finite number, or an integer. Throws InputError for other fields.
-  double get_number(std::size_t row, Column column) const;
-  int get_integer(std::size_t row, Column column) const;
+  double get_cell_number(std::size_t row, Column column) const;
+  int get_cell_integer(std::size_t row, Column column) const;
   /// Returns a coordinate in meters. Throws InputError also if it exceeds kMaxCoordinate_m.
-  double get_coordinate_m(std::size_t row, Column column) const;
+  double get_cell_coordinate_m(std::size_t row, Column column) const;
   /// Returns a number; std::nullopt if the column is missing or the field is empty.
-  std::optional<double> get_optional_number(std::size_t row, std::optional<Column> column) const;
+  std::optional<double> get_optional_cell_number(std::size_t row,
+                                                 std::optional<Column> column) const;
 
   /// Returns the line in the file at which a row begins, from 1.
-  std::size_t line(std::size_t row) const { return lines_[row]; }
+  std::size_t line_number_of_row(std::size_t row) const { return lines_[row]; }
 
-  InputError make_error(std::size_t row, Column column, const std::string& problem) const;
+  InputError make_cell_error(std::size_t row, Column column, const std::string& problem) const;
 
  private:
   friend struct CsvParsing;
@@ -68,9 +69,11 @@ class NameIndex {
   explicit NameIndex(std::size_t max_names) { indices_.reserve(max_names); }
 
   /// Adds a name with the next index, from 0. Returns false, without a change, if the name exists.
-  bool insert(std::string_view name) { return indices_.try_emplace(name, indices_.size()).second; }
+  bool insert_unique_name(std::string_view name) {
+    return indices_.try_emplace(name, indices_.size()).second;
+  }
   /// Returns the index of a name; std::nullopt if it does not exist.
-  std::optional<std::size_t> find(std::string_view name) const {
+  std::optional<std::size_t> find_name_index(std::string_view name) const {
     const auto found = indices_.find(name);
     return found == indices_.end() ? std::nullopt : std::optional(found->second);
   }

@@ -24,16 +24,16 @@ bool is_number(std::string_view field) {
 
 }  // namespace
 
-void CsvWriter::row(std::initializer_list<std::string_view> fields) {
-  write_row({fields.begin(), fields.size()});
+void CsvWriter::write_csv_row(std::initializer_list<std::string_view> fields) {
+  write_csv_fields({fields.begin(), fields.size()});
 }
 
-void CsvWriter::row(const std::vector<std::string>& fields) {
+void CsvWriter::write_csv_row(const std::vector<std::string>& fields) {
   const std::vector<std::string_view> views(fields.begin(), fields.end());
-  write_row(views);
+  write_csv_fields(views);
 }
 
-void CsvWriter::write_row(std::span<const std::string_view> fields) {
+void CsvWriter::write_csv_fields(std::span<const std::string_view> fields) {
   const char* separator = "";
   for (const std::string_view field : fields) {
     buffer_ += separator;
@@ -49,21 +49,21 @@ void CsvWriter::write_row(std::span<const std::string_view> fields) {
   }
   buffer_ += '\n';
   constexpr std::size_t flush_bytes = 1 << 16;
-  if (buffer_.size() >= flush_bytes) flush_buffer();
+  if (buffer_.size() >= flush_bytes) flush_csv_buffer();
 }
 
-void CsvWriter::flush_buffer() {
+void CsvWriter::flush_csv_buffer() {
   file_.write(buffer_);
   buffer_.clear();
 }
 
 void CsvWriter::save_file() {
-  flush_buffer();
+  flush_csv_buffer();
   file_.save_file();
 }
 
 void CsvWriter::save_without_fsync() {
-  flush_buffer();
+  flush_csv_buffer();
   file_.save_without_fsync();
 }
 

@@ -31,23 +31,23 @@ class CsvWriter {
  public:
   CsvWriter(const std::filesystem::path& file, std::initializer_list<std::string_view> header)
       : file_(file) {
-    row(header);
+    write_csv_row(header);
   }
   CsvWriter(const std::filesystem::path& file, const std::vector<std::string>& header)
       : file_(file) {
-    row(header);
+    write_csv_row(header);
   }
 
   /// Writes a row with as many fields as the header has.
-  void row(std::initializer_list<std::string_view> fields);
-  void row(const std::vector<std::string>& fields);
+  void write_csv_row(std::initializer_list<std::string_view> fields);
+  void write_csv_row(const std::vector<std::string>& fields);
   void save_file();
   /// Saves the file without waiting for the disk (AtomicFileWriter::save_without_fsync()).
   void save_without_fsync();
 
  private:
-  void flush_buffer();
-  void write_row(std::span<const std::string_view> fields);
+  void flush_csv_buffer();
+  void write_csv_fields(std::span<const std::string_view> fields);
 
   AtomicFileWriter file_;
   std::string buffer_;

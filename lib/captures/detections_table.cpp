@@ -14,26 +14,26 @@ std::vector<Frame> read_detections(const std::filesystem::path& file) {
   const CsvTable csv(file);
   const auto image = csv.get_required_column("image"), lamp = csv.get_required_column("lamp");
   const auto u_px = csv.get_required_column("u_px"), v_px = csv.get_required_column("v_px");
-  const auto sigma_px = csv.get_optional("sigma_px");
+  const auto sigma_px = csv.get_optional_column("sigma_px");
   std::vector<Frame> frames;
   std::unordered_map<std::string, std::size_t> frame_of_image;
-  for (std::size_t row = 0; row < csv.rows(); ++row) {
-    const std::string name(csv.get_text(row, image));
-    if (name.empty()) throw csv.make_error(row, image, "is empty");
+  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
+    const std::string name(csv.get_cell_text(row, image));
+    if (name.empty()) throw csv.make_cell_error(row, image, "is empty");
     const auto [entry, is_new] = frame_of_image.try_emplace(name, frames.size());
     if (is_new) frames.push_back({name, {}});
     auto& detections = frames[entry->second].detections;
-    const Detection detection{csv.get_integer(row, lamp),
-                              {csv.get_number(row, u_px), csv.get_number(row, v_px)},
-                              csv.get_optional_number(row, sigma_px)};
+    const Detection detection{csv.get_cell_integer(row, lamp),
+                              {csv.get_cell_number(row, u_px), csv.get_cell_number(row, v_px)},
+                              csv.get_optional_cell_number(row, sigma_px)};
     const double sigma = detection.sigma_px.value_or(1);
     if (sigma < kMinSigma_px || sigma > kMaxSigma_px) {
-      throw csv.make_error(row, *sigma_px, "should be within 0.0001 and 1000 px");
+      throw csv.make_cell_error(row, *sigma_px, "should be within 0.0001 and 1000 px");
     }
     for (const Detection& other : detections) {
       if (other.lamp == detection.lamp) {
-        throw csv.make_error(row, lamp,
-                             std::to_string(other.lamp) + " occurs twice in image '" + name + "'");
+        throw csv.make_cell_error(
+            row, lamp, std::to_string(other.lamp) + " occurs twice in image '" + name + "'");
       }
     }
     detections.push_back(detection);
@@ -48,7 +48,7 @@ void write_detections(const std::filesystem::path& file, const std::vector<Frame
   CsvWriter csv(file, {"image", "lamp", "u_px", "v_px", "sigma_px"});
   for (const Frame& frame : frames) {
     for (const Detection& detection : frame.detections) {
-      csv.row(
+      csv.write_csv_row(
           {frame.image, std::to_string(detection.lamp),
            format_fixed_decimals(detection.pixel.x(), digits),
            format_fixed_decimals(detection.pixel.y(), digits),

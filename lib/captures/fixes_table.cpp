@@ -20,16 +20,17 @@ struct FixColumns {
   explicit FixColumns(const CsvTable& csv)
       : pose{csv.get_required_column("x_m"), csv.get_required_column("y_m"),
              csv.get_required_column("z_m"), csv.get_required_column("yaw_rad")},
-        sd{csv.get_optional("x_sd_m"), csv.get_optional("y_sd_m"), csv.get_optional("z_sd_m"),
-           csv.get_optional("yaw_sd_rad")},
-        noise_sd{csv.get_optional("x_noise_sd_m"), csv.get_optional("y_noise_sd_m"),
-                 csv.get_optional("z_noise_sd_m"), csv.get_optional("yaw_noise_sd_rad")},
-        residual_px(csv.get_optional("residual_px")),
-        time_s(csv.get_optional("time_s")),
-        velocity{csv.get_optional("vx_m_per_s"), csv.get_optional("vy_m_per_s")},
-        lean{csv.get_optional("roll_rad"), csv.get_optional("pitch_rad")},
-        rejected(csv.get_optional("rejected")),
-        outside_region(csv.get_optional("outside_region")) {}
+        sd{csv.get_optional_column("x_sd_m"), csv.get_optional_column("y_sd_m"),
+           csv.get_optional_column("z_sd_m"), csv.get_optional_column("yaw_sd_rad")},
+        noise_sd{csv.get_optional_column("x_noise_sd_m"), csv.get_optional_column("y_noise_sd_m"),
+                 csv.get_optional_column("z_noise_sd_m"),
+                 csv.get_optional_column("yaw_noise_sd_rad")},
+        residual_px(csv.get_optional_column("residual_px")),
+        time_s(csv.get_optional_column("time_s")),
+        velocity{csv.get_optional_column("vx_m_per_s"), csv.get_optional_column("vy_m_per_s")},
+        lean{csv.get_optional_column("roll_rad"), csv.get_optional_column("pitch_rad")},
+        rejected(csv.get_optional_column("rejected")),
+        outside_region(csv.get_optional_column("outside_region")) {}
 
   std::array<CsvTable::Column, 4> pose;
   std::array<std::optional<CsvTable::Column>, 4> sd, noise_sd;
@@ -41,8 +42,8 @@ struct FixColumns {
 std::optional<Eigen::Vector2d> read_optional_pair(
     const CsvTable& csv, std::size_t row,
     const std::array<std::optional<CsvTable::Column>, 2>& columns) {
-  const auto a = csv.get_optional_number(row, columns[0]),
-             b = csv.get_optional_number(row, columns[1]);
+  const auto a = csv.get_optional_cell_number(row, columns[0]),
+             b = csv.get_optional_cell_number(row, columns[1]);
   if (!a || !b) return std::nullopt;
   return Eigen::Vector2d(*a, *b);
 }
@@ -53,9 +54,9 @@ std::optional<Eigen::Vector4d> read_sds(
   Eigen::Vector4d sd;
   for (int i = 0; i < 4; ++i) {
     const auto column = columns[static_cast<std::size_t>(i)];
-    const auto value = csv.get_optional_number(row, column);
+    const auto value = csv.get_optional_cell_number(row, column);
     if (!value) return std::nullopt;
-    if (*value < 0) throw csv.make_error(row, *column, "should not be negative");
+    if (*value < 0) throw csv.make_cell_error(row, *column, "should not be negative");
     sd[i] = *value;
   }
   return sd;
@@ -63,11 +64,11 @@ std::optional<Eigen::Vector4d> read_sds(
 
 FixRow::Fix read_fix(const CsvTable& csv, std::size_t row, const FixColumns& columns) {
   const auto [x_m, y_m, z_m, yaw_rad] = columns.pose;
-  FixRow::Fix fix{{{csv.get_coordinate_m(row, x_m), csv.get_coordinate_m(row, y_m),
-                    csv.get_coordinate_m(row, z_m)},
-                   csv.get_number(row, yaw_rad)},
+  FixRow::Fix fix{{{csv.get_cell_coordinate_m(row, x_m), csv.get_cell_coordinate_m(row, y_m),
+                    csv.get_cell_coordinate_m(row, z_m)},
+                   csv.get_cell_number(row, yaw_rad)},
                   read_sds(csv, row, columns.sd),
-                  csv.get_optional_number(row, columns.residual_px).value_or(0),
+                  csv.get_optional_cell_number(row, columns.residual_px).value_or(0),
                   read_sds(csv, row, columns.noise_sd)};
   fix.velocity_m_per_s = read_optional_pair(csv, row, columns.velocity);
   if (const auto lean = read_optional_pair(csv, row, columns.lean))
@@ -78,13 +79,13 @@ FixRow::Fix read_fix(const CsvTable& csv, std::size_t row, const FixColumns& col
 /// Reads ids separated by blanks.
 std::vector<int> read_id_list(const CsvTable& csv, std::size_t row, CsvTable::Column column) {
   std::vector<int> ids;
-  std::string_view remaining = csv.get_text(row, column);
+  std::string_view remaining = csv.get_cell_text(row, column);
   while (!remaining.empty()) {
     const std::string_view word = remaining.substr(0, remaining.find(' '));
     int id = 0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), id);
     if (error != std::errc() || end != word.data() + word.size()) {
-      throw csv.make_error(row, column, "should be ids of lamps, separated by blanks");
+      throw csv.make_cell_error(row, column, "should be ids of lamps, separated by blanks");
     }
     ids.push_back(id);
     remaining.remove_prefix(std::min(remaining.size(), word.size() + 1));
@@ -181,7 +182,7 @@ void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& r
       fields[11] = format_significant_digits(fix->residual_px, kSdDigits);
     }
     for (const AddedColumn& column : added) fields.push_back(column.text(row));
-    csv.row(fields);
+    csv.write_csv_row(fields);
   }
   csv.save_file();
 }
@@ -189,27 +190,27 @@ void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& r
 std::vector<FixRow> read_fixes(const std::filesystem::path& file) {
   const CsvTable csv(file);
   const auto image = csv.get_required_column("image"), status = csv.get_required_column("status");
-  const auto lamps = csv.get_optional("lamps");
+  const auto lamps = csv.get_optional_column("lamps");
   const FixColumns columns(csv);
-  NameIndex images(csv.rows());
+  NameIndex images(csv.num_rows());
   std::vector<FixRow> rows;
-  rows.reserve(csv.rows());
-  for (std::size_t row = 0; row < csv.rows(); ++row) {
+  rows.reserve(csv.num_rows());
+  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
     const auto name = read_unique_name_of_row(csv, row, image, images);
     FixRow& read = rows.emplace_back(FixRow{std::string(name),
-                                            std::string(csv.get_text(row, status)),
+                                            std::string(csv.get_cell_text(row, status)),
                                             {},
-                                            lamps ? csv.get_integer(row, *lamps) : 0,
-                                            csv.line(row)});
-    if (read.status.empty()) throw csv.make_error(row, status, "is empty");
+                                            lamps ? csv.get_cell_integer(row, *lamps) : 0,
+                                            csv.line_number_of_row(row)});
+    if (read.status.empty()) throw csv.make_cell_error(row, status, "is empty");
     if (count_bytes_of_utf8_prefix(read.status) != read.status.size()) {
-      throw csv.make_error(row, status, "should be UTF-8");
+      throw csv.make_cell_error(row, status, "should be UTF-8");
     }
     if (read.status == "ok") read.fix = read_fix(csv, row, columns);
     if (columns.rejected) read.rejected = read_id_list(csv, row, *columns.rejected);
     if (columns.outside_region)
       read.outside_region = read_id_list(csv, row, *columns.outside_region);
-    read.time_s = csv.get_optional_number(row, columns.time_s);
+    read.time_s = csv.get_optional_cell_number(row, columns.time_s);
   }
   if (rows.empty()) throw InputError(file, "contains no fix");
   return rows;

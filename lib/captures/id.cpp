@@ -17,14 +17,14 @@ constexpr std::size_t kMaxBytes = 200;
 
 bool Id::is_valid_id(std::string_view text) {
   return !text.empty() && text.size() <= kMaxBytes && text.front() != '.' &&
-         text.find('/') == std::string_view::npos && escape_for_single_line(text) == text;
+         text.find('/') == std::string_view::npos && escape_text_for_single_line(text) == text;
 }
 
 Id::Id(std::string text, const std::filesystem::path& source, std::string_view kind)
     : text_(std::move(text)) {
   if (is_valid_id(text_)) return;
   constexpr std::size_t max_shown = 100;
-  std::string problem = truncate_utf8(escape_for_single_line(text_), max_shown);
+  std::string problem = truncate_utf8_text(escape_text_for_single_line(text_), max_shown);
   throw InputError(source, problem.insert(0, "'").append("' is no id of a ").append(kind) +
                                ": 1 to 200 bytes of UTF-8 are one, without '/', without "
                                "control characters, and without a '.' at the beginning");

@@ -22,7 +22,7 @@ class Id {
   /// Returns true if a text is an id.
   static bool is_valid_id(std::string_view text);
 
-  const std::string& get_text() const { return text_; }
+  const std::string& id_text() const { return text_; }
 
  private:
   std::string text_;

@@ -61,11 +61,15 @@ std::string escape_characters(std::string_view text, std::string_view kept) {
 
 }  // namespace
 
-std::string escape_for_terminal(std::string_view text) { return escape_characters(text, "\n\t"); }
+std::string escape_text_for_terminal(std::string_view text) {
+  return escape_characters(text, "\n\t");
+}
 
-std::string escape_for_single_line(std::string_view text) { return escape_characters(text, ""); }
+std::string escape_text_for_single_line(std::string_view text) {
+  return escape_characters(text, "");
+}
 
-std::string truncate_utf8(std::string text, std::size_t max_bytes) {
+std::string truncate_utf8_text(std::string text, std::size_t max_bytes) {
   const auto goes_on = [](char byte) { return (static_cast<unsigned char>(byte) & 0xC0) == 0x80; };
   if (text.size() <= max_bytes) return text;
   while (max_bytes > 0 && goes_on(text[max_bytes])) --max_bytes;

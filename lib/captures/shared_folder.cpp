@@ -66,11 +66,11 @@ void SharedFolder::check_folder_not_replaced() const {
   throw InputError(path_, "was moved or replaced while it was in use: restore it, then run again");
 }
 
-fs::path SharedFolder::opened_path() const {
+fs::path SharedFolder::opened_folder_path() const {
   return "/proc/self/fd/" + std::to_string(descriptor_);
 }
 
-fs::path SharedFolder::checked_entry_path(const std::string& name) const {
+fs::path SharedFolder::checked_folder_entry_path(const std::string& name) const {
   const bool is_one_part = !name.empty() && name != "." && name != ".." &&
                            name.find('/') == std::string::npos &&
                            name.find('\0') == std::string::npos;
@@ -79,34 +79,34 @@ fs::path SharedFolder::checked_entry_path(const std::string& name) const {
 }
 
 std::optional<SharedFolder> SharedFolder::open_subfolder_if_exists(const Id& name) const {
-  fs::path path = path_ / name.get_text();
-  const int found = ::openat(descriptor_, name.get_text().c_str(), kFolderFlags | O_NOFOLLOW);
+  fs::path path = path_ / name.id_text();
+  const int found = ::openat(descriptor_, name.id_text().c_str(), kFolderFlags | O_NOFOLLOW);
   if (found >= 0) return SharedFolder(std::move(path), found);
   const int reason = errno;
-  const auto status = read_status(descriptor_, name.get_text());
+  const auto status = read_status(descriptor_, name.id_text());
   if (!status) return std::nullopt;
   if (S_ISLNK(status->st_mode)) throw InputError(path, kLink);
   errno = reason;
   fail(path, "cannot be opened");
 }
 
-SharedFolder SharedFolder::make_subfolder(const Id& name) const {
+SharedFolder SharedFolder::open_or_create_subfolder(const Id& name) const {
   constexpr mode_t mode = 0777;
-  const int made = ::mkdirat(descriptor_, name.get_text().c_str(), mode);
+  const int made = ::mkdirat(descriptor_, name.id_text().c_str(), mode);
   const int reason = errno;
   auto folder = open_subfolder_if_exists(name);
   if (folder) return std::move(*folder);
   errno = made == 0 ? ENOENT : reason;
-  fail(path_ / name.get_text(), "cannot be made");
+  fail(path_ / name.id_text(), "cannot be made");
 }
 
-bool SharedFolder::contains_entry(const std::string& name) const {
-  checked_entry_path(name);
+bool SharedFolder::contains_folder_entry(const std::string& name) const {
+  checked_folder_entry_path(name);
   return read_status(descriptor_, name).has_value();
 }
 
-int SharedFolder::open(const std::string& name, int flags) const {
-  const fs::path path = checked_entry_path(name);
+int SharedFolder::open_regular_file(const std::string& name, int flags) const {
+  const fs::path path = checked_folder_entry_path(name);
   constexpr mode_t mode = 0666;
   // Without waiting for the other end of a pipe.
   const int descriptor =
@@ -126,10 +126,10 @@ int SharedFolder::open(const std::string& name, int flags) const {
   throw InputError(path, "is no regular file");
 }
 
-std::optional<std::string> SharedFolder::read(const std::string& name,
-                                              std::size_t max_bytes) const {
-  const fs::path path = checked_entry_path(name);
-  const int descriptor = open(name, O_RDONLY);
+std::optional<std::string> SharedFolder::read_file_if_exists(const std::string& name,
+                                                             std::size_t max_bytes) const {
+  const fs::path path = checked_folder_entry_path(name);
+  const int descriptor = open_regular_file(name, O_RDONLY);
   if (descriptor < 0) {
     if (errno == ENOENT) return std::nullopt;
     fail(path, "cannot be opened");
@@ -138,15 +138,16 @@ std::optional<std::string> SharedFolder::read(const std::string& name,
   return read_file(file);
 }
 
-void SharedFolder::replace_file(const std::string& name, std::string_view content) const {
-  AtomicFileWriter file(opened_path(), name, checked_entry_path(name));
+void SharedFolder::replace_file_atomically(const std::string& name,
+                                           std::string_view content) const {
+  AtomicFileWriter file(opened_folder_path(), name, checked_folder_entry_path(name));
   file.write(content);
   file.save_file();
 }
 
 bool SharedFolder::rename_file(const std::string& from, const std::string& to) const {
-  const fs::path path = checked_entry_path(from);
-  checked_entry_path(to);
+  const fs::path path = checked_folder_entry_path(from);
+  checked_folder_entry_path(to);
   if (::renameat(descriptor_, from.c_str(), descriptor_, to.c_str()) == 0) return true;
   if (errno == ENOENT) return false;
   // [FILE-1] `cannot be renamed`, `cannot be removed`
@@ -154,22 +155,22 @@ bool SharedFolder::rename_file(const std::string& from, const std::string& to) c
 }
 
 void SharedFolder::remove_file(const std::string& name) const {
-  const fs::path path = checked_entry_path(name);
+  const fs::path path = checked_folder_entry_path(name);
   if (::unlinkat(descriptor_, name.c_str(), 0) != 0 && errno != ENOENT) {
     fail(path, "cannot be removed");
   }
 }
 
 void SharedFolder::remove_subfolder(const Id& name) const {
-  if (::unlinkat(descriptor_, name.get_text().c_str(), AT_REMOVEDIR) != 0) {
-    fail(path_ / name.get_text(), "cannot be deleted");
+  if (::unlinkat(descriptor_, name.id_text().c_str(), AT_REMOVEDIR) != 0) {
+    fail(path_ / name.id_text(), "cannot be deleted");
   }
 }
 
-void SharedFolder::remove_all_entries() const {
+void SharedFolder::remove_all_folder_entries() const {
   std::error_code error;
   std::vector<fs::path> entries;
-  for (fs::directory_iterator entry(opened_path(), error);
+  for (fs::directory_iterator entry(opened_folder_path(), error);
        !error && entry != fs::directory_iterator(); entry.increment(error)) {
     entries.push_back(entry->path());
   }

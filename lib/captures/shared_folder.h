@@ -26,7 +26,7 @@ class SharedFolder {
   SharedFolder& operator=(SharedFolder&&) = delete;
   ~SharedFolder();
 
-  const std::filesystem::path& path() const { return path_; }
+  const std::filesystem::path& folder_path() const { return path_; }
   /// Checks that the path of a folder, made or found in another one, still leads to it, and not by
   /// a link.
   void check_folder_not_replaced() const;
@@ -34,33 +34,34 @@ class SharedFolder {
   /// Opens a subfolder. Returns std::nullopt if it does not exist.
   std::optional<SharedFolder> open_subfolder_if_exists(const Id& name) const;
   /// Opens a subfolder, and creates it first if it does not exist.
-  SharedFolder make_subfolder(const Id& name) const;
+  SharedFolder open_or_create_subfolder(const Id& name) const;
 
   /// Returns true if an entry of this name exists, including a symbolic link.
-  bool contains_entry(const std::string& name) const;
+  bool contains_folder_entry(const std::string& name) const;
   /// Reads a regular file. Returns std::nullopt if it does not exist. Throws if it is a link, a
   /// pipe or a device, or longer than `max_bytes`.
-  std::optional<std::string> read(const std::string& name, std::size_t max_bytes) const;
+  std::optional<std::string> read_file_if_exists(const std::string& name,
+                                                 std::size_t max_bytes) const;
   /// Replaces or creates a file atomically: a temporary file, fsync, rename. Mode and owner of a
   /// replaced regular file are kept. A link is replaced and not followed.
-  void replace_file(const std::string& name, std::string_view content) const;
+  void replace_file_atomically(const std::string& name, std::string_view content) const;
   /// Opens a regular file with the flags of open(2). Returns -1 if it cannot be opened; throws if
   /// it is a link, a pipe or a device.
-  int open(const std::string& name, int flags) const;
+  int open_regular_file(const std::string& name, int flags) const;
   /// Renames a file within the folder. Returns false if it does not exist.
   bool rename_file(const std::string& from, const std::string& to) const;
   /// Removes a file if it exists.
   void remove_file(const std::string& name) const;
   /// Removes all entries of the folder, including its folders. Of a link, only the link is removed.
-  void remove_all_entries() const;
+  void remove_all_folder_entries() const;
   /// Removes an empty subfolder.
   void remove_subfolder(const Id& name) const;
 
  private:
   SharedFolder(std::filesystem::path path, int descriptor);
-  std::filesystem::path checked_entry_path(const std::string& name) const;
+  std::filesystem::path checked_folder_entry_path(const std::string& name) const;
   /// Returns a path of the open folder, whose name may refer to another one by now.
-  std::filesystem::path opened_path() const;
+  std::filesystem::path opened_folder_path() const;
 
   std::filesystem::path path_;
   int descriptor_;

@@ -13,18 +13,19 @@ std::vector<TruthRow> read_truth_table(const std::filesystem::path& file) {
   const CsvTable csv(file);
   const auto image = csv.get_required_column("image");
   const auto x_m = csv.get_required_column("x_m"), y_m = csv.get_required_column("y_m");
-  const auto z_m = csv.get_optional("z_m"), yaw_rad = csv.get_optional("yaw_rad");
-  NameIndex images(csv.rows());
+  const auto z_m = csv.get_optional_column("z_m"), yaw_rad = csv.get_optional_column("yaw_rad");
+  NameIndex images(csv.num_rows());
   std::vector<TruthRow> rows;
-  rows.reserve(csv.rows());
-  for (std::size_t row = 0; row < csv.rows(); ++row) {
+  rows.reserve(csv.num_rows());
+  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
     const auto name = read_unique_name_of_row(csv, row, image, images);
     TruthRow& read = rows.emplace_back();
     read.image = name;
-    read.xy_m = {csv.get_coordinate_m(row, x_m), csv.get_coordinate_m(row, y_m)};
-    if (z_m && !csv.get_text(row, *z_m).empty()) read.z_m = csv.get_coordinate_m(row, *z_m);
-    read.yaw_rad = csv.get_optional_number(row, yaw_rad);
-    read.line = csv.line(row);
+    read.xy_m = {csv.get_cell_coordinate_m(row, x_m), csv.get_cell_coordinate_m(row, y_m)};
+    if (z_m && !csv.get_cell_text(row, *z_m).empty())
+      read.z_m = csv.get_cell_coordinate_m(row, *z_m);
+    read.yaw_rad = csv.get_optional_cell_number(row, yaw_rad);
+    read.line = csv.line_number_of_row(row);
   }
   if (rows.empty()) throw InputError(file, "contains no position");
   return rows;
@@ -57,11 +58,12 @@ NearestOnPath find_nearest_point_on_path(const Path& path, const Eigen::Vector2d
 Path read_path_table(const std::filesystem::path& file) {
   const CsvTable csv(file);
   const auto x_m = csv.get_required_column("x_m"), y_m = csv.get_required_column("y_m");
-  const auto z_m = csv.get_optional("z_m");
+  const auto z_m = csv.get_optional_column("z_m");
   Path path;
-  for (std::size_t row = 0; row < csv.rows(); ++row) {
-    path.waypoints_m.emplace_back(csv.get_coordinate_m(row, x_m), csv.get_coordinate_m(row, y_m));
-    if (z_m) path.z_m.push_back(csv.get_coordinate_m(row, *z_m));
+  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
+    path.waypoints_m.emplace_back(csv.get_cell_coordinate_m(row, x_m),
+                                  csv.get_cell_coordinate_m(row, y_m));
+    if (z_m) path.z_m.push_back(csv.get_cell_coordinate_m(row, *z_m));
   }
   const bool leads_somewhere =
       std::any_of(path.waypoints_m.begin(), path.waypoints_m.end(),

@@ -22,11 +22,11 @@ class VideoReader {
   VideoReader(const VideoReader&) = delete;
   VideoReader& operator=(const VideoReader&) = delete;
 
-  virtual bool open(const std::string& source, int api) = 0;
+  virtual bool open_video(const std::string& source, int api) = 0;
   virtual bool grab_frame() = 0;
   virtual bool retrieve_frame(cv::Mat& frame) = 0;
-  virtual double get(int property) const = 0;
-  virtual void set(int property, double value) = 0;
+  virtual double get_video_property(int property) const = 0;
+  virtual void set_video_property(int property, double value) = 0;
 };
 
 /// Decoder and encoder of images, and factory of video readers. Several threads can call its

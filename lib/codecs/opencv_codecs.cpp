@@ -12,11 +12,11 @@ namespace {
 
 class OpencvVideoReader : public VideoReader {
  public:
-  bool open(const std::string& source, int api) override { return video_.open(source, api); }
+  bool open_video(const std::string& source, int api) override { return video_.open(source, api); }
   bool grab_frame() override { return video_.grab(); }
   bool retrieve_frame(cv::Mat& frame) override { return video_.retrieve(frame); }
-  double get(int property) const override { return video_.get(property); }
-  void set(int property, double value) override { video_.set(property, value); }
+  double get_video_property(int property) const override { return video_.get(property); }
+  void set_video_property(int property, double value) override { video_.set(property, value); }
 
  private:
   cv::VideoCapture video_;

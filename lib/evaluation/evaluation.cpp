@@ -17,16 +17,16 @@ Path make_reference_path(const EvaluationInput& input) {
 }
 
 void add_horizontal(Evaluation& evaluation, const std::vector<FixError>& errors, int threads) {
-  auto [sizes_m, clusters] =
-      collect_component(errors, [](const FixError& error) { return error.horizontal_m.norm(); });
+  auto [sizes_m, clusters] = collect_error_component(
+      errors, [](const FixError& error) { return error.horizontal_m.norm(); });
   evaluation.intervals_m = bootstrap_error_intervals(sizes_m, clusters, threads);
   evaluation.horizontal_m = compute_error_statistics(sizes_m);
-  evaluation.distribution_m = compute_percentiles(std::move(sizes_m));
+  evaluation.distribution_m = compute_error_percentiles(std::move(sizes_m));
 }
 
 std::optional<SignedErrorStatistics> compute_signed_statistics(
     const std::vector<FixError>& errors, std::optional<double> FixError::*part) {
-  auto values = collect_component(errors, std::mem_fn(part)).values;
+  auto values = collect_error_component(errors, std::mem_fn(part)).values;
   if (values.empty()) return std::nullopt;
   return compute_signed_error_statistics(std::move(values));
 }
@@ -50,11 +50,11 @@ double compute_loss_against_reference_m(const Comparison& comparison) {
 }  // namespace
 
 FixErrors compute_fix_errors(const EvaluationInput& input, const FromFile<FixRow>& fixes) {
-  if (input.truth) return compute_errors_against_truth(fixes, *input.truth, input.station_m);
-  return compute_errors_against_path(fixes.rows, make_reference_path(input));
+  if (input.truth) return compute_fix_errors_against_truth(fixes, *input.truth, input.station_m);
+  return compute_fix_errors_against_path(fixes.rows, make_reference_path(input));
 }
 
-Evaluation evaluate(const EvaluationInput& input) {
+Evaluation evaluate_fix_accuracy(const EvaluationInput& input) {
   const auto [captures, missing, errors] = compute_fix_errors(input, input.fixes);
   Evaluation evaluation;
   evaluation.reference = input.truth ? "truth" : input.path ? "path" : "line";
@@ -73,8 +73,8 @@ Evaluation evaluate(const EvaluationInput& input) {
   }
   if (input.truth && input.limit) {
     const auto& [lamps, camera, noise_px] = *input.limit;
-    evaluation.limit =
-        compute_crlb_ratio(errors, input.truth->rows, lamps, camera, noise_px, input.threads);
+    evaluation.limit = compute_error_to_crlb_ratio(errors, input.truth->rows, lamps, camera,
+                                                   noise_px, input.threads);
   }
   if (input.line_m) evaluation.fit = fit_line_to_fixes(input.fixes.rows, *input.line_m);
   if (input.others) add_comparison(evaluation, input, errors);
@@ -97,7 +97,7 @@ std::vector<Metric> collect_evaluation_metrics(const Evaluation& evaluation) {
   }
   if (evaluation.height_m) add_mm("height_rms_mm", evaluation.height_m->sizes.rms);
   if (evaluation.yaw_rad) add("yaw_rms_deg", deg_from_rad(evaluation.yaw_rad->sizes.rms));
-  add("missing_fraction", evaluation.missing_fraction());
+  add("missing_fraction", evaluation.missing_fix_fraction());
   if (evaluation.normalized_errors)
     add("normalized_error_rms", evaluation.normalized_errors->horizontal);
   if (evaluation.limit) add("crlb_ratio", evaluation.limit->horizontal);

@@ -48,7 +48,7 @@ struct Evaluation {
   std::size_t captures = 0, fixes = 0;
   /// Number of captures without a fix, by the word of their status.
   std::map<std::string, std::size_t> missing;
-  double missing_fraction() const {
+  double missing_fix_fraction() const {
     return static_cast<double>(captures - fixes) / static_cast<double>(captures);
   }
 
@@ -75,7 +75,7 @@ FixErrors compute_fix_errors(const EvaluationInput& input, const FromFile<FixRow
 
 /// Evaluates the fixes of `input`.
 /// @throws InputError if image names do not match
-Evaluation evaluate(const EvaluationInput& input);
+Evaluation evaluate_fix_accuracy(const EvaluationInput& input);
 
 /// Returns the metrics of MetricSource::evaluation and ::reference that were measured, in their
 /// order.

@@ -113,22 +113,23 @@ Json to_json(const std::vector<CheckedMetric>& gates) {
                     {"unit", gate.unit},
                     {"value", gate.value ? Json(*gate.value) : Json(nullptr)},
                     {"limit", gate.limit.value()},
-                    {"direction", describe(gate.direction)},
-                    {"passed", gate.has_passed()}});
+                    {"direction", describe_limit_direction(gate.direction)},
+                    {"passed", gate.has_passed_gate()}});
   }
   return list;
 }
 
-bool is_gate_failed(const CheckedMetric& gate) { return !gate.has_passed(); }
+bool is_gate_failed(const CheckedMetric& gate) { return !gate.has_passed_gate(); }
 
 }  // namespace
 
-std::string to_json(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates) {
+std::string format_evaluation_json(const Evaluation& evaluation,
+                                   const std::vector<CheckedMetric>& gates) {
   Json json{{"format", "vlp-evaluation/3"},
             {"reference", evaluation.reference},
             {"captures", evaluation.captures},
             {"fixes", evaluation.fixes},
-            {"missing_fraction", evaluation.missing_fraction()},
+            {"missing_fraction", evaluation.missing_fix_fraction()},
             {"missing", evaluation.missing},
             {"horizontal", to_json(evaluation.horizontal_m, kMmKeys)}};
   if (const auto& intervals = evaluation.intervals_m) {
@@ -150,7 +151,7 @@ std::string to_json(const Evaluation& evaluation, const std::vector<CheckedMetri
   if (evaluation.limit) {
     json["crlb"] = {{"ratio", evaluation.limit->horizontal},
                     {"rms_mm", kMmKeys.factor * evaluation.limit->limit_m},
-                    {"errors_below_crlb", evaluation.limit->is_below_crlb()},
+                    {"errors_below_crlb", evaluation.limit->are_errors_below_crlb()},
                     {"fixes", evaluation.limit->fixes}};
   }
   if (evaluation.comparison) json["comparison"] = to_json(*evaluation.comparison);

@@ -26,6 +26,7 @@ namespace vlp {
 ///   comparison    verdict, pairs, difference, and the smallest difference that matters
 ///   gates         name, unit, value, limit, direction ("at most" or "at least"), passed
 ///   passed        true if all gates are passed
-std::string to_json(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates);
+std::string format_evaluation_json(const Evaluation& evaluation,
+                                   const std::vector<CheckedMetric>& gates);
 
 }  // namespace vlp

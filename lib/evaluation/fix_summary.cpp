@@ -17,7 +17,7 @@ FixSummary summarize_fixes(std::span<const FixRow> rows) {
   std::vector<int> lamps;
   for (const FixRow& row : rows) {
     if (!row.fix) {
-      ++summary.refused[row.status];
+      ++summary.failures_by_status[row.status];
       continue;
     }
     lamps.push_back(row.lamps);

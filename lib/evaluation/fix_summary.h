@@ -17,21 +17,21 @@ struct FixSummary {
   std::size_t fixes = 0;
   /// Number of frames without a fix, by the word of their status, for example "too_few_lamps"
   /// (to_string(FixStatus)). Statuses that do not occur are missing.
-  std::map<std::string, std::size_t> refused;
+  std::map<std::string, std::size_t> failures_by_status;
   /// Statistics over the frames with a fix; std::nullopt if there are none.
-  struct Typical {
+  struct FixStatistics {
     int min_lamps, max_lamps;
     double mean_lamps;
     /// Median over the fixes from three lamps or more; fewer lamps yield no residual.
     std::optional<double> median_residual_px;
   };
-  std::optional<Typical> typical;
+  std::optional<FixStatistics> typical;
   /// Medians of the reported standard deviations: horizontal (root of the sum of the squares of x
   /// and y), height, yaw. std::nullopt if no fix reports them.
-  struct Spread {
+  struct MedianSds {
     double horizontal_m, height_m, yaw_rad;
   };
-  std::optional<Spread> median_sd;
+  std::optional<MedianSds> median_sd;
 };
 
 /// Counts fixes and failures, and computes the medians over the fixes.

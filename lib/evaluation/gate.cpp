@@ -50,11 +50,11 @@ CheckedMetric make_checked_metric(const MetricKind& kind, const std::vector<Metr
 }  // namespace
 
 double CheckedMetric::acceptance_limit() const {
-  const double width = guard ? guard->width() : 0;
+  const double width = guard ? guard->guard_band_width() : 0;
   return direction == Direction::at_least ? limit.value() + width : limit.value() - width;
 }
 
-bool CheckedMetric::has_passed() const {
+bool CheckedMetric::has_passed_gate() const {
   if (!limit) return true;
   if (!value) return false;
   return direction == Direction::at_least ? *value >= acceptance_limit()
@@ -86,7 +86,7 @@ Gate parse_gate(const std::string& text, const std::vector<MetricKind>& known) {
   const auto kind = std::find_if(known.begin(), known.end(),
                                  [&](const MetricKind& each) { return each.name == name; });
   if (kind == known.end()) {
-    const std::string_view present = find_present_name(NameKind::metric, name);
+    const std::string_view present = find_current_name_for_former(NameKind::metric, name);
     if (!present.empty()) throw std::invalid_argument("gate " + describe_renaming(name, present));
     throw std::invalid_argument("gate '" + name +
                                 "' is not known; the gates are: " + join_names(known));
@@ -119,26 +119,26 @@ std::vector<Gate> parse_gates(const std::vector<std::string>& texts,
 }
 
 std::vector<Gate> read_gates(const YamlValue& value, const std::vector<MetricKind>& known) {
-  YamlMap map = value.get_mapping();
+  YamlMap map = value.read_yaml_mapping();
   std::vector<Gate> gates;
   for (const MetricKind& kind : known) {
-    const auto limit = map.get_optional(kind.name);
+    const auto limit = map.get_optional_yaml_value(kind.name);
     if (!limit) continue;
-    gates.push_back({kind.name, limit->get_number()});
+    gates.push_back({kind.name, limit->read_yaml_number()});
     const std::string problem = describe_invalid_limit(kind, gates.back().limit);
-    if (!problem.empty()) throw limit->make_error(problem);
+    if (!problem.empty()) throw limit->make_yaml_error(problem);
   }
-  map.check_all_keys_read();
+  map.check_all_yaml_keys_read();
   if (gates.empty())
-    throw value.make_error("contains no gate; the gates are: " + join_names(known));
+    throw value.make_yaml_error("contains no gate; the gates are: " + join_names(known));
   return gates;
 }
 
 std::vector<Gate> read_gates(const std::filesystem::path& file,
                              const std::vector<MetricKind>& known) {
-  YamlMap document = read_yaml(file, "vlp-gates/1");
-  const YamlValue gates = document.get_required_column("gates");
-  document.check_all_keys_read();
+  YamlMap document = read_yaml_file(file, "vlp-gates/1");
+  const YamlValue gates = document.get_required_yaml_value("gates");
+  document.check_all_yaml_keys_read();
   return read_gates(gates, known);
 }
 
@@ -167,9 +167,9 @@ std::vector<CheckedMetric> check_gates(const std::vector<Gate>& gates,
   return results;
 }
 
-std::vector<CheckedMetric> check_all_metrics(const std::vector<Gate>& gates,
-                                             const std::vector<Metric>& metrics,
-                                             const std::vector<MetricKind>& known) {
+std::vector<CheckedMetric> check_all_metrics_against_gates(const std::vector<Gate>& gates,
+                                                           const std::vector<Metric>& metrics,
+                                                           const std::vector<MetricKind>& known) {
   std::vector<CheckedMetric> results;
   for (const MetricKind& kind : known) {
     CheckedMetric result = make_checked_metric(kind, metrics);
@@ -183,30 +183,32 @@ std::vector<CheckedMetric> check_all_metrics(const std::vector<Gate>& gates,
   return results;
 }
 
-std::string describe(const CheckedMetric& gate) {
+std::string describe_gate_result(const CheckedMetric& gate) {
   return gate.name + " is " + (gate.value ? with_unit(*gate.value, gate.unit) : "not known") +
-         ", " + describe(gate.direction) + " " + with_unit(gate.limit.value(), gate.unit) +
-         describe_guard_band(gate) + " is required";
+         ", " + describe_limit_direction(gate.direction) + " " +
+         with_unit(gate.limit.value(), gate.unit) + describe_guard_band(gate) + " is required";
 }
 
 std::string describe_guard_band(const CheckedMetric& gate) {
   if (!gate.guard) return "";
   return std::string(gate.direction == Direction::at_least ? " and" : " less") +
-         " a guard band of " + with_unit(gate.guard->width(), gate.unit);
+         " a guard band of " + with_unit(gate.guard->guard_band_width(), gate.unit);
 }
 
 std::string describe_failed_gates(const std::vector<CheckedMetric>& gates) {
   std::string words;
   for (const CheckedMetric& gate : gates) {
-    if (!gate.has_passed()) words.append(words.empty() ? "" : "; ").append(describe(gate));
+    if (!gate.has_passed_gate())
+      words.append(words.empty() ? "" : "; ").append(describe_gate_result(gate));
   }
   return words;
 }
 
 std::string describe_failed_gate(const CheckedMetric& gate) {
-  if (!gate.value) return describe(gate);
+  if (!gate.value) return describe_gate_result(gate);
   const auto kind = find_metric_kind(gate.name);
-  return std::string(kind ? kind->cause : "a gate is not met") + " (" + describe(gate) + ")";
+  return std::string(kind ? kind->cause : "a gate is not met") + " (" + describe_gate_result(gate) +
+         ")";
 }
 
 }  // namespace vlp

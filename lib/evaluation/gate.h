@@ -25,7 +25,7 @@ struct GuardBand {
   double standard_uncertainty;
   double k;
 
-  double width() const { return k * standard_uncertainty; }
+  double guard_band_width() const { return k * standard_uncertainty; }
 };
 
 /// Acceptance limit of a metric. Its direction, at most or at least, is that of the metric's kind.
@@ -50,7 +50,7 @@ struct CheckedMetric {
   /// @pre there is a gate
   double acceptance_limit() const;
   /// Returns true if the gate is passed, or if there is none. A gate without a value is not passed.
-  bool has_passed() const;
+  bool has_passed_gate() const;
   /// Returns the probability that the true value is within the limit, given only the measured
   /// value: Phi((limit - value) / u), or Phi((value - limit) / u) (JCGM 106:2012, section 7).
   /// Returns std::nullopt without a value, a limit or a guard band.
@@ -91,24 +91,24 @@ std::vector<CheckedMetric> check_gates(const std::vector<Gate>& gates,
 
 /// Returns all metrics, with and without gates, and the gates whose metric was not measured. They
 /// are in the order of the kinds.
-std::vector<CheckedMetric> check_all_metrics(const std::vector<Gate>& gates,
-                                             const std::vector<Metric>& metrics,
-                                             const std::vector<MetricKind>& known);
+std::vector<CheckedMetric> check_all_metrics_against_gates(const std::vector<Gate>& gates,
+                                                           const std::vector<Metric>& metrics,
+                                                           const std::vector<MetricKind>& known);
 
 /// Describes a gate, for example "mean_mm is 1.25 mm, at most 1 mm is required". With a guard
 /// band, "less a guard band of 0.04 mm" follows the limit.
 /// @pre there is a gate
-std::string describe(const CheckedMetric& gate);
+std::string describe_gate_result(const CheckedMetric& gate);
 
 /// Returns " less a guard band of 0.04 mm", or " and ..." for lower limits; empty without a guard
 /// band.
 std::string describe_guard_band(const CheckedMetric& gate);
 
-/// Returns describe() for all gates that are not passed, separated by "; ".
+/// Returns describe_gate_result() for all gates that are not passed, separated by "; ".
 std::string describe_failed_gates(const std::vector<CheckedMetric>& gates);
 
-/// Returns the probable cause of a failed gate, followed by describe(); describe() alone if the
-/// metric was not measured.
+/// Returns the probable cause of a failed gate, followed by describe_gate_result();
+/// describe_gate_result() alone if the metric was not measured.
 std::string describe_failed_gate(const CheckedMetric& gate);
 
 }  // namespace vlp

@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-void write_floor_limits(const std::filesystem::path& file, const FloorLimits& limits) {
+void write_floor_accuracy_limits(const std::filesystem::path& file, const FloorLimits& limits) {
   constexpr int digits = 6;
   std::vector<std::string> header{"x_m",    "y_m",    "z_m",    "yaw_rad",   "lamps",
                                   "x_sd_m", "y_sd_m", "z_sd_m", "yaw_sd_rad"};
@@ -25,14 +25,14 @@ void write_floor_limits(const std::filesystem::path& file, const FloorLimits& li
                                  format(position_m.z()), format(yaw_rad),
                                  std::to_string(place.lamps)};
     if (!place.parts.empty()) {
-      const Eigen::Vector4d sd = place.total_covariance().diagonal().cwiseMax(0).cwiseSqrt();
+      const Eigen::Vector4d sd = place.total_pose_covariance().diagonal().cwiseMax(0).cwiseSqrt();
       for (const double sd_component : sd) row.push_back(format(sd_component));
       for (const Matrix4& part : place.parts)
         row.push_back(format(compute_fix_sds(part).horizontal_m));
-      row.push_back(format(compute_fix_sds(place.total_covariance()).horizontal_m));
+      row.push_back(format(compute_fix_sds(place.total_pose_covariance()).horizontal_m));
     }
     row.resize(header.size());
-    csv.row(row);
+    csv.write_csv_row(row);
   }
   csv.save_file();
 }

@@ -156,7 +156,7 @@ constexpr auto kMetricKinds = std::to_array<MetricKind>({
 
 }  // namespace
 
-std::string describe(Direction required) {
+std::string describe_limit_direction(Direction required) {
   return required == Direction::at_least ? "at least" : "at most";
 }
 
@@ -175,8 +175,8 @@ std::optional<MetricKind> find_metric_kind(const std::string& name) {
   return kind == kMetricKinds.end() ? std::nullopt : std::optional(*kind);
 }
 
-std::string find_present_metric_name(const std::string& name) {
-  const std::string_view present = find_present_name(NameKind::metric, name);
+std::string find_current_metric_name(const std::string& name) {
+  const std::string_view present = find_current_name_for_former(NameKind::metric, name);
   return present.empty() ? name : std::string(present);
 }
 

@@ -28,7 +28,7 @@ enum class MetricSource {
 enum class Direction { at_most, at_least };
 
 /// Returns "at most" or "at least".
-std::string describe(Direction direction);
+std::string describe_limit_direction(Direction direction);
 
 /// Metric that can be measured and that a gate may limit.
 struct MetricKind {
@@ -55,7 +55,7 @@ std::vector<MetricKind> list_metric_kinds(std::initializer_list<MetricSource> so
 std::optional<MetricKind> find_metric_kind(const std::string& name);
 
 /// Returns the present name of a metric of a record, which may have been kept under a former one.
-std::string find_present_metric_name(const std::string& name);
+std::string find_current_metric_name(const std::string& name);
 
 /// Measured metric.
 struct Metric {

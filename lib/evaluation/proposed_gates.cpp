@@ -41,7 +41,7 @@ double compute_proposed_limit(double value, const Interval& interval) {
 std::optional<ErrorIntervals> compute_intervals(const std::vector<FixError>& errors,
                                                 std::optional<double> FixError::*part,
                                                 int threads) {
-  auto [sizes, clusters] = collect_component(errors, std::mem_fn(part));
+  auto [sizes, clusters] = collect_error_component(errors, std::mem_fn(part));
   for (double& size : sizes) size = std::abs(size);
   return bootstrap_error_intervals(sizes, clusters, threads);
 }
@@ -69,7 +69,7 @@ std::vector<Gate> propose_gates_from_evaluation(const EvaluationInput& input,
   if (yaw_rad) add("yaw_rms_deg", evaluation.yaw_rad->sizes.rms, yaw_rad->rms, degrees);
   constexpr double millionth = 1e-6;  // resolution of the written limit
   gates.push_back(
-      {"missing_fraction", millionth * std::ceil(evaluation.missing_fraction() / millionth)});
+      {"missing_fraction", millionth * std::ceil(evaluation.missing_fix_fraction() / millionth)});
   return gates;
 }
 

@@ -35,7 +35,7 @@ std::string make_missing_fixes_warning(const Evaluation& evaluation,
 
 std::string make_crlb_warning(const Evaluation& evaluation) {
   const auto& limit = evaluation.limit;
-  if (!limit || !limit->is_below_crlb()) return "";
+  if (!limit || !limit->are_errors_below_crlb()) return "";
   constexpr int digits = 3;
   // [GATE-3] `limit: either` | smaller noise than `--noise-px`, or fixes from more than one level
   //   image | check `--noise-px`

@@ -17,8 +17,9 @@ std::string make_missing_fixes_warning(const Evaluation& evaluation,
                                        const std::vector<CheckedMetric>& gates);
 
 /// Returns a warning if the errors are significantly below the theoretical limit
-/// (CrlbRatio::is_below_crlb()), one line without a full stop. Empty otherwise. The assumed pixel
-/// noise is then too large, or the fixes use more information than one image of a level camera.
+/// (CrlbRatio::are_errors_below_crlb()), one line without a full stop. Empty otherwise. The assumed
+/// pixel noise is then too large, or the fixes use more information than one image of a level
+/// camera.
 std::string make_crlb_warning(const Evaluation& evaluation);
 
 /// Returns warnings about intervals and verdicts from few stations or captures, one line each

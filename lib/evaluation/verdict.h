@@ -43,7 +43,7 @@ struct Cause {
 
 /// Returns the verdict of the first cause, because later causes can follow from it; PASS without
 /// causes.
-inline Verdict decide_verdict(const std::vector<Cause>& causes) {
+inline Verdict decide_verdict_from_causes(const std::vector<Cause>& causes) {
   if (causes.empty()) return Verdict::pass;
   return causes.front().of_camera ? Verdict::fail : Verdict::invalid;
 }

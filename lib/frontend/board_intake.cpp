@@ -79,7 +79,8 @@ void reject_other_sizes(std::vector<Observation>& images) {
   const std::array<int, 2> size_px = most_frequent->size_px;
   for (Observation& image : images) {
     if (!image.board || image.size_px == size_px) continue;
-    image.set_rejection(RejectionReason::wrong_size, describe_wrong_size(image.size_px, size_px));
+    image.set_image_rejection(RejectionReason::wrong_size,
+                              describe_wrong_image_size(image.size_px, size_px));
     image.board.reset();
   }
 }
@@ -130,9 +131,9 @@ void explain_from_sample_images(
     const std::function<bool(const fs::path& file, const cv::Mat&)>& inspect) {
   const FrontendOptions sparse = make_sparse_options(images, options);
   ImageSource source(images, sparse);
-  while (const auto image = source.read_next()) {
+  while (const auto image = source.read_next_image()) {
     try {
-      if (!inspect(image->file, image->read(sparse)) || --num_samples == 0) return;
+      if (!inspect(image->file, image->read_gray_image(sparse)) || --num_samples == 0) return;
     } catch (const InputError&) {
       continue;  // rejected already
     }
@@ -260,17 +261,17 @@ bool is_mrcal_table(const fs::path& file) { return file.extension() == ".vnl"; }
 /// Rejects an image with too few corners to determine the pose of the board.
 void reject_few_corners(const Board& board, const BoardLattice& lattice, Observation& image) {
   const BoardDetection& seen = image.board->seen;
-  if (lattice.has_sufficient_corners(seen)) return;
-  if (!seen.has_corners() && !seen.foreign.empty()) {
+  if (lattice.are_corners_sufficient_for_pose(seen)) return;
+  if (!seen.has_detected_corners() && !seen.foreign.empty()) {
     // [LENS-3] `the board does not have`, `not show the board` | other board, or wrong `first_id`,
     //   `cols`, `rows`, `id_order` | correct `board.yaml`
-    return image.set_rejection(RejectionReason::other_board,
-                               "shows tags that the board does not have");
+    return image.set_image_rejection(RejectionReason::other_board,
+                                     "shows tags that the board does not have");
   }
-  if (!seen.has_corners() && seen.unusable == 0 && board.kind != BoardKind::chessboard) {
-    return image.set_rejection(RejectionReason::no_board, "does not show the board");
+  if (!seen.has_detected_corners() && seen.unusable == 0 && board.kind != BoardKind::chessboard) {
+    return image.set_image_rejection(RejectionReason::no_board, "does not show the board");
   }
-  image.set_rejection(
+  image.set_image_rejection(
       are_tags_overexposed(seen) ? RejectionReason::overexposed : RejectionReason::too_few_corners,
       describe_too_few_corners(board, seen));
 }
@@ -286,52 +287,53 @@ BoardIntake::BoardIntake(const Board& board, const FrontendOptions& options,
       imager_px_(imager_px),
       cache_(options.corner_cache, board) {}
 
-Observation BoardIntake::detect_in_image(const SourceImage& source) const {
+Observation BoardIntake::detect_board_in_image(const SourceImage& source) const {
   Observation result{source.file, source.time_s};
-  std::optional<CachedView> found = cache_.find(source);
+  std::optional<CachedView> found = cache_.find_cached_view(source);
   if (found && (!imager_px_ || found->view.imager_px == *imager_px_)) {
     result.size_px = found->view.imager_px;
   } else {
-    read_image_and_detect(source, options_, imager_px_, result, [&](const cv::Mat& image) {
+    read_image_and_run_detection(source, options_, imager_px_, result, [&](const cv::Mat& image) {
       const ImageBlur blur = measure_image_blur(image);
-      BoardView view{result.file_name(), result.size_px, detector_.detect_board(image)};
+      BoardView view{result.image_file_name(), result.size_px, detector_.detect_board(image)};
       const double white = compute_saturated_fraction(image, find_board_region(view.seen, image));
       found = CachedView{std::move(view),
                          std::isfinite(blur.sigma_px) ? std::optional(blur.sigma_px) : std::nullopt,
                          blur.bright_fraction, white};
     });
-    if (!result.is_kept()) return result;
-    cache_.keep(source, *found);
+    if (!result.is_image_kept()) return result;
+    cache_.store_cached_view(source, *found);
   }
   result.blur_px = found->blur_px;
   result.board = std::move(found->view);
-  reject_unusable(result, found->bright_fraction, found->white_fraction);
+  reject_unusable_board_image(result, found->bright_fraction, found->white_fraction);
   return result;
 }
 
-void BoardIntake::reject_unusable(Observation& image, double bright_fraction,
-                                  double white_fraction) const {
+void BoardIntake::reject_unusable_board_image(Observation& image, double bright_fraction,
+                                              double white_fraction) const {
   const BoardDetection& seen = image.board->seen;
   if (white_fraction > options_.max_white_fraction) {
-    return image.set_rejection(
+    return image.set_image_rejection(
         RejectionReason::overexposed,
         fmt::format("overexposed: {:.0f} % of the {} is at full scale, {:.0f} % at most",
-                    100 * white_fraction, seen.has_corners() ? "board" : "image",
+                    100 * white_fraction, seen.has_detected_corners() ? "board" : "image",
                     100 * options_.max_white_fraction));
   }
-  if (!lattice_.has_sufficient_corners(seen) && bright_fraction < options_.min_bright_fraction) {
+  if (!lattice_.are_corners_sufficient_for_pose(seen) &&
+      bright_fraction < options_.min_bright_fraction) {
     // [LENS-1] `too dark:` | corners not measurable, or displaced | change exposure or light;
     //   limit: `--max-white-fraction`
-    return image.set_rejection(
+    return image.set_image_rejection(
         RejectionReason::too_dark,
         fmt::format("too dark: the brightest 1 % reach {:.0f} % of the full scale, "
                     "{:.0f} % at least",
                     100 * bright_fraction, 100 * options_.min_bright_fraction));
   }
   // [LENS-2] `blurred:`, `no contrast` | no sharp edges | focus, hold still; limit: `--max-blur-px`
-  if (!image.blur_px) return image.set_rejection(RejectionReason::no_contrast, "no contrast");
+  if (!image.blur_px) return image.set_image_rejection(RejectionReason::no_contrast, "no contrast");
   if (*image.blur_px > options_.max_blur_px) {
-    return image.set_rejection(
+    return image.set_image_rejection(
         RejectionReason::blurred,
         fmt::format("blurred: {:.1f} px, {:.1f} at most", *image.blur_px, options_.max_blur_px));
   }
@@ -343,14 +345,14 @@ Observations detect_boards_in_images(const std::vector<fs::path>& images, const 
                                      const IntakeProgress& progress) {
   const BoardIntake intake(board, options);
   ImageSource source(images, options);
-  Observations result = detect_in_images(
+  Observations result = collect_observations_of_images(
       source, options.threads,
-      [&](const SourceImage& image) { return intake.detect_in_image(image); }, progress);
+      [&](const SourceImage& image) { return intake.detect_board_in_image(image); }, progress);
   check_any_image_readable(images.front().parent_path(), result.images);
   reject_other_sizes(result.images);
   reject_repeated_images(result.images, ImageUse::boards, options);
   if (std::none_of(result.images.begin(), result.images.end(), [](const Observation& image) {
-        return image.board && image.board->seen.has_corners();
+        return image.board && image.board->seen.has_detected_corners();
       })) {
     result.failure =
         explain_no_board(images, board, board_file, options, collect_views(result.images));
@@ -371,7 +373,7 @@ Observations read_board_views(const fs::path& file, const Board& board, const fs
   for (BoardView& view : is_mrcal_table(file) ? read_mrcal_corners(file, board, imager_px)
                                               : read_corner_table(file, board, imager_px)) {
     remove_corner_outliers(lattice, view, result.warnings);
-    is_seen = is_seen || view.seen.has_corners();
+    is_seen = is_seen || view.seen.has_detected_corners();
     Observation image{view.image};
     image.size_px = view.imager_px;
     image.board = std::move(view);

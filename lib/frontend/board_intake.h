@@ -29,11 +29,12 @@ class BoardIntake {
   /// Detects the board in an image. Rejects the image if it is unreadable, of another size,
   /// overexposed, too dark, blurred, or shows too few corners to determine the board's pose.
   /// Repeated images are not rejected here, see Selection.
-  Observation detect_in_image(const SourceImage& source) const;
+  Observation detect_board_in_image(const SourceImage& source) const;
 
  private:
   /// Rejects an image that is overexposed, too dark, blurred, or shows too few corners.
-  void reject_unusable(Observation& image, double bright_fraction, double white_fraction) const;
+  void reject_unusable_board_image(Observation& image, double bright_fraction,
+                                   double white_fraction) const;
 
   const Board board_;
   const BoardLattice lattice_;

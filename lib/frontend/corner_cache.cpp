@@ -21,13 +21,15 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string describe_settings(const Board& board) {
-  std::string settings = fmt::format(
-      "13 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols, board.rows,
-      format_shortest(board.tag_size_m), format_shortest(board.tag_spacing), board.border_bits,
-      board.corner_squares, board.first_id, to_string(board.id_order));
+  std::string settings =
+      fmt::format("13 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
+                  board.rows, format_shortest_exact_number(board.tag_size_m),
+                  format_shortest_exact_number(board.tag_spacing), board.border_bits,
+                  board.corner_squares, board.first_id, to_string(board.id_order));
   if (board.has_chessboard_squares()) {
-    settings += fmt::format(" {} {} {}", static_cast<int>(board.kind),
-                            format_shortest(board.square_size_m), board.top_left_white);
+    settings +=
+        fmt::format(" {} {} {}", static_cast<int>(board.kind),
+                    format_shortest_exact_number(board.square_size_m), board.top_left_white);
   }
   return settings;
 }
@@ -48,7 +50,7 @@ class NumberFile {
   /// text is cut short or damaged.
   void transfer(double& value) {
     if (!is_read_) {
-      text_ += format_shortest(value) + " ";
+      text_ += format_shortest_exact_number(value) + " ";
       return;
     }
     const char* const end = text_.data() + text_.size();
@@ -149,15 +151,15 @@ CornerCache::CornerCache(fs::path folder, const Board& board)
   if (error) throw InputError(folder_, "cannot be made: " + error.message());
 }
 
-fs::path CornerCache::make_path(const SourceImage& image) const {
+fs::path CornerCache::make_cache_file_path(const SourceImage& image) const {
   return folder_ / (compute_text_sha256(compute_digest(image) + " " + settings_) + ".txt");
 }
 
-std::optional<CachedView> CornerCache::find(const SourceImage& image) const {
+std::optional<CachedView> CornerCache::find_cached_view(const SourceImage& image) const {
   constexpr std::size_t max_bytes = std::size_t{64} << 20;
   if (folder_.empty()) return std::nullopt;
   try {
-    const fs::path path = make_path(image);
+    const fs::path path = make_cache_file_path(image);
     if (!fs::exists(path)) return std::nullopt;
     NumberFile file(read_file(path, max_bytes));
     CachedView cached{{image.file.filename().string(), {}, {}}, {}, 0, 0};
@@ -168,12 +170,12 @@ std::optional<CachedView> CornerCache::find(const SourceImage& image) const {
   }
 }
 
-void CornerCache::keep(const SourceImage& image, CachedView view) const {
+void CornerCache::store_cached_view(const SourceImage& image, CachedView view) const {
   if (folder_.empty()) return;
   try {
     NumberFile numbers;
     transfer_view(numbers, view);
-    AtomicFileWriter file(make_path(image));
+    AtomicFileWriter file(make_cache_file_path(image));
     file.write(numbers.text());
     file.save_without_fsync();
   } catch (const InputError&) {  // a full disk; the view itself is there

@@ -36,12 +36,12 @@ class CornerCache {
   CornerCache(std::filesystem::path folder, const Board& board);
 
   /// Returns the stored detection of an image with the same content; std::nullopt if there is none.
-  std::optional<CachedView> find(const SourceImage& image) const;
+  std::optional<CachedView> find_cached_view(const SourceImage& image) const;
   /// Stores the detection of an image in its file. A file that cannot be written is skipped.
-  void keep(const SourceImage& image, CachedView view) const;
+  void store_cached_view(const SourceImage& image, CachedView view) const;
 
  private:
-  std::filesystem::path make_path(const SourceImage& image) const;
+  std::filesystem::path make_cache_file_path(const SourceImage& image) const;
 
   std::filesystem::path folder_;
   std::string settings_;

@@ -218,13 +218,13 @@ Size read_image_size_from_header(std::string_view bytes) {
   return format == nullptr ? Size() : format->read_size(bytes);
 }
 
-void check_image_size(const fs::path& file, std::int64_t width, std::int64_t height,
-                      double max_mpx) {
+void check_image_megapixels(const fs::path& file, std::int64_t width, std::int64_t height,
+                            double max_mpx) {
   constexpr double million = 1e6;
   if (static_cast<double>(width) * static_cast<double>(height) <= max_mpx * million) return;
   throw InputError(
       file, "is " + std::to_string(width) + " x " + std::to_string(height) + " px, more than the " +
-                format_shortest(max_mpx) +
+                format_shortest_exact_number(max_mpx) +
                 " million that are allowed; --max-mpx of vlp-detect and vlp-intrinsics "
                 "allows more");
 }
@@ -244,7 +244,7 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
                   ? "cannot be read as an image: it is cut short or damaged"
                   : "cannot be read as an image: it is not PNG, JPEG, BMP, TIFF, PBM, PGM or PPM");
   }
-  check_image_size(file, (*size)[0], (*size)[1], max_mpx);
+  check_image_megapixels(file, (*size)[0], (*size)[1], max_mpx);
   if (is_cut_png(bytes)) throw InputError(file, cut);
   cv::Mat image;
   try {
@@ -254,14 +254,14 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
     throw InputError(file, "cannot be read as an image: " + failure.err);
   }
   if (image.empty()) throw InputError(file, "cannot be read as an image");
-  check_image_size(file, image.cols, image.rows, max_mpx);
+  check_image_megapixels(file, image.cols, image.rows, max_mpx);
   if (image.depth() != CV_8U && image.depth() != CV_16U) {
     throw InputError(file, "has neither 8 nor 16 bits");
   }
   return image;
 }
 
-bool has_extension(const fs::path& file, std::initializer_list<std::string_view> extensions) {
+bool has_file_extension(const fs::path& file, std::initializer_list<std::string_view> extensions) {
   std::string extension = file.extension().string();
   std::ranges::transform(extension, extension.begin(),
                          [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -269,7 +269,7 @@ bool has_extension(const fs::path& file, std::initializer_list<std::string_view>
 }
 
 bool is_image_file_name(const fs::path& file) {
-  return has_extension(file, {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"});
+  return has_file_extension(file, {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"});
 }
 
 std::vector<fs::path> list_images(const fs::path& folder) {

@@ -16,8 +16,8 @@
 namespace vlp {
 
 /// Checks that an image has at most `max_mpx` megapixels. Throws InputError otherwise.
-void check_image_size(const std::filesystem::path& file, std::int64_t width, std::int64_t height,
-                      double max_mpx);
+void check_image_megapixels(const std::filesystem::path& file, std::int64_t width,
+                            std::int64_t height, double max_mpx);
 
 /// Returns true if `bytes` starts with the signature of PNG, JPEG, BMP, TIFF, PBM, PGM or PPM.
 /// `bytes` is a file or its beginning.
@@ -38,8 +38,8 @@ cv::Mat read_image(const std::filesystem::path& file,
                    double max_mpx = std::numeric_limits<double>::infinity());
 
 /// Returns true if the file has one of the extensions, which are in lower case, as ".png".
-bool has_extension(const std::filesystem::path& file,
-                   std::initializer_list<std::string_view> extensions);
+bool has_file_extension(const std::filesystem::path& file,
+                        std::initializer_list<std::string_view> extensions);
 
 /// Returns true if the extension of the file name, in upper or lower case, is that of an image:
 /// PNG, JPEG, BMP, TIFF or PGM. The file is not opened.

@@ -96,7 +96,7 @@ ImageBlur measure_image_blur(const cv::Mat& image) {
   return {std::sqrt(std::max(0.0, variance_px2)), bright};
 }
 
-ImageSignal measure_image_signal(const cv::Mat& image) {
+ImageSignal measure_image_signal_to_noise(const cv::Mat& image) {
   const auto [dark_along, bright_along] = find_gray_level_extremes(image, {1, 0});
   const auto [dark_across, bright_across] = find_gray_level_extremes(image, {0, 1});
   const double dark = std::min(dark_along, dark_across);

@@ -24,11 +24,11 @@ ImageSource::ImageSource(std::vector<std::filesystem::path> files, const Fronten
       continue;
     }
     Video video(file.string());
-    const auto [width, height] = video.size_px();
-    check_image_size(file, width, height, options.max_mpx);
-    check_image_matches_imager(file, {width, height}, imager_px);
+    const auto [width, height] = video.frame_size_px();
+    check_image_megapixels(file, width, height, options.max_mpx);
+    check_image_size_matches_imager(file, {width, height}, imager_px);
     // [FILE-8] `no frame that can be decoded`
-    if (!video.read_next()) throw InputError(file, "contains no frame that can be decoded");
+    if (!video.read_next_frame()) throw InputError(file, "contains no frame that can be decoded");
     const auto every = static_cast<std::size_t>(every_);
     expected_ += (std::max<std::size_t>(video.reported_frame_count(), 1) + every - 1) / every;
   }
@@ -38,14 +38,14 @@ ImageSource::~ImageSource() = default;
 
 std::size_t ImageSource::expected_image_count() const { return expected_; }
 
-std::optional<SourceImage> ImageSource::next_frame() {
+std::optional<SourceImage> ImageSource::read_next_video_frame() {
   const auto& file = files_[file_];
   if (!video_) {
     video_ = std::make_unique<Video>(file.string());
   } else {
-    for (int i = 1; i < every_; ++i) video_->skip_frame();
+    for (int i = 1; i < every_; ++i) video_->skip_video_frame();
   }
-  auto frame = video_->read_next();
+  auto frame = video_->read_next_frame();
   if (!frame) {
     const std::string missing = video_->describe_missing_frames();
     if (!missing.empty()) warnings_.push_back(file.string() + ": " + missing);
@@ -58,12 +58,12 @@ std::optional<SourceImage> ImageSource::next_frame() {
   return image;
 }
 
-std::optional<SourceImage> ImageSource::read_next() {
+std::optional<SourceImage> ImageSource::read_next_image() {
   const std::lock_guard lock(mutex_);
   for (; file_ < files_.size(); ++file_) {
     std::optional<SourceImage> image;
     if (is_video_file_name(files_[file_])) {
-      image = next_frame();
+      image = read_next_video_frame();
       if (!image) continue;
     } else {
       image.emplace(files_[file_++]);
@@ -95,7 +95,7 @@ void for_each_image(ImageSource& source, int threads,
   process_images_in_parallel(workers, threads, [&](std::size_t) {
     try {
       while (!failed) {
-        const auto image = source.read_next();
+        const auto image = source.read_next_image();
         if (!image) return;
         task(*image);
       }
@@ -106,17 +106,17 @@ void for_each_image(ImageSource& source, int threads,
   });
 }
 
-std::string describe_wrong_size(const std::array<int, 2>& size_px,
-                                const std::array<int, 2>& imager_px) {
+std::string describe_wrong_image_size(const std::array<int, 2>& size_px,
+                                      const std::array<int, 2>& imager_px) {
   return fmt::format("is {} x {} px, the camera's images are {} x {} px", size_px[0], size_px[1],
                      imager_px[0], imager_px[1]);
 }
 
-void check_image_matches_imager(const std::filesystem::path& file,
-                                const std::array<int, 2>& size_px,
-                                const std::optional<std::array<int, 2>>& imager_px) {
+void check_image_size_matches_imager(const std::filesystem::path& file,
+                                     const std::array<int, 2>& size_px,
+                                     const std::optional<std::array<int, 2>>& imager_px) {
   if (!imager_px || size_px == *imager_px) return;
-  throw InputError(file, describe_wrong_size(size_px, *imager_px));
+  throw InputError(file, describe_wrong_image_size(size_px, *imager_px));
 }
 
 }  // namespace vlp

@@ -37,7 +37,7 @@ struct SourceImage {
 
   /// Returns the gray levels of the image, 8 or 16 bits; reads the file if it is no video frame.
   /// @throws InputError as read_image()
-  cv::Mat read(const FrontendOptions& options) const {
+  cv::Mat read_gray_image(const FrontendOptions& options) const {
     return frame.empty() ? read_image(file, options.max_mpx) : frame;
   }
 };
@@ -55,14 +55,14 @@ class ImageSource {
   ~ImageSource();
 
   /// Returns the next image; std::nullopt at the end.
-  std::optional<SourceImage> read_next();
+  std::optional<SourceImage> read_next_image();
   /// Number of images, with the frames that the headers of the videos report.
   std::size_t expected_image_count() const;
   /// Warnings of videos with missing frames among those already read, one line each.
   const std::vector<std::string>& video_warnings() const { return warnings_; }
 
  private:
-  std::optional<SourceImage> next_frame();
+  std::optional<SourceImage> read_next_video_frame();
 
   std::vector<std::filesystem::path> files_;
   int every_;
@@ -87,13 +87,13 @@ void for_each_image(ImageSource& source, int threads,
                     const std::function<void(const SourceImage&)>& task);
 
 /// Describes that the size of an image is not that of the camera.
-std::string describe_wrong_size(const std::array<int, 2>& size_px,
-                                const std::array<int, 2>& imager_px);
+std::string describe_wrong_image_size(const std::array<int, 2>& size_px,
+                                      const std::array<int, 2>& imager_px);
 
 /// Checks that the size of an image is `imager_px` (width, height), if given. Throws InputError
 /// otherwise.
-void check_image_matches_imager(const std::filesystem::path& file,
-                                const std::array<int, 2>& size_px,
-                                const std::optional<std::array<int, 2>>& imager_px);
+void check_image_size_matches_imager(const std::filesystem::path& file,
+                                     const std::array<int, 2>& size_px,
+                                     const std::optional<std::array<int, 2>>& imager_px);
 
 }  // namespace vlp

@@ -18,7 +18,7 @@ std::unordered_map<std::string, const Frame*> index_frames_by_image(
 }
 
 bool may_be_lamp(const Light& light, const std::array<int, 2>& size_px) {
-  return is_modulated(light) && is_fully_in_view(light, {size_px[0], size_px[1]});
+  return is_light_modulated(light) && is_light_fully_in_view(light, {size_px[0], size_px[1]});
 }
 
 }  // namespace
@@ -40,8 +40,8 @@ void add_labeled_lights(std::span<const Observation> images, const std::vector<F
   const auto frames = index_frames_by_image(labels);
   std::size_t number = labeled.lights.empty() ? 0 : labeled.lights.back().image + 1;
   for (const Observation& image : images) {
-    const auto frame = frames.find(image.file_name());
-    if (frame == frames.end() || !image.is_kept()) continue;
+    const auto frame = frames.find(image.image_file_name());
+    if (frame == frames.end() || !image.is_image_kept()) continue;
     for (const Detection& label : frame->second->detections) {
       ++labeled.labels;
       if (const Light* light = find_light_at_pixel(image, label.pixel)) {
@@ -77,7 +77,7 @@ std::vector<LightPeriod> collect_light_periods(std::span<const Observation> imag
       }
       continue;
     }
-    const auto frame = frames.find(image.file_name());
+    const auto frame = frames.find(image.image_file_name());
     if (frame == frames.end()) continue;
     for (const Detection& label : frame->second->detections) {
       if (const Light* light = find_light_at_pixel(image, label.pixel)) add(i, *light, label.lamp);

@@ -44,7 +44,7 @@ bool is_overexposed(const Light& light, const cv::Mat& image) {
 }
 
 /// Returns true if the range of the gray levels is small (image uniformly dark or white), so that
-/// the signal may be noise. Takes a small part of the time of measure_image_signal().
+/// the signal may be noise. Takes a small part of the time of measure_image_signal_to_noise().
 bool is_image_uniform(const cv::Mat& image) {
   constexpr double max_range = 0.25;  // of the full scale
   double min = 0, max = 0;
@@ -54,15 +54,15 @@ bool is_image_uniform(const cv::Mat& image) {
 
 /// Rejects an image in which nothing exceeds the noise, as too dark or overexposed.
 void reject_image_without_signal(const cv::Mat& image, Observation& result) {
-  const ImageSignal signal = measure_image_signal(image);
+  const ImageSignal signal = measure_image_signal_to_noise(image);
   if (signal.signal_to_noise < kMinSignalToNoise && signal.dark_fraction > kMaxDarkFraction) {
-    return result.set_rejection(
+    return result.set_image_rejection(
         RejectionReason::overexposed,
         fmt::format("overexposed: all of the image is at {:.0f} % of the full scale or more",
                     100 * signal.dark_fraction));
   }
   if (signal.signal_to_noise < kMinSignalToNoise) {
-    return result.set_rejection(
+    return result.set_image_rejection(
         RejectionReason::too_dark,
         fmt::format("too dark: the brightest is {:.0f} times the noise over the darkest, {:.0f} "
                     "wanted",
@@ -73,7 +73,7 @@ void reject_image_without_signal(const cv::Mat& image, Observation& result) {
 /// Rejects an image with too few lamps, with the exposure as the reason if it is one.
 void reject_image_with_few_lamps(const cv::Mat& image, Observation& result) {
   reject_image_without_signal(image, result);
-  if (!result.is_kept()) return;
+  if (!result.is_image_kept()) return;
   const auto count = [&](const auto& condition) {
     return std::count_if(result.lights.begin(), result.lights.end(), condition);
   };
@@ -84,13 +84,13 @@ void reject_image_with_few_lamps(const cv::Mat& image, Observation& result) {
   const auto unknown = count(is_kind(LightKind::unknown));
   const auto white = count([&](const Light& light) { return is_overexposed(light, image); });
   if (white > 0) {
-    return result.set_rejection(
+    return result.set_image_rejection(
         RejectionReason::overexposed,
         fmt::format(
             "overexposed: {} of {} lights are completely at full scale, {} of the visible lamps",
             white, unknown, lamps));
   }
-  result.set_rejection(
+  result.set_image_rejection(
       RejectionReason::too_few_lamps,
       fmt::format("too few lamps: {} visible, {} cut off by the image border, {} lights unlike any",
                   lamps, count(is_kind(LightKind::cut)), unknown));
@@ -194,8 +194,9 @@ std::string list_shared_frequencies(const LampMap& map) {
 /// Explains that no lamp is identified, with the reason that most of the lights have.
 std::string explain_no_lamp(const std::vector<Observation>& images, const LampMap& map) {
   const auto count = [&](LightKind kind) { return count_lights_of_kind(images, kind); };
-  const auto skipped = std::count_if(images.begin(), images.end(),
-                                     [](const Observation& image) { return !image.is_kept(); });
+  const auto skipped = std::count_if(images.begin(), images.end(), [](const Observation& image) {
+    return !image.is_image_kept();
+  });
   // [LAMP-1] `no lamp was identified wholly in view` | lights unlike any lamp: wrong row time,
   //   readout or map; steady or cut lamps | see the most frequent reason below
   std::string message = fmt::format(
@@ -203,12 +204,12 @@ std::string explain_no_lamp(const std::vector<Observation>& images, const LampMa
       "image's edge, {} lights flicker unlike any lamp of the map, {} are steady, {} have no form)",
       images.size(), skipped, count(LightKind::cut), count(LightKind::unknown),
       count(LightKind::steady), count(LightKind::formless));
-  const auto reasons = count_light_reasons(images);
+  const auto reasons = count_rejected_lights_by_reason(images);
   if (reasons.empty()) {
     return message + ": are lamps lit and in view, and the exposure long enough?";
   }
   const auto& [kind, reason, lights] = reasons.front();
-  message += fmt::format("; most often, {} times: {}", lights, describe(reason));
+  message += fmt::format("; most often, {} times: {}", lights, describe_light_reason(reason));
   const std::string shared = list_shared_frequencies(map);
   if (reason == LightReason::unknown_period && !shared.empty()) {
     message += "; lamps of the map that share a frequency: " + shared +
@@ -236,7 +237,7 @@ LightDetector make_detector(const LampImages& images, const FrontendOptions& opt
                               : DetectorCamera{Readout::rows, options.row_time_s, {}};
   std::optional<LampClassifier> classifier;
   if (options.classifier.empty()) {
-    check_lamp_frequencies(images.lamps, images.lamps_file);
+    check_map_has_lamp_frequencies(images.lamps, images.lamps_file);
     if (!camera.row_time_s) {
       throw InputError(
           images.calibration_file,
@@ -267,26 +268,28 @@ LevelRotations read_level_rotations(const LampImages& images) {
   CapturesTable captures = images.captures.value_or(CapturesTable());
   if (!images.captures && !is_video_file_name(images.images))
     captures = read_captures_csv_of_folder(images.images);
-  return compute_level_rotations(captures, *images.calibration, images.yaw_in_robot_rad);
+  return compute_level_rotations_of_images(captures, *images.calibration, images.yaw_in_robot_rad);
 }
 
 }  // namespace
 
-Eigen::Matrix3d compute_level_rotation(const Inclination& inclination, double yaw_in_robot_rad,
-                                       const Eigen::Matrix3d& base_from_camera) {
+Eigen::Matrix3d compute_level_rotation_from_inclination(const Inclination& inclination,
+                                                        double yaw_in_robot_rad,
+                                                        const Eigen::Matrix3d& base_from_camera) {
   const Eigen::Matrix3d level_from_base =
       compute_inclination_rotation(inclination, yaw_in_robot_rad).level_from_base;
-  return level_from_zenith((level_from_base * base_from_camera).inverse().col(2));
+  return level_rotation_from_zenith((level_from_base * base_from_camera).inverse().col(2));
 }
 
-LevelRotations compute_level_rotations(const CapturesTable& captures,
-                                       const Calibration& calibration, double yaw_in_robot_rad) {
+LevelRotations compute_level_rotations_of_images(const CapturesTable& captures,
+                                                 const Calibration& calibration,
+                                                 double yaw_in_robot_rad) {
   const Eigen::Matrix3d base_from_camera = make_detector_camera(calibration).level_from_camera;
   LevelRotations levels;
   for (const auto& [image, capture] : captures) {
     if (!capture.inclination) continue;
-    levels.emplace(
-        image, compute_level_rotation(*capture.inclination, yaw_in_robot_rad, base_from_camera));
+    levels.emplace(image, compute_level_rotation_from_inclination(
+                              *capture.inclination, yaw_in_robot_rad, base_from_camera));
   }
   return levels;
 }
@@ -309,39 +312,39 @@ LampIntake::LampIntake(const LampImages& images, ImageUse use, const FrontendOpt
   if (!options.annotate.empty()) create_annotate_folder(options.annotate, images.images);
 }
 
-LampIntake LampIntake::copy_with_level_rotations(const LevelRotations& levels) const {
+LampIntake LampIntake::copy_intake_with_level_rotations(const LevelRotations& levels) const {
   LampIntake other = *this;
   other.use_ = ImageUse::fixes;
   for (const auto& [image, level] : levels) other.levels_.insert_or_assign(image, level);
   return other;
 }
 
-LampIntake LampIntake::with_annotation_folder(const fs::path& folder) const {
+LampIntake LampIntake::copy_intake_with_annotation_folder(const fs::path& folder) const {
   LampIntake other = *this;
   other.options_.annotate = folder;
   return other;
 }
 
-Observation LampIntake::detect_in_image(const SourceImage& source) const {
+Observation LampIntake::detect_lamps_in_image(const SourceImage& source) const {
   Observation result{source.file, source.time_s};
-  result.readout = detector_.readout();
+  result.readout = detector_.readout_direction();
   cv::Mat pixels;
-  read_image_and_detect(source, options_, imager_px_, result, [&](const cv::Mat& image) {
+  read_image_and_run_detection(source, options_, imager_px_, result, [&](const cv::Mat& image) {
     pixels = image;
-    if (min_lamps_for_use(use_) > 0 && is_image_uniform(image))
+    if (min_lamps_for_image_use(use_) > 0 && is_image_uniform(image))
       reject_image_without_signal(image, result);
-    if (!result.is_kept()) return;
-    const auto level = levels_.find(result.file_name());
+    if (!result.is_image_kept()) return;
+    const auto level = levels_.find(result.image_file_name());
     const LightDetector detector =
-        level == levels_.end() ? detector_ : detector_.with_tilt(level->second);
+        level == levels_.end() ? detector_ : detector_.copy_detector_with_tilt(level->second);
     if (can_turn_) {
       auto [readout, lights] = detect_lights_with_unknown_readout(detector, to_image_view(image));
       result.readout = readout;
       result.lights = std::move(lights);
     } else {
-      result.lights = detector.detect(to_image_view(image));
+      result.lights = detector.detect_lights(to_image_view(image));
     }
-    if (std::cmp_less(collect_identified_lamps(result).size(), min_lamps_for_use(use_)))
+    if (std::cmp_less(collect_identified_lamps(result).size(), min_lamps_for_image_use(use_)))
       reject_image_with_few_lamps(image, result);
   });
   if (!options_.annotate.empty() && !pixels.empty()) {
@@ -352,22 +355,22 @@ Observation LampIntake::detect_in_image(const SourceImage& source) const {
   return result;
 }
 
-Observations LampIntake::detect_in_all_images(const std::vector<fs::path>& files,
-                                              const IntakeProgress& progress) const {
+Observations LampIntake::detect_lamps_in_all_images(const std::vector<fs::path>& files,
+                                                    const IntakeProgress& progress) const {
   ImageSource source(files, options_, imager_px_);
-  Observations result = detect_in_images(
-      source, options_.threads, [&](const SourceImage& image) { return detect_in_image(image); },
-      progress);
+  Observations result = collect_observations_of_images(
+      source, options_.threads,
+      [&](const SourceImage& image) { return detect_lamps_in_image(image); }, progress);
   reject_repeated_images(result.images, use_, options_);
-  const auto turned =
-      std::count_if(result.images.begin(), result.images.end(),
-                    [&](const Observation& image) { return image.readout != detector_.readout(); });
+  const auto turned = std::count_if(
+      result.images.begin(), result.images.end(),
+      [&](const Observation& image) { return image.readout != detector_.readout_direction(); });
   if (turned > 0) {
     result.notes.push_back(fmt::format("{} of {} images show stripes along {}", turned,
                                        result.images.size(),
-                                       readout() == Readout::rows ? "columns" : "rows"));
+                                       readout_direction() == Readout::rows ? "columns" : "rows"));
   }
-  prepend_remarks(remarks_, result);
+  prepend_observation_messages(remarks_, result);
   return result;
 }
 
@@ -379,17 +382,17 @@ Observations detect_lamps_in_images(const LampImages& images, ImageUse use,
                                     const FrontendOptions& options,
                                     const IntakeProgress& progress) {
   Observations result = LampIntake(images, use, options)
-                            .detect_in_all_images(list_lamp_images(images.images), progress);
-  check_lamps_identified(images, result);
+                            .detect_lamps_in_all_images(list_lamp_images(images.images), progress);
+  check_any_lamp_identified(images, result);
   return result;
 }
 
-void check_lamps_identified(const LampImages& images, Observations& result) {
+void check_any_lamp_identified(const LampImages& images, Observations& result) {
   check_any_image_readable(images.images, result.images);
   if (count_lights_of_kind(result.images, LightKind::lamp) == 0) {
     result.failure = {false, explain_no_lamp(result.images, images.lamps)};
   } else if (std::none_of(result.images.begin(), result.images.end(),
-                          [](const Observation& image) { return image.is_kept(); })) {
+                          [](const Observation& image) { return image.is_image_kept(); })) {
     result.failure = {false, describe_why_no_image_is_kept(result.images)};
   }
 }
@@ -403,10 +406,10 @@ Readout estimate_readout_direction(const std::vector<fs::path>& images,
   ImageSource source(images, options, imager_px);
   cv::Mat pixels;
   const auto found = estimate_readout_direction(source.expected_image_count(), [&](std::size_t) {
-    const auto image = source.read_next();
+    const auto image = source.read_next_image();
     pixels.release();
     try {
-      if (image) pixels = image->read(options);
+      if (image) pixels = image->read_gray_image(options);
     } catch (const InputError&) {  // rejected when its lights are detected
     }
     return to_image_view(pixels);
@@ -424,7 +427,7 @@ Readout estimate_readout_direction(const std::vector<fs::path>& images,
   return *found;
 }
 
-void check_lamp_frequencies(const LampMap& lamps, const fs::path& lamps_file) {
+void check_map_has_lamp_frequencies(const LampMap& lamps, const fs::path& lamps_file) {
   if (std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
                   [](const Lamp& lamp) { return lamp.frequency_hz.has_value(); })) {
     return;
@@ -433,8 +436,8 @@ void check_lamp_frequencies(const LampMap& lamps, const fs::path& lamps_file) {
                    "no lamp has a frequency_hz, which is needed to identify lamps; add it");
 }
 
-void check_lamps_in_map(std::span<const Frame> frames, const LampMap& lamps,
-                        const fs::path& lamps_file) {
+void check_map_contains_captured_lamps(std::span<const Frame> frames, const LampMap& lamps,
+                                       const fs::path& lamps_file) {
   for (const Frame& frame : frames) {
     for (const Detection& detection : frame.detections) {
       if (find_lamp_by_id(lamps.lamps, detection.lamp) != nullptr) return;

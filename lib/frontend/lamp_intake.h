@@ -22,7 +22,7 @@
 namespace vlp {
 
 /// Rotations level_from_camera of images, by name; std::nullopt if unknown
-/// (LightDetector::with_tilt()).
+/// (LightDetector::copy_detector_with_tilt()).
 using LevelRotations = std::map<std::string, std::optional<Eigen::Matrix3d>>;
 
 /// Computes the rotation level_from_camera from the inclination of a robot.
@@ -32,12 +32,14 @@ using LevelRotations = std::map<std::string, std::optional<Eigen::Matrix3d>>;
 /// @param base_from_camera  rotation by the calibrated tilt of the camera
 /// @return                  rotation with an arbitrary yaw; a detector uses only its zenith
 ///     direction
-Eigen::Matrix3d compute_level_rotation(const Inclination& inclination, double yaw_in_robot_rad,
-                                       const Eigen::Matrix3d& base_from_camera);
+Eigen::Matrix3d compute_level_rotation_from_inclination(const Inclination& inclination,
+                                                        double yaw_in_robot_rad,
+                                                        const Eigen::Matrix3d& base_from_camera);
 
 /// Returns the level rotations of the images whose inclination is in the table.
-LevelRotations compute_level_rotations(const CapturesTable& captures,
-                                       const Calibration& calibration, double yaw_in_robot_rad);
+LevelRotations compute_level_rotations_of_images(const CapturesTable& captures,
+                                                 const Calibration& calibration,
+                                                 double yaw_in_robot_rad);
 
 /// Images of lamps with the lamp map and the camera.
 struct LampImages {
@@ -67,7 +69,8 @@ class LampIntake {
              const std::optional<std::array<int, 2>>& imager_px, LevelRotations levels = {});
 
   /// Creates the intake of a set of images: reads the classifier and estimates the readout
-  /// direction if it is not known. detect_in_all_images() returns its notes and warnings, too.
+  /// direction if it is not known. detect_lamps_in_all_images() returns its notes and warnings,
+  /// too.
   /// @throws InputError if the row time, the frequencies or images are missing, or if captures.csv
   ///     cannot be read; also if the classifier is for other lamps or another row time
   LampIntake(const LampImages& images, ImageUse use, const FrontendOptions& options);
@@ -76,20 +79,20 @@ class LampIntake {
   /// dark, overexposed, or shows fewer lamps than its use needs. Repeated images are not rejected
   /// here, see Selection.
   /// @throws InputError if an annotated image cannot be written
-  Observation detect_in_image(const SourceImage& source) const;
+  Observation detect_lamps_in_image(const SourceImage& source) const;
 
   /// Returns an intake that repeats a detection with other level rotations for some images. It
   /// rejects no image for its content.
-  LampIntake copy_with_level_rotations(const LevelRotations& levels) const;
+  LampIntake copy_intake_with_level_rotations(const LevelRotations& levels) const;
   /// Returns the same intake with annotated images in `folder`; without them if it is empty.
-  LampIntake with_annotation_folder(const std::filesystem::path& folder) const;
+  LampIntake copy_intake_with_annotation_folder(const std::filesystem::path& folder) const;
 
-  /// Applies detect_in_image() to all images and video frames. Returns one observation per image,
-  /// in order.
-  Observations detect_in_all_images(const std::vector<std::filesystem::path>& files,
-                                    const IntakeProgress& progress = {}) const;
+  /// Applies detect_lamps_in_image() to all images and video frames. Returns one observation per
+  /// image, in order.
+  Observations detect_lamps_in_all_images(const std::vector<std::filesystem::path>& files,
+                                          const IntakeProgress& progress = {}) const;
 
-  Readout readout() const { return detector_.readout(); }
+  Readout readout_direction() const { return detector_.readout_direction(); }
 
  private:
   /// Notes and warnings about the set of images.
@@ -117,7 +120,7 @@ Observations detect_lamps_in_images(const LampImages& images, ImageUse use,
 
 /// Sets Observations::failure if no lamp is identified in any image, or no image is kept.
 /// @throws InputError if no image can be read
-void check_lamps_identified(const LampImages& images, Observations& result);
+void check_any_lamp_identified(const LampImages& images, Observations& result);
 
 /// Estimates the readout direction from images unless it is known. Adds a note to `result`, or a
 /// warning if the images do not determine it and rows are assumed.
@@ -129,11 +132,11 @@ Readout estimate_readout_direction(const std::vector<std::filesystem::path>& ima
 
 /// Checks the frequencies of a lamp map.
 /// @throws InputError if no lamp has a frequency
-void check_lamp_frequencies(const LampMap& lamps, const std::filesystem::path& lamps_file);
+void check_map_has_lamp_frequencies(const LampMap& lamps, const std::filesystem::path& lamps_file);
 
 /// Checks that a lamp map belongs to captures.
 /// @throws InputError if the map has none of the lamps in the captures
-void check_lamps_in_map(std::span<const Frame> frames, const LampMap& lamps,
-                        const std::filesystem::path& lamps_file);
+void check_map_contains_captured_lamps(std::span<const Frame> frames, const LampMap& lamps,
+                                       const std::filesystem::path& lamps_file);
 
 }  // namespace vlp

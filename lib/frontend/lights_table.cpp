@@ -22,7 +22,7 @@ namespace {
 std::string_view outline_name(const Light& light) {
   if (light.kind == LightKind::formless) return "";
   if (light.is_glow) return "glow";
-  if (!is_disc(light)) return traits_of(light.shape).name;
+  if (!is_disc_light(light)) return get_lamp_shape_traits(light.shape).name;
   return light.is_uneven ? "rim" : "edge";
 }
 
@@ -44,7 +44,7 @@ int count_lights_of_kind(std::span<const Observation> images, LightKind kind) {
   return static_cast<int>(count);
 }
 
-std::vector<CountedReason> count_light_reasons(std::span<const Observation> images) {
+std::vector<CountedReason> count_rejected_lights_by_reason(std::span<const Observation> images) {
   std::map<std::pair<LightKind, LightReason>, int> counts;
   for (const Observation& image : images) {
     for (const Light& light : image.lights) {
@@ -63,7 +63,7 @@ std::vector<CountedReason> count_light_reasons(std::span<const Observation> imag
   return reasons;
 }
 
-std::string_view to_string(LightKind kind) {
+std::string_view light_kind_name(LightKind kind) {
   constexpr std::array<std::pair<LightKind, std::string_view>, 5> names{
       {{LightKind::lamp, "lamp"},
        {LightKind::cut, "cut"},
@@ -73,7 +73,7 @@ std::string_view to_string(LightKind kind) {
   return find_name(names, kind);
 }
 
-std::string_view to_string(LightReason reason) {
+std::string_view light_reason_name(LightReason reason) {
   constexpr std::array<std::pair<LightReason, std::string_view>, 9> names{
       {{LightReason::identified, "identified"},
        // [LAMP-2] `overexposed` | most pixels of the light at full scale | expose shorter
@@ -101,7 +101,7 @@ std::string_view to_string(LightReason reason) {
   return find_name(names, reason);
 }
 
-std::string describe(LightReason reason) {
+std::string describe_light_reason(LightReason reason) {
   switch (reason) {
     case LightReason::identified:
       return "its stripes match this lamp";
@@ -135,15 +135,16 @@ std::string describe(LightReason reason) {
 }
 
 std::string describe_light(const Light& light) {
-  std::string line =
-      fmt::format("({:.1f}, {:.1f}) {}", light.pixel.x(), light.pixel.y(), to_string(light.kind));
+  std::string line = fmt::format("({:.1f}, {:.1f}) {}", light.pixel.x(), light.pixel.y(),
+                                 light_kind_name(light.kind));
   if (light.lamp) line += fmt::format(" {}", *light.lamp);
-  line += fmt::format(": {}; radius {:.1f} px", describe(light.reason), light.radius_px);
+  line +=
+      fmt::format(": {}; radius {:.1f} px", describe_light_reason(light.reason), light.radius_px);
   if (light.kind == LightKind::formless) return line;
   const Stripes& stripes = light.stripes;
-  line +=
-      fmt::format(", {} {:.0f} % {}, contrast {:.2f}", outline_name(light), 100 * light.roundness,
-                  traits_of(light.shape).is_round ? "round" : "straight", stripes.contrast);
+  line += fmt::format(
+      ", {} {:.0f} % {}, contrast {:.2f}", outline_name(light), 100 * light.roundness,
+      get_lamp_shape_traits(light.shape).is_round ? "round" : "straight", stripes.contrast);
   if (!(stripes.period_lines > 0)) return line;
   return line + fmt::format(
                     ", {:.1f} periods of {:.2f} lines, periodicity_r2 {:.2f}, coherence {:.2f}",
@@ -162,14 +163,15 @@ void write_lights_table(const std::filesystem::path& file, std::span<const Obser
       const Stripes& stripes = light.stripes;
       const bool form = light.kind != LightKind::formless;
       const bool striped = form && stripes.period_lines > 0;
-      csv.row({image.file_name(), to_string(light.kind), to_string(light.reason), lamp_name(light),
-               format_fixed_decimals(light.pixel.x(), 4), format_fixed_decimals(light.pixel.y(), 4),
-               number_if(form, light.sigma_px), format_fixed_decimals(light.radius_px, 4),
-               outline_name(light), number_if(form, light.rise_px),
-               number_if(form, light.roundness), number_if(form, stripes.contrast),
-               number_if(striped, stripes.period_lines), number_if(striped, stripes.periods),
-               number_if(striped, stripes.periodicity_r2), number_if(striped, light.coherence),
-               number_if(striped, stripes.duty)});
+      csv.write_csv_row(
+          {image.image_file_name(), light_kind_name(light.kind), light_reason_name(light.reason),
+           lamp_name(light), format_fixed_decimals(light.pixel.x(), 4),
+           format_fixed_decimals(light.pixel.y(), 4), number_if(form, light.sigma_px),
+           format_fixed_decimals(light.radius_px, 4), outline_name(light),
+           number_if(form, light.rise_px), number_if(form, light.roundness),
+           number_if(form, stripes.contrast), number_if(striped, stripes.period_lines),
+           number_if(striped, stripes.periods), number_if(striped, stripes.periodicity_r2),
+           number_if(striped, light.coherence), number_if(striped, stripes.duty)});
     }
   }
   csv.save_file();
@@ -191,7 +193,7 @@ cv::Scalar choose_color(LightKind kind) {
 
 std::string make_label(const Light& light) {
   if (light.kind != LightKind::lamp && light.kind != LightKind::cut) {
-    return fmt::format("{}: {}", to_string(light.kind), to_string(light.reason));
+    return fmt::format("{}: {}", light_kind_name(light.kind), light_reason_name(light.reason));
   }
   return std::to_string(*light.lamp) + (light.kind == LightKind::cut ? " cut" : "");
 }

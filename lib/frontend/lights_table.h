@@ -27,22 +27,23 @@ struct CountedReason {
 
 /// Counts the lights that are no lamps, per kind and reason. The most frequent reason comes first.
 /// Lights without outline come last, because they are rarely lamps.
-std::vector<CountedReason> count_light_reasons(std::span<const Observation> images);
+std::vector<CountedReason> count_rejected_lights_by_reason(std::span<const Observation> images);
 
 /// Returns the enumerator as a word, for example "steady" and "too_few_periods".
-std::string_view to_string(LightKind kind);
-std::string_view to_string(LightReason reason);
+std::string_view light_kind_name(LightKind kind);
+std::string_view light_reason_name(LightReason reason);
 
 /// Describes a reason and its remedy in a clause, for example "it shows no clear period: ...".
-std::string describe(LightReason reason);
+std::string describe_light_reason(LightReason reason);
 
 /// Describes a light in one line: its position, its kind with the reason, and its measurements.
 std::string describe_light(const Light& light);
 
-/// Writes `lights.csv` atomically, one row per light. Columns: image, kind, reason (to_string()
-/// both), lamp, u_px, v_px, sigma_px, radius_px, outline (edge, rim, glow or shape), edge_rise_px,
-/// inlier_fraction, contrast, period_lines, periods, periodicity_r2, coherence, duty; see Light and
-/// Stripes. Cells are empty for a light without lamp, stripes or outline.
+/// Writes `lights.csv` atomically, one row per light. Columns: image, kind, reason
+/// (light_kind_name(), light_reason_name()), lamp, u_px, v_px, sigma_px, radius_px, outline (edge,
+/// rim, glow or shape), edge_rise_px, inlier_fraction, contrast, period_lines, periods,
+/// periodicity_r2, coherence, duty; see Light and Stripes. Cells are empty for a light without
+/// lamp, stripes or outline.
 /// @throws InputError if the file cannot be written
 void write_lights_table(const std::filesystem::path& file, std::span<const Observation> images);
 

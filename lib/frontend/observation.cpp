@@ -54,14 +54,16 @@ const ReasonText& find_text(RejectionReason reason) {
 
 }  // namespace
 
-std::string_view to_string(RejectionReason reason) { return find_text(reason).phrase; }
+std::string_view rejection_reason_phrase(RejectionReason reason) {
+  return find_text(reason).phrase;
+}
 
-bool is_redundant(RejectionReason reason) {
+bool is_redundancy_rejection(RejectionReason reason) {
   return reason == RejectionReason::same_image || reason == RejectionReason::same_view ||
          reason == RejectionReason::not_needed;
 }
 
-void prepend_remarks(const Observations& remarks, Observations& result) {
+void prepend_observation_messages(const Observations& remarks, Observations& result) {
   result.warnings.insert(result.warnings.begin(), remarks.warnings.begin(), remarks.warnings.end());
   result.notes.insert(result.notes.begin(), remarks.notes.begin(), remarks.notes.end());
 }
@@ -74,18 +76,19 @@ std::vector<Detection> collect_identified_lamps(const Observation& image) {
   return lamps;
 }
 
-std::vector<BoardView> collect_kept_views(std::span<const Observation> images) {
+std::vector<BoardView> collect_kept_board_views(std::span<const Observation> images) {
   std::vector<BoardView> views;
   for (const Observation& image : images) {
-    if (image.is_kept() && image.board) views.push_back(*image.board);
+    if (image.is_image_kept() && image.board) views.push_back(*image.board);
   }
   return views;
 }
 
-std::vector<Frame> collect_kept_frames(std::span<const Observation> images) {
+std::vector<Frame> collect_kept_lamp_frames(std::span<const Observation> images) {
   std::vector<Frame> frames;
   for (const Observation& image : images) {
-    if (image.is_kept()) frames.push_back({image.file_name(), collect_identified_lamps(image)});
+    if (image.is_image_kept())
+      frames.push_back({image.image_file_name(), collect_identified_lamps(image)});
   }
   return frames;
 }
@@ -95,12 +98,13 @@ std::string summarize_image_rejections(std::span<const Observation> images) {
   std::map<std::pair<RejectionReason, std::string>, std::string> remedies;
   int rejected = 0;
   for (const Observation& image : images) {
-    if (image.is_kept()) continue;
+    if (image.is_image_kept()) continue;
     const auto& [reason, message] = *image.rejection;
     // The message names the run of the image; the text after the colon is the remedy.
     const bool has_owner = reason == RejectionReason::used_elsewhere;
     const auto colon = std::min(message.find(':'), message.size());
-    const std::pair key(reason, has_owner ? message.substr(0, colon) : to_string(reason).data());
+    const std::pair key(
+        reason, has_owner ? message.substr(0, colon) : rejection_reason_phrase(reason).data());
     remedies[key] = has_owner ? message.substr(colon) : find_text(reason).remedy;
     ++counts[key];
     ++rejected;
@@ -121,39 +125,41 @@ std::string describe_why_no_image_is_kept(std::span<const Observation> images) {
 void check_any_image_readable(const std::filesystem::path& where,
                               std::span<const Observation> images) {
   const auto is_readable = [](const Observation& image) {
-    return image.is_kept() || (image.rejection->reason != RejectionReason::unreadable &&
-                               image.rejection->reason != RejectionReason::wrong_size);
+    return image.is_image_kept() || (image.rejection->reason != RejectionReason::unreadable &&
+                                     image.rejection->reason != RejectionReason::wrong_size);
   };
   if (std::any_of(images.begin(), images.end(), is_readable)) return;
   std::string message = fmt::format("none of its {} images can be used", images.size());
   if (!images.empty()) {
-    message += fmt::format("; the first, {}: {}", images.front().file_name(),
+    message += fmt::format("; the first, {}: {}", images.front().image_file_name(),
                            images.front().rejection->message);
   }
   throw InputError(where, message);
 }
 
-void read_image_and_detect(const SourceImage& source, const FrontendOptions& options,
-                           const std::optional<std::array<int, 2>>& imager_px, Observation& result,
-                           const std::function<void(const cv::Mat&)>& detect) {
+void read_image_and_run_detection(const SourceImage& source, const FrontendOptions& options,
+                                  const std::optional<std::array<int, 2>>& imager_px,
+                                  Observation& result,
+                                  const std::function<void(const cv::Mat&)>& detect) {
   RejectionReason reason = RejectionReason::unreadable;
   try {
-    const cv::Mat image = source.read(options);
+    const cv::Mat image = source.read_gray_image(options);
     result.size_px = {image.cols, image.rows};
     reason = RejectionReason::wrong_size;
-    check_image_matches_imager(source.file, result.size_px, imager_px);
+    check_image_size_matches_imager(source.file, result.size_px, imager_px);
     reason = RejectionReason::unreadable;
     detect(image);
   } catch (const InputError& error) {
-    result.set_rejection(reason, make_one_line_message(source.file, error));
+    result.set_image_rejection(reason, make_one_line_message(source.file, error));
   } catch (const std::exception& error) {
-    result.set_rejection(reason, "cannot be used: " + make_one_line_message(source.file, error));
+    result.set_image_rejection(reason,
+                               "cannot be used: " + make_one_line_message(source.file, error));
   }
 }
 
-Observations detect_in_images(ImageSource& source, int threads,
-                              const std::function<Observation(const SourceImage&)>& observe,
-                              const IntakeProgress& progress) {
+Observations collect_observations_of_images(
+    ImageSource& source, int threads, const std::function<Observation(const SourceImage&)>& observe,
+    const IntakeProgress& progress) {
   Observations result;
   std::mutex counting;
   std::size_t done = 0;
@@ -208,38 +214,39 @@ bool are_points_close(const std::vector<PointDetection>& a, const std::vector<Po
 
 }  // namespace
 
-int min_lamps_for_use(ImageUse use) {
+int min_lamps_for_image_use(ImageUse use) {
   return use == ImageUse::turn || use == ImageUse::places ? 2 : 0;
 }
 
-void Selection::add(Observation& image) {
-  if (!image.is_kept() || use_ == ImageUse::fixes) return;
+void Selection::add_or_reject_image(Observation& image) {
+  if (!image.is_image_kept() || use_ == ImageUse::fixes) return;
   std::vector<PointDetection> points = get_points_in(image);
   if (points.empty()) return;
   for (const Kept& kept : kept_) {
     if (!are_points_equal(points, kept.points)) continue;
     // [FILE-10] `the same image`, `the same view` | copy, or view within 1 % of the image width of
     //   another; counts once | move the board, or rotate the camera
-    return image.set_rejection(RejectionReason::same_image, "is the same image as " + kept.name);
+    return image.set_image_rejection(RejectionReason::same_image,
+                                     "is the same image as " + kept.name);
   }
   if (use_ != ImageUse::places) {
     for (const Kept& kept : kept_) {
       if (!are_points_close(points, kept.points, same_view_fraction_ * image.size_px[0])) continue;
-      return image.set_rejection(RejectionReason::same_view,
-                                 "shows the same view as " + kept.name + ": views count once");
+      return image.set_image_rejection(
+          RejectionReason::same_view, "shows the same view as " + kept.name + ": views count once");
     }
   }
-  kept_.push_back({image.file_name(), std::move(points)});
+  kept_.push_back({image.image_file_name(), std::move(points)});
 }
 
-void Selection::keep(const Observation& image) {
-  if (use_ != ImageUse::fixes) kept_.push_back({image.file_name(), get_points_in(image)});
+void Selection::add_kept_image(const Observation& image) {
+  if (use_ != ImageUse::fixes) kept_.push_back({image.image_file_name(), get_points_in(image)});
 }
 
 void reject_repeated_images(std::vector<Observation>& images, ImageUse use,
                             const FrontendOptions& options) {
   Selection selection(use, options);
-  for (Observation& image : images) selection.add(image);
+  for (Observation& image : images) selection.add_or_reject_image(image);
 }
 
 }  // namespace vlp

@@ -42,10 +42,10 @@ enum class RejectionReason {
 
 /// Returns a phrase for a message that follows a number of images: "blurred" for "10 blurred",
 /// "cannot be read", ...
-std::string_view to_string(RejectionReason reason);
+std::string_view rejection_reason_phrase(RejectionReason reason);
 
 /// Returns true if the image has no fault, but other images make it unnecessary.
-bool is_redundant(RejectionReason reason);
+bool is_redundancy_rejection(RejectionReason reason);
 
 /// Rejection of an image.
 struct Rejection {
@@ -74,9 +74,9 @@ struct Observation {
   std::vector<Light> lights = {};
   Readout readout = Readout::rows;
 
-  bool is_kept() const { return !rejection; }
-  std::string file_name() const { return file.filename().string(); }
-  void set_rejection(RejectionReason reason, std::string message) {
+  bool is_image_kept() const { return !rejection; }
+  std::string image_file_name() const { return file.filename().string(); }
+  void set_image_rejection(RejectionReason reason, std::string message) {
     rejection = Rejection{reason, std::move(message)};
   }
 };
@@ -99,17 +99,17 @@ struct Observations {
 };
 
 /// Inserts the messages of `remarks` before those of `result`.
-void prepend_remarks(const Observations& remarks, Observations& result);
+void prepend_observation_messages(const Observations& remarks, Observations& result);
 
 /// Returns a detection for each light of kind `lamp`: id, pixel of the center, and its standard
 /// deviation.
 std::vector<Detection> collect_identified_lamps(const Observation& image);
 
 /// Returns the detections of the board in the images that are used, in their order.
-std::vector<BoardView> collect_kept_views(std::span<const Observation> images);
+std::vector<BoardView> collect_kept_board_views(std::span<const Observation> images);
 
 /// Returns the lamps in the images that are used, one frame per image.
-std::vector<Frame> collect_kept_frames(std::span<const Observation> images);
+std::vector<Frame> collect_kept_lamp_frames(std::span<const Observation> images);
 
 /// Returns the number of rejected images per reason, for example "10 blurred, 2 too dark". Appends
 /// the remedy if one reason applies to more than half of them. Empty if no image is rejected.
@@ -125,9 +125,10 @@ void check_any_image_readable(const std::filesystem::path& where,
 
 /// Reads an image and passes its pixels to `detect`. Rejects the image, with the reason, if it
 /// cannot be read, is not of `imager_px`, or makes `detect` throw an exception.
-void read_image_and_detect(const SourceImage& source, const FrontendOptions& options,
-                           const std::optional<std::array<int, 2>>& imager_px, Observation& result,
-                           const std::function<void(const cv::Mat&)>& detect);
+void read_image_and_run_detection(const SourceImage& source, const FrontendOptions& options,
+                                  const std::optional<std::array<int, 2>>& imager_px,
+                                  Observation& result,
+                                  const std::function<void(const cv::Mat&)>& detect);
 
 /// Callback with the number of images done and their total, as far as the headers of videos report
 /// it. Calls do not overlap.
@@ -135,9 +136,9 @@ using IntakeProgress = std::function<void(std::size_t done, std::size_t total)>;
 
 /// Calls `observe` for each image of the source on several threads and returns the results in the
 /// order of the images. An image that cannot be used does not end the run.
-Observations detect_in_images(ImageSource& source, int threads,
-                              const std::function<Observation(const SourceImage&)>& observe,
-                              const IntakeProgress& progress = {});
+Observations collect_observations_of_images(
+    ImageSource& source, int threads, const std::function<Observation(const SourceImage&)>& observe,
+    const IntakeProgress& progress = {});
 
 /// Use of a set of images, which determines the reasons for a rejection.
 enum class ImageUse {
@@ -157,10 +158,10 @@ class Selection {
 
   /// Rejects the image if it repeats one that was added or kept before. Does not change images that
   /// are already rejected or have no corners or lamps.
-  void add(Observation& image);
+  void add_or_reject_image(Observation& image);
 
   /// Adds an image that is used anyway. Later images that repeat it are rejected.
-  void keep(const Observation& image);
+  void add_kept_image(const Observation& image);
 
  private:
   struct Kept {
@@ -177,6 +178,6 @@ void reject_repeated_images(std::vector<Observation>& images, ImageUse use,
                             const FrontendOptions& options);
 
 /// Returns the minimum number of lamps that an image needs.
-int min_lamps_for_use(ImageUse use);
+int min_lamps_for_image_use(ImageUse use);
 
 }  // namespace vlp

@@ -19,14 +19,15 @@
 namespace vlp {
 
 bool is_video_file_name(const std::filesystem::path& file) {
-  return has_extension(file, {".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".mpg", ".mpeg"});
+  return has_file_extension(file,
+                            {".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".mpg", ".mpeg"});
 }
 
 std::string make_video_frame_name(const std::string& video, std::size_t number) {
   return fmt::format("{}#{:06}", video, number);
 }
 
-std::optional<std::string> parse_video_of_frame_name(const std::string& name) {
+std::optional<std::string> parse_video_name_from_frame_name(const std::string& name) {
   const auto mark = name.rfind('#');
   if (mark == std::string::npos || mark + 1 == name.size() ||
       name.find_first_not_of("0123456789", mark + 1) != std::string::npos ||
@@ -56,7 +57,7 @@ Video::Video(const std::string& source, const std::optional<std::array<int, 2>>&
   const bool has_ffmpeg = get_codecs().has_video_backend(cv::CAP_FFMPEG);
   const int file_api = !is_url && has_ffmpeg ? cv::CAP_FFMPEG : cv::CAP_ANY;
   VideoReader& video = *capture_->reader;
-  if (!video.open(source, is_live_camera() ? cv::CAP_V4L2 : file_api)) {
+  if (!video.open_video(source, is_live_camera() ? cv::CAP_V4L2 : file_api)) {
     // [FILE-1]
     // [FILE-8] `cannot be opened as a video` | codec missing in OpenCV, or end missing (an MP4 that
     //   was not closed) | record or convert again
@@ -64,25 +65,28 @@ Video::Video(const std::string& source, const std::optional<std::array<int, 2>>&
                                  ? "cannot be opened as a camera"
                                  : "cannot be opened as a video: is it cut short, or none?");
   }
-  video.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
+  video.set_video_property(cv::CAP_PROP_ORIENTATION_AUTO, 0);
   if (!is_live_camera() || !camera_px) return;
-  video.set(cv::CAP_PROP_FRAME_WIDTH, (*camera_px)[0]);
-  video.set(cv::CAP_PROP_FRAME_HEIGHT, (*camera_px)[1]);
-  video.set(cv::CAP_PROP_BUFFERSIZE, 1);  // returns the current frame, not a buffered one
+  video.set_video_property(cv::CAP_PROP_FRAME_WIDTH, (*camera_px)[0]);
+  video.set_video_property(cv::CAP_PROP_FRAME_HEIGHT, (*camera_px)[1]);
+  video.set_video_property(cv::CAP_PROP_BUFFERSIZE,
+                           1);  // returns the current frame, not a buffered one
 }
 
 Video::~Video() = default;
 
 bool Video::is_live_camera() const { return source_.starts_with("/dev/"); }
 
-std::array<int, 2> Video::size_px() const {
-  const auto of = [&](int property) { return static_cast<int>(capture_->reader->get(property)); };
+std::array<int, 2> Video::frame_size_px() const {
+  const auto of = [&](int property) {
+    return static_cast<int>(capture_->reader->get_video_property(property));
+  };
   return {of(cv::CAP_PROP_FRAME_WIDTH), of(cv::CAP_PROP_FRAME_HEIGHT)};
 }
 
 std::size_t Video::reported_frame_count() const {
   constexpr double max_frames = 1e9;
-  const double reported = capture_->reader->get(cv::CAP_PROP_FRAME_COUNT);
+  const double reported = capture_->reader->get_video_property(cv::CAP_PROP_FRAME_COUNT);
   return reported > 0 && reported < max_frames ? static_cast<std::size_t>(reported) : 0;
 }
 
@@ -103,19 +107,20 @@ bool Video::grab_frame() {
   return false;
 }
 
-std::optional<VideoFrame> Video::read_next() {
+std::optional<VideoFrame> Video::read_next_frame() {
   cv::Mat frame;
   do {
     if (!grab_frame()) return {};
   } while (!capture_->reader->retrieve_frame(frame) || frame.empty());
-  VideoFrame next{{}, grabbed_ - 1, capture_->reader->get(cv::CAP_PROP_POS_MSEC) / 1000};
+  VideoFrame next{
+      {}, grabbed_ - 1, capture_->reader->get_video_property(cv::CAP_PROP_POS_MSEC) / 1000};
   if (frame.channels() == 1) {
     next.image = frame.clone();  // OpenCV overwrites the buffer with the next frame
   } else {
     cv::cvtColor(frame, next.image, cv::COLOR_BGR2GRAY);
   }
   // Some decoders lose the time stamps of the last frames.
-  const double rate = capture_->reader->get(cv::CAP_PROP_FPS);
+  const double rate = capture_->reader->get_video_property(cv::CAP_PROP_FPS);
   if (!(next.time_s > last_s_) && last_ && rate > 0) {
     next.time_s = last_s_ + static_cast<double>(next.number - *last_) / rate;
   }
@@ -124,7 +129,7 @@ std::optional<VideoFrame> Video::read_next() {
   return next;
 }
 
-void Video::skip_frame() { grab_frame(); }
+void Video::skip_video_frame() { grab_frame(); }
 
 std::string Video::describe_missing_frames() const {
   const std::size_t reported = reported_frame_count();

@@ -20,7 +20,7 @@ bool is_video_file_name(const std::filesystem::path& file);
 std::string make_video_frame_name(const std::string& video, std::size_t number);
 
 /// Parses the name of a frame, VIDEO#000123, and returns VIDEO; std::nullopt for other names.
-std::optional<std::string> parse_video_of_frame_name(const std::string& name);
+std::optional<std::string> parse_video_name_from_frame_name(const std::string& name);
 
 /// Decoded frame of a video.
 struct VideoFrame {
@@ -45,12 +45,12 @@ class Video {
   Video& operator=(const Video&) = delete;
 
   /// Returns the next frame that can be decoded; std::nullopt at the end.
-  std::optional<VideoFrame> read_next();
+  std::optional<VideoFrame> read_next_frame();
   /// Skips the next frame.
-  void skip_frame();
+  void skip_video_frame();
 
   bool is_live_camera() const;
-  std::array<int, 2> size_px() const;
+  std::array<int, 2> frame_size_px() const;
   /// Number of frames according to the header of the file; 0 if unknown.
   std::size_t reported_frame_count() const;
   /// Describes missing frames in one line without the file name; empty if there are none.
@@ -64,7 +64,7 @@ class Video {
   std::string source_;
   std::unique_ptr<Capture> capture_;
   std::size_t grabbed_ = 0;
-  /// Number and time of the last frame that read_next() returned.
+  /// Number and time of the last frame that read_next_frame() returned.
   std::optional<std::size_t> last_;
   double last_s_ = -1;
   bool gap_ = false, ended_ = false;

@@ -11,13 +11,13 @@ Eigen::Matrix3d rotation_about_z(double yaw_rad) {
   return Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
 }
 
-Eigen::Matrix3d level_from_inclination(const Inclination& inclination) {
+Eigen::Matrix3d level_rotation_from_inclination(const Inclination& inclination) {
   return (Eigen::AngleAxisd(inclination.pitch_rad, Eigen::Vector3d::UnitY()) *
           Eigen::AngleAxisd(inclination.roll_rad, Eigen::Vector3d::UnitX()))
       .toRotationMatrix();
 }
 
-Eigen::Matrix3d level_from_zenith(const Eigen::Vector3d& zenith_in_camera) {
+Eigen::Matrix3d level_rotation_from_zenith(const Eigen::Vector3d& zenith_in_camera) {
   const Eigen::Vector3d up = zenith_in_camera.normalized();
   assert(up.z() > -1);
   // Rodrigues' formula for the rotation u -> e_z, free of trigonometry: the axis times the sine
@@ -30,7 +30,7 @@ Eigen::Matrix3d level_from_zenith(const Eigen::Vector3d& zenith_in_camera) {
   return level_from_camera;
 }
 
-Eigen::Vector3d level_from_world(const Pose& level, const Eigen::Vector3d& x_in_world) {
+Eigen::Vector3d level_point_from_world(const Pose& level, const Eigen::Vector3d& x_in_world) {
   return rotation_about_z(level.yaw_rad).transpose() * (x_in_world - level.position_m);
 }
 

@@ -32,15 +32,15 @@ struct Inclination {
 Eigen::Matrix3d rotation_about_z(double yaw_rad);
 
 /// Computes level_from_camera from the measurement of an inclination sensor.
-Eigen::Matrix3d level_from_inclination(const Inclination& inclination);
+Eigen::Matrix3d level_rotation_from_inclination(const Inclination& inclination);
 
 /// Computes level_from_camera from a calibrated tilt: the smallest rotation from
 /// `zenith_in_camera` to +Z. It adds no yaw.
 ///
 /// @param zenith_in_camera  up direction in the camera frame, of any length except 0, not -Z
-Eigen::Matrix3d level_from_zenith(const Eigen::Vector3d& zenith_in_camera);
+Eigen::Matrix3d level_rotation_from_zenith(const Eigen::Vector3d& zenith_in_camera);
 
 /// Transforms a point from the world frame to the level frame of the pose `level`, in m.
-Eigen::Vector3d level_from_world(const Pose& level, const Eigen::Vector3d& x_in_world);
+Eigen::Vector3d level_point_from_world(const Pose& level, const Eigen::Vector3d& x_in_world);
 
 }  // namespace vlp

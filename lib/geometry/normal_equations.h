@@ -21,7 +21,7 @@ struct Normal {
   /// Adds a weighted residual. `row` holds its derivatives with respect to the unknowns, as a
   /// std::array or an Eigen vector.
   template <typename Row>
-  void add_row(const Row& row, double residual, double weight = 1) {
+  void add_residual_row(const Row& row, double residual, double weight = 1) {
     const double* const slope = row.data();
     for (std::size_t i = 0; i < n; ++i) {
       const double weighted = weight * slope[i];
@@ -64,7 +64,7 @@ struct Cholesky {
   }
 
   /// Solves A y = x and returns y.
-  std::array<double, n> solve(std::array<double, n> x) const {
+  std::array<double, n> solve_normal_equations(std::array<double, n> x) const {
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t k = 0; k < i; ++k) x[i] -= lower[i][k] * x[k];
       x[i] *= inverse_diagonal[i];
@@ -80,7 +80,7 @@ struct Cholesky {
   std::array<double, n> compute_inverse_column(std::size_t i) const {
     std::array<double, n> unit{};
     unit[i] = 1;
-    return solve(unit);
+    return solve_normal_equations(unit);
   }
 };
 

@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-std::string describe(const ImageSize& size) {
+std::string describe_image_size(const ImageSize& size) {
   return std::to_string(size.width) + " x " + std::to_string(size.height);
 }
 
@@ -20,8 +20,9 @@ std::string describe(const ImageSize& size) {
 void check(const ImageView& image, const ImageSize& size) {
   if (image.data == nullptr) throw std::invalid_argument("the image has no pixels");
   if (image.size() != size) {
-    throw std::invalid_argument("the image is " + describe(image.size()) +
-                                ", the calibration's camera has " + describe(size) + " px");
+    throw std::invalid_argument("the image is " + describe_image_size(image.size()) +
+                                ", the calibration's camera has " + describe_image_size(size) +
+                                " px");
   }
   if (image.bits != 8 && image.bits != 16) {
     throw std::invalid_argument("pixels have " + std::to_string(image.bits) +
@@ -49,10 +50,10 @@ LampDetector::LampDetector(const LampMap& lamps, const Calibration& calibration)
   detector_ = std::make_shared<const LightDetector>(lamps, make_detector_camera(calibration));
 }
 
-std::vector<Detection> LampDetector::detect(const ImageView& image) const {
+std::vector<Detection> LampDetector::detect_lamps(const ImageView& image) const {
   check(image, size_);
   std::vector<Detection> detections;
-  for (const Light& light : detector_->detect(image)) {
+  for (const Light& light : detector_->detect_lights(image)) {
     if (light.kind != LightKind::lamp) continue;
     detections.push_back({*light.lamp, light.pixel, light.sigma_px});
   }

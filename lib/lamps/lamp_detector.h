@@ -15,7 +15,8 @@ namespace vlp {
 class LightDetector;  // light_detector.h: reports all lights with their measurements
 
 /// Detects and identifies the lamps of a map in images of a rolling-shutter camera, for
-/// Positioner::locate(). Immutable: any number of threads may share the detector and its copies.
+/// Positioner::compute_position_fix(). Immutable: any number of threads may share the detector and
+/// its copies.
 ///
 /// The center of a lamp is estimated from its outline, a disc or a rectangle, and projected through
 /// the lens. A lamp is identified by its frequency f, which makes stripes with a period of 1 / (f
@@ -35,7 +36,7 @@ class LampDetector {
   /// @return       pixel (u, v) of the centers and their standard deviation per axis, in pixels
   /// @throws std::invalid_argument if `image` has no pixels, another size, another bit depth, rows
   ///        that overlap, or 16-bit pixels at odd addresses
-  std::vector<Detection> detect(const ImageView& image) const;
+  std::vector<Detection> detect_lamps(const ImageView& image) const;
 
  private:
   std::shared_ptr<const LightDetector> detector_;

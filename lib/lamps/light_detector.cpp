@@ -28,14 +28,14 @@ namespace vlp {
 
 namespace {
 
-/// Function that fits a light to a blob with the outline of find_outline(), for lamps of one shape
-/// with the sizes `sizes_m`. Returns std::nullopt if the blob has another shape. See
-/// fit_rectangle().
-using ShapeDetector = decltype(&fit_rectangle);
+/// Function that fits a light to a blob with the outline of find_blob_outline(), for lamps of one
+/// shape with the sizes `sizes_m`. Returns std::nullopt if the blob has another shape. See
+/// fit_rectangular_light().
+using ShapeDetector = decltype(&fit_rectangular_light);
 
 /// Detectors of all shapes but discs, see LightShape, in the order in which they are tried.
-constexpr auto kShapeDetectors =
-    std::to_array<std::pair<ShapeKind, ShapeDetector>>({{ShapeKind::rectangle, &fit_rectangle}});
+constexpr auto kShapeDetectors = std::to_array<std::pair<ShapeKind, ShapeDetector>>(
+    {{ShapeKind::rectangle, &fit_rectangular_light}});
 
 /// Returns the largest number of lines without light between two stripes of a lamp.
 int compute_max_dark_rows(const LampMap& lamps, const std::optional<double>& row_time_s) {
@@ -62,19 +62,19 @@ bool is_full_scale_level(double level, int bits_per_pixel) {
   return false;
 }
 
-/// Returns Light::clipped of a steady light.
+/// Returns Light::clipped_fraction of a steady light.
 double clipped_fraction(const ImageView& lines, const Eigen::Vector2d& low,
                         const Eigen::Vector2d& high) {
   const Eigen::Vector2d middle = (low + high) / 2, size = (high - low) / 2;
-  const ImageView pixels = lines.part({static_cast<int>(std::lround(middle.x() - size.x() / 2)),
-                                       static_cast<int>(std::lround(middle.y() - size.y() / 2)),
-                                       static_cast<int>(std::lround(size.x())),
-                                       static_cast<int>(std::lround(size.y()))});
+  const ImageView pixels = lines.crop_to_box(
+      {static_cast<int>(std::lround(middle.x() - size.x() / 2)),
+       static_cast<int>(std::lround(middle.y() - size.y() / 2)),
+       static_cast<int>(std::lround(size.x())), static_cast<int>(std::lround(size.y()))});
   if (pixels.empty()) return 0;
   int brightest = 0, count = 0;
   for (int row = 0; row < pixels.height; ++row) {
     for (int column = 0; column < pixels.width; ++column) {
-      const int level = pixels.level_at(column, row);
+      const int level = pixels.gray_level_at_pixel(column, row);
       if (level > brightest) count = 0;
       brightest = std::max(brightest, level);
       count += level == brightest ? 1 : 0;
@@ -113,7 +113,7 @@ std::optional<LightReason> find_reason_for_steady_light(const Light& light) {
   constexpr double min_clarity = 0.5, min_clipped = 0.5;
   const Stripes& stripes = light.stripes;
   if (!(stripes.contrast >= kMinContrast)) {
-    return light.clipped > min_clipped ? LightReason::overexposed : LightReason::steady;
+    return light.clipped_fraction > min_clipped ? LightReason::overexposed : LightReason::steady;
   }
   if (!(stripes.periods >= kMinPeriods)) return LightReason::too_few_periods;
   if (!(stripes.periodicity_r2 >= min_clarity)) return LightReason::no_clear_period;
@@ -130,9 +130,9 @@ Blob clip(std::span<const Blob> blobs, const PixelBox& box) {
   Blob result;
   for (const Blob& blob : blobs) {
     for (PixelRun run : blob.runs) {
-      if (run.row < box.y || run.row >= box.bottom()) continue;
+      if (run.row < box.y || run.row >= box.end_row()) continue;
       run.begin = std::max(run.begin, box.x);
-      run.end = std::min(run.end, box.right());
+      run.end = std::min(run.end, box.end_column());
       if (run.begin < run.end) result.runs.push_back(run);
     }
   }
@@ -148,9 +148,9 @@ Blob find_pixels_above_level(const PixelBox& box, std::span<const Blob> blobs,
                              const ImageSize& size) {
   constexpr int max_area_ratio = 4;
   for (const Blob& blob : blobs) {
-    const PixelBox whole = blob.bounding_box();
-    const bool is_most = 2 * intersection(whole, box).area() > box.area();
-    if (is_most && whole.area() < max_area_ratio * box.area()) return blob;
+    const PixelBox whole = blob.blob_bounding_box();
+    const bool is_most = 2 * intersect_boxes(whole, box).area_px() > box.area_px();
+    if (is_most && whole.area_px() < max_area_ratio * box.area_px()) return blob;
   }
   return clip(blobs, expand_and_clip_box(box, std::max(box.width, box.height) / 4, size));
 }
@@ -164,7 +164,7 @@ Light make_light_without_outline(const ImageView& lines, const ModulatedLight& f
   const PixelBox& box = found.box;
   light.low = shape.swap_image_and_scanline_axes({box.x - 0.5, box.y - 0.5});
   light.high = shape.swap_image_and_scanline_axes(
-      {std::min(box.right(), lines.width) - 0.5, std::min(box.bottom(), lines.height) - 0.5});
+      {std::min(box.end_column(), lines.width) - 0.5, std::min(box.end_row(), lines.height) - 0.5});
   light.rise_px = found.radius_px / 2;
   light.roundness = 1;
   light.is_glow = true;
@@ -203,8 +203,8 @@ Light make_light_from_modulation(const ImageView& lines, const ModulatedLight& f
 std::vector<PixelBox> merge_overlapping_boxes(std::vector<PixelBox> boxes) {
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     for (std::size_t j = 0; j < boxes.size(); ++j) {
-      if (j == i || intersection(boxes[i], boxes[j]).area() == 0) continue;
-      boxes[i] = around(boxes[i], boxes[j]);
+      if (j == i || intersect_boxes(boxes[i], boxes[j]).area_px() == 0) continue;
+      boxes[i] = enclosing_box(boxes[i], boxes[j]);
       boxes.erase(boxes.begin() + std::ptrdiff_t(j));
       if (j < i) --i;
       j = std::size_t(-1);  // the larger box may also overlap earlier boxes
@@ -220,7 +220,8 @@ DetectorCamera make_detector_camera(const Calibration& calibration) {
   DetectorCamera result{camera.readout.value_or(Readout::rows), camera.row_time_s,
                         Lens(camera.lens_model, camera.intrinsics)};
   if (calibration.rotation_center) {
-    result.level_from_camera = level_from_zenith(calibration.rotation_center->zenith_in_camera);
+    result.level_from_camera =
+        level_rotation_from_zenith(calibration.rotation_center->zenith_in_camera);
   }
   return result;
 }
@@ -252,7 +253,7 @@ LightDetector::LightDetector(const LampMap& lamps, const DetectorCamera& camera,
   }
 }
 
-LightDetector LightDetector::with_tilt(
+LightDetector LightDetector::copy_detector_with_tilt(
     const std::optional<Eigen::Matrix3d>& level_from_camera) const {
   DetectorCamera camera = camera_;
   if (level_from_camera) {
@@ -264,7 +265,7 @@ LightDetector LightDetector::with_tilt(
   return {lamps_, camera, classifier_};
 }
 
-LightDetector LightDetector::with_readout_direction(Readout readout) const {
+LightDetector LightDetector::copy_detector_with_readout_direction(Readout readout) const {
   DetectorCamera camera = camera_;
   camera.readout = readout;
   return {lamps_, camera, classifier_};
@@ -273,9 +274,9 @@ LightDetector LightDetector::with_readout_direction(Readout readout) const {
 std::vector<LightPart> LightDetector::find_light_parts(const ImageView& lines, const Blob& blob,
                                                        const Background& background) const {
   constexpr std::size_t max_lights = 4;
-  const PixelBox box = blob.bounding_box();
+  const PixelBox box = blob.blob_bounding_box();
   std::vector<LightPart> parts;
-  auto remaining = find_outline(lines, blob, background);
+  auto remaining = find_blob_outline(lines, blob, background);
   for (const auto& [kind, detect] : kShapeDetectors) {
     const auto sizes_m = sizes_m_.find(kind);
     if (sizes_m == sizes_m_.end()) continue;
@@ -288,7 +289,8 @@ std::vector<LightPart> LightDetector::find_light_parts(const ImageView& lines, c
     auto light = shape_.fit_light_to_outline(remaining, background);
     if (!light && !parts.empty()) break;
     auto outline = std::move(remaining);
-    remaining = light ? shape_.outside(*light, outline) : std::vector<EdgePoint>();
+    remaining =
+        light ? shape_.find_outline_points_outside(*light, outline) : std::vector<EdgePoint>();
     parts.push_back({std::move(light), std::move(outline), box});
     if (remaining.empty()) break;
   }
@@ -320,11 +322,11 @@ void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
     if (!has_clear_outline(light)) return false;
     const auto steady = find_reason_for_steady_light(light);
     if (steady) return *steady == LightReason::steady || *steady == LightReason::overexposed;
-    return identify_lamp(light.stripes).has_value();
+    return identify_lamp_by_stripes(light.stripes).has_value();
   };
   std::vector<PixelBox> boxes;
   for (const Blob& blob : blobs) {
-    const PixelBox box = blob.bounding_box();
+    const PixelBox box = blob.blob_bounding_box();
     const Eigen::Vector2d middle(box.x + box.width / 2.0, box.y + box.height / 2.0);
     const bool is_known = std::any_of(lights.begin(), lights.end(), [&](const Light& light) {
       return is_conclusive(light) &&
@@ -347,7 +349,7 @@ void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
     if (found.lamp) light.lamp = lamps_by_period_[*found.lamp];
     // Lamps with the same period differ in duty; without known periods a classifier decides.
     const bool has_choice = found.lamp ? !light.lamp : lamp_periods_.empty();
-    if (has_choice) light.lamp = identify_lamp(light.stripes);
+    if (has_choice) light.lamp = identify_lamp_by_stripes(light.stripes);
     const auto is_at_it = [&](const Light& other) { return are_at_same_position(other, light); };
     const auto is_better = [&](const Light& other) {
       return is_at_it(other) && (!found.lamp || other.by_modulation || is_conclusive(other));
@@ -360,11 +362,11 @@ void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
 
 void LightDetector::refine_and_measure_light(const ImageView& lines, const Background& background,
                                              Light& light) const {
-  if (is_disc(light)) {
+  if (is_disc_light(light)) {
     const DiscImage disc{shape_.swap_image_and_scanline_axes(light.low),
                          shape_.swap_image_and_scanline_axes(light.high),
                          shape_.swap_image_and_scanline_axes(light.pixel)};
-    auto outline = refine_outline(lines, light.outline, disc, background);
+    auto outline = refine_disc_outline(lines, light.outline, disc, background);
     auto better =
         shape_.fit_light_to_outline(std::move(outline.points), background, outline.is_mottled);
     if (better && 2 * better->outline.size() > light.outline.size()) {
@@ -377,7 +379,7 @@ void LightDetector::refine_and_measure_light(const ImageView& lines, const Backg
   const Eigen::Vector2d low = shape_.swap_image_and_scanline_axes(light.low),
                         high = shape_.swap_image_and_scanline_axes(light.high);
   const auto chords =
-      is_disc(light)
+      is_disc_light(light)
           ? find_chords_in_ellipse(low, high, lines.size())
           : find_chords_in_polygon(shape_.swap_image_and_scanline_axes(light.face), lines.size());
   const auto signal = compute_scanline_signal(lines, chords, background.level);
@@ -387,10 +389,11 @@ void LightDetector::refine_and_measure_light(const ImageView& lines, const Backg
     light.coherence =
         compute_stripe_coherence(lines, chords, background, light.stripes.period_lines);
   }
-  if (light.stripes.contrast < kMinContrast) light.clipped = clipped_fraction(lines, low, high);
+  if (light.stripes.contrast < kMinContrast)
+    light.clipped_fraction = clipped_fraction(lines, low, high);
 }
 
-void LightDetector::correct_centers_for_motion(std::vector<Light>& lights) const {
+void LightDetector::correct_light_centers_for_motion(std::vector<Light>& lights) const {
   const auto has_sharp_circle = [](const Light& light) {
     return !light.sums.empty() && !light.is_glow && !light.is_uneven;
   };
@@ -403,12 +406,12 @@ void LightDetector::correct_centers_for_motion(std::vector<Light>& lights) const
   for (Light& light : lights) {
     if (!has_sharp_circle(light)) continue;
     shape_.correct_light_for_motion(shear->predict_oval_from_motion(light.sums),
-                                    shear->motion_per_scanline_of(light.sums), light);
+                                    shear->motion_per_scanline(light.sums), light);
   }
 }
 
-std::vector<Light> LightDetector::detect(const ImageView& image) const {
-  const Background background = estimate_background(image);
+std::vector<Light> LightDetector::detect_lights(const ImageView& image) const {
+  const Background background = estimate_image_background(image);
   const auto [lines, lit, memory] = make_scanline_image(image, camera_.readout, background);
   const auto blobs = group_pixel_runs_into_blobs(find_pixel_runs(lines, background.threshold, lit),
                                                  max_dark_rows_);
@@ -420,7 +423,7 @@ std::vector<Light> LightDetector::detect(const ImageView& image) const {
   }
   std::vector<Light> lights = join_parts_of_one_light(parts, shape_, background);
   for (Light& light : lights) refine_and_measure_light(lines, background, light);
-  correct_centers_for_motion(lights);
+  correct_light_centers_for_motion(lights);
   add_lights_found_by_modulation(lines, blobs, background, lights);
   for (Light& light : make_lights_without_outline(std::move(parts), lights, shape_, lines.size())) {
     lights.push_back(std::move(light));
@@ -428,8 +431,8 @@ std::vector<Light> LightDetector::detect(const ImageView& image) const {
   std::sort(lights.begin(), lights.end(), [](const Light& a, const Light& b) {
     return a.pixel.y() != b.pixel.y() ? a.pixel.y() < b.pixel.y() : a.pixel.x() < b.pixel.x();
   });
-  identify_lights(lights, image.size());
-  if (!shape_.has_lens()) add_error_of_unknown_lens(image.size(), lights);
+  identify_lamps_of_lights(lights, image.size());
+  if (!shape_.has_known_lens()) add_error_of_unknown_lens(image.size(), lights);
   return lights;
 }
 
@@ -508,13 +511,13 @@ void keep_best_light_of_lamp(int lamp, std::vector<Light>& lights) {
 
 }  // namespace
 
-bool is_fully_in_view(const Light& light, const ImageSize& size) {
+bool is_light_fully_in_view(const Light& light, const ImageSize& size) {
   return light.low.minCoeff() > -0.5 && light.high.x() < size.width - 0.5 &&
          light.high.y() < size.height - 0.5;
 }
 
-std::optional<int> LightDetector::identify_lamp(const Stripes& stripes) const {
-  if (classifier_) return vlp::identify_lamp(*classifier_, stripes);
+std::optional<int> LightDetector::identify_lamp_by_stripes(const Stripes& stripes) const {
+  if (classifier_) return vlp::identify_lamp_by_classifier(*classifier_, stripes);
   if (!camera_.row_time_s) return std::nullopt;
   return identify_lamp_by_frequency(lamps_, *camera_.row_time_s, stripes);
 }
@@ -522,7 +525,7 @@ std::optional<int> LightDetector::identify_lamp(const Stripes& stripes) const {
 std::optional<double> LightDetector::compute_log_aspect_ratio_difference(const Light& light,
                                                                          int lamp) const {
   // An unknown lens changes the aspect ratio by more than an unknown tilt.
-  const double max_off = shape_.has_lens() ? 2 * kUnknownTiltSd : 0.3;
+  const double max_off = shape_.has_known_lens() ? 2 * kUnknownTiltSd : 0.3;
   const Lamp* mapped = find_lamp_by_id(lamps_.lamps, lamp);  // a classifier may have other lamps
   const LampShape shape = mapped != nullptr ? mapped->shape : LampShape();
   if (shape.kind != light.shape) return std::nullopt;
@@ -531,7 +534,8 @@ std::optional<double> LightDetector::compute_log_aspect_ratio_difference(const L
   return off < max_off ? std::optional(off) : std::nullopt;
 }
 
-void LightDetector::identify_lights(std::vector<Light>& lights, const ImageSize& size) const {
+void LightDetector::identify_lamps_of_lights(std::vector<Light>& lights,
+                                             const ImageSize& size) const {
   // A surface that blurs the image of a lamp reflects less than 5 % of its light in one direction.
   // A tone curve of gamma 2.2 displays this as a quarter of the level.
   constexpr double min_peak_ratio = 0.25;
@@ -547,14 +551,14 @@ void LightDetector::identify_lights(std::vector<Light>& lights, const ImageSize&
       continue;
     }
     if (!light.is_uneven && !light.is_glow) sharpest_px = std::min(sharpest_px, light.rise_px);
-    if (!light.by_modulation) light.lamp = identify_lamp(light.stripes);
+    if (!light.by_modulation) light.lamp = identify_lamp_by_stripes(light.stripes);
     if (!are_stripes_readable(light.stripes)) light.reason = LightReason::no_clear_period;
     if (!light.lamp) continue;
     const auto off = compute_log_aspect_ratio_difference(light, *light.lamp);
     if (!off) {
       reject(light, LightReason::wrong_shape);
-    } else if (shape_.has_lens()) {
-      add_error_of_hidden_end(*off, shape_.has_tilt() ? 0 : kUnknownTiltSd, light);
+    } else if (shape_.has_known_lens()) {
+      add_error_of_hidden_end(*off, shape_.is_camera_tilted() ? 0 : kUnknownTiltSd, light);
     }
     if (light.lamp && !light.is_glow) brightest = std::max(brightest, light.peak);
   }
@@ -583,7 +587,7 @@ void LightDetector::identify_lights(std::vector<Light>& lights, const ImageSize&
   for (Light& light : lights) {
     if (light.lamp && !sure) reject(light, LightReason::too_few_periods);
     if (!light.lamp) continue;
-    light.kind = is_fully_in_view(light, size) ? LightKind::lamp : LightKind::cut;
+    light.kind = is_light_fully_in_view(light, size) ? LightKind::lamp : LightKind::cut;
     light.reason = LightReason::identified;
   }
 }

@@ -19,11 +19,11 @@
 namespace vlp {
 
 /// Returns true if the image border cuts no part of the light.
-bool is_fully_in_view(const Light& light, const ImageSize& size);
+bool is_light_fully_in_view(const Light& light, const ImageSize& size);
 
 /// Returns the camera parameters of a calibration for a detector: row time, lens, readout direction
-/// (rows if unknown). level_from_camera is the calibrated tilt (level_from_zenith()); identity
-/// without a rotation center.
+/// (rows if unknown). level_from_camera is the calibrated tilt (level_rotation_from_zenith());
+/// identity without a rotation center.
 DetectorCamera make_detector_camera(const Calibration& calibration);
 
 /// Detects and identifies the lamps of a map in images of a rolling-shutter camera. All methods are
@@ -43,16 +43,17 @@ class LightDetector {
                 std::optional<LampClassifier> classifier = {});
 
   /// Detects the lights of an image, sorted from the top. @pre The image is not empty.
-  std::vector<Light> detect(const ImageView& image) const;
+  std::vector<Light> detect_lights(const ImageView& image) const;
 
   /// Returns a copy of the detector for a camera with another tilt. If the tilt is unknown,
   /// ellipses are fitted in the image, as without a lens.
-  LightDetector with_tilt(const std::optional<Eigen::Matrix3d>& level_from_camera) const;
+  LightDetector copy_detector_with_tilt(
+      const std::optional<Eigen::Matrix3d>& level_from_camera) const;
 
   /// Returns a copy of the detector for images with another readout direction.
-  LightDetector with_readout_direction(Readout readout) const;
+  LightDetector copy_detector_with_readout_direction(Readout readout) const;
 
-  Readout readout() const { return camera_.readout; }
+  Readout readout_direction() const { return camera_.readout; }
 
  private:
   /// Fits outlines to a blob: one, or several if lights touch. Sets Light::is_doubtful.
@@ -67,13 +68,13 @@ class LightDetector {
   void refine_and_measure_light(const ImageView& lines, const Background& background,
                                 Light& light) const;
   /// Corrects the centers of partly visible lights for camera motion, see Shear.
-  void correct_centers_for_motion(std::vector<Light>& lights) const;
-  void identify_lights(std::vector<Light>& lights, const ImageSize& size) const;
+  void correct_light_centers_for_motion(std::vector<Light>& lights) const;
+  void identify_lamps_of_lights(std::vector<Light>& lights, const ImageSize& size) const;
   /// Returns the absolute difference between the log aspect ratios of a light and a lamp. Returns
   /// std::nullopt if the light has another shape or the difference exceeds its limit.
   std::optional<double> compute_log_aspect_ratio_difference(const Light& light, int lamp) const;
   /// Returns the id of the lamp with these stripes; std::nullopt if no lamp or several lamps agree.
-  std::optional<int> identify_lamp(const Stripes& stripes) const;
+  std::optional<int> identify_lamp_by_stripes(const Stripes& stripes) const;
 
   LampMap lamps_;
   DetectorCamera camera_;

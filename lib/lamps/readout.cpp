@@ -6,17 +6,17 @@
 
 namespace vlp {
 
-std::optional<Readout> ReadoutDirectionEvidence::readout() const {
+std::optional<Readout> ReadoutDirectionEvidence::readout_direction() const {
   constexpr double min_ratio = 3, min_evidence = 1;
   if (rows >= min_evidence && rows >= min_ratio * columns) return Readout::rows;
   if (columns >= min_evidence && columns >= min_ratio * rows) return Readout::columns;
   return std::nullopt;
 }
 
-double sum_readout_evidence(std::span<const Light> lights) {
+double sum_readout_direction_evidence(std::span<const Light> lights) {
   double sum = 0;
   for (const Light& light : lights) {
-    if (!is_modulated(light)) continue;
+    if (!is_light_modulated(light)) continue;
     sum += light.stripes.periodicity_r2 * light.stripes.contrast * light.roundness;
   }
   return sum;
@@ -24,9 +24,9 @@ double sum_readout_evidence(std::span<const Light> lights) {
 
 void add_readout_evidence_of_image(const ImageView& image, ReadoutDirectionEvidence& evidence) {
   const LightDetector by_rows({}, {Readout::rows, {}, {}});
-  evidence.rows += sum_readout_evidence(by_rows.detect(image));
-  evidence.columns +=
-      sum_readout_evidence(by_rows.with_readout_direction(Readout::columns).detect(image));
+  evidence.rows += sum_readout_direction_evidence(by_rows.detect_lights(image));
+  evidence.columns += sum_readout_direction_evidence(
+      by_rows.copy_detector_with_readout_direction(Readout::columns).detect_lights(image));
 }
 
 std::optional<Readout> estimate_readout_direction(
@@ -41,23 +41,25 @@ std::optional<Readout> estimate_readout_direction(
     const double before = evidence.rows + evidence.columns;
     add_readout_evidence_of_image(frame, evidence);
     if (evidence.rows + evidence.columns > before) ++used;
-    if (evidence.rows + evidence.columns >= sufficient_evidence && evidence.readout()) break;
+    if (evidence.rows + evidence.columns >= sufficient_evidence && evidence.readout_direction())
+      break;
   }
-  return evidence.readout();
+  return evidence.readout_direction();
 }
 
 LightsWithReadout detect_lights_with_unknown_readout(const LightDetector& detector,
                                                      const ImageView& image) {
-  const Readout default_readout = detector.readout();
+  const Readout default_readout = detector.readout_direction();
   const Readout other_readout = default_readout == Readout::rows ? Readout::columns : Readout::rows;
-  LightsWithReadout result{default_readout, detector.detect(image)};
-  std::vector<Light> lights = detector.with_readout_direction(other_readout).detect(image);
-  const double default_evidence = sum_readout_evidence(result.lights),
-               other_evidence = sum_readout_evidence(lights);
+  LightsWithReadout result{default_readout, detector.detect_lights(image)};
+  std::vector<Light> lights =
+      detector.copy_detector_with_readout_direction(other_readout).detect_lights(image);
+  const double default_evidence = sum_readout_direction_evidence(result.lights),
+               other_evidence = sum_readout_direction_evidence(lights);
   const ReadoutDirectionEvidence evidence =
       default_readout == Readout::rows ? ReadoutDirectionEvidence{default_evidence, other_evidence}
                                        : ReadoutDirectionEvidence{other_evidence, default_evidence};
-  if (evidence.readout() == other_readout) result = {other_readout, std::move(lights)};
+  if (evidence.readout_direction() == other_readout) result = {other_readout, std::move(lights)};
   return result;
 }
 

@@ -23,12 +23,12 @@ struct ReadoutDirectionEvidence {
 
   /// Returns the readout direction with the larger evidence. Returns std::nullopt if this evidence
   /// is below 1, that of one perfect light, or below three times that of the other direction.
-  std::optional<Readout> readout() const;
+  std::optional<Readout> readout_direction() const;
 };
 
 /// Returns the sum of ReadoutDirectionEvidence over `lights`, which were detected with one readout
 /// direction.
-double sum_readout_evidence(std::span<const Light> lights);
+double sum_readout_direction_evidence(std::span<const Light> lights);
 
 /// Adds the evidence of a whole image. With the correct readout direction a lamp has stripes; with
 /// the other one it breaks into pieces or has no stripes.

@@ -33,7 +33,7 @@ bool is_below_lamps(const FreePose& camera, const std::array<Eigen::Vector3d, 3>
 
 double compute_mean_lamp_distance_m(const BodyObservations& frame, const BodyState& state) {
   double sum = 0;
-  for (const BodyObservation& seen : frame.as_span()) {
+  for (const BodyObservation& seen : frame.observations_span()) {
     sum += (seen.lamp_m - state.pose.position_m).norm();
   }
   return sum / static_cast<double>(frame.size);
@@ -71,7 +71,7 @@ InitialStates compute_initial_states(const BodyObservations& frame,
     points_m[i] = frame.sightings[lamps[i]].lamp_m;
     rays[i] = frame.sightings[lamps[i]].ray;
   }
-  const ThreeLampPoses found = compute_three_lamp_poses(points_m, rays);
+  const ThreeLampPoses found = compute_poses_from_three_lamps(points_m, rays);
   InitialStates initial_states;
   for (int i = 0; i < found.count; ++i) {
     const FreePose& pose = found.poses[static_cast<std::size_t>(i)];
@@ -94,10 +94,10 @@ bool is_determined(const BodyObservations& frame, const BodyFix& fix) {
 namespace {
 
 InitialStates compute_level_state(const BodyObservations& frame, const BodyProblem& problem) {
-  const Eigen::Matrix3d lean = level_from_inclination(problem.prior.mean.inclination);
+  const Eigen::Matrix3d lean = level_rotation_from_inclination(problem.prior.mean.inclination);
   LevelSightings level;
   if (!level.fill(frame, lean)) return {FixStatus::lamp_below_camera, 0, {}};
-  const InitialPose start = compute_initial_pose(level.as_span());
+  const InitialPose start = compute_initial_pose(level.observations_span());
   if (start.status != FixStatus::ok) return {start.status, 0, {}};
   return {FixStatus::ok, 1, {make_body_state(start.pose, problem, lean)}};
 }
@@ -125,8 +125,9 @@ std::array<std::size_t, 3> find_widest_lamps(const BodyObservations& frame) {
 
 bool are_below_lamps(const BodyObservations& frame, const BodyProblem& problem,
                      const BodyState& state) {
-  const double z_m = state.pose.position_m.z() +
-                     (level_from_inclination(state.motion.inclination) * problem.arm_m).z();
+  const double z_m =
+      state.pose.position_m.z() +
+      (level_rotation_from_inclination(state.motion.inclination) * problem.arm_m).z();
   return std::all_of(frame.sightings.begin(),
                      frame.sightings.begin() + static_cast<std::ptrdiff_t>(frame.size),
                      [&](const BodyObservation& seen) { return seen.lamp_m.z() > z_m; });
@@ -142,8 +143,8 @@ BodySolution find_best_body_solution(const InitialStates& initial_states,
   if (initial_states.count == 1) at_start[0] = 0;
   for (std::size_t i = 0; initial_states.count > 1 && static_cast<int>(i) < initial_states.count;
        ++i) {
-    const auto chi_squared = compute_chi_squared(frame.as_span(), problem.arm_m, problem.prior,
-                                                 initial_states.states[i]);
+    const auto chi_squared = compute_body_state_chi_squared(
+        frame.observations_span(), problem.arm_m, problem.prior, initial_states.states[i]);
     if (chi_squared) at_start[i] = *chi_squared;
   }
   const double min_chi_squared = *std::min_element(at_start.begin(), at_start.end());
@@ -151,7 +152,7 @@ BodySolution find_best_body_solution(const InitialStates& initial_states,
   double second = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; static_cast<int>(i) < initial_states.count; ++i) {
     if (!(at_start[i] <= hopeless * (min_chi_squared + small))) continue;
-    const auto fix = estimate_body_state(frame.as_span(), problem.arm_m, problem.prior,
+    const auto fix = estimate_body_state(frame.observations_span(), problem.arm_m, problem.prior,
                                          initial_states.states[i]);
     if (!fix || !are_below_lamps(frame, problem, fix->state)) continue;
     if (!best) {

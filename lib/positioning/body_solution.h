@@ -56,7 +56,7 @@ struct LevelSightings {
   std::array<Sighting, kMaxSightings> sightings;
   std::size_t size = 0;
 
-  std::span<const Sighting> as_span() const { return {sightings.data(), size}; }
+  std::span<const Sighting> observations_span() const { return {sightings.data(), size}; }
 
   bool fill(const BodyObservations& frame, const Eigen::Matrix3d& level_from_body);
 };
@@ -76,7 +76,7 @@ bool is_determined(const BodyObservations& frame, const BodyFix& fix);
 
 /// Computes the fix of all lamps, assuming that the identities are correct. Initial states: the
 /// pose of a level camera (compute_initial_pose()), or if roll and pitch are estimated the poses
-/// from the three lamps that are farthest apart (compute_three_lamp_poses()).
+/// from the three lamps that are farthest apart (compute_poses_from_three_lamps()).
 BodySolution estimate_body_from_all_lamps(const BodyObservations& frame,
                                           const BodyProblem& problem);
 

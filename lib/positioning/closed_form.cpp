@@ -54,7 +54,7 @@ TwoLampPoses compute_two_lamp_poses(const Sighting& first, const Sighting& secon
     const Eigen::Vector2d heading = turn / length;
     const Eigen::Vector2d s = first.lamp_m.head<2>() - height_m * complex_product(heading, first.z);
     fix.poses[static_cast<std::size_t>(fix.count++)] =
-        LevelPose({s.x(), s.y(), first.lamp_m.z() - height_m}, heading).pose();
+        LevelPose({s.x(), s.y(), first.lamp_m.z() - height_m}, heading).convert_to_yaw_pose();
   }
   fix.lamp_below_camera = fix.lamp_below_camera && fix.count == 0;
   return fix;
@@ -82,9 +82,10 @@ double compute_disagreement(const Pose& pose, std::span<const Sighting> sighting
   const LevelPose camera(pose);
   double sum = 0;
   for (const Sighting& sighting : sightings) {
-    sum += lamp_height_above_camera(camera, sighting.lamp_m) > 0
-               ? (sighting.z - project_to_normalized_point(camera, sighting.lamp_m)).squaredNorm()
-               : 1e6;
+    sum +=
+        lamp_height_above_camera_m(camera, sighting.lamp_m) > 0
+            ? (sighting.z - project_lamp_to_normalized_point(camera, sighting.lamp_m)).squaredNorm()
+            : 1e6;
   }
   return sum;
 }
@@ -147,10 +148,10 @@ std::optional<Pose> compute_pose_at_known_height_and_yaw(const Sighting& sightin
   return Pose{{s.x(), s.y(), known.z_m}, known.yaw_rad};
 }
 
-Matrix4 compute_one_lamp_covariance(const Sighting& sighting, const Pose& pose) {
+Matrix4 compute_one_lamp_pixel_noise_covariance(const Sighting& sighting, const Pose& pose) {
   const Eigen::Matrix2d d_pixel_d_xy =
       sighting.d_pixel_d_z *
-      predict_normalized_point(LevelPose(pose), sighting.lamp_m).d_z_d_state.leftCols<2>();
+      project_lamp_with_jacobian(LevelPose(pose), sighting.lamp_m).d_z_d_state.leftCols<2>();
   const Eigen::Matrix2d d_xy_d_pixel = d_pixel_d_xy.inverse();
   Matrix4 covariance = Matrix4::Zero();
   covariance.topLeftCorner<2, 2>() =
@@ -186,11 +187,11 @@ Matrix4 compute_one_lamp_sensor_covariance(const Sighting& sighting, const Pose&
 Eigen::Matrix<double, 4, 3> compute_one_lamp_rotation_jacobian(const Sighting& sighting,
                                                                const Pose& pose) {
   Eigen::Matrix<double, 2, 3> d_z;
-  d_z << compute_point_jacobian_wrt_level_tilt(sighting.z),
+  d_z << compute_normalized_point_jacobian_wrt_tilt(sighting.z),
       Eigen::Vector2d(-sighting.z.y(), sighting.z.x());
   const LevelPose camera(pose);
   Eigen::Matrix<double, 4, 3> effect = Eigen::Matrix<double, 4, 3>::Zero();
-  effect.topRows<2>() = -lamp_height_above_camera(camera, sighting.lamp_m) *
+  effect.topRows<2>() = -lamp_height_above_camera_m(camera, sighting.lamp_m) *
                         complex_product_matrix(camera.heading) * d_z;
   return effect;
 }

@@ -72,7 +72,7 @@ std::optional<Pose> compute_pose_at_known_height_and_yaw(const Sighting& sightin
 
 /// Returns the covariance of (X, Y, Zs, g), in m and rad, from the pixel noise alone.
 /// @pre compute_pose_at_known_height_and_yaw() computed `pose`
-Matrix4 compute_one_lamp_covariance(const Sighting& sighting, const Pose& pose);
+Matrix4 compute_one_lamp_pixel_noise_covariance(const Sighting& sighting, const Pose& pose);
 
 /// Returns the covariance of (X, Y, Zs, g), in m and rad, from the errors of height, yaw and
 /// motion.

@@ -18,7 +18,8 @@ Eigen::Matrix3d make_shear_matrix(const Eigen::Vector2d& offset) {
 
 }  // namespace
 
-Eigen::Matrix3d level_from_camera(const Calibration& calibration, Correction correction) {
+Eigen::Matrix3d compute_level_from_camera_rotation(const Calibration& calibration,
+                                                   Correction correction) {
   const auto& rotation = calibration.rotation_center;
   const auto& dispersion = calibration.dispersion;
   if (correction == Correction::rotation && !rotation) {
@@ -40,12 +41,13 @@ Eigen::Matrix3d level_from_camera(const Calibration& calibration, Correction cor
   const bool tilts = rotation && rotation->model == RotationModel::tilt;
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
   if (rotation && (correction == Correction::rotation || correction == Correction::all)) {
-    matrix = tilts ? level_from_zenith(rotation->zenith_in_camera)
+    matrix = tilts ? level_rotation_from_zenith(rotation->zenith_in_camera)
                    : make_shear_matrix((rotation->center_px - center_px).cwiseQuotient(focal_px));
   }
   if (dispersion && (correction == Correction::dispersion || correction == Correction::all)) {
     const Eigen::Vector2d offset = dispersion->offset_px.cwiseQuotient(focal_px);
-    matrix = (tilts ? level_from_zenith({offset.x(), offset.y(), 1}) : make_shear_matrix(offset)) *
+    matrix = (tilts ? level_rotation_from_zenith({offset.x(), offset.y(), 1})
+                    : make_shear_matrix(offset)) *
              matrix;
   }
   return matrix;

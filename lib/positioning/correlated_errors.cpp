@@ -24,7 +24,8 @@ void add_rotation_vectors(std::vector<Eigen::Matrix3d>& turns, const Calibration
   for (int axis = 0; axis < 2; ++axis) {
     const Eigen::Vector2d error = step * Eigen::Vector2d::Unit(axis);
     const Calibration less = with_error(calibration, -error), more = with_error(calibration, error);
-    turns.emplace_back((level_from_camera(more, correction) - level_from_camera(less, correction)) /
+    turns.emplace_back((compute_level_from_camera_rotation(more, correction) -
+                        compute_level_from_camera_rotation(less, correction)) /
                        (2 * step));
   }
 }
@@ -41,7 +42,7 @@ Eigen::MatrixXd compute_posterior_covariance(const Eigen::MatrixXd& covariance, 
   const Eigen::VectorXd inverse_sd =
       (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(size));
   const Eigen::MatrixXd scaled = columns * inverse_sd.asDiagonal();
-  const auto eigen = eigendecompose_symmetric(
+  const auto eigen = eigendecompose_symmetric_matrix(
       Eigen::MatrixXd(inverse_sd.asDiagonal() * scaled.middleRows(first, size)));
   constexpr double rounding = 1e-12;
   const Eigen::ArrayXd values = eigen.values;
@@ -65,14 +66,14 @@ Eigen::Matrix2d normalized_point_from_pixel(const std::optional<Matrix2>& covari
 }
 
 /// Returns true if the lamp of a map has this place, to 1 um.
-bool is_at(const Lamp& lamp, const Eigen::Vector3d& position_m) {
+bool is_lamp_at_position(const Lamp& lamp, const Eigen::Vector3d& position_m) {
   constexpr double tolerance_m = 1e-6;
   return (position_m - lamp.position_m).norm() < tolerance_m;
 }
 
 /// Returns the place of a lamp in an adjustment or a dispersion; nullptr if it is not in it.
 template <typename Place>
-const Place* find_place(const std::vector<Place>& places, int id) {
+const Place* find_lamp_position_by_id(const std::vector<Place>& places, int id) {
   const auto place =
       std::find_if(places.begin(), places.end(), [&](const Place& one) { return one.id == id; });
   return place == places.end() ? nullptr : &*place;
@@ -83,14 +84,14 @@ const Place* find_place(const std::vector<Place>& places, int id) {
 CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration,
                            Correction correction)
     : intrinsics_(count_intrinsics_with_covariance(calibration.camera)),
-      base_from_camera_(level_from_camera(calibration, correction)),
+      base_from_camera_(compute_level_from_camera_rotation(calibration, correction)),
       camera_from_base_(base_from_camera_.inverse()) {
   const bool turned = calibration.rotation_center &&
                       (correction == Correction::rotation || correction == Correction::all);
   const bool shifted = calibration.dispersion &&
                        (correction == Correction::dispersion || correction == Correction::all);
-  if (turned) add_rotation_vectors(turns_, calibration, correction, with_zenith_error);
-  if (shifted) add_rotation_vectors(turns_, calibration, correction, with_offset_error);
+  if (turned) add_rotation_vectors(turns_, calibration, correction, perturb_zenith_direction);
+  if (shifted) add_rotation_vectors(turns_, calibration, correction, perturb_dispersion_offset);
   offset_ = intrinsics_ + (turned ? 2 : 0);
   assign_covariance_rows_to_lamps(lamps, calibration);
   set_lens_and_zenith_covariances(calibration);
@@ -104,12 +105,15 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
 void CommonErrors::assign_covariance_rows_to_lamps(std::span<const Lamp> lamps,
                                                    const Calibration& calibration) {
   const auto is_correlated = [&](const Lamp& lamp) {
-    const auto* adjusted =
-        calibration.adjustment ? find_place(calibration.adjustment->lamps, lamp.id) : nullptr;
-    if (adjusted != nullptr && is_at(lamp, adjusted->position_m)) return true;
+    const auto* adjusted = calibration.adjustment
+                               ? find_lamp_position_by_id(calibration.adjustment->lamps, lamp.id)
+                               : nullptr;
+    if (adjusted != nullptr && is_lamp_at_position(lamp, adjusted->position_m)) return true;
     const auto* uncertain =
-        has_offset_errors() ? find_place(calibration.dispersion->by_lamps, lamp.id) : nullptr;
-    return uncertain != nullptr && is_at(lamp, uncertain->position_m);
+        has_dispersion_offset_errors()
+            ? find_lamp_position_by_id(calibration.dispersion->by_lamps, lamp.id)
+            : nullptr;
+    return uncertain != nullptr && is_lamp_at_position(lamp, uncertain->position_m);
   };
   lamps_.resize(lamps.size());
   Eigen::Index size = num_shared_errors();
@@ -141,14 +145,15 @@ void CommonErrors::set_lens_and_zenith_covariances(const Calibration& calibratio
   const auto& report = calibration.intrinsics_report;
   // A part that was calibrated with the lens compensates its errors in part: without by_intrinsics
   // these would count twice.
-  const bool lens_counts_once = has_zenith_errors()   ? center->by_intrinsics.has_value()
-                                : has_offset_errors() ? dispersion->by_intrinsics.has_value()
-                                                      : true;
+  const bool lens_counts_once = has_zenith_errors() ? center->by_intrinsics.has_value()
+                                : has_dispersion_offset_errors()
+                                    ? dispersion->by_intrinsics.has_value()
+                                    : true;
   const bool lens = report && report->covariance && lens_counts_once;
   const bool zenith_stated = adjustment || (has_zenith_errors() && center->covariance);
   complete_ = adjustment || (lens && zenith_stated);
   part_stated_ = {adjustment || lens, zenith_stated,
-                  !has_offset_errors() || dispersion->covariance.has_value(), true};
+                  !has_dispersion_offset_errors() || dispersion->covariance.has_value(), true};
   if (lens && !adjustment) {
     covariance_.topLeftCorner(intrinsics_, intrinsics_) = *report->covariance;
   }
@@ -167,13 +172,14 @@ void CommonErrors::set_lamp_covariances(std::span<const Lamp> lamps,
   }
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     const auto& row = lamps_[i].row;
-    const auto* place = adjustment ? find_place(adjustment->lamps, lamps[i].id) : nullptr;
-    if (place != nullptr && is_at(lamps[i], place->position_m)) {
+    const auto* place =
+        adjustment ? find_lamp_position_by_id(adjustment->lamps, lamps[i].id) : nullptr;
+    if (place != nullptr && is_lamp_at_position(lamps[i], place->position_m)) {
       const Eigen::Index from = intrinsics_ + 4 + 3 * (place - adjustment->lamps.data());
       for (Eigen::Index k = 0; k < 3; ++k) adjusted.emplace_back(*row + k, from + k);
       continue;
     }
-    if (place != nullptr) ++lamps_elsewhere_;
+    if (place != nullptr) ++num_lamps_moved_since_calibration_;
     if (!lamps[i].sd_m) {
       complete_ = part_stated_.back() = false;
       continue;
@@ -203,7 +209,7 @@ void CommonErrors::propagate_errors_to_zenith_and_offset(std::span<const Lamp> l
       calibration.rotation_center->by_intrinsics) {
     derivatives.topLeftCorner(2, intrinsics_) = *calibration.rotation_center->by_intrinsics;
   }
-  if (has_offset_errors()) {
+  if (has_dispersion_offset_errors()) {
     const Dispersion& dispersion = *calibration.dispersion;
     covariance_.block<2, 2>(offset_, offset_) =
         normalized_point_from_pixel(dispersion.covariance, calibration.camera.focal_px());
@@ -232,13 +238,13 @@ void CommonErrors::propagate_errors_to_zenith_and_offset(std::span<const Lamp> l
 std::optional<Eigen::Index> CommonErrors::find_covariance_row_of_lamp(
     std::span<const Lamp> lamps, const Dispersion::UncertainLamp& uncertain) const {
   const Lamp* lamp = find_lamp_by_id(lamps, uncertain.id);
-  if (lamp == nullptr || !is_at(*lamp, uncertain.position_m)) return std::nullopt;
+  if (lamp == nullptr || !is_lamp_at_position(*lamp, uncertain.position_m)) return std::nullopt;
   const auto row = lamps_[static_cast<std::size_t>(lamp - lamps.data())].row;
   const bool is_stated = lamp->sd_m || covariance_.block<3, 3>(*row, *row).trace() > 0;
   return is_stated ? row : std::nullopt;
 }
 
-CommonErrors CommonErrors::extract_error_source(CommonErrorSource part) const {
+CommonErrors CommonErrors::extract_covariance_of_error_source(CommonErrorSource part) const {
   const std::array<Eigen::Index, kCommonErrorSources.size() + 1> rows{
       0, intrinsics_, offset_, num_shared_errors(), covariance_.rows()};
   CommonErrors one = *this;
@@ -262,7 +268,7 @@ CommonErrors::RayJacobian CommonErrors::compute_ray_error_jacobian(
     const Eigen::Vector3d& ray_in_base, const Lens& lens) const {
   RayJacobian effect = RayJacobian::Zero(3, num_shared_errors());
   const Eigen::Vector3d ray = camera_from_base_ * ray_in_base;
-  if (const auto seen = lens.project_with_jacobians(ray)) {
+  if (const auto seen = lens.project_point_with_jacobians(ray)) {
     // For a fixed pixel the ray moves within its plane of z.
     const Eigen::Matrix2d d_ray = -seen->d_pixel_d_point.leftCols<2>().inverse();
     const Eigen::Matrix<double, 3, 2> d_ray_in_base = base_from_camera_.leftCols<2>() * d_ray;
@@ -283,13 +289,13 @@ CommonErrors::Effect CommonErrors::compute_observation_error_jacobians(
   const Eigen::Matrix<double, 2, 3> d_z_d_base = d_z * level_from_base;
   Effect effect;
   effect.jacobian_wrt_lamp =
-      predict_normalized_point(pose, sighting.lamp_m).d_z_d_state.leftCols<3>();
+      project_lamp_with_jacobian(pose, sighting.lamp_m).d_z_d_state.leftCols<3>();
   effect.jacobian_wrt_shared = d_z_d_base.lazyProduct(
       compute_ray_error_jacobian(level_from_base.transpose() * sighting.z.homogeneous(), lens));
   return effect;
 }
 
-CommonErrors::Gain CommonErrors::compute_gain_of_fix_errors(
+CommonErrors::Gain CommonErrors::compute_gain_from_errors_to_fix(
     std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
     const PoseEstimate& camera, const Lens& lens, const Eigen::Matrix3d& level_from_base) const {
   const LevelPose pose(camera.pose);
@@ -303,11 +309,11 @@ CommonErrors::Gain CommonErrors::compute_gain_of_fix_errors(
       // compute_pose_at_known_height_and_yaw(): s = p - H e^{jg} z.
       d_fix_d_z.setZero();
       d_fix_d_z.topRows<2>() =
-          -lamp_height_above_camera(pose, sighting.lamp_m) * complex_product_matrix(pose.heading);
+          -lamp_height_above_camera_m(pose, sighting.lamp_m) * complex_product_matrix(pose.heading);
     } else {
       const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
       d_fix_d_z = camera.covariance *
-                  predict_normalized_point(pose, sighting.lamp_m).d_z_d_state.transpose() *
+                  project_lamp_with_jacobian(pose, sighting.lamp_m).d_z_d_state.transpose() *
                   (whitening.transpose() * whitening);
     }
     gain.jacobian_wrt_shared.noalias() += d_fix_d_z.lazyProduct(effect.jacobian_wrt_shared);
@@ -319,11 +325,11 @@ CommonErrors::Gain CommonErrors::compute_gain_of_fix_errors(
 CommonErrors::BodyEffect CommonErrors::compute_observation_error_jacobians(
     const BodyObservation& sighting, const EvaluatedState& body, const Eigen::Vector3d& arm_m,
     const Lens& lens, const Eigen::Matrix3d& body_from_base) const {
-  const Eigen::Matrix<double, 2, 3> d_pixel = d_whitened_pixel_d_lamp(
-      sighting, body.lamp_in_body(sighting.lamp_m, sighting.time_s) - arm_m);
+  const Eigen::Matrix<double, 2, 3> d_pixel = d_whitened_pixel_d_lamp_position(
+      sighting, body.lamp_position_in_body(sighting.lamp_m, sighting.time_s) - arm_m);
   BodyEffect effect;
   effect.jacobian_wrt_state =
-      d_pixel.lazyProduct(body.d_lamp_in_body_d_state(sighting.lamp_m, sighting.time_s));
+      d_pixel.lazyProduct(body.d_lamp_position_in_body_d_state(sighting.lamp_m, sighting.time_s));
   const Eigen::Matrix<double, 2, 3> by_ray = sighting.whitened_pixel_from_ray * body_from_base;
   effect.by_errors.jacobian_wrt_shared = by_ray.lazyProduct(
       compute_ray_error_jacobian(body_from_base.transpose() * sighting.ray, lens));
@@ -331,7 +337,7 @@ CommonErrors::BodyEffect CommonErrors::compute_observation_error_jacobians(
   return effect;
 }
 
-CommonErrors::BodyGain CommonErrors::compute_gain_of_fix_errors(
+CommonErrors::BodyGain CommonErrors::compute_gain_from_errors_to_fix(
     std::span<const BodyObservation> sightings, std::span<const std::size_t> lamps,
     const Eigen::Vector3d& arm_m, const BodyFix& fix, const Lens& lens,
     const Eigen::Matrix3d& body_from_base) const {
@@ -349,7 +355,7 @@ CommonErrors::BodyGain CommonErrors::compute_gain_of_fix_errors(
 }
 
 template <int States>
-Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::compute_covariance(
+Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::propagate_covariance_to_fix(
     const GainMatrix<States>& gain) const {
   using SharedGain = typename GainMatrix<States>::SharedGain;
   using LampGain = typename GainMatrix<States>::LampGain;
@@ -385,7 +391,8 @@ double CommonErrors::compute_expected_chi_squared(std::span<const Sighting> sigh
     const Eigen::Matrix2d whitening = sightings[i].d_pixel_d_z / sightings[i].sigma_px;
     const Effect effect =
         compute_observation_error_jacobians(sightings[i], pose, lens, level_from_base);
-    sum += (whitening * compute_covariance(effect, lamps[i]) * whitening.transpose()).trace();
+    sum += (whitening * compute_observation_covariance(effect, lamps[i]) * whitening.transpose())
+               .trace();
   }
   return sum;
 }
@@ -402,7 +409,7 @@ double CommonErrors::compute_expected_chi_squared(std::span<const BodyObservatio
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     const auto [by_state, by_errors] =
         compute_observation_error_jacobians(sightings[i], body, arm_m, lens, body_from_base);
-    sum += compute_covariance(by_errors, lamps[i]).trace();
+    sum += compute_observation_covariance(by_errors, lamps[i]).trace();
     information += by_state.transpose() * by_state;
   }
   // States that are not estimated have no variance, and `common` is zero there.
@@ -415,14 +422,14 @@ double CommonErrors::compute_expected_chi_squared(std::span<const BodyObservatio
   return sum - (with_priors * common).trace();
 }
 
-template Matrix4 CommonErrors::compute_covariance(const Gain& gain) const;
-template BodyCovariance CommonErrors::compute_covariance(const BodyGain& gain) const;
+template Matrix4 CommonErrors::propagate_covariance_to_fix(const Gain& gain) const;
+template BodyCovariance CommonErrors::propagate_covariance_to_fix(const BodyGain& gain) const;
 
-Matrix2 CommonErrors::compute_covariance(const Effect& effect, std::size_t lamp) const {
+Matrix2 CommonErrors::compute_observation_covariance(const Effect& effect, std::size_t lamp) const {
   GainMatrix<2> gain(num_shared_errors());
   gain.jacobian_wrt_shared = effect.jacobian_wrt_shared;
   gain.add(lamp, effect.jacobian_wrt_lamp);
-  return compute_covariance(gain);
+  return propagate_covariance_to_fix(gain);
 }
 
 namespace {
@@ -430,23 +437,23 @@ namespace {
 /// Returns true if the calibration reports errors of its lens that `errors` lacks.
 bool lacks_lens_covariance(const CommonErrors& errors, const Calibration& calibration) {
   const auto& report = calibration.intrinsics_report;
-  return report && report->covariance && !errors.are_errors_known(CommonErrorSource::lens);
+  return report && report->covariance && !errors.is_error_source_known(CommonErrorSource::lens);
 }
 
 }  // namespace
 
 std::optional<Matrix2> compute_zenith_covariance(const Calibration& calibration) {
   const CommonErrors errors({}, calibration, Correction::all);
-  if (!errors.are_errors_known(CommonErrorSource::zenith) ||
+  if (!errors.is_error_source_known(CommonErrorSource::zenith) ||
       lacks_lens_covariance(errors, calibration))
     return std::nullopt;
   const Eigen::Index zenith = count_intrinsics_with_covariance(calibration.camera);
-  return Matrix2(errors.joint_covariance().block<2, 2>(zenith, zenith));
+  return Matrix2(errors.joint_error_covariance().block<2, 2>(zenith, zenith));
 }
 
-std::optional<Matrix2> compute_offset_covariance(const Calibration& calibration) {
+std::optional<Matrix2> compute_dispersion_offset_covariance(const Calibration& calibration) {
   const CommonErrors errors({}, calibration, Correction::all);
-  if (!errors.are_errors_known(CommonErrorSource::offset) ||
+  if (!errors.is_error_source_known(CommonErrorSource::offset) ||
       lacks_lens_covariance(errors, calibration))
     return std::nullopt;
   if (!calibration.adjustment) {
@@ -454,12 +461,14 @@ std::optional<Matrix2> compute_offset_covariance(const Calibration& calibration)
     const auto& report = calibration.intrinsics_report;
     if (report && report->covariance && !dispersion.by_intrinsics) return std::nullopt;
     const bool turned = calibration.rotation_center.has_value();
-    if (turned && !(errors.are_errors_known(CommonErrorSource::zenith) && dispersion.by_zenith))
+    if (turned &&
+        !(errors.is_error_source_known(CommonErrorSource::zenith) && dispersion.by_zenith))
       return std::nullopt;
   }
-  const Eigen::Index offset = errors.joint_covariance().rows() - 2;
+  const Eigen::Index offset = errors.joint_error_covariance().rows() - 2;
   const Eigen::Vector2d focal_px = calibration.camera.focal_px();
-  return Matrix2(focal_px.asDiagonal() * errors.joint_covariance().block<2, 2>(offset, offset) *
+  return Matrix2(focal_px.asDiagonal() *
+                 errors.joint_error_covariance().block<2, 2>(offset, offset) *
                  focal_px.asDiagonal());
 }
 

@@ -55,12 +55,12 @@ class CommonErrors {
   CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration, Correction correction);
 
   /// Returns true if the error of any calibrated quantity or lamp is known.
-  bool are_errors_known() const { return stated_; }
+  bool are_any_errors_known() const { return stated_; }
   /// Returns true if the errors of lens, zenith and every lamp of the map are known. Only then can
   /// a wrong lamp be identified by them.
   bool are_lens_zenith_and_lamp_errors_known() const { return complete_; }
   /// Returns true if the errors of the part are known, or if the calibration lacks the part.
-  bool are_errors_known(CommonErrorSource part) const {
+  bool is_error_source_known(CommonErrorSource part) const {
     return part_stated_[static_cast<std::size_t>(part)];
   }
   /// Returns one part of C, with the others taken as exact. The parts add up to C, and no part
@@ -70,10 +70,10 @@ class CommonErrors {
   /// parts, in the order of kCommonErrorSources, already are. For sequential steps a part holds the
   /// errors of its own step. The part of the lens includes its effects on later steps. The part of
   /// the lamps excludes errors that an offset found with the same map compensates.
-  CommonErrors extract_error_source(CommonErrorSource part) const;
+  CommonErrors extract_covariance_of_error_source(CommonErrorSource part) const;
   /// Returns the number of lamps of the adjustment that the map has at another position. Their
   /// correlation with the calibration is lost.
-  int lamps_elsewhere() const { return lamps_elsewhere_; }
+  int num_lamps_moved_since_calibration() const { return num_lamps_moved_since_calibration_; }
 
   /// Derivative of the ray of a pixel with respect to the shared errors, one column each. The ray
   /// is along the axes of the base, the camera frame after correction of its tilt.
@@ -120,16 +120,17 @@ class CommonErrors {
   /// Returns the gain of a least-squares fix (estimate_pose_least_squares) with the covariance of
   /// `camera`. `lamps` are the indices in the map of the observed lamps. For a single lamp, returns
   /// the gain of compute_pose_at_known_height_and_yaw().
-  Gain compute_gain_of_fix_errors(std::span<const Sighting> sightings,
-                                  std::span<const std::size_t> lamps, const PoseEstimate& camera,
-                                  const Lens& lens, const Eigen::Matrix3d& level_from_base) const;
+  Gain compute_gain_from_errors_to_fix(std::span<const Sighting> sightings,
+                                       std::span<const std::size_t> lamps,
+                                       const PoseEstimate& camera, const Lens& lens,
+                                       const Eigen::Matrix3d& level_from_base) const;
   /// Returns the gain of a body with the camera at `arm_m` in the body frame, m. The gain of the
   /// pixels, in standard deviations, is that of the least-squares fix (estimate_body_state()).
-  BodyGain compute_gain_of_fix_errors(std::span<const BodyObservation> sightings,
-                                      std::span<const std::size_t> lamps,
-                                      const Eigen::Vector3d& arm_m, const BodyFix& fix,
-                                      const Lens& lens,
-                                      const Eigen::Matrix3d& body_from_base) const;
+  BodyGain compute_gain_from_errors_to_fix(std::span<const BodyObservation> sightings,
+                                           std::span<const std::size_t> lamps,
+                                           const Eigen::Vector3d& arm_m, const BodyFix& fix,
+                                           const Lens& lens,
+                                           const Eigen::Matrix3d& body_from_base) const;
   /// Computes the expected contribution of the errors to chi-squared, from the common covariance
   /// `common` = G C G' of the fix:
   ///   tr(R C R') = tr(W J_c C J_c') - tr(N common),   R = W^1/2 (J_c - J G),   N = J' W J.
@@ -147,21 +148,21 @@ class CommonErrors {
   /// Returns G C G', the covariance of the states of a fix from the common errors, in the units of
   /// the states.
   template <int States>
-  Eigen::Matrix<double, States, States, Eigen::DontAlign> compute_covariance(
+  Eigen::Matrix<double, States, States, Eigen::DontAlign> propagate_covariance_to_fix(
       const GainMatrix<States>& gain) const;
   /// Returns the covariance of the normalized point z of one observation from the common errors.
   /// `lamp` is the index of the lamp in the map.
-  Matrix2 compute_covariance(const Effect& effect, std::size_t lamp) const;
+  Matrix2 compute_observation_covariance(const Effect& effect, std::size_t lamp) const;
 
   /// Returns the joint covariance: intrinsics, zenith and offset, as far as they exist. Lamps with
   /// correlated errors follow, in the order of the map.
-  const MatrixX& joint_covariance() const { return covariance_; }
-  Eigen::Index intrinsics() const { return intrinsics_; }
+  const MatrixX& joint_error_covariance() const { return covariance_; }
+  Eigen::Index num_intrinsics() const { return intrinsics_; }
   Eigen::Index num_shared_errors() const { return intrinsics_ + std::ssize(turns_); }
 
  private:
   bool has_zenith_errors() const { return offset_ > intrinsics_; }
-  bool has_offset_errors() const { return num_shared_errors() > offset_; }
+  bool has_dispersion_offset_errors() const { return num_shared_errors() > offset_; }
   /// Errors of a lamp of the map. A large map has few lamps whose errors are correlated with
   /// others: those of an adjustment or of a dispersion have rows in the joint covariance.
   struct LampErrors {
@@ -209,7 +210,7 @@ class CommonErrors {
   std::vector<LampErrors> lamps_;
   bool stated_ = false, complete_ = false;
   std::array<bool, kCommonErrorSources.size()> part_stated_ = {};
-  int lamps_elsewhere_ = 0;
+  int num_lamps_moved_since_calibration_ = 0;
 };
 
 /// Computes the covariance of the zenith's normalized point from all its sources: its captures and
@@ -222,6 +223,6 @@ std::optional<Matrix2> compute_zenith_covariance(const Calibration& calibration)
 /// the zenith, and the lens, which affects both. Returns std::nullopt as
 /// compute_zenith_covariance().
 /// @pre there is a dispersion
-std::optional<Matrix2> compute_offset_covariance(const Calibration& calibration);
+std::optional<Matrix2> compute_dispersion_offset_covariance(const Calibration& calibration);
 
 }  // namespace vlp

@@ -17,21 +17,22 @@ const Eigen::Vector3d kNoArm = Eigen::Vector3d::Zero();
 std::optional<BodyObservation> make_noise_free_observation(
     const Eigen::Vector3d& lamp_m, const Lens& lens, const Eigen::Matrix3d& camera_from_level,
     const Pose& level, double noise_px, const std::optional<RowClock>& row_clock) {
-  const auto pixel = lens.project(camera_from_level * level_from_world(level, lamp_m));
+  const auto pixel = lens.project_point(camera_from_level * level_point_from_world(level, lamp_m));
   if (!pixel) return std::nullopt;
-  const auto ray = lens.unproject(*pixel);
+  const auto ray = lens.unproject_pixel(*pixel);
   if (!ray) return std::nullopt;
   const Eigen::Matrix3d level_from_camera = camera_from_level.transpose();
   const Eigen::Vector3d direction = level_from_camera * ray->direction;
-  const auto whitened =
-      whitened_pixel_from_ray(direction, level_from_camera * ray->d_direction_d_pixel, noise_px);
+  const auto whitened = compute_whitened_pixel_from_ray(
+      direction, level_from_camera * ray->d_direction_d_pixel, noise_px);
   if (!whitened) return std::nullopt;
   return BodyObservation{lamp_m, direction.normalized(), *whitened, noise_px,
-                         row_clock ? row_clock->compute_time_from_middle_row_s(*pixel) : 0};
+                         row_clock ? row_clock->compute_pixel_readout_time_s(*pixel) : 0};
 }
 
 std::optional<Matrix4> compute_pose_covariance(const BodyPoseBound& limit, const BodyPrior& prior) {
-  const auto fix = estimate_body_state(limit.frame.as_span(), kNoArm, prior, limit.fix.state);
+  const auto fix =
+      estimate_body_state(limit.frame.observations_span(), kNoArm, prior, limit.fix.state);
   if (!fix) return std::nullopt;
   return Matrix4(fix->covariance.topLeftCorner<4, 4>());
 }
@@ -99,9 +100,10 @@ struct Row {
 
 std::optional<Row> linearize_lamp(const Eigen::Vector3d& lamp_m, const Lens& lens,
                                   const LevelPose& camera) {
-  if (!(lamp_height_above_camera(camera, lamp_m) > 0)) return std::nullopt;
-  const Prediction prediction = predict_normalized_point(camera, lamp_m);
-  const auto projection = lens.project_with_jacobians({prediction.z.x(), prediction.z.y(), 1});
+  if (!(lamp_height_above_camera_m(camera, lamp_m) > 0)) return std::nullopt;
+  const Prediction prediction = project_lamp_with_jacobian(camera, lamp_m);
+  const auto projection =
+      lens.project_point_with_jacobians({prediction.z.x(), prediction.z.y(), 1});
   if (!projection) return std::nullopt;
   // On the plane z = 1, where the sightings are.
   const Eigen::Matrix2d d_pixel_d_z = projection->d_pixel_d_point.leftCols<2>();
@@ -115,9 +117,9 @@ Eigen::Matrix<double, 2, 3> d_pixel_d_lamp_position(const Row& row) {
 
 }  // namespace
 
-std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d> lamps_m,
-                                                const Lens& lens, const Pose& level,
-                                                const ErrorSources& sources) {
+std::optional<ErrorBudget> compute_fix_error_budget(std::span<const Eigen::Vector3d> lamps_m,
+                                                    const Lens& lens, const Pose& level,
+                                                    const ErrorSources& sources) {
   if (lamps_m.size() < 2) return std::nullopt;
   const LevelPose camera(level);
   Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
@@ -129,11 +131,12 @@ std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d>
     const Matrix42 transposed = row->d_pixel_d_state.transpose();
     information += transposed * row->d_pixel_d_state;
     center_gradient += transposed;
-    tilt_gradient += transposed * row->d_pixel_d_z * compute_point_jacobian_wrt_level_tilt(row->z);
+    tilt_gradient +=
+        transposed * row->d_pixel_d_z * compute_normalized_point_jacobian_wrt_tilt(row->z);
     const Matrix43 lamp_gradient = transposed * d_pixel_d_lamp_position(*row);
     lamp_map_gradient += lamp_gradient * lamp_gradient.transpose();
   }
-  const auto inverse = invert_positive_definite(information);
+  const auto inverse = invert_positive_definite_matrix(information);
   if (!inverse) return std::nullopt;
   const Matrix42 by_center = sources.center_px * *inverse * center_gradient;
   const Matrix42 by_tilt = sources.tilt_rad * *inverse * tilt_gradient;
@@ -143,10 +146,11 @@ std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d>
       sources.lamp_map_m * sources.lamp_map_m * *inverse * lamp_map_gradient * *inverse};
 }
 
-std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d> lamps_m,
-                                                const Lens& lens, const Pose& level,
-                                                const ErrorSources& sources, const BodyPrior& prior,
-                                                const std::optional<RowClock>& row_clock) {
+std::optional<ErrorBudget> compute_fix_error_budget(std::span<const Eigen::Vector3d> lamps_m,
+                                                    const Lens& lens, const Pose& level,
+                                                    const ErrorSources& sources,
+                                                    const BodyPrior& prior,
+                                                    const std::optional<RowClock>& row_clock) {
   const auto limit = compute_pose_crlb(lamps_m, lens, Eigen::Matrix3d::Identity(), level,
                                        sources.noise_px, prior, row_clock);
   if (!limit) return std::nullopt;
@@ -154,11 +158,11 @@ std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d>
   const Eigen::Matrix<double, 4, kBodyStates> covariance = limit->fix.covariance.topRows<4>();
   Matrix42 by_center = Matrix42::Zero(), by_tilt = Matrix42::Zero();
   Eigen::Matrix4d of_lamps = Eigen::Matrix4d::Zero();
-  for (const BodyObservation& seen : limit->frame.as_span()) {
-    const Eigen::Vector3d in_body = body.lamp_in_body(seen.lamp_m, seen.time_s);
+  for (const BodyObservation& seen : limit->frame.observations_span()) {
+    const Eigen::Vector3d in_body = body.lamp_position_in_body(seen.lamp_m, seen.time_s);
     const Eigen::Matrix<double, 2, kBodyStates> d_pixel_d_state =
-        d_whitened_pixel_d_lamp(seen, in_body) *
-        body.d_lamp_in_body_d_state(seen.lamp_m, seen.time_s);
+        d_whitened_pixel_d_lamp_position(seen, in_body) *
+        body.d_lamp_position_in_body_d_state(seen.lamp_m, seen.time_s);
     const Matrix42 gain = covariance * d_pixel_d_state.transpose();
     by_center += gain / sources.noise_px;
     Eigen::Matrix<double, 3, 2> d_ray_d_tilt;

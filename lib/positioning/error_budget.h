@@ -73,7 +73,7 @@ struct ErrorBudget {
   /// pitch (BodyPoseBound). Zero if they are known.
   Matrix4 motion = Matrix4::Zero(), roll_pitch = Matrix4::Zero();
 
-  Matrix4 total_covariance() const {
+  Matrix4 total_pose_covariance() const {
     return noise + center + tilt + lamp_map + motion + roll_pitch;
   }
 };
@@ -82,18 +82,19 @@ struct ErrorBudget {
 /// `lamps_m` (positions in the world) with equal weights. Propagates each source through the
 /// least-squares fix to first order. Returns std::nullopt for fewer than two lamps, for lamps that
 /// the lens does not image, or for lamps that do not determine a fix.
-std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d> lamps_m,
-                                                const Lens& lens, const Pose& level,
-                                                const ErrorSources& sources);
+std::optional<ErrorBudget> compute_fix_error_budget(std::span<const Eigen::Vector3d> lamps_m,
+                                                    const Lens& lens, const Pose& level,
+                                                    const ErrorSources& sources);
 
 /// Computes the error budget of a camera that may move and be tilted, with the prior `prior`. Its
 /// mean is at rest and level. Returns std::nullopt also if lamps and prior do not determine a fix
 /// (estimate_body_state_robust()). If the tilt is estimated, an error of the calibrated tilt has
 /// almost no effect.
 /// @pre `row_clock` has a value if the prior leaves the motion free
-std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d> lamps_m,
-                                                const Lens& lens, const Pose& level,
-                                                const ErrorSources& sources, const BodyPrior& prior,
-                                                const std::optional<RowClock>& row_clock);
+std::optional<ErrorBudget> compute_fix_error_budget(std::span<const Eigen::Vector3d> lamps_m,
+                                                    const Lens& lens, const Pose& level,
+                                                    const ErrorSources& sources,
+                                                    const BodyPrior& prior,
+                                                    const std::optional<RowClock>& row_clock);
 
 }  // namespace vlp

@@ -65,7 +65,9 @@ const Entry& find_status_entry(FixStatus status) {
 
 }  // namespace
 
-std::string_view to_string(FixStatus status) { return find_status_entry(status).name; }
-std::string_view describe(FixStatus status) { return find_status_entry(status).explanation; }
+std::string_view fix_status_name(FixStatus status) { return find_status_entry(status).name; }
+std::string_view describe_fix_status(FixStatus status) {
+  return find_status_entry(status).explanation;
+}
 
 }  // namespace vlp

@@ -12,7 +12,7 @@
 
 namespace vlp {
 
-/// Status of a fix. to_string() returns the word in fixes.csv.
+/// Status of a fix. fix_status_name() returns the word in fixes.csv.
 enum class FixStatus {
   ok,
   too_few_lamps,      // fewer than two lamps of the map
@@ -31,10 +31,10 @@ enum class FixStatus {
 
 /// Returns the name of a status as in fixes.csv: that of the enumerator, for example
 /// "too_few_lamps".
-std::string_view to_string(FixStatus status);
+std::string_view fix_status_name(FixStatus status);
 
 /// Returns an explanation of a status with the remedy, human-readable, in one line.
-std::string_view describe(FixStatus status);
+std::string_view describe_fix_status(FixStatus status);
 
 /// A pose and the covariance of its (X, Y, Z, yaw) in meters and radians.
 struct PoseEstimate {
@@ -100,7 +100,7 @@ struct Fix {
   /// refers.
   std::optional<double> time_s;
 
-  bool ok() const { return status == FixStatus::ok; }
+  bool has_succeeded() const { return status == FixStatus::ok; }
 };
 
 }  // namespace vlp

@@ -89,11 +89,11 @@ FloorGrid make_grid_of_floor_positions(const LampMap& map, double step_m) {
 std::vector<Eigen::Vector3d> find_visible_lamps(const LampMap& map, const Camera& camera,
                                                 const Pose& pose) {
   return get_lamp_positions(
-      map, find_lamps_in_view(map, Lens(camera.lens_model, camera.intrinsics), camera.imager_px,
-                              Eigen::Matrix3d::Identity(), pose));
+      map, find_fully_visible_lamp_indices(map, Lens(camera.lens_model, camera.intrinsics),
+                                           camera.imager_px, Eigen::Matrix3d::Identity(), pose));
 }
 
-Matrix4 FloorLimits::Place::total_covariance() const {
+Matrix4 FloorLimits::Place::total_pose_covariance() const {
   Matrix4 sum = Matrix4::Zero();
   for (const Matrix4& part : parts) sum += part;
   return sum;
@@ -103,21 +103,21 @@ FloorLimits compute_accuracy_limits_on_floor(const LampMap& map, const Camera& c
                                              const FloorGrid& grid, double z_m, double yaw_rad,
                                              const ErrorSources& sources, const BodyPrior& prior) {
   const Lens lens(camera.lens_model, camera.intrinsics);
-  const auto row_clock = make_row_clock(camera);
+  const auto row_clock = make_row_readout_clock(camera);
   FloorLimits limits{list_image_error_sources(prior), make_positions_on(grid, z_m, yaw_rad)};
   for (const auto& source :
        {Source{"principal point", "principal_point"}, {"tilt", "tilt"}, kLampMap}) {
     limits.sources.push_back(source);
   }
   for (FloorLimits::Place& place : limits.places) {
-    const auto lamps =
-        find_lamps_in_view(map, lens, camera.imager_px, Eigen::Matrix3d::Identity(), place.camera);
+    const auto lamps = find_fully_visible_lamp_indices(map, lens, camera.imager_px,
+                                                       Eigen::Matrix3d::Identity(), place.camera);
     place.lamps = static_cast<int>(lamps.size());
     const auto lamps_m = get_lamp_positions(map, lamps);
     const auto budget =
         is_motion_or_tilt_estimated(prior)
-            ? compute_error_budget(lamps_m, lens, place.camera, sources, prior, row_clock)
-            : compute_error_budget(lamps_m, lens, place.camera, sources);
+            ? compute_fix_error_budget(lamps_m, lens, place.camera, sources, prior, row_clock)
+            : compute_fix_error_budget(lamps_m, lens, place.camera, sources);
     if (!budget) continue;
     place.parts = split_covariance_by_image_source(*budget, prior);
     place.parts.insert(place.parts.end(), {budget->center, budget->tilt, budget->lamp_map});
@@ -131,18 +131,19 @@ FloorLimits compute_accuracy_limits_on_floor(const UnitErrors& unit, const Floor
   FloorLimits limits{list_image_error_sources(prior), make_positions_on(grid, z_m, yaw_rad)};
   limits.sources.push_back({"lens", "lens"});
   limits.sources.push_back({"zenith", "zenith"});
-  if (unit.has_offset_errors()) limits.sources.push_back({"offset", "offset"});
+  if (unit.has_dispersion_offset_errors()) limits.sources.push_back({"offset", "offset"});
   limits.sources.push_back(kLampMap);
   for (FloorLimits::Place& place : limits.places) {
-    const auto lamps = unit.find_visible_lamps(place.camera);
+    const auto lamps = unit.find_fully_visible_lamp_indices(place.camera);
     place.lamps = static_cast<int>(lamps.size());
-    const auto budget = is_motion_or_tilt_estimated(prior)
-                            ? unit.compute_budget(place.camera, lamps, noise_px, prior)
-                            : unit.compute_budget(place.camera, lamps, noise_px);
+    const auto budget =
+        is_motion_or_tilt_estimated(prior)
+            ? unit.compute_unit_fix_error_budget(place.camera, lamps, noise_px, prior)
+            : unit.compute_unit_fix_error_budget(place.camera, lamps, noise_px);
     if (!budget) continue;
     place.parts = split_covariance_by_image_source(*budget, prior);
     place.parts.insert(place.parts.end(), {budget->lens, budget->zenith});
-    if (unit.has_offset_errors()) place.parts.push_back(budget->offset);
+    if (unit.has_dispersion_offset_errors()) place.parts.push_back(budget->offset);
     place.parts.push_back(budget->lamp_map);
   }
   return limits;
@@ -172,7 +173,7 @@ FloorSummary::Row summarize_source(const FloorLimits::Source& source, const Floo
     height_m.push_back(spread.height_m);
     yaw_rad.push_back(spread.yaw_rad);
     part += spread.horizontal_m * spread.horizontal_m;
-    whole += place.total_covariance().topLeftCorner<2, 2>().trace();
+    whole += place.total_pose_covariance().topLeftCorner<2, 2>().trace();
   }
   const auto h = find_median_and_worst(horizontal_m), z = find_median_and_worst(height_m),
              yaw = find_median_and_worst(yaw_rad);
@@ -202,7 +203,7 @@ std::optional<FloorSummary> summarize_floor_limits(const FloorLimits& limits) {
   FloorSummary summary{
       {},
       summarize_source({"total", "horizontal"}, limits,
-                       [](const Place& place) { return place.total_covariance(); }),
+                       [](const Place& place) { return place.total_pose_covariance(); }),
       static_cast<std::size_t>(with_fix)};
   for (std::size_t i = 0; i < limits.sources.size(); ++i) {
     summary.sources.push_back(summarize_source(limits.sources[i], limits,

@@ -46,7 +46,7 @@ struct FloorLimits {
     /// visible, or if these do not determine all estimated quantities.
     std::vector<Matrix4> parts;
 
-    Matrix4 total_covariance() const;
+    Matrix4 total_pose_covariance() const;
   };
   std::vector<Place> places;
 };

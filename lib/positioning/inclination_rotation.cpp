@@ -15,7 +15,7 @@ InclinationRotation compute_inclination_rotation(const Inclination& inclination,
   const double pitch_rad = inclination.pitch_rad;
   InclinationRotation lean;
   lean.level_from_base =
-      base_from_robot * level_from_inclination(inclination) * base_from_robot.transpose();
+      base_from_robot * level_rotation_from_inclination(inclination) * base_from_robot.transpose();
   lean.error_axes.col(0) =
       base_from_robot * Eigen::Vector3d(std::cos(pitch_rad), 0, -std::sin(pitch_rad));
   lean.error_axes.col(1) = base_from_robot.col(1);

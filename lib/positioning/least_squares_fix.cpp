@@ -18,11 +18,12 @@ struct NormalEquations {
   bool lamps_above = true;
 };
 
-NormalEquations linearize(std::span<const Sighting> sightings, const LevelPose& camera) {
+NormalEquations make_pose_normal_equations(std::span<const Sighting> sightings,
+                                           const LevelPose& camera) {
   NormalEquations normal;
   for (const Sighting& sighting : sightings) {
-    if (!(lamp_height_above_camera(camera, sighting.lamp_m) > 0)) return {.lamps_above = false};
-    const Prediction prediction = predict_normalized_point(camera, sighting.lamp_m);
+    if (!(lamp_height_above_camera_m(camera, sighting.lamp_m) > 0)) return {.lamps_above = false};
+    const Prediction prediction = project_lamp_with_jacobian(camera, sighting.lamp_m);
     const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
     const Eigen::Matrix<double, 2, 4> jacobian = whitening * prediction.d_z_d_state;
     const Eigen::Vector2d residual = whitening * (sighting.z - prediction.z);
@@ -42,9 +43,9 @@ LevelPose apply_pose_step(const LevelPose& pose, const Eigen::Vector4d& step) {
 double compute_residual_rms_px(std::span<const Sighting> sightings, const LevelPose& camera) {
   double sum = 0;
   for (const Sighting& sighting : sightings) {
-    sum +=
-        (sighting.d_pixel_d_z * (sighting.z - project_to_normalized_point(camera, sighting.lamp_m)))
-            .squaredNorm();
+    sum += (sighting.d_pixel_d_z *
+            (sighting.z - project_lamp_to_normalized_point(camera, sighting.lamp_m)))
+               .squaredNorm();
   }
   return std::sqrt(sum / static_cast<double>(sightings.size()));
 }
@@ -59,9 +60,9 @@ std::optional<LeastSquaresFix> estimate_pose_least_squares(std::span<const Sight
   // Near the minimum the sum of squares changes by less than it can be computed.
   constexpr double rounding = 1e-12;
   LevelPose camera(start);
-  NormalEquations normal = linearize(sightings, camera);
+  NormalEquations normal = make_pose_normal_equations(sightings, camera);
   if (!normal.lamps_above) return std::nullopt;
-  const double scale_m = lamp_height_above_camera(camera, sightings.front().lamp_m);
+  const double scale_m = lamp_height_above_camera_m(camera, sightings.front().lamp_m);
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     const Eigen::LLT<Eigen::Matrix4d> factor(normal.information);
     if (factor.info() != Eigen::Success) return std::nullopt;
@@ -72,10 +73,10 @@ std::optional<LeastSquaresFix> estimate_pose_least_squares(std::span<const Sight
       if (step.head<3>().norm() <= small_step * scale_m && std::abs(step[3]) <= small_step) {
         const Eigen::Matrix4d covariance = normal.information.inverse();
         if (!covariance.allFinite()) return std::nullopt;
-        return LeastSquaresFix{next.pose(), covariance, normal.chi_squared,
+        return LeastSquaresFix{next.convert_to_yaw_pose(), covariance, normal.chi_squared,
                                compute_residual_rms_px(sightings, next)};
       }
-      const NormalEquations next_normal = linearize(sightings, next);
+      const NormalEquations next_normal = make_pose_normal_equations(sightings, next);
       if (next_normal.lamps_above &&
           next_normal.chi_squared <= normal.chi_squared * (1 + rounding)) {
         camera = next, normal = next_normal;

@@ -68,11 +68,11 @@ void mirror_observations(FrameObservations& frame) {
 /// Returns the residual limit in z. The RMS radii of the lamps in z and on the floor plan give the
 /// scale, since the fix may be wrong.
 double compute_residual_limit(const FrameObservations& frame, double max_residual_share) {
-  const double spread =
-      compute_rms_radius(frame.as_span(), [](const Sighting& sighting) { return sighting.z; });
-  const double spread_m = compute_rms_radius(frame.as_span(), [](const Sighting& sighting) {
-    return Eigen::Vector2d(sighting.lamp_m.head<2>());
-  });
+  const double spread = compute_rms_radius(frame.observations_span(),
+                                           [](const Sighting& sighting) { return sighting.z; });
+  const double spread_m = compute_rms_radius(
+      frame.observations_span(),
+      [](const Sighting& sighting) { return Eigen::Vector2d(sighting.lamp_m.head<2>()); });
   return std::min(max_residual_share * spread,
                   kMaxNeighborFraction * find_nearest_lamp_distance_m(frame) * spread / spread_m);
 }
@@ -80,7 +80,7 @@ double compute_residual_limit(const FrameObservations& frame, double max_residua
 /// Computes the fix with the mirror image of the map.
 ConsistentFix estimate_pose_of_mirrored_map(FrameObservations& frame, double limit) {
   mirror_observations(frame);
-  const ConsistentFix solution = estimate_and_check_pose(frame.as_span(), limit);
+  const ConsistentFix solution = estimate_and_check_pose(frame.observations_span(), limit);
   mirror_observations(frame);
   return solution;
 }
@@ -97,13 +97,14 @@ ConsistentFix recheck_with_noise_threshold(FrameObservations& frame, const Consi
     return {FixStatus::mirrored_map, {}};
   }
   if (!frame.noise_is_stated || frame.size < 4) return all;
-  const auto majority = find_largest_consistent_set(
-      frame.as_span(), std::sqrt(kMaxReducedChiSquared) * compute_max_point_sd(frame.as_span()));
+  const auto majority = find_largest_consistent_lamp_set(
+      frame.observations_span(),
+      std::sqrt(kMaxReducedChiSquared) * compute_max_point_sd(frame.observations_span()));
   if (!majority) return all;
   FrameObservations agreeing = frame;
-  agreeing.keep_only(majority->agreeing);
+  agreeing.keep_only_observations(majority->agreeing);
   const ConsistentFix solution = estimate_and_check_pose(
-      agreeing.as_span(), compute_residual_limit(agreeing, max_residual_share));
+      agreeing.observations_span(), compute_residual_limit(agreeing, max_residual_share));
   const double remaining = compute_reduced_chi_squared(solution.fix.chi_squared, agreeing.size);
   const bool explains = solution.status == FixStatus::ok && remaining < kMaxReducedChiSquared &&
                         kClearGain * remaining < excess;
@@ -116,7 +117,7 @@ ConsistentFix recheck_with_noise_threshold(FrameObservations& frame, const Consi
 
 ConsistentFix estimate_pose_robust(FrameObservations& frame, double max_residual_share) {
   const double limit = compute_residual_limit(frame, max_residual_share);
-  const ConsistentFix all = estimate_and_check_pose(frame.as_span(), limit);
+  const ConsistentFix all = estimate_and_check_pose(frame.observations_span(), limit);
   if (frame.size < 3) return all;
   if (all.status == FixStatus::ok) {
     return compute_reduced_chi_squared(all.fix.chi_squared, frame.size) > kMaxReducedChiSquared
@@ -126,10 +127,10 @@ ConsistentFix estimate_pose_robust(FrameObservations& frame, double max_residual
   if (estimate_pose_of_mirrored_map(frame, limit).status == FixStatus::ok)
     return {FixStatus::mirrored_map, {}};
   if (frame.size < 4) return all;
-  const auto majority = find_largest_consistent_set(frame.as_span(), limit);
+  const auto majority = find_largest_consistent_lamp_set(frame.observations_span(), limit);
   if (!majority) return all;
-  frame.keep_only(majority->agreeing);
-  return estimate_and_check_pose(frame.as_span(),
+  frame.keep_only_observations(majority->agreeing);
+  return estimate_and_check_pose(frame.observations_span(),
                                  compute_residual_limit(frame, max_residual_share));
 }
 
@@ -145,9 +146,10 @@ Vote find_pose_with_most_votes(std::span<const Sighting> sightings, const Pose& 
   const LevelPose camera(pose);
   Vote result{{pose, {}, 0}, 0};
   for (std::size_t i = 0; i < sightings.size(); ++i) {
-    if (!(lamp_height_above_camera(camera, sightings[i].lamp_m) > 0)) continue;
+    if (!(lamp_height_above_camera_m(camera, sightings[i].lamp_m) > 0)) continue;
     const double square =
-        (sightings[i].z - project_to_normalized_point(camera, sightings[i].lamp_m)).squaredNorm();
+        (sightings[i].z - project_lamp_to_normalized_point(camera, sightings[i].lamp_m))
+            .squaredNorm();
     if (!(square <= max_residual * max_residual)) continue;
     result.consensus.agreeing.set(i);
     ++result.consensus.count;
@@ -158,8 +160,8 @@ Vote find_pose_with_most_votes(std::span<const Sighting> sightings, const Pose& 
 
 }  // namespace
 
-std::optional<Consensus> find_largest_consistent_set(std::span<const Sighting> sightings,
-                                                     double max_residual) {
+std::optional<Consensus> find_largest_consistent_lamp_set(std::span<const Sighting> sightings,
+                                                          double max_residual) {
   const std::size_t n = sightings.size();
   const std::size_t stride = 1 + n / 65;
   Vote best{{{}, {}, 0}, 0};
@@ -186,7 +188,7 @@ bool are_consistent_with_pose(std::span<const Sighting> sightings, const Pose& p
                               double max_residual) {
   const LevelPose camera(pose);
   return std::all_of(sightings.begin(), sightings.end(), [&](const Sighting& sighting) {
-    return (sighting.z - project_to_normalized_point(camera, sighting.lamp_m)).norm() <=
+    return (sighting.z - project_lamp_to_normalized_point(camera, sighting.lamp_m)).norm() <=
            max_residual;
   });
 }
@@ -213,15 +215,15 @@ using Agreeing = std::bitset<kMaxSightings>;
 /// Returns the distance of a lamp from its observed ray; infinity if the lamp is behind it.
 double distance_from_ray(const BodyObservation& seen, const BodyProblem& problem,
                          const EvaluatedState& body) {
-  const Eigen::Vector3d q = body.lamp_in_body(seen.lamp_m, seen.time_s) - problem.arm_m;
+  const Eigen::Vector3d q = body.lamp_position_in_body(seen.lamp_m, seen.time_s) - problem.arm_m;
   const double depth_m = seen.ray.dot(q);
   return depth_m > 0 ? (q - depth_m * seen.ray).norm() : std::numeric_limits<double>::infinity();
 }
 
 /// Returns the largest accepted distance of a lamp from its ray, in m.
 double compute_residual_limit(const BodyObservations& frame, double max_residual_share) {
-  const double spread_m =
-      compute_rms_radius(frame.as_span(), [](const BodyObservation& seen) { return seen.lamp_m; });
+  const double spread_m = compute_rms_radius(
+      frame.observations_span(), [](const BodyObservation& seen) { return seen.lamp_m; });
   return std::min(max_residual_share * spread_m,
                   kMaxNeighborFraction * find_nearest_lamp_distance_m(frame));
 }
@@ -258,7 +260,7 @@ bool is_consistent(const BodySolution& solution, const BodyObservations& frame,
 
 BodyObservations select_lamps(const BodyObservations& frame, const Agreeing& agreeing) {
   BodyObservations remaining = frame;
-  remaining.keep_only(agreeing);
+  remaining.keep_only_observations(agreeing);
   return remaining;
 }
 
@@ -296,17 +298,18 @@ std::optional<Agreeing> find_majority_with_free_tilt(const BodyObservations& fra
 /// Finds the largest set of lamps that agree with a state with the inclination of the prior.
 std::optional<Agreeing> find_majority_if_level(const BodyObservations& frame,
                                                const BodyProblem& problem, double limit_m) {
-  const Eigen::Matrix3d lean = level_from_inclination(problem.prior.mean.inclination);
+  const Eigen::Matrix3d lean = level_rotation_from_inclination(problem.prior.mean.inclination);
   LevelSightings level;
   if (!level.fill(frame, lean)) return std::nullopt;
   // The limit is converted to z by the ratio of the distances between lamps.
   double sum_z = 0, sum_m = 0;
   const Sighting& first = level.sightings[0];
-  for (const Sighting& seen : level.as_span()) {
+  for (const Sighting& seen : level.observations_span()) {
     sum_z += (seen.z - first.z).norm();
     sum_m += (seen.lamp_m - first.lamp_m).head<2>().norm();
   }
-  const auto majority = find_largest_consistent_set(level.as_span(), limit_m * sum_z / sum_m);
+  const auto majority =
+      find_largest_consistent_lamp_set(level.observations_span(), limit_m * sum_z / sum_m);
   if (!majority) return std::nullopt;
   return find_agreeing_observations(make_body_state(majority->pose, problem, lean), frame, problem,
                                     limit_m);
@@ -318,7 +321,7 @@ BodySolution estimate_body_from_majority(BodyObservations& frame, const BodyProb
   const BodySolution none{FixStatus::inconsistent, {}};
   const double limit_m = compute_residual_limit(frame, max_residual_share);
   double latest_s = 0;
-  for (const BodyObservation& seen : frame.as_span()) {
+  for (const BodyObservation& seen : frame.observations_span()) {
     latest_s = std::max(latest_s, std::abs(seen.time_s));
   }
   const double driven_m = 2 * problem.prior.velocity_sd_m_per_s * latest_s;
@@ -360,8 +363,8 @@ std::optional<BodySolution> reject_moved_lamps(BodyObservations& frame, const Bo
       others.set().reset(i);
       const BodyObservations without = select_lamps(remaining, others);
       if (without.num_current < 2) continue;
-      const auto fix =
-          estimate_body_state(without.as_span(), problem.arm_m, problem.prior, solution.fix.state);
+      const auto fix = estimate_body_state(without.observations_span(), problem.arm_m,
+                                           problem.prior, solution.fix.state);
       if (!fix) continue;
       if (!best || fix->chi_squared < best->chi_squared) {
         if (best) second = best->chi_squared;
@@ -442,7 +445,7 @@ OutlierLamps find_outlier_lamps(std::span<const Sighting> sightings,
         const Sighting& one = sightings[i];
         const Eigen::Matrix2d by_pixel = one.d_pixel_d_z.inverse() * one.sigma_px;
         const Eigen::Matrix2d covariance = by_pixel * by_pixel.transpose() + common[i];
-        const Prediction prediction = predict_normalized_point(pose, one.lamp_m);
+        const Prediction prediction = project_lamp_with_jacobian(pose, one.lamp_m);
         use(i, covariance, prediction.d_z_d_state, Eigen::Vector2d(one.z - prediction.z));
       }
     };
@@ -452,7 +455,7 @@ OutlierLamps find_outlier_lamps(std::span<const Sighting> sightings,
       information += weighted * jacobian;
       gradient += weighted * residual;
     });
-    const auto state_covariance = invert_positive_definite(information);
+    const auto state_covariance = invert_positive_definite_matrix(information);
     if (!state_covariance) return {};
     const Eigen::Vector4d step = *state_covariance * gradient;
     double chi_squared = 0, worst = 0;

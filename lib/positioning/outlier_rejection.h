@@ -18,7 +18,7 @@
 
 namespace vlp {
 
-/// Result of find_largest_consistent_set(): a pose and the observations that agree with it.
+/// Result of find_largest_consistent_lamp_set(): a pose and the observations that agree with it.
 /// `agreeing` has a bit per observation, by its index; `count` is the number of set bits.
 struct Consensus {
   Pose pose;
@@ -32,8 +32,8 @@ struct Consensus {
 /// lamps the pairs are a fixed selection. Returns std::nullopt without a majority of at least
 /// three.
 /// @pre at most kMaxSightings observations
-std::optional<Consensus> find_largest_consistent_set(std::span<const Sighting> sightings,
-                                                     double max_residual);
+std::optional<Consensus> find_largest_consistent_lamp_set(std::span<const Sighting> sightings,
+                                                          double max_residual);
 
 /// Least-squares fix of a frame, valid if the status is `ok`.
 struct ConsistentFix {
@@ -56,7 +56,8 @@ ConsistentFix estimate_and_check_pose(std::span<const Sighting> sightings, doubl
 ///   which excludes confusion of neighbors.
 /// On a contradiction, with
 ///   three or more  that fit the mirror image of the map, the status is `mirrored_map`;
-///   four or more   the agreeing majority makes the fix (find_largest_consistent_set()); the others
+///   four or more   the agreeing majority makes the fix (find_largest_consistent_lamp_set()); the
+///   others
 ///                  are rejected;
 ///   others         the status is `inconsistent`.
 ///
@@ -71,7 +72,7 @@ ConsistentFix estimate_pose_robust(FrameObservations& frame, double max_residual
 ///
 /// Initial state: if the standard deviation of roll and pitch is at most 0.15 rad, the fix of a
 /// level camera (compute_initial_pose). Otherwise the poses from the three lamps that are farthest
-/// apart (compute_three_lamp_poses). Only poses below the lamps are accepted.
+/// apart (compute_poses_from_three_lamps). Only poses below the lamps are accepted.
 ///
 /// Checks residuals, mirrored maps and majorities as estimate_pose_robust() does for level cameras.
 /// The residual limits apply to distances in meters across the rays; estimate_pose_robust() applies

@@ -174,7 +174,7 @@ struct Linearized : Normal<S::kCount> {
         const Eigen::Vector3d d_axis = d_pixel_d_q.row(axis);
         std::array<double, S::kCount> row;
         for (std::size_t i = 0; i < S::kCount; ++i) row[i] = d_axis.dot(d_q[i]);
-        this->add_row(row, residual.value[axis]);
+        this->add_residual_row(row, residual.value[axis]);
       }
       const double square = residual.value.squaredNorm();
       chi_squared += square;
@@ -240,7 +240,7 @@ std::optional<BodyFix> solve(std::span<const BodyObservation> sightings,
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     const Cholesky<S::kCount> factor(normal);
     if (!factor.is_positive) return std::nullopt;
-    const auto solution = factor.solve(normal.gradient);
+    const auto solution = factor.solve_normal_equations(normal.gradient);
     BodyVector step = BodyVector::Zero();
     for (std::size_t i = 0; i < S::kCount; ++i) step[indices[i]] = solution[i];
     if (!step.allFinite()) return std::nullopt;
@@ -267,7 +267,7 @@ std::optional<BodyFix> solve(std::span<const BodyObservation> sightings,
 
 }  // namespace
 
-std::optional<Eigen::Matrix<double, 2, 3>> whitened_pixel_from_ray(
+std::optional<Eigen::Matrix<double, 2, 3>> compute_whitened_pixel_from_ray(
     const Eigen::Vector3d& ray, const Eigen::Matrix<double, 3, 2>& d_ray_d_pixel, double sigma_px) {
   const double inverse_length = 1 / ray.norm();
   const Eigen::Vector3d unit_ray = inverse_length * ray;
@@ -289,11 +289,12 @@ EvaluatedState::EvaluatedState(const BodyState& at)
   pitch_axis = {0, cr, -sr};
 }
 
-Eigen::Vector3d EvaluatedState::lamp_in_body(const Eigen::Vector3d& lamp_m, double time_s) const {
+Eigen::Vector3d EvaluatedState::lamp_position_in_body(const Eigen::Vector3d& lamp_m,
+                                                      double time_s) const {
   return compute_lamp_terms(*this, lamp_m, time_s).in_body;
 }
 
-Eigen::Matrix<double, 3, kBodyStates> EvaluatedState::d_lamp_in_body_d_state(
+Eigen::Matrix<double, 3, kBodyStates> EvaluatedState::d_lamp_position_in_body_d_state(
     const Eigen::Vector3d& lamp_m, double time_s) const {
   const auto columns = States<true, true, true>::d_lamp_in_body_d_estimated_states(
       *this, compute_lamp_terms(*this, lamp_m, time_s), time_s);
@@ -302,14 +303,15 @@ Eigen::Matrix<double, 3, kBodyStates> EvaluatedState::d_lamp_in_body_d_state(
   return derivative;
 }
 
-Matrix23 d_whitened_pixel_d_lamp(const BodyObservation& sighting,
-                                 const Eigen::Vector3d& lamp_from_camera_m) {
+Matrix23 d_whitened_pixel_d_lamp_position(const BodyObservation& sighting,
+                                          const Eigen::Vector3d& lamp_from_camera_m) {
   return d_pixel_d_lamp_in_body(sighting, compute_lamp_residual(sighting, lamp_from_camera_m));
 }
 
-std::optional<double> compute_chi_squared(std::span<const BodyObservation> sightings,
-                                          const Eigen::Vector3d& arm_in_body_m,
-                                          const BodyPrior& prior, const BodyState& state) {
+std::optional<double> compute_body_state_chi_squared(std::span<const BodyObservation> sightings,
+                                                     const Eigen::Vector3d& arm_in_body_m,
+                                                     const BodyPrior& prior,
+                                                     const BodyState& state) {
   const EvaluatedState at(state);
   double sum = compute_prior_residuals(state, prior, compute_prior_weights(prior)).squaredNorm();
   for (const BodyObservation& sighting : sightings) {

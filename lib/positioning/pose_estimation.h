@@ -71,7 +71,7 @@ struct BodyObservation {
 
 /// Computes M of a pixel from its standard deviation and the derivative of its ray, which may have
 /// any length. Returns std::nullopt if the lens is not invertible there.
-std::optional<Eigen::Matrix<double, 2, 3>> whitened_pixel_from_ray(
+std::optional<Eigen::Matrix<double, 2, 3>> compute_whitened_pixel_from_ray(
     const Eigen::Vector3d& ray, const Eigen::Matrix<double, 3, 2>& d_ray_d_pixel, double sigma_px);
 
 /// Estimated state of a body with covariance and statistics of the residuals.
@@ -98,11 +98,11 @@ class EvaluatedState {
 
   /// Returns the position of a lamp relative to the body, q + arm, along the axes of the body, m.
   /// `time_s` is the readout time.
-  Eigen::Vector3d lamp_in_body(const Eigen::Vector3d& lamp_m, double time_s) const;
+  Eigen::Vector3d lamp_position_in_body(const Eigen::Vector3d& lamp_m, double time_s) const;
   /// Returns the derivative of q, m, with respect to the states X, Y, Z, yaw, u, w, roll, pitch
   /// (BodyIndex), in m, rad and s.
-  Eigen::Matrix<double, 3, kBodyStates> d_lamp_in_body_d_state(const Eigen::Vector3d& lamp_m,
-                                                               double time_s) const;
+  Eigen::Matrix<double, 3, kBodyStates> d_lamp_position_in_body_d_state(
+      const Eigen::Vector3d& lamp_m, double time_s) const;
 
   BodyState state;
   /// Unit vector (cos g, sin g) of the yaw g.
@@ -115,14 +115,15 @@ class EvaluatedState {
 
 /// Returns the derivative of a lamp's pixel, in standard deviations, with respect to q, m. q is its
 /// position relative to the camera, along the axes of the body.
-Eigen::Matrix<double, 2, 3> d_whitened_pixel_d_lamp(const BodyObservation& sighting,
-                                                    const Eigen::Vector3d& lamp_from_camera_m);
+Eigen::Matrix<double, 2, 3> d_whitened_pixel_d_lamp_position(
+    const BodyObservation& sighting, const Eigen::Vector3d& lamp_from_camera_m);
 
 /// Computes the sum of the squared residuals of pixels and priors over their variances at `state`.
 /// Returns std::nullopt if a lamp is behind its ray.
-std::optional<double> compute_chi_squared(std::span<const BodyObservation> sightings,
-                                          const Eigen::Vector3d& arm_in_body_m,
-                                          const BodyPrior& prior, const BodyState& state);
+std::optional<double> compute_body_state_chi_squared(std::span<const BodyObservation> sightings,
+                                                     const Eigen::Vector3d& arm_in_body_m,
+                                                     const BodyPrior& prior,
+                                                     const BodyState& state);
 
 /// Estimates the state by least squares over pixels and priors. Gauss-Newton from `start`; a step
 /// that does not reduce the sum of squares is halved. Returns std::nullopt if a lamp is behind its

@@ -52,22 +52,24 @@ std::vector<Lamp> sorted_by_id(std::vector<Lamp> lamps) {
   return lamps;
 }
 
-bool is_sd(double value) { return std::isfinite(value) && value >= 0; }
+bool is_valid_sd(double value) { return std::isfinite(value) && value >= 0; }
 
-bool finite(const KnownMotion& motion) {
+bool are_values_finite(const KnownMotion& motion) {
   return motion.velocity_m_per_s.allFinite() && std::isfinite(motion.yaw_rate_rad_per_s) &&
-         is_sd(motion.velocity_sd_m_per_s) && is_sd(motion.yaw_rate_sd_rad_per_s);
+         is_valid_sd(motion.velocity_sd_m_per_s) && is_valid_sd(motion.yaw_rate_sd_rad_per_s);
 }
 
-bool finite(const Sensors& sensors) {
+bool are_values_finite(const Sensors& sensors) {
   const auto& lean = sensors.inclination;
   const auto& known = sensors.height_and_yaw;
   const auto& height = sensors.height;
-  return is_sd(sensors.inclination_sigma_rad) && (!sensors.motion || finite(*sensors.motion)) &&
-         (!height || (std::isfinite(height->z_m) && is_sd(height->sd_m) && height->sd_m > 0)) &&
+  return is_valid_sd(sensors.inclination_sigma_rad) &&
+         (!sensors.motion || are_values_finite(*sensors.motion)) &&
+         (!height ||
+          (std::isfinite(height->z_m) && is_valid_sd(height->sd_m) && height->sd_m > 0)) &&
          (!lean || (std::isfinite(lean->roll_rad) && std::isfinite(lean->pitch_rad))) &&
          (!known || (std::isfinite(known->z_m) && std::isfinite(known->yaw_rad) &&
-                     is_sd(known->z_sd_m) && is_sd(known->yaw_sd_rad)));
+                     is_valid_sd(known->z_sd_m) && is_valid_sd(known->yaw_sd_rad)));
 }
 
 /// Returns the mean position of the lamps, relative to which national coordinates lose no digits.
@@ -144,7 +146,7 @@ class Positioner::Impl {
       : lamps_(sorted_by_id(map.lamps)),
         lens_(calibration.camera.lens_model, calibration.camera.intrinsics),
         origin_m_(get_lamp_center(lamps_)),
-        base_from_camera_(level_from_camera(calibration, options.correction)),
+        base_from_camera_(compute_level_from_camera_rotation(calibration, options.correction)),
         common_(lamps_, calibration, options.correction),
         mount_(options.mount.value_or(CameraMount{Eigen::Vector3d::Zero(), 0})),
         body_from_base_(rotation_about_z(mount_.yaw_in_robot_rad)),
@@ -152,7 +154,7 @@ class Positioner::Impl {
         max_residual_share_(options.max_residual_share),
         unstated_sigma_px_(options.unstated_sigma_px),
         computes_common_chi_squared_(options.computes_common_chi_squared),
-        row_clock_(make_row_clock(calibration.camera)) {
+        row_clock_(make_row_readout_clock(calibration.camera)) {
     for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
     nearest_m_ = compute_distances_to_nearest_lamp(lamps_);
     if (!(mount_.position_in_robot_m.allFinite() && std::isfinite(mount_.yaw_in_robot_rad))) {
@@ -165,10 +167,10 @@ class Positioner::Impl {
     }
   }
 
-  Fix locate(std::span<const Detection> detections, const Sensors& sensors) const {
-    if (!finite(sensors)) return make_fix_without_pose(FixStatus::not_finite, 0);
+  Fix compute_position_fix(std::span<const Detection> detections, const Sensors& sensors) const {
+    if (!are_values_finite(sensors)) return make_fix_without_pose(FixStatus::not_finite, 0);
     if (needs_body_estimation(sensors) && detections.size() > 1) {
-      if (auto fix = locate_body(detections, sensors, {})) return *fix;
+      if (auto fix = compute_body_fix(detections, sensors, {})) return *fix;
     }
     const InclinationRotation lean =
         sensors.inclination
@@ -200,7 +202,7 @@ class Positioner::Impl {
       known.z_m -= origin_m_.z();
       const auto pose = compute_pose_at_known_height_and_yaw(sighting, known, *readout);
       if (!pose) return make_fix_without_pose(FixStatus::lamp_below_camera, frame.unknown_lamps);
-      fix.estimate = {*pose, compute_one_lamp_covariance(sighting, *pose)};
+      fix.estimate = {*pose, compute_one_lamp_pixel_noise_covariance(sighting, *pose)};
       height_and_yaw_covariance =
           compute_one_lamp_sensor_covariance(sighting, *pose, known, *readout);
       d_pose_d_inclination = compute_one_lamp_rotation_jacobian(sighting, *pose) * lean.error_axes;
@@ -218,23 +220,27 @@ class Positioner::Impl {
     return fix;
   }
 
-  Fix locate(std::span<const Detection> detections, const Sensors& sensors,
-             std::span<const EarlierFrame> earlier) const {
+  Fix compute_position_fix(std::span<const Detection> detections, const Sensors& sensors,
+                           std::span<const EarlierFrame> earlier) const {
     const bool finite_times =
         std::all_of(earlier.begin(), earlier.end(),
                     [](const EarlierFrame& before) { return std::isfinite(before.before_s); });
-    if (!finite(sensors) || !finite_times) return make_fix_without_pose(FixStatus::not_finite, 0);
-    if (const auto fix = locate_body(detections, sensors, earlier)) return *fix;
-    return locate(detections, sensors);
+    if (!are_values_finite(sensors) || !finite_times)
+      return make_fix_without_pose(FixStatus::not_finite, 0);
+    if (const auto fix = compute_body_fix(detections, sensors, earlier)) return *fix;
+    return compute_position_fix(detections, sensors);
   }
 
-  int lamps_elsewhere() const { return common_.lamps_elsewhere(); }
+  int num_lamps_moved_since_calibration() const {
+    return common_.num_lamps_moved_since_calibration();
+  }
 
  private:
   /// Adds each detection of a lamp of the map to the frame: `add` takes it, its lamp, its ray and
   /// its standard deviation, and fills the frame's sighting.
   template <typename Frame, typename Add>
-  FixStatus find_lamps(std::span<const Detection> detections, Frame& frame, const Add& add) const {
+  FixStatus match_detections_to_map(std::span<const Detection> detections, Frame& frame,
+                                    const Add& add) const {
     const auto ids_begin = frame.ids.begin() + static_cast<std::ptrdiff_t>(frame.size);
     for (const Detection& detection : detections) {
       const auto lamp = std::ranges::lower_bound(lamps_, detection.lamp, {}, &Lamp::id);
@@ -248,7 +254,7 @@ class Positioner::Impl {
       const double sigma_px = detection.sigma_px.value_or(unstated_sigma_px_);
       const bool plausible = sigma_px >= kMinSigma_px && sigma_px <= kMaxSigma_px;
       if (!detection.pixel.allFinite() || !plausible) return FixStatus::not_finite;
-      const auto ray = lens_.unproject(detection.pixel);
+      const auto ray = lens_.unproject_pixel(detection.pixel);
       if (!ray) return FixStatus::outside_lens;
       const FixStatus added = add(detection, *lamp, *ray, sigma_px);
       if (added != FixStatus::ok) return added;
@@ -259,7 +265,7 @@ class Positioner::Impl {
     return FixStatus::ok;
   }
 
-  std::size_t find_index(int id) const {
+  std::size_t find_lamp_index_by_id(int id) const {
     return static_cast<std::size_t>(std::ranges::lower_bound(lamps_, id, {}, &Lamp::id) -
                                     lamps_.begin());
   }
@@ -275,31 +281,34 @@ class Positioner::Impl {
     const LevelPose pose(solution.fix.pose);
     std::array<Matrix2, max_lamps> common;
     for (std::size_t i = 0; i < frame.size; ++i) {
-      common[i] = common_.compute_covariance(common_.compute_observation_error_jacobians(
-                                                 frame.sightings[i], pose, lens_, level_from_base),
-                                             find_index(frame.ids[i]));
+      common[i] = common_.compute_observation_covariance(
+          common_.compute_observation_error_jacobians(frame.sightings[i], pose, lens_,
+                                                      level_from_base),
+          find_lamp_index_by_id(frame.ids[i]));
     }
     const OutlierLamps wrong =
-        find_outlier_lamps(frame.as_span(), {common.data(), frame.size}, solution.fix);
+        find_outlier_lamps(frame.observations_span(), {common.data(), frame.size}, solution.fix);
     if (wrong.count == 0) return;
     std::bitset<kMaxSightings> kept;
     kept.set();
     for (std::size_t i = 0; i < wrong.count; ++i) kept.reset(wrong.lamps[i]);
-    frame.keep_only(kept);
-    solution = estimate_and_check_pose(frame.as_span(), std::numeric_limits<double>::infinity());
+    frame.keep_only_observations(kept);
+    solution =
+        estimate_and_check_pose(frame.observations_span(), std::numeric_limits<double>::infinity());
   }
 
   /// Returns G C G'. Sets fix.common_chi_squared if PositionerOptions require it.
   Matrix4 compute_common_covariance(const FrameObservations& frame,
                                     const Eigen::Matrix3d& level_from_base, Fix& fix) const {
     std::array<std::size_t, max_lamps> lamps;
-    for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_index(frame.ids[i]);
+    for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_lamp_index_by_id(frame.ids[i]);
     const std::span<const std::size_t> in_map(lamps.data(), frame.size);
-    const Matrix4 common = common_.compute_covariance(common_.compute_gain_of_fix_errors(
-        frame.as_span(), in_map, fix.estimate, lens_, level_from_base));
+    const Matrix4 common =
+        common_.propagate_covariance_to_fix(common_.compute_gain_from_errors_to_fix(
+            frame.observations_span(), in_map, fix.estimate, lens_, level_from_base));
     if (computes_common_chi_squared_ && fix.redundancy > 0) {
       fix.common_chi_squared = common_.compute_expected_chi_squared(
-          frame.as_span(), in_map, fix.estimate, common, lens_, level_from_base);
+          frame.observations_span(), in_map, fix.estimate, common, lens_, level_from_base);
     }
     return common;
   }
@@ -308,13 +317,14 @@ class Positioner::Impl {
                                            const Eigen::Vector3d& arm_m, const BodyFix& solution,
                                            Fix& fix) const {
     std::array<std::size_t, max_lamps> lamps;
-    for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_index(frame.ids[i]);
+    for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_lamp_index_by_id(frame.ids[i]);
     const std::span<const std::size_t> in_map(lamps.data(), frame.size);
-    const BodyCovariance common = common_.compute_covariance(common_.compute_gain_of_fix_errors(
-        frame.as_span(), in_map, arm_m, solution, lens_, body_from_base_));
+    const BodyCovariance common =
+        common_.propagate_covariance_to_fix(common_.compute_gain_from_errors_to_fix(
+            frame.observations_span(), in_map, arm_m, solution, lens_, body_from_base_));
     if (computes_common_chi_squared_ && fix.redundancy > 0) {
       fix.common_chi_squared = common_.compute_expected_chi_squared(
-          frame.as_span(), in_map, arm_m, solution, common, lens_, body_from_base_);
+          frame.observations_span(), in_map, arm_m, solution, common, lens_, body_from_base_);
     }
     return common;
   }
@@ -339,7 +349,7 @@ class Positioner::Impl {
       }
       return FixStatus::ok;
     };
-    return find_lamps(detections, frame, add);
+    return match_detections_to_map(detections, frame, add);
   }
 
   FixStatus make_body_observations(std::span<const Detection> detections, double time_s,
@@ -347,21 +357,21 @@ class Positioner::Impl {
     const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
                          double sigma_px) {
       const Eigen::Vector3d direction = body_from_camera_ * ray.direction;
-      const auto whitened =
-          whitened_pixel_from_ray(direction, body_from_camera_ * ray.d_direction_d_pixel, sigma_px);
+      const auto whitened = compute_whitened_pixel_from_ray(
+          direction, body_from_camera_ * ray.d_direction_d_pixel, sigma_px);
       if (!whitened) return FixStatus::outside_lens;
       const double read_s =
-          row_clock_ ? row_clock_->compute_time_from_middle_row_s(detection.pixel) : 0;
+          row_clock_ ? row_clock_->compute_pixel_readout_time_s(detection.pixel) : 0;
       frame.sightings[frame.size] = {lamp.position_m, direction.normalized(), *whitened, sigma_px,
                                      time_s + read_s};
       return FixStatus::ok;
     };
-    return find_lamps(detections, frame, add);
+    return match_detections_to_map(detections, frame, add);
   }
 
   /// Returns std::nullopt if the frame has fewer than two lamps of the map.
-  std::optional<Fix> locate_body(std::span<const Detection> detections, const Sensors& sensors,
-                                 std::span<const EarlierFrame> earlier) const {
+  std::optional<Fix> compute_body_fix(std::span<const Detection> detections, const Sensors& sensors,
+                                      std::span<const EarlierFrame> earlier) const {
     const KnownMotion motion = sensors.motion.value_or(KnownMotion());
     if (may_camera_move_during_readout(motion) && !row_clock_)
       return make_fix_without_pose(FixStatus::row_time_unknown, 0);
@@ -393,7 +403,7 @@ class Positioner::Impl {
     fix.redundancy = solution.redundancy;
     fix.chi_squared = solution.pixels_chi_squared;
     fix.body = rotate_estimate_to_world(solution,
-                                        common_.are_errors_known()
+                                        common_.are_any_errors_known()
                                             ? compute_common_covariance(frame, arm_m, solution, fix)
                                             : BodyCovariance(BodyCovariance::Zero()));
     fix.noise_covariance = fix.body->noise_covariance.topLeftCorner<4, 4>();
@@ -417,15 +427,16 @@ class Positioner::Impl {
     const Matrix4 by_weights = fix.estimate.covariance;
     Matrix4 covariance = Matrix4::Zero();
     double expected_squares = 0;
-    for (const Sighting& sighting : frame.as_span()) {
-      const auto seen = lens_.project_with_jacobians(camera_from_level * sighting.z.homogeneous());
+    for (const Sighting& sighting : frame.observations_span()) {
+      const auto seen =
+          lens_.project_point_with_jacobians(camera_from_level * sighting.z.homogeneous());
       Eigen::Matrix2d d_pixel_d_z = sighting.d_pixel_d_z;
       if (seen) d_pixel_d_z = seen->d_pixel_d_point * camera_from_level.leftCols<2>();
       const Eigen::Matrix2d z_by_noise = sighting.sigma_px * d_pixel_d_z.inverse();
       const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
       const Eigen::Matrix2d residual_by_noise = whitening * z_by_noise;
       const Eigen::Matrix<double, 4, 2> fix_by_noise =
-          by_weights * predict_normalized_point(pose, sighting.lamp_m).d_z_d_state.transpose() *
+          by_weights * project_lamp_with_jacobian(pose, sighting.lamp_m).d_z_d_state.transpose() *
           whitening.transpose() * residual_by_noise;
       covariance += fix_by_noise * fix_by_noise.transpose();
       expected_squares += residual_by_noise.squaredNorm();
@@ -441,7 +452,7 @@ class Positioner::Impl {
                        const InclinationJacobian& d_pose_d_inclination, const Sensors& sensors,
                        const Matrix4& height_and_yaw_covariance, Fix& fix) const {
     const double sigma_rad = sensors.inclination_sigma_rad;
-    const Matrix4 common = common_.are_errors_known()
+    const Matrix4 common = common_.are_any_errors_known()
                                ? compute_common_covariance(frame, lean.level_from_base, fix)
                                : Matrix4(Matrix4::Zero());
     if (!frame.is_weighed_by_noise)
@@ -467,7 +478,7 @@ class Positioner::Impl {
     const auto detection = std::find_if(detections.begin(), detections.end(),
                                         [&](const Detection& one) { return one.lamp == lamp; });
     readout.motion = *sensors.motion;
-    readout.time_s = row_clock_->compute_time_from_middle_row_s(detection->pixel);
+    readout.time_s = row_clock_->compute_pixel_readout_time_s(detection->pixel);
     const Eigen::Rotation2Dd camera_from_robot(-mount_.yaw_in_robot_rad);
     readout.motion.velocity_m_per_s = camera_from_robot * sensors.motion->velocity_m_per_s;
     readout.arm_m = camera_from_robot * mount_.position_in_robot_m.head<2>();
@@ -495,16 +506,18 @@ Positioner::Positioner(const LampMap& map, const Calibration& calibration,
                        const PositionerOptions& options)
     : impl_(std::make_shared<const Impl>(map, calibration, options)) {}
 
-Fix Positioner::locate(std::span<const Detection> detections,
-                       const Sensors& sensors) const noexcept {
-  return impl_->locate(detections, sensors);
+Fix Positioner::compute_position_fix(std::span<const Detection> detections,
+                                     const Sensors& sensors) const noexcept {
+  return impl_->compute_position_fix(detections, sensors);
 }
 
-Fix Positioner::locate(std::span<const Detection> detections, const Sensors& sensors,
-                       std::span<const EarlierFrame> earlier) const noexcept {
-  return impl_->locate(detections, sensors, earlier);
+Fix Positioner::compute_position_fix(std::span<const Detection> detections, const Sensors& sensors,
+                                     std::span<const EarlierFrame> earlier) const noexcept {
+  return impl_->compute_position_fix(detections, sensors, earlier);
 }
 
-int Positioner::lamps_elsewhere() const noexcept { return impl_->lamps_elsewhere(); }
+int Positioner::num_lamps_moved_since_calibration() const noexcept {
+  return impl_->num_lamps_moved_since_calibration();
+}
 
 }  // namespace vlp

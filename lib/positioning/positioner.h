@@ -59,7 +59,8 @@ struct KnownMotion {
 
   /// Returns a motion of which only the maximum speed and yaw rate are known: mean zero, standard
   /// deviation half the maximum.
-  static KnownMotion up_to(double speed_m_per_s, double yaw_rate_rad_per_s) {
+  static KnownMotion make_motion_prior_from_limits(double speed_m_per_s,
+                                                   double yaw_rate_rad_per_s) {
     return {{0, 0}, 0, speed_m_per_s / 2, yaw_rate_rad_per_s / 2};
   }
 };
@@ -115,17 +116,18 @@ class Positioner {
   /// motion or inclination free, or give a height. If the covariances of calibration or survey
   /// cover every lamp, lamps that contradict all uncertainties together are rejected, too
   /// (find_outlier_lamps).
-  Fix locate(std::span<const Detection> detections, const Sensors& sensors = {}) const noexcept;
+  Fix compute_position_fix(std::span<const Detection> detections,
+                           const Sensors& sensors = {}) const noexcept;
   /// Computes the fix of one frame together with frames from shortly before. Velocity, yaw rate,
   /// roll and pitch are assumed constant over the frames. If the current frame has fewer than two
   /// lamps of the map, the earlier frames are not used. Without sensor readings the camera is
   /// assumed at rest.
-  Fix locate(std::span<const Detection> detections, const Sensors& sensors,
-             std::span<const EarlierFrame> earlier) const noexcept;
+  Fix compute_position_fix(std::span<const Detection> detections, const Sensors& sensors,
+                           std::span<const EarlierFrame> earlier) const noexcept;
 
   /// Returns the number of lamps of the adjustment that the map has at another position. The
   /// reported covariances do not include their errors (CommonErrors).
-  int lamps_elsewhere() const noexcept;
+  int num_lamps_moved_since_calibration() const noexcept;
 
  private:
   class Impl;

@@ -13,7 +13,7 @@ namespace vlp {
 
 namespace {
 
-bool has_redundancy(const Fix& fix) { return fix.ok() && fix.redundancy > 0; }
+bool has_redundancy(const Fix& fix) { return fix.has_succeeded() && fix.redundancy > 0; }
 
 /// Returns the median of chi_squared over its degrees of freedom.
 double compute_median_reduced_chi_squared(std::span<const Fix> fixes) {

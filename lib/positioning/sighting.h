@@ -37,7 +37,7 @@ struct LevelPose {
       : position_m(position), heading(unit_heading) {}
   explicit LevelPose(const Pose& pose)
       : position_m(pose.position_m), heading(std::cos(pose.yaw_rad), std::sin(pose.yaw_rad)) {}
-  Pose pose() const { return {position_m, std::atan2(heading.y(), heading.x())}; }
+  Pose convert_to_yaw_pose() const { return {position_m, std::atan2(heading.y(), heading.x())}; }
 };
 
 /// Normalized point z of a lamp, predicted from a pose, with its derivative.
@@ -48,24 +48,25 @@ struct Prediction {
 };
 
 /// Returns the height of a lamp above the camera, in m.
-inline double lamp_height_above_camera(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
+inline double lamp_height_above_camera_m(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
   return lamp_m.z() - camera.position_m.z();
 }
 
 /// Computes z of a lamp from a pose.
 /// @pre the lamp is above the camera
-inline Eigen::Vector2d project_to_normalized_point(const LevelPose& camera,
-                                                   const Eigen::Vector3d& lamp_m) {
+inline Eigen::Vector2d project_lamp_to_normalized_point(const LevelPose& camera,
+                                                        const Eigen::Vector3d& lamp_m) {
   const Eigen::Vector2d offset = (lamp_m - camera.position_m).head<2>();
-  return conjugate_product(camera.heading, offset) / lamp_height_above_camera(camera, lamp_m);
+  return conjugate_product(camera.heading, offset) / lamp_height_above_camera_m(camera, lamp_m);
 }
 
 /// Computes z of a lamp from a pose, and its derivatives.
 /// @pre the lamp is above the camera
-inline Prediction predict_normalized_point(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
-  const double inverse_height = 1 / lamp_height_above_camera(camera, lamp_m);
+inline Prediction project_lamp_with_jacobian(const LevelPose& camera,
+                                             const Eigen::Vector3d& lamp_m) {
+  const double inverse_height = 1 / lamp_height_above_camera_m(camera, lamp_m);
   const double c = camera.heading.x() * inverse_height, s = camera.heading.y() * inverse_height;
-  const Eigen::Vector2d z = project_to_normalized_point(camera, lamp_m);
+  const Eigen::Vector2d z = project_lamp_to_normalized_point(camera, lamp_m);
   Prediction prediction{z, {}};
   prediction.d_z_d_state << -c, -s, z.x() * inverse_height, z.y(),  //
       s, -c, z.y() * inverse_height, -z.x();
@@ -74,7 +75,7 @@ inline Prediction predict_normalized_point(const LevelPose& camera, const Eigen:
 
 /// Returns the derivative of z with respect to a small rotation of the level frame about its x and
 /// y axes, rad.
-inline Eigen::Matrix2d compute_point_jacobian_wrt_level_tilt(const Eigen::Vector2d& z) {
+inline Eigen::Matrix2d compute_normalized_point_jacobian_wrt_tilt(const Eigen::Vector2d& z) {
   Eigen::Matrix2d jacobian;
   jacobian << -z.x() * z.y(), 1 + z.x() * z.x(), -(1 + z.y() * z.y()), z.x() * z.y();
   return jacobian;

@@ -117,8 +117,8 @@ Eigen::Matrix3d compute_point_frame(const Eigen::Vector3d& p0, const Eigen::Vect
 
 }  // namespace
 
-ThreeLampPoses compute_three_lamp_poses(const std::array<Eigen::Vector3d, 3>& points_m,
-                                        const std::array<Eigen::Vector3d, 3>& rays) {
+ThreeLampPoses compute_poses_from_three_lamps(const std::array<Eigen::Vector3d, 3>& points_m,
+                                              const std::array<Eigen::Vector3d, 3>& rays) {
   ThreeLampPoses found;
   const Cones cones = make_cones(points_m, rays);
   Eigen::Matrix3d first = cones.a12 * cones.m01 - cones.a01 * cones.m12;

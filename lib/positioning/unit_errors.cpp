@@ -12,19 +12,20 @@
 
 namespace vlp {
 
-std::vector<std::size_t> find_lamps_in_view(const LampMap& map, const Lens& lens,
-                                            const std::array<int, 2>& imager_px,
-                                            const Eigen::Matrix3d& camera_from_level,
-                                            const Pose& level) {
+std::vector<std::size_t> find_fully_visible_lamp_indices(const LampMap& map, const Lens& lens,
+                                                         const std::array<int, 2>& imager_px,
+                                                         const Eigen::Matrix3d& camera_from_level,
+                                                         const Pose& level) {
   const auto in_image = [&](const Eigen::Vector3d& x_in_world) {
-    const auto pixel = lens.project(camera_from_level * level_from_world(level, x_in_world));
+    const auto pixel =
+        lens.project_point(camera_from_level * level_point_from_world(level, x_in_world));
     return pixel && pixel->minCoeff() >= -0.5 && pixel->x() <= imager_px[0] - 0.5 &&
            pixel->y() <= imager_px[1] - 0.5;
   };
   const auto seen_whole = [&](const Lamp& lamp) {
     if (lamp.position_m.z() <= level.position_m.z()) return false;
     if (!in_image(lamp.position_m)) return false;
-    const auto outline_m = outline_of(lamp.shape, lamp.position_m);
+    const auto outline_m = compute_lamp_outline_points(lamp.shape, lamp.position_m);
     return std::all_of(outline_m.begin(), outline_m.end(), in_image);
   };
   std::vector<std::size_t> seen;
@@ -38,30 +39,32 @@ UnitErrors::UnitErrors(const LampMap& map, const Calibration& calibration)
     : map_(map),
       camera_(calibration.camera),
       lens_(camera_.lens_model, camera_.intrinsics),
-      camera_from_level_(level_from_camera(calibration, Correction::all).inverse()),
+      camera_from_level_(
+          compute_level_from_camera_rotation(calibration, Correction::all).inverse()),
       whole_(map_.lamps, calibration, Correction::all),
-      parts_{whole_.extract_error_source(CommonErrorSource::lens),
-             whole_.extract_error_source(CommonErrorSource::zenith),
-             whole_.extract_error_source(CommonErrorSource::offset),
-             whole_.extract_error_source(CommonErrorSource::lamps)},
+      parts_{whole_.extract_covariance_of_error_source(CommonErrorSource::lens),
+             whole_.extract_covariance_of_error_source(CommonErrorSource::zenith),
+             whole_.extract_covariance_of_error_source(CommonErrorSource::offset),
+             whole_.extract_covariance_of_error_source(CommonErrorSource::lamps)},
       has_offset_(calibration.dispersion.has_value()) {}
 
-std::vector<std::size_t> UnitErrors::find_visible_lamps(const Pose& level) const {
-  return find_lamps_in_view(map_, lens_, camera_.imager_px, camera_from_level_, level);
+std::vector<std::size_t> UnitErrors::find_fully_visible_lamp_indices(const Pose& level) const {
+  return vlp::find_fully_visible_lamp_indices(map_, lens_, camera_.imager_px, camera_from_level_,
+                                              level);
 }
 
-std::optional<UnitBudget> UnitErrors::compute_budget(const Pose& level,
-                                                     std::span<const std::size_t> lamps,
-                                                     double noise_px) const {
+std::optional<UnitBudget> UnitErrors::compute_unit_fix_error_budget(
+    const Pose& level, std::span<const std::size_t> lamps, double noise_px) const {
   if (lamps.size() < 2 || lamps.size() > kMaxSightings) return std::nullopt;
   const LevelPose pose(level);
   std::vector<Sighting> sightings;
   Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
   for (const std::size_t lamp : lamps) {
     const Eigen::Vector3d& lamp_m = map_.lamps[lamp].position_m;
-    if (!(lamp_height_above_camera(pose, lamp_m) > 0)) return std::nullopt;
-    const Prediction seen = predict_normalized_point(pose, lamp_m);
-    const auto projection = lens_.project_with_jacobians(camera_from_level_ * seen.z.homogeneous());
+    if (!(lamp_height_above_camera_m(pose, lamp_m) > 0)) return std::nullopt;
+    const Prediction seen = project_lamp_with_jacobian(pose, lamp_m);
+    const auto projection =
+        lens_.project_point_with_jacobians(camera_from_level_ * seen.z.homogeneous());
     if (!projection) return std::nullopt;
     const Eigen::Matrix2d d_pixel_d_z =
         projection->d_pixel_d_point * camera_from_level_.leftCols<2>();
@@ -69,33 +72,33 @@ std::optional<UnitBudget> UnitErrors::compute_budget(const Pose& level,
     const Eigen::Matrix<double, 2, 4> by_state = d_pixel_d_z * seen.d_z_d_state / noise_px;
     information += by_state.transpose() * by_state;
   }
-  const auto noise = invert_positive_definite(information);
+  const auto noise = invert_positive_definite_matrix(information);
   if (!noise) return std::nullopt;
-  const CommonErrors::Gain gain = whole_.compute_gain_of_fix_errors(
+  const CommonErrors::Gain gain = whole_.compute_gain_from_errors_to_fix(
       sightings, lamps, {level, *noise}, lens_, Eigen::Matrix3d::Identity());
   const auto part = [&](CommonErrorSource of) {
-    return parts_[static_cast<std::size_t>(of)].compute_covariance(gain);
+    return parts_[static_cast<std::size_t>(of)].propagate_covariance_to_fix(gain);
   };
   return UnitBudget{*noise, part(CommonErrorSource::lens), part(CommonErrorSource::zenith),
                     part(CommonErrorSource::offset), part(CommonErrorSource::lamps)};
 }
 
-std::optional<UnitBudget> UnitErrors::compute_budget(const Pose& level,
-                                                     std::span<const std::size_t> lamps,
-                                                     double noise_px,
-                                                     const BodyPrior& prior) const {
+std::optional<UnitBudget> UnitErrors::compute_unit_fix_error_budget(
+    const Pose& level, std::span<const std::size_t> lamps, double noise_px,
+    const BodyPrior& prior) const {
   std::vector<Eigen::Vector3d> lamps_m;
   lamps_m.reserve(lamps.size());
   for (const std::size_t lamp : lamps) lamps_m.push_back(map_.lamps[lamp].position_m);
   const auto limit = compute_pose_crlb(lamps_m, lens_, camera_from_level_, level, noise_px, prior,
-                                       make_row_clock(camera_));
+                                       make_row_readout_clock(camera_));
   if (!limit) return std::nullopt;
-  const CommonErrors::BodyGain gain =
-      whole_.compute_gain_of_fix_errors(limit->frame.as_span(), lamps, Eigen::Vector3d::Zero(),
-                                        limit->fix, lens_, Eigen::Matrix3d::Identity());
+  const CommonErrors::BodyGain gain = whole_.compute_gain_from_errors_to_fix(
+      limit->frame.observations_span(), lamps, Eigen::Vector3d::Zero(), limit->fix, lens_,
+      Eigen::Matrix3d::Identity());
   const auto part = [&](CommonErrorSource of) {
-    return Matrix4(
-        parts_[static_cast<std::size_t>(of)].compute_covariance(gain).topLeftCorner<4, 4>());
+    return Matrix4(parts_[static_cast<std::size_t>(of)]
+                       .propagate_covariance_to_fix(gain)
+                       .topLeftCorner<4, 4>());
   };
   return UnitBudget{limit->noise,
                     part(CommonErrorSource::lens),

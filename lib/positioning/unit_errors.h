@@ -22,22 +22,24 @@ namespace vlp {
 /// Returns the indices in the map of the lamps that are fully visible to a camera with its level
 /// frame at `level`. Such a lamp has its center, and its outline if the size is known, above the
 /// camera and within the image. `camera_from_level` is the identity for a level camera.
-std::vector<std::size_t> find_lamps_in_view(const LampMap& map, const Lens& lens,
-                                            const std::array<int, 2>& imager_px,
-                                            const Eigen::Matrix3d& camera_from_level,
-                                            const Pose& level);
+std::vector<std::size_t> find_fully_visible_lamp_indices(const LampMap& map, const Lens& lens,
+                                                         const std::array<int, 2>& imager_px,
+                                                         const Eigen::Matrix3d& camera_from_level,
+                                                         const Pose& level);
 
 /// Predicted covariances of the fix (X, Y, Z, yaw) of a calibrated camera, one per error source, in
 /// m and rad. `noise` is independent between images. `lens`, `zenith`, `offset` and `lamp_map` are
-/// common to all fixes of a camera (CommonErrors::extract_error_source()).
+/// common to all fixes of a camera (CommonErrors::extract_covariance_of_error_source()).
 struct UnitBudget {
   Matrix4 noise, lens, zenith, offset, lamp_map;
   /// Increase of `noise` due to unknown motion, and the further increase due to unknown roll and
   /// pitch (BodyPoseBound). Independent between images, too.
   Matrix4 motion = Matrix4::Zero(), roll_pitch = Matrix4::Zero();
 
-  Matrix4 common() const { return lens + zenith + offset + lamp_map; }
-  Matrix4 total_covariance() const { return noise + motion + roll_pitch + common(); }
+  Matrix4 common_covariance() const { return lens + zenith + offset + lamp_map; }
+  Matrix4 total_pose_covariance() const {
+    return noise + motion + roll_pitch + common_covariance();
+  }
 };
 
 /// Predicts the covariance of a calibrated camera's fixes from pixel noise and from the reported
@@ -48,24 +50,27 @@ class UnitErrors {
   /// @throws std::invalid_argument if the intrinsics do not match the lens model
   UnitErrors(const LampMap& map, const Calibration& calibration);
 
-  const CommonErrors& common() const { return whole_; }
-  bool has_offset_errors() const { return has_offset_; }
+  const CommonErrors& common_errors() const { return whole_; }
+  bool has_dispersion_offset_errors() const { return has_offset_; }
 
   /// Returns the indices in the map of the lamps that are fully visible to the camera with its
   /// calibrated tilt. `level` is the pose of its level frame. Such a lamp has its center, and its
   /// rim if the diameter is known, in the image.
-  std::vector<std::size_t> find_visible_lamps(const Pose& level) const;
+  std::vector<std::size_t> find_fully_visible_lamp_indices(const Pose& level) const;
 
   /// Computes the budget of a fix from these lamps, with noise `noise_px` per axis. Agrees with the
-  /// covariance of Positioner::locate(). Returns std::nullopt for fewer than two lamps or more than
-  /// kMaxSightings. Also returns it for lamps that the lens does not image or that do not determine
-  /// a fix.
-  std::optional<UnitBudget> compute_budget(const Pose& level, std::span<const std::size_t> lamps,
-                                           double noise_px) const;
-  /// Computes the budget of a camera that may move and be tilted, as compute_error_budget().
+  /// covariance of Positioner::compute_position_fix(). Returns std::nullopt for fewer than two
+  /// lamps or more than kMaxSightings. Also returns it for lamps that the lens does not image or
+  /// that do not determine a fix.
+  std::optional<UnitBudget> compute_unit_fix_error_budget(const Pose& level,
+                                                          std::span<const std::size_t> lamps,
+                                                          double noise_px) const;
+  /// Computes the budget of a camera that may move and be tilted, as compute_fix_error_budget().
   /// @pre the calibration has row time and readout direction if the prior leaves the motion free
-  std::optional<UnitBudget> compute_budget(const Pose& level, std::span<const std::size_t> lamps,
-                                           double noise_px, const BodyPrior& prior) const;
+  std::optional<UnitBudget> compute_unit_fix_error_budget(const Pose& level,
+                                                          std::span<const std::size_t> lamps,
+                                                          double noise_px,
+                                                          const BodyPrior& prior) const;
 
  private:
   LampMap map_;

@@ -112,10 +112,10 @@ BodyEstimate get_given_body_estimate(const Sensors& sensors, double yaw_rad) {
   return body;
 }
 
-void fill(const Fix& from, const Sensors& sensors, vlp_fix& fix) {
+void copy_fix_to_c_struct(const Fix& from, const Sensors& sensors, vlp_fix& fix) {
   fix.status = static_cast<std::int32_t>(from.status);
   fix.unknown_lamps = from.unknown_lamps;
-  if (!from.ok()) return;
+  if (!from.has_succeeded()) return;
   const auto& [pose, covariance] = from.estimate;
   const BodyEstimate body = from.body ? *from.body : get_given_body_estimate(sensors, pose.yaw_rad);
   std::copy_n(pose.position_m.data(), 3, fix.position_m);
@@ -151,7 +151,7 @@ std::int32_t set_error_from_exception() {
   }
 }
 
-ImageView make_view(const vlp_image& image) {
+ImageView make_image_view(const vlp_image& image) {
   const std::ptrdiff_t row_bytes = std::ptrdiff_t{image.width} * (image.bits / 8);
   return {image.data, image.width, image.height, image.stride != 0 ? image.stride : row_bytes,
           image.bits};
@@ -239,7 +239,7 @@ int32_t vlp_detect(const vlp_positioner* positioner, const vlp_image* image,
   if (!positioner->room_error.empty())
     return set_error_and_return_code(VLP_BAD_FILE, positioner->room_error);
   try {
-    const auto seen = positioner->detector->detect(make_view(*image));
+    const auto seen = positioner->detector->detect_lamps(make_image_view(*image));
     for (std::size_t i = 0; i < std::min(seen.size(), capacity); ++i) {
       detections[i] = {seen[i].lamp, seen[i].pixel.x(), seen[i].pixel.y(),
                        seen[i].sigma_px.value_or(0)};
@@ -284,12 +284,13 @@ int32_t vlp_locate_with_earlier(const vlp_positioner* positioner, const vlp_dete
   }
   const Sensors known = sensors != nullptr ? convert_sensors(*sensors) : Sensors();
   const Positioner& with = positioner->positioner;
-  fill(frames > 0 ? with.locate(frame, known, {before.data(), frames}) : with.locate(frame, known),
-       known, *fix);
+  copy_fix_to_c_struct(frames > 0 ? with.compute_position_fix(frame, known, {before.data(), frames})
+                                  : with.compute_position_fix(frame, known),
+                       known, *fix);
   return fix->status;
 }
 
-const char* vlp_explanation(int32_t code) {
+const char* vlp_describe_status(int32_t code) {
   switch (code) {
     case VLP_BAD_FILE:
       return "a file cannot be read or has invalid content; see vlp_last_error()";
@@ -305,7 +306,7 @@ const char* vlp_explanation(int32_t code) {
       break;
   }
   if (code < VLP_OK || code > VLP_ROW_TIME_UNKNOWN) return "no code of this library";
-  return vlp::describe(static_cast<vlp::FixStatus>(code)).data();
+  return vlp::describe_fix_status(static_cast<vlp::FixStatus>(code)).data();
 }
 
 const char* vlp_last_error(void) { return vlp::last_error.data(); }

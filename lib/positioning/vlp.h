@@ -19,7 +19,7 @@ extern "C" {
 #endif
 
 /* Result of a call: the status of a fix as in FixStatus (positioning/fix.h), or, if negative, an
- * error. vlp_explanation() describes each of them. */
+ * error. vlp_describe_status() describes each of them. */
 enum {
   VLP_OK = 0,
   VLP_TOO_FEW_LAMPS = 1,     /* fewer than two lamps of the map */
@@ -180,15 +180,15 @@ int32_t vlp_locate(const vlp_positioner* positioner, const vlp_detection* detect
                    const vlp_sensors* sensors, vlp_fix* fix);
 
 /* Computes the fix together with frames from shortly before. All frames determine one velocity, yaw
- * rate, roll and pitch (Positioner::locate with EarlierFrame). Returns VLP_TOO_MANY_LAMPS if the
- * frames have more than VLP_MAX_LAMPS detections in total. */
+ * rate, roll and pitch (Positioner::compute_position_fix with EarlierFrame). Returns
+ * VLP_TOO_MANY_LAMPS if the frames have more than VLP_MAX_LAMPS detections in total. */
 int32_t vlp_locate_with_earlier(const vlp_positioner* positioner, const vlp_detection* detections,
                                 size_t count, const vlp_sensors* sensors,
                                 const vlp_earlier_frame* earlier, size_t earlier_count,
                                 vlp_fix* fix);
 
 /* Returns one line with the meaning of a status or an error and the remedy. Never null. */
-const char* vlp_explanation(int32_t code);
+const char* vlp_describe_status(int32_t code);
 
 /* Returns the message of the last vlp_open(), vlp_open_room() or vlp_detect() of this thread that
  * failed: file, line and key, or the problem with the image. "" before the first failure. Valid

@@ -35,7 +35,7 @@ class PrintableMessage : public spdlog::custom_flag_formatter {
   void format(const spdlog::details::log_msg& message, const std::tm&,
               spdlog::memory_buf_t& line) override {
     const std::string text =
-        escape_for_single_line({message.payload.data(), message.payload.size()});
+        escape_text_for_single_line({message.payload.data(), message.payload.size()});
     line.append(text.data(), text.data() + text.size());
   }
   std::unique_ptr<custom_flag_formatter> clone() const override {
@@ -66,7 +66,8 @@ CLI::Validator make_number_validator(const std::string& name, bool (*accepts)(do
       "");
 }
 
-CLI::Validator ending_check(const std::vector<std::string>& endings, const std::string& problem) {
+CLI::Validator make_ending_validator(const std::vector<std::string>& endings,
+                                     const std::string& problem) {
   return CLI::Validator(
       [endings, problem](const std::string& name) {
         const bool is_valid = std::ranges::any_of(
@@ -91,7 +92,7 @@ std::string describe_unknown_options(const CLI::App& app) {
   for (const std::string& word : app.remaining(true)) {
     if (!word.starts_with("--")) continue;
     const std::string name = word.substr(0, word.find('='));
-    const std::string present(find_present_name(NameKind::option, name));
+    const std::string present(find_current_name_for_former(NameKind::option, name));
     if (!present.empty() && has_option(app, present)) {
       return "option " + describe_renaming(name, present);
     }
@@ -132,7 +133,7 @@ int check_stdout_written(int exit_code) {
 }
 
 /// Returns true if two outputs, which need not exist, are the same file; false for an empty name.
-bool same_file(const std::string& one, const std::string& other) {
+bool are_same_file(const std::string& one, const std::string& other) {
   const auto canonical_path = [](const std::string& file) {
     return std::filesystem::weakly_canonical(std::filesystem::absolute(file));
   };
@@ -156,17 +157,17 @@ CLI::Validator make_finite_non_negative_validator() {
 }
 
 CLI::Validator make_file_extension_validator(const std::string& ending) {
-  return ending_check({ending}, "the file's name should end in " + ending);
+  return make_ending_validator({ending}, "the file's name should end in " + ending);
 }
 
 CLI::Validator make_plot_file_validator() {
-  return ending_check({".png", ".svg"}, "a picture's name should end in .png or .svg");
+  return make_ending_validator({".png", ".svg"}, "a picture's name should end in .png or .svg");
 }
 
-CLI::Validator make_former_value_validator() {
+CLI::Validator make_renamed_option_value_validator() {
   return CLI::Validator(
       [](const std::string& text) {
-        const std::string_view present = find_present_name(NameKind::value, text);
+        const std::string_view present = find_current_name_for_former(NameKind::value, text);
         return present.empty() ? std::string() : describe_renaming(text, present);
       },
       "");
@@ -177,7 +178,7 @@ void add_threads_option(CLI::App& app, int& threads, const std::string& what) {
       ->check(CLI::Range(1, 1024));
 }
 
-void check_output_file(const std::string& output, const std::vector<std::string>& inputs) {
+void check_output_is_not_input(const std::string& output, const std::vector<std::string>& inputs) {
   for (const std::string& input : inputs) {
     std::error_code missing;
     if (std::filesystem::equivalent(output, input, missing)) {
@@ -186,20 +187,22 @@ void check_output_file(const std::string& output, const std::vector<std::string>
   }
 }
 
-void check_output_files(const std::vector<std::pair<std::string, std::string>>& outputs,
-                        const std::vector<std::string>& inputs) {
+void check_output_files_are_distinct(
+    const std::vector<std::pair<std::string, std::string>>& outputs,
+    const std::vector<std::string>& inputs) {
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     const auto& [option, file] = outputs[i];
-    check_output_file(file, inputs);
+    check_output_is_not_input(file, inputs);
     for (std::size_t k = 0; k < i; ++k) {
-      if (!same_file(file, outputs[k].second)) continue;
+      if (!are_same_file(file, outputs[k].second)) continue;
       throw std::invalid_argument(
           fmt::format("{} and {} are the same file; use another name", outputs[k].first, option));
     }
   }
 }
 
-int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& run) {
+int parse_arguments_and_run(CLI::App& app, int argc, char** argv,
+                            const std::function<void()>& run) {
   bool quiet = false, verbose = false;
   const auto formatter = std::make_shared<HelpFormatter>();
   app.formatter(formatter);
@@ -213,7 +216,7 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
   std::signal(SIGXFSZ,
               SIG_IGN);  // a write beyond the size limit fails; temporary files are removed
   if (argc == 3 && std::string_view(argv[1]) == "--reference") {
-    const std::string text = format_program_reference(app, argv[2]);
+    const std::string text = format_manual_or_completion(app, argv[2]);
     if (!text.empty()) {  // the parser reports other names
       std::fputs(text.c_str(), stdout);
       return check_stdout_written(kDone);

@@ -20,7 +20,7 @@ namespace vlp {
 enum ExitCode : int { kDone = 0, kGateNotMet = 1, kBadInput = 2, kUndetermined = 3 };
 
 /// Exception for data that cannot determine the answer; what() is one line with the remedy.
-/// run_app() prints it and returns the exit code 3.
+/// parse_arguments_and_run() prints it and returns the exit code 3.
 class Undetermined : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -39,7 +39,7 @@ CLI::Validator make_finite_positive_validator();
 CLI::Validator make_finite_non_negative_validator();
 
 /// Returns a validator that rejects the former name of a value and names the present one.
-CLI::Validator make_former_value_validator();
+CLI::Validator make_renamed_option_value_validator();
 
 /// Returns a validator that accepts file names with this ending.
 CLI::Validator make_file_extension_validator(const std::string& ending);
@@ -51,20 +51,21 @@ void add_threads_option(CLI::App& app, int& threads,
                         const std::string& what = "Number of images to process in parallel");
 
 /// Throws std::invalid_argument if `output` is one of the input files.
-void check_output_file(const std::string& output, const std::vector<std::string>& inputs);
+void check_output_is_not_input(const std::string& output, const std::vector<std::string>& inputs);
 
-/// Applies check_output_file() to all outputs and throws std::invalid_argument if two of them are
-/// the same file.
+/// Applies check_output_is_not_input() to all outputs and throws std::invalid_argument if two of
+/// them are the same file.
 ///
 /// @param outputs  option and file name of each output; an empty name is ignored
-void check_output_files(const std::vector<std::pair<std::string, std::string>>& outputs,
-                        const std::vector<std::string>& inputs);
+void check_output_files_are_distinct(
+    const std::vector<std::pair<std::string, std::string>>& outputs,
+    const std::vector<std::string>& inputs);
 
 /// Runs a program: adds --quiet, --verbose and --version to `app`, formats its --help in 80
 /// columns, parses the arguments and calls `run`. Messages go through spdlog to stderr.
 ///
 /// Returns the exit code. Errors print one line: bad usage and bad input return 2, Undetermined 3,
 /// GateNotMet 1. `--reference` prints the manual page or a shell completion (reference.h).
-int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& run);
+int parse_arguments_and_run(CLI::App& app, int argc, char** argv, const std::function<void()>& run);
 
 }  // namespace vlp

@@ -70,7 +70,7 @@ Value classify_option_value(const CLI::Option& option) {
 }
 
 /// Returns `text` with a backslash before each of `letters`.
-std::string escape(const std::string& text, std::string_view letters) {
+std::string escape_letters_in_text(const std::string& text, std::string_view letters) {
   std::string result;
   for (const char letter : text) {
     if (letters.find(letter) != std::string_view::npos) result += '\\';
@@ -173,7 +173,7 @@ std::string format_bash_options(const CLI::App& app, const std::string& indent) 
 std::string format_zsh_option(const CLI::Option& option) {
   const auto names = collect_names(option);
   const bool is_repeatable = option.get_expected_max() > 1;
-  std::string text = escape(option.get_description(), "[]:\\");
+  std::string text = escape_letters_in_text(option.get_description(), "[]:\\");
   for (auto at = text.find('\''); at != std::string::npos; at = text.find('\'', at + 4)) {
     text.replace(at, 1, "'\\''");
   }
@@ -298,7 +298,7 @@ std::string format_zsh_completion(const CLI::App& app) {
   return text + "esac\n";
 }
 
-std::string format_program_reference(const CLI::App& app, std::string_view which) {
+std::string format_manual_or_completion(const CLI::App& app, std::string_view which) {
   if (which == "man") return format_manual_page(app);
   if (which == "bash") return format_bash_completion(app);
   if (which == "zsh") return format_zsh_completion(app);

@@ -112,14 +112,14 @@ Eigen::VectorXi get_lamp_ids(const LampMapFile& lamps) {
 
 Lens make_lens(const std::string& model, const std::vector<double>& intrinsics) {
   const auto known = lens_model_from_name(model);
-  if (!known) throw std::invalid_argument("there are " + lens_model_names());
+  if (!known) throw std::invalid_argument("there are " + list_lens_model_names());
   return Lens(*known, intrinsics);
 }
 
 Rows2 project(const Lens& lens, const Doubles& points) {
   Rows2 pixels(count_rows(points, 3, "points"), 2);
   for (Eigen::Index i = 0; i < pixels.rows(); ++i) {
-    const auto pixel = lens.project(Eigen::Vector3d(points.data() + 3 * i));
+    const auto pixel = lens.project_point(Eigen::Vector3d(points.data() + 3 * i));
     pixels.row(i) = pixel.value_or(Eigen::Vector2d::Constant(kNone));
   }
   return pixels;
@@ -128,7 +128,7 @@ Rows2 project(const Lens& lens, const Doubles& points) {
 Rows3 unproject(const Lens& lens, const Doubles& pixels) {
   Rows3 rays(count_rows(pixels, 2, "pixels"), 3);
   for (Eigen::Index i = 0; i < rays.rows(); ++i) {
-    const auto ray = lens.unproject(Eigen::Vector2d(pixels.data() + 2 * i));
+    const auto ray = lens.unproject_pixel(Eigen::Vector2d(pixels.data() + 2 * i));
     rays.row(i) = ray ? ray->direction.normalized() : kNowhere;
   }
   return rays;
@@ -204,14 +204,14 @@ Fix locate(const Positioner& positioner, const py::object& lamps, const Doubles&
            const std::optional<Doubles>& sigma_px, const Sensors& sensors,
            const std::vector<EarlierArrays>& earlier) {
   const auto detections = make_detections(to_integers(lamps, "lamps"), pixels, sigma_px);
-  if (earlier.empty()) return positioner.locate(detections, sensors);
+  if (earlier.empty()) return positioner.compute_position_fix(detections, sensors);
   std::vector<std::vector<Detection>> before;
   std::vector<EarlierFrame> frames;
   for (const auto& [ids, at, sigma, before_s] : earlier) {
     before.push_back(make_detections(to_integers(ids, "lamps"), at, sigma));
     frames.push_back({before.back(), before_s});  // a frame's detections keep their address
   }
-  return positioner.locate(detections, sensors, frames);
+  return positioner.compute_position_fix(detections, sensors, frames);
 }
 
 /// Returns the index at which each run of equal numbers begins, and the number of elements.
@@ -244,8 +244,9 @@ py::dict locate_camera_in_frames(const Positioner& positioner, const py::object&
     for (Eigen::Index i = 0; i < n; ++i) {
       const std::size_t begin = begins[static_cast<std::size_t>(i)];
       const std::size_t end = begins[static_cast<std::size_t>(i) + 1];
-      const Fix fix = positioner.locate({detections.data() + begin, end - begin}, sensors);
-      const bool ok = fix.ok();
+      const Fix fix =
+          positioner.compute_position_fix({detections.data() + begin, end - begin}, sensors);
+      const bool ok = fix.has_succeeded();
       frame[i] = frame_in[begin];
       status[i] = static_cast<int>(fix.status);
       used[i] = ok ? fix.lamps : 0;
@@ -272,7 +273,7 @@ std::vector<int> list_rejected_lamp_ids(const Fix& fix) {
 }
 
 std::string to_repr(const Fix& fix) {
-  if (!fix.ok()) return "<vlp.Fix: " + std::string(to_string(fix.status)) + ">";
+  if (!fix.has_succeeded()) return "<vlp.Fix: " + std::string(fix_status_name(fix.status)) + ">";
   const Pose& pose = fix.estimate.pose;
   std::array<char, 160> text{};
   std::snprintf(text.data(), text.size(), "<vlp.Fix: x %.4f m, y %.4f m, z %.4f m, yaw %.4f rad>",
@@ -329,7 +330,7 @@ py::tuple detect(const ImageDetector& of_camera, const py::array& array) {
   std::vector<Detection> detections;
   {
     const py::gil_scoped_release others_may_run;
-    for (const Light& light : detector.detect(image)) {
+    for (const Light& light : detector.detect_lights(image)) {
       if (light.kind == LightKind::lamp) {
         detections.push_back({*light.lamp, light.pixel, light.sigma_px});
       }
@@ -424,13 +425,13 @@ void check_numpy() {
 /// Defines the statuses of fixes and their explanations.
 void define_statuses(py::module_& m) {
   py::list statuses;
-  for (int i = 0; i < kStatuses; ++i) statuses.append(to_string(static_cast<FixStatus>(i)));
+  for (int i = 0; i < kStatuses; ++i) statuses.append(fix_status_name(static_cast<FixStatus>(i)));
   m.attr("STATUSES") = py::tuple(statuses);
   m.def(
       "explanation",
       [](int status) {
         if (status < 0 || status >= kStatuses) throw std::invalid_argument("no such status");
-        return describe(static_cast<FixStatus>(status));
+        return describe_fix_status(static_cast<FixStatus>(status));
       },
       "status"_a, "Description of a status (index in STATUSES), with its remedy.");
 }
@@ -456,8 +457,8 @@ void define_calibration(py::module_& m) {
       .def_property_readonly("camera_id", [](const Calibration& c) { return c.camera.id; })
       .def_property_readonly(
           "imager_px", [](const Calibration& c) { return c.camera.imager_px; }, "Width and height.")
-      .def_property_readonly("lens_model",
-                             [](const Calibration& c) { return to_string(c.camera.lens_model); })
+      .def_property_readonly(
+          "lens_model", [](const Calibration& c) { return lens_model_name(c.camera.lens_model); })
       .def_property_readonly("intrinsics",
                              [](const Calibration& c) -> Eigen::VectorXd {
                                return Eigen::VectorXd::Map(c.camera.intrinsics.data(),
@@ -473,20 +474,23 @@ void define_calibration(py::module_& m) {
 void define_fix(py::module_& m) {
   py::class_<Fix>(m, "Fix", "Result for one frame; values are NaN if it is not ok.")
       .def_property_readonly("ok", &Fix::ok)
-      .def_property_readonly("status", [](const Fix& fix) { return to_string(fix.status); })
-      .def_property_readonly("explanation", [](const Fix& fix) { return describe(fix.status); })
+      .def_property_readonly("status", [](const Fix& fix) { return fix_status_name(fix.status); })
+      .def_property_readonly("explanation",
+                             [](const Fix& fix) { return describe_fix_status(fix.status); })
+      .def_property_readonly("position_m",
+                             [](const Fix& fix) {
+                               return fix.has_succeeded() ? fix.estimate.pose.position_m : kNowhere;
+                             })
       .def_property_readonly(
-          "position_m",
-          [](const Fix& fix) { return fix.ok() ? fix.estimate.pose.position_m : kNowhere; })
-      .def_property_readonly(
-          "yaw_rad", [](const Fix& fix) { return fix.ok() ? fix.estimate.pose.yaw_rad : kNone; })
+          "yaw_rad",
+          [](const Fix& fix) { return fix.has_succeeded() ? fix.estimate.pose.yaw_rad : kNone; })
       .def_property_readonly(
           "covariance",
-          [](const Fix& fix) { return fix.ok() ? fix.estimate.covariance : kUnknown; },
+          [](const Fix& fix) { return fix.has_succeeded() ? fix.estimate.covariance : kUnknown; },
           "(4, 4), covariance of x, y, z, yaw from all known error sources.")
       .def_property_readonly(
           "noise_covariance",
-          [](const Fix& fix) { return fix.ok() ? fix.noise_covariance : kUnknown; },
+          [](const Fix& fix) { return fix.has_succeeded() ? fix.noise_covariance : kUnknown; },
           "The part that is of this frame alone and averages out.")
       .def_property_readonly(
           "roll_pitch_rad",
@@ -502,8 +506,9 @@ void define_fix(py::module_& m) {
             return Pair{fix.body->velocity_m_per_s.x(), fix.body->velocity_m_per_s.y()};
           },
           "In the world, if estimated.")
-      .def_property_readonly("residual_px",
-                             [](const Fix& fix) { return fix.ok() ? fix.residual_px : kNone; })
+      .def_property_readonly(
+          "residual_px",
+          [](const Fix& fix) { return fix.has_succeeded() ? fix.residual_px : kNone; })
       .def_readonly("lamps", &Fix::lamps, "Used for the fix.")
       .def_property_readonly(
           "body_covariance", &make_body_covariance_array,

@@ -39,7 +39,7 @@ std::string make_camera_html_table(const Camera& camera) {
   const auto& [width_px, height_px] = camera.imager_px;
   if (!camera.id.empty()) add_row("camera", camera.id);
   add_row("image", std::to_string(width_px) + " x " + std::to_string(height_px) + " px");
-  add_row("lens model", std::string(to_string(camera.lens_model)));
+  add_row("lens model", std::string(lens_model_name(camera.lens_model)));
   const std::vector<double>& k = camera.intrinsics;
   add_row("focal length", format_pair({k[0], k[1]}, "px"));
   add_row("principal point", format_pair({k[2], k[3]}, "px"));
@@ -109,10 +109,11 @@ std::string make_dispersion_html_table(const Dispersion& dispersion,
          mm(dispersion.center_m.x()) + ", " + mm(dispersion.center_m.y()) + " mm"},
         {"offset subtracted from the image",
          format_pair(dispersion.offset_px, "px") +
-             format_sds(compute_offset_covariance_with_map(dispersion, focal_px), 1, "px")}}});
+             format_sds(compute_dispersion_offset_covariance_with_map(dispersion, focal_px), 1,
+                        "px")}}});
 }
 
-std::string make_history_html_list(const std::vector<HistoryEntry>& entries) {
+std::string make_calibration_history_html_list(const std::vector<HistoryEntry>& entries) {
   constexpr std::size_t max_unfolded = 8;
   std::string html;
   for (const auto& entry : entries) {

@@ -18,6 +18,6 @@ std::string make_dispersion_html_table(const Dispersion& dispersion,
 
 /// Returns the history of a calibration as HTML, one foldable entry per part: program, version and
 /// options, and a table of the inputs with their SHA-256.
-std::string make_history_html_list(const std::vector<HistoryEntry>& entries);
+std::string make_calibration_history_html_list(const std::vector<HistoryEntry>& entries);
 
 }  // namespace vlp

@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-std::string format_number(double value) { return format_for_humans(value, 3); }
+std::string format_number(double value) { return format_number_for_humans(value, 3); }
 
 std::string format_range(double low, double high) {
   return format_number(low) + " to " + format_number(high);
@@ -19,7 +19,7 @@ std::string format_range(double low, double high) {
 
 ReportStatistic make_length_statistic(const std::string& label, double value_m,
                                       const Interval* interval_m = nullptr) {
-  return {label, format_mm(value_m), "mm",
+  return {label, format_length_in_mm(value_m), "mm",
           interval_m == nullptr ? "" : format_range(1e3 * interval_m->low, 1e3 * interval_m->high)};
 }
 
@@ -40,10 +40,11 @@ void add_horizontal_statistics(std::vector<ReportStatistic>& figures,
 }
 
 std::string describe_comparison(const Comparison& comparison) {
-  std::string note = "Compared with the other fixes: " + comparison.describe_result() + "; ";
+  std::string note =
+      "Compared with the other fixes: " + comparison.describe_comparison_result() + "; ";
   if (comparison.pairs > 0) {
-    note += "the mean error is " + format_mm(std::abs(comparison.mean_difference_m)) + " mm " +
-            (comparison.mean_difference_m < 0 ? "smaller" : "larger") + " than theirs";
+    note += "the mean error is " + format_length_in_mm(std::abs(comparison.mean_difference_m)) +
+            " mm " + (comparison.mean_difference_m < 0 ? "smaller" : "larger") + " than theirs";
   }
   if (const auto& interval_m = comparison.interval_m) {
     note += " (difference, 95 %: " + format_range(1e3 * interval_m->low, 1e3 * interval_m->high) +
@@ -56,7 +57,7 @@ std::string describe_comparison(const Comparison& comparison) {
 
 }  // namespace
 
-std::vector<ReportStatistic> make_report_statistics(const Evaluation& evaluation) {
+std::vector<ReportStatistic> format_evaluation_statistics(const Evaluation& evaluation) {
   std::vector<ReportStatistic> figures = {
       {"captures", std::to_string(evaluation.captures), "", ""},
       {"without a fix", std::to_string(evaluation.captures - evaluation.fixes), "", ""}};
@@ -87,13 +88,13 @@ std::vector<ReportStatistic> make_report_statistics(const Evaluation& evaluation
                        format_number(evaluation.limit->horizontal), "", ""});
   }
   if (evaluation.fit) {
-    const auto fit_statistics = make_report_statistics("drive", *evaluation.fit);
+    const auto fit_statistics = format_line_drive_statistics("drive", *evaluation.fit);
     figures.insert(figures.end(), fit_statistics.begin(), fit_statistics.end());
   }
   return figures;
 }
 
-std::vector<std::string> make_report_notes(const Evaluation& evaluation) {
+std::vector<std::string> make_evaluation_notes(const Evaluation& evaluation) {
   std::vector<std::string> notes;
   const char* reference = evaluation.reference == "truth"  ? "from the true place, by image"
                           : evaluation.reference == "path" ? "from the path driven"
@@ -118,7 +119,8 @@ std::vector<std::string> make_report_notes(const Evaluation& evaluation) {
   return notes;
 }
 
-std::vector<ReportStatistic> make_report_statistics(const std::string& drive, const LineFit& fit) {
+std::vector<ReportStatistic> format_line_drive_statistics(const std::string& drive,
+                                                          const LineFit& fit) {
   return {make_length_statistic(drive + ": fitted line from the commanded one, mean",
                                 fit.distances_m.mean),
           make_length_statistic(drive + ": the same, 90th percentile", fit.distances_m.p90),

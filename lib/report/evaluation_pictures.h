@@ -16,14 +16,15 @@ namespace vlp {
 
 /// Plots the errors of the fixes on the floor plan.
 /// @throws InputError if image names do not match
-Drawing make_floor_plan_drawing(const EvaluationInput& input, const LampMap& lamps);
+Drawing draw_fix_errors_on_floor_plan(const EvaluationInput& input, const LampMap& lamps);
 
 /// Returns the plots of an evaluation, rendered: the errors on the floor plan, and their
 /// distribution. With a commanded line, the drive along it takes the place of the floor plan.
 /// @pre there is at least one fix
-/// @throws InputError if image names do not match, and as render_svg()
-std::vector<ReportPlot> make_evaluation_plots(const EvaluationInput& input,
-                                              const Evaluation& evaluation, const LampMap& lamps);
+/// @throws InputError if image names do not match, and as render_plot_as_svg()
+std::vector<ReportPlot> make_position_error_plots(const EvaluationInput& input,
+                                                  const Evaluation& evaluation,
+                                                  const LampMap& lamps);
 
 /// Returns a plot of the contributions to the reported horizontal variance of each fix.
 ///
@@ -34,9 +35,10 @@ std::vector<ReportPlot> make_evaluation_plots(const EvaluationInput& input,
 ///
 /// Returns std::nullopt if no fix reports such a common part.
 /// @pre the fixes are positions of the camera, not of a robot's center; this cannot be checked here
-/// @throws InputError as render_svg()
-std::optional<ReportPlot> make_budget_plot(const std::vector<FixRow>& fixes, const LampMap& lamps,
-                                           const Calibration& calibration);
+/// @throws InputError as render_plot_as_svg()
+std::optional<ReportPlot> make_fix_error_budget_plot(const std::vector<FixRow>& fixes,
+                                                     const LampMap& lamps,
+                                                     const Calibration& calibration);
 
 /// Returns a plot of a drive along a commanded line.
 /// @pre `fit` is the line fit of `fixes`

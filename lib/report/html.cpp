@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-std::string base64(const std::string& bytes) {
+std::string encode_base64(const std::string& bytes) {
   constexpr std::size_t group = 3, letters = 4;
   std::string text((bytes.size() + group - 1) / group * letters + 1, '\0');  // + 1: final zero
   // The C interface takes unsigned characters.
@@ -103,7 +103,7 @@ std::string make_html_figure(const ReportPlot& picture) {
          ">\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Picture\">"
          "<img alt=\"" +
          escape_html_text(picture.alt) + "\" src=\"data:image/" + (png ? "png" : "svg+xml") +
-         ";base64," + base64(picture.image) + "\"></div>\n" +
+         ";base64," + encode_base64(picture.image) + "\"></div>\n" +
          make_html_element("figcaption", picture.caption) + "</figure>\n" +
          (table.rows.empty() ? "" : make_html_table(table));
 }

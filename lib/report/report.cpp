@@ -15,23 +15,23 @@ namespace {
 /// No-break space, which keeps a unit next to its number.
 const std::string kSpace = "\u00a0";
 
-std::string with_unit(const std::string& text, const std::string& unit) {
+std::string append_unit(const std::string& text, const std::string& unit) {
   return text.empty() || unit.empty() ? text : text + kSpace + unit;
 }
 
 std::string format_quantity(const std::optional<double>& value, const std::string& unit) {
-  return value ? with_unit(format_significant_digits(*value, 4), unit) : "none";
+  return value ? append_unit(format_significant_digits(*value, 4), unit) : "none";
 }
 
-std::vector<std::string> make_row(const CheckedMetric& gate, bool may_be_out_of_reach) {
+std::vector<std::string> make_gate_table_row(const CheckedMetric& gate, bool may_be_out_of_reach) {
   const bool out_of_reach = may_be_out_of_reach && !gate.value;
-  const std::string result = gate.has_passed() ? "met"
-                             : out_of_reach    ? "not\u00a0reached"
-                                               : "NOT\u00a0MET";
+  const std::string result = gate.has_passed_gate() ? "met"
+                             : out_of_reach         ? "not\u00a0reached"
+                                                    : "NOT\u00a0MET";
   const auto sure = gate.conformance_probability();
   return {gate.name, format_quantity(gate.value, gate.unit),
-          describe(gate.direction) + kSpace + format_quantity(gate.limit, gate.unit) +
-              describe_guard_band(gate),
+          describe_limit_direction(gate.direction) + kSpace +
+              format_quantity(gate.limit, gate.unit) + describe_guard_band(gate),
           result +
               (sure ? ", conforms with p\u00a0=\u00a0" + format_significant_digits(*sure, 3) : "")};
 }
@@ -40,8 +40,9 @@ std::string make_gates_table(const Report& report) {
   HtmlTable table{"", {"gate", "value", "limit", "result"}, {}};
   for (const auto& gate : report.gates) {
     const bool given = report.verdict.has_value();
-    if (!gate.has_passed() && (gate.value || !given)) table.marked.push_back(table.rows.size());
-    table.rows.push_back(make_row(gate, given));
+    if (!gate.has_passed_gate() && (gate.value || !given))
+      table.marked.push_back(table.rows.size());
+    table.rows.push_back(make_gate_table_row(gate, given));
   }
   return table.rows.empty() ? "" : make_html_table(table);
 }
@@ -65,7 +66,7 @@ std::string format_gate_verdict(const std::vector<CheckedMetric>& gates,
     return make_verdict_box(Verdict::invalid, "NO VERDICT", "No gates were set.");
   }
   const auto missed = std::count_if(gates.begin(), gates.end(),
-                                    [](const auto& gate) { return !gate.has_passed(); });
+                                    [](const auto& gate) { return !gate.has_passed_gate(); });
   const std::string count = std::to_string(gates.size());
   const std::string of_gates = gates.size() == 1 ? " gate" : " gates";
   const std::string reason = missed == 0
@@ -103,8 +104,8 @@ std::string format_statistics(const Report& report) {
     HtmlTable table{"", {"metric", "value"}, {}};
     if (intervals) table.header.emplace_back("95 % confidence interval");
     for (const auto& [label, value, unit, interval] : report.metrics) {
-      table.rows.push_back({label, with_unit(value, unit)});
-      if (intervals) table.rows.back().push_back(with_unit(interval, unit));
+      table.rows.push_back({label, append_unit(value, unit)});
+      if (intervals) table.rows.back().push_back(append_unit(interval, unit));
     }
     html += make_html_table(table);
   }
@@ -124,7 +125,7 @@ std::string format_history(const Report& report) {
   std::vector<HistoryEntry> entries;
   if (report.calibration) entries = report.calibration->history;
   if (report.evaluation) entries.push_back(*report.evaluation);
-  return make_history_html_list(entries);
+  return make_calibration_history_html_list(entries);
 }
 
 }  // namespace

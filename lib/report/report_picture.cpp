@@ -108,8 +108,8 @@ ReportPlot read_report_plot(const std::filesystem::path& file) {
   return classify_image(std::move(image), file.filename().string());
 }
 
-ReportPlot make_report_plot(const Drawing& drawing) {
-  ReportPlot picture = classify_image(render_svg(drawing), drawing.name);
+ReportPlot render_report_plot(const Drawing& drawing) {
+  ReportPlot picture = classify_image(render_plot_as_svg(drawing), drawing.name);
   picture.table = drawing.table;
   return picture;
 }

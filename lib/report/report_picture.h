@@ -31,7 +31,7 @@ struct ReportPlot {
 ReportPlot read_report_plot(const std::filesystem::path& file);
 
 /// Renders a drawing as a report picture.
-/// @throws InputError as render_svg()
-ReportPlot make_report_plot(const Drawing& drawing);
+/// @throws InputError as render_plot_as_svg()
+ReportPlot render_report_plot(const Drawing& drawing);
 
 }  // namespace vlp

@@ -35,10 +35,10 @@ constexpr double kMaxPrintSd = 0.02;  // check_board_layout() detects larger err
 std::size_t find_word(const YamlValue& value, const auto& names, const std::string& introduction) {
   std::string list;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (value.get_text() == names[i]) return i;
+    if (value.read_yaml_text() == names[i]) return i;
     list += (i == 0 ? "" : ", ") + std::string(names[i]);
   }
-  throw value.make_unknown_word_error(introduction + list);
+  throw value.make_unknown_yaml_word_error(introduction + list);
 }
 
 IdOrder read_id_order(const YamlValue& value) {
@@ -47,7 +47,7 @@ IdOrder read_id_order(const YamlValue& value) {
   for (const bool column_major : {false, true}) {
     for (std::size_t corner = 0; corner < kCorners.size(); ++corner) {
       orders.push_back({column_major, static_cast<BoardCorner>(corner)});
-      names.push_back(to_string(orders.back()));
+      names.push_back(id_order_name(orders.back()));
     }
   }
   return orders[find_word(value, names, "the orders are: ")];
@@ -62,28 +62,31 @@ Board read_board_of_squares(BoardKind kind) {
 
 Board read_squares(YamlMap& map, BoardKind kind) {
   Board board = read_board_of_squares(kind);
-  board.cols = map.get_required_column("cols").get_integer_within(kMinSquares, kMaxSquares);
-  board.rows = map.get_required_column("rows").get_integer_within(kMinSquares, kMaxSquares);
-  board.square_size_m =
-      map.get_required_column("square_size_m").get_number_within(kMinTag_m, kMaxTag_m, "m");
+  board.cols =
+      map.get_required_yaml_value("cols").read_yaml_integer_within(kMinSquares, kMaxSquares);
+  board.rows =
+      map.get_required_yaml_value("rows").read_yaml_integer_within(kMinSquares, kMaxSquares);
+  board.square_size_m = map.get_required_yaml_value("square_size_m")
+                            .read_yaml_number_within(kMinTag_m, kMaxTag_m, "m");
   if (kind == BoardKind::chessboard) return board;
-  const YamlValue marker = map.get_required_column("marker_size_m");
-  board.tag_size_m = marker.get_number_within(kMinTag_m, kMaxTag_m, "m");
+  const YamlValue marker = map.get_required_yaml_value("marker_size_m");
+  board.tag_size_m = marker.read_yaml_number_within(kMinTag_m, kMaxTag_m, "m");
   if (!(board.tag_size_m < board.square_size_m)) {
-    throw marker.make_error("a marker is smaller than the square around it");
+    throw marker.make_yaml_error("a marker is smaller than the square around it");
   }
-  const YamlValue dictionary = map.get_required_column("dictionary");
-  board.family = dictionary.get_text();
+  const YamlValue dictionary = map.get_required_yaml_value("dictionary");
+  board.family = dictionary.read_yaml_text();
   if (!board.family.starts_with("DICT_")) {
-    throw dictionary.make_error("should be one of OpenCV's dictionaries, such as DICT_5X5_100");
+    throw dictionary.make_yaml_error(
+        "should be one of OpenCV's dictionaries, such as DICT_5X5_100");
   }
-  if (const auto first = map.get_optional("first_id")) {
-    board.first_id = first->get_integer_within(0, kMaxId);
+  if (const auto first = map.get_optional_yaml_value("first_id")) {
+    board.first_id = first->read_yaml_integer_within(0, kMaxId);
   }
-  if (const auto top_left = map.get_optional("top_left")) {
-    board.top_left_white = top_left->get_text() == "white";
-    if (!board.top_left_white && top_left->get_text() != "black") {
-      throw top_left->make_unknown_word_error("the colors of a square are: black, white");
+  if (const auto top_left = map.get_optional_yaml_value("top_left")) {
+    board.top_left_white = top_left->read_yaml_text() == "white";
+    if (!board.top_left_white && top_left->read_yaml_text() != "black") {
+      throw top_left->make_unknown_yaml_word_error("the colors of a square are: black, white");
     }
   }
   return board;
@@ -92,19 +95,19 @@ Board read_squares(YamlMap& map, BoardKind kind) {
 /// Reads Kalibr's checkerboard, which counts corners.
 Board read_kalibr_checkerboard(YamlMap& map) {
   Board board = read_board_of_squares(BoardKind::chessboard);
-  board.cols =
-      map.get_required_column("targetCols").get_integer_within(kMinSquares - 1, kMaxSquares - 1) +
-      1;
-  board.rows =
-      map.get_required_column("targetRows").get_integer_within(kMinSquares - 1, kMaxSquares - 1) +
-      1;
-  const YamlValue height = map.get_required_column("rowSpacingMeters");
-  board.square_size_m =
-      map.get_required_column("colSpacingMeters").get_number_within(kMinTag_m, kMaxTag_m, "m");
+  board.cols = map.get_required_yaml_value("targetCols")
+                   .read_yaml_integer_within(kMinSquares - 1, kMaxSquares - 1) +
+               1;
+  board.rows = map.get_required_yaml_value("targetRows")
+                   .read_yaml_integer_within(kMinSquares - 1, kMaxSquares - 1) +
+               1;
+  const YamlValue height = map.get_required_yaml_value("rowSpacingMeters");
+  board.square_size_m = map.get_required_yaml_value("colSpacingMeters")
+                            .read_yaml_number_within(kMinTag_m, kMaxTag_m, "m");
   constexpr double rounding = 1e-9;
-  if (std::abs(height.get_number_within(kMinTag_m, kMaxTag_m, "m") - board.square_size_m) >
+  if (std::abs(height.read_yaml_number_within(kMinTag_m, kMaxTag_m, "m") - board.square_size_m) >
       rounding) {
-    throw height.make_error("is not colSpacingMeters: the lens is found from squares");
+    throw height.make_yaml_error("is not colSpacingMeters: the lens is found from squares");
   }
   return board;
 }
@@ -113,93 +116,93 @@ Board read_kalibr_checkerboard(YamlMap& map) {
 /// a border of two bits and squares at the corners. Ids count from codeOffset, or 0, along the rows
 /// from the bottom left.
 Board read_kalibr_target(YamlMap& map) {
-  const YamlValue kind = map.get_required_column("target_type");
-  if (kind.get_text() == "checkerboard") return read_kalibr_checkerboard(map);
-  if (kind.get_text() != "aprilgrid") {
-    throw kind.make_error("should be aprilgrid or checkerboard; from others no lens is found");
+  const YamlValue kind = map.get_required_yaml_value("target_type");
+  if (kind.read_yaml_text() == "checkerboard") return read_kalibr_checkerboard(map);
+  if (kind.read_yaml_text() != "aprilgrid") {
+    throw kind.make_yaml_error("should be aprilgrid or checkerboard; from others no lens is found");
   }
   Board board{"tag36h11", 0, 0, 0, 0, 2, true, 0, {false, BoardCorner::bottom_left}};
-  board.cols = map.get_required_column("tagCols").get_integer_within(1, kMaxTags);
-  board.rows = map.get_required_column("tagRows").get_integer_within(1, kMaxTags);
+  board.cols = map.get_required_yaml_value("tagCols").read_yaml_integer_within(1, kMaxTags);
+  board.rows = map.get_required_yaml_value("tagRows").read_yaml_integer_within(1, kMaxTags);
   board.tag_size_m =
-      map.get_required_column("tagSize").get_number_within(kMinTag_m, kMaxTag_m, "m");
+      map.get_required_yaml_value("tagSize").read_yaml_number_within(kMinTag_m, kMaxTag_m, "m");
   board.tag_spacing =
-      map.get_required_column("tagSpacing").get_number_within(0.01, 10, "(gap / tag)");
-  if (const auto first = map.get_optional("codeOffset")) {
-    board.first_id = first->get_integer_within(0, kMaxId);
+      map.get_required_yaml_value("tagSpacing").read_yaml_number_within(0.01, 10, "(gap / tag)");
+  if (const auto first = map.get_optional_yaml_value("codeOffset")) {
+    board.first_id = first->read_yaml_integer_within(0, kMaxId);
   }
   return board;
 }
 
 }  // namespace
 
-std::string to_string(const IdOrder& order) {
+std::string id_order_name(const IdOrder& order) {
   return std::string(order.column_major ? "column" : "row") + "-major-from-" +
          kCorners[static_cast<std::size_t>(order.from)];
 }
 
-Board read_board(YamlMap& map) {
-  const auto named = map.get_optional("kind");
+Board read_board_from_yaml(YamlMap& map) {
+  const auto named = map.get_optional_yaml_value("kind");
   const BoardKind kind =
       named ? static_cast<BoardKind>(find_word(*named, kKinds, "the kinds of boards are: "))
             : BoardKind::apriltags;
   if (kind != BoardKind::apriltags) return read_squares(map, kind);
   Board board;
   board.family =
-      kFamilies[find_word(map.get_required_column("family"), kFamilies, "the families are: ")];
-  board.cols = map.get_required_column("cols").get_integer_within(1, kMaxTags);
-  board.rows = map.get_required_column("rows").get_integer_within(1, kMaxTags);
+      kFamilies[find_word(map.get_required_yaml_value("family"), kFamilies, "the families are: ")];
+  board.cols = map.get_required_yaml_value("cols").read_yaml_integer_within(1, kMaxTags);
+  board.rows = map.get_required_yaml_value("rows").read_yaml_integer_within(1, kMaxTags);
   board.tag_size_m =
-      map.get_required_column("tag_size_m").get_number_within(kMinTag_m, kMaxTag_m, "m");
+      map.get_required_yaml_value("tag_size_m").read_yaml_number_within(kMinTag_m, kMaxTag_m, "m");
   board.tag_spacing =
-      map.get_required_column("tag_spacing").get_number_within(0.01, 10, "(gap / tag)");
-  board.border_bits = map.get_required_column("border_bits").get_integer_within(1, 2);
-  board.corner_squares = map.get_required_column("corner_squares").get_boolean();
-  board.first_id = map.get_required_column("first_id").get_integer_within(0, kMaxId);
-  board.id_order = read_id_order(map.get_required_column("id_order"));
+      map.get_required_yaml_value("tag_spacing").read_yaml_number_within(0.01, 10, "(gap / tag)");
+  board.border_bits = map.get_required_yaml_value("border_bits").read_yaml_integer_within(1, 2);
+  board.corner_squares = map.get_required_yaml_value("corner_squares").read_yaml_boolean();
+  board.first_id = map.get_required_yaml_value("first_id").read_yaml_integer_within(0, kMaxId);
+  board.id_order = read_id_order(map.get_required_yaml_value("id_order"));
   return board;
 }
 
 Board read_board(const std::filesystem::path& file) {
-  YamlMap document = read_yaml(file);
-  const bool kalibr = document.has("target_type");
-  if (!kalibr) check_file_format(document, kBoardFormat);
-  Board board = kalibr ? read_kalibr_target(document) : read_board(document);
-  if (const auto print_sd = kalibr ? std::nullopt : document.get_optional("print_sd")) {
-    board.print_sd = print_sd->get_number_within(0, kMaxPrintSd, "(relative)");
+  YamlMap document = read_yaml_file(file);
+  const bool kalibr = document.has_yaml_key("target_type");
+  if (!kalibr) check_yaml_file_format(document, kBoardFormat);
+  Board board = kalibr ? read_kalibr_target(document) : read_board_from_yaml(document);
+  if (const auto print_sd = kalibr ? std::nullopt : document.get_optional_yaml_value("print_sd")) {
+    board.print_sd = print_sd->read_yaml_number_within(0, kMaxPrintSd, "(relative)");
   }
-  document.check_all_keys_read();
+  document.check_all_yaml_keys_read();
   return board;
 }
 
 void write_board(const std::filesystem::path& file, const Board& board) {
   YAML::Emitter out;
   out << YAML::BeginMap;
-  emit_plain_word(out, "format", kBoardFormat);
+  emit_yaml_plain_word(out, "format", kBoardFormat);
   if (board.has_chessboard_squares()) {
-    emit_plain_word(out, "kind", kKinds[static_cast<std::size_t>(board.kind)]);
+    emit_yaml_plain_word(out, "kind", kKinds[static_cast<std::size_t>(board.kind)]);
   } else {
-    emit_plain_word(out, "family", board.family);
+    emit_yaml_plain_word(out, "family", board.family);
   }
-  emit_integer(out, "cols", board.cols);
-  emit_integer(out, "rows", board.rows);
+  emit_yaml_integer(out, "cols", board.cols);
+  emit_yaml_integer(out, "rows", board.rows);
   if (board.has_chessboard_squares()) {
-    emit_number(out, "square_size_m", board.square_size_m);
+    emit_yaml_number(out, "square_size_m", board.square_size_m);
   } else {
-    emit_number(out, "tag_size_m", board.tag_size_m);
-    emit_number(out, "tag_spacing", board.tag_spacing);
-    emit_integer(out, "border_bits", board.border_bits);
-    emit_plain_word(out, "corner_squares", board.corner_squares ? "true" : "false");
-    emit_integer(out, "first_id", board.first_id);
-    emit_plain_word(out, "id_order", to_string(board.id_order));
+    emit_yaml_number(out, "tag_size_m", board.tag_size_m);
+    emit_yaml_number(out, "tag_spacing", board.tag_spacing);
+    emit_yaml_integer(out, "border_bits", board.border_bits);
+    emit_yaml_plain_word(out, "corner_squares", board.corner_squares ? "true" : "false");
+    emit_yaml_integer(out, "first_id", board.first_id);
+    emit_yaml_plain_word(out, "id_order", id_order_name(board.id_order));
   }
   if (board.kind == BoardKind::charuco) {
-    emit_number(out, "marker_size_m", board.tag_size_m);
-    emit_plain_word(out, "dictionary", board.family);
-    emit_integer(out, "first_id", board.first_id);
-    emit_plain_word(out, "top_left", board.top_left_white ? "white" : "black");
+    emit_yaml_number(out, "marker_size_m", board.tag_size_m);
+    emit_yaml_plain_word(out, "dictionary", board.family);
+    emit_yaml_integer(out, "first_id", board.first_id);
+    emit_yaml_plain_word(out, "top_left", board.top_left_white ? "white" : "black");
   }
-  if (board.print_sd > 0) emit_number(out, "print_sd", board.print_sd);
+  if (board.print_sd > 0) emit_yaml_number(out, "print_sd", board.print_sd);
   out << YAML::EndMap << YAML::Newline;
   write_file(file, out.c_str());
 }

@@ -19,7 +19,7 @@ struct IdOrder {
 };
 
 /// Returns the name of an order in YAML, for example "row-major-from-bottom-left".
-std::string to_string(const IdOrder& order);
+std::string id_order_name(const IdOrder& order);
 
 /// Pattern of a board: AprilTags in rows; black and white squares; squares with an ArUco marker in
 /// each white square, as OpenCV's CharucoBoard. In YAML: "apriltags", "chessboard", "charuco".

@@ -147,7 +147,8 @@ struct Adjustment {
 
 /// Returns a name for each row of Adjustment::covariance: fx, fy, cx, cy, k1 ..., zenith_x,
 /// zenith_y, lever_arm_x_m, lever_arm_y_m, lamp_ID_x_m ...
-std::vector<std::string> parameter_names(const Camera& camera, const Adjustment& adjustment);
+std::vector<std::string> list_adjustment_parameter_names(const Camera& camera,
+                                                         const Adjustment& adjustment);
 
 /// Provenance of a part of a calibration: program, options and digests of the input files.
 struct HistoryEntry {

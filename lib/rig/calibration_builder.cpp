@@ -19,7 +19,7 @@ void add_history(Calibration& calibration, const std::string& part, HistoryEntry
 
 }  // namespace
 
-Calibration make_calibration_with_camera(Camera camera, std::optional<IntrinsicsReport> report,
+Calibration make_camera_only_calibration(Camera camera, std::optional<IntrinsicsReport> report,
                                          HistoryEntry entry) {
   Calibration calibration;
   calibration.camera = std::move(camera);
@@ -28,8 +28,9 @@ Calibration make_calibration_with_camera(Camera camera, std::optional<Intrinsics
   return calibration;
 }
 
-Calibration with_rotation_center(Calibration calibration, const RotationCenter& rotation_center,
-                                 HistoryEntry entry) {
+Calibration add_rotation_center_to_calibration(Calibration calibration,
+                                               const RotationCenter& rotation_center,
+                                               HistoryEntry entry) {
   calibration.dispersion.reset();
   remove_history(calibration, "dispersion");
   calibration.adjustment.reset();
@@ -39,8 +40,9 @@ Calibration with_rotation_center(Calibration calibration, const RotationCenter& 
   return calibration;
 }
 
-Calibration with_adjustment(Calibration calibration, const RotationCenter& rotation_center,
-                            Adjustment adjustment, HistoryEntry entry) {
+Calibration add_adjustment_to_calibration(Calibration calibration,
+                                          const RotationCenter& rotation_center,
+                                          Adjustment adjustment, HistoryEntry entry) {
   calibration.dispersion.reset();
   remove_history(calibration, "dispersion");
   remove_history(calibration, "rotation_center");
@@ -50,8 +52,8 @@ Calibration with_adjustment(Calibration calibration, const RotationCenter& rotat
   return calibration;
 }
 
-Calibration with_dispersion(Calibration calibration, const Dispersion& dispersion,
-                            HistoryEntry entry) {
+Calibration add_dispersion_to_calibration(Calibration calibration, const Dispersion& dispersion,
+                                          HistoryEntry entry) {
   calibration.dispersion = dispersion;
   add_history(calibration, "dispersion", std::move(entry));
   return calibration;

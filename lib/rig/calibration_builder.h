@@ -16,21 +16,23 @@ namespace vlp {
 /// Returns a calibration that consists of this camera and its report, with `entry` as its only
 /// history. There is no rotation center, dispersion or adjustment, because these depend on the
 /// camera.
-Calibration make_calibration_with_camera(Camera camera, std::optional<IntrinsicsReport> report,
+Calibration make_camera_only_calibration(Camera camera, std::optional<IntrinsicsReport> report,
                                          HistoryEntry entry);
 
 /// Returns the calibration with this rotation center and `entry` in its history. Dispersion and
 /// adjustment are removed, because they depend on the old one.
-Calibration with_rotation_center(Calibration calibration, const RotationCenter& rotation_center,
-                                 HistoryEntry entry);
+Calibration add_rotation_center_to_calibration(Calibration calibration,
+                                               const RotationCenter& rotation_center,
+                                               HistoryEntry entry);
 
 /// Returns the calibration with this rotation center, adjustment and history entry. The dispersion
 /// is removed. `calibration` has the adjusted camera and keeps its intrinsics_report.
-Calibration with_adjustment(Calibration calibration, const RotationCenter& rotation_center,
-                            Adjustment adjustment, HistoryEntry entry);
+Calibration add_adjustment_to_calibration(Calibration calibration,
+                                          const RotationCenter& rotation_center,
+                                          Adjustment adjustment, HistoryEntry entry);
 
 /// Returns the calibration with this dispersion and `entry` in its history.
-Calibration with_dispersion(Calibration calibration, const Dispersion& dispersion,
-                            HistoryEntry entry);
+Calibration add_dispersion_to_calibration(Calibration calibration, const Dispersion& dispersion,
+                                          HistoryEntry entry);
 
 }  // namespace vlp

@@ -14,8 +14,9 @@ namespace {
 void move_principal_point_to_zenith(Calibration& calibration) {
   if (!calibration.rotation_center) return;
   RotationCenter& center = *calibration.rotation_center;
-  center.center_px = normalized_zenith_point(center).cwiseProduct(calibration.camera.focal_px()) +
-                     calibration.camera.principal_point_px();
+  center.center_px =
+      compute_normalized_zenith_point(center).cwiseProduct(calibration.camera.focal_px()) +
+      calibration.camera.principal_point_px();
 }
 
 }  // namespace
@@ -25,11 +26,11 @@ Eigen::Index count_intrinsics_with_covariance(const Camera& camera) {
   return is_splined_lens_model(camera.lens_model) ? core : std::ssize(camera.intrinsics);
 }
 
-Eigen::Vector2d normalized_zenith_point(const RotationCenter& center) {
+Eigen::Vector2d compute_normalized_zenith_point(const RotationCenter& center) {
   return center.zenith_in_camera.hnormalized();
 }
 
-Calibration with_lens_error(Calibration calibration, const Eigen::VectorXd& error) {
+Calibration perturb_lens_intrinsics(Calibration calibration, const Eigen::VectorXd& error) {
   auto& intrinsics = calibration.camera.intrinsics;
   Eigen::Map<Eigen::VectorXd>(intrinsics.data(), error.size()) += error;
   if (auto& center = calibration.rotation_center; center && center->lever_arm_by_intrinsics) {
@@ -42,21 +43,22 @@ Calibration with_lens_error(Calibration calibration, const Eigen::VectorXd& erro
   return calibration;
 }
 
-Calibration with_zenith_error(Calibration calibration, const Eigen::Vector2d& error) {
+Calibration perturb_zenith_direction(Calibration calibration, const Eigen::Vector2d& error) {
   RotationCenter& center = *calibration.rotation_center;
-  center.zenith_in_camera = (normalized_zenith_point(center) + error).homogeneous().normalized();
+  center.zenith_in_camera =
+      (compute_normalized_zenith_point(center) + error).homogeneous().normalized();
   if (center.lever_arm_by_zenith) *center.lever_arm_m += *center.lever_arm_by_zenith * error;
   move_principal_point_to_zenith(calibration);
   return calibration;
 }
 
-Calibration with_offset_error(Calibration calibration, const Eigen::Vector2d& error) {
+Calibration perturb_dispersion_offset(Calibration calibration, const Eigen::Vector2d& error) {
   calibration.dispersion->offset_px += error.cwiseProduct(calibration.camera.focal_px());
   return calibration;
 }
 
-std::optional<Matrix2> compute_offset_covariance_with_map(const Dispersion& dispersion,
-                                                          const Eigen::Vector2d& focal_px) {
+std::optional<Matrix2> compute_dispersion_offset_covariance_with_map(
+    const Dispersion& dispersion, const Eigen::Vector2d& focal_px) {
   if (!dispersion.covariance) return std::nullopt;
   Eigen::Matrix2d covariance = *dispersion.covariance;
   for (const Dispersion::UncertainLamp& lamp : dispersion.by_lamps) {

@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Errors name the file that the user specified.
-[[noreturn]] void fail(const fs::path& wanted) {
+[[noreturn]] void throw_write_error(const fs::path& wanted) {
   // [FILE-1] `cannot be written`
   throw InputError(wanted, std::string("cannot be written: ") + std::strerror(errno));
 }
@@ -205,10 +205,11 @@ std::string read_file(const fs::path& path, std::size_t max_bytes) {
 std::string read_file(InputFile& file) {
   constexpr std::size_t block_bytes = 1 << 16;
   std::string content;
-  content.reserve(file.bytes() + block_bytes);
+  content.reserve(file.file_size_bytes() + block_bytes);
   for (;;) {
     const std::size_t before = content.size();
-    const std::size_t wanted = before < file.bytes() ? file.bytes() - before : block_bytes;
+    const std::size_t wanted =
+        before < file.file_size_bytes() ? file.file_size_bytes() - before : block_bytes;
     content.resize(before + wanted);
     const std::size_t count = file.read(content.data() + before, wanted);
     content.resize(before + count);
@@ -246,35 +247,35 @@ AtomicFileWriter::AtomicFileWriter(const fs::path& path) : path_(path) {
   }
   if (descriptor_ < 0) {
     temporary_.clear();
-    fail(path_);
+    throw_write_error(path_);
   }
 }
 
 AtomicFileWriter::AtomicFileWriter(const fs::path& folder, const std::string& name,
                                    const fs::path& shown)
     : path_(shown), target_(folder / name), descriptor_(create_replacement(target_, temporary_)) {
-  if (descriptor_ < 0) fail(path_);
+  if (descriptor_ < 0) throw_write_error(path_);
 }
 
 void AtomicFileWriter::write(std::string_view content) {
   while (!content.empty()) {
     const ssize_t written = ::write(descriptor_, content.data(), content.size());
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0) fail(path_);
+    if (written < 0) throw_write_error(path_);
     content.remove_prefix(static_cast<std::size_t>(written));
   }
 }
 
 void AtomicFileWriter::save_file() {
   if (temporary_.empty()) return;
-  if (::fsync(descriptor_) != 0) fail(path_);
+  if (::fsync(descriptor_) != 0) throw_write_error(path_);
   save_without_fsync();
   sync_folder(target_.has_parent_path() ? target_.parent_path() : ".");
 }
 
 void AtomicFileWriter::save_without_fsync() {
   if (temporary_.empty()) return;
-  if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail(path_);
+  if (::rename(temporary_.c_str(), target_.c_str()) != 0) throw_write_error(path_);
   temporary_.clear();
 }
 

@@ -26,7 +26,7 @@ class InputFile {
   InputFile& operator=(const InputFile&) = delete;
 
   /// Returns the size of the file when it was opened; 0 for a stream.
-  std::size_t bytes() const { return bytes_; }
+  std::size_t file_size_bytes() const { return bytes_; }
   /// Reads up to `bytes` into `data` and returns the number read; 0 at the end. Throws InputError
   /// if it cannot be read, or if the total exceeds `max_bytes`.
   [[gnu::visibility("hidden")]] std::size_t read(char* data, std::size_t bytes);

@@ -8,7 +8,7 @@ namespace vlp {
 namespace {
 
 /// Returns one line without control characters.
-std::string printable(std::string text) {
+std::string escape_control_characters(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
   return text;
@@ -21,7 +21,8 @@ InputError::InputError(const std::filesystem::path& file, const std::string& pro
 
 InputError::InputError(const std::filesystem::path& file, std::size_t line, const std::string& key,
                        const std::string& problem)
-    : std::runtime_error(printable(file.string() + (line > 0 ? ":" + std::to_string(line) : "") +
-                                   ": " + (key.empty() ? "" : key + ": ") + problem)) {}
+    : std::runtime_error(
+          escape_control_characters(file.string() + (line > 0 ? ":" + std::to_string(line) : "") +
+                                    ": " + (key.empty() ? "" : key + ": ") + problem)) {}
 
 }  // namespace vlp

@@ -40,7 +40,7 @@ static_assert([] {
 }());
 
 /// Returns the properties of a kind of shapes from kShapeTraits.
-inline const ShapeTraits& traits_of(ShapeKind kind) {
+inline const ShapeTraits& get_lamp_shape_traits(ShapeKind kind) {
   return kShapeTraits[static_cast<std::size_t>(kind)];
 }
 
@@ -54,20 +54,22 @@ struct LampShape {
 };
 
 /// Returns a disc with this diameter, m.
-inline LampShape make_disc(double diameter_m) {
+inline LampShape make_disc_lamp_shape(double diameter_m) {
   return {ShapeKind::disc, Eigen::Vector2d::Constant(diameter_m)};
 }
 
 /// Converts a point (x, y) of a shape to the world frame, m. The point is in units of the half
 /// axes: (1, 0) is the end of the first half axis.
 /// @pre The shape has a size.
-Eigen::Vector3d world_from_shape(const LampShape& shape, const Eigen::Vector3d& center_m,
-                                 const Eigen::Vector2d& point);
+Eigen::Vector3d transform_shape_point_to_world(const LampShape& shape,
+                                               const Eigen::Vector3d& center_m,
+                                               const Eigen::Vector2d& point);
 
 /// Computes `count` points of the outline in the world frame, m, counter-clockwise seen from above.
 /// Returns none if the size is unknown. The points of a box include its corners if `count` is a
 /// multiple of 8.
-std::vector<Eigen::Vector3d> outline_of(const LampShape& shape, const Eigen::Vector3d& center_m,
-                                        int count = 16);
+std::vector<Eigen::Vector3d> compute_lamp_outline_points(const LampShape& shape,
+                                                         const Eigen::Vector3d& center_m,
+                                                         int count = 16);
 
 }  // namespace vlp

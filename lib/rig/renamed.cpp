@@ -95,13 +95,13 @@ constexpr std::array kRenamings{
 
 }  // namespace
 
-std::string_view find_present_name(NameKind kind, std::string_view former) {
+std::string_view find_current_name_for_former(NameKind kind, std::string_view former) {
   const auto found = std::ranges::find_if(
       kRenamings, [&](const Renaming& each) { return each.kind == kind && each.former == former; });
   return found == kRenamings.end() ? std::string_view() : found->present;
 }
 
-std::string_view find_former_name(NameKind kind, std::string_view present) {
+std::string_view find_former_name_for_current(NameKind kind, std::string_view present) {
   const auto found = std::ranges::find_if(kRenamings, [&](const Renaming& each) {
     return each.kind == kind && each.present == present;
   });

@@ -20,10 +20,10 @@ enum class NameKind {
 
 /// Returns the present name of a key, column, metric, option or value that was called `former` in
 /// earlier versions. Empty if nothing of this kind had that name.
-std::string_view find_present_name(NameKind kind, std::string_view former);
+std::string_view find_current_name_for_former(NameKind kind, std::string_view former);
 
 /// Returns the former name for a present one; empty if there is none.
-std::string_view find_former_name(NameKind kind, std::string_view present);
+std::string_view find_former_name_for_current(NameKind kind, std::string_view present);
 
 /// Describes a renaming for a message: "'spot' is now called 'pivot'".
 std::string describe_renaming(std::string_view former, std::string_view present);

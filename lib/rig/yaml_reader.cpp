@@ -48,17 +48,17 @@ class TreeBuilder : public YAML::EventHandler {
   void OnMapEnd() override { close(); }
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark& mark, YAML::anchor_t) override {
-    add({YamlNode::Kind::null, line_of_yaml_mark(mark), {}, {}});
+    add({YamlNode::Kind::null, line_number_of_yaml_mark(mark), {}, {}});
   }
   void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
                 const std::string& text) override {
-    add({YamlNode::Kind::scalar, line_of_yaml_mark(mark), text, {}});
+    add({YamlNode::Kind::scalar, line_number_of_yaml_mark(mark), text, {}});
   }
 
  private:
   void open(YamlNode::Kind kind, const YAML::Mark& mark) {
     constexpr std::size_t max_depth = 20;
-    open_.push_back({kind, line_of_yaml_mark(mark), {}, {}});
+    open_.push_back({kind, line_number_of_yaml_mark(mark), {}, {}});
     if (open_.size() > max_depth)
       throw_not_supported(mark, "is nested too deep: is it the right file?");
   }
@@ -75,7 +75,7 @@ class TreeBuilder : public YAML::EventHandler {
     }
   }
   [[noreturn]] void throw_not_supported(const YAML::Mark& mark, const std::string& problem) const {
-    throw InputError(file_, line_of_yaml_mark(mark), "", problem);
+    throw InputError(file_, line_number_of_yaml_mark(mark), "", problem);
   }
   const std::filesystem::path& file_;
   bool found_document_ = false;
@@ -99,7 +99,7 @@ YamlNode build_tree(const std::filesystem::path& file, const std::string& text) 
     return tree.take_root_node();
   } catch (const YAML::Exception& failure) {
     const bool tabs = text.find('\t') != std::string::npos;
-    throw InputError(file, line_of_yaml_mark(failure.mark), "",
+    throw InputError(file, line_number_of_yaml_mark(failure.mark), "",
                      "is not valid YAML: " + failure.msg +
                          (tabs ? " (there are tabs: YAML is indented with spaces)" : ""));
   }
@@ -109,7 +109,7 @@ YamlNode build_tree(const std::filesystem::path& file, const std::string& text) 
 std::string describe_yaml_value(const YamlNode& node) {
   switch (node.kind) {
     case YamlNode::Kind::scalar:
-      return quote_for_message(node.text);
+      return quote_text_for_message(node.text);
     case YamlNode::Kind::list:
       return "a list";
     case YamlNode::Kind::map:
@@ -122,7 +122,7 @@ std::string describe_yaml_value(const YamlNode& node) {
 
 }  // namespace
 
-YAML::Node parse_yaml(const std::filesystem::path& file, const std::string& text) {
+YAML::Node parse_yaml_text(const std::filesystem::path& file, const std::string& text) {
   build_tree(file, text);  // refuses what yaml-cpp must not build
   return YAML::Load(text);
 }
@@ -133,15 +133,17 @@ YamlMap::YamlMap(const YamlPart& node, const std::filesystem::path* file, std::s
   entries_.reserve(node->children.size() / 2);
   for (std::size_t i = 0; i + 1 < node->children.size(); i += 2) {
     const YamlNode &name = node->children[i], &value = node->children[i + 1];
-    if (name.kind != YamlNode::Kind::scalar) throw make_error(name.line, "a key should be a word");
+    if (name.kind != YamlNode::Kind::scalar)
+      throw make_yaml_error(name.line, "a key should be a word");
     if (!seen.insert(name.text).second) {
-      throw make_error(name.line, "key " + quote_for_message(name.text) + " occurs twice");
+      throw make_yaml_error(name.line,
+                            "key " + quote_text_for_message(name.text) + " occurs twice");
     }
     entries_.push_back({name.text, name.line, YamlPart(node, &value)});
   }
 }
 
-std::optional<YamlValue> YamlMap::get_optional(const std::string& key) {
+std::optional<YamlValue> YamlMap::get_optional_yaml_value(const std::string& key) {
   if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.push_back(key);
   for (const Entry& entry : entries_) {
     if (entry.key != key) continue;
@@ -154,7 +156,7 @@ std::optional<YamlValue> YamlMap::get_optional(const std::string& key) {
   return std::nullopt;
 }
 
-bool YamlMap::has(const std::string& key) const {
+bool YamlMap::has_yaml_key(const std::string& key) const {
   const bool found = std::any_of(entries_.begin(), entries_.end(),
                                  [&](const Entry& entry) { return entry.key == key; });
   if (!found) check_key_not_renamed(key);
@@ -164,69 +166,70 @@ bool YamlMap::has(const std::string& key) const {
 /// Throws InputError if an entry has the former name of `key`, which may be that of a metric.
 void YamlMap::check_key_not_renamed(std::string_view key) const {
   for (const NameKind kind : {NameKind::key, NameKind::metric}) {
-    const std::string_view former = find_former_name(kind, key);
+    const std::string_view former = find_former_name_for_current(kind, key);
     for (const Entry& entry : entries_) {
       if (!former.empty() && entry.key == former) {
-        throw make_error(entry.line, "key " + describe_renaming(former, key));
+        throw make_yaml_error(entry.line, "key " + describe_renaming(former, key));
       }
     }
   }
 }
 
-std::optional<double> YamlMap::get_optional_number(const std::string& key, double min, double max,
-                                                   std::string_view unit) {
-  const auto value = get_optional(key);
-  return value ? std::optional(value->get_number_within(min, max, unit)) : std::nullopt;
+std::optional<double> YamlMap::get_optional_yaml_number(const std::string& key, double min,
+                                                        double max, std::string_view unit) {
+  const auto value = get_optional_yaml_value(key);
+  return value ? std::optional(value->read_yaml_number_within(min, max, unit)) : std::nullopt;
 }
 
-YamlValue YamlMap::get_required_column(const std::string& key) {
-  if (auto value = get_optional(key)) return *value;
+YamlValue YamlMap::get_required_yaml_value(const std::string& key) {
+  if (auto value = get_optional_yaml_value(key)) return *value;
   std::string names;
   for (const Entry& entry : entries_) names += (names.empty() ? "" : ", ") + entry.key;
-  throw make_error(line_,
-                   "key '" + key + "' is missing; the keys are: " + truncate_text(names, 150));
+  throw make_yaml_error(line_,
+                        "key '" + key + "' is missing; the keys are: " + truncate_text(names, 150));
 }
 
-void YamlMap::check_all_keys_read() const {
+void YamlMap::check_all_yaml_keys_read() const {
   for (const Entry& entry : entries_) {
     if (std::find(known_.begin(), known_.end(), entry.key) != known_.end()) continue;
     for (const std::string& name : known_) check_key_not_renamed(name);
     std::string names;
     for (const std::string& name : known_) names += (names.empty() ? "" : ", ") + name;
-    throw make_error(entry.line,
-                     "key " + quote_for_message(entry.key) + " is unknown; the keys are: " + names);
+    throw make_yaml_error(entry.line, "key " + quote_text_for_message(entry.key) +
+                                          " is unknown; the keys are: " + names);
   }
 }
 
-InputError YamlMap::make_error(const std::string& problem) const {
-  return make_error(line_, problem);
+InputError YamlMap::make_yaml_error(const std::string& problem) const {
+  return make_yaml_error(line_, problem);
 }
 
-InputError YamlMap::make_error(std::size_t line, const std::string& problem) const {
+InputError YamlMap::make_yaml_error(std::size_t line, const std::string& problem) const {
   return {*file_, line, prefix_, problem};
 }
 
-YamlMap read_yaml(const std::filesystem::path& file) {
+YamlMap read_yaml_file(const std::filesystem::path& file) {
   const auto node =
       std::make_shared<YamlNode>(build_tree(file, read_text_file(file, kMaxYamlBytes)));
-  return YamlValue(node, &file, "", node->line).get_mapping();
+  return YamlValue(node, &file, "", node->line).read_yaml_mapping();
 }
 
-YamlMap read_yaml(const std::filesystem::path& file, const std::string& format) {
-  YamlMap map = read_yaml(file);
-  check_file_format(map, format);
+YamlMap read_yaml_file(const std::filesystem::path& file, const std::string& format) {
+  YamlMap map = read_yaml_file(file);
+  check_yaml_file_format(map, format);
   return map;
 }
 
-void check_file_format(YamlMap& map, const std::string& format) {
-  const auto found = map.get_optional("format");
+void check_yaml_file_format(YamlMap& map, const std::string& format) {
+  const auto found = map.get_optional_yaml_value("format");
   if (!found) {
-    throw map.make_error("key 'format' is missing: the file should begin with 'format: " + format +
-                         "'");
+    throw map.make_yaml_error(
+        "key 'format' is missing: the file should begin with 'format: " + format + "'");
   }
-  if (found->get_text() != format) {
-    throw found->make_error("should be '" + format + "', not " +
-                            quote_for_message(found->get_text()) + ": is it the right file?");
+  if (found->read_yaml_text() != format) {
+    throw found->make_yaml_error("should be '" + format + "', not " +
+                                 quote_text_for_message(found->read_yaml_text()) +
+                                 ": is it the right file?");
   }
 }
 
@@ -249,67 +252,68 @@ YamlValue::YamlValue(YamlPart node, const std::filesystem::path* file, std::stri
                      std::size_t line)
     : node_(std::move(node)), file_(file), key_(std::move(key)), line_(line) {}
 
-double YamlValue::get_number() const {
+double YamlValue::read_yaml_number() const {
   const auto value = parse_number<double>(*node_);
   if (!value || !std::isfinite(*value)) {
-    throw make_error("should be a finite number, not " + describe_yaml_value(*node_));
+    throw make_yaml_error("should be a finite number, not " + describe_yaml_value(*node_));
   }
   return *value;
 }
 
-double YamlValue::get_number_within(double min, double max, std::string_view unit) const {
-  const double value = get_number();
+double YamlValue::read_yaml_number_within(double min, double max, std::string_view unit) const {
+  const double value = read_yaml_number();
   if (value < min || value > max) {
     // [FILE-3] `is it in the right unit?` | mm, us or degrees in place of m, s or rad; national
     //   coordinates with too many digits | convert
-    throw make_error(format_shortest(value) + " " + std::string(unit) + " is not within " +
-                     format_shortest(min) + " and " + format_shortest(max) + " " +
-                     std::string(unit) + ": is it in the right unit?");
+    throw make_yaml_error(format_shortest_exact_number(value) + " " + std::string(unit) +
+                          " is not within " + format_shortest_exact_number(min) + " and " +
+                          format_shortest_exact_number(max) + " " + std::string(unit) +
+                          ": is it in the right unit?");
   }
   return value;
 }
 
-int YamlValue::get_integer_within(int min, int max) const {
+int YamlValue::read_yaml_integer_within(int min, int max) const {
   const auto value = parse_number<int>(*node_);
   if (!value || *value < min || *value > max) {
-    throw make_error("should be a whole number within " + std::to_string(min) + " and " +
-                     std::to_string(max) + ", not " + describe_yaml_value(*node_));
+    throw make_yaml_error("should be a whole number within " + std::to_string(min) + " and " +
+                          std::to_string(max) + ", not " + describe_yaml_value(*node_));
   }
   return *value;
 }
 
-bool YamlValue::get_boolean() const {
+bool YamlValue::read_yaml_boolean() const {
   if (node_->kind == YamlNode::Kind::scalar && node_->text == "true") return true;
   if (node_->kind == YamlNode::Kind::scalar && node_->text == "false") return false;
-  throw make_error("should be true or false, not " + describe_yaml_value(*node_));
+  throw make_yaml_error("should be true or false, not " + describe_yaml_value(*node_));
 }
 
-std::string YamlValue::get_text() const {
+std::string YamlValue::read_yaml_text() const {
   if (node_->kind != YamlNode::Kind::scalar)
-    throw make_error("should be text, not " + describe_yaml_value(*node_));
+    throw make_yaml_error("should be text, not " + describe_yaml_value(*node_));
   return node_->text;
 }
 
-std::vector<double> YamlValue::get_numbers(std::size_t count) const {
+std::vector<double> YamlValue::read_yaml_numbers(std::size_t count) const {
   std::vector<double> values;
-  for (const YamlValue& item : get_list()) values.push_back(item.get_number());
+  for (const YamlValue& item : read_yaml_list()) values.push_back(item.read_yaml_number());
   if (values.size() != count) {
-    throw make_error("should be " + std::to_string(count) + " numbers, not " +
-                     std::to_string(values.size()));
+    throw make_yaml_error("should be " + std::to_string(count) + " numbers, not " +
+                          std::to_string(values.size()));
   }
   return values;
 }
 
-std::vector<double> YamlValue::numbers_within(std::size_t count, double min, double max,
-                                              std::string_view unit) const {
-  std::vector<double> values = get_numbers(count);
-  for (const YamlValue& item : get_list()) item.get_number_within(min, max, unit);
+std::vector<double> YamlValue::read_yaml_numbers_within(std::size_t count, double min, double max,
+                                                        std::string_view unit) const {
+  std::vector<double> values = read_yaml_numbers(count);
+  for (const YamlValue& item : read_yaml_list()) item.read_yaml_number_within(min, max, unit);
   return values;
 }
 
-std::vector<YamlValue> YamlValue::get_list() const {
+std::vector<YamlValue> YamlValue::read_yaml_list() const {
   if (node_->kind != YamlNode::Kind::list)
-    throw make_error("should be a list, not " + describe_yaml_value(*node_));
+    throw make_yaml_error("should be a list, not " + describe_yaml_value(*node_));
   std::vector<YamlValue> items;
   items.reserve(node_->children.size());
   for (const YamlNode& item : node_->children) {
@@ -319,19 +323,20 @@ std::vector<YamlValue> YamlValue::get_list() const {
   return items;
 }
 
-YamlMap YamlValue::get_mapping() const {
+YamlMap YamlValue::read_yaml_mapping() const {
   if (node_->kind != YamlNode::Kind::map) {
-    throw make_error("should be a mapping of keys to values, not " + describe_yaml_value(*node_));
+    throw make_yaml_error("should be a mapping of keys to values, not " +
+                          describe_yaml_value(*node_));
   }
   return {node_, file_, key_};
 }
 
-InputError YamlValue::make_error(const std::string& problem) const {
+InputError YamlValue::make_yaml_error(const std::string& problem) const {
   return {*file_, line_, key_, problem};
 }
 
-InputError YamlValue::make_unknown_word_error(const std::string& known) const {
-  return make_error(describe_yaml_value(*node_) + " is unknown; " + known);
+InputError YamlValue::make_unknown_yaml_word_error(const std::string& known) const {
+  return make_yaml_error(describe_yaml_value(*node_) + " is unknown; " + known);
 }
 
 }  // namespace vlp

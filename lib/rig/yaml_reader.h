@@ -41,32 +41,32 @@ class YamlValue {
  public:
   YamlValue(YamlPart node, const std::filesystem::path* file, std::string key, std::size_t line);
 
-  /// Returns a finite number. get_number_within() also throws InputError if it is outside [min,
-  /// max]; `unit` is for the message.
-  double get_number() const;
-  double get_number_within(double min, double max, std::string_view unit) const;
-  int get_integer_within(int min, int max) const;
-  bool get_boolean() const;
-  std::string get_text() const;
-  /// Returns a list of exactly `count` finite numbers. numbers_within() also checks each one as
-  /// get_number_within() does.
-  std::vector<double> get_numbers(std::size_t count) const;
-  std::vector<double> numbers_within(std::size_t count, double min, double max,
-                                     std::string_view unit) const;
-  std::vector<YamlValue> get_list() const;
-  YamlMap get_mapping() const;
+  /// Returns a finite number. read_yaml_number_within() also throws InputError if it is outside
+  /// [min, max]; `unit` is for the message.
+  double read_yaml_number() const;
+  double read_yaml_number_within(double min, double max, std::string_view unit) const;
+  int read_yaml_integer_within(int min, int max) const;
+  bool read_yaml_boolean() const;
+  std::string read_yaml_text() const;
+  /// Returns a list of exactly `count` finite numbers. read_yaml_numbers_within() also checks each
+  /// one as read_yaml_number_within() does.
+  std::vector<double> read_yaml_numbers(std::size_t count) const;
+  std::vector<double> read_yaml_numbers_within(std::size_t count, double min, double max,
+                                               std::string_view unit) const;
+  std::vector<YamlValue> read_yaml_list() const;
+  YamlMap read_yaml_mapping() const;
   /// Applies `read`, a function of a YamlMap&, to a mapping and returns its result. Throws
   /// InputError if the mapping has a key that `read` has not read.
   template <typename Read>
-  auto read_map(const Read& read) const;
-  /// Applies `read` as read_map() does to each item of a list of mappings. Returns the results in
-  /// the order of the list.
+  auto convert_yaml_mapping(const Read& read) const;
+  /// Applies `read` as convert_yaml_mapping() does to each item of a list of mappings. Returns the
+  /// results in the order of the list.
   template <typename Read>
-  auto read_maps(const Read& read) const;
+  auto convert_yaml_mapping_list(const Read& read) const;
 
-  InputError make_error(const std::string& problem) const;
+  InputError make_yaml_error(const std::string& problem) const;
   /// Returns the error for a word that is not among the valid ones, `known`.
-  InputError make_unknown_word_error(const std::string& known) const;
+  InputError make_unknown_yaml_word_error(const std::string& known) const;
 
  private:
   YamlPart node_;
@@ -75,41 +75,42 @@ class YamlValue {
   std::size_t line_;
 };
 
-/// A mapping. The caller reads every valid key, then calls check_all_keys_read(). `file` must
+/// A mapping. The caller reads every valid key, then calls check_all_yaml_keys_read(). `file` must
 /// outlive it.
 class YamlMap {
  public:
   YamlMap(const YamlPart& node, const std::filesystem::path* file, std::string key);
 
   /// The readers of keys also throw InputError if the mapping has the key under its former name.
-  bool has(const std::string& key) const;
-  YamlValue get_required_column(const std::string& key);
-  std::optional<YamlValue> get_optional(const std::string& key);
-  /// Return the value of a key by YamlValue::get_number_within() or read_map(); std::nullopt if the
-  /// mapping lacks the key.
-  std::optional<double> get_optional_number(const std::string& key, double min, double max,
-                                            std::string_view unit);
+  bool has_yaml_key(const std::string& key) const;
+  YamlValue get_required_yaml_value(const std::string& key);
+  std::optional<YamlValue> get_optional_yaml_value(const std::string& key);
+  /// Return the value of a key by YamlValue::read_yaml_number_within() or convert_yaml_mapping();
+  /// std::nullopt if the mapping lacks the key.
+  std::optional<double> get_optional_yaml_number(const std::string& key, double min, double max,
+                                                 std::string_view unit);
   template <typename Read>
-  auto optional_map(const std::string& key, const Read& read) {
-    const auto value = get_optional(key);
-    return value ? std::optional(value->read_map(read)) : std::nullopt;
+  auto convert_optional_yaml_mapping(const std::string& key, const Read& read) {
+    const auto value = get_optional_yaml_value(key);
+    return value ? std::optional(value->convert_yaml_mapping(read)) : std::nullopt;
   }
-  /// Returns the list of a key by YamlValue::read_maps(); an empty list if the mapping lacks the
-  /// key.
+  /// Returns the list of a key by YamlValue::convert_yaml_mapping_list(); an empty list if the
+  /// mapping lacks the key.
   template <typename Read>
-  auto optional_maps(const std::string& key, const Read& read) {
-    const auto value = get_optional(key);
-    return value ? value->read_maps(read) : decltype(value->read_maps(read))();
+  auto convert_optional_yaml_mapping_list(const std::string& key, const Read& read) {
+    const auto value = get_optional_yaml_value(key);
+    return value ? value->convert_yaml_mapping_list(read)
+                 : decltype(value->convert_yaml_mapping_list(read))();
   }
   /// Checks that all keys of the mapping were read. Throws InputError for the first one that was
   /// not.
-  void check_all_keys_read() const;
+  void check_all_yaml_keys_read() const;
 
   /// Returns an error with `problem`, file, line and key of the mapping, to be thrown.
-  InputError make_error(const std::string& problem) const;
+  InputError make_yaml_error(const std::string& problem) const;
 
  private:
-  InputError make_error(std::size_t line, const std::string& problem) const;
+  InputError make_yaml_error(std::size_t line, const std::string& problem) const;
   void check_key_not_renamed(std::string_view key) const;
 
   struct Entry {
@@ -125,23 +126,23 @@ class YamlMap {
 };
 
 template <typename Read>
-auto YamlValue::read_map(const Read& read) const {
-  YamlMap keys = get_mapping();
+auto YamlValue::convert_yaml_mapping(const Read& read) const {
+  YamlMap keys = read_yaml_mapping();
   auto result = read(keys);
-  keys.check_all_keys_read();
+  keys.check_all_yaml_keys_read();
   return result;
 }
 
 template <typename Read>
-auto YamlValue::read_maps(const Read& read) const {
-  std::vector<decltype(read_map(read))> results;
-  for (const YamlValue& item : get_list()) results.push_back(item.read_map(read));
+auto YamlValue::convert_yaml_mapping_list(const Read& read) const {
+  std::vector<decltype(convert_yaml_mapping(read))> results;
+  for (const YamlValue& item : read_yaml_list()) results.push_back(item.convert_yaml_mapping(read));
   return results;
 }
 
 /// Parses the text of a YAML file, which may be other than a mapping, by yaml-cpp. Throws
-/// InputError as read_yaml().
-YAML::Node parse_yaml(const std::filesystem::path& file, const std::string& text);
+/// InputError as read_yaml_file().
+YAML::Node parse_yaml_text(const std::filesystem::path& file, const std::string& text);
 
 /// Maximum size of a YAML file that is parsed: yaml-cpp needs 500 times as much memory for a
 /// YAML::Node.
@@ -150,12 +151,12 @@ inline constexpr std::size_t kMaxYamlBytes = std::size_t{1} << 20;
 /// Reads a YAML file that is a mapping.
 /// @throws InputError if it cannot be read or parsed, is longer than 1 MiB or is not UTF-8; if it
 ///     contains aliases or a second document, or is nested more than 20 levels deep
-YamlMap read_yaml(const std::filesystem::path& file);
+YamlMap read_yaml_file(const std::filesystem::path& file);
 /// Reads a YAML file with the first key `format: NAME/VERSION`. Throws InputError for other
 /// formats, too.
-YamlMap read_yaml(const std::filesystem::path& file, const std::string& format);
+YamlMap read_yaml_file(const std::filesystem::path& file, const std::string& format);
 /// Checks that the key `format` of a mapping has this value. Throws InputError otherwise.
-void check_file_format(YamlMap& map, const std::string& format);
+void check_yaml_file_format(YamlMap& map, const std::string& format);
 
 }  // namespace vlp
 #pragma GCC visibility pop

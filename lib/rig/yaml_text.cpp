@@ -24,7 +24,7 @@ std::size_t count_bytes_of_utf8_character(std::string_view text) {
   return code < min_code[length] || code > 0x10ffff || surrogate ? 0 : length;
 }
 
-std::string format_shortest(double value) {
+std::string format_shortest_exact_number(double value) {
   char text[32];
   std::string digits(text, std::to_chars(text, text + sizeof text, value).ptr);
   const std::size_t exponent = digits.find('e');
@@ -39,9 +39,11 @@ std::string truncate_text(std::string_view text, std::size_t max_bytes) {
   return std::string(text.substr(0, count_bytes_of_utf8_prefix(text.substr(0, max_bytes)))) + "...";
 }
 
-std::string quote_for_message(std::string_view text) { return "'" + truncate_text(text, 40) + "'"; }
+std::string quote_text_for_message(std::string_view text) {
+  return "'" + truncate_text(text, 40) + "'";
+}
 
-std::size_t line_of_yaml_mark(const YAML::Mark& mark) {
+std::size_t line_number_of_yaml_mark(const YAML::Mark& mark) {
   return mark.is_null() ? 0 : static_cast<std::size_t>(mark.line) + 1;
 }
 

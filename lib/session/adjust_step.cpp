@@ -32,7 +32,7 @@ std::map<std::string, std::string> find_pivot_of_images(const AdjustSet& set,
   std::map<std::string, std::string> spots;
   if (turn.status != RotationStatus::ok) {
     result.warnings.push_back(fmt::format("{} is not treated as a rotation in place: {}", set.name,
-                                          describe(turn.status)));
+                                          describe_rotation_status(turn.status)));
     return spots;
   }
   for (const RotationCapture& capture : turn.captures) {
@@ -99,7 +99,8 @@ AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepRe
       capture.place = make_known_place(capture_entry, set, input, without_sd);
       capture.motion = find_capture_motion(capture_entry, input.motion, input.yaw_rate_sd_rad_per_s)
                            .value_or(KnownMotion());
-      if (may_camera_move_during_readout(capture.motion)) check_row_time(input.calibration.camera);
+      if (may_camera_move_during_readout(capture.motion))
+        check_row_time_and_readout_known(input.calibration.camera);
       all.captures.push_back(std::move(capture));
     }
     if (without_sd > 0) {
@@ -118,10 +119,11 @@ void add_warnings(AdjustStepResult& result, const MapErrors& map_errors) {
     if (!lamp.moved) continue;
     // The adjustment uses more data than the check of the map: heights, places, motion.
     for (const MapError& error : map_errors.errors) {
-      if (error.lamps == std::vector<int>{lamp.id}) std::erase(result.warnings, describe(error));
+      if (error.lamps == std::vector<int>{lamp.id})
+        std::erase(result.warnings, describe_map_error(error));
     }
     result.warnings.push_back(
-        describe({MapErrorKind::moved, {lamp.id}, lamp.correction_m, lamp.sd_m}));
+        describe_map_error({MapErrorKind::moved, {lamp.id}, lamp.correction_m, lamp.sd_m}));
   }
   for (const auto& place : found.places) {
     if (!place.wrong) continue;
@@ -136,7 +138,7 @@ void add_warnings(AdjustStepResult& result, const MapErrors& map_errors) {
     result.warnings.push_back(
         fmt::format("the captures contradict the lens: its correction has a chi-squared of {:.0f}, "
                     "{} is expected; is it the lens of this camera, with the same focus?",
-                    found.lens_chi_squared, found.lens_freedom));
+                    found.lens_chi_squared, found.lens_degrees_of_freedom));
   }
   if (found.noise_is_contradicted) {
     // [ROTATION-1]
@@ -164,7 +166,7 @@ void make_adjust_set_names_unique(std::vector<AdjustSet>& sets,
   }
 }
 
-AdjustStepResult run_adjustment_step(const AdjustStepInput& input, HistoryEntry entry) {
+AdjustStepResult run_joint_adjustment_step(const AdjustStepInput& input, HistoryEntry entry) {
   AdjustStepResult result;
   const Calibration alone = extract_camera_calibration(input.calibration);
   const AdjustmentInput all = make_adjustment_input(input, result);
@@ -175,17 +177,18 @@ AdjustStepResult run_adjustment_step(const AdjustStepInput& input, HistoryEntry 
     captures.frames.push_back({capture.name, capture.detections});
     captures.motions.push_back(capture.motion);
   }
-  const MapErrors map_errors = check_lamp_map(captures, alone, result);
-  if (!result.ok()) return result;
+  const MapErrors map_errors = check_lamp_map_with_captures(captures, alone, result);
+  if (!result.has_succeeded()) return result;
   result.found = run_bundle_adjustment(all);
   const AdjustmentResult& found = result.found;
-  if (!found.ok()) {
-    result.set_failure(StepFailure::undetermined, found.undetermined);
-    explain_failure_by_map_errors(captures, alone, result);
+  if (!found.has_succeeded()) {
+    result.set_step_failure(StepFailure::undetermined, found.undetermined);
+    explain_failure_by_lamp_map_errors(captures, alone, result);
     return result;
   }
   add_warnings(result, map_errors);
-  result.metrics = {{"tilt_deg", deg_from_rad(compute_camera_tilt(found.center).angle_rad)}};
+  result.metrics = {
+      {"tilt_deg", deg_from_rad(compute_tilt_from_rotation_center(found.center).angle_rad)}};
   if (const auto& arm_m = found.center.lever_arm_m) {
     result.metrics.push_back({"lever_arm_mm", 1e3 * arm_m->norm()});
   }
@@ -205,8 +208,8 @@ AdjustStepResult run_adjustment_step(const AdjustStepInput& input, HistoryEntry 
     const Eigen::Index n = count_intrinsics_with_covariance(found.camera);
     calibration.intrinsics_report->covariance = adjustment.covariance.topLeftCorner(n, n);
   }
-  result.calibration = with_adjustment(std::move(calibration), found.center, std::move(adjustment),
-                                       std::move(entry));
+  result.calibration = add_adjustment_to_calibration(std::move(calibration), found.center,
+                                                     std::move(adjustment), std::move(entry));
   return result;
 }
 

@@ -31,7 +31,7 @@ struct AdjustSet {
 void make_adjust_set_names_unique(std::vector<AdjustSet>& sets,
                                   const std::vector<std::string>& paths);
 
-/// Input of run_adjustment_step().
+/// Input of run_joint_adjustment_step().
 struct AdjustStepInput {
   std::vector<AdjustSet> sets;
   LampMap lamps;
@@ -52,7 +52,7 @@ struct AdjustStepInput {
   bool refine_map = false;
 };
 
-/// Result of run_adjustment_step().
+/// Result of run_joint_adjustment_step().
 struct AdjustStepResult : StepResult {
   AdjustmentResult found;
 };
@@ -69,6 +69,6 @@ struct AdjustStepResult : StepResult {
 ///     already
 /// @throws std::invalid_argument if the camera moves and its calibration lacks row_time_s or
 /// readout
-AdjustStepResult run_adjustment_step(const AdjustStepInput& input, HistoryEntry entry);
+AdjustStepResult run_joint_adjustment_step(const AdjustStepInput& input, HistoryEntry entry);
 
 }  // namespace vlp

@@ -18,10 +18,10 @@
 
 namespace vlp {
 
-KnownPositions collect_reference_positions(std::span<const Frame> frames,
-                                           const CapturesTable& table,
-                                           const std::optional<Eigen::Vector2d>& place_m,
-                                           PlaceOf place_of) {
+KnownPositions collect_captures_at_known_positions(std::span<const Frame> frames,
+                                                   const CapturesTable& table,
+                                                   const std::optional<Eigen::Vector2d>& place_m,
+                                                   PlaceOf place_of) {
   KnownPositions places;
   for (const Frame& frame : frames) {
     const auto entry = table.find(frame.image);
@@ -45,7 +45,7 @@ namespace {
 Fix locate_capture(const Positioner& positioner, const ReferencePointCapture& capture) {
   Sensors sensors;
   sensors.inclination = capture.inclination;
-  return positioner.locate(capture.detections, sensors);
+  return positioner.compute_position_fix(capture.detections, sensors);
 }
 
 /// Returns the captures with places of the camera. Captures without a fix have no yaw and keep
@@ -59,7 +59,7 @@ std::vector<ReferencePointCapture> move_reference_points_to_camera(const KnownPo
   for (std::size_t i = 0; i < captures.size(); ++i) {
     if (places.of[i] != PlaceOf::axis) continue;
     const Fix fix = locate_capture(positioner, captures[i]);
-    if (!fix.ok()) continue;
+    if (!fix.has_succeeded()) continue;
     captures[i].reference_point_m +=
         rotation_about_z(fix.estimate.pose.yaw_rad).topLeftCorner<2, 2>() * arm_m;
   }
@@ -74,7 +74,7 @@ double compute_mean_height_m(const KnownPositions& places, const LampMap& lamps,
   int fixes = 0;
   for (const ReferencePointCapture& capture : places.captures) {
     const Fix fix = locate_capture(positioner, capture);
-    if (!fix.ok()) continue;
+    if (!fix.has_succeeded()) continue;
     height_m += lamps.lamps.front().position_m.z() - fix.estimate.pose.position_m.z();
     ++fixes;
   }
@@ -124,10 +124,10 @@ void propagate_uncertainty(DispersionResult& result, const CapturesFor& captures
   bool is_propagated = true;
   if (const auto& report = input.calibration.intrinsics_report; report && report->covariance) {
     const auto offset_for_lens_error = [&](const Eigen::VectorXd& error) {
-      return offset_for(with_lens_error(input.calibration, error));
+      return offset_for(perturb_lens_intrinsics(input.calibration, error));
     };
     dispersion.by_intrinsics =
-        estimate_numeric_jacobian(offset_for_lens_error, nominal, *report->covariance);
+        estimate_solution_jacobian_wrt_errors(offset_for_lens_error, nominal, *report->covariance);
     is_propagated = dispersion.by_intrinsics.has_value();
   }
   if (const auto& center = input.calibration.rotation_center; center && center->covariance) {
@@ -136,10 +136,10 @@ void propagate_uncertainty(DispersionResult& result, const CapturesFor& captures
         std::sqrt(center->covariance->trace()) / input.calibration.camera.focal_px().x();
     const double step = std::max(min_step, sd);
     const auto offset_for_zenith_error = [&](const Eigen::VectorXd& error) {
-      return offset_for(with_zenith_error(input.calibration, error));
+      return offset_for(perturb_zenith_direction(input.calibration, error));
     };
-    const auto by_zenith = estimate_numeric_jacobian(offset_for_zenith_error, nominal,
-                                                     step * step * Eigen::Matrix2d::Identity());
+    const auto by_zenith = estimate_solution_jacobian_wrt_errors(
+        offset_for_zenith_error, nominal, step * step * Eigen::Matrix2d::Identity());
     if (by_zenith) dispersion.by_zenith = *by_zenith;
     is_propagated = is_propagated && by_zenith;
   }
@@ -181,16 +181,17 @@ void warn_about_few_captures(DispersionResult& result, DispersionMethod method) 
 void set_dispersion_failure(DispersionResult& result, const LampCaptures& input,
                             const Calibration& leveled) {
   const DispersionFit& fit = result.fit;
-  std::string why(describe(fit.status));
+  std::string why(describe_dispersion_status(fit.status));
   if (fit.status == DispersionStatus::no_fix) {
-    why += fmt::format("; the first: {}", describe(fit.no_fix_status));
+    why += fmt::format("; the first: {}", describe_fix_status(fit.no_fix_status));
   }
-  const bool is_far = fit.status == DispersionStatus::station_far;
-  result.set_failure(is_far ? StepFailure::wrong_place : StepFailure::undetermined, std::move(why));
+  const bool is_far = fit.status == DispersionStatus::all_far_from_reference;
+  result.set_step_failure(is_far ? StepFailure::wrong_place : StepFailure::undetermined,
+                          std::move(why));
   const bool is_of_captures = fit.status == DispersionStatus::too_few_captures ||
-                              fit.status == DispersionStatus::one_yaw ||
-                              fit.status == DispersionStatus::many_yaws;
-  if (!is_far && !is_of_captures) explain_failure_by_map_errors(input, leveled, result);
+                              fit.status == DispersionStatus::single_yaw ||
+                              fit.status == DispersionStatus::several_yaws;
+  if (!is_far && !is_of_captures) explain_failure_by_lamp_map_errors(input, leveled, result);
 }
 
 std::vector<Metric> make_dispersion_metrics(const DispersionFit& fit) {
@@ -205,19 +206,20 @@ std::vector<Metric> make_dispersion_metrics(const DispersionFit& fit) {
 
 }  // namespace
 
-DispersionResult run_dispersion_step(const LampCaptures& input, const KnownPositions& places,
-                                     DispersionMethod method, DispersionCircle circle,
-                                     HistoryEntry entry) {
+DispersionResult run_dispersion_calibration_step(const LampCaptures& input,
+                                                 const KnownPositions& places,
+                                                 DispersionMethod method, DispersionCircle circle,
+                                                 HistoryEntry entry) {
   DispersionResult result;
   Calibration leveled = input.calibration;
   leveled.dispersion.reset();
-  check_lamp_map(input, leveled, result);
-  if (!result.ok()) return result;
+  check_lamp_map_with_captures(input, leveled, result);
+  if (!result.has_succeeded()) return result;
   const bool of_axis =
       std::find(places.of.begin(), places.of.end(), PlaceOf::axis) != places.of.end();
   const auto& center = input.calibration.rotation_center;
   if (of_axis && !(center && center->lever_arm_m)) {
-    result.set_failure(
+    result.set_step_failure(
         StepFailure::undetermined,
         "the positions are those of the axis, and the calibration has no lever arm; run "
         "vlp-rotation with captures at two heights");
@@ -248,9 +250,11 @@ DispersionResult run_dispersion_step(const LampCaptures& input, const KnownPosit
                              compute_mean_height_m(places, input.lamps, leveled));
   }
   propagate_uncertainty(result, captures_for, input, method, circle);
-  result.calibration = with_dispersion(input.calibration, fit.dispersion, std::move(entry));
+  result.calibration =
+      add_dispersion_to_calibration(input.calibration, fit.dispersion, std::move(entry));
   result.drawing = [fit] {
-    return make_gnuplot_drawing(collect_plot_data("Fixes at a reference point", fit));
+    return make_dispersion_plot_drawing(
+        collect_dispersion_plot_data("Fixes at a reference point", fit));
   };
   return result;
 }

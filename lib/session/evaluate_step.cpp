@@ -23,7 +23,7 @@ void add_line_drive(Report& report, const Drive& drive) {
                      "no line can be fitted to its fixes: they do not determine a direction");
   }
   const std::string name = fixes.file.filename().string();
-  const auto metrics = make_report_statistics(name, *fit);
+  const auto metrics = format_line_drive_statistics(name, *fit);
   report.metrics.insert(report.metrics.end(), metrics.begin(), metrics.end());
   report.pictures.push_back(plot_drive_along_line(name, fixes.rows, commanded_m, *fit));
 }
@@ -55,18 +55,19 @@ double compute_same_position_radius_m(const Calibration& calibration) {
   return repeated_m + (center && center->lever_arm_m ? 2 * center->lever_arm_m->norm() : 0);
 }
 
-EvaluateResult evaluate_fixes(const EvaluationInput& input, const std::vector<Gate>& gates) {
+EvaluateResult evaluate_fixes_against_truth(const EvaluationInput& input,
+                                            const std::vector<Gate>& gates) {
   EvaluateResult result;
-  result.evaluation = evaluate(input);
+  result.evaluation = evaluate_fix_accuracy(input);
   const Evaluation& evaluation = result.evaluation;
   if (evaluation.fixes == 0) {
     const auto& [status, count] =
         *std::max_element(evaluation.missing.begin(), evaluation.missing.end(),
                           [](const auto& a, const auto& b) { return a.second < b.second; });
-    result.set_failure(StepFailure::undetermined,
-                       fmt::format("none of {} captures has a fix ({} of them: {})",
-                                   evaluation.captures, count, status),
-                       input.fixes.file);
+    result.set_step_failure(StepFailure::undetermined,
+                            fmt::format("none of {} captures has a fix ({} of them: {})",
+                                        evaluation.captures, count, status),
+                            input.fixes.file);
     return result;
   }
   result.metrics = collect_evaluation_metrics(evaluation);
@@ -76,23 +77,23 @@ EvaluateResult evaluate_fixes(const EvaluationInput& input, const std::vector<Ga
   return result;
 }
 
-std::string render_report_page(EvaluationReport report_content) {
+std::string render_evaluation_report_html(EvaluationReport report_content) {
   Report& report = report_content.page;
   report.caution = report_content.result.caution;
-  report.metrics = make_report_statistics(report_content.result.evaluation);
-  report.notes = make_report_notes(report_content.result.evaluation);
+  report.metrics = format_evaluation_statistics(report_content.result.evaluation);
+  report.notes = make_evaluation_notes(report_content.result.evaluation);
   report.title = "Accuracy report: " + report_content.input.fixes.file.filename().string();
   if (report.calibration && !report.calibration->camera.id.empty()) {
     report.title = "Accuracy report: " + report.calibration->camera.id;
   }
   for (const Drive& drive : report_content.drives) add_line_drive(report, drive);
-  for (auto& picture : make_evaluation_plots(report_content.input, report_content.result.evaluation,
-                                             report_content.lamps)) {
+  for (auto& picture : make_position_error_plots(
+           report_content.input, report_content.result.evaluation, report_content.lamps)) {
     report.pictures.push_back(std::move(picture));
   }
   if (report.calibration) {
-    auto budget = make_budget_plot(report_content.input.fixes.rows, report_content.lamps,
-                                   *report.calibration);
+    auto budget = make_fix_error_budget_plot(report_content.input.fixes.rows, report_content.lamps,
+                                             *report.calibration);
     if (budget) report.pictures.push_back(std::move(*budget));
   }
   if (report.evaluation) report.evaluation->part = "evaluation";

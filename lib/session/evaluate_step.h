@@ -13,7 +13,7 @@
 
 namespace vlp {
 
-/// Result of evaluate_fixes().
+/// Result of evaluate_fixes_against_truth().
 struct EvaluateResult : StepResult {
   Evaluation evaluation;
   /// Caution to be shown with the verdict, one line: captures have no fix, and no gate limits their
@@ -28,7 +28,8 @@ double compute_same_position_radius_m(const Calibration& calibration);
 /// Evaluates fixes against ground truth. Metrics: all that gates can limit
 /// (collect_evaluation_metrics()). Failure: undetermined, if no capture has a fix. Throws
 /// InputError if the image names do not match.
-EvaluateResult evaluate_fixes(const EvaluationInput& input, const std::vector<Gate>& gates);
+EvaluateResult evaluate_fixes_against_truth(const EvaluationInput& input,
+                                            const std::vector<Gate>& gates);
 
 /// Fixes of a drive along a commanded straight line, and the ends of this line in the world, m.
 struct Drive {
@@ -43,12 +44,13 @@ struct EvaluationReport {
   LampMap lamps;
   std::vector<Drive> drives;
   /// Other content: the gates of all steps, the calibration, its plots, and the history entry of
-  /// the evaluation. render_report_page() adds title, metrics, notes and plots of the fixes.
+  /// the evaluation. render_evaluation_report_html() adds title, metrics, notes and plots of the
+  /// fixes.
   Report page;
 };
 
 /// Renders the report as HTML (render_report_html()). Throws InputError if no line can be fitted to
 /// a drive.
-std::string render_report_page(EvaluationReport report);
+std::string render_evaluation_report_html(EvaluationReport report);
 
 }  // namespace vlp

@@ -41,7 +41,7 @@ std::vector<KnownMotion> find_capture_motions(std::span<const Frame> frames,
   return motions;
 }
 
-void check_row_time(const Camera& camera) {
+void check_row_time_and_readout_known(const Camera& camera) {
   if (camera.row_time_s && camera.readout) return;
   throw std::invalid_argument(
       "a moving camera needs row_time_s and readout in its calibration; give --row-time-s and "

@@ -46,6 +46,6 @@ std::vector<KnownMotion> find_capture_motions(std::span<const Frame> frames,
 
 /// Checks that the camera has row_time_s and readout, which motion compensation requires. Throws
 /// std::invalid_argument otherwise.
-void check_row_time(const Camera& camera);
+void check_row_time_and_readout_known(const Camera& camera);
 
 }  // namespace vlp

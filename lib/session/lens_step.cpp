@@ -26,7 +26,7 @@ IntrinsicsReport make_report(const LensEstimate& lens) {
   std::optional<std::array<double, 2>> board_warp_m;
   if (solution.solved_for.warp) {
     const Eigen::Vector2d warp_m =
-        solution.problem.warp_m.cwiseProduct(lens.lattice->part_to_board_warp_ratio());
+        solution.problem.warp_m.cwiseProduct(lens.lattice->board_to_part_warp_ratio());
     board_warp_m = {warp_m.x(), warp_m.y()};
   }
   return {static_cast<int>(solution.views.size()),
@@ -54,17 +54,18 @@ void fail_without_views(const LensInput& input, LensResult& result) {
   }
   const std::string layout = check_board_layout(input.board, views, {}).problem;
   if (!layout.empty())
-    return result.set_failure(StepFailure::wrong_board, layout, input.board_file);
-  result.set_failure(StepFailure::undetermined, describe_why_no_image_is_kept(input.seen.images));
+    return result.set_step_failure(StepFailure::wrong_board, layout, input.board_file);
+  result.set_step_failure(StepFailure::undetermined,
+                          describe_why_no_image_is_kept(input.seen.images));
 }
 
 }  // namespace
 
-LensResult run_lens_step(LensInput input, HistoryEntry entry) {
+LensResult run_lens_calibration_step(LensInput input, HistoryEntry entry) {
   LensResult result;
-  add_intake_remarks(input.seen, result);
-  if (!result.ok()) return result;
-  LensViews views{collect_kept_views(input.seen.images),
+  add_image_intake_remarks(input.seen, result);
+  if (!result.has_succeeded()) return result;
+  LensViews views{collect_kept_board_views(input.seen.images),
                   input.board,
                   input.camera.lens_model,
                   input.held_out,
@@ -78,25 +79,26 @@ LensResult run_lens_step(LensInput input, HistoryEntry entry) {
   std::move(lens.warnings.begin(), lens.warnings.end(), std::back_inserter(result.warnings));
   std::move(lens.details.begin(), lens.details.end(), std::back_inserter(result.details));
   if (lens.status == LensStatus::wrong_board) {
-    result.set_failure(StepFailure::wrong_board, lens.problem, input.board_file);
+    result.set_step_failure(StepFailure::wrong_board, lens.problem, input.board_file);
     return result;
   }
-  if (!lens.ok()) {
+  if (!lens.has_succeeded()) {
     std::string problem = lens.problem;
     const std::string rejections = summarize_image_rejections(input.seen.images);
     if (lens.status == LensStatus::too_few_views && !rejections.empty()) {
       problem += "; not used: " + rejections;
     }
-    result.set_failure(StepFailure::undetermined, std::move(problem));
+    result.set_step_failure(StepFailure::undetermined, std::move(problem));
     return result;
   }
   const Camera camera = make_camera(input.camera, lens.solution.problem);
-  result.calibration = make_calibration_with_camera(camera, make_report(lens), std::move(entry));
+  result.calibration = make_camera_only_calibration(camera, make_report(lens), std::move(entry));
   result.metrics = collect_lens_metrics(lens);
-  const std::string title = fmt::format("{}, {}", camera.id, to_string(camera.lens_model));
+  const std::string title = fmt::format("{}, {}", camera.id, lens_model_name(camera.lens_model));
   result.drawing = [title, solution = lens.solution, lattice = *lens.lattice,
                     sharpness = lens.sharpness] {
-    return make_gnuplot_drawing(collect_plot_data(title, solution, lattice, sharpness));
+    return make_intrinsics_plot_drawing(
+        collect_intrinsics_plot_data(title, solution, lattice, sharpness));
   };
   return result;
 }

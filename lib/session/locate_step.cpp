@@ -28,7 +28,7 @@
 
 namespace vlp {
 
-Sensors make_sensor_data(const std::string& image, const LocateInput& input) {
+Sensors make_capture_sensor_readings(const std::string& image, const LocateInput& input) {
   Sensors sensors;
   sensors.motion = input.motion;
   sensors.inclination_sigma_rad = input.roll_pitch_sd_rad;
@@ -109,10 +109,10 @@ Fix locate_frame(const Frame& frame, const Positioner& positioner, const Earlier
                  const Sensors& sensors) {
   const auto earlier = frames.list_earlier_frames(sensors.time_s);
   if (!earlier.empty() && sensors.motion) {
-    const Fix joint_fix = positioner.locate(frame.detections, sensors, earlier);
-    if (joint_fix.ok()) return joint_fix;
+    const Fix joint_fix = positioner.compute_position_fix(frame.detections, sensors, earlier);
+    if (joint_fix.has_succeeded()) return joint_fix;
   }
-  return positioner.locate(frame.detections, sensors);
+  return positioner.compute_position_fix(frame.detections, sensors);
 }
 
 std::vector<Fix> locate_all_frames(const LocateInput& input, const PositionerOptions& how) {
@@ -121,7 +121,8 @@ std::vector<Fix> locate_all_frames(const LocateInput& input, const PositionerOpt
   std::vector<Fix> fixes;
   fixes.reserve(input.frames.size());
   for (const Frame& frame : input.frames) {
-    fixes.push_back(locate_frame(frame, positioner, frames, make_sensor_data(frame.image, input)));
+    fixes.push_back(
+        locate_frame(frame, positioner, frames, make_capture_sensor_readings(frame.image, input)));
   }
   return fixes;
 }
@@ -130,10 +131,10 @@ void check_motion(const LocateInput& input) {
   const bool motion =
       input.motion ||
       std::any_of(input.frames.begin(), input.frames.end(), [&](const Frame& frame) {
-        const auto known = make_sensor_data(frame.image, input).motion;
+        const auto known = make_capture_sensor_readings(frame.image, input).motion;
         return known && may_camera_move_during_readout(*known);
       });
-  if (motion) check_row_time(input.calibration.camera);
+  if (motion) check_row_time_and_readout_known(input.calibration.camera);
 }
 
 /// Returns the input with LocateInput::sigma_px in all detections.
@@ -158,11 +159,11 @@ std::span<const int> list_rejected(const Fix& fix) {
 
 FixRow make_fix_row(const Frame& frame, const CapturesTable& captures, const Fix& fix,
                     bool noise_known) {
-  FixRow row{frame.image, std::string(to_string(fix.status)), {}, fix.lamps};
+  FixRow row{frame.image, std::string(fix_status_name(fix.status)), {}, fix.lamps};
   if (const auto entry = captures.find(frame.image); entry != captures.end()) {
     row.time_s = entry->second.time_s;
   }
-  if (!fix.ok()) return row;
+  if (!fix.has_succeeded()) return row;
   row.fix = {fix.estimate.pose, {}, fix.residual_px};
   if (const auto& body = fix.body) {
     const auto is_uncertain = [&](int index) { return body->covariance(index, index) > 0; };
@@ -208,20 +209,20 @@ bool warn_about_noise(LocateResult& result, const std::vector<Frame>& frames, do
 /// Returns true if no motion of the camera is given.
 bool is_assumed_standing(const LocateInput& input) {
   return std::none_of(input.frames.begin(), input.frames.end(), [&](const Frame& frame) {
-    return make_sensor_data(frame.image, input).motion.has_value();
+    return make_capture_sensor_readings(frame.image, input).motion.has_value();
   });
 }
 
 std::size_t count_fixes(const std::vector<Fix>& fixes) {
-  return static_cast<std::size_t>(
-      std::count_if(fixes.begin(), fixes.end(), [](const Fix& fix) { return fix.ok(); }));
+  return static_cast<std::size_t>(std::count_if(
+      fixes.begin(), fixes.end(), [](const Fix& fix) { return fix.has_succeeded(); }));
 }
 
 /// Returns the median speed of fixes whose velocity is estimated, if that is significant.
 std::optional<double> find_speed_m_per_s(const std::vector<Fix>& fixes) {
   std::vector<double> speeds, sigmas;
   for (const Fix& fix : fixes) {
-    if (!fix.ok() || !fix.body) continue;
+    if (!fix.has_succeeded() || !fix.body) continue;
     const Eigen::Vector2d& velocity = fix.body->velocity_m_per_s;
     const double variance =
         fix.body->covariance.block<2, 2>(kBodyVelocity, kBodyVelocity).trace() / 2;
@@ -237,13 +238,14 @@ std::optional<double> find_speed_m_per_s(const std::vector<Fix>& fixes) {
 /// Criterion: half as many failures, or half the residual.
 void warn_about_motion(LocateResult& result, const LocateInput& input, bool is_noisy) {
   const std::size_t failed = input.frames.size() - count_fixes(result.fixes);
-  if (!make_row_clock(input.calibration.camera) || !is_assumed_standing(input) ||
+  if (!make_row_readout_clock(input.calibration.camera) || !is_assumed_standing(input) ||
       (!is_noisy && 2 * failed < input.frames.size())) {
     return;
   }
   constexpr double max_speed_m_per_s = 3, max_yaw_rate_rad_per_s = 2;
   LocateInput moving = input;
-  moving.motion = KnownMotion::up_to(max_speed_m_per_s, max_yaw_rate_rad_per_s);
+  moving.motion =
+      KnownMotion::make_motion_prior_from_limits(max_speed_m_per_s, max_yaw_rate_rad_per_s);
   const std::vector<Fix> fixes = locate_all_frames(moving, input.how);
   const auto standing_px = estimate_pixel_noise_px(sum_squared_residuals_of_fixes(result.fixes));
   const auto moving_px = estimate_pixel_noise_px(sum_squared_residuals_of_fixes(fixes));
@@ -284,7 +286,7 @@ void locate_with_scaled_noise(const LocateInput& input, const PositionerOptions&
                               std::vector<Fix>& fixes) {
   std::vector<Fix> rescaled = locate_all_frames(scale_stated_noise(input, fixes, factor), how);
   for (std::size_t i = 0; i < fixes.size(); ++i) {
-    if (!fixes[i].ok() || !rescaled[i].ok()) continue;
+    if (!fixes[i].has_succeeded() || !rescaled[i].has_succeeded()) continue;
     rescaled[i].rejected_lamps = fixes[i].rejected_lamps;
     rescaled[i].rejected_ids = fixes[i].rejected_ids;
     rescaled[i].unknown_lamps = fixes[i].unknown_lamps;
@@ -357,7 +359,7 @@ void mark_fixes_outside_valid_region(LocateResult& result, const LocateInput& in
   if (!report || report->region_px.empty()) return;
   std::size_t outside = 0, fixes = 0;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    if (!result.fixes[i].ok()) continue;
+    if (!result.fixes[i].has_succeeded()) continue;
     ++fixes;
     const auto& detections = input.frames[i].detections;
     const auto& rejected = result.rows[i].rejected;
@@ -399,7 +401,7 @@ MapErrors find_errors_while_standing(const LocateInput& input, const std::vector
   std::vector<Frame> frames;
   MapErrorOptions options;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    const Sensors sensors = make_sensor_data(input.frames[i].image, input);
+    const Sensors sensors = make_capture_sensor_readings(input.frames[i].image, input);
     if (sensors.motion && may_camera_move_during_readout(*sensors.motion)) continue;
     const auto& body = fixes[i].body;
     frames.push_back(input.frames[i]);
@@ -429,7 +431,7 @@ void warn_about_rejected_lamps(LocateResult& result, const LocateInput& input,
         fmt::format("{} detections of lamps not in the map, rejected", unknown));
   }
   for (const MapError& error : map_errors.errors) {
-    result.warnings.push_back(describe(error));
+    result.warnings.push_back(describe_map_error(error));
     for (const int id : error.lamps) {
       rejected -= captures[id];
       captures.erase(id);
@@ -449,8 +451,8 @@ void warn_about_rejected_lamps(LocateResult& result, const LocateInput& input,
 
 }  // namespace
 
-LocateResult locate_camera_in_frames(const LocateInput& input) {
-  if (input.sigma_px) return locate_camera_in_frames(apply_given_pixel_noise(input));
+LocateResult locate_camera_from_frames(const LocateInput& input) {
+  if (input.sigma_px) return locate_camera_from_frames(apply_given_pixel_noise(input));
   check_motion(input);
   LocateResult result;
   const bool noise_known = locate_with_noise(input, result);
@@ -461,12 +463,13 @@ LocateResult locate_camera_in_frames(const LocateInput& input) {
   }
   warn_about_image(result, input);
   mark_fixes_outside_valid_region(result, input);
-  const int elsewhere = Positioner(input.lamps, input.calibration, input.how).lamps_elsewhere();
+  const int elsewhere =
+      Positioner(input.lamps, input.calibration, input.how).num_lamps_moved_since_calibration();
   if (elsewhere > 0) result.warnings.push_back(describe_lamps_moved_since_calibration(elsewhere));
   warn_about_captures(result, input);
   const bool is_contradicted =
       std::any_of(result.fixes.begin(), result.fixes.end(),
-                  [](const Fix& fix) { return !fix.ok() || fix.rejected_lamps > 0; });
+                  [](const Fix& fix) { return !fix.has_succeeded() || fix.rejected_lamps > 0; });
   MapErrors map_errors;
   if (input.lamp_offsets || is_contradicted)
     map_errors = find_errors_while_standing(input, result.fixes);
@@ -482,9 +485,9 @@ LocateResult locate_camera_in_frames(const LocateInput& input) {
   }
   result.summary = summarize_fixes(result.rows);
   if (result.summary.fixes == 0) {
-    result.set_failure(
-        StepFailure::undetermined,
-        fmt::format("no frame has a fix; the first: {}", describe(result.fixes.front().status)));
+    result.set_step_failure(StepFailure::undetermined,
+                            fmt::format("no frame has a fix; the first: {}",
+                                        describe_fix_status(result.fixes.front().status)));
   }
   return result;
 }
@@ -505,10 +508,11 @@ class TiltedCaptures {
   TiltedCaptures(LocateInput& input, const Redetector& redetect)
       : input_(input),
         redetect_(redetect),
-        base_from_camera_(level_from_camera(input.calibration, input.how.correction)) {
+        base_from_camera_(
+            compute_level_from_camera_rotation(input.calibration, input.how.correction)) {
     for (std::size_t i = 0; i < input.frames.size(); ++i) {
       const Frame& frame = input.frames[i];
-      if (make_sensor_data(frame.image, input).inclination_sigma_rad > 0) {
+      if (make_capture_sensor_readings(frame.image, input).inclination_sigma_rad > 0) {
         captures_.push_back({i, frame.detections});
       }
     }
@@ -516,7 +520,7 @@ class TiltedCaptures {
 
   LevelRotations iterate_until_tilt_converges() {
     if (captures_.empty()) return {};
-    fixes_ = locate_camera_in_frames(input_).fixes;
+    fixes_ = locate_camera_from_frames(input_).fixes;
     initialize_tilt_from_ellipses();
     constexpr int max_iterations = 6;
     for (int i = 0; i < max_iterations && redetect_in_level_planes(); ++i) {
@@ -545,7 +549,7 @@ class TiltedCaptures {
         input_.frames[capture.frame].detections = std::move(frame->detections);
       }
     }
-    fixes_ = locate_camera_in_frames(input_).fixes;
+    fixes_ = locate_camera_from_frames(input_).fixes;
   }
 
   void initialize_tilt_from_ellipses() {
@@ -553,8 +557,9 @@ class TiltedCaptures {
     const std::vector<Fix> first = fixes_;
     LevelRotations levels;
     for (TiltedCapture& capture : captures_) {
-      const double sd_rad = make_sensor_data(image_name(capture), input_).inclination_sigma_rad;
-      if (sd_rad <= max_small_tilt_rad && fixes_[capture.frame].ok()) continue;
+      const double sd_rad =
+          make_capture_sensor_readings(image_name(capture), input_).inclination_sigma_rad;
+      if (sd_rad <= max_small_tilt_rad && fixes_[capture.frame].has_succeeded()) continue;
       capture.level.emplace();
       levels.emplace(image_name(capture), std::nullopt);
     }
@@ -562,9 +567,9 @@ class TiltedCaptures {
     for (TiltedCapture& capture : captures_) {
       const Fix& fix = first[capture.frame];
       std::vector<Detection>& seen = input_.frames[capture.frame].detections;
-      if (fixes_[capture.frame].ok()) continue;
-      capture.has_converged = !fix.ok();
-      if (!fix.ok() && seen.size() > capture.first_detections.size()) continue;
+      if (fixes_[capture.frame].has_succeeded()) continue;
+      capture.has_converged = !fix.has_succeeded();
+      if (!fix.has_succeeded() && seen.size() > capture.first_detections.size()) continue;
       capture.level.reset();
       seen = capture.first_detections;
       fixes_[capture.frame] = fix;
@@ -576,11 +581,11 @@ class TiltedCaptures {
     LevelRotations levels;
     for (TiltedCapture& capture : captures_) {
       const Fix& fix = fixes_[capture.frame];
-      capture.has_converged = capture.has_converged || !fix.ok() || !fix.body;
+      capture.has_converged = capture.has_converged || !fix.has_succeeded() || !fix.body;
       if (capture.has_converged) continue;
       const double yaw_in_robot_rad = input_.how.mount ? input_.how.mount->yaw_in_robot_rad : 0;
-      capture.level =
-          compute_level_rotation(fix.body->inclination, yaw_in_robot_rad, base_from_camera_);
+      capture.level = compute_level_rotation_from_inclination(fix.body->inclination,
+                                                              yaw_in_robot_rad, base_from_camera_);
       levels.emplace(image_name(capture), *capture.level);
     }
     const std::vector<Fix> before = fixes_;
@@ -594,7 +599,7 @@ class TiltedCaptures {
 
   static bool has_fix_converged(const Fix& before, const Fix& after) {
     constexpr double tolerance_sd = 0.1;
-    if (!after.ok()) return true;
+    if (!after.has_succeeded()) return true;
     Eigen::Vector4d change;
     change << after.estimate.pose.position_m - before.estimate.pose.position_m,
         wrap_angle_rad(after.estimate.pose.yaw_rad - before.estimate.pose.yaw_rad);
@@ -617,7 +622,7 @@ Observations detect_in_images_again(const LampIntake& intake,
   std::copy_if(files.begin(), files.end(), std::back_inserter(named), [&](const auto& file) {
     return levels.find(file.filename().string()) != levels.end();
   });
-  return intake.copy_with_level_rotations(levels).detect_in_all_images(named);
+  return intake.copy_intake_with_level_rotations(levels).detect_lamps_in_all_images(named);
 }
 
 bool has_detections(const std::vector<Frame>& frames) {
@@ -627,45 +632,49 @@ bool has_detections(const std::vector<Frame>& frames) {
 
 }  // namespace
 
-LocateResult locate_camera_in_images(const LampImages& images, ImageUse use, LocateInput input,
-                                     const FrontendOptions& options,
-                                     const IntakeProgress& progress) {
+LocateResult locate_camera_from_images(const LampImages& images, ImageUse use, LocateInput input,
+                                       const FrontendOptions& options,
+                                       const IntakeProgress& progress) {
   const LampIntake intake(images, use, options);
-  if (!input.calibration.camera.readout) input.calibration.camera.readout = intake.readout();
+  if (!input.calibration.camera.readout)
+    input.calibration.camera.readout = intake.readout_direction();
   const auto files = list_lamp_images(images.images);
-  Observations seen = intake.detect_in_all_images(files, progress);
-  check_lamps_identified(images, seen);
-  input.frames = collect_kept_frames(seen.images);
-  const LampIntake without_pictures = intake.with_annotation_folder({});
+  Observations seen = intake.detect_lamps_in_all_images(files, progress);
+  check_any_lamp_identified(images, seen);
+  input.frames = collect_kept_lamp_frames(seen.images);
+  const LampIntake without_pictures = intake.copy_intake_with_annotation_folder({});
   std::map<std::string, Observation> latest;
-  const LevelRotations levels = redetect_tilted_captures(input, [&](const LevelRotations& tilted) {
-    const Observations repeated = detect_in_images_again(without_pictures, files, tilted);
-    for (const Observation& image : repeated.images) {
-      if (image.is_kept()) latest.insert_or_assign(image.file_name(), image);
-    }
-    return collect_kept_frames(repeated.images);
-  });
+  const LevelRotations levels =
+      redetect_lamps_of_tilted_captures(input, [&](const LevelRotations& tilted) {
+        const Observations repeated = detect_in_images_again(without_pictures, files, tilted);
+        for (const Observation& image : repeated.images) {
+          if (image.is_image_kept()) latest.insert_or_assign(image.image_file_name(), image);
+        }
+        return collect_kept_lamp_frames(repeated.images);
+      });
   for (Observation& image : seen.images) {
-    const auto repeated = latest.find(image.file_name());
-    if (levels.contains(image.file_name()) && repeated != latest.end()) image = repeated->second;
+    const auto repeated = latest.find(image.image_file_name());
+    if (levels.contains(image.image_file_name()) && repeated != latest.end())
+      image = repeated->second;
   }
   if (!options.annotate.empty()) detect_in_images_again(intake, files, levels);
   LocateResult result;
   if (has_detections(input.frames)) {
     seen.failure.reset();
-    result = locate_camera_in_frames(input);
+    result = locate_camera_from_frames(input);
   }
-  add_intake_remarks(seen, result);
+  add_image_intake_remarks(seen, result);
   // A classifier identifies lamps without the row time: it is no reason why there is no result.
-  if (options.classifier.empty() || result.ok()) {
-    explain_by_row_time(seen.images, input.lamps, make_detector_camera(input.calibration),
-                        images.calibration_file.filename().string(), result);
+  if (options.classifier.empty() || result.has_succeeded()) {
+    add_row_time_contradiction_to_result(seen.images, input.lamps,
+                                         make_detector_camera(input.calibration),
+                                         images.calibration_file.filename().string(), result);
   }
   result.seen = std::move(seen);
   return result;
 }
 
-LevelRotations redetect_tilted_captures(LocateInput& input, const Redetector& redetect) {
+LevelRotations redetect_lamps_of_tilted_captures(LocateInput& input, const Redetector& redetect) {
   return TiltedCaptures(input, redetect).iterate_until_tilt_converges();
 }
 

@@ -20,7 +20,7 @@
 
 namespace vlp {
 
-/// Input of locate_camera_in_frames(): captures, lamp map, calibration, and options of the
+/// Input of locate_camera_from_frames(): captures, lamp map, calibration, and options of the
 /// positioner.
 struct LocateInput {
   std::vector<Frame> frames;
@@ -59,21 +59,21 @@ struct LocateInput {
 };
 
 /// Returns the sensor data of a capture: motion, time, inclination, height and yaw.
-Sensors make_sensor_data(const std::string& image, const LocateInput& input);
+Sensors make_capture_sensor_readings(const std::string& image, const LocateInput& input);
 
 /// Counts the detections outside the image by more than 10 % of its width or height. The center of
 /// a lamp at the image's edge may be slightly outside.
 std::size_t count_detections_outside_image(std::span<const Frame> frames,
                                            const std::array<int, 2>& imager_px);
 
-/// Result of locate_camera_in_frames().
+/// Result of locate_camera_from_frames().
 struct LocateResult : StepResult {
   /// Fix of each frame, in the order of LocateInput::frames.
   std::vector<Fix> fixes;
   /// Rows of fixes.csv, in the order of `fixes`.
   std::vector<FixRow> rows;
   FixSummary summary;
-  /// Observations of the images in which the lamps were detected (locate_camera_in_images()).
+  /// Observations of the images in which the lamps were detected (locate_camera_from_images()).
   Observations seen = {};
 };
 
@@ -87,18 +87,18 @@ struct LocateResult : StepResult {
 /// Warnings: residuals larger than the reported noise explains; detections outside the image or the
 /// calibrated region (region_px); images missing in `captures`; rejected lamps.
 /// @throws std::invalid_argument if a camera moves and its calibration lacks row_time_s or readout
-LocateResult locate_camera_in_frames(const LocateInput& input);
+LocateResult locate_camera_from_frames(const LocateInput& input);
 
 /// Detects the lamps in images (detect_lamps_in_images()) and locates the camera of each image.
 /// `input` holds everything except the frames. If the tilt of a camera is estimated, its lamps are
-/// detected again in the plane that is level by its fix (redetect_tilted_captures()).
+/// detected again in the plane that is level by its fix (redetect_lamps_of_tilted_captures()).
 ///
 /// Skipped images and remarks of the intake are part of the result. It fails as
-/// locate_camera_in_frames() does, or if no lamp is identified.
-/// @throws as detect_lamps_in_images() and locate_camera_in_frames()
-LocateResult locate_camera_in_images(const LampImages& images, ImageUse use, LocateInput input,
-                                     const FrontendOptions& options,
-                                     const IntakeProgress& progress = {});
+/// locate_camera_from_frames() does, or if no lamp is identified.
+/// @throws as detect_lamps_in_images() and locate_camera_from_frames()
+LocateResult locate_camera_from_images(const LampImages& images, ImageUse use, LocateInput input,
+                                       const FrontendOptions& options,
+                                       const IntakeProgress& progress = {});
 
 /// Function that detects the lamps of the named images again, in their level planes. Returns a
 /// frame per image, by name.
@@ -113,6 +113,6 @@ using Redetector = std::function<std::vector<Frame>(const LevelRotations&)>;
 /// discarded. A capture without a fix either way keeps the detection with more lamps.
 ///
 /// Replaces the frames of `input`. Returns the level rotations of the frames that changed.
-LevelRotations redetect_tilted_captures(LocateInput& input, const Redetector& redetect);
+LevelRotations redetect_lamps_of_tilted_captures(LocateInput& input, const Redetector& redetect);
 
 }  // namespace vlp

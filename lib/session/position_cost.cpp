@@ -90,9 +90,10 @@ BodyObservations make_frame(const GroupedLights& image, std::vector<AssignedLigh
     const Lamp& lamp = *light.lamp;
     const double map_sd_fraction = lamp.sd_m.value_or(0) / spread_m;
     const double sd_px = std::hypot(sigma_px, spread_px * std::max(sd_fraction, map_sd_fraction));
-    const auto ray = lens.unproject(pixel);
+    const auto ray = lens.unproject_pixel(pixel);
     if (!ray) continue;
-    const auto whitened = whitened_pixel_from_ray(ray->direction, ray->d_direction_d_pixel, sd_px);
+    const auto whitened =
+        compute_whitened_pixel_from_ray(ray->direction, ray->d_direction_d_pixel, sd_px);
     if (!whitened) continue;
     frame.sightings[frame.size] = {lamp.position_m, ray->direction.normalized(), *whitened, sd_px,
                                    0};
@@ -133,7 +134,7 @@ std::vector<double> compute_squared_residuals_of_lights(const GroupedLights& ima
   const EvaluatedState body(fix.state);
   for (std::size_t i = 0; i < frame.size; ++i) {
     const BodyObservation& seen = frame.sightings[i];
-    const Eigen::Vector3d lamp_in_body = body.lamp_in_body(seen.lamp_m, 0);
+    const Eigen::Vector3d lamp_in_body = body.lamp_position_in_body(seen.lamp_m, 0);
     const double depth_m = seen.ray.dot(lamp_in_body);
     if (!(depth_m > 0)) continue;
     const double square = (seen.whitened_pixel_from_ray * lamp_in_body / depth_m).squaredNorm();
@@ -155,10 +156,10 @@ std::vector<bool> find_unique_lamps(const RowTimeCandidates& found) {
 
 }  // namespace
 
-std::vector<double> compute_lamp_position_costs(const RowTimeCandidates& found,
-                                                std::span<const GroupedLights> images,
-                                                const LampMap& lamps,
-                                                const std::optional<Lens>& lens) {
+std::vector<double> compute_row_time_position_costs(const RowTimeCandidates& found,
+                                                    std::span<const GroupedLights> images,
+                                                    const LampMap& lamps,
+                                                    const std::optional<Lens>& lens) {
   const std::vector<bool> unique = find_unique_lamps(found);
   const Tolerance& tolerance = lens ? kWithLens : kWithoutLens;
   // Squared residuals of the images by candidate and group.

@@ -60,9 +60,9 @@ struct GroupedLights {
 ///     sum over groups of log(1 + median over images of r^2).
 ///
 /// An error of the map or of the lens is the same in all images; therefore images are not summed.
-std::vector<double> compute_lamp_position_costs(const RowTimeCandidates& found,
-                                                std::span<const GroupedLights> images,
-                                                const LampMap& lamps,
-                                                const std::optional<Lens>& lens);
+std::vector<double> compute_row_time_position_costs(const RowTimeCandidates& found,
+                                                    std::span<const GroupedLights> images,
+                                                    const LampMap& lamps,
+                                                    const std::optional<Lens>& lens);
 
 }  // namespace vlp

@@ -21,7 +21,7 @@
 namespace vlp {
 namespace {
 
-std::string_view name_of(RotationMethod method) {
+std::string_view rotation_method_name(RotationMethod method) {
   return std::ranges::find(kRotationMethods, method,
                            &std::pair<std::string_view, RotationMethod>::second)
       ->first;
@@ -33,17 +33,17 @@ RotationFit fit_rotation(const RotationCaptures& spot, const Camera& camera,
     case RotationMethod::axis:
       return fit_rotation_axis(spot, camera);
     case RotationMethod::joint:
-      return fit_joint_rotation_center(spot, camera);
+      return fit_rotation_center_to_all_lamps(spot, camera);
     case RotationMethod::circle:
       break;
   }
-  return fit_centers_of_lamp_circles(spot, camera).mean;
+  return fit_and_average_lamp_circle_centers(spot, camera).mean;
 }
 
 /// Returns the zenith point and, if known, the lever arm.
 Eigen::VectorXd make_solution_vector(const RotationCenter& center) {
   Eigen::VectorXd solved(center.lever_arm_m ? 4 : 2);
-  solved.head<2>() = normalized_zenith_point(center);
+  solved.head<2>() = compute_normalized_zenith_point(center);
   if (center.lever_arm_m) solved.tail<2>() = *center.lever_arm_m;
   return solved;
 }
@@ -57,13 +57,13 @@ void propagate_lens_errors(
   const auto& report = input.calibration.intrinsics_report;
   if (!report || !report->covariance) return;
   const auto with_error = [&](const Eigen::VectorXd& error) -> std::optional<Eigen::VectorXd> {
-    const auto moved =
-        center_for(with_lens_error(extract_camera_calibration(input.calibration), error).camera);
+    const auto moved = center_for(
+        perturb_lens_intrinsics(extract_camera_calibration(input.calibration), error).camera);
     if (!moved || moved->lever_arm_m.has_value() != center.lever_arm_m.has_value()) return {};
     return make_solution_vector(*moved);
   };
-  if (const auto jacobian = estimate_numeric_jacobian(with_error, make_solution_vector(center),
-                                                      *report->covariance)) {
+  if (const auto jacobian = estimate_solution_jacobian_wrt_errors(
+          with_error, make_solution_vector(center), *report->covariance)) {
     center.by_intrinsics = jacobian->topRows(2);
     if (center.lever_arm_m) center.lever_arm_by_intrinsics = jacobian->bottomRows(2);
     return;
@@ -132,8 +132,9 @@ void add_warnings(RotationResult& result) {
 
 void add_metrics(RotationResult& result) {
   const RotationCenter& center = result.fit.center;
-  result.metrics = {{"rotation_px", result.fit.residual_px},
-                    {"tilt_deg", deg_from_rad(compute_camera_tilt(center).angle_rad)}};
+  result.metrics = {
+      {"rotation_px", result.fit.residual_px},
+      {"tilt_deg", deg_from_rad(compute_tilt_from_rotation_center(center).angle_rad)}};
   if (!result.circles.circles.empty()) {
     result.metrics.push_back({"rotation_spread_px", result.circles.spread_px});
   }
@@ -147,8 +148,8 @@ void add_metrics(RotationResult& result) {
 
 /// Finds errors of the map from the captures in which the camera stands. From captures of a moving
 /// camera, which shear lamps by several millimeters, finds only errors of the map as a whole.
-MapErrors find_errors(const LampCaptures& input, const Calibration& calibration,
-                      double min_offset_px) {
+MapErrors find_lamp_map_errors(const LampCaptures& input, const Calibration& calibration,
+                               double min_offset_px) {
   std::vector<Frame> frames;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
     if (input.motions.empty() || !may_camera_move_during_readout(input.motions[i]))
@@ -183,35 +184,37 @@ Calibration extract_camera_calibration(const Calibration& calibration) {
   return alone;
 }
 
-MapErrors check_lamp_map(const LampCaptures& input, const Calibration& calibration,
-                         StepResult& result) {
-  MapErrors found = find_errors(input, calibration, MapErrorOptions().min_offset_px);
-  if (found.is_map_unusable()) {
-    result.set_failure(StepFailure::wrong_map, describe(found.errors), input.lamps_file);
+MapErrors check_lamp_map_with_captures(const LampCaptures& input, const Calibration& calibration,
+                                       StepResult& result) {
+  MapErrors found = find_lamp_map_errors(input, calibration, MapErrorOptions().min_offset_px);
+  if (found.is_lamp_map_unusable()) {
+    result.set_step_failure(StepFailure::wrong_map, describe_map_errors(found.errors),
+                            input.lamps_file);
     return found;
   }
   for (const MapError& error : found.errors) {
-    if (!error.lamps.empty()) result.warnings.push_back(describe(error));
+    if (!error.lamps.empty()) result.warnings.push_back(describe_map_error(error));
   }
   return found;
 }
 
-void explain_failure_by_map_errors(const LampCaptures& input, const Calibration& calibration,
-                                   StepResult& result) {
-  const MapErrors found = find_errors(input, calibration, kMinBlame_px);
+void explain_failure_by_lamp_map_errors(const LampCaptures& input, const Calibration& calibration,
+                                        StepResult& result) {
+  const MapErrors found = find_lamp_map_errors(input, calibration, kMinBlame_px);
   const bool has_lamps = std::any_of(found.errors.begin(), found.errors.end(),
                                      [](const MapError& error) { return !error.lamps.empty(); });
   if (found.errors.empty() || (!has_lamps && result.failure == StepFailure::wrong_map)) return;
   // The advice of a fit that diverges because of a lamp is misleading.
-  result.set_failure(StepFailure::wrong_map, describe(found.errors), input.lamps_file);
-  for (const MapError& error : found.errors) std::erase(result.warnings, describe(error));
+  result.set_step_failure(StepFailure::wrong_map, describe_map_errors(found.errors),
+                          input.lamps_file);
+  for (const MapError& error : found.errors) std::erase(result.warnings, describe_map_error(error));
 }
 
-RotationResult run_rotation_step(const LampCaptures& input, RotationMethod method,
-                                 HistoryEntry entry) {
+RotationResult run_rotation_calibration_step(const LampCaptures& input, RotationMethod method,
+                                             HistoryEntry entry) {
   RotationResult result;
-  check_lamp_map(input, extract_camera_calibration(input.calibration), result);
-  if (!result.ok()) return result;
+  check_lamp_map_with_captures(input, extract_camera_calibration(input.calibration), result);
+  if (!result.has_succeeded()) return result;
   const Camera& camera = input.calibration.camera;
   result.spot = find_in_place_rotation_captures(input.frames, input.lamps, camera);
   for (const auto& [image, reason] : result.spot.rejected) {
@@ -219,62 +222,68 @@ RotationResult run_rotation_step(const LampCaptures& input, RotationMethod metho
   }
   if (result.spot.status != RotationStatus::ok) {
     const bool map = result.spot.status == RotationStatus::other_map;
-    result.set_failure(map ? StepFailure::wrong_map : StepFailure::undetermined,
-                       std::string(describe(result.spot.status)),
-                       map ? input.lamps_file : std::filesystem::path());
+    result.set_step_failure(map ? StepFailure::wrong_map : StepFailure::undetermined,
+                            std::string(describe_rotation_status(result.spot.status)),
+                            map ? input.lamps_file : std::filesystem::path());
     if (map || result.spot.status == RotationStatus::moved) {
-      explain_failure_by_map_errors(input, extract_camera_calibration(input.calibration), result);
+      explain_failure_by_lamp_map_errors(input, extract_camera_calibration(input.calibration),
+                                         result);
     }
     return result;
   }
-  result.circles = fit_centers_of_lamp_circles(result.spot, camera);
+  result.circles = fit_and_average_lamp_circle_centers(result.spot, camera);
   result.fit = fit_rotation(result.spot, camera, method);
   if (!result.fit.converged) {
     const bool is_noise = method == RotationMethod::circle && result.circles.undetermined > 0;
-    result.set_failure(
+    result.set_step_failure(
         StepFailure::undetermined,
         is_noise ? "noise determines most circles, as with captures at two yaws: add captures at "
                    "other yaws, preferably twelve over a full turn, or use --method joint"
                  : "no rotation center fits the captures: take them at one position per height, "
                    "over more of the turn, with more visible lamps, and check lens and lamp map");
-    explain_failure_by_map_errors(input, extract_camera_calibration(input.calibration), result);
+    explain_failure_by_lamp_map_errors(input, extract_camera_calibration(input.calibration),
+                                       result);
     return result;
   }
   propagate_lens_errors(result, input, method);
   add_metrics(result);
   add_warnings(result);
-  result.calibration = with_rotation_center(input.calibration, result.fit.center, std::move(entry));
-  const std::string title = fmt::format("{}, method {}", camera.id, name_of(method));
+  result.calibration =
+      add_rotation_center_to_calibration(input.calibration, result.fit.center, std::move(entry));
+  const std::string title = fmt::format("{}, method {}", camera.id, rotation_method_name(method));
   result.drawing = [title, spot = result.spot, circles = result.circles, fit = result.fit, camera] {
-    return make_gnuplot_drawing(collect_plot_data(title, spot, circles, fit, camera));
+    return make_rotation_plot_drawing(
+        collect_rotation_plot_data(title, spot, circles, fit, camera));
   };
   return result;
 }
 
-TiltResult run_tilt_step(const LampCaptures& input, bool refine_map, HistoryEntry entry) {
+TiltResult run_tilt_calibration_step(const LampCaptures& input, bool refine_map,
+                                     HistoryEntry entry) {
   TiltResult result;
   const Calibration alone = extract_camera_calibration(input.calibration);
-  check_lamp_map(input, alone, result);
-  if (!result.ok()) return result;
+  check_lamp_map_with_captures(input, alone, result);
+  if (!result.has_succeeded()) return result;
   TiltCalibrationOptions options;
   options.refine_map = refine_map;
   options.motions = input.motions;
   if (std::any_of(input.motions.begin(), input.motions.end(), may_camera_move_during_readout)) {
-    check_row_time(input.calibration.camera);
+    check_row_time_and_readout_known(input.calibration.camera);
   }
   const auto leveled = [&](const Camera& camera) {
-    return estimate_tilt_from_lamps(input.frames, input.lamps, camera, options);
+    return estimate_camera_tilt_from_lamps(input.frames, input.lamps, camera, options);
   };
   TiltCalibration& leveling = result.leveling;
   leveling = leveled(input.calibration.camera);
   if (!leveling.undetermined.empty()) {
-    result.set_failure(StepFailure::undetermined, leveling.undetermined);
-    explain_failure_by_map_errors(input, alone, result);
+    result.set_step_failure(StepFailure::undetermined, leveling.undetermined);
+    explain_failure_by_lamp_map_errors(input, alone, result);
     return result;
   }
   if (leveling.captures_rejected > leveling.captures) {
-    result.set_failure(StepFailure::wrong_map, describe(MapError{MapErrorKind::other_room}),
-                       input.lamps_file);
+    result.set_step_failure(StepFailure::wrong_map,
+                            describe_map_error(MapError{MapErrorKind::other_room}),
+                            input.lamps_file);
     return result;
   }
   const auto center_for = [&](const Camera& camera) {
@@ -282,7 +291,8 @@ TiltResult run_tilt_step(const LampCaptures& input, bool refine_map, HistoryEntr
     return other.undetermined.empty() ? std::optional(other.center) : std::nullopt;
   };
   propagate_lens_errors(leveling.center, input, center_for, result);
-  result.metrics = {{"tilt_deg", deg_from_rad(compute_camera_tilt(leveling.center).angle_rad)}};
+  result.metrics = {
+      {"tilt_deg", deg_from_rad(compute_tilt_from_rotation_center(leveling.center).angle_rad)}};
   constexpr double max_noise_scale = 3;
   if (leveling.noise_scale > max_noise_scale) {
     // [ROTATION-1] `--refine-map may help`
@@ -291,7 +301,8 @@ TiltResult run_tilt_step(const LampCaptures& input, bool refine_map, HistoryEntr
                     "is slightly wrong, and the error of the tilt may exceed its sd{}",
                     leveling.noise_scale, refine_map ? "" : "; --refine-map may help"));
   }
-  result.calibration = with_rotation_center(input.calibration, leveling.center, std::move(entry));
+  result.calibration =
+      add_rotation_center_to_calibration(input.calibration, leveling.center, std::move(entry));
   return result;
 }
 

@@ -64,7 +64,7 @@ constexpr double kMicrosecondsPerSecond = 1e6;
 std::vector<MeasuredPeriod> collect_lamp_periods(const std::vector<Observation>& images) {
   std::vector<MeasuredPeriod> periods;
   for (const Observation& image : images) {
-    if (!image.is_kept()) continue;  // excludes copies and images of another camera
+    if (!image.is_image_kept()) continue;  // excludes copies and images of another camera
     for (const Light& light : image.lights) {
       const bool is_measured = light.kind == LightKind::lamp && light.lamp &&
                                !light.by_modulation && are_stripes_reliable(light.stripes);
@@ -77,7 +77,7 @@ std::vector<MeasuredPeriod> collect_lamp_periods(const std::vector<Observation>&
 
 }  // namespace
 
-std::vector<std::span<const Observation>> DetectedLights::folders() const {
+std::vector<std::span<const Observation>> DetectedLights::observations_by_folder() const {
   std::vector<std::span<const Observation>> folders;
   std::span<const Observation> remaining = seen.images;
   for (const std::size_t size : folder_sizes) {
@@ -87,20 +87,23 @@ std::vector<std::span<const Observation>> DetectedLights::folders() const {
   return folders;
 }
 
-RowTimeResult select_row_time_by_positions(std::span<const std::span<const Observation>> folders,
-                                           const std::vector<std::vector<Frame>>& labels,
-                                           const LampMap& lamps, const std::optional<Lens>& lens) {
+RowTimeResult select_row_time_by_periods_and_positions(
+    std::span<const std::span<const Observation>> folders,
+    const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,
+    const std::optional<Lens>& lens) {
   const PeriodsOfImages periods(folders, labels);
   const RowTimeCandidates found = estimate_row_time_candidates(
       std::vector<MeasuredPeriod>(periods.lights.begin(), periods.lights.end()), lamps);
   if (found.candidates.size() < 2) return select_row_time_candidate(found);
   const auto images = periods.group_lights(found.groups);
-  return select_row_time_candidate(found, compute_lamp_position_costs(found, images, lamps, lens));
+  return select_row_time_candidate(found,
+                                   compute_row_time_position_costs(found, images, lamps, lens));
 }
 
-DetectedLights detect_lights(const std::vector<fs::path>& folders, const LampMap& lamps,
-                             const std::optional<Calibration>& calibration, bool with_row_time,
-                             const FrontendOptions& options, const IntakeProgress& progress) {
+DetectedLights detect_lights_in_folders(const std::vector<fs::path>& folders, const LampMap& lamps,
+                                        const std::optional<Calibration>& calibration,
+                                        bool with_row_time, const FrontendOptions& options,
+                                        const IntakeProgress& progress) {
   DetectedLights lights;
   std::optional<std::array<int, 2>> imager_px;
   std::optional<Readout> readout = options.readout;
@@ -120,13 +123,13 @@ DetectedLights detect_lights(const std::vector<fs::path>& folders, const LampMap
   Observations remarks;
   lights.camera.readout = estimate_readout_direction(images, readout, options, imager_px, remarks);
   const LampIntake intake(LightDetector(lamps, lights.camera), ImageUse::fixes, options, imager_px);
-  lights.seen = intake.detect_in_all_images(images, progress);
-  prepend_remarks(remarks, lights.seen);
+  lights.seen = intake.detect_lamps_in_all_images(images, progress);
+  prepend_observation_messages(remarks, lights.seen);
   check_any_image_readable(folders.front(), lights.seen.images);
   return lights;
 }
 
-std::string compare_row_times(const RowTime& measured, const GivenRowTime& given) {
+std::string describe_row_time_contradiction(const RowTime& measured, const GivenRowTime& given) {
   constexpr double max_sds = 3;
   const double max_deviation = kLampDrift + max_sds * measured.sd_s / measured.row_time_s;
   const double deviation = std::abs(std::log(measured.row_time_s / given.row_time_s));
@@ -140,35 +143,37 @@ std::string compare_row_times(const RowTime& measured, const GivenRowTime& given
       kMicrosecondsPerSecond * measured.row_time_s, kMicrosecondsPerSecond * measured.sd_s);
 }
 
-RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMap& lamps,
-                            const GivenRowTime& given) {
+RowTimeCheck check_row_time_against_lamps(const std::vector<Observation>& images,
+                                          const LampMap& lamps, const GivenRowTime& given) {
   const auto found = estimate_row_time_candidates(collect_lamp_periods(images), lamps);
   if (found.candidates.empty()) return {};
   const RowTime& measured = found.candidates.front().row_time;
   if (measured.lamps < kMinRowTimeLamps) return {};
-  return {measured, compare_row_times(measured, given)};
+  return {measured, describe_row_time_contradiction(measured, given)};
 }
 
-std::string describe_other_row_time(const std::vector<Observation>& images, const LampMap& lamps,
-                                    const std::optional<Lens>& lens, const GivenRowTime& given) {
+std::string describe_alternative_row_time(const std::vector<Observation>& images,
+                                          const LampMap& lamps, const std::optional<Lens>& lens,
+                                          const GivenRowTime& given) {
   const auto found =
-      select_row_time_by_positions(std::array{std::span(images)}, {{}}, lamps, lens).found;
-  return found ? compare_row_times(*found, given) : "";
+      select_row_time_by_periods_and_positions(std::array{std::span(images)}, {{}}, lamps, lens)
+          .found;
+  return found ? describe_row_time_contradiction(*found, given) : "";
 }
 
-void explain_by_row_time(const std::vector<Observation>& images, const LampMap& lamps,
-                         const DetectorCamera& camera, const std::string& source,
-                         StepResult& result) {
+void add_row_time_contradiction_to_result(const std::vector<Observation>& images,
+                                          const LampMap& lamps, const DetectorCamera& camera,
+                                          const std::string& source, StepResult& result) {
   if (!camera.row_time_s) return;
   const GivenRowTime given{*camera.row_time_s, source};
   std::string error;
-  if (result.ok()) error = check_row_time(images, lamps, given).error;
-  if (error.empty()) error = describe_other_row_time(images, lamps, camera.lens, given);
+  if (result.has_succeeded()) error = check_row_time_against_lamps(images, lamps, given).error;
+  if (error.empty()) error = describe_alternative_row_time(images, lamps, camera.lens, given);
   if (error.empty()) return;
-  if (result.ok()) {
+  if (result.has_succeeded()) {
     result.warnings.push_back(std::move(error));
   } else {
-    result.set_failure(StepFailure::bad_input, std::move(error));
+    result.set_step_failure(StepFailure::bad_input, std::move(error));
   }
 }
 
@@ -183,19 +188,20 @@ RowTimeStepResult estimate_row_time_from_lights(const DetectedLights& seen,
                                                 const LampMap& lamps, const fs::path& lamps_file,
                                                 const std::optional<Calibration>& calibration,
                                                 HistoryEntry entry) {
-  check_lamp_frequencies(lamps, lamps_file);
+  check_map_has_lamp_frequencies(lamps, lamps_file);
   RowTimeStepResult result;
-  const RowTimeResult estimate =
-      select_row_time_by_positions(seen.folders(), labels, lamps, seen.camera.lens);
+  const RowTimeResult estimate = select_row_time_by_periods_and_positions(
+      seen.observations_by_folder(), labels, lamps, seen.camera.lens);
   if (!estimate.found) {
-    result.set_failure(StepFailure::undetermined, estimate.problem);
+    result.set_step_failure(StepFailure::undetermined, estimate.problem);
     return result;
   }
   result.found = *estimate.found;
   result.metrics = make_row_time_metrics({result.found});
   if (!calibration) return result;
   if (const auto& stated_s = calibration->camera.row_time_s) {
-    std::string error = compare_row_times(result.found, {*stated_s, "the calibration"});
+    std::string error =
+        describe_row_time_contradiction(result.found, {*stated_s, "the calibration"});
     if (!error.empty()) result.warnings.push_back(std::move(error));
   }
   result.calibration = *calibration;

@@ -30,24 +30,26 @@ struct DetectedLights {
   DetectorCamera camera;
 
   /// Returns the observations of each folder.
-  std::vector<std::span<const Observation>> folders() const;
+  std::vector<std::span<const Observation>> observations_by_folder() const;
 };
 
 /// Detects the lights in the images of each folder without identifying lamps. `calibration`
 /// supplies the lens and the readout direction if it has them. If `with_row_time` is false, its row
 /// time is ignored. Throws InputError if no image can be read.
-DetectedLights detect_lights(const std::vector<std::filesystem::path>& folders,
-                             const LampMap& lamps, const std::optional<Calibration>& calibration,
-                             bool with_row_time, const FrontendOptions& options,
-                             const IntakeProgress& progress = {});
+DetectedLights detect_lights_in_folders(const std::vector<std::filesystem::path>& folders,
+                                        const LampMap& lamps,
+                                        const std::optional<Calibration>& calibration,
+                                        bool with_row_time, const FrontendOptions& options,
+                                        const IntakeProgress& progress = {});
 
 /// Chooses a row time by periods and duty cycles of the lights in the images of each folder. Also
-/// uses their positions if several row times fit (compute_lamp_position_costs()).
+/// uses their positions if several row times fit (compute_row_time_position_costs()).
 ///
 /// @param labels  lights of each folder that are lamps; empty: all lights
-RowTimeResult select_row_time_by_positions(std::span<const std::span<const Observation>> folders,
-                                           const std::vector<std::vector<Frame>>& labels,
-                                           const LampMap& lamps, const std::optional<Lens>& lens);
+RowTimeResult select_row_time_by_periods_and_positions(
+    std::span<const std::span<const Observation>> folders,
+    const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,
+    const std::optional<Lens>& lens);
 
 /// Result of estimate_row_time_from_lights().
 struct RowTimeStepResult : StepResult {
@@ -56,9 +58,10 @@ struct RowTimeStepResult : StepResult {
 
 /// Estimates the row time from lamps with a frequency in the map (estimate_row_time_candidates()).
 /// If several row times explain their periods, chooses by their positions
-/// (compute_lamp_position_costs()). Adds row time and readout direction to the camera of
-/// `calibration`, if given, and warns if it states another row time (compare_row_times()). Failure:
-/// undetermined. Throws InputError if no lamp has a frequency.
+/// (compute_row_time_position_costs()). Adds row time and readout direction to the camera of
+/// `calibration`, if given, and warns if it states another row time
+/// (describe_row_time_contradiction()). Failure: undetermined. Throws InputError if no lamp has a
+/// frequency.
 RowTimeStepResult estimate_row_time_from_lights(const DetectedLights& seen,
                                                 const std::vector<std::vector<Frame>>& labels,
                                                 const LampMap& lamps,
@@ -81,11 +84,11 @@ struct RowTimeCheck {
   std::string error = {};
 };
 
-/// Compares a measured row time with the stated one, as check_row_time() does.
+/// Compares a measured row time with the stated one, as check_row_time_against_lamps() does.
 ///
 /// @return  the contradiction in one line; empty if there is none or fewer than three lamps were
 ///          measured
-std::string compare_row_times(const RowTime& measured, const GivenRowTime& given);
+std::string describe_row_time_contradiction(const RowTime& measured, const GivenRowTime& given);
 
 /// Estimates the row time from the identified lamps of the kept images
 /// (estimate_row_time_candidates()) and compares it with the given one. They contradict each other
@@ -96,28 +99,29 @@ std::string compare_row_times(const RowTime& measured, const GivenRowTime& given
 /// A lamp may deviate from its frequency by kLampDrift (frequency_identification.h). The mean of
 /// several lamps then deviates by at most kLampDrift, whether their deviations are independent or
 /// common. The second term covers the measurement, and lamps that deviate by more.
-RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMap& lamps,
-                            const GivenRowTime& given);
+RowTimeCheck check_row_time_against_lamps(const std::vector<Observation>& images,
+                                          const LampMap& lamps, const GivenRowTime& given);
 
 /// Finds another row time that makes the lights of the images lamps of the map, by their periods
 /// and positions, independently of their identification (select_row_time_candidate()): a wrong row
 /// time leaves lights unknown or exchanges lamps.
 ///
 /// @return  the contradiction in one line; empty unless at least three lamps contradict the given
-///          row time as in check_row_time()
-std::string describe_other_row_time(const std::vector<Observation>& images, const LampMap& lamps,
-                                    const std::optional<Lens>& lens, const GivenRowTime& given);
+///          row time as in check_row_time_against_lamps()
+std::string describe_alternative_row_time(const std::vector<Observation>& images,
+                                          const LampMap& lamps, const std::optional<Lens>& lens,
+                                          const GivenRowTime& given);
 
 /// Adds a contradiction of the row time of `camera` to the result of a step: in place of the reason
 /// if the step failed, as a warning otherwise, because fixes at rest are valid. The contradiction
-/// is that of check_row_time() if there is a result. Otherwise, and if identified lamps agree
-/// because each was taken for its neighbor, it is that of describe_other_row_time(). An unknown
-/// row time adds nothing.
+/// is that of check_row_time_against_lamps() if there is a result. Otherwise, and if identified
+/// lamps agree because each was taken for its neighbor, it is that of
+/// describe_alternative_row_time(). An unknown row time adds nothing.
 ///
 /// @param source  name of the file or of the option that gives the row time
-void explain_by_row_time(const std::vector<Observation>& images, const LampMap& lamps,
-                         const DetectorCamera& camera, const std::string& source,
-                         StepResult& result);
+void add_row_time_contradiction_to_result(const std::vector<Observation>& images,
+                                          const LampMap& lamps, const DetectorCamera& camera,
+                                          const std::string& source, StepResult& result);
 
 /// Returns the metrics row_time_us and row_time_sd_us; none if the row time was not measured.
 std::vector<Metric> make_row_time_metrics(const RowTimeCheck& check);

@@ -73,7 +73,7 @@ constexpr std::array kPlots{"lens.svg", "rotation.svg", "dispersion.svg"};
 std::vector<Gate> select_gates_of_step(const SessionFolder& session,
                                        const SessionOptions& options) {
   std::vector<Gate> gates;
-  if (!session.camera_file()) gates = make_default_lens_gates();
+  if (!session.camera_calibration_file()) gates = make_default_lens_gates();
   const fs::path file = session.gates_file().value_or(options.gates_file);
   if (file.empty()) return gates;
   return merge_gates(std::move(gates), read_gates(file, list_session_metrics()));
@@ -88,8 +88,8 @@ struct Work {
 /// Writes the summaries, session.json last: without it the results are those of a killed run.
 void write_summaries(const SessionResults& results, const SessionResult& result,
                      const SessionOptions& options) {
-  write_file(results.file("junit.xml"), format_session_junit(result));
-  write_file(results.file("session.json"), format_session_json(result, options));
+  write_file(results.results_file_path("junit.xml"), format_session_junit_xml(result));
+  write_file(results.results_file_path("session.json"), format_session_json(result, options));
 }
 
 class SessionRun {
@@ -105,10 +105,10 @@ class SessionRun {
 
   SessionResult run() {
     check_redo_option();
-    results_.plan_steps(list_outputs());
-    if (run_calibration_steps() && locate()) {
+    results_.set_steps_and_remove_stale_files(list_outputs());
+    if (run_calibration_steps() && locate_check_and_drives()) {
       add_gates_of_missing_steps();
-      evaluate();
+      evaluate_session_fixes();
     }
     finish_session();
     return std::move(result_);
@@ -118,7 +118,7 @@ class SessionRun {
   void check_redo_option() const {
     std::vector<std::string> names;
     for (const auto& [step, files] : list_outputs()) names.push_back(step);
-    for (const std::string& name : options_.redo) {
+    for (const std::string& name : options_.steps_to_redo) {
       if (std::ranges::find(names, name) != names.end()) continue;
       throw std::invalid_argument(
           fmt::format("no step {}; the steps are: {}", name, fmt::join(names, ", ")));
@@ -126,19 +126,21 @@ class SessionRun {
   }
 
   bool is_redo_requested(const std::string& step) const {
-    return std::ranges::find(options_.redo, step) != options_.redo.end();
+    return std::ranges::find(options_.steps_to_redo, step) != options_.steps_to_redo.end();
   }
 
-  fs::path output_path_of(const std::string& name) const { return results_.file(name); }
-  fs::path fixes_of(const fs::path& captures) const {
-    return output_path_of(captures.filename().string() + "-fixes.csv");
+  fs::path output_file_path(const std::string& name) const {
+    return results_.results_file_path(name);
+  }
+  fs::path fixes_file_path(const fs::path& captures) const {
+    return output_file_path(captures.filename().string() + "-fixes.csv");
   }
   fs::path lamps_file() const { return session_.lamp_map_file(); }
   LampMap read_lamps() const { return read_lamps_of_room(lamps_file(), options_.frontend.room); }
 
   std::string remove_folder(std::string text) const {
-    return vlp::remove_folder(vlp::remove_folder(std::move(text), session_.path()),
-                              results_.path());
+    return vlp::remove_folder(vlp::remove_folder(std::move(text), session_.session_folder_path()),
+                              results_.results_folder_path());
   }
 
   std::vector<fs::path> line_drive_folders() const {
@@ -152,9 +154,9 @@ class SessionRun {
       return names;
     };
     std::vector<std::string> lens;
-    if (!session_.camera_file()) lens = with_picture({"lens.yaml"}, "lens.svg");
-    if (!session_.camera_file() &&
-        (options_.choose_lens_model || is_supported_by_mrcal(options_.lens_model))) {
+    if (!session_.camera_calibration_file()) lens = with_picture({"lens.yaml"}, "lens.svg");
+    if (!session_.camera_calibration_file() &&
+        (options_.choose_lens_model || is_lens_model_supported_by_mrcal(options_.lens_model))) {
       lens.insert(lens.begin() + 1, "lens.cameramodel");
     }
     std::vector<StepOutputs> steps{
@@ -162,9 +164,9 @@ class SessionRun {
         {"row-time", {"camera.yaml"}},
         {"rotation", with_picture({"rotated.yaml"}, "rotation.svg")},
         {"dispersion", with_picture({"calibration.yaml"}, "dispersion.svg")}};
-    if (session_.check()) steps.push_back({"check", {"check-fixes.csv"}});
+    if (session_.check_captures_folder()) steps.push_back({"check", {"check-fixes.csv"}});
     for (const fs::path& line : line_drive_folders()) {
-      steps.push_back({line.filename().string(), {fixes_of(line).filename().string()}});
+      steps.push_back({line.filename().string(), {fixes_file_path(line).filename().string()}});
     }
     steps.push_back({"evaluate", with_picture({"evaluation.json"}, "report.html")});
     return steps;
@@ -188,26 +190,26 @@ class SessionRun {
 
   /// Runs a step unless inputs, options, program and outputs are unchanged since it last ended.
   /// Returns false if the step failed.
-  bool step(const std::string& name, const std::vector<fs::path>& inputs,
-            const std::string& options, const std::function<Work()>& work) {
+  bool run_or_reuse_step(const std::string& name, const std::vector<fs::path>& inputs,
+                         const std::string& options, const std::function<Work()>& work) {
     if (observer_.begins) observer_.begins(name);
     const std::string key = compute_step_key(inputs, options);
     SessionStep done{name, false, {}};
-    if (auto cached_result = results_.find_cached_result(name, key);
+    if (auto cached_result = results_.find_cached_step_result(name, key);
         cached_result && !is_redo_requested(name)) {
       done.is_up_to_date = true;
       done.result = std::move(*cached_result);
     } else {
       results_.remove_outputs_of_step(name);
       done.result = run_step_work(work);
-      results_.store_result(name, key, done.result);
+      results_.store_step_result(name, key, done.result);
     }
-    if (done.result.ok())
+    if (done.result.has_succeeded())
       done.result.gates = check_gates(find_step_gates(name), done.result.metrics);
     result_.gates.insert(result_.gates.end(), done.result.gates.begin(), done.result.gates.end());
     result_.steps.push_back(std::move(done));
     if (observer_.ends) observer_.ends(result_.steps.back());
-    return result_.steps.back().result.ok();
+    return result_.steps.back().result.has_succeeded();
   }
 
   /// Adds the gates of steps that the session lacks: they fail, because their metrics have no
@@ -238,24 +240,24 @@ class SessionRun {
     try {
       done = work();
     } catch (const InputError& error) {
-      done.result.set_failure(StepFailure::bad_input, error.what());
+      done.result.set_step_failure(StepFailure::bad_input, error.what());
     } catch (const std::invalid_argument& error) {
-      done.result.set_failure(StepFailure::bad_input, error.what());
+      done.result.set_step_failure(StepFailure::bad_input, error.what());
     }
     StepResult& result = done.result;
-    result.set_failure(result.failure, remove_folder(format_failure_message(result)));
+    result.set_step_failure(result.failure, remove_folder(format_failure_message(result)));
     for (std::string& warning : result.warnings) warning = remove_folder(std::move(warning));
     for (auto& [image, reason] : result.skipped) reason = remove_folder(std::move(reason));
-    if (result.ok()) done.write();
+    if (result.has_succeeded()) done.write();
     return std::move(result);
   }
 
   HistoryEntry make_step_history(const std::string& options, const std::vector<fs::path>& inputs) {
-    return vlp::make_history_entry(options_.program, options, inputs, digests_);
+    return vlp::make_calibration_history_entry(options_.program, options, inputs, digests_);
   }
 
   void write_picture(const StepResult& result, const std::string& name) const {
-    if (options_.report && result.drawing) write_plot(output_path_of(name), result.drawing());
+    if (options_.report && result.drawing) write_plot(output_file_path(name), result.drawing());
   }
 
   /// Returns the options of the camera as text for the history.
@@ -275,100 +277,110 @@ class SessionRun {
       text += fmt::format(" --max-white-fraction {}", limits.max_white_fraction);
     }
     text += " --lens ";
-    return text.append(options_.choose_lens_model ? "auto" : to_string(options_.lens_model));
+    return text.append(options_.choose_lens_model ? "auto" : lens_model_name(options_.lens_model));
   }
 
   bool run_lens() {
     const std::string settings = fmt::format("{} {}", format_camera_options(), options_.report);
-    return step("lens", {session_.board_images_folder(), session_.board_file()}, settings, [&] {
-      LensInput input;
-      input.board = read_board(session_.board_file());
-      input.board_file = session_.board_file();
-      FrontendOptions options = options_.frontend;
-      options.corner_cache = results_.corner_cache_folder();
-      input.seen = detect_boards_in_images(list_images(session_.board_images_folder()), input.board,
-                                           session_.board_file(), options, observer_.progress);
-      input.camera.id = options_.camera_id;
-      input.camera.lens_model = options_.lens_model;
-      input.camera.row_time_s = options_.frontend.row_time_s;
-      input.camera.readout = options_.frontend.readout;
-      input.choose_lens_model = options_.choose_lens_model;
-      LensResult lens =
-          run_lens_step(std::move(input),
-                        make_step_history(format_camera_options(),
-                                          {session_.board_file(), session_.board_images_folder()}));
-      if (lens.lens.choice) lens.notes.push_back("lens model: " + describe(*lens.lens.choice));
-      return Work{lens, [this, lens] {
-                    if (is_supported_by_mrcal(lens.calibration.camera.lens_model)) {
-                      write_mrcal_cameramodel(output_path_of("lens.cameramodel"),
-                                              lens.lens.solution);
-                    }
-                    write_picture(lens, "lens.svg");
-                    write_calibration(output_path_of("lens.yaml"), lens.calibration);
-                  }};
-    });
+    return run_or_reuse_step(
+        "lens", {session_.board_images_folder(), session_.board_file()}, settings, [&] {
+          LensInput input;
+          input.board = read_board(session_.board_file());
+          input.board_file = session_.board_file();
+          FrontendOptions options = options_.frontend;
+          options.corner_cache = results_.corner_cache_folder();
+          input.seen =
+              detect_boards_in_images(list_images(session_.board_images_folder()), input.board,
+                                      session_.board_file(), options, observer_.progress);
+          input.camera.id = options_.camera_id;
+          input.camera.lens_model = options_.lens_model;
+          input.camera.row_time_s = options_.frontend.row_time_s;
+          input.camera.readout = options_.frontend.readout;
+          input.choose_lens_model = options_.choose_lens_model;
+          LensResult lens = run_lens_calibration_step(
+              std::move(input),
+              make_step_history(format_camera_options(),
+                                {session_.board_file(), session_.board_images_folder()}));
+          if (lens.lens.choice)
+            lens.notes.push_back("lens model: " + describe_lens_model_choice(*lens.lens.choice));
+          return Work{lens, [this, lens] {
+                        if (is_lens_model_supported_by_mrcal(lens.calibration.camera.lens_model)) {
+                          write_mrcal_cameramodel(output_file_path("lens.cameramodel"),
+                                                  lens.lens.solution);
+                        }
+                        write_picture(lens, "lens.svg");
+                        write_calibration(output_file_path("lens.yaml"), lens.calibration);
+                      }};
+        });
   }
 
   bool estimate_row_time_from_lights(const fs::path& camera_file) {
-    return step("row-time", {session_.rotation_folder(), lamps_file(), camera_file}, "", [&] {
-      const LampMap lamps = read_lamps();
-      const Calibration camera = read_calibration(camera_file);
-      FrontendOptions options = options_.frontend;
-      options.readout.reset();
-      const DetectedLights seen = detect_lights({session_.rotation_folder()}, lamps, camera, false,
-                                                options, observer_.progress);
-      RowTimeStepResult found = vlp::estimate_row_time_from_lights(
-          seen, {{}}, lamps, lamps_file(), camera,
-          make_step_history("--row-time", {session_.rotation_folder(), lamps_file()}));
-      add_intake_remarks(seen.seen, found);
-      return Work{found, [this, found] {
-                    write_calibration(output_path_of("camera.yaml"), found.calibration);
-                  }};
-    });
+    return run_or_reuse_step(
+        "row-time", {session_.rotation_captures_folder(), lamps_file(), camera_file}, "", [&] {
+          const LampMap lamps = read_lamps();
+          const Calibration camera = read_calibration(camera_file);
+          FrontendOptions options = options_.frontend;
+          options.readout.reset();
+          const DetectedLights seen =
+              detect_lights_in_folders({session_.rotation_captures_folder()}, lamps, camera, false,
+                                       options, observer_.progress);
+          RowTimeStepResult found = vlp::estimate_row_time_from_lights(
+              seen, {{}}, lamps, lamps_file(), camera,
+              make_step_history("--row-time", {session_.rotation_captures_folder(), lamps_file()}));
+          add_image_intake_remarks(seen.seen, found);
+          return Work{found, [this, found] {
+                        write_calibration(output_file_path("camera.yaml"), found.calibration);
+                      }};
+        });
   }
 
   FrontendOptions make_lamp_options() const {
     FrontendOptions options = options_.frontend;
     options.readout.reset();  // already part of the calibration
-    if (const auto classifier = session_.classifier_file()) options.classifier = *classifier;
+    if (const auto classifier = session_.lamp_classifier_file()) options.classifier = *classifier;
     return options;
   }
 
   /// Detects the lamps in the captures of a step. Returns the remarks, the metrics of the row time,
   /// and the failure if no image can be used.
-  StepResult observe(const LampImages& images, ImageUse use, LampCaptures& captures,
-                     std::vector<Observation>& seen) const {
+  StepResult observe_lamp_images(const LampImages& images, ImageUse use, LampCaptures& captures,
+                                 std::vector<Observation>& seen) const {
     Observations observed =
         detect_lamps_in_images(images, use, make_lamp_options(), observer_.progress);
-    captures.frames = collect_kept_frames(observed.images);
+    captures.frames = collect_kept_lamp_frames(observed.images);
     StepResult result;
-    add_intake_remarks(observed, result);
+    add_image_intake_remarks(observed, result);
     seen = std::move(observed.images);
-    explain_by_row_time(captures, seen, result);
+    add_row_time_contradiction_to_result(captures, seen, result);
     const auto& row_time_s = captures.calibration.camera.row_time_s;
     if (use == ImageUse::turn && is_row_time_given() && row_time_s) {
-      result.metrics = make_row_time_metrics(
-          check_row_time(seen, captures.lamps, {*row_time_s, describe_row_time_source()}));
+      result.metrics = make_row_time_metrics(check_row_time_against_lamps(
+          seen, captures.lamps, {*row_time_s, describe_row_time_source()}));
     }
     return result;
   }
 
-  /// Adds a contradiction of the row time to the result of a step (explain_by_row_time()).
-  void explain_by_row_time(const LampCaptures& captures, const std::vector<Observation>& images,
-                           StepResult& result) const {
-    if (session_.classifier_file()) return;  // the lamps are not identified by frequency
-    vlp::explain_by_row_time(images, captures.lamps, make_detector_camera(captures.calibration),
-                             describe_row_time_source(), result);
+  /// Adds a contradiction of the row time to the result of a step
+  /// (add_row_time_contradiction_to_result()).
+  void add_row_time_contradiction_to_result(const LampCaptures& captures,
+                                            const std::vector<Observation>& images,
+                                            StepResult& result) const {
+    if (session_.lamp_classifier_file()) return;  // the lamps are not identified by frequency
+    vlp::add_row_time_contradiction_to_result(images, captures.lamps,
+                                              make_detector_camera(captures.calibration),
+                                              describe_row_time_source(), result);
   }
 
   /// Returns false if the row time was estimated by the step row-time, or is not used.
   bool is_row_time_given() const {
-    return !session_.classifier_file() && (session_.camera_file() || options_.frontend.row_time_s);
+    return !session_.lamp_classifier_file() &&
+           (session_.camera_calibration_file() || options_.frontend.row_time_s);
   }
 
   /// Returns the name of the file or the option that gives the row time.
   std::string describe_row_time_source() const {
-    if (session_.camera_file()) return session_.camera_file()->filename().string();
+    if (session_.camera_calibration_file())
+      return session_.camera_calibration_file()->filename().string();
     return options_.frontend.row_time_s ? "--row-time-s" : "camera.yaml";
   }
 
@@ -381,58 +393,60 @@ class SessionRun {
                            remarks.warnings.end());
   }
 
-  static LampImages lamp_images(const fs::path& folder, const LampCaptures& captures,
-                                const fs::path& calibration_file) {
+  static LampImages make_session_lamp_images(const fs::path& folder, const LampCaptures& captures,
+                                             const fs::path& calibration_file) {
     return {folder, captures.lamps, captures.lamps_file, captures.calibration, calibration_file};
   }
 
   std::vector<fs::path> list_lamp_inputs(const fs::path& folder,
                                          const fs::path& calibration) const {
-    return {folder, lamps_file(), calibration, session_.classifier_file().value_or("")};
+    return {folder, lamps_file(), calibration, session_.lamp_classifier_file().value_or("")};
   }
 
   std::string format_plot_setting() const { return options_.report ? "picture" : ""; }
 
   bool run_rotation(const fs::path& camera_file) {
-    const auto inputs = list_lamp_inputs(session_.rotation_folder(), camera_file);
-    return step("rotation", inputs, format_plot_setting(), [&] {
+    const auto inputs = list_lamp_inputs(session_.rotation_captures_folder(), camera_file);
+    return run_or_reuse_step("rotation", inputs, format_plot_setting(), [&] {
       LampCaptures captures{{}, read_lamps(), lamps_file(), read_calibration(camera_file)};
-      LampImages images = lamp_images(session_.rotation_folder(), captures, camera_file);
+      LampImages images =
+          make_session_lamp_images(session_.rotation_captures_folder(), captures, camera_file);
       images.captures.emplace();  // inclinations are ignored: the axis is level
       std::vector<Observation> seen;
-      const StepResult remarks = observe(images, ImageUse::turn, captures, seen);
-      if (!remarks.ok()) return Work{remarks};
-      RotationResult found =
-          run_rotation_step(captures, RotationMethod::axis, make_step_history("", inputs));
-      if (!found.ok()) explain_by_row_time(captures, seen, found);
+      const StepResult remarks = observe_lamp_images(images, ImageUse::turn, captures, seen);
+      if (!remarks.has_succeeded()) return Work{remarks};
+      RotationResult found = run_rotation_calibration_step(captures, RotationMethod::axis,
+                                                           make_step_history("", inputs));
+      if (!found.has_succeeded()) add_row_time_contradiction_to_result(captures, seen, found);
       add(remarks, found);
       return Work{found, [this, found] {
                     write_picture(found, "rotation.svg");
-                    write_calibration(output_path_of("rotated.yaml"), found.calibration);
+                    write_calibration(output_file_path("rotated.yaml"), found.calibration);
                   }};
     });
   }
 
   bool run_dispersion() {
-    const fs::path folder = *session_.dispersion_folder(), rotated = output_path_of("rotated.yaml");
+    const fs::path folder = *session_.dispersion_captures_folder(),
+                   rotated = output_file_path("rotated.yaml");
     const auto inputs = list_lamp_inputs(folder, rotated);
-    return step("dispersion", inputs, format_plot_setting(), [&] {
+    return run_or_reuse_step("dispersion", inputs, format_plot_setting(), [&] {
       LampCaptures captures{{}, read_lamps(), lamps_file(), read_calibration(rotated)};
       std::vector<Observation> seen;
-      const StepResult remarks =
-          observe(lamp_images(folder, captures, rotated), ImageUse::places, captures, seen);
-      if (!remarks.ok()) return Work{remarks};
+      const StepResult remarks = observe_lamp_images(
+          make_session_lamp_images(folder, captures, rotated), ImageUse::places, captures, seen);
+      if (!remarks.has_succeeded()) return Work{remarks};
       const KnownPositions places =
-          collect_reference_positions(captures.frames, read_captures_with_truth(folder));
+          collect_captures_at_known_positions(captures.frames, read_captures_with_truth(folder));
       if (places.captures.empty()) {
         throw InputError(folder,
                          "its captures have no positions; add x_m and y_m to captures.csv, with "
                          "the names of the images");
       }
-      DispersionResult found =
-          run_dispersion_step(captures, places, DispersionMethod::camera, DispersionCircle::mean,
-                              make_step_history("", add_capture_tables(inputs, folder)));
-      if (!found.ok()) explain_by_row_time(captures, seen, found);
+      DispersionResult found = run_dispersion_calibration_step(
+          captures, places, DispersionMethod::camera, DispersionCircle::mean,
+          make_step_history("", add_capture_tables(inputs, folder)));
+      if (!found.has_succeeded()) add_row_time_contradiction_to_result(captures, seen, found);
       add(remarks, found);
       if (places.without > 0) {
         found.warnings.push_back(
@@ -441,7 +455,7 @@ class SessionRun {
       }
       return Work{found, [this, found] {
                     write_picture(found, "dispersion.svg");
-                    write_calibration(output_path_of("calibration.yaml"), found.calibration);
+                    write_calibration(output_file_path("calibration.yaml"), found.calibration);
                   }};
     });
   }
@@ -455,15 +469,15 @@ class SessionRun {
   }
 
   bool run_calibration_steps() {
-    fs::path camera = output_path_of("lens.yaml");
-    if (const auto is_known_step = session_.camera_file()) {
+    fs::path camera = output_file_path("lens.yaml");
+    if (const auto is_known_step = session_.camera_calibration_file()) {
       camera = *is_known_step;
       if (!read_given_camera(camera)) return false;
     } else if (!run_lens()) {
       return false;
     }
     result_.calibration = read_calibration(camera);
-    if (result_.calibration->camera.row_time_s || session_.classifier_file()) {
+    if (result_.calibration->camera.row_time_s || session_.lamp_classifier_file()) {
       results_.remove_outputs_of_step("row-time");
       if (is_redo_requested("row-time")) {
         throw std::invalid_argument(
@@ -473,24 +487,24 @@ class SessionRun {
     } else if (!estimate_row_time_from_lights(camera)) {
       return false;
     } else {
-      camera = output_path_of("camera.yaml");
+      camera = output_file_path("camera.yaml");
     }
     if (!run_rotation(camera)) return false;
-    result_.calibration = read_calibration(output_path_of("rotated.yaml"));
-    if (!session_.dispersion_folder()) {
+    result_.calibration = read_calibration(output_file_path("rotated.yaml"));
+    if (!session_.dispersion_captures_folder()) {
       results_.remove_outputs_of_step("dispersion");
-      write_calibration(output_path_of("calibration.yaml"), *result_.calibration);
+      write_calibration(output_file_path("calibration.yaml"), *result_.calibration);
       return true;
     }
     if (!run_dispersion()) return false;
-    result_.calibration = read_calibration(output_path_of("calibration.yaml"));
+    result_.calibration = read_calibration(output_file_path("calibration.yaml"));
     return true;
   }
 
   /// Runs the step lens for a given camera.yaml, which fails if the file cannot be read.
   bool read_given_camera(const fs::path& camera) {
     const std::string unused = list_changed_camera_options();
-    return step("lens", {camera}, unused, [&] {
+    return run_or_reuse_step("lens", {camera}, unused, [&] {
       const auto report = read_calibration(camera).intrinsics_report;
       Work work;
       if (report && report->views > 0) work.result.metrics = {{"rms_px", report->rms_px}};
@@ -520,49 +534,55 @@ class SessionRun {
     return stated;
   }
 
-  bool locate() {
-    if (const auto check = session_.check(); check && !locate(*check)) return false;
+  bool locate_check_and_drives() {
+    if (const auto check = session_.check_captures_folder();
+        check && !locate_check_and_drives(*check))
+      return false;
     for (const fs::path& line : line_drive_folders()) {
-      if (!locate(line)) return false;
+      if (!locate_check_and_drives(line)) return false;
     }
     return true;
   }
 
-  bool locate(const fs::path& folder) {
-    const fs::path calibration = output_path_of("calibration.yaml");
-    return step(folder.filename().string(), list_lamp_inputs(folder, calibration), "", [&] {
-      LocateInput input{
-          {}, read_lamps(), read_calibration(calibration), read_captures_csv_of_folder(folder)};
-      input.lamp_offsets = session_.check() == folder;
-      const LampImages images{folder, input.lamps, lamps_file(), input.calibration, calibration};
-      const ImageUse use = session_.check() == folder ? ImageUse::places : ImageUse::fixes;
-      LocateResult found = locate_camera_in_images(images, use, std::move(input),
-                                                   make_lamp_options(), observer_.progress);
-      return Work{found,
-                  [this, folder, rows = found.rows] { write_fixes(fixes_of(folder), rows); }};
-    });
+  bool locate_check_and_drives(const fs::path& folder) {
+    const fs::path calibration = output_file_path("calibration.yaml");
+    return run_or_reuse_step(
+        folder.filename().string(), list_lamp_inputs(folder, calibration), "", [&] {
+          LocateInput input{
+              {}, read_lamps(), read_calibration(calibration), read_captures_csv_of_folder(folder)};
+          input.lamp_offsets = session_.check_captures_folder() == folder;
+          const LampImages images{folder, input.lamps, lamps_file(), input.calibration,
+                                  calibration};
+          const ImageUse use =
+              session_.check_captures_folder() == folder ? ImageUse::places : ImageUse::fixes;
+          LocateResult found = locate_camera_from_images(images, use, std::move(input),
+                                                         make_lamp_options(), observer_.progress);
+          return Work{found, [this, folder, rows = found.rows] {
+                        write_fixes(fixes_file_path(folder), rows);
+                      }};
+        });
   }
 
-  void evaluate() {
+  void evaluate_session_fixes() {
     std::optional<fs::path> truth;
-    std::vector<fs::path> inputs{output_path_of("check-fixes.csv"), lamps_file(),
-                                 output_path_of("calibration.yaml")};
-    if (const auto check = session_.check()) {
+    std::vector<fs::path> inputs{output_file_path("check-fixes.csv"), lamps_file(),
+                                 output_file_path("calibration.yaml")};
+    if (const auto check = session_.check_captures_folder()) {
       for (const fs::path& table : add_capture_tables({}, *check)) inputs.push_back(table);
     }
     for (const char* plot : kPlots) {
-      if (options_.report && fs::exists(output_path_of(plot)))
-        inputs.push_back(output_path_of(plot));
+      if (options_.report && fs::exists(output_file_path(plot)))
+        inputs.push_back(output_file_path(plot));
     }
     for (const fs::path& line : line_drive_folders()) {
-      inputs.push_back(fixes_of(line));
+      inputs.push_back(fixes_file_path(line));
       for (const fs::path& table : add_capture_tables({}, line)) inputs.push_back(table);
     }
     const std::vector<Gate> gates = find_step_gates("evaluate");
     std::string limits;
     for (const Gate& gate : gates_) limits += fmt::format("{} {}\n", gate.metric, gate.limit);
-    step("evaluate", inputs, format_plot_setting() + limits, [&] {
-      const auto check = session_.check();
+    run_or_reuse_step("evaluate", inputs, format_plot_setting() + limits, [&] {
+      const auto check = session_.check_captures_folder();
       if (check) truth = find_truth_file(*check);
       if (truth) return evaluate_check(*truth, inputs, gates);
       Work skipped_work;
@@ -577,21 +597,21 @@ class SessionRun {
   Work evaluate_check(const fs::path& truth, const std::vector<fs::path>& inputs,
                       const std::vector<Gate>& gates) {
     auto input = std::make_shared<EvaluationInput>();
-    input->fixes = {output_path_of("check-fixes.csv"),
-                    read_fixes(output_path_of("check-fixes.csv"))};
+    input->fixes = {output_file_path("check-fixes.csv"),
+                    read_fixes(output_file_path("check-fixes.csv"))};
     input->truth = {truth, read_truth_positions(truth.parent_path())};
     input->station_m = compute_same_position_radius_m(*result_.calibration);
     input->threads = options_.frontend.threads;
-    EvaluateResult found = evaluate_fixes(*input, gates);
+    EvaluateResult found = evaluate_fixes_against_truth(*input, gates);
     std::vector<Drive> drives;
     for (const fs::path& line : line_drive_folders()) {
-      const fs::path places = *find_truth_file(line), fixes = fixes_of(line);
+      const fs::path places = *find_truth_file(line), fixes = fixes_file_path(line);
       drives.push_back({{fixes, read_fixes(fixes)},
                         find_end_points_of_drive(places, read_truth_positions(line))});
       if (fit_line_to_fixes(drives.back().fixes.rows, drives.back().commanded_m)) continue;
       throw InputError(fixes, "no line can be fitted to its fixes: they have no direction");
     }
-    if (!found.ok()) return {found};
+    if (!found.has_succeeded()) return {found};
     std::vector<CaptureError> errors;
     for (const FixError& error : compute_fix_errors(*input, input->fixes).errors) {
       const FixRow& row = input->fixes.rows[error.fix];
@@ -604,33 +624,35 @@ class SessionRun {
       found.warnings.push_back(std::move(outliers));
     }
     return {found, [=, this] {
-              write_file(output_path_of("evaluation.json"), to_json(found.evaluation, found.gates));
+              write_file(output_file_path("evaluation.json"),
+                         format_evaluation_json(found.evaluation, found.gates));
               if (!options_.report) return;
               Report page;
               page.gates = result_.gates;
               page.gates.insert(page.gates.end(), found.gates.begin(), found.gates.end());
               page.calibration = result_.calibration;
               for (const char* plot : kPlots) {
-                if (fs::exists(output_path_of(plot)))
-                  page.pictures.push_back(read_report_plot(output_path_of(plot)));
+                if (fs::exists(output_file_path(plot)))
+                  page.pictures.push_back(read_report_plot(output_file_path(plot)));
               }
               page.evaluation = make_step_history("", inputs);
-              write_file(output_path_of("report.html"),
-                         render_report_page({*input, found, read_lamps(), drives, page}));
+              write_file(
+                  output_file_path("report.html"),
+                  render_evaluation_report_html({*input, found, read_lamps(), drives, page}));
             }};
   }
 
   /// Sets the verdict, removes outputs of later steps if the run failed, and writes the summaries.
   void finish_session() {
     const SessionStep& last = result_.steps.back();
-    if (!last.result.ok()) {
+    if (!last.result.has_succeeded()) {
       result_.verdict = Verdict::invalid;
       result_.failure = last.result.failure;
       result_.reason = last.name + ": " + last.result.why;
       results_.remove_outputs_of_later_steps(last.name);
     }
     const std::string missed = describe_failed_gates(result_.gates);
-    if (!missed.empty() && last.result.ok()) {
+    if (!missed.empty() && last.result.has_succeeded()) {
       result_.verdict = Verdict::fail;
       result_.reason = missed;
     }
@@ -654,11 +676,12 @@ std::vector<MetricKind> list_session_metrics() {
                             MetricSource::evaluation});
 }
 
-SessionResult run_session(const fs::path& session, const fs::path& results,
-                          const SessionOptions& options, const SessionObserver& observer) {
+SessionResult run_calibration_session(const fs::path& session, const fs::path& results,
+                                      const SessionOptions& options,
+                                      const SessionObserver& observer) {
   if (!options.gates_file.empty()) read_gates(options.gates_file, list_session_metrics());
   if (!fs::is_directory(session)) throw InputError(session, "is not a folder of captures");
-  if (is_captures_folder(session, results)) {
+  if (is_session_or_captures_folder(session, results)) {
     throw InputError(results, "contains captures: choose another folder for the results");
   }
   SessionResults session_results(results, session);

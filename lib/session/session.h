@@ -19,7 +19,7 @@
 namespace vlp {
 
 // clang-format off
-/// Options of run_session(). The steps of the procedure, in their order; each drive along a line,
+/// Options of run_calibration_session(). The steps of the procedure, in their order; each drive along a line,
 /// "line-x", is a separate step between check and evaluate:
 ///
 ///   lens        boards -> lens.yaml, lens.cameramodel, lens.svg      unless there is camera.yaml
@@ -46,7 +46,7 @@ struct SessionOptions {
   /// Makes plots, drives along lines and report.html, which take longer than all other results.
   bool report = true;
   /// Names of steps that are run even if their inputs have not changed.
-  std::vector<std::string> redo = {};
+  std::vector<std::string> steps_to_redo = {};
 };
 
 /// Name and result of one step of a run.
@@ -57,7 +57,7 @@ struct SessionStep {
   StepResult result;
 };
 
-/// Result of run_session().
+/// Result of run_calibration_session().
 struct SessionResult {
   /// `fail` if a gate fails, `invalid` if a step failed.
   Verdict verdict = Verdict::pass;
@@ -95,8 +95,9 @@ std::vector<MetricKind> list_session_metrics();
 /// @throws InputError if `session` is not a folder or the file of gates is invalid; if `results`
 ///     holds captures or the results of another session, is in use by another run, or cannot be
 ///     written
-SessionResult run_session(const std::filesystem::path& session,
-                          const std::filesystem::path& results, const SessionOptions& options,
-                          const SessionObserver& observer = {});
+SessionResult run_calibration_session(const std::filesystem::path& session,
+                                      const std::filesystem::path& results,
+                                      const SessionOptions& options,
+                                      const SessionObserver& observer = {});
 
 }  // namespace vlp

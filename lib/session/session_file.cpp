@@ -31,7 +31,7 @@ Json make_sd_json(const std::optional<Matrix2>& covariance, double factor) {
 
 Json make_calibration_json(const Calibration& calibration) {
   const auto& in = calibration.camera.intrinsics;
-  Json json{{"lens_model", to_string(calibration.camera.lens_model)},
+  Json json{{"lens_model", lens_model_name(calibration.camera.lens_model)},
             {"focal_px", {in[0], in[1]}},
             {"principal_point_px", {in[2], in[3]}}};
   const auto& lens = calibration.intrinsics_report;
@@ -42,12 +42,12 @@ Json make_calibration_json(const Calibration& calibration) {
   }
   if (const auto& row_time_s = calibration.camera.row_time_s) json["row_time_s"] = *row_time_s;
   if (const auto& center = calibration.rotation_center) {
-    const auto [angle_rad, azimuth_rad] = compute_camera_tilt(*center);
+    const auto [angle_rad, azimuth_rad] = compute_tilt_from_rotation_center(*center);
     json["rotation_center_px"] = {center->center_px.x(), center->center_px.y()};
     json["rotation_center_sd_px"] = make_sd_json(center->covariance, 1);
     json["tilt_deg"] = deg_from_rad(angle_rad);
     json["tilt_azimuth_deg"] = deg_from_rad(azimuth_rad);
-    const Eigen::Vector2d zenith = normalized_zenith_point(*center);
+    const Eigen::Vector2d zenith = compute_normalized_zenith_point(*center);
     json["zenith_deg"] = {kDegrees * zenith.x(), kDegrees * zenith.y()};
     json["zenith_sd_deg"] = make_sd_json(compute_zenith_covariance(calibration), kDegrees);
     if (const auto& arm_m = center->lever_arm_m) {
@@ -57,7 +57,8 @@ Json make_calibration_json(const Calibration& calibration) {
   }
   if (const auto& dispersion = calibration.dispersion) {
     json["dispersion_offset_px"] = {dispersion->offset_px.x(), dispersion->offset_px.y()};
-    json["dispersion_offset_sd_px"] = make_sd_json(compute_offset_covariance(calibration), 1);
+    json["dispersion_offset_sd_px"] =
+        make_sd_json(compute_dispersion_offset_covariance(calibration), 1);
     json["dispersion_radius_mm"] = kMillimetersPerMeter * dispersion->radius_m;
   }
   return json;
@@ -83,7 +84,7 @@ Json make_history_json(const Calibration& calibration) {
 Json make_metrics_json(const SessionResult& result) {
   Json metrics = Json::array();
   for (const SessionStep& step : result.steps) {
-    const Json of_step = to_json(step.result);
+    const Json of_step = make_step_result_json(step.result);
     for (Json metric : of_step.at("metrics")) {
       const auto name = metric.at("name").get<std::string>();
       metric["step"] = step.name;
@@ -92,7 +93,7 @@ Json make_metrics_json(const SessionResult& result) {
       }
       for (const CheckedMetric& gate : step.result.gates) {
         if (gate.name != name) continue;
-        const Json of_gate = to_json(gate);
+        const Json of_gate = make_gate_json(gate);
         for (const char* key : {"limit", "direction", "passed"}) metric[key] = of_gate.at(key);
       }
       metrics.push_back(std::move(metric));
@@ -119,8 +120,9 @@ Eigen::Vector2d parse_vector(const Json& json) {
 StepResult parse_result(const Json& json) {
   StepResult result;
   const auto failure = step_failure_from_name(json.at("failure").get<std::string>());
-  result.set_failure(failure.value_or(StepFailure::bad_input),
-                     json.at("message").get<std::string>(), json.at("file").get<std::string>());
+  result.set_step_failure(failure.value_or(StepFailure::bad_input),
+                          json.at("message").get<std::string>(),
+                          json.at("file").get<std::string>());
   for (const Json& metric : json.at("metrics")) {
     result.metrics.push_back(
         {metric.at("name").get<std::string>(), number_or_nan(metric.at("value"))});
@@ -145,19 +147,19 @@ StepResult parse_result(const Json& json) {
 
 }  // namespace
 
-Json to_json(const CheckedMetric& gate) {
+Json make_gate_json(const CheckedMetric& gate) {
   return {{"name", gate.name},
           {"unit", gate.unit},
           {"value", gate.value ? Json(*gate.value) : Json(nullptr)},
           {"limit", gate.limit ? Json(*gate.limit) : Json(nullptr)},
-          {"direction", describe(gate.direction)},
-          {"passed", gate.has_passed()}};
+          {"direction", describe_limit_direction(gate.direction)},
+          {"passed", gate.has_passed_gate()}};
 }
 
-Json to_json(const StepResult& result) {
-  Json json{{"failure", to_string(result.failure)},
+Json make_step_result_json(const StepResult& result) {
+  Json json{{"failure", step_failure_name(result.failure)},
             {"message", result.why},
-            {"file", result.subject.string()},
+            {"file", result.file_to_correct.string()},
             {"metrics", Json::array()},
             {"warnings", result.warnings},
             {"notes", result.notes},
@@ -186,8 +188,8 @@ Json to_json(const StepResult& result) {
 
 std::optional<StepRecord> read_step_record(const std::filesystem::path& file) {
   try {
-    const auto text =
-        SharedFolder(file.parent_path()).read(file.filename().string(), kMaxStepBytes);
+    const auto text = SharedFolder(file.parent_path())
+                          .read_file_if_exists(file.filename().string(), kMaxStepBytes);
     if (!text) return std::nullopt;
     check_json_size_and_depth(*text);
     const Json json = Json::parse(*text, nullptr, false);
@@ -204,7 +206,7 @@ void write_step_record(const std::filesystem::path& file, const StepRecord& step
   const Json json{{"format", kStepFormat},
                   {"key", step.key},
                   {"outputs", step.outputs},
-                  {"result", to_json(step.result)}};
+                  {"result", make_step_result_json(step.result)}};
   AtomicFileWriter whole(file);
   whole.write(json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
   whole.save_without_fsync();  // an incomplete record is ignored, and the step runs again
@@ -215,15 +217,15 @@ std::string format_session_json(const SessionResult& result, const SessionOption
   Json json{{"format", "vlp-session/2"},
             {"verdict", session_verdict_name(result.verdict)},
             {"reason", result.reason},
-            {"failure", to_string(result.failure)},
+            {"failure", step_failure_name(result.failure)},
             {"camera", known ? result.calibration->camera.id : options.camera_id},
             {"version", options.program.version},
             {"metrics", make_metrics_json(result)},
             {"gates", Json::array()},
             {"steps", Json::array()}};
-  for (const CheckedMetric& gate : result.gates) json["gates"].push_back(to_json(gate));
+  for (const CheckedMetric& gate : result.gates) json["gates"].push_back(make_gate_json(gate));
   for (const SessionStep& step : result.steps) {
-    const Json of_step = to_json(step.result);
+    const Json of_step = make_step_result_json(step.result);
     Json entry{{"name", step.name}, {"failure", of_step.at("failure")}};
     for (const char* key :
          {"message", "warnings", "notes", "skipped", "rejected_lamps", "lamp_offsets"}) {
@@ -238,26 +240,26 @@ std::string format_session_json(const SessionResult& result, const SessionOption
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-std::string format_session_junit(const SessionResult& result) {
+std::string format_session_junit_xml(const SessionResult& result) {
   std::vector<JUnitTest> tests;
   tests.reserve(result.steps.size() + result.gates.size() + 1);
   for (const SessionStep& step : result.steps) {
     JUnitTest test{step.name};
     test.warnings = step.result.warnings;
-    if (!step.result.ok()) {
+    if (!step.result.has_succeeded()) {
       test.result = JUnitTest::Result::error;
       test.message = step.result.why;
-      test.error_type = to_string(step.result.failure);
+      test.error_type = step_failure_name(step.result.failure);
     }
     tests.push_back(std::move(test));
   }
   if (result.steps.empty()) {
     tests.push_back({"session", JUnitTest::Result::error, result.reason,
-                     std::string(to_string(result.failure))});
+                     std::string(step_failure_name(result.failure))});
   }
-  const auto gates = make_junit_tests(result.gates);
+  const auto gates = make_junit_tests_from_gates(result.gates);
   tests.insert(tests.end(), gates.begin(), gates.end());
-  return format_junit("vlp-calibrate", tests);
+  return format_junit_xml("vlp-calibrate", tests);
 }
 
 }  // namespace vlp

@@ -31,9 +31,9 @@ void write_step_record(const std::filesystem::path& file, const StepRecord& step
 
 /// Returns a result in the form of the record and of session.json. Metrics that are not finite are
 /// null.
-nlohmann::ordered_json to_json(const StepResult& result);
+nlohmann::ordered_json make_step_result_json(const StepResult& result);
 /// Returns a checked gate in the form of session.json.
-nlohmann::ordered_json to_json(const CheckedMetric& gate);
+nlohmann::ordered_json make_gate_json(const CheckedMetric& gate);
 
 /// Returns the content of `session.json`, the machine-readable result in format "vlp-session/2":
 ///   verdict      "pass", "gate" or "no result"
@@ -53,6 +53,6 @@ std::string format_session_json(const SessionResult& result, const SessionOption
 /// Returns the content of `junit.xml` for CI systems: a test for each step with its warnings, then
 /// a test for each gate. A step without a result is an error of type SessionResult::failure, with
 /// its message. A session that cannot be read is an error of a test named "session".
-std::string format_session_junit(const SessionResult& result);
+std::string format_session_junit_xml(const SessionResult& result);
 
 }  // namespace vlp

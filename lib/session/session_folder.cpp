@@ -66,10 +66,11 @@ SessionFolder::SessionFolder(const fs::path& folder) : folder_(folder) {
   };
   need("lamps.yaml");
   need("rotation");
-  if (!camera_file() && !fs::exists(board_file()) && !fs::exists(board_images_folder())) {
+  if (!camera_calibration_file() && !fs::exists(board_file()) &&
+      !fs::exists(board_images_folder())) {
     throw InputError(folder, "has neither boards with board.yaml nor camera.yaml");
   }
-  if (!camera_file()) {
+  if (!camera_calibration_file()) {
     need("board.yaml");
     need("boards");
   }
@@ -81,11 +82,11 @@ SessionFolder::SessionFolder(const fs::path& folder) : folder_(folder) {
   std::sort(lines_.begin(), lines_.end());
 }
 
-std::optional<fs::path> SessionFolder::find_existing_entry(const char* name) const {
+std::optional<fs::path> SessionFolder::find_session_file_or_folder(const char* name) const {
   return fs::exists(folder_ / name) ? std::optional(folder_ / name) : std::nullopt;
 }
 
-bool is_captures_folder(const fs::path& session, const fs::path& results) {
+bool is_session_or_captures_folder(const fs::path& session, const fs::path& results) {
   std::error_code missing;
   if (fs::equivalent(results, session, missing)) return true;
   for (const auto& entry : fs::directory_iterator(session)) {

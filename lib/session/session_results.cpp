@@ -35,7 +35,7 @@ constexpr std::array kResults{
 /// Steps other than drives.
 constexpr std::array kNamedSteps{"lens", "row-time", "rotation", "dispersion", "check", "evaluate"};
 
-bool contains(std::span<const char* const> names, std::string_view name) {
+bool contains_name(std::span<const char* const> names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
@@ -68,7 +68,7 @@ constexpr const char* kOutputs = "outputs";
 constexpr std::string_view kSteps = "steps/", kRecordEnd = ".json", kFixesEnd = "-fixes.csv";
 
 /// Returns the name of a step's record in the folder of results.
-std::string record_name(const std::string& step) {
+std::string step_record_file_name(const std::string& step) {
   return std::string(kSteps).append(step).append(kRecordEnd);
 }
 
@@ -78,11 +78,11 @@ bool is_drive_name(std::string_view step) {
 }
 
 SharedFolder make_steps_folder(const fs::path& results) {
-  return SharedFolder(results).make_subfolder({"steps", results, "step"});
+  return SharedFolder(results).open_or_create_subfolder({"steps", results, "step"});
 }
 
 int lock_folder(const SharedFolder& steps, const fs::path& results) {
-  const int lock = steps.open("lock", O_RDWR | O_CREAT);
+  const int lock = steps.open_regular_file("lock", O_RDWR | O_CREAT);
   if (lock < 0) throw InputError(results, "cannot be written to");
   if (::flock(lock, LOCK_EX | LOCK_NB) == 0) return lock;
   ::close(lock);
@@ -100,9 +100,9 @@ bool is_existing(const fs::path& file) {
 std::set<std::string> find_unlisted_outputs(const fs::path& results,
                                             const std::vector<StepOutputs>& planned) {
   std::set<std::string> names(kResults.begin(), kResults.end());
-  for (const char* step : kNamedSteps) names.insert(record_name(step));
+  for (const char* step : kNamedSteps) names.insert(step_record_file_name(step));
   const auto insert_drive = [&](const std::string& step) {
-    names.insert({record_name(step), std::string(step).append(kFixesEnd)});
+    names.insert({step_record_file_name(step), std::string(step).append(kFixesEnd)});
   };
   for (const auto& entry : fs::directory_iterator(results / "steps")) {
     const std::string step = entry.path().stem().string();
@@ -122,10 +122,10 @@ bool is_output_name(std::string_view name) {
     if (has_end) name.remove_suffix(end.size());
     return has_end;
   };
-  if (contains(kResults, name)) return true;
+  if (contains_name(kResults, name)) return true;
   if (!name.starts_with(kSteps)) return remove_end(kFixesEnd) && is_drive_name(name);
   name.remove_prefix(kSteps.size());
-  return remove_end(kRecordEnd) && (contains(kNamedSteps, name) || is_drive_name(name));
+  return remove_end(kRecordEnd) && (contains_name(kNamedSteps, name) || is_drive_name(name));
 }
 
 }  // namespace
@@ -140,22 +140,22 @@ SessionResults::SessionResults(fs::path folder, const fs::path& session)
   const SharedFolder steps = make_steps_folder(folder_);
   lock_ = lock_folder(steps, folder_);
   steps.open_subfolder_if_exists({"corners", folder_, "step"});  // throws if it is a link
-  if (steps.contains_entry("session")) return;
+  if (steps.contains_folder_entry("session")) return;
   // The list of files that do not require a plan, written before the mark: a folder without the
   // mark is free.
-  steps.replace_file(kOutputs, "junit.xml\nsession.json\n");
-  steps.replace_file("session", owner_mark_text(session));
+  steps.replace_file_atomically(kOutputs, "junit.xml\nsession.json\n");
+  steps.replace_file_atomically("session", owner_mark_text(session));
 }
 
 SessionResults::~SessionResults() { ::close(lock_); }
 
 fs::path SessionResults::step_record_file(const std::string& step) const {
-  return file(record_name(step));
+  return results_file_path(step_record_file_name(step));
 }
 
-std::set<std::string> SessionResults::list_outputs() const {
+std::set<std::string> SessionResults::list_recorded_output_files() const {
   constexpr std::size_t max_bytes = 1 << 20;
-  const auto list = make_steps_folder(folder_).read(kOutputs, max_bytes);
+  const auto list = make_steps_folder(folder_).read_file_if_exists(kOutputs, max_bytes);
   if (!list) return find_unlisted_outputs(folder_, steps_);
   std::set<std::string> names;
   std::istringstream lines(*list);
@@ -165,67 +165,71 @@ std::set<std::string> SessionResults::list_outputs() const {
   return names;
 }
 
-std::set<std::string> SessionResults::remove_unwanted_outputs(
+std::set<std::string> SessionResults::remove_unwanted_output_files(
     const std::set<std::string>& wanted) const {
   std::set<std::string> not_removed;
-  for (const std::string& name : list_outputs()) {
+  for (const std::string& name : list_recorded_output_files()) {
     if (wanted.contains(name)) continue;
     std::error_code error;
-    fs::remove(file(name), error);
+    fs::remove(results_file_path(name), error);
     if (error) not_removed.insert(name);
   }
   return not_removed;
 }
 
-void SessionResults::plan_steps(std::vector<StepOutputs> steps) {
+void SessionResults::set_steps_and_remove_stale_files(std::vector<StepOutputs> steps) {
   steps_ = std::move(steps);
   std::set<std::string> wanted{"session.json", "junit.xml"};
   for (const auto& [step, files] : steps_) {
     wanted.insert(files.begin(), files.end());
-    wanted.insert(record_name(step));
+    wanted.insert(step_record_file_name(step));
   }
-  const std::set<std::string> written = list_outputs();
+  const std::set<std::string> written = list_recorded_output_files();
   for (const std::string& name : wanted) {
-    if (is_existing(file(name)) && (!written.contains(name) || fs::is_symlink(file(name)))) {
+    if (is_existing(results_file_path(name)) &&
+        (!written.contains(name) || fs::is_symlink(results_file_path(name)))) {
       throw InputError(folder_, fmt::format("holds {}, which is not of vlp-calibrate; give the "
                                             "results a folder of their own",
                                             name));
     }
   }
-  wanted.merge(remove_unwanted_outputs(wanted));  // the next run tries again
+  wanted.merge(remove_unwanted_output_files(wanted));  // the next run tries again
   const SharedFolder records = make_steps_folder(folder_);
   // An unchanged list is not written again, which avoids waiting for the disk.
-  if (wanted == written && records.contains_entry(kOutputs)) return;
+  if (wanted == written && records.contains_folder_entry(kOutputs)) return;
   std::string list;
   for (const std::string& name : wanted) list.append(name).append("\n");
-  records.replace_file(kOutputs, list);
+  records.replace_file_atomically(kOutputs, list);
 }
 
-std::optional<StepResult> SessionResults::find_cached_result(const std::string& step,
-                                                             const std::string& key) const {
+std::optional<StepResult> SessionResults::find_cached_step_result(const std::string& step,
+                                                                  const std::string& key) const {
   auto cached_result = read_step_record(step_record_file(step));
   if (!cached_result || cached_result->result.failure == StepFailure::bad_input)
     return std::nullopt;
-  if (cached_result->key != key || cached_result->outputs != compute_outputs_digest(step))
+  if (cached_result->key != key || cached_result->outputs != compute_step_outputs_digest(step))
     return std::nullopt;
   return std::move(cached_result->result);
 }
 
-void SessionResults::store_result(const std::string& step, const std::string& key,
-                                  const StepResult& result) const {
-  write_step_record(step_record_file(step), {key, compute_outputs_digest(step), result});
+void SessionResults::store_step_result(const std::string& step, const std::string& key,
+                                       const StepResult& result) const {
+  write_step_record(step_record_file(step), {key, compute_step_outputs_digest(step), result});
 }
 
-std::vector<std::string> SessionResults::outputs_of(const std::string& step) const {
+std::vector<std::string> SessionResults::list_planned_output_files(const std::string& step) const {
   const auto found = std::ranges::find(steps_, step, &StepOutputs::step);
   return found == steps_.end() ? std::vector<std::string>() : found->files;
 }
 
-std::string SessionResults::compute_outputs_digest(const std::string& step) const {
+std::string SessionResults::compute_step_outputs_digest(const std::string& step) const {
   std::string digests;
-  for (const std::string& output : outputs_of(step)) {
+  for (const std::string& output : list_planned_output_files(step)) {
     digests +=
-        output + " " + (fs::exists(file(output)) ? compute_file_sha256(file(output)) : "") + "\n";
+        output + " " +
+        (fs::exists(results_file_path(output)) ? compute_file_sha256(results_file_path(output))
+                                               : "") +
+        "\n";
   }
   return compute_text_sha256(digests);
 }
@@ -233,7 +237,8 @@ std::string SessionResults::compute_outputs_digest(const std::string& step) cons
 void SessionResults::remove_outputs_of_step(const std::string& step) const {
   std::error_code ignored;
   fs::remove(step_record_file(step), ignored);
-  for (const std::string& output : outputs_of(step)) fs::remove(file(output), ignored);
+  for (const std::string& output : list_planned_output_files(step))
+    fs::remove(results_file_path(output), ignored);
 }
 
 void SessionResults::remove_outputs_of_later_steps(const std::string& step) const {
@@ -245,12 +250,12 @@ void SessionResults::remove_outputs_of_later_steps(const std::string& step) cons
 }
 
 void SessionResults::remove_evaluation_outputs() const {
-  const std::set<std::string> written = list_outputs();
+  const std::set<std::string> written = list_recorded_output_files();
   for (const char* name : {"evaluation.json", "report.html", "steps/evaluate.json"}) {
-    if (written.contains(name)) fs::remove(file(name));
+    if (written.contains(name)) fs::remove(results_file_path(name));
   }
 }
 
-void SessionResults::remove_outputs_of_all_steps() const { remove_unwanted_outputs({}); }
+void SessionResults::remove_outputs_of_all_steps() const { remove_unwanted_output_files({}); }
 
 }  // namespace vlp

@@ -41,42 +41,42 @@ class SessionResults {
   SessionResults(const SessionResults&) = delete;
   SessionResults& operator=(const SessionResults&) = delete;
 
-  const std::filesystem::path& path() const { return folder_; }
-  std::filesystem::path file(const std::string& name) const { return folder_ / name; }
+  const std::filesystem::path& results_folder_path() const { return folder_; }
+  std::filesystem::path results_file_path(const std::string& name) const { return folder_ / name; }
   /// Returns the folder with the cached corners of boards.
   std::filesystem::path corner_cache_folder() const { return folder_ / "steps/corners"; }
 
   /// Sets the steps of this run, in their order, and removes files of earlier runs that this run
   /// does not write. Throws InputError if the run would overwrite a file that no run wrote.
-  void plan_steps(std::vector<StepOutputs> steps);
+  void set_steps_and_remove_stale_files(std::vector<StepOutputs> steps);
 
   /// Returns the result of the last execution of a step if it is up to date. `key`, the digest of
   /// all that the step depends on, and the outputs must be unchanged. Returns std::nullopt
   /// otherwise, and after bad_input, because the file may have been corrected.
-  std::optional<StepResult> find_cached_result(const std::string& step,
-                                               const std::string& key) const;
+  std::optional<StepResult> find_cached_step_result(const std::string& step,
+                                                    const std::string& key) const;
   /// Records the result of a step, with its key and the digest of its outputs.
-  void store_result(const std::string& step, const std::string& key,
-                    const StepResult& result) const;
+  void store_step_result(const std::string& step, const std::string& key,
+                         const StepResult& result) const;
 
   /// Removes the outputs and the record of a step.
   void remove_outputs_of_step(const std::string& step) const;
   /// Removes outputs and records of all steps after `step`.
   void remove_outputs_of_later_steps(const std::string& step) const;
   /// Removes outputs and record of the step evaluate, which depend on the gates. Does not require
-  /// plan_steps().
+  /// set_steps_and_remove_stale_files().
   void remove_evaluation_outputs() const;
-  /// Removes outputs and records of all steps. Does not require plan_steps().
+  /// Removes outputs and records of all steps. Does not require set_steps_and_remove_stale_files().
   void remove_outputs_of_all_steps() const;
 
  private:
   std::filesystem::path step_record_file(const std::string& step) const;
-  std::set<std::string> list_outputs() const;
+  std::set<std::string> list_recorded_output_files() const;
   /// Returns the files of a step of this run; none for other steps.
-  std::vector<std::string> outputs_of(const std::string& step) const;
+  std::vector<std::string> list_planned_output_files(const std::string& step) const;
   /// Removes the outputs that are not wanted. Returns those that cannot be removed.
-  std::set<std::string> remove_unwanted_outputs(const std::set<std::string>& wanted) const;
-  std::string compute_outputs_digest(const std::string& step) const;
+  std::set<std::string> remove_unwanted_output_files(const std::set<std::string>& wanted) const;
+  std::string compute_step_outputs_digest(const std::string& step) const;
 
   std::filesystem::path folder_;
   std::vector<StepOutputs> steps_;

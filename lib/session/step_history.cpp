@@ -47,9 +47,10 @@ std::string InputDigests::compute_folder_digest(const std::filesystem::path& fol
   return compute_text_sha256(text);
 }
 
-HistoryEntry make_history_entry(const ProgramVersion& program, const std::string& options,
-                                const std::vector<std::filesystem::path>& inputs,
-                                InputDigests& digests) {
+HistoryEntry make_calibration_history_entry(const ProgramVersion& program,
+                                            const std::string& options,
+                                            const std::vector<std::filesystem::path>& inputs,
+                                            InputDigests& digests) {
   HistoryEntry entry{"", program.program, program.version, options, {}};
   for (const auto& input : inputs) {
     if (input.empty()) continue;

@@ -36,9 +36,10 @@ class InputDigests {
 /// Returns an entry for the history, without the part's name. `inputs` are files and folders of
 /// images; an empty name is an input that was not given. Stores only the last component of each
 /// path, because folders differ between machines. Throws InputError if an input cannot be read.
-HistoryEntry make_history_entry(const ProgramVersion& program, const std::string& options,
-                                const std::vector<std::filesystem::path>& inputs,
-                                InputDigests& digests);
+HistoryEntry make_calibration_history_entry(const ProgramVersion& program,
+                                            const std::string& options,
+                                            const std::vector<std::filesystem::path>& inputs,
+                                            InputDigests& digests);
 
 /// Returns the last component of a path, also for ".".
 std::string last_path_component(const std::filesystem::path& path);

@@ -29,13 +29,14 @@ struct SkippedFrames {
   int count;
 };
 
-void prepend_remarks(const std::vector<std::string>& remarks, std::vector<std::string>& all) {
+void prepend_observation_messages(const std::vector<std::string>& remarks,
+                                  std::vector<std::string>& all) {
   all.insert(all.begin(), remarks.begin(), remarks.end());
 }
 
 }  // namespace
 
-std::string_view to_string(StepFailure failure) {
+std::string_view step_failure_name(StepFailure failure) {
   for (const auto& [known, name] : kNames) {
     if (known == failure) return name;
   }
@@ -56,9 +57,9 @@ std::vector<SkippedImage> list_skipped_images(const std::vector<Observation>& im
   std::vector<SkippedImage> skipped;
   std::vector<SkippedFrames> frames;
   for (const Observation& image : images) {
-    if (image.is_kept()) continue;
-    const std::string name = is_one_folder ? image.file_name() : image.file.string();
-    const auto video = parse_video_of_frame_name(name);
+    if (image.is_image_kept()) continue;
+    const std::string name = is_one_folder ? image.image_file_name() : image.file.string();
+    const auto video = parse_video_name_from_frame_name(name);
     if (!video) {
       skipped.push_back({name, image.rejection->message});
       continue;
@@ -74,29 +75,32 @@ std::vector<SkippedImage> list_skipped_images(const std::vector<Observation>& im
     }
   }
   for (const auto& [video, reason, count] : frames) {
-    skipped.push_back({video, fmt::format("{} of its frames: {}", count, to_string(reason))});
+    skipped.push_back(
+        {video, fmt::format("{} of its frames: {}", count, rejection_reason_phrase(reason))});
   }
   return skipped;
 }
 
-void add_intake_remarks(const Observations& seen, StepResult& result) {
+void add_image_intake_remarks(const Observations& seen, StepResult& result) {
   const auto skipped = list_skipped_images(seen.images);
   result.skipped.insert(result.skipped.begin(), skipped.begin(), skipped.end());
-  prepend_remarks(seen.warnings, result.warnings);
-  prepend_remarks(seen.notes, result.notes);
-  prepend_remarks(seen.details, result.details);
+  prepend_observation_messages(seen.warnings, result.warnings);
+  prepend_observation_messages(seen.notes, result.notes);
+  prepend_observation_messages(seen.details, result.details);
   for (const Observation& image : seen.images) {
-    if (image.is_kept() || !parse_video_of_frame_name(image.file_name())) continue;
-    result.details.push_back(image.file_name() + ": " + image.rejection->message);
+    if (image.is_image_kept() || !parse_video_name_from_frame_name(image.image_file_name()))
+      continue;
+    result.details.push_back(image.image_file_name() + ": " + image.rejection->message);
   }
   if (!seen.failure) return;
   const auto& [is_wrong_file, message, file] = *seen.failure;
-  result.set_failure(is_wrong_file ? StepFailure::wrong_board : StepFailure::undetermined, message,
-                     file);
+  result.set_step_failure(is_wrong_file ? StepFailure::wrong_board : StepFailure::undetermined,
+                          message, file);
 }
 
 std::string format_failure_message(const StepResult& result) {
-  return result.subject.empty() ? result.why : InputError(result.subject, result.why).what();
+  return result.file_to_correct.empty() ? result.why
+                                        : InputError(result.file_to_correct, result.why).what();
 }
 
 }  // namespace vlp

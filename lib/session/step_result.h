@@ -46,7 +46,7 @@ struct StepResult {
   /// Reason of the failure and the remedy, in one line; empty if the step succeeded.
   std::string why = {};
   /// File to correct; empty if the captures are the cause.
-  std::filesystem::path subject = {};
+  std::filesystem::path file_to_correct = {};
 
   std::vector<Metric> metrics = {};
   /// Checked gates of some of the metrics, passed and failed.
@@ -61,9 +61,9 @@ struct StepResult {
   /// Makes the plot of the step on demand; may be empty.
   std::function<Drawing()> drawing = {};
 
-  bool ok() const { return failure == StepFailure::none; }
+  bool has_succeeded() const { return failure == StepFailure::none; }
   /// Sets failure, message and file to correct.
-  void set_failure(StepFailure how, std::string words, std::filesystem::path file = {}) {
+  void set_step_failure(StepFailure how, std::string words, std::filesystem::path file = {}) {
     failure = how;
     why = std::move(words);
     subject = std::move(file);
@@ -72,7 +72,7 @@ struct StepResult {
 
 /// Returns the name of a failure as in session.json: that of the enumerator, for example
 /// "wrong_map".
-std::string_view to_string(StepFailure failure);
+std::string_view step_failure_name(StepFailure failure);
 /// Returns the failure with this name; std::nullopt if there is none.
 std::optional<StepFailure> step_failure_from_name(std::string_view name);
 
@@ -82,7 +82,7 @@ std::vector<SkippedImage> list_skipped_images(const std::vector<Observation>& im
 
 /// Adds the remarks of an intake to the result of a step: skipped images, warnings, notes, details.
 /// Fails the step if no image can be used.
-void add_intake_remarks(const Observations& seen, StepResult& result);
+void add_image_intake_remarks(const Observations& seen, StepResult& result);
 
 /// Returns "FILE: message", or the message alone without a file.
 std::string format_failure_message(const StepResult& result);

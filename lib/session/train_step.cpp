@@ -36,16 +36,16 @@ bool has_examples(std::span<const LabeledLight> lights, const LampMap& lamps,
     few += fmt::format("{}{} (has {})", few.empty() ? "" : ", ", lamp, count);
   }
   if (!few.empty()) {
-    result.set_failure(
+    result.set_step_failure(
         StepFailure::undetermined,
         fmt::format("too few labeled lights of lamps {}: add captures in which they are "
                     "wholly in view, {} or more of each",
                     few, kMinExamples));
   } else if (counts.size() < 2) {
-    result.set_failure(StepFailure::undetermined,
-                       "a classifier needs two lamps or more; add lamps");
+    result.set_step_failure(StepFailure::undetermined,
+                            "a classifier needs two lamps or more; add lamps");
   }
-  return result.ok();
+  return result.has_succeeded();
 }
 
 /// Returns true if training kept enough lights of each lamp; otherwise fails the step.
@@ -56,7 +56,7 @@ bool has_kept_examples(const LampClassifier& classifier, TrainStepResult& result
     few += fmt::format("{}{}", few.empty() ? "" : ", ", lamp.lamp);
   }
   if (few.empty()) return true;
-  result.set_failure(
+  result.set_step_failure(
       StepFailure::undetermined,
       fmt::format("the lights of lamps {} differ too much: are their labels right? Add "
                   "captures that show them clearly",
@@ -84,10 +84,12 @@ void warn_about_inseparable_lamps(const LampClassifier& classifier, TrainStepRes
 void warn_about_row_time(const DetectedLights& seen, const std::vector<std::vector<Frame>>& labels,
                          const LampMap& lamps, TrainStepResult& result) {
   if (!seen.camera.row_time_s) return;
-  const auto measured =
-      select_row_time_by_positions(seen.folders(), labels, lamps, seen.camera.lens).found;
+  const auto measured = select_row_time_by_periods_and_positions(seen.observations_by_folder(),
+                                                                 labels, lamps, seen.camera.lens)
+                            .found;
   if (!measured) return;
-  std::string error = compare_row_times(*measured, {*seen.camera.row_time_s, "the calibration"});
+  std::string error =
+      describe_row_time_contradiction(*measured, {*seen.camera.row_time_s, "the calibration"});
   if (!error.empty()) result.warnings.push_back(std::move(error));
 }
 
@@ -99,7 +101,7 @@ TrainStepResult train_lamp_classifier(const DetectedLights& seen,
                                       const std::filesystem::path& first_folder) {
   TrainStepResult result;
   LabeledLights& labeled = result.labeled;
-  const auto folders = seen.folders();
+  const auto folders = seen.observations_by_folder();
   for (std::size_t i = 0; i < labels.size(); ++i) {
     add_labeled_lights(folders[i], labels[i], labeled);
   }

@@ -22,8 +22,8 @@ struct TrainStepResult : StepResult {
 
 /// Trains the lamp classifier with the lights that the labels of each folder identify. Warns of
 /// inseparable lamps, and if lamps with known frequencies contradict the row time of the
-/// calibration (compare_row_times()). Failure: undetermined, if there is one lamp only, or a lamp
-/// has too few lights or too dissimilar ones.
+/// calibration (describe_row_time_contradiction()). Failure: undetermined, if there is one lamp
+/// only, or a lamp has too few lights or too dissimilar ones.
 ///
 /// @param first_folder  folder named in the error about labels
 /// @throws InputError if the labels name no usable image of any folder

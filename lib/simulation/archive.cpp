@@ -60,15 +60,15 @@ constexpr std::array<std::pair<ArchiveDamage, const char*>, 8> kDamageTargets = 
 
 /// Returns how many of the first n sessions are chosen if the fraction `fraction` of all is chosen.
 /// Rounded to nearest, so that small archives have chosen sessions, too.
-std::size_t count_chosen(std::size_t n, double fraction) {
+std::size_t count_chosen_sessions(std::size_t n, double fraction) {
   return static_cast<std::size_t>(std::floor(static_cast<double>(n) * fraction + 0.5));
 }
 
 /// Returns the number of the choice (from 0) that falls on session `index`; std::nullopt if it is
 /// not chosen.
 std::optional<std::size_t> find_chosen_index(std::size_t index, double fraction) {
-  const std::size_t before = count_chosen(index, fraction);
-  if (count_chosen(index + 1, fraction) == before) return std::nullopt;
+  const std::size_t before = count_chosen_sessions(index, fraction);
+  if (count_chosen_sessions(index + 1, fraction) == before) return std::nullopt;
   return before;
 }
 
@@ -81,7 +81,7 @@ std::string format_numbered(const std::string& name, std::size_t number, std::si
 Mount tilt_mount(const Mount& mount, double tilt_rad, double azimuth_rad) {
   const Eigen::Vector3d zenith_in_camera = mount.level_from_camera.row(2);
   const Eigen::Vector3d axis(-std::sin(azimuth_rad), std::cos(azimuth_rad), 0);
-  return {level_from_zenith(Eigen::AngleAxisd(tilt_rad, axis) * zenith_in_camera),
+  return {level_rotation_from_zenith(Eigen::AngleAxisd(tilt_rad, axis) * zenith_in_camera),
           mount.lever_arm_m};
 }
 
@@ -130,9 +130,9 @@ void check(const Scene& scene) {
 void write_table(const Scene& scene, std::size_t sessions, const fs::path& output) {
   CsvWriter table(output / "archive.csv", {"camera", "session", "fault", "damage", "damaged"});
   for (std::size_t i = 0; i < sessions; ++i) {
-    const ArchiveSession session = make_archive_session(scene, i);
-    table.row({session.camera, session.session, to_string(session.fault), to_string(session.damage),
-               session.damaged});
+    const ArchiveSession session = make_simulated_archive_session(scene, i);
+    table.write_csv_row({session.camera, session.session, archive_fault_name(session.fault),
+                         archive_damage_name(session.damage), session.damaged});
   }
   table.save_file();
 }
@@ -147,9 +147,10 @@ bool render_archive_session(const ArchiveSession& session, const fs::path& outpu
   fs::create_directories(place.parent_path());
   fs::create_directories(unfinished);
   const std::string first_line = provenance.substr(0, provenance.find('\n'));
-  simulate(session.scene, unfinished,
-           {{}, 1, first_line + ": " + session.camera + "/" + session.session + " of an archive\n"},
-           [](const SimulationSummary&, std::size_t) {});
+  render_scene_to_folder(
+      session.scene, unfinished,
+      {{}, 1, first_line + ": " + session.camera + "/" + session.session + " of an archive\n"},
+      [](const SimulationSummary&, std::size_t) {});
   damage_session_files(session, unfinished);
   fs::rename(unfinished, place);
   return true;
@@ -157,11 +158,11 @@ bool render_archive_session(const ArchiveSession& session, const fs::path& outpu
 
 }  // namespace
 
-std::string_view to_string(ArchiveFault fault) {
+std::string_view archive_fault_name(ArchiveFault fault) {
   return kFaultNames[static_cast<std::size_t>(fault)];
 }
 
-std::string_view to_string(ArchiveDamage damage) {
+std::string_view archive_damage_name(ArchiveDamage damage) {
   return kDamageNames[static_cast<std::size_t>(damage)];
 }
 
@@ -194,7 +195,7 @@ void damage_session_files(const ArchiveSession& session, const fs::path& folder)
   }
 }
 
-ArchiveSession make_archive_session(const Scene& scene, std::size_t index) {
+ArchiveSession make_simulated_archive_session(const Scene& scene, std::size_t index) {
   const ArchiveVariation& variation = *scene.archive;
   const auto per_camera = static_cast<std::size_t>(variation.sessions_per_camera);
   const std::size_t camera = index / per_camera;
@@ -206,9 +207,9 @@ ArchiveSession make_archive_session(const Scene& scene, std::size_t index) {
                          ""};
   session.scene.camera.id = session.camera;
   draw_camera(session.scene, variation,
-              make_seeded_generator(scene.seed, "archive camera", camera));
+              make_seeded_random_generator(scene.seed, "archive camera", camera));
   draw_session(session.scene, variation,
-               make_seeded_generator(scene.seed, "archive session", index));
+               make_seeded_random_generator(scene.seed, "archive session", index));
   const auto fault = find_chosen_index(index, variation.fault_fraction);
   if (const auto damage_target = find_chosen_index(index, variation.damage_fraction)) {
     std::tie(session.damage, session.damaged) =
@@ -220,9 +221,9 @@ ArchiveSession make_archive_session(const Scene& scene, std::size_t index) {
   return session;
 }
 
-SimulationSummary simulate_archive(const Scene& scene, std::size_t sessions, const fs::path& output,
-                                   const SimulationOptions& options,
-                                   const SimulationProgress& progress) {
+SimulationSummary simulate_session_archive(const Scene& scene, std::size_t sessions,
+                                           const fs::path& output, const SimulationOptions& options,
+                                           const SimulationProgress& progress) {
   check(scene);
   claim_output_folder(output, options.provenance);
   write_table(scene, sessions, output);
@@ -230,8 +231,8 @@ SimulationSummary simulate_archive(const Scene& scene, std::size_t sessions, con
   std::mutex counting;
   try {
     parallel_for(sessions, options.threads, [&](std::size_t index) {
-      const bool rendered =
-          render_archive_session(make_archive_session(scene, index), output, options.provenance);
+      const bool rendered = render_archive_session(make_simulated_archive_session(scene, index),
+                                                   output, options.provenance);
       const std::lock_guard lock(counting);
       ++(rendered ? summary.rendered : summary.found);
       progress(summary, sessions);

@@ -23,7 +23,7 @@ image_u8_t* render_tag(image_u8_t* (*draw)(apriltag_family_t*, Id), apriltag_fam
   return draw(family, static_cast<Id>(id));
 }
 
-void add_corner_squares(const Board& board, const Ink& ink, std::vector<Rectangle>& all) {
+void add_corner_squares(const Board& board, const InkRadiances& ink, std::vector<Rectangle>& all) {
   const double gap_m = board.tag_size_m * board.tag_spacing;
   for (int row = 0; row <= board.rows; ++row) {
     for (int col = 0; col <= board.cols; ++col) {
@@ -34,7 +34,7 @@ void add_corner_squares(const Board& board, const Ink& ink, std::vector<Rectangl
   }
 }
 
-void add_squares(const Board& board, const Ink& ink, std::vector<Rectangle>& all) {
+void add_squares(const Board& board, const InkRadiances& ink, std::vector<Rectangle>& all) {
   const double size_m = board.square_size_m;
   for (int row = 0; row < board.rows; ++row) {
     for (int col = 0; col < board.cols; ++col) {
@@ -49,17 +49,18 @@ TagPattern make_tag_bits(const Board& board, int id) {
   if (!board.has_chessboard_squares()) return make_tag_pattern(board.family, id, board.border_bits);
   const ArucoMarker marker = make_aruco_marker(board.family, id);
   TagPattern pattern{marker.width + 2, 0, {}};
-  pattern.white.assign(pattern.flat_index(0, pattern.width()), false);
+  pattern.white.assign(pattern.flat_bit_index(0, pattern.pattern_width_bits()), false);
   for (int row = 0; row < marker.width; ++row) {
     for (int col = 0; col < marker.width; ++col) {
-      pattern.white[pattern.flat_index(col + 1, row + 1)] =
+      pattern.white[pattern.flat_bit_index(col + 1, row + 1)] =
           marker.white[static_cast<std::size_t>(row * marker.width + col)];
     }
   }
   return pattern;
 }
 
-void add_tag(const Board& board, const BoardTag& tag, const Ink& ink, std::vector<Rectangle>& all) {
+void add_tag(const Board& board, const BoardTag& tag, const InkRadiances& ink,
+             std::vector<Rectangle>& all) {
   const TagPattern pattern = make_tag_bits(board, tag.id);
   const double bit_m = board.tag_size_m / pattern.border_width;
   if (2 * pattern.outside * bit_m > board.tag_size_m * board.tag_spacing) {
@@ -67,10 +68,10 @@ void add_tag(const Board& board, const BoardTag& tag, const Ink& ink, std::vecto
   }
   const Eigen::Vector2d corner_m =
       tag.corners_m[3] - Eigen::Vector2d::Constant(pattern.outside * bit_m);
-  for (int row = 0; row < pattern.width(); ++row) {
-    for (int col = 0; col < pattern.width(); ++col) {
+  for (int row = 0; row < pattern.pattern_width_bits(); ++row) {
+    for (int col = 0; col < pattern.pattern_width_bits(); ++col) {
       const double left_m = corner_m.x() + col * bit_m, top_m = corner_m.y() + row * bit_m;
-      const bool white = pattern.white[pattern.flat_index(col, row)];
+      const bool white = pattern.white[pattern.flat_bit_index(col, row)];
       all.push_back({left_m, top_m, left_m + bit_m, top_m + bit_m, white ? ink.white : ink.black});
     }
   }
@@ -79,9 +80,9 @@ void add_tag(const Board& board, const BoardTag& tag, const Ink& ink, std::vecto
 /// Returns the printed rectangles with the paper below them, in printing order: later ones cover
 /// earlier ones.
 std::vector<Rectangle> make_rectangles(const SceneBoard& board) {
-  const Ink ink{board.white_e_per_s - board.surround_e_per_s,
-                board.black_e_per_s - board.surround_e_per_s};
-  const double margin_m = board.margin_m + compute_printed_border_m(board.print);
+  const InkRadiances ink{board.white_e_per_s - board.surround_e_per_s,
+                         board.black_e_per_s - board.surround_e_per_s};
+  const double margin_m = board.margin_m + compute_printed_margin_around_tags_m(board.print);
   const Eigen::Vector2d field_m = compute_tag_field_size_m(board.print);
   std::vector<Rectangle> all = make_board_pattern(board.print, ink);
   all.insert(all.begin(),
@@ -107,21 +108,21 @@ TagPattern make_tag_pattern(const std::string& name, int id, int border_bits) {
   TagPattern pattern;
   pattern.border_width = codes->width_at_border + 2 * extra;
   pattern.outside = (codes->total_width - codes->width_at_border) / 2 - trimmed;
-  const int width = pattern.width();
-  pattern.white.assign(pattern.flat_index(0, width), false);
+  const int width = pattern.pattern_width_bits();
+  pattern.white.assign(pattern.flat_bit_index(0, width), false);
   const std::unique_ptr<image_u8_t, void (*)(image_u8_t*)> rendered(
       render_tag(apriltag_to_image, codes.get(), id), image_u8_destroy);
   for (int row = extra; row < width - extra; ++row) {
     for (int column = extra; column < width - extra; ++column) {
       const int y = row - extra + trimmed, x = column - extra + trimmed;
-      pattern.white[pattern.flat_index(column, row)] =
+      pattern.white[pattern.flat_bit_index(column, row)] =
           rendered->buf[y * rendered->stride + x] > 127;
     }
   }
   return pattern;
 }
 
-std::vector<Rectangle> make_board_pattern(const Board& board, const Ink& ink) {
+std::vector<Rectangle> make_board_pattern(const Board& board, const InkRadiances& ink) {
   std::vector<Rectangle> all;
   if (board.has_chessboard_squares()) add_squares(board, ink, all);
   if (board.corner_squares) add_corner_squares(board, ink, all);
@@ -129,7 +130,7 @@ std::vector<Rectangle> make_board_pattern(const Board& board, const Ink& ink) {
   return all;
 }
 
-double compute_printed_border_m(const Board& board) {
+double compute_printed_margin_around_tags_m(const Board& board) {
   if (board.has_chessboard_squares()) return board.square_size_m;
   return board.corner_squares ? board.tag_size_m * board.tag_spacing : 0;
 }
@@ -137,7 +138,7 @@ double compute_printed_border_m(const Board& board) {
 BoardWarp::BoardWarp(const SceneBoard& board)
     : field_m_(compute_tag_field_size_m(board.print)), warp_m_(board.warp_m) {}
 
-BoardWarp::Depth BoardWarp::compute_deflection(const Eigen::Vector2d& at_m) const {
+BoardWarp::Depth BoardWarp::compute_board_deflection(const Eigen::Vector2d& at_m) const {
   constexpr double max_offset = 1.5;  // outside the paper, where the parabola would bend back
   Depth warp{0, {0, 0}};
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
@@ -152,15 +153,15 @@ BoardWarp::Depth BoardWarp::compute_deflection(const Eigen::Vector2d& at_m) cons
 BoardPattern::BoardPattern(const SceneBoard& board)
     : warp_(board), mosaic_(make_rectangles(board)) {}
 
-Eigen::Vector2d BoardPattern::intersect_ray(const Eigen::Vector3d& origin,
-                                            const Eigen::Vector3d& direction) const {
+Eigen::Vector2d BoardPattern::intersect_ray_with_shape(const Eigen::Vector3d& origin,
+                                                       const Eigen::Vector3d& direction) const {
   Eigen::Vector2d at_m = intersect_ray_with_plane(origin, direction);
-  if (warp_.is_flat()) return at_m;
+  if (warp_.is_board_flat()) return at_m;
   // Newton's method along the ray; converges in two or three steps.
   constexpr double tolerance_m = 1e-9;
   double distance = -origin.z() / direction.z();
   for (int step = 0; step < 8; ++step) {
-    const auto [depth_m, slope] = warp_.compute_deflection(at_m);
+    const auto [depth_m, slope] = warp_.compute_board_deflection(at_m);
     const double missed_m = origin.z() + distance * direction.z() - depth_m;
     if (!(std::abs(missed_m) > tolerance_m)) break;
     distance -= missed_m / (direction.z() - slope.dot(direction.head<2>()));

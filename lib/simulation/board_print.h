@@ -20,12 +20,12 @@ struct TagPattern {
   int border_width;
   /// Number of bits outside that square on each side (families whose border is white inside).
   int outside;
-  /// Bits row by row from the top left, width() along an edge; true is white.
+  /// Bits row by row from the top left, pattern_width_bits() along an edge; true is white.
   std::vector<bool> white;
 
-  int width() const { return border_width + 2 * outside; }
-  std::size_t flat_index(int column, int row) const {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(width()) +
+  int pattern_width_bits() const { return border_width + 2 * outside; }
+  std::size_t flat_bit_index(int column, int row) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(pattern_width_bits()) +
            static_cast<std::size_t>(column);
   }
 };
@@ -36,7 +36,7 @@ struct TagPattern {
 TagPattern make_tag_pattern(const std::string& family, int id, int border_bits);
 
 /// Values of white and black areas.
-struct Ink {
+struct InkRadiances {
   double white, black;
 };
 
@@ -44,12 +44,12 @@ struct Ink {
 /// printing order: later rectangles cover earlier ones.
 /// @throws std::invalid_argument if the family lacks an id, or if the gaps are too small for the
 /// family
-std::vector<Rectangle> make_board_pattern(const Board& board, const Ink& ink);
+std::vector<Rectangle> make_board_pattern(const Board& board, const InkRadiances& ink);
 
 /// Returns the distance from the edge of the tag field (compute_tag_field_size_m()) to the
 /// outermost printed edge, m. Corner squares and the outer squares of chessboards extend beyond the
 /// field; otherwise 0.
-double compute_printed_border_m(const Board& board);
+double compute_printed_margin_around_tags_m(const Board& board);
 
 /// Deflection of a warped board along z of the board frame (SceneBoard::warp_m).
 class BoardWarp {
@@ -62,8 +62,8 @@ class BoardWarp {
     Eigen::Vector2d slope;
   };
   /// Returns the deflection at a point (x, y) of the board, m.
-  Depth compute_deflection(const Eigen::Vector2d& at_m) const;
-  bool is_flat() const { return warp_m_.isZero(0); }
+  Depth compute_board_deflection(const Eigen::Vector2d& at_m) const;
+  bool is_board_flat() const { return warp_m_.isZero(0); }
 
  private:
   Eigen::Vector2d field_m_, warp_m_;
@@ -80,18 +80,19 @@ class BoardPattern {
 
   /// Returns (x, y) of the intersection of a ray with the board, in the board frame; NaN if there
   /// is none.
-  Eigen::Vector2d intersect_ray(const Eigen::Vector3d& origin,
-                                const Eigen::Vector3d& direction) const;
+  Eigen::Vector2d intersect_ray_with_shape(const Eigen::Vector3d& origin,
+                                           const Eigen::Vector3d& direction) const;
   double integrate_shape_along_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
     return mosaic_.integrate_shape_along_edge(p, q);
   }
-  std::optional<double> find_constant_value(const std::array<Eigen::Vector2d, 4>& corners) const {
-    return mosaic_.find_constant_value(corners);
+  std::optional<double> find_constant_value_in_quadrilateral(
+      const std::array<Eigen::Vector2d, 4>& corners) const {
+    return mosaic_.find_constant_value_in_quadrilateral(corners);
   }
 
  private:
   BoardWarp warp_;
-  Mosaic mosaic_;
+  RectanglePattern mosaic_;
 };
 
 }  // namespace vlp

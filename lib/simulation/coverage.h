@@ -40,9 +40,9 @@ inline double cross_product_2d(const Eigen::Vector2d& a, const Eigen::Vector2d& 
 /// means instead would displace an edge by 0.01 px. Rays within a pixel are interpolated linearly
 /// between those of its corners.
 ///
-/// A shape has intersect_ray(origin, direction) in its frame and integrate_shape_along_edge(p, q).
-/// Its find_constant_value(corners) is the value of the pattern if it is constant over a whole
-/// quadrilateral.
+/// A shape has intersect_ray_with_shape(origin, direction) in its frame and
+/// integrate_shape_along_edge(p, q). Its find_constant_value_in_quadrilateral(corners) is the value
+/// of the pattern if it is constant over a whole quadrilateral.
 template <typename Shape>
 void add_shape_to_image(const PixelRays& rays, const PixelWindow& window,
                         const TargetFromCamera& target_from_camera, const Shape& shape,
@@ -66,16 +66,17 @@ void add_shape_to_image(const PixelRays& rays, const PixelWindow& window,
     const Eigen::Vector3d origin = pose.translation();
     for (std::size_t i = 0; i <= columns; ++i) {
       const int column = static_cast<int>(i);
-      above[i] = row % per_px == 0
-                     ? shape.intersect_ray(origin, pose.linear() * corner_ray(row, column))
-                     : below[i];
-      below[i] = shape.intersect_ray(origin, pose.linear() * corner_ray(row + 1, column));
+      above[i] = row % per_px == 0 ? shape.intersect_ray_with_shape(
+                                         origin, pose.linear() * corner_ray(row, column))
+                                   : below[i];
+      below[i] =
+          shape.intersect_ray_with_shape(origin, pose.linear() * corner_ray(row + 1, column));
     }
     std::optional<Edge> left;
     for (std::size_t i = 0; i < columns; ++i) {
       float& element = image(row, static_cast<int>(i));
-      if (const auto even =
-              shape.find_constant_value({above[i], above[i + 1], below[i + 1], below[i]})) {
+      if (const auto even = shape.find_constant_value_in_quadrilateral(
+              {above[i], above[i + 1], below[i + 1], below[i]})) {
         element += static_cast<float>(weight * *even);
         left.reset();
         continue;

@@ -55,19 +55,20 @@ void apply_filters(const Bayer& bayer, cv::Mat1f& electrons) {
 
 }  // namespace
 
-double white_level_dn(const Sensor& sensor) { return sensor.bits == 8 ? 255 : 65535; }
+double sensor_white_level_dn(const Sensor& sensor) { return sensor.bits == 8 ? 255 : 65535; }
 
-int bayer_filter_at(int line, int place) {
+int bayer_color_index_at(int line, int place) {
   const auto parity = [](int i) { return ((i % 2) + 2) % 2; };
   return 2 - parity(line) - parity(place);
 }
 
 double bayer_filter_transmission(const Bayer& bayer, int line, int place) {
   const std::array transmissions{bayer.blue_to_green_ratio, 1.0, bayer.red_to_green_ratio};
-  return transmissions[static_cast<std::size_t>(bayer_filter_at(line, place))];
+  return transmissions[static_cast<std::size_t>(bayer_color_index_at(line, place))];
 }
 
-std::vector<cv::Mat1f> demosaic(const Bayer& bayer, const Sensor& sensor, const cv::Mat1f& levels) {
+std::vector<cv::Mat1f> demosaic_bayer_image(const Bayer& bayer, const Sensor& sensor,
+                                            const cv::Mat1f& levels) {
   // The weights over the 3 x 3 neighborhood add up to 1 over the pixels that have the color.
   const cv::Matx33f corners(.25F, .5F, .25F, .5F, 1, .5F, .25F, .5F, .25F);
   const cv::Matx33f sides(0, .25F, 0, .25F, 1, .25F, 0, .25F, 0);
@@ -78,7 +79,7 @@ std::vector<cv::Mat1f> demosaic(const Bayer& bayer, const Sensor& sensor, const 
     cv::Mat1f channel(levels.size(), 0);
     for (int line = 0; line < levels.rows; ++line) {
       for (int place = 0; place < levels.cols; ++place) {
-        if (bayer_filter_at(line, place) == color)
+        if (bayer_color_index_at(line, place) == color)
           channel(line, place) = levels(line, place) - black;
       }
     }
@@ -91,9 +92,9 @@ std::vector<cv::Mat1f> demosaic(const Bayer& bayer, const Sensor& sensor, const 
   return colors;
 }
 
-double correct_views_for_tone_curve(const ImageProcessing& picture, const Sensor& sensor,
-                                    double level_dn) {
-  const double black = sensor.black_level_dn, white = white_level_dn(sensor);
+double apply_tone_curve_to_gray_level(const ImageProcessing& picture, const Sensor& sensor,
+                                      double level_dn) {
+  const double black = sensor.black_level_dn, white = sensor_white_level_dn(sensor);
   const double fraction = std::clamp((level_dn - black) / (white - black), 0.0, 1.0);
   return white * std::pow(fraction, 1 / picture.gamma);
 }
@@ -101,7 +102,7 @@ double correct_views_for_tone_curve(const ImageProcessing& picture, const Sensor
 void apply_tone_curve_and_sharpening(const ImageProcessing& picture, const Sensor& sensor,
                                      cv::Mat1f& levels) {
   for (float& level : levels) {
-    level = static_cast<float>(correct_views_for_tone_curve(picture, sensor, double(level)));
+    level = static_cast<float>(apply_tone_curve_to_gray_level(picture, sensor, double(level)));
   }
   if (!picture.sharpening) return;
   const auto [amount, radius_px] = *picture.sharpening;
@@ -114,8 +115,8 @@ std::string image_file_extension(const std::optional<ImageProcessing>& picture) 
   return picture && picture->jpeg_quality ? ".jpg" : ".png";
 }
 
-std::vector<unsigned char> encode_image(const cv::Mat& image,
-                                        const std::optional<ImageProcessing>& picture) {
+std::vector<unsigned char> encode_image_as_jpeg_or_png(
+    const cv::Mat& image, const std::optional<ImageProcessing>& picture) {
   const std::string bytes =
       picture && picture->jpeg_quality
           ? get_codecs().encode_image_file(".jpg", image,
@@ -124,8 +125,8 @@ std::vector<unsigned char> encode_image(const cv::Mat& image,
   return {bytes.begin(), bytes.end()};
 }
 
-cv::Mat simulate_sensor(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint64_t seed,
-                        const std::optional<ImageProcessing>& picture) {
+cv::Mat simulate_sensor_image(const Sensor& sensor, const cv::Mat1f& mean_electrons,
+                              std::uint64_t seed, const std::optional<ImageProcessing>& picture) {
   cv::RNG random(seed);
   cv::Mat1f electrons = mean_electrons.clone();
   if (picture && picture->bayer) apply_filters(*picture->bayer, electrons);
@@ -154,8 +155,8 @@ cv::Mat simulate_sensor(const Sensor& sensor, const cv::Mat1f& mean_electrons, s
   }
   // The analog-to-digital converter rounds before demosaicing.
   for (float& level : levels)
-    level = std::clamp(std::round(level), 0.F, float(white_level_dn(sensor)));
-  auto colors = demosaic(*picture->bayer, sensor, levels);
+    level = std::clamp(std::round(level), 0.F, float(sensor_white_level_dn(sensor)));
+  auto colors = demosaic_bayer_image(*picture->bayer, sensor, levels);
   for (cv::Mat1f& color : colors) apply_tone_curve_and_sharpening(*picture, sensor, color);
   cv::Mat color_image;
   cv::merge(colors, color_image);

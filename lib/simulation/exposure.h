@@ -13,21 +13,22 @@
 namespace vlp {
 
 /// Returns the white level of the sensor, 255 or 65535.
-double white_level_dn(const Sensor& sensor);
+double sensor_white_level_dn(const Sensor& sensor);
 
 /// Returns the color of a pixel's Bayer filter (RGGB): 0 blue, 1 green, 2 red, the channel order of
 /// OpenCV. The pixel is in readout order (line, place), both from 0 and possibly negative.
-int bayer_filter_at(int line, int place);
+int bayer_color_index_at(int line, int place);
 
 /// Returns the fraction of a pixel's light that its filter passes, relative to green.
 double bayer_filter_transmission(const Bayer& bayer, int line, int place);
 
 /// Demosaics the gray levels behind a mosaic of filters and balances the three colors.
-std::vector<cv::Mat1f> demosaic(const Bayer& bayer, const Sensor& sensor, const cv::Mat1f& levels);
+std::vector<cv::Mat1f> demosaic_bayer_image(const Bayer& bayer, const Sensor& sensor,
+                                            const cv::Mat1f& levels);
 
 /// Applies the tone curve of ImageProcessing to one gray level, DN.
-double correct_views_for_tone_curve(const ImageProcessing& picture, const Sensor& sensor,
-                                    double level_dn);
+double apply_tone_curve_to_gray_level(const ImageProcessing& picture, const Sensor& sensor,
+                                      double level_dn);
 
 /// Applies tone curve and sharpening of ImageProcessing to gray levels before rounding. Border
 /// pixels are replicated.
@@ -38,8 +39,8 @@ void apply_tone_curve_and_sharpening(const ImageProcessing& picture, const Senso
 std::string image_file_extension(const std::optional<ImageProcessing>& picture);
 
 /// Encodes the image as JPEG, or losslessly as PNG.
-std::vector<unsigned char> encode_image(const cv::Mat& image,
-                                        const std::optional<ImageProcessing>& picture);
+std::vector<unsigned char> encode_image_as_jpeg_or_png(
+    const cv::Mat& image, const std::optional<ImageProcessing>& picture);
 
 /// Simulates a sensor (see Sensor) from the mean number of electrons of each pixel.
 ///
@@ -48,7 +49,8 @@ std::vector<unsigned char> encode_image(const cv::Mat& image,
 /// filters are rounded before demosaicing. Last, rounding and the limits of 8 or 16 bits. The
 /// result has 8 or 16 bits; behind color filters it has three colors, blue first. The same seed
 /// yields the same image.
-cv::Mat simulate_sensor(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint64_t seed,
-                        const std::optional<ImageProcessing>& picture = {});
+cv::Mat simulate_sensor_image(const Sensor& sensor, const cv::Mat1f& mean_electrons,
+                              std::uint64_t seed,
+                              const std::optional<ImageProcessing>& picture = {});
 
 }  // namespace vlp

@@ -21,8 +21,8 @@ namespace vlp {
 namespace {
 
 cv::Mat1f compute_vignetting(const PixelRays& rays, double power) {
-  cv::Mat1f image(rays.lines(), rays.pixels_per_line());
-  for (int line = 0; line < rays.lines(); ++line) {
+  cv::Mat1f image(rays.num_readout_lines(), rays.pixels_per_line());
+  for (int line = 0; line < rays.num_readout_lines(); ++line) {
     for (int place = 0; place < rays.pixels_per_line(); ++place) {
       const Eigen::Vector3d ray = rays.pixel_corner_ray(line, place).normalized() +
                                   rays.pixel_corner_ray(line, place + 1).normalized() +
@@ -51,8 +51,9 @@ FrameRenderer::FrameRenderer(const Scene& scene)
   if (scene.board) pattern_.emplace(*scene.board);
 }
 
-cv::Mat1f FrameRenderer::apply_exposure(const cv::Mat1f& electrons_per_s, double exposure_s) const {
-  return cv::Mat1f(rays_.crop_margin(electrons_per_s).mul(transmission_, exposure_s));
+cv::Mat1f FrameRenderer::integrate_electrons_over_exposure(const cv::Mat1f& electrons_per_s,
+                                                           double exposure_s) const {
+  return cv::Mat1f(rays_.crop_image_margin(electrons_per_s).mul(transmission_, exposure_s));
 }
 
 namespace {
@@ -76,7 +77,8 @@ std::vector<Eigen::AlignedBox2d> make_window_bars(const Blind& blind) {
 }
 
 /// Returns a mosaic with the value 1 in boxes of a panel, given as fractions of its edges.
-Mosaic make_panel_mosaic(const Panel& panel, const std::vector<Eigen::AlignedBox2d>& boxes) {
+RectanglePattern make_panel_mosaic(const Panel& panel,
+                                   const std::vector<Eigen::AlignedBox2d>& boxes) {
   const Eigen::Vector2d size_m(panel.edge_a_m.norm(), panel.edge_b_m.norm());
   std::vector<Rectangle> rectangles;
   for (const Eigen::AlignedBox2d& box : boxes) {
@@ -84,11 +86,11 @@ Mosaic make_panel_mosaic(const Panel& panel, const std::vector<Eigen::AlignedBox
     const Eigen::Vector2d to_m = box.max().cwiseProduct(size_m);
     rectangles.push_back({from_m.x(), from_m.y(), to_m.x(), to_m.y(), 1});
   }
-  return Mosaic(rectangles);
+  return RectanglePattern(rectangles);
 }
 
-Mosaic make_panel_mosaic(const Panel& panel) {
-  return Mosaic({{0, 0, panel.edge_a_m.norm(), panel.edge_b_m.norm(), 1}});
+RectanglePattern make_panel_mosaic(const Panel& panel) {
+  return RectanglePattern({{0, 0, panel.edge_a_m.norm(), panel.edge_b_m.norm(), 1}});
 }
 
 /// Light with its wave in a capture.
@@ -130,13 +132,15 @@ class LampFrame {
         shot_(shot),
         motion_(shot.motion),
         part_(part) {
-    if (!scene.clutter.occluders.empty() || mirror) transmittance_ = rays_.make_constant_image(1);
+    if (!scene.clutter.occluders.empty() || mirror)
+      transmittance_ = rays_.make_constant_image_with_margin(1);
     for (const Panel& occluder : scene.clutter.occluders) {
       transmittance_ = transmittance_.mul(1 - compute_shape_coverage(occluder));
     }
     if (!mirror) return;
     transmittance_ = transmittance_.mul(mirror->reflectance * compute_shape_coverage(mirror->pane));
-    pane_window_ = compute_object_window(outline_of(mirror->pane), motion_, part_, rays_);
+    pane_window_ = compute_window_of_moving_object(compute_object_outline_points(mirror->pane),
+                                                   motion_, part_, rays_);
     mirror_ = mirror;
     reflection_ = make_reflection_about_panel(mirror->pane);
   }
@@ -161,13 +165,15 @@ class LampFrame {
     }
     for (const Glow& lamp : clutter.steady_lamps) {
       const PixelWindow window = compute_light_window(lamp);
-      if (!window.empty()) draw(lamp, window, window.crop_to_window(image, rays_.margin_px()));
+      if (!window.is_empty_window())
+        render_light_into_window(lamp, window,
+                                 window.crop_image_to_window(image, rays_.image_margin_px()));
     }
     for (const Panel& occluder : clutter.occluders) {
       const cv::Mat1f hidden = compute_shape_coverage(occluder);
       image = image.mul(1 - hidden) + occluder.electron_rate_e_per_s * hidden;
     }
-    optics_.apply_point_spread(image, {-rays_.margin_px(), -rays_.margin_px()});
+    optics_.apply_point_spread(image, {-rays_.image_margin_px(), -rays_.image_margin_px()});
     optics_.add_veiling_glare(image);
     return image;
   }
@@ -177,32 +183,33 @@ class LampFrame {
     const Eigen::Vector3d eye_m = motion_.world_from_camera(0).translation();
     if (mirror_ && !are_on_same_side_of_mirror(*mirror_, source.glow.position_m, eye_m)) return;
     const PixelWindow window = compute_light_window(source.glow);
-    if (window.empty()) return;
-    cv::Mat1f patch = window.make_constant_image(0);
-    draw(source.glow, window, patch);
+    if (window.is_empty_window()) return;
+    cv::Mat1f patch = window.make_constant_window_image(0);
+    render_light_into_window(source.glow, window, patch);
     if (!transmittance_.empty())
-      patch = patch.mul(window.crop_to_window(transmittance_, rays_.margin_px()));
+      patch = patch.mul(window.crop_image_to_window(transmittance_, rays_.image_margin_px()));
     optics_.apply_point_spread(patch, {window.line_begin, window.place_begin});
     // Light that a veil scatters to all pixels.
-    if (const float scattered_e_per_s = optics_.remove_scattered_light(patch);
+    if (const float scattered_e_per_s = optics_.split_off_veiling_glare(patch);
         scattered_e_per_s != 0) {
       for (int row = 0; row < image.rows; ++row) {
-        image.row(row) +=
-            compute_lit_fraction(source.wave, row - rays_.margin_px()) * scattered_e_per_s;
+        image.row(row) += compute_mean_light_fraction(source.wave, row - rays_.image_margin_px()) *
+                          scattered_e_per_s;
       }
     }
-    cv::Mat1f target = window.crop_to_window(image, rays_.margin_px());
+    cv::Mat1f target = window.crop_image_to_window(image, rays_.image_margin_px());
     for (int line = window.line_begin; line < window.line_end; ++line) {
       const int row = line - window.line_begin;
-      target.row(row) += compute_lit_fraction(source.wave, line) * patch.row(row);
+      target.row(row) += compute_mean_light_fraction(source.wave, line) * patch.row(row);
     }
   }
 
  private:
-  double compute_lit_fraction(const LightWave& wave, int line) const {
+  double compute_mean_light_fraction(const LightWave& wave, int line) const {
     return std::visit(
         [&](const auto& each) {
-          return each.compute_lit_fraction(part_.begin_s(line), part_.end_s(line));
+          return each.compute_mean_light_fraction(part_.exposure_sample_begin_s(line),
+                                                  part_.exposure_sample_end_s(line));
         },
         wave);
   }
@@ -212,25 +219,27 @@ class LampFrame {
     if (!scene_.clutter.ambient_flicker) return scene_.ambient_e_per_s;
     RectifiedSine wave = *scene_.clutter.ambient_flicker;
     wave.phase = shot_.ambient_phase;
-    return scene_.ambient_e_per_s * compute_lit_fraction(wave, line);
+    return scene_.ambient_e_per_s * compute_mean_light_fraction(wave, line);
   }
 
   cv::Mat1f render_ceiling() const {
-    cv::Mat1f image = rays_.make_constant_image(0);
+    cv::Mat1f image = rays_.make_constant_image_with_margin(0);
     for (int row = 0; row < image.rows; ++row) {
-      image.row(row) = static_cast<float>(compute_ceiling_radiance(row - rays_.margin_px()));
+      image.row(row) = static_cast<float>(compute_ceiling_radiance(row - rays_.image_margin_px()));
     }
     return image;
   }
 
   /// Replaces the radiance of the ceiling by that of a panel where the pattern is 1.
-  void replace_ceiling_by_panel(const Panel& panel, const Mosaic& pattern, cv::Mat1f& image) const {
-    const PixelWindow window = compute_object_window(outline_of(panel), motion_, part_, rays_);
-    if (window.empty()) return;
-    cv::Mat1f cover = window.make_constant_image(0);
+  void replace_ceiling_by_panel(const Panel& panel, const RectanglePattern& pattern,
+                                cv::Mat1f& image) const {
+    const PixelWindow window = compute_window_of_moving_object(compute_object_outline_points(panel),
+                                                               motion_, part_, rays_);
+    if (window.is_empty_window()) return;
+    cv::Mat1f cover = window.make_constant_window_image(0);
     add_shape_to_image(rays_, window, compute_target_from_camera(compute_panel_from_world(panel)),
                        pattern, 1, cover);
-    cv::Mat1f target = window.crop_to_window(image, rays_.margin_px());
+    cv::Mat1f target = window.crop_image_to_window(image, rays_.image_margin_px());
     for (int line = window.line_begin; line < window.line_end; ++line) {
       const int row = line - window.line_begin;
       target.row(row) +=
@@ -239,31 +248,36 @@ class LampFrame {
   }
   /// Returns the fraction of each pixel that a panel covers.
   cv::Mat1f compute_shape_coverage(const Panel& panel) const {
-    cv::Mat1f covered = rays_.make_constant_image(0);
-    const PixelWindow window = compute_object_window(outline_of(panel), motion_, part_, rays_);
-    if (!window.empty()) draw(panel, 1, window, window.crop_to_window(covered, rays_.margin_px()));
+    cv::Mat1f covered = rays_.make_constant_image_with_margin(0);
+    const PixelWindow window = compute_window_of_moving_object(compute_object_outline_points(panel),
+                                                               motion_, part_, rays_);
+    if (!window.is_empty_window())
+      render_light_into_window(panel, 1, window,
+                               window.crop_image_to_window(covered, rays_.image_margin_px()));
     return covered;
   }
   PixelWindow compute_light_window(const Glow& glow) const {
-    auto outline_m = outline_of(glow);
-    if (!mirror_) return compute_object_window(outline_m, motion_, part_, rays_);
+    auto outline_m = compute_object_outline_points(glow);
+    if (!mirror_) return compute_window_of_moving_object(outline_m, motion_, part_, rays_);
     for (Eigen::Vector3d& point_m : outline_m) point_m = reflection_ * point_m;
-    return intersect_windows(compute_object_window(outline_m, motion_, part_, rays_), pane_window_);
+    return intersect_pixel_windows(
+        compute_window_of_moving_object(outline_m, motion_, part_, rays_), pane_window_);
   }
   /// Returns the pose of the camera in a target's frame; for a mirror, of the reflected camera.
   TargetFromCamera compute_target_from_camera(const Eigen::Isometry3d& target_from_world) const {
     return [this, target_from_rays = target_from_world * reflection_](int line) {
-      return target_from_rays * motion_.world_from_camera(part_.time_sample_middle_s(line));
+      return target_from_rays * motion_.world_from_camera(part_.exposure_sample_middle_s(line));
     };
   }
   /// Draws a glow. `target` is the window's part of an image.
-  void draw(const Glow& glow, const PixelWindow& window, cv::Mat1f target) const {
-    if (!traits_of(glow.shape.kind).is_round) {
+  void render_light_into_window(const Glow& glow, const PixelWindow& window,
+                                cv::Mat1f target) const {
+    if (!get_lamp_shape_traits(glow.shape.kind).is_round) {
       const Panel panel = make_panel_around_glow(glow);
       if (glow.rim_to_center_ratio == 1)
-        return draw(panel, glow.electron_rate_e_per_s, window, target);
-      cv::Mat1f patch = window.make_constant_image(0);
-      draw(panel, glow.electron_rate_e_per_s, window, patch);
+        return render_light_into_window(panel, glow.electron_rate_e_per_s, window, target);
+      cv::Mat1f patch = window.make_constant_window_image(0);
+      render_light_into_window(panel, glow.electron_rate_e_per_s, window, patch);
       apply_panel_falloff(panel, glow.rim_to_center_ratio, window, patch);
       target += patch;
       return;
@@ -302,7 +316,8 @@ class LampFrame {
     }
   }
   /// Draws a panel. `target` is the window's part of an image.
-  void draw(const Panel& panel, double value, const PixelWindow& window, cv::Mat1f target) const {
+  void render_light_into_window(const Panel& panel, double value, const PixelWindow& window,
+                                cv::Mat1f target) const {
     add_shape_to_image(rays_, window, compute_target_from_camera(compute_panel_from_world(panel)),
                        make_panel_mosaic(panel), value, target);
   }
@@ -325,7 +340,7 @@ class LampFrame {
 std::vector<Eigen::Vector3d> collect_outlines(const Scene& scene) {
   std::vector<Eigen::Vector3d> points_m;
   const auto add = [&](const auto& thing) {
-    const auto outline_m = outline_of(thing);
+    const auto outline_m = compute_object_outline_points(thing);
     points_m.insert(points_m.end(), outline_m.begin(), outline_m.end());
   };
   for (const SceneLamp& lamp : scene.lamps) add(lamp.glow);
@@ -342,16 +357,16 @@ std::vector<Eigen::Vector3d> collect_outlines(const Scene& scene) {
 
 }  // namespace
 
-cv::Mat1f FrameRenderer::render_lamp_electrons(const LampShot& shot) const {
-  Shutter part = make_shutter(shot.exposure_s);
-  if (!shot.motion.is_at_rest()) {
+cv::Mat1f FrameRenderer::render_lamps_in_electrons(const LampShot& shot) const {
+  Shutter part = make_rolling_shutter(shot.exposure_s);
+  if (!shot.motion.is_base_at_rest()) {
     const auto pose = [&](double time_s) {
       return shot.motion.world_from_camera(time_s).inverse();
     };
     part.count = count_exposure_time_samples(
         compute_max_image_motion_px(collect_outlines(scene_), pose, shot.exposure_s, rays_));
   }
-  cv::Mat1f sum = rays_.make_constant_image(0);
+  cv::Mat1f sum = rays_.make_constant_image_with_margin(0);
   for (; part.index < part.count; ++part.index) {
     const LampFrame frame(scene_, rays_, optics_, shot, part);
     sum += frame.render_steady_light();
@@ -361,7 +376,7 @@ cv::Mat1f FrameRenderer::render_lamp_electrons(const LampShot& shot) const {
       for (const Source& source : list_sources(scene_, shot, true)) mirrored.add(source, sum);
     }
   }
-  return apply_exposure(sum, shot.exposure_s / part.count);
+  return integrate_electrons_over_exposure(sum, shot.exposure_s / part.count);
 }
 
 namespace {
@@ -384,27 +399,27 @@ std::vector<Eigen::Vector3d> sample_surface_points(const Board& board) {
 
 }  // namespace
 
-cv::Mat1f FrameRenderer::render_board_electrons(const BoardShot& shot) const {
-  Shutter part = make_shutter(shot.exposure_s);
+cv::Mat1f FrameRenderer::render_board_in_electrons(const BoardShot& shot) const {
+  Shutter part = make_rolling_shutter(shot.exposure_s);
   if (!shot.velocity_in_camera_m_per_s.isZero(0)) {
     const auto pose = [&](double time_s) { return shot.camera_from_board(time_s); };
     part.count = count_exposure_time_samples(compute_max_image_motion_px(
         sample_surface_points(scene_.board->print), pose, shot.exposure_s, rays_));
   }
   const auto surround = static_cast<float>(scene_.board->surround_e_per_s);
-  const cv::Size pixels = rays_.make_constant_image(0).size();
+  const cv::Size pixels = rays_.make_constant_image_with_margin(0).size();
   cv::Mat1f supersampled(2 * pixels.height, 2 * pixels.width, surround), image;
   for (; part.index < part.count; ++part.index) {
     const auto board_from_camera = [&](int line) {
-      return shot.camera_from_board(part.time_sample_middle_s(line)).inverse();
+      return shot.camera_from_board(part.exposure_sample_middle_s(line)).inverse();
     };
     add_shape_to_image(rays_, make_whole_image_window(rays_), board_from_camera, *pattern_,
                        1.0 / part.count, supersampled, 2);
   }
-  optics_.apply_point_spread(supersampled, {-rays_.margin_px(), -rays_.margin_px(), 2});
+  optics_.apply_point_spread(supersampled, {-rays_.image_margin_px(), -rays_.image_margin_px(), 2});
   cv::resize(supersampled, image, pixels, 0, 0, cv::INTER_AREA);
   optics_.add_veiling_glare(image);
-  return apply_exposure(image, shot.exposure_s);
+  return integrate_electrons_over_exposure(image, shot.exposure_s);
 }
 
 }  // namespace vlp

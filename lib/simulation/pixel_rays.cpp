@@ -20,7 +20,7 @@ PixelRays::PixelRays(const Camera& camera, int margin_px)
       const Eigen::Vector2d line_and_place(line - 0.5, place - 0.5);
       const Eigen::Vector2d pixel =
           readout_ == Readout::rows ? Eigen::Vector2d(line_and_place.reverse()) : line_and_place;
-      const auto ray = lens_.unproject(pixel);
+      const auto ray = lens_.unproject_pixel(pixel);
       corners_.push_back(ray ? ray->direction : Eigen::Vector3d::Constant(nan));
     }
   }

@@ -20,14 +20,14 @@ class PixelRays {
  public:
   PixelRays(const Camera& camera, int margin_px);
 
-  const Lens& lens() const { return lens_; }
-  Readout readout() const { return readout_; }
+  const Lens& camera_lens() const { return lens_; }
+  Readout readout_direction() const { return readout_; }
   /// Number of lines of the image, without the margin: its height in pixels for Readout::rows, its
   /// width for Readout::columns.
-  int lines() const { return lines_; }
+  int num_readout_lines() const { return lines_; }
   int pixels_per_line() const { return places_; }
   /// Width of the margin on each side.
-  int margin_px() const { return margin_px_; }
+  int image_margin_px() const { return margin_px_; }
 
   /// Returns the ray through the common corner of the pixels (line - 1, place - 1) and (line,
   /// place), in the camera frame, not normalized. Valid for line and place from -margin to count +
@@ -38,16 +38,16 @@ class PixelRays {
   }
 
   /// Returns (line, place) of a pixel (u, v), which need not be integer.
-  Eigen::Vector2d line_and_place_of_pixel(const Eigen::Vector2d& pixel) const {
+  Eigen::Vector2d convert_pixel_to_readout_order(const Eigen::Vector2d& pixel) const {
     return readout_ == Readout::rows ? Eigen::Vector2d(pixel.y(), pixel.x()) : pixel;
   }
 
   /// Returns a constant image of lines x places with the margin all around.
-  cv::Mat1f make_constant_image(float value) const {
+  cv::Mat1f make_constant_image_with_margin(float value) const {
     return cv::Mat1f(lines_ + 2 * margin_px_, places_ + 2 * margin_px_, value);
   }
   /// Returns the part of an image with margin that is inside the margin.
-  cv::Mat1f crop_margin(const cv::Mat1f& image) const {
+  cv::Mat1f crop_image_margin(const cv::Mat1f& image) const {
     return image(cv::Rect(margin_px_, margin_px_, places_, lines_));
   }
 

@@ -16,14 +16,14 @@ namespace vlp {
 struct PixelWindow {
   int line_begin, line_end, place_begin, place_end;
 
-  bool empty() const { return line_begin >= line_end || place_begin >= place_end; }
-  cv::Mat1f make_constant_image(float value) const {
+  bool is_empty_window() const { return line_begin >= line_end || place_begin >= place_end; }
+  cv::Mat1f make_constant_window_image(float value) const {
     return cv::Mat1f(line_end - line_begin, place_end - place_begin, value);
   }
   /// Returns the part of `image` inside this window; it shares the pixels. `image` covers the whole
   /// image of the camera with a margin of margin_px on each side
-  /// (PixelRays::make_constant_image()).
-  cv::Mat1f crop_to_window(const cv::Mat1f& image, int margin_px) const {
+  /// (PixelRays::make_constant_image_with_margin()).
+  cv::Mat1f crop_image_to_window(const cv::Mat1f& image, int margin_px) const {
     return image(cv::Rect(place_begin + margin_px, line_begin + margin_px, place_end - place_begin,
                           line_end - line_begin));
   }
@@ -37,20 +37,20 @@ PixelWindow make_whole_image_window(const PixelRays& rays);
 /// outline.
 ///
 /// @param outline_m  neighboring points on the outline, in the world, m
-PixelWindow compute_object_window(const std::vector<Eigen::Vector3d>& outline_m,
-                                  const BaseMotion& motion, const Shutter& shutter,
-                                  const PixelRays& rays);
+PixelWindow compute_window_of_moving_object(const std::vector<Eigen::Vector3d>& outline_m,
+                                            const BaseMotion& motion, const Shutter& shutter,
+                                            const PixelRays& rays);
 
 /// Returns the pixels that are in both windows.
-PixelWindow intersect_windows(const PixelWindow& a, const PixelWindow& b);
+PixelWindow intersect_pixel_windows(const PixelWindow& a, const PixelWindow& b);
 
 /// Returns the box around a glow.
 Panel make_panel_around_glow(const Glow& glow);
 
 /// Returns points around the light of a glow (its rim, or the end of its halo), or along the edges
 /// of a panel.
-std::vector<Eigen::Vector3d> outline_of(const Glow& glow);
-std::vector<Eigen::Vector3d> outline_of(const Panel& panel);
+std::vector<Eigen::Vector3d> compute_object_outline_points(const Glow& glow);
+std::vector<Eigen::Vector3d> compute_object_outline_points(const Panel& panel);
 
 /// Pose of a rendered target in the camera frame at a time relative to that of the capture.
 using CameraFromTarget = std::function<Eigen::Isometry3d(double time_s)>;

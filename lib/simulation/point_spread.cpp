@@ -79,13 +79,13 @@ int compute_blur_radius_px(const Optics& optics) {
 
 void PointSpread::apply_point_spread(cv::Mat1f& part, const SpreadWindow& window) const {
   blur_by_kernel(part, window.per_px * optics_.blur_px);
-  if (optics_.defocus) apply_defocus(part, window);
+  if (optics_.defocus) apply_defocus_blur(part, window);
   for (const LensSmear& each : optics_.smears) apply_lens_smear(each, part, window);
 }
 
-void PointSpread::apply_defocus(cv::Mat1f& part, const SpreadWindow& window) const {
-  const Eigen::Array2d half(rays_.lines() / 2.0, rays_.pixels_per_line() / 2.0);
-  const Eigen::Vector2d tilt_px = rays_.line_and_place_of_pixel(optics_.defocus->tilt_px);
+void PointSpread::apply_defocus_blur(cv::Mat1f& part, const SpreadWindow& window) const {
+  const Eigen::Array2d half(rays_.num_readout_lines() / 2.0, rays_.pixels_per_line() / 2.0);
+  const Eigen::Vector2d tilt_px = rays_.convert_pixel_to_readout_order(optics_.defocus->tilt_px);
   const cv::Mat1f radii = map_pixels_by_distance(part, window, [&](const Eigen::Vector2d& at) {
     const Eigen::Vector2d from_middle = (at.array() + 0.5 - half) / half;
     return std::abs(optics_.defocus->radius_px + tilt_px.dot(from_middle));
@@ -113,7 +113,7 @@ void PointSpread::apply_defocus(cv::Mat1f& part, const SpreadWindow& window) con
 
 void PointSpread::apply_lens_smear(const LensSmear& smear, cv::Mat1f& part,
                                    const SpreadWindow& window) const {
-  const Eigen::Vector2d middle = rays_.line_and_place_of_pixel(smear.at_px);
+  const Eigen::Vector2d middle = rays_.convert_pixel_to_readout_order(smear.at_px);
   const cv::Mat1f scattered = map_pixels_by_distance(part, window, [&](const Eigen::Vector2d& at) {
     return smear.fraction * compute_soft_spot_profile((at - middle).norm() / smear.radius_px);
   });
@@ -128,18 +128,18 @@ void PointSpread::add_veiling_glare(cv::Mat1f& image) const {
   image = (1 - optics_.veil) * image + optics_.veil * mean;
 }
 
-float PointSpread::remove_scattered_light(cv::Mat1f& part) const {
+float PointSpread::split_off_veiling_glare(cv::Mat1f& part) const {
   if (optics_.veil == 0) return 0;
-  const double pixels = double(rays_.lines()) * rays_.pixels_per_line();
+  const double pixels = double(rays_.num_readout_lines()) * rays_.pixels_per_line();
   const double scattered = optics_.veil * cv::sum(part)[0] / pixels;
   part = part * (1 - optics_.veil);
   return static_cast<float>(scattered);
 }
 
 cv::Mat1f compute_dust_transmission(const std::vector<Dust>& dust, const PixelRays& rays) {
-  cv::Mat1f transmission(rays.lines(), rays.pixels_per_line(), 1.F);
+  cv::Mat1f transmission(rays.num_readout_lines(), rays.pixels_per_line(), 1.F);
   for (const Dust& speck : dust) {
-    const Eigen::Vector2d middle = rays.line_and_place_of_pixel(speck.at_px);
+    const Eigen::Vector2d middle = rays.convert_pixel_to_readout_order(speck.at_px);
     const cv::Mat1f shadow =
         map_pixels_by_distance(transmission, {0, 0}, [&](const Eigen::Vector2d& at) {
           return 1 -

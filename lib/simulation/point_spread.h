@@ -41,10 +41,10 @@ class PointSpread {
 
   /// Removes the fraction scattered by the veil from the light of a part of the scene. Returns the
   /// amount that each pixel of the image receives of it.
-  float remove_scattered_light(cv::Mat1f& part) const;
+  float split_off_veiling_glare(cv::Mat1f& part) const;
 
  private:
-  void apply_defocus(cv::Mat1f& part, const SpreadWindow& window) const;
+  void apply_defocus_blur(cv::Mat1f& part, const SpreadWindow& window) const;
   void apply_lens_smear(const LensSmear& smear, cv::Mat1f& part, const SpreadWindow& window) const;
 
   const Optics& optics_;

@@ -17,7 +17,7 @@ namespace {
 void draw_hot_spots(cv::RNG random, Glow& glow) {
   if (!glow.random_chips) return;
   const RandomChips& chips = *glow.random_chips;
-  const double radius_m = glow.radius_m();
+  const double radius_m = glow.glow_radius_m();
   glow.hot_spots.clear();
   for (int i = 0; i < chips.count; ++i) {
     const double angle = random.uniform(0.0, 2 * std::numbers::pi);
@@ -70,7 +70,7 @@ Eigen::Vector3d compute_normal(const Panel& pane) {
 
 }  // namespace
 
-cv::RNG make_seeded_generator(std::uint64_t seed, std::string_view name, std::size_t index) {
+cv::RNG make_seeded_random_generator(std::uint64_t seed, std::string_view name, std::size_t index) {
   std::vector<std::uint32_t> words{std::uint32_t(seed), std::uint32_t(seed >> 32),
                                    std::uint32_t(index), std::uint32_t(index >> 32)};
   words.insert(words.end(), name.begin(), name.end());
@@ -85,7 +85,7 @@ std::uint64_t draw_random_seed(cv::RNG& random) {
   return high << 32 | random.next();
 }
 
-double SquareWave::compute_lit_fraction(double begin_s, double end_s) const {
+double SquareWave::compute_mean_light_fraction(double begin_s, double end_s) const {
   const auto lit_periods_until = [&](double t_s) {
     const double periods = frequency_hz * t_s + phase;
     const double whole = std::floor(periods);
@@ -95,7 +95,7 @@ double SquareWave::compute_lit_fraction(double begin_s, double end_s) const {
          (frequency_hz * (end_s - begin_s));
 }
 
-double RectifiedSine::compute_lit_fraction(double begin_s, double end_s) const {
+double RectifiedSine::compute_mean_light_fraction(double begin_s, double end_s) const {
   // The integral of |sin(pi x)| from 0 to x grows by 2 / pi for each whole period.
   const auto integral_until = [&](double t_s) {
     const double periods = frequency_hz * t_s + phase;
@@ -107,14 +107,14 @@ double RectifiedSine::compute_lit_fraction(double begin_s, double end_s) const {
   return 1 - depth + depth * mean;
 }
 
-LightWave with_wave_phase(LightWave wave, double phase) {
+LightWave copy_light_wave_with_phase(LightWave wave, double phase) {
   std::visit([&](auto& each) { each.phase = phase; }, wave);
   return wave;
 }
 
 void draw_random_scene_parts(Scene& scene) {
   const auto random = [&](std::string_view name, std::size_t index) {
-    return make_seeded_generator(scene.seed, name, index);
+    return make_seeded_random_generator(scene.seed, name, index);
   };
   for (SceneLamp& lamp : scene.lamps) {
     draw_hot_spots(random("chips of a lamp", static_cast<std::size_t>(lamp.id)), lamp.glow);

@@ -24,7 +24,7 @@ namespace vlp {
 
 /// Returns a random generator seeded by a seed, a name and an index alone; the same on every
 /// machine.
-cv::RNG make_seeded_generator(std::uint64_t seed, std::string_view name, std::size_t index);
+cv::RNG make_seeded_random_generator(std::uint64_t seed, std::string_view name, std::size_t index);
 
 /// Draws a random number of 64 bits from `random`, for use as the seed of another generator.
 std::uint64_t draw_random_seed(cv::RNG& random);
@@ -36,7 +36,7 @@ struct SquareWave {
   double phase;  // in periods
 
   /// Returns the lit fraction of the time from begin_s to end_s > begin_s, in closed form.
-  double compute_lit_fraction(double begin_s, double end_s) const;
+  double compute_mean_light_fraction(double begin_s, double end_s) const;
 };
 
 /// Wave of a light on the mains, as a fraction of its greatest brightness:
@@ -48,13 +48,13 @@ struct RectifiedSine {
   double phase;  // in periods
 
   /// Returns the mean over the time from begin_s to end_s > begin_s, in closed form.
-  double compute_lit_fraction(double begin_s, double end_s) const;
+  double compute_mean_light_fraction(double begin_s, double end_s) const;
 };
 
 using LightWave = std::variant<SquareWave, RectifiedSine>;
 
 /// Returns the wave with another phase, in periods.
-LightWave with_wave_phase(LightWave wave, double phase);
+LightWave copy_light_wave_with_phase(LightWave wave, double phase);
 
 /// Straight drive at constant speed.
 struct StraightDrive {
@@ -208,7 +208,7 @@ struct Glow {
   std::vector<HotSpot> hot_spots = {};
 
   /// Returns half of the first axis: the radius of a disc.
-  double radius_m() const { return shape.size_m->x() / 2; }
+  double glow_radius_m() const { return shape.size_m->x() / 2; }
 };
 
 /// Lamp of the lamp map: a glow switched by a square wave.
@@ -380,9 +380,9 @@ struct ImageProcessing {
 
 /// Mounting of the camera on a base that rotates about a vertical axis.
 ///
-/// The camera is tilted without yaw (level_from_zenith()). Let t be the tilt and a its azimuth,
-/// from the image's x to its y. The up direction in the camera frame is then (sin t cos a, sin t
-/// sin a, cos t).
+/// The camera is tilted without yaw (level_rotation_from_zenith()). Let t be the tilt and a its
+/// azimuth, from the image's x to its y. The up direction in the camera frame is then (sin t cos a,
+/// sin t sin a, cos t).
 struct Mount {
   Eigen::Matrix3d level_from_camera;
   /// Vector from the rotation axis to the camera, in the level frame.
@@ -438,12 +438,12 @@ struct Scene {
 /// Angles in the file are in degrees.
 /// @throws InputError with line and key: unknown or missing keys, invalid values, a lamp that is
 /// not above the camera, a spot outside the room
-Scene read_scene(const std::filesystem::path& file);
+Scene read_scene_file(const std::filesystem::path& file);
 
 /// Draws the random parts of a scene that are the same in all captures, from its seed: the hot
 /// spots of random chips, for each lamp by its id, and the letters of signs.
 ///
-/// read_scene() calls it. Call it again after a change of the seed or of one of these parts.
+/// read_scene_file() calls it. Call it again after a change of the seed or of one of these parts.
 void draw_random_scene_parts(Scene& scene);
 
 /// Returns the reflection about a panel's plane, in the world:

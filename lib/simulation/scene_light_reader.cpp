@@ -14,75 +14,78 @@ namespace vlp {
 namespace {
 
 double read_fraction(YamlMap& map, const std::string& key) {
-  return map.get_required_column(key).get_number_within(0, 1, "(of the source's radiance)");
+  return map.get_required_yaml_value(key).read_yaml_number_within(0, 1,
+                                                                  "(of the source's radiance)");
 }
 
 DarkSide read_dark_side(YamlMap& map) {
-  return {
-      read_fraction(map, "reflector_ratio"),
-      rad_from_deg(map.get_required_column("azimuth_deg").get_number_within(-360, 360, "degrees"))};
+  return {read_fraction(map, "reflector_ratio"),
+          rad_from_deg(map.get_required_yaml_value("azimuth_deg")
+                           .read_yaml_number_within(-360, 360, "degrees"))};
 }
 
 Recess read_recess(YamlMap& map, const Glow& rim) {
   Recess recess;
-  recess.depth_m = map.get_required_column("depth_m").get_number_within(0, 2, "m");
-  const YamlValue source = map.get_required_column("source_diameter_m");
-  recess.source_diameter_m = source.get_number_within(1e-3, 10, "m");
-  if (recess.source_diameter_m > 2 * rim.radius_m()) {
-    throw source.make_error("is larger than the rim, diameter_m");
+  recess.depth_m = map.get_required_yaml_value("depth_m").read_yaml_number_within(0, 2, "m");
+  const YamlValue source = map.get_required_yaml_value("source_diameter_m");
+  recess.source_diameter_m = source.read_yaml_number_within(1e-3, 10, "m");
+  if (recess.source_diameter_m > 2 * rim.glow_radius_m()) {
+    throw source.make_yaml_error("is larger than the rim, diameter_m");
   }
   recess.reflector_ratio = read_fraction(map, "reflector_ratio");
-  recess.dark_side = map.optional_map("dark_side", read_dark_side);
+  recess.dark_side = map.convert_optional_yaml_mapping("dark_side", read_dark_side);
   recess.source_power =
-      map.get_optional_number("source_power", 0.5, 30, "").value_or(recess.source_power);
-  recess.rim_power = map.get_optional_number("rim_power", 0, 30, "").value_or(recess.rim_power);
-  recess.beam_power = map.get_optional_number("beam_power", 0, 30, "").value_or(recess.beam_power);
-  recess.far_side_slope =
-      map.get_optional_number("far_side_slope", 0.01, 100, "(meters sideways for each meter up)");
+      map.get_optional_yaml_number("source_power", 0.5, 30, "").value_or(recess.source_power);
+  recess.rim_power =
+      map.get_optional_yaml_number("rim_power", 0, 30, "").value_or(recess.rim_power);
+  recess.beam_power =
+      map.get_optional_yaml_number("beam_power", 0, 30, "").value_or(recess.beam_power);
+  recess.far_side_slope = map.get_optional_yaml_number("far_side_slope", 0.01, 100,
+                                                       "(meters sideways for each meter up)");
   return recess;
 }
 
 Chips read_chips(YamlMap& map, const Glow& disc) {
   Chips chips;
   chips.fraction = read_fraction(map, "fraction");
-  const YamlValue pitch = map.get_required_column("pitch_m");
-  chips.pitch_m = pitch.get_number_within(1e-3, 10, "m");
-  if (chips.pitch_m > 2 * disc.radius_m())
-    throw pitch.make_error("is larger than the disc, diameter_m");
-  const YamlValue width = map.get_required_column("width_m");
-  chips.width_m = width.get_number_within(1e-4, 10, "m");
+  const YamlValue pitch = map.get_required_yaml_value("pitch_m");
+  chips.pitch_m = pitch.read_yaml_number_within(1e-3, 10, "m");
+  if (chips.pitch_m > 2 * disc.glow_radius_m())
+    throw pitch.make_yaml_error("is larger than the disc, diameter_m");
+  const YamlValue width = map.get_required_yaml_value("width_m");
+  chips.width_m = width.read_yaml_number_within(1e-4, 10, "m");
   if (chips.width_m > 2 * chips.pitch_m) {
-    throw width.make_error("is more than twice pitch_m: such chips are an even disc");
+    throw width.make_yaml_error("is more than twice pitch_m: such chips are an even disc");
   }
   return chips;
 }
 
 RandomChips read_random_chips(YamlMap& map) {
   RandomChips chips;
-  chips.count = map.get_required_column("count").get_integer_within(1, 1000);
-  chips.sigma_fraction = map.get_required_column("sigma_fraction")
-                             .get_number_within(0.01, 1, "(of the disc's radius)");
-  chips.within_fraction =
-      map.get_required_column("within_fraction").get_number_within(0, 1, "(of the disc's radius)");
+  chips.count = map.get_required_yaml_value("count").read_yaml_integer_within(1, 1000);
+  chips.sigma_fraction = map.get_required_yaml_value("sigma_fraction")
+                             .read_yaml_number_within(0.01, 1, "(of the disc's radius)");
+  chips.within_fraction = map.get_required_yaml_value("within_fraction")
+                              .read_yaml_number_within(0, 1, "(of the disc's radius)");
   std::tie(chips.min_excess, chips.max_excess) =
-      read_yaml_range(map.get_required_column("excess"), 0, 10, "(of the disc's radiance)");
+      read_yaml_range(map.get_required_yaml_value("excess"), 0, 10, "(of the disc's radiance)");
   return chips;
 }
 
 Halo read_halo(YamlMap& map) {
   return {read_fraction(map, "fraction"),
-          map.get_required_column("length_m").get_number_within(1e-3, 2, "m")};
+          map.get_required_yaml_value("length_m").read_yaml_number_within(1e-3, 2, "m")};
 }
 
 /// Reads the keys of a glow except those of read_radial_profile().
 Glow read_glow(YamlMap& map, const Room& room) {
-  const YamlValue position = map.get_required_column("position_m");
-  Glow glow{read_yaml_point(position), read_lamp_shape(map), 0, 1};
-  if (!glow.shape.size_m) map.get_required_column("diameter_m");
+  const YamlValue position = map.get_required_yaml_value("position_m");
+  Glow glow{read_yaml_point(position), read_lamp_shape_from_yaml(map), 0, 1};
+  if (!glow.shape.size_m) map.get_required_yaml_value("diameter_m");
   glow.electron_rate_e_per_s = read_electron_rate(map, "electron_rate_e_per_s");
   const Eigen::Array3d at = glow.position_m.array();
   if ((at < room.min_m.array()).any() || (at > room.max_m.array()).any()) {
-    throw position.make_error("is outside the room");
+    throw position.make_yaml_error("is outside the room");
   }
   return glow;
 }
@@ -91,18 +94,21 @@ Glow read_glow(YamlMap& map, const Room& room) {
 /// are evenly bright.
 void read_radial_profile(YamlMap& map, Glow& glow) {
   if (glow.shape.kind != ShapeKind::disc) return;
-  glow.recess = map.optional_map("recess", [&](YamlMap& keys) { return read_recess(keys, glow); });
+  glow.recess = map.convert_optional_yaml_mapping(
+      "recess", [&](YamlMap& keys) { return read_recess(keys, glow); });
   if (!glow.recess) {
-    glow.rim_to_center_ratio = map.get_required_column("rim_to_center_ratio")
-                                   .get_number_within(0, 2, "(of the radiance at the center)");
-    glow.chips = map.optional_map("chips", [&](YamlMap& keys) { return read_chips(keys, glow); });
-    if (const auto chips = map.get_optional("random_chips")) {
+    glow.rim_to_center_ratio =
+        map.get_required_yaml_value("rim_to_center_ratio")
+            .read_yaml_number_within(0, 2, "(of the radiance at the center)");
+    glow.chips = map.convert_optional_yaml_mapping(
+        "chips", [&](YamlMap& keys) { return read_chips(keys, glow); });
+    if (const auto chips = map.get_optional_yaml_value("random_chips")) {
       if (glow.chips)
-        throw chips->make_error("excludes chips: a disc has one of them; leave one out");
-      glow.random_chips = chips->read_map(read_random_chips);
+        throw chips->make_yaml_error("excludes chips: a disc has one of them; leave one out");
+      glow.random_chips = chips->convert_yaml_mapping(read_random_chips);
     }
   }
-  glow.halo = map.optional_map("halo", read_halo);
+  glow.halo = map.convert_optional_yaml_mapping("halo", read_halo);
 }
 
 Glow read_steady_lamp(YamlMap& map, const Room& room) {
@@ -112,77 +118,79 @@ Glow read_steady_lamp(YamlMap& map, const Room& room) {
 }
 
 Reflection read_reflection(YamlMap& map, const std::vector<SceneLamp>& lamps, const Room& room) {
-  const YamlValue id = map.get_required_column("of_lamp");
-  const int wanted = id.get_integer_within(0, std::numeric_limits<int>::max());
+  const YamlValue id = map.get_required_yaml_value("of_lamp");
+  const int wanted = id.read_yaml_integer_within(0, std::numeric_limits<int>::max());
   const auto lamp = std::ranges::find(lamps, wanted, &SceneLamp::id);
-  if (lamp == lamps.end()) throw id.make_error("there is no lamp " + std::to_string(wanted));
+  if (lamp == lamps.end()) throw id.make_yaml_error("there is no lamp " + std::to_string(wanted));
   Reflection reflection{read_glow(map, room), std::size_t(lamp - lamps.begin())};
   reflection.glow.rim_to_center_ratio = 0;
   return reflection;
 }
 
 /// Reads a panel's corner and edges.
-Panel read_place(YamlMap& map) {
+Panel read_panel_edges(YamlMap& map) {
   Panel panel{};
-  panel.corner_m = read_yaml_point(map.get_required_column("corner_m"));
-  const YamlValue edges = map.get_required_column("edges_m");
-  const auto list = edges.get_list();
+  panel.corner_m = read_yaml_point(map.get_required_yaml_value("corner_m"));
+  const YamlValue edges = map.get_required_yaml_value("edges_m");
+  const auto list = edges.read_yaml_list();
   if (list.size() != 2)
-    throw edges.make_error("should be two vectors, from the corner along each edge");
+    throw edges.make_yaml_error("should be two vectors, from the corner along each edge");
   panel.edge_a_m = read_yaml_point(list[0]);
   panel.edge_b_m = read_yaml_point(list[1]);
   const double lengths = panel.edge_a_m.norm() * panel.edge_b_m.norm();
   constexpr double right_angle = 1e-6;
   if (!(lengths > 0) || std::abs(panel.edge_a_m.dot(panel.edge_b_m)) > right_angle * lengths) {
-    throw edges.make_error("should be at right angles to each other and not of length zero");
+    throw edges.make_yaml_error("should be at right angles to each other and not of length zero");
   }
   return panel;
 }
 
 Panel read_panel(YamlMap& map) {
-  Panel panel = read_place(map);
+  Panel panel = read_panel_edges(map);
   panel.electron_rate_e_per_s = read_electron_rate(map, "electron_rate_e_per_s");
   return panel;
 }
 
 RectifiedSine read_mains(YamlMap& map) {
-  return {map.get_required_column("frequency_hz").get_number_within(10, 1000, "Hz"),
-          map.get_required_column("depth").get_number_within(0, 1, "(of the light)"), 0};
+  return {map.get_required_yaml_value("frequency_hz").read_yaml_number_within(10, 1000, "Hz"),
+          map.get_required_yaml_value("depth").read_yaml_number_within(0, 1, "(of the light)"), 0};
 }
 
 SquareWave read_pwm(YamlMap& map) {
-  return {map.get_required_column("frequency_hz").get_number_within(1, 1e6, "Hz"),
-          map.get_required_column("duty").get_number_within(1e-3, 1, "(of a period)"), 0};
+  return {map.get_required_yaml_value("frequency_hz").read_yaml_number_within(1, 1e6, "Hz"),
+          map.get_required_yaml_value("duty").read_yaml_number_within(1e-3, 1, "(of a period)"), 0};
 }
 
 ForeignLight read_foreign_light(YamlMap& map, const Room& room) {
   ForeignLight light{read_steady_lamp(map, room), {}, {}};
-  const auto pwm = map.get_optional("pwm"), mains = map.get_optional("mains");
+  const auto pwm = map.get_optional_yaml_value("pwm"), mains = map.get_optional_yaml_value("mains");
   if (pwm.has_value() == mains.has_value())
-    throw map.make_error("needs one of the keys pwm and mains");
+    throw map.make_yaml_error("needs one of the keys pwm and mains");
   if (pwm) {
-    light.wave = pwm->read_map(read_pwm);
+    light.wave = pwm->convert_yaml_mapping(read_pwm);
   } else {
-    light.wave = mains->read_map(read_mains);
+    light.wave = mains->convert_yaml_mapping(read_mains);
   }
-  light.phase = map.get_optional_number("phase", 0, 1, "(of a period)");
+  light.phase = map.get_optional_yaml_number("phase", 0, 1, "(of a period)");
   return light;
 }
 
 Mirror read_mirror(YamlMap& map) {
-  return {read_place(map),
-          map.get_required_column("reflectance").get_number_within(0, 1, "(of the light)")};
+  return {
+      read_panel_edges(map),
+      map.get_required_yaml_value("reflectance").read_yaml_number_within(0, 1, "(of the light)")};
 }
 
 Blind read_venetian_blind(YamlMap& map) {
-  return {read_panel(map), map.get_required_column("slats").get_integer_within(1, 1000),
-          map.get_required_column("open_fraction").get_number_within(0, 1, "(of a slat's pitch)")};
+  return {read_panel(map), map.get_required_yaml_value("slats").read_yaml_integer_within(1, 1000),
+          map.get_required_yaml_value("open_fraction")
+              .read_yaml_number_within(0, 1, "(of a slat's pitch)")};
 }
 
 Sign read_sign(YamlMap& map) {
   return {read_panel(map),
-          map.get_required_column("lines").get_integer_within(1, 100),
-          map.get_required_column("letters").get_integer_within(1, 100),
+          map.get_required_yaml_value("lines").read_yaml_integer_within(1, 100),
+          map.get_required_yaml_value("letters").read_yaml_integer_within(1, 100),
           {}};
 }
 
@@ -211,19 +219,19 @@ void check_occluder(const YamlValue& item, const Panel& occluder, double lowest_
   const double highest_m = occluder.corner_m.z() + std::max(0.0, occluder.edge_a_m.z()) +
                            std::max(0.0, occluder.edge_b_m.z());
   if (highest_m < lowest_light_m) return;
-  throw item.make_error("is not below every lamp and other light");
+  throw item.make_yaml_error("is not below every lamp and other light");
 }
 
 SceneLamp read_scene_lamp(YamlMap& map, const Lamp& lamp, const Room& room) {
   SceneLamp read{lamp.id,
                  read_glow(map, room),
-                 map.get_required_column("frequency_hz").get_number(),
-                 map.get_required_column("duty").get_number(),
+                 map.get_required_yaml_value("frequency_hz").read_yaml_number(),
+                 map.get_required_yaml_value("duty").read_yaml_number(),
                  {},
                  Eigen::Vector3d::Zero()};
   read_radial_profile(map, read.glow);
-  read.phase = map.get_optional_number("phase", 0, 1, "(of a period)");
-  if (const auto error = map.get_optional("map_error_m"))
+  read.phase = map.get_optional_yaml_number("phase", 0, 1, "(of a period)");
+  if (const auto error = map.get_optional_yaml_value("map_error_m"))
     read.map_error_m = read_yaml_point(*error);
   return read;
 }
@@ -233,34 +241,34 @@ SceneLamp read_scene_lamp(YamlMap& map, const Lamp& lamp, const Room& room) {
 std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room) {
   std::vector<SceneLamp> lamps;
   UniqueLamps earlier;
-  for (const YamlValue& item : list.get_list()) {
-    lamps.push_back(item.read_map([&](YamlMap& map) {
-      const Lamp lamp = read_lamp(map);
-      earlier.check_id_and_position_unique(lamp, item);
-      earlier.add(lamp);
+  for (const YamlValue& item : list.read_yaml_list()) {
+    lamps.push_back(item.convert_yaml_mapping([&](YamlMap& map) {
+      const Lamp lamp = read_lamp_from_yaml(map);
+      earlier.check_lamp_id_and_position_unique(lamp, item);
+      earlier.register_lamp_id_and_position(lamp);
       return read_scene_lamp(map, lamp, room);
     }));
   }
   return lamps;
 }
 
-Clutter read_clutter(YamlMap& map, const std::vector<SceneLamp>& lamps, const Room& room) {
+Clutter read_scene_clutter(YamlMap& map, const std::vector<SceneLamp>& lamps, const Room& room) {
   Clutter clutter;
-  clutter.steady_lamps = map.optional_maps(
+  clutter.steady_lamps = map.convert_optional_yaml_mapping_list(
       "steady_lamps", [&](YamlMap& keys) { return read_steady_lamp(keys, room); });
-  clutter.windows = map.optional_maps("windows", read_panel);
-  clutter.reflections = map.optional_maps(
+  clutter.windows = map.convert_optional_yaml_mapping_list("windows", read_panel);
+  clutter.reflections = map.convert_optional_yaml_mapping_list(
       "reflections", [&](YamlMap& keys) { return read_reflection(keys, lamps, room); });
-  clutter.foreign_lights = map.optional_maps(
+  clutter.foreign_lights = map.convert_optional_yaml_mapping_list(
       "foreign_lights", [&](YamlMap& keys) { return read_foreign_light(keys, room); });
-  clutter.mirrors = map.optional_maps("mirrors", read_mirror);
-  clutter.blinds = map.optional_maps("blinds", read_venetian_blind);
-  clutter.signs = map.optional_maps("signs", read_sign);
-  clutter.ambient_flicker = map.optional_map("ambient_flicker", read_mains);
+  clutter.mirrors = map.convert_optional_yaml_mapping_list("mirrors", read_mirror);
+  clutter.blinds = map.convert_optional_yaml_mapping_list("blinds", read_venetian_blind);
+  clutter.signs = map.convert_optional_yaml_mapping_list("signs", read_sign);
+  clutter.ambient_flicker = map.convert_optional_yaml_mapping("ambient_flicker", read_mains);
   const double lowest_m = find_lowest_light_m(lamps, clutter);
-  if (const auto occluders = map.get_optional("occluders")) {
-    for (const YamlValue& item : occluders->get_list()) {
-      clutter.occluders.push_back(item.read_map(read_panel));
+  if (const auto occluders = map.get_optional_yaml_value("occluders")) {
+    for (const YamlValue& item : occluders->read_yaml_list()) {
+      clutter.occluders.push_back(item.convert_yaml_mapping(read_panel));
       check_occluder(item, clutter.occluders.back(), lowest_m);
     }
   }

@@ -26,8 +26,8 @@ std::pair<double, double> read_yaml_range(const YamlValue& value, double min, do
                                           std::string_view unit);
 /// Read lamps, or other objects; lights are checked to be inside the room.
 std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room);
-Clutter read_clutter(YamlMap& map, const std::vector<SceneLamp>& lamps, const Room& room);
+Clutter read_scene_clutter(YamlMap& map, const std::vector<SceneLamp>& lamps, const Room& room);
 /// Reads a capture set. Camera heights are checked to be below the lamps and inside the room.
-CaptureSet read_capture_set(YamlMap& map, const Scene& scene, const Room& room);
+CaptureSet read_scene_capture_set(YamlMap& map, const Scene& scene, const Room& room);
 
 }  // namespace vlp

@@ -58,7 +58,7 @@ struct CellTraversal {
 
 }  // namespace
 
-Mosaic::Mosaic(const std::vector<Rectangle>& rectangles) {
+RectanglePattern::RectanglePattern(const std::vector<Rectangle>& rectangles) {
   for (const Rectangle& each : rectangles) {
     x_m_.insert(x_m_.end(), {each.left_m, each.right_m});
     y_m_.insert(y_m_.end(), {each.top_m, each.bottom_m});
@@ -67,23 +67,23 @@ Mosaic::Mosaic(const std::vector<Rectangle>& rectangles) {
   y_m_ = merge_lines(std::move(y_m_));
   stride_ = x_m_.size() + 1;
   values_.assign(stride_ * (y_m_.size() + 1), 0);
-  for (const Rectangle& rectangle : rectangles) fill(rectangle);
+  for (const Rectangle& rectangle : rectangles) fill_pattern_rectangle(rectangle);
   accumulate_row_sums();
 }
 
-void Mosaic::fill(const Rectangle& rectangle) {
+void RectanglePattern::fill_pattern_rectangle(const Rectangle& rectangle) {
   const int top = find_closest_line(y_m_, rectangle.top_m),
             bottom = find_closest_line(y_m_, rectangle.bottom_m);
   const int left = find_closest_line(x_m_, rectangle.left_m),
             right = find_closest_line(x_m_, rectangle.right_m);
   for (int row = top + 1; row <= bottom; ++row) {
     for (int column = left + 1; column <= right; ++column) {
-      values_[flat_index(column, row)] = rectangle.value;
+      values_[flat_cell_index(column, row)] = rectangle.value;
     }
   }
 }
 
-void Mosaic::accumulate_row_sums() {
+void RectanglePattern::accumulate_row_sums() {
   sums_.assign(values_.size(), 0);
   for (std::size_t i = 0; i < values_.size(); ++i) {
     const std::size_t column = i % stride_;
@@ -93,14 +93,14 @@ void Mosaic::accumulate_row_sums() {
 }
 
 /// Returns the integral of the pattern along a row up to x, which lies in the given column.
-double Mosaic::integrate_row_up_to(int column, int row, double x) const {
+double RectanglePattern::integrate_pattern_row_up_to(int column, int row, double x) const {
   if (column == 0) return 0;
-  const std::size_t i = flat_index(column, row);
+  const std::size_t i = flat_cell_index(column, row);
   return sums_[i] + values_[i] * (x - x_m_[static_cast<std::size_t>(column) - 1]);
 }
 
-double Mosaic::integrate_shape_along_edge(const Eigen::Vector2d& p,
-                                          const Eigen::Vector2d& q) const {
+double RectanglePattern::integrate_shape_along_edge(const Eigen::Vector2d& p,
+                                                    const Eigen::Vector2d& q) const {
   const Eigen::Vector2d displacement = q - p;
   if (!displacement.allFinite()) return std::numeric_limits<double>::quiet_NaN();
   CellTraversal x(x_m_, p.x(), displacement.x()), y(y_m_, p.y(), displacement.y());
@@ -109,7 +109,7 @@ double Mosaic::integrate_shape_along_edge(const Eigen::Vector2d& p,
     const double x_end = x.end(), y_end = y.end();
     const double next = std::min({x_end, y_end, 1.0});
     const double middle = p.x() + displacement.x() * (done + next) / 2;
-    sum += integrate_row_up_to(x.cell, y.cell, middle) * (next - done);
+    sum += integrate_pattern_row_up_to(x.cell, y.cell, middle) * (next - done);
     if (x_end <= y_end) {
       x.step();
     } else {
@@ -120,7 +120,7 @@ double Mosaic::integrate_shape_along_edge(const Eigen::Vector2d& p,
   return sum * displacement.y();
 }
 
-std::optional<double> Mosaic::find_constant_value(
+std::optional<double> RectanglePattern::find_constant_value_in_quadrilateral(
     const std::array<Eigen::Vector2d, 4>& corners) const {
   const auto points = to_matrix(corners);
   if (!points.allFinite()) return std::nullopt;
@@ -132,19 +132,21 @@ std::optional<double> Mosaic::find_constant_value(
   };
   if (ends_before(x_m_, column, upper.x()) || ends_before(y_m_, row, upper.y()))
     return std::nullopt;
-  return values_[flat_index(column, row)];
+  return values_[flat_cell_index(column, row)];
 }
 
-double Disc::integrate_triangle(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
+double Disc::integrate_disc_radiance_in_triangle(const Eigen::Vector2d& p,
+                                                 const Eigen::Vector2d& q) const {
   return cross_product_2d(p, q) *
          (0.5 - fall_ / 12 * (p.squaredNorm() + p.dot(q) + q.squaredNorm()));
 }
 
-double Disc::integrate_sector(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
+double Disc::integrate_disc_radiance_in_sector(const Eigen::Vector2d& p,
+                                               const Eigen::Vector2d& q) const {
   return std::atan2(cross_product_2d(p, q), p.dot(q)) * (0.5 - fall_ / 4);
 }
 
-std::optional<double> Disc::find_constant_value(
+std::optional<double> Disc::find_constant_value_in_quadrilateral(
     const std::array<Eigen::Vector2d, 4>& corners) const {
   const auto points = to_matrix(corners);
   const bool outside =
@@ -153,19 +155,20 @@ std::optional<double> Disc::find_constant_value(
 }
 
 double Disc::integrate_shape_along_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
-  if (p.squaredNorm() <= 1 && q.squaredNorm() <= 1) return integrate_triangle(p, q);
+  if (p.squaredNorm() <= 1 && q.squaredNorm() <= 1)
+    return integrate_disc_radiance_in_triangle(p, q);
   // |p + t (q - p)| = 1
   const Eigen::Vector2d displacement = q - p;
   const double a = displacement.squaredNorm(), b = p.dot(displacement), c = p.squaredNorm() - 1;
   const double discriminant = b * b - a * c;
-  if (!(discriminant > 0)) return integrate_sector(p, q);
+  if (!(discriminant > 0)) return integrate_disc_radiance_in_sector(p, q);
   const double root = std::sqrt(discriminant);
   const double enters = std::max((-b - root) / a, 0.0), leaves = std::min((-b + root) / a, 1.0);
-  if (!(enters < leaves)) return integrate_sector(p, q);
+  if (!(enters < leaves)) return integrate_disc_radiance_in_sector(p, q);
   const Eigen::Vector2d in = p + enters * displacement, out = p + leaves * displacement;
-  double sum = integrate_triangle(in, out);
-  if (enters > 0) sum += integrate_sector(p, in);
-  if (leaves < 1) sum += integrate_sector(out, q);
+  double sum = integrate_disc_radiance_in_triangle(in, out);
+  if (enters > 0) sum += integrate_disc_radiance_in_sector(p, in);
+  if (leaves < 1) sum += integrate_disc_radiance_in_sector(out, q);
   return sum;
 }
 

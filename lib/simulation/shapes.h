@@ -19,13 +19,13 @@ struct Rectangle {
 
 /// Flat pattern of rectangles, each with a constant value; positions are in m. The value is 0
 /// outside all rectangles.
-class Mosaic {
+class RectanglePattern {
  public:
   /// Creates the pattern; later rectangles cover earlier ones. Edges closer than 1 nm are merged.
-  explicit Mosaic(const std::vector<Rectangle>& rectangles);
+  explicit RectanglePattern(const std::vector<Rectangle>& rectangles);
 
-  Eigen::Vector2d intersect_ray(const Eigen::Vector3d& origin,
-                                const Eigen::Vector3d& direction) const {
+  Eigen::Vector2d intersect_ray_with_shape(const Eigen::Vector3d& origin,
+                                           const Eigen::Vector3d& direction) const {
     return intersect_ray_with_plane(origin, direction);
   }
 
@@ -35,15 +35,16 @@ class Mosaic {
 
   /// Returns the value of the pattern over a quadrilateral; std::nullopt if a line of the pattern
   /// lies between its corners.
-  std::optional<double> find_constant_value(const std::array<Eigen::Vector2d, 4>& corners) const;
+  std::optional<double> find_constant_value_in_quadrilateral(
+      const std::array<Eigen::Vector2d, 4>& corners) const;
 
  private:
-  void fill(const Rectangle& rectangle);
+  void fill_pattern_rectangle(const Rectangle& rectangle);
   void accumulate_row_sums();
-  std::size_t flat_index(int column, int row) const {
+  std::size_t flat_cell_index(int column, int row) const {
     return static_cast<std::size_t>(row) * stride_ + static_cast<std::size_t>(column);
   }
-  double integrate_row_up_to(int column, int row, double x) const;
+  double integrate_pattern_row_up_to(int column, int row, double x) const;
 
   std::vector<double> x_m_, y_m_;
   /// Row by row. Each row begins with the empty cell to its left and ends with the one to its
@@ -59,13 +60,14 @@ class Disc {
   Disc(const Eigen::Vector2d& half_axes_m, double rim_to_center_ratio)
       : half_axes_m_(half_axes_m), fall_(1 - rim_to_center_ratio) {}
 
-  Eigen::Vector2d intersect_ray(const Eigen::Vector3d& origin,
-                                const Eigen::Vector3d& direction) const {
+  Eigen::Vector2d intersect_ray_with_shape(const Eigen::Vector3d& origin,
+                                           const Eigen::Vector3d& direction) const {
     return intersect_ray_with_plane(origin, direction).cwiseQuotient(half_axes_m_);
   }
 
   /// Returns 0 for a quadrilateral on the outer side of one side of the square around the disc.
-  std::optional<double> find_constant_value(const std::array<Eigen::Vector2d, 4>& corners) const;
+  std::optional<double> find_constant_value_in_quadrilateral(
+      const std::array<Eigen::Vector2d, 4>& corners) const;
 
   /// Returns the integral over the part of the triangle (0, p, q) inside the disc, in units of the
   /// radius. add_shape_to_image() needs no other triangles.
@@ -74,8 +76,10 @@ class Disc {
   double integrate_shape_along_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
 
  private:
-  double integrate_triangle(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
-  double integrate_sector(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
+  double integrate_disc_radiance_in_triangle(const Eigen::Vector2d& p,
+                                             const Eigen::Vector2d& q) const;
+  double integrate_disc_radiance_in_sector(const Eigen::Vector2d& p,
+                                           const Eigen::Vector2d& q) const;
 
   Eigen::Vector2d half_axes_m_;
   double fall_;

@@ -49,18 +49,18 @@ CaptureIndices find_capture_indices(const LampShots& captures, std::size_t index
 std::optional<Lens::Ray> find_last_ray(const Lens& lens, const Eigen::Vector2d& middle,
                                        const Eigen::Vector2d& offset) {
   constexpr int halvings = 30;
-  auto ray = lens.unproject(middle + offset);
+  auto ray = lens.unproject_pixel(middle + offset);
   double within = 0, beyond = 1;
   for (int halving = 0; !ray && halving < halvings; ++halving) {
     const double between = (within + beyond) / 2;
-    (lens.unproject(middle + between * offset) ? within : beyond) = between;
+    (lens.unproject_pixel(middle + between * offset) ? within : beyond) = between;
   }
-  return ray ? ray : lens.unproject(middle + within * offset);
+  return ray ? ray : lens.unproject_pixel(middle + within * offset);
 }
 
 }  // namespace
 
-Pose BaseMotion::pose(double time_s) const {
+Pose BaseMotion::camera_pose_at(double time_s) const {
   const double yaw = yaw_rad + turn_rate_rad_per_s * time_s;
   Pose pose{axis_m, yaw};
   pose.position_m.head<2>() +=
@@ -68,7 +68,7 @@ Pose BaseMotion::pose(double time_s) const {
   return pose;
 }
 
-Inclination BaseMotion::inclination(double time_s) const {
+Inclination BaseMotion::base_inclination_at(double time_s) const {
   const double angle = phase_rad + 2 * std::numbers::pi * vibration.frequency_hz * time_s;
   return {lean.roll_rad + vibration.amplitude_rad * std::sin(angle),
           lean.pitch_rad + vibration.amplitude_rad * std::cos(angle)};
@@ -80,10 +80,10 @@ Eigen::Vector2d BaseMotion::camera_velocity_m_per_s() const {
 }
 
 Eigen::Isometry3d BaseMotion::world_from_camera(double time_s) const {
-  const Pose level = pose(time_s);
+  const Pose level = camera_pose_at(time_s);
   Eigen::Isometry3d world_from_camera;
   world_from_camera.linear() = rotation_about_z(level.yaw_rad) *
-                               level_from_inclination(inclination(time_s)) *
+                               level_rotation_from_inclination(inclination(time_s)) *
                                mount.level_from_camera;
   world_from_camera.translation() = level.position_m;
   return world_from_camera;
@@ -100,9 +100,9 @@ std::size_t count_captures_of_set(const CaptureSet& set) {
          static_cast<std::size_t>(lamps.repeat);
 }
 
-LampShot make_lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index) {
+LampShot make_simulated_lamp_capture(const Scene& scene, const CaptureSet& set, std::size_t index) {
   const LampShots& captures = *set.lamps;
-  cv::RNG random = make_seeded_generator(scene.seed, set.folder, index);
+  cv::RNG random = make_seeded_random_generator(scene.seed, set.folder, index);
   const CaptureIndices indices = find_capture_indices(captures, index);
   const double jitter_rad = captures.yaw_jitter_rad * random.uniform(-1.0, 1.0);
 
@@ -143,16 +143,17 @@ LampShot make_lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t i
     const double frequency_hz =
         std::visit([](const auto& wave) { return wave.frequency_hz; }, light.wave);
     shot.foreign_waves.push_back(
-        with_wave_phase(light.wave, draw_phase(light.phase, frequency_hz)));
+        copy_light_wave_with_phase(light.wave, draw_phase(light.phase, frequency_hz)));
   }
   if (scene.clutter.ambient_flicker) shot.ambient_phase = random.uniform(0.0, 1.0);
   return shot;
 }
 
-BoardShot make_board_shot(const Scene& scene, const CaptureSet& set, std::size_t index) {
+BoardShot make_simulated_board_capture(const Scene& scene, const CaptureSet& set,
+                                       std::size_t index) {
   const BoardViews& views = *set.board;
   const Lens lens(scene.camera.lens_model, scene.camera.intrinsics);
-  cv::RNG random = make_seeded_generator(scene.seed, set.folder, index);
+  cv::RNG random = make_seeded_random_generator(scene.seed, set.folder, index);
   const auto fraction = [&] { return random.uniform(-1.0, 1.0); };
 
   // The board's center is placed on a random ray and the board faces the camera; then it is rotated
@@ -168,7 +169,7 @@ BoardShot make_board_shot(const Scene& scene, const CaptureSet& set, std::size_t
   const double azimuth = std::numbers::pi * fraction(),
                tilt = views.tilt_rad * std::abs(fraction());
   const double roll = views.roll_rad * fraction();
-  const Eigen::Matrix3d facing = level_from_zenith(sight).transpose();
+  const Eigen::Matrix3d facing = level_rotation_from_zenith(sight).transpose();
   const Eigen::Vector3d tilt_axis(std::cos(azimuth), std::sin(azimuth), 0);
 
   BoardShot shot;

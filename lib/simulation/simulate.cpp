@@ -45,8 +45,8 @@ void make_folder(const fs::path& folder) {
 
 void write_common_files(const Scene& scene, const fs::path& output) {
   if (!scene.lamps.empty()) {
-    write_lamp_map(output / "lamps.yaml", make_lamp_map(scene, true));
-    write_lamp_map(output / "true_lamps.yaml", make_lamp_map(scene, false));
+    write_lamp_map(output / "lamps.yaml", make_scene_lamp_map(scene, true));
+    write_lamp_map(output / "true_lamps.yaml", make_scene_lamp_map(scene, false));
   }
   if (scene.board) write_board(output / "board.yaml", scene.board->print);
   write_calibration(output / "true_calibration.yaml", make_true_calibration(scene));
@@ -54,7 +54,8 @@ void write_common_files(const Scene& scene, const fs::path& output) {
 
 void write_image(const fs::path& file, const cv::Mat& lines, const Scene& scene) {
   const bool by_rows = scene.camera.readout == Readout::rows;
-  const auto bytes = encode_image(by_rows ? lines : cv::Mat(lines.t()), scene.picture);
+  const auto bytes =
+      encode_image_as_jpeg_or_png(by_rows ? lines : cv::Mat(lines.t()), scene.picture);
   write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
@@ -63,18 +64,18 @@ bool render_capture(const Scene& scene, const FrameRenderer& renderer, const Cap
                     std::size_t index, const fs::path& folder) {
   const auto write = [&](const std::string& image, const auto& electrons, std::uint64_t seed) {
     if (fs::exists(folder / image)) return false;
-    write_image(folder / image, simulate_sensor(scene.sensor, electrons(), seed, scene.picture),
-                scene);
+    write_image(folder / image,
+                simulate_sensor_image(scene.sensor, electrons(), seed, scene.picture), scene);
     return true;
   };
   if (set.board) {
-    const BoardShot shot = make_board_shot(scene, set, index);
+    const BoardShot shot = make_simulated_board_capture(scene, set, index);
     return write(
-        shot.image, [&] { return renderer.render_board_electrons(shot); }, shot.noise_seed);
+        shot.image, [&] { return renderer.render_board_in_electrons(shot); }, shot.noise_seed);
   }
-  const LampShot shot = make_lamp_shot(scene, set, index);
+  const LampShot shot = make_simulated_lamp_capture(scene, set, index);
   return write(
-      shot.image, [&] { return renderer.render_lamp_electrons(shot); }, shot.noise_seed);
+      shot.image, [&] { return renderer.render_lamps_in_electrons(shot); }, shot.noise_seed);
 }
 
 /// Returns the gray level of a source that fills a pixel on the axis. Without a picture it may
@@ -84,7 +85,7 @@ double compute_level(const Scene& scene, const CaptureSet& set, double electron_
   const double level =
       sensor.black_level_dn +
       sensor.gain_dn_per_e * std::min(electron_rate_e_per_s * set.exposure_s, sensor.full_well_e);
-  return scene.picture ? correct_views_for_tone_curve(*scene.picture, sensor, level) : level;
+  return scene.picture ? apply_tone_curve_to_gray_level(*scene.picture, sensor, level) : level;
 }
 
 std::string whole(double value) { return std::to_string(std::lround(value)); }
@@ -93,7 +94,7 @@ void add_brightness_warnings(const Scene& scene, const CaptureSet& set, const st
                              double bright_e_per_s, const std::string& dark, double dark_e_per_s,
                              std::vector<std::string>& warnings) {
   constexpr double too_dark = 0.03, too_bright = 0.6;
-  const double white = white_level_dn(scene.sensor);
+  const double white = sensor_white_level_dn(scene.sensor);
   const std::string fit =
       ": does sensor.gain_dn_per_e suit sensor.bits, and the light the exposure?";
   const double high = compute_level(scene, set, bright_e_per_s);
@@ -165,8 +166,9 @@ void claim_output_folder(const fs::path& output, const std::string& provenance) 
   write_file(mark, provenance);
 }
 
-SimulationSummary simulate(const Scene& scene, const fs::path& output,
-                           const SimulationOptions& options, const SimulationProgress& progress) {
+SimulationSummary render_scene_to_folder(const Scene& scene, const fs::path& output,
+                                         const SimulationOptions& options,
+                                         const SimulationProgress& progress) {
   const std::vector<CaptureSet> sets = select_sets(scene, options.folders);
   const FrameRenderer renderer(scene);
   claim_output_folder(output, options.provenance);

@@ -13,7 +13,7 @@
 
 namespace vlp {
 
-/// Options of simulate().
+/// Options of render_scene_to_folder().
 struct SimulationOptions {
   /// Names of the folders of the scene to render. Empty: all folders of the scene.
   std::vector<std::string> folders;
@@ -53,8 +53,9 @@ using SimulationProgress = std::function<void(const SimulationSummary& so_far, s
 /// resumed. The bytes depend on the scene alone, not on the number of threads.
 /// @throws InputError if a folder holds something else, or if files cannot be written
 /// @throws std::invalid_argument if the scene lacks a folder, or if the board cannot be printed
-SimulationSummary simulate(const Scene& scene, const std::filesystem::path& output,
-                           const SimulationOptions& options, const SimulationProgress& progress);
+SimulationSummary render_scene_to_folder(const Scene& scene, const std::filesystem::path& output,
+                                         const SimulationOptions& options,
+                                         const SimulationProgress& progress);
 
 /// Claims a folder for captures by writing `provenance` as its scene.yaml. Has no effect if the
 /// folder is claimed by the same `provenance` already.

@@ -40,11 +40,13 @@ std::optional<ImagePoint> find_image_point(const FrameRenderer& renderer, const 
   double time_s = 0;
   // Each iteration multiplies the error by the lines that the point moves in a row time.
   for (int iteration = 0; iteration < 200; ++iteration) {
-    const auto pixel = renderer.pixel_rays().lens().project(camera_from_target(time_s) * point_m);
+    const auto pixel =
+        renderer.pixel_rays().camera_lens().project_point(camera_from_target(time_s) * point_m);
     if (!pixel) return std::nullopt;
     if (before && (*pixel - *before).norm() < tolerance_px) return ImagePoint{*pixel, time_s};
     before = pixel;
-    time_s = shutter.exposure_center_s(renderer.pixel_rays().line_and_place_of_pixel(*pixel)[0]);
+    time_s = shutter.line_exposure_center_s(
+        renderer.pixel_rays().convert_pixel_to_readout_order(*pixel)[0]);
   }
   return std::nullopt;
 }
@@ -76,9 +78,9 @@ GlowPoints sample_surface_points(const Glow& glow) {
   constexpr double golden_angle = std::numbers::pi * (3 - 2.2360679774997896964);
   GlowPoints points;
   const auto add = [&](const Eigen::Vector2d& at) {
-    points.face_m.push_back(world_from_shape(glow.shape, glow.position_m, at));
+    points.face_m.push_back(transform_shape_point_to_world(glow.shape, glow.position_m, at));
   };
-  if (traits_of(glow.shape.kind).is_round) {
+  if (get_lamp_shape_traits(glow.shape.kind).is_round) {
     for (int i = 0; i < count; ++i) {
       const double radius = std::sqrt((i + 0.5) / count), angle = golden_angle * i;
       add(radius * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
@@ -89,7 +91,7 @@ GlowPoints sample_surface_points(const Glow& glow) {
       add(2 * (cell + 0.5) / per_side - 1);
     }
   }
-  points.rim_m = outline_of(glow.shape, glow.position_m, rim_points);
+  points.rim_m = compute_lamp_outline_points(glow.shape, glow.position_m, rim_points);
   return points;
 }
 
@@ -138,7 +140,7 @@ std::optional<GlowImage> find_glow_image(const Scene& scene, const FrameRenderer
     if (!are_on_same_side_of_mirror(*mirror, center_m, eye_m)) return std::nullopt;
     center_m = make_reflection_about_panel(mirror->pane) * center_m;
   }
-  const Shutter shutter = renderer.make_shutter(shot.exposure_s);
+  const Shutter shutter = renderer.make_rolling_shutter(shot.exposure_s);
   const auto center = find_image_point(renderer, shutter, camera_from_world, center_m);
   if (!center) return std::nullopt;
   const double in_view =
@@ -156,9 +158,9 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
   // Columns that no capture of the set needs are omitted.
   bool moves = false, has_roll_pitch = false;
   for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
-    const BaseMotion motion = make_lamp_shot(scene, set, i).motion;
-    moves = moves || !motion.is_at_rest();
-    has_roll_pitch = has_roll_pitch || !motion.is_level();
+    const BaseMotion motion = make_simulated_lamp_capture(scene, set, i).motion;
+    moves = moves || !motion.is_base_at_rest();
+    has_roll_pitch = has_roll_pitch || !motion.is_base_level();
   }
   std::vector<std::string> columns{"image", "x_m", "y_m", "z_m", "yaw_rad"};
   if (moves) {
@@ -175,8 +177,8 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
             : std::initializer_list<std::string_view>{"image", "time_s"});
   std::size_t empty = 0;
   for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
-    const LampShot shot = make_lamp_shot(scene, set, i);
-    const auto& [position_m, yaw_rad] = shot.motion.pose(0);
+    const LampShot shot = make_simulated_lamp_capture(scene, set, i);
+    const auto& [position_m, yaw_rad] = shot.motion.camera_pose_at(0);
     const std::string x = length(position_m.x()), y = length(position_m.y());
     const std::string z = length(position_m.z()), time = format_fixed_decimals(shot.time_s, 9);
     std::vector<std::string> row{shot.image, x, y, z, angle(wrap_angle_rad(yaw_rad))};
@@ -186,20 +188,20 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
                              angle(shot.motion.turn_rate_rad_per_s)});
     }
     if (has_roll_pitch) {
-      const Inclination lean = shot.motion.inclination(0);
+      const Inclination lean = shot.motion.base_inclination_at(0);
       row.insert(row.end(), {angle(lean.roll_rad), angle(lean.pitch_rad)});
     }
-    truth.row(row);
+    truth.write_csv_row(row);
     if (known) {
-      captures.row({shot.image, time, x, y, z});
+      captures.write_csv_row({shot.image, time, x, y, z});
     } else {
-      captures.row({shot.image, time});
+      captures.write_csv_row({shot.image, time});
     }
     const auto lamps = find_true_lamps_in_image(scene, renderer, shot);
     empty += lamps.empty();
     for (const auto& [id, at_px, in_view] : lamps) {
-      detections.row({shot.image, std::to_string(id), pixel(at_px.x()), pixel(at_px.y()),
-                      format_significant_digits(in_view, 3)});
+      detections.write_csv_row({shot.image, std::to_string(id), pixel(at_px.x()), pixel(at_px.y()),
+                                format_significant_digits(in_view, 3)});
     }
   }
   truth.save_file();
@@ -214,11 +216,11 @@ void write_other_lights(const Scene& scene, const FrameRenderer& renderer, const
   CsvWriter table(folder / "true_other_lights.csv",
                   {"image", "kind", "lamp", "u_px", "v_px", "in_view"});
   for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
-    const LampShot shot = make_lamp_shot(scene, set, i);
+    const LampShot shot = make_simulated_lamp_capture(scene, set, i);
     for (const auto& [kind, lamp, at_px, in_view] :
-         find_other_lights_in_image(scene, renderer, shot)) {
-      table.row({shot.image, kind, lamp ? std::to_string(*lamp) : "", pixel(at_px.x()),
-                 pixel(at_px.y()), format_significant_digits(in_view, 3)});
+         find_true_other_lights_in_image(scene, renderer, shot)) {
+      table.write_csv_row({shot.image, kind, lamp ? std::to_string(*lamp) : "", pixel(at_px.x()),
+                           pixel(at_px.y()), format_significant_digits(in_view, 3)});
     }
   }
   table.save_file();
@@ -233,21 +235,21 @@ std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
   CsvWriter corners(folder / "true_corners.csv", columns);
   std::size_t empty = 0;
   for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
-    const BoardShot shot = make_board_shot(scene, set, i);
+    const BoardShot shot = make_simulated_board_capture(scene, set, i);
     const Eigen::Isometry3d camera_from_board = shot.camera_from_board(0);
     const Eigen::Vector3d place_m = camera_from_board.translation();
     const Eigen::AngleAxisd rotation(camera_from_board.linear());
     const Eigen::Vector3d rotation_vector_rad = rotation.angle() * rotation.axis();
-    boards.row({shot.image, length(place_m.x()), length(place_m.y()), length(place_m.z()),
-                angle(rotation_vector_rad.x()), angle(rotation_vector_rad.y()),
-                angle(rotation_vector_rad.z())});
+    boards.write_csv_row({shot.image, length(place_m.x()), length(place_m.y()), length(place_m.z()),
+                          angle(rotation_vector_rad.x()), angle(rotation_vector_rad.y()),
+                          angle(rotation_vector_rad.z())});
     const auto visible_corners = find_true_corners_in_image(scene, renderer, shot);
     empty += visible_corners.empty();
     for (const auto& [tag, corner, at_px] : visible_corners) {
       std::vector<std::string> row{shot.image};
       if (tag) row.push_back(std::to_string(*tag));
       row.insert(row.end(), {std::to_string(corner), pixel(at_px.x()), pixel(at_px.y())});
-      corners.row(row);
+      corners.write_csv_row(row);
     }
   }
   boards.save_file();
@@ -267,9 +269,9 @@ std::vector<TrueLamp> find_true_lamps_in_image(const Scene& scene, const FrameRe
   return lamps;
 }
 
-std::vector<TrueOtherLight> find_other_lights_in_image(const Scene& scene,
-                                                       const FrameRenderer& renderer,
-                                                       const LampShot& shot) {
+std::vector<TrueOtherLight> find_true_other_lights_in_image(const Scene& scene,
+                                                            const FrameRenderer& renderer,
+                                                            const LampShot& shot) {
   std::vector<TrueOtherLight> lights;
   for (const Mirror& mirror : scene.clutter.mirrors) {
     for (const SceneLamp& lamp : scene.lamps) {
@@ -294,8 +296,8 @@ std::vector<TrueCorner> find_true_corners_in_image(const Scene& scene,
   const auto camera_from_board = [&](double time_s) { return shot.camera_from_board(time_s); };
   std::vector<TrueCorner> corners;
   const auto add = [&](std::optional<int> tag, int corner, const Eigen::Vector2d& at_m) {
-    const Eigen::Vector3d point_m(at_m.x(), at_m.y(), warp.compute_deflection(at_m).depth_m);
-    const auto at = find_image_point(renderer, renderer.make_shutter(shot.exposure_s),
+    const Eigen::Vector3d point_m(at_m.x(), at_m.y(), warp.compute_board_deflection(at_m).depth_m);
+    const auto at = find_image_point(renderer, renderer.make_rolling_shutter(shot.exposure_s),
                                      camera_from_board, point_m);
     if (at && is_in_image(scene.camera, at->pixel)) corners.push_back({tag, corner, at->pixel});
   };
@@ -326,7 +328,7 @@ Calibration make_true_calibration(const Scene& scene) {
   return calibration;
 }
 
-LampMap make_lamp_map(const Scene& scene, bool surveyed) {
+LampMap make_scene_lamp_map(const Scene& scene, bool surveyed) {
   LampMap map;
   for (const SceneLamp& lamp : scene.lamps) {
     Eigen::Vector3d position_m = lamp.glow.position_m;

@@ -45,9 +45,9 @@ struct TrueOtherLight {
 
 /// Returns the mirror images and foreign lights that are at least partly in view and whose center
 /// the lens describes.
-std::vector<TrueOtherLight> find_other_lights_in_image(const Scene& scene,
-                                                       const FrameRenderer& renderer,
-                                                       const LampShot& shot);
+std::vector<TrueOtherLight> find_true_other_lights_in_image(const Scene& scene,
+                                                            const FrameRenderer& renderer,
+                                                            const LampShot& shot);
 
 /// Corner of a tag's black border as it appears in a capture, in the order of BoardTag. For a board
 /// of squares without tags: an inner corner, numbered as in list_chessboard_corners_m().
@@ -66,7 +66,7 @@ std::vector<TrueCorner> find_true_corners_in_image(const Scene& scene,
 Calibration make_true_calibration(const Scene& scene);
 
 /// Returns the lamp map with map errors (`surveyed` true), or with the true positions.
-LampMap make_lamp_map(const Scene& scene, bool surveyed);
+LampMap make_scene_lamp_map(const Scene& scene, bool surveyed);
 
 /// Writes the ground truth of a set into `folder`.
 ///   Lamps: truth.csv, true_detections.csv (with the fraction in view), captures.csv and, for a

@@ -73,17 +73,17 @@ std::string get_host_name() {
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
 }
 
-bool is_server_address(const std::string& where) {
+bool is_database_server_address(const std::string& where) {
   return where.find(kScheme) != std::string::npos;
 }
 
-bool contains_password(const std::string& where) {
-  return is_server_address(where) && !parse_parts(where)["password"].empty();
+bool contains_database_password(const std::string& where) {
+  return is_database_server_address(where) && !parse_parts(where)["password"].empty();
 }
 
 std::string describe_database(const std::string& where) {
   const std::string form = "is not of the form postgresql://USER@HOST/NAME";
-  if (!is_server_address(where)) {
+  if (!is_database_server_address(where)) {
     if (is_keyword_connection_string(where))
       throw InputError("a connection string of keywords", form);
     return where;
@@ -100,7 +100,7 @@ std::string describe_database(const std::string& where) {
 
 std::string derive_database_identity(const std::string& where) {
   const std::string name = describe_database(where);
-  if (!is_server_address(where)) {
+  if (!is_database_server_address(where)) {
     return get_host_name() + ":" + std::filesystem::absolute(name).lexically_normal().string();
   }
   Parts parts = parse_parts(where);
@@ -116,7 +116,7 @@ std::string derive_database_identity(const std::string& where) {
          stated("service", " of the service ");
 }
 
-std::string make_connection_string(const std::string& where) {
+std::string make_database_connection_string(const std::string& where) {
   std::string connection;
   for (const char c : where) {
     if (c == ' ') {
@@ -134,15 +134,15 @@ std::string make_connection_string(const std::string& where) {
       .append(std::to_string(kPatience_s));
 }
 
-bool is_server_responding(const std::string& where) {
-  const std::string connection = make_connection_string(where);
+bool is_database_server_responding(const std::string& where) {
+  const std::string connection = make_database_connection_string(where);
   const std::array keywords{"dbname", "sslmode", kPatience, static_cast<const char*>(nullptr)};
   const std::array values{connection.c_str(), "prefer", "2", static_cast<const char*>(nullptr)};
   return PQpingParams(keywords.data(), values.data(), 1) == PQPING_OK;
 }
 
 int get_database_timeout_s(const std::string& where) {
-  if (!is_server_address(where)) return kPatienceWithFile_s;
+  if (!is_database_server_address(where)) return kPatienceWithFile_s;
   const auto parts = parse_parts(where);
   const auto without_parameters = parts.find(kPatience);
   if (without_parameters == parts.end()) return kPatience_s;

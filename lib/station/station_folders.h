@@ -10,10 +10,10 @@
 namespace vlp {
 
 /// Creates a folder of a station if it does not exist. Throws InputError.
-void make_folder(const std::filesystem::path& folder);
+void create_station_folder(const std::filesystem::path& folder);
 
 /// Checks, before a unit is started, that a folder is writable and has `bytes` bytes of free space.
 /// @throws InputError if it is not writable or has less space
-void check_free_space(const SharedFolder& folder, std::uintmax_t bytes);
+void check_folder_writable_and_space(const SharedFolder& folder, std::uintmax_t bytes);
 
 }  // namespace vlp

@@ -50,7 +50,7 @@ Lens read_lens(const std::string& text, LensModel model) {
   const std::string key = "'intrinsics': [";
   const char* at = text.c_str() + text.find(key) + key.size();
   std::vector<double> parameters;
-  for (std::size_t i = 0; i < parameter_count(model); ++i) {
+  for (std::size_t i = 0; i < num_lens_parameters(model); ++i) {
     char* end = nullptr;
     parameters.push_back(std::strtod(at, &end));
     at = end + 1;  // the comma
@@ -141,9 +141,9 @@ bool compare(const Case& test_case, int num_repetitions) {
       "mrcal-calibrate-cameras --corners-cache {} --corners-cache-has-weights --lensmodel {} "
       "--focal {} --object-spacing {} --object-width-n {} --object-height-n {} "
       "--imagersize {} {} --outdir {} {} '*.png*' >{}/log 2>&1",
-      corners, to_string(test_case.input.lens_model), test_case.focal_px,
-      test_case.input.lattice.point_spacing_m(), test_case.input.lattice.cols(),
-      test_case.input.lattice.rows(), width, height, folder.string(), test_case.options,
+      corners, lens_model_name(test_case.input.lens_model), test_case.focal_px,
+      test_case.input.lattice.point_spacing_m(), test_case.input.lattice.lattice_cols(),
+      test_case.input.lattice.lattice_rows(), width, height, folder.string(), test_case.options,
       folder.string());
   int status = std::system(command.c_str());
   const double mrcal_s = cpu_of_children_s() - children_s;
@@ -162,11 +162,11 @@ bool compare(const Case& test_case, int num_repetitions) {
   }
   const ProjectionUncertainty uncertainty(solution);
   const auto known = [&](const Eigen::Vector2d& pixel) {
-    return uncertainty.max_direction_sd_px(pixel) <= test_case.known_px ? 1.0 : INFINITY;
+    return uncertainty.max_projection_sd_px(pixel) <= test_case.known_px ? 1.0 : INFINITY;
   };
   const auto difference =
       compute_projection_difference(read_lens(model.str(), test_case.input.lens_model),
-                                    solution.lens(), test_case.input.imager_px, known);
+                                    solution.fitted_lens(), test_case.input.imager_px, known);
   if (!difference) {
     fmt::print("{}: the lenses share no place\n", test_case.name);
     return false;

@@ -81,9 +81,10 @@ Sensor sensor_behind(const Sensor& sensor, const std::optional<ImageProcessing>&
 
 cv::Mat developed(const Scene& scene, const cv::Mat1f& electrons, std::uint64_t seed,
                   const std::optional<ImageProcessing>& picture) {
-  cv::Mat image = simulate_sensor(scene.sensor, electrons, seed, picture);
+  cv::Mat image = simulate_sensor_image(scene.sensor, electrons, seed, picture);
   if (scene.camera.readout == Readout::columns) image = image.t();  // lines are columns
-  return cv::imdecode(encode_image(image, picture), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
+  return cv::imdecode(encode_image_as_jpeg_or_png(image, picture),
+                      cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
 }
 
 /// Difference over the pixels of a region, after rotating the lenses to the best agreement over the
@@ -94,9 +95,9 @@ double worst_within(const ImageRegion& region, const Lens& truth, const Lens& le
   const auto turned = fit_rotation_between_lenses(truth, lens, pixels);
   double worst_px = 0;
   for (const Eigen::Vector2d& pixel : pixels) {
-    const auto ray = truth.unproject(pixel);
+    const auto ray = truth.unproject_pixel(pixel);
     if (!turned || !ray || !polygon_contains(region, pixel)) continue;
-    const auto seen = lens.project(*turned * ray->direction);
+    const auto seen = lens.project_point(*turned * ray->direction);
     worst_px = std::max(worst_px, seen ? (*seen - pixel).norm() : INFINITY);
   }
   return worst_px;
@@ -110,13 +111,13 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
   input.camera = scene.camera;
   input.seen.images.resize(electrons.size());
   const auto threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  const double holds_e = std::min(
-      scene.sensor.full_well_e,
-      (white_level_dn(scene.sensor) - scene.sensor.black_level_dn) / scene.sensor.gain_dn_per_e);
+  const double holds_e = std::min(scene.sensor.full_well_e, (sensor_white_level_dn(scene.sensor) -
+                                                             scene.sensor.black_level_dn) /
+                                                                scene.sensor.gain_dn_per_e);
   const double white_e = scene.board->white_e_per_s * boards.exposure_s;
   const double exposures = development.white > 0 ? development.white * holds_e / white_e : 1;
   parallel_for(electrons.size(), threads, [&](std::size_t i) {
-    const BoardShot shot = make_board_shot(scene, boards, i);
+    const BoardShot shot = make_simulated_board_capture(scene, boards, i);
     cv::Mat1f lit;
     electrons[i].convertTo(lit, CV_32F, exposures);
     const cv::Mat image = developed(scene, lit, shot.noise_seed, development.picture);
@@ -124,24 +125,24 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
         observed({shot.image, {image.cols, image.rows}, detector.detect_board(image)});
   });
   std::size_t tags = 0, usable = 0;
-  for (const BoardView& view : collect_kept_views(input.seen.images)) {
+  for (const BoardView& view : collect_kept_board_views(input.seen.images)) {
     usable += view.seen.tags.size();
     tags += view.seen.tags.size() + static_cast<std::size_t>(view.seen.unusable);
   }
   const BoardLattice lattice(input.board);
   for (Observation& image : input.seen.images) {
-    if (lattice.has_sufficient_corners(image.board->seen)) continue;
-    image.set_rejection(RejectionReason::too_few_corners, "shows too little of the board");
+    if (lattice.are_corners_sufficient_for_pose(image.board->seen)) continue;
+    image.set_image_rejection(RejectionReason::too_few_corners, "shows too little of the board");
   }
-  const LensResult result = run_lens_step(input, {});
+  const LensResult result = run_lens_calibration_step(input, {});
   const std::string detected_percent =
       fmt::format("{:.1f}", 100 * static_cast<double>(usable) / static_cast<double>(tags));
-  if (!result.ok()) {
+  if (!result.has_succeeded()) {
     fmt::print("{:48} {:5} % of the tags: no lens\n", development.name, detected_percent);
     return;
   }
   const Camera& camera = scene.camera;
-  const Lens truth(camera.lens_model, camera.intrinsics), lens = result.lens.solution.lens();
+  const Lens truth(camera.lens_model, camera.intrinsics), lens = result.lens.solution.fitted_lens();
   const auto even = [](const Eigen::Vector2d&) { return 1; };
   const auto difference = compute_projection_difference(truth, lens, camera.imager_px, even);
   fmt::print(
@@ -163,10 +164,11 @@ void try_seed(Scene scene, std::uint64_t seed, int views, const std::string& wan
   const FrameRenderer renderer(scene);
   const BoardDetector detector(scene.board->print);
   std::vector<cv::Mat1f> electrons(count_captures_of_set(boards));
-  parallel_for(electrons.size(), static_cast<int>(std::thread::hardware_concurrency()),
-               [&](std::size_t i) {
-                 electrons[i] = renderer.render_board_electrons(make_board_shot(scene, boards, i));
-               });
+  parallel_for(
+      electrons.size(), static_cast<int>(std::thread::hardware_concurrency()), [&](std::size_t i) {
+        electrons[i] =
+            renderer.render_board_in_electrons(make_simulated_board_capture(scene, boards, i));
+      });
   fmt::print("seed {}, {} views\n", seed, electrons.size());
   for (const Development& development : developments()) {
     if (development.name.find(wanted) == std::string::npos) continue;
@@ -182,7 +184,7 @@ int main(int argc, char** argv) {
   constexpr int default_seeds = 3;
   const std::string name = argc > 1 ? argv[1] : "paper-rig";
   const int seeds = argc > 2 ? std::atoi(argv[2]) : default_seeds;
-  const vlp::Scene scene = vlp::read_scene(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
+  const vlp::Scene scene = vlp::read_scene_file(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
   for (int i = 0; i < seeds; ++i) {
     vlp::try_seed(scene, scene.seed + static_cast<std::uint64_t>(i),
                   argc > 3 ? std::atoi(argv[3]) : 0, argc > 4 ? argv[4] : "");

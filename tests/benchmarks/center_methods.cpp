@@ -65,14 +65,14 @@ LitPixels find_lit_pixels(const cv::Mat& image, const Light& light) {
   const cv::Point high(int(std::ceil(light.high.x())) + around_px + 1,
                        int(std::ceil(light.high.y())) + around_px + 1);
   const cv::Rect box = cv::Rect(low, high) & cv::Rect({0, 0}, image.size());
-  const Background background = estimate_background(to_image_view(image));
+  const Background background = estimate_image_background(to_image_view(image));
   return image.depth() == CV_8U ? find_lit_pixels<std::uint8_t>(image, background, box)
                                 : find_lit_pixels<std::uint16_t>(image, background, box);
 }
 
 std::map<int, Light> lamps_in(const LightDetector& detector, const cv::Mat& image) {
   std::map<int, Light> lamps;
-  for (Light& light : detector.detect(to_image_view(image))) {
+  for (Light& light : detector.detect_lights(to_image_view(image))) {
     if (light.kind == LightKind::lamp) lamps[*light.lamp] = std::move(light);
   }
   return lamps;
@@ -85,10 +85,10 @@ std::map<std::string, std::map<int, Vector2d>> truth_in(const std::filesystem::p
   const auto u = table.get_required_column("u_px"), v = table.get_required_column("v_px");
   const auto in_view = table.get_required_column("in_view");
   std::map<std::string, std::map<int, Vector2d>> truth;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    if (table.get_number(row, in_view) < 1) continue;
-    truth[std::string(table.get_text(row, image))][table.get_integer(row, lamp)] = {
-        table.get_number(row, u), table.get_number(row, v)};
+  for (std::size_t row = 0; row < table.num_rows(); ++row) {
+    if (table.get_cell_number(row, in_view) < 1) continue;
+    truth[std::string(table.get_cell_text(row, image))][table.get_cell_integer(row, lamp)] = {
+        table.get_cell_number(row, u), table.get_cell_number(row, v)};
   }
   return truth;
 }

@@ -220,7 +220,8 @@ bool has_warning(const StepResult& result) {
 }
 
 Trial make_trial(const StepResult& result) {
-  return {.has_result = result.ok(), .is_warned = result.ok() && has_warning(result)};
+  return {.has_result = result.has_succeeded(),
+          .is_warned = result.has_succeeded() && has_warning(result)};
 }
 
 void add_center_errors(Trial& trial, const RotationCenter& found, const RotationCenter& truth) {
@@ -246,7 +247,7 @@ Trial try_rotation(const Cell& cell, Random& random, RotationMethod method, doub
       input.frames.push_back({std::to_string(input.frames.size()), room.draw_detections(pose)});
     }
   }
-  const RotationResult result = run_rotation_step(input, method, {});
+  const RotationResult result = run_rotation_calibration_step(input, method, {});
   Trial trial = make_trial(result);
   if (!trial.has_result) return trial;
   add_center_errors(trial, result.fit.center, room.center());
@@ -280,7 +281,7 @@ Trial try_lamps(const Cell& cell, Random& random) {
   for (int k = 0; k < cell.captures; ++k) {
     input.frames.push_back({std::to_string(k), room.draw_detections(room.draw_pose(k))});
   }
-  const TiltResult result = run_tilt_step(input, false, {});
+  const TiltResult result = run_tilt_calibration_step(input, false, {});
   Trial trial = make_trial(result);
   if (trial.has_result) add_center_errors(trial, result.leveling.center, room.center());
   return trial;
@@ -308,13 +309,14 @@ Trial try_dispersion(const Cell& cell, Random& random, DispersionMethod method) 
     input.frames.push_back({std::to_string(k), places.captures.back().detections});
   }
   const DispersionResult result =
-      run_dispersion_step(input, places, method, DispersionCircle::mean, {});
+      run_dispersion_calibration_step(input, places, method, DispersionCircle::mean, {});
   Trial trial = make_trial(result);
   const DispersionFit truth =
       estimate_heading_dependent_offset(exact, room.true_map(), believed, method);
   if (!trial.has_result || truth.status != DispersionStatus::ok) return trial;
   const Dispersion& found = result.fit.dispersion;
-  const auto covariance_px2 = compute_offset_covariance_with_map(found, believed.camera.focal_px());
+  const auto covariance_px2 =
+      compute_dispersion_offset_covariance_with_map(found, believed.camera.focal_px());
   if (!covariance_px2) return trial;
   trial.errors.push_back(normalize(found.offset_px - truth.dispersion.offset_px, *covariance_px2));
   return trial;
@@ -325,7 +327,7 @@ Trial try_camera_dispersion(const Cell& cell, Random& random) {
 }
 
 Trial try_paper_dispersion(const Cell& cell, Random& random) {
-  return try_dispersion(cell, random, DispersionMethod::paper);
+  return try_dispersion(cell, random, DispersionMethod::chen_guan);
 }
 
 /// Rotations at two heights, with the axis position measured once at each.
@@ -352,7 +354,7 @@ Trial try_adjustment(const Cell& cell, Random& random) {
     }
   }
   input.sets.push_back(std::move(set));
-  const AdjustStepResult result = run_adjustment_step(input, {});
+  const AdjustStepResult result = run_joint_adjustment_step(input, {});
   Trial trial = make_trial(result);
   if (!trial.has_result) return trial;
   add_center_errors(trial, result.found.center, room.center());
@@ -369,7 +371,7 @@ Trial try_fixes(const Cell& cell, Random& random) {
     truth.push_back(room.draw_pose(k));
     input.frames.push_back({std::to_string(k), room.draw_detections(truth.back())});
   }
-  const LocateResult result = locate_camera_in_frames(input);
+  const LocateResult result = locate_camera_from_frames(input);
   Trial trial = make_trial(result);
   if (!trial.has_result) return trial;
   trial.errors.resize(3);

@@ -49,12 +49,12 @@ struct Errors {
   int fixes = 0, refused = 0;
 
   void add(const Fix& fix, const BaseMotion& truth) {
-    if (!fix.ok()) {
+    if (!fix.has_succeeded()) {
       ++refused;
       return;
     }
     ++fixes;
-    const Pose pose = truth.pose(0);
+    const Pose pose = truth.camera_pose_at(0);
     Eigen::Vector4d error;
     error << fix.estimate.pose.position_m - pose.position_m,
         wrap_angle_rad(fix.estimate.pose.yaw_rad - pose.yaw_rad);
@@ -113,7 +113,7 @@ struct CenterErrors {
 class Trials {
  public:
   explicit Trials(double row_time_s)
-      : scene_(read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml")) {
+      : scene_(read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml")) {
     scene_.camera.row_time_s = row_time_s;
   }
 
@@ -121,7 +121,7 @@ class Trials {
   void run_leaning(int captures) {
     const FrameRenderer renderer(scene_);
     const Calibration calibration = make_true_calibration(scene_);
-    const LampMap lamps = make_lamp_map(scene_, false);
+    const LampMap lamps = make_scene_lamp_map(scene_, false);
     const LightDetector detector(lamps, make_detector_camera(calibration));
     const Positioner positioner(lamps, calibration);
     Sensors in_hand;
@@ -130,7 +130,8 @@ class Trials {
       Random random(72);
       Errors errors, again;
       for (int i = 0; i < captures; ++i) {
-        LampShot shot = make_lamp_shot(scene_, scene_.sets.at(0), static_cast<std::size_t>(i) % 12);
+        LampShot shot = make_simulated_lamp_capture(scene_, scene_.sets.at(0),
+                                                    static_cast<std::size_t>(i) % 12);
         BaseMotion& motion = shot.motion;
         motion.axis_m = {random.uniform(-0.5, 0.5), random.uniform(-0.3, 0.3), 0};
         motion.yaw_rad = random.uniform(-3.1, 3.1);
@@ -140,15 +141,16 @@ class Trials {
                        rad_from_deg(random.uniform(-max_deg, max_deg))};
         const auto detections = detections_in(renderer, detector, shot);
         if (detections.size() < 4) continue;
-        const Fix fix = positioner.locate(detections, in_hand);
+        const Fix fix = positioner.compute_position_fix(detections, in_hand);
         errors.add(fix, motion);
-        if (!fix.ok()) continue;
+        if (!fix.has_succeeded()) continue;
         // Discs are circles in the level plane: detected again with the estimated tilt.
         DetectorCamera leaning = make_detector_camera(calibration);
         leaning.level_from_camera =
-            level_from_inclination(fix.body->inclination) * leaning.level_from_camera;
+            level_rotation_from_inclination(fix.body->inclination) * leaning.level_from_camera;
         const auto seen_again = detections_in(renderer, LightDetector(lamps, leaning), shot);
-        if (seen_again.size() >= 4) again.add(positioner.locate(seen_again, in_hand), motion);
+        if (seen_again.size() >= 4)
+          again.add(positioner.compute_position_fix(seen_again, in_hand), motion);
       }
       const std::string lean = fmt::format("lean to {:2.0f} deg", max_deg);
       print(lean, "lean unknown", errors, nullptr);
@@ -159,7 +161,7 @@ class Trials {
   void run(int captures) {
     const FrameRenderer renderer(scene_);
     const Calibration calibration = make_true_calibration(scene_);
-    const LampMap lamps = make_lamp_map(scene_, false);
+    const LampMap lamps = make_scene_lamp_map(scene_, false);
     const LightDetector detector(lamps, make_detector_camera(calibration));
     const Positioner positioner(lamps, calibration);
     Errors standing;
@@ -170,7 +172,8 @@ class Trials {
       CenterErrors centers;
       std::vector<DrivenCapture> captures_seen;
       for (int i = 0; i < captures; ++i) {
-        LampShot shot = make_lamp_shot(scene_, scene_.sets.at(0), static_cast<std::size_t>(i) % 12);
+        LampShot shot = make_simulated_lamp_capture(scene_, scene_.sets.at(0),
+                                                    static_cast<std::size_t>(i) % 12);
         BaseMotion& motion = shot.motion;
         motion.axis_m.x() = random.uniform(-0.3, 0.3);
         motion.axis_m.y() = random.uniform(-0.12, 0.12);
@@ -189,7 +192,8 @@ class Trials {
             -(camera_from_world *
               Eigen::Vector3d(std::cos(direction_rad), std::sin(direction_rad), 0))
                  .head<2>();
-        DrivenCapture seen{{}, motion.pose(0), speed_m_per_s, std::abs(motion.turn_rate_rad_per_s)};
+        DrivenCapture seen{
+            {}, motion.camera_pose_at(0), speed_m_per_s, std::abs(motion.turn_rate_rad_per_s)};
         for (const Detection& detection : detections) {
           seen.lamps_m.push_back(find_lamp_by_id(lamps.lamps, detection.lamp)->position_m);
         }
@@ -201,7 +205,7 @@ class Trials {
           }
         }
         Sensors known = {}, unknown = {};
-        unknown.motion = KnownMotion::up_to(2.5, rad_from_deg(180));
+        unknown.motion = KnownMotion::make_motion_prior_from_limits(2.5, rad_from_deg(180));
         const double sd_m_per_s = 0.01 * speed_m_per_s;
         const double sd_rad_per_s = 0.01 * std::abs(motion.turn_rate_rad_per_s);
         Eigen::Vector2d velocity =
@@ -209,11 +213,11 @@ class Trials {
         velocity += sd_m_per_s * Eigen::Vector2d(odometry[0], odometry[1]);
         known.motion = {velocity, motion.turn_rate_rad_per_s + sd_rad_per_s * odometry[2],
                         sd_m_per_s, sd_rad_per_s};
-        errors[0].add(positioner.locate(detections), motion);
-        errors[1].add(positioner.locate(detections, unknown), motion);
-        errors[2].add(positioner.locate(detections, known), motion);
+        errors[0].add(positioner.compute_position_fix(detections), motion);
+        errors[1].add(positioner.compute_position_fix(detections, unknown), motion);
+        errors[2].add(positioner.compute_position_fix(detections, known), motion);
         const auto two = farthest_two(detections, lamps);
-        errors[3].add(positioner.locate(two, known), motion);
+        errors[3].add(positioner.compute_position_fix(two, known), motion);
         const double before_s = 0.05;
         LampShot earlier = shot;
         earlier.motion.axis_m.head<2>() -= before_s * motion.velocity_m_per_s;
@@ -224,7 +228,7 @@ class Trials {
         });
         if (before.size() < 2) continue;
         const std::array frames{EarlierFrame{before, before_s}};
-        errors[4].add(positioner.locate(two, unknown, frames), motion);
+        errors[4].add(positioner.compute_position_fix(two, unknown, frames), motion);
       }
       if (speed_m_per_s == 0) {
         standing = errors[0];
@@ -252,11 +256,11 @@ class Trials {
                       bool odometry, double noise_px) const {
     const Lens lens(scene_.camera.lens_model, scene_.camera.intrinsics);
     const Eigen::Matrix3d camera_from_level = scene_.mount.level_from_camera.transpose();
-    const auto clock = make_row_clock(scene_.camera);
+    const auto clock = make_row_readout_clock(scene_.camera);
     Possible moving, standing;
     int count = 0;
     for (const DrivenCapture& seen : captures) {
-      const KnownMotion known = KnownMotion::up_to(2.5, rad_from_deg(180));
+      const KnownMotion known = KnownMotion::make_motion_prior_from_limits(2.5, rad_from_deg(180));
       BodyPrior prior;
       prior.velocity_sd_m_per_s = odometry ? 0.01 * seen.speed_m_per_s : known.velocity_sd_m_per_s;
       prior.yaw_rate_sd_rad_per_s =
@@ -283,10 +287,10 @@ class Trials {
 
   std::vector<Detection> detections_in(const FrameRenderer& renderer, const LightDetector& detector,
                                        const LampShot& shot) const {
-    const cv::Mat image =
-        simulate_sensor(scene_.sensor, renderer.render_lamp_electrons(shot), shot.noise_seed);
+    const cv::Mat image = simulate_sensor_image(
+        scene_.sensor, renderer.render_lamps_in_electrons(shot), shot.noise_seed);
     std::vector<Detection> detections;
-    for (const Light& light : detector.detect(to_image_view(image))) {
+    for (const Light& light : detector.detect_lights(to_image_view(image))) {
       if (light.kind == LightKind::lamp) {
         detections.push_back({*light.lamp, light.pixel, light.sigma_px});
       }

@@ -35,8 +35,9 @@ Scene make_scene(std::size_t lamps) {
 void fix(benchmark::State& state) {
   const Scene scene = make_scene(static_cast<std::size_t>(state.range(0)));
   const Positioner positioner(scene.rig.map, scene.rig.calibration);
-  if (!positioner.locate(scene.detections).ok()) throw std::logic_error("no fix");
-  for (auto _ : state) benchmark::DoNotOptimize(positioner.locate(scene.detections));
+  if (!positioner.compute_position_fix(scene.detections).has_succeeded())
+    throw std::logic_error("no fix");
+  for (auto _ : state) benchmark::DoNotOptimize(positioner.compute_position_fix(scene.detections));
 }
 BENCHMARK(fix)->ArgName("lamps")->Arg(2)->Arg(3)->Arg(4)->Arg(8);
 
@@ -79,11 +80,11 @@ void fix_with_the_common_part(benchmark::State& state) {
   Random random(1);
   scene.detections = with_noise(seen_from(rig, 0.1), random);
   const Positioner positioner(rig.map, rig.calibration);
-  const Fix once = positioner.locate(scene.detections);
-  if (!once.ok() || once.noise_covariance == once.estimate.covariance) {
+  const Fix once = positioner.compute_position_fix(scene.detections);
+  if (!once.has_succeeded() || once.noise_covariance == once.estimate.covariance) {
     throw std::logic_error("no fix, or one without the common part");
   }
-  for (auto _ : state) benchmark::DoNotOptimize(positioner.locate(scene.detections));
+  for (auto _ : state) benchmark::DoNotOptimize(positioner.compute_position_fix(scene.detections));
 }
 BENCHMARK(fix_with_the_common_part)->ArgName("lamps")->Arg(2)->Arg(3)->Arg(4)->Arg(8);
 
@@ -95,15 +96,17 @@ void fix_of_a_body(benchmark::State& state, const Sensors& sensors, const BodyMo
   Random random(1);
   const auto detections = with_noise(seen_from(rig, 0.1), random);
   const Positioner positioner = rig.positioner();
-  if (detections.size() != rig.map.lamps.size() || !positioner.locate(detections, sensors).ok()) {
+  if (detections.size() != rig.map.lamps.size() ||
+      !positioner.compute_position_fix(detections, sensors).has_succeeded()) {
     throw std::logic_error("no fix");
   }
-  for (auto _ : state) benchmark::DoNotOptimize(positioner.locate(detections, sensors));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(positioner.compute_position_fix(detections, sensors));
 }
 const BodyMotion kDriving{{0.8, -0.6}, 0, {0, 0}};
 const BodyMotion kTurning{{0.8, -0.6}, 1, {0, 0}};
 const BodyMotion kLeaning{{0.8, -0.6}, 0, {0.06, -0.08}};
-const KnownMotion kOneMeterPerSecond = KnownMotion::up_to(2, 0);
+const KnownMotion kOneMeterPerSecond = KnownMotion::make_motion_prior_from_limits(2, 0);
 Sensors make_sensors(double yaw_rate_sd_rad_per_s, double inclination_sigma_rad) {
   Sensors sensors;
   sensors.motion = kOneMeterPerSecond;

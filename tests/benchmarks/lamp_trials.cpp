@@ -41,16 +41,16 @@ namespace {
 
 /// The only call of the detector.
 std::vector<Light> detect_lights(const LightDetector& detector, const cv::Mat& image) {
-  return detector.detect(to_image_view(image));
+  return detector.detect_lights(to_image_view(image));
 }
 
 /// Returns the image of a shot as read from a file: gray, rows from the top.
 cv::Mat render_image(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot) {
-  cv::Mat image = simulate_sensor(scene.sensor, renderer.render_lamp_electrons(shot),
-                                  shot.noise_seed, scene.picture);
+  cv::Mat image = simulate_sensor_image(scene.sensor, renderer.render_lamps_in_electrons(shot),
+                                        shot.noise_seed, scene.picture);
   if (scene.camera.readout == Readout::columns) image = image.t();
   if (!scene.picture) return image;
-  return cv::imdecode(encode_image(image, scene.picture),
+  return cv::imdecode(encode_image_as_jpeg_or_png(image, scene.picture),
                       cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
 }
 
@@ -67,8 +67,8 @@ std::vector<Eigen::Vector3d> bright_points(const Glow& lamp, const Eigen::Vector
   constexpr int steps = 60;
   Glow rim = lamp;
   rim.halo.reset();
-  if (!lamp.recess) return outline_of(rim);
-  const double radius_m = lamp.radius_m();
+  if (!lamp.recess) return compute_object_outline_points(rim);
+  const double radius_m = lamp.glow_radius_m();
   std::vector<std::pair<double, Eigen::Vector3d>> fractions_at_points;
   double greatest = 0;
   for (int i = 0; i < steps * steps; ++i) {
@@ -76,7 +76,7 @@ std::vector<Eigen::Vector3d> bright_points(const Glow& lamp, const Eigen::Vector
                                                             2 * (i / steps + 0.5) / steps - 1);
     if (at_m.norm() > radius_m) continue;
     const double radiance_fraction =
-        compute_relative_radiance(*lamp.recess, radius_m, eye_m - lamp.position_m, at_m);
+        compute_downlight_relative_radiance(*lamp.recess, radius_m, eye_m - lamp.position_m, at_m);
     fractions_at_points.emplace_back(radiance_fraction,
                                      lamp.position_m + Eigen::Vector3d(at_m.x(), at_m.y(), 0));
     greatest = std::max(greatest, radiance_fraction);
@@ -91,19 +91,19 @@ std::vector<Eigen::Vector3d> bright_points(const Glow& lamp, const Eigen::Vector
 Extent compute_extent(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot,
                       const SceneLamp& lamp, const Eigen::Vector2d& center) {
   const Eigen::Isometry3d camera_from_world = shot.motion.world_from_camera(0).inverse();
-  const Lens& lens = renderer.pixel_rays().lens();
+  const Lens& lens = renderer.pixel_rays().camera_lens();
   double radius_px = 0, first_line = INFINITY, last_line = -INFINITY;
   Glow rim = lamp.glow;
   rim.halo.reset();
-  for (const Eigen::Vector3d& point_m : outline_of(rim)) {
-    const auto pixel = lens.project(camera_from_world * point_m);
+  for (const Eigen::Vector3d& point_m : compute_object_outline_points(rim)) {
+    const auto pixel = lens.project_point(camera_from_world * point_m);
     if (pixel) radius_px = std::max(radius_px, (*pixel - center).norm());
   }
   const Eigen::Vector3d eye_m = shot.motion.world_from_camera(0).translation();
   for (const Eigen::Vector3d& point_m : bright_points(lamp.glow, eye_m)) {
-    const auto pixel = lens.project(camera_from_world * point_m);
+    const auto pixel = lens.project_point(camera_from_world * point_m);
     if (!pixel) continue;
-    const double line = renderer.pixel_rays().line_and_place_of_pixel(*pixel)[0];
+    const double line = renderer.pixel_rays().convert_pixel_to_readout_order(*pixel)[0];
     first_line = std::min(first_line, line);
     last_line = std::max(last_line, line);
   }
@@ -180,8 +180,8 @@ class Score {
     }
     ++(is_wrong ? tally.wrong : tally.missed);
     if (is_wrong) return;
-    ++reasons_[nearest ? std::string(to_string(nearest->kind)) + ": " +
-                             std::string(to_string(nearest->reason))
+    ++reasons_[nearest ? std::string(light_kind_name(nearest->kind)) + ": " +
+                             std::string(light_reason_name(nearest->reason))
                        : "no light there"];
   }
 
@@ -196,7 +196,7 @@ class Score {
     const double near_px = 0.08 * scene.camera.imager_px[0];
     std::string name = "elsewhere";
     double min_px = near_px;
-    for (const TrueOtherLight& other : find_other_lights_in_image(scene, renderer, shot)) {
+    for (const TrueOtherLight& other : find_true_other_lights_in_image(scene, renderer, shot)) {
       const double distance_px = (other.pixel - pixel).norm();
       if (distance_px > min_px) continue;
       min_px = distance_px;
@@ -228,16 +228,18 @@ class Score {
 void try_shot(const Scene& scene, const FrameRenderer& renderer, const LightDetector& detector,
               const LampShot& shot, Score& score) {
   const cv::Mat image = render_image(scene, renderer, shot);
-  if (shot.motion.is_level()) {
+  if (shot.motion.is_base_level()) {
     return score.add(scene, renderer, shot, detect_lights(detector, image));
   }
   const Eigen::Matrix3d level_from_camera =
-      level_from_inclination(shot.motion.inclination(0)) * scene.mount.level_from_camera;
-  score.add(scene, renderer, shot, detect_lights(detector.with_tilt(level_from_camera), image));
+      level_rotation_from_inclination(shot.motion.base_inclination_at(0)) *
+      scene.mount.level_from_camera;
+  score.add(scene, renderer, shot,
+            detect_lights(detector.copy_detector_with_tilt(level_from_camera), image));
 }
 
 LightDetector make_detector_for_image(const Scene& scene) {
-  return {make_lamp_map(scene, false), make_detector_camera(make_true_calibration(scene))};
+  return {make_scene_lamp_map(scene, false), make_detector_camera(make_true_calibration(scene))};
 }
 
 /// Images of a scene's folders of lamps. The seed of each round also changes the chips.
@@ -260,12 +262,13 @@ void try_scene(Scene scene, std::uint64_t seed, int images, bool new_seed_in_eac
     const auto wanted = static_cast<std::size_t>(images) / sets.size() + 1;
     const std::size_t step = std::max<std::size_t>(1, count_captures_of_set(set) / wanted);
     try_shot(scene, renderer, detector,
-             make_lamp_shot(scene, set, index * step % count_captures_of_set(set)), score);
+             make_simulated_lamp_capture(scene, set, index * step % count_captures_of_set(set)),
+             score);
   }
 }
 
 Scene chips_scene() {
-  Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
+  Scene scene = read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
   for (SceneLamp& lamp : scene.lamps) {
     lamp.glow.rim_to_center_ratio = 1;
     lamp.glow.random_chips = RandomChips{7, 0.12, 0.75, 0.3, 0.8};
@@ -279,7 +282,7 @@ Scene chips_scene() {
 class ForeignScene {
  public:
   explicit ForeignScene(std::uint64_t seed) : seed_(seed) {
-    scene_ = read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
+    scene_ = read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
     scene_.board.reset();
     Camera& camera = scene_.camera;
     camera.imager_px = {400, 300};
@@ -288,7 +291,10 @@ class ForeignScene {
     scene_.lamps.clear();
     constexpr std::array frequencies_hz = {1100, 1400, 1800, 2300, 2900, 3500, 4100, 4700};
     for (int i = 0; i < 8; ++i) {
-      Glow glow{{-0.75 + 0.5 * (i % 4), i < 4 ? -0.3 : 0.3, kCeilingM}, make_disc(0.18), 2e8, 0.9};
+      Glow glow{{-0.75 + 0.5 * (i % 4), i < 4 ? -0.3 : 0.3, kCeilingM},
+                make_disc_lamp_shape(0.18),
+                2e8,
+                0.9};
       scene_.lamps.push_back(
           {i + 1, glow, double(frequencies_hz[std::size_t(i)]), 0.5, {}, Eigen::Vector3d::Zero()});
     }
@@ -302,19 +308,20 @@ class ForeignScene {
 
   /// Sets a different duty cycle for each lamp, also in the lamp map.
   void draw_duties(int index) {
-    cv::RNG random = make_seeded_generator(seed_, "duties", static_cast<std::size_t>(index));
+    cv::RNG random = make_seeded_random_generator(seed_, "duties", static_cast<std::size_t>(index));
     for (SceneLamp& lamp : scene_.lamps) lamp.duty = random.uniform(0.3, 0.7);
   }
 
   LampShot draw_shot(int index) {
-    random_ = make_seeded_generator(seed_, "foreign lights", static_cast<std::size_t>(index));
+    random_ =
+        make_seeded_random_generator(seed_, "foreign lights", static_cast<std::size_t>(index));
     set_.lamps->pivots_m = {{random_.uniform(-0.7, 0.7), random_.uniform(-0.3, 0.3)}};
     set_.lamps->heights_m = {random_.uniform(0.0, 0.7)};
     set_.lamps->yaws_rad = {random_.uniform(0.0, 2 * std::numbers::pi)};
     scene_.seed = draw_random_seed(random_);
     draw_clutter();
     draw_random_scene_parts(scene_);
-    return make_lamp_shot(scene_, set_, 0);
+    return make_simulated_lamp_capture(scene_, set_, 0);
   }
 
   const Scene& scene() const { return scene_; }
@@ -364,7 +371,7 @@ class ForeignScene {
     Glow glow{{0, 0, kCeilingM}, {}, draw_log(4e7, 4e8), random_.uniform(0.4, 1.0)};
     const double length_m = random_.uniform(0.08, 0.35);
     if (draw_chance(0.5)) {
-      glow.shape = make_disc(length_m);
+      glow.shape = make_disc_lamp_shape(length_m);
     } else {
       const double width_m = length_m * random_.uniform(0.15, 1.0);
       glow.shape = {ShapeKind::rectangle, Eigen::Vector2d(length_m, width_m),
@@ -414,14 +421,16 @@ class ForeignScene {
     Clutter& clutter = scene_.clutter = {};
     occupied_.clear();
     for (const SceneLamp& lamp : scene_.lamps) {
-      occupied_.push_back({lamp.glow.position_m.head<2>(), lamp.glow.radius_m()});
+      occupied_.push_back({lamp.glow.position_m.head<2>(), lamp.glow.glow_radius_m()});
     }
     const int lights = random_.uniform(1, 5);
     for (int i = 0; i < lights; ++i) draw_foreign_light();
     if (draw_chance(0.5)) {
       if (const auto place_m = draw_place(0.1)) {
-        clutter.steady_lamps.push_back(
-            {{place_m->x(), place_m->y(), kCeilingM}, make_disc(0.2), draw_log(5e7, 4e8), 0.8});
+        clutter.steady_lamps.push_back({{place_m->x(), place_m->y(), kCeilingM},
+                                        make_disc_lamp_shape(0.2),
+                                        draw_log(5e7, 4e8),
+                                        0.8});
       }
     }
     if (draw_chance(0.3)) {
@@ -476,7 +485,7 @@ void run(const std::string& kind, int images, std::optional<std::uint64_t> seed)
     try_scene(chips_scene(), seed.value_or(1), images, true, score);
   } else {
     const Scene scene =
-        read_scene(kind == "recessed" ? VLP_SOURCE_DIR "/datasets/recessed/scene.yaml" : kind);
+        read_scene_file(kind == "recessed" ? VLP_SOURCE_DIR "/datasets/recessed/scene.yaml" : kind);
     try_scene(scene, seed.value_or(scene.seed), images, false, score);
   }
   score.print(double(std::clock() - begin) / CLOCKS_PER_SEC);

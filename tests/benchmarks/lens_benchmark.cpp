@@ -44,11 +44,11 @@ std::vector<double> splined_parameters(const SplineGrid& grid) {
 }
 
 std::vector<double> lens_parameters(LensModel model) {
-  if (is_splined_lens_model(model)) return splined_parameters(spline_grid_of_model(model));
+  if (is_splined_lens_model(model)) return splined_parameters(spline_grid_of_lens_model(model));
   if (model == LensModel::fisheye) return {400, 401, 399.5, 299.5, 0.03, -0.012, 0.004, -0.0006};
   std::vector<double> parameters{520,   521,  399.5, 299.5, -0.28, 0.09,  1e-4,  -2e-4,
                                  -0.01, 0.02, 0.01,  0.001, 1e-3,  -5e-4, -1e-3, 5e-4};
-  parameters.resize(parameter_count(model));
+  parameters.resize(num_lens_parameters(model));
   return parameters;
 }
 
@@ -67,13 +67,13 @@ std::vector<Eigen::Vector3d> points_seen_by(const Lens& lens) {
   Random random(2);
   std::vector<Eigen::Vector3d> points;
   for (const auto& pixel : random_pixels()) {
-    points.push_back(lens.unproject(pixel).value().direction * random.uniform(1, 3));
+    points.push_back(lens.unproject_pixel(pixel).value().direction * random.uniform(1, 3));
   }
   return points;
 }
 
 MrcalOracle make_oracle(LensModel model) {
-  return {std::string(to_string(model)), lens_parameters(model)};
+  return {std::string(lens_model_name(model)), lens_parameters(model)};
 }
 
 void count_points(benchmark::State& state) {
@@ -87,7 +87,7 @@ void report_worst(benchmark::State& state, LensModel model, const RayOf& get_ray
   const auto pixels = random_pixels();
   double worst_px = 0;
   for (std::size_t i = 0; i < kPoints; ++i) {
-    worst_px = std::max(worst_px, (lens.project(get_ray(i)).value() - pixels[i]).norm());
+    worst_px = std::max(worst_px, (lens.project_point(get_ray(i)).value() - pixels[i]).norm());
   }
   state.counters["worst_px"] = worst_px;
 }
@@ -96,11 +96,11 @@ void unproject_here(benchmark::State& state, LensModel model) {
   const Lens lens(model, lens_parameters(model));
   const auto pixels = random_pixels();
   for (auto _ : state) {
-    for (const auto& pixel : pixels) benchmark::DoNotOptimize(lens.unproject(pixel));
+    for (const auto& pixel : pixels) benchmark::DoNotOptimize(lens.unproject_pixel(pixel));
   }
   count_points(state);
   report_worst(state, model,
-               [&](std::size_t i) { return lens.unproject(pixels[i]).value().direction; });
+               [&](std::size_t i) { return lens.unproject_pixel(pixels[i]).value().direction; });
 }
 
 void unproject_mrcal(benchmark::State& state, LensModel model) {
@@ -114,7 +114,7 @@ void project_here(benchmark::State& state, LensModel model) {
   const Lens lens(model, lens_parameters(model));
   const auto points = points_seen_by(lens);
   for (auto _ : state) {
-    for (const auto& point : points) benchmark::DoNotOptimize(lens.project(point));
+    for (const auto& point : points) benchmark::DoNotOptimize(lens.project_point(point));
   }
   count_points(state);
 }

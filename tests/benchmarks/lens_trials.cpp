@@ -55,11 +55,11 @@ void try_set(int set, Counts& counts) {
   IntrinsicsInput input = views.input(8 + static_cast<int>(random.index(29)), random, noise_px);
   if (set % 4 == 3) spoil(input.views[random.index(input.views.size())]);
   const IntrinsicsSolution solution = solve_intrinsics(input);
-  if (!solution.ok()) {
+  if (!solution.has_succeeded()) {
     ++counts.unsolved;
     return;
   }
-  const CalibrationReport report = compute_calibration_report(solution, input);
+  const CalibrationReport report = compute_lens_calibration_report(solution, input);
   LensEstimate lens;
   lens.solution = solution;
   lens.report = report;
@@ -71,7 +71,7 @@ void try_set(int set, Counts& counts) {
   }
   ++counts.num_accepted;
   const auto difference = compute_projection_difference(
-      views.lens, solution.lens(), views.imager_px, [](const auto&) { return 1; });
+      views.lens, solution.fitted_lens(), views.imager_px, [](const auto&) { return 1; });
   const double ratio = difference ? difference->rms_px / report.expected_rms_px : INFINITY;
   counts.max_ratio = std::max(counts.max_ratio, ratio);
   if (!difference || (ratio > apart && difference->rms_px > small_px)) {

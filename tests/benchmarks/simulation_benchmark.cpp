@@ -18,7 +18,7 @@ struct Rig {
     return *std::find_if(scene.sets.begin(), scene.sets.end(),
                          [&](const CaptureSet& each) { return each.folder == folder; });
   }
-  Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
+  Scene scene = read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
   FrameRenderer renderer{scene};
 };
 
@@ -28,29 +28,30 @@ const Rig& rig() {
 }
 
 void lamp_light(benchmark::State& state) {
-  const LampShot shot = make_lamp_shot(rig().scene, rig().set("check"), 100);
-  for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.render_lamp_electrons(shot));
+  const LampShot shot = make_simulated_lamp_capture(rig().scene, rig().set("check"), 100);
+  for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.render_lamps_in_electrons(shot));
 }
 
 void board_light(benchmark::State& state) {
-  const BoardShot shot = make_board_shot(rig().scene, rig().set("boards"), 3);
-  for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.render_board_electrons(shot));
+  const BoardShot shot = make_simulated_board_capture(rig().scene, rig().set("boards"), 3);
+  for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.render_board_in_electrons(shot));
 }
 
 cv::Mat1f electrons(bool board) {
-  return board ? rig().renderer.render_board_electrons(
-                     make_board_shot(rig().scene, rig().set("boards"), 3))
-               : rig().renderer.render_lamp_electrons(
-                     make_lamp_shot(rig().scene, rig().set("check"), 100));
+  return board ? rig().renderer.render_board_in_electrons(
+                     make_simulated_board_capture(rig().scene, rig().set("boards"), 3))
+               : rig().renderer.render_lamps_in_electrons(
+                     make_simulated_lamp_capture(rig().scene, rig().set("check"), 100));
 }
 
 void sensor(benchmark::State& state, bool board) {
   const cv::Mat1f light = electrons(board);
-  for (auto _ : state) benchmark::DoNotOptimize(simulate_sensor(rig().scene.sensor, light, 1));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(simulate_sensor_image(rig().scene.sensor, light, 1));
 }
 
 void png(benchmark::State& state, bool board) {
-  const cv::Mat image = simulate_sensor(rig().scene.sensor, electrons(board), 1);
+  const cv::Mat image = simulate_sensor_image(rig().scene.sensor, electrons(board), 1);
   std::vector<unsigned char> bytes;
   for (auto _ : state) cv::imencode(".png", image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 1});
 }

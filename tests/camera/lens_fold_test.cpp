@@ -53,14 +53,14 @@ class FoldingLens : public testing::TestWithParam<FoldedLens> {
     return result;
   }
   const Lens lens_{model(), parameters_with(model(), GetParam().distortion)};
-  const double valid_radius_ = distortion().compute_max_valid_radius();
+  const double valid_radius_ = distortion().compute_max_valid_distortion_radius();
 };
 
 TEST_P(FoldingLens, UnprojectReturnsValidRayOrNulloptInAndAroundImage) {
   int rays = 0, refused = 0;
   for (double v = -600; v <= 1200; v += 14) {
     for (double u = -800; u <= 1600; u += 14) {
-      const auto ray = lens_.unproject({u, v});
+      const auto ray = lens_.unproject_pixel({u, v});
       if (!ray) {
         ++refused;
         continue;
@@ -68,7 +68,7 @@ TEST_P(FoldingLens, UnprojectReturnsValidRayOrNulloptInAndAroundImage) {
       ++rays;
       ASSERT_EQ(ray->direction.z(), 1);
       ASSERT_LE(ray->direction.head<2>().norm(), valid_radius_);
-      const auto back = lens_.project(ray->direction);
+      const auto back = lens_.project_point(ray->direction);
       ASSERT_TRUE(back) << u << ", " << v;
       ASSERT_THAT(*back, IsNear(Vector2d(u, v), 1e-9));
     }
@@ -84,9 +84,9 @@ TEST_P(FoldingLens, UnprojectInvertsProjectUpToFold) {
     const double radius = valid_radius_ * std::sqrt(random.uniform(0, 0.999));
     const double around_rad = random.uniform(-4, 4);
     const Vector3d point(radius * std::cos(around_rad), radius * std::sin(around_rad), 1);
-    const auto pixel = lens_.project(point);
+    const auto pixel = lens_.project_point(point);
     ASSERT_TRUE(pixel) << point.transpose();
-    const auto ray = lens_.unproject(*pixel);
+    const auto ray = lens_.unproject_pixel(*pixel);
     ASSERT_TRUE(ray) << point.transpose();
     // Near the fold 1e-3 of a radius of pixel holds all rays; rounding is amplified as much.
     ASSERT_THAT(ray->direction, IsNear(point, 1e-10)) << point.transpose();
@@ -97,39 +97,39 @@ TEST_P(FoldingLens, ProjectReturnsNulloptBeyondFold) {
   for (double around_rad = 0; around_rad < 6.3; around_rad += 0.1) {
     const Vector2d direction(std::cos(around_rad), std::sin(around_rad));
     const auto at = [&](double radius) -> Vector3d { return (radius * direction).homogeneous(); };
-    EXPECT_TRUE(lens_.project(at(valid_radius_ * (1 - 1e-9))));
-    EXPECT_FALSE(lens_.project(at(valid_radius_ * (1 + 1e-9))));
-    EXPECT_FALSE(lens_.project_with_jacobians(at(valid_radius_ * 3)));
+    EXPECT_TRUE(lens_.project_point(at(valid_radius_ * (1 - 1e-9))));
+    EXPECT_FALSE(lens_.project_point(at(valid_radius_ * (1 + 1e-9))));
+    EXPECT_FALSE(lens_.project_point_with_jacobians(at(valid_radius_ * 3)));
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Lenses, FoldingLens, testing::ValuesIn(kFoldedLenses),
                          [](const auto& test) { return std::string(test.param.name); });
 
-TEST(Unproject, RejectsExactlyPixelsBeyondFoldOfBarrelLens) {
+TEST(Unproject, ReturnsNulloptOnlyBeyondFoldOfBarrelLens) {
   // r (1 - 0.4 r^2) is largest at r = 1 / sqrt(1.2), where it is two thirds of r.
   const Lens lens(LensModel::opencv4, parameters_with(LensModel::opencv4, {-0.4}));
   const double edge_px = 520 * 2 / 3.0 / std::sqrt(1.2);
   for (double around_rad = 0; around_rad < 6.3; around_rad += 0.01) {
     const Vector2d direction(std::cos(around_rad), std::sin(around_rad));
     for (const double fraction : {0.1, 0.9, 0.999, 1 - 1e-6, 1 - 1e-9}) {
-      EXPECT_TRUE(lens.unproject(lens.principal_point_px() + fraction * edge_px * direction))
+      EXPECT_TRUE(lens.unproject_pixel(lens.principal_point_px() + fraction * edge_px * direction))
           << fraction;
     }
     for (const double fraction : {1 + 1e-9, 1 + 1e-6, 1.001, 1.1, 2.0, 10.0, 1e6}) {
-      EXPECT_FALSE(lens.unproject(lens.principal_point_px() + fraction * edge_px * direction))
+      EXPECT_FALSE(lens.unproject_pixel(lens.principal_point_px() + fraction * edge_px * direction))
           << fraction;
     }
   }
 }
 
-TEST(Unproject, ConvergesIfInitialPointLiesBeyondLaterFold) {
+TEST(Unproject, ReturnsTrueRayIfInitialPointLiesBeyondLaterFold) {
   // No fold up to r = 10, but one at 12.9, behind which 'distorted' lies as a first guess.
   const Lens lens(LensModel::opencv4,
                   parameters_with(LensModel::opencv4, {0.277, -1e-3, -9e-3, -8e-3}));
   for (double radius = 0.5; radius < 9.9; radius += 0.1) {
     const Vector3d point(0.6 * radius, -0.8 * radius, 1);
-    const auto ray = lens.unproject(lens.project(point).value());
+    const auto ray = lens.unproject_pixel(lens.project_point(point).value());
     ASSERT_TRUE(ray) << radius;
     EXPECT_THAT(ray->direction, IsNear(point, 1e-12));
   }

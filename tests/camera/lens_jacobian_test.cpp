@@ -29,21 +29,22 @@ class LensJacobian : public testing::TestWithParam<LensModel> {};
 // step leaves less.
 constexpr double kStep = 1e-5, kTolerance = 1e-7;
 
-TEST_P(LensJacobian, WithRespectToPointMatchesDifferenceQuotient) {
+TEST_P(LensJacobian, PixelJacobianWrtPointMatchesDifferenceQuotient) {
   for_random_points(GetParam(), [](const auto&, const Lens& lens, const Eigen::Vector3d& point) {
-    const auto projection = lens.project_with_jacobians(point).value();
+    const auto projection = lens.project_point_with_jacobians(point).value();
     Eigen::Matrix<double, 2, 3> expected;
     for (int i = 0; i < 3; ++i) {
       const Eigen::Vector3d step = kStep * Eigen::Vector3d::Unit(i);
       expected.col(i) =
-          (lens.project(point + step).value() - lens.project(point - step).value()) / (2 * kStep);
+          (lens.project_point(point + step).value() - lens.project_point(point - step).value()) /
+          (2 * kStep);
     }
     const double scale = 1 + expected.cwiseAbs().maxCoeff();
     ASSERT_THAT(projection.d_pixel_d_point, IsNear(expected, kTolerance * scale));
   });
 }
 
-TEST_P(LensJacobian, WithRespectToParametersMatchesDifferenceQuotient) {
+TEST_P(LensJacobian, PixelJacobianWrtParametersMatchesDifferenceQuotient) {
   const LensModel model = GetParam();
   int points = 0;
   for_random_points(model, [&](const std::vector<double>& parameters, const Lens& lens,
@@ -55,7 +56,7 @@ TEST_P(LensJacobian, WithRespectToParametersMatchesDifferenceQuotient) {
     const auto pixel_with = [&](std::size_t i, double step) {
       auto changed = parameters;
       changed[i] += step;
-      return Lens(model, changed).project(point).value();
+      return Lens(model, changed).project_point(point).value();
     };
     Eigen::Matrix2Xd expected(2, std::ssize(parameters));
     for (std::size_t i = 0; i < parameters.size(); ++i) {
@@ -67,16 +68,16 @@ TEST_P(LensJacobian, WithRespectToParametersMatchesDifferenceQuotient) {
   });
 }
 
-TEST_P(LensJacobian, RayJacobianMatchesDifferenceQuotient) {
+TEST_P(LensJacobian, RayJacobianWrtPixelMatchesDifferenceQuotient) {
   for_random_points(GetParam(), [](const auto&, const Lens& lens, const Eigen::Vector3d& point) {
-    const Eigen::Vector2d pixel = lens.project(point).value();
-    const auto ray = lens.unproject(pixel).value();
+    const Eigen::Vector2d pixel = lens.project_point(point).value();
+    const auto ray = lens.unproject_pixel(pixel).value();
     constexpr double step_px = 1e-3;
     Eigen::Matrix<double, 3, 2> expected;
     for (int i = 0; i < 2; ++i) {
       const Eigen::Vector2d step = step_px * Eigen::Vector2d::Unit(i);
-      expected.col(i) = (lens.unproject(pixel + step).value().direction -
-                         lens.unproject(pixel - step).value().direction) /
+      expected.col(i) = (lens.unproject_pixel(pixel + step).value().direction -
+                         lens.unproject_pixel(pixel - step).value().direction) /
                         (2 * step_px);
     }
     // The Jacobian is that of Newton's last but one point, up to 1e-7 of the radius away.
@@ -87,8 +88,8 @@ TEST_P(LensJacobian, RayJacobianMatchesDifferenceQuotient) {
 
 TEST_P(LensJacobian, RayJacobianInvertsPixelJacobian) {
   for_random_points(GetParam(), [](const auto&, const Lens& lens, const Eigen::Vector3d& point) {
-    const auto ray = lens.unproject(lens.project(point).value()).value();
-    const auto projection = lens.project_with_jacobians(ray.direction).value();
+    const auto ray = lens.unproject_pixel(lens.project_point(point).value()).value();
+    const auto projection = lens.project_point_with_jacobians(ray.direction).value();
     ASSERT_THAT(projection.d_pixel_d_point * ray.d_direction_d_pixel,
                 IsNear(Eigen::Matrix2d::Identity(), 1e-6));
   });

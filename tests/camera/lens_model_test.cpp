@@ -9,21 +9,21 @@
 namespace vlp {
 namespace {
 
-TEST(LensModelName, MatchesMrcal) {
-  EXPECT_EQ(to_string(LensModel::pinhole), "LENSMODEL_PINHOLE");
-  EXPECT_EQ(to_string(LensModel::stereographic), "LENSMODEL_STEREOGRAPHIC");
-  EXPECT_EQ(to_string(LensModel::opencv4), "LENSMODEL_OPENCV4");
-  EXPECT_EQ(to_string(LensModel::opencv5), "LENSMODEL_OPENCV5");
-  EXPECT_EQ(to_string(LensModel::opencv8), "LENSMODEL_OPENCV8");
-  EXPECT_EQ(to_string(LensModel::opencv12), "LENSMODEL_OPENCV12");
+TEST(LensModelToString, ReturnsLensModelNamesOfMrcal) {
+  EXPECT_EQ(lens_model_name(LensModel::pinhole), "LENSMODEL_PINHOLE");
+  EXPECT_EQ(lens_model_name(LensModel::stereographic), "LENSMODEL_STEREOGRAPHIC");
+  EXPECT_EQ(lens_model_name(LensModel::opencv4), "LENSMODEL_OPENCV4");
+  EXPECT_EQ(lens_model_name(LensModel::opencv5), "LENSMODEL_OPENCV5");
+  EXPECT_EQ(lens_model_name(LensModel::opencv8), "LENSMODEL_OPENCV8");
+  EXPECT_EQ(lens_model_name(LensModel::opencv12), "LENSMODEL_OPENCV12");
 }
 
-TEST(LensModelFromName, InvertsNameOfEachModel) {
+TEST(LensModelFromName, InvertsToStringForEachModel) {
   for (const LensModel model : kEveryModel)
-    EXPECT_EQ(lens_model_from_name(to_string(model)), model);
+    EXPECT_EQ(lens_model_from_name(lens_model_name(model)), model);
 }
 
-TEST(LensModelFromName, ReturnsNulloptForInexactNames) {
+TEST(LensModelFromName, ReturnsNulloptForUnknownOrInexactNames) {
   for (const char* name :
        {"",
         "LENSMODEL_",
@@ -49,30 +49,30 @@ TEST(LensModelFromName, ReturnsNulloptForInexactNames) {
   }
 }
 
-TEST(LensModelNames, ListsAllModels) {
-  EXPECT_EQ(lens_model_names(),
+TEST(ListLensModelNames, ReturnsNamesOfAllModelsInOneString) {
+  EXPECT_EQ(list_lens_model_names(),
             "LENSMODEL_PINHOLE, LENSMODEL_STEREOGRAPHIC, LENSMODEL_OPENCV4, LENSMODEL_OPENCV5, "
             "LENSMODEL_OPENCV8, LENSMODEL_OPENCV12, OPENCV_FISHEYE, "
             "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14_fov_x_deg=190 and its like");
 }
 
-TEST(LensModelFromName, ReturnsDistinctModelForEachSplineGrid) {
+TEST(LensModelForSplineGrid, ReturnsModelWithGridNameAndParameterCount) {
   for (const SplineGrid& grid : {SplineGrid{2, 3, 3, 1}, SplineGrid{3, 4, 4, 359},
                                  SplineGrid{2, 255, 255, 359}, SplineGrid{3, 30, 20, 170}}) {
     const LensModel model = lens_model_for_spline_grid(grid);
     EXPECT_TRUE(is_splined_lens_model(model));
-    EXPECT_EQ(spline_grid_of_model(model), grid);
-    EXPECT_EQ(lens_model_from_name(to_string(model)), model);
-    EXPECT_EQ(parameter_count(model), 4U + 2U * static_cast<unsigned>(grid.nx * grid.ny));
+    EXPECT_EQ(spline_grid_of_lens_model(model), grid);
+    EXPECT_EQ(lens_model_from_name(lens_model_name(model)), model);
+    EXPECT_EQ(num_lens_parameters(model), 4U + 2U * static_cast<unsigned>(grid.nx * grid.ny));
   }
-  EXPECT_EQ(to_string(lens_model_for_spline_grid({3, 30, 20, 170})),
+  EXPECT_EQ(lens_model_name(lens_model_for_spline_grid({3, 30, 20, 170})),
             "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=30_Ny=20_fov_x_deg=170");
 }
 
-TEST(ParameterCount, MatchesMrcal) {
+TEST(NumLensParameters, EqualsOnlyCountAcceptedByMrcal) {
   for (const LensModel model : kMrcalModels) {
-    const std::vector<double> parameters(parameter_count(model), 1.0);
-    EXPECT_NO_THROW(make_oracle(model, parameters)) << to_string(model);
+    const std::vector<double> parameters(num_lens_parameters(model), 1.0);
+    EXPECT_NO_THROW(make_oracle(model, parameters)) << lens_model_name(model);
     EXPECT_ANY_THROW(make_oracle(model, std::vector<double>(parameters.size() + 1, 1.0)));
   }
 }

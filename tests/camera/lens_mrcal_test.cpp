@@ -23,29 +23,29 @@ class LensAgainstMrcal : public testing::TestWithParam<LensModel> {
   }
 };
 
-TEST_P(LensAgainstMrcal, ProjectMatchesPixels) {
+TEST_P(LensAgainstMrcal, ProjectMatchesPixelsOfMrcal) {
   for (int camera = 0; camera < kMrcalCameras; ++camera) {
     const auto parameters = random_parameters(GetParam(), random_);
     const Lens lens(GetParam(), parameters);
     const auto points = random_points();
     const auto expected = make_oracle(GetParam(), parameters).project(points);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const auto pixel = lens.project(points[i]);
+      const auto pixel = lens.project_point(points[i]);
       ASSERT_TRUE(pixel) << points[i].transpose();
       ASSERT_THAT(*pixel, IsNear(expected[i], 1e-8)) << points[i].transpose();
     }
   }
 }
 
-TEST_P(LensAgainstMrcal, JacobiansMatchGradients) {
+TEST_P(LensAgainstMrcal, PixelJacobiansMatchGradientsOfMrcal) {
   for (int camera = 0; camera < kMrcalCameras; ++camera) {
     const auto parameters = random_parameters(GetParam(), random_);
     const Lens lens(GetParam(), parameters);
     const MrcalOracle oracle = make_oracle(GetParam(), parameters);
     for (const auto& point : random_points()) {
-      const auto projection = lens.project_with_jacobians(point);
+      const auto projection = lens.project_point_with_jacobians(point);
       ASSERT_TRUE(projection);
-      EXPECT_EQ(projection->pixel, lens.project(point));
+      EXPECT_EQ(projection->pixel, lens.project_point(point));
       const auto expected = oracle.gradients(point);
       const auto rounding = [](const auto& matrix) {
         return 1e-13 * (1 + matrix.cwiseAbs().maxCoeff());
@@ -67,7 +67,7 @@ TEST_P(LensAgainstMrcal, JacobiansMatchGradients) {
 // more than 1e-9 rad; it may end on the second ray of a pixel, beyond the fold of the model, or
 // nowhere (NaN). Those pixels are left out of the comparison, but not of the comparison with the
 // points that made them.
-TEST_P(LensAgainstMrcal, UnprojectMatchesRays) {
+TEST_P(LensAgainstMrcal, UnprojectMatchesRaysOfMrcal) {
   int compared = 0;
   for (int camera = 0; camera < kMrcalCameras; ++camera) {
     const auto parameters = random_parameters(GetParam(), random_);
@@ -77,10 +77,10 @@ TEST_P(LensAgainstMrcal, UnprojectMatchesRays) {
     const auto pixels = oracle.project(points);
     const auto rays = oracle.unproject(pixels);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const auto ray = lens.unproject(pixels[i]);
+      const auto ray = lens.unproject_pixel(pixels[i]);
       ASSERT_TRUE(ray) << pixels[i].transpose();
       ASSERT_LT(angle_rad(ray->direction, points[i]), 1e-9) << pixels[i].transpose();
-      const auto back = lens.project(rays[i]);
+      const auto back = lens.project_point(rays[i]);
       if (!back || !((*back - pixels[i]).norm() < 1e-8)) continue;
       ++compared;
       ASSERT_LT(angle_rad(ray->direction, rays[i]), 1e-9) << pixels[i].transpose();

@@ -17,8 +17,8 @@ class LensWithInvalidInput : public testing::TestWithParam<LensModel> {};
 TEST_P(LensWithInvalidInput, UnprojectReturnsNulloptForNonFinitePixels) {
   const Lens lens = plain_lens(GetParam());
   for (const double bad : {kNan, kInfinity, -kInfinity}) {
-    EXPECT_FALSE(lens.unproject({bad, 0}));
-    EXPECT_FALSE(lens.unproject({0, bad}));
+    EXPECT_FALSE(lens.unproject_pixel({bad, 0}));
+    EXPECT_FALSE(lens.unproject_pixel({0, bad}));
   }
 }
 
@@ -29,24 +29,24 @@ TEST_P(LensWithInvalidInput, ProjectReturnsNulloptForNonFinitePoints) {
       Vector3d point(0.1, 0.2, 1);
       point(i) = bad;
       if (i == 2 && bad == kInfinity) continue;  // straight ahead for a division by z
-      EXPECT_FALSE(lens.project(point)) << point.transpose();
-      EXPECT_FALSE(lens.project_with_jacobians(point)) << point.transpose();
+      EXPECT_FALSE(lens.project_point(point)) << point.transpose();
+      EXPECT_FALSE(lens.project_point_with_jacobians(point)) << point.transpose();
     }
   }
 }
 
-TEST_P(LensWithInvalidInput, ReturnsOnlyFiniteResultsForHugeInput) {
+TEST_P(LensWithInvalidInput, ProjectAndUnprojectReturnOnlyFiniteResultsForHugeInput) {
   const Lens lens = plain_lens(GetParam());
   for (const double huge : {1e150, 1e160, 1e305, 1e308}) {
-    const auto ray = lens.unproject({huge, -huge});
+    const auto ray = lens.unproject_pixel({huge, -huge});
     EXPECT_TRUE(!ray || ray->direction.allFinite()) << huge;
-    const auto pixel = lens.project({huge, 1, 1});
+    const auto pixel = lens.project_point({huge, 1, 1});
     EXPECT_TRUE(!pixel || pixel->allFinite()) << huge;
   }
 }
 
 TEST_P(LensWithInvalidInput, ProjectReturnsNulloptForCameraCenter) {
-  EXPECT_FALSE(plain_lens(GetParam()).project(Vector3d::Zero()));
+  EXPECT_FALSE(plain_lens(GetParam()).project_point(Vector3d::Zero()));
 }
 
 TEST_P(LensWithInvalidInput, ConstructorThrowsForInvalidParameters) {
@@ -77,7 +77,7 @@ TEST_P(LensWithInvalidInput, ConstructorThrowsForInvalidParameters) {
 INSTANTIATE_TEST_SUITE_P(Models, LensWithInvalidInput, testing::ValuesIn(kEveryModel),
                          testing::PrintToStringParamName());
 
-TEST(Lens, ExceptionReportsExpectedParameterCount) {
+TEST(Lens, ConstructorExceptionStatesExpectedAndGivenParameterCount) {
   const std::vector<double> parameters(9, 1.0);
   EXPECT_THAT([&] { Lens(LensModel::opencv8, parameters); },
               testing::ThrowsMessage<std::invalid_argument>(
@@ -91,10 +91,11 @@ TEST(Lens, ProjectsPointsBehindCameraForWideModelsOnly) {
     if (is_splined_lens_model(model)) continue;  // as far as their control points go
     const bool all_round = model == LensModel::stereographic || model == LensModel::fisheye;
     for (const Vector3d& point : {Vector3d(0.1, 0.2, -1), Vector3d(1, 0, 0), Vector3d(1, 2, -1)}) {
-      EXPECT_EQ(lens.project(point).has_value(), all_round) << to_string(model);
-      EXPECT_EQ(lens.project_with_jacobians(point).has_value(), all_round) << to_string(model);
+      EXPECT_EQ(lens.project_point(point).has_value(), all_round) << lens_model_name(model);
+      EXPECT_EQ(lens.project_point_with_jacobians(point).has_value(), all_round)
+          << lens_model_name(model);
     }
-    EXPECT_FALSE(lens.project({0, 0, -1})) << to_string(model);
+    EXPECT_FALSE(lens.project_point({0, 0, -1})) << lens_model_name(model);
   }
 }
 

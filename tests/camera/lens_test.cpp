@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 
 class EveryLens : public testing::TestWithParam<LensModel> {};
 
-TEST_P(EveryLens, ReturnsItsModelFocalLengthsAndCenter) {
+TEST_P(EveryLens, AccessorsReturnModelFocalLengthsAndPrincipalPoint) {
   auto parameters = parameters_with(GetParam(), {});
   parameters[1] = 530;
   const Lens lens(GetParam(), parameters);
@@ -24,10 +24,10 @@ TEST_P(EveryLens, ReturnsItsModelFocalLengthsAndCenter) {
   EXPECT_EQ(lens.principal_point_px(), Vector2d(399.5, 299.5));
 }
 
-TEST_P(EveryLens, ProjectsOpticalAxisToCenter) {
+TEST_P(EveryLens, ProjectsOpticalAxisToPrincipalPointAndBack) {
   const Lens lens = plain_lens(GetParam());
-  EXPECT_EQ(lens.project({0, 0, 2}), lens.principal_point_px());
-  const auto ray = lens.unproject(lens.principal_point_px());
+  EXPECT_EQ(lens.project_point({0, 0, 2}), lens.principal_point_px());
+  const auto ray = lens.unproject_pixel(lens.principal_point_px());
   ASSERT_TRUE(ray);
   EXPECT_EQ(ray->direction, Vector3d::UnitZ());
 }
@@ -37,9 +37,9 @@ TEST_P(EveryLens, ProjectInvertsUnproject) {
   for (int trial = 0; trial < 2000; ++trial) {
     const Lens lens(GetParam(), random_parameters(GetParam(), random));
     const Vector2d pixel(random.uniform(200, 600), random.uniform(100, 500));
-    const auto ray = lens.unproject(pixel);
+    const auto ray = lens.unproject_pixel(pixel);
     ASSERT_TRUE(ray);
-    const auto back = lens.project(ray->direction);
+    const auto back = lens.project_point(ray->direction);
     ASSERT_TRUE(back);
     ASSERT_THAT(*back, IsNear(pixel, 1e-9));
   }
@@ -50,9 +50,9 @@ TEST_P(EveryLens, UnprojectInvertsProject) {
   for (int trial = 0; trial < 2000; ++trial) {
     const Lens lens(GetParam(), random_parameters(GetParam(), random));
     const Vector3d point = random_point(random);
-    const auto pixel = lens.project(point);
+    const auto pixel = lens.project_point(point);
     ASSERT_TRUE(pixel);
-    const auto ray = lens.unproject(*pixel);
+    const auto ray = lens.unproject_pixel(*pixel);
     ASSERT_TRUE(ray);
     ASSERT_LT(angle_rad(ray->direction, point), 1e-12);
   }
@@ -63,7 +63,8 @@ TEST_P(EveryLens, ProjectIsIndependentOfDistance) {
   const Lens lens(GetParam(), random_parameters(GetParam(), random));
   const Vector3d point = random_point(random);
   for (const double factor : {1e-9, 1e-3, 1e3, 1e9}) {
-    EXPECT_THAT(lens.project(factor * point).value(), IsNear(lens.project(point).value(), 1e-10));
+    EXPECT_THAT(lens.project_point(factor * point).value(),
+                IsNear(lens.project_point(point).value(), 1e-10));
   }
 }
 
@@ -73,7 +74,7 @@ INSTANTIATE_TEST_SUITE_P(Models, EveryLens, testing::ValuesIn(kEveryModel),
 TEST(Lens, UnprojectsStereographicRaysBehindCamera) {
   const Lens lens = plain_lens(LensModel::stereographic);
   const Vector3d point(1, -2, -3);
-  const auto ray = lens.unproject(lens.project(point).value());
+  const auto ray = lens.unproject_pixel(lens.project_point(point).value());
   ASSERT_TRUE(ray);
   EXPECT_LT(ray->direction.z(), 0);
   EXPECT_LT(angle_rad(ray->direction, point), 1e-14);

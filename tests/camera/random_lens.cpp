@@ -47,7 +47,7 @@ std::vector<double> random_parameters(LensModel model, Random& random) {
     }
     if (is_splined_lens_model(model)) {
       constexpr double error = 0.01;  // at most a twentieth of the way to the next control point
-      const auto splined = splined_parameters(spline_grid_of_model(model), error, random);
+      const auto splined = splined_parameters(spline_grid_of_lens_model(model), error, random);
       parameters.insert(parameters.end(), splined.begin() + 4, splined.end());
       return parameters;
     }
@@ -56,15 +56,15 @@ std::vector<double> random_parameters(LensModel model, Random& random) {
         parameters.push_back(random.uniform(-bound, bound));
       }
       const Fisheye fisheye{{parameters[4], parameters[5], parameters[6], parameters[7]}};
-      if (fisheye.compute_max_valid_angle_rad() > 1.7) return parameters;
+      if (fisheye.compute_max_valid_fisheye_angle_rad() > 1.7) return parameters;
       continue;
     }
     Distortion distortion;
-    for (std::size_t i = 0; i + 4 < parameter_count(model); ++i) {
+    for (std::size_t i = 0; i + 4 < num_lens_parameters(model); ++i) {
       distortion.k[i] = random.uniform(kBounds[i][0], kBounds[i][1]);
       parameters.push_back(distortion.k[i]);
     }
-    if (distortion.compute_max_valid_radius() > 1.1 * kTan60) return parameters;
+    if (distortion.compute_max_valid_distortion_radius() > 1.1 * kTan60) return parameters;
   }
 }
 
@@ -79,13 +79,14 @@ Eigen::Vector3d random_point(Random& random) {
 std::vector<double> parameters_with(LensModel model, const std::vector<double>& distortion) {
   std::vector<double> parameters{520, 520, 399.5, 299.5};
   parameters.insert(parameters.end(), distortion.begin(), distortion.end());
-  parameters.resize(parameter_count(model));
+  parameters.resize(num_lens_parameters(model));
   return parameters;
 }
 
 Eigen::Matrix2Xd parameter_jacobian(const Lens& lens, const Eigen::Vector3d& x_in_camera) {
-  const auto [parameters, d_pixel] = lens.compute_intrinsics_jacobian(x_in_camera).value();
-  const auto count = static_cast<Eigen::Index>(parameter_count(lens.lens_model()));
+  const auto [parameters, d_pixel] =
+      lens.compute_pixel_jacobian_wrt_intrinsics(x_in_camera).value();
+  const auto count = static_cast<Eigen::Index>(num_lens_parameters(lens.lens_model()));
   Eigen::Matrix2Xd jacobian = Eigen::Matrix2Xd::Zero(2, count);
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     jacobian.col(parameters[i]) = d_pixel.col(static_cast<Eigen::Index>(i));

@@ -19,7 +19,7 @@ inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // For GoogleTest, which looks for it next to the type; names of tests have no equals sign.
 inline void PrintTo(LensModel model, std::ostream* out) {
-  for (const char letter : to_string(model)) {
+  for (const char letter : lens_model_name(model)) {
     if (letter != '=') *out << letter;
   }
 }
@@ -45,14 +45,15 @@ inline constexpr LensModel kOpencvModels[] = {LensModel::opencv4, LensModel::ope
 std::vector<double> splined_parameters(const SplineGrid& grid, double error, Random& random);
 
 /// A random plausible lens that is one to one up to 60 degrees off axis and a little more; the
-/// rest is for its tangential and prism terms, which compute_max_valid_radius() leaves out.
+/// rest is for its tangential and prism terms, which compute_max_valid_distortion_radius() leaves
+/// out.
 std::vector<double> random_parameters(LensModel model, Random& random);
 
 /// A random point one to ten units away, up to 60 degrees off axis.
 Eigen::Vector3d random_point(Random& random);
 
 inline MrcalOracle make_oracle(LensModel model, const std::vector<double>& parameters) {
-  return {std::string(to_string(model)), parameters};
+  return {std::string(lens_model_name(model)), parameters};
 }
 
 /// A lens of 520 px focal length for an imager of 800 x 600 with these distortions.

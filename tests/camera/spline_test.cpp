@@ -20,10 +20,11 @@ Vector3d ray_of(const Vector2d& u) { return {u.x(), u.y(), 1 - u.squaredNorm() /
 class SplinedLens : public testing::TestWithParam<LensModel> {
  protected:
   Random random_{61};
-  const SplineGrid grid_ = spline_grid_of_model(GetParam());
+  const SplineGrid grid_ = spline_grid_of_lens_model(GetParam());
   const std::vector<double> parameters_ = splined_parameters(grid_, 0.01, random_);
   const Lens lens_{GetParam(), parameters_};
-  const Vector2d reach_ = SplineSurface(grid_, std::span(parameters_).subspan(4)).half_extent();
+  const Vector2d reach_ =
+      SplineSurface(grid_, std::span(parameters_).subspan(4)).spline_half_extent();
 
   Vector2d random_position() {
     const double y = random_.uniform(-1, 1), x = random_.uniform(-1, 1);
@@ -31,25 +32,25 @@ class SplinedLens : public testing::TestWithParam<LensModel> {
   }
 };
 
-TEST_P(SplinedLens, MatchesMrcalOverAllControlPoints) {
+TEST_P(SplinedLens, ProjectAndUnprojectMatchMrcalOverAllControlPoints) {
   const MrcalOracle oracle = make_oracle(GetParam(), parameters_);
   std::vector<Vector3d> rays;
   std::vector<Vector2d> pixels;
   for (int trial = 0; trial < 3000; ++trial) {
     rays.emplace_back(random_.uniform(1, 5) * ray_of(random_position()));
-    pixels.push_back(lens_.project(rays.back()).value());
+    pixels.push_back(lens_.project_point(rays.back()).value());
   }
   const auto expected = oracle.project(rays);
   const auto seen = oracle.unproject(pixels);
   int compared = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
     ASSERT_THAT(pixels[i], IsNear(expected[i], 1e-9));
-    const auto ray = lens_.unproject(pixels[i]);
+    const auto ray = lens_.unproject_pixel(pixels[i]);
     ASSERT_TRUE(ray) << rays[i].transpose();
     ASSERT_LT(angle_rad(ray->direction, rays[i]), 1e-10);
-    ASSERT_THAT(lens_.project(ray->direction).value(), IsNear(pixels[i], 1e-8));
+    ASSERT_THAT(lens_.project_point(ray->direction).value(), IsNear(pixels[i], 1e-8));
     // mrcal stops near 1e-7 px, or somewhere else.
-    const auto back = lens_.project(seen[i]);
+    const auto back = lens_.project_point(seen[i]);
     if (!back || (*back - pixels[i]).norm() > 1e-6) continue;
     ++compared;
     ASSERT_LT(angle_rad(ray->direction, seen[i]), 1e-7);
@@ -57,7 +58,7 @@ TEST_P(SplinedLens, MatchesMrcalOverAllControlPoints) {
   EXPECT_GT(compared, 2700);
 }
 
-TEST_P(SplinedLens, ProjectsUpToEndOfPiecesOnly) {
+TEST_P(SplinedLens, ProjectReturnsNulloptOnlyBeyondEdgeOfSplineGrid) {
   const double edge_rad = grid_.fov_x_deg / 2.0 * std::numbers::pi / 180;
   EXPECT_NEAR(reach_.x(), 2 * std::tan(edge_rad / 2), 1e-12);
   EXPECT_NEAR(reach_.y() / reach_.x(), double(grid_.ny - grid_.order) / (grid_.nx - grid_.order),
@@ -67,28 +68,28 @@ TEST_P(SplinedLens, ProjectsUpToEndOfPiecesOnly) {
       const Vector2d at_side(sign * reach_.x(), fraction * reach_.y() * (1 - 1e-9));
       const Vector2d at_top(fraction * reach_.x() * (1 - 1e-9), sign * reach_.y());
       for (const Vector2d& edge : {at_side, at_top}) {
-        const auto pixel = lens_.project(ray_of((1 - 1e-9) * edge));
+        const auto pixel = lens_.project_point(ray_of((1 - 1e-9) * edge));
         ASSERT_TRUE(pixel) << edge.transpose();
-        EXPECT_TRUE(lens_.unproject(*pixel)) << edge.transpose();
-        EXPECT_FALSE(lens_.project(ray_of((1 + 1e-9) * edge)));
-        EXPECT_FALSE(lens_.project_with_jacobians(ray_of((1 + 1e-9) * edge)));
-        EXPECT_FALSE(lens_.compute_intrinsics_jacobian(ray_of((1 + 1e-9) * edge)));
+        EXPECT_TRUE(lens_.unproject_pixel(*pixel)) << edge.transpose();
+        EXPECT_FALSE(lens_.project_point(ray_of((1 + 1e-9) * edge)));
+        EXPECT_FALSE(lens_.project_point_with_jacobians(ray_of((1 + 1e-9) * edge)));
+        EXPECT_FALSE(lens_.compute_pixel_jacobian_wrt_intrinsics(ray_of((1 + 1e-9) * edge)));
       }
     }
   }
 }
 
-TEST_P(SplinedLens, UnprojectReturnsNulloptForPixelsOutside) {
+TEST_P(SplinedLens, UnprojectReturnsInverseOfProjectOrNullopt) {
   int rays = 0, refused = 0;
   for (double v = -1200; v <= 1800; v += 29) {
     for (double x = -1200; x <= 2000; x += 29) {
-      const auto ray = lens_.unproject({x, v});
+      const auto ray = lens_.unproject_pixel({x, v});
       if (!ray) {
         ++refused;
         continue;
       }
       ++rays;
-      const auto back = lens_.project(ray->direction);
+      const auto back = lens_.project_point(ray->direction);
       ASSERT_TRUE(back) << x << ", " << v;
       ASSERT_THAT(*back, IsNear(Vector2d(x, v), 1e-8));
     }
@@ -100,7 +101,7 @@ TEST_P(SplinedLens, UnprojectReturnsNulloptForPixelsOutside) {
 TEST_P(SplinedLens, CopyProjectsToSamePixels) {
   const Lens copy = lens_;
   const Vector3d ray = ray_of(random_position());
-  EXPECT_EQ(copy.project(ray), lens_.project(ray));
+  EXPECT_EQ(copy.project_point(ray), lens_.project_point(ray));
   EXPECT_EQ(copy.lens_model(), GetParam());
 }
 
@@ -114,13 +115,13 @@ TEST(SplinedLensWithRandomControlPoints, UnprojectReturnsRaysOnlyWithoutFold) {
   int rays = 0;
   for (int trial = 0; trial < 20; ++trial) {
     const LensModel model = lens_model_for_spline_grid({3, 12, 10, 120});
-    const Lens lens(model, splined_parameters(spline_grid_of_model(model), 0.4, random));
+    const Lens lens(model, splined_parameters(spline_grid_of_lens_model(model), 0.4, random));
     for (double v = -300; v <= 900; v += 37) {
       for (double x = -300; x <= 1100; x += 37) {
-        const auto ray = lens.unproject({x, v});
+        const auto ray = lens.unproject_pixel({x, v});
         if (!ray) continue;
         ++rays;
-        const auto back = lens.project_with_jacobians(ray->direction);
+        const auto back = lens.project_point_with_jacobians(ray->direction);
         ASSERT_TRUE(back);
         ASSERT_THAT(back->pixel, IsNear(Vector2d(x, v), 1e-7));
         ASSERT_GT(ray->d_direction_d_pixel.topRows<2>().determinant(), 0);
@@ -130,17 +131,17 @@ TEST(SplinedLensWithRandomControlPoints, UnprojectReturnsRaysOnlyWithoutFold) {
   EXPECT_GT(rays, 1000);
 }
 
-TEST(SplinedLensWithRandomControlPoints, ReturnsOnlyFiniteResults) {
+TEST(SplinedLensWithExtremeControlPoints, ProjectAndUnprojectReturnOnlyFiniteResults) {
   const LensModel model = lens_model_for_spline_grid({3, 5, 4, 90});
   for (const double all : {0.0, -1.0, 1e150, -1e300}) {
-    std::vector<double> parameters(parameter_count(model), all);
+    std::vector<double> parameters(num_lens_parameters(model), all);
     std::fill_n(parameters.begin(), 4, 500);
     const Lens lens(model, parameters);
     for (const double pixel : {-1e9, 0.0, 500.0, 1e300}) {
-      const auto ray = lens.unproject({pixel, 500});
+      const auto ray = lens.unproject_pixel({pixel, 500});
       EXPECT_TRUE(!ray || ray->direction.allFinite());
     }
-    const auto seen = lens.project({0.1, 0.1, 1});
+    const auto seen = lens.project_point({0.1, 0.1, 1});
     EXPECT_TRUE(!seen || seen->allFinite());
   }
 }

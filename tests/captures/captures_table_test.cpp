@@ -12,7 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(ReadCapturesCsv, ReadsAnyColumns) {
+TEST(ReadCapturesCsv, ReadsColumnsInAnyOrderAndLeavesMissingOnesEmpty) {
   const TemporaryFolder folder;
   const auto captures = read_captures_csv(
       folder.file("captures.csv",
@@ -30,7 +30,7 @@ TEST(ReadCapturesCsv, ReadsAnyColumns) {
   EXPECT_FALSE(captures.at("b").z_m);
 }
 
-TEST(ReadCapturesCsv, ReadsPlaceAndSpot) {
+TEST(ReadCapturesCsv, ReadsReferencePointPositionSdAndPivotColumns) {
   const TemporaryFolder folder;
   const auto captures = read_captures_csv(folder.file(
       "captures.csv",
@@ -43,7 +43,7 @@ TEST(ReadCapturesCsv, ReadsPlaceAndSpot) {
   EXPECT_TRUE(captures.at("b").spot.empty());
 }
 
-TEST(ReadCapturesCsv, NamesThePresentColumn) {
+TEST(ReadCapturesCsv, RejectsFormerColumnStatingItsPresentName) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& content) {
     return rejection_message([&] { read_captures_csv(folder.file("c.csv", content)); });
@@ -56,7 +56,7 @@ TEST(ReadCapturesCsv, NamesThePresentColumn) {
               HasSubstr("c.csv:1: column 'place_sd_m' is now called 'position_sd_m'"));
 }
 
-TEST(ReadCapturesCsv, ReadsOdometry) {
+TEST(ReadCapturesCsv, ReadsVelocityYawRateAndVelocitySdColumns) {
   const TemporaryFolder folder;
   const auto captures = read_captures_csv(folder.file(
       "captures.csv",
@@ -71,7 +71,7 @@ TEST(ReadCapturesCsv, ReadsOdometry) {
   EXPECT_FALSE(captures.at("c").velocity_m_per_s);
 }
 
-TEST(ReadCapturesCsv, RejectsContradictions) {
+TEST(ReadCapturesCsv, RejectsInvalidOrContradictoryRows) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& content) {
     return rejection_message([&] { read_captures_csv(folder.file("c.csv", content)); });

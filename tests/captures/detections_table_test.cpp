@@ -35,7 +35,7 @@ TEST_F(ReadDetections, GroupsRowsByImageInOrderOfAppearance) {
   EXPECT_FALSE(frames[0].detections[0].sigma_px);
 }
 
-TEST_F(ReadDetections, ReadsSigmaWhenGiven) {
+TEST_F(ReadDetections, ReturnsSigmaOnlyForRowsThatContainIt) {
   const auto frames = read("lamp,sigma_px,image,v_px,u_px,note\n1,0.05,a,2,1,x\n2,,a,4,3,y\n");
   ASSERT_EQ(frames.size(), 1);
   ASSERT_EQ(frames[0].detections.size(), 2);
@@ -43,7 +43,7 @@ TEST_F(ReadDetections, ReadsSigmaWhenGiven) {
   EXPECT_FALSE(frames[0].detections[1].sigma_px);
 }
 
-TEST_F(ReadDetections, ReturnsWrittenFrames) {
+TEST_F(ReadDetections, ReturnsFramesWrittenByWriteDetections) {
   const std::vector<Frame> frames{{"a, b.png", {{3, {1.25, -7.5}, 0.05}, {4, {100, 200}, {}}}},
                                   {"c.png", {{3, {0.0625, 2}, 1.5}}}};
   write_detections(folder / "e.csv", frames);
@@ -60,7 +60,7 @@ TEST_F(ReadDetections, ReturnsWrittenFrames) {
   }
 }
 
-TEST_F(ReadDetections, ReportsFileLineAndColumn) {
+TEST_F(ReadDetections, ReportsFileLineAndColumnOfInvalidInput) {
   const std::string header = "image,lamp,u_px,v_px,sigma_px\n";
   EXPECT_THAT(refusal("image,lamp,u,v\na,1,2,3\n"),
               HasSubstr("d.csv:1: u_px: this column is missing"));

@@ -12,7 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(WriteFixes, WritesDocumentedColumns) {
+TEST(WriteFixes, WritesExpectedHeaderAndRowOfEachFix) {
   const TemporaryFolder folder;
   const Pose pose{{1.5, -0.25, 0.1234567891}, 3};
   write_fixes(folder / "fixes.csv",
@@ -26,7 +26,7 @@ TEST(WriteFixes, WritesDocumentedColumns) {
             "\"c,d.png\",too_few_lamps,,,,,,,,,0,\n");
 }
 
-TEST(ReadFixes, ReturnsWrittenRows) {
+TEST(ReadFixes, ReturnsRowsWrittenByWriteFixes) {
   const TemporaryFolder folder;
   const Pose pose{{1.5, -0.25, 0.125}, 3};
   write_fixes(folder / "fixes.csv",
@@ -48,7 +48,7 @@ TEST(ReadFixes, ReturnsWrittenRows) {
   EXPECT_EQ(rows[2].line, 4);
 }
 
-TEST(WriteFixes, WritesMotionLeanAndTimeWhenGiven) {
+TEST(WriteFixes, WritesTimeVelocityAndInclinationColumnsOnlyWhenGiven) {
   const TemporaryFolder folder;
   const Pose pose{{1.5, -0.25, 0.125}, 3};
   FixRow moving{"a.png", "ok", FixRow::Fix{pose, {}, 0.05}, 4};
@@ -79,7 +79,7 @@ TEST(WriteFixes, WritesMotionLeanAndTimeWhenGiven) {
               testing::HasSubstr("residual_px,vx_m_per_s,vy_m_per_s\n"));
 }
 
-TEST(ReadFixes, ReportsLineOfInvalidRow) {
+TEST(ReadFixes, ReportsFileLineAndColumnOfInvalidRow) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& rows) {
     const std::string header = "image,status,x_m,y_m,z_m,yaw_rad,x_sd_m,y_sd_m,z_sd_m,yaw_sd_rad\n";
@@ -101,7 +101,7 @@ TEST(ReadFixes, ReportsLineOfInvalidRow) {
   EXPECT_THAT(refusal(""), HasSubstr("fixes.csv: contains no fix"));
 }
 
-TEST(ReadFixes, NamesThePresentColumns) {
+TEST(ReadFixes, RejectsFormerColumnStatingItsPresentName) {
   const TemporaryFolder folder;
   for (const std::string axis : {"x", "y", "z", "yaw"}) {
     const std::string unit = axis == "yaw" ? "_rad" : "_m";
@@ -117,7 +117,7 @@ TEST(ReadFixes, NamesThePresentColumns) {
   }
 }
 
-TEST(WriteFixes, WritesNoisePartAndRejectedLampsWhenGiven) {
+TEST(WriteFixes, WritesNoiseSdsAndRejectedLampsOnlyWhenGiven) {
   const TemporaryFolder folder;
   FixRow plain{"a", "ok", FixRow::Fix{{{1, 2, 3}, 0.5}, Eigen::Vector4d(1, 1, 1, 1), 0.1}, 4};
   FixRow whole = plain;

@@ -14,7 +14,7 @@ TEST(Id, AcceptsSinglePathComponent) {
        {std::string("0001"), std::string("a.b"), std::string("Kamera 7"), std::string("-x"),
         std::string("\u00fc\u20ac"), std::string(200, 'a'), std::string("20261121T134501Z-01")}) {
     EXPECT_TRUE(Id::is_valid_id(text)) << text;
-    EXPECT_EQ(Id(text, "file", "camera").get_text(), text);
+    EXPECT_EQ(Id(text, "file", "camera").id_text(), text);
   }
 }
 

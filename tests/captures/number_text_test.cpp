@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-TEST(NumberText, ReturnsRequestedDigits) {
+TEST(NumberText, FormatFunctionsReturnRequestedNumberOfDigits) {
   EXPECT_EQ(format_fixed_decimals(1.0 / 3, 4), "0.3333");
   EXPECT_EQ(format_fixed_decimals(-2e-12, 9), "-0.000000000");
   EXPECT_EQ(format_significant_digits(1234.5678, 6), "1234.57");

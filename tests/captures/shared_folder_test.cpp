@@ -29,58 +29,58 @@ class SharedFolderTest : public testing::Test {
 
 TEST_F(SharedFolderTest, WritesReadsRenamesAndRemovesFiles) {
   const SharedFolder shared(path);
-  EXPECT_FALSE(shared.contains_entry("a"));
-  EXPECT_EQ(shared.read("a", 10), std::nullopt);
-  shared.replace_file("a", "first");
-  shared.replace_file("a", "second");
-  EXPECT_EQ(shared.read("a", 6), "second");
-  EXPECT_THAT(rejection_message([&] { shared.read("a", 5); }),
+  EXPECT_FALSE(shared.contains_folder_entry("a"));
+  EXPECT_EQ(shared.read_file_if_exists("a", 10), std::nullopt);
+  shared.replace_file_atomically("a", "first");
+  shared.replace_file_atomically("a", "second");
+  EXPECT_EQ(shared.read_file_if_exists("a", 6), "second");
+  EXPECT_THAT(rejection_message([&] { shared.read_file_if_exists("a", 5); }),
               HasSubstr("a: is longer than 5 bytes"));
   EXPECT_TRUE(shared.rename_file("a", "b"));
   EXPECT_FALSE(shared.rename_file("a", "b"));
-  EXPECT_EQ(shared.read("b", 10), "second");
+  EXPECT_EQ(shared.read_file_if_exists("b", 10), "second");
   shared.remove_file("b");
   shared.remove_file("b");
-  EXPECT_FALSE(shared.contains_entry("b"));
+  EXPECT_FALSE(shared.contains_folder_entry("b"));
   EXPECT_TRUE(fs::is_empty(path)) << "no temporary file is left";
 }
 
-TEST_F(SharedFolderTest, CreatesAndFindsFolders) {
+TEST_F(SharedFolderTest, CreatesAndOpensSubfolders) {
   const SharedFolder shared(path);
   EXPECT_FALSE(shared.open_subfolder_if_exists(id("0001")));
-  shared.make_subfolder(id("0001")).replace_file("a", "a");
+  shared.open_or_create_subfolder(id("0001")).replace_file_atomically("a", "a");
   const auto found = shared.open_subfolder_if_exists(id("0001"));
   ASSERT_TRUE(found);
   EXPECT_EQ(found->path(), path / "0001");
-  EXPECT_EQ(found->read("a", 1), "a");
-  shared.replace_file("file", "");
-  EXPECT_THAT(rejection_message([&] { shared.make_subfolder(id("file")); }),
+  EXPECT_EQ(found->read_file_if_exists("a", 1), "a");
+  shared.replace_file_atomically("file", "");
+  EXPECT_THAT(rejection_message([&] { shared.open_or_create_subfolder(id("file")); }),
               HasSubstr("file: cannot be"));
   EXPECT_THAT(rejection_message([&] { SharedFolder(path / "file"); }),
               HasSubstr("cannot be opened"));
 }
 
-TEST_F(SharedFolderTest, RejectsLinksInFolder) {
+TEST_F(SharedFolderTest, ThrowsInsteadOfFollowingSymbolicLinks) {
   fs::create_symlink(outside, path / "link");
   fs::create_directory_symlink(folder / "", path / "folder");
   const SharedFolder shared(path);
   const auto expect_refused = [](const auto& action) {
     EXPECT_THAT(rejection_message(action), HasSubstr("is a symbolic link, which is not followed"));
   };
-  expect_refused([&] { shared.read("link", 100); });
-  expect_refused([&] { shared.open("link", O_CREAT | O_RDWR); });
+  expect_refused([&] { shared.read_file_if_exists("link", 100); });
+  expect_refused([&] { shared.open_regular_file("link", O_CREAT | O_RDWR); });
   expect_refused([&] { shared.open_subfolder_if_exists(id("folder")); });
-  expect_refused([&] { shared.make_subfolder(id("folder")); });
-  EXPECT_TRUE(shared.contains_entry("link"));
-  shared.replace_file("link", "ours");
-  EXPECT_EQ(shared.read("link", 100), "ours");
+  expect_refused([&] { shared.open_or_create_subfolder(id("folder")); });
+  EXPECT_TRUE(shared.contains_folder_entry("link"));
+  shared.replace_file_atomically("link", "ours");
+  EXPECT_EQ(shared.read_file_if_exists("link", 100), "ours");
   fs::remove(path / "link");
   fs::create_symlink(outside, path / "link");
   shared.remove_file("link");
   EXPECT_EQ(TemporaryFolder::read_content(outside), "mine");
 }
 
-TEST_F(SharedFolderTest, RejectsNamesOutsideFolder) {
+TEST_F(SharedFolderTest, ThrowsForNamesThatLeaveFolder) {
   const SharedFolder shared(path);
   for (const std::string& name :
        {std::string(), std::string("."), std::string(".."), std::string("../outside.txt"),
@@ -88,10 +88,10 @@ TEST_F(SharedFolderTest, RejectsNamesOutsideFolder) {
     const auto expect_refused = [&](const auto& action) {
       EXPECT_THAT(rejection_message(action), HasSubstr("is no name of a file in it")) << name;
     };
-    expect_refused([&] { shared.contains_entry(name); });
-    expect_refused([&] { shared.read(name, 100); });
-    expect_refused([&] { shared.replace_file(name, "x"); });
-    expect_refused([&] { shared.open(name, O_RDONLY); });
+    expect_refused([&] { shared.contains_folder_entry(name); });
+    expect_refused([&] { shared.read_file_if_exists(name, 100); });
+    expect_refused([&] { shared.replace_file_atomically(name, "x"); });
+    expect_refused([&] { shared.open_regular_file(name, O_RDONLY); });
     expect_refused([&] { shared.rename_file(name, "a"); });
     expect_refused([&] { shared.rename_file("a", name); });
     expect_refused([&] { shared.remove_file(name); });
@@ -99,7 +99,7 @@ TEST_F(SharedFolderTest, RejectsNamesOutsideFolder) {
   EXPECT_EQ(TemporaryFolder::read_content(outside), "mine");
 }
 
-TEST_F(SharedFolderTest, RemovesContentOfOpenedFolderAfterRename) {
+TEST_F(SharedFolderTest, RemoveAllFolderEntriesClearsOpenedFolderAfterItsRename) {
   fs::create_directories(folder / "elsewhere/kept");
   fs::create_directories(path / "sub");
   folder.file("shared/sub/file", "");
@@ -107,59 +107,59 @@ TEST_F(SharedFolderTest, RemovesContentOfOpenedFolderAfterRename) {
   const SharedFolder shared(path);
   fs::rename(path, folder / "moved");
   fs::create_directory_symlink(folder / "elsewhere", path);
-  shared.remove_all_entries();
+  shared.remove_all_folder_entries();
   EXPECT_TRUE(fs::is_empty(folder / "moved"));
   EXPECT_TRUE(fs::exists(folder / "elsewhere/kept"));
 }
 
-TEST_F(SharedFolderTest, ReadsRegularFilesOnly) {
+TEST_F(SharedFolderTest, ThrowsWhenOpeningPipeOrReadingFolder) {
   ASSERT_EQ(::mkfifo((path / "pipe").c_str(), 0600), 0);
   const SharedFolder shared(path);
   for (const int flags : {O_RDONLY, O_WRONLY, O_RDWR}) {
-    EXPECT_THAT(rejection_message([&] { shared.open("pipe", flags); }),
+    EXPECT_THAT(rejection_message([&] { shared.open_regular_file("pipe", flags); }),
                 HasSubstr("is no regular file"));
   }
   fs::create_directory(path / "folder");
-  EXPECT_THAT(rejection_message([&] { shared.read("folder", 10); }),
+  EXPECT_THAT(rejection_message([&] { shared.read_file_if_exists("folder", 10); }),
               HasSubstr("is no regular file"));
 }
 
-TEST_F(SharedFolderTest, KeepsModeAndOwnerOfReplacedFile) {
+TEST_F(SharedFolderTest, ReplaceFileAtomicallyKeepsModeAndOwner) {
   const SharedFolder shared(path);
-  shared.replace_file("a", "first");
+  shared.replace_file_atomically("a", "first");
   ASSERT_EQ(::chmod((path / "a").c_str(), 0640), 0);
   const bool is_root = ::geteuid() == 0;
   constexpr uid_t other = 12345;
   if (is_root) {
     ASSERT_EQ(::chown((path / "a").c_str(), other, other), 0);
   }
-  shared.replace_file("a", "second");
+  shared.replace_file_atomically("a", "second");
   struct stat status {};
   ASSERT_EQ(::stat((path / "a").c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777U, 0640U);
   if (is_root) {
     EXPECT_EQ(status.st_uid, other);
   }
-  EXPECT_EQ(shared.read("a", 10), "second");
+  EXPECT_EQ(shared.read_file_if_exists("a", 10), "second");
 }
 
 std::string error_message(const std::string& text) {
   return rejection_message<std::runtime_error>([&] { check_json_size_and_depth(text); });
 }
 
-TEST(CheckJsonSizeAndDepth, AcceptsLevelsAndValuesUpToLimits) {
+TEST(CheckJsonSizeAndDepth, Accepts16LevelsAndOneMillionValues) {
   EXPECT_EQ(error_message(""), "");
   EXPECT_EQ(error_message(std::string(16, '[') + std::string(16, ']')), "");
   EXPECT_EQ(error_message("[" + std::string(999'999, ',') + "]"), "");
 }
 
-TEST(CheckJsonSizeAndDepth, ThrowsAboveLimits) {
+TEST(CheckJsonSizeAndDepth, ThrowsAbove16LevelsOrOneMillionValues) {
   EXPECT_THAT(error_message(std::string(17, '[')), HasSubstr("more than 16 levels"));
   EXPECT_THAT(error_message(R"({"a":)" + std::string(16, '{')), HasSubstr("more than 16 levels"));
   EXPECT_THAT(error_message("[" + std::string(1'000'000, ',')), HasSubstr("more than a million"));
 }
 
-TEST(CheckJsonSizeAndDepth, IgnoresContentOfStrings) {
+TEST(CheckJsonSizeAndDepth, IgnoresBracketsAndCommasInStrings) {
   EXPECT_EQ(error_message("\"" + std::string(100, '[') + std::string(2'000'000, ',') + "\""), "");
   EXPECT_EQ(error_message(R"("\"[[[[[[[[[[[[[[[[[[")"), "");
   EXPECT_THAT(error_message(R"("\\")" + std::string(17, '[')), HasSubstr("levels"));

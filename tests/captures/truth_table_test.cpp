@@ -26,7 +26,7 @@ TEST(ReadTruthTable, AcceptsMissingHeightAndYaw) {
   EXPECT_EQ(rows[1].line, 3);
 }
 
-TEST(ReadTruthTable, ReportsLineOfInvalidRow) {
+TEST(ReadTruthTable, ReportsFileLineAndColumnOfInvalidRow) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& rows) {
     return rejection_message(
@@ -63,7 +63,7 @@ TEST(ReadPathTable, RejectsPathWithoutLength) {
       HasSubstr("p.csv:2: y_m"));
 }
 
-TEST(FindNearestPointOnPath, ReturnsNearestPoint) {
+TEST(FindNearestPointOnPath, DistanceMatchesBruteForceSearch) {
   Random random(1);
   Path path;
   for (int i = 0; i < 30; ++i) {
@@ -86,7 +86,7 @@ TEST(FindNearestPointOnPath, ReturnsNearestPoint) {
   }
 }
 
-TEST(ReadPathTable, RejectsDistantWaypoint) {
+TEST(ReadPathTable, RejectsWaypointBeyond1000Kilometers) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& row) {
     return rejection_message(
@@ -98,7 +98,7 @@ TEST(ReadPathTable, RejectsDistantWaypoint) {
   EXPECT_THAT(refusal("0,0,1e7\n"), HasSubstr("p.csv:3: z_m"));
 }
 
-TEST(FindNearestPointOnPath, InterpolatesHeight) {
+TEST(FindNearestPointOnPath, InterpolatesHeightBetweenWaypoints) {
   const Path path{{{0, 0}, {2, 0}, {2, 2}}, {0, 1, 5}};
   EXPECT_DOUBLE_EQ(find_nearest_point_on_path(path, {1, 1e-3}).z_m.value(), 0.5);
   EXPECT_DOUBLE_EQ(find_nearest_point_on_path(path, {3, 1.5}).z_m.value(), 4);

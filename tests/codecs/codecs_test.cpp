@@ -22,7 +22,7 @@ cv::Mat1w gradient() {
   return image;
 }
 
-TEST(Codecs, DecodeRestoresEncodedImage) {
+TEST(Codecs, DecodeReturnsEncoded16BitImageExactly) {
   const cv::Mat1w image = gradient();
   for (const char* ending : {".png", ".tiff", ".pgm"}) {
     std::string bytes = get_codecs().encode_image_file(ending, image, {});
@@ -33,7 +33,7 @@ TEST(Codecs, DecodeRestoresEncodedImage) {
   }
 }
 
-TEST(Codecs, DecodeReturnsEmptyImageForOtherBytes) {
+TEST(Codecs, DecodeReturnsEmptyImageForBytesOfNoImage) {
   std::string bytes = "no image";
   EXPECT_TRUE(get_codecs().decode_image(bytes, kUnchanged).empty());
 }
@@ -42,12 +42,12 @@ TEST(Codecs, EncodeThrowsForUnknownExtension) {
   EXPECT_ANY_THROW(get_codecs().encode_image_file(".unknown", gradient(), {}));
 }
 
-TEST(VideoReader, OpenFailsForMissingFile) {
+TEST(VideoReader, OpenReturnsFalseForMissingFile) {
   constexpr int ffmpeg = 1900;  // cv::CAP_FFMPEG
   if (!get_codecs().has_video_backend(ffmpeg)) GTEST_SKIP() << "OpenCV without FFmpeg";
   const auto reader = get_codecs().make_video_reader();
   ASSERT_TRUE(reader);
-  EXPECT_FALSE(reader->open("/nonexistent.avi", ffmpeg));
+  EXPECT_FALSE(reader->open_video("/nonexistent.avi", ffmpeg));
   cv::Mat frame;
   EXPECT_FALSE(reader->grab_frame() && reader->retrieve_frame(frame));
 }

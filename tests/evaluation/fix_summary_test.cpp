@@ -14,7 +14,7 @@ FixRow row(int lamps, double residual_px, double sd_m) {
       lamps};
 }
 
-TEST(SummarizeFixes, CountsFixesStatusesAndLamps) {
+TEST(SummarizeFixes, ReturnsCountsAndMediansOfFixes) {
   const std::vector<FixRow> rows{row(2, 0, 1),
                                  row(5, 3, 2),
                                  row(3, 1, 3),
@@ -24,8 +24,8 @@ TEST(SummarizeFixes, CountsFixesStatusesAndLamps) {
   const FixSummary summary = summarize_fixes(rows);
   EXPECT_EQ(summary.frames, 6);
   EXPECT_EQ(summary.fixes, 3);
-  EXPECT_EQ(summary.refused.at("degenerate"), 2);
-  EXPECT_EQ(summary.refused.at("too_few_lamps"), 1);
+  EXPECT_EQ(summary.failures_by_status.at("degenerate"), 2);
+  EXPECT_EQ(summary.failures_by_status.at("too_few_lamps"), 1);
   ASSERT_TRUE(summary.typical);
   EXPECT_EQ(summary.typical->min_lamps, 2);
   EXPECT_EQ(summary.typical->max_lamps, 5);
@@ -37,7 +37,7 @@ TEST(SummarizeFixes, CountsFixesStatusesAndLamps) {
   EXPECT_EQ(summary.median_sd->yaw_rad, 4);
 }
 
-TEST(SummarizeFixes, OmitsMissingStatistics) {
+TEST(SummarizeFixes, OmitsStatisticsWithoutFixesOrReportedSds) {
   EXPECT_FALSE(summarize_fixes({}).typical);
   FixRow without_sd = row(3, 1, 1);
   without_sd.fix->sd.reset();

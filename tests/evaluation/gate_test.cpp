@@ -30,10 +30,10 @@ Evaluation evaluation() {
   input.truth = FromFile<TruthRow>{
       "truth.csv",
       {{"a", {0, 0}, 0, {}}, {"b", {0, 0}, {}, {}}, {"c", {0, 0}, {}, {}}, {"d", {0, 0}, {}, {}}}};
-  return evaluate(input);
+  return evaluate_fix_accuracy(input);
 }
 
-TEST(CheckGates, PassesIfValueDoesNotExceedLimit) {
+TEST(CheckGates, PassesOnlyIfValueDoesNotExceedLimit) {
   const auto results = check_gates({{"mean_mm", 3.001},
                                     {"mean_mm", 2.999},
                                     {"p90_mm", 6.001},
@@ -42,40 +42,41 @@ TEST(CheckGates, PassesIfValueDoesNotExceedLimit) {
                                     {"height_rms_mm", 2.9}},
                                    collect_evaluation_metrics(evaluation()));
   std::vector<bool> passed;
-  for (const CheckedMetric& result : results) passed.push_back(result.has_passed());
+  for (const CheckedMetric& result : results) passed.push_back(result.has_passed_gate());
   ASSERT_EQ(passed, (std::vector<bool>{true, false, true, true, false, false}));
   EXPECT_NEAR(results[5].value.value(), 3, 1e-9);
   EXPECT_EQ(results[5].unit, "mm");
-  EXPECT_EQ(describe(results[5]), "height_rms_mm is 3 mm, at most 2.9 mm is required");
+  EXPECT_EQ(describe_gate_result(results[5]), "height_rms_mm is 3 mm, at most 2.9 mm is required");
 }
 
-TEST(CheckGates, IncludesLimitInBothDirections) {
-  EXPECT_TRUE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.3}})[0].has_passed());
-  EXPECT_FALSE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.31}})[0].has_passed());
+TEST(CheckGates, PassesValueEqualToUpperOrLowerLimit) {
+  EXPECT_TRUE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.3}})[0].has_passed_gate());
+  EXPECT_FALSE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.31}})[0].has_passed_gate());
   const auto coverage = check_gates({{"coverage", 0.7}}, {{"coverage", 0.69}});
-  EXPECT_FALSE(coverage[0].has_passed());
-  EXPECT_EQ(describe(coverage[0]), "coverage is 0.69, at least 0.7 is required");
+  EXPECT_FALSE(coverage[0].has_passed_gate());
+  EXPECT_EQ(describe_gate_result(coverage[0]), "coverage is 0.69, at least 0.7 is required");
   EXPECT_EQ(describe_failed_gate(coverage[0]),
-            "the board views do not cover the image (" + describe(coverage[0]) + ")");
-  EXPECT_TRUE(check_gates({{"coverage", 0.7}}, {{"coverage", 0.7}})[0].has_passed());
+            "the board views do not cover the image (" + describe_gate_result(coverage[0]) + ")");
+  EXPECT_TRUE(check_gates({{"coverage", 0.7}}, {{"coverage", 0.7}})[0].has_passed_gate());
 }
 
-TEST(CheckGates, TightensLimitByGuardBand) {
+TEST(CheckGates, TightensUpperAndLowerLimitsByGuardBand) {
   const auto of = [](const char* metric, double limit, double value) {
-    return check_all_metrics({{metric, limit, GuardBand{0.01, 1.5}}}, {{metric, value}},
-                             {find_metric_kind(metric).value()})[0];
+    return check_all_metrics_against_gates({{metric, limit, GuardBand{0.01, 1.5}}},
+                                           {{metric, value}},
+                                           {find_metric_kind(metric).value()})[0];
   };
-  EXPECT_TRUE(of("rms_px", 0.3, 0.2849).has_passed());
+  EXPECT_TRUE(of("rms_px", 0.3, 0.2849).has_passed_gate());
   const CheckedMetric within = of("rms_px", 0.3, 0.286);
-  EXPECT_FALSE(within.has_passed());
-  EXPECT_EQ(describe(within),
+  EXPECT_FALSE(within.has_passed_gate());
+  EXPECT_EQ(describe_gate_result(within),
             "rms_px is 0.286 px, at most 0.3 px less a guard band of 0.015 px is required");
-  EXPECT_FALSE(
-      check_gates({{"rms_px", 0.3, GuardBand{0.01, 1.5}}}, {{"rms_px", 0.286}})[0].has_passed());
-  EXPECT_TRUE(of("coverage", 0.7, 0.7151).has_passed());
+  EXPECT_FALSE(check_gates({{"rms_px", 0.3, GuardBand{0.01, 1.5}}}, {{"rms_px", 0.286}})[0]
+                   .has_passed_gate());
+  EXPECT_TRUE(of("coverage", 0.7, 0.7151).has_passed_gate());
   const CheckedMetric below = of("coverage", 0.7, 0.714);
-  EXPECT_FALSE(below.has_passed());
-  EXPECT_EQ(describe(below),
+  EXPECT_FALSE(below.has_passed_gate());
+  EXPECT_EQ(describe_gate_result(below),
             "coverage is 0.714, at least 0.7 and a guard band of 0.015 is required");
   // Tables of the normal distribution.
   EXPECT_NEAR(of("rms_px", 0.3, 0.286).conformance_probability().value(), 0.91924, 5e-6);
@@ -98,7 +99,7 @@ TEST(ConformanceProbability, MatchesSimulatedDecisionErrors) {
     const double truth = random.uniform(limit - 5 * u, limit + 5 * u);
     unit.value = truth + u * random.normal();
     const double conforms = unit.conformance_probability().value();
-    if (unit.has_passed()) {
+    if (unit.has_passed_gate()) {
       passed_falsely += truth > limit ? 1 : 0;
       stated_passed += 1 - conforms;
     } else {
@@ -106,7 +107,7 @@ TEST(ConformanceProbability, MatchesSimulatedDecisionErrors) {
       stated_failed += conforms;
     }
     unit.value = limit + u * random.normal();
-    passed_at_limit += unit.has_passed() ? 1 : 0;
+    passed_at_limit += unit.has_passed_gate() ? 1 : 0;
   }
   // 630 units pass falsely: their number has a standard error of 4 %.
   EXPECT_NEAR(passed_falsely / stated_passed, 1, 0.1);
@@ -114,19 +115,19 @@ TEST(ConformanceProbability, MatchesSimulatedDecisionErrors) {
   EXPECT_NEAR(double(passed_at_limit) / clusters, 0.05, 0.005);
 }
 
-TEST(CheckAllMetrics, IncludesMetricsWithoutGateAndGatesWithoutValue) {
+TEST(CheckAllMetricsAgainstGates, IncludesMetricsWithoutGateAndGatesWithoutValue) {
   const double infinity = std::numeric_limits<double>::infinity();
   const auto known = list_metric_kinds({MetricSource::lens, MetricSource::rotation});
-  const auto all =
-      check_all_metrics({{"rms_px", 0.3}}, {{"tilt_deg", 1}, {"rms_px", infinity}}, known);
+  const auto all = check_all_metrics_against_gates({{"rms_px", 0.3}},
+                                                   {{"tilt_deg", 1}, {"rms_px", infinity}}, known);
   ASSERT_EQ(all.size(), 2);
   EXPECT_EQ(all[0].name, "rms_px");
   EXPECT_FALSE(all[0].value);
-  EXPECT_FALSE(all[0].has_passed());
+  EXPECT_FALSE(all[0].has_passed_gate());
   EXPECT_EQ(describe_failed_gates(all), "rms_px is not known, at most 0.3 px is required");
   EXPECT_EQ(all[1].value, 1);
   EXPECT_FALSE(all[1].limit);
-  EXPECT_TRUE(all[1].has_passed());
+  EXPECT_TRUE(all[1].has_passed_gate());
 }
 
 TEST(MergeGates, ReplacesLimitsAndAppendsNewGates) {
@@ -138,11 +139,12 @@ TEST(MergeGates, ReplacesLimitsAndAppendsNewGates) {
   EXPECT_EQ(gates[2].metric, "coverage");
 }
 
-TEST(CheckGates, PassesWorseGateWhenClustersAreTooFew) {
+TEST(CheckGates, FailsGateOnWorseErrorsOnlyWithEnoughClusters) {
   Evaluation compared = evaluation();
   compared.comparison = Comparison{};
   const auto passed = [&] {
-    return check_gates({{"worse_mm", 0}}, collect_evaluation_metrics(compared))[0].has_passed();
+    return check_gates({{"worse_mm", 0}}, collect_evaluation_metrics(compared))[0]
+        .has_passed_gate();
   };
   EXPECT_FALSE(find_metric_value(collect_evaluation_metrics(compared), "worse_mm")) << "no pair";
   compared.comparison->pairs = compared.comparison->clusters = 19;
@@ -157,7 +159,7 @@ TEST(CheckGates, PassesWorseGateWhenClustersAreTooFew) {
   EXPECT_TRUE(passed());
 }
 
-TEST(ParseGate, RejectsUnreachableLimits) {
+TEST(ParseGate, RejectsLimitsOutsideRangeOfMetric) {
   const auto known = list_metric_kinds({MetricSource::lens, MetricSource::evaluation});
   const auto words = [&](const char* text) -> std::string {
     try {
@@ -191,16 +193,16 @@ TEST(ParseGate, RejectsUnreachableLimits) {
 
 TEST(CheckGates, FailsGateWithoutValue) {
   const CheckedMetric gate = check_gates({{"split_half_px", 1}}, {{"rms_px", 0.1}})[0];
-  EXPECT_EQ(describe(gate), "split_half_px is not known, at most 1 px is required");
-  const auto json = nlohmann::json::parse(to_json(evaluation(), {gate}));
+  EXPECT_EQ(describe_gate_result(gate), "split_half_px is not known, at most 1 px is required");
+  const auto json = nlohmann::json::parse(format_evaluation_json(evaluation(), {gate}));
   EXPECT_TRUE(json["gates"][0]["value"].is_null());
   EXPECT_EQ(json["passed"], false);
-  const auto tests = make_junit_tests(std::vector{gate});
+  const auto tests = make_junit_tests_from_gates(std::vector{gate});
   ASSERT_EQ(tests.size(), 1);
   EXPECT_THAT(tests[0].message, HasSubstr("split_half_px is not known, at most 1 px"));
 }
 
-TEST(ParseGate, ParsesNameAndLimit) {
+TEST(ParseGate, ReturnsMetricAndLimitAndThrowsForInvalidText) {
   const auto known = list_metric_kinds({MetricSource::evaluation});
   const Gate gate = parse_gate("p90_mm=2.5", known);
   EXPECT_EQ(gate.metric, "p90_mm");
@@ -211,7 +213,7 @@ TEST(ParseGate, ParsesNameAndLimit) {
   }
 }
 
-TEST(ReadGates, ReadsFileAndRejectsInvalidOnes) {
+TEST(ReadGates, ReturnsGatesOfFileAndRejectsInvalidFiles) {
   const TemporaryFolder folder;
   const auto known = list_metric_kinds({MetricSource::evaluation});
   const auto gates = read_gates(
@@ -231,10 +233,10 @@ TEST(ReadGates, ReadsFileAndRejectsInvalidOnes) {
   EXPECT_THAT(refusal("gates: {}\n"), HasSubstr("contains no gate"));
 }
 
-TEST(EvaluationJson, HasUnitsInKeys) {
+TEST(EvaluationToJson, WritesMetricsWithUnitsInKeys) {
   const auto json = nlohmann::json::parse(
-      to_json(evaluation(), check_gates({{"max_mm", 5}, {"missing_fraction", 1}},
-                                        collect_evaluation_metrics(evaluation()))));
+      format_evaluation_json(evaluation(), check_gates({{"max_mm", 5}, {"missing_fraction", 1}},
+                                                       collect_evaluation_metrics(evaluation()))));
   EXPECT_EQ(json["format"], "vlp-evaluation/3");
   EXPECT_EQ(json["captures"], 4);
   EXPECT_EQ(json["missing"]["degenerate"], 1);
@@ -246,18 +248,18 @@ TEST(EvaluationJson, HasUnitsInKeys) {
   EXPECT_EQ(json["passed"], false);
 }
 
-TEST(EvaluationJson, OmitsP90IntervalForFewUnits) {
+TEST(EvaluationToJson, OmitsMissingP90IntervalAndStatesTooFewClusters) {
   Evaluation few = evaluation();
   const Interval interval{0.001, 0.002};
   few.intervals_m = {interval, interval, {}, interval, 19};
   few.comparison = Comparison{};
-  const auto json = nlohmann::json::parse(to_json(few, {}));
+  const auto json = nlohmann::json::parse(format_evaluation_json(few, {}));
   EXPECT_FALSE(json["horizontal"]["intervals_95"].contains("p90_mm"));
   EXPECT_NEAR(json["horizontal"]["intervals_95"]["rms_mm"][1].get<double>(), 2, 1e-9);
   EXPECT_EQ(json["comparison"]["reason"], "too few clusters");
   few.intervals_m->p90 = interval;
   few.comparison->clusters = 20;
-  const auto sufficient = nlohmann::json::parse(to_json(few, {}));
+  const auto sufficient = nlohmann::json::parse(format_evaluation_json(few, {}));
   EXPECT_NEAR(sufficient["horizontal"]["intervals_95"]["p90_mm"][0].get<double>(), 1, 1e-9);
   EXPECT_FALSE(sufficient["comparison"].contains("reason"));
 }

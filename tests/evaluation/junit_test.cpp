@@ -9,11 +9,11 @@
 namespace vlp {
 namespace {
 
-TEST(MakeJUnitTests, FailsGatesThatAreNotPassed) {
+TEST(MakeJUnitTests, MarksOnlyGatesThatDidNotPassAsFailed) {
   const std::vector<CheckedMetric> gates{{"mean_mm", "mm", 1.25, 1, Direction::at_most},
                                          {"missing_fraction", "", 0, 0, Direction::at_most},
                                          {"split_half_px", "px", {}, 1, Direction::at_most}};
-  const auto tests = make_junit_tests(gates);
+  const auto tests = make_junit_tests_from_gates(gates);
   ASSERT_EQ(tests.size(), 3);
   EXPECT_EQ(tests[0].name, "mean_mm");
   EXPECT_EQ(tests[0].result, JUnitTest::Result::failed);
@@ -32,7 +32,7 @@ TEST(FormatJUnit, WritesEachResultWithMessageAndWarnings) {
       {"mean_mm", JUnitTest::Result::failed, "mean_mm is <2>"},
       {"rotation", JUnitTest::Result::error, "lamp 2 moved \x01\xff", "wrong_map"}};
   pugi::xml_document document;
-  ASSERT_TRUE(document.load_string(format_junit("vlp-calibrate", tests).c_str()));
+  ASSERT_TRUE(document.load_string(format_junit_xml("vlp-calibrate", tests).c_str()));
   const pugi::xml_node suite = document.child("testsuites").child("testsuite");
   EXPECT_STREQ(suite.attribute("name").value(), "vlp-calibrate");
   EXPECT_EQ(suite.attribute("tests").as_int(), 3);

@@ -10,7 +10,7 @@
 namespace vlp {
 namespace {
 
-TEST(ListMetricKinds, HaveUniqueNamesAndDescriptions) {
+TEST(ListMetricKinds, ReturnsUniqueNamesAndNonEmptyDescriptions) {
   std::set<std::string> names;
   const auto kinds =
       list_metric_kinds({MetricSource::station, MetricSource::lens, MetricSource::rotation,

@@ -34,16 +34,17 @@ EvaluationInput draw_run(std::size_t count, unsigned seed, double height_scale =
   return input;
 }
 
-TEST(ProposeGatesFromEvaluation, RunsOfSameAccuracyPass) {
+TEST(ProposeGatesFromEvaluation, OtherRunOfSameAccuracyPassesProposedGates) {
   int exceeded = 0, checked = 0;
   for (unsigned seed = 0; seed < 200; ++seed) {
     const EvaluationInput first = draw_run(40, 2 * seed), second = draw_run(40, 2 * seed + 1);
-    const auto gates = propose_gates_from_evaluation(first, evaluate(first));
+    const auto gates = propose_gates_from_evaluation(first, evaluate_fix_accuracy(first));
     ASSERT_EQ(gates.size(), 5);
-    for (const auto& gate : check_gates(gates, collect_evaluation_metrics(evaluate(second)))) {
+    for (const auto& gate :
+         check_gates(gates, collect_evaluation_metrics(evaluate_fix_accuracy(second)))) {
       if (gate.name == "missing_fraction") continue;
       ++checked;
-      if (!gate.has_passed()) ++exceeded;
+      if (!gate.has_passed_gate()) ++exceeded;
     }
   }
   ASSERT_EQ(checked, 800);
@@ -51,21 +52,21 @@ TEST(ProposeGatesFromEvaluation, RunsOfSameAccuracyPass) {
   EXPECT_LE(exceeded, 5);
 }
 
-TEST(ProposeGatesFromEvaluation, RunWithScaledHeightErrorsFails) {
+TEST(ProposeGatesFromEvaluation, RunWithTripledHeightErrorsFailsProposedGates) {
   const EvaluationInput good = draw_run(40, 1), wrong = draw_run(40, 2, 3);
-  const auto gates = propose_gates_from_evaluation(good, evaluate(good));
+  const auto gates = propose_gates_from_evaluation(good, evaluate_fix_accuracy(good));
   ASSERT_FALSE(gates.empty());
-  EXPECT_THAT(
-      describe_failed_gates(check_gates(gates, collect_evaluation_metrics(evaluate(wrong)))),
-      HasSubstr("height_rms_mm is"));
+  EXPECT_THAT(describe_failed_gates(
+                  check_gates(gates, collect_evaluation_metrics(evaluate_fix_accuracy(wrong)))),
+              HasSubstr("height_rms_mm is"));
 }
 
-TEST(ProposeGatesFromEvaluation, KeepsMarginWithoutScatter) {
+TEST(ProposeGatesFromEvaluation, ProposesLimitsSlightlyAboveErrorsWithoutScatter) {
   EvaluationInput input = draw_run(8, 1);
   for (std::size_t i = 0; i < 8; ++i) {
     input.fixes.rows[i].fix->pose = {{static_cast<double>(i) + 1e-3, 0, 0}, 0};
   }
-  const auto gates = propose_gates_from_evaluation(input, evaluate(input));
+  const auto gates = propose_gates_from_evaluation(input, evaluate_fix_accuracy(input));
   ASSERT_EQ(gates.size(), 4) << "p90 needs 20 units";
   EXPECT_EQ(gates[0].metric, "mean_mm");
   EXPECT_NEAR(gates[0].limit, 1.01, 1e-9);
@@ -75,16 +76,16 @@ TEST(ProposeGatesFromEvaluation, KeepsMarginWithoutScatter) {
   EXPECT_EQ(gates[3].limit, 0);
 }
 
-TEST(ProposeGatesFromEvaluation, ReturnsNoneForFewerThanFiveUnits) {
+TEST(ProposeGatesFromEvaluation, ReturnsNoGatesForFewerThanFivePositions) {
   const EvaluationInput input = draw_run(4, 1);
-  EXPECT_TRUE(propose_gates_from_evaluation(input, evaluate(input)).empty());
+  EXPECT_TRUE(propose_gates_from_evaluation(input, evaluate_fix_accuracy(input)).empty());
 }
 
-TEST(FormatGates, OwnRunWithMissingCapturesPasses) {
+TEST(FormatGates, RunPassesItsOwnProposedGatesDespiteMissingFixes) {
   EvaluationInput input = draw_run(21, 1);
   for (std::size_t i = 0; i < 7; ++i) input.fixes.rows[3 * i].fix.reset();
-  const Evaluation evaluation = evaluate(input);
-  ASSERT_NEAR(evaluation.missing_fraction(), 1.0 / 3, 1e-12);
+  const Evaluation evaluation = evaluate_fix_accuracy(input);
+  ASSERT_NEAR(evaluation.missing_fix_fraction(), 1.0 / 3, 1e-12);
   const TemporaryFolder folder;
   const auto gates = read_gates(
       folder.file("gates.yaml",
@@ -94,9 +95,9 @@ TEST(FormatGates, OwnRunWithMissingCapturesPasses) {
   EXPECT_EQ(describe_failed_gates(check_gates(gates, collect_evaluation_metrics(evaluation))), "");
 }
 
-TEST(FormatGates, RoundTripsThroughReadGates) {
+TEST(FormatGates, ReadGatesReturnsFormattedGates) {
   const EvaluationInput input = draw_run(40, 1);
-  const Evaluation evaluation = evaluate(input);
+  const Evaluation evaluation = evaluate_fix_accuracy(input);
   const auto gates = propose_gates_from_evaluation(input, evaluation);
   const TemporaryFolder folder;
   const auto read = read_gates(folder.file("gates.yaml", format_gates(gates, evaluation)),

@@ -27,7 +27,7 @@ Evaluation evaluation(std::size_t clusters) {
   return evaluation;
 }
 
-TEST(MissingFixesWarning, WarnsIfNoGateLimitsMissingFixes) {
+TEST(MakeMissingFixesWarning, WarnsIfNoneOfTheGatesLimitsMissingFixes) {
   const auto gates = check_gates({{"mean_mm", 2}, {"missing_fraction", 1}},
                                  {{"mean_mm", 1}, {"missing_fraction", 0.9}});
   const CheckedMetric &mean = gates[0], &missing = gates[1];
@@ -42,7 +42,7 @@ TEST(MissingFixesWarning, WarnsIfNoGateLimitsMissingFixes) {
   EXPECT_EQ(make_missing_fixes_warning(all, {mean}), "");
 }
 
-TEST(SampleSizeWarnings, WarnsForFewUnits) {
+TEST(MakeSampleSizeWarnings, WarnsForFewerThanFiftyStations) {
   EXPECT_THAT(make_sample_size_warnings(evaluation(50)), IsEmpty());
   EXPECT_THAT(
       make_sample_size_warnings(evaluation(49)),
@@ -58,7 +58,7 @@ TEST(SampleSizeWarnings, WarnsForFewUnits) {
               ElementsAre("there are too few reference points with a fix for intervals"));
 }
 
-TEST(LimitWarning, WarnsIfErrorsAreBelowCrlb) {
+TEST(MakeCrlbWarning, WarnsIfErrorsAreSignificantlyBelowCrlb) {
   Evaluation limited = evaluation(1000);
   EXPECT_EQ(make_crlb_warning(limited), "");
   limited.limit = CrlbRatio{0.609, 1e-3, 36, 1.0 / 12};
@@ -70,7 +70,7 @@ TEST(LimitWarning, WarnsIfErrorsAreBelowCrlb) {
   EXPECT_EQ(make_crlb_warning(limited), "");
 }
 
-TEST(SampleSizeWarnings, CountsUnitsOfPairs) {
+TEST(MakeSampleSizeWarnings, WarnsForFewerThanFiftyStationsInComparison) {
   Evaluation compared = evaluation(1000);
   compared.comparison = Comparison{};
   compared.comparison->clusters = 8;

@@ -39,7 +39,7 @@ struct BoardIntakeOfFolder : testing::Test {
   /// Returns the observation of an image with these pixels.
   Observation observe(const cv::Mat& image) const {
     return BoardIntake(board, options, std::array{good.cols, good.rows})
-        .detect_in_image(SourceImage(write("image.png", image)));
+        .detect_board_in_image(SourceImage(write("image.png", image)));
   }
   Observations observe_all() const {
     return detect_boards_in_images(list_images(folder / ""), board, "board.yaml", options);
@@ -47,7 +47,7 @@ struct BoardIntakeOfFolder : testing::Test {
 };
 
 RejectionReason rejection_reason(const Observation& image) {
-  EXPECT_TRUE(image.rejection) << image.file_name() << " is not rejected";
+  EXPECT_TRUE(image.rejection) << image.image_file_name() << " is not rejected";
   return image.rejection ? image.rejection->reason : RejectionReason::not_needed;
 }
 
@@ -59,7 +59,7 @@ cv::Mat scaled(const cv::Mat& image, double factor) {
 
 TEST_F(BoardIntakeOfFolder, KeepsSharpImage) {
   const Observation image = observe(good);
-  EXPECT_TRUE(image.is_kept()) << image.rejection->message;
+  EXPECT_TRUE(image.is_image_kept()) << image.rejection->message;
   ASSERT_TRUE(image.board);
   EXPECT_GE(image.board->seen.tags.size(), 20U);
   EXPECT_EQ(image.size_px, (std::array{800, 600}));
@@ -67,7 +67,7 @@ TEST_F(BoardIntakeOfFolder, KeepsSharpImage) {
   EXPECT_LT(*image.blur_px, 1.5);
 }
 
-TEST_F(BoardIntakeOfFolder, RejectsPoorImagesWithMeasuredValues) {
+TEST_F(BoardIntakeOfFolder, RejectsBlurredDarkOverexposedUniformOrWronglySizedImages) {
   cv::Mat blurred;
   cv::GaussianBlur(good, blurred, {}, 3);
   const Observation blur = observe(blurred);
@@ -90,15 +90,15 @@ TEST_F(BoardIntakeOfFolder, RejectsPoorImagesWithMeasuredValues) {
   EXPECT_EQ(rejection_reason(observe(good(cv::Rect(0, 0, 400, 300)))), RejectionReason::wrong_size);
 }
 
-TEST_F(BoardIntakeOfFolder, AppliesLimitsOfOptions) {
+TEST_F(BoardIntakeOfFolder, RejectsImageBlurredBeyondMaxBlurOfOptions) {
   cv::Mat blurred;
   cv::GaussianBlur(good, blurred, {}, 1.5);
-  ASSERT_TRUE(observe(blurred).is_kept());
+  ASSERT_TRUE(observe(blurred).is_image_kept());
   options.max_blur_px = 1;
   EXPECT_EQ(rejection_reason(observe(blurred)), RejectionReason::blurred);
 }
 
-TEST_F(BoardIntakeOfFolder, RejectsImagesWithTooFewTags) {
+TEST_F(BoardIntakeOfFolder, RejectsImagesWithTwoOrNoTags) {
   // Some tags are left, then none.
   cv::Mat few = good.clone(), none = good.clone();
   const BoardDetection seen = BoardDetector(board).detect_board(good);
@@ -120,15 +120,15 @@ TEST_F(BoardIntakeOfFolder, RejectsImagesWithTooFewTags) {
   EXPECT_EQ(rejection_reason(observe(none)), RejectionReason::no_board);
 }
 
-TEST_F(BoardIntakeOfFolder, RejectsTagsOfOtherBoard) {
+TEST_F(BoardIntakeOfFolder, RejectsImageWithTagsOfOtherBoard) {
   const Observation before = observe(good);
-  ASSERT_TRUE(before.is_kept());
+  ASSERT_TRUE(before.is_image_kept());
   board.first_id += 100;
   const Observation image = observe(good);
   EXPECT_EQ(rejection_reason(image), RejectionReason::other_board);
 }
 
-TEST_F(BoardIntakeOfFolder, ReturnsSameResultForAnyNumberOfThreads) {
+TEST_F(BoardIntakeOfFolder, ReturnsSameCornersWithOneAndFourThreads) {
   for (const char* name : {"a.png", "b.png", "c.png", "d.png"}) write(name, good);
   write("e.png", other);
   folder.file("bad.png", "no image");
@@ -146,8 +146,9 @@ TEST_F(BoardIntakeOfFolder, ReturnsSameResultForAnyNumberOfThreads) {
   ASSERT_EQ(one.images.size(), 6U);
   int compared = 0;
   for (std::size_t i = 0; i < one.images.size(); ++i) {
-    EXPECT_EQ(one.images[i].file_name(), four.images[i].file_name());
-    ASSERT_EQ(one.images[i].is_kept(), four.images[i].is_kept()) << one.images[i].file_name();
+    EXPECT_EQ(one.images[i].image_file_name(), four.images[i].image_file_name());
+    ASSERT_EQ(one.images[i].is_image_kept(), four.images[i].is_image_kept())
+        << one.images[i].image_file_name();
     ASSERT_EQ(one.images[i].board.has_value(), four.images[i].board.has_value());
     if (!one.images[i].board) continue;
     const auto &tags = one.images[i].board->seen.tags, &others = four.images[i].board->seen.tags;
@@ -171,15 +172,15 @@ TEST_F(BoardIntakeOfFolder, RejectsRepeatedImagesAndViews) {
   write("d.png", other);
   const Observations seen = observe_all();
   ASSERT_EQ(seen.images.size(), 4U);
-  EXPECT_TRUE(seen.images[0].is_kept());
+  EXPECT_TRUE(seen.images[0].is_image_kept());
   EXPECT_EQ(rejection_reason(seen.images[1]), RejectionReason::same_image);
   ASSERT_TRUE(seen.images[1].rejection && seen.images[2].rejection);
   EXPECT_EQ(seen.images[1].rejection->message, "is the same image as a.png");
   EXPECT_EQ(rejection_reason(seen.images[2]), RejectionReason::same_view);
   EXPECT_EQ(seen.images[2].rejection->message, "shows the same view as a.png: views count once");
-  EXPECT_TRUE(seen.images[3].is_kept());
+  EXPECT_TRUE(seen.images[3].is_image_kept());
   EXPECT_FALSE(seen.failure);
-  EXPECT_EQ(collect_kept_views(seen.images).size(), 2U);
+  EXPECT_EQ(collect_kept_board_views(seen.images).size(), 2U);
 }
 
 TEST_F(BoardIntakeOfFolder, RejectsImagesOfMinoritySize) {
@@ -192,7 +193,7 @@ TEST_F(BoardIntakeOfFolder, RejectsImagesOfMinoritySize) {
   ASSERT_TRUE(seen.images[0].rejection);
   EXPECT_THAT(seen.images[0].rejection->message,
               StartsWith("is 700 x 600 px, the camera's images are 800 x 600"));
-  EXPECT_TRUE(seen.images[1].is_kept());
+  EXPECT_TRUE(seen.images[1].is_image_kept());
 }
 
 TEST_F(BoardIntakeOfFolder, ThrowsIfNoImageIsReadable) {
@@ -213,13 +214,13 @@ TEST_F(BoardIntakeOfFolder, ReportsFailureIfNoImageShowsBoard) {
   EXPECT_THAT(seen.failure->message, HasSubstr("with other ids than those of the board"));
 }
 
-TEST_F(BoardIntakeOfFolder, ReturnsCachedDetection) {
+TEST_F(BoardIntakeOfFolder, ReturnsCachedDetectionButAppliesCurrentLimits) {
   const fs::path file = write("a.png", good);
   options.corner_cache = folder / "cache";
   const BoardIntake intake(board, options);
-  const Observation detected = intake.detect_in_image(SourceImage(file));
+  const Observation detected = intake.detect_board_in_image(SourceImage(file));
   ASSERT_FALSE(fs::is_empty(options.corner_cache));
-  const Observation cached = intake.detect_in_image(SourceImage(file));
+  const Observation cached = intake.detect_board_in_image(SourceImage(file));
   ASSERT_TRUE(detected.board && cached.board);
   ASSERT_TRUE(detected.blur_px);
   ASSERT_FALSE(detected.board->seen.tags.empty());
@@ -228,11 +229,11 @@ TEST_F(BoardIntakeOfFolder, ReturnsCachedDetection) {
   EXPECT_EQ(detected.board->seen.tags.size(), cached.board->seen.tags.size());
   // The stored figures count, not the image.
   CornerCache(options.corner_cache, board)
-      .keep(SourceImage(file), {*detected.board, 1.25, 0.9, 0.1});
-  EXPECT_EQ(intake.detect_in_image(SourceImage(file)).blur_px, 1.25);
+      .store_cached_view(SourceImage(file), {*detected.board, 1.25, 0.9, 0.1});
+  EXPECT_EQ(intake.detect_board_in_image(SourceImage(file)).blur_px, 1.25);
   // Limits are no part of the cache.
   options.max_blur_px = 0.1;
-  EXPECT_EQ(rejection_reason(BoardIntake(board, options).detect_in_image(SourceImage(file))),
+  EXPECT_EQ(rejection_reason(BoardIntake(board, options).detect_board_in_image(SourceImage(file))),
             RejectionReason::blurred);
 }
 

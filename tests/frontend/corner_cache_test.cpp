@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Files of the cache are not synchronized: a power failure may truncate a file.
-TEST(CornerCache, IgnoresTruncatedFiles) {
+TEST(CornerCache, TruncatedFileYieldsSameDetectionAndIsRewritten) {
   const fs::path rig = kRig;
   const TemporaryFolder folder;
   const Board board = read_board(rig / "board.yaml");
@@ -30,7 +30,7 @@ TEST(CornerCache, IgnoresTruncatedFiles) {
   options.corner_cache = folder / "cache";
   const auto view = [&] {
     const fs::path image = rig / "sample-boards/0000.png";
-    return BoardIntake(board, options).detect_in_image(SourceImage(image)).board.value();
+    return BoardIntake(board, options).detect_board_in_image(SourceImage(image)).board.value();
   };
   const BoardView whole = view();
   ASSERT_GE(whole.seen.tags.size(), 20U);
@@ -50,7 +50,7 @@ TEST(CornerCache, IgnoresTruncatedFiles) {
 }
 
 /// The tone curve is estimated from all images of a camera, so that fits for all curves are stored.
-TEST(CornerCache, RestoresFitsForAllToneCurves) {
+TEST(CornerCache, FindReturnsStoredFitsForAllToneCurves) {
   const fs::path rig = kRig;
   const TemporaryFolder folder;
   const Board board = read_board(rig / "board.yaml");
@@ -79,8 +79,8 @@ TEST(CornerCache, RestoresFitsForAllToneCurves) {
   cv::imwrite(folder / "coded.png", coded);
   const SourceImage image(folder / "coded.png");
   const CornerCache cache(folder / "cache", board);
-  cache.keep(image, {view, 0.8, 0.9, 0.05});
-  const auto kept = cache.find(image);
+  cache.store_cached_view(image, {view, 0.8, 0.9, 0.05});
+  const auto kept = cache.find_cached_view(image);
   ASSERT_TRUE(kept);
   EXPECT_EQ(kept->blur_px, 0.8);
   EXPECT_EQ(kept->bright_fraction, 0.9);

@@ -44,7 +44,7 @@ INSTANTIATE_TEST_SUITE_P(Formats, ReadImageSizeFromHeaderOfFormat,
                          testing::Values(".png", ".jpg", ".bmp", ".tif", ".pgm"),
                          [](const auto& ending) { return std::string(ending.param + 1); });
 
-TEST(ReadImageSizeFromHeader, ReadsDirectoryOfBigTiff) {
+TEST(ReadImageSizeFromHeader, ReturnsSizeOfBigTiff) {
   std::string bytes("II+\0\x08\0\0\0\x10\0\0\0\0\0\0\0", 16);
   bytes += std::string("\x02\0\0\0\0\0\0\0", 8);
   bytes += std::string("\0\x01\x04\0\x01\0\0\0\0\0\0\0\x20\x4e\0\0\0\0\0\0", 20);
@@ -55,7 +55,7 @@ TEST(ReadImageSizeFromHeader, ReadsDirectoryOfBigTiff) {
   }
 }
 
-TEST(ReadImageSizeFromHeader, ReturnsNulloptForOtherFiles) {
+TEST(ReadImageSizeFromHeader, ReturnsNulloptForFilesThatAreNoImages) {
   EXPECT_FALSE(read_image_size_from_header(""));
   EXPECT_FALSE(read_image_size_from_header("no image"));
   EXPECT_FALSE(read_image_size_from_header("P5 # never ends"));
@@ -104,7 +104,7 @@ TEST(ReadImageSizeFromHeader, UsesFirstOfRepeatedTagsOfTiff) {
   EXPECT_FALSE(read_image_size_from_header(make_tiff({elsewhere, height})));
 }
 
-TEST(ReadImage, ReportsTruncatedFiles) {
+TEST(ReadImage, ReportsTruncatedFilesAsCutShortOrDamaged) {
   const TemporaryFolder folder;
   const std::string tiff = encoded_as(".tif", 33, 21), jpeg("\xff\xd8\xff\xda\xff\xd9");
   for (const std::string& content : {tiff.substr(0, 8), jpeg, std::string("BM12"), make_tiff({})}) {
@@ -113,7 +113,7 @@ TEST(ReadImage, ReportsTruncatedFiles) {
   }
 }
 
-TEST(ReadImage, RejectsOtherFormatsBeforeDecoding) {
+TEST(ReadImage, RejectsFilesOfUnsupportedFormats) {
   const TemporaryFolder folder;
   const std::string webp("RIFF\x10\0\0\0WEBPVP8L\x04\0\0\0\x2f\xff\xff\xff", 24);
   for (const std::string& content : {webp, std::string("no image"), std::string(100, '\0')}) {
@@ -126,7 +126,7 @@ TEST(ReadImage, RejectsOtherFormatsBeforeDecoding) {
   }
 }
 
-TEST(ReadImage, RejectsTooLargeImagesBeforeDecoding) {
+TEST(ReadImage, RejectsImageWhoseHeaderExceedsMaxMegapixels) {
   std::string bytes = encoded_as(".png", 30, 30);
   for (const std::size_t at : {16U, 20U}) bytes.replace(at, 4, std::string("\0\0\x75\x30", 4));
   const TemporaryFolder folder;

@@ -10,7 +10,7 @@
 namespace vlp {
 namespace {
 
-TEST(ProcessImagesInParallel, ProcessesEachImageOnceOnOneThread) {
+TEST(ProcessImagesInParallel, RunsTaskOncePerImageWithOneOpencvThread) {
   cv::setNumThreads(4);
   constexpr std::size_t count = 50;
   std::vector<int> times(count), threads(count);

@@ -15,11 +15,11 @@ const std::string kSample = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample"
 std::vector<Observation> sample_lights() {
   const LightDetector detector({}, {Readout::rows, {}, {}});
   return LampIntake(detector, ImageUse::fixes, {}, {})
-      .detect_in_all_images(list_images(kSample))
+      .detect_lamps_in_all_images(list_images(kSample))
       .images;
 }
 
-TEST(AddLabeled, AddsLightsNamedByTable) {
+TEST(AddLabeledLights, AddsOneLightPerLabelOfTable) {
   const auto images = sample_lights();
   ASSERT_EQ(images.size(), 2);
   LabeledLights labeled;
@@ -39,7 +39,7 @@ TEST(AddLabeled, AddsLightsNamedByTable) {
   EXPECT_EQ(labeled.lights.back().image, 3);
 }
 
-TEST(AddLabeled, CountsLabelsWithoutLight) {
+TEST(AddLabeledLights, CountsLabelsWithoutLight) {
   auto labels = read_detections(kSample + "/true_detections.csv");
   labels[0].detections[0].pixel.x() += 30;
   LabeledLights labeled;
@@ -48,7 +48,7 @@ TEST(AddLabeled, CountsLabelsWithoutLight) {
   EXPECT_EQ(labeled.lights.size(), 11);
 }
 
-TEST(AddLabeled, RejectsTruncatedLights) {
+TEST(AddLabeledLights, CountsLabelOfLightCutByBorderAsWithoutLight) {
   auto images = sample_lights();
   const auto labels = read_detections(kSample + "/true_detections.csv");
   images[0].size_px = {int(labels[0].detections[0].pixel.x()), 600};
@@ -57,7 +57,7 @@ TEST(AddLabeled, RejectsTruncatedLights) {
   EXPECT_GT(labeled.without_light, 0);
 }
 
-TEST(MeasuredPeriods, ReturnsPeriodsOfAllOrLabeledLights) {
+TEST(CollectLightPeriods, ReturnsPeriodsOfAllLightsOrOnlyLabeledOnes) {
   const auto images = sample_lights();
   const auto all = collect_light_periods(images, {});
   EXPECT_GE(all.size(), 8);

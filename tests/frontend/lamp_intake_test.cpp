@@ -26,11 +26,11 @@ struct LampIntakeOfImage : testing::Test {
     cv::imwrite(file.string(), image);
     return LampIntake(LightDetector(lamps, make_detector_camera(calibration)), use, {},
                       calibration.camera.imager_px)
-        .detect_in_image(SourceImage(file));
+        .detect_lamps_in_image(SourceImage(file));
   }
   std::string refusal(const cv::Mat& image) const {
     const Observation seen = observe(image);
-    return seen.is_kept() ? "" : seen.rejection->message;
+    return seen.is_image_kept() ? "" : seen.rejection->message;
   }
   /// Creates an image of a ceiling with this level and noise, and a lamp with stripes brighter by
   /// `lamp`.
@@ -69,17 +69,17 @@ TEST_F(LampIntakeOfImage, RejectsImageOfOtherSize) {
 
 TEST_F(LampIntakeOfImage, KeepsImageWithLamps) {
   const Observation image = observe(read_image(kRig + "/sample/0000.png"));
-  EXPECT_TRUE(image.is_kept());
+  EXPECT_TRUE(image.is_image_kept());
   EXPECT_GE(collect_identified_lamps(image).size(), 4U);
-  EXPECT_EQ(collect_kept_frames(std::vector{image}).at(0).detections.size(),
+  EXPECT_EQ(collect_kept_lamp_frames(std::vector{image}).at(0).detections.size(),
             collect_identified_lamps(image).size());
   for (const Light& light : image.lights) EXPECT_TRUE(light.outline.empty());
 }
 
 /// Dark images have a row in the table of fixes, without a fix.
-TEST_F(LampIntakeOfImage, KeepsDarkImageForFixes) {
+TEST_F(LampIntakeOfImage, KeepsDarkImageWhenUsedForFixes) {
   const Observation image = observe(ceiling(2, 0.5, 2), ImageUse::fixes);
-  EXPECT_TRUE(image.is_kept());
+  EXPECT_TRUE(image.is_image_kept());
   EXPECT_TRUE(collect_identified_lamps(image).empty());
 }
 
@@ -94,15 +94,16 @@ TEST(DetectLampsInImages, RejectsRepeatedImagesUnlessUsedForFixes) {
                           read_calibration(kRig + "/true_calibration.yaml"), "calibration.yaml"};
   const Observations turn = detect_lamps_in_images(images, ImageUse::turn, {});
   ASSERT_EQ(turn.images.size(), 4U);
-  EXPECT_TRUE(turn.images[0].is_kept());
-  ASSERT_FALSE(turn.images[1].is_kept());
+  EXPECT_TRUE(turn.images[0].is_image_kept());
+  ASSERT_FALSE(turn.images[1].is_image_kept());
   EXPECT_EQ(turn.images[1].rejection->reason, RejectionReason::same_image);
-  EXPECT_TRUE(turn.images[2].is_kept());
-  ASSERT_FALSE(turn.images[3].is_kept());
+  EXPECT_TRUE(turn.images[2].is_image_kept());
+  ASSERT_FALSE(turn.images[3].is_image_kept());
   EXPECT_EQ(turn.images[3].rejection->reason, RejectionReason::unreadable);
-  EXPECT_EQ(collect_kept_frames(turn.images).size(), 2U);
-  EXPECT_EQ(collect_kept_frames(detect_lamps_in_images(images, ImageUse::fixes, {}).images).size(),
-            3U);
+  EXPECT_EQ(collect_kept_lamp_frames(turn.images).size(), 2U);
+  EXPECT_EQ(
+      collect_kept_lamp_frames(detect_lamps_in_images(images, ImageUse::fixes, {}).images).size(),
+      3U);
 }
 
 }  // namespace

@@ -51,9 +51,9 @@ TEST(WriteLightsTable, WritesOneRowPerLight) {
                      std::vector{image_with("a, b.png", {lamp, steady}), image_with("none.png", {}),
                                  image_with("c.png", {formless})});
   const CsvTable table(folder / "lights.csv");
-  ASSERT_EQ(table.rows(), 3U);
+  ASSERT_EQ(table.num_rows(), 3U);
   const auto text = [&](std::size_t row, const char* column) {
-    return std::string(table.get_text(row, table.get_required_column(column)));
+    return std::string(table.get_cell_text(row, table.get_required_column(column)));
   };
   EXPECT_EQ(text(0, "image"), "a, b.png");
   EXPECT_EQ(text(0, "kind"), "lamp");
@@ -78,7 +78,7 @@ TEST(WriteLightsTable, WritesOneRowPerLight) {
   EXPECT_THROW(write_lights_table(folder / "no" / "lights.csv", {}), InputError);
 }
 
-TEST(CountLightReasons, SortsByCountWithFormlessLightsLast) {
+TEST(CountRejectedLightsByReason, SortsByCountWithFormlessLightsLast) {
   Light lamp = light_of_kind(LightKind::lamp, LightReason::identified);
   lamp.lamp = 4;
   const Light soft = light_of_kind(LightKind::unknown, LightReason::reflection);
@@ -86,7 +86,7 @@ TEST(CountLightReasons, SortsByCountWithFormlessLightsLast) {
   const Light small = light_of_kind(LightKind::formless, LightReason::incomplete);
   const std::vector images{image_with("a.png", {small, small, lamp, soft, even}),
                            image_with("b.png", {small, even, lamp})};
-  const auto reasons = count_light_reasons(images);
+  const auto reasons = count_rejected_lights_by_reason(images);
   ASSERT_EQ(reasons.size(), 3U);
   EXPECT_EQ(reasons[0].reason, LightReason::steady);
   EXPECT_EQ(reasons[0].lights, 2);
@@ -98,12 +98,12 @@ TEST(CountLightReasons, SortsByCountWithFormlessLightsLast) {
   EXPECT_EQ(count_lights_of_kind(images, LightKind::cut), 0);
 }
 
-TEST(LightReasonText, IsUniqueForEachReason) {
+TEST(LightReasonText, NameAndDescriptionAreUniqueForEachReason) {
   std::set<std::string> names, explanations;
   int reasons = 0;
   for (int i = 0; i <= static_cast<int>(LightReason::incomplete); ++i, ++reasons) {
-    names.emplace(to_string(static_cast<LightReason>(i)));
-    explanations.insert(describe(static_cast<LightReason>(i)));
+    names.emplace(light_reason_name(static_cast<LightReason>(i)));
+    explanations.insert(describe_light_reason(static_cast<LightReason>(i)));
   }
   EXPECT_EQ(names.size(), std::size_t(reasons));
   EXPECT_EQ(explanations.size(), std::size_t(reasons));
@@ -118,7 +118,7 @@ const cv::Size kReasonSize(300, 200);
 /// Detects the lights in a drawing by a detector whose map contains its lamp.
 std::vector<Light> lights_in_drawing(const cv::Mat& image) {
   return LightDetector({{drawn_lamp(1, kReasonPeriod_lines)}}, drawn_camera(kReasonSize))
-      .detect(to_image_view(image));
+      .detect_lights(to_image_view(image));
 }
 
 cv::Mat drawn_lamp_at(const Eigen::Vector2d& center, double radius_px, double level = 0.7,
@@ -128,7 +128,7 @@ cv::Mat drawn_lamp_at(const Eigen::Vector2d& center, double radius_px, double le
       CV_8U, 0.5);
 }
 
-TEST(LightReasons, DistinguishClippedFromUnmodulatedLamp) {
+TEST(LightDetector, ReportsOverexposedForClippedAndSteadyForUnmodulatedLamp) {
   const DrawnStripes steady{.period_lines = kReasonPeriod_lines, .duty = 1};
   for (const auto& [level, reason] :
        {std::pair(0.7, LightReason::steady), {1.5, LightReason::overexposed}}) {
@@ -139,7 +139,7 @@ TEST(LightReasons, DistinguishClippedFromUnmodulatedLamp) {
   }
 }
 
-TEST(LightReasons, ReportReasonForLightsWithoutOutline) {
+TEST(LightDetector, ReportsIncompleteOrWrongShapeForLightsWithoutOutline) {
   cv::Mat cross(kReasonSize, CV_8U, cv::Scalar(10));
   cv::rectangle(cross, {50, 95, 200, 8}, 200, cv::FILLED);
   cv::rectangle(cross, {146, 20, 8, 160}, 200, cv::FILLED);
@@ -149,11 +149,11 @@ TEST(LightReasons, ReportReasonForLightsWithoutOutline) {
         {drawn_lamp_at({150.3, -30.6}, 38), LightReason::incomplete},
         {cross, LightReason::wrong_shape}}) {
     const auto lights = lights_in_drawing(image);
-    ASSERT_EQ(lights.size(), 1U) << to_string(reason);
+    ASSERT_EQ(lights.size(), 1U) << light_reason_name(reason);
     EXPECT_EQ(lights[0].kind, LightKind::formless);
-    EXPECT_EQ(to_string(lights[0].reason), to_string(reason));
+    EXPECT_EQ(light_reason_name(lights[0].reason), light_reason_name(reason));
     EXPECT_FALSE(lights[0].lamp);
-    EXPECT_FALSE(is_modulated(lights[0]));
+    EXPECT_FALSE(is_light_modulated(lights[0]));
   }
 }
 

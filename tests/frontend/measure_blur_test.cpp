@@ -31,7 +31,7 @@ cv::Mat checkerboard(double sigma_px, double dark, double bright, double angle_r
   return image;
 }
 
-TEST(MeasureImageBlur, MatchesSigmaOfEdges) {
+TEST(MeasureImageBlur, MatchesGaussianSigmaOfCheckerboardEdges) {
   // Edges with a blur of less than half a pixel are undersampled.
   for (const double sigma_px : {0.3, 0.5, 1.0, 2.0, 3.0, 5.0}) {
     for (const double angle_rad : {0.02, 0.15, 0.7}) {
@@ -43,7 +43,7 @@ TEST(MeasureImageBlur, MatchesSigmaOfEdges) {
   }
 }
 
-TEST(MeasureImageBlur, IsIndependentOfContrast) {
+TEST(MeasureImageBlur, ReturnsSameSigmaForDifferentContrasts) {
   EXPECT_NEAR(measure_image_blur(checkerboard(2, 20, 60)).sigma_px,
               measure_image_blur(checkerboard(2, 20, 220)).sigma_px, 0.1);
 }

@@ -29,7 +29,8 @@ std::vector<std::optional<RejectionReason>> select(std::vector<Observation> imag
   reject_repeated_images(images, use, {});
   std::vector<std::optional<RejectionReason>> reasons;
   for (const Observation& image : images) {
-    reasons.push_back(image.is_kept() ? std::nullopt : std::optional(image.rejection->reason));
+    reasons.push_back(image.is_image_kept() ? std::nullopt
+                                            : std::optional(image.rejection->reason));
   }
   return reasons;
 }
@@ -37,7 +38,7 @@ std::vector<std::optional<RejectionReason>> select(std::vector<Observation> imag
 using Reasons = std::vector<std::optional<RejectionReason>>;
 const std::vector<Eigen::Vector2d> kPixels{{100, 100}, {400, 120}, {700, 90}, {420, 500}};
 
-TEST(Selection, RejectsCopiesAndRepeatedViewsByUse) {
+TEST(Selection, RejectsCopiesAndSameViewsDependingOnImageUse) {
   auto near = kPixels, far = kPixels;
   for (Eigen::Vector2d& pixel : near) pixel.x() += 7.9;  // 1 % of the width is 8 px
   for (Eigen::Vector2d& pixel : far) pixel.x() += 8.1;
@@ -49,7 +50,7 @@ TEST(Selection, RejectsCopiesAndRepeatedViewsByUse) {
   EXPECT_EQ(select(images, ImageUse::fixes), (Reasons{{}, {}, {}, {}}));
 }
 
-TEST(Selection, KeepsViewsWithFewCommonLamps) {
+TEST(Selection, KeepsViewThatSharesOnlyHalfOfLamps) {
   auto fewer = kPixels;
   fewer.resize(2);  // half of the lamps
   EXPECT_EQ(select({image_of_lamps("a", kPixels), image_of_lamps("b", fewer)}, ImageUse::turn),
@@ -60,9 +61,9 @@ TEST(Selection, KeepsViewsWithFewCommonLamps) {
             (Reasons{{}, RejectionReason::same_view}));
 }
 
-TEST(Selection, ComparesWithKeptImagesOnly) {
+TEST(Selection, KeepsCopyOfRejectedImage) {
   auto images = std::vector{image_of_lamps("a", kPixels), image_of_lamps("b", kPixels)};
-  images[0].set_rejection(RejectionReason::blurred, "blurred");
+  images[0].set_image_rejection(RejectionReason::blurred, "blurred");
   EXPECT_EQ(select(images, ImageUse::turn), (Reasons{RejectionReason::blurred, {}}));
 }
 
@@ -74,9 +75,9 @@ TEST(Selection, KeepsImagesWithoutLamps) {
 TEST(Selection, RejectsCopyOfImageAddedByKeep) {
   std::vector images{image_of_lamps("a", kPixels), image_of_lamps("b", kPixels)};
   Selection selection(ImageUse::turn, {});
-  selection.keep(images[0]);
-  selection.add(images[1]);
-  ASSERT_FALSE(images[1].is_kept());
+  selection.add_kept_image(images[0]);
+  selection.add_or_reject_image(images[1]);
+  ASSERT_FALSE(images[1].is_image_kept());
   EXPECT_EQ(images[1].rejection->message, "is the same image as a");
 }
 

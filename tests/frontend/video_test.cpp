@@ -45,7 +45,8 @@ class VideoOfFrames : public testing::Test {
   }
   std::vector<std::string> names(ImageSource& source) const {
     std::vector<std::string> all;
-    while (const auto image = source.read_next()) all.push_back(image->file.filename().string());
+    while (const auto image = source.read_next_image())
+      all.push_back(image->file.filename().string());
     return all;
   }
   /// Writes a file with the first part of the video.
@@ -59,29 +60,29 @@ class VideoOfFrames : public testing::Test {
   std::vector<cv::Mat> frames;
 };
 
-TEST(VideoNames, MatchFilesAndFrames) {
+TEST(VideoFrameNames, ContainNumberAndAreParsedBackToVideo) {
   EXPECT_TRUE(is_video_file_name("a/drive.MP4"));
   EXPECT_FALSE(is_video_file_name("a/drive.png"));
   EXPECT_EQ(make_video_frame_name("drive.mp4", 123), "drive.mp4#000123");
   EXPECT_EQ(make_video_frame_name("drive.mp4", 1234567), "drive.mp4#1234567");
-  EXPECT_EQ(parse_video_of_frame_name("drive.mp4#000123"), "drive.mp4");
+  EXPECT_EQ(parse_video_name_from_frame_name("drive.mp4#000123"), "drive.mp4");
   for (const char* other : {"drive.mp4", "drive.mp4#", "drive.mp4#12a", "a.png#000123"}) {
-    EXPECT_EQ(parse_video_of_frame_name(other), std::nullopt) << other;
+    EXPECT_EQ(parse_video_name_from_frame_name(other), std::nullopt) << other;
   }
 }
 
 TEST_F(VideoOfFrames, ReturnsAllFramesWithTimes) {
   Video video(film.string());
   EXPECT_EQ(video.reported_frame_count(), std::size_t{kFrames});
-  EXPECT_EQ(video.size_px(), (std::array{320, 240}));
+  EXPECT_EQ(video.frame_size_px(), (std::array{320, 240}));
   for (int i = 0; i < kFrames; ++i) {
-    const auto frame = video.read_next();
+    const auto frame = video.read_next_frame();
     ASSERT_TRUE(frame);
     EXPECT_EQ(frame->number, std::size_t(i));
     EXPECT_NEAR(frame->time_s, 0.05 * i, 1e-9);
     EXPECT_EQ(cv::norm(frame->image, frames[std::size_t(i)], cv::NORM_INF), 0);
   }
-  EXPECT_FALSE(video.read_next());
+  EXPECT_FALSE(video.read_next_frame());
   EXPECT_EQ(video.describe_missing_frames(), "");
 }
 
@@ -96,11 +97,11 @@ TEST_F(VideoOfFrames, SourceReturnsEveryNthFrameBetweenImages) {
                                       "film.avi#000030", "image.png"));
   EXPECT_THAT(all.video_warnings(), IsEmpty());
   ImageSource source({film}, options);
-  source.read_next();
-  const auto second = source.read_next();
+  source.read_next_image();
+  const auto second = source.read_next_image();
   ASSERT_TRUE(second);
   EXPECT_NEAR(second->time_s.value(), 0.75, 1e-9);
-  EXPECT_EQ(cv::norm(second->read(options), frames[15], cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(second->read_gray_image(options), frames[15], cv::NORM_INF), 0);
 }
 
 TEST_F(VideoOfFrames, SourceWarnsOfTruncatedVideo) {
@@ -123,7 +124,7 @@ TEST_F(VideoOfFrames, ReadingContinuesAfterDamagedFrames) {
   Video video(folder.file("bad.avi", bytes).string());
   std::size_t count = 0;
   double last_s = 0;
-  while (const auto frame = video.read_next()) {
+  while (const auto frame = video.read_next_frame()) {
     EXPECT_EQ(frame->number, count);
     ++count;
     last_s = frame->time_s;
@@ -134,7 +135,7 @@ TEST_F(VideoOfFrames, ReadingContinuesAfterDamagedFrames) {
   EXPECT_THAT(video.describe_missing_frames(), HasSubstr(" of its 40 frames can be decoded"));
 }
 
-TEST_F(VideoOfFrames, SourceThrowsForInvalidVideos) {
+TEST_F(VideoOfFrames, SourceThrowsForInvalidOrWronglySizedVideos) {
   const auto refusal = [&](const fs::path& file, const FrontendOptions& options = {},
                            const std::optional<std::array<int, 2>>& imager_px = {}) {
     return rejection_message([&] { ImageSource({file}, options, imager_px); });
@@ -167,18 +168,20 @@ TEST_F(VideoOfFrames, YieldsSameLampsAsImages) {
   const auto seen = [&](const std::vector<fs::path>& sources, int threads) {
     FrontendOptions options;
     options.threads = threads;
-    return LampIntake(detector, ImageUse::fixes, options, {}).detect_in_all_images(sources).images;
+    return LampIntake(detector, ImageUse::fixes, options, {})
+        .detect_lamps_in_all_images(sources)
+        .images;
   };
   const auto of_images = seen(files, 1), of_film = seen({film}, 3);
   ASSERT_EQ(of_images.size(), files.size());
   ASSERT_EQ(of_film.size(), files.size());
   EXPECT_FALSE(of_images[1].time_s);
-  EXPECT_EQ(of_film[1].file_name(), "film.avi#000001");
+  EXPECT_EQ(of_film[1].image_file_name(), "film.avi#000001");
   EXPECT_NEAR(of_film[1].time_s.value(), 0.05, 1e-9);
   for (std::size_t i = 0; i < files.size(); ++i) {
     const auto one = collect_identified_lamps(of_images[i]),
                other = collect_identified_lamps(of_film[i]);
-    EXPECT_EQ(of_film[i].file_name(), make_video_frame_name("film.avi", i));
+    EXPECT_EQ(of_film[i].image_file_name(), make_video_frame_name("film.avi", i));
     ASSERT_EQ(one.size(), other.size());
     EXPECT_GE(one.size(), 4U);
     for (std::size_t k = 0; k < one.size(); ++k) {
@@ -189,7 +192,7 @@ TEST_F(VideoOfFrames, YieldsSameLampsAsImages) {
 }
 
 /// Corners of a frame are kept as those of a file are.
-TEST_F(VideoOfFrames, YieldsSameBoardsAsImages) {
+TEST_F(VideoOfFrames, YieldsSameBoardCornersAsImages) {
   const fs::path file = kRig + "/sample-boards/0000.png";
   const cv::Mat image = read_image(file);
   ASSERT_TRUE(write_video(film, {image, image / 2}));
@@ -203,7 +206,7 @@ TEST_F(VideoOfFrames, YieldsSameBoardsAsImages) {
     options.corner_cache = folder / "cache";
     const auto seen = detect_boards_in_images({film}, board, "board.yaml", options).images;
     ASSERT_EQ(seen.size(), 2U);
-    EXPECT_EQ(seen[1].file_name(), "film.avi#000001");
+    EXPECT_EQ(seen[1].image_file_name(), "film.avi#000001");
     ASSERT_TRUE(seen[0].board && seen[1].board);
     ASSERT_EQ(seen[0].board->seen.tags.size(), of_image.tags.size());
     for (std::size_t i = 0; i < of_image.tags.size(); ++i) {

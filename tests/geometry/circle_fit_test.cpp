@@ -26,7 +26,7 @@ void expect_found(const Circle& truth, const Points& points, double tolerance) {
   EXPECT_LE(fit->rms, tolerance);
 }
 
-TEST(FitCircle, IsExactForCirclesOfAnySize) {
+TEST(FitCircle, RecoversCirclesOfAnySizeExactly) {
   for (const double scale : {1e-6, 1.0, 1e6}) {
     const Circle truth{Vector2d(3, -2) * scale, 5 * scale};
     for (const std::size_t count : {3U, 4U, 12U, 1000U}) {
@@ -35,7 +35,7 @@ TEST(FitCircle, IsExactForCirclesOfAnySize) {
   }
 }
 
-TEST(FitCircle, IsExactForShortArcs) {
+TEST(FitCircle, RecoversCircleFromExactShortArcs) {
   const Circle truth{{3, -2}, 5};
   for (const double arc_deg : {90.0, 30.0, 10.0, 3.0, 1.0}) {
     const double arc_rad = arc_deg * pi / 180;
@@ -46,7 +46,7 @@ TEST(FitCircle, IsExactForShortArcs) {
   }
 }
 
-TEST(FitCircle, IsAccurateFarFromOrigin) {
+TEST(FitCircle, RecoversCircleFarFromOrigin) {
   // In UTM coordinates; they are rounded to 1e-9.
   for (const double radius : {0.1, 1.0, 100.0}) {
     const Circle truth{{5e5, 5e6}, radius};
@@ -55,7 +55,7 @@ TEST(FitCircle, IsAccurateFarFromOrigin) {
   }
 }
 
-TEST(FitCircle, IsAccurateForShortArcsFarFromOrigin) {
+TEST(FitCircle, RecoversCircleFromShortArcsFarFromOrigin) {
   // 1e-9 of rounding over a sagitta of 2e-3 is a part in 2e6 of the radius.
   const Circle truth{{5e5, 5e6}, 1};
   expect_found(truth, arc(truth, 1, 1.12, 12), 1e-5);
@@ -81,7 +81,7 @@ TEST(FitCircle, MinimizesSquaredDistances) {
   }
 }
 
-TEST(FitCircle, IsExactForThreePoints) {
+TEST(FitCircle, ReturnsCircleThroughThreePointsExactly) {
   const auto fit = fit_circle(Points{{0, 0}, {2, 0}, {0, 4}});
   ASSERT_TRUE(fit);
   EXPECT_THAT(fit->circle.center, IsNear(Vector2d(1, 2), 1e-14));

@@ -59,14 +59,14 @@ TEST_P(FitCircleMonteCarlo, CenterIsUnbiased) {
   EXPECT_LT(kTrials * e.dot(scatter_.covariance.ldlt().solve(e)), 20);
 }
 
-TEST_P(FitCircleMonteCarlo, CenterErrorMatchesReportedCovariance) {
+TEST_P(FitCircleMonteCarlo, MeanNormalizedCenterErrorMatchesReportedCovariance) {
   // With the scatter estimated from the same n points, e^T C^-1 e / 2 is F(2, n - 3), whose mean
   // is (n - 3) / (n - 5). Its mean over 8000 trials has a standard deviation of 0.05.
   const double freedom = static_cast<double>(kPoints) - 3;
   EXPECT_NEAR(scatter_.mahalanobis_squared, 2 * freedom / (freedom - 2), 0.24);
 }
 
-TEST_P(FitCircleMonteCarlo, CenterCovarianceMatchesReportedShape) {
+TEST_P(FitCircleMonteCarlo, CenterScatterMatrixMatchesReportedCovariance) {
   // In units of the reported covariance the covariance found is the identity; an entry of it has
   // a standard deviation of sqrt(2 / 8000) = 0.016 at most.
   const Matrix2d root = scatter_.reported_covariance.llt().matrixL();

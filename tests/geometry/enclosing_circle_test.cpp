@@ -14,7 +14,7 @@ namespace {
 
 using Points = std::vector<Eigen::Vector2d>;
 
-TEST(EnclosingCircle, IsExactForFewPoints) {
+TEST(ComputeEnclosingCircle, IsExactForOneOrTwoDistinctPoints) {
   EXPECT_EQ(compute_enclosing_circle(Points{{3, 4}}).radius, 0);
   const Circle pair = compute_enclosing_circle(Points{{0, 0}, {0, 2}});
   EXPECT_THAT(pair.center, IsNear(Eigen::Vector2d(0, 1), 1e-15));
@@ -22,7 +22,7 @@ TEST(EnclosingCircle, IsExactForFewPoints) {
   EXPECT_EQ(compute_enclosing_circle(Points(5, {3, 4})).radius, 0);
 }
 
-TEST(EnclosingCircle, SpansPointsOnOneLine) {
+TEST(ComputeEnclosingCircle, HasOutermostPointsAsDiameterForCollinearPoints) {
   const Circle circle = compute_enclosing_circle(Points{{1, 1}, {0, 0}, {3, 3}, {2, 2}});
   EXPECT_THAT(circle.center, IsNear(Eigen::Vector2d(1.5, 1.5), 1e-12));
   EXPECT_NEAR(circle.radius, 1.5 * std::sqrt(2), 1e-12);
@@ -30,7 +30,7 @@ TEST(EnclosingCircle, SpansPointsOnOneLine) {
 
 /// The circle contains all points, and no smaller circle does: its center is in the convex hull of
 /// the points on its rim, so that these do not lie on one side of the center.
-TEST(EnclosingCircle, IsSmallestCircleContainingAllPoints) {
+TEST(ComputeEnclosingCircle, ReturnsSmallestCircleContainingAllPoints) {
   Random random(1);
   for (int draw = 0; draw < 200; ++draw) {
     Points points;

@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-TEST(EstimateHomography, IsExactForExactPairs) {
+TEST(EstimateHomography, RecoversTrueHomographyFromExactPairs) {
   Eigen::Matrix3d truth;
   truth << 800, 30, 400, -20, 750, 300, 0.1, -0.2, 1;
   Random random(3);

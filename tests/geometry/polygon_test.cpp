@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-TEST(PolygonContains, SupportsConcavePolygonsInEitherDirection) {
+TEST(PolygonContains, MatchesInsideOfConcavePolygonInEitherDirection) {
   std::vector<Eigen::Vector2d> polygon{{0, 0}, {400, 0}, {200, 100}, {400, 400}, {0, 400}};
   for (int direction = 0; direction < 2; ++direction) {
     EXPECT_TRUE(polygon_contains(polygon, {199, 100}));

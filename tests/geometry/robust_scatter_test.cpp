@@ -18,13 +18,13 @@ std::vector<double> draw_squares(Random& random, std::size_t count, double sigma
   return squares;
 }
 
-TEST(EstimateRobustVariance2d, ReturnsVariancePerAxis) {
+TEST(EstimateRobustVariance2d, MatchesVariancePerAxisOfNormalSamples) {
   Random random(1);
   const double variance = estimate_robust_variance_2d(draw_squares(random, 20000, 3), 2 * 20000);
   EXPECT_NEAR(variance / 9, 1, 0.03);
 }
 
-TEST(EstimateRobustVariance2d, CorrectsForDegreesOfFreedom) {
+TEST(EstimateRobustVariance2d, IsInverselyProportionalToDegreesOfFreedom) {
   const std::vector<double> squares(10, 1.0);
   EXPECT_DOUBLE_EQ(estimate_robust_variance_2d(squares, 5),
                    4 * estimate_robust_variance_2d(squares, 20));
@@ -38,7 +38,7 @@ TEST(ComputeSquaredOutlierBound2d, ApproachesSigmasSquaredForManyDegreesOfFreedo
 /// A bound of 2.5 sigmas, which 4.4 % of the residuals exceed where the variance is known, is
 /// exceeded often enough to be counted. The median of few is biased upwards, so that fewer exceed
 /// it.
-TEST(ComputeSquaredOutlierBound2d, LimitsFalseAlarmsOfSmallSamples) {
+TEST(ComputeSquaredOutlierBound2d, IsExceededAtMostAtNominalRateForSmallSamples) {
   constexpr double sigmas = 2.5;
   const double expected = std::exp(-sigmas * sigmas / 2);
   for (const std::size_t count : {5U, 9U, 15U, 41U}) {

@@ -39,7 +39,7 @@ TEST(FitSimilarityTransform, ReturnsKnownQuarterTurn) {
   EXPECT_THAT(found->offset, IsNear(Vector2d(5, 5), 1e-15));
 }
 
-TEST(FitSimilarityTransform, IsExactForTwoPairs) {
+TEST(FitSimilarityTransform, MapsBothPointsExactlyForTwoPairs) {
   Random random(1);
   for (int trial = 0; trial < 1000; ++trial) {
     const Points from = random_points(random, 2), to = random_points(random, 2);
@@ -52,7 +52,7 @@ TEST(FitSimilarityTransform, IsExactForTwoPairs) {
   }
 }
 
-TEST(FitSimilarityTransform, RecoversTrueTransform) {
+TEST(FitSimilarityTransform, RecoversTrueTransformFromExactPairs) {
   Random random(2);
   for (const std::size_t count : {2U, 3U, 4U, 10U, 1000U}) {
     for (int trial = 0; trial < 20; ++trial) {
@@ -97,7 +97,7 @@ TEST(FitSimilarityTransform, ExcludesReflections) {
   EXPECT_GT(complex_product_matrix(found->factor).determinant(), 0);
 }
 
-TEST(FitSimilarityTransform, IsAccurateInUtmCoordinates) {
+TEST(FitSimilarityTransform, RecoversTrueTransformToUtmCoordinates) {
   Random random(4);
   const Similarity truth{{5e5, 5e6}, {-1.2, 0.7}};
   for (int trial = 0; trial < 100; ++trial) {
@@ -110,7 +110,7 @@ TEST(FitSimilarityTransform, IsAccurateInUtmCoordinates) {
   }
 }
 
-TEST(FitSimilarityTransform, IsAccurateBetweenMapsFarFromOrigin) {
+TEST(FitSimilarityTransform, MapsPointsAccuratelyBetweenMapsFarFromOrigin) {
   Random random(5);
   const Similarity truth{{-3e5, 4e5}, {0.6, 0.8}};
   Points from = random_points(random, 4, 10);

@@ -51,11 +51,11 @@ double chi_squared_upper_tail(double chi_squared, double m) {
   });
 }
 
-TEST(SigmasOfOneInTenThousand, MatchesNormalDistribution) {
+TEST(SigmasOfOneInTenThousand, MatchesUpperTailOfNormalDistribution) {
   EXPECT_NEAR(normal_upper_tail(kSigmasOfOneInTenThousand), 1e-4, 1e-7);
 }
 
-TEST(StudentBound, IsExceededAsRarelyAsSigmas) {
+TEST(ComputeTSquaredBound, IsExceededAsRarelyAsSigmasOfNormalDistribution) {
   for (const double sigmas : kSigmas) {
     for (const double m : kDegreesOfFreedom) {
       const double tail = student_upper_tail(std::sqrt(compute_t_squared_bound(sigmas, m)), m);
@@ -65,7 +65,7 @@ TEST(StudentBound, IsExceededAsRarelyAsSigmas) {
   }
 }
 
-TEST(ComputeChiSquaredBound, IsExceededAsRarelyAsSigmas) {
+TEST(ComputeChiSquaredBound, IsExceededAsRarelyAsSigmasOfNormalDistribution) {
   for (const double sigmas : kSigmas) {
     for (const double m : kDegreesOfFreedom) {
       const double tail = chi_squared_upper_tail(compute_chi_squared_bound(sigmas, m), m);
@@ -75,7 +75,7 @@ TEST(ComputeChiSquaredBound, IsExceededAsRarelyAsSigmas) {
   }
 }
 
-TEST(StatisticalBounds, ApproachNormalDistribution) {
+TEST(StatisticalBounds, ApproachSigmasOfNormalDistributionForManyFreedoms) {
   constexpr double m = 1e9;
   for (const double sigmas : kSigmas) {
     EXPECT_NEAR(compute_t_squared_bound(sigmas, m), sigmas * sigmas, 1e-6);

@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-TEST(SymmetricEigen, ReconstructsMatrixFromAscendingValues) {
+TEST(EigendecomposeSymmetricMatrix, AscendingEigenvaluesAndVectorsReconstructMatrix) {
   Eigen::Matrix2d two;
   two << 5, 2, 2, 3;
   Eigen::MatrixXd four(4, 4);
@@ -25,30 +25,31 @@ TEST(SymmetricEigen, ReconstructsMatrixFromAscendingValues) {
         Eigen::MatrixXd(eigen.vectors * eigen.values.asDiagonal() * eigen.vectors.transpose()),
         IsNear(Eigen::MatrixXd(matrix), 1e-14));
   };
-  expect_same(eigendecompose_symmetric(two), two);
-  expect_same(eigendecompose_symmetric(four), four);
+  expect_same(eigendecompose_symmetric_matrix(two), two);
+  expect_same(eigendecompose_symmetric_matrix(four), four);
 }
 
-TEST(SymmetricEigen, ReturnsNanForNanMatrix) {
+TEST(EigendecomposeSymmetricMatrix, ReturnsNoPositiveSmallestEigenvalueForNanMatrix) {
   const Eigen::MatrixXd none =
       Eigen::MatrixXd::Constant(3, 3, std::numeric_limits<double>::quiet_NaN());
-  EXPECT_FALSE(eigendecompose_symmetric(none).values.minCoeff() > 0);
-  EXPECT_EQ(eigendecompose_symmetric(none).vectors.cols(), 3);
+  EXPECT_FALSE(eigendecompose_symmetric_matrix(none).values.minCoeff() > 0);
+  EXPECT_EQ(eigendecompose_symmetric_matrix(none).vectors.cols(), 3);
 }
 
-TEST(InvertPositiveDefinite, ReturnsInverseOrNullopt) {
+TEST(InvertPositiveDefiniteMatrix, ReturnsInverseOrNulloptIfNotPositiveDefinite) {
   Eigen::Matrix4d positive;
   positive << 4, 1, 0, -1, 1, 3, 2, 0, 0, 2, 5, 1, -1, 0, 1, 2;
-  const auto inverse = invert_positive_definite(positive);
+  const auto inverse = invert_positive_definite_matrix(positive);
   ASSERT_TRUE(inverse);
   EXPECT_THAT(Eigen::Matrix4d(*inverse * positive),
               IsNear(Eigen::Matrix4d(Eigen::Matrix4d::Identity()), 1e-14));
 
   Eigen::Matrix4d indefinite = positive;
   indefinite(2, 2) = -1;
-  EXPECT_FALSE(invert_positive_definite(indefinite));
-  EXPECT_FALSE(invert_positive_definite(Eigen::Matrix4d::Zero()));
-  EXPECT_FALSE(invert_positive_definite(1e-310 * Eigen::Matrix4d::Identity()));  // 1 / it overflows
+  EXPECT_FALSE(invert_positive_definite_matrix(indefinite));
+  EXPECT_FALSE(invert_positive_definite_matrix(Eigen::Matrix4d::Zero()));
+  EXPECT_FALSE(
+      invert_positive_definite_matrix(1e-310 * Eigen::Matrix4d::Identity()));  // 1 / it overflows
 }
 
 }  // namespace

@@ -159,17 +159,17 @@ class HostileNames : public testing::Test {
   const TemporaryFolder folder;
 };
 
-TEST_F(HostileNames, EscapeForSingleLineReturnsOneHarmlessLine) {
+TEST_F(HostileNames, EscapeTextForSingleLineReturnsOneHarmlessLine) {
   int as_they_are = 0;
   for (int i = 0; i < kNames; ++i) {
     const std::string name = random_name(random);
-    const std::string line = escape_for_single_line(name);
+    const std::string line = escape_text_for_single_line(name);
     ASSERT_TRUE(is_harmless(line)) << line;
-    ASSERT_EQ(escape_for_single_line(line), line);
+    ASSERT_EQ(escape_text_for_single_line(line), line);
     if (line == name) ++as_they_are;
     const std::string message = InputError(name, name).what();
     ASSERT_EQ(message.find('\n'), std::string::npos);
-    ASSERT_TRUE(is_harmless(escape_for_single_line(message)));
+    ASSERT_TRUE(is_harmless(escape_text_for_single_line(message)));
   }
   EXPECT_GT(as_they_are, kNames / 100) << "some are good";
 }
@@ -202,15 +202,15 @@ TEST_F(HostileNames, SharedFolderOpensNoFileOutsideIt) {
   for (int i = 0; i < kNames; ++i) {
     const std::string name = random_name(random);
     try {
-      const int file = shared.open(name, O_CREAT | O_EXCL | O_WRONLY);
+      const int file = shared.open_regular_file(name, O_CREAT | O_EXCL | O_WRONLY);
       if (file < 0) continue;  // too long
       ::close(file);
       ++made;
-      ASSERT_TRUE(shared.contains_entry(name));
-      if (i % 1000 == 0) shared.replace_file(name, name);
+      ASSERT_TRUE(shared.contains_folder_entry(name));
+      if (i % 1000 == 0) shared.replace_file_atomically(name, name);
       if (i % 10 == 0) shared.rename_file(name, "renamed");
       shared.remove_file(name);
-      if (Id::is_valid_id(name)) shared.make_subfolder({name, "test", "camera"});
+      if (Id::is_valid_id(name)) shared.open_or_create_subfolder({name, "test", "camera"});
     } catch (const InputError&) {
       continue;
     }
@@ -238,17 +238,19 @@ TEST_F(HostileNames, SharedFolderFollowsNoLinkOutOfIt) {
     const std::string link = (folder / "shared").string() + "/" + name;
     if (!is_one_part || ::symlink(canary.c_str(), link.c_str()) != 0) continue;
     ++files;
-    ASSERT_NE(rejection_message([&] { ::close(shared.open(name, O_WRONLY | O_TRUNC)); }), "")
+    ASSERT_NE(
+        rejection_message([&] { ::close(shared.open_regular_file(name, O_WRONLY | O_TRUNC)); }), "")
         << name;
-    ASSERT_NE(rejection_message([&] { (void)shared.read(name, kMaxBytes); }), "") << name;
-    shared.replace_file(name, name);
+    ASSERT_NE(rejection_message([&] { (void)shared.read_file_if_exists(name, kMaxBytes); }), "")
+        << name;
+    shared.replace_file_atomically(name, name);
     ASSERT_FALSE(fs::is_symlink(link)) << name;
     shared.remove_file(name);
     if (!Id::is_valid_id(name)) continue;
     ++folders;
     ASSERT_EQ(::symlink((folder / "outside").c_str(), link.c_str()), 0);
     const Id id{name, "test", "camera"};
-    ASSERT_NE(rejection_message([&] { (void)shared.make_subfolder(id); }), "") << name;
+    ASSERT_NE(rejection_message([&] { (void)shared.open_or_create_subfolder(id); }), "") << name;
     ASSERT_NE(rejection_message([&] { (void)shared.open_subfolder_if_exists(id); }), "") << name;
     shared.remove_file(name);
     ASSERT_EQ(TemporaryFolder::read_content(canary), "mine") << name;
@@ -259,28 +261,28 @@ TEST_F(HostileNames, SharedFolderFollowsNoLinkOutOfIt) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder / "outside"), {}), 1);
 }
 
-TEST_F(HostileNames, ReadSpooledRunReturnsWrittenNames) {
+TEST_F(HostileNames, ReadSpooledRunReturnsEscapedNames) {
   int refused = 0;
   constexpr int every = 20;  // parsing takes long without optimization
   for (int i = 0; i < kNames; ++i) {
     const std::string name = random_name(random);
-    const std::string text = serialize_run({run_with(name, i), name});
+    const std::string text = serialize_spooled_run({run_with(name, i), name});
     if (i % every != 0) continue;
     const auto json = nlohmann::json::parse(text);
-    ASSERT_EQ(json.at("station"), escape_for_single_line(name));
-    ASSERT_EQ(json.at("images")[0].at("image"), escape_for_single_line(name));
+    ASSERT_EQ(json.at("station"), escape_text_for_single_line(name));
+    ASSERT_EQ(json.at("images")[0].at("image"), escape_text_for_single_line(name));
     const fs::path file = folder.file("run.json", text);
-    if (!Id::is_valid_id(escape_for_single_line(name))) {
+    if (!Id::is_valid_id(escape_text_for_single_line(name))) {
       ASSERT_NE(rejection_message([&] { read_spooled_run(file); }), "");
       ++refused;
     } else {
-      ASSERT_EQ(read_spooled_run(file).run.operator_name, escape_for_single_line(name));
+      ASSERT_EQ(read_spooled_run(file).run.operator_name, escape_text_for_single_line(name));
     }
   }
   EXPECT_GT(refused, 0);
 }
 
-TEST_F(HostileNames, ReportsEscapeNames) {
+TEST_F(HostileNames, UnitReportContainsNoHtmlTagsFromNames) {
   const auto extract_tags = [](const std::string& page) {
     std::string tags;
     bool is_tag = false;
@@ -294,7 +296,7 @@ TEST_F(HostileNames, ReportsEscapeNames) {
   const auto report = [](const std::string& name) {
     RunRecord run = run_with(name, 0);
     run.events.clear();
-    return make_unit_report(escape_run_texts(std::move(run)), {}, {});
+    return make_run_report_html(escape_run_texts(std::move(run)), {}, {});
   };
   const std::string plain = extract_tags(report("a"));
   ASSERT_GT(plain.size(), 100U);
@@ -303,11 +305,11 @@ TEST_F(HostileNames, ReportsEscapeNames) {
     const std::string name = random_name(random) + "x";  // an empty fact has no row
     const std::string page = report(name);
     ASSERT_TRUE(is_utf8(page));
-    ASSERT_EQ(extract_tags(page), plain) << escape_for_single_line(name);
+    ASSERT_EQ(extract_tags(page), plain) << escape_text_for_single_line(name);
   }
 }
 
-TEST_F(HostileNames, ExportRunsToFileAddsNoRows) {
+TEST_F(HostileNames, ExportSelectedRunsToFileWritesExactlyOneRowPerRun) {
   constexpr int every = 10;
   std::vector<RunRecord> runs;
   runs.reserve(kNames / every);
@@ -318,12 +320,12 @@ TEST_F(HostileNames, ExportRunsToFileAddsNoRows) {
   for (RunRecord& run : runs) run = escape_run_texts(std::move(run));  // as in records
   export_runs_to_file(folder / "runs.csv", runs);
   const CsvTable table(folder / "runs.csv");
-  ASSERT_EQ(table.rows(), runs.size());
+  ASSERT_EQ(table.num_rows(), runs.size());
   const auto verdict = table.get_required_column("verdict"),
              name = table.get_required_column("run");
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    ASSERT_EQ(table.get_text(row, verdict), "FAIL");
-    ASSERT_EQ(table.get_text(row, name), runs[row].run);
+  for (std::size_t row = 0; row < table.num_rows(); ++row) {
+    ASSERT_EQ(table.get_cell_text(row, verdict), "FAIL");
+    ASSERT_EQ(table.get_cell_text(row, name), runs[row].run);
     ASSERT_EQ(json[row].at("verdict"), "FAIL");
   }
 }
@@ -333,7 +335,7 @@ TEST_F(HostileNames, ReadCalibrationReturnsWrittenCameraId) {
   Calibration calibration = read_calibration(example);
   constexpr int every = 50;
   for (int i = 0; i < kNames / every; ++i) {
-    const std::string name = "a" + escape_for_single_line(random_name(random));
+    const std::string name = "a" + escape_text_for_single_line(random_name(random));
     calibration.camera.id = name;
     const auto file = folder.file("calibration.yaml", format_calibration_yaml(calibration));
     const Calibration read = read_calibration(file);
@@ -342,7 +344,7 @@ TEST_F(HostileNames, ReadCalibrationReturnsWrittenCameraId) {
   }
 }
 
-TEST_F(HostileNames, RecordsAddNoRuns) {
+TEST_F(HostileNames, RecordsListExactlyTheStoredRuns) {
   constexpr int every = 200;
   const std::string where = (folder / "records.db").string();
   {
@@ -352,8 +354,8 @@ TEST_F(HostileNames, RecordsAddNoRuns) {
       std::erase(name, '\0');  // of texts of databases
       records.store_run(escape_run_texts(run_with(name, i)));
     }
-    EXPECT_EQ(records.list_runs({}).size(), std::size_t{kNames / every});
-    EXPECT_THAT(records.check("").problems, testing::IsEmpty());
+    EXPECT_EQ(records.list_run_summaries({}).size(), std::size_t{kNames / every});
+    EXPECT_THAT(records.check_records_by_audit_trail("").problems, testing::IsEmpty());
   }
   const auto listed = run_program("vlp-station list --records " + where);
   ASSERT_EQ(listed.exit_code, 0) << listed.errors;

@@ -80,7 +80,7 @@ void PrintTo(const Trial& trial, std::ostream* out) { *out << trial.name; }
 
 class HostileFile : public testing::TestWithParam<Trial> {};
 
-TEST_P(HostileFile, ProgramEndsWithinLimitsWithExpectedExitCode) {
+TEST_P(HostileFile, ProgramEndsWithinTimeAndMemoryWithExpectedExitCode) {
   const TemporaryFolder folder;
   add_example(folder);
   const Trial& trial = GetParam();
@@ -281,7 +281,7 @@ void PrintTo(const BadFile& bad, std::ostream* out) { *out << bad.name; }
 
 class EveryReader : public testing::TestWithParam<BadFile> {};
 
-TEST_P(EveryReader, RejectsSpecialFileImmediately) {
+TEST_P(EveryReader, RejectsSpecialFileWithErrorAndWritesNoOutput) {
   std::size_t refused = 0;
   for (const std::string& reader : kReaders) {
     for (const char* ending : {".csv", ".yaml"}) {
@@ -312,7 +312,7 @@ INSTANTIATE_TEST_SUITE_P(
                     BadFile{"LinkToStdin", "ln -s /dev/stdin $B"}),
     [](const auto& bad) { return bad.param.name; });
 
-TEST(EveryProgram, ReportsWriteErrorOfHelp) {
+TEST(EveryProgram, ReportsErrorWhenHelpCannotBeWritten) {
   std::size_t programs = 0;
   for (const auto& program : fs::directory_iterator(VLP_PROGRAMS_DIR)) {
     const std::string name = program.path().filename();

@@ -102,7 +102,7 @@ class HostileStation : public SmallStation {
     run.causes = "no images\n";
     run.calibration = "format: vlp-calibration/1\n";
     std::string text =
-        serialize_run({run, derive_database_identity((home / "records.db").string())});
+        serialize_spooled_run({run, derive_database_identity((home / "records.db").string())});
     const auto at = text.find(from);
     ASSERT_NE(at, std::string::npos) << from;
     write("spool/a.json", text.replace(at, from.size(), to));
@@ -525,7 +525,7 @@ const std::vector<StationTrial> kResultsTrials{
 };
 
 /// Measures time and memory of a command with spool files of the maximum size, or larger.
-TEST_F(HostileStation, LimitsSizeOfSpoolFiles) {
+TEST_F(HostileStation, ListEndsWithinTimeAndMemoryForHugeSpoolFiles) {
   ASSERT_EQ(empty_run().exit_code, 3);
   RunRecord large;
   large.run = "20261121T134501Z-0123456789abcdef";
@@ -538,8 +538,8 @@ TEST_F(HostileStation, LimitsSizeOfSpoolFiles) {
   long_text.calibration.assign(limit_bytes - 1000, 'x');
   // Runs of other records, so that they are read but not delivered.
   const std::vector<std::pair<std::string, std::string>> files{
-      {"a million values", serialize_run({large, "elsewhere"})},
-      {"a text of 64 MiB", serialize_run({long_text, "elsewhere"})},
+      {"a million values", serialize_spooled_run({large, "elsewhere"})},
+      {"a text of 64 MiB", serialize_spooled_run({long_text, "elsewhere"})},
       {"64 MiB of levels", std::string(limit_bytes - 1, '[') + "\n"},
       {"more than 64 MiB", std::string(limit_bytes + 1, 'x')}};
   const auto script =
@@ -565,7 +565,7 @@ TEST_F(HostileStation, LimitsSizeOfSpoolFiles) {
 
 class HostileFolder : public HostileStation, public testing::WithParamInterface<StationTrial> {};
 
-TEST_P(HostileFolder, IsRejectedOrHasNoEffect) {
+TEST_P(HostileFolder, ProgramEndsWithExpectedExitCodeAndWritesNothingOutside) {
   const StationTrial& trial = GetParam();
   const auto begun = std::chrono::steady_clock::now();
   const ProgramResult result = trial.run(*this);

@@ -10,12 +10,12 @@ namespace vlp {
 namespace {
 
 Score score_behind_filters(const std::string& name, std::size_t step) {
-  Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
+  Scene scene = read_scene_file(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
   scene.picture = ImageProcessing{1, {}, {}, Bayer{0.6, 0.55}};
   return Captures(std::move(scene), "check").score(step);
 }
 
-TEST(LightDetector, DetectsDiscsWithoutBiasBehindColorFilters) {
+TEST(LightDetector, LocatesDiscsAccuratelyBehindColorFilters) {
   for (const auto& [scene, step, max_missed] : {std::tuple("paper-rig", 12, 0), {"wide", 16, 4}}) {
     const Score score = score_behind_filters(scene, std::size_t(step));
     EXPECT_GT(score.lamps, 90) << scene;
@@ -26,7 +26,7 @@ TEST(LightDetector, DetectsDiscsWithoutBiasBehindColorFilters) {
   }
 }
 
-TEST(LightDetector, DetectsPanelsAndTubesWithoutBiasBehindColorFilters) {
+TEST(LightDetector, LocatesPanelsAndTubesAccuratelyBehindColorFilters) {
   const Score score = score_behind_filters("panels", 11);
   EXPECT_GT(score.lamps, 85);
   EXPECT_EQ(score.wrong, 0);

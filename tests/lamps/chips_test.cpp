@@ -9,7 +9,7 @@ namespace vlp {
 namespace {
 
 Score score_with(const std::optional<Chips>& chips, const std::optional<Halo>& halo) {
-  Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
+  Scene scene = read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
   for (SceneLamp& lamp : scene.lamps) {
     lamp.glow.chips = chips;
     lamp.glow.halo = halo;
@@ -31,11 +31,11 @@ void expect_accurate(const Score& score) {
   EXPECT_LT(score.chi_square / score.lamps, 1.5);
 }
 
-TEST(LightDetector, CenterIsUnbiasedForChipsBehindDiffuser) {
+TEST(LightDetector, LocatesLampsWithChipsBehindDiffuserWithinQuarterPixel) {
   expect_accurate(score_with(Chips{0.3, 0.03, 0.02}, std::nullopt));
 }
 
-TEST(LightDetector, CenterIsUnbiasedForChipsBehindDiffuserWithHalo) {
+TEST(LightDetector, LocatesLampsWithChipsAndHaloWithinQuarterPixel) {
   expect_accurate(score_with(Chips{0.3, 0.03, 0.02}, Halo{0.03, 0.02}));
 }
 

@@ -9,7 +9,7 @@ namespace {
 
 class LightDetectorInClutter : public testing::TestWithParam<const char*> {};
 
-TEST_P(LightDetectorInClutter, ReportsNoWrongLamps) {
+TEST_P(LightDetectorInClutter, IdentifiesAllVisibleLampsAndNoWrongOnes) {
   const Score score = Captures("clutter", GetParam()).score(6);
   EXPECT_GE(score.lamps, 20);
   EXPECT_EQ(score.wrong, 0);

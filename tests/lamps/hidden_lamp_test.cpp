@@ -37,8 +37,8 @@ Tally tally(double width_of_diameter) {
       const int id = tally.lamps % 2 == 0 ? 2 : 3;
       lamp.stripes.period_lines = id == 2 ? 9.6 : 11.5;
       ++tally.lamps;
-      for (const Light& light :
-           lamp_detector.detect(to_image_view(render_lamps({lamp}, kHiddenSize, CV_8U, 0.5)))) {
+      for (const Light& light : lamp_detector.detect_lights(
+               to_image_view(render_lamps({lamp}, kHiddenSize, CV_8U, 0.5)))) {
         if (light.kind != LightKind::lamp) continue;
         SCOPED_TRACE(testing::Message() << "bar at " << degrees << " deg, " << offset
                                         << " off, as wide as " << width_of_diameter);
@@ -64,10 +64,10 @@ TEST(LightDetector, ReportsOnlyCorrectLampsBehindOccludingBars) {
   EXPECT_LE(found, lamps);
 }
 
-TEST(LightDetector, DetectsLampWithoutOccluder) {
+TEST(LightDetector, IdentifiesAndLocatesSingleLampWithoutOccluder) {
   const DrawnLamp lamp{.stripes = {.period_lines = 9.6}};
   const auto lights =
-      detector().detect(to_image_view(render_lamps({lamp}, kHiddenSize, CV_8U, 0.5)));
+      detector().detect_lights(to_image_view(render_lamps({lamp}, kHiddenSize, CV_8U, 0.5)));
   ASSERT_EQ(lights.size(), 1U);
   EXPECT_EQ(lights[0].lamp, 2);
   EXPECT_LT((lights[0].pixel - lamp.center).norm(), 0.05);

@@ -50,13 +50,13 @@ Handle open(const Calibration& calibration) {
   return {positioner, &vlp_close};
 }
 
-TEST(LampDetector, MatchesLightDetector) {
+TEST(LampDetector, DetectReturnsSameLampsAsLightDetector) {
   const cv::Mat image = sample();
-  const auto lamps = LampDetector(lamp_map(), calibration()).detect(to_image_view(image));
+  const auto lamps = LampDetector(lamp_map(), calibration()).detect_lamps(to_image_view(image));
   ASSERT_EQ(lamps.size(), 6U);
   std::size_t i = 0;
   const LightDetector lights(lamp_map(), make_detector_camera(calibration()));
-  for (const Light& light : lights.detect(to_image_view(image))) {
+  for (const Light& light : lights.detect_lights(to_image_view(image))) {
     if (light.kind != LightKind::lamp) continue;
     ASSERT_LT(i, lamps.size());
     EXPECT_EQ(lamps[i].lamp, light.lamp);
@@ -73,7 +73,7 @@ TEST(LampDetector, ThrowsForImagesThatDoNotMatchCamera) {
     ImageView view = to_image_view(image);
     change(view);
     try {
-      detector.detect(view);
+      detector.detect_lamps(view);
     } catch (const std::invalid_argument& error) {
       return error.what();
     }
@@ -100,9 +100,9 @@ TEST(LampDetector, ThrowsForImagesThatDoNotMatchCamera) {
   EXPECT_THROW(LampDetector(lamp_map(), without), std::invalid_argument);
 }
 
-TEST(VlpDetect, MatchesLampDetector) {
+TEST(VlpDetect, ReturnsSameLampsAsLampDetector) {
   const cv::Mat image = sample();
-  const auto expected = LampDetector(lamp_map(), calibration()).detect(to_image_view(image));
+  const auto expected = LampDetector(lamp_map(), calibration()).detect_lamps(to_image_view(image));
   ASSERT_EQ(expected.size(), 6U);
   const Handle positioner = open(calibration());
   // Rows without padding, and rows with padding.
@@ -137,10 +137,10 @@ TEST(VlpDetect, ReturnsRequiredCountWhenArrayIsTooSmall) {
     EXPECT_EQ(count, 6U);
     for (const vlp_detection& detection : detections) EXPECT_GT(detection.sigma_px, 0);
   }
-  EXPECT_NE(vlp_explanation(VLP_TOO_SMALL), std::string(vlp_explanation(-99)));
+  EXPECT_NE(vlp_describe_status(VLP_TOO_SMALL), std::string(vlp_describe_status(-99)));
 }
 
-TEST(VlpDetect, RejectsInvalidArguments) {
+TEST(VlpDetect, ReturnsBadArgumentForInvalidPointersOrImages) {
   const cv::Mat image = sample();
   const Handle positioner = open(calibration());
   const vlp_image valid_image = c_image(to_image_view(image));
@@ -182,7 +182,7 @@ TEST(VlpDetect, RejectsInvalidArguments) {
   }));
 }
 
-TEST(VlpDetect, ReturnsErrorWithoutRowTime) {
+TEST(VlpDetect, ReturnsRowTimeUnknownWithoutRowTime) {
   const cv::Mat image = sample();
   const vlp_image given = c_image(to_image_view(image));
   Calibration without = calibration();
@@ -213,7 +213,7 @@ std::string two_rooms() {
   return text + office;
 }
 
-TEST(VlpOpenRoom, IdentifiesLampsOfTheChosenRoom) {
+TEST(VlpOpenRoom, YieldsOnlyLampsOfChosenRoomAndRequiresOne) {
   const TemporaryFolder folder;
   const std::string lamps = folder.file("lamps.yaml", two_rooms());
   const std::string camera = kRendered + "true_calibration.yaml";

@@ -17,7 +17,7 @@
 namespace vlp {
 namespace {
 
-TEST(LightDetector, IdentifiesAllLampsOfPaperRig) {
+TEST(LightDetector, IdentifiesAndLocatesAllLampsOfPaperRig) {
   const Score score = Captures("paper-rig", "check").score(12);
   EXPECT_GT(score.lamps, 180);
   EXPECT_EQ(score.missed, 0);
@@ -26,14 +26,14 @@ TEST(LightDetector, IdentifiesAllLampsOfPaperRig) {
   EXPECT_LT(score.worst_px, 0.08);
 }
 
-TEST(LightDetector, SigmaMatchesScatterOfCenters) {
+TEST(LightDetector, SigmaMatchesErrorsOfLampCenters) {
   const Score score = Captures("paper-rig", "check").score(12);
   ASSERT_GT(score.lamps, 180);
   EXPECT_GT(score.chi_square / score.lamps, 0.7);
   EXPECT_LT(score.chi_square / score.lamps, 2);
 }
 
-TEST(LightDetector, IsAccurateWithTiltAndDecenteredLens) {
+TEST(LightDetector, LocatesAllLampsAccuratelyWithTiltAndDecenteredLens) {
   const Score score = Captures("paper-rig-faulty", "check").score(24);
   ASSERT_GT(score.lamps, 0);
   EXPECT_EQ(score.missed, 0);
@@ -41,7 +41,7 @@ TEST(LightDetector, IsAccurateWithTiltAndDecenteredLens) {
   EXPECT_LT(score.rms_px(), 0.02);
 }
 
-TEST(LightDetector, IsAccurateWithWideLensAndColumnReadout) {
+TEST(LightDetector, LocatesLampsAccuratelyWithWideLensAndColumnReadout) {
   const Score score = Captures("wide", "check").score(8);
   EXPECT_GT(score.lamps, 150);
   EXPECT_LE(score.missed, 4);  // too few stripes for identification
@@ -49,11 +49,11 @@ TEST(LightDetector, IsAccurateWithWideLensAndColumnReadout) {
   EXPECT_LT(score.rms_px(), 0.03);
 }
 
-TEST(LightDetector, RejectsSteadyLightsAndReflections) {
+TEST(LightDetector, ClassifiesSteadyLightsAsSteadyAndReflectionAsUnknown) {
   const Captures captures("clutter", "sample");
   const LampShot shot = captures.shot(0);
   std::map<LightKind, int> kinds;
-  for (const Light& light : captures.detector().detect(to_image_view(captures.image(shot))))
+  for (const Light& light : captures.detector().detect_lights(to_image_view(captures.image(shot))))
     ++kinds[light.kind];
   EXPECT_GE(kinds[LightKind::lamp], 3);
   EXPECT_LE(kinds[LightKind::lamp], 6) << "and three of them partly hidden";
@@ -66,7 +66,7 @@ TEST(LightDetector, ReportsCutForLampsAtImageBorder) {
   int cut = 0;
   for (std::size_t i = 0; i < 432; i += 8) {
     const LampShot shot = captures.shot(i);
-    const auto lights = captures.detector().detect(to_image_view(captures.image(shot)));
+    const auto lights = captures.detector().detect_lights(to_image_view(captures.image(shot)));
     for (const auto& [id, pixel, in_view] : captures.truth(shot)) {
       if (in_view > 0.9) continue;
       for (const Light& light : lights) {
@@ -79,11 +79,11 @@ TEST(LightDetector, ReportsCutForLampsAtImageBorder) {
   EXPECT_GT(cut, 5);
 }
 
-TEST(LightDetector, ReportsUnknownForLampOutsideMap) {
+TEST(LightDetector, ReportsUnknownForLampsMissingInMap) {
   const Captures captures("paper-rig", "sample");
   const LightDetector detector(LampMap{{Lamp{7, {0, 0, 1.6}, {}, 6000, 0.5}}},
                                {Readout::rows, 3e-5, {}});
-  const auto lights = detector.detect(to_image_view(captures.image(captures.shot(0))));
+  const auto lights = detector.detect_lights(to_image_view(captures.image(captures.shot(0))));
   ASSERT_FALSE(lights.empty());
   for (const Light& light : lights) {
     EXPECT_EQ(light.kind, LightKind::unknown);
@@ -91,12 +91,12 @@ TEST(LightDetector, ReportsUnknownForLampOutsideMap) {
   }
 }
 
-TEST(LightDetector, RejectsLampsOfNearlyEqualFrequency) {
+TEST(LightDetector, IdentifiesNoLampWhenTwoMapFrequenciesAreNearlyEqual) {
   const Captures captures("paper-rig", "sample");
   LampMap map{{Lamp{3, {0, 0, 1.6}, {}, 2500, 0.5}, Lamp{7, {1, 0, 1.6}, {}, 2520, 0.5}}};
   const auto identified = [&] {
     const LightDetector detector(map, {Readout::rows, 3e-5, {}});
-    const auto lights = detector.detect(to_image_view(captures.image(captures.shot(0))));
+    const auto lights = detector.detect_lights(to_image_view(captures.image(captures.shot(0))));
     return std::count_if(lights.begin(), lights.end(),
                          [](const Light& light) { return light.lamp.has_value(); });
   };
@@ -105,18 +105,18 @@ TEST(LightDetector, RejectsLampsOfNearlyEqualFrequency) {
   EXPECT_EQ(identified(), 1);
 }
 
-TEST(LightDetector, AcceptsFewPeriodsOnlyWithReliableLampInImage) {
+TEST(LightDetector, IdentifiesLampOfFewPeriodsOnlyNextToReliableLamp) {
   const cv::Size size(300, 160);
   const LightDetector detector(LampMap{{drawn_lamp(1, 36), drawn_lamp(2, 11)}}, drawn_camera(size));
   const DrawnLamp few{.center = {81.3, 79.6}, .stripes = {.period_lines = 36}};
   const DrawnLamp more{.center = {210.3, 79.6}, .stripes = {.period_lines = 11}};
-  const auto alone = detector.detect(to_image_view(render_lamps({few}, size, CV_8U, 0.5)));
+  const auto alone = detector.detect_lights(to_image_view(render_lamps({few}, size, CV_8U, 0.5)));
   ASSERT_EQ(alone.size(), 1U);
   EXPECT_LT(alone[0].stripes.periods, kMinReliablePeriods);
   EXPECT_EQ(alone[0].kind, LightKind::unknown);
   EXPECT_EQ(alone[0].reason, LightReason::too_few_periods);
   const auto two_lights =
-      detector.detect(to_image_view(render_lamps({few, more}, size, CV_8U, 0.5)));
+      detector.detect_lights(to_image_view(render_lamps({few, more}, size, CV_8U, 0.5)));
   ASSERT_EQ(two_lights.size(), 2U);
   for (const Light& light : two_lights) EXPECT_EQ(light.kind, LightKind::lamp);
 }
@@ -130,15 +130,15 @@ std::vector<std::pair<LightKind, LightReason>> list_kinds(std::vector<Light> lig
   return kinds;
 }
 
-TEST(LightDetector, KeepsBrighterOneOfLampAndMirrorImage) {
+TEST(LightDetector, IdentifiesLampOnlyIfMirrorImageIsMuchDarker) {
   const cv::Size size(300, 160);
   const LightDetector detector(LampMap{{drawn_lamp(1, 11)}}, drawn_camera(size));
   const DrawnLamp lamp{.center = {81.3, 79.6}};
   DrawnLamp mirror_image{.center = {210.3, 79.6}};
   const auto kinds_beside = [&](double fraction) {
     mirror_image.level = fraction * lamp.level;
-    return list_kinds(
-        detector.detect(to_image_view(render_lamps({lamp, mirror_image}, size, CV_8U, 0.5))));
+    return list_kinds(detector.detect_lights(
+        to_image_view(render_lamps({lamp, mirror_image}, size, CV_8U, 0.5))));
   };
   const std::pair lamp_kind(LightKind::lamp, LightReason::identified);
   const std::pair reflection(LightKind::unknown, LightReason::reflection);
@@ -146,7 +146,7 @@ TEST(LightDetector, KeepsBrighterOneOfLampAndMirrorImage) {
   EXPECT_EQ(kinds_beside(0.8), (std::vector{reflection, reflection}));
 }
 
-TEST(LightDetector, RejectsPeriodThatContradictsOtherLights) {
+TEST(LightDetector, RejectsLampWhosePeriodAloneDeviatesFromMap) {
   const cv::Size size(520, 160);
   const LightDetector detector(
       LampMap{{drawn_lamp(1, 9), drawn_lamp(2, 11), drawn_lamp(3, 14), drawn_lamp(4, 18)}},
@@ -157,7 +157,7 @@ TEST(LightDetector, RejectsPeriodThatContradictsOtherLights) {
       lamps.push_back({.center = {70.3 + 120 * double(lamps.size()), 79.6},
                        .stripes = {.period_lines = period}});
     }
-    return list_kinds(detector.detect(to_image_view(render_lamps(lamps, size, CV_8U, 0.5))));
+    return list_kinds(detector.detect_lights(to_image_view(render_lamps(lamps, size, CV_8U, 0.5))));
   };
   const std::pair lamp(LightKind::lamp, LightReason::identified);
   const std::pair other_period(LightKind::unknown, LightReason::unknown_period);
@@ -166,7 +166,7 @@ TEST(LightDetector, RejectsPeriodThatContradictsOtherLights) {
       << "the row time is wrong";
 }
 
-TEST(LightDetector, IgnoresMapFrequenciesWithClassifier) {
+TEST(LightDetector, IdentifiesLampsByClassifierDespiteWrongMapFrequency) {
   const cv::Size size(520, 160);
   const std::vector<double> periods{9, 11, 14, 18};
   LampMap map;
@@ -184,7 +184,7 @@ TEST(LightDetector, IgnoresMapFrequenciesWithClassifier) {
   std::vector<LabeledLight> training;
   const LightDetector by_map(map, drawn_camera(size));
   for (std::size_t i = 0; i < 10; ++i) {
-    for (const Light& light : by_map.detect(to_image_view(draw(double(i) / 10)))) {
+    for (const Light& light : by_map.detect_lights(to_image_view(draw(double(i) / 10)))) {
       if (light.lamp) training.push_back({*light.lamp, light.stripes, i});
     }
   }
@@ -192,17 +192,18 @@ TEST(LightDetector, IgnoresMapFrequenciesWithClassifier) {
   *map.lamps[0].frequency_hz *= 1.05;
   const LightDetector by_classifier(map, drawn_camera(size), fit_lamp_classifier(training));
   const std::pair lamp(LightKind::lamp, LightReason::identified);
-  EXPECT_EQ(list_kinds(by_classifier.detect(to_image_view(draw(0.33)))), std::vector(4, lamp));
+  EXPECT_EQ(list_kinds(by_classifier.detect_lights(to_image_view(draw(0.33)))),
+            std::vector(4, lamp));
 }
 
 TEST(LightDetector, ReturnsNoLightsForUniformImages) {
   const LightDetector detector = Captures("paper-rig", "sample").detector();
   for (const int type : {CV_8U, CV_16U}) {
     for (const double level : {0.0, 100.0, 255.0, 65535.0}) {
-      EXPECT_TRUE(
-          detector.detect(to_image_view(cv::Mat(600, 800, type, cv::Scalar(level)))).empty());
+      EXPECT_TRUE(detector.detect_lights(to_image_view(cv::Mat(600, 800, type, cv::Scalar(level))))
+                      .empty());
     }
-    EXPECT_TRUE(detector.detect(to_image_view(cv::Mat(1, 1, type, cv::Scalar(9)))).empty());
+    EXPECT_TRUE(detector.detect_lights(to_image_view(cv::Mat(1, 1, type, cv::Scalar(9)))).empty());
   }
 }
 

@@ -16,7 +16,7 @@ constexpr std::size_t kStep = 11;  // of 144 captures, through all yaws
 
 bool is_panel_or_tube(int lamp) { return lamp <= 4; }
 
-TEST(FitRectangle, FindsPanelsAndTubesByTheirEdges) {
+TEST(LightDetector, LocatesAllPanelsAndTubesAccuratelyWithKnownTilt) {
   const Score score = Captures("panels", "check").score(kStep, is_panel_or_tube);
   EXPECT_EQ(score.wrong, 0);
   EXPECT_GE(score.lamps, 50);
@@ -26,7 +26,7 @@ TEST(FitRectangle, FindsPanelsAndTubesByTheirEdges) {
   EXPECT_LT(score.chi_square / score.lamps, 1.5);
 }
 
-TEST(FitRectangle, FindsPanelsAndTubesWithUnknownTilt) {
+TEST(LightDetector, LocatesPanelsAndTubesAccuratelyWithUnknownTilt) {
   const Captures captures("panels", "check");
   DetectorCamera camera = make_detector_camera(captures.calibration());
   camera.level_from_camera.setIdentity();
@@ -40,7 +40,7 @@ TEST(FitRectangle, FindsPanelsAndTubesWithUnknownTilt) {
   EXPECT_LT(score.chi_square / score.lamps, 1.5);
 }
 
-TEST(LightDetector, KeepsDiscsWhenMapHasRectangles) {
+TEST(LightDetector, LocatesDiscsIdenticallyWithAndWithoutRectanglesInMap) {
   const Captures captures("panels", "check");
   LampMap discs = captures.lamps();
   for (Lamp& lamp : discs.lamps) {
@@ -50,8 +50,8 @@ TEST(LightDetector, KeepsDiscsWhenMapHasRectangles) {
   int compared = 0;
   for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
     const cv::Mat image = captures.image(captures.shot(i));
-    const auto lights = captures.detector().detect(to_image_view(image)),
-               others = without.detect(to_image_view(image));
+    const auto lights = captures.detector().detect_lights(to_image_view(image)),
+               others = without.detect_lights(to_image_view(image));
     for (const Light& light : lights) {
       if (!light.lamp || is_panel_or_tube(*light.lamp)) continue;
       const auto same = std::find_if(others.begin(), others.end(), [&](const Light& other) {
@@ -65,7 +65,7 @@ TEST(LightDetector, KeepsDiscsWhenMapHasRectangles) {
   EXPECT_GT(compared, 8);
 }
 
-TEST(LightDetector, RejectsPanelsWithWrongAspectRatio) {
+TEST(LightDetector, IdentifiesNoPanelsWhoseAspectRatioContradictsMap) {
   const Captures captures("panels", "check");
   LampMap swapped = captures.lamps();
   for (Lamp& lamp : swapped.lamps) {
@@ -74,8 +74,9 @@ TEST(LightDetector, RejectsPanelsWithWrongAspectRatio) {
   const LightDetector detector(swapped, make_detector_camera(captures.calibration()));
   int refused = 0;
   for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
-    for (const Light& light : detector.detect(to_image_view(captures.image(captures.shot(i))))) {
-      if (is_disc(light)) continue;
+    for (const Light& light :
+         detector.detect_lights(to_image_view(captures.image(captures.shot(i))))) {
+      if (is_disc_light(light)) continue;
       EXPECT_FALSE(light.lamp);
       EXPECT_EQ(light.kind, LightKind::unknown);
       refused += light.reason == LightReason::wrong_shape;
@@ -84,7 +85,7 @@ TEST(LightDetector, RejectsPanelsWithWrongAspectRatio) {
   EXPECT_GT(refused, 6);
 }
 
-TEST(FitRectangle, CorrectsCenterOfPanelsByEdgeCurvatureWithoutLens) {
+TEST(LightDetector, PanelCenterErrorsStayWithinFourSigmaWithoutLens) {
   const Captures captures("panels", "check");
   const LightDetector detector(captures.lamps(), {Readout::rows, 3e-5, std::nullopt});
   double squares = 0;
@@ -92,8 +93,8 @@ TEST(FitRectangle, CorrectsCenterOfPanelsByEdgeCurvatureWithoutLens) {
   for (std::size_t i = 0; i < captures.size(); i += 3 * kStep) {
     const LampShot shot = captures.shot(i);
     const auto truth = captures.truth(shot);
-    for (const Light& light : detector.detect(to_image_view(captures.image(shot)))) {
-      if (light.kind != LightKind::lamp || is_disc(light)) continue;
+    for (const Light& light : detector.detect_lights(to_image_view(captures.image(shot)))) {
+      if (light.kind != LightKind::lamp || is_disc_light(light)) continue;
       const auto lamp = std::find_if(truth.begin(), truth.end(), [&](const TrueLamp& candidate) {
         return candidate.id == light.lamp;
       });
@@ -110,13 +111,13 @@ TEST(FitRectangle, CorrectsCenterOfPanelsByEdgeCurvatureWithoutLens) {
   EXPECT_LT(std::sqrt(squares / found), 0.4);
 }
 
-Scene panels_scene() { return read_scene(VLP_SOURCE_DIR "/datasets/panels/scene.yaml"); }
+Scene panels_scene() { return read_scene_file(VLP_SOURCE_DIR "/datasets/panels/scene.yaml"); }
 
-TEST(FitRectangle, DoesNotMatchSmallDiscs) {
+TEST(LightDetector, LocatesAllSmallDiscsAmongPanelsAndTubes) {
   Scene scene = panels_scene();
   for (SceneLamp& lamp : scene.lamps) {
     if (lamp.glow.shape.kind == ShapeKind::rectangle) continue;
-    lamp.glow.shape = make_disc(0.095);  // 10 to 12 px
+    lamp.glow.shape = make_disc_lamp_shape(0.095);  // 10 to 12 px
     lamp.frequency_hz = 6100 + 1200 * (lamp.id - 5);
   }
   const Captures captures(std::move(scene), "check");
@@ -133,7 +134,7 @@ Panel bar(double x_m, double width_m) {
   return {{x_m, -1.5, 2.2}, {width_m, 0, 0}, {0, 3, 0}, 1e6};
 }
 
-TEST(FitRectangle, SigmaCoversErrorsOfPartlyHiddenPanels) {
+TEST(LightDetector, SigmaCoversErrorsOfPartlyHiddenPanels) {
   Scene scene = panels_scene();
   // Along edges of panels and across a tube's end: the visible part is also a rectangle.
   scene.clutter.occluders = {bar(-1.2, 0.08), bar(0.6, 0.3)};
@@ -142,8 +143,9 @@ TEST(FitRectangle, SigmaCoversErrorsOfPartlyHiddenPanels) {
   for (std::size_t i = 0; i < captures.size(); i += 5) {
     const LampShot shot = captures.shot(i);
     const auto truth = captures.truth(shot);
-    for (const Light& light : captures.detector().detect(to_image_view(captures.image(shot)))) {
-      if (light.kind != LightKind::lamp || is_disc(light)) continue;
+    for (const Light& light :
+         captures.detector().detect_lights(to_image_view(captures.image(shot)))) {
+      if (light.kind != LightKind::lamp || is_disc_light(light)) continue;
       const auto lamp = std::find_if(truth.begin(), truth.end(), [&](const TrueLamp& candidate) {
         return candidate.id == light.lamp;
       });
@@ -161,12 +163,12 @@ TEST(FitRectangle, SigmaCoversErrorsOfPartlyHiddenPanels) {
   EXPECT_GT(far, 5) << "there is something to state";
 }
 
-TEST(LightDetector, RejectsPanelsCutByImageBorder) {
+TEST(LightDetector, ReportsNoLampForPanelsCutByImageBorder) {
   const Captures captures("panels", "check");
   int cut = 0, identified = 0;
   for (std::size_t i = 0; i < captures.size(); i += 5) {
     const LampShot shot = captures.shot(i);
-    const auto lights = captures.detector().detect(to_image_view(captures.image(shot)));
+    const auto lights = captures.detector().detect_lights(to_image_view(captures.image(shot)));
     identified += static_cast<int>(std::count_if(
         lights.begin(), lights.end(), [](const Light& light) { return light.lamp.has_value(); }));
     for (const TrueLamp& lamp : captures.truth(shot)) {
@@ -182,7 +184,7 @@ TEST(LightDetector, RejectsPanelsCutByImageBorder) {
   EXPECT_GT(identified, 0);
 }
 
-TEST(LightDetector, RejectsReflectionsOfPanels) {
+TEST(LightDetector, IdentifiesNoReflectionsOfPanelsAsLamps) {
   Scene scene = panels_scene();
   for (const std::size_t lamp : {1U, 2U}) {
     scene.clutter.reflections.push_back({scene.lamps[lamp].glow, lamp});
@@ -197,21 +199,24 @@ TEST(LightDetector, RejectsReflectionsOfPanels) {
   EXPECT_LT(score.rms_px(), 0.15);
 }
 
-TEST(Positioner, ComputesFixFromPanels) {
+TEST(Positioner, ComputesFixWithinTwoMillimetersFromPanels) {
   const Captures captures("panels", "check");
   const Positioner positioner(captures.lamps(), captures.calibration());
   int fixes = 0;
   for (std::size_t i = 0; i < captures.size(); i += 2 * kStep) {
     const LampShot shot = captures.shot(i);
     std::vector<Detection> detections;
-    for (const Light& light : captures.detector().detect(to_image_view(captures.image(shot)))) {
-      if (light.kind != LightKind::lamp || is_disc(light)) continue;
+    for (const Light& light :
+         captures.detector().detect_lights(to_image_view(captures.image(shot)))) {
+      if (light.kind != LightKind::lamp || is_disc_light(light)) continue;
       detections.push_back({*light.lamp, light.pixel, light.sigma_px});
     }
     if (detections.size() < 3) continue;
-    const Fix fix = positioner.locate(detections);
+    const Fix fix = positioner.compute_position_fix(detections);
     ASSERT_EQ(fix.status, FixStatus::ok) << i;
-    EXPECT_LT((fix.estimate.pose.position_m - shot.motion.pose(0).position_m).norm(), 0.002) << i;
+    EXPECT_LT((fix.estimate.pose.position_m - shot.motion.camera_pose_at(0).position_m).norm(),
+              0.002)
+        << i;
     ++fixes;
   }
   EXPECT_GE(fixes, 3);

@@ -20,7 +20,7 @@ std::optional<Readout> found_in(const cv::Mat& image) {
   return estimate_readout_direction(1, [&](std::size_t) { return to_image_view(image); });
 }
 
-TEST(EstimateReadoutDirection, ReturnsReadoutOfRenderedImages) {
+TEST(EstimateReadoutDirection, ReturnsTrueReadoutOfRenderedImages) {
   for (const char* scene : {"paper-rig", "paper-rig-faulty", "clutter"}) {
     EXPECT_EQ(found_in(sample(scene)), Readout::rows) << scene;
     EXPECT_EQ(found_in(sample(scene).t()), Readout::columns) << scene;
@@ -35,7 +35,7 @@ TEST(EstimateReadoutDirection, ReturnsNulloptWithoutLamps) {
   EXPECT_FALSE(estimate_readout_direction(0, [](std::size_t) { return ImageView(); }));
 }
 
-TEST(EstimateReadoutDirection, StopsAfterFirstConclusiveImages) {
+TEST(EstimateReadoutDirection, StopsReadingAfterFirstConclusiveImages) {
   const cv::Mat lamps = sample("paper-rig"), dark(600, 800, CV_8U, cv::Scalar(2));
   const std::array images{cv::Mat(), dark, lamps, lamps, cv::Mat()};
   std::size_t asked = 0;
@@ -45,11 +45,11 @@ TEST(EstimateReadoutDirection, StopsAfterFirstConclusiveImages) {
   EXPECT_LE(asked, 4);
 }
 
-TEST(ReadoutDirectionEvidence, ReturnsNulloptWhenEvidenceIsWeakOrContradictory) {
-  EXPECT_FALSE((ReadoutDirectionEvidence{0.9, 0}).readout());
-  EXPECT_FALSE((ReadoutDirectionEvidence{3, 2}).readout());
-  EXPECT_EQ((ReadoutDirectionEvidence{3, 0.5}).readout(), Readout::rows);
-  EXPECT_EQ((ReadoutDirectionEvidence{0.5, 3}).readout(), Readout::columns);
+TEST(ReadoutDirectionEvidence, ReadoutReturnsNulloptForWeakOrContradictoryEvidence) {
+  EXPECT_FALSE((ReadoutDirectionEvidence{0.9, 0}).readout_direction());
+  EXPECT_FALSE((ReadoutDirectionEvidence{3, 2}).readout_direction());
+  EXPECT_EQ((ReadoutDirectionEvidence{3, 0.5}).readout_direction(), Readout::rows);
+  EXPECT_EQ((ReadoutDirectionEvidence{0.5, 3}).readout_direction(), Readout::columns);
 }
 
 }  // namespace

@@ -42,7 +42,7 @@ ImageDetections detect_lamps_in(const std::filesystem::path& folder, const char*
   result.map = read_lamp_map(folder / "lamps.yaml");
   result.calibration.camera = make_camera(image, readout);
   const LightDetector detector(result.map, make_detector_camera(result.calibration));
-  for (const Light& light : detector.detect(to_image_view(image))) {
+  for (const Light& light : detector.detect_lights(to_image_view(image))) {
     if (light.kind != LightKind::lamp) continue;
     EXPECT_FALSE(result.lamps.contains(*light.lamp)) << "one lamp twice";
     result.lamps[*light.lamp] = light;
@@ -52,7 +52,7 @@ ImageDetections detect_lamps_in(const std::filesystem::path& folder, const char*
   return result;
 }
 
-TEST(PositionerOnRealGlows, ComputesFixFromFiveLamps) {
+TEST(PositionerOnRealGlows, ComputesTrueDistanceWithinTwoCentimetersFromFiveLamps) {
   const auto folder = real_data("luxapose");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   const ImageDetections result = detect_lamps_in(folder, "x_0_y_1.27.jpg", Readout::rows);
@@ -62,8 +62,8 @@ TEST(PositionerOnRealGlows, ComputesFixFromFiveLamps) {
     detections.push_back({id, light.pixel, light.sigma_px});
   }
   ASSERT_EQ(detections.size(), 5U);
-  const Fix fix = Positioner(result.map, result.calibration).locate(detections);
-  ASSERT_TRUE(fix.ok()) << describe(fix.status);
+  const Fix fix = Positioner(result.map, result.calibration).compute_position_fix(detections);
+  ASSERT_TRUE(fix.has_succeeded()) << describe_fix_status(fix.status);
   EXPECT_EQ(fix.lamps, 5);
   const double distance_m = 2.46 - fix.estimate.pose.position_m.z();
   EXPECT_NEAR(distance_m, 2.45, 0.02);
@@ -113,7 +113,7 @@ std::vector<Eigen::Vector3d> opencv_places(const ImageDetections& result,
 
 /// Estimates roll and pitch, as for a hand-held phone. The position agrees with that of OpenCV for
 /// the same points within 1 % of the distance. Five lamps determine all six parameters.
-TEST(PositionerOnRealGlows, MatchesOpenCvPoseOfFiveLamps) {
+TEST(PositionerOnRealGlows, PositionMatchesOpenCvForFiveLamps) {
   const auto folder = real_data("luxapose");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   const ImageDetections result = detect_lamps_in(folder, "x_0_y_1.27.jpg", Readout::rows);
@@ -121,8 +121,9 @@ TEST(PositionerOnRealGlows, MatchesOpenCvPoseOfFiveLamps) {
   ASSERT_EQ(detections.size(), 5U);
   Sensors sensors;
   sensors.inclination_sigma_rad = 1.6;
-  const Fix fix = Positioner(result.map, result.calibration).locate(detections, sensors);
-  ASSERT_TRUE(fix.ok()) << describe(fix.status);
+  const Fix fix =
+      Positioner(result.map, result.calibration).compute_position_fix(detections, sensors);
+  ASSERT_TRUE(fix.has_succeeded()) << describe_fix_status(fix.status);
   ASSERT_TRUE(fix.body);
   const auto places_m = opencv_places(result, detections, cv::SOLVEPNP_SQPNP);
   ASSERT_EQ(places_m.size(), 1U);
@@ -134,7 +135,7 @@ TEST(PositionerOnRealGlows, MatchesOpenCvPoseOfFiveLamps) {
 }
 
 /// Three lamps allow several tilts; the height above the floor resolves the ambiguity.
-TEST(PositionerOnRealGlows, MatchesOneOpenCvSolutionOfThreeLamps) {
+TEST(PositionerOnRealGlows, PositionMatchesOpenCvForThreeLampsWithGivenHeight) {
   const auto folder = real_data("luxapose");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   const ImageDetections result =
@@ -146,23 +147,23 @@ TEST(PositionerOnRealGlows, MatchesOneOpenCvSolutionOfThreeLamps) {
   const Positioner positioner(result.map, result.calibration);
   Sensors sensors;
   sensors.inclination_sigma_rad = 1.6;
-  const Fix free = positioner.locate(detections, sensors);
-  std::printf("%zu of OpenCV's, free: %s\n", places_m.size(), to_string(free.status).data());
+  const Fix free = positioner.compute_position_fix(detections, sensors);
+  std::printf("%zu of OpenCV's, free: %s\n", places_m.size(), fix_status_name(free.status).data());
   EXPECT_EQ(free.status == FixStatus::ambiguous, places_m.size() > 1);
   int matched = 0;
   for (const Eigen::Vector3d& place_m : places_m) {
     sensors.height = KnownHeight{place_m.z(), 1e-3};
-    const Fix fix = positioner.locate(detections, sensors);
+    const Fix fix = positioner.compute_position_fix(detections, sensors);
     std::printf("OpenCV's at %.4f %.4f %.4f m, ours %s\n", place_m.x(), place_m.y(), place_m.z(),
-                to_string(fix.status).data());
-    if (!fix.ok()) continue;
+                fix_status_name(fix.status).data());
+    if (!fix.has_succeeded()) continue;
     EXPECT_LT((fix.estimate.pose.position_m - place_m).norm(), 0.01 * 2.35);
     ++matched;
   }
   EXPECT_GT(matched, 0);
 }
 
-TEST(LightDetectorOnRealGlows, IdentifiesLampsWithColumnReadout) {
+TEST(LightDetectorOnRealGlows, IdentifiesAllThreeLampsWithColumnReadout) {
   const auto folder = real_data("luxapose");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   const ImageDetections result =

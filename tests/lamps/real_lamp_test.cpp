@@ -11,11 +11,11 @@
 namespace vlp {
 namespace {
 
-TEST(LightDetectorOnRealLamp, MeasuresPeriodAndRadius) {
+TEST(LightDetectorOnRealLamp, ReturnsTruePeriodAndRadiusOfStripedLamp) {
   const auto folder = real_data("striped-lamp");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   const LightDetector detector({}, {Readout::rows, {}, {}});
-  const auto lights = detector.detect(to_image_view(read_image(folder / "single_LED.bmp")));
+  const auto lights = detector.detect_lights(to_image_view(read_image(folder / "single_LED.bmp")));
   ASSERT_EQ(lights.size(), 1);
   EXPECT_NEAR(lights[0].stripes.period_lines, 10.1, 0.2);
   EXPECT_NEAR(lights[0].radius_px, 34.5, 1);

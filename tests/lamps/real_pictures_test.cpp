@@ -18,14 +18,14 @@ LampMap map_of_five() {
   LampMap map;
   for (const double frequency_hz : {2000.0, 2500.0, 3012.0, 3521.0, 3968.0}) {
     const int id = static_cast<int>(map.lamps.size()) + 1;
-    map.lamps.push_back({id, {0.5 * id, 0, 2}, make_disc(0.15), frequency_hz, {}});
+    map.lamps.push_back({id, {0.5 * id, 0, 2}, make_disc_lamp_shape(0.15), frequency_hz, {}});
   }
   return map;
 }
 
 void expect_no_lamp(const std::filesystem::path& file, Readout readout, double row_time_s) {
   const LightDetector detector(map_of_five(), {readout, row_time_s, {}});
-  for (const Light& light : detector.detect(to_image_view(read_image(file)))) {
+  for (const Light& light : detector.detect_lights(to_image_view(read_image(file)))) {
     EXPECT_FALSE(light.lamp) << file << " at " << light.pixel.transpose() << ", " << row_time_s;
   }
 }

@@ -37,7 +37,7 @@ struct Score {
 class Captures {
  public:
   explicit Captures(const std::string& scene, const std::string& folder)
-      : Captures(read_scene(VLP_SOURCE_DIR "/datasets/" + scene + "/scene.yaml"), folder) {}
+      : Captures(read_scene_file(VLP_SOURCE_DIR "/datasets/" + scene + "/scene.yaml"), folder) {}
   Captures(Scene scene, const std::string& folder)
       : scene_(std::move(scene)),
         renderer_(scene_),
@@ -47,18 +47,20 @@ class Captures {
   /// Error of a center above which a lamp counts as wrong.
   double max_error_px = 5;
 
-  LampShot shot(std::size_t index) const { return make_lamp_shot(scene_, set_, index); }
+  LampShot shot(std::size_t index) const {
+    return make_simulated_lamp_capture(scene_, set_, index);
+  }
   cv::Mat image(const LampShot& shot) const {
-    const cv::Mat lines = simulate_sensor(scene_.sensor, renderer_.render_lamp_electrons(shot),
-                                          shot.noise_seed, scene_.picture);
+    const cv::Mat lines = simulate_sensor_image(
+        scene_.sensor, renderer_.render_lamps_in_electrons(shot), shot.noise_seed, scene_.picture);
     const cv::Mat image = scene_.camera.readout == Readout::rows ? lines : cv::Mat(lines.t());
-    return cv::imdecode(encode_image(image, scene_.picture),
+    return cv::imdecode(encode_image_as_jpeg_or_png(image, scene_.picture),
                         cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
   }
   std::vector<TrueLamp> truth(const LampShot& shot) const {
     return find_true_lamps_in_image(scene_, renderer_, shot);
   }
-  LampMap lamps() const { return make_lamp_map(scene_, false); }
+  LampMap lamps() const { return make_scene_lamp_map(scene_, false); }
   Calibration calibration() const { return make_true_calibration(scene_); }
   LightDetector detector() const { return {lamps(), make_detector_camera(calibration())}; }
   std::size_t size() const { return count_captures_of_set(set_); }
@@ -76,7 +78,7 @@ class Captures {
     for (std::size_t i = 0; i < count_captures_of_set(set_); i += step) {
       const LampShot shot = this->shot(i);
       std::map<int, Light> found;
-      for (Light& light : lamp_detector.detect(to_image_view(image(shot)))) {
+      for (Light& light : lamp_detector.detect_lights(to_image_view(image(shot)))) {
         if (light.kind != LightKind::lamp) continue;
         EXPECT_FALSE(found.contains(*light.lamp)) << "one lamp twice in image " << i;
         found[*light.lamp] = light;

@@ -33,7 +33,7 @@ void expect_both(const Touching& touching) {
                               .stripes = {.period_lines = kPeriods_lines[1], .phase = 0.8}};
   const LampMap map{{drawn_lamp(1, kPeriods_lines[0]), drawn_lamp(2, kPeriods_lines[1])}};
   const LightDetector detector(map, drawn_camera(kTouchingSize));
-  const auto lights = detector.detect(
+  const auto lights = detector.detect_lights(
       to_image_view(render_lamps({first_lamp, second_lamp}, kTouchingSize, touching.depth, 0.5)));
   int lamps = 0;
   for (const Light& light : lights) {
@@ -47,7 +47,7 @@ void expect_both(const Touching& touching) {
   EXPECT_EQ(lights.size(), 2U);
 }
 
-TEST(LightDetector, SeparatesTouchingLamps) {
+TEST(LightDetector, IdentifiesBothOfTwoTouchingLamps) {
   for (const double gap_px : {0.0, 1.0, 2.0}) {
     for (const int degrees : {0, 30, 45, 60, 90, 120, 150, 180, 210, 270}) {
       for (const double radius_ratio : {1.0, 0.8}) {

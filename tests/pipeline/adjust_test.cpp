@@ -61,7 +61,7 @@ class VlpAdjust : public testing::Test {
   std::string refined() { return "--refine-map " + (folder / "refined.yaml").string(); }
 };
 
-TEST_F(VlpAdjust, RefinesMapOfOneRoom) {
+TEST_F(VlpAdjust, WritesOnlyLampsOfRoomOptionToRefinedMap) {
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
   write_lamp_map(folder / "lamps.yaml", rig.map);
   std::string lamps = TemporaryFolder::read_content(folder / "lamps.yaml");
@@ -76,7 +76,7 @@ TEST_F(VlpAdjust, RefinesMapOfOneRoom) {
   EXPECT_EQ(read_lamp_map(folder / "refined.yaml").lamps.size(), rig.map.lamps.size());
 }
 
-TEST_F(VlpAdjust, RefinesMapAndReportsUncertaintyOfFixes) {
+TEST_F(VlpAdjust, ReducesMapErrorsAndAddsCalibrationUncertaintyToFixes) {
   const LampMap truth = rig.map;
   Random random(1);
   for (Lamp& lamp : rig.map.lamps) {
@@ -106,12 +106,12 @@ TEST_F(VlpAdjust, RefinesMapAndReportsUncertaintyOfFixes) {
                   "--calibration " + path("adjusted.yaml") + "-o " + path("fixes.csv"));
   ASSERT_EQ(located.exit_code, 0) << located.errors;
   const CsvTable fixes(folder / "fixes.csv");
-  EXPECT_GT(fixes.get_number(0, fixes.get_required_column("x_sd_m")),
-            fixes.get_number(0, fixes.get_required_column("x_noise_sd_m")));
+  EXPECT_GT(fixes.get_cell_number(0, fixes.get_required_column("x_sd_m")),
+            fixes.get_cell_number(0, fixes.get_required_column("x_noise_sd_m")));
 }
 
 /// Turns that do not stop for their captures: 60 degrees a second, 9 degrees an image.
-TEST_F(VlpAdjust, AcceptsContinuousRotation) {
+TEST_F(VlpAdjust, RecoversZenithAndLeverArmFromRotationWithYawRate) {
   const double rate_rad_per_s = 1;
   BodyRig body{rig.map, rolling_calibration(), {}, {}};
   body.calibration.rotation_center = rig.calibration.rotation_center;
@@ -144,14 +144,14 @@ TEST_F(VlpAdjust, AcceptsContinuousRotation) {
   EXPECT_THAT(refused.errors, HasSubstr("a moving camera needs row_time_s and readout"));
 }
 
-TEST_F(VlpAdjust, RejectsLampWithoutStandardDeviation) {
+TEST_F(VlpAdjust, RejectsLampWithoutSdUnlessMapSdOptionIsGiven) {
   const ProgramResult result = adjust("");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr("lamps.yaml: lamp 1 has no sd_m"));
   EXPECT_EQ(adjust("--map-sd-m 0.001").exit_code, 0);
 }
 
-TEST_F(VlpAdjust, EstimatesLensWithoutCovariance) {
+TEST_F(VlpAdjust, CorrectsFocalLengthOnlyWithLensSdOption) {
   const std::vector<double> truth = rig.calibration.camera.intrinsics;
   rig.calibration.camera.intrinsics[0] *= 0.97;
   EXPECT_THAT(adjust("--map-sd-m 0.001").output,
@@ -162,7 +162,7 @@ TEST_F(VlpAdjust, EstimatesLensWithoutCovariance) {
   EXPECT_NEAR(read_calibration(folder / "adjusted.yaml").camera.focal_px().x() / truth[0], 1, 1e-3);
 }
 
-TEST_F(VlpAdjust, RejectsLensSdForLensWithCovariance) {
+TEST_F(VlpAdjust, RejectsLensSdOptionForLensWithCovariance) {
   rig.calibration.intrinsics_report.emplace();
   rig.calibration.intrinsics_report->covariance =
       make_nominal_intrinsics_covariance(rig.calibration.camera, 1);
@@ -171,14 +171,14 @@ TEST_F(VlpAdjust, RejectsLensSdForLensWithCovariance) {
   EXPECT_THAT(result.errors, HasSubstr("camera.yaml: has a lens covariance already"));
 }
 
-TEST_F(VlpAdjust, WarnsOfMovedLamp) {
+TEST_F(VlpAdjust, WarnsOfLampMovedByThirtyMillimeters) {
   rig.map.lamps[1].position_m.y() += 0.03;
   const ProgramResult result = adjust("--map-sd-m 0.001");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.errors, HasSubstr("lamp 2 hangs 30 mm from where the map has it (x"));
 }
 
-TEST_F(VlpAdjust, RejectsAdjustedCalibration) {
+TEST_F(VlpAdjust, RejectsCalibrationThatIsAlreadyAdjusted) {
   ASSERT_EQ(adjust("--map-sd-m 0.001").exit_code, 0);
   rig.calibration = read_calibration(folder / "adjusted.yaml");
   const ProgramResult result = adjust("--map-sd-m 0.001");
@@ -186,7 +186,7 @@ TEST_F(VlpAdjust, RejectsAdjustedCalibration) {
   EXPECT_THAT(result.errors, HasSubstr("is adjusted already"));
 }
 
-TEST_F(VlpAdjust, ReportsRemedyWhenUndetermined) {
+TEST_F(VlpAdjust, AsksForSecondHeightWhenUndetermined) {
   frames.resize(1);
   frames[0].detections.resize(2);
   captures = "image,pivot\n0,s\n";

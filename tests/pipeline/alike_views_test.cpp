@@ -45,7 +45,7 @@ class VlpIntrinsicsSimilarViews : public VlpIntrinsics {
 };
 
 /// The board far away in a corner of the image, by a hand that trembles.
-TEST_F(VlpIntrinsicsSimilarViews, CountAsOneInOneImageCorner) {
+TEST_F(VlpIntrinsicsSimilarViews, CountAsOneWhenBoardMovesByFewPixels) {
   constexpr int count = 30;
   constexpr double size = 0.5, reach_px = 3, noise_dn = 2;
   const cv::Mat sample = cv::imread(kSample, cv::IMREAD_GRAYSCALE);
@@ -80,7 +80,7 @@ TEST_F(VlpIntrinsicsSimilarViews, CountAsOneWhenSavedAgainAsJpeg) {
   EXPECT_THAT(result.errors, HasSubstr("1 views with the board: fewer than three"));
 }
 
-TEST_F(VlpIntrinsicsSimilarViews, DoNotPassGateByCopiedFiles) {
+TEST_F(VlpIntrinsicsSimilarViews, CopiedFilesDoNotPassGateOnNumberOfViews) {
   render(5);
   const auto once = calibrate_images();
   EXPECT_EQ(once.exit_code, 1);

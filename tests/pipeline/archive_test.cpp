@@ -31,7 +31,7 @@ class VlpSimulateArchive : public SmallSimulation {
   }
 };
 
-TEST_F(VlpSimulateArchive, KeepsExistingSessionsWhenExtended) {
+TEST_F(VlpSimulateArchive, KeepsFilesOfExistingSessionsWhenExtended) {
   const Files four = archive(4), ten = archive(10);
   for (const auto& [name, content] : four) {
     if (name != "archive.csv") {
@@ -44,7 +44,7 @@ TEST_F(VlpSimulateArchive, KeepsExistingSessionsWhenExtended) {
   EXPECT_TRUE(archive(10, "--threads 3") == ten);
 }
 
-TEST_F(VlpSimulateArchive, ResumesAfterInterruption) {
+TEST_F(VlpSimulateArchive, RendersOnlyMissingSessionsAfterInterruption) {
   const Files expected = archive(10);
   // As a run leaves it that is killed after it damaged session 6 and before that was in its place.
   for (const char* session : {"camera-00003/session-02", "camera-00001/session-01"}) {
@@ -62,11 +62,11 @@ TEST_F(VlpSimulateArchive, ResumesAfterInterruption) {
 TEST_F(VlpSimulateArchive, DamagesSessionsAsListedInTable) {
   const Files files = archive(32);
   const CsvTable table(output / "archive.csv");
-  ASSERT_EQ(table.rows(), 32U);
+  ASSERT_EQ(table.num_rows(), 32U);
   std::set<std::string> kinds;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
+  for (std::size_t row = 0; row < table.num_rows(); ++row) {
     const auto cell = [&](const char* column) {
-      return std::string(table.get_text(row, table.get_required_column(column)));
+      return std::string(table.get_cell_text(row, table.get_required_column(column)));
     };
     const fs::path session = output / cell("camera") / cell("session");
     const fs::path target = session / cell("damaged");
@@ -90,7 +90,7 @@ TEST_F(VlpSimulateArchive, DamagesSessionsAsListedInTable) {
   EXPECT_EQ(kinds.size(), 5U) << "four kinds and none";
 }
 
-TEST_F(VlpSimulateArchive, RejectsSceneWithoutArchiveAndOptionOnly) {
+TEST_F(VlpSimulateArchive, RejectsOptionOnlyAndSceneWithoutKeyArchive) {
   EXPECT_THAT(simulate("--archive 2 --only boards").errors, HasSubstr("--only"));
   change_scene("archive: {", "# {");
   const auto result = simulate("--archive 2");

@@ -27,7 +27,7 @@ void PrintTo(const Bad& bad, std::ostream* out) { *out << bad.name; }
 
 class BadInputFile : public testing::TestWithParam<Bad> {};
 
-TEST_P(BadInputFile, IsReportedInOneLineWithoutOutput) {
+TEST_P(BadInputFile, IsReportedByVlpLocateInOneLineWithoutOutput) {
   const TemporaryFolder folder;
   for (const std::string name : {"lamps.yaml", "calibration.yaml", "detections.csv"}) {
     std::string content = TemporaryFolder::read_content(kExample + name);
@@ -74,14 +74,14 @@ INSTANTIATE_TEST_SUITE_P(
             ":3: "}),
     [](const auto& instance) { return instance.param.name; });
 
-TEST(VlpLocateInput, NamesMissingFile) {
+TEST(VlpLocateInput, ErrorNamesMissingFile) {
   const auto result =
       run_program("vlp-locate no.csv --lamps no.yaml --calibration no.yaml -o a.csv");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr("no.yaml: cannot be opened: No such file or directory"));
 }
 
-TEST(VlpLocateOutput, NamesFileThatCannotBeWritten) {
+TEST(VlpLocateOutput, ErrorNamesOutputFileThatCannotBeWritten) {
   const auto result = run_program("vlp-locate " + kExample + "detections.csv --lamps " + kExample +
                                   "lamps.yaml --calibration " + kExample +
                                   "calibration.yaml -o /no/such/folder/fixes.csv");
@@ -89,7 +89,7 @@ TEST(VlpLocateOutput, NamesFileThatCannotBeWritten) {
   EXPECT_THAT(result.errors, HasSubstr("/no/such/folder/fixes.csv: cannot be written"));
 }
 
-TEST(VlpLocateUsage, ReportsErrorInOneLine) {
+TEST(VlpLocateUsage, ErrorPointsToHelpForInvalidOptions) {
   for (const std::string options : {"", "--nonsense", "a b c", "--correction some"}) {
     const auto result = run_program("vlp-locate " + options);
     EXPECT_EQ(result.exit_code, 2) << options;

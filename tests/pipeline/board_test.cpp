@@ -23,7 +23,7 @@ class VlpBoard : public testing::Test {
   const TemporaryFolder folder;
 };
 
-TEST_F(VlpBoard, WritesPdfAsPrinted) {
+TEST_F(VlpBoard, WritesIdenticalPdfTwiceAndMatchingBoardFile) {
   const std::string pdf = (folder / "board.pdf").string();
   ASSERT_EQ(run_program("vlp-board --kalibr --tag-mm 30 --paper A3 -o " + pdf).exit_code, 0);
   const std::string bytes = TemporaryFolder::read_content(pdf);
@@ -54,7 +54,7 @@ TEST_F(VlpBoard, PrintsTagsToScale) {
   EXPECT_NEAR(width_px / px_per_mm / 1000, compute_tag_field_size_m(board).x(), 1e-4);
 }
 
-TEST_F(VlpBoard, RejectsBoardLargerThanPage) {
+TEST_F(VlpBoard, RejectsTooLargeBoardUnknownPaperAndTooHighIds) {
   const std::string output = " -o " + (folder / "board.pdf").string();
   const auto large = run_program("vlp-board --tag-mm 50" + output);
   EXPECT_EQ(large.exit_code, 2);

@@ -71,7 +71,7 @@ class VlpCalibrateAccuracy : public VlpCalibrate,
                              public testing::WithParamInterface<const char*> {};
 
 /// The gates are 1.5 times what was measured when they were written.
-TEST_P(VlpCalibrateAccuracy, PassesGates) {
+TEST_P(VlpCalibrateAccuracy, RenderedSessionPassesGatesOfItsDataset) {
   const std::string rig = kDatasets + GetParam();
   render(rig + "/scene.yaml", "boards,rotation,dispersion,check");
   fs::copy(rig + "/gates.yaml", folder / "a session/gates.yaml");
@@ -85,7 +85,7 @@ INSTANTIATE_TEST_SUITE_P(Rigs, VlpCalibrateAccuracy,
                          testing::Values("paper-rig", "paper-rig-faulty"));
 
 /// The fixes at the dispersion's place reject different lamps, so that no offset explains them.
-TEST_F(VlpCalibrate, NamesMovedLampInEveryStep) {
+TEST_F(VlpCalibrate, ReportsMovedLampInSeveralSteps) {
   render(kDatasets + "paper-rig/scene.yaml", "rotation,dispersion,check");
   Calibration known;
   known.camera = read_calibration(folder / "a session/true_calibration.yaml").camera;
@@ -110,7 +110,7 @@ TEST_F(VlpCalibrate, NamesMovedLampInEveryStep) {
 }
 
 // From boards that are seen beyond 90 degrees off the axis.
-TEST_F(VlpCalibrate, Calibrates190DegreeLens) {
+TEST_F(VlpCalibrate, Calibrates190DegreeLensWithinTenthOfPixel) {
   std::string scene = TemporaryFolder::read_content(kDatasets + "fisheye/scene.yaml");
   for (const auto& [what, by] : std::vector<std::pair<std::string, std::string>>{
            {"turn: \\{count: 40, jitter_deg: 4\\}", "turn: {count: 12, jitter_deg: 4}"},
@@ -128,7 +128,7 @@ TEST_F(VlpCalibrate, Calibrates190DegreeLens) {
     const auto up_to = [&](double degrees) {
       return compute_projection_difference(
           lens, Lens(found.lens_model, found.intrinsics), truth.imager_px, [&](const auto& pixel) {
-            const auto ray = lens.unproject(pixel);
+            const auto ray = lens.unproject_pixel(pixel);
             const double least = std::cos(rad_from_deg(degrees));
             return ray && ray->direction.normalized().z() > least ? 1.0 : INFINITY;
           });
@@ -165,7 +165,7 @@ class VlpCalibrateSmallSession : public VlpCalibrate {
   }
 };
 
-TEST_F(VlpCalibrate, RunsOnlyChangedSteps) {
+TEST_F(VlpCalibrate, RunsOnlyStepsWhoseInputChanged) {
   // Stripes enough to find the row time; fewer check captures than the scene has.
   std::string scene = TemporaryFolder::read_content(kDatasets + "paper-rig/scene.yaml");
   const std::string grid = "columns: 6, rows: 6}\n    heights_m: [0, 0.1, 0.2, 0.3]";
@@ -199,7 +199,7 @@ TEST_F(VlpCalibrate, RunsOnlyChangedSteps) {
   EXPECT_THAT(result("evaluation.json"), HasSubstr("\"missing\""));
 }
 
-TEST_F(VlpCalibrateSmallSession, RepeatsVerdictOfGates) {
+TEST_F(VlpCalibrateSmallSession, ReportsFailedGatesAgainWhenRepeated) {
   folder.file("a session/gates.yaml",
               "format: vlp-gates/1\ngates:\n  mean_mm: 1e-6\n  tilt_deg: 1e-6\n");
   for (int run = 0; run < 2; ++run) {
@@ -224,7 +224,7 @@ TEST_F(VlpCalibrateSmallSession, RepeatsVerdictOfGates) {
   EXPECT_THAT(refused.errors, HasSubstr("gates.yaml:3: gates.coverage: should be a fraction"));
 }
 
-TEST_F(VlpCalibrateSmallSession, GivesSameResultInForkedProcess) {
+TEST_F(VlpCalibrateSmallSession, BatchStdinWritesSameResultsAsSingleRun) {
   ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows").exit_code, 0);
   const nlohmann::json line{{"arguments",
                              {path("a session"), "-o", path("each"), "--no-report", "--row-time-s",
@@ -250,7 +250,7 @@ TEST_F(VlpCalibrateSmallSession, GivesSameResultInForkedProcess) {
   }
 }
 
-TEST_F(VlpCalibrateSmallSession, FollowsChangesOfSessionFolder) {
+TEST_F(VlpCalibrateSmallSession, UpdatesResultsWhenSessionFilesChange) {
   ASSERT_EQ(calibrate().exit_code, 0);
   const std::string calibration = result("calibration.yaml");
   // Without the dispersion nothing of it is left, and with it again all is as it was.
@@ -295,7 +295,7 @@ TEST_F(VlpCalibrateSmallSession, FollowsChangesOfSessionFolder) {
   EXPECT_FALSE(fs::exists(folder / "results/report.html"));
 }
 
-TEST_F(VlpCalibrateSmallSession, SelectsLensModel) {
+TEST_F(VlpCalibrateSmallSession, SelectsOpencvModelWithOptionLensAuto) {
   const std::string chosen = "--row-time-s 3e-5 --readout rows --lens auto";
   const auto run = calibrate(chosen);
   EXPECT_LE(run.exit_code, 1) << run.errors;
@@ -306,7 +306,7 @@ TEST_F(VlpCalibrateSmallSession, SelectsLensModel) {
   EXPECT_THAT(calibrate().output, Not(HasSubstr("lens          up to date")));
 }
 
-TEST_F(VlpCalibrateSmallSession, FailsWhenGateOfLensFails) {
+TEST_F(VlpCalibrateSmallSession, ReturnsOneWhenGateOfLensFails) {
   std::size_t views = 0;
   for (const auto& image : fs::directory_iterator(folder / "a session/boards")) {
     if (image.path().extension() == ".png" && ++views > 5) fs::remove(image.path());
@@ -317,7 +317,7 @@ TEST_F(VlpCalibrateSmallSession, FailsWhenGateOfLensFails) {
   EXPECT_THAT(result("report.html"), HasSubstr("FAIL"));
 }
 
-TEST_F(VlpCalibrateSmallSession, StopsAtFailedStep) {
+TEST_F(VlpCalibrateSmallSession, WritesNoCalibrationWhenRotationStepFails) {
   ASSERT_EQ(calibrate().exit_code, 0);
   for (const auto& image : fs::directory_iterator(folder / "a session/rotation")) {
     if (image.path().filename() != "0000.png") fs::remove(image.path());
@@ -376,14 +376,14 @@ class SingleStepPrograms : public VlpCalibrateSmallSession {
   }
 };
 
-TEST_F(SingleStepPrograms, MatchVlpCalibrate) {
+TEST_F(SingleStepPrograms, WriteSameResultsAsVlpCalibrate) {
   ASSERT_EQ(calibrate("--no-report " + how).exit_code, 0);
   run_steps(lens_by_hand(), "truth.csv");
   expect_same_results();
   EXPECT_EQ(by_hand("lens.cameramodel"), result("lens.cameramodel"));
 }
 
-TEST_F(SingleStepPrograms, MatchVlpCalibrateWithInclinationSensor) {
+TEST_F(SingleStepPrograms, WriteSameResultsAsVlpCalibrateWithInclinationSensor) {
   // One that reads a little, and a table of places without truth.csv.
   std::string captures = "image,x_m,y_m,z_m,roll_rad,pitch_rad\n";
   for (const TruthRow& row : read_truth_table(folder / "a session/check/truth.csv")) {
@@ -402,14 +402,14 @@ TEST_F(SingleStepPrograms, MatchVlpCalibrateWithInclinationSensor) {
   EXPECT_NE(by_hand("fixes.csv"), result("check-fixes.csv"));
 }
 
-TEST_F(SingleStepPrograms, MatchVlpCalibrateWithGivenLens) {
+TEST_F(SingleStepPrograms, WriteSameResultsAsVlpCalibrateWithGivenLens) {
   fs::copy(folder / "a session/true_calibration.yaml", folder / "a session/camera.yaml");
   ASSERT_EQ(calibrate("--no-report").exit_code, 0);
   run_steps("'" + path("a session/camera.yaml'"), "truth.csv");
   expect_same_results();
 }
 
-TEST_F(SingleStepPrograms, MatchVlpCalibrateWithClassifier) {
+TEST_F(SingleStepPrograms, WriteSameResultsAsVlpCalibrateWithClassifier) {
   const std::string in = path("a session");
   const auto trained = run_program("vlp-train '" + in + "/rotation' --lamps '" + in +
                                    "/lamps.yaml' --calibration '" + in +
@@ -424,7 +424,7 @@ TEST_F(SingleStepPrograms, MatchVlpCalibrateWithClassifier) {
   expect_same_results();
 }
 
-TEST_F(VlpCalibrateSmallSession, RunsStepNamedByRedo) {
+TEST_F(VlpCalibrateSmallSession, RunsOnlyStepNamedByRedoAgain) {
   ASSERT_EQ(calibrate().exit_code, 0);
   const std::string session = result("session.json");
   const auto again = calibrate("--row-time-s 3e-5 --readout rows --redo check");
@@ -442,7 +442,7 @@ TEST_F(VlpCalibrateSmallSession, RunsStepNamedByRedo) {
               HasSubstr("there is no step row-time in this session, as the row time is known"));
 }
 
-TEST_F(VlpCalibrateSmallSession, ResumesAfterKill) {
+TEST_F(VlpCalibrateSmallSession, WritesSameResultsWhenResumedAfterKill) {
   ASSERT_EQ(calibrate().exit_code, 0);
   const std::string session = result("session.json"), report = result("report.html");
   int killed_in_time = 0;
@@ -465,7 +465,7 @@ TEST_F(VlpCalibrateSmallSession, ResumesAfterKill) {
   EXPECT_GE(killed_in_time, 1) << "a busy machine may be late for the last moments";
 }
 
-TEST_F(VlpCalibrateSmallSession, KeepsForeignFiles) {
+TEST_F(VlpCalibrateSmallSession, RejectsResultFolderThatContainsForeignFile) {
   fs::create_directory(folder / "mine");
   folder.file("mine/calibration.yaml", "of somebody\n");
   const auto run =
@@ -476,7 +476,7 @@ TEST_F(VlpCalibrateSmallSession, KeepsForeignFiles) {
   EXPECT_FALSE(fs::exists(folder / "mine/steps"));
 }
 
-TEST_F(VlpCalibrateSmallSession, RemovesOldResultsAfterFailure) {
+TEST_F(VlpCalibrateSmallSession, RemovesOldResultsWhenLampMapIsMissing) {
   ASSERT_EQ(calibrate().exit_code, 0);
   const std::string lamps = TemporaryFolder::read_content(folder / "a session/lamps.yaml");
   fs::remove(folder / "a session/lamps.yaml");
@@ -497,7 +497,7 @@ TEST_F(VlpCalibrateSmallSession, RemovesOldResultsAfterFailure) {
   EXPECT_THAT(result("session.json"), HasSubstr("\"verdict\": \"no result\""));
 }
 
-TEST_F(VlpCalibrateSmallSession, ReportsDamagedImages) {
+TEST_F(VlpCalibrateSmallSession, ListsDamagedImagesAsSkippedInSessionJson) {
   folder.file("a session/rotation/0003.png", "no image");
   fs::resize_file(folder / "a session/check/0001.png", 100);
   const auto run = calibrate("--no-report --row-time-s 3e-5 --readout rows");
@@ -515,7 +515,7 @@ TEST_F(VlpCalibrateSmallSession, ReportsDamagedImages) {
   expect_documents_as_their_schemas_say();
 }
 
-TEST_F(VlpCalibrateSmallSession, ReportsUncertaintyOfCalibration) {
+TEST_F(VlpCalibrateSmallSession, WritesCalibrationSdsAndLampOffsetsToSessionJson) {
   ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows").exit_code, 0);
   const auto json = nlohmann::json::parse(result("session.json"));
   const auto& figures = json["calibration"];
@@ -537,7 +537,7 @@ TEST_F(VlpCalibrateSmallSession, ReportsUncertaintyOfCalibration) {
   EXPECT_EQ(lamps, 6);
 }
 
-TEST_F(VlpCalibrateSmallSession, RejectsResultsOfAnotherSession) {
+TEST_F(VlpCalibrateSmallSession, RejectsResultFolderOfAnotherSession) {
   ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows").exit_code, 0);
   fs::copy(folder / "a session", folder / "another", fs::copy_options::recursive);
   const auto other = run_program("vlp-calibrate '" + path("another") + "' -o '" + path("results") +
@@ -551,7 +551,7 @@ TEST_F(VlpCalibrateSmallSession, RejectsResultsOfAnotherSession) {
   EXPECT_THAT(inside.errors, HasSubstr("contains captures: choose another folder for the results"));
 }
 
-TEST_F(VlpCalibrate, NamesMissingInput) {
+TEST_F(VlpCalibrate, ErrorNamesMissingFolderFileOrUnknownOption) {
   EXPECT_EQ(run_program("vlp-calibrate").exit_code, 2);
   const auto nowhere = calibrate();
   EXPECT_EQ(nowhere.exit_code, 2);

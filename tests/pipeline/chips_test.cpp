@@ -32,7 +32,7 @@ std::string scene_with_chips(const std::string& chips) {
   return scene;
 }
 
-TEST(DetectLamps, IsUnbiasedForVisibleLedChips) {
+TEST(VlpDetectWithLedChips, LocatesAllVisibleLampsWithinQuarterPixel) {
   const TemporaryFolder folder;
   const auto scene =
       folder.file("scene.yaml", scene_with_chips("fraction: 0.3, pitch_m: 0.03, width_m: 0.02"));
@@ -52,13 +52,13 @@ TEST(DetectLamps, IsUnbiasedForVisibleLedChips) {
   const CsvTable truth(out / "rotation" / "true_detections.csv");
   double squares = 0, chi_square = 0, worst_px = 0;
   int lamps = 0;
-  for (std::size_t row = 0; row < truth.rows(); ++row) {
+  for (std::size_t row = 0; row < truth.num_rows(); ++row) {
     const auto number = [&](const char* name) {
-      return truth.get_number(row, truth.get_required_column(name));
+      return truth.get_cell_number(row, truth.get_required_column(name));
     };
-    const std::string image(truth.get_text(row, truth.get_required_column("image")));
+    const std::string image(truth.get_cell_text(row, truth.get_required_column("image")));
     const auto lamp =
-        found.find({image, truth.get_integer(row, truth.get_required_column("lamp"))});
+        found.find({image, truth.get_cell_integer(row, truth.get_required_column("lamp"))});
     if (number("in_view") < 1) continue;
     ASSERT_NE(lamp, found.end()) << "row " << row;
     const Eigen::Vector2d off_px =

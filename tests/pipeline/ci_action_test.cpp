@@ -44,7 +44,7 @@ class CiAction : public testing::Test {
   }
 };
 
-TEST_F(CiAction, PassesAndComparesWithAcceptedFixes) {
+TEST_F(CiAction, PassesAndComparesOnlyIfAcceptedFixesAreGiven) {
   const auto first = run_action("results=accepted");
   ASSERT_EQ(first.exit_code, 0) << first.output << first.errors;
   EXPECT_THAT(content("accepted/junit.xml"),
@@ -56,7 +56,7 @@ TEST_F(CiAction, PassesAndComparesWithAcceptedFixes) {
               AllOf(HasSubstr("failures=\"0\" errors=\"0\""), HasSubstr("name=\"worse_mm\"")));
 }
 
-TEST_F(CiAction, NamesWrongLampOfMap) {
+TEST_F(CiAction, NamesLampThatMapMisplacesByThirtyMillimeters) {
   const std::string lamps = content("session/lamps.yaml"), before = "position_m: [-0.6, -0.3,";
   ASSERT_NE(lamps.find(before), std::string::npos);
   folder.file("session/lamps.yaml", std::string(lamps).replace(lamps.find(before), before.size(),

@@ -54,7 +54,7 @@ class VlpConvert : public testing::Test {
   Calibration calibration_;
 };
 
-TEST_F(VlpConvert, RoundTripIsExact) {
+TEST_F(VlpConvert, RoundTripThroughEachFormatKeepsCameraExactly) {
   const Camera& camera = calibration_.camera;
   const auto expect_back = [&](const char* format) {
     const Camera back = round_trip(format).camera;
@@ -68,7 +68,7 @@ TEST_F(VlpConvert, RoundTripIsExact) {
   for (const char* format : {"opencv", "ros", "kalibr"}) expect_back(format);
 }
 
-TEST_F(VlpConvert, KeepsCalibratedRegion) {
+TEST_F(VlpConvert, KeepsCalibratedRegionOnlyThroughMrcalFormat) {
   IntrinsicsReport report{20, 2000, 3, 0.1, {}, 0.05, {}};
   report.region_px = {{0, 0}, {500.25, 0}, {512, 300.125}, {500, 599}, {0, 599}};
   calibration_.intrinsics_report = report;
@@ -87,7 +87,7 @@ TEST_F(VlpConvert, KeepsCalibratedRegion) {
 }
 
 /// Compares the reported error of a fit with the rays of 1,000 pixels.
-TEST_F(VlpConvert, ReportsLargestErrorOfFit) {
+TEST_F(VlpConvert, PrintsLargestPixelErrorOfFittedLens) {
   write_calibration(folder_ / "camera.yaml", calibration_);
   const std::string said =
       convert("camera.yaml", "kalibr.yaml", "--to kalibr --lens OPENCV_FISHEYE");
@@ -111,7 +111,7 @@ TEST_F(VlpConvert, ReportsLargestErrorOfFit) {
                  u = std::clamp(random.uniform(-40, 839), 0.0, 799.0);
     const Eigen::Vector2d pixel =
         i < 4 ? Eigen::Vector2d(799.0 * (i % 2), i < 2 ? 0 : 599) : Eigen::Vector2d(u, v);
-    const auto there = lens.project(was.unproject(pixel).value().direction);
+    const auto there = lens.project_point(was.unproject_pixel(pixel).value().direction);
     worst_px = std::max(worst_px, (there.value() - pixel).norm());
   }
   constexpr double three_digits = 1.005;
@@ -119,7 +119,7 @@ TEST_F(VlpConvert, ReportsLargestErrorOfFit) {
   EXPECT_GE(worst_px, 0.95 * stated_px);
 }
 
-TEST_F(VlpConvert, RejectsUnsupportedLensModel) {
+TEST_F(VlpConvert, RejectsLensModelThatFormatDoesNotSupport) {
   write_calibration(folder_ / "camera.yaml", calibration_);
   const auto result =
       run_program("vlp-convert " + path("camera.yaml") + " --to kalibr -o " + path("out"));

@@ -53,7 +53,7 @@ class VlpIntrinsicsCornerFiles : public VlpIntrinsics {
 
 constexpr const char* kSize = "--imager-px 800 600";
 
-TEST_F(VlpIntrinsicsCornerFiles, RejectOptionsForImages) {
+TEST_F(VlpIntrinsicsCornerFiles, RejectOptionsThatApplyOnlyToImages) {
   const std::string corners = folder.file("corners.vnl", vnl({"a.png"})).string();
   for (const std::string option : {"--cache", "--threads", "--max-mpx", "--every"}) {
     EXPECT_EQ(refusal(corners, std::string(kSize) + " " + option + " 2"),
@@ -63,7 +63,7 @@ TEST_F(VlpIntrinsicsCornerFiles, RejectOptionsForImages) {
 }
 
 /// A slip in a table costs its tag, and neither the view nor the table.
-TEST_F(VlpIntrinsicsCornerFiles, TolerateOutlier) {
+TEST_F(VlpIntrinsicsCornerFiles, YieldAccurateLensDespiteOneWrongCorner) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   std::vector<BoardView> seen;
   Random random(5);
@@ -71,7 +71,7 @@ TEST_F(VlpIntrinsicsCornerFiles, TolerateOutlier) {
   constexpr double noise_px = 0.02;
   while (seen.size() < 10) {
     const BoardDetection view = views.random_view(random, noise_px);
-    if (!lattice.has_sufficient_corners(view)) continue;
+    if (!lattice.are_corners_sufficient_for_pose(view)) continue;
     seen.push_back({"view" + std::to_string(seen.size()) + ".png", views.imager_px, view});
   }
   const fs::path table = folder / "corners.csv", board = folder / "board.yaml";
@@ -103,7 +103,7 @@ TEST_F(VlpIntrinsicsCornerFiles, RejectWarpOfSquareChessboard) {
   }
 }
 
-TEST_F(VlpIntrinsicsCornerFiles, GiveLensOfImagesExactly) {
+TEST_F(VlpIntrinsicsCornerFiles, YieldLensOfImagesExactlyAndOfMrcalClosely) {
   const std::string rig = (folder / "rig").string(), board = rig + "/board.yaml";
   ASSERT_EQ(run_program("vlp-simulate -q " VLP_SOURCE_DIR
                         "/datasets/paper-rig/scene.yaml --only boards -o " +
@@ -171,7 +171,7 @@ TEST_F(VlpIntrinsicsCornerFiles, GiveLensOfImagesExactly) {
   EXPECT_LT(over, 1.06);
 }
 
-TEST_F(VlpIntrinsicsCornerFiles, AreRejectedWithCauseInOneLine) {
+TEST_F(VlpIntrinsicsCornerFiles, InvalidOnesAreRejectedNamingLineAndCause) {
   const std::string good = vnl({"0.png", "1.png"});
   const auto with = [&](const std::string& from, const std::string& to) {
     std::string changed = good;
@@ -217,7 +217,7 @@ TEST_F(VlpIntrinsicsCornerFiles, AreRejectedWithCauseInOneLine) {
 }
 
 /// Tables of chessboards whose sizes are miscounted.
-TEST_F(VlpIntrinsicsCornerFiles, ReportMiscountedBoardSize) {
+TEST_F(VlpIntrinsicsCornerFiles, MiscountedBoardSizeIsReportedWithCorrection) {
   std::string text = "# filename x y level\n", table = "image,corner,u_px,v_px\n";
   for (int row = 0; row < 5; ++row) {
     for (int col = 0; col < 8; ++col) {

@@ -38,7 +38,7 @@ class VlpDetect : public testing::Test {
 };
 
 /// A row time that leaves lamps identified, and one with which each is taken for its neighbor.
-TEST_F(VlpDetect, ReportsBothRowTimesIfGivenOneIsWrong) {
+TEST_F(VlpDetect, WarnsWithGivenAndMeasuredRowTimeIfTheyDiffer) {
   const std::string images = kRig + "/sample' --lamps " + kRig + "/lamps.yaml";
   const std::string output = " -o " + (folder / "out.csv").string();
   std::string calibration = TemporaryFolder::read_content(kRig + "/true_calibration.yaml");
@@ -94,9 +94,9 @@ TEST_F(VlpDetect, IdentifiesOnlyLampsOfRoomOption) {
                              HasSubstr("the key room of lamps and --room")));
   ASSERT_EQ(detect_in(" --room hall").exit_code, 0);
   const CsvTable found(folder / "rooms.csv");
-  ASSERT_GT(found.rows(), 0U);
-  for (std::size_t row = 0; row < found.rows(); ++row) {
-    EXPECT_LT(found.get_number(row, found.get_required_column("lamp")), 900);
+  ASSERT_GT(found.num_rows(), 0U);
+  for (std::size_t row = 0; row < found.num_rows(); ++row) {
+    EXPECT_LT(found.get_cell_number(row, found.get_required_column("lamp")), 900);
   }
   const auto attic = detect_in(" --room attic");
   EXPECT_EQ(attic.exit_code, 2);
@@ -110,18 +110,18 @@ TEST_F(VlpDetect, YieldsTruePositionWithVlpLocate) {
                                    "/true_calibration.yaml -o " + (folder / "fixes.csv").string());
   ASSERT_EQ(located.exit_code, 0) << located.errors;
   const CsvTable fixes(folder / "fixes.csv"), truth(kRig + "/sample/truth.csv");
-  ASSERT_EQ(fixes.rows(), 2);
+  ASSERT_EQ(fixes.num_rows(), 2);
   for (std::size_t row = 0; row < 2; ++row) {
-    EXPECT_EQ(fixes.get_text(row, fixes.get_required_column("image")),
-              truth.get_text(row, truth.get_required_column("image")));
+    EXPECT_EQ(fixes.get_cell_text(row, fixes.get_required_column("image")),
+              truth.get_cell_text(row, truth.get_required_column("image")));
     for (const char* axis : {"x_m", "y_m", "z_m"}) {
-      EXPECT_NEAR(fixes.get_number(row, fixes.get_required_column(axis)),
-                  truth.get_number(row, truth.get_required_column(axis)), 1e-4);
+      EXPECT_NEAR(fixes.get_cell_number(row, fixes.get_required_column(axis)),
+                  truth.get_cell_number(row, truth.get_required_column(axis)), 1e-4);
     }
   }
 }
 
-TEST_F(VlpDetect, WritesAnnotatedImages) {
+TEST_F(VlpDetect, AnnotateOptionWritesImagesWithColoredOutlines) {
   const fs::path pictures = folder / "new" / "pictures";
   ASSERT_EQ(detect(kRig + "/sample", "--annotate " + pictures.string()).exit_code, 0);
   for (const char* name : {"0000.png.png", "0001.png.png"}) {
@@ -138,7 +138,7 @@ TEST_F(VlpDetect, WritesAnnotatedImages) {
   EXPECT_THAT(refused.errors, HasSubstr("contains the images"));
 }
 
-TEST_F(VlpDetect, ReportsClassAndReasonOfEachLight) {
+TEST_F(VlpDetect, LightsTableListsKindAndReasonOfEachLight) {
   const std::string clutter = std::string(VLP_SOURCE_DIR) + "/datasets/clutter/rendered";
   const fs::path lights = folder / "lights.csv";
   const auto found =
@@ -148,14 +148,15 @@ TEST_F(VlpDetect, ReportsClassAndReasonOfEachLight) {
   ASSERT_EQ(found.exit_code, 0) << found.errors;
   const CsvTable table(lights), lamps(folder / "found.csv");
   std::map<std::string, std::size_t> kinds;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::string kind(table.get_text(row, table.get_required_column("kind")));
+  for (std::size_t row = 0; row < table.num_rows(); ++row) {
+    const std::string kind(table.get_cell_text(row, table.get_required_column("kind")));
     ++kinds[kind];
     const bool identified = kind == "lamp" || kind == "cut";
-    EXPECT_EQ(identified, table.get_text(row, table.get_required_column("reason")) == "identified");
-    EXPECT_EQ(identified, !table.get_text(row, table.get_required_column("lamp")).empty());
+    EXPECT_EQ(identified,
+              table.get_cell_text(row, table.get_required_column("reason")) == "identified");
+    EXPECT_EQ(identified, !table.get_cell_text(row, table.get_required_column("lamp")).empty());
   }
-  EXPECT_EQ(kinds["lamp"], lamps.rows());
+  EXPECT_EQ(kinds["lamp"], lamps.num_rows());
   EXPECT_EQ(kinds["steady"], 2U) << "the steady lamp and the window";
   EXPECT_EQ(kinds["unknown"], 1U) << "the reflection of lamp 5";
   EXPECT_THAT(found.output,
@@ -163,20 +164,20 @@ TEST_F(VlpDetect, ReportsClassAndReasonOfEachLight) {
   EXPECT_THAT(found.errors, HasSubstr(") lamp 5: its stripes match this lamp; radius 28.6 px"));
 }
 
-TEST_F(VlpDetect, WritesLightsWithoutLamp) {
+TEST_F(VlpDetect, WritesLightsTableEvenIfNoLampIsFound) {
   const fs::path lights = folder / "lights.csv";
   const auto result = detect(kRig + "/sample-boards", "--lights " + lights.string());
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(result.errors, HasSubstr("; most often, "));
   EXPECT_FALSE(fs::exists(folder / "found.csv"));
   const CsvTable table(lights);
-  EXPECT_GT(table.rows(), 0U);
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    EXPECT_EQ(table.get_text(row, table.get_required_column("lamp")), "");
+  EXPECT_GT(table.num_rows(), 0U);
+  for (std::size_t row = 0; row < table.num_rows(); ++row) {
+    EXPECT_EQ(table.get_cell_text(row, table.get_required_column("lamp")), "");
   }
 }
 
-TEST_F(VlpDetect, DoesNotOverwriteOtherFilesWithLights) {
+TEST_F(VlpDetect, RejectsLightsOptionThatNamesInputOrOutput) {
   const auto refused = [&](const fs::path& lights, const std::string& message) {
     const auto result = detect(kRig + "/sample", "--lights " + lights.string());
     EXPECT_EQ(result.exit_code, 2);
@@ -190,7 +191,7 @@ TEST_F(VlpDetect, DoesNotOverwriteOtherFilesWithLights) {
   refused(folder / "none" / "lights.csv", "lights.csv");
 }
 
-TEST_F(VlpDetect, RequiresOnlyRowTimeOfCamera) {
+TEST_F(VlpDetect, DetectsSameLampsWithRowTimeInsteadOfCalibration) {
   const std::string call = "vlp-detect '" + kRig + "/sample' --lamps " + kRig + "/lamps.yaml -o " +
                            (folder / "found.csv").string();
   const auto refused = run_program(call);
@@ -200,15 +201,15 @@ TEST_F(VlpDetect, RequiresOnlyRowTimeOfCamera) {
   const CsvTable without(folder / "found.csv");
   ASSERT_EQ(detect(kRig + "/sample").exit_code, 0);
   const CsvTable with(folder / "found.csv");
-  ASSERT_EQ(without.rows(), with.rows());
-  for (std::size_t row = 0; row < with.rows(); ++row) {
+  ASSERT_EQ(without.num_rows(), with.num_rows());
+  for (std::size_t row = 0; row < with.num_rows(); ++row) {
     // The lens moves the middle of an outline by as much.
-    EXPECT_NEAR(without.get_number(row, without.get_required_column("u_px")),
-                with.get_number(row, with.get_required_column("u_px")), 1);
+    EXPECT_NEAR(without.get_cell_number(row, without.get_required_column("u_px")),
+                with.get_cell_number(row, with.get_required_column("u_px")), 1);
   }
 }
 
-TEST_F(VlpDetect, MatchesVlpLocateOnImages) {
+TEST_F(VlpDetect, VlpLocatePrintsSameForImagesAndForDetections) {
   ASSERT_EQ(detect(kRig + "/sample").exit_code, 0);
   const std::string rig = " --lamps " + kRig + "/lamps.yaml --calibration " + kRig +
                           "/true_calibration.yaml -o " + (folder / "fixes").string();
@@ -222,11 +223,11 @@ TEST_F(VlpDetect, MatchesVlpLocateOnImages) {
   fs::copy(kRig + "/sample-boards/0000.png", images / "0002.png");
   ASSERT_EQ(run_program("vlp-locate " + images.string() + rig + "3.csv").exit_code, 0);
   const CsvTable fixes(folder / "fixes3.csv");
-  ASSERT_EQ(fixes.rows(), 3);
-  EXPECT_NE(fixes.get_text(2, fixes.get_required_column("status")), "ok");
+  ASSERT_EQ(fixes.num_rows(), 3);
+  EXPECT_NE(fixes.get_cell_text(2, fixes.get_required_column("status")), "ok");
 }
 
-TEST_F(VlpDetect, GivesSameBytesForAllThreadCounts) {
+TEST_F(VlpDetect, WritesIdenticalFilesForOneAndFourThreads) {
   ASSERT_EQ(detect(kRig + "/sample", "--threads 1").exit_code, 0);
   const std::string one = TemporaryFolder::read_content(folder / "found.csv");
   ASSERT_EQ(detect(kRig + "/sample", "--threads 4").exit_code, 0);
@@ -265,7 +266,7 @@ TEST_F(VlpDetect, SkipsAndCountsUnusableImages) {
   EXPECT_THAT(result.errors,
               HasSubstr("text.png: cannot be read as an image: it is not PNG, JPEG"));
   EXPECT_THAT(result.errors, HasSubstr("the camera's images are 800 x 600 px; skipped"));
-  EXPECT_EQ(CsvTable(folder / "found.csv").rows(), 12);
+  EXPECT_EQ(CsvTable(folder / "found.csv").num_rows(), 12);
 }
 
 TEST_F(VlpDetect, ReportsErrorInOneLineIfNoLampIsFound) {
@@ -292,7 +293,7 @@ TEST_F(VlpDetect, SkipsNonRegularFiles) {
   EXPECT_THAT(result.output, HasSubstr("images      2\n"));
 }
 
-TEST_F(VlpDetect, DoesNotOverwriteItsImages) {
+TEST_F(VlpDetect, RejectsOutputThatIsAnInputImage) {
   const fs::path images = this->images();
   const auto result = run_program("vlp-detect " + images.string() + " --lamps " + kRig +
                                   "/lamps.yaml --calibration " + kRig +
@@ -301,7 +302,7 @@ TEST_F(VlpDetect, DoesNotOverwriteItsImages) {
   EXPECT_THAT(result.errors, HasSubstr("0001.png: is also an input"));
 }
 
-TEST_F(VlpDetect, FailsWhenNoImageIsUsable) {
+TEST_F(VlpDetect, ReturnsTwoWhenNoImageIsUsable) {
   fs::create_directory(folder / "bad");
   folder.file("bad/one.png", "no image\n");
   const auto result = detect((folder / "bad").string());
@@ -309,7 +310,7 @@ TEST_F(VlpDetect, FailsWhenNoImageIsUsable) {
   EXPECT_THAT(result.errors, HasSubstr("bad: none of its 1 images can be used"));
 }
 
-TEST_F(VlpDetect, RequiresRowTimeAndFrequencies) {
+TEST_F(VlpDetect, ReturnsTwoWithoutRowTimeOrLampFrequencies) {
   std::string calibration = TemporaryFolder::read_content(kRig + "/true_calibration.yaml");
   calibration.erase(calibration.find("  row_time_s"), 21);
   const auto without_row_time = run_program(

@@ -47,7 +47,7 @@ class VlpDispersion : public testing::Test {
   }
 };
 
-TEST_F(VlpDispersion, MakesFixesExactAtOtherPositions) {
+TEST_F(VlpDispersion, CorrectedCalibrationYieldsExactFixAtOtherPosition) {
   const auto result = dispersion(turn(12, 6.28), "--reference-point 0.102 -0.051");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("captures    12, 12 used, 0 rejected"));
@@ -68,12 +68,12 @@ TEST_F(VlpDispersion, MakesFixesExactAtOtherPositions) {
                   "--calibration " + path("calibration.yaml") + "-o " + path("fixes.csv"));
   ASSERT_EQ(located.exit_code, 0) << located.errors;
   const CsvTable fixes(folder / "fixes.csv");
-  EXPECT_NEAR(fixes.get_number(0, fixes.get_required_column("x_m")), -0.3, 2e-6);
-  EXPECT_NEAR(fixes.get_number(0, fixes.get_required_column("y_m")), 0.2, 2e-6);
-  EXPECT_NEAR(fixes.get_number(0, fixes.get_required_column("z_m")), 0.25, 2e-6);
+  EXPECT_NEAR(fixes.get_cell_number(0, fixes.get_required_column("x_m")), -0.3, 2e-6);
+  EXPECT_NEAR(fixes.get_cell_number(0, fixes.get_required_column("y_m")), 0.2, 2e-6);
+  EXPECT_NEAR(fixes.get_cell_number(0, fixes.get_required_column("z_m")), 0.25, 2e-6);
 }
 
-TEST_F(VlpDispersion, ReadsPlacesFromCapturesCsv) {
+TEST_F(VlpDispersion, ReadsCapturePositionsFromCapturesCsv) {
   const auto frames = turn(6, 6.28);
   std::string table = "image,x_m,y_m\n";
   for (const Frame& frame : frames) table += frame.image + ",0.1,-0.05\n";
@@ -93,7 +93,7 @@ TEST_F(VlpDispersion, ReadsPlacesFromCapturesCsv) {
               HasSubstr("the positions of the captures are unknown"));
 }
 
-TEST_F(VlpDispersion, RequiresSeveralYawsOrMethodPaper) {
+TEST_F(VlpDispersion, RequiresSeveralYawsUnlessMethodIsChenGuan) {
   const auto refused = dispersion(turn(6, 0), "--reference-point 0.1 -0.05");
   EXPECT_EQ(refused.exit_code, 3);
   EXPECT_THAT(refused.errors, HasSubstr("turn the camera at the reference point"));
@@ -108,7 +108,7 @@ TEST_F(VlpDispersion, RequiresSeveralYawsOrMethodPaper) {
             3);
 }
 
-TEST_F(VlpDispersion, ReportsCauseOfFailure) {
+TEST_F(VlpDispersion, ErrorNamesCauseForUnusableCaptures) {
   const auto far = dispersion(turn(6, 6.28), "--reference-point 100 -50");
   EXPECT_EQ(far.exit_code, 2);
   EXPECT_THAT(far.errors, HasSubstr("in the frame of the lamp map, and"));
@@ -134,14 +134,14 @@ TEST_F(VlpDispersion, ReportsCauseOfFailure) {
   EXPECT_EQ(dispersion(frames, "--reference-point 0.1 -0.05").exit_code, 3);
 }
 
-TEST_F(VlpDispersion, PlotsFixes) {
+TEST_F(VlpDispersion, WritesPlotAsSvgFile) {
   const auto result =
       dispersion(turn(12, 6.28), "--reference-point 0.1 -0.05 --plot " + path("picture.svg"));
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(TemporaryFolder::read_content(folder / "picture.svg"), HasSubstr("<svg"));
 }
 
-TEST_F(VlpDispersion, KeepsOtherPartsOfCalibration) {
+TEST_F(VlpDispersion, WarnsToRunVlpRotationWithoutRotationCenter) {
   rig.calibration.rotation_center.reset();
   believed.rotation_center.reset();
   believed.dispersion.reset();
@@ -153,7 +153,7 @@ TEST_F(VlpDispersion, KeepsOtherPartsOfCalibration) {
 }
 
 /// From images: a camera whose tilt is not known at all, at the station of a scene.
-TEST(VlpDispersionOfRenderedImages, EqualsTiltOfCamera) {
+TEST(VlpDispersionOfRenderedImages, OffsetEqualsErrorOfRotationCenter) {
   const TemporaryFolder folder;
   const std::string rendered = (folder / "rendered").string();
   const auto simulated = run_program("vlp-simulate -q " VLP_SOURCE_DIR

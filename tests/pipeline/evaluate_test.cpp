@@ -58,7 +58,7 @@ class VlpEvaluate : public testing::Test {
   }
 };
 
-TEST_F(VlpEvaluate, MatchesHandComputedMetrics) {
+TEST_F(VlpEvaluate, PrintsHandComputedMetrics) {
   const auto result = with_truth();
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output,
@@ -71,7 +71,7 @@ TEST_F(VlpEvaluate, MatchesHandComputedMetrics) {
                     HasSubstr("yaw         rms 0.2562 deg")));
 }
 
-TEST_F(VlpEvaluate, ReturnsOneAndWritesAllWhenGateFails) {
+TEST_F(VlpEvaluate, ReturnsOneAndWritesJsonAndJUnitWhenGateFails) {
   const auto result = with_truth(
       "--gate mean_mm=2.5,p90_mm=3 --gate missing_fraction=0 --json evaluation.json --junit "
       "junit.xml");
@@ -99,7 +99,7 @@ TEST_F(VlpEvaluate, WritesErrorToJUnitWhenNoGateIsChecked) {
   EXPECT_THAT(content("junit.xml"), HasSubstr("<error type=\"undetermined\" message=\""));
 }
 
-TEST_F(VlpEvaluate, ProposesGatesThatPass) {
+TEST_F(VlpEvaluate, ProposedGatesPassForSameFixes) {
   const auto few = with_truth("--propose-gates gates.yaml");
   EXPECT_EQ(few.exit_code, 3);
   EXPECT_THAT(few.errors, HasSubstr("--propose-gates: too few reference points or captures"));
@@ -123,7 +123,7 @@ TEST_F(VlpEvaluate, WarnsOfMissingFixesWithoutGate) {
   EXPECT_THAT(with_truth("--gate missing_fraction=1").errors, testing::Not(HasSubstr(words)));
 }
 
-TEST_F(VlpEvaluate, CombinesGatesOfFileAndCommandLine) {
+TEST_F(VlpEvaluate, CommandLineGatesOverrideGatesOfFile) {
   folder.file("gates.yaml", "format: vlp-gates/1\ngates: {mean_mm: 1, max_mm: 5}\n");
   EXPECT_EQ(with_truth("--gates gates.yaml").exit_code, 1);
   EXPECT_EQ(with_truth("--gates gates.yaml --gate mean_mm=3").exit_code, 0);
@@ -138,7 +138,7 @@ TEST_F(VlpEvaluate, CombinesGatesOfFileAndCommandLine) {
       HasSubstr("gates.yaml:3: gates.missing_fraction: should be a fraction from 0 to 1, not 50"));
 }
 
-TEST_F(VlpEvaluate, ComparesFixesWithPathAndLine) {
+TEST_F(VlpEvaluate, PrintsErrorsAgainstPathAndAgainstLine) {
   folder.file("path.csv", "x_m,y_m,z_m\n0,0,0\n1,0,0\n");
   const auto path = evaluate("--path path.csv");
   ASSERT_EQ(path.exit_code, 0) << path.errors;
@@ -152,7 +152,7 @@ TEST_F(VlpEvaluate, ComparesFixesWithPathAndLine) {
   EXPECT_EQ(problems_by_schema("evaluation", {folder / "line.json"}), "");
 }
 
-TEST_F(VlpEvaluate, ReportsBetterOfTwoRuns) {
+TEST_F(VlpEvaluate, CompareOptionReportsBetterSameOrWorseRun) {
   std::string good = kFixes, bad = kFixes, truth = "image,x_m,y_m\n";
   for (int i = 0; i < 20; ++i) {
     const std::string name = std::to_string(i);
@@ -188,7 +188,7 @@ TEST_F(VlpEvaluate, ReportsBetterOfTwoRuns) {
   EXPECT_EQ(evaluate("--line 0 0 9 0 --compare other.csv").exit_code, 2);
 }
 
-TEST_F(VlpEvaluate, SchemaRejectsChangedDocuments) {
+TEST_F(VlpEvaluate, SchemaRejectsChangedEvaluationJson) {
   with_truth("--json evaluation.json");
   const std::string whole = content("evaluation.json");
   const auto problems_with = [&](const std::string& what, const std::string& other) {
@@ -204,7 +204,7 @@ TEST_F(VlpEvaluate, SchemaRejectsChangedDocuments) {
   EXPECT_THAT(problems_with("vlp-evaluation/3", "vlp-evaluation/2"), HasSubstr("$.format"));
 }
 
-TEST_F(VlpEvaluate, ComparesExampleWithCrlb) {
+TEST_F(VlpEvaluate, ErrorsOfExampleAreWithinThirtyPercentOfCrlb) {
   // Errors of 36 fixes are within 30 % of the limit of their noise: three standard errors.
   const auto result =
       evaluate_example("--noise-px 0.05 --gate crlb_ratio=1.3,normalized_error_rms=1.3");
@@ -223,7 +223,7 @@ TEST_F(VlpEvaluate, WarnsOfErrorsBelowCrlb) {
   EXPECT_EQ(problems_by_schema("evaluation", {folder / "e.json"}), "");
 }
 
-TEST_F(VlpEvaluate, ReturnsThreeWithoutFix) {
+TEST_F(VlpEvaluate, ReturnsThreeWhenNoCaptureHasFix) {
   folder.file("fixes.csv", kFixes + "a.png,degenerate,,,,,,,,,1,\n");
   const auto result = with_truth("--json none.json");
   EXPECT_EQ(result.exit_code, 3);
@@ -270,7 +270,7 @@ TEST_F(VlpEvaluate, ReturnsTwoForBadUsage) {
   EXPECT_THAT(with_truth("--gate mean=1").errors, HasSubstr("the gates are: mean_mm, median_mm"));
 }
 
-TEST_F(VlpEvaluate, GivesSameBytesForAllThreadCounts) {
+TEST_F(VlpEvaluate, WritesIdenticalJsonForOneAndFourThreads) {
   std::string fixes = kFixes, truth = "image,x_m,y_m\n";
   for (int i = 0; i < 60; ++i) {  // enough for intervals
     const std::string name = std::to_string(i) + ".png,", x_m = std::to_string(i);

@@ -19,16 +19,17 @@ const std::string kLocate = "vlp-locate " + kExample + "detections.csv --lamps "
 /// Horizontal errors of fixes.csv against truth.csv, in its order.
 std::vector<double> horizontal_errors_m(const std::filesystem::path& fixes_file) {
   const CsvTable fixes(fixes_file), truth(kExample + "truth.csv");
-  EXPECT_EQ(fixes.rows(), truth.rows());
+  EXPECT_EQ(fixes.num_rows(), truth.num_rows());
   std::vector<double> errors_m;
-  for (std::size_t row = 0; row < truth.rows(); ++row) {
-    EXPECT_EQ(fixes.get_text(row, fixes.get_required_column("image")),
-              truth.get_text(row, truth.get_required_column("image")));
-    EXPECT_EQ(fixes.get_text(row, fixes.get_required_column("status")), "ok");
-    errors_m.push_back(std::hypot(fixes.get_number(row, fixes.get_required_column("x_m")) -
-                                      truth.get_number(row, truth.get_required_column("x_m")),
-                                  fixes.get_number(row, fixes.get_required_column("y_m")) -
-                                      truth.get_number(row, truth.get_required_column("y_m"))));
+  for (std::size_t row = 0; row < truth.num_rows(); ++row) {
+    EXPECT_EQ(fixes.get_cell_text(row, fixes.get_required_column("image")),
+              truth.get_cell_text(row, truth.get_required_column("image")));
+    EXPECT_EQ(fixes.get_cell_text(row, fixes.get_required_column("status")), "ok");
+    errors_m.push_back(
+        std::hypot(fixes.get_cell_number(row, fixes.get_required_column("x_m")) -
+                       truth.get_cell_number(row, truth.get_required_column("x_m")),
+                   fixes.get_cell_number(row, fixes.get_required_column("y_m")) -
+                       truth.get_cell_number(row, truth.get_required_column("y_m"))));
   }
   return errors_m;
 }
@@ -50,7 +51,7 @@ TEST(MakeExample, ReproducesCommittedFiles) {
   }
 }
 
-TEST(Example, IsLocatedWithinNoise) {
+TEST(VlpLocateOnExample, MeanErrorIsBetween20And200Micrometers) {
   const TemporaryFolder folder;
   const auto fixes = (folder / "fixes.csv").string();
   const auto result = run_program(kLocate + fixes);
@@ -62,14 +63,14 @@ TEST(Example, IsLocatedWithinNoise) {
   EXPECT_GT(mean(errors_m), 0.02e-3);
 }
 
-TEST(Example, HasLargeErrorsWithoutTiltCorrection) {
+TEST(VlpLocateOnExample, MeanErrorExceedsTwentyMillimetersWithoutTiltCorrection) {
   const TemporaryFolder folder;
   const auto fixes = (folder / "fixes.csv").string();
   ASSERT_EQ(run_program(kLocate + fixes + " --correction none").exit_code, 0);
   EXPECT_GT(mean(horizontal_errors_m(fixes)), 20e-3);  // 1.3 degrees at 1.3 to 1.6 m
 }
 
-TEST(Example, GivesSameBytesTwice) {
+TEST(VlpLocateOnExample, WritesIdenticalFixesWhenRepeated) {
   const TemporaryFolder folder;
   const auto first = run_program(kLocate + (folder / "a.csv").string());
   const auto second = run_program(kLocate + (folder / "b.csv").string());

@@ -76,7 +76,7 @@ TEST(Headers, DefineEachTypeNameOnce) {
   }
 }
 
-TEST(Headers, IncludeNoHigherLayer) {
+TEST(Headers, IncludeNoFolderThatIsBuiltLater) {
   const std::vector<std::string> order = read_build_order();
   const FolderIncludes includes = read_folder_includes();
   ASSERT_GT(order.size(), 10U);

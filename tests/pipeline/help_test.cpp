@@ -54,7 +54,7 @@ std::vector<std::string> subcommands_in(const std::string& help) {
 
 class Help : public testing::TestWithParam<const char*> {};
 
-TEST_P(Help, ExampleRunsAsTyped) {
+TEST_P(Help, ExampleInHelpRunsAsTyped) {
   const std::string program = GetParam();
   const auto help = run_program(program + " --help");
   ASSERT_EQ(help.exit_code, 0);
@@ -69,7 +69,7 @@ TEST_P(Help, ExampleRunsAsTyped) {
   EXPECT_EQ(result.exit_code, 0) << example << result.errors;
 }
 
-TEST_P(Help, FitsIn80Columns) {
+TEST_P(Help, LinesFitIn80Columns) {
   const std::string program = GetParam();
   std::vector<std::string> commands = subcommands_in(run_program(program + " --help").output);
   EXPECT_EQ(commands.empty(), program != "vlp-station");
@@ -85,7 +85,7 @@ TEST_P(Help, FitsIn80Columns) {
 }
 
 /// The codecs of images, with all that they bring, are loaded at the first image.
-TEST_P(Help, LoadsNoCodecs) {
+TEST_P(Help, ProgramLinksNoImageCodecs) {
   const auto libraries =
       run_program(std::string("ldd " VLP_PROGRAMS_DIR "/") + GetParam() + " | sort");
   ASSERT_EQ(libraries.exit_code, 0) << libraries.errors;
@@ -95,7 +95,7 @@ TEST_P(Help, LoadsNoCodecs) {
   }
 }
 
-TEST_P(Help, PrintsVersion) {
+TEST_P(Help, VersionOptionPrintsProgramAndVersion) {
   const auto result = run_program(std::string(GetParam()) + " --version");
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.output, HasSubstr(std::string(GetParam()) + " 0."));
@@ -150,7 +150,7 @@ std::vector<std::string> completed(const std::string& program, const std::string
   return split_lines(offered.output);
 }
 
-TEST_P(Help, ShellsCompleteAllOptions) {
+TEST_P(Help, BashCompletesAllOptionsAndZshScriptIsValid) {
   const std::string program = GetParam();
   const auto offered = completed(program, "-");
   for (const std::string& option : options_in(run_program(program + " --help").output)) {
@@ -166,7 +166,7 @@ TEST_P(Help, ShellsCompleteAllOptions) {
   }
 }
 
-TEST_P(Help, RejectsUnknownReference) {
+TEST_P(Help, RejectsUnknownFormatOfReferenceOption) {
   const auto result = run_program(std::string(GetParam()) + " --reference odd");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_EQ(result.output, "");
@@ -189,7 +189,7 @@ TEST(BashCompletion, CompletesChoicesCommandsAndFiles) {
 }
 
 /// No program with commands has an option with choices beside them: here is one.
-TEST(BashCompletion, PrefersChoicesToCommands) {
+TEST(BashCompletion, CompletesChoicesOfOptionInsteadOfCommands) {
   CLI::App app("Tests.", "vlp-odd");
   std::string kind;
   double size = 0;
@@ -210,7 +210,7 @@ TEST(BashCompletion, PrefersChoicesToCommands) {
 }
 
 /// An option of four numbers takes four words, not one.
-TEST(ZshCompletion, AcceptsAllValuesOfOption) {
+TEST(ZshCompletion, CompletesEachOfFourValuesOfOption) {
   const auto zsh = run_program("vlp-limits --reference zsh").output;
   const auto begin = zsh.find("--floor-m");
   const std::string floor = zsh.substr(begin, zsh.find('\n', begin) - begin);
@@ -219,14 +219,14 @@ TEST(ZshCompletion, AcceptsAllValuesOfOption) {
 }
 
 /// An option that was renamed would be recorded.
-TEST(ListOptionsNotInHistory, ReturnsOnlyExistingOptions) {
+TEST(ListOptionsOmittedFromHistory, ReturnsOnlyExistingOptions) {
   std::vector<std::string> options;
   for (const char* program : {"vlp-adjust", "vlp-convert", "vlp-dispersion", "vlp-evaluate",
                               "vlp-intrinsics", "vlp-rotation", "vlp-train"}) {
     const auto more = options_in(run_program(std::string(program) + " --help").output);
     options.insert(options.end(), more.begin(), more.end());
   }
-  for (const std::string_view option : list_options_not_in_history()) {
+  for (const std::string_view option : list_options_omitted_from_history()) {
     EXPECT_THAT(options, testing::Contains(option));
   }
 }

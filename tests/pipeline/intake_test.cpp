@@ -114,7 +114,7 @@ std::string without_origin(const std::string& calibration) {
   return kept;
 }
 
-TEST_F(Intake, IsIdenticalAtStationAndInSession) {
+TEST_F(Intake, RejectionsAndCalibrationAreEqualAtStationAndInSession) {
   render();
   spoil("boards");
   spoil("rotation");

@@ -64,7 +64,7 @@ TEST_F(VlpIntrinsicsErrors, RejectsTwoOutputsInOneFile) {
               HasSubstr("--output's .cameramodel and --kalibr are the same file"));
 }
 
-TEST_F(VlpIntrinsicsErrors, ReportsCauseOfMissingTags) {
+TEST_F(VlpIntrinsicsErrors, ErrorNamesCauseOfUndetectedTags) {
   const std::string board = kRig + "/board.yaml";
   const auto lamps = calibrate(kRig + "/sample", board);
   EXPECT_EQ(lamps.exit_code, 3);
@@ -84,7 +84,7 @@ TEST_F(VlpIntrinsicsErrors, ReportsCauseOfMissingTags) {
   EXPECT_THAT(mirror.errors, HasSubstr("the image is mirrored"));
 }
 
-TEST_F(VlpIntrinsicsErrors, ReportsWrongKeyOfBoard) {
+TEST_F(VlpIntrinsicsErrors, ErrorNamesWrongKeyOfBoardFile) {
   std::string text = TemporaryFolder::read_content(kRig + "/board.yaml");
   const auto with = [&](const std::string& from, const std::string& to) {
     std::string changed = text;
@@ -108,7 +108,7 @@ TEST_F(VlpIntrinsicsErrors, ReportsWrongKeyOfBoard) {
   EXPECT_THAT(spacing.errors, HasSubstr("tag_spacing is 0.5, but the images show gaps of "));
 }
 
-TEST_F(VlpIntrinsicsErrors, ReportsIdOrderOfSquareKalibrBoard) {
+TEST_F(VlpIntrinsicsErrors, ErrorStatesDetectedIdOrderOfSquareKalibrBoard) {
   std::string scene =
       TemporaryFolder::read_content(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/scene.yaml");
   const std::string rows = "rows: 5,";
@@ -148,7 +148,7 @@ TEST_F(VlpIntrinsicsErrors, SkipsInvalidImagesAndOtherSizes) {
               HasSubstr("2.png: is 640 x 480 px, the camera's images are 800 x 600 px; skipped"));
 }
 
-TEST_F(VlpIntrinsicsErrors, RejectsFormatWithoutLensModelBeforeSolving) {
+TEST_F(VlpIntrinsicsErrors, RejectsKalibrFormatForOpencv8LensWithoutOutput) {
   const std::string kalibr = (folder / "kalibr.yaml").string();
   const auto result =
       calibrate(kRig + "/sample-boards", kRig + "/board.yaml", "--kalibr " + kalibr);
@@ -158,7 +158,7 @@ TEST_F(VlpIntrinsicsErrors, RejectsFormatWithoutLensModelBeforeSolving) {
   EXPECT_FALSE(fs::exists(kalibr));
 }
 
-TEST_F(VlpIntrinsicsErrors, SkipsTinyAndHugeImages) {
+TEST_F(VlpIntrinsicsErrors, SkipsHugeImageAndReportsNoTagInTinyImage) {
   const std::string images = copies({"0.png"});
   cv::imwrite((folder / "images/1.png").string(), cv::Mat(600, 801, CV_8UC1, cv::Scalar(7)));
   const auto huge = calibrate(images, kRig + "/board.yaml", "--max-mpx 0.4802");
@@ -170,7 +170,7 @@ TEST_F(VlpIntrinsicsErrors, SkipsTinyAndHugeImages) {
   EXPECT_THAT(tiny.errors, HasSubstr("no tag of tag36h11 is visible in 1 images"));
 }
 
-TEST_F(VlpIntrinsicsErrors, ReportsOverexposedTags) {
+TEST_F(VlpIntrinsicsErrors, ErrorNamesOverexposureForWashedOutTags) {
   cv::Mat image = cv::imread(kFaulty + "/sample-boards/0000.png", cv::IMREAD_GRAYSCALE), white;
   // White runs over all but the middles of what is black.
   cv::dilate(image, white, cv::getStructuringElement(cv::MORPH_ELLIPSE, {5, 5}));
@@ -181,7 +181,7 @@ TEST_F(VlpIntrinsicsErrors, ReportsOverexposedTags) {
   EXPECT_THAT(result.errors, HasSubstr("overexposed"));
 }
 
-TEST_F(VlpIntrinsicsErrors, ReportsSaturatedBoards) {
+TEST_F(VlpIntrinsicsErrors, ErrorAdvisesLessExposureForSaturatedBoards) {
   const std::string text =
       TemporaryFolder::read_content(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/scene.yaml");
   const std::string usual = "folder: boards\n    exposure_s: 0.004\n    views: {count: 36,";
@@ -204,7 +204,7 @@ TEST_F(VlpIntrinsicsErrors, ReportsSaturatedBoards) {
   }
 }
 
-TEST_F(VlpIntrinsicsErrors, RejectsBadOptions) {
+TEST_F(VlpIntrinsicsErrors, ReturnsTwoForInvalidOptionValues) {
   const std::string images = kRig + "/sample-boards", board = kRig + "/board.yaml";
   EXPECT_EQ(calibrate(images, board, "--gate mean=3").exit_code, 2);
   EXPECT_EQ(calibrate(images, board, "--gate rms_px=no").exit_code, 2);

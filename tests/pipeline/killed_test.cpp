@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-TEST(VlpLocateOutput, IsOldOrNewFileAfterKill) {
+TEST(VlpLocateOutput, IsCompleteOldOrNewFileAfterKill) {
   const TemporaryFolder folder;
   const std::string example = VLP_SOURCE_DIR "/datasets/example/";
   // The example many times over, so that writing takes a while.

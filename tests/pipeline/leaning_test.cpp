@@ -129,7 +129,7 @@ class TiltedCamera : public testing::Test {
   }
 };
 
-TEST_F(TiltedCamera, HasErrorsAsPredictedFromPixelNoise) {
+TEST_F(TiltedCamera, FixesAreWithinOneMillimeterUpToUnknownTiltOf50Degrees) {
   for (const int tilt_deg : {5, 15, 30, 50}) add_set(tilt_deg);
   render();
   for (const int tilt_deg : {5, 15, 30, 50})
@@ -137,7 +137,7 @@ TEST_F(TiltedCamera, HasErrorsAsPredictedFromPixelNoise) {
 }
 
 /// The inclination in captures.csv determines the plane in which lamps are discs.
-TEST_F(TiltedCamera, HasErrorsAsPredictedFromInclinationSensor) {
+TEST_F(TiltedCamera, FixesAreWithinOneMillimeterWithInclinationSensor) {
   for (const int tilt_deg : {5, 15}) add_set(tilt_deg);
   render();
   for (const int tilt_deg : {5, 15}) {
@@ -156,7 +156,7 @@ TEST_F(TiltedCamera, HasErrorsAsPredictedFromInclinationSensor) {
 }
 
 /// A camera of 3 Mpx close to large lamps, which show enough stripes from aside.
-TEST_F(TiltedCamera, IsLocatedFromEllipsesUpTo80Degrees) {
+TEST_F(TiltedCamera, FixesAreWithinThreeMillimetersUpToUnknownTiltOf80Degrees) {
   std::string scene = kScene;
   const auto replace = [&](const std::string& from, const std::string& to) {
     const auto at = scene.find(from);
@@ -198,7 +198,7 @@ TEST_F(TiltedCamera, IsLocatedFromEllipsesUpTo80Degrees) {
   }
 }
 
-TEST_F(TiltedCamera, AnnotatesFinalDetection) {
+TEST_F(TiltedCamera, AnnotatedImageDiffersWhenRollAndPitchAreEstimated) {
   add_set(15);
   render();
   const std::string level = (folder / "level").string(), leaning = (folder / "leaning").string();
@@ -213,7 +213,7 @@ TEST_F(TiltedCamera, AnnotatesFinalDetection) {
 }
 
 /// Neither lean nor motion is known.
-TEST_F(TiltedCamera, IsLocatedWhileMoving) {
+TEST_F(TiltedCamera, FixesAreWithinOneMillimeterWhileMovingWithUnknownTilt) {
   captures +=
       "  - {folder: drive, exposure_s: 5.0e-5, drive: {from_m: [-0.2, 0.35], to_m: [0.2, 0.4], "
       "speed_m_per_s: 1}, heights_m: [0.3], yaws_deg: [0], turn_rate_deg_per_s: 30, "

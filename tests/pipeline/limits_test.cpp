@@ -23,7 +23,7 @@ const std::string kLimits = "vlp-limits --lamps " VLP_SOURCE_DIR
                             "/datasets/example/lamps.yaml --calibration " VLP_SOURCE_DIR
                             "/datasets/example/calibration.yaml --height-m 0 --noise-px 0.1 ";
 
-TEST(VlpLimits, PrintsErrorBudget) {
+TEST(VlpLimits, PrintsRowForEachErrorSource) {
   const auto result =
       run_program(kLimits + "--principal-point-px 1 --tilt-deg 0.5 --lamp-map-mm 1");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
@@ -32,29 +32,29 @@ TEST(VlpLimits, PrintsErrorBudget) {
   }
 }
 
-TEST(VlpLimits, WritesMapAsTableAndPlot) {
+TEST(VlpLimits, WritesErrorMapAsCsvAndPng) {
   const TemporaryFolder folder;
   const auto result =
       run_program(kLimits + "--tilt-deg 1 --floor-m -0.2 0.2 0 0.1 --step-m 0.1 --map " +
                   (folder / "map.csv").string() + " --picture " + (folder / "map.png").string());
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   const CsvTable map(folder / "map.csv");
-  ASSERT_EQ(map.rows(), 5 * 2);
-  for (std::size_t row = 0; row < map.rows(); ++row) {
-    const double noise_m = map.get_number(row, map.get_required_column("noise_m"));
-    const double tilt_m = map.get_number(row, map.get_required_column("tilt_m"));
+  ASSERT_EQ(map.num_rows(), 5 * 2);
+  for (std::size_t row = 0; row < map.num_rows(); ++row) {
+    const double noise_m = map.get_cell_number(row, map.get_required_column("noise_m"));
+    const double tilt_m = map.get_cell_number(row, map.get_required_column("tilt_m"));
     // 0.1 px is about 0.2 mm, one degree on each of two axes at 1.6 m about 40 mm.
     EXPECT_GT(noise_m, 0.1e-3);
     EXPECT_LT(noise_m, 0.5e-3);
     EXPECT_NEAR(tilt_m, 40e-3, 8e-3);
-    EXPECT_NEAR(map.get_number(row, map.get_required_column("horizontal_m")),
+    EXPECT_NEAR(map.get_cell_number(row, map.get_required_column("horizontal_m")),
                 std::hypot(noise_m, tilt_m), 1e-6);
-    EXPECT_EQ(map.get_number(row, map.get_required_column("principal_point_m")), 0);
+    EXPECT_EQ(map.get_cell_number(row, map.get_required_column("principal_point_m")), 0);
   }
   EXPECT_THAT(TemporaryFolder::read_content(folder / "map.png"), StartsWith("\x89PNG"));
 }
 
-TEST(VlpLimits, ReportsEffectOfMotionAndTilt) {
+TEST(VlpLimits, HorizontalErrorIncludesMotionAndRollAndPitch) {
   const TemporaryFolder folder;
   const auto compute_map = [&](const std::string& options) {
     const auto result = run_program(kLimits + "--floor-m -0.2 0.2 0 0.1 --step-m 0.1 --map " +
@@ -71,26 +71,26 @@ TEST(VlpLimits, ReportsEffectOfMotionAndTilt) {
               HasSubstr("up to 2 m/s, roll and pitch sd 90 deg"));
   const auto [standing_output, standing] = compute_map("");
   EXPECT_THAT(standing_output, Not(HasSubstr("motion")));
-  ASSERT_EQ(map.rows(), standing.rows());
+  ASSERT_EQ(map.num_rows(), standing.num_rows());
   int with_fix = 0;
-  for (std::size_t row = 0; row < map.rows(); ++row) {
-    EXPECT_EQ(map.get_number(row, map.get_required_column("lamps")),
-              standing.get_number(row, standing.get_required_column("lamps")));
-    if (map.get_text(row, map.get_required_column("noise_m")).empty()) continue;
+  for (std::size_t row = 0; row < map.num_rows(); ++row) {
+    EXPECT_EQ(map.get_cell_number(row, map.get_required_column("lamps")),
+              standing.get_cell_number(row, standing.get_required_column("lamps")));
+    if (map.get_cell_text(row, map.get_required_column("noise_m")).empty()) continue;
     ++with_fix;
-    const double noise_m = map.get_number(row, map.get_required_column("noise_m"));
-    EXPECT_NEAR(noise_m, standing.get_number(row, standing.get_required_column("noise_m")),
+    const double noise_m = map.get_cell_number(row, map.get_required_column("noise_m"));
+    EXPECT_NEAR(noise_m, standing.get_cell_number(row, standing.get_required_column("noise_m")),
                 1e-3 * noise_m);
-    EXPECT_NEAR(map.get_number(row, map.get_required_column("horizontal_m")),
-                std::hypot(noise_m, map.get_number(row, map.get_required_column("motion_m")),
-                           map.get_number(row, map.get_required_column("roll_pitch_m"))),
+    EXPECT_NEAR(map.get_cell_number(row, map.get_required_column("horizontal_m")),
+                std::hypot(noise_m, map.get_cell_number(row, map.get_required_column("motion_m")),
+                           map.get_cell_number(row, map.get_required_column("roll_pitch_m"))),
                 1e-8);  // six digits
-    EXPECT_GT(map.get_number(row, map.get_required_column("roll_pitch_m")), noise_m);
+    EXPECT_GT(map.get_cell_number(row, map.get_required_column("roll_pitch_m")), noise_m);
   }
   EXPECT_GT(with_fix, 0);
 }
 
-TEST(VlpLimits, RequiresRowTimeOfMovingCamera) {
+TEST(VlpLimits, RequiresRowTimeForMovingCamera) {
   const TemporaryFolder folder;
   Calibration calibration{synthetic_camera(), {}, {}, {}, {}};
   write_calibration(folder / "camera.yaml", calibration);
@@ -116,7 +116,7 @@ class VlpLimitsFromCalibration : public testing::Test {
   VlpLimitsFromCalibration() {
     RotationCenter center = tilted_by(calibration.camera, 0.02, 1);
     center.covariance = 1e-4 * Eigen::Matrix2d::Identity();
-    calibration = with_rotation_center(calibration, center, {});
+    calibration = add_rotation_center_to_calibration(calibration, center, {});
     for (Lamp& lamp : lamps.lamps) lamp.sd_m = 0.002;
   }
   ProgramResult run(const std::string& options) {
@@ -135,19 +135,19 @@ TEST_F(VlpLimitsFromCalibration, NamesLargestErrorSource) {
   EXPECT_THAT(result.output, HasSubstr("vlp-adjust --refine-map"));
   EXPECT_THAT(result.errors, HasSubstr("lens: the uncertainties are missing and count as zero"));
   const CsvTable map(folder / "map.csv");
-  ASSERT_GT(map.rows(), 0U);
-  for (std::size_t row = 0; row < map.rows(); ++row) {
+  ASSERT_GT(map.num_rows(), 0U);
+  for (std::size_t row = 0; row < map.num_rows(); ++row) {
     double variance = 0;
     for (const char* part : {"noise_m", "lens_m", "zenith_m", "lamp_map_m"}) {
-      variance += std::pow(map.get_number(row, map.get_required_column(part)), 2);
+      variance += std::pow(map.get_cell_number(row, map.get_required_column(part)), 2);
     }
-    EXPECT_NEAR(map.get_number(row, map.get_required_column("horizontal_m")), std::sqrt(variance),
-                1e-8);
-    EXPECT_EQ(map.get_number(row, map.get_required_column("lens_m")), 0);
+    EXPECT_NEAR(map.get_cell_number(row, map.get_required_column("horizontal_m")),
+                std::sqrt(variance), 1e-8);
+    EXPECT_EQ(map.get_cell_number(row, map.get_required_column("lens_m")), 0);
   }
 }
 
-TEST_F(VlpLimitsFromCalibration, IncludeOnlyLensWithoutRotationCenter) {
+TEST_F(VlpLimitsFromCalibration, IncludesOnlyLensUncertaintyWithoutRotationCenter) {
   calibration.rotation_center.reset();
   calibration.history.clear();  // it names the center
   calibration.intrinsics_report = IntrinsicsReport{10, 1000, 0, 0.1, {}, {}};
@@ -160,7 +160,7 @@ TEST_F(VlpLimitsFromCalibration, IncludeOnlyLensWithoutRotationCenter) {
   EXPECT_THAT(result.errors, HasSubstr("zenith, lamp map: the uncertainties are missing"));
 }
 
-TEST_F(VlpLimitsFromCalibration, WarnOfLampsAdjustedElsewhere) {
+TEST_F(VlpLimitsFromCalibration, WarnsOfLampsMovedSinceAdjustment) {
   StatedRig rig;
   rig.adjust(1);
   lamps = rig.map;
@@ -175,7 +175,7 @@ TEST_F(VlpLimitsFromCalibration, WarnOfLampsAdjustedElsewhere) {
               HasSubstr("1 lamps have other positions than in the adjustment of the calibration"));
 }
 
-TEST_F(VlpLimitsFromCalibration, RejectErrorsGivenTwice) {
+TEST_F(VlpLimitsFromCalibration, RejectsTiltOptionAndCalibrationWithoutUncertainties) {
   EXPECT_EQ(run("--from-calibration --tilt-deg 1").exit_code, 2);
   calibration.rotation_center->covariance.reset();
   for (Lamp& lamp : lamps.lamps) lamp.sd_m.reset();
@@ -199,7 +199,7 @@ TEST(VlpLimits, WritesNothingForInvalidPlotName) {
   EXPECT_FALSE(std::filesystem::exists(map));
 }
 
-TEST(VlpLimits, CoverFieldOfViewOfFisheye) {
+TEST(VlpLimits, CountsMoreVisibleLampsForFisheye) {
   const TemporaryFolder folder;
   const auto compute_map = [&](const Camera& camera) {
     write_calibration(folder / "camera.yaml", {camera, {}, {}, {}, {}});
@@ -213,15 +213,15 @@ TEST(VlpLimits, CoverFieldOfViewOfFisheye) {
   };
   const CsvTable by_fisheye = compute_map(fisheye_camera()),
                  by_other = compute_map(synthetic_camera());
-  ASSERT_EQ(by_fisheye.rows(), by_other.rows());
+  ASSERT_EQ(by_fisheye.num_rows(), by_other.num_rows());
   int more = 0;
-  for (std::size_t row = 0; row < by_fisheye.rows(); ++row) {
+  for (std::size_t row = 0; row < by_fisheye.num_rows(); ++row) {
     const auto lamps = [row](const CsvTable& map) {
-      return map.get_number(row, map.get_required_column("lamps"));
+      return map.get_cell_number(row, map.get_required_column("lamps"));
     };
     EXPECT_GE(lamps(by_fisheye), lamps(by_other));
     if (lamps(by_fisheye) > lamps(by_other)) ++more;
-    EXPECT_GT(by_fisheye.get_number(row, by_fisheye.get_required_column("noise_m")), 0);
+    EXPECT_GT(by_fisheye.get_cell_number(row, by_fisheye.get_required_column("noise_m")), 0);
   }
   EXPECT_GT(more, 0);
 }
@@ -235,7 +235,7 @@ TEST(VlpLimits, RejectsTwoOutputsInOneFile) {
   EXPECT_FALSE(std::filesystem::exists(folder / "a.svg"));
 }
 
-TEST(VlpLimits, ReportsFailedWriteToStdout) {
+TEST(VlpLimits, ReturnsTwoWhenStdoutCannotBeWritten) {
   const auto result = run_program("{ " + kLimits + "; } >/dev/full");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr("stdout cannot be written"));

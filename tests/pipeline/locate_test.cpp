@@ -31,11 +31,11 @@ class VlpLocate : public testing::Test {
   }
   double figure(std::size_t row, const char* column) {
     const CsvTable fixes(folder / "fixes.csv");
-    return fixes.get_number(row, fixes.get_required_column(column));
+    return fixes.get_cell_number(row, fixes.get_required_column(column));
   }
   std::string word(std::size_t row, const char* column) {
     const CsvTable fixes(folder / "fixes.csv");
-    return std::string(fixes.get_text(row, fixes.get_required_column(column)));
+    return std::string(fixes.get_cell_text(row, fixes.get_required_column(column)));
   }
   std::vector<Detection> seen(std::size_t lamps, std::optional<double> sigma_px = 0.1) {
     auto detections = seen_from(rig);
@@ -45,7 +45,7 @@ class VlpLocate : public testing::Test {
   }
 };
 
-TEST_F(VlpLocate, WritesRowForEveryImage) {
+TEST_F(VlpLocate, WritesRowPerFrameWithFixOrStatus) {
   auto swapped = seen(8);
   std::swap(swapped[0].lamp, swapped[1].lamp);
   auto unknown = seen(3);
@@ -66,7 +66,7 @@ TEST_F(VlpLocate, WritesRowForEveryImage) {
   EXPECT_THAT(result.errors, HasSubstr("2 detections that contradict the others"));
 }
 
-TEST_F(VlpLocate, UsesNoiseOfColumnOptionOrResiduals) {
+TEST_F(VlpLocate, PositionSdFollowsSigmaPxOptionOrResidualNoise) {
   locate({{"a", seen(4, 0.1)}});
   const double stated_m = figure(0, "x_sd_m");
   locate({{"a", seen(4, 0.1)}}, "--sigma-px 0.3");
@@ -87,14 +87,14 @@ TEST_F(VlpLocate, UsesNoiseOfColumnOptionOrResiduals) {
   EXPECT_NEAR(figure(0, "x_sd_m"), std::sqrt(scatter), 0.1 * std::sqrt(scatter));
 }
 
-TEST_F(VlpLocate, LeavesSdEmptyForUnknownNoise) {
+TEST_F(VlpLocate, LeavesSdEmptyAndWarnsWhenNoiseIsUnknown) {
   const auto result = locate({{"a", seen(2, std::nullopt)}});
   ASSERT_EQ(result.exit_code, 0);
   EXPECT_EQ(word(0, "x_sd_m"), "");
   EXPECT_THAT(result.errors, HasSubstr("sd columns are empty"));
 }
 
-TEST_F(VlpLocate, UsesInclinationSensor) {
+TEST_F(VlpLocate, CorrectsTiltWithInclinationsOfCapturesTable) {
   rig.inclination = {0.05, -0.03};
   const auto captures = folder.file("captures.csv", "image,roll_rad,pitch_rad\na,0.05,-0.03\n");
   const auto seen_leaning = seen(4);
@@ -107,14 +107,14 @@ TEST_F(VlpLocate, UsesInclinationSensor) {
   EXPECT_GT(std::hypot(figure(0, "x_m") - 0.1, figure(0, "y_m") + 0.2), 0.02);
 }
 
-TEST_F(VlpLocate, WarnsOfCapturesOfOtherImages) {
+TEST_F(VlpLocate, WarnsWhenCapturesTableOmitsImages) {
   const auto captures = folder.file("captures.csv", "image,roll_rad,pitch_rad\nz.png,0,0\n");
   const auto result = locate({{"a", seen(4)}}, "--captures " + captures.string());
   EXPECT_THAT(result.errors, HasSubstr("1 of 1 images are not in captures.csv"));
   EXPECT_EQ(locate({{"a", seen(4)}}, "--one-lamp").exit_code, 2) << "it needs captures.csv";
 }
 
-TEST_F(VlpLocate, LocatesWithOneLampOnRequest) {
+TEST_F(VlpLocate, OneLampOptionIsRequiredToLocateFromOneLamp) {
   const auto captures = folder.file("captures.csv", "image,z_m,yaw_rad\na,0.05,0.5\n");
   EXPECT_EQ(locate({{"a", seen(1)}}, "--captures " + captures.string()).exit_code, 3);
   const auto result = locate({{"a", seen(1)}}, "--one-lamp --captures " + captures.string());
@@ -122,7 +122,7 @@ TEST_F(VlpLocate, LocatesWithOneLampOnRequest) {
   EXPECT_NEAR(figure(0, "x_m"), 0.1, 1e-5);
 }
 
-TEST_F(VlpLocate, ReturnsCenterOfRobot) {
+TEST_F(VlpLocate, WritesRobotPoseWithCameraOnRobotOption) {
   ASSERT_EQ(locate({{"a", seen(4)}}, "--camera-on-robot 0.3 0 0.2 90").exit_code, 0);
   const double robot_yaw_rad = 0.5 - M_PI / 2;
   EXPECT_NEAR(figure(0, "yaw_rad"), robot_yaw_rad, 1e-5);
@@ -131,7 +131,7 @@ TEST_F(VlpLocate, ReturnsCenterOfRobot) {
   EXPECT_NEAR(figure(0, "z_m"), 0.05 - 0.2, 1e-5);
 }
 
-TEST_F(VlpLocate, AppliesRequestedCorrections) {
+TEST_F(VlpLocate, AppliesTiltCorrectionUnlessOptionIsNone) {
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.03, 1);
   const auto seen_tilted = seen(4);
   locate({{"a", seen_tilted}});
@@ -145,14 +145,14 @@ TEST_F(VlpLocate, AppliesRequestedCorrections) {
   EXPECT_THAT(result.errors, HasSubstr("the calibration has no dispersion"));
 }
 
-TEST_F(VlpLocate, ReturnsThreeWithoutFix) {
+TEST_F(VlpLocate, ExitsWith3WhenNoFrameHasFix) {
   const auto result = locate({{"a", seen(1)}});
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(result.errors, HasSubstr("no frame has a fix; the first: fewer than two lamps"));
   EXPECT_EQ(word(0, "status"), "too_few_lamps") << "the rows are written all the same";
 }
 
-TEST_F(VlpLocate, FollowsQuietAndVerbose) {
+TEST_F(VlpLocate, QuietPrintsNothingAndVerboseNamesContradictingLamp) {
   EXPECT_EQ(locate({{"a", seen(4)}}, "--quiet").output, "");
   auto wrong = seen(4);
   wrong[0].lamp = 8;

@@ -44,7 +44,7 @@ class Packages : public testing::Test {
   }
 };
 
-TEST_F(Packages, UseExistingBuild) {
+TEST_F(Packages, ReconfiguresExistingBuildForUsrAndRestoresPrefix) {
   folder.file("build/CMakeCache.txt",
               "CMAKE_INSTALL_PREFIX:PATH=/opt/vlp\nCMAKE_UNITY_BUILD:BOOL=OFF\n");
   EXPECT_THAT(calls(),
@@ -55,7 +55,7 @@ TEST_F(Packages, UseExistingBuild) {
                     HasSubstr("cmake -DCMAKE_INSTALL_PREFIX=/opt/vlp -UCMAKE_INSTALL_LIBDIR ")));
 }
 
-TEST_F(Packages, UseReleasePresetWithoutBuild) {
+TEST_F(Packages, ConfiguresReleasePresetWhenNoBuildExists) {
   const std::string called = calls();
   EXPECT_THAT(called, testing::StartsWith("cmake --preset release -DCMAKE_INSTALL_PREFIX=/usr "));
   EXPECT_THAT(called.substr(0, called.find('\n')), HasSubstr(" -DBUILD_TESTING=OFF"));

@@ -172,7 +172,7 @@ void expect_formats_to_name_columns(const fs::path& results) {
   EXPECT_GT(tables, 10U);
 }
 
-TEST(DocumentationPages, CommandsRunAsTyped) {
+TEST(DocumentationPages, CommandsOnPagesExitWithZero) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "hundreds of images; the programs' own tests run under the sanitizers";
 #endif
@@ -209,7 +209,7 @@ std::vector<std::string> program_names() {
   return names;
 }
 
-TEST(DocumentationPages, ExistForEachProgram) {
+TEST(DocumentationPages, EachProgramHasLinkedPage) {
   const auto names = program_names();
   ASSERT_THAT(names, testing::Contains("vlp-locate"));
   for (const std::string& name : names) {
@@ -244,7 +244,7 @@ std::vector<std::string> named_options(const std::string& code) {
   return matches(code, "(?:^|[ |])(--[a-z][a-z0-9-]*)");
 }
 
-TEST(DocumentationPages, NameOptionsOfTheirPrograms) {
+TEST(DocumentationPages, NamedOptionsExistInHelpOfTheirPrograms) {
   std::set<std::string> names;
   std::map<std::string, std::set<std::string>> options;
   for (const std::string& name : program_names()) {
@@ -272,7 +272,7 @@ TEST(DocumentationPages, NameOptionsOfTheirPrograms) {
   EXPECT_GT(checked, 60U);
 }
 
-TEST(DocumentationPages, NamedOptionsAreFoundInCode) {
+TEST(NamedOptions, ReturnsOptionsWithoutArgumentsAndFileNames) {
   EXPECT_THAT(named_options("vlp-locate FOLDER --camera-on-robot"),
               testing::ElementsAre("--camera-on-robot"));
   EXPECT_THAT(named_options("--gate missing_fraction=0 --json=out/no--option.json"),
@@ -283,7 +283,7 @@ TEST(DocumentationPages, NamedOptionsAreFoundInCode) {
 
 /// Each metric has one row in "Choosing gates", marked if its gate is a minimum or not of the
 /// camera.
-TEST(DocumentationPages, DefineEachMetricOnce) {
+TEST(DocumentationPages, ChoosingGatesDefinesEachMetricOnce) {
   std::vector<std::string> defined, kinds;
   for (const std::string& line : lines_in(kSource / "apps/choosing-gates.md")) {
     if (!line.starts_with("| `")) continue;
@@ -306,11 +306,11 @@ TEST(DocumentationPages, DefineEachMetricOnce) {
   EXPECT_THAT(defined, testing::UnorderedElementsAreArray(kinds));
 }
 
-TEST(DocumentationPages, ReadmeFitsOnOnePage) {
+TEST(DocumentationPages, ReadmeHasAtMost6000Bytes) {
   EXPECT_LE(fs::file_size(kSource / "README.md"), 6000U);
 }
 
-TEST(DocumentationPages, LinksHaveTargets) {
+TEST(DocumentationPages, LinkedFilesAndSectionsExist) {
   std::size_t links = 0;
   for (const fs::path& page : pages()) {
     for (const std::string& link : matches(read_prose(page), "\\]\\(([^)\\s]+)\\)")) {
@@ -326,7 +326,7 @@ TEST(DocumentationPages, LinksHaveTargets) {
   EXPECT_GT(links, 100U);
 }
 
-TEST(DocumentationPages, NameExistingPaths) {
+TEST(DocumentationPages, NamedFilesAndFoldersExist) {
   // A file of source, with a folder, or anything in a folder of the tree; not with * or such.
   const char* path =
       "`([A-Za-z0-9_.-]+/[A-Za-z0-9_./-]*\\.(?:h|cpp|md|py|sh)"
@@ -407,7 +407,7 @@ std::string read_section(const fs::path& page, const std::string& heading) {
   return std::regex_replace(text, std::regex(" +"), " ");
 }
 
-TEST(DocumentationPages, AnswerQuestionsWithinTwoClicks) {
+TEST(DocumentationPages, AnswersAreWithinTwoLinksOfReadme) {
   std::set<std::string> reached{"README.md"};
   for (int click = 0; click < 2; ++click) {
     for (const std::string& page : std::set(reached)) {
@@ -472,7 +472,7 @@ TEST(DocumentationPages, NamedTestsAndBenchmarksExist) {
   EXPECT_GT(programs, 5U);
 }
 
-TEST(DocumentationPages, TheoryHasCitedSections) {
+TEST(DocumentationPages, SectionsOfTheoryCitedInSourcesExist) {
   const auto headings = find_headings(kSource / "lib/THEORY.md");
   std::size_t citations = 0;
   for (const fs::path& file : find_files({".h", ".cpp"})) {

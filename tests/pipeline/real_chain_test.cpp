@@ -63,7 +63,7 @@ class VlpLocateRealLamps : public testing::Test {
     const Lens lens(phone.lens_model, phone.intrinsics);
     std::vector<int> ids;
     for (const Lamp& lamp : read_lamp_map(luxapose / "lamps.yaml").lamps) {
-      const auto pixel = lens.project(level_from_world(camera, lamp.position_m));
+      const auto pixel = lens.project_point(level_point_from_world(camera, lamp.position_m));
       if (pixel && pixel->minCoeff() > 0 && pixel->x() < phone.imager_px[0] - 1 &&
           pixel->y() < phone.imager_px[1] - 1) {
         ids.push_back(lamp.id);
@@ -73,7 +73,7 @@ class VlpLocateRealLamps : public testing::Test {
   }
 };
 
-TEST_F(VlpLocateRealLamps, LocatesRigCenterWithFiveLamps) {
+TEST_F(VlpLocateRealLamps, MaxErrorIsBelow20MmWithFiveLamps) {
   const auto located = locate("x_0_y_1.27.jpg", 7712, 4352, "rows");
   ASSERT_EQ(located.exit_code, 0) << located.errors;
   const FixRow row = only_fix();
@@ -93,7 +93,7 @@ TEST_F(VlpLocateRealLamps, LocatesRigCenterWithFiveLamps) {
   EXPECT_EQ(evaluate(" --gate max_mm=18").exit_code, 1);
 }
 
-TEST_F(VlpLocateRealLamps, LocatesRigWithThreeVisibleLamps) {
+TEST_F(VlpLocateRealLamps, HeightErrorIsBelow20MmWithThreeLamps) {
   const auto located = locate("2014-02-27--18-15-03-62.jpg", 4352, 7712, "columns");
   ASSERT_EQ(located.exit_code, 0) << located.errors;
   // The lamps have no outline: their sigma_px contains the residuals of a lens that is not known.
@@ -107,7 +107,7 @@ TEST_F(VlpLocateRealLamps, LocatesRigWithThreeVisibleLamps) {
 }
 
 /// Another phone, calibrated from its own photographs: what it would reach under those lamps.
-TEST_F(VlpIntrinsics, YieldsCrlbOfPhoneUnderRealLamps) {
+TEST_F(VlpIntrinsics, VlpLimitsSdsMatchPinholeFormulaForCalibratedPhone) {
   const auto board = real_data("apriltag-lattice-phone"), luxapose = real_data("luxapose");
   if (board.empty() || luxapose.empty()) GTEST_SKIP() << "no real captures here";
   const auto calibrated = calibrate(board.string(), (board / "board.yaml").string());
@@ -126,9 +126,9 @@ TEST_F(VlpIntrinsics, YieldsCrlbOfPhoneUnderRealLamps) {
                   (folder / "map.csv").string()));
   ASSERT_EQ(limits.exit_code, 0) << limits.errors;
   const CsvTable map(folder / "map.csv");
-  ASSERT_EQ(map.rows(), 1);
+  ASSERT_EQ(map.num_rows(), 1);
   const auto figure = [&](const char* column) {
-    return map.get_number(0, map.get_required_column(column));
+    return map.get_cell_number(0, map.get_required_column(column));
   };
   // n lamps about the camera, S the sum of their squared distances from its axis:
   // sd_x = sigma h / (f sqrt(n)), sd_z = sigma h^2 / (f sqrt(S)); the lens stretches the image by

@@ -62,16 +62,16 @@ class RealLog : public testing::Test {
   void keep_every_third_frame() const {
     const CsvTable all(log / "detections.csv");
     const auto text = [&](std::size_t row, const char* name) {
-      return all.get_text(row, all.get_required_column(name));
+      return all.get_cell_text(row, all.get_required_column(name));
     };
     CsvWriter some(folder / "third.csv", {"image", "lamp", "u_px", "v_px"});
     std::string_view image;
     int images = 0;
-    for (std::size_t row = 0; row < all.rows(); ++row) {
+    for (std::size_t row = 0; row < all.num_rows(); ++row) {
       if (text(row, "image") != image) ++images;
       image = text(row, "image");
       if (images % 3 != 1) continue;
-      some.row({image, text(row, "lamp"), text(row, "u_px"), text(row, "v_px")});
+      some.write_csv_row({image, text(row, "lamp"), text(row, "u_px"), text(row, "v_px")});
     }
     some.save_without_fsync();
   }
@@ -88,19 +88,20 @@ class RealLog : public testing::Test {
     EXPECT_EQ(result.exit_code, 0) << result.errors;
     std::vector<Eigen::Vector2d> driven;
     const CsvTable waypoints(log / "path.csv");
-    for (std::size_t row = 0; row < waypoints.rows(); ++row) {
-      driven.emplace_back(waypoints.get_number(row, waypoints.get_required_column("x_m")),
-                          waypoints.get_number(row, waypoints.get_required_column("y_m")));
+    for (std::size_t row = 0; row < waypoints.num_rows(); ++row) {
+      driven.emplace_back(waypoints.get_cell_number(row, waypoints.get_required_column("x_m")),
+                          waypoints.get_cell_number(row, waypoints.get_required_column("y_m")));
     }
     const CsvTable fixes(folder / "fixes.csv");
-    EXPECT_EQ(fixes.rows(), 5057);
+    EXPECT_EQ(fixes.num_rows(), 5057);
     double sum_m = 0;
     std::vector<double> residuals_px;
-    for (std::size_t row = 0; row < fixes.rows(); ++row) {
-      EXPECT_EQ(fixes.get_text(row, fixes.get_required_column("status")), "ok");
-      sum_m += distance_from(driven, {fixes.get_number(row, fixes.get_required_column("x_m")),
-                                      fixes.get_number(row, fixes.get_required_column("y_m"))});
-      residuals_px.push_back(fixes.get_number(row, fixes.get_required_column("residual_px")));
+    for (std::size_t row = 0; row < fixes.num_rows(); ++row) {
+      EXPECT_EQ(fixes.get_cell_text(row, fixes.get_required_column("status")), "ok");
+      sum_m +=
+          distance_from(driven, {fixes.get_cell_number(row, fixes.get_required_column("x_m")),
+                                 fixes.get_cell_number(row, fixes.get_required_column("y_m"))});
+      residuals_px.push_back(fixes.get_cell_number(row, fixes.get_required_column("residual_px")));
     }
     std::nth_element(residuals_px.begin(), residuals_px.begin() + 2528, residuals_px.end());
     return {sum_m / 5057, residuals_px[2528]};
@@ -113,7 +114,7 @@ class RealLog : public testing::Test {
 };
 
 /// The same two figures from vlp-evaluate, as a user would have them.
-TEST_F(RealLog, MatchesErrorsAgainstPath) {
+TEST_F(RealLog, VlpEvaluateMeanErrorHalvesAfterLeveling) {
   const auto evaluate = [&](const char* gate) {
     return run_program("vlp-evaluate " + path("fixes.csv") + "--path " + in_log("path.csv") + gate);
   };
@@ -128,7 +129,7 @@ TEST_F(RealLog, MatchesErrorsAgainstPath) {
 /// The robot stands level; a tilt estimated per image adds errors. Mean error and 90 % quantile
 /// with a free tilt: 36.4 and 67.3 mm, as for OpenCV's PnP on the same points; with one tilt
 /// calibration for all images: 32.6 and 61.9 mm. A free tilt makes the calibrated tilt irrelevant.
-TEST_F(RealLog, HasLargerErrorsWithTiltPerImage) {
+TEST_F(RealLog, MeanErrorIsLargerWithTiltPerImageThanLeveled) {
   const auto evaluate = [&] {
     const auto result =
         run_program("vlp-evaluate " + path("fixes.csv") + "--path " + in_log("path.csv"));
@@ -145,13 +146,13 @@ TEST_F(RealLog, HasLargerErrorsWithTiltPerImage) {
   EXPECT_THAT(evaluate(), testing::HasSubstr("p90            61.89"));
 }
 
-TEST_F(RealLog, Has66MmErrorWithoutTiltCorrection) {
+TEST_F(RealLog, MeanErrorIs66MmWithoutTiltCorrection) {
   const auto [distance_m, residual_px] = figures(in_log("lamps.yaml"), calibration);
   EXPECT_NEAR(distance_m, 0.066, 0.001);
   EXPECT_NEAR(residual_px, 3.8, 0.1);
 }
 
-TEST_F(RealLog, HasHalfErrorWithTiltFromLamps) {
+TEST_F(RealLog, MeanErrorIsBelow34MmWithTiltFromLamps) {
   ASSERT_EQ(level().exit_code, 0);
   const auto [distance_m, residual_px] = figures(in_log("lamps.yaml"), path("leveled.yaml"));
   EXPECT_LT(distance_m, 0.034);
@@ -160,7 +161,7 @@ TEST_F(RealLog, HasHalfErrorWithTiltFromLamps) {
 
 /// The size of the map as a whole is held, and the path says that it is 5 % off: the map's shape
 /// shows in the residuals alone.
-TEST_F(RealLog, HasHalfResidualWithRefinedMap) {
+TEST_F(RealLog, MedianResidualIsBelowSevenTenthsPixelWithRefinedMap) {
   ASSERT_EQ(level("--refine-map " + path("lamps.yaml")).exit_code, 0);
   const auto [distance_m, residual_px] = figures(path("lamps.yaml"), path("leveled.yaml"));
   EXPECT_LT(distance_m, 0.038);
@@ -197,7 +198,7 @@ double path_over_fixes(const std::vector<Eigen::Vector2d>& driven,
 /// the lens estimated from the log, the lengths agree within 2 %, and the estimated pixels are
 /// square without a constraint. The residuals then exceed the rounding to whole pixels (0.41 px,
 /// both axes) only slightly, and the distances match the reported uncertainty of the fixes.
-TEST_F(RealLog, ContradictsGivenLens) {
+TEST_F(RealLog, PathLengthMatchesAdjustedButNotGivenLens) {
   ASSERT_EQ(level().exit_code, 0);
   keep_every_third_frame();
   const auto adjusted = [&](const std::string& options) {
@@ -210,9 +211,9 @@ TEST_F(RealLog, ContradictsGivenLens) {
     for (const auto& [file, points] :
          {std::pair(log / "path.csv", &driven), std::pair(folder / "fixes.csv", &fixes)}) {
       const CsvTable table(file);
-      for (std::size_t row = 0; row < table.rows(); ++row) {
-        points->emplace_back(table.get_number(row, table.get_required_column("x_m")),
-                             table.get_number(row, table.get_required_column("y_m")));
+      for (std::size_t row = 0; row < table.num_rows(); ++row) {
+        points->emplace_back(table.get_cell_number(row, table.get_required_column("x_m")),
+                             table.get_cell_number(row, table.get_required_column("y_m")));
       }
     }
     return path_over_fixes(driven, fixes);
@@ -232,10 +233,10 @@ TEST_F(RealLog, ContradictsGivenLens) {
   // Distances are across the path, along one axis: the mean of |e| is 0.80 standard deviations.
   const CsvTable fixes(folder / "fixes.csv");
   double variance_m2 = 0;
-  for (std::size_t row = 0; row < fixes.rows(); ++row) {
-    const double x_m = fixes.get_number(row, fixes.get_required_column("x_sd_m"));
-    const double y_m = fixes.get_number(row, fixes.get_required_column("y_sd_m"));
-    variance_m2 += (x_m * x_m + y_m * y_m) / 2 / static_cast<double>(fixes.rows());
+  for (std::size_t row = 0; row < fixes.num_rows(); ++row) {
+    const double x_m = fixes.get_cell_number(row, fixes.get_required_column("x_sd_m"));
+    const double y_m = fixes.get_cell_number(row, fixes.get_required_column("y_sd_m"));
+    variance_m2 += (x_m * x_m + y_m * y_m) / 2 / static_cast<double>(fixes.num_rows());
   }
   const double ratio = after.mean_distance_m / (0.798 * std::sqrt(variance_m2));
   std::printf(

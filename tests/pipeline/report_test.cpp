@@ -41,7 +41,7 @@ class VlpEvaluateReport : public testing::Test {
     must("vlp-locate " + kExample + "detections.csv" + rig(kExample + "calibration.yaml") + " -o" +
          in("fixes.csv"));
     write_plot(folder / "camera.svg",
-               make_gnuplot_drawing(
+               make_intrinsics_plot_drawing(
                    IntrinsicsPlot{"unit 7",
                                   {800, 600},
                                   {{{10, 20}, {0.1, 0.2}, false}, {{700, 500}, {-0.1, 0.1}, false}},
@@ -64,7 +64,7 @@ class VlpEvaluateReport : public testing::Test {
   }
 };
 
-TEST_F(VlpEvaluateReport, PassesBrowserCheck) {
+TEST_F(VlpEvaluateReport, HtmlPassesBrowserCheckAndPdfHasAllSections) {
   const auto [code, output, errors] = evaluate(all());
   ASSERT_EQ(code, 0) << errors;
   const auto check = run_program("python3 " + kCheck + in("report.html"));
@@ -79,7 +79,7 @@ TEST_F(VlpEvaluateReport, PassesBrowserCheck) {
   }
 }
 
-TEST_F(VlpEvaluateReport, IsReproducibleAndWrittenWhenGateFails) {
+TEST_F(VlpEvaluateReport, IsByteIdenticalOnRepeatAndWrittenWhenGateFails) {
   ASSERT_EQ(evaluate(all()).exit_code, 0);
   const std::string first = TemporaryFolder::read_content(folder / "report.html");
   EXPECT_THAT(first, Not(HasSubstr((folder / "").string()))) << "paths of a machine";
@@ -90,7 +90,7 @@ TEST_F(VlpEvaluateReport, IsReproducibleAndWrittenWhenGateFails) {
               HasSubstr("FAIL</strong>1 of 2"));
 }
 
-TEST_F(VlpEvaluateReport, RejectsInvalidContent) {
+TEST_F(VlpEvaluateReport, RejectsInvalidInputsWithoutWritingReport) {
   const auto refusal = [&](const std::string& more) {
     const auto [code, output, errors] = evaluate(more);
     EXPECT_EQ(code, 2) << more;
@@ -108,12 +108,12 @@ TEST_F(VlpEvaluateReport, RejectsInvalidContent) {
 /// A page that passes, small enough to be broken in many ways.
 std::string good_page() {
   Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, Direction::at_most}}, {}, {}, {}, {}, {}};
-  report.pictures = {make_report_plot(
-      make_gnuplot_drawing(CdfPlot{"errors", {{"fixes", {0.001, 0.002}, 0.001, 0.002}}}))};
+  report.pictures = {render_report_plot(
+      make_error_cdf_plot_drawing(CdfPlot{"errors", {{"fixes", {0.001, 0.002}, 0.001, 0.002}}}))};
   return render_report_html(report);
 }
 
-TEST(BrowserCheck, DetectsFaults) {
+TEST(BrowserCheckScript, ReportsEachFaultInsertedIntoHtml) {
   const struct {
     const char *name, *from, *to, *complaint;
   } faults[] = {

@@ -56,7 +56,7 @@ std::vector<double> row(const std::string& table, const std::string& label, int 
   return numbers;
 }
 
-TEST_F(ReproducePaper, ComparesWithTableOfPaper) {
+TEST_F(ReproducePaper, CorrectionReducesErrorsAndMissingFixExitsWith1) {
   const auto result = reproduce();
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_EQ(result.errors, "");

@@ -28,17 +28,17 @@ class VlpRotationErrors : public VlpRotation {
   LampMap lamps = read_lamp_map(kExample + "lamps.yaml");
 };
 
-TEST_F(VlpRotationErrors, ReportsMirroredMap) {
+TEST_F(VlpRotationErrors, RejectsMirroredLampMap) {
   for (Lamp& lamp : lamps.lamps) lamp.position_m.x() *= -1;
   expect_refusals("the lamp map seems to be mirrored");
 }
 
-TEST_F(VlpRotationErrors, ReportsSwappedLamps) {
+TEST_F(VlpRotationErrors, RejectsLampMapAndNamesSwappedLamps) {
   std::swap(lamps.lamps[0].position_m, lamps.lamps[1].position_m);
   expect_refusals("lamps 1 and 2 seem to be swapped");
 }
 
-TEST_F(VlpRotationErrors, RejectsInsufficientCaptures) {
+TEST_F(VlpRotationErrors, ExitsWith3ForTooFewCapturesYawsOrLamps) {
   expect_refusal(rotation(captures([](std::size_t i) { return i < 1; })), 3, "add captures");
   expect_refusal(rotation(captures([](std::size_t i) { return i < 3; })), 3,
                  "less than 90 degrees: add captures");
@@ -51,7 +51,7 @@ TEST_F(VlpRotationErrors, RejectsInsufficientCaptures) {
 }
 
 /// Captures that differ by their noise alone, at two yaws of the turn or at three.
-TEST_F(VlpRotationErrors, RejectsCirclesAtTwoOppositeYaws) {
+TEST_F(VlpRotationErrors, RejectsCircleMethodForCapturesAtTwoYaws) {
   const auto turn = read_detections(kExample + "turning.csv");
   // The turn is at two heights, one after the other.
   const std::size_t half = turn.size() / 4, quarter = turn.size() / 8;
@@ -69,7 +69,7 @@ TEST_F(VlpRotationErrors, RejectsCirclesAtTwoOppositeYaws) {
             0);
 }
 
-TEST_F(VlpRotationErrors, RejectsMapOfAnotherRoom) {
+TEST_F(VlpRotationErrors, ExitsWith2ForLampMapOfAnotherRoom) {
   const std::string map = "format: vlp-lamps/1\nlamps:\n";
   const auto other = [&](const std::string& places) {
     return run_program("vlp-rotation " + kExample + "turning.csv --lamps " +
@@ -85,7 +85,7 @@ TEST_F(VlpRotationErrors, RejectsMapOfAnotherRoom) {
                  2, "is it the map of this room?");
 }
 
-TEST_F(VlpRotationErrors, DoesNotOverwriteInput) {
+TEST_F(VlpRotationErrors, RejectsPlotPathEqualToLampMap) {
   const std::string input = kExample + "lamps.yaml";
   EXPECT_EQ(rotation(kExample + "turning.csv", "--plot " + input).exit_code, 2);
 }

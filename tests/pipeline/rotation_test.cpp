@@ -20,7 +20,7 @@ double angle_between_deg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return deg_from_rad(std::atan2(a.cross(b).norm(), a.dot(b)));
 }
 
-TEST_F(VlpRotation, EstimatesTiltAndLeverArmOfExample) {
+TEST_F(VlpRotation, EstimatesTrueTiltAndLeverArmOfExample) {
   const auto result = rotation(kExample + "turning.csv");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_EQ(result.errors, "");
@@ -34,7 +34,7 @@ TEST_F(VlpRotation, EstimatesTiltAndLeverArmOfExample) {
   }
 }
 
-TEST_F(VlpRotation, KeepsCameraAndReplacesRotationCenter) {
+TEST_F(VlpRotation, SecondRunKeepsCameraAndReplacesRotationCenter) {
   ASSERT_EQ(rotation(kExample + "turning.csv").exit_code, 0);
   ASSERT_EQ(run_program("vlp-rotation -q " + kExample + "turning.csv --lamps " + kExample +
                         "lamps.yaml --calibration " + output.string() + " -o " +
@@ -50,7 +50,7 @@ TEST_F(VlpRotation, KeepsCameraAndReplacesRotationCenter) {
   EXPECT_THAT(again.rotation_center->center_px, IsNear(found().center_px, 1e-6));
 }
 
-TEST_F(VlpRotation, GivesSameBytesTwice) {
+TEST_F(VlpRotation, WritesIdenticalCalibrationAndPlotOnRepeat) {
   const auto first = rotation(kExample + "turning.csv", "--plot " + (folder / "a.png").string());
   const std::string calibration = TemporaryFolder::read_content(output);
   const auto second = rotation(kExample + "turning.csv", "--plot " + (folder / "b.png").string());
@@ -62,7 +62,7 @@ TEST_F(VlpRotation, GivesSameBytesTwice) {
 }
 
 /// Lamps at 2.4 to 2.6 m, camera at one height. Rendered images give realistic noise.
-TEST_F(VlpRotation, EstimatesLeverArmFromLampsAtSeveralHeights) {
+TEST_F(VlpRotation, EstimatesTrueLeverArmFromLampsAtSeveralHeights) {
   const std::string rendered = (folder / "wide").string();
   ASSERT_EQ(run_program("vlp-simulate -q " VLP_SOURCE_DIR
                         "/datasets/wide/scene.yaml --only rotation -o " +
@@ -84,7 +84,7 @@ TEST_F(VlpRotation, EstimatesLeverArmFromLampsAtSeveralHeights) {
   EXPECT_THAT(*found().lever_arm_m, IsNear(Eigen::Vector2d(0.01, 0.005), 1e-3));
 }
 
-TEST_F(VlpRotation, ReportsAssumedLeverArmAtOneHeight) {
+TEST_F(VlpRotation, WarnsOfAssumedZeroLeverArmAtOneHeight) {
   auto frames = read_detections(kExample + "turning.csv");
   frames.resize(12);
   for (Frame& frame : frames) {  // without the only lamp that hangs lower
@@ -99,13 +99,13 @@ TEST_F(VlpRotation, ReportsAssumedLeverArmAtOneHeight) {
 }
 
 /// For a tilted camera a fixed center in the image is inexact, which increases the residuals.
-TEST_F(VlpRotation, WarnsOfResidualsAboveNoise) {
+TEST_F(VlpRotation, JointMethodWarnsOfResidualsAboveStatedNoise) {
   const auto result = rotation(kExample + "turning.csv", "--method joint");
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.errors, HasSubstr("px of noise, 0.05 px are stated"));
 }
 
-TEST_F(VlpRotation, SupportsMethodsJointAndCircle) {
+TEST_F(VlpRotation, MethodsJointAndCircleEstimateCenterWithin5Px) {
   for (const std::string method : {"joint", "circle"}) {
     ASSERT_EQ(rotation(kExample + "turning.csv", "--method " + method).exit_code, 0);
     EXPECT_EQ(found().model, RotationModel::shift);
@@ -116,7 +116,7 @@ TEST_F(VlpRotation, SupportsMethodsJointAndCircle) {
   EXPECT_EQ(rotation(kExample + "turning.csv", "--method guess").exit_code, 2);
 }
 
-TEST_F(VlpRotation, WarnsOfMissingSdForThreePointsOfCircle) {
+TEST_F(VlpRotation, CircleMethodWarnsOfMissingSdForThreePoints) {
   const auto result =
       rotation(captures([](std::size_t i) { return i % 4 == 0; }), "--method circle");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
@@ -128,7 +128,7 @@ TEST_F(VlpRotation, WarnsOfMissingSdForThreePointsOfCircle) {
   EXPECT_THAT(full.errors, testing::Not(HasSubstr("no standard deviation")));
 }
 
-TEST_F(VlpRotation, NamesMisidentifiedLamp) {
+TEST_F(VlpRotation, NamesSwappedDetectionsAndEstimatesTrueZenith) {
   auto frames = read_detections(kExample + "turning.csv");
   std::swap(frames[5].detections[0].pixel, frames[5].detections[1].pixel);
   const auto result = rotation(written(frames));
@@ -141,7 +141,7 @@ TEST_F(VlpRotation, NamesMisidentifiedLamp) {
 }
 
 /// From rendered images, with the lens known: the whole way from pixels.
-TEST(VlpRotationOfRenderedImages, EstimatesZenith) {
+TEST(VlpRotationOfRenderedImages, EstimatesTrueZenithAndLeverArm) {
   for (const std::string rig : {"paper-rig", "paper-rig-faulty"}) {
     SCOPED_TRACE(rig);
     const TemporaryFolder folder;

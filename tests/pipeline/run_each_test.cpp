@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-class RunForEachStdinLine : public testing::Test {
+class RunProgramForEachStdinLine : public testing::Test {
  protected:
   ProgramResult run(const std::string& lines) const {
     std::ofstream(folder / "lines") << lines;
@@ -44,7 +44,7 @@ class RunForEachStdinLine : public testing::Test {
   TemporaryFolder folder;
 };
 
-TEST_F(RunForEachStdinLine, ReportsExitCodeAndErrorsOfSeparateRuns) {
+TEST_F(RunProgramForEachStdinLine, ReportsExitCodeAndErrorsOfSeparateProgramRun) {
   const auto [code, output, errors] = run(line("nowhere's") + line("\n"));
   EXPECT_EQ(code, 0);
   EXPECT_EQ(errors, "");
@@ -58,7 +58,7 @@ TEST_F(RunForEachStdinLine, ReportsExitCodeAndErrorsOfSeparateRuns) {
   EXPECT_GT(all[1].at("cpu_s"), 0);
 }
 
-TEST_F(RunForEachStdinLine, ContinuesAfterTimeLimit) {
+TEST_F(RunProgramForEachStdinLine, RunsNextLineAfterKillingRunAtTimeLimit) {
   // Images of 200 million pixels, which take no room on the disk.
   const auto session = folder / "endless";
   std::filesystem::create_directories(session / "rotation");
@@ -80,7 +80,7 @@ TEST_F(RunForEachStdinLine, ContinuesAfterTimeLimit) {
   EXPECT_EQ(all[1].at("exit_code"), 2);
 }
 
-TEST_F(RunForEachStdinLine, RejectsInvalidLine) {
+TEST_F(RunProgramForEachStdinLine, RejectsInvalidLineAndExtraArguments) {
   for (const std::string bad :
        {"x", "{}", R"({"arguments": "a", "limit_s": 1})", R"({"arguments": ["a"], "limit_s": "b"})",
         R"({"arguments": ["a"], "limit_s": 0})", R"({"arguments": ["a"], "limit_s": -1})",

@@ -52,7 +52,7 @@ void expect_same_picture(const fs::path& committed, const fs::path& rendered) {
   EXPECT_LT(rms, 0.01 * brightest) << committed;
 }
 
-TEST_P(RenderedSamples, MatchScene) {
+TEST_P(RenderedSamples, VlpSimulateReproducesCommittedFiles) {
   std::string only;
   for (const fs::directory_entry& entry : fs::directory_iterator(dataset / "rendered")) {
     if (entry.is_directory()) only += (only.empty() ? "" : ",") + entry.path().filename().string();
@@ -76,7 +76,7 @@ TEST_P(RenderedSamples, MatchScene) {
 }
 
 /// As committed: what another system renders is not asked here.
-TEST_P(RenderedSamplesOfDiscs, HaveMeanErrorBelowLimit) {
+TEST_P(RenderedSamplesOfDiscs, VlpLocateFixesHaveMeanErrorBelowLimit) {
   const std::string rendered = (dataset / "rendered").string();
   const std::string fixes = (folder / "fixes.csv").string();
   const auto located =

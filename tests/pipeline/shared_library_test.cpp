@@ -42,7 +42,7 @@ std::set<std::string> words_of_headers() {
   return words;
 }
 
-/// "vlp::Positioner::locate(...)": Positioner, locate.
+/// "vlp::Positioner::compute_position_fix(...)": Positioner, compute_position_fix.
 std::vector<std::string> names_in(const std::string& symbol) {
   std::vector<std::string> names;
   std::istringstream parts(symbol.substr(0, symbol.find_first_of("(<[")));
@@ -52,7 +52,7 @@ std::vector<std::string> names_in(const std::string& symbol) {
   return names;
 }
 
-TEST(SharedLibrary, ExportsOnlyDeclaredSymbols) {
+TEST(SharedLibrary, ExportsOnlySymbolsDeclaredInPublicHeaders) {
   const auto shown = run_program("nm -D --defined-only --demangle '" VLP_SHARED_LIBRARY "'");
   ASSERT_EQ(shown.exit_code, 0) << shown.errors;
   const std::set<std::string> words = words_of_headers();
@@ -76,14 +76,14 @@ TEST(SharedLibrary, ExportsOnlyDeclaredSymbols) {
     functions.insert(symbol.substr(0, symbol.find('(')));
   }
   for (const char* function :
-       {"vlp::Positioner::locate", "vlp::read_calibration", "vlp::read_lamp_map", "vlp::describe",
-        "vlp::InputError::InputError", "vlp::LampDetector::LampDetector",
+       {"vlp::Positioner::compute_position_fix", "vlp::read_calibration", "vlp::read_lamp_map",
+        "vlp::describe", "vlp::InputError::InputError", "vlp::LampDetector::LampDetector",
         "vlp::LampDetector::detect", "vlp_open", "vlp_detect", "vlp_locate"}) {
     EXPECT_THAT(functions, testing::Contains(function));
   }
 }
 
-TEST(SharedLibrary, ExportsAllFunctionsOfCHeader) {
+TEST(SharedLibrary, ExportsAllFunctionsOfVlpHeader) {
   const auto shown = run_program("nm -D --defined-only '" VLP_SHARED_LIBRARY "'");
   const std::string text = read_header("positioning/vlp.h");
   const std::regex function(
@@ -99,7 +99,7 @@ TEST(SharedLibrary, ExportsAllFunctionsOfCHeader) {
 
 /// Alignment of Eigen's matrices follows the widest vector instructions: matrices of a multiple of
 /// 32 bytes change with AVX, of 64 bytes with AVX-512.
-TEST(SharedLibrary, HasProcessorIndependentLayout) {
+TEST(SharedLibrary, PublicTypesHaveSameLayoutForAllProcessors) {
   const std::regex matrix("Eigen::(?:Matrix<double, ([0-9]+), ([0-9]+)>|(Matrix|Vector)([24])d)");
   for (const std::string& header : headers()) {
     const std::string text = read_header(header);
@@ -142,7 +142,7 @@ TEST(SharedLibrary, HasProcessorIndependentLayout) {
   }
 }
 
-TEST(SharedLibrary, LinksNoOtherToolboxLibrary) {
+TEST(SharedLibrary, LinksNeitherOpencvNorOtherCalibrationLibraries) {
   auto result = run_program("ldd '" VLP_SHARED_LIBRARY "'");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   std::string& needed = result.output;

@@ -19,7 +19,7 @@ ino_t file_number(const std::filesystem::path& file) {
   return status.st_ino;
 }
 
-TEST_F(VlpSimulateInterrupted, RendersOnlyMissingFiles) {
+TEST_F(VlpSimulateInterrupted, RendersOnlyMissingImagesWhenRepeated) {
   const Files expected = undisturbed();
   ASSERT_EQ(simulate().exit_code, 0);
   for (const char* name : {"lamps/0003.png", "lamps/0015.png", "boards/0000.png",
@@ -48,20 +48,20 @@ TEST_F(VlpSimulateInterrupted, RendersNothingWhenComplete) {
   EXPECT_TRUE(files_below(output) == before);
 }
 
-TEST_F(VlpSimulateInterrupted, StartsInEmptyFolder) {
+TEST_F(VlpSimulateInterrupted, RendersIntoExistingEmptyFolder) {
   ASSERT_TRUE(std::filesystem::create_directory(output));
   EXPECT_EQ(simulate("--only boards").exit_code, 0);
 }
 
 // That is how it is left when the program is killed as it writes there first; see AtomicFileWriter.
-TEST_F(VlpSimulateInterrupted, StartsInFolderWithTemporaryFile) {
+TEST_F(VlpSimulateInterrupted, RendersIntoFolderWithLeftTemporarySceneFile) {
   ASSERT_TRUE(std::filesystem::create_directory(output));
   folder.file("output/.scene.yaml.tmp-123-0", "# vlp-sim");
   const auto result = simulate("--only boards");
   EXPECT_EQ(result.exit_code, 0) << result.errors;
 }
 
-TEST_F(VlpSimulateInterrupted, LeavesCompleteImagesAfterKill) {
+TEST_F(VlpSimulateInterrupted, LeavesOnlyCompleteFilesWhenKilledAndResumes) {
   const Files expected = undisturbed();
   const auto begin = std::chrono::steady_clock::now();
   ASSERT_EQ(simulate("--threads 2").exit_code, 0);

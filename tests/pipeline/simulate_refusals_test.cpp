@@ -26,7 +26,7 @@ class VlpSimulateErrors : public SmallSimulation {
   }
 };
 
-TEST_F(VlpSimulateErrors, KeepFolderOfOtherSeedOrScene) {
+TEST_F(VlpSimulateErrors, RejectsOutputFolderOfOtherSeedOrScene) {
   ASSERT_EQ(simulate("--only boards").exit_code, 0);
   std::filesystem::remove(output / "boards/0000.png");
   const Files before = files_below(output);
@@ -41,7 +41,7 @@ TEST_F(VlpSimulateErrors, KeepFolderOfOtherSeedOrScene) {
   EXPECT_EQ(simulate("--only boards").exit_code, 0) << "it is the same scene again";
 }
 
-TEST_F(VlpSimulateErrors, KeepFolderOfOtherFiles) {
+TEST_F(VlpSimulateErrors, RejectsOutputFolderWithForeignFiles) {
   for (const std::string name : {"notes.txt", "boards/0000.png", "lamps.yaml"}) {
     std::filesystem::create_directories(output / "boards");
     folder.file("output/" + name, "mine\n");
@@ -51,18 +51,18 @@ TEST_F(VlpSimulateErrors, KeepFolderOfOtherFiles) {
   }
 }
 
-TEST_F(VlpSimulateErrors, RefuseToOverwriteSceneFile) {
+TEST_F(VlpSimulateErrors, RejectsOutputThatWouldOverwriteSceneFile) {
   output = folder / "";
   expect_refused("", "scene.yaml: is also an input and would be overwritten");
   EXPECT_EQ(files_below(output).at("scene.yaml"), kSmallScene);
 }
 
-TEST_F(VlpSimulateErrors, NameFolderMissingInScene) {
+TEST_F(VlpSimulateErrors, NamesRequestedCapturesMissingInScene) {
   expect_refused_and_nothing_made("--only nothing", "the scene has no captures called 'nothing'");
   expect_refused_and_nothing_made("--only boards,../boards", "no captures called '../boards'");
 }
 
-TEST_F(VlpSimulateErrors, NameOutputThatCannotBeCreated) {
+TEST_F(VlpSimulateErrors, NamesOutputFolderThatCannotBeCreated) {
   output = folder.file("file", "mine\n");
   expect_refused("", output.string() + ": cannot be made: Not a directory");
   output = output / "below";
@@ -70,24 +70,24 @@ TEST_F(VlpSimulateErrors, NameOutputThatCannotBeCreated) {
   EXPECT_EQ(TemporaryFolder::read_content(folder / "file"), "mine\n");
 }
 
-TEST_F(VlpSimulateErrors, NameLineAndKeyOfInvalidScene) {
+TEST_F(VlpSimulateErrors, NamesLineAndKeyOfInvalidSceneValue) {
   change_scene("bits: 8", "bits: 12");
   expect_refused_and_nothing_made("", scene.string() + ":12: sensor.bits: should be 8 or 16");
   expect_refused_and_nothing_made("--quiet", scene.string() + ":12: sensor.bits: ");
 }
 
-TEST_F(VlpSimulateErrors, NameMissingScene) {
+TEST_F(VlpSimulateErrors, NamesMissingSceneFile) {
   scene = folder / "no.yaml";
   expect_refused_and_nothing_made("", scene.string() + ": cannot be opened: No such file");
 }
 
-TEST_F(VlpSimulateErrors, RejectInvalidNumbers) {
+TEST_F(VlpSimulateErrors, RejectsInvalidThreadsAndSeeds) {
   for (const std::string options : {"--threads 0", "--threads two", "--seed -1", "--seed 1.5"}) {
     expect_refused_and_nothing_made(options, "see vlp-simulate --help");
   }
 }
 
-TEST_F(VlpSimulateErrors, NameTagMissingInFamily) {
+TEST_F(VlpSimulateErrors, RejectsBoardWithTagsBeyondFamily) {
   const std::string message =
       "scene.yaml:21: board.pattern: tag36h11 has no tag 587, only 0 to 586";
   change_scene("first_id: 0", "first_id: 581");
@@ -101,7 +101,7 @@ TEST_F(VlpSimulateErrors, NameTagMissingInFamily) {
   expect_refused_and_nothing_made("", message);
 }
 
-TEST_F(VlpSimulateErrors, NameFamilyWithoutTwoBitBorder) {
+TEST_F(VlpSimulateErrors, RejectsTwoBitBorderForFamilyWithoutIt) {
   change_scene("border_bits: 1", "border_bits: 2");
   EXPECT_EQ(run_program(command("--only boards")).exit_code, 0);
   std::filesystem::remove_all(output);
@@ -110,7 +110,7 @@ TEST_F(VlpSimulateErrors, NameFamilyWithoutTwoBitBorder) {
       "", "board.pattern: tags of tagStandard41h12 have no border of two black bits");
 }
 
-TEST_F(VlpSimulateErrors, NameFamilyWithOverlappingTags) {
+TEST_F(VlpSimulateErrors, RejectsTagSpacingTooSmallForFamily) {
   change_scene("family: tag36h11", "family: tagStandard41h12");
   EXPECT_EQ(run_program(command("--only boards")).exit_code, 0);
   std::filesystem::remove_all(output);

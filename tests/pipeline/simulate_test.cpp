@@ -16,7 +16,7 @@ using testing::UnorderedElementsAre;
 
 using VlpSimulate = SmallSimulation;
 
-TEST_F(VlpSimulate, WritesCapturesWithGroundTruth) {
+TEST_F(VlpSimulate, WritesImagesMapsAndGroundTruthFiles) {
   const auto result = simulate();
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_EQ(result.output, "rendered 24 captures, 0 existed; in " + output.string() + "\n");
@@ -34,7 +34,7 @@ TEST_F(VlpSimulate, WritesCapturesWithGroundTruth) {
   EXPECT_NE(files.at("lamps.yaml"), files.at("true_lamps.yaml")) << "lamp 1 is off in the map";
 }
 
-TEST_F(VlpSimulate, GivesSameBytesForAllThreadCounts) {
+TEST_F(VlpSimulate, WritesIdenticalFilesForAllThreadCounts) {
   const Files expected = undisturbed("--threads 1");
   EXPECT_EQ(std::set<std::string>({expected.at("lamps/0000.png"), expected.at("lamps/0001.png"),
                                    expected.at("lamps/0002.png"), expected.at("lamps/0003.png")})
@@ -47,7 +47,7 @@ TEST_F(VlpSimulate, GivesSameBytesForAllThreadCounts) {
   }
 }
 
-TEST_F(VlpSimulate, ChangesImagesButNotRigWithSeed) {
+TEST_F(VlpSimulate, SeedChangesImagesButNotMapsAndCalibration) {
   const Files first = undisturbed();
   EXPECT_TRUE(undisturbed("--seed 1") == first) << "the scene's own";
   const Files other = undisturbed("--seed 2");
@@ -59,7 +59,7 @@ TEST_F(VlpSimulate, ChangesImagesButNotRigWithSeed) {
   EXPECT_NE(first.at("boards/true_boards.csv"), other.at("boards/true_boards.csv"));
 }
 
-TEST_F(VlpSimulate, RendersSingleFolderIdentically) {
+TEST_F(VlpSimulate, RendersFolderAloneIdenticallyToFullRun) {
   const Files all = undisturbed();
   const auto result = simulate("--only boards");
   EXPECT_EQ(result.output, "rendered 8 captures, 0 existed; in " + output.string() + "\n");
@@ -71,7 +71,7 @@ TEST_F(VlpSimulate, RendersSingleFolderIdentically) {
   EXPECT_TRUE(files_below(output) == all);
 }
 
-TEST_F(VlpSimulate, IsReproducibleFromWrittenScene) {
+TEST_F(VlpSimulate, RendersIdenticalFilesFromWrittenScene) {
   ASSERT_EQ(simulate("--seed 5").exit_code, 0);
   const auto first = files_below(output);
   EXPECT_EQ(first.at("scene.yaml").substr(0, 15), "# vlp-simulate ");
@@ -81,7 +81,7 @@ TEST_F(VlpSimulate, IsReproducibleFromWrittenScene) {
   EXPECT_EQ(files_below(folder / "again"), first);
 }
 
-TEST_F(VlpSimulate, WarnsOfUnusableCaptures) {
+TEST_F(VlpSimulate, WarnsOfBadExposureUnclearStripesAndEmptyViews) {
   const auto warnings_with = [&](const std::string& from, const std::string& to) {
     change_scene(from, to);
     const auto result = simulate("");
@@ -105,7 +105,7 @@ TEST_F(VlpSimulate, WarnsOfUnusableCaptures) {
               HasSubstr("boards: nothing is in view in "));
 }
 
-TEST_F(VlpSimulate, PrintsNothingWhenQuiet) {
+TEST_F(VlpSimulate, PrintsNothingWithQuietOption) {
   const auto result = simulate("--quiet");
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.output, "");
@@ -126,16 +126,16 @@ Differences located_against_truth(const std::filesystem::path& output) {
                                   "/true_calibration.yaml -o " + path + "/fixes.csv");
   EXPECT_EQ(result.exit_code, 0) << result.errors;
   const CsvTable fixes(output / "fixes.csv"), truth(output / "lamps/truth.csv");
-  EXPECT_EQ(fixes.rows(), truth.rows());
+  EXPECT_EQ(fixes.num_rows(), truth.num_rows());
   Differences differences;
-  for (std::size_t row = 0; row < fixes.rows() && row < truth.rows(); ++row) {
-    EXPECT_EQ(fixes.get_text(row, fixes.get_required_column("image")),
-              truth.get_text(row, truth.get_required_column("image")));
-    if (fixes.get_text(row, fixes.get_required_column("status")) != "ok") continue;
+  for (std::size_t row = 0; row < fixes.num_rows() && row < truth.num_rows(); ++row) {
+    EXPECT_EQ(fixes.get_cell_text(row, fixes.get_required_column("image")),
+              truth.get_cell_text(row, truth.get_required_column("image")));
+    if (fixes.get_cell_text(row, fixes.get_required_column("status")) != "ok") continue;
     ++differences.fixes;
     const auto difference = [&](const char* column) {
-      return fixes.get_number(row, fixes.get_required_column(column)) -
-             truth.get_number(row, truth.get_required_column(column));
+      return fixes.get_cell_number(row, fixes.get_required_column(column)) -
+             truth.get_cell_number(row, truth.get_required_column(column));
     };
     for (const char* axis : {"x_m", "y_m", "z_m"}) {
       differences.position_m = std::max(differences.position_m, std::abs(difference(axis)));
@@ -147,7 +147,7 @@ Differences located_against_truth(const std::filesystem::path& output) {
 }
 
 // Pixels are written to 1e-6 px, which are 2e-8 m here.
-TEST_F(VlpSimulate, GroundTruthMatchesVlpLocate) {
+TEST_F(VlpSimulate, VlpLocateReproducesTruePosesFromTrueDetections) {
   ASSERT_EQ(simulate("--only lamps").exit_code, 0);
   const Differences differences = located_against_truth(output);
   EXPECT_EQ(differences.fixes, 16U);

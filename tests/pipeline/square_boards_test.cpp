@@ -52,7 +52,7 @@ class VlpIntrinsicsSquareBoards : public VlpIntrinsics {
   const std::string boards = rig + "/boards", board = rig + "/board.yaml";
 };
 
-TEST_F(VlpIntrinsicsSquareBoards, GiveLensFromChessboard) {
+TEST_F(VlpIntrinsicsSquareBoards, EstimatesLensFromChessboardAndRejectsCornerCounts) {
   render("{kind: chessboard, cols: 10, rows: 7, square_size_m: 0.015}",
          "{count: 24, distance_m: [0.15, 0.25], tilt_deg: 45, roll_deg: 180, field_coverage: 0.7}");
   const std::string cache = " --cache " + (folder / "cache").string();
@@ -81,7 +81,7 @@ TEST_F(VlpIntrinsicsSquareBoards, GiveLensFromChessboard) {
                         "rows count squares, not the corners between them"));
 }
 
-TEST_F(VlpIntrinsicsSquareBoards, GiveLensFromCharucoBoard) {
+TEST_F(VlpIntrinsicsSquareBoards, EstimatesLensFromCharucoBoardAndNamesWrongBoardKeys) {
   render(
       "{kind: charuco, cols: 10, rows: 8, square_size_m: 0.02, marker_size_m: 0.015, "
       "dictionary: DICT_5X5_100, top_left: white}",
@@ -112,7 +112,7 @@ TEST_F(VlpIntrinsicsSquareBoards, GiveLensFromCharucoBoard) {
               HasSubstr("a square is 2 markers wide by board.yaml, but 1.3"));
 }
 
-TEST_F(VlpIntrinsicsSquareBoards, ArePrintedToScale) {
+TEST_F(VlpIntrinsicsSquareBoards, VlpBoardPrintsSquaresToScale) {
   const std::string pdf = (folder / "board.pdf").string();
   const auto made = run_program("vlp-board --charuco --dictionary DICT_4X4_50 -o " + pdf);
   ASSERT_EQ(made.exit_code, 0) << made.errors;

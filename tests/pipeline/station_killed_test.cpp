@@ -96,13 +96,13 @@ void VlpStationKilled::expect_all_there() const {
 }
 
 // As often as VLP_STATION_KILLS says.
-TEST_F(VlpStationKilled, ResumesUnit) {
+TEST_F(VlpStationKilled, ResumesUnitAfterKillsWithSqlite) {
   render();
   kill_repeatedly(read_environment_number("VLP_STATION_KILLS", 4));
   expect_all_there();
 }
 
-TEST_F(VlpStationKilled, ResumesUnitWithPostgres) {
+TEST_F(VlpStationKilled, ResumesUnitAfterKillsWithPostgres) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
@@ -114,7 +114,7 @@ TEST_F(VlpStationKilled, ResumesUnitWithPostgres) {
 
 /// Killed between record and end: the same command says what the verdict was, and nothing is done
 /// twice.
-TEST_F(VlpStationKilled, RepeatsVerdictAfterKill) {
+TEST_F(VlpStationKilled, RepeatsRecordedVerdictWhenKilledBeforeEnd) {
   prepare("b");
   const auto ended = run_program(run("b", "-q --idle-s 0.2"));
   EXPECT_EQ(ended.exit_code, 3);
@@ -134,7 +134,7 @@ TEST_F(VlpStationKilled, RepeatsVerdictAfterKill) {
 }
 
 /// The same while the records, which have the run, are away: it is not judged again.
-TEST_F(VlpStationKilled, KeepsVerdictWhileRecordsAreUnavailable) {
+TEST_F(VlpStationKilled, DoesNotJudgeAgainWhileRecordsAreUnavailable) {
   change("station.yaml", "records: records.db", "records: share/records.db");
   const auto share = folder / "station/share", unmounted = folder / "station/unmounted";
   fs::create_directory(share);
@@ -157,7 +157,7 @@ TEST_F(VlpStationKilled, KeepsVerdictWhileRecordsAreUnavailable) {
 }
 
 /// A hook that was not run to its end is known as such, though its run ended.
-TEST_F(VlpStationKilled, ListsHookAsUnfinishedAfterKill) {
+TEST_F(VlpStationKilled, ListsHookAsUnfinishedWhenKilledDuringHook) {
   change("station.yaml", "records: records.db",
          "records: records.db\nhook: {command: [sh, hook.sh]}");
   folder.file("station/hook.sh", "echo $$ >pid.new; mv pid.new pid; exec sleep 100\n");
@@ -176,7 +176,7 @@ TEST_F(VlpStationKilled, ListsHookAsUnfinishedAfterKill) {
   EXPECT_THAT(records("list").output, testing::Not(HasSubstr("hook")));
 }
 
-TEST_F(VlpStationKilled, SurvivesFullDisk) {
+TEST_F(VlpStationKilled, LeavesNoResultsWithoutRecordWhenDiskIsFull) {
   change("scene.yaml", "count: 16", "count: 8");
   change("station.yaml", "board_views: 16", "board_views: 8");
   render("boards");  // the unit fails, and has a record as long

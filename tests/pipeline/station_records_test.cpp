@@ -20,7 +20,7 @@ using testing::Not;
 class VlpStationRecords : public SmallStation {};
 
 /// Expired images of a run are deleted; its record, with an event for it, is kept.
-TEST_F(VlpStationRecords, CleanDeletesExpiredFolders) {
+TEST_F(VlpStationRecords, CleanDeletesExpiredImagesAndKeepsRecord) {
   prepare("0001");
   ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
   EXPECT_EQ(records("clean").exit_code, 2);
@@ -54,7 +54,7 @@ TEST_F(VlpStationRecords, CleanDeletesExpiredFolders) {
 }
 
 /// Stations that share their records.
-TEST_F(VlpStationRecords, ListsOnlyRunsOfItsStation) {
+TEST_F(VlpStationRecords, ListsOnlyRunsOfOwnStationInSharedRecords) {
   ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
   change("station.yaml", "station: station-1", "station: station-2");
   ASSERT_EQ(run_program(run("0002", "--idle-s 0.1")).exit_code, 3);
@@ -73,7 +73,7 @@ TEST_F(VlpStationRecords, ListsOnlyRunsOfItsStation) {
 }
 
 /// Manual changes of the database are detected.
-TEST_F(VlpStationRecords, VerifyDetectsChangedRecords) {
+TEST_F(VlpStationRecords, VerifyRecordsFailsWhenRunWasChanged) {
   prepare("0001");
   ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
   const auto kept = records("verify-records");
@@ -103,7 +103,7 @@ TEST_F(VlpStationRecords, VerifyDetectsChangedRecords) {
 }
 
 /// A voided run, with operator and reason.
-TEST_F(VlpStationRecords, VoidsRun) {
+TEST_F(VlpStationRecords, VoidRecordsOperatorAndReasonAndRemovesVerdict) {
   prepare("0001");
   ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
   const std::string listed = records("list").output;
@@ -129,7 +129,7 @@ TEST_F(VlpStationRecords, VoidsRun) {
 }
 
 /// The recipe of apps/vlp-station.md, "Backup", with SQLite and with PostgreSQL.
-TEST_F(VlpStationRecords, AreRestoredFromBackup) {
+TEST_F(VlpStationRecords, ShowIsUnchangedAfterRestoreFromBackup) {
   const std::string backup = (folder / "backup").string(), here = (folder / "station").string();
   fs::create_directory(backup);
   prepare("0001");
@@ -170,7 +170,7 @@ TEST_F(VlpStationRecords, AreRestoredFromBackup) {
 }
 
 /// A station that is watched: exit code 1 for an alarm, of what can be compared.
-TEST_F(VlpStationRecords, TrendReportsAlarm) {
+TEST_F(VlpStationRecords, TrendExitsWith1ForOutlierAmongComparableRuns) {
   render_four_boards();
   ASSERT_EQ(run_program(batch()).exit_code, 3);  // makes the tables
   const auto add = [&](int first, const std::string& of, const std::string& kind,

@@ -20,7 +20,7 @@ using testing::Not;
 class VlpStationShift : public SmallStation {};
 
 /// Overdue, the golden unit comes before all units.
-TEST_F(VlpStationShift, PassesNoUnitWhileGoldenUnitIsDue) {
+TEST_F(VlpStationShift, PassesNoUnitWhileGoldenUnitIsDueOrFailed) {
   render("check");
   fs::copy_file(folder / "unit/true_calibration.yaml", folder / "station/golden.yaml");
   change("station.yaml", "# The images of a unit",
@@ -85,7 +85,7 @@ TEST_F(VlpStationShift, PassesNoUnitWhileGoldenUnitIsDue) {
 }
 
 /// Unit after unit without a terminal: a line each. What becomes of one ends nothing.
-TEST_F(VlpStationShift, MeasuresUnitsSequentially) {
+TEST_F(VlpStationShift, MeasuresUnitsFromStdinSequentiallyDespiteFaults) {
   render();
   change("station.yaml", "records: records.db",
          "records: records.db\nserial_pattern: '[0-9]{4}'\nhook: {command: [\"false\"]}");
@@ -113,7 +113,7 @@ TEST_F(VlpStationShift, MeasuresUnitsSequentially) {
 }
 
 /// The golden unit's serial is a `verify` of what has arrived, and no unit of the shift.
-TEST_F(VlpStationShift, RequiresGoldenUnitWhenDue) {
+TEST_F(VlpStationShift, VerifiesScannedGoldenUnitBeforeUnitsWhenDue) {
   render("check");
   fs::copy_file(folder / "unit/true_calibration.yaml", folder / "station/golden.yaml");
   change("station.yaml", "# The images of a unit",
@@ -142,7 +142,7 @@ TEST_F(VlpStationShift, RequiresGoldenUnitWhenDue) {
 
 /// From a tenth of the units to the last of them, of which VLP_STATION_UNITS may say another
 /// number.
-TEST_F(VlpStationShift, MemoryDoesNotGrow) {
+TEST_F(VlpStationShift, MemoryGrowsLessThan10PercentOverUnits) {
   const char* said = std::getenv("VLP_STATION_UNITS");
   const std::string units = said == nullptr ? "20" : said;
   const auto shift = run_program(
@@ -166,7 +166,7 @@ TEST_F(VlpStationShift, MemoryDoesNotGrow) {
 }
 
 /// A hook gets each run; that it fails is recorded and said, and it can be run again.
-TEST_F(VlpStationShift, CallsHookForEachVerdict) {
+TEST_F(VlpStationShift, ReportsFailedHookAndHookCommandRerunsIt) {
   render_four_boards();
   change("station.yaml", "records: records.db",
          "records: records.db\nhook: {command: [sh, hook.sh], time_limit_s: 20}");

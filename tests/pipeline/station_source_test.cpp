@@ -30,7 +30,7 @@ bool write_video(const fs::path& file, const std::vector<fs::path>& images) {
   return true;
 }
 
-TEST_F(VlpStationSource, AcceptsVideo) {
+TEST_F(VlpStationSource, UsesFramesOfVideoAsBoardImages) {
   render();
   prepare("a");
   const std::string video = (folder / "boards.avi").string();
@@ -45,7 +45,7 @@ TEST_F(VlpStationSource, AcceptsVideo) {
 }
 
 /// All frames are rejected and none is kept: the record has the reason.
-TEST_F(VlpStationSource, ReportsCauseOfUnusableVideo) {
+TEST_F(VlpStationSource, ReportsBlurWhenAllVideoFramesAreRejected) {
   change("scene.yaml", "blur_px: 0.7", "blur_px: 2.5");
   change("scene.yaml", "count: 16", "count: 6");
   render("boards");
@@ -58,7 +58,7 @@ TEST_F(VlpStationSource, ReportsCauseOfUnusableVideo) {
   EXPECT_THAT(records("show").output, HasSubstr("images     10, 0 used"));
 }
 
-TEST_F(VlpStationSource, LeavesNoFilesWhenMissing) {
+TEST_F(VlpStationSource, LeavesNoCapturesWhenSourceCannotBeOpened) {
   const auto camera = run_program(run("0001", "--source boards=/dev/video99"));
   EXPECT_EQ(camera.exit_code, 2);
   EXPECT_EQ(camera.errors,
@@ -71,7 +71,7 @@ TEST_F(VlpStationSource, LeavesNoFilesWhenMissing) {
 }
 
 /// Frames that had room are kept whole, and the same command goes on with them once there is room.
-TEST_F(VlpStationSource, SurvivesFullDisk) {
+TEST_F(VlpStationSource, KeepsCompleteFramesOfVideoWhenDiskIsFull) {
   change("scene.yaml", "count: 16", "count: 8");
   change("station.yaml", "board_views: 16", "board_views: 8");
   render("boards");

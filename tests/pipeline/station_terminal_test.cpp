@@ -84,7 +84,7 @@ class VlpStationTerminal : public SmallStation {
   }
 };
 
-TEST_F(VlpStationTerminal, GuidesOperatorThroughUnit) {
+TEST_F(VlpStationTerminal, ShowsProgressAndVerdictOfUnit) {
   if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
   change("station.yaml", "same_pose_fraction: 0.01", "same_pose_fraction: 0.02");
   render();
@@ -127,7 +127,7 @@ TEST_F(VlpStationTerminal, GuidesOperatorThroughUnit) {
   EXPECT_THAT(TemporaryFolder::read_content(folder / "log"), Not(HasSubstr("error")));
 }
 
-TEST_F(VlpStationTerminal, UsesColorAndStopsOnKey) {
+TEST_F(VlpStationTerminal, ShowsColorsAndEndsRunOnKeyQ) {
   if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
   const Tmux tmux("PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null");
   tmux.screen_with("Ctrl-C");
@@ -139,7 +139,7 @@ TEST_F(VlpStationTerminal, UsesColorAndStopsOnKey) {
 }
 
 /// A shift: who measures, then unit after unit by a scanner, which types.
-TEST_F(VlpStationTerminal, RunsShift) {
+TEST_F(VlpStationTerminal, ShowsUnitsOfShiftWithScannedSerials) {
   if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
   change("station.yaml", "records: records.db",
          "records: records.db\nserial_pattern: 'SN-[0-9]{4}'");
@@ -172,7 +172,7 @@ TEST_F(VlpStationTerminal, RunsShift) {
 }
 
 /// The operator need not take the rest of the unit.
-TEST_F(VlpStationTerminal, ReportsCertainFailureEarly) {
+TEST_F(VlpStationTerminal, ShowsFailureBeforeRemainingStepsHaveImages) {
   if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
   change("scene.yaml", "402.3, 297.4", "418.3, 285.4");
   change("scene.yaml", "count: 16", "count: 12");
@@ -194,7 +194,7 @@ int lines_with(const std::string& screen, const std::string& text) {
   return count;
 }
 
-TEST_F(VlpStationTerminal, AdaptsToTerminalSize) {
+TEST_F(VlpStationTerminal, RedrawsScreenWhenTerminalIsResized) {
   if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
   const Tmux tmux("PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null",
                   "-x 80 -y 24");

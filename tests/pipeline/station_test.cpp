@@ -111,7 +111,7 @@ TEST_F(VlpStation, PassesGoodUnitAndKeepsRecord) {
 }
 
 /// Runs on the same images count once, independently of the verdict.
-TEST_F(VlpStation, CountsSameImagesOnce) {
+TEST_F(VlpStation, RejectsAlreadyJudgedImagesUntilRunIsVoided) {
   render();
   ASSERT_EQ(run_program(batch()).exit_code, 0);
   const std::string first = only_results("0001").filename().string();
@@ -129,7 +129,7 @@ TEST_F(VlpStation, CountsSameImagesOnce) {
 }
 
 /// The station feeds images one by one to the steps that vlp-calibrate takes a folder through.
-TEST_F(VlpStation, MatchesVlpCalibrate) {
+TEST_F(VlpStation, MetricsEqualThoseOfVlpCalibrate) {
   render();
   folder.file("unit/check/captures.csv", with_inclinations("check"));
   ASSERT_EQ(run_program(batch()).exit_code, 0);
@@ -174,7 +174,7 @@ TEST_F(VlpStation, MatchesVlpCalibrate) {
   EXPECT_NEAR(of_station("check_mean_mm"), horizontal.at("mean_mm").get<double>(), 1e-6);
 }
 
-TEST_F(VlpStation, NamesFaultOfLampsAndBoard) {
+TEST_F(VlpStation, NamesMovedLampSwappedLampsAndWrongBoard) {
   render();
   const auto lamps = TemporaryFolder::read_content(folder / "station/lamps.yaml");
   change("lamps.yaml", "[0, 0.28, 1.6]", "[0.05, 0.27, 1.6]");
@@ -207,7 +207,7 @@ TEST_F(VlpStation, NamesFaultOfLampsAndBoard) {
 }
 
 /// Faults of the operator or the station do not fail a unit.
-TEST_F(VlpStation, DoesNotFailUnitForStationFault) {
+TEST_F(VlpStation, ReturnsInvalidNotFailForStationFaults) {
   render();
   const auto table = folder / "unit/check/captures.csv", truth = folder / "unit/check/truth.csv";
   fs::rename(table, folder / "captures.csv");
@@ -253,7 +253,7 @@ TEST_F(VlpStation, DoesNotFailUnitForStationFault) {
 
 /// Row times with which lamps are still identified, with which none is, and with which each is
 /// taken for its neighbor.
-TEST_F(VlpStation, ReportsWrongRowTime) {
+TEST_F(VlpStation, ReturnsInvalidAndMeasuredRowTimeForWrongTypeFile) {
   render();
   std::string stated = "row_time_s: 3.0e-05";
   for (const char* wrong_us : {"28.5", "33", "37.5"}) {
@@ -271,7 +271,7 @@ TEST_F(VlpStation, ReportsWrongRowTime) {
   EXPECT_THAT(records("show").output, HasSubstr("row_time_sd_us"));
 }
 
-TEST_F(VlpStation, ReportsWrongRowTimeOfGoldenUnit) {
+TEST_F(VlpStation, VerifyReportsWrongRowTimeInGoldenCalibration) {
   render("check");
   const std::string right = TemporaryFolder::read_content(folder / "unit/true_calibration.yaml");
   const std::string stated = "row_time_s: 0.00003";
@@ -293,7 +293,7 @@ TEST_F(VlpStation, ReportsWrongRowTimeOfGoldenUnit) {
 }
 
 /// One unit's images, as another's.
-TEST_F(VlpStation, RejectsImagesOfAnotherUnit) {
+TEST_F(VlpStation, RejectsImagesUsedForAnotherSerial) {
   render_four_boards();
   EXPECT_EQ(run_program(batch("0001")).exit_code, 3);
   EXPECT_EQ(run_program(batch("0001")).exit_code, 3);  // its own, again
@@ -307,7 +307,7 @@ TEST_F(VlpStation, RejectsImagesOfAnotherUnit) {
 }
 
 /// The way out that is named after images went under a wrong serial.
-TEST_F(VlpStation, ReleasesImagesOfVoidedRun) {
+TEST_F(VlpStation, AcceptsImagesForOtherSerialAfterRunIsVoided) {
   render_four_boards();
   EXPECT_EQ(run_program(batch("MIX")).exit_code, 3);
   const std::string errors = run_program(batch("0002")).errors;
@@ -318,7 +318,7 @@ TEST_F(VlpStation, ReleasesImagesOfVoidedRun) {
 }
 
 /// Before the first image is looked at.
-TEST_F(VlpStation, ReportsUnwritableResultsBeforeFirstImage) {
+TEST_F(VlpStation, RejectsUnwritableResultsFolder) {
   folder.file("station/results", "a file");
   const auto result = run_program(run("0001", "--idle-s 60"));
   EXPECT_EQ(result.exit_code, 2);
@@ -326,7 +326,7 @@ TEST_F(VlpStation, ReportsUnwritableResultsBeforeFirstImage) {
 }
 
 /// Whatever cannot be written, the verdict is on the screen, in the record, and can be restored.
-TEST_F(VlpStation, KeepsVerdictWhenFilesCannotBeWritten) {
+TEST_F(VlpStation, RecordsVerdictAndRestoresFilesThatCouldNotBeWritten) {
   render_four_boards();
   fs::create_directories(captures("0001"));
   fs::copy(folder / "unit/boards", captures("0001") / "boards");
@@ -354,7 +354,7 @@ TEST_F(VlpStation, KeepsVerdictWhenFilesCannotBeWritten) {
 }
 
 /// Repetitions of evaluated units are found in the records.
-TEST_F(VlpStation, ReportsUncheckedRepetitionsWhileRecordsAreUnavailable) {
+TEST_F(VlpStation, WarnsThatRepetitionIsUncheckedWhileRecordsAreOffline) {
   change("station.yaml", "records: records.db", "records: share/records.db");
   render();
   const auto passed = run_program(batch());
@@ -366,7 +366,7 @@ TEST_F(VlpStation, ReportsUncheckedRepetitionsWhileRecordsAreUnavailable) {
 }
 
 /// Records away: units get their verdicts all the same, and nothing is lost.
-TEST_F(VlpStation, SpoolsRunsWhileRecordsAreUnavailable) {
+TEST_F(VlpStation, SpoolsRunsAndDeliversThemWhenRecordsReturn) {
   change("station.yaml", "records: records.db", "records: share/records.db");
   render_four_boards();
   const auto first = run_program(batch("0001"));
@@ -410,7 +410,7 @@ TEST_F(VlpStation, SpoolsRunsWhileRecordsAreUnavailable) {
 }
 
 /// Saturation hides edges and stripes.
-TEST_F(VlpStation, ReportsOverexposure) {
+TEST_F(VlpStation, RefusesOverexposedBoardImages) {
   change("scene.yaml", "white_e_per_s: 2.4e+6", "white_e_per_s: 2.4e+8");
   render_four_boards();
   const auto boards = run_program(batch("0001"));
@@ -419,7 +419,7 @@ TEST_F(VlpStation, ReportsOverexposure) {
 }
 
 /// Lamps below the noise, and a saturated ceiling.
-TEST_F(VlpStation, ReportsWrongExposureOfLampImages) {
+TEST_F(VlpStation, RefusesOverexposedAndTooDarkLampImages) {
   render("boards");
   change("scene.yaml", "ambient_e_per_s: 1.0e+6", "ambient_e_per_s: 1.0e+10");
   render_after_the_boards("rotation");
@@ -435,7 +435,7 @@ TEST_F(VlpStation, ReportsWrongExposureOfLampImages) {
 }
 
 /// The lamps do not turn about one axis, and the fixes scatter: because of that.
-TEST_F(VlpStation, ReportsLampImagesOfAnotherCamera) {
+TEST_F(VlpStation, ReturnsInvalidWhenAllLampImagesShowAnotherLens) {
   render("boards");
   change("scene.yaml", "[520, 520.6, 402.3, 297.4", "[508, 508.4, 407.3, 304.4");
   render_after_the_boards("rotation,dispersion,check");
@@ -447,7 +447,7 @@ TEST_F(VlpStation, ReportsLampImagesOfAnotherCamera) {
 }
 
 /// Images of another unit among those of the boards.
-TEST_F(VlpStation, ReportsBoardImagesOfAnotherUnit) {
+TEST_F(VlpStation, ReturnsInvalidAndNamesBoardImagesOfAnotherUnit) {
   render("boards");
   fs::rename(folder / "unit", folder / "first");
   change("scene.yaml", "[520, 520.6, 402.3, 297.4", "[508, 508.4, 407.3, 304.4");
@@ -474,7 +474,7 @@ TEST_F(VlpStation, ReportsBoardImagesOfAnotherUnit) {
 }
 
 /// Images of another unit among those of the check, or all of them.
-TEST_F(VlpStation, ReportsCheckImagesOfAnotherUnit) {
+TEST_F(VlpStation, ReturnsInvalidWhenCheckImagesShowAnotherUnit) {
   render();
   fs::rename(folder / "unit", folder / "first");
   change("scene.yaml", "[520, 520.6, 402.3, 297.4", "[516, 516.5, 399.1, 301.0");
@@ -508,7 +508,7 @@ TEST_F(VlpStation, ReportsCheckImagesOfAnotherUnit) {
 }
 
 /// Images of another unit that the fits reject as outliers.
-TEST_F(VlpStation, ReportsLampImagesOfAnotherUnit) {
+TEST_F(VlpStation, ReturnsInvalidAndNamesLampImagesOfAnotherUnit) {
   render();
   fs::rename(folder / "unit", folder / "first");
   change("scene.yaml", "[520, 520.6, 402.3, 297.4", "[508, 508.4, 407.3, 304.4");
@@ -531,7 +531,7 @@ TEST_F(VlpStation, ReportsLampImagesOfAnotherUnit) {
 }
 
 /// A camera that tilts in its housing after the turn.
-TEST_F(VlpStation, FailsLooseUnit) {
+TEST_F(VlpStation, FailsUnitWhoseTiltChangesBeforeCheck) {
   render();
   fs::rename(folder / "unit/check", folder / "check");
   fs::rename(folder / "unit", folder / "first");
@@ -558,7 +558,7 @@ struct LensFault {
 };
 class VlpStationFaultyLens : public SmallStation, public testing::WithParamInterface<LensFault> {};
 
-TEST_P(VlpStationFaultyLens, IsNamedAsCause) {
+TEST_P(VlpStationFaultyLens, FirstCauseNamesFaultOfLens) {
   change("scene.yaml", GetParam().from, GetParam().to);
   change("scene.yaml", "count: 16", "count: 12");
   change("station.yaml", "board_views: 16", "board_views: 12");
@@ -592,7 +592,7 @@ INSTANTIATE_TEST_SUITE_P(
                               "boards (0/12): 12 of 12 images refused: 12 too dark"}),
     [](const auto& instance) { return instance.param.name; });
 
-TEST_F(VlpStation, NamesUnknownCommand) {
+TEST_F(VlpStation, NamesUnknownOrMissingCommand) {
   for (const char* words : {"diff", "diff --operator Ann", "diff run-1 run-2"}) {
     const auto refused = run_program(std::string("vlp-station ") + words);
     EXPECT_EQ(refused.exit_code, 2) << words;
@@ -607,7 +607,7 @@ TEST_F(VlpStation, NamesUnknownCommand) {
   EXPECT_THAT(run_program("vlp-station --oprator Ann").errors, HasSubstr("unknown: --oprator"));
 }
 
-TEST_F(VlpStation, RejectsInvalidInput) {
+TEST_F(VlpStation, RejectsMissingFoldersRunsMetricsAndRecords) {
   EXPECT_EQ(run_program(batch()).exit_code, 2);  // no folders
   EXPECT_EQ(run_program(run("../up", "--batch " + folder.file("a", "").string())).exit_code, 2);
   EXPECT_THAT(records("show").errors, HasSubstr("no such run"));

@@ -15,7 +15,7 @@ using testing::HasSubstr;
 
 class VlpStationWatched : public SmallStation {};
 
-TEST_F(VlpStationWatched, MatchesBatchRunAndArchivesImages) {
+TEST_F(VlpStationWatched, CalibrationEqualsBatchRunAndImagesAreArchived) {
   render();
   ASSERT_EQ(run_program(batch("a")).exit_code, 0);
   take_again();
@@ -34,7 +34,7 @@ TEST_F(VlpStationWatched, MatchesBatchRunAndArchivesImages) {
   EXPECT_EQ(kept, 48);
 }
 
-TEST_F(VlpStationWatched, ReportsReasonOfRejectedImage) {
+TEST_F(VlpStationWatched, PrintsReasonForEachRejectedImage) {
   const auto at = captures("a") / "boards";
   fs::create_directories(at);
   const std::string view = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample-boards/0000.png";
@@ -53,7 +53,7 @@ TEST_F(VlpStationWatched, ReportsReasonOfRejectedImage) {
 }
 
 /// All that is there when a run goes on comes at once: its order is no order.
-TEST_F(VlpStationWatched, IgnoresOrderOfExistingRejectedImages) {
+TEST_F(VlpStationWatched, TakesGoodImageAfterManyUnreadableExistingImages) {
   const auto at = captures("a") / "boards";
   fs::create_directories(at);
   for (int i = 0; i < 13; ++i) std::ofstream(at / ("bad-" + std::to_string(i) + ".png")) << "none";
@@ -66,7 +66,7 @@ TEST_F(VlpStationWatched, IgnoresOrderOfExistingRejectedImages) {
 }
 
 /// A name cannot speak to the terminal.
-TEST_F(VlpStationWatched, EscapesControlCharactersInNames) {
+TEST_F(VlpStationWatched, EscapesControlCharactersOfFileNamesInOutput) {
   const auto at = captures("a") / "boards";
   fs::create_directories(at);
   std::ofstream(at / "\x1b[2Jgone.png") << "none";
@@ -79,7 +79,7 @@ TEST_F(VlpStationWatched, EscapesControlCharactersInNames) {
 }
 
 /// A captures.csv that comes last, and in parts, is read when it is whole.
-TEST_F(VlpStationWatched, WaitsForTablesOfPlaces) {
+TEST_F(VlpStationWatched, WaitsForCompleteCapturesTable) {
   render();
   prepare("a");
   const auto table = captures("a") / "check/captures.csv";
@@ -94,7 +94,7 @@ TEST_F(VlpStationWatched, WaitsForTablesOfPlaces) {
 
 /// Inclinations that arrive after the images: lamps are detected again in the planes that are level
 /// by them, as for inclinations that arrive before.
-TEST_F(VlpStationWatched, RedetectsLampsAfterNewInclinations) {
+TEST_F(VlpStationWatched, CalibrationIsSameWhenInclinationsArriveAfterImages) {
   render();
   const std::string told = with_inclinations("dispersion");
   ASSERT_EQ(run_program(batch("untold")).exit_code, 0);

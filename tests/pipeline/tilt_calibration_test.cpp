@@ -48,7 +48,7 @@ class VlpRotationByLamps : public testing::Test {
   }
 };
 
-TEST_F(VlpRotationByLamps, WritesTilt) {
+TEST_F(VlpRotationByLamps, WritesTrueTiltAndDropsDispersion) {
   auto frames = drive(10);
   frames[3].detections.resize(2);
   const auto result = level(frames);
@@ -66,7 +66,7 @@ TEST_F(VlpRotationByLamps, WritesTilt) {
             "--lamps lamps.yaml --calibration camera.yaml --method lamps");
 }
 
-TEST_F(VlpRotationByLamps, WritesRefinedMap) {
+TEST_F(VlpRotationByLamps, RefineMapRestoresTrueLampDistancesUpToScale) {
   for (Lamp& lamp : rig.map.lamps) lamp.position_m.x() += random.uniform(-0.004, 0.004);
   const auto plain = level(drive(20));
   EXPECT_THAT(plain.errors, HasSubstr("--refine-map may help"));
@@ -94,7 +94,7 @@ TEST_F(VlpRotationByLamps, WritesRefinedMap) {
 }
 
 /// One that drives at 1 m/s, by odometry in captures.csv, by its greatest speed, and left out.
-TEST_F(VlpRotationByLamps, AcceptsCapturesOfMovingCamera) {
+TEST_F(VlpRotationByLamps, TiltErrorDecreasesWithOdometryOrMaximumSpeed) {
   BodyRig body{rig.map, rolling_calibration(), {}, {}};
   body.calibration.rotation_center = rig.calibration.rotation_center;
   rig.calibration.camera = body.calibration.camera;
@@ -130,7 +130,7 @@ TEST_F(VlpRotationByLamps, AcceptsCapturesOfMovingCamera) {
   }
 }
 
-TEST_F(VlpRotationByLamps, RejectsUnusableCapturesWithCause) {
+TEST_F(VlpRotationByLamps, RejectsTooFewOrEqualCapturesAndOtherMap) {
   const auto one = level(drive(1));
   EXPECT_EQ(one.exit_code, 3);
   EXPECT_THAT(one.errors, HasSubstr("add captures"));
@@ -149,7 +149,7 @@ TEST_F(VlpRotationByLamps, RejectsUnusableCapturesWithCause) {
   EXPECT_THAT(other_map.errors, HasSubstr("lamps.yaml: has none of the lamps"));
 }
 
-TEST_F(VlpRotationByLamps, RejectsIncompatibleOptions) {
+TEST_F(VlpRotationByLamps, RejectsOverwrittenInputsAndOptionsOfOtherMethods) {
   EXPECT_EQ(level(drive(5), "--refine-map " + path("leveled.yaml")).exit_code, 2);
   EXPECT_EQ(level(drive(5), "--refine-map " + path("lamps.yaml")).exit_code, 2);
   EXPECT_EQ(level(drive(5), "--plot " + path("a.png")).exit_code, 2);

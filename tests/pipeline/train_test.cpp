@@ -44,7 +44,7 @@ class VlpTrain : public testing::Test {
   const fs::path output = folder / "trained.yaml";
 };
 
-TEST_F(VlpTrain, MakesClassifierForVlpDetectAndVlpLocate) {
+TEST_F(VlpTrain, ClassifierIdentifiesAllLampsInVlpDetectAndVlpLocate) {
   const auto trained = train(captures() + kLamps + kCalibration);
   ASSERT_EQ(trained.exit_code, 0) << trained.errors;
   EXPECT_THAT(trained.output, HasSubstr("correct     100.00 %\n  wrong     0\n  unknown   0\n"));
@@ -60,18 +60,18 @@ TEST_F(VlpTrain, MakesClassifierForVlpDetectAndVlpLocate) {
                                     output.string() + " -o " + (folder / "found.csv").string());
   ASSERT_EQ(detected.exit_code, 0) << detected.errors;
   const CsvTable found(folder / "found.csv"), truth(kRig + "/sample/true_detections.csv");
-  ASSERT_EQ(found.rows(), 12);
-  for (std::size_t row = 0; row < found.rows(); ++row) {
+  ASSERT_EQ(found.num_rows(), 12);
+  for (std::size_t row = 0; row < found.num_rows(); ++row) {
     const auto matches = [&](std::size_t other) {
-      return found.get_text(row, found.get_required_column("image")) ==
-                 truth.get_text(other, truth.get_required_column("image")) &&
-             found.get_integer(row, found.get_required_column("lamp")) ==
-                 truth.get_integer(other, truth.get_required_column("lamp")) &&
-             std::abs(found.get_number(row, found.get_required_column("u_px")) -
-                      truth.get_number(other, truth.get_required_column("u_px"))) < 0.5;
+      return found.get_cell_text(row, found.get_required_column("image")) ==
+                 truth.get_cell_text(other, truth.get_required_column("image")) &&
+             found.get_cell_integer(row, found.get_required_column("lamp")) ==
+                 truth.get_cell_integer(other, truth.get_required_column("lamp")) &&
+             std::abs(found.get_cell_number(row, found.get_required_column("u_px")) -
+                      truth.get_cell_number(other, truth.get_required_column("u_px"))) < 0.5;
     };
     int matching = 0;
-    for (std::size_t other = 0; other < truth.rows(); ++other) matching += matches(other);
+    for (std::size_t other = 0; other < truth.num_rows(); ++other) matching += matches(other);
     EXPECT_EQ(matching, 1) << row;
   }
   const auto located = run_program("vlp-locate " + kRig + "/sample" + rest + " --classifier " +
@@ -80,7 +80,7 @@ TEST_F(VlpTrain, MakesClassifierForVlpDetectAndVlpLocate) {
   EXPECT_THAT(located.output, HasSubstr("fixes       2\n"));
 }
 
-TEST_F(VlpTrain, GivesSameBytesForAllThreadCounts) {
+TEST_F(VlpTrain, WritesIdenticalClassifierForOneAndFourThreads) {
   const std::string options = captures() + kLamps + kCalibration;
   ASSERT_EQ(train(options + " --threads 1").exit_code, 0);
   const std::string one = TemporaryFolder::read_content(output);
@@ -88,7 +88,7 @@ TEST_F(VlpTrain, GivesSameBytesForAllThreadCounts) {
   EXPECT_EQ(TemporaryFolder::read_content(output), one);
 }
 
-TEST_F(VlpTrain, NamesLampsWithTooFewLights) {
+TEST_F(VlpTrain, NamesLampsWithTooFewLabeledLights) {
   const auto result = train(kRig + "/sample" + kLamps);
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(result.errors, HasSubstr("too few labeled lights of lamps 1 (has 2), 2 (has 2)"));
@@ -96,7 +96,7 @@ TEST_F(VlpTrain, NamesLampsWithTooFewLights) {
   EXPECT_FALSE(fs::exists(output));
 }
 
-TEST_F(VlpTrain, RequiresLabels) {
+TEST_F(VlpTrain, RejectsMissingLabelsAndLabelsOfUnknownLamps) {
   fs::create_directory(folder / "bare");
   fs::copy(kRig + "/sample/0000.png", folder / "bare/0000.png");
   const auto result = train((folder / "bare").string() + kLamps);
@@ -110,7 +110,7 @@ TEST_F(VlpTrain, RequiresLabels) {
   EXPECT_EQ(run_program("vlp-train " + kRig + "/sample" + kLamps).exit_code, 2) << "no output";
 }
 
-TEST_F(VlpTrain, EstimatesRowTimeAndReadoutDirection) {
+TEST_F(VlpTrain, WritesTrueRowTimeAndReadoutFromUnlabeledImages) {
   // Nothing but the images is there.
   fs::create_directory(folder / "images");
   for (const auto& entry : fs::directory_iterator(captures())) {
@@ -136,7 +136,7 @@ TEST_F(VlpTrain, EstimatesRowTimeAndReadoutDirection) {
 
 /// Without its first lamp, which shows too few stripes, the frequencies of this scene fit two row
 /// times.
-TEST_F(VlpTrain, EstimatesRowTimeFromLampPositions) {
+TEST_F(VlpTrain, LampPositionsDecideBetweenTwoFittingRowTimes) {
   const fs::path set = folder / "archive";
   const auto simulated = run_program("vlp-simulate " VLP_SOURCE_DIR
                                      "/datasets/archive/scene.yaml -q --only rotation -o " +
@@ -162,7 +162,7 @@ TEST_F(VlpTrain, EstimatesRowTimeFromLampPositions) {
 }
 
 /// The classifier is still trained, because it identifies lamps without the row time.
-TEST_F(VlpTrain, ReportsBothRowTimesIfGivenOneIsWrong) {
+TEST_F(VlpTrain, ReportsGivenAndMeasuredRowTimeWhenTheyDiffer) {
   const std::string images = captures();
   const std::string right = TemporaryFolder::read_content(kRig + "/true_calibration.yaml");
   const std::string stated = "row_time_s: 0.00003";
@@ -190,7 +190,7 @@ TEST_F(VlpTrain, ReportsBothRowTimesIfGivenOneIsWrong) {
   EXPECT_THAT(train(images + kLamps + kCalibration).errors, testing::Not(HasSubstr("row time")));
 }
 
-TEST_F(VlpTrain, ReportsAmbiguousRowTime) {
+TEST_F(VlpTrain, ExitsWith3WhenFrequenciesFitSeveralRowTimes) {
   std::string map = "format: vlp-lamps/1\nlamps:\n";
   for (int id = 1; id <= 9; ++id) {
     map += "  - {id: " + std::to_string(id) + ", position_m: [" + std::to_string(id) +
@@ -209,7 +209,7 @@ TEST_F(VlpTrain, ReportsAmbiguousRowTime) {
   EXPECT_THAT(nowhere.errors, HasSubstr("add --calibration"));
 }
 
-TEST_F(VlpTrain, EstimatesColumnReadoutForVlpDetect) {
+TEST_F(VlpTrain, VlpDetectEstimatesColumnReadoutWhenCalibrationHasNone) {
   const std::string wide = VLP_SOURCE_DIR "/datasets/wide/rendered";
   std::string calibration = TemporaryFolder::read_content(wide + "/true_calibration.yaml");
   calibration.erase(calibration.find("  readout: columns\n"), 19);
@@ -219,15 +219,15 @@ TEST_F(VlpTrain, EstimatesColumnReadoutForVlpDetect) {
   const auto found = run_program(command);
   ASSERT_EQ(found.exit_code, 0) << found.errors;
   EXPECT_THAT(found.errors, HasSubstr("the images show stripes along columns"));
-  const auto lamps = CsvTable(folder / "found.csv").rows();
+  const auto lamps = CsvTable(folder / "found.csv").num_rows();
   EXPECT_GE(lamps, 6);
   ASSERT_EQ(run_program(command + " --readout columns").exit_code, 0);
-  EXPECT_EQ(CsvTable(folder / "found.csv").rows(), lamps);
+  EXPECT_EQ(CsvTable(folder / "found.csv").num_rows(), lamps);
   EXPECT_EQ(run_program(command + " --readout rows").exit_code, 3);
   EXPECT_EQ(run_program(command + " --readout diagonal").exit_code, 2);
 }
 
-TEST_F(VlpTrain, ClassifierMustMatchLampsAndCamera) {
+TEST_F(VlpTrain, ProgramsRejectClassifierOfOtherLampsOrRowTime) {
   ASSERT_EQ(train(captures() + kLamps + kCalibration).exit_code, 0);
   const auto refusal = [&](const std::string& lamps, const std::string& calibration) {
     const auto result =
@@ -252,7 +252,7 @@ TEST_F(VlpTrain, ClassifierMustMatchLampsAndCamera) {
   EXPECT_THAT(table.errors, HasSubstr("is no folder of images"));
 }
 
-TEST_F(VlpTrain, IsNotRequiredForWarningOfInseparableLamps) {
+TEST_F(VlpTrain, VlpDetectWarnsOfInseparableLampsWithoutClassifier) {
   std::string map = TemporaryFolder::read_content(kRig + "/lamps.yaml");
   map.replace(map.find("2000"), 4, "1620");
   const std::string command = "vlp-detect " + kRig + "/sample" + kCalibration + " --lamps " +

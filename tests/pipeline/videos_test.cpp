@@ -80,7 +80,7 @@ TEST_F(VlpDetectVideo, YieldsSameDetectionsAsImages) {
               Not(HasSubstr("drive.avi#000001")));
 }
 
-TEST_F(VlpDetectVideo, ReportsErrorInOneLine) {
+TEST_F(VlpDetectVideo, RejectsUnusableVideosInOneLine) {
   const auto refused = [&](const std::string& images, const std::string& options,
                            const std::string& message) {
     const auto result = detect(images, "found.csv", options);
@@ -113,7 +113,7 @@ TEST_F(VlpDetectVideo, ReportsErrorInOneLine) {
 
 class BoardVideo : public VlpIntrinsics {};
 
-TEST_F(BoardVideo, YieldsSameCornersAsImages) {
+TEST_F(BoardVideo, VlpIntrinsicsYieldsSameCornersAsForImages) {
   const std::string rig = (folder / "rig").string(), board = rig + "/board.yaml";
   std::string scene =
       TemporaryFolder::read_content(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");

@@ -25,7 +25,7 @@ class PositionerLocateBody : public testing::Test {
 
   static Sensors driving() {
     Sensors sensors;
-    sensors.motion = KnownMotion::up_to(2, 3);
+    sensors.motion = KnownMotion::make_motion_prior_from_limits(2, 3);
     return sensors;
   }
   static Sensors leaning() {
@@ -43,11 +43,11 @@ class PositionerLocateBody : public testing::Test {
 
   std::vector<Detection> seen() { return with_noise(seen_from(rig, kBodyNoise_px), random); }
   Fix locate(const std::vector<Detection>& detections, const Sensors& sensors) const {
-    return rig.positioner().locate(detections, sensors);
+    return rig.positioner().compute_position_fix(detections, sensors);
   }
   /// Expects errors below five reported standard deviations.
   void expect_truth(const Fix& fix) const {
-    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+    ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
     for (int i = 0; i < 3; ++i) {
       EXPECT_NEAR(fix.estimate.pose.position_m[i], rig.body.pose.position_m[i],
                   5 * std::sqrt(fix.estimate.covariance(i, i)));
@@ -55,29 +55,29 @@ class PositionerLocateBody : public testing::Test {
   }
 };
 
-TEST_F(PositionerLocateBody, MatchesStandingFixExactlyWithoutMotion) {
+TEST_F(PositionerLocateBody, EqualsFixWithoutMotionWhenMotionIsExactlyZero) {
   stand();
   Sensors standing;
   standing.motion = KnownMotion();
   const auto detections = seen();
   const Fix with = locate(detections, standing), without = locate(detections, {});
-  ASSERT_TRUE(with.ok());
+  ASSERT_TRUE(with.has_succeeded());
   EXPECT_EQ(with.estimate.pose.position_m, without.estimate.pose.position_m);
   EXPECT_EQ(with.estimate.covariance, without.estimate.covariance);
   EXPECT_FALSE(with.body.has_value());
 }
 
-TEST_F(PositionerLocateBody, ReturnsRowTimeUnknownWithoutRowTime) {
+TEST_F(PositionerLocateBody, ReturnsRowTimeUnknownForMotionWithoutReadoutTiming) {
   auto detections = seen();
   rig.calibration.camera.row_time_s.reset();
   EXPECT_EQ(locate(detections, driving()).status, FixStatus::row_time_unknown);
   rig.calibration.camera.row_time_s = 3e-5;
   rig.calibration.camera.readout.reset();
   EXPECT_EQ(locate(detections, driving()).status, FixStatus::row_time_unknown);
-  EXPECT_TRUE(locate(detections, leaning()).ok());
+  EXPECT_TRUE(locate(detections, leaning()).has_succeeded());
 }
 
-TEST_F(PositionerLocateBody, ReturnsTimeOfSensors) {
+TEST_F(PositionerLocateBody, ReturnsFixWithTimeOfSensors) {
   Sensors sensors = driving();
   sensors.time_s = 17.25;
   EXPECT_EQ(locate(seen(), sensors).time_s, 17.25);
@@ -86,7 +86,7 @@ TEST_F(PositionerLocateBody, ReturnsTimeOfSensors) {
   EXPECT_EQ(locate(seen(), sensors).time_s, 17.25);
 }
 
-TEST_F(PositionerLocateBody, ReturnsNotFiniteForInvalidSensors) {
+TEST_F(PositionerLocateBody, ReturnsNotFiniteForNanOrInvalidSdOfSensors) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (int which = 0; which < 6; ++which) {
     Sensors sensors = driving();
@@ -121,7 +121,7 @@ TEST_F(PositionerLocateBody, ReturnsUndeterminedForCollinearLampsWithFreeTilt) {
 }
 
 /// Three lamps fit several poses of a camera with unknown tilt; a known height selects one.
-TEST_F(PositionerLocateBody, ResolvesAmbiguityOfThreeLampsByHeight) {
+TEST_F(PositionerLocateBody, KnownHeightResolvesMostAmbiguitiesOfThreeLamps) {
   int ambiguous = 0, num_resolved = 0;
   for (int i = 0; i < 200; ++i) {
     rig.body.pose.position_m = {random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.3), 0};
@@ -130,12 +130,12 @@ TEST_F(PositionerLocateBody, ResolvesAmbiguityOfThreeLampsByHeight) {
     if (detections.size() < 3) continue;
     detections.resize(3);
     const Fix alone = locate(detections, leaning());
-    if (alone.ok()) expect_truth(alone);
+    if (alone.has_succeeded()) expect_truth(alone);
     ambiguous += alone.status == FixStatus::ambiguous;
     Sensors with_height = leaning();
     with_height.height = KnownHeight{0, 0.02};
     const Fix fix = locate(detections, with_height);
-    if (!fix.ok()) continue;
+    if (!fix.has_succeeded()) continue;
     expect_truth(fix);
     num_resolved += alone.status == FixStatus::ambiguous;
   }
@@ -143,7 +143,7 @@ TEST_F(PositionerLocateBody, ResolvesAmbiguityOfThreeLampsByHeight) {
   EXPECT_GT(num_resolved, ambiguous / 2);
 }
 
-TEST_F(PositionerLocateBody, RejectsMisidentifiedLamp) {
+TEST_F(PositionerLocateBody, RejectsMisidentifiedLampAndReturnsTruth) {
   for (const bool leans : {false, true}) {
     if (leans) lean();
     for (std::size_t wrong = 0; wrong < 5; ++wrong) {
@@ -170,11 +170,11 @@ TEST_F(PositionerLocateBody, ReturnsNoFixWhenAllLampsContradict) {
     auto detections = seen();
     ASSERT_EQ(detections.size(), 8);
     for (Detection& detection : detections) detection.lamp = 1 + (detection.lamp * 3) % 8;
-    EXPECT_FALSE(locate(detections, sensors).ok());
+    EXPECT_FALSE(locate(detections, sensors).has_succeeded());
   }
 }
 
-TEST_F(PositionerLocateBody, DetectsMirroredMap) {
+TEST_F(PositionerLocateBody, ReturnsMirroredMapForMirroredLampMap) {
   const auto mirrored = [](LampMap map) {
     for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;
     return map;
@@ -189,7 +189,7 @@ TEST_F(PositionerLocateBody, DetectsMirroredMap) {
 }
 
 /// In a room and in a hall of ten times its size.
-TEST_F(PositionerLocateBody, RejectsTwoSwappedLamps) {
+TEST_F(PositionerLocateBody, RejectsTwoSwappedLampsAndReturnsTruth) {
   for (const double scale : {1, 10}) {
     for (Lamp& lamp : rig.map.lamps) lamp.position_m *= scale;
     rig.body.pose.position_m *= scale;
@@ -208,7 +208,7 @@ TEST_F(PositionerLocateBody, RejectsTwoSwappedLamps) {
 }
 
 /// A lamp 36 mm away from its position in the map.
-TEST_F(PositionerLocateBody, RejectsMovedLamp) {
+TEST_F(PositionerLocateBody, RejectsLampMovedBy36MmAndReturnsTruth) {
   for (const bool leans : {false, true}) {
     if (leans) lean();
     const LampMap map = rig.map;
@@ -222,15 +222,15 @@ TEST_F(PositionerLocateBody, RejectsMovedLamp) {
 }
 
 /// A velocity above the maximum indicates another error.
-TEST_F(PositionerLocateBody, ReturnsInconsistentForImpossibleMotion) {
+TEST_F(PositionerLocateBody, ReturnsInconsistentForSpeedFarAboveMaximum) {
   rig.body.motion.velocity_m_per_s = {3, 0};
   Sensors slow;
-  slow.motion = KnownMotion::up_to(0.2, 3);
+  slow.motion = KnownMotion::make_motion_prior_from_limits(0.2, 3);
   EXPECT_EQ(locate(seen(), slow).status, FixStatus::inconsistent);
 }
 
 /// The lamps determine each state to a few percent of its prior.
-TEST_F(PositionerLocateBody, ReturnsInconsistentBeyondFiveSigmasOfPrior) {
+TEST_F(PositionerLocateBody, ReturnsInconsistentForStateBeyondFiveSigmasOfPrior) {
   Sensors known;
   known.motion = KnownMotion{{0, 0}, 0, 0.4, 0.4};
   known.inclination_sigma_rad = 0.02;
@@ -249,15 +249,15 @@ TEST_F(PositionerLocateBody, ReturnsInconsistentBeyondFiveSigmasOfPrior) {
 }
 
 /// A tilted camera with a level prior is inconsistent; with free roll and pitch it is located.
-TEST_F(PositionerLocateBody, ReturnsInconsistentForUnmodeledTilt) {
+TEST_F(PositionerLocateBody, ReturnsInconsistentForTiltedCameraUnlessTiltIsFree) {
   rig.body.motion = {{0, 0}, 0, {0.7, -0.5}};
   rig.map = draw_lamps_in_view(rig, 6, true, 0.3, random);
   EXPECT_EQ(locate(seen(), {}).status, FixStatus::inconsistent);
-  EXPECT_NE(describe(FixStatus::inconsistent).find("tilt"), std::string_view::npos);
+  EXPECT_NE(describe_fix_status(FixStatus::inconsistent).find("tilt"), std::string_view::npos);
   expect_truth(locate(seen(), leaning()));
 }
 
-TEST_F(PositionerLocateBody, MatchesTruthInNationalCoordinates) {
+TEST_F(PositionerLocateBody, MatchesTruthForLargeNationalCoordinates) {
   const Eigen::Vector3d origin_m(4.5e5, 5e6, 120);
   for (Lamp& lamp : rig.map.lamps) lamp.position_m += origin_m;
   rig.body.pose.position_m += origin_m;
@@ -269,21 +269,21 @@ TEST_F(PositionerLocateBody, MatchesTruthInNationalCoordinates) {
 
 /// Noise of 2.5 times the reported one: a lamp is rejected only if that explains the residuals a
 /// hundred times better.
-TEST_F(PositionerLocateBody, KeepsMovedLampThatExplainsLittle) {
+TEST_F(PositionerLocateBody, RejectsOutlierOnlyWhenFarAboveUnderstatedNoise) {
   for (const auto& [moved_px, rejected] : {std::pair(7.0, 0), {25.0, 1}}) {
     auto detections = with_noise(seen_from(rig, 2.5 * kBodyNoise_px), random);
     ASSERT_EQ(detections.size(), 8);
     for (Detection& detection : detections) detection.sigma_px = kBodyNoise_px;
     detections[5].pixel.x() += moved_px;
     const Fix fix = locate(detections, driving());
-    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+    ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
     EXPECT_GT(fix.chi_squared, (rejected == 0 ? 100 : 2) * fix.redundancy);
     EXPECT_EQ(fix.rejected_lamps, rejected) << moved_px << " px";
   }
 }
 
 /// Three lamps determine position and tilt exactly: without any of four the others agree.
-TEST_F(PositionerLocateBody, KeepsAllOfFourLampsWithFreeTilt) {
+TEST_F(PositionerLocateBody, KeepsMovedLampOfFourWithFreeTilt) {
   stand();
   for (std::size_t moved = 0; moved < 4; ++moved) {
     auto detections = seen_from(rig, kBodyNoise_px);
@@ -291,7 +291,7 @@ TEST_F(PositionerLocateBody, KeepsAllOfFourLampsWithFreeTilt) {
     detections.resize(4);
     detections[moved].pixel += Eigen::Vector2d(6, 4);
     const Fix fix = locate(detections, leaning());
-    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+    ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
     EXPECT_GT(fix.chi_squared, 25 * fix.redundancy);
     EXPECT_EQ(fix.rejected_lamps, 0) << moved;
   }
@@ -306,8 +306,8 @@ TEST_F(PositionerLocateBody, CountsLampsAndSightingsOfEarlierFrames) {
   now[4].lamp = 77;
   before[0].lamp = 78;
   const EarlierFrame earlier{before, 0.05};
-  const Fix fix = rig.positioner().locate(now, driving(), {&earlier, 1});
-  ASSERT_TRUE(fix.ok());
+  const Fix fix = rig.positioner().compute_position_fix(now, driving(), {&earlier, 1});
+  ASSERT_TRUE(fix.has_succeeded());
   EXPECT_EQ(fix.lamps, 4);
   EXPECT_EQ(fix.sightings, 4 + 7);
   EXPECT_EQ(fix.unknown_lamps, 1);
@@ -322,8 +322,8 @@ TEST_F(PositionerLocateBody, MatchesTruthOfMovingBodyWithEarlierFrame) {
   const EarlierFrame earlier{before, before_s};
   Sensors sensors;
   sensors.motion = KnownMotion{{0, 0}, 0, 1e3, 1e3};
-  const Fix fix = rig.positioner().locate(now, sensors, {&earlier, 1});
-  ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+  const Fix fix = rig.positioner().compute_position_fix(now, sensors, {&earlier, 1});
+  ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
   EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.body.pose.position_m, 1e-7));
   ASSERT_TRUE(fix.body);
   EXPECT_NEAR(fix.body->yaw_rate_rad_per_s, 0.5, 1e-5);

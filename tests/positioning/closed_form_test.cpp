@@ -11,8 +11,8 @@ namespace vlp {
 namespace {
 
 Sighting seen(const Eigen::Vector3d& lamp_m, const Pose& pose) {
-  return {lamp_m, project_to_normalized_point(LevelPose(pose), lamp_m), Matrix2::Identity() * 500,
-          1};
+  return {lamp_m, project_lamp_to_normalized_point(LevelPose(pose), lamp_m),
+          Matrix2::Identity() * 500, 1};
 }
 
 Pose random_pose(Random& random) {
@@ -25,7 +25,7 @@ void expect_pose(const Pose& pose, const Pose& truth) {
   EXPECT_NEAR(wrap_angle_rad(pose.yaw_rad - truth.yaw_rad), 0, 1e-9);
 }
 
-TEST(ComputeTwoLampPoses, ReturnsOnlyPoseForEqualHeights) {
+TEST(ComputeTwoLampPoses, ReturnsOnlyTruePoseForLampsAtEqualHeight) {
   Random random(3);
   for (int i = 0; i < 200; ++i) {
     const Pose truth = random_pose(random);
@@ -36,7 +36,7 @@ TEST(ComputeTwoLampPoses, ReturnsOnlyPoseForEqualHeights) {
   }
 }
 
-TEST(ComputeTwoLampPoses, ContainsTruthForDifferentHeights) {
+TEST(ComputeTwoLampPoses, ContainsTruePoseForLampsAtDifferentHeights) {
   Random random(4);
   int doubles = 0;
   for (int i = 0; i < 500; ++i) {
@@ -52,21 +52,21 @@ TEST(ComputeTwoLampPoses, ContainsTruthForDifferentHeights) {
     EXPECT_LT((nearest.position_m - truth.position_m).norm(), 1e-6);
     for (int k = 0; k < fix.count; ++k) {
       const LevelPose pose(fix.poses[static_cast<std::size_t>(k)]);
-      EXPECT_THAT(project_to_normalized_point(pose, a.lamp_m), IsNear(a.z, 1e-9));
-      EXPECT_THAT(project_to_normalized_point(pose, b.lamp_m), IsNear(b.z, 1e-9));
+      EXPECT_THAT(project_lamp_to_normalized_point(pose, a.lamp_m), IsNear(a.z, 1e-9));
+      EXPECT_THAT(project_lamp_to_normalized_point(pose, b.lamp_m), IsNear(b.z, 1e-9));
     }
   }
   EXPECT_GT(doubles, 10) << "the ambiguous case was not met";
 }
 
-TEST(ComputeTwoLampPoses, ReturnsNoneForCoincidentLamps) {
+TEST(ComputeTwoLampPoses, ReturnsNoPoseForCoincidentImagePoints) {
   const Pose pose{{0, 0, 0}, 0};
   Sighting a = seen({0, 0, 2}, pose), b = seen({1, 0, 2}, pose);
   b.z = a.z;
   EXPECT_EQ(compute_two_lamp_poses(a, b).count, 0);
 }
 
-TEST(ComputeTwoLampPoses, ReportsLampBelowCamera) {
+TEST(ComputeTwoLampPoses, FlagsLampBelowCameraAndReturnsNoPose) {
   // The only pose has the second lamp, 2 m below the first, at the camera's own height.
   const Sighting a{{0, 0, 3}, {-1, 0}, Matrix2::Identity(), 1};
   const Sighting b{{2, 0, 1}, {1, 0}, Matrix2::Identity(), 1};
@@ -89,7 +89,7 @@ TEST(ComputePoseFromCoplanarLamps, MatchesTruthForThreeLampsOrMore) {
   }
 }
 
-TEST(ComputeOneLampPose, MatchesTruthWithKnownHeightAndYaw) {
+TEST(ComputePoseAtKnownHeightAndYaw, ReturnsTruePoseForOneLamp) {
   Random random(6);
   for (int i = 0; i < 100; ++i) {
     const Pose truth = random_pose(random);
@@ -100,7 +100,7 @@ TEST(ComputeOneLampPose, MatchesTruthWithKnownHeightAndYaw) {
   }
 }
 
-TEST(ComputeOneLampPose, ReturnsNulloptWhenLampIsNotAboveCamera) {
+TEST(ComputePoseAtKnownHeightAndYaw, ReturnsNulloptWhenLampIsNotAboveCamera) {
   const Sighting sighting = seen({0, 0, 2}, {{0, 0, 0}, 0});
   EXPECT_FALSE(compute_pose_at_known_height_and_yaw(sighting, {2, 0}));
   EXPECT_FALSE(compute_pose_at_known_height_and_yaw(sighting, {2.5, 0}));

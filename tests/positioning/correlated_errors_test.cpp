@@ -61,7 +61,7 @@ class CommonErrorsTest : public testing::Test {
 class CommonErrorsOfFix : public CommonErrorsTest,
                           public testing::WithParamInterface<std::tuple<RotationModel, Sensors>> {};
 
-TEST_P(CommonErrorsOfFix, MatchesFiniteDifferencesOfFix) {
+TEST_P(CommonErrorsOfFix, CommonCovarianceMatchesFiniteDifferencesOfFix) {
   const Sensors& known = std::get<Sensors>(GetParam());
   rig.calibration.rotation_center->model = std::get<RotationModel>(GetParam());
   rig.adjust(1);
@@ -76,27 +76,29 @@ TEST_P(CommonErrorsOfFix, MatchesFiniteDifferencesOfFix) {
     LampMap map = rig.map;
     Calibration other = rig.calibration;
     if (parameter < 12) {
-      other = with_lens_error(other, by * Eigen::VectorXd::Unit(12, parameter));
+      other = perturb_lens_intrinsics(other, by * Eigen::VectorXd::Unit(12, parameter));
     } else if (parameter < 14) {
-      other = with_zenith_error(other, by * Eigen::Vector2d::Unit(parameter - 12));
+      other = perturb_zenith_direction(other, by * Eigen::Vector2d::Unit(parameter - 12));
     } else if (parameter >= 16) {
       map.lamps[static_cast<std::size_t>(parameter - 16) / 3].position_m[(parameter - 16) % 3] +=
           by;
     }
     other.adjustment.reset();
-    return to_states(Positioner(map, other, options).locate(detections, known));
+    return to_states(Positioner(map, other, options).compute_position_fix(detections, known));
   };
   Eigen::MatrixXd by_parameters(kBodyStates, 40);
   for (Eigen::Index i = 0; i < 40; ++i) {
     const double step = i < 4 ? 1e-3 : 1e-6;
     by_parameters.col(i) = (fix_with(i, step) - fix_with(i, -step)) / (2 * step);
   }
-  const Fix fix = Positioner(rig.map, rig.calibration, options).locate(detections, known);
-  ASSERT_TRUE(fix.ok());
+  const Fix fix =
+      Positioner(rig.map, rig.calibration, options).compute_position_fix(detections, known);
+  ASSERT_TRUE(fix.has_succeeded());
   ASSERT_EQ(fix.body.has_value(), known.motion || known.inclination_sigma_rad > 0);
   expect_common(fix, by_parameters, adjustment.covariance);
   rig.calibration.adjustment.reset();
-  const Fix noise = Positioner(rig.map, rig.calibration, options).locate(detections, known);
+  const Fix noise =
+      Positioner(rig.map, rig.calibration, options).compute_position_fix(detections, known);
   EXPECT_EQ(noise.estimate.covariance, noise.noise_covariance);
   EXPECT_THAT(fix.noise_covariance, IsNear(noise.noise_covariance, 1e-15));
 }
@@ -119,12 +121,15 @@ std::string name_of_body(const testing::TestParamInfo<CommonErrorsOfFix::ParamTy
 INSTANTIATE_TEST_SUITE_P(
     Bodies, CommonErrorsOfFix,
     testing::Combine(testing::Values(RotationModel::tilt, RotationModel::shift),
-                     testing::Values(sensors(0, {}), sensors(0, KnownMotion::up_to(1, 1)),
-                                     sensors(0.1, {}), sensors(0.1, KnownMotion::up_to(1, 1)))),
+                     testing::Values(sensors(0, {}),
+                                     sensors(0, KnownMotion::make_motion_prior_from_limits(1, 1)),
+                                     sensors(0.1, {}),
+                                     sensors(0.1,
+                                             KnownMotion::make_motion_prior_from_limits(1, 1)))),
     name_of_body);
 
 /// A calibration as by vlp-intrinsics: no other part depends on the lens.
-TEST_F(CommonErrorsTest, MatchesFiniteDifferencesIfOnlyLensIsUncertain) {
+TEST_F(CommonErrorsTest, FixCovarianceMatchesFiniteDifferencesWhenOnlyLensIsUncertain) {
   rig.calibrate_in_a_row();
   rig.calibration.rotation_center.reset();
   rig.calibration.dispersion.reset();
@@ -133,25 +138,25 @@ TEST_F(CommonErrorsTest, MatchesFiniteDifferencesIfOnlyLensIsUncertain) {
   const auto detections = seen_from(rig, 0.1);
   const auto fix_with = [&](Eigen::Index parameter, double by) {
     const Calibration other =
-        with_lens_error(rig.calibration, by * Eigen::VectorXd::Unit(12, parameter));
-    return to_states(Positioner(rig.map, other).locate(detections));
+        perturb_lens_intrinsics(rig.calibration, by * Eigen::VectorXd::Unit(12, parameter));
+    return to_states(Positioner(rig.map, other).compute_position_fix(detections));
   };
   Eigen::MatrixXd by_parameters(kBodyStates, 12);
   for (Eigen::Index i = 0; i < 12; ++i) {
     const double step = i < 4 ? 1e-3 : 1e-6;
     by_parameters.col(i) = (fix_with(i, step) - fix_with(i, -step)) / (2 * step);
   }
-  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections);
-  ASSERT_TRUE(fix.ok());
+  const Fix fix = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
+  ASSERT_TRUE(fix.has_succeeded());
   EXPECT_GT(fix.estimate.covariance(0, 0), 2 * fix.noise_covariance(0, 0));
   expect_common(fix, by_parameters, covariance);
 }
 
 /// A part without derivatives by the lens hides the errors of the lens.
-TEST_F(CommonErrorsTest, StatedReportsLensOnlyWithDerivatives) {
+TEST_F(CommonErrorsTest, LensErrorsAreUnknownWithoutDerivativesOfAppliedCorrection) {
   const auto stated = [&](Correction correction) {
     return CommonErrors(rig.map.lamps, rig.calibration, correction)
-        .are_errors_known(CommonErrorSource::lens);
+        .is_error_source_known(CommonErrorSource::lens);
   };
   rig.calibrate_in_a_row();
   for (const Correction correction :
@@ -166,41 +171,42 @@ TEST_F(CommonErrorsTest, StatedReportsLensOnlyWithDerivatives) {
   EXPECT_TRUE(stated(Correction::none));
 }
 
-TEST_F(CommonErrorsTest, PropagatesStandardDeviationOfSurvey) {
+TEST_F(CommonErrorsTest, FixCovarianceIncludesSurveySdOfLamps) {
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
-  const Fix fix = Positioner(rig.map, rig.calibration).locate(seen_from(rig, 0.1));
-  ASSERT_TRUE(fix.ok());
+  const Fix fix = Positioner(rig.map, rig.calibration).compute_position_fix(seen_from(rig, 0.1));
+  ASSERT_TRUE(fix.has_succeeded());
   const Matrix4 common = fix.estimate.covariance - fix.noise_covariance;
   // Eight lamps of 2 mm around the camera: slightly more than 2 / sqrt(8).
   EXPECT_NEAR(std::sqrt(common(0, 0)), 0.00075, 0.00008);
 }
 
 /// Lamps of a dispersion have rows in the joint covariance; a derivative of 0 adds no error to it.
-TEST_F(CommonErrorsTest, MatchesWithAndWithoutRowsOfLamps) {
+TEST_F(CommonErrorsTest, FixCovarianceIsUnchangedByLampsWithZeroDerivative) {
   rig.calibrate_in_a_row();
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
   rig.calibration.dispersion->by_lamps.clear();
   const auto detections = seen_from(rig, 0.1);
-  const Fix without = Positioner(rig.map, rig.calibration).locate(detections);
+  const Fix without = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
   const CommonErrors small(rig.map.lamps, rig.calibration, Correction::all);
   for (const Lamp& lamp : rig.map.lamps) {
     rig.calibration.dispersion->by_lamps.push_back(
         {lamp.id, lamp.position_m, *lamp.sd_m, Eigen::Matrix<double, 2, 3>::Zero()});
   }
   const CommonErrors large(rig.map.lamps, rig.calibration, Correction::all);
-  EXPECT_EQ(small.joint_covariance().rows(), small.num_shared_errors());
-  EXPECT_EQ(large.joint_covariance().rows(),
+  EXPECT_EQ(small.joint_error_covariance().rows(), small.num_shared_errors());
+  EXPECT_EQ(large.joint_error_covariance().rows(),
             large.num_shared_errors() + 3 * std::ssize(rig.map.lamps));
-  const Fix with = Positioner(rig.map, rig.calibration).locate(detections);
-  ASSERT_TRUE(with.ok() && without.ok());
+  const Fix with = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
+  ASSERT_TRUE(with.has_succeeded() && without.has_succeeded());
   const double scale = with.estimate.covariance.norm();
   EXPECT_THAT(without.estimate.covariance, IsNear(with.estimate.covariance, 1e-12 * scale));
-  EXPECT_TRUE(small.are_errors_known() &&
-              small.extract_error_source(CommonErrorSource::lamps).are_errors_known());
+  EXPECT_TRUE(
+      small.are_any_errors_known() &&
+      small.extract_covariance_of_error_source(CommonErrorSource::lamps).are_any_errors_known());
 }
 
 /// The offset depends on a lamp of the adjustment, whose error is not in the survey.
-TEST_F(CommonErrorsTest, PropagatesAdjustedLampToOffset) {
+TEST_F(CommonErrorsTest, OffsetCovarianceIncludesErrorOfAdjustedLamp) {
   rig.adjust(1);
   Eigen::Matrix<double, 2, 3> by_position;
   by_position << 0.5, -0.1, 0.2, 0.1, 0.6, -0.3;
@@ -210,17 +216,19 @@ TEST_F(CommonErrorsTest, PropagatesAdjustedLampToOffset) {
   dispersion.by_lamps = {{2, rig.map.lamps[1].position_m, 0.001, by_position}};
   const CommonErrors errors(rig.map.lamps, rig.calibration, Correction::all);
   const Eigen::Matrix3d lamp = rig.calibration.adjustment->covariance.block<3, 3>(19, 19);
-  ASSERT_EQ(errors.joint_covariance().rows(), 12 + 2 + 2 + 24);
-  const Eigen::Matrix2d offset = errors.joint_covariance().block<2, 2>(14, 14);
-  const Eigen::Matrix<double, 2, 3> mixed = errors.joint_covariance().block<2, 3>(14, 19);
+  ASSERT_EQ(errors.joint_error_covariance().rows(), 12 + 2 + 2 + 24);
+  const Eigen::Matrix2d offset = errors.joint_error_covariance().block<2, 2>(14, 14);
+  const Eigen::Matrix<double, 2, 3> mixed = errors.joint_error_covariance().block<2, 3>(14, 19);
   EXPECT_THAT(offset, IsNear((by_position * lamp * by_position.transpose()).eval(), 1e-18));
   EXPECT_THAT(mixed, IsNear((by_position * lamp).eval(), 1e-18));
-  EXPECT_EQ(errors.lamps_elsewhere(), 0);
+  EXPECT_EQ(errors.num_lamps_moved_since_calibration(), 0);
   rig.map.lamps[1].position_m.x() += 1e-5;
-  EXPECT_EQ(CommonErrors(rig.map.lamps, rig.calibration, Correction::all).lamps_elsewhere(), 1);
+  EXPECT_EQ(CommonErrors(rig.map.lamps, rig.calibration, Correction::all)
+                .num_lamps_moved_since_calibration(),
+            1);
 }
 
-TEST_F(CommonErrorsTest, RejectsLampThatNoErrorExplains) {
+TEST_F(CommonErrorsTest, LocateRejectsLampMovedBeyondItsSurveySd) {
   rig.adjust(0.3);
   Random random(8);
   for (const double off_m : {0.01, 0.03}) {
@@ -228,8 +236,8 @@ TEST_F(CommonErrorsTest, RejectsLampThatNoErrorExplains) {
       SyntheticRig room = rig;
       room.map.lamps[moved].position_m.x() += off_m;
       const auto detections = with_noise(seen_from(room, 0.03), random);
-      const Fix fix = Positioner(rig.map, rig.calibration).locate(detections);
-      ASSERT_TRUE(fix.ok());
+      const Fix fix = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
+      ASSERT_TRUE(fix.has_succeeded());
       EXPECT_EQ(fix.rejected_lamps, 1) << off_m << " m, lamp " << moved + 1;
       EXPECT_EQ(fix.rejected_ids[0], static_cast<int>(moved) + 1);
       EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, 0.001));
@@ -237,15 +245,15 @@ TEST_F(CommonErrorsTest, RejectsLampThatNoErrorExplains) {
   }
 }
 
-TEST_F(CommonErrorsTest, KeepsLampsThatSurveyErrorsExplain) {
+TEST_F(CommonErrorsTest, LocateKeepsLampMovedWithinItsSurveySd) {
   rig.adjust(3);
   Random random(9);
   for (std::size_t moved = 0; moved < 8; ++moved) {
     SyntheticRig room = rig;
     room.map.lamps[moved].position_m.y() += 0.004;
-    const Fix fix =
-        Positioner(rig.map, rig.calibration).locate(with_noise(seen_from(room, 0.03), random));
-    ASSERT_TRUE(fix.ok());
+    const Fix fix = Positioner(rig.map, rig.calibration)
+                        .compute_position_fix(with_noise(seen_from(room, 0.03), random));
+    ASSERT_TRUE(fix.has_succeeded());
     EXPECT_EQ(fix.rejected_lamps, 0);
   }
 }
@@ -264,7 +272,7 @@ class FindOutlierLamps : public testing::Test {
     sightings.clear();
     for (std::size_t i = 0; i < count; ++i) {
       const Eigen::Vector3d& lamp_m = map.lamps[i].position_m;
-      sightings.push_back({lamp_m, project_to_normalized_point(LevelPose(fix.pose), lamp_m),
+      sightings.push_back({lamp_m, project_lamp_to_normalized_point(LevelPose(fix.pose), lamp_m),
                            Matrix2::Identity() * kFocal_px, kSigma_px});
     }
     common.assign(count, kCommonSd * kCommonSd * Matrix2::Identity());
@@ -277,7 +285,7 @@ class FindOutlierLamps : public testing::Test {
     Eigen::VectorXd residuals(jacobian.rows());
     for (std::size_t i = 0; i < sightings.size(); ++i) {
       const Prediction prediction =
-          predict_normalized_point(LevelPose(fix.pose), sightings[i].lamp_m);
+          project_lamp_with_jacobian(LevelPose(fix.pose), sightings[i].lamp_m);
       const auto row = 2 * static_cast<Eigen::Index>(i);
       jacobian.middleRows<2>(row) = prediction.d_z_d_state / sd;
       residuals.segment<2>(row) = (sightings[i].z - prediction.z) / sd;
@@ -308,7 +316,7 @@ TEST_F(FindOutlierLamps, RejectsLampWhenChiSquaredExceedsBound) {
   }
 }
 
-TEST_F(FindOutlierLamps, ReturnsNoneWithoutMajorityOfThree) {
+TEST_F(FindOutlierLamps, ReturnsNoneWhenFewerThanThreeLampsAgree) {
   for (const std::size_t count : {3u, 4u}) {
     see_lamps(count);
     sightings[0].z += Eigen::Vector2d(0.02, 0);
@@ -317,7 +325,7 @@ TEST_F(FindOutlierLamps, ReturnsNoneWithoutMajorityOfThree) {
   }
 }
 
-TEST_F(FindOutlierLamps, RejectsMinorityLargestFirst) {
+TEST_F(FindOutlierLamps, ReturnsTwoOutliersOfEightLargestFirst) {
   see_lamps(8);
   sightings[5].z += Eigen::Vector2d(0.02, 0);
   sightings[2].z += Eigen::Vector2d(0, 0.05);
@@ -327,15 +335,15 @@ TEST_F(FindOutlierLamps, RejectsMinorityLargestFirst) {
   EXPECT_EQ(found.lamps[1], 5);
 }
 
-TEST_F(CommonErrorsTest, RejectsOneLampOfFour) {
+TEST_F(CommonErrorsTest, LocateRejectsLampMovedBy30MmAmongFour) {
   rig.adjust(0.3);
   SyntheticRig room = rig;
   room.map.lamps[1].position_m.x() += 0.03;
   auto detections = seen_from(room, 0.03);
   ASSERT_EQ(detections.size(), 8);
   detections.resize(4);
-  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections);
-  ASSERT_TRUE(fix.ok());
+  const Fix fix = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
+  ASSERT_TRUE(fix.has_succeeded());
   EXPECT_EQ(fix.rejected_lamps, 1);
   EXPECT_EQ(fix.rejected_ids[0], 2);
 }
@@ -359,9 +367,9 @@ class StepCovariance : public testing::Test {
 };
 
 class ComputeZenithCovariance : public StepCovariance {};
-class ComputeOffsetCovariance : public StepCovariance {};
+class ComputeDispersionOffsetCovariance : public StepCovariance {};
 
-TEST_F(ComputeZenithCovariance, SumsCapturesAndLens) {
+TEST_F(ComputeZenithCovariance, SumsCovariancesOfCapturesAndLensUnlessAdjusted) {
   const RotationCenter& center = *calibration.rotation_center;
   const MatrixX by_lens = *center.by_intrinsics;
   expect_equal(compute_zenith_covariance(calibration),
@@ -373,7 +381,7 @@ TEST_F(ComputeZenithCovariance, SumsCapturesAndLens) {
                calibration.adjustment->covariance.block<2, 2>(12, 12));
 }
 
-TEST_F(ComputeZenithCovariance, ReturnsNulloptWhenPartIsMissing) {
+TEST_F(ComputeZenithCovariance, ReturnsNulloptWithoutCovarianceOrLensDerivatives) {
   calibration.rotation_center->by_intrinsics.reset();
   EXPECT_FALSE(compute_zenith_covariance(calibration));
   SetUp();
@@ -381,7 +389,7 @@ TEST_F(ComputeZenithCovariance, ReturnsNulloptWhenPartIsMissing) {
   EXPECT_FALSE(compute_zenith_covariance(calibration));
 }
 
-TEST_F(ComputeOffsetCovariance, SumsCapturesLensZenithAndLamps) {
+TEST_F(ComputeDispersionOffsetCovariance, SumsCovariancesOfCapturesLensZenithAndLamps) {
   Dispersion& dispersion = *calibration.dispersion;
   Eigen::Matrix<double, 2, 3> by_position;
   by_position << 0.5, -0.1, 0.2, 0.1, 0.6, -0.3;
@@ -394,27 +402,27 @@ TEST_F(ComputeOffsetCovariance, SumsCapturesLensZenithAndLamps) {
       *dispersion.by_zenith * per_focal(*calibration.rotation_center->covariance) *
           dispersion.by_zenith->transpose() +
       0.002 * 0.002 * by_position * by_position.transpose();
-  expect_equal(compute_offset_covariance(calibration),
+  expect_equal(compute_dispersion_offset_covariance(calibration),
                focal_px.asDiagonal() * expected * focal_px.asDiagonal());
 }
 
-TEST_F(ComputeOffsetCovariance, ReturnsNulloptWhenPartIsMissing) {
-  EXPECT_TRUE(compute_offset_covariance(calibration));
+TEST_F(ComputeDispersionOffsetCovariance, ReturnsNulloptWithoutRequiredCovariancesOrDerivatives) {
+  EXPECT_TRUE(compute_dispersion_offset_covariance(calibration));
   calibration.dispersion->by_zenith.reset();
-  EXPECT_FALSE(compute_offset_covariance(calibration));
+  EXPECT_FALSE(compute_dispersion_offset_covariance(calibration));
   SetUp();
   calibration.dispersion->by_intrinsics.reset();
-  EXPECT_FALSE(compute_offset_covariance(calibration));
+  EXPECT_FALSE(compute_dispersion_offset_covariance(calibration));
   SetUp();
   calibration.dispersion->covariance.reset();
-  EXPECT_FALSE(compute_offset_covariance(calibration));
+  EXPECT_FALSE(compute_dispersion_offset_covariance(calibration));
   SetUp();
   calibration.rotation_center->covariance.reset();
-  EXPECT_FALSE(compute_offset_covariance(calibration));
+  EXPECT_FALSE(compute_dispersion_offset_covariance(calibration));
   calibration.rotation_center.reset();
   calibration.intrinsics_report.reset();
   calibration.dispersion->by_intrinsics.reset();
-  const auto alone = compute_offset_covariance(calibration);
+  const auto alone = compute_dispersion_offset_covariance(calibration);
   expect_equal(alone, *calibration.dispersion->covariance);
 }
 

@@ -30,8 +30,8 @@ Eigen::Matrix4d compute_limit(const SyntheticRig& rig, double sigma_px) {
   std::vector<Eigen::Vector3d> lamps_m;
   for (const Lamp& lamp : rig.map.lamps) lamps_m.push_back(lamp.position_m);
   const Camera& camera = rig.calibration.camera;
-  const auto budget = compute_error_budget(lamps_m, Lens(camera.lens_model, camera.intrinsics),
-                                           rig.camera, {sigma_px, 0, 0, 0});
+  const auto budget = compute_fix_error_budget(lamps_m, Lens(camera.lens_model, camera.intrinsics),
+                                               rig.camera, {sigma_px, 0, 0, 0});
   return budget.value().noise;
 }
 
@@ -48,12 +48,12 @@ class FixCovariance : public testing::TestWithParam<std::size_t> {
   void expect_consistent(double sigma_px, const Sensors& sensors = {}) {
     const Positioner positioner(rig.map, rig.calibration);
     const auto exact = seen_from(rig, sigma_px);
-    const Fix reported = positioner.locate(exact, sensors);
-    ASSERT_TRUE(reported.ok());
+    const Fix reported = positioner.compute_position_fix(exact, sensors);
+    ASSERT_TRUE(reported.has_succeeded());
     Scatter scatter(rig.camera, reported.estimate.covariance);
     for (int i = 0; i < kDraws; ++i) {
-      const Fix fix = positioner.locate(with_noise(exact, random), sensors);
-      ASSERT_TRUE(fix.ok());
+      const Fix fix = positioner.compute_position_fix(with_noise(exact, random), sensors);
+      ASSERT_TRUE(fix.has_succeeded());
       scatter.add(fix.estimate.pose);
     }
     expect_efficient(scatter);
@@ -64,8 +64,9 @@ class FixCovariance : public testing::TestWithParam<std::size_t> {
 
 TEST_P(FixCovariance, EqualsCramerRaoBound) {
   const double sigma_px = 0.2;
-  const Fix fix = Positioner(rig.map, rig.calibration).locate(seen_from(rig, sigma_px));
-  ASSERT_TRUE(fix.ok());
+  const Fix fix =
+      Positioner(rig.map, rig.calibration).compute_position_fix(seen_from(rig, sigma_px));
+  ASSERT_TRUE(fix.has_succeeded());
   const Eigen::Matrix4d limit = compute_limit(rig, sigma_px);
   EXPECT_LT((fix.estimate.covariance - limit).norm(), 1e-6 * limit.norm());
 }
@@ -82,93 +83,96 @@ TEST_P(FixCovariance, MatchesScatterWithTiltAndManyHeights) {
 
 INSTANTIATE_TEST_SUITE_P(Lamps, FixCovariance, testing::Values(2, 3, 4, 8));
 
-TEST(FixCovariance, MatchesScatterWithDifferentNoise) {
+TEST(FixCovariance, MatchesScatterWhenLampsHaveDifferentNoise) {
   const SyntheticRig rig = make_rig(4);
   const Positioner positioner(rig.map, rig.calibration);
   auto exact = seen_from(rig, 0.1);
   ASSERT_EQ(exact.size(), 4);
   exact[1].sigma_px = 0.5;
   exact[3].sigma_px = 0.3;
-  const Fix reported = positioner.locate(exact);
-  ASSERT_TRUE(reported.ok());
+  const Fix reported = positioner.compute_position_fix(exact);
+  ASSERT_TRUE(reported.has_succeeded());
   Scatter scatter(rig.camera, reported.estimate.covariance);
   Random random(12);
   for (int i = 0; i < kDraws; ++i) {
-    scatter.add(positioner.locate(with_noise(exact, random)).estimate.pose);
+    scatter.add(positioner.compute_position_fix(with_noise(exact, random)).estimate.pose);
   }
   expect_efficient(scatter);
 }
 
-TEST(FixCovariance, IncludesNoiseOfInclinationSensor) {
+TEST(FixCovariance, MatchesScatterWithInclinationSensorNoise) {
   SyntheticRig rig = make_rig(4);
   rig.inclination = {0.03, -0.02};
   const Positioner positioner(rig.map, rig.calibration);
   const auto exact = seen_from(rig, 0.1);
   const double sigma_rad = 0.002;
-  const Fix reported = positioner.locate(exact, {rig.inclination, sigma_rad, {}});
-  ASSERT_TRUE(reported.ok());
+  const Fix reported = positioner.compute_position_fix(exact, {rig.inclination, sigma_rad, {}});
+  ASSERT_TRUE(reported.has_succeeded());
   Scatter scatter(rig.camera, reported.estimate.covariance);
   Random random(13);
   for (int i = 0; i < kDraws; ++i) {
     const Inclination read{rig.inclination->roll_rad + sigma_rad * random.normal(),
                            rig.inclination->pitch_rad + sigma_rad * random.normal()};
-    scatter.add(positioner.locate(with_noise(exact, random), {read, sigma_rad, {}}).estimate.pose);
+    scatter.add(positioner.compute_position_fix(with_noise(exact, random), {read, sigma_rad, {}})
+                    .estimate.pose);
   }
   expect_efficient(scatter);
   EXPECT_NEAR(scatter.share_beyond_95(), 0.05, kShareTolerance);
 }
 
-TEST(FixCovariance, MatchesScatterOfRobotCenter) {
+TEST(FixCovariance, MatchesScatterOfRobotPoseWithCameraMount) {
   const SyntheticRig rig = make_rig(3);
   PositionerOptions options;
   options.mount = CameraMount{{0.4, -0.3, 0.2}, 0.5};
   const Positioner positioner(rig.map, rig.calibration, options);
   const auto exact = seen_from(rig, 0.2);
-  const Fix truth = positioner.locate(exact);
-  ASSERT_TRUE(truth.ok());
+  const Fix truth = positioner.compute_position_fix(exact);
+  ASSERT_TRUE(truth.has_succeeded());
   Scatter scatter(truth.estimate.pose, truth.estimate.covariance);
   Random random(14);
   for (int i = 0; i < kDraws; ++i) {
-    scatter.add(positioner.locate(with_noise(exact, random)).estimate.pose);
+    scatter.add(positioner.compute_position_fix(with_noise(exact, random)).estimate.pose);
   }
   expect_efficient(scatter);
   EXPECT_NEAR(scatter.share_beyond_95(), 0.05, kShareTolerance);
 }
 
-TEST(FixCovariance, IncludesInclinationOfMountArm) {
+TEST(FixCovariance, MatchesScatterWithInclinationNoiseAndMountArm) {
   const SyntheticRig rig = make_rig(4);
   PositionerOptions options;
   options.mount = CameraMount{{0.3, -0.2, 1.0}, 0.8};
   const Positioner positioner(rig.map, rig.calibration, options);
   const auto exact = seen_from(rig, 0.1);
   const double sigma_rad = 0.005;
-  const Fix truth = positioner.locate(exact, {Inclination{0, 0}, sigma_rad, {}});
-  ASSERT_TRUE(truth.ok());
+  const Fix truth = positioner.compute_position_fix(exact, {Inclination{0, 0}, sigma_rad, {}});
+  ASSERT_TRUE(truth.has_succeeded());
   Scatter scatter(truth.estimate.pose, truth.estimate.covariance);
   Random random(17);
   for (int i = 0; i < kDraws; ++i) {
     const Inclination read{sigma_rad * random.normal(), sigma_rad * random.normal()};
-    scatter.add(positioner.locate(with_noise(exact, random), {read, sigma_rad, {}}).estimate.pose);
+    scatter.add(positioner.compute_position_fix(with_noise(exact, random), {read, sigma_rad, {}})
+                    .estimate.pose);
   }
   expect_efficient(scatter);
 }
 
-TEST(FixCovariance, IncludesInclinationForOneLamp) {
+TEST(FixCovariance, MatchesScatterForOneLampWithInclinationNoise) {
   const SyntheticRig rig = make_rig(1);
   const Positioner positioner(rig.map, rig.calibration);
   const double sigma_rad = 0.005;
   const HeightAndYaw known{rig.camera.position_m.z(), rig.camera.yaw_rad};
   const auto exact = seen_from(rig, 0.1);
-  const Fix reported = positioner.locate(exact, {Inclination{0, 0}, sigma_rad, known});
-  ASSERT_TRUE(reported.ok());
+  const Fix reported =
+      positioner.compute_position_fix(exact, {Inclination{0, 0}, sigma_rad, known});
+  ASSERT_TRUE(reported.has_succeeded());
   Eigen::Matrix4d covariance = reported.estimate.covariance;
   covariance.bottomRightCorner<2, 2>().setIdentity();
   Scatter scatter(rig.camera, covariance);
   Random random(18);
   for (int i = 0; i < kDraws; ++i) {
     const Inclination read{sigma_rad * random.normal(), sigma_rad * random.normal()};
-    scatter.add(
-        positioner.locate(with_noise(exact, random), {read, sigma_rad, known}).estimate.pose);
+    scatter.add(positioner.compute_position_fix(with_noise(exact, random), {read, sigma_rad, known})
+                    .estimate.pose);
   }
   EXPECT_LT(scatter.excess().head<2>().cwiseAbs().maxCoeff(), kScatterTolerance);
 }
@@ -180,23 +184,23 @@ TEST(FixCovariance, MatchesScatterWithStereographicLens) {
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.1, 1);
   const Positioner positioner(rig.map, rig.calibration);
   const auto exact = seen_from(rig, 0.1);
-  const Fix reported = positioner.locate(exact);
-  ASSERT_TRUE(reported.ok());
+  const Fix reported = positioner.compute_position_fix(exact);
+  ASSERT_TRUE(reported.has_succeeded());
   Scatter scatter(rig.camera, reported.estimate.covariance);
   Random random(19);
   for (int i = 0; i < kDraws; ++i) {
-    scatter.add(positioner.locate(with_noise(exact, random)).estimate.pose);
+    scatter.add(positioner.compute_position_fix(with_noise(exact, random)).estimate.pose);
   }
   expect_efficient(scatter);
 }
 
-TEST(FixCovariance, MatchesScatterForOneLamp) {
+TEST(FixCovariance, MatchesScatterForOneLampWithKnownHeightAndYaw) {
   const SyntheticRig rig = make_rig(1);
   const Positioner positioner(rig.map, rig.calibration);
   const Sensors known{{}, 0, HeightAndYaw{rig.camera.position_m.z(), rig.camera.yaw_rad}};
   const auto exact = seen_from(rig, 0.2);
-  const Fix reported = positioner.locate(exact, known);
-  ASSERT_TRUE(reported.ok());
+  const Fix reported = positioner.compute_position_fix(exact, known);
+  ASSERT_TRUE(reported.has_succeeded());
   Eigen::Matrix4d covariance = reported.estimate.covariance;
   EXPECT_EQ(covariance(2, 2), 0);
   EXPECT_EQ(covariance(3, 3), 0);
@@ -204,13 +208,13 @@ TEST(FixCovariance, MatchesScatterForOneLamp) {
   Scatter scatter(rig.camera, covariance);
   Random random(15);
   for (int i = 0; i < kDraws; ++i) {
-    scatter.add(positioner.locate(with_noise(exact, random), known).estimate.pose);
+    scatter.add(positioner.compute_position_fix(with_noise(exact, random), known).estimate.pose);
   }
   EXPECT_LT(scatter.excess().head<2>().cwiseAbs().maxCoeff(), kScatterTolerance);
 }
 
 /// One lamp with height, yaw and inclination of given standard deviations, and the motion.
-TEST(OneLampSensorCovariance, MatchesScatter) {
+TEST(FixCovariance, MatchesScatterForOneLampWithUncertainSensors) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {{{0.15, -0.1, 0.1}, 0.9}, {}}, {}};
   rig.map.lamps.resize(1);
   const double sigma_rad = 0.002, sigma_px = 0.2;
@@ -221,8 +225,8 @@ TEST(OneLampSensorCovariance, MatchesScatter) {
   const Positioner positioner(rig.map, rig.calibration);
   rig.body.motion = {sensors.motion->velocity_m_per_s, sensors.motion->yaw_rate_rad_per_s, {0, 0}};
   sensors.inclination = Inclination{0, 0};
-  const Fix reported = positioner.locate(seen_from(rig, sigma_px), sensors);
-  ASSERT_TRUE(reported.ok());
+  const Fix reported = positioner.compute_position_fix(seen_from(rig, sigma_px), sensors);
+  ASSERT_TRUE(reported.has_succeeded());
   EXPECT_LT((reported.estimate.pose.position_m - rig.body.pose.position_m).norm(), 1e-9);
   Scatter scatter(rig.body.pose, reported.estimate.covariance);
   Random random(21);
@@ -233,23 +237,25 @@ TEST(OneLampSensorCovariance, MatchesScatter) {
     sensors.height_and_yaw->z_m = 0.1 + 0.005 * random.normal();
     sensors.height_and_yaw->yaw_rad = 0.9 + rad_from_deg(1) * random.normal();
     sensors.inclination = Inclination{sigma_rad * random.normal(), sigma_rad * random.normal()};
-    const Fix fix = positioner.locate(with_noise(seen_from(rig, sigma_px), random), sensors);
-    ASSERT_TRUE(fix.ok());
+    const Fix fix =
+        positioner.compute_position_fix(with_noise(seen_from(rig, sigma_px), random), sensors);
+    ASSERT_TRUE(fix.has_succeeded());
     scatter.add(fix.estimate.pose);
   }
   expect_efficient(scatter);
 }
 
-TEST(PositionerLocate, ReturnsRowTimeUnknownForOneMovingLamp) {
+TEST(PositionerLocate, ReturnsRowTimeUnknownForMovingCameraWithoutRowTime) {
   const SyntheticRig rig = make_rig(1);
   Sensors sensors;
   sensors.height_and_yaw = HeightAndYaw{0.1, 0.9};
   sensors.motion = KnownMotion{{0.8, 0}, 0, 0, 0};
-  EXPECT_EQ(Positioner(rig.map, rig.calibration).locate(seen_from(rig), sensors).status,
-            FixStatus::row_time_unknown);
+  EXPECT_EQ(
+      Positioner(rig.map, rig.calibration).compute_position_fix(seen_from(rig), sensors).status,
+      FixStatus::row_time_unknown);
 }
 
-TEST(ComputeOneLampPose, MatchesTruthForRotatingRobot) {
+TEST(PositionerLocate, ReturnsTruePositionFromOneLampOnRotatingRobot) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {{{0.15, -0.1, 0.1}, 0.9}, {}}, {}};
   rig.mount = CameraMount{{0.3, -0.2, 0.5}, 0.7};
   rig.body.motion = {{0.5, 0.2}, 1.5, {0, 0}};
@@ -259,8 +265,8 @@ TEST(ComputeOneLampPose, MatchesTruthForRotatingRobot) {
   std::vector<Detection> seen = seen_from(rig, 0.1);
   ASSERT_FALSE(seen.empty());
   seen.resize(1);
-  const Fix fix = rig.positioner().locate(seen, sensors);
-  ASSERT_TRUE(fix.ok());
+  const Fix fix = rig.positioner().compute_position_fix(seen, sensors);
+  ASSERT_TRUE(fix.has_succeeded());
   EXPECT_LT((fix.estimate.pose.position_m - rig.body.pose.position_m).norm(), 1e-9);
 }
 
@@ -281,7 +287,7 @@ TEST(FixCovariance, ClosedFormsReachCramerRaoBoundWithPinhole) {
     Random random(16);
     for (int i = 0; i < kDraws; ++i) {
       for (Sighting& sighting : sightings) {
-        sighting.z = project_to_normalized_point(camera, sighting.lamp_m) +
+        sighting.z = project_lamp_to_normalized_point(camera, sighting.lamp_m) +
                      sigma_px / 520 * Eigen::Vector2d(random.normal(), random.normal());
       }
       scatter.add(lamps == 2 ? compute_two_lamp_poses(sightings[0], sightings[1]).poses[0]

@@ -21,7 +21,7 @@ std::vector<Eigen::Vector3d> get_lamp_positions(const LampMap& map) {
   return positions_m;
 }
 
-TEST(ComputeErrorBudget, MatchesFormulaForPinholeAndEqualHeights) {
+TEST(ComputeFixErrorBudget, NoiseTermMatchesFormulaForPinholeAndEqualHeights) {
   const double focal_px = 520, sigma_px = 0.3;
   const Lens lens(LensModel::pinhole, std::array{focal_px, focal_px, 400.0, 300.0});
   for (const std::size_t n : {2u, 3u, 5u, 8u}) {
@@ -35,7 +35,7 @@ TEST(ComputeErrorBudget, MatchesFormulaForPinholeAndEqualHeights) {
     for (const auto& lamp_m : lamps_m) spread += (lamp_m - mean).squaredNorm();
     const double height_m = 1.6 - 0.25, unit_m = height_m / focal_px * sigma_px;
     const double d = (mean - pose.position_m).head<2>().norm();
-    const auto budget = compute_error_budget(lamps_m, lens, pose, {sigma_px, 0, 0, 0});
+    const auto budget = compute_fix_error_budget(lamps_m, lens, pose, {sigma_px, 0, 0, 0});
     ASSERT_TRUE(budget);
     const double horizontal_m = unit_m * std::sqrt(1 / static_cast<double>(n) + d * d / spread);
     const Eigen::Vector4d expected(horizontal_m, horizontal_m,
@@ -55,8 +55,8 @@ class ErrorBudgetTerm : public testing::Test {
 
   ErrorBudget budget(const ErrorSources& sources) {
     const Camera& camera = rig.calibration.camera;
-    return compute_error_budget(get_lamp_positions(rig.map),
-                                Lens(camera.lens_model, camera.intrinsics), rig.camera, sources)
+    return compute_fix_error_budget(get_lamp_positions(rig.map),
+                                    Lens(camera.lens_model, camera.intrinsics), rig.camera, sources)
         .value();
   }
 
@@ -70,7 +70,7 @@ class ErrorBudgetTerm : public testing::Test {
   }
 };
 
-TEST_F(ErrorBudgetTerm, CenterMatchesScatter) {
+TEST_F(ErrorBudgetTerm, CenterCovarianceMatchesScatterOfFixes) {
   rig.map.lamps.resize(3);
   const Positioner positioner(rig.map, rig.calibration);
   // The covariance of four states from two errors is singular; yaw and height barely change.
@@ -81,7 +81,7 @@ TEST_F(ErrorBudgetTerm, CenterMatchesScatter) {
     auto shifted = exact;
     const Eigen::Vector2d shift = 0.5 * Eigen::Vector2d(random.normal(), random.normal());
     for (Detection& detection : shifted) detection.pixel += shift;
-    const Pose pose = positioner.locate(shifted).estimate.pose;
+    const Pose pose = positioner.compute_position_fix(shifted).estimate.pose;
     Eigen::Vector4d error;
     error << pose.position_m - rig.camera.position_m, pose.yaw_rad - rig.camera.yaw_rad;
     sum += error * error.transpose();
@@ -89,14 +89,14 @@ TEST_F(ErrorBudgetTerm, CenterMatchesScatter) {
   EXPECT_LT((sum / kDraws - covariance).norm(), 0.05 * covariance.norm());
 }
 
-TEST_F(ErrorBudgetTerm, TiltMatchesScatter) {
+TEST_F(ErrorBudgetTerm, TiltCovarianceMatchesScatterOfFixes) {
   const Positioner positioner(rig.map, rig.calibration);
   const Eigen::Matrix4d covariance = budget({1, 0, 0.003, 0}).tilt;
   const auto exact = seen_from(rig);
   Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
   for (int i = 0; i < kDraws; ++i) {
     const Inclination wrong{0.003 * random.normal(), 0.003 * random.normal()};
-    const Pose pose = positioner.locate(exact, {wrong, 0, {}}).estimate.pose;
+    const Pose pose = positioner.compute_position_fix(exact, {wrong, 0, {}}).estimate.pose;
     Eigen::Vector4d error;
     error << pose.position_m - rig.camera.position_m, pose.yaw_rad - rig.camera.yaw_rad;
     sum += error * error.transpose();
@@ -104,41 +104,41 @@ TEST_F(ErrorBudgetTerm, TiltMatchesScatter) {
   EXPECT_LT((sum / kDraws - covariance).norm(), 0.05 * covariance.norm());
 }
 
-TEST_F(ErrorBudgetTerm, LampMapMatchesScatter) {
+TEST_F(ErrorBudgetTerm, LampMapCovarianceMatchesScatterOfFixes) {
   expect_scatter(budget({1, 0, 0, 0.004}).lamp_map, [&](const auto& exact) {
     LampMap wrong = rig.map;
     for (Lamp& lamp : wrong.lamps) {
       lamp.position_m += 0.004 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
     }
-    return Positioner(wrong, rig.calibration).locate(exact);
+    return Positioner(wrong, rig.calibration).compute_position_fix(exact);
   });
 }
 
-TEST_F(ErrorBudgetTerm, NoiseMatchesScatter) {
+TEST_F(ErrorBudgetTerm, NoiseCovarianceMatchesScatterOfFixes) {
   const Positioner positioner(rig.map, rig.calibration);
   expect_scatter(budget({0.4, 0, 0, 0}).noise, [&](auto noisy) {
     for (Detection& detection : noisy) detection.sigma_px = 0.4;
-    return positioner.locate(with_noise(noisy, random));
+    return positioner.compute_position_fix(with_noise(noisy, random));
   });
 }
 
-TEST(ComputeErrorBudget, TotalCovarianceIsSumOfSourceCovariances) {
+TEST(ComputeFixErrorBudget, TotalCovarianceIsSumOfSourceCovariances) {
   const Lens lens(LensModel::pinhole, std::array{520.0, 520.0, 400.0, 300.0});
-  const auto budget = compute_error_budget(get_lamp_positions(synthetic_lamps()), lens,
-                                           {{0, 0, 0}, 0}, {0.1, 0.2, 0.003, 0.004});
+  const auto budget = compute_fix_error_budget(get_lamp_positions(synthetic_lamps()), lens,
+                                               {{0, 0, 0}, 0}, {0.1, 0.2, 0.003, 0.004});
   ASSERT_TRUE(budget);
-  EXPECT_THAT(budget->total_covariance(),
+  EXPECT_THAT(budget->total_pose_covariance(),
               IsNear(Matrix4(budget->noise + budget->center + budget->tilt + budget->lamp_map), 0));
   EXPECT_GT(budget->lamp_map(0, 0), 0);
 }
 
-TEST(ComputeErrorBudget, ReturnsNulloptWithoutTwoLampsInFrontOfLens) {
+TEST(ComputeFixErrorBudget, ReturnsNulloptWithoutTwoLampsInFrontOfLens) {
   const Lens lens(LensModel::pinhole, std::array{520.0, 520.0, 400.0, 300.0});
   const ErrorSources noise{0.1, 0, 0, 0};
   const std::vector<Eigen::Vector3d> lamps_m{{0, 0, 2}, {1, 0, 2}};
-  EXPECT_FALSE(compute_error_budget({lamps_m.data(), 1}, lens, {{0, 0, 0}, 0}, noise));
-  EXPECT_FALSE(compute_error_budget(lamps_m, lens, {{0, 0, 2.5}, 0}, noise));
-  EXPECT_TRUE(compute_error_budget(lamps_m, lens, {{0, 0, 0}, 0}, noise));
+  EXPECT_FALSE(compute_fix_error_budget({lamps_m.data(), 1}, lens, {{0, 0, 0}, 0}, noise));
+  EXPECT_FALSE(compute_fix_error_budget(lamps_m, lens, {{0, 0, 2.5}, 0}, noise));
+  EXPECT_TRUE(compute_fix_error_budget(lamps_m, lens, {{0, 0, 0}, 0}, noise));
 }
 
 /// Free states of a camera that is level and at rest: one or all.
@@ -168,13 +168,13 @@ class ErrorBudgetWithPrior : public testing::TestWithParam<FreeStates> {
   }
   std::optional<ErrorBudget> budget(const BodyPrior& prior) const {
     const Camera& camera = rig.calibration.camera;
-    return compute_error_budget(get_lamp_positions(rig.map),
-                                Lens(camera.lens_model, camera.intrinsics), rig.body.pose, sources,
-                                prior, make_row_clock(camera));
+    return compute_fix_error_budget(get_lamp_positions(rig.map),
+                                    Lens(camera.lens_model, camera.intrinsics), rig.body.pose,
+                                    sources, prior, make_row_readout_clock(camera));
   }
   Eigen::Vector4d locate(const BodyRig& with, const std::vector<Detection>& detections) const {
-    const Fix fix = with.positioner().locate(detections, sensors());
-    EXPECT_TRUE(fix.ok());
+    const Fix fix = with.positioner().compute_position_fix(detections, sensors());
+    EXPECT_TRUE(fix.has_succeeded());
     Eigen::Vector4d state;
     state << fix.estimate.pose.position_m, fix.estimate.pose.yaw_rad;
     return state;
@@ -194,23 +194,23 @@ class ErrorBudgetWithPrior : public testing::TestWithParam<FreeStates> {
   }
 };
 
-TEST_P(ErrorBudgetWithPrior, MatchesReportedCovarianceOfFix) {
-  const Fix fix = rig.positioner().locate(seen_from(rig, kNoise_px), sensors());
-  ASSERT_TRUE(fix.ok());
+TEST_P(ErrorBudgetWithPrior, NoiseMotionAndRollPitchTermsSumToFixCovariance) {
+  const Fix fix = rig.positioner().compute_position_fix(seen_from(rig, kNoise_px), sensors());
+  ASSERT_TRUE(fix.has_succeeded());
   const auto found = budget(prior(GetParam()));
   ASSERT_TRUE(found);
   expect_close(found->noise + found->motion + found->roll_pitch, fix.noise_covariance, 1e-6);
   const auto& [drive, turn, lean] = GetParam();
   EXPECT_EQ(found->motion.diagonal().minCoeff() > 0, drive || turn);
   EXPECT_EQ(found->roll_pitch.diagonal().maxCoeff() > 1e-12, lean);
-  EXPECT_THAT(found->total_covariance(),
+  EXPECT_THAT(found->total_pose_covariance(),
               IsNear(Matrix4(found->noise + found->motion + found->roll_pitch + found->center +
                              found->tilt + found->lamp_map),
                      1e-15));
 }
 
 /// The effects of single errors on fixes match the budget.
-TEST_P(ErrorBudgetWithPrior, MatchesEffectOfErrorsOnFix) {
+TEST_P(ErrorBudgetWithPrior, CenterTiltAndMapTermsMatchErrorsOfFixes) {
   const auto found = budget(prior(GetParam()));
   ASSERT_TRUE(found);
   const auto exact = seen_from(rig, kNoise_px);
@@ -242,7 +242,7 @@ TEST_P(ErrorBudgetWithPrior, MatchesEffectOfErrorsOnFix) {
     }
   }
   // Errors of second order in the steps. Two errors change four states: yaw and height barely.
-  const Eigen::Vector4d scale = found->total_covariance().diagonal().cwiseSqrt();
+  const Eigen::Vector4d scale = found->total_pose_covariance().diagonal().cwiseSqrt();
   const auto relative = [&](const Eigen::Matrix4d& difference) {
     return difference.cwiseQuotient(scale * scale.transpose()).cwiseAbs().maxCoeff();
   };
@@ -265,28 +265,28 @@ INSTANTIATE_TEST_SUITE_P(
 
 class ErrorBudgetPriorCases : public ErrorBudgetWithPrior {};
 
-TEST_F(ErrorBudgetPriorCases, MatchesStandingCameraWhenPriorIsTight) {
+TEST_F(ErrorBudgetPriorCases, EqualsBudgetOfStandingCameraWhenPriorIsTight) {
   BodyPrior prior;
   prior.velocity_sd_m_per_s = prior.inclination_sd_rad = 1e-7;
   const auto found = budget(prior);
   const Camera& camera = rig.calibration.camera;
   const auto standing =
-      compute_error_budget(get_lamp_positions(rig.map), Lens(camera.lens_model, camera.intrinsics),
-                           rig.body.pose, sources);
+      compute_fix_error_budget(get_lamp_positions(rig.map),
+                               Lens(camera.lens_model, camera.intrinsics), rig.body.pose, sources);
   ASSERT_TRUE(found && standing);
   expect_close(found->noise, standing->noise, 1e-6);
-  expect_close(found->total_covariance(), standing->total_covariance(), 1e-6);
+  expect_close(found->total_pose_covariance(), standing->total_pose_covariance(), 1e-6);
 }
 
 /// An unknown tilt is estimated, independently of the calibration.
-TEST_F(ErrorBudgetPriorCases, IgnoresCalibratedTiltWhenTiltIsEstimated) {
+TEST_F(ErrorBudgetPriorCases, CalibratedTiltTermIsNegligibleWhenTiltIsEstimated) {
   const auto known = budget(prior({true, false, false}));
   const auto unknown = budget(prior({true, false, true}));
   ASSERT_TRUE(known && unknown);
   EXPECT_LT(unknown->tilt(0, 0), 0.01 * known->tilt(0, 0));
 }
 
-TEST_F(ErrorBudgetPriorCases, ReturnsNulloptWhenLampsDoNotDetermineTilt) {
+TEST_F(ErrorBudgetPriorCases, ReturnsNulloptForTwoOrCollinearLampsWithFreeTilt) {
   BodyPrior in_hand;
   in_hand.inclination_sd_rad = 1.6;
   rig.map.lamps.resize(2);

@@ -32,8 +32,8 @@ SyntheticRig make_rig(std::size_t lamps, bool equal_heights) {
 void expect_exact(const SyntheticRig& rig, const Sensors& sensors = {}) {
   const auto detections = seen_from(rig);
   ASSERT_EQ(detections.size(), rig.map.lamps.size());
-  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections, sensors);
-  ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+  const Fix fix = Positioner(rig.map, rig.calibration).compute_position_fix(detections, sensors);
+  ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
   EXPECT_EQ(fix.lamps, static_cast<int>(detections.size()));
   EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, kExact_m));
   EXPECT_NEAR(wrap_angle_rad(fix.estimate.pose.yaw_rad - rig.camera.yaw_rad), 0, kExact_rad);
@@ -98,7 +98,7 @@ TEST(PositionerNoiseless, MatchesTruthForOneLampWithKnownHeightAndYaw) {
   expect_exact(rig, {{}, 0, HeightAndYaw{0.2, -2.5}});
 }
 
-TEST(PositionerNoiseless, MatchesTruthOfRobotCenter) {
+TEST(PositionerNoiseless, MatchesRobotPoseWithCameraMount) {
   SyntheticRig rig = make_rig(4, true);
   const Pose robot{{0.1, -0.2, 0.05}, 3.0};
   const CameraMount mount{{0.12, -0.03, 0.2}, 0.4};
@@ -106,13 +106,14 @@ TEST(PositionerNoiseless, MatchesTruthOfRobotCenter) {
                 robot.yaw_rad + mount.yaw_in_robot_rad};
   PositionerOptions options;
   options.mount = mount;
-  const Fix fix = Positioner(rig.map, rig.calibration, options).locate(seen_from(rig));
-  ASSERT_TRUE(fix.ok());
+  const Fix fix =
+      Positioner(rig.map, rig.calibration, options).compute_position_fix(seen_from(rig));
+  ASSERT_TRUE(fix.has_succeeded());
   EXPECT_THAT(fix.estimate.pose.position_m, IsNear(robot.position_m, kExact_m));
   EXPECT_NEAR(fix.estimate.pose.yaw_rad, robot.yaw_rad, kExact_rad);
 }
 
-TEST(PositionerNoiseless, MatchesTruthOfTiltedRobotCenter) {
+TEST(PositionerNoiseless, MatchesPoseOfTiltedRobotWithCameraMount) {
   SyntheticRig rig = make_rig(4, true);
   const Eigen::Vector3d robot_m(0.1, -0.2, 0.05);
   const CameraMount mount{{0.12, -0.03, 0.2}, 1.3};
@@ -120,20 +121,20 @@ TEST(PositionerNoiseless, MatchesTruthOfTiltedRobotCenter) {
   const double robot_yaw_rad = 0.6;
   rig.camera.yaw_rad = robot_yaw_rad + mount.yaw_in_robot_rad;
   rig.camera.position_m = robot_m + rotation_about_z(robot_yaw_rad) *
-                                        level_from_inclination(of_robot) *
+                                        level_rotation_from_inclination(of_robot) *
                                         mount.position_in_robot_m;
   // The same rotation about the axes of the camera, which are rotated relative to the robot's.
   const Eigen::Matrix3d camera_from_robot = rotation_about_z(-mount.yaw_in_robot_rad);
   const Eigen::Matrix3d lean =
-      camera_from_robot * level_from_inclination(of_robot) * camera_from_robot.transpose();
+      camera_from_robot * level_rotation_from_inclination(of_robot) * camera_from_robot.transpose();
   rig.inclination = {std::atan2(lean(2, 1), lean(2, 2)), -std::asin(lean(2, 0))};
   const double yaw_of_lean_rad = std::atan2(lean(1, 0), lean(0, 0));
   rig.camera.yaw_rad += yaw_of_lean_rad;  // Rz Ry Rx of the camera's axes
   PositionerOptions options;
   options.mount = mount;
-  const Fix fix =
-      Positioner(rig.map, rig.calibration, options).locate(seen_from(rig), {of_robot, 0, {}});
-  ASSERT_TRUE(fix.ok());
+  const Fix fix = Positioner(rig.map, rig.calibration, options)
+                      .compute_position_fix(seen_from(rig), {of_robot, 0, {}});
+  ASSERT_TRUE(fix.has_succeeded());
   EXPECT_THAT(fix.estimate.pose.position_m, IsNear(robot_m, kExact_m));
   EXPECT_NEAR(fix.estimate.pose.yaw_rad, robot_yaw_rad, kExact_rad);
 }
@@ -149,15 +150,15 @@ TEST(PositionerNoiseless, MatchesTruthForThreeLampsWithAmbiguousPair) {
                   random.uniform(-3, 3)};
     const auto detections = seen_from(rig, 1e-3);
     if (detections.size() < 3) continue;
-    const Fix fix = Positioner(rig.map, rig.calibration).locate(detections);
-    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+    const Fix fix = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
+    ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
     EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, 1e-6));
     ++fixes;
   }
   EXPECT_GT(fixes, 0);
 }
 
-TEST(PositionerNoiseless, MatchesTruthInNationalCoordinates) {
+TEST(PositionerNoiseless, MatchesTruthForLargeNationalCoordinates) {
   SyntheticRig rig = make_rig(5, false);
   const Eigen::Vector3d origin_m(4.5e5, 5e6, 120);
   for (Lamp& lamp : rig.map.lamps) lamp.position_m += origin_m;
@@ -165,15 +166,16 @@ TEST(PositionerNoiseless, MatchesTruthInNationalCoordinates) {
   for (int i = 0; i < 200; ++i) {
     rig.camera = {origin_m + Eigen::Vector3d(0.1, -0.2, 0), random.uniform(-3, 3)};
     const Positioner positioner(rig.map, rig.calibration);
-    const Fix exact = positioner.locate(seen_from(rig));
-    ASSERT_TRUE(exact.ok());
+    const Fix exact = positioner.compute_position_fix(seen_from(rig));
+    ASSERT_TRUE(exact.has_succeeded());
     // The coordinates themselves are rounded to 1e-9 m.
     EXPECT_THAT(exact.estimate.pose.position_m, IsNear(rig.camera.position_m, 1e-8));
-    EXPECT_TRUE(positioner.locate(with_noise(seen_from(rig, 0.5), random)).ok());
+    EXPECT_TRUE(
+        positioner.compute_position_fix(with_noise(seen_from(rig, 0.5), random)).has_succeeded());
   }
 }
 
-TEST(PositionerNoiseless, MatchesTruthWithEveryLensModel) {
+TEST(PositionerNoiseless, MatchesTruthWithEveryParametricLensExceptFisheye) {
   const std::vector<double> opencv12{520,  522,  403,  296,  -0.28, 0.09,  1e-4, -2e-4,
                                      -.01, 0.02, 0.01, 1e-3, 1e-3,  -1e-3, 2e-3, 1e-3};
   for (const LensModel model : {LensModel::pinhole, LensModel::stereographic, LensModel::opencv4,
@@ -182,7 +184,7 @@ TEST(PositionerNoiseless, MatchesTruthWithEveryLensModel) {
     Camera& camera = rig.calibration.camera;
     camera.lens_model = model;
     camera.intrinsics = opencv12;
-    camera.intrinsics.resize(parameter_count(model));
+    camera.intrinsics.resize(num_lens_parameters(model));
     rig.camera = {{0.1, 0.1, 0}, 1};
     expect_exact(rig);
   }
@@ -212,7 +214,7 @@ TEST(PositionerNoiseless, MatchesTruthForLampsBeyond90DegreesOffAxis) {
   const Lens lens(LensModel::fisheye, rig.calibration.camera.intrinsics);
   int beyond = 0;
   for (const Detection& detection : seen_from(rig)) {
-    const auto ray = lens.unproject(detection.pixel);
+    const auto ray = lens.unproject_pixel(detection.pixel);
     ASSERT_TRUE(ray);
     if (ray->direction.z() < 0) ++beyond;
   }

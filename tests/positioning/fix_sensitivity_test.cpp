@@ -54,20 +54,21 @@ class FixSensitivity : public testing::Test {
     return {sd, [this, of](double error) {
               Sensors wrong = sensors;
               of(wrong) += error;
-              return Positioner(rig.map, rig.calibration, options).locate(detections, wrong);
+              return Positioner(rig.map, rig.calibration, options)
+                  .compute_position_fix(detections, wrong);
             }};
   }
   std::vector<Source> sources() const {
     std::vector<Source> all;
     for (std::size_t i = 0; i < detections.size(); ++i) {
       for (const int axis : {0, 1}) {
-        all.push_back(
-            {detections[i].sigma_px.value_or(options.unstated_sigma_px),
-             [this, i, axis](double error) {
-               auto wrong = detections;
-               wrong[i].pixel[axis] += error;
-               return Positioner(rig.map, rig.calibration, options).locate(wrong, sensors);
-             }});
+        all.push_back({detections[i].sigma_px.value_or(options.unstated_sigma_px),
+                       [this, i, axis](double error) {
+                         auto wrong = detections;
+                         wrong[i].pixel[axis] += error;
+                         return Positioner(rig.map, rig.calibration, options)
+                             .compute_position_fix(wrong, sensors);
+                       }});
       }
     }
     if (sensors.height_and_yaw && detections.size() == 1) {
@@ -100,14 +101,15 @@ class FixSensitivity : public testing::Test {
   }
 
   static Eigen::Vector4d pose_of(const Fix& fix) {
-    EXPECT_TRUE(fix.ok()) << to_string(fix.status);
+    EXPECT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
     Eigen::Vector4d pose;
     pose << fix.estimate.pose.position_m, fix.estimate.pose.yaw_rad;
     return pose;
   }
   void expect_matches() const {
-    const Fix fix = Positioner(rig.map, rig.calibration, options).locate(detections, sensors);
-    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+    const Fix fix =
+        Positioner(rig.map, rig.calibration, options).compute_position_fix(detections, sensors);
+    ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
     EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.body.pose.position_m, 1e-5));
     EXPECT_EQ(fix.rejected_lamps, 0);
     Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
@@ -132,7 +134,7 @@ class FixSensitivity : public testing::Test {
   }
 };
 
-TEST_F(FixSensitivity, MatchesCovarianceOfLevelCamera) {
+TEST_F(FixSensitivity, FixCovarianceMatchesFiniteDifferencesForLevelCamera) {
   stand_level();
   for (const std::size_t lamps : {2u, 3u, 4u, 8u}) {
     SCOPED_TRACE(lamps);
@@ -142,7 +144,7 @@ TEST_F(FixSensitivity, MatchesCovarianceOfLevelCamera) {
 }
 
 /// The fix weights equal noise in the undistorted image; the covariance is for the image.
-TEST_F(FixSensitivity, CovarianceMatchesSensitivityWhenSigmaIsUnset) {
+TEST_F(FixSensitivity, FixCovarianceMatchesFiniteDifferencesWhenSigmaIsUnset) {
   stand_level();
   options.unstated_sigma_px = 0.3;
   for (const std::size_t lamps : {2u, 3u, 8u}) {
@@ -153,7 +155,7 @@ TEST_F(FixSensitivity, CovarianceMatchesSensitivityWhenSigmaIsUnset) {
   }
 }
 
-TEST_F(FixSensitivity, MatchesCovarianceOfRobotWithExactInclination) {
+TEST_F(FixSensitivity, FixCovarianceMatchesFiniteDifferencesForExactlyInclinedRobot) {
   stand_level();
   rig.body.motion.inclination = {0.08, -0.05};
   rig.mount = CameraMount{{0.3, -0.2, 0.4}, 0.5};
@@ -162,7 +164,7 @@ TEST_F(FixSensitivity, MatchesCovarianceOfRobotWithExactInclination) {
   expect_matches();
 }
 
-TEST_F(FixSensitivity, CovarianceMatchesNumericalSensitivityForOneLamp) {
+TEST_F(FixSensitivity, FixCovarianceMatchesFiniteDifferencesForOneLamp) {
   for (const bool on_robot : {false, true}) {
     SCOPED_TRACE(on_robot);
     if (on_robot) rig.mount = CameraMount{{0.3, -0.2, 0.4}, 0.5};
@@ -182,7 +184,7 @@ TEST_F(FixSensitivity, CovarianceMatchesNumericalSensitivityForOneLamp) {
 /// Priors of the states, some of them exact.
 class FixSensitivityWithPriors : public FixSensitivity, public testing::WithParamInterface<int> {};
 
-TEST_P(FixSensitivityWithPriors, MatchesCovarianceOfRobot) {
+TEST_P(FixSensitivityWithPriors, FixCovarianceMatchesFiniteDifferencesForUncertainMotionAndTilt) {
   const BodyMotion& motion = rig.body.motion;
   rig.mount = CameraMount{{0.3, -0.2, 0.4}, 0.5};
   const int free = GetParam();
@@ -196,7 +198,8 @@ TEST_P(FixSensitivityWithPriors, MatchesCovarianceOfRobot) {
     if (with_height) sensors.height = KnownHeight{rig.body.pose.position_m.z(), 0.002};
     see_lamps(5);
     expect_matches();
-    const Fix fix = Positioner(rig.map, rig.calibration, options).locate(detections, sensors);
+    const Fix fix =
+        Positioner(rig.map, rig.calibration, options).compute_position_fix(detections, sensors);
     ASSERT_TRUE(fix.body);
     const BodyCovariance& covariance = fix.body->covariance;
     EXPECT_EQ(covariance(kBodyYawRate, kBodyYawRate) > 0, yaw_rate);

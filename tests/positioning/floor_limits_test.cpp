@@ -26,7 +26,7 @@ Camera pinhole_camera() {
 
 const ErrorSources kNoise{0.1, 0, 0, 0};
 
-TEST(FindVisibleLamps, ExcludesLampsOutsideImage) {
+TEST(FindVisibleLamps, ExcludesLampsOutsideImageOrBelowCamera) {
   // At 1 m above the camera the image is 1.6 m wide: its edges are at +-0.8 m, -+0.6 m.
   const LampMap map = make_lamp_map({{0.7999, 0, 1},
                                      {0.8001, 0, 1},
@@ -43,19 +43,19 @@ TEST(FindVisibleLamps, ExcludesLampsOutsideImage) {
 TEST(FindVisibleLamps, ExcludesTruncatedLampsWhenDiameterIsKnown) {
   LampMap map = make_lamp_map({{0.75, 0, 1}, {0, 0, 1}});
   EXPECT_EQ(find_visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 2);
-  map.lamps[0].shape = map.lamps[1].shape = make_disc(0.2);
+  map.lamps[0].shape = map.lamps[1].shape = make_disc_lamp_shape(0.2);
   const auto visible = find_visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0});
   ASSERT_EQ(visible.size(), 1);
   EXPECT_THAT(visible[0], IsNear(Eigen::Vector3d(0, 0, 1), 0));
 }
 
-TEST(FindVisibleLamps, DependsOnYaw) {
+TEST(FindVisibleLamps, ExcludesLampThatYawMovesOutOfImage) {
   const LampMap map = make_lamp_map({{0.7, 0, 1}});
   EXPECT_EQ(find_visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 1);
   EXPECT_EQ(find_visible_lamps(map, pinhole_camera(), {{0, 0, 0}, M_PI / 2}).size(), 0);
 }
 
-TEST(ComputeAccuracyLimitsOnFloor, CoversGridRowByRow) {
+TEST(ComputeAccuracyLimitsOnFloor, ReturnsPlacesOfGridRowByRow) {
   const LampMap map = synthetic_lamps();
   const auto limits = compute_accuracy_limits_on_floor(map, pinhole_camera(),
                                                        {0, 0.3, -0.1, 0.1, 0.1}, 0.2, 0, kNoise);
@@ -67,7 +67,7 @@ TEST(ComputeAccuracyLimitsOnFloor, CoversGridRowByRow) {
   }
 }
 
-TEST(ComputeAccuracyLimitsOnFloor, IncludesMotionAndLeanWhenFree) {
+TEST(ComputeAccuracyLimitsOnFloor, TotalVarianceIncreasesWhenMotionAndTiltAreEstimated) {
   Camera camera = pinhole_camera();
   camera.row_time_s = 3e-5;
   camera.readout = Readout::rows;
@@ -97,13 +97,14 @@ TEST(ComputeAccuracyLimitsOnFloor, IncludesMotionAndLeanWhenFree) {
     ASSERT_FALSE(standing.places[i].parts.empty());
     // Additional estimated states increase the covariance.
     EXPECT_THAT(place.parts[0], IsNear(standing.places[i].parts[0], 1e-12));
-    EXPECT_GT(place.total_covariance()(0, 0), standing.places[i].total_covariance()(0, 0));
+    EXPECT_GT(place.total_pose_covariance()(0, 0),
+              standing.places[i].total_pose_covariance()(0, 0));
   }
   EXPECT_GT(with_fix, 0);
   EXPECT_GT(without, 0) << "some see too few lamps for roll and pitch";
 }
 
-TEST(ComputeAccuracyLimitsOnFloor, MatchesScatterWithFisheye) {
+TEST(ComputeAccuracyLimitsOnFloor, NoiseCovarianceMatchesScatterOfFixesWithFisheye) {
   constexpr int draws = 4000;
   const FloorGrid grid{-1.2, 1.2, 0.2, 0.2, 0.8};
   SyntheticRig rig{synthetic_lamps(), {fisheye_camera(), {}, {}, {}, {}}, {}, {}};
@@ -119,14 +120,14 @@ TEST(ComputeAccuracyLimitsOnFloor, MatchesScatterWithFisheye) {
     const auto exact = seen_from(rig, kNoise.noise_px);
     Scatter scatter(place.camera, place.parts[0]);
     for (int i = 0; i < draws; ++i) {
-      scatter.add(positioner.locate(with_noise(exact, random)).estimate.pose);
+      scatter.add(positioner.compute_position_fix(with_noise(exact, random)).estimate.pose);
     }
     // Four standard deviations of a standard deviation from `draws` draws.
     EXPECT_LT(scatter.excess().cwiseAbs().maxCoeff(), 4 / std::sqrt(2.0 * draws));
   }
 }
 
-TEST(ComputeAccuracyLimitsOnFloor, ReturnsNoPartsWithoutVisibleLamps) {
+TEST(ComputeAccuracyLimitsOnFloor, ReturnsNoCovariancesForPlaceWithoutVisibleLamps) {
   const auto limits = compute_accuracy_limits_on_floor(synthetic_lamps(), pinhole_camera(),
                                                        {50, 50, 0, 0, 1}, 0, 0, kNoise);
   ASSERT_EQ(limits.places.size(), 1);
@@ -147,7 +148,7 @@ TEST(ComputeAccuracyLimitsOnFloor, ThrowsOnInvalidGrid) {
   EXPECT_THROW(on({0, NAN, 0, 1, 0.1}), std::invalid_argument);
 }
 
-TEST(MakeGridOfFloorPositions, ReturnsBoundingBoxOfLamps) {
+TEST(MakeGridOfFloorPositions, GridSpansBoundingBoxOfLamps) {
   const FloorGrid grid = make_grid_of_floor_positions(synthetic_lamps(), 0.05);
   EXPECT_EQ(grid.x_min_m, -0.8);
   EXPECT_EQ(grid.x_max_m, 0.8);

@@ -9,15 +9,16 @@
 namespace vlp {
 namespace {
 
-TEST(ComputeInclinationRotation, ErrorAxesMatchFiniteDifferences) {
+TEST(ComputeInclinationRotation, ErrorAxesMatchFiniteDifferencesByRollAndPitch) {
   constexpr double step = 1e-5, yaw_rad = 0.6;
   const Inclination inclination{0.2, -0.3};
   const InclinationRotation found = compute_inclination_rotation(inclination, yaw_rad);
   const Eigen::Matrix3d robot_from_base = rotation_about_z(yaw_rad);
-  EXPECT_THAT(found.level_from_base, IsNear((robot_from_base.transpose() *
-                                             level_from_inclination(inclination) * robot_from_base)
-                                                .eval(),
-                                            1e-15));
+  EXPECT_THAT(found.level_from_base,
+              IsNear((robot_from_base.transpose() * level_rotation_from_inclination(inclination) *
+                      robot_from_base)
+                         .eval(),
+                     1e-15));
   for (const int axis : {0, 1}) {
     Inclination more = inclination, less = inclination;
     (axis == 0 ? more.roll_rad : more.pitch_rad) += step;

@@ -52,9 +52,9 @@ SyntheticRig tilted_rig() {
   return rig;
 }
 
-static_assert(noexcept(std::declval<const Positioner&>().locate({}, {})));
+static_assert(noexcept(std::declval<const Positioner&>().compute_position_fix({}, {})));
 
-TEST(Positioner, LocateDoesNotAllocate) {
+TEST(Positioner, LocateAllocatesNoMemory) {
   const SyntheticRig rig = tilted_rig();
   PositionerOptions options;
   options.mount = CameraMount{{0.1, 0.2, 0.3}, 0.4};
@@ -68,7 +68,7 @@ TEST(Positioner, LocateDoesNotAllocate) {
   // All combinations of estimated states of a body, from one frame and from two.
   std::array<Sensors, 8> bodies;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
-    bodies[i].motion = KnownMotion::up_to(i & 1 ? 1 : 0, i & 2 ? 1 : 0);
+    bodies[i].motion = KnownMotion::make_motion_prior_from_limits(i & 1 ? 1 : 0, i & 2 ? 1 : 0);
     bodies[i].inclination_sigma_rad = i & 4 ? 1.6 : 0;
     bodies[i].height = KnownHeight{0, 1};
   }
@@ -76,10 +76,10 @@ TEST(Positioner, LocateDoesNotAllocate) {
     const std::array earlier{EarlierFrame{good, 0.05}};
     const long before = allocations;
     for (std::size_t count = 0; count <= detections.size(); ++count) {
-      (void)positioner.locate({detections.data(), count}, sensors);
+      (void)positioner.compute_position_fix({detections.data(), count}, sensors);
       for (const Sensors& body : bodies) {
-        (void)positioner.locate({detections.data(), count}, body);
-        (void)positioner.locate({detections.data(), count}, body, earlier);
+        (void)positioner.compute_position_fix({detections.data(), count}, body);
+        (void)positioner.compute_position_fix({detections.data(), count}, body, earlier);
       }
     }
     EXPECT_EQ(allocations, before);
@@ -89,17 +89,17 @@ TEST(Positioner, LocateDoesNotAllocate) {
   EXPECT_EQ(allocations, before + 1) << "the counter does not count";
 }
 
-TEST(Positioner, LocateDoesNotAllocateWithSplinedLens) {
+TEST(Positioner, LocateAllocatesNoMemoryWithSplinedLens) {
   SyntheticRig rig = tilted_rig();
   rig.calibration.camera = splined_camera();
   const Positioner positioner(rig.map, rig.calibration);
   const auto detections = seen_from(rig);
   const long before = allocations;
-  EXPECT_TRUE(positioner.locate(detections).ok());
+  EXPECT_TRUE(positioner.compute_position_fix(detections).has_succeeded());
   EXPECT_EQ(allocations, before);
 }
 
-TEST(VlpLocate, DoesNotAllocate) {
+TEST(VlpLocate, CFunctionAllocatesNoMemory) {
   const SyntheticRig rig = tilted_rig();
   const TemporaryFolder folder;
   const std::string lamps = folder / "lamps.yaml", calibration = folder / "calibration.yaml";
@@ -123,18 +123,18 @@ TEST(VlpLocate, DoesNotAllocate) {
   vlp_close(positioner);
 }
 
-TEST(Positioner, LocateReturnsSameFixInAllThreads) {
+TEST(Positioner, LocateReturnsEqualFixesFromConcurrentThreads) {
   const SyntheticRig rig = tilted_rig();
   const Positioner positioner(rig.map, rig.calibration);
   const auto detections = seen_from(rig);
-  const Fix expected = positioner.locate(detections);
-  ASSERT_TRUE(expected.ok());
+  const Fix expected = positioner.compute_position_fix(detections);
+  ASSERT_TRUE(expected.has_succeeded());
   std::atomic<int> different{0};
   std::vector<std::thread> threads;
   for (int thread = 0; thread < 8; ++thread) {
     threads.emplace_back([&] {
       for (int i = 0; i < 2000; ++i) {
-        const Fix fix = positioner.locate(detections);
+        const Fix fix = positioner.compute_position_fix(detections);
         if (fix.estimate.pose.position_m != expected.estimate.pose.position_m ||
             fix.estimate.covariance != expected.estimate.covariance) {
           ++different;

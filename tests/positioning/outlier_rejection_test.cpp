@@ -24,28 +24,28 @@ std::array<Sighting, 5> sightings() {
                                                {0, 0.5, 1.8}};
   std::array<Sighting, 5> seen;
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    seen[i] = {lamps_m[i], project_to_normalized_point(LevelPose(kTruth), lamps_m[i]),
+    seen[i] = {lamps_m[i], project_lamp_to_normalized_point(LevelPose(kTruth), lamps_m[i]),
                Matrix2::Identity(), 0.05};
   }
   return seen;
 }
 
-TEST(FindLargestConsistentSet, ReturnsPoseWithSmallestResidualsAmongEqualCounts) {
+TEST(FindLargestConsistentLampSet, ReturnsPoseWithSmallestResidualsAmongEqualCounts) {
   auto seen = sightings();
   seen[0].z.x() += 0.004;  // the first pairs propose wrong poses
-  const auto consensus = find_largest_consistent_set(seen, 0.1);
+  const auto consensus = find_largest_consistent_lamp_set(seen, 0.1);
   ASSERT_TRUE(consensus);
   EXPECT_EQ(consensus->count, 5u);
   EXPECT_THAT(consensus->pose.position_m, IsNear(kTruth.position_m, 1e-12));
 }
 
-TEST(FindLargestConsistentSet, ReturnsNulloptWithoutMajorityOfThree) {
+TEST(FindLargestConsistentLampSet, ReturnsNulloptWhenFewerThanThreeLampsAgree) {
   auto seen = sightings();
   seen[0].z.x() += 0.1, seen[1].z.y() -= 0.15;
-  const auto consensus = find_largest_consistent_set(seen, 0.01);
+  const auto consensus = find_largest_consistent_lamp_set(seen, 0.01);
   ASSERT_TRUE(consensus);
   EXPECT_EQ(consensus->agreeing.to_ulong(), 0b11100u);
-  EXPECT_FALSE(find_largest_consistent_set(std::span(seen).first(4), 0.01)) << "two of four";
+  EXPECT_FALSE(find_largest_consistent_lamp_set(std::span(seen).first(4), 0.01)) << "two of four";
 }
 
 TEST(EstimateAndCheckPose, ReturnsDegenerateWhenHeightSdExceedsHeight) {
@@ -65,7 +65,7 @@ TEST(EstimateAndCheckPose, ReturnsDegenerateWhenHeightSdExceedsHeight) {
 }
 
 /// The first full step from far below leads above the lamps, and is halved.
-TEST(EstimatePoseLeastSquares, ConvergesFromFarBelowLamps) {
+TEST(EstimatePoseLeastSquares, ConvergesToTruthFromInitialPoseFarBelow) {
   const auto seen = sightings();
   const auto fix = estimate_pose_least_squares(seen, {{0, 0, -5}, 0.3});
   ASSERT_TRUE(fix);

@@ -20,7 +20,7 @@ struct OverLimit {
   int fixes = 0, refused = 0;
 
   void add(const Fix& fix, const Pose& truth, const Matrix4& limit) {
-    if (!fix.ok()) {
+    if (!fix.has_succeeded()) {
       ++refused;
       return;
     }
@@ -37,12 +37,12 @@ struct OverLimit {
 
 /// Returns the covariance of the fix of exact observations, which equals the bound.
 std::optional<Matrix4> compute_limit(const BodyRig& rig, const Sensors& sensors) {
-  const Fix exact = rig.positioner().locate(seen_from(rig, kLimitNoise_px), sensors);
-  if (!exact.ok()) return std::nullopt;
+  const Fix exact = rig.positioner().compute_position_fix(seen_from(rig, kLimitNoise_px), sensors);
+  if (!exact.has_succeeded()) return std::nullopt;
   return exact.noise_covariance;
 }
 
-TEST(IsMotionEstimated, ReturnsTrueForAnyFreeVelocityOrYawRate) {
+TEST(IsMotionEstimated, ReturnsTrueWhenVelocityOrYawRateIsUncertain) {
   BodyPrior prior;
   EXPECT_FALSE(is_motion_estimated(prior) || is_motion_or_tilt_estimated(prior));
   prior.velocity_sd_m_per_s = 0.01;
@@ -57,7 +57,7 @@ TEST(IsMotionEstimated, ReturnsTrueForAnyFreeVelocityOrYawRate) {
 
 /// Four or five lamps of a ceiling, tilt of up to 80 degrees known from the image alone: errors at
 /// most 1.5 times the bound of six states.
-TEST(BodyPoseBound, FixErrorsStayNearBoundForAnyTilt) {
+TEST(BodyPoseBound, FixErrorsAreAtMost150PercentOfBoundForAnyTilt) {
   Random random(81);
   Sensors in_hand;
   in_hand.inclination_sigma_rad = 1.6;
@@ -78,7 +78,8 @@ TEST(BodyPoseBound, FixErrorsStayNearBoundForAnyTilt) {
       const auto limit = compute_limit(rig, in_hand);
       if (exact.size() < 4 || !limit) continue;
       lamps_seen += static_cast<int>(exact.size());
-      found.add(rig.positioner().locate(with_noise(exact, random), in_hand), rig.body.pose, *limit);
+      found.add(rig.positioner().compute_position_fix(with_noise(exact, random), in_hand),
+                rig.body.pose, *limit);
     }
     std::printf(
         "lean %2.0f to %2.0f degrees: %d fixes, %d refused, %.1f lamps, over the limit "
@@ -93,10 +94,10 @@ TEST(BodyPoseBound, FixErrorsStayNearBoundForAnyTilt) {
 
 /// A camera at rest with a prior of up to 2 m/s: its errors are 0.9 to 1.1 of the reported standard
 /// deviations, with four lamps and with eight.
-TEST(BodyPoseBound, FixErrorsMatchReportedWithFreeMotion) {
+TEST(BodyPoseBound, FixErrorsMatchReportedSdsWithUnknownMotion) {
   Random random(82);
   Sensors might_drive;
-  might_drive.motion = KnownMotion::up_to(2, rad_from_deg(180));
+  might_drive.motion = KnownMotion::make_motion_prior_from_limits(2, rad_from_deg(180));
   for (const std::size_t lamps : {4U, 8U}) {
     OverLimit with_motion, at_rest;
     Eigen::Array4d price = Eigen::Array4d::Zero();
@@ -109,8 +110,9 @@ TEST(BodyPoseBound, FixErrorsMatchReportedWithFreeMotion) {
       const auto limit = compute_limit(rig, might_drive), standing = compute_limit(rig, {});
       if (exact.size() < 4 || !limit || !standing) continue;
       const auto noisy = with_noise(exact, random);
-      with_motion.add(rig.positioner().locate(noisy, might_drive), rig.body.pose, *limit);
-      at_rest.add(rig.positioner().locate(noisy), rig.body.pose, *standing);
+      with_motion.add(rig.positioner().compute_position_fix(noisy, might_drive), rig.body.pose,
+                      *limit);
+      at_rest.add(rig.positioner().compute_position_fix(noisy), rig.body.pose, *standing);
       price += limit->diagonal().array() / standing->diagonal().array();
     }
     price = (price / with_motion.fixes).sqrt().eval();

@@ -75,7 +75,7 @@ Sensors sensors_for(const BodyState& state, const Estimated& estimated) {
 }
 
 void expect_state(const Fix& fix, const BodyState& state, double tolerance) {
-  ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+  ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
   EXPECT_THAT(fix.estimate.pose.position_m, IsNear(state.pose.position_m, tolerance));
   EXPECT_NEAR(wrap_angle_rad(fix.estimate.pose.yaw_rad - state.pose.yaw_rad), 0, tolerance);
   ASSERT_TRUE(fix.body.has_value());
@@ -97,7 +97,8 @@ class PositionerNoiselessBody : public testing::TestWithParam<Estimated> {
     rig.map = draw_lamps_in_view(rig, lamps, one_height, min_rad, random);
     const auto detections = seen_from(rig, kTinyNoise_px);
     if (detections.size() < lamps) return;
-    const Fix fix = rig.positioner().locate(detections, sensors_for(rig.body, GetParam()));
+    const Fix fix =
+        rig.positioner().compute_position_fix(detections, sensors_for(rig.body, GetParam()));
     expect_state(fix, rig.body, kExactBody);
     ++fixes;
   }
@@ -128,7 +129,7 @@ TEST_P(PositionerNoiselessBody, MatchesTruthWithColumnReadoutAndCalibratedTilt) 
   EXPECT_GT(fixes, 25);
 }
 
-TEST_P(PositionerNoiselessBody, MatchesTruthOfRobot) {
+TEST_P(PositionerNoiselessBody, MatchesRobotPoseWithCameraMount) {
   for (int i = 0; i < 40; ++i) {
     BodyRig rig{{}, rolling_calibration(), random_state(random, 0.1), {}};
     rig.mount = CameraMount{{0.3, -0.1, 0.2}, 0.1 * i};
@@ -149,7 +150,7 @@ TEST_P(PositionerNoiselessBody, MatchesTruthForTiltUpTo80Degrees) {
 }
 
 /// A correct prior does not change the fix, even if the lamps hardly determine the state.
-TEST_P(PositionerNoiselessBody, MatchesTruthWhenPriorMeanIsTrue) {
+TEST_P(PositionerNoiselessBody, MatchesTruthForFewLampsWithTruePriorMean) {
   for (int i = 0; i < 60; ++i) {
     BodyRig rig{{}, rolling_calibration(), random_state(random, 0.1), {}};
     const std::size_t lamps = 2 + random.index(3);
@@ -162,7 +163,7 @@ TEST_P(PositionerNoiselessBody, MatchesTruthWhenPriorMeanIsTrue) {
                       GetParam().velocity ? 0.5 : 0, GetParam().yaw_rate ? 0.3 : 0};
     sensors.inclination = motion.inclination;
     sensors.inclination_sigma_rad = GetParam().lean ? 0.02 : 0;
-    expect_state(rig.positioner().locate(detections, sensors), rig.body, kExactBody);
+    expect_state(rig.positioner().compute_position_fix(detections, sensors), rig.body, kExactBody);
     ++fixes;
   }
   EXPECT_GT(fixes, 40);
@@ -171,7 +172,7 @@ TEST_P(PositionerNoiselessBody, MatchesTruthWhenPriorMeanIsTrue) {
 INSTANTIATE_TEST_SUITE_P(Estimates, PositionerNoiselessBody, testing::ValuesIn(kCombinations),
                          name_of_combination);
 
-TEST(EvaluatedState, DerivativesMatchFiniteDifferences) {
+TEST(EvaluatedState, LampInBodyDerivativesMatchFiniteDifferences) {
   // Central differences: step^2 and rounding / step, times a second at most.
   constexpr double step = 1e-6, tolerance = 1e-8;
   Random random(5);
@@ -179,7 +180,7 @@ TEST(EvaluatedState, DerivativesMatchFiniteDifferences) {
     const BodyState state = random_state(random, 1.4);
     const Eigen::Vector3d lamp_m(1.1, 0.4, 2.5);
     const double time_s = random.uniform(-0.2, 0.2);
-    const auto derivative = EvaluatedState(state).d_lamp_in_body_d_state(lamp_m, time_s);
+    const auto derivative = EvaluatedState(state).d_lamp_position_in_body_d_state(lamp_m, time_s);
     for (int index = 0; index < kBodyStates; ++index) {
       const auto q = [&](double change) {
         BodyState at = state;
@@ -191,7 +192,7 @@ TEST(EvaluatedState, DerivativesMatchFiniteDifferences) {
         if (index == kBodyYawRate) motion.yaw_rate_rad_per_s += change;
         if (index == kBodyRoll) motion.inclination.roll_rad += change;
         if (index == kBodyPitch) motion.inclination.pitch_rad += change;
-        return EvaluatedState(at).lamp_in_body(lamp_m, time_s);
+        return EvaluatedState(at).lamp_position_in_body(lamp_m, time_s);
       };
       const Eigen::Vector3d difference = (q(step) - q(-step)) / (2 * step);
       EXPECT_THAT(Eigen::Vector3d(derivative.col(index)), IsNear(difference, tolerance)) << index;
@@ -199,37 +200,39 @@ TEST(EvaluatedState, DerivativesMatchFiniteDifferences) {
   }
 }
 
-TEST(WhitenedPixelFromRay, MatchesLens) {
+TEST(WhitenedPixelFromRay, MapsRayDisplacementToPixelDisplacement) {
   const Camera camera = synthetic_camera();
   const Lens lens(camera.lens_model, camera.intrinsics);
   constexpr double step_px = 1e-3, sigma_px = 0.25;
   for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(100, 500), Eigen::Vector2d(420, 290)}) {
-    const auto ray = lens.unproject(pixel);
+    const auto ray = lens.unproject_pixel(pixel);
     ASSERT_TRUE(ray);
-    const auto matrix = whitened_pixel_from_ray(ray->direction, ray->d_direction_d_pixel, sigma_px);
+    const auto matrix =
+        compute_whitened_pixel_from_ray(ray->direction, ray->d_direction_d_pixel, sigma_px);
     ASSERT_TRUE(matrix);
     const Eigen::Vector3d unit_ray = ray->direction.normalized();
     EXPECT_THAT(Eigen::Vector2d(*matrix * unit_ray), IsNear(Eigen::Vector2d(0, 0), 1e-9));
     for (const Eigen::Vector2d& move : {Eigen::Vector2d(step_px, 0), Eigen::Vector2d(0, step_px)}) {
-      const Eigen::Vector3d moved = lens.unproject(pixel + move).value().direction;
+      const Eigen::Vector3d moved = lens.unproject_pixel(pixel + move).value().direction;
       const Eigen::Vector2d found = *matrix * moved / unit_ray.dot(moved) * sigma_px;
       EXPECT_THAT(found, IsNear(move, 1e-7));
     }
   }
 }
 
-TEST(ComputeChiSquared, SumsPixelsAndPriors) {
+TEST(ComputeBodyStateChiSquared, SumsPixelAndPriorTermsUnlessLampIsBehind) {
   constexpr double focal_px = 500, sigma_px = 0.5;
   Eigen::Matrix<double, 3, 2> d_ray_d_pixel = Eigen::Matrix<double, 3, 2>::Zero();
   d_ray_d_pixel.topRows<2>().diagonal().setConstant(1 / focal_px);
   const Eigen::Vector3d axis(0, 0, 1);
-  const auto whitened = whitened_pixel_from_ray(axis, d_ray_d_pixel, sigma_px);
+  const auto whitened = compute_whitened_pixel_from_ray(axis, d_ray_d_pixel, sigma_px);
   ASSERT_TRUE(whitened);
   // The lamp is 2 m above the camera, and 25 px and 50 px away from the optical axis.
   std::vector<BodyObservation> seen{{{0.1, 0.2, 2.5}, axis, *whitened, sigma_px, 0}};
   const Eigen::Vector3d arm_m(0, 0, 0.5);
   BodyPrior prior;
-  EXPECT_NEAR(compute_chi_squared(seen, arm_m, prior, {}).value_or(0), 50 * 50 + 100 * 100, 1e-6);
+  EXPECT_NEAR(compute_body_state_chi_squared(seen, arm_m, prior, {}).value_or(0),
+              50 * 50 + 100 * 100, 1e-6);
   prior.height = KnownHeight{0.1, 0.05};
   prior.mean.velocity_m_per_s = {0.3, 0};
   prior.velocity_sd_m_per_s = 0.1;
@@ -237,13 +240,14 @@ TEST(ComputeChiSquared, SumsPixelsAndPriors) {
   prior.yaw_rate_sd_rad_per_s = 0.2;
   prior.mean.inclination = {0, -0.5};
   prior.inclination_sd_rad = 0.1;
-  EXPECT_NEAR(compute_chi_squared(seen, arm_m, prior, {}).value_or(0),
+  EXPECT_NEAR(compute_body_state_chi_squared(seen, arm_m, prior, {}).value_or(0),
               50 * 50 + 100 * 100 + 2 * 2 + 3 * 3 + 4 * 4 + 5 * 5, 1e-6);
   seen.push_back({{0.1, 0.2, -1}, axis, *whitened, sigma_px, 0});
-  EXPECT_FALSE(compute_chi_squared(seen, arm_m, prior, {})) << "the second lamp is behind";
+  EXPECT_FALSE(compute_body_state_chi_squared(seen, arm_m, prior, {}))
+      << "the second lamp is behind";
 }
 
-TEST(ComputeThreeLampPoses, ContainsTruth) {
+TEST(ComputePosesFromThreeLamps, ContainsTruePoseForRandomScenes) {
   Random random(6);
   int exact = 0;
   constexpr int draws = 5000;
@@ -257,7 +261,7 @@ TEST(ComputeThreeLampPoses, ContainsTruth) {
       lamps_m[k].z() = i % 2 ? 2 : random.uniform(1.7, 2.3);
       rays[k] = (camera_from_world * lamps_m[k]).normalized();
     }
-    const ThreeLampPoses found = compute_three_lamp_poses(lamps_m, rays);
+    const ThreeLampPoses found = compute_poses_from_three_lamps(lamps_m, rays);
     double nearest = 1;
     for (int k = 0; k < found.count; ++k) {
       const FreePose& pose = found.poses[static_cast<std::size_t>(k)];
@@ -270,17 +274,17 @@ TEST(ComputeThreeLampPoses, ContainsTruth) {
   EXPECT_GE(exact, draws - 5);
 }
 
-TEST(ComputeThreeLampPoses, ReturnsNoneForCollinearLamps) {
+TEST(ComputePosesFromThreeLamps, ReturnsNoPoseForCollinearLamps) {
   const std::array<Eigen::Vector3d, 3> lamps_m{
       Eigen::Vector3d(-1, 0.2, 2), {0, 0.2, 2}, {1, 0.2, 2}};
   std::array<Eigen::Vector3d, 3> rays;
   for (std::size_t i = 0; i < 3; ++i) rays[i] = lamps_m[i].normalized();
-  EXPECT_EQ(compute_three_lamp_poses(lamps_m, rays).count, 0);
+  EXPECT_EQ(compute_poses_from_three_lamps(lamps_m, rays).count, 0);
 }
 
 /// Noise may remove two nearly equal solutions; which of them are kept does not depend on the unit
 /// of length.
-TEST(ComputeThreeLampPoses, ReturnsScaledPosesForScaledLamps) {
+TEST(ComputePosesFromThreeLamps, ReturnsSameNumberOfPosesForScaledLamps) {
   Random random(9);
   int poses = 0;
   for (int i = 0; i < 2000; ++i) {
@@ -291,8 +295,8 @@ TEST(ComputeThreeLampPoses, ReturnsScaledPosesForScaledLamps) {
       rays[k] = lamps_m[k] + 0.05 * Eigen::Vector3d(random.normal(), random.normal(), 0);
       rays[k].normalize();
     }
-    const ThreeLampPoses found = compute_three_lamp_poses(lamps_m, rays);
-    const ThreeLampPoses scaled = compute_three_lamp_poses(lamps_cm, rays);
+    const ThreeLampPoses found = compute_poses_from_three_lamps(lamps_m, rays);
+    const ThreeLampPoses scaled = compute_poses_from_three_lamps(lamps_cm, rays);
     ASSERT_EQ(scaled.count, found.count) << i;
     poses += found.count;
   }
@@ -300,7 +304,7 @@ TEST(ComputeThreeLampPoses, ReturnsScaledPosesForScaledLamps) {
 }
 
 /// A lamp with equal distances and angles to both others: one of the conics is a pair of lines.
-TEST(ComputeThreeLampPoses, ContainsTruthForSymmetricLamps) {
+TEST(ComputePosesFromThreeLamps, ContainsTruePositionForSymmetricLamps) {
   for (const double up_m : {-2.0, -1.5}) {
     for (const double aside_m : {0.0, 0.3}) {
       const Eigen::Vector3d camera_m(0, aside_m, up_m);
@@ -308,7 +312,7 @@ TEST(ComputeThreeLampPoses, ContainsTruthForSymmetricLamps) {
           Eigen::Vector3d(-0.5, -0.5, 0), {0.5, -0.5, 0}, {0, 0.6, 0}};
       std::array<Eigen::Vector3d, 3> rays;
       for (std::size_t i = 0; i < 3; ++i) rays[i] = (lamps_m[i] - camera_m).normalized();
-      const ThreeLampPoses found = compute_three_lamp_poses(lamps_m, rays);
+      const ThreeLampPoses found = compute_poses_from_three_lamps(lamps_m, rays);
       double nearest_m = 1;
       for (int i = 0; i < found.count; ++i) {
         const FreePose& pose = found.poses[static_cast<std::size_t>(i)];
@@ -375,27 +379,27 @@ class BodyFixCovariance : public testing::TestWithParam<Estimated> {
   }
 };
 
-TEST_P(BodyFixCovariance, MatchesScatterWithLampsAlone) {
+TEST_P(BodyFixCovariance, MatchesScatterOfFixesWithLampsAlone) {
   const auto exact = seen_from(rig, 0.05);
   ASSERT_EQ(exact.size(), 8);
   const Positioner positioner = rig.positioner();
   const Sensors sensors = sensors_for(rig.body, GetParam());
-  const Fix stated = positioner.locate(exact, sensors);
-  ASSERT_TRUE(stated.ok()) << to_string(stated.status);
+  const Fix stated = positioner.compute_position_fix(exact, sensors);
+  ASSERT_TRUE(stated.has_succeeded()) << fix_status_name(stated.status);
   ASSERT_TRUE(stated.body);
   const auto truth = BodyScatter::to_vector(stated);
   BodyScatter scatter;
   Random random(51);
   for (int i = 0; i < kBodyDraws; ++i) {
-    const Fix fix = positioner.locate(with_noise(exact, random), sensors);
-    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+    const Fix fix = positioner.compute_position_fix(with_noise(exact, random), sensors);
+    ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
     scatter.add(BodyScatter::to_vector(fix) - truth);
   }
   scatter.expect(stated.body->covariance, kBodyScatterTolerance);
 }
 
 /// Odometry and inclination sensor with errors of the reported size.
-TEST_P(BodyFixCovariance, MatchesScatterWithLampsAndSensors) {
+TEST_P(BodyFixCovariance, MatchesScatterOfFixesWithLampsAndSensors) {
   rig.mount = CameraMount{{0.2, -0.1, 0.3}, 0.5};
   auto exact = seen_from(rig, 0.05);
   ASSERT_GE(exact.size(), 4);
@@ -407,8 +411,8 @@ TEST_P(BodyFixCovariance, MatchesScatterWithLampsAndSensors) {
                     GetParam().velocity ? 0.05 : 0, GetParam().yaw_rate ? 0.02 : 0};
   sensors.inclination = motion.inclination;
   sensors.inclination_sigma_rad = GetParam().lean ? 0.003 : 0;
-  const Fix stated = positioner.locate(exact, sensors);
-  ASSERT_TRUE(stated.ok()) << to_string(stated.status);
+  const Fix stated = positioner.compute_position_fix(exact, sensors);
+  ASSERT_TRUE(stated.has_succeeded()) << fix_status_name(stated.status);
   ASSERT_TRUE(stated.body);
   const auto truth = BodyScatter::to_vector(stated);
   BodyScatter scatter;
@@ -421,8 +425,8 @@ TEST_P(BodyFixCovariance, MatchesScatterWithLampsAndSensors) {
     read.motion->yaw_rate_rad_per_s += sensors.motion->yaw_rate_sd_rad_per_s * random.normal();
     read.inclination->roll_rad += sensors.inclination_sigma_rad * random.normal();
     read.inclination->pitch_rad += sensors.inclination_sigma_rad * random.normal();
-    const Fix fix = positioner.locate(with_noise(exact, random), read);
-    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+    const Fix fix = positioner.compute_position_fix(with_noise(exact, random), read);
+    ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
     scatter.add(BodyScatter::to_vector(fix) - truth);
   }
   scatter.expect(stated.body->covariance, kBodyScatterTolerance);
@@ -431,19 +435,19 @@ TEST_P(BodyFixCovariance, MatchesScatterWithLampsAndSensors) {
 INSTANTIATE_TEST_SUITE_P(Estimates, BodyFixCovariance, testing::ValuesIn(kCombinations),
                          name_of_combination);
 
-TEST(BodyFix, RedundancyMatchesMeanOfPixelResiduals) {
+TEST(PositionerLocate, RedundancyMatchesMeanSquaredPixelResidualOfBodyFix) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   rig.body = {{{0.1, -0.05, 0.05}, 0.7}, {{0.8, -0.5}, 0.6, {0.03, -0.05}}};
   const auto exact = seen_from(rig, 0.05);
   Sensors sensors;
-  sensors.motion = KnownMotion::up_to(2, 2);
+  sensors.motion = KnownMotion::make_motion_prior_from_limits(2, 2);
   sensors.inclination_sigma_rad = 1;
   const Positioner positioner = rig.positioner();
   Random random(53);
   double sum = 0, redundancy = 0;
   for (int i = 0; i < kBodyDraws; ++i) {
-    const Fix fix = positioner.locate(with_noise(exact, random), sensors);
-    ASSERT_TRUE(fix.ok());
+    const Fix fix = positioner.compute_position_fix(with_noise(exact, random), sensors);
+    ASSERT_TRUE(fix.has_succeeded());
     sum += 8 * std::pow(fix.residual_px / 0.05, 2);
     redundancy += fix.redundancy;
   }

@@ -20,7 +20,7 @@ class PositionerStatus : public testing::Test {
       synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0.1, -0.05, 0}, 0.4}, {}};
 
   FixStatus status(const std::vector<Detection>& detections, const Sensors& sensors = {}) {
-    return Positioner(rig.map, rig.calibration).locate(detections, sensors).status;
+    return Positioner(rig.map, rig.calibration).compute_position_fix(detections, sensors).status;
   }
   std::vector<Detection> seen(std::size_t lamps) {
     auto detections = seen_from(rig, 0.2);
@@ -29,25 +29,25 @@ class PositionerStatus : public testing::Test {
   }
 };
 
-TEST_F(PositionerStatus, ReturnsTooFewLampsBelowTwo) {
+TEST_F(PositionerStatus, ReturnsTooFewLampsForFewerThanTwo) {
   EXPECT_EQ(status({}), FixStatus::too_few_lamps);
   EXPECT_EQ(status(seen(1)), FixStatus::too_few_lamps);
   EXPECT_EQ(status(seen(2)), FixStatus::ok);
 }
 
-TEST_F(PositionerStatus, ReturnsTooFewLampsWhenLampsAreUnknown) {
+TEST_F(PositionerStatus, ReturnsTooFewLampsWhenMapHasOnlyOneOfTwo) {
   auto detections = seen(2);
   detections[1].lamp = 77;
-  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections);
+  const Fix fix = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
   EXPECT_EQ(fix.status, FixStatus::too_few_lamps);
   EXPECT_EQ(fix.unknown_lamps, 1);
 }
 
-TEST_F(PositionerStatus, ReturnsOkWithoutUnknownLamps) {
+TEST_F(PositionerStatus, ReturnsOkAndCountsLampsNotInMap) {
   auto detections = seen(4);
   detections[1].lamp = 77;
-  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections);
-  EXPECT_TRUE(fix.ok());
+  const Fix fix = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
+  EXPECT_TRUE(fix.has_succeeded());
   EXPECT_EQ(fix.lamps, 3);
   EXPECT_EQ(fix.unknown_lamps, 1);
 }
@@ -58,7 +58,7 @@ TEST_F(PositionerStatus, ReturnsDuplicateLampForRepeatedId) {
   EXPECT_EQ(status(detections), FixStatus::duplicate_lamp);
 }
 
-TEST_F(PositionerStatus, ReturnsTooManyLampsAboveLimit) {
+TEST_F(PositionerStatus, ReturnsTooManyLampsForMoreThan256) {
   std::vector<Eigen::Vector3d> positions_m;
   for (int i = 0; i < 257; ++i) positions_m.emplace_back(0.01 * (i % 16), 0.01 * (i / 16), 2);
   rig.map = make_lamp_map(positions_m);
@@ -69,7 +69,7 @@ TEST_F(PositionerStatus, ReturnsTooManyLampsAboveLimit) {
   EXPECT_EQ(status(detections), FixStatus::ok);
 }
 
-TEST_F(PositionerStatus, ReturnsNotFiniteForInvalidNumbers) {
+TEST_F(PositionerStatus, ReturnsNotFiniteForInvalidPixelsSigmasOrSensors) {
   for (const double bad : {kNan, std::numeric_limits<double>::infinity()}) {
     for (const int which : {0, 1, 2}) {
       auto detections = seen(3);
@@ -98,14 +98,14 @@ TEST_F(PositionerStatus, ReturnsOutsideLensForUnreachablePixel) {
   EXPECT_EQ(status(detections), FixStatus::outside_lens);
 }
 
-TEST_F(PositionerStatus, ReturnsLampBelowCamera) {
+TEST_F(PositionerStatus, ReturnsLampBelowCameraForHeightOrInclinationAboveLamps) {
   EXPECT_EQ(status(seen(1), {{}, 0, HeightAndYaw{1.6, 0}}), FixStatus::lamp_below_camera);
   EXPECT_EQ(status(seen(1), {{}, 0, HeightAndYaw{2.0, 0}}), FixStatus::lamp_below_camera);
   // An inclination that points the lamps' rays below the horizon.
   EXPECT_EQ(status(seen(3), {Inclination{3.1, 0}, 0, {}}), FixStatus::lamp_below_camera);
 }
 
-TEST_F(PositionerStatus, ReturnsDegenerateForCoincidentPixels) {
+TEST_F(PositionerStatus, ReturnsDegenerateWhenAllPixelsCoincide) {
   for (const std::size_t count : {2u, 3u, 4u}) {
     auto detections = seen(count);
     for (Detection& detection : detections) detection.pixel = detections[0].pixel;
@@ -113,19 +113,19 @@ TEST_F(PositionerStatus, ReturnsDegenerateForCoincidentPixels) {
   }
 }
 
-TEST_F(PositionerStatus, ReturnsDegenerateWhenLampsAreCloserThanNoise) {
+TEST_F(PositionerStatus, ReturnsDegenerateWhenPixelsAreCloserThanNoise) {
   auto detections = seen(2);
   detections[1].pixel = detections[0].pixel + Eigen::Vector2d(0.1, 0);
   EXPECT_EQ(status(detections), FixStatus::degenerate);
 }
 
-TEST_F(PositionerStatus, ReturnsAmbiguousForTwoPoses) {
+TEST_F(PositionerStatus, ReturnsAmbiguousWhenTwoLampsFitTwoPoses) {
   rig.map = make_lamp_map({{1.0, 0, 1.6}, {1.2, 0.1, 2.4}});
   rig.camera = {{0, 0, 0}, 0};
   EXPECT_EQ(status(seen(2)), FixStatus::ambiguous);
 }
 
-TEST_F(PositionerStatus, ConstructorThrowsOnInvalidArguments) {
+TEST_F(PositionerStatus, ConstructorThrowsForInvalidMapCalibrationOrOptions) {
   const auto build = [&](const LampMap& map, const Calibration& calibration,
                          const PositionerOptions& options = {}) {
     return Positioner(map, calibration, options);
@@ -160,11 +160,11 @@ TEST_F(PositionerStatus, ConstructorThrowsOnInvalidArguments) {
 TEST(FixStatus, HasNameAndExplanationForEachValue) {
   for (int i = 0; i <= static_cast<int>(FixStatus::mirrored_map); ++i) {
     const auto status = static_cast<FixStatus>(i);
-    EXPECT_FALSE(to_string(status).empty());
-    EXPECT_FALSE(describe(status).empty());
+    EXPECT_FALSE(fix_status_name(status).empty());
+    EXPECT_FALSE(describe_fix_status(status).empty());
   }
-  EXPECT_EQ(to_string(FixStatus::ok), "ok");
-  EXPECT_EQ(to_string(FixStatus::mirrored_map), "mirrored_map");
+  EXPECT_EQ(fix_status_name(FixStatus::ok), "ok");
+  EXPECT_EQ(fix_status_name(FixStatus::mirrored_map), "mirrored_map");
 }
 
 }  // namespace

@@ -25,10 +25,10 @@ class PositionerOutlierRejection : public testing::Test {
     return detections;
   }
   Fix locate(const std::vector<Detection>& detections) {
-    return Positioner(rig.map, rig.calibration).locate(detections);
+    return Positioner(rig.map, rig.calibration).compute_position_fix(detections);
   }
   void expect_truth(const Fix& fix) {
-    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+    ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
     EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, 0.005));
   }
 };
@@ -66,7 +66,7 @@ TEST_F(PositionerOutlierRejection, RejectsTwoSwappedLampsOfFiveOrMore) {
 }
 
 /// The fix lists 32 ids of rejected lamps.
-TEST_F(PositionerOutlierRejection, ListsFirstIdsOfManyRejectedLamps) {
+TEST_F(PositionerOutlierRejection, ListsFirst32IdsButCountsAllRejectedLamps) {
   std::vector<Eigen::Vector3d> positions_m;
   for (int i = 0; i < 100; ++i) {
     positions_m.emplace_back(0.15 * (i % 10) - 0.7, 0.1 * (i / 10) - 0.5, 1.6);
@@ -87,7 +87,7 @@ TEST_F(PositionerOutlierRejection, ListsFirstIdsOfManyRejectedLamps) {
   }
 }
 
-TEST_F(PositionerOutlierRejection, RejectsOutlierWithManyHeightsAndTilt) {
+TEST_F(PositionerOutlierRejection, RejectsOutlierForLampsAtManyHeightsAndTiltedCamera) {
   for (std::size_t i = 0; i < rig.map.lamps.size(); ++i) {
     rig.map.lamps[i].position_m.z() += i % 2 ? 0.3 : -0.1;
   }
@@ -107,7 +107,7 @@ TEST_F(PositionerOutlierRejection, KeepsAllLampsUnderUncorrectedTilt) {
   SyntheticRig tilted = rig;
   tilted.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.09, 2);  // 5 degrees
   const Fix fix = locate(seen_from(tilted));
-  ASSERT_TRUE(fix.ok());
+  ASSERT_TRUE(fix.has_succeeded());
   EXPECT_EQ(fix.lamps, 8);
   EXPECT_EQ(fix.rejected_lamps, 0);
 }
@@ -148,7 +148,7 @@ TEST_F(PositionerOutlierRejection, RejectsLampTakenForItsNeighbor) {
 }
 
 /// In a grid of lamps scale and rotation can hide a wrong identity.
-TEST_F(PositionerOutlierRejection, ReturnsNoWrongFixInRegularGrid) {
+TEST_F(PositionerOutlierRejection, FixesHaveErrorsBelow20MmDespiteMisidentifiedGridLamp) {
   std::vector<Eigen::Vector3d> positions_m;
   for (int i = 0; i < 49; ++i)
     positions_m.emplace_back(0.5 * (i % 7) - 1.5, 0.5 * (i / 7) - 1.5, 1.8);
@@ -176,7 +176,7 @@ TEST_F(PositionerOutlierRejection, ReturnsNoWrongFixInRegularGrid) {
       wrong.lamp = 1 + static_cast<int>(random.index(49));
     }
     const Fix fix = locate(detections);
-    if (!fix.ok()) continue;
+    if (!fix.has_succeeded()) continue;
     ++fixes;
     EXPECT_LT((fix.estimate.pose.position_m - rig.camera.position_m).norm(), 0.02) << i;
   }
@@ -184,7 +184,7 @@ TEST_F(PositionerOutlierRejection, ReturnsNoWrongFixInRegularGrid) {
 }
 
 /// A cluster of lamps and a distant wrong one, which slightly rotates and scales the others.
-TEST_F(PositionerOutlierRejection, RejectsWrongLampFarFromCluster) {
+TEST_F(PositionerOutlierRejection, RejectsMisidentifiedLampFarFromClusterOrReturnsNoFix) {
   rig.map =
       make_lamp_map({{0, 0, 2.5}, {0.1, 0, 2.5}, {0, 0.1, 2.5}, {1.5, 0, 2.5}, {0, 1.5, 2.5}});
   rig.camera = {{0.3, 0.2, 0}, 0};
@@ -195,29 +195,29 @@ TEST_F(PositionerOutlierRejection, RejectsWrongLampFarFromCluster) {
       if (!stated) detection.sigma_px.reset();
     }
     const Fix fix = locate(detections);
-    EXPECT_TRUE(!fix.ok() || fix.rejected_ids[0] == 5) << fix.residual_px << " px";
+    EXPECT_TRUE(!fix.has_succeeded() || fix.rejected_ids[0] == 5) << fix.residual_px << " px";
   }
 }
 
-TEST_F(PositionerOutlierRejection, DetectsMirroredMapOfNearlyCollinearLamps) {
+TEST_F(PositionerOutlierRejection, ReturnsMirroredMapForMirroredNearlyCollinearLamps) {
   for (const double width_m : {0.1, 0.15, 0.3}) {
     rig.map = make_lamp_map({{0, 0, 2.5}, {0.6, width_m, 2.5}, {1.2, 0, 2.5}, {1.8, width_m, 2.5}});
     rig.camera = {{0.9, 0, 0}, 0.4};
     const auto detections = seen(4);
     SyntheticRig mirrored_rig = rig;
     for (Lamp& lamp : mirrored_rig.map.lamps) lamp.position_m.y() *= -1;
-    const Fix fix = Positioner(mirrored_rig.map, rig.calibration).locate(detections);
-    EXPECT_EQ(fix.status, FixStatus::mirrored_map) << width_m << to_string(fix.status);
+    const Fix fix = Positioner(mirrored_rig.map, rig.calibration).compute_position_fix(detections);
+    EXPECT_EQ(fix.status, FixStatus::mirrored_map) << width_m << fix_status_name(fix.status);
   }
 }
 
-TEST_F(PositionerOutlierRejection, ReturnsInconsistentWhenHalvesContradict) {
+TEST_F(PositionerOutlierRejection, ReturnsInconsistentWhenHalfOfLampsAreDisplaced) {
   auto detections = seen(6);
   for (std::size_t i = 0; i < 3; ++i) detections[i].pixel += Eigen::Vector2d(60, 40);
   EXPECT_EQ(locate(detections).status, FixStatus::inconsistent);
 }
 
-TEST_F(PositionerOutlierRejection, ReturnsInconsistentWhenThreeLampsContradict) {
+TEST_F(PositionerOutlierRejection, ReturnsInconsistentWhenOneOfThreeLampsIsMisidentified) {
   auto detections = seen(3);
   detections[1].lamp = 8;
   EXPECT_EQ(locate(detections).status, FixStatus::inconsistent);
@@ -237,7 +237,7 @@ TEST_F(PositionerOutlierRejection, ReturnsInconsistentForMapOfAnotherRoom) {
   EXPECT_EQ(locate(detections).status, FixStatus::inconsistent);
 }
 
-TEST_F(PositionerOutlierRejection, DetectsMirroredMap) {
+TEST_F(PositionerOutlierRejection, ReturnsMirroredMapForMirroredLampsAtAnyHeights) {
   for (const bool equal_heights : {true, false}) {
     rig.map = synthetic_lamps();
     for (std::size_t i = 0; i < 8 && !equal_heights; ++i) {
@@ -247,8 +247,9 @@ TEST_F(PositionerOutlierRejection, DetectsMirroredMap) {
       const auto detections = seen(count);
       SyntheticRig mirrored_rig = rig;
       for (Lamp& lamp : mirrored_rig.map.lamps) lamp.position_m.x() *= -1;
-      const Fix fix = Positioner(mirrored_rig.map, rig.calibration).locate(detections);
-      EXPECT_EQ(fix.status, FixStatus::mirrored_map) << count << to_string(fix.status);
+      const Fix fix =
+          Positioner(mirrored_rig.map, rig.calibration).compute_position_fix(detections);
+      EXPECT_EQ(fix.status, FixStatus::mirrored_map) << count << fix_status_name(fix.status);
     }
   }
 }

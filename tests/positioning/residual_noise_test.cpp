@@ -27,7 +27,7 @@ Fix fix_with(double chi_squared, double common_chi_squared, double degrees_of_fr
   return fix;
 }
 
-TEST(SumResiduals, IgnoresFixesWithoutRedundancy) {
+TEST(SumSquaredResidualsOfFixes, IgnoresFailedFixesAndFixesWithoutRedundancy) {
   const std::vector<Fix> fixes{fix_with(12, 2, 8), Fix(), fix_with(5, 1, 0), fix_with(6, 0, 4)};
   const ResidualSums sums = sum_squared_residuals_of_fixes(fixes);
   EXPECT_EQ(sums.degrees_of_freedom, 12);
@@ -36,7 +36,7 @@ TEST(SumResiduals, IgnoresFixesWithoutRedundancy) {
   EXPECT_EQ(sums.squares_px2, 2);
 }
 
-TEST(SumResiduals, ExcludesFixWithWrongLamp) {
+TEST(SumSquaredResidualsOfFixes, ExcludesFixAbove25TimesMedianChiSquaredRatio) {
   // The median of 1, 1.25 and the third one's ratio is 1.25, and 25 times that is 31.25.
   for (const auto& [chi_squared, sum] : {std::pair(124.0, 133.0), {126.0, 9.0}, {3000.0, 9.0}}) {
     const std::vector<Fix> fixes{fix_with(5, 0, 4), fix_with(4, 0, 4), fix_with(chi_squared, 0, 4)};
@@ -44,7 +44,7 @@ TEST(SumResiduals, ExcludesFixWithWrongLamp) {
   }
 }
 
-TEST(EstimateNoiseScaleFactor, SubtractsCommonErrors) {
+TEST(EstimateNoiseScaleFactor, SubtractsCommonChiSquaredButKeepsQuarterOfTotal) {
   EXPECT_DOUBLE_EQ(
       estimate_noise_scale_factor({.chi_squared = 36, .degrees_of_freedom = 9}).value(), 2);
   EXPECT_DOUBLE_EQ(estimate_noise_scale_factor(
@@ -58,7 +58,7 @@ TEST(EstimateNoiseScaleFactor, SubtractsCommonErrors) {
   EXPECT_FALSE(estimate_noise_scale_factor({}));
 }
 
-TEST(EstimateBirgeRatio, ReturnsOneWhenResidualsAreNotLarger) {
+TEST(EstimateBirgeRatio, IsOneForSmallResidualsOrFewDegreesOfFreedom) {
   EXPECT_EQ(estimate_birge_ratio({.chi_squared = 10, .degrees_of_freedom = 20}), 1);
   EXPECT_EQ(estimate_birge_ratio({.chi_squared = 40, .degrees_of_freedom = 10}), 1);
   EXPECT_DOUBLE_EQ(estimate_birge_ratio({.chi_squared = 80, .degrees_of_freedom = 20}), 2);
@@ -89,9 +89,10 @@ class ComputeExpectedChiSquared : public testing::Test {
       }
       const double sd_rad = sensors.inclination_sigma_rad;
       real.inclination = Inclination{sd_rad * random.normal(), sd_rad * random.normal()};
-      const Fix fix = positioner.locate(with_noise(seen_from(real, kPixelSd_px), random), sensors);
+      const Fix fix = positioner.compute_position_fix(
+          with_noise(seen_from(real, kPixelSd_px), random), sensors);
       // Draws without a fix or with a rejected lamp have the largest residuals: 1 in 10,000.
-      if (!fix.ok() || fix.rejected_lamps > 0) continue;
+      if (!fix.has_succeeded() || fix.rejected_lamps > 0) continue;
       found += fix.chi_squared;
       expected += fix.redundancy + fix.common_chi_squared;
       common += fix.common_chi_squared;
@@ -104,17 +105,18 @@ class ComputeExpectedChiSquared : public testing::Test {
   Random random{5};
 };
 
-TEST_F(ComputeExpectedChiSquared, MatchesMeanOfStandingCamera) { expect_mean({}); }
+TEST_F(ComputeExpectedChiSquared, MatchesMeanChiSquaredOfStandingCamera) { expect_mean({}); }
 
-TEST_F(ComputeExpectedChiSquared, MatchesMeanWithEstimatedTilt) {
+TEST_F(ComputeExpectedChiSquared, MatchesMeanChiSquaredWithEstimatedTilt) {
   Sensors sensors;
   sensors.inclination_sigma_rad = 0.01;
   expect_mean(sensors);
 }
 
-TEST_F(ComputeExpectedChiSquared, ReturnsZeroUnlessRequested) {
-  const Fix fix = Positioner(rig.map, rig.calibration).locate(seen_from(rig, kPixelSd_px));
-  ASSERT_TRUE(fix.ok());
+TEST_F(ComputeExpectedChiSquared, CommonChiSquaredOfFixIsZeroUnlessRequested) {
+  const Fix fix =
+      Positioner(rig.map, rig.calibration).compute_position_fix(seen_from(rig, kPixelSd_px));
+  ASSERT_TRUE(fix.has_succeeded());
   EXPECT_EQ(fix.common_chi_squared, 0);
 }
 

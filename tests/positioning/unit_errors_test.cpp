@@ -42,19 +42,20 @@ std::vector<std::size_t> all_lamps() {
   return lamps;
 }
 
-UnitBudget compute_budget(const StatedRig& rig) {
-  return *UnitErrors(rig.map, rig.calibration).compute_budget(rig.camera, all_lamps(), kNoise_px);
+UnitBudget compute_unit_fix_error_budget(const StatedRig& rig) {
+  return *UnitErrors(rig.map, rig.calibration)
+              .compute_unit_fix_error_budget(rig.camera, all_lamps(), kNoise_px);
 }
 
 /// seen_from() does not apply the dispersion.
 std::vector<Detection> make_detections(const StatedRig& rig) {
   const Lens lens(rig.calibration.camera.lens_model, rig.calibration.camera.intrinsics);
   const Eigen::Matrix3d camera_from_level =
-      level_from_camera(rig.calibration, Correction::all).inverse();
+      compute_level_from_camera_rotation(rig.calibration, Correction::all).inverse();
   std::vector<Detection> detections;
   for (const Lamp& lamp : rig.map.lamps) {
     const auto pixel =
-        lens.project(camera_from_level * level_from_world(rig.camera, lamp.position_m));
+        lens.project_point(camera_from_level * level_point_from_world(rig.camera, lamp.position_m));
     detections.push_back({lamp.id, pixel.value(), kNoise_px});
   }
   return detections;
@@ -62,40 +63,42 @@ std::vector<Detection> make_detections(const StatedRig& rig) {
 
 class UnitErrorsParts : public testing::TestWithParam<StatedRig> {};
 
-TEST_P(UnitErrorsParts, BudgetEqualsCovarianceOfFix) {
+TEST_P(UnitErrorsParts, BudgetTermsSumToFixCovarianceOfLevelCamera) {
   const StatedRig& rig = GetParam();
-  const Fix fix = Positioner(rig.map, rig.calibration).locate(make_detections(rig));
-  ASSERT_TRUE(fix.ok());
+  const Fix fix = Positioner(rig.map, rig.calibration).compute_position_fix(make_detections(rig));
+  ASSERT_TRUE(fix.has_succeeded());
   ASSERT_EQ(fix.lamps, 8);
-  const UnitBudget budget = compute_budget(rig);
+  const UnitBudget budget = compute_unit_fix_error_budget(rig);
   const Eigen::Matrix4d common = fix.estimate.covariance - fix.noise_covariance;
   const Eigen::Vector4d sd = fix.estimate.covariance.diagonal().cwiseSqrt();
   const Eigen::Matrix4d scale = sd * sd.transpose();
   // Convergence tolerance of the fix.
   constexpr double stopped = 1e-8;
-  EXPECT_LT((budget.common() - common).cwiseQuotient(scale).cwiseAbs().maxCoeff(), stopped);
+  EXPECT_LT((budget.common_covariance() - common).cwiseQuotient(scale).cwiseAbs().maxCoeff(),
+            stopped);
   EXPECT_LT((budget.noise - fix.noise_covariance).cwiseQuotient(scale).cwiseAbs().maxCoeff(),
             stopped);
-  EXPECT_EQ(budget.total_covariance(), Matrix4(budget.noise + budget.common()));
+  EXPECT_EQ(budget.total_pose_covariance(), Matrix4(budget.noise + budget.common_covariance()));
 }
 
 /// The same for a camera that may move and be tilted.
-TEST_P(UnitErrorsParts, BudgetEqualsCovarianceWithFreeMotion) {
+TEST_P(UnitErrorsParts, BudgetTermsSumToFixCovarianceWithUnknownMotion) {
   StatedRig rig = GetParam();
   rig.calibration.camera.row_time_s = 55e-6;
   rig.calibration.camera.readout = Readout::rows;
   Sensors sensors;
-  sensors.motion = KnownMotion::up_to(2, 1);
+  sensors.motion = KnownMotion::make_motion_prior_from_limits(2, 1);
   sensors.inclination_sigma_rad = 0.1;
-  const Fix fix = Positioner(rig.map, rig.calibration).locate(make_detections(rig), sensors);
-  ASSERT_TRUE(fix.ok());
+  const Fix fix =
+      Positioner(rig.map, rig.calibration).compute_position_fix(make_detections(rig), sensors);
+  ASSERT_TRUE(fix.has_succeeded());
   ASSERT_EQ(fix.lamps, 8);
   BodyPrior prior;
   prior.velocity_sd_m_per_s = 1;
   prior.yaw_rate_sd_rad_per_s = 0.5;
   prior.inclination_sd_rad = 0.1;
   const auto budget = UnitErrors(rig.map, rig.calibration)
-                          .compute_budget(rig.camera, all_lamps(), kNoise_px, prior);
+                          .compute_unit_fix_error_budget(rig.camera, all_lamps(), kNoise_px, prior);
   ASSERT_TRUE(budget);
   const Eigen::Vector4d sd = fix.estimate.covariance.diagonal().cwiseSqrt();
   const Eigen::Matrix4d scale = sd * sd.transpose();
@@ -105,38 +108,39 @@ TEST_P(UnitErrorsParts, BudgetEqualsCovarianceWithFreeMotion) {
   };
   EXPECT_LT(differ(budget->noise + budget->motion + budget->roll_pitch, fix.noise_covariance),
             stopped);
-  EXPECT_LT(differ(budget->common(), fix.estimate.covariance - fix.noise_covariance), stopped);
-  EXPECT_LT(differ(budget->total_covariance(), fix.estimate.covariance), stopped);
+  EXPECT_LT(differ(budget->common_covariance(), fix.estimate.covariance - fix.noise_covariance),
+            stopped);
+  EXPECT_LT(differ(budget->total_pose_covariance(), fix.estimate.covariance), stopped);
   EXPECT_GT(budget->roll_pitch(0, 0), budget->noise(0, 0)) << "unknown roll and pitch cost much";
 }
 
-TEST_P(UnitErrorsParts, SumToJointCovariance) {
+TEST_P(UnitErrorsParts, CovariancesOfErrorSourcesSumToJointCovariance) {
   const StatedRig& rig = GetParam();
   const UnitErrors unit(rig.map, rig.calibration);
-  const Eigen::MatrixXd& whole = unit.common().joint_covariance();
+  const Eigen::MatrixXd& whole = unit.common_errors().joint_error_covariance();
   ASSERT_GT(whole.rows(), 0);
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(whole.rows(), whole.cols());
   for (const CommonErrorSource part : kCommonErrorSources)
-    sum += unit.common().extract_error_source(part).joint_covariance();
+    sum += unit.common_errors().extract_covariance_of_error_source(part).joint_error_covariance();
   const Eigen::VectorXd inverse_sd = whole.diagonal().cwiseSqrt().cwiseInverse();
   EXPECT_THAT(inverse_sd.asDiagonal() * (sum - whole) * inverse_sd.asDiagonal(),
               IsNear(Eigen::MatrixXd::Zero(whole.rows(), whole.cols()), 1e-13));
 }
 
-TEST_P(UnitErrorsParts, ArePositiveSemidefinite) {
-  const UnitBudget budget = compute_budget(GetParam());
+TEST_P(UnitErrorsParts, BudgetTermsArePositiveSemidefinite) {
+  const UnitBudget budget = compute_unit_fix_error_budget(GetParam());
   for (const Matrix4& part :
        {budget.noise, budget.lens, budget.zenith, budget.offset, budget.lamp_map}) {
-    const Eigen::Vector4d sd = budget.total_covariance().diagonal().cwiseSqrt().cwiseInverse();
+    const Eigen::Vector4d sd = budget.total_pose_covariance().diagonal().cwiseSqrt().cwiseInverse();
     const Eigen::MatrixXd scaled = sd.asDiagonal() * part * sd.asDiagonal();
-    EXPECT_GT(eigendecompose_symmetric(scaled).values.minCoeff(), -1e-9);
+    EXPECT_GT(eigendecompose_symmetric_matrix(scaled).values.minCoeff(), -1e-9);
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Stated, UnitErrorsParts, testing::Values(adjusted(), in_a_row()),
                          [](const auto& one) { return one.index == 0 ? "Adjusted" : "InARow"; });
 
-TEST(UnitErrors, PartIsZeroForExactQuantity) {
+TEST(UnitErrors, BudgetTermIsZeroForQuantityWithoutError) {
   StatedRig rig = adjusted();
   MatrixX& covariance = rig.calibration.adjustment->covariance;
   const auto without = [&](Eigen::Index first, Eigen::Index size) {
@@ -144,31 +148,31 @@ TEST(UnitErrors, PartIsZeroForExactQuantity) {
     MatrixX& left = other.calibration.adjustment->covariance;
     left.middleRows(first, size).setZero();
     left.middleCols(first, size).setZero();
-    return compute_budget(other);
+    return compute_unit_fix_error_budget(other);
   };
   const UnitBudget lens = without(0, 12), zenith = without(12, 2), map = without(16, 24);
   EXPECT_TRUE(lens.lens.isZero(0) && zenith.zenith.isZero(0) && map.lamp_map.isZero(0));
   for (const UnitBudget& budget : {lens, zenith, map}) {
-    EXPECT_GT(budget.common()(0, 0), 0);
+    EXPECT_GT(budget.common_covariance()(0, 0), 0);
     EXPECT_TRUE(budget.offset.isZero(0));
   }
   covariance.setZero();
-  EXPECT_TRUE(compute_budget(rig).common().isZero(0));
+  EXPECT_TRUE(compute_unit_fix_error_budget(rig).common_covariance().isZero(0));
 }
 
 /// Each part of sequential steps results from the covariance of one step alone.
-TEST(UnitErrors, PartsMatchSequentialSteps) {
+TEST(UnitErrors, BudgetTermEqualsBudgetWithOnlyThatError) {
   const StatedRig rig = in_a_row();
-  const UnitBudget whole = compute_budget(rig);
+  const UnitBudget whole = compute_unit_fix_error_budget(rig);
   StatedRig only_lens = rig, only_zenith = rig, only_offset = rig, only_map = rig;
   const auto clear = [](StatedRig& one, bool lens, bool zenith, bool offset, bool map) {
     if (!lens) one.calibration.intrinsics_report->covariance->setZero();
     if (!zenith) one.calibration.rotation_center->covariance->setZero();
     if (!offset) one.calibration.dispersion->covariance->setZero();
     for (Lamp& lamp : one.map.lamps) lamp.sd_m = map ? *lamp.sd_m : 0;
-    return compute_budget(one).common();
+    return compute_unit_fix_error_budget(one).common_covariance();
   };
-  const double small = 1e-9 * whole.common().cwiseAbs().maxCoeff();
+  const double small = 1e-9 * whole.common_covariance().cwiseAbs().maxCoeff();
   EXPECT_THAT(whole.lens, IsNear(clear(only_lens, true, false, false, false), small));
   EXPECT_THAT(whole.zenith, IsNear(clear(only_zenith, false, true, false, false), small));
   EXPECT_THAT(whole.offset, IsNear(clear(only_offset, false, false, true, false), small));
@@ -176,9 +180,9 @@ TEST(UnitErrors, PartsMatchSequentialSteps) {
 }
 
 /// Fixes with calibrations and maps drawn from the reported covariance, and with pixel noise.
-TEST(UnitErrors, BudgetMatchesErrorsOfDrawnCalibrations) {
+TEST(UnitErrors, BudgetMatchesFixErrorsOfRandomlyDrawnCalibrations) {
   const StatedRig rig = adjusted();
-  const UnitBudget budget = compute_budget(rig);
+  const UnitBudget budget = compute_unit_fix_error_budget(rig);
   const auto exact = make_detections(rig);
   const Eigen::MatrixXd root = rig.calibration.adjustment->covariance.llt().matrixL();
   Random random(11);
@@ -189,40 +193,40 @@ TEST(UnitErrors, BudgetMatchesErrorsOfDrawnCalibrations) {
     Eigen::VectorXd draw(root.cols());
     for (double& one : draw) one = random.normal();
     const Eigen::VectorXd error = root * draw;
-    Calibration calibration =
-        with_zenith_error(with_lens_error(rig.calibration, error.head<12>()), error.segment<2>(12));
+    Calibration calibration = perturb_zenith_direction(
+        perturb_lens_intrinsics(rig.calibration, error.head<12>()), error.segment<2>(12));
     calibration.adjustment.reset();
     LampMap map = rig.map;
     for (std::size_t i = 0; i < 8; ++i) {
       map.lamps[i].position_m += error.segment<3>(16 + 3 * static_cast<Eigen::Index>(i));
     }
-    const Fix fix = Positioner(map, calibration).locate(with_noise(exact, random));
-    ASSERT_TRUE(fix.ok());
+    const Fix fix = Positioner(map, calibration).compute_position_fix(with_noise(exact, random));
+    ASSERT_TRUE(fix.has_succeeded());
     const Eigen::Vector4d off = compute_pose_error(fix, rig.camera);
     scatter += off * off.transpose() / trials;
-    nees.add(off, budget.total_covariance());
+    nees.add(off, budget.total_pose_covariance());
   }
   // 2000 draws determine a variance to 3.2 %, its root to half of that.
   for (int i = 0; i < 4; ++i) {
-    EXPECT_NEAR(std::sqrt(scatter(i, i) / budget.total_covariance()(i, i)), 1, 0.06) << i;
+    EXPECT_NEAR(std::sqrt(scatter(i, i) / budget.total_pose_covariance()(i, i)), 1, 0.06) << i;
   }
   EXPECT_NEAR(nees.mean(), 1, 0.06);
   EXPECT_NEAR(nees.fraction(), 0.95, 0.02);
 }
 
-TEST(ComputeFixSds, ReturnsZeroForNegativeVariances) {
+TEST(ComputeFixSds, ReturnsZeroForTinyNegativeVariances) {
   const FixSds spread = compute_fix_sds(Matrix4(-1e-22 * Matrix4::Identity()));
   EXPECT_EQ(spread.horizontal_m, 0);
   EXPECT_EQ(spread.height_m, 0);
   EXPECT_EQ(spread.yaw_rad, 0);
 }
 
-TEST(UnitErrors, StatedReportsKnownParts) {
+TEST(UnitErrors, AreErrorsKnownIsFalseForSourcesWithoutSd) {
   StatedRig rig;
   const auto stated = [&](CommonErrorSource part) {
-    return UnitErrors(rig.map, rig.calibration).common().are_errors_known(part);
+    return UnitErrors(rig.map, rig.calibration).common_errors().is_error_source_known(part);
   };
-  EXPECT_FALSE(UnitErrors(rig.map, rig.calibration).common().are_errors_known());
+  EXPECT_FALSE(UnitErrors(rig.map, rig.calibration).common_errors().are_any_errors_known());
   EXPECT_FALSE(stated(CommonErrorSource::lens) || stated(CommonErrorSource::zenith) ||
                stated(CommonErrorSource::lamps));
   EXPECT_TRUE(stated(CommonErrorSource::offset));  // there is none
@@ -233,7 +237,7 @@ TEST(UnitErrors, StatedReportsKnownParts) {
   EXPECT_FALSE(stated(CommonErrorSource::lamps) || stated(CommonErrorSource::offset));
 }
 
-TEST(UnitErrors, BudgetReturnsNulloptForTooFewOrTooManyLamps) {
+TEST(UnitErrors, BudgetIsNulloptUnlessThereAre2To256Lamps) {
   StatedRig rig;
   std::vector<Eigen::Vector3d> positions_m;
   for (int i = 0; i < 300; ++i) positions_m.emplace_back(0.01 * (i % 20), 0.01 * (i / 20), 1.6);
@@ -248,23 +252,27 @@ TEST(UnitErrors, BudgetReturnsNulloptForTooFewOrTooManyLamps) {
   for (const std::size_t count : {1u, 2u, 256u, 257u, 300u}) {
     const std::span<const std::size_t> some(lamps.data(), count);
     const bool possible = count == 2 || count == 256;
-    EXPECT_EQ(unit.compute_budget(rig.camera, some, kNoise_px).has_value(), possible) << count;
-    EXPECT_EQ(unit.compute_budget(rig.camera, some, kNoise_px, prior).has_value(), possible)
+    EXPECT_EQ(unit.compute_unit_fix_error_budget(rig.camera, some, kNoise_px).has_value(), possible)
+        << count;
+    EXPECT_EQ(unit.compute_unit_fix_error_budget(rig.camera, some, kNoise_px, prior).has_value(),
+              possible)
         << count;
   }
 }
 
-TEST(UnitErrors, LampsSeenFromAppliesTilt) {
+TEST(UnitErrors, FindVisibleLampsAppliesCalibratedTilt) {
   StatedRig rig;
   rig.map = make_lamp_map({{0, 0, 1.6}, {0.1, 0, 1.6}});
   rig.camera = {{0, 0, 0}, 0};
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.9, 0);
-  EXPECT_TRUE(UnitErrors(rig.map, rig.calibration).find_visible_lamps(rig.camera).empty());
+  EXPECT_TRUE(
+      UnitErrors(rig.map, rig.calibration).find_fully_visible_lamp_indices(rig.camera).empty());
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.1, 0);
-  EXPECT_EQ(UnitErrors(rig.map, rig.calibration).find_visible_lamps(rig.camera).size(), 2U);
+  EXPECT_EQ(UnitErrors(rig.map, rig.calibration).find_fully_visible_lamp_indices(rig.camera).size(),
+            2U);
 }
 
-TEST(FloorSummary, LargestReturnsDominantSource) {
+TEST(FloorSummary, LargestErrorSourceIsOneWithLargestVariance) {
   StatedRig rig = in_a_row();
   const auto summary_of = [&](double map_sd_m, double noise_px) {
     for (Lamp& lamp : rig.map.lamps) lamp.sd_m = map_sd_m;

@@ -101,17 +101,17 @@ void expect_same(const vlp_fix& c, const Fix& fix) {
   EXPECT_EQ(c.rejected_lamps, fix.rejected_lamps);
   EXPECT_EQ(c.unknown_lamps, fix.unknown_lamps);
   EXPECT_TRUE(covariance.isApprox(covariance.transpose(), 1e-12));
-  EXPECT_GE(eigendecompose_symmetric(Eigen::MatrixXd(covariance)).values.minCoeff(), -1e-15);
+  EXPECT_GE(eigendecompose_symmetric_matrix(Eigen::MatrixXd(covariance)).values.minCoeff(), -1e-15);
 }
 
-TEST_F(CInterface, LocateMatchesCppForStandingCamera) {
+TEST_F(CInterface, VlpLocateEqualsCppFixForStandingCamera) {
   rig.body.motion = {};
   seen = seen_from(rig, 0.1);
   for (std::size_t i = 0; i < seen.size(); ++i) {
     given[i] = {seen[i].lamp, seen[i].pixel.x(), seen[i].pixel.y(), 0.1};
   }
   const auto positioner = open();
-  expect_same(located(positioner.get(), nullptr), rig.positioner().locate(seen));
+  expect_same(located(positioner.get(), nullptr), rig.positioner().compute_position_fix(seen));
   const vlp_fix fix = located(positioner.get(), nullptr);
   EXPECT_NEAR(fix.position_m[0], 0.1, 1e-9);
   EXPECT_EQ(fix.roll_rad, 0);
@@ -119,7 +119,7 @@ TEST_F(CInterface, LocateMatchesCppForStandingCamera) {
   EXPECT_EQ(Covariance6(fix.covariance).row(3), Eigen::RowVectorXd::Zero(6));
 }
 
-TEST_F(CInterface, LocateMatchesCppForMovingTiltedBody) {
+TEST_F(CInterface, VlpLocateEqualsCppFixForMovingTiltedRobot) {
   rig.mount = CameraMount{{0.2, -0.1, 0.3}, 0.5};
   vlp_options options = {};
   options.has_mount = 1;
@@ -135,7 +135,7 @@ TEST_F(CInterface, LocateMatchesCppForMovingTiltedBody) {
   Sensors same;
   same.inclination_sigma_rad = 0.2;
   same.motion = KnownMotion{{0, 0}, 0, 1, 0};
-  const Fix fix = rig.positioner().locate(seen, same);
+  const Fix fix = rig.positioner().compute_position_fix(seen, same);
   const vlp_fix c = located(open(&options).get(), &sensors);
   expect_same(c, fix);
   ASSERT_TRUE(fix.body);
@@ -158,7 +158,7 @@ TEST_F(CInterface, LocateMatchesCppForMovingTiltedBody) {
   EXPECT_LT(fix.body->noise_covariance(kBodyVelocity, kBodyVelocity), c.velocity_covariance[0]);
 }
 
-TEST_F(CInterface, LocateAppliesOptions) {
+TEST_F(CInterface, VlpLocateAppliesSigmaAndResidualLimitOptions) {
   rig.body.motion = {};
   seen = seen_from(rig, 0.1);
   seen[1].pixel.x() += 4;
@@ -171,7 +171,7 @@ TEST_F(CInterface, LocateAppliesOptions) {
   const vlp_fix fix = located(open(&options).get(), nullptr);
   PositionerOptions same;
   same.unstated_sigma_px = 3;
-  expect_same(fix, Positioner(rig.map, rig.calibration, same).locate(seen));
+  expect_same(fix, Positioner(rig.map, rig.calibration, same).compute_position_fix(seen));
   EXPECT_EQ(fix.rejected_lamps, 0);
   options.max_residual_share = 0.003;
   const vlp_fix strict = located(open(&options).get(), nullptr);
@@ -180,7 +180,7 @@ TEST_F(CInterface, LocateAppliesOptions) {
   EXPECT_EQ(strict.rejected_ids[0], seen[1].lamp);
 }
 
-TEST_F(CInterface, LocateMatchesCppForOneLampWithAllSensors) {
+TEST_F(CInterface, VlpLocateEqualsCppFixWithOneLampAndSensors) {
   seen.resize(1);
   given.resize(1);
   vlp_sensors sensors = {};
@@ -199,7 +199,7 @@ TEST_F(CInterface, LocateMatchesCppForOneLampWithAllSensors) {
   Sensors same{Inclination{0.06, -0.08}, 0.01, HeightAndYaw{0, 0.4, 0.005, 0.02}};
   same.motion = KnownMotion{{2, 0}, 0.1, 0, 0.2};
   const vlp_fix fix = located(open().get(), &sensors);
-  expect_same(fix, rig.positioner().locate(seen, same));
+  expect_same(fix, rig.positioner().compute_position_fix(seen, same));
   EXPECT_EQ(fix.roll_rad, 0.06);
   EXPECT_EQ(fix.pitch_rad, -0.08);
   EXPECT_DOUBLE_EQ(Covariance6(fix.covariance)(4, 4), 1e-4);
@@ -209,7 +209,7 @@ TEST_F(CInterface, LocateMatchesCppForOneLampWithAllSensors) {
   EXPECT_DOUBLE_EQ(fix.velocity_covariance[8], 0.04);
 }
 
-TEST_F(CInterface, LocateMatchesCppWithEarlierFrames) {
+TEST_F(CInterface, VlpLocateWithEarlierEqualsCppFix) {
   vlp_sensors sensors = {};
   sensors.has_motion = 1;
   sensors.velocity_sd_m_per_s = 1;
@@ -231,10 +231,10 @@ TEST_F(CInterface, LocateMatchesCppWithEarlierFrames) {
   ASSERT_EQ(vlp_locate_with_earlier(positioner.get(), given.data(), given.size(), &sensors,
                                     &given_frame, 1, &fix),
             VLP_OK);
-  expect_same(fix, rig.positioner().locate(seen, same, {&frame, 1}));
+  expect_same(fix, rig.positioner().compute_position_fix(seen, same, {&frame, 1}));
 }
 
-TEST_F(CInterface, LocateRejectsNullOrTooManyEarlierFrames) {
+TEST_F(CInterface, VlpLocateWithEarlierRejectsNullOrTooManyDetections) {
   const Handle positioner = open();
   vlp_fix fix;
   const vlp_earlier_frame null{nullptr, 3, 0.05};
@@ -251,7 +251,7 @@ TEST_F(CInterface, LocateRejectsNullOrTooManyEarlierFrames) {
             VLP_TOO_MANY_LAMPS);
 }
 
-TEST_F(CInterface, LocateMatchesCppWithKnownHeight) {
+TEST_F(CInterface, VlpLocateEqualsCppFixWithKnownHeight) {
   vlp_sensors sensors = {};
   sensors.inclination_sigma_rad = 0.2;
   sensors.has_motion = sensors.has_height = 1;
@@ -262,18 +262,19 @@ TEST_F(CInterface, LocateMatchesCppWithKnownHeight) {
   same.motion = KnownMotion{{0, 0}, 0, 1, 0};
   same.height = KnownHeight{0, 1e-4};
   const vlp_fix fix = located(open().get(), &sensors);
-  expect_same(fix, rig.positioner().locate(seen, same));
+  expect_same(fix, rig.positioner().compute_position_fix(seen, same));
   EXPECT_LE(std::sqrt(fix.noise_covariance[14]), 1e-4);
 }
 
-TEST_F(CInterface, LocateRejectsHeightWithoutStandardDeviation) {
+TEST_F(CInterface, VlpLocateReturnsNotFiniteForHeightWithoutSd) {
   vlp_sensors sensors = {};
   sensors.has_height = 1;
   EXPECT_EQ(located(open().get(), &sensors).status, VLP_NOT_FINITE);
-  EXPECT_THAT(vlp_explanation(VLP_NOT_FINITE), HasSubstr("that of a known height is not positive"));
+  EXPECT_THAT(vlp_describe_status(VLP_NOT_FINITE),
+              HasSubstr("that of a known height is not positive"));
 }
 
-TEST_F(CInterface, LocateReportsStampAndUnknownLampsWithoutFix) {
+TEST_F(CInterface, VlpLocateReturnsStampAndUnknownLampsWithoutFix) {
   ASSERT_FALSE(given.empty());
   for (vlp_detection& detection : given) detection.lamp += 100;
   vlp_sensors sensors = {};
@@ -285,7 +286,7 @@ TEST_F(CInterface, LocateReportsStampAndUnknownLampsWithoutFix) {
   EXPECT_EQ(fix.position_m[0], 0);
 }
 
-TEST_F(CInterface, LocateRejectsInvalidArguments) {
+TEST_F(CInterface, VlpLocateRejectsNullPointersExcessLampsAndInvalidSigma) {
   const auto positioner = open();
   vlp_fix fix;
   EXPECT_EQ(vlp_locate(nullptr, given.data(), given.size(), nullptr, &fix), VLP_BAD_ARGUMENT);
@@ -303,7 +304,7 @@ TEST_F(CInterface, LocateRejectsInvalidArguments) {
   vlp_close(nullptr);
 }
 
-TEST_F(CInterface, LastErrorReportsInvalidFileOrOption) {
+TEST_F(CInterface, VlpLastErrorNamesInvalidFileOrOption) {
   EXPECT_STREQ(vlp_last_error(), "");
   vlp_positioner* positioner = nullptr;
   const std::string missing = folder / "none.yaml";
@@ -326,13 +327,13 @@ TEST_F(CInterface, LastErrorReportsInvalidFileOrOption) {
   EXPECT_THAT(vlp_last_error(), HasSubstr("xxx"));
 }
 
-TEST(VlpExplanation, DescribesEachCode) {
+TEST(VlpDescribeStatus, ReturnsDifferentTextForEachCode) {
   std::set<std::string> texts;
   for (int code = VLP_TOO_SMALL; code <= VLP_ROW_TIME_UNKNOWN; ++code) {
-    texts.insert(vlp_explanation(code));
+    texts.insert(vlp_describe_status(code));
   }
   EXPECT_EQ(texts.size(), static_cast<std::size_t>(VLP_ROW_TIME_UNKNOWN - VLP_TOO_SMALL + 1));
-  EXPECT_EQ(vlp_explanation(13), std::string(vlp_explanation(-6)));
+  EXPECT_EQ(vlp_describe_status(13), std::string(vlp_describe_status(-6)));
   EXPECT_THAT(vlp_version(), HasSubstr("."));
 }
 

@@ -25,11 +25,11 @@ std::pair<int, std::string> run_and_capture(const std::function<void()>& run) {
   char* argv[] = {name.data(), nullptr};
   CLI::App app("Something", name);
   testing::internal::CaptureStderr();
-  const int code = run_app(app, 1, argv, run);
+  const int code = parse_arguments_and_run(app, 1, argv, run);
   return {code, testing::internal::GetCapturedStderr()};
 }
 
-TEST(RunApp, ReturnsExitCodeOfOutcome) {
+TEST(ParseArgumentsAndRun, ReturnsExitCodeOfThrownException) {
   EXPECT_EQ(run_and_capture([] {}).first, kDone);
   EXPECT_EQ(run_and_capture([] { throw GateNotMet("mean_mm"); }).first, kGateNotMet);
   EXPECT_EQ(run_and_capture([] { throw InputError("lamps.yaml", "is empty"); }).first, kBadInput);
@@ -37,7 +37,7 @@ TEST(RunApp, ReturnsExitCodeOfOutcome) {
   EXPECT_EQ(run_and_capture([] { throw Undetermined("add lamps"); }).first, kUndetermined);
 }
 
-TEST(RunApp, PrintsErrorInOnePrintableLine) {
+TEST(ParseArgumentsAndRun, PrintsErrorInOneLineWithoutControlCharacters) {
   const std::string said =
       run_and_capture([] { throw Undetermined("lamp \x1b[2J is dark"); }).second;
   EXPECT_THAT(said, HasSubstr("vlp-something: error: lamp "));
@@ -55,15 +55,15 @@ std::string said_of(std::vector<std::string> arguments) {
   std::string method, digest;
   app.add_option("--roll-pitch-sd-deg", sd_deg);
   app.add_option("--method", method)
-      ->check(make_former_value_validator())
+      ->check(make_renamed_option_value_validator())
       ->check(CLI::IsMember({"camera", "chen-guan"}));
   app.add_subcommand("verify", "Verifies")->add_option("--expected-digest", digest);
   testing::internal::CaptureStderr();
-  run_app(app, static_cast<int>(argv.size()), argv.data(), [] {});
+  parse_arguments_and_run(app, static_cast<int>(argv.size()), argv.data(), [] {});
   return testing::internal::GetCapturedStderr();
 }
 
-TEST(RunApp, NamesPresentOptionForFormerName) {
+TEST(ParseArgumentsAndRun, NamesNewNameForRenamedOptionOrValue) {
   const std::string problem =
       "vlp-something: error: option '--lean-sd-deg' is now called '--roll-pitch-sd-deg'; see "
       "vlp-something --help\n";
@@ -94,7 +94,7 @@ std::pair<int, std::string> end_with_full_stdout(const std::function<void()>& ru
   return end;
 }
 
-TEST(RunApp, ReportsErrorIfStdoutIsFull) {
+TEST(ParseArgumentsAndRun, ReturnsBadInputWhenStdoutCannotBeWritten) {
   for (const std::function<void()>& run : std::vector<std::function<void()>>{
            [] {}, [] { throw GateNotMet("mean_mm"); }, [] { throw Undetermined("add lamps"); }}) {
     const auto [code, said] = end_with_full_stdout(run);
@@ -103,28 +103,29 @@ TEST(RunApp, ReportsErrorIfStdoutIsFull) {
   }
 }
 
-TEST(CheckOutputFile, RejectsInputFile) {
+TEST(CheckOutputIsNotInput, RejectsOutputThatIsAlsoInput) {
   const TemporaryFolder folder;
   const std::string lamps = folder.file("lamps.yaml", "x").string();
   const std::string again = (folder / ".").string() + "/lamps.yaml";
   EXPECT_THAT(rejection_message<std::invalid_argument>([&] {
-                check_output_file(again, {"", lamps});
+                check_output_is_not_input(again, {"", lamps});
               }),
               HasSubstr("is also an input"));
-  check_output_file((folder / "other.yaml").string(), {lamps});
+  check_output_is_not_input((folder / "other.yaml").string(), {lamps});
 }
 
-TEST(CheckOutputFiles, RejectsSameFileTwice) {
+TEST(CheckOutputFilesAreDistinct, RejectsTwoOptionsWithSameFile) {
   const TemporaryFolder folder;
   const std::string file = (folder / "a").string(), same = (folder / "b/../a").string();
-  check_output_files({{"--output", file}, {"--ros", ""}, {"--plot", ""}}, {});
-  EXPECT_EQ(rejection_message<std::invalid_argument>([&] {
-              check_output_files({{"--output", file}, {"--ros", ""}, {"--plot", same}}, {});
-            }),
-            "--output and --plot are the same file; use another name");
+  check_output_files_are_distinct({{"--output", file}, {"--ros", ""}, {"--plot", ""}}, {});
+  EXPECT_EQ(
+      rejection_message<std::invalid_argument>([&] {
+        check_output_files_are_distinct({{"--output", file}, {"--ros", ""}, {"--plot", same}}, {});
+      }),
+      "--output and --plot are the same file; use another name");
 }
 
-TEST(Validators, CheckNumbersAndNames) {
+TEST(OptionValidators, RejectInvalidNumbersAndFileExtensions) {
   EXPECT_EQ(make_finite_validator()("-1e3"), "");
   EXPECT_NE(make_finite_validator()("inf"), "");
   EXPECT_NE(make_finite_validator()("1 m"), "");

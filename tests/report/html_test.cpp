@@ -10,14 +10,14 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-TEST(EscapeHtmlText, EscapesMarkupQuotesAndControlCharacters) {
+TEST(EscapeHtmlText, EscapesMarkupAndQuotesAndReplacesControlCharacters) {
   EXPECT_EQ(escape_html_text("a<b>&\"c'"), "a&lt;b&gt;&amp;&quot;c&#39;");
   EXPECT_EQ(escape_html_text("a\nb\tc"), "a b c");
   EXPECT_EQ(escape_html_text("\x1b[0m"), "\ufffd[0m");
   EXPECT_EQ(escape_html_text("\u00a0\u00b5"), "\u00a0\u00b5");
 }
 
-TEST(HtmlTable, MarksRowsAndDeclaresHeaderScope) {
+TEST(MakeHtmlTable, MarksRowsAndDeclaresScopeOfHeaderCells) {
   const std::string html = make_html_table({"<c>", {"h"}, {{"a", "b"}, {"d", "e"}}, {1}});
   EXPECT_THAT(html, HasSubstr("<caption>&lt;c&gt;</caption>"));
   EXPECT_THAT(html, HasSubstr("<th scope=\"col\">h</th>"));

@@ -14,12 +14,13 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-TEST(ReadReportPlot, RecognizesPlotsByTitle) {
+TEST(ReadReportPlot, AssignsReportPartByTitleOfOwnPlots) {
   const TemporaryFolder folder;
-  write_plot(folder / "a.svg", make_gnuplot_drawing(RotationPlot{"", {}, {203, 198}, {210, 190}}));
+  write_plot(folder / "a.svg",
+             make_rotation_plot_drawing(RotationPlot{"", {}, {203, 198}, {210, 190}}));
   EXPECT_EQ(read_report_plot(folder / "a.svg").part, ReportPart::rotation);
-  write_plot(folder / "b.svg",
-             make_gnuplot_drawing(DispersionPlot{"", {{{0.01, 0}}, {{0, 0}, 0.01}}, {{}, {}}, {}}));
+  write_plot(folder / "b.svg", make_dispersion_plot_drawing(DispersionPlot{
+                                   "", {{{0.01, 0}}, {{0, 0}, 0.01}}, {{}, {}}, {}}));
   const ReportPlot picture = read_report_plot(folder / "b.svg");
   EXPECT_EQ(picture.part, ReportPart::dispersion);
   EXPECT_EQ(picture.image, TemporaryFolder::read_content(folder / "b.svg"));
@@ -27,7 +28,7 @@ TEST(ReadReportPlot, RecognizesPlotsByTitle) {
   EXPECT_THAT(picture.alt, HasSubstr("dispersion"));
 }
 
-TEST(ReadReportPlot, NamesUnknownImagesByFile) {
+TEST(ReadReportPlot, CaptionsUnknownImagesWithFileName) {
   const TemporaryFolder folder;
   const auto file = folder.file("my room.svg", "<?xml?><svg><title>else</title></svg>");
   EXPECT_EQ(read_report_plot(file).part, ReportPart::other);
@@ -36,7 +37,7 @@ TEST(ReadReportPlot, NamesUnknownImagesByFile) {
             ReportPart::other);
 }
 
-TEST(ReadReportPlot, RejectsInvalidFile) {
+TEST(ReadReportPlot, RejectsMissingEmptyTruncatedOrTooLongFile) {
   const TemporaryFolder folder;
   EXPECT_THAT(rejection_message([&] { read_report_plot(folder / "none.svg"); }),
               HasSubstr("none.svg: cannot be opened"));

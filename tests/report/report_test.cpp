@@ -65,7 +65,7 @@ TEST(RenderReportHtml, OmitsEmptySections) {
   EXPECT_THAT(html, Not(HasSubstr("<img")));
 }
 
-TEST(RenderReportHtml, EscapesAllInput) {
+TEST(RenderReportHtml, EscapesMarkupInAllTexts) {
   const std::string evil = "</title><script>alert('1')</script>&\"";
   Report report{
       evil, {{evil, evil, 1, 2, Direction::at_most}}, {{evil, evil, evil, evil}}, {evil}, {}, {},
@@ -81,7 +81,7 @@ TEST(RenderReportHtml, EscapesAllInput) {
   EXPECT_THAT(html, HasSubstr("&lt;/title&gt;&lt;script&gt;alert(&#39;1&#39;)"));
 }
 
-TEST(RenderReportHtml, ContainsEachPartOfCalibrationAndHistory) {
+TEST(RenderReportHtml, ShowsValuesOfEachCalibrationPartAndHistory) {
   Calibration calibration;
   calibration.camera = {
       "cam-9", {800, 600}, LensModel::opencv4, {500, 501, 400, 300, 0.125, 0, 0, 0}, {}, 3e-5, {}};
@@ -104,7 +104,7 @@ TEST(RenderReportHtml, ContainsEachPartOfCalibrationAndHistory) {
   }
 }
 
-TEST(RenderReportHtml, ReportsOnlyValidRegionOfImportedLens) {
+TEST(RenderReportHtml, ShowsValidRegionButNoViewsForImportedLens) {
   Calibration calibration;
   calibration.camera = {"cam-9", {800, 600}, LensModel::pinhole, {500, 501, 400, 300}, {}, {}, {}};
   calibration.intrinsics_report.emplace();
@@ -115,7 +115,7 @@ TEST(RenderReportHtml, ReportsOnlyValidRegionOfImportedLens) {
   EXPECT_THAT(html, Not(HasSubstr("views of the board")));
 }
 
-TEST(RenderReportHtml, OrdersPlotsByPart) {
+TEST(RenderReportHtml, OrdersPlotsByReportPart) {
   Report report{"a", {}, {}, {}, {}, {}, {}};
   report.pictures = {{ReportPart::distribution, "<svg>", "second", "b"},
                      {ReportPart::camera, "\x89PNG", "first", "a"}};

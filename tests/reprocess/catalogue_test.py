@@ -64,7 +64,7 @@ class Scan(unittest.TestCase):
         after = os.stat(self.session / name)
         self.assertEqual((before.st_size, before.st_ino, before.st_mtime_ns), (after.st_size, after.st_ino, after.st_mtime_ns))
 
-    def replace_file(self, name):
+    def replace_file_atomically(self, name):
         before = os.stat(self.session / name)
         (self.session / "new").write_text("two")
         os.utime(self.session / "new", ns=(before.st_atime_ns, before.st_mtime_ns))
@@ -84,7 +84,7 @@ class Scan(unittest.TestCase):
         for change in (
             lambda: self.overwrite("boards/0.png", "two"),
             lambda: self.overwrite("check/more/2.png", "two"),
-            lambda: self.replace_file("boards/1.png"),
+            lambda: self.replace_file_atomically("boards/1.png"),
             lambda: (self.session / "boards/1.png").rename(self.session / "boards/3.png"),
             lambda: (self.session / "boards/3.png").unlink(),
             lambda: (self.session / "rotation").mkdir() or (self.session / "rotation/0.png").write_text("one"),
@@ -99,8 +99,8 @@ class Scan(unittest.TestCase):
     def test_scan_of_folders_misses_only_overwritten_images(self):
         said = [self.fingerprint("folders")]
         for change in (
-            lambda: self.replace_file("boards/1.png"),
-            lambda: self.replace_file("check/more/2.png"),
+            lambda: self.replace_file_atomically("boards/1.png"),
+            lambda: self.replace_file_atomically("check/more/2.png"),
             lambda: (self.session / "boards/2.png").write_text("one"),
             lambda: self.overwrite("lamps.yaml", "two"),
             lambda: self.overwrite("check/truth.csv", "two"),

@@ -18,7 +18,7 @@ std::vector<int> ids_of(const IdOrder& order) {
   return ids;
 }
 
-TEST(ListBoardTags, PlacesMarkersInWhiteSquares) {
+TEST(ListBoardTags, PlacesCharucoMarkersInWhiteSquares) {
   Board board{"DICT_4X4_50", 5, 4, 0.01, 1, 1, false, 3, {false, BoardCorner::top_left}};
   board.kind = BoardKind::charuco;
   board.square_size_m = 0.02;
@@ -36,7 +36,7 @@ TEST(ListBoardTags, PlacesMarkersInWhiteSquares) {
   EXPECT_NEAR(list_board_tags(board)[0].corners_m[3].x(), -0.015, 1e-12);
 }
 
-TEST(ListBoardTags, AssignsIdsByIdOrderOfBoard) {
+TEST(ListBoardTags, NumbersTagsInEachIdOrderOfBoard) {
   using enum BoardCorner;
   EXPECT_EQ(ids_of({false, top_left}), (std::vector{10, 11, 12, 13, 14, 15}));
   EXPECT_EQ(ids_of({false, top_right}), (std::vector{12, 11, 10, 15, 14, 13}));
@@ -48,7 +48,7 @@ TEST(ListBoardTags, AssignsIdsByIdOrderOfBoard) {
   EXPECT_EQ(ids_of({true, bottom_right}), (std::vector{15, 13, 11, 14, 12, 10}));
 }
 
-TEST(ListBoardTags, PlacesTagsAtPitch) {
+TEST(ListBoardTags, PlacesLastTagAtMultiplesOfTagPitch) {
   const Board board = board_with({false, BoardCorner::top_left});
   EXPECT_DOUBLE_EQ(compute_tag_pitch_m(board), 0.03);
   EXPECT_TRUE(compute_tag_field_size_m(board).isApprox(Eigen::Vector2d(0.08, 0.05)));

@@ -21,13 +21,13 @@ TEST(ReadBoard, ReadsEveryKey) {
   expect_same(read_board(folder.file("board.yaml", kBoardYaml)), sample_board());
 }
 
-TEST(WriteBoard, MatchesFormatByteForByte) {
+TEST(WriteBoard, WritesExpectedYamlByteForByte) {
   const TemporaryFolder folder;
   write_board(folder / "board.yaml", sample_board());
   EXPECT_EQ(folder.read_content(folder / "board.yaml"), kBoardYaml);
 }
 
-TEST(WriteBoard, KeepsEachIdOrder) {
+TEST(WriteBoard, RoundTripsEachIdOrder) {
   const std::pair<std::string, IdOrder> orders[] = {
       {"row-major-from-bottom-left", {false, BoardCorner::bottom_left}},
       {"row-major-from-bottom-right", {false, BoardCorner::bottom_right}},
@@ -56,14 +56,14 @@ constexpr const char* kKalibrTarget =
     "tagSize: 0.02            #size of apriltag, edge to edge [m]\n"
     "tagSpacing: 0.2          #ratio of space between tags to tagSize\n";
 
-TEST(ReadBoard, ReadsKalibrAprilGrid) {
+TEST(ReadBoard, ReadsBoardFromKalibrAprilGrid) {
   const TemporaryFolder folder;
   const Board board{"tag36h11", 5, 4, 0.02, 0.2, 2, true, 0, {false, BoardCorner::bottom_left}};
   expect_same(read_board(folder.file("target.yaml", kKalibrTarget)), board);
 }
 
 /// Ends as the files that Kalibr distributes.
-TEST(ReadBoard, UsesKalibrOffsetAsFirstId) {
+TEST(ReadBoard, UsesKalibrCodeOffsetAsFirstId) {
   const TemporaryFolder folder;
   const auto with = [&](const std::string& offset) {
     return folder.file("target.yaml", kKalibrTarget + ("codeOffset: " + offset) +
@@ -77,7 +77,7 @@ TEST(ReadBoard, UsesKalibrOffsetAsFirstId) {
   EXPECT_THAT(refusal(read_board, with("0.5")), HasSubstr("target.yaml:6: codeOffset: should be"));
 }
 
-TEST(ReadBoard, RejectsOtherKalibrTargetsAndKeys) {
+TEST(ReadBoard, RejectsOtherKalibrTargetTypesAndWrongKeys) {
   const TemporaryFolder folder;
   const auto rejection_message = [&](const std::string& from, const std::string& to) {
     return refusal(read_board, folder.file("target.yaml", changed(kKalibrTarget, from, to)));
@@ -100,7 +100,7 @@ constexpr const char* kCharuco =
     "format: vlp-board/1\nkind: charuco\ncols: 10\nrows: 7\nsquare_size_m: 0.03\n"
     "marker_size_m: 0.02\ndictionary: DICT_5X5_100\n";
 
-TEST(ReadBoard, ReadsBoardsOfSquares) {
+TEST(ReadBoard, ReadsChessboardAndCharucoBoard) {
   const TemporaryFolder folder;
   const std::string chessboard =
       "format: vlp-board/1\nkind: chessboard\ncols: 10\nrows: 7\nsquare_size_m: 0.03\n";
@@ -120,7 +120,7 @@ TEST(ReadBoard, ReadsBoardsOfSquares) {
   EXPECT_EQ(folder.read_content(folder / "written.yaml"), all);
 }
 
-TEST(ReadBoard, RejectsInvalidBoardOfSquares) {
+TEST(ReadBoard, RejectsInvalidValuesOfCharucoBoard) {
   const TemporaryFolder folder;
   const auto rejection_message = [&](const std::string& from, const std::string& to) {
     return refusal(read_board, folder.file("board.yaml", changed(kCharuco, from, to)));
@@ -137,7 +137,7 @@ TEST(ReadBoard, RejectsInvalidBoardOfSquares) {
               HasSubstr("top_left: 'red' is unknown; the colors of a square are: black, white"));
 }
 
-TEST(ReadBoard, ReadsKalibrCheckerboard) {
+TEST(ReadBoard, ReadsKalibrCheckerboardWithEqualSpacingsOnly) {
   const TemporaryFolder folder;
   const std::string target =
       "target_type: 'checkerboard'\ntargetCols: 9\ntargetRows: 6\n"
@@ -147,7 +147,7 @@ TEST(ReadBoard, ReadsKalibrCheckerboard) {
               HasSubstr("target.yaml:4: rowSpacingMeters: is not colSpacingMeters"));
 }
 
-TEST(WriteBoard, KeepsBothValuesOfEachSwitch) {
+TEST(WriteBoard, RoundTripsOneBorderBitWithoutCornerSquares) {
   Board board = sample_board();
   board.border_bits = 1;
   board.corner_squares = false;
@@ -158,7 +158,7 @@ TEST(WriteBoard, KeepsBothValuesOfEachSwitch) {
   expect_same(read_board(folder / "board.yaml"), board);
 }
 
-TEST(WriteBoard, KeepsPrintSd) {
+TEST(WriteBoard, RoundTripsPrintSdAndReadRejectsTooLargeOne) {
   const TemporaryFolder folder;
   const Board board = read_board(folder.file("board.yaml", kBoardYaml + "print_sd: 0.0002\n"));
   EXPECT_EQ(board.print_sd, 0.0002);
@@ -179,7 +179,7 @@ TEST(ReadBoard, ReportsLineAndKeyOfMissingKey) {
   }
 }
 
-TEST(ReadBoard, ReportsValidWords) {
+TEST(ReadBoard, ListsValidWordsForUnknownFamilyOrIdOrder) {
   EXPECT_EQ(refusal_with("tag36h11", "tag36h12"),
             "board.yaml:2: family: 'tag36h12' is unknown; the families are: tag36h11, tag25h9, "
             "tag16h5, tagCircle21h7, tagCircle49h12, tagCustom48h12, tagStandard41h12, "
@@ -189,7 +189,7 @@ TEST(ReadBoard, ReportsValidWords) {
                         "row-major-from-bottom-left, row-major-from-bottom-right, "));
 }
 
-TEST(ReadBoard, RejectsInvalidValues) {
+TEST(ReadBoard, ReportsLineAndKeyOfInvalidValue) {
   EXPECT_EQ(refusal_with("cols: 8", "cols: 0"),
             "board.yaml:3: cols: should be a whole number within 1 and 1000, not '0'");
   EXPECT_EQ(refusal_with("rows: 5", "rows: 4.5"),
@@ -208,7 +208,7 @@ TEST(ReadBoard, RejectsInvalidValues) {
             "board.yaml:9: first_id: should be a whole number within 0 and 1000000, not '-1'");
 }
 
-TEST(ReadBoard, ReportsLineOfEmptyValue) {
+TEST(ReadBoard, ReportsLineAndKeyOfEmptyValue) {
   EXPECT_EQ(refusal_with("tag_size_m: 0.016", "tag_size_m:"),
             "board.yaml:5: tag_size_m: should be a finite number, not nothing");
   EXPECT_EQ(refusal_with("id_order: column-major-from-top-left", "id_order:"),

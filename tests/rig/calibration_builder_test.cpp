@@ -19,18 +19,18 @@ Calibration whole_calibration() {
   return calibration;
 }
 
-TEST(MakeCalibrationWithCamera, RemovesOtherParts) {
+TEST(MakeCameraOnlyCalibration, ContainsOnlyCameraIntrinsicsReportAndHistoryEntry) {
   const Calibration sample = sample_calibration();
   Calibration expected = sample;
   expected.rotation_center.reset();
   expected.dispersion.reset();
   expected.history = {{"camera", "vlp-intrinsics", "1.2.3", "", {}}};
-  expect_same(make_calibration_with_camera(sample.camera, sample.intrinsics_report,
+  expect_same(make_camera_only_calibration(sample.camera, sample.intrinsics_report,
                                            entry_of("vlp-intrinsics")),
               expected);
 }
 
-TEST(WithRotationCenter, AddsPartToCamera) {
+TEST(AddRotationCenterToCalibration, AddsRotationCenterAndHistoryEntryToCameraAlone) {
   Calibration before = whole_calibration();
   const RotationCenter center = *before.rotation_center;
   before.rotation_center.reset();
@@ -39,10 +39,11 @@ TEST(WithRotationCenter, AddsPartToCamera) {
   Calibration expected = before;
   expected.rotation_center = center;
   expected.history.push_back({"rotation_center", "vlp-rotation", "1.2.3", "", {}});
-  expect_same(with_rotation_center(before, center, entry_of("vlp-rotation")), expected);
+  expect_same(add_rotation_center_to_calibration(before, center, entry_of("vlp-rotation")),
+              expected);
 }
 
-TEST(WithRotationCenter, ReplacesOldPartAndRemovesDispersion) {
+TEST(AddRotationCenterToCalibration, ReplacesRotationCenterAndRemovesDispersion) {
   RotationCenter center = *sample_calibration().rotation_center;
   center.center_px = {1, 2};
   Calibration expected = whole_calibration();
@@ -50,22 +51,24 @@ TEST(WithRotationCenter, ReplacesOldPartAndRemovesDispersion) {
   expected.dispersion.reset();
   expected.history.resize(1);
   expected.history.push_back({"rotation_center", "vlp-rotation", "1.2.3", "", {}});
-  expect_same(with_rotation_center(whole_calibration(), center, entry_of("vlp-rotation")),
-              expected);
+  expect_same(
+      add_rotation_center_to_calibration(whole_calibration(), center, entry_of("vlp-rotation")),
+      expected);
 }
 
-TEST(WithDispersion, KeepsEarlierPartsAndReplacesOldPart) {
+TEST(AddDispersionToCalibration, ReplacesDispersionAndKeepsOtherParts) {
   const Dispersion dispersion{{3, 4}, 0.5, {6, 7}, 8, {}};
   Calibration expected = whole_calibration();
   expected.dispersion = dispersion;
   expected.history[2] = {"dispersion", "vlp-dispersion", "1.2.3", "", {}};
-  expect_same(with_dispersion(whole_calibration(), dispersion, entry_of("vlp-dispersion")),
-              expected);
+  expect_same(
+      add_dispersion_to_calibration(whole_calibration(), dispersion, entry_of("vlp-dispersion")),
+      expected);
 }
 
-TEST(WithDispersion, ResultCanBeWrittenAndRead) {
+TEST(AddRotationCenterToCalibration, ResultIsUnchangedByWritingAndReading) {
   const TemporaryFolder folder;
-  const Calibration given = with_rotation_center(
+  const Calibration given = add_rotation_center_to_calibration(
       whole_calibration(), *sample_calibration().rotation_center, entry_of("vlp-rotation"));
   write_calibration(folder / "calibration.yaml", given);
   expect_same(read_calibration(folder / "calibration.yaml"), given);

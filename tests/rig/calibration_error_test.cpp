@@ -21,8 +21,8 @@ Calibration leaning() {
   return calibration;
 }
 
-TEST(WithLensError, KeepsZenithAndMovesItsPixel) {
-  const Calibration moved = with_lens_error(leaning(), Eigen::Vector4d(10, -5, 1, 2));
+TEST(PerturbLensIntrinsics, ChangesIntrinsicsAndRotationCenterPixelButNotZenith) {
+  const Calibration moved = perturb_lens_intrinsics(leaning(), Eigen::Vector4d(10, -5, 1, 2));
   EXPECT_EQ(moved.camera.intrinsics, (std::vector<double>{510, 505, 401, 302}));
   ASSERT_TRUE(moved.rotation_center);
   EXPECT_EQ(moved.rotation_center->zenith_in_camera, leaning().rotation_center->zenith_in_camera);
@@ -30,21 +30,21 @@ TEST(WithLensError, KeepsZenithAndMovesItsPixel) {
               IsNear(Eigen::Vector2d(401 + 0.02 * 510, 302 - 0.01 * 505), 1e-9));
   Calibration alone = leaning();
   alone.rotation_center.reset();
-  EXPECT_FALSE(with_lens_error(alone, Eigen::Vector4d(1, 0, 0, 0)).rotation_center);
+  EXPECT_FALSE(perturb_lens_intrinsics(alone, Eigen::Vector4d(1, 0, 0, 0)).rotation_center);
 }
 
-TEST(WithZenithError, MovesNormalizedPoint) {
-  const Calibration moved = with_zenith_error(leaning(), {0.001, 0.002});
+TEST(PerturbZenithDirection, AddsErrorToNormalizedZenithPointAndMovesPixel) {
+  const Calibration moved = perturb_zenith_direction(leaning(), {0.001, 0.002});
   ASSERT_TRUE(moved.rotation_center);
-  EXPECT_THAT(normalized_zenith_point(*moved.rotation_center),
+  EXPECT_THAT(compute_normalized_zenith_point(*moved.rotation_center),
               IsNear(Eigen::Vector2d(0.021, -0.008), 1e-15));
   EXPECT_NEAR(moved.rotation_center->zenith_in_camera.norm(), 1, 1e-15);
   EXPECT_THAT(moved.rotation_center->center_px,
               IsNear(Eigen::Vector2d(400 + 0.021 * 500, 300 - 0.008 * 510), 1e-9));
 }
 
-TEST(WithOffsetError, UsesUnitsOfNormalizedPlane) {
-  const Calibration moved = with_offset_error(leaning(), {0.001, -0.002});
+TEST(PerturbDispersionOffset, AddsErrorTimesFocalLengthToDispersionOffset) {
+  const Calibration moved = perturb_dispersion_offset(leaning(), {0.001, -0.002});
   ASSERT_TRUE(moved.dispersion && moved.rotation_center);
   EXPECT_THAT(moved.dispersion->offset_px, IsNear(Eigen::Vector2d(1, -1.22), 1e-12));
   EXPECT_EQ(moved.rotation_center->center_px, leaning().rotation_center->center_px);

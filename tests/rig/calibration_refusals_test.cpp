@@ -64,7 +64,7 @@ TEST(ReadCalibration, ReportsLineAndKeyOfInvalidCamera) {
        {"readout:", "read_out:", "camera: key 'read_out' is unknown; the keys are: id, "}});
 }
 
-TEST(ReadCalibration, ReportsLineAndKeyOfInvalidReport) {
+TEST(ReadCalibration, ReportsLineAndKeyOfInvalidIntrinsicsReport) {
   expect_refused(
       {{"views: 40", "views: -1", "intrinsics_report.views: should be a whole number within 0 and"},
        {"corners: 6400", "corners: many", "intrinsics_report.corners: should be a whole number"},
@@ -131,7 +131,7 @@ TEST(ReadCalibration, ReportsLineAndKeyOfInvalidHistory) {
        {"[]\n", "none\n", "history[1].inputs: should be a list, not 'none'"}});
 }
 
-TEST(ReadCalibration, ReportsMissingKeysOfEachPart) {
+TEST(ReadCalibration, ReportsMissingKeyOfEachPart) {
   for (const std::string key : {"views", "corners", "outliers", "rms_px", "model", "center_px",
                                 "zenith_in_camera", "offset_px", "radius_m", "center_m", "captures",
                                 "id", "imager_px", "lens_model", "intrinsics"}) {
@@ -143,7 +143,7 @@ TEST(ReadCalibration, ReportsMissingKeysOfEachPart) {
   }
 }
 
-TEST(ReadCalibration, ReportsMissingPartOfHistory) {
+TEST(ReadCalibration, RejectsHistoryEntryWhosePartIsMissing) {
   const std::size_t begin = kCalibrationYaml.find("dispersion:\n");
   const std::size_t end = kCalibrationYaml.find("camera:\n");
   EXPECT_EQ(calibration_refusal(

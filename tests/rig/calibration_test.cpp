@@ -34,7 +34,7 @@ TEST(ReadCalibration, ReadsEveryKey) {
   expect_same(read_calibration(file), sample_calibration());
 }
 
-TEST(WriteCalibration, MatchesFormatByteForByte) {
+TEST(WriteCalibration, WritesExpectedYamlByteForByte) {
   const TemporaryFolder folder;
   write_calibration(folder / "calibration.yaml", sample_calibration());
   EXPECT_EQ(folder.read_content(folder / "calibration.yaml"), kCalibrationYaml);
@@ -49,7 +49,7 @@ TEST(ReadCalibration, AcceptsPartsInAnyOrder) {
   expect_same(read_calibration(folder.file("calibration.yaml", reordered)), sample_calibration());
 }
 
-TEST(WriteCalibration, KeepsCovariancesAndAdjustment) {
+TEST(WriteCalibration, RoundTripsCovariancesDerivativesAndAdjustment) {
   Calibration calibration = sample_calibration();
   const Eigen::MatrixXd root = Eigen::MatrixXd::Random(12 + 6, 12 + 6);
   Eigen::MatrixXd covariance = 0.01 * root * root.transpose();
@@ -64,7 +64,7 @@ TEST(WriteCalibration, KeepsCovariancesAndAdjustment) {
   expect_kept(calibration);
 }
 
-TEST(ReadCalibration, RejectsMismatchedAdjustment) {
+TEST(ReadCalibration, RejectsAdjustmentWithMissingStateRowOrInvalidCorrelation) {
   const TemporaryFolder folder;
   Calibration calibration = sample_calibration();
   calibration.adjustment =
@@ -85,7 +85,7 @@ TEST(ReadCalibration, RejectsMismatchedAdjustment) {
   EXPECT_THAT(refusal("    - [1]\n", ""), testing::HasSubstr("15 rows of 1, 2, 3"));
 }
 
-TEST(WriteCalibration, OmitsInfiniteUncertainty) {
+TEST(WriteCalibration, OmitsInfiniteExpectedMaxError) {
   Calibration calibration = sample_calibration();
   calibration.intrinsics_report->expected_max_error_px = std::numeric_limits<double>::infinity();
   const TemporaryFolder folder;
@@ -94,7 +94,7 @@ TEST(WriteCalibration, OmitsInfiniteUncertainty) {
   expect_same(read_calibration(folder / "calibration.yaml"), calibration);
 }
 
-TEST(WriteCalibration, KeepsEachPartWithoutOptionalKeys) {
+TEST(WriteCalibration, RoundTripsCalibrationWithoutEachOptionalPart) {
   const std::function<void(Calibration&)> removals[] = {
       [](Calibration& c) { c.camera.pixel_pitch_m.reset(); },
       [](Calibration& c) { c.camera.row_time_s.reset(); },
@@ -123,7 +123,7 @@ TEST(WriteCalibration, KeepsEachPartWithoutOptionalKeys) {
   }
 }
 
-TEST(WriteCalibration, RoundTripsRotationModelAndReadout) {
+TEST(WriteCalibration, RoundTripsEachRotationModelAndReadout) {
   for (const RotationModel model : {RotationModel::shift, RotationModel::tilt}) {
     for (const Readout readout : {Readout::rows, Readout::columns}) {
       Calibration calibration = sample_calibration();
@@ -134,7 +134,7 @@ TEST(WriteCalibration, RoundTripsRotationModelAndReadout) {
   }
 }
 
-TEST(WriteCalibration, KeepsEachLensModelWithParameters) {
+TEST(WriteCalibration, RoundTripsParametersOfEachLensModel) {
   for (const auto& [model, parameters] : {std::pair{LensModel::pinhole, 4},
                                           {LensModel::stereographic, 4},
                                           {LensModel::opencv4, 8},
@@ -150,7 +150,7 @@ TEST(WriteCalibration, KeepsEachLensModelWithParameters) {
   }
 }
 
-TEST(WriteCalibration, KeepsErrorsOfSplinedLensCore) {
+TEST(WriteCalibration, RoundTripsCovariancesOfSplinedLensCore) {
   Calibration calibration = sample_calibration();
   const auto first = [](const std::optional<MatrixX>& by) { return MatrixX(by->leftCols(4)); };
   auto& report = *calibration.intrinsics_report;
@@ -166,11 +166,11 @@ TEST(WriteCalibration, KeepsErrorsOfSplinedLensCore) {
   calibration.adjustment.reset();
   std::erase_if(calibration.history, [](const auto& entry) { return entry.part == "adjustment"; });
   calibration.camera.lens_model = lens_model_for_spline_grid({2, 3, 3, 120});
-  calibration.camera.intrinsics.resize(parameter_count(calibration.camera.lens_model), 0.25);
+  calibration.camera.intrinsics.resize(num_lens_parameters(calibration.camera.lens_model), 0.25);
   expect_kept(calibration);
 }
 
-TEST(WriteCalibration, KeepsAnyText) {
+TEST(WriteCalibration, RoundTripsAnyText) {
   std::string all_ascii;
   for (char c = 0; c >= 0 && c < 127; ++c) all_ascii += c;
   for (const std::string& text :
@@ -188,7 +188,7 @@ TEST(WriteCalibration, KeepsAnyText) {
   }
 }
 
-TEST(WriteCalibration, KeepsRandomNumbersExactly) {
+TEST(WriteCalibration, RoundTripsRandomNumbersExactly) {
   std::mt19937_64 random(2);
   std::normal_distribution<double> normal(0, 1000);
   const auto random_number = [&] { return normal(random) * std::exp(normal(random) / 100); };
@@ -207,7 +207,7 @@ TEST(WriteCalibration, KeepsRandomNumbersExactly) {
   }
 }
 
-TEST(WriteCalibration, KeepsUnitVectorsAndFullCorrelation) {
+TEST(WriteCalibration, RoundTripsUnitVectorsAndFullyCorrelatedCovariances) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
   for (int i = 0; i < 30; ++i) {

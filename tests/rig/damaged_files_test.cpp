@@ -19,12 +19,12 @@ void expect_refused_when_cut(const TemporaryFolder& folder, Read read, const std
   std::filesystem::remove(file);
 }
 
-TEST(ReadBoard, RejectsEveryTruncation) {
+TEST(ReadBoard, RejectsFileTruncatedAtAnyByte) {
   const TemporaryFolder folder;
   expect_refused_when_cut(folder, read_board, kBoardYaml);
 }
 
-TEST(ReadCalibration, RejectsEveryTruncation) {
+TEST(ReadCalibration, RejectsFileTruncatedAtAnyByte) {
   const TemporaryFolder folder;
   for (unsigned parts = 0; parts < 1U << 4; ++parts) {
     SCOPED_TRACE(parts);
@@ -40,7 +40,7 @@ TEST(ReadCalibration, RejectsEveryTruncation) {
 }
 
 // The format does not contain the number of lamps.
-TEST(ReadLampMap, ReturnsEarlierLampsWhenTruncatedBetweenLines) {
+TEST(ReadLampMap, AcceptsTruncationOnlyAfterCompleteLampLine) {
   const TemporaryFolder folder;
   const auto file = folder.file("lamps.yaml", kLampsYaml);
   int maps = 0;
@@ -114,15 +114,15 @@ void expect_read_or_refused(const std::string& whole, Read read, Write write) {
   EXPECT_LT(times_read, times / 2);
 }
 
-TEST(ReadLampMap, ReadsOrRejectsDamagedFile) {
+TEST(ReadLampMap, RoundTripsOrRejectsRandomlyDamagedFile) {
   expect_read_or_refused(kLampsYaml, read_lamp_map, write_lamp_map);
 }
 
-TEST(ReadBoard, ReadsOrRejectsDamagedFile) {
+TEST(ReadBoard, RoundTripsOrRejectsRandomlyDamagedFile) {
   expect_read_or_refused(kBoardYaml, read_board, write_board);
 }
 
-TEST(ReadCalibration, ReadsOrRejectsDamagedFile) {
+TEST(ReadCalibration, RoundTripsOrRejectsRandomlyDamagedFile) {
   expect_read_or_refused(kCalibrationYaml, read_calibration, write_calibration);
 }
 

@@ -22,7 +22,7 @@ std::string repeated(const std::string& text, std::size_t count) {
   return all;
 }
 
-TEST(ReadYaml, RejectsHundredThousandLevels) {
+TEST(ReadYamlFile, RejectsNestingOf100000Levels) {
   constexpr std::size_t levels = 100000;
   const std::string deep = ": is nested too deep: is it the right file?";
   for (const std::string open : {"[", "{", "{a: ", "- ", "? ", "[{a: ", "[a, "}) {
@@ -37,7 +37,7 @@ TEST(ReadYaml, RejectsHundredThousandLevels) {
   EXPECT_THAT(map_refusal(indented), HasSubstr(deep));
 }
 
-TEST(ReadYaml, RejectsBillionLaughs) {
+TEST(ReadYamlFile, RejectsAliasesOfExponentialExpansion) {
   std::string bomb = "a0: &a0 [lol, lol, lol, lol, lol, lol, lol, lol, lol]\n";
   for (int i = 1; i < 10; ++i) {
     const std::string alias = "*a" + std::to_string(i - 1);
@@ -50,7 +50,7 @@ TEST(ReadYaml, RejectsBillionLaughs) {
 }
 
 // All keys are valid, but the file would need 400 GB.
-TEST(ReadYaml, RejectsSelfReferencingHistory) {
+TEST(ReadYamlFile, RejectsHistoryOfManyAliases) {
   std::string text = changed(kCalibrationYaml, "history:\n  - part", "history:\n  - &a\n    part");
   text = changed(text, "    inputs:\n",
                  "    inputs:\n" + repeated("      - {file: a, sha256: b}\n", 15000));
@@ -61,7 +61,7 @@ TEST(ReadYaml, RejectsSelfReferencingHistory) {
               HasSubstr(": an alias (*) is not supported: write out the value"));
 }
 
-TEST(ReadYaml, RejectsFileAboveOneMebibyte) {
+TEST(ReadYamlFile, RejectsFileAboveOneMebibyte) {
   std::string content = kLampsYaml + "#";
   content += std::string(kMaxBytes - content.size() - 1, 'x') + "\n";
   ASSERT_EQ(content.size(), kMaxBytes);
@@ -75,11 +75,11 @@ TEST(ReadYaml, RejectsFileAboveOneMebibyte) {
   EXPECT_EQ(refusal(read_lamp_map, file), refused);
 }
 
-TEST(ReadYaml, RejectsDeviceWithoutReading) {
+TEST(ReadYamlFile, RejectsDeviceFile) {
   EXPECT_EQ(refusal(read_lamp_map, "/dev/zero"), "zero: is a pipe or a device, not a file");
 }
 
-TEST(ReadYaml, ReportsLineForManySmallNodes) {
+TEST(ReadYamlFile, RejectsManySmallNodesWithLineNumber) {
   for (const std::string piece : {"1,", "[],", "{},", "&a 1,", "a: 1,", "'',", "? ,"}) {
     const std::string list = repeated(piece, 100'000 / piece.size()).append("]");
     EXPECT_THAT(refusal_of_lamps("[" + list), testing::StartsWith("lamps.yaml:2: "));

@@ -43,7 +43,7 @@ TEST(ReadLampMap, ReportsLineAndKeyOfDuplicateKey) {
             "lamps.yaml:3: key 'lamps' occurs twice");
 }
 
-TEST(ReadLampMap, RejectsKeysOfOtherShape) {
+TEST(ReadLampMap, RejectsInvalidShapesAndKeysOfOtherShape) {
   const std::string lamp = "id: 1, position_m: [0, 0, 2], ", place = "lamps.yaml:3: lamps[0]";
   EXPECT_EQ(refusal_of_lamp(lamp + "size_m: [1.2, 0.1]"),
             place + ".size_m: is of a rectangle: say 'shape: rectangle', too");
@@ -68,13 +68,13 @@ TEST(ReadLampMap, ReportsLineOfDuplicateId) {
             "lamps.yaml:4: lamps[1]: id 1 occurs twice");
 }
 
-TEST(ReadLampMap, ReportsBothLampsAtOnePosition) {
+TEST(ReadLampMap, ReportsBothLampsAtSamePosition) {
   EXPECT_EQ(map_refusal(changed(kLampsYaml, "[-0.25, 0, 2.1]", "[0.5, -0.3, 2.1009]")),
             "lamps.yaml:4: lamps[1]: lamp 7 is where lamp 1 is");
   EXPECT_EQ(map_refusal(changed(kLampsYaml, "[-0.25, 0, 2.1]", "[0.5, -0.3, 2.102]")), "");
 }
 
-TEST(ReadLampMap, RejectsIdThatIsNotInteger) {
+TEST(ReadLampMap, RejectsIdThatIsNotNonNegativeInteger) {
   for (const std::string id : {"-1", "1.5", "1.0", "2147483648", "one", "0x1", "[1]", "''", ""}) {
     EXPECT_THAT(refusal_of_lamp("id: " + id + ", position_m: [0, 0, 2]"),
                 HasSubstr("lamps.yaml:3: lamps[0].id: should be a whole number within 0 and "
@@ -113,7 +113,7 @@ TEST(ReadLampMap, RejectsPositionWithoutThreeNumbers) {
             place + "should be a list, not a mapping");
 }
 
-TEST(ReadLampMap, ReportsUnitOfImplausibleValue) {
+TEST(ReadLampMap, ReportsUnitOfValueOutOfRange) {
   const std::string lamp = "id: 1, position_m: [0, 0, 2], ";
   const std::string place = "lamps.yaml:3: lamps[0].";
   EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [500, -300, 2100]"),
@@ -128,7 +128,7 @@ TEST(ReadLampMap, ReportsUnitOfImplausibleValue) {
   EXPECT_THAT(refusal_of_lamp(lamp + "duty: 0"), HasSubstr(place + "duty: 0 (a fraction of the"));
 }
 
-TEST(ReadLampMap, RejectsUnknownShape) {
+TEST(ReadLampMap, RejectsLampsThatAreNoListOfMappings) {
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\nlamps: []\n"),
             "lamps.yaml:2: lamps: contains no lamp");
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\n\nlamps:\n\n# none\n"),

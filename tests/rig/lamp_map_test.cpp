@@ -22,13 +22,13 @@ TEST(ReadLampMap, ReadsEveryKey) {
   expect_same(read_lamp_map(folder.file("lamps.yaml", kLampsYaml)), sample_lamps());
 }
 
-TEST(WriteLampMap, MatchesFormatByteForByte) {
+TEST(WriteLampMap, WritesExpectedYamlByteForByte) {
   const TemporaryFolder folder;
   write_lamp_map(folder / "lamps.yaml", sample_lamps());
   EXPECT_EQ(folder.read_content(folder / "lamps.yaml"), kLampsYaml);
 }
 
-TEST(ReadLampMap, ReadsStandardDeviationOfMapOrLamp) {
+TEST(ReadLampMap, UsesSdOfLampBeforeSdOfMap) {
   const TemporaryFolder folder;
   const LampMap map = read_lamp_map(folder.file("lamps.yaml", R"(format: vlp-lamps/1
 sd_m: 0.002
@@ -42,7 +42,7 @@ lamps:
   expect_same(read_lamp_map(folder / "written.yaml"), map);
 }
 
-TEST(ReadLampsOfRoom, ReturnsLampsOfOneRoom) {
+TEST(ReadLampsOfRoom, ReturnsOnlyLampsOfNamedRoom) {
   const TemporaryFolder folder;
   const auto file = folder.file("lamps.yaml", R"(format: vlp-lamps/1
 lamps:
@@ -60,7 +60,7 @@ lamps:
               HasSubstr("has no lamp with 'room: attic'"));
 }
 
-TEST(ReadLampMap, ReadsDiscsAndRectangles) {
+TEST(ReadLampMap, ReadsShapesOfDiscsAndRectangles) {
   const TemporaryFolder folder;
   const std::string yaml = R"(format: vlp-lamps/1
 lamps:
@@ -83,7 +83,7 @@ lamps:
   expect_same(read_as("2.1], diameter_m", "2.1], shape: disc, diameter_m"), map);
 }
 
-TEST(FindLampById, ReturnsLampWithId) {
+TEST(FindLampById, ReturnsLampWithIdOrNullptr) {
   LampMap map;
   for (const int id : {7, 2, 40}) map.lamps.push_back({id, {0, 0.1 * id, 2}, {}, {}, {}});
   EXPECT_EQ(find_lamp_by_id(map.lamps, 2), &map.lamps[1]);
@@ -92,7 +92,7 @@ TEST(FindLampById, ReturnsLampWithId) {
   EXPECT_EQ(find_lamp_by_id({}, 7), nullptr);
 }
 
-TEST(WriteLampMap, KeepsEveryDoubleExactly) {
+TEST(WriteLampMap, RoundTripsAnyFiniteDoubleExactly) {
   std::mt19937_64 random(1);
   const auto any_finite = [&random] {
     for (;;) {
@@ -113,14 +113,14 @@ TEST(WriteLampMap, KeepsEveryDoubleExactly) {
 }
 
 // Readers of YAML 1.1 parse 1e-07 as text.
-TEST(WriteLampMap, WritesPointInNumbersWithExponent) {
+TEST(WriteLampMap, WritesDecimalPointInNumbersWithExponent) {
   const TemporaryFolder folder;
   write_lamp_map(folder / "lamps.yaml", {{{1, {1e-7, -2e300, 0}, {}, 1e5, {}}}});
   EXPECT_THAT(folder.read_content(folder / "lamps.yaml"),
               HasSubstr("{id: 1, position_m: [1.0e-07, -2.0e+300, 0], frequency_hz: 100000}"));
 }
 
-TEST(ReadLampMap, AcceptsOtherYamlStyles) {
+TEST(ReadLampMap, AcceptsYamlInBlockStyleAndAnyKeyOrder) {
   const TemporaryFolder folder;
   const auto lamps = read_lamp_map(folder.file("lamps.yaml", R"(---
 # A comment.

@@ -10,9 +10,9 @@
 namespace vlp {
 namespace {
 
-TEST(OutlineOf, RectangleContainsCorners) {
+TEST(ComputeLampOutlinePoints, ContainsCornersOfRotatedRectangle) {
   const LampShape shape{ShapeKind::rectangle, Eigen::Vector2d(1.2, 0.4), std::numbers::pi / 2};
-  const auto outline_m = outline_of(shape, {1, 2, 3}, 8);
+  const auto outline_m = compute_lamp_outline_points(shape, {1, 2, 3}, 8);
   ASSERT_EQ(outline_m.size(), 8U);
   EXPECT_LT((outline_m[1] - Eigen::Vector3d(0.8, 2.6, 3)).norm(), 1e-12);
   EXPECT_LT((outline_m[3] - Eigen::Vector3d(0.8, 1.4, 3)).norm(), 1e-12);
@@ -21,9 +21,9 @@ TEST(OutlineOf, RectangleContainsCorners) {
   EXPECT_LT((outline_m[0] - Eigen::Vector3d(1, 2.6, 3)).norm(), 1e-12) << "middle of a side";
 }
 
-TEST(OutlineOf, DiscIsCircle) {
+TEST(ComputeLampOutlinePoints, ReturnsCircleOfDiscRadiusForDisc) {
   const Eigen::Vector3d center_m(1, 2, 3);
-  const auto outline_m = outline_of(make_disc(0.2), center_m);
+  const auto outline_m = compute_lamp_outline_points(make_disc_lamp_shape(0.2), center_m);
   ASSERT_EQ(outline_m.size(), 16U);
   for (const Eigen::Vector3d& point_m : outline_m) {
     EXPECT_NEAR((point_m - center_m).norm(), 0.1, 1e-12);
@@ -31,11 +31,13 @@ TEST(OutlineOf, DiscIsCircle) {
   }
 }
 
-TEST(OutlineOf, ReturnsNoneWithoutSize) { EXPECT_TRUE(outline_of({}, {1, 2, 3}).empty()); }
+TEST(ComputeLampOutlinePoints, IsEmptyWithoutSize) {
+  EXPECT_TRUE(compute_lamp_outline_points({}, {1, 2, 3}).empty());
+}
 
-TEST(WorldFromShape, ScalesAndRotatesPoints) {
+TEST(TransformShapePointToWorld, ScalesRotatesAndTranslatesPoint) {
   const LampShape shape{ShapeKind::rectangle, Eigen::Vector2d(1.2, 0.4), std::numbers::pi / 2};
-  const Eigen::Vector3d point_m = world_from_shape(shape, {1, 2, 3}, {0.5, -1});
+  const Eigen::Vector3d point_m = transform_shape_point_to_world(shape, {1, 2, 3}, {0.5, -1});
   EXPECT_LT((point_m - Eigen::Vector3d(1.2, 2.3, 3)).norm(), 1e-12);
 }
 

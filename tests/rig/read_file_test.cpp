@@ -17,7 +17,7 @@ std::string read_refusal(const fs::path& file, std::size_t max_bytes = 100) {
   return refusal([&](const fs::path& path) { (void)read_file(path, max_bytes); }, file);
 }
 
-TEST(ReadFile, ReturnsAllBytes) {
+TEST(ReadFile, ReturnsAllBytesUpToLimit) {
   const TemporaryFolder folder;
   for (const std::size_t bytes : {0U, 1U, 99U, 100U}) {
     const std::string content(bytes, '\0');
@@ -27,7 +27,7 @@ TEST(ReadFile, ReturnsAllBytes) {
   EXPECT_EQ(read_file(folder.file("a", large), large.size()), large);
 }
 
-TEST(ReadFile, RejectsFileAboveLimitWithoutReading) {
+TEST(ReadFile, RejectsFileLongerThanLimit) {
   const TemporaryFolder folder;
   const auto file = folder.file("a", std::string(101, 'x'));
   EXPECT_EQ(read_refusal(file), "a: is longer than 100 bytes: is it the right file?");
@@ -35,7 +35,7 @@ TEST(ReadFile, RejectsFileAboveLimitWithoutReading) {
   EXPECT_EQ(read_refusal(file, 5 << 20), "a: is longer than 5 MiB: is it the right file?");
 }
 
-TEST(ReadFile, RejectsOtherFileTypesWithoutWaiting) {
+TEST(ReadFile, RejectsPipesDevicesFoldersAndBrokenLinks) {
   const TemporaryFolder folder;
   ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
   fs::create_symlink("/dev/zero", folder / "device");
@@ -50,7 +50,7 @@ TEST(ReadFile, RejectsOtherFileTypesWithoutWaiting) {
   EXPECT_EQ(read_refusal(folder / "none"), "none: cannot be opened: No such file or directory");
 }
 
-TEST(ReadFile, ReadsStreamOfProcess) {
+TEST(ReadFile, ReadsPipeGivenAsDevFd) {
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
   const std::string name = "/dev/fd/" + std::to_string(ends[0]);
@@ -60,7 +60,7 @@ TEST(ReadFile, ReadsStreamOfProcess) {
   ::close(ends[0]);
 }
 
-TEST(ReadFile, RejectsLinkToStreamAmongDevices) {
+TEST(ReadFile, RejectsSymbolicLinkInDevShmToPipe) {
   const fs::path link = "/dev/shm/vlp-test-" + std::to_string(::getpid());
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
@@ -77,7 +77,7 @@ TEST(ReadFile, RejectsLinkToStreamAmongDevices) {
   ::close(ends[0]);
 }
 
-TEST(ReadFile, RejectsStreamAboveLimit) {
+TEST(ReadFile, RejectsPipeLongerThanLimit) {
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
   const std::string name = "/dev/fd/" + std::to_string(ends[0]);

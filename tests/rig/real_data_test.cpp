@@ -19,7 +19,7 @@ class RealFiles : public testing::Test {
   const std::filesystem::path data = VLP_REAL_DATA_DIR;
 };
 
-TEST_F(RealFiles, ReadLampMapReturnsLamps) {
+TEST_F(RealFiles, ReadLampFromYamlMapReturnsLampsOfRealMaps) {
   const LampMap log = read_lamp_map(data / "ceiling-lamps-log" / "lamps.yaml");
   ASSERT_EQ(log.lamps.size(), 8U);
   EXPECT_EQ(log.lamps[7].id, 8);
@@ -34,7 +34,7 @@ TEST_F(RealFiles, ReadLampMapReturnsLamps) {
   EXPECT_EQ(luxapose.lamps[3].duty, 0.5);
 }
 
-TEST_F(RealFiles, ReadBoardReturnsBoards) {
+TEST_F(RealFiles, ReadBoardReturnsRealBoards) {
   expect_same(read_board(data / "apriltag-lattice-phone" / "board.yaml"),
               {"tag36h11", 8, 5, 0.016, 1.0, 1, false, 1, {true, BoardCorner::top_left}});
   expect_same(read_board(data / "kalibr-aprilgrid-stereo" / "board.yaml"),

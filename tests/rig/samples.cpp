@@ -69,7 +69,8 @@ camera:
 )";
 
 LampMap sample_lamps() {
-  return {{{1, {0.5, -0.3, 2.1}, make_disc(0.18), 2000.0, 0.5}, {7, {-0.25, 0, 2.1}, {}, {}, {}}}};
+  return {{{1, {0.5, -0.3, 2.1}, make_disc_lamp_shape(0.18), 2000.0, 0.5},
+           {7, {-0.25, 0, 2.1}, {}, {}, {}}}};
 }
 
 Board sample_board() {

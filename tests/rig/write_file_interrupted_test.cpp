@@ -32,7 +32,7 @@ void become_nobody() {
   if (::geteuid() == 0 && ::setuid(65534) != 0) throw std::runtime_error("cannot change user");
 }
 
-TEST(WriteFileFailure, KeepsOldFileInReadOnlyFolder) {
+TEST(WriteFile, KeepsOldFileWhenFolderIsReadOnly) {
   const TemporaryFolder folder;
   const auto file = folder.file("a.yaml", kOld);
   fs::permissions(folder / "", fs::perms(0555));
@@ -46,7 +46,7 @@ TEST(WriteFileFailure, KeepsOldFileInReadOnlyFolder) {
   EXPECT_EQ(count_in(folder / ""), 1U);
 }
 
-TEST(WriteFileFailure, KeepsOldFileAfterPartialWrite) {
+TEST(WriteFile, KeepsOldFileWhenSizeLimitIsExceeded) {
   const TemporaryFolder folder;
   const auto file = folder.file("a.yaml", kOld);
   const std::string message = thrown_in_child([&] {
@@ -60,7 +60,7 @@ TEST(WriteFileFailure, KeepsOldFileAfterPartialWrite) {
   EXPECT_EQ(count_in(folder / ""), 1U);
 }
 
-TEST(WriteFileFailure, KeepsOldFileOnFullDisk) {
+TEST(WriteFile, KeepsOldFileWhenDiskIsFull) {
   const TemporaryFolder folder;
   const std::string cannot_mount = "cannot mount";
   const std::string message = thrown_in_child([&] {
@@ -84,7 +84,7 @@ TEST(WriteFileFailure, KeepsOldFileOnFullDisk) {
   EXPECT_THAT(message, HasSubstr("a.yaml: cannot be written: No space left on device; kept"));
 }
 
-TEST(ReadFile, RejectsUnreadableFile) {
+TEST(ReadLampMap, NamesFileWithoutReadPermission) {
   const TemporaryFolder folder;
   const auto file = folder.file("lamps.yaml", kLampsYaml);
   fs::permissions(file, fs::perms::none);
@@ -132,7 +132,7 @@ TEST(WriteFile, LeavesOldOrNewFileWhenKilled) {
   EXPECT_GT(count_in(folder / ""), 1U) << "no child was killed while it wrote";
 }
 
-TEST(WriteFile, LeavesOneCompleteContentFromManyThreads) {
+TEST(WriteFile, LeavesContentOfOneWriterWhenThreadsWriteConcurrently) {
   const TemporaryFolder folder;
   const auto file = folder.file("a.yaml", std::string(100'000, 'a'));
   const auto is_whole = [&] {

@@ -27,7 +27,7 @@ std::vector<std::string> names_in(const fs::path& folder) {
   return names;
 }
 
-TEST(WriteFile, ReplacesContent) {
+TEST(WriteFile, ReplacesWholeContentOfExistingFile) {
   const TemporaryFolder folder;
   const auto file = folder.file("a.yaml", "old content that is longer\n");
   write_file(file, "new\n");
@@ -106,14 +106,14 @@ mode_t mode_after_another_user(const TemporaryFolder& folder, const std::vector<
   return found.st_mode & 0777;
 }
 
-TEST(WriteFile, GivesNoPermissionsToOtherGroup) {
+TEST(WriteFile, RemovesGroupPermissionsWhenGroupCannotBeKept) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root acts as another user";
   const TemporaryFolder folder;
   EXPECT_EQ(mode_after_another_user(folder, {12346}), mode_t{0664});
   EXPECT_EQ(mode_after_another_user(folder, {}), mode_t{0604});
 }
 
-TEST(WriteFile, WritesToStreamOfProcess) {
+TEST(WriteFile, AppendsToStreamGivenAsDevFd) {
   const TemporaryFolder folder;
   const auto file = folder.file("log", "old\n");
   const int descriptor = ::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
@@ -124,7 +124,7 @@ TEST(WriteFile, WritesToStreamOfProcess) {
   EXPECT_EQ(folder.read_content(file), "old\nnew\nnewer\n");
 }
 
-TEST(WriteFile, AcceptsPathInCurrentFolder) {
+TEST(WriteFile, AcceptsFileNameWithoutFolder) {
   const TemporaryFolder folder;
   const fs::path before = fs::current_path();
   fs::current_path(folder / "");
@@ -133,7 +133,7 @@ TEST(WriteFile, AcceptsPathInCurrentFolder) {
   EXPECT_THAT(names_in(folder / ""), ElementsAre("a.yaml"));
 }
 
-TEST(WriteFile, AcceptsLongestName) {
+TEST(WriteFile, AcceptsNameOf255Characters) {
   const TemporaryFolder folder;
   const std::string name(255, 'x');
   write_file(folder / name, "new\n");
@@ -157,7 +157,7 @@ TEST(WriteFile, LeavesNoFileWhenWritingFails) {
   EXPECT_EQ(folder.read_content(file), "old\n");
 }
 
-TEST(WriteFile, FollowsSymbolicLinks) {
+TEST(WriteFile, ReplacesTargetOfSymbolicLink) {
   const TemporaryFolder folder;
   fs::create_directory(folder / "real");
   const auto file = folder.file("real/a.yaml", "old\n");
@@ -176,7 +176,7 @@ TEST(WriteFile, FollowsSymbolicLinks) {
   EXPECT_THAT(names_in(folder / "real"), ElementsAre("a.yaml"));
 }
 
-TEST(WriteFile, FollowsLinkToMissingFile) {
+TEST(WriteFile, CreatesMissingTargetOfSymbolicLink) {
   const TemporaryFolder folder;
   fs::create_directory(folder / "real");
   fs::create_symlink("real/new.yaml", folder / "link");
@@ -185,7 +185,7 @@ TEST(WriteFile, FollowsLinkToMissingFile) {
   EXPECT_EQ(folder.read_content(folder / "real/new.yaml"), "new\n");
 }
 
-TEST(WriteFile, RejectsLinkToItself) {
+TEST(WriteFile, RejectsCircularSymbolicLinks) {
   const TemporaryFolder folder;
   fs::create_symlink("b", folder / "a");
   fs::create_symlink("a", folder / "b");
@@ -193,14 +193,14 @@ TEST(WriteFile, RejectsLinkToItself) {
   EXPECT_TRUE(fs::is_symlink(folder / "a") && fs::is_symlink(folder / "b"));
 }
 
-TEST(WriteFile, WritesToDevicesDirectly) {
+TEST(WriteFile, DoesNotReplaceDeviceFiles) {
   write_file("/dev/null", "new\n");
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
   EXPECT_EQ(write_refusal("/dev/full"), "full: cannot be written: No space left on device");
   EXPECT_TRUE(fs::is_character_file("/dev/full"));
 }
 
-TEST(WriteFile, WritesToPipeDirectly) {
+TEST(WriteFile, WritesToNamedPipeWithoutReplacingIt) {
   const TemporaryFolder folder;
   const fs::path pipe = folder / "pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);

@@ -11,7 +11,7 @@ using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
 
-TEST(ReadYaml, RejectsOtherFormat) {
+TEST(ReadYamlFile, RejectsFileOfOtherFormat) {
   EXPECT_EQ(map_refusal(changed(kLampsYaml, "vlp-lamps/1", "vlp-lamps/2")),
             "lamps.yaml:1: format: should be 'vlp-lamps/1', not 'vlp-lamps/2': is it the right "
             "file?");
@@ -25,7 +25,7 @@ TEST(ReadYaml, RejectsOtherFormat) {
   EXPECT_THAT(refusal(read_calibration, lamps), HasSubstr("should be 'vlp-calibration/1', not "));
 }
 
-TEST(ReadYaml, RejectsOtherNodeType) {
+TEST(ReadYamlFile, RejectsDocumentThatIsNotOneMapping) {
   EXPECT_EQ(map_refusal("- 1\n"),
             "lamps.yaml:1: should be a mapping of keys to values, not a list");
   EXPECT_EQ(map_refusal("lamps\n"),
@@ -38,7 +38,7 @@ TEST(ReadYaml, RejectsOtherNodeType) {
             "lamps.yaml:2: a key should be a word");
 }
 
-TEST(ReadYaml, ReportsLineOfInvalidYaml) {
+TEST(ReadYamlFile, ReportsLineOfInvalidYaml) {
   const std::string head = "format: vlp-lamps/1\nlamps:\n";
   for (const std::string line : {"  - {id: 1]\n", "  - {id: 1\nx: 1\n", "  - %\n", "  - @\n",
                                  "  - *unknown\n", "  - a: b: c\n", "\t- {id: 1}\n"}) {
@@ -49,14 +49,14 @@ TEST(ReadYaml, ReportsLineOfInvalidYaml) {
               HasSubstr("(there are tabs: YAML is indented with spaces)"));
 }
 
-TEST(ReadYaml, RejectsAliases) {
+TEST(ReadYamlFile, RejectsAliases) {
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\nlamps:\n  - &lamp {id: 1, position_m: [0, 0, 2]}\n"
                         "  - *lamp\n"),
             "lamps.yaml:4: an alias (*) is not supported: write out the value");
   EXPECT_THAT(map_refusal("format: vlp-lamps/1\nlamps: &a [*a]\n"), HasSubstr(":2: an alias"));
 }
 
-TEST(ReadYaml, AcceptsWindowsLineEndsAndByteOrderMark) {
+TEST(ReadYamlFile, AcceptsWindowsLineEndingsAndByteOrderMark) {
   std::string windows = "\xEF\xBB\xBF";
   for (const char c : kLampsYaml) windows += c == '\n' ? std::string("\r\n") : std::string(1, c);
   const TemporaryFolder folder;
@@ -66,13 +66,13 @@ TEST(ReadYaml, AcceptsWindowsLineEndsAndByteOrderMark) {
             "lamps.yaml:4: lamps[1]: id 1 occurs twice");
 }
 
-TEST(ReadYaml, RejectsMissingFinalNewline) {
+TEST(ReadYamlFile, RejectsFileWithoutFinalNewline) {
   EXPECT_EQ(map_refusal(kLampsYaml.substr(0, kLampsYaml.size() - 1)),
             "lamps.yaml:4: the last line has no end: is the file cut short? If it is complete, end "
             "it with a newline");
 }
 
-TEST(ReadYaml, RejectsBinaryFile) {
+TEST(ReadYamlFile, RejectsEmptyBinaryOrNonUtf8File) {
   EXPECT_EQ(map_refusal(""), "lamps.yaml: is empty");
   EXPECT_EQ(map_refusal("\x89PNG\r\n\x1a\n"), "lamps.yaml:2: is not a text file");
   EXPECT_EQ(map_refusal(changed(kLampsYaml, "id: 7", std::string("id: 7\0", 6))),
@@ -90,7 +90,7 @@ TEST(ReadYaml, RejectsBinaryFile) {
             "");
 }
 
-TEST(ReadYaml, RejectsMissingFile) {
+TEST(ReadYamlFile, RejectsMissingFileAndFolder) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "folder.yaml");
   std::filesystem::create_symlink("folder/missing", folder / "dangling");
@@ -101,7 +101,7 @@ TEST(ReadYaml, RejectsMissingFile) {
   EXPECT_EQ(refusal(read_lamp_map, ""), ": " + missing);
 }
 
-TEST(ReadYaml, ReportsErrorInOneShortLine) {
+TEST(ReadYamlFile, ErrorIsOneLineOfFewerThan300Characters) {
   const auto refusal_of_lamp = [](const std::string& key) {
     return map_refusal("format: vlp-lamps/1\nlamps:\n  - {id: 1, position_m: [0, 0, 2], " + key +
                        "}\n");

@@ -8,7 +8,7 @@
 namespace vlp {
 namespace {
 
-TEST(NameApart, UsesPathsForEqualNames) {
+TEST(MakeAdjustSetNamesUnique, UsesPathsForEqualNames) {
   std::vector<AdjustSet> sets{{"check", {}, {}}, {"rotation", {}, {}}, {"check", {}, {}}};
   make_adjust_set_names_unique(sets, {"a/check", "a/rotation", "b/check"});
   EXPECT_EQ(sets[0].name, "a/check");

@@ -20,7 +20,7 @@ std::vector<CaptureError> errors_with(const std::vector<std::size_t>& indices) {
   return errors;
 }
 
-TEST(DescribePositionErrorOutliers, NamesRangesOfCaptures) {
+TEST(DescribePositionErrorOutliers, NamesConsecutiveCapturesAsRanges) {
   EXPECT_EQ(describe_position_error_outliers(errors_with({0, 1, 2, 3, 4})),
             "captures 100 to 104 have errors up to 52.0 mm, the others 0.05 mm: taken at other "
             "positions than those in their table, or by another camera");
@@ -40,7 +40,7 @@ TEST(DescribePositionErrorOutliers, EndsRangeAtCaptureWithoutError) {
   EXPECT_EQ(outliers.substr(0, outliers.find(" have")), "captures 100 to 102, 104, 105");
 }
 
-TEST(DescribePositionErrorOutliers, ReturnsEmptyWithoutGrossOutliers) {
+TEST(DescribePositionErrorOutliers, ReturnsEmptyTextWithoutGrossOutliers) {
   EXPECT_EQ(describe_position_error_outliers(errors_with({})), "");
   auto errors = errors_with({});
   errors[3].size = 0.004;
@@ -51,7 +51,7 @@ TEST(DescribePositionErrorOutliers, ReturnsEmptyWithoutGrossOutliers) {
       << "too few";
 }
 
-TEST(DescribeResidualOutliers, RequiresTwoCaptures) {
+TEST(DescribeResidualOutliers, NamesCapturesOnlyWhenAtLeastTwoAreOutliers) {
   std::vector<CaptureError> residuals;
   residuals.reserve(24);
   for (std::size_t i = 0; i < 24; ++i) residuals.push_back({std::to_string(100 + i), 0.02, i});

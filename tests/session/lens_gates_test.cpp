@@ -7,7 +7,7 @@
 namespace vlp {
 namespace {
 
-TEST(LensGates, PassUpToLimits) {
+TEST(MakeDefaultLensGates, GatesPassAtLimitsAndFailBeyond) {
   const std::vector<Metric> good{{"rms_px", 1},        {"expected_max_error_px", 2},
                                  {"split_half_px", 1}, {"coverage", 0.4},
                                  {"views", 6},         {"board_tilt_deg", 20}};
@@ -19,10 +19,10 @@ TEST(LensGates, PassUpToLimits) {
                                 {"views", 5},
                                 {"board_tilt_deg", 19}};
   for (const CheckedMetric& gate : check_gates(make_default_lens_gates(), bad))
-    EXPECT_FALSE(gate.has_passed());
+    EXPECT_FALSE(gate.has_passed_gate());
 }
 
-TEST(LensGates, FailWithoutSplitHalfDifference) {
+TEST(MakeDefaultLensGates, GatesFailWithoutSplitHalfDifference) {
   const std::vector<Metric> metrics{{"rms_px", 0.1},
                                     {"expected_max_error_px", 0.1},
                                     {"coverage", 1},

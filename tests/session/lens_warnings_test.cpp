@@ -28,21 +28,21 @@ LensInput views_with_edges(double shift_px) {
   return input;
 }
 
-TEST(RunLensStep, WarnsOfLargeEdgeDisplacement) {
-  EXPECT_THAT(run_lens_step(views_with_edges(0.3), {}).warnings, IsEmpty());
-  const LensResult result = run_lens_step(views_with_edges(0.6), {});
-  ASSERT_TRUE(result.ok()) << result.why;
+TEST(RunLensCalibrationStep, WarnsOfSixTenthsButNotThreeTenthsPixelEdgeDisplacement) {
+  EXPECT_THAT(run_lens_calibration_step(views_with_edges(0.3), {}).warnings, IsEmpty());
+  const LensResult result = run_lens_calibration_step(views_with_edges(0.6), {});
+  ASSERT_TRUE(result.has_succeeded()) << result.why;
   EXPECT_THAT(result.warnings, Contains(HasSubstr("0.60 px towards the dark")));
   EXPECT_THAT(result.warnings, Contains(HasSubstr("is tag_spacing of board.yaml right?")));
 }
 
-TEST(RunLensStep, WarnsWhenNoViewIsHeldOut) {
+TEST(RunLensCalibrationStep, WarnsWhenViewsAreTooFewToHoldOut) {
   LensInput input = views_with_edges(0);
   input.held_out = 30;
-  EXPECT_THAT(run_lens_step(input, {}).warnings,
+  EXPECT_THAT(run_lens_calibration_step(input, {}).warnings,
               Contains("no view is held out: 20 views are fewer than 30"));
   input.held_out = 10;
-  EXPECT_THAT(run_lens_step(input, {}).warnings, IsEmpty());
+  EXPECT_THAT(run_lens_calibration_step(input, {}).warnings, IsEmpty());
 }
 
 }  // namespace

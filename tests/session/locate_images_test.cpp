@@ -44,7 +44,7 @@ class LeaningRig {
 
  private:
   double off_rad(const Eigen::Matrix3d& level) const {
-    const Eigen::Vector3d up = level_from_inclination(lean_).row(2);
+    const Eigen::Vector3d up = level_rotation_from_inclination(lean_).row(2);
     return std::acos(std::min(1.0, up.dot(level.row(2))));
   }
   std::vector<Detection> seen_in(const std::optional<Eigen::Matrix3d>& level) const {
@@ -60,15 +60,15 @@ class LeaningRig {
 };
 
 double error_m(const LocateInput& input) {
-  const LocateResult found = locate_camera_in_frames(input);
-  return found.ok() ? found.rows[0].fix->pose.position_m.norm() : 1;
+  const LocateResult found = locate_camera_from_frames(input);
+  return found.has_succeeded() ? found.rows[0].fix->pose.position_m.norm() : 1;
 }
 
-TEST(RedetectTilted, RepeatsUntilConvergence) {
+TEST(RedetectLampsOfTiltedCaptures, ReducesPositionErrorBelow100MicrometersForUnknownTilt) {
   LeaningRig rig;
   LocateInput input = rig.input(1.6);
   EXPECT_GT(error_m(input), 0.01);
-  const LevelRotations levels = redetect_tilted_captures(input, rig.redetector());
+  const LevelRotations levels = redetect_lamps_of_tilted_captures(input, rig.redetector());
   EXPECT_LT(error_m(input), 1e-4);
   ASSERT_EQ(levels.size(), 1U);
   EXPECT_TRUE(levels.at("a"));
@@ -78,24 +78,24 @@ TEST(RedetectTilted, RepeatsUntilConvergence) {
   EXPECT_LT(rig.looks.back(), 0.01);
 }
 
-TEST(RedetectTilted, SkipsCapturesWithGivenInclination) {
+TEST(RedetectLampsOfTiltedCaptures, SkipsCapturesOnlyWhenInclinationIsExact) {
   LeaningRig rig;
   LocateInput input = rig.input(0);
   input.captures["a"].inclination = Inclination{rad_from_deg(16), rad_from_deg(-12)};
   const double before_m = error_m(input);
-  EXPECT_THAT(redetect_tilted_captures(input, rig.redetector()), IsEmpty());
+  EXPECT_THAT(redetect_lamps_of_tilted_captures(input, rig.redetector()), IsEmpty());
   EXPECT_THAT(rig.looks, IsEmpty());
   EXPECT_EQ(error_m(input), before_m);
   input.inclination_sigma_rad = rad_from_deg(0.5);
-  redetect_tilted_captures(input, rig.redetector());
+  redetect_lamps_of_tilted_captures(input, rig.redetector());
   EXPECT_LT(error_m(input), 1e-4) << "but for a sensor that is not exact";
 }
 
-TEST(RedetectTilted, KeepsDetectionWithMoreLampsWithoutFix) {
+TEST(RedetectLampsOfTiltedCaptures, KeepsDetectionsWithMoreLampsWhenFixFails) {
   LeaningRig rig;
   rig.shown_by_ellipses_alone = true;
   LocateInput input = rig.input(1.6);
-  const LevelRotations levels = redetect_tilted_captures(input, rig.redetector());
+  const LevelRotations levels = redetect_lamps_of_tilted_captures(input, rig.redetector());
   EXPECT_THAT(rig.looks, ElementsAre(-1));
   EXPECT_EQ(input.frames[0].detections.size(), 2U);
   ASSERT_EQ(levels.size(), 1U);

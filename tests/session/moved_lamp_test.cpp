@@ -48,22 +48,26 @@ class MovedLamp : public testing::Test {
     }
   }
 
-  StepResult rotate() const { return run_rotation_step(rotation, RotationMethod::axis, {}); }
+  StepResult rotate() const {
+    return run_rotation_calibration_step(rotation, RotationMethod::axis, {});
+  }
   StepResult disperse() const {
     KnownPositions places;
     for (const Frame& frame : dispersion.frames) {
       places.captures.push_back({frame.detections, {0, 0}});
       places.of.push_back(PlaceOf::camera);
     }
-    return run_dispersion_step(dispersion, places, DispersionMethod::camera, DispersionCircle::mean,
-                               {});
+    return run_dispersion_calibration_step(dispersion, places, DispersionMethod::camera,
+                                           DispersionCircle::mean, {});
   }
-  StepResult level() const { return run_tilt_step({check, map, kFile, camera}, false, {}); }
+  StepResult level() const {
+    return run_tilt_calibration_step({check, map, kFile, camera}, false, {});
+  }
   StepResult locate() const {
-    return locate_camera_in_frames({check, map, dispersion.calibration});
+    return locate_camera_from_frames({check, map, dispersion.calibration});
   }
   StepResult adjust() const {
-    return run_adjustment_step(
+    return run_joint_adjustment_step(
         {{{"check", check, {}}}, map, kFile, camera, "camera.yaml", 1e-3, {}}, {});
   }
 
@@ -87,11 +91,11 @@ class MovedLamp : public testing::Test {
 /// Returns the warnings and, of a step that failed, the reason.
 std::vector<std::string> collect_lines(const StepResult& result) {
   std::vector<std::string> lines = result.warnings;
-  if (!result.ok()) lines.push_back(format_failure_message(result));
+  if (!result.has_succeeded()) lines.push_back(format_failure_message(result));
   return lines;
 }
 
-TEST_F(MovedLamp, IsReportedIdenticallyByAllSteps) {
+TEST_F(MovedLamp, AllStepsNameLampAndDisplacementOnce) {
   take_captures({-0.018, 0.024});
   const auto names_it = HasSubstr(
       "lamp 2 hangs 30 mm from where the map has it (x -18 mm, y +24 mm): moved, or entered "
@@ -107,7 +111,7 @@ TEST_F(MovedLamp, IsReportedIdenticallyByAllSteps) {
   }
 }
 
-TEST_F(MovedLamp, IsReportedAsCauseOfFailedDispersion) {
+TEST_F(MovedLamp, DispersionStepFailsWithMovedLampAsCause) {
   take_captures({0.03, 0});
   const StepResult result = disperse();
   EXPECT_EQ(result.failure, StepFailure::wrong_map);
@@ -115,17 +119,17 @@ TEST_F(MovedLamp, IsReportedAsCauseOfFailedDispersion) {
               testing::StartsWith("lamps.yaml: lamp 2 hangs 30 mm from where the map has it"));
 }
 
-TEST_F(MovedLamp, IsNotReportedForCorrectMap) {
+TEST_F(MovedLamp, NoStepWarnsOfLampWhenMapIsCorrect) {
   take_captures({0, 0});
   for (const StepResult& result : {rotate(), disperse(), level(), locate(), adjust()}) {
-    EXPECT_TRUE(result.ok()) << result.why;
+    EXPECT_TRUE(result.has_succeeded()) << result.why;
     EXPECT_THAT(result.warnings, Each(Not(HasSubstr("lamp "))));
   }
 }
 
 /// Captures of a large room tie few of its lamps together. The captures that fit a mirrored map by
 /// chance must not pass for all.
-TEST(RunTiltStep, FailsWhenMostCapturesContradictMap) {
+TEST(RunTiltCalibrationStep, FailsWithWrongMapForMirroredMapOfLargeRoom) {
   constexpr int rows = 10;
   constexpr double distance_m = 1.2, height_m = 2.5, focal_px = 520, noise_px = 0.05;
   LampCaptures input{{}, {}, "lamps.yaml", {}};
@@ -154,9 +158,9 @@ TEST(RunTiltStep, FailsWhenMostCapturesContradictMap) {
     }
     input.frames.push_back(frame);
   }
-  EXPECT_TRUE(run_tilt_step(input, false, {}).ok());
+  EXPECT_TRUE(run_tilt_calibration_step(input, false, {}).has_succeeded());
   for (Lamp& lamp : input.lamps.lamps) lamp.position_m.y() *= -1;
-  const TiltResult result = run_tilt_step(input, false, {});
+  const TiltResult result = run_tilt_calibration_step(input, false, {});
   EXPECT_EQ(result.failure, StepFailure::wrong_map) << result.why;
 }
 

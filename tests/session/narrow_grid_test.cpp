@@ -27,12 +27,12 @@ LensResult solve_with_grid(const SplineGrid& grid) {
     input.seen.images.push_back(
         observed({std::to_string(input.seen.images.size()) + ".png", kWideImager, seen}));
   }
-  return run_lens_step(input, {});
+  return run_lens_calibration_step(input, {});
 }
 
-TEST(RunLensStepNarrowGrid, ProposesWiderSplineGrid) {
+TEST(RunLensCalibrationStep, ProposesWiderSplineGridWhenGridIsTooNarrow) {
   const LensResult result = solve_with_grid({3, 12, 12, 100});
-  ASSERT_FALSE(result.ok());
+  ASSERT_FALSE(result.has_succeeded());
   EXPECT_THAT(
       result.why,
       HasSubstr(
@@ -42,15 +42,15 @@ TEST(RunLensStepNarrowGrid, ProposesWiderSplineGrid) {
               HasSubstr(": use --lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny="));
 }
 
-TEST(RunLensStepNarrowGrid, ProposesMoreRowsForVerticalField) {
+TEST(RunLensCalibrationStep, ProposesMoreGridRowsForVerticalFieldOfView) {
   const LensResult result = solve_with_grid({3, 12, 5, 230});
-  ASSERT_FALSE(result.ok());
+  ASSERT_FALSE(result.has_succeeded());
   EXPECT_THAT(result.why,
               testing::ContainsRegex(
                   "use --lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny=10_fov_x_deg=230"));
 }
 
-TEST(RunLensStepWideGrid, FailsWithProposedGrid) {
+TEST(RunLensCalibrationStep, ProposesSolvableGridWhenGridIsTooWide) {
   constexpr std::size_t count = 12;
   constexpr double noise_px = 0.02;
   Random random(62);
@@ -60,13 +60,13 @@ TEST(RunLensStepWideGrid, FailsWithProposedGrid) {
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::off};
   while (input.seen.images.size() < count) {
     const BoardDetection seen = views.random_view(random, noise_px);
-    if (!lattice.has_sufficient_corners(seen)) continue;
+    if (!lattice.are_corners_sufficient_for_pose(seen)) continue;
     input.seen.images.push_back(
         observed({std::to_string(input.seen.images.size()) + ".png", views.imager_px, seen}));
   }
   input.camera.lens_model = lens_model_for_spline_grid({3, 10, 10, 350});
-  const LensResult result = run_lens_step(input, {});
-  ASSERT_FALSE(result.ok());
+  const LensResult result = run_lens_calibration_step(input, {});
+  ASSERT_FALSE(result.has_succeeded());
   const std::string take =
       " do not cover the field of view, 5 degrees off axis horizontally and 4 vertically: use "
       "--lens ";
@@ -75,7 +75,7 @@ TEST(RunLensStepWideGrid, FailsWithProposedGrid) {
   const auto model = lens_model_from_name(result.why.substr(result.why.find(take) + take.size()));
   ASSERT_TRUE(model) << result.why;
   input.camera.lens_model = *model;
-  EXPECT_TRUE(run_lens_step(input, {}).ok());
+  EXPECT_TRUE(run_lens_calibration_step(input, {}).has_succeeded());
 }
 
 }  // namespace

@@ -53,10 +53,11 @@ Observation observe(const LampMap& map, const std::vector<double>& deviations, b
   return image;
 }
 
-TEST(CheckRowTime, ReportsRowTimeErrorOf5Percent) {
+TEST(CheckRowTimeAgainstLamps, ReportsMeasuredRowTimeWhenGivenIs5PercentOff) {
   const LampMap map = make_map();
   const std::vector<Observation> images(4, observe(map, {0, 0, 0, 0, 0}, true));
-  const RowTimeCheck check = check_row_time(images, map, {1.9e-5, "camera_type.yaml"});
+  const RowTimeCheck check =
+      check_row_time_against_lamps(images, map, {1.9e-5, "camera_type.yaml"});
   ASSERT_TRUE(check.measured);
   EXPECT_EQ(check.measured->lamps, 5);
   EXPECT_NEAR(check.measured->row_time_s, kTrueRowTime_s, 1e-9);
@@ -69,7 +70,7 @@ TEST(CheckRowTime, ReportsRowTimeErrorOf5Percent) {
   EXPECT_NEAR(*find_metric_value(metrics, "row_time_sd_us"), 0.01, 0.005);
 }
 
-TEST(CheckRowTime, AcceptsLampsWithinDrift) {
+TEST(CheckRowTimeAgainstLamps, ReportsNoErrorForFrequenciesWithinLampDrift) {
   const LampMap map = make_map();
   Random random(1);
   constexpr int trials = 500;
@@ -80,29 +81,31 @@ TEST(CheckRowTime, AcceptsLampsWithinDrift) {
     for (double& deviation : deviations) deviation = kLampDrift * random.uniform(-1, 1);
     if (trial % 2 == 0) deviations.assign(map.lamps.size(), kLampDrift * (trial % 4 == 0 ? 1 : -1));
     const std::vector<Observation> images(4, observe(map, deviations, true));
-    const RowTimeCheck check = check_row_time(images, map, {kTrueRowTime_s, "camera_type.yaml"});
+    const RowTimeCheck check =
+        check_row_time_against_lamps(images, map, {kTrueRowTime_s, "camera_type.yaml"});
     measured += check.measured ? 1 : 0;
     EXPECT_EQ(check.error, "") << trial;
   }
   EXPECT_EQ(measured, trials);
 }
 
-TEST(CheckRowTime, ReturnsNulloptForTwoLamps) {
+TEST(CheckRowTimeAgainstLamps, MeasuresNoRowTimeFromTwoLamps) {
   LampMap map = make_map();
   map.lamps.resize(2);
   const std::vector<Observation> images(4, observe(map, {0, 0}, true));
-  const RowTimeCheck check = check_row_time(images, map, {1.9e-5, "camera_type.yaml"});
+  const RowTimeCheck check =
+      check_row_time_against_lamps(images, map, {1.9e-5, "camera_type.yaml"});
   EXPECT_FALSE(check.measured);
   EXPECT_EQ(check.error, "");
 }
 
-TEST(DescribeOtherRowTime, ReportsRowTimeThatIdentifiesNoLamp) {
+TEST(DescribeAlternativeRowTime, NamesWrongRowTimeWithWhichNoLampIsIdentified) {
   const LampMap map = make_map();
   const std::vector<Observation> images(4, observe(map, {0, 0, 0, 0, 0}, false));
-  EXPECT_THAT(describe_other_row_time(images, map, std::nullopt, {2.2e-5, "camera.yaml"}),
+  EXPECT_THAT(describe_alternative_row_time(images, map, std::nullopt, {2.2e-5, "camera.yaml"}),
               HasSubstr("row time is 22 us in camera.yaml, but the stripes of 5 lamps measure"));
-  EXPECT_EQ(describe_other_row_time(images, map, std::nullopt, {2e-5, "camera.yaml"}), "");
-  EXPECT_EQ(describe_other_row_time({}, map, std::nullopt, {2.2e-5, "camera.yaml"}), "");
+  EXPECT_EQ(describe_alternative_row_time(images, map, std::nullopt, {2e-5, "camera.yaml"}), "");
+  EXPECT_EQ(describe_alternative_row_time({}, map, std::nullopt, {2.2e-5, "camera.yaml"}), "");
 }
 
 }  // namespace

@@ -23,11 +23,11 @@ StepResult sample() {
   result.skipped = {{"a.png", "is empty"}};
   result.rejected_lamps = {{2, 12}};
   result.lamp_offsets = {{3, 12, {-0.6, 0.3}, {1e-3, -2e-3}, {1e-4, 2e-4}}};
-  result.set_failure(StepFailure::wrong_map, "seem to be swapped", "lamps.yaml");
+  result.set_step_failure(StepFailure::wrong_map, "seem to be swapped", "lamps.yaml");
   return result;
 }
 
-TEST(StepFile, RoundTripIsExact) {
+TEST(WriteStepRecord, RoundTripsAllFields) {
   const TemporaryFolder folder;
   write_step_record(folder / "s.json", {"key", "outputs", sample()});
   const auto kept = read_step_record(folder / "s.json");
@@ -51,10 +51,10 @@ TEST(StepFile, RoundTripIsExact) {
   EXPECT_EQ(format_failure_message(result), "lamps.yaml: seem to be swapped");
 }
 
-TEST(StepFile, MatchesSchema) {
+TEST(WriteStepRecord, MatchesJsonSchemaForEachFailure) {
   const TemporaryFolder folder;
   std::vector<std::filesystem::path> files;
-  for (int failure = 0; !to_string(static_cast<StepFailure>(failure)).empty(); ++failure) {
+  for (int failure = 0; !step_failure_name(static_cast<StepFailure>(failure)).empty(); ++failure) {
     StepResult result = sample();
     result.failure = static_cast<StepFailure>(failure);
     files.push_back(folder / (std::to_string(failure) + ".json"));
@@ -64,7 +64,7 @@ TEST(StepFile, MatchesSchema) {
   EXPECT_EQ(problems_by_schema("step", files), "");
 }
 
-TEST(ReadStep, ReturnsNulloptForTruncatedFileOrOtherVersion) {
+TEST(ReadStepRecord, ReturnsNulloptForMissingTruncatedOrOtherVersion) {
   const TemporaryFolder folder;
   EXPECT_FALSE(read_step_record(folder / "none.json"));
   write_step_record(folder / "s.json", {"key", "outputs", sample()});
@@ -77,11 +77,11 @@ TEST(ReadStep, ReturnsNulloptForTruncatedFileOrOtherVersion) {
   EXPECT_FALSE(read_step_record(folder.file("other.json", other)));
 }
 
-TEST(StepFailure, HasNameForEachEnumerator) {
+TEST(StepFailureFromName, InvertsToStringForEachValue) {
   for (const auto failure :
        {StepFailure::none, StepFailure::bad_input, StepFailure::undetermined,
         StepFailure::wrong_board, StepFailure::wrong_map, StepFailure::wrong_place}) {
-    EXPECT_EQ(step_failure_from_name(to_string(failure)), failure);
+    EXPECT_EQ(step_failure_from_name(step_failure_name(failure)), failure);
   }
   EXPECT_FALSE(step_failure_from_name("odd"));
 }

@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using testing::SizeIs;
 
-TEST(CapturesIn, PrefersTruthToCaptures) {
+TEST(ReadCapturesWithTruth, PrefersTruthTableToCapturesTable) {
   const TemporaryFolder folder;
   EXPECT_THAT(read_captures_with_truth(folder / ""), SizeIs(0));
   folder.file("captures.csv",
@@ -32,14 +32,14 @@ TEST(CapturesIn, PrefersTruthToCaptures) {
   EXPECT_FALSE(captures.at("c.png").inclination);
 }
 
-TEST(CapturesIn, NamesLineOfInvalidTable) {
+TEST(ReadCapturesWithTruth, NamesLineOfInvalidTable) {
   const TemporaryFolder folder;
   folder.file("captures.csv", "image,x_m,y_m\na.png,1,2\nb.png,1");
   EXPECT_THAT(rejection_message([&] { read_captures_with_truth(folder / ""); }),
               HasSubstr("captures.csv:3"));
 }
 
-TEST(TruthFile, ReturnsTruthOrCapturesWithPlaces) {
+TEST(FindTruthFile, PrefersTruthTableToCapturesTableWithPositions) {
   const TemporaryFolder folder;
   EXPECT_FALSE(find_truth_file(folder / ""));
   folder.file("captures.csv", "image,time_s\na.png,1\n");
@@ -50,7 +50,7 @@ TEST(TruthFile, ReturnsTruthOrCapturesWithPlaces) {
   EXPECT_EQ(find_truth_file(folder / "")->filename(), "truth.csv");
 }
 
-TEST(TruthIn, ReadsPlacesOfCaptures) {
+TEST(ReadTruthPositions, ReadsPositionsOfTruthElseOfCapturesTable) {
   const TemporaryFolder folder;
   folder.file("captures.csv", "image,x_m,y_m\nb.png,3,4\na.png,1,2\nc.png,,\n");
   const auto places = read_truth_positions(folder / "");
@@ -61,7 +61,7 @@ TEST(TruthIn, ReadsPlacesOfCaptures) {
   EXPECT_EQ(read_truth_positions(folder / "")[0].image, "d.png");
 }
 
-TEST(SessionFolder, NamesMissingFile) {
+TEST(SessionFolder, ConstructorNamesMissingFileOrFolder) {
   const TemporaryFolder folder;
   const auto refusal = [&] { return rejection_message([&] { SessionFolder(folder / "unit"); }); };
   EXPECT_THAT(refusal(), HasSubstr("unit: is not a folder of captures"));
@@ -75,11 +75,11 @@ TEST(SessionFolder, NamesMissingFile) {
   EXPECT_THAT(refusal(), HasSubstr("unit/board.yaml: is missing"));
   folder.file("unit/camera.yaml", "\n");
   const SessionFolder known(folder / "unit");
-  EXPECT_TRUE(known.camera_file());
-  EXPECT_FALSE(known.check());
+  EXPECT_TRUE(known.camera_calibration_file());
+  EXPECT_FALSE(known.check_captures_folder());
 }
 
-TEST(SessionFolder, FindsDrivesWithPlaces) {
+TEST(SessionFolder, LineDriveFoldersAreThoseWithPositions) {
   const TemporaryFolder folder;
   for (const char* name : {"unit/rotation", "unit/line-y", "unit/line-x", "unit/line-z"}) {
     fs::create_directories(folder / name);
@@ -93,12 +93,12 @@ TEST(SessionFolder, FindsDrivesWithPlaces) {
   ASSERT_THAT(lines, SizeIs(2));
   EXPECT_EQ(lines[0].filename(), "line-x");
   EXPECT_EQ(lines[1].filename(), "line-y");
-  EXPECT_TRUE(is_captures_folder(folder / "unit", folder / "unit"));
-  EXPECT_TRUE(is_captures_folder(folder / "unit", folder / "unit/line-x"));
-  EXPECT_FALSE(is_captures_folder(folder / "unit", folder / "unit/results"));
+  EXPECT_TRUE(is_session_or_captures_folder(folder / "unit", folder / "unit"));
+  EXPECT_TRUE(is_session_or_captures_folder(folder / "unit", folder / "unit/line-x"));
+  EXPECT_FALSE(is_session_or_captures_folder(folder / "unit", folder / "unit/results"));
 }
 
-TEST(EndsOf, ReturnsFirstAndLastPlace) {
+TEST(FindEndPointsOfDrive, ReturnsFirstAndLastPosition) {
   const std::vector<TruthRow> drive{
       {"a", {0, 1}, {}, {}}, {"b", {2, 1}, {}, {}}, {"c", {3, 1}, {}, {}}};
   EXPECT_EQ(find_end_points_of_drive("t.csv", drive)[1].x(), 3);

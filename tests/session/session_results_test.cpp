@@ -18,57 +18,57 @@ class SessionResultsTest : public testing::Test {
  protected:
   /// A folder in which lens and rotation have ended, with an output each.
   void keep_two_steps(SessionResults& cached_result) const {
-    cached_result.plan_steps(kPlan);
+    cached_result.set_steps_and_remove_stale_files(kPlan);
     folder.file("results/lens.yaml", "lens");
-    cached_result.store_result("lens", "key of the lens", StepResult());
+    cached_result.store_step_result("lens", "key of the lens", StepResult());
     folder.file("results/rotated.yaml", "rotated");
-    cached_result.store_result("rotation", "key of the rotation", StepResult());
+    cached_result.store_step_result("rotation", "key of the rotation", StepResult());
   }
   const std::vector<StepOutputs> kPlan{{"lens", {"lens.yaml"}}, {"rotation", {"rotated.yaml"}}};
   const TemporaryFolder folder;
   const fs::path results = folder / "results", session = folder / "session";
 };
 
-TEST_F(SessionResultsTest, KeepsStepsWithUnchangedInputsAndOutputs) {
+TEST_F(SessionResultsTest, ReturnsCachedResultOnlyForUnchangedKeyAndOutputs) {
   SessionResults cached_result(results, session);
-  EXPECT_FALSE(cached_result.find_cached_result("lens", "key of the lens"));
+  EXPECT_FALSE(cached_result.find_cached_step_result("lens", "key of the lens"));
   keep_two_steps(cached_result);
-  EXPECT_TRUE(cached_result.find_cached_result("lens", "key of the lens"));
-  EXPECT_FALSE(cached_result.find_cached_result("lens", "another key"));
+  EXPECT_TRUE(cached_result.find_cached_step_result("lens", "key of the lens"));
+  EXPECT_FALSE(cached_result.find_cached_step_result("lens", "another key"));
   folder.file("results/lens.yaml", "changed");
-  EXPECT_FALSE(cached_result.find_cached_result("lens", "key of the lens"));
-  EXPECT_TRUE(cached_result.find_cached_result("rotation", "key of the rotation"));
+  EXPECT_FALSE(cached_result.find_cached_step_result("lens", "key of the lens"));
+  EXPECT_TRUE(cached_result.find_cached_step_result("rotation", "key of the rotation"));
   fs::remove(results / "rotated.yaml");
-  EXPECT_FALSE(cached_result.find_cached_result("rotation", "key of the rotation"));
+  EXPECT_FALSE(cached_result.find_cached_step_result("rotation", "key of the rotation"));
 }
 
-TEST_F(SessionResultsTest, RepeatsStepAfterBadInput) {
+TEST_F(SessionResultsTest, CachesUndeterminedResultButNotBadInput) {
   SessionResults cached_result(results, session);
-  cached_result.plan_steps(kPlan);
+  cached_result.set_steps_and_remove_stale_files(kPlan);
   StepResult bad, undetermined;
-  bad.set_failure(StepFailure::bad_input, "cut");
-  undetermined.set_failure(StepFailure::undetermined, "too few");
-  cached_result.store_result("lens", "key", bad);
-  EXPECT_FALSE(cached_result.find_cached_result("lens", "key"));
-  cached_result.store_result("lens", "key", undetermined);
-  ASSERT_TRUE(cached_result.find_cached_result("lens", "key"));
-  EXPECT_EQ(cached_result.find_cached_result("lens", "key")->why, "too few");
+  bad.set_step_failure(StepFailure::bad_input, "cut");
+  undetermined.set_step_failure(StepFailure::undetermined, "too few");
+  cached_result.store_step_result("lens", "key", bad);
+  EXPECT_FALSE(cached_result.find_cached_step_result("lens", "key"));
+  cached_result.store_step_result("lens", "key", undetermined);
+  ASSERT_TRUE(cached_result.find_cached_step_result("lens", "key"));
+  EXPECT_EQ(cached_result.find_cached_step_result("lens", "key")->why, "too few");
 }
 
-TEST_F(SessionResultsTest, RemovesOutputsOfEarlierRuns) {
+TEST_F(SessionResultsTest, SetStepsAndRemoveStaleFilesRemovesOutputsOfStepsNotPlanned) {
   {
     SessionResults before(results, session);
     keep_two_steps(before);
     std::vector<StepOutputs> with_drive = kPlan;
     with_drive.push_back({"line-x", {"line-x-fixes.csv"}});
-    before.plan_steps(with_drive);
+    before.set_steps_and_remove_stale_files(with_drive);
     folder.file("results/line-x-fixes.csv", "of a drive");
-    before.store_result("line-x", "key", StepResult());
+    before.store_step_result("line-x", "key", StepResult());
     folder.file("results/mine.txt", "of somebody");
   }
   SessionResults now(results, session);
-  now.plan_steps({{"lens", {"lens.yaml"}}});
-  EXPECT_TRUE(now.find_cached_result("lens", "key of the lens"));
+  now.set_steps_and_remove_stale_files({{"lens", {"lens.yaml"}}});
+  EXPECT_TRUE(now.find_cached_step_result("lens", "key of the lens"));
   EXPECT_FALSE(fs::exists(results / "rotated.yaml"));
   EXPECT_FALSE(fs::exists(results / "steps/rotation.json"));
   EXPECT_FALSE(fs::exists(results / "line-x-fixes.csv"));
@@ -76,15 +76,15 @@ TEST_F(SessionResultsTest, RemovesOutputsOfEarlierRuns) {
   EXPECT_TRUE(fs::exists(results / "mine.txt"));
 }
 
-TEST_F(SessionResultsTest, KeepsForeignFiles) {
+TEST_F(SessionResultsTest, KeepsForeignFilesAndRejectsThemAsOutputs) {
   fs::create_directories(results / "steps");
   const std::vector<std::string> mine{"line-a-fixes.csv", "steps/mine.json", "steps/line-a.json"};
   for (const std::string& name : mine) folder.file("results/" + name, "mine");
   {
     SessionResults first(results, session);
-    first.plan_steps(kPlan);
+    first.set_steps_and_remove_stale_files(kPlan);
     folder.file("results/lens.svg", "mine, beside results");
-    first.plan_steps(kPlan);
+    first.set_steps_and_remove_stale_files(kPlan);
     first.remove_evaluation_outputs();
     first.remove_outputs_of_all_steps();
   }
@@ -95,23 +95,23 @@ TEST_F(SessionResultsTest, KeepsForeignFiles) {
   SessionResults next(results, session);
   EXPECT_THAT(
       [&] {
-        next.plan_steps({{"lens", {"lens.yaml", "lens.svg"}}});
+        next.set_steps_and_remove_stale_files({{"lens", {"lens.yaml", "lens.svg"}}});
       },
       ThrowsMessage<InputError>(HasSubstr("holds lens.svg, which is not of vlp-calibrate")));
 }
 
-TEST_F(SessionResultsTest, ForgedListRemovesNothingOutside) {
+TEST_F(SessionResultsTest, RemovesNoFileOutsideResultsFolderByForgedList) {
   folder.file("outside.txt", "mine");
   { const SessionResults taken(results, session); }
   folder.file("results/steps/outputs", "../outside.txt\nsteps/../../outside.txt\n" +
                                            (folder / "outside.txt").string() + "\n..\n");
   SessionResults taken(results, session);
-  taken.plan_steps(kPlan);
+  taken.set_steps_and_remove_stale_files(kPlan);
   taken.remove_outputs_of_all_steps();
   EXPECT_TRUE(fs::exists(folder / "outside.txt"));
 }
 
-TEST_F(SessionResultsTest, RemovesOnlyOutputsOfRunsByForeignList) {
+TEST_F(SessionResultsTest, RemovesOnlyKnownOutputNamesByForgedList) {
   { const SessionResults taken(results, session); }
   folder.file("results/mine.txt", "mine");
   folder.file("results/line-x", "mine");
@@ -128,89 +128,89 @@ TEST_F(SessionResultsTest, RemovesOnlyOutputsOfRunsByForeignList) {
   }
 }
 
-TEST_F(SessionResultsTest, KeepsOutputsThatCannotBeRemovedInList) {
+TEST_F(SessionResultsTest, KeepsListingOutputsThatCouldNotBeRemoved) {
   const std::vector<StepOutputs> with_picture{{"lens", {"lens.yaml", "lens.svg"}}};
   {
     SessionResults before(results, session);
-    before.plan_steps(with_picture);
+    before.set_steps_and_remove_stale_files(with_picture);
     fs::create_directories(results / "lens.svg/full");  // cannot be removed, even by root
-    before.plan_steps(kPlan);
+    before.set_steps_and_remove_stale_files(kPlan);
   }
   fs::remove_all(results / "lens.svg");
   folder.file("results/lens.svg", "of a run");
   SessionResults now(results, session);
-  EXPECT_NO_THROW(now.plan_steps(with_picture));
+  EXPECT_NO_THROW(now.set_steps_and_remove_stale_files(with_picture));
   EXPECT_TRUE(fs::exists(results / "lens.svg"));
-  now.plan_steps(kPlan);
+  now.set_steps_and_remove_stale_files(kPlan);
   EXPECT_FALSE(fs::exists(results / "lens.svg"));
 }
 
-TEST_F(SessionResultsTest, ResumesInterruptedResultsOfEarlierVersion) {
+TEST_F(SessionResultsTest, SetStepsAndRemoveStaleFilesAcceptsPlannedOutputsWithoutOutputList) {
   { const SessionResults taken(results, session); }
   fs::remove(results / "steps/outputs");
   folder.file("results/line-x-fixes.csv", "of a drive whose step is not recorded");
   folder.file("results/steps/line-x.json", "cannot be read");
   folder.file("results/line-y-fixes.csv", "of no drive of the session");
   SessionResults now(results, session);
-  EXPECT_NO_THROW(now.plan_steps({{"line-x", {"line-x-fixes.csv"}}}));
+  EXPECT_NO_THROW(now.set_steps_and_remove_stale_files({{"line-x", {"line-x-fixes.csv"}}}));
   EXPECT_TRUE(fs::exists(results / "line-x-fixes.csv"));
   EXPECT_TRUE(fs::exists(results / "line-y-fixes.csv"));
 }
 
-TEST_F(SessionResultsTest, AcceptsDrivesWithLongestNames) {
+TEST_F(SessionResultsTest, RemovesOutputsOfDrivesWithLongNames) {
   const std::string drive = "line-" + std::string(195, 'x'), fixes = drive + "-fixes.csv";
   {
     SessionResults before(results, session);
-    before.plan_steps({{drive, {fixes}}});
+    before.set_steps_and_remove_stale_files({{drive, {fixes}}});
     folder.file("results/" + fixes, "of a drive");
   }
   SessionResults now(results, session);
-  EXPECT_NO_THROW(now.plan_steps({{drive, {fixes}}}));
-  now.plan_steps(kPlan);
+  EXPECT_NO_THROW(now.set_steps_and_remove_stale_files({{drive, {fixes}}}));
+  now.set_steps_and_remove_stale_files(kPlan);
   EXPECT_FALSE(fs::exists(results / fixes));
 }
 
-TEST_F(SessionResultsTest, RejectsLinkedOutputs) {
+TEST_F(SessionResultsTest, RejectsSymbolicLinkInPlaceOfOutput) {
   { const SessionResults taken(results, session); }
   fs::create_symlink(folder.file("mine.txt", "mine"), results / "lens.yaml");
   SessionResults taken(results, session);
-  EXPECT_THAT([&] { taken.plan_steps(kPlan); },
+  EXPECT_THAT([&] { taken.set_steps_and_remove_stale_files(kPlan); },
               ThrowsMessage<InputError>(HasSubstr("holds lens.yaml, which is not of")));
   EXPECT_EQ(TemporaryFolder::read_content(folder / "mine.txt"), "mine");
 }
 
-TEST_F(SessionResultsTest, AdoptsResultsOfEarlierVersion) {
+TEST_F(SessionResultsTest, RemovesOutputsByStepRecordsWithoutOutputList) {
   {
     SessionResults before(results, session);
     std::vector<StepOutputs> with_drive = kPlan;
     with_drive.push_back({"line-x", {"line-x-fixes.csv"}});
-    before.plan_steps(with_drive);
+    before.set_steps_and_remove_stale_files(with_drive);
     keep_two_steps(before);
-    before.plan_steps(with_drive);
+    before.set_steps_and_remove_stale_files(with_drive);
     folder.file("results/line-x-fixes.csv", "of a drive");
-    before.store_result("line-x", "key", StepResult());
+    before.store_step_result("line-x", "key", StepResult());
   }
   fs::remove(results / "steps/outputs");
   folder.file("results/line-y-fixes.csv", "mine");
   SessionResults now(results, session);
-  now.plan_steps(kPlan);
-  EXPECT_TRUE(now.find_cached_result("lens", "key of the lens"));
+  now.set_steps_and_remove_stale_files(kPlan);
+  EXPECT_TRUE(now.find_cached_step_result("lens", "key of the lens"));
   EXPECT_FALSE(fs::exists(results / "line-x-fixes.csv"));
   EXPECT_TRUE(fs::exists(results / "line-y-fixes.csv"));
 }
 
-TEST_F(SessionResultsTest, RemovesStepsAfterFailedStep) {
+TEST_F(SessionResultsTest, RemoveOutputsOfLaterStepsKeepsNamedStep) {
   SessionResults cached_result(results, session);
   keep_two_steps(cached_result);
   cached_result.remove_outputs_of_later_steps("lens");
-  EXPECT_TRUE(cached_result.find_cached_result("lens", "key of the lens"));
+  EXPECT_TRUE(cached_result.find_cached_step_result("lens", "key of the lens"));
   EXPECT_FALSE(fs::exists(results / "rotated.yaml"));
   cached_result.remove_outputs_of_step("lens");
   EXPECT_FALSE(fs::exists(results / "lens.yaml"));
-  EXPECT_FALSE(cached_result.find_cached_result("lens", "key of the lens"));
+  EXPECT_FALSE(cached_result.find_cached_step_result("lens", "key of the lens"));
 }
 
-TEST_F(SessionResultsTest, AllowsOneSessionAndOneRun) {
+TEST_F(SessionResultsTest, RejectsConcurrentRunOtherSessionAndForeignFiles) {
   const auto take = [&](const fs::path& of) { return [&, of] { SessionResults(results, of); }; };
   {
     const SessionResults taken(results, session);

@@ -11,7 +11,7 @@ using testing::ElementsAre;
 
 Observation rejected(const char* file, RejectionReason reason, const char* message) {
   Observation image{file};
-  image.set_rejection(reason, message);
+  image.set_image_rejection(reason, message);
   return image;
 }
 
@@ -29,14 +29,14 @@ TEST(ListSkippedImages, OmitsFolderFromNamesInSingleFolder) {
       ElementsAre("b.png: is empty", "c.png: is 3: large"));
 }
 
-TEST(ListSkippedImages, NamesFoldersWhenSeveral) {
+TEST(ListSkippedImages, NamesFoldersWhenThereAreSeveral) {
   EXPECT_THAT(
       lines(list_skipped_images(
           {Observation{"f/a.png"}, rejected("g/a.png", RejectionReason::unreadable, "is empty")})),
       ElementsAre("g/a.png: is empty"));
 }
 
-TEST(AddIntakeRemarks, CombinesFramesOfVideo) {
+TEST(AddImageIntakeRemarks, CombinesRejectedFramesOfVideoByReason) {
   Observations seen;
   seen.images = {rejected("a.png", RejectionReason::too_few_corners, "shows 1 tag"),
                  rejected("b.avi#000000", RejectionReason::too_few_corners, "shows 2 tags"),
@@ -44,8 +44,8 @@ TEST(AddIntakeRemarks, CombinesFramesOfVideo) {
                  rejected("c.avi#000000", RejectionReason::too_few_corners, "shows 2 tags"),
                  rejected("b.avi#000004", RejectionReason::same_view, "is as #000003")};
   StepResult result;
-  add_intake_remarks(seen, result);
-  EXPECT_TRUE(result.ok());
+  add_image_intake_remarks(seen, result);
+  EXPECT_TRUE(result.has_succeeded());
   EXPECT_THAT(
       lines(result.skipped),
       ElementsAre("a.png: shows 1 tag", "b.avi: 2 of its frames: with too little of the board",
@@ -56,13 +56,13 @@ TEST(AddIntakeRemarks, CombinesFramesOfVideo) {
                           "c.avi#000000: shows 2 tags", "b.avi#000004: is as #000003"));
 }
 
-TEST(AddIntakeRemarks, CopiesFailureAndPrependsWarnings) {
+TEST(AddImageIntakeRemarks, CopiesFailureAndPrependsWarnings) {
   Observations seen;
   seen.warnings = {"dark"};
   seen.failure = {true, "shows another board", "board.yaml"};
   StepResult result;
   result.warnings = {"later"};
-  add_intake_remarks(seen, result);
+  add_image_intake_remarks(seen, result);
   EXPECT_EQ(result.failure, StepFailure::wrong_board);
   EXPECT_EQ(result.subject, "board.yaml");
   EXPECT_THAT(result.warnings, ElementsAre("dark", "later"));

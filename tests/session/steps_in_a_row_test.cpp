@@ -59,13 +59,13 @@ struct CalibrationChain {
   }
 
   Calibration calibrated() const {
-    const RotationResult rotation = run_rotation_step(turns, RotationMethod::axis, {});
-    EXPECT_TRUE(rotation.ok()) << rotation.why;
+    const RotationResult rotation = run_rotation_calibration_step(turns, RotationMethod::axis, {});
+    EXPECT_TRUE(rotation.has_succeeded()) << rotation.why;
     LampCaptures leveled = turns;
     leveled.calibration = rotation.calibration;
-    const DispersionResult dispersion =
-        run_dispersion_step(leveled, known, DispersionMethod::camera, DispersionCircle::mean, {});
-    EXPECT_TRUE(dispersion.ok());
+    const DispersionResult dispersion = run_dispersion_calibration_step(
+        leveled, known, DispersionMethod::camera, DispersionCircle::mean, {});
+    EXPECT_TRUE(dispersion.has_succeeded());
     return dispersion.calibration;
   }
 };
@@ -77,7 +77,7 @@ TEST(SequentialCalibration, HasNoLensJacobianWithoutLensCovariance) {
   EXPECT_FALSE(calibration.dispersion->by_intrinsics);
 }
 
-TEST(SequentialCalibration, LensJacobianPredictsChange) {
+TEST(SequentialCalibration, LensJacobiansPredictChangeOfZenithAndOffset) {
   Random random(2);
   CalibrationChain row(random, 0);
   Calibration& calibration = row.turns.calibration;
@@ -92,8 +92,8 @@ TEST(SequentialCalibration, LensJacobianPredictsChange) {
     error[i] = calibration.camera.intrinsics[k] - camera.intrinsics[k];
   }
   const Calibration moved = row.calibrated();
-  const Eigen::Vector2d zenith = normalized_zenith_point(*moved.rotation_center) -
-                                 normalized_zenith_point(*exact.rotation_center);
+  const Eigen::Vector2d zenith = compute_normalized_zenith_point(*moved.rotation_center) -
+                                 compute_normalized_zenith_point(*exact.rotation_center);
   const Eigen::Vector2d zenith_said = *exact.rotation_center->by_intrinsics * error;
   EXPECT_GT(zenith.norm(), 1e-6);
   EXPECT_LT((zenith - zenith_said).norm(), 0.02 * zenith.norm());
@@ -109,7 +109,7 @@ TEST(SequentialCalibration, LensJacobianPredictsChange) {
 
 /// Rotations at yaws that barely determine the circles. A lens error changes the set of determined
 /// circles, which moves their mean by up to 14 times the effect of the error itself.
-TEST(RunRotationStep, CircleLensJacobianMatchesJointFit) {
+TEST(RunRotationCalibrationStep, CircleMethodLensErrorIsWithin50PercentOfJoint) {
   constexpr double spread_rad = 6e-4;  // a few times what the noise turns a lamp by
   for (const unsigned seed : {44U, 127U, 144U, 223U, 227U}) {
     Random random(seed);
@@ -125,10 +125,10 @@ TEST(RunRotationStep, CircleLensJacobianMatchesJointFit) {
     for (const auto& capture : survey.input.captures) {
       turn.frames.push_back({capture.name, capture.detections});
     }
-    const RotationResult circle = run_rotation_step(turn, RotationMethod::circle, {});
-    const RotationResult joint = run_rotation_step(turn, RotationMethod::joint, {});
-    ASSERT_TRUE(joint.ok());
-    ASSERT_TRUE(circle.ok());
+    const RotationResult circle = run_rotation_calibration_step(turn, RotationMethod::circle, {});
+    const RotationResult joint = run_rotation_calibration_step(turn, RotationMethod::joint, {});
+    ASSERT_TRUE(joint.has_succeeded());
+    ASSERT_TRUE(circle.has_succeeded());
     ASSERT_TRUE(joint.fit.center.by_intrinsics);
     ASSERT_TRUE(circle.fit.center.by_intrinsics);
     const auto compute_sd = [&](const RotationFit& fit) {
@@ -141,7 +141,7 @@ TEST(RunRotationStep, CircleLensJacobianMatchesJointFit) {
 }
 
 /// Tilt calibration from the lamps of a drive.
-TEST(RunTiltStep, LensJacobianPredictsChange) {
+TEST(RunTiltCalibrationStep, LensJacobianPredictsChangeOfZenith) {
   Random random(4);
   Survey survey(kExactMap_m);
   for (int k = 0; k < 40; ++k) {
@@ -155,8 +155,8 @@ TEST(RunTiltStep, LensJacobianPredictsChange) {
     for (const auto& capture : survey.input.captures) {
       drive.frames.push_back({capture.name, capture.detections});
     }
-    const TiltResult result = run_tilt_step(drive, false, {});
-    EXPECT_TRUE(result.ok()) << result.why;
+    const TiltResult result = run_tilt_calibration_step(drive, false, {});
+    EXPECT_TRUE(result.has_succeeded()) << result.why;
     return *result.calibration.rotation_center;
   };
   EXPECT_FALSE(leveled().by_intrinsics);
@@ -170,14 +170,15 @@ TEST(RunTiltStep, LensJacobianPredictsChange) {
   const Eigen::VectorXd error =
       Eigen::Map<const Eigen::VectorXd>(calibration.camera.intrinsics.data(), covariance.rows()) -
       before;
-  const Eigen::Vector2d moved = normalized_zenith_point(leveled()) - normalized_zenith_point(exact);
+  const Eigen::Vector2d moved =
+      compute_normalized_zenith_point(leveled()) - compute_normalized_zenith_point(exact);
   EXPECT_GT(moved.norm(), 1e-6);
   EXPECT_LT((moved - *exact.by_intrinsics * error).norm(), 0.05 * moved.norm());
 }
 
 class SequentialCalibrationFixes : public testing::TestWithParam<PlaceOf> {};
 
-TEST_P(SequentialCalibrationFixes, FixCovarianceMatchesErrors) {
+TEST_P(SequentialCalibrationFixes, FixCovarianceMatchesErrorsOfFixes) {
   constexpr int trials = 40;
   Random random(3);
   NeesStatistics whole, common;
@@ -186,14 +187,14 @@ TEST_P(SequentialCalibrationFixes, FixCovarianceMatchesErrors) {
     CalibrationChain row(random, 0.1, GetParam());
     const Calibration calibration = row.calibrated();
     const Eigen::Vector2d zenith_error =
-        normalized_zenith_point(*calibration.rotation_center) -
-        normalized_zenith_point(*row.survey.truth.calibration.rotation_center);
+        compute_normalized_zenith_point(*calibration.rotation_center) -
+        compute_normalized_zenith_point(*row.survey.truth.calibration.rotation_center);
     const Eigen::Vector2d& offset_px = calibration.dispersion->offset_px;
     const auto squared = [](const Eigen::Vector2d& error, const Eigen::Matrix2d& covariance) {
       return error.dot(covariance.inverse() * error) / (2 * trials);
     };
     zenith += squared(zenith_error, *compute_zenith_covariance(calibration));
-    offset += squared(offset_px, *compute_offset_covariance(calibration));
+    offset += squared(offset_px, *compute_dispersion_offset_covariance(calibration));
     offset_alone += squared(offset_px, *calibration.dispersion->covariance);
     const Positioner positioner(row.survey.truth.map, calibration);
     for (int k = 0; k < 5; ++k) {
@@ -201,9 +202,9 @@ TEST_P(SequentialCalibrationFixes, FixCovarianceMatchesErrors) {
       const double z_m = random.uniform(0, 0.3), yaw_rad = random.uniform(-3, 3);
       row.survey.truth.camera = {{x_m, y_m, z_m}, yaw_rad};
       const auto exact = seen_from(row.survey.truth, row.survey.sigma_px);
-      const Fix fix = positioner.locate(with_noise(exact, random));
-      const Fix without_noise = positioner.locate(exact);
-      ASSERT_TRUE(fix.ok() && without_noise.ok());
+      const Fix fix = positioner.compute_position_fix(with_noise(exact, random));
+      const Fix without_noise = positioner.compute_position_fix(exact);
+      ASSERT_TRUE(fix.has_succeeded() && without_noise.has_succeeded());
       whole.add(compute_pose_error(fix, row.survey.truth.camera), fix.estimate.covariance);
       common.add(compute_pose_error(without_noise, row.survey.truth.camera),
                  without_noise.estimate.covariance - without_noise.noise_covariance);

@@ -36,7 +36,7 @@ std::map<std::string, Outcome> outcomes() {
   return outcomes;
 }
 
-TEST(RunLensStep, DoesNotPassInsufficientViews) {
+TEST(RunLensCalibrationStep, FailsGatesForInsufficientViews) {
   // Limit for these sets; of several hundred sets, one slightly exceeds three.
   constexpr double most = 2.5;
   int passed = 0;

@@ -23,7 +23,7 @@ struct Training {
   explicit Training(std::size_t folders) {
     FrontendOptions options;
     options.readout = Readout::rows;
-    const DetectedLights one = detect_lights({kSample}, lamps, {}, false, options);
+    const DetectedLights one = detect_lights_in_folders({kSample}, lamps, {}, false, options);
     for (std::size_t i = 0; i < folders; ++i) {
       seen.seen.images.insert(seen.seen.images.end(), one.seen.images.begin(),
                               one.seen.images.end());
@@ -34,22 +34,22 @@ struct Training {
   TrainStepResult trained() const { return train_lamp_classifier(seen, labels, lamps, "sample"); }
 };
 
-TEST(TrainLamps, RequiresSeveralLightsOfEachLamp) {
+TEST(TrainLampClassifier, ReturnsUndeterminedForTooFewLightsPerLamp) {
   const TrainStepResult result = Training(1).trained();
   EXPECT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.why, HasSubstr("too few labeled lights of lamps 1 (has 2), 2 (has 2)"));
 }
 
-TEST(TrainLamps, ReportsCrossValidatedConfusion) {
+TEST(TrainLampClassifier, CrossValidationIdentifiesAllLamps) {
   const TrainStepResult result = Training(kMinExamples).trained();
-  ASSERT_TRUE(result.ok()) << result.why;
+  ASSERT_TRUE(result.has_succeeded()) << result.why;
   EXPECT_EQ(result.classifier.lamps.size(), 6U);
   EXPECT_EQ(result.labeled.labels, 12 * kMinExamples);
   EXPECT_EQ(result.confusion.counts.sum(), 12 * kMinExamples);
   EXPECT_EQ(result.confusion.count_wrongly_identified(), 0);
 }
 
-TEST(TrainLamps, ThrowsForUnknownImageOrLamp) {
+TEST(TrainLampClassifier, ThrowsForLabelsOfUnknownImageOrLamp) {
   Training training(1);
   training.lamps.lamps.pop_back();
   EXPECT_THAT(rejection_message<std::invalid_argument>([&] { training.trained(); }),

@@ -39,24 +39,24 @@ LensInput make_wide_set(double reach_deg, LensModel model) {
 
 class RunLensStepWideField : public testing::TestWithParam<LensModel> {};
 
-TEST_P(RunLensStepWideField, FailsWhereModelHasNoRays) {
-  const LensResult result = run_lens_step(make_wide_set(180, GetParam()), {});
+TEST_P(RunLensStepWideField, ProposesFisheyeWhenBoardIsBeyondRaysOfModel) {
+  const LensResult result = run_lens_calibration_step(make_wide_set(180, GetParam()), {});
   EXPECT_EQ(result.failure, StepFailure::undetermined);
-  EXPECT_THAT(result.why,
-              AllOf(HasSubstr("30 views with the board: it is visible up to 10"),
-                    HasSubstr("degrees off axis, where " + std::string(to_string(GetParam())) +
-                              " has no rays: use --lens OPENCV_FISHEYE"),
-                    Not(HasSubstr("add views"))));
+  EXPECT_THAT(result.why, AllOf(HasSubstr("30 views with the board: it is visible up to 10"),
+                                HasSubstr("degrees off axis, where " +
+                                          std::string(lens_model_name(GetParam())) +
+                                          " has no rays: use --lens OPENCV_FISHEYE"),
+                                Not(HasSubstr("add views"))));
 }
 
 /// Up to 87 degrees: the errors of a lens that passes match the reported ones in the calibrated
 /// region.
-TEST_P(RunLensStepWideField, WarnsAndCoversErrorsNearLimitOfModel) {
+TEST_P(RunLensStepWideField, LensErrorsAreWithinThreeSigmasIfGatesPass) {
   constexpr double sigmas = 3;
   int compared = 0;
   for (const double reach_deg : {60, 75, 87}) {
-    const LensResult result = run_lens_step(make_wide_set(reach_deg, GetParam()), {});
-    if (!result.ok()) {
+    const LensResult result = run_lens_calibration_step(make_wide_set(reach_deg, GetParam()), {});
+    if (!result.has_succeeded()) {
       EXPECT_THAT(result.why, HasSubstr("use --lens OPENCV_FISHEYE"));
       continue;
     }
@@ -67,7 +67,8 @@ TEST_P(RunLensStepWideField, WarnsAndCoversErrorsNearLimitOfModel) {
     if (!describe_failed_gates(check_gates(make_default_lens_gates(), result.metrics)).empty())
       continue;
     const auto difference = compute_projection_difference(
-        wide_lens(), result.lens.solution.lens(), kWideImager, [&](const Eigen::Vector2d& pixel) {
+        wide_lens(), result.lens.solution.fitted_lens(), kWideImager,
+        [&](const Eigen::Vector2d& pixel) {
           return polygon_contains(result.lens.report.region, pixel) ? 1.0 : INFINITY;
         });
     ASSERT_TRUE(difference);
@@ -86,15 +87,15 @@ INSTANTIATE_TEST_SUITE_P(Models, RunLensStepWideField,
                          });
 
 /// OPENCV5 does not fit a lens of this width; detecting this takes seconds.
-TEST(RunLensStep, DoesNotBlameBoardForUnsuitableModel) {
-  const LensResult result = run_lens_step(make_wide_set(87, LensModel::opencv5), {});
+TEST(RunLensCalibrationStep, ProposesFisheyeInsteadOfBoardErrorForUnsuitableModel) {
+  const LensResult result = run_lens_calibration_step(make_wide_set(87, LensModel::opencv5), {});
   ASSERT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.why, AllOf(HasSubstr("OPENCV_FISHEYE fits with 0.05 px"),
                                 HasSubstr("use --lens OPENCV_FISHEYE"),
                                 Not(HasSubstr("board.yaml")), Not(HasSubstr("cannot be"))));
 }
 
-TEST(RunLensStep, KeepsMarginAroundCornersForOwnModel) {
+TEST(RunLensCalibrationStep, ValidRegionCoversImageWhenModelFits) {
   constexpr int count = 30;
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::automatic};
@@ -104,8 +105,8 @@ TEST(RunLensStep, KeepsMarginAroundCornersForOwnModel) {
     input.seen.images.push_back(
         observed({std::to_string(i), views.imager_px, views.random_view(random, 0.05)}));
   }
-  const LensResult result = run_lens_step(input, {});
-  ASSERT_TRUE(result.ok()) << result.why;
+  const LensResult result = run_lens_calibration_step(input, {});
+  ASSERT_TRUE(result.has_succeeded()) << result.why;
   EXPECT_FALSE(result.lens.solution.other_model_fits);
   EXPECT_FALSE(result.lens.better_model);
   EXPECT_THAT(result.warnings, testing::IsEmpty());

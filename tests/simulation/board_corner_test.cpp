@@ -99,8 +99,8 @@ TEST_P(FrameRendererBoard, RenderedCornersMatchTrueCorners) {
   double worst_px = 0, squares = 0;
   int corners = 0;
   for (std::size_t index = 0; index < 6; ++index) {
-    const BoardShot shot = make_board_shot(scene_, views_, index);
-    const cv::Mat1d image(renderer.render_board_electrons(shot) / 1e3);
+    const BoardShot shot = make_simulated_board_capture(scene_, views_, index);
+    const cv::Mat1d image(renderer.render_board_in_electrons(shot) / 1e3);
     const cv::Mat1d transposed(image.t());
     std::map<int, std::map<int, Eigen::Vector2d>> tags;
     for (const auto& [tag, corner, pixel] : find_true_corners_in_image(scene_, renderer, shot)) {
@@ -129,9 +129,9 @@ TEST_P(FrameRendererBoard, RenderedCornersMatchTrueCorners) {
 
 TEST_P(FrameRendererBoard, TrueCornersMatchMrcalProjection) {
   const FrameRenderer renderer(scene_);
-  const MrcalOracle mrcal(std::string(to_string(scene_.camera.lens_model)),
+  const MrcalOracle mrcal(std::string(lens_model_name(scene_.camera.lens_model)),
                           scene_.camera.intrinsics);
-  const BoardShot shot = make_board_shot(scene_, views_, 1);
+  const BoardShot shot = make_simulated_board_capture(scene_, views_, 1);
   const auto layout = list_board_tags(scene_.board->print);
   const Eigen::Vector2d field_m = compute_tag_field_size_m(scene_.board->print);
   const auto truth = find_true_corners_in_image(scene_, renderer, shot);
@@ -174,8 +174,8 @@ TEST(FrameRenderer, BlursBoardEdgeBeforePixelIntegration) {
   scene.optics.blur_px = sigma_px;
   scene.board = plain_board();
   const FrameRenderer renderer(scene);
-  const BoardShot shot = make_board_shot(scene, board_views(1, 0.171, 0, 0, 0), 0);
-  const cv::Mat1f image(renderer.render_board_electrons(shot) / 1e3);
+  const BoardShot shot = make_simulated_board_capture(scene, board_views(1, 0.171, 0, 0, 0), 0);
+  const cv::Mat1f image(renderer.render_board_in_electrons(shot) / 1e3);
   double worst = 0;
   int edges = 0;
   // Left of a tag there is white, and its black border is seven pixels wide.
@@ -202,13 +202,13 @@ double level_at(const Eigen::Vector2d& pixel, double vignetting_power) {
       {},        3e-5,       Readout::rows};
   scene.optics.vignetting_power = vignetting_power;
   scene.board = plain_board();
-  const cv::Mat1f image = FrameRenderer(scene).render_board_electrons(
-      make_board_shot(scene, board_views(1, 5, 0, 0, 0), 0));
+  const cv::Mat1f image = FrameRenderer(scene).render_board_in_electrons(
+      make_simulated_board_capture(scene, board_views(1, 5, 0, 0, 0), 0));
   return image(static_cast<int>(pixel.y()), static_cast<int>(pixel.x()));
 }
 
 // 350 px from the center are 95 degrees, 360 px beyond the last ray.
-TEST(FrameRenderer, RendersBoardBeyondNinetyDegreesWithoutVignetting) {
+TEST(FrameRenderer, RendersBoardBeyond90DegreesOnlyWithoutVignetting) {
   const double on_axis = level_at({400, 100}, 0);
   EXPECT_GT(on_axis, 0);
   EXPECT_EQ(level_at({749, 400}, 0), on_axis);

@@ -14,7 +14,7 @@ std::string without_board() {
   return yaml.erase(begin, yaml.find("captures:\n") - begin);
 }
 
-TEST(ReadCaptureSet, RejectsSpotOutsideRoom) {
+TEST(ReadSceneCaptureSet, RejectsCameraPositionOutsideRoom) {
   const std::string problem = "moves the camera outside the room";
   EXPECT_EQ(refusal_with("[-0.2, 0.3]", "[-0.2, 0.6]"),
             "scene.yaml:25: captures[0].pivots_m[1]: " + problem);
@@ -30,7 +30,7 @@ TEST(ReadCaptureSet, RejectsSpotOutsideRoom) {
             "scene.yaml:26: captures[1].heights_m[0]: " + problem);
 }
 
-TEST(ReadCaptureSet, RejectsPositionWhenLeverArmCanLeaveRoom) {
+TEST(ReadSceneCaptureSet, RejectsPositionWhenLeverArmCanLeaveRoom) {
   const std::string problem = "moves the camera outside the room";
   EXPECT_EQ(refusal_with("[-0.2, 0.3]", "[0.949, -0.449]"), "");
   EXPECT_EQ(refusal_with("[-0.2, 0.3]", "[0.951, -0.449]"),
@@ -43,14 +43,14 @@ TEST(ReadCaptureSet, RejectsPositionWhenLeverArmCanLeaveRoom) {
             "scene.yaml:27: captures[2].drive.to_m: " + problem);
 }
 
-TEST(ReadCaptureSet, RejectsHeightNotBelowLamp) {
+TEST(ReadSceneCaptureSet, RejectsHeightNotBelowAllLamps) {
   EXPECT_EQ(refusal_with("[0, 0.2]", "[0, 1.5]"),
             "scene.yaml:25: captures[0].heights_m[1]: lamp 5 is not above the camera");
   EXPECT_EQ(refusal_with("[0, 0.2]", "[0, 1.65]"),
             "scene.yaml:25: captures[0].heights_m[1]: lamp 1 is not above the camera");
 }
 
-TEST(ReadCaptureSet, RejectsValuesOutOfRange) {
+TEST(ReadSceneCaptureSet, RejectsValuesOutOfRange) {
   EXPECT_EQ(refusal_with("exposure_s: 5.0e-5", "exposure_s: -0.5"),
             "scene.yaml:25: captures[0].exposure_s: -0.5 s is not within 1.0e-07 and 1 s: is "
             "it in the right unit?");
@@ -75,7 +75,7 @@ TEST(ReadCaptureSet, RejectsValuesOutOfRange) {
             "is it in the right unit?");
 }
 
-TEST(ReadCaptureSet, RequiresExactlyOneKeyForPositions) {
+TEST(ReadSceneCaptureSet, RejectsNoneOrTwoKeysForPositions) {
   const std::string problem = "needs one of the keys pivots_m, grid, drive, views";
   EXPECT_EQ(refusal_with("pivots_m: [[0.1, -0.05], [-0.2, 0.3]], ", ""),
             "scene.yaml:25: captures[0]: " + problem);
@@ -88,14 +88,14 @@ TEST(ReadCaptureSet, RequiresExactlyOneKeyForPositions) {
             "exposure_s, views");
 }
 
-TEST(ReadCaptureSet, RequiresExactlyOneKeyForYaws) {
+TEST(ReadSceneCaptureSet, RejectsNoneOrTwoKeysForYaws) {
   const std::string problem = "needs one of the keys yaws_deg and turn";
   EXPECT_EQ(refusal_with("yaws_deg: [20, -90], ", ""), "scene.yaml:25: captures[0]: " + problem);
   EXPECT_EQ(refusal_with("folder: grid,", "folder: grid, yaws_deg: [0],"),
             "scene.yaml:26: captures[1]: " + problem);
 }
 
-TEST(ReadCaptureSet, RejectsEmptyList) {
+TEST(ReadSceneCaptureSet, RejectsEmptyListOfSpotsHeightsYawsOrCaptures) {
   EXPECT_EQ(refusal_with("[[0.1, -0.05], [-0.2, 0.3]]", "[]"),
             "scene.yaml:25: captures[0].pivots_m: contains no pivot");
   EXPECT_EQ(refusal_with("heights_m: [0, 0.2]", "heights_m: []"),
@@ -107,19 +107,19 @@ TEST(ReadCaptureSet, RejectsEmptyList) {
             "scene.yaml:24: captures: contains no captures");
 }
 
-TEST(ReadCaptureSet, RejectsDriveWithoutLength) {
+TEST(ReadSceneCaptureSet, RejectsDriveWithEqualEnds) {
   EXPECT_EQ(refusal_with("to_m: [0.5, 0.4]", "to_m: [-0.3, 0]"),
             "scene.yaml:27: captures[2].drive: has no length");
 }
 
-TEST(ReadCaptureSet, RejectsTooManyCaptures) {
+TEST(ReadSceneCaptureSet, RejectsMoreThanOneMillionCaptures) {
   EXPECT_EQ(refusal_with("speed_m_per_s: 0.5", "speed_m_per_s: 1.0e-6"),
             "scene.yaml:27: captures[2].drive: makes more than 1000000 captures");
   EXPECT_EQ(refusal_with("repeat: 3", "repeat: 1000000"),
             "scene.yaml:25: captures[0]: makes more than 1000000 captures");
 }
 
-TEST(ReadCaptureSet, RejectsInvalidFolderName) {
+TEST(ReadSceneCaptureSet, RejectsFolderNameWithOtherThanLettersDigitsDashUnderscore) {
   for (const std::string name : {"../spots", "..", ".", "a/b", "/tmp", "''", "a.b", "a b", "ä"}) {
     EXPECT_EQ(refusal_with("folder: spots", "folder: " + name),
               "scene.yaml:25: captures[0].folder: should be a name of letters, digits, - and _");
@@ -127,12 +127,12 @@ TEST(ReadCaptureSet, RejectsInvalidFolderName) {
   EXPECT_EQ(refusal_with("folder: spots", "folder: Spots-2_b"), "");
 }
 
-TEST(ReadCaptureSet, RejectsRepeatedFolder) {
+TEST(ReadSceneCaptureSet, RejectsTwoCaptureSetsWithSameFolder) {
   EXPECT_EQ(refusal_with("folder: line", "folder: spots"),
             "scene.yaml:27: captures[2]: folder 'spots' occurs twice");
 }
 
-TEST(ReadCaptureSet, RejectsSetWithoutItsLampsOrBoard) {
+TEST(ReadSceneCaptureSet, RejectsSetWhoseSceneHasNoLampsOrBoard) {
   EXPECT_EQ(scene_refusal(without_board()),
             "scene.yaml:21: captures[3]: views are of a board, and the scene has none");
   std::string dark = kSceneYaml;

@@ -20,7 +20,7 @@ class FrameRendererClutter : public testing::Test {
     const FrameRenderer renderer(scene_);
     LampShot shot = shot_at(scene_, {0, 0, 0.1}, 0);
     for (SquareWave& wave : shot.waves) wave.duty = duty;
-    return renderer.render_lamp_electrons(shot);
+    return renderer.render_lamps_in_electrons(shot);
   }
   double in_view() {
     const FrameRenderer renderer(scene_);
@@ -31,7 +31,7 @@ class FrameRendererClutter : public testing::Test {
   Scene scene_ = plain_scene();
 };
 
-TEST_F(FrameRendererClutter, AmbientLightCoversWholeImage) {
+TEST_F(FrameRendererClutter, AmbientLightIsUniformOverImage) {
   scene_.lamps.clear();
   scene_.ambient_e_per_s = 2e7;
   const cv::Mat1f image = rendered();
@@ -41,7 +41,7 @@ TEST_F(FrameRendererClutter, AmbientLightCoversWholeImage) {
   EXPECT_NEAR(brightest, 1000, 1e-2);
 }
 
-TEST_F(FrameRendererClutter, VignettingIsPowerOfCosine) {
+TEST_F(FrameRendererClutter, VignettingIsGivenPowerOfCosineOfAngle) {
   scene_.lamps.clear();
   scene_.ambient_e_per_s = 2e7;
   scene_.optics.vignetting_power = 4;
@@ -52,7 +52,7 @@ TEST_F(FrameRendererClutter, VignettingIsPowerOfCosine) {
   }
 }
 
-TEST_F(FrameRendererClutter, WindowIsRectangleOfItsRadiance) {
+TEST_F(FrameRendererClutter, WindowIsRenderedAsRectangleOfItsRadiance) {
   scene_.lamps.clear();
   scene_.ambient_e_per_s = 1e6;
   scene_.clutter.windows = {{{0.3, 0.1, 1.6}, {0, 0.3, 0}, {0.15, 0, 0}, 5e7}};
@@ -63,9 +63,9 @@ TEST_F(FrameRendererClutter, WindowIsRectangleOfItsRadiance) {
   EXPECT_NEAR(measure_brightness(cv::Mat1f(image - 50)).sum, 5000 * 2450, 5000 * 2450 * 1e-4);
 }
 
-TEST_F(FrameRendererClutter, ReflectionHasStripesOfItsLampAndSteadyLampNone) {
-  scene_.clutter.steady_lamps = {{{-0.3, 0, 1.6}, make_disc(0.12), 3e7, 1}};
-  scene_.clutter.reflections = {{{{0.3, 0, 1.6}, make_disc(0.12), 2e7, 0}, 0}};
+TEST_F(FrameRendererClutter, ReflectionFlickersWithItsLampAndSteadyLampDoesNot) {
+  scene_.clutter.steady_lamps = {{{-0.3, 0, 1.6}, make_disc_lamp_shape(0.12), 3e7, 1}};
+  scene_.clutter.reflections = {{{{0.3, 0, 1.6}, make_disc_lamp_shape(0.12), 2e7, 0}, 0}};
   const cv::Mat1f always = rendered(), switched = rendered(0.5);
   for (int line = 285; line < 315; ++line) {
     EXPECT_EQ(switched(line, 300), always(line, 300));
@@ -77,7 +77,7 @@ TEST_F(FrameRendererClutter, ReflectionHasStripesOfItsLampAndSteadyLampNone) {
   EXPECT_LT(always(300, 517), 250) << "a reflection fades";
 }
 
-TEST_F(FrameRendererClutter, RectangularReflectionFadesTowardsItsSides) {
+TEST_F(FrameRendererClutter, RectangularReflectionFadesParabolicallyTowardsItsSides) {
   const LampShape shape{ShapeKind::rectangle, Eigen::Vector2d(0.12, 0.06), std::numbers::pi / 2};
   const Glow glow{{0.3, 0, 1.6}, shape, 2e7, 0};
   scene_.lamps[0].glow.electron_rate_e_per_s = 0;
@@ -93,7 +93,7 @@ TEST_F(FrameRendererClutter, RectangularReflectionFadesTowardsItsSides) {
   EXPECT_EQ(image(322, 499), 0);
 }
 
-TEST_F(FrameRendererClutter, OccluderHidesLampBehindIt) {
+TEST_F(FrameRendererClutter, OccluderHidesCoveredHalfOfLamp) {
   const double whole = measure_brightness(rendered()).sum;
   // From the lamp's middle to the left, half way up.
   scene_.clutter.occluders = {{{-0.2, -0.2, 0.85}, {0.2, 0, 0}, {0, 0.4, 0}, 0}};
@@ -113,7 +113,7 @@ TEST_F(FrameRendererClutter, OccluderReplacesCeilingRadiance) {
   EXPECT_NEAR(image(200, 500), 500, 1e-3);
 }
 
-TEST_F(FrameRendererClutter, TrueLampIsPartlyInViewAtImageEdge) {
+TEST_F(FrameRendererClutter, VisibleFractionIsHalfForLampAtImageEdge) {
   scene_.lamps[0].glow.position_m.x() = 1.2;  // 400 px to the right
   EXPECT_NEAR(in_view(), 0.5, 0.02);
   scene_.lamps[0].glow.position_m.x() = 0;

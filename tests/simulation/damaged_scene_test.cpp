@@ -18,7 +18,7 @@ int times_read_when_cut(const std::string& whole, std::size_t step) {
     if (bytes % step != 0 && (bytes == 0 || whole[bytes - 1] != '\n')) continue;
     SCOPED_TRACE(bytes);
     std::filesystem::resize_file(file, bytes);
-    const std::string message = rejection_message([&] { read_scene(file); });
+    const std::string message = rejection_message([&] { read_scene_file(file); });
     EXPECT_EQ(message.find('\n'), std::string::npos) << message;
     times_read += message.empty() ? 1 : 0;
   }
@@ -26,11 +26,11 @@ int times_read_when_cut(const std::string& whole, std::size_t step) {
 }
 
 // The format does not declare the number of captures or the presence of a picture.
-TEST(ReadScene, RejectsFileTruncatedWithinCapture) {
+TEST(ReadSceneFile, AcceptsTruncatedSampleSceneAtFourLengthsOnly) {
   EXPECT_EQ(times_read_when_cut(kSceneYaml, 1), 4);
 }
 
-TEST(ReadScene, HandlesTruncatedScenesOfDatasets) {
+TEST(ReadSceneFile, AcceptsOrRejectsTruncatedScenesOfDatasets) {
   for (const std::string name :
        {"paper-rig", "paper-rig-faulty", "wide", "clutter", "downlights", "recessed", "foreign"}) {
     const std::string whole =
@@ -39,7 +39,7 @@ TEST(ReadScene, HandlesTruncatedScenesOfDatasets) {
   }
 }
 
-TEST(ReadScene, HandlesAnyReplacedNumber) {
+TEST(ReadSceneFile, AcceptsOrRejectsAnyReplacedNumber) {
   const TemporaryFolder folder;
   const std::string figure = "0123456789.-+e";
   const auto is_figure = [&](std::size_t at) {
@@ -55,7 +55,7 @@ TEST(ReadScene, HandlesAnyReplacedNumber) {
       const std::string yaml = std::string(kSceneYaml).replace(begin, end - begin, other);
       SCOPED_TRACE(yaml);
       const auto file = folder.file("scene.yaml", yaml);
-      ++(rejection_message([&] { read_scene(file); }).empty() ? read : refused);
+      ++(rejection_message([&] { read_scene_file(file); }).empty() ? read : refused);
       std::filesystem::remove(file);  // or the file system is slow to write it anew
     }
   }

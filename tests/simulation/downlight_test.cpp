@@ -24,7 +24,7 @@ class FrameRendererDownlight : public testing::Test {
     const FrameRenderer renderer(scene_);
     LampShot shot = shot_at(scene_, eye_m, 0);
     shot.waves[0].duty = duty;
-    return renderer.render_lamp_electrons(shot);
+    return renderer.render_lamps_in_electrons(shot);
   }
   /// Returns the intersection of a pixel's ray with the rim's plane, from the lamp, for a camera
   /// straight below.
@@ -33,14 +33,14 @@ class FrameRendererDownlight : public testing::Test {
   }
   Eigen::Vector2d projected(const Eigen::Vector3d& point_m, const LampShot& shot) const {
     const Lens lens(scene_.camera.lens_model, scene_.camera.intrinsics);
-    return lens.project(shot.motion.world_from_camera(0).inverse() * point_m).value();
+    return lens.project_point(shot.motion.world_from_camera(0).inverse() * point_m).value();
   }
 
   static constexpr double kRadiusM = 0.09, kFull = 5e4;
   Scene scene_ = plain_scene();
 };
 
-TEST_F(FrameRendererDownlight, IsDiscIfWallsEqualSource) {
+TEST_F(FrameRendererDownlight, RecessRendersAsDiscWhenWallsEqualSource) {
   const Eigen::Vector3d eye_m(0.21, -0.4, 0.1);
   const cv::Mat1f disc = rendered(eye_m);
   ASSERT_GT(measure_brightness(disc).sum, 0);
@@ -48,7 +48,7 @@ TEST_F(FrameRendererDownlight, IsDiscIfWallsEqualSource) {
   EXPECT_LT(cv::norm(rendered(eye_m), disc, cv::NORM_INF), 1e-6 * kFull) << "rim and all";
 }
 
-TEST_F(FrameRendererDownlight, SourceIsOffsetByDepthTimesSlope) {
+TEST_F(FrameRendererDownlight, SourceIsShiftedByRecessDepthTimesRaySlope) {
   glow().recess = Recess{0.05, 0.02, 0, {}};
   const Eigen::Vector3d eye_m(0.31, -0.155, 0.1);
   const Eigen::Vector3d slope(-0.2, 0.1, 0);  // of the ray to the source, 1.55 m above
@@ -62,14 +62,14 @@ TEST_F(FrameRendererDownlight, SourceIsOffsetByDepthTimesSlope) {
       << "the truth is the rim's center";
 }
 
-TEST_F(FrameRendererDownlight, IsHalfAsBrightAtSourceDiameter) {
+TEST_F(FrameRendererDownlight, BrightnessIsHalfAtEdgeOfSourceDiameter) {
   glow().recess = Recess{0, 0.06, 0, {}};
   const cv::Mat1f image = rendered({0.0015, 0.0015, 0.1});  // the lamp is at (399, 299)
   EXPECT_NEAR(image(299, 399) / kFull, 1, 1e-6);
   EXPECT_NEAR(image(299, 409) / kFull, 0.5, 1e-6) << "3 cm are 10 px";
 }
 
-TEST_F(FrameRendererDownlight, MatchesRecessEquationInsideRim) {
+TEST_F(FrameRendererDownlight, BrightnessMatchesRecessEquationSeenFromBelow) {
   glow().recess = Recess{0.06, 0.05, 0.1, DarkSide{0.02, M_PI}};
   const cv::Mat1f image = rendered();
   for (const cv::Point& at : {cv::Point(399, 299), cv::Point(405, 310), cv::Point(375, 299),
@@ -84,7 +84,7 @@ TEST_F(FrameRendererDownlight, MatchesRecessEquationInsideRim) {
   EXPECT_LT(image(299, 373), 0.3 * image(299, 426)) << "dark towards -x";
 }
 
-TEST_F(FrameRendererDownlight, HaloMatchesItsEquation) {
+TEST_F(FrameRendererDownlight, HaloDecaysExponentiallyOutsideRim) {
   const cv::Mat1f without = rendered();
   glow().halo = Halo{0.02, 0.03};
   const cv::Mat1f image = rendered();
@@ -95,10 +95,10 @@ TEST_F(FrameRendererDownlight, HaloMatchesItsEquation) {
   EXPECT_EQ(image(299, 399), without(299, 399)) << "not inside the rim";
   EXPECT_EQ(image(299, 399 + 30 + 82), 0) << "8 lengths are 80 px";
   EXPECT_GT(image(299, 399 + 30 + 78), 0);
-  EXPECT_NEAR(compute_light_radius_m(glow()), 0.09 + 0.24, 1e-12);
+  EXPECT_NEAR(compute_light_source_radius_m(glow()), 0.09 + 0.24, 1e-12);
 }
 
-TEST_F(FrameRendererDownlight, HaloFlickersWithLamp) {
+TEST_F(FrameRendererDownlight, HaloAndRecessFlickerInPhaseWithLamp) {
   glow().recess = Recess{0.05, 0.04, 0.1, {}};
   glow().halo = Halo{0.02, 0.03};
   const cv::Mat1f always = rendered(), switched = rendered({0, 0, 0.1}, 0.5);
@@ -113,7 +113,7 @@ TEST_F(FrameRendererDownlight, HaloFlickersWithLamp) {
   EXPECT_TRUE(dark && lit);
 }
 
-TEST_F(FrameRendererDownlight, ChipsMatchTheirEquation) {
+TEST_F(FrameRendererDownlight, ChipsAddBrightnessOfTheirEquationInsideRim) {
   const Eigen::Vector3d eye_m(0.0015, 0.0015, 0.1);  // the lamp is at (399, 299)
   const cv::Mat1f even = rendered(eye_m);
   glow().chips = Chips{0.4, 0.03, 0.015};
@@ -134,7 +134,7 @@ TEST_F(FrameRendererDownlight, ChipsMatchTheirEquation) {
   }
 }
 
-TEST_F(FrameRendererDownlight, MatchesRecessModelInObliqueView) {
+TEST_F(FrameRendererDownlight, BrightnessMatchesRecessEquationInObliqueView) {
   Recess recess{0.06, 0.03, 0.1, {}};
   recess.source_power = 1.5;
   recess.rim_power = 3;
@@ -166,7 +166,7 @@ TEST_F(FrameRendererDownlight, MatchesRecessModelInObliqueView) {
   EXPECT_GE(inside, 8);
 }
 
-TEST_F(FrameRendererDownlight, RendersCrescentWhereRimHidesSource) {
+TEST_F(FrameRendererDownlight, RendersCrescentAtNearRimWhenRimHidesSource) {
   glow().recess = Recess{0.2, 0.05, 0, {}};
   const Eigen::Vector3d eye_m(0.75, 0, 0.1);  // the source is 0.1 m beyond the rim's center
   const Eigen::Vector2d rim_px = projected(glow().position_m, shot_at(scene_, eye_m, 0));
@@ -181,7 +181,7 @@ TEST_F(FrameRendererDownlight, RendersCrescentWhereRimHidesSource) {
   EXPECT_LT((lamps[0].pixel - rim_px).norm(), 1e-6) << "the truth is the rim's center";
 }
 
-TEST_F(FrameRendererDownlight, HotSpotsMatchTheirEquation) {
+TEST_F(FrameRendererDownlight, HotSpotsAddGaussianBrightnessInsideRim) {
   const Eigen::Vector3d eye_m(0.0015, 0.0015, 0.1);  // the lamp is at (399, 299)
   const cv::Mat1f even = rendered(eye_m);
   glow().hot_spots = {{{0.03, 0}, 0.012, 0.5}, {{-0.03, 0.03}, 0.009, 0.8}};
@@ -194,7 +194,7 @@ TEST_F(FrameRendererDownlight, HotSpotsMatchTheirEquation) {
   EXPECT_EQ(more(435, 299), 0) << "beyond the rim";
 }
 
-TEST(DrawRandomSceneParts, DrawsSeededHotSpotsWithinBounds) {
+TEST(DrawRandomSceneParts, DrawsHotSpotsWithinBoundsBySeedAndLampId) {
   Scene scene = plain_scene();
   scene.lamps.push_back(scene.lamps[0]);
   scene.lamps[1].id = 2;
@@ -223,8 +223,12 @@ TEST(DrawRandomSceneParts, DrawsSeededHotSpotsWithinBounds) {
 
 TEST_F(FrameRendererDownlight, OccluderHidesSteadyDownlight) {
   scene_.lamps[0].glow.electron_rate_e_per_s = 0;
-  scene_.clutter.steady_lamps = {
-      {{0, 0, 1.6}, make_disc(0.18), 1e9, 0, Recess{0.05, 0.04, 0.2, {}}, Halo{0.1, 0.02}}};
+  scene_.clutter.steady_lamps = {{{0, 0, 1.6},
+                                  make_disc_lamp_shape(0.18),
+                                  1e9,
+                                  0,
+                                  Recess{0.05, 0.04, 0.2, {}},
+                                  Halo{0.1, 0.02}}};
   const cv::Mat1f open = rendered();
   scene_.clutter.occluders = {{{-0.2, -0.2, 0.85}, {0.2, 0, 0}, {0, 0.4, 0}, 0}};
   const cv::Mat1f image = rendered();

@@ -23,7 +23,7 @@ class FrameRendererForeignLight : public testing::Test {
 
   LampShot shot() const { return shot_at(scene_, {0, 0, 0.1}, 0); }
   cv::Mat1f rendered(const LampShot& shot) const {
-    return FrameRenderer(scene_).render_lamp_electrons(shot);
+    return FrameRenderer(scene_).render_lamps_in_electrons(shot);
   }
   cv::Mat1f rendered() const { return rendered(shot()); }
   Scene scene_ = plain_scene();
@@ -41,7 +41,7 @@ double mean_over_line(int line, double exposure_s, const Function& function) {
   return sum / samples;
 }
 
-TEST(RectifiedSine, MeanMatchesNumericalIntegral) {
+TEST(RectifiedSine, LitFractionMatchesNumericalMean) {
   const RectifiedSine wave{100, 0.4, 0.3};
   const auto mean_until = [&](double end_s) {
     constexpr int samples = 100000;
@@ -53,14 +53,14 @@ TEST(RectifiedSine, MeanMatchesNumericalIntegral) {
     return sum / samples;
   };
   for (const double end_s : {-0.0039, 0.002, 0.013, 0.1}) {
-    EXPECT_NEAR(wave.compute_lit_fraction(-0.004, end_s), mean_until(end_s), 1e-7);
+    EXPECT_NEAR(wave.compute_mean_light_fraction(-0.004, end_s), mean_until(end_s), 1e-7);
   }
 }
 
-TEST_F(FrameRendererForeignLight, StripesMatchFrequencyDutyAndPhaseOfPwm) {
+TEST_F(FrameRendererForeignLight, PwmStripesMatchFrequencyDutyAndPhase) {
   // 500 Hz are 66.7 rows; the light is 400 rows high.
   scene_.clutter.foreign_lights = {
-      {{{0, 0, 1.6}, make_disc(1.2), 1e9, 1}, SquareWave{500, 0.3, 0}, 0.25}};
+      {{{0, 0, 1.6}, make_disc_lamp_shape(1.2), 1e9, 1}, SquareWave{500, 0.3, 0}, 0.25}};
   const cv::Mat1f image = rendered();
   std::vector<double> rises;
   double lit = 0;
@@ -77,9 +77,9 @@ TEST_F(FrameRendererForeignLight, StripesMatchFrequencyDutyAndPhaseOfPwm) {
   EXPECT_NEAR(lit, 0.3, 0.001) << "three periods";
 }
 
-TEST_F(FrameRendererForeignLight, RowBrightnessMatchesMainsEquation) {
+TEST_F(FrameRendererForeignLight, RowBrightnessMatchesRectifiedSineOfMainsLight) {
   scene_.clutter.foreign_lights = {
-      {{{0, 0, 1.6}, make_disc(1.2), 1e9, 1}, RectifiedSine{100, 0.6, 0}, 0.2}};
+      {{{0, 0, 1.6}, make_disc_lamp_shape(1.2), 1e9, 1}, RectifiedSine{100, 0.6, 0}, 0.2}};
   LampShot long_shot = shot();
   long_shot.exposure_s = 5e-4;
   const cv::Mat1f image = rendered(long_shot);
@@ -91,13 +91,13 @@ TEST_F(FrameRendererForeignLight, RowBrightnessMatchesMainsEquation) {
   }
 }
 
-TEST_F(FrameRendererForeignLight, RendersRectangle) {
+TEST_F(FrameRendererForeignLight, RectangularForeignLightCoversItsProjectedArea) {
   const Glow tube{{0.1, 0, 1.6}, {ShapeKind::rectangle, Eigen::Vector2d(0.9, 0.06)}, 1e9, 1};
   scene_.clutter.foreign_lights = {{tube, RectifiedSine{120, 0, 0}, {}}};
   EXPECT_NEAR(measure_brightness(rendered()).sum, 300 * 20 * 5e4, 1e-4 * 300 * 20 * 5e4);
 }
 
-TEST_F(FrameRendererForeignLight, AmbientFlickerVariesByRowOnly) {
+TEST_F(FrameRendererForeignLight, AmbientFlickerVariesByRowButNotAlongRow) {
   scene_.ambient_e_per_s = 2e7;
   scene_.clutter.ambient_flicker = RectifiedSine{100, 0.5, 0};
   scene_.clutter.windows = {{{0.3, 0.1, 1.6}, {0, 0.3, 0}, {0.15, 0, 0}, 5e7}};
@@ -114,7 +114,7 @@ TEST_F(FrameRendererForeignLight, AmbientFlickerVariesByRowOnly) {
   EXPECT_NEAR(image(370, 520), 2500, 1e-2) << "daylight does not flicker";
 }
 
-TEST_F(FrameRendererForeignLight, BlindRendersBarsOfWindow) {
+TEST_F(FrameRendererForeignLight, BlindRendersAlternateBrightAndDarkBars) {
   // 80 px along x, 100 px along y: ten bars of 5 px along x.
   scene_.ambient_e_per_s = 1e6;
   scene_.clutter.blinds = {{{{0.1, 0.1, 1.6}, {0.24, 0, 0}, {0, 0.3, 0}, 6e7}, 10, 0.5}};
@@ -145,7 +145,7 @@ TEST_F(FrameRendererForeignLight, SlantedBlindRendersBarsAlongFirstEdge) {
   }
 }
 
-TEST_F(FrameRendererForeignLight, SignRendersSeededLettersOfItsRadiance) {
+TEST_F(FrameRendererForeignLight, SignRendersSeededRandomStrokesOfItsRadiance) {
   scene_.ambient_e_per_s = 1e6;
   scene_.clutter.signs = {{{{-0.3, -0.15, 1.6}, {0.6, 0, 0}, {0, 0.3, 0}, 6e7}, 2, 5, {}}};
   draw_random_scene_parts(scene_);
@@ -172,13 +172,13 @@ TEST_F(FrameRendererForeignLight, SignRendersSeededLettersOfItsRadiance) {
   EXPECT_FALSE(same) << "another seed";
 }
 
-TEST_F(FrameRendererForeignLight, IsListedInTrueOtherLightsOnly) {
+TEST_F(FrameRendererForeignLight, ForeignLightsInViewAreListedAsOtherLightsNotLamps) {
   scene_.clutter.foreign_lights = {
-      {{{0.3, 0, 1.6}, make_disc(0.12), 1e9, 1}, SquareWave{500, 0.3, 0}, {}},
-      {{{-0.3, 0, 1.6}, make_disc(0.12), 1e9, 1}, RectifiedSine{100, 1, 0}, {}},
-      {{{5, 0, 1.6}, make_disc(0.12), 1e9, 1}, RectifiedSine{100, 1, 0}, {}}};
+      {{{0.3, 0, 1.6}, make_disc_lamp_shape(0.12), 1e9, 1}, SquareWave{500, 0.3, 0}, {}},
+      {{{-0.3, 0, 1.6}, make_disc_lamp_shape(0.12), 1e9, 1}, RectifiedSine{100, 1, 0}, {}},
+      {{{5, 0, 1.6}, make_disc_lamp_shape(0.12), 1e9, 1}, RectifiedSine{100, 1, 0}, {}}};
   const FrameRenderer renderer(scene_);
-  const auto lights = find_other_lights_in_image(scene_, renderer, shot());
+  const auto lights = find_true_other_lights_in_image(scene_, renderer, shot());
   ASSERT_EQ(lights.size(), 2U) << "the third is out of view";
   EXPECT_EQ(lights[0].kind, "pwm");
   EXPECT_EQ(lights[1].kind, "mains");
@@ -186,10 +186,10 @@ TEST_F(FrameRendererForeignLight, IsListedInTrueOtherLightsOnly) {
   EXPECT_NEAR(lights[0].pixel.x(), 499.5, 1e-6);
   EXPECT_EQ(lights[0].in_view, 1);
   EXPECT_EQ(find_true_lamps_in_image(scene_, renderer, shot()).size(), 1U);
-  EXPECT_EQ(make_lamp_map(scene_, true).lamps.size(), 1U);
+  EXPECT_EQ(make_scene_lamp_map(scene_, true).lamps.size(), 1U);
 }
 
-TEST_F(FrameRendererForeignLight, WriteTruthTablesListsItInTrueOtherLightsTable) {
+TEST_F(FrameRendererForeignLight, WriteTruthTablesListsForeignLightInTrueOtherLights) {
   CaptureSet set{"check", 5e-5, LampShots{}, {}};
   set.lamps->heights_m = {0.1};
   set.lamps->pivots_m = {Eigen::Vector2d::Zero()};
@@ -202,7 +202,7 @@ TEST_F(FrameRendererForeignLight, WriteTruthTablesListsItInTrueOtherLightsTable)
   write_truth_tables(scene_, FrameRenderer(scene_), set, folder / "");
   EXPECT_FALSE(std::filesystem::exists(folder / "true_other_lights.csv")) << "there are none";
   scene_.clutter.foreign_lights = {
-      {{{0.3, 0, 1.6}, make_disc(0.12), 1e9, 1}, SquareWave{500, 0.3, 0}, {}}};
+      {{{0.3, 0, 1.6}, make_disc_lamp_shape(0.12), 1e9, 1}, SquareWave{500, 0.3, 0}, {}}};
   scene_.clutter.mirrors = {{{{0.4, -1, 0}, {0, 2, 0}, {0, 0, 1.7}, 0}, 0.2}};
   write_truth_tables(scene_, FrameRenderer(scene_), set, folder / "");
   const std::string table = TemporaryFolder::read_content(folder / "true_other_lights.csv");
@@ -212,7 +212,7 @@ TEST_F(FrameRendererForeignLight, WriteTruthTablesListsItInTrueOtherLightsTable)
             "0000.png,pwm,,499.500000,299.500000,1\n");
 }
 
-TEST(LampShot, ForeignLightPhasesDoNotChangeOtherRandomValues) {
+TEST(MakeSimulatedLampCapture, ForeignLightPhasesDoNotChangeOtherRandomValues) {
   Scene scene = plain_scene();
   scene.lamps[0].phase.reset();
   CaptureSet set{"check", 5e-5, LampShots{}, {}};
@@ -222,12 +222,13 @@ TEST(LampShot, ForeignLightPhasesDoNotChangeOtherRandomValues) {
   set.lamps->yaw_jitter_rad = set.lamps->turn_rate_rad_per_s = 0;
   set.lamps->repeat = 3;
   set.lamps->interval_s = 0.25;
-  const LampShot without = make_lamp_shot(scene, set, 1);
+  const LampShot without = make_simulated_lamp_capture(scene, set, 1);
   scene.clutter.foreign_lights = {
-      {{{0.3, 0, 1.6}, make_disc(0.12), 1e9, 1}, SquareWave{500, 0.3, 0}, {}},
-      {{{0, 0.3, 1.6}, make_disc(0.12), 1e9, 1}, RectifiedSine{101, 1, 0}, 0.5}};
+      {{{0.3, 0, 1.6}, make_disc_lamp_shape(0.12), 1e9, 1}, SquareWave{500, 0.3, 0}, {}},
+      {{{0, 0.3, 1.6}, make_disc_lamp_shape(0.12), 1e9, 1}, RectifiedSine{101, 1, 0}, 0.5}};
   scene.clutter.ambient_flicker = RectifiedSine{100, 0.5, 0};
-  const LampShot with = make_lamp_shot(scene, set, 1), next = make_lamp_shot(scene, set, 2);
+  const LampShot with = make_simulated_lamp_capture(scene, set, 1),
+                 next = make_simulated_lamp_capture(scene, set, 2);
   EXPECT_EQ(with.waves.at(0).phase, without.waves.at(0).phase);
   EXPECT_EQ(with.noise_seed, without.noise_seed);
   ASSERT_EQ(with.foreign_waves.size(), 2U);

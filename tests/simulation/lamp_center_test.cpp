@@ -36,18 +36,19 @@ class FrameRendererDisc : public testing::TestWithParam<LensCase> {
   FrameRendererDisc() {
     scene_.camera = GetParam().camera;
     scene_.mount.level_from_camera =
-        level_from_inclination({GetParam().tilt_rad, -GetParam().tilt_rad / 2});
+        level_rotation_from_inclination({GetParam().tilt_rad, -GetParam().tilt_rad / 2});
     scene_.optics.blur_px = GetParam().blur_px;
   }
 
   /// Returns the image of a capture, with blur and quantization.
   cv::Mat1f render_image(const FrameRenderer& renderer, const LampShot& shot) const {
-    const cv::Mat image = simulate_sensor(scene_.sensor, renderer.render_lamp_electrons(shot), 1);
+    const cv::Mat image =
+        simulate_sensor_image(scene_.sensor, renderer.render_lamps_in_electrons(shot), 1);
     return cv::Mat1f(image);
   }
   std::vector<Eigen::Vector2d> projected(const LampShot& shot,
                                          const std::vector<Eigen::Vector3d>& points_m) const {
-    const MrcalOracle mrcal(std::string(to_string(scene_.camera.lens_model)),
+    const MrcalOracle mrcal(std::string(lens_model_name(scene_.camera.lens_model)),
                             scene_.camera.intrinsics);
     const Eigen::Isometry3d camera_from_world = shot.motion.world_from_camera(0).inverse();
     std::vector<Eigen::Vector3d> rays;
@@ -75,7 +76,7 @@ class FrameRendererDisc : public testing::TestWithParam<LensCase> {
   Scene scene_ = plain_scene();
 };
 
-TEST_P(FrameRendererDisc, CentroidMatchesProjectedOutline) {
+TEST_P(FrameRendererDisc, CentroidAndTotalLightMatchProjectedOutline) {
   constexpr int rim_points = 20000;
   const FrameRenderer renderer(scene_);
   const Glow& glow = scene_.lamps[0].glow;
@@ -84,7 +85,7 @@ TEST_P(FrameRendererDisc, CentroidMatchesProjectedOutline) {
     for (int i = 0; i < rim_points; ++i) {
       const double angle = 2 * std::numbers::pi * i / rim_points;
       rim_m.push_back(glow.position_m +
-                      glow.radius_m() * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0));
+                      glow.glow_radius_m() * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0));
     }
     const auto outline = projected(shot, rim_m);
     // The centroid of a polygon.
@@ -102,7 +103,7 @@ TEST_P(FrameRendererDisc, CentroidMatchesProjectedOutline) {
   }
 }
 
-TEST_P(FrameRendererDisc, CentroidOnCeilingMatchesLampPosition) {
+TEST_P(FrameRendererDisc, CentroidBackProjectedToCeilingMatchesLampPosition) {
   const FrameRenderer renderer(scene_);
   const Eigen::Vector3d lamp_m = scene_.lamps[0].glow.position_m;
   for (const LampShot& shot : shots(renderer)) {
@@ -113,8 +114,9 @@ TEST_P(FrameRendererDisc, CentroidOnCeilingMatchesLampPosition) {
     const cv::Mat1f image = render_image(renderer, shot);
     const Eigen::Isometry3d world_from_camera = shot.motion.world_from_camera(0);
     const auto ceiling_m = [&](double u, double v) {
-      const Eigen::Vector3d ray = world_from_camera.linear() *
-                                  renderer.pixel_rays().lens().unproject({u, v}).value().direction;
+      const Eigen::Vector3d ray =
+          world_from_camera.linear() *
+          renderer.pixel_rays().camera_lens().unproject_pixel({u, v}).value().direction;
       return Eigen::Vector2d(world_from_camera.translation().head<2>() +
                              (lamp_m.z() - world_from_camera.translation().z()) / ray.z() *
                                  ray.head<2>());

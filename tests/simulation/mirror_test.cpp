@@ -27,7 +27,7 @@ class FrameRendererMirror : public testing::Test {
     const FrameRenderer renderer(scene_);
     LampShot shot = shot_at(scene_, {0, 0, 0.1}, 0);
     for (SquareWave& wave : shot.waves) wave = {wave.frequency_hz, duty, phase};
-    return renderer.render_lamp_electrons(shot);
+    return renderer.render_lamps_in_electrons(shot);
   }
   /// Returns the part of the image in which the pane appears.
   static cv::Mat1f behind_pane(const cv::Mat1f& image) {
@@ -37,12 +37,12 @@ class FrameRendererMirror : public testing::Test {
   }
   std::vector<TrueOtherLight> truth() const {
     const FrameRenderer renderer(scene_);
-    return find_other_lights_in_image(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0));
+    return find_true_other_lights_in_image(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0));
   }
   Scene scene_ = plain_scene();
 };
 
-TEST(MakeReflectionAboutPanel, MovesPointsByTwiceTheirDistance) {
+TEST(MakeReflectionAboutPanel, MovesPointByTwiceItsDistanceFromPanel) {
   const Eigen::Isometry3d reflection =
       make_reflection_about_panel({{0.4, 5, 0}, {0, 2, 0}, {0, 0, 3}, 0});
   EXPECT_LT((reflection * Eigen::Vector3d(0.1, 2, 3) - Eigen::Vector3d(0.7, 2, 3)).norm(), 1e-12);
@@ -52,7 +52,7 @@ TEST(MakeReflectionAboutPanel, MovesPointsByTwiceTheirDistance) {
   EXPECT_LT((slanted * Eigen::Vector3d::Zero() - Eigen::Vector3d(1, 1, 0)).norm(), 1e-12);
 }
 
-TEST_F(FrameRendererMirror, ReflectsLampAtMirroredPositionTimesReflectance) {
+TEST_F(FrameRendererMirror, MirrorImageHasMirroredPositionAndLightTimesReflectance) {
   // The mirror image of the lamp over the camera is 0.8 m aside: 266.7 px.
   const Brightness lamp = measure_brightness(cv::Mat1f(rendered().colRange(0, 480)));
   const Brightness image = measure_brightness(behind_pane(rendered()));
@@ -63,7 +63,7 @@ TEST_F(FrameRendererMirror, ReflectsLampAtMirroredPositionTimesReflectance) {
   EXPECT_NEAR(rendered()(299, 666), 0.2 * 5e4, 1);
 }
 
-TEST_F(FrameRendererMirror, ReflectionFlickersInPhaseWithLamp) {
+TEST_F(FrameRendererMirror, MirrorImageFlickersInPhaseWithLamp) {
   const cv::Mat1f always = rendered(), switched = rendered(0.4, 0.3);
   bool dark = false, lit = false;
   for (int line = 280; line < 320; ++line) {
@@ -75,7 +75,7 @@ TEST_F(FrameRendererMirror, ReflectionFlickersInPhaseWithLamp) {
   EXPECT_TRUE(dark && lit);
 }
 
-TEST_F(FrameRendererMirror, ReflectsNothingOutsidePane) {
+TEST_F(FrameRendererMirror, MirrorImageIsCutAtBorderOfPane) {
   // The rays to the mirror image cross the plane of the pane half way up, at 0.85 m, from y = -4.5
   // to 4.5 cm: a pane from y = 0 reflects half of it.
   pane() = {{0.4, 0, 0}, {0, 1, 0}, {0, 0, 1.7}, 0};
@@ -91,7 +91,7 @@ TEST_F(FrameRendererMirror, ReflectsNothingOutsidePane) {
   EXPECT_TRUE(truth().empty());
 }
 
-TEST_F(FrameRendererMirror, DoesNotReflectLampBehindPane) {
+TEST_F(FrameRendererMirror, LampBehindPaneHasNoMirrorImage) {
   // Its mirror image would be before the pane, in line with the upper part of the pane.
   pane() = {{0.4, -1, 0}, {0, 2, 0}, {0, 0, 4}, 0};
   scene_.lamps[0].glow.position_m.x() = 0.6;
@@ -102,7 +102,7 @@ TEST_F(FrameRendererMirror, DoesNotReflectLampBehindPane) {
   EXPECT_EQ(cv::norm(with, rendered(), cv::NORM_INF), 0);
 }
 
-TEST_F(FrameRendererMirror, ReflectsDarkSideOfRecess) {
+TEST_F(FrameRendererMirror, MirrorImageHasMirroredDarkSideOfRecess) {
   const double dark_azimuth_rad = 0.3;
   scene_.lamps[0].glow.recess = Recess{0.05, 0.04, 0.2, DarkSide{0.02, dark_azimuth_rad}};
   const cv::Mat1f image = behind_pane(rendered());
@@ -115,7 +115,7 @@ TEST_F(FrameRendererMirror, ReflectsDarkSideOfRecess) {
   EXPECT_LT(cv::norm(image, cv::Mat1f(0.2 * moved), cv::NORM_INF), 0.01);
 }
 
-TEST_F(FrameRendererMirror, GlossyCeilingShowsDiscButNotRecessedLamp) {
+TEST_F(FrameRendererMirror, GlossyCeilingReflectsDiscButNotRecessedLamp) {
   // A glossy ceiling 20 cm above the lamp: its mirror image is at 1.8 + 0.2 m, 1.9 m above.
   scene_.clutter.mirrors = {{{{-1, -1, 1.8}, {2, 0, 0}, {0, 2, 0}, 0}, 0.2}};
   scene_.lamps[0].glow.position_m.x() = 0.5;
@@ -128,7 +128,7 @@ TEST_F(FrameRendererMirror, GlossyCeilingShowsDiscButNotRecessedLamp) {
   EXPECT_EQ(rendered()(299, int(std::lround(u_px)) - 10), 0);
 }
 
-TEST_F(FrameRendererMirror, MirrorImageIsListedInTrueOtherLightsOnly) {
+TEST_F(FrameRendererMirror, MirrorImageIsListedAsOtherLightNotAsLamp) {
   const auto lights = truth();
   ASSERT_EQ(lights.size(), 1U);
   EXPECT_EQ(lights[0].kind, "mirror_image");

@@ -22,7 +22,7 @@ TEST(MakeSimulationProvenance, PrependsProgramLineAndReplacesSceneSeed) {
             "# vlp-simulate 0.2.0\nformat: vlp-scene/1\nseed: 7\nlamps: []\n");
 }
 
-TEST(MakeSimulationProvenance, RejectsSeedWithoutLineOfItsOwn) {
+TEST(MakeSimulationProvenance, RejectsSeedWhenSceneSeedSharesItsLine) {
   const TemporaryFolder folder;
   const auto scene = folder.file("scene.yaml", "{format: vlp-scene/1, seed: 1}\n");
   EXPECT_THAT(
@@ -30,9 +30,9 @@ TEST(MakeSimulationProvenance, RejectsSeedWithoutLineOfItsOwn) {
       testing::HasSubstr("--seed needs the scene's seed on a line of its own"));
 }
 
-TEST(FindPageSize, ReturnsPageSizeOrThrowsForUnknownName) {
-  EXPECT_EQ(find_paper_size_by_name("A3").size_m.x(), 0.297);
-  EXPECT_EQ(rejection_message<std::invalid_argument>([] { find_paper_size_by_name("B5"); }),
+TEST(FindPageSizeByName, ReturnsPaperSizeOrThrowsForUnknownName) {
+  EXPECT_EQ(find_page_size_by_name("A3").size_m.x(), 0.297);
+  EXPECT_EQ(rejection_message<std::invalid_argument>([] { find_page_size_by_name("B5"); }),
             "there is no paper 'B5', only A4, A3, A2, A1, A0, Letter");
 }
 

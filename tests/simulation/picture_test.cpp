@@ -24,40 +24,41 @@ cv::Mat1f step(double left, double right) {
 
 bool same(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF) == 0; }
 
-TEST(SimulateSensor, AppliesToneCurveToStep) {
-  const cv::Mat image = simulate_sensor(kSensor, step(20, 200), 1, ImageProcessing{2.2, {}, {}});
+TEST(SimulateSensorImage, AppliesGammaToBothLevelsOfStep) {
+  const cv::Mat image =
+      simulate_sensor_image(kSensor, step(20, 200), 1, ImageProcessing{2.2, {}, {}});
   EXPECT_EQ(image.at<std::uint8_t>(10, 19), std::lround(255 * std::pow(10 / 255.0, 1 / 2.2)));
   EXPECT_EQ(image.at<std::uint8_t>(10, 20), std::lround(255 * std::pow(100 / 255.0, 1 / 2.2)));
 }
 
-TEST(CorrectViewsForToneCurve, MapsBlackLevelToZeroAndClipsAtWhite) {
+TEST(ApplyToneCurveToGrayLevel, MapsBlackLevelToZeroAndClipsAtWhite) {
   Sensor sensor = kSensor;
   sensor.black_level_dn = 15;
   const ImageProcessing picture{2, {}, {}};
-  EXPECT_EQ(correct_views_for_tone_curve(picture, sensor, 15), 0);
-  EXPECT_EQ(correct_views_for_tone_curve(picture, sensor, 3), 0) << "noise below it";
-  EXPECT_EQ(correct_views_for_tone_curve(picture, sensor, 15 + 60), 255 * 0.5);
-  EXPECT_EQ(correct_views_for_tone_curve(picture, sensor, 300), 255);
+  EXPECT_EQ(apply_tone_curve_to_gray_level(picture, sensor, 15), 0);
+  EXPECT_EQ(apply_tone_curve_to_gray_level(picture, sensor, 3), 0) << "noise below it";
+  EXPECT_EQ(apply_tone_curve_to_gray_level(picture, sensor, 15 + 60), 255 * 0.5);
+  EXPECT_EQ(apply_tone_curve_to_gray_level(picture, sensor, 300), 255);
   sensor.bits = 16;
-  EXPECT_EQ(correct_views_for_tone_curve(picture, sensor, 65535), 65535);
+  EXPECT_EQ(apply_tone_curve_to_gray_level(picture, sensor, 65535), 65535);
 }
 
-TEST(SimulateSensor, HasFixConvergedByGammaOne) {
+TEST(SimulateSensorImage, GammaOneLeavesImageUnchanged) {
   const Sensor noisy{16, 0.5, 0, 60000, 0, true, {}};
   const cv::Mat1f electrons = step(300, 3000);
-  EXPECT_TRUE(same(simulate_sensor(noisy, electrons, 1, ImageProcessing{1, {}, {}}),
-                   simulate_sensor(noisy, electrons, 1)));
+  EXPECT_TRUE(same(simulate_sensor_image(noisy, electrons, 1, ImageProcessing{1, {}, {}}),
+                   simulate_sensor_image(noisy, electrons, 1)));
 }
 
 const ImageProcessing kBayer{1, {}, {}, Bayer{0.5, 0.25}};
 
-TEST(ExposeBayer, ReturnsGrayColorImageForUniformLight) {
-  const cv::Mat image = simulate_sensor(kSensor, cv::Mat1f(20, 40, 200), 1, kBayer);
+TEST(SimulateSensorImage, BayerImageOfUniformLightIsGray) {
+  const cv::Mat image = simulate_sensor_image(kSensor, cv::Mat1f(20, 40, 200), 1, kBayer);
   ASSERT_EQ(image.type(), CV_8UC3);
   EXPECT_TRUE(same(image, cv::Mat(image.size(), CV_8UC3, cv::Scalar::all(100))));
 }
 
-TEST(ExposeBayer, LitPixelAppearsInColorOfItsFilter) {
+TEST(SimulateSensorImage, BayerPixelAppearsOnlyInColorOfItsFilter) {
   struct Lit {
     int line, place, color;
     float electrons;
@@ -68,7 +69,7 @@ TEST(ExposeBayer, LitPixelAppearsInColorOfItsFilter) {
     cv::Mat1f light(20, 40, 0.F);
     light(line, place) = electrons;
     cv::Mat channels[3];
-    cv::split(simulate_sensor(kSensor, light, 1, kBayer), channels);
+    cv::split(simulate_sensor_image(kSensor, light, 1, kBayer), channels);
     for (int i = 0; i < 3; ++i) {
       EXPECT_EQ(cv::countNonZero(channels[i]) > 0, i == color) << line << ", " << place;
     }
@@ -79,7 +80,7 @@ TEST(ExposeBayer, LitPixelAppearsInColorOfItsFilter) {
   }
 }
 
-TEST(ExposeBayer, ReproducesLinearGradient) {
+TEST(SimulateSensorImage, BayerImageReproducesLinearGradient) {
   cv::Mat1f light(20, 40);
   for (int line = 0; line < light.rows; ++line) {
     for (int place = 0; place < light.cols; ++place) {
@@ -87,7 +88,7 @@ TEST(ExposeBayer, ReproducesLinearGradient) {
     }
   }
   cv::Mat channels[3];
-  cv::split(simulate_sensor(kSensor, light, 1, kBayer), channels);
+  cv::split(simulate_sensor_image(kSensor, light, 1, kBayer), channels);
   // Levels behind filters are rounded, and multiplied by up to four after.
   for (int line = 1; line + 1 < light.rows; ++line) {
     for (int place = 1; place + 1 < light.cols; ++place) {
@@ -98,7 +99,7 @@ TEST(ExposeBayer, ReproducesLinearGradient) {
   }
 }
 
-TEST(ApplyToneCurveAndSharpening, OvershootsStepLikeUnsharpMask) {
+TEST(ApplyToneCurveAndSharpening, OvershootAtStepMatchesUnsharpMaskEquation) {
   const double amount = 0.8, radius_px = 1.5, low = 50, high = 100;
   const ImageProcessing picture{1, Sharpening{amount, radius_px}, {}};
   cv::Mat1f levels = step(low, high);
@@ -114,11 +115,11 @@ TEST(ApplyToneCurveAndSharpening, OvershootsStepLikeUnsharpMask) {
   EXPECT_NEAR(levels(10, 39), high, 1e-3);
 }
 
-TEST(SimulateSensor, SharpensAfterToneCurveAndBeforeRounding) {
+TEST(SimulateSensorImage, SharpensAfterToneCurveAndBeforeRounding) {
   const ImageProcessing curve{2, {}, {}}, curve_and_sharpening{2, Sharpening{1, 1}, {}};
-  const double low = correct_views_for_tone_curve(curve, kSensor, 10),
-               high = correct_views_for_tone_curve(curve, kSensor, 100);
-  const cv::Mat image = simulate_sensor(kSensor, step(20, 200), 1, curve_and_sharpening);
+  const double low = apply_tone_curve_to_gray_level(curve, kSensor, 10),
+               high = apply_tone_curve_to_gray_level(curve, kSensor, 100);
+  const cv::Mat image = simulate_sensor_image(kSensor, step(20, 200), 1, curve_and_sharpening);
   const ImageProcessing sharpening{1, Sharpening{1, 1}, {}};
   cv::Mat1f levels = step(low, high);
   apply_tone_curve_and_sharpening(sharpening, kSensor, levels);
@@ -127,42 +128,44 @@ TEST(SimulateSensor, SharpensAfterToneCurveAndBeforeRounding) {
   }
 }
 
-TEST(EncodeImage, ReturnsLosslessPngWithoutJpegQuality) {
+TEST(EncodeImageAsJpegOrPng, ReturnsLosslessPngWithoutJpegQuality) {
   const Sensor noisy{8, 0.5, 5, 60000, 8, true, {}};
-  const cv::Mat image = simulate_sensor(noisy, step(50, 400), 1);
+  const cv::Mat image = simulate_sensor_image(noisy, step(50, 400), 1);
   for (const auto& picture :
        {std::optional<ImageProcessing>(), std::optional<ImageProcessing>({2.2, {}, {}})}) {
     EXPECT_EQ(image_file_extension(picture), ".png");
-    EXPECT_TRUE(same(cv::imdecode(encode_image(image, picture), cv::IMREAD_UNCHANGED), image));
+    EXPECT_TRUE(same(
+        cv::imdecode(encode_image_as_jpeg_or_png(image, picture), cv::IMREAD_UNCHANGED), image));
   }
 }
 
-TEST(EncodeImage, ReturnsJpegOfGivenQuality) {
+TEST(EncodeImageAsJpegOrPng, JpegHasLessLossAtHigherQuality) {
   const Sensor noisy{8, 0.5, 5, 60000, 8, true, {}};
-  const cv::Mat image = simulate_sensor(noisy, step(50, 400), 1);
+  const cv::Mat image = simulate_sensor_image(noisy, step(50, 400), 1);
   const ImageProcessing coarse{1, {}, 30}, fine{1, {}, 95};
   EXPECT_EQ(image_file_extension(fine), ".jpg");
-  const auto bytes = encode_image(image, fine);
+  const auto bytes = encode_image_as_jpeg_or_png(image, fine);
   EXPECT_EQ(bytes.at(0), 0xff);
   EXPECT_EQ(bytes.at(1), 0xd8);
-  EXPECT_EQ(encode_image(image, fine), bytes);
-  EXPECT_GT(bytes.size(), encode_image(image, coarse).size());
+  EXPECT_EQ(encode_image_as_jpeg_or_png(image, fine), bytes);
+  EXPECT_GT(bytes.size(), encode_image_as_jpeg_or_png(image, coarse).size());
   const cv::Mat found = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
   EXPECT_EQ(found.type(), CV_8U);
   const double loss = cv::norm(found, image),
-               coarse_loss =
-                   cv::norm(cv::imdecode(encode_image(image, coarse), cv::IMREAD_UNCHANGED), image);
+               coarse_loss = cv::norm(
+                   cv::imdecode(encode_image_as_jpeg_or_png(image, coarse), cv::IMREAD_UNCHANGED),
+                   image);
   EXPECT_GT(loss, 0);
   EXPECT_LT(loss, 0.5 * coarse_loss);
 }
 
-TEST(LampShot, ImageNameHasExtensionOfPictureFormat) {
+TEST(MakeSimulatedLampCapture, ImageNameIsPngUnlessJpegQualityIsGiven) {
   Scene scene = plain_scene();
   const LampShots captures{{0}, {{0, 0}}, {}, {0}, 0, 0, 1, 0.5, false};
   const CaptureSet set{"one", 5e-5, captures, {}};
-  EXPECT_EQ(make_lamp_shot(scene, set, 0).image, "0000.png");
+  EXPECT_EQ(make_simulated_lamp_capture(scene, set, 0).image, "0000.png");
   scene.picture = ImageProcessing{2.2, {}, 90};
-  EXPECT_EQ(make_lamp_shot(scene, set, 0).image, "0000.jpg");
+  EXPECT_EQ(make_simulated_lamp_capture(scene, set, 0).image, "0000.jpg");
 }
 
 }  // namespace

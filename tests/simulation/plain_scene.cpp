@@ -31,8 +31,12 @@ Scene plain_scene() {
   scene.camera = paper_rig_camera();
   scene.sensor = {16, 1, 0, 60000, 0, false, {}};
   scene.mount = {Eigen::Matrix3d::Identity(), Eigen::Vector2d::Zero()};
-  scene.lamps = {
-      {1, {{0, 0, 1.6}, make_disc(0.18), 1e9, 1}, 1000, 1, 0.0, Eigen::Vector3d::Zero()}};
+  scene.lamps = {{1,
+                  {{0, 0, 1.6}, make_disc_lamp_shape(0.18), 1e9, 1},
+                  1000,
+                  1,
+                  0.0,
+                  Eigen::Vector3d::Zero()}};
   return scene;
 }
 
@@ -43,7 +47,7 @@ LampShot shot_at(const Scene& scene, const Eigen::Vector3d& position_m, double y
     shot.waves.push_back({lamp.frequency_hz, lamp.duty, lamp.phase.value_or(0)});
   }
   for (const ForeignLight& light : scene.clutter.foreign_lights) {
-    shot.foreign_waves.push_back(with_wave_phase(light.wave, light.phase.value_or(0)));
+    shot.foreign_waves.push_back(copy_light_wave_with_phase(light.wave, light.phase.value_or(0)));
   }
   return shot;
 }

@@ -18,12 +18,13 @@ namespace {
 class FrameRendererRectangle : public testing::TestWithParam<LampShape> {
  protected:
   FrameRendererRectangle() {
-    scene_.mount.level_from_camera = level_from_inclination({rad_from_deg(2), rad_from_deg(-1)});
+    scene_.mount.level_from_camera =
+        level_rotation_from_inclination({rad_from_deg(2), rad_from_deg(-1)});
     scene_.lamps[0].glow.shape = GetParam();
   }
   std::vector<Eigen::Vector2d> projected(const LampShot& shot,
                                          const std::vector<Eigen::Vector3d>& points_m) const {
-    const MrcalOracle mrcal(std::string(to_string(scene_.camera.lens_model)),
+    const MrcalOracle mrcal(std::string(lens_model_name(scene_.camera.lens_model)),
                             scene_.camera.intrinsics);
     const Eigen::Isometry3d camera_from_world = shot.motion.world_from_camera(0).inverse();
     std::vector<Eigen::Vector3d> rays;
@@ -34,7 +35,7 @@ class FrameRendererRectangle : public testing::TestWithParam<LampShape> {
   Scene scene_ = plain_scene();
 };
 
-TEST_P(FrameRendererRectangle, CoversProjectedOutline) {
+TEST_P(FrameRendererRectangle, RectangleCoversItsProjectedOutline) {
   constexpr int per_side = 4000;
   const FrameRenderer renderer(scene_);
   const Glow& glow = scene_.lamps[0].glow;
@@ -68,7 +69,8 @@ TEST_P(FrameRendererRectangle, CoversProjectedOutline) {
       twice_area += cross_product_2d(p, q);
       moment += cross_product_2d(p, q) * (p + q) / 3;
     }
-    const cv::Mat1f image(simulate_sensor(scene_.sensor, renderer.render_lamp_electrons(shot), 1));
+    const cv::Mat1f image(
+        simulate_sensor_image(scene_.sensor, renderer.render_lamps_in_electrons(shot), 1));
     const Brightness rendered = measure_brightness(image);
     EXPECT_LT((rendered.centroid_px - moment / twice_area).norm(), 0.001);
     const double level = glow.electron_rate_e_per_s * shot.exposure_s;
@@ -90,7 +92,7 @@ TEST_P(FrameRendererRectangle, CoversProjectedOutline) {
   }
 }
 
-TEST_P(FrameRendererRectangle, TrueLampIsImageOfCenter) {
+TEST_P(FrameRendererRectangle, TrueLampPixelIsProjectedRectangleCenter) {
   const FrameRenderer renderer(scene_);
   const LampShot shot = shot_at(scene_, {0.35, -0.2, 0.1}, 0.4);
   const auto truth = find_true_lamps_in_image(scene_, renderer, shot);
@@ -100,7 +102,7 @@ TEST_P(FrameRendererRectangle, TrueLampIsImageOfCenter) {
   EXPECT_LT((truth[0].pixel - center).norm(), 1e-6);
 }
 
-TEST_P(FrameRendererRectangle, TrueLampIsPartlyInViewAtImageEdge) {
+TEST_P(FrameRendererRectangle, VisibleFractionIsBetweenZeroAndOneAtImageEdge) {
   const FrameRenderer renderer(scene_);
   const LampShot shot = shot_at(scene_, {1.2, 0, 0.1}, 0);
   const auto truth = find_true_lamps_in_image(scene_, renderer, shot);

@@ -8,7 +8,7 @@
 namespace vlp {
 namespace {
 
-TEST(ReadScene, RejectsRadianceOutOfRange) {
+TEST(ReadSceneFile, RejectsElectronRateOutOfRange) {
   const std::string range =
       " electrons per second is not within 0 and 1.0e+12 electrons per second: is it in the right "
       "unit?";
@@ -30,7 +30,7 @@ TEST(ReadScene, RejectsRadianceOutOfRange) {
             "scene.yaml:22: board.black_e_per_s: -2" + range);
 }
 
-TEST(ReadScene, RejectsInvalidSensor) {
+TEST(ReadSceneFile, RejectsInvalidSensor) {
   EXPECT_EQ(refusal_with("bits: 8", "bits: 12"), "scene.yaml:6: sensor.bits: should be 8 or 16");
   EXPECT_EQ(refusal_with("bits: 8", "bits: 32"),
             "scene.yaml:6: sensor.bits: should be a whole number within 8 and 16, not '32'");
@@ -52,7 +52,7 @@ TEST(ReadScene, RejectsInvalidSensor) {
             "charge): is it in the right unit?");
 }
 
-TEST(ReadScene, RejectsInvalidMountOrLens) {
+TEST(ReadSceneFile, RejectsInvalidTiltLeverArmOrFocalLength) {
   EXPECT_EQ(refusal_with("tilt_deg: 2,", "tilt_deg: 100,"),
             "scene.yaml:7: mount.tilt_deg: 100 degrees is not within 0 and 45 degrees: is it in "
             "the right unit?");
@@ -64,12 +64,12 @@ TEST(ReadScene, RejectsInvalidMountOrLens) {
             "positive");
 }
 
-TEST(ReadScene, RejectsTooLargeImager) {
+TEST(ReadSceneFile, RejectsImagerAbove64Megapixels) {
   EXPECT_EQ(refusal_with("imager_px: [160, 120]", "imager_px: [20000, 20000]"),
             "scene.yaml:4: camera.imager_px: has more than 64 million pixels");
 }
 
-TEST(ReadScene, RejectsLightOutsideRoomOrBelowCamera) {
+TEST(ReadSceneFile, RejectsLightsOutsideRoomOrNotAboveCamera) {
   EXPECT_EQ(refusal_with("[-0.6, -0.3, 1.6]", "[-0.6, -0.3, 16]"),
             "scene.yaml:10: lamps[0].position_m: is outside the room");
   EXPECT_EQ(refusal_with("position_m: [0.3, 0, 1.6]", "position_m: [3, 0, 1.6]"),
@@ -88,7 +88,7 @@ TEST(ReadScene, RejectsLightOutsideRoomOrBelowCamera) {
             "scene.yaml:24: captures[0].heights_m[1]: a reflection is not above the camera");
 }
 
-TEST(ReadScene, RejectsInvalidLamp) {
+TEST(ReadSceneFile, RejectsDuplicateLampsAndInvalidPhaseOrMapError) {
   EXPECT_EQ(refusal_with("id: 5,", "id: 1,"), "scene.yaml:11: lamps[1]: id 1 occurs twice");
   EXPECT_EQ(refusal_with("[0.6, 0.2, 1.5]", "[-0.6, -0.3, 1.6]"),
             "scene.yaml:11: lamps[1]: lamp 5 is where lamp 1 is");
@@ -99,7 +99,7 @@ TEST(ReadScene, RejectsInvalidLamp) {
             "scene.yaml:11: lamps[1].map_error_m: should be 3 numbers, not 2");
 }
 
-TEST(ReadScene, RejectsInvalidRecessOrHalo) {
+TEST(ReadSceneFile, RejectsRecessOrHaloValuesOutOfRange) {
   const std::string recess = "scene.yaml:13: clutter.steady_lamps[1].recess.";
   const std::string unit = ": is it in the right unit?";
   EXPECT_EQ(refusal_with("depth_m: 0.07", "depth_m: -0.07"),
@@ -124,7 +124,7 @@ TEST(ReadScene, RejectsInvalidRecessOrHalo) {
             "scene.yaml:11: lamps[1].halo.length_m: 0 m is not within 0.001 and 2 m" + unit);
 }
 
-TEST(ReadScene, RejectsInvalidColorFilters) {
+TEST(ReadSceneFile, RejectsInvalidOrMissingColorFilterRatio) {
   const auto with = [](const std::string& filters) {
     return refusal_with("jpeg_quality: 90}", "jpeg_quality: 90, bayer: {" + filters + "}}");
   };
@@ -136,7 +136,7 @@ TEST(ReadScene, RejectsInvalidColorFilters) {
   EXPECT_THAT(with("red_to_green_ratio: 0.6"), testing::HasSubstr("blue_to_green_ratio"));
 }
 
-TEST(ReadScene, RejectsInvalidChips) {
+TEST(ReadSceneFile, RejectsChipsOutOfRangeOrLargerThanDisc) {
   const auto with = [](const std::string& chips) {
     return refusal_with("rim_to_center_ratio: 0.8}",
                         "rim_to_center_ratio: 0.8, chips: {" + chips + "}}");
@@ -153,7 +153,7 @@ TEST(ReadScene, RejectsInvalidChips) {
             chips + "width_m: is more than twice pitch_m: such chips are an even disc");
 }
 
-TEST(ReadScene, RejectsInvalidRandomChips) {
+TEST(ReadSceneFile, RejectsRandomChipsOutOfRangeOrNextToChips) {
   const auto with = [](const std::string& keys) {
     return refusal_with("rim_to_center_ratio: 0.8}", "rim_to_center_ratio: 0.8, " + keys + "}");
   };
@@ -172,7 +172,7 @@ TEST(ReadScene, RejectsInvalidRandomChips) {
             chips + ": excludes chips: a disc has one of them; leave one out");
 }
 
-TEST(ReadScene, RejectsInvalidRecessExponents) {
+TEST(ReadSceneFile, RejectsRecessSlopeOrExponentOutOfRange) {
   const auto with = [](const std::string& keys) {
     return refusal_with("depth_m: 0.07,", "depth_m: 0.07, " + keys + ",");
   };
@@ -181,7 +181,7 @@ TEST(ReadScene, RejectsInvalidRecessExponents) {
   EXPECT_THAT(with("beam_power: -1"), testing::HasSubstr("recess.beam_power: -1"));
 }
 
-TEST(ReadScene, RejectsInvalidForeignLight) {
+TEST(ReadSceneFile, RejectsForeignLightWithoutWaveOrOutOfRange) {
   const auto with = [](const std::string& keys) {
     return refusal_with(
         "clutter:\n", "clutter:\n  foreign_lights: [{position_m: [0, 0.2, 1.6], " + keys + "}]\n");
@@ -203,7 +203,7 @@ TEST(ReadScene, RejectsInvalidForeignLight) {
               testing::StartsWith(place + ".mains.depth: 1.3"));
 }
 
-TEST(ReadScene, RejectsInvalidMirrorBlindOrSign) {
+TEST(ReadSceneFile, RejectsInvalidMirrorBlindSignOrAmbientFlicker) {
   const auto with = [](const std::string& line) {
     return refusal_with("clutter:\n", "clutter:\n  " + line + "\n");
   };
@@ -223,7 +223,7 @@ TEST(ReadScene, RejectsInvalidMirrorBlindOrSign) {
   EXPECT_THAT(with("ambient_flicker: {depth: 0.3}"), testing::HasSubstr("frequency_hz"));
 }
 
-TEST(ReadScene, RectangleLampTakesKeysOfLampMapOnly) {
+TEST(ReadSceneFile, RejectsDiscKeysForRectangularLamp) {
   const std::string disc =
       "diameter_m: 0.18, frequency_hz: 1600, duty: 0.4, "
       "electron_rate_e_per_s: 2.0e+8, rim_to_center_ratio: 0.8}";
@@ -243,14 +243,14 @@ TEST(ReadScene, RectangleLampTakesKeysOfLampMapOnly) {
   EXPECT_THAT(with("shape: rectangle, yaw_rad: 0"), testing::HasSubstr("size_m"));
 }
 
-TEST(ReadScene, RejectsRimToCenterRatioWithRecess) {
+TEST(ReadSceneFile, RejectsRimToCenterRatioWithRecess) {
   EXPECT_EQ(
       refusal_with("recess: {", "rim_to_center_ratio: 1, recess: {"),
       "scene.yaml:13: clutter.steady_lamps[1]: key 'rim_to_center_ratio' is unknown; the keys are: "
       "position_m, shape, diameter_m, size_m, yaw_rad, electron_rate_e_per_s, recess, halo");
 }
 
-TEST(ReadScene, RejectsInvalidPicture) {
+TEST(ReadSceneFile, RejectsInvalidImageProcessing) {
   const std::string gamma = "scene.yaml:29: processing.gamma: ";
   EXPECT_EQ(refusal_with("gamma: 2.2", "gamma: 0"),
             gamma +
@@ -278,7 +278,7 @@ TEST(ReadScene, RejectsInvalidPicture) {
             "scene.yaml:29: processing: needs levels between sensor.black_level_dn and white");
 }
 
-TEST(ReadScene, RejectsPanelThatIsNoRectangle) {
+TEST(ReadSceneFile, RejectsPanelEdgesThatFormNoRectangle) {
   const std::string problem = "should be at right angles to each other and not of length zero";
   EXPECT_EQ(refusal_with("[0, 0.3, 0]", "[0.01, 0.3, 0]"),
             "scene.yaml:14: clutter.windows[0].edges_m: " + problem);
@@ -291,7 +291,7 @@ TEST(ReadScene, RejectsPanelThatIsNoRectangle) {
             "along each edge");
 }
 
-TEST(ReadScene, RejectsOccluderNotBelowEveryLight) {
+TEST(ReadSceneFile, RejectsOccluderNotBelowEveryLight) {
   const std::string problem =
       "scene.yaml:16: clutter.occluders[0]: is not below every lamp and other light";
   EXPECT_EQ(refusal_with("[-0.7, -0.2, 1.4]", "[-0.7, -0.2, 1.49]"), "");
@@ -303,7 +303,7 @@ TEST(ReadScene, RejectsOccluderNotBelowEveryLight) {
   EXPECT_EQ(refusal_with("[0, 0.3, 0]", "[0, 0, -0.3]"), problem) << "the window";
 }
 
-TEST(ReadScene, RejectsReflectionOfUnknownLamp) {
+TEST(ReadSceneFile, RejectsReflectionOfUnknownLamp) {
   EXPECT_EQ(refusal_with("of_lamp: 5", "of_lamp: 2"),
             "scene.yaml:15: clutter.reflections[0].of_lamp: there is no lamp 2");
   EXPECT_EQ(refusal_with("of_lamp: 5", "of_lamp: -5"),
@@ -311,7 +311,7 @@ TEST(ReadScene, RejectsReflectionOfUnknownLamp) {
             "2147483647, not '-5'");
 }
 
-TEST(ReadScene, RejectsReflectionSizeOfOtherShape) {
+TEST(ReadSceneFile, RejectsReflectionSizeOfOtherShape) {
   const std::string place = "scene.yaml:15: clutter.reflections[0]";
   EXPECT_EQ(refusal_with("diameter_m: 0.22", "shape: rectangle, size_m: [0.6, 0.1]"), "");
   EXPECT_EQ(refusal_with("diameter_m: 0.22", "size_m: [0.6, 0.1]"),
@@ -320,7 +320,7 @@ TEST(ReadScene, RejectsReflectionSizeOfOtherShape) {
             place + ".diameter_m: is of a disc, and this is a rectangle: it has a size_m");
 }
 
-TEST(ReadScene, RejectsInvalidSteadyLampOrBoard) {
+TEST(ReadSceneFile, RejectsSteadyLampOrBoardWarpOutOfRange) {
   EXPECT_EQ(refusal_with("diameter_m: 0.12", "diameter_m: 120"),
             "scene.yaml:13: clutter.steady_lamps[0].diameter_m: 120 m is not within 0.001 and 10 "
             "m: is it in the right unit?");

@@ -9,9 +9,9 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(ReadScene, AcceptsSampleScene) { EXPECT_EQ(scene_refusal(kSceneYaml), ""); }
+TEST(ReadSceneFile, AcceptsSampleScene) { EXPECT_EQ(scene_refusal(kSceneYaml), ""); }
 
-TEST(ReadScene, RejectsUnknownKeyInEachSection) {
+TEST(ReadSceneFile, RejectsUnknownKeyInEachSection) {
   EXPECT_EQ(
       refusal_with("seed: 7", "seed: 7\nlight: 1"),
       "scene.yaml:3: key 'light' is unknown; the keys are: format, seed, room, camera, optics, "
@@ -50,7 +50,7 @@ TEST(ReadScene, RejectsUnknownKeyInEachSection) {
               HasSubstr("scene.yaml:14: clutter: key 'nonsense' is unknown"));
 }
 
-TEST(ReadScene, RejectsMissingKey) {
+TEST(ReadSceneFile, NamesMissingKeyOfEachSection) {
   EXPECT_EQ(refusal_with("seed: 7\n", ""),
             "scene.yaml:1: key 'seed' is missing; the keys are: format, room, camera, optics, "
             "sensor, mount, ambient_e_per_s, lamps, clutter, board, captures, processing");
@@ -88,7 +88,7 @@ TEST(ReadScene, RejectsMissingKey) {
   missing("field_coverage: 0.75, ", "28: captures[3].views: ", "field_coverage");
 }
 
-TEST(ReadScene, RejectsCameraWithoutRowTimeOrReadout) {
+TEST(ReadSceneFile, RejectsCameraWithoutRowTimeReadoutOrSufficientImager) {
   EXPECT_EQ(refusal_with(", row_time_s: 3.0e-5", ""),
             "scene.yaml:4: camera: key 'row_time_s' is missing; the keys are: id, imager_px, "
             "lens_model, intrinsics, pixel_pitch_m, readout");
@@ -100,7 +100,7 @@ TEST(ReadScene, RejectsCameraWithoutRowTimeOrReadout) {
             "'4'");
 }
 
-TEST(ReadScene, RejectsOtherFormat) {
+TEST(ReadSceneFile, RejectsOtherFormat) {
   EXPECT_EQ(refusal_with("vlp-scene/1", "vlp-scene/2"),
             "scene.yaml:1: format: should be 'vlp-scene/1', not 'vlp-scene/2': is it the right "
             "file?");
@@ -109,7 +109,7 @@ TEST(ReadScene, RejectsOtherFormat) {
             "vlp-scene/1'");
 }
 
-TEST(ReadScene, RejectsValueOfWrongType) {
+TEST(ReadSceneFile, RejectsValueOfWrongType) {
   EXPECT_EQ(refusal_with("seed: 7", "seed: -1"),
             "scene.yaml:2: seed: should be a whole number within 0 and 2147483647, not '-1'");
   EXPECT_EQ(refusal_with("blur_px: 0.7", "blur_px: .nan"),

@@ -48,13 +48,13 @@ std::string scene_with(const std::string& from, const std::string& to) {
 
 Scene read_scene_text(const std::string& yaml) {
   const TemporaryFolder folder;
-  return read_scene(folder.file("scene.yaml", yaml));
+  return read_scene_file(folder.file("scene.yaml", yaml));
 }
 
 std::string scene_refusal(const std::string& yaml) {
   const TemporaryFolder folder;
   const auto file = folder.file("scene.yaml", yaml);
-  const std::string message = rejection_message([&] { read_scene(file); });
+  const std::string message = rejection_message([&] { read_scene_file(file); });
   const std::string parent = (folder / "").string();
   return message.starts_with(parent) ? message.substr(parent.size()) : message;
 }

@@ -19,7 +19,7 @@ using testing::Pointwise;
 
 constexpr double kRounding = 1e-12;
 
-TEST(ReadScene, ReadsCameraAndSensor) {
+TEST(ReadSceneFile, ReadsCameraAndSensor) {
   const Scene scene = read_scene_text(kSceneYaml);
   EXPECT_EQ(scene.seed, 7U);
   EXPECT_EQ(scene.camera.id, "small");
@@ -41,14 +41,14 @@ TEST(ReadScene, ReadsCameraAndSensor) {
   EXPECT_EQ(scene.sensor.bloom->sigma_px, 2.5);
 }
 
-TEST(ReadScene, ConvertsMountToRadians) {
+TEST(ReadSceneFile, ConvertsMountTiltFromDegreesToRotation) {
   const Mount mount = read_scene_text(kSceneYaml).mount;
   EXPECT_THAT(mount.level_from_camera,
-              IsNear(level_from_zenith({0, std::tan(rad_from_deg(2)), 1}), kRounding));
+              IsNear(level_rotation_from_zenith({0, std::tan(rad_from_deg(2)), 1}), kRounding));
   EXPECT_EQ(mount.lever_arm_m, Vector2d(0.03, -0.04));
 }
 
-TEST(ReadScene, ReadsLampsInOrderOfFile) {
+TEST(ReadSceneFile, ReadsLampsInOrderOfFile) {
   const Scene scene = read_scene_text(kSceneYaml);
   ASSERT_EQ(scene.lamps.size(), 2U);
   EXPECT_EQ(scene.ambient_e_per_s, 1e6);
@@ -58,7 +58,7 @@ TEST(ReadScene, ReadsLampsInOrderOfFile) {
   const SceneLamp& lamp = scene.lamps[1];
   EXPECT_EQ(lamp.id, 5);
   EXPECT_EQ(lamp.glow.position_m, Vector3d(0.6, 0.2, 1.5));
-  EXPECT_EQ(lamp.glow.radius_m(), 0.05);
+  EXPECT_EQ(lamp.glow.glow_radius_m(), 0.05);
   EXPECT_EQ(lamp.glow.electron_rate_e_per_s, 3e8);
   EXPECT_EQ(lamp.glow.rim_to_center_ratio, 0.9);
   EXPECT_EQ(lamp.frequency_hz, 2500);
@@ -67,7 +67,7 @@ TEST(ReadScene, ReadsLampsInOrderOfFile) {
   EXPECT_EQ(lamp.map_error_m, Vector3d(0.001, 0.002, 0.003));
 }
 
-TEST(ReadScene, ReadsClutterAndBoard) {
+TEST(ReadSceneFile, ReadsClutterAndBoard) {
   const Scene scene = read_scene_text(kSceneYaml);
   const Clutter& clutter = scene.clutter;
   EXPECT_EQ(clutter.steady_lamps.at(0).rim_to_center_ratio, 0.7);
@@ -85,7 +85,7 @@ TEST(ReadScene, ReadsClutterAndBoard) {
   EXPECT_EQ(scene.board->surround_e_per_s, 6e5);
 }
 
-TEST(ReadScene, ReadsReflectionOfRectangle) {
+TEST(ReadSceneFile, ReadsShapeOfRectangularReflection) {
   const Scene scene = read_scene_text(
       scene_with("diameter_m: 0.22", "shape: rectangle, size_m: [0.6, 0.1], yaw_rad: 0.2"));
   const Glow& glow = scene.clutter.reflections.at(0).glow;
@@ -95,7 +95,7 @@ TEST(ReadScene, ReadsReflectionOfRectangle) {
   EXPECT_EQ(glow.rim_to_center_ratio, 0) << "it fades towards its sides";
 }
 
-TEST(ReadScene, ReadsRecessesAndHalos) {
+TEST(ReadSceneFile, ReadsRecessesAndHalosOnlyWhereGiven) {
   const Scene scene = read_scene_text(kSceneYaml);
   ASSERT_EQ(scene.lamps.size(), 2U);
   EXPECT_FALSE(scene.lamps[0].glow.recess);
@@ -112,7 +112,7 @@ TEST(ReadScene, ReadsRecessesAndHalos) {
   EXPECT_NEAR(recess.dark_side->azimuth_rad, std::numbers::pi / 2, kRounding);
 }
 
-TEST(ReadScene, ReadsPicture) {
+TEST(ReadSceneFile, ReadsImageProcessingOnlyIfGiven) {
   const ImageProcessing picture = read_scene_text(kSceneYaml).picture.value();
   EXPECT_EQ(picture.gamma, 2.2);
   ASSERT_TRUE(picture.sharpening);
@@ -122,7 +122,7 @@ TEST(ReadScene, ReadsPicture) {
   EXPECT_FALSE(read_scene_text(scene_with("processing: ", "# ")).picture);
 }
 
-TEST(ReadScene, ReadsSpotsInOrderOfFile) {
+TEST(ReadSceneFile, ReadsSpotsHeightsAndYawsInOrderOfFile) {
   const CaptureSet set = read_scene_text(kSceneYaml).sets.at(0);
   EXPECT_EQ(set.folder, "spots");
   EXPECT_EQ(set.exposure_s, 5e-5);
@@ -139,7 +139,7 @@ TEST(ReadScene, ReadsSpotsInOrderOfFile) {
   EXPECT_EQ(count_captures_of_set(set), 2U * 2 * 2 * 3);
 }
 
-TEST(ReadScene, OrdersCaptureSpotsRowByRow) {
+TEST(ReadSceneFile, OrdersSpotsOfGridRowByRow) {
   const LampShots captures = read_scene_text(kSceneYaml).sets.at(1).lamps.value();
   const std::vector<Vector2d> expected{{-0.6, 0.3},  {0, 0.3},  {0.6, 0.3},
                                        {-0.6, -0.3}, {0, -0.3}, {0.6, -0.3}};
@@ -156,7 +156,7 @@ TEST(ReadScene, OrdersCaptureSpotsRowByRow) {
   EXPECT_FALSE(captures.known);
 }
 
-TEST(ReadScene, ComputesPositionsAlongDriveUpToItsEnd) {
+TEST(ReadSceneFile, ReturnsEquidistantDrivePositionsUpToItsEnd) {
   const LampShots captures = read_scene_text(kSceneYaml).sets.at(2).lamps.value();
   ASSERT_TRUE(captures.drive);
   EXPECT_EQ(captures.drive->speed_m_per_s, 0.5);
@@ -172,7 +172,7 @@ TEST(ReadScene, ComputesPositionsAlongDriveUpToItsEnd) {
               IsNear(Vector2d(0.7, 0), kRounding));
 }
 
-TEST(ReadScene, ReadsBoardViews) {
+TEST(ReadSceneFile, ReadsLimitsOfBoardViews) {
   const CaptureSet set = read_scene_text(kSceneYaml).sets.at(3);
   EXPECT_FALSE(set.lamps);
   EXPECT_EQ(count_captures_of_set(set), 5U);
@@ -184,7 +184,7 @@ TEST(ReadScene, ReadsBoardViews) {
   EXPECT_EQ(set.board->velocity_m_per_s, Vector3d(0.1, 0, 0.2));
 }
 
-TEST(ReadScene, ReadsForeignLightsMirrorsBlindsAndSigns) {
+TEST(ReadSceneFile, ReadsForeignLightsMirrorsBlindsAndSigns) {
   const std::string panel = "corner_m: [0.9, 0.1, 1.5], edges_m: [[0, 0.3, 0], [0, 0, 0.2]], ";
   const Clutter clutter =
       read_scene_text(
@@ -209,7 +209,7 @@ TEST(ReadScene, ReadsForeignLightsMirrorsBlindsAndSigns) {
           .clutter;
   ASSERT_EQ(clutter.foreign_lights.size(), 2U);
   const ForeignLight &dimmed = clutter.foreign_lights[0], &tube = clutter.foreign_lights[1];
-  EXPECT_EQ(dimmed.glow.radius_m(), 0.1);
+  EXPECT_EQ(dimmed.glow.glow_radius_m(), 0.1);
   EXPECT_EQ(dimmed.glow.rim_to_center_ratio, 0.9);
   EXPECT_EQ(dimmed.phase, 0.25);
   EXPECT_EQ(std::get<SquareWave>(dimmed.wave).frequency_hz, 500);
@@ -235,7 +235,7 @@ TEST(ReadScene, ReadsForeignLightsMirrorsBlindsAndSigns) {
   EXPECT_EQ(clutter.ambient_flicker->depth, 0.6);
 }
 
-TEST(ReadScene, ReadsRandomChipsAndRecessExponents) {
+TEST(ReadSceneFile, ReadsRandomChipsAndRecessExponents) {
   const Scene chips = read_scene_text(scene_with("rim_to_center_ratio: 0.8}",
                                                  "rim_to_center_ratio: 0.8, random_chips: {count: "
                                                  "7, sigma_fraction: 0.12, within_fraction: 0.75, "
@@ -255,11 +255,11 @@ TEST(ReadScene, ReadsRandomChipsAndRecessExponents) {
   EXPECT_EQ(read.far_side_slope, 0.06);
 }
 
-TEST(ReadScene, ReadsScenesOfDatasets) {
+TEST(ReadSceneFile, ReadsScenesOfDatasets) {
   for (const std::string name :
        {"paper-rig", "paper-rig-faulty", "wide", "clutter", "downlights", "recessed", "foreign"}) {
     SCOPED_TRACE(name);
-    const Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
+    const Scene scene = read_scene_file(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
     EXPECT_EQ(scene.camera.id, name);
     EXPECT_GE(scene.lamps.size(), 5U);
     EXPECT_EQ(scene.sets.at(0).folder, "sample");

@@ -45,7 +45,7 @@ std::array<Eigen::Vector2d, 3> random_triangle(Random& random, double reach) {
   return triangle;
 }
 
-TEST(Disc, IntegralOverEnclosingTriangleIsTotal) {
+TEST(Disc, IntegralOverEnclosingTriangleIsThatOfWholeDisc) {
   const std::array<Eigen::Vector2d, 3> triangle{{{-5, -4}, {7, -3}, {0, 9}}};
   EXPECT_NEAR(integral_over(Disc({1, 1}, 1), triangle), std::numbers::pi, 1e-12);
   // 1 - fall r^2 over the unit disc: pi (1 - fall / 2)
@@ -75,15 +75,15 @@ TEST(Disc, IntegralOverRandomTriangleMatchesSampling) {
   }
 }
 
-TEST(Disc, IntegralOutsideIsZero) {
+TEST(Disc, IntegralOverTriangleOutsideDiscIsZero) {
   EXPECT_NEAR(integral_over(Disc({1, 1}, 1), {{{2, 0}, {3, 0}, {2, 50}}}), 0, 1e-14);
 }
 
-TEST(Mosaic, IntegralOverRandomTriangleMatchesSampling) {
-  const Mosaic mosaic({{-1, -0.8, -0.4, 0, 7},  // covered by the next
-                       {-1, -0.8, -0.4, 0, 2},
-                       {-0.4, 0, 0.9, 0.7, -1},
-                       {0.1, -0.8, 0.9, 0, 0.5}});
+TEST(RectanglePattern, IntegralOverRandomTriangleMatchesSampling) {
+  const RectanglePattern mosaic({{-1, -0.8, -0.4, 0, 7},  // covered by the next
+                                 {-1, -0.8, -0.4, 0, 2},
+                                 {-0.4, 0, 0.9, 0.7, -1},
+                                 {0.1, -0.8, 0.9, 0, 0.5}});
   const auto value = [](const Eigen::Vector2d& at) {
     if (at.x() < -1 || at.x() > 0.9 || at.y() < -0.8 || at.y() > 0.7) return 0.0;
     if (at.y() < 0) return at.x() < -0.4 ? 2 : at.x() < 0.1 ? 0 : 0.5;
@@ -96,8 +96,8 @@ TEST(Mosaic, IntegralOverRandomTriangleMatchesSampling) {
   }
 }
 
-TEST(Mosaic, IntegralIsExactAlongItsLines) {
-  const Mosaic square({{0, 0, 2, 3, 0.5}});
+TEST(RectanglePattern, IntegralIsExactAlongItsLines) {
+  const RectanglePattern square({{0, 0, 2, 3, 0.5}});
   EXPECT_DOUBLE_EQ(integral_over(square, {{{0, 0}, {2, 0}, {2, 3}}}), 1.5);
   EXPECT_DOUBLE_EQ(integral_over(square, {{{2, 3}, {0, 3}, {0, 0}}}), 1.5);
   EXPECT_DOUBLE_EQ(integral_over(square, {{{-9, -9}, {20, -9}, {-9, 20}}}), 3);

@@ -15,13 +15,13 @@ namespace {
 /// middle.
 std::vector<double> lit_lines(Scene scene, double frequency_hz, double duty, double exposure_s) {
   scene.camera = pinhole_camera();
-  scene.lamps[0].glow.shape = make_disc(1.2);
+  scene.lamps[0].glow.shape = make_disc_lamp_shape(1.2);
   LampShot shot = shot_at(scene, {0, 0, 0.1}, 0);
   shot.exposure_s = exposure_s;
   const FrameRenderer renderer(scene);
-  const cv::Mat1f always = renderer.render_lamp_electrons(shot);
+  const cv::Mat1f always = renderer.render_lamps_in_electrons(shot);
   shot.waves[0] = {frequency_hz, duty, 0.123};
-  const cv::Mat1f switched = renderer.render_lamp_electrons(shot);
+  const cv::Mat1f switched = renderer.render_lamps_in_electrons(shot);
   const int middle = always.cols / 2;
   std::vector<double> lit;
   for (int line = 110; line < 490; ++line) {
@@ -47,7 +47,7 @@ struct Wave {
 
 class FrameRendererStripes : public testing::TestWithParam<Wave> {};
 
-TEST_P(FrameRendererStripes, PeriodAndDutyMatchWave) {
+TEST_P(FrameRendererStripes, StripePeriodAndDutyMatchLamp) {
   const auto [frequency_hz, duty] = GetParam();
   const auto lit = lit_lines(plain_scene(), frequency_hz, duty, 2e-5);
   const auto rises = find_rises(lit);
@@ -96,16 +96,16 @@ TEST(FrameRenderer, StripeContrastIsSincOfExposure) {
   }
 }
 
-TEST(FrameRenderer, StripesMatchExposureTimeOfEachLine) {
+TEST(FrameRenderer, RowBrightnessIsLitFractionOfRowExposure) {
   // At 1 kHz half a period is 16.67 lines; the middle line's exposure is centered at time 0.
   Scene scene = plain_scene();
   scene.camera = pinhole_camera();
-  scene.lamps[0].glow.shape = make_disc(1.2);
+  scene.lamps[0].glow.shape = make_disc_lamp_shape(1.2);
   LampShot shot = shot_at(scene, {0, 0, 0.1}, 0);
   const FrameRenderer renderer(scene);
-  const cv::Mat1f always = renderer.render_lamp_electrons(shot);
+  const cv::Mat1f always = renderer.render_lamps_in_electrons(shot);
   shot.waves[0] = {1000, 0.5, 0};
-  const cv::Mat1f switched = renderer.render_lamp_electrons(shot);
+  const cv::Mat1f switched = renderer.render_lamps_in_electrons(shot);
   for (int line = 200; line < 400; ++line) {
     const double middle_s = (line - 299.5) * 3e-5;
     constexpr int steps = 5000;
@@ -118,14 +118,14 @@ TEST(FrameRenderer, StripesMatchExposureTimeOfEachLine) {
   }
 }
 
-TEST(FrameRenderer, StripesFollowReadoutDirection) {
+TEST(FrameRenderer, ImageIsTransposedForColumnReadout) {
   Scene scene = plain_scene();
   scene.camera.readout = Readout::columns;
   scene.lamps[0].duty = 0.5;
   scene.lamps[0].frequency_hz = 3000;
   const FrameRenderer renderer(scene);
   // Lines of the electrons are columns of the image.
-  const cv::Mat1f electrons = renderer.render_lamp_electrons(shot_at(scene, {0, 0, 0.1}, 0));
+  const cv::Mat1f electrons = renderer.render_lamps_in_electrons(shot_at(scene, {0, 0, 0.1}, 0));
   EXPECT_EQ(electrons.size(), cv::Size(600, 800));
   const Brightness brightness = measure_brightness(electrons);
   EXPECT_NEAR(brightness.centroid_px.y(), 402.3, 6);

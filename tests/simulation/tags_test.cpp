@@ -43,9 +43,9 @@ void expect_all_read(const Scene& scene, apriltag_family_t* family) {
   const FrameRenderer renderer(scene);
   const CaptureSet views = board_views(4, 0.28, rad_from_deg(35), rad_from_deg(180), 0);
   for (std::size_t index = 0; index < 4; ++index) {
-    const BoardShot shot = make_board_shot(scene, views, index);
-    const Corners found =
-        detected(simulate_sensor(scene.sensor, renderer.render_board_electrons(shot), 1), family);
+    const BoardShot shot = make_simulated_board_capture(scene, views, index);
+    const Corners found = detected(
+        simulate_sensor_image(scene.sensor, renderer.render_board_in_electrons(shot), 1), family);
     const auto truth = find_true_corners_in_image(scene, renderer, shot);
     ASSERT_FALSE(truth.empty());
     EXPECT_EQ(found.size(), truth.size());
@@ -68,14 +68,14 @@ class FrameRendererTags : public testing::Test {
   Scene scene_ = plain_scene();
 };
 
-TEST_F(FrameRendererTags, PlainTagsAreDetectedAtTrueCorners) {
+TEST_F(FrameRendererTags, AprilTagDetectsPlainTagsAtTrueCorners) {
   scene_.board->print.id_order = {true, BoardCorner::bottom_right};
   apriltag_family_t* family = tag36h11_create();
   expect_all_read(scene_, family);
   tag36h11_destroy(family);
 }
 
-TEST_F(FrameRendererTags, TagsWithOuterBitsAreDetectedAtTrueCorners) {
+TEST_F(FrameRendererTags, AprilTagDetectsTagsWithOuterBitsAtTrueCorners) {
   scene_.board->print.family = "tagStandard41h12";
   scene_.board->print.first_id = 100;
   apriltag_family_t* family = tagStandard41h12_create();
@@ -83,11 +83,11 @@ TEST_F(FrameRendererTags, TagsWithOuterBitsAreDetectedAtTrueCorners) {
   tagStandard41h12_destroy(family);
 }
 
-TEST(TagPattern, HasSecondBlackRingForTwoBorderBits) {
+TEST(MakeTagPattern, AddsSecondBlackRingForTwoBorderBits) {
   const TagPattern plain = make_tag_pattern("tag36h11", 17, 1),
                    wide = make_tag_pattern("tag36h11", 17, 2);
-  ASSERT_EQ(plain.width(), 8);
-  ASSERT_EQ(wide.width(), 10);
+  ASSERT_EQ(plain.pattern_width_bits(), 8);
+  ASSERT_EQ(wide.pattern_width_bits(), 10);
   for (int row = 0; row < 10; ++row) {
     for (int column = 0; column < 10; ++column) {
       const bool ring = row == 0 || column == 0 || row == 9 || column == 9;
@@ -97,7 +97,7 @@ TEST(TagPattern, HasSecondBlackRingForTwoBorderBits) {
   }
 }
 
-TEST(TagPattern, ThrowsForUnknownIdOrBorder) {
+TEST(MakeTagPattern, ThrowsForUnknownIdOrBorderWidth) {
   EXPECT_THROW(make_tag_pattern("tag36h11", 587, 1), std::invalid_argument);
   EXPECT_NO_THROW(make_tag_pattern("tag36h11", 586, 1));
   EXPECT_THROW(make_tag_pattern("tag36h11", -1, 1), std::invalid_argument);

@@ -33,12 +33,12 @@ struct DatabaseIdentity : testing::Test {
   std::string here;
 };
 
-TEST_F(DatabaseIdentity, ReturnsMachineAndAbsolutePathForFile) {
+TEST_F(DatabaseIdentity, IsMachineAndNormalizedPathForFile) {
   EXPECT_EQ(derive_database_identity("/var/lib/vlp/records.db"), here + "/var/lib/vlp/records.db");
   EXPECT_EQ(derive_database_identity("/var/lib/../lib/records.db"), here + "/var/lib/records.db");
 }
 
-TEST_F(DatabaseIdentity, DiffersBetweenServers) {
+TEST_F(DatabaseIdentity, DiffersForDifferentServersAndDatabasesOnly) {
   const auto of = [](const std::string& where) { return derive_database_identity(where); };
   EXPECT_EQ(of("postgresql://u@db/vlp"), "postgresql://db/vlp");
   EXPECT_EQ(of("postgres://other:secret@db:5432/vlp?connect_timeout=2"), of("postgresql://db/vlp"));
@@ -64,7 +64,7 @@ TEST_F(DatabaseIdentity, IncludesMachineForLocalServer) {
               Not(StartsWith(here)));
 }
 
-TEST_F(DatabaseIdentity, OmitsPassword) {
+TEST_F(DatabaseIdentity, ContainsNoPassword) {
   for (const char* where : {"postgresql://u:secret@db", "postgresql://u@db/vlp?password=secret"}) {
     EXPECT_THAT(derive_database_identity(where), Not(HasSubstr("secret")));
   }

@@ -29,8 +29,9 @@ inline RunRecord make_sample_record(const std::string& run, const std::string& c
   record.libraries = "none";
   record.config_sha256 = std::string(64, 'a');
   record.calibration = "format: vlp-calibration/1\ncamera: {id: \"it's\"}\n";
-  record.metrics = check_all_metrics({{"rms_px", 1, GuardBand{0.1 + 0.2, 1.5}}, {"tilt_deg", 2}},
-                                     {{"rms_px", rms_px}, {"coverage", 0.75}}, list_unit_metrics());
+  record.metrics = check_all_metrics_against_gates(
+      {{"rms_px", 1, GuardBand{0.1 + 0.2, 1.5}}, {"tilt_deg", 2}},
+      {{"rms_px", rms_px}, {"coverage", 0.75}}, list_unit_metrics());
   record.images = {{"boards", "0000.png", std::string(64, 'b'), ""},
                    {"check", "0000.png", std::string(64, 'c'), "too dark"}};
   return record;
@@ -44,7 +45,7 @@ inline std::string numbered_run_id(int number) {
 template <typename Runs>
 std::vector<std::string> list_ids(Runs& runs, const RunFilter& filter) {
   std::vector<std::string> ids;
-  for (const RunSummary& run : runs.list_runs(filter)) ids.push_back(run.run);
+  for (const RunSummary& run : runs.list_run_summaries(filter)) ids.push_back(run.run);
   return ids;
 }
 

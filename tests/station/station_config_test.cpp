@@ -31,13 +31,13 @@ class ReadStationConfig : public testing::Test {
     ASSERT_NE(at, std::string::npos) << from;
     folder.file(name, text.replace(at, from.size(), to));
   }
-  std::string refusal() const {
+  std::string rejection_message() const {
     return rejection_message([&] { read_station_config(folder / "station.yaml"); });
   }
   TemporaryFolder folder;
 };
 
-TEST_F(ReadStationConfig, ReadsReferencedFiles) {
+TEST_F(ReadStationConfig, ReturnsContentOfReferencedFiles) {
   const StationConfig config = read_station_config(folder / "station.yaml");
   EXPECT_EQ(config.station, "station-1");
   EXPECT_EQ(config.type.imager_px[0], 800);
@@ -49,7 +49,7 @@ TEST_F(ReadStationConfig, ReadsReferencedFiles) {
 }
 
 /// The keys commented out with '#' are valid.
-TEST_F(ReadStationConfig, AcceptsOptionalKeysOfExample) {
+TEST_F(ReadStationConfig, AcceptsCommentedOutOptionalKeysOfExample) {
   folder.file("golden.yaml", TemporaryFolder::read_content(kExample + "calibration.yaml"));
   folder.file(
       "station.yaml",
@@ -63,8 +63,8 @@ TEST_F(ReadStationConfig, AcceptsOptionalKeysOfExample) {
   EXPECT_THAT(config.golden->gates, SizeIs(7));
   ASSERT_TRUE(config.verify_due);
   EXPECT_EQ(config.verify_due->units, 200);
-  EXPECT_EQ(describe_serial_problem(config, "0001"), "");
-  EXPECT_NE(describe_serial_problem(config, "x1"), "");
+  EXPECT_EQ(describe_serial_number_problem(config, "0001"), "");
+  EXPECT_NE(describe_serial_number_problem(config, "x1"), "");
   EXPECT_EQ(config.void_operators, (std::vector<std::string>{"Ann", "Bea"}));
   ASSERT_TRUE(config.hook);
   EXPECT_THAT(config.hook->command, SizeIs(3));
@@ -73,22 +73,23 @@ TEST_F(ReadStationConfig, AcceptsOptionalKeysOfExample) {
 
 TEST_F(ReadStationConfig, RejectsUnknownGateWithLine) {
   change("station.yaml", "  rms_px: 0.014", "  rms_mm: 0.014");
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("station.yaml:"), HasSubstr("rms_mm")));
+  EXPECT_THAT(rejection_message(), AllOf(HasSubstr("station.yaml:"), HasSubstr("rms_mm")));
 }
 
-TEST_F(ReadStationConfig, RejectsImplausibleValues) {
+TEST_F(ReadStationConfig, RejectsCoverageFractionsAboveOne) {
   change("station.yaml", "\n  coverage: 0.7", "\n  coverage: 7");
-  EXPECT_THAT(refusal(), HasSubstr("gates.coverage: should be a fraction from 0 to 1, not 7"));
+  EXPECT_THAT(rejection_message(),
+              HasSubstr("gates.coverage: should be a fraction from 0 to 1, not 7"));
   change("station.yaml", "board_coverage: 0.7", "board_coverage: 70");
-  EXPECT_THAT(refusal(), HasSubstr("completion.board_coverage"));
+  EXPECT_THAT(rejection_message(), HasSubstr("completion.board_coverage"));
 }
 
 TEST_F(ReadStationConfig, RejectsCameraTypeWithoutRowTime) {
   change("camera_type.yaml", "  row_time_s: 3.0e-05\n", "");
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("camera_type"), HasSubstr("row_time_s")));
+  EXPECT_THAT(rejection_message(), AllOf(HasSubstr("camera_type"), HasSubstr("row_time_s")));
 }
 
-TEST_F(ReadStationConfig, ReadsGuardBands) {
+TEST_F(ReadStationConfig, ReadsGuardBandsAndRejectsUnsuitableOnes) {
   change("station.yaml", "\nrecords: records.db",
          "\nguard_bands: {k: 1.645, standard_uncertainties: {check_mean_mm: 0.02}}"
          "\nrecords: records.db");
@@ -101,7 +102,7 @@ TEST_F(ReadStationConfig, ReadsGuardBands) {
   const auto refused = [&](const std::string& from, const std::string& to) {
     const std::string before = TemporaryFolder::read_content(folder / "station.yaml");
     change("station.yaml", from, to);
-    const std::string why = refusal();
+    const std::string why = rejection_message();
     folder.file("station.yaml", before);
     return why;
   };
@@ -117,7 +118,7 @@ TEST_F(ReadStationConfig, ReadsGuardBands) {
               HasSubstr("leaves no value within the gate"));
 }
 
-TEST_F(ReadStationConfig, ReadsHook) {
+TEST_F(ReadStationConfig, ReadsHookCommandAndTimeLimit) {
   EXPECT_FALSE(read_station_config(folder / "station.yaml").hook);
   change("station.yaml", "records: records.db",
          "records: records.db\nhook: {command: [./label, --to, it's]}");
@@ -130,41 +131,43 @@ TEST_F(ReadStationConfig, ReadsHook) {
               testing::ElementsAre("label"));
   EXPECT_EQ(read_station_config(folder / "station.yaml").hook->time_limit_s, 0.5);
   change("station.yaml", "time_limit_s: 0.5", "time_limit_s: 0");
-  EXPECT_THAT(refusal(), HasSubstr("hook.time_limit_s: should be above 0"));
+  EXPECT_THAT(rejection_message(), HasSubstr("hook.time_limit_s: should be above 0"));
   change("station.yaml", "[label], time_limit_s: 0", "[]");
-  EXPECT_THAT(refusal(), HasSubstr("hook.command: should be a program and its arguments"));
+  EXPECT_THAT(rejection_message(),
+              HasSubstr("hook.command: should be a program and its arguments"));
 }
 
-TEST_F(ReadStationConfig, ReadsSerialPattern) {
+TEST_F(ReadStationConfig, SerialPatternRestrictsAcceptedSerials) {
   StationConfig config = read_station_config(folder / "station.yaml");
-  EXPECT_EQ(describe_serial_problem(config, "anything"), "");
-  EXPECT_THAT(describe_serial_problem(config, "a/b"), HasSubstr("a camera's id has letters"));
+  EXPECT_EQ(describe_serial_number_problem(config, "anything"), "");
+  EXPECT_THAT(describe_serial_number_problem(config, "a/b"),
+              HasSubstr("a camera's id has letters"));
   change("station.yaml", "records: records.db",
          "records: records.db\nserial_pattern: 'SN-[0-9]{4}'");
   config = read_station_config(folder / "station.yaml");
-  EXPECT_EQ(describe_serial_problem(config, "SN-0123"), "");
-  EXPECT_EQ(describe_serial_problem(config, "SN-01234"),
+  EXPECT_EQ(describe_serial_number_problem(config, "SN-0123"), "");
+  EXPECT_EQ(describe_serial_number_problem(config, "SN-01234"),
             "'SN-01234' is not of the form SN-[0-9]{4}");
-  EXPECT_THAT(describe_serial_problem(config, ""), HasSubstr("a camera's id has letters"));
+  EXPECT_THAT(describe_serial_number_problem(config, ""), HasSubstr("a camera's id has letters"));
   change("station.yaml", "'SN-[0-9]{4}'", "'SN-[0-9'");
-  EXPECT_THAT(refusal(), HasSubstr("serial_pattern: is no regular expression"));
+  EXPECT_THAT(rejection_message(), HasSubstr("serial_pattern: is no regular expression"));
 }
 
 /// Nested repetitions can match in exponentially many combinations.
-TEST(DescribeSerialProblem, LimitsTimeOfPatternMatch) {
+TEST(DescribeSerialNumberProblem, ReportsPatternWhoseComparisonIsTooSlow) {
   StationConfig config{};
   config.serial_pattern = "(a+)+b";
-  EXPECT_EQ(describe_serial_problem(config, "aaab"), "");
-  EXPECT_THAT(describe_serial_problem(config, std::string(60, 'a')),
+  EXPECT_EQ(describe_serial_number_problem(config, "aaab"), "");
+  EXPECT_THAT(describe_serial_number_problem(config, std::string(60, 'a')),
               HasSubstr("serial_pattern: the comparison is too slow for"));
   config.serial_pattern = "[A-Za-z0-9_.-]{1,64}";
-  EXPECT_EQ(describe_serial_problem(config, std::string(64, 'a')), "");
+  EXPECT_EQ(describe_serial_number_problem(config, std::string(64, 'a')), "");
 }
 
-TEST_F(ReadStationConfig, ReadsVerifyDueAndRetention) {
+TEST_F(ReadStationConfig, RejectsVerifyDueWithoutGoldenUnitAndZeroLimits) {
   change("station.yaml", "records: records.db",
          "records: records.db\nretention: {images_days: 90}\nverify_due: {hours: 24, units: 200}");
-  EXPECT_THAT(refusal(), HasSubstr("verify_due: needs a golden unit"));
+  EXPECT_THAT(rejection_message(), HasSubstr("verify_due: needs a golden unit"));
   folder.file("golden.yaml", TemporaryFolder::read_content(kExample + "calibration.yaml"));
   change("station.yaml", "records: records.db",
          "records: records.db\n"
@@ -175,32 +178,32 @@ TEST_F(ReadStationConfig, ReadsVerifyDueAndRetention) {
   EXPECT_EQ(config.keep.images_days, 90);
   EXPECT_FALSE(config.keep.results_days);
   change("station.yaml", "{hours: 24, units: 200}", "{}");
-  EXPECT_THAT(refusal(), HasSubstr("verify_due: should have hours or units"));
+  EXPECT_THAT(rejection_message(), HasSubstr("verify_due: should have hours or units"));
   change("station.yaml", "verify_due: {}", "verify_due: {hours: 0}");
-  EXPECT_THAT(refusal(), HasSubstr("verify_due: hours should be above 0"));
+  EXPECT_THAT(rejection_message(), HasSubstr("verify_due: hours should be above 0"));
   change("station.yaml", "verify_due: {hours: 0}", "verify_due: {}");
   change("station.yaml", "images_days: 90", "images_days: 0");
-  EXPECT_THAT(refusal(), HasSubstr("verify_due"));
+  EXPECT_THAT(rejection_message(), HasSubstr("verify_due"));
   change("station.yaml", "verify_due: {}", "verify_due: {units: 1}");
-  EXPECT_THAT(refusal(), HasSubstr("retention.images_days"));
+  EXPECT_THAT(rejection_message(), HasSubstr("retention.images_days"));
 }
 
-TEST_F(ReadStationConfig, RejectsGoldenUnitWithoutRowTime) {
+TEST_F(ReadStationConfig, RejectsGoldenCalibrationWithoutRowTime) {
   folder.file("golden.yaml", TemporaryFolder::read_content(kExample + "calibration.yaml"));
   change("station.yaml", "records: records.db",
          "records: records.db\n"
          "golden: {camera_id: g, calibration: golden.yaml, gates: {tilt_deg: 1}}");
   EXPECT_TRUE(read_station_config(folder / "station.yaml").golden);
   change("golden.yaml", "  row_time_s: 0.00003\n", "");
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("golden.calibration"), HasSubstr("row_time_s")));
+  EXPECT_THAT(rejection_message(), AllOf(HasSubstr("golden.calibration"), HasSubstr("row_time_s")));
 }
 
-TEST_F(ReadStationConfig, RejectsUnknownDatabase) {
+TEST_F(ReadStationConfig, RejectsUnknownKindOfDatabase) {
   change("station.yaml", "records: records.db", "records: mysql://server/records");
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("records"), HasSubstr("postgresql://")));
+  EXPECT_THAT(rejection_message(), AllOf(HasSubstr("records"), HasSubstr("postgresql://")));
 }
 
-TEST_F(ReadStationConfig, ChangesDigestWithReferencedFiles) {
+TEST_F(ReadStationConfig, DigestChangesWithReferencedFile) {
   const std::string before = read_station_config(folder / "station.yaml").sha256;
   EXPECT_EQ(read_station_config(folder / "station.yaml").sha256, before);
   change("lamps.yaml", "-0.32", "-0.33");

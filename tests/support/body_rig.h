@@ -47,13 +47,13 @@ inline Eigen::Isometry3d world_from_body(const BodyState& state, double time_s) 
       state.pose.position_m + time_s * Eigen::Vector3d(velocity.x(), velocity.y(), 0);
   world_from_body.linear() =
       rotation_about_z(state.pose.yaw_rad + motion.yaw_rate_rad_per_s * time_s) *
-      level_from_inclination(motion.inclination);
+      level_rotation_from_inclination(motion.inclination);
   return world_from_body;
 }
 
 inline Eigen::Isometry3d body_from_camera(const BodyRig& rig) {
   Eigen::Isometry3d body_from_camera = Eigen::Isometry3d::Identity();
-  body_from_camera.linear() = level_from_camera(rig.calibration, Correction::all);
+  body_from_camera.linear() = compute_level_from_camera_rotation(rig.calibration, Correction::all);
   if (!rig.mount) return body_from_camera;
   const Eigen::Matrix3d robot_from_level = rotation_about_z(rig.mount->yaw_in_robot_rad);
   body_from_camera.linear() = robot_from_level * body_from_camera.linear();
@@ -79,7 +79,7 @@ inline std::vector<Detection> seen_from(const BodyRig& rig, double sigma_px, dou
     std::optional<Eigen::Vector2d> pixel;
     for (int round = 0; round < 100; ++round) {
       const Eigen::Isometry3d world_from_camera = world_from_body(rig.body, time_s) * body_from_cam;
-      pixel = lens.project(world_from_camera.inverse() * lamp.position_m);
+      pixel = lens.project_point(world_from_camera.inverse() * lamp.position_m);
       if (!pixel) break;
       time_s = read_s(camera, *pixel, start_s);
     }
@@ -102,14 +102,14 @@ inline LampMap draw_lamps_in_view(const BodyRig& rig, std::size_t count, bool on
     const double u = random.uniform(60, 740), v = random.uniform(60, 540);
     const double ceiling_m = one_height ? 1.6 : random.uniform(1.4, 2.2);
     const Eigen::Vector3d ray =
-        world_from_camera.linear() * lens.unproject({u, v})->direction.normalized();
+        world_from_camera.linear() * lens.unproject_pixel({u, v})->direction.normalized();
     if (ray.z() < std::sin(min_rad)) continue;
     const Eigen::Vector3d from_m = world_from_camera.translation();
     const Eigen::Vector3d lamp_m = from_m + ray * ((ceiling_m - from_m.z()) / ray.z());
     // Far apart in the image, so that they determine the state.
     bool apart = true;
     for (const Eigen::Vector3d& other_m : positions_m) {
-      const auto pixel = lens.project(world_from_camera.inverse() * other_m);
+      const auto pixel = lens.project_point(world_from_camera.inverse() * other_m);
       apart = apart && (*pixel - Eigen::Vector2d(u, v)).norm() > 120;
     }
     if (apart) positions_m.push_back(lamp_m);

@@ -20,7 +20,7 @@ LampMap example_lamps() {
   LampMap map = make_lamp_map(
       {{-0.6, -0.35, 1.6}, {0.6, -0.35, 1.6}, {0.6, 0.35, 1.6}, {-0.6, 0.35, 1.6}, {0.05, 0, 1.5}});
   for (Lamp& lamp : map.lamps) {
-    lamp.shape = make_disc(0.1);
+    lamp.shape = make_disc_lamp_shape(0.1);
     lamp.frequency_hz = 1000 + 500 * lamp.id;
     lamp.duty = 0.5;
   }
@@ -82,9 +82,9 @@ void make_example(const std::filesystem::path& folder) {
                   wrap_angle_rad(rad_from_deg(100 * i))};
     frames.push_back(make_frame(rig, "spot", i, random));
     const Eigen::Vector3d& p = rig.camera.position_m;
-    truth.row({frames.back().image, format_fixed_decimals(p.x(), 6),
-               format_fixed_decimals(p.y(), 6), format_fixed_decimals(p.z(), 6),
-               format_fixed_decimals(rig.camera.yaw_rad, 9)});
+    truth.write_csv_row({frames.back().image, format_fixed_decimals(p.x(), 6),
+                         format_fixed_decimals(p.y(), 6), format_fixed_decimals(p.z(), 6),
+                         format_fixed_decimals(rig.camera.yaw_rad, 9)});
   }
   write_lamp_map(folder / "lamps.yaml", rig.map);
   write_calibration(folder / "calibration.yaml", rig.calibration);

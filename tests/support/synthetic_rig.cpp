@@ -23,7 +23,7 @@ Camera splined_camera() {
   Camera camera = synthetic_camera();
   camera.lens_model = lens_model_for_spline_grid({3, 12, 10, 130});
   camera.intrinsics.resize(4);
-  camera.intrinsics.resize(parameter_count(camera.lens_model));
+  camera.intrinsics.resize(num_lens_parameters(camera.lens_model));
   for (std::size_t i = 4; i < camera.intrinsics.size(); ++i) {
     camera.intrinsics[i] = 0.01 * std::sin(static_cast<double>(i * i));
   }
@@ -71,15 +71,16 @@ RotationCenter tilted_by(const Camera& camera, double tilt_rad, double azimuth_r
 std::vector<Detection> seen_from(const SyntheticRig& rig, double sigma_px) {
   const Camera& camera = rig.calibration.camera;
   const Lens lens(camera.lens_model, camera.intrinsics);
-  Eigen::Matrix3d level_from_camera = vlp::level_from_camera(rig.calibration, Correction::all);
+  Eigen::Matrix3d level_from_camera =
+      vlp::compute_level_from_camera_rotation(rig.calibration, Correction::all);
   if (rig.inclination) {
-    level_from_camera = level_from_inclination(*rig.inclination) * level_from_camera;
+    level_from_camera = level_rotation_from_inclination(*rig.inclination) * level_from_camera;
   }
   std::vector<Detection> detections;
   for (const Lamp& lamp : rig.map.lamps) {
     const Eigen::Vector3d x_in_camera =
-        level_from_camera.inverse() * level_from_world(rig.camera, lamp.position_m);
-    if (const auto pixel = lens.project(x_in_camera)) {
+        level_from_camera.inverse() * level_point_from_world(rig.camera, lamp.position_m);
+    if (const auto pixel = lens.project_point(x_in_camera)) {
       detections.push_back({lamp.id, *pixel, sigma_px});
     }
   }

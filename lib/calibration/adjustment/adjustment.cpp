@@ -133,7 +133,7 @@ class ProblemAssembler {
   explicit ProblemAssembler(const AdjustmentInput& input)
       : input_(input),
         lens_(input.calibration.camera.lens_model, input.calibration.camera.intrinsics),
-        row_clock_(make_row_clock(input.calibration.camera)),
+        row_clock_(make_row_readout_clock(input.calibration.camera)),
         pivots_(list_pivots(input)),
         all_(make_empty_problem(input, pivots_.size())),
         sums_m_(pivots_.size(), Eigen::Vector3d::Zero()),
@@ -143,7 +143,7 @@ class ProblemAssembler {
   }
 
   /// Adds a capture with its known position; counts it as rejected if it determines no pose.
-  void add_capture(const AdjustmentCapture& capture) {
+  void add_capture_with_initial_pose(const AdjustmentCapture& capture) {
     const InclinationRotation inclination =
         capture.inclination ? compute_inclination_rotation(*capture.inclination, 0)
                             : InclinationRotation();
@@ -154,7 +154,7 @@ class ProblemAssembler {
       return;
     }
     const std::size_t index = problem_.captures.size();
-    problem_.add_capture(
+    problem_.add_capture_with_initial_pose(
         {add_to_pivot(capture, *pose), inclination.level_from_base.transpose(), capture.motion},
         *pose);
     for (auto& term : lamps.terms) {
@@ -174,7 +174,7 @@ class ProblemAssembler {
     problem_.place_used.assign(all_.places.size(), true);
     if (input_.frees_map_shape) problem_.gauge = make_gauge(lamps_m_, all_.lamp_seen);
     for (std::size_t i = 0; i < sums_m_.size(); ++i) {
-      problem_.state_vector().segment<3>(problem_.parameter_layout().pivot_state_index(i)) =
+      problem_.state_vector().segment<3>(problem_.state_vector_layout().pivot_state_index(i)) =
           sums_m_[i] / std::max(1, num_captures_[i]);
     }
     return std::move(all_);
@@ -203,7 +203,7 @@ class ProblemAssembler {
     for (const Lamp& lamp : input_.lamps.lamps) {
       lamps_m_.emplace_back(lamp.position_m - all_.origin_m);
       problem_.state_vector().segment<3>(
-          problem_.parameter_layout().lamp_state_index(lamps_m_.size() - 1)) = lamps_m_.back();
+          problem_.state_vector_layout().lamp_state_index(lamps_m_.size() - 1)) = lamps_m_.back();
       problem_.lamps.push_back(
           {lamps_m_.back(), input_.frees_map_shape ? kInfinite : lamp.sd_m.value_or(0)});
     }
@@ -213,11 +213,11 @@ class ProblemAssembler {
   void set_tilt_and_lever_arm() {
     Eigen::Vector2d zenith(0, 0);
     if (const auto& center = input_.calibration.rotation_center) {
-      zenith = normalized_zenith_point(*center);
+      zenith = compute_normalized_zenith_point(*center);
       lever_arm_m_ = center->lever_arm_m.value_or(lever_arm_m_);
     }
-    problem_.state_vector().segment<2>(problem_.parameter_layout().zenith) = zenith;
-    problem_.state_vector().segment<2>(problem_.parameter_layout().lever_arm) = lever_arm_m_;
+    problem_.state_vector().segment<2>(problem_.state_vector_layout().zenith) = zenith;
+    problem_.state_vector().segment<2>(problem_.state_vector_layout().lever_arm) = lever_arm_m_;
     base_from_camera_ = rotate_level_point_to_camera(zenith, Eigen::Vector3d::UnitZ())
                             .camera_from_level.transpose();
   }
@@ -230,7 +230,7 @@ class ProblemAssembler {
       const Lamp* lamp = find_lamp_by_id(input_.lamps.lamps, detection.lamp);
       if (lamp == nullptr || found.sightings.size() == kMaxSightings) continue;
       const auto index = static_cast<std::size_t>(lamp - input_.lamps.lamps.data());
-      const auto ray = lens_.unproject(detection.pixel);
+      const auto ray = lens_.unproject_pixel(detection.pixel);
       if (!ray || std::ranges::find(found.indices, index) != found.indices.end()) continue;
       const Eigen::Vector3d level = level_from_base * base_from_camera_ * ray->direction;
       if (!(level.z() > 0)) continue;
@@ -242,7 +242,7 @@ class ProblemAssembler {
       }
       found.terms.push_back(
           {0, index, detection.pixel, sigma_px, whitening,
-           row_clock_ ? row_clock_->compute_time_from_middle_row_s(detection.pixel) : 0});
+           row_clock_ ? row_clock_->compute_pixel_readout_time_s(detection.pixel) : 0});
       found.indices.push_back(index);
       found.sightings.push_back({lamps_m_[index], level.hnormalized(),
                                  Eigen::Matrix2d(lens_.focal_px().asDiagonal()), 1});
@@ -299,7 +299,8 @@ class ProblemAssembler {
 
 AssembledProblem assemble_adjustment_problem(const AdjustmentInput& input) {
   ProblemAssembler assembler(input);
-  for (const AdjustmentCapture& capture : input.captures) assembler.add_capture(capture);
+  for (const AdjustmentCapture& capture : input.captures)
+    assembler.add_capture_with_initial_pose(capture);
   return std::move(assembler).finish();
 }
 
@@ -307,9 +308,9 @@ AssembledProblem assemble_adjustment_problem(const AdjustmentInput& input) {
 std::vector<double> compute_residual_norms(const AdjustmentProblem& problem) {
   std::vector<double> lengths;
   lengths.reserve(problem.sightings.size());
-  const auto lens = problem.lens();
+  const auto lens = problem.current_lens();
   for (const auto& sighting : problem.sightings) {
-    const auto at = lens ? problem.linearize(sighting, *lens) : std::nullopt;
+    const auto at = lens ? problem.linearize_lamp_observation(sighting, *lens) : std::nullopt;
     lengths.push_back(at ? at->value.norm() : kInfinite);
   }
   return lengths;
@@ -346,7 +347,7 @@ void compute_reference_position_residuals(AssembledProblem& all) {
   for (const auto& seen : all.problem.places) {
     auto& place = all.places[seen.place];
     place.residual_m.head(seen.size) +=
-        (all.problem.predict_reference_position(seen) - seen.stated_m).head(seen.size) /
+        (all.problem.predict_camera_or_axis_position(seen) - seen.stated_m).head(seen.size) /
         place.captures;
   }
 }
@@ -360,7 +361,7 @@ double compute_normalized_residual(const AssembledProblem& all, std::size_t plac
 double compute_normalized_survey_correction(const AdjustmentProblem& problem,
                                             const Eigen::MatrixXd& covariance, std::size_t lamp,
                                             double sd_m, bool counts) {
-  const Eigen::Index at = problem.parameter_layout().lamp_state_index(lamp);
+  const Eigen::Index at = problem.state_vector_layout().lamp_state_index(lamp);
   const Eigen::Vector3d r_m =
       problem.state_vector().segment<3>(at) - problem.lamps[lamp].surveyed_m;
   const Eigen::Matrix3d found = covariance.block<3, 3>(at, at);
@@ -400,7 +401,7 @@ class Contradictions {
     for (std::size_t i = 0; i < sd_m_.size(); ++i) {
       const auto& [surveyed_m, sd_m] = all_.problem.lamps[i];
       const Eigen::Vector3d found_m = all_.problem.state_vector().segment<3>(
-          all_.problem.parameter_layout().lamp_state_index(i));
+          all_.problem.state_vector_layout().lamp_state_index(i));
       if (all_.lamp_seen[i] && sd_m > 0 && (found_m - surveyed_m).norm() > max_sigmas * sd_m) {
         stop_using_surveyed_position(i);
       }
@@ -487,13 +488,13 @@ double compute_noise_ratio(const AdjustmentProblem& problem, double degrees_of_f
 
 /// Solves until the sets of used detections, lamps and known positions and the noise are unchanged,
 /// at most 40 times. Returns std::nullopt if a solution fails.
-std::optional<AdjustmentProblem::GlobalCovariance> refine(AssembledProblem& all,
-                                                          Contradictions& contradictions) {
+std::optional<AdjustmentProblem::GlobalCovariance> refine_adjustment(
+    AssembledProblem& all, Contradictions& contradictions) {
   AdjustmentProblem& problem = all.problem;
   constexpr int max_iterations = 40;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    if (!problem.solve(false)) return std::nullopt;
-    const auto found = problem.compute_global_covariance();
+    if (!problem.solve_adjustment(false)) return std::nullopt;
+    const auto found = problem.compute_global_unknowns_covariance();
     const double ratio = compute_noise_ratio(problem, found.freedom);
     bool changed = update_inliers(problem, all.noise_is_stated, found.freedom);
     if (!changed) changed = contradictions.refine(found.matrix);
@@ -509,8 +510,8 @@ std::optional<AdjustmentProblem::GlobalCovariance> refine(AssembledProblem& all,
     }
     if (!changed) return found;
   }
-  if (!problem.solve(false)) return std::nullopt;
-  return problem.compute_global_covariance();
+  if (!problem.solve_adjustment(false)) return std::nullopt;
+  return problem.compute_global_unknowns_covariance();
 }
 
 /// Returns the covariance for equal noise in the image, and estimates that noise. The estimates
@@ -520,18 +521,19 @@ Eigen::MatrixXd compute_covariance_for_image_noise(AssembledProblem& all) {
   for (auto& sighting : problem.sightings) {
     sighting.whitening = Eigen::Matrix2d::Identity() / sighting.sigma_px;
   }
-  const double ratio = compute_noise_ratio(problem, problem.compute_global_covariance().freedom);
+  const double ratio =
+      compute_noise_ratio(problem, problem.compute_global_unknowns_covariance().freedom);
   problem.noise_scale = std::max(problem.noise_scale * ratio, kMinNoise_px);
-  return problem.compute_global_covariance().matrix;
+  return problem.compute_global_unknowns_covariance().matrix;
 }
 
 std::string explain_undetermined(const AdjustmentProblem& problem,
                                  const Eigen::MatrixXd& covariance, double height_m,
                                  const AdjustmentLimits& limits, bool& has_lever_arm) {
-  const AdjustmentLayout& at = problem.parameter_layout();
+  const AdjustmentLayout& at = problem.state_vector_layout();
   const auto compute_max_sd = [&](Eigen::Index first) {
     const Eigen::Matrix2d block = covariance.block<2, 2>(first, first);
-    return std::sqrt(eigendecompose_symmetric(block).values.maxCoeff());
+    return std::sqrt(eigendecompose_symmetric_matrix(block).values.maxCoeff());
   };
   const bool zenith = compute_max_sd(at.zenith) <= limits.zenith_rad;
   has_lever_arm =
@@ -549,9 +551,10 @@ std::string explain_undetermined(const AdjustmentProblem& problem,
 /// the solution fails.
 bool solve_robustly(AssembledProblem& all, Contradictions& contradictions) {
   AdjustmentProblem& problem = all.problem;
-  if (!problem.solve(true) || !problem.solve(true)) return false;
+  if (!problem.solve_adjustment(true) || !problem.solve_adjustment(true)) return false;
   contradictions.reject_far_observations();
-  update_inliers(problem, all.noise_is_stated, problem.compute_global_covariance().freedom);
+  update_inliers(problem, all.noise_is_stated,
+                 problem.compute_global_unknowns_covariance().freedom);
   return true;
 }
 
@@ -565,7 +568,7 @@ std::optional<AdjustmentProblem::GlobalCovariance> solve_all_stages(
     all.problem.sightings[i].used = initial_norms[i] < kInfinite;
   }
   if (!input.captures_are_checked && !solve_robustly(all, contradictions)) return std::nullopt;
-  auto adjusted = refine(all, contradictions);
+  auto adjusted = refine_adjustment(all, contradictions);
   if (adjusted && input.weighs_in_undistorted_image && !all.noise_is_stated) {
     adjusted->matrix = compute_covariance_for_image_noise(all);
   }
@@ -574,7 +577,7 @@ std::optional<AdjustmentProblem::GlobalCovariance> solve_all_stages(
 
 /// Returns the mean height above the camera of the lamps used.
 double compute_mean_height_m(const AdjustmentProblem& problem) {
-  const AdjustmentLayout& at = problem.parameter_layout();
+  const AdjustmentLayout& at = problem.state_vector_layout();
   const Eigen::VectorXd& state = problem.state_vector();
   double sum_m = 0;
   int count = 0;
@@ -614,9 +617,9 @@ void set_detection_residuals(const AdjustmentProblem& problem, bool noise_is_sta
 void set_adjusted_rotation_center(const AdjustmentProblem& problem,
                                   const Eigen::MatrixXd& covariance, bool has_lever_arm,
                                   AdjustmentResult& result) {
-  const AdjustmentLayout& at = problem.parameter_layout();
+  const AdjustmentLayout& at = problem.state_vector_layout();
   const Eigen::VectorXd& state = problem.state_vector();
-  result.camera.intrinsics = problem.intrinsics();
+  result.camera.intrinsics = problem.current_intrinsics();
   const Eigen::Vector2d focal_px = result.camera.focal_px();
   const Eigen::Vector2d zenith = state.segment<2>(at.zenith);
   result.center.model = RotationModel::tilt;
@@ -639,7 +642,7 @@ void set_adjusted_rotation_center(const AdjustmentProblem& problem,
 void set_adjusted_joint_covariance(const AdjustmentProblem& problem,
                                    const Eigen::MatrixXd& covariance, bool has_lever_arm,
                                    AdjustmentResult& result) {
-  const AdjustmentLayout& at = problem.parameter_layout();
+  const AdjustmentLayout& at = problem.state_vector_layout();
   const Eigen::Index intrinsics = count_intrinsics_with_covariance(result.camera);
   const Eigen::Index rows = intrinsics + at.spots - at.zenith;
   Eigen::MatrixXd from_state = Eigen::MatrixXd::Zero(rows, at.global);
@@ -659,7 +662,7 @@ void set_adjusted_joint_covariance(const AdjustmentProblem& problem,
 void set_adjusted_map(const AssembledProblem& all, const Contradictions& contradictions,
                       AdjustmentResult& result) {
   const AdjustmentProblem& problem = all.problem;
-  const AdjustmentLayout& at = problem.parameter_layout();
+  const AdjustmentLayout& at = problem.state_vector_layout();
   const Eigen::VectorXd& state = problem.state_vector();
   const Eigen::Index first_lamp = count_intrinsics_with_covariance(result.camera) + 4;
   for (std::size_t i = 0; i < problem.lamps.size(); ++i) {
@@ -721,11 +724,11 @@ void set_position_residuals(AssembledProblem& all, AdjustmentResult& result) {
 /// Tests the correction of the lens against its covariance.
 void set_adjusted_lens(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
                        AdjustmentResult& result) {
-  const AdjustmentLayout& at = problem.parameter_layout();
+  const AdjustmentLayout& at = problem.state_vector_layout();
   const Eigen::VectorXd& state = problem.state_vector();
   const Eigen::VectorXd u = state.segment(at.lens, at.lens_size);
   if (at.lens_size > 0) {
-    const auto determined = eigendecompose_symmetric(
+    const auto determined = eigendecompose_symmetric_matrix(
         Eigen::MatrixXd(Eigen::MatrixXd::Identity(at.lens_size, at.lens_size) -
                         covariance.block(at.lens, at.lens, at.lens_size, at.lens_size)));
     for (Eigen::Index i = 0; i < at.lens_size; ++i) {
@@ -733,12 +736,12 @@ void set_adjusted_lens(const AdjustmentProblem& problem, const Eigen::MatrixXd& 
       if (!(determined.values[i] > min_determined)) continue;
       const double along = determined.vectors.col(i).dot(u);
       result.lens_chi_squared += along * along / determined.values[i];
-      ++result.lens_freedom;
+      ++result.lens_degrees_of_freedom;
     }
     result.lens_contradicted =
-        result.lens_freedom > 0 &&
+        result.lens_degrees_of_freedom > 0 &&
         result.lens_chi_squared >
-            compute_chi_squared_bound(kSigmasOfOneInTenThousand, result.lens_freedom);
+            compute_chi_squared_bound(kSigmasOfOneInTenThousand, result.lens_degrees_of_freedom);
   }
 }
 
@@ -752,10 +755,10 @@ MatrixX make_nominal_intrinsics_covariance(const Camera& camera, double sd_px) {
   for (int row = 0; row < across; ++row) {
     for (int column = 0; column < across; ++column) {
       const Eigen::Vector2d fraction((column + 0.5) / across, (row + 0.5) / across);
-      const auto ray = lens.unproject(
+      const auto ray = lens.unproject_pixel(
           {fraction.x() * camera.imager_px[0] - 0.5, fraction.y() * camera.imager_px[1] - 0.5});
       if (!ray) continue;
-      const auto seen = lens.project_with_jacobians(ray->direction);
+      const auto seen = lens.project_point_with_jacobians(ray->direction);
       if (!seen) continue;
       squares += seen->d_pixel_d_parameters.colwise().squaredNorm().transpose() / 2;
       ++rays;

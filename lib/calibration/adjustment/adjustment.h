@@ -141,7 +141,7 @@ struct AdjustmentResult {
   /// captures determine.
   double lens_chi_squared = 0;
   /// Number of directions of the lens in `lens_chi_squared`, which is its expectation.
-  int lens_freedom = 0;
+  int lens_degrees_of_freedom = 0;
   /// True if `lens_chi_squared` exceeds its bound of one in ten thousand.
   bool lens_contradicted = false;
 
@@ -162,7 +162,7 @@ struct AdjustmentResult {
   /// no capture contains.
   std::vector<std::string> notes;
 
-  bool ok() const { return undetermined.empty(); }
+  bool has_succeeded() const { return undetermined.empty(); }
 };
 
 /// Returns a nominal covariance of the intrinsics, in their order, for a lens whose calibration has

@@ -30,7 +30,7 @@ struct CapturePose {
 
 ZenithRotation rotate_level_point_to_camera(const Eigen::Vector2d& zenith,
                                             const Eigen::Vector3d& x) {
-  // Transpose of level_from_zenith(), the smallest rotation of n to +Z.
+  // Transpose of level_rotation_from_zenith(), the smallest rotation of n to +Z.
   const double nz = 1 / std::sqrt(1 + zenith.squaredNorm());
   const Eigen::Vector2d n = zenith * nz;
   const double a = n.dot(x.head<2>()), across = a / (1 + nz), lift = x.z() - across;
@@ -58,7 +58,7 @@ LensParametrization::LensParametrization(const Camera& camera,
   const Eigen::VectorXd sd = covariance->diagonal().cwiseSqrt();
   const Eigen::VectorXd inverse_sd =
       (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(sd.size()));
-  const auto eigen = eigendecompose_symmetric(
+  const auto eigen = eigendecompose_symmetric_matrix(
       Eigen::MatrixXd(inverse_sd.asDiagonal() * *covariance * inverse_sd.asDiagonal()));
   constexpr double rounding = 1e-12;
   const Eigen::VectorXd& values = eigen.values;
@@ -82,7 +82,7 @@ AdjustmentProblem::AdjustmentProblem(LensModel model, LensParametrization freedo
   state_ = Eigen::VectorXd::Zero(layout_.global);
 }
 
-void AdjustmentProblem::add_capture(const Capture& capture, const Pose& start) {
+void AdjustmentProblem::add_capture_with_initial_pose(const Capture& capture, const Pose& start) {
   Capture added = capture;
   added.local = state_.size();
   captures.push_back(added);
@@ -97,7 +97,7 @@ void AdjustmentProblem::add_capture(const Capture& capture, const Pose& start) {
   if (capture.is_yaw_rate_estimated()) state_[next] = capture.motion.yaw_rate_rad_per_s;
 }
 
-std::vector<double> AdjustmentProblem::intrinsics() const {
+std::vector<double> AdjustmentProblem::current_intrinsics() const {
   std::vector<double> values(static_cast<std::size_t>(freedom_.start.size()));
   Eigen::Map<Eigen::VectorXd> changed(values.data(), std::ssize(values));
   changed = freedom_.start;
@@ -106,8 +106,8 @@ std::vector<double> AdjustmentProblem::intrinsics() const {
   return values;
 }
 
-std::optional<Lens> AdjustmentProblem::lens() const {
-  const std::vector<double> values = intrinsics();
+std::optional<Lens> AdjustmentProblem::current_lens() const {
+  const std::vector<double> values = current_intrinsics();
   for (const double value : values) {
     if (!std::isfinite(value)) return std::nullopt;
   }
@@ -143,8 +143,8 @@ double arm_factor(const AdjustmentProblem::PositionObservation& place,
 
 }  // namespace
 
-std::optional<AdjustmentResidual> AdjustmentProblem::linearize(const Sighting& sighting,
-                                                               const Lens& lens) const {
+std::optional<AdjustmentResidual> AdjustmentProblem::linearize_lamp_observation(
+    const Sighting& sighting, const Lens& lens) const {
   const Capture& capture = captures[sighting.capture];
   const CapturePose camera = compute_capture_pose(state_, layout_, capture);
   const Eigen::Index lamp = layout_.lamp_state_index(sighting.lamp);
@@ -159,7 +159,7 @@ std::optional<AdjustmentResidual> AdjustmentProblem::linearize(const Sighting& s
   if (capture.spot) level.head<2>() -= state_.segment<2>(layout_.lever_arm);
   const ZenithRotation turn = rotate_level_point_to_camera(state_.segment<2>(layout_.zenith),
                                                            capture.base_from_level * level);
-  const auto seen = lens.project_with_jacobians(turn.x_in_camera);
+  const auto seen = lens.project_point_with_jacobians(turn.x_in_camera);
   if (!seen) return std::nullopt;
   const Eigen::Matrix2d weight = sighting.whitening / noise_scale;
   const Matrix23 by_camera = -weight * seen->d_pixel_d_point;
@@ -191,7 +191,7 @@ std::optional<AdjustmentResidual> AdjustmentProblem::linearize(const Sighting& s
   return at;
 }
 
-Eigen::Vector3d AdjustmentProblem::predict_reference_position(
+Eigen::Vector3d AdjustmentProblem::predict_camera_or_axis_position(
     const PositionObservation& place) const {
   const Capture& capture = captures[place.capture];
   const CapturePose camera = compute_capture_pose(state_, layout_, capture);
@@ -201,11 +201,12 @@ Eigen::Vector3d AdjustmentProblem::predict_reference_position(
          arm_factor(place, capture) * (camera.level_from_world.transpose() * arm_m);
 }
 
-AdjustmentResidual AdjustmentProblem::linearize(const PositionObservation& place) const {
+AdjustmentResidual AdjustmentProblem::linearize_known_position(
+    const PositionObservation& place) const {
   const Capture& capture = captures[place.capture];
   const CapturePose camera = compute_capture_pose(state_, layout_, capture);
   const double factor = arm_factor(place, capture);
-  const Eigen::Vector3d position_m = predict_reference_position(place);
+  const Eigen::Vector3d position_m = predict_camera_or_axis_position(place);
   const Eigen::Vector3d arm_m = position_m - camera.position_m;
   Eigen::MatrixXd by_local = Eigen::MatrixXd::Zero(3, capture.size());
   if (!capture.spot) by_local.leftCols<3>().setIdentity();
@@ -243,7 +244,7 @@ AdjustmentResidual AdjustmentProblem::linearize_motion_prior(const Capture& capt
   return at;
 }
 
-AdjustmentResidual AdjustmentProblem::linearize_gauge() const {
+AdjustmentResidual AdjustmentProblem::linearize_gauge_constraint() const {
   AdjustmentResidual at{Eigen::VectorXd::Zero(gauge.cols()), {}};
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     const Eigen::MatrixXd by_lamp =
@@ -255,21 +256,22 @@ AdjustmentResidual AdjustmentProblem::linearize_gauge() const {
   return at;
 }
 
-bool AdjustmentProblem::is_exact(Eigen::Index first) const {
+bool AdjustmentProblem::is_lamp_position_exact(Eigen::Index first) const {
   return first >= layout_.lamps && first < layout_.spots &&
          lamps[static_cast<std::size_t>(first - layout_.lamps) / 3].sd_m == 0;
 }
 
-std::vector<AdjustmentProblem::Term> AdjustmentProblem::make_terms(
+std::vector<AdjustmentProblem::Term> AdjustmentProblem::make_least_squares_terms(
     const std::optional<Lens>& lens) const {
   std::vector<Term> terms;
   std::vector<bool> capture_used(captures.size());
   for (const Sighting& sighting : sightings) {
     if (!sighting.used) continue;
     capture_used[sighting.capture] = true;
-    terms.push_back(
-        {[this, &sighting, &lens] { return lens ? linearize(sighting, *lens) : std::nullopt; },
-         true, true, sighting.capture});
+    terms.push_back({[this, &sighting, &lens] {
+                       return lens ? linearize_lamp_observation(sighting, *lens) : std::nullopt;
+                     },
+                     true, true, sighting.capture});
   }
   if (layout_.lens_size > 0) {
     terms.push_back({[this] {
@@ -288,10 +290,11 @@ std::vector<AdjustmentProblem::Term> AdjustmentProblem::make_terms(
                      },
                      true});
   }
-  if (gauge.cols() > 0) terms.push_back({[this] { return linearize_gauge(); }});
+  if (gauge.cols() > 0) terms.push_back({[this] { return linearize_gauge_constraint(); }});
   for (const PositionObservation& place : places) {
     if (!place_used[place.place] || !capture_used[place.capture]) continue;
-    terms.push_back({[this, &place] { return linearize(place); }, true, false, place.capture});
+    terms.push_back(
+        {[this, &place] { return linearize_known_position(place); }, true, false, place.capture});
   }
   for (std::size_t k = 0; k < captures.size(); ++k) {
     if (captures[k].num_motion_unknowns() == 0 || !capture_used[k]) continue;
@@ -304,9 +307,9 @@ namespace {
 
 /// Lens of the state at which Ceres evaluates the terms.
 struct LensUpdater : ceres::EvaluationCallback {
-  explicit LensUpdater(const AdjustmentProblem& of) : problem(of), lens(of.lens()) {}
+  explicit LensUpdater(const AdjustmentProblem& of) : problem(of), lens(of.current_lens()) {}
   void PrepareForEvaluation(bool, bool new_point) override {
-    if (new_point) lens = problem.lens();
+    if (new_point) lens = problem.current_lens();
   }
   const AdjustmentProblem& problem;
   std::optional<Lens> lens;
@@ -345,7 +348,7 @@ class TermCost : public ceres::CostFunction {
 
 }  // namespace
 
-bool AdjustmentProblem::solve(bool robust) {
+bool AdjustmentProblem::solve_adjustment(bool robust) {
   // 95 % efficiency for normal noise, approximately in two and in three dimensions.
   constexpr double width = 2.385;
   LensUpdater lenses(*this);
@@ -353,7 +356,7 @@ bool AdjustmentProblem::solve(bool robust) {
   problem_options.evaluation_callback = &lenses;
   ceres::Problem ceres(problem_options);
   auto order = std::make_shared<ceres::ParameterBlockOrdering>();
-  for (const Term& term : make_terms(lenses.lens)) {
+  for (const Term& term : make_least_squares_terms(lenses.lens)) {
     const auto start = term.linearize();
     if (!start) return false;
     std::vector<double*> blocks;
@@ -361,7 +364,7 @@ bool AdjustmentProblem::solve(bool robust) {
       double* const block = blocks.emplace_back(state_.data() + first);
       ceres.AddParameterBlock(block, static_cast<int>(jacobian.cols()));
       order->AddElementToGroup(block, first < layout_.global ? 1 : 0);
-      if (is_exact(first)) ceres.SetParameterBlockConstant(block);
+      if (is_lamp_position_exact(first)) ceres.SetParameterBlockConstant(block);
     }
     ceres::LossFunction* const loss =
         robust && term.has_loss ? new ceres::CauchyLoss(width) : nullptr;
@@ -383,7 +386,7 @@ bool AdjustmentProblem::solve(bool robust) {
   return summary.IsSolutionUsable() && state_.allFinite();
 }
 
-Eigen::MatrixXd AdjustmentProblem::guess_information() const {
+Eigen::MatrixXd AdjustmentProblem::make_weak_prior_information_matrix() const {
   constexpr double guess_rad = 1, guess_m = 10;
   Eigen::VectorXd information = Eigen::VectorXd::Zero(layout_.global);
   information.segment<2>(layout_.zenith).setConstant(1 / (guess_rad * guess_rad));
@@ -444,7 +447,7 @@ struct CaptureRows {
     Eigen::MatrixXd local = by_local.transpose() * by_local;
     local.diagonal().head(capture.num_pose_unknowns()).array() += guess_information;
     local_covariance =
-        solve_symmetric(local, Eigen::MatrixXd::Identity(capture.size(), capture.size()));
+        solve_symmetric_system(local, Eigen::MatrixXd::Identity(capture.size(), capture.size()));
     const Eigen::MatrixXd cross = by_local.transpose() * by_global;
     local_from_global = local_covariance * cross;
     information(columns, columns) +=
@@ -466,14 +469,14 @@ struct CaptureRows {
 
 }  // namespace
 
-AdjustmentProblem::GlobalCovariance AdjustmentProblem::compute_global_covariance() const {
-  Eigen::MatrixXd information = guess_information();
+AdjustmentProblem::GlobalCovariance AdjustmentProblem::compute_global_unknowns_covariance() const {
+  Eigen::MatrixXd information = make_weak_prior_information_matrix();
   std::vector<CaptureRows> rows(captures.size());
-  const auto lens = this->lens();
-  for (const Term& term : make_terms(lens)) {
+  const auto lens = this->current_lens();
+  for (const Term& term : make_least_squares_terms(lens)) {
     auto at = term.linearize();
     if (!at) continue;
-    std::erase_if(at->parts, [&](const auto& part) { return is_exact(part.first); });
+    std::erase_if(at->parts, [&](const auto& part) { return is_lamp_position_exact(part.first); });
     if (term.capture) {
       rows[*term.capture].add(*at, term.is_detection, captures[*term.capture].local);
       continue;
@@ -488,12 +491,12 @@ AdjustmentProblem::GlobalCovariance AdjustmentProblem::compute_global_covariance
     rows[k].marginalize_local_unknowns(captures[k], information);
   const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd covariance =
-      solve_symmetric(scale.asDiagonal() * information * scale.asDiagonal(),
-                      Eigen::MatrixXd::Identity(layout_.global, layout_.global));
+      solve_symmetric_system(scale.asDiagonal() * information * scale.asDiagonal(),
+                             Eigen::MatrixXd::Identity(layout_.global, layout_.global));
   covariance = (scale.asDiagonal() * covariance * scale.asDiagonal()).eval();
   covariance = 0.5 * (covariance + covariance.transpose()).eval();
   for (std::size_t i = 0; i < lamps.size(); ++i) {
-    if (is_exact(layout_.lamp_state_index(i)))
+    if (is_lamp_position_exact(layout_.lamp_state_index(i)))
       covariance.diagonal().segment<3>(layout_.lamp_state_index(i)).setZero();
   }
   double freedom = 0;

@@ -119,9 +119,9 @@ class AdjustmentProblem {
                     std::size_t spots);
 
   /// Adds a capture and its local unknowns, with the initial pose `start`.
-  void add_capture(const Capture& capture, const Pose& start);
+  void add_capture_with_initial_pose(const Capture& capture, const Pose& start);
 
-  const AdjustmentLayout& parameter_layout() const { return layout_; }
+  const AdjustmentLayout& state_vector_layout() const { return layout_; }
   Eigen::VectorXd& state_vector() { return state_; }
   const Eigen::VectorXd& state_vector() const { return state_; }
 
@@ -141,20 +141,21 @@ class AdjustmentProblem {
   /// Solves by least squares from the current state and updates it. With `robust`, applies a Cauchy
   /// loss to observations, lamps and known positions. Returns false if the solution is not usable
   /// or not finite.
-  bool solve(bool robust);
+  bool solve_adjustment(bool robust);
 
   /// Linearizes an observation at the current state, measured minus predicted. Returns std::nullopt
   /// if the lens cannot project the point.
-  std::optional<AdjustmentResidual> linearize(const Sighting& sighting, const Lens& lens) const;
+  std::optional<AdjustmentResidual> linearize_lamp_observation(const Sighting& sighting,
+                                                               const Lens& lens) const;
 
   /// Returns the position of the camera (or of the axis) in the capture, from the current state.
-  Eigen::Vector3d predict_reference_position(const PositionObservation& place) const;
+  Eigen::Vector3d predict_camera_or_axis_position(const PositionObservation& place) const;
 
   /// Returns the lens of the current state; std::nullopt if its intrinsics are invalid.
-  std::optional<Lens> lens() const;
-  std::vector<double> intrinsics() const;
+  std::optional<Lens> current_lens() const;
+  std::vector<double> current_intrinsics() const;
 
-  /// Result of compute_global_covariance().
+  /// Result of compute_global_unknowns_covariance().
   struct GlobalCovariance {
     /// Covariance of the global unknowns, zero for exact ones. Unknowns without any residual have
     /// the standard deviation of a guess: 1 rad, 10 m.
@@ -165,7 +166,7 @@ class AdjustmentProblem {
   };
   /// Computes the covariance of the global unknowns at the current state, after marginalization of
   /// the local ones.
-  GlobalCovariance compute_global_covariance() const;
+  GlobalCovariance compute_global_unknowns_covariance() const;
 
   const LensParametrization& lens_parametrization() const { return freedom_; }
 
@@ -181,14 +182,14 @@ class AdjustmentProblem {
   };
   /// Returns all terms, those of the detections first. They refer to this object and to `lens`, the
   /// lens of the current state.
-  std::vector<Term> make_terms(const std::optional<Lens>& lens) const;
-  AdjustmentResidual linearize(const PositionObservation& place) const;
+  std::vector<Term> make_least_squares_terms(const std::optional<Lens>& lens) const;
+  AdjustmentResidual linearize_known_position(const PositionObservation& place) const;
   AdjustmentResidual linearize_motion_prior(const Capture& capture) const;
-  AdjustmentResidual linearize_gauge() const;
+  AdjustmentResidual linearize_gauge_constraint() const;
   /// Returns true if the block of the state is a lamp with an exact position.
-  bool is_exact(Eigen::Index first) const;
+  bool is_lamp_position_exact(Eigen::Index first) const;
   /// Returns the information of the global unknowns without a prior, for a guess.
-  Eigen::MatrixXd guess_information() const;
+  Eigen::MatrixXd make_weak_prior_information_matrix() const;
 
   LensModel model_;
   LensParametrization freedom_;

@@ -14,8 +14,8 @@ namespace {
 /// Sets the fixes and circles before and after the correction.
 void set_fixes_before_and_after(DispersionFit& fit, const ReferencePointFixes& station,
                                 const std::vector<bool>& used, DispersionCircle kind) {
-  const OptionalFixes before = station.locate_captures_at_offset({0, 0}),
-                      after = station.locate_captures_at_offset(fit.dispersion.offset_px);
+  const OptionalFixes before = station.compute_capture_fixes_at_offset({0, 0}),
+                      after = station.compute_capture_fixes_at_offset(fit.dispersion.offset_px);
   std::vector<Eigen::Vector2d> before_m, after_m;
   for (std::size_t i = 0; i < before.size(); ++i) {
     if (!before[i] || !after[i]) continue;
@@ -56,7 +56,7 @@ std::vector<Dispersion::UncertainLamp> make_uncertain_lamps(const LampDerivative
 void fit_chen_guan_offset(DispersionFit& fit, const ReferencePointFixes& station,
                           const Eigen::Vector2d& focal_px, DispersionCircle kind) {
   const ChenGuanOffset found =
-      estimate_chen_guan_offset(station, focal_px, kind, fit.noise_is_stated);
+      estimate_dispersion_offset_by_chen_guan(station, focal_px, kind, fit.noise_is_stated);
   fit.status = found.status;
   if (found.status != DispersionStatus::ok) return;
   fit.dispersion.offset_px = found.offset_px;
@@ -72,13 +72,13 @@ void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& station,
     fit.status = DispersionStatus::diverged;
     return;
   }
-  const OptionalFixes fixes = station.locate_captures_at_offset({0, 0});
+  const OptionalFixes fixes = station.compute_capture_fixes_at_offset({0, 0});
   if (compute_mean_fix(fixes, separation->used).count < 3) {
     fit.status = DispersionStatus::too_few_captures;
     return;
   }
-  if (has_single_yaw_without_one_fix(fixes, separation->used)) {
-    fit.status = DispersionStatus::one_yaw;
+  if (is_yaw_variation_due_to_one_fix(fixes, separation->used)) {
+    fit.status = DispersionStatus::single_yaw;
     return;
   }
   if (separation->freedom <= 0) {
@@ -93,7 +93,7 @@ void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& station,
   fit.dispersion.covariance = covariance;
   fit.dispersion.by_lamps = make_uncertain_lamps(separation->by_lamps, focal_px);
   const Eigen::MatrixXd world_changes_m =
-      separation->by_lamps.compute_changes_per_lamp_sd().bottomRows<2>();
+      separation->by_lamps.scale_jacobian_by_lamp_sds().bottomRows<2>();
   fit.world_offset_m = separation->world_m;
   fit.world_covariance = factor * separation->covariance.bottomRightCorner<2, 2>() +
                          world_changes_m * world_changes_m.transpose();
@@ -106,22 +106,22 @@ DispersionFit estimate_heading_dependent_offset(std::span<const ReferencePointCa
                                                 const LampMap& map, const Calibration& calibration,
                                                 DispersionMethod method, DispersionCircle circle) {
   const ReferencePointFixes station(captures, map, calibration);
-  const OptionalFixes fixes = station.locate_captures_at_offset({0, 0});
+  const OptionalFixes fixes = station.compute_capture_fixes_at_offset({0, 0});
   const auto count =
       std::count_if(fixes.begin(), fixes.end(), [](const auto& fix) { return fix.has_value(); });
   DispersionFit fit;
   fit.captures_without_fix = static_cast<int>(std::ssize(fixes) - count);
-  fit.no_fix_status = station.first_failed_status();
+  fit.no_fix_status = station.first_failed_fix_status();
   fit.noise_is_stated = all_have_sigma(captures);
   if (count == 0) return fit;
-  const bool paper = method == DispersionMethod::paper;
+  const bool paper = method == DispersionMethod::chen_guan;
   const std::vector<bool> all(fixes.size(), true);
-  if (are_all_fixes_far_from_reference(fixes)) {
-    fit.status = DispersionStatus::station_far;
+  if (are_all_fixes_far_from_reference_point(fixes)) {
+    fit.status = DispersionStatus::all_far_from_reference;
   } else if (count < (paper ? 2 : 3)) {
     fit.status = DispersionStatus::too_few_captures;
-  } else if (!paper && compute_mean_fix(fixes, all).has_single_yaw()) {
-    fit.status = DispersionStatus::one_yaw;
+  } else if (!paper && compute_mean_fix(fixes, all).are_capture_yaws_similar()) {
+    fit.status = DispersionStatus::single_yaw;
   } else {
     fit.status = DispersionStatus::ok;
     const Eigen::Vector2d focal_px = calibration.camera.focal_px();
@@ -134,7 +134,7 @@ DispersionFit estimate_heading_dependent_offset(std::span<const ReferencePointCa
   return fit;
 }
 
-std::string_view describe(DispersionStatus status) {
+std::string_view describe_dispersion_status(DispersionStatus status) {
   switch (status) {
     case DispersionStatus::ok:
       return "ok";
@@ -143,16 +143,16 @@ std::string_view describe(DispersionStatus status) {
     case DispersionStatus::too_few_captures:
       return "too few captures have a fix that agrees with the others: three or more are needed "
              "(two for --method chen-guan); add captures";
-    case DispersionStatus::station_far:
+    case DispersionStatus::all_far_from_reference:
       return "every fix is farther from its reference point than a fifth of the lamp height: is "
              "the reference point in meters, in the frame of the lamp map, and that of these "
              "captures?";
-    case DispersionStatus::one_yaw:
+    case DispersionStatus::single_yaw:
       return "all captures, or all but one, have one yaw, which cannot separate errors of the "
              "camera from errors of the reference point or the lamp map; turn the camera at the "
              "reference point and add captures, or use --method chen-guan, which assumes an exact "
              "reference point and lamp map";
-    case DispersionStatus::many_yaws:
+    case DispersionStatus::several_yaws:
       return "the captures have different yaws, over which the circle of Chen and Guan averages "
              "out the camera error; use one yaw, or use --method camera";
     case DispersionStatus::diverged:

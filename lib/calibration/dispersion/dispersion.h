@@ -32,7 +32,7 @@ enum class DispersionMethod {
   camera,
   /// Method of Chen and Guan: moves the center of the dispersion circle to the reference point.
   /// Requires captures at one yaw.
-  paper
+  chen_guan
 };
 
 /// Definition of the dispersion circle: `mean` is centered at the mean fix and contains the
@@ -42,16 +42,16 @@ enum class DispersionCircle { mean, enclosing };
 /// Result of a dispersion calibration.
 enum class DispersionStatus {
   ok,
-  no_fix,            // no capture has a position fix
-  too_few_captures,  // fewer than three with a fix (`paper`: two)
-  station_far,       // every fix is far from the reference point
-  one_yaw,           // `camera`: one yaw cannot separate errors of camera and world
-  many_yaws,         // `paper`: the captures are at several yaws
-  diverged           // no offset explains the fixes
+  no_fix,                  // no capture has a position fix
+  too_few_captures,        // fewer than three with a fix (`chen_guan`: two)
+  all_far_from_reference,  // every fix is far from the reference point
+  single_yaw,              // `camera`: one yaw cannot separate errors of camera and world
+  several_yaws,            // `chen_guan`: the captures are at several yaws
+  diverged                 // no offset explains the fixes
 };
 
 /// Describes the status and the remedy, human-readable.
-std::string_view describe(DispersionStatus status);
+std::string_view describe_dispersion_status(DispersionStatus status);
 
 /// Result of estimate_heading_dependent_offset(). Members after `noise_is_stated` are valid only if
 /// the status is `ok`.
@@ -69,8 +69,8 @@ struct DispersionFit {
   /// the map's sd_m. Both are absent for the enclosing circle.
   Dispersion dispersion = {{0, 0}, 0, {0, 0}, 0, {}};
   /// Mean error of the corrected fixes, fixed in the world: fix minus reference point. Caused by
-  /// errors of the reference point or the lamp map. Absent for method `paper`, which assumes that
-  /// it is zero.
+  /// errors of the reference point or the lamp map. Absent for method `chen_guan`, which assumes
+  /// that it is zero.
   std::optional<Eigen::Vector2d> world_offset_m = {};
   /// Covariance of `world_offset_m`, m^2, from noise and lamp map.
   Matrix2 world_covariance = Matrix2::Zero();
@@ -98,10 +98,10 @@ struct DispersionFit {
 /// too large by delta, and reference point or map have an error m, then
 ///   fix_k - station = -H_k e^{j g_k} delta + m
 ///
-/// Method `paper` assumes m = 0. The center D of the circle gives offset_px = -f e^{-jg} D / H. The
-/// offset is corrected until the circle of the recomputed fixes is centered at the reference point
-/// (estimate_chen_guan_offset()). These are eq. 10 to 13, with the scale f / H and the rotation by
-/// the yaw, which the paper omits.
+/// Method `chen_guan` assumes m = 0. The center D of the circle gives offset_px = -f e^{-jg} D / H.
+/// The offset is corrected until the circle of the recomputed fixes is centered at the reference
+/// point (estimate_dispersion_offset_by_chen_guan()). These are eq. 10 to 13, with the scale f / H
+/// and the rotation by the yaw, which the paper omits.
 ///
 /// Method `camera` estimates offset_px = f delta and m. The fixes are recomputed with the offset as
 /// in level_from_camera(), so that the model is exact. Each fix is weighted by its covariance.

@@ -28,15 +28,16 @@ struct Equation {
   Eigen::Matrix2d whitening;
 };
 
-std::vector<Equation> linearize(const ReferencePointFixes& fixes, const OffsetSeparation& at) {
+std::vector<Equation> linearize_fix_equations(const ReferencePointFixes& fixes,
+                                              const OffsetSeparation& at) {
   constexpr double step_px =
       0.25;  // fixes are smooth over this step, which is far above their rounding
   const Eigen::Vector2d along_u(step_px, 0), along_v(0, step_px);
-  const Fixes here = fixes.locate_captures_at_offset(at.offset_px);
-  const Fixes right = fixes.locate_captures_at_offset(at.offset_px + along_u),
-              left = fixes.locate_captures_at_offset(at.offset_px - along_u);
-  const Fixes down = fixes.locate_captures_at_offset(at.offset_px + along_v),
-              up = fixes.locate_captures_at_offset(at.offset_px - along_v);
+  const Fixes here = fixes.compute_capture_fixes_at_offset(at.offset_px);
+  const Fixes right = fixes.compute_capture_fixes_at_offset(at.offset_px + along_u),
+              left = fixes.compute_capture_fixes_at_offset(at.offset_px - along_u);
+  const Fixes down = fixes.compute_capture_fixes_at_offset(at.offset_px + along_v),
+              up = fixes.compute_capture_fixes_at_offset(at.offset_px - along_v);
   std::vector<Equation> equations;
   equations.reserve(here.size());
   for (std::size_t i = 0; i < here.size(); ++i) {
@@ -103,7 +104,7 @@ bool solve_approximately(const ReferencePointFixes& fixes, OffsetSeparation& at)
   constexpr int iterations = 6;
   constexpr double width_squared = 2.385 * 2.385;  // 95 % efficiency for normal noise
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    const auto equations = linearize(fixes, at);
+    const auto equations = linearize_fix_equations(fixes, at);
     if (equations.empty()) return false;
     std::vector<double> weights = compute_squared_residuals(equations);
     const double variance = iteration == 0 ? 0 : estimate_variance(weights);
@@ -120,7 +121,7 @@ bool solve_approximately(const ReferencePointFixes& fixes, OffsetSeparation& at)
 std::optional<bool> solve_without_outliers(const ReferencePointFixes& fixes, OffsetSeparation& at) {
   constexpr int max_iterations = 30;
   constexpr double tolerance_px = 1e-7, tolerance_m = 1e-10;
-  auto equations = linearize(fixes, at);
+  auto equations = linearize_fix_equations(fixes, at);
   if (equations.empty()) return std::nullopt;
   const auto squares = compute_squared_residuals(equations);
   const double limit =
@@ -140,7 +141,7 @@ std::optional<bool> solve_without_outliers(const ReferencePointFixes& fixes, Off
     if (!step) return std::nullopt;
     if (step->head<2>().norm() < tolerance_px && step->tail<2>().norm() < tolerance_m)
       return changed;
-    equations = linearize(fixes, at);
+    equations = linearize_fix_equations(fixes, at);
   }
   return std::nullopt;
 }
@@ -148,11 +149,11 @@ std::optional<bool> solve_without_outliers(const ReferencePointFixes& fixes, Off
 /// Propagates errors of the map. The solution changes by -(J'WJ)^-1 J'W d, where d are the changes
 /// of the fixes.
 LampDerivatives propagate_map_errors(const ReferencePointFixes& fixes, const OffsetSeparation& at) {
-  LampDerivatives derivatives = fixes.compute_jacobian_wrt_lamps(at.offset_px);
+  LampDerivatives derivatives = fixes.compute_fix_jacobian_wrt_lamps(at.offset_px);
   if (derivatives.lamps.empty()) return derivatives;
   const Eigen::MatrixXd& d_fixes = derivatives.by_positions;
   Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(4, d_fixes.cols());
-  for (const Equation& equation : linearize(fixes, at)) {
+  for (const Equation& equation : linearize_fix_equations(fixes, at)) {
     if (!at.used[equation.capture]) continue;
     const auto row = 2 * static_cast<Eigen::Index>(equation.capture);
     gradient += equation.jacobian.transpose() * equation.whitening * d_fixes.middleRows<2>(row);
@@ -166,7 +167,7 @@ LampDerivatives propagate_map_errors(const ReferencePointFixes& fixes, const Off
 std::optional<OffsetSeparation> separate_camera_and_world_offsets(
     const ReferencePointFixes& fixes) {
   OffsetSeparation result;
-  result.used.resize(fixes.locate_captures_at_offset(result.offset_px).size());
+  result.used.resize(fixes.compute_capture_fixes_at_offset(result.offset_px).size());
   if (!solve_approximately(fixes, result)) return std::nullopt;
   constexpr int max_iterations = 10;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
@@ -183,7 +184,7 @@ namespace {
 std::vector<Eigen::Vector2d> compute_errors(const ReferencePointFixes& station,
                                             const Eigen::Vector2d& offset_px,
                                             const std::vector<bool>& used) {
-  const OptionalFixes fixes = station.locate_captures_at_offset(offset_px);
+  const OptionalFixes fixes = station.compute_capture_fixes_at_offset(offset_px);
   std::vector<Eigen::Vector2d> errors_m;
   for (std::size_t i = 0; i < fixes.size(); ++i) {
     if (fixes[i] && used[i]) errors_m.push_back(fixes[i]->error_m);
@@ -254,7 +255,7 @@ Eigen::Matrix2d estimate_covariance_of_mean(const std::vector<Eigen::Vector2d>& 
     return compute_small_sample_variance_factor(1, freedom, false) * scatter / n;
   const Eigen::Matrix2d l = root.matrixL(), l_inverse = l.inverse();
   auto [values, axes] =
-      eigendecompose_symmetric(Eigen::Matrix2d(l_inverse * scatter * l_inverse.transpose()));
+      eigendecompose_symmetric_matrix(Eigen::Matrix2d(l_inverse * scatter * l_inverse.transpose()));
   const double ratio = (l_inverse * squares * l_inverse.transpose()).trace() / freedom;
   for (double& value : values)
     value = compute_small_sample_variance_factor(value, freedom, true, ratio);
@@ -266,7 +267,7 @@ Eigen::Matrix2d estimate_covariance_of_mean(const std::vector<Eigen::Vector2d>& 
 LampDerivatives compute_offset_derivatives(const ReferencePointFixes& station,
                                            const ChenGuanOffset& found,
                                            const Eigen::Matrix2d& image_from_floor) {
-  LampDerivatives derivatives = station.compute_jacobian_wrt_lamps(found.offset_px);
+  LampDerivatives derivatives = station.compute_fix_jacobian_wrt_lamps(found.offset_px);
   Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(2, derivatives.by_positions.cols());
   double count = 0;
   for (std::size_t i = 0; i < found.used.size(); ++i) {
@@ -290,13 +291,14 @@ Circle fit_circle_to_dispersed_fixes(const std::vector<Eigen::Vector2d>& points,
   return circle;
 }
 
-ChenGuanOffset estimate_chen_guan_offset(const ReferencePointFixes& station,
-                                         const Eigen::Vector2d& focal_px, DispersionCircle kind,
-                                         bool noise_is_stated) {
-  const OptionalFixes fixes = station.locate_captures_at_offset({0, 0});
-  const std::vector<bool> used = find_fixes_near_median(fixes);
+ChenGuanOffset estimate_dispersion_offset_by_chen_guan(const ReferencePointFixes& station,
+                                                       const Eigen::Vector2d& focal_px,
+                                                       DispersionCircle kind,
+                                                       bool noise_is_stated) {
+  const OptionalFixes fixes = station.compute_capture_fixes_at_offset({0, 0});
+  const std::vector<bool> used = flag_fixes_near_median(fixes);
   const MeanFix mean_fix = compute_mean_fix(fixes, used);
-  if (!mean_fix.has_single_yaw()) return {.status = DispersionStatus::many_yaws};
+  if (!mean_fix.are_capture_yaws_similar()) return {.status = DispersionStatus::several_yaws};
   Eigen::Matrix2d image_from_floor =
       focal_px.asDiagonal() *
       Eigen::Matrix2d(complex_product_matrix(mean_fix.heading.normalized()).transpose() /
@@ -318,8 +320,8 @@ ChenGuanOffset estimate_chen_guan_offset(const ReferencePointFixes& station,
     }
     ChenGuanOffset found{.status = DispersionStatus::ok, .offset_px = offset_px, .used = used};
     if (kind == DispersionCircle::mean) {
-      const Eigen::Matrix2d noise_m2 =
-          compute_mean_noise(station.locate_captures_at_offset(offset_px), used, noise_is_stated);
+      const Eigen::Matrix2d noise_m2 = compute_mean_noise(
+          station.compute_capture_fixes_at_offset(offset_px), used, noise_is_stated);
       const Eigen::Matrix2d mean_covariance_m2 = estimate_covariance_of_mean(errors_m, noise_m2);
       Matrix2 covariance = image_from_floor * mean_covariance_m2 * image_from_floor.transpose();
       covariance(1, 0) = covariance(0, 1);

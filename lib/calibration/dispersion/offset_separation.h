@@ -52,9 +52,10 @@ inline constexpr double kFixRoundingVariance = 1e-24;
 Circle fit_circle_to_dispersed_fixes(const std::vector<Eigen::Vector2d>& points,
                                      DispersionCircle kind);
 
-/// Result of estimate_chen_guan_offset(). Members other than `status` are valid only if it is `ok`.
+/// Result of estimate_dispersion_offset_by_chen_guan(). Members other than `status` are valid only
+/// if it is `ok`.
 struct ChenGuanOffset {
-  /// Status `ok`, `many_yaws` or `diverged`.
+  /// Status `ok`, `several_yaws` or `diverged`.
   DispersionStatus status;
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
   /// Covariance from the scatter of the fixes, at least that of their noise. Absent for the
@@ -78,8 +79,8 @@ struct ChenGuanOffset {
 /// is applied as a shift and all lamps have one height. After a rotation center of model `tilt` the
 /// offset is applied as a rotation, which moves fixes by more. The offset is therefore corrected by
 /// the remaining D until it vanishes.
-ChenGuanOffset estimate_chen_guan_offset(const ReferencePointFixes& station,
-                                         const Eigen::Vector2d& focal_px, DispersionCircle kind,
-                                         bool noise_is_stated);
+ChenGuanOffset estimate_dispersion_offset_by_chen_guan(const ReferencePointFixes& station,
+                                                       const Eigen::Vector2d& focal_px,
+                                                       DispersionCircle kind, bool noise_is_stated);
 
 }  // namespace vlp

@@ -35,12 +35,12 @@ double compute_lamp_height_above_camera(const ReferencePointCapture& capture, co
 Fix locate_camera_of_capture(const Positioner& positioner, const ReferencePointCapture& capture) {
   Sensors sensors;
   sensors.inclination = capture.inclination;
-  return positioner.locate(capture.detections, sensors);
+  return positioner.compute_position_fix(capture.detections, sensors);
 }
 
 }  // namespace
 
-Eigen::MatrixXd LampDerivatives::compute_changes_per_lamp_sd() const {
+Eigen::MatrixXd LampDerivatives::scale_jacobian_by_lamp_sds() const {
   Eigen::MatrixXd moves = by_positions;
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     moves.middleCols<3>(3 * static_cast<Eigen::Index>(i)) *= *lamps[i].sd_m;
@@ -55,25 +55,25 @@ ReferencePointFixes::ReferencePointFixes(std::span<const ReferencePointCapture> 
   const Positioner positioner(map_, calibration_);
   for (const ReferencePointCapture& capture : captures_) {
     const Fix fix = locate_camera_of_capture(positioner, capture);
-    if (!fix.ok() && first_failure_ == FixStatus::ok) first_failure_ = fix.status;
+    if (!fix.has_succeeded() && first_failure_ == FixStatus::ok) first_failure_ = fix.status;
   }
 }
 
 std::vector<std::optional<ReferencePointFixes::Estimate>>
-ReferencePointFixes::locate_captures_at_offset(const Eigen::Vector2d& offset_px) const {
-  return locate_captures_at_offset(offset_px, map_);
+ReferencePointFixes::compute_capture_fixes_at_offset(const Eigen::Vector2d& offset_px) const {
+  return compute_capture_fixes_at_offset(offset_px, map_);
 }
 
 std::vector<std::optional<ReferencePointFixes::Estimate>>
-ReferencePointFixes::locate_captures_at_offset(const Eigen::Vector2d& offset_px,
-                                               const LampMap& map) const {
+ReferencePointFixes::compute_capture_fixes_at_offset(const Eigen::Vector2d& offset_px,
+                                                     const LampMap& map) const {
   Calibration calibration = calibration_;
   calibration.dispersion = Dispersion{offset_px, 0, {0, 0}, 1, {}};
   const Positioner positioner(map, calibration);
   std::vector<std::optional<Estimate>> fixes(captures_.size());
   for (std::size_t i = 0; i < captures_.size(); ++i) {
     const Fix fix = locate_camera_of_capture(positioner, captures_[i]);
-    if (!fix.ok()) continue;
+    if (!fix.has_succeeded()) continue;
     const Pose& pose = fix.estimate.pose;
     fixes[i] = Estimate{pose.position_m.head<2>() - captures_[i].reference_point_m,
                         fix.noise_covariance.topLeftCorner<2, 2>(),
@@ -85,7 +85,7 @@ ReferencePointFixes::locate_captures_at_offset(const Eigen::Vector2d& offset_px,
   return fixes;
 }
 
-LampDerivatives ReferencePointFixes::compute_jacobian_wrt_lamps(
+LampDerivatives ReferencePointFixes::compute_fix_jacobian_wrt_lamps(
     const Eigen::Vector2d& offset_px) const {
   std::set<int> detected;
   for (const ReferencePointCapture& capture : captures_) {
@@ -102,7 +102,7 @@ LampDerivatives ReferencePointFixes::compute_jacobian_wrt_lamps(
   Eigen::MatrixXd& by_positions = derivatives.by_positions;
   by_positions = Eigen::MatrixXd::Zero(2 * std::ssize(captures_), 3 * std::ssize(uncertain));
   if (uncertain.empty()) return derivatives;
-  const auto here = locate_captures_at_offset(offset_px);
+  const auto here = compute_capture_fixes_at_offset(offset_px);
   LampMap moved = map_;
   for (Eigen::Index column = 0; column < by_positions.cols(); ++column) {
     const std::size_t lamp = uncertain[static_cast<std::size_t>(column / 3)];
@@ -111,7 +111,7 @@ LampDerivatives ReferencePointFixes::compute_jacobian_wrt_lamps(
     constexpr double max_step_m = 1e-4;
     const double step_m = std::min(*map_.lamps[lamp].sd_m, max_step_m);
     coordinate_m += step_m;
-    const auto there = locate_captures_at_offset(offset_px, moved);
+    const auto there = compute_capture_fixes_at_offset(offset_px, moved);
     coordinate_m = map_.lamps[lamp].position_m[column % 3];
     for (std::size_t i = 0; i < here.size(); ++i) {
       if (!here[i] || !there[i]) continue;
@@ -146,13 +146,13 @@ double compute_yaw_contradiction(double ratio, double degrees_of_freedom) {
 
 }  // namespace
 
-double MeanFix::compute_yaw_variation() const {
+double MeanFix::compute_capture_yaw_variation() const {
   return std::sqrt(std::max(0.0, 1 - heading.squaredNorm()));
 }
 
-bool MeanFix::has_single_yaw() const {
+bool MeanFix::are_capture_yaws_similar() const {
   constexpr double one_yaw_rad = rad_from_deg(10);
-  return compute_yaw_variation() < std::sin(one_yaw_rad);
+  return compute_capture_yaw_variation() < std::sin(one_yaw_rad);
 }
 
 MeanFix compute_mean_fix(const OptionalFixes& fixes, const std::vector<bool>& used) {
@@ -168,17 +168,17 @@ MeanFix compute_mean_fix(const OptionalFixes& fixes, const std::vector<bool>& us
   return mean_fix;
 }
 
-bool has_single_yaw_without_one_fix(const OptionalFixes& fixes, std::vector<bool> used) {
+bool is_yaw_variation_due_to_one_fix(const OptionalFixes& fixes, std::vector<bool> used) {
   for (std::size_t i = 0; i < used.size(); ++i) {
     if (!fixes[i] || !used[i]) continue;
     used[i] = false;
-    if (compute_mean_fix(fixes, used).has_single_yaw()) return true;
+    if (compute_mean_fix(fixes, used).are_capture_yaws_similar()) return true;
     used[i] = true;
   }
   return false;
 }
 
-bool are_all_fixes_far_from_reference(const OptionalFixes& fixes) {
+bool are_all_fixes_far_from_reference_point(const OptionalFixes& fixes) {
   return std::all_of(fixes.begin(), fixes.end(), [](const auto& fix) {
     return !fix || fix->error_m.norm() > kMaxErrorFraction * fix->height_m;
   });
@@ -198,7 +198,7 @@ double compute_small_sample_variance_factor(double ratio, double degrees_of_free
   return factor * std::pow(std::max(1.0, from_residuals / factor), weight);
 }
 
-std::vector<bool> find_fixes_near_median(const OptionalFixes& fixes) {
+std::vector<bool> flag_fixes_near_median(const OptionalFixes& fixes) {
   std::vector<double> x, y, squares;
   for (const auto& fix : fixes) {
     if (!fix) continue;

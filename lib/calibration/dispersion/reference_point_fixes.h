@@ -21,7 +21,7 @@ struct LampDerivatives {
 
   /// Returns the changes of the quantities for errors of one standard deviation, one column per
   /// lamp coordinate.
-  Eigen::MatrixXd compute_changes_per_lamp_sd() const;
+  Eigen::MatrixXd scale_jacobian_by_lamp_sds() const;
 };
 
 /// Position fixes of captures at a reference point, as functions of the dispersion's offset.
@@ -47,18 +47,18 @@ class ReferencePointFixes {
                       const Calibration& calibration);
 
   /// Returns the fix of each capture; std::nullopt for captures without a fix.
-  std::vector<std::optional<Estimate>> locate_captures_at_offset(
+  std::vector<std::optional<Estimate>> compute_capture_fixes_at_offset(
       const Eigen::Vector2d& offset_px) const;
   /// Computes the derivatives of the fixes, in m, with respect to the positions of the lamps that
   /// are detected and have an sd_m above zero. Differentiates numerically, one coordinate at a
   /// time. The result has two rows for each capture, which are zero without a fix.
-  LampDerivatives compute_jacobian_wrt_lamps(const Eigen::Vector2d& offset_px) const;
+  LampDerivatives compute_fix_jacobian_wrt_lamps(const Eigen::Vector2d& offset_px) const;
   /// Returns the status of the first capture without a fix; `ok` if there is none.
-  FixStatus first_failed_status() const { return first_failure_; }
+  FixStatus first_failed_fix_status() const { return first_failure_; }
 
  private:
-  std::vector<std::optional<Estimate>> locate_captures_at_offset(const Eigen::Vector2d& offset_px,
-                                                                 const LampMap& map) const;
+  std::vector<std::optional<Estimate>> compute_capture_fixes_at_offset(
+      const Eigen::Vector2d& offset_px, const LampMap& map) const;
 
   std::span<const ReferencePointCapture> captures_;
   const LampMap& map_;
@@ -79,9 +79,9 @@ struct MeanFix {
   int count = 0;
 
   /// Returns the approximate RMS sine of the yaws relative to their mean.
-  double compute_yaw_variation() const;
+  double compute_capture_yaw_variation() const;
   /// Returns true if the yaws vary by less than about 10 degrees.
-  bool has_single_yaw() const;
+  bool are_capture_yaws_similar() const;
 };
 
 /// Computes the means over the fixes that are used.
@@ -89,11 +89,11 @@ MeanFix compute_mean_fix(const OptionalFixes& fixes, const std::vector<bool>& us
 
 /// Returns true if the removal of a single fix leaves one yaw. One fix alone is not sufficient to
 /// separate errors of camera and world.
-bool has_single_yaw_without_one_fix(const OptionalFixes& fixes, std::vector<bool> used);
+bool is_yaw_variation_due_to_one_fix(const OptionalFixes& fixes, std::vector<bool> used);
 
 /// Returns true if every fix is farther from the reference point than a camera tilted by 11 degrees
 /// would be.
-bool are_all_fixes_far_from_reference(const OptionalFixes& fixes);
+bool are_all_fixes_far_from_reference_point(const OptionalFixes& fixes);
 
 /// Degrees of freedom assigned to given noise: its standard deviation is accurate to 29 %, 1 /
 /// sqrt(12).
@@ -118,6 +118,6 @@ double compute_small_sample_variance_factor(double ratio, double degrees_of_free
 /// Returns true for each fix within five standard deviations of the median fix, for fixes at one
 /// yaw.
 /// @pre there is at least one fix
-std::vector<bool> find_fixes_near_median(const OptionalFixes& fixes);
+std::vector<bool> flag_fixes_near_median(const OptionalFixes& fixes);
 
 }  // namespace vlp

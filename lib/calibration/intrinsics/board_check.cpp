@@ -34,7 +34,7 @@ std::optional<TagDetection> undistort_tag(const TagDetection& tag,
   if (!lens) return tag;
   TagDetection straight = tag;
   for (auto& corner : straight.corners_px) {
-    const auto ray = lens->unproject(corner);
+    const auto ray = lens->unproject_pixel(corner);
     if (!ray || !(ray->direction.z() > 0)) return {};
     corner = ray->direction.hnormalized();
   }
@@ -341,9 +341,10 @@ BoardCheck check_charuco_layout(const Board& board, const std::vector<Step>& ste
   constexpr double tolerance = 0.15, hundreds = 100;
   const double stated = board.square_size_m / board.tag_size_m;
   if (std::abs(*check.pitch / stated - 1) <= tolerance) return check;
-  check.problem = "a square is " + format_shortest(std::round(hundreds * stated) / hundreds) +
+  check.problem = "a square is " +
+                  format_shortest_exact_number(std::round(hundreds * stated) / hundreds) +
                   " markers wide by board.yaml, but " +
-                  format_shortest(std::round(hundreds * *check.pitch) / hundreds) +
+                  format_shortest_exact_number(std::round(hundreds * *check.pitch) / hundreds) +
                   " in the images";
   return check;
 }
@@ -368,8 +369,8 @@ BoardCheck check_board_layout(const Board& board, std::span<const BoardView> vie
     const double seen = std::round((*fit.pitch - 1) * hundreds) / hundreds;
     // [LENS-4] `images show gaps` | wrong `tag_spacing`; strong tone curve or overexposure; far out
     //   of focus | measure it; expose less; focus
-    check.problem = "tag_spacing is " + format_shortest(board.tag_spacing) +
-                    ", but the images show gaps of " + format_shortest(seen) + " tags";
+    check.problem = "tag_spacing is " + format_shortest_exact_number(board.tag_spacing) +
+                    ", but the images show gaps of " + format_shortest_exact_number(seen) + " tags";
   }
   return check;
 }

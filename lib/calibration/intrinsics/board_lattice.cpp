@@ -76,7 +76,7 @@ std::vector<BoardLattice::Corner> BoardLattice::match_corners_to_flat_board(
   if (has_squares_ || !seen.points.empty()) {
     all.reserve(seen.points.size());
     for (const auto& [index, pixel, weight] : seen.points) {
-      const std::size_t part = index / num_points(), point = index % num_points();
+      const std::size_t part = index / num_points_per_part(), point = index % num_points_per_part();
       const auto cols = static_cast<std::size_t>(cols_);
       const std::size_t row = point / cols;
       const Eigen::Vector2d node(static_cast<double>(point % cols), static_cast<double>(row));
@@ -104,7 +104,7 @@ std::vector<BoardLattice::Corner> BoardLattice::match_corners_to_flat_board(
   return all;
 }
 
-std::vector<BoardLattice::Corner> BoardLattice::apply_board_warp(
+std::vector<BoardLattice::Corner> BoardLattice::apply_warp_to_board_corners(
     std::vector<Corner> corners, const Eigen::Vector2d& warp_of_part_m) const {
   const Eigen::Vector2d warp_m = warp_of_part_m.cwiseProduct(board_warp_ratio_);
   for (Corner& corner : corners) {
@@ -121,28 +121,28 @@ BoardPose BoardLattice::compute_board_part_pose(const BoardPose& camera_from_boa
                                           rotate_into_camera(camera_from_board, origins_m_[part])};
 }
 
-bool BoardLattice::has_sufficient_points(const std::vector<PointDetection>& seen) const {
+bool BoardLattice::are_points_sufficient_for_pose(const std::vector<PointDetection>& seen) const {
   constexpr std::size_t min_count = 12, min_count_per_part = 6;  // of a part, where there are four
   std::vector<std::map<std::size_t, int>> in_row(parts_);
   std::vector<std::size_t> count(parts_);
   for (const PointDetection& point : seen) {
-    const std::size_t part = point.index / num_points();
+    const std::size_t part = point.index / num_points_per_part();
     ++count[part];
-    ++in_row[part][point.index % num_points() / static_cast<std::size_t>(cols_)];
+    ++in_row[part][point.index % num_points_per_part() / static_cast<std::size_t>(cols_)];
   }
   for (std::size_t part = 0; part < parts_; ++part) {
     const auto rows = std::count_if(in_row[part].begin(), in_row[part].end(),
                                     [](const auto& row) { return row.second > 1; });
     if (rows < 2) return false;
     // A small board may have no more.
-    if (count[part] < std::min(num_points(), parts_ == 1 ? min_count : min_count_per_part))
+    if (count[part] < std::min(num_points_per_part(), parts_ == 1 ? min_count : min_count_per_part))
       return false;
   }
   return true;
 }
 
-bool BoardLattice::has_sufficient_corners(const BoardDetection& seen) const {
-  if (has_squares_ || !seen.points.empty()) return has_sufficient_points(seen.points);
+bool BoardLattice::are_corners_sufficient_for_pose(const BoardDetection& seen) const {
+  if (has_squares_ || !seen.points.empty()) return are_points_sufficient_for_pose(seen.points);
   constexpr std::size_t min_count = 3, min_count_per_part = 6;
   std::set<int> cols, rows;
   for (const TagDetection& tag : seen.tags) {

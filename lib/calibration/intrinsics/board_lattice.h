@@ -25,17 +25,17 @@ class BoardLattice {
   explicit BoardLattice(const Board& board);
 
   /// Number of parts into which the board is divided: 1 or 4.
-  std::size_t num_parts() const { return parts_; }
+  std::size_t num_lattice_parts() const { return parts_; }
   /// Number of points along the width and the height of a part.
-  int cols() const { return cols_; }
-  int rows() const { return rows_; }
+  int lattice_cols() const { return cols_; }
+  int lattice_rows() const { return rows_; }
   /// Distance between adjacent points of a part, m.
   double point_spacing_m() const { return spacing_m_; }
-  std::size_t num_points() const {
+  std::size_t num_points_per_part() const {
     return static_cast<std::size_t>(cols_) * static_cast<std::size_t>(rows_);
   }
   /// Ratio of the warp of the whole board to that of a part, along x and y; a part is smaller.
-  const Eigen::Vector2d& part_to_board_warp_ratio() const { return board_warp_ratio_; }
+  const Eigen::Vector2d& board_to_part_warp_ratio() const { return board_warp_ratio_; }
 
   /// Corner of the board and its measurement in a view.
   struct Corner {
@@ -45,7 +45,7 @@ class BoardLattice {
     std::size_t part, point;
     /// Displacement (u, v) of the corner, px, if all edges of its tag move inwards by 1 px. 0 for
     /// corners between touching squares, which do not move.
-    Eigen::Vector2d inward{0, 0};
+    Eigen::Vector2d d_pixel_d_edge_shift{0, 0};
     /// Factor by which a solve multiplies the residual of the corner.
     double weight = 1;
     /// Curvature of the tag's edge from this corner to the tag's next corner.
@@ -57,19 +57,19 @@ class BoardLattice {
   /// four corners of each tag.
   std::vector<Corner> match_corners_to_flat_board(const BoardDetection& seen) const;
   /// Returns the PointDetection::index of a point: part by part, row by row.
-  std::size_t point_index(std::size_t part, std::size_t point) const {
-    return part * num_points() + point;
+  std::size_t point_detection_index(std::size_t part, std::size_t point) const {
+    return part * num_points_per_part() + point;
   }
   /// Returns the index of the tag of a point. The corners of a tag share its edges and therefore
   /// have correlated errors. On a board of squares each point is a group of its own.
-  std::size_t find_tag_of_point(std::size_t point) const {
+  std::size_t find_tag_index_of_point(std::size_t point) const {
     if (has_squares_ || parts_ > 1) return point;
     const auto cols = static_cast<std::size_t>(cols_);
     return point / cols / 2 * (cols / 2) + point % cols / 2;
   }
   /// Returns the corners of a board whose parts have the warp `warp_of_part_m`, along x and y.
-  std::vector<Corner> apply_board_warp(std::vector<Corner> corners,
-                                       const Eigen::Vector2d& warp_of_part_m) const;
+  std::vector<Corner> apply_warp_to_board_corners(std::vector<Corner> corners,
+                                                  const Eigen::Vector2d& warp_of_part_m) const;
 
   /// Computes the pose of a part from that of the board.
   BoardPose compute_board_part_pose(const BoardPose& camera_from_board, std::size_t part) const;
@@ -78,10 +78,10 @@ class BoardLattice {
   ///   smaller board; at least two points in each of two rows
   /// - tags: at least 3 of a board in one part; at least 6 of a board in four parts, in at least
   ///   two columns and two rows
-  bool has_sufficient_corners(const BoardDetection& seen) const;
+  bool are_corners_sufficient_for_pose(const BoardDetection& seen) const;
 
  private:
-  bool has_sufficient_points(const std::vector<PointDetection>& seen) const;
+  bool are_points_sufficient_for_pose(const std::vector<PointDetection>& seen) const;
   struct TagPosition {
     int col, row;
     std::array<Eigen::Vector2d, 4> corners_m;

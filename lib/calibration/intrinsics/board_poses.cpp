@@ -33,7 +33,7 @@ struct RigidPose {
 double compute_squared_residuals(Corners corners, const Lens& lens, const RigidPose& pose) {
   double squares = 0;
   for (const auto& corner : corners) {
-    const auto pixel = lens.project(pose.transform_to_camera(corner.in_board_m));
+    const auto pixel = lens.project_point(pose.transform_to_camera(corner.in_board_m));
     if (!pixel) return INFINITY;
     squares += corner.weight * corner.weight * (*pixel - corner.pixel).squaredNorm();
   }
@@ -48,7 +48,7 @@ std::optional<RigidPose> compute_pose_step(Corners corners, const Lens& lens, co
   Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
   for (const auto& corner : corners) {
     const Eigen::Vector3d point = pose.transform_to_camera(corner.in_board_m);
-    const auto projection = lens.project_with_jacobians(point);
+    const auto projection = lens.project_point_with_jacobians(point);
     if (!projection) return {};
     const Eigen::Vector3d rotated = point - pose.translation_m;
     Eigen::Matrix<double, 2, 6> jacobian;
@@ -59,7 +59,7 @@ std::optional<RigidPose> compute_pose_step(Corners corners, const Lens& lens, co
     right += jacobian.transpose() * (corner.weight * (corner.pixel - projection->pixel));
   }
   normal.diagonal() *= 1 + damping;
-  const Eigen::Matrix<double, 6, 1> step = solve_symmetric(normal, right);
+  const Eigen::Matrix<double, 6, 1> step = solve_symmetric_system(normal, right);
   if (!step.allFinite()) return {};
   const double angle = step.head<3>().norm();
   const Eigen::Vector3d axis =
@@ -107,12 +107,12 @@ std::optional<ViewPose> estimate_board_view_pose(Corners corners, const Lens& le
   std::vector<std::pair<const BoardLattice::Corner*, Eigen::Vector3d>> rays;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const auto& corner : corners) {
-    const auto ray = lens.unproject(corner.pixel);
+    const auto ray = lens.unproject_pixel(corner.pixel);
     if (!ray) continue;
     rays.emplace_back(&corner, ray->direction.normalized());
     middle += rays.back().second;
   }
-  const Eigen::Matrix3d turned_from_camera = level_from_zenith(middle);
+  const Eigen::Matrix3d turned_from_camera = level_rotation_from_zenith(middle);
   std::vector<cv::Point3d> in_board;
   std::vector<cv::Point2d> normalized;
   for (const auto& [corner, ray] : rays) {

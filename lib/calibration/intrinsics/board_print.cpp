@@ -18,7 +18,7 @@ namespace {
 /// Returns the points of a board in the order of BoardProblem, row by row.
 std::vector<Eigen::Vector3d> make_board_points(const BoardProblem& problem) {
   std::vector<Eigen::Vector3d> points;
-  points.reserve(problem.points_per_board());
+  points.reserve(problem.num_points_per_board());
   for (int j = 0; j < problem.rows; ++j) {
     for (int i = 0; i < problem.cols; ++i) {
       const Eigen::Array2d normalized_position(2.0 * i / (problem.cols - 1) - 1,
@@ -32,11 +32,10 @@ std::vector<Eigen::Vector3d> make_board_points(const BoardProblem& problem) {
 
 }  // namespace
 
-std::optional<PrintEffect> compute_board_aspect_error_effect(const IntrinsicsSolution& solution,
-                                                             double print_sd,
-                                                             const ImageRegion& region) {
+std::optional<PrintEffect> compute_board_aspect_error_effect_on_lens(
+    const IntrinsicsSolution& solution, double print_sd, const ImageRegion& region) {
   const double aspect_error = std::numbers::sqrt2 * print_sd;
-  const Lens lens = solution.lens();
+  const Lens lens = solution.fitted_lens();
   BoardProblem problem = solution.problem;
   const std::vector<Eigen::Vector3d> points = make_board_points(problem);
   for (std::size_t pose = 0; pose < problem.poses.size(); ++pose) {
@@ -47,8 +46,8 @@ std::optional<PrintEffect> compute_board_aspect_error_effect(const IntrinsicsSol
       if (measured.z() < 0) continue;
       const Eigen::Vector3d in_camera = rotation * points[i] + problem.poses[pose].translation_m;
       const Eigen::Vector3d along = rotation * Eigen::Vector3d::UnitX();
-      const auto stated = lens.project(in_camera);
-      const auto printed = lens.project(in_camera + aspect_error * points[i].x() * along);
+      const auto stated = lens.project_point(in_camera);
+      const auto printed = lens.project_point(in_camera + aspect_error * points[i].x() * along);
       if (!stated || !printed) return {};
       measured.head<2>() += *stated - *printed;
     }

@@ -34,8 +34,7 @@ struct PrintEffect {
 /// @param print_sd  Board::print_sd, > 0
 /// @param region    region where the lens is known (CalibrationReport::region)
 /// @return std::nullopt if that solve fails
-std::optional<PrintEffect> compute_board_aspect_error_effect(const IntrinsicsSolution& solution,
-                                                             double print_sd,
-                                                             const ImageRegion& region = {});
+std::optional<PrintEffect> compute_board_aspect_error_effect_on_lens(
+    const IntrinsicsSolution& solution, double print_sd, const ImageRegion& region = {});
 
 }  // namespace vlp

@@ -46,7 +46,7 @@ std::optional<PointProjection> project_point(const Lens& lens, const LatticePoin
   Eigen::Vector3d in_board;
   in_board << point.in_board_m, warp_m.dot(point.d_z_d_warp);
   const Eigen::Vector3d rotated = rotation * in_board;
-  const auto projection = lens.project_with_jacobians(rotated + pose.translation_m);
+  const auto projection = lens.project_point_with_jacobians(rotated + pose.translation_m);
   if (!projection) return {};
   PointProjection result{projection->pixel, *projection, {}, {}};
   result.d_pixel_d_pose << -projection->d_pixel_d_point * skew_symmetric_matrix(rotated) * left,
@@ -61,7 +61,7 @@ std::optional<PointProjection> project_point(const Lens& lens, const LatticePoin
 class BoardCost : public ceres::CostFunction {
  public:
   BoardCost(const BoardProblem& problem, std::size_t pose) : problem_(problem) {
-    const std::size_t count = problem.points_per_board();
+    const std::size_t count = problem.num_points_per_board();
     for (std::size_t i = 0; i < count; ++i) {
       if (problem.points[pose * count + i].z() > 0) inliers_.push_back(pose * count + i);
     }
@@ -81,11 +81,11 @@ class BoardCost : public ceres::CostFunction {
     }
     const Lens lens(problem_.lens_model, intrinsics);
     const BoardPose pose{Eigen::Vector3d(parameters[1]), Eigen::Vector3d(parameters[1] + 3)};
-    const Eigen::Matrix3d rotation = rotation_matrix_from_vector(pose.rotation),
+    const Eigen::Matrix3d rotation = rotation_matrix_from_rotation_vector(pose.rotation),
                           left = so3_left_jacobian(pose.rotation);
     const Eigen::Vector2d warp_m(parameters[2]);
     const auto columns = static_cast<Eigen::Index>(intrinsics.size());
-    const std::size_t count = problem_.points_per_board();
+    const std::size_t count = problem_.num_points_per_board();
     using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     for (std::size_t k = 0; k < inliers_.size(); ++k) {
       const auto point = project_point(lens, make_lattice_point(problem_, inliers_[k] % count),
@@ -219,7 +219,7 @@ struct InlierFit {
 
 }  // namespace
 
-std::vector<Eigen::Vector2d> collect_inlier_pixels(const BoardProblem& problem) {
+std::vector<Eigen::Vector2d> collect_inlier_corner_pixels(const BoardProblem& problem) {
   std::vector<Eigen::Vector2d> pixels;
   for (const Eigen::Vector3d& point : problem.points) {
     if (point.z() > 0) pixels.emplace_back(point.head<2>());
@@ -227,32 +227,35 @@ std::vector<Eigen::Vector2d> collect_inlier_pixels(const BoardProblem& problem) 
   return pixels;
 }
 
-bool is_supported_by_mrcal(LensModel model) { return to_string(model).starts_with("LENSMODEL_"); }
+bool is_lens_model_supported_by_mrcal(LensModel model) {
+  return lens_model_name(model).starts_with("LENSMODEL_");
+}
 
-bool solve(BoardProblem& problem, const SolveOptions& what) {
-  if (!is_supported_by_mrcal(problem.lens_model))
-    return solve_by_ceres(problem, what) && is_valid_lens(problem);
+bool solve_board_problem(BoardProblem& problem, const SolveOptions& what) {
+  if (!is_lens_model_supported_by_mrcal(problem.lens_model))
+    return solve_board_problem_by_ceres(problem, what) && is_valid_lens(problem);
   constexpr double max_rms_ratio = 1.05;
   const BoardProblem start = problem;
-  if (!solve_by_mrcal(problem, what) || !is_valid_lens(problem)) return false;
+  if (!solve_board_problem_by_mrcal(problem, what) || !is_valid_lens(problem)) return false;
   const InlierFit left(problem);
   if (left.projects_all || is_splined_lens_model(problem.lens_model) ||
       !InlierFit(start).projects_all)
     return true;
   BoardProblem without_poles = start;
-  if (solve_by_ceres(without_poles, what) &&
+  if (solve_board_problem_by_ceres(without_poles, what) &&
       !(InlierFit(without_poles).rms_px > max_rms_ratio * left.rms_px)) {
     problem = std::move(without_poles);
   }
   return true;
 }
 
-Linearization linearize(const BoardProblem& problem, const SolveOptions& what) {
-  return is_supported_by_mrcal(problem.lens_model) ? linearize_by_mrcal(problem, what)
-                                                   : linearize_analytically(problem, what);
+Linearization linearize_board_problem(const BoardProblem& problem, const SolveOptions& what) {
+  return is_lens_model_supported_by_mrcal(problem.lens_model)
+             ? linearize_board_problem_by_mrcal(problem, what)
+             : linearize_board_problem_analytically(problem, what);
 }
 
-bool solve_by_ceres(BoardProblem& problem, const SolveOptions& what) {
+bool solve_board_problem_by_ceres(BoardProblem& problem, const SolveOptions& what) {
   if (!solve_without_reweighting(problem, what)) return false;
   constexpr int max_iterations = 10;
   for (int iteration = 0;
@@ -263,12 +266,13 @@ bool solve_by_ceres(BoardProblem& problem, const SolveOptions& what) {
   return true;
 }
 
-Linearization linearize_analytically(const BoardProblem& problem, const SolveOptions& what) {
+Linearization linearize_board_problem_analytically(const BoardProblem& problem,
+                                                   const SolveOptions& what) {
   const auto intrinsics = static_cast<Eigen::Index>(problem.intrinsics.size());
   const auto boards = static_cast<Eigen::Index>(problem.poses.size());
   const Eigen::Index warp = intrinsics + 6 * boards, states = warp + (what.warp ? 2 : 0);
   const auto rows = static_cast<Eigen::Index>(2 * problem.points.size());
-  const std::size_t count = problem.points_per_board();
+  const std::size_t count = problem.num_points_per_board();
   const Lens lens(problem.lens_model, problem.intrinsics);
   Linearization result;
   result.residuals_px = Eigen::VectorXd::Zero(rows);
@@ -280,7 +284,7 @@ Linearization linearize_analytically(const BoardProblem& problem, const SolveOpt
     if (!(problem.points[i].z() > 0)) continue;
     const BoardPose& pose = problem.poses[i / count];
     const auto point = project_point(lens, make_lattice_point(problem, i % count),
-                                     rotation_matrix_from_vector(pose.rotation),
+                                     rotation_matrix_from_rotation_vector(pose.rotation),
                                      so3_left_jacobian(pose.rotation), pose, problem.warp_m);
     if (!point) continue;
     const auto row = static_cast<Eigen::Index>(2 * i);

@@ -50,13 +50,13 @@ struct BoardProblem {
   };
   std::vector<FixedRay> fixed_rays = {};
 
-  std::size_t points_per_board() const {
+  std::size_t num_points_per_board() const {
     return static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows);
   }
 };
 
 /// Returns the measured pixels of the points that are not outliers.
-std::vector<Eigen::Vector2d> collect_inlier_pixels(const BoardProblem& problem);
+std::vector<Eigen::Vector2d> collect_inlier_corner_pixels(const BoardProblem& problem);
 
 /// Parameters that a solve may change in addition to the poses.
 struct SolveOptions {
@@ -77,7 +77,7 @@ struct SolveOptions {
 ///
 /// @return false if the solve fails: no lens of the model can project the points, too few points
 ///     for the unknowns, or a focal length that is not positive
-bool solve(BoardProblem& problem, const SolveOptions& what);
+bool solve_board_problem(BoardProblem& problem, const SolveOptions& what);
 
 /// Residuals and Jacobian of a problem. State and Jacobian are packed: the state is divided by
 /// `scale`, so that its entries have similar magnitudes.
@@ -97,16 +97,18 @@ struct Linearization {
   Eigen::Index first_intrinsic, poses;
 };
 /// Linearizes a problem at its current parameters.
-Linearization linearize(const BoardProblem& problem, const SolveOptions& what);
+Linearization linearize_board_problem(const BoardProblem& problem, const SolveOptions& what);
 
 /// Returns true if mrcal has the lens model.
-bool is_supported_by_mrcal(LensModel model);
-/// Implementations of solve() and linearize() by mrcal and by Ceres.
-bool solve_by_mrcal(BoardProblem& problem, const SolveOptions& what);
-bool solve_by_ceres(BoardProblem& problem, const SolveOptions& what);
-Linearization linearize_by_mrcal(const BoardProblem& problem, const SolveOptions& what);
+bool is_lens_model_supported_by_mrcal(LensModel model);
+/// Implementations of solve_board_problem() and linearize_board_problem() by mrcal and by Ceres.
+bool solve_board_problem_by_mrcal(BoardProblem& problem, const SolveOptions& what);
+bool solve_board_problem_by_ceres(BoardProblem& problem, const SolveOptions& what);
+Linearization linearize_board_problem_by_mrcal(const BoardProblem& problem,
+                                               const SolveOptions& what);
 /// Linearizes with analytic Jacobians, with respect to all intrinsics and poses, and to the warp if
 /// what.warp.
-Linearization linearize_analytically(const BoardProblem& problem, const SolveOptions& what);
+Linearization linearize_board_problem_analytically(const BoardProblem& problem,
+                                                   const SolveOptions& what);
 
 }  // namespace vlp

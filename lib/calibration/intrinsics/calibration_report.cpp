@@ -30,8 +30,8 @@ void add_uncertainty_over_image(const ProjectionUncertainty& uncertainty, const 
     // A fisheye or a spline may end beyond the farthest corner and has no rays there.
     const bool can_end =
         lens.lens_model() == LensModel::fisheye || is_splined_lens_model(lens.lens_model());
-    if (can_end && !lens.unproject(pixel)) continue;
-    const double sigma_px = uncertainty.max_direction_sd_px(pixel);
+    if (can_end && !lens.unproject_pixel(pixel)) continue;
+    const double sigma_px = uncertainty.max_projection_sd_px(pixel);
     if (!polygon_contains(report.region, pixel)) {
       report.uncertainty_beyond_px = std::max(report.uncertainty_beyond_px, sigma_px);
       continue;
@@ -50,19 +50,19 @@ std::optional<ProjectionDifference> compare_lenses_of_view_halves(
     const ProjectionUncertainty& uncertainty, const ImageRegion& region) {
   const IntrinsicsSolution even = solve_intrinsics_from_half_of_views(solution, 0);
   const IntrinsicsSolution odd = solve_intrinsics_from_half_of_views(solution, 1);
-  if (!even.ok() || !odd.ok()) return std::nullopt;
+  if (!even.has_succeeded() || !odd.has_succeeded()) return std::nullopt;
   // Half of the views may not determine all parts of a splined lens.
   std::vector<ProjectionUncertainty> halves;
-  if (is_splined_lens_model(solution.lens().lens_model()))
+  if (is_splined_lens_model(solution.fitted_lens().lens_model()))
     halves = {{even, input.lattice}, {odd, input.lattice}};
   constexpr double max_ratio = 3;  // typically sqrt(2)
   return compute_projection_difference(
-      even.lens(), odd.lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
-        const double sigma_px = uncertainty.max_direction_sd_px(pixel);
+      even.fitted_lens(), odd.fitted_lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
+        const double sigma_px = uncertainty.max_projection_sd_px(pixel);
         const bool is_determined =
             polygon_contains(region, pixel) &&
             std::ranges::none_of(halves, [&](const ProjectionUncertainty& half) {
-              return half.max_direction_sd_px(pixel) > max_ratio * sigma_px;
+              return half.max_projection_sd_px(pixel) > max_ratio * sigma_px;
             });
         return is_determined ? sigma_px : std::numeric_limits<double>::infinity();
       });
@@ -70,19 +70,19 @@ std::optional<ProjectionDifference> compare_lenses_of_view_halves(
 
 }  // namespace
 
-CalibrationReport compute_calibration_report(const IntrinsicsSolution& solution,
-                                             const IntrinsicsInput& input) {
+CalibrationReport compute_lens_calibration_report(const IntrinsicsSolution& solution,
+                                                  const IntrinsicsInput& input) {
   const ProjectionUncertainty uncertainty(solution, input.lattice);
-  const Lens lens = solution.lens();
-  const Eigen::MatrixXd by_views = estimate_jackknife_covariance(solution);
+  const Lens lens = solution.fitted_lens();
+  const Eigen::MatrixXd by_views = estimate_intrinsics_covariance_by_jackknife(solution);
   ImageRegion region =
-      compute_valid_lens_region(collect_inlier_pixels(solution.problem), input.imager_px,
+      compute_valid_lens_region(collect_inlier_corner_pixels(solution.problem), input.imager_px,
                                 lens.lens_model(), solution.other_model_fits);
   // Splines are undetermined outside the region.
   const ImageRegion compared = is_splined_lens_model(lens.lens_model()) ? region : ImageRegion();
   const auto expected = compute_expected_projection_difference(
       lens, input.imager_px, uncertainty.intrinsics_covariance(), compared);
-  const double region_fraction = compute_fraction_of_image_area(region, input.imager_px);
+  const double region_fraction = compute_region_fraction_of_image_area(region, input.imager_px);
   CalibrationReport report{
       std::move(region),
       region_fraction,
@@ -101,38 +101,38 @@ CalibrationReport compute_calibration_report(const IntrinsicsSolution& solution,
     for (const Eigen::MatrixXd& covariance :
          {uncertainty.intrinsics_covariance(), independent.intrinsics_covariance(), by_views}) {
       if (!covariance.allFinite()) continue;
-      report.uncertainty_worst_px = std::max(
-          report.uncertainty_worst_px,
-          estimate_max_expected_difference_px(lens, input.imager_px, covariance, report.region));
+      report.uncertainty_worst_px = std::max(report.uncertainty_worst_px,
+                                             estimate_expected_max_projection_difference_px(
+                                                 lens, input.imager_px, covariance, report.region));
     }
   }
   report.halves = compare_lenses_of_view_halves(solution, input, uncertainty, report.region);
   return report;
 }
 
-std::vector<double> compute_held_out_view_rms_px(const IntrinsicsSolution& solution,
-                                                 const IntrinsicsInput& held_out) {
-  const Lens lens = solution.lens();
+std::vector<double> compute_held_out_view_residual_rms_px(const IntrinsicsSolution& solution,
+                                                          const IntrinsicsInput& held_out) {
+  const Lens lens = solution.fitted_lens();
   auto views = held_out.views;
   for (auto& view : views) {
-    correct_corners_for_curved_edges(view, lens);
-    view = held_out.lattice.apply_board_warp(std::move(view), solution.problem.warp_m);
+    correct_corners_for_edge_curvature(view, lens);
+    view = held_out.lattice.apply_warp_to_board_corners(std::move(view), solution.problem.warp_m);
   }
   const auto shifts = estimate_tag_edge_displacements(views, lens);
   std::vector<double> rms_px;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    correct_edge_displacement(views[i], shifts[i]);
+    correct_corners_for_edge_displacement(views[i], shifts[i]);
     const auto pose = estimate_board_view_pose(views[i], lens);
     rms_px.push_back(pose ? pose->rms_px : std::numeric_limits<double>::infinity());
   }
   return rms_px;
 }
 
-HeldOutFit evaluate_held_out_views(const IntrinsicsSolution& solution,
-                                   const IntrinsicsInput& held_out) {
+HeldOutFit evaluate_lens_on_held_out_views(const IntrinsicsSolution& solution,
+                                           const IntrinsicsInput& held_out) {
   HeldOutFit fit;
   double squares = 0;
-  const auto rms_px = compute_held_out_view_rms_px(solution, held_out);
+  const auto rms_px = compute_held_out_view_residual_rms_px(solution, held_out);
   for (std::size_t i = 0; i < rms_px.size(); ++i) {
     if (!std::isfinite(rms_px[i])) continue;
     const std::size_t corners = held_out.views[i].size();
@@ -152,12 +152,13 @@ ViewCoverage compute_board_view_coverage(const IntrinsicsSolution& solution,
   for (const std::size_t view : solution.views) {
     for (const auto& corner : input.views[view]) {
       const double u = corner.pixel.x(), v = corner.pixel.y();
-      ++coverage.corners[static_cast<std::size_t>(ImageCoverage::part(v, height, 3) * 3 +
-                                                  ImageCoverage::part(u, width, 3))];
-      parts.add(corner.pixel);
+      ++coverage.corners[static_cast<std::size_t>(
+          ImageCoverage::cell_index_along_edge(v, height, 3) * 3 +
+          ImageCoverage::cell_index_along_edge(u, width, 3))];
+      parts.add_corner_pixel(corner.pixel);
     }
   }
-  coverage.covered_fraction = parts.covered_fraction();
+  coverage.covered_fraction = parts.covered_image_fraction();
   std::vector<Eigen::Vector3d> normals;
   for (const BoardPose& pose : solution.problem.poses) {
     // Points away from the camera; the board is nearer on the side to which it is tilted.

@@ -20,22 +20,22 @@ struct CalibrationReport {
   /// `region_fraction` is its area as a fraction of the image, 0 to 1.
   ImageRegion region;
   double region_fraction;
-  /// Mean and maximum of ProjectionUncertainty::max_direction_sd_px() by tags, px, over the
+  /// Mean and maximum of ProjectionUncertainty::max_projection_sd_px() by tags, px, over the
   /// make_regular_pixel_grid() of the region.
   ///
-  /// The maximum is at least estimate_max_expected_difference_px() over the region for each of
-  /// three covariances: by tags, by independent corners and by views. Splined lenses are excluded
-  /// from this rule. If another lens model fits equally well, estimate_lens() raises the maximum to
-  /// the largest difference between the two lenses.
+  /// The maximum is at least estimate_expected_max_projection_difference_px() over the region for
+  /// each of three covariances: by tags, by independent corners and by views. Splined lenses are
+  /// excluded from this rule. If another lens model fits equally well, estimate_lens() raises the
+  /// maximum to the largest difference between the two lenses.
   double uncertainty_mean_px, uncertainty_worst_px;
-  /// Maximum of ProjectionUncertainty::max_direction_sd_px() outside the region, px.
+  /// Maximum of ProjectionUncertainty::max_projection_sd_px() outside the region, px.
   double uncertainty_beyond_px;
   /// Standard deviation of fx, px: from the noise of the tags, and from
-  /// estimate_jackknife_covariance().
+  /// estimate_intrinsics_covariance_by_jackknife().
   double focal_sd_px, focal_sd_by_views_px;
   /// Expected compute_projection_difference() from the true lens, RMS per axis, px: from the noise
-  /// of the tags, and from estimate_jackknife_covariance(). For splined lenses over the region
-  /// only.
+  /// of the tags, and from estimate_intrinsics_covariance_by_jackknife(). For splined lenses over
+  /// the region only.
   double expected_rms_px, expected_by_views_rms_px;
   /// Difference over the region between the lens of every second view and that of the other views
   /// (solve_intrinsics_from_half_of_views()). It is about twice expected_rms_px if the lens model
@@ -45,18 +45,18 @@ struct CalibrationReport {
   std::optional<ProjectionDifference> halves;
 };
 /// Computes the report of a solution; solves twice for `halves`. `input`: input of its solve.
-/// @pre solution.ok()
-CalibrationReport compute_calibration_report(const IntrinsicsSolution& solution,
-                                             const IntrinsicsInput& input);
+/// @pre solution.has_succeeded()
+CalibrationReport compute_lens_calibration_report(const IntrinsicsSolution& solution,
+                                                  const IntrinsicsInput& input);
 
 /// Returns the RMS residual of each held-out view, per axis, px; infinity for a view without a
 /// pose.
 ///
 /// Lens and board warp are those of the solution. Edges get the curvature of the lens
-/// (correct_corners_for_curved_edges()); pose and edge shifts of each view are fitted. All corners
-/// keep their given weights, so that lens models can be compared.
-std::vector<double> compute_held_out_view_rms_px(const IntrinsicsSolution& solution,
-                                                 const IntrinsicsInput& held_out);
+/// (correct_corners_for_edge_curvature()); pose and edge shifts of each view are fitted. All
+/// corners keep their given weights, so that lens models can be compared.
+std::vector<double> compute_held_out_view_residual_rms_px(const IntrinsicsSolution& solution,
+                                                          const IntrinsicsInput& held_out);
 
 /// Residuals of all held-out views together, for the lens of the other views.
 struct HeldOutFit {
@@ -64,10 +64,10 @@ struct HeldOutFit {
   /// RMS residual per axis, px.
   double rms_px = 0;
 };
-/// Computes the fit of the held-out views as compute_held_out_view_rms_px(), without views that
-/// have no pose.
-HeldOutFit evaluate_held_out_views(const IntrinsicsSolution& solution,
-                                   const IntrinsicsInput& held_out);
+/// Computes the fit of the held-out views as compute_held_out_view_residual_rms_px(), without views
+/// that have no pose.
+HeldOutFit evaluate_lens_on_held_out_views(const IntrinsicsSolution& solution,
+                                           const IntrinsicsInput& held_out);
 
 /// Distribution of the corners over the image, and tilts of the boards.
 struct ViewCoverage {

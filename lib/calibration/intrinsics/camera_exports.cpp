@@ -14,7 +14,7 @@ namespace {
 std::string format_list(const std::vector<double>& values) {
   std::string text = "[";
   for (const double value : values) {
-    text.append(text.size() > 1 ? ", " : "").append(format_shortest(value));
+    text.append(text.size() > 1 ? ", " : "").append(format_shortest_exact_number(value));
   }
   return text + "]";
 }
@@ -34,7 +34,8 @@ std::vector<double> pad_distortions(const Camera& camera, std::size_t min_count)
 
 [[noreturn]] void throw_unsupported(const Camera& camera, const char* format, const char* known) {
   throw std::invalid_argument(std::string(format) + " has no lens model like " +
-                              std::string(to_string(camera.lens_model)) + "; use --lens " + known);
+                              std::string(lens_model_name(camera.lens_model)) + "; use --lens " +
+                              known);
 }
 
 /// Returns ROS's name of the distortion model; nullptr if it has none.
@@ -141,10 +142,10 @@ std::string format_mrcal_valid_region(const ImageRegion& region) {
 }
 
 std::string format_mrcal_cameramodel(const Camera& camera, const ImageRegion& region) {
-  if (!is_supported_by_mrcal(camera.lens_model))
+  if (!is_lens_model_supported_by_mrcal(camera.lens_model))
     throw_unsupported(camera, "mrcal", "LENSMODEL_OPENCV8");
   std::string text = "{\n    'lensmodel':  '";
-  text.append(to_string(camera.lens_model)).append("',\n    'intrinsics': ");
+  text.append(lens_model_name(camera.lens_model)).append("',\n    'intrinsics': ");
   text.append(format_list(camera.intrinsics))
       .append(",\n")
       .append(format_mrcal_valid_region(region));

@@ -138,7 +138,8 @@ AnyCamera parse_mrcal_camera(const fs::path& file, const std::string& text) {
   const std::string name = get_required_value(file, head, "lensmodel");
   const auto model = lens_model_from_name(name);
   if (!model) {
-    throw InputError(file, "has lens model " + name + "; the models are: " + lens_model_names());
+    throw InputError(file,
+                     "has lens model " + name + "; the models are: " + list_lens_model_names());
   }
   const auto imager = parse_python_numbers(file, head, "imagersize");
   const auto is_size = [](double value) { return value >= 1 && value <= kMaxImager_px; };
@@ -241,7 +242,7 @@ LensFit measure_lens_fit(const std::vector<double>& parameters, LensModel model,
   step.normal = Eigen::MatrixXd::Zero(size, size);
   step.right = Eigen::VectorXd::Zero(size);
   for (const auto& [pixel, ray] : rays) {
-    const auto at = lens.project_with_jacobians(ray);
+    const auto at = lens.project_point_with_jacobians(ray);
     if (!at) continue;
     const Eigen::Vector2d residual = pixel - at->pixel;
     step.squares += residual.squaredNorm();
@@ -261,14 +262,14 @@ void fit_lens_parameters(const Camera& camera, const Lens& from, LensModel model
   constexpr double function_tolerance = 1e-12, min_damping = 1e-12, max_damping = 1e12;
   std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>> rays;
   for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(camera.imager_px)) {
-    if (const auto ray = from.unproject(pixel)) rays.emplace_back(pixel, ray->direction);
+    if (const auto ray = from.unproject_pixel(pixel)) rays.emplace_back(pixel, ray->direction);
   }
   double damping = 1e-3;
   LensFit fit = measure_lens_fit(parameters, model, rays);
   for (int i = 0; i < max_iterations && fit.count > 0 && !is_splined_lens_model(model); ++i) {
     Eigen::MatrixXd damped = fit.normal;
     damped.diagonal() *= 1 + damping;
-    const Eigen::VectorXd change = solve_symmetric(damped, fit.right);
+    const Eigen::VectorXd change = solve_symmetric_system(damped, fit.right);
     std::vector<double> next = parameters;
     for (std::size_t k = 0; k < next.size(); ++k) next[k] += change[static_cast<Eigen::Index>(k)];
     const bool is_possible = change.allFinite() && next[0] > 0 && next[1] > 0;
@@ -290,8 +291,8 @@ void fit_lens_parameters(const Camera& camera, const Lens& from, LensModel model
   if (fit.count == 0 || !std::isfinite(fit.squares)) {
     // [LENS-7] `has no lens near` | `vlp-convert`: unsupported model or value | fit another with
     //   `--lens`
-    throw std::invalid_argument(std::string(to_string(model)) + " has no lens near " +
-                                std::string(to_string(camera.lens_model)));
+    throw std::invalid_argument(std::string(lens_model_name(model)) + " has no lens near " +
+                                std::string(lens_model_name(camera.lens_model)));
   }
 }
 
@@ -303,8 +304,8 @@ void set_lens_differences(const Lens& from, const Lens& to, const std::array<int
   const auto pixels = make_regular_pixel_grid(imager_px, points_per_row);
   std::size_t num_common = 0;
   for (const Eigen::Vector2d& pixel : pixels) {
-    const auto ray = from.unproject(pixel);
-    const auto found = ray ? to.project(ray->direction) : std::nullopt;
+    const auto ray = from.unproject_pixel(pixel);
+    const auto found = ray ? to.project_point(ray->direction) : std::nullopt;
     if (!found) continue;
     fitted.worst_px = std::max(fitted.worst_px, (*found - pixel).norm());
     ++num_common;
@@ -331,7 +332,7 @@ AnyCamera read_camera_of_any_format(const fs::path& file) {
       throw InputError(file, "contains no camera: a YAML file of a camera is shorter than 1 MiB");
     }
     try {
-      const YAML::Node document = parse_yaml(file, text);
+      const YAML::Node document = parse_yaml_text(file, text);
       if (!document.IsMap()) throw InputError(file, "contains no camera");
       if (document["format"]) {
         const Calibration calibration = read_calibration(file);
@@ -359,7 +360,7 @@ AnyCamera read_camera_of_any_format(const fs::path& file) {
   return found;
 }
 
-FittedCamera convert_to_lens_model(const Camera& camera, LensModel model) {
+FittedCamera convert_camera_to_lens_model(const Camera& camera, LensModel model) {
   if (camera.lens_model == model) return {camera, 0, 1};
   const Lens from(camera.lens_model, camera.intrinsics);
   FittedCamera fitted{camera, 0, 0};
@@ -367,10 +368,10 @@ FittedCamera convert_to_lens_model(const Camera& camera, LensModel model) {
   auto& parameters = fitted.camera.intrinsics;
   parameters.resize(4);
   parameters.resize(
-      parameter_count(is_splined_lens_model(model) ? LensModel::stereographic : model), 0);
+      num_lens_parameters(is_splined_lens_model(model) ? LensModel::stereographic : model), 0);
   if (is_splined_lens_model(model)) {
     if (camera.lens_model != LensModel::stereographic) {
-      parameters = convert_to_lens_model(camera, LensModel::stereographic).camera.intrinsics;
+      parameters = convert_camera_to_lens_model(camera, LensModel::stereographic).camera.intrinsics;
     }
     const auto splined = fit_splined_lens_to_lens(from, camera.imager_px, model, parameters);
     if (!splined) {

@@ -38,6 +38,6 @@ struct FittedCamera {
 /// already has the model unchanged.
 /// @throws std::invalid_argument if no lens of the model is close to the camera's; if a splined
 ///     model has too few control points in the field of view
-FittedCamera convert_to_lens_model(const Camera& camera, LensModel model);
+FittedCamera convert_camera_to_lens_model(const Camera& camera, LensModel model);
 
 }  // namespace vlp

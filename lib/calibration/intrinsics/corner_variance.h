@@ -26,7 +26,7 @@ struct CornerVariance {
 
   /// Returns the variance of a corner per axis, px^2. `sd_px` is its standard deviation from pixel
   /// noise.
-  double at(double sd_px) const { return floor_px2 + scale2 * sd_px * sd_px; }
+  double corner_variance_px2(double sd_px) const { return floor_px2 + scale2 * sd_px * sd_px; }
 };
 
 /// Estimates the variance components by least squares of the squared residuals, each divided by its
@@ -35,7 +35,7 @@ struct CornerVariance {
 /// A residual beyond three standard deviations counts as three. The standard deviation of a corner
 /// is at least 4 % of the RMS residual of all, so that no corner dominates.
 /// @pre at least one error, not all of them 0; standard deviations are finite
-CornerVariance estimate_variance_components(std::span<const CornerError> errors);
+CornerVariance estimate_corner_variance_components(std::span<const CornerError> errors);
 
 /// Factors by which a solve multiplies residuals:
 ///   weight^2 = mean of the squared residuals / variance.
@@ -54,7 +54,7 @@ class CornerWeights {
   CornerWeights(std::span<const CornerError> known, std::span<const CornerError> unknown);
 
   /// Returns the weight of a corner. `sd_px`: its predicted standard deviation, px; 0 if unknown.
-  double at(double sd_px) const;
+  double corner_weight(double sd_px) const;
 
  private:
   CornerVariance variance_;

@@ -38,7 +38,7 @@ std::optional<double> compute_edge_sagitta_by_lens(const Chord& chord,
   const Eigen::Vector2d length = chord.to - chord.from;
   double fraction = (1 + w) / 2;
   for (int iteration = 0;; ++iteration) {
-    const auto pixel = lens.project((1 - fraction) * from_ray + fraction * to_ray);
+    const auto pixel = lens.project_point((1 - fraction) * from_ray + fraction * to_ray);
     if (!pixel) return {};
     const Eigen::Vector2d offset = *pixel - chord.from;
     if (iteration + 1 == max_iterations) return chord.outwards.dot(offset);
@@ -54,7 +54,7 @@ struct DisplacedEdge {
 
 std::optional<DisplacedEdge> compute_displaced_edge(const Chord& chord, const EdgeCurvature& seen,
                                                     const Lens& lens) {
-  const auto from_ray = lens.unproject(chord.from), to_ray = lens.unproject(chord.to);
+  const auto from_ray = lens.unproject_pixel(chord.from), to_ray = lens.unproject_pixel(chord.to);
   if (!from_ray || !to_ray) return {};
   const auto lens_at = [&](double w) {
     return compute_edge_sagitta_by_lens(chord, from_ray->direction, to_ray->direction, lens, w);
@@ -81,8 +81,8 @@ std::optional<DisplacedEdge> compute_displaced_edge(const Chord& chord, const Ed
 
 }  // namespace
 
-double correct_corners_for_curved_edges(std::vector<BoardLattice::Corner>& corners,
-                                        const Lens& lens) {
+double correct_corners_for_edge_curvature(std::vector<BoardLattice::Corner>& corners,
+                                          const Lens& lens) {
   constexpr double max_fraction = 0.25;  // of an edge; beyond it the corner or the edges are wrong
   double max_displacement_px = 0;
   for (std::size_t first = 0; first + 4 <= corners.size(); first += 4) {
@@ -144,7 +144,7 @@ struct DisplacementEquations {
     Column sum = right;
     all.diagonal().tail<4>() += weights;
     sum.tail<4>() += weights.cwiseProduct(prior);
-    const Column solution = solve_symmetric(all, sum);
+    const Column solution = solve_symmetric_system(all, sum);
     EdgeDisplacement result = shift;
     if (solution.allFinite()) result.coefficients = solution.tail<4>();
     return result;
@@ -154,7 +154,7 @@ struct DisplacementEquations {
 DisplacementEquations make_displacement_equations(const std::vector<BoardLattice::Corner>& corners,
                                                   const Lens& lens) {
   constexpr std::size_t min_corners = 12;
-  if (corners.size() < min_corners || corners.front().inward.isZero(0)) return {};
+  if (corners.size() < min_corners || corners.front().d_pixel_d_edge_shift.isZero(0)) return {};
   const auto pose = estimate_board_view_pose(corners, lens);
   if (!pose) return {};
   DisplacementEquations equations;
@@ -166,16 +166,16 @@ DisplacementEquations make_displacement_equations(const std::vector<BoardLattice
   }
   equations.shift.radius_px = std::max(1.0, std::sqrt(squares));
   const auto& [rotation, translation_m] = pose->camera_from_board;
-  const Eigen::Matrix3d rotation_matrix = rotation_matrix_from_vector(rotation);
+  const Eigen::Matrix3d rotation_matrix = rotation_matrix_from_rotation_vector(rotation);
   for (const auto& corner : corners) {
     const Eigen::Vector3d rotated = rotation_matrix * corner.in_board_m;
-    const auto projection = lens.project_with_jacobians(rotated + translation_m);
+    const auto projection = lens.project_point_with_jacobians(rotated + translation_m);
     if (!projection) return {};
     const Eigen::Vector2d x = (corner.pixel - equations.shift.middle) / equations.shift.radius_px;
     Eigen::Matrix<double, 2, kUnknowns> jacobian;
     jacobian << -projection->d_pixel_d_point * skew_symmetric_matrix(rotated),
         projection->d_pixel_d_point,
-        corner.inward * Eigen::RowVector4d(1, x.x(), x.y(), x.squaredNorm());
+        corner.d_pixel_d_edge_shift * Eigen::RowVector4d(1, x.x(), x.y(), x.squaredNorm());
     jacobian *= corner.weight;
     equations.normal += jacobian.transpose() * jacobian;
     equations.right += jacobian.transpose() * (corner.weight * (corner.pixel - projection->pixel));
@@ -209,19 +209,19 @@ std::vector<EdgeDisplacement> estimate_tag_edge_displacements(
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (equations[i].is_valid) {
       shifts[i] = equations[i].solve_with_prior(prior, prior_weights);
-    } else if (!views[i].empty() && !views[i].front().inward.isZero(0)) {
+    } else if (!views[i].empty() && !views[i].front().d_pixel_d_edge_shift.isZero(0)) {
       shifts[i].coefficients = prior;
     }
   }
   return shifts;
 }
 
-double correct_edge_displacement(std::vector<BoardLattice::Corner>& corners,
-                                 const EdgeDisplacement& shift) {
+double correct_corners_for_edge_displacement(std::vector<BoardLattice::Corner>& corners,
+                                             const EdgeDisplacement& shift) {
   double sum_px = 0;
   for (auto& corner : corners) {
     const double shift_px = shift.at(corner.pixel);
-    corner.pixel -= shift_px * corner.inward;
+    corner.pixel -= shift_px * corner.d_pixel_d_edge_shift;
     sum_px += shift_px;
   }
   return corners.empty() ? 0 : sum_px / static_cast<double>(corners.size());

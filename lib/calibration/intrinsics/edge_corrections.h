@@ -29,8 +29,8 @@ namespace vlp {
 /// A tag is not changed if the curvature of an edge is unknown (touching squares, files without
 /// it). It is not changed if the lens does not describe one of its edges. It is also not changed if
 /// a corner would move by 25 % of an edge or more.
-double correct_corners_for_curved_edges(std::vector<BoardLattice::Corner>& corners,
-                                        const Lens& lens);
+double correct_corners_for_edge_curvature(std::vector<BoardLattice::Corner>& corners,
+                                          const Lens& lens);
 
 /// Displacement of the tag edges in a view inwards, towards the dark, as a function of the pixel:
 ///   shift = coefficients . (1, x, y, x^2 + y^2),  (x, y) = (pixel - middle) / radius_px,  px.
@@ -69,7 +69,7 @@ std::vector<EdgeDisplacement> estimate_tag_edge_displacements(
     DisplacementForm form = DisplacementForm::varying);
 
 /// Moves the edges back by a shift. Returns the mean displacement, px.
-double correct_edge_displacement(std::vector<BoardLattice::Corner>& corners,
-                                 const EdgeDisplacement& shift);
+double correct_corners_for_edge_displacement(std::vector<BoardLattice::Corner>& corners,
+                                             const EdgeDisplacement& shift);
 
 }  // namespace vlp

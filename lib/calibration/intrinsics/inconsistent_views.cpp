@@ -76,7 +76,8 @@ InconsistentViews find_views_inconsistent_with_lens(const IntrinsicsSolution& so
   return found;
 }
 
-std::string describe(const InconsistentViews& found, const std::vector<std::string>& images) {
+std::string describe_inconsistent_views(const InconsistentViews& found,
+                                        const std::vector<std::string>& images) {
   std::string names;
   for (std::size_t i = 0; i < std::min(found.views.size(), kMaxNames); ++i) {
     names.append(names.empty() ? "" : ", ").append(images[found.views[i]]);

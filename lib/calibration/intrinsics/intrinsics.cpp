@@ -24,7 +24,7 @@
 
 namespace vlp {
 
-std::string_view describe(IntrinsicsStatus status) {
+std::string_view describe_intrinsics_status(IntrinsicsStatus status) {
   switch (status) {
     case IntrinsicsStatus::ok:
       return "ok";
@@ -41,7 +41,7 @@ std::string_view describe(IntrinsicsStatus status) {
   return "";
 }
 
-void IntrinsicsSolution::update_fit_statistics() {
+void IntrinsicsSolution::update_lens_fit_statistics() {
   double squares = 0;
   corners = outliers = 0;
   const auto residuals = compute_reprojection_residuals(problem);
@@ -62,7 +62,7 @@ std::vector<Eigen::Vector2d> compute_reprojection_residuals(const BoardProblem& 
   const Lens lens(problem.lens_model, problem.intrinsics);
   std::vector<Eigen::Vector2d> residuals(problem.points.size(), Eigen::Vector2d::Constant(nan));
   const std::size_t cols = static_cast<std::size_t>(problem.cols),
-                    count = problem.points_per_board();
+                    count = problem.num_points_per_board();
   const Eigen::Array2d last(problem.cols - 1, problem.rows - 1);
   for (std::size_t pose = 0; pose < problem.poses.size(); ++pose) {
     const Eigen::Vector3d& r = problem.poses[pose].rotation;
@@ -76,7 +76,7 @@ std::vector<Eigen::Vector2d> compute_reprojection_residuals(const BoardProblem& 
       Eigen::Vector3d point;
       point << problem.spacing_m * node.matrix(),
           problem.warp_m.dot((1 - normalized_position.square()).matrix());
-      const auto pixel = lens.project(rotation * point + problem.poses[pose].translation_m);
+      const auto pixel = lens.project_point(rotation * point + problem.poses[pose].translation_m);
       if (pixel) residuals[pose * count + i] = seen.head<2>() - *pixel;
     }
   }
@@ -101,7 +101,8 @@ Eigen::Vector3d compute_board_normal(const BoardPose& pose) {
 
 void rotate_all_board_poses(std::vector<BoardPose>& poses, const Eigen::Matrix3d& new_from_old) {
   for (BoardPose& pose : poses) {
-    const Eigen::AngleAxisd rotation(new_from_old * rotation_matrix_from_vector(pose.rotation));
+    const Eigen::AngleAxisd rotation(new_from_old *
+                                     rotation_matrix_from_rotation_vector(pose.rotation));
     pose = {rotation.angle() * rotation.axis(), new_from_old * pose.translation_m};
   }
 }
@@ -133,32 +134,32 @@ class IntrinsicsSolver {
   explicit IntrinsicsSolver(const IntrinsicsInput& input);
 
   /// Stage 2, from an initial focal length.
-  bool solve_from_focal_length(double focal_px);
+  bool solve_intrinsics_from_focal_length(double focal_px);
   /// Splined lenses only: initializes stage 3 with the rotationally symmetric lens OPENCV_FISHEYE.
   /// Keeps the initial lens STEREOGRAPHIC if that fails.
-  void initialize_with_symmetric_lens();
+  void initialize_spline_from_symmetric_lens();
   /// Stage 3.
   bool refine_intrinsics();
   /// Splined lenses only: scales the regularization to the noise of the corners.
-  bool scale_spline_regularization();
-  /// Stages 4 and 7: applies correct_corners_for_curved_edges() to all views and solves again.
-  bool correct_corners_and_solve_again();
+  bool scale_spline_regularization_to_noise();
+  /// Stages 4 and 7: applies correct_corners_for_edge_curvature() to all views and solves again.
+  bool correct_edge_curvature_and_solve_again();
   /// Stages 5 (DisplacementForm::constant) and 7 (DisplacementForm::varying): corrects the corners
   /// for estimate_tag_edge_displacements() and solves again, at most twice, until the terms of the
   /// shifts are below 0.002 px.
-  bool correct_tag_edge_displacements(DisplacementForm form);
+  bool correct_edge_displacements_and_solve_again(DisplacementForm form);
   /// Stage 6: estimates the warp of the board if WarpChoice permits it.
   bool solve_board_warp();
   /// Stage 7: weights the corners by their variances (CornerWeights) if standard deviations of some
   /// corners are known.
-  bool reweight_corners();
+  bool reweight_corners_by_variance();
   /// Stage 8.
-  bool reject_outliers();
+  bool reject_corner_outliers();
   /// Stage 9, splined lenses only. Returns true also if the rotation has not converged.
   bool rotate_camera_frame_to_optical_axis();
 
   /// Returns the current solution.
-  IntrinsicsSolution make_solution() const;
+  IntrinsicsSolution make_intrinsics_solution() const;
 
  private:
   /// A view of the input and a corner of it.
@@ -173,20 +174,21 @@ class IntrinsicsSolver {
   void assemble_board_problem(const Lens& lens);
   /// Returns the index of a corner in the points of the problem; `used` is the index of its view in
   /// used_.
-  std::size_t find_problem_point_index(std::size_t used, const BoardLattice::Corner& corner) const;
+  std::size_t find_problem_index_of_corner(std::size_t used,
+                                           const BoardLattice::Corner& corner) const;
   /// Copies pixels and weights of the corners from the input to the problem; outliers are kept.
-  void update_problem_points();
+  void copy_corners_to_board_problem();
   /// Returns the RMS residual of each view used, px, in the order of used_; infinity if not finite.
-  std::vector<double> compute_view_rms_px() const;
+  std::vector<double> compute_view_residual_rms_px() const;
   /// Returns true if the lens projects all corners of most views. mrcal also solves for points
   /// behind the camera, and takes long.
-  bool can_project_most_views() const;
+  bool can_lens_project_most_views() const;
   /// Returns the corners of tags with a corner whose residual differs from those of its neighbors.
   /// Skips views in which these would be more than a quarter of the corners.
   std::set<CornerOfView> find_corners_of_outlier_tags() const;
   /// If a view fits badly, re-estimates the poses of all views used and drops the worst of the
   /// views that still fit badly. Returns true if the problem has to be solved again.
-  bool reestimate_board_poses();
+  bool reestimate_poses_and_drop_bad_views();
   /// Reinstates dropped views that fit the current lens: a worse view had distorted the earlier
   /// lens. Returns true if there are any.
   bool reinstate_dropped_views();
@@ -213,7 +215,7 @@ IntrinsicsSolver::IntrinsicsSolver(const IntrinsicsInput& input) : input_(input)
   edge_shifts_px_.assign(input.views.size(), 0);
 }
 
-bool IntrinsicsSolver::solve_from_focal_length(double focal_px) {
+bool IntrinsicsSolver::solve_intrinsics_from_focal_length(double focal_px) {
   constexpr int max_iterations = 4;
   constexpr double convergence = 1e-3;
   Lens lens = make_stereographic_lens(input_, focal_px);
@@ -229,31 +231,31 @@ bool IntrinsicsSolver::solve_from_focal_length(double focal_px) {
   return true;
 }
 
-void IntrinsicsSolver::initialize_with_symmetric_lens() {
+void IntrinsicsSolver::initialize_spline_from_symmetric_lens() {
   if (!is_splined_lens_model(input_.lens_model)) return;
   IntrinsicsSolver symmetric = *this;
   symmetric.input_.lens_model = LensModel::fisheye;
   if (!symmetric.refine_intrinsics()) return;  // keeps STEREOGRAPHIC
   symmetric_ = symmetric.problem_.intrinsics;
   displaced_corners_ = symmetric.find_corners_of_outlier_tags();
-  const Lens fisheye = symmetric.lens();
+  const Lens fisheye = symmetric.fitted_lens();
   for (const std::size_t view : used_) {
     if (const auto pose = estimate_board_view_pose(input_.views[view], fisheye)) {
       initial_poses_.poses[view] = pose->camera_from_board;
     }
   }
   const std::vector<double> core =
-      fit_splined_lens_core(fisheye, collect_inlier_pixels(symmetric.problem_));
+      fit_splined_lens_core(fisheye, collect_inlier_corner_pixels(symmetric.problem_));
   // With too few control points, STEREOGRAPHIC with that core is used.
   problem_.intrinsics =
       fit_splined_lens_to_lens(fisheye, input_.imager_px, input_.lens_model, core).value_or(core);
   problem_.lens_model = input_.lens_model;
-  problem_.intrinsics.resize(parameter_count(input_.lens_model), 0);
+  problem_.intrinsics.resize(num_lens_parameters(input_.lens_model), 0);
   // The axis, and two rays next to it that prevent a rotation about it.
   for (const double beside : {0.0, -0.25, 0.25}) {
     const Eigen::Vector2d pixel =
         fisheye.principal_point_px() + Eigen::Vector2d(beside * input_.imager_px[0], 0);
-    if (const auto ray = fisheye.unproject(pixel))
+    if (const auto ray = fisheye.unproject_pixel(pixel))
       problem_.fixed_rays.push_back({pixel, ray->direction});
   }
   assemble_board_problem(lens());
@@ -264,7 +266,7 @@ bool IntrinsicsSolver::rotate_camera_frame_to_optical_axis() {
   constexpr double tolerance_rad = 1e-4;  // 0.006 degrees
   if (symmetric_.empty()) return true;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    const auto pixels = collect_inlier_pixels(problem_);
+    const auto pixels = collect_inlier_corner_pixels(problem_);
     BoardProblem symmetric = problem_;
     symmetric.lens_model = LensModel::fisheye;
     symmetric.intrinsics = symmetric_;
@@ -280,7 +282,7 @@ bool IntrinsicsSolver::rotate_camera_frame_to_optical_axis() {
     const double turned_rad = Eigen::AngleAxisd(*new_from_old).angle();
     if (turned_rad < tolerance_rad) return true;
     for (auto& [pixel, ray] : problem_.fixed_rays) {
-      if (const auto seen = lens().project(new_from_old->transpose() * ray)) pixel = *seen;
+      if (const auto seen = lens().project_point(new_from_old->transpose() * ray)) pixel = *seen;
     }
     rotate_all_board_poses(problem_.poses, *new_from_old);
     if (!solve(solved_for_)) return false;
@@ -295,15 +297,15 @@ bool IntrinsicsSolver::refine_intrinsics() {
   // The core of a splined lens would only compensate the control points; mrcal fixes it, too.
   if (is_splined_lens_model(input_.lens_model)) solved_for_.core = false;
   const std::size_t given = problem_.intrinsics.size();
-  problem_.intrinsics.resize(parameter_count(input_.lens_model), 0);
-  const auto distortions = list_distortion_names_and_start_values(input_.lens_model);
+  problem_.intrinsics.resize(num_lens_parameters(input_.lens_model), 0);
+  const auto distortions = list_distortion_names_and_initial_values(input_.lens_model);
   for (std::size_t i = given; i < core + distortions.size(); ++i) {
     problem_.intrinsics[i] = distortions[i - core].start;
   }
   bool convergence = false;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     if (!solve(solved_for_)) return false;
-    convergence = !reestimate_board_poses();
+    convergence = !reestimate_poses_and_drop_bad_views();
     if (convergence) break;
     if (used_.size() < kMinViews) return false;
     assemble_board_problem(lens());
@@ -311,17 +313,17 @@ bool IntrinsicsSolver::refine_intrinsics() {
   if (reinstate_dropped_views()) {
     assemble_board_problem(lens());
   } else if (convergence) {
-    return can_project_most_views();
+    return can_lens_project_most_views();
   }
-  return solve(solved_for_) && can_project_most_views();
+  return solve(solved_for_) && can_lens_project_most_views();
 }
 
-bool IntrinsicsSolver::scale_spline_regularization() {
+bool IntrinsicsSolver::scale_spline_regularization_to_noise() {
   constexpr int max_iterations = 3;
   constexpr double min_px = 0.01, convergence = 0.1;
   if (!is_splined_lens_model(problem_.lens_model)) return true;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    const double noise_px = std::clamp(make_solution().rms_px, min_px, 1.0);
+    const double noise_px = std::clamp(make_intrinsics_solution().rms_px, min_px, 1.0);
     if (std::abs(noise_px / problem_.noise_px - 1) < convergence) break;
     problem_.noise_px = noise_px;
     if (!solve(solved_for_)) return false;
@@ -329,39 +331,40 @@ bool IntrinsicsSolver::scale_spline_regularization() {
   return true;
 }
 
-std::size_t IntrinsicsSolver::find_problem_point_index(std::size_t used,
-                                                       const BoardLattice::Corner& corner) const {
-  return (used * input_.lattice.num_parts() + corner.part) * input_.lattice.num_points() +
+std::size_t IntrinsicsSolver::find_problem_index_of_corner(
+    std::size_t used, const BoardLattice::Corner& corner) const {
+  return (used * input_.lattice.num_lattice_parts() + corner.part) *
+             input_.lattice.num_points_per_part() +
          corner.point;
 }
 
-void IntrinsicsSolver::update_problem_points() {
+void IntrinsicsSolver::copy_corners_to_board_problem() {
   for (std::size_t i = 0; i < used_.size(); ++i) {
     for (const auto& corner : input_.views[used_[i]]) {
-      Eigen::Vector3d& point = problem_.points[find_problem_point_index(i, corner)];
+      Eigen::Vector3d& point = problem_.points[find_problem_index_of_corner(i, corner)];
       point << corner.pixel, std::copysign(corner.weight, point.z());
     }
   }
 }
 
-bool IntrinsicsSolver::correct_corners_and_solve_again() {
+bool IntrinsicsSolver::correct_edge_curvature_and_solve_again() {
   constexpr double tolerance_px = 0.002;
   double max_px = 0;
   const Lens lens = this->lens();
   for (auto& view : input_.views)
-    max_px = std::max(max_px, correct_corners_for_curved_edges(view, lens));
+    max_px = std::max(max_px, correct_corners_for_edge_curvature(view, lens));
   if (max_px < tolerance_px) return true;
-  update_problem_points();
+  copy_corners_to_board_problem();
   return solve(solved_for_);
 }
 
-bool IntrinsicsSolver::correct_tag_edge_displacements(DisplacementForm form) {
+bool IntrinsicsSolver::correct_edge_displacements_and_solve_again(DisplacementForm form) {
   constexpr int max_iterations = 2;
   constexpr double tolerance_px = 0.002;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     auto views = input_.views;
     for (auto& view : views)
-      view = input_.lattice.apply_board_warp(std::move(view), problem_.warp_m);
+      view = input_.lattice.apply_warp_to_board_corners(std::move(view), problem_.warp_m);
     const auto shifts = estimate_tag_edge_displacements(views, lens(), form);
     if (std::all_of(shifts.begin(), shifts.end(), [](const EdgeDisplacement& shift) {
           return shift.coefficients.lpNorm<Eigen::Infinity>() < tolerance_px;
@@ -369,9 +372,10 @@ bool IntrinsicsSolver::correct_tag_edge_displacements(DisplacementForm form) {
       return true;
     }
     for (std::size_t view = 0; view < input_.views.size(); ++view) {
-      edge_shifts_px_[view] += correct_edge_displacement(input_.views[view], shifts[view]);
+      edge_shifts_px_[view] +=
+          correct_corners_for_edge_displacement(input_.views[view], shifts[view]);
     }
-    update_problem_points();
+    copy_corners_to_board_problem();
     if (!solve(solved_for_)) return false;
   }
   return true;
@@ -383,10 +387,10 @@ bool IntrinsicsSolver::solve_board_warp() {
   const auto squares = [](const IntrinsicsSolution& solution) {
     return solution.rms_px * solution.rms_px * 2 * solution.corners;
   };
-  const IntrinsicsSolution flat = make_solution();
+  const IntrinsicsSolution flat = make_intrinsics_solution();
   solved_for_.warp = true;
   if (!solve(solved_for_)) return false;
-  const IntrinsicsSolution with_warp = make_solution();
+  const IntrinsicsSolution with_warp = make_intrinsics_solution();
   if (input_.warp == WarpChoice::automatic &&
       squares(flat) - squares(with_warp) <= min_reduction * with_warp.rms_px * with_warp.rms_px) {
     problem_ = flat.problem;
@@ -395,12 +399,12 @@ bool IntrinsicsSolver::solve_board_warp() {
   return true;
 }
 
-bool IntrinsicsSolver::reweight_corners() {
+bool IntrinsicsSolver::reweight_corners_by_variance() {
   const auto residuals = compute_reprojection_residuals(problem_);
   std::vector<CornerError> known, unknown;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     for (const auto& corner : input_.views[used_[i]]) {
-      const Eigen::Vector2d& residual = residuals[find_problem_point_index(i, corner)];
+      const Eigen::Vector2d& residual = residuals[find_problem_index_of_corner(i, corner)];
       if (!residual.allFinite()) continue;
       (corner.sd_px > 0 ? known : unknown).push_back({residual.squaredNorm() / 2, corner.sd_px});
     }
@@ -412,24 +416,24 @@ bool IntrinsicsSolver::reweight_corners() {
   for (auto& view : input_.views) {
     for (auto& corner : view) corner.weight = weights.at(corner.sd_px);
   }
-  update_problem_points();
+  copy_corners_to_board_problem();
   return solve(solved_for_);
 }
 
-bool IntrinsicsSolver::reject_outliers() {
+bool IntrinsicsSolver::reject_corner_outliers() {
   // Without noise, residuals are caused by the regularization and are not outliers.
   constexpr double exact_px = 0.005;
-  if (make_solution().rms_px < exact_px) return true;
+  if (make_intrinsics_solution().rms_px < exact_px) return true;
   SolveOptions without_outliers = solved_for_;
   without_outliers.without_outliers = true;
-  return solve(without_outliers) && std::isfinite(make_solution().rms_px);
+  return solve(without_outliers) && std::isfinite(make_intrinsics_solution().rms_px);
 }
 
-IntrinsicsSolution IntrinsicsSolver::make_solution() const {
+IntrinsicsSolution IntrinsicsSolver::make_intrinsics_solution() const {
   IntrinsicsSolution result{IntrinsicsStatus::ok, problem_, used_, dropped_, {}, 0, 0, 0};
   result.solved_for = solved_for_;
   for (const std::size_t view : used_) result.edge_shifts_px.push_back(edge_shifts_px_[view]);
-  result.update_fit_statistics();
+  result.update_lens_fit_statistics();
   return result;
 }
 
@@ -451,33 +455,34 @@ void IntrinsicsSolver::assemble_board_problem(const Lens& lens) {
                            lens.principal_point_px().y()};
   }
   problem_.imager_px = input_.imager_px;
-  problem_.cols = lattice.cols();
-  problem_.rows = lattice.rows();
+  problem_.cols = lattice.lattice_cols();
+  problem_.rows = lattice.lattice_rows();
   problem_.spacing_m = lattice.point_spacing_m();
   problem_.poses.clear();
-  problem_.points.assign(used_.size() * lattice.num_parts() * lattice.num_points(),
+  problem_.points.assign(used_.size() * lattice.num_lattice_parts() * lattice.num_points_per_part(),
                          {-1, -1, BoardProblem::kUnseen});
   for (std::size_t i = 0; i < used_.size(); ++i) {
-    for (std::size_t part = 0; part < lattice.num_parts(); ++part) {
+    for (std::size_t part = 0; part < lattice.num_lattice_parts(); ++part) {
       problem_.poses.push_back(
           lattice.compute_board_part_pose(initial_poses_.poses[used_[i]], part));
     }
     const auto& corners = input_.views[used_[i]];
     for (std::size_t k = 0; k < corners.size(); ++k) {
       const double sign = displaced_corners_.contains({used_[i], k}) ? -1 : 1;
-      problem_.points[find_problem_point_index(i, corners[k])] << corners[k].pixel,
+      problem_.points[find_problem_index_of_corner(i, corners[k])] << corners[k].pixel,
           sign * corners[k].weight;
     }
   }
 }
 
-bool IntrinsicsSolver::can_project_most_views() const {
-  return std::isfinite(upper_median(compute_view_rms_px()));
+bool IntrinsicsSolver::can_lens_project_most_views() const {
+  return std::isfinite(upper_median(compute_view_residual_rms_px()));
 }
 
-std::vector<double> IntrinsicsSolver::compute_view_rms_px() const {
+std::vector<double> IntrinsicsSolver::compute_view_residual_rms_px() const {
   const auto residuals = compute_reprojection_residuals(problem_);
-  const std::size_t count = input_.lattice.num_parts() * input_.lattice.num_points();
+  const std::size_t count =
+      input_.lattice.num_lattice_parts() * input_.lattice.num_points_per_part();
   std::vector<double> rms;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     double squares = 0;
@@ -504,7 +509,7 @@ std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::find_corners_of_outli
   for (std::size_t i = 0; i < used_.size(); ++i) {
     const auto& corners = input_.views[used_[i]];
     const auto residual = [&](std::size_t k) -> const Eigen::Vector2d& {
-      return residuals[find_problem_point_index(i, corners[k])];
+      return residuals[find_problem_index_of_corner(i, corners[k])];
     };
     for (std::size_t k = 0; k < corners.size(); ++k) {
       std::vector<std::pair<double, std::size_t>> near;
@@ -537,9 +542,9 @@ std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::find_corners_of_outli
   for (const auto& [outlier, px] : deviations_px) {
     if (px <= limit_px) continue;
     const auto& corners = input_.views[outlier.first];
-    const std::size_t tag = input_.lattice.find_tag_of_point(corners[outlier.second].point);
+    const std::size_t tag = input_.lattice.find_tag_index_of_point(corners[outlier.second].point);
     for (std::size_t k = 0; k < corners.size(); ++k) {
-      if (input_.lattice.find_tag_of_point(corners[k].point) == tag)
+      if (input_.lattice.find_tag_index_of_point(corners[k].point) == tag)
         found.insert({outlier.first, k});
     }
   }
@@ -552,9 +557,9 @@ std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::find_corners_of_outli
   return found;
 }
 
-bool IntrinsicsSolver::reestimate_board_poses() {
+bool IntrinsicsSolver::reestimate_poses_and_drop_bad_views() {
   constexpr double max_ratio = 0.7;
-  const auto rms = compute_view_rms_px();
+  const auto rms = compute_view_residual_rms_px();
   const double limit_px = compute_max_view_rms(rms);
   const double worst_px = *std::max_element(rms.begin(), rms.end());
   if (worst_px <= limit_px) return false;
@@ -576,7 +581,7 @@ bool IntrinsicsSolver::reestimate_board_poses() {
 }
 
 bool IntrinsicsSolver::reinstate_dropped_views() {
-  const double limit_px = compute_max_view_rms(compute_view_rms_px());
+  const double limit_px = compute_max_view_rms(compute_view_residual_rms_px());
   const Lens lens = this->lens();
   const std::size_t before = dropped_.size();
   std::erase_if(dropped_, [&](const auto& dropped) {
@@ -605,20 +610,20 @@ IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input) {
   initial_focal_lengths_px.resize(std::min(initial_focal_lengths_px.size(), max_starts));
   for (const double focal_px : initial_focal_lengths_px) {
     IntrinsicsSolver solver(input);
-    if (!solver.solve_from_focal_length(focal_px)) continue;
-    solver.initialize_with_symmetric_lens();
-    if (!solver.refine_intrinsics() || !solver.scale_spline_regularization() ||
-        !solver.correct_corners_and_solve_again() ||
-        !solver.correct_tag_edge_displacements(DisplacementForm::constant) ||
-        !solver.solve_board_warp() || !solver.reweight_corners() ||
-        !solver.correct_corners_and_solve_again() ||
-        !solver.correct_tag_edge_displacements(DisplacementForm::varying) ||
-        !solver.reweight_corners() || !solver.scale_spline_regularization() ||
-        !solver.reject_outliers() || !solver.scale_spline_regularization() ||
+    if (!solver.solve_intrinsics_from_focal_length(focal_px)) continue;
+    solver.initialize_spline_from_symmetric_lens();
+    if (!solver.refine_intrinsics() || !solver.scale_spline_regularization_to_noise() ||
+        !solver.correct_edge_curvature_and_solve_again() ||
+        !solver.correct_edge_displacements_and_solve_again(DisplacementForm::constant) ||
+        !solver.solve_board_warp() || !solver.reweight_corners_by_variance() ||
+        !solver.correct_edge_curvature_and_solve_again() ||
+        !solver.correct_edge_displacements_and_solve_again(DisplacementForm::varying) ||
+        !solver.reweight_corners_by_variance() || !solver.scale_spline_regularization_to_noise() ||
+        !solver.reject_corner_outliers() || !solver.scale_spline_regularization_to_noise() ||
         !solver.rotate_camera_frame_to_optical_axis()) {
       continue;
     }
-    IntrinsicsSolution solution = solver.make_solution();
+    IntrinsicsSolution solution = solver.make_intrinsics_solution();
     if (are_all_boards_parallel(solution.problem))
       return make_failure(IntrinsicsStatus::all_parallel);
     if (2 * solution.views.size() > input.views.size()) return solution;
@@ -630,7 +635,7 @@ IntrinsicsSolution solve_intrinsics_from_half_of_views(const IntrinsicsSolution&
                                                        std::size_t first) {
   const BoardProblem& all = whole.problem;
   const std::size_t parts = all.poses.size() / whole.views.size();
-  const std::size_t points = parts * all.points_per_board();
+  const std::size_t points = parts * all.num_points_per_board();
   IntrinsicsSolution half = whole;
   half.views.clear();
   half.edge_shifts_px.clear();
@@ -653,7 +658,7 @@ IntrinsicsSolution solve_intrinsics_from_half_of_views(const IntrinsicsSolution&
     return make_failure(IntrinsicsStatus::no_solution);
   }
   if (are_all_boards_parallel(half.problem)) return make_failure(IntrinsicsStatus::all_parallel);
-  half.update_fit_statistics();
+  half.update_lens_fit_statistics();
   return half;
 }
 

@@ -35,7 +35,7 @@ enum class IntrinsicsStatus {
   no_solution,    // no lens of the model fits
 };
 /// Describes a status in one line, with the remedy.
-std::string_view describe(IntrinsicsStatus status);
+std::string_view describe_intrinsics_status(IntrinsicsStatus status);
 
 /// Result of solve_intrinsics(): lens, poses and board warp with their fit.
 struct IntrinsicsSolution {
@@ -60,10 +60,10 @@ struct IntrinsicsSolution {
   /// Number of used corners, and number of corners that are outliers.
   int corners, outliers;
 
-  bool ok() const { return status == IntrinsicsStatus::ok; }
+  bool has_succeeded() const { return status == IntrinsicsStatus::ok; }
   /// Computes rms_px, corners and outliers from `problem`.
-  void update_fit_statistics();
-  Lens lens() const { return Lens(problem.lens_model, problem.intrinsics); }
+  void update_lens_fit_statistics();
+  Lens fitted_lens() const { return Lens(problem.lens_model, problem.intrinsics); }
   /// Estimated parameters: the intrinsics (splined lenses: without the core), and the warp if
   /// selected.
   SolveOptions solved_for{true, true, true, false};
@@ -81,7 +81,7 @@ struct IntrinsicsSolution {
 /// 3. Solves the requested model, regularized as in mrcal, and re-estimates the poses. Drops views
 ///   that fit no pose. Splined lenses: see below.
 /// 4. Corrects the corners of the tags for the edge curvature of this lens
-///   (correct_corners_for_curved_edges()).
+///   (correct_corners_for_edge_curvature()).
 /// 5. Corrects the shift of the tag edges, constant over a view
 ///   (estimate_tag_edge_displacements()), and solves again, at most twice.
 /// 6. Estimates the warp of the board (WarpChoice).
@@ -112,7 +112,7 @@ IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input);
 /// Solves for every second view of a solution, beginning with view `first`, starting from that
 /// solution. Estimates lens, poses and warp. Keeps from `whole` the edge shifts, the weights, the
 /// outliers, and whether the warp is estimated.
-/// @pre whole.ok()
+/// @pre whole.has_succeeded()
 IntrinsicsSolution solve_intrinsics_from_half_of_views(const IntrinsicsSolution& whole,
                                                        std::size_t first);
 

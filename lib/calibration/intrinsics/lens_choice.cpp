@@ -38,8 +38,8 @@ std::optional<Squares> cross_validate(const IntrinsicsInput& input) {
       (view % parts == part ? held_out : solved).views.push_back(input.views[view]);
     }
     const IntrinsicsSolution solution = solve_intrinsics(solved);
-    if (!solution.ok()) return {};
-    for (const double rms_px : compute_held_out_view_rms_px(solution, held_out)) {
+    if (!solution.has_succeeded()) return {};
+    for (const double rms_px : compute_held_out_view_residual_rms_px(solution, held_out)) {
       squares.push_back(rms_px * rms_px);
     }
   }
@@ -100,11 +100,11 @@ std::optional<FisheyeFit> fit_fisheye_lens(IntrinsicsInput input) {
   constexpr double max_rms_px = 2;
   input.lens_model = LensModel::fisheye;
   IntrinsicsSolution solution = solve_intrinsics(input);
-  if (!solution.ok() || solution.rms_px > max_rms_px) return {};
-  const Lens lens = solution.lens();
+  if (!solution.has_succeeded() || solution.rms_px > max_rms_px) return {};
+  const Lens lens = solution.fitted_lens();
   double smallest = 1;
-  for (const Eigen::Vector2d& pixel : collect_inlier_pixels(solution.problem)) {
-    if (const auto ray = lens.unproject(pixel)) {
+  for (const Eigen::Vector2d& pixel : collect_inlier_corner_pixels(solution.problem)) {
+    if (const auto ray = lens.unproject_pixel(pixel)) {
       smallest = std::min(smallest, ray->direction.normalized().z());
     }
   }
@@ -128,14 +128,14 @@ std::optional<LensChoice> select_lens_model(const IntrinsicsInput& input) {
   if (input.views.size() < kMinViewsToChoose) return {};
   LensChoice choice{};
   choice.fisheye = fit_fisheye_lens(input);
-  if (choice.fisheye && choice.fisheye->farthest_rad >= kRightAngle_rad) {
-    choice.beyond_rad = choice.fisheye->farthest_rad;
+  if (choice.fisheye && choice.fisheye->max_corner_angle_rad >= kRightAngle_rad) {
+    choice.beyond_right_angle_rad = choice.fisheye->max_corner_angle_rad;
   }
   std::vector<std::optional<Squares>> squares;
   for (const LensModel model : kModels) {
     IntrinsicsInput with_model = input;
     with_model.lens_model = model;
-    const bool is_candidate = model == LensModel::fisheye || choice.beyond_rad == 0;
+    const bool is_candidate = model == LensModel::fisheye || choice.beyond_right_angle_rad == 0;
     squares.push_back(is_candidate ? cross_validate(with_model) : std::nullopt);
   }
   remove_views_no_model_fits(squares);
@@ -159,20 +159,20 @@ std::optional<LensChoice> select_lens_model(const IntrinsicsInput& input) {
   return choice;
 }
 
-std::string describe(const LensChoice& choice) {
+std::string describe_lens_model_choice(const LensChoice& choice) {
   std::string taken, others;
-  if (choice.beyond_rad > 0) {
+  if (choice.beyond_right_angle_rad > 0) {
     others = fmt::format(
         "the board is visible up to {:.0f} degrees off axis, where no LENSMODEL_OPENCVn has rays",
-        deg_from_rad(choice.beyond_rad));
+        deg_from_rad(choice.beyond_right_angle_rad));
   }
   for (const auto& [model, rms_px] : choice.tried) {
     const std::string left =
         std::isfinite(rms_px) ? fmt::format("{:.3f} px", rms_px) : std::string("no lens");
     if (model == choice.model) {
-      taken = fmt::format("{}, {}", to_string(model), left);
-    } else if (choice.beyond_rad == 0) {
-      others += fmt::format("{}{} {}", others.empty() ? "" : ", ", to_string(model), left);
+      taken = fmt::format("{}, {}", lens_model_name(model), left);
+    } else if (choice.beyond_right_angle_rad == 0) {
+      others += fmt::format("{}{} {}", others.empty() ? "" : ", ", lens_model_name(model), left);
     }
   }
   return fmt::format("{} rms in held-out views; {}", taken, others);

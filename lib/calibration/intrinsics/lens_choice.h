@@ -27,7 +27,7 @@ constexpr std::size_t kMinViewsToChoose = 6;
 /// Fit of OPENCV_FISHEYE, and the largest angle of a corner off its axis.
 struct FisheyeFit {
   IntrinsicsSolution solution;
-  double farthest_rad;
+  double max_corner_angle_rad;
 };
 
 /// Selected lens model and the results of its selection.
@@ -37,7 +37,7 @@ struct LensChoice {
   std::vector<LensCandidate> tried;
   /// Largest angle of a corner off the axis of OPENCV_FISHEYE if it is at least a right angle,
   /// where no OPENCVn has rays; 0 otherwise.
-  double beyond_rad = 0;
+  double beyond_right_angle_rad = 0;
   /// Fit of OPENCV_FISHEYE; std::nullopt if it does not fit.
   std::optional<FisheyeFit> fisheye = {};
 };
@@ -57,9 +57,9 @@ bool may_be_wide_angle_lens(const IntrinsicsInput& input);
 ///
 /// Each model with distortion is solved with two parts (solve_intrinsics()) and evaluated with the
 /// third, so that each view is evaluated once. The evaluation fits only poses and edge shifts
-/// (compute_held_out_view_rms_px()). Two models are compared by the mean, over the views, of the
-/// logarithm of the ratio of their squared residuals. The views of a few positions do not dominate
-/// this mean.
+/// (compute_held_out_view_residual_rms_px()). Two models are compared by the mean, over the views,
+/// of the logarithm of the ratio of their squared residuals. The views of a few positions do not
+/// dominate this mean.
 ///
 /// Selects the model with the fewest parameters whose mean exceeds that of the best by at most two
 /// standard errors: the one-standard-error rule of Breiman, Friedman, Olshen and Stone,
@@ -73,6 +73,6 @@ bool may_be_wide_angle_lens(const IntrinsicsInput& input);
 std::optional<LensChoice> select_lens_model(const IntrinsicsInput& input);
 
 /// Describes the candidates with their residuals, the selected one first.
-std::string describe(const LensChoice& choice);
+std::string describe_lens_model_choice(const LensChoice& choice);
 
 }  // namespace vlp

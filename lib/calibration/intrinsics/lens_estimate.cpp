@@ -74,15 +74,15 @@ struct BoardExtent {
 
 BoardExtent measure_board_extent(const IntrinsicsSolution& fisheye,
                                  const Eigen::Vector2d& grid_reach) {
-  const Lens lens = fisheye.lens();
+  const Lens lens = fisheye.fitted_lens();
   const BoardProblem& problem = fisheye.problem;
-  const std::size_t points = problem.points_per_board();
+  const std::size_t points = problem.num_points_per_board();
   BoardExtent reach;
   for (std::size_t board = 0; board < problem.poses.size(); ++board) {
     Eigen::Vector2d board_reach(0, 0);
     for (std::size_t i = board * points; i < (board + 1) * points; ++i) {
       if (!(problem.points[i].z() > 0)) continue;
-      const auto ray = lens.unproject(problem.points[i].head<2>());
+      const auto ray = lens.unproject_pixel(problem.points[i].head<2>());
       if (!ray) continue;
       const Eigen::Vector3d& x = ray->direction;
       board_reach = board_reach.cwiseMax(x.head<2>().cwiseAbs() * (2 / (x.norm() + x.z())));
@@ -101,16 +101,16 @@ BoardExtent measure_board_extent(const IntrinsicsSolution& fisheye,
 std::string explain_unsuitable_grid(IntrinsicsInput input) {
   constexpr double margin = 1.05;
   const LensModel splined = input.lens_model;
-  const SplineGrid grid = spline_grid_of_model(input.lens_model);
+  const SplineGrid grid = spline_grid_of_lens_model(input.lens_model);
   input.lens_model = LensModel::fisheye;
   const IntrinsicsSolution solution = solve_intrinsics(input);
-  if (!solution.ok() || solution.rms_px > kMaxFit_px) return "";
+  if (!solution.has_succeeded() || solution.rms_px > kMaxFit_px) return "";
   const Eigen::Vector2d grid_reach =
-      SplineSurface(grid, std::vector<double>(2 * grid.num_control_points())).half_extent();
+      SplineSurface(grid, std::vector<double>(2 * grid.num_control_points())).spline_half_extent();
   const BoardExtent reach = measure_board_extent(solution, grid_reach);
   if (10 * reach.boards_within >= 9 * reach.boards) {
-    const Lens lens = solution.lens();
-    const auto core = fit_splined_lens_core(lens, collect_inlier_pixels(solution.problem));
+    const Lens lens = solution.fitted_lens();
+    const auto core = fit_splined_lens_core(lens, collect_inlier_corner_pixels(solution.problem));
     return fit_splined_lens_to_lens(lens, input.imager_px, splined, core)
                ? ""
                : describe_too_coarse_spline_grid(lens, input.imager_px, splined, core);
@@ -119,15 +119,16 @@ std::string explain_unsuitable_grid(IntrinsicsInput input) {
   return fmt::format(
       "the control points of {} extend to {:.0f} degrees off axis horizontally and {:.0f} "
       "vertically, but the board is visible to {:.0f} and {:.0f} degrees: use --lens {}",
-      to_string(grid), angle_deg(grid_reach.x()), angle_deg(grid_reach.y()),
+      splined_lens_model_name(grid), angle_deg(grid_reach.x()), angle_deg(grid_reach.y()),
       angle_deg(reach.farthest.x()), angle_deg(reach.farthest.y()),
-      to_string(extend_spline_grid(grid, grid_reach.cwiseMax(margin * reach.farthest))));
+      splined_lens_model_name(
+          extend_spline_grid(grid, grid_reach.cwiseMax(margin * reach.farthest))));
 }
 
 std::string recommend_model(LensModel requested, const IntrinsicsSolution& other) {
-  const std::string name(to_string(other.problem.lens_model));
+  const std::string name(lens_model_name(other.problem.lens_model));
   return fmt::format("no lens of {} fits, but {} fits with {:.2f} px: use --lens {}",
-                     to_string(requested), name, other.rms_px, name);
+                     lens_model_name(requested), name, other.rms_px, name);
 }
 
 /// Recommends another model that fits if the requested one does not; empty if there is none.
@@ -140,7 +141,7 @@ std::string explain_why_no_lens_fits(IntrinsicsInput input,
     if (other == requested || (other == LensModel::fisheye && fisheye)) continue;
     input.lens_model = other;
     const IntrinsicsSolution solution = solve_intrinsics(input);
-    if (!solution.ok() || solution.rms_px >= best_px) continue;
+    if (!solution.has_succeeded() || solution.rms_px >= best_px) continue;
     best_px = solution.rms_px;
     problem = recommend_model(requested, solution);
   }
@@ -170,8 +171,8 @@ void raise_uncertainty_to_difference(const Lens& lens, const Lens& other,
   const auto lens_from_other = fit_rotation_between_lenses(other, lens, pixels);
   if (!lens_from_other) return;
   for (const Eigen::Vector2d& pixel : pixels) {
-    const auto ray = other.unproject(pixel);
-    const auto seen = ray ? lens.project(*lens_from_other * ray->direction) : std::nullopt;
+    const auto ray = other.unproject_pixel(pixel);
+    const auto seen = ray ? lens.project_point(*lens_from_other * ray->direction) : std::nullopt;
     const double difference_px =
         seen ? (*seen - pixel).norm() : std::numeric_limits<double>::infinity();
     report.uncertainty_worst_px = std::max(report.uncertainty_worst_px, difference_px);
@@ -185,18 +186,19 @@ void recommend_fisheye(const FisheyeFit& fisheye, LensEstimate& result) {
   const IntrinsicsSolution& solution = result.solution;
   const LensModel model = solution.problem.lens_model;
   if (fisheye.solution.rms_px > max_ratio * solution.rms_px &&
-      fisheye.farthest_rad < min_angle_rad) {
+      fisheye.max_corner_angle_rad < min_angle_rad) {
     result.details.push_back(fmt::format(
         "{} fits the views as well as {}: the lens is valid only where corners were detected",
-        to_string(LensModel::fisheye), to_string(model)));
+        lens_model_name(LensModel::fisheye), lens_model_name(model)));
     return;
   }
   result.better_model = LensModel::fisheye;
   result.warnings.push_back(fmt::format(
       "the board is visible up to {:.0f} degrees off axis; {} fits with {:.3f} px, {} with {:.3f} "
       "px and no rays beyond 90 degrees: use --lens {}",
-      deg_from_rad(fisheye.farthest_rad), to_string(LensModel::fisheye), fisheye.solution.rms_px,
-      to_string(model), solution.rms_px, to_string(LensModel::fisheye)));
+      deg_from_rad(fisheye.max_corner_angle_rad), lens_model_name(LensModel::fisheye),
+      fisheye.solution.rms_px, lens_model_name(model), solution.rms_px,
+      lens_model_name(LensModel::fisheye)));
 }
 
 /// Warns of a displacement of the edges that a wrong gap between the tags causes, not a camera.
@@ -218,7 +220,7 @@ void warn_about_dropped_views(LensEstimate& result) {
       result.warnings.push_back(
           fmt::format("{}: dropped, as the board is where {} has no control points; use a larger "
                       "fov_x_deg or Ny",
-                      result.images[view], to_string(model)));
+                      result.images[view], lens_model_name(model)));
       continue;
     }
     // [LENS-5] `no pose that goes with`
@@ -231,7 +233,7 @@ void warn_about_dropped_views(LensEstimate& result) {
 void warn_about_inconsistent_views(LensEstimate& result) {
   const InconsistentViews found = find_views_inconsistent_with_lens(result.solution);
   if (found.views.empty()) return;
-  result.inconsistent_views = describe(found, result.images);
+  result.inconsistent_views = describe_inconsistent_views(found, result.images);
   result.warnings.push_back(result.inconsistent_views);
 }
 
@@ -257,7 +259,7 @@ std::string explain_why_lens_not_found(const SplitViews& views,
   std::string problem;
   if (status == IntrinsicsStatus::no_solution)
     problem = explain_why_no_lens_fits(views.solved, fisheye);
-  return problem.empty() ? std::string(describe(status)) : problem;
+  return problem.empty() ? std::string(describe_intrinsics_status(status)) : problem;
 }
 
 /// Adds the uncertainty of a solution. `print_sd` is Board::print_sd.
@@ -265,19 +267,19 @@ void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& f
                      bool is_chosen, double print_sd, LensEstimate& result) {
   IntrinsicsSolution& solution = result.solution;
   solution.other_model_fits = fisheye && fits_equally_well(fisheye->solution, solution);
-  result.report = compute_calibration_report(solution, views.solved);
+  result.report = compute_lens_calibration_report(solution, views.solved);
   if (solution.other_model_fits) {
-    raise_uncertainty_to_difference(solution.lens(), fisheye->solution.lens(),
+    raise_uncertainty_to_difference(solution.fitted_lens(), fisheye->solution.fitted_lens(),
                                     views.solved.imager_px, result.report);
     if (!is_chosen) recommend_fisheye(*fisheye, result);
   }
   result.coverage = compute_board_view_coverage(solution, views.solved);
-  result.held_out = evaluate_held_out_views(solution, views.held_out);
+  result.held_out = evaluate_lens_on_held_out_views(solution, views.held_out);
   result.lattice = views.solved.lattice;
   result.sharpness = measure_lens_sharpness(result.views, views.solved.imager_px);
   std::optional<PrintEffect> print;
   if (print_sd > 0)
-    print = compute_board_aspect_error_effect(solution, print_sd, result.report.region);
+    print = compute_board_aspect_error_effect_on_lens(solution, print_sd, result.report.region);
   if (print) {
     CalibrationReport& report = result.report;
     result.print_px = print->rms_px;
@@ -293,7 +295,7 @@ void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& f
   // The covariance of hundreds of control points would fill the file, without use for fixes.
   if (is_splined_lens_model(solution.problem.lens_model)) return;
   const ProjectionUncertainty uncertainty(solution, views.solved.lattice);
-  const Eigen::VectorXd& bias = uncertainty.regularization_bias();
+  const Eigen::VectorXd& bias = uncertainty.intrinsics_regularization_bias();
   MatrixX covariance = uncertainty.intrinsics_covariance() + bias * bias.transpose();
   if (print) covariance += print->intrinsics * print->intrinsics.transpose();
   if (covariance.allFinite()) result.intrinsics_covariance = covariance;
@@ -315,7 +317,7 @@ LensEstimate estimate_lens(LensViews input) {
   LensEstimate result;
   result.views = std::move(input.views);
   input.views = {result.views.front()};
-  result.gamma = estimate_and_apply_tone_curve(result.views, input.board);
+  result.gamma = estimate_and_correct_tone_curve(result.views, input.board);
   const BoardCheck layout = check_board_layout(input.board, result.views, {});
   if (!layout.problem.empty()) {
     fail(result, LensStatus::wrong_board, layout.problem);
@@ -334,18 +336,18 @@ LensEstimate estimate_lens(LensViews input) {
   std::optional<FisheyeFit> fisheye;
   if (is_opencv_model(model) && may_be_wide_angle_lens(views.solved)) {
     fisheye = result.choice ? result.choice->fisheye : fit_fisheye_lens(views.solved);
-    if (fisheye && fisheye->farthest_rad >= kRightAngle_rad) {
+    if (fisheye && fisheye->max_corner_angle_rad >= kRightAngle_rad) {
       fail_undetermined(
           result, views,
           fmt::format(
               "it is visible up to {:.0f} degrees off axis, where {} has no rays: use --lens {}",
-              deg_from_rad(fisheye->farthest_rad), to_string(model),
-              to_string(LensModel::fisheye)));
+              deg_from_rad(fisheye->max_corner_angle_rad), lens_model_name(model),
+              lens_model_name(LensModel::fisheye)));
       return result;
     }
   }
   result.solution = solve_intrinsics(views.solved);
-  if (!result.solution.ok()) {
+  if (!result.solution.has_succeeded()) {
     fail_undetermined(result, views,
                       explain_why_lens_not_found(views, fisheye, result.solution.status));
     if (result.solution.status == IntrinsicsStatus::too_few_views) {
@@ -354,8 +356,9 @@ LensEstimate estimate_lens(LensViews input) {
     return result;
   }
   warn_about_dropped_views(result);
-  const BoardCheck exact = check_board_layout(input.board, result.views, result.solution.lens(),
-                                              upper_median(result.solution.edge_shifts_px));
+  const BoardCheck exact =
+      check_board_layout(input.board, result.views, result.solution.fitted_lens(),
+                         upper_median(result.solution.edge_shifts_px));
   if (!exact.problem.empty()) {
     fail(result, LensStatus::wrong_board, exact.problem);
     return result;

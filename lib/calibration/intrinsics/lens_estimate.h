@@ -18,7 +18,7 @@ namespace vlp {
 /// Views of a board from which a lens is estimated.
 struct LensViews {
   /// Detections of the board, one per image, in different poses; at least one. Each has enough
-  /// corners to determine a pose (BoardLattice::has_sufficient_corners()).
+  /// corners to determine a pose (BoardLattice::are_corners_sufficient_for_pose()).
   std::vector<BoardView> views;
   Board board;
   LensModel lens_model = LensModel::opencv8;
@@ -56,8 +56,8 @@ struct LensEstimate {
   /// near a right angle off the axis.
   std::optional<LensModel> better_model = {};
   /// Change of projections by one standard deviation of the board's print
-  /// (compute_board_aspect_error_effect()), RMS over the image, px; std::nullopt if Board::print_sd
-  /// is 0 or the solve fails.
+  /// (compute_board_aspect_error_effect_on_lens()), RMS over the image, px; std::nullopt if
+  /// Board::print_sd is 0 or the solve fails.
   std::optional<double> print_px = {};
   /// Lattice of the corners in `solution`. Covariance of the intrinsics including the bias of the
   /// regularization and the print of the board; std::nullopt for splined lenses and if not finite.
@@ -74,7 +74,7 @@ struct LensEstimate {
   std::string inconsistent_views = {};
   std::vector<std::string> warnings = {}, details = {};
 
-  bool ok() const { return status == LensStatus::ok; }
+  bool has_succeeded() const { return status == LensStatus::ok; }
 };
 
 /// Returns `warp`, or WarpChoice::off for a square chessboard. Such a board looks the same after a
@@ -83,8 +83,9 @@ struct LensEstimate {
 WarpChoice select_board_warp_model(const Board& board, WarpChoice warp);
 
 /// Estimates a lens from views of a board in these stages: tone curve of the camera
-/// (estimate_and_apply_tone_curve()), layout of the board (check_board_layout()), lens model, solve
-/// (solve_intrinsics()), board again with the lens, uncertainty (compute_calibration_report()).
+/// (estimate_and_correct_tone_curve()), layout of the board (check_board_layout()), lens model,
+/// solve (solve_intrinsics()), board again with the lens, uncertainty
+/// (compute_lens_calibration_report()).
 /// @throws std::invalid_argument as BoardLattice
 LensEstimate estimate_lens(LensViews input);
 

@@ -37,8 +37,8 @@ class ViewValues {
            const Statistic& statistic) {
     std::vector<std::vector<double>> values_by_part(parts_.size());
     for (std::size_t i = 0; i < values.size(); ++i) {
-      const int col = ImageCoverage::part(at_px[i].x(), imager_px_[0], cols_);
-      const int row = ImageCoverage::part(at_px[i].y(), imager_px_[1], rows_);
+      const int col = ImageCoverage::cell_index_along_edge(at_px[i].x(), imager_px_[0], cols_);
+      const int row = ImageCoverage::cell_index_along_edge(at_px[i].y(), imager_px_[1], rows_);
       values_by_part[static_cast<std::size_t>(row * cols_ + col)].push_back(values[i]);
     }
     for (std::size_t i = 0; i < parts_.size(); ++i) {
@@ -92,7 +92,7 @@ std::vector<double> compute_relative_lights(const std::vector<MeasuredEdge>& edg
   }
   const EdgeField field(edge_values, EdgeField::Terms::place);
   for (const auto& [middle_px, along, step] : edges) {
-    lights.push_back(step.bright / field.value(middle_px, along));
+    lights.push_back(step.bright / field.predict_edge_property(middle_px, along));
   }
   return lights;
 }
@@ -218,7 +218,8 @@ void fill_sharpness_maps(std::span<const BoardView> views, const std::array<int,
     lights.add(at_px, compute_relative_lights(edges), compute_mean);
   }
   blurs.summarize(
-      kMinViewsOfQuartile, [](const auto& values) { return compute_mtf50(lower_quartile(values)); },
+      kMinViewsOfQuartile,
+      [](const auto& values) { return compute_mtf50_of_gaussian_blur(lower_quartile(values)); },
       result.mtf50);
   ratios.summarize(kMinViews, compute_median, result.black_to_white);
   lights.summarize(kMinViews, compute_median, result.light);
@@ -226,7 +227,7 @@ void fill_sharpness_maps(std::span<const BoardView> views, const std::array<int,
 
 }  // namespace
 
-double compute_mtf50(double sigma_px) {
+double compute_mtf50_of_gaussian_blur(double sigma_px) {
   return std::sqrt(std::numbers::ln2 / 2) / (std::numbers::pi * sigma_px);
 }
 
@@ -235,7 +236,7 @@ std::optional<double> compute_median_edge_mtf50(const BoardDetection& seen) {
   blurs_px.reserve(4 * seen.tags.size());
   for (const MeasuredEdge& edge : collect_edges(seen)) blurs_px.push_back(edge.step.blur_px);
   if (blurs_px.empty()) return std::nullopt;
-  return compute_mtf50(upper_median(std::move(blurs_px)));
+  return compute_mtf50_of_gaussian_blur(upper_median(std::move(blurs_px)));
 }
 
 std::optional<LensSharpness> measure_lens_sharpness(std::span<const BoardView> views,

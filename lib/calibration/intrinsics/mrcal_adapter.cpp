@@ -37,7 +37,7 @@ struct Arguments {
   Arguments(const BoardProblem& problem, const SolveOptions& what,
             std::span<const BoardProblem::FixedRay> fixed_rays = {})
       : frames(static_cast<int>(problem.poses.size())), fixed(static_cast<int>(fixed_rays.size())) {
-    const std::string name(to_string(problem.lens_model));
+    const std::string name(lens_model_name(problem.lens_model));
     if (!mrcal_lensmodel_from_name(&lens, name.c_str())) {
       // [LENS-7] `mrcal does not support`
       throw std::runtime_error("mrcal does not support " + name);

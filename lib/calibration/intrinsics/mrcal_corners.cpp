@@ -53,7 +53,8 @@ class CornerTable {
       from = end + 1;
     }
     if (rows.empty()) throw InputError(file, "contains no corner");
-    if (are_too_many_corners_outside(num_outside_, num_seen_)) throw InputError(*first_outside_);
+    if (are_too_many_corners_outside_image(num_outside_, num_seen_))
+      throw InputError(*first_outside_);
   }
 
   InputError error(std::size_t line, const std::string& problem) const {
@@ -95,8 +96,8 @@ class CornerTable {
     double value = 0;
     const auto [end, problem] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (problem != std::errc() || end != word.data() + word.size() || !std::isfinite(value)) {
-      throw error(line,
-                  quote_for_message(truncate_text(word, 40)) + " should be a finite number, or -");
+      throw error(line, quote_text_for_message(truncate_text(word, 40)) +
+                            " should be a finite number, or -");
     }
     return value;
   }
@@ -125,14 +126,14 @@ class CornerTable {
 /// Describes the numbers of corners of a board, for messages.
 std::string describe_size(const Board& board, const BoardLattice& lattice) {
   return fmt::format("a board of {} x {} {} has {} x {} corners", board.cols, board.rows,
-                     board.has_chessboard_squares() ? "squares" : "tags", lattice.cols(),
-                     lattice.rows());
+                     board.has_chessboard_squares() ? "squares" : "tags", lattice.lattice_cols(),
+                     lattice.lattice_rows());
 }
 
 std::string describe_wrong_count(const Board& board, const BoardLattice& lattice,
                                  std::size_t rows) {
   std::string words = fmt::format("{} rows, but {}", rows, describe_size(board, lattice));
-  if (lattice.num_parts() > 1) words += " of each kind";
+  if (lattice.num_lattice_parts() > 1) words += " of each kind";
   if (board.has_chessboard_squares() && rows == static_cast<std::size_t>(board.cols * board.rows)) {
     words += fmt::format(
         "; cols and rows of board.yaml count squares, not the corners between them: cols {}, rows "
@@ -155,7 +156,7 @@ struct PartOfImage {
 PartOfImage parse_part_of_image_name(const BoardLattice& lattice, const CornerTable& table,
                                      std::size_t line, std::string_view name) {
   PartOfImage found{std::string(name), 0};
-  if (lattice.num_parts() == 1) return found;
+  if (lattice.num_lattice_parts() == 1) return found;
   const auto ending = name.rfind("-corner");
   if (ending == name.npos || ending + 8 != name.size() || name.back() < '0' || name.back() > '3') {
     throw table.error(line,
@@ -170,10 +171,10 @@ PartOfImage parse_part_of_image_name(const BoardLattice& lattice, const CornerTa
 /// Throws InputError if the corners lie in rows of another length than that of the board.
 void check_row_length(const Board& board, const BoardLattice& lattice, const CornerTable& table,
                       const std::vector<LatticePixels>& images, std::size_t first_line) {
-  const auto stated = static_cast<std::size_t>(lattice.cols());
-  const std::size_t found_cols = estimate_lattice_row_length(images, stated);
+  const auto stated = static_cast<std::size_t>(lattice.lattice_cols());
+  const std::size_t found_cols = estimate_points_per_lattice_row(images, stated);
   if (found_cols == stated) return;
-  const bool is_swapped = found_cols == static_cast<std::size_t>(lattice.rows());
+  const bool is_swapped = found_cols == static_cast<std::size_t>(lattice.lattice_rows());
   throw table.error(first_line, fmt::format("the corners lie in rows of {}, but {}{}", found_cols,
                                             describe_size(board, lattice),
                                             is_swapped ? "; swap cols and rows of board.yaml"
@@ -203,7 +204,7 @@ std::vector<BoardView> read_mrcal_corners(const std::filesystem::path& file, con
     if (is_new) views.push_back({image, imager_px, {}});
     BoardView& view = views[entry->second];
     const bool none = end == from + 1 && !first_pixel;
-    if (!none && end - from != lattice.num_points()) {
+    if (!none && end - from != lattice.num_points_per_part()) {
       // [LENS-6] `image '{}' has` | mrcal's table: a row for each corner, detected or not; one row
       //   with `-` without board | complete it
       throw table.error(line, fmt::format("image '{}' has {}", name,
@@ -211,8 +212,8 @@ std::vector<BoardView> read_mrcal_corners(const std::filesystem::path& file, con
     }
     for (std::size_t i = from; i < end; ++i) {
       if (!table.rows[i].pixel) continue;
-      view.seen.points.push_back(
-          {lattice.point_index(part, i - from), *table.rows[i].pixel, table.rows[i].weight});
+      view.seen.points.push_back({lattice.point_detection_index(part, i - from),
+                                  *table.rows[i].pixel, table.rows[i].weight});
     }
     if (!none) {
       if (images.empty()) first_line = line;
@@ -227,10 +228,10 @@ std::vector<BoardView> read_mrcal_corners(const std::filesystem::path& file, con
               [](const PointDetection& a, const PointDetection& b) { return a.index < b.index; });
   }
   check_row_length(board, lattice, table, images, first_line);
-  if (lattice.num_parts() == 1) {
+  if (lattice.num_lattice_parts() == 1) {
     for (BoardView& view : views) {
-      order_lattice_points(view.seen.points, lattice.cols(), lattice.rows(),
-                           board.kind == BoardKind::chessboard);
+      renumber_lattice_points(view.seen.points, lattice.lattice_cols(), lattice.lattice_rows(),
+                              board.kind == BoardKind::chessboard);
     }
   }
   return views;

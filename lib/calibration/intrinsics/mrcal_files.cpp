@@ -42,28 +42,28 @@ std::string format_mrcal_optimization_inputs(const IntrinsicsSolution& solution)
   const std::array<std::int32_t, 2> imager{problem.imager_px[0], problem.imager_px[1]};
 
   NumpyArchive archive;
-  archive.add_entry("lensmodel", to_string(problem.lens_model));
-  archive.add_entry("intrinsics", {1, problem.intrinsics.size()}, problem.intrinsics);
-  archive.add_entry("extrinsics_rt_fromref", {0, 6}, std::span<const double>{});
-  archive.add_entry("frames_rt_toref", {boards, 6}, poses);
-  archive.add_entry("observations_board", {boards, rows, cols, 3}, points);
-  archive.add_entry("indices_frame_camintrinsics_camextrinsics", {boards, 3}, indices);
-  archive.add_entry("calobject_warp", {2}, std::span(problem.warp_m.data(), 2));
-  archive.add_entry("imagersizes", {1, 2}, imager);
-  archive.add_entry("calibration_object_spacing", problem.spacing_m);
-  archive.add_entry("do_optimize_intrinsics_core", solution.solved_for.core);
-  archive.add_entry("do_optimize_intrinsics_distortions", problem.intrinsics.size() > 4);
-  archive.add_entry("do_optimize_extrinsics", true);
-  archive.add_entry("do_optimize_frames", true);
-  archive.add_entry("do_optimize_calobject_warp", solution.solved_for.warp);
-  archive.add_entry("do_apply_regularization", problem.intrinsics.size() > 4);
-  archive.add_entry("do_apply_outlier_rejection", true);
-  archive.add_entry("verbose", false);
+  archive.add_npz_array("lensmodel", lens_model_name(problem.lens_model));
+  archive.add_npz_array("intrinsics", {1, problem.intrinsics.size()}, problem.intrinsics);
+  archive.add_npz_array("extrinsics_rt_fromref", {0, 6}, std::span<const double>{});
+  archive.add_npz_array("frames_rt_toref", {boards, 6}, poses);
+  archive.add_npz_array("observations_board", {boards, rows, cols, 3}, points);
+  archive.add_npz_array("indices_frame_camintrinsics_camextrinsics", {boards, 3}, indices);
+  archive.add_npz_array("calobject_warp", {2}, std::span(problem.warp_m.data(), 2));
+  archive.add_npz_array("imagersizes", {1, 2}, imager);
+  archive.add_npz_array("calibration_object_spacing", problem.spacing_m);
+  archive.add_npz_array("do_optimize_intrinsics_core", solution.solved_for.core);
+  archive.add_npz_array("do_optimize_intrinsics_distortions", problem.intrinsics.size() > 4);
+  archive.add_npz_array("do_optimize_extrinsics", true);
+  archive.add_npz_array("do_optimize_frames", true);
+  archive.add_npz_array("do_optimize_calobject_warp", solution.solved_for.warp);
+  archive.add_npz_array("do_apply_regularization", problem.intrinsics.size() > 4);
+  archive.add_npz_array("do_apply_outlier_rejection", true);
+  archive.add_npz_array("verbose", false);
   for (const char* none :
        {"points", "observations_point", "indices_point_camintrinsics_camextrinsics"}) {
-    archive.add_entry(none, std::string_view());
+    archive.add_npz_array(none, std::string_view());
   }
-  return encode_base85(archive.serialize());
+  return encode_base85(archive.serialize_npz_archive());
 }
 
 }  // namespace
@@ -72,10 +72,10 @@ void write_mrcal_cameramodel(const std::filesystem::path& file,
                              const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
   const ImageRegion region =
-      compute_valid_lens_region(collect_inlier_pixels(problem), problem.imager_px,
+      compute_valid_lens_region(collect_inlier_corner_pixels(problem), problem.imager_px,
                                 problem.lens_model, solution.other_model_fits);
   std::string text = "{\n    'lensmodel':  '";
-  text.append(to_string(problem.lens_model)).append("',\n    'intrinsics': [");
+  text.append(lens_model_name(problem.lens_model)).append("',\n    'intrinsics': [");
   for (const double value : problem.intrinsics) {
     text.append(" ").append(format_significant_digits(value, kDigits)).append(",");
   }
@@ -111,7 +111,7 @@ void write_mrcal_corners(const std::filesystem::path& file, const IntrinsicsSolu
                          std::span<const std::string> images) {
   const BoardProblem& problem = solution.problem;
   const std::size_t parts = problem.poses.size() / solution.views.size();
-  const std::size_t count = problem.points_per_board();
+  const std::size_t count = problem.num_points_per_board();
   // mrcal truncates levels to integers from 0 on; an option makes it read weights instead.
   const bool weights = std::ranges::any_of(problem.points, [](const Eigen::Vector3d& point) {
     const double level = -std::log2(point.z());
@@ -128,7 +128,8 @@ void write_mrcal_corners(const std::filesystem::path& file, const IntrinsicsSolu
       if (point.z() > 0) {
         text.append(" ").append(format_significant_digits(point.x(), kDigits));
         text.append(" ").append(format_significant_digits(point.y(), kDigits)).append(" ");
-        text.append(format_shortest(weights ? point.z() : 0 - std::log2(point.z()))).append("\n");
+        text.append(format_shortest_exact_number(weights ? point.z() : 0 - std::log2(point.z())))
+            .append("\n");
       } else {
         text += " -1 -1 -\n";
       }

@@ -20,11 +20,12 @@ const MrcalFunctions& mrcal_functions() {
 
 }  // namespace
 
-bool solve_by_mrcal(BoardProblem& problem, const SolveOptions& what) {
+bool solve_board_problem_by_mrcal(BoardProblem& problem, const SolveOptions& what) {
   return mrcal_functions().solve(problem, what);
 }
 
-Linearization linearize_by_mrcal(const BoardProblem& problem, const SolveOptions& what) {
+Linearization linearize_board_problem_by_mrcal(const BoardProblem& problem,
+                                               const SolveOptions& what) {
   return mrcal_functions().linearize(problem, what);
 }
 

@@ -39,29 +39,29 @@ std::string_view view_bytes(std::span<const Number> values) {
 
 }  // namespace
 
-void NumpyArchive::add_entry(std::string_view name, const Shape& shape,
-                             std::span<const double> values) {
-  add_array(name, "<f8", shape, view_bytes(values));
+void NumpyArchive::add_npz_array(std::string_view name, const Shape& shape,
+                                 std::span<const double> values) {
+  add_npz_data(name, "<f8", shape, view_bytes(values));
 }
 
-void NumpyArchive::add_entry(std::string_view name, const Shape& shape,
-                             std::span<const std::int32_t> values) {
-  add_array(name, "<i4", shape, view_bytes(values));
+void NumpyArchive::add_npz_array(std::string_view name, const Shape& shape,
+                                 std::span<const std::int32_t> values) {
+  add_npz_data(name, "<i4", shape, view_bytes(values));
 }
 
-void NumpyArchive::add_entry(std::string_view name, bool value) {
-  add_array(name, "|b1", {}, std::string(1, value ? '\1' : '\0'));
+void NumpyArchive::add_npz_array(std::string_view name, bool value) {
+  add_npz_data(name, "|b1", {}, std::string(1, value ? '\1' : '\0'));
 }
 
-void NumpyArchive::add_entry(std::string_view name, std::string_view text) {
+void NumpyArchive::add_npz_array(std::string_view name, std::string_view text) {
   std::string wide;
   for (const char c : text) wide += uint32_bytes(static_cast<unsigned char>(c));
   if (text.empty()) wide = uint32_bytes(0);
-  add_array(name, "<U" + std::to_string(std::max<std::size_t>(1, text.size())), {}, wide);
+  add_npz_data(name, "<U" + std::to_string(std::max<std::size_t>(1, text.size())), {}, wide);
 }
 
-void NumpyArchive::add_array(std::string_view name, std::string_view type, const Shape& shape,
-                             std::string_view data) {
+void NumpyArchive::add_npz_data(std::string_view name, std::string_view type, const Shape& shape,
+                                std::string_view data) {
   std::string header = "{'descr': '";
   header.append(type).append("', 'fortran_order': False, 'shape': (");
   for (const std::size_t size : shape) header.append(std::to_string(size)).append(",");
@@ -71,10 +71,10 @@ void NumpyArchive::add_array(std::string_view name, std::string_view type, const
   header += '\n';
   std::string content("\x93NUMPY\x01\x00", 8);
   content.append(uint16_bytes(header.size())).append(header).append(data);
-  add_file(std::string(name) + ".npy", content);
+  add_zip_file(std::string(name) + ".npy", content);
 }
 
-void NumpyArchive::add_file(const std::string& name, const std::string& content) {
+void NumpyArchive::add_zip_file(const std::string& name, const std::string& content) {
   constexpr std::size_t version = 20, first_of_1980 = 0x21;
   std::string common = uint16_bytes(version);
   common.append(uint16_bytes(0))
@@ -95,7 +95,7 @@ void NumpyArchive::add_file(const std::string& name, const std::string& content)
   ++count_;
 }
 
-std::string NumpyArchive::serialize() const {
+std::string NumpyArchive::serialize_npz_archive() const {
   std::string end = "PK\x05\x06";
   end.append(uint16_bytes(0))
       .append(uint16_bytes(0))

@@ -20,20 +20,23 @@ class NumpyArchive {
 
   /// Adds an array of doubles with a name. `values` are in C order (last index fastest). Their
   /// number is the product of `shape`; an empty shape is a scalar.
-  void add_entry(std::string_view name, const Shape& shape, std::span<const double> values);
-  void add_entry(std::string_view name, const Shape& shape, std::span<const std::int32_t> values);
-  void add_entry(std::string_view name, double value) { add_entry(name, {}, std::span(&value, 1)); }
-  void add_entry(std::string_view name, bool value);
+  void add_npz_array(std::string_view name, const Shape& shape, std::span<const double> values);
+  void add_npz_array(std::string_view name, const Shape& shape,
+                     std::span<const std::int32_t> values);
+  void add_npz_array(std::string_view name, double value) {
+    add_npz_array(name, {}, std::span(&value, 1));
+  }
+  void add_npz_array(std::string_view name, bool value);
   /// Adds an ASCII string.
-  void add_entry(std::string_view name, std::string_view text);
+  void add_npz_array(std::string_view name, std::string_view text);
 
   /// Returns the complete archive.
-  std::string serialize() const;
+  std::string serialize_npz_archive() const;
 
  private:
-  void add_array(std::string_view name, std::string_view type, const Shape& shape,
-                 std::string_view data);
-  void add_file(const std::string& name, const std::string& content);
+  void add_npz_data(std::string_view name, std::string_view type, const Shape& shape,
+                    std::string_view data);
+  void add_zip_file(const std::string& name, const std::string& content);
 
   std::string files_, directory_;
   std::uint16_t count_ = 0;

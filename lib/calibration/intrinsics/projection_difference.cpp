@@ -41,7 +41,7 @@ std::optional<Eigen::Matrix3d> fit_rotation_between_lenses(
     const Lens& a, const Lens& b, std::span<const Eigen::Vector2d> pixels) {
   std::vector<Pair> pairs;
   for (const Eigen::Vector2d& pixel : pixels) {
-    const auto from_a = a.unproject(pixel), from_b = b.unproject(pixel);
+    const auto from_a = a.unproject_pixel(pixel), from_b = b.unproject_pixel(pixel);
     if (!from_a || !from_b) continue;
     pairs.push_back({pixel, from_a->direction.normalized(), from_b->direction.normalized(), 1});
   }
@@ -68,7 +68,7 @@ std::optional<ProjectionDifference> compute_projection_difference(
     const std::function<double(const Eigen::Vector2d&)>& sigma_px) {
   std::vector<Pair> pairs;
   for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(imager_px)) {
-    const auto from_a = a.unproject(pixel), from_b = b.unproject(pixel);
+    const auto from_a = a.unproject_pixel(pixel), from_b = b.unproject_pixel(pixel);
     const double sigma = sigma_px(pixel);
     if (!from_a || !from_b || !(sigma > 0) || !std::isfinite(sigma)) continue;
     pairs.push_back({pixel, from_a->direction.normalized(), from_b->direction.normalized(),
@@ -79,7 +79,7 @@ std::optional<ProjectionDifference> compute_projection_difference(
   ProjectionDifference difference{0, 0, 0};
   double count = 0;
   for (const Pair& pair : pairs) {
-    const auto pixel = b.project(rotation * pair.a);
+    const auto pixel = b.project_point(rotation * pair.a);
     if (!pixel) continue;
     const double distance_px = (*pixel - pair.pixel).norm();
     difference.mean_px += distance_px;
@@ -107,13 +107,13 @@ std::vector<PixelDerivatives> compute_pixel_derivatives(const Lens& lens,
   std::vector<PixelDerivatives> derivatives;
   for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(imager_px)) {
     if (!region.empty() && !polygon_contains(region, pixel)) continue;
-    const auto seen = lens.unproject(pixel);
+    const auto seen = lens.unproject_pixel(pixel);
     if (!seen) continue;
     const Eigen::Vector3d ray = seen->direction.normalized();
-    const auto projection = lens.project_with_jacobians(ray);
+    const auto projection = lens.project_point_with_jacobians(ray);
     if (!projection) continue;
     derivatives.push_back({-projection->d_pixel_d_point * skew_symmetric_matrix(ray),
-                           *lens.compute_intrinsics_jacobian(ray)});
+                           *lens.compute_pixel_jacobian_wrt_intrinsics(ray)});
   }
   return derivatives;
 }
@@ -177,9 +177,10 @@ ExpectedDifference compute_expected_projection_difference(const Lens& lens,
   return {std::sqrt(mean), mean * mean / (terms * terms).trace()};
 }
 
-double estimate_max_expected_difference_px(const Lens& lens, const std::array<int, 2>& imager_px,
-                                           const Eigen::MatrixXd& covariance,
-                                           const ImageRegion& region) {
+double estimate_expected_max_projection_difference_px(const Lens& lens,
+                                                      const std::array<int, 2>& imager_px,
+                                                      const Eigen::MatrixXd& covariance,
+                                                      const ImageRegion& region) {
   if (!covariance.allFinite()) return std::numeric_limits<double>::infinity();
   const Eigen::MatrixXd samples = draw_samples(covariance);
   Eigen::RowVectorXd largest = Eigen::RowVectorXd::Zero(samples.cols());

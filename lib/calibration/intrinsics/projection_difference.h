@@ -71,8 +71,9 @@ ExpectedDifference compute_expected_projection_difference(const Lens& lens,
 ///
 /// It exceeds the largest standard deviation of a single pixel, because the maximum is over many
 /// pixels. Infinite if the covariance is not finite.
-double estimate_max_expected_difference_px(const Lens& lens, const std::array<int, 2>& imager_px,
-                                           const Eigen::MatrixXd& covariance,
-                                           const ImageRegion& region = {});
+double estimate_expected_max_projection_difference_px(const Lens& lens,
+                                                      const std::array<int, 2>& imager_px,
+                                                      const Eigen::MatrixXd& covariance,
+                                                      const ImageRegion& region = {});
 
 }  // namespace vlp

@@ -30,7 +30,8 @@ double compute_residual_sd(const BoardProblem& problem, const Eigen::VectorXd& r
 /// each view, from a row for each residual.
 Eigen::MatrixXd sum_rows_by_tag(const Eigen::MatrixXd& by_residual,
                                 const Eigen::VectorXd& residuals_px, const BoardLattice& lattice) {
-  const std::size_t points = lattice.num_points(), points_per_view = lattice.num_parts() * points;
+  const std::size_t points = lattice.num_points_per_part(),
+                    points_per_view = lattice.num_lattice_parts() * points;
   const Eigen::Index corners = residuals_px.size() / 2;
   const auto views = static_cast<std::size_t>(corners) / points_per_view;
   Eigen::MatrixXd sums =
@@ -38,7 +39,7 @@ Eigen::MatrixXd sum_rows_by_tag(const Eigen::MatrixXd& by_residual,
   for (Eigen::Index i = 0; i < corners; ++i) {
     const auto corner = static_cast<std::size_t>(i);
     const std::size_t tag =
-        corner / points_per_view * points + lattice.find_tag_of_point(corner % points);
+        corner / points_per_view * points + lattice.find_tag_index_of_point(corner % points);
     sums.row(static_cast<Eigen::Index>(tag)) +=
         residuals_px.segment<2>(2 * i).transpose() * by_residual.middleRows<2>(2 * i);
   }
@@ -47,7 +48,7 @@ Eigen::MatrixXd sum_rows_by_tag(const Eigen::MatrixXd& by_residual,
 
 /// Returns the factor n / (n - k) of ProjectionUncertainty.
 double compute_degrees_of_freedom_factor(const BoardProblem& problem, Eigen::Index states) {
-  const double count = 2 * static_cast<double>(collect_inlier_pixels(problem).size());
+  const double count = 2 * static_cast<double>(collect_inlier_corner_pixels(problem).size());
   return count / std::max(count - static_cast<double>(states), 1.0);
 }
 
@@ -84,11 +85,11 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
 
 ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
                                              const BoardLattice* lattice)
-    : lens_(solution.lens()),
+    : lens_(solution.fitted_lens()),
       is_determined_(false),
       regularization_bias_(Eigen::VectorXd::Zero(std::ssize(solution.problem.intrinsics))) {
   const BoardProblem& problem = solution.problem;
-  const Linearization at = linearize(problem, solution.solved_for);
+  const Linearization at = linearize_board_problem(problem, solution.solved_for);
   const Eigen::SparseMatrix<double>& jt = at.jacobian_transposed;
   const Eigen::SparseMatrix<double> normal = jt * jt.transpose();
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
@@ -118,10 +119,10 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
 }
 
 Eigen::Matrix2d ProjectionUncertainty::projection_covariance(const Eigen::Vector2d& pixel) const {
-  const auto ray = lens_.unproject(pixel);
-  const auto projection = ray ? lens_.project_with_jacobians(ray->direction) : std::nullopt;
+  const auto ray = lens_.unproject_pixel(pixel);
+  const auto projection = ray ? lens_.project_point_with_jacobians(ray->direction) : std::nullopt;
   const auto derivatives =
-      projection ? lens_.compute_intrinsics_jacobian(ray->direction) : std::nullopt;
+      projection ? lens_.compute_pixel_jacobian_wrt_intrinsics(ray->direction) : std::nullopt;
   if (!is_determined_ || !derivatives) {
     return Eigen::Matrix2d::Identity() * std::numeric_limits<double>::infinity();
   }
@@ -134,7 +135,7 @@ Eigen::Matrix2d ProjectionUncertainty::projection_covariance(const Eigen::Vector
   return gradient * state_covariance * gradient.transpose();
 }
 
-double ProjectionUncertainty::max_direction_sd_px(const Eigen::Vector2d& pixel) const {
+double ProjectionUncertainty::max_projection_sd_px(const Eigen::Vector2d& pixel) const {
   const Eigen::Matrix2d c = projection_covariance(pixel);
   if (!c.allFinite()) return std::numeric_limits<double>::infinity();
   const double mean = c.trace() / 2, half = (c(0, 0) - c(1, 1)) / 2;
@@ -142,7 +143,7 @@ double ProjectionUncertainty::max_direction_sd_px(const Eigen::Vector2d& pixel) 
 }
 
 Eigen::MatrixXd ProjectionUncertainty::intrinsics_covariance() const {
-  const auto count = static_cast<Eigen::Index>(parameter_count(lens_.lens_model()));
+  const auto count = static_cast<Eigen::Index>(num_lens_parameters(lens_.lens_model()));
   if (is_determined_) return covariance_.topLeftCorner(count, count);
   return Eigen::MatrixXd::Constant(count, count, std::numeric_limits<double>::infinity());
 }

@@ -32,11 +32,11 @@ class ProjectionUncertainty {
  public:
   /// Computes the covariances of a solution, assuming that the errors of all corners are
   /// independent, as mrcal does.
-  /// @pre solution.ok()
+  /// @pre solution.has_succeeded()
   explicit ProjectionUncertainty(const IntrinsicsSolution& solution);
   /// Computes the covariances of a solution, allowing for correlated errors of the corners of a
   /// tag.
-  /// @pre solution.ok(), with boards of that lattice
+  /// @pre solution.has_succeeded(), with boards of that lattice
   ProjectionUncertainty(const IntrinsicsSolution& solution, const BoardLattice& lattice);
 
   /// Returns false if the views do not determine all parameters.
@@ -47,7 +47,7 @@ class ProjectionUncertainty {
   Eigen::Matrix2d projection_covariance(const Eigen::Vector2d& pixel) const;
 
   /// Returns the standard deviation in the direction in which it is largest, px.
-  double max_direction_sd_px(const Eigen::Vector2d& pixel) const;
+  double max_projection_sd_px(const Eigen::Vector2d& pixel) const;
 
   /// Returns the covariance of the intrinsics; 0 for the core of splined lenses, which is not
   /// estimated.
@@ -62,7 +62,7 @@ class ProjectionUncertainty {
   ///   (Jo' Jo + s^2 Jr' Jr)^-1 (1 - s^2) Jr' r,  s at least 0.01 and at most 1.
   /// 0 without regularization. Use it as a standard deviation of the intrinsics in addition to that
   /// from noise.
-  const Eigen::VectorXd& regularization_bias() const { return regularization_bias_; }
+  const Eigen::VectorXd& intrinsics_regularization_bias() const { return regularization_bias_; }
 
   /// Returns the standard deviation of the focal length along x, px. Infinite if the views do not
   /// determine all parameters, and for splined lenses, whose control points compensate the focal

@@ -73,7 +73,7 @@ std::optional<std::vector<double>> fit_splined_lens_to_lens(
     const std::vector<double>& core, const Eigen::Matrix3d& lens_from_splined) {
   constexpr int rays_per_piece = 4;
   constexpr double margin = 0.05;  // of the image, around it
-  const SplineGrid grid = spline_grid_of_model(model);
+  const SplineGrid grid = spline_grid_of_lens_model(model);
   const SplineSurface straight(grid, std::vector<double>(2 * grid.num_control_points()));
   const Eigen::Array2d focal_px(core[0], core[1]), center_px(core[2], core[3]);
   const Eigen::Array2d size_px(imager_px[0], imager_px[1]);
@@ -85,15 +85,15 @@ std::optional<std::vector<double>> fit_splined_lens_to_lens(
   for (int row = 0; row <= rows; ++row) {
     for (int column = 0; column <= columns; ++column) {
       const Eigen::Array2d fraction(double(column) / columns, double(row) / rows);
-      const Eigen::Vector2d u = straight.half_extent().array() * (2 * fraction - 1);
+      const Eigen::Vector2d u = straight.spline_half_extent().array() * (2 * fraction - 1);
       const Eigen::Vector3d ray(u.x(), u.y(), 1 - u.squaredNorm() / 4);
-      const auto pixel = lens.project(lens_from_splined * ray);
+      const auto pixel = lens.project_point(lens_from_splined * ray);
       if (!pixel || (pixel->array() < -margin * size_px).any() ||
           (pixel->array() > (1 + margin) * size_px).any()) {
         continue;
       }
       positions.push_back(u);
-      const SplineSurface::Weights at = straight.spline_weights(u);
+      const SplineSurface::Weights at = straight.control_point_weights(u);
       for (int j = 0; j <= grid.order; ++j) {
         for (int i = 0; i <= grid.order; ++i) {
           equations.entries.emplace_back(
@@ -129,12 +129,12 @@ std::string describe_too_coarse_spline_grid(const Lens& lens, const std::array<i
   constexpr double extension = 1.05;
   Eigen::Vector2d farthest(0, 0);
   for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(imager_px)) {
-    const auto ray = lens.unproject(pixel);
+    const auto ray = lens.unproject_pixel(pixel);
     if (!ray) continue;
     const Eigen::Vector3d& x = ray->direction;
     farthest = farthest.cwiseMax(x.head<2>().cwiseAbs() * (2 / (x.norm() + x.z())));
   }
-  SplineGrid finer = spline_grid_of_model(model);
+  SplineGrid finer = spline_grid_of_lens_model(model);
   LensModel other = lens_model_for_spline_grid(extend_spline_grid(finer, extension * farthest));
   while (!fit_splined_lens_to_lens(lens, imager_px, other, core) &&
          2 * finer.nx <= SplineGrid::kMaxKnots) {
@@ -146,8 +146,8 @@ std::string describe_too_coarse_spline_grid(const Lens& lens, const std::array<i
   return fmt::format(
       "the control points of {} do not cover the field of view, {:.0f} degrees off axis "
       "horizontally and {:.0f} vertically: use {}",
-      to_string(model), angle_deg(farthest.x()), angle_deg(farthest.y()),
-      helps ? fmt::format("--lens {}", to_string(other)) : "another model");
+      lens_model_name(model), angle_deg(farthest.x()), angle_deg(farthest.y()),
+      helps ? fmt::format("--lens {}", lens_model_name(other)) : "another model");
 }
 
 SplineGrid extend_spline_grid(const SplineGrid& grid, const Eigen::Vector2d& u) {
@@ -169,7 +169,7 @@ std::vector<double> fit_splined_lens_core(const Lens& lens,
                                           std::span<const Eigen::Vector2d> pixels) {
   Eigen::Array2d products(0, 0), squares(0, 0);
   for (const Eigen::Vector2d& pixel : pixels) {
-    const auto ray = lens.unproject(pixel);
+    const auto ray = lens.unproject_pixel(pixel);
     if (!ray) continue;
     const Eigen::Vector3d& x = ray->direction;
     const Eigen::Array2d u = x.head<2>() * (2 / (x.norm() + x.z()));

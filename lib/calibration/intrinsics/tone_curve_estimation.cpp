@@ -39,7 +39,7 @@ std::vector<const BoardDetection*> select_detections(const std::vector<BoardView
   constexpr std::size_t max_views = 24;
   std::vector<const BoardDetection*> sufficient;
   for (const BoardView& view : views) {
-    if (lattice.has_sufficient_corners(view.seen)) sufficient.push_back(&view.seen);
+    if (lattice.are_corners_sufficient_for_pose(view.seen)) sufficient.push_back(&view.seen);
   }
   if (sufficient.size() <= max_views) return sufficient;
   std::vector<const BoardDetection*> selected;
@@ -51,10 +51,12 @@ std::vector<const BoardDetection*> select_detections(const std::vector<BoardView
 /// Solves OPENCV8 and OPENCV_FISHEYE and returns the solution with the smaller residuals.
 IntrinsicsSolution solve_better_fitting_model(IntrinsicsInput input) {
   auto fisheye = may_be_wide_angle_lens(input) ? fit_fisheye_lens(input) : std::nullopt;
-  if (fisheye && fisheye->farthest_rad >= kRightAngle_rad) return std::move(fisheye->solution);
+  if (fisheye && fisheye->max_corner_angle_rad >= kRightAngle_rad)
+    return std::move(fisheye->solution);
   input.lens_model = LensModel::opencv8;
   IntrinsicsSolution solution = solve_intrinsics(input);
-  const bool other = fisheye && !(solution.ok() && solution.rms_px < fisheye->solution.rms_px);
+  const bool other =
+      fisheye && !(solution.has_succeeded() && solution.rms_px < fisheye->solution.rms_px);
   return other ? std::move(fisheye->solution) : solution;
 }
 
@@ -72,12 +74,12 @@ std::optional<double> compute_median_sd_px(const IntrinsicsInput& input) {
 
 /// Returns the RMS residual of the lens for each curve, divided by the noise of the corners;
 /// std::nullopt if no lens is found.
-std::optional<PerCurve> compute_residual_noise_ratios(const std::vector<BoardView>& views,
-                                                      const Board& board) {
+std::optional<ValuesPerGamma> compute_residual_noise_ratios(const std::vector<BoardView>& views,
+                                                            const Board& board) {
   constexpr double exact_px = 1e-6;
   IntrinsicsInput input{BoardLattice(board), {}, views.front().imager_px, LensModel::opencv8};
   auto selected = select_detections(views, input.lattice);
-  PerCurve ratios{};
+  ValuesPerGamma ratios{};
   for (std::size_t curve = 0; curve < ratios.size(); ++curve) {
     input.views.clear();
     for (const BoardDetection* seen : selected) {
@@ -87,7 +89,7 @@ std::optional<PerCurve> compute_residual_noise_ratios(const std::vector<BoardVie
     const IntrinsicsSolution solution =
         curve == 0 ? solve_better_fitting_model(input) : solve_intrinsics(input);
     const auto noise_px = compute_median_sd_px(input);
-    if (!solution.ok() || !noise_px) return {};
+    if (!solution.has_succeeded() || !noise_px) return {};
     ratios[curve] = std::max(solution.rms_px, exact_px) / *noise_px;
     if (curve > 0) continue;
     // The other curves are solved with the same model, warp and views, so that ratios are
@@ -110,9 +112,9 @@ bool may_have_tone_curve(const BoardView& view) {
 
 }  // namespace
 
-double estimate_and_apply_tone_curve(std::vector<BoardView>& views, const Board& board) {
+double estimate_and_correct_tone_curve(std::vector<BoardView>& views, const Board& board) {
   constexpr double levels_sd = 0.2, residuals = 50;
-  const PerCurve level_costs = sum_tone_curve_costs(views);
+  const ValuesPerGamma level_costs = sum_tone_curve_costs(views);
   const bool has_no_curve = 2 * std::ranges::count_if(views, may_have_tone_curve) <=
                             std::ranges::count_if(views, has_gray_level_costs);
   if (has_no_curve || !check_board_layout(board, views, {}).problem.empty())
@@ -121,7 +123,7 @@ double estimate_and_apply_tone_curve(std::vector<BoardView>& views, const Board&
   if (!ratios) return correct_views_for_tone_curve(views, level_costs);
   const double levels_gamma = estimate_tone_curve_gamma(level_costs);
   const double n = residuals / *std::ranges::min_element(*ratios);
-  PerCurve costs{};
+  ValuesPerGamma costs{};
   for (std::size_t i = 0; i < costs.size(); ++i) {
     const double off = std::log(kGammas[i] / levels_gamma) / levels_sd;
     costs[i] = n * std::log((*ratios)[i]) + off * off / 2;

@@ -35,6 +35,6 @@ namespace vlp {
 /// Reason for n: thousands of residuals do not determine gamma as precisely as exact ratios would.
 /// With n, a ratio of 2 % weighs as much as the gray values, and less if the noise explains few of
 /// the residuals.
-double estimate_and_apply_tone_curve(std::vector<BoardView>& views, const Board& board);
+double estimate_and_correct_tone_curve(std::vector<BoardView>& views, const Board& board);
 
 }  // namespace vlp

@@ -79,12 +79,12 @@ ImageRegion compute_valid_lens_region(const std::vector<Eigen::Vector2d>& corner
     region = clip_polygon(region, axis, last[axis], 1);
   }
   constexpr double whole = 0.985;
-  if (compute_fraction_of_image_area(region, imager_px) < whole) return region;
+  if (compute_region_fraction_of_image_area(region, imager_px) < whole) return region;
   return {{0, 0}, {last.x(), 0}, last, {0, last.y()}};
 }
 
-double compute_fraction_of_image_area(const ImageRegion& region,
-                                      const std::array<int, 2>& imager_px) {
+double compute_region_fraction_of_image_area(const ImageRegion& region,
+                                             const std::array<int, 2>& imager_px) {
   return compute_polygon_area(region) / ((imager_px[0] - 1.0) * (imager_px[1] - 1.0));
 }
 

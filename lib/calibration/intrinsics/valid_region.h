@@ -32,7 +32,7 @@ ImageRegion compute_valid_lens_region(const std::vector<Eigen::Vector2d>& corner
 
 /// Computes the area of a region as a fraction of the image. The image extends from the center of
 /// its first pixel to that of its last.
-double compute_fraction_of_image_area(const ImageRegion& region,
-                                      const std::array<int, 2>& imager_px);
+double compute_region_fraction_of_image_area(const ImageRegion& region,
+                                             const std::array<int, 2>& imager_px);
 
 }  // namespace vlp

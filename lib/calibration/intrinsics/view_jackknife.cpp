@@ -56,9 +56,9 @@ ReducedEquations compute_reduced_equations(const Linearization& at, const Layout
 
 }  // namespace
 
-Eigen::MatrixXd estimate_jackknife_covariance(const IntrinsicsSolution& solution) {
+Eigen::MatrixXd estimate_intrinsics_covariance_by_jackknife(const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
-  const Linearization at = linearize(problem, solution.solved_for);
+  const Linearization at = linearize_board_problem(problem, solution.solved_for);
   const auto views = static_cast<Eigen::Index>(solution.views.size());
   const auto boards = static_cast<Eigen::Index>(problem.poses.size());
   const auto intrinsics = static_cast<Eigen::Index>(problem.intrinsics.size());

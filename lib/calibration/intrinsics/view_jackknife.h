@@ -16,12 +16,12 @@ namespace vlp {
 /// Source: Efron, "The Jackknife, the Bootstrap and Other Resampling Plans", 1982.
 ///
 /// @return infinite elements if the remaining views do not determine a lens
-/// @pre solution.ok()
+/// @pre solution.has_succeeded()
 ///
 /// ProjectionUncertainty assumes independent errors of tags or of corners. This estimate assumes
 /// independence of views only. It includes errors common to the corners of a view: a varying warp
 /// of the board, a rolling shutter, a lens model that does not fit. With few views it is imprecise,
 /// by a relative 1 / sqrt(2 (n - 1)), and often too large.
-Eigen::MatrixXd estimate_jackknife_covariance(const IntrinsicsSolution& solution);
+Eigen::MatrixXd estimate_intrinsics_covariance_by_jackknife(const IntrinsicsSolution& solution);
 
 }  // namespace vlp

@@ -56,7 +56,7 @@ Eigen::MatrixXd make_similarity_basis(const std::vector<Eigen::Vector2d>& points
     moves.block<2, 1>(2 * i, 3) = point * scales[static_cast<std::size_t>(i)];
   }
   const auto [squares, directions] =
-      eigendecompose_symmetric(Eigen::MatrixXd(moves.transpose() * moves));
+      eigendecompose_symmetric_matrix(Eigen::MatrixXd(moves.transpose() * moves));
   constexpr double numeric_tolerance = 1e-12;
   const auto rank = (squares.array() > numeric_tolerance * squares.maxCoeff()).count();
   return moves * directions.rightCols(rank) *
@@ -113,8 +113,9 @@ Eigen::MatrixXd make_gauge_basis(const std::vector<Eigen::Vector2d>& map_m) {
   return make_similarity_basis(centered_m, std::vector<double>(centered_m.size(), 1));
 }
 
-std::optional<LampDisplacements> solve(const LampMap& map, const std::vector<CeilingView>& views,
-                                       bool tilt_is_free) {
+std::optional<LampDisplacements> solve_lamp_displacements(const LampMap& map,
+                                                          const std::vector<CeilingView>& views,
+                                                          bool tilt_is_free) {
   LampDisplacements found;
   std::map<int, int> captures;
   std::map<int, Eigen::Index> column;
@@ -150,11 +151,11 @@ std::optional<LampDisplacements> solve(const LampMap& map, const std::vector<Cei
   if (tilt_is_free) {
     found.information -=
         normal.topRightCorner(size, 2) *
-        solve_symmetric(normal.bottomRightCorner(2, 2), normal.bottomLeftCorner(2, size));
+        solve_symmetric_system(normal.bottomRightCorner(2, 2), normal.bottomLeftCorner(2, size));
   }
   normal = (projector * normal * projector).eval();
   normal.topLeftCorner(size, size) += gauge * gauge.transpose();
-  const auto [weights, directions] = eigendecompose_symmetric(normal);
+  const auto [weights, directions] = eigendecompose_symmetric_matrix(normal);
   constexpr double numeric_tolerance = 1e-12;
   if (!(weights.minCoeff() > numeric_tolerance * weights.maxCoeff())) return std::nullopt;
   const Eigen::MatrixXd inverse =
@@ -176,8 +177,8 @@ std::optional<LampDisplacements> solve(const LampMap& map, const std::vector<Cei
 /// Removes outliers and adds them to `outliers_m`. Removes the largest residual of each view if it
 /// exceeds half the largest of all, because an outlier also changes the residuals of other
 /// detections. Returns true if any was removed.
-bool reject_outliers(std::vector<CeilingView>& views, const LampDisplacements& found,
-                     std::map<int, std::vector<double>>& outliers_m) {
+bool reject_corner_outliers(std::vector<CeilingView>& views, const LampDisplacements& found,
+                            std::map<int, std::vector<double>>& outliers_m) {
   constexpr double max_sigmas = 6, numeric_tolerance_m = 1e-7;
   std::vector<double> squares_m2;
   for (const Eigen::VectorXd& residuals_m : found.residuals_m) {
@@ -217,10 +218,10 @@ std::optional<LampDisplacements> estimate_lamp_displacements(const LampMap& map,
   std::map<int, std::vector<double>> outliers_m;
   remove_unconnected_detections(views);
   const std::size_t detections = count_detections(views);
-  std::optional<LampDisplacements> found = solve(map, views, tilt_is_free);
-  while (found && reject_outliers(views, *found, outliers_m)) {
+  std::optional<LampDisplacements> found = solve_lamp_displacements(map, views, tilt_is_free);
+  while (found && reject_corner_outliers(views, *found, outliers_m)) {
     remove_unconnected_detections(views);
-    found = solve(map, views, tilt_is_free);
+    found = solve_lamp_displacements(map, views, tilt_is_free);
   }
   if (!found) return std::nullopt;
   found->height_m = views.front().lamps.front().above_camera_m;
@@ -235,18 +236,18 @@ std::optional<Eigen::Vector2d> compute_lamp_offset_relative_to_others(
   std::vector<Eigen::Vector2d> from_m, to_m;
   for (std::size_t i = 0; i < found.lamps.size(); ++i) {
     if (std::find(excluded.begin(), excluded.end(), i) != excluded.end()) continue;
-    from_m.push_back(found.displaced_position_m(i));
+    from_m.push_back(found.displaced_lamp_position_m(i));
     to_m.push_back(found.map_m[i]);
   }
   const auto to_map = fit_similarity_transform(
       from_m.size(), [&](std::size_t i) { return from_m[i]; },
       [&](std::size_t i) { return to_m[i]; });
   if (!to_map) return std::nullopt;
-  return to_map->offset + complex_product(to_map->factor, found.displaced_position_m(lamp)) -
+  return to_map->offset + complex_product(to_map->factor, found.displaced_lamp_position_m(lamp)) -
          found.map_m[lamp];
 }
 
-std::vector<LampOffset> compute_offsets_from_other_lamps(const LampDisplacements& found) {
+std::vector<LampOffset> compute_lamp_offsets_relative_to_others(const LampDisplacements& found) {
   constexpr double min_own_fraction = 1e-3;
   std::vector<LampOffset> offsets;
   for (std::size_t i = 0; i < found.lamps.size(); ++i) {

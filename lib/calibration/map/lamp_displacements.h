@@ -67,7 +67,7 @@ struct LampDisplacements {
   double inlier_fraction = 1;
 
   /// Returns the displaced position of a lamp, up to a similarity of all lamps.
-  Eigen::Vector2d displaced_position_m(std::size_t lamp) const {
+  Eigen::Vector2d displaced_lamp_position_m(std::size_t lamp) const {
     return map_m[lamp] + displacement_m.segment<2>(2 * static_cast<Eigen::Index>(lamp));
   }
 };
@@ -95,6 +95,6 @@ std::optional<Eigen::Vector2d> compute_lamp_offset_relative_to_others(
 
 /// Computes the offset of each lamp from the similarity that fits the other lamps best. Omits lamps
 /// whose offset the other lamps do not determine.
-std::vector<LampOffset> compute_offsets_from_other_lamps(const LampDisplacements& found);
+std::vector<LampOffset> compute_lamp_offsets_relative_to_others(const LampDisplacements& found);
 
 }  // namespace vlp

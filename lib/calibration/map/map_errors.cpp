@@ -42,7 +42,7 @@ std::vector<LevelRay> compute_level_rays(const Frame& frame, const LampMap& map,
   for (const Detection& detection : frame.detections) {
     const Lamp* lamp = find_lamp_by_id(map.lamps, detection.lamp);
     if (lamp == nullptr || counts[lamp->id] > 1) continue;
-    const auto ray = lens.unproject(detection.pixel);
+    const auto ray = lens.unproject_pixel(detection.pixel);
     if (!ray) continue;
     const Eigen::Vector3d level = level_from_camera * ray->direction;
     if (level.z() > 0) rays.push_back({lamp, level.hnormalized()});
@@ -68,7 +68,7 @@ std::vector<Eigen::Vector2d> compute_displaced_positions(const LampDisplacements
   Eigen::Vector2d mean_m(0, 0);
   std::vector<Eigen::Vector2d> positions_m;
   for (std::size_t i = 0; i < found.lamps.size(); ++i) {
-    positions_m.push_back(found.displaced_position_m(i));
+    positions_m.push_back(found.displaced_lamp_position_m(i));
     mean_m += positions_m.back() / static_cast<double>(found.lamps.size());
   }
   const double scale = rms_radius(found.map_m) / rms_radius(positions_m);
@@ -79,8 +79,8 @@ std::vector<Eigen::Vector2d> compute_displaced_positions(const LampDisplacements
 
 /// Projects the rays onto the ceiling from the camera pose that fits the displaced lamps best. The
 /// height is the ratio of the sizes of both patterns, so that errors of the map barely change it.
-std::optional<CeilingView> project(const std::vector<LevelRay>& rays,
-                                   const LampPositions& positions_m) {
+std::optional<CeilingView> project_rays_to_ceiling(const std::vector<LevelRay>& rays,
+                                                   const LampPositions& positions_m) {
   std::vector<Eigen::Vector2d> z, lamps_m;
   double mean_z_m = 0;
   for (const LevelRay& ray : rays) {
@@ -137,7 +137,7 @@ struct MapCaptures {
       const auto rays =
           compute_level_rays(frames[i], map, lens, inclination.level_from_base * base_from_camera);
       if (rays.size() < min_lamps) continue;
-      if (auto view = project(rays, positions_m)) views.push_back(std::move(*view));
+      if (auto view = project_rays_to_ceiling(rays, positions_m)) views.push_back(std::move(*view));
     }
     return views;
   }
@@ -148,9 +148,9 @@ struct MapCaptures {
     constexpr int max_iterations = 8;
     constexpr double tolerance_m = 1e-6;
     const bool tilt_is_free = !calibration.rotation_center;
-    Eigen::Matrix3d base_from_camera = tilt_is_free
-                                           ? Eigen::Matrix3d::Identity()
-                                           : level_from_camera(calibration, Correction::all);
+    Eigen::Matrix3d base_from_camera =
+        tilt_is_free ? Eigen::Matrix3d::Identity()
+                     : compute_level_from_camera_rotation(calibration, Correction::all);
     LampPositions positions_m;
     for (const Lamp& lamp : map.lamps) positions_m[lamp.id] = lamp.position_m.head<2>();
     std::optional<LampDisplacements> found;
@@ -169,7 +169,7 @@ struct MapCaptures {
       const Eigen::Vector3d up(-found->tilt.x(), -found->tilt.y(), 1);
       const Eigen::Vector3d zenith = base_from_camera.transpose() * up.normalized();
       if (!(zenith.z() > 0)) return std::nullopt;
-      if (tilt_is_free) base_from_camera = level_from_zenith(zenith);
+      if (tilt_is_free) base_from_camera = level_rotation_from_zenith(zenith);
     }
     return found;
   }
@@ -195,11 +195,11 @@ class DisplacementTest {
       variance_is_known_ = variance_is_known_ && sd_m;
       covariance(i, i) += sd_m.value_or(0) * sd_m.value_or(0) + kNumericVariance_m2;
     }
-    const auto range = eigendecompose_symmetric(found.projector);
+    const auto range = eigendecompose_symmetric_matrix(found.projector);
     const Eigen::Index rank = (range.values.array() > 0.5).count();
     const Eigen::MatrixXd basis = range.vectors.rightCols(rank);
     const auto [values, vectors] =
-        eigendecompose_symmetric(Eigen::MatrixXd(basis.transpose() * covariance * basis));
+        eigendecompose_symmetric_matrix(Eigen::MatrixXd(basis.transpose() * covariance * basis));
     variances_m2_ = values.cwiseMax(kNumericVariance_m2);
     basis_ = basis * vectors;
     coordinates_ = basis_.transpose() * found.displacement_m;
@@ -219,8 +219,8 @@ class DisplacementTest {
     const Eigen::MatrixXd weighted = jacobian * weights.matrix().asDiagonal();
     const Eigen::VectorXd gradient = weighted * coordinates_;
     Fit fit{(weights * coordinates_.array().square()).sum(), {}, {}};
-    fit.covariance_m2 =
-        solve_symmetric(weighted * jacobian.transpose(), Eigen::MatrixXd::Identity(size, size));
+    fit.covariance_m2 = solve_symmetric_system(weighted * jacobian.transpose(),
+                                               Eigen::MatrixXd::Identity(size, size));
     fit.offsets_m = fit.covariance_m2 * gradient;
     fit.chi_squared -= gradient.dot(fit.offsets_m);
     return fit;
@@ -475,7 +475,7 @@ std::string describe_offset(int lamp, const Eigen::Vector3d& offset_m) {
 
 }  // namespace
 
-std::string describe(const MapError& error) {
+std::string describe_map_error(const MapError& error) {
   switch (error.kind) {
     case MapErrorKind::moved:
       return describe_offset(error.lamps[0], error.offset_m);
@@ -503,9 +503,10 @@ std::string describe(const MapError& error) {
   return "";
 }
 
-std::string describe(std::span<const MapError> errors) {
+std::string describe_map_errors(std::span<const MapError> errors) {
   std::string text;
-  for (const MapError& error : errors) text += (text.empty() ? "" : "; ") + describe(error);
+  for (const MapError& error : errors)
+    text += (text.empty() ? "" : "; ") + describe_map_error(error);
   return text;
 }
 
@@ -516,7 +517,7 @@ std::string describe_lamps_moved_since_calibration(int lamps) {
       lamps);
 }
 
-bool MapErrors::is_map_unusable() const {
+bool MapErrors::is_lamp_map_unusable() const {
   return std::any_of(errors.begin(), errors.end(), [](const MapError& error) {
     return error.kind == MapErrorKind::swapped || error.kind == MapErrorKind::mirrored;
   });
@@ -528,7 +529,7 @@ MapErrors detect_misplaced_or_swapped_lamps(std::span<const Frame> frames, const
   const MapCaptures captures{frames, calibration, options};
   const auto found = captures.estimate_displacements(map);
   MapErrors result;
-  if (found) result.offsets = compute_offsets_from_other_lamps(*found);
+  if (found) result.offsets = compute_lamp_offsets_relative_to_others(*found);
   if (auto exchange = find_swapped_lamps(captures, map, found)) {
     result.errors.push_back(std::move(*exchange));
     return result;

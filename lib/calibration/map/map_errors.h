@@ -42,15 +42,15 @@ struct MapError {
 };
 
 /// Describes the error in one line: ids, offset in millimeters, direction, remedy.
-std::string describe(const MapError& error);
+std::string describe_map_error(const MapError& error);
 
 /// Describes the number of lamps whose map position differs from that in an adjusted calibration
-/// (Positioner::lamps_elsewhere()).
+/// (Positioner::num_lamps_moved_since_calibration()).
 /// @pre lamps >= 1
 std::string describe_lamps_moved_since_calibration(int lamps);
 
 /// Describes all errors in one line.
-std::string describe(std::span<const MapError> errors);
+std::string describe_map_errors(std::span<const MapError> errors);
 
 /// Result of detect_misplaced_or_swapped_lamps().
 struct MapErrors {
@@ -59,7 +59,7 @@ struct MapErrors {
   std::vector<LampOffset> offsets;
 
   /// Returns true if the map cannot be used: two lamps are swapped, or it is mirrored.
-  bool is_map_unusable() const;
+  bool is_lamp_map_unusable() const;
 };
 
 /// Options of detect_misplaced_or_swapped_lamps().

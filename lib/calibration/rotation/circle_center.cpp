@@ -168,7 +168,7 @@ bool is_determined(const Circle& circle, const std::vector<Eigen::Vector2d>& poi
     information += (radial - mean) * (radial - mean).transpose();
     tangents += tangent * tangent.transpose();
   }
-  const auto [values, axes] = eigendecompose_symmetric(information);
+  const auto [values, axes] = eigendecompose_symmetric_matrix(information);
   const double variance = noise * noise / (circle.radius * circle.radius);
   for (Eigen::Index i = 0; i < 2; ++i) {
     const double from_noise = variance * axes.col(i).dot(tangents * axes.col(i));
@@ -222,7 +222,7 @@ std::optional<double> estimate_noise(const std::vector<HeightCircles>& heights,
   std::optional<double> noise;
   if (freedom > 0) {
     noise = std::sqrt(squares / freedom);
-  } else if (const RotationFit joint = fit_joint_rotation_center(rotation, camera);
+  } else if (const RotationFit joint = fit_rotation_center_to_all_lamps(rotation, camera);
              joint.converged) {
     noise = joint.residual_px / focal_px;
   }
@@ -233,7 +233,8 @@ std::optional<double> estimate_noise(const std::vector<HeightCircles>& heights,
 
 }  // namespace
 
-CircleCenters fit_centers_of_lamp_circles(const RotationCaptures& rotation, const Camera& camera) {
+CircleCenters fit_and_average_lamp_circle_centers(const RotationCaptures& rotation,
+                                                  const Camera& camera) {
   assert(rotation.status == RotationStatus::ok);
   CircleCenters result;
   const double focal_px = camera.focal_px().x();
@@ -281,7 +282,8 @@ CircleCenters fit_centers_of_lamp_circles(const RotationCaptures& rotation, cons
   }
   result.spread_px = focal_px * std::sqrt(spread / count);
   result.mean.converged = true;
-  result.mean.center = make_rotation_center(mean, RotationModel::shift, camera, measured);
+  result.mean.center =
+      make_rotation_center_from_axis_point(mean, RotationModel::shift, camera, measured);
   result.mean.residual_px = freedom > 0 ? focal_px * std::sqrt(squares / freedom) : 0;
   result.mean.yaws_rad = collect_capture_yaws_rad(rotation);
   return result;

@@ -22,7 +22,7 @@ struct LampCircle {
   CircleFit fit;
 };
 
-/// Result of fit_centers_of_lamp_circles().
+/// Result of fit_and_average_lamp_circle_centers().
 struct CircleCenters {
   /// Mean of the circle centers. `yaws_rad` are the yaws of the captures' position fixes.
   /// `residual_px` is the RMS distance of the points from their circles, with three unknowns per
@@ -54,6 +54,7 @@ struct CircleCenters {
 /// most of its circles are determined.
 ///
 /// Source: Chen and Guan, section 3.1, eq. 9.
-CircleCenters fit_centers_of_lamp_circles(const RotationCaptures& rotation, const Camera& camera);
+CircleCenters fit_and_average_lamp_circle_centers(const RotationCaptures& rotation,
+                                                  const Camera& camera);
 
 }  // namespace vlp

@@ -29,8 +29,8 @@ int count_free_parameters(const ceres::Problem& problem) {
 
 }  // namespace
 
-void RobustFit::add_residual(std::unique_ptr<ceres::CostFunction> cost,
-                             std::vector<double*> parameters) {
+void RobustFit::add_residual_block(std::unique_ptr<ceres::CostFunction> cost,
+                                   std::vector<double*> parameters) {
   blocks_.push_back({std::move(cost), std::move(parameters)});
   used_.push_back(true);
 }
@@ -53,7 +53,7 @@ std::unique_ptr<ceres::Problem> RobustFit::make_ceres_problem(double loss_width)
   return problem;
 }
 
-bool RobustFit::minimize_with_cauchy_loss(double loss_width) {
+bool RobustFit::minimize_residuals_with_cauchy_loss(double loss_width) {
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_SCHUR;
   options.max_num_iterations = 100;
@@ -87,17 +87,18 @@ double RobustFit::estimate_residual_variance() const {
                   kRounding * kRounding);
 }
 
-bool RobustFit::solve() {
+bool RobustFit::solve_robust_fit() {
   used_.assign(blocks_.size(), true);
   update_residual_norms();
   constexpr int num_loss_iterations = 4;
   for (int iteration = 0; iteration < num_loss_iterations; ++iteration) {
-    if (!minimize_with_cauchy_loss(2 * std::sqrt(estimate_residual_variance()))) return false;
+    if (!minimize_residuals_with_cauchy_loss(2 * std::sqrt(estimate_residual_variance())))
+      return false;
   }
-  return refine();
+  return refine_fit_without_outliers();
 }
 
-bool RobustFit::refine() {
+bool RobustFit::refine_fit_without_outliers() {
   update_residual_norms();
   constexpr int max_iterations = 6;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
@@ -109,7 +110,7 @@ bool RobustFit::refine() {
     const std::vector<bool> before = used_;
     for (std::size_t i = 0; i < used_.size(); ++i) used_[i] = lengths_[i] <= limit;
     if (iteration > 0 && used_ == before) break;
-    if (!minimize_with_cauchy_loss(0)) return false;
+    if (!minimize_residuals_with_cauchy_loss(0)) return false;
   }
   return true;
 }
@@ -119,7 +120,7 @@ int RobustFit::degrees_of_freedom() const {
   return all->NumResiduals() - count_free_parameters(*all);
 }
 
-std::optional<RobustFit::Linearization> RobustFit::linearize() const {
+std::optional<RobustFit::Linearization> RobustFit::linearize_used_residuals() const {
   Linearization at;
   const int redundancy = degrees_of_freedom();
   if (redundancy <= 0) return std::nullopt;

@@ -32,7 +32,8 @@ class RobustFit {
 
   /// Adds a residual with two components, a function of `parameters`. The caller owns `parameters`,
   /// which must outlive the fit.
-  void add_residual(std::unique_ptr<ceres::CostFunction> cost, std::vector<double*> parameters);
+  void add_residual_block(std::unique_ptr<ceres::CostFunction> cost,
+                          std::vector<double*> parameters);
   /// Fixes a parameter at its value.
   void set_parameter_constant(const double* parameter) { fixed_.push_back({parameter}); }
   /// Fixes the first of `parameters` on which a used residual depends. Removes a degree of freedom
@@ -41,23 +42,24 @@ class RobustFit {
     fixed_.push_back(std::move(parameters));
   }
 
-  /// Runs the robust fit, then refine(). Returns false if Ceres finds no usable solution.
-  bool solve();
+  /// Runs the robust fit, then refine_fit_without_outliers(). Returns false if Ceres finds no
+  /// usable solution.
+  bool solve_robust_fit();
   /// Repeats the final fit without outliers, from the current parameters. Returns false if Ceres
   /// finds no usable solution.
-  bool refine();
-  /// Returns, for each residual in the order of add_residual(), true if it is used and false if it
-  /// is rejected.
-  const std::vector<bool>& used() const { return used_; }
-  /// Returns the norm of each residual, including outliers, in the order of add_residual().
+  bool refine_fit_without_outliers();
+  /// Returns, for each residual in the order of add_residual_block(), true if it is used and false
+  /// if it is rejected.
+  const std::vector<bool>& residual_inlier_flags() const { return used_; }
+  /// Returns the norm of each residual, including outliers, in the order of add_residual_block().
   const std::vector<double>& residual_norms() const { return lengths_; }
   /// Returns the number of rows of the used residuals minus the number of free parameters.
   int degrees_of_freedom() const;
 
   /// Used residuals and unknowns at the solution.
   struct Linearization {
-    /// Used residual: its index in the order of add_residual(), and its derivatives with respect to
-    /// `unknowns`, including fixed ones.
+    /// Used residual: its index in the order of add_residual_block(), and its derivatives with
+    /// respect to `unknowns`, including fixed ones.
     struct Residual {
       std::size_t index;
       std::vector<Eigen::Index> unknowns;
@@ -79,7 +81,7 @@ class RobustFit {
   };
   /// Linearizes the used residuals. Returns std::nullopt if there are no more residual rows than
   /// parameters, or if the residuals do not determine the parameters.
-  std::optional<Linearization> linearize() const;
+  std::optional<Linearization> linearize_used_residuals() const;
 
  private:
   struct Block {
@@ -87,7 +89,7 @@ class RobustFit {
     std::vector<double*> parameters;
   };
   std::unique_ptr<ceres::Problem> make_ceres_problem(double loss_width) const;
-  bool minimize_with_cauchy_loss(double loss_width);
+  bool minimize_residuals_with_cauchy_loss(double loss_width);
   void update_residual_norms();
   /// Estimates the variance of the used residuals per axis from their median. Never returns less
   /// than the numeric noise.

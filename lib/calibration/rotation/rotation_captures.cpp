@@ -186,7 +186,7 @@ class RotationSearch {
     }
     if (median_residual_m() > 0.05 * compute_median_pivot_height(fixes_, 0))
       return RotationStatus::moved;
-    reject_outliers();
+    reject_corner_outliers();
     locate(PositionerOptions().max_residual_share);
     cluster_fixes_by_height(fixes_, height_noise_m_);
     return fit_rotation_to_fixes(false);
@@ -230,10 +230,10 @@ class RotationSearch {
     std::vector<Fix> found;
     for (std::size_t i = 0; i < frames_.size(); ++i) {
       if (outliers_.contains(i)) continue;
-      const Fix fix = positioner.locate(frames_[i].detections);
+      const Fix fix = positioner.compute_position_fix(frames_[i].detections);
       statuses_.push_back(fix.status);
-      rejection_reasons_[i] = fix.ok() ? "" : describe(fix.status);
-      if (!fix.ok()) continue;
+      rejection_reasons_[i] = fix.has_succeeded() ? "" : describe_fix_status(fix.status);
+      if (!fix.has_succeeded()) continue;
       const Pose& pose = fix.estimate.pose;
       fixes_.frames.push_back(i);
       fixes_.fixes.push_back({pose, lamps_z_m_ - pose.position_m.z(), 0});
@@ -270,7 +270,7 @@ class RotationSearch {
     model_fit_ = fit_rotation_model_to_fixes(fixes_.fixes, fixes_.num_pivots,
                                              lever_arm || fixes_.num_pivots > 1);
     const Eigen::Vector3d up(-model_fit_.delta.x(), -model_fit_.delta.y(), 1);
-    current_zenith() = (level_from_zenith(current_zenith()).transpose() * up).normalized();
+    current_zenith() = (level_rotation_from_zenith(current_zenith()).transpose() * up).normalized();
     // Three captures and a lever arm have no redundancy: noise can move the zenith anywhere.
     return current_zenith().z() > 0 ? RotationStatus::ok : RotationStatus::moved;
   }
@@ -280,7 +280,7 @@ class RotationSearch {
     return model_fit_.delta.norm() < tolerance_rad;
   }
 
-  void reject_outliers() {
+  void reject_corner_outliers() {
     const double max_residual_m =
         std::max(8 * median_residual_m(), 0.01 * compute_median_pivot_height(fixes_, 0));
     for (std::size_t i = 0; i < fixes_.fixes.size(); ++i) {
@@ -308,10 +308,10 @@ void add_observations_of_capture(RotationCaptures& rotation, const Frame& frame,
                                  std::size_t capture, const Lens& lens) {
   for (const Detection& detection : frame.detections) {
     const Lamp* lamp = find_lamp_by_id(rotation.lamps, detection.lamp);
-    const auto ray = lens.unproject(detection.pixel);
+    const auto ray = lens.unproject_pixel(detection.pixel);
     if (lamp == nullptr || !ray) continue;
     const Eigen::Vector3d unit = ray->direction.normalized();
-    const auto projection = lens.project_with_jacobians(unit);
+    const auto projection = lens.project_point_with_jacobians(unit);
     if (!projection) continue;
     rotation.observations.push_back(
         {capture, static_cast<std::size_t>(lamp - rotation.lamps.data()), detection.pixel,
@@ -367,7 +367,7 @@ RotationCaptures find_in_place_rotation_captures(const std::vector<Frame>& frame
   return rotation;
 }
 
-std::string_view describe(RotationStatus status) {
+std::string_view describe_rotation_status(RotationStatus status) {
   switch (status) {
     case RotationStatus::ok:
       return "captures of a rotation in place";

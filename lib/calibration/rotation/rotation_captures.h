@@ -63,7 +63,7 @@ enum class RotationStatus {
 };
 
 /// Describes the status and the remedy, human-readable.
-std::string_view describe(RotationStatus status);
+std::string_view describe_rotation_status(RotationStatus status);
 
 /// Captures of a rotation in place about a vertical axis, with approximate values of the unknowns.
 ///

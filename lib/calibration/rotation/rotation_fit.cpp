@@ -42,7 +42,8 @@ struct RotationResidual {
     const T c = cos(*yaw_rad), s = sin(*yaw_rad);
     const Eigen::Matrix<T, 3, 1> in_level(c * x + s * y - lever_arm_m[0],
                                           c * y - s * x - lever_arm_m[1], lamp_z_m - axis_m[2]);
-    // camera_from_level: the transpose of level_from_zenith(), the smallest turn of n to +Z.
+    // camera_from_level: the transpose of level_rotation_from_zenith(), the smallest turn of n to
+    // +Z.
     const T nz = 1.0 / sqrt(1.0 + zenith[0] * zenith[0] + zenith[1] * zenith[1]);
     const Eigen::Matrix<T, 3, 1> n(zenith[0] * nz, zenith[1] * nz, nz);
     const T across = (n[0] * in_level[0] + n[1] * in_level[1]) / (1.0 + nz);
@@ -93,7 +94,7 @@ void add_residual_blocks(RobustFit& fit, const RotationCaptures& rotation, bool 
                          State& state) {
   for (const RotationObservation& observation : rotation.observations) {
     const std::size_t height = rotation.captures[observation.capture].height;
-    fit.add_residual(
+    fit.add_residual_block(
         RotationResidual::create(observation, rotation.lamps[observation.lamp].position_m.z()),
         {state.zenith.data(), state.lever_arm_m.data(), state.lamps_m[observation.lamp].data(),
          state.axes_m[height].data(), &state.yaws_rad[observation.capture]});
@@ -215,7 +216,7 @@ void set_residual_statistics(RotationFit& result, const RobustFit& fit,
   double squares_px2 = 0;
   for (std::size_t i = 0; i < rotation.observations.size(); ++i) {
     const double distance_px = fit.residual_norms()[i] * rotation.observations[i].sigma_px;
-    if (fit.used()[i]) {
+    if (fit.residual_inlier_flags()[i]) {
       result.used_observations.push_back(i);
       squares_px2 += distance_px * distance_px;
     } else {
@@ -235,12 +236,12 @@ RotationFit fit_axis(const RotationCaptures& rotation, const Camera& camera, boo
   RotationFit result;
   constexpr int max_iterations = 10;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    result.converged = iteration == 0 ? fit.solve() : fit.refine();
+    result.converged = iteration == 0 ? fit.solve_robust_fit() : fit.refine_fit_without_outliers();
     if (!result.converged) return result;
     if (!lever_arm || scale_state_to_map(rotation, state)) break;
   }
   std::optional<Matrix2> zenith_covariance, arm_covariance, arm_by_zenith;
-  if (const auto at = fit.linearize()) {
+  if (const auto at = fit.linearize_used_residuals()) {
     // Without a lever arm, any height of a lamp explains its observations.
     const MapErrorPropagation map =
         lever_arm ? propagate_map_errors(fit, *at, rotation, state) : MapErrorPropagation();
@@ -255,8 +256,8 @@ RotationFit fit_axis(const RotationCaptures& rotation, const Camera& camera, boo
                       zenith_covariance->inverse();
     }
   }
-  result.center =
-      make_rotation_center(state.zenith, RotationModel::tilt, camera, zenith_covariance);
+  result.center = make_rotation_center_from_axis_point(state.zenith, RotationModel::tilt, camera,
+                                                       zenith_covariance);
   if (lever_arm) result.center.lever_arm_m = state.lever_arm_m;
   result.center.lever_arm_covariance = arm_covariance;
   result.center.lever_arm_by_zenith = arm_by_zenith;
@@ -267,7 +268,7 @@ RotationFit fit_axis(const RotationCaptures& rotation, const Camera& camera, boo
 
 }  // namespace
 
-Tilt compute_camera_tilt(const RotationCenter& center) {
+Tilt compute_tilt_from_rotation_center(const RotationCenter& center) {
   const Eigen::Vector3d& up = center.zenith_in_camera;
   return {std::atan2(up.head<2>().norm(), up.z()), std::atan2(up.y(), up.x())};
 }
@@ -281,18 +282,19 @@ std::optional<double> compute_rotation_axis_sd_rad(const RotationCenter& center,
   return std::sqrt(variances.mean());
 }
 
-Eigen::Vector2d undistorted_pixel_from_normalized(const Camera& camera, const Eigen::Vector2d& z) {
+Eigen::Vector2d undistorted_pixel_from_normalized_point(const Camera& camera,
+                                                        const Eigen::Vector2d& z) {
   const Eigen::Vector2d focal_px = camera.focal_px();
   return focal_px.cwiseProduct(z) + camera.principal_point_px();
 }
 
-RotationCenter make_rotation_center(const Eigen::Vector2d& z, RotationModel model,
-                                    const Camera& camera,
-                                    const std::optional<Matrix2>& covariance) {
+RotationCenter make_rotation_center_from_axis_point(const Eigen::Vector2d& z, RotationModel model,
+                                                    const Camera& camera,
+                                                    const std::optional<Matrix2>& covariance) {
   const Eigen::Vector2d focal_px = camera.focal_px();
   RotationCenter center;
   center.model = model;
-  center.center_px = undistorted_pixel_from_normalized(camera, z);
+  center.center_px = undistorted_pixel_from_normalized_point(camera, z);
   center.zenith_in_camera = z.homogeneous().normalized();
   if (covariance) {
     center.covariance = covariance->cwiseProduct((focal_px * focal_px.transpose()).eval());
@@ -307,7 +309,8 @@ std::vector<double> collect_capture_yaws_rad(const RotationCaptures& rotation) {
   return yaws_rad;
 }
 
-RotationFit fit_joint_rotation_center(const RotationCaptures& rotation, const Camera& camera) {
+RotationFit fit_rotation_center_to_all_lamps(const RotationCaptures& rotation,
+                                             const Camera& camera) {
   assert(rotation.status == RotationStatus::ok);
   // The model of the axis fit, with an exactly level camera, the axis at the origin, lamps at
   // height 1, and the center as minus the lever arm. Each height has its own lamps.
@@ -330,22 +333,23 @@ RotationFit fit_joint_rotation_center(const RotationCaptures& rotation, const Ca
   for (const RotationObservation& observation : rotation.observations) {
     const std::size_t height = rotation.captures[observation.capture].height;
     const std::size_t lamp = height * rotation.lamps.size() + observation.lamp;
-    fit.add_residual(RotationResidual::create(observation, 1),
-                     {state.zenith.data(), state.lever_arm_m.data(), state.lamps_m[lamp].data(),
-                      state.axes_m.front().data(), &state.yaws_rad[observation.capture]});
+    fit.add_residual_block(
+        RotationResidual::create(observation, 1),
+        {state.zenith.data(), state.lever_arm_m.data(), state.lamps_m[lamp].data(),
+         state.axes_m.front().data(), &state.yaws_rad[observation.capture]});
   }
   fit.set_parameter_constant(state.zenith.data());
   fit.set_parameter_constant(state.axes_m.front().data());
   for (auto& yaws : yaws_at) fit.set_first_used_parameter_constant(std::move(yaws));
   RotationFit result;
-  result.converged = fit.solve();
+  result.converged = fit.solve_robust_fit();
   if (!result.converged) return result;
   std::optional<Matrix2> covariance;
-  if (const auto at = fit.linearize()) {
+  if (const auto at = fit.linearize_used_residuals()) {
     covariance = at->covariance(state.lever_arm_m.data(), state.lever_arm_m.data());
   }
-  result.center =
-      make_rotation_center(-state.lever_arm_m, RotationModel::shift, camera, covariance);
+  result.center = make_rotation_center_from_axis_point(-state.lever_arm_m, RotationModel::shift,
+                                                       camera, covariance);
   set_residual_statistics(result, fit, rotation);
   result.yaws_rad = std::move(state.yaws_rad);
   return result;

@@ -45,7 +45,7 @@ struct Tilt {
   double azimuth_rad;
 };
 /// Returns the tilt that the zenith of `center` corresponds to.
-Tilt compute_camera_tilt(const RotationCenter& center);
+Tilt compute_tilt_from_rotation_center(const RotationCenter& center);
 
 /// Returns the standard deviation of the axis direction, rad: the RMS over the two directions
 /// across it. Returns std::nullopt if `center` has no covariance.
@@ -53,12 +53,14 @@ std::optional<double> compute_rotation_axis_sd_rad(const RotationCenter& center,
                                                    const Camera& camera);
 
 /// Returns the pixel f * z + c of a normalized point in the undistorted image.
-Eigen::Vector2d undistorted_pixel_from_normalized(const Camera& camera, const Eigen::Vector2d& z);
+Eigen::Vector2d undistorted_pixel_from_normalized_point(const Camera& camera,
+                                                        const Eigen::Vector2d& z);
 
 /// Returns the rotation center whose axis appears at normalized point z in the camera. `covariance`
 /// is the covariance of z.
-RotationCenter make_rotation_center(const Eigen::Vector2d& z, RotationModel model,
-                                    const Camera& camera, const std::optional<Matrix2>& covariance);
+RotationCenter make_rotation_center_from_axis_point(const Eigen::Vector2d& z, RotationModel model,
+                                                    const Camera& camera,
+                                                    const std::optional<Matrix2>& covariance);
 
 /// Returns the yaws of the captures, rad, in the order of RotationCaptures::captures.
 std::vector<double> collect_capture_yaws_rad(const RotationCaptures& rotation);
@@ -76,8 +78,10 @@ std::vector<double> collect_capture_yaws_rad(const RotationCaptures& rotation);
 ///   q_ih  position of lamp i about the center, at height h and yaw 0
 ///
 /// Exact for a level camera and captures at one height. If the camera is tilted, c is biased
-/// outwards as in fit_centers_of_lamp_circles(). The model of the result is RotationModel::shift.
-RotationFit fit_joint_rotation_center(const RotationCaptures& rotation, const Camera& camera);
+/// outwards as in fit_and_average_lamp_circle_centers(). The model of the result is
+/// RotationModel::shift.
+RotationFit fit_rotation_center_to_all_lamps(const RotationCaptures& rotation,
+                                             const Camera& camera);
 
 /// Largest standard deviation of a lever arm that lamps at several heights determine, as a fraction
 /// of the lamps' height above the camera. It corresponds to 0.3 degrees of tilt.

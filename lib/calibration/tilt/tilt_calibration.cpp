@@ -77,8 +77,8 @@ Placement locate_captures_separately(const std::vector<AdjustmentCapture>& captu
     // used.
     detections = capture.detections;
     for (Detection& detection : detections) detection.sigma_px.reset();
-    const Fix fix = positioner.locate(detections);
-    if (!fix.ok() || fix.lamps < 3) continue;
+    const Fix fix = positioner.compute_position_fix(detections);
+    if (!fix.has_succeeded() || fix.lamps < 3) continue;
     AdjustmentCapture placed = capture;
     const auto rejected_end =
         fix.rejected_ids.begin() +
@@ -204,7 +204,7 @@ AdjustmentResult adjust_until_detections_agree(const std::vector<AdjustmentCaptu
     }
     input.captures = std::move(placement.captures);
     found = run_bundle_adjustment(input, {no_limit, no_limit});
-    if (!found.ok()) {
+    if (!found.has_succeeded()) {
       result.undetermined = kUndeterminedMessage;
       break;
     }
@@ -215,9 +215,9 @@ AdjustmentResult adjust_until_detections_agree(const std::vector<AdjustmentCaptu
 
 }  // namespace
 
-TiltCalibration estimate_tilt_from_lamps(std::span<const Frame> frames, const LampMap& map,
-                                         const Camera& camera,
-                                         const TiltCalibrationOptions& options) {
+TiltCalibration estimate_camera_tilt_from_lamps(std::span<const Frame> frames, const LampMap& map,
+                                                const Camera& camera,
+                                                const TiltCalibrationOptions& options) {
   TiltCalibration result;
   result.map = map;
   const auto captures = select_captures(frames, map, options.motions, result);

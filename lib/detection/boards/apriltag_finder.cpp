@@ -78,7 +78,7 @@ class ApriltagFinder : public TagFinder {
     return_detector(acquire_idle_detector());
   }
 
-  std::vector<TagDetection> find(const cv::Mat1b& image) const override {
+  std::vector<TagDetection> detect_tags(const cv::Mat1b& image) const override {
     std::unique_ptr<Detector> detector = acquire_idle_detector();
     detector->detector->quad_decimate = image.cols * image.rows >= kLargePixels ? 2 : 1;
     // The detector does not write to the image, but its interface lacks const.
@@ -125,7 +125,7 @@ class ApriltagFinder : public TagFinder {
 
 }  // namespace
 
-void load_tag_family(const std::string& name) { get_decoding_table(name); }
+void load_tag_family_decoder(const std::string& name) { get_decoding_table(name); }
 
 std::unique_ptr<TagFinder> make_apriltag_detector(const Board& board) {
   return std::make_unique<ApriltagFinder>(board);

@@ -87,7 +87,7 @@ class ArucoFinder : public TagFinder {
             charuco_ ? find_dictionary(board.family) : find_tag_dictionary(board.family))),
         border_bits_(board.border_bits) {}
 
-  std::vector<TagDetection> find(const cv::Mat1b& image) const override {
+  std::vector<TagDetection> detect_tags(const cv::Mat1b& image) const override {
     std::vector<std::vector<cv::Point2f>> corners;
     std::vector<int> ids;
 #ifdef VLP_ARUCO_IS_A_CLASS

@@ -76,7 +76,7 @@ BoardDetector::BoardDetector(const Board& board) {
 
 BoardDetector::~BoardDetector() = default;
 
-cv::Mat1b scale_to_8_bits(const cv::Mat& image) {
+cv::Mat1b scale_image_to_8_bits(const cv::Mat& image) {
   if (image.depth() == CV_8U) return image;
   double brightest = 0;
   cv::minMaxLoc(image, nullptr, &brightest);
@@ -89,7 +89,7 @@ BoardDetection BoardDetector::detect_board(const cv::Mat& image) const {
   // Tags are wider, and libapriltag reads out of bounds for images of one or two rows.
   constexpr int min_px = 10;
   if (std::min(image.cols, image.rows) < min_px) return {};
-  const cv::Mat1b levels = scale_to_8_bits(image);
+  const cv::Mat1b levels = scale_image_to_8_bits(image);
   const GrayLevels gray{levels, print_ ? cv::Mat1f() : smooth_image(levels)};
   BoardDetection seen;
   if (!finder_) {
@@ -97,7 +97,7 @@ BoardDetection BoardDetector::detect_board(const cv::Mat& image) const {
     return seen;
   }
   std::map<int, std::vector<TagDetection>> found;
-  for (const TagDetection& tag : finder_->find(levels)) {
+  for (const TagDetection& tag : finder_->detect_tags(levels)) {
     (ids_.contains(tag.id) ? found[tag.id] : seen.foreign).push_back(tag);
   }
   std::vector<TagDetection> once;

@@ -27,7 +27,9 @@ class SquareCorners;
 struct EdgeCurvature {
   double quadratic_px = 0, cubic_px = 0, reach = 0;
 
-  double at(double w) const { return (w * w - 1) * (quadratic_px + cubic_px * w); }
+  double curve_displacement_px(double w) const {
+    return (w * w - 1) * (quadratic_px + cubic_px * w);
+  }
   bool operator==(const EdgeCurvature&) const = default;
 };
 
@@ -80,7 +82,7 @@ struct TagDetection {
 struct PointDetection {
   /// Index of the point on the board. Boards of squares: row by row from the top left, as OpenCV
   /// counts the corners of a ChArUco board. Boards of AprilTags, whose points come from a file: as
-  /// BoardLattice::point_index().
+  /// BoardLattice::point_detection_index().
   std::size_t index;
   Eigen::Vector2d pixel;
   /// Factor by which a solve multiplies the residual of the point.
@@ -108,7 +110,7 @@ struct BoardDetection {
   std::vector<double> curve_costs = {};
 
   /// Returns true if a tag or a point was detected.
-  bool has_corners() const { return !tags.empty() || !points.empty(); }
+  bool has_detected_corners() const { return !tags.empty() || !points.empty(); }
 };
 
 /// Image with the detection of a board.
@@ -125,12 +127,12 @@ std::vector<PointDetection> collect_detected_corners(const BoardDetection& seen)
 
 /// Converts an image to gray levels of 8 bits. 16-bit images are scaled so that their brightest
 /// pixel has level 255.
-cv::Mat1b scale_to_8_bits(const cv::Mat& image);
+cv::Mat1b scale_image_to_8_bits(const cv::Mat& image);
 
 /// Creates the decoding table of a tag family, which every detection of its tags needs (20 ms for
 /// tag36h11). A process that calls it before it forks shares the table with its children.
 /// @throws std::invalid_argument if there is no such family
-void load_tag_family(const std::string& name);
+void load_tag_family_decoder(const std::string& name);
 
 /// Detector of a board's tags, or of the corners of its squares (SquareCorners). Safe to share
 /// between threads.

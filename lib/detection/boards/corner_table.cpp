@@ -50,27 +50,27 @@ constexpr std::array kBowColumns{"edge_quadratic_px", "edge_cubic_px", "edge_hal
 EdgeCurvature read_curvature(const CsvTable& csv, std::size_t row) {
   constexpr double min_reach = 0.01, max_reach = 2;
   if (std::ranges::none_of(kBowColumns,
-                           [&](auto name) { return csv.get_optional(name).has_value(); }))
+                           [&](auto name) { return csv.get_optional_column(name).has_value(); }))
     return {};
   const auto reach_at = csv.get_required_column(kBowColumns[2]);
-  const double reach = csv.get_number(row, reach_at);
+  const double reach = csv.get_cell_number(row, reach_at);
   if (reach != 0 && !(reach >= min_reach && reach <= max_reach)) {
-    throw csv.make_error(
+    throw csv.make_cell_error(
         row, reach_at,
         "should be the half extent of the edge pixels, 0.01 to 2, or 0 if there are none");
   }
-  return {csv.get_number(row, csv.get_required_column(kBowColumns[0])),
-          csv.get_number(row, csv.get_required_column(kBowColumns[1])), reach};
+  return {csv.get_cell_number(row, csv.get_required_column(kBowColumns[0])),
+          csv.get_cell_number(row, csv.get_required_column(kBowColumns[1])), reach};
 }
 
 constexpr const char* kDeviationColumn = "sd_px";
 
 double read_sd_px(const CsvTable& csv, std::size_t row) {
-  const auto column = csv.get_optional(kDeviationColumn);
+  const auto column = csv.get_optional_column(kDeviationColumn);
   if (!column) return 0;
-  const double sd_px = csv.get_number(row, *column);
+  const double sd_px = csv.get_cell_number(row, *column);
   if (sd_px < 0) {
-    throw csv.make_error(row, *column, "should be a standard deviation, or 0 if unknown");
+    throw csv.make_cell_error(row, *column, "should be a standard deviation, or 0 if unknown");
   }
   return sd_px;
 }
@@ -84,7 +84,7 @@ std::string describe_wrong_rows(const Board& board, std::span<const BoardView> v
     pixels.emplace_back(cols * rows);
     for (const PointDetection& point : view.seen.points) pixels.back()[point.index] = point.pixel;
   }
-  const std::size_t row_length = estimate_lattice_row_length(pixels, cols);
+  const std::size_t row_length = estimate_points_per_lattice_row(pixels, cols);
   if (row_length == cols) return "";
   return fmt::format(
       "the corners lie in rows of {}, but a board of {} x {} squares has {} x {} corners; {}",
@@ -104,10 +104,11 @@ std::string describe_corner_outside_image(const Eigen::Vector2d& pixel,
   }
   return fmt::format(
       "a corner at ({}, {}) is outside an image of {} x {} px; is it of this camera?",
-      format_shortest(pixel.x()), format_shortest(pixel.y()), width, height);
+      format_shortest_exact_number(pixel.x()), format_shortest_exact_number(pixel.y()), width,
+      height);
 }
 
-bool are_too_many_corners_outside(std::size_t outside, std::size_t corners) {
+bool are_too_many_corners_outside_image(std::size_t outside, std::size_t corners) {
   constexpr std::size_t one_of = 50;
   return one_of * outside > corners;
 }
@@ -132,32 +133,32 @@ class CornerTableReader {
   /// Returns the corners of all images. Throws InputError if there are none, or if too many of them
   /// are outside the image.
   std::vector<BoardView> read() {
-    for (std::size_t row = 0; row < csv_.rows(); ++row) read_row(row);
+    for (std::size_t row = 0; row < csv_.num_rows(); ++row) read_row(row);
     if (views_.empty()) throw InputError(file_, "contains no corner");
-    if (are_too_many_corners_outside(outside_, corners_)) throw InputError(*first_outside_);
+    if (are_too_many_corners_outside_image(outside_, corners_)) throw InputError(*first_outside_);
     return std::move(views_);
   }
 
  private:
   void read_row(std::size_t row) {
-    const std::string name(csv_.get_text(row, image_));
-    if (name.empty()) throw csv_.make_error(row, image_, "is empty");
+    const std::string name(csv_.get_cell_text(row, image_));
+    if (name.empty()) throw csv_.make_cell_error(row, image_, "is empty");
     const auto [entry, is_new] = index_by_name_.try_emplace(name, views_.size());
     if (is_new) views_.push_back({name, imager_px_, {}});
     const auto cells = {tag_id_, number_, u_px_, v_px_};
     if (std::all_of(cells.begin(), cells.end(),
-                    [&](auto cell) { return csv_.get_text(row, cell).empty(); })) {
+                    [&](auto cell) { return csv_.get_cell_text(row, cell).empty(); })) {
       return;  // an image without a corner
     }
-    const Eigen::Vector2d pixel(csv_.get_number(row, u_px_), csv_.get_number(row, v_px_));
+    const Eigen::Vector2d pixel(csv_.get_cell_number(row, u_px_), csv_.get_cell_number(row, v_px_));
     ++corners_;
     if (const auto words = describe_corner_outside_image(pixel, imager_px_); !words.empty()) {
-      if (outside_++ == 0) first_outside_ = csv_.make_error(row, u_px_, words);
+      if (outside_++ == 0) first_outside_ = csv_.make_cell_error(row, u_px_, words);
     }
     const int corner = read_number(row);
     if (!add(row, corner, pixel, views_[entry->second].seen)) {
-      throw csv_.make_error(row, number_,
-                            fmt::format("{} occurs twice in image '{}'", corner, name));
+      throw csv_.make_cell_error(row, number_,
+                                 fmt::format("{} occurs twice in image '{}'", corner, name));
     }
   }
 
@@ -165,14 +166,15 @@ class CornerTableReader {
   int read_number(std::size_t row) const {
     const int last =
         board_.has_chessboard_squares() ? (board_.cols - 1) * (board_.rows - 1) - 1 : 3;
-    const int corner = csv_.get_integer(row, number_);
+    const int corner = csv_.get_cell_integer(row, number_);
     if (corner >= 0 && corner <= last) return corner;
-    throw csv_.make_error(row, number_,
-                          board_.has_chessboard_squares()
-                              ? fmt::format("should be within 0 and {}, as on a board of {} x {} "
-                                            "squares; is board.yaml that of the board?",
-                                            last, board_.cols, board_.rows)
-                              : "should be within 0 and 3");
+    throw csv_.make_cell_error(
+        row, number_,
+        board_.has_chessboard_squares()
+            ? fmt::format("should be within 0 and {}, as on a board of {} x {} "
+                          "squares; is board.yaml that of the board?",
+                          last, board_.cols, board_.rows)
+            : "should be within 0 and 3");
   }
 
   /// Adds a corner to those of its image. Returns false if the image has it already.
@@ -184,7 +186,7 @@ class CornerTableReader {
       if (is_new) seen.points.push_back({index, pixel});
       return is_new;
     }
-    const int id = csv_.get_integer(row, tag_id_);
+    const int id = csv_.get_cell_integer(row, tag_id_);
     auto tag = std::ranges::find(seen.tags, id, &TagDetection::id);
     if (tag == seen.tags.end()) tag = seen.tags.insert(tag, make_empty_tag(id));
     const auto k = static_cast<std::size_t>(corner);
@@ -220,8 +222,8 @@ std::vector<BoardView> read_corner_table(const std::filesystem::path& file, cons
   for (BoardView& view : views) {
     complete_detection(view.seen, ids);
     if (!board.has_chessboard_squares()) continue;
-    order_lattice_points(view.seen.points, board.cols - 1, board.rows - 1,
-                         board.kind == BoardKind::chessboard);
+    renumber_lattice_points(view.seen.points, board.cols - 1, board.rows - 1,
+                            board.kind == BoardKind::chessboard);
   }
   return views;
 }
@@ -242,24 +244,26 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
     if (squares ? seen.points.empty() : seen.tags.empty() && seen.foreign.empty()) {
       std::vector<std::string> empty(header.size());
       empty.front() = view.image;
-      csv.row(empty);
+      csv.write_csv_row(empty);
     }
     if (squares) {
       for (const PointDetection& point : seen.points) {
-        csv.row({view.image, std::to_string(point.index), format_shortest(point.pixel.x()),
-                 format_shortest(point.pixel.y())});
+        csv.write_csv_row({view.image, std::to_string(point.index),
+                           format_shortest_exact_number(point.pixel.x()),
+                           format_shortest_exact_number(point.pixel.y())});
       }
       continue;
     }
     for (const auto* each : {&seen.tags, &seen.foreign}) {
       for (const TagDetection& tag : *each) {
         for (std::size_t k = 0; k < 4; ++k) {
-          csv.row({view.image, std::to_string(tag.id), std::to_string(k),
-                   format_shortest(tag.corners_px[k].x()), format_shortest(tag.corners_px[k].y()),
-                   format_shortest(tag.curvatures[k].quadratic_px),
-                   format_shortest(tag.curvatures[k].cubic_px),
-                   format_shortest(tag.curvatures[k].reach),
-                   format_shortest(tag.corner_sds_px[k])});
+          csv.write_csv_row({view.image, std::to_string(tag.id), std::to_string(k),
+                             format_shortest_exact_number(tag.corners_px[k].x()),
+                             format_shortest_exact_number(tag.corners_px[k].y()),
+                             format_shortest_exact_number(tag.curvatures[k].quadratic_px),
+                             format_shortest_exact_number(tag.curvatures[k].cubic_px),
+                             format_shortest_exact_number(tag.curvatures[k].reach),
+                             format_shortest_exact_number(tag.corner_sds_px[k])});
         }
       }
     }

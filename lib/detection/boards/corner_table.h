@@ -21,12 +21,12 @@ namespace vlp {
 ///   sd_px                                  optional: TagDetection::corner_sds_px
 /// Columns for boards of squares:
 ///   image, corner, u_px, v_px              corner as in PointDetection::index; rows may also
-///                                          be counted upwards (order_lattice_points())
+///                                          be counted upwards (renumber_lattice_points())
 /// An image without corners has one row with its name only. Tags without all four corners are
 /// rejected. Tags that the board does not have are BoardDetection::foreign.
 ///
 /// @throws InputError with file and line, also for a repeated corner, and if too many corners are
-///         outside the image (are_too_many_corners_outside())
+///         outside the image (are_too_many_corners_outside_image())
 std::vector<BoardView> read_corner_table(const std::filesystem::path& file, const Board& board,
                                          const std::array<int, 2>& imager_px);
 
@@ -42,6 +42,6 @@ std::string describe_corner_outside_image(const Eigen::Vector2d& pixel,
 
 /// Returns true if more than 2 % of the corners are outside the image. Fewer may be outliers; more
 /// indicate an image of another size.
-bool are_too_many_corners_outside(std::size_t outside, std::size_t corners);
+bool are_too_many_corners_outside_image(std::size_t outside, std::size_t corners);
 
 }  // namespace vlp

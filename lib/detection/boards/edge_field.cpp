@@ -28,7 +28,8 @@ EdgeField::EdgeField(std::span<const EdgeSample> samples, Terms terms) {
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     std::vector<double> residuals, magnitudes, variances;
     for (std::size_t i = 0; i < samples.size(); ++i) {
-      residuals.push_back(logs[i] - row(samples[i].at_px, samples[i].along).dot(coefficients_));
+      residuals.push_back(
+          logs[i] - model_terms_at_edge(samples[i].at_px, samples[i].along).dot(coefficients_));
       magnitudes.push_back(std::abs(residuals.back()));
       variances.push_back(samples[i].sd * samples[i].sd);
     }
@@ -45,18 +46,19 @@ EdgeField::EdgeField(std::span<const EdgeSample> samples, Terms terms) {
       const double weight =
           std::min(1.0, huber_threshold / std::max(sigmas, huber_threshold)) / variance;
       const Eigen::VectorXd terms_row =
-          row(samples[i].at_px, samples[i].along).head(terms_).transpose();
+          model_terms_at_edge(samples[i].at_px, samples[i].along).head(terms_).transpose();
       normal.noalias() += weight * terms_row * terms_row.transpose();
       right += weight * residuals[i] * terms_row;
     }
     normal.diagonal().array() *= 1 + 1e-9;
-    const Eigen::VectorXd step = solve_symmetric(normal, right);
+    const Eigen::VectorXd step = solve_symmetric_system(normal, right);
     if (!step.allFinite()) break;
     coefficients_.head(terms_) += step;
   }
 }
 
-EdgeField::Row EdgeField::row(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const {
+EdgeField::Row EdgeField::model_terms_at_edge(const Eigen::Vector2d& at_px,
+                                              const Eigen::Vector2d& along) const {
   const Eigen::Vector2d x = (at_px - middle_px_) / reach_px_;
   const double square = along.x() * along.x() - along.y() * along.y();
   Row row;
@@ -66,8 +68,9 @@ EdgeField::Row EdgeField::row(const Eigen::Vector2d& at_px, const Eigen::Vector2
   return row;
 }
 
-double EdgeField::value(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const {
-  return std::exp(row(at_px, along).dot(coefficients_));
+double EdgeField::predict_edge_property(const Eigen::Vector2d& at_px,
+                                        const Eigen::Vector2d& along) const {
+  return std::exp(model_terms_at_edge(at_px, along).dot(coefficients_));
 }
 
 }  // namespace vlp

@@ -30,15 +30,15 @@ class EdgeField {
   /// @pre There is at least one sample.
   EdgeField(std::span<const EdgeSample> samples, Terms terms);
 
-  double value(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
+  double predict_edge_property(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
   /// Relative standard deviation of the edges from the model that exceeds their own standard
   /// deviations.
-  double excess_edge_sd() const { return excess_sd_; }
+  double unexplained_edge_sd() const { return excess_sd_; }
 
  private:
   static constexpr Eigen::Index kMaxTerms = 8;
   using Row = Eigen::Matrix<double, 1, kMaxTerms>;
-  Row row(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
+  Row model_terms_at_edge(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
 
   Eigen::Vector2d middle_px_{0, 0};
   double reach_px_ = 1;

@@ -32,7 +32,7 @@ struct EncodedLevel {
   double level, slope;
 };
 
-double linearize(double level, double gamma) {
+double convert_level_to_light(double level, double gamma) {
   return gamma == 1 ? level : kWhite * std::pow(level / kWhite, gamma);
 }
 
@@ -182,7 +182,7 @@ struct EdgeSides {
     double ins = 0, outs = 0, whites_in = 0, whites_out = 0;
     for (const EdgePixel& pixel : pixels) {
       const bool inside = pixel.across_px < edge.curve_displacement_px(pixel.along);
-      (inside ? in : out) += linearize(pixel.level, gamma);
+      (inside ? in : out) += convert_level_to_light(pixel.level, gamma);
       (inside ? ins : outs) += 1;
       if (pixel.level >= white) (inside ? whites_in : whites_out) += 1;
     }
@@ -203,7 +203,7 @@ EdgeLight make_initial_light(const EdgeSides& sides, double gamma) {
 EdgeLight convert_light(const EdgeLight& light, double gamma) {
   if (gamma == light.gamma) return light;
   const auto convert = [&](double side) {
-    return linearize(EncodedLevel(side, light.gamma).level, gamma);
+    return convert_level_to_light(EncodedLevel(side, light.gamma).level, gamma);
   };
   const double in = convert(light.middle - light.contrast),
                out = convert(light.middle + light.contrast);
@@ -265,7 +265,7 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
 
 }  // namespace
 
-Eigen::Vector2d EdgeCurve::compute_distance_gradient(const Eigen::Vector2d& x) const {
+Eigen::Vector2d EdgeCurve::compute_curve_distance_gradient(const Eigen::Vector2d& x) const {
   const double w = along.dot(x - middle) / half_px;
   const Coefficients& c = coefficients;
   const double slope = c[1] + w * (2 * c[2] + w * 3 * c[3]);
@@ -277,8 +277,8 @@ Eigen::Vector2d find_edge_intersection(const EdgeCurve& a, const EdgeCurve& b,
   constexpr int steps = 4;
   for (int i = 0; i < steps; ++i) {
     Eigen::Matrix2d gradients;
-    gradients << a.compute_distance_gradient(point).transpose(),
-        b.compute_distance_gradient(point).transpose();
+    gradients << a.compute_curve_distance_gradient(point).transpose(),
+        b.compute_curve_distance_gradient(point).transpose();
     point -= gradients.inverse() *
              Eigen::Vector2d(a.distance_from_curve_px(point), b.distance_from_curve_px(point));
   }

@@ -43,7 +43,7 @@ struct EdgeCurve {
   }
   /// Returns the gradient of distance_from_curve_px() with respect to the pixel (u, v);
   /// dimensionless.
-  Eigen::Vector2d compute_distance_gradient(const Eigen::Vector2d& x) const;
+  Eigen::Vector2d compute_curve_distance_gradient(const Eigen::Vector2d& x) const;
 };
 
 /// Computes the intersection of two curves by Newton's method from a nearby point.

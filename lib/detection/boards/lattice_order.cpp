@@ -59,8 +59,8 @@ double compute_row_unevenness_px(std::span<const LatticePixels> images, std::siz
 
 }  // namespace
 
-void order_lattice_points(std::vector<PointDetection>& points, int cols, int rows,
-                          bool has_180_degree_symmetry) {
+void renumber_lattice_points(std::vector<PointDetection>& points, int cols, int rows,
+                             bool has_180_degree_symmetry) {
   const auto width = static_cast<std::size_t>(cols);
   const auto [right, down] = find_axis_directions(points, width);
   if (right.x() * down.y() - right.y() * down.x() < 0) {
@@ -80,7 +80,8 @@ void order_lattice_points(std::vector<PointDetection>& points, int cols, int row
   }
 }
 
-std::size_t estimate_lattice_row_length(std::span<const LatticePixels> images, std::size_t stated) {
+std::size_t estimate_points_per_lattice_row(std::span<const LatticePixels> images,
+                                            std::size_t stated) {
   constexpr double max_ratio = 0.5;
   if (images.empty()) return stated;
   const std::size_t points = images.front().size();

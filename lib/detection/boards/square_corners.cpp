@@ -54,8 +54,8 @@ SquareCorners::SquareCorners(const Board& board)
       margin_m_((board.square_size_m - board.tag_size_m) / 2),
       layout_(list_board_tags(board)) {}
 
-std::vector<PointDetection> SquareCorners::refine(const std::vector<Guess>& guesses,
-                                                  const GrayLevels& image) const {
+std::vector<PointDetection> SquareCorners::refine_corner_guesses(const std::vector<Guess>& guesses,
+                                                                 const GrayLevels& image) const {
   constexpr int min_px = 2, max_px = 5;
   constexpr double min_fit_px = 2.5, max_fit_px = 8, fit_fraction = 0.75;
   constexpr double edge_px = 2;  // a corner nearer to the image's edge is cut short
@@ -94,7 +94,7 @@ std::vector<PointDetection> SquareCorners::detect_chessboard_corners(
     points.back().pixel = {scale_to_full_resolution(x, image.sharp.cols, searched.cols),
                            scale_to_full_resolution(y, image.sharp.rows, searched.rows)};
   }
-  order_lattice_points(points, cols_, rows_, true);
+  renumber_lattice_points(points, cols_, rows_, true);
   const auto at = [&](int col, int row) {
     return points[static_cast<std::size_t>(row * cols_ + col)].pixel;
   };
@@ -111,7 +111,7 @@ std::vector<PointDetection> SquareCorners::detect_chessboard_corners(
                          std::min((right - here).norm(), (down - here).norm())});
     }
   }
-  auto corners = refine(guesses, image);
+  auto corners = refine_corner_guesses(guesses, image);
   // A single missing corner makes all others doubtful, because OpenCV extrapolates the lattice.
   return corners.size() == guesses.size() ? corners : std::vector<PointDetection>();
 }
@@ -125,8 +125,8 @@ std::vector<PointDetection> SquareCorners::detect_corners_near_markers(
   for (int row = 0; row < rows_; ++row) {
     for (int col = 0; col < cols_; ++col) {
       const Eigen::Vector2d here_m = square_size_m_ * Eigen::Vector2d(col, row);
-      const auto [pairs, nearest_m] =
-          find_nearest_corners(markers, layout_, near * square_size_m_, [&](const BoardTag& tag) {
+      const auto [pairs, nearest_m] = find_nearest_tag_corners(
+          markers, layout_, near * square_size_m_, [&](const BoardTag& tag) {
             return ((tag.corners_m[0] + tag.corners_m[2]) / 2 - here_m).norm();
           });
       if (nearest_m > adjacent * square_size_m_) continue;
@@ -148,13 +148,14 @@ std::vector<PointDetection> SquareCorners::detect_corners_near_markers(
                          std::sqrt(2) * square_px * margin_m_ / square_size_m_});
     }
   }
-  return refine(guesses, image);
+  return refine_corner_guesses(guesses, image);
 }
 
 std::array<int, 2> count_chessboard_squares(const cv::Mat& image) {
   constexpr int min_px = 10;
   if (std::min(image.cols, image.rows) < min_px) return {0, 0};
-  const cv::Mat1b levels = reduce_image(scale_to_8_bits(image), choose_reduction_factor(image));
+  const cv::Mat1b levels =
+      reduce_image(scale_image_to_8_bits(image), choose_reduction_factor(image));
   std::vector<cv::Point2f> corners;
   cv::Mat squares;
   seed_random_generator();
@@ -211,10 +212,10 @@ std::optional<TagDetection> TouchingTags::refine_tag_corners(TagDetection tag,
   return tag;
 }
 
-std::optional<TagDetection> TouchingTags::predict(const BoardTag& missing,
-                                                  const std::vector<TagDetection>& tags) const {
+std::optional<TagDetection> TouchingTags::predict_missing_tag(
+    const BoardTag& missing, const std::vector<TagDetection>& tags) const {
   constexpr double max_distance = 2.2;  // in tags: neighbors, including diagonal ones
-  const auto [pairs, nearest_m] = find_nearest_corners(
+  const auto [pairs, nearest_m] = find_nearest_tag_corners(
       tags, layout_, max_distance * tag_size_m_,
       [&](const BoardTag& tag) { return (tag.corners_m[0] - missing.corners_m[0]).norm(); });
   if (pairs.empty()) return {};
@@ -235,7 +236,7 @@ std::vector<TagDetection> TouchingTags::find_missing_tags(const std::vector<TagD
       const bool known = std::any_of(all.begin(), all.end(),
                                      [&](const TagDetection& tag) { return tag.id == place.id; });
       if (known) continue;
-      const auto guess = predict(place, all);
+      const auto guess = predict_missing_tag(place, all);
       const auto tag = guess ? refine_tag_corners(*guess, image) : std::nullopt;
       if (!tag) continue;
       all.push_back(*tag);

@@ -25,7 +25,7 @@ class SquareCorners {
   /// Detects the inner corners of a chessboard (findChessboardCornersSB() of OpenCV, then a
   /// sub-pixel fit). Returns all corners, row by row of the board, or none if the board is not
   /// completely in view. The two ends of the board cannot be distinguished
-  /// (order_lattice_points()).
+  /// (renumber_lattice_points()).
   std::vector<PointDetection> detect_chessboard_corners(const GrayLevels& image) const;
 
   /// Detects the corners next to markers whose own corners are accurate to 1 to 2 px.
@@ -41,8 +41,8 @@ class SquareCorners {
     std::array<Eigen::Vector2d, 2> next;
     double free_px;
   };
-  std::vector<PointDetection> refine(const std::vector<Guess>& guesses,
-                                     const GrayLevels& image) const;
+  std::vector<PointDetection> refine_corner_guesses(const std::vector<Guess>& guesses,
+                                                    const GrayLevels& image) const;
 
   int cols_, rows_;
   double square_size_m_, margin_m_;
@@ -70,8 +70,8 @@ class TouchingTags {
                                               const GrayLevels& image) const;
 
  private:
-  std::optional<TagDetection> predict(const BoardTag& missing,
-                                      const std::vector<TagDetection>& tags) const;
+  std::optional<TagDetection> predict_missing_tag(const BoardTag& missing,
+                                                  const std::vector<TagDetection>& tags) const;
 
   std::vector<BoardTag> layout_;
   TagFamily family_;

@@ -189,7 +189,7 @@ TagEdges::TagEdges(const TagDetection& tag, const cv::Mat1b& image, const TagGeo
   }
   edges_ = approximate_;
   predict_neighbor_patterns(print);
-  const double bit_px = width_px_ / print.width();
+  const double bit_px = width_px_ / print.tag_width();
   band_ = {std::clamp(print.inner_stripe_width() * bit_px - away_px, min_px, max_px),
            std::clamp(print.outer_stripe_width() * bit_px - away_px, min_px, max_px)};
   const auto fit_without_curve = [&] {
@@ -211,7 +211,7 @@ TagEdges::TagEdges(const TagDetection& tag, const cv::Mat1b& image, const TagGeo
 }
 
 void TagEdges::predict_neighbor_patterns(const TagGeometry& print) {
-  const double width = print.width(), deep = print.inner_stripe_width();
+  const double width = print.tag_width(), deep = print.inner_stripe_width();
   const std::array<Eigen::Vector2d, 4> square{{{0, 0}, {width, 0}, {width, width}, {0, width}}};
   const TagGeometry::Sides white = print.find_white_bit_segments(tag_.id);
   for (std::size_t k = 0; k < 4; ++k) {
@@ -396,12 +396,12 @@ void EdgeModels::fit_light(const TagSelection& tags) {
 EdgePrior EdgeModels::make_prior(const EdgeCurve& edge, double gamma) const {
   EdgePrior prior{gamma};
   if (blur_) {
-    prior.blur_px = blur_->value(edge.middle, edge.along);
-    prior.blur_weight = noise_ / (blur_->excess_edge_sd() * prior.blur_px);
+    prior.blur_px = blur_->predict_edge_property(edge.middle, edge.along);
+    prior.blur_weight = noise_ / (blur_->unexplained_edge_sd() * prior.blur_px);
   }
   if (light_) {
-    prior.bright_light = light_->value(edge.middle, edge.along);
-    prior.bright_weight = noise_ / (light_->excess_edge_sd() * prior.bright_light);
+    prior.bright_light = light_->predict_edge_property(edge.middle, edge.along);
+    prior.bright_weight = noise_ / (light_->unexplained_edge_sd() * prior.bright_light);
   }
   return prior;
 }

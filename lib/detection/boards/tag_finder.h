@@ -17,7 +17,7 @@ namespace vlp {
 class TagFinder {
  public:
   virtual ~TagFinder() = default;
-  virtual std::vector<TagDetection> find(const cv::Mat1b& image) const = 0;
+  virtual std::vector<TagDetection> detect_tags(const cv::Mat1b& image) const = 0;
 };
 
 /// Creates a detector (libapriltag) of the tags of the board's family, for tags surrounded by

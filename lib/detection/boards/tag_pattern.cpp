@@ -90,9 +90,9 @@ TagGeometry::Sides TagGeometry::find_white_bit_segments(int id) const {
   return sides;
 }
 
-NearestCorners find_nearest_corners(const std::vector<TagDetection>& tags,
-                                    const std::vector<BoardTag>& layout, double max_distance_m,
-                                    const std::function<double(const BoardTag&)>& distance_m) {
+NearestCorners find_nearest_tag_corners(const std::vector<TagDetection>& tags,
+                                        const std::vector<BoardTag>& layout, double max_distance_m,
+                                        const std::function<double(const BoardTag&)>& distance_m) {
   constexpr std::size_t max_tags = 4;
   struct Neighbor {
     double distance_m;

@@ -56,7 +56,7 @@ class TagGeometry {
   explicit TagGeometry(const Board& board);
 
   /// Width of a tag with its border, in bits.
-  double width() const { return width_; }
+  double tag_width() const { return width_; }
   /// Width of the uniform stripe along an edge, inside and outside the tag, in bits.
   double inner_stripe_width() const { return inside_; }
   double outer_stripe_width() const { return outside_; }
@@ -79,8 +79,8 @@ struct NearestCorners {
 
 /// Returns the corners of the detected tags with the smallest `distance_m` below `max_distance_m`.
 /// @pre `layout` has the ids of all tags
-NearestCorners find_nearest_corners(const std::vector<TagDetection>& tags,
-                                    const std::vector<BoardTag>& layout, double max_distance_m,
-                                    const std::function<double(const BoardTag&)>& distance_m);
+NearestCorners find_nearest_tag_corners(const std::vector<TagDetection>& tags,
+                                        const std::vector<BoardTag>& layout, double max_distance_m,
+                                        const std::function<double(const BoardTag&)>& distance_m);
 
 }  // namespace vlp

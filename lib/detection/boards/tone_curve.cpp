@@ -38,13 +38,13 @@ struct Parabola {
 };
 
 /// Returns the parabola through the smallest cost and its neighbors.
-Parabola make_parabola_at_minimum(const PerCurve& costs) {
+Parabola make_parabola_at_minimum(const ValuesPerGamma& costs) {
   const auto best =
       static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
   return {std::clamp<std::size_t>(best, 1, kGammas.size() - 2) - 1};
 }
 
-double estimate_log_gamma(const PerCurve& costs) {
+double estimate_log_gamma(const ValuesPerGamma& costs) {
   const Parabola parabola = make_parabola_at_minimum(costs);
   return parabola.find_minimum(
       {costs[parabola.first], costs[parabola.first + 1], costs[parabola.first + 2]});
@@ -60,9 +60,9 @@ EdgeStep interpolate_step(const EdgeStep& below, const EdgeStep& above, double f
 
 }  // namespace
 
-PerCurve sum_tone_curve_costs(const std::vector<BoardView>& views) {
+ValuesPerGamma sum_tone_curve_costs(const std::vector<BoardView>& views) {
   constexpr double max_cost = 1000;
-  PerCurve sums{};
+  ValuesPerGamma sums{};
   for (const BoardView& view : views) {
     const auto& costs = view.seen.curve_costs;
     if (costs.empty()) continue;
@@ -74,11 +74,11 @@ PerCurve sum_tone_curve_costs(const std::vector<BoardView>& views) {
   return sums;
 }
 
-double estimate_tone_curve_gamma(const PerCurve& costs) {
+double estimate_tone_curve_gamma(const ValuesPerGamma& costs) {
   return std::exp(estimate_log_gamma(costs));
 }
 
-double correct_views_for_tone_curve(std::vector<BoardView>& views, const PerCurve& costs) {
+double correct_views_for_tone_curve(std::vector<BoardView>& views, const ValuesPerGamma& costs) {
   constexpr double min_gamma = 1.2;
   const Parabola parabola = make_parabola_at_minimum(costs);
   const double log_gamma = estimate_log_gamma(costs);

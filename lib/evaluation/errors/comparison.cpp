@@ -27,7 +27,7 @@ std::string_view Comparison::comparison_verdict() const {
   return within ? "equivalent" : "inconclusive";
 }
 
-std::string Comparison::describe_result() const {
+std::string Comparison::describe_comparison_result() const {
   constexpr int digits = 2;
   const std::string threshold = format_significant_digits(1e3 * min_relevant_m, digits) + " mm";
   std::string words(comparison_verdict());
@@ -41,13 +41,14 @@ Comparison compare_horizontal_errors(const std::vector<FixRow>& fixes,
                                      const std::vector<FixRow>& other_fixes,
                                      const std::vector<FixError>& other_errors, int threads) {
   NameIndex images(other_errors.size());
-  for (const FixError& other : other_errors) images.insert(other_fixes[other.fix].image);
+  for (const FixError& other : other_errors)
+    images.insert_unique_name(other_fixes[other.fix].image);
   Comparison comparison;
   std::vector<double> differences_m;
   std::vector<std::size_t> clusters;
   double others_m = 0;
   for (const FixError& error : errors) {
-    const auto other = images.find(fixes[error.fix].image);
+    const auto other = images.find_name_index(fixes[error.fix].image);
     if (!other) {
       ++comparison.only_these;
       continue;

@@ -50,7 +50,7 @@ struct Comparison {
   std::string_view comparison_verdict() const;
   /// Returns, for example, "worse by more than 0.004 mm", with min_relevant_m if the verdict
   /// depends on it.
-  std::string describe_result() const;
+  std::string describe_comparison_result() const;
 };
 
 /// Compares fixes, paired by image. `other_errors` are against the same ground truth or path.

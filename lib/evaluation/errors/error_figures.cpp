@@ -61,7 +61,7 @@ SignedErrorStatistics compute_signed_error_statistics(std::vector<double> errors
   return {bias, compute_error_statistics(std::move(errors))};
 }
 
-std::vector<std::pair<double, double>> compute_percentiles(std::vector<double> errors) {
+std::vector<std::pair<double, double>> compute_error_percentiles(std::vector<double> errors) {
   std::sort(errors.begin(), errors.end());
   std::vector<std::pair<double, double>> points;
   points.reserve(100);

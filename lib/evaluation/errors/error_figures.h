@@ -40,7 +40,7 @@ SignedErrorStatistics compute_signed_error_statistics(std::vector<double> errors
 
 /// Returns the percentiles of the errors, 1 % to 100 %, as pairs of fraction and quantile.
 /// @pre not empty
-std::vector<std::pair<double, double>> compute_percentiles(std::vector<double> errors);
+std::vector<std::pair<double, double>> compute_error_percentiles(std::vector<double> errors);
 
 /// Bias and repeatability over the reference points with two fixes or more.
 struct BiasAndRepeatability {
@@ -66,7 +66,7 @@ struct BiasAndRepeatability {
   double bias_m;
 };
 
-/// Computes bias and scatter from the errors of compute_errors_against_truth(). Returns
+/// Computes bias and scatter from the errors of compute_fix_errors_against_truth(). Returns
 /// std::nullopt if no reference point has two fixes.
 std::optional<BiasAndRepeatability> compute_bias_and_repeatability(
     const std::vector<FixError>& errors, const std::vector<TruthRow>& truth);

@@ -59,23 +59,23 @@ std::optional<NormalizedErrors> compute_normalized_errors(const std::vector<FixR
                           yaw.fraction_within_95_percent()};
 }
 
-bool CrlbRatio::is_below_crlb() const {
+bool CrlbRatio::are_errors_below_crlb() const {
   constexpr double num_sds = 3;
   return horizontal < 1 - num_sds * sd;
 }
 
-std::optional<CrlbRatio> compute_crlb_ratio(const std::vector<FixError>& errors,
-                                            const std::vector<TruthRow>& truth,
-                                            const LampMap& lamps, const Camera& camera,
-                                            double noise_px, int threads) {
+std::optional<CrlbRatio> compute_error_to_crlb_ratio(const std::vector<FixError>& errors,
+                                                     const std::vector<TruthRow>& truth,
+                                                     const LampMap& lamps, const Camera& camera,
+                                                     double noise_px, int threads) {
   const Lens lens(camera.lens_model, camera.intrinsics);
   std::vector<Eigen::Matrix2d> limits_m2(errors.size(), Eigen::Matrix2d::Zero());  // 0: no limit
   parallel_for(errors.size(), threads, [&](std::size_t i) {
     const TruthRow& place = truth[errors[i].truth];
     if (!place.z_m || !place.yaw_rad) return;
     const Pose pose{{place.xy_m.x(), place.xy_m.y(), *place.z_m}, *place.yaw_rad};
-    const auto budget = compute_error_budget(find_visible_lamps(lamps, camera, pose), lens, pose,
-                                             {noise_px, 0, 0, 0});
+    const auto budget = compute_fix_error_budget(find_visible_lamps(lamps, camera, pose), lens,
+                                                 pose, {noise_px, 0, 0, 0});
     if (budget) limits_m2[i] = budget->noise.topLeftCorner<2, 2>();
   });
   double errors_m2 = 0, limit_m2 = 0, variance_m4 = 0;

@@ -50,7 +50,7 @@ struct CrlbRatio {
 
   /// Returns true if the errors are below the limit by more than three sd, by chance in 1 of 700
   /// cases. Systematic errors only increase the ratio.
-  bool is_below_crlb() const;
+  bool are_errors_below_crlb() const;
 };
 /// Computes the ratio to the limit at the true pose of each fix: ErrorBudget::noise, for a level
 /// camera and all lamps of the map that are wholly in its image.
@@ -58,9 +58,9 @@ struct CrlbRatio {
 /// Returns std::nullopt if the ground truth has no height and yaw, or if two lamps are visible from
 /// no position.
 /// @pre noise_px > 0, intrinsics match the lens model, threads > 0
-std::optional<CrlbRatio> compute_crlb_ratio(const std::vector<FixError>& errors,
-                                            const std::vector<TruthRow>& truth,
-                                            const LampMap& lamps, const Camera& camera,
-                                            double noise_px, int threads);
+std::optional<CrlbRatio> compute_error_to_crlb_ratio(const std::vector<FixError>& errors,
+                                                     const std::vector<TruthRow>& truth,
+                                                     const LampMap& lamps, const Camera& camera,
+                                                     double noise_px, int threads);
 
 }  // namespace vlp

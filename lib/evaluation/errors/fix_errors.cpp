@@ -18,13 +18,13 @@ template <typename Row>
 std::vector<std::size_t> match_rows(const FromFile<FixRow>& fixes, const FromFile<Row>& table,
                                     const std::string& hint, const std::string& question) {
   NameIndex images(table.rows.size());
-  for (const Row& row : table.rows) images.insert(row.image);
+  for (const Row& row : table.rows) images.insert_unique_name(row.image);
   std::vector<std::size_t> rows;
   rows.reserve(fixes.rows.size());
   std::size_t num_unmatched = 0;
   const FixRow* first = nullptr;
   for (const FixRow& fix : fixes.rows) {
-    const auto row = images.find(fix.image);
+    const auto row = images.find_name_index(fix.image);
     rows.push_back(row.value_or(0));
     if (row) continue;
     ++num_unmatched;
@@ -44,13 +44,13 @@ std::vector<std::size_t> group_captures(const std::vector<TruthRow>& truth, doub
   for (const TruthRow& row : truth) {
     places_m.emplace_back(row.xy_m.x(), row.xy_m.y(), row.z_m.value_or(0));
   }
-  return assign_reference_points(places_m, station_m);
+  return assign_positions_to_reference_points(places_m, station_m);
 }
 
 }  // namespace
 
-FixErrors compute_errors_against_truth(const FromFile<FixRow>& fixes,
-                                       const FromFile<TruthRow>& truth, double station_m) {
+FixErrors compute_fix_errors_against_truth(const FromFile<FixRow>& fixes,
+                                           const FromFile<TruthRow>& truth, double station_m) {
   const std::string hint =
       truth.rows.empty() ? "" : ", whose first is '" + truth.rows.front().image + "'";
   const std::vector<std::size_t> truth_rows =
@@ -83,7 +83,7 @@ FixErrors compute_errors_against_truth(const FromFile<FixRow>& fixes,
   return result;
 }
 
-FixErrors compute_errors_against_path(const std::vector<FixRow>& fixes, const Path& path) {
+FixErrors compute_fix_errors_against_path(const std::vector<FixRow>& fixes, const Path& path) {
   FixErrors result;
   result.captures = fixes.size();
   for (std::size_t i = 0; i < fixes.size(); ++i) {

@@ -55,7 +55,7 @@ std::optional<LineFit> fit_line_to_fixes(const std::vector<FixRow>& fixes,
   }
   return LineFit{line_m, std::atan2(cross(commanded, direction), commanded.dot(direction)),
                  std::sqrt(across_m2 / static_cast<double>(points_m.cols())),
-                 compute_error_statistics(distances_m), compute_percentiles(distances_m)};
+                 compute_error_statistics(distances_m), compute_error_percentiles(distances_m)};
 }
 
 }  // namespace vlp

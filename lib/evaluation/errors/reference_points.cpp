@@ -63,8 +63,8 @@ class ReferencePointTable {
 
 }  // namespace
 
-std::vector<std::size_t> assign_reference_points(std::span<const Eigen::Vector3d> places_m,
-                                                 double radius_m) {
+std::vector<std::size_t> assign_positions_to_reference_points(
+    std::span<const Eigen::Vector3d> places_m, double radius_m) {
   ReferencePointTable table(places_m.size(), radius_m);
   std::vector<std::size_t> stations;
   stations.reserve(places_m.size());

@@ -55,10 +55,10 @@ Histogram sample_histogram(const ImageView& image) {
   Histogram sample(image.get_max_gray_level() + 1);
   for (int row = std::min(step / 2, image.height / 2); row < image.height; row += step) {
     for (int column = row / step % step; column < image.width; column += step) {
-      sample.add(image.level_at(column, row));
+      sample.add(image.gray_level_at_pixel(column, row));
     }
   }
-  if (sample.count_samples() == 0) sample.add(image.level_at(0, 0));
+  if (sample.count_samples() == 0) sample.add(image.gray_level_at_pixel(0, 0));
   return sample;
 }
 
@@ -102,7 +102,7 @@ double estimate_noise_above_median(const Histogram& sample, int median) {
 
 }  // namespace
 
-Background estimate_background(const ImageView& image) {
+Background estimate_image_background(const ImageView& image) {
   const Histogram sample = sample_histogram(image);
   const double step = find_level_step(sample);
   const int half = sample.count_samples() / 2, median = sample.level_at(half);

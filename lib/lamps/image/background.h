@@ -21,6 +21,6 @@ struct Background {
 };
 
 /// Estimates dark level, noise and threshold of an image. @pre The image is not empty.
-Background estimate_background(const ImageView& image);
+Background estimate_image_background(const ImageView& image);
 
 }  // namespace vlp

@@ -28,19 +28,19 @@ struct ImageView {
   /// Returns the first pixel of row y. `Level` is std::uint8_t or std::uint16_t, according to
   /// `bits`.
   template <typename Level>
-  const Level* row(int y) const {
+  const Level* row_pixels(int y) const {
     return reinterpret_cast<const Level*>(static_cast<const std::byte*>(data) + y * stride);
   }
 
   /// Returns the level of the pixel in column x of row y. @pre The pixel is in the image.
-  int level_at(int x, int y) const {
-    return bits == 8 ? row<std::uint8_t>(y)[x] : row<std::uint16_t>(y)[x];
+  int gray_level_at_pixel(int x, int y) const {
+    return bits == 8 ? row_pixels<std::uint8_t>(y)[x] : row_pixels<std::uint16_t>(y)[x];
   }
 
   /// Returns a view of the intersection of `box` and the image; an empty view if they do not
   /// overlap.
-  ImageView part(const PixelBox& box) const {
-    const PixelBox inside = intersection(box, {0, 0, width, height});
+  ImageView crop_to_box(const PixelBox& box) const {
+    const PixelBox inside = intersect_boxes(box, {0, 0, width, height});
     const auto* first = static_cast<const std::byte*>(data) + inside.y * stride;
     return {first + std::ptrdiff_t(inside.x) * (bits / 8), inside.width, inside.height, stride,
             bits};

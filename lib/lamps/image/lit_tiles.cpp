@@ -20,7 +20,7 @@ template <typename Level, int step>
 Rows<Level> get_rows_from(const ImageView& image, int first) {
   Rows<Level> rows;
   for (int i = 0; i < kRowsAtOnce; ++i) {
-    rows[std::size_t(i)] = image.row<Level>(std::min(first + step * i, image.height - 1));
+    rows[std::size_t(i)] = image.row_pixels<Level>(std::min(first + step * i, image.height - 1));
   }
   return rows;
 }
@@ -46,7 +46,7 @@ void search(const ImageView& image, Level threshold, TileMask& found) {
   const int whole = image.width / kTile_px;
   for (int top = 0; top < image.height; top += span) {
     const Rows<Level> rows = get_rows_from<Level, 2>(image, top - top / span % 2);
-    auto* marks = found.row(top / kTile_px);
+    auto* marks = found.tile_row(top / kTile_px);
     for (int tile = 0; tile < whole; ++tile) {
       if (find_brightest_level(rows, tile * kTile_px, kTile_px) > threshold) marks[tile] = 1;
     }
@@ -60,12 +60,12 @@ void search(const ImageView& image, Level threshold, TileMask& found) {
 template <typename Level>
 std::uint8_t count_above(const ImageView& image, const PixelBox& box, Level threshold) {
   std::ptrdiff_t count = 0;
-  for (int top = box.y; top < box.bottom() && count < 2; top += kRowsAtOnce) {
+  for (int top = box.y; top < box.end_row() && count < 2; top += kRowsAtOnce) {
     const auto rows = get_rows_from<Level, 1>(image, top);
     if (find_brightest_level(rows, box.x, box.width) <= threshold) continue;
-    for (int y = top; y < std::min(top + kRowsAtOnce, box.bottom()); ++y) {
-      const Level* row = image.row<Level>(y);
-      count += std::count_if(row + box.x, row + box.right(),
+    for (int y = top; y < std::min(top + kRowsAtOnce, box.end_row()); ++y) {
+      const Level* row = image.row_pixels<Level>(y);
+      count += std::count_if(row + box.x, row + box.end_column(),
                              [&](Level level) { return level > threshold; });
     }
   }
@@ -76,8 +76,8 @@ std::uint8_t count_above(const ImageView& image, const PixelBox& box, Level thre
 template <typename Function>
 void for_each_neighbor_tile(const TileMask& mask, int column, int row, Function&& function) {
   const PixelBox box = expand_and_clip_box({column, row, 1, 1}, 1, {mask.columns, mask.rows});
-  for (int y = box.y; y < box.bottom(); ++y) {
-    for (int x = box.x; x < box.right(); ++x) function(x, y);
+  for (int y = box.y; y < box.end_row(); ++y) {
+    for (int x = box.x; x < box.end_column(); ++x) function(x, y);
   }
 }
 
@@ -86,7 +86,7 @@ template <typename Function>
 void for_each_nonzero_tile(const TileMask& mask, Function&& function) {
   for (int row = 0; row < mask.rows; ++row) {
     for (int column = 0; column < mask.columns; ++column) {
-      if (mask.row(row)[column] != 0) function(column, row);
+      if (mask.tile_row(row)[column] != 0) function(column, row);
     }
   }
 }
@@ -96,7 +96,7 @@ int count_tiles_for(int pixels) { return (pixels + kTile_px - 1) / kTile_px; }
 }  // namespace
 
 PixelBox pixel_box_from_tile_box(const PixelBox& tiles, const ImageSize& size) {
-  return intersection(
+  return intersect_boxes(
       {tiles.x * kTile_px, tiles.y * kTile_px, tiles.width * kTile_px, tiles.height * kTile_px},
       {0, 0, size.width, size.height});
 }
@@ -110,13 +110,14 @@ TileMask find_bright_tiles(const ImageView& image, double threshold) {
     search(image, level, found);
     for_each_nonzero_tile(dilate_tile_mask(found), [&](int column, int row) {
       const PixelBox box = pixel_box_from_tile_box({column, row, 1, 1}, image.size());
-      counts.row(row)[column] = count_above(image, box, level);
+      counts.tile_row(row)[column] = count_above(image, box, level);
     });
   });
   for_each_nonzero_tile(counts, [&](int column, int row) {
     int around = 0;
-    for_each_neighbor_tile(counts, column, row, [&](int x, int y) { around += counts.row(y)[x]; });
-    lit.row(row)[column] = around > 1 ? 1 : 0;
+    for_each_neighbor_tile(counts, column, row,
+                           [&](int x, int y) { around += counts.tile_row(y)[x]; });
+    lit.tile_row(row)[column] = around > 1 ? 1 : 0;
   });
   return lit;
 }
@@ -124,15 +125,16 @@ TileMask find_bright_tiles(const ImageView& image, double threshold) {
 TileMask dilate_tile_mask(const TileMask& mask) {
   TileMask result(mask.columns, mask.rows);
   for_each_nonzero_tile(mask, [&](int column, int row) {
-    for_each_neighbor_tile(mask, column, row, [&](int x, int y) { result.row(y)[x] = 1; });
+    for_each_neighbor_tile(mask, column, row, [&](int x, int y) { result.tile_row(y)[x] = 1; });
   });
   return result;
 }
 
-TileMask transpose_mask(const TileMask& mask) {
+TileMask transpose_tile_mask(const TileMask& mask) {
   TileMask result(mask.rows, mask.columns);
-  for_each_nonzero_tile(
-      mask, [&](int column, int row) { result.row(column)[row] = mask.row(row)[column]; });
+  for_each_nonzero_tile(mask, [&](int column, int row) {
+    result.tile_row(column)[row] = mask.tile_row(row)[column];
+  });
   return result;
 }
 
@@ -140,19 +142,19 @@ std::vector<PixelBox> find_tile_group_boxes(TileMask mask) {
   std::vector<PixelBox> boxes;
   std::vector<std::pair<int, int>> open;
   const auto visit_tile = [&](int x, int y) {
-    if (mask.row(y)[x] == 0) return;
+    if (mask.tile_row(y)[x] == 0) return;
     open.emplace_back(x, y);
-    mask.row(y)[x] = 0;
+    mask.tile_row(y)[x] = 0;
   };
   for (int row = 0; row < mask.rows; ++row) {
     for (int column = 0; column < mask.columns; ++column) {
-      if (mask.row(row)[column] == 0) continue;
+      if (mask.tile_row(row)[column] == 0) continue;
       PixelBox box{column, row, 1, 1};
       visit_tile(column, row);
       while (!open.empty()) {
         const auto [x, y] = open.back();
         open.pop_back();
-        box = around(box, {x, y, 1, 1});
+        box = enclosing_box(box, {x, y, 1, 1});
         for_each_neighbor_tile(mask, x, y, visit_tile);
       }
       boxes.push_back(box);

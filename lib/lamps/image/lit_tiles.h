@@ -24,8 +24,8 @@ struct TileMask {
   TileMask(int columns_, int rows_)
       : columns(columns_), rows(rows_), values(std::size_t(columns_) * std::size_t(rows_)) {}
   bool empty() const { return values.empty(); }
-  std::uint8_t* row(int y) { return values.data() + std::ptrdiff_t(y) * columns; }
-  const std::uint8_t* row(int y) const { return values.data() + std::ptrdiff_t(y) * columns; }
+  std::uint8_t* tile_row(int y) { return values.data() + std::ptrdiff_t(y) * columns; }
+  const std::uint8_t* tile_row(int y) const { return values.data() + std::ptrdiff_t(y) * columns; }
 };
 
 /// Finds the tiles with pixels above `threshold`. The tile and its neighbors have to contain more
@@ -40,7 +40,7 @@ TileMask find_bright_tiles(const ImageView& image, double threshold);
 /// Returns the mask with all eight neighbors of its nonzero tiles added.
 TileMask dilate_tile_mask(const TileMask& mask);
 
-TileMask transpose_mask(const TileMask& mask);
+TileMask transpose_tile_mask(const TileMask& mask);
 
 /// Returns the bounding boxes, in tiles, of the 8-connected groups of nonzero tiles.
 std::vector<PixelBox> find_tile_group_boxes(TileMask mask);

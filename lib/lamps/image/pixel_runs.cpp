@@ -27,7 +27,7 @@ void add_runs_of_row(const Level* pixels, int columns, int row, Level threshold,
   constexpr int max_gap = 2, min_width = 3;
   PixelRun run{row, 0, -1};  // empty
   const auto finish = [&] {
-    if (run.width() >= min_width) runs.push_back(run);
+    if (run.run_width_px() >= min_width) runs.push_back(run);
     run.end = -1;
   };
   for (const int tile : tiles) {
@@ -51,11 +51,11 @@ std::vector<PixelRun> find_pixel_runs_above(const ImageView& image, Level thresh
   for (int top = 0; top < image.height; top += kTile_px) {
     tiles.clear();
     for (int tile = 0; tile * kTile_px < image.width; ++tile) {
-      if (lit.empty() || lit.row(top / kTile_px)[tile] != 0) tiles.push_back(tile);
+      if (lit.empty() || lit.tile_row(top / kTile_px)[tile] != 0) tiles.push_back(tile);
     }
     if (tiles.empty()) continue;
     for (int row = top; row < std::min(top + kTile_px, image.height); ++row) {
-      add_runs_of_row(image.row<Level>(row), image.width, row, threshold, tiles, runs);
+      add_runs_of_row(image.row_pixels<Level>(row), image.width, row, threshold, tiles, runs);
     }
   }
   return runs;
@@ -90,19 +90,19 @@ struct Growing {
 
 }  // namespace
 
-PixelBox Blob::bounding_box() const {
+PixelBox Blob::blob_bounding_box() const {
   int begin = runs[0].begin, end = runs[0].end;
   for (const PixelRun& run : runs) {
     begin = std::min(begin, run.begin);
     end = std::max(end, run.end);
   }
-  return {begin, first_row(), end - begin, bottom() + 1 - first_row()};
+  return {begin, first_blob_row(), end - begin, last_blob_row() + 1 - first_blob_row()};
 }
 
-double mean_level(const ImageView& image, const PixelRun& run) {
+double mean_run_level(const ImageView& image, const PixelRun& run) {
   return visit_levels(image, [&](auto level) {
-    const auto* row = image.row<decltype(level)>(run.row);
-    return std::accumulate(row + run.begin, row + run.end, 0.0) / run.width();
+    const auto* row = image.row_pixels<decltype(level)>(run.row);
+    return std::accumulate(row + run.begin, row + run.end, 0.0) / run.run_width_px();
   });
 }
 

@@ -14,12 +14,12 @@ namespace vlp {
 struct PixelRun {
   int row, begin, end;
 
-  int width() const { return end - begin; }
+  int run_width_px() const { return end - begin; }
 };
 
 /// Returns the mean gray level of the pixels of a run. The dark level is not subtracted.
 /// @pre The run is not empty and lies in the image.
-double mean_level(const ImageView& image, const PixelRun& run);
+double mean_run_level(const ImageView& image, const PixelRun& run);
 
 /// Finds the runs of pixels above `threshold`, row by row. Gaps of up to two pixels do not end a
 /// run; runs of less than three pixels are discarded as noise. Searches the nonzero tiles of `lit`,
@@ -32,9 +32,9 @@ std::vector<PixelRun> find_pixel_runs(const ImageView& image, double threshold,
 struct Blob {
   std::vector<PixelRun> runs;  // ordered by row
 
-  int first_row() const { return runs.front().row; }
-  int bottom() const { return runs.back().row; }
-  PixelBox bounding_box() const;
+  int first_blob_row() const { return runs.front().row; }
+  int last_blob_row() const { return runs.back().row; }
+  PixelBox blob_bounding_box() const;
 };
 
 std::vector<Blob> group_pixel_runs_into_blobs(const std::vector<PixelRun>& runs, int max_dark_rows);

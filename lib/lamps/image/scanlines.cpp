@@ -44,7 +44,8 @@ void fill_around_lit_tiles(const TileMask& lit, Level level, const Pixels<Level>
     if (size == 1) continue;  // the tiles around it are transposed
     const PixelBox box = pixel_box_from_tile_box(
         expand_and_clip_box(tiles, size, {lit.columns, lit.rows}), {pixels.width, pixels.height});
-    for (int y = box.y; y < box.bottom(); ++y) std::fill_n(pixels.row(y) + box.x, box.width, level);
+    for (int y = box.y; y < box.end_row(); ++y)
+      std::fill_n(pixels.row(y) + box.x, box.width, level);
   }
 }
 
@@ -52,11 +53,11 @@ void fill_around_lit_tiles(const TileMask& lit, Level level, const Pixels<Level>
 template <typename Level>
 void transpose(const ImageView& image, const PixelBox& box, const Pixels<Level>& turned) {
   constexpr int square = 16;
-  for (int top = box.y; top < box.bottom(); top += square) {
-    const int bottom = std::min(top + square, box.bottom());
-    for (int x = box.x; x < box.right(); ++x) {
+  for (int top = box.y; top < box.end_row(); top += square) {
+    const int bottom = std::min(top + square, box.end_row());
+    for (int x = box.x; x < box.end_column(); ++x) {
       Level* target = turned.row(x);
-      for (int y = top; y < bottom; ++y) target[y] = image.row<Level>(y)[x];
+      for (int y = top; y < bottom; ++y) target[y] = image.row_pixels<Level>(y)[x];
     }
   }
 }
@@ -85,7 +86,7 @@ ScanlineImage make_scanline_image(const ImageView& image, Readout readout,
   lines.memory = allocate_black_image({image.height, image.width}, image.bits);
   lines.pixels = {lines.memory.get(), image.height, image.width,
                   std::ptrdiff_t(image.height) * (image.bits / 8), image.bits};
-  lines.lit = transpose_mask(lit);
+  lines.lit = transpose_tile_mask(lit);
   visit_levels(image, [&](auto level) {
     fill_scanlines<decltype(level)>(image, lit, background.level, lines);
   });

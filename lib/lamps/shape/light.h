@@ -23,7 +23,8 @@ enum class LightKind {
 };
 
 /// Reason for the class of a light: the check that rejected it as a lamp, or `identified`. The
-/// checks run in another order than that of the enumerators (LightDetector::identify_lights()).
+/// checks run in another order than that of the enumerators
+/// (LightDetector::identify_lamps_of_lights()).
 enum class LightReason {
   identified,       ///< a lamp, possibly cut by the image border
   overexposed,      ///< steady: contrast below kMinContrast, most pixels at full scale
@@ -63,7 +64,7 @@ struct Light {
   double coherence;
   /// Steady lights only: fraction of the pixels in the middle that have the level of the light's
   /// brightest pixel. 0 if this level is not full scale.
-  double clipped;
+  double clipped_fraction;
   /// Level of the brightest scanlines above the dark level, in gray levels.
   double peak;
   /// True if the light was found by its modulation, which then also determined its stripes.
@@ -98,10 +99,10 @@ struct Light {
 /// Minimum of Light::roundness for an identified lamp.
 inline constexpr double kMinRoundness = 0.45;
 
-inline bool is_disc(const Light& light) { return light.shape == ShapeKind::disc; }
+inline bool is_disc_light(const Light& light) { return light.shape == ShapeKind::disc; }
 
 /// Returns true if a light is modulated: it may be a lamp of this map or of another one.
-inline bool is_modulated(const Light& light) {
+inline bool is_light_modulated(const Light& light) {
   return light.kind != LightKind::steady && light.kind != LightKind::formless;
 }
 

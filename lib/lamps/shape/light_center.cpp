@@ -70,7 +70,8 @@ WeightedOutline make_weighted_outline(std::vector<EdgePoint> edges, const LightS
   WeightedOutline result{{}, {}, {}, 0, 0};
   std::vector<Eigen::Vector2d> pixels;
   std::erase_if(edges, [&](const EdgePoint& edge) {
-    const auto plane = shape.level_plane_from_pixel(shape.swap_image_and_scanline_axes(edge.pixel));
+    const auto plane =
+        shape.level_plane_point_from_pixel(shape.swap_image_and_scanline_axes(edge.pixel));
     if (plane) {
       result.points.push_back(*plane);
       pixels.push_back(edge.pixel);
@@ -82,7 +83,8 @@ WeightedOutline make_weighted_outline(std::vector<EdgePoint> edges, const LightS
   for (const EdgePoint& edge : edges) {
     result.weights.push_back(std::pow(edge.level / result.brightest, 2));
   }
-  result.per_px = compute_outline_extent(result.points) / compute_outline_extent(pixels);
+  result.per_px =
+      compute_bounding_box_diagonal(result.points) / compute_bounding_box_diagonal(pixels);
   result.edges = std::move(edges);
   return result;
 }
@@ -111,13 +113,14 @@ std::optional<RobustEllipse> fit_circle_or_ellipse(const WeightedOutline& outlin
 /// Sets the center of a light and its bounding box. Returns false if the lens does not cover its
 /// rim.
 bool set_center_and_box(const RobustEllipse& fit, const LightShape& shape, Light& light) {
-  const auto pixel = shape.pixel_from_level_plane(fit.center);
+  const auto pixel = shape.pixel_from_level_plane_point(fit.center);
   if (!pixel) return false;
   light.pixel = light.low = light.high = *pixel;
   for (int i = 0; i < 16; ++i) {
     const double angle = std::numbers::pi / 8 * i;
     const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
-    const auto rim = shape.pixel_from_level_plane(fit.center + fit.rim_from_circle * direction);
+    const auto rim =
+        shape.pixel_from_level_plane_point(fit.center + fit.rim_from_circle * direction);
     if (!rim) return false;
     light.low = light.low.cwiseMin(*rim);
     light.high = light.high.cwiseMax(*rim);
@@ -137,20 +140,20 @@ std::vector<Eigen::Vector2d> LightShape::swap_image_and_scanline_axes(
   return points;
 }
 
-std::optional<Eigen::Vector2d> LightShape::level_plane_from_pixel(
+std::optional<Eigen::Vector2d> LightShape::level_plane_point_from_pixel(
     const Eigen::Vector2d& pixel) const {
   if (!camera_.lens) return pixel;
-  const auto ray = camera_.lens->unproject(pixel);
+  const auto ray = camera_.lens->unproject_pixel(pixel);
   if (!ray) return std::nullopt;
   const Eigen::Vector3d level = camera_.level_from_camera * ray->direction;
   if (!(level.z() > 0)) return std::nullopt;
   return level.head<2>() / level.z();
 }
 
-std::optional<Eigen::Vector2d> LightShape::pixel_from_level_plane(
+std::optional<Eigen::Vector2d> LightShape::pixel_from_level_plane_point(
     const Eigen::Vector2d& plane) const {
   if (!camera_.lens) return plane;
-  return camera_.lens->project(camera_.level_from_camera.transpose() * plane.homogeneous());
+  return camera_.lens->project_point(camera_.level_from_camera.transpose() * plane.homogeneous());
 }
 
 std::optional<Light> LightShape::fit_light_to_outline(std::vector<EdgePoint> outline,
@@ -177,7 +180,7 @@ std::optional<Light> LightShape::fit_light_to_outline(std::vector<EdgePoint> out
     if (selected[i]) light.outline.push_back(edges[i]);
   }
   if (camera_.lens) {
-    const Circle circle = fit->circle();
+    const Circle circle = fit->to_circle();
     light.sums = {
         weighted.points, weighted.weights, selected, circle, compute_scanline_gradient(circle),
         num_correlated};
@@ -189,7 +192,7 @@ std::optional<Light> LightShape::fit_light_to_outline(std::vector<EdgePoint> out
 Eigen::Vector2d LightShape::compute_scanline_gradient(const Circle& circle) const {
   const auto line = [&](double x, double y) {
     const auto pixel =
-        pixel_from_level_plane(circle.center + circle.radius / 2 * Eigen::Vector2d(x, y));
+        pixel_from_level_plane_point(circle.center + circle.radius / 2 * Eigen::Vector2d(x, y));
     return pixel ? swap_image_and_scanline_axes(*pixel).y()
                  : std::numeric_limits<double>::quiet_NaN();
   };
@@ -199,12 +202,12 @@ Eigen::Vector2d LightShape::compute_scanline_gradient(const Circle& circle) cons
 Eigen::Vector2d LightShape::compute_readout_center_offset(
     const Circle& circle, const Eigen::Vector2d& motion_per_line) const {
   constexpr int directions = 16;
-  const auto center = pixel_from_level_plane(circle.center);
+  const auto center = pixel_from_level_plane_point(circle.center);
   Eigen::Vector2d off = Eigen::Vector2d::Zero();
   for (int i = 0; i < directions; ++i) {
     const double angle = 2 * std::numbers::pi / directions * i;
     const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
-    const auto rim = pixel_from_level_plane(circle.center + circle.radius * direction);
+    const auto rim = pixel_from_level_plane_point(circle.center + circle.radius * direction);
     if (!center || !rim) return Eigen::Vector2d::Zero();
     const double later =
         swap_image_and_scanline_axes(*rim).y() - swap_image_and_scanline_axes(*center).y();
@@ -215,11 +218,12 @@ Eigen::Vector2d LightShape::compute_readout_center_offset(
 
 void LightShape::correct_light_for_motion(const Oval& oval, const Eigen::Vector2d& motion_per_line,
                                           Light& light) const {
-  const auto estimate = light.sums.solve_with_oval_prior(oval);
+  const auto estimate = light.sums.solve_outline_with_oval_prior(oval);
   if (!estimate) return;
   const Circle& circle = light.sums.fitted_circle();
-  const auto pixel = pixel_from_level_plane(circle.center + circle.radius * estimate->p.head<2>() -
-                                            compute_readout_center_offset(circle, motion_per_line));
+  const auto pixel =
+      pixel_from_level_plane_point(circle.center + circle.radius * estimate->p.head<2>() -
+                                   compute_readout_center_offset(circle, motion_per_line));
   if (!pixel) return;
   light.pixel = *pixel;
   const double sigma_px =
@@ -227,8 +231,8 @@ void LightShape::correct_light_for_motion(const Oval& oval, const Eigen::Vector2
   light.sigma_px = std::clamp(sigma_px, kMinSigma_px, kMaxSigma_px);
 }
 
-std::vector<EdgePoint> LightShape::outside(const Light& light,
-                                           const std::vector<EdgePoint>& outline) const {
+std::vector<EdgePoint> LightShape::find_outline_points_outside(
+    const Light& light, const std::vector<EdgePoint>& outline) const {
   // Uses the axis-aligned ellipse in the box, although the ellipse of the light may be rotated.
   constexpr double clear = 1.1, clear_px = 1.5;
   const Eigen::Vector2d center = (light.low + light.high) / 2;

@@ -56,19 +56,20 @@ class LightShape {
                                 Light& light) const;
 
   /// Returns the outline points outside a light, beyond a margin of 10 % and 1.5 px.
-  std::vector<EdgePoint> outside(const Light& light, const std::vector<EdgePoint>& outline) const;
+  std::vector<EdgePoint> find_outline_points_outside(const Light& light,
+                                                     const std::vector<EdgePoint>& outline) const;
 
   /// Converts (u, v) of the image to (column, line), and back.
   Eigen::Vector2d swap_image_and_scanline_axes(const Eigen::Vector2d& at) const;
   std::vector<Eigen::Vector2d> swap_image_and_scanline_axes(
       std::vector<Eigen::Vector2d> points) const;
 
-  bool has_lens() const { return camera_.lens.has_value(); }
-  bool has_tilt() const { return !camera_.level_from_camera.isIdentity(0); }
+  bool has_known_lens() const { return camera_.lens.has_value(); }
+  bool is_camera_tilted() const { return !camera_.level_from_camera.isIdentity(0); }
   /// Converts (u, v) to a point of the level plane at height 1, and back. Without a lens both are
   /// equal. Return std::nullopt if the lens or the plane does not cover the point.
-  std::optional<Eigen::Vector2d> level_plane_from_pixel(const Eigen::Vector2d& pixel) const;
-  std::optional<Eigen::Vector2d> pixel_from_level_plane(const Eigen::Vector2d& plane) const;
+  std::optional<Eigen::Vector2d> level_plane_point_from_pixel(const Eigen::Vector2d& pixel) const;
+  std::optional<Eigen::Vector2d> pixel_from_level_plane_point(const Eigen::Vector2d& plane) const;
 
  private:
   /// Returns the derivative of the scanline at which a point near the circle is read with respect

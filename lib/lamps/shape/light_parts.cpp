@@ -11,19 +11,20 @@ namespace vlp {
 namespace {
 
 bool contains_point(const Light& light, const Eigen::Vector2d& pixel) {
-  if (!is_disc(light)) return polygon_contains(light.face, pixel);
+  if (!is_disc_light(light)) return polygon_contains(light.face, pixel);
   return (light.pixel - pixel).norm() < light.radius_px;
 }
 
 /// Returns true if two blobs may be parts of one light.
 bool may_belong_together(const PixelBox& a, const PixelBox& b) {
   const int size = std::max({a.width, a.height, b.width, b.height});
-  return 2 * compute_gap(a, b) < size;
+  return 2 * compute_box_gap_px(a, b) < size;
 }
 
 /// Returns true if a part is not a piece of a light that an occluder splits.
 bool make_whole_light(const LightPart& part) {
-  return part.light && (part.light->is_glow || part.light->is_uneven || !is_disc(*part.light));
+  return part.light &&
+         (part.light->is_glow || part.light->is_uneven || !is_disc_light(*part.light));
 }
 
 std::size_t count_points(const LightPart& part) {
@@ -35,7 +36,7 @@ std::size_t count_points(const LightPart& part) {
 bool consists_of_two_parts(const Light& whole, const LightPart& a, const LightPart& b,
                            std::size_t points) {
   constexpr double min_fraction = 0.6, min_gain = 1.25, min_joined_fraction = 0.8, max_hidden = 1.5;
-  const PixelBox box = around(a.box, b.box);
+  const PixelBox box = enclosing_box(a.box, b.box);
   if (2 * whole.radius_px > max_hidden * std::max(box.width, box.height)) return false;
   const auto on_circle = double(whole.outline.size());
   const auto count_a = double(count_points(a)), count_b = double(count_points(b));
@@ -48,7 +49,7 @@ bool consists_of_two_parts(const Light& whole, const LightPart& a, const LightPa
 LightReason find_formless_reason(const LightPart& part, const ImageSize& size) {
   const PixelBox& box = part.box;
   const bool inside =
-      box.x > 0 && box.y > 0 && box.right() < size.width && box.bottom() < size.height;
+      box.x > 0 && box.y > 0 && box.end_column() < size.width && box.end_row() < size.height;
   if (!inside) return LightReason::incomplete;
   // Some of the points belong to other objects.
   const bool small = part.outline.size() < 2 * kMinOutlinePoints;
@@ -56,7 +57,7 @@ LightReason find_formless_reason(const LightPart& part, const ImageSize& size) {
 }
 
 bool do_lights_overlap(const Light& a, const Light& b) {
-  if (is_disc(a) && is_disc(b)) {
+  if (is_disc_light(a) && is_disc_light(b)) {
     return (a.pixel - b.pixel).norm() < std::max(a.radius_px, b.radius_px);
   }
   return contains_point(a, b.pixel) || contains_point(b, a.pixel);
@@ -98,7 +99,7 @@ std::vector<Light> join_parts_of_one_light(std::vector<LightPart>& parts, const 
           !consists_of_two_parts(*joined_light, parts[i], parts[j], joined_outline.size()))
         continue;
       parts[i] = {std::move(joined_light), std::move(joined_outline),
-                  around(parts[i].box, parts[j].box)};
+                  enclosing_box(parts[i].box, parts[j].box)};
       parts.erase(parts.begin() + std::ptrdiff_t(j));
       j = i;  // the joined part may have further pieces
     }
@@ -123,7 +124,7 @@ std::vector<Light> make_lights_without_outline(std::vector<LightPart> parts,
     light.kind = LightKind::formless;
     light.reason = find_formless_reason(part, size);
     light.low = shape.swap_image_and_scanline_axes({box.x - 0.5, box.y - 0.5});
-    light.high = shape.swap_image_and_scanline_axes({box.right() - 0.5, box.bottom() - 0.5});
+    light.high = shape.swap_image_and_scanline_axes({box.end_column() - 0.5, box.end_row() - 0.5});
     light.pixel = (light.low + light.high) / 2;
     light.radius_px = (light.high - light.low).mean() / 2;
     const bool inside = std::any_of(lights.begin(), lights.end(), [&](const Light& other) {

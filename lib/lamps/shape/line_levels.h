@@ -34,16 +34,16 @@ class LineLevels {
 
   /// Returns the brightest level above the dark level, in gray levels.
   double max_level_above_dark() const { return brightest_; }
-  std::optional<LineLevel> at(int line) const;
+  std::optional<LineLevel> scanline_level(int line) const;
   /// Returns the period of the stripes; 0 for steady light.
-  double period_lines() const { return period_lines_; }
+  double stripe_period_lines() const { return period_lines_; }
   /// Returns the ratio of the level at a column to that at the middle column.
   double relative_level_at_column(double column) const {
     return std::max(0.1, 1 + slope_ * (column - middle_));
   }
 
  private:
-  LineLevel predict(int line) const;
+  LineLevel predict_scanline_level(int line) const;
 
   int first_;
   double brightest_ = 0, middle_ = 0, slope_ = 0;

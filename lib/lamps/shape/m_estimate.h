@@ -40,7 +40,7 @@ struct MEstimateStep {
   double sum_of_weights;
 
   /// Returns the covariance of the parameters. The variance of a point is at least `min_variance`.
-  Eigen::Matrix<double, N, N> covariance(double min_variance = 0) const {
+  Eigen::Matrix<double, N, N> parameter_covariance(double min_variance = 0) const {
     return std::max(variance, min_variance) * inverse;
   }
 };
@@ -82,14 +82,14 @@ std::optional<MEstimateStep<N>> compute_m_estimate_step(std::span<const double> 
     all += weights[i];
     psi_squares += weights[i] * std::pow(inside * inside * error, 2);
     slopes += weights[i] * inside * (1 - 5 * relative_error * relative_error);
-    normal.add_row(slope, error, weight);
+    normal.add_residual_row(slope, error, weight);
     result.sum_of_weights += weight;
     ++result.count;
   }
   if (result.count < min_points || !(slopes > 0)) return std::nullopt;
   const Cholesky<std::size_t(N)> factor(normal);
   if (!factor.has_full_rank(1e-12)) return std::nullopt;
-  const auto step = factor.solve(normal.gradient);
+  const auto step = factor.solve_normal_equations(normal.gradient);
   std::copy(step.begin(), step.end(), result.step.begin());
   // Variance of an M-estimate: the mean of psi^2 over the squared mean of its slope.
   result.variance =

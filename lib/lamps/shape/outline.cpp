@@ -23,7 +23,7 @@ struct Profile {
     const int column = edge + direction * i;
     return column >= 0 && column < image.width;
   }
-  double operator()(int i) const { return image.level_at(edge + direction * i, row); }
+  double operator()(int i) const { return image.gray_level_at_pixel(edge + direction * i, row); }
 
   /// Returns the first position from `begin` to before `end` where the profile rises through
   /// `level`; std::nullopt if there is none.
@@ -170,7 +170,7 @@ std::vector<InnerLevel> measure_inner_levels(const ImageView& image,
 }
 
 /// Fits the edge of a profile near `at` to all pixels there; `width` is the standard deviation of
-/// the blur along the profile. See refine_outline().
+/// the blur along the profile. See refine_disc_outline().
 std::optional<double> find_blurred_edge(const Profile& profile, double at, double width,
                                         double level, double dark) {
   constexpr int num_iterations = 4;
@@ -190,11 +190,12 @@ std::optional<double> find_blurred_edge(const Profile& profile, double at, doubl
       const double rise = t * lit + width * density;
       const double model = outside * (1 - lit) + inside * lit + slope * rise;
       const double d_level_d_edge = -(inside - outside) / width * density - slope * lit;
-      normal.add_row(std::array{d_level_d_edge, 1 - lit, lit, rise}, model + dark - profile(i));
+      normal.add_residual_row(std::array{d_level_d_edge, 1 - lit, lit, rise},
+                              model + dark - profile(i));
     }
     const Cholesky<4> factor(normal);
     if (!factor.has_full_rank(1e-9)) return std::nullopt;
-    const auto step = factor.solve(normal.gradient);
+    const auto step = factor.solve_normal_equations(normal.gradient);
     edge -= step[0], outside -= step[1], inside -= step[2], slope -= step[3];
     if (!(std::abs(edge - at) < far * width)) return std::nullopt;
   }
@@ -258,8 +259,8 @@ bool has_uneven_inner_levels(const ImageView& image, const std::vector<InnerLeve
 
 }  // namespace
 
-RefinedOutline refine_outline(const ImageView& image, const std::vector<EdgePoint>& points,
-                              const DiscImage& disc, const Background& background) {
+RefinedOutline refine_disc_outline(const ImageView& image, const std::vector<EdgePoint>& points,
+                                   const DiscImage& disc, const Background& background) {
   // With more blur its tail reaches the samples and is mistaken for curvature.
   constexpr double max_blur_to_bend_px = 1.3;
   // Variance that interpolation between pixels adds to the measured rises.
@@ -323,15 +324,15 @@ std::vector<EdgePoint> select_outermost_edge_points(std::vector<EdgePoint> point
   return points;
 }
 
-std::vector<EdgePoint> find_outline(const ImageView& image, const Blob& blob,
-                                    const Background& background) {
+std::vector<EdgePoint> find_blob_outline(const ImageView& image, const Blob& blob,
+                                         const Background& background) {
   constexpr int min_width = 8;
   std::vector<EdgePoint> points;
   points.reserve(2 * blob.runs.size());
   for (const PixelRun& run : blob.runs) {
-    if (run.width() < min_width) continue;
-    add_edge({image, run.row, run.begin, 1}, run.width(), background.level, points);
-    add_edge({image, run.row, run.end - 1, -1}, run.width(), background.level, points);
+    if (run.run_width_px() < min_width) continue;
+    add_edge({image, run.row, run.begin, 1}, run.run_width_px(), background.level, points);
+    add_edge({image, run.row, run.end - 1, -1}, run.run_width_px(), background.level, points);
   }
   // Between the stripes of a saturated lamp, spilled charge has no outline of its own.
   constexpr double min_fraction = 0.35;

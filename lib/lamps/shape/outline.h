@@ -30,7 +30,7 @@ struct DiscImage {
   Eigen::Vector2d low, high, center;
 };
 
-/// Result of refine_outline(): the outline of a light with refined points.
+/// Result of refine_disc_outline(): the outline of a light with refined points.
 struct RefinedOutline {
   std::vector<EdgePoint> points;
   /// True if the level inside the light varies locally, as with LED chips behind a diffuser. Errors
@@ -59,8 +59,8 @@ struct RefinedOutline {
 ///     level(i) = o (1 - F(t / s)) + a F(t / s) + b (t F(t / s) + s f(t / s)),
 ///
 /// a blurred step to a level that rises linearly; F, f: the normal distribution and its density.
-RefinedOutline refine_outline(const ImageView& image, const std::vector<EdgePoint>& points,
-                              const DiscImage& disc, const Background& background);
+RefinedOutline refine_disc_outline(const ImageView& image, const std::vector<EdgePoint>& points,
+                                   const DiscImage& disc, const Background& background);
 
 /// Returns the first begin and the last end of each row: the outline of a light that an occluder
 /// splits.
@@ -68,7 +68,7 @@ std::vector<EdgePoint> select_outermost_edge_points(std::vector<EdgePoint> point
 
 /// Returns the two ends of each run. Excludes ends at the image border and ends of runs that are
 /// too short.
-std::vector<EdgePoint> find_outline(const ImageView& image, const Blob& blob,
-                                    const Background& background);
+std::vector<EdgePoint> find_blob_outline(const ImageView& image, const Blob& blob,
+                                         const Background& background);
 
 }  // namespace vlp

@@ -86,7 +86,7 @@ double square(double value) { return value * value; }
 /// calibrated tilt is accurate to some tenths of a degree. Every given tilt counts as calibrated,
 /// and an identity rotation as an unknown tilt.
 double get_tilt_sd(const LightShape& shape) {
-  return shape.has_tilt() ? kUnknownTiltSd / 30 : kUnknownTiltSd;
+  return shape.is_camera_tilted() ? kUnknownTiltSd / 30 : kUnknownTiltSd;
 }
 
 /// Returns the variance of the distance of an edge's middle, in square pixels.
@@ -171,7 +171,7 @@ Sides fit_sides(const std::vector<Eigen::Vector2d>& points, Sides sides, double 
     for (const Eigen::Vector2d& point : side_points[i]) {
       spread += (point - mean) * (point - mean).transpose();
     }
-    const auto axes = eigendecompose_symmetric(spread);
+    const auto axes = eigendecompose_symmetric_matrix(spread);
     Eigen::Vector2d direction = axes.vectors.col(1);
     const double length = std::sqrt(axes.values[1] / double(side_points[i].size()) * 12);
     if (length < min_spread * (sides[i].to - sides[i].from).norm()) continue;
@@ -288,7 +288,7 @@ std::vector<Eigen::Vector2d> make_polygon(const Sides& sides, double inset,
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Vector2d &from = (*corners)[i], &to = (*corners)[(i + 1) % 4];
     for (int piece = 0; piece < pieces; ++piece) {
-      const auto pixel = shape.pixel_from_level_plane(from + (to - from) * piece / pieces);
+      const auto pixel = shape.pixel_from_level_plane_point(from + (to - from) * piece / pieces);
       if (!pixel) return {};
       face.push_back(*pixel);
     }
@@ -351,7 +351,7 @@ std::optional<Matrix2> center_covariance(const Sides& sides, const EndsCovarianc
   constexpr double moved_px = 0.05;
   const auto pixel_with = [&](const Sides& moved) -> std::optional<Eigen::Vector2d> {
     const auto center = find_center(moved);
-    return center ? shape.pixel_from_level_plane(*center) : std::nullopt;
+    return center ? shape.pixel_from_level_plane_point(*center) : std::nullopt;
   };
   const auto here = pixel_with(sides);
   Eigen::Matrix<double, 2, 8> slope;
@@ -368,8 +368,8 @@ std::optional<Matrix2> center_covariance(const Sides& sides, const EndsCovarianc
 
 /// Returns true if the outline extends into the corners, unlike that of a disc: (2 u / length)^2 +
 /// (2 v / width)^2 is 1 on an ellipse inside the sides, and up to 2 on the sides.
-bool has_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
-                 const Eigen::Vector2d& center) {
+bool has_detected_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
+                          const Eigen::Vector2d& center) {
   constexpr double beyond = 1.35, min_fraction = 0.1;
   const auto off_middle = [&](const Eigen::Vector2d& at, std::size_t i) {
     const double length = (sides[i].to - sides[i].from).norm();
@@ -392,19 +392,19 @@ std::optional<Light> fit_light(std::array<StraightEdge, 4>& edges, double per_px
     sides[i] = edges[i].side;
     get_block(ends, i) = edges[i].covariance_px;
   }
-  if (shape.has_lens()) apply_right_angles(shape, per_px, sides, ends);
+  if (shape.has_known_lens()) apply_right_angles(shape, per_px, sides, ends);
   const auto corners = find_corners(sides);
   if (!corners || !is_rectangular(sides)) return std::nullopt;
   const auto center = find_center(sides);
-  if (!center || !has_corners(points, sides, *center)) return std::nullopt;
+  if (!center || !has_detected_corners(points, sides, *center)) return std::nullopt;
   const auto covariance = center_covariance(sides, ends, per_px, shape);
   sides = make_sides(*corners);
-  auto pixel = shape.pixel_from_level_plane(*center);
+  auto pixel = shape.pixel_from_level_plane_point(*center);
   const auto around = make_polygon(sides, 0, shape);
   if (!pixel || !covariance || around.empty()) return std::nullopt;
   Light light{};
   double lens_sd_px = 0;
-  if (!shape.has_lens()) {
+  if (!shape.has_known_lens()) {
     const CenterOffset behind =
         estimate_center_offset(edges, *center, shape.swap_image_and_scanline_axes(middle));
     *pixel += behind.shift;
@@ -494,8 +494,8 @@ std::optional<Place> predict_edge_position(const EdgeImage& image, const FoundEd
   return place;
 }
 
-/// Adds hidden edges from the visible ones, see fit_rectangle(). Returns false if two neighboring
-/// edges are missing or a missing edge is not found.
+/// Adds hidden edges from the visible ones, see fit_rectangular_light(). Returns false if two
+/// neighboring edges are missing or a missing edge is not found.
 bool add_hidden_edges(const EdgeImage& image, const Sides& sides, EdgeSearch search,
                       const std::vector<Eigen::Vector2d>& sizes_m, FoundEdges& edges) {
   constexpr double ramp_lines = 3, unknown_sd_px = 100;
@@ -508,8 +508,9 @@ bool add_hidden_edges(const EdgeImage& image, const Sides& sides, EdgeSearch sea
   }
   search.blur_px = find_most_certain_blur_px(visible);
   // The window extends to the next stripe, but not to the opposite edge.
-  search.reach_px = std::max(search.reach_px, std::min(image.levels.period_lines() + ramp_lines,
-                                                       min_side / image.per_px / 2));
+  search.reach_px = std::max(
+      search.reach_px,
+      std::min(image.levels.stripe_period_lines() + ramp_lines, min_side / image.per_px / 2));
   Sides expected = sides;
   EndsCovariance ends = square(unknown_sd_px) * EndsCovariance::Identity();
   for (std::size_t i = 0; i < 4; ++i) {
@@ -558,7 +559,8 @@ std::optional<PlaneOutline> project_outline_to_plane(const std::vector<EdgePoint
   result.points.reserve(outline.size());
   Eigen::AlignedBox2d in_plane, in_image;
   for (const EdgePoint& edge : outline) {
-    const auto point = shape.level_plane_from_pixel(shape.swap_image_and_scanline_axes(edge.pixel));
+    const auto point =
+        shape.level_plane_point_from_pixel(shape.swap_image_and_scanline_axes(edge.pixel));
     if (!point) return std::nullopt;
     result.points.push_back(*point);
     in_plane.extend(*point);
@@ -569,9 +571,9 @@ std::optional<PlaneOutline> project_outline_to_plane(const std::vector<EdgePoint
 }
 
 /// Finds the corners from which the edges are searched. Without a lens the sides may be curved.
-std::optional<FirstCorners> find_initial_corners(const PlaneOutline& outline, bool has_lens) {
+std::optional<FirstCorners> find_initial_corners(const PlaneOutline& outline, bool has_known_lens) {
   auto first = find_first_corners(outline.points, outline.per_px);
-  if (has_lens) return first;
+  if (has_known_lens) return first;
   const auto curved = find_corners_of_curved_sides(outline.points);
   if (curved && (!first || curved->near > first->near)) first = curved;
   return first;
@@ -644,17 +646,17 @@ std::vector<PixelRun> find_chords_in_polygon(const std::vector<Eigen::Vector2d>&
   return chords;
 }
 
-std::optional<Light> fit_rectangle(const ImageView& lines, const Blob& blob,
-                                   const std::vector<EdgePoint>& outline,
-                                   const Background& background, const LightShape& shape,
-                                   const std::vector<Eigen::Vector2d>& sizes_m) {
+std::optional<Light> fit_rectangular_light(const ImageView& lines, const Blob& blob,
+                                           const std::vector<EdgePoint>& outline,
+                                           const Background& background, const LightShape& shape,
+                                           const std::vector<Eigen::Vector2d>& sizes_m) {
   constexpr double min_px = 10, max_aspect = 40;
-  const PixelBox box = blob.bounding_box();
+  const PixelBox box = blob.blob_bounding_box();
   if (outline.size() < kMinOutlinePoints || std::min(box.width, box.height) < min_px) return {};
   const auto in_plane = project_outline_to_plane(outline, shape);
   if (!in_plane) return std::nullopt;
   const double per_px = in_plane->per_px;
-  const auto first = find_initial_corners(*in_plane, shape.has_lens());
+  const auto first = find_initial_corners(*in_plane, shape.has_known_lens());
   if (!first) return std::nullopt;
 
   // A disc that stripes partly hide is less slender than this.
@@ -686,8 +688,8 @@ std::optional<Light> fit_rectangle(const ImageView& lines, const Blob& blob,
       found_edges[i] = fit_straight_edge(image, sides[i], search);
     }
     if (!std::ranges::all_of(found_edges, [](const auto& edge) { return edge.has_value(); })) {
-      if (!shape.has_lens() || !add_hidden_edges(image, sides, search, sizes_m, found_edges) ||
-          is_rather_round(sides)) {
+      if (!shape.has_known_lens() ||
+          !add_hidden_edges(image, sides, search, sizes_m, found_edges) || is_rather_round(sides)) {
         return std::nullopt;
       }
     }

@@ -23,7 +23,7 @@ inline constexpr double kUnknownTiltSd = 0.06;
 ///
 /// @param lines    image whose rows are the scanlines
 /// @param blob     lit pixels of the light
-/// @param outline  result of find_outline() for the blob, (column, row)
+/// @param outline  result of find_blob_outline() for the blob, (column, row)
 /// @param sizes_m  lengths of both axes of the map's rectangles, used only for hidden edges
 /// @return  the light; its sigma is propagated from the eight ends of the sides, and `low` and
 ///     `high` include two standard deviations of the sides
@@ -48,10 +48,10 @@ inline constexpr double kUnknownTiltSd = 0.06;
 ///     ratio above 40.
 ///   - An edge that is not hidden is outside the image or not found.
 ///   - Edges are hidden and a circle explains more of the outline.
-std::optional<Light> fit_rectangle(const ImageView& lines, const Blob& blob,
-                                   const std::vector<EdgePoint>& outline,
-                                   const Background& background, const LightShape& shape,
-                                   const std::vector<Eigen::Vector2d>& sizes_m);
+std::optional<Light> fit_rectangular_light(const ImageView& lines, const Blob& blob,
+                                           const std::vector<EdgePoint>& outline,
+                                           const Background& background, const LightShape& shape,
+                                           const std::vector<Eigen::Vector2d>& sizes_m);
 
 /// Returns the pixels inside a convex polygon, (column, row), on each line of an image of `size`.
 std::vector<PixelRun> find_chords_in_polygon(const std::vector<Eigen::Vector2d>& polygon,

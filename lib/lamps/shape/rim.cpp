@@ -55,9 +55,9 @@ struct Ellipse {
 Matrix2 compute_unit_plane_from_pixel(const LightShape& shape, const Eigen::Vector2d& pixel) {
   constexpr double step_px = 1;
   Matrix2 derivative = Matrix2::Identity();
-  const auto at = shape.level_plane_from_pixel(shape.swap_image_and_scanline_axes(pixel));
+  const auto at = shape.level_plane_point_from_pixel(shape.swap_image_and_scanline_axes(pixel));
   for (int i = 0; i < 2; ++i) {
-    const auto beside = shape.level_plane_from_pixel(
+    const auto beside = shape.level_plane_point_from_pixel(
         shape.swap_image_and_scanline_axes(pixel + step_px * Eigen::Vector2d::Unit(i)));
     if (!at || !beside) return Matrix2::Identity();
     derivative.col(i) = *beside - *at;
@@ -80,10 +80,10 @@ class Face {
       : box_(box), window_(window) {
     constexpr double fraction = 0.02;
     const auto dark = static_cast<float>(background.level);
-    levels_.reserve(std::size_t(box.area()));
-    for (int row = box.y; row < box.bottom(); ++row) {
-      for (int column = box.x; column < box.right(); ++column) {
-        levels_.push_back(static_cast<float>(image.level_at(column, row)) - dark);
+    levels_.reserve(std::size_t(box.area_px()));
+    for (int row = box.y; row < box.end_row(); ++row) {
+      for (int column = box.x; column < box.end_column(); ++column) {
+        levels_.push_back(static_cast<float>(image.gray_level_at_pixel(column, row)) - dark);
       }
     }
     const double brightest = *std::max_element(levels_.begin(), levels_.end());
@@ -96,7 +96,7 @@ class Face {
   /// Returns the scanlines of bright stripes.
   const std::vector<int>& bright_stripe_scanlines() const { return lit_; }
   bool has(int column) const {
-    return column >= box_.x + window_ && column + window_ <= box_.right();
+    return column >= box_.x + window_ && column + window_ <= box_.end_column();
   }
 
   /// Returns the mean levels before and after the border between a column and the previous one.
@@ -111,7 +111,7 @@ class Face {
     const auto [before, after] = around(line, column);
     const double outside = begins ? before : after, inside = begins ? after : before;
     const int further = column - 1 + (begins ? 2 : -1) * window_;
-    const double beyond = mean(line, std::clamp(further, box_.x, box_.right() - 1));
+    const double beyond = mean(line, std::clamp(further, box_.x, box_.end_column() - 1));
     const double ratio = (inside + soft_) / (outside + soft_);
     const double slope = std::max(1.0, (beyond + soft_) / (inside + soft_));
     return std::log(ratio / slope);
@@ -146,7 +146,7 @@ class Face {
   /// the first pixel is used.
   void compute_moving_means() {
     means_.reserve(levels_.size());
-    for (int row = box_.y; row < box_.bottom(); ++row) {
+    for (int row = box_.y; row < box_.end_row(); ++row) {
       const float* line = levels_.data() + index(row, box_.x);
       double sum = double(line[0]) * window_;
       for (int column = 0; column < box_.width; ++column) {
@@ -273,13 +273,13 @@ Ellipse make_ellipse(const Light& light, const LightShape& shape) {
                         high = shape.swap_image_and_scanline_axes(light.high);
   const Eigen::Vector2d center = (low + high) / 2;
   Matrix2 unit_from_pixel;
-  const auto at = shape.level_plane_from_pixel(shape.swap_image_and_scanline_axes(center));
+  const auto at = shape.level_plane_point_from_pixel(shape.swap_image_and_scanline_axes(center));
   for (int i = 0; i < 2; ++i) {
     // The difference spans the whole outline, because of lens distortion.
     const double reach_px = (high - low)[i] / 2;
-    const auto beside = shape.level_plane_from_pixel(
+    const auto beside = shape.level_plane_point_from_pixel(
         shape.swap_image_and_scanline_axes(center + reach_px * Eigen::Vector2d::Unit(i)));
-    const auto before = shape.level_plane_from_pixel(
+    const auto before = shape.level_plane_point_from_pixel(
         shape.swap_image_and_scanline_axes(center - reach_px * Eigen::Vector2d::Unit(i)));
     if (!at || !beside || !before) return {center, Matrix2::Identity() / light.radius_px};
     unit_from_pixel.col(i) = light.unit_from_plane * (*beside - *before) / (2 * reach_px);
@@ -350,8 +350,8 @@ double measure_bright_level(const ImageView& image, const Blob& blob, double dar
   for (const PixelRun& run : blob.runs) {
     int& level = levels.emplace_back(0);
     for (const int quarters : {1, 2, 3}) {
-      const int column = run.begin + quarters * (run.width() / 4);
-      level = std::max(level, image.level_at(column, run.row));
+      const int column = run.begin + quarters * (run.run_width_px() / 4);
+      level = std::max(level, image.gray_level_at_pixel(column, run.row));
     }
   }
   const auto tenth = levels.begin() + std::ptrdiff_t(levels.size() * 9 / 10);
@@ -372,19 +372,21 @@ std::optional<Light> fit_light_to_steps(const ImageView& image, const std::vecto
   constexpr double gamma = 2, other_gamma = 1.8;
   StepImageModel picture{first_blur_px, gamma};
   for (int iteration = 1; iteration < num_iterations; ++iteration) {
-    auto steps = fit_rim_steps(image, light, lit_lines, background, picture, iteration > 1, shape);
-    if (!estimate_outline_offset(steps.pieces, shape.has_lens())) return std::nullopt;
+    auto steps = fit_brightness_steps_at_rim(image, light, lit_lines, background, picture,
+                                             iteration > 1, shape);
+    if (!estimate_outline_offset(steps.pieces, shape.has_known_lens())) return std::nullopt;
     picture.blur_px = steps.blur_px;
     auto better = shape.fit_light_to_outline(std::move(steps.points), background);
     if (!better || 2 * better->outline.size() < light.outline.size()) return std::nullopt;
     light = std::move(*better);
   }
-  const auto steps = fit_rim_steps(image, light, lit_lines, background, picture, true, shape);
-  const auto shift = estimate_outline_offset(steps.pieces, shape.has_lens());
+  const auto steps =
+      fit_brightness_steps_at_rim(image, light, lit_lines, background, picture, true, shape);
+  const auto shift = estimate_outline_offset(steps.pieces, shape.has_known_lens());
   picture.gamma = other_gamma;
   const auto other = estimate_outline_offset(
-      fit_rim_steps(image, light, lit_lines, background, picture, true, shape).pieces,
-      shape.has_lens());
+      fit_brightness_steps_at_rim(image, light, lit_lines, background, picture, true, shape).pieces,
+      shape.has_known_lens());
   if (!shift || !other ||
       !(shift->num_inliers > min_inlier_fraction * double(steps.num_examined))) {
     return std::nullopt;
@@ -401,8 +403,9 @@ bool is_blob_unevenly_lit(const ImageView& image, const Blob& blob,
   constexpr double much = 3, min_ends = 0.2;
   constexpr int min_width = 8;
   if (outline.empty()) return false;
-  const auto wide = std::count_if(blob.runs.begin(), blob.runs.end(),
-                                  [](const PixelRun& run) { return run.width() >= min_width; });
+  const auto wide = std::count_if(blob.runs.begin(), blob.runs.end(), [](const PixelRun& run) {
+    return run.run_width_px() >= min_width;
+  });
   if (double(outline.size()) < min_ends * 2 * double(wide)) return true;
   std::vector<double> levels;
   levels.reserve(outline.size());
@@ -415,7 +418,7 @@ std::optional<Rim> fit_rim_of_light(const ImageView& image, const Blob& blob,
                                     const Background& background, const LightShape& shape) {
   constexpr int min_size = 20, min_lines = 10;
   constexpr double margin = 0.2, min_step = 0.28;
-  const PixelBox box = blob.bounding_box();
+  const PixelBox box = blob.blob_bounding_box();
   if (std::min(box.width, box.height) < min_size) return std::nullopt;
   const int margin_px = static_cast<int>(margin * std::max(box.width, box.height));
   const PixelBox wide = expand_and_clip_box(box, margin_px, image.size());

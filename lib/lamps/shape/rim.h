@@ -43,7 +43,8 @@ struct Rim {
 ///
 /// 2. Fits a circle, or an ellipse without a lens, to the clearest steps near it.
 ///
-/// 3. Fits steps to the pixels next to it, see fit_rim_steps(). If 60 % of the pieces show a step,
+/// 3. Fits steps to the pixels next to it, see fit_brightness_steps_at_rim(). If 60 % of the pieces
+/// show a step,
 ///   the steps define the rim and the sigma of its center. Sigma includes the shift that another
 ///   tone curve causes. Otherwise sigma is the larger one of the scatter of the points and the
 ///   jackknife over eight pieces of the outline.

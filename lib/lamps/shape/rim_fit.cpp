@@ -27,10 +27,10 @@ class Levels {
     const PixelBox box{x, y, static_cast<int>(high.x()) + 1 - x,
                        static_cast<int>(high.y()) + 1 - y};
     int brightest = 0;
-    const ImageView pixels = image.part(box);
+    const ImageView pixels = image.crop_to_box(box);
     for (int row = 0; row < pixels.height; ++row) {
       for (int column = 0; column < pixels.width; ++column) {
-        brightest = std::max(brightest, pixels.level_at(column, row));
+        brightest = std::max(brightest, pixels.gray_level_at_pixel(column, row));
       }
     }
     if (brightest > 0) scale_ = 255.0 / brightest;
@@ -38,7 +38,9 @@ class Levels {
 
   int columns() const { return image_.width; }
   double to_relative_level(double level) const { return scale_ * level; }
-  double at(int row, int column) const { return to_relative_level(image_.level_at(column, row)); }
+  double at(int row, int column) const {
+    return to_relative_level(image_.gray_level_at_pixel(column, row));
+  }
 
  private:
   ImageView image_;
@@ -169,7 +171,7 @@ class CrossedOutline {
   /// Returns the distance from the center as a fraction of that of the outline.
   double relative_radius_at(double column, double line) const {
     constexpr double far = 10;
-    const auto plane = shape_.level_plane_from_pixel(
+    const auto plane = shape_.level_plane_point_from_pixel(
         shape_.swap_image_and_scanline_axes(Eigen::Vector2d(column, line)));
     return plane ? (light_.unit_from_plane * (*plane - light_.plane_center)).norm() : far;
   }
@@ -283,19 +285,20 @@ std::optional<Step> fit_step_of_piece(const Piece& piece, double dark,
     const StepVector limit{0.7, 0.5, 0.1, 0.5, 0.1, 0.05, 0.3};
     model.x -= last->step.cwiseMin(limit).cwiseMax(-limit);
     if (!(std::abs(model.x[kAt]) < farthest_px)) return std::nullopt;
-    const StepVector sds = last->covariance().diagonal().cwiseSqrt();
+    const StepVector sds = last->parameter_covariance().diagonal().cwiseSqrt();
     if ((last->step.array().abs() < min_step_sds * sds.array()).all()) break;
   }
-  const auto covariance = last->covariance();
+  const auto covariance = last->parameter_covariance();
   return Step{model.x[kAt], std::sqrt(covariance(kAt, kAt)), model.x[kLogBlur],
               std::sqrt(covariance(kLogBlur, kLogBlur))};
 }
 
 }  // namespace
 
-RimSteps fit_rim_steps(const ImageView& image, const Light& light,
-                       const std::vector<int>& lit_lines, const Background& background,
-                       const StepImageModel& picture, bool blur_known, const LightShape& shape) {
+RimSteps fit_brightness_steps_at_rim(const ImageView& image, const Light& light,
+                                     const std::vector<int>& lit_lines,
+                                     const Background& background, const StepImageModel& picture,
+                                     bool blur_known, const LightShape& shape) {
   constexpr double piece_radius_fraction = 0.2, min_lines = 6, max_sd_px = 0.5;
   constexpr double min_reach_px = 7, reach_blur_ratio = 4;
   constexpr double blur_sd_fraction = 0.05;  // effect of sharpening and compression
@@ -344,13 +347,13 @@ std::optional<OutlineShift> estimate_shift(const std::vector<RimPiece>& pieces) 
   std::optional<MEstimateStep<N>> last;
   for (int round = 0; round < num_iterations; ++round) {
     last = compute_m_estimate_step<N>(weights, tolerance, [&](std::size_t i) {
-      const auto& [inwards, behind_px, sd_px] = pieces[i];
+      const auto& [inwards, step_depth_px, sd_px] = pieces[i];
       const double c = inwards.x(), s = inwards.y();
       CurveDistance<N> result;
       result.slope.template head<3>() << -c, -s, 1;
       if constexpr (N > 3) result.slope.template tail<2>() << s * s - c * c, -2 * c * s;
       result.slope /= sd_px;
-      result.error = behind_px / sd_px + result.slope.dot(x);
+      result.error = step_depth_px / sd_px + result.slope.dot(x);
       return result;
     });
     if (!last) return std::nullopt;

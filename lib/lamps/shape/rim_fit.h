@@ -20,14 +20,14 @@ struct StepImageModel {
 };
 
 /// Piece of a rim that neighboring scanlines cross, with the step of light found there. `inwards`
-/// is the unit normal (column, line) towards the center. `behind_px` is the distance of the step
-/// from the outline, px, positive inwards; `sd_px` is its standard deviation.
+/// is the unit normal (column, line) towards the center. `step_depth_px` is the distance of the
+/// step from the outline, px, positive inwards; `sd_px` is its standard deviation.
 struct RimPiece {
   Eigen::Vector2d inwards;
-  double behind_px, sd_px;
+  double step_depth_px, sd_px;
 };
 
-/// Result of fit_rim_steps().
+/// Result of fit_brightness_steps_at_rim().
 struct RimSteps {
   std::vector<RimPiece> pieces;
   /// Number of examined pieces, with or without a clear step.
@@ -50,9 +50,10 @@ struct RimSteps {
 /// because half of a coded level is not half of the light: the larger the step, the further out it
 /// appears (lib/THEORY.md). A clipped pixel is a lower bound of its light. The blur is also fitted
 /// unless `blur_known`.
-RimSteps fit_rim_steps(const ImageView& image, const Light& light,
-                       const std::vector<int>& lit_lines, const Background& background,
-                       const StepImageModel& picture, bool blur_known, const LightShape& shape);
+RimSteps fit_brightness_steps_at_rim(const ImageView& image, const Light& light,
+                                     const std::vector<int>& lit_lines,
+                                     const Background& background, const StepImageModel& picture,
+                                     bool blur_known, const LightShape& shape);
 
 /// Offset of an outline, (column, line), estimated from its pieces, and its covariance.
 struct OutlineShift {

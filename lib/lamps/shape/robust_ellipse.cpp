@@ -38,7 +38,7 @@ std::optional<Circle> find_best_supported_circle(std::span<const Eigen::Vector2d
   std::optional<Circle> best;
   double max_score = kMinCirclePoints - 1;
   const std::size_t n = points.size();
-  const double largest = compute_outline_extent(points);
+  const double largest = compute_bounding_box_diagonal(points);
   std::uint32_t state = 1;
   const auto next = [&] {
     state = state * 1664525 + 1013904223;
@@ -85,7 +85,7 @@ struct Conic {
 
 }  // namespace
 
-double compute_outline_extent(std::span<const Eigen::Vector2d> points) {
+double compute_bounding_box_diagonal(std::span<const Eigen::Vector2d> points) {
   Eigen::AlignedBox2d box;
   for (const Eigen::Vector2d& point : points) box.extend(point);
   return box.isEmpty() ? 0 : box.diagonal().norm();
@@ -108,7 +108,7 @@ std::optional<RobustEllipse> fit_robust_circle(std::span<const Eigen::Vector2d> 
     if (!better) return std::nullopt;
     center -= better->step.head<2>();
     radius -= better->step[2];
-    fit.center_covariance = better->covariance().topLeftCorner<2, 2>();
+    fit.center_covariance = better->parameter_covariance().topLeftCorner<2, 2>();
     fit.inliers = std::move(better->inliers);
     fit.count = better->count;
     if (better->step.norm() < 1e-3 * tolerance) break;
@@ -123,11 +123,11 @@ std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d>
                                                 std::span<const double> weights, double tolerance) {
   constexpr double max_oval = 1.0 / 8, max_axis_ratio = 3;
   constexpr int num_iterations = 10;
-  const double oval = std::max(tolerance, max_oval * compute_outline_extent(points) / 2);
+  const double oval = std::max(tolerance, max_oval * compute_bounding_box_diagonal(points) / 2);
   const auto circle = fit_robust_circle(points, weights, oval);
   if (!circle) return std::nullopt;
   // Computed in units of the circle, so that center and conic have similar scales.
-  const double unit = circle->circle().radius;
+  const double unit = circle->to_circle().radius;
   Conic ellipse{Eigen::Vector2d::Zero(), Matrix2::Identity()};
   RobustEllipse fit{};
   for (int iteration = 0; iteration < num_iterations; ++iteration) {
@@ -142,11 +142,11 @@ std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d>
     ellipse.conic(0, 1) -= better->step[3];
     ellipse.conic(1, 0) = ellipse.conic(0, 1);
     ellipse.conic(1, 1) -= better->step[4];
-    fit.center_covariance = better->covariance().topLeftCorner<2, 2>() * (unit * unit);
+    fit.center_covariance = better->parameter_covariance().topLeftCorner<2, 2>() * (unit * unit);
     fit.inliers = std::move(better->inliers);
     fit.count = better->count;
   }
-  const auto axes = eigendecompose_symmetric(Eigen::Matrix2d(ellipse.conic));
+  const auto axes = eigendecompose_symmetric_matrix(Eigen::Matrix2d(ellipse.conic));
   const double min_eigenvalue = axes.values[0], max_eigenvalue = axes.values[1];
   if (!(min_eigenvalue * max_axis_ratio * max_axis_ratio > max_eigenvalue)) return std::nullopt;
   fit.center = circle->center + unit * ellipse.center;
@@ -168,7 +168,7 @@ std::optional<RobustEllipse> fit_slender_ellipse(std::span<const Eigen::Vector2d
     scatter += (point - middle) * (point - middle).transpose() / count;
   }
   const auto compute_square_root = [](const Matrix2& square) -> Matrix2 {
-    const auto axes = eigendecompose_symmetric(Eigen::Matrix2d(square));
+    const auto axes = eigendecompose_symmetric_matrix(Eigen::Matrix2d(square));
     return axes.vectors * axes.values.cwiseMax(0).cwiseSqrt().asDiagonal() *
            axes.vectors.transpose();
   };

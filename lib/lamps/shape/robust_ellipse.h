@@ -25,11 +25,11 @@ struct RobustEllipse {
   int count;
 
   /// Returns the circle. @pre The fit is that of fit_robust_circle().
-  Circle circle() const { return {center, rim_from_circle(0, 0)}; }
+  Circle to_circle() const { return {center, rim_from_circle(0, 0)}; }
 };
 
 /// Returns the diagonal of the bounding box of the points; 0 if there are none.
-double compute_outline_extent(std::span<const Eigen::Vector2d> points);
+double compute_bounding_box_diagonal(std::span<const Eigen::Vector2d> points);
 
 /// Fits the circle that most of the points support. Selects the best of many circles through three
 /// points each (RANSAC, Fischler and Bolles 1981, with a fixed choice of triples). Then applies

@@ -78,7 +78,7 @@ OutlineSums::OutlineSums(std::span<const Eigen::Vector2d> points, std::span<cons
   }
 }
 
-std::optional<OutlineSums::Estimate> OutlineSums::solve_with_oval_prior(
+std::optional<OutlineSums::Estimate> OutlineSums::solve_outline_with_oval_prior(
     const std::optional<Oval>& known) const {
   constexpr int unknowns = 5, min_points = 2 * unknowns;
   if (count_ < min_points) return std::nullopt;
@@ -110,7 +110,7 @@ std::optional<Shear> Shear::estimate_shear_from_outlines(std::span<const Outline
   constexpr double contradicts = 14;   // a chi-square of 2
   std::vector<MeasuredOval> ovals;
   for (const OutlineSums& light : lights) {
-    const auto estimate = light.solve_with_oval_prior(std::nullopt);
+    const auto estimate = light.solve_outline_with_oval_prior(std::nullopt);
     if (!estimate) continue;
     const Matrix2 covariance = estimate->covariance.bottomRightCorner<2, 2>();
     if (covariance.trace() > 2 * max_sd * max_sd) continue;
@@ -142,7 +142,7 @@ Oval Shear::predict_oval_from_motion(const OutlineSums& light) const {
           from_motion * covariance_ * from_motion.transpose() + compute_model_covariance(oval)};
 }
 
-Eigen::Vector2d Shear::motion_per_scanline_of(const OutlineSums& light) const {
+Eigen::Vector2d Shear::motion_per_scanline(const OutlineSums& light) const {
   const Eigen::Vector2d& at = light.fitted_circle().center;
   return 2 * (motion_.head<2>() + motion_[2] * Eigen::Vector2d(-at.y(), at.x()));
 }

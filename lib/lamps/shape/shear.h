@@ -48,7 +48,7 @@ class OutlineSums {
   /// Solves for p, with the oval as a prior if it is known. The variance is that of the residuals
   /// times the number of points with a common error. Returns std::nullopt if the points do not
   /// determine p.
-  std::optional<Estimate> solve_with_oval_prior(const std::optional<Oval>& known) const;
+  std::optional<Estimate> solve_outline_with_oval_prior(const std::optional<Oval>& known) const;
 
   bool empty() const { return count_ == 0; }
   const Circle& fitted_circle() const { return circle_; }
@@ -80,7 +80,7 @@ class Shear {
   /// Returns the oval of a light's outline that the motion causes, with its covariance.
   Oval predict_oval_from_motion(const OutlineSums& light) const;
   /// Returns the motion of a light in the level plane per scanline.
-  Eigen::Vector2d motion_per_scanline_of(const OutlineSums& light) const;
+  Eigen::Vector2d motion_per_scanline(const OutlineSums& light) const;
 
  private:
   Shear(const Eigen::Vector3d& motion, const Eigen::Matrix3d& covariance)

@@ -104,14 +104,14 @@ class Samples {
   /// Returns true if a scanline is not dark.
   bool is_scanline_lit(int line) const {
     constexpr double minimum = 0.1;
-    const auto lit = image_.levels.at(line);
+    const auto lit = image_.levels.scanline_level(line);
     return lit && lit->level > minimum;
   }
 
   /// Returns the pixel, (column, row), on the side; std::nullopt if it is outside the image.
   std::optional<Eigen::Vector2d> find_pixel(double t) const {
     const auto pixel =
-        image_.shape.pixel_from_level_plane(side_.from + t * (side_.to - side_.from));
+        image_.shape.pixel_from_level_plane_point(side_.from + t * (side_.to - side_.from));
     if (!pixel) return std::nullopt;
     const Eigen::Vector2d at = image_.shape.swap_image_and_scanline_axes(*pixel).array().round();
     const ImageSize size = image_.lines.size();
@@ -124,7 +124,8 @@ class Samples {
   bool add_place(const Eigen::Vector2d& middle, int across, double reach_px) {
     constexpr double apart_px = 2;
     const auto plane = [&](const Eigen::Vector2d& pixel) {
-      return image_.shape.level_plane_from_pixel(image_.shape.swap_image_and_scanline_axes(pixel));
+      return image_.shape.level_plane_point_from_pixel(
+          image_.shape.swap_image_and_scanline_axes(pixel));
     };
     const auto here = plane(middle);
     const auto right = plane(middle + Eigen::Vector2d(apart_px, 0));
@@ -147,13 +148,13 @@ class Samples {
         if (can_leave_image_) continue;
         return false;
       }
-      const auto lit = image_.levels.at(row);
+      const auto lit = image_.levels.scanline_level(row);
       if (!lit) continue;
       const Eigen::Vector2d away = *here + plane_from_pixel * (pixel - middle) - side_.from;
       const double fraction = image_.levels.relative_level_at_column(column);
       samples.push_back({row,
                          {fraction * lit->level, fraction * lit->sd},
-                         (image_.lines.level_at(column, row) - image_.dark) /
+                         (image_.lines.gray_level_at_pixel(column, row) - image_.dark) /
                              image_.levels.max_level_above_dark(),
                          away.dot(side_.edge_direction()) / length,
                          away.dot(inwards) / px,
@@ -218,11 +219,11 @@ std::optional<Matrix2> compute_ends_covariance(const Model& model,
   double count = 0;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (!inliers[i]) continue;
-    normal.add_row(model.residual(samples[i]).slope, 0, weights[i]);
+    normal.add_residual_row(model.residual(samples[i]).slope, 0, weights[i]);
     ++count;
   }
   for (std::size_t which = 0; which < kNumPriors; ++which) {
-    normal.add_row(evaluate_prior(model, which, priors).slope, 0);
+    normal.add_residual_row(evaluate_prior(model, which, priors).slope, 0);
   }
   const Cholesky<kUnknowns> factor(normal);
   if (!factor.has_full_rank(1e-12) || !(count > kUnknowns)) return std::nullopt;
@@ -427,17 +428,18 @@ std::optional<StraightEdge> fit_straight_edge(const EdgeImage& image, const Side
   if (all.samples.size() < minimum) return std::nullopt;
   const double length_px = all.length_px;
   const double focal_px = std::hypot(lines.width, lines.height) / 2;
-  const double bow_sd_px = shape.has_lens() ? straight_px : length_px * length_px / (12 * focal_px);
+  const double bow_sd_px =
+      shape.has_known_lens() ? straight_px : length_px * length_px / (12 * focal_px);
   auto edge = fit(all, side, per_px, {length_px, search.blur_px, bow_sd_px});
   if (!edge) return std::nullopt;
   const Side& found = edge->side;
   const auto points = static_cast<int>(length_px);
   for (int i = 0; i < points; ++i) {
     const double t = (i + 0.5) / points;
-    const auto pixel = shape.pixel_from_level_plane(found.from + t * (found.to - found.from));
+    const auto pixel = shape.pixel_from_level_plane_point(found.from + t * (found.to - found.from));
     if (!pixel) continue;
     const Eigen::Vector2d at = shape.swap_image_and_scanline_axes(*pixel);
-    const auto lit = levels.at(static_cast<int>(std::lround(at.y())));
+    const auto lit = levels.scanline_level(static_cast<int>(std::lround(at.y())));
     if (!lit || lit->level < min_lit) continue;
     edge->points.push_back(
         {at, lit->level * levels.max_level_above_dark(), rise_of_blur * edge->blur_px, false});

@@ -104,7 +104,8 @@ LampClassifier fit_lamp_classifier(std::span<const LabeledLight> lights) {
   return classifier;
 }
 
-std::optional<int> identify_lamp(const LampClassifier& classifier, const Stripes& stripes) {
+std::optional<int> identify_lamp_by_classifier(const LampClassifier& classifier,
+                                               const Stripes& stripes) {
   constexpr double min_probability = 0.99, farthest = 6, farthest_unclear = 3;
   const LampFeatures z = standardize_features(classifier, compute_classifier_features(stripes));
   const Eigen::LLT<Eigen::Matrix4d> factor(classifier.covariance);
@@ -156,7 +157,7 @@ Confusion cross_validate_lamp_classifier(std::span<const LabeledLight> lights,
     }
     const LampClassifier classifier = train(others);
     for (const LabeledLight& light : held_out) {
-      const auto answer = identify_lamp(classifier, light.stripes);
+      const auto answer = identify_lamp_by_classifier(classifier, light.stripes);
       ++confusion.counts(index_of(light.lamp), answer ? index_of(*answer) : unknown);
     }
   }
@@ -168,31 +169,31 @@ namespace {
 constexpr const char* kFormat = "vlp-classifier/1";
 
 LampFeatures read_features(const YamlValue& value) {
-  return LampFeatures(value.get_numbers(kLampFeatures.size()).data());
+  return LampFeatures(value.read_yaml_numbers(kLampFeatures.size()).data());
 }
 
 void check_features(const YamlValue& value) {
-  const auto names = value.get_list();
+  const auto names = value.read_yaml_list();
   std::string known;
   for (const std::string_view name : kLampFeatures) {
     known.append(known.empty() ? "" : ", ").append(name);
   }
   bool same = names.size() == kLampFeatures.size();
   for (std::size_t i = 0; same && i < names.size(); ++i)
-    same = names[i].get_text() == kLampFeatures[i];
-  if (!same) throw value.make_error("should be [" + known + "]: train the classifier again");
+    same = names[i].read_yaml_text() == kLampFeatures[i];
+  if (!same) throw value.make_yaml_error("should be [" + known + "]: train the classifier again");
 }
 
 Eigen::Matrix4d read_covariance(const YamlValue& value) {
-  const auto rows = value.get_list();
+  const auto rows = value.read_yaml_list();
   if (rows.size() != kLampFeatures.size())
-    throw value.make_error("should be four rows of four numbers");
+    throw value.make_yaml_error("should be four rows of four numbers");
   Eigen::Matrix4d covariance;
   for (int row = 0; row < 4; ++row) {
     covariance.row(row) = read_features(rows[static_cast<std::size_t>(row)]).transpose();
   }
-  if (covariance != covariance.transpose() || !invert_positive_definite(covariance)) {
-    throw value.make_error("is not a covariance: it should be symmetric and positive");
+  if (covariance != covariance.transpose() || !invert_positive_definite_matrix(covariance)) {
+    throw value.make_yaml_error("is not a covariance: it should be symmetric and positive");
   }
   return covariance;
 }
@@ -200,58 +201,58 @@ Eigen::Matrix4d read_covariance(const YamlValue& value) {
 LampClassifier::Class read_class(YamlMap map) {
   constexpr int largest = std::numeric_limits<int>::max();
   LampClassifier::Class lamp;
-  lamp.lamp = map.get_required_column("id").get_integer_within(0, largest);
-  lamp.examples = map.get_required_column("examples").get_integer_within(1, largest);
-  lamp.center = read_features(map.get_required_column("center"));
-  map.check_all_keys_read();
+  lamp.lamp = map.get_required_yaml_value("id").read_yaml_integer_within(0, largest);
+  lamp.examples = map.get_required_yaml_value("examples").read_yaml_integer_within(1, largest);
+  lamp.center = read_features(map.get_required_yaml_value("center"));
+  map.check_all_yaml_keys_read();
   return lamp;
 }
 
 }  // namespace
 
 LampClassifier read_lamp_classifier(const std::filesystem::path& file) {
-  YamlMap document = read_yaml(file, kFormat);
+  YamlMap document = read_yaml_file(file, kFormat);
   LampClassifier classifier;
-  if (const auto value = document.get_optional("row_time_s")) {
-    classifier.row_time_s = value->get_number_within(1e-8, 1e-3, "s");
+  if (const auto value = document.get_optional_yaml_value("row_time_s")) {
+    classifier.row_time_s = value->read_yaml_number_within(1e-8, 1e-3, "s");
   }
-  check_features(document.get_required_column("features"));
-  classifier.mean = read_features(document.get_required_column("mean"));
-  const YamlValue scale = document.get_required_column("scale");
+  check_features(document.get_required_yaml_value("features"));
+  classifier.mean = read_features(document.get_required_yaml_value("mean"));
+  const YamlValue scale = document.get_required_yaml_value("scale");
   classifier.scale = read_features(scale);
-  if (!(classifier.scale.minCoeff() > 0)) throw scale.make_error("should be positive");
-  const auto lamps = document.get_required_column("lamps");
-  classifier.covariance = read_covariance(document.get_required_column("covariance"));
-  document.check_all_keys_read();
-  for (const YamlValue& item : lamps.get_list()) {
-    const auto lamp = read_class(item.get_mapping());
+  if (!(classifier.scale.minCoeff() > 0)) throw scale.make_yaml_error("should be positive");
+  const auto lamps = document.get_required_yaml_value("lamps");
+  classifier.covariance = read_covariance(document.get_required_yaml_value("covariance"));
+  document.check_all_yaml_keys_read();
+  for (const YamlValue& item : lamps.read_yaml_list()) {
+    const auto lamp = read_class(item.read_yaml_mapping());
     for (const auto& other : classifier.lamps) {
       if (other.lamp == lamp.lamp) {
-        throw item.make_error("id " + std::to_string(lamp.lamp) + " occurs twice");
+        throw item.make_yaml_error("id " + std::to_string(lamp.lamp) + " occurs twice");
       }
     }
     classifier.lamps.push_back(lamp);
   }
-  if (classifier.lamps.empty()) throw lamps.make_error("contains no lamp");
+  if (classifier.lamps.empty()) throw lamps.make_yaml_error("contains no lamp");
   return classifier;
 }
 
 void write_lamp_classifier(const std::filesystem::path& file, const LampClassifier& classifier) {
   YAML::Emitter out;
   out << YAML::BeginMap;
-  emit_plain_word(out, "format", kFormat);
-  if (classifier.row_time_s) emit_number(out, "row_time_s", *classifier.row_time_s);
+  emit_yaml_plain_word(out, "format", kFormat);
+  if (classifier.row_time_s) emit_yaml_number(out, "row_time_s", *classifier.row_time_s);
   out << YAML::Key << "features" << YAML::Value << YAML::Flow << YAML::BeginSeq;
   for (const std::string_view name : kLampFeatures) out << std::string(name);
   out << YAML::EndSeq;
-  emit_numbers(out, "mean", classifier.mean);
-  emit_numbers(out, "scale", classifier.scale);
+  emit_yaml_numbers(out, "mean", classifier.mean);
+  emit_yaml_numbers(out, "scale", classifier.scale);
   out << YAML::Key << "lamps" << YAML::Value << YAML::BeginSeq;
   for (const auto& lamp : classifier.lamps) {
     out << YAML::Flow << YAML::BeginMap;
-    emit_integer(out, "id", lamp.lamp);
-    emit_integer(out, "examples", lamp.examples);
-    emit_numbers(out, "center", lamp.center);
+    emit_yaml_integer(out, "id", lamp.lamp);
+    emit_yaml_integer(out, "examples", lamp.examples);
+    emit_yaml_numbers(out, "center", lamp.center);
     out << YAML::EndMap;
   }
   out << YAML::EndSeq;
@@ -259,7 +260,7 @@ void write_lamp_classifier(const std::filesystem::path& file, const LampClassifi
   out << YAML::Key << "covariance" << YAML::Value << YAML::BeginSeq;
   for (int row = 0; row < 4; ++row) {
     const LampFeatures values = classifier.covariance.row(row).transpose();
-    emit_inline_list(out, {values.data(), 4});
+    emit_yaml_inline_list(out, {values.data(), 4});
   }
   out << YAML::EndSeq << YAML::EndMap << YAML::Newline;
   write_file(file, out.c_str());

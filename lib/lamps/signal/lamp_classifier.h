@@ -85,7 +85,8 @@ LampClassifier fit_lamp_classifier(std::span<const LabeledLight> lights);
 /// - (z - c_k)^T C^-1 (z - c_k) exceeds 36 (3e-7 of normal lights), or 9 if the stripes are not
 ///   are_stripes_reliable().
 /// - The stripes are not are_stripes_readable().
-std::optional<int> identify_lamp(const LampClassifier& classifier, const Stripes& stripes);
+std::optional<int> identify_lamp_by_classifier(const LampClassifier& classifier,
+                                               const Stripes& stripes);
 
 /// Two lamps and their Mahalanobis distance, the square root of (c_j - c_k)^T C^-1 (c_j - c_k).
 struct LampDistance {
@@ -93,8 +94,8 @@ struct LampDistance {
   double distance;
 };
 
-/// Returns the pairs of lamps that identify_lamp() cannot separate, with a distance below 6. At
-/// distance 6 one light in forty is unknown.
+/// Returns the pairs of lamps that identify_lamp_by_classifier() cannot separate, with a distance
+/// below 6. At distance 6 one light in forty is unknown.
 std::vector<LampDistance> find_inseparable_lamps(const LampClassifier& classifier);
 
 /// Confusion matrix of a classifier for lights of known lamps.
@@ -104,10 +105,12 @@ struct Confusion {
   /// Number of lights by lamp (row) and by result (column); the last column is "unknown".
   Eigen::MatrixXi counts;
 
-  int right() const { return counts.diagonal().sum(); }
+  int count_correctly_identified() const { return counts.diagonal().sum(); }
   /// Returns the number of lights that are identified as another lamp.
-  int count_wrongly_identified() const { return counts.sum() - right() - unknown(); }
-  int unknown() const { return counts.rightCols<1>().sum(); }
+  int count_wrongly_identified() const {
+    return counts.sum() - count_correctly_identified() - count_unidentified();
+  }
+  int count_unidentified() const { return counts.rightCols<1>().sum(); }
 };
 
 /// Number of folds of the cross-validation.

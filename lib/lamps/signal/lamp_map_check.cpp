@@ -21,7 +21,7 @@ double compute_exposure_lines(const StripeConditions& conditions) {
 /// Returns the relative standard deviation of a lamp's period; 0 if the size of the lamp is
 /// unknown.
 double predict_lamp_period_sd(const Lamp& lamp, const StripeConditions& conditions) {
-  const auto lines = compute_scanlines_on_lamp(lamp, conditions);
+  const auto lines = count_scanlines_on_lamp(lamp, conditions);
   if (!lines) return 0;
   const double period = 1 / (*lamp.frequency_hz * conditions.row_time_s);
   return predict_relative_period_sd(period, *lines, compute_exposure_lines(conditions));
@@ -71,8 +71,8 @@ std::string explain_why_room_is_needed(const LampMapFile& lamps, const std::stri
   return "";
 }
 
-std::optional<double> compute_scanlines_on_lamp(const Lamp& lamp,
-                                                const StripeConditions& conditions) {
+std::optional<double> count_scanlines_on_lamp(const Lamp& lamp,
+                                              const StripeConditions& conditions) {
   const double above_m = lamp.position_m.z() - conditions.camera_height_m;
   const auto& size_m = lamp.shape.size_m;
   if (!size_m || !conditions.focal_px || !(above_m > 0)) return std::nullopt;
@@ -115,7 +115,7 @@ std::vector<UnreadableLamp> find_lamps_with_unreadable_period(const LampMap& lam
     if (!lamp.frequency_hz) continue;
     const double phase = std::numbers::pi * *lamp.frequency_hz * conditions.exposure_s.value_or(0);
     const double contrast = phase > 0 ? std::abs(std::sin(phase) / phase) : 1;
-    const auto lines = compute_scanlines_on_lamp(lamp, conditions);
+    const auto lines = count_scanlines_on_lamp(lamp, conditions);
     const double periods = lines ? kUsedHeight * *lines * *lamp.frequency_hz * conditions.row_time_s
                                  : std::numeric_limits<double>::infinity();
     const double period_lines = 1 / (*lamp.frequency_hz * conditions.row_time_s);

@@ -27,8 +27,7 @@ struct StripeConditions {
 /// size is the shorter axis of the lamp, which is across the scanlines in the worst case. Only the
 /// fraction kUsedHeight of the scanlines is used. Returns std::nullopt without a size or a focal
 /// length, or if the lamp is not above the camera.
-std::optional<double> compute_scanlines_on_lamp(const Lamp& lamp,
-                                                const StripeConditions& conditions);
+std::optional<double> count_scanlines_on_lamp(const Lamp& lamp, const StripeConditions& conditions);
 
 /// Predicts the relative standard deviation of the period that measure_stripes() measures on
 /// `lines` scanlines. A period is the slope of least-squares lines through the numbered begins and

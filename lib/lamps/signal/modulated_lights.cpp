@@ -65,7 +65,7 @@ LineProfile compute_profile(const CellLevels& cells, const ModulationMap& map,
   for (const auto& [step, begin, end] : region.spans) {
     for (int x = begin; x < end; x += kCellWidth_px) {
       const int cell = (x - cells.box.x) / kCellWidth_px;
-      weights[std::size_t(cell - first_cell)] += map.amplitude[map.index(step, cell)];
+      weights[std::size_t(cell - first_cell)] += map.amplitude[map.cell_index(step, cell)];
     }
   }
   const auto bin_at = [&](double line) {
@@ -73,11 +73,11 @@ LineProfile compute_profile(const CellLevels& cells, const ModulationMap& map,
     return static_cast<int>(std::clamp(bin, 0.0, double(cells.bins)));
   };
   const int begin = bin_at(region.box.y - margin_lines);
-  const int end = bin_at(region.box.bottom() + margin_lines);
+  const int end = bin_at(region.box.end_row() + margin_lines);
   LineProfile profile{
       cells.box.y + (begin + 0.5) * cells.lines_per_bin - 0.5, cells.lines_per_bin, {}};
   for (int bin = begin; bin < end; ++bin) {
-    const float* row = cells.row(bin) + first_cell;
+    const float* row = cells.bin_levels(bin) + first_cell;
     double sum = 0;
     for (std::size_t c = 0; c < weights.size(); ++c) sum += double(weights[c]) * double(row[c]);
     profile.levels.push_back(std::max(0.0, sum));
@@ -151,7 +151,7 @@ double compute_phase_coherence(const CellLevels& cells, const ModulationMap& map
   std::complex<double> sum;
   double amplitudes = 0;
   for (const auto& [step, begin, end] : region.spans) {
-    const double middle = (map.line(step) + 0.5 - cells.box.y) / cells.lines_per_bin;
+    const double middle = (map.scanline_of_step(step) + 0.5 - cells.box.y) / cells.lines_per_bin;
     const int first = std::max(0, static_cast<int>(std::ceil(middle - period)));
     const int last = std::min(cells.bins, static_cast<int>(std::floor(middle + period)));
     for (int x = begin; x < end; x += kCellWidth_px) {
@@ -159,7 +159,7 @@ double compute_phase_coherence(const CellLevels& cells, const ModulationMap& map
       std::complex<double> z;
       for (int bin = first; bin < last; ++bin) {
         const double weight = std::max(0.0, period - std::abs(bin + 0.5 - middle));
-        z += std::polar(weight * double(cells.row(bin)[cell]),
+        z += std::polar(weight * double(cells.bin_levels(bin)[cell]),
                         -2 * std::numbers::pi * (bin + 0.5) / period);
       }
       sum += z;
@@ -212,7 +212,7 @@ bool are_parts_of_one_light(const RegionCandidate& a, const RegionCandidate& b) 
   const auto size = [](const RegionCandidate& c) {
     return std::max(c.region.box.width, c.region.box.height);
   };
-  if (2 * compute_gap(a.region.box, b.region.box) > std::max(size(a), size(b))) return false;
+  if (2 * compute_box_gap_px(a.region.box, b.region.box) > std::max(size(a), size(b))) return false;
   return are_in_phase(a, a.fit, b, b.fit);
 }
 
@@ -229,9 +229,9 @@ template <std::size_t n>
 void add_region_area(const ModulationMap& map, const ModulatedRegion& region, double peak,
                      const std::array<double, n>& fractions, std::array<LitArea, n>& areas) {
   for (const auto& [step, begin, end] : region.spans) {
-    const double line = map.line(step);
+    const double line = map.scanline_of_step(step);
     for (int x = begin; x < end; x += kCellWidth_px) {
-      const double amplitude = map.amplitude[map.index(step, (x - map.box.x) / kCellWidth_px)];
+      const double amplitude = map.amplitude[map.cell_index(step, (x - map.box.x) / kCellWidth_px)];
       for (std::size_t i = 0; i < n; ++i) {
         if (amplitude < fractions[i] * peak) continue;
         areas[i].sum += Eigen::Vector2d(x + (kCellWidth_px - 1) / 2.0, line);
@@ -281,7 +281,7 @@ ModulatedLight make_light(const ModulationMap& map,
   for (const RegionCandidate* part : parts) {
     // Darker parts are light that the lamp casts on its surroundings.
     if (part->region.peak < double(kBorderFraction) * brightest.region.peak) continue;
-    light.box = around(light.box, part->region.box);
+    light.box = enclosing_box(light.box, part->region.box);
     add_region_area(map, part->region, brightest.region.peak, fractions, areas);
   }
   light.energy = areas[0].energy;
@@ -320,7 +320,7 @@ std::vector<ModulatedLight> join_candidates(const ModulationMap& map,
     return !light.lamp &&
            std::any_of(lights.begin(), lights.end(), [&](const ModulatedLight& other) {
              return other.lamp && other.energy > light.energy &&
-                    compute_gap(light.box, other.box) <
+                    compute_box_gap_px(light.box, other.box) <
                         std::max(other.box.width, other.box.height) / 2;
            });
   });

@@ -89,14 +89,14 @@ PeriodFit fit_periodic_signal(const LineProfile& profile, double period_lines) {
     if (weight == 0) continue;
     ++lit;
     const double value = profile.levels[i] / envelope.levels[i] - 1;
-    normal.add_row(compute_harmonics(start + step * double(i)), value, weight);
+    normal.add_residual_row(compute_harmonics(start + step * double(i)), value, weight);
     squares += weight * value * value;
   }
   fit.periods = lit / period;
   if (!(squares > 0)) return fit;
   const Cholesky<2 * kHarmonics> factor(normal);
   if (!factor.has_full_rank(1e-9)) return fit;
-  const HarmonicCoefficients coefficients = factor.solve(normal.gradient);
+  const HarmonicCoefficients coefficients = factor.solve_normal_equations(normal.gradient);
   fit.unexplained =
       std::clamp(1 - multiply_harmonics(coefficients, normal.gradient) / squares, 0.0, 1.0);
   fit.depth = std::hypot(coefficients[0], coefficients[1]);

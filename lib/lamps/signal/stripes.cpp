@@ -185,9 +185,9 @@ std::vector<PartLevels> measure_parts(const ImageView& image, const std::vector<
   for (const PixelRun& chord : chords) {
     PartLevels& line = levels.emplace_back();
     for (int part = 0; part < parts; ++part) {
-      const int from = chord.begin + chord.width() * part / parts;
-      const int to = std::max(from + 1, chord.begin + chord.width() * (part + 1) / parts);
-      line[part] = mean_level(image, {chord.row, from, to}) - dark;
+      const int from = chord.begin + chord.run_width_px() * part / parts;
+      const int to = std::max(from + 1, chord.begin + chord.run_width_px() * (part + 1) / parts);
+      line[part] = mean_run_level(image, {chord.row, from, to}) - dark;
     }
   }
   return levels;

@@ -35,7 +35,7 @@ constexpr const char* kAny = "any";
 
 /// Prints a line to stdout. Escapes control characters, so that names in records can neither add a
 /// line nor control the terminal.
-void print_line(const std::string& text) { fmt::print("{}\n", escape_for_single_line(text)); }
+void print_line(const std::string& text) { fmt::print("{}\n", escape_text_for_single_line(text)); }
 
 /// Opens the runs of a station, or of records alone. Reports the state of the spool. If the records
 /// are unavailable, commands that continue without them report it (warn_if_unavailable()).
@@ -46,22 +46,23 @@ std::unique_ptr<KnownRuns> open_runs(const StationRecordsOptions& options) {
   try {
     if (options.station.empty()) return std::make_unique<KnownRuns>(options.records);
     auto known = std::make_unique<KnownRuns>(read_station_config(options.station));
-    const std::string state = known->spool()->state();
+    const std::string state = known->station_spool()->describe_spool_state();
     if (!state.empty()) {
       spdlog::log(known->are_records_offline() ? spdlog::level::debug : spdlog::level::warn, "{}",
-                  escape_for_terminal(state));
+                  escape_text_for_terminal(state));
     }
     return known;
   } catch (const RecordsUnavailable& error) {
-    if (error.details != error.what()) spdlog::debug("{}", escape_for_terminal(error.details));
+    if (error.details != error.what()) spdlog::debug("{}", escape_text_for_terminal(error.details));
     throw;
   }
 }
 
 /// Reports that a command used the runs in the spool because the records are unavailable.
 void warn_if_unavailable(KnownRuns& known) {
-  if (known.spool() != nullptr && known.are_records_offline()) {
-    spdlog::warn("{}", escape_for_terminal(known.spool()->make_operator_notice()));
+  if (known.station_spool() != nullptr && known.are_records_offline()) {
+    spdlog::warn("{}",
+                 escape_text_for_terminal(known.station_spool()->make_spool_notice_for_operator()));
   }
 }
 
@@ -76,16 +77,16 @@ RunFilter remove_conditions_any(RunFilter filter) {
 /// Returns the filter of the options: runs of --station, unless --of-station is given.
 RunFilter make_filter_of_options(const StationRecordsOptions& options, const KnownRuns& known) {
   RunFilter filter = options.filter;
-  if (filter.station.empty() && known.station() != nullptr) {
-    filter.station = known.station()->station;
+  if (filter.station.empty() && known.station_config() != nullptr) {
+    filter.station = known.station_config()->station;
   }
   return remove_conditions_any(std::move(filter));
 }
 
 /// Returns the named run, or the last that the filter accepts.
-RunRecord load_archive_run(KnownRuns& known, const StationRecordsOptions& options) {
+RunRecord load_run_of_archive_session(KnownRuns& known, const StationRecordsOptions& options) {
   RunRecord run = options.run.empty() ? known.find_last_run(make_filter_of_options(options, known))
-                                      : known.find(options.run);
+                                      : known.find_run_by_id(options.run);
   warn_if_unavailable(known);
   return run;
 }
@@ -99,10 +100,10 @@ RunFilter make_filter_of_comparable_runs(const StationRecordsOptions& options,
 }
 
 /// Checks that all points are from one station, if neither options nor filter name a station.
-void check_points_of_one_station(const std::vector<TrendPoint>& points,
-                                 const StationRecordsOptions& options) {
+void check_values_are_of_one_station(const std::vector<TrendPoint>& points,
+                                     const StationRecordsOptions& options) {
   if (options.station.empty() && options.filter.station.empty())
-    check_points_of_one_station(points);
+    check_values_are_of_one_station(points);
 }
 
 /// Checks that --output is not an input of the command: the records, station.yaml, or a file named
@@ -110,11 +111,11 @@ void check_points_of_one_station(const std::vector<TrendPoint>& points,
 void check_output_option(const StationRecordsOptions& options, const KnownRuns& known) {
   if (options.output.empty()) return;
   std::vector<std::string> inputs{options.station, options.records};
-  if (const StationConfig* station = known.station()) {
+  if (const StationConfig* station = known.station_config()) {
     inputs.push_back(station->records);
     for (const auto& file : station->inputs) inputs.push_back(file.string());
   }
-  check_output_file(options.output, inputs);
+  check_output_is_not_input(options.output, inputs);
 }
 
 /// Returns the folder for the files of a run.
@@ -151,10 +152,10 @@ std::map<std::string, double> parse_references(const std::vector<std::string>& t
   return references;
 }
 
-std::string describe(const EstimateTest& estimate) {
+std::string format_estimate_test(const EstimateTest& estimate) {
   return fmt::format("{:>12.4g}{:>12.3g}{:>9.2f}{:>9.4f}   {:.4g} to {:.4g}{}", estimate.value,
                      estimate.standard_error, estimate.t, estimate.p, estimate.low, estimate.high,
-                     estimate.is_significant() ? "   shows" : "");
+                     estimate.differs_significantly_from_zero() ? "   shows" : "");
 }
 
 /// Prints bias and linearity of a station against reference units.
@@ -162,15 +163,16 @@ void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
   const auto references = parse_references(options.references);
   const auto known = open_runs(options);
   check_output_option(options, *known);
-  const auto points = load_judged_values(known->records(), options.metric,
-                                         make_filter_of_comparable_runs(options, *known));
-  check_points_of_one_station(points, options);
-  const auto values = select_reference_values(points, references);
+  const auto points = load_metric_of_judged_runs(known->station_records(), options.metric,
+                                                 make_filter_of_comparable_runs(options, *known));
+  check_values_are_of_one_station(points, options);
+  const auto values = select_values_of_reference_units(points, references);
   std::vector<std::string> units;
   units.reserve(references.size());
   for (const auto& [unit, reference] : references) units.push_back(unit);
   const BiasStudy study = run_study([&] {
-    check_runs_share_no_images(known->records(), points, select_study_values(points, units));
+    check_runs_share_no_images(known->station_records(), points,
+                               select_values_of_study_units(points, units));
     return analyze_bias_and_linearity(values);
   });
   constexpr const char* head = "{:<20}{:>10}{:>6}{:>12}{:>12}{:>9}{:>9}   {}";
@@ -182,10 +184,10 @@ void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
       fmt::format(head, "unit", "reference", "runs", "bias", "se", "t", "p", "95 % interval"));
   for (const UnitBias& unit : study.units) {
     print_line(fmt::format("{:<20}{:>10.4g}{:>6}{}", unit.unit, unit.reference, unit.count,
-                           describe(unit.bias)));
+                           format_estimate_test(unit.bias)));
   }
   const auto line = [](const char* name, const EstimateTest& estimate) {
-    fmt::print("{:<36}{}\n", name, describe(estimate));
+    fmt::print("{:<36}{}\n", name, format_estimate_test(estimate));
   };
   line("all", study.all);
   if (study.linearity) {
@@ -197,7 +199,7 @@ void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
                linearity.residual_sd, 100 * linearity.r_squared, "", "reference", "line");
     for (const UnitBias& unit : study.units) {
       const double at = linearity.predict_bias_at(unit.reference),
-                   half = linearity.confidence_band_at(unit.reference);
+                   half = linearity.confidence_half_width_at(unit.reference);
       print_line(fmt::format("{:<20}{:>10.4g}{:>18.4g}   {:.4g} to {:.4g}{}", unit.unit,
                              unit.reference, at, at - half, at + half,
                              std::abs(at) > half ? "   without 0" : ""));
@@ -214,10 +216,10 @@ bool includes_all_runs_of_camera(const RunFilter& filter) {
 
 }  // namespace
 
-void print_runs(const StationRecordsOptions& options) {
+void print_station_run_list(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
   RunFilter filter = make_filter_of_options(options, *known);
-  const auto runs = known->list_runs(filter);
+  const auto runs = known->list_run_summaries(filter);
   constexpr const char* line = "{:<34} {:<20} {:<8} {:<7} {:<12} {:<16} {}";
   print_line(
       fmt::format(line, "run", "ended (UTC)", "verdict", "kind", "station", "camera", "cause"));
@@ -228,7 +230,7 @@ void print_runs(const StationRecordsOptions& options) {
                            counts ? run.causes.substr(0, run.causes.find('\n'))
                                   : "was " + run.verdict + ": " + run.voided));
   }
-  const RunCounts counts = count_runs(runs);
+  const RunCounts counts = count_runs_by_verdict(runs);
   fmt::print("\n{} runs, {} passed, {} failed, {} invalid", runs.size(), counts.passed,
              counts.failed, counts.invalid);
   if (counts.voided > 0) fmt::print(", {} voided", counts.voided);
@@ -243,7 +245,7 @@ void print_runs(const StationRecordsOptions& options) {
                counts.cameras, counts.cameras_reworked, percent * *yield);
   }
   filter.has_open_hook = true;
-  const auto open = known->list_runs(filter);
+  const auto open = known->list_run_summaries(filter);
   const auto without = std::ranges::count_if(runs, [&](const RunSummary& run) {
     return std::ranges::find(open, run.run, &RunSummary::run) != open.end();
   });
@@ -252,12 +254,13 @@ void print_runs(const StationRecordsOptions& options) {
         "{} of them with a hook that failed or did not finish: 'vlp-station hook' runs it again\n",
         without);
   }
-  known->records();  // throws if the records are unavailable, because the list is incomplete
+  known
+      ->station_records();  // throws if the records are unavailable, because the list is incomplete
 }
 
-void print_run(const StationRecordsOptions& options) {
+void print_station_run_details(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
-  const RunRecord record = load_archive_run(*known, options);
+  const RunRecord record = load_run_of_archive_session(*known, options);
   for (const ScreenLine& line : make_verdict_screen(record)) print_line(line.text);
   fmt::print("\nmetrics without a gate\n");
   for (const CheckedMetric& metric : record.metrics) {
@@ -272,43 +275,43 @@ void print_run(const StationRecordsOptions& options) {
   fmt::print("images     {}, {} used\n", record.images.size(), record.count_used_images());
   for (const RunEvent& event : record.events) {
     const std::string who = event.who.empty() ? "" : event.who + ": ";
-    print_line(fmt::format("{:<11} {} {}{}", event.what, event.utc_text(), who, event.text));
+    print_line(fmt::format("{:<11} {} {}{}", event.what, event.event_time_utc(), who, event.text));
   }
 }
 
-void restore_run(const StationRecordsOptions& options) {
+void restore_run_files(const StationRecordsOptions& options) {
   const std::filesystem::path results = find_results_folder(options);
   const auto known = open_runs(options);
-  const RunRecord record = load_archive_run(*known, options);
-  const std::string no_verdict = find_verdict_problem(record);
+  const RunRecord record = load_run_of_archive_session(*known, options);
+  const std::string no_verdict = describe_verdict_problem(record);
   if (!no_verdict.empty()) throw InputError(record.run, no_verdict);
-  print_line(publish_run(record, {}, results, ExistingReport::replace).string());
+  print_line(publish_run_files(record, {}, results, ExistingReport::replace).string());
 }
 
 void write_calibration_certificate(const StationRecordsOptions& options) {
   const std::filesystem::path results = find_results_folder(options);
   const auto known = open_runs(options);
-  const RunRecord record = load_archive_run(*known, options);
+  const RunRecord record = load_run_of_archive_session(*known, options);
   print_line(write_calibration_certificate(record, results).string());
 }
 
-void list_or_delete_expired_folders(const StationRecordsOptions& options) {
+void list_or_delete_expired_run_folders(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
-  const StationConfig& config = *known->station();
+  const StationConfig& config = *known->station_config();
   if (!config.keep.images_days && !config.keep.results_days) {
     throw InputError(options.station, "nothing expires; add the key 'retention'");
   }
-  check_clock_is_not_behind(config, known->records());
-  const RetentionResult found = find_expired_folders(config, known->records());
+  check_clock_against_recorded_runs(config, known->station_records());
+  const RetentionResult found = find_expired_run_folders(config, known->station_records());
   constexpr double megabyte = 1e6;
   double all_mb = 0;
   std::size_t done = 0;
   for (const ExpiredFolder& expired : found.expired) {
     const double mb = double(expired.bytes) / megabyte;
     try {
-      if (options.remove) delete_expired_folder(expired, config, *known->spool());
+      if (options.remove) delete_expired_run_folder(expired, config, *known->station_spool());
     } catch (const InputError& error) {
-      spdlog::warn("{}", escape_for_terminal(error.what()));
+      spdlog::warn("{}", escape_text_for_terminal(error.what()));
       continue;
     }
     ++done;
@@ -328,27 +331,28 @@ void list_or_delete_expired_folders(const StationRecordsOptions& options) {
   }
   fmt::print("{} folders, {:.1f} MB{}\n", done, all_mb,
              options.remove ? " deleted" : ": --delete deletes them");
-  known->spool()->deliver_waiting_runs();
+  known->station_spool()->deliver_waiting_runs();
   if (done == found.expired.size()) return;
   // [FILE-1] `could not be deleted`
   throw std::runtime_error(fmt::format("{} of {} folders could not be deleted",
                                        found.expired.size() - done, found.expired.size()));
 }
 
-void void_run(const StationRecordsOptions& options) {
+void void_recorded_run(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
   const auto [record, problem, files_problem] =
-      void_run(*known, options.run, options.operator_name, options.reason);
-  if (!problem.empty()) spdlog::error("{}", escape_for_terminal(problem));
-  if (!files_problem.empty()) spdlog::warn("{}", escape_for_terminal(files_problem));
+      void_recorded_run(*known, options.run, options.operator_name, options.reason);
+  if (!problem.empty()) spdlog::error("{}", escape_text_for_terminal(problem));
+  if (!files_problem.empty()) spdlog::warn("{}", escape_text_for_terminal(files_problem));
   warn_if_unavailable(*known);
   print_line(fmt::format("{} {} {}: voided", record.run, record.camera, record.verdict));
-  for (const ScreenLine& line : make_hook_lines(record)) print_line(line.text);
+  for (const ScreenLine& line : make_pending_hook_lines(record)) print_line(line.text);
 }
 
-void print_audit_trail_check(const StationRecordsOptions& options) {
+void verify_records_by_audit_trail(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
-  const TrailCheck found = known->records().check(options.expected_digest);
+  const TrailCheck found =
+      known->station_records().check_records_by_audit_trail(options.expected_digest);
   for (const std::string& problem : found.problems) print_line(problem);
   fmt::print("{} runs, {} entries in the trail\n", found.runs, found.entries);
   if (!found.last_digest.empty()) fmt::print("last digest {}\n", found.last_digest);
@@ -360,16 +364,16 @@ void print_audit_trail_check(const StationRecordsOptions& options) {
       found.problems.size() == 1 ? "" : fmt::format(", and {} more", found.problems.size() - 1)));
 }
 
-void export_runs(const StationRecordsOptions& options) {
+void export_selected_runs(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
   check_output_option(options, *known);
-  const auto runs = known->load_all_runs(make_filter_of_options(options, *known));
+  const auto runs = known->load_matching_runs(make_filter_of_options(options, *known));
   export_runs_to_file(options.output, runs);
   fmt::print("{} runs\n", runs.size());
 }
 
-void import_archive(const StationRecordsOptions& options) {
-  auto [sessions, undated, crashed, refused] = read_archive_sessions(options.archive);
+void import_archive_sessions_as_runs(const StationRecordsOptions& options) {
+  auto [sessions, undated, crashed, refused] = read_reprocessed_archive_sessions(options.archive);
   if (undated > 0) {
     // [STATION-14] `program crashed`, `neither archive.csv`, `session with a date`
     spdlog::warn("{} sessions are ignored: neither archive.csv nor their names have their date",
@@ -385,19 +389,19 @@ void import_archive(const StationRecordsOptions& options) {
   std::vector<std::string> other;
   for (std::size_t i = 0; i < sessions.size(); ++i) {
     const RunRecord& run = sessions[i].run;
-    if (const auto kept = records.find(run.run)) {
+    if (const auto kept = records.find_run_by_id(run.run)) {
       if (kept->config_sha256 != run.config_sha256) other.push_back(run.run);
     } else {
       std::optional<RunRecord> read;
       try {
-        read = load_archive_run(sessions[i]);
+        read = load_run_of_archive_session(sessions[i]);
       } catch (const InputError& error) {
         refused.emplace_back(error.what());
       }
       if (read) records.store_run(*read);
       ++(read ? taken : unread);
     }
-    progress.update_display(i + 1, sessions.size());
+    progress.update_progress_display(i + 1, sessions.size());
   }
   if (!sessions.empty()) {
     print_line(fmt::format("station {}: {} runs added, {} existed", sessions.front().run.station,
@@ -420,11 +424,11 @@ void print_metric_trend(const StationRecordsOptions& options) {
   const MetricKind kind = find_run_metric(options.metric);
   const auto known = open_runs(options);
   check_output_option(options, *known);
-  Records& records = known->records();
+  Records& records = known->station_records();
   RunFilter filter = make_filter_of_comparable_runs(options, *known);
-  if (options.filter.verdict.empty()) filter.verdict = to_string(Verdict::pass);
-  const auto points = records.load_trend(options.metric, filter);
-  check_points_of_one_station(points, options);
+  if (options.filter.verdict.empty()) filter.verdict = run_verdict_name(Verdict::pass);
+  const auto points = records.load_metric_trend(options.metric, filter);
+  check_values_are_of_one_station(points, options);
   constexpr std::size_t min_points = 2;
   if (points.size() < min_points) {
     throw Undetermined(
@@ -433,14 +437,14 @@ void print_metric_trend(const StationRecordsOptions& options) {
   const std::vector<double> values = extract_trend_values(points);
   const auto alarms = find_control_chart_alarms(values, options.rules);
   const ControlChart chart = compute_control_chart(values);
-  const auto gate = find_gate_limit(options.metric, known->station(), records, points);
+  const auto gate = find_gate_limit(options.metric, known->station_config(), records, points);
   if (!options.output.empty())
     write_trend_plot(options.output, options.metric, points, alarms, gate);
   print_line(fmt::format("{} of {} runs, {} to {}", options.metric, points.size(),
                          points.front().ended_utc, points.back().ended_utc));
   fmt::print("mean      {:.4g} {}\nlimits    {:.4g} to {:.4g}\n", chart.mean, kind.unit,
              chart.lower, chart.upper);
-  if (gate) fmt::print("gate      {} {:.4g}\n", describe(kind.direction), *gate);
+  if (gate) fmt::print("gate      {} {:.4g}\n", describe_limit_direction(kind.direction), *gate);
   for (const ChartAlarm& alarm : alarms) {
     const TrendPoint& point = points[alarm.index];
     print_line(fmt::format("{} {} {} {:.4g}  {}: {}", point.ended_utc, point.run, point.camera,
@@ -455,17 +459,17 @@ void print_process_capability(const StationRecordsOptions& options) {
   std::vector<MetricKind> kinds = list_run_metrics();
   if (!options.metric.empty()) kinds = {find_run_metric(options.metric)};
   const auto known = open_runs(options);
-  Records& records = known->records();
+  Records& records = known->station_records();
   const RunFilter filter = make_filter_of_comparable_runs(options, *known);
   constexpr const char* head = "{:<27}{:>5}{:>10}{:>10}{:>10}{:>10}   {:<25}{}";
   std::vector<std::string> rows;
   rows.reserve(kinds.size());
   for (const MetricKind& kind : kinds) {
-    const auto points = load_judged_values(records, kind.name, filter);
-    check_points_of_one_station(points, options);
-    const auto gate = find_gate_limit(kind.name, known->station(), records, points);
+    const auto points = load_metric_of_judged_runs(records, kind.name, filter);
+    check_values_are_of_one_station(points, options);
+    const auto gate = find_gate_limit(kind.name, known->station_config(), records, points);
     const auto found =
-        compute_capability(extract_trend_values(points), make_tolerance_limits(kind, gate));
+        compute_process_capability(extract_trend_values(points), make_tolerance_limits(kind, gate));
     if (!found) continue;
     const auto index = [](const CapabilityIndex& of) {
       return fmt::format("{:.2f} ({:.2f} to {:.2f})", of.value, of.low, of.high);
@@ -485,20 +489,21 @@ void print_process_capability(const StationRecordsOptions& options) {
   for (const std::string& row : rows) print_line(row);
 }
 
-void print_measurement_study(const StationRecordsOptions& options) {
+void print_gauge_study(const StationRecordsOptions& options) {
   const MetricKind kind = find_run_metric(options.metric);
   if (!options.references.empty()) return print_bias(kind, options);
   const auto known = open_runs(options);
-  Records& records = known->records();
+  Records& records = known->station_records();
   RunFilter filter = options.filter;
   if (filter.kind.empty()) filter.kind = "unit";
-  const auto points = load_judged_values(records, options.metric, remove_conditions_any(filter));
-  const auto values = select_study_values(points, options.units);
+  const auto points =
+      load_metric_of_judged_runs(records, options.metric, remove_conditions_any(filter));
+  const auto values = select_values_of_study_units(points, options.units);
   const MeasurementStudy study = run_study([&] {
     check_runs_share_no_images(records, points, values);
-    return analyze_measurements(values);
+    return analyze_repeatability_and_reproducibility(values);
   });
-  const auto gate = find_gate_limit(options.metric, known->station(), records, points);
+  const auto gate = find_gate_limit(options.metric, known->station_config(), records, points);
   print_line(fmt::format("{}: {} units, {} stations, {} runs each, mean {:.4g} {}", options.metric,
                          study.units, study.stations, study.repeats, study.mean, kind.unit));
   fmt::print("\n");
@@ -521,21 +526,21 @@ void print_measurement_study(const StationRecordsOptions& options) {
   };
   part("repeatability (EV)", study.repeatability);
   if (study.stations > 1) {
-    part("stations (AV)", study.of_station);
-    part("units x stations (INT)", study.of_interaction);
+    part("stations (AV)", study.station_sd);
+    part("units x stations (INT)", study.interaction_sd);
   }
   part("measurement, total (GRR)", study.grr);
-  part("units (PV)", study.of_unit);
+  part("units (PV)", study.unit_sd);
   part("total (TV)", study.total);
-  if (const auto categories = study.compute_distinct_categories()) {
+  if (const auto categories = study.compute_number_of_distinct_categories()) {
     fmt::print("distinct categories (ndc){:>21}\n", *categories);
   }
   if (const auto percent_of_tolerance =
-          study.compute_percent_of_tolerance(make_tolerance_limits(kind, gate))) {
+          study.compute_precision_to_tolerance_percent(make_tolerance_limits(kind, gate))) {
     fmt::print("measurement / tolerance (P/T){:>17.1f} %\n", *percent_of_tolerance);
   } else if (gate) {
-    fmt::print("no P/T: the mean is not within the gate, {} {:.4g}\n", describe(kind.direction),
-               *gate);
+    fmt::print("no P/T: the mean is not within the gate, {} {:.4g}\n",
+               describe_limit_direction(kind.direction), *gate);
   }
   if (study.stations == 1) {
     fmt::print("\nOne station: differences between stations are unknown.\n");

@@ -37,18 +37,18 @@ const ProgramVersion kProgram{"vlp-station", VLP_VERSION};
 /// Updates the state of the golden unit. Reports errors only: the verdict is valid without it.
 void update_golden_unit_state(const StationConfig& config, const RunRecord& record) {
   try {
-    update_golden_unit_note(config, record);
+    record_run_in_golden_unit_note(config, record);
   } catch (const InputError& error) {
     // [STATION-3] `due time of the golden unit`
     spdlog::error("the due time of the golden unit is unknown: {}", error.what());
   }
 }
 
-/// Returns Spool::make_operator_notice() and logs its details.
+/// Returns Spool::make_spool_notice_for_operator() and logs its details.
 std::string make_spool_notice(Spool& spool) {
-  std::string notice = spool.make_operator_notice();
-  if (const std::string state = spool.state(); state != notice) {
-    spdlog::debug("{}", escape_for_terminal(state));
+  std::string notice = spool.make_spool_notice_for_operator();
+  if (const std::string state = spool.describe_spool_state(); state != notice) {
+    spdlog::debug("{}", escape_text_for_terminal(state));
   }
   return notice;
 }
@@ -58,11 +58,12 @@ std::string make_spool_notice(Spool& spool) {
 void log_arrivals(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals,
                   std::size_t& num_done) {
   for (const auto& [step, image, gone] : arrivals) {
-    if (!gone) spdlog::info("{}", make_last_image_line(unit, step, image));
+    if (!gone) spdlog::info("{}", describe_last_image_result(unit, step, image));
   }
-  for (; num_done < kStationSteps.size() && unit.step(kStationSteps[num_done]).is_done();
+  for (;
+       num_done < kStationSteps.size() && unit.step_state(kStationSteps[num_done]).is_step_solved();
        ++num_done) {
-    spdlog::info("{} is done", to_string(kStationSteps[num_done]));
+    spdlog::info("{} is done", station_step_name(kStationSteps[num_done]));
   }
 }
 
@@ -70,17 +71,17 @@ void log_arrivals(const Unit& unit, const std::vector<WatchedRun::Arrival>& arri
 bool has_image_arrived(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals,
                        bool of_source) {
   return std::ranges::any_of(arrivals, [&](const WatchedRun::Arrival& arrival) {
-    const auto& images = unit.step(arrival.step).images;
+    const auto& images = unit.step_state(arrival.step).images;
     const auto image = images.find(arrival.image);
-    return !of_source || image == images.end() || image->second.is_used();
+    return !of_source || image == images.end() || image->second.is_image_used();
   });
 }
 
 /// Checks whether the golden unit is due. Called at the first image of a unit, which may arrive
 /// long after its serial number was scanned.
 void check_golden_unit(Unit& unit, const Terminal& terminal) {
-  std::string why = describe_golden_unit_problem(unit.config());
-  if (!why.empty() && why != unit.invalid_reason() && !terminal.is_interactive()) {
+  std::string why = describe_golden_unit_problem(unit.station_config());
+  if (!why.empty() && why != unit.invalid_verdict_reason() && !terminal.is_interactive()) {
     // [STATION-4] `no unit passes` | station changed, or golden unit due; units are INVALID until
     //   it passes | `vlp-station show` of its run: cause
     spdlog::warn("{}; no unit passes", why);
@@ -98,8 +99,8 @@ void guide_operator(const StationRunOptions& options, Unit& unit, WatchedRun& wa
   Clock::time_point last = Clock::now();
   std::size_t num_done = 0;
   bool changed = true, has_begun = false;
-  while (unit.current_step() && !unit.cannot_pass_any_more()) {
-    const auto arrivals = watched.poll_folder_changes(static_cast<std::size_t>(options.threads));
+  while (unit.first_incomplete_step() && !unit.can_no_longer_pass()) {
+    const auto arrivals = watched.process_folder_changes(static_cast<std::size_t>(options.threads));
     if (!has_begun && !arrivals.empty()) {
       has_begun = true;
       check_golden_unit(unit, terminal);
@@ -108,32 +109,32 @@ void guide_operator(const StationRunOptions& options, Unit& unit, WatchedRun& wa
     changed = changed || !arrivals.empty();
     if (changed && terminal.is_interactive()) {
       auto lines = make_station_screen(unit);
-      for (ScreenLine& line : make_spool_lines(spool.make_operator_notice()))
+      for (ScreenLine& line : make_spool_notice_lines(spool.make_spool_notice_for_operator()))
         lines.push_back(std::move(line));
       lines.push_back({"q: verdict now   Ctrl-C: leave, to go on later"});
-      terminal.draw_screen(lines);
+      terminal.redraw_terminal_screen(lines);
     }
     changed = false;
-    if (has_image_arrived(unit, arrivals, sources.has_sources())) last = Clock::now();
-    sources.write_next_frame(unit, watched);
-    if (sources.ended(unit)) {
-      unit.end_unit_early("the frames ended");
+    if (has_image_arrived(unit, arrivals, sources.has_frame_sources())) last = Clock::now();
+    sources.write_next_frame_of_step(unit, watched);
+    if (sources.has_step_source_ended(unit)) {
+      unit.end_unit_before_completion("the frames ended");
       break;
     }
     const std::chrono::duration<double> idle = Clock::now() - last;
     if (options.idle_s && idle.count() > *options.idle_s) {
-      unit.end_unit_early(fmt::format("no image came for {:g} s", *options.idle_s));
+      unit.end_unit_before_completion(fmt::format("no image came for {:g} s", *options.idle_s));
       break;
     }
     if (terminal.wait_for_key(arrivals.empty() ? poll_interval_ms : 0) == 'q') {
-      unit.end_unit_early("the operator ended the run");
+      unit.end_unit_before_completion("the operator ended the run");
       break;
     }
-    if (was_interrupted()) {
+    if (was_interrupt_signal_received()) {
       // [STATION-10] `left before`
       throw std::runtime_error("left before the verdict; the same command continues");
     }
-    changed = terminal.was_resized();
+    changed = terminal.was_terminal_resized();
   }
 }
 
@@ -143,35 +144,35 @@ void store_and_report_run(
     RunRecord measured, const std::vector<ReportPlot>& pictures, Spool& spool,
     const StationConfig& config, Terminal& terminal,
     const std::function<void()>& mark_run_stored = [] {},
-    const std::function<void()>& rename_finished_folder = [] {}) {
+    const std::function<void()>& rename_finished_run_folder = [] {}) {
   RunRecord record = escape_run_texts(std::move(measured));  // in the form of the records
   auto lines = make_verdict_screen(record);
   std::optional<HookLock> lock;
   if (config.hook) {
-    lock.emplace(spool.folder(), record.run);
+    lock.emplace(spool.spool_folder(), record.run);
     record.events.push_back(make_hook_requested_event(*config.hook, record.operator_name));
   }
   // After a kill in between, the golden unit is due too early, not too late.
-  const bool golden_passed = record.kind == "golden" && record.has_passed();
+  const bool golden_passed = record.kind == "golden" && record.has_run_passed();
   if (!golden_passed) update_golden_unit_state(config, record);
   try {
     spool.store_run(record);
   } catch (const InputError&) {
-    lines.push_back({"NOT RECORDED: repeat the run when it can be stored", Tone::bad});
-    terminal.print_lines(lines);
+    lines.push_back({"NOT RECORDED: repeat the run when it can be stored", ScreenLineStyle::bad});
+    terminal.print_permanent_lines(lines);
     throw;
   }
   mark_run_stored();
-  terminal.print_lines(lines);
+  terminal.print_permanent_lines(lines);
   if (golden_passed) update_golden_unit_state(config, record);
   std::string file_error, remedy;
   try {
     remedy = fmt::format("'vlp-station restore {} --station {}' writes the files", record.run,
                          config.file.string());
-    const fs::path folder = publish_run(record, pictures, config.results);
+    const fs::path folder = publish_run_files(record, pictures, config.results);
     spdlog::info("run {}: {}", record.run, folder.string());
     remedy = "move the folder there before the next run";
-    rename_finished_folder();
+    rename_finished_run_folder();
   } catch (const InputError& error) {
     file_error = error.what();
   }
@@ -179,9 +180,9 @@ void store_and_report_run(
   if (config.hook) {
     const std::string problem = run_hook_and_record_result(*config.hook, record, *lock, spool);
     if (!problem.empty()) spdlog::error("{}", problem);
-    terminal.print_lines(make_hook_lines(record));
+    terminal.print_permanent_lines(make_pending_hook_lines(record));
   }
-  terminal.print_lines(make_spool_lines(make_spool_notice(spool)));
+  terminal.print_permanent_lines(make_spool_notice_lines(make_spool_notice(spool)));
   if (file_error.empty()) return;
   // [STATION-20] `the verdict` | recorded, its files not written | `restore RUN`
   throw std::runtime_error(
@@ -190,44 +191,43 @@ void store_and_report_run(
 
 void warn_of_spool(Spool& spool) {
   if (const auto notice = make_spool_notice(spool); !notice.empty()) {
-    spdlog::warn("{}", escape_for_terminal(notice));
+    spdlog::warn("{}", escape_text_for_terminal(notice));
   }
 }
 
 /// Checks the conditions that are known before the first image.
-void prepare(Spool& spool, const StationConfig& config, const std::string& camera) {
-  check_results_folder(config.results, camera);
-  spool.check_storage();
+void prepare_station_run(Spool& spool, const StationConfig& config, const std::string& camera) {
+  check_results_folder_writable(config.results, camera);
+  spool.check_runs_can_be_stored();
   warn_of_spool(spool);
 }
 
-void prepare(Unit& unit, Spool& spool, const StationConfig& config) {
-  prepare(spool, config, unit.camera_id());
-  unit.reject_images_of_other_cameras(
-      [&spool, camera = unit.camera_id()](const std::string& sha256) {
-        return spool.find_other_camera_using_image(sha256, camera);
-      });
+void prepare_station_run(Unit& unit, Spool& spool, const StationConfig& config) {
+  prepare_station_run(spool, config, unit.camera_id());
+  unit.set_image_owner_lookup([&spool, camera = unit.camera_id()](const std::string& sha256) {
+    return spool.find_other_camera_using_image(sha256, camera);
+  });
   unit.invalidate_verdict(describe_golden_unit_problem(config));
 }
 
 /// Throws GateNotMet if the run failed, Undetermined if it is invalid.
 void throw_unless_passed(const RunRecord& record) {
-  if (record.has_passed()) return;
-  if (record.is_invalid()) {
+  if (record.has_run_passed()) return;
+  if (record.is_verdict_invalid()) {
     throw Undetermined(
-        fmt::format("camera {} is not judged: {}", record.camera, record.first_cause()));
+        fmt::format("camera {} is not judged: {}", record.camera, record.first_verdict_cause()));
   }
   throw GateNotMet((record.kind == "golden" ? "station " + record.station + " has moved: "
                                             : "camera " + record.camera + " fails: ") +
-                   record.first_cause());
+                   record.first_verdict_cause());
 }
 
 void add_step_folders(Unit& unit, const fs::path& folder) {
   bool any = false;
   for (const StationStep step : kStationSteps) {
-    if (!fs::is_directory(folder / to_string(step))) continue;
+    if (!fs::is_directory(folder / station_step_name(step))) continue;
     any = true;
-    unit.add(step, list_images(folder / to_string(step)));
+    unit.add_step_images(step, list_images(folder / station_step_name(step)));
   }
   if (!any) throw InputError(folder, "has none of the folders boards, rotation, dispersion, check");
 }
@@ -236,21 +236,22 @@ void add_step_folders(Unit& unit, const fs::path& folder) {
 /// meantime, but not if it only became due.
 RunRecord make_final_record(Unit& unit, const std::string& run, const StationRunOptions& options,
                             Spool& spool) {
-  if (unit.invalid_reason().empty()) {
-    unit.invalidate_verdict(describe_golden_unit_problem(unit.config(), GoldenCheckTime::verdict));
-    const std::string due = describe_golden_unit_problem(unit.config());
-    if (unit.invalid_reason().empty() && !due.empty()) {
+  if (unit.invalid_verdict_reason().empty()) {
+    unit.invalidate_verdict(
+        describe_golden_unit_problem(unit.station_config(), GoldenCheckTime::verdict));
+    const std::string due = describe_golden_unit_problem(unit.station_config());
+    if (unit.invalid_verdict_reason().empty() && !due.empty()) {
       // [STATION-3] `before the next unit`
       spdlog::warn("{} before the next unit; this unit was started before", due);
     }
   }
-  RunRecord record = make_unit_record(unit, run, kProgram);
+  RunRecord record = make_unit_run_record(unit, run, kProgram);
   record.operator_name = options.operator_name;
   record.shift = options.shift;
-  if (record.is_invalid()) return record;  // images of an invalid run may be used again
-  const auto earlier = spool.find_repeated_run(record);
+  if (record.is_verdict_invalid()) return record;  // images of an invalid run may be used again
+  const auto earlier = spool.find_run_with_same_images(record);
   if (earlier && !earlier->empty()) {
-    reject_reused_images(record, *earlier, options.station);
+    invalidate_run_for_reused_images(record, *earlier, options.station);
   } else if (!earlier) {
     // [STATION-1] `records are offline`
     const std::string unchecked =
@@ -265,13 +266,14 @@ RunRecord run_with_given_folder(const StationRunOptions& options, const StationC
                                 Spool& spool) {
   const std::string run = make_run_id();
   Unit unit(config, options.camera_id, kProgram, options.threads);
-  prepare(unit, spool, config);
-  if (!unit.invalid_reason().empty()) spdlog::warn("{}; no unit passes", unit.invalid_reason());
+  prepare_station_run(unit, spool, config);
+  if (!unit.invalid_verdict_reason().empty())
+    spdlog::warn("{}; no unit passes", unit.invalid_verdict_reason());
   add_step_folders(unit, options.batch);
-  unit.solve_complete_steps(true);
+  unit.solve_completed_station_steps(true);
   RunRecord record = make_final_record(unit, run, options, spool);
   Terminal terminal;
-  store_and_report_run(record, unit.report_plots(), spool, config, terminal);
+  store_and_report_run(record, unit.collect_report_plots(), spool, config, terminal);
   return record;
 }
 
@@ -279,34 +281,35 @@ RunRecord run_with_watched_folders(const StationRunOptions& options, const Stati
                                    Spool& spool) {
   StepSources sources(options.sources, config.type.imager_px);
   Unit unit(config, options.camera_id, kProgram, options.threads);
-  prepare(unit, spool, config);
+  prepare_station_run(unit, spool, config);
   WatchedRun watched(unit, spool);
   Terminal terminal;
-  if (const auto& finished = watched.finished_record()) {
-    terminal.print_lines(make_verdict_screen(*finished));
-    terminal.print_lines(make_hook_lines(*finished));
+  if (const auto& finished = watched.finished_run_record()) {
+    terminal.print_permanent_lines(make_verdict_screen(*finished));
+    terminal.print_permanent_lines(make_pending_hook_lines(*finished));
     spdlog::info("run {} has its verdict already; the same command starts another run",
                  finished->run);
     return *finished;
   }
-  spdlog::info("run {}; images go to {}/STEP", watched.run(), watched.folder().string());
-  if (!unit.invalid_reason().empty() && !terminal.is_interactive()) {
-    spdlog::warn("{}; no unit passes", unit.invalid_reason());
+  spdlog::info("run {}; images go to {}/STEP", watched.run_id(), watched.run_folder().string());
+  if (!unit.invalid_verdict_reason().empty() && !terminal.is_interactive()) {
+    spdlog::warn("{}; no unit passes", unit.invalid_verdict_reason());
   }
   guide_operator(options, unit, watched, sources, spool, terminal);
-  unit.solve_complete_steps(true);
-  RunRecord record = make_final_record(unit, watched.run(), options, spool);
+  unit.solve_completed_station_steps(true);
+  RunRecord record = make_final_record(unit, watched.run_id(), options, spool);
   store_and_report_run(
-      record, unit.report_plots(), spool, config, terminal, [&] { watched.mark_run_stored(); },
-      [&] { watched.rename_finished_folder(); });
+      record, unit.collect_report_plots(), spool, config, terminal,
+      [&] { watched.mark_run_stored(); }, [&] { watched.rename_finished_run_folder(); });
   return record;
 }
 
 }  // namespace
 
-void measure_unit(const StationRunOptions& options) {
+void measure_camera_unit(const StationRunOptions& options) {
   const StationConfig config = read_station_config(options.station);
-  if (const std::string why = describe_serial_problem(config, options.camera_id); !why.empty()) {
+  if (const std::string why = describe_serial_number_problem(config, options.camera_id);
+      !why.empty()) {
     throw std::invalid_argument("--camera-id: " + why);
   }
   Spool spool(config.spool, config.records);
@@ -318,13 +321,13 @@ void verify_station_with_golden_unit(const StationRunOptions& options) {
   const StationConfig config = read_station_config(options.station);
   if (!config.golden) throw InputError(options.station, "has no golden unit: add the key 'golden'");
   Spool spool(config.spool, config.records);
-  prepare(spool, config, config.golden->camera_id);
+  prepare_station_run(spool, config, config.golden->camera_id);
   const fs::path arrived = config.captures / config.golden->camera_id;
   const bool batch = !options.batch.empty();
-  auto [record, pictures] = verify_station(config, batch ? fs::path(options.batch) : arrived,
-                                           make_run_id(), kProgram, options.threads);
+  auto [record, pictures] = verify_station_from_golden_images(
+      config, batch ? fs::path(options.batch) : arrived, make_run_id(), kProgram, options.threads);
   if (config.verify_due) {
-    invalidate_if_images_were_used(record, [&](const std::string& sha256) {
+    invalidate_run_if_images_reused(record, [&](const std::string& sha256) {
       return spool.find_golden_run_using_image(sha256);
     });
   }
@@ -334,28 +337,28 @@ void verify_station_with_golden_unit(const StationRunOptions& options) {
   store_and_report_run(
       record, pictures, spool, config, terminal, [] {},
       [&, run = record.run] {
-        if (!batch) rename_finished_folder(arrived, run);
+        if (!batch) rename_finished_run_folder(arrived, run);
       });
   throw_unless_passed(record);
 }
 
-void run_hooks(const StationRunOptions& options) {
+void rerun_unfinished_hooks(const StationRunOptions& options) {
   const StationConfig config = read_station_config(options.station);
   if (!config.hook) throw InputError(options.station, "has no hook: add the key 'hook'");
   Spool spool(config.spool, config.records);
   spool.deliver_waiting_runs();
-  const auto runs = spool.list_runs({.station = config.station, .has_open_hook = true});
+  const auto runs = spool.list_run_summaries({.station = config.station, .has_open_hook = true});
   std::size_t failed = 0;
   for (const RunSummary& run : runs) {
     const auto report = [&](const std::string& outcome) {
-      fmt::print("{}\n", escape_for_single_line(fmt::format("{} {} {}: {}", run.run, run.camera,
-                                                            run.verdict, outcome)));
+      fmt::print("{}\n", escape_text_for_single_line(fmt::format(
+                             "{} {} {}: {}", run.run, run.camera, run.verdict, outcome)));
     };
-    const HookLock lock(spool.folder(), run.run);
-    auto record = spool.find(run.run);
+    const HookLock lock(spool.spool_folder(), run.run);
+    auto record = spool.find_run_by_id(run.run);
     // Another program can have called it.
     if (!record || !is_hook_pending(*record)) continue;
-    if (!lock.is_lock_held()) {
+    if (!lock.is_hook_lock_held()) {
       report("is being run");
       continue;
     }

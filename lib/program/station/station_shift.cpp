@@ -32,8 +32,9 @@ constexpr const char* kQuit = "q";
 /// Reads a line in the form in which records store it; std::nullopt at the end of the input.
 std::optional<std::string> read_word(const std::string& label, Terminal& terminal) {
   constexpr std::size_t longest = 64;
-  const auto line = terminal.line({{label}});
-  return line ? std::optional(escape_for_terminal(truncate_utf8(*line, longest))) : std::nullopt;
+  const auto line = terminal.read_input_line({{label}});
+  return line ? std::optional(escape_text_for_terminal(truncate_utf8_text(*line, longest)))
+              : std::nullopt;
 }
 
 /// Reads the names of operator and shift if they are empty. Returns false if the input ended or the
@@ -57,15 +58,15 @@ std::optional<std::string> read_serial(const StationConfig& config, Terminal& te
   std::string problem;
   for (;;) {
     std::vector<ScreenLine> prompt;
-    if (!golden.empty()) prompt.push_back({"Station  " + golden, Tone::bad});
-    if (!problem.empty()) prompt.push_back({"Wrong    " + problem, Tone::bad});
+    if (!golden.empty()) prompt.push_back({"Station  " + golden, ScreenLineStyle::bad});
+    if (!problem.empty()) prompt.push_back({"Wrong    " + problem, ScreenLineStyle::bad});
     prompt.push_back({"Next     scan a unit's serial; q: end"});
     prompt.push_back({"Serial   "});
-    auto line = terminal.line(prompt);
+    auto line = terminal.read_input_line(prompt);
     if (!line || *line == kQuit) return std::nullopt;
     if (line->empty()) continue;
     const bool is_golden = config.golden && *line == config.golden->camera_id;
-    problem = is_golden ? "" : describe_serial_problem(config, *line);
+    problem = is_golden ? "" : describe_serial_number_problem(config, *line);
     if (problem.empty()) return line;
     // Without a screen, the prompt does not print the problem.
     if (!terminal.is_interactive()) spdlog::error("{}", problem);
@@ -114,7 +115,8 @@ int run_process(const std::vector<std::string>& command) {
       return kBadInput;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    if (was_interrupted() && !is_signaled) is_signaled = ::kill(process, SIGTERM) == 0;
+    if (was_interrupt_signal_received() && !is_signaled)
+      is_signaled = ::kill(process, SIGTERM) == 0;
   }
   if (WIFEXITED(status)) return WEXITSTATUS(status);
   // [STATION-10] `ended by signal`
@@ -124,7 +126,7 @@ int run_process(const std::vector<std::string>& command) {
 
 }  // namespace
 
-void measure_scanned_units(StationRunOptions options) {
+void measure_units_with_scanned_ids(StationRunOptions options) {
   StationConfig config = read_station_config(options.station);
   Terminal terminal;
   std::map<int, int> exit_counts;  // number of units by exit code
@@ -146,7 +148,7 @@ void measure_scanned_units(StationRunOptions options) {
       ++exit_counts[code];
     }
     const bool judged = code == kDone || code == kGateNotMet || code == kUndetermined;
-    if (was_interrupted() && !judged) {
+    if (was_interrupt_signal_received() && !judged) {
       // [STATION-10] `left in the middle`
       throw std::runtime_error("the shift was left in the middle of a unit");
     }

@@ -47,15 +47,15 @@ void restore_and_raise(int signal) {
   errno = error_before;
 }
 
-const char* color_code(Tone tone) {
+const char* color_code(ScreenLineStyle tone) {
   switch (tone) {
-    case Tone::heading:
+    case ScreenLineStyle::heading:
       return "\x1b[1m";
-    case Tone::good:
+    case ScreenLineStyle::good:
       return "\x1b[32m";
-    case Tone::bad:
+    case ScreenLineStyle::bad:
       return "\x1b[31m";
-    case Tone::plain:
+    case ScreenLineStyle::plain:
       break;
   }
   return "";
@@ -88,7 +88,7 @@ Terminal::~Terminal() {
   for (const int signal : {SIGINT, SIGTERM, SIGQUIT, SIGTSTP}) std::signal(signal, SIG_DFL);
 }
 
-Terminal::Size Terminal::size() {
+Terminal::Size Terminal::query_terminal_size() {
   winsize known{};
   if (::ioctl(::fileno(stdout), TIOCGWINSZ, &known) != 0 || known.ws_col == 0 ||
       known.ws_row == 0) {
@@ -97,14 +97,14 @@ Terminal::Size Terminal::size() {
   return {known.ws_col, known.ws_row};
 }
 
-bool Terminal::was_resized() const {
-  return interactive_ && num_drawn_lines_ > 0 && (size() != size_ || resumed);
+bool Terminal::was_terminal_resized() const {
+  return interactive_ && num_drawn_lines_ > 0 && (query_terminal_size() != size_ || resumed);
 }
 
 /// Replaces the drawn text. Clears the screen after a change of size or a stop, because the
 /// position of the drawn text is unknown then.
-void Terminal::replace_drawn_text(const std::string& text, std::size_t lines) {
-  const Size current_size = size();
+void Terminal::replace_drawn_terminal_text(const std::string& text, std::size_t lines) {
+  const Size current_size = query_terminal_size();
   const bool moved = num_drawn_lines_ > 0 && (resumed.exchange(false) || current_size != size_);
   if (text == last_text_ && !moved) return;
   const std::string home = moved                  ? "\x1b[2J\x1b[H"
@@ -117,35 +117,37 @@ void Terminal::replace_drawn_text(const std::string& text, std::size_t lines) {
   size_ = current_size;
 }
 
-void Terminal::draw_screen(const std::vector<ScreenLine>& lines) {
+void Terminal::redraw_terminal_screen(const std::vector<ScreenLine>& lines) {
   if (!interactive_) return;
-  const auto [columns, rows] = size();
+  const auto [columns, rows] = query_terminal_size();
   const std::size_t num_lines = std::min(lines.size(), rows - 1);
   std::string text;
   for (std::size_t i = 0; i < num_lines; ++i) {
     // The last line lists the keys and is always drawn.
     const auto& [line, tone] = i + 1 == num_lines ? lines.back() : lines[i];
-    text += colorize(truncate_utf8(escape_for_single_line(line), columns), tone) + "\x1b[K\n";
+    text += colorize_text(truncate_utf8_text(escape_text_for_single_line(line), columns), tone) +
+            "\x1b[K\n";
   }
-  replace_drawn_text(text, num_lines);
+  replace_drawn_terminal_text(text, num_lines);
 }
 
-void Terminal::print_lines(const std::vector<ScreenLine>& lines) {
+void Terminal::print_permanent_lines(const std::vector<ScreenLine>& lines) {
   std::string text;
   for (const auto& [line, tone] : lines) {
-    text += colorize(escape_for_single_line(line), tone) + (interactive_ ? "\x1b[K\n" : "\n");
+    text +=
+        colorize_text(escape_text_for_single_line(line), tone) + (interactive_ ? "\x1b[K\n" : "\n");
   }
   if (!interactive_) {
     fmt::print("{}", text);
     std::fflush(stdout);  // the next output may be delayed
     return;
   }
-  replace_drawn_text(text, lines.size());
+  replace_drawn_terminal_text(text, lines.size());
   num_drawn_lines_ = 0;
   last_text_.clear();
 }
 
-std::string Terminal::colorize(const std::string& text, Tone tone) const {
+std::string Terminal::colorize_text(const std::string& text, ScreenLineStyle tone) const {
   return has_color_ ? fmt::format("{}{}\x1b[0m", color_code(tone), text) : text;
 }
 
@@ -157,30 +159,32 @@ std::optional<char> Terminal::wait_for_key(int wait_ms) const {
   char first = 0, key = 0;
   if (!read_key(first, wait_ms)) return std::nullopt;
   bool alone = true;
-  while (!was_interrupted() && read_key(key, kMaxScannerPause_ms)) alone = alone && key == first;
+  while (!was_interrupt_signal_received() && read_key(key, kMaxScannerPause_ms))
+    alone = alone && key == first;
   return alone ? std::optional(first) : std::nullopt;
 }
 
 void Terminal::discard_typed_keys() const {
   char key = 0;
-  while (reads_keys_ && !was_interrupted() && read_key(key, kMaxScannerPause_ms)) continue;
+  while (reads_keys_ && !was_interrupt_signal_received() && read_key(key, kMaxScannerPause_ms))
+    continue;
 }
 
-std::optional<std::string> Terminal::line(std::vector<ScreenLine> prompt) {
+std::optional<std::string> Terminal::read_input_line(std::vector<ScreenLine> prompt) {
   constexpr char escape = 0x1b, backspace = 0x08, del = 0x7f, end = 0x04;
   constexpr int poll_interval_ms = 100;
   constexpr std::size_t max_bytes = 200, max_character_bytes = 4;
   const std::string prompt_text = prompt.back().text;
   std::string typed;
   if (!interactive_ && ::isatty(STDIN_FILENO) == 1) {
-    fmt::print(stderr, "{}\n", escape_for_terminal(prompt_text));
+    fmt::print(stderr, "{}\n", escape_text_for_terminal(prompt_text));
   }
   for (;;) {
     prompt.back().text = prompt_text + typed;
-    draw_screen(prompt);
+    redraw_terminal_screen(prompt);
     pollfd input{STDIN_FILENO, POLLIN, 0};
     char key = 0;
-    if (was_interrupted()) return std::nullopt;
+    if (was_interrupt_signal_received()) return std::nullopt;
     if (::poll(&input, 1, poll_interval_ms) < 1) continue;
     const bool ended = ::read(STDIN_FILENO, &key, 1) != 1 || key == end;
     if (ended && typed.empty()) return std::nullopt;
@@ -188,19 +192,19 @@ std::optional<std::string> Terminal::line(std::vector<ScreenLine> prompt) {
     if (key == escape) {  // an arrow, or another key of several characters
       while (reads_keys_ && read_key(key, 0)) continue;
     } else if (key == backspace || key == del) {
-      if (!typed.empty()) typed = truncate_utf8(typed, typed.size() - 1);
+      if (!typed.empty()) typed = truncate_utf8_text(typed, typed.size() - 1);
     } else if (static_cast<unsigned char>(key) >= ' ' &&
                typed.size() < max_bytes + max_character_bytes) {
       typed += key;
     }
   }
-  if (interactive_) print_lines(prompt);  // keeps the line on the screen
-  typed = truncate_utf8(typed, max_bytes);
+  if (interactive_) print_permanent_lines(prompt);  // keeps the line on the screen
+  typed = truncate_utf8_text(typed, max_bytes);
   const auto first = typed.find_first_not_of(' ');
   return first == std::string::npos ? ""
                                     : typed.substr(first, typed.find_last_not_of(' ') + 1 - first);
 }
 
-bool was_interrupted() { return stop_requested; }
+bool was_interrupt_signal_received() { return stop_requested; }
 
 }  // namespace vlp

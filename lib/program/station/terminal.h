@@ -12,11 +12,12 @@
 namespace vlp {
 
 /// Display for the operator: on a terminal one screen that is redrawn in place, in color unless
-/// NO_COLOR is set. Without a terminal, only print_lines() writes.
+/// NO_COLOR is set. Without a terminal, only print_permanent_lines() writes.
 class Terminal {
  public:
   /// Switches a terminal on stdin to single keys without echo, until destruction; only if stdout is
-  /// a terminal, too. From then on, SIGINT and SIGTERM do not end the process (was_interrupted()).
+  /// a terminal, too. From then on, SIGINT and SIGTERM do not end the process
+  /// (was_interrupt_signal_received()).
   Terminal();
   ~Terminal();
   Terminal(const Terminal&) = delete;
@@ -25,12 +26,12 @@ class Terminal {
   bool is_interactive() const { return interactive_; }
   /// Redraws the screen in place if the lines have changed; only on a terminal. Crops lines to the
   /// size of the terminal, but keeps the last one.
-  void draw_screen(const std::vector<ScreenLine>& lines);
+  void redraw_terminal_screen(const std::vector<ScreenLine>& lines);
   /// Replaces the drawn screen by lines that stay.
-  void print_lines(const std::vector<ScreenLine>& lines);
-  /// Returns true if the size of the terminal has changed since the last draw_screen(), or if the
-  /// process was stopped (Ctrl-Z) since then.
-  bool was_resized() const;
+  void print_permanent_lines(const std::vector<ScreenLine>& lines);
+  /// Returns true if the size of the terminal has changed since the last redraw_terminal_screen(),
+  /// or if the process was stopped (Ctrl-Z) since then.
+  bool was_terminal_resized() const;
   /// Returns the key pressed within `wait_ms`; std::nullopt if there is none. Several different
   /// keys in quick succession come from a scanner and are ignored; repetitions of one key count as
   /// one.
@@ -43,16 +44,16 @@ class Terminal {
   /// @param prompt  lines to draw; the input follows the last one. Only the last one is printed, to
   ///                stderr, if stdin is a terminal and stdout is not.
   /// @return        std::nullopt at the end of the input and after SIGINT or SIGTERM
-  std::optional<std::string> line(std::vector<ScreenLine> prompt);
+  std::optional<std::string> read_input_line(std::vector<ScreenLine> prompt);
 
  private:
   struct Size {
     std::size_t columns, rows;
     bool operator==(const Size&) const = default;
   };
-  static Size size();
-  void replace_drawn_text(const std::string& text, std::size_t lines);
-  std::string colorize(const std::string& text, Tone tone) const;
+  static Size query_terminal_size();
+  void replace_drawn_terminal_text(const std::string& text, std::size_t lines);
+  std::string colorize_text(const std::string& text, ScreenLineStyle tone) const;
 
   bool interactive_, has_color_, reads_keys_ = false;
   std::size_t num_drawn_lines_ = 0;
@@ -62,6 +63,6 @@ class Terminal {
 
 /// Returns true if SIGINT or SIGTERM arrived while a Terminal existed. The program should end; its
 /// work is on disk.
-bool was_interrupted();
+bool was_interrupt_signal_received();
 
 }  // namespace vlp

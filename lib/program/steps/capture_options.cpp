@@ -24,7 +24,7 @@
 
 namespace vlp {
 
-FrontendOptions make_default_frontend_options() {
+FrontendOptions make_default_image_intake_options() {
   FrontendOptions options;
   options.threads = count_cpu_cores();
   return options;
@@ -35,20 +35,20 @@ void add_capture_options(CLI::App& app, CaptureOptions& options, const CaptureTe
   app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
   app.add_option("--calibration", options.calibration, texts.calibration)->required();
   app.add_option("-o,--output", options.output, texts.output)->required();
-  add_detect_options(app, options);
+  add_lamp_detection_options(app, options);
 }
 
-void add_lens_option(CLI::App& app, std::string& lens) {
+void add_lens_model_option(CLI::App& app, std::string& lens) {
   app.add_option("--lens", lens,
                  "Lens model (default: LENSMODEL_OPENCV8). auto: selected by cross-validation over "
                  "the views")
       ->check([](const std::string& name) {
         const bool known = name == kAutomaticLens || lens_model_from_name(name);
-        return known ? std::string() : "the models are: auto, " + lens_model_names();
+        return known ? std::string() : "the models are: auto, " + list_lens_model_names();
       });
 }
 
-void add_readout_option(CLI::App& app, std::optional<Readout>& readout) {
+void add_readout_direction_option(CLI::App& app, std::optional<Readout>& readout) {
   static const std::map<std::string, Readout> names{{"rows", Readout::rows},
                                                     {"columns", Readout::columns}};
   app.add_option_function<std::string>(
@@ -65,7 +65,7 @@ void add_frame_step_option(CLI::App& app, int& every) {
       ->option_text("N");
 }
 
-void check_frame_step_needs_video(int every, const std::vector<std::string>& files) {
+void reject_frame_step_without_video(int every, const std::vector<std::string>& files) {
   if (every == 1 || std::any_of(files.begin(), files.end(), is_video_file_name)) return;
   throw std::invalid_argument("--every: there is no video; leave it out");
 }
@@ -75,12 +75,12 @@ void add_room_option(CLI::App& app, std::string& room) {
                  "Room whose lamps are used, by the key room in the lamp map (default: all lamps)");
 }
 
-void write_refined_map(const std::filesystem::path& file, const LampMap& map,
-                       const std::string& room) {
+void write_refined_lamp_map(const std::filesystem::path& file, const LampMap& map,
+                            const std::string& room) {
   write_lamp_map(file, map);
   if (room.empty()) return;
   fmt::print("{} contains the lamps of room {} only: use it without --room\n",
-             escape_for_terminal(file.string()), escape_for_terminal(room));
+             escape_text_for_terminal(file.string()), escape_text_for_terminal(room));
 }
 
 void add_max_mpx_option(CLI::App& app, double& max_mpx) {
@@ -91,7 +91,7 @@ void add_max_mpx_option(CLI::App& app, double& max_mpx) {
       ->check(CLI::Range(0.001, 1e6));
 }
 
-void add_board_limit_options(CLI::App& app, FrontendOptions& options) {
+void add_board_image_limit_options(CLI::App& app, FrontendOptions& options) {
   constexpr double max_limit_px = 100;
   app.add_option("--max-blur-px", options.max_blur_px,
                  "Maximum blur of a board image: sigma of its sharpest edges, in px; others are "
@@ -103,13 +103,13 @@ void add_board_limit_options(CLI::App& app, FrontendOptions& options) {
       ->check(CLI::Range(0.0, 1.0));
 }
 
-void add_detect_options(CLI::App& app, CaptureOptions& options) {
+void add_lamp_detection_options(CLI::App& app, CaptureOptions& options) {
   add_room_option(app, options.frontend.room);
   app.add_option("--classifier", options.frontend.classifier,
                  "Lamp classifier of vlp-train, used instead of the frequencies in the map");
   app.add_option("--annotate", options.frontend.annotate,
                  "Output folder of annotated images with outlines, centers and lamp ids");
-  add_readout_option(app, options.frontend.readout);
+  add_readout_direction_option(app, options.frontend.readout);
   app.add_option(
          "--exposure-s", options.frontend.exposure_s,
          "Exposure time of the images, in s, for the check of the lamp map (default: short)")
@@ -118,14 +118,14 @@ void add_detect_options(CLI::App& app, CaptureOptions& options) {
   add_threads_option(app, options.frontend.threads);
 }
 
-std::optional<KnownMotion> MotionOptions::make_known_motion() const {
+std::optional<KnownMotion> MotionOptions::make_motion_prior() const {
   constexpr double fastest_deg_per_s = 180;  // maximum yaw rate of robots
   if (!max_speed_m_per_s) return std::nullopt;
-  return KnownMotion::up_to(*max_speed_m_per_s,
-                            rad_from_deg(max_yaw_rate_deg_per_s.value_or(fastest_deg_per_s)));
+  return KnownMotion::make_motion_prior_from_limits(
+      *max_speed_m_per_s, rad_from_deg(max_yaw_rate_deg_per_s.value_or(fastest_deg_per_s)));
 }
 
-void add_motion_options(CLI::App& app, MotionOptions& options, const char* help) {
+void add_motion_limit_options(CLI::App& app, MotionOptions& options, const char* help) {
   app.add_option("--max-speed-m-per-s", options.max_speed_m_per_s, help)
       ->check(make_finite_positive_validator());
   app.add_option(
@@ -146,54 +146,55 @@ std::vector<std::string> list_capture_input_files(const CaptureOptions& options)
   return {options.images, options.lamps, options.calibration, options.frontend.classifier.string()};
 }
 
-LampImages make_lamp_image_inputs(const CaptureOptions& options, const LampMap& lamps,
-                                  const std::optional<Calibration>& calibration) {
+LampImages make_lamp_detection_input(const CaptureOptions& options, const LampMap& lamps,
+                                     const std::optional<Calibration>& calibration) {
   return {options.images,          lamps,
           options.lamps,           calibration,
           options.calibration,     options.captures,
           options.yaw_in_robot_rad};
 }
 
-void check_image_output_options(const CaptureOptions& options) {
+void check_outputs_are_not_images(const CaptureOptions& options) {
   if (is_video_file_name(options.images)) return;
   for (const auto& image : list_images(options.images)) {
-    check_output_file(options.output, {image.string()});
-    if (!options.lights.empty()) check_output_file(options.lights, {image.string()});
+    check_output_is_not_input(options.output, {image.string()});
+    if (!options.lights.empty()) check_output_is_not_input(options.lights, {image.string()});
   }
 }
 
-void print_each_light(const Observations& seen) {
+void print_detected_lights(const Observations& seen) {
   if (!spdlog::should_log(spdlog::level::debug)) return;
   for (const Observation& image : seen.images) {
     for (const Light& light : image.lights)
-      spdlog::debug("{}: {}", image.file_name(), describe_light(light));
+      spdlog::debug("{}: {}", image.image_file_name(), describe_light(light));
   }
 }
 
 Observations detect_lamps_in_captures(const CaptureOptions& options, ImageUse use,
                                       const LampMap& lamps,
                                       const std::optional<Calibration>& calibration) {
-  check_image_output_options(options);
+  check_outputs_are_not_images(options);
   Observations seen;
   {
     Progress progress("images");
-    seen = detect_lamps_in_images(
-        make_lamp_image_inputs(options, lamps, calibration), use, options.frontend,
-        [&](std::size_t done, std::size_t total) { progress.update_display(done, total); });
+    seen = detect_lamps_in_images(make_lamp_detection_input(options, lamps, calibration), use,
+                                  options.frontend, [&](std::size_t done, std::size_t total) {
+                                    progress.update_progress_display(done, total);
+                                  });
   }
   StepResult remarks;
-  add_intake_remarks(seen, remarks);
+  add_image_intake_remarks(seen, remarks);
   // A classifier identifies lamps without the row time.
-  if (options.frontend.classifier.empty() || remarks.ok()) {
+  if (options.frontend.classifier.empty() || remarks.has_succeeded()) {
     const auto camera = calibration
                             ? make_detector_camera(*calibration)
                             : DetectorCamera{Readout::rows, options.frontend.row_time_s, {}};
     const auto file = std::filesystem::path(options.calibration).filename();
-    explain_by_row_time(seen.images, lamps, camera, calibration ? file.string() : "--row-time-s",
-                        remarks);
+    add_row_time_contradiction_to_result(seen.images, lamps, camera,
+                                         calibration ? file.string() : "--row-time-s", remarks);
   }
   print_step_remarks(remarks);
-  print_each_light(seen);
+  print_detected_lights(seen);
   if (!options.lights.empty()) write_lights_table(options.lights, seen.images);
   throw_if_step_failed(remarks);
   return seen;
@@ -208,13 +209,13 @@ LampCaptures read_lamp_captures(const CaptureOptions& options, ImageUse use) {
   if (readout) captures.calibration.camera.readout = readout;
   captures.frames =
       std::filesystem::is_directory(options.images)
-          ? collect_kept_frames(
+          ? collect_kept_lamp_frames(
                 detect_lamps_in_captures(options, use, captures.lamps, captures.calibration).images)
-          : read_detection_captures(options);
+          : read_captures_from_detections_file(options);
   return captures;
 }
 
-std::vector<Frame> read_detection_captures(const CaptureOptions& options) {
+std::vector<Frame> read_captures_from_detections_file(const CaptureOptions& options) {
   if (is_video_file_name(options.images)) {
     throw std::invalid_argument(options.images +
                                 " is a video; use vlp-detect, with --captures for the frame times");

@@ -43,7 +43,7 @@ void print_residuals(const RotationFit& fit, const RotationCaptures& spot) {
   for (const auto& [index, distance_px] : fit.outliers) {
     const RotationObservation& observation = spot.observations[index];
     fmt::print("  outlier   {} lamp {}: residual {:.2f} px\n",
-               escape_for_single_line(spot.captures[observation.capture].image),
+               escape_text_for_single_line(spot.captures[observation.capture].image),
                spot.lamps[observation.lamp].id, distance_px);
   }
 }
@@ -55,8 +55,8 @@ void print_circle(const char* name, const Circle& circle) {
 
 }  // namespace
 
-void print_calibration_summary(const IntrinsicsSolution& solution, const CalibrationReport& report,
-                               const ViewCoverage& coverage, const HeldOutFit& held_out) {
+void print_lens_calibration(const IntrinsicsSolution& solution, const CalibrationReport& report,
+                            const ViewCoverage& coverage, const HeldOutFit& held_out) {
   const auto& parameters = solution.problem.intrinsics;
   fmt::print("views         {} used, {} rejected\n", solution.views.size(),
              solution.dropped.size());
@@ -71,7 +71,7 @@ void print_calibration_summary(const IntrinsicsSolution& solution, const Calibra
   fmt::print("focal length  {:.2f}, {:.2f} px", parameters[0], parameters[1]);
   if (is_splined_lens_model(solution.problem.lens_model)) {
     fmt::print(", compensated by {} control points\n",
-               spline_grid_of_model(solution.problem.lens_model).num_control_points());
+               spline_grid_of_lens_model(solution.problem.lens_model).num_control_points());
   } else {
     fmt::print(", sd {:.2f} by noise, {:.2f} by views\n", report.focal_sd_px,
                report.focal_sd_by_views_px);
@@ -110,15 +110,15 @@ void print_rotation_center(const RotationCenter& center, const Camera& camera) {
              center.center_px.y(), format_sd(center.covariance, 1, "px"));
   const Eigen::Vector3d& up = center.zenith_in_camera;
   fmt::print("zenith      {:.6f} {:.6f} {:.6f} in the camera\n", up.x(), up.y(), up.z());
-  const auto [angle_rad, azimuth_rad] = compute_camera_tilt(center);
+  const auto [angle_rad, azimuth_rad] = compute_tilt_from_rotation_center(center);
   const auto sd_rad = compute_rotation_axis_sd_rad(center, camera);
   fmt::print("tilt        {:.4f} deg towards {:.1f} deg in the image{}\n", deg_from_rad(angle_rad),
              deg_from_rad(azimuth_rad),
              sd_rad ? fmt::format(", sd {:.4f} deg", deg_from_rad(*sd_rad)) : "");
 }
 
-void print_calibration_summary(const RotationFit& fit, const RotationCaptures& spot,
-                               const CircleCenters& circles, const Camera& camera) {
+void print_rotation_calibration(const RotationFit& fit, const RotationCaptures& spot,
+                                const CircleCenters& circles, const Camera& camera) {
   fmt::print("captures    {} of {}\n", spot.captures.size(),
              spot.captures.size() + spot.rejected.size());
   for (const RotationHeight& height : spot.heights) {
@@ -140,12 +140,12 @@ void print_calibration_summary(const RotationFit& fit, const RotationCaptures& s
     const RotationCapture& capture = spot.captures[i];
     fmt::print("{:>10} {:10.3f}  {}\n", format_height_m(spot.heights[capture.height].z_m),
                deg_from_rad(wrap_angle_rad(fit.yaws_rad[i])),
-               escape_for_single_line(capture.image));
+               escape_text_for_single_line(capture.image));
   }
 }
 
-void print_dispersion(const DispersionFit& fit, const Eigen::Vector2d& focal_px,
-                      std::size_t captures) {
+void print_dispersion_calibration(const DispersionFit& fit, const Eigen::Vector2d& focal_px,
+                                  std::size_t captures) {
   const Dispersion& found = fit.dispersion;
   fmt::print("captures    {}, {} used, {} rejected as outliers, {} without a fix\n", captures,
              found.captures, static_cast<int>(fit.fixes.size()) - found.captures,
@@ -153,7 +153,7 @@ void print_dispersion(const DispersionFit& fit, const Eigen::Vector2d& focal_px,
   print_circle("before", fit.before);
   print_circle("after", fit.after);
   fmt::print("offset      {:.4f} {:.4f} px", found.offset_px.x(), found.offset_px.y());
-  if (const auto covariance_px2 = compute_offset_covariance_with_map(found, focal_px)) {
+  if (const auto covariance_px2 = compute_dispersion_offset_covariance_with_map(found, focal_px)) {
     fmt::print(", sd {:.4f} {:.4f} px", std::sqrt((*covariance_px2)(0, 0)),
                std::sqrt((*covariance_px2)(1, 1)));
   }
@@ -171,18 +171,19 @@ void print_dispersion(const DispersionFit& fit, const Eigen::Vector2d& focal_px,
   }
 }
 
-void print_corrections_header() {
+void print_lamp_corrections_header() {
   fmt::print("\n{:>10} {:>28} {:>28}\n", "lamp", "correction x y z (mm)", "sd (mm)");
 }
 
-void print_correction(int lamp, const Eigen::Vector3d& correction_m, const Eigen::Vector3d& sd_m,
-                      const char* note) {
+void print_lamp_correction_row(int lamp, const Eigen::Vector3d& correction_m,
+                               const Eigen::Vector3d& sd_m, const char* note) {
   fmt::print("{:10} {:10.3f}{:9.3f}{:9.3f} {:10.3f}{:9.3f}{:9.3f}{}\n", lamp,
              1e3 * correction_m.x(), 1e3 * correction_m.y(), 1e3 * correction_m.z(), 1e3 * sd_m.x(),
              1e3 * sd_m.y(), 1e3 * sd_m.z(), note);
 }
 
-void print_adjustment(const AdjustmentResult& found, const Calibration& before, bool lens_stated) {
+void print_joint_adjustment(const AdjustmentResult& found, const Calibration& before,
+                            bool lens_stated) {
   const RotationCenter& center = found.center;
   const double focal_px = std::sqrt(found.camera.focal_px().prod());
   fmt::print("captures    {} used, {} rejected\n", found.captures, found.rejected_captures);
@@ -203,9 +204,9 @@ void print_adjustment(const AdjustmentResult& found, const Calibration& before, 
   } else {
     fmt::print("lever arm   not determined: add a rotation in place at a second height\n");
   }
-  if (found.lens_freedom > 0) {
+  if (found.lens_degrees_of_freedom > 0) {
     fmt::print("lens        corrected: chi-squared {:.1f}, {} expected\n", found.lens_chi_squared,
-               found.lens_freedom);
+               found.lens_degrees_of_freedom);
     const auto& lens = found.camera.intrinsics;
     const Eigen::VectorXd sd = found.surveyed_covariance.diagonal().head<4>().cwiseSqrt();
     fmt::print(
@@ -224,9 +225,9 @@ void print_adjustment(const AdjustmentResult& found, const Calibration& before, 
                1e3 * place.residual_m.x(), 1e3 * place.residual_m.y(), 1e3 * place.residual_m.z(),
                place.wrong ? ", rejected" : "");
   }
-  print_corrections_header();
+  print_lamp_corrections_header();
   for (const auto& [id, correction_m, sd_m, moved] : found.lamps) {
-    print_correction(id, correction_m, sd_m, moved ? "  differs from the map" : "");
+    print_lamp_correction_row(id, correction_m, sd_m, moved ? "  differs from the map" : "");
   }
 }
 

@@ -15,12 +15,13 @@ namespace vlp {
 
 namespace {
 
-double mm(double value_m) { return 1e3 * value_m; }
+double convert_m_to_mm(double value_m) { return 1e3 * value_m; }
 
 void print_statistic(const char* name, double value_m, const Interval* interval_m) {
-  fmt::print("{:10} {:>10.3f} mm", name, mm(value_m));
+  fmt::print("{:10} {:>10.3f} mm", name, convert_m_to_mm(value_m));
   if (interval_m != nullptr) {
-    fmt::print("   {:.3f} to {:.3f}", mm(interval_m->low), mm(interval_m->high));
+    fmt::print("   {:.3f} to {:.3f}", convert_m_to_mm(interval_m->low),
+               convert_m_to_mm(interval_m->high));
   }
   fmt::print("\n");
 }
@@ -45,7 +46,7 @@ void print_horizontal(const Evaluation& evaluation) {
   for (const std::size_t percent : percents) fmt::print("{:>8} %", percent);
   fmt::print("\n");
   for (const std::size_t percent : percents) {
-    fmt::print("{:>10.3f}", mm(distribution_m[percent - 1].second));
+    fmt::print("{:>10.3f}", convert_m_to_mm(distribution_m[percent - 1].second));
   }
   fmt::print("\n\n");
 }
@@ -53,7 +54,8 @@ void print_horizontal(const Evaluation& evaluation) {
 void print_height_and_yaw(const Evaluation& evaluation) {
   if (const auto& height_m = evaluation.height_m) {
     fmt::print("height      rms {:.3f} mm, max {:.3f} mm, bias {:+.3f} mm\n",
-               mm(height_m->sizes.rms), mm(height_m->sizes.max), mm(height_m->bias));
+               convert_m_to_mm(height_m->sizes.rms), convert_m_to_mm(height_m->sizes.max),
+               convert_m_to_mm(height_m->bias));
   }
   if (const auto& yaw_rad = evaluation.yaw_rad) {
     fmt::print("yaw         rms {:.4f} deg, max {:.4f} deg, bias {:+.4f} deg\n",
@@ -71,11 +73,12 @@ void print_bias_and_repeatability(const BiasAndRepeatability& statistics) {
       std::max_element(stations.begin(), stations.end(),
                        [](const auto& a, const auto& b) { return a.sd_m < b.sd_m; });
   fmt::print("ref. points {} with {} fixes: bias {:.3f} mm rms, repeatability {:.3f} mm\n",
-             stations.size(), statistics.fixes, mm(statistics.bias_m), mm(statistics.scatter_m));
+             stations.size(), statistics.fixes, convert_m_to_mm(statistics.bias_m),
+             convert_m_to_mm(statistics.scatter_m));
   fmt::print(
       "  worst     bias {:.3f} mm at ({:.3f}, {:.3f}) m; sd {:.3f} mm at ({:.3f}, {:.3f}) m\n",
-      mm(worst_bias->bias_m.norm()), worst_bias->xy_m.x(), worst_bias->xy_m.y(), mm(worst_sd->sd_m),
-      worst_sd->xy_m.x(), worst_sd->xy_m.y());
+      convert_m_to_mm(worst_bias->bias_m.norm()), worst_bias->xy_m.x(), worst_bias->xy_m.y(),
+      convert_m_to_mm(worst_sd->sd_m), worst_sd->xy_m.x(), worst_sd->xy_m.y());
 }
 
 void print_line_fit(const LineFit& fit) {
@@ -84,8 +87,9 @@ void print_line_fit(const LineFit& fit) {
       "line fit    mean {:.3f} mm, median {:.3f}, p90 {:.3f}, rms {:.3f}, max {:.3f}\n"
       "  jitter    {:.3f} mm rms across the fitted line, not included; line rotated by {:+.4f} "
       "deg\n",
-      mm(statistics.mean), mm(statistics.median), mm(statistics.p90), mm(statistics.rms),
-      mm(statistics.max), mm(fit.jitter_m), deg_from_rad(fit.angle_rad));
+      convert_m_to_mm(statistics.mean), convert_m_to_mm(statistics.median),
+      convert_m_to_mm(statistics.p90), convert_m_to_mm(statistics.rms),
+      convert_m_to_mm(statistics.max), convert_m_to_mm(fit.jitter_m), deg_from_rad(fit.angle_rad));
 }
 
 void print_normalized_errors_and_crlb(const Evaluation& evaluation) {
@@ -104,20 +108,21 @@ void print_normalized_errors_and_crlb(const Evaluation& evaluation) {
     fmt::print(" (errors within 1.96 sd; correlated within one calibration)\n");
   }
   if (const auto& limit = evaluation.limit) {
-    fmt::print("limit       {:.3f} mm rms, error / limit {:.3f} ({})\n", mm(limit->limit_m),
-               limit->horizontal,
-               limit->is_below_crlb() ? "below the limit: see the warning"
-                                      : "1: optimal for one level image");
+    fmt::print("limit       {:.3f} mm rms, error / limit {:.3f} ({})\n",
+               convert_m_to_mm(limit->limit_m), limit->horizontal,
+               limit->are_errors_below_crlb() ? "below the limit: see the warning"
+                                              : "1: optimal for one level image");
   }
 }
 
 void print_comparison(const Comparison& comparison) {
-  fmt::print("compared    {}", comparison.describe_result());
+  fmt::print("compared    {}", comparison.describe_comparison_result());
   if (comparison.pairs > 0) {
-    fmt::print(": mean error differs by {:+.3f} mm", mm(comparison.mean_difference_m));
+    fmt::print(": mean error differs by {:+.3f} mm", convert_m_to_mm(comparison.mean_difference_m));
   }
   if (const auto& interval_m = comparison.interval_m) {
-    fmt::print(" (95 %: {:+.3f} to {:+.3f})", mm(interval_m->low), mm(interval_m->high));
+    fmt::print(" (95 %: {:+.3f} to {:+.3f})", convert_m_to_mm(interval_m->low),
+               convert_m_to_mm(interval_m->high));
   }
   fmt::print(
       "\n  captures  {} in both: {} with a smaller error, {} with a larger; {} only in the "
@@ -140,9 +145,9 @@ std::string_view find_remedy(std::string_view key) {
 
 }  // namespace
 
-void print_fixes(const FixSummary& summary) {
+void print_position_fix_summary(const FixSummary& summary) {
   fmt::print("frames      {}\nfixes       {}\n", summary.frames, summary.fixes);
-  for (const auto& [status, count] : summary.refused) {
+  for (const auto& [status, count] : summary.failures_by_status) {
     fmt::print("  no fix    {} {}\n", count, status);
   }
   if (const auto& typical = summary.typical) {
@@ -158,9 +163,10 @@ void print_fixes(const FixSummary& summary) {
   }
 }
 
-void print_evaluation(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates) {
+void print_fix_error_evaluation(const Evaluation& evaluation,
+                                const std::vector<CheckedMetric>& gates) {
   fmt::print("captures    {}\nfixes       {}\nmissing     {:.3g} %\n", evaluation.captures,
-             evaluation.fixes, 100 * evaluation.missing_fraction());
+             evaluation.fixes, 100 * evaluation.missing_fix_fraction());
   for (const auto& [status, count] : evaluation.missing) {
     fmt::print("  no fix    {} {}\n", count, status);
   }
@@ -172,13 +178,14 @@ void print_evaluation(const Evaluation& evaluation, const std::vector<CheckedMet
   if (evaluation.comparison) print_comparison(*evaluation.comparison);
   if (!gates.empty()) fmt::print("\n");
   for (const CheckedMetric& gate : gates) {
-    fmt::print("{:6} gate {:20} {:>10.4g} {:3} {} {:.4g}\n", gate.has_passed() ? "met" : "NOT MET",
-               gate.name, gate.value.value(), gate.unit, describe(gate.direction),
-               gate.limit.value());
+    fmt::print("{:6} gate {:20} {:>10.4g} {:3} {} {:.4g}\n",
+               gate.has_passed_gate() ? "met" : "NOT MET", gate.name, gate.value.value(), gate.unit,
+               describe_limit_direction(gate.direction), gate.limit.value());
   }
 }
 
-void print_floor_limits(const FloorSummary& summary, const FloorLimits& limits, bool is_free) {
+void print_floor_error_budget(const FloorSummary& summary, const FloorLimits& limits,
+                              bool is_free) {
   const auto in_view =
       std::count_if(limits.places.begin(), limits.places.end(),
                     [](const FloorLimits::Place& place) { return place.lamps > 1; });

@@ -27,18 +27,18 @@ SessionObserver SessionLog::make_session_observer() {
   return {[this](const std::string&) { step_start_ = Clock::now(); },
           [this](std::size_t done, std::size_t total) {
             if (!progress_) progress_ = std::make_unique<Progress>("images");
-            progress_->update_display(done, total);
+            progress_->update_progress_display(done, total);
           },
-          [this](const SessionStep& step) { on_step_finished(step); }};
+          [this](const SessionStep& step) { print_finished_step(step); }};
 }
 
-void SessionLog::on_step_finished(const SessionStep& step) {
+void SessionLog::print_finished_step(const SessionStep& step) {
   progress_.reset();
   const double seconds = std::chrono::duration<double>(Clock::now() - step_start_).count();
   const bool missed = !describe_failed_gates(step.result.gates).empty();
   fmt::print("{:13} {}{}\n", step.name,
              step.is_up_to_date ? "up to date" : fmt::format("{:5.1f} s", seconds),
-             step.result.ok() ? missed ? ", a gate is not met" : "" : ", failed");
+             step.result.has_succeeded() ? missed ? ", a gate is not met" : "" : ", failed");
   std::fflush(stdout);
   print_step_remarks(step.result);
 }
@@ -62,7 +62,7 @@ void print_session_result(const SessionResult& result, const std::string& result
     if (const auto value = find(result, name)) fmt::print("{:11} {:.4g} {}\n", label, *value, unit);
   }
   for (const CheckedMetric& gate : result.gates) {
-    if (!gate.has_passed()) fmt::print("NOT MET     {}\n", describe(gate));
+    if (!gate.has_passed_gate()) fmt::print("NOT MET     {}\n", describe_gate_result(gate));
   }
   fmt::print("verdict     {}; results are in {}\n", session_verdict_name(result.verdict), results);
 }

@@ -15,14 +15,14 @@ namespace vlp {
 /// a progress display while it runs.
 class SessionLog {
  public:
-  /// Returns the callbacks that write the log during one call of run_session(). They refer to this
-  /// log, which must outlive the run.
+  /// Returns the callbacks that write the log during one call of run_calibration_session(). They
+  /// refer to this log, which must outlive the run.
   SessionObserver make_session_observer();
 
  private:
   using Clock = std::chrono::steady_clock;
 
-  void on_step_finished(const SessionStep& step);
+  void print_finished_step(const SessionStep& step);
 
   Clock::time_point step_start_;
   std::unique_ptr<Progress> progress_;

@@ -30,13 +30,13 @@ void print_confusion(const Confusion& confusion) {
   }
   const int all = confusion.counts.sum();
   fmt::print("correct     {:.2f} %\n  wrong     {}\n  unknown   {}\n",
-             100.0 * confusion.right() / all, confusion.count_wrongly_identified(),
-             confusion.unknown());
+             100.0 * confusion.count_correctly_identified() / all,
+             confusion.count_wrongly_identified(), confusion.count_unidentified());
 }
 
 }  // namespace
 
-void print_classifier_training(const TrainStepResult& result) {
+void print_lamp_classifier_training(const TrainStepResult& result) {
   print_labeled_lights(result.labeled, result.classifier);
   print_confusion(result.confusion);
 }

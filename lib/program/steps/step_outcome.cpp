@@ -18,7 +18,7 @@ namespace vlp {
 namespace {
 
 bool does_option_affect_result(const CLI::Option& option) {
-  const auto excluded = list_options_not_in_history();
+  const auto excluded = list_options_omitted_from_history();
   return std::find(excluded.begin(), excluded.end(), option.get_name()) == excluded.end();
 }
 
@@ -53,13 +53,13 @@ void print_step_remarks(const StepResult& result) {
 }
 
 void throw_if_step_failed(const StepResult& result) {
-  if (result.ok()) return;
+  if (result.has_succeeded()) return;
   if (result.failure == StepFailure::undetermined)
     throw Undetermined(format_failure_message(result));
   throw std::invalid_argument(format_failure_message(result));
 }
 
-std::span<const std::string_view> list_options_not_in_history() {
+std::span<const std::string_view> list_options_omitted_from_history() {
   static constexpr std::array<std::string_view, 15> excluded = {
       "--output",  "--plot",   "--annotate", "--threads", "--quiet",
       "--verbose", "--cache",  "--ros",      "--corners", "--kalibr",
@@ -67,11 +67,11 @@ std::span<const std::string_view> list_options_not_in_history() {
   return excluded;
 }
 
-HistoryEntry make_program_history_entry(const CLI::App& app,
-                                        const std::vector<std::string>& inputs) {
+HistoryEntry make_history_entry_from_command_line(const CLI::App& app,
+                                                  const std::vector<std::string>& inputs) {
   InputDigests digests;
-  return make_history_entry({app.get_name(), VLP_VERSION}, format_options(app, inputs),
-                            {inputs.begin(), inputs.end()}, digests);
+  return make_calibration_history_entry({app.get_name(), VLP_VERSION}, format_options(app, inputs),
+                                        {inputs.begin(), inputs.end()}, digests);
 }
 
 }  // namespace vlp

@@ -26,19 +26,19 @@ void throw_if_step_failed(const StepResult& result);
 
 /// Returns the options that do not affect the recorded result: --output, other outputs, a cache,
 /// and options of the display.
-std::span<const std::string_view> list_options_not_in_history();
+std::span<const std::string_view> list_options_omitted_from_history();
 
 /// Makes the history entry of a part of a calibration, without the name of the part
 /// (rig/calibration_builder.h). Holds program and version, the given options in the order of
 /// --help, and a digest of each input.
 ///
 /// The entry is the same on every machine: paths are reduced to their last component, and
-/// list_options_not_in_history() are omitted.
+/// list_options_omitted_from_history() are omitted.
 ///
 /// @param inputs  files and folders of images; an empty name is an input that was not given
 /// @throws InputError if an input cannot be read
 /// @pre `app` has parsed the command line
-HistoryEntry make_program_history_entry(const CLI::App& app,
-                                        const std::vector<std::string>& inputs);
+HistoryEntry make_history_entry_from_command_line(const CLI::App& app,
+                                                  const std::vector<std::string>& inputs);
 
 }  // namespace vlp

@@ -17,7 +17,8 @@
 namespace vlp {
 namespace {
 
-std::string points(const std::string& name, const std::vector<Eigen::Vector2d>& errors_m) {
+std::string make_point_data_block(const std::string& name,
+                                  const std::vector<Eigen::Vector2d>& errors_m) {
   std::string rows;
   for (const auto& error_m : errors_m)
     rows += format_gnuplot_data_row({1e3 * error_m.x(), 1e3 * error_m.y()});
@@ -32,13 +33,13 @@ std::string circle(const std::string& name, const Circle& circle_m) {
   return make_gnuplot_data_block(
              name, format_gnuplot_data_row({1e3 * circle_m.center.x(), 1e3 * circle_m.center.y(),
                                             1e3 * circle_m.radius})) +
-         points(name + "_box", corners);
+         make_point_data_block(name + "_box", corners);
 }
 
 /// Returns the plot clauses of points with their circle and its center.
-std::string layer(const std::string& name, const std::string& color, const std::string& marker,
-                  const std::string& dashes) {
-  const std::string style = line_color(color);
+std::string make_gnuplot_layer(const std::string& name, const std::string& color,
+                               const std::string& marker, const std::string& dashes) {
+  const std::string style = make_gnuplot_color_clause(color);
   return "$" + name + "_circle using 1:2:3 with circles linewidth 1.5 dashtype " + dashes + style +
          "notitle, " + "$" + name + "_circle_box using 1:2 with points pointtype -1 notitle, $" +
          name + "_circle using 1:2 with points pointtype 2 pointsize 1.5 linewidth 2" + style +
@@ -56,7 +57,7 @@ std::string format_square_range(const Eigen::AlignedBox2d& box) {
 }
 
 /// Returns the data blocks: corners and outliers as u v du dv, and the map as u v sd.
-std::string format_data(const IntrinsicsPlot& plot) {
+std::string format_intrinsics_data(const IntrinsicsPlot& plot) {
   std::string corners, outliers, map;
   for (const auto& [seen_px, residual_px, outlier] : plot.corners) {
     (outlier ? outliers : corners) +=
@@ -186,21 +187,23 @@ std::string format_mtf50_map(const IntrinsicsPlot& plot) {
 
 }  // namespace
 
-Drawing make_gnuplot_drawing(const DispersionPlot& plot) {
-  std::string commands =
-      points("before", plot.before.errors_m) + circle("before_circle", plot.before.circle) +
-      points("after", plot.after.errors_m) + circle("after_circle", plot.after.circle) +
-      points("outliers", plot.outliers_m) + make_common_plot_settings() + set_title(plot.title) +
-      "set xlabel 'fix minus reference point, x (mm)'\n"
-      "set ylabel 'y (mm)'\n"
-      "set size ratio -1\n"
-      // Contains the reference point always, and is never empty.
-      "set xrange [* < -0.01 : 0.01 < *]\n"
-      "set yrange [* < -0.01 : 0.01 < *]\n"
-      "set offsets graph 0.05, graph 0.05, graph 0.05, graph 0.05\n"
-      "plot " +
-      layer("before", plot_colors::blue, "8", "2") + ", " +
-      layer("after", plot_colors::vermilion, "7", "1");
+Drawing make_dispersion_plot_drawing(const DispersionPlot& plot) {
+  std::string commands = make_point_data_block("before", plot.before.errors_m) +
+                         circle("before_circle", plot.before.circle) +
+                         make_point_data_block("after", plot.after.errors_m) +
+                         circle("after_circle", plot.after.circle) +
+                         make_point_data_block("outliers", plot.outliers_m) +
+                         make_common_gnuplot_settings() + make_gnuplot_title_command(plot.title) +
+                         "set xlabel 'fix minus reference point, x (mm)'\n"
+                         "set ylabel 'y (mm)'\n"
+                         "set size ratio -1\n"
+                         // Contains the reference point always, and is never empty.
+                         "set xrange [* < -0.01 : 0.01 < *]\n"
+                         "set yrange [* < -0.01 : 0.01 < *]\n"
+                         "set offsets graph 0.05, graph 0.05, graph 0.05, graph 0.05\n"
+                         "plot " +
+                         make_gnuplot_layer("before", plot_colors::blue, "8", "2") + ", " +
+                         make_gnuplot_layer("after", plot_colors::vermilion, "7", "1");
   if (!plot.outliers_m.empty()) {
     commands += ", $outliers using 1:2 with points pointtype 4 linecolor rgb '" +
                 std::string(plot_colors::gray) + "' title 'rejected'";
@@ -211,7 +214,7 @@ Drawing make_gnuplot_drawing(const DispersionPlot& plot) {
   return {"dispersion", 720, 720, commands};
 }
 
-Drawing make_gnuplot_drawing(const RotationPlot& plot) {
+Drawing make_rotation_plot_drawing(const RotationPlot& plot) {
   std::string places, ellipses, labels;
   std::set<int> labeled;
   Eigen::AlignedBox2d image, centers(plot.rotation_center_px);
@@ -240,14 +243,14 @@ Drawing make_gnuplot_drawing(const RotationPlot& plot) {
       make_gnuplot_data_block("axis", format_gnuplot_data_row({axis.x(), axis.y()})) +
       make_gnuplot_data_block("principal",
                               format_gnuplot_data_row({principal.x(), principal.y()})) +
-      make_common_plot_settings() +
+      make_common_gnuplot_settings() +
       "set size ratio -1\n"
       "set xlabel 'u (px)'\n"
       "set ylabel 'v (px)'\n"
       "unset colorbox\n"
       "set palette defined (0 '#440154', 1 '#3b528b', 2 '#21918c', 3 '#5ec962', 4 '#e0b000')\n"
       "set multiplot layout 1,2 title " +
-      quote_for_gnuplot(plot.title) +
+      quote_text_for_gnuplot(plot.title) +
       " noenhanced\n"
       "set title 'lamps while turning, undistorted image'\n" +
       format_square_range(image.extend(centers)) +
@@ -265,7 +268,7 @@ double choose_residual_magnification(double rms_px, int width_px) {
   return rms_px > 0 ? round_down_to_1_2_5_series(width_px / 40.0 / rms_px) : 1;
 }
 
-Drawing make_gnuplot_drawing(const IntrinsicsPlot& plot) {
+Drawing make_intrinsics_plot_drawing(const IntrinsicsPlot& plot) {
   assert(plot.cols >= 2 && plot.sd_px.size() >= 2 * static_cast<std::size_t>(plot.cols));
   const auto [width, height] = plot.imager_px;
   const std::string times =
@@ -274,7 +277,7 @@ Drawing make_gnuplot_drawing(const IntrinsicsPlot& plot) {
       "using 1:2:($3 * " + times + "):($4 * " + times + ") with vectors nohead ";
   const std::string dots = "using 1:2 with points pointtype 7 pointsize 0.18";
   const std::string commands =
-      format_data(plot) + make_common_plot_settings() +
+      format_intrinsics_data(plot) + make_common_gnuplot_settings() +
       "set size ratio -1\n"
       "set xrange [-0.5:" +
       format_significant_digits(width - 0.5, kPlotDigits) +
@@ -285,15 +288,16 @@ Drawing make_gnuplot_drawing(const IntrinsicsPlot& plot) {
       "set xlabel 'u (px)'\n"
       "set ylabel 'v (px)'\n"
       "set multiplot layout 2,2 margins 0.1,0.9,0.08,0.88 spacing 0.13,0.2 title " +
-      quote_for_gnuplot(plot.title) +
+      quote_text_for_gnuplot(plot.title) +
       " noenhanced\n"
       "set title " +
-      quote_for_gnuplot("corners of all views\n" + describe_counts(plot, " (crosses)")) + "\n" +
+      quote_text_for_gnuplot("corners of all views\n" + describe_counts(plot, " (crosses)")) +
+      "\n" +
       format_plot_commands(plot, dots,
                            "using 1:2 with points pointtype 2 pointsize 1.2 linewidth 2") +
       "set title " +
-      quote_for_gnuplot("residuals, seen minus projected, " + times + " times as long\n" +
-                        describe_counts(plot, " (thick)")) +
+      quote_text_for_gnuplot("residuals, seen minus projected, " + times + " times as long\n" +
+                             describe_counts(plot, " (thick)")) +
       "\n" +
       format_plot_commands(
           plot, dots + " linecolor rgb '#0072b2' notitle, $corners " + arrows + "linewidth 0.5",
@@ -303,9 +307,10 @@ Drawing make_gnuplot_drawing(const IntrinsicsPlot& plot) {
   return {"intrinsics", 900, 280 + 720 * height / width, commands};
 }
 
-IntrinsicsPlot collect_plot_data(const std::string& title, const IntrinsicsSolution& solution,
-                                 const BoardLattice& lattice,
-                                 const std::optional<LensSharpness>& sharpness) {
+IntrinsicsPlot collect_intrinsics_plot_data(const std::string& title,
+                                            const IntrinsicsSolution& solution,
+                                            const BoardLattice& lattice,
+                                            const std::optional<LensSharpness>& sharpness) {
   const BoardProblem& problem = solution.problem;
   IntrinsicsPlot plot{title, problem.imager_px, {}, 0, {}};
   const auto residuals_px = compute_reprojection_residuals(problem);
@@ -317,7 +322,7 @@ IntrinsicsPlot collect_plot_data(const std::string& title, const IntrinsicsSolut
   const ProjectionUncertainty uncertainty(solution, lattice);
   for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(problem.imager_px)) {
     if (pixel.y() == 0) ++plot.cols;
-    plot.sd_px.push_back(uncertainty.max_direction_sd_px(pixel));
+    plot.sd_px.push_back(uncertainty.max_projection_sd_px(pixel));
   }
   if (sharpness) {
     plot.mtf50_cols = sharpness->mtf50.cols;
@@ -326,29 +331,29 @@ IntrinsicsPlot collect_plot_data(const std::string& title, const IntrinsicsSolut
   return plot;
 }
 
-RotationPlot collect_plot_data(const std::string& title, const RotationCaptures& spot,
-                               const CircleCenters& circles, const RotationFit& fit,
-                               const Camera& camera) {
+RotationPlot collect_rotation_plot_data(const std::string& title, const RotationCaptures& spot,
+                                        const CircleCenters& circles, const RotationFit& fit,
+                                        const Camera& camera) {
   RotationPlot plot{title,
                     {},
                     fit.center.center_px,
-                    undistorted_pixel_from_normalized(camera, Eigen::Vector2d::Zero())};
+                    undistorted_pixel_from_normalized_point(camera, Eigen::Vector2d::Zero())};
   for (const auto& [lamp, height, circle] : circles.circles) {
     const Eigen::Vector2d radii_px = camera.focal_px();
     plot.traces.push_back({spot.lamps[lamp].id,
                            {},
-                           undistorted_pixel_from_normalized(camera, circle.circle.center),
+                           undistorted_pixel_from_normalized_point(camera, circle.circle.center),
                            circle.circle.radius * radii_px});
     for (const RotationObservation& observation : spot.observations) {
       if (observation.lamp != lamp || spot.captures[observation.capture].height != height) continue;
       plot.traces.back().places_px.push_back(
-          undistorted_pixel_from_normalized(camera, observation.ray.hnormalized()));
+          undistorted_pixel_from_normalized_point(camera, observation.ray.hnormalized()));
     }
   }
   return plot;
 }
 
-DispersionPlot collect_plot_data(const std::string& title, const DispersionFit& fit) {
+DispersionPlot collect_dispersion_plot_data(const std::string& title, const DispersionFit& fit) {
   DispersionPlot plot{title, {{}, fit.before}, {{}, fit.after}, {}};
   for (const auto& fix : fit.fixes) {
     if (fix.used) {

@@ -122,7 +122,7 @@ std::string make_scale_bar(const Scale& scale, const Eigen::Vector2d& from_m) {
   const double end_m = from_m.x() + scale.magnification * length_m;
   return "set arrow from " + at(from_m.x()) + " to " + at(end_m) +
          " heads size graph 0.01,90 linewidth 2 front\nset label '" +
-         format_mm_with_unit(length_m) + "' at " + at(end_m) + " offset 1,0 front\n";
+         format_length_with_mm_unit(length_m) + "' at " + at(end_m) + " offset 1,0 front\n";
 }
 
 std::string format_plot_commands(const ErrorPlot& plot, const Blocks& blocks, const Scale& scale) {
@@ -133,7 +133,7 @@ std::string format_plot_commands(const ErrorPlot& plot, const Blocks& blocks, co
   });
   std::vector<std::string> layers;
   if (!blocks.arrows.empty()) {
-    layers.push_back("$arrows" + arrow + "1.3" + line_color(plot_colors::blue) +
+    layers.push_back("$arrows" + arrow + "1.3" + make_gnuplot_color_clause(plot_colors::blue) +
                      "title 'error of a fix'");
   }
   if (!blocks.places.empty()) {
@@ -142,20 +142,21 @@ std::string format_plot_commands(const ErrorPlot& plot, const Blocks& blocks, co
         "'truth'");
   }
   if (cut > 0) {
-    layers.push_back("$cut" + arrow + "1.5 dashtype 2" + line_color(plot_colors::vermilion) +
-                     "title '" + std::to_string(cut) + " beyond " +
-                     format_mm_with_unit(scale.find_longest_arrow_m()) + ", cut short'");
+    layers.push_back("$cut" + arrow + "1.5 dashtype 2" +
+                     make_gnuplot_color_clause(plot_colors::vermilion) + "title '" +
+                     std::to_string(cut) + " beyond " +
+                     format_length_with_mm_unit(scale.find_longest_arrow_m()) + ", cut short'");
   }
   if (!blocks.missing.empty()) {
     const std::size_t count = plot.missing_m.size(),
                       step = compute_thinning_step(count, kMaxMissing);
     layers.push_back("$missing using 1:2 with points pointtype 2 linewidth 2" +
-                     line_color(plot_colors::vermilion) + "title 'no fix: " +
+                     make_gnuplot_color_clause(plot_colors::vermilion) + "title 'no fix: " +
                      (step == 1 ? std::to_string(count) : describe_thinning(count, step)) + "'");
   }
   if (!blocks.lamps.empty()) {
     layers.push_back("$lamps using 1:2 with points pointtype 6 pointsize 1.6 linewidth 2" +
-                     line_color(plot_colors::gray) +
+                     make_gnuplot_color_clause(plot_colors::gray) +
                      "title 'lamps', $lamps using 1:2:(sprintf('%d', int($3))) with labels left "
                      "offset 1,0.7 notitle");
   }
@@ -169,7 +170,7 @@ constexpr std::array<const char*, 4> kColors = {plot_colors::blue, plot_colors::
                                                 plot_colors::green, plot_colors::purple};
 
 /// Returns rows of error in mm and cumulative fraction in percent.
-std::string format_steps(std::vector<double> errors_m) {
+std::string format_cdf_steps(std::vector<double> errors_m) {
   std::sort(errors_m.begin(), errors_m.end());
   const std::size_t count = errors_m.size(), steps = std::min(count, kMaxSteps);
   std::string rows = format_gnuplot_data_row({0, 0});
@@ -181,20 +182,21 @@ std::string format_steps(std::vector<double> errors_m) {
 }
 
 /// Returns the data blocks of a curve: its steps and its two marks.
-std::string format_blocks(const CdfPlot::Curve& curve, const std::string& number) {
-  return make_gnuplot_data_block("curve" + number, format_steps(curve.errors_m)) +
+std::string format_cdf_data_blocks(const CdfPlot::Curve& curve, const std::string& number) {
+  return make_gnuplot_data_block("curve" + number, format_cdf_steps(curve.errors_m)) +
          make_gnuplot_data_block("marks" + number,
                                  format_gnuplot_data_row({1e3 * curve.p50_m, 50}) +
                                      format_gnuplot_data_row({1e3 * curve.p90_m, 90}));
 }
 
 std::string format_layer(const CdfPlot::Curve& curve, std::size_t i) {
-  const std::string number = std::to_string(i), color = line_color(kColors[i % kColors.size()]),
+  const std::string number = std::to_string(i),
+                    color = make_gnuplot_color_clause(kColors[i % kColors.size()]),
                     style = " dashtype " + std::to_string(i + 1) + color,
-                    label = curve.label + ": p50 " + format_mm(curve.p50_m) + " mm, p90 " +
-                            format_mm(curve.p90_m) + " mm";
+                    label = curve.label + ": p50 " + format_length_in_mm(curve.p50_m) +
+                            " mm, p90 " + format_length_in_mm(curve.p90_m) + " mm";
   return "$curve" + number + " using 1:2 with steps linewidth 2.5" + style + "title " +
-         quote_for_gnuplot(label) + " noenhanced, $marks" + number +
+         quote_text_for_gnuplot(label) + " noenhanced, $marks" + number +
          " using 1:2 with points pointtype " + std::to_string(5 + 2 * (i % kColors.size())) +
          " pointsize 1.3" + color + "notitle";
 }
@@ -224,8 +226,8 @@ std::string format_row(const LineFrame& frame, const Eigen::Vector2d& point_m) {
 std::string format_plot_commands(const std::string& columns) {
   return "plot $commanded using " + columns + " with lines linewidth 2 linecolor rgb 'black' " +
          "title 'commanded', $fixes using " + columns + " with points pointtype 7 pointsize 0.35" +
-         line_color(plot_colors::blue) + "title 'fixes', $fitted using " + columns +
-         " with lines linewidth 2 dashtype 2" + line_color(plot_colors::vermilion) +
+         make_gnuplot_color_clause(plot_colors::blue) + "title 'fixes', $fitted using " + columns +
+         " with lines linewidth 2 dashtype 2" + make_gnuplot_color_clause(plot_colors::vermilion) +
          "title 'fitted line'\n";
 }
 
@@ -297,7 +299,7 @@ double choose_error_magnification(double p90_m, double width_m) {
   return p90_m > 0 ? std::max(1.0, round_down_to_1_2_5_series(largest_share * width_m / p90_m)) : 1;
 }
 
-Drawing make_gnuplot_drawing(const ErrorPlot& plot) {
+Drawing make_fix_error_plot_drawing(const ErrorPlot& plot) {
   Scale scale(plot);
   const std::size_t step = compute_thinning_step(plot.fixes.size(), kMaxArrows);
   const Blocks blocks(plot, step, scale);
@@ -314,7 +316,7 @@ Drawing make_gnuplot_drawing(const ErrorPlot& plot) {
   return {
       "errors", width_px,
       static_cast<int>(std::clamp<double>(plan_px + around_px, smallest_px, largest_px)),
-      blocks.text() + make_common_plot_settings() + set_title(title) +
+      blocks.text() + make_common_gnuplot_settings() + make_gnuplot_title_command(title) +
           make_scale_bar(scale, {scale.extent.min().x(), scale.extent.min().y() - 1.2 * margin_m}) +
           "set xlabel 'x (m)'\nset ylabel 'y (m)'\nset size ratio -1\nset xrange " +
           format_gnuplot_range(lower.x(), upper.x()) + "\nset yrange " +
@@ -323,7 +325,7 @@ Drawing make_gnuplot_drawing(const ErrorPlot& plot) {
       make_error_table(plot)};
 }
 
-Drawing make_gnuplot_drawing(const CdfPlot& plot) {
+Drawing make_error_cdf_plot_drawing(const CdfPlot& plot) {
   assert(!plot.curves.empty());
   constexpr double off_the_picture = 4, margin = 1.05;
   double largest_m = 0, largest_p90_m = 0;
@@ -337,13 +339,13 @@ Drawing make_gnuplot_drawing(const CdfPlot& plot) {
 
   std::string blocks, layers;
   for (std::size_t i = 0; i < plot.curves.size(); ++i) {
-    blocks += format_blocks(plot.curves[i], std::to_string(i));
+    blocks += format_cdf_data_blocks(plot.curves[i], std::to_string(i));
     layers.append(layers.empty() ? "plot " : ", ").append(format_layer(plot.curves[i], i));
   }
   const std::string beyond =
-      cut ? "; the largest, " + format_mm(largest_m) + " mm, is outside the plot" : "";
+      cut ? "; the largest, " + format_length_in_mm(largest_m) + " mm, is outside the plot" : "";
   return {"cdf", 720, 460 + 24 * static_cast<int>(plot.curves.size()),
-          blocks + make_common_plot_settings() + set_title(plot.title) +
+          blocks + make_common_gnuplot_settings() + make_gnuplot_title_command(plot.title) +
               "set xlabel 'horizontal error (mm)" + beyond +
               "'\n"
               "set ylabel 'share of fixes no further off (%)'\n"
@@ -353,7 +355,7 @@ Drawing make_gnuplot_drawing(const CdfPlot& plot) {
               "\nset yrange [0:102]\nset ytics (0, 25, 50, 75, 90, 100)\n" + layers + "\n"};
 }
 
-Drawing make_gnuplot_drawing(const TrackPlot& plot) {
+Drawing make_line_drive_plot_drawing(const TrackPlot& plot) {
   assert(plot.commanded_m[0] != plot.commanded_m[1] && plot.fitted_m[0] != plot.fitted_m[1]);
   assert(!plot.fixes_m.empty());
   const std::size_t step = compute_thinning_step(plot.fixes_m.size(), kMaxFixes);
@@ -376,9 +378,9 @@ Drawing make_gnuplot_drawing(const TrackPlot& plot) {
   return {
       "track", 720, static_cast<int>(height_px),
       make_gnuplot_data_block("commanded", commanded) + make_gnuplot_data_block("fixes", fixes) +
-          make_gnuplot_data_block("fitted", fitted) + make_common_plot_settings() +
+          make_gnuplot_data_block("fitted", fitted) + make_common_gnuplot_settings() +
           "set multiplot title " +
-          quote_for_gnuplot(note.empty() ? plot.title : plot.title + "\n" + note) +
+          quote_text_for_gnuplot(note.empty() ? plot.title : plot.title + "\n" + note) +
           " noenhanced\n"
           "set lmargin at screen 0.12\nset rmargin at screen 0.98\nset bmargin at screen " +
           from_bottom(below_px) + "\nset tmargin at screen " + from_bottom(below_px + plan_px) +
@@ -400,7 +402,7 @@ Drawing make_gnuplot_drawing(const TrackPlot& plot) {
           "\n" + format_plot_commands("3:4") + "unset multiplot\n"};
 }
 
-std::vector<double> BudgetPlot::compute_contribution_fractions() const {
+std::vector<double> BudgetPlot::compute_variance_contribution_fractions() const {
   std::vector<double> fractions(parts.size());
   double whole = 0;
   for (const auto& fix : variances_m2) {
@@ -411,20 +413,20 @@ std::vector<double> BudgetPlot::compute_contribution_fractions() const {
   return fractions;
 }
 
-Drawing make_gnuplot_drawing(const BudgetPlot& plot) {
+Drawing make_variance_budget_plot_drawing(const BudgetPlot& plot) {
   assert(!plot.variances_m2.empty() && plot.parts.size() <= kPartColors.size());
-  const std::vector<double> fractions = plot.compute_contribution_fractions();
+  const std::vector<double> fractions = plot.compute_variance_contribution_fractions();
   std::string layers;
   for (std::size_t i = 0; i < plot.parts.size(); ++i) {
     if (!(fractions[i] > 0)) continue;
     const std::string label = fmt::format("{}, {:.0f} %", plot.parts[i], 100 * fractions[i]);
     layers += fmt::format("{}$budget using {} linecolor rgb '{}' title {} noenhanced",
                           layers.empty() ? "plot " : ", ", i + 1, kPartColors[i],
-                          quote_for_gnuplot(label));
+                          quote_text_for_gnuplot(label));
   }
   return {"budget", 720, 520,
-          make_gnuplot_data_block("budget", format_columns(plot)) + make_common_plot_settings() +
-              set_title(plot.title) +
+          make_gnuplot_data_block("budget", format_columns(plot)) + make_common_gnuplot_settings() +
+              make_gnuplot_title_command(plot.title) +
               "set xlabel 'fixes, the most certain first'\n"
               "set ylabel 'horizontal variance (mm²)'\n"
               "set style data histograms\n"

@@ -9,12 +9,13 @@
 
 namespace vlp {
 
-FloorPlot collect_plot_data(const FloorLimits& limits, const std::string& title, double step_m) {
+FloorPlot collect_floor_plot_data(const FloorLimits& limits, const std::string& title,
+                                  double step_m) {
   FloorPlot plot{title, "horizontal standard deviation (mm)", step_m, {}};
   for (const FloorLimits::Place& place : limits.places) {
     plot.places.push_back({place.camera.position_m.head<2>(), {}});
     if (place.parts.empty()) continue;
-    plot.places.back().value = 1e3 * compute_fix_sds(place.total_covariance()).horizontal_m;
+    plot.places.back().value = 1e3 * compute_fix_sds(place.total_pose_covariance()).horizontal_m;
   }
   return plot;
 }
@@ -33,8 +34,8 @@ void write_floor_plot(const std::filesystem::path& picture, const FloorPlot& plo
   const std::string half = format_significant_digits(plot.step_m / 2, kPlotDigits);
   const std::string commands =
       make_gnuplot_data_block("places", places) + make_gnuplot_data_block("lamps", on_floor) +
-      make_common_plot_settings() + set_title(plot.title) + "set cblabel " +
-      quote_for_gnuplot(plot.label) +
+      make_common_gnuplot_settings() + make_gnuplot_title_command(plot.title) + "set cblabel " +
+      quote_text_for_gnuplot(plot.label) +
       " noenhanced\n"
       "set xlabel 'x (m)'\n"
       "set ylabel 'y (m)'\n"

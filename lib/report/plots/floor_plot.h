@@ -31,7 +31,8 @@ struct FloorPlot {
 
 /// Collects the horizontal standard deviation from all sources, in mm; blank where no fix is
 /// possible.
-FloorPlot collect_plot_data(const FloorLimits& limits, const std::string& title, double step_m);
+FloorPlot collect_floor_plot_data(const FloorLimits& limits, const std::string& title,
+                                  double step_m);
 
 /// Writes the plot as .png or .svg, by the extension of `picture`.
 /// @throws InputError as write_plot()

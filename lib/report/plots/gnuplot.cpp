@@ -134,7 +134,7 @@ void write_plot(const fs::path& picture, const Drawing& drawing) {
   }
 }
 
-std::string render_svg(const Drawing& drawing) {
+std::string render_plot_as_svg(const Drawing& drawing) {
   return render_with_terminal(make_svg_terminal(drawing), drawing, drawing.name);
 }
 

@@ -28,6 +28,6 @@ void write_plot(const std::filesystem::path& picture, const Drawing& drawing);
 
 /// Renders as SVG text.
 /// @throws InputError if gnuplot is missing or fails
-std::string render_svg(const Drawing& drawing);
+std::string render_plot_as_svg(const Drawing& drawing);
 
 }  // namespace vlp

@@ -39,18 +39,20 @@ std::vector<double> list_1_2_5_series(double lowest, double highest) {
   return numbers;
 }
 
-std::string format_for_humans(double value, int digits) {
+std::string format_number_for_humans(double value, int digits) {
   return std::abs(value) >= std::pow(10, digits) ? format_fixed_decimals(value, 0)
                                                  : format_significant_digits(value, digits);
 }
 
-std::string format_mm(double length_m) { return format_for_humans(1e3 * length_m, 3); }
+std::string format_length_in_mm(double length_m) {
+  return format_number_for_humans(1e3 * length_m, 3);
+}
 
-std::string format_mm_with_unit(double length_m) {
+std::string format_length_with_mm_unit(double length_m) {
   return format_significant_digits(1e3 * length_m, 3) + " mm";
 }
 
-std::string quote_for_gnuplot(const std::string& text) {
+std::string quote_text_for_gnuplot(const std::string& text) {
   std::string quoted = "'";
   for (const char c : text) {
     if (c == '\'') {
@@ -75,7 +77,7 @@ std::string make_gnuplot_data_block(const std::string& name, const std::string& 
   return "$" + name + " << END\n" + rows + "END\n";
 }
 
-std::string make_common_plot_settings() {
+std::string make_common_gnuplot_settings() {
   return "set encoding utf8\n"
          "set tics out nomirror\n"
          "set key below Left reverse height 1\n"
@@ -84,11 +86,13 @@ std::string make_common_plot_settings() {
          "set palette defined (0 '#440154', 1 '#3b528b', 2 '#21918c', 3 '#5ec962', 4 '#fde725')\n";
 }
 
-std::string set_title(const std::string& title) {
-  return "set title " + quote_for_gnuplot(title) + " noenhanced\n";
+std::string make_gnuplot_title_command(const std::string& title) {
+  return "set title " + quote_text_for_gnuplot(title) + " noenhanced\n";
 }
 
-std::string line_color(const std::string& color) { return " linecolor rgb '" + color + "' "; }
+std::string make_gnuplot_color_clause(const std::string& color) {
+  return " linecolor rgb '" + color + "' ";
+}
 
 std::string format_gnuplot_range(double from, double to) {
   return "[" + format_significant_digits(from, kPlotDigits) + ":" +

@@ -23,13 +23,13 @@ std::vector<double> list_1_2_5_series(double lowest, double highest);
 
 /// Formats a number for humans with `digits` significant digits. Integer digits are all kept, so
 /// that large numbers have no exponent.
-std::string format_for_humans(double value, int digits);
+std::string format_number_for_humans(double value, int digits);
 
-/// Format a length in millimeters with three significant digits. format_mm() has no unit and
-/// keeps all integer digits, as format_for_humans(). format_mm_with_unit() appends the unit and is
-/// for columns.
-std::string format_mm(double length_m);
-std::string format_mm_with_unit(double length_m);
+/// Format a length in millimeters with three significant digits. format_length_in_mm() has no unit
+/// and keeps all integer digits, as format_number_for_humans(). format_length_with_mm_unit()
+/// appends the unit and is for columns.
+std::string format_length_in_mm(double length_m);
+std::string format_length_with_mm_unit(double length_m);
 
 /// Color-blind safe palette of Okabe and Ito. Items that differ in color also differ in marker or
 /// dashes.
@@ -42,7 +42,7 @@ constexpr const char* gray = "#666666";
 }  // namespace plot_colors
 
 /// Returns `text` as a gnuplot string without interpretation of its content; line breaks are kept.
-std::string quote_for_gnuplot(const std::string& text);
+std::string quote_text_for_gnuplot(const std::string& text);
 
 /// Significant digits of the numbers in a plot.
 constexpr int kPlotDigits = 7;
@@ -55,13 +55,13 @@ std::string make_gnuplot_data_block(const std::string& name, const std::string& 
 
 /// Returns the settings common to all plots: encoding, tics, grid, key below, label boxes, and the
 /// palette viridis. Viridis is even in lightness, and readable in gray and for the color-blind.
-std::string make_common_plot_settings();
+std::string make_common_gnuplot_settings();
 
 /// Returns the command that sets the title, without interpretation of its content.
-std::string set_title(const std::string& title);
+std::string make_gnuplot_title_command(const std::string& title);
 
 /// Returns the clause of a color, with a space before and after.
-std::string line_color(const std::string& color);
+std::string make_gnuplot_color_clause(const std::string& color);
 
 /// Returns the range `[from:to]`.
 std::string format_gnuplot_range(double from, double to);

@@ -51,7 +51,7 @@ void add_metrics(const nlohmann::json& entries, std::vector<CheckedMetric>& metr
   metrics.reserve(metrics.size() + entries.size());
   for (const nlohmann::json& entry : entries) {
     CheckedMetric metric;
-    metric.name = find_present_metric_name(entry.at("name"));
+    metric.name = find_current_metric_name(entry.at("name"));
     if (!names.insert(metric.name).second) continue;
     metric.unit = entry.value("unit", "");
     metric.value = find_number(entry, "value");
@@ -76,15 +76,15 @@ std::optional<SharedFolder> open_session(const fs::path& folder) {
 
 }  // namespace
 
-ReprocessedArchive read_archive_sessions(const fs::path& results) {
+ReprocessedArchive read_reprocessed_archive_sessions(const fs::path& results) {
   const CsvTable summary(results / "summary.csv");
   const auto text = [&](std::size_t row, const char* column) {
-    return std::string(summary.get_text(row, summary.get_required_column(column)));
+    return std::string(summary.get_cell_text(row, summary.get_required_column(column)));
   };
   const fs::path named = fs::absolute(results).lexically_normal();
   const fs::path last = named.has_filename() ? named.filename() : named.parent_path().filename();
   ReprocessedArchive archive;
-  for (std::size_t row = 0; row < summary.rows(); ++row) {
+  for (std::size_t row = 0; row < summary.num_rows(); ++row) {
     const std::string date = text(row, "date"), verdict = text(row, "verdict");
     const bool crashed = verdict == "crashed";
     if (crashed || date.empty()) {
@@ -95,11 +95,11 @@ ReprocessedArchive read_archive_sessions(const fs::path& results) {
     run.kind = "unit";
     run.station = last.string();
     const fs::path line =
-        (results / "summary.csv").string() + ":" + std::to_string(summary.line(row));
+        (results / "summary.csv").string() + ":" + std::to_string(summary.line_number_of_row(row));
     std::string session;
     try {
-      run.camera = Id(text(row, "camera"), line, "camera").get_text();
-      session = run.camera + "/" + Id(text(row, "session"), line, "session").get_text();
+      run.camera = Id(text(row, "camera"), line, "camera").id_text();
+      session = run.camera + "/" + Id(text(row, "session"), line, "session").id_text();
     } catch (const InputError& error) {
       archive.refused.emplace_back(error.what());
       continue;
@@ -111,7 +111,9 @@ ReprocessedArchive read_archive_sessions(const fs::path& results) {
     // "look" is the former name of "review".
     const bool passed = verdict == "pass" || verdict == "review" || verdict == "look";
     const bool failed = verdict == "gate";
-    run.verdict = to_string(passed ? Verdict::pass : failed ? Verdict::fail : Verdict::invalid);
+    run.verdict = run_verdict_name(passed   ? Verdict::pass
+                                   : failed ? Verdict::fail
+                                            : Verdict::invalid);
     if (!passed) run.causes = text(row, "reason") + "\n";
     archive.sessions.push_back(
         {std::move(run), results / (passed || failed ? "sessions" : "failed") / session});
@@ -120,11 +122,12 @@ ReprocessedArchive read_archive_sessions(const fs::path& results) {
   return archive;
 }
 
-RunRecord load_archive_run(const ReprocessedSession& session) {
+RunRecord load_run_of_archive_session(const ReprocessedSession& session) {
   RunRecord run = session.run;
   const fs::path file = session.folder / "session.json";
   const auto folder = open_session(session.folder);
-  const auto text = folder ? folder->read("session.json", kMaxSessionFileBytes) : std::nullopt;
+  const auto text =
+      folder ? folder->read_file_if_exists("session.json", kMaxSessionFileBytes) : std::nullopt;
   if (!text) throw InputError(file, "cannot be opened: there is none");
   try {
     check_json_size_and_depth(*text);
@@ -136,7 +139,8 @@ RunRecord load_archive_run(const ReprocessedSession& session) {
     // [STATION-14] `vlp-calibrate writes`
     throw InputError(file, fmt::format("is not as vlp-calibrate writes it: {}", error.what()));
   }
-  run.calibration = folder->read("calibration.yaml", kMaxSessionFileBytes).value_or("");
+  run.calibration =
+      folder->read_file_if_exists("calibration.yaml", kMaxSessionFileBytes).value_or("");
   return run;
 }
 

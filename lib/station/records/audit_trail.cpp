@@ -135,11 +135,12 @@ void check_chain(const std::vector<Entry>& entries, std::vector<std::string>& pr
 
 void lock_audit_trail(soci::session& sql) { sql << "UPDATE vlp_schema SET version = version"; }
 
-void append_to_audit_trail(soci::session& sql, const std::string& run, bool is_new_run,
-                           const std::vector<RunEvent>& new_events) {
+void append_run_events_to_audit_trail(soci::session& sql, const std::string& run, bool is_new_run,
+                                      const std::vector<RunEvent>& new_events) {
   std::vector<Entry> added;
   // As read from the database, which can store a number differently than given.
-  if (is_new_run) added.push_back({0, run, "", compute_digest(load_run(sql, run).value()), ""});
+  if (is_new_run)
+    added.push_back({0, run, "", compute_digest(load_complete_run(sql, run).value()), ""});
   for (const RunEvent& event : new_events) {
     added.push_back({0, run, event.event, compute_digest(run, event), ""});
   }
@@ -161,7 +162,7 @@ void append_to_audit_trail(soci::session& sql, const std::string& run, bool is_n
 
 void append_all_runs_to_audit_trail(soci::session& sql) {
   for (const std::string& run : load_run_ids(sql)) {
-    append_to_audit_trail(sql, run, true, load_run(sql, run).value().events);
+    append_run_events_to_audit_trail(sql, run, true, load_complete_run(sql, run).value().events);
   }
 }
 
@@ -192,7 +193,7 @@ TrailCheck check_audit_trail(soci::session& sql, const std::string& expected_dig
     }
   };
   for (const std::string& name : load_run_ids(sql)) {
-    const RunRecord run = load_run(sql, name).value();
+    const RunRecord run = load_complete_run(sql, name).value();
     ++check.runs;
     check_item(name, "", compute_digest(run));
     for (const RunEvent& event : run.events) {

@@ -31,8 +31,8 @@ namespace vlp {
 void lock_audit_trail(soci::session& sql);
 /// Locks the trail and appends the entries of new events of a run, after that of the run itself if
 /// `is_new_run`.
-void append_to_audit_trail(soci::session& sql, const std::string& run, bool is_new_run,
-                           const std::vector<RunEvent>& new_events);
+void append_run_events_to_audit_trail(soci::session& sql, const std::string& run, bool is_new_run,
+                                      const std::vector<RunEvent>& new_events);
 /// Appends entries of all runs, for records of an earlier version without a trail.
 void append_all_runs_to_audit_trail(soci::session& sql);
 

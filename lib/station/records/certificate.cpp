@@ -27,9 +27,9 @@ using Values = std::vector<CertifiedValue>;
 
 /// Adds x and y with the standard deviations of a covariance.
 template <typename Covariance>
-void add_two_values(Values& values, const std::string& name, const std::string& unit,
-                    const Eigen::Vector2d& pair, const std::optional<Covariance>& covariance,
-                    double scale = 1, Eigen::Index first = 0) {
+void add_x_and_y_values(Values& values, const std::string& name, const std::string& unit,
+                        const Eigen::Vector2d& pair, const std::optional<Covariance>& covariance,
+                        double scale = 1, Eigen::Index first = 0) {
   for (const Eigen::Index i : {0, 1}) {
     std::optional<double> sd;
     if (covariance) sd = scale * std::sqrt((*covariance)(first + i, first + i));
@@ -37,14 +37,15 @@ void add_two_values(Values& values, const std::string& name, const std::string& 
   }
 }
 
-std::string with_unit(const std::string& text, const std::string& unit) {
+std::string append_unit(const std::string& text, const std::string& unit) {
   return unit.empty() ? text : text + "\u00a0" + unit;
 }
 
 std::string make_verdict_section(const RunRecord& record) {
-  const bool conforms = record.has_passed();
-  const std::string words = conforms ? "The unit conforms with all requirements below."
-                                     : "The unit does not conform: " + record.first_cause() + ".";
+  const bool conforms = record.has_run_passed();
+  const std::string words =
+      conforms ? "The unit conforms with all requirements below."
+               : "The unit does not conform: " + record.first_verdict_cause() + ".";
   return std::string("<div class=\"verdict ") + (conforms ? "pass" : "fail") + "\"><strong>" +
          escape_html_text(record.verdict) + "</strong>" + make_html_element("p", words) +
          "</div>\n";
@@ -73,7 +74,7 @@ std::string make_subject_section(const RunRecord& record, const Calibration& cal
 
 /// Describes the inputs that the uncertainty includes, and those that are assumed exact.
 std::string describe_inputs(const RunRecord& record, const Calibration& calibration) {
-  const CheckedMetric* print = record.find_metric("board_print_px");
+  const CheckedMetric* print = record.find_metric_by_name("board_print_px");
   const auto& report = calibration.intrinsics_report;
   if (print == nullptr || !print->value || !report || !report->covariance) {
     return "The board and the known points are assumed to be exact.";
@@ -88,9 +89,9 @@ std::string describe_inputs(const RunRecord& record, const Calibration& calibrat
 std::string make_results_section(const RunRecord& record, const Calibration& calibration) {
   HtmlTable table{"", {"quantity", "value and expanded uncertainty"}, {}};
   for (const CertifiedValue& value : collect_certified_values(calibration)) {
-    table.rows.push_back({value.name, describe(value)});
+    table.rows.push_back({value.name, format_certified_value(value)});
   }
-  const std::string lens(to_string(calibration.camera.lens_model));
+  const std::string lens(lens_model_name(calibration.camera.lens_model));
   return make_html_table(table) +
          make_html_element(
              "p", "Lens model " + lens +
@@ -115,25 +116,25 @@ std::string make_conformity_table(const RunRecord& record) {
   for (const CheckedMetric& metric : record.metrics) {
     if (!metric.limit) continue;
     std::string measured = metric.value ? format_significant_digits(*metric.value, digits) : "none";
-    std::string rule = "simple", outcome = metric.has_passed() ? "yes" : "no";
+    std::string rule = "simple", outcome = metric.has_passed_gate() ? "yes" : "no";
     if (const auto& guard = metric.guard) {
       if (metric.value) {
-        measured =
-            describe(CertifiedValue{"", metric.unit, *metric.value, guard->standard_uncertainty});
+        measured = format_certified_value(
+            CertifiedValue{"", metric.unit, *metric.value, guard->standard_uncertainty});
       }
       rule = fmt::format("guard band of {:.4g} u", guard->k);
       if (const auto sure = metric.conformance_probability()) {
         outcome += ", p = " + format_significant_digits(*sure, probability_digits);
       }
     } else if (metric.value) {
-      measured = with_unit(measured, metric.unit);
+      measured = append_unit(measured, metric.unit);
     }
-    if (!metric.has_passed()) table.marked.push_back(table.rows.size());
+    if (!metric.has_passed_gate()) table.marked.push_back(table.rows.size());
     table.rows.push_back(
         {describe_requirement(metric.name), measured,
-         describe(metric.direction) + " " +
-             with_unit(format_significant_digits(*metric.limit, digits), metric.unit),
-         with_unit(format_significant_digits(metric.acceptance_limit(), digits), metric.unit),
+         describe_limit_direction(metric.direction) + " " +
+             append_unit(format_significant_digits(*metric.limit, digits), metric.unit),
+         append_unit(format_significant_digits(metric.acceptance_limit(), digits), metric.unit),
          outcome, rule});
   }
   return make_html_table(table) +
@@ -166,7 +167,7 @@ std::string make_traceability_section(const RunRecord& record, const Calibration
                                 : " \"check\", the list of names and digests of the "
                                   "images at the known points: " +
                                       check + ".")) +
-         make_history_html_list(calibration.history);
+         make_calibration_history_html_list(calibration.history);
 }
 
 /// Makes the part with the data that a record does not contain.
@@ -188,30 +189,30 @@ std::vector<CertifiedValue> collect_certified_values(const Calibration& calibrat
   const auto& lens = calibration.intrinsics_report;
   const std::optional<MatrixX> lens_covariance = lens ? lens->covariance : std::nullopt;
   Values values;
-  add_two_values(values, "focal length", "px", {k[0], k[1]}, lens_covariance);
-  add_two_values(values, "principal point", "px", {k[2], k[3]}, lens_covariance, 1, 2);
+  add_x_and_y_values(values, "focal length", "px", {k[0], k[1]}, lens_covariance);
+  add_x_and_y_values(values, "principal point", "px", {k[2], k[3]}, lens_covariance, 1, 2);
   if (const auto& center = calibration.rotation_center) {
-    add_two_values(values, "rotation center, undistorted image", "px", center->center_px,
-                   center->covariance);
-    add_two_values(values, "zenith from the optical axis, 180/pi times its normalized point", "deg",
-                   normalized_zenith_point(*center), compute_zenith_covariance(calibration),
-                   degrees);
+    add_x_and_y_values(values, "rotation center, undistorted image", "px", center->center_px,
+                       center->covariance);
+    add_x_and_y_values(values, "zenith from the optical axis, 180/pi times its normalized point",
+                       "deg", compute_normalized_zenith_point(*center),
+                       compute_zenith_covariance(calibration), degrees);
     if (center->lever_arm_m) {
-      add_two_values(values, "lever arm", "mm", *center->lever_arm_m, center->lever_arm_covariance,
-                     millimeters);
+      add_x_and_y_values(values, "lever arm", "mm", *center->lever_arm_m,
+                         center->lever_arm_covariance, millimeters);
     }
   }
   if (const auto& dispersion = calibration.dispersion) {
-    add_two_values(values, "dispersion offset", "px", dispersion->offset_px,
-                   compute_offset_covariance(calibration));
+    add_x_and_y_values(values, "dispersion offset", "px", dispersion->offset_px,
+                       compute_dispersion_offset_covariance(calibration));
   }
   return values;
 }
 
-std::string describe(const CertifiedValue& value) {
+std::string format_certified_value(const CertifiedValue& value) {
   const double expanded = kCoverage * value.standard_uncertainty.value_or(0);
   if (!(expanded > 0) || !std::isfinite(expanded)) {
-    return with_unit(format_significant_digits(value.value, kSixDigits), value.unit) +
+    return append_unit(format_significant_digits(value.value, kSixDigits), value.unit) +
            ", uncertainty not stated";
   }
   constexpr double ten = 10, two_digits = 100;
@@ -220,9 +221,9 @@ std::string describe(const CertifiedValue& value) {
   // 0.0996 is 0.10.
   if (std::round(expanded * std::pow(ten, 1 - exponent)) >= two_digits) ++exponent;
   const int places = std::clamp(1 - exponent, 0, max_places);
-  return with_unit(format_fixed_decimals(value.value, places) + " \u00b1 " +
-                       format_fixed_decimals(expanded, places),
-                   value.unit);
+  return append_unit(format_fixed_decimals(value.value, places) + " \u00b1 " +
+                         format_fixed_decimals(expanded, places),
+                     value.unit);
 }
 
 void check_run_is_certifiable(const RunRecord& record) {
@@ -230,9 +231,10 @@ void check_run_is_certifiable(const RunRecord& record) {
     return InputError(record.run, why + ": it has no certificate");
   };
   if (record.kind != "unit") throw none("is a run of the golden unit, which measures the station");
-  const std::string no_verdict = find_verdict_problem(record);
+  const std::string no_verdict = describe_verdict_problem(record);
   if (!no_verdict.empty()) throw none(no_verdict);
-  if (record.is_invalid()) throw none("was not judged (" + record.first_cause() + ")");
+  if (record.is_verdict_invalid())
+    throw none("was not judged (" + record.first_verdict_cause() + ")");
   if (record.calibration.empty()) throw none("has no calibration");
 }
 
@@ -252,11 +254,12 @@ std::filesystem::path write_calibration_certificate(const RunRecord& record,
                                                     const std::filesystem::path& results) {
   check_run_is_certifiable(record);
   const std::filesystem::path calibration =
-      publish_run(record, {}, results) / calibration_file_name(record);
-  const SharedFolder folder = open_run_folder(record, results);
+      publish_run_files(record, {}, results) / calibration_file_name(record);
+  const SharedFolder folder = open_run_results_folder(record, results);
   constexpr const char* name = "certificate.html";
-  folder.replace_file(name, make_calibration_certificate(record, read_calibration(calibration)));
-  return folder.path() / name;
+  folder.replace_file_atomically(
+      name, make_calibration_certificate(record, read_calibration(calibration)));
+  return folder.folder_path() / name;
 }
 
 }  // namespace vlp

@@ -31,7 +31,7 @@ std::vector<CertifiedValue> collect_certified_values(const Calibration& calibrat
 /// Formats a value as "12.346 +- 0.012 px". The expanded uncertainty U = 2 u has two significant
 /// digits (JCGM 100:2008, 7.2.6), and the value ends at the same digit. Without an uncertainty the
 /// value has six digits and a note that none is stated.
-std::string describe(const CertifiedValue& value);
+std::string format_certified_value(const CertifiedValue& value);
 
 /// Checks that a run may have a certificate. Throws InputError for
 /// - a run of a golden unit,
@@ -54,7 +54,7 @@ void check_run_is_certifiable(const RunRecord& record);
 std::string make_calibration_certificate(const RunRecord& record, const Calibration& calibration);
 
 /// Writes the certificate to certificate.html next to the files of the run, and returns its path.
-/// Writes missing files of the run, too (publish_run()). Throws InputError.
+/// Writes missing files of the run, too (publish_run_files()). Throws InputError.
 std::filesystem::path write_calibration_certificate(const RunRecord& record,
                                                     const std::filesystem::path& results);
 

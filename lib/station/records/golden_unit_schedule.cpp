@@ -49,13 +49,13 @@ void delete_note(const StationConfig& config) {
 /// Adds a line to the note if it exists. Throws InputError if it cannot be written.
 void append_line_to_note(const SharedFolder& spool, const std::string& note,
                          std::string_view line) {
-  const int file = spool.open(note, O_WRONLY | O_APPEND);
+  const int file = spool.open_regular_file(note, O_WRONLY | O_APPEND);
   if (file < 0 && errno == ENOENT) return;
   const bool is_written =
       file >= 0 && ::write(file, line.data(), line.size()) == static_cast<ssize_t>(line.size());
   if (file >= 0) ::close(file);
   // [FILE-1]
-  if (!is_written) throw InputError(spool.path() / note, "cannot be written");
+  if (!is_written) throw InputError(spool.folder_path() / note, "cannot be written");
 }
 
 /// Text of names and values, one per line. Numbers have the shortest text that is parsed to the
@@ -80,7 +80,7 @@ class Lines {
 
 void add_board(const Board& board, Lines& lines) {
   lines.add("board", board.family);
-  lines.add("id_order", to_string(board.id_order));
+  lines.add("id_order", id_order_name(board.id_order));
   lines.add({{"kind", static_cast<double>(board.kind)},
              {"cols", board.cols},
              {"rows", board.rows},
@@ -107,7 +107,7 @@ void add_lamps(LampMap map, Lines& lines) {
     lines.add("duty", lamp.duty);
     lines.add("sd_m", lamp.sd_m);
     if (is_disc) continue;
-    lines.add("shape", std::string(traits_of(shape.kind).name));
+    lines.add("shape", std::string(get_lamp_shape_traits(shape.kind).name));
     lines.add({{"length_m", shape.size_m->x()},
                {"width_m", shape.size_m->y()},
                {"yaw_rad", shape.yaw_rad}});
@@ -174,7 +174,9 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
   }
   std::string text;
   try {
-    text = SharedFolder(config.spool).read(make_note_name(config), kMaxBytes).value_or("");
+    text = SharedFolder(config.spool)
+               .read_file_if_exists(make_note_name(config), kMaxBytes)
+               .value_or("");
   } catch (const InputError& error) {
     return describe_damaged_note(error.what());
   }
@@ -183,8 +185,8 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
   std::istringstream words(text.substr(0, text.find('\n')));
   std::string run, verdict, ended_utc, measured_with;
   words >> run >> verdict >> ended_utc >> measured_with;
-  const bool failed = verdict == to_string(Verdict::fail);
-  if ((!failed && verdict != to_string(Verdict::pass)) || ended_utc.empty()) {
+  const bool failed = verdict == run_verdict_name(Verdict::fail);
+  if ((!failed && verdict != run_verdict_name(Verdict::pass)) || ended_utc.empty()) {
     return describe_damaged_note(file.string() + " is damaged");
   }
   if (failed) {
@@ -203,7 +205,7 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
   }
   if (at == GoldenCheckTime::verdict) return "";
   constexpr double second_per_hour = 3600;
-  const double age_h = seconds_since(ended_utc) / second_per_hour;
+  const double age_h = compute_seconds_since_utc(ended_utc) / second_per_hour;
   const auto& due = *config.verify_due;
   if (due.hours && !(age_h >= 0 && age_h <= *due.hours)) {
     // [STATION-3] `golden unit was measured`
@@ -218,16 +220,16 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
   return "";
 }
 
-void update_golden_unit_note(const StationConfig& config, const RunRecord& record) {
-  if (!config.verify_due || record.is_invalid()) return;
-  make_folder(config.spool);
+void record_run_in_golden_unit_note(const StationConfig& config, const RunRecord& record) {
+  if (!config.verify_due || record.is_verdict_invalid()) return;
+  create_station_folder(config.spool);
   const SharedFolder spool(config.spool);
   const std::string note = make_note_name(config);
   try {
     if (record.kind == "golden") {
-      spool.replace_file(note,
-                         fmt::format("{} {} {} {}\n", record.run, record.verdict, record.ended_utc,
-                                     compute_measurement_settings_digest(config)));
+      spool.replace_file_atomically(
+          note, fmt::format("{} {} {} {}\n", record.run, record.verdict, record.ended_utc,
+                            compute_measurement_settings_digest(config)));
     } else {
       append_line_to_note(spool, note, kUnitLine);  // never measured: nothing to count from
     }
@@ -237,9 +239,10 @@ void update_golden_unit_note(const StationConfig& config, const RunRecord& recor
   }
 }
 
-bool invalidate_golden_unit_note(const StationConfig& config, const std::string& run) {
+bool delete_golden_unit_note_of_run(const StationConfig& config, const std::string& run) {
   try {
-    const auto note = SharedFolder(config.spool).read(make_note_name(config), kMaxBytes);
+    const auto note =
+        SharedFolder(config.spool).read_file_if_exists(make_note_name(config), kMaxBytes);
     if (!note || note->substr(0, note->find(' ')) != run) return false;
   } catch (const InputError&) {  // no spool, or no valid note (describe_golden_unit_problem())
     return false;

@@ -31,9 +31,9 @@ enum class GoldenCheckTime { first_image, verdict };
 /// - was measured with another measuring setup (compute_measurement_settings_digest()),
 /// - was never measured here.
 ///
-/// The function uses only the note of update_golden_unit_note() in the station's spool, because the
-/// records may be offline. The golden unit is due, too, if the clock was set back or the note is
-/// damaged.
+/// The function uses only the note of record_run_in_golden_unit_note() in the station's spool,
+/// because the records may be offline. The golden unit is due, too, if the clock was set back or
+/// the note is damaged.
 ///
 /// GoldenCheckTime::verdict ignores limits of hours and units that expired after the unit was
 /// started. At its start the golden unit met `verify_due`, and a repetition would give no further
@@ -48,10 +48,10 @@ std::string describe_golden_unit_problem(const StationConfig& config,
 /// and the compute_measurement_settings_digest(), then a line for each later unit. Throws
 /// InputError if the file cannot be written. The note is then deleted, so that the golden unit is
 /// due.
-void update_golden_unit_note(const StationConfig& config, const RunRecord& record);
+void record_run_in_golden_unit_note(const StationConfig& config, const RunRecord& record);
 
 /// Deletes the note if it is of the golden run `run`, which is no longer valid; the golden unit is
 /// then due. Returns true if it was.
-bool invalidate_golden_unit_note(const StationConfig& config, const std::string& run);
+bool delete_golden_unit_note_of_run(const StationConfig& config, const std::string& run);
 
 }  // namespace vlp

@@ -206,9 +206,9 @@ std::string find_last_line(std::string text) {
     text.pop_back();
   }
   text.erase(0, text.rfind('\n') + 1);  // npos + 1 is 0
-  text = escape_for_terminal(text);
+  text = escape_text_for_terminal(text);
   std::replace(text.begin(), text.end(), '\t', ' ');
-  return escape_for_terminal(text.substr(0, max_bytes));
+  return escape_text_for_terminal(text.substr(0, max_bytes));
 }
 
 RunEvent make_hook_failed_event(const std::string& why) {
@@ -226,12 +226,12 @@ bool is_same_file(int descriptor, const std::filesystem::path& file) {
 }  // namespace
 
 RunEvent make_hook_requested_event(const Hook& hook, const std::string& operator_name) {
-  return make_run_event_now(kHookRequested,
-                            escape_for_single_line(fmt::format("{}", fmt::join(hook.command, " "))),
-                            operator_name);
+  return make_run_event_now(
+      kHookRequested, escape_text_for_single_line(fmt::format("{}", fmt::join(hook.command, " "))),
+      operator_name);
 }
 
-RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& lock) {
+RunEvent run_station_hook(const Hook& hook, const RunRecord& record, const HookLock& lock) {
   std::array<int, 2> pipe{};
   const Descriptor input(make_memory_file(format_hook_json(record)));
   if (input.get() < 0 || ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
@@ -273,22 +273,23 @@ RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& loc
 }
 
 bool is_hook_pending(const RunRecord& record) {
-  return find_last_event(record, kHookRequested) > find_last_event(record, kHookDone);
+  return find_last_event_of_kind(record, kHookRequested) >
+         find_last_event_of_kind(record, kHookDone);
 }
 
 std::string describe_pending_hook(const RunRecord& record) {
   if (!is_hook_pending(record)) return "";
-  const std::ptrdiff_t failed = find_last_event(record, kHookFailed);
+  const std::ptrdiff_t failed = find_last_event_of_kind(record, kHookFailed);
   // [STATION-9] `not run to its end` | station ended, error, or `time_limit_s` exceeded; output:
   //   `vlp-station show RUN` | `vlp-station hook`
-  if (failed < find_last_event(record, kHookRequested)) return "was not run to its end";
+  if (failed < find_last_event_of_kind(record, kHookRequested)) return "was not run to its end";
   return "failed: " + record.events[static_cast<std::size_t>(failed)].text;
 }
 
 std::string run_hook_and_record_result(const Hook& hook, RunRecord& record, const HookLock& lock,
                                        Spool& spool) {
   std::string problem;
-  record.events.push_back(run_hook(hook, record, lock));
+  record.events.push_back(run_station_hook(hook, record, lock));
   try {
     spool.store_run(record);
   } catch (const InputError& error) {
@@ -303,7 +304,7 @@ HookLock::HookLock(const std::filesystem::path& spool, const std::string& run)
     : file_(spool / (".hook-" + run)) {
   for (;;) {
     try {
-      descriptor_ = SharedFolder(spool).open(".hook-" + run, O_CREAT | O_RDWR);
+      descriptor_ = SharedFolder(spool).open_regular_file(".hook-" + run, O_CREAT | O_RDWR);
     } catch (const InputError&) {  // no folder, or no regular file: no shared lock
       descriptor_ = -1;
     }

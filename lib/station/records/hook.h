@@ -31,7 +31,7 @@ class HookLock {
   HookLock& operator=(const HookLock&) = delete;
 
   /// Returns true unless another program is running the hook.
-  bool is_lock_held() const { return held_; }
+  bool is_hook_lock_held() const { return held_; }
   /// Returns the file descriptor of the lock; negative if there is no lock file. A process that has
   /// the descriptor holds the lock.
   int lock_file_descriptor() const { return descriptor_; }
@@ -52,7 +52,7 @@ class HookLock {
 /// At the time limit the hook is killed with all processes that it has started. That includes
 /// processes that left its group, but not those of another user. The hook inherits the lock's
 /// descriptor as 3. If this program is killed, no other program runs the hook until it has ended.
-RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& lock);
+RunEvent run_station_hook(const Hook& hook, const RunRecord& record, const HookLock& lock);
 
 /// Runs the hook of a stored run and records the result as another event of the run. Returns the
 /// reason why the event is not recorded; empty if it is. The verdict is valid without the event.

@@ -29,7 +29,7 @@ void check_void_permission(const StationConfig& station, const std::string& oper
   throw std::invalid_argument(
       fmt::format("operator {} may not void runs of station {}: void_operators in station.yaml has "
                   "those who may",
-                  escape_for_single_line(operator_name), station.station));
+                  escape_text_for_single_line(operator_name), station.station));
 }
 
 }  // namespace
@@ -38,18 +38,18 @@ KnownRuns::KnownRuns(StationConfig station) : station_(std::move(station)) {
   spool_.emplace(station_->spool, station_->records);
   spool_->deliver_waiting_runs();
   offline_reason_ = spool_->last_offline_reason();  // not waited for twice
-  if (offline_reason_.empty()) open(station_->records);
+  if (offline_reason_.empty()) open_records(station_->records);
   if (!offline_reason_.empty() && list_waiting_runs().empty()) throw_unavailable();
 }
 
 KnownRuns::KnownRuns(const std::string& records) {
-  open(records);
+  open_records(records);
   if (!offline_reason_.empty()) throw_unavailable();
 }
 
-void KnownRuns::open(const std::string& where) {
+void KnownRuns::open_records(const std::string& where) {
   try {
-    if (!is_server_address(where) && !std::filesystem::exists(where)) {
+    if (!is_database_server_address(where) && !std::filesystem::exists(where)) {
       throw InputError(describe_database(where), "there are no records");
     }
     records_.emplace(where);
@@ -63,7 +63,7 @@ void KnownRuns::open(const std::string& where) {
 
 void KnownRuns::throw_unavailable() {
   const bool has_notice = spool_ && !spool_->last_offline_reason().empty();
-  throw RecordsUnavailable(has_notice ? spool_->make_operator_notice() : offline_reason_,
+  throw RecordsUnavailable(has_notice ? spool_->make_spool_notice_for_operator() : offline_reason_,
                            offline_reason_);
 }
 
@@ -71,37 +71,37 @@ std::vector<RunRecord> KnownRuns::list_waiting_runs() {
   return spool_ ? spool_->list_waiting_runs() : std::vector<RunRecord>();
 }
 
-Records& KnownRuns::records() {
+Records& KnownRuns::station_records() {
   if (!records_) throw_unavailable();
   return *records_;
 }
 
-std::vector<RunSummary> KnownRuns::list_runs(const RunFilter& filter) {
+std::vector<RunSummary> KnownRuns::list_run_summaries(const RunFilter& filter) {
   // First, so that a run that another program delivers at this time is in one of the two.
   const std::vector<RunRecord> waiting = this->list_waiting_runs();
-  return merge_runs(records_ ? records_->list_runs(filter) : std::vector<RunSummary>(), waiting,
-                    filter);
+  return merge_stored_and_waiting_runs(
+      records_ ? records_->list_run_summaries(filter) : std::vector<RunSummary>(), waiting, filter);
 }
 
-RunRecord KnownRuns::find(const std::string& run) {
+RunRecord KnownRuns::find_run_by_id(const std::string& run) {
   for (const RunRecord& waiting : this->list_waiting_runs()) {
     if (waiting.run == run) return waiting;
   }
-  auto record = records().find(run);
+  auto record = station_records().find_run_by_id(run);
   if (!record) throw std::invalid_argument("there is no run " + run);
   return *record;
 }
 
 RunRecord KnownRuns::find_last_run(const RunFilter& filter) {
-  const auto runs = list_runs(filter);
+  const auto runs = list_run_summaries(filter);
   if (runs.empty()) throw std::invalid_argument("there is no such run");
-  return find(runs.back().run);
+  return find_run_by_id(runs.back().run);
 }
 
-std::vector<RunRecord> KnownRuns::load_all_runs(const RunFilter& filter) {
+std::vector<RunRecord> KnownRuns::load_matching_runs(const RunFilter& filter) {
   std::vector<RunRecord> runs;
-  for (const RunSummary& run : records().list_runs(filter)) {
-    if (auto record = records().find(run.run)) runs.push_back(std::move(*record));
+  for (const RunSummary& run : station_records().list_run_summaries(filter)) {
+    if (auto record = station_records().find_run_by_id(run.run)) runs.push_back(std::move(*record));
   }
   return runs;
 }
@@ -116,7 +116,7 @@ std::optional<double> RunCounts::compute_first_pass_yield() const {
   return static_cast<double>(cameras_passed_first) / static_cast<double>(cameras);
 }
 
-RunCounts count_runs(std::span<const RunSummary> runs) {
+RunCounts count_runs_by_verdict(std::span<const RunSummary> runs) {
   RunCounts counts;
   std::map<std::string, int> judged;
   for (const RunSummary& run : runs) {
@@ -124,11 +124,11 @@ RunCounts count_runs(std::span<const RunSummary> runs) {
       ++counts.voided;
       continue;
     }
-    const bool passed = run.verdict == to_string(Verdict::pass);
-    const bool failed = run.verdict == to_string(Verdict::fail);
+    const bool passed = run.verdict == run_verdict_name(Verdict::pass);
+    const bool failed = run.verdict == run_verdict_name(Verdict::fail);
     if (passed) ++counts.passed;
     if (failed) ++counts.failed;
-    if (run.verdict == to_string(Verdict::invalid)) ++counts.invalid;
+    if (run.verdict == run_verdict_name(Verdict::invalid)) ++counts.invalid;
     if (run.kind != "unit") continue;
     if (passed) ++counts.units_passed;
     if (!passed && !failed) continue;
@@ -156,7 +156,7 @@ bool rename_files(const StationConfig* own_station, const RunRecord& record, std
     return false;
   }
   try {
-    return mark_files_voided(record, own_station->results);
+    return rename_files_of_voided_run(record, own_station->results);
   } catch (const InputError& error) {
     problem = fmt::format("the run is voided, but its files keep their names: {}", error.what());
     return true;
@@ -165,21 +165,21 @@ bool rename_files(const StationConfig* own_station, const RunRecord& record, std
 
 }  // namespace
 
-VoidedRun void_run(KnownRuns& known, const std::string& run, const std::string& operator_name,
-                   const std::string& reason) {
-  VoidedRun result{known.find(run)};
+VoidedRun void_recorded_run(KnownRuns& known, const std::string& run,
+                            const std::string& operator_name, const std::string& reason) {
+  VoidedRun result{known.find_run_by_id(run)};
   RunRecord& record = result.run;
-  const std::string who = escape_for_single_line(operator_name);
-  const StationConfig* station = known.station();
+  const std::string who = escape_text_for_single_line(operator_name);
+  const StationConfig* station = known.station_config();
   if (station != nullptr && record.station != station->station) station = nullptr;
   std::optional<HookLock> lock;
   if (station != nullptr && station->hook) {
-    lock.emplace(known.spool()->folder(), record.run);
+    lock.emplace(known.station_spool()->spool_folder(), record.run);
     // The result of that hook would be mistaken for that of the hook about the voiding.
-    if (!lock->is_lock_held()) {
+    if (!lock->is_hook_lock_held()) {
       throw InputError(record.run, "its hook is being run: void it when that has ended");
     }
-    record = known.find(run);  // it can have been voided before the lock was acquired
+    record = known.find_run_by_id(run);  // it can have been voided before the lock was acquired
   }
   if (station != nullptr) check_void_permission(*station, operator_name);
   // Each step is done unless it was done before: a voiding by the records alone (--records) lacks
@@ -189,16 +189,17 @@ VoidedRun void_run(KnownRuns& known, const std::string& run, const std::string& 
     repeated =
         fmt::format("run {} was voided before, by {}: {}", record.run, event->who, event->text);
   } else {
-    record.events.push_back(make_run_event_now(kVoided, escape_for_single_line(reason), who));
+    record.events.push_back(make_run_event_now(kVoided, escape_text_for_single_line(reason), who));
   }
-  const bool calls_hook =
-      lock && find_last_event(record, kHookRequested) < find_last_event(record, kVoided);
+  const bool calls_hook = lock && find_last_event_of_kind(record, kHookRequested) <
+                                      find_last_event_of_kind(record, kVoided);
   if (calls_hook) record.events.push_back(make_hook_requested_event(*station->hook, who));
   bool is_any_done = repeated.empty() || calls_hook;
-  Spool* spool = known.spool();
-  if (is_any_done) spool != nullptr ? spool->store_run(record) : known.records().store_run(record);
+  Spool* spool = known.station_spool();
+  if (is_any_done)
+    spool != nullptr ? spool->store_run(record) : known.station_records().store_run(record);
   if (station != nullptr && record.kind == "golden") {
-    is_any_done = invalidate_golden_unit_note(*station, record.run) || is_any_done;
+    is_any_done = delete_golden_unit_note_of_run(*station, record.run) || is_any_done;
   }
   is_any_done = rename_files(station, record, result.files_problem) || is_any_done;
   if (!is_any_done) throw std::invalid_argument(repeated);

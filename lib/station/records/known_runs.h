@@ -37,26 +37,27 @@ class KnownRuns {
   explicit KnownRuns(const std::string& records);
 
   /// Returns the station; null for records without a station.
-  const StationConfig* station() const { return station_ ? &*station_ : nullptr; }
+  const StationConfig* station_config() const { return station_ ? &*station_ : nullptr; }
   /// Returns the station's spool; null without a station.
-  Spool* spool() { return spool_ ? &*spool_ : nullptr; }
+  Spool* station_spool() { return spool_ ? &*spool_ : nullptr; }
   /// Returns the records. Throws RecordsUnavailable if they are offline.
-  Records& records();
+  Records& station_records();
   /// Returns true if the records are offline. Only the waiting runs are known then.
   bool are_records_offline() const { return !records_; }
 
-  /// Returns the runs of the records, if online, and the waiting runs (merge_runs()).
-  std::vector<RunSummary> list_runs(const RunFilter& filter);
+  /// Returns the runs of the records, if online, and the waiting runs
+  /// (merge_stored_and_waiting_runs()).
+  std::vector<RunSummary> list_run_summaries(const RunFilter& filter);
   /// Returns a run that waits or that the records contain. Throws std::invalid_argument if no run
-  /// has this id, otherwise as records().
-  RunRecord find(const std::string& run);
-  /// Returns the last run that matches the filter. Throws as find().
+  /// has this id, otherwise as station_records().
+  RunRecord find_run_by_id(const std::string& run);
+  /// Returns the last run that matches the filter. Throws as find_run_by_id().
   RunRecord find_last_run(const RunFilter& filter);
   /// Returns the complete runs that the records contain.
-  std::vector<RunRecord> load_all_runs(const RunFilter& filter);
+  std::vector<RunRecord> load_matching_runs(const RunFilter& filter);
 
  private:
-  void open(const std::string& where);
+  void open_records(const std::string& where);
   [[noreturn]] void throw_unavailable();
   std::vector<RunRecord> list_waiting_runs();
 
@@ -83,7 +84,7 @@ struct RunCounts {
 };
 
 /// Counts runs. `runs` are in chronological order.
-RunCounts count_runs(std::span<const RunSummary> runs);
+RunCounts count_runs_by_verdict(std::span<const RunSummary> runs);
 
 struct VoidedRun {
   RunRecord run;
@@ -95,14 +96,14 @@ struct VoidedRun {
 /// Voids a run, which then counts in no yield, trend or study. Its events record operator and
 /// reason. A voided golden run makes the golden unit due.
 ///
-/// At the station of the run its files are renamed (mark_files_voided()), and its hook is called
-/// (run_hook_and_record_result()). These steps are completed there for a run that was voided before
-/// with records alone.
+/// At the station of the run its files are renamed (rename_files_of_voided_run()), and its hook is
+/// called (run_hook_and_record_result()). These steps are completed there for a run that was voided
+/// before with records alone.
 ///
 /// Throws std::invalid_argument if the operator is not among StationConfig::void_operators of that
 /// station. Throws it, too, if the run was voided before and no step is missing. Throws InputError
 /// if the event cannot be recorded or the hook is running.
-VoidedRun void_run(KnownRuns& known, const std::string& run, const std::string& operator_name,
-                   const std::string& reason);
+VoidedRun void_recorded_run(KnownRuns& known, const std::string& run,
+                            const std::string& operator_name, const std::string& reason);
 
 }  // namespace vlp

@@ -30,7 +30,7 @@ Id describe_run(const RunRecord& record) { return {record.run, "the record of a 
 bool has_file_content(const SharedFolder& folder, const std::string& name,
                       const std::string& content) {
   try {
-    return folder.read(name, content.size()) == content;
+    return folder.read_file_if_exists(name, content.size()) == content;
   } catch (const InputError&) {
     return false;
   }
@@ -39,9 +39,9 @@ bool has_file_content(const SharedFolder& folder, const std::string& name,
 /// Writes the calibration of a record, or checks the existing one. Returns its path.
 fs::path write_calibration(const RunRecord& record, const SharedFolder& folder) {
   const char* name = calibration_file_name(record);
-  fs::path file = folder.path() / name;
-  if (!folder.contains_entry(name)) {
-    folder.replace_file(name, record.calibration);
+  fs::path file = folder.folder_path() / name;
+  if (!folder.contains_folder_entry(name)) {
+    folder.replace_file_atomically(name, record.calibration);
   } else if (!has_file_content(folder, name, record.calibration)) {
     throw InputError(file, "differs from the record: move it away");
   }
@@ -49,11 +49,11 @@ fs::path write_calibration(const RunRecord& record, const SharedFolder& folder) 
 }
 
 ReportVerdict make_verdict_box(const RunRecord& record) {
-  const std::string no_verdict = find_verdict_problem(record);
+  const std::string no_verdict = describe_verdict_problem(record);
   ReportVerdict verdict{record.verdict,
-                        record.has_passed()   ? Verdict::pass
-                        : record.is_invalid() ? Verdict::invalid
-                                              : Verdict::fail,
+                        record.has_run_passed()       ? Verdict::pass
+                        : record.is_verdict_invalid() ? Verdict::invalid
+                                                      : Verdict::fail,
                         {}};
   if (!no_verdict.empty()) verdict = {"NO VERDICT", Verdict::invalid, {no_verdict}};
   std::istringstream causes(record.causes);
@@ -68,19 +68,20 @@ std::string describe_meaning(const CheckedMetric& metric) {
 
 }  // namespace
 
-void check_results_folder(const fs::path& results, const std::string& camera) {
+void check_results_folder_writable(const fs::path& results, const std::string& camera) {
   constexpr std::uintmax_t room_bytes = 8'000'000;
-  make_folder(results);
-  check_free_space(SharedFolder(results).make_subfolder({camera, results, "camera"}), room_bytes);
+  create_station_folder(results);
+  check_folder_writable_and_space(
+      SharedFolder(results).open_or_create_subfolder({camera, results, "camera"}), room_bytes);
 }
 
 const char* calibration_file_name(const RunRecord& record) {
   if (find_voiding_event(record) != nullptr) return "voided-calibration.yaml";
-  if (record.has_passed()) return "calibration.yaml";
-  return record.is_invalid() ? "invalid-calibration.yaml" : "failed-calibration.yaml";
+  if (record.has_run_passed()) return "calibration.yaml";
+  return record.is_verdict_invalid() ? "invalid-calibration.yaml" : "failed-calibration.yaml";
 }
 
-bool mark_files_voided(const RunRecord& record, const fs::path& results) {
+bool rename_files_of_voided_run(const RunRecord& record, const fs::path& results) {
   constexpr std::array names{std::pair("calibration.yaml", "voided-calibration.yaml"),
                              std::pair("failed-calibration.yaml", "voided-calibration.yaml"),
                              std::pair("invalid-calibration.yaml", "voided-calibration.yaml"),
@@ -100,14 +101,14 @@ bool mark_files_voided(const RunRecord& record, const fs::path& results) {
   return is_any_renamed;
 }
 
-SharedFolder open_run_folder(const RunRecord& record, const fs::path& results) {
+SharedFolder open_run_results_folder(const RunRecord& record, const fs::path& results) {
   const Id camera = describe_camera(record), run = describe_run(record);
-  make_folder(results);
-  return SharedFolder(results).make_subfolder(camera).make_subfolder(run);
+  create_station_folder(results);
+  return SharedFolder(results).open_or_create_subfolder(camera).open_or_create_subfolder(run);
 }
 
-std::string make_unit_report(const RunRecord& record, const std::filesystem::path& calibration,
-                             const std::vector<ReportPlot>& pictures) {
+std::string make_run_report_html(const RunRecord& record, const std::filesystem::path& calibration,
+                                 const std::vector<ReportPlot>& pictures) {
   Report report;
   report.title = "Camera " + record.camera + " on " + record.station;
   report.verdict = make_verdict_box(record);
@@ -141,21 +142,21 @@ std::string make_unit_report(const RunRecord& record, const std::filesystem::pat
   return render_report_html(report);
 }
 
-fs::path publish_run(const RunRecord& record, const std::vector<ReportPlot>& pictures,
-                     const fs::path& results, ExistingReport existing) {
-  const SharedFolder folder = open_run_folder(record, results);
+fs::path publish_run_files(const RunRecord& record, const std::vector<ReportPlot>& pictures,
+                           const fs::path& results, ExistingReport existing) {
+  const SharedFolder folder = open_run_results_folder(record, results);
   fs::path calibration;
   if (!record.calibration.empty()) calibration = write_calibration(record, folder);
   const std::string name = find_voiding_event(record) ? "voided-report.html" : "report.html";
-  const bool is_there = folder.contains_entry(name);
-  if (is_there && existing == ExistingReport::keep) return folder.path();
-  const std::string report = make_unit_report(record, calibration, pictures);
-  if (is_there && has_file_content(folder, name, report)) return folder.path();
+  const bool is_there = folder.contains_folder_entry(name);
+  if (is_there && existing == ExistingReport::keep) return folder.folder_path();
+  const std::string report = make_run_report_html(record, calibration, pictures);
+  if (is_there && has_file_content(folder, name, report)) return folder.folder_path();
   // The first one is kept: those that a restoring has drawn can be drawn again.
   const std::string replaced = "replaced-" + name;
-  if (is_there && !folder.contains_entry(replaced)) folder.rename_file(name, replaced);
-  folder.replace_file(name, report);
-  return folder.path();
+  if (is_there && !folder.contains_folder_entry(replaced)) folder.rename_file(name, replaced);
+  folder.replace_file_atomically(name, report);
+  return folder.folder_path();
 }
 
 }  // namespace vlp

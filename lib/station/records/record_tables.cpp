@@ -167,7 +167,7 @@ bool has_current_schema_version(soci::session& sql) {
   return load_table_version(sql) == kSchemaVersion;
 }
 
-void create_record_tables(soci::session& sql) {
+void create_or_migrate_record_tables(soci::session& sql) {
   soci::transaction transaction(sql);
   // Serialized: a waiting program sees the changes of the other.
   if (is_sqlite(sql)) {
@@ -199,7 +199,7 @@ void create_record_tables(soci::session& sql) {
   transaction.commit();
 }
 
-std::optional<RunRecord> load_run_header(soci::session& sql, const std::string& run) {
+std::optional<RunRecord> load_run_text_fields(soci::session& sql, const std::string& run) {
   RunRecord record;
   soci::statement select(sql);
   std::string columns;
@@ -215,8 +215,8 @@ std::optional<RunRecord> load_run_header(soci::session& sql, const std::string& 
   return record;
 }
 
-std::optional<RunRecord> load_run(soci::session& sql, const std::string& run) {
-  std::optional<RunRecord> found = load_run_header(sql, run);
+std::optional<RunRecord> load_complete_run(soci::session& sql, const std::string& run) {
+  std::optional<RunRecord> found = load_run_text_fields(sql, run);
   if (!found) return found;
   read_run_metrics(sql, *found);
   RunRecord::Image image;

@@ -16,7 +16,7 @@ extern const int kSchemaVersion;
 
 /// Returns true if the tables in the database have the version kSchemaVersion of this program.
 /// Takes no lock, so that users without write permission can call it. Throws as
-/// create_record_tables().
+/// create_or_migrate_record_tables().
 bool has_current_schema_version(soci::session& sql);
 
 /// Advisory lock of PostgreSQL for creating and migrating tables ("vlp"). Older programs do not
@@ -27,13 +27,13 @@ inline constexpr int kTableLockId = 0x766c70;
 /// Creates the tables of the records, identical in SQLite and PostgreSQL, or migrates tables of an
 /// earlier version. Runs in one transaction and in one program at a time. Throws soci::soci_error,
 /// and std::runtime_error for tables of a later version.
-void create_record_tables(soci::session& sql);
+void create_or_migrate_record_tables(soci::session& sql);
 
 /// Loads the texts of a run (list_run_text_fields()) from tables of the current version;
 /// std::nullopt if no run has this id. Throws soci::soci_error.
-std::optional<RunRecord> load_run_header(soci::session& sql, const std::string& run);
+std::optional<RunRecord> load_run_text_fields(soci::session& sql, const std::string& run);
 /// Loads a run with its metrics, images and events, with the names of metrics as they were stored;
 /// std::nullopt if no run has this id.
-std::optional<RunRecord> load_run(soci::session& sql, const std::string& run);
+std::optional<RunRecord> load_complete_run(soci::session& sql, const std::string& run);
 
 }  // namespace vlp

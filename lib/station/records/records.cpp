@@ -51,9 +51,9 @@ void configure_connection(soci::session& sql, int timeout_s) {
   sql << "PRAGMA foreign_keys = ON";
 }
 
-void open(soci::session& sql, const std::string& where) {
-  if (is_server_address(where)) {
-    sql.open(soci::postgresql, make_connection_string(where));
+void open_database_session(soci::session& sql, const std::string& where) {
+  if (is_database_server_address(where)) {
+    sql.open(soci::postgresql, make_database_connection_string(where));
   } else {
     if (where.find('"') != std::string::npos) {
       throw InputError(where, "the name of a database cannot have a quote (\"): rename its folder");
@@ -154,7 +154,7 @@ struct Records::Database {
     if (what.starts_with(soci)) what.erase(0, soci.size());
     constexpr std::chrono::seconds soon(2);
     const bool refused =
-        std::chrono::steady_clock::now() - begun < soon && is_server_responding(where);
+        std::chrono::steady_clock::now() - begun < soon && is_database_server_responding(where);
     // [STATION-1] `records cannot be reached` | no data are lost, but repeated images are not
     //   detected (event `unchecked`) | `--verbose` prints the server's message
     if (!refused)
@@ -244,7 +244,7 @@ void insert_metrics(soci::session& sql, const RunRecord& record, ConnectionWatch
     const auto [uncertainty, guard_k] = metric.guard.value_or(GuardBand{});
     soci::indicator has_guard = metric.guard ? soci::i_ok : soci::i_null;
     const int at_least = metric.direction == Direction::at_least ? 1 : 0,
-              passed = metric.has_passed() ? 1 : 0;
+              passed = metric.has_passed_gate() ? 1 : 0;
     ++place;
     sql << "INSERT INTO figures (run, place, name, value, gate, at_least, met, unit, uncertainty, "
            "guard_k) VALUES (:run, :place, :name, :value, :gate, :at_least, :met, :unit, "
@@ -330,7 +330,7 @@ std::vector<Row> query_rows(soci::session& sql, const std::string& select, const
   for (std::string Row::*text : texts) statement.exchange(soci::into(row.*text));
   if (value != nullptr) statement.exchange(soci::into(row.*value));
   const std::string conditions = bind_filter(statement, filter);
-  const std::string former(find_former_name(NameKind::metric, metric));
+  const std::string former(find_former_name_for_current(NameKind::metric, metric));
   if (!metric.empty()) {
     statement.exchange(soci::use(metric));
     statement.exchange(soci::use(former));
@@ -357,14 +357,14 @@ Records::Records(const std::string& where) : database_(std::make_unique<Database
   database_->name = describe_database(where);
   database_->timeout_s = get_database_timeout_s(where);
   soci::session& sql = database_->sql;
-  database_->add_database_name_to_error([&] { open(sql, where); });
+  database_->add_database_name_to_error([&] { open_database_session(sql, where); });
   const bool are_there = database_->run([&](ConnectionWatchdog& watch) {
     configure_connection(sql, database_->timeout_s);
     watch.on_progress();
     return has_current_schema_version(sql);
   });
   if (!are_there) {
-    database_->run([&](ConnectionWatchdog&) { create_record_tables(sql); },
+    database_->run([&](ConnectionWatchdog&) { create_or_migrate_record_tables(sql); },
                    kMigrationTimeoutFactor);
   }
   database_->ready = true;
@@ -394,7 +394,7 @@ void Records::store_run(const RunRecord& record) {
     if (is_new) {
       insert_metrics(sql, record, watch);
       insert_images(sql, record, watch);
-    } else if (const auto kept = load_run_header(sql, record.run);
+    } else if (const auto kept = load_run_text_fields(sql, record.run);
                !kept || !have_same_texts(*kept, record)) {
       // [STATION-15] `has another run` | records or results edited, or two of one name; nothing is
       //   overwritten | compare both
@@ -402,7 +402,7 @@ void Records::store_run(const RunRecord& record) {
     }
     const auto new_events = insert_events(sql, record, watch);
     // Last, because all stations that share the records wait for it.
-    append_to_audit_trail(sql, record.run, is_new, new_events);
+    append_run_events_to_audit_trail(sql, record.run, is_new, new_events);
     transaction.commit();
   });
 }
@@ -415,7 +415,7 @@ void Records::check_database_writable() {
   });
 }
 
-std::vector<RunSummary> Records::list_runs(const RunFilter& filter) {
+std::vector<RunSummary> Records::list_run_summaries(const RunFilter& filter) {
   using Line = RunSummary;
   constexpr const char* select =
       "SELECT run, kind, station, camera, ended_utc, verdict, causes, COALESCE((SELECT "
@@ -430,7 +430,8 @@ std::vector<RunSummary> Records::list_runs(const RunFilter& filter) {
       filter.image_sha256.empty() ? kManyRowsTimeoutFactor : 1);
 }
 
-std::vector<TrendPoint> Records::load_trend(const std::string& metric, const RunFilter& filter) {
+std::vector<TrendPoint> Records::load_metric_trend(const std::string& metric,
+                                                   const RunFilter& filter) {
   using Point = TrendPoint;
   constexpr const char* select =
       "SELECT runs.run, runs.station, runs.camera, runs.verdict, runs.ended_utc, figures.value "
@@ -448,14 +449,15 @@ std::vector<TrendPoint> Records::load_trend(const std::string& metric, const Run
       kManyRowsTimeoutFactor);
 }
 
-std::optional<RunRecord> Records::find(const std::string& run) {
-  auto found = database_->run([&](ConnectionWatchdog&) { return load_run(database_->sql, run); });
+std::optional<RunRecord> Records::find_run_by_id(const std::string& run) {
+  auto found =
+      database_->run([&](ConnectionWatchdog&) { return load_complete_run(database_->sql, run); });
   if (!found) return found;
-  for (CheckedMetric& metric : found->metrics) metric.name = find_present_metric_name(metric.name);
+  for (CheckedMetric& metric : found->metrics) metric.name = find_current_metric_name(metric.name);
   return found;
 }
 
-TrailCheck Records::check(const std::string& expected_digest) {
+TrailCheck Records::check_records_by_audit_trail(const std::string& expected_digest) {
   return database_->run(
       [&](ConnectionWatchdog& watch) {
         soci::session& sql = database_->sql;

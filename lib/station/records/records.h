@@ -97,16 +97,16 @@ class Records {
   /// different run of the same id is an error.
   void store_run(const RunRecord& record);
   /// Returns a complete run; std::nullopt if no run has this id.
-  std::optional<RunRecord> find(const std::string& run);
+  std::optional<RunRecord> find_run_by_id(const std::string& run);
   /// Checks that runs can be stored now. Throws InputError otherwise.
   void check_database_writable();
   /// Returns the runs that match the filter, in chronological order.
-  std::vector<RunSummary> list_runs(const RunFilter& filter);
+  std::vector<RunSummary> list_run_summaries(const RunFilter& filter);
   /// Returns the values of a metric in the runs that match the filter, without voided runs.
-  std::vector<TrendPoint> load_trend(const std::string& metric, const RunFilter& filter);
+  std::vector<TrendPoint> load_metric_trend(const std::string& metric, const RunFilter& filter);
   /// Checks by the trail (audit_trail.h) that the records are unchanged. `expected_digest` is the
   /// last digest of an earlier check, which the trail must still contain, or empty.
-  TrailCheck check(const std::string& expected_digest);
+  TrailCheck check_records_by_audit_trail(const std::string& expected_digest);
 
  private:
   struct Database;

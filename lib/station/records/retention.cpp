@@ -27,7 +27,7 @@ constexpr std::size_t kRunLength = 33;  // of make_run_id()
 
 bool is_older(const std::string& utc, int days) {
   constexpr double seconds_per_day = 86'400;
-  return seconds_since(utc) > days * seconds_per_day;  // false for an invalid time
+  return compute_seconds_since_utc(utc) > days * seconds_per_day;  // false for an invalid time
 }
 
 std::vector<fs::path> list_folders_in(const fs::path& folder) {
@@ -93,7 +93,7 @@ bool is_path_through_folder(const fs::path& file, const fs::path& folder) {
 bool is_in_use(const fs::path& folder, const StationConfig& config) {
   std::vector<fs::path> needed = config.inputs;
   needed.insert(needed.end(), {config.spool, config.captures, config.results});
-  if (!is_server_address(config.records)) needed.emplace_back(config.records);
+  if (!is_database_server_address(config.records)) needed.emplace_back(config.records);
   if (config.hook) {  // its arguments can be files, such as the script of an interpreter
     for (const std::string& word : config.hook->command) {
       if (!word.empty()) needed.push_back(config.hook->folder / word);
@@ -109,7 +109,7 @@ void add_if_expired(RetentionResult& found, Records& records, const StationConfi
                     const fs::path& folder, const std::string& camera, const std::string& run,
                     const char* what, int days) {
   if (run.size() != kRunLength || !is_older(start_utc_of_run_id(run), days)) return;
-  auto record = records.find(run);
+  auto record = records.find_run_by_id(run);
   if (!record || record->camera != camera) {
     found.without_record.push_back(folder);
   } else if (record->station == config.station && is_older(record->ended_utc, days)) {
@@ -125,7 +125,7 @@ void add_if_expired(RetentionResult& found, Records& records, const StationConfi
 SharedFolder open_existing(const SharedFolder& parent, const Id& name) {
   auto found = parent.open_subfolder_if_exists(name);
   if (!found)
-    throw InputError(parent.path() / name.get_text(), "cannot be deleted: it is not there");
+    throw InputError(parent.folder_path() / name.id_text(), "cannot be deleted: it is not there");
   return std::move(*found);
 }
 
@@ -139,7 +139,7 @@ SharedFolder open_parent(const ExpiredFolder& expired, const StationConfig& conf
 
 }  // namespace
 
-RetentionResult find_expired_folders(const StationConfig& config, Records& records) {
+RetentionResult find_expired_run_folders(const StationConfig& config, Records& records) {
   RetentionResult found;
   if (const auto& days = config.keep.images_days) {
     for (const fs::path& folder : list_folders_in(config.captures)) {
@@ -162,26 +162,26 @@ RetentionResult find_expired_folders(const StationConfig& config, Records& recor
   return found;
 }
 
-void check_clock_is_not_behind(const StationConfig& config, Records& records) {
+void check_clock_against_recorded_runs(const StationConfig& config, Records& records) {
   constexpr double day_s = 86'400;
   constexpr double max_idle_s = 366 * day_s;  // longer than a plant is shut
   constexpr double max_ahead_s = day_s;       // between computers that share records
   constexpr int trusted_days = 7;             // within them a wrong clock is noticed
   std::vector<std::string> ended;
-  for (const RunSummary& run : records.list_runs({.station = config.station})) {
-    const bool is_time = !std::isnan(seconds_since(run.ended_utc));
+  for (const RunSummary& run : records.list_run_summaries({.station = config.station})) {
+    const bool is_time = !std::isnan(compute_seconds_since_utc(run.ended_utc));
     if (run.voided.empty() && is_time) ended.push_back(run.ended_utc);
   }
   std::sort(ended.begin(), ended.end());
   if (ended.empty()) return;
   const std::string& newest = ended.back();
-  if (seconds_since(newest) < -max_ahead_s) {
+  if (compute_seconds_since_utc(newest) < -max_ahead_s) {
     throw InputError(config.file,
                      fmt::format("the newest run ended {}, after the clock, {}: set the clock, or, "
                                  "if it is right, void the runs with wrong dates",
                                  newest, get_current_utc()));
   }
-  if (seconds_since(newest) > max_idle_s) {
+  if (compute_seconds_since_utc(newest) > max_idle_s) {
     throw InputError(
         config.file,
         fmt::format("the newest run ended {}, more than a year before the clock, {}: set "
@@ -189,9 +189,9 @@ void check_clock_is_not_behind(const StationConfig& config, Records& records) {
                     newest, get_current_utc()));
   }
   for (std::size_t i = ended.size() - 1; i > 0; --i) {
-    const double age_s = seconds_since(ended[i]);
+    const double age_s = compute_seconds_since_utc(ended[i]);
     if (age_s > trusted_days * day_s) return;
-    if (seconds_since(ended[i - 1]) - age_s < max_idle_s) continue;
+    if (compute_seconds_since_utc(ended[i - 1]) - age_s < max_idle_s) continue;
     throw InputError(config.file,
                      fmt::format("the runs since {} ended more than a year after those before: set "
                                  "the clock and void them, or, if it is right, clean again when "
@@ -200,12 +200,12 @@ void check_clock_is_not_behind(const StationConfig& config, Records& records) {
   }
 }
 
-void delete_expired_folder(const ExpiredFolder& expired, const StationConfig& config,
-                           Spool& spool) {
+void delete_expired_run_folder(const ExpiredFolder& expired, const StationConfig& config,
+                               Spool& spool) {
   const SharedFolder parent = open_parent(expired, config);
   const Id name(expired.folder.filename().string(), expired.folder, "run");
-  open_existing(parent, name).remove_all_entries();
-  if (find_last_event(expired.run, expired.what) < 0) {
+  open_existing(parent, name).remove_all_folder_entries();
+  if (find_last_event_of_kind(expired.run, expired.what) < 0) {
     constexpr double megabyte = 1e6;
     RunRecord run = expired.run;
     run.events.push_back(make_run_event_now(

@@ -67,21 +67,21 @@ std::string describe_account() {
 
 }  // namespace
 
-void RunRecord::set_verdict(std::vector<Cause> why) {
+void RunRecord::set_verdict_from_causes(std::vector<Cause> why) {
   if (std::string problem = describe_clock_problem(*this); !problem.empty()) {
     why.insert(why.begin(), {std::move(problem), false});
   }
-  verdict = to_string(decide_verdict(why));
+  verdict = run_verdict_name(decide_verdict_from_causes(why));
   causes.clear();
   for (const Cause& cause : why) causes.append(cause.text).append("\n");
 }
 
 void RunRecord::invalidate_verdict(const std::string& why) {
-  verdict = to_string(Verdict::invalid);
+  verdict = run_verdict_name(Verdict::invalid);
   causes = why + "\n" + causes;
 }
 
-const CheckedMetric* RunRecord::find_metric(std::string_view name) const {
+const CheckedMetric* RunRecord::find_metric_by_name(std::string_view name) const {
   const auto metric = std::ranges::find(metrics, name, &CheckedMetric::name);
   return metric == metrics.end() ? nullptr : &*metric;
 }
@@ -95,7 +95,7 @@ const RunEvent* find_voiding_event(const RunRecord& record) {
   return event == record.events.end() ? nullptr : &*event;
 }
 
-std::ptrdiff_t find_last_event(const RunRecord& record, const char* what) {
+std::ptrdiff_t find_last_event_of_kind(const RunRecord& record, const char* what) {
   const auto event = std::find_if(record.events.rbegin(), record.events.rend(),
                                   [&](const RunEvent& each) { return each.what == what; });
   return record.events.rend() - event - 1;
@@ -117,24 +117,25 @@ bool uses_images_of_earlier_run(const RunRecord& run, const RunRecord& earlier) 
   if (run.camera != earlier.camera || run.run == earlier.run) return false;
   std::set<std::string> earlier_digests;
   for (const RunRecord::Image& image : earlier.images) {
-    if (image.is_used()) earlier_digests.insert(image.sha256);
+    if (image.is_image_used()) earlier_digests.insert(image.sha256);
   }
   return run.count_used_images() > 0 &&
          std::ranges::none_of(run.images, [&](const RunRecord::Image& image) {
-           return image.is_used() && !earlier_digests.contains(image.sha256);
+           return image.is_image_used() && !earlier_digests.contains(image.sha256);
          });
 }
 
-std::string find_verdict_problem(const RunRecord& record) {
+std::string describe_verdict_problem(const RunRecord& record) {
   if (const RunEvent* event = find_voiding_event(record)) {
     return fmt::format("was voided by {}: {}", event->who, event->text);
   }
-  if (!record.has_passed()) return "";
+  if (!record.has_run_passed()) return "";
   // [STATION-15] `changed by hand`
   constexpr const char* words = "the record has PASS, but {}: it was changed by hand";
   if (!record.causes.empty()) return fmt::format(words, "names a cause");
   for (const CheckedMetric& metric : record.metrics) {
-    if (metric.limit && !metric.has_passed()) return fmt::format(words, describe(metric));
+    if (metric.limit && !metric.has_passed_gate())
+      return fmt::format(words, describe_gate_result(metric));
   }
   return "";
 }
@@ -155,7 +156,7 @@ std::string start_utc_of_run_id(const std::string& run) {
          run.substr(11, 2) + ":" + run.substr(13, 3);
 }
 
-std::string RunEvent::utc_text() const {
+std::string RunEvent::event_time_utc() const {
   return start_utc_of_run_id(event.substr(0, event.find('.')) + "Z");
 }
 
@@ -173,7 +174,7 @@ RunEvent make_run_event_now(const std::string& what, const std::string& text,
                                 : fmt::format("{} ({})", operator_name, describe_account())};
 }
 
-double seconds_since(const std::string& utc) {
+double compute_seconds_since_utc(const std::string& utc) {
   const auto time = parse_utc(utc);
   return time ? std::difftime(current_time_s(), *time) : std::numeric_limits<double>::quiet_NaN();
 }
@@ -222,15 +223,15 @@ RunRecord escape_run_texts(RunRecord run) {
     const bool has_lines =
         field.text == &RunRecord::causes || field.text == &RunRecord::calibration;
     std::string& text = run.*field.text;
-    text = has_lines ? escape_for_terminal(text) : escape_for_single_line(text);
+    text = has_lines ? escape_text_for_terminal(text) : escape_text_for_single_line(text);
   }
   for (RunRecord::Image& image : run.images) {
-    image.name = escape_for_single_line(image.name);
-    image.refused = escape_for_single_line(image.refused);
+    image.name = escape_text_for_single_line(image.name);
+    image.refused = escape_text_for_single_line(image.refused);
   }
   for (RunEvent& event : run.events) {
-    event.text = escape_for_single_line(event.text);
-    event.who = escape_for_single_line(event.who);
+    event.text = escape_text_for_single_line(event.text);
+    event.who = escape_text_for_single_line(event.who);
   }
   return run;
 }
@@ -278,7 +279,7 @@ std::vector<MetricKind> list_columns(const std::vector<RunRecord>& runs) {
   auto kinds = list_unit_metrics();
   for (const MetricKind& kind : list_metric_kinds({MetricSource::evaluation})) {
     const auto has_kind = [&](const RunRecord& run) {
-      return run.find_metric(kind.name) != nullptr;
+      return run.find_metric_by_name(kind.name) != nullptr;
     };
     if (std::ranges::any_of(runs, has_kind)) kinds.push_back(kind);
   }
@@ -299,7 +300,7 @@ void write_csv(const std::filesystem::path& file, const std::vector<RunRecord>& 
       if (field.in_csv) row.push_back(join_lines(run.*field.text));
     }
     for (const MetricKind& kind : kinds) {
-      const CheckedMetric* metric = run.find_metric(kind.name);
+      const CheckedMetric* metric = run.find_metric_by_name(kind.name);
       const bool has_value = metric != nullptr && metric->value;
       row.push_back(has_value ? format_significant_digits(*metric->value, kDigits) : "");
     }
@@ -344,7 +345,7 @@ Json to_json(const RunRecord& run) {
               {"unit", metric.unit},
               {"gate", json_number_or_null(metric.limit)},
               {"at_least", metric.direction == Direction::at_least},
-              {"passed", metric.has_passed()}};
+              {"passed", metric.has_passed_gate()}};
     add_guard_band(metric, figure);
     if (metric.guard) {
       figure["conformance_probability"] = json_number_or_null(metric.conformance_probability());
@@ -381,7 +382,7 @@ SpooledRun parse_run(const Json& json) {
   }
   for (const Json& metric : json.at(is_former ? "figures" : "metrics")) {
     run.metrics.push_back(
-        {find_present_metric_name(metric.at("name")), metric.at("unit"),
+        {find_current_metric_name(metric.at("name")), metric.at("unit"),
          read_optional_number(metric.at("value")), read_optional_number(metric.at("gate")),
          metric.at("at_least").get<bool>() ? Direction::at_least : Direction::at_most,
          read_guard_band(metric)});
@@ -406,11 +407,11 @@ std::string serialize(const Json& json) {
 
 }  // namespace
 
-std::string serialize_run(const SpooledRun& spooled) {
+std::string serialize_spooled_run(const SpooledRun& spooled) {
   const RunRecord run = escape_run_texts(spooled.run);
   Json json;
   json["format"] = kRunFormat;
-  json["records"] = escape_for_single_line(spooled.records);
+  json["records"] = escape_text_for_single_line(spooled.records);
   for (const RunField& field : list_run_text_fields()) json[field.name] = run.*field.text;
   json["metrics"] = Json::array();
   for (const CheckedMetric& metric : run.metrics) {
@@ -426,8 +427,8 @@ std::string serialize_run(const SpooledRun& spooled) {
 }
 
 SpooledRun read_spooled_run(const std::filesystem::path& file) {
-  const auto text =
-      SharedFolder(file.parent_path()).read(file.filename().string(), kMaxRunFileBytes);
+  const auto text = SharedFolder(file.parent_path())
+                        .read_file_if_exists(file.filename().string(), kMaxRunFileBytes);
   // [FILE-1]
   if (!text) throw InputError(file, "cannot be opened: it was removed");
   try {

@@ -28,7 +28,7 @@ struct RunEvent {
   std::string who = {};
 
   /// Returns the time of the event, as 2026-11-21T13:45:01Z.
-  std::string utc_text() const;
+  std::string event_time_utc() const;
 };
 inline constexpr const char *kHookRequested = "hook wanted", *kHookDone = "hook done",
                             *kHookFailed = "hook failed", *kImagesDeleted = "images deleted",
@@ -51,7 +51,7 @@ struct RunRecord {
   std::string operator_name, shift;
   /// Start and end of the run in UTC, as 2026-11-21T13:45:01Z.
   std::string begun_utc, ended_utc;
-  /// Verdict (to_string()), and its causes, one per line, the primary cause first.
+  /// Verdict (run_verdict_name()), and its causes, one per line, the primary cause first.
   std::string verdict, causes;
   /// Program with its version, and the libraries that affect the result with their versions.
   std::string program, libraries;
@@ -64,23 +64,23 @@ struct RunRecord {
     /// Reason why the image was not used; empty if it was.
     std::string refused;
 
-    bool is_used() const { return refused.empty(); }
+    bool is_image_used() const { return refused.empty(); }
   };
   std::vector<Image> images;
   /// Events, in chronological order.
   std::vector<RunEvent> events;
 
   /// Returns the metric of this name; null if there is none.
-  const CheckedMetric* find_metric(std::string_view name) const;
+  const CheckedMetric* find_metric_by_name(std::string_view name) const;
   /// Returns the number of images that were used.
   std::ptrdiff_t count_used_images() const;
-  bool has_passed() const { return verdict == to_string(Verdict::pass); }
-  bool is_invalid() const { return verdict == to_string(Verdict::invalid); }
+  bool has_run_passed() const { return verdict == run_verdict_name(Verdict::pass); }
+  bool is_verdict_invalid() const { return verdict == run_verdict_name(Verdict::invalid); }
   /// Returns the first cause, in one line; empty if the run passed.
-  std::string first_cause() const { return causes.substr(0, causes.find('\n')); }
+  std::string first_verdict_cause() const { return causes.substr(0, causes.find('\n')); }
   /// Sets verdict and causes from `why`, the most important cause first. A wrong clock
   /// (describe_clock_problem()) precedes all.
-  void set_verdict(std::vector<Cause> why);
+  void set_verdict_from_causes(std::vector<Cause> why);
   /// Makes the run INVALID for another reason, which precedes the others.
   void invalidate_verdict(const std::string& why);
 };
@@ -89,7 +89,7 @@ struct RunRecord {
 struct ImageUser {
   std::string camera = {}, run = {};
 
-  bool empty() const { return run.empty(); }
+  bool has_no_run() const { return run.empty(); }
   friend bool operator==(const ImageUser&, const ImageUser&) = default;
 };
 
@@ -107,12 +107,12 @@ bool uses_images_of_earlier_run(const RunRecord& run, const RunRecord& earlier);
 const RunEvent* find_voiding_event(const RunRecord& record);
 
 /// Returns the index of the last event of a kind; -1 if there is none.
-std::ptrdiff_t find_last_event(const RunRecord& record, const char* what);
+std::ptrdiff_t find_last_event_of_kind(const RunRecord& record, const char* what);
 
 /// Returns the reason why the verdict of a record is not valid; empty if it is valid. The verdict
 /// is not valid if the run was voided, or if it is PASS despite a failed gate or a cause. The
 /// latter shows that the record was edited.
-std::string find_verdict_problem(const RunRecord& record);
+std::string describe_verdict_problem(const RunRecord& record);
 
 /// Text member of a record: a column of the table of runs and a key of its JSON.
 struct RunField {
@@ -142,11 +142,11 @@ std::string get_current_utc();
 std::string describe_utc_problem(const std::string& text);
 /// Returns the time since a UTC as 2026-11-21T13:45:01Z, s: negative for a future time, NaN for an
 /// invalid text.
-double seconds_since(const std::string& utc);
+double compute_seconds_since_utc(const std::string& utc);
 
 /// Returns the run with texts that are safe for terminals, reports and the spool:
-/// escape_for_terminal(), and escape_for_single_line() for operators and for names of images and
-/// events.
+/// escape_text_for_terminal(), and escape_text_for_single_line() for operators and for names of
+/// images and events.
 RunRecord escape_run_texts(RunRecord run);
 
 /// Returns the cause INVALID of a run whose end is before its start, because the clock was set
@@ -171,10 +171,10 @@ struct SpooledRun {
 /// database), the texts of list_run_text_fields(), "metrics", "images" and "events".
 /// Metrics with a guard band have "uncertainty" and "guard_k". Control characters and bytes that
 /// are not UTF-8 are escaped (escape_run_texts()).
-std::string serialize_run(const SpooledRun& spooled);
-/// Reads a run in the format of serialize_run(). A missing text of list_run_text_fields() is empty,
-/// as in files of older programs. Throws InputError with the file. Also throws it for a run without
-/// a verdict, or if the name of run, camera or event is not a valid Id.
+std::string serialize_spooled_run(const SpooledRun& spooled);
+/// Reads a run in the format of serialize_spooled_run(). A missing text of list_run_text_fields()
+/// is empty, as in files of older programs. Throws InputError with the file. Also throws it for a
+/// run without a verdict, or if the name of run, camera or event is not a valid Id.
 SpooledRun read_spooled_run(const std::filesystem::path& file);
 
 /// Returns a run as a JSON object for the hook: "event" ("verdict", or "voided" for a voided run),

@@ -74,7 +74,7 @@ bool matches_filter(const RunRecord& run, const RunFilter& filter) {
     return wanted.empty() || text == wanted;
   };
   const auto has_image = [&](const RunRecord::Image& image) {
-    return image.sha256 == filter.image_sha256 && image.is_used();
+    return image.sha256 == filter.image_sha256 && image.is_image_used();
   };
   return is(run.camera, filter.camera) && is(run.station, filter.station) &&
          is(run.verdict, filter.verdict) && is(run.kind, filter.kind) &&
@@ -98,14 +98,14 @@ std::string make_offline_notice(const InputError& error) {
 Spool::Spool(fs::path folder, std::string records)
     : folder_(std::move(folder)),
       where_(std::move(records)),
-      name_(escape_for_single_line(derive_database_identity(where_))) {}
+      name_(escape_text_for_single_line(derive_database_identity(where_))) {}
 
 Spool::~Spool() = default;
 
-void Spool::open() {
+void Spool::open_records() {
   if (records_) return;
   std::error_code none;
-  if (!is_server_address(where_) && !fs::exists(where_, none)) {
+  if (!is_database_server_address(where_) && !fs::exists(where_, none)) {
     throw RecordsOffline(where_, "there are no records");
   }
   records_ = std::make_unique<Records>(where_);
@@ -114,7 +114,7 @@ void Spool::open() {
 /// Runs an action on the records. Returns the reason if it failed; empty on success.
 std::string Spool::try_database_action(const std::function<void(Records&)>& action) {
   try {
-    open();
+    open_records();
     action(*records_);
     offline_reason_.clear();
     return "";
@@ -145,9 +145,9 @@ void Spool::suspend_database_access(const InputError& error) {
   offline_notice_ = make_offline_notice(error);
 }
 
-void Spool::check_storage() {
-  make_folder(folder_);
-  check_free_space(SharedFolder(folder_), kRequiredSpace_bytes);
+void Spool::check_runs_can_be_stored() {
+  create_station_folder(folder_);
+  check_folder_writable_and_space(SharedFolder(folder_), kRequiredSpace_bytes);
   remove_stale_files(folder_);
   try {
     if (!records_) records_ = std::make_unique<Records>(where_);
@@ -160,10 +160,10 @@ void Spool::check_storage() {
 
 void Spool::store_run(const RunRecord& run) {
   try {
-    make_folder(folder_);
+    create_station_folder(folder_);
     const std::string name = file_name(run);
     known_.erase(folder_ / name);  // possibly a different run of the same name
-    SharedFolder(folder_).replace_file(name, serialize_run({run, name_}));
+    SharedFolder(folder_).replace_file_atomically(name, serialize_spooled_run({run, name_}));
   } catch (const InputError& error) {
     const std::string refused =
         try_database_action([&](Records& records) { records.store_run(run); });
@@ -189,7 +189,7 @@ void Spool::deliver_waiting_runs() {
     SpooledRun spooled;
     try {
       spooled = read_spooled_run(file);
-    } catch (const InputError&) {  // reported by state()
+    } catch (const InputError&) {  // reported by describe_spool_state()
       continue;
     }
     if (spooled.records != name_) continue;
@@ -226,7 +226,7 @@ std::string Spool::append_spool_remarks(const std::string& first) const {
   return fmt::format("{}", fmt::join(remarks, "; "));
 }
 
-std::string Spool::state() {
+std::string Spool::describe_spool_state() {
   const std::size_t waiting = this->list_waiting_runs().size();
   const std::string& why = offline_reason_.empty() ? problem_ : offline_reason_;
   if (waiting > 0) {
@@ -236,8 +236,8 @@ std::string Spool::state() {
   return append_spool_remarks(why.empty() ? "" : "runs are queued in the spool: " + why);
 }
 
-std::string Spool::make_operator_notice() {
-  if (offline_reason_.empty() || offline_notice_.empty()) return state();
+std::string Spool::make_spool_notice_for_operator() {
+  if (offline_reason_.empty() || offline_notice_.empty()) return describe_spool_state();
   const std::size_t waiting = this->list_waiting_runs().size();
   const std::string runs = waiting == 0   ? "runs are"
                            : waiting == 1 ? "1 run"
@@ -261,7 +261,8 @@ std::vector<fs::path> Spool::list_spooled_files() {
 }
 
 /// Reads the new files of the spool, and returns the selected runs in chronological order.
-std::vector<RunRecord> Spool::collect(const std::function<bool(const SpooledRun&)>& is_selected) {
+std::vector<RunRecord> Spool::collect_spooled_runs(
+    const std::function<bool(const SpooledRun&)>& is_selected) {
   const auto files = this->list_spooled_files();
   std::erase_if(known_, [&](const auto& known) {
     return !std::binary_search(files.begin(), files.end(), known.first);
@@ -285,23 +286,24 @@ std::vector<RunRecord> Spool::collect(const std::function<bool(const SpooledRun&
 }
 
 std::vector<RunRecord> Spool::list_waiting_runs() {
-  return collect([&](const SpooledRun& spooled) { return spooled.records == name_; });
+  return collect_spooled_runs([&](const SpooledRun& spooled) { return spooled.records == name_; });
 }
 
-std::optional<RunRecord> Spool::find(const std::string& run) {
-  const auto here = collect([&](const SpooledRun& spooled) { return spooled.run.run == run; });
+std::optional<RunRecord> Spool::find_run_by_id(const std::string& run) {
+  const auto here =
+      collect_spooled_runs([&](const SpooledRun& spooled) { return spooled.run.run == run; });
   if (!here.empty()) return here.front();
   std::optional<RunRecord> found;
-  query_records([&](Records& records) { found = records.find(run); });
+  query_records([&](Records& records) { found = records.find_run_by_id(run); });
   return found;
 }
 
-std::vector<RunSummary> Spool::list_runs(const RunFilter& filter) {
+std::vector<RunSummary> Spool::list_run_summaries(const RunFilter& filter) {
   // The spool first: a run that is delivered meanwhile is then found in both.
   const std::vector<RunRecord> waiting = list_waiting_runs();
   std::vector<RunSummary> stored;
-  query_records([&](Records& records) { stored = records.list_runs(filter); });
-  return merge_runs(std::move(stored), waiting, filter);
+  query_records([&](Records& records) { stored = records.list_run_summaries(filter); });
+  return merge_stored_and_waiting_runs(std::move(stored), waiting, filter);
 }
 
 /// Returns the first run that uses an image of this digest, of all runs of the spool and the
@@ -309,14 +311,14 @@ std::vector<RunSummary> Spool::list_runs(const RunFilter& filter) {
 std::optional<RunSummary> Spool::find_run_that_used_image(
     const std::string& sha256, const std::function<bool(const RunSummary&)>& is_searched) {
   const RunFilter filter{.image_sha256 = sha256};
-  const auto spooled = collect([&](const SpooledRun& each) {
+  const auto spooled = collect_spooled_runs([&](const SpooledRun& each) {
     return std::ranges::find(each.run.images, sha256, &RunRecord::Image::sha256) !=
            each.run.images.end();
   });
   std::vector<RunSummary> stored;
   const bool has_answer =
-      query_records([&](Records& records) { stored = records.list_runs(filter); });
-  for (RunSummary& run : merge_runs(std::move(stored), spooled, filter)) {
+      query_records([&](Records& records) { stored = records.list_run_summaries(filter); });
+  for (RunSummary& run : merge_stored_and_waiting_runs(std::move(stored), spooled, filter)) {
     if (is_searched(run)) return std::move(run);
   }
   if (!has_answer) ++num_unchecked_;
@@ -333,29 +335,32 @@ ImageUser Spool::find_other_camera_using_image(const std::string& sha256,
 
 std::string Spool::find_golden_run_using_image(const std::string& sha256) {
   const auto run = find_run_that_used_image(sha256, [](const RunSummary& user) {
-    return user.kind == "golden" && user.verdict != to_string(Verdict::invalid);
+    return user.kind == "golden" && user.verdict != run_verdict_name(Verdict::invalid);
   });
   return run ? run->run : "";
 }
 
-std::optional<std::string> Spool::find_repeated_run(const RunRecord& run) {
+std::optional<std::string> Spool::find_run_with_same_images(const RunRecord& run) {
   const auto first = std::ranges::find_if(run.images, &RunRecord::Image::is_used);
   if (first == run.images.end()) return "";
   const RunFilter filter{.camera = run.camera, .kind = "unit", .image_sha256 = first->sha256};
   const std::vector<RunRecord> waiting = list_waiting_runs();
   std::vector<RunSummary> stored;
-  bool has_answer = query_records([&](Records& records) { stored = records.list_runs(filter); });
-  for (const RunSummary& earlier : merge_runs(std::move(stored), waiting, filter)) {
-    if (earlier.verdict == to_string(Verdict::invalid) || !earlier.voided.empty()) continue;
-    const auto record = find(earlier.run);
+  bool has_answer =
+      query_records([&](Records& records) { stored = records.list_run_summaries(filter); });
+  for (const RunSummary& earlier :
+       merge_stored_and_waiting_runs(std::move(stored), waiting, filter)) {
+    if (earlier.verdict == run_verdict_name(Verdict::invalid) || !earlier.voided.empty()) continue;
+    const auto record = find_run_by_id(earlier.run);
     if (record && uses_images_of_earlier_run(run, *record)) return earlier.run;
     has_answer = has_answer && record;
   }
   return has_answer ? std::optional<std::string>("") : std::nullopt;
 }
 
-std::vector<RunSummary> merge_runs(std::vector<RunSummary> stored,
-                                   const std::vector<RunRecord>& waiting, const RunFilter& filter) {
+std::vector<RunSummary> merge_stored_and_waiting_runs(std::vector<RunSummary> stored,
+                                                      const std::vector<RunRecord>& waiting,
+                                                      const RunFilter& filter) {
   std::vector<RunSummary> runs = std::move(stored);
   for (const RunRecord& run : waiting) {
     const RunEvent* event = find_voiding_event(run);

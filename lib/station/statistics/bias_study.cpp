@@ -32,7 +32,7 @@ EstimateTest test_estimate(double value, double standard_error, double dof) {
   EstimateTest estimate{value, standard_error, dof, 0, 1, value, value};
   if (standard_error > 0) {
     estimate.t = value / standard_error;
-    estimate.p = compute_two_tailed_p(estimate.t, dof);
+    estimate.p = compute_two_tailed_t_probability(estimate.t, dof);
     const double half = compute_two_tailed_t_quantile(kLevel, dof) * standard_error;
     estimate.low = value - half;
     estimate.high = value + half;
@@ -69,13 +69,13 @@ Linearity fit_line(const std::vector<double>& references, const std::vector<doub
 
 }  // namespace
 
-bool EstimateTest::is_significant() const { return p < kLevel; }
+bool EstimateTest::differs_significantly_from_zero() const { return p < kLevel; }
 
 double Linearity::predict_bias_at(double reference) const {
   return intercept.value + slope.value * reference;
 }
 
-double Linearity::confidence_band_at(double reference) const {
+double Linearity::confidence_half_width_at(double reference) const {
   const double offset = reference - mean_reference;
   return compute_two_tailed_t_quantile(kLevel, slope.dof) * residual_sd *
          std::sqrt(1 / count + offset * offset / reference_squares);
@@ -128,14 +128,14 @@ void write_bias_plot(const std::filesystem::path& picture, const std::string& ti
       "{}{}{}set xlabel 'reference'\nset ylabel {} noenhanced\n"
       "set offsets graph 0.05, graph 0.05, graph 0.1, graph 0.1\n",
       make_gnuplot_data_block("data", data), make_gnuplot_data_block("means", means),
-      make_common_plot_settings(), quote_for_gnuplot(title + ", measured - reference"));
+      make_common_gnuplot_settings(), quote_text_for_gnuplot(title + ", measured - reference"));
   if (study.linearity) {
     const double first = study.units.front().reference, last = study.units.back().reference;
     constexpr int parts = 50;
     for (int i = 0; i <= parts; ++i) {
       const double at = first + (last - first) * i / parts;
       const double bias = study.linearity->predict_bias_at(at),
-                   band = study.linearity->confidence_band_at(at);
+                   band = study.linearity->confidence_half_width_at(at);
       line += format_gnuplot_data_row({at, bias, bias - band, bias + band});
     }
     commands += make_gnuplot_data_block("line", line);

@@ -26,7 +26,7 @@ struct EstimateTest {
   double value = 0, standard_error = 0, dof = 0, t = 0, p = 1, low = 0, high = 0;
 
   /// Returns true if the value differs significantly from 0 (p < 0.05).
-  bool is_significant() const;
+  bool differs_significantly_from_zero() const;
 };
 
 /// Bias of the measured values of one reference unit. `mean` and `sd` are those of its values.
@@ -50,7 +50,7 @@ struct Linearity {
   double predict_bias_at(double reference) const;
   /// Returns half of the 95 % confidence band of the line at a reference x: t s sqrt(1 / n + (x -
   /// mean)^2 / S_xx).
-  double confidence_band_at(double reference) const;
+  double confidence_half_width_at(double reference) const;
 };
 
 /// Bias and linearity of a measurement system against reference units (AIAG MSA, 4th ed., chapter

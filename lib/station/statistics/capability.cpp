@@ -16,14 +16,14 @@ constexpr double kBelow = 0.025, kAbove = 0.975, kNormalQuantile = 1.95996398454
 
 }  // namespace
 
-CapabilityIndex compute_cp(double tolerance, double sd, double dof) {
+CapabilityIndex compute_cp_index(double tolerance, double sd, double dof) {
   const double cp = tolerance / (6 * sd);
-  return {cp, cp * std::sqrt(chi_square_quantile(kBelow, dof) / dof),
-          cp * std::sqrt(chi_square_quantile(kAbove, dof) / dof)};
+  return {cp, cp * std::sqrt(compute_chi_square_quantile(kBelow, dof) / dof),
+          cp * std::sqrt(compute_chi_square_quantile(kAbove, dof) / dof)};
 }
 
-CapabilityIndex compute_cpk(const ToleranceLimits& limits, double mean, double sd, double dof,
-                            std::size_t count) {
+CapabilityIndex compute_cpk_index(const ToleranceLimits& limits, double mean, double sd, double dof,
+                                  std::size_t count) {
   constexpr double none = std::numeric_limits<double>::infinity();
   const double margin = std::min(limits.upper ? *limits.upper - mean : none,
                                  limits.lower ? mean - *limits.lower : none);
@@ -33,8 +33,8 @@ CapabilityIndex compute_cpk(const ToleranceLimits& limits, double mean, double s
   return {cpk, cpk - half, cpk + half};
 }
 
-std::optional<Capability> compute_capability(std::span<const double> values,
-                                             const ToleranceLimits& limits) {
+std::optional<Capability> compute_process_capability(std::span<const double> values,
+                                                     const ToleranceLimits& limits) {
   if (values.size() < 2 || (!limits.lower && !limits.upper)) return std::nullopt;
   const auto count = static_cast<double>(values.size());
   const ControlChart chart = compute_control_chart(values);
@@ -47,12 +47,12 @@ std::optional<Capability> compute_capability(std::span<const double> values,
                     .mean = chart.mean,
                     .within_sd = chart.sigma,
                     .overall_sd = std::sqrt(squares / dof)};
-  result.cpk = compute_cpk(limits, result.mean, result.within_sd, within_dof, result.count);
-  result.ppk = compute_cpk(limits, result.mean, result.overall_sd, dof, result.count);
+  result.cpk = compute_cpk_index(limits, result.mean, result.within_sd, within_dof, result.count);
+  result.ppk = compute_cpk_index(limits, result.mean, result.overall_sd, dof, result.count);
   if (limits.lower && limits.upper) {
     const double tolerance = *limits.upper - *limits.lower;
-    result.cp = compute_cp(tolerance, result.within_sd, within_dof);
-    result.pp = compute_cp(tolerance, result.overall_sd, dof);
+    result.cp = compute_cp_index(tolerance, result.within_sd, within_dof);
+    result.pp = compute_cp_index(tolerance, result.overall_sd, dof);
   }
   return result;
 }

@@ -50,15 +50,15 @@ struct Capability {
 
 /// Computes capability and performance. Returns std::nullopt for fewer than two values, for equal
 /// values, and without a limit.
-std::optional<Capability> compute_capability(std::span<const double> values,
-                                             const ToleranceLimits& limits);
+std::optional<Capability> compute_process_capability(std::span<const double> values,
+                                                     const ToleranceLimits& limits);
 
 /// Computes Cp = (U - L) / (6 s) with its interval. `tolerance` is U - L, and `dof` the degrees of
 /// freedom of `sd`.
-CapabilityIndex compute_cp(double tolerance, double sd, double dof);
+CapabilityIndex compute_cp_index(double tolerance, double sd, double dof);
 /// Computes Cpk, the smaller of (U - m) / (3 s) and (m - L) / (3 s), with its interval. `count` is
 /// the number of values of the mean. Precondition: at least one limit.
-CapabilityIndex compute_cpk(const ToleranceLimits& limits, double mean, double sd, double dof,
-                            std::size_t count);
+CapabilityIndex compute_cpk_index(const ToleranceLimits& limits, double mean, double sd, double dof,
+                                  std::size_t count);
 
 }  // namespace vlp

@@ -180,7 +180,7 @@ void write_trend_plot(const std::filesystem::path& picture, const std::string& t
   }
   using namespace plot_colors;
   const auto number = [](double value) { return format_significant_digits(value, 9); };
-  std::string commands = make_gnuplot_data_block("data", data) + make_common_plot_settings();
+  std::string commands = make_gnuplot_data_block("data", data) + make_common_gnuplot_settings();
   if (!alarm_points.empty()) commands += make_gnuplot_data_block("marked", alarm_points);
   commands += fmt::format(
       "set xlabel 'runs, in the order of their end'\nset ylabel {} noenhanced\nset xrange {}\n"
@@ -189,7 +189,7 @@ void write_trend_plot(const std::filesystem::path& picture, const std::string& t
       "{} with lines dashtype 2 linecolor rgb '{}' notitle, "
       "{} with lines linecolor rgb '{}' title 'mean', "
       "$data using 1:2 with linespoints pointtype 7 linecolor rgb '{}' title 'runs'",
-      quote_for_gnuplot(title), format_gnuplot_range(0.5, double(points.size()) + 0.5),
+      quote_text_for_gnuplot(title), format_gnuplot_range(0.5, double(points.size()) + 0.5),
       number(chart.upper), vermilion, number(chart.lower), vermilion, number(chart.mean), green,
       blue);
   if (gate) {

@@ -17,15 +17,15 @@ double compute_mean(std::span<const double> values) {
   return values.front() + above_first / static_cast<double>(values.size());
 }
 
-double chi_square_quantile(double probability, double dof) {
+double compute_chi_square_quantile(double probability, double dof) {
   return quantile(boost::math::chi_squared(dof), probability);
 }
 
-double f_upper_tail(double x, double dof_above, double dof_below) {
+double compute_f_upper_tail_probability(double x, double dof_above, double dof_below) {
   return cdf(complement(boost::math::fisher_f(dof_above, dof_below), x));
 }
 
-double compute_two_tailed_p(double t, double dof) {
+double compute_two_tailed_t_probability(double t, double dof) {
   return 2 * cdf(complement(boost::math::students_t(dof), std::abs(t)));
 }
 

@@ -94,15 +94,16 @@ double variance_component(double larger, double smaller, double count) {
 
 }  // namespace
 
-MeasurementStudy analyze_measurements(const std::vector<StudyValue>& values) {
+MeasurementStudy analyze_repeatability_and_reproducibility(const std::vector<StudyValue>& values) {
   constexpr double significant = 0.05;
   MeasurementStudy study = analyze_variance(group_cells(values));
   double error = study.error.mean_square(), interaction = study.interaction.mean_square();
   if (study.stations > 1) {
-    study.interaction_p =
-        error > 0 ? f_upper_tail(interaction / error, study.interaction.dof, study.error.dof)
-        : interaction > 0 ? 0
-                          : 1;
+    study.interaction_p = error > 0
+                              ? compute_f_upper_tail_probability(
+                                    interaction / error, study.interaction.dof, study.error.dof)
+                          : interaction > 0 ? 0
+                                            : 1;
   }
   study.pooled = study.interaction_p.value_or(1) > significant;
   if (study.pooled) {
@@ -118,21 +119,21 @@ MeasurementStudy analyze_measurements(const std::vector<StudyValue>& values) {
                                                : 0,
                of_unit = variance_component(study.unit.mean_square(), interaction, o * r);
   study.repeatability = std::sqrt(error);
-  study.of_interaction = std::sqrt(of_interaction);
-  study.of_station = std::sqrt(of_station);
-  study.of_unit = std::sqrt(of_unit);
+  study.interaction_sd = std::sqrt(of_interaction);
+  study.station_sd = std::sqrt(of_station);
+  study.unit_sd = std::sqrt(of_unit);
   study.grr = std::sqrt(error + of_interaction + of_station);
   study.total = std::sqrt(error + of_interaction + of_station + of_unit);
   return study;
 }
 
-std::optional<int> MeasurementStudy::compute_distinct_categories() const {
+std::optional<int> MeasurementStudy::compute_number_of_distinct_categories() const {
   if (grr <= 0) return std::nullopt;
   constexpr double per_ratio = 1.41, max_categories = 1e6;
-  return std::max(1, static_cast<int>(std::min(max_categories, per_ratio * of_unit / grr)));
+  return std::max(1, static_cast<int>(std::min(max_categories, per_ratio * unit_sd / grr)));
 }
 
-std::optional<double> MeasurementStudy::compute_percent_of_tolerance(
+std::optional<double> MeasurementStudy::compute_precision_to_tolerance_percent(
     const ToleranceLimits& limits) const {
   constexpr double percent = 100;
   if (limits.lower && limits.upper) {

@@ -44,17 +44,17 @@ struct MeasurementStudy {
 
   /// AIAG's EV (equipment variation, e), AV (appraiser variation, station) and INT (interaction).
   /// The last two are 0 with one station, because they cannot be determined.
-  double repeatability = 0, of_station = 0, of_interaction = 0;
+  double repeatability = 0, station_sd = 0, interaction_sd = 0;
   /// AIAG's GRR = sqrt(EV^2 + AV^2 + INT^2), PV (part variation), and TV (total variation). By the
   /// manual's rule 100 GRR / TV is acceptable up to 10 and unacceptable above 30.
-  double grr = 0, of_unit = 0, total = 0;
+  double grr = 0, unit_sd = 0, total = 0;
   /// Returns AIAG's ndc = 1.41 PV / GRR, truncated and at least 1; the manual requires 5. Returns
   /// std::nullopt if GRR is 0.
-  std::optional<int> compute_distinct_categories() const;
+  std::optional<int> compute_number_of_distinct_categories() const;
   /// Returns the precision-to-tolerance ratio P/T in percent: 600 GRR / (U - L). With a single
   /// limit it is 300 GRR / (U - mean) or 300 GRR / (mean - L). Returns std::nullopt without a
   /// limit, and if the mean is at or beyond the single limit.
-  std::optional<double> compute_percent_of_tolerance(const ToleranceLimits& limits) const;
+  std::optional<double> compute_precision_to_tolerance_percent(const ToleranceLimits& limits) const;
 };
 
 /// Measured value of a unit on a station.
@@ -65,6 +65,6 @@ struct StudyValue {
 
 /// Analyzes a crossed study. Throws std::invalid_argument for fewer than two units or repeats, or
 /// if the number of repeats differs between units or stations; the message names what is missing.
-MeasurementStudy analyze_measurements(const std::vector<StudyValue>& values);
+MeasurementStudy analyze_repeatability_and_reproducibility(const std::vector<StudyValue>& values);
 
 }  // namespace vlp

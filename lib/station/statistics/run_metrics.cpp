@@ -23,24 +23,25 @@ MetricKind find_run_metric(const std::string& name) {
   const auto kinds = list_run_metrics();
   const auto kind = std::ranges::find(kinds, name, &MetricKind::name);
   if (kind != kinds.end()) return *kind;
-  const std::string_view present = find_present_name(NameKind::metric, name);
+  const std::string_view present = find_current_name_for_former(NameKind::metric, name);
   if (!present.empty()) throw std::invalid_argument("metric " + describe_renaming(name, present));
   std::string names;
   for (const MetricKind& any : kinds) names.append(names.empty() ? "" : ", ").append(any.name);
   throw std::invalid_argument("there is no metric " + name + "; the metrics are: " + names);
 }
 
-std::vector<TrendPoint> load_judged_values(Records& records, const std::string& metric,
-                                           RunFilter filter) {
-  if (!filter.verdict.empty()) return records.load_trend(metric, filter);
+std::vector<TrendPoint> load_metric_of_judged_runs(Records& records, const std::string& metric,
+                                                   RunFilter filter) {
+  if (!filter.verdict.empty()) return records.load_metric_trend(metric, filter);
   const int last = std::exchange(filter.last, 0);
-  auto points = records.load_trend(metric, filter);
-  std::erase_if(
-      points, [](const TrendPoint& point) { return point.verdict == to_string(Verdict::invalid); });
+  auto points = records.load_metric_trend(metric, filter);
+  std::erase_if(points, [](const TrendPoint& point) {
+    return point.verdict == run_verdict_name(Verdict::invalid);
+  });
   return keep_last_rows(std::move(points), last);
 }
 
-void check_points_of_one_station(const std::vector<TrendPoint>& points) {
+void check_values_are_of_one_station(const std::vector<TrendPoint>& points) {
   for (const TrendPoint& point : points) {
     if (point.station == points.front().station) continue;
     throw std::invalid_argument(
@@ -58,8 +59,8 @@ std::optional<double> find_gate_limit(const std::string& metric, const StationCo
     }
     return std::nullopt;
   }
-  const auto last = points.empty() ? std::nullopt : records.find(points.back().run);
-  const CheckedMetric* gate = last ? last->find_metric(metric) : nullptr;
+  const auto last = points.empty() ? std::nullopt : records.find_run_by_id(points.back().run);
+  const CheckedMetric* gate = last ? last->find_metric_by_name(metric) : nullptr;
   return gate != nullptr ? gate->limit : std::nullopt;
 }
 
@@ -68,8 +69,8 @@ ToleranceLimits make_tolerance_limits(const MetricKind& kind, std::optional<doub
   return {std::nullopt, gate};
 }
 
-std::vector<StudyValue> select_study_values(const std::vector<TrendPoint>& points,
-                                            const std::vector<std::string>& units) {
+std::vector<StudyValue> select_values_of_study_units(const std::vector<TrendPoint>& points,
+                                                     const std::vector<std::string>& units) {
   std::map<std::string, std::size_t> runs;
   for (const TrendPoint& point : points) ++runs[point.camera];
   std::string unknown;
@@ -96,7 +97,7 @@ void check_runs_share_no_images(Records& records, const std::vector<TrendPoint>&
   for (const TrendPoint& point : points) {
     const auto runs = runs_of_unit.find(point.camera);
     if (runs == runs_of_unit.end()) continue;
-    auto run = records.find(point.run);
+    auto run = records.find_run_by_id(point.run);
     if (!run) continue;
     for (const RunRecord& earlier : runs->second) {
       if (!uses_images_of_earlier_run(*run, earlier) && !uses_images_of_earlier_run(earlier, *run))
@@ -110,13 +111,13 @@ void check_runs_share_no_images(Records& records, const std::vector<TrendPoint>&
   }
 }
 
-std::vector<ReferenceValue> select_reference_values(
+std::vector<ReferenceValue> select_values_of_reference_units(
     const std::vector<TrendPoint>& points, const std::map<std::string, double>& references) {
   std::vector<std::string> units;
   units.reserve(references.size());
   for (const auto& [unit, reference] : references) units.push_back(unit);
   std::vector<ReferenceValue> values;
-  for (const auto& [unit, station, value] : select_study_values(points, units)) {
+  for (const auto& [unit, station, value] : select_values_of_study_units(points, units)) {
     values.push_back({unit, references.at(unit), value});
   }
   return values;

@@ -26,12 +26,12 @@ MetricKind find_run_metric(const std::string& name);
 
 /// Returns the values of a metric in judged runs, or in runs of the verdict that the filter
 /// selects.
-std::vector<TrendPoint> load_judged_values(Records& records, const std::string& metric,
-                                           RunFilter filter);
+std::vector<TrendPoint> load_metric_of_judged_runs(Records& records, const std::string& metric,
+                                                   RunFilter filter);
 
 /// Checks that all values are of one station. Throws std::invalid_argument otherwise; several
 /// stations are compared only on request.
-void check_points_of_one_station(const std::vector<TrendPoint>& points);
+void check_values_are_of_one_station(const std::vector<TrendPoint>& points);
 
 /// Returns the gate of a metric in the station's configuration or, without a station, in the last
 /// run. Returns std::nullopt if there is none.
@@ -41,15 +41,16 @@ ToleranceLimits make_tolerance_limits(const MetricKind& kind, std::optional<doub
 
 /// Returns the values of the named units; those of all units with two runs or more if `units` is
 /// empty. Throws std::invalid_argument for units without a value.
-std::vector<StudyValue> select_study_values(const std::vector<TrendPoint>& points,
-                                            const std::vector<std::string>& units);
+std::vector<StudyValue> select_values_of_study_units(const std::vector<TrendPoint>& points,
+                                                     const std::vector<std::string>& units);
 /// Checks that no two runs of a unit use the same images, because such runs do not show
 /// repeatability. Throws std::invalid_argument that names two such runs. Ignores runs without
 /// images.
 void check_runs_share_no_images(Records& records, const std::vector<TrendPoint>& points,
                                 const std::vector<StudyValue>& values);
-/// Returns the values of reference units with their known values. Throws as select_study_values().
-std::vector<ReferenceValue> select_reference_values(
+/// Returns the values of reference units with their known values. Throws as
+/// select_values_of_study_units().
+std::vector<ReferenceValue> select_values_of_reference_units(
     const std::vector<TrendPoint>& points, const std::map<std::string, double>& references);
 
 }  // namespace vlp

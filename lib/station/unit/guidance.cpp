@@ -19,12 +19,12 @@ namespace {
 
 /// Computes the coverage of the views as in vlp-intrinsics, with poses from the nominal lens.
 ViewCoverage compute_coverage(const Unit& unit) {
-  const StationConfig& config = unit.config();
+  const StationConfig& config = unit.station_config();
   const Lens nominal(config.type.lens_model, config.type.intrinsics);
   IntrinsicsInput input{
       BoardLattice(config.board), {}, config.type.imager_px, config.type.lens_model};
   IntrinsicsSolution poses{};
-  for (const UnitImage* image : list_used_images(unit.step(StationStep::boards))) {
+  for (const UnitImage* image : list_used_images(unit.step_state(StationStep::boards))) {
     poses.views.push_back(input.views.size());
     input.views.push_back(input.lattice.match_corners_to_flat_board(image->seen.board->seen));
     const auto pose = estimate_board_view_pose(input.views.back(), nominal);
@@ -44,8 +44,8 @@ std::string describe_missing_angles(const YawCoverage::Height& height) {
 
 /// Returns a map of the corners over the image: '#' many, '+' some, '.' none.
 std::vector<std::string> draw_board_map(const Unit& unit) {
-  const ImageCoverage coverage =
-      compute_board_coverage(unit.step(StationStep::boards), unit.config().type.imager_px);
+  const ImageCoverage coverage = compute_board_coverage(unit.step_state(StationStep::boards),
+                                                        unit.station_config().type.imager_px);
   constexpr int many = 20;
   std::vector<std::string> lines;
   const std::string edge = "  +-----------------+";
@@ -59,11 +59,11 @@ std::vector<std::string> draw_board_map(const Unit& unit) {
     lines.push_back(line + " |");
   }
   lines.push_back(edge);
-  lines[1] +=
-      fmt::format("   {:.0f} % of the image have corners, {:.0f} % wanted",
-                  100 * coverage.covered_fraction(), 100 * unit.config().sufficient.board_coverage);
+  lines[1] += fmt::format("   {:.0f} % of the image have corners, {:.0f} % wanted",
+                          100 * coverage.covered_image_fraction(),
+                          100 * unit.station_config().sufficient.board_coverage);
   lines[3] += "   # many corners   + some   . none";
-  const UnitStep& boards = unit.step(StationStep::boards);
+  const UnitStep& boards = unit.step_state(StationStep::boards);
   const auto last = boards.images.find(boards.last);
   if (last == boards.images.end() || !last->second.seen.board) return lines;
   if (const auto mtf50 = compute_median_edge_mtf50(last->second.seen.board->seen)) {
@@ -74,10 +74,10 @@ std::vector<std::string> draw_board_map(const Unit& unit) {
 
 /// Returns the covered angles of the rotation in place; empty before the lens is known.
 YawCoverage compute_yaw_coverage_of_unit(const Unit& unit) {
-  const auto& lens = unit.step(StationStep::boards).result;
-  if (!lens || !lens->ok()) return {};
-  return compute_yaw_coverage(collect_frames(unit.step(StationStep::rotation)), unit.config(),
-                              lens->calibration);
+  const auto& lens = unit.step_state(StationStep::boards).result;
+  if (!lens || !lens->has_succeeded()) return {};
+  return compute_yaw_coverage(collect_frames_of_used_images(unit.step_state(StationStep::rotation)),
+                              unit.station_config(), lens->calibration);
 }
 
 /// Returns the heights of the rotation with covered and missing angles, as lines.
@@ -102,7 +102,7 @@ std::string describe_lamps(const Unit& unit, const UnitStep& step) {
     for (const Detection& lamp : collect_identified_lamps(image->seen)) ++seen[lamp.lamp];
   }
   std::string there, missing;
-  for (const Lamp& lamp : unit.config().lamps.lamps) {
+  for (const Lamp& lamp : unit.station_config().lamps.lamps) {
     (seen.contains(lamp.id) ? there : missing) += fmt::format(" {}", lamp.id);
   }
   return "  lamps seen:" + (there.empty() ? " none" : there) +
@@ -111,26 +111,26 @@ std::string describe_lamps(const Unit& unit, const UnitStep& step) {
 
 }  // namespace
 
-std::string format_count(const Unit& unit, StationStep step) {
-  const CompletionCriteria& sufficient = unit.config().sufficient;
+std::string format_step_image_count(const Unit& unit, StationStep step) {
+  const CompletionCriteria& sufficient = unit.station_config().sufficient;
   const std::array wanted{sufficient.board_views,
                           sufficient.turn_captures * sufficient.turn_heights,
                           sufficient.dispersion_captures, sufficient.check_captures};
-  return fmt::format("{}/{}", unit.step(step).count_used_images(),
+  return fmt::format("{}/{}", unit.step_state(step).count_used_images(),
                      wanted[static_cast<std::size_t>(step)]);
 }
 
-std::vector<std::string> describe_progress(const Unit& unit, StationStep step) {
+std::vector<std::string> describe_step_progress(const Unit& unit, StationStep step) {
   if (step == StationStep::boards) return draw_board_map(unit);
   std::vector<std::string> lines;
   if (step == StationStep::rotation) lines = describe_rotation_coverage(unit);
-  lines.push_back(describe_lamps(unit, unit.step(step)));
+  lines.push_back(describe_lamps(unit, unit.step_state(step)));
   return lines;
 }
 
-std::string describe_next_action(const Unit& unit, StationStep step) {
-  const UnitStep& state = unit.step(step);
-  if (state.result && !state.result->ok()) {
+std::string describe_next_operator_action(const Unit& unit, StationStep step) {
+  const UnitStep& state = unit.step_state(step);
+  if (state.result && !state.result->has_succeeded()) {
     return state.result->why + "; add images, or empty the folder of the step and repeat it";
   }
   switch (step) {

@@ -46,8 +46,8 @@ std::vector<FrameFix> locate_by_three_lamps(std::span<const Frame> frames, const
   const Positioner positioner(map, calibration);
   std::vector<FrameFix> located;
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    Fix fix = positioner.locate(frames[i].detections);
-    if (fix.ok() && fix.lamps >= 3) located.push_back({i, std::move(fix)});
+    Fix fix = positioner.compute_position_fix(frames[i].detections);
+    if (fix.has_succeeded() && fix.lamps >= 3) located.push_back({i, std::move(fix)});
   }
   return located;
 }
@@ -138,9 +138,9 @@ double max_corner_displacement_px(const Camera& a, const Camera& b) {
 
 }  // namespace
 
-std::vector<std::string> describe_lamp_faults(std::span<const Frame> frames, const LampMap& map,
-                                              const Calibration& calibration,
-                                              double min_offset_px) {
+std::vector<std::string> describe_lamp_map_faults(std::span<const Frame> frames, const LampMap& map,
+                                                  const Calibration& calibration,
+                                                  double min_offset_px) {
   std::vector<std::string> faults;
   if (frames.size() < kMinFrames) return faults;
   MapErrorOptions options;
@@ -148,7 +148,7 @@ std::vector<std::string> describe_lamp_faults(std::span<const Frame> frames, con
   for (const MapError& error :
        detect_misplaced_or_swapped_lamps(frames, map, calibration, options).errors) {
     if (!error.lamps.empty() || error.kind == MapErrorKind::mirrored) {
-      faults.push_back(describe(error));
+      faults.push_back(describe_map_error(error));
     }
   }
   return faults;
@@ -158,7 +158,7 @@ std::vector<std::string> describe_missing_lamps(std::span<const Frame> frames, c
   std::vector<std::string> faults;
   if (frames.size() < kMinFrames) return faults;
   for (const MapError& error : find_undetected_lamps(frames, map))
-    faults.push_back(describe(error));
+    faults.push_back(describe_map_error(error));
   return faults;
 }
 
@@ -219,7 +219,7 @@ std::optional<CommonOffset> find_common_position_offset(std::span<const Frame> f
   return std::nullopt;
 }
 
-std::string describe(const CommonOffset& offset) {
+std::string describe_common_position_offset(const CommonOffset& offset) {
   constexpr double millimeters = 1e3;
   const Eigen::Vector2d offset_mm = millimeters * offset.offset_m;
   // [STATION-19] `lamps have moved` | station fault: INVALID; known points or lamps moved: FAIL for
@@ -236,15 +236,16 @@ std::string describe(const CommonOffset& offset) {
           : "the known points or the lamps have moved");
 }
 
-std::string describe_contradiction_to_lens(std::span<const Frame> frames, const LampMap& map,
-                                           const Calibration& calibration) {
+std::string describe_contradiction_to_calibrated_lens(std::span<const Frame> frames,
+                                                      const LampMap& map,
+                                                      const Calibration& calibration) {
   constexpr std::size_t min_captures =
       10;  // with fewer a free lens absorbs residuals of other faults
   if (frames.size() < min_captures) return "";
   const AdjustmentResult constrained = adjust_frames_without_positions(frames, map, calibration);
   const AdjustmentResult unconstrained =
       adjust_frames_without_positions(frames, map, with_free_focal_length(calibration));
-  if (!constrained.ok() || !unconstrained.ok()) return "";
+  if (!constrained.has_succeeded() || !unconstrained.has_succeeded()) return "";
   constexpr double max_residual_ratio = 1.0 / 3, min_displacement_px = 1;
   if (unconstrained.residual_px >= max_residual_ratio * constrained.residual_px) return "";
   if (max_corner_displacement_px(calibration.camera, unconstrained.camera) < min_displacement_px)
@@ -284,9 +285,9 @@ std::string describe_lens_difference(std::span<const Frame> frames,
   const AdjustmentResult result = adjust_frames_without_positions(frames, map, calibration);
   const AdjustmentResult reference_result =
       adjust_frames_without_positions(reference, map, calibration);
-  if (!result.ok() || !reference_result.ok()) return "";
-  // The same ratio as in describe_contradiction_to_lens(); 0.1 px is 0.3 mm at lamps 1.6 m above a
-  // lens of 520 px.
+  if (!result.has_succeeded() || !reference_result.has_succeeded()) return "";
+  // The same ratio as in describe_contradiction_to_calibrated_lens(); 0.1 px is 0.3 mm at lamps 1.6
+  // m above a lens of 520 px.
   constexpr double min_ratio = 3, min_residual_px = 0.1;
   if (result.residual_px < std::max(min_residual_px, min_ratio * reference_result.residual_px))
     return "";

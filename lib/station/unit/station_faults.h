@@ -20,9 +20,9 @@ namespace vlp {
 /// each. Requires three captures. Offsets below `min_offset_px` in the image are ignored. The
 /// default is large, so that small errors of the map do not excuse a camera that is being
 /// calibrated. It can be smaller for a known camera.
-std::vector<std::string> describe_lamp_faults(std::span<const Frame> frames, const LampMap& map,
-                                              const Calibration& calibration,
-                                              double min_offset_px = 2.5);
+std::vector<std::string> describe_lamp_map_faults(std::span<const Frame> frames, const LampMap& map,
+                                                  const Calibration& calibration,
+                                                  double min_offset_px = 2.5);
 
 /// Returns a message for each lamp of the map that no frame contains, one line each. Empty if all
 /// lamps were detected, and for fewer than three frames.
@@ -65,7 +65,7 @@ std::optional<CommonOffset> find_common_position_offset(std::span<const Frame> f
                                                         const CapturesTable& places);
 
 /// Describes an offset with its size and direction, and its possible reasons, in one line.
-std::string describe(const CommonOffset& offset);
+std::string describe_common_position_offset(const CommonOffset& offset);
 
 /// Describes a contradiction between captures of lamps and the calibrated lens; empty if there is
 /// none.
@@ -76,8 +76,9 @@ std::string describe(const CommonOffset& offset);
 /// third of the first, and a corner of the image moves by 1 px or more.
 ///
 /// Returns an empty string if an adjustment is undetermined, and for fewer than ten captures.
-std::string describe_contradiction_to_lens(std::span<const Frame> frames, const LampMap& map,
-                                           const Calibration& calibration);
+std::string describe_contradiction_to_calibrated_lens(std::span<const Frame> frames,
+                                                      const LampMap& map,
+                                                      const Calibration& calibration);
 
 /// Captures of lamps with their known heights.
 struct CapturesWithPositions {

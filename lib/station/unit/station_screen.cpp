@@ -22,7 +22,7 @@ constexpr std::size_t kColumns = 80;
 
 /// Adds a text in lines of the screen's width, the first one with a label.
 void add_wrapped_lines(std::vector<ScreenLine>& lines, const std::string& label,
-                       const std::string& text, Tone tone) {
+                       const std::string& text, ScreenLineStyle tone) {
   std::istringstream words(text);
   std::string line = fmt::format("{:<9}", label), word;
   const std::size_t indent = line.size();
@@ -39,12 +39,12 @@ void add_wrapped_lines(std::vector<ScreenLine>& lines, const std::string& label,
 /// Returns a problem as lines; no line if it is empty.
 std::vector<ScreenLine> make_problem_lines(const std::string& label, const std::string& problem) {
   std::vector<ScreenLine> lines;
-  if (!problem.empty()) add_wrapped_lines(lines, label, problem, Tone::bad);
+  if (!problem.empty()) add_wrapped_lines(lines, label, problem, ScreenLineStyle::bad);
   return lines;
 }
 
 std::string describe_outcome(const UnitImage& image) {
-  return image.is_used() ? "taken" : "refused: " + image.refusal();
+  return image.is_image_used() ? "taken" : "refused: " + image.rejection_message();
 }
 
 /// Returns the step of a unit's run that did not finish, with which its causes begin
@@ -55,7 +55,7 @@ std::optional<StationStep> find_unfinished_step(const RunRecord& record) {
   std::istringstream causes(record.causes);
   for (std::string cause; std::getline(causes, cause);) {
     for (const StationStep step : kStationSteps) {
-      const std::string name = to_string(step);
+      const std::string name = station_step_name(step);
       if (cause.starts_with(name + ": ") || cause.starts_with(name + " (")) return step;
     }
   }
@@ -75,7 +75,7 @@ std::string describe_unmeasured_gates(const RunRecord& record) {
   // [STATION-7] `did not finish` | step without result; its gates and later ones have no value |
   //   see the causes below it
   return fmt::format("{} {}, because {} did not finish", names.size(),
-                     names.size() == 1 ? "gate" : "gates", to_string(*step));
+                     names.size() == 1 ? "gate" : "gates", station_step_name(*step));
 }
 
 ScreenLine make_gate_line(const CheckedMetric& metric) {
@@ -83,13 +83,13 @@ ScreenLine make_gate_line(const CheckedMetric& metric) {
   const std::string limit =
       fmt::format("{} {:.4g}",
                   metric.direction == Direction::at_least ? ">=" : "<=", metric.acceptance_limit());
-  std::string outcome = metric.has_passed() ? "met" : "NOT MET";
+  std::string outcome = metric.has_passed_gate() ? "met" : "NOT MET";
   if (const auto sure = metric.conformance_probability()) {
     outcome += fmt::format(", p {:.3f}", *sure);
   }
   return {
       fmt::format("{:<28}{:>12}{:>14} {:<4} {}", metric.name, value, limit, metric.unit, outcome),
-      metric.has_passed() ? Tone::plain : Tone::bad};
+      metric.has_passed_gate() ? ScreenLineStyle::plain : ScreenLineStyle::bad};
 }
 
 const std::array kPass{"  ####     #     ####    #### ", "  #   #   # #   #       #     ",
@@ -109,88 +109,93 @@ const std::array kInvalid{"  ###  #   #  #   #    #    #      ###  #### ",
 
 std::vector<ScreenLine> make_station_screen(const Unit& unit) {
   std::vector<ScreenLine> lines;
-  lines.push_back(
-      {fmt::format("{}   camera {}", unit.config().station, unit.camera_id()).substr(0, kColumns),
-       Tone::heading});
-  const auto current = unit.current_step();
+  lines.push_back({fmt::format("{}   camera {}", unit.station_config().station, unit.camera_id())
+                       .substr(0, kColumns),
+                   ScreenLineStyle::heading});
+  const auto current = unit.first_incomplete_step();
   std::string steps;
   for (const StationStep step : kStationSteps) {
-    const char* mark = unit.step(step).is_done() ? "x" : step == current ? ">" : " ";
-    steps += fmt::format("[{}] {} {}   ", mark, to_string(step), format_count(unit, step));
+    const char* mark = unit.step_state(step).is_step_solved() ? "x" : step == current ? ">" : " ";
+    steps += fmt::format("[{}] {} {}   ", mark, station_step_name(step),
+                         format_step_image_count(unit, step));
   }
   lines.push_back({steps.substr(0, kColumns)});
-  if (!unit.invalid_reason().empty()) {
-    add_wrapped_lines(lines, "Station", unit.invalid_reason() + "; no unit passes", Tone::bad);
+  if (!unit.invalid_verdict_reason().empty()) {
+    add_wrapped_lines(lines, "Station", unit.invalid_verdict_reason() + "; no unit passes",
+                      ScreenLineStyle::bad);
   }
   lines.push_back({""});
   if (!current) return lines;
-  const UnitStep& state = unit.step(*current);
-  lines.push_back({to_string(*current), Tone::heading});
-  for (std::string& line : describe_progress(unit, *current)) {
+  const UnitStep& state = unit.step_state(*current);
+  lines.push_back({station_step_name(*current), ScreenLineStyle::heading});
+  for (std::string& line : describe_step_progress(unit, *current)) {
     lines.push_back({line.substr(0, kColumns)});
   }
-  add_wrapped_lines(lines, "Next", describe_next_action(unit, *current), Tone::plain);
+  add_wrapped_lines(lines, "Next", describe_next_operator_action(unit, *current),
+                    ScreenLineStyle::plain);
   if (const auto image = state.images.find(state.last); image != state.images.end()) {
     add_wrapped_lines(lines, "Last", image->first + ": " + describe_outcome(image->second),
-                      image->second.is_used() ? Tone::good : Tone::bad);
+                      image->second.is_image_used() ? ScreenLineStyle::good : ScreenLineStyle::bad);
   }
-  for (const CheckedMetric& metric : unit.metrics()) {
+  for (const CheckedMetric& metric : unit.collect_unit_metrics()) {
     // Blur of all current views: a few views can be misleading.
     const bool known = metric.value && metric.name != "blur_px";
-    if (known && !metric.has_passed())
-      add_wrapped_lines(lines, "Fails", describe_failed_gate(metric), Tone::bad);
+    if (known && !metric.has_passed_gate())
+      add_wrapped_lines(lines, "Fails", describe_failed_gate(metric), ScreenLineStyle::bad);
   }
   if (state.num_consecutive_rejections > 1) {
     add_wrapped_lines(
         lines, "Refused",
         fmt::format("{} in a row; after {} the run ends", state.num_consecutive_rejections,
-                    unit.config().max_consecutive_rejections),
-        Tone::bad);
+                    unit.station_config().max_consecutive_rejections),
+        ScreenLineStyle::bad);
   }
   return lines;
 }
 
-std::string make_last_image_line(const Unit& unit, StationStep step, const std::string& image) {
-  const auto& images = unit.step(step).images;
+std::string describe_last_image_result(const Unit& unit, StationStep step,
+                                       const std::string& image) {
+  const auto& images = unit.step_state(step).images;
   const auto found = images.find(image);
   const std::string outcome =
       found == images.end() ? "waits for the step before" : describe_outcome(found->second);
-  return fmt::format("{} {}: {} ({})", to_string(step), image, outcome, format_count(unit, step));
+  return fmt::format("{} {}: {} ({})", station_step_name(step), image, outcome,
+                     format_step_image_count(unit, step));
 }
 
-std::vector<ScreenLine> make_spool_lines(const std::string& notice) {
-  return make_problem_lines("Records", escape_for_terminal(notice));
+std::vector<ScreenLine> make_spool_notice_lines(const std::string& notice) {
+  return make_problem_lines("Records", escape_text_for_terminal(notice));
 }
 
-std::vector<ScreenLine> make_hook_lines(const RunRecord& record) {
+std::vector<ScreenLine> make_pending_hook_lines(const RunRecord& record) {
   const std::string problem = describe_pending_hook(record);
   return make_problem_lines("Hook",
                             problem.empty() ? "" : problem + "; 'vlp-station hook' runs it again");
 }
 
 std::vector<ScreenLine> make_verdict_screen(const RunRecord& record) {
-  const std::string no_verdict = find_verdict_problem(record);
-  const bool passed = record.has_passed() && no_verdict.empty();
-  const Tone tone = passed ? Tone::good : Tone::bad;
+  const std::string no_verdict = describe_verdict_problem(record);
+  const bool passed = record.has_run_passed() && no_verdict.empty();
+  const ScreenLineStyle tone = passed ? ScreenLineStyle::good : ScreenLineStyle::bad;
   std::vector<ScreenLine> lines{
-      {fmt::format("{:<28}{:>12}{:>14}", "gate", "value", "limit"), Tone::heading}};
+      {fmt::format("{:<28}{:>12}{:>14}", "gate", "value", "limit"), ScreenLineStyle::heading}};
   for (const CheckedMetric& metric : record.metrics) {
     if (metric.limit && metric.value) lines.push_back(make_gate_line(metric));
   }
   if (const std::string gates = describe_unmeasured_gates(record); !gates.empty()) {
-    add_wrapped_lines(lines, "Gates", "not measured: " + gates, Tone::plain);
+    add_wrapped_lines(lines, "Gates", "not measured: " + gates, ScreenLineStyle::plain);
   }
   std::istringstream causes(record.causes);
   if (!record.causes.empty()) lines.push_back({""});
   for (std::string cause; std::getline(causes, cause);) {
-    add_wrapped_lines(lines, "Cause", cause, Tone::bad);
+    add_wrapped_lines(lines, "Cause", cause, ScreenLineStyle::bad);
   }
-  if (!no_verdict.empty()) add_wrapped_lines(lines, "Cause", no_verdict, Tone::bad);
+  if (!no_verdict.empty()) add_wrapped_lines(lines, "Cause", no_verdict, ScreenLineStyle::bad);
   // Last, so that it is visible on a terminal of 24 lines.
   lines.push_back({""});
-  const std::span<const char* const> banner = passed                ? std::span(kPass)
-                                              : record.is_invalid() ? std::span(kInvalid)
-                                                                    : std::span(kFail);
+  const std::span<const char* const> banner = passed                        ? std::span(kPass)
+                                              : record.is_verdict_invalid() ? std::span(kInvalid)
+                                                                            : std::span(kFail);
   if (no_verdict.empty()) {
     for (const char* row : banner) lines.push_back({row, tone});
   }
@@ -198,7 +203,7 @@ std::vector<ScreenLine> make_verdict_screen(const RunRecord& record) {
   const std::string word = no_verdict.empty() ? record.verdict : "NO VERDICT";
   lines.push_back(
       {fmt::format("{}   camera {}   {}", word, record.camera, record.station).substr(0, kColumns),
-       Tone::heading});
+       ScreenLineStyle::heading});
   return lines;
 }
 

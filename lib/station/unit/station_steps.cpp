@@ -26,7 +26,7 @@ constexpr double kMillimetersPerMeter = 1e3;
 
 /// Prepends the failed part to the reason.
 StepResult add_step_name(const char* what, StepResult result) {
-  if (!result.ok()) result.why = fmt::format("{}: {}", what, result.why);
+  if (!result.has_succeeded()) result.why = fmt::format("{}: {}", what, result.why);
   return result;
 }
 
@@ -40,9 +40,9 @@ void add_nominal_differences(const Camera& type, LensResult& result) {
   result.metrics.push_back({"focal_percent", percent * focal});
   result.metrics.push_back(
       {"principal_point_px", std::hypot(found[2] - nominal[2], found[3] - nominal[3])});
-  const auto difference =
-      compute_projection_difference(result.lens.solution.lens(), Lens(type.lens_model, nominal),
-                                    type.imager_px, [](const Eigen::Vector2d&) { return 1.0; });
+  const auto difference = compute_projection_difference(
+      result.lens.solution.fitted_lens(), Lens(type.lens_model, nominal), type.imager_px,
+      [](const Eigen::Vector2d&) { return 1.0; });
   if (difference) result.metrics.push_back({"nominal_difference_px", difference->worst_px});
   const auto& report = result.calibration.intrinsics_report;
   const auto [x_m, y_m] =
@@ -70,10 +70,10 @@ std::string describe_positions_problem(std::size_t known, std::size_t captures, 
 /// can be those of another camera. The operator has to repeat them.
 StepResult fail_if_inconsistent(const StationConfig& config, const std::vector<Frame>& frames,
                                 StepResult result) {
-  if (!result.ok()) return result;
+  if (!result.has_succeeded()) return result;
   std::string fault =
       describe_captures_with_large_residuals(frames, config.lamps, result.calibration);
-  if (!fault.empty()) result.set_failure(StepFailure::undetermined, std::move(fault));
+  if (!fault.empty()) result.set_step_failure(StepFailure::undetermined, std::move(fault));
   return result;
 }
 
@@ -105,7 +105,8 @@ void add_check_fractions(const LocateResult& located, const std::vector<Frame>& 
   for (std::size_t i = 0; i < frames.size(); ++i) {
     lamps += frames[i].detections.size();
     for (const Detection& detection : frames[i].detections) seen.insert(detection.lamp);
-    if (located.fixes[i].ok()) num_inliers += static_cast<std::size_t>(located.fixes[i].lamps);
+    if (located.fixes[i].has_succeeded())
+      num_inliers += static_cast<std::size_t>(located.fixes[i].lamps);
   }
   const auto ratio = [](std::size_t part, std::size_t whole) {
     return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
@@ -131,75 +132,82 @@ void add_position_error_metrics(const EvaluationInput& input, const Evaluation& 
 
 }  // namespace
 
-StepResult run_board_step(const StationConfig& config, const std::string& camera_id,
-                          Observations seen) {
+StepResult calibrate_lens_on_station(const StationConfig& config, const std::string& camera_id,
+                                     Observations seen) {
   LensInput input{std::move(seen), config.board, {}, config.type};
   input.camera.id = camera_id;
-  LensResult result = run_lens_step(std::move(input), {});
+  LensResult result = run_lens_calibration_step(std::move(input), {});
   result.skipped.clear();  // the station reports images itself
   if (result.failure == StepFailure::wrong_board)
     return add_step_name("wrong board", std::move(result));
-  if (result.ok()) add_nominal_differences(config.type, result);
+  if (result.has_succeeded()) add_nominal_differences(config.type, result);
   // A lens from images of two cameras fits neither of them. The operator has to remove the wrong
   // images.
-  if (result.ok() && !result.lens.inconsistent_views.empty()) {
-    result.set_failure(StepFailure::undetermined, result.lens.inconsistent_views);
+  if (result.has_succeeded() && !result.lens.inconsistent_views.empty()) {
+    result.set_step_failure(StepFailure::undetermined, result.lens.inconsistent_views);
   }
   return result;
 }
 
-StepResult run_rotation_step(const StationConfig& config, const Calibration& calibration,
-                             const std::vector<Frame>& frames) {
-  return add_step_name(
-      "the rotation in place",
-      fail_if_inconsistent(config, frames,
-                           run_rotation_step(make_lamp_captures(config, calibration, frames),
-                                             RotationMethod::axis, {})));
+StepResult calibrate_rotation_on_station(const StationConfig& config,
+                                         const Calibration& calibration,
+                                         const std::vector<Frame>& frames) {
+  return add_step_name("the rotation in place",
+                       fail_if_inconsistent(config, frames,
+                                            run_rotation_calibration_step(
+                                                make_lamp_captures(config, calibration, frames),
+                                                RotationMethod::axis, {})));
 }
 
-StepResult run_dispersion_step(const StationConfig& config, const Calibration& calibration,
-                               const std::vector<Frame>& frames, const CapturesTable& places) {
+StepResult calibrate_dispersion_on_station(const StationConfig& config,
+                                           const Calibration& calibration,
+                                           const std::vector<Frame>& frames,
+                                           const CapturesTable& places) {
   const KnownPositions known =
-      collect_reference_positions(frames, places, config.dispersion_position_m);
+      collect_captures_at_known_positions(frames, places, config.dispersion_position_m);
   std::string problem = describe_positions_problem(known.captures.size(), frames.size(),
                                                    config.sufficient.dispersion_captures);
   if (!problem.empty()) {
     StepResult result;
-    result.set_failure(StepFailure::wrong_place, std::move(problem));
+    result.set_step_failure(StepFailure::wrong_place, std::move(problem));
     return result;
   }
   return add_step_name(
       "the fixes at the station",
       fail_if_inconsistent(
           config, frames,
-          run_dispersion_step(make_lamp_captures(config, calibration, frames), known,
-                              DispersionMethod::camera, DispersionCircle::mean, {})));
+          run_dispersion_calibration_step(make_lamp_captures(config, calibration, frames), known,
+                                          DispersionMethod::camera, DispersionCircle::mean, {})));
 }
 
-StepResult run_check_step(const StationConfig& config, const Calibration& calibration,
-                          const std::vector<Frame>& frames, const CapturesTable& places) {
+StepResult check_position_accuracy_on_station(const StationConfig& config,
+                                              const Calibration& calibration,
+                                              const std::vector<Frame>& frames,
+                                              const CapturesTable& places) {
   StepResult result;
   KnownPoints known = select_known_points(frames, places);
   std::string problem = describe_positions_problem(known.frames.size(), frames.size(),
                                                    config.sufficient.check_captures);
   if (!problem.empty()) {
-    result.set_failure(StepFailure::wrong_place, std::move(problem));
+    result.set_step_failure(StepFailure::wrong_place, std::move(problem));
     return result;
   }
   result.calibration = calibration;
   const LocateResult located =
-      locate_camera_in_frames({known.frames, config.lamps, calibration, places});
+      locate_camera_from_frames({known.frames, config.lamps, calibration, places});
   add_check_fractions(located, known.frames, config.lamps, result);
   result.rejected_lamps = located.rejected_lamps;
   result.warnings = located.warnings;
   result.notes = located.notes;
-  if (!located.ok()) return result;
+  if (!located.has_succeeded()) return result;
   EvaluationInput input;
   input.fixes = {"check", located.rows};
   input.truth = {"check", std::move(known.truth)};
   input.station_m = compute_same_position_radius_m(calibration);
-  const EvaluateResult errors = evaluate_fixes(input, {});
-  result.drawing = [input, lamps = config.lamps] { return make_floor_plan_drawing(input, lamps); };
+  const EvaluateResult errors = evaluate_fixes_against_truth(input, {});
+  result.drawing = [input, lamps = config.lamps] {
+    return draw_fix_errors_on_floor_plan(input, lamps);
+  };
   add_position_error_metrics(input, errors.evaluation, result);
   if (const auto& typical = located.summary.typical; typical && typical->median_residual_px) {
     result.metrics.push_back({"check_residual_px", *typical->median_residual_px});

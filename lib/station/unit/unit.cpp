@@ -45,14 +45,14 @@ Unit::Unit(const StationConfig& config, std::string camera_id, ProgramVersion pr
 void Unit::reread_capture_tables(StationStep step) {
   if (step != StationStep::dispersion && step != StationStep::check) return;
   reprocess_images_of_step(step);
-  at(step).result.reset();
+  mutable_step_state(step).result.reset();
   reset_steps_after(step);
 }
 
 /// Processes the images again whose inclination changed. They are not counted again.
 void Unit::reprocess_images_of_step(StationStep step) {
-  const LevelRotations levels = find_level_rotations(step);
-  UnitStep& state = at(step);
+  const LevelRotations levels = find_level_rotations_of_images(step);
+  UnitStep& state = mutable_step_state(step);
   std::vector<fs::path> again;
   for (const auto& [name, image] : state.images) {
     if (!image.discarded && find_level_rotation(levels, name) != image.level)
@@ -61,50 +61,50 @@ void Unit::reprocess_images_of_step(StationStep step) {
   if (again.empty() || !calibration_before_step(step)) return;
   const int refused = state.num_rejected_in_batch;
   const bool used = state.is_any_used_in_batch;
-  process_files(step, again);
+  process_image_files(step, again);
   state.num_rejected_in_batch = refused;
   state.is_any_used_in_batch = used;
 }
 
-void Unit::solve_complete_steps(bool all_in) {
-  solve_steps(all_in);
-  row_time_ =
-      check_row_time(collect_lamp_observations(*this), config_.lamps, make_given_row_time(config_));
+void Unit::solve_completed_station_steps(bool all_in) {
+  solve_steps_in_order(all_in);
+  row_time_ = check_row_time_against_lamps(collect_lamp_observations(*this), config_.lamps,
+                                           make_configured_row_time(config_));
 }
 
-void Unit::solve_steps(bool all_in) {
+void Unit::solve_steps_in_order(bool all_in) {
   for (const StationStep step : kStationSteps) {
-    UnitStep& state = at(step);
+    UnitStep& state = mutable_step_state(step);
     if (!calibration_before_step(step)) return;
     const auto waiting = std::exchange(state.waiting, {});
     if (!waiting.empty()) {
-      process_files(step, waiting);
+      process_image_files(step, waiting);
       count_consecutive_rejections(step);
     }
-    if (state.result && (state.result->ok() || !all_in)) continue;
+    if (state.result && (state.result->has_succeeded() || !all_in)) continue;
     state.sufficient = has_sufficient_images(step);
     if (!state.sufficient && !all_in) return;
-    state.result = solve(step, all_in);
+    state.result = solve_station_step(step, all_in);
     state.picture = state.result->drawing ? render_plot_async(state.result->drawing) : StepPlot{};
-    if (!state.result->ok()) return;
+    if (!state.result->has_succeeded()) return;
   }
 }
 
 std::optional<Calibration> Unit::calibration_before_step(StationStep step) const {
   if (step == StationStep::boards) return Calibration{};
-  const UnitStep& before = steps_[index(step) - 1];
-  if (!before.result || !before.result->ok()) return std::nullopt;
+  const UnitStep& before = steps_[step_index(step) - 1];
+  if (!before.result || !before.result->has_succeeded()) return std::nullopt;
   return before.result->calibration;
 }
 
-std::optional<StationStep> Unit::current_step() const {
+std::optional<StationStep> Unit::first_incomplete_step() const {
   for (const StationStep step : kStationSteps) {
-    if (!this->step(step).is_done()) return step;
+    if (!this->step_state(step).is_step_solved()) return step;
   }
   return std::nullopt;
 }
 
-std::vector<ReportPlot> Unit::report_plots() const {
+std::vector<ReportPlot> Unit::collect_report_plots() const {
   std::vector<ReportPlot> pictures;
   for (const UnitStep& state : steps_) {
     if (!state.result || !state.picture.valid()) continue;
@@ -113,33 +113,35 @@ std::vector<ReportPlot> Unit::report_plots() const {
   return pictures;
 }
 
-bool Unit::cannot_pass_any_more() const {
-  const auto step = current_step();
+bool Unit::can_no_longer_pass() const {
+  const auto step = first_incomplete_step();
   if (!step) return false;
-  const UnitStep& state = this->step(*step);
+  const UnitStep& state = this->step_state(*step);
   if (state.num_consecutive_rejections >= config_.max_consecutive_rejections) return true;
-  const bool stuck = state.sufficient && state.result && !state.result->ok();
+  const bool stuck = state.sufficient && state.result && !state.result->has_succeeded();
   if (!stuck || *step == StationStep::boards) return false;
-  const auto frames = collect_frames(state);
-  return !describe_lamp_faults(frames, config_.lamps, *calibration_before_step(*step)).empty() ||
+  const auto frames = collect_frames_of_used_images(state);
+  return !describe_lamp_map_faults(frames, config_.lamps, *calibration_before_step(*step))
+              .empty() ||
          !describe_missing_lamps(frames, config_.lamps).empty();
 }
 
-void Unit::add(StationStep step, const std::vector<fs::path>& files, bool more_to_come) {
-  UnitStep& state = at(step);
+void Unit::add_step_images(StationStep step, const std::vector<fs::path>& files,
+                           bool more_to_come) {
+  UnitStep& state = mutable_step_state(step);
   if (files.empty()) return;
   state.folder = files.front().parent_path();
   if (!calibration_before_step(step)) {
     state.waiting.insert(state.waiting.end(), files.begin(), files.end());
     return;
   }
-  process_files(step, files);
+  process_image_files(step, files);
   if (!more_to_come) count_consecutive_rejections(step);
 }
 
 /// Updates the number of consecutive rejections after a batch.
 void Unit::count_consecutive_rejections(StationStep step) {
-  UnitStep& state = at(step);
+  UnitStep& state = mutable_step_state(step);
   const int refused = std::exchange(state.num_rejected_in_batch, 0);
   const bool used = std::exchange(state.is_any_used_in_batch, false);
   state.num_consecutive_rejections = used ? 0 : state.num_consecutive_rejections + refused;
@@ -147,21 +149,21 @@ void Unit::count_consecutive_rejections(StationStep step) {
 
 /// Returns the rotations of captures of known inclination. Those of the rotation step have none,
 /// because its axis is vertical.
-LevelRotations Unit::find_level_rotations(StationStep step) const {
+LevelRotations Unit::find_level_rotations_of_images(StationStep step) const {
   if (step != StationStep::dispersion && step != StationStep::check) return {};
   const auto calibration = calibration_before_step(step);
   if (!calibration) return {};
   try {
-    return compute_level_rotations(read_captures_csv_of_folder(this->step(step).folder),
-                                   *calibration, 0);
+    return compute_level_rotations_of_images(
+        read_captures_csv_of_folder(this->step_state(step).folder), *calibration, 0);
   } catch (const InputError&) {  // reported by the step
     return {};
   }
 }
 
-void Unit::process_files(StationStep step, const std::vector<fs::path>& files) {
+void Unit::process_image_files(StationStep step, const std::vector<fs::path>& files) {
   std::vector<UnitImage> images(files.size());
-  const LevelRotations levels = find_level_rotations(step);
+  const LevelRotations levels = find_level_rotations_of_images(step);
   std::optional<LampIntake> lamps;
   if (step != StationStep::boards) {
     lamps.emplace(
@@ -170,28 +172,28 @@ void Unit::process_files(StationStep step, const std::vector<fs::path>& files) {
   }
   process_images_in_parallel(files.size(), threads_, [&](std::size_t i) {
     images[i] = observe_unit_image(files[i], [&](const SourceImage& source) {
-      return lamps ? lamps->detect_in_image(source) : boards_.detect_in_image(source);
+      return lamps ? lamps->detect_lamps_in_image(source) : boards_.detect_board_in_image(source);
     });
-    images[i].level = find_level_rotation(levels, images[i].seen.file_name());
+    images[i].level = find_level_rotation(levels, images[i].seen.image_file_name());
   });
   for (UnitImage& image : images) {
     const ImageUser owner = owner_ && !image.sha256.empty() ? owner_(image.sha256) : ImageUser();
-    if (!owner.empty()) {
-      image.seen.set_rejection(RejectionReason::used_elsewhere,
-                               "already of " + describe_run_using_image(owner, config_.file));
+    if (!owner.has_no_run()) {
+      image.seen.set_image_rejection(RejectionReason::used_elsewhere,
+                                     "already of " + describe_run_using_image(owner, config_.file));
     }
-    at(step).last = image.seen.file_name();
-    add_image(step, std::move(image));
+    mutable_step_state(step).last = image.seen.image_file_name();
+    add_image_to_step(step, std::move(image));
   }
 }
 
-void Unit::add_image(StationStep step, UnitImage image) {
-  UnitStep& state = at(step);
-  const std::string name = image.seen.file_name();
-  forget_image(step, name);  // it was overwritten
-  if (image.is_used()) reject_redundant_image(step, image);
-  const bool used = image.is_used();
-  const bool fault = !used && !image.is_redundant() && !state.is_done();
+void Unit::add_image_to_step(StationStep step, UnitImage image) {
+  UnitStep& state = mutable_step_state(step);
+  const std::string name = image.seen.image_file_name();
+  remove_image_from_step(step, name);  // it was overwritten
+  if (image.is_image_used()) reject_image_if_redundant(step, image);
+  const bool used = image.is_image_used();
+  const bool fault = !used && !image.is_image_redundant() && !state.is_step_solved();
   state.num_rejected_in_batch += fault ? 1 : 0;
   state.is_any_used_in_batch = state.is_any_used_in_batch || used;
   state.images.emplace(name, std::move(image));
@@ -202,56 +204,57 @@ void Unit::add_image(StationStep step, UnitImage image) {
 
 /// Rejects an image without a fault that is redundant. It has the content of an image of any step,
 /// shows the same as an image of this step, or the step is complete.
-void Unit::reject_redundant_image(StationStep step, UnitImage& image) const {
+void Unit::reject_image_if_redundant(StationStep step, UnitImage& image) const {
   for (const UnitStep& any : steps_) {
     for (const UnitImage* other : list_used_images(any)) {
       if (image.sha256.empty() || other->sha256 != image.sha256) continue;
-      return image.seen.set_rejection(RejectionReason::same_image,
-                                      "is the same image as " + other->seen.file_name());
+      return image.seen.set_image_rejection(
+          RejectionReason::same_image, "is the same image as " + other->seen.image_file_name());
     }
   }
   Selection selection(find_image_use(step), config_.frontend);
-  for (const UnitImage* other : list_used_images(this->step(step))) selection.keep(other->seen);
-  selection.add(image.seen);
-  if (!image.is_used() || !this->step(step).is_done()) return;
-  image.seen.set_rejection(RejectionReason::not_needed, "not needed: the step has enough");
+  for (const UnitImage* other : list_used_images(this->step_state(step)))
+    selection.add_kept_image(other->seen);
+  selection.add_or_reject_image(image.seen);
+  if (!image.is_image_used() || !this->step_state(step).is_step_solved()) return;
+  image.seen.set_image_rejection(RejectionReason::not_needed, "not needed: the step has enough");
 }
 
 /// Removes an image and the results that depend on it. Images that were redundant because of it are
 /// used again.
-void Unit::forget_image(StationStep step, const std::string& name) {
-  UnitStep& state = at(step);
+void Unit::remove_image_from_step(StationStep step, const std::string& name) {
+  UnitStep& state = mutable_step_state(step);
   const auto image = state.images.find(name);
   if (image == state.images.end()) return;
-  const bool used = image->second.is_used();
+  const bool used = image->second.is_image_used();
   state.images.erase(image);
   if (!used) return;
   state.result.reset();
   reset_steps_after(step);
   std::vector<UnitImage> again;
   for (const auto& [other, known] : state.images) {
-    if (known.is_redundant()) again.push_back(known);
+    if (known.is_image_redundant()) again.push_back(known);
   }
-  std::erase_if(state.images, [](const auto& known) { return known.second.is_redundant(); });
+  std::erase_if(state.images, [](const auto& known) { return known.second.is_image_redundant(); });
   for (UnitImage& known : again) {
     known.seen.rejection.reset();
-    add_image(step, std::move(known));
+    add_image_to_step(step, std::move(known));
   }
 }
 
-void Unit::remove_file(StationStep step, const std::string& name) {
-  UnitStep& state = at(step);
+void Unit::remove_deleted_image(StationStep step, const std::string& name) {
+  UnitStep& state = mutable_step_state(step);
   std::erase_if(state.waiting, [&](const fs::path& file) { return file.filename() == name; });
   if (state.images.contains(name)) state.num_consecutive_rejections = 0;
-  forget_image(step, name);
+  remove_image_from_step(step, name);
 }
 
-void Unit::discard_image(StationStep step, const std::string& name) {
-  UnitStep& state = at(step);
+void Unit::mark_image_discarded(StationStep step, const std::string& name) {
+  UnitStep& state = mutable_step_state(step);
   const auto image = state.images.find(name);
-  if (image == state.images.end() || image->second.is_used()) return;
+  if (image == state.images.end() || image->second.is_image_used()) return;
   state.num_consecutive_rejections = 0;
-  if (image->second.is_redundant()) {
+  if (image->second.is_image_redundant()) {
     state.images.erase(image);
   } else {
     image->second.discarded = true;
@@ -262,7 +265,7 @@ void Unit::discard_image(StationStep step, const std::string& name) {
 void Unit::reset_steps_after(StationStep step) {
   for (const StationStep later : kStationSteps) {
     if (later <= step) continue;
-    UnitStep& state = at(later);
+    UnitStep& state = mutable_step_state(later);
     for (const auto& [name, image] : state.images) {
       if (!image.discarded) state.waiting.push_back(image.seen.file);
     }
@@ -273,15 +276,16 @@ void Unit::reset_steps_after(StationStep step) {
 }
 
 bool Unit::has_sufficient_images(StationStep step) const {
-  const UnitStep& state = this->step(step);
+  const UnitStep& state = this->step_state(step);
   const CompletionCriteria& sufficient = config_.sufficient;
   switch (step) {
     case StationStep::boards:
       return state.count_used_images() >= sufficient.board_views &&
-             compute_board_coverage(state, config_.type.imager_px).covered_fraction() >=
+             compute_board_coverage(state, config_.type.imager_px).covered_image_fraction() >=
                  sufficient.board_coverage;
     case StationStep::rotation:
-      return compute_yaw_coverage(collect_frames(state), config_, *calibration_before_step(step))
+      return compute_yaw_coverage(collect_frames_of_used_images(state), config_,
+                                  *calibration_before_step(step))
           .sufficient;
     case StationStep::dispersion:
       return state.count_used_images() >= sufficient.dispersion_captures;
@@ -291,80 +295,84 @@ bool Unit::has_sufficient_images(StationStep step) const {
   return false;
 }
 
-StepResult Unit::solve(StationStep step, bool all_in) const {
-  const UnitStep& state = this->step(step);
+StepResult Unit::solve_station_step(StationStep step, bool all_in) const {
+  const UnitStep& state = this->step_state(step);
   StepResult result;
   if (state.count_used_images() == 0) {
-    result.set_failure(StepFailure::undetermined, "no image can be used");
+    result.set_step_failure(StepFailure::undetermined, "no image can be used");
     return result;
   }
   const Calibration before = *calibration_before_step(step);
   try {
     switch (step) {
       case StationStep::boards:
-        result = run_board_step(config_, camera_id_, collect_observations(state));
+        result = calibrate_lens_on_station(config_, camera_id_, collect_step_observations(state));
         break;
       case StationStep::rotation:
-        result = run_rotation_step(config_, before, collect_frames(state));
+        result =
+            calibrate_rotation_on_station(config_, before, collect_frames_of_used_images(state));
         break;
       case StationStep::dispersion:
-        result = run_dispersion_step(config_, before, collect_frames(state),
-                                     read_captures_with_truth(state.folder));
+        result =
+            calibrate_dispersion_on_station(config_, before, collect_frames_of_used_images(state),
+                                            read_captures_with_truth(state.folder));
         break;
       case StationStep::check:
-        return run_check_step(config_, before, collect_frames(state),
-                              read_captures_with_truth(state.folder));
+        return check_position_accuracy_on_station(config_, before,
+                                                  collect_frames_of_used_images(state),
+                                                  read_captures_with_truth(state.folder));
     }
   } catch (const InputError& error) {  // the table may be incomplete
     if (all_in) throw;
-    result.set_failure(StepFailure::bad_input, error.what());
+    result.set_step_failure(StepFailure::bad_input, error.what());
     return result;
   }
-  if (result.ok()) {
+  if (result.has_succeeded()) {
     HistoryEntry& entry = result.calibration.history.back();
     const std::string part = entry.part;
-    entry = make_history_entry(step);
+    entry = make_step_history_entry(step);
     entry.part = part;
   }
   return result;
 }
 
-HistoryEntry Unit::make_history_entry(StationStep step) const {
+HistoryEntry Unit::make_step_history_entry(StationStep step) const {
   std::string digests;
-  for (const auto& [name, image] : this->step(step).images) {
-    if (image.is_used()) digests += fmt::format("{}  {}\n", image.sha256, name);
+  for (const auto& [name, image] : this->step_state(step).images) {
+    if (image.is_image_used()) digests += fmt::format("{}  {}\n", image.sha256, name);
   }
   return {"",
           program_.program,
           program_.version,
           "",
-          {{"station", config_.sha256}, {to_string(step), compute_text_sha256(digests)}}};
+          {{"station", config_.sha256}, {station_step_name(step), compute_text_sha256(digests)}}};
 }
 
 std::vector<Observation> collect_lamp_observations(const Unit& unit) {
   std::vector<Observation> images;
   for (const StationStep step : kStationSteps) {
     if (step == StationStep::boards) continue;
-    std::ranges::move(collect_observations(unit.step(step)).images, std::back_inserter(images));
+    std::ranges::move(collect_step_observations(unit.step_state(step)).images,
+                      std::back_inserter(images));
   }
   return images;
 }
 
-GivenRowTime make_given_row_time(const StationConfig& config) {
+GivenRowTime make_configured_row_time(const StationConfig& config) {
   return {config.type.row_time_s.value(), config.type_file};
 }
 
-std::optional<Calibration> Unit::calibration() const {
+std::optional<Calibration> Unit::latest_calibration() const {
   std::optional<Calibration> last;
   for (const UnitStep& state : steps_) {
-    if (state.result && state.result->ok()) last = state.result->calibration;
+    if (state.result && state.result->has_succeeded()) last = state.result->calibration;
   }
   return last;
 }
 
-std::vector<CheckedMetric> Unit::metrics() const {
+std::vector<CheckedMetric> Unit::collect_unit_metrics() const {
   std::vector<Metric> values;
-  if (const auto blur_px = compute_median_blur_px(step(StationStep::boards))) {
+  if (const auto blur_px = compute_median_blur_px(step_state(StationStep::boards))) {
     values.push_back({"blur_px", *blur_px});
   }
   for (const UnitStep& state : steps_) {
@@ -373,7 +381,7 @@ std::vector<CheckedMetric> Unit::metrics() const {
   }
   const auto row_time = make_row_time_metrics(row_time_);
   values.insert(values.end(), row_time.begin(), row_time.end());
-  return check_all_metrics(config_.gates, values, list_unit_metrics());
+  return check_all_metrics_against_gates(config_.gates, values, list_unit_metrics());
 }
 
 }  // namespace vlp

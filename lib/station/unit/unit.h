@@ -40,72 +40,72 @@ class Unit {
   /// images that arrive together is unknown, so their rejections count as consecutive only if none
   /// of them is used. `more_to_come` is true if the next call has more images that arrived with
   /// these.
-  void add(StationStep step, const std::vector<std::filesystem::path>& files,
-           bool more_to_come = false);
+  void add_step_images(StationStep step, const std::vector<std::filesystem::path>& files,
+                       bool more_to_come = false);
   /// Removes an image whose file was deleted. Images that are redundant only because of it are used
   /// instead.
-  void remove_file(StationStep step, const std::string& name);
+  void remove_deleted_image(StationStep step, const std::string& name);
   /// Marks the file of a rejected image as deleted. The rejection remains, but does not count as
   /// consecutive, because a moving camera blurs images. A redundant image is removed.
-  void discard_image(StationStep step, const std::string& name);
+  void mark_image_discarded(StationStep step, const std::string& name);
   /// Handles a change of the step's captures.csv or truth.csv.
   void reread_capture_tables(StationStep step);
   /// Solves the steps that are complete. If `all_in`, no more images arrive, and incomplete steps
   /// are solved, too. An unreadable captures.csv then throws InputError; otherwise it is the step's
   /// problem.
-  void solve_complete_steps(bool all_in);
+  void solve_completed_station_steps(bool all_in);
   /// Sets the function that finds another camera's run by the SHA-256 of an image. Such images are
   /// rejected.
-  void reject_images_of_other_cameras(std::function<ImageUser(const std::string& sha256)> owner) {
+  void set_image_owner_lookup(std::function<ImageUser(const std::string& sha256)> owner) {
     owner_ = std::move(owner);
   }
   /// Ends an incomplete unit: no more images arrive. `why` is human-readable, as "the operator
   /// ended the run".
-  void end_unit_early(std::string why) { ended_ = std::move(why); }
-  /// The reason given to end_unit_early(); empty if the unit was not ended early.
-  const std::string& ended() const { return ended_; }
+  void end_unit_before_completion(std::string why) { ended_ = std::move(why); }
+  /// The reason given to end_unit_before_completion(); empty if the unit was not ended early.
+  const std::string& early_end_reason() const { return ended_; }
 
   /// Makes the verdict of this unit not count, because of the station. `why`, human-readable,
   /// becomes the first of its causes; empty if the verdict counts.
   void invalidate_verdict(std::string why) { invalid_reason_ = std::move(why); }
-  const std::string& invalid_reason() const { return invalid_reason_; }
+  const std::string& invalid_verdict_reason() const { return invalid_reason_; }
 
-  const UnitStep& step(StationStep step) const { return steps_[index(step)]; }
+  const UnitStep& step_state(StationStep step) const { return steps_[step_index(step)]; }
   /// Returns the comparison of the type's row time with that of the lamps of all steps, as of the
-  /// last solve_complete_steps().
-  const RowTimeCheck& row_time() const { return row_time_; }
+  /// last solve_completed_station_steps().
+  const RowTimeCheck& row_time_check() const { return row_time_; }
   /// Returns the first step that is not completed; std::nullopt if all are.
-  std::optional<StationStep> current_step() const;
+  std::optional<StationStep> first_incomplete_step() const;
   /// Returns true if continuing is useless. A step then has too many consecutive rejected images,
   /// or it is complete but fails because of the lamps.
-  bool cannot_pass_any_more() const;
+  bool can_no_longer_pass() const;
 
   /// Returns the calibration of the last completed step; std::nullopt before the lens is known.
-  std::optional<Calibration> calibration() const;
+  std::optional<Calibration> latest_calibration() const;
   /// Returns all metrics, including those with gates.
-  std::vector<CheckedMetric> metrics() const;
+  std::vector<CheckedMetric> collect_unit_metrics() const;
   /// Returns the plots of lens, rotation center and dispersion for the report, of the solved steps.
   /// Waits for their rendering.
-  std::vector<ReportPlot> report_plots() const;
-  const StationConfig& config() const { return config_; }
+  std::vector<ReportPlot> collect_report_plots() const;
+  const StationConfig& station_config() const { return config_; }
   const std::string& camera_id() const { return camera_id_; }
 
  private:
-  static std::size_t index(StationStep step) { return static_cast<std::size_t>(step); }
-  UnitStep& at(StationStep step) { return steps_[index(step)]; }
-  void solve_steps(bool all_in);
-  void process_files(StationStep step, const std::vector<std::filesystem::path>& files);
-  LevelRotations find_level_rotations(StationStep step) const;
+  static std::size_t step_index(StationStep step) { return static_cast<std::size_t>(step); }
+  UnitStep& mutable_step_state(StationStep step) { return steps_[step_index(step)]; }
+  void solve_steps_in_order(bool all_in);
+  void process_image_files(StationStep step, const std::vector<std::filesystem::path>& files);
+  LevelRotations find_level_rotations_of_images(StationStep step) const;
   void reprocess_images_of_step(StationStep step);
-  void add_image(StationStep step, UnitImage image);
+  void add_image_to_step(StationStep step, UnitImage image);
   void count_consecutive_rejections(StationStep step);
-  void reject_redundant_image(StationStep step, UnitImage& image) const;
-  void forget_image(StationStep step, const std::string& name);
+  void reject_image_if_redundant(StationStep step, UnitImage& image) const;
+  void remove_image_from_step(StationStep step, const std::string& name);
   void reset_steps_after(StationStep step);
   bool has_sufficient_images(StationStep step) const;
-  StepResult solve(StationStep step, bool all_in) const;
+  StepResult solve_station_step(StationStep step, bool all_in) const;
   std::optional<Calibration> calibration_before_step(StationStep step) const;
-  HistoryEntry make_history_entry(StationStep step) const;
+  HistoryEntry make_step_history_entry(StationStep step) const;
 
   const StationConfig& config_;
   std::string camera_id_;
@@ -122,6 +122,6 @@ class Unit {
 std::vector<Observation> collect_lamp_observations(const Unit& unit);
 
 /// Returns the row time of the station's type of camera.
-GivenRowTime make_given_row_time(const StationConfig& config);
+GivenRowTime make_configured_row_time(const StationConfig& config);
 
 }  // namespace vlp

@@ -24,11 +24,13 @@ namespace {
 /// Steps whose images show lamps, in their order.
 constexpr std::array kLampSteps{StationStep::rotation, StationStep::dispersion, StationStep::check};
 
-void append(std::vector<Cause>& causes, std::vector<Cause> more) {
+void append_causes(std::vector<Cause>& causes, std::vector<Cause> more) {
   std::move(more.begin(), more.end(), std::back_inserter(causes));
 }
 
-bool is_solved(const UnitStep& state) { return state.result && state.result->ok(); }
+bool is_step_result_valid(const UnitStep& state) {
+  return state.result && state.result->has_succeeded();
+}
 
 /// Rejected images of an unfinished step.
 struct RejectionSummary {
@@ -46,7 +48,8 @@ int min_images_to_blame_camera(const StationConfig& config) {
 RejectionSummary summarize_refusals(const UnitStep& state, const StationConfig& config) {
   std::vector<Observation> rejected;
   for (const auto& [name, image] : state.images) {
-    if (image.is_used() || image.seen.rejection->reason == RejectionReason::not_needed) continue;
+    if (image.is_image_used() || image.seen.rejection->reason == RejectionReason::not_needed)
+      continue;
     rejected.push_back({image.seen.file});
     rejected.back().rejection = image.seen.rejection;
   }
@@ -61,25 +64,27 @@ RejectionSummary summarize_refusals(const UnitStep& state, const StationConfig& 
 
 /// Returns the reasons why a step did not finish.
 std::vector<Cause> find_step_problems(const Unit& unit, StationStep step) {
-  const UnitStep& state = unit.step(step);
-  if (state.is_done()) return {};
+  const UnitStep& state = unit.step_state(step);
+  if (state.is_step_solved()) return {};
   std::vector<Cause> causes;
-  const std::string count = format_count(unit, step);
-  const RejectionSummary refused = summarize_refusals(state, unit.config());
+  const std::string count = format_step_image_count(unit, step);
+  const RejectionSummary refused = summarize_refusals(state, unit.station_config());
   if (!refused.text.empty()) {
-    causes.push_back(
-        {fmt::format("{} ({}): {}", to_string(step), count, refused.text), refused.are_blurred});
+    causes.push_back({fmt::format("{} ({}): {}", station_step_name(step), count, refused.text),
+                      refused.are_blurred});
   }
-  const bool failed = state.result && !state.result->ok() && state.count_used_images() > 0;
-  if (failed) causes.push_back({fmt::format("{}: {}", to_string(step), state.result->why)});
+  const bool failed =
+      state.result && !state.result->has_succeeded() && state.count_used_images() > 0;
+  if (failed) causes.push_back({fmt::format("{}: {}", station_step_name(step), state.result->why)});
   const bool is_explained = failed || !refused.text.empty();
-  if (state.sufficient || (is_explained && unit.ended().empty())) return causes;
+  if (state.sufficient || (is_explained && unit.early_end_reason().empty())) return causes;
   // [STATION-16] `before there was`, `too much alike` | INVALID: step ended, or images refused, too
   //   early | repeat it
-  causes.push_back({unit.ended().empty() ? fmt::format("{}: too few images, or too much alike ({})",
-                                                       to_string(step), count)
-                                         : fmt::format("{}: {} before there was enough ({})",
-                                                       to_string(step), unit.ended(), count)});
+  causes.push_back({unit.early_end_reason().empty()
+                        ? fmt::format("{}: too few images, or too much alike ({})",
+                                      station_step_name(step), count)
+                        : fmt::format("{}: {} before there was enough ({})",
+                                      station_step_name(step), unit.early_end_reason(), count)});
   return causes;
 }
 
@@ -95,20 +100,23 @@ std::vector<Cause> describe_failures(const std::vector<CheckedMetric>& metrics, 
 }
 
 /// Returns true if a gate is not passed by a measured value.
-bool is_missed(const CheckedMetric& metric) { return metric.value && !metric.has_passed(); }
+bool is_gate_missed(const CheckedMetric& metric) {
+  return metric.value && !metric.has_passed_gate();
+}
 
 /// Returns the problems of a step and its failed gates, those of the station before those of the
 /// camera.
 std::vector<Cause> find_step_causes(const Unit& unit, StationStep step,
                                     const std::vector<CheckedMetric>& metrics) {
   std::vector<Cause> causes = find_step_problems(unit, step);
-  const UnitStep& state = unit.step(step);
-  if (!is_solved(state)) return causes;
+  const UnitStep& state = unit.step_state(step);
+  if (!is_step_result_valid(state)) return causes;
   for (const bool of_camera : {false, true}) {
-    append(causes, describe_failures(metrics, of_camera, [&](const CheckedMetric& metric) {
-             return find_metric_value(state.result->metrics, metric.name) && !metric.has_passed() &&
-                    find_metric_kind(metric.name)->of_camera == of_camera;
-           }));
+    append_causes(causes, describe_failures(metrics, of_camera, [&](const CheckedMetric& metric) {
+                    return find_metric_value(state.result->metrics, metric.name) &&
+                           !metric.has_passed_gate() &&
+                           find_metric_kind(metric.name)->of_camera == of_camera;
+                  }));
   }
   return causes;
 }
@@ -132,15 +140,15 @@ bool is_blur_known(const UnitStep& boards, const StationConfig& config) {
 /// Returns the causes visible in the board images: another board, blur, and faults of the lens.
 std::vector<Cause> find_board_causes(const Unit& unit, const std::vector<CheckedMetric>& metrics) {
   std::vector<Cause> causes;
-  const UnitStep& boards = unit.step(StationStep::boards);
+  const UnitStep& boards = unit.step_state(StationStep::boards);
   // [STATION-19] `wrong board:`
   if (is_other_board(boards)) causes.push_back({"wrong board: the tags have other ids"});
-  if (is_blur_known(boards, unit.config())) {
-    append(causes, describe_failures(metrics, true, [](const CheckedMetric& metric) {
-             return metric.name == "blur_px" && is_missed(metric);
-           }));
+  if (is_blur_known(boards, unit.station_config())) {
+    append_causes(causes, describe_failures(metrics, true, [](const CheckedMetric& metric) {
+                    return metric.name == "blur_px" && is_gate_missed(metric);
+                  }));
   }
-  append(causes, find_step_causes(unit, StationStep::boards, metrics));
+  append_causes(causes, find_step_causes(unit, StationStep::boards, metrics));
   return causes;
 }
 
@@ -150,30 +158,30 @@ std::vector<Cause> find_lamp_step_causes(const Unit& unit,
   std::vector<Cause> causes;
   StationStep before = StationStep::boards;
   for (const StationStep step : kLampSteps) {
-    if (!is_solved(unit.step(std::exchange(before, step)))) break;
-    append(causes, find_step_causes(unit, step, metrics));
+    if (!is_step_result_valid(unit.step_state(std::exchange(before, step)))) break;
+    append_causes(causes, find_step_causes(unit, step, metrics));
   }
   return causes;
 }
 
 /// Returns faults of the known points, of the images of the check, or of the camera in the check.
 std::vector<Cause> find_check_faults(const Unit& unit, const Calibration& calibration) {
-  const UnitStep& check = unit.step(StationStep::check);
-  if (!is_solved(check)) return {};
-  const LampMap& lamps = unit.config().lamps;
-  const CapturesWithPositions captures{collect_frames(check),
+  const UnitStep& check = unit.step_state(StationStep::check);
+  if (!is_step_result_valid(check)) return {};
+  const LampMap& lamps = unit.station_config().lamps;
+  const CapturesWithPositions captures{collect_frames_of_used_images(check),
                                        read_captures_with_truth(check.folder)};
   // A common offset is no fault of single captures; one that rotates is a fault of the camera.
   const auto offset =
       find_common_position_offset(captures.frames, lamps, calibration, captures.places);
-  if (offset && !offset->in_camera) return {{describe(*offset)}};
+  if (offset && !offset->in_camera) return {{describe_common_position_offset(*offset)}};
   if (!offset) {
     std::string fault =
         describe_wrong_reference_positions(captures.frames, lamps, calibration, captures.places);
     if (!fault.empty()) return {{std::move(fault)}};
   }
-  const UnitStep& dispersion = unit.step(StationStep::dispersion);
-  const CapturesWithPositions reference{collect_frames(dispersion),
+  const UnitStep& dispersion = unit.step_state(StationStep::dispersion);
+  const CapturesWithPositions reference{collect_frames_of_used_images(dispersion),
                                         read_captures_with_truth(dispersion.folder)};
   std::string other = describe_focal_length_difference(captures, reference, lamps, calibration);
   // Without an offset, residuals can be caused by a lens that is inaccurate near the corners.
@@ -183,32 +191,34 @@ std::vector<Cause> find_check_faults(const Unit& unit, const Calibration& calibr
   if (!other.empty()) {
     return {{"the images of check are of another camera: " + other + "; take them with this unit"}};
   }
-  if (offset) return {{describe(*offset), true}};
+  if (offset) return {{describe_common_position_offset(*offset), true}};
   return {};
 }
 
 /// Returns faults of the lamps and of the lens, from the captures of all steps. Without these,
 /// returns faults of the known points or of the camera in the check.
 std::vector<Cause> find_station_faults(const Unit& unit) {
-  const auto known = unit.calibration();
+  const auto known = unit.latest_calibration();
   if (!known) return {};
   // Tested first, because a wrong row time confuses or removes lamps.
   const Lens lens(known->camera.lens_model, known->camera.intrinsics);
   std::string row_time =
-      describe_other_row_time(collect_lamp_observations(unit), unit.config().lamps, lens,
-                              make_given_row_time(unit.config()));
+      describe_alternative_row_time(collect_lamp_observations(unit), unit.station_config().lamps,
+                                    lens, make_configured_row_time(unit.station_config()));
   if (!row_time.empty()) return {{std::move(row_time)}};
   std::vector<Frame> frames;
   for (const StationStep step : kLampSteps) {
-    for (Frame& frame : collect_frames(unit.step(step))) frames.push_back(std::move(frame));
+    for (Frame& frame : collect_frames_of_used_images(unit.step_state(step)))
+      frames.push_back(std::move(frame));
   }
   std::vector<Cause> causes;
-  for (const auto& faults : {describe_lamp_faults(frames, unit.config().lamps, *known),
-                             describe_missing_lamps(frames, unit.config().lamps)}) {
+  for (const auto& faults : {describe_lamp_map_faults(frames, unit.station_config().lamps, *known),
+                             describe_missing_lamps(frames, unit.station_config().lamps)}) {
     for (const std::string& fault : faults) causes.push_back({fault});
   }
   if (!causes.empty()) return causes;
-  if (std::string fault = describe_contradiction_to_lens(frames, unit.config().lamps, *known);
+  if (std::string fault =
+          describe_contradiction_to_calibrated_lens(frames, unit.station_config().lamps, *known);
       !fault.empty()) {
     return {{std::move(fault)}};
   }
@@ -217,26 +227,26 @@ std::vector<Cause> find_station_faults(const Unit& unit) {
 
 }  // namespace
 
-RunRecord make_unit_record(const Unit& unit, const std::string& run,
-                           const ProgramVersion& program) {
-  RunRecord record = make_run_record("unit", unit.config(), unit.camera_id(), run, program);
-  if (const auto calibration = unit.calibration()) {
+RunRecord make_unit_run_record(const Unit& unit, const std::string& run,
+                               const ProgramVersion& program) {
+  RunRecord record = make_run_record("unit", unit.station_config(), unit.camera_id(), run, program);
+  if (const auto calibration = unit.latest_calibration()) {
     record.calibration = format_calibration_yaml(*calibration);
   }
-  record.metrics = unit.metrics();
-  record.set_verdict(find_causes_of_failure(unit));
+  record.metrics = unit.collect_unit_metrics();
+  record.set_verdict_from_causes(find_causes_of_failure(unit));
   for (const StationStep step : kStationSteps) {
-    for (const auto& [name, image] : unit.step(step).images) {
-      std::string refused = image.refusal();
+    for (const auto& [name, image] : unit.step_state(step).images) {
+      std::string refused = image.rejection_message();
       if (image.discarded) refused.append(" (not kept)");
-      record.images.push_back({.step = to_string(step),
+      record.images.push_back({.step = station_step_name(step),
                                .name = name,
                                .sha256 = image.sha256,
                                .refused = std::move(refused)});
     }
-    for (const auto& file : unit.step(step).waiting) {
+    for (const auto& file : unit.step_state(step).waiting) {
       // [STATION-16] `not looked at:`
-      record.images.push_back({.step = to_string(step),
+      record.images.push_back({.step = station_step_name(step),
                                .name = file.filename().string(),
                                .sha256 = compute_file_sha256(file),
                                .refused = "not looked at: a step before is not done"});
@@ -245,8 +255,8 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run,
   return record;
 }
 
-void reject_reused_images(RunRecord& record, const std::string& earlier,
-                          const std::filesystem::path& station_file) {
+void invalidate_run_for_reused_images(RunRecord& record, const std::string& earlier,
+                                      const std::filesystem::path& station_file) {
   // [STATION-6] `no repetition` | images used in the stated run (INVALID and voided runs excepted)
   //   | new images, or void that run if its serial was wrong
   record.invalidate_verdict(fmt::format(
@@ -256,28 +266,29 @@ void reject_reused_images(RunRecord& record, const std::string& earlier,
 }
 
 std::vector<Cause> find_causes_of_failure(const Unit& unit) {
-  const std::vector<CheckedMetric> metrics = unit.metrics();
+  const std::vector<CheckedMetric> metrics = unit.collect_unit_metrics();
   const std::vector<Cause> board_causes = find_board_causes(unit, metrics);
   std::vector<Cause> lamp_causes = find_lamp_step_causes(unit, metrics);
-  if (!unit.current_step()) {
-    append(lamp_causes, describe_failures(metrics, false, [](const CheckedMetric& metric) {
-             return !metric.value;
-           }));
+  if (!unit.first_incomplete_step()) {
+    append_causes(lamp_causes, describe_failures(metrics, false, [](const CheckedMetric& metric) {
+                    return !metric.value;
+                  }));
   }
 
   std::vector<Cause> causes;
-  if (!unit.invalid_reason().empty()) causes.push_back({unit.invalid_reason()});
-  append(causes, board_causes);  // before faults of the lamps: the lens was measured without them
-  if (std::string error = unit.row_time().error; !error.empty()) {
+  if (!unit.invalid_verdict_reason().empty()) causes.push_back({unit.invalid_verdict_reason()});
+  append_causes(causes,
+                board_causes);  // before faults of the lamps: the lens was measured without them
+  if (std::string error = unit.row_time_check().error; !error.empty()) {
     causes.push_back({std::move(error)});
   } else if (!board_causes.empty() || !lamp_causes.empty()) {
-    append(causes, find_station_faults(unit));
+    append_causes(causes, find_station_faults(unit));
   }
-  append(causes, std::move(lamp_causes));
+  append_causes(causes, std::move(lamp_causes));
   // Gates of make_row_time_metrics(), which refer to all steps together.
-  append(causes, describe_failures(metrics, false, [](const CheckedMetric& metric) {
-           return metric.name.starts_with("row_time_") && is_missed(metric);
-         }));
+  append_causes(causes, describe_failures(metrics, false, [](const CheckedMetric& metric) {
+                  return metric.name.starts_with("row_time_") && is_gate_missed(metric);
+                }));
   return causes;
 }
 

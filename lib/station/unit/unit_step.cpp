@@ -24,26 +24,26 @@ UnitImage observe_unit_image(const std::filesystem::path& file,
     image.seen = observe(SourceImage(file));
   } catch (const InputError&) {
     image.seen = {file};
-    image.seen.set_rejection(RejectionReason::unreadable, "cannot be read as an image");
+    image.seen.set_image_rejection(RejectionReason::unreadable, "cannot be read as an image");
   }
   return image;
 }
 
 int UnitStep::count_used_images() const {
-  return static_cast<int>(
-      std::ranges::count_if(images, [](const auto& entry) { return entry.second.is_used(); }));
+  return static_cast<int>(std::ranges::count_if(
+      images, [](const auto& entry) { return entry.second.is_image_used(); }));
 }
 
-Observations collect_observations(const UnitStep& step) {
+Observations collect_step_observations(const UnitStep& step) {
   Observations seen;
   for (const auto& [name, image] : step.images) seen.images.push_back(image.seen);
   return seen;
 }
 
-std::vector<Frame> collect_frames(const UnitStep& step) {
+std::vector<Frame> collect_frames_of_used_images(const UnitStep& step) {
   std::vector<Frame> frames;
   for (const UnitImage* image : list_used_images(step)) {
-    frames.push_back({image->seen.file_name(), collect_identified_lamps(image->seen)});
+    frames.push_back({image->seen.image_file_name(), collect_identified_lamps(image->seen)});
   }
   return frames;
 }
@@ -51,7 +51,7 @@ std::vector<Frame> collect_frames(const UnitStep& step) {
 std::vector<const UnitImage*> list_used_images(const UnitStep& step) {
   std::vector<const UnitImage*> used;
   for (const auto& [name, image] : step.images) {
-    if (image.is_used()) used.push_back(&image);
+    if (image.is_image_used()) used.push_back(&image);
   }
   return used;
 }
@@ -61,7 +61,7 @@ ImageCoverage compute_board_coverage(const UnitStep& step, const std::array<int,
   for (const UnitImage* image : list_used_images(step)) {
     if (!image->seen.board) continue;
     for (const PointDetection& corner : collect_detected_corners(image->seen.board->seen))
-      coverage.add(corner.pixel);
+      coverage.add_corner_pixel(corner.pixel);
   }
   return coverage;
 }
@@ -85,8 +85,8 @@ std::vector<LocatedFrame> locate_camera_in_frames(const std::vector<Frame>& fram
   for (const Lamp& lamp : config.lamps.lamps) ceiling_m = std::max(ceiling_m, lamp.position_m.z());
   std::vector<LocatedFrame> located;
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    const Fix fix = positioner.locate(frames[i].detections);
-    if (!fix.ok()) continue;
+    const Fix fix = positioner.compute_position_fix(frames[i].detections);
+    if (!fix.has_succeeded()) continue;
     const auto& pose = fix.estimate.pose;
     located.push_back({pose.position_m.z(), ceiling_m - pose.position_m.z(), pose.yaw_rad, i});
   }
@@ -132,7 +132,7 @@ YawCoverage compute_yaw_coverage(const std::vector<Frame>& frames, const Station
 std::optional<double> compute_median_blur_px(const UnitStep& boards) {
   std::vector<double> blurs_px;
   for (const auto& [name, image] : boards.images) {
-    const bool counts = image.is_used() || !boards.sufficient;
+    const bool counts = image.is_image_used() || !boards.sufficient;
     if (counts && image.seen.blur_px) blurs_px.push_back(*image.seen.blur_px);
   }
   if (blurs_px.empty()) return std::nullopt;
@@ -142,7 +142,7 @@ std::optional<double> compute_median_blur_px(const UnitStep& boards) {
 StepPlot render_plot_async(std::function<Drawing()> drawing) {
   const auto draw = [drawing = std::move(drawing)]() -> std::optional<ReportPlot> {
     try {
-      return make_report_plot(drawing());
+      return render_report_plot(drawing());
     } catch (const InputError&) {  // no gnuplot: a report without it is better than none
       return std::nullopt;
     }

@@ -29,7 +29,7 @@ enum class StationStep { boards, rotation, dispersion, check };
 inline constexpr std::array kStationSteps{StationStep::boards, StationStep::rotation,
                                           StationStep::dispersion, StationStep::check};
 
-constexpr const char* to_string(StationStep step) {
+constexpr const char* station_step_name(StationStep step) {
   constexpr std::array names{"boards", "rotation", "dispersion", "check"};
   return names[static_cast<std::size_t>(step)];
 }
@@ -51,11 +51,13 @@ struct UnitImage {
   /// Rotation level_from_camera with which the lamps were detected; zero for the calibrated one.
   Eigen::Matrix3d level = Eigen::Matrix3d::Zero();
 
-  bool is_used() const { return seen.is_kept(); }
+  bool is_image_used() const { return seen.is_image_kept(); }
   /// Returns true for an image without a fault that is redundant because of others.
-  bool is_redundant() const { return !is_used() && vlp::is_redundant(seen.rejection->reason); }
+  bool is_image_redundant() const {
+    return !is_image_used() && vlp::is_redundancy_rejection(seen.rejection->reason);
+  }
   /// Reason for the rejection, in one line; empty if the image is used.
-  std::string refusal() const { return is_used() ? "" : seen.rejection->message; }
+  std::string rejection_message() const { return is_image_used() ? "" : seen.rejection->message; }
 };
 
 /// Observes an image file by `observe`, the intake of a step. A file that cannot be read is
@@ -85,14 +87,14 @@ struct UnitStep {
   /// Name of the last image that was processed.
   std::string last = {};
 
-  bool is_done() const { return sufficient && result && result->ok(); }
+  bool is_step_solved() const { return sufficient && result && result->has_succeeded(); }
   int count_used_images() const;
 };
 
 /// Returns the observations of the images, by name.
-Observations collect_observations(const UnitStep& step);
+Observations collect_step_observations(const UnitStep& step);
 /// Returns the frames of the images that are used, by name.
-std::vector<Frame> collect_frames(const UnitStep& step);
+std::vector<Frame> collect_frames_of_used_images(const UnitStep& step);
 /// Returns the images that are used, by name.
 std::vector<const UnitImage*> list_used_images(const UnitStep& step);
 

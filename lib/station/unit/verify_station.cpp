@@ -32,23 +32,28 @@ class Verification {
     config_.type = golden_.calibration.camera;
   }
 
-  void boards() {
+  void check_golden_boards() {
     const BoardIntake intake(config_.board, config_.frontend, config_.type.imager_px);
-    const UnitStep step = observe_folder(folder_ / "boards", ImageUse::boards, intake);
+    const UnitStep step = observe_folder(
+        folder_ / "boards", ImageUse::boards,
+        [&](const SourceImage& image) { return intake.detect_board_in_image(image); });
     if (step.count_used_images() > 0)
-      add("boards", run_board_step(config_, golden_.camera_id, collect_observations(step)));
+      add_step_result("boards", calibrate_lens_on_station(config_, golden_.camera_id,
+                                                          collect_step_observations(step)));
     add_images(StationStep::boards, step);
   }
 
-  void lamps(StationStep station_step) {
-    const fs::path folder = folder_ / to_string(station_step);
-    const LampIntake intake(
-        LightDetector(config_.lamps, make_detector_camera(golden_.calibration)), ImageUse::places,
-        config_.frontend, config_.type.imager_px,
-        compute_level_rotations(read_captures_csv_of_folder(folder), golden_.calibration, 0));
-    const UnitStep step = observe_folder(folder, ImageUse::places, intake);
-    std::ranges::move(collect_observations(step).images, std::back_inserter(lamp_images_));
-    const auto frames = collect_frames(step);
+  void check_golden_lamp_captures(StationStep station_step) {
+    const fs::path folder = folder_ / station_step_name(station_step);
+    const LampIntake intake(LightDetector(config_.lamps, make_detector_camera(golden_.calibration)),
+                            ImageUse::places, config_.frontend, config_.type.imager_px,
+                            compute_level_rotations_of_images(read_captures_csv_of_folder(folder),
+                                                              golden_.calibration, 0));
+    const UnitStep step = observe_folder(folder, ImageUse::places, [&](const SourceImage& image) {
+      return intake.detect_lamps_in_image(image);
+    });
+    std::ranges::move(collect_step_observations(step).images, std::back_inserter(lamp_images_));
+    const auto frames = collect_frames_of_used_images(step);
     frames_.insert(frames_.end(), frames.begin(), frames.end());
     const auto places = read_captures_with_truth(step.folder);
     if (station_step == StationStep::check) {
@@ -57,32 +62,33 @@ class Verification {
       place_fault_ =
           describe_wrong_reference_positions(frames, config_.lamps, golden_.calibration, places);
     }
-    add(to_string(station_step),
+    add_step_result(
+        station_step_name(station_step),
         station_step == StationStep::check
-            ? run_check_step(config_, golden_.calibration, frames, places)
-            : run_dispersion_step(config_, golden_.calibration, frames, places));
+            ? check_position_accuracy_on_station(config_, golden_.calibration, frames, places)
+            : calibrate_dispersion_on_station(config_, golden_.calibration, frames, places));
     add_images(station_step, step);
   }
 
   RunRecord make_verification_record(const std::string& run, const ProgramVersion& program) {
     const GivenRowTime stated{*config_.type.row_time_s, "the calibration of the golden unit"};
-    const RowTimeCheck row_time = check_row_time(lamp_images_, config_.lamps, stated);
+    const RowTimeCheck row_time = check_row_time_against_lamps(lamp_images_, config_.lamps, stated);
     for (const Metric& metric : make_row_time_metrics(row_time)) values_.push_back(metric);
     RunRecord record = make_run_record("golden", config_, golden_.camera_id, run, program);
-    record.metrics = check_all_metrics(golden_.gates, values_, list_unit_metrics());
+    record.metrics = check_all_metrics_against_gates(golden_.gates, values_, list_unit_metrics());
     record.images = images_;
     for (const CheckedMetric& metric : record.metrics) {
       // The station is under test, and fails by its metrics.
-      if (!metric.has_passed())
+      if (!metric.has_passed_gate())
         causes_.push_back({describe_failed_gate(metric), metric.value.has_value()});
     }
     std::vector<Cause> causes = find_station_causes(row_time, stated);
     causes.insert(causes.end(), causes_.begin(), causes_.end());
-    record.set_verdict(std::move(causes));
+    record.set_verdict_from_causes(std::move(causes));
     return record;
   }
 
-  std::vector<ReportPlot> report_plots() const {
+  std::vector<ReportPlot> collect_report_plots() const {
     std::vector<ReportPlot> pictures;
     for (const StepPlot& plot : plots_) {
       if (const auto& picture = plot.get()) pictures.push_back(*picture);
@@ -96,12 +102,13 @@ class Verification {
     std::string row_time_error = row_time.error;
     if (row_time_error.empty() && !causes_.empty()) {
       const Camera& camera = golden_.calibration.camera;
-      row_time_error = describe_other_row_time(lamp_images_, config_.lamps,
-                                               Lens(camera.lens_model, camera.intrinsics), stated);
+      row_time_error = describe_alternative_row_time(
+          lamp_images_, config_.lamps, Lens(camera.lens_model, camera.intrinsics), stated);
     }
     // Independent of the gates: this camera is known.
     constexpr double min_offset_px = 0.6;
-    auto faults = describe_lamp_faults(frames_, config_.lamps, golden_.calibration, min_offset_px);
+    auto faults =
+        describe_lamp_map_faults(frames_, config_.lamps, golden_.calibration, min_offset_px);
     if (!causes_.empty()) {
       // If all gates pass, they decide whether all lamps must be detected.
       std::ranges::move(describe_missing_lamps(frames_, config_.lamps), std::back_inserter(faults));
@@ -111,7 +118,7 @@ class Verification {
     for (const std::string& fault : faults) causes.push_back({fault, true});
     if (!faults.empty()) return causes;
     if (common_offset_ && !causes_.empty()) {
-      causes.push_back({describe(*common_offset_), true});
+      causes.push_back({describe_common_position_offset(*common_offset_), true});
     } else if (!place_fault_.empty()) {
       causes.push_back({place_fault_, false});
     }
@@ -119,26 +126,25 @@ class Verification {
   }
 
   /// Observes the images of a folder and rejects the repeated ones.
-  template <typename Intake>
-  UnitStep observe_folder(const fs::path& folder, ImageUse use, const Intake& intake) const {
+  template <typename Detect>
+  UnitStep observe_folder(const fs::path& folder, ImageUse use, const Detect& detect) const {
     const auto files = list_images(folder);
     std::vector<UnitImage> images(files.size());
     process_images_in_parallel(files.size(), threads_, [&](std::size_t i) {
-      images[i] = observe_unit_image(
-          files[i], [&](const SourceImage& image) { return intake.detect_in_image(image); });
+      images[i] = observe_unit_image(files[i], detect);
     });
     UnitStep step;
     step.folder = folder;
     Selection selection(use, config_.frontend);
     for (UnitImage& image : images) {
-      selection.add(image.seen);
-      std::string name = image.seen.file_name();
+      selection.add_or_reject_image(image.seen);
+      std::string name = image.seen.image_file_name();
       step.images.emplace(std::move(name), std::move(image));
     }
     return step;
   }
-  void add(const char* step, const StepResult& result) {
-    if (!result.ok()) {
+  void add_step_result(const char* step, const StepResult& result) {
+    if (!result.has_succeeded()) {
       const bool is_station_fault =
           result.failure == StepFailure::wrong_board || result.failure == StepFailure::wrong_map;
       causes_.push_back({fmt::format("{}: {}", step, result.why), is_station_fault});
@@ -148,10 +154,10 @@ class Verification {
   }
   void add_images(StationStep station_step, const UnitStep& step) {
     for (const auto& [name, image] : step.images) {
-      images_.push_back({.step = to_string(station_step),
+      images_.push_back({.step = station_step_name(station_step),
                          .name = name,
                          .sha256 = image.sha256,
-                         .refused = image.refusal()});
+                         .refused = image.rejection_message()});
     }
   }
 
@@ -172,17 +178,18 @@ class Verification {
 
 }  // namespace
 
-VerificationResult verify_station(const StationConfig& config, const fs::path& folder,
-                                  const std::string& run, const ProgramVersion& program,
-                                  int threads) {
+VerificationResult verify_station_from_golden_images(const StationConfig& config,
+                                                     const fs::path& folder, const std::string& run,
+                                                     const ProgramVersion& program, int threads) {
   Verification verification(config, folder, threads);
-  if (fs::is_directory(folder / "boards")) verification.boards();
-  if (fs::is_directory(folder / "dispersion")) verification.lamps(StationStep::dispersion);
-  verification.lamps(StationStep::check);
-  return {verification.make_verification_record(run, program), verification.report_plots()};
+  if (fs::is_directory(folder / "boards")) verification.check_golden_boards();
+  if (fs::is_directory(folder / "dispersion"))
+    verification.check_golden_lamp_captures(StationStep::dispersion);
+  verification.check_golden_lamp_captures(StationStep::check);
+  return {verification.make_verification_record(run, program), verification.collect_report_plots()};
 }
 
-void invalidate_if_images_were_used(
+void invalidate_run_if_images_reused(
     RunRecord& record,
     const std::function<std::string(const std::string& sha256)>& find_golden_run_using_image) {
   for (const RunRecord::Image& image : record.images) {

@@ -35,22 +35,23 @@ std::string make_table_state(const fs::path& folder) {
 }
 
 SharedFolder open_captures(const fs::path& captures, const std::string& camera) {
-  make_folder(captures);
-  return SharedFolder(captures).make_subfolder({camera, captures, "camera"});
+  create_station_folder(captures);
+  return SharedFolder(captures).open_or_create_subfolder({camera, captures, "camera"});
 }
 
 }  // namespace
 
 WatchedRun::WatchedRun(Unit& unit, Spool& spool)
     : unit_(unit),
-      folder_(unit.config().captures / unit.camera_id()),
-      files_(open_captures(unit.config().captures, unit.camera_id())) {
-  begin(spool);
+      folder_(unit.station_config().captures / unit.camera_id()),
+      files_(open_captures(unit.station_config().captures, unit.camera_id())) {
+  start_or_continue_run(spool);
   if (finished_) return;
   steps_.reserve(kStationSteps.size());
   for (const StationStep step : kStationSteps) {
-    SharedFolder folder = files_.make_subfolder({to_string(step), folder_, "step"});
-    const fs::path path = folder.path();
+    SharedFolder folder =
+        files_.open_or_create_subfolder({station_step_name(step), folder_, "step"});
+    const fs::path path = folder.folder_path();
     steps_.push_back({std::move(folder), WatchedFolder(path)});
   }
 }
@@ -62,7 +63,7 @@ WatchedRun::~WatchedRun() {
 /// Reads the run id from `.run`. Returns true if the run is stored.
 bool WatchedRun::read_run_state() {
   constexpr std::size_t max_bytes = 100;
-  const auto state = files_.read(kState, max_bytes);
+  const auto state = files_.read_file_if_exists(kState, max_bytes);
   if (!state) return false;
   run_ = state->substr(0, state->find('\n'));
   if (!is_run_id(run_)) {
@@ -72,9 +73,9 @@ bool WatchedRun::read_run_state() {
   return state->ends_with(fmt::format("\n{}\n", kKept));
 }
 
-void WatchedRun::begin(Spool& spool) {
+void WatchedRun::start_or_continue_run(Spool& spool) {
   constexpr const char* lock = ".lock";
-  lock_ = files_.open(lock, O_CREAT | O_RDWR);
+  lock_ = files_.open_regular_file(lock, O_CREAT | O_RDWR);
   if (lock_ < 0) throw InputError(folder_ / lock, "cannot be written");
   if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
     throw InputError(folder_, "another vlp-station works on this camera");
@@ -82,10 +83,10 @@ void WatchedRun::begin(Spool& spool) {
   const bool is_stored = read_run_state();
   if (run_.empty()) {
     run_ = make_run_id();
-    files_.replace_file(kState, run_ + "\n");
+    files_.replace_file_atomically(kState, run_ + "\n");
     return;
   }
-  finished_ = spool.find(run_);
+  finished_ = spool.find_run_by_id(run_);
   if (finished_ && finished_->camera != unit_.camera_id()) {
     throw InputError(folder_ / kState,
                      fmt::format("names run {} of camera {}: remove it, then its images are of a "
@@ -101,16 +102,16 @@ void WatchedRun::begin(Spool& spool) {
                                                                  : spool.last_offline_reason()));
   }
   if (!finished_) return;  // the run continues
-  publish_run(*finished_, {}, unit_.config().results);
-  rename_finished_folder();
+  publish_run_files(*finished_, {}, unit_.config().results);
+  rename_finished_run_folder();
 }
 
-std::vector<WatchedRun::Arrival> WatchedRun::poll_folder_changes(std::size_t max_images) {
+std::vector<WatchedRun::Arrival> WatchedRun::process_folder_changes(std::size_t max_images) {
   std::vector<Arrival> arrivals;
   bool reread = false;
   for (const StationStep step : kStationSteps) {
     auto& [folder, images, waiting, known_tables] = steps_[static_cast<std::size_t>(step)];
-    std::string tables = make_table_state(images.folder());
+    std::string tables = make_table_state(images.watched_folder());
     if (tables != known_tables) {
       known_tables = std::move(tables);
       unit_.reread_capture_tables(step);
@@ -119,7 +120,7 @@ std::vector<WatchedRun::Arrival> WatchedRun::poll_folder_changes(std::size_t max
     const auto changes = images.poll_folder_changes();
     for (const std::string& name : changes.gone) {
       std::erase_if(waiting, [&](const fs::path& file) { return file.filename() == name; });
-      unit_.remove_file(step, name);
+      unit_.remove_deleted_image(step, name);
       arrivals.push_back({step, name, true});
     }
     waiting.insert(waiting.end(), changes.added.begin(), changes.added.end());
@@ -128,33 +129,33 @@ std::vector<WatchedRun::Arrival> WatchedRun::poll_folder_changes(std::size_t max
     const std::vector<fs::path> now(waiting.begin(), end);
     waiting.erase(waiting.begin(), end);
     max_images -= now.size();
-    unit_.add(step, now, !waiting.empty());
+    unit_.add_step_images(step, now, !waiting.empty());
     for (const fs::path& file : now) arrivals.push_back({step, file.filename().string(), false});
   }
-  if (!arrivals.empty() || reread) unit_.solve_complete_steps(false);
+  if (!arrivals.empty() || reread) unit_.solve_completed_station_steps(false);
   return arrivals;
 }
 
 void WatchedRun::mark_run_stored() const {
   try {
-    files_.replace_file(kState, fmt::format("{}\n{}\n", run_, kKept));
-  } catch (
-      const InputError&) {  // rename_finished_folder() reports it; records reject a second verdict
+    files_.replace_file_atomically(kState, fmt::format("{}\n{}\n", run_, kKept));
+  } catch (const InputError&) {  // rename_finished_run_folder() reports it; records reject a second
+                                 // verdict
   }
 }
 
-void WatchedRun::discard_image(StationStep step, const std::string& image) {
+void WatchedRun::delete_rejected_image_file(StationStep step, const std::string& image) {
   step_folder(step).remove_file(image);
-  steps_[static_cast<std::size_t>(step)].images.ignore_removed_file(image);
-  unit_.discard_image(step, image);
+  steps_[static_cast<std::size_t>(step)].images.ignore_removal_of_file(image);
+  unit_.mark_image_discarded(step, image);
 }
 
-void WatchedRun::rename_finished_folder() const {
+void WatchedRun::rename_finished_run_folder() const {
   files_.check_folder_not_replaced();
-  vlp::rename_finished_folder(folder_, run_);
+  vlp::rename_finished_run_folder(folder_, run_);
 }
 
-void rename_finished_folder(const fs::path& folder, const std::string& run) {
+void rename_finished_run_folder(const fs::path& folder, const std::string& run) {
   const fs::path kept = folder.string() + "." + run;
   std::error_code error;
   fs::rename(folder, kept, error);

@@ -33,9 +33,9 @@ class WatchedFolder {
   /// a dot, which are incomplete files.
   Changes poll_folder_changes();
   /// Ignores the removal of a file that the caller is about to delete.
-  void ignore_removed_file(const std::string& name) { files_.erase(name); }
+  void ignore_removal_of_file(const std::string& name) { files_.erase(name); }
 
-  const std::filesystem::path& folder() const { return folder_; }
+  const std::filesystem::path& watched_folder() const { return folder_; }
 
  private:
   struct File {
@@ -49,7 +49,7 @@ class WatchedFolder {
 
 /// Renames the folder of a finished run, CAPTURES/CAMERA, to CAPTURES/CAMERA.RUN, with its images.
 /// Throws InputError.
-void rename_finished_folder(const std::filesystem::path& folder, const std::string& run);
+void rename_finished_run_folder(const std::filesystem::path& folder, const std::string& run);
 
 /// Run of a unit whose images arrive in CAPTURES/CAMERA/STEP/. One program at a time processes a
 /// camera.
@@ -72,7 +72,7 @@ class WatchedRun {
 
   /// Returns the record of a run whose program was killed after the verdict. The run is already
   /// published and moved away, and no images are left to process.
-  const std::optional<RunRecord>& finished_record() const { return finished_; }
+  const std::optional<RunRecord>& finished_run_record() const { return finished_; }
 
   struct Arrival {
     StationStep step;
@@ -81,23 +81,23 @@ class WatchedRun {
   };
   /// Processes changes, at most `max_images` images, and solves the steps that are complete.
   /// Returns the changes.
-  std::vector<Arrival> poll_folder_changes(std::size_t max_images);
+  std::vector<Arrival> process_folder_changes(std::size_t max_images);
 
-  /// Deletes the file of a rejected image; its rejection remains (Unit::discard_image()). Throws
-  /// InputError if it cannot be deleted.
-  void discard_image(StationStep step, const std::string& image);
+  /// Deletes the file of a rejected image; its rejection remains (Unit::mark_image_discarded()).
+  /// Throws InputError if it cannot be deleted.
+  void delete_rejected_image_file(StationStep step, const std::string& image);
 
-  const std::string& run() const { return run_; }
-  const std::filesystem::path& folder() const { return folder_; }
+  const std::string& run_id() const { return run_; }
+  const std::filesystem::path& run_folder() const { return folder_; }
   const SharedFolder& step_folder(StationStep step) const {
     return steps_[static_cast<std::size_t>(step)].folder;
   }
 
   /// Marks the run as stored. It is not judged again afterwards, even if the records are offline.
   void mark_run_stored() const;
-  /// Renames the folder by rename_finished_folder(). Throws InputError also if its path leads
+  /// Renames the folder by rename_finished_run_folder(). Throws InputError also if its path leads
   /// elsewhere by now.
-  void rename_finished_folder() const;
+  void rename_finished_run_folder() const;
 
  private:
   struct Step {
@@ -108,7 +108,7 @@ class WatchedRun {
     /// State of the tables of the captures' positions.
     std::string tables = {};
   };
-  void begin(Spool& spool);
+  void start_or_continue_run(Spool& spool);
   bool read_run_state();
 
   Unit& unit_;

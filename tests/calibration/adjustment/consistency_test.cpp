@@ -40,7 +40,7 @@ Unit calibrated(Survey& survey, const Case& the, Random& random) {
   }
   survey.add_noise(random, true, true, true);
   const AdjustmentResult found = run_bundle_adjustment(survey.input);
-  EXPECT_TRUE(found.ok()) << found.undetermined;
+  EXPECT_TRUE(found.has_succeeded()) << found.undetermined;
   const LampMap map = the.refined ? found.refined : survey.input.lamps;
   Adjustment adjustment{{},
                         the.refined ? found.refined_covariance : found.surveyed_covariance,
@@ -51,10 +51,10 @@ Unit calibrated(Survey& survey, const Case& the, Random& random) {
   for (const Lamp& lamp : map.lamps) adjustment.lamps.push_back({lamp.id, lamp.position_m});
   Calibration result = calibration;
   result.camera = found.camera;
-  return {with_adjustment(result, found.center, adjustment, {}), map};
+  return {add_adjustment_to_calibration(result, found.center, adjustment, {}), map};
 }
 
-TEST_P(RunBundleAdjustmentCovariance, YieldsConsistentFixCovariances) {
+TEST_P(RunBundleAdjustmentCovariance, FixCovarianceMatchesFixErrorsAfterAdjustment) {
   const Case& the = GetParam();
   constexpr int trials = 200;
   Random random(20 + static_cast<std::uint64_t>(the.places));
@@ -72,9 +72,9 @@ TEST_P(RunBundleAdjustmentCovariance, YieldsConsistentFixCovariances) {
       const double z_m = random.uniform(0, 0.3), yaw_rad = random.uniform(-3, 3);
       survey.truth.camera = {{x_m, y_m, z_m}, yaw_rad};
       const auto exact = seen_from(survey.truth, survey.sigma_px);
-      const Fix fix = positioner.locate(with_noise(exact, random));
-      const Fix without_noise = positioner.locate(exact);
-      ASSERT_TRUE(fix.ok() && without_noise.ok());
+      const Fix fix = positioner.compute_position_fix(with_noise(exact, random));
+      const Fix without_noise = positioner.compute_position_fix(exact);
+      ASSERT_TRUE(fix.has_succeeded() && without_noise.has_succeeded());
       EXPECT_EQ(fix.rejected_lamps, 0);
       whole.add(compute_pose_error(fix, survey.truth.camera), fix.estimate.covariance);
       common.add(compute_pose_error(without_noise, survey.truth.camera),

@@ -26,12 +26,12 @@ class RenderedDriveCalibration : public testing::Test {
   static constexpr double kPlaceSd_m = 1e-4, kMapSd_m = 1e-4;
 
   Scene scene = [] {
-    Scene rig = read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
+    Scene rig = read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
     rig.camera.row_time_s = 55e-6;
     return rig;
   }();
   const Calibration truth = make_true_calibration(scene);
-  const LampMap lamps = make_lamp_map(scene, false);
+  const LampMap lamps = make_scene_lamp_map(scene, false);
 
   struct Drive {
     std::vector<Frame> frames;
@@ -46,7 +46,8 @@ class RenderedDriveCalibration : public testing::Test {
     Random random(5);
     Drive drive;
     for (int i = 0; i < kCaptures; ++i) {
-      LampShot shot = make_lamp_shot(scene, scene.sets.at(0), static_cast<std::size_t>(i) % 12);
+      LampShot shot =
+          make_simulated_lamp_capture(scene, scene.sets.at(0), static_cast<std::size_t>(i) % 12);
       BaseMotion& motion = shot.motion;
       motion.axis_m = {random.uniform(-0.3, 0.3), random.uniform(-0.12, 0.12), i % 2 ? 0.3 : 0.0};
       motion.yaw_rad = random.uniform(-3.1, 3.1);
@@ -55,10 +56,10 @@ class RenderedDriveCalibration : public testing::Test {
       motion.velocity_m_per_s =
           speed_m_per_s * Eigen::Vector2d(std::cos(direction_rad), std::sin(direction_rad));
       motion.turn_rate_rad_per_s = speed_m_per_s > 0 ? rate_rad_per_s : 0;
-      const cv::Mat image =
-          simulate_sensor(scene.sensor, renderer.render_lamp_electrons(shot), shot.noise_seed);
+      const cv::Mat image = simulate_sensor_image(
+          scene.sensor, renderer.render_lamps_in_electrons(shot), shot.noise_seed);
       Frame frame{std::to_string(i), {}};
-      for (const Light& light : detector.detect(to_image_view(image))) {
+      for (const Light& light : detector.detect_lights(to_image_view(image))) {
         if (light.kind != LightKind::lamp) continue;
         frame.detections.push_back({*light.lamp, light.pixel, light.sigma_px});
       }
@@ -91,7 +92,7 @@ class RenderedDriveCalibration : public testing::Test {
     TiltCalibrationOptions options;
     options.motions = motions;
     const TiltCalibration found =
-        estimate_tilt_from_lamps(drive.frames, lamps, scene.camera, options);
+        estimate_camera_tilt_from_lamps(drive.frames, lamps, scene.camera, options);
     EXPECT_EQ(found.undetermined, "");
     return {zenith_error(found.center), zenith_sd(found.center), 0, 0};
   }
@@ -107,7 +108,7 @@ class RenderedDriveCalibration : public testing::Test {
       input.captures.push_back(capture);
     }
     const AdjustmentResult found = run_bundle_adjustment(input);
-    EXPECT_TRUE(found.ok() && found.center.lever_arm_m) << found.undetermined;
+    EXPECT_TRUE(found.has_succeeded() && found.center.lever_arm_m) << found.undetermined;
     if (!found.center.lever_arm_m) return {};
     return {zenith_error(found.center), zenith_sd(found.center),
             (*found.center.lever_arm_m - scene.mount.lever_arm_m).norm(),
@@ -129,12 +130,13 @@ class RenderedDriveCalibration : public testing::Test {
 /// Number of standard deviations, of two angles together, that one error in a hundred exceeds.
 constexpr double kFar = 3;
 
-TEST_F(RenderedDriveCalibration, EstimatesTiltOfMovingCamera) {
+TEST_F(RenderedDriveCalibration, TiltFromLampsMatchesTruthForMovingCamera) {
   const Drive standing = drive(0), driving = drive(1);
   const Found of_standing = level(standing, {});
   const Found with_odometry = level(driving, simulate_odometry(driving, 0.01));
-  const Found unknown =
-      level(driving, std::vector<KnownMotion>(kCaptures, KnownMotion::up_to(2, rad_from_deg(180))));
+  const Found unknown = level(
+      driving, std::vector<KnownMotion>(
+                   kCaptures, KnownMotion::make_motion_prior_from_limits(2, rad_from_deg(180))));
   const Found left_out = level(driving, {});
   print("standing, leveled", of_standing);
   print("1 m/s, odometry 1 %", with_odometry);
@@ -147,12 +149,13 @@ TEST_F(RenderedDriveCalibration, EstimatesTiltOfMovingCamera) {
   EXPECT_GT(left_out.zenith_rad, 5 * with_odometry.zenith_rad);
 }
 
-TEST_F(RenderedDriveCalibration, EstimatesTiltAndLeverArmFromKnownPositions) {
+TEST_F(RenderedDriveCalibration, AdjustedTiltAndLeverArmMatchTruthForMovingCamera) {
   const Drive standing = drive(0), driving = drive(1);
   const Found of_standing = adjust(standing, {});
   const Found with_odometry = adjust(driving, simulate_odometry(driving, 0.01));
   const Found unknown = adjust(
-      driving, std::vector<KnownMotion>(kCaptures, KnownMotion::up_to(2, rad_from_deg(180))));
+      driving, std::vector<KnownMotion>(
+                   kCaptures, KnownMotion::make_motion_prior_from_limits(2, rad_from_deg(180))));
   const Found left_out = adjust(driving, {});
   print("standing, adjusted", of_standing);
   print("1 m/s, odometry 1 %", with_odometry);

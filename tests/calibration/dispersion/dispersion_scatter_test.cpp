@@ -56,28 +56,28 @@ void expect_consistent(const Station& station, const std::vector<ReferencePointC
   }
 }
 
-TEST(EstimateHeadingDependentOffset, CovarianceMatchesScatter) {
+TEST(EstimateHeadingDependentOffset, CameraMethodCovarianceMatchesScatterOverFullTurn) {
   Station station(0.01);
   const auto exact = station.captures(16, true, {0.003, 0.001}, 0.1);
   expect_consistent(station, exact, DispersionMethod::camera, true);
 }
 
-TEST(EstimateHeadingDependentOffset, CovarianceMatchesScatterWithoutGivenNoise) {
+TEST(EstimateHeadingDependentOffset, CameraMethodCovarianceMatchesScatterWithoutGivenNoise) {
   Station station(0.01);
   const auto exact = station.captures(16, true, {0.003, 0.001}, 0.1);
   expect_consistent(station, exact, DispersionMethod::camera, false);
 }
 
-TEST(EstimateHeadingDependentOffset, CovarianceMatchesScatterFor135Degrees) {
+TEST(EstimateHeadingDependentOffset, CameraMethodCovarianceMatchesScatterOver135Degrees) {
   Station station(0.01);
   auto exact = station.captures(24, true, {0.003, 0.001}, 0.1);
   exact.resize(10);
   expect_consistent(station, exact, DispersionMethod::camera, true);
 }
 
-TEST(EstimateHeadingDependentOffset, PaperMethodCovarianceMatchesScatter) {
+TEST(EstimateHeadingDependentOffset, PaperMethodCovarianceMatchesScatterAtOneYaw) {
   Station station(0.01);
-  expect_consistent(station, station.captures_at(0.7, 30), DispersionMethod::paper, true);
+  expect_consistent(station, station.captures_at(0.7, 30), DispersionMethod::chen_guan, true);
 }
 
 /// Few captures at one yaw, and the scatter of their fixes.
@@ -95,12 +95,12 @@ class EstimateHeadingDependentOffsetWithFewCaptures : public testing::TestWithPa
 /// 600 draws of two axes determine an RMS to 3 % and the fraction of 5 % to 0.6 %. Few captures do
 /// not determine their scatter. The test therefore checks the 95 % interval, and that standard
 /// deviations are not too small.
-TEST_P(EstimateHeadingDependentOffsetWithFewCaptures, PaperMethodCoversErrorAtReportedRate) {
+TEST_P(EstimateHeadingDependentOffsetWithFewCaptures, PaperMethodIntervalCoversOffsetErrors) {
   const FewCaptures& few = GetParam();
   Station station(0.01);
   const auto exact = station.captures_at(0.7, few.count);
   const auto reference = estimate_heading_dependent_offset(exact, station.rig.map, station.believed,
-                                                           DispersionMethod::paper);
+                                                           DispersionMethod::chen_guan);
   ASSERT_EQ(reference.status, DispersionStatus::ok);
   Random random(43);
   double squares = 0;
@@ -116,7 +116,7 @@ TEST_P(EstimateHeadingDependentOffsetWithFewCaptures, PaperMethodCoversErrorAtRe
       }
     }
     const auto fit = estimate_heading_dependent_offset(captures, station.rig.map, station.believed,
-                                                       DispersionMethod::paper);
+                                                       DispersionMethod::chen_guan);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     ASSERT_TRUE(fit.dispersion.covariance);
     EXPECT_EQ(fit.dispersion.captures, few.count);
@@ -162,7 +162,7 @@ struct Captures {
 
 std::vector<ReferencePointCapture> make_captures(Station& station, const Captures& captures) {
   constexpr double noise_px = 0.3;
-  if (captures.method == DispersionMethod::paper) {
+  if (captures.method == DispersionMethod::chen_guan) {
     return station.captures_at(0.7, captures.count, noise_px);
   }
   std::vector<ReferencePointCapture> made;
@@ -179,7 +179,7 @@ std::vector<ReferencePointCapture> make_captures(Station& station, const Capture
 class EstimateHeadingDependentOffsetUncertainty : public testing::TestWithParam<Captures> {};
 
 /// 600 draws of two axes determine an RMS to 3 % and the fraction of 5 % to 0.6 %.
-TEST_P(EstimateHeadingDependentOffsetUncertainty, CoversErrorAtReportedRate) {
+TEST_P(EstimateHeadingDependentOffsetUncertainty, Offset95PercentIntervalCoversErrorAtNominalRate) {
   const Captures& cell = GetParam();
   Station station(0.01);
   const auto exact = make_captures(station, cell);
@@ -207,8 +207,8 @@ TEST_P(EstimateHeadingDependentOffsetUncertainty, CoversErrorAtReportedRate) {
     const auto fit =
         estimate_heading_dependent_offset(captures, surveyed, station.believed, cell.method);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
-    const auto covariance_px2 =
-        compute_offset_covariance_with_map(fit.dispersion, station.believed.camera.focal_px());
+    const auto covariance_px2 = compute_dispersion_offset_covariance_with_map(
+        fit.dispersion, station.believed.camera.focal_px());
     ASSERT_TRUE(covariance_px2);
     for (Eigen::Index axis = 0; axis < 2; ++axis) {
       const double error = fit.dispersion.offset_px[axis] - truth.dispersion.offset_px[axis];
@@ -234,13 +234,13 @@ TEST_P(EstimateHeadingDependentOffsetUncertainty, CoversErrorAtReportedRate) {
     EXPECT_NEAR(std::sqrt(world_squares / (2 * kStations)), 1, kStationTolerance);
   }
   // Three captures whose given noise is 1.4 times too small cover 93.2 % on average
-  // (ComputeVarianceFactor below). 600 draws of two axes determine this to 0.7 %.
+  // (ComputeSmallSampleVarianceFactor below). 600 draws of two axes determine this to 0.7 %.
   const bool is_understated = cell.stated_ratio.value_or(1) < 1;
   EXPECT_LT(fraction, is_understated ? 0.068 + 2 * 0.007 : 0.05 + 3 * 0.0063);
   EXPECT_GT(fraction, 0.01);
 }
 
-constexpr DispersionMethod kCamera = DispersionMethod::camera, kPaper = DispersionMethod::paper;
+constexpr DispersionMethod kCamera = DispersionMethod::camera, kPaper = DispersionMethod::chen_guan;
 INSTANTIATE_TEST_SUITE_P(
     Captures, EstimateHeadingDependentOffsetUncertainty,
     testing::Values(Captures{"PaperThreeUnderMapErrors", kPaper, 3, 2e-3, 1},
@@ -320,7 +320,7 @@ struct PlaceConsistency {
 class PositionerAfterDispersion : public testing::TestWithParam<DispersionMethod> {};
 
 /// 600 draws of two axes determine an RMS to 2.1 % to 2.9 %, as the axes are correlated.
-TEST_P(PositionerAfterDispersion, ReportsConsistentCovariance) {
+TEST_P(PositionerAfterDispersion, FixCovarianceMatchesErrorsUnderSameAndOtherLamps) {
   constexpr int draws = 600;
   Station station = make_station_with_far_lamps();
   SyntheticRig& rig = station.rig;
@@ -344,9 +344,9 @@ TEST_P(PositionerAfterDispersion, ReportsConsistentCovariance) {
     for (PlaceConsistency& place : places) {
       rig.camera = place.camera;
       const auto detections = with_noise(detect_in_image(rig), random);
-      const Fix fix = positioner.locate(detections);
-      ASSERT_TRUE(fix.ok());
-      const Fix same = independent.locate(detections);
+      const Fix fix = positioner.compute_position_fix(detections);
+      ASSERT_TRUE(fix.has_succeeded());
+      const Fix same = independent.compute_position_fix(detections);
       for (int axis = 0; axis < 2; ++axis) {
         const double error_m = fix.estimate.pose.position_m[axis] - place.camera.position_m[axis];
         place.squares += error_m * error_m / fix.estimate.covariance(axis, axis);
@@ -368,7 +368,7 @@ TEST_P(PositionerAfterDispersion, ReportsConsistentCovariance) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, PositionerAfterDispersion,
-                         testing::Values(DispersionMethod::camera, DispersionMethod::paper),
+                         testing::Values(DispersionMethod::camera, DispersionMethod::chen_guan),
                          [](const auto& method) {
                            return method.param == DispersionMethod::camera ? "Camera" : "Paper";
                          });
@@ -387,7 +387,7 @@ TEST(ComputeSmallSampleVarianceFactor, IncreasesContinuouslyWithResiduals) {
   }
 }
 
-TEST(ComputeSmallSampleVarianceFactor, ReturnsResidualOrGivenVarianceForManyDegreesOfFreedom) {
+TEST(ComputeSmallSampleVarianceFactor, ApproachesResidualRatioFlooredAtOneForGivenNoise) {
   constexpr double many = 1e5;
   EXPECT_NEAR(compute_small_sample_variance_factor(0.5, many, false), 0.5, 1e-3);
   EXPECT_NEAR(compute_small_sample_variance_factor(2, many, false), 2, 1e-3);
@@ -397,7 +397,7 @@ TEST(ComputeSmallSampleVarianceFactor, ReturnsResidualOrGivenVarianceForManyDegr
 
 /// Given noise equal to the true noise, 1.4 times too small, and absent. 20,000 draws determine the
 /// coverage to 0.15 %.
-TEST(ComputeSmallSampleVarianceFactor, CoversErrorsAtNominalRate) {
+TEST(ComputeSmallSampleVarianceFactor, ScaledIntervalsCoverErrorsAtNominalRate) {
   struct FactorCase {
     double freedom, noise_ratio;
     bool is_stated;

@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-TEST(EstimateHeadingDependentOffset, SeparatesCameraAndWorldErrorsExactly) {
+TEST(EstimateHeadingDependentOffset, CameraMethodRecoversWorldOffsetAndCorrectsFixesExactly) {
   Random random(1);
   for (const double error_rad : {0.0, 0.005, 0.05}) {
     Station station(error_rad);
@@ -22,7 +22,7 @@ TEST(EstimateHeadingDependentOffset, SeparatesCameraAndWorldErrorsExactly) {
     const auto captures = station.captures(12, true, wrong_m);
     const auto fit = estimate_heading_dependent_offset(captures, station.rig.map, station.believed,
                                                        DispersionMethod::camera);
-    ASSERT_EQ(fit.status, DispersionStatus::ok) << describe(fit.status);
+    ASSERT_EQ(fit.status, DispersionStatus::ok) << describe_dispersion_status(fit.status);
     ASSERT_TRUE(fit.world_offset_m);
     EXPECT_THAT(*fit.world_offset_m, IsNear(wrong_m, 1e-9));
     EXPECT_LT(fit.after.radius, 1e-9);
@@ -36,14 +36,14 @@ TEST(EstimateHeadingDependentOffset, SeparatesCameraAndWorldErrorsExactly) {
     for (int i = 0; i < 20; ++i) {  // other positions, heights and yaws
       station.rig.camera = {{random.uniform(-0.4, 0.4), random.uniform(-0.3, 0.3), 0.02 * i},
                             random.uniform(-3, 3)};
-      const Fix fix = positioner.locate(seen_from(station.rig));
-      ASSERT_TRUE(fix.ok());
+      const Fix fix = positioner.compute_position_fix(seen_from(station.rig));
+      ASSERT_TRUE(fix.has_succeeded());
       EXPECT_THAT(fix.estimate.pose.position_m, IsNear(station.rig.camera.position_m, 1e-8));
     }
   }
 }
 
-TEST(EstimateHeadingDependentOffset, ReturnsOffsetOfShiftedCenter) {
+TEST(EstimateHeadingDependentOffset, CameraMethodReturnsTrueOffsetForShiftedCenter) {
   Station station(0);
   station.believed.rotation_center.reset();
   station.rig.calibration.rotation_center.reset();
@@ -58,7 +58,7 @@ TEST(EstimateHeadingDependentOffset, ReturnsOffsetOfShiftedCenter) {
 }
 
 /// The paper's equations are exact for a shift and lamps of one height, at any yaw.
-TEST(EstimateHeadingDependentOffset, PaperMethodReturnsShiftAtOneYaw) {
+TEST(EstimateHeadingDependentOffset, PaperMethodReturnsTrueOffsetAtOneYaw) {
   for (const DispersionCircle circle : {DispersionCircle::mean, DispersionCircle::enclosing}) {
     Station station(0);
     station.believed.rotation_center.reset();
@@ -67,7 +67,7 @@ TEST(EstimateHeadingDependentOffset, PaperMethodReturnsShiftAtOneYaw) {
     for (const double yaw_rad : {0.0, 2.0, -1.0}) {
       const auto captures = station.captures_at(yaw_rad, 5);
       const auto fit = estimate_heading_dependent_offset(
-          captures, station.rig.map, station.believed, DispersionMethod::paper, circle);
+          captures, station.rig.map, station.believed, DispersionMethod::chen_guan, circle);
       ASSERT_EQ(fit.status, DispersionStatus::ok);
       EXPECT_FALSE(fit.world_offset_m.has_value());
       // Fixes of many lamps have weights by the lens, which depend on the shift.
@@ -79,7 +79,7 @@ TEST(EstimateHeadingDependentOffset, PaperMethodReturnsShiftAtOneYaw) {
 
 /// After a rotation center of model `tilt` the offset is applied as a rotation. The factor f / H
 /// and the yaw alone would leave 10 % of 16 mm.
-TEST(EstimateHeadingDependentOffset, PaperMethodCentersCircleForTiltedCamera) {
+TEST(EstimateHeadingDependentOffset, PaperMethodCentersFixesOnReferencePointForTiltedCamera) {
   for (const DispersionCircle circle : {DispersionCircle::mean, DispersionCircle::enclosing}) {
     Station station(0.01);
     Random random(3);
@@ -87,7 +87,7 @@ TEST(EstimateHeadingDependentOffset, PaperMethodCentersCircleForTiltedCamera) {
       auto captures = station.captures_at(yaw_rad, 6);
       for (auto& capture : captures) capture.detections = with_noise(capture.detections, random);
       const auto fit = estimate_heading_dependent_offset(
-          captures, station.rig.map, station.believed, DispersionMethod::paper, circle);
+          captures, station.rig.map, station.believed, DispersionMethod::chen_guan, circle);
       ASSERT_EQ(fit.status, DispersionStatus::ok);
       EXPECT_GT(fit.before.center.norm(), 0.01);
       EXPECT_LT(fit.after.center.norm(), 1e-9);
@@ -103,16 +103,16 @@ TEST(EstimateHeadingDependentOffset, PaperMethodAttributesReferencePointErrorToC
     auto captures = station.captures_at(yaw_rad, 5);
     for (auto& capture : captures) capture.reference_point_m.x() -= 0.008;
     const auto fit = estimate_heading_dependent_offset(captures, station.rig.map, station.believed,
-                                                       DispersionMethod::paper);
+                                                       DispersionMethod::chen_guan);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     EXPECT_NEAR(fit.dispersion.offset_px.x(), -sign * 520 * 0.008 / 1.6, 0.01);
   }
 }
 
-TEST(EstimateHeadingDependentOffset, RejectsWrongFixes) {
+TEST(EstimateHeadingDependentOffset, RejectsQuarterOfFixesWithFiveCentimeterErrors) {
   Station station(0.01);
   Random random(2);
-  for (const auto method : {DispersionMethod::camera, DispersionMethod::paper}) {
+  for (const auto method : {DispersionMethod::camera, DispersionMethod::chen_guan}) {
     auto captures = method == DispersionMethod::camera ? station.captures(40, true, {0, 0})
                                                        : station.captures_at(0.5, 40);
     const auto clean =
@@ -133,7 +133,7 @@ TEST(EstimateHeadingDependentOffset, RejectsWrongFixes) {
   }
 }
 
-TEST(EstimateHeadingDependentOffset, UsesInclinationSensor) {
+TEST(EstimateHeadingDependentOffset, ReducesFixCircleToZeroWithInclinationSensor) {
   Station station(0.01);
   station.rig.inclination = Inclination{0.04, -0.03};
   auto captures = station.captures(12, true, {0, 0});
@@ -144,7 +144,7 @@ TEST(EstimateHeadingDependentOffset, UsesInclinationSensor) {
   EXPECT_LT(fit.after.radius, 1e-9);
 }
 
-TEST(EstimateHeadingDependentOffset, ReportsStatusForInsufficientCaptures) {
+TEST(EstimateHeadingDependentOffset, ReturnsStatusNamingReasonForEachKindOfUnusableCaptures) {
   Station station(0.01);
   const auto find_status = [&](const std::vector<ReferencePointCapture>& captures,
                                DispersionMethod method = DispersionMethod::camera) {
@@ -154,17 +154,18 @@ TEST(EstimateHeadingDependentOffset, ReportsStatusForInsufficientCaptures) {
   const auto turned = station.captures(12, true, {0, 0});
   EXPECT_EQ(find_status({}), DispersionStatus::no_fix);
   EXPECT_EQ(find_status({turned[0]}), DispersionStatus::too_few_captures);
-  EXPECT_EQ(find_status({turned[0]}, DispersionMethod::paper), DispersionStatus::too_few_captures);
-  EXPECT_EQ(find_status(turned, DispersionMethod::paper), DispersionStatus::many_yaws);
-  EXPECT_EQ(find_status(station.captures_at(1, 20)), DispersionStatus::one_yaw);
+  EXPECT_EQ(find_status({turned[0]}, DispersionMethod::chen_guan),
+            DispersionStatus::too_few_captures);
+  EXPECT_EQ(find_status(turned, DispersionMethod::chen_guan), DispersionStatus::several_yaws);
+  EXPECT_EQ(find_status(station.captures_at(1, 20)), DispersionStatus::single_yaw);
   // A single capture at another yaw, with an error, must not decide.
   auto one_other = station.captures_at(1, 12);
   one_other.push_back(station.captures_at(2.5, 1)[0]);
   one_other.back().reference_point_m.x() += 0.05;
-  EXPECT_EQ(find_status(one_other), DispersionStatus::one_yaw);
+  EXPECT_EQ(find_status(one_other), DispersionStatus::single_yaw);
   auto far = turned;
   for (auto& capture : far) capture.reference_point_m.x() += 1;
-  EXPECT_EQ(find_status(far), DispersionStatus::station_far);
+  EXPECT_EQ(find_status(far), DispersionStatus::all_far_from_reference);
   auto other_map = turned;
   for (auto& capture : other_map) {
     for (auto& detection : capture.detections) detection.lamp += 50;

@@ -38,13 +38,13 @@ TEST_P(CheckBoardLayout, ReportsNoProblemForCorrectBoard) {
               1 + views_.board.tag_spacing, 0.005);
 }
 
-TEST_P(CheckBoardLayout, IgnoresTagSize) {
+TEST_P(CheckBoardLayout, ReportsNoProblemForWrongTagSize) {
   Board board = views_.board;
   board.tag_size_m *= 2;
   EXPECT_THAT(problem(board, views_.lens), IsEmpty());
 }
 
-TEST_P(CheckBoardLayout, ReportsOtherTagSpacing) {
+TEST_P(CheckBoardLayout, ReportsMeasuredGapWhenTagSpacingIsWrong) {
   Board board = views_.board;
   board.tag_spacing += 0.2;
   EXPECT_THAT(problem(board), HasSubstr("but the images show gaps of"));
@@ -53,7 +53,7 @@ TEST_P(CheckBoardLayout, ReportsOtherTagSpacing) {
   EXPECT_THAT(problem(board, views_.lens), HasSubstr(GetParam() ? "gaps of 0.3 " : "gaps of 1 "));
 }
 
-TEST_P(CheckBoardLayout, ReportsOtherIdOrder) {
+TEST_P(CheckBoardLayout, ReportsDetectedIdOrderWhenGivenOrderIsWrong) {
   for (const bool column_major : {false, true}) {
     for (const auto from : {BoardCorner::bottom_right, BoardCorner::top_left}) {
       Board board = views_.board;
@@ -66,7 +66,7 @@ TEST_P(CheckBoardLayout, ReportsOtherIdOrder) {
   EXPECT_THAT(problem(board), HasSubstr("cols 6, rows 5"));
 }
 
-TEST_P(CheckBoardLayout, ReportsOtherIdOrderOfSquareBoard) {
+TEST_P(CheckBoardLayout, ReportsDetectedIdOrderOfSquareBoardForWrongOrder) {
   Board truth = views_.board;
   truth.rows = truth.cols;
   const SyntheticViews views{truth, views_.lens};
@@ -86,7 +86,7 @@ TEST_P(CheckBoardLayout, ReportsOtherIdOrderOfSquareBoard) {
   }
 }
 
-TEST_P(CheckBoardLayout, ReportsOtherNumberOfTags) {
+TEST_P(CheckBoardLayout, ReportsDetectedColumnsWhenGivenNumberIsWrong) {
   for (const int cols : {4, 5, 7}) {
     Board board = views_.board;
     board.cols = cols;
@@ -97,7 +97,7 @@ TEST_P(CheckBoardLayout, ReportsOtherNumberOfTags) {
 }
 
 /// As in the detector: tags with ids that the board does not have are foreign.
-TEST_P(CheckBoardLayout, ReportsLargerBoardFromForeignTags) {
+TEST_P(CheckBoardLayout, ReportsDetectedRowsAndFirstIdFromForeignTags) {
   Board board = views_.board;
   board.rows = 4;
   for (BoardView& view : seen_) {
@@ -113,7 +113,7 @@ TEST_P(CheckBoardLayout, ReportsLargerBoardFromForeignTags) {
                                         "first_id 0"));
 }
 
-TEST_P(CheckBoardLayout, IgnoresSingleForeignTags) {
+TEST_P(CheckBoardLayout, ReportsNoProblemForSingleForeignTags) {
   for (const int id : {100, 31}) {
     auto views = seen_;
     for (BoardView& view : views) {
@@ -126,7 +126,7 @@ TEST_P(CheckBoardLayout, IgnoresSingleForeignTags) {
   }
 }
 
-TEST_P(CheckBoardLayout, IgnoresTagsOfSecondBoard) {
+TEST_P(CheckBoardLayout, ReportsNoProblemForTagsOfSecondBoard) {
   for (BoardView& view : seen_) {
     Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
     for (const TagDetection& tag : view.seen.tags) {
@@ -144,7 +144,7 @@ TEST_P(CheckBoardLayout, IgnoresTagsOfSecondBoard) {
   EXPECT_THAT(problem(views_.board), IsEmpty());
 }
 
-TEST_P(CheckBoardLayout, ReportsOtherBoardForPermutedIds) {
+TEST_P(CheckBoardLayout, SuggestsAnotherBoardWhenTagIdsArePermuted) {
   for (BoardView& view : seen_) {
     for (TagDetection& tag : view.seen.tags) tag.id = tag.id * 7 % 30;
   }

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kPrintSd = 5e-4;
 
-class ComputePrintEffect : public testing::TestWithParam<bool> {};
+class ComputeBoardAspectErrorEffectOnLens : public testing::TestWithParam<bool> {};
 
 /// Returns the solution from views of a board that is wider than stated by this factor, with
 /// exact corners.
@@ -29,14 +29,14 @@ IntrinsicsSolution solve_stretched(bool kalibr, double factor) {
 }
 
 /// Compares full solves with a wider board and with the board as stated.
-TEST_P(ComputePrintEffect, MatchesSolveOfWiderBoard) {
+TEST_P(ComputeBoardAspectErrorEffectOnLens, MatchesLensChangeOfSolveWithWiderBoard) {
   const IntrinsicsSolution stated = solve_stretched(GetParam(), 1);
   const IntrinsicsSolution wider = solve_stretched(GetParam(), 1 + std::sqrt(2) * kPrintSd);
-  ASSERT_TRUE(stated.ok() && wider.ok());
-  const auto effect = compute_board_aspect_error_effect(stated, kPrintSd);
+  ASSERT_TRUE(stated.has_succeeded() && wider.has_succeeded());
+  const auto effect = compute_board_aspect_error_effect_on_lens(stated, kPrintSd);
   ASSERT_TRUE(effect);
   const auto expected =
-      compute_projection_difference(stated.lens(), wider.lens(), {800, 600}, even);
+      compute_projection_difference(stated.fitted_lens(), wider.fitted_lens(), {800, 600}, even);
   ASSERT_TRUE(expected);
   EXPECT_GT(expected->rms_px, 0.01);
   // A full solve also estimates the shift of the edges, which a board that is wider changes.
@@ -49,23 +49,23 @@ TEST_P(ComputePrintEffect, MatchesSolveOfWiderBoard) {
   EXPECT_LT((effect->intrinsics.head<2>() - change).norm(), 0.2 * change.norm());
 }
 
-TEST_P(ComputePrintEffect, IsProportionalToStandardDeviation) {
+TEST_P(ComputeBoardAspectErrorEffectOnLens, RmsIsProportionalToPrintStandardDeviation) {
   const IntrinsicsSolution stated = solve_stretched(GetParam(), 1);
-  ASSERT_TRUE(stated.ok());
-  const auto one = compute_board_aspect_error_effect(stated, kPrintSd);
-  const auto two = compute_board_aspect_error_effect(stated, 2 * kPrintSd);
+  ASSERT_TRUE(stated.has_succeeded());
+  const auto one = compute_board_aspect_error_effect_on_lens(stated, kPrintSd);
+  const auto two = compute_board_aspect_error_effect_on_lens(stated, 2 * kPrintSd);
   ASSERT_TRUE(one && two);
   EXPECT_NEAR(two->rms_px / one->rms_px, 2, 0.05);
 }
 
-TEST(PrintEffect, IsNegligibleForExactBoardAndPinholeLens) {
+TEST(ComputeBoardAspectErrorEffectOnLens, VanishesForExactPrintWithPinholeLens) {
   const std::array parameters{520.0, 521.0, 402.0, 297.0};
   const SyntheticViews views{synthetic_board(false), Lens(LensModel::pinhole, parameters)};
   Random random(4);
   const IntrinsicsSolution solution = solve_intrinsics(views.input(20, random, 0.05));
-  ASSERT_TRUE(solution.ok());
-  const auto exact = compute_board_aspect_error_effect(solution, 1e-9);
-  const auto printed = compute_board_aspect_error_effect(solution, kPrintSd);
+  ASSERT_TRUE(solution.has_succeeded());
+  const auto exact = compute_board_aspect_error_effect_on_lens(solution, 1e-9);
+  const auto printed = compute_board_aspect_error_effect_on_lens(solution, kPrintSd);
   ASSERT_TRUE(exact && printed);
   EXPECT_LT(exact->rms_px, 0.01 * printed->rms_px);
   EXPECT_GT(printed->rms_px, 0.01);
@@ -73,7 +73,7 @@ TEST(PrintEffect, IsNegligibleForExactBoardAndPinholeLens) {
 
 /// Monte Carlo: errors of lenses from boards with random print and random noise, against the
 /// uncertainty that one of them states.
-TEST(EstimateLens, IncludesThePrintInTheUncertainty) {
+TEST(EstimateLens, ReportedUncertaintyIncludesBoardPrintError) {
   constexpr double noise_px = 0.02;
   constexpr int draws = 40;
   SyntheticViews views{synthetic_board(false), synthetic_lens()};
@@ -83,8 +83,9 @@ TEST(EstimateLens, IncludesThePrintInTheUncertainty) {
   for (int draw = 0; draw < draws; ++draw) {
     views.stretch = {1 + kPrintSd * random.normal(), 1 + kPrintSd * random.normal()};
     const IntrinsicsSolution solution = solve_intrinsics(views.input(20, random, noise_px));
-    ASSERT_TRUE(solution.ok());
-    const auto error = compute_projection_difference(solution.lens(), views.lens, {800, 600}, even);
+    ASSERT_TRUE(solution.has_succeeded());
+    const auto error =
+        compute_projection_difference(solution.fitted_lens(), views.lens, {800, 600}, even);
     ASSERT_TRUE(error);
     squares += error->worst_px * error->worst_px / draws;
   }
@@ -98,7 +99,7 @@ TEST(EstimateLens, IncludesThePrintInTheUncertainty) {
   const LensEstimate with_print = estimate_lens(stated);
   stated.board.print_sd = 0;
   const LensEstimate exact = estimate_lens(stated);
-  ASSERT_TRUE(with_print.ok() && exact.ok());
+  ASSERT_TRUE(with_print.has_succeeded() && exact.has_succeeded());
   const double ratio = std::sqrt(squares) / with_print.report.uncertainty_worst_px;
   EXPECT_GT(ratio, 0.6);
   EXPECT_LT(ratio, 1.1);
@@ -106,7 +107,7 @@ TEST(EstimateLens, IncludesThePrintInTheUncertainty) {
   EXPECT_GT(with_print.report.uncertainty_mean_px, exact.report.uncertainty_mean_px);
 }
 
-INSTANTIATE_TEST_SUITE_P(Boards, ComputePrintEffect, testing::Bool(),
+INSTANTIATE_TEST_SUITE_P(Boards, ComputeBoardAspectErrorEffectOnLens, testing::Bool(),
                          [](const auto& board) { return board.param ? "Kalibr" : "Plain"; });
 
 }  // namespace

@@ -19,7 +19,7 @@ const Camera kFour = camera_with(LensModel::opencv4, {500, 501, 400, 300, 0.1, -
 const Camera kEight = camera_with(
     LensModel::opencv8, {500, 501, 400, 300, 0.1, -0.2, 0.003, 0.004, 0.05, 0.06, 0.07, 0.08});
 
-TEST(OpencvCamera, AreStripesReadableByOpencv) {
+TEST(FormatOpencvCamera, WritesMatrixAndDistortionReadableByOpencv) {
   const cv::FileStorage file(format_opencv_camera(kEight),
                              cv::FileStorage::READ | cv::FileStorage::MEMORY);
   cv::Mat matrix, distortions;
@@ -32,7 +32,7 @@ TEST(OpencvCamera, AreStripesReadableByOpencv) {
   EXPECT_EQ(distortions.at<double>(0, 7), 0.08);
 }
 
-TEST(RosCameraInfo, ContainsDistortionModelAndCoefficients) {
+TEST(FormatRosCameraInfo, WritesDistortionModelAndCoefficients) {
   const YAML::Node eight = YAML::Load(format_ros_camera_info(kEight));
   EXPECT_EQ(eight["distortion_model"].as<std::string>(), "rational_polynomial");
   EXPECT_EQ(eight["distortion_coefficients"]["data"].size(), 8U);
@@ -44,14 +44,14 @@ TEST(RosCameraInfo, ContainsDistortionModelAndCoefficients) {
   EXPECT_EQ(four["distortion_coefficients"]["data"].size(), 5U);
 }
 
-TEST(KalibrCamchain, ContainsIntrinsicsAndResolution) {
+TEST(FormatKalibrCamchain, WritesIntrinsicsAndResolution) {
   const YAML::Node camera = YAML::Load(format_kalibr_camchain(kFour))["cam0"];
   EXPECT_EQ(camera["distortion_coeffs"].size(), 4U);
   EXPECT_EQ(camera["intrinsics"][3].as<double>(), 300);
   EXPECT_EQ(camera["resolution"][1].as<int>(), 600);
 }
 
-TEST(CameraExports, ThrowForUnsupportedLensModel) {
+TEST(CameraExports, FormatFunctionsThrowForUnsupportedLensModel) {
   EXPECT_THROW(format_kalibr_camchain(kEight), std::invalid_argument);
   const Camera round = camera_with(LensModel::stereographic, {500, 501, 400, 300});
   EXPECT_THROW(format_ros_camera_info(round), std::invalid_argument);

@@ -23,7 +23,7 @@ class ReadCameraOfAnyFormat : public testing::Test {
     EXPECT_EQ(back.lens_model, as);
     EXPECT_EQ(back.imager_px, camera.imager_px);
     std::vector<double> expected = camera.intrinsics;
-    expected.resize(parameter_count(as), 0);
+    expected.resize(num_lens_parameters(as), 0);
     EXPECT_EQ(back.intrinsics, expected);
   }
   std::string refusal(const std::string& text) const {
@@ -36,7 +36,7 @@ class ReadCameraOfAnyFormat : public testing::Test {
   }
 };
 
-TEST_F(ReadCameraOfAnyFormat, ReturnsExportedCameraExactly) {
+TEST_F(ReadCameraOfAnyFormat, ReturnsExportedCameraExactlyFromEachFormat) {
   for (const LensModel model : {LensModel::pinhole, LensModel::opencv4, LensModel::opencv5,
                                 LensModel::opencv8, LensModel::opencv12, LensModel::fisheye}) {
     const Camera camera = make_camera(model);
@@ -50,7 +50,7 @@ TEST_F(ReadCameraOfAnyFormat, ReturnsExportedCameraExactly) {
   }
 }
 
-TEST_F(ReadCameraOfAnyFormat, ReturnsExportedSplinedLensExactly) {
+TEST_F(ReadCameraOfAnyFormat, ReturnsSplinedLensExactlyFromCameramodelOnly) {
   const Camera camera = splined_camera();
   comes_back(camera, format_mrcal_cameramodel(camera), camera.lens_model);
   for (const auto& format_camera :
@@ -62,42 +62,42 @@ TEST_F(ReadCameraOfAnyFormat, ReturnsExportedSplinedLensExactly) {
   EXPECT_THAT(refusal(short_one), testing::HasSubstr("takes 312 parameters, not 290"));
 }
 
-TEST(ConvertToLensModel, ConvertsToSplinedLensAndBack) {
-  const auto wide = convert_to_lens_model(make_camera(LensModel::fisheye),
-                                          lens_model_for_spline_grid({3, 20, 16, 190}));
+TEST(ConvertCameraToLensModel, KeepsFisheyePixelsWithinFiveMillipixelsThroughSplinedLens) {
+  const auto wide = convert_camera_to_lens_model(make_camera(LensModel::fisheye),
+                                                 lens_model_for_spline_grid({3, 20, 16, 190}));
   EXPECT_LT(wide.worst_px, 0.002);
   EXPECT_EQ(wide.common_fraction, 1);
   // The rays outside the grid do not count.
-  const auto part = convert_to_lens_model(make_camera(LensModel::fisheye),
-                                          lens_model_for_spline_grid({3, 14, 12, 100}));
+  const auto part = convert_camera_to_lens_model(make_camera(LensModel::fisheye),
+                                                 lens_model_for_spline_grid({3, 14, 12, 100}));
   EXPECT_LT(part.worst_px, 0.01);
   EXPECT_LT(part.common_fraction, 0.8);
-  const auto back = convert_to_lens_model(wide.camera, LensModel::fisheye);
+  const auto back = convert_camera_to_lens_model(wide.camera, LensModel::fisheye);
   EXPECT_LT(back.worst_px, 0.005);
   for (std::size_t i = 0; i < 4; ++i) {
     EXPECT_NEAR(back.camera.intrinsics[i], make_camera(LensModel::fisheye).intrinsics[i], 0.01);
   }
-  const auto near = convert_to_lens_model(make_camera(LensModel::opencv8),
-                                          lens_model_for_spline_grid({2, 20, 16, 100}));
+  const auto near = convert_camera_to_lens_model(make_camera(LensModel::opencv8),
+                                                 lens_model_for_spline_grid({2, 20, 16, 100}));
   EXPECT_LT(near.worst_px, 0.2);  // quadratic pieces
 }
 
 /// Lenses of 10 degrees, with no, one or a few rays of a piece in the image, and of a strip with
 /// one row of pieces. The recommended model has to fit.
-TEST(ConvertToLensModel, RecommendsFinerGridWhenGridIsTooWide) {
+TEST(ConvertCameraToLensModel, ThrowsRecommendingFittingGridWhenGridIsTooCoarse) {
   const auto expect_other = [](const Camera& camera, const SplineGrid& grid) {
-    const std::string words =
-        "the control points of " + to_string(grid) + " do not cover the field of view, ";
+    const std::string words = "the control points of " + splined_lens_model_name(grid) +
+                              " do not cover the field of view, ";
     std::string said;
     try {
-      convert_to_lens_model(camera, lens_model_for_spline_grid(grid));
+      convert_camera_to_lens_model(camera, lens_model_for_spline_grid(grid));
     } catch (const std::invalid_argument& error) {
       said = error.what();
     }
     ASSERT_THAT(said, testing::StartsWith(words)) << camera.intrinsics[2];
     const auto model = lens_model_from_name(said.substr(said.find("LENSMODEL", words.size())));
     ASSERT_TRUE(model) << said;
-    const FittedCamera fitted = convert_to_lens_model(camera, *model);
+    const FittedCamera fitted = convert_camera_to_lens_model(camera, *model);
     EXPECT_LT(fitted.worst_px, 0.01) << said;
     EXPECT_EQ(fitted.common_fraction, 1) << said;
   };
@@ -140,18 +140,22 @@ TEST_F(ReadCameraOfAnyFormat, IgnoresCommentsInCameramodel) {
              text, LensModel::pinhole);
 }
 
-TEST(ConvertToLensModel, ReportsDifferenceAndCommonFraction) {
+TEST(ConvertCameraToLensModel, IsExactOnlyIfTargetModelIncludesSourceModel) {
   // A model that includes the other fits exactly, another one approximately.
-  const auto exact = convert_to_lens_model(make_camera(LensModel::opencv4), LensModel::opencv8);
+  const auto exact =
+      convert_camera_to_lens_model(make_camera(LensModel::opencv4), LensModel::opencv8);
   EXPECT_LT(exact.worst_px, 1e-6);
   EXPECT_EQ(exact.common_fraction, 1);
-  const auto near = convert_to_lens_model(make_camera(LensModel::opencv8), LensModel::fisheye);
+  const auto near =
+      convert_camera_to_lens_model(make_camera(LensModel::opencv8), LensModel::fisheye);
   EXPECT_LT(near.worst_px, 1);
   EXPECT_GT(near.worst_px, 1e-6);
-  const auto same = convert_to_lens_model(make_camera(LensModel::opencv8), LensModel::opencv8);
+  const auto same =
+      convert_camera_to_lens_model(make_camera(LensModel::opencv8), LensModel::opencv8);
   EXPECT_EQ(same.camera.intrinsics, make_camera(LensModel::opencv8).intrinsics);
   // Perspective models have no rays beyond 90 degrees.
-  const auto half = convert_to_lens_model(make_camera(LensModel::fisheye), LensModel::opencv4);
+  const auto half =
+      convert_camera_to_lens_model(make_camera(LensModel::fisheye), LensModel::opencv4);
   EXPECT_LT(half.common_fraction, 1);
 }
 

@@ -13,7 +13,7 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 
 /// In strongly distorted views exactly the displaced corner is found.
-TEST(FindCornerOutliers, ReturnsSingleDisplacedCorner) {
+TEST(FindCornerOutliers, ReturnsOnlyTheOneDisplacedCorner) {
   constexpr double noise_px = 0.05, apart_px = 20;
   for (const bool kalibr : {false, true}) {
     const SyntheticViews views{synthetic_board(kalibr), synthetic_lens()};
@@ -36,7 +36,7 @@ TEST(FindCornerOutliers, ReturnsSingleDisplacedCorner) {
 }
 
 /// A view that is wrong as a whole has no outliers.
-TEST(FindCornerOutliers, ReturnsNoneForRandomCorners) {
+TEST(FindCornerOutliers, ReturnsNoneWhenAllCornersAreRandom) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(12);
   auto corners =

@@ -19,7 +19,7 @@ std::vector<CornerError> simulate_errors(const CornerVariance& truth, Random& ra
   std::vector<CornerError> errors;
   for (int i = 0; i < 4000; ++i) {
     const double sd_px = 0.01 * std::pow(10, random.uniform(0, 1));
-    const double unweighted_rms_px = std::sqrt(truth.at(sd_px));
+    const double unweighted_rms_px = std::sqrt(truth.corner_variance_px2(sd_px));
     const Eigen::Vector2d residual =
         unweighted_rms_px * Eigen::Vector2d(random.normal(), random.normal());
     errors.push_back({residual.squaredNorm() / 2, sd_px});
@@ -27,46 +27,52 @@ std::vector<CornerError> simulate_errors(const CornerVariance& truth, Random& ra
   return errors;
 }
 
-TEST(EstimateCornerVariance, MatchesSimulatedVariance) {
+TEST(EstimateCornerVarianceComponents, MatchesTrueVarianceOfSimulatedCorners) {
   Random random(1);
   for (const auto& [rest_px, scale] :
        {std::pair{0.02, 1.2}, {0.0, 1.0}, {0.05, 0.0}, {0.2, 1.0}, {0.005, 2.0}}) {
     const CornerVariance truth{rest_px * rest_px, scale * scale};
-    const CornerVariance found = estimate_variance_components(simulate_errors(truth, random));
+    const CornerVariance found =
+        estimate_corner_variance_components(simulate_errors(truth, random));
     for (const double sd_px : {0.01, 0.03, 0.1}) {
-      EXPECT_NEAR(std::sqrt(found.at(sd_px) / truth.at(sd_px)), 1, 0.08)
+      EXPECT_NEAR(std::sqrt(found.corner_variance_px2(sd_px) / truth.corner_variance_px2(sd_px)), 1,
+                  0.08)
           << rest_px << " " << scale << " " << sd_px;
     }
   }
 }
 
-TEST(EstimateCornerVariance, IsRobustToOutliers) {
+TEST(EstimateCornerVarianceComponents, MatchesTrueVarianceWithOnePercentOutliers) {
   Random random(2);
   const CornerVariance truth{1e-4, 1};
   auto errors = simulate_errors(truth, random);
   for (std::size_t i = 0; i < errors.size(); i += 100) errors[i].square_px2 = 4;
-  const CornerVariance found = estimate_variance_components(errors);
+  const CornerVariance found = estimate_corner_variance_components(errors);
   for (const double sd_px : {0.01, 0.1}) {
-    EXPECT_NEAR(std::sqrt(found.at(sd_px) / truth.at(sd_px)), 1, 0.15);
+    EXPECT_NEAR(std::sqrt(found.corner_variance_px2(sd_px) / truth.corner_variance_px2(sd_px)), 1,
+                0.15);
   }
 }
 
-TEST(EstimateCornerVariance, IsRobustToOneWrongDeviation) {
+TEST(EstimateCornerVarianceComponents, MatchesTrueVarianceWhenOneSdIsTooLarge) {
   Random random(2);
   const CornerVariance truth{1e-4, 1};
   for (const double sd_px : {0.5, 1.0, 1e9}) {
     auto errors = simulate_errors(truth, random);
     errors[3].sd_px = sd_px;
-    const CornerVariance found = estimate_variance_components(errors);
+    const CornerVariance found = estimate_corner_variance_components(errors);
     for (const double known_px : {0.01, 0.1}) {
-      EXPECT_NEAR(std::sqrt(found.at(known_px) / truth.at(known_px)), 1, 0.08) << sd_px;
+      EXPECT_NEAR(
+          std::sqrt(found.corner_variance_px2(known_px) / truth.corner_variance_px2(known_px)), 1,
+          0.08)
+          << sd_px;
     }
   }
 }
 
-TEST(EstimateCornerVariance, ReturnsMeanSquareForEqualDeviations) {
+TEST(EstimateCornerVarianceComponents, ReturnsMeanSquareErrorWhenAllSdsAreEqual) {
   const std::vector<CornerError> errors{{4e-4, 0.01}, {1e-4, 0.01}, {1e-4, 0.01}};
-  EXPECT_NEAR(estimate_variance_components(errors).at(0.01), 2e-4, 1e-9);
+  EXPECT_NEAR(estimate_corner_variance_components(errors).corner_variance_px2(0.01), 2e-4, 1e-9);
 }
 
 /// Returns corners of 16 views with known standard deviations, ten times as large at the rim of the
@@ -77,7 +83,7 @@ IntrinsicsInput uneven_input(const SyntheticViews& views, Random& random) {
   for (auto& view : input.views) {
     for (auto& corner : view) {
       const double off = (corner.pixel - Eigen::Vector2d(400, 300)).norm() / 500;
-      corner.inward.setZero();
+      corner.d_pixel_d_edge_shift.setZero();
       corner.sd_px = 0.01 * std::exp(3 * off);
       corner.pixel += corner.sd_px * Eigen::Vector2d(random.normal(), random.normal());
     }
@@ -98,7 +104,7 @@ double unweighted_rms_px(const IntrinsicsSolution& solution) {
 }
 
 /// Compares solves with and without known standard deviations.
-TEST(CornerWeights, ReducesProjectionErrorOfSolve) {
+TEST(CornerWeights, KnownCornerSdsReduceProjectionErrorOfSolve) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   double known_px2 = 0, unknown_px2 = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
@@ -106,9 +112,9 @@ TEST(CornerWeights, ReducesProjectionErrorOfSolve) {
     IntrinsicsInput input = uneven_input(views, random);
     const auto square_px2 = [&] {
       const IntrinsicsSolution solution = solve_intrinsics(input);
-      EXPECT_TRUE(solution.ok());
+      EXPECT_TRUE(solution.has_succeeded());
       const auto difference =
-          compute_projection_difference(views.lens, solution.lens(), views.imager_px, even);
+          compute_projection_difference(views.lens, solution.fitted_lens(), views.imager_px, even);
       return std::pow(difference.value().rms_px, 2);
     };
     known_px2 += square_px2();
@@ -121,16 +127,16 @@ TEST(CornerWeights, ReducesProjectionErrorOfSolve) {
   RecordProperty("told_over_untold", std::to_string(std::sqrt(known_px2 / unknown_px2)));
 }
 
-TEST(CornerWeights, WeightedRmsEqualsUnweightedRms) {
+TEST(CornerWeights, WeightedRmsOfSolutionMatchesUnweightedResidualRms) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(3);
   const IntrinsicsSolution solution = solve_intrinsics(uneven_input(views, random));
-  ASSERT_TRUE(solution.ok());
+  ASSERT_TRUE(solution.has_succeeded());
   EXPECT_NEAR(solution.rms_px, unweighted_rms_px(solution), 0.05 * unweighted_rms_px(solution));
 }
 
 /// Some corners have no standard deviation and much larger errors than the others.
-TEST(CornerWeights, LimitsEffectOfCornersWithoutDeviation) {
+TEST(CornerWeights, SolvedLensHardlyChangesByErroneousCornersWithoutSd) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(4);
   IntrinsicsInput input = uneven_input(views, random);
@@ -143,29 +149,30 @@ TEST(CornerWeights, LimitsEffectOfCornersWithoutDeviation) {
     }
   }
   const IntrinsicsSolution with = solve_intrinsics(input);
-  ASSERT_TRUE(without.ok() && with.ok());
+  ASSERT_TRUE(without.has_succeeded() && with.has_succeeded());
   EXPECT_LT(with.outliers, without.outliers + unknown / 4);
-  const auto apart =
-      compute_projection_difference(without.lens(), with.lens(), views.imager_px, even);
+  const auto apart = compute_projection_difference(without.fitted_lens(), with.fitted_lens(),
+                                                   views.imager_px, even);
   ASSERT_TRUE(apart);
   EXPECT_LT(apart->rms_px, 0.02);
 }
 
-TEST(CornerWeights, MatchesVariancesAndMeanSquare) {
+TEST(CornerWeights, WeightsAreInverseToSdsAndKeepMeanSquaredError) {
   Random random(5);
   const CornerVariance truth{1e-4, 1};
   const auto known = simulate_errors(truth, random);
   const CornerWeights weights(known, {});
-  EXPECT_NEAR(weights.at(0.01) / weights.at(0.1), std::sqrt(truth.at(0.1) / truth.at(0.01)), 0.3);
+  EXPECT_NEAR(weights.corner_weight(0.01) / weights.corner_weight(0.1),
+              std::sqrt(truth.corner_variance_px2(0.1) / truth.corner_variance_px2(0.01)), 0.3);
   double squares = 0, weighted = 0;
   for (const auto& [square_px2, sd_px] : known) {
     squares += square_px2;
-    weighted += std::pow(weights.at(sd_px), 2) * square_px2;
+    weighted += std::pow(weights.corner_weight(sd_px), 2) * square_px2;
   }
   EXPECT_NEAR(std::sqrt(weighted / squares), 1, 0.03);
   // A few corners without a deviation that fit by chance get no larger weight than the others.
   const std::vector<CornerError> unknown{{1e-8, 0}, {2e-8, 0}};
-  EXPECT_LT(CornerWeights(known, unknown).at(0), weights.at(0.01));
+  EXPECT_LT(CornerWeights(known, unknown).corner_weight(0), weights.corner_weight(0.01));
 }
 
 }  // namespace

@@ -26,15 +26,15 @@ constexpr double kReach = 0.8;
 Eigen::Vector3d fit_parabola(const Lens& lens, const Eigen::Vector2d& from,
                              const Eigen::Vector2d& to, const Eigen::Vector2d& outwards) {
   constexpr int steps = 2000;
-  const Eigen::Vector3d a = lens.unproject(from).value().direction,
-                        b = lens.unproject(to).value().direction;
+  const Eigen::Vector3d a = lens.unproject_pixel(from).value().direction,
+                        b = lens.unproject_pixel(to).value().direction;
   const Eigen::Vector2d length = to - from;
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   double before = -1;
   for (int i = 1; i < steps; ++i) {
     const double share = double(i) / steps;
-    const Eigen::Vector2d off = lens.project((1 - share) * a + share * b).value() - from;
+    const Eigen::Vector2d off = lens.project_point((1 - share) * a + share * b).value() - from;
     const double w = 2 * length.dot(off) / length.squaredNorm() - 1, step = w - before;
     before = w;
     if (std::abs(w) > kReach) continue;
@@ -82,31 +82,31 @@ Tag tag_with_errors(const std::array<double, 4>& error_px) {
   return tag;
 }
 
-TEST(CorrectCornersForCurvedEdges, MovesCornersToTruePositions) {
+TEST(CorrectCornersForEdgeCurvature, MovesCornersToTruePositionsDespiteCurvatureErrors) {
   for (const std::array<double, 4> errors_px :
        {std::array{0.0, 0.0, 0.0, 0.0}, {0.1, 0.0, 0.0, 0.0}, {0.06, -0.1, 0.03, 0.08}}) {
     Tag tag = tag_with_errors(errors_px);
-    correct_corners_for_curved_edges(tag.seen, synthetic_lens());
+    correct_corners_for_edge_curvature(tag.seen, synthetic_lens());
     for (std::size_t k = 0; k < 4; ++k) {
       // The errors rotate the chords.
       EXPECT_LT((tag.seen[k].pixel - tag.truth[k]).norm(), 1e-3);
     }
     // The corners now have the curvature of the lens.
-    EXPECT_LT(correct_corners_for_curved_edges(tag.seen, synthetic_lens()), 1e-3);
+    EXPECT_LT(correct_corners_for_edge_curvature(tag.seen, synthetic_lens()), 1e-3);
   }
 }
 
-TEST(CorrectCornersForCurvedEdges, KeepsTagsWithoutMeasuredCurvature) {
+TEST(CorrectCornersForEdgeCurvature, KeepsCornersOfTagWithUnmeasuredEdgeCurvature) {
   Tag tag = tag_with_errors({0.1, 0.1, 0.1, 0.1});
   tag.seen[2].bow.reach = 0;
   const auto before = tag.seen;
-  EXPECT_EQ(correct_corners_for_curved_edges(tag.seen, synthetic_lens()), 0);
+  EXPECT_EQ(correct_corners_for_edge_curvature(tag.seen, synthetic_lens()), 0);
   for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(tag.seen[k].pixel, before[k].pixel);
 }
 
 /// Above all the noise of the position of a tag as a whole.
-TEST(CorrectCornersForCurvedEdges, ReducesCornerNoise) {
-  const Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
+TEST(CorrectCornersForEdgeCurvature, ReducesCornerErrorsOfRenderedBoardByQuarter) {
+  const Scene scene = read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
   const CaptureSet views = *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
   const FrameRenderer renderer(scene);
   const BoardDetector detector(scene.board->print);
@@ -116,13 +116,13 @@ TEST(CorrectCornersForCurvedEdges, ReducesCornerNoise) {
   double stated = 0;
   std::size_t corners = 0;
   for (std::size_t index = 0; index < 8; ++index) {
-    const BoardShot shot = make_board_shot(scene, views, index);
+    const BoardShot shot = make_simulated_board_capture(scene, views, index);
     std::map<int, TagDetection::Corners> truth;
     for (const auto& [tag, corner, pixel] : find_true_corners_in_image(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
     }
     const BoardDetection seen = detector.detect_board(
-        simulate_sensor(scene.sensor, renderer.render_board_electrons(shot), index));
+        simulate_sensor_image(scene.sensor, renderer.render_board_in_electrons(shot), index));
     auto all = lattice.match_corners_to_flat_board(seen);
     for (const std::size_t pass : {0U, 1U}) {
       for (std::size_t i = 0; i < seen.tags.size(); ++i) {
@@ -134,7 +134,7 @@ TEST(CorrectCornersForCurvedEdges, ReducesCornerNoise) {
         }
         of_tags[pass] += sum.squaredNorm();
       }
-      correct_corners_for_curved_edges(all, lens);
+      correct_corners_for_edge_curvature(all, lens);
     }
     for (const auto& corner : all) stated += 2 * corner.sd_px * corner.sd_px;
     corners += all.size();

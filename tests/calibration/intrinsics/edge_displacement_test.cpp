@@ -14,7 +14,7 @@ namespace vlp {
 namespace {
 
 /// Board of separate tags, with gaps as wide as a tag or narrower.
-class EstimateEdgeShifts : public testing::TestWithParam<double> {
+class EstimateTagEdgeDisplacements : public testing::TestWithParam<double> {
  protected:
   Board board() const {
     Board board = synthetic_board(false);
@@ -28,7 +28,7 @@ class EstimateEdgeShifts : public testing::TestWithParam<double> {
     std::vector<BoardView> seen;
     while (static_cast<int>(seen.size()) < count) {
       BoardDetection view = views.random_view(random, noise_px);
-      if (!lattice.has_sufficient_corners(view)) continue;
+      if (!lattice.are_corners_sufficient_for_pose(view)) continue;
       for (TagDetection& tag : view.tags) tag = shrunk(tag, shift_px);
       seen.push_back({"", views.imager_px, view});
     }
@@ -42,31 +42,33 @@ class EstimateEdgeShifts : public testing::TestWithParam<double> {
   }
 };
 
-TEST_P(EstimateEdgeShifts, ReturnsShiftOfEachView) {
+TEST_P(EstimateTagEdgeDisplacements, ReturnsTrueEdgeDisplacementOfEachView) {
   const auto input = make_input(shrunk_views(6, 0, 0.3));
   const auto shifts = estimate_tag_edge_displacements(input.views, synthetic_lens());
   ASSERT_EQ(shifts.size(), 6U);
-  for (const EdgeDisplacement& shift : shifts) EXPECT_NEAR(shift.at(shift.middle), 0.3, 0.005);
+  for (const EdgeDisplacement& shift : shifts)
+    EXPECT_NEAR(shift.displacement_px_at_pixel(shift.middle), 0.3, 0.005);
   const auto none =
       estimate_tag_edge_displacements(make_input(shrunk_views(6, 0, 0)).views, synthetic_lens());
   ASSERT_EQ(none.size(), 6U);
-  for (const EdgeDisplacement& shift : none) EXPECT_NEAR(shift.at(shift.middle), 0, 1e-6);
+  for (const EdgeDisplacement& shift : none)
+    EXPECT_NEAR(shift.displacement_px_at_pixel(shift.middle), 0, 1e-6);
 }
 
-TEST_P(EstimateEdgeShifts, CorrectsLensOfSolve) {
+TEST_P(EstimateTagEdgeDisplacements, SolveIntrinsicsRecoversEdgeShiftAndTrueLens) {
   const auto input = make_input(shrunk_views(16, 0.03, 0.35));
   const IntrinsicsSolution solution = solve_intrinsics(input);
-  ASSERT_TRUE(solution.ok());
+  ASSERT_TRUE(solution.has_succeeded());
   ASSERT_EQ(solution.edge_shifts_px.size(), 16U);
   for (const double shift_px : solution.edge_shifts_px) EXPECT_NEAR(shift_px, 0.35, 0.03);
   EXPECT_NEAR(solution.rms_px, 0.03, 0.004);
   const auto difference =
-      compute_projection_difference(synthetic_lens(), solution.lens(), {800, 600}, even);
+      compute_projection_difference(synthetic_lens(), solution.fitted_lens(), {800, 600}, even);
   ASSERT_TRUE(difference);
   EXPECT_LT(difference->mean_px, 0.03);
 }
 
-TEST_P(EstimateEdgeShifts, DistinguishesVaryingShiftFromWarp) {
+TEST_P(EstimateTagEdgeDisplacements, SolveIntrinsicsEstimatesNoWarpWhenEdgeShiftVaries) {
   auto seen = shrunk_views(16, 0.03, 0);
   for (BoardView& view : seen) {
     for (TagDetection& tag : view.seen.tags) {
@@ -74,16 +76,16 @@ TEST_P(EstimateEdgeShifts, DistinguishesVaryingShiftFromWarp) {
     }
   }
   const IntrinsicsSolution solution = solve_intrinsics(make_input(seen));
-  ASSERT_TRUE(solution.ok());
+  ASSERT_TRUE(solution.has_succeeded());
   EXPECT_FALSE(solution.solved_for.warp);
   EXPECT_NEAR(solution.rms_px, 0.03, 0.004);
   const auto difference =
-      compute_projection_difference(synthetic_lens(), solution.lens(), {800, 600}, even);
+      compute_projection_difference(synthetic_lens(), solution.fitted_lens(), {800, 600}, even);
   ASSERT_TRUE(difference);
   EXPECT_LT(difference->mean_px, 0.03);
 }
 
-TEST_P(EstimateEdgeShifts, KeepsSpacingAcceptedByCheckBoard) {
+TEST_P(EstimateTagEdgeDisplacements, CheckBoardLayoutAcceptsTrueSpacingDespiteEdgeShift) {
   const auto seen = shrunk_views(10, 0.03, 0.4);
   EXPECT_EQ(check_board_layout(board(), seen, {}).problem, "");
   EXPECT_EQ(check_board_layout(board(), seen, synthetic_lens()).problem, "");
@@ -92,26 +94,26 @@ TEST_P(EstimateEdgeShifts, KeepsSpacingAcceptedByCheckBoard) {
   EXPECT_NE(check_board_layout(other, seen, synthetic_lens()).problem, "");
 }
 
-INSTANTIATE_TEST_SUITE_P(Spacings, EstimateEdgeShifts, testing::Values(1.0, 0.4),
+INSTANTIATE_TEST_SUITE_P(Spacings, EstimateTagEdgeDisplacements, testing::Values(1.0, 0.4),
                          [](const auto& gap) { return gap.param == 1 ? "OneTag" : "Narrow"; });
 
 /// A warped board that is assumed flat looks as if edges shifted inwards here and outwards there.
-TEST(EdgeDisplacement, DoesNotAbsorbBoardWarp) {
+TEST(EdgeDisplacement, SolveEstimatesWarpInsteadOfEdgeShiftsForWarpedBoard) {
   constexpr double noise_px = 0.017;
   Random random(12);
   const WideBoards boards{0.1, 0.2};
   const auto input = wide_input(false, 40, random, noise_px, {6e-4, 9e-4}, boards);
   const IntrinsicsSolution solution = solve_intrinsics(input);
-  ASSERT_TRUE(solution.ok());
+  ASSERT_TRUE(solution.has_succeeded());
   EXPECT_TRUE(solution.solved_for.warp);
   EXPECT_NEAR(solution.rms_px, 0.0165, 0.0005);  // 0.0176 with such shifts left in
   const auto difference =
-      compute_projection_difference(wide_lens(), solution.lens(), kWideImager, even);
+      compute_projection_difference(wide_lens(), solution.fitted_lens(), kWideImager, even);
   ASSERT_TRUE(difference);
   EXPECT_LT(difference->rms_px, 0.006);  // 0.0144
 }
 
-TEST(EdgeDisplacement, IsZeroForTouchingSquares) {
+TEST(EstimateTagEdgeDisplacements, ReturnsZeroForTouchingSquares) {
   const SyntheticViews views{synthetic_board(true), synthetic_lens()};
   Random random(3);
   const auto input = views.input(4, random, 0.1);

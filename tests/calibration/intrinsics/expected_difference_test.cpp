@@ -32,8 +32,8 @@ Scatter scatter(double bent_m) {
       input.views.push_back(views.input(1, random, kNoise).views[0]);
     }
     const IntrinsicsSolution solution = solve_intrinsics(input);
-    EXPECT_TRUE(solution.ok());
-    const Lens lens = solution.lens();
+    EXPECT_TRUE(solution.has_succeeded());
+    const Lens lens = solution.fitted_lens();
     const ProjectionDifference difference =
         compute_projection_difference(views.lens, lens, views.imager_px, [](const auto&) {
           return 1;
@@ -41,12 +41,12 @@ Scatter scatter(double bent_m) {
     const auto noise = compute_expected_projection_difference(
         lens, views.imager_px, ProjectionUncertainty(solution).intrinsics_covariance());
     const auto by_views = compute_expected_projection_difference(
-        lens, views.imager_px, estimate_jackknife_covariance(solution));
+        lens, views.imager_px, estimate_intrinsics_covariance_by_jackknife(solution));
     sum.found += difference.rms_px * difference.rms_px / kSeeds;
     sum.by_noise += noise.rms_px * noise.rms_px / kSeeds;
     sum.by_views += by_views.rms_px * by_views.rms_px / kSeeds;
     sum.degrees_of_freedom += noise.degrees_of_freedom;
-    const double worst_px = estimate_max_expected_difference_px(
+    const double worst_px = estimate_expected_max_projection_difference_px(
         lens, views.imager_px, ProjectionUncertainty(solution).intrinsics_covariance());
     sum.worst_found += difference.worst_px * difference.worst_px / kSeeds;
     sum.worst_by_noise += worst_px * worst_px / kSeeds;
@@ -56,7 +56,7 @@ Scatter scatter(double bent_m) {
 
 // A mean square of n terms has the relative standard deviation sqrt(2 / n); the limit is three
 // times that.
-TEST(ExpectedDifference, MatchesDifferenceFromTruth) {
+TEST(ComputeExpectedProjectionDifference, MatchesActualLensErrorForPixelNoise) {
   const Scatter of = scatter(0);
   const double sd = std::sqrt(2 / of.degrees_of_freedom);
   EXPECT_LT(sd, 0.3);
@@ -69,7 +69,7 @@ TEST(ExpectedDifference, MatchesDifferenceFromTruth) {
   EXPECT_LT(of.by_views / of.by_noise, 2.5);
 }
 
-TEST(EstimateJackknifeCovariance, IncludesErrorsCommonToView) {
+TEST(EstimateIntrinsicsCovarianceByJackknife, CoversErrorsOfBoardWarpThatVariesPerView) {
   const Scatter of = scatter(0.0005);
   const double sd = std::sqrt(2 / of.degrees_of_freedom);
   EXPECT_GT(of.found / of.by_noise, 1 + 3 * sd);  // noise alone does not explain it

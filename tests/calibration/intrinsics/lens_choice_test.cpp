@@ -49,11 +49,13 @@ void expect_chosen(const Lens& lens) {
   constexpr int count = 30;
   const auto choice = select_lens_model(seen_through(lens, count));
   ASSERT_TRUE(choice);
-  EXPECT_EQ(to_string(choice->model), to_string(lens.lens_model())) << describe(*choice);
+  EXPECT_EQ(lens_model_name(choice->model), lens_model_name(lens.lens_model()))
+      << describe_lens_model_choice(*choice);
   // Noise, and errors outside the region of the other views.
   EXPECT_NEAR(find_rms(*choice, choice->model), kNoise_px, 0.25 * kNoise_px);
   EXPECT_EQ(choice->tried.size(), 5U);
-  EXPECT_TRUE(describe(*choice).starts_with(to_string(lens.lens_model()))) << describe(*choice);
+  EXPECT_TRUE(describe_lens_model_choice(*choice).starts_with(lens_model_name(lens.lens_model())))
+      << describe_lens_model_choice(*choice);
 }
 
 TEST(SelectLensModel, ReturnsOpencv4ForRadialLens) { expect_chosen(radial_lens()); }
@@ -62,7 +64,7 @@ TEST(SelectLensModel, ReturnsOpencv8ForRationalLens) { expect_chosen(rational_le
 
 TEST(SelectLensModel, ReturnsFisheyeForFisheyeLens) { expect_chosen(fisheye_lens()); }
 
-TEST(SelectLensModel, IgnoresBadView) {
+TEST(SelectLensModel, ReturnsOpencv8ForRationalLensDespiteOneBadView) {
   constexpr int count = 24;
   IntrinsicsInput input = seen_through(rational_lens(), count);
   for (auto& corner : input.views[5]) {
@@ -70,11 +72,12 @@ TEST(SelectLensModel, IgnoresBadView) {
   }
   const auto choice = select_lens_model(input);
   ASSERT_TRUE(choice);
-  EXPECT_EQ(to_string(choice->model), to_string(LensModel::opencv8)) << describe(*choice);
+  EXPECT_EQ(lens_model_name(choice->model), lens_model_name(LensModel::opencv8))
+      << describe_lens_model_choice(*choice);
   EXPECT_NEAR(find_rms(*choice, choice->model), kNoise_px, 0.4 * kNoise_px);
 }
 
-TEST(SelectLensModel, UsesFewViewsFarFromCenter) {
+TEST(SelectLensModel, RejectsOpencv4IfFewViewsLieFarFromCenter) {
   constexpr std::size_t all = 30, far = 6;
   constexpr double inner_px = 220;
   SyntheticViews views{synthetic_board(false), rational_lens()};
@@ -84,7 +87,7 @@ TEST(SelectLensModel, UsesFewViewsFarFromCenter) {
   const Eigen::Vector2d middle = rational_lens().principal_point_px();
   while (input.views.size() < all) {
     const BoardDetection seen = views.random_view(random, kNoise_px);
-    if (!input.lattice.has_sufficient_corners(seen)) continue;
+    if (!input.lattice.are_corners_sufficient_for_pose(seen)) continue;
     auto corners = input.lattice.match_corners_to_flat_board(seen);
     const bool inner = std::all_of(corners.begin(), corners.end(), [&](const auto& corner) {
       return (corner.pixel - middle).norm() < inner_px;
@@ -94,7 +97,8 @@ TEST(SelectLensModel, UsesFewViewsFarFromCenter) {
   }
   const auto choice = select_lens_model(input);
   ASSERT_TRUE(choice);
-  EXPECT_NE(to_string(choice->model), to_string(LensModel::opencv4)) << describe(*choice);
+  EXPECT_NE(lens_model_name(choice->model), lens_model_name(LensModel::opencv4))
+      << describe_lens_model_choice(*choice);
   EXPECT_LT(find_rms(*choice, choice->model), 2 * kNoise_px);
 }
 
@@ -103,31 +107,31 @@ TEST(SelectLensModel, ReturnsNulloptForFewerThanSixViews) {
   EXPECT_TRUE(select_lens_model(seen_through(radial_lens(), 6)));
 }
 
-TEST(SelectLensModel, SkipsOpencvModelsBeyondRightAngle) {
+TEST(SelectLensModel, ReturnsFisheyeForCornersBeyondRightAngle) {
   Random random(44);
   const auto choice = select_lens_model(wide_input(false, 24, random, kNoise_px));
   ASSERT_TRUE(choice);
   EXPECT_EQ(choice->model, LensModel::fisheye);
-  EXPECT_GT(choice->beyond_rad, 1.58);
-  EXPECT_LT(choice->beyond_rad, 2);
+  EXPECT_GT(choice->beyond_right_angle_rad, 1.58);
+  EXPECT_LT(choice->beyond_right_angle_rad, 2);
   ASSERT_FALSE(choice->tried.empty());
   for (const LensCandidate& tried : choice->tried) {
     EXPECT_EQ(std::isfinite(tried.rms_px), tried.model == LensModel::fisheye);
   }
-  EXPECT_EQ(select_lens_model(seen_through(fisheye_lens(), 8)).value().beyond_rad, 0);
+  EXPECT_EQ(select_lens_model(seen_through(fisheye_lens(), 8)).value().beyond_right_angle_rad, 0);
 }
 
-TEST(DescribeLensChoice, ExplainsFisheyeBeyondRightAngle) {
+TEST(DescribeLensChoice, StatesOffAxisAngleWhenBoardIsBeyondRightAngle) {
   const LensChoice choice{
       LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}, 1.7};
-  EXPECT_EQ(describe(choice),
+  EXPECT_EQ(describe_lens_model_choice(choice),
             "OPENCV_FISHEYE, 0.051 px rms in held-out views; the board is visible up to 97 degrees "
             "off axis, where no LENSMODEL_OPENCVn has rays");
 }
 
-TEST(DescribeLensChoice, ListsModelsWithoutLens) {
+TEST(DescribeLensChoice, ListsModelsForWhichNoLensWasFound) {
   const LensChoice choice{LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}};
-  EXPECT_EQ(describe(choice),
+  EXPECT_EQ(describe_lens_model_choice(choice),
             "OPENCV_FISHEYE, 0.051 px rms in held-out views; LENSMODEL_OPENCV4 no lens");
 }
 

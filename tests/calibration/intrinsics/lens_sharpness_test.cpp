@@ -47,9 +47,10 @@ LensSharpness measured(const StepAt& step_at) {
   return measure_lens_sharpness(make_views(step_at), kSharpnessImager_px).value();
 }
 
-TEST(MeasureLensSharpness, ReturnsMtf50OfEvenLens) {
+TEST(MeasureLensSharpness, ReturnsMtf50AndNoDefectsForUniformBlur) {
   const LensSharpness even = measured(even_step);
-  EXPECT_NEAR(even.mean_mtf50, compute_mtf50(kLensBlur_px), 0.02 * even.mean_mtf50);
+  EXPECT_NEAR(even.mean_mtf50, compute_mtf50_of_gaussian_blur(kLensBlur_px),
+              0.02 * even.mean_mtf50);
   EXPECT_GT(even.worst_ratio, 0.97);
   EXPECT_LT(even.asymmetry, 0.02);
   EXPECT_LT(even.local_loss, 0.03);
@@ -57,7 +58,7 @@ TEST(MeasureLensSharpness, ReturnsMtf50OfEvenLens) {
   EXPECT_NEAR(even.black_level, 14.0 / 190, 1e-6);
 }
 
-TEST(MeasureLensSharpness, IgnoresShakenViews) {
+TEST(MeasureLensSharpness, KeepsMeanMtf50WhenHalfOfViewsAreShaken) {
   const LensSharpness still = measured(even_step);
   const LensSharpness shaken = measured([](const Eigen::Vector2d& at_px, int view) {
     EdgeStep step = even_step(at_px, view);
@@ -67,7 +68,7 @@ TEST(MeasureLensSharpness, IgnoresShakenViews) {
   EXPECT_NEAR(shaken.mean_mtf50, still.mean_mtf50, 0.02 * still.mean_mtf50);
 }
 
-TEST(MeasureLensSharpness, ReportsAsymmetryOfTiltedFocalPlane) {
+TEST(MeasureLensSharpness, ReportsAsymmetryForTiltedFocalPlane) {
   const LensSharpness tilted = measured([](const Eigen::Vector2d& at_px, int view) {
     EdgeStep step = even_step(at_px, view);
     step.blur_px = std::hypot(step.blur_px, 1.0 * (at_px.x() / 400 - 1));
@@ -77,7 +78,7 @@ TEST(MeasureLensSharpness, ReportsAsymmetryOfTiltedFocalPlane) {
   EXPECT_LT(tilted.worst_ratio, 0.9);
 }
 
-TEST(MeasureLensSharpness, ReportsNoAsymmetryOfSymmetricLens) {
+TEST(MeasureLensSharpness, ReportsNoAsymmetryForRadiallySymmetricBlur) {
   const LensSharpness symmetric = measured([](const Eigen::Vector2d& at_px, int view) {
     EdgeStep step = even_step(at_px, view);
     step.blur_px *= 1 + 0.5 * (at_px - Eigen::Vector2d(400, 300)).squaredNorm() / 250000;
@@ -88,7 +89,7 @@ TEST(MeasureLensSharpness, ReportsNoAsymmetryOfSymmetricLens) {
   EXPECT_LT(symmetric.local_loss, 0.05);
 }
 
-TEST(MeasureLensSharpness, LocatesShadowOfDust) {
+TEST(MeasureLensSharpness, ReturnsDepthAndPositionOfDustShadow) {
   const Eigen::Vector2d dust_px(500, 200);
   const LensSharpness dusty = measured([&](const Eigen::Vector2d& at_px, int view) {
     EdgeStep step = even_step(at_px, view);
@@ -102,7 +103,7 @@ TEST(MeasureLensSharpness, LocatesShadowOfDust) {
   EXPECT_LT(dusty.local_loss, 0.05);
 }
 
-TEST(MeasureLensSharpness, ReportsLossOfSmear) {
+TEST(MeasureLensSharpness, ReportsLocalMtf50LossWhereLensIsSmeared) {
   const Eigen::Vector2d smear_px(300, 350);
   const LensSharpness smeared = measured([&](const Eigen::Vector2d& at_px, int view) {
     EdgeStep step = even_step(at_px, view);
@@ -115,7 +116,7 @@ TEST(MeasureLensSharpness, ReportsLossOfSmear) {
 }
 
 /// A part of the image with few views is not sharper than the others.
-TEST(MeasureLensSharpness, IsIndependentOfNumberOfViews) {
+TEST(MeasureLensSharpness, Mtf50IsUnbiasedInImagePartsWithFewerViews) {
   std::mt19937 random(3);
   std::normal_distribution<double> of_view(0, 0.1);
   std::vector<double> ratios;
@@ -139,7 +140,7 @@ TEST(MeasureLensSharpness, IsIndependentOfNumberOfViews) {
   EXPECT_NEAR(mean, 1, 0.03);
 }
 
-TEST(MeasureLensSharpness, ReportsUnknownShadowForFewTagsPerView) {
+TEST(MeasureLensSharpness, ReturnsNanShadowForFewerThanEightTagsPerView) {
   // Seven tags in a view are 28 edges, too few for a field of the light; all views cover the image.
   const auto dense = make_views(even_step, 140);
   std::vector<BoardView> views;
@@ -156,7 +157,7 @@ TEST(MeasureLensSharpness, ReportsUnknownShadowForFewTagsPerView) {
   EXPECT_TRUE(std::isnan(found->local_shadow));
 }
 
-TEST(MeasureLensSharpness, ReturnsNulloptWithoutEdges) {
+TEST(MeasureLensSharpness, ReturnsNulloptWhenTagsHaveNoEdgeSteps) {
   auto views = make_views(even_step, 6);
   for (BoardView& view : views) {
     for (TagDetection& tag : view.seen.tags) tag.steps = {};
@@ -164,11 +165,11 @@ TEST(MeasureLensSharpness, ReturnsNulloptWithoutEdges) {
   EXPECT_FALSE(measure_lens_sharpness(views, kSharpnessImager_px));
 }
 
-TEST(Mtf50OfView, ReturnsMedianOfEdges) {
+TEST(ComputeMedianEdgeMtf50, MatchesMtf50OfUniformEdgeBlur) {
   const auto views = make_views(even_step, 1);
   const auto found = compute_median_edge_mtf50(views[0].seen);
   ASSERT_TRUE(found);
-  EXPECT_NEAR(*found, compute_mtf50(kLensBlur_px), 0.01 * *found);
+  EXPECT_NEAR(*found, compute_mtf50_of_gaussian_blur(kLensBlur_px), 0.01 * *found);
 }
 
 }  // namespace

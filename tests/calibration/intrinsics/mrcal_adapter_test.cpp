@@ -14,7 +14,7 @@ namespace vlp {
 namespace {
 
 /// mrcal reports outliers on stderr. Only the messages of other threads may appear there.
-TEST(SolveByMrcal, SuppressesOnlyMessagesOfMrcal) {
+TEST(SolveBoardProblemByMrcal, SuppressesMrcalMessagesButKeepsStderrOfOtherThreads) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(7);
   IntrinsicsInput input = views.input(15, random, 0.05);
@@ -36,7 +36,7 @@ TEST(SolveByMrcal, SuppressesOnlyMessagesOfMrcal) {
     }
   }
   EXPECT_EQ(testing::internal::GetCapturedStderr(), written);
-  ASSERT_TRUE(solution.ok());
+  ASSERT_TRUE(solution.has_succeeded());
   EXPECT_GE(solution.outliers, 10);
 }
 

@@ -28,11 +28,11 @@ class WriteMrcalCorners : public testing::TestWithParam<bool> {
 };
 
 /// Tests a plain board, and a Kalibr board, which is four lattices for mrcal.
-TEST_P(WriteMrcalCorners, KeepsSolutionAfterRoundTrip) {
+TEST_P(WriteMrcalCorners, RereadCornersYieldSameLensAsOriginalSolve) {
   constexpr int count = 12;
   Random random(3);
   const IntrinsicsSolution solution = solve_intrinsics(views.input(count, random, 0.05));
-  ASSERT_TRUE(solution.ok());
+  ASSERT_TRUE(solution.has_succeeded());
   std::vector<std::string> names;
   for (int i = 0; i < count; ++i) names.push_back(std::to_string(i) + ".png");
   write_mrcal_corners(folder / "corners.vnl", solution, names);
@@ -47,20 +47,21 @@ TEST_P(WriteMrcalCorners, KeepsSolutionAfterRoundTrip) {
   EXPECT_EQ(corners, static_cast<std::size_t>(solution.corners));
   const IntrinsicsSolution again =
       solve_intrinsics(make_input(views.board, read, LensModel::opencv8));
-  ASSERT_TRUE(again.ok());
-  EXPECT_LT(compute_projection_difference(solution.lens(), again.lens(), kImager_px, even)
-                .value()
-                .worst_px,
-            1e-3);
+  ASSERT_TRUE(again.has_succeeded());
+  EXPECT_LT(
+      compute_projection_difference(solution.fitted_lens(), again.fitted_lens(), kImager_px, even)
+          .value()
+          .worst_px,
+      1e-3);
   EXPECT_NEAR(again.rms_px, solution.rms_px, 1e-5);
 }
 
 /// Images of two folders with the same names.
-TEST_P(WriteMrcalCorners, MakesImageNamesUnique) {
+TEST_P(WriteMrcalCorners, AppendsNumbersToRepeatedImageNames) {
   constexpr std::size_t count = 8;
   Random random(3);
   const IntrinsicsSolution solution = solve_intrinsics(views.input(count, random, 0.05));
-  ASSERT_TRUE(solution.ok());
+  ASSERT_TRUE(solution.has_succeeded());
   ASSERT_EQ(solution.views.size(), count);
   const std::vector<std::string> names{"0.png",   "1.png", "0.png", "1.png",
                                        "1.png-2", "a b",   "a_b",   "0.png"};
@@ -68,7 +69,7 @@ TEST_P(WriteMrcalCorners, MakesImageNamesUnique) {
   std::vector<std::string> found;
   for (const BoardView& view :
        read_mrcal_corners(folder / "corners.vnl", views.board, kImager_px)) {
-    EXPECT_TRUE(view.seen.has_corners());
+    EXPECT_TRUE(view.seen.has_detected_corners());
     found.push_back(view.image);
   }
   EXPECT_EQ(found, (std::vector<std::string>{"0.png", "1.png", "0.png-2", "1.png-2", "1.png-2-2",
@@ -88,7 +89,7 @@ std::string row(const std::string& x_and_y, const std::string& fourth) {
   return "0.png " + x_and_y + " " + fourth + "\n";
 }
 
-TEST(ReadMrcalCorners, ComputesWeightsFromLevels) {
+TEST(ReadMrcalCorners, ReturnsWeightsFromLevelOrWeightColumn) {
   const TemporaryFolder folder;
   std::string rows;
   for (int i = 0; i < 12; ++i) {
@@ -104,7 +105,7 @@ TEST(ReadMrcalCorners, ComputesWeightsFromLevels) {
   };
   const auto by_level = read("# filename x y level\n");
   ASSERT_EQ(by_level.size(), 2U);
-  EXPECT_FALSE(by_level[1].seen.has_corners());
+  EXPECT_FALSE(by_level[1].seen.has_detected_corners());
   ASSERT_EQ(by_level[0].seen.points.size(), 11U);
   EXPECT_EQ(by_level[0].seen.points[0].index, 1U);
   EXPECT_EQ(by_level[0].seen.points[0].weight, 1);  // mrcal takes the whole part
@@ -116,7 +117,7 @@ TEST(ReadMrcalCorners, ComputesWeightsFromLevels) {
   EXPECT_EQ(by_weight[0].seen.points[1].weight, 1);
 }
 
-TEST(ReadMrcalCorners, ThrowsForExcessiveWeight) {
+TEST(ReadMrcalCorners, ThrowsForWeightAbove1000) {
   const TemporaryFolder folder;
   const auto file = folder.file("corners.vnl", "# filename x y weight\n" + row("100 100", "1e7"));
   EXPECT_EQ(rejection_message([&] { read_mrcal_corners(file, chessboard(), kImager_px); }),
@@ -124,7 +125,7 @@ TEST(ReadMrcalCorners, ThrowsForExcessiveWeight) {
 }
 
 /// Levels start at 0, so that weights above 1 are written as weights, also powers of two.
-TEST(ReadMrcalCorners, ReturnsWrittenWeights) {
+TEST(ReadMrcalCorners, ReturnsWeightsWrittenByWriteMrcalCorners) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(6);
   IntrinsicsInput input = views.input(6, random, 0.05);
@@ -133,7 +134,7 @@ TEST(ReadMrcalCorners, ReturnsWrittenWeights) {
       for (std::size_t i = 0; i < view.size(); ++i) view[i].weight = most / (i % 2 == 0 ? 1 : 4);
     }
     const IntrinsicsSolution solution = solve_intrinsics(input);
-    ASSERT_TRUE(solution.ok());
+    ASSERT_TRUE(solution.has_succeeded());
     ASSERT_GT(solution.corners, 0);
     const TemporaryFolder folder;
     const auto file = folder / "corners.vnl";
@@ -151,16 +152,16 @@ TEST(ReadMrcalCorners, ReturnsWrittenWeights) {
 }
 
 /// With either solver, corners with large errors and small weights have little influence.
-TEST(CornerWeight, ScalesInfluenceOnSolve) {
+TEST(CornerWeight, SmallWeightsKeepSolvedLensAccurateDespiteCornerErrors) {
   const std::array fisheye{450.0, 451.0, 402.0, 297.0, 0.02, -0.01, 0.003, -0.0004};
   for (const Lens& lens : {synthetic_lens(), Lens(LensModel::fisheye, fisheye)}) {
-    SCOPED_TRACE(to_string(lens.lens_model()));
+    SCOPED_TRACE(lens_model_name(lens.lens_model()));
     const SyntheticViews views{synthetic_board(false), lens};
     Random random(5);
     IntrinsicsInput input = views.input(16, random, 0.05);
     input.warp = WarpChoice::off;
     for (auto& view : input.views) {
-      for (auto& corner : view) corner.inward.setZero();
+      for (auto& corner : view) corner.d_pixel_d_edge_shift.setZero();
     }
     const IntrinsicsSolution whole = solve_intrinsics(input);
     IntrinsicsInput weighted = input;
@@ -168,7 +169,7 @@ TEST(CornerWeight, ScalesInfluenceOnSolve) {
       for (auto& corner : view) corner.weight = 0.5;
     }
     const IntrinsicsSolution half = solve_intrinsics(weighted);
-    ASSERT_TRUE(whole.ok() && half.ok());
+    ASSERT_TRUE(whole.has_succeeded() && half.has_succeeded());
     EXPECT_NEAR(half.rms_px, whole.rms_px / 2, 0.02 * whole.rms_px);
     // Every second corner has errors of a pixel, with a fiftieth of the weight.
     for (auto& view : input.views) {
@@ -178,9 +179,10 @@ TEST(CornerWeight, ScalesInfluenceOnSolve) {
       }
     }
     const IntrinsicsSolution spoilt = solve_intrinsics(input);
-    ASSERT_TRUE(spoilt.ok());
-    EXPECT_LT(compute_projection_difference(lens, spoilt.lens(), kImager_px, even).value().mean_px,
-              0.1);
+    ASSERT_TRUE(spoilt.has_succeeded());
+    EXPECT_LT(
+        compute_projection_difference(lens, spoilt.fitted_lens(), kImager_px, even).value().mean_px,
+        0.1);
   }
 }
 

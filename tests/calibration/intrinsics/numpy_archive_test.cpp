@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-TEST(Base85, MatchesPython) {
+TEST(EncodeBase85, MatchesOutputOfPython) {
   EXPECT_EQ(encode_base85(""), "");
   EXPECT_EQ(encode_base85("hello"), "Xk~0{Zv");
   EXPECT_EQ(encode_base85(std::string("\0\0\0\0", 4)), "00000");
@@ -20,15 +20,15 @@ TEST(Base85, MatchesPython) {
 }
 
 // Checked by the program unzip, which fails for a wrong CRC.
-TEST(NumpyArchive, IsValidZipArchive) {
+TEST(NumpyArchive, SerializeReturnsValidZipWithNpyHeader) {
   if (run_program("command -v unzip").exit_code != 0) GTEST_SKIP() << "no unzip here";
   const TemporaryFolder folder;
   NumpyArchive archive;
   const std::array values{1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
-  archive.add_entry("matrix", {2, 3}, values);
-  archive.add_entry("text", "LENSMODEL_OPENCV8");
-  archive.add_entry("flag", true);
-  const auto file = folder.file("a.npz", archive.serialize());
+  archive.add_npz_array("matrix", {2, 3}, values);
+  archive.add_npz_array("text", "LENSMODEL_OPENCV8");
+  archive.add_npz_array("flag", true);
+  const auto file = folder.file("a.npz", archive.serialize_npz_archive());
   const auto checked = run_program("unzip -t '" + file.string() + "'");
   EXPECT_EQ(checked.exit_code, 0) << checked.output << checked.errors;
   const auto matrix = run_program("unzip -p '" + file.string() + "' matrix.npy | head -c 80");

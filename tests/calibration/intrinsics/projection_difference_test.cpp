@@ -9,13 +9,13 @@
 namespace vlp {
 namespace {
 
-TEST(ProjectionDifference, IsZeroForSameLens) {
+TEST(ComputeProjectionDifference, ReturnsZeroForIdenticalLenses) {
   const Lens lens = synthetic_lens();
   EXPECT_LT(compute_projection_difference(lens, lens, {800, 600}, even).value().worst_px, 1e-6);
 }
 
 // A displaced center is equivalent to a rotation, except for terms of second order in the angle.
-TEST(ProjectionDifference, IgnoresRotation) {
+TEST(ComputeProjectionDifference, IgnoresPrincipalPointShiftEquivalentToRotation) {
   const std::array near{3000.0, 3000.0, 400.0, 300.0}, shifted{3000.0, 3000.0, 403.0, 300.0};
   const auto difference = compute_projection_difference(
       Lens(LensModel::pinhole, near), Lens(LensModel::pinhole, shifted), {800, 600}, even);
@@ -23,7 +23,7 @@ TEST(ProjectionDifference, IgnoresRotation) {
   EXPECT_LT(difference->worst_px, 0.1);
 }
 
-TEST(ProjectionDifference, IncludesFocalLength) {
+TEST(ComputeProjectionDifference, WorstPixelMatchesFocalLengthDifferenceAtImageCorner) {
   const std::array one{500.0, 500.0, 399.5, 299.5}, other{501.0, 501.0, 399.5, 299.5};
   const auto difference = compute_projection_difference(
       Lens(LensModel::pinhole, one), Lens(LensModel::pinhole, other), {800, 600}, even);

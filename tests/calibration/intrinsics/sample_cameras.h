@@ -20,13 +20,14 @@ inline Camera make_camera(LensModel model) {
   }
   camera.intrinsics.insert(
       camera.intrinsics.end(), distortions.begin(),
-      distortions.begin() + static_cast<std::ptrdiff_t>(parameter_count(model) - 4));
+      distortions.begin() + static_cast<std::ptrdiff_t>(num_lens_parameters(model) - 4));
   return camera;
 }
 
 /// Returns a camera with a splined lens like one of 150 degrees.
 inline Camera splined_camera(const SplineGrid& grid = {3, 13, 11, 150}) {
-  return convert_to_lens_model(make_camera(LensModel::fisheye), lens_model_for_spline_grid(grid))
+  return convert_camera_to_lens_model(make_camera(LensModel::fisheye),
+                                      lens_model_for_spline_grid(grid))
       .camera;
 }
 

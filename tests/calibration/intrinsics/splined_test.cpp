@@ -27,36 +27,36 @@ IntrinsicsInput splined_input(int count, Random& random, double noise_px) {
   return input;
 }
 
-TEST(SolveSplinedLens, MatchesTruthBeyondNinetyDegrees) {
+TEST(SolveSplinedLens, MatchesTrueLensUpTo94DegreesOffAxis) {
   constexpr double noise_px = 0.02;  // as in rendered boards
   Random random(18);
   const auto input = splined_input(40, random, noise_px);
   const IntrinsicsSolution solution = solve_intrinsics(input);
-  ASSERT_TRUE(solution.ok()) << describe(solution.status);
+  ASSERT_TRUE(solution.has_succeeded()) << describe_intrinsics_status(solution.status);
   EXPECT_EQ(solution.views.size(), 40U);
   EXPECT_FALSE(solution.solved_for.core);
   EXPECT_NEAR(solution.rms_px, noise_px, 0.003);
   EXPECT_NEAR(solution.problem.noise_px, noise_px, 0.005);
-  EXPECT_LT(up_to(90, solution.lens()).mean_px, 0.03);
-  EXPECT_LT(up_to(94, solution.lens()).worst_px, 0.1);
-  const CalibrationReport report = compute_calibration_report(solution, input);
+  EXPECT_LT(up_to(90, solution.fitted_lens()).mean_px, 0.03);
+  EXPECT_LT(up_to(94, solution.fitted_lens()).worst_px, 0.1);
+  const CalibrationReport report = compute_lens_calibration_report(solution, input);
   EXPECT_LT(report.uncertainty_mean_px, 0.05);
   ASSERT_TRUE(report.halves);
   EXPECT_LT(report.halves->mean_px, 0.1);
   // The frame is that of the true lens, which is symmetric.
-  const auto turn = fit_rotation_between_lenses(wide_lens(), solution.lens(),
-                                                collect_inlier_pixels(solution.problem));
+  const auto turn = fit_rotation_between_lenses(wide_lens(), solution.fitted_lens(),
+                                                collect_inlier_corner_pixels(solution.problem));
   ASSERT_TRUE(turn);
   EXPECT_LT(Eigen::AngleAxisd(*turn).angle() * 180 / std::numbers::pi, 0.02);
-  EXPECT_NEAR(solution.lens().principal_point_px().x(), 501, 0.2);
-  EXPECT_NEAR(solution.lens().principal_point_px().y(), 498, 0.2);
+  EXPECT_NEAR(solution.fitted_lens().principal_point_px().x(), 501, 0.2);
+  EXPECT_NEAR(solution.fitted_lens().principal_point_px().y(), 498, 0.2);
   const ProjectionUncertainty uncertainty(solution);
   EXPECT_EQ(uncertainty.intrinsics_covariance().topRows<4>().norm(), 0);
 }
 
 // The edge of a tag at a slant may be misdetected. Near the rim, where corners are sparse, a
 // splined lens would overfit it.
-TEST(SolveSplinedLens, RejectsTagsWithDisplacedEdge) {
+TEST(SolveSplinedLens, RejectsWholeTagsWithDisplacedEdgeAsOutliers) {
   constexpr double noise_px = 0.02, displacement_px = 2.5;
   constexpr std::size_t count = 40, corners_per_tag = 4;
   Random random(18);
@@ -75,23 +75,23 @@ TEST(SolveSplinedLens, RejectsTagsWithDisplacedEdge) {
     corners[farthest + 1].pixel.x() += displacement_px;
   }
   const IntrinsicsSolution solution = solve_intrinsics(input);
-  ASSERT_TRUE(solution.ok()) << describe(solution.status);
+  ASSERT_TRUE(solution.has_succeeded()) << describe_intrinsics_status(solution.status);
   EXPECT_GE(solution.outliers, 20);  // the tags whole
-  EXPECT_LT(up_to(90, solution.lens()).mean_px, 0.03);
-  EXPECT_LT(up_to(94, solution.lens()).worst_px, 0.15);
+  EXPECT_LT(up_to(90, solution.fitted_lens()).mean_px, 0.03);
+  EXPECT_LT(up_to(94, solution.fitted_lens()).worst_px, 0.15);
 }
 
-TEST(SolveSplinedLens, FailsWhenGridIsTooNarrow) {
+TEST(SolveSplinedLens, FailsWhenGridIsNarrowerThanFieldOfView) {
   Random random(19);
   IntrinsicsInput input = splined_input(12, random, 0.05);
   input.lens_model = lens_model_for_spline_grid({3, 10, 10, 120});
   const IntrinsicsSolution solution = solve_intrinsics(input);
-  EXPECT_FALSE(solution.ok());
+  EXPECT_FALSE(solution.has_succeeded());
 }
 
 // Outliers are found with OPENCV_FISHEYE, which does not quite fit this lens. That alone rejects no
 // tag. Tags with a displaced edge are rejected, by that test or as outliers of mrcal.
-TEST(SolveSplinedLens, KeepsTagsThatFisheyeFitsPoorly) {
+TEST(SolveSplinedLens, RejectsOnlyDisplacedTagsWhenFisheyeModelFitsPoorly) {
   constexpr double noise_px = 0.02, displacement_px = 2.5;
   constexpr std::size_t count = 40, corners_per_tag = 4;
   Random random(18);
@@ -99,7 +99,7 @@ TEST(SolveSplinedLens, KeepsTagsThatFisheyeFitsPoorly) {
   IntrinsicsInput input = views.input(count, random, noise_px);
   input.lens_model = lens_model_for_spline_grid({3, 14, 11, 90});
   const IntrinsicsSolution good = solve_intrinsics(input);
-  ASSERT_TRUE(good.ok()) << describe(good.status);
+  ASSERT_TRUE(good.has_succeeded()) << describe_intrinsics_status(good.status);
   EXPECT_EQ(good.outliers, 0);
   for (std::size_t view = 0; view < count; view += 8) {
     auto& corners = input.views[view];
@@ -114,12 +114,12 @@ TEST(SolveSplinedLens, KeepsTagsThatFisheyeFitsPoorly) {
     corners[farthest + 1].pixel.x() += displacement_px;
   }
   const IntrinsicsSolution slipped = solve_intrinsics(input);
-  ASSERT_TRUE(slipped.ok()) << describe(slipped.status);
+  ASSERT_TRUE(slipped.has_succeeded()) << describe_intrinsics_status(slipped.status);
   EXPECT_GE(slipped.outliers, 20);  // the tags whole
-  const ImageRegion region = compute_valid_lens_region(collect_inlier_pixels(slipped.problem),
-                                                       input.imager_px, input.lens_model);
+  const ImageRegion region = compute_valid_lens_region(
+      collect_inlier_corner_pixels(slipped.problem), input.imager_px, input.lens_model);
   const auto difference = compute_projection_difference(
-      views.lens, slipped.lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
+      views.lens, slipped.fitted_lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
         return polygon_contains(region, pixel) ? 1.0 : INFINITY;
       });
   ASSERT_TRUE(difference);
@@ -132,15 +132,15 @@ Eigen::Vector3d mean_turn(const IntrinsicsSolution& from, const IntrinsicsSoluti
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < from.problem.poses.size(); ++i) {
     const Eigen::AngleAxisd turn(
-        rotation_matrix_from_vector(to.problem.poses[i].rotation) *
-        rotation_matrix_from_vector(from.problem.poses[i].rotation).transpose());
+        rotation_matrix_from_rotation_vector(to.problem.poses[i].rotation) *
+        rotation_matrix_from_rotation_vector(from.problem.poses[i].rotation).transpose());
     sum += turn.angle() * turn.axis();
   }
   return sum / static_cast<double>(from.problem.poses.size());
 }
 
 // Compares projections of twenty seeds of noise on the same boards with the reported uncertainty.
-TEST(ProjectionUncertainty, MatchesScatterOfSplinedLens) {
+TEST(ProjectionUncertainty, ProjectionCovarianceMatchesScatterOfSplinedLens) {
   constexpr int seeds = 20;
   constexpr double noise_px = 0.1;
   Random of_boards(41);
@@ -161,22 +161,22 @@ TEST(ProjectionUncertainty, MatchesScatterOfSplinedLens) {
   std::vector<IntrinsicsSolution> solutions;
   for (int seed = 0; seed < seeds; ++seed) {
     solutions.push_back(solved(300 + static_cast<std::uint64_t>(seed)));
-    ASSERT_TRUE(solutions.back().ok());
+    ASSERT_TRUE(solutions.back().has_succeeded());
   }
   // Relative to their mean, because a common bias is not part of the uncertainty.
   const IntrinsicsSolution& first = solutions.front();
   const ProjectionUncertainty uncertainty(first);
-  const Lens lens = first.lens();
+  const Lens lens = first.fitted_lens();
   double squares = 0, freedoms = 0;
   for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(kWideImager)) {
-    const auto ray = lens.unproject(pixel);
+    const auto ray = lens.unproject_pixel(pixel);
     if (!ray || ray->direction.normalized().z() < 0) continue;
     std::vector<Eigen::Vector2d> seen;
     Eigen::Vector2d mean(0, 0);
     for (const IntrinsicsSolution& solution : solutions) {
       const Eigen::Vector3d turned =
-          rotation_matrix_from_vector(mean_turn(first, solution)) * ray->direction;
-      seen.push_back(solution.lens().project(turned).value());
+          rotation_matrix_from_rotation_vector(mean_turn(first, solution)) * ray->direction;
+      seen.push_back(solution.fitted_lens().project_point(turned).value());
       mean += seen.back() / seeds;
     }
     const Eigen::Matrix2d information = uncertainty.projection_covariance(pixel).inverse();

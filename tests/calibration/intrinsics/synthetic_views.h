@@ -98,7 +98,7 @@ struct SyntheticViews {
         Eigen::Vector3d point;
         point << stretch.cwiseProduct(place.corners_m[k] - field_m / 2),
             warp_m.dot((1 - share.square()).matrix());
-        const auto pixel = lens.project(rotation * point + middle_m);
+        const auto pixel = lens.project_point(rotation * point + middle_m);
         whole = whole && pixel && (pixel->array() > 3).all() && pixel->x() < imager_px[0] - 3 &&
                 pixel->y() < imager_px[1] - 3;
         if (!whole) break;
@@ -115,7 +115,7 @@ struct SyntheticViews {
     IntrinsicsInput input{BoardLattice(board), {}, imager_px, lens.lens_model()};
     while (static_cast<int>(input.views.size()) < views) {
       const BoardDetection seen = random_view(random, noise_px);
-      if (input.lattice.has_sufficient_corners(seen))
+      if (input.lattice.are_corners_sufficient_for_pose(seen))
         input.views.push_back(input.lattice.match_corners_to_flat_board(seen));
     }
     return input;

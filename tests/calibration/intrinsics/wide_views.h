@@ -51,7 +51,7 @@ inline BoardDetection wide_view(const SyntheticViews& views, Random& random, dou
   BoardDetection seen = views.view(rotation, distance_m * towards.col(2), random, noise_px);
   std::erase_if(seen.tags, [&](const TagDetection& tag) {
     return std::ranges::any_of(tag.corners_px, [&](const Eigen::Vector2d& pixel) {
-      const auto ray = views.lens.unproject(pixel);
+      const auto ray = views.lens.unproject_pixel(pixel);
       return !ray || std::acos(ray->direction.normalized().z()) > boards.reach_rad;
     });
   });
@@ -59,7 +59,7 @@ inline BoardDetection wide_view(const SyntheticViews& views, Random& random, dou
 }
 
 inline bool has_enough_tags(const BoardDetection& seen, const BoardLattice& lattice) {
-  return seen.tags.size() > 5 && lattice.has_sufficient_corners(seen);
+  return seen.tags.size() > 5 && lattice.are_corners_sufficient_for_pose(seen);
 }
 
 inline IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double noise_px,
@@ -79,7 +79,7 @@ inline IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double
 inline ProjectionDifference up_to(double degrees, const Lens& found) {
   const auto difference =
       compute_projection_difference(wide_lens(), found, kWideImager, [&](const auto& pixel) {
-        const auto ray = wide_lens().unproject(pixel);
+        const auto ray = wide_lens().unproject_pixel(pixel);
         const double cosine = ray ? ray->direction.normalized().z() : -1;
         return cosine > std::cos(degrees * std::numbers::pi / 180) ? 1.0 : INFINITY;
       });

@@ -15,7 +15,7 @@ namespace {
 
 std::vector<LampOffset> compute_offsets(const LampMap& map, const std::vector<CeilingView>& views) {
   const auto found = estimate_lamp_displacements(map, views);
-  return found ? compute_offsets_from_other_lamps(*found) : std::vector<LampOffset>();
+  return found ? compute_lamp_offsets_relative_to_others(*found) : std::vector<LampOffset>();
 }
 
 /// Captures of eight lamps from twelve positions, with wrong fixes: position, yaw and height have
@@ -52,7 +52,7 @@ class EstimateLampDisplacements : public testing::Test {
   std::uint64_t seed_ = 1;
 };
 
-TEST_F(EstimateLampDisplacements, ReturnsOffsetOfMovedLampForWrongFixes) {
+TEST_F(EstimateLampDisplacements, ReturnsOffsetOfMovedLampDespiteWrongFixes) {
   for (const double by_m : {1e-3, 5e-3, 0.1}) {
     moved_m_[3] = {0.6 * by_m, -0.8 * by_m};
     const auto offsets = found();
@@ -63,7 +63,7 @@ TEST_F(EstimateLampDisplacements, ReturnsOffsetOfMovedLampForWrongFixes) {
 
 /// Same formula as in scripts/reprocess/fleet.py, which subtracts the effect of a moved lamp on the
 /// other lamps.
-TEST_F(EstimateLampDisplacements, OffsetsOfOtherLampsMatchProjector) {
+TEST_F(EstimateLampDisplacements, OffsetsOfUnmovedLampsMatchClosedFormula) {
   moved_m_[3] = {3e-3, -4e-3};
   Eigen::Vector2d middle_m(0, 0);
   for (const Lamp& lamp : lamps_.lamps) middle_m += lamp.position_m.head<2>() / 8;
@@ -85,7 +85,7 @@ TEST_F(EstimateLampDisplacements, OffsetsOfOtherLampsMatchProjector) {
   }
 }
 
-TEST_F(EstimateLampDisplacements, StandardDeviationMatchesScatter) {
+TEST_F(EstimateLampDisplacements, OffsetSdsMatchScatterOfOffsets) {
   constexpr int trials = 300;
   Eigen::Array2d squares(0, 0);
   for (int trial = 0; trial < trials; ++trial) {
@@ -99,7 +99,7 @@ TEST_F(EstimateLampDisplacements, StandardDeviationMatchesScatter) {
   EXPECT_NEAR(std::sqrt(squares.mean()), 1, 0.05);  // of 4,800 correlated values
 }
 
-TEST_F(EstimateLampDisplacements, RejectsMisidentifiedLamps) {
+TEST_F(EstimateLampDisplacements, KeepsOffsetsWhenSomeLampsAreMisidentified) {
   moved_m_[3] = {1e-3, 0};
   const auto right = found(1e-4);
   misidentified_ = true;
@@ -115,7 +115,7 @@ TEST_F(EstimateLampDisplacements, RejectsMisidentifiedLamps) {
   EXPECT_LE(captures, 4);
 }
 
-TEST_F(EstimateLampDisplacements, ReturnsNoOffsetsForUnconnectedLamps) {
+TEST_F(EstimateLampDisplacements, ReturnsNoOffsetsForSingleViewOrUnconnectedLampGroups) {
   CeilingView view{{0, 0}, {}};
   for (int id = 1; id <= 3; ++id) {
     const auto& lamp = lamps_.lamps[static_cast<std::size_t>(id - 1)];

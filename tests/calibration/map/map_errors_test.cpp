@@ -17,7 +17,7 @@ using testing::IsEmpty;
 using testing::SizeIs;
 
 /// Camera that is tilted by 3 degrees, which its calibration does not contain.
-class FindLampMapErrors : public testing::Test {
+class DetectMisplacedOrSwappedLamps : public testing::Test {
  protected:
   Random random{41};
   SyntheticRig rig = make_tilted_rig(0.05, 1);
@@ -32,7 +32,7 @@ class FindLampMapErrors : public testing::Test {
   std::vector<MapError> errors() const {
     return detect_misplaced_or_swapped_lamps(frames, map, extract_camera()).errors;
   }
-  std::string found() const { return describe(errors()); }
+  std::string found() const { return describe_map_errors(errors()); }
   std::vector<Frame> noisy_drive() {
     std::vector<Frame> noisy = drive(rig, 20, random, 0.1);
     for (Frame& frame : noisy) frame.detections = with_noise(frame.detections, random);
@@ -53,7 +53,7 @@ class FindLampMapErrors : public testing::Test {
   Eigen::Vector3d& place(std::size_t lamp) { return map.lamps[lamp].position_m; }
 };
 
-TEST_F(FindLampMapErrors, ReturnsNoneForCorrectMap) {
+TEST_F(DetectMisplacedOrSwappedLamps, ReturnsNoErrorsForMapCorrectWithinFiveMillimeters) {
   ASSERT_THAT(detect_misplaced_or_swapped_lamps(frames, map, extract_camera()).offsets,
               SizeIs(map.lamps.size()));
   EXPECT_EQ(found(), "");
@@ -61,7 +61,7 @@ TEST_F(FindLampMapErrors, ReturnsNoneForCorrectMap) {
   EXPECT_EQ(found(), "") << "5 mm are for --refine-map";
 }
 
-TEST_F(FindLampMapErrors, ReturnsOffsetOfOneLampForAnyTilt) {
+TEST_F(DetectMisplacedOrSwappedLamps, ReturnsOffsetOfOneMovedLampForTiltedCamera) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     map = rig.map;
     place(i).head<2>() += Eigen::Vector2d(-0.03, 0.004);
@@ -71,14 +71,14 @@ TEST_F(FindLampMapErrors, ReturnsOffsetOfOneLampForAnyTilt) {
     EXPECT_EQ(one[0].lamps, std::vector<int>{map.lamps[i].id});
     EXPECT_LT((one[0].offset_m - Eigen::Vector3d(0.03, -0.004, 0)).norm(), 1e-3);
     const MapErrors leveled = detect_misplaced_or_swapped_lamps(frames, map, rig.calibration);
-    EXPECT_EQ(describe(leveled.errors), found()) << "with the tilt in the calibration";
+    EXPECT_EQ(describe_map_errors(leveled.errors), found()) << "with the tilt in the calibration";
     EXPECT_THAT(leveled.offsets, SizeIs(map.lamps.size()));
   }
   EXPECT_THAT(found(),
               testing::StartsWith("lamp 8 hangs 30 mm from where the map has it (x +30 mm"));
 }
 
-TEST_F(FindLampMapErrors, ReturnsThreeDisplacedLampsOfEight) {
+TEST_F(DetectMisplacedOrSwappedLamps, ReturnsThreeDisplacedLampsOfEight) {
   survey(1e-3);
   place(0).x() += 0.05;
   place(3).y() -= 0.07;
@@ -92,7 +92,7 @@ TEST_F(FindLampMapErrors, ReturnsThreeDisplacedLampsOfEight) {
 
 /// With three lamps any of them may be displaced. With four, the other lamps determine the scatter
 /// of the map poorly.
-TEST_F(FindLampMapErrors, RequiresLargerOffsetsForFewLamps) {
+TEST_F(DetectMisplacedOrSwappedLamps, ReportsNoMovedLampOfThreeOrFourWithoutGivenSd) {
   use_lamps(3);
   place(0).x() += 0.05;
   EXPECT_THAT(errors(), IsEmpty());
@@ -109,7 +109,7 @@ TEST_F(FindLampMapErrors, RequiresLargerOffsetsForFewLamps) {
 
 /// Its detections contradict the other lamps in all directions. They are rejected, but the lamp is
 /// still reported.
-TEST_F(FindLampMapErrors, DetectsLampOfWrongHeight) {
+TEST_F(DetectMisplacedOrSwappedLamps, ReportsOnlyTheLampOfWrongHeight) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     map = rig.map;
     place(i).z() -= 0.1;
@@ -120,7 +120,7 @@ TEST_F(FindLampMapErrors, DetectsLampOfWrongHeight) {
 }
 
 /// In a large room each capture contains few of the lamps.
-TEST_F(FindLampMapErrors, DetectsMirroredMapOfLargeRoom) {
+TEST_F(DetectMisplacedOrSwappedLamps, DetectsMirroredMapOfLargeRoom) {
   constexpr int rows = 10;
   constexpr double distance_m = 1.2, height_m = 2.5, reach_m = 1.9;
   map.lamps.clear();
@@ -138,7 +138,7 @@ TEST_F(FindLampMapErrors, DetectsMirroredMapOfLargeRoom) {
     Frame frame{std::to_string(i), {}};
     for (const Lamp& lamp : map.lamps) {
       const Eigen::Vector3d ray = lamp.position_m - camera_m;
-      const auto pixel = ray.head<2>().norm() < reach_m ? lens.project(ray) : std::nullopt;
+      const auto pixel = ray.head<2>().norm() < reach_m ? lens.project_point(ray) : std::nullopt;
       if (pixel) frame.detections.push_back({lamp.id, *pixel, 0.05});
     }
     frames.push_back(frame);
@@ -153,7 +153,7 @@ TEST_F(FindLampMapErrors, DetectsMirroredMapOfLargeRoom) {
   EXPECT_THAT(found(), HasSubstr("most captures contradict the lamp map"));
 }
 
-TEST_F(FindLampMapErrors, KeepsFalseAlarmRateBelowLimit) {
+TEST_F(DetectMisplacedOrSwappedLamps, ReportsErrorsForAtMostTenOf400CorrectMaps) {
   constexpr int maps = 400, max_alarms = 10;  // p = 0.01: 4 are expected
   for (const std::size_t lamps : {5U, 8U}) {
     rig = make_tilted_rig(0.05, 1);
@@ -176,7 +176,7 @@ TEST_F(FindLampMapErrors, KeepsFalseAlarmRateBelowLimit) {
   }
 }
 
-TEST_F(FindLampMapErrors, ReportsStandardDeviationOfOffsets) {
+TEST_F(DetectMisplacedOrSwappedLamps, OffsetSdsMatchErrorsOfReportedOffsets) {
   constexpr int maps = 200;
   double squares = 0;
   int count = 0;
@@ -196,12 +196,12 @@ TEST_F(FindLampMapErrors, ReportsStandardDeviationOfOffsets) {
   EXPECT_NEAR(std::sqrt(squares / count), 1, 0.15);
 }
 
-TEST_F(FindLampMapErrors, DetectsMirroredMap) {
+TEST_F(DetectMisplacedOrSwappedLamps, DetectsMirroredMap) {
   for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;
   EXPECT_THAT(found(), HasSubstr("seems to be mirrored"));
 }
 
-TEST_F(FindLampMapErrors, DetectsSwappedLamps) {
+TEST_F(DetectMisplacedOrSwappedLamps, NamesBothSwappedLampsOfEight) {
   for (const auto& [first, second] : {std::pair(2, 4), std::pair(0, 7)}) {
     map = rig.map;
     std::swap(place(static_cast<std::size_t>(first)), place(static_cast<std::size_t>(second)));
@@ -210,7 +210,7 @@ TEST_F(FindLampMapErrors, DetectsSwappedLamps) {
   }
 }
 
-TEST_F(FindLampMapErrors, DetectsSwappedLampsOfFour) {
+TEST_F(DetectMisplacedOrSwappedLamps, NamesBothSwappedLampsOfFour) {
   use_lamps(4);
   rig.map.lamps[1].position_m.x() =
       0.5;  // a rectangle's mirror image is an exchange of its corners
@@ -220,7 +220,7 @@ TEST_F(FindLampMapErrors, DetectsSwappedLampsOfFour) {
 }
 
 /// No similarity takes a square to its mirror image.
-TEST_F(FindLampMapErrors, DetectsMirroredSquare) {
+TEST_F(DetectMisplacedOrSwappedLamps, DetectsMirroredMapOfLampsInSquare) {
   for (std::size_t i = 0; i < 4; ++i) {
     Eigen::Vector3d& corner_m = rig.map.lamps[i].position_m;
     corner_m.x() = std::copysign(corner_m.y(), corner_m.x());
@@ -231,7 +231,7 @@ TEST_F(FindLampMapErrors, DetectsMirroredSquare) {
   EXPECT_THAT(found(), HasSubstr("seems to be mirrored"));
 }
 
-TEST_F(FindLampMapErrors, ReportsLampWithMostOutliers) {
+TEST_F(DetectMisplacedOrSwappedLamps, ReportsLampWhoseDetectionsContradictOtherLamps) {
   for (std::size_t i = 0; i < 6; ++i) {
     std::swap(frames[i].detections[0], frames[i].detections.back());
     frames[i].detections.back().pixel += Eigen::Vector2d(i % 2 == 0 ? 60 : -40, 30);
@@ -239,7 +239,7 @@ TEST_F(FindLampMapErrors, ReportsLampWithMostOutliers) {
   EXPECT_THAT(found(), HasSubstr("lamp 1 contradicts the other lamps in 6 of "));
 }
 
-TEST_F(FindLampMapErrors, ReportsOtherRoomWithoutLamps) {
+TEST_F(DetectMisplacedOrSwappedLamps, ReportsContradictedMapOnlyWhenLampIdsMatch) {
   for (Lamp& lamp : map.lamps) {
     lamp.position_m.head<2>() = Eigen::Vector2d(random.uniform(-1, 1), random.uniform(-1, 1));
   }

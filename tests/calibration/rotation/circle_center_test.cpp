@@ -38,10 +38,11 @@ Eigen::Vector2d center_of_level_camera(const RotationScene& scene) {
   return {f[2] + f[0] * z.x(), f[3] + f[1] * z.y()};
 }
 
-TEST(FitCentersOfLampCircles, ReturnsAxisPixelWhenCameraIsLevel) {
+TEST(FitAndAverageLampCircleCenters, ReturnsAxisPixelWhenCameraIsLevel) {
   RotationScene scene;
   scene.lever_arm_m = {0.05, -0.02};
-  const CircleCenters found = fit_centers_of_lamp_circles(find_captures(scene), scene.camera);
+  const CircleCenters found =
+      fit_and_average_lamp_circle_centers(find_captures(scene), scene.camera);
   ASSERT_TRUE(found.mean.converged);
   EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
   EXPECT_LT(found.spread_px, 1e-6);
@@ -53,7 +54,7 @@ TEST(FitCentersOfLampCircles, ReturnsAxisPixelWhenCameraIsLevel) {
 /// The rays to a lamp form a cone about the axis. A tilted camera maps it to an ellipse with its
 /// center at f sin t cos t / (cos^2 t - sin^2 phi) from the principal point. A circle through many
 /// equally spaced points of the ellipse has the same center, up to second order in t.
-TEST(FitCentersOfLampCircles, BiasMatchesFormulaForTiltedCamera) {
+TEST(FitAndAverageLampCircleCenters, CircleCentersMatchEllipseFormulaForTiltedCamera) {
   for (const double tilt_deg : {0.5, 1.0, 2.0}) {
     SCOPED_TRACE(tilt_deg);
     RotationScene scene = pinhole_scene();
@@ -63,7 +64,7 @@ TEST(FitCentersOfLampCircles, BiasMatchesFormulaForTiltedCamera) {
     scene.arc_rad = 2 * M_PI * (72 - 0.7) / 72;
     scene.only_in_image = false;
     const RotationCaptures rotation = find_captures(scene);
-    const CircleCenters found = fit_centers_of_lamp_circles(rotation, scene.camera);
+    const CircleCenters found = fit_and_average_lamp_circle_centers(rotation, scene.camera);
     ASSERT_EQ(found.circles.size(), scene.map.lamps.size());
     const double t = scene.tilt_rad;
     for (const auto& [lamp, height, fit] : found.circles) {
@@ -77,14 +78,14 @@ TEST(FitCentersOfLampCircles, BiasMatchesFormulaForTiltedCamera) {
   }
 }
 
-TEST(FitCentersOfLampCircles, RejectsOutlier) {
+TEST(FitAndAverageLampCircleCenters, RejectsOneDisplacedDetectionAsOutlier) {
   const RotationScene scene;
   std::vector<Frame> frames = scene.frames();
   frames[3].detections[2].pixel += Eigen::Vector2d(12, -9);
   const RotationCaptures rotation =
       find_in_place_rotation_captures(frames, scene.map, scene.camera);
   ASSERT_EQ(rotation.status, RotationStatus::ok);
-  const CircleCenters found = fit_centers_of_lamp_circles(rotation, scene.camera);
+  const CircleCenters found = fit_and_average_lamp_circle_centers(rotation, scene.camera);
   EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
   ASSERT_EQ(found.mean.outliers.size(), 1U);
   const RotationObservation& outlier = rotation.observations[found.mean.outliers[0].observation];
@@ -124,7 +125,7 @@ RotationCaptures captures_at(const std::vector<double>& yaws_rad, bool noise_is_
 }
 
 /// With captures at two opposite yaws, only noise makes a triangle of the positions of a lamp.
-TEST(FitCentersOfLampCircles, DoesNotConvergeAtTwoOppositeYaws) {
+TEST(FitAndAverageLampCircleCenters, DoesNotConvergeAtTwoOppositeYaws) {
   constexpr int draws = 25;
   Random random(31);
   for (const int count : {3, 6, 12, 40}) {
@@ -135,7 +136,8 @@ TEST(FitCentersOfLampCircles, DoesNotConvergeAtTwoOppositeYaws) {
         for (int k = 0; k < count; ++k) yaws_rad.push_back(yaw_rad + k % 2 * M_PI);
         const RotationCaptures rotation = captures_at(yaws_rad, noise_is_stated, random);
         ASSERT_EQ(rotation.status, RotationStatus::ok);
-        const CircleCenters found = fit_centers_of_lamp_circles(rotation, RotationScene().camera);
+        const CircleCenters found =
+            fit_and_average_lamp_circle_centers(rotation, RotationScene().camera);
         EXPECT_FALSE(found.mean.converged) << count << " captures, draw " << i;
         EXPECT_GT(found.undetermined, 0);
       }
@@ -144,7 +146,7 @@ TEST(FitCentersOfLampCircles, DoesNotConvergeAtTwoOppositeYaws) {
 }
 
 /// Two positions of a lamp determine no circle for a tilted camera either.
-TEST(FitCentersOfLampCircles, DoesNotConvergeAtTwoOppositeYawsWhenTilted) {
+TEST(FitAndAverageLampCircleCenters, DoesNotConvergeAtTwoOppositeYawsWhenTilted) {
   constexpr int draws = 25;
   Random random(33);
   const RotationScene scene = tilted_scene();
@@ -155,13 +157,13 @@ TEST(FitCentersOfLampCircles, DoesNotConvergeAtTwoOppositeYawsWhenTilted) {
     const RotationCaptures rotation = find_in_place_rotation_captures(
         frames_at(scene, yaws_rad, 0, random), scene.map, scene.camera);
     ASSERT_EQ(rotation.status, RotationStatus::ok);
-    EXPECT_FALSE(fit_centers_of_lamp_circles(rotation, scene.camera).mean.converged)
+    EXPECT_FALSE(fit_and_average_lamp_circle_centers(rotation, scene.camera).mean.converged)
         << "draw " << i;
   }
 }
 
 /// One of two heights has captures at two opposite yaws only; the other height is used.
-TEST(FitCentersOfLampCircles, IgnoresHeightWithTwoOppositeYaws) {
+TEST(FitAndAverageLampCircleCenters, IgnoresHeightWithTwoOppositeYaws) {
   constexpr int draws = 25;
   Random random(34);
   const RotationScene scene;
@@ -182,8 +184,8 @@ TEST(FitCentersOfLampCircles, IgnoresHeightWithTwoOppositeYaws) {
     ASSERT_EQ(spot_below.status, RotationStatus::ok);
     ASSERT_EQ(spot_both.status, RotationStatus::ok);
     ASSERT_EQ(spot_both.heights.size(), 2U);
-    const CircleCenters expected = fit_centers_of_lamp_circles(spot_below, scene.camera);
-    const CircleCenters found = fit_centers_of_lamp_circles(spot_both, scene.camera);
+    const CircleCenters expected = fit_and_average_lamp_circle_centers(spot_below, scene.camera);
+    const CircleCenters found = fit_and_average_lamp_circle_centers(spot_both, scene.camera);
     ASSERT_TRUE(expected.mean.converged);
     ASSERT_TRUE(found.mean.converged);
     EXPECT_THAT(found.mean.center.center_px, IsNear(expected.mean.center.center_px, 1e-9));
@@ -195,7 +197,7 @@ TEST(FitCentersOfLampCircles, IgnoresHeightWithTwoOppositeYaws) {
   }
 }
 
-TEST(FitCentersOfLampCircles, ConvergesWhenThirdYawJoinsOppositeYaws) {
+TEST(FitAndAverageLampCircleCenters, ConvergesWhenThirdYawJoinsOppositeYaws) {
   constexpr int draws = 25;
   Random random(32);
   for (int i = 0; i < draws; ++i) {
@@ -204,39 +206,40 @@ TEST(FitCentersOfLampCircles, ConvergesWhenThirdYawJoinsOppositeYaws) {
         {yaw_rad, yaw_rad + M_PI, yaw_rad, yaw_rad + M_PI, yaw_rad + M_PI / 2, yaw_rad + M_PI / 2},
         true, random);
     ASSERT_EQ(rotation.status, RotationStatus::ok);
-    const CircleCenters found = fit_centers_of_lamp_circles(rotation, RotationScene().camera);
+    const CircleCenters found =
+        fit_and_average_lamp_circle_centers(rotation, RotationScene().camera);
     ASSERT_TRUE(found.mean.converged);
     ASSERT_TRUE(found.mean.center.covariance);
     EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(RotationScene()), 2));
   }
 }
 
-TEST(FitJointRotationCenter, ReturnsAxisPixelWhenCameraIsLevel) {
+TEST(FitRotationCenterToAllLamps, ReturnsAxisPixelWhenCameraIsLevel) {
   RotationScene scene;
   scene.lever_arm_m = {0.05, -0.02};
-  const RotationFit found = fit_joint_rotation_center(find_captures(scene), scene.camera);
+  const RotationFit found = fit_rotation_center_to_all_lamps(find_captures(scene), scene.camera);
   ASSERT_TRUE(found.converged);
   EXPECT_THAT(found.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
   EXPECT_LT(found.residual_px, 1e-7);
   EXPECT_EQ(found.center.model, RotationModel::shift);
 }
 
-TEST(FitJointRotationCenter, ReturnsSameCenterAtAllHeightsWithoutLeverArm) {
+TEST(FitRotationCenterToAllLamps, ReturnsAxisPixelForTwoHeightsWithoutLeverArm) {
   RotationScene scene;
   scene.heights_m = {0, 0.3};
-  const RotationFit found = fit_joint_rotation_center(find_captures(scene), scene.camera);
+  const RotationFit found = fit_rotation_center_to_all_lamps(find_captures(scene), scene.camera);
   ASSERT_TRUE(found.converged);
   EXPECT_THAT(found.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
 }
 
-TEST(FitJointRotationCenter, RejectsOutlier) {
+TEST(FitRotationCenterToAllLamps, RejectsOneDisplacedDetectionAsOutlier) {
   const RotationScene scene;
   std::vector<Frame> frames = scene.frames();
   frames[3].detections[2].pixel += Eigen::Vector2d(12, -9);
   const RotationCaptures rotation =
       find_in_place_rotation_captures(frames, scene.map, scene.camera);
   ASSERT_EQ(rotation.status, RotationStatus::ok);
-  const RotationFit found = fit_joint_rotation_center(rotation, scene.camera);
+  const RotationFit found = fit_rotation_center_to_all_lamps(rotation, scene.camera);
   EXPECT_THAT(found.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
   ASSERT_EQ(found.outliers.size(), 1U);
   EXPECT_NEAR(found.outliers[0].distance_px, 15, 0.3);

@@ -33,12 +33,12 @@ Matrix2 covariance_with(const std::vector<std::size_t>& order) {
   for (int i = 0; i < 60; ++i) {
     const Eigen::Vector2d point(random.uniform(-1, 1), random.uniform(-1, 1));
     const Eigen::Vector2d seen = point + 0.01 * Eigen::Vector2d(random.normal(), random.normal());
-    fit.add_residual(std::make_unique<ceres::AutoDiffCostFunction<TurnedPoint, 2, 2, 1>>(
-                         new TurnedPoint{point, seen}),
-                     {offset, memory.data() + 2 * order[random.index(turns)]});
+    fit.add_residual_block(std::make_unique<ceres::AutoDiffCostFunction<TurnedPoint, 2, 2, 1>>(
+                               new TurnedPoint{point, seen}),
+                           {offset, memory.data() + 2 * order[random.index(turns)]});
   }
-  EXPECT_TRUE(fit.solve());
-  const auto at = fit.linearize();
+  EXPECT_TRUE(fit.solve_robust_fit());
+  const auto at = fit.linearize_used_residuals();
   EXPECT_TRUE(at);
   return at ? at->covariance(offset, offset) : Matrix2(Matrix2::Zero());
 }

@@ -17,13 +17,13 @@ RotationStatus find_status(const RotationScene& scene) {
   return find_status(scene, scene.frames());
 }
 
-TEST(FindRotationCaptures, ReportsTooSmallArc) {
+TEST(FindInPlaceRotationCaptures, ReturnsShortArcStatusForArcOf80Degrees) {
   RotationScene scene;
   scene.arc_rad = rad_from_deg(80);
   EXPECT_EQ(find_status(scene), RotationStatus::short_arc);
 }
 
-TEST(FindRotationCaptures, ReportsCapturesAtOneYaw) {
+TEST(FindInPlaceRotationCaptures, ReturnsAlikeStatusForCapturesAtOneYaw) {
   RotationScene scene;
   scene.arc_rad = 1e-3;
   EXPECT_EQ(find_status(scene), RotationStatus::alike);
@@ -31,7 +31,7 @@ TEST(FindRotationCaptures, ReportsCapturesAtOneYaw) {
   EXPECT_EQ(find_status(scene, with_noise(scene.frames(0.3), random)), RotationStatus::alike);
 }
 
-TEST(FindRotationCaptures, ReportsTooFewCaptures) {
+TEST(FindInPlaceRotationCaptures, ReturnsTooFewCapturesStatusForOneOrTwoCaptures) {
   RotationScene scene;
   for (const int captures : {1, 2}) {
     scene.captures = captures;
@@ -40,7 +40,7 @@ TEST(FindRotationCaptures, ReportsTooFewCaptures) {
   EXPECT_EQ(find_status(scene, {}), RotationStatus::other_map);
 }
 
-TEST(FindRotationCaptures, ReportsTooFewLamps) {
+TEST(FindInPlaceRotationCaptures, ReturnsTooFewLampsStatusForOneLampPerCapture) {
   RotationScene scene;
   auto frames = scene.frames();
   for (Frame& frame : frames) {
@@ -59,7 +59,7 @@ TEST(FindRotationCaptures, ReportsTooFewLamps) {
   EXPECT_EQ(find_status(in_turn, frames), RotationStatus::too_few_lamps);
 }
 
-TEST(FindRotationCaptures, ReportsLampsOfAnotherMap) {
+TEST(FindInPlaceRotationCaptures, ReturnsOtherMapStatusForUnknownMirroredOrSwappedLamps) {
   RotationScene scene;
   const auto frames = scene.frames();
   for (Lamp& lamp : scene.map.lamps) lamp.id += 100;
@@ -74,7 +74,7 @@ TEST(FindRotationCaptures, ReportsLampsOfAnotherMap) {
   EXPECT_EQ(find_status(scene, frames), RotationStatus::other_map);
 }
 
-TEST(FindRotationCaptures, ReportsMovingAxis) {
+TEST(FindInPlaceRotationCaptures, ReturnsMovedStatusWhenAxisMovesBetweenCaptures) {
   RotationScene scene;
   std::vector<Frame> frames;
   for (int k = 0; k < 12; ++k) {

@@ -21,7 +21,7 @@ void expect_axis(const RotationFit& found, const RotationScene& scene, double wi
       within_deg);
 }
 
-TEST(FindRotationCaptures, EstimatesHeightsYawsAndAxes) {
+TEST(FindInPlaceRotationCaptures, ReturnsTrueHeightsYawsAxesAndLeverArm) {
   const RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   const RotationCaptures rotation =
       find_in_place_rotation_captures(scene.frames(), scene.map, scene.camera);
@@ -41,7 +41,7 @@ TEST(FindRotationCaptures, EstimatesHeightsYawsAndAxes) {
   EXPECT_TRUE(rotation.rejected.empty());
 }
 
-TEST(FindRotationCaptures, AcceptsTwoLampsAndThreeCaptures) {
+TEST(FindInPlaceRotationCaptures, YieldsExactAxisFromTwoLampsAndThreeCaptures) {
   RotationScene scene;
   scene.tilt_rad = rad_from_deg(10);
   scene.map = make_lamp_map({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}});
@@ -50,20 +50,20 @@ TEST(FindRotationCaptures, AcceptsTwoLampsAndThreeCaptures) {
   expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
 }
 
-TEST(FindRotationCaptures, AcceptsLampsAtSeveralHeights) {
+TEST(FindInPlaceRotationCaptures, YieldsExactAxisForLampsAtSeveralHeights) {
   RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.map =
       make_lamp_map({{-0.5, -0.35, 1.6}, {0.5, 0.2, 1.4}, {-0.4, 0.3, 1.8}, {0.1, -0.4, 1.5}});
   expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
 }
 
-TEST(FindRotationCaptures, AcceptsQuarterRotation) {
+TEST(FindInPlaceRotationCaptures, YieldsExactAxisForQuarterRotation) {
   RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.arc_rad = rad_from_deg(105);  // minus the uneven steps at the ends
   expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
 }
 
-TEST(FindRotationCaptures, RejectsHeightWithTooFewCaptures) {
+TEST(FindInPlaceRotationCaptures, RejectsCapturesOfHeightWithOnlyTwoCaptures) {
   const RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   auto frames = scene.frames();
   frames.resize(14);
@@ -76,7 +76,7 @@ TEST(FindRotationCaptures, RejectsHeightWithTooFewCaptures) {
 }
 
 /// One third of the captures with a large error of one lamp and the noise of a poor detector.
-TEST(FitRotationBetweenLensesAxis, RejectsOutliers) {
+TEST(FitRotationAxis, RejectsDisplacedDetectionsInThirdOfCaptures) {
   const RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   Random random(5);
   auto frames = with_noise(scene.frames(0.05), random);
@@ -102,7 +102,7 @@ TEST(FitRotationBetweenLensesAxis, RejectsOutliers) {
   EXPECT_LE(named.size(), wrong.size() + 1);
 }
 
-TEST(FindRotationCaptures, RejectsCaptureWithMisidentifiedLamp) {
+TEST(FindInPlaceRotationCaptures, RejectsCaptureWithMisidentifiedLamp) {
   RotationScene scene;
   scene.tilt_rad = rad_from_deg(1.5);
   scene.map = make_lamp_map({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}, {0.1, 0.4, 1.6}});
@@ -118,7 +118,7 @@ TEST(FindRotationCaptures, RejectsCaptureWithMisidentifiedLamp) {
 }
 
 /// The fit uses the heights of the map, but not its horizontal positions.
-TEST(FitRotationBetweenLensesAxis, ToleratesHorizontalMapErrors) {
+TEST(FitRotationAxis, KeepsAxisDespiteHorizontalMapErrors) {
   RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.arc_rad = 2.5;
   const auto frames = scene.frames();

@@ -29,7 +29,7 @@ void expect_exact(const RotationScene& scene) {
   }
 }
 
-TEST(FitRotationBetweenLensesAxis, ReturnsExactAxisAtOneHeightWithoutLeverArm) {
+TEST(FitRotationAxis, ReturnsExactAxisAtOneHeightWithoutLeverArm) {
   for (const double tilt_deg : {0.0, 0.5, 2.0, 5.0, 10.0}) {
     SCOPED_TRACE(tilt_deg);
     RotationScene scene;
@@ -38,7 +38,7 @@ TEST(FitRotationBetweenLensesAxis, ReturnsExactAxisAtOneHeightWithoutLeverArm) {
   }
 }
 
-TEST(FitRotationBetweenLensesAxis, RejectsCapturesAboutTwoAxes) {
+TEST(FitRotationAxis, FailsForCapturesAboutTwoAxes) {
   RotationScene scene, elsewhere;
   elsewhere.axis_m.x() += 0.07;
   auto frames = scene.frames(0.1);
@@ -50,7 +50,7 @@ TEST(FitRotationBetweenLensesAxis, RejectsCapturesAboutTwoAxes) {
               !fit_rotation_axis(rotation, scene.camera).converged);
 }
 
-TEST(FitRotationBetweenLensesAxis, ReturnsExactLeverArmAtTwoHeights) {
+TEST(FitRotationAxis, ReturnsExactAxisAndLeverArmAtTwoHeights) {
   for (const double tilt_deg : {0.0, 0.5, 2.0, 5.0, 10.0}) {
     for (const Eigen::Vector2d& lever_arm_m :
          {Eigen::Vector2d(0, 0), Eigen::Vector2d(0.002, -0.001), Eigen::Vector2d(0.012, -0.009),
@@ -66,7 +66,7 @@ TEST(FitRotationBetweenLensesAxis, ReturnsExactLeverArmAtTwoHeights) {
 }
 
 /// Lamps anywhere in view, few captures, small arcs: the closed-form initial values suffice.
-TEST(FitRotationBetweenLensesAxis, ConvergesForRandomScenes) {
+TEST(FitRotationAxis, ReturnsExactAxisForRandomScenes) {
   Random random(11);
   for (int i = 0; i < 150; ++i) {
     SCOPED_TRACE(i);

@@ -25,11 +25,11 @@ RotationScene high_scene() {
 
 RotationCaptures find_captures(const RotationScene& scene, const std::vector<Frame>& frames) {
   RotationCaptures rotation = find_in_place_rotation_captures(frames, scene.map, scene.camera);
-  EXPECT_EQ(rotation.status, RotationStatus::ok) << describe(rotation.status);
+  EXPECT_EQ(rotation.status, RotationStatus::ok) << describe_rotation_status(rotation.status);
   return rotation;
 }
 
-TEST(FindRotationCaptures, SeparatesHeightsTenCentimetersApart) {
+TEST(FindInPlaceRotationCaptures, SeparatesHeightsTenCentimetersApart) {
   RotationScene scene = high_scene();
   scene.heights_m = {0, 0.1};
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -49,7 +49,7 @@ TEST(FindRotationCaptures, SeparatesHeightsTenCentimetersApart) {
   }
 }
 
-TEST(FindRotationCaptures, SeparatesFourHeights) {
+TEST(FindInPlaceRotationCaptures, SeparatesFourHeightsWithinTwentyCentimeters) {
   RotationScene scene = high_scene();
   scene.heights_m = {0, 0.05, 0.15, 0.2};
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -62,7 +62,7 @@ TEST(FindRotationCaptures, SeparatesFourHeights) {
 }
 
 /// Noise of 1 px causes height errors of 1 % of the distance for fixes of two lamps.
-TEST(FindRotationCaptures, KeepsOneHeightUnderNoise) {
+TEST(FindInPlaceRotationCaptures, ReturnsOneHeightUnderNoiseOfOnePixel) {
   for (const std::size_t lamps : {std::size_t{2}, std::size_t{8}}) {
     RotationScene scene = tilted_scene();
     scene.map.lamps.resize(lamps);
@@ -78,7 +78,7 @@ TEST(FindRotationCaptures, KeepsOneHeightUnderNoise) {
   }
 }
 
-TEST(FitRotationBetweenLensesAxis, EstimatesLeverArmFromLampsAtSeveralHeights) {
+TEST(FitRotationAxis, ReturnsExactLeverArmFromLampsAtSeveralHeights) {
   RotationScene scene = tilted_scene();
   scene.map =
       make_lamp_map({{-0.5, -0.35, 1.6}, {0.5, 0.2, 1.4}, {-0.4, 0.3, 1.8}, {0.1, -0.4, 1.5}});
@@ -90,7 +90,7 @@ TEST(FitRotationBetweenLensesAxis, EstimatesLeverArmFromLampsAtSeveralHeights) {
 }
 
 /// Lamps whose heights differ by 2 mm determine a lever arm of 15 mm only to several centimeters.
-TEST(FitRotationBetweenLensesAxis, OmitsLeverArmForLampsAtNearlyOneHeight) {
+TEST(FitRotationAxis, OmitsLeverArmForLampsAtNearlyOneHeight) {
   RotationScene scene = tilted_scene();
   for (std::size_t i = 0; i < scene.map.lamps.size(); i += 2) {
     scene.map.lamps[i].position_m.z() += 0.002;
@@ -103,7 +103,7 @@ TEST(FitRotationBetweenLensesAxis, OmitsLeverArmForLampsAtNearlyOneHeight) {
 }
 
 /// With a lever arm and a single height, fixes are those of the axis at that height.
-TEST(FitRotationBetweenLensesAxis, YieldsFixesOfAxisAtOneHeight) {
+TEST(FitRotationAxis, YieldsFixesNearAxisForLeverArmAtOneHeight) {
   const RotationScene scene = tilted_scene();
   const RotationFit found = fit_rotation_axis(find_captures(scene, scene.frames()), scene.camera);
   ASSERT_TRUE(found.converged);
@@ -113,8 +113,8 @@ TEST(FitRotationBetweenLensesAxis, YieldsFixesOfAxisAtOneHeight) {
   calibration.rotation_center = found.center;
   const Positioner positioner(scene.map, calibration);
   for (const Frame& frame : scene.frames()) {
-    const Fix fix = positioner.locate(frame.detections);
-    ASSERT_TRUE(fix.ok());
+    const Fix fix = positioner.compute_position_fix(frame.detections);
+    ASSERT_TRUE(fix.has_succeeded());
     const Eigen::Vector2d place_m = fix.estimate.pose.position_m.head<2>();
     EXPECT_THAT(place_m, IsNear(scene.axis_m, 0.1 * scene.lever_arm_m.norm()));
   }

@@ -22,7 +22,7 @@ constexpr int kDraws = 300;
 constexpr double kNoise_px = 0.3;
 
 RotationFit mean_circle(const RotationCaptures& rotation, const Camera& camera) {
-  return fit_centers_of_lamp_circles(rotation, camera).mean;
+  return fit_and_average_lamp_circle_centers(rotation, camera).mean;
 }
 
 using Method = RotationFit (*)(const RotationCaptures&, const Camera&);
@@ -73,14 +73,15 @@ RotationScene level_scene() {
 
 /// Pinhole lens, for which the undistorted image used by `circle` is the image. 300 draws of 24
 /// degrees of freedom or more determine a standard deviation to 1 %.
-TEST(RotationFit, ResidualMatchesNoisePerAxis) {
+TEST(RotationFit, ResidualOfEachMethodMatchesPixelNoisePerAxis) {
   RotationScene scene;  // no lever arm, which `axis` at one height cannot separate from a tilt
   scene.camera.lens_model = LensModel::pinhole;
   scene.camera.intrinsics.resize(4);
   scene.captures = 5;           // few, so that degrees of freedom count
   scene.only_in_image = false;  // or some circle has three points
   scene.arc_rad = 5;
-  for (const Method method : {&mean_circle, &fit_joint_rotation_center, &fit_rotation_axis}) {
+  for (const Method method :
+       {&mean_circle, &fit_rotation_center_to_all_lamps, &fit_rotation_axis}) {
     Random random(9);
     const auto frames = scene.frames(kNoise_px);
     double squares = 0;
@@ -103,10 +104,10 @@ struct TurnUnderMap {
   double step_m;
 };
 
-class FitRotationBetweenLensesAxisWithMapErrors : public testing::TestWithParam<TurnUnderMap> {};
+class FitRotationAxisWithMapErrors : public testing::TestWithParam<TurnUnderMap> {};
 
 /// 300 maps of two axes determine a standard deviation to 4 %.
-TEST_P(FitRotationBetweenLensesAxisWithMapErrors, ReportsConsistentCovariances) {
+TEST_P(FitRotationAxisWithMapErrors, ZenithAndLeverArmErrorsMatchReportedCovariances) {
   constexpr int maps = 300;
   const TurnUnderMap& turn = GetParam();
   RotationScene scene = tilted_scene(turn.lever_arm_m, turn.heights_m);
@@ -144,7 +145,7 @@ TEST_P(FitRotationBetweenLensesAxisWithMapErrors, ReportsConsistentCovariances) 
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    RotationScatter, FitRotationBetweenLensesAxisWithMapErrors,
+    RotationScatter, FitRotationAxisWithMapErrors,
     testing::Values(TurnUnderMap{"ExactMap", 0, {0.25, -0.2}, {0, 0.3}, 0},
                     TurnUnderMap{"LongArm", 2e-3, {0.25, -0.2}, {0, 0.3}, 0},
                     TurnUnderMap{"ShortArm", 2e-3, {0.016, -0.012}, {0, 0.3}, 0},
@@ -161,11 +162,11 @@ struct SmallTurn {
 /// 2).
 class RotationFitWithFewCaptures : public testing::TestWithParam<SmallTurn> {};
 
-TEST_P(RotationFitWithFewCaptures, KeepsInliersAndConsistentCovariance) {
+TEST_P(RotationFitWithFewCaptures, CenterErrorsMatchCovarianceAndInliersAreKept) {
   constexpr int runs = 400;
-  for (const Method method : {&fit_joint_rotation_center, &fit_rotation_axis}) {
+  for (const Method method : {&fit_rotation_center_to_all_lamps, &fit_rotation_axis}) {
     RotationScene scene =
-        method == &fit_joint_rotation_center ? level_scene() : tilted_scene({0, 0});
+        method == &fit_rotation_center_to_all_lamps ? level_scene() : tilted_scene({0, 0});
     scene.map.lamps.resize(static_cast<std::size_t>(GetParam().lamps));
     scene.captures = GetParam().captures;
     scene.only_in_image = false;
@@ -202,7 +203,7 @@ INSTANTIATE_TEST_SUITE_P(RotationScatter, RotationFitWithFewCaptures,
                                   std::to_string(turn.param.lamps) + "Lamps";
                          });
 
-TEST(FitCentersOfLampCircles, KeepsInliersOfFewCaptures) {
+TEST(FitAndAverageLampCircleCenters, RejectsInliersInAtMostOnePercentOfRuns) {
   constexpr int runs = 200;
   for (const int captures : {8, 9, 12, 24}) {
     RotationScene scene = level_scene();
@@ -220,14 +221,15 @@ TEST(FitCentersOfLampCircles, KeepsInliersOfFewCaptures) {
 }
 
 /// A detection with an error of 6 px, 20 standard deviations, is rejected, and only this one.
-TEST(RotationFit, RejectsOutlierAmongFewCaptures) {
+TEST(RotationFit, EachMethodRejectsOnlyTheOutlierAmongFewCaptures) {
   constexpr int runs = 50;
   struct Case {
     Method method;
     int captures;
   };
   for (const auto& [method, captures] :
-       {Case{mean_circle, 12}, Case{fit_joint_rotation_center, 4}, Case{fit_rotation_axis, 4}}) {
+       {Case{mean_circle, 12}, Case{fit_rotation_center_to_all_lamps, 4},
+        Case{fit_rotation_axis, 4}}) {
     RotationScene scene = method == &fit_rotation_axis ? tilted_scene({0, 0}) : level_scene();
     scene.map.lamps.resize(5);
     scene.captures = captures;
@@ -256,32 +258,32 @@ TEST(RotationFit, RejectsOutlierAmongFewCaptures) {
   }
 }
 
-TEST(FitCentersOfLampCircles, CovarianceMatchesScatter) {
+TEST(FitAndAverageLampCircleCenters, MeanCenterCovarianceMatchesScatterForLevelCamera) {
   expect_consistent(level_scene(), mean_circle, false);
 }
 
-TEST(FitJointRotationCenter, CovarianceMatchesScatter) {
-  expect_consistent(level_scene(), fit_joint_rotation_center, true);
+TEST(FitRotationCenterToAllLamps, CenterCovarianceMatchesScatterForLevelCamera) {
+  expect_consistent(level_scene(), fit_rotation_center_to_all_lamps, true);
 }
 
-TEST(FitRotationBetweenLensesAxis, CovarianceMatchesScatter) {
+TEST(FitRotationAxis, CenterCovarianceMatchesScatterWithoutLeverArm) {
   expect_consistent(tilted_scene({0, 0}), fit_rotation_axis, true);
 }
 
-TEST(FitRotationBetweenLensesAxis, CovarianceMatchesScatterFor135Degrees) {
+TEST(FitRotationAxis, CenterCovarianceMatchesScatterForArcOfThreeRadians) {
   RotationScene scene = tilted_scene({0, 0});
   scene.arc_rad = 3;
   expect_consistent(scene, fit_rotation_axis, true);
 }
 
-TEST(FitRotationBetweenLensesAxis, CovarianceMatchesScatterForTwoLamps) {
+TEST(FitRotationAxis, CenterCovarianceMatchesScatterForTwoLamps) {
   RotationScene scene = tilted_scene({0, 0});
   scene.map.lamps.resize(2);
   scene.map.lamps[1].position_m = {0.5, 0.4, 1.6};
   expect_consistent(scene, fit_rotation_axis, true);
 }
 
-TEST(FitRotationBetweenLensesAxis, CovariancesMatchScatterForTwoHeights) {
+TEST(FitRotationAxis, CenterAndLeverArmCovariancesMatchScatterForTwoHeights) {
   RotationScene scene = tilted_scene({0, 0});
   scene.heights_m = {0, 0.3};
   scene.lever_arm_m = {0.012, -0.009};

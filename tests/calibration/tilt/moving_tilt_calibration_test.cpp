@@ -17,10 +17,10 @@ TiltCalibration level(const MovingCaptures& captures, const std::vector<KnownMot
   TiltCalibrationOptions options;
   options.motions = motions;
   options.refine_map = refine_map;
-  return estimate_tilt_from_lamps(captures.frames, rig.map, rig.calibration.camera, options);
+  return estimate_camera_tilt_from_lamps(captures.frames, rig.map, rig.calibration.camera, options);
 }
 
-TEST(EstimateTiltFromLamps, ReturnsExactTiltForKnownAndUnknownMotion) {
+TEST(EstimateCameraTiltFromLamps, ReturnsExactTiltForKnownAndUnknownMotion) {
   Random random(1);
   const BodyRig rig = make_tilted_body();
   const MovingCaptures captures = make_moving_captures(rig, 12, 2, random, 1e-3);
@@ -31,7 +31,8 @@ TEST(EstimateTiltFromLamps, ReturnsExactTiltForKnownAndUnknownMotion) {
     EXPECT_THAT(known.center.zenith_in_camera, IsNear(truth, 1e-8));
     EXPECT_EQ(known.detections_rejected, 0);
     // The prior of the motion has a millionth of the weight of the pixels.
-    const std::vector<KnownMotion> unknown(captures.frames.size(), KnownMotion::up_to(1e3, 1e3));
+    const std::vector<KnownMotion> unknown(captures.frames.size(),
+                                           KnownMotion::make_motion_prior_from_limits(1e3, 1e3));
     const TiltCalibration found = level(captures, unknown, rig, refine_map);
     ASSERT_EQ(found.undetermined, "");
     EXPECT_THAT(found.center.zenith_in_camera, IsNear(truth, 1e-8));
@@ -39,7 +40,7 @@ TEST(EstimateTiltFromLamps, ReturnsExactTiltForKnownAndUnknownMotion) {
   }
 }
 
-TEST(EstimateTiltFromLamps, HasLargerErrorWhenMotionIsIgnored) {
+TEST(EstimateCameraTiltFromLamps, TiltErrorIsTenTimesLargerWhenMotionIsIgnored) {
   Random random(2);
   const BodyRig rig = make_tilted_body();
   MovingCaptures captures = make_moving_captures(rig, 24, 1, random, 0.03);
@@ -81,13 +82,15 @@ double mean_chi_squared(const std::vector<KnownMotion>& stated, double sd_m_per_
   return sum / draws;
 }
 
-TEST(EstimateTiltFromLamps, ReportsConsistentCovarianceWithOdometry) {
+TEST(EstimateCameraTiltFromLamps, ZenithErrorsMatchCovarianceWithOdometry) {
   // An error of 50 mm/s moves lamps by 0.5 mm from the first row to the last.
   EXPECT_NEAR(mean_chi_squared({}, 0.05, 0.03, 0.05), 1, 0.25);
 }
 
-TEST(EstimateTiltFromLamps, ReportsConsistentCovarianceWithUnknownMotion) {
-  EXPECT_NEAR(mean_chi_squared(std::vector<KnownMotion>(16, KnownMotion::up_to(2, 3)), 0, 0, 0.05),
+TEST(EstimateCameraTiltFromLamps, ZenithErrorsMatchCovarianceWithUnknownMotion) {
+  EXPECT_NEAR(mean_chi_squared(
+                  std::vector<KnownMotion>(16, KnownMotion::make_motion_prior_from_limits(2, 3)), 0,
+                  0, 0.05),
               1, 0.25);
 }
 

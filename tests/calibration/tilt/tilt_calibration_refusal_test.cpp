@@ -19,8 +19,8 @@ class EstimateTiltFromLampsFailure : public testing::Test {
   std::string rejection_message(const std::vector<Frame>& frames, bool refine_map = false) {
     TiltCalibrationOptions options;
     options.refine_map = refine_map;
-    return estimate_tilt_from_lamps(with_noise(frames, random), rig.map, rig.calibration.camera,
-                                    options)
+    return estimate_camera_tilt_from_lamps(with_noise(frames, random), rig.map,
+                                           rig.calibration.camera, options)
         .undetermined;
   }
   Frame seen_at(const Eigen::Vector3d& position_m, double yaw_rad) {
@@ -29,12 +29,12 @@ class EstimateTiltFromLampsFailure : public testing::Test {
   }
 };
 
-TEST_F(EstimateTiltFromLampsFailure, ReportsTooFewCaptures) {
+TEST_F(EstimateTiltFromLampsFailure, ReportsUndeterminedForNoneOrOneCapture) {
   EXPECT_THAT(rejection_message({}), HasSubstr("there is none"));
   EXPECT_THAT(rejection_message(drive(rig, 1, random, 0.1)), HasSubstr("there is one"));
 }
 
-TEST_F(EstimateTiltFromLampsFailure, ReportsTooFewOrUnknownLamps) {
+TEST_F(EstimateTiltFromLampsFailure, ReportsNoUsableCaptureForTwoUnknownOrMirroredLamps) {
   auto frames = drive(rig, 20, random, 0.1);
   for (Frame& frame : frames) frame.detections.resize(2);
   EXPECT_THAT(rejection_message(frames), HasSubstr("there is none"));
@@ -46,19 +46,19 @@ TEST_F(EstimateTiltFromLampsFailure, ReportsTooFewOrUnknownLamps) {
   EXPECT_THAT(rejection_message(frames), HasSubstr("there is none")) << "mirrored";
 }
 
-TEST_F(EstimateTiltFromLampsFailure, ReportsCollinearLampsAtOneYaw) {
+TEST_F(EstimateTiltFromLampsFailure, RequestsMoreCapturesForCollinearLampsAtOneYaw) {
   rig.map = make_lamp_map({{-0.8, 0, 1.6}, {0, 0, 1.6}, {0.8, 0, 1.6}, {0.3, 0, 1.6}});
   std::vector<Frame> along;
   for (int i = 0; i < 12; ++i) along.push_back(seen_at({-0.5 + 0.1 * i, 0.05 * i - 0.3, 0}, 1));
   EXPECT_THAT(rejection_message(along), HasSubstr("add captures"));
 }
 
-TEST_F(EstimateTiltFromLampsFailure, ReportsIdenticalCaptures) {
+TEST_F(EstimateTiltFromLampsFailure, RequestsTurningCameraForIdenticalCaptures) {
   const Frame frame = seen_at({0.1, 0.1, 0}, 1);
   EXPECT_THAT(rejection_message({20, frame}), HasSubstr("turn the camera"));
 }
 
-TEST_F(EstimateTiltFromLampsFailure, ReportsOneYawOrOnePositionWhenRefiningMap) {
+TEST_F(EstimateTiltFromLampsFailure, ReportsOneYawOrOnePositionOnlyWhenRefiningMap) {
   std::vector<Frame> along, around;
   for (int i = 0; i < 12; ++i) {
     along.push_back(seen_at({-0.5 + 0.1 * i, 0.05 * i - 0.3, 0.02 * i}, 1));
@@ -70,7 +70,7 @@ TEST_F(EstimateTiltFromLampsFailure, ReportsOneYawOrOnePositionWhenRefiningMap) 
   EXPECT_THAT(rejection_message(around, true), HasSubstr("at one position"));
 }
 
-TEST_F(EstimateTiltFromLampsFailure, ReportsTooLargeStandardDeviations) {
+TEST_F(EstimateTiltFromLampsFailure, ReportsTooLargeSdOfTiltOrRefinedLamp) {
   auto frames = drive(rig, 3, random, 8);
   EXPECT_THAT(rejection_message(frames), HasSubstr(" degrees: add captures"));
   frames = drive(rig, 12, random, 0.9);
@@ -87,7 +87,7 @@ TEST_F(EstimateTiltFromLampsFailure, ReportsTooLargeStandardDeviations) {
 TEST_F(EstimateTiltFromLampsFailure, RejectsOnlyCaptureWithDuplicateLamp) {
   auto frames = drive(rig, 10, random, 0.1);
   frames[3].detections.push_back(frames[3].detections.front());
-  const auto result = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
+  const auto result = estimate_camera_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
   EXPECT_EQ(result.undetermined, "");
   EXPECT_EQ(result.captures_rejected, 1);
 }

@@ -24,7 +24,8 @@ void expect_consistent(const std::vector<Frame>& exact, const SyntheticRig& rig,
   Random random(21);
   TiltCalibrationOptions options;
   options.refine_map = refine_map;
-  const auto reference = estimate_tilt_from_lamps(exact, surveyed, rig.calibration.camera, options);
+  const auto reference =
+      estimate_camera_tilt_from_lamps(exact, surveyed, rig.calibration.camera, options);
   ASSERT_EQ(reference.undetermined, "");
   ASSERT_EQ(reference.corrections.size(), refine_map ? 8 : 0);
   Matrix2 scatter = Matrix2::Zero(), reported = Matrix2::Zero();
@@ -36,7 +37,8 @@ void expect_consistent(const std::vector<Frame>& exact, const SyntheticRig& rig,
         if (!stated) detection.sigma_px.reset();
       }
     }
-    const auto result = estimate_tilt_from_lamps(frames, surveyed, rig.calibration.camera, options);
+    const auto result =
+        estimate_camera_tilt_from_lamps(frames, surveyed, rig.calibration.camera, options);
     ASSERT_EQ(result.undetermined, "");
     ASSERT_TRUE(result.center.covariance);
     ASSERT_EQ(result.corrections.size(), reference.corrections.size());
@@ -62,13 +64,13 @@ void expect_consistent(const std::vector<Frame>& exact, const SyntheticRig& rig,
   EXPECT_LT((lamp_ratio - 1).abs().maxCoeff(), kDriveTolerance + 0.02) << lamp_ratio.transpose();
 }
 
-TEST(EstimateTiltFromLamps, CovarianceMatchesScatter) {
+TEST(EstimateCameraTiltFromLamps, ZenithCovarianceMatchesScatterWithGivenNoise) {
   Random random(22);
   const auto rig = make_tilted_rig(0.05, 1);
   expect_consistent(drive(rig, 12, random, 0.1), rig, rig.map, false, true);
 }
 
-TEST(EstimateTiltFromLamps, CovarianceMatchesScatterForThreeLamps) {
+TEST(EstimateCameraTiltFromLamps, ZenithCovarianceMatchesScatterForThreeLampsPerCapture) {
   Random random(23);
   const auto rig = make_tilted_rig(0.05, 1);
   auto exact = drive(rig, 30, random, 0.1);
@@ -76,7 +78,7 @@ TEST(EstimateTiltFromLamps, CovarianceMatchesScatterForThreeLamps) {
   expect_consistent(exact, rig, rig.map, false, true);
 }
 
-TEST(EstimateTiltFromLamps, CovarianceMatchesScatterWithoutGivenNoise) {
+TEST(EstimateCameraTiltFromLamps, ZenithCovarianceMatchesScatterWithoutGivenNoise) {
   Random random(24);
   auto rig = make_tilted_rig(0.05, 1);
   rig.calibration.camera.lens_model = LensModel::pinhole;  // equal noise in the undistorted image
@@ -84,7 +86,7 @@ TEST(EstimateTiltFromLamps, CovarianceMatchesScatterWithoutGivenNoise) {
   expect_consistent(drive(rig, 12, random, 0.1), rig, rig.map, false, false);
 }
 
-TEST(EstimateTiltFromLamps, CovarianceMatchesScatterWhenRefiningMap) {
+TEST(EstimateCameraTiltFromLamps, ZenithCovarianceMatchesScatterWhenRefiningMap) {
   Random random(25);
   auto rig = make_tilted_rig(0.05, 1);
   const LampMap surveyed = rig.map;
@@ -105,7 +107,7 @@ struct LampErrors {
 class EstimateTiltFromLampsWithMapErrors : public testing::TestWithParam<LampErrors> {};
 
 /// 300 maps of two axes determine a standard deviation to 4 %.
-TEST_P(EstimateTiltFromLampsWithMapErrors, ReportsConsistentZenithCovariance) {
+TEST_P(EstimateTiltFromLampsWithMapErrors, ZenithErrorsMatchReportedCovariance) {
   const LampErrors& errors = GetParam();
   constexpr int maps = 300;
   Random random(26);
@@ -126,7 +128,7 @@ TEST_P(EstimateTiltFromLampsWithMapErrors, ReportsConsistentZenithCovariance) {
       lamp.sd_m = errors.map_sd_m;
       for (double& coordinate : lamp.position_m) coordinate += errors.map_sd_m * random.normal();
     }
-    const auto result = estimate_tilt_from_lamps(frames, surveyed, rig.calibration.camera);
+    const auto result = estimate_camera_tilt_from_lamps(frames, surveyed, rig.calibration.camera);
     ASSERT_EQ(result.undetermined, "");
     ASSERT_TRUE(result.center.covariance);
     const Eigen::Vector2d error =

@@ -49,7 +49,7 @@ double compute_shape_error_m(const LampMap& found, const LampMap& truth) {
   return worst_m;
 }
 
-TEST(EstimateTiltFromLamps, ReturnsExactTiltWithoutNoise) {
+TEST(EstimateCameraTiltFromLamps, ReturnsExactTiltWithoutNoise) {
   Random random(1);
   for (const double tilt_deg : {0.0, 0.5, 3.0, 6.0, 10.0}) {
     for (const bool stated : {true, false}) {
@@ -60,7 +60,7 @@ TEST(EstimateTiltFromLamps, ReturnsExactTiltWithoutNoise) {
           if (!stated) detection.sigma_px.reset();
         }
       }
-      const auto result = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
+      const auto result = estimate_camera_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
       ASSERT_EQ(result.undetermined, "") << tilt_deg;
       const auto& truth = *rig.calibration.rotation_center;
       EXPECT_LT(angle_between(result.center.zenith_in_camera, truth.zenith_in_camera), 1e-10);
@@ -74,13 +74,13 @@ TEST(EstimateTiltFromLamps, ReturnsExactTiltWithoutNoise) {
   }
 }
 
-TEST(EstimateTiltFromLamps, ReturnsExactTiltFromThreeLampsPerCapture) {
+TEST(EstimateCameraTiltFromLamps, ReturnsExactTiltFromThreeLampsPerCapture) {
   Random random(2);
   const auto rig = make_tilted_rig(0.05, 1);
   auto frames = drive(rig, 10, random);
   for (Frame& frame : frames) frame.detections.resize(3);
   frames[4].detections.resize(2);
-  const auto result = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
+  const auto result = estimate_camera_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
   ASSERT_EQ(result.undetermined, "");
   EXPECT_LT(angle_between(result.center.zenith_in_camera,
                           rig.calibration.rotation_center->zenith_in_camera),
@@ -89,7 +89,7 @@ TEST(EstimateTiltFromLamps, ReturnsExactTiltFromThreeLampsPerCapture) {
   EXPECT_EQ(result.captures, 9);
 }
 
-TEST(EstimateTiltFromLamps, RecoversMapShapeWhenRefiningMap) {
+TEST(EstimateCameraTiltFromLamps, RecoversExactTiltAndMapShapeWhenRefiningMap) {
   Random random(3);
   auto rig = make_tilted_rig(0.05, 2);
   const LampMap surveyed = rig.map;
@@ -97,7 +97,8 @@ TEST(EstimateTiltFromLamps, RecoversMapShapeWhenRefiningMap) {
   const auto frames = drive(rig, 12, random);
   TiltCalibrationOptions options;
   options.refine_map = true;
-  const auto result = estimate_tilt_from_lamps(frames, surveyed, rig.calibration.camera, options);
+  const auto result =
+      estimate_camera_tilt_from_lamps(frames, surveyed, rig.calibration.camera, options);
   ASSERT_EQ(result.undetermined, "");
   EXPECT_LT(angle_between(result.center.zenith_in_camera,
                           rig.calibration.rotation_center->zenith_in_camera),
@@ -123,7 +124,7 @@ TEST(EstimateTiltFromLamps, RecoversMapShapeWhenRefiningMap) {
   EXPECT_LT(std::abs(scaled), 1e-12);
 }
 
-TEST(EstimateTiltFromLamps, KeepsUndetectedLampsWhenRefiningMap) {
+TEST(EstimateCameraTiltFromLamps, KeepsPositionOfUndetectedLampWhenRefiningMap) {
   Random random(4);
   const auto rig = make_tilted_rig(0.03, 2);
   auto frames = drive(rig, 12, random);
@@ -132,14 +133,15 @@ TEST(EstimateTiltFromLamps, KeepsUndetectedLampsWhenRefiningMap) {
   }
   TiltCalibrationOptions options;
   options.refine_map = true;
-  const auto result = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera, options);
+  const auto result =
+      estimate_camera_tilt_from_lamps(frames, rig.map, rig.calibration.camera, options);
   ASSERT_EQ(result.undetermined, "");
   EXPECT_EQ(result.corrections.size(), 7);
   ASSERT_EQ(result.map.lamps.size(), 8);
   EXPECT_EQ(result.map.lamps[2].position_m, rig.map.lamps[2].position_m);
 }
 
-TEST(EstimateTiltFromLamps, RejectsWrongDetections) {
+TEST(EstimateCameraTiltFromLamps, RejectsSwappedAndDisplacedDetections) {
   Random random(5);
   const auto rig = make_tilted_rig(0.08, -1);
   auto frames = with_noise(drive(rig, 40, random, 0.05), random);
@@ -151,7 +153,7 @@ TEST(EstimateTiltFromLamps, RejectsWrongDetections) {
       detections[2].pixel += Eigen::Vector2d(random.uniform(2, 10), random.uniform(2, 10));
     }
   }
-  const auto result = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
+  const auto result = estimate_camera_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
   ASSERT_EQ(result.undetermined, "");
   EXPECT_GE(result.detections_rejected, 15);
   EXPECT_LE(result.detections_rejected, 20);

@@ -61,29 +61,31 @@ struct Types {
 
 struct Functions {
   decltype(&rotation_about_z) rotation = &rotation_about_z;
-  decltype(&level_from_inclination) from_inclination = &level_from_inclination;
-  decltype(&level_from_zenith) from_zenith = &level_from_zenith;
-  decltype(&level_from_world) from_world = &level_from_world;
+  decltype(&level_rotation_from_inclination) from_inclination = &level_rotation_from_inclination;
+  decltype(&level_rotation_from_zenith) from_zenith = &level_rotation_from_zenith;
+  decltype(&level_point_from_world) from_world = &level_point_from_world;
   std::string_view (*name_of_lens)(LensModel) = &to_string;
   FromName* lens_from_name = &lens_model_from_name;
-  decltype(&lens_model_names) lens_names = &lens_model_names;
-  decltype(&parameter_count) parameters = &parameter_count;
+  decltype(&list_lens_model_names) lens_names = &list_lens_model_names;
+  decltype(&num_lens_parameters) parameters = &num_lens_parameters;
   decltype(&read_lamp_map) read_map = &read_lamp_map;
   decltype(&read_lamps_of_room) read_room = &read_lamps_of_room;
   decltype(&write_lamp_map) write_map = &write_lamp_map;
-  decltype(&world_from_shape) from_shape = &world_from_shape;
-  decltype(&outline_of) outline = &outline_of;
-  decltype(&parameter_names) names = &parameter_names;
+  decltype(&transform_shape_point_to_world) from_shape = &transform_shape_point_to_world;
+  decltype(&compute_lamp_outline_points) outline = &compute_lamp_outline_points;
+  decltype(&list_adjustment_parameter_names) names = &list_adjustment_parameter_names;
   decltype(&read_calibration) read = &read_calibration;
   decltype(&write_calibration) write = &write_calibration;
   decltype(&level_from_camera) from_camera = &level_from_camera;
   std::string_view (*name_of_status)(FixStatus) = &to_string;
   decltype(&describe) explanation = &describe;
-  Fix (Positioner::*locate)(Seen, const Sensors&) const noexcept = &Positioner::locate;
-  Fix (Positioner::*locate_together)(
-      Seen, const Sensors&, std::span<const EarlierFrame>) const noexcept = &Positioner::locate;
-  std::vector<Detection> (LampDetector::*detect)(const ImageView&) const = &LampDetector::detect;
-  int (Positioner::*elsewhere)() const noexcept = &Positioner::lamps_elsewhere;
+  Fix (Positioner::*locate)(Seen,
+                            const Sensors&) const noexcept = &Positioner::compute_position_fix;
+  Fix (Positioner::*locate_together)(Seen, const Sensors&, std::span<const EarlierFrame>)
+      const noexcept = &Positioner::compute_position_fix;
+  std::vector<Detection> (LampDetector::*detect)(const ImageView&) const =
+      &LampDetector::detect_lamps;
+  int (Positioner::*elsewhere)() const noexcept = &Positioner::num_lamps_moved_since_calibration;
   decltype(&vlp_version) c_version = &vlp_version;
   decltype(&vlp_open) c_open = &vlp_open;
   decltype(&vlp_open_room) c_open_room = &vlp_open_room;
@@ -91,7 +93,7 @@ struct Functions {
   decltype(&vlp_detect) c_detect = &vlp_detect;
   decltype(&vlp_locate) c_locate = &vlp_locate;
   decltype(&vlp_locate_with_earlier) c_locate_with_earlier = &vlp_locate_with_earlier;
-  decltype(&vlp_explanation) c_explanation = &vlp_explanation;
+  decltype(&vlp_describe_status) c_explanation = &vlp_describe_status;
   decltype(&vlp_last_error) c_last_error = &vlp_last_error;
 };
 

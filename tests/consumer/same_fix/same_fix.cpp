@@ -31,9 +31,9 @@ int main() {
                                             {3, {677.3313, 499.7995}, 0.05},
                                             {4, {335.0629, 517.9374}, {}},
                                             {5, {545.7014, 421.0321}, 0.05}};
-  print(positioner.locate(seen));
+  print(positioner.compute_position_fix(seen));
   vlp::Sensors sensors;
   sensors.inclination_sigma_rad = 0.05;
   sensors.motion = vlp::KnownMotion{{0, 0}, 0, 1, 0};
-  print(positioner.locate(seen, sensors));
+  print(positioner.compute_position_fix(seen, sensors));
 }

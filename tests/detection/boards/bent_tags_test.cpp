@@ -21,7 +21,7 @@ using Corners = std::array<Eigen::Vector2d, 4>;
 
 /// The room of datasets/wide without noise, through a wider lens that is nearer to the board.
 Scene wider_scene() {
-  Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/wide/scene.yaml");
+  Scene scene = read_scene_file(VLP_SOURCE_DIR "/datasets/wide/scene.yaml");
   scene.camera.lens_model = LensModel::fisheye;
   scene.camera.intrinsics = {290, 291, 501, 498, 0.03, -0.012, 0.004, -0.0006};
   scene.camera.readout = Readout::rows;
@@ -46,7 +46,7 @@ struct Errors {
   double rms_px() const { return std::sqrt(squares / (8 * tags)); }
 };
 
-TEST(BoardDetector, RefinesCornersOfCurvedTags) {
+TEST(BoardDetector, LocatesCornersOfCurvedTagsWithinHundredthsOfPixel) {
   constexpr double long_px = 80, far_off_px = 0.3;
   Scene scene = wider_scene();
   CaptureSet views = *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
@@ -55,14 +55,15 @@ TEST(BoardDetector, RefinesCornersOfCurvedTags) {
   const BoardDetector detector(scene.board->print);
   Errors of_long, of_others;
   for (std::size_t index = 0; index < 6; ++index) {
-    const BoardShot shot = make_board_shot(scene, views, index);
+    const BoardShot shot = make_simulated_board_capture(scene, views, index);
     std::map<int, Corners> truth;
     std::map<int, int> seen_corners;
     for (const auto& [tag, corner, pixel] : find_true_corners_in_image(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
       ++seen_corners[*tag];
     }
-    const cv::Mat image = simulate_sensor(scene.sensor, renderer.render_board_electrons(shot), 1);
+    const cv::Mat image =
+        simulate_sensor_image(scene.sensor, renderer.render_board_in_electrons(shot), 1);
     for (const TagDetection& tag : detector.detect_board(image).tags) {
       if (seen_corners[tag.id] < 4) continue;
       Errors& errors = longest_px(truth[tag.id]) > long_px ? of_long : of_others;

@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-TEST(ErrorFunction, MatchesStandardLibrary) {
+TEST(ErrorFunction, ValueAndSlopeMatchStandardLibrary) {
   for (double x = -7; x < 7; x += 0.0007) {
     const ErrorFunction erf(x);
     EXPECT_NEAR(erf.value, std::erf(x), 1e-13) << x;
@@ -17,13 +17,13 @@ TEST(ErrorFunction, MatchesStandardLibrary) {
   }
 }
 
-TEST(ErrorFunction, ReturnsOneForLargeInfiniteAndNanArguments) {
+TEST(ErrorFunction, HasMagnitudeOneForLargeInfiniteAndNanArguments) {
   EXPECT_EQ(ErrorFunction(1e9).value, 1);
   EXPECT_EQ(ErrorFunction(-std::numeric_limits<double>::infinity()).value, -1);
   EXPECT_EQ(std::abs(ErrorFunction(std::numeric_limits<double>::quiet_NaN()).value), 1);
 }
 
-TEST(BlurredStep, DerivativesMatchDifferenceQuotients) {
+TEST(BlurredStep, DerivativesByDistanceAndBlurMatchDifferenceQuotients) {
   constexpr double h = 1e-5;
   for (const double distance_px : {-2.0, -0.3, 0.0, 0.7, 3.0}) {
     for (const double blur_px : {0.3, 0.8, 2.0}) {

@@ -29,12 +29,13 @@ class BoardDetectorOnRenderedBoard : public testing::TestWithParam<const char*> 
   std::map<int, std::array<Eigen::Vector2d, 4>> find_true_corners() const {
     const CsvTable table(rig / "sample-boards/true_corners.csv");
     std::map<int, std::array<Eigen::Vector2d, 4>> corners;
-    for (std::size_t row = 0; row < static_cast<std::size_t>(table.rows()); ++row) {
-      const int tag = static_cast<int>(table.get_number(row, table.get_required_column("tag")));
+    for (std::size_t row = 0; row < static_cast<std::size_t>(table.num_rows()); ++row) {
+      const int tag =
+          static_cast<int>(table.get_cell_number(row, table.get_required_column("tag")));
       const auto k =
-          static_cast<std::size_t>(table.get_number(row, table.get_required_column("corner")));
-      corners[tag][k] = {table.get_number(row, table.get_required_column("u_px")),
-                         table.get_number(row, table.get_required_column("v_px"))};
+          static_cast<std::size_t>(table.get_cell_number(row, table.get_required_column("corner")));
+      corners[tag][k] = {table.get_cell_number(row, table.get_required_column("u_px")),
+                         table.get_cell_number(row, table.get_required_column("v_px"))};
     }
     return corners;
   }
@@ -59,7 +60,7 @@ TEST_P(BoardDetectorOnRenderedBoard, DetectsAllTagsWithAccurateCorners) {
   EXPECT_LT(rms_px(seen), 0.03);  // 0.019 and 0.013 over all views; 0.5 with the origin wrong
 }
 
-TEST_P(BoardDetectorOnRenderedBoard, DetectsTagsIn16BitImage) {
+TEST_P(BoardDetectorOnRenderedBoard, DetectsAllTagsAccuratelyIn16BitImage) {
   cv::Mat deep;
   image.convertTo(deep, CV_16U, 16);  // as a camera of 12 bits has it
   const BoardDetection seen = BoardDetector(board).detect_board(deep);
@@ -67,7 +68,7 @@ TEST_P(BoardDetectorOnRenderedBoard, DetectsTagsIn16BitImage) {
   EXPECT_LT(rms_px(seen), 0.03);
 }
 
-TEST_P(BoardDetectorOnRenderedBoard, KeepsWholeTagsOfTruncatedBoard) {
+TEST_P(BoardDetectorOnRenderedBoard, DetectsPartOfTagsAccuratelyOnTruncatedBoard) {
   const cv::Mat part = image(cv::Rect(0, 0, image.cols / 2, image.rows)).clone();
   const BoardDetection seen = BoardDetector(board).detect_board(part);
   EXPECT_GT(seen.tags.size(), 3U);
@@ -120,7 +121,7 @@ TEST_P(BoardDetectorOnRenderedBoard, ReturnsNoTagsForTinyImages) {
 INSTANTIATE_TEST_SUITE_P(Boards, BoardDetectorOnRenderedBoard,
                          testing::Values("paper-rig", "paper-rig-faulty"));
 
-TEST(BoardDetector, ThrowsForFamilyMissingInAruco) {
+TEST(BoardDetector, ConstructorThrowsForTagFamilyMissingInAruco) {
   Board board = read_board(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/rendered/board.yaml");
   board.family = "tagStandard41h12";
   EXPECT_THROW(BoardDetector{board}, std::invalid_argument);
@@ -136,7 +137,7 @@ std::map<std::size_t, int> images_by_tags(const fs::path& folder, const fs::path
   return counts;
 }
 
-TEST(BoardDetector, DetectsAllTagsInPhoneImages) {
+TEST(BoardDetector, DetectsAll40TagsInEachPhoneImage) {
   const auto folder = real_data("apriltag-lattice-phone");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   EXPECT_EQ(images_by_tags(folder, folder / "board.yaml"), (std::map<std::size_t, int>{{40, 8}}));

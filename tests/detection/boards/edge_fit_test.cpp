@@ -60,7 +60,7 @@ struct Step {
   }
 };
 
-TEST(FitEdgeCurve, IsExactWithoutNoise) {
+TEST(FitEdgeCurveAndBlur, RecoversEdgeExactlyWithoutNoise) {
   const Step step;
   EdgeCurve edge = step.start();
   const auto fit = fit_edge_curve_and_blur(edge, step.pixels(), {});
@@ -70,7 +70,7 @@ TEST(FitEdgeCurve, IsExactWithoutNoise) {
   EXPECT_FALSE(fit->is_saturated);
 }
 
-TEST(FitEdgeCurve, IsExactWithToneCurve) {
+TEST(FitEdgeCurveAndBlur, RecoversEdgeExactlyWithGivenToneCurve) {
   for (const double gamma : {1.3, 2.4}) {
     const Step step{.gamma = gamma};
     EdgeCurve edge = step.start();
@@ -83,7 +83,7 @@ TEST(FitEdgeCurve, IsExactWithToneCurve) {
   }
 }
 
-TEST(FitEdgeCurve, IsBiasedOutwardsByUnmodeledWhiteBits) {
+TEST(FitEdgeCurveAndBlur, MovesEdgeOutwardsWhenWhiteBitsAreNotModeled) {
   const Step step;
   auto pixels = step.pixels();
   for (EdgePixel& pixel : pixels) pixel.white_behind = 0;
@@ -92,7 +92,7 @@ TEST(FitEdgeCurve, IsBiasedOutwardsByUnmodeledWhiteBits) {
   EXPECT_GT(edge.coefficients[0], step.off_px + 0.02);
 }
 
-TEST(FitEdgeCurve, IsExactForSaturatedOuterSide) {
+TEST(FitEdgeCurveAndBlur, RecoversEdgeWithSaturatedOuterSide) {
   for (const double gamma : {1.0, 2.2}) {
     const Step step{.white = 380, .gamma = gamma, .clipped_at = 255};
     EdgeCurve edge = step.start();
@@ -105,7 +105,7 @@ TEST(FitEdgeCurve, IsExactForSaturatedOuterSide) {
 }
 
 /// Tags of some families are white inside.
-TEST(FitEdgeCurve, IsExactForSaturatedInnerSide) {
+TEST(FitEdgeCurveAndBlur, RecoversEdgeWithSaturatedInnerSide) {
   const Step step{.black = 380, .white = 16, .stripe_px = 100};
   auto pixels = step.pixels();
   for (EdgePixel& pixel : pixels) pixel.white_behind = 0;
@@ -129,13 +129,13 @@ double scatter_px(const Step& step, const EdgePrior& prior) {
   return std::sqrt(squares);
 }
 
-TEST(FitEdgeCurve, KeepsPrecisionForNearlySaturatedPaper) {
+TEST(FitEdgeCurveAndBlur, PositionScatterHardlyIncreasesForNearlySaturatedPaper) {
   const double other_px = scatter_px({.white = 240, .noise = 1.5}, {});
   const double bright_px = scatter_px({.white = 252, .noise = 1.5}, {});
   EXPECT_LT(bright_px, 1.2 * other_px);
 }
 
-TEST(FitEdgeCurve, PriorsImprovePrecisionOfSaturatedEdge) {
+TEST(FitEdgeCurveAndBlur, BlurAndLightPriorsReduceScatterOfSaturatedEdge) {
   const Step step{.white = 380, .gamma = 2.2, .noise = 1};
   const double alone_px = scatter_px(step, {step.gamma});
   const double held_px = scatter_px(step, {step.gamma, step.blur_px, 60});
@@ -145,7 +145,7 @@ TEST(FitEdgeCurve, PriorsImprovePrecisionOfSaturatedEdge) {
   EXPECT_LT(lit_px, 0.6 * held_px);
 }
 
-TEST(FitEdgeCurve, ReportedVariancesOfLightAndBlurMatchErrors) {
+TEST(FitEdgeCurveAndBlur, ReportedVariancesOfLightAndBlurMatchErrors) {
   const Step step{.white = 380, .gamma = 2.2, .noise = 1}, seen{.gamma = 2.2, .noise = 1};
   constexpr unsigned sets = 100;
   double lights = 0, blurs = 0;
@@ -165,14 +165,14 @@ TEST(FitEdgeCurve, ReportedVariancesOfLightAndBlurMatchErrors) {
   EXPECT_NEAR(blurs, 1, 0.35);
 }
 
-TEST(FitEdgeCurve, FitsDimEdgeWithSteepestToneCurve) {
+TEST(FitEdgeCurveAndBlur, RecoversDimEdgeWithSteepestToneCurve) {
   const Step step{.black = 0.3, .white = 5, .gamma = 2.4};  // levels of 15 and 49
   EdgeCurve edge = step.start();
   ASSERT_TRUE(fit_edge_curve_and_blur(edge, step.pixels(), {step.gamma}));
   step.expect_found(edge, 5e-3);
 }
 
-TEST(FitEdgeCurve, ReturnsNulloptForNoiseOrFewPixels) {
+TEST(FitEdgeCurveAndBlur, ReturnsNulloptForNoiseOrFewPixels) {
   Step step{.black = 99, .white = 101, .noise = 30};
   EdgeCurve edge = step.start();
   EXPECT_FALSE(fit_edge_curve_and_blur(edge, step.pixels(), {}));
@@ -181,7 +181,7 @@ TEST(FitEdgeCurve, ReturnsNulloptForNoiseOrFewPixels) {
   EXPECT_FALSE(fit_edge_curve_and_blur(edge, few, {}));
 }
 
-TEST(EdgeCurveIntersection, LiesOnBothCurves) {
+TEST(FindEdgeIntersection, ReturnsPointOnBothCurves) {
   EdgeCurve flat = Step().start(), upright = flat;
   flat.coefficients << 0.5, 0.1, -0.3, 0.05;
   upright.along = {0, 1};

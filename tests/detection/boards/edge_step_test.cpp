@@ -57,9 +57,9 @@ Found measure(const Scene& scene, std::size_t count, double min_side_px = 0) {
   std::vector<BoardView> views;
   views.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const BoardShot shot = make_board_shot(scene, set, i);
-    const cv::Mat image =
-        simulate_sensor(scene.sensor, renderer.render_board_electrons(shot), i, scene.picture);
+    const BoardShot shot = make_simulated_board_capture(scene, set, i);
+    const cv::Mat image = simulate_sensor_image(
+        scene.sensor, renderer.render_board_in_electrons(shot), i, scene.picture);
     views.push_back({shot.image, scene.camera.imager_px, detector.detect_board(image)});
   }
   correct_views_for_tone_curve(views, sum_tone_curve_costs(views));
@@ -77,12 +77,12 @@ Found measure(const Scene& scene, std::size_t count, double min_side_px = 0) {
   }
   if (blurs_px.empty()) return {};
   const std::size_t edges = blurs_px.size();
-  return {edges, compute_mtf50(upper_median(blurs_px)), upper_median(ratios)};
+  return {edges, compute_mtf50_of_gaussian_blur(upper_median(blurs_px)), upper_median(ratios)};
 }
 
-Scene station_scene() { return read_scene(VLP_SOURCE_DIR "/datasets/station/scene.yaml"); }
+Scene station_scene() { return read_scene_file(VLP_SOURCE_DIR "/datasets/station/scene.yaml"); }
 
-TEST(EdgeSteps, MatchMtf50OfRenderedBlur) {
+TEST(EdgeSteps, MedianMtf50MatchesRenderedGaussianBlur) {
   for (const double sigma_px : {0.5, 0.7, 1.0, 1.5, 2.0}) {
     Scene scene = station_scene();
     scene.optics.blur_px = sigma_px;
@@ -96,7 +96,7 @@ TEST(EdgeSteps, MatchMtf50OfRenderedBlur) {
   }
 }
 
-TEST(EdgeSteps, MatchMtf50OfDefocus) {
+TEST(EdgeSteps, MedianMtf50MatchesRenderedDefocus) {
   for (const double radius_px : {0.8, 1.6, 2.4}) {
     Scene scene = station_scene();
     scene.optics.defocus = Defocus{radius_px};
@@ -113,7 +113,7 @@ TEST(EdgeSteps, MatchMtf50OfDefocus) {
   }
 }
 
-TEST(EdgeSteps, MatchMtf50WithToneCurve) {
+TEST(EdgeSteps, MedianMtf50MatchesRenderedBlurWithToneCurve) {
   for (const double sigma_px : {0.7, 1.4}) {
     Scene scene = station_scene();
     scene.optics.blur_px = sigma_px;
@@ -128,7 +128,7 @@ TEST(EdgeSteps, MatchMtf50WithToneCurve) {
   }
 }
 
-TEST(EdgeSteps, ReportDarkLightRaisedByVeil) {
+TEST(EdgeSteps, BlackToWhiteRatioMoreThanDoublesUnderVeil) {
   const double clean = measure(station_scene(), 3).black_to_white;
   Scene veiled = station_scene();
   veiled.optics.veil = 0.25;

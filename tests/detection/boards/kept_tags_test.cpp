@@ -34,19 +34,19 @@ struct Pictures {
 class BoardDetectorYield : public testing::TestWithParam<Pictures> {
  protected:
   const Scene scene =
-      read_scene(std::string(VLP_SOURCE_DIR "/datasets/") + GetParam().scene + "/scene.yaml");
+      read_scene_file(std::string(VLP_SOURCE_DIR "/datasets/") + GetParam().scene + "/scene.yaml");
   const Board& board = scene.board->print;
 
   cv::Mat image(const FrameRenderer& renderer, const CaptureSet& set, std::size_t index) const {
-    const BoardShot shot = make_board_shot(scene, set, index);
+    const BoardShot shot = make_simulated_board_capture(scene, set, index);
     const auto& picture = GetParam().picture;
-    const cv::Mat exposed = simulate_sensor(scene.sensor, renderer.render_board_electrons(shot),
-                                            shot.noise_seed, picture);
-    return cv::imdecode(encode_image(exposed, picture), cv::IMREAD_GRAYSCALE);
+    const cv::Mat exposed = simulate_sensor_image(
+        scene.sensor, renderer.render_board_in_electrons(shot), shot.noise_seed, picture);
+    return cv::imdecode(encode_image_as_jpeg_or_png(exposed, picture), cv::IMREAD_GRAYSCALE);
   }
   std::set<int> detect_ids(const TagFinder& finder, const cv::Mat& image) const {
     std::set<int> ids;
-    for (const TagDetection& tag : finder.find(image)) ids.insert(tag.id);
+    for (const TagDetection& tag : finder.detect_tags(image)) ids.insert(tag.id);
     std::set<int> of_board;
     for (const BoardTag& tag : list_board_tags(board)) {
       if (ids.contains(tag.id)) of_board.insert(tag.id);
@@ -55,12 +55,12 @@ class BoardDetectorYield : public testing::TestWithParam<Pictures> {
   }
 };
 
-TEST_P(BoardDetectorYield, KeepsNearlyAllTagsOfTagFinder) {
+TEST_P(BoardDetectorYield, KeepsAtLeast95PercentOfTagsOfTagFinder) {
   constexpr std::size_t views = 36, apart = 3;
   CaptureSet set = *std::find_if(scene.sets.begin(), scene.sets.end(),
                                  [](const CaptureSet& each) { return each.folder == "boards"; });
-  const double white_e =
-      (white_level_dn(scene.sensor) - scene.sensor.black_level_dn) / scene.sensor.gain_dn_per_e;
+  const double white_e = (sensor_white_level_dn(scene.sensor) - scene.sensor.black_level_dn) /
+                         scene.sensor.gain_dn_per_e;
   set.exposure_s = GetParam().white * white_e / scene.board->white_e_per_s;
   const FrameRenderer renderer(scene);
   const BoardDetector detector(board);

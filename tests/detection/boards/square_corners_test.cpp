@@ -113,7 +113,7 @@ TEST(SquareCorners, DetectsVisibleCornersOfTruncatedCharucoBoard) {
 }
 
 // Clutter that looks like a marker of the board at another position.
-TEST(SquareCorners, RejectsCornersNextToMisreadMarker) {
+TEST(SquareCorners, KeepsOnlyAccurateCornersWhenOneMarkerIsDisplaced) {
   const Board board = squares(BoardKind::charuco, 7, 5);
   const cv::Mat1b image = drawn_by_opencv(board);
   cv::Mat1f smoothed;
@@ -172,7 +172,7 @@ TEST(SquareCorners, ReturnsNoCornersForIncompleteChessboard) {
   EXPECT_TRUE(BoardDetector(board).detect_board(image).points.empty());
 }
 
-TEST(OtherTags, ReportsChessboardSizeAndMarkerDictionary) {
+TEST(OtherTags, ChessboardSquaresAreCountedAndMarkerDictionaryIsNamed) {
   const cv::Mat image = drawn_chessboard(squares(BoardKind::chessboard, 9, 6));
   const auto [cols, rows] = count_chessboard_squares(image);
   EXPECT_EQ(std::max(cols, rows), 9);
@@ -184,17 +184,17 @@ TEST(OtherTags, ReportsChessboardSizeAndMarkerDictionary) {
             "the image shows markers of DICT_5X5, the largest of id 16");
 }
 
-TEST(OrderLatticePoints, ReversesRowsCountedUpwards) {
+TEST(RenumberLatticePoints, ReversesRowsCountedUpwards) {
   std::vector<PointDetection> points;
   for (std::size_t i = 0; i < 12; ++i) {
     points.push_back({i, {10.0 * static_cast<double>(i % 4), -10.0 * static_cast<double>(i / 4)}});
   }
-  order_lattice_points(points, 4, 3, false);
+  renumber_lattice_points(points, 4, 3, false);
   EXPECT_EQ(points[0].pixel, Eigen::Vector2d(0, -20));
   EXPECT_EQ(points[11].pixel, Eigen::Vector2d(30, 0));
 }
 
-TEST(BoardDetector, ThrowsForUnknownMarkerDictionary) {
+TEST(BoardDetector, ConstructorThrowsForUnknownMarkerDictionary) {
   Board board = squares(BoardKind::charuco, 7, 5);
   board.family = "DICT_9X9_50";
   EXPECT_THROW(BoardDetector{board}, std::invalid_argument);

@@ -55,13 +55,13 @@ CornerErrors measure_errors(const Scene& scene, const CaptureSet& views, std::si
   const BoardDetector detector(scene.board->print);
   CornerErrors errors;
   for (std::size_t index = 0; index < images; ++index) {
-    const BoardShot shot = make_board_shot(scene, views, index);
+    const BoardShot shot = make_simulated_board_capture(scene, views, index);
     std::map<int, TagDetection::Corners> truth;
     for (const auto& [tag, corner, pixel] : find_true_corners_in_image(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
     }
-    const cv::Mat image =
-        simulate_sensor(scene.sensor, renderer.render_board_electrons(shot), index, scene.picture);
+    const cv::Mat image = simulate_sensor_image(
+        scene.sensor, renderer.render_board_in_electrons(shot), index, scene.picture);
     for (const TagDetection& tag : detector.detect_board(image).tags) {
       if (wanted(truth[tag.id])) errors.add(tag.corners_px, truth[tag.id]);
     }
@@ -69,13 +69,13 @@ CornerErrors measure_errors(const Scene& scene, const CaptureSet& views, std::si
   return errors;
 }
 
-Scene paper_rig() { return read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml"); }
+Scene paper_rig() { return read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml"); }
 
 CaptureSet find_board_set(const Scene& scene) {
   return *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
 }
 
-TEST(TagEdges, CornersOfNarrowTagsAreNotBiasedByBits) {
+TEST(BoardDetectorOnNarrowTags, CornersAreNotBiasedByWhiteBits) {
   Scene scene = paper_rig();
   scene.sensor.shot_noise = false;
   scene.sensor.read_noise_e = 0;
@@ -89,7 +89,7 @@ TEST(TagEdges, CornersOfNarrowTagsAreNotBiasedByBits) {
   RecordProperty("rms_px", std::to_string(errors.rms_px()));
 }
 
-TEST(TagEdges, CornersOfSaturatedTagsAreUnbiased) {
+TEST(BoardDetectorOnSaturatedTags, CornersAreNotBiasedOutwards) {
   Scene scene = paper_rig();
   CaptureSet views = find_board_set(scene);
   views.exposure_s = 0.0079;  // one and a half times white

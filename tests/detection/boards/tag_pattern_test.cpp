@@ -10,7 +10,7 @@
 namespace vlp {
 namespace {
 
-TEST(TagGeometry, MatchesImagesOfLibapriltag) {
+TEST(TagGeometry, WhiteBitSegmentsMatchImagesOfLibapriltag) {
   Board board;
   board.border_bits = 1;
   board.tag_spacing = 0.5;
@@ -19,7 +19,7 @@ TEST(TagGeometry, MatchesImagesOfLibapriltag) {
     const TagGeometry print(board);
     const TagFamily drawn = make_tag_family(family);
     const int width = drawn->width_at_border, margin = (drawn->total_width - width) / 2;
-    EXPECT_EQ(print.width(), width);
+    EXPECT_EQ(print.tag_width(), width);
     EXPECT_EQ(print.inner_stripe_width(), 1);
     EXPECT_EQ(print.outer_stripe_width(), 0.5 * width);
     for (const int id : {0, 5, 17}) {
@@ -46,7 +46,7 @@ TEST(TagGeometry, MatchesImagesOfLibapriltag) {
   }
 }
 
-TEST(TagGeometry, ShiftsBitsByWidthOfBorder) {
+TEST(TagGeometry, ShiftsWhiteBitSegmentsByWidthOfBorder) {
   Board board;
   board.family = "tag36h11";
   board.border_bits = 1;
@@ -54,7 +54,7 @@ TEST(TagGeometry, ShiftsBitsByWidthOfBorder) {
   const TagGeometry::Sides narrow = TagGeometry(board).find_white_bit_segments(3);
   board.border_bits = 2;
   const TagGeometry wide(board);
-  EXPECT_EQ(wide.width(), 10);
+  EXPECT_EQ(wide.tag_width(), 10);
   EXPECT_EQ(wide.inner_stripe_width(), 2);
   const TagGeometry::Sides sides = wide.find_white_bit_segments(3);
   std::size_t segments = 0;
@@ -68,7 +68,7 @@ TEST(TagGeometry, ShiftsBitsByWidthOfBorder) {
   EXPECT_GT(segments, 0U);
 }
 
-TEST(TagGeometry, ReturnsNoSegmentsForWhiteBorder) {
+TEST(TagGeometry, ReturnsNoWhiteBitSegmentsForFamilyWithWhiteBorder) {
   Board board;
   board.family = "tagStandard41h12";
   board.border_bits = 1;

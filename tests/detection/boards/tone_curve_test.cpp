@@ -42,7 +42,7 @@ double apply_curve_of_levels(std::vector<BoardView>& views) {
   return correct_views_for_tone_curve(views, sum_tone_curve_costs(views));
 }
 
-TEST(CorrectViewsForToneCurve, EstimatesGammaAndInterpolatesCorners) {
+TEST(CorrectViewsForToneCurve, InterpolatesCornersAndCurvaturesAtEstimatedGamma) {
   for (const double gamma : {1.25, 1.7, 2.2, 2.4}) {
     std::vector<BoardView> images{image(gamma, 500)};
     EXPECT_NEAR(apply_curve_of_levels(images), gamma, 1e-9);
@@ -57,7 +57,7 @@ TEST(CorrectViewsForToneCurve, EstimatesGammaAndInterpolatesCorners) {
   }
 }
 
-TEST(CorrectViewsForToneCurve, InterpolatesStandardDeviationsLinearly) {
+TEST(CorrectViewsForToneCurve, InterpolatesCornerSdsLinearlyInLogGamma) {
   std::vector<BoardView> images{image(1.8, 500)};
   TagDetection& tag = images[0].seen.tags[0];
   const double at = std::log(1.8 / 1.6) / std::log(2.0 / 1.6);
@@ -69,7 +69,7 @@ TEST(CorrectViewsForToneCurve, InterpolatesStandardDeviationsLinearly) {
   EXPECT_EQ(images[0].seen.tags[0].corner_sds_px[1], 0);
 }
 
-TEST(CorrectViewsForToneCurve, EstimatesCommonGammaOfAllImages) {
+TEST(CorrectViewsForToneCurve, CorrectsAllViewsForOneCommonGamma) {
   std::vector<BoardView> images{image(1.6, 300), image(2.0, 300), image(1.1, 10)};
   const double gamma = apply_curve_of_levels(images);
   EXPECT_NEAR(gamma, 1.76, 0.03);
@@ -78,20 +78,20 @@ TEST(CorrectViewsForToneCurve, EstimatesCommonGammaOfAllImages) {
   }
 }
 
-TEST(CorrectViewsForToneCurve, LimitsInfluenceOfSingleImage) {
+TEST(CorrectViewsForToneCurve, KeepsCornersWhenOnlyOneOfManyViewsShowsCurve) {
   std::vector<BoardView> images(12, image(1, 500));
   images.push_back(image(2.4, 1e7));
   EXPECT_EQ(apply_curve_of_levels(images), 1);
   EXPECT_EQ(images.back().seen.tags[0].corners_px[0].x(), 100);
 }
 
-TEST(CorrectViewsForToneCurve, ReturnsOneForSmallGamma) {
+TEST(CorrectViewsForToneCurve, KeepsCornersWhenGammaIsCloseToOne) {
   std::vector<BoardView> images{image(1.15, 500)};
   EXPECT_EQ(apply_curve_of_levels(images), 1);
   EXPECT_EQ(images[0].seen.tags[0].corners_px[0].x(), 100);
 }
 
-TEST(CorrectViewsForToneCurve, KeepsCornersOfImagesWithoutToneCurve) {
+TEST(CorrectViewsForToneCurve, KeepsOnlyCornersOfViewsWithoutToneCurve) {
   BoardView plain = image(1, 500);
   plain.seen.curve_costs.resize(2);
   plain.seen.tags[0].tone_curve_fits.clear();
@@ -101,7 +101,7 @@ TEST(CorrectViewsForToneCurve, KeepsCornersOfImagesWithoutToneCurve) {
   EXPECT_LT(images[1].seen.tags[0].corners_px[0].x(), 99.8);
 }
 
-TEST(CorrectViewsForToneCurve, DoesNothingWhenRepeated) {
+TEST(CorrectViewsForToneCurve, KeepsCornersWhenRepeated) {
   std::vector<BoardView> images{image(2, 500)};
   apply_curve_of_levels(images);
   const auto once = images[0].seen.tags[0].corners_px;
@@ -109,7 +109,7 @@ TEST(CorrectViewsForToneCurve, DoesNothingWhenRepeated) {
   EXPECT_EQ(images[0].seen.tags[0].corners_px, once);
 }
 
-TEST(CorrectViewsForToneCurve, ReturnsOneWithoutImages) {
+TEST(CorrectViewsForToneCurve, EstimatesGammaOfOneWithoutViewsOrTags) {
   std::vector<BoardView> none, without(2);
   EXPECT_EQ(apply_curve_of_levels(none), 1);
   EXPECT_EQ(apply_curve_of_levels(without), 1);

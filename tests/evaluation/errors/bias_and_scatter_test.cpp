@@ -13,7 +13,7 @@ namespace vlp {
 namespace {
 
 /// Two stations with biases of 3 mm and -3 mm along x and fixes 4 mm to either side along y.
-TEST(BiasAndRepeatability, SeparatesBiasFromScatter) {
+TEST(ComputeBiasAndRepeatability, ReturnsTrueBiasAndScatterOfEachStation) {
   std::vector<FixError> errors;
   for (const std::size_t station : {0U, 1U}) {
     for (const double side : {-4e-3, 4e-3}) {
@@ -32,7 +32,7 @@ TEST(BiasAndRepeatability, SeparatesBiasFromScatter) {
   EXPECT_EQ(statistics->bias_m, 0);  // 9 of bias^2, and 16 that chance puts there
 }
 
-TEST(BiasAndRepeatability, IsUnbiasedUnderLargeScatter) {
+TEST(ComputeBiasAndRepeatability, MatchesTrueBiasWhenScatterExceedsIt) {
   Random random(1);
   std::vector<FixError> errors;
   for (std::size_t i = 0; i < 20000; ++i) {

@@ -64,14 +64,14 @@ std::array<int, 4> count_covered(std::size_t stations, std::size_t captures, dou
 
 /// The expectation of 95 % of 300 cases is 285 with a standard deviation of 4. Percentile intervals
 /// from a hundred clusters are slightly too narrow: 94.5 % in 2,000 cases.
-TEST(ErrorIntervals, CoversTrueValuesAtNominalRate) {
+TEST(BootstrapErrorIntervals, CoversTrueStatisticsAtNominalRate) {
   for (const int count : count_covered(100, 1, 0, 1)) {
     EXPECT_GE(count, 270);
     EXPECT_LE(count, 297);
   }
 }
 
-TEST(ErrorIntervals, CoversTrueValuesWithPerStationBias) {
+TEST(BootstrapErrorIntervals, CoversTrueStatisticsAtNominalRateWithStationBias) {
   for (const int count : count_covered(100, 3, 1, 0.3)) {
     EXPECT_GE(count, 270);
     EXPECT_LE(count, 297);
@@ -79,7 +79,7 @@ TEST(ErrorIntervals, CoversTrueValuesWithPerStationBias) {
 }
 
 /// Resampling single captures ignores their common bias, which is why clusters are resampled.
-TEST(ErrorIntervals, SingleCapturesAsUnitsAreTooNarrow) {
+TEST(BootstrapErrorIntervals, IsNarrowerWhenBiasedCapturesAreResampledSingly) {
   Random random(2);
   Errors errors = draw(40, 12, 1, 0.1, random);
   const Interval together =
@@ -91,7 +91,7 @@ TEST(ErrorIntervals, SingleCapturesAsUnitsAreTooNarrow) {
 
 /// Theoretical widths for many errors: 2 x 1.96 sd of the mean, and for quantiles sqrt(q (1 - q) /
 /// n) / density. Percentiles of 2,000 resamples of 1,000 groups are accurate to some 5 %.
-TEST(ErrorIntervals, WidthMatchesTheoryForManyErrors) {
+TEST(BootstrapErrorIntervals, WidthMatchesTheoryForManyErrors) {
   Random random(3);
   const std::size_t count = 50000;
   const Errors errors = draw(count, 1, 0, 1, random);
@@ -111,7 +111,7 @@ TEST(ErrorIntervals, WidthMatchesTheoryForManyErrors) {
   expect_width(intervals->p90.value(), quantile_sd(0.9));
 }
 
-TEST(ErrorIntervals, IsIndependentOfThreadCount) {
+TEST(BootstrapErrorIntervals, ReturnsIdenticalIntervalsForAnyThreadCount) {
   Random random(4);
   const Errors errors = draw(3000, 2, 1, 1, random);
   const auto one = bootstrap_error_intervals(errors.values, errors.clusters, 1);
@@ -126,7 +126,7 @@ TEST(ErrorIntervals, IsIndependentOfThreadCount) {
   EXPECT_EQ(one->p90->high, four->p90->high);
 }
 
-TEST(ErrorIntervals, ReturnsNulloptForFewUnits) {
+TEST(BootstrapErrorIntervals, ReturnsNulloptForFewerThanFiveClusters) {
   const std::vector<double> errors{1, 2, 3, 4, 5, 6};
   EXPECT_FALSE(bootstrap_error_intervals(errors, std::vector<std::size_t>{0, 0, 1, 1, 2, 3}, 1));
   const auto intervals =
@@ -135,7 +135,7 @@ TEST(ErrorIntervals, ReturnsNulloptForFewUnits) {
   EXPECT_EQ(intervals->clusters, 5);
 }
 
-TEST(ErrorIntervals, OmitsP90ForFewUnits) {
+TEST(BootstrapErrorIntervals, OmitsP90ForTooFewClusters) {
   Random random(5);
   const Errors few = draw(kMinClustersForP90 - 1, 3, 1, 1, random);
   EXPECT_FALSE(bootstrap_error_intervals(few.values, few.clusters, 1).value().p90);
@@ -143,7 +143,7 @@ TEST(ErrorIntervals, OmitsP90ForFewUnits) {
   EXPECT_TRUE(bootstrap_error_intervals(sufficient.values, sufficient.clusters, 1).value().p90);
 }
 
-TEST(ErrorIntervals, HasZeroWidthForEqualErrors) {
+TEST(BootstrapErrorIntervals, HasZeroWidthForEqualErrors) {
   const std::vector<double> errors(20, 2.5);
   std::vector<std::size_t> clusters(20);
   std::iota(clusters.begin(), clusters.end(), std::size_t{0});

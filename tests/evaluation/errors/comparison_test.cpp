@@ -36,7 +36,7 @@ std::string_view compare_pairs(const Pairs& all) {
       .comparison_verdict();
 }
 
-TEST(CompareFixes, DetectsSmallPairedDifferences) {
+TEST(CompareHorizontalErrors, ReturnsBetterOrWorseForSmallPairedDifferences) {
   EXPECT_EQ(compare_pairs(pairs(100, 3e-4)), "worse");
   EXPECT_EQ(compare_pairs(pairs(100, -3e-4)), "better");
   EXPECT_EQ(compare_pairs(pairs(kMinClustersCompared, 1e-2)), "worse");
@@ -48,7 +48,7 @@ TEST(CompareFixes, DetectsSmallPairedDifferences) {
             "equivalent");
 }
 
-TEST(CompareFixes, ReportsInsignificantDifferenceAsTheSame) {
+TEST(CompareHorizontalErrors, ReturnsTheSameForDifferencesBelowOnePercent) {
   // For errors of 15 mm on average 1 % is 0.15 mm; the mean difference has an uncertainty of 0.01
   // mm.
   EXPECT_EQ(compare_pairs(pairs(100, 1e-4)), "equivalent");
@@ -57,7 +57,7 @@ TEST(CompareFixes, ReportsInsignificantDifferenceAsTheSame) {
   const Pairs tenth = pairs(100, 1e-4);
   EXPECT_EQ(
       compare_horizontal_errors(tenth.fixes, tenth.errors, tenth.others, tenth.other_errors, 1)
-          .describe_result(),
+          .describe_comparison_result(),
       "equivalent within 0.15 mm");
   // For small errors the smallest relevant difference is a micrometer.
   Pairs small = pairs(100, 0);
@@ -65,16 +65,16 @@ TEST(CompareFixes, ReportsInsignificantDifferenceAsTheSame) {
   for (FixError& error : small.other_errors) error.horizontal_m = {1e-5, 0};
   Comparison comparison =
       compare_horizontal_errors(small.fixes, small.errors, small.others, small.other_errors, 1);
-  EXPECT_EQ(comparison.describe_result(), "equivalent within 0.001 mm");
+  EXPECT_EQ(comparison.describe_comparison_result(), "equivalent within 0.001 mm");
   ASSERT_TRUE(comparison.interval_m);
   EXPECT_GT(comparison.interval_m->low, 0);
   comparison.min_relevant_m = 1e-7;
-  EXPECT_EQ(comparison.describe_result(), "worse by more than 0.0001 mm");
+  EXPECT_EQ(comparison.describe_comparison_result(), "worse by more than 0.0001 mm");
   comparison.clusters = 1;
-  EXPECT_EQ(comparison.describe_result(), "inconclusive, too few");
+  EXPECT_EQ(comparison.describe_comparison_result(), "inconclusive, too few");
 }
 
-TEST(CompareFixes, RequiresUnitsNotPairs) {
+TEST(CompareHorizontalErrors, ReturnsNoEvidenceForFewClustersDespiteManyPairs) {
   Pairs all = pairs(100, 1e-2);
   for (FixError& error : all.errors) error.cluster = 3 * (error.cluster % 19);
   const Comparison comparison =
@@ -100,7 +100,7 @@ TEST(Comparison, VerdictRequiresWholeIntervalOnOneSide) {
   EXPECT_EQ(comparison.comparison_verdict(), "worse");
 }
 
-TEST(CompareFixes, CountsPairsAndMissingFixes) {
+TEST(CompareHorizontalErrors, CountsPairsAndFixesMissingInEitherRun) {
   Pairs all = pairs(10, 1e-2);
   all.errors.erase(all.errors.begin(), all.errors.begin() + 3);
   all.other_errors.erase(all.other_errors.begin() + 9);
@@ -114,7 +114,7 @@ TEST(CompareFixes, CountsPairsAndMissingFixes) {
   EXPECT_NEAR(comparison.mean_difference_m, 1e-2, 2e-4);
 }
 
-TEST(CheckSameImagesInFixes, RejectsFixesOfOtherCaptures) {
+TEST(CheckSameImagesInFixes, ThrowsNamingImageMissingInOtherFile) {
   const FromFile<FixRow> fixes{"a.csv", {fix_at("a", 0, 0)}};
   const FromFile<FixRow> others{"b.csv", {fix_at("a", 0, 0), fix_at("b", 0, 0)}};
   EXPECT_THAT(rejection_message([&] { check_same_images_in_fixes(fixes, others); }),

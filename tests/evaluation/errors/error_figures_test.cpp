@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-TEST(ErrorStatistics, MatchesManualComputation) {
+TEST(ComputeErrorStatistics, MatchesManuallyComputedValuesOfTenErrors) {
   const ErrorStatistics statistics = compute_error_statistics({10, 1, 2, 3, 4, 9, 8, 7, 6, 5});
   EXPECT_EQ(statistics.count, 10);
   EXPECT_DOUBLE_EQ(statistics.mean, 5.5);
@@ -19,7 +19,7 @@ TEST(ErrorStatistics, MatchesManualComputation) {
   EXPECT_DOUBLE_EQ(statistics.rms, std::sqrt(38.5));
 }
 
-TEST(ErrorStatistics, ReturnsTheErrorForSingleError) {
+TEST(ComputeErrorStatistics, EachStatisticEqualsSingleError) {
   const ErrorStatistics statistics = compute_error_statistics({3});
   for (const double figure :
        {statistics.mean, statistics.median, statistics.p90, statistics.max, statistics.rms}) {
@@ -27,17 +27,17 @@ TEST(ErrorStatistics, ReturnsTheErrorForSingleError) {
   }
 }
 
-TEST(SignedErrorStatistics, ReturnsBias) {
+TEST(ComputeSignedErrorStatistics, ReturnsMeanAsBiasAndMagnitudeStatistics) {
   const SignedErrorStatistics statistics = compute_signed_error_statistics({-3, 1, -1});
   EXPECT_EQ(statistics.bias, -1);
   EXPECT_EQ(statistics.sizes.median, 1);
   EXPECT_EQ(statistics.sizes.max, 3);
 }
 
-TEST(ComputePercentiles, MatchesP90OfErrorStatistics) {
+TEST(ComputeErrorPercentiles, Returns100PercentilesWithP90OfErrorStatistics) {
   std::vector<double> errors(200);
   for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = static_cast<double>(200 - i);
-  const auto distribution = compute_percentiles(errors);
+  const auto distribution = compute_error_percentiles(errors);
   ASSERT_EQ(distribution.size(), 100);
   EXPECT_EQ(distribution[0], std::pair(0.01, 2.0));
   EXPECT_EQ(distribution[6], std::pair(0.07, 14.0));  // 0.07 * 200 is a little more than 14

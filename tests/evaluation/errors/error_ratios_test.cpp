@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-TEST(NormalizedErrors, IsOneIfErrorsMatchReportedSd) {
+TEST(ComputeNormalizedErrors, ReturnsOneIfErrorsMatchReportedSd) {
   Random random(1);
   std::vector<FixRow> fixes;
   std::vector<FixError> errors;
@@ -56,14 +56,15 @@ Camera pinhole() {
 
 /// Four lamps round the camera, 2 m above it, and a focal length of 500 px: sd(X) = sd(Y) =
 /// (H / f) noise / sqrt(4), see ErrorBudget::noise.
-TEST(CrlbRatio, MatchesAnalyticLimit) {
+TEST(ComputeErrorToCrlbRatio, MatchesClosedFormLimitForFourLamps) {
   const double sd_m = 2.0 / 500 * 0.1 / 2, limit_m = sd_m * std::sqrt(2);
   const std::vector<TruthRow> truth{
       {"a", {0, 0}, 0, 0.3}, {"b", {90, 0}, 0, 0}, {"c", {0, 0}, {}, 0}};
-  const auto ratio = compute_crlb_ratio({{0, {0, 3 * limit_m}, {}, {}, 0, 0},
-                                         {1, {5, 5}, {}, {}, 1, 1},   // sees no lamp
-                                         {2, {5, 5}, {}, {}, 2, 2}},  // at an unknown height
-                                        truth, four_lamps(), pinhole(), 0.1, 2);
+  const auto ratio =
+      compute_error_to_crlb_ratio({{0, {0, 3 * limit_m}, {}, {}, 0, 0},
+                                   {1, {5, 5}, {}, {}, 1, 1},   // sees no lamp
+                                   {2, {5, 5}, {}, {}, 2, 2}},  // at an unknown height
+                                  truth, four_lamps(), pinhole(), 0.1, 2);
   ASSERT_TRUE(ratio);
   EXPECT_EQ(ratio->fixes, 1);
   EXPECT_NEAR(ratio->limit_m, limit_m, 1e-9);
@@ -71,7 +72,7 @@ TEST(CrlbRatio, MatchesAnalyticLimit) {
   EXPECT_NEAR(ratio->sd, 1 / std::sqrt(4.0), 1e-6);
 }
 
-TEST(CrlbRatio, BeatenIgnoresChanceAndDetectsSmallErrors) {
+TEST(CrlbRatio, AreErrorsBelowCrlbOnlyForSignificantlySmallerErrors) {
   Random random(3);
   constexpr int trials = 2000, fixes = 50;
   const auto count_below_limit = [&](double stated) {
@@ -80,7 +81,8 @@ TEST(CrlbRatio, BeatenIgnoresChanceAndDetectsSmallErrors) {
       double squares = 0;
       for (int i = 0; i < 2 * fixes; ++i) squares += std::pow(random.normal(), 2);
       const double ratio = std::sqrt(squares / (2 * fixes)) / stated;
-      count += CrlbRatio{ratio, 1, fixes, 1 / std::sqrt(4.0 * fixes)}.is_below_crlb() ? 1 : 0;
+      count +=
+          CrlbRatio{ratio, 1, fixes, 1 / std::sqrt(4.0 * fixes)}.are_errors_below_crlb() ? 1 : 0;
     }
     return count;
   };
@@ -90,7 +92,7 @@ TEST(CrlbRatio, BeatenIgnoresChanceAndDetectsSmallErrors) {
 
 /// Every sixth camera is 10 m below the lamps, the others 2 m: their limit is five times as large,
 /// and a few fixes make up most of the ratio.
-TEST(CrlbRatio, FalseAlarmRateHoldsForUnequalLimits) {
+TEST(CrlbRatio, AreErrorsBelowCrlbHardlyEverByChanceForUnequalLimits) {
   Random random(4);
   constexpr int trials = 300;
   constexpr std::size_t fixes = 60;
@@ -108,11 +110,11 @@ TEST(CrlbRatio, FalseAlarmRateHoldsForUnequalLimits) {
       const double x_m = sd_m * random.normal(), y_m = sd_m * random.normal();
       errors.push_back({i, {x_m, y_m}, {}, {}, i, i});
     }
-    const auto ratio = compute_crlb_ratio(errors, truth, lamps, camera, 0.1, 1);
+    const auto ratio = compute_error_to_crlb_ratio(errors, truth, lamps, camera, 0.1, 1);
     ASSERT_TRUE(ratio);
     sd = ratio->sd;
     square += std::pow(ratio->horizontal - 1, 2) / trials;
-    num_below_limit += ratio->is_below_crlb() ? 1 : 0;
+    num_below_limit += ratio->are_errors_below_crlb() ? 1 : 0;
     as_if_equal += ratio->horizontal < 1 - 3 / std::sqrt(4.0 * fixes) ? 1 : 0;
   }
   EXPECT_NEAR(std::sqrt(square) / sd, 1, 0.13);  // three standard errors

@@ -13,14 +13,14 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(ComputeErrorsAgainstTruth, MatchesRowsByImage) {
+TEST(ComputeFixErrorsAgainstTruth, PairsFixesAndTruthByImageName) {
   const FromFile<FixRow> fixes{
       "fixes.csv",
       {fix_at("b", 1.003, 2.004, 0.5, 3.1), no_fix("c", "degenerate"), fix_at("a", 0, 0, 0.1)}};
   const FromFile<TruthRow> truth{
       "truth.csv",
       {{"a", {0, 0}, 0, 0}, {"b", {1, 2}, 0.4, -3.1}, {"c", {0, 0}, 0, 0}, {"d", {0, 0}, 0, 0}}};
-  const FixErrors errors = compute_errors_against_truth(fixes, truth, 1e-3);
+  const FixErrors errors = compute_fix_errors_against_truth(fixes, truth, 1e-3);
   EXPECT_EQ(errors.captures, 4);
   EXPECT_EQ(errors.missing, (std::map<std::string, std::size_t>{{"degenerate", 1}, {"no row", 1}}));
   ASSERT_EQ(errors.errors.size(), 2);
@@ -31,19 +31,19 @@ TEST(ComputeErrorsAgainstTruth, MatchesRowsByImage) {
   EXPECT_EQ(errors.errors[1].cluster, 0);
 }
 
-TEST(ComputeErrorsAgainstTruth, RejectsImagesMissingInTruth) {
+TEST(ComputeFixErrorsAgainstTruth, ThrowsForFixesOfImagesMissingInTruth) {
   FromFile<FixRow> fixes{"fixes.csv", {fix_at("a", 0, 0), fix_at("x", 0, 0), fix_at("y", 0, 0)}};
   fixes.rows[1].line = 17;
   const FromFile<TruthRow> truth{"truth.csv", {{"a", {0, 0}, {}, {}}}};
   const std::string refusal =
-      rejection_message([&] { compute_errors_against_truth(fixes, truth, 1e-3); });
+      rejection_message([&] { compute_fix_errors_against_truth(fixes, truth, 1e-3); });
   EXPECT_THAT(refusal, HasSubstr("fixes.csv:17: image: 'x' is not in truth.csv"));
   EXPECT_THAT(refusal, HasSubstr("2 of 3"));
 }
 
-TEST(ComputeErrorsAgainstPath, UsesNearestPointOfPath) {
+TEST(ComputeFixErrorsAgainstPath, MeasuresErrorsToNearestPointOfPath) {
   const Path path{{{0, 0}, {1, 0}, {1, 1}}, {0, 1, 1}};
-  const FixErrors errors = compute_errors_against_path(
+  const FixErrors errors = compute_fix_errors_against_path(
       {fix_at("a", 0.5, 0.1, 0.7), fix_at("b", -3, -4), fix_at("c", 1.2, 0.5), no_fix("d", "x")},
       path);
   EXPECT_EQ(errors.captures, 4);
@@ -55,9 +55,9 @@ TEST(ComputeErrorsAgainstPath, UsesNearestPointOfPath) {
   EXPECT_FALSE(errors.errors[2].yaw_rad);
 }
 
-TEST(ComputeErrorsAgainstPath, GroupsFixesIntoThirtyUnits) {
+TEST(ComputeFixErrorsAgainstPath, GroupsConsecutiveFixesIntoThirtyClusters) {
   const std::vector<FixRow> fixes(3000, fix_at("a", 0, 0));
-  const FixErrors errors = compute_errors_against_path(fixes, {{{0, 0}, {1, 0}}, {}});
+  const FixErrors errors = compute_fix_errors_against_path(fixes, {{{0, 0}, {1, 0}}, {}});
   ASSERT_EQ(errors.errors.size(), 3000);
   EXPECT_EQ(errors.errors.front().cluster, 0);
   EXPECT_EQ(errors.errors[99].cluster, 0);

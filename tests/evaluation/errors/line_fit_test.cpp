@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-TEST(FitLineToFixes, AveragesOutJitter) {
+TEST(FitLineToFixes, DistancesFromCommandedLineExcludeJitter) {
   std::vector<FixRow> fixes;
   for (int i = 0; i <= 100; ++i) {  // along x = 1 - 0.01 + ..., upwards, jitter of 2 mm across
     fixes.push_back(fix_at("", 0.01 + (i % 2 == 0 ? 2e-3 : -2e-3), i / 100.0));
@@ -29,7 +29,7 @@ TEST(FitLineToFixes, AveragesOutJitter) {
 
 /// Line through the center of the commanded one, rotated by 0.1: errors grow linearly from 0 to
 /// 0.1.
-TEST(FitLineToFixes, ReturnsErrorStatisticsWhenLineIsRotated) {
+TEST(FitLineToFixes, ReturnsAngleAndDistanceStatisticsOfRotatedLine) {
   std::vector<FixRow> fixes;
   for (int i = -10; i <= 10; ++i) fixes.push_back(fix_at("", i / 10.0, i / 100.0));
   const auto fit = fit_line_to_fixes(fixes, {Eigen::Vector2d(-1, 0), Eigen::Vector2d(1, 0)});
@@ -41,7 +41,7 @@ TEST(FitLineToFixes, ReturnsErrorStatisticsWhenLineIsRotated) {
   EXPECT_NEAR(fit->jitter_m, 0, 1e-7);  // the root of rounding
 }
 
-TEST(FitLineToFixes, HasDirectionOfCommandedLine) {
+TEST(FitLineToFixes, ReturnsLineInDirectionOfCommandedLine) {
   const std::vector<FixRow> fixes{fix_at("", 0, 0), fix_at("", 1, 0)};
   const Eigen::Vector2d begin(0, 0), end(1, 0);
   for (const CommandedLine& line : {CommandedLine{begin, end}, CommandedLine{end, begin}}) {
@@ -52,7 +52,7 @@ TEST(FitLineToFixes, HasDirectionOfCommandedLine) {
   }
 }
 
-TEST(FitLineToFixes, ReturnsNulloptWithoutDirection) {
+TEST(FitLineToFixes, ReturnsNulloptWhenFixesDetermineNoDirection) {
   const CommandedLine line{Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0)};
   EXPECT_FALSE(fit_line_to_fixes({fix_at("", 0, 0)}, line));
   EXPECT_FALSE(fit_line_to_fixes({fix_at("", 1, 1), fix_at("", 1, 1)}, line));

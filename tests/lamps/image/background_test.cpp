@@ -27,20 +27,20 @@ cv::Mat noisy(cv::Size size, double level, double noise, std::size_t bright_ever
 }
 
 void expect_dark(const cv::Mat& image, double level, double noise) {
-  const Background background = estimate_background(to_image_view(image));
+  const Background background = estimate_image_background(to_image_view(image));
   EXPECT_NEAR(background.level, level, 0.15 * noise + 0.5);
   EXPECT_NEAR(background.noise, noise, 0.1 * noise);
   EXPECT_DOUBLE_EQ(background.threshold, background.level + 4.5 * background.noise);
 }
 
 void expect_flat(const cv::Mat& image, double level) {
-  const Background background = estimate_background(to_image_view(image));
+  const Background background = estimate_image_background(to_image_view(image));
   EXPECT_EQ(background.level, level);
   EXPECT_LT(background.noise, 0.5);
   EXPECT_EQ(background.threshold, level + 1.6);
 }
 
-TEST(EstimateBackground, MatchesLevelAndNoiseOfFlat8BitImages) {
+TEST(EstimateImageBackground, MatchesLevelAndNoiseOfFlat8BitImages) {
   for (const cv::Size size : {cv::Size(97, 80), cv::Size(800, 600), cv::Size(1920, 1200)}) {
     for (const double noise : {2.0, 5.0, 10.0}) {
       SCOPED_TRACE(testing::Message() << size << ", " << noise);
@@ -49,49 +49,50 @@ TEST(EstimateBackground, MatchesLevelAndNoiseOfFlat8BitImages) {
   }
 }
 
-TEST(EstimateBackground, MatchesLevelAndNoiseOfFlat16BitImages) {
+TEST(EstimateImageBackground, MatchesLevelAndNoiseOfFlat16BitImages) {
   for (const double noise : {3.0, 50.0, 400.0}) {
     SCOPED_TRACE(noise);
     expect_dark(noisy<std::uint16_t>({800, 600}, 4000, noise, 0, 0), 4000, noise);
   }
 }
 
-TEST(EstimateBackground, IsUnbiasedWhenFivePercentOfPixelsAreLit) {
+TEST(EstimateImageBackground, MatchesLevelAndNoiseWithFivePercentLitPixels) {
   expect_dark(noisy<std::uint8_t>({800, 600}, 20, 4, 20, 250), 20, 4);
   expect_dark(noisy<std::uint16_t>({800, 600}, 900, 80, 20, 65535), 900, 80);
 }
 
-TEST(EstimateBackground, ThresholdExceedsNearlyAllPixelsOfFlatImages) {
+TEST(EstimateImageBackground, ThresholdExceedsNearlyAllPixelsOfFlatImages) {
   for (const double noise : {0.5, 2.0, 8.0}) {
     const cv::Mat image = noisy<std::uint8_t>({800, 600}, 60, noise, 0, 0);
-    EXPECT_LT(cv::countNonZero(image > estimate_background(to_image_view(image)).threshold), 20)
+    EXPECT_LT(cv::countNonZero(image > estimate_image_background(to_image_view(image)).threshold),
+              20)
         << noise;
   }
 }
 
-TEST(EstimateBackground, ReturnsMedianForTinyImages) {
+TEST(EstimateImageBackground, ReturnsMedianForTinyImages) {
   expect_flat(cv::Mat(1, 1, CV_8U, cv::Scalar(40)), 40);
   expect_flat(cv::Mat(1, 1, CV_16U, cv::Scalar(4000)), 4000);
   expect_flat((cv::Mat_<std::uint8_t>(3, 2) << 9, 9, 200, 9, 9, 9), 9);
   expect_flat((cv::Mat_<std::uint16_t>(2, 3) << 700, 700, 700, 60000, 700, 700), 700);
 }
 
-TEST(EstimateBackground, ReturnsLevelOfBlackAndWhiteImages) {
+TEST(EstimateImageBackground, ReturnsExactLevelOfUniformBlackOrWhiteImages) {
   expect_flat(cv::Mat::zeros(600, 800, CV_8U), 0);
   expect_flat(cv::Mat::zeros(600, 800, CV_16U), 0);
   expect_flat(cv::Mat(600, 800, CV_8U, cv::Scalar(255)), 255);
   expect_flat(cv::Mat(600, 800, CV_16U, cv::Scalar(65535)), 65535);
 }
 
-TEST(EstimateBackground, MatchesNoiseWhenDarkLevelIsClipped) {
+TEST(EstimateImageBackground, MatchesNoiseWhenDarkLevelIsClipped) {
   // Models a brightened image that was black in most places.
   const cv::Mat image = cv::max(noisy<std::uint8_t>({800, 600}, 1, 1.2, 0, 0), 1);
-  const Background background = estimate_background(to_image_view(image));
+  const Background background = estimate_image_background(to_image_view(image));
   EXPECT_NEAR(background.noise, 1.2, 0.3);
   EXPECT_LT(cv::countNonZero(image > background.threshold), 20);
 }
 
-TEST(EstimateBackground, DetectsNoClippingInNoiselessImagesWithLargeLights) {
+TEST(EstimateImageBackground, ReturnsDarkLevelOfNoiselessImagesWithLargeLights) {
   for (const int type : {CV_8U, CV_16U}) {
     for (const double dark : {0.0, 9.0}) {
       for (const int lit_rows : {60, 150, 240}) {  // of 600: a tenth to two fifths
@@ -105,14 +106,14 @@ TEST(EstimateBackground, DetectsNoClippingInNoiselessImagesWithLargeLights) {
   }
 }
 
-TEST(EstimateBackground, IgnoresParentPixelsOfSubimage) {
+TEST(EstimateImageBackground, IgnoresParentPixelsOfSubimage) {
   cv::Mat image(600, 800, CV_8U, cv::Scalar(200));
   cv::Mat part = image(cv::Rect(100, 50, 33, 41));
   part = 30;
   expect_flat(part, 30);
 }
 
-TEST(EstimateBackground, ScalesWithLevelStepIn16BitImages) {
+TEST(EstimateImageBackground, LevelNoiseAndThresholdScaleWithLevelStep) {
   Random random(3);
   cv::Mat eight(600, 800, CV_8U), sixteen;
   for (const double dark : {0.2, 3.0, 40.0}) {
@@ -123,10 +124,10 @@ TEST(EstimateBackground, ScalesWithLevelStepIn16BitImages) {
             cv::saturate_cast<std::uint8_t>(dark + lamp + 0.8 * random.normal());
       }
     }
-    const Background expected = estimate_background(to_image_view(eight));
+    const Background expected = estimate_image_background(to_image_view(eight));
     for (const int step : {16, 257}) {
       eight.convertTo(sixteen, CV_16U, step);
-      const Background found = estimate_background(to_image_view(sixteen));
+      const Background found = estimate_image_background(to_image_view(sixteen));
       EXPECT_NEAR(found.level / step, expected.level, 1e-9);
       EXPECT_NEAR(found.noise / step, expected.noise, 1e-9);
       EXPECT_NEAR(found.threshold / step, expected.threshold, 1e-9);
@@ -134,19 +135,19 @@ TEST(EstimateBackground, ScalesWithLevelStepIn16BitImages) {
   }
 }
 
-TEST(EstimateBackground, IgnoresLevelStepWhenFewLevelsOccur) {
+TEST(EstimateImageBackground, ReturnsLowThresholdWhenOnlyTwoLevelsOccur) {
   cv::Mat image = cv::Mat::zeros(600, 800, CV_16U);
   image(cv::Rect(100, 50, 200, 200)) = 400;
-  EXPECT_LT(estimate_background(to_image_view(image)).threshold, 2);
+  EXPECT_LT(estimate_image_background(to_image_view(image)).threshold, 2);
 }
 
-TEST(EstimateBackground, SamplesAllColumnsOfColorFilterPattern) {
+TEST(EstimateImageBackground, LevelAveragesAllColumnsOfColorFilterPattern) {
   // One of four columns is darker, as with a mosaic of color filters.
   for (const cv::Size size : {cv::Size(800, 600), cv::Size(1280, 960), cv::Size(1920, 1200)}) {
     for (int darker = 0; darker < 4; ++darker) {
       cv::Mat image(size, CV_8U, cv::Scalar(30));
       for (int column = darker; column < size.width; column += 4) image.col(column) = 20;
-      EXPECT_NEAR(estimate_background(to_image_view(image)).level, 27.5, 0.1)
+      EXPECT_NEAR(estimate_image_background(to_image_view(image)).level, 27.5, 0.1)
           << size << ", " << darker;
     }
   }

@@ -30,13 +30,13 @@ TEST(GroupPixelRunsIntoBlobs, ReturnsNoBlobsWithoutRuns) {
   EXPECT_TRUE(group_pixel_runs_into_blobs({}, 5).empty());
 }
 
-TEST(GroupPixelRunsIntoBlobs, JoinsRunsAcrossMaxDarkRows) {
+TEST(GroupPixelRunsIntoBlobs, JoinsRunsAcrossAtMostMaxDarkRows) {
   for (const int dark : {0, 1, 5, 24}) {
     const auto runs = joined({rows(10, 14, 20, 40), rows(15 + dark, 19 + dark, 20, 40)});
     const auto whole = group_pixel_runs_into_blobs(runs, dark);
     ASSERT_EQ(whole.size(), 1U) << dark;
-    EXPECT_EQ(whole[0].first_row(), 10);
-    EXPECT_EQ(whole[0].bottom(), 19 + dark);
+    EXPECT_EQ(whole[0].first_blob_row(), 10);
+    EXPECT_EQ(whole[0].last_blob_row(), 19 + dark);
     EXPECT_EQ(whole[0].runs.size(), 10U);
     if (dark > 0) {
       EXPECT_EQ(group_pixel_runs_into_blobs(runs, dark - 1).size(), 2U) << dark;
@@ -48,9 +48,9 @@ TEST(GroupPixelRunsIntoBlobs, SeparatesLightsSideBySide) {
   const auto blobs =
       group_pixel_runs_into_blobs(joined({rows(10, 30, 20, 40), rows(5, 35, 40, 60)}), 5);
   ASSERT_EQ(blobs.size(), 2U);
-  EXPECT_EQ(blobs[0].first_row(), 5);
+  EXPECT_EQ(blobs[0].first_blob_row(), 5);
   EXPECT_EQ(blobs[0].runs.size(), 31U);
-  EXPECT_EQ(blobs[1].first_row(), 10);
+  EXPECT_EQ(blobs[1].first_blob_row(), 10);
   EXPECT_EQ(blobs[1].runs.size(), 21U);
 }
 
@@ -73,12 +73,12 @@ TEST(GroupPixelRunsIntoBlobs, JoinsBlobsConnectedByOneRun) {
   const auto runs = joined({rows(10, 20, 20, 40), rows(12, 20, 50, 70), rows(21, 22, 20, 70)});
   const auto blobs = group_pixel_runs_into_blobs(runs, 3);
   ASSERT_EQ(blobs.size(), 1U);
-  EXPECT_EQ(blobs[0].first_row(), 10);
-  EXPECT_EQ(blobs[0].bottom(), 22);
+  EXPECT_EQ(blobs[0].first_blob_row(), 10);
+  EXPECT_EQ(blobs[0].last_blob_row(), 22);
   EXPECT_EQ(blobs[0].runs.size(), runs.size());
 }
 
-TEST(GroupPixelRunsIntoBlobs, JoinsBlobsWithDifferentLastRows) {
+TEST(GroupPixelRunsIntoBlobs, JoinsBlobsWithDifferentLastRowsWithinMaxDarkRows) {
   // A stripe of one blob ends before the run that joins both.
   const auto runs = joined({rows(10, 14, 20, 40), rows(10, 18, 50, 70), rows(19, 20, 35, 55)});
   EXPECT_EQ(group_pixel_runs_into_blobs(runs, 3).size(), 2U);

@@ -22,7 +22,7 @@ cv::Mat with_light(const std::vector<cv::Rect>& boxes, int depth = CV_8U) {
 }
 
 bool is_lit(const TileMask& tiles, int x, int y) {
-  return tiles.row(y / kTile_px)[x / kTile_px] != 0;
+  return tiles.tile_row(y / kTile_px)[x / kTile_px] != 0;
 }
 
 int count(const TileMask& tiles) {
@@ -74,7 +74,8 @@ TEST(FindBrightTiles, ReturnsNoTilesWhenThresholdIsWhiteOrHigher) {
 
 TEST(FindTileGroupBoxes, JoinsTilesThatTouchAtCorners) {
   TileMask tiles(6, 5);
-  for (const auto& [x, y] : {std::pair(1, 0), {2, 1}, {1, 2}, {5, 4}, {4, 4}}) tiles.row(y)[x] = 1;
+  for (const auto& [x, y] : {std::pair(1, 0), {2, 1}, {1, 2}, {5, 4}, {4, 4}})
+    tiles.tile_row(y)[x] = 1;
   const auto boxes = find_tile_group_boxes(tiles);
   ASSERT_EQ(boxes.size(), 2U);
   EXPECT_EQ(boxes[0], (PixelBox{1, 0, 2, 3}));

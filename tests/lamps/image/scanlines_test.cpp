@@ -72,7 +72,7 @@ TEST(MakeScanlineImage, ReturnsSameImageForRowReadout) {
             image.data);
 }
 
-TEST(MakeScanlineImage, TransposesTilesAroundLitPixels) {
+TEST(MakeScanlineImage, TransposesTilesAroundLitPixelsForColumnReadout) {
   for (const cv::Size& size : {cv::Size(640, 448), cv::Size(601, 333), cv::Size(64, 64),
                                cv::Size(63, 65), cv::Size(1000, 7), cv::Size(1, 500)}) {
     for (const int spots : {1, 4, 20}) {
@@ -132,14 +132,14 @@ bool before(const Light& a, const Light& b) {
 }
 
 TEST(MakeScanlineImage, YieldsSameLightsForTransposedImage) {
-  Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
+  Scene scene = read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
   // The sample for the background uses other pixels of a transposed image; they must have the same
   // levels.
   scene.ambient_e_per_s = 0;
   scene.sensor.shot_noise = false;
   scene.sensor.read_noise_e = 0;
   const FrameRenderer renderer(scene);
-  const LampMap map = make_lamp_map(scene, false);
+  const LampMap map = make_scene_lamp_map(scene, false);
   const double row_time_s = *scene.camera.row_time_s;
   const LightDetector by_rows(map, {Readout::rows, row_time_s, std::nullopt});
   const LightDetector by_columns(map, {Readout::columns, row_time_s, std::nullopt});
@@ -147,11 +147,11 @@ TEST(MakeScanlineImage, YieldsSameLightsForTransposedImage) {
       *std::find_if(scene.sets.begin(), scene.sets.end(),
                     [](const CaptureSet& any) { return any.folder == "check"; });
   for (std::size_t i = 0; i < 3; ++i) {
-    const LampShot shot = make_lamp_shot(scene, set, i * 7);
-    const cv::Mat image =
-        simulate_sensor(scene.sensor, renderer.render_lamp_electrons(shot), shot.noise_seed);
-    const auto upright = by_rows.detect(to_image_view(image));
-    auto turned = by_columns.detect(to_image_view(image.t()));
+    const LampShot shot = make_simulated_lamp_capture(scene, set, i * 7);
+    const cv::Mat image = simulate_sensor_image(
+        scene.sensor, renderer.render_lamps_in_electrons(shot), shot.noise_seed);
+    const auto upright = by_rows.detect_lights(to_image_view(image));
+    auto turned = by_columns.detect_lights(to_image_view(image.t()));
     std::sort(turned.begin(), turned.end(), before);
     EXPECT_GE(upright.size(), 4U);
     ASSERT_EQ(upright.size(), turned.size());

@@ -72,20 +72,20 @@ struct DrawnDisc {
 
 inline std::vector<EdgePoint> outline_in(const cv::Mat& pixels) {
   const ImageView image = to_image_view(pixels);
-  const Background background = estimate_background(image);
+  const Background background = estimate_image_background(image);
   std::vector<EdgePoint> all;
   for (const Blob& blob :
        group_pixel_runs_into_blobs(find_pixel_runs(image, background.threshold), 3)) {
-    const auto points = find_outline(image, blob, background);
+    const auto points = find_blob_outline(image, blob, background);
     all.insert(all.end(), points.begin(), points.end());
   }
   return all;
 }
 
 inline RefinedOutline refined_outline_in(const cv::Mat& image, const DrawnDisc& disc) {
-  return refine_outline(to_image_view(image), outline_in(image),
-                        {disc.low(), disc.high(), disc.center},
-                        estimate_background(to_image_view(image)));
+  return refine_disc_outline(to_image_view(image), outline_in(image),
+                             {disc.low(), disc.high(), disc.center},
+                             estimate_image_background(to_image_view(image)));
 }
 
 inline std::vector<EdgePoint> refined_in(const cv::Mat& image, const DrawnDisc& disc) {

@@ -31,7 +31,7 @@ std::optional<DiscProjection> project_disc(const Lens& lens, double tilt_rad,
   const Eigen::Matrix3d camera_from_level =
       Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitY()).toRotationMatrix();
   const auto project_to_pixel = [&](const Eigen::Vector2d& on_ceiling) {
-    return lens.project(camera_from_level * on_ceiling.homogeneous());
+    return lens.project_point(camera_from_level * on_ceiling.homogeneous());
   };
   std::vector<Eigen::Vector2d> rim;
   for (int i = 0; i < 200; ++i) {
@@ -64,7 +64,7 @@ Lens make_lens(LensModel model, double focal_px, std::vector<double> coefficient
   return Lens(model, parameters);
 }
 
-TEST(UnknownLensSd, CoversEquidistantLens) {
+TEST(PredictCenterSdWithoutLens, BoundsCenterShiftOfEquidistantLens) {
   const Lens equidistant = make_lens(LensModel::fisheye, kHalf_px, {0, 0, 0, 0});
   int discs = 0;
   for (const double off_axis : {0.1, 0.3, 0.5, 0.7, 0.9}) {
@@ -82,7 +82,7 @@ TEST(UnknownLensSd, CoversEquidistantLens) {
   EXPECT_EQ(discs, 15);
 }
 
-TEST(UnknownLensSd, CoversTiltedCamera) {
+TEST(PredictCenterSdWithoutLens, BoundsCenterShiftOfTiltedPinholeCamera) {
   const Lens pinhole = make_lens(LensModel::pinhole, kHalf_px, {});
   for (const double tilt_deg : {2.0, 5.0, 10.0}) {
     const double tilt_rad = rad_from_deg(tilt_deg);
@@ -95,7 +95,7 @@ TEST(UnknownLensSd, CoversTiltedCamera) {
   }
 }
 
-TEST(UnknownLensSd, IncreasesWithRadiusAndDistanceFromImageCenter) {
+TEST(PredictCenterSdWithoutLens, IncreasesWithRadiusAndDistanceFromImageCenter) {
   Light light{};
   light.pixel = {399.5, 299.5};
   light.radius_px = 30;
@@ -118,7 +118,7 @@ Score without_lens(const std::string& scene, std::size_t step) {
   return captures.score(step, LightDetector(captures.lamps(), camera));
 }
 
-TEST(LightDetector, SigmaCoversUnknownLens) {
+TEST(LightDetector, SigmaMatchesCenterErrorsForUnknownLens) {
   for (const auto& [scene, step] :
        {std::pair("paper-rig", 12), {"paper-rig-faulty", 24}, {"wide", 16}}) {
     const Score score = without_lens(scene, std::size_t(step));

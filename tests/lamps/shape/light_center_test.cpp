@@ -20,7 +20,7 @@ using Eigen::Vector2d;
 class LightShapeOfMovingDisc : public testing::Test {
  protected:
   LightShapeOfMovingDisc()
-      : shape(camera), center_px(shape.pixel_from_level_plane(circle.center).value()) {}
+      : shape(camera), center_px(shape.pixel_from_level_plane_point(circle.center).value()) {}
 
   /// Returns the rim with each point at its position when its scanline is read: at d + m (l - l_c).
   std::vector<EdgePoint> outline(const Vector2d& motion_per_line) const {
@@ -30,10 +30,11 @@ class LightShapeOfMovingDisc : public testing::Test {
       const double angle = 2 * std::numbers::pi * i / count;
       const Vector2d rim =
           circle.center + circle.radius * Vector2d(std::cos(angle), std::sin(angle));
-      Vector2d pixel = shape.pixel_from_level_plane(rim).value();
+      Vector2d pixel = shape.pixel_from_level_plane_point(rim).value();
       for (int iteration = 0; iteration < 20; ++iteration) {
-        pixel = shape.pixel_from_level_plane(rim + (pixel.y() - center_px.y()) * motion_per_line)
-                    .value();
+        pixel =
+            shape.pixel_from_level_plane_point(rim + (pixel.y() - center_px.y()) * motion_per_line)
+                .value();
       }
       points.push_back({pixel, 100, 1, pixel.x() < center_px.x()});
     }
@@ -48,7 +49,7 @@ class LightShapeOfMovingDisc : public testing::Test {
   Background dark{0, 1, 5};
 };
 
-TEST_F(LightShapeOfMovingDisc, CenterMatchesPositionAtReadoutOfCenterRow) {
+TEST_F(LightShapeOfMovingDisc, CorrectedCenterMatchesPositionAtReadoutOfCenterRow) {
   // A lamp 2.5 m above a camera that moves at 2 m/s, with a row time of 30 us.
   for (const Vector2d& motion :
        {Vector2d(2.4e-5, 0), Vector2d(0, 2.4e-5), Vector2d(-1.5e-5, 2e-5)}) {
@@ -64,7 +65,7 @@ TEST_F(LightShapeOfMovingDisc, CenterMatchesPositionAtReadoutOfCenterRow) {
   }
 }
 
-TEST_F(LightShapeOfMovingDisc, KeepsCenterForStationaryCamera) {
+TEST_F(LightShapeOfMovingDisc, CorrectedCenterMatchesTrueCenterForStationaryCamera) {
   auto light = shape.fit_light_to_outline(outline(Vector2d::Zero()), dark);
   ASSERT_TRUE(light);
   shape.correct_light_for_motion({Vector2d::Zero(), 1e-12 * Matrix2::Identity()}, Vector2d::Zero(),

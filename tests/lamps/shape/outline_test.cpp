@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-TEST(FindOutline, PointsLieOnCircleOfDisc) {
+TEST(FindBlobOutline, PointsLieOnCircleOfDisc) {
   for (const int depth : {CV_8U, CV_16U}) {
     for (const double blur_px : {0.6, 0.8}) {
       const DrawnDisc disc{.blur_px = blur_px};
@@ -25,7 +25,7 @@ TEST(FindOutline, PointsLieOnCircleOfDisc) {
   }
 }
 
-TEST(FindOutline, ReturnsSideLevelAndRiseOfEdges) {
+TEST(FindBlobOutline, ReturnsSideLevelAndRiseOfEdges) {
   const DrawnDisc disc;
   const double rise_px = 2 * 0.6745 * disc.blur_px;  // between the quartiles of a normal curve
   const auto points = outline_in(disc.image(CV_16U));
@@ -42,7 +42,7 @@ TEST(FindOutline, ReturnsSideLevelAndRiseOfEdges) {
   EXPECT_GT(steep, 0);
 }
 
-TEST(FindOutline, ExcludesImageBorder) {
+TEST(FindBlobOutline, ReturnsNoPointsAtImageBorderForCutDisc) {
   for (const double column : {25.0, 175.0}) {
     const DrawnDisc disc{.center = {column, 79.6}};
     const auto points = outline_in(disc.image(CV_16U));

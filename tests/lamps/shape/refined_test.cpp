@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-TEST(RefineOutline, PointsLieOnCircle) {
+TEST(RefineDiscOutline, PointsLieOnCircleForUniformDisc) {
   for (const int depth : {CV_8U, CV_16U}) {
     for (const double blur_px : {0.7, 0.8}) {
       const DrawnDisc disc{.blur_px = blur_px};
@@ -25,14 +25,14 @@ TEST(RefineOutline, PointsLieOnCircle) {
   }
 }
 
-TEST(RefineOutline, ReducesErrorForBlurredDiscs) {
+TEST(RefineDiscOutline, ReducesDistanceFromCircleOfBlurredDisc) {
   const DrawnDisc disc{.blur_px = 1.2};
   const cv::Mat image = disc.image(CV_16U);
   EXPECT_GT(worst_off(disc, outline_in(image), kSteep), 0.2);
   EXPECT_LT(worst_off(disc, refined_in(image, disc), kSteep), 0.1);
 }
 
-TEST(RefineOutline, PointsLieOnCircleForSmallDiscs) {
+TEST(RefineDiscOutline, PointsLieOnCircleForSmallDiscs) {
   for (const double radius_px : {8.0, 12.0, 16.0, 24.0}) {
     const DrawnDisc disc{.radius_px = radius_px};
     const auto points = refined_in(disc.image(CV_16U), disc);
@@ -41,7 +41,7 @@ TEST(RefineOutline, PointsLieOnCircleForSmallDiscs) {
   }
 }
 
-TEST(RefineOutline, PointsLieOnCircleWithBrightnessGradient) {
+TEST(RefineDiscOutline, PointsLieOnCircleWithBrightnessGradient) {
   for (const double change : {-0.3, 0.15, 0.3}) {
     const DrawnDisc disc{.change = change};
     const auto points = refined_in(disc.image(CV_16U), disc);
@@ -51,7 +51,7 @@ TEST(RefineOutline, PointsLieOnCircleWithBrightnessGradient) {
   }
 }
 
-TEST(RefineOutline, IsUnbiasedForSmallDiscsWithBrightnessGradient) {
+TEST(RefineDiscOutline, MeanPointOffsetIsSmallForSmallDiscsWithGradient) {
   for (const double radius_px : {8.0, 10.0, 12.0, 16.0}) {
     for (const double change : {0.1, 0.3}) {
       const DrawnDisc disc{.radius_px = radius_px, .change = change};
@@ -67,7 +67,7 @@ TEST(RefineOutline, IsUnbiasedForSmallDiscsWithBrightnessGradient) {
   }
 }
 
-TEST(RefineOutline, IsUnbiasedUnderBlurAndDarkRim) {
+TEST(RefineDiscOutline, MeanRadialOffsetIsSmallUnderBlurAndDarkRim) {
   for (const auto& [radius_px, blur_px] : {std::pair(12.0, 1.0), {24.0, 0.5}, {24.0, 1.0}}) {
     for (const double fall : {0.0, 0.3}) {
       const DrawnDisc disc{.radius_px = radius_px, .blur_px = blur_px, .fall = fall};
@@ -93,7 +93,7 @@ cv::Mat noisy(const cv::Mat& image, double noise, std::uint64_t seed) {
   return result;
 }
 
-TEST(RefineOutline, DetectsMottledLights) {
+TEST(RefineDiscOutline, ReportsMottledForDiscsWithVisibleChips) {
   for (const double radius_px : {24.0, 38.4}) {
     for (const double chips : {0.1, 0.3, 0.6}) {
       for (const double pitch_px : {5.0, 9.0}) {
@@ -107,7 +107,7 @@ TEST(RefineOutline, DetectsMottledLights) {
   }
 }
 
-TEST(RefineOutline, ReportsNotMottledForNoiseGradientOrDarkRim) {
+TEST(RefineDiscOutline, ReportsNotMottledForNoiseGradientOrDarkRim) {
   std::uint64_t seed = 0;
   for (const double noise : {0.0, 0.5, 2.0, 6.0}) {
     for (const auto& [change, fall] : {std::pair(0.0, 0.0), {0.3, 0.0}, {0.0, 0.3}, {0.15, 0.15}}) {
@@ -123,14 +123,14 @@ TEST(RefineOutline, ReportsNotMottledForNoiseGradientOrDarkRim) {
   }
 }
 
-TEST(RefineOutline, PointsLieOnCircleForMottledLights) {
+TEST(RefineDiscOutline, PointsLieNearCircleForMottledDisc) {
   const DrawnDisc disc{.level = 0.5, .chips = 0.3};
   const auto points = refined_in(disc.image(CV_16U), disc);
   EXPECT_GT(points.size(), 100U);
   EXPECT_LT(rms_off(disc, points), 0.12);
 }
 
-TEST(RefineOutline, ExcludesPointsAtFlatAngles) {
+TEST(RefineDiscOutline, ExcludesPointsWhereRowsCrossOutlineAtFlatAngles) {
   const DrawnDisc disc;
   const cv::Mat image = disc.image(CV_16U);
   const double sine_20_deg = 0.342;

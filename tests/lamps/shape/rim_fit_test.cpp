@@ -30,7 +30,7 @@ std::vector<RimPiece> pieces_of_circle(int count, double noise, Random& random) 
   return pieces;
 }
 
-TEST(EstimateOutlineOffset, IsExactWithoutNoise) {
+TEST(EstimateOutlineOffset, ReturnsExactOffsetWithoutNoise) {
   Random random(1);
   for (const bool round : {true, false}) {
     const auto shift = estimate_outline_offset(pieces_of_circle(12, 0, random), round);
@@ -40,7 +40,7 @@ TEST(EstimateOutlineOffset, IsExactWithoutNoise) {
   }
 }
 
-TEST(EstimateOutlineOffset, CovarianceMatchesScatter) {
+TEST(EstimateOutlineOffset, OffsetCovarianceMatchesScatter) {
   constexpr int draws = 4000;
   Random random(2);
   for (const bool round : {true, false}) {
@@ -58,10 +58,10 @@ TEST(EstimateOutlineOffset, CovarianceMatchesScatter) {
   }
 }
 
-TEST(EstimateOutlineOffset, RejectsOutlierPiece) {
+TEST(EstimateOutlineOffset, OffsetIsAccurateDespiteOneOutlierPiece) {
   Random random(3);
   auto pieces = pieces_of_circle(14, 1, random);
-  pieces[3].behind_px += 2;
+  pieces[3].step_depth_px += 2;
   const auto shift = estimate_outline_offset(pieces, true);
   ASSERT_TRUE(shift);
   EXPECT_LT((shift->px - kShift).norm(), 4 * std::sqrt(shift->covariance.trace()));

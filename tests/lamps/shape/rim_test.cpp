@@ -25,13 +25,13 @@ Blob largest_blob(const ImageView& image, const Background& background) {
   const auto blobs = group_pixel_runs_into_blobs(find_pixel_runs(image, background.threshold), 24);
   if (blobs.empty()) throw std::runtime_error("the image has no blob");
   return *std::max_element(blobs.begin(), blobs.end(), [](const Blob& a, const Blob& b) {
-    return a.bounding_box().area() < b.bounding_box().area();
+    return a.blob_bounding_box().area_px() < b.blob_bounding_box().area_px();
   });
 }
 
 std::optional<Rim> rim_in(const cv::Mat& pixels) {
   const ImageView image = to_image_view(pixels);
-  const Background background = estimate_background(image);
+  const Background background = estimate_image_background(image);
   return fit_rim_of_light(image, largest_blob(image, background), background,
                           LightShape(drawn_camera(kSize)));
 }
@@ -62,7 +62,7 @@ void for_each_downlight(const Test& test) {
   }
 }
 
-TEST(FitRimOfLight, MatchesDownlightForAllCorePositions) {
+TEST(FitRimOfLight, CenterAndRadiusMatchDownlightForAllCorePositions) {
   double chi_square = 0, worst_px = 0, count = 0;
   for_each_downlight([&](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
     const auto rim = rim_in(render_lamps({lamp}, kSize, depth, noise, seed));
@@ -91,7 +91,7 @@ cv::Mat coded(const cv::Mat& image) {
   return result;
 }
 
-TEST(FitRimOfLight, IsUnbiasedUnderToneCurve) {
+TEST(FitRimOfLight, CenterIsUnbiasedUnderToneCurve) {
   double towards_px = 0, squares = 0, chi_square = 0, worst = 0;
   int count = 0;
   for (const double period : {12.0, 17.0, 26.0, 33.0}) {
@@ -126,7 +126,7 @@ cv::Mat1b coded_and_clipped(const DrawnLamp& lamp, double noise, Random& random)
   return image;
 }
 
-TEST(FitRimOfLight, IsUnbiasedBesideSaturatedWalls) {
+TEST(FitRimOfLight, CenterIsUnbiasedNextToSaturatedWalls) {
   Random random(1);
   for (const double white : {0.8, 1.5, 2.0, 4.0}) {
     double towards_px = 0, chi_square = 0, worst = 0;
@@ -162,7 +162,7 @@ TEST(FitRimOfLight, DetectsClearRimOfLargeDownlights) {
     const cv::Size size(int(scale * kSize.width), int(scale * kSize.height));
     const cv::Mat pixels = render_lamps({lamp}, size, CV_8U, 1);
     const ImageView image = to_image_view(pixels);
-    const Background background = estimate_background(image);
+    const Background background = estimate_image_background(image);
     const auto rim = fit_rim_of_light(image, largest_blob(image, background), background,
                                       LightShape(drawn_camera(size)));
     ASSERT_TRUE(rim) << scale;
@@ -171,12 +171,13 @@ TEST(FitRimOfLight, DetectsClearRimOfLargeDownlights) {
   }
 }
 
-TEST(LightDetector, IdentifiesDownlights) {
+TEST(LightDetector, IdentifiesDownlightsOnlyWithReliableNumberOfPeriods) {
   int identified = 0;
   for_each_downlight([&](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
     const LampMap map{{drawn_lamp(7, lamp.stripes.period_lines), drawn_lamp(8, 14.5)}};
-    const auto lights = LightDetector(map, drawn_camera(kSize))
-                            .detect(to_image_view(render_lamps({lamp}, kSize, depth, noise, seed)));
+    const auto lights =
+        LightDetector(map, drawn_camera(kSize))
+            .detect_lights(to_image_view(render_lamps({lamp}, kSize, depth, noise, seed)));
     ASSERT_EQ(lights.size(), 1U);
     if (lights[0].stripes.periods < kMinReliablePeriods) {
       EXPECT_EQ(lights[0].reason, LightReason::too_few_periods);
@@ -203,7 +204,7 @@ TEST(FitRimOfLight, ReportsNoClearRimForGlows) {
   }
 }
 
-TEST(FitRimOfLight, MatchesEdgeOfDisc) {
+TEST(FitRimOfLight, ReturnsClearRimWithCenterOfDisc) {
   const DrawnLamp disc{.center = {151.3, 139.6}, .radius_px = 50.7};
   const auto rim = rim_in(render_lamps({disc}, kSize, CV_8U, 1));
   ASSERT_TRUE(rim);
@@ -216,13 +217,14 @@ TEST(FitRimOfLight, ReturnsNulloptForSmallBlob) {
   EXPECT_FALSE(rim_in(render_lamps({speck}, kSize, CV_8U)));
 }
 
-TEST(IsBlobUnevenlyLit, DistinguishesDownlightsFromDiscs) {
+TEST(IsBlobUnevenlyLit, ReturnsTrueForDownlightsAndFalseForDiscs) {
   const auto is_uneven = [](const DrawnLamp& lamp, int depth) {
     const cv::Mat pixels = render_lamps({lamp}, kSize, depth, 1);
     const ImageView image = to_image_view(pixels);
-    const Background background = estimate_background(image);
+    const Background background = estimate_image_background(image);
     const Blob blob = largest_blob(image, background);
-    return is_blob_unevenly_lit(image, blob, find_outline(image, blob, background), background);
+    return is_blob_unevenly_lit(image, blob, find_blob_outline(image, blob, background),
+                                background);
   };
   for (const int depth : {CV_8U, CV_16U}) {
     EXPECT_TRUE(is_uneven(downlight(0.2, 17), depth));

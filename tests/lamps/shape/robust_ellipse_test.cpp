@@ -29,7 +29,7 @@ void expect_found(const Points& points, const Circle& truth, double within, int 
   const auto fit = fit_circle_to(points);
   ASSERT_TRUE(fit);
   EXPECT_THAT(fit->center, IsNear(truth.center, within));
-  EXPECT_NEAR(fit->circle().radius, truth.radius, within);
+  EXPECT_NEAR(fit->to_circle().radius, truth.radius, within);
   EXPECT_EQ(fit->count, count);
   EXPECT_EQ(std::count(fit->inliers.begin(), fit->inliers.end(), true), count);
 }
@@ -41,7 +41,7 @@ Points with_line(Points points, std::size_t count, const Vector2d& begin, const 
   return points;
 }
 
-TEST(FitRobustCircle, MatchesCircleOfExactPoints) {
+TEST(FitRobustCircle, RecoversCircleFromExactPoints) {
   for (const Circle& truth : {Circle{{300, 200}, 40}, Circle{{-3, 2}, 6}}) {
     for (const std::size_t count : {5U, 6U, 20U, 300U}) {
       expect_found(arc(truth, 0.3, 0.3 + 2 * pi, count), truth, 1e-9, int(count));
@@ -49,7 +49,7 @@ TEST(FitRobustCircle, MatchesCircleOfExactPoints) {
   }
 }
 
-TEST(FitRobustCircle, MatchesCircleOfArc) {
+TEST(FitRobustCircle, RecoversCircleFromArcOf90DegreesOrMore) {
   const Circle truth{{300, 200}, 40};
   for (const double arc_deg : {270.0, 180.0, 90.0}) {
     for (const double begin : {0.0, 1.0, 4.0}) {
@@ -58,7 +58,7 @@ TEST(FitRobustCircle, MatchesCircleOfArc) {
   }
 }
 
-TEST(FitRobustCircle, RejectsLineWithFortyPercentOfPoints) {
+TEST(FitRobustCircle, RecoversCircleDespiteLineWithFortyPercentOfPoints) {
   const Circle truth{{300, 200}, 40};
   // Next to the circle, and along the extension of a chord, away from a tangent.
   expect_found(with_line(arc(truth, 0, 2 * pi, 60), 40, {345, 100}, {345, 300}), truth, 1e-9, 60);
@@ -68,7 +68,7 @@ TEST(FitRobustCircle, RejectsLineWithFortyPercentOfPoints) {
                60);
 }
 
-TEST(FitRobustCircle, CovarianceMatchesScatter) {
+TEST(FitRobustCircle, CenterCovarianceMatchesScatter) {
   const Circle truth{{300, 200}, 40};
   for (const double arc_rad : {2 * pi, pi}) {
     Random random(5);
@@ -86,7 +86,7 @@ TEST(FitRobustCircle, CovarianceMatchesScatter) {
   }
 }
 
-TEST(FitRobustCircle, UsesWeights) {
+TEST(FitRobustCircle, CenterFollowsPointsWithLargeWeights) {
   // Two parts that differ slightly: the one with large weights determines the fit.
   const Circle heavy{{300, 200}, 40};
   Points points = arc(heavy, 0, 1.5 * pi, 90);
@@ -100,14 +100,14 @@ TEST(FitRobustCircle, UsesWeights) {
   EXPECT_GT((fit_circle_to(points).value().center - heavy.center).norm(), 0.02);
 }
 
-TEST(FitRobustCircle, IsDeterministic) {
+TEST(FitRobustCircle, ReturnsIdenticalFitWhenRepeated) {
   Random random(3);
   const Points points =
       with_line(with_noise(arc({{300, 200}, 40}, 0, 4, 60), 0.1, random), 30, {0, 0}, {300, 200});
   const auto first_fit = fit_circle_to(points), second_fit = fit_circle_to(points);
   ASSERT_TRUE(first_fit && second_fit);
   EXPECT_EQ(first_fit->center, second_fit->center);
-  EXPECT_EQ(first_fit->circle().radius, second_fit->circle().radius);
+  EXPECT_EQ(first_fit->to_circle().radius, second_fit->to_circle().radius);
   EXPECT_EQ(first_fit->inliers, second_fit->inliers);
 }
 
@@ -159,7 +159,7 @@ void expect_found(const Points& points, const Ellipse& truth, double within, int
   EXPECT_EQ(std::count(fit->inliers.begin(), fit->inliers.end(), true), count);
 }
 
-TEST(FitRobustEllipse, MatchesEllipseOfExactPoints) {
+TEST(FitRobustEllipse, RecoversEllipseFromExactPoints) {
   for (const double ratio : {1.0, 1.03, 1.08, 1.15}) {
     for (int degrees = 0; degrees < 180; degrees += 15) {
       SCOPED_TRACE(testing::Message() << ratio << " at " << degrees);
@@ -170,7 +170,7 @@ TEST(FitRobustEllipse, MatchesEllipseOfExactPoints) {
   }
 }
 
-TEST(FitRobustEllipse, RejectsOutliers) {
+TEST(FitRobustEllipse, RecoversEllipseDespiteThirtyPercentOutliers) {
   Random random(4);
   for (const double ratio : {1.0, 1.07, 1.15}) {
     for (const int outliers : {10, 20, 30}) {
@@ -189,7 +189,7 @@ TEST(FitRobustEllipse, RejectsOutliers) {
   }
 }
 
-TEST(FitRobustEllipse, CovarianceMatchesScatter) {
+TEST(FitRobustEllipse, CenterCovarianceMatchesScatter) {
   for (const double ratio : {1.0, 1.1}) {
     const Ellipse truth = ellipse_of(ratio, 0.6);
     for (const double arc_rad : {2 * pi, 1.3 * pi}) {
@@ -209,7 +209,7 @@ TEST(FitRobustEllipse, CovarianceMatchesScatter) {
   }
 }
 
-TEST(FitRobustEllipse, MatchesOpenCvWithoutOutliers) {
+TEST(FitRobustEllipse, CenterAndAreaMatchOpenCvWithoutOutliers) {
   Random random(8);
   for (int degrees = 0; degrees < 180; degrees += 20) {
     const Ellipse truth = ellipse_of(1.12, degrees * pi / 180);
@@ -225,7 +225,7 @@ TEST(FitRobustEllipse, MatchesOpenCvWithoutOutliers) {
   }
 }
 
-TEST(FitRobustEllipse, MatchesAccuracyOfCircleFitForCircles) {
+TEST(FitRobustEllipse, CenterIsAsAccurateAsCircleFitForCircles) {
   Random random(9);
   const Circle truth{{300, 200}, 40};
   double circle_squares = 0, ellipse_squares = 0;
@@ -250,7 +250,7 @@ TEST(FitRobustEllipse, ReturnsNulloptForLessThanSevenInliers) {
   EXPECT_FALSE(ellipse_of({{0, 0}, {3, 2}, {6, 4}, {9, 6}, {12, 8}, {15, 10}, {18, 12}, {21, 14}}));
 }
 
-TEST(FitSlenderEllipse, MatchesEllipseOfExactPoints) {
+TEST(FitSlenderEllipse, RecoversEllipseFromExactPoints) {
   for (const double ratio : {1.0, 3.0, 6.0, 12.0}) {
     for (const double degrees : {0.0, 30.0, 90.0, 140.0}) {
       const Ellipse truth = ellipse_of(ratio, degrees * pi / 180);
@@ -266,7 +266,7 @@ TEST(FitSlenderEllipse, MatchesEllipseOfExactPoints) {
   EXPECT_FALSE(fit_slender_ellipse(line, std::vector<double>(line.size(), 1), 0.35));
 }
 
-TEST(FitSlenderEllipse, CovarianceMatchesScatter) {
+TEST(FitSlenderEllipse, CenterCovarianceMatchesScatter) {
   Random random(9);
   const Ellipse truth = ellipse_of(6, 0.6);
   double chi_square = 0;

@@ -41,7 +41,7 @@ class MovingCamera {
     for (Vector2d& point : points) point += noise * Vector2d(random.normal(), random.normal());
     const std::vector<double> weights(points.size(), 1);
     const RobustEllipse circle = fit_robust_circle(points, weights, 1e-3).value();
-    return {points, weights, circle.inliers, circle.circle(), kLineSlope};
+    return {points, weights, circle.inliers, circle.to_circle(), kLineSlope};
   }
 
   Vector2d v{2.0e-5, -1.5e-5};
@@ -55,7 +55,7 @@ std::vector<OutlineSums> three_whole(const MovingCamera& moving_camera, Random& 
           moving_camera.make_outline({0.1, -0.4}, 2 * pi, random)};
 }
 
-TEST(Shear, MatchesMotionOfTranslatingAndRotatingCamera) {
+TEST(Shear, PredictedOvalMatchesMotionOfTranslatingAndRotatingCamera) {
   Random random(1);
   const MovingCamera moving_camera;
   const auto lights = three_whole(moving_camera, random);
@@ -68,11 +68,11 @@ TEST(Shear, MatchesMotionOfTranslatingAndRotatingCamera) {
                  expected = 300 * Vector2d(-motion.y(), motion.x());
   EXPECT_GT(expected.norm(), 0.005);
   EXPECT_THAT(oval.oval, IsNear(expected, 3e-4));
-  EXPECT_THAT(shear->motion_per_scanline_of(moving_camera.make_outline(at, 2 * pi, random)),
+  EXPECT_THAT(shear->motion_per_scanline(moving_camera.make_outline(at, 2 * pi, random)),
               IsNear(motion, 1e-6));
 }
 
-TEST(Shear, CorrectsCenterOfPartialOutline) {
+TEST(Shear, ReducesCenterErrorOfPartialOutline) {
   Random random(2);
   const MovingCamera moving_camera;
   const Vector2d center(-0.3, -0.3);
@@ -84,7 +84,7 @@ TEST(Shear, CorrectsCenterOfPartialOutline) {
     const OutlineSums& part = lights.back();
     const auto shear = Shear::estimate_shear_from_outlines(lights);
     ASSERT_TRUE(shear);
-    const auto found = part.solve_with_oval_prior(shear->predict_oval_from_motion(part));
+    const auto found = part.solve_outline_with_oval_prior(shear->predict_oval_from_motion(part));
     ASSERT_TRUE(found);
     const Vector2d by_circle = part.fitted_circle().center - center;
     const Vector2d error = (by_circle + kRadius * found->p.head<2>()) / kRadius;
@@ -99,7 +99,7 @@ TEST(Shear, CorrectsCenterOfPartialOutline) {
   EXPECT_LT(chi_square, 1.3);
 }
 
-TEST(Shear, ReturnsNulloptForStationaryCamera) {
+TEST(Shear, EstimateReturnsNulloptForStationaryCamera) {
   Random random(3);
   MovingCamera moving_camera;
   moving_camera.v.setZero();
@@ -111,7 +111,7 @@ TEST(Shear, ReturnsNulloptForStationaryCamera) {
   EXPECT_EQ(found, 0);
 }
 
-TEST(Shear, RejectsContradictingLight) {
+TEST(Shear, EstimateIgnoresLightWithContradictingMotion) {
   Random random(4);
   const MovingCamera moving_camera;
   auto lights = three_whole(moving_camera, random);
@@ -125,13 +125,13 @@ TEST(Shear, RejectsContradictingLight) {
               IsNear(300 * Vector2d(-motion.y(), motion.x()), 5e-4));
 }
 
-TEST(Shear, ReturnsNulloptWithoutUsableLights) {
+TEST(Shear, EstimateReturnsNulloptWithoutUsableLights) {
   EXPECT_FALSE(Shear::estimate_shear_from_outlines({}));
   // Three points of an outline do not determine the motion.
   const Points points{{1, 0}, {0, 1}, {-1, 0}};
   const OutlineSums few(points, std::vector<double>{1, 1, 1}, {true, true, true}, {{0, 0}, 1},
                         kLineSlope);
-  EXPECT_FALSE(few.solve_with_oval_prior(std::nullopt));
+  EXPECT_FALSE(few.solve_outline_with_oval_prior(std::nullopt));
   EXPECT_FALSE(Shear::estimate_shear_from_outlines(std::vector{few}));
 }
 

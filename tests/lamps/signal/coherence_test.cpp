@@ -21,7 +21,7 @@ double coherence_in(const cv::Mat& pixels, const DrawnLamp& lamp) {
   const Eigen::Vector2d half(lamp.radius_px, lamp.radius_px);
   return compute_stripe_coherence(
       image, find_chords_in_ellipse(lamp.center - half, lamp.center + half, image.size()),
-      estimate_background(image), lamp.stripes.period_lines);
+      estimate_image_background(image), lamp.stripes.period_lines);
 }
 
 double coherence_of_drawn(const DrawnLamp& lamp) {
@@ -36,12 +36,12 @@ TEST(ComputeStripeCoherence, ReturnsNearlyOneForLampsOfAnyShape) {
   EXPECT_GT(coherence_of_drawn(DrawnLamp{.recess = DrawnRecess{}}), 0.97);
 }
 
-TEST(ComputeStripeCoherence, IgnoresOneHiddenPart) {
+TEST(ComputeStripeCoherence, ReturnsAboveNineTenthsWithOneHiddenPart) {
   const DrawnBar bar{std::numbers::pi / 2, 20, 14};
   EXPECT_GT(coherence_of_drawn(DrawnLamp{.bar = bar}), 0.9);
 }
 
-TEST(ComputeStripeCoherence, RejectsTiltedBars) {
+TEST(ComputeStripeCoherence, ReturnsLessThanMinimumForTiltedBars) {
   const auto coherence_of_tilted_bars = [](double degrees) {
     DrawnLamp lamp;
     lamp.stripes.period_lines = 0.9 * lamp.radius_px;  // two periods
@@ -62,7 +62,7 @@ TEST(ComputeStripeCoherence, RejectsTiltedBars) {
   EXPECT_LT(coherence_of_tilted_bars(12), kMinCoherence);
 }
 
-TEST(ComputeStripeCoherence, RejectsIndependentParts) {
+TEST(ComputeStripeCoherence, HardlyEverExceedsMinimumForIndependentParts) {
   // Patches with the height of a quarter of a period and the width of a part.
   constexpr int trials = 2000, patch = 6;
   Random random(5);
@@ -82,7 +82,7 @@ TEST(ComputeStripeCoherence, RejectsIndependentParts) {
   EXPECT_LE(coherent, 10);
 }
 
-TEST(ComputeStripeCoherence, ReturnsZeroForTooFewLines) {
+TEST(ComputeStripeCoherence, ReturnsZeroForTooFewScanlines) {
   const DrawnLamp lamp{.stripes = {.period_lines = 170}};
   EXPECT_EQ(coherence_of_drawn(lamp), 0);
   const cv::Mat pixels(120, 120, CV_8U, cv::Scalar(10));

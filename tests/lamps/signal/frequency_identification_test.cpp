@@ -27,7 +27,7 @@ std::optional<int> identified(const std::vector<Lamp>& lamps, const Stripes& str
   return identify_lamp_by_frequency({lamps}, kRowTime_s, stripes);
 }
 
-TEST(IdentifyLampByFrequency, ReturnsLampOfMatchingFrequency) {
+TEST(IdentifyLampByFrequency, ReturnsLampOnlyWithinToleranceOfItsFrequency) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000), rule_lamp(2, 2500)};
   EXPECT_EQ(identified(lamps, stripes(2000)), 1);
   EXPECT_EQ(identified(lamps, stripes(2080)), 1);
@@ -47,7 +47,7 @@ TEST(IdentifyLampByFrequency, AllowsLessDeviationForFewOrUnclearStripes) {
   EXPECT_EQ(identified(lamps, few), 1);
 }
 
-TEST(IdentifyLampByFrequency, RejectsUnclearIrregularStripes) {
+TEST(IdentifyLampByFrequency, ReturnsNulloptForUnclearIrregularStripes) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000)};
   Stripes unclear = stripes(2000);
   unclear.periodicity_r2 = 0.6;
@@ -67,7 +67,7 @@ TEST(IdentifyLampByFrequency, SeparatesLampsOfEqualFrequencyByDuty) {
       << "the other's duty is not known";
 }
 
-TEST(IdentifyLampByFrequency, PrefersClearFrequencyOverDuty) {
+TEST(IdentifyLampByFrequency, ReturnsLampByFrequencyEvenIfDutyContradicts) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000, 0.3), rule_lamp(2, 2500, 0.7)};
   EXPECT_EQ(identified(lamps, stripes(2000, 0.7)), 1);
 }

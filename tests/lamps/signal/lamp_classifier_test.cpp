@@ -45,15 +45,15 @@ const std::vector<LampSpec> kLamps{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 10.8, 0.5
 /// Two lamps of the same period, which only their duty distinguishes.
 const std::vector<LampSpec> kTwins{{1, 12, 0.35}, {2, 12, 0.7}};
 
-TEST(LampClassifier, IdentifiesTrainedLamps) {
+TEST(LampClassifier, IdentifiesNearlyAllLightsOfTrainedLamps) {
   const LampClassifier classifier = fit_lamp_classifier(make_lights(kLamps, 30, 1));
   ASSERT_EQ(classifier.lamps.size(), 3);
   EXPECT_EQ(classifier.lamps[0].lamp, 4);
   const Confusion confusion = compute_confusion_matrix(classifier, make_lights(kLamps, 100, 2));
   EXPECT_EQ(confusion.lamps, (std::vector<int>{4, 7, 9}));
   EXPECT_EQ(confusion.count_wrongly_identified(), 0);
-  EXPECT_GE(confusion.right(), 297);
-  EXPECT_EQ(confusion.right() + confusion.unknown(), 300);
+  EXPECT_GE(confusion.count_correctly_identified(), 297);
+  EXPECT_EQ(confusion.count_correctly_identified() + confusion.count_unidentified(), 300);
   EXPECT_TRUE(find_inseparable_lamps(classifier).empty());
 }
 
@@ -61,7 +61,7 @@ TEST(LampClassifier, SeparatesLampsOfEqualPeriodByDuty) {
   const LampClassifier classifier = fit_lamp_classifier(make_lights(kTwins, 40, 1));
   const Confusion confusion = compute_confusion_matrix(classifier, make_lights(kTwins, 100, 2));
   EXPECT_EQ(confusion.count_wrongly_identified(), 0);
-  EXPECT_GE(confusion.right(), 150) << confusion.counts;
+  EXPECT_GE(confusion.count_correctly_identified(), 150) << confusion.counts;
 }
 
 TEST(LampClassifier, ReportsUnknownForUntrainedLamps) {
@@ -69,7 +69,7 @@ TEST(LampClassifier, ReportsUnknownForUntrainedLamps) {
   ASSERT_EQ(classifier.lamps.size(), 3);
   const Confusion confusion =
       compute_confusion_matrix(classifier, make_lights({{5, 11.9, 0.5}, {6, 6, 0.5}}, 50, 2));
-  EXPECT_EQ(confusion.unknown(), 100);
+  EXPECT_EQ(confusion.count_unidentified(), 100);
 }
 
 TEST(LampClassifier, ReportsUnknownForInseparableLamps) {
@@ -78,14 +78,14 @@ TEST(LampClassifier, ReportsUnknownForInseparableLamps) {
   const Confusion confusion =
       compute_confusion_matrix(classifier, make_lights(similar_lamps, 100, 2));
   EXPECT_EQ(confusion.counts(0, 0), 100);
-  EXPECT_GE(confusion.unknown(), 190);
+  EXPECT_GE(confusion.count_unidentified(), 190);
   const auto pairs = find_inseparable_lamps(classifier);
   ASSERT_EQ(pairs.size(), 1);
   EXPECT_EQ(pairs[0].first, 7);
   EXPECT_EQ(pairs[0].second, 9);
 }
 
-TEST(FitLampClassifier, RejectsWrongLabels) {
+TEST(FitLampClassifier, ExcludesWronglyLabeledLightsFromTraining) {
   auto lights = make_lights(kLamps, 30, 1);
   lights[0].lamp = 9, lights[4].lamp = 4, lights[8].lamp = 7;
   const LampClassifier classifier = fit_lamp_classifier(lights);
@@ -95,20 +95,20 @@ TEST(FitLampClassifier, RejectsWrongLabels) {
   EXPECT_GE(used, 80);
   const Confusion confusion = compute_confusion_matrix(classifier, make_lights(kLamps, 100, 2));
   EXPECT_EQ(confusion.count_wrongly_identified(), 0);
-  EXPECT_GE(confusion.right(), 297);
+  EXPECT_GE(confusion.count_correctly_identified(), 297);
 }
 
-TEST(LampClassifier, AcceptsUnclearStripesOnlyCloseToLamp) {
+TEST(LampClassifier, RejectsDeviatingPeriodWhenStripesAreUnclear) {
   const LampClassifier classifier = fit_lamp_classifier(make_lights(kLamps, 30, 1));
   Stripes stripes = make_lights(kLamps, 1, 3)[1].stripes;
-  ASSERT_EQ(identify_lamp(classifier, stripes), 7);
+  ASSERT_EQ(identify_lamp_by_classifier(classifier, stripes), 7);
   stripes.period_lines *= 1.025;
-  EXPECT_EQ(identify_lamp(classifier, stripes), 7);
+  EXPECT_EQ(identify_lamp_by_classifier(classifier, stripes), 7);
   stripes.periodicity_r2 = 0.6;
-  EXPECT_EQ(identify_lamp(classifier, stripes), std::nullopt);
+  EXPECT_EQ(identify_lamp_by_classifier(classifier, stripes), std::nullopt);
 }
 
-TEST(FitLampClassifier, IsIndependentOfOrderOfLights) {
+TEST(FitLampClassifier, ReturnsSameClassifierForReversedOrderOfLights) {
   auto lights = make_lights(kLamps, 20, 1);
   const LampClassifier a = fit_lamp_classifier(lights);
   std::reverse(lights.begin(), lights.end());
@@ -127,7 +127,7 @@ TEST(CrossValidateLampClassifier, CountsEachLightOnce) {
       cross_validate_lamp_classifier(make_lights(kLamps, 40, 1), fit_lamp_classifier);
   EXPECT_EQ(confusion.counts.sum(), 120);
   EXPECT_EQ(confusion.count_wrongly_identified(), 0);
-  EXPECT_GE(confusion.right(), 117);
+  EXPECT_GE(confusion.count_correctly_identified(), 117);
 }
 
 TEST(CrossValidateLampClassifier, ExcludesHeldOutImagesFromTraining) {
@@ -141,7 +141,7 @@ TEST(CrossValidateLampClassifier, ExcludesHeldOutImagesFromTraining) {
   EXPECT_EQ(confusion.counts(2, 3), 8);
 }
 
-TEST(CrossValidateLampClassifier, UsesGivenTrainingFunction) {
+TEST(CrossValidateLampClassifier, MisidentifiesLampsWhenTrainingFunctionSwapsThem) {
   const auto mistaken = [](std::span<const LabeledLight> lights) {
     LampClassifier classifier = fit_lamp_classifier(lights);
     std::swap(classifier.lamps.front().lamp, classifier.lamps.back().lamp);
@@ -151,7 +151,7 @@ TEST(CrossValidateLampClassifier, UsesGivenTrainingFunction) {
   EXPECT_GE(confusion.count_wrongly_identified(), 78);
 }
 
-TEST(ComputeStripeFeatures, ReturnsFeaturesOfStripes) {
+TEST(ComputeClassifierFeatures, ReturnsLogPeriodDutyCountAndLitArea) {
   Stripes stripes{};
   stripes.period_lines = 12;
   stripes.duty = 0.4;
@@ -161,7 +161,7 @@ TEST(ComputeStripeFeatures, ReturnsFeaturesOfStripes) {
   EXPECT_EQ(kLampFeatures[0], "log_period_lines");
 }
 
-TEST(ComputeStripeFeatures, IsIndependentOfDistance) {
+TEST(ComputeClassifierFeatures, MeanFeaturesAreIndependentOfNumberOfScanlines) {
   Random random(7);
   for (const int lines : {60, 90, 120, 180}) {
     for (const double duty : {0.35, 0.6}) {

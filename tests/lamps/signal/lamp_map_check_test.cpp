@@ -14,7 +14,7 @@ namespace {
 constexpr StripeConditions kConditions{3e-5, 520, 0, 5e-5};
 
 Lamp lamp(int id, double frequency_hz, std::optional<double> duty = 0.5) {
-  return {id, {double(id), 0, 1.6}, make_disc(0.18), frequency_hz, duty};
+  return {id, {double(id), 0, 1.6}, make_disc_lamp_shape(0.18), frequency_hz, duty};
 }
 
 /// Returns the ratio of the RMS error of many measured periods to predict_relative_period_sd().
@@ -31,7 +31,7 @@ double measured_over_stated(double period, double lines, double exposure_lines) 
   return std::sqrt(squares / draws) / predict_relative_period_sd(period, lines, exposure_lines);
 }
 
-TEST(PredictPeriodSd, MatchesMeasuredErrors) {
+TEST(PredictRelativePeriodSd, CoversErrorsOfMeasuredPeriods) {
   for (const double lines : {40.0, 60.0, 100.0}) {
     for (const double period : {9.3, 20.8}) {
       for (const double exposure_lines : {0.02, 0.5, 1.0, 1.67, 4.0}) {
@@ -45,28 +45,28 @@ TEST(PredictPeriodSd, MatchesMeasuredErrors) {
   }
 }
 
-TEST(PredictPeriodSd, BoundsErrorsForIntegerPeriods) {
+TEST(PredictRelativePeriodSd, CoversErrorsOfMeasuredIntegerPeriods) {
   for (const double period : {5.0, 14.0}) {
     EXPECT_LT(measured_over_stated(period, 60, 0.02), 1.1);
     EXPECT_LT(measured_over_stated(period, 60, 1.67), 1.1);
   }
 }
 
-TEST(PredictPeriodSd, ReturnsInfinityForTooFewPeriods) {
+TEST(PredictRelativePeriodSd, ReturnsInfinityForTooFewPeriods) {
   EXPECT_EQ(predict_relative_period_sd(40, 50, 1), std::numeric_limits<double>::infinity());
 }
 
-TEST(ComputeScanlinesOnLamp, ComputesNumberOfLines) {
-  EXPECT_NEAR(compute_scanlines_on_lamp(lamp(1, 2000), kConditions).value(), 58.5, 1e-9);
+TEST(CountScanlinesOnLamp, ReturnsScanlinesOrNulloptForUnknownSizeOrLampBelow) {
+  EXPECT_NEAR(count_scanlines_on_lamp(lamp(1, 2000), kConditions).value(), 58.5, 1e-9);
   Lamp unknown = lamp(1, 2000);
   unknown.shape.size_m.reset();
-  EXPECT_FALSE(compute_scanlines_on_lamp(unknown, kConditions));
+  EXPECT_FALSE(count_scanlines_on_lamp(unknown, kConditions));
   StripeConditions above = kConditions;
   above.camera_height_m = 2;
-  EXPECT_FALSE(compute_scanlines_on_lamp(lamp(1, 2000), above));
+  EXPECT_FALSE(count_scanlines_on_lamp(lamp(1, 2000), above));
 }
 
-TEST(FindAmbiguousLamps, ReportsLampsOfNearlyEqualFrequency) {
+TEST(FindAmbiguousLamps, ReturnsPairOfLampsWithNearlyEqualFrequencies) {
   const LampMap map{{lamp(1, 2000), lamp(2, 2500), lamp(3, 2530), lamp(4, 3100)}};
   const auto pairs = find_ambiguous_lamps(map, kConditions);
   ASSERT_EQ(pairs.size(), 1);
@@ -76,7 +76,7 @@ TEST(FindAmbiguousLamps, ReportsLampsOfNearlyEqualFrequency) {
   EXPECT_GT(pairs[0].needed, kLampDrift);
 }
 
-TEST(FindAmbiguousLamps, AcceptsLampsOfDifferentDuty) {
+TEST(FindAmbiguousLamps, ReturnsNoneForEqualFrequenciesWithDifferentDuties) {
   EXPECT_TRUE(
       find_ambiguous_lamps({{lamp(2, 2500, 0.3), lamp(3, 2500, 0.7)}}, kConditions).empty());
   EXPECT_EQ(find_ambiguous_lamps({{lamp(2, 2500, 0.4), lamp(3, 2500, 0.6)}}, kConditions).size(),
@@ -84,7 +84,7 @@ TEST(FindAmbiguousLamps, AcceptsLampsOfDifferentDuty) {
   EXPECT_EQ(find_ambiguous_lamps({{lamp(2, 2500, 0.3), lamp(3, 2500, {})}}, kConditions).size(), 1);
 }
 
-TEST(FindAmbiguousLamps, RequiresLargerDifferenceForFewerLines) {
+TEST(FindAmbiguousLamps, RequiresLargerDifferenceForFewerLinesOrUnknownExposure) {
   const LampMap map{{lamp(1, 2500), lamp(2, 2560)}};
   EXPECT_TRUE(find_ambiguous_lamps(map, kConditions).empty());
   StripeConditions sharp = kConditions, far = kConditions;
@@ -94,7 +94,7 @@ TEST(FindAmbiguousLamps, RequiresLargerDifferenceForFewerLines) {
   EXPECT_EQ(find_ambiguous_lamps(map, far).size(), 1);
 }
 
-TEST(ExplainWhyRoomIsNeeded, NamesTheRoomsOfLampsWithOneFrequency) {
+TEST(ExplainWhyRoomIsNeeded, NamesLampsSharingFrequencyAndAllRooms) {
   LampMapFile lamps{"lamps.yaml", {{lamp(1, 2000), lamp(2, 2500), lamp(7, 2010)}}, {"b", "b", "a"}};
   const std::string message = explain_why_room_is_needed(lamps, "--room");
   EXPECT_EQ(
@@ -104,7 +104,7 @@ TEST(ExplainWhyRoomIsNeeded, NamesTheRoomsOfLampsWithOneFrequency) {
   EXPECT_EQ(explain_why_room_is_needed(lamps, "--room"), "");
 }
 
-TEST(ExplainWhyRoomIsNeeded, IsEmptyWhereARoomWouldNotHelp) {
+TEST(ExplainWhyRoomIsNeeded, IsEmptyWhenChoosingRoomWouldNotHelp) {
   const LampMap map{{lamp(1, 2000), lamp(2, 2000)}};
   EXPECT_EQ(explain_why_room_is_needed({"lamps.yaml", map, {"hall", "hall"}}, "--room"), "");
   EXPECT_EQ(explain_why_room_is_needed({"lamps.yaml", map, {"", ""}}, "--room"), "");
@@ -123,7 +123,7 @@ TEST(ExplainWhyRoomIsNeeded, ListsTenRoomsAtMost) {
 }
 
 /// Nearly all lamps just above the reported limit are identified.
-TEST(FindAmbiguousLamps, NeededDifferenceSufficesForIdentification) {
+TEST(FindAmbiguousLamps, ReportedNeededDifferenceSufficesForIdentification) {
   StripeConditions conditions = kConditions;
   conditions.exposure_s.reset();
   const auto pairs = find_ambiguous_lamps({{lamp(1, 2500), lamp(2, 2501)}}, conditions);
@@ -135,7 +135,7 @@ TEST(FindAmbiguousLamps, NeededDifferenceSufficesForIdentification) {
   for (int draw = 0; draw < 400; ++draw) {
     const double period = 1 / (2500 * conditions.row_time_s);
     const auto lines =
-        static_cast<int>(kUsedHeight * compute_scanlines_on_lamp(map.lamps[0], conditions).value());
+        static_cast<int>(kUsedHeight * count_scanlines_on_lamp(map.lamps[0], conditions).value());
     const auto id = identify_lamp_by_frequency(
         map, conditions.row_time_s,
         measure_stripes(noisy_square_wave(lines, period, 0.5, 0.02, 0.02, random)));
@@ -146,7 +146,7 @@ TEST(FindAmbiguousLamps, NeededDifferenceSufficesForIdentification) {
   EXPECT_EQ(wrong, 0);
 }
 
-TEST(FindLampsWithUnreadablePeriod, ReportsLampsWithoutReadableStripes) {
+TEST(FindLampsWithUnreadablePeriod, ReturnsLampsWithTooFewPeriodsOrLowContrast) {
   const LampMap map{{lamp(1, 600), lamp(2, 2500), lamp(3, 19000)}};
   const auto unreadable = find_lamps_with_unreadable_period(map, kConditions);
   ASSERT_EQ(unreadable.size(), 2);

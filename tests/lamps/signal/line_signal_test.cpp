@@ -8,7 +8,7 @@
 namespace vlp {
 namespace {
 
-TEST(ComputeScanlineSignal, ReturnsMeanOfEachLineAboveDark) {
+TEST(ComputeScanlineSignal, ReturnsMeanOfEachScanlineMinusDarkLevel) {
   for (const int depth : {CV_8U, CV_16U}) {
     cv::Mat pixels(100, 120, depth, cv::Scalar(10));
     for (int row = 31; row <= 69; ++row) pixels(cv::Rect(40, row, 41, 1)) = 2 * row;

@@ -21,7 +21,7 @@ constexpr std::array kLampPeriods_lines{9.0, 11.0, 14.5, 18.0, 24.0};
 std::vector<ModulatedLight> find_lights(const cv::Mat& image, std::span<const double> periods) {
   const ImageView view = to_image_view(image);
   const std::array boxes{PixelBox{0, 0, view.width, view.height}};
-  return find_modulated_lights(view, boxes, estimate_background(view), periods);
+  return find_modulated_lights(view, boxes, estimate_image_background(view), periods);
 }
 
 DrawnLamp make_glow(const Eigen::Vector2d& center, double period_lines) {
@@ -30,7 +30,7 @@ DrawnLamp make_glow(const Eigen::Vector2d& center, double period_lines) {
           .glow = DrawnGlow{.fall_px = 18, .core_px = 14}};
 }
 
-TEST(FindModulatedLights, IdentifiesGlowsAndTheirCenters) {
+TEST(FindModulatedLights, IdentifiesGlowsAndLocatesTheirCenters) {
   for (std::size_t i = 0; i < kLampPeriods_lines.size(); ++i) {
     for (const int depth : {CV_8U, CV_16U}) {
       const Eigen::Vector2d center(203.3, 131.6);
@@ -46,7 +46,7 @@ TEST(FindModulatedLights, IdentifiesGlowsAndTheirCenters) {
   }
 }
 
-TEST(FindModulatedLights, FindsPeriodWithoutLampPeriods) {
+TEST(FindModulatedLights, ReturnsPeriodWithoutGivenLampPeriods) {
   const auto lights =
       find_lights(render_lamps({make_glow({203.3, 131.6}, 13)}, kSearchSize, CV_8U, 1), {});
   ASSERT_EQ(lights.size(), 1U);
@@ -78,7 +78,7 @@ cv::Mat draw_bars(double period_lines, double tilt_rad) {
   return image;
 }
 
-TEST(FindModulatedLights, RejectsTiltedBars) {
+TEST(FindModulatedLights, ReturnsNoLightsForTiltedBars) {
   // Their phase changes by half of a period across the disc, and their mean is still modulated.
   for (const double period : {11.0, 18.0, 24.0}) {
     EXPECT_EQ(find_lights(draw_bars(period, 0), kLampPeriods_lines).size(), 1U) << period;
@@ -88,7 +88,7 @@ TEST(FindModulatedLights, RejectsTiltedBars) {
   }
 }
 
-TEST(FindModulatedLights, SigmaCoversOffsetOfBrightCore) {
+TEST(FindModulatedLights, CenterSdCoversOffsetOfBrightCore) {
   double squares = 0;
   int count = 0;
   for (const double angle : {0.3, 1.4, 2.5, 3.6, 4.7, 5.8}) {

@@ -29,7 +29,7 @@ LineProfile make_profile(double period_lines, double sigma_lines, double noise =
   return profile;
 }
 
-TEST(FitPeriodicSignal, ExplainsSquareWaveWithEnvelope) {
+TEST(FitPeriodicSignal, ReturnsSmallUnexplainedFractionForSquareWaveWithEnvelope) {
   for (const double period : {9.0, 15.0, 26.5}) {
     const PeriodFit fit = fit_periodic_signal(make_profile(period, 2 * period), period);
     EXPECT_LT(fit.unexplained, 0.12) << period;
@@ -38,20 +38,20 @@ TEST(FitPeriodicSignal, ExplainsSquareWaveWithEnvelope) {
   }
 }
 
-TEST(FitPeriodicSignal, LeavesVarianceOfOtherPeriodUnexplained) {
+TEST(FitPeriodicSignal, ReturnsLargeUnexplainedFractionForOtherPeriod) {
   const LineProfile profile = make_profile(20, 40);
   EXPECT_GT(fit_periodic_signal(profile, 25).unexplained, 0.6);
   EXPECT_GT(fit_periodic_signal(profile, 16).unexplained, 0.6);
 }
 
-TEST(FitPeriodicSignal, ReturnsUnexplainedOneWithoutSignal) {
+TEST(FitPeriodicSignal, ReturnsUnexplainedFractionOneWithoutSignal) {
   EXPECT_EQ(fit_periodic_signal({0, 1, {}}, 10).unexplained, 1);
   EXPECT_EQ(fit_periodic_signal({0, 1, std::vector<double>(50, 0)}, 10).unexplained, 1);
   EXPECT_EQ(fit_periodic_signal({0, 1, std::vector<double>(50, 3)}, 100).unexplained, 1)
       << "half a period";
 }
 
-TEST(FindBestFittingPeriod, ReturnsPeriodInNoise) {
+TEST(FindBestFittingPeriod, ReturnsTruePeriodInNoise) {
   for (const double period : {9.0, 15.0, 26.5}) {
     const PeriodFit fit = find_best_fitting_period(make_profile(period, 2 * period, 5), 4);
     EXPECT_NEAR(fit.period_lines / period, 1, 0.01) << period;
@@ -59,7 +59,7 @@ TEST(FindBestFittingPeriod, ReturnsPeriodInNoise) {
   }
 }
 
-TEST(FindBestFittingPeriod, LeavesNoiseUnexplained) {
+TEST(FindBestFittingPeriod, ReturnsLargeUnexplainedFractionForPureNoise) {
   Random random(3);
   int explained = 0;
   for (int i = 0; i < 50; ++i) {
@@ -70,7 +70,7 @@ TEST(FindBestFittingPeriod, LeavesNoiseUnexplained) {
   EXPECT_EQ(explained, 0);
 }
 
-TEST(DivideProfileByEnvelope, KeepsStripes) {
+TEST(DivideProfileByEnvelope, ReturnsStripesOfEqualHeight) {
   const auto signal = divide_profile_by_envelope(make_profile(15, 40), 15);
   ASSERT_GT(signal.size(), 100U);
   // Away from the ends the brightest lines are at 1 / duty.

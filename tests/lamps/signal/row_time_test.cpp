@@ -38,7 +38,7 @@ RowTimeResult find_row_time(const std::vector<MeasuredPeriod>& lights, const Lam
 
 const LampMap kMap = make_lamp_map({2000, 2500, 3000, 3500, 4000});
 
-TEST(EstimateRowTimeCandidates, IsExactWithoutNoise) {
+TEST(EstimateRowTimeCandidates, ReturnsExactRowTimeWithoutNoise) {
   Random random(1);
   std::vector<MeasuredPeriod> lights;
   for (const Lamp& lamp : kMap.lamps) add(lights, *lamp.frequency_hz, 1, 0, random);
@@ -49,7 +49,7 @@ TEST(EstimateRowTimeCandidates, IsExactWithoutNoise) {
   EXPECT_EQ(result.found->lights, 5);
 }
 
-TEST(EstimateRowTimeCandidates, SdMatchesScatter) {
+TEST(EstimateRowTimeCandidates, RowTimeSdMatchesScatter) {
   Random random(2);
   double chi_square = 0;
   constexpr int draws = 300;
@@ -68,7 +68,7 @@ TEST(EstimateRowTimeCandidates, SdMatchesScatter) {
   EXPECT_LT(chi_square / draws, 3);
 }
 
-TEST(EstimateRowTimeCandidates, IsRobustAgainstWrongLampFrequency) {
+TEST(EstimateRowTimeCandidates, RowTimeIsAccurateDespiteOneWrongLampFrequency) {
   // Periods measured in a photograph of real lamps: the first has an error of 4.4 %.
   std::vector<MeasuredPeriod> lights;
   for (const double frequency_hz : {2089.0, 2511.0, 3006.0, 3533.0, 4014.0}) {
@@ -80,7 +80,7 @@ TEST(EstimateRowTimeCandidates, IsRobustAgainstWrongLampFrequency) {
   EXPECT_LT(std::abs(result.found->row_time_s - kTrue_s), 3 * result.found->sd_s);
 }
 
-TEST(EstimateRowTimeCandidates, IsRobustAgainstOtherLights) {
+TEST(EstimateRowTimeCandidates, RowTimeIsAccurateDespiteLightsMissingInMap) {
   Random random(3);
   std::vector<MeasuredPeriod> lights;
   for (const Lamp& lamp : kMap.lamps) add(lights, *lamp.frequency_hz, 20, 0.002, random);
@@ -92,7 +92,7 @@ TEST(EstimateRowTimeCandidates, IsRobustAgainstOtherLights) {
   EXPECT_EQ(result.found->lamps, 5);
 }
 
-TEST(EstimateRowTimeCandidates, NeedsNoLabelsForSingleFrequency) {
+TEST(EstimateRowTimeCandidates, ReturnsRowTimeWithoutLabelsForSingleFrequency) {
   const auto result = find_row_time(std::vector<MeasuredPeriod>{{1 / (2500 * kTrue_s), {}}},
                                     make_lamp_map({2500, 2500}));
   ASSERT_TRUE(result.found) << result.problem;
@@ -127,7 +127,7 @@ std::vector<MeasuredPeriod> with_duties(const LampMap& map,
   return lights;
 }
 
-TEST(EstimateRowTimeCandidates, ReturnsAllCandidatesWithTheirLamps) {
+TEST(EstimateRowTimeCandidates, ReturnsBothCandidatesWithTheirLampsWhenAmbiguous) {
   const LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
   const auto result = estimate_row_time_candidates(with_duties(even, {1, 2, 3}), even);
   ASSERT_EQ(result.groups.size(), 3);
@@ -148,7 +148,7 @@ TEST(EstimateRowTimeCandidates, ReturnsAllCandidatesWithTheirLamps) {
   }
 }
 
-TEST(EstimateRowTimeCandidates, ResolvesAmbiguityByDuties) {
+TEST(EstimateRowTimeCandidates, ResolvesAmbiguityByDifferentDutiesOfAllLamps) {
   LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
   const std::vector duties{0.3, 0.7, 0.4, 0.7};
   for (std::size_t i = 0; i < 4; ++i) even.lamps[i].duty = duties[i];
@@ -166,7 +166,7 @@ TEST(EstimateRowTimeCandidates, ResolvesAmbiguityByDuties) {
   EXPECT_FALSE(find_row_time(with_duties(even, {1, 2, 3}), even).found);
 }
 
-TEST(SelectRowTimeCandidate, AddsPositionCosts) {
+TEST(SelectRowTimeCandidate, SelectsCandidateWithClearlyLowerPositionCost) {
   const LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
   const auto found = estimate_row_time_candidates(with_duties(even, {1, 2, 3}), even);
   ASSERT_EQ(found.candidates.size(), 2);
@@ -190,7 +190,7 @@ TEST(EstimateRowTimeCandidates, ResolvesAmbiguityByLabels) {
   EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-12);
 }
 
-TEST(SelectRowTimeCandidate, ReportsReasonWithoutRowTime) {
+TEST(SelectRowTimeCandidate, ReturnsProblemWithoutMatchingLights) {
   EXPECT_THAT(find_row_time({}, kMap).problem, HasSubstr("no light has clear stripes"));
   EXPECT_THAT(find_row_time(std::vector<MeasuredPeriod>{{10, 77}}, kMap).problem,
               HasSubstr("no lamp of the map"));

@@ -59,7 +59,7 @@ TEST_P(MeasureStripesOfSquareWave, ReturnsPeriodAndDuty) {
   }
 }
 
-TEST_P(MeasureStripesOfSquareWave, ReturnsPeriodUnderExposure) {
+TEST_P(MeasureStripesOfSquareWave, ReturnsPeriodWhenExposureBlursStripes) {
   const double period = GetParam();
   for (const int lines : {40, 55, 70}) {
     if (lines < kMinPeriods * period) continue;
@@ -151,14 +151,14 @@ TEST(MeasureStripes, ReturnsFiniteDutyForSignalWithOneOutlier) {
   }
 }
 
-TEST(MeasureStripes, CountsStripesInStepsOfHalf) {
+TEST(MeasureStripes, CountPerLineAveragesBeginsAndEndsOfStripes) {
   // 60 lines, lit from 5 to 9, 15 to 19 and so on: six begins, five or six ends.
   std::vector<double> signal(60, 0);
   for (std::size_t i = 0; i < signal.size(); ++i) signal[i] = i % 10 >= 5 ? 100 : 0;
   EXPECT_NEAR(measure_stripes(signal).count_per_line, 11.0 / 2 / 60, 1e-12);
 }
 
-TEST(MeasureStripes, ReturnsLitFractionOfDiscArea) {
+TEST(MeasureStripes, LitAreaMatchesLitFractionOfDiscArea) {
   // The upper half is lit, then the half in the middle, where the chords are longer.
   std::vector<double> half(80, 0), middle(80, 0);
   for (std::size_t i = 0; i < 80; ++i) {

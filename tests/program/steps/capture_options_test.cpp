@@ -10,22 +10,22 @@
 namespace vlp {
 namespace {
 
-TEST(MotionOptions, ReturnNulloptWithoutSpeed) {
-  EXPECT_FALSE(MotionOptions{}.make_known_motion());
+TEST(MotionOptions, MakeMotionPriorIsNulloptWithoutSpeed) {
+  EXPECT_FALSE(MotionOptions{}.make_motion_prior());
   const MotionOptions drives{2.0, {}}, straight{2.0, 0.0};
-  ASSERT_TRUE(drives.make_known_motion());
-  EXPECT_GT(drives.make_known_motion()->yaw_rate_sd_rad_per_s, rad_from_deg(45));
-  EXPECT_EQ(straight.make_known_motion()->yaw_rate_sd_rad_per_s, 0);
-  EXPECT_EQ(straight.make_known_motion()->velocity_sd_m_per_s,
-            drives.make_known_motion()->velocity_sd_m_per_s);
+  ASSERT_TRUE(drives.make_motion_prior());
+  EXPECT_GT(drives.make_motion_prior()->yaw_rate_sd_rad_per_s, rad_from_deg(45));
+  EXPECT_EQ(straight.make_motion_prior()->yaw_rate_sd_rad_per_s, 0);
+  EXPECT_EQ(straight.make_motion_prior()->velocity_sd_m_per_s,
+            drives.make_motion_prior()->velocity_sd_m_per_s);
 }
 
-TEST(CheckFrameStepNeedsVideo, ThrowsWithoutVideo) {
-  check_frame_step_needs_video(1, {"boards"});
-  check_frame_step_needs_video(5, {"boards", "boards.mp4"});
-  EXPECT_EQ(
-      rejection_message<std::invalid_argument>([] { check_frame_step_needs_video(5, {"boards"}); }),
-      "--every: there is no video; leave it out");
+TEST(RejectFrameStepWithoutVideo, ThrowsForStepAboveOneWithoutVideo) {
+  reject_frame_step_without_video(1, {"boards"});
+  reject_frame_step_without_video(5, {"boards", "boards.mp4"});
+  EXPECT_EQ(rejection_message<std::invalid_argument>(
+                [] { reject_frame_step_without_video(5, {"boards"}); }),
+            "--every: there is no video; leave it out");
 }
 
 }  // namespace

@@ -31,10 +31,10 @@ HistoryEntry make_entry(const std::string& arguments, const std::vector<std::str
   app.add_flag("--refine-map", flag);
   app.add_flag("-q,--quiet", quiet);
   app.parse(arguments);
-  return make_program_history_entry(app, inputs);
+  return make_history_entry_from_command_line(app, inputs);
 }
 
-TEST(Sha256, MatchesFips180Examples) {  // FIPS 180-2, appendix B
+TEST(ComputeFileSha256, MatchesFips180Examples) {  // FIPS 180-2, appendix B
   const TemporaryFolder folder;
   EXPECT_EQ(compute_file_sha256(folder.file("abc", "abc")),
             "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
@@ -42,7 +42,7 @@ TEST(Sha256, MatchesFips180Examples) {  // FIPS 180-2, appendix B
             "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
-TEST(InputDigests, MatchSha256sumForFolder) {
+TEST(InputDigests, ImageFolderDigestMatchesSha256sumOfItsImages) {
   const TemporaryFolder folder;
   folder.file("b.png", "second");
   folder.file("a.png", "first");
@@ -52,7 +52,7 @@ TEST(InputDigests, MatchSha256sumForFolder) {
   EXPECT_EQ(InputDigests().compute_image_folder_digest(folder / ""), oracle.output.substr(0, 64));
 }
 
-TEST(HistoryEntry, IsIndependentOfMachine) {
+TEST(MakeHistoryEntryFromCommandLine, OmitsFoldersOfMachineFromOptionsAndInputs) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "spot");
   folder.file("spot/0.png", "an image");
@@ -72,7 +72,7 @@ TEST(HistoryEntry, IsIndependentOfMachine) {
   EXPECT_EQ(entry.inputs[1].sha256, compute_file_sha256(lamps));
 }
 
-TEST(HistoryEntry, IsEmptyWithoutOptionsAndThrowsForUnreadableInput) {
+TEST(MakeHistoryEntryFromCommandLine, HasEmptyOptionsWithoutOptionsAndThrowsForUnreadableInput) {
   const TemporaryFolder folder;
   EXPECT_EQ(make_entry("images", {}).options, "");
   const std::string missing = (folder / "missing").string();

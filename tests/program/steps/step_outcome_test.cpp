@@ -10,12 +10,12 @@
 namespace vlp {
 namespace {
 
-TEST(Require, ThrowsUndeterminedOnlyForUndeterminedStep) {
+TEST(ThrowIfStepFailed, ThrowsUndeterminedOnlyForUndeterminedStep) {
   StepResult result;
   throw_if_step_failed(result);
-  result.set_failure(StepFailure::undetermined, "add captures");
+  result.set_step_failure(StepFailure::undetermined, "add captures");
   EXPECT_EQ(rejection_message<Undetermined>([&] { throw_if_step_failed(result); }), "add captures");
-  result.set_failure(StepFailure::wrong_map, "contradicts the captures", "lamps.yaml");
+  result.set_step_failure(StepFailure::wrong_map, "contradicts the captures", "lamps.yaml");
   EXPECT_EQ(rejection_message<std::invalid_argument>([&] { throw_if_step_failed(result); }),
             "lamps.yaml: contradicts the captures");
 }

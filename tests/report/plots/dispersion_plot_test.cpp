@@ -23,7 +23,7 @@ class DispersionPlotTest : public testing::Test {
                       {}};
 
   std::string rendered(const char* name) {
-    write_plot(folder / name, make_gnuplot_drawing(plot));
+    write_plot(folder / name, make_dispersion_plot_drawing(plot));
     return TemporaryFolder::read_content(folder / name);
   }
 };
@@ -32,17 +32,18 @@ TEST_F(DispersionPlotTest, RendersReproduciblePngOrSvgByExtension) {
   EXPECT_THAT(rendered("a.png"), StartsWith("\x89PNG"));
   EXPECT_EQ(rendered("a.png"), rendered("a.png"));
   EXPECT_THAT(rendered("a.svg"), HasSubstr("a 'title'"));
-  EXPECT_THAT(rejection_message([&] { write_plot(folder / "a.gif", make_gnuplot_drawing(plot)); }),
-              HasSubstr("a.gif: a picture's name should end in"));
+  EXPECT_THAT(
+      rejection_message([&] { write_plot(folder / "a.gif", make_dispersion_plot_drawing(plot)); }),
+      HasSubstr("a.gif: a picture's name should end in"));
 }
 
-TEST_F(DispersionPlotTest, MarksOutliersIfAny) {
+TEST_F(DispersionPlotTest, LabelsOutliersOnlyIfThereAreAny) {
   EXPECT_THAT(rendered("a.svg"), Not(HasSubstr("rejected")));
   plot.outliers_m = {{0.05, 0.05}};
   EXPECT_THAT(rendered("a.svg"), HasSubstr("rejected"));
 }
 
-TEST_F(DispersionPlotTest, RendersSingleFix) {
+TEST_F(DispersionPlotTest, RendersSingleFixBeforeAndAfter) {
   plot.before = {{{0.01, 0}}, {{0.01, 0}, 0}};
   plot.after = {{{0, 0}}, {{0, 0}, 0}};
   EXPECT_THAT(rendered("a.svg"), HasSubstr("<svg"));

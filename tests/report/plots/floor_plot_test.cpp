@@ -33,7 +33,7 @@ TEST_F(FloorPlotTest, RendersPngOrSvgByExtension) {
   EXPECT_THAT(svg, HasSubstr(">7<"));
 }
 
-TEST_F(FloorPlotTest, IsReproducible) {
+TEST_F(FloorPlotTest, WritesIdenticalFilesOnRepeat) {
   for (const char* name : {"a.png", "a.svg"}) {
     write_floor_plot(folder / name, plot, lamps);
     const std::string first = TemporaryFolder::read_content(folder / name);
@@ -43,7 +43,7 @@ TEST_F(FloorPlotTest, IsReproducible) {
   }
 }
 
-TEST_F(FloorPlotTest, RejectsOtherExtension) {
+TEST_F(FloorPlotTest, RejectsExtensionOtherThanPngOrSvg) {
   EXPECT_THAT(rejection_message([&] { write_floor_plot(folder / "a.gif", plot, lamps); }),
               HasSubstr("a.gif: a picture's name should end in .png or .svg"));
 }
@@ -57,7 +57,7 @@ TEST_F(FloorPlotTest, KeepsExistingFileWhenGnuplotFails) {
   EXPECT_EQ(TemporaryFolder::read_content(file), "old");
 }
 
-TEST_F(FloorPlotTest, ReportsWhyScriptCannotBeMade) {
+TEST_F(FloorPlotTest, NamesSystemErrorWhenGnuplotScriptCannotBeCreated) {
   rlimit before{};
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
   rlimit none = before;
@@ -70,8 +70,8 @@ TEST_F(FloorPlotTest, ReportsWhyScriptCannotBeMade) {
                                  "Too many open files"));
 }
 
-TEST(QuoteForGnuplot, PreventsInterpretation) {
-  EXPECT_EQ(quote_for_gnuplot("it's `ls` $x"), "'it''s `ls` $x'");
+TEST(QuoteTextForGnuplot, DoublesSingleQuotesAndKeepsOtherCharacters) {
+  EXPECT_EQ(quote_text_for_gnuplot("it's `ls` $x"), "'it''s `ls` $x'");
 }
 
 }  // namespace

@@ -21,9 +21,9 @@ using testing::StartsWith;
 class IntrinsicsPlotTest : public testing::Test {
  protected:
   /// gnuplot's stderr is passed through to the user; it has to be empty.
-  std::string render_svg(const IntrinsicsPlot& intrinsics_plot) const {
+  std::string render_plot_as_svg(const IntrinsicsPlot& intrinsics_plot) const {
     testing::internal::CaptureStderr();
-    write_plot(folder / "a.svg", make_gnuplot_drawing(intrinsics_plot));
+    write_plot(folder / "a.svg", make_intrinsics_plot_drawing(intrinsics_plot));
     EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
     return TemporaryFolder::read_content(folder / "a.svg");
   }
@@ -39,44 +39,46 @@ class IntrinsicsPlotTest : public testing::Test {
                       {0.4, 0.3, 0.4, 0.2, 0.03, 0.2, 0.4, 0.3, 0.4}};
 };
 
-TEST_F(IntrinsicsPlotTest, ShowsCornerCountsAndArrowScale) {
-  const std::string svg = render_svg(plot);
+TEST_F(IntrinsicsPlotTest, ShowsCornerCountArrowScaleAndSdLevels) {
+  const std::string svg = render_plot_as_svg(plot);
   for (const char* text : {"a 'title'", "2 corners", "1 outliers", "200 times as long",
                            "standard deviation (px)", "0.05", "0.1", "0.2", "0.5"}) {
     EXPECT_THAT(svg, HasSubstr(text));
   }
   EXPECT_THAT(svg, AllOf(HasSubstr("u (px)"), HasSubstr("v (px)")));
   plot.corners.pop_back();
-  EXPECT_THAT(render_svg(plot), Not(HasSubstr("outliers")));
+  EXPECT_THAT(render_plot_as_svg(plot), Not(HasSubstr("outliers")));
 }
 
 TEST_F(IntrinsicsPlotTest, RendersReproduciblePngOrSvgByExtension) {
-  write_plot(folder / "a.png", make_gnuplot_drawing(plot));
+  write_plot(folder / "a.png", make_intrinsics_plot_drawing(plot));
   const std::string first = TemporaryFolder::read_content(folder / "a.png");
   EXPECT_THAT(first, StartsWith("\x89PNG"));
-  write_plot(folder / "a.png", make_gnuplot_drawing(plot));
+  write_plot(folder / "a.png", make_intrinsics_plot_drawing(plot));
   EXPECT_EQ(TemporaryFolder::read_content(folder / "a.png"), first);
-  const std::string svg = render_svg(plot);
+  const std::string svg = render_plot_as_svg(plot);
   ASSERT_FALSE(svg.empty());
-  EXPECT_EQ(render_svg(plot), svg);
-  EXPECT_THAT(rejection_message([&] { write_plot(folder / "a.gif", make_gnuplot_drawing(plot)); }),
-              HasSubstr("a.gif: a picture's name should end in .png or .svg"));
+  EXPECT_EQ(render_plot_as_svg(plot), svg);
+  EXPECT_THAT(
+      rejection_message([&] { write_plot(folder / "a.gif", make_intrinsics_plot_drawing(plot)); }),
+      HasSubstr("a.gif: a picture's name should end in .png or .svg"));
 }
 
-TEST_F(IntrinsicsPlotTest, LeavesUnknownValuesBlank) {
-  const std::string whole = render_svg(plot);
+TEST_F(IntrinsicsPlotTest, RendersUnknownSdsAndStatesWhenAllAreUnknown) {
+  const std::string whole = render_plot_as_svg(plot);
   plot.sd_px[0] = std::numeric_limits<double>::infinity();
-  const std::string part = render_svg(plot);
+  const std::string part = render_plot_as_svg(plot);
   EXPECT_NE(part, whole);
   EXPECT_THAT(part, HasSubstr("0.05"));
   plot.sd_px.assign(9, std::nan(""));
-  EXPECT_THAT(render_svg(plot), AllOf(HasSubstr("not determined"), HasSubstr("2 corners")));
+  EXPECT_THAT(render_plot_as_svg(plot), AllOf(HasSubstr("not determined"), HasSubstr("2 corners")));
 }
 
 TEST_F(IntrinsicsPlotTest, RendersConstantMapAndZeroResiduals) {
   plot.sd_px.assign(9, 0.2);
   for (auto& corner : plot.corners) corner = {corner.seen_px, {0, 0}, false};
-  EXPECT_THAT(render_svg(plot), AllOf(HasSubstr("3 corners"), HasSubstr("1 times as long")));
+  EXPECT_THAT(render_plot_as_svg(plot),
+              AllOf(HasSubstr("3 corners"), HasSubstr("1 times as long")));
 }
 
 TEST(ChooseResidualMagnification, ReturnsRoundNumberWithinBounds) {

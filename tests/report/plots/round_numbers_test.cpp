@@ -21,7 +21,7 @@ TEST(RoundDownTo125Series, ReturnsOneTwoOrFiveTimesPowerOfTen) {
   }
 }
 
-TEST(List125Series, CoversBothEnds) {
+TEST(List125Series, ReturnsNumbersFromBelowLowerToAboveUpperEnd) {
   EXPECT_THAT(list_1_2_5_series(0.016, 0.158),
               Pointwise(testing::DoubleEq(), {0.01, 0.02, 0.05, 0.1, 0.2}));
   EXPECT_THAT(list_1_2_5_series(0.5, 10),

@@ -9,7 +9,7 @@ namespace {
 
 using testing::ElementsAre;
 
-TEST(ComputeThinningStep, LimitsCountAndReportsStep) {
+TEST(ComputeThinningStep, ReturnsSmallestStepThatKeepsAtMostLimit) {
   EXPECT_EQ(compute_thinning_step(0, 10), 1u);
   EXPECT_EQ(compute_thinning_step(10, 10), 1u);
   EXPECT_EQ(compute_thinning_step(11, 10), 2u);
@@ -20,7 +20,7 @@ TEST(ComputeThinningStep, LimitsCountAndReportsStep) {
   EXPECT_EQ(describe_thinning(230, 23), "every 23rd of 230 drawn");
 }
 
-TEST(SelectEveryNthAndLargest, ReturnsAscendingIndices) {
+TEST(SelectEveryNthAndLargest, ReturnsAscendingIndicesOfEveryNthAndLargest) {
   const std::vector<double> values = {1, 9, 2, 3, 9, 8, 0};
   EXPECT_THAT(select_every_nth_and_largest(values, 3, 2), ElementsAre(0, 1, 3, 4, 6));
   EXPECT_THAT(select_every_nth_and_largest(values, 3, 0), ElementsAre(0, 3, 6));

@@ -62,8 +62,8 @@ class ArchiveRuns : public testing::Test {
 
   std::vector<RunRecord> runs() const {
     std::vector<RunRecord> all;
-    for (const auto& session : read_archive_sessions(folder / "archive").sessions) {
-      all.push_back(load_archive_run(session));
+    for (const auto& session : read_reprocessed_archive_sessions(folder / "archive").sessions) {
+      all.push_back(load_run_of_archive_session(session));
     }
     return all;
   }
@@ -72,8 +72,8 @@ class ArchiveRuns : public testing::Test {
   std::string summary = "camera,session,verdict,date,reason,version,key\n";
 };
 
-TEST_F(ArchiveRuns, ReturnsDatedSessionsInChronologicalOrder) {
-  const auto archive = read_archive_sessions(folder / "archive");
+TEST_F(ArchiveRuns, ReturnsDatedSessionsAsRunsInChronologicalOrder) {
+  const auto archive = read_reprocessed_archive_sessions(folder / "archive");
   EXPECT_EQ(archive.undated, 1U);
   EXPECT_EQ(archive.crashed, 1U);
   const auto runs = this->runs();
@@ -84,14 +84,15 @@ TEST_F(ArchiveRuns, ReturnsDatedSessionsInChronologicalOrder) {
   EXPECT_THAT((std::vector{runs[0].verdict, runs[1].verdict, runs[2].verdict, runs[3].verdict}),
               ElementsAre("PASS", "PASS", "FAIL", "INVALID"));
   EXPECT_EQ(runs[0].station, "archive");
-  EXPECT_EQ(read_archive_sessions(folder / "archive/").sessions[0].run.station, "archive");
+  EXPECT_EQ(read_reprocessed_archive_sessions(folder / "archive/").sessions[0].run.station,
+            "archive");
   EXPECT_EQ(runs[0].config_sha256, "key");
   EXPECT_EQ(runs[1].calibration, "format: vlp-calibration/1\n");
-  EXPECT_EQ(runs[2].first_cause(), "rms_px is 2 px, at most 1 px is required");
+  EXPECT_EQ(runs[2].first_verdict_cause(), "rms_px is 2 px, at most 1 px is required");
   EXPECT_EQ(runs[3].program, "vlp-calibrate 1.2.3");
   ASSERT_THAT(runs[2].metrics, SizeIs(5));
   EXPECT_EQ(runs[2].metrics[0].value, 2);
-  EXPECT_FALSE(runs[2].metrics[0].has_passed());
+  EXPECT_FALSE(runs[2].metrics[0].has_passed_gate());
   EXPECT_EQ(runs[2].metrics[0].direction, Direction::at_most);
   EXPECT_EQ(runs[2].metrics[2].name, "residual_ratio");
   EXPECT_FALSE(runs[2].metrics[2].limit);
@@ -100,24 +101,25 @@ TEST_F(ArchiveRuns, ReturnsDatedSessionsInChronologicalOrder) {
   EXPECT_FALSE(runs[2].metrics[4].value);
 }
 
-TEST_F(ArchiveRuns, AreStoredOnceIfReadTwice) {
+TEST_F(ArchiveRuns, StoreRunKeepsOneCopyOfRunsReadTwice) {
   Records records((folder / "records.db").string());
   for (int time = 0; time < 2; ++time) {
     for (const RunRecord& run : runs()) records.store_run(run);
   }
-  EXPECT_THAT(records.list_runs({}), SizeIs(4));
-  EXPECT_THAT(extract_trend_values(load_judged_values(records, "rms_px", {})),
+  EXPECT_THAT(records.list_run_summaries({}), SizeIs(4));
+  EXPECT_THAT(extract_trend_values(load_metric_of_judged_runs(records, "rms_px", {})),
               ElementsAre(0.3, 0.1, 2));
-  EXPECT_THAT(extract_trend_values(load_judged_values(records, "mean_mm", {})),
+  EXPECT_THAT(extract_trend_values(load_metric_of_judged_runs(records, "mean_mm", {})),
               ElementsAre(0.5, 0.5, 0.5));
-  EXPECT_EQ(find_gate_limit("rms_px", nullptr, records, load_judged_values(records, "rms_px", {})),
+  EXPECT_EQ(find_gate_limit("rms_px", nullptr, records,
+                            load_metric_of_judged_runs(records, "rms_px", {})),
             1);
   EXPECT_STREQ(find_run_metric("mean_mm").unit, "mm");
-  EXPECT_TRUE(records.check("").problems.empty());
+  EXPECT_TRUE(records.check_records_by_audit_trail("").problems.empty());
 }
 
-TEST_F(ArchiveRuns, ThrowsForFilesNotWrittenByReprocessing) {
-  EXPECT_THAT(rejection_message([&] { read_archive_sessions(folder / "none"); }),
+TEST_F(ArchiveRuns, ThrowsForMissingOrInvalidFilesOfArchive) {
+  EXPECT_THAT(rejection_message([&] { read_reprocessed_archive_sessions(folder / "none"); }),
               HasSubstr("summary.csv"));
   write("archive/sessions/a/s1/session.json", "{\"metrics\": 1}\n");
   EXPECT_THAT(rejection_message([&] { runs(); }),
@@ -126,16 +128,16 @@ TEST_F(ArchiveRuns, ThrowsForFilesNotWrittenByReprocessing) {
   EXPECT_THAT(rejection_message([&] { runs(); }), HasSubstr("a/s1/session.json: cannot be opened"));
 }
 
-TEST_F(ArchiveRuns, SkipsRowsWithInvalidIds) {
-  const std::size_t before = read_archive_sessions(folder / "archive").sessions.size();
+TEST_F(ArchiveRuns, SkipsAndListsRowsWithInvalidCameraIds) {
+  const std::size_t before = read_reprocessed_archive_sessions(folder / "archive").sessions.size();
   row("..,s1,pass,2026-03-19,,1.2.3,key");
-  const ReprocessedArchive archive = read_archive_sessions(folder / "archive");
+  const ReprocessedArchive archive = read_reprocessed_archive_sessions(folder / "archive");
   EXPECT_EQ(archive.sessions.size(), before);
   ASSERT_EQ(archive.refused.size(), 1U);
   EXPECT_THAT(archive.refused.front(), HasSubstr("summary.csv:8: '..' is no id of a camera"));
 }
 
-TEST_F(ArchiveRuns, RejectsLinksOutOfArchive) {
+TEST_F(ArchiveRuns, RejectsSymbolicLinkInPlaceOfCalibration) {
   write("secret.yaml", "password: 1\n");
   std::filesystem::remove(folder / "archive/sessions/a/s1/calibration.yaml");
   std::filesystem::create_symlink(folder / "secret.yaml",
@@ -145,7 +147,7 @@ TEST_F(ArchiveRuns, RejectsLinksOutOfArchive) {
 }
 
 /// Comparing all pairs would take minutes.
-TEST_F(ArchiveRuns, ReadsManyMetricsInProportionalTime) {
+TEST_F(ArchiveRuns, Reads400000MetricsWithin30Seconds) {
   constexpr std::size_t count = 400'000;
   std::string metrics;
   for (std::size_t i = 0; i < count; ++i) {

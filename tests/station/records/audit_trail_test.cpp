@@ -95,26 +95,26 @@ void check_forgeries(const std::function<std::string()>& new_database) {
     const std::string where = new_database();
     keep_three(where);
     Records records(where);
-    const TrailCheck kept = records.check("");
+    const TrailCheck kept = records.check_records_by_audit_trail("");
     EXPECT_THAT(kept.problems, IsEmpty());
     EXPECT_EQ(kept.runs, 3U);
     EXPECT_EQ(kept.entries, 5U);
     run_database_client(where, forgery.sql);
-    EXPECT_EQ(records.check("").problems, forgery.problems) << forgery.sql;
+    EXPECT_EQ(records.check_records_by_audit_trail("").problems, forgery.problems) << forgery.sql;
     if (!forgery.problems.empty()) continue;
     EXPECT_THAT(
-        records.check(kept.last_digest).problems,
+        records.check_records_by_audit_trail(kept.last_digest).problems,
         ElementsAre(StartsWith("the entry that was noted, " + kept.last_digest + ", is not in")));
   }
 }
 
-TEST(CheckAuditTrail, DetectsChangesInFile) {
+TEST(CheckAuditTrail, DetectsEachChangeOfSqliteRecords) {
   const TemporaryFolder folder;
   int count = 0;
   check_forgeries([&] { return (folder / (std::to_string(++count) + ".db")).string(); });
 }
 
-TEST(CheckAuditTrail, DetectsChangesInPostgres) {
+TEST(CheckAuditTrail, DetectsEachChangeOfPostgresRecords) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
@@ -125,22 +125,22 @@ TEST(CheckAuditTrail, DetectsChangesInPostgres) {
 }
 
 /// An earlier last digest remains in the trail unless it is removed.
-TEST(CheckAuditTrail, AcceptsEarlierDigestAfterNewRuns) {
+TEST(CheckAuditTrail, AcceptsEarlierLastDigestAfterNewRun) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   keep_three(where);
   Records records(where);
-  const std::string expected_digest = records.check("").last_digest;
+  const std::string expected_digest = records.check_records_by_audit_trail("").last_digest;
   EXPECT_THAT(expected_digest, SizeIs(64));
   records.store_run(make_sample_record(numbered_run_id(4), "d", 0.5));
-  const TrailCheck later = records.check(expected_digest);
+  const TrailCheck later = records.check_records_by_audit_trail(expected_digest);
   EXPECT_THAT(later.problems, IsEmpty());
   EXPECT_EQ(later.entries, 6U);
   EXPECT_NE(later.last_digest, expected_digest);
 }
 
 /// Equal runs have equal digests in every database.
-TEST(CheckAuditTrail, ReturnsSameDigestInPostgresAndFile) {
+TEST(CheckAuditTrail, ReturnsSameDigestForPostgresAndSqlite) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
@@ -148,7 +148,8 @@ TEST(CheckAuditTrail, ReturnsSameDigestInPostgresAndFile) {
   const std::string file = (folder / "records.db").string();
   keep_three(file);
   keep_three(server.uri());
-  EXPECT_EQ(Records(file).check("").last_digest, Records(server.uri()).check("").last_digest);
+  EXPECT_EQ(Records(file).check_records_by_audit_trail("").last_digest,
+            Records(server.uri()).check_records_by_audit_trail("").last_digest);
 }
 
 /// Records in the tables of version 5, which had no trail.
@@ -187,7 +188,7 @@ INSERT INTO events VALUES ('20261121T135511.000000Z-00000002', '20261121T134509Z
 /// Checks that the migration of kVersion5 adds all existing runs to the trail.
 void check_sealing(const std::string& where) {
   Records records(where);
-  const TrailCheck sealed = records.check("");
+  const TrailCheck sealed = records.check_records_by_audit_trail("");
   EXPECT_THAT(sealed.problems, IsEmpty());
   EXPECT_EQ(sealed.runs, 1U);
   EXPECT_EQ(sealed.entries, 3U);
@@ -198,16 +199,16 @@ void check_sealing(const std::string& where) {
   EXPECT_EQ(run.events[1].who, "");
   run.events.push_back(make_run_event_now(kHookDone, "", "Bob"));
   records.store_run(run);
-  EXPECT_THAT(records.find(run.run)->events[2].who, StartsWith("Bob ("));
-  EXPECT_EQ(records.check(sealed.last_digest).entries, 4U);
-  EXPECT_THAT(records.check(sealed.last_digest).problems, IsEmpty());
+  EXPECT_THAT(records.find_run_by_id(run.run)->events[2].who, StartsWith("Bob ("));
+  EXPECT_EQ(records.check_records_by_audit_trail(sealed.last_digest).entries, 4U);
+  EXPECT_THAT(records.check_records_by_audit_trail(sealed.last_digest).problems, IsEmpty());
   run_database_client(where, "UPDATE events SET text = 'label 7' WHERE what = 'hook failed';\n");
-  EXPECT_THAT(records.check("").problems,
+  EXPECT_THAT(records.check_records_by_audit_trail("").problems,
               ElementsAre("event 20261121T135511.000000Z-00000002 of run 20261121T134509Z-0009 was "
                           "changed"));
 }
 
-TEST(CheckAuditTrail, IncludesRunsOfVersion5) {
+TEST(CheckAuditTrail, AddsRunsOfDatabaseVersion5ToTrail) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   run_database_client(file, kVersion5);

@@ -44,16 +44,16 @@ RunRecord certified_run() {
   record.program = "vlp-station 0";
   record.config_sha256 = std::string(64, 'a');
   record.calibration = "format: vlp-calibration/1\n";
-  record.verdict = to_string(Verdict::pass);
-  record.metrics =
-      check_all_metrics({{"rms_px", 0.3}, {"check_mean_mm", 1, GuardBand{0.02, 1.645}}},
-                        {{"rms_px", 0.123456}, {"check_mean_mm", 0.9600001}}, list_unit_metrics());
+  record.verdict = run_verdict_name(Verdict::pass);
+  record.metrics = check_all_metrics_against_gates(
+      {{"rms_px", 0.3}, {"check_mean_mm", 1, GuardBand{0.02, 1.645}}},
+      {{"rms_px", 0.123456}, {"check_mean_mm", 0.9600001}}, list_unit_metrics());
   return record;
 }
 
-TEST(CertifiedValue, DescribeRoundsExpandedUncertaintyToTwoDigits) {
+TEST(CertifiedValue, DescribeStatesTwiceTheSdWithTwoDigits) {
   const auto words = [](double value, std::optional<double> u) {
-    return describe(CertifiedValue{"", "px", value, u});
+    return format_certified_value(CertifiedValue{"", "px", value, u});
   };
   EXPECT_EQ(words(520.12345, 0.006), "520.123 \u00b1 0.012\u00a0px");
   EXPECT_EQ(words(520.12345, 0.0498), "520.12 \u00b1 0.10\u00a0px");  // not 0.0996, nor 0.100
@@ -63,7 +63,7 @@ TEST(CertifiedValue, DescribeRoundsExpandedUncertaintyToTwoDigits) {
   EXPECT_EQ(words(520.12345, 0), words(520.12345, std::nullopt));
 }
 
-TEST(CertifiedValues, ReturnsUncertaintiesOfCalibration) {
+TEST(CollectCertifiedValues, ReturnsStandardUncertaintiesOfCalibration) {
   const Calibration calibration = measured();
   const auto values = collect_certified_values(calibration);
   ASSERT_EQ(values.size(), 10u);
@@ -95,7 +95,7 @@ TEST(CertifiedValues, ReturnsUncertaintiesOfCalibration) {
   }
 }
 
-TEST(Certificate, ContainsDataOfRecord) {
+TEST(MakeCalibrationCertificate, ContainsMetricsGatesAndDecisionsOfRun) {
   const std::string page = make_calibration_certificate(certified_run(), measured());
   EXPECT_EQ(make_calibration_certificate(certified_run(), measured()), page);
   EXPECT_THAT(
@@ -113,7 +113,7 @@ TEST(Certificate, ContainsDataOfRecord) {
   EXPECT_THAT(page, HasSubstr("counter(pages)"));
 }
 
-TEST(Certificate, ContainsPrintErrorOfBoard) {
+TEST(MakeCalibrationCertificate, StatesBoardPrintErrorIfMeasuredElseExactBoard) {
   EXPECT_THAT(make_calibration_certificate(certified_run(), measured()),
               HasSubstr("The board and the known points are assumed to be exact"));
   RunRecord record = certified_run();
@@ -123,16 +123,16 @@ TEST(Certificate, ContainsPrintErrorOfBoard) {
                     Not(HasSubstr("The board and"))));
 }
 
-TEST(Certificate, StatesNonconformityOfFailedUnit) {
+TEST(MakeCalibrationCertificate, StatesNonconformityAndCauseOfFailedUnit) {
   RunRecord record = certified_run();
   record.metrics[0].value = 0.4;
-  record.set_verdict({{"the lens is poor", true}});
+  record.set_verdict_from_causes({{"the lens is poor", true}});
   EXPECT_THAT(make_calibration_certificate(record, measured()),
               AllOf(HasSubstr("FAIL"), HasSubstr("does not conform: the lens is poor."),
                     HasSubstr("<td>no</td>"), Not(HasSubstr("conforms with all"))));
 }
 
-TEST(Certificate, ThrowsForGoldenInvalidOrEditedRuns) {
+TEST(MakeCalibrationCertificate, ThrowsForGoldenInvalidOrEditedRuns) {
   const auto refusal = [](const RunRecord& record) {
     return rejection_message([&] { make_calibration_certificate(record, measured()); });
   };
@@ -140,7 +140,7 @@ TEST(Certificate, ThrowsForGoldenInvalidOrEditedRuns) {
   golden.kind = "golden";
   EXPECT_THAT(refusal(golden), HasSubstr("is a run of the golden unit"));
   RunRecord invalid = certified_run();
-  invalid.set_verdict({{"lamp 5 is loose", false}});
+  invalid.set_verdict_from_causes({{"lamp 5 is loose", false}});
   EXPECT_THAT(refusal(invalid),
               AllOf(HasSubstr("20261121T134501Z-0001"), HasSubstr("not judged (lamp 5 is loose)")));
   RunRecord changed = certified_run();

@@ -56,7 +56,7 @@ class DescribeGoldenUnitProblem : public testing::Test {
     run.kind = kind;
     run.verdict = verdict;
     run.ended_utc = ended_utc;
-    update_golden_unit_note(config, run);
+    record_run_in_golden_unit_note(config, run);
   }
   std::string problem() const { return describe_golden_unit_problem(config); }
 
@@ -64,7 +64,7 @@ class DescribeGoldenUnitProblem : public testing::Test {
   StationConfig config{};
 };
 
-TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnit) {
+TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnitUntilItPassesHere) {
   note("unit", "PASS");
   EXPECT_THAT(problem(), StartsWith("the golden unit was not measured here yet: "));
   note("golden", "INVALID");
@@ -75,7 +75,7 @@ TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnit) {
   EXPECT_THAT(problem(), HasSubstr("not measured"));
 }
 
-TEST_F(DescribeGoldenUnitProblem, ReportsExpiredNumberOfUnits) {
+TEST_F(DescribeGoldenUnitProblem, ReportsReachedUnitLimitUntilGoldenUnitPasses) {
   note("golden", "PASS");
   note("unit", "FAIL");
   note("unit", "INVALID");
@@ -88,7 +88,7 @@ TEST_F(DescribeGoldenUnitProblem, ReportsExpiredNumberOfUnits) {
   EXPECT_EQ(problem(), "");
 }
 
-TEST_F(DescribeGoldenUnitProblem, ReportsExpiredHours) {
+TEST_F(DescribeGoldenUnitProblem, ReportsPassOlderThanHourLimitOrInFuture) {
   note("golden", "PASS", "2026-01-01T00:00:00Z");
   EXPECT_THAT(problem(), HasSubstr("measured 2026-01-01T00:00:00Z (run RUN), not within 24 h"));
   note("golden", "PASS", "9999-01-01T00:00:00Z");  // with a clock that was set back later
@@ -98,7 +98,7 @@ TEST_F(DescribeGoldenUnitProblem, ReportsExpiredHours) {
 }
 
 /// The unit was started before the limits expired.
-TEST_F(DescribeGoldenUnitProblem, IgnoresLimitsExpiredBeforeVerdict) {
+TEST_F(DescribeGoldenUnitProblem, IgnoresExpiredLimitsButNotFailureAtVerdict) {
   const auto at_verdict = [&] {
     return describe_golden_unit_problem(config, GoldenCheckTime::verdict);
   };
@@ -111,13 +111,13 @@ TEST_F(DescribeGoldenUnitProblem, IgnoresLimitsExpiredBeforeVerdict) {
   note("unit", "PASS");
   EXPECT_THAT(problem(), StartsWith("2 units since"));
   EXPECT_EQ(at_verdict(), "");
-  config.lamps.lamps.push_back({1, {0, 0, 2}, make_disc(0.18), 1600, 0.5});
+  config.lamps.lamps.push_back({1, {0, 0, 2}, make_disc_lamp_shape(0.18), 1600, 0.5});
   EXPECT_THAT(at_verdict(), StartsWith("station.yaml or a file that it names was changed"));
   note("golden", "FAIL");
   EXPECT_THAT(at_verdict(), StartsWith("the golden unit failed"));
 }
 
-TEST_F(DescribeGoldenUnitProblem, ReportsFailedGoldenUnit) {
+TEST_F(DescribeGoldenUnitProblem, ReportsFailedGoldenUnitAlsoAfterInvalidRun) {
   note("golden", "PASS");
   note("golden", "FAIL");
   EXPECT_THAT(problem(), StartsWith("the golden unit failed (run RUN): repair the station"));
@@ -126,12 +126,12 @@ TEST_F(DescribeGoldenUnitProblem, ReportsFailedGoldenUnit) {
 }
 
 /// A golden run with another lamp map does not qualify the station.
-TEST_F(DescribeGoldenUnitProblem, ReportsChangedMeasuringSetup) {
+TEST_F(DescribeGoldenUnitProblem, ReportsChangedLampMapUntilReverted) {
   note("golden", "PASS");
   ASSERT_EQ(problem(), "");
   config.sha256 = "of other comments";
   EXPECT_EQ(problem(), "");
-  config.lamps.lamps.push_back({1, {0, 0, 2}, make_disc(0.18), 1600, 0.5});
+  config.lamps.lamps.push_back({1, {0, 0, 2}, make_disc_lamp_shape(0.18), 1600, 0.5});
   EXPECT_EQ(problem(),
             "station.yaml or a file that it names was changed in a way that affects measurements "
             "after the golden unit was measured (run RUN): 'vlp-station verify' is due");
@@ -139,13 +139,13 @@ TEST_F(DescribeGoldenUnitProblem, ReportsChangedMeasuringSetup) {
   EXPECT_THAT(problem(), StartsWith("station.yaml or a file that it names was changed"));
   config.lamps.lamps.clear();
   EXPECT_EQ(problem(), "") << "as it was again";
-  config.lamps.lamps.push_back({1, {0, 0, 2}, make_disc(0.18), 1600, 0.5});
+  config.lamps.lamps.push_back({1, {0, 0, 2}, make_disc_lamp_shape(0.18), 1600, 0.5});
   note("golden", "PASS");
   EXPECT_EQ(problem(), "");
 }
 
 /// An earlier PASS is not valid after a run that could not be noted.
-TEST_F(DescribeGoldenUnitProblem, ReportsMissingNoteAfterWriteError) {
+TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnitWhenNoteCouldNotBeWritten) {
   for (const std::string kind : {"golden", "unit"}) {
     note("golden", "PASS");
     ASSERT_EQ(problem(), "");
@@ -157,7 +157,7 @@ TEST_F(DescribeGoldenUnitProblem, ReportsMissingNoteAfterWriteError) {
   }
 }
 
-TEST_F(DescribeGoldenUnitProblem, ReportsDamagedNote) {
+TEST_F(DescribeGoldenUnitProblem, ReportsUnknownResultForDamagedNote) {
   note("golden", "PASS");
   ASSERT_EQ(problem(), "");
   const auto file = std::filesystem::directory_iterator(config.spool)->path();
@@ -187,22 +187,22 @@ TEST_F(DescribeGoldenUnitProblem, RejectsSymbolicLinkAsNote) {
   EXPECT_THAT(problem(), HasSubstr("is a symbolic link"));
   EXPECT_THROW(note("unit", "PASS"), InputError);
   std::filesystem::create_symlink(mine, file);
-  EXPECT_FALSE(invalidate_golden_unit_note(config, "RUN"));
+  EXPECT_FALSE(delete_golden_unit_note_of_run(config, "RUN"));
   note("golden", "PASS");
   EXPECT_EQ(problem(), "");
   EXPECT_EQ(TemporaryFolder::read_content(mine), "mine\n");
 }
 
-TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnitAfterVoiding) {
+TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnitWhenItsRunIsVoided) {
   note("golden", "PASS");
-  invalidate_golden_unit_note(config, "another");
+  delete_golden_unit_note_of_run(config, "another");
   EXPECT_EQ(problem(), "");
-  invalidate_golden_unit_note(config, "RUN");
+  delete_golden_unit_note_of_run(config, "RUN");
   EXPECT_THAT(problem(), HasSubstr("not measured here yet"));
-  invalidate_golden_unit_note(config, "RUN");
+  delete_golden_unit_note_of_run(config, "RUN");
 }
 
-TEST_F(DescribeGoldenUnitProblem, ReturnsEmptyWithoutVerifyDue) {
+TEST_F(DescribeGoldenUnitProblem, ReturnsEmptyTextWithoutVerifyDueSetting) {
   config.verify_due.reset();
   note("golden", "FAIL");
   EXPECT_EQ(problem(), "");
@@ -243,7 +243,7 @@ class ComputeMeasurementSettingsDigest : public testing::Test {
   TemporaryFolder folder;
 };
 
-TEST_F(ComputeMeasurementSettingsDigest, ChangesWithMeasuringSetup) {
+TEST_F(ComputeMeasurementSettingsDigest, ChangesWithSettingsThatAffectMeasurements) {
   std::set<std::string> digests{digest()};
   const auto is_new = [&](const char* file, const char* from, const char* to) {
     EXPECT_TRUE(digests.insert(digest_with(file, from, to)).second) << from << " -> " << to;
@@ -271,7 +271,7 @@ TEST_F(ComputeMeasurementSettingsDigest, ChangesWithMeasuringSetup) {
   is_new("golden.yaml", "403, 296", "403, 297");
 }
 
-TEST_F(ComputeMeasurementSettingsDigest, IgnoresOtherSettings) {
+TEST_F(ComputeMeasurementSettingsDigest, IsUnchangedByCommentsFileNamesAndOtherSettings) {
   const std::string before = digest();
   const std::string config_sha256 = read_station_config(folder / "station.yaml").sha256;
   const auto is_same = [&](const char* file, const std::string& from, const std::string& to) {

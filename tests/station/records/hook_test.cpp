@@ -35,12 +35,12 @@ RunRecord judged_run() {
   return run;
 }
 
-class RunHook : public testing::Test {
+class RunStationHook : public testing::Test {
  protected:
   RunEvent run(const std::string& script, double time_limit_s = 20) {
     const auto begun = std::chrono::steady_clock::now();
-    RunEvent event = run_hook({{"sh", "-c", script}, folder / ".", time_limit_s}, judged_run(),
-                              HookLock(folder / ".", judged_run().run));
+    RunEvent event = run_station_hook({{"sh", "-c", script}, folder / ".", time_limit_s},
+                                      judged_run(), HookLock(folder / ".", judged_run().run));
     took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     return event;
   }
@@ -48,7 +48,7 @@ class RunHook : public testing::Test {
   double took_s = 0;
 };
 
-TEST_F(RunHook, PassesRunOnStdinInHookFolder) {
+TEST_F(RunStationHook, PassesRunAsJsonOnStdinInHookFolder) {
   const RunEvent event = run("cat >seen.json; echo first; echo label 7; echo");
   EXPECT_EQ(event.what, kHookDone);
   EXPECT_EQ(event.text, "label 7");
@@ -59,7 +59,7 @@ TEST_F(RunHook, PassesRunOnStdinInHookFolder) {
   EXPECT_EQ(json["metrics"]["rms_px"]["passed"], true);
 }
 
-TEST_F(RunHook, SucceedsIfHookIgnoresInputOrLeavesChildren) {
+TEST_F(RunStationHook, SucceedsIfHookIgnoresInputOrLeavesChildren) {
   EXPECT_EQ(run("exec <&-; head -c 3000000 /dev/zero | tr '\\0' '\\n'; echo end >&2").text, "end");
   // Remaining children do not delay the caller.
   EXPECT_EQ(run("sleep 10 & echo printed").text, "printed");
@@ -67,19 +67,19 @@ TEST_F(RunHook, SucceedsIfHookIgnoresInputOrLeavesChildren) {
   EXPECT_EQ(run("exec >&- 2>&-; sleep 0.1").what, kHookDone);
 }
 
-TEST_F(RunHook, DescribesFailure) {
+TEST_F(RunStationHook, DescribesExitCodeSignalOrStartFailure) {
   EXPECT_EQ(run("echo the printer is out of labels; exit 3").what, kHookFailed);
   EXPECT_EQ(run("echo the printer is out of labels; exit 3").text,
             "exit code 3: the printer is out of labels");
   EXPECT_EQ(run("kill -9 $$").text, "ended by signal 9");
   EXPECT_EQ(run("printf '\\033[31m\\377'; exit 1").text, "exit code 1: \\x1b[31m\\xff");
-  const RunEvent missing = run_hook({{"/nowhere/label"}, folder / ".", 1}, judged_run(),
-                                    HookLock(folder / ".", judged_run().run));
+  const RunEvent missing = run_station_hook({{"/nowhere/label"}, folder / ".", 1}, judged_run(),
+                                            HookLock(folder / ".", judged_run().run));
   EXPECT_EQ(missing.what, kHookFailed);
   EXPECT_THAT(missing.text, HasSubstr("/nowhere/label cannot be started: No such file"));
 }
 
-TEST_F(RunHook, KillsHookAndChildrenAtTimeLimit) {
+TEST_F(RunStationHook, KillsHookAndChildrenAtTimeLimit) {
   const RunEvent event = run("sleep 100 & echo $! >child; echo waits; wait", 0.3);
   EXPECT_EQ(event.what, kHookFailed);
   EXPECT_EQ(event.text, "no end within 0.3 s, killed: waits");
@@ -95,7 +95,7 @@ TEST_F(RunHook, KillsHookAndChildrenAtTimeLimit) {
   EXPECT_EQ(TemporaryFolder::read_content(its), "");
 }
 
-TEST_F(RunHook, KillsHookThatFloodsOutputOrLeftItsGroup) {
+TEST_F(RunStationHook, KillsHookThatFloodsOutputOrLeavesProcessGroup) {
   EXPECT_EQ(run("exec cat /dev/zero", 0.3).what, kHookFailed);
   EXPECT_LT(took_s, 5);
   const RunEvent event =
@@ -106,7 +106,7 @@ TEST_F(RunHook, KillsHookThatFloodsOutputOrLeftItsGroup) {
   EXPECT_LT(took_s, 5);
 }
 
-TEST_F(RunHook, KillsChildrenInOwnSessions) {
+TEST_F(RunStationHook, KillsChildrenInOtherSessionsAtTimeLimit) {
   const RunEvent event = run(
       "setsid sh -c 'sleep 100 & echo $! >child'; setsid sleep 100 & echo $! >other; sleep 100", 1);
   EXPECT_EQ(event.text, "no end within 1 s, killed");
@@ -120,11 +120,12 @@ TEST_F(RunHook, KillsChildrenInOwnSessions) {
 }
 
 /// The hook of a killed station continues, and is not run a second time meanwhile.
-TEST_F(RunHook, KeepsLockWhenStationIsKilled) {
+TEST_F(RunStationHook, HookKeepsLockWhenStationIsKilled) {
   const std::string name = judged_run().run;
   const pid_t station = start_child([&] {
-    run_hook({{"sh", "-c", "touch begun; until [ -e end ]; do sleep 0.02; done"}, folder / ".", 20},
-             judged_run(), HookLock(folder / ".", name));
+    run_station_hook(
+        {{"sh", "-c", "touch begun; until [ -e end ]; do sleep 0.02; done"}, folder / ".", 20},
+        judged_run(), HookLock(folder / ".", name));
   });
   const auto wait_for = [](const auto& is) {
     for (int i = 0; i < 1000 && !is(); ++i) {
@@ -134,13 +135,13 @@ TEST_F(RunHook, KeepsLockWhenStationIsKilled) {
   };
   ASSERT_TRUE(wait_for([&] { return std::filesystem::exists(folder / "begun"); }));
   kill_child(station);
-  EXPECT_FALSE(HookLock(folder / ".", name).is_lock_held());
+  EXPECT_FALSE(HookLock(folder / ".", name).is_hook_lock_held());
   folder.file("end", "");
-  EXPECT_TRUE(wait_for([&] { return HookLock(folder / ".", name).is_lock_held(); }));
+  EXPECT_TRUE(wait_for([&] { return HookLock(folder / ".", name).is_hook_lock_held(); }));
 }
 
 /// The parent of this program can ignore signals and leave files open.
-TEST_F(RunHook, InheritsNoSignalsOrDescriptors) {
+TEST_F(RunStationHook, HookInheritsNoIgnoredSignalsOrOpenFiles) {
   std::signal(SIGCHLD, SIG_IGN);
   EXPECT_EQ(run("exit 3").text, "exit code 3");
   const auto interrupt = std::signal(SIGINT, SIG_IGN), pipe = std::signal(SIGPIPE, SIG_IGN);
@@ -154,7 +155,7 @@ TEST_F(RunHook, InheritsNoSignalsOrDescriptors) {
   std::signal(SIGPIPE, pipe);
 }
 
-TEST_F(RunHook, IsOpenUntilHookSucceeds) {
+TEST_F(RunStationHook, IsHookPendingUntilRequestedHookSucceeds) {
   RunRecord run = judged_run();
   EXPECT_FALSE(is_hook_pending(run));
   EXPECT_EQ(describe_pending_hook(run), "");
@@ -176,15 +177,15 @@ TEST_F(RunHook, IsOpenUntilHookSucceeds) {
   EXPECT_FALSE(is_hook_pending(run));
 }
 
-TEST_F(RunHook, RefusesSecondLockOfRun) {
+TEST_F(RunStationHook, SecondHookLockOfSameRunIsNotHeld) {
   const std::string name = judged_run().run;
   {
     const HookLock first_lock(folder / ".", name), other(folder / ".", name);
-    EXPECT_TRUE(first_lock.is_lock_held());
-    EXPECT_FALSE(other.is_lock_held());
-    EXPECT_TRUE(HookLock(folder / ".", "another").is_lock_held());
+    EXPECT_TRUE(first_lock.is_hook_lock_held());
+    EXPECT_FALSE(other.is_hook_lock_held());
+    EXPECT_TRUE(HookLock(folder / ".", "another").is_hook_lock_held());
   }
-  EXPECT_TRUE(HookLock(folder / ".", name).is_lock_held());
+  EXPECT_TRUE(HookLock(folder / ".", name).is_hook_lock_held());
   EXPECT_TRUE(std::filesystem::is_empty(folder / "."));
 }
 

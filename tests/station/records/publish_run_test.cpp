@@ -21,59 +21,60 @@ RunRecord passed() {
   record.run = "20261121T134501Z-0001";
   record.camera = "0001";
   record.station = "station-1";
-  record.verdict = to_string(Verdict::pass);
+  record.verdict = run_verdict_name(Verdict::pass);
   record.calibration =
       TemporaryFolder::read_content(fs::path(VLP_SOURCE_DIR) / "datasets/example/calibration.yaml");
   return record;
 }
 
-TEST(PublishRun, RestoresOnlyMissingFiles) {
+TEST(PublishRun, WritesOnlyMissingFiles) {
   const TemporaryFolder folder;
   const RunRecord record = passed();
-  const fs::path results = publish_run(record, {}, folder / "results");
+  const fs::path results = publish_run_files(record, {}, folder / "results");
   const std::string report = TemporaryFolder::read_content(results / "report.html");
   EXPECT_EQ(TemporaryFolder::read_content(results / "calibration.yaml"), record.calibration);
   // The missing file is written again, the other one stays.
   fs::remove(results / "calibration.yaml");
   folder.file((results / "report.html").string(), "with pictures");
-  publish_run(record, {}, folder / "results");
+  publish_run_files(record, {}, folder / "results");
   EXPECT_EQ(TemporaryFolder::read_content(results / "calibration.yaml"), record.calibration);
   EXPECT_EQ(TemporaryFolder::read_content(results / "report.html"), "with pictures");
   fs::remove(results / "report.html");
-  publish_run(record, {}, folder / "results");
+  publish_run_files(record, {}, folder / "results");
   EXPECT_EQ(TemporaryFolder::read_content(results / "report.html"), report);
 }
 
 TEST(PublishRun, ReplacesDifferentReportOnRequest) {
   const TemporaryFolder folder;
   const RunRecord record = passed();
-  const fs::path results = publish_run(record, {}, folder / "results");
+  const fs::path results = publish_run_files(record, {}, folder / "results");
   const std::string report = TemporaryFolder::read_content(results / "report.html");
-  publish_run(record, {}, folder / "results", ExistingReport::replace);
+  publish_run_files(record, {}, folder / "results", ExistingReport::replace);
   EXPECT_FALSE(fs::exists(results / "replaced-report.html")) << "it was the record's";
   folder.file((results / "report.html").string(), "planted");
-  publish_run(record, {}, folder / "results", ExistingReport::replace);
+  publish_run_files(record, {}, folder / "results", ExistingReport::replace);
   EXPECT_EQ(TemporaryFolder::read_content(results / "report.html"), report);
   EXPECT_EQ(TemporaryFolder::read_content(results / "replaced-report.html"), "planted");
   folder.file((results / "report.html").string(), "again");
-  publish_run(record, {}, folder / "results", ExistingReport::replace);
+  publish_run_files(record, {}, folder / "results", ExistingReport::replace);
   EXPECT_EQ(TemporaryFolder::read_content(results / "replaced-report.html"), "planted");
-  EXPECT_TRUE(mark_files_voided(record, folder / "results"));
+  EXPECT_TRUE(rename_files_of_voided_run(record, folder / "results"));
   EXPECT_FALSE(fs::exists(results / "replaced-report.html"));
 }
 
-TEST(PublishRun, WritesNothingOutsideResults) {
+TEST(PublishRun, WritesNothingOutsideResultsFolder) {
   const TemporaryFolder folder;
   fs::create_directory(folder / "elsewhere");
   RunRecord record = passed();
   record.camera = "..";
-  EXPECT_THAT(rejection_message([&] { publish_run(record, {}, folder / "results"); }),
+  EXPECT_THAT(rejection_message([&] { publish_run_files(record, {}, folder / "results"); }),
               HasSubstr("'..' is no id of a camera"));
   record.camera = "0001";
   record.run = "../../../x";
-  EXPECT_THAT(rejection_message([&] { publish_run(record, {}, folder / "results"); }),
+  EXPECT_THAT(rejection_message([&] { publish_run_files(record, {}, folder / "results"); }),
               HasSubstr("'../../../x' is no id of a run"));
-  EXPECT_THAT(rejection_message([&] { mark_files_voided(passed(), folder / "results"); }), "");
+  EXPECT_THAT(rejection_message([&] { rename_files_of_voided_run(passed(), folder / "results"); }),
+              "");
   EXPECT_FALSE(fs::exists(folder / "results"));
   record = passed();
   fs::create_directory(folder / "results");
@@ -82,28 +83,29 @@ TEST(PublishRun, WritesNothingOutsideResults) {
     EXPECT_THAT(rejection_message(action),
                 HasSubstr("0001: is a symbolic link, which is not followed"));
   };
-  expect_link([&] { publish_run(record, {}, folder / "results"); });
-  expect_link([&] { mark_files_voided(record, folder / "results"); });
-  expect_link([&] { check_results_folder(folder / "results", "0001"); });
+  expect_link([&] { publish_run_files(record, {}, folder / "results"); });
+  expect_link([&] { rename_files_of_voided_run(record, folder / "results"); });
+  expect_link([&] { check_results_folder_writable(folder / "results", "0001"); });
   EXPECT_TRUE(fs::is_empty(folder / "elsewhere"));
 }
 
-TEST(CheckResultsFolder, ReplacesSymbolicLinkAndKeepsItsTarget) {
+TEST(CheckResultsFolderWritable, RemovesSymbolicLinkOfTestFileAndKeepsItsTarget) {
   const TemporaryFolder folder;
   const fs::path mine = folder.file("mine.txt", "mine");
   fs::create_directories(folder / "results/0001");
   fs::create_symlink(mine, folder / "results/0001/.writable");
-  EXPECT_EQ(rejection_message([&] { check_results_folder(folder / "results", "0001"); }), "");
+  EXPECT_EQ(rejection_message([&] { check_results_folder_writable(folder / "results", "0001"); }),
+            "");
   EXPECT_EQ(TemporaryFolder::read_content(mine), "mine");
   EXPECT_FALSE(fs::is_symlink(folder / "results/0001/.writable"));
 }
 
-TEST(PublishRun, ThrowsForDifferentCalibration) {
+TEST(PublishRun, ThrowsWhenExistingCalibrationDiffersFromRecord) {
   const TemporaryFolder folder;
   const RunRecord record = passed();
-  const fs::path results = publish_run(record, {}, folder / "results");
+  const fs::path results = publish_run_files(record, {}, folder / "results");
   const auto expect_refused = [&] {
-    EXPECT_THAT(rejection_message([&] { publish_run(record, {}, folder / "results"); }),
+    EXPECT_THAT(rejection_message([&] { publish_run_files(record, {}, folder / "results"); }),
                 HasSubstr("calibration.yaml: differs from the record: move it away"));
   };
   const fs::path file = folder.file((results / "calibration.yaml").string(), "another\n");
@@ -118,21 +120,21 @@ TEST(PublishRun, ThrowsForDifferentCalibration) {
   EXPECT_FALSE(fs::exists(folder / "mine.yaml"));
 }
 
-TEST(PublishRun, NamesCalibrationByVerdict) {
+TEST(PublishRun, PrefixesCalibrationFileNameWithFailedOrInvalid) {
   const TemporaryFolder folder;
   RunRecord record = passed();
-  record.set_verdict({{"the lens is decentered", true}});
-  EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "a") / "failed-calibration.yaml"));
-  record.set_verdict({{"lamp 5 is loose", false}});
-  EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "b") / "invalid-calibration.yaml"));
+  record.set_verdict_from_causes({{"the lens is decentered", true}});
+  EXPECT_TRUE(fs::exists(publish_run_files(record, {}, folder / "a") / "failed-calibration.yaml"));
+  record.set_verdict_from_causes({{"lamp 5 is loose", false}});
+  EXPECT_TRUE(fs::exists(publish_run_files(record, {}, folder / "b") / "invalid-calibration.yaml"));
 }
 
-TEST(MarkFilesVoided, RenamesAllFiles) {
+TEST(RenameFilesOfVoidedRun, PrefixesAllFileNamesWithVoided) {
   const TemporaryFolder folder;
   RunRecord record = passed();
-  const fs::path results = publish_run(record, {}, folder / "results");
+  const fs::path results = publish_run_files(record, {}, folder / "results");
   folder.file((results / "certificate.html").string(), "certificate");
-  mark_files_voided(record, folder / "results");
+  rename_files_of_voided_run(record, folder / "results");
   std::vector<std::string> names;
   for (const auto& file : fs::directory_iterator(results)) {
     names.push_back(file.path().filename().string());
@@ -141,20 +143,22 @@ TEST(MarkFilesVoided, RenamesAllFiles) {
               testing::UnorderedElementsAre("voided-calibration.yaml", "voided-certificate.html",
                                             "voided-report.html"));
   // As after a kill before the files are written.
-  mark_files_voided(record, folder / "results");
-  mark_files_voided(record, folder / "none");
+  rename_files_of_voided_run(record, folder / "results");
+  rename_files_of_voided_run(record, folder / "none");
   // A run that is published after it was voided.
   record.events.push_back(make_run_event_now(kVoided, "wrong serial", "Ann"));
-  EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "a") / "voided-calibration.yaml"));
+  EXPECT_TRUE(fs::exists(publish_run_files(record, {}, folder / "a") / "voided-calibration.yaml"));
   EXPECT_FALSE(fs::exists(folder / "a" / record.camera / record.run / "report.html"));
 }
 
-TEST(CheckResultsFolder, ThrowsIfFolderCannotBeCreated) {
+TEST(CheckResultsFolderWritable, ThrowsIfFolderCannotBeCreated) {
   const TemporaryFolder folder;
-  EXPECT_EQ(rejection_message([&] { check_results_folder(folder / "results", "0001"); }), "");
+  EXPECT_EQ(rejection_message([&] { check_results_folder_writable(folder / "results", "0001"); }),
+            "");
   EXPECT_TRUE(fs::is_empty(folder / "results/0001"));
-  EXPECT_THAT(rejection_message([&] { check_results_folder(folder.file("file", ""), "0001"); }),
-              HasSubstr("file: cannot be made"));
+  EXPECT_THAT(
+      rejection_message([&] { check_results_folder_writable(folder.file("file", ""), "0001"); }),
+      HasSubstr("file: cannot be made"));
 }
 
 }  // namespace

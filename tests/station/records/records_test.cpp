@@ -45,7 +45,7 @@ RunRecord with_all_texts() {
 void check_all_texts(Records& records) {
   const RunRecord kept = with_all_texts();
   records.store_run(kept);
-  const auto found = records.find(kept.run);
+  const auto found = records.find_run_by_id(kept.run);
   ASSERT_TRUE(found);
   for (const RunField& field : list_run_text_fields()) {
     EXPECT_EQ((*found).*field.text, kept.*field.text) << field.name;
@@ -69,7 +69,7 @@ void check_events(Records& records) {
   run.events = {make_run_event_now(kHookDone, "")};  // by a program without the other events
   records.store_run(run);
   EXPECT_THAT(list_open_hooks(records, "station-1"), IsEmpty());
-  const auto found = records.find(run.run);
+  const auto found = records.find_run_by_id(run.run);
   ASSERT_TRUE(found);
   ASSERT_THAT(found->events, SizeIs(3));
   EXPECT_EQ(found->events[0].event, wanted.event);
@@ -82,19 +82,20 @@ void check_events(Records& records) {
 
 /// Part of check_records(): a voided run remains, but is not counted.
 void check_voided(Records& records) {
-  const std::size_t before = records.load_trend("rms_px", {}).size();
+  const std::size_t before = records.load_metric_trend("rms_px", {}).size();
   RunRecord run = make_sample_record(numbered_run_id(0), "a", 0);
   run.events = {make_run_event_now(kVoided, "wrong serial", "Ann")};
   records.store_run(run);
-  const auto found = records.find(run.run);
+  const auto found = records.find_run_by_id(run.run);
   ASSERT_TRUE(found);
-  EXPECT_THAT(find_verdict_problem(*found),
+  EXPECT_THAT(describe_verdict_problem(*found),
               testing::MatchesRegex("was voided by Ann [(].*@.*: wrong serial"));
-  EXPECT_THAT(records.load_trend("rms_px", {}), SizeIs(before - 1));
-  EXPECT_EQ(records.list_runs({})[0].run, run.run);
-  EXPECT_EQ(records.list_runs({})[0].voided, "wrong serial");
-  EXPECT_EQ(records.list_runs({})[1].voided, "");
-  EXPECT_EQ(records.list_runs({.image_sha256 = std::string(64, 'b')})[0].voided, "wrong serial");
+  EXPECT_THAT(records.load_metric_trend("rms_px", {}), SizeIs(before - 1));
+  EXPECT_EQ(records.list_run_summaries({})[0].run, run.run);
+  EXPECT_EQ(records.list_run_summaries({})[0].voided, "wrong serial");
+  EXPECT_EQ(records.list_run_summaries({})[1].voided, "");
+  EXPECT_EQ(records.list_run_summaries({.image_sha256 = std::string(64, 'b')})[0].voided,
+            "wrong serial");
 }
 
 /// Checks the properties of records in every database.
@@ -109,7 +110,7 @@ void check_records(const std::string& where) {
   EXPECT_THAT(rejection_message(
                   [&] { records.store_run(make_sample_record(numbered_run_id(0), "other", 0.7)); }),
               HasSubstr("has another run " + numbered_run_id(0)));
-  const auto all = records.list_runs({});
+  const auto all = records.list_run_summaries({});
   ASSERT_THAT(all, SizeIs(4));
   EXPECT_EQ(all[0].camera, "a");
   EXPECT_EQ(all[3].verdict, "FAIL");
@@ -125,21 +126,21 @@ void check_records(const std::string& where) {
   EXPECT_EQ(rejection_message([&] { records.check_database_writable(); }), "");
   RunFilter filter;
   filter.camera = "a";
-  EXPECT_THAT(records.list_runs(filter), SizeIs(3));
+  EXPECT_THAT(records.list_run_summaries(filter), SizeIs(3));
   filter.verdict = "PASS";
   filter.last = 1;
-  ASSERT_THAT(records.list_runs(filter), SizeIs(1));
-  EXPECT_EQ(records.list_runs(filter)[0].run, numbered_run_id(1));
+  ASSERT_THAT(records.list_run_summaries(filter), SizeIs(1));
+  EXPECT_EQ(records.list_run_summaries(filter)[0].run, numbered_run_id(1));
 
   EXPECT_FALSE(records.find("another"));
-  const auto found = records.find(numbered_run_id(3));
+  const auto found = records.find_run_by_id(numbered_run_id(3));
   ASSERT_TRUE(found);
   const RunRecord expected = make_sample_record(numbered_run_id(3), "a", 1.5);
   EXPECT_EQ(found->causes, expected.causes);
   EXPECT_EQ(found->calibration, expected.calibration);
   ASSERT_THAT(found->metrics, SizeIs(3));
   EXPECT_EQ(found->metrics[0].value, 1.5);
-  EXPECT_FALSE(found->metrics[0].has_passed());
+  EXPECT_FALSE(found->metrics[0].has_passed_gate());
   EXPECT_EQ(found->metrics[0].unit, "px");
   ASSERT_TRUE(found->metrics[0].guard);
   EXPECT_EQ(found->metrics[0].guard->standard_uncertainty, 0.1 + 0.2);  // to the last bit
@@ -153,14 +154,14 @@ void check_records(const std::string& where) {
 
   RunFilter of_a;
   of_a.camera = "a";
-  const auto trend = records.load_trend("rms_px", of_a);
+  const auto trend = records.load_metric_trend("rms_px", of_a);
   ASSERT_THAT(trend, SizeIs(3));
   EXPECT_DOUBLE_EQ(trend[2].value, 1.5);
-  EXPECT_THAT(records.load_trend("tilt_deg", {}), IsEmpty());
+  EXPECT_THAT(records.load_metric_trend("tilt_deg", {}), IsEmpty());
   check_all_texts(records);
   check_events(records);
   check_voided(records);
-  const TrailCheck trail = records.check("");
+  const TrailCheck trail = records.check_records_by_audit_trail("");
   EXPECT_THAT(trail.problems, IsEmpty());
   EXPECT_EQ(trail.runs, 7U);
   EXPECT_EQ(trail.entries, 7U + 6U) << "runs and events";
@@ -181,12 +182,13 @@ void check_two_writers(const std::string& where) {
   }
   EXPECT_TRUE(end_well(children));
   Records records(where);
-  const auto runs = records.list_runs({});
+  const auto runs = records.list_run_summaries({});
   EXPECT_THAT(runs, SizeIs(2 * each));
-  const TrailCheck trail = records.check("");
+  const TrailCheck trail = records.check_records_by_audit_trail("");
   EXPECT_THAT(trail.problems, IsEmpty());
   EXPECT_EQ(trail.entries, 2U * each);
-  for (const RunSummary& run : runs) EXPECT_THAT(records.find(run.run)->images, SizeIs(2));
+  for (const RunSummary& run : runs)
+    EXPECT_THAT(records.find_run_by_id(run.run)->images, SizeIs(2));
 }
 
 /// Records in the tables of version 1.
@@ -236,23 +238,24 @@ void check_migration(const std::string& where) {
   EXPECT_EQ(found->begun_utc, "2026-11-21T13:45:01Z");
   EXPECT_EQ(found->calibration, "format: vlp-calibration/1");
   ASSERT_THAT(found->metrics, SizeIs(5));
-  EXPECT_EQ(describe(found->metrics[0]), "rms_px is 1.5 px, at most 1 px is required");
-  EXPECT_EQ(describe(found->metrics[1]), "coverage is not known, at least 0.7 is required");
+  EXPECT_EQ(describe_gate_result(found->metrics[0]), "rms_px is 1.5 px, at most 1 px is required");
+  EXPECT_EQ(describe_gate_result(found->metrics[1]),
+            "coverage is not known, at least 0.7 is required");
   EXPECT_EQ(found->metrics[2].unit, "deg");
   EXPECT_EQ(found->metrics[3].name, "world_offset_mm");  // the present name of world_mm
   EXPECT_EQ(found->metrics[3].unit, "mm");
-  EXPECT_THAT(records.load_trend("world_offset_mm", {}), SizeIs(1));
-  EXPECT_THAT(records.load_trend("world_mm", {}), SizeIs(1));
+  EXPECT_THAT(records.load_metric_trend("world_offset_mm", {}), SizeIs(1));
+  EXPECT_THAT(records.load_metric_trend("world_mm", {}), SizeIs(1));
   EXPECT_EQ(found->metrics[4].unit, "%");
   EXPECT_FALSE(found->metrics[0].guard);
   EXPECT_THAT(found->images, SizeIs(1));
   records.store_run(make_sample_record(numbered_run_id(5), "b", 0.1));
-  EXPECT_THAT(records.list_runs({}), SizeIs(2));
-  EXPECT_EQ(records.find(numbered_run_id(5))->metrics[0].unit, "px");
-  EXPECT_TRUE(records.find(numbered_run_id(5))->metrics[0].guard);
+  EXPECT_THAT(records.list_run_summaries({}), SizeIs(2));
+  EXPECT_EQ(records.find_run_by_id(numbered_run_id(5))->metrics[0].unit, "px");
+  EXPECT_TRUE(records.find_run_by_id(numbered_run_id(5))->metrics[0].guard);
   EXPECT_THAT(found->events, IsEmpty());
   check_events(records);
-  EXPECT_THAT(records.check("").problems, IsEmpty());
+  EXPECT_THAT(records.check_records_by_audit_trail("").problems, IsEmpty());
 }
 
 /// Checks that a database with kVersion1 is migrated once, if another program is about to migrate
@@ -297,7 +300,7 @@ void check_later_version(const std::string& where) {
   EXPECT_EQ(read_state(where), before);
 }
 
-TEST(DescribeUtcProblem, AcceptsOnlyExistingDaysAndTimes) {
+TEST(DescribeUtcProblem, ReturnsEmptyTextOnlyForExistingDaysAndTimes) {
   for (const char* valid_text : {"2026-11-21", "2024-02-29", "2026-11-21T13:45",
                                  "2026-11-21T13:45:01", "2026-11-21T13:45:01Z"}) {
     EXPECT_EQ(describe_utc_problem(valid_text), "");
@@ -308,21 +311,21 @@ TEST(DescribeUtcProblem, AcceptsOnlyExistingDaysAndTimes) {
   }
 }
 
-TEST(Records, MigratesVersion1InFile) {
+TEST(Records, MigratesSqliteDatabaseOfVersion1) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   run_database_client(file, kVersion1);
   check_migration(file);
 }
 
-TEST(Records, MigratesVersion1InFileOnce) {
+TEST(Records, MigratesSqliteDatabaseOfVersion1OnceForTwoPrograms) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   run_database_client(file, kVersion1);
   check_migration_by_another(file);
 }
 
-TEST(Records, CheckDatabaseWritableThrowsForReadOnlyTables) {
+TEST(Records, CheckDatabaseWritableThrowsWhenUpdateFails) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   { const Records made(file); }
@@ -334,7 +337,7 @@ TEST(Records, CheckDatabaseWritableThrowsForReadOnlyTables) {
   EXPECT_THAT(rejection_message([&] { records.check_database_writable(); }), HasSubstr("stopped"));
 }
 
-TEST(Records, KeepsVersion1InFileWhenMigrationFails) {
+TEST(Records, KeepsSqliteVersion1WhenMigrationFails) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   run_database_client(file,
@@ -344,14 +347,14 @@ TEST(Records, KeepsVersion1InFileWhenMigrationFails) {
   check_stopped_migration(file);
 }
 
-TEST(Records, RejectsLaterVersionInFile) {
+TEST(Records, RejectsSqliteDatabaseOfLaterVersion) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   run_database_client(file, kVersion1);
   check_later_version(file);
 }
 
-TEST(Records, TreatsOtherVersionsInPostgresLikeFiles) {
+TEST(Records, MigratesVersion1AndRejectsLaterVersionInPostgres) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
@@ -370,23 +373,23 @@ TEST(Records, TreatsOtherVersionsInPostgresLikeFiles) {
   check_later_version(server.uri());
 }
 
-TEST(Records, StoresRunsInFile) {
+TEST(Records, StoresAndFindsRunsInSqlite) {
   const TemporaryFolder folder;
   check_records((folder / "records.db").string());
 }
 
-TEST(Records, KeepsRunsOfTwoConcurrentStationsInFile) {
+TEST(Records, KeepsAllRunsOfTwoConcurrentWritersInSqlite) {
   const TemporaryFolder folder;
   check_two_writers((folder / "records.db").string());
 }
 
-TEST(Records, StoresRunsInPostgres) {
+TEST(Records, StoresAndFindsRunsInPostgres) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
   check_two_writers(server.uri());
   // A connection string without a parameter, as for psql.
-  EXPECT_THAT(Records(server.plain_uri()).list_runs({}), SizeIs(50));
+  EXPECT_THAT(Records(server.plain_uri()).list_run_summaries({}), SizeIs(50));
   run_database_client(server.uri(), kDropAll);
   check_records(server.uri());
 
@@ -396,12 +399,12 @@ TEST(Records, StoresRunsInPostgres) {
                       "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> "
                       "pg_backend_pid() AND backend_type = 'client backend';\n");
   records.store_run(make_sample_record(numbered_run_id(9), "c", 0.1));
-  EXPECT_TRUE(records.find(numbered_run_id(9)));
+  EXPECT_TRUE(records.find_run_by_id(numbered_run_id(9)));
 }
 
 /// A program that waited creates nothing in addition to what it finds, here a single table: indices
 /// of tables in use would lock out their users.
-TEST(Records, CreatesTablesInPostgresUnderLock) {
+TEST(Records, WaitsForOtherProgramCreatingTablesInPostgres) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
@@ -421,8 +424,8 @@ TEST(Records, CreatesTablesInPostgresUnderLock) {
   while (!std::filesystem::exists(begun) && std::chrono::steady_clock::now() < until) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  auto made =
-      std::async(std::launch::async, [&] { return Records(server.uri()).list_runs({}).size(); });
+  auto made = std::async(std::launch::async,
+                         [&] { return Records(server.uri()).list_run_summaries({}).size(); });
   EXPECT_EQ(made.wait_for(std::chrono::milliseconds(500)), std::future_status::timeout);
   folder.file("go_on", "");
   another.get();
@@ -432,14 +435,14 @@ TEST(Records, CreatesTablesInPostgresUnderLock) {
               Not(HasSubstr("1")));
 }
 
-TEST(Records, ThrowsForFileThatIsNoDatabase) {
+TEST(Records, ThrowsForFileThatIsNotDatabase) {
   const TemporaryFolder folder;
   const auto file = folder.file("records.db", std::string(5000, 'x'));
   EXPECT_THAT(rejection_message([&] { Records records(file.string()); }),
               testing::AllOf(HasSubstr("records.db"), HasSubstr("not a database")));
 }
 
-TEST(Records, OmitsPasswordOfServerFromErrors) {
+TEST(Records, ErrorsOmitPasswordOfServerAddress) {
   for (const char* where : {"postgresql://vlp:secret@/postgres?host=/nowhere",
                             "postgresql://vlp@/postgres?password=secret&host=/nowhere",
                             "postgresql://vlp@/postgres?host=/nowhere&password=a@secret"}) {
@@ -461,7 +464,7 @@ TEST(Records, OmitsPasswordOfServerFromErrors) {
   }
 }
 
-TEST(Records, OmitsPasswordOfKeywordsFromErrors) {
+TEST(Records, ErrorsOmitPasswordOfKeywordConnectionString) {
   EXPECT_THAT(rejection_message([&] { Records records("host=/nowhere user=vlp password=secret"); }),
               AllOf(HasSubstr("is not of the form postgresql://"), Not(HasSubstr("secret"))));
 }
@@ -469,7 +472,7 @@ TEST(Records, OmitsPasswordOfKeywordsFromErrors) {
 /// Returns the first line of a text.
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-TEST(ExportRunsToFile, WritesCsv) {
+TEST(ExportRunsToFile, WritesMetricsAndSelectedTextsAsCsv) {
   const TemporaryFolder folder;
   const auto file = folder / "runs.csv";
   export_runs_to_file(file, {make_sample_record(numbered_run_id(1), "a", 0.25),
@@ -505,7 +508,7 @@ std::vector<std::string> list_keys(const nlohmann::ordered_json& json) {
   return keys;
 }
 
-TEST(ExportRunsToFile, WritesJson) {
+TEST(ExportRunsToFile, WritesMetricsImagesAndAllTextsAsJson) {
   const TemporaryFolder folder;
   const auto file = folder / "runs.json";
   const RunRecord all = with_all_texts();
@@ -536,19 +539,20 @@ TEST(ExportRunsToFile, WritesJson) {
   }
 }
 
-TEST(ExportRunsToFile, MatchesJsonSchemasOfRunsAndSpool) {
+TEST(ExportRunsToFile, JsonOfRunsAndSpoolMatchesSchemas) {
   const TemporaryFolder folder;
   const auto file = folder / "runs.json";
   RunRecord golden = make_sample_record(numbered_run_id(2), "b", 1.5);
   golden.kind = "golden";
   RunRecord invalid = make_sample_record(numbered_run_id(3), "c", 1.5);
-  invalid.verdict = to_string(Verdict::invalid);
+  invalid.verdict = run_verdict_name(Verdict::invalid);
   export_runs_to_file(file, {make_sample_record(numbered_run_id(1), "a", 0.25), golden, invalid});
   EXPECT_EQ(problems_by_schema("runs", {file}), "");
   std::vector<std::filesystem::path> waiting;
   for (const RunRecord& run :
        {make_sample_record(numbered_run_id(1), "a", 0.25), golden, invalid}) {
-    waiting.push_back(folder.file(run.camera + ".json", serialize_run({run, "records.db"})));
+    waiting.push_back(
+        folder.file(run.camera + ".json", serialize_spooled_run({run, "records.db"})));
   }
   EXPECT_EQ(problems_by_schema("run", waiting), "");
 }

@@ -56,7 +56,7 @@ class RetentionTest : public testing::Test {
   StationConfig config{};
 };
 
-TEST_F(RetentionTest, FindsExpiredFolders) {
+TEST_F(RetentionTest, FindExpiredRunFoldersReturnsFoldersOlderThanRetention) {
   keep(kOld, "a.b", "2020-01-01T01:00:00Z");
   const std::string now = make_run_id(), resumed = "20200101T000000Z-fedcba9876543210";
   keep(now, "a.b", get_current_utc());
@@ -71,7 +71,7 @@ TEST_F(RetentionTest, FindsExpiredFolders) {
   }
   const fs::path without_record =
       with_file("captures/d." + kOld);  // the record is of another camera
-  const RetentionResult found = find_expired_folders(config, records);
+  const RetentionResult found = find_expired_run_folders(config, records);
   ASSERT_THAT(found.expired, SizeIs(2));
   EXPECT_EQ(found.expired[0].folder, images);
   EXPECT_STREQ(found.expired[0].what, kImagesDeleted);
@@ -80,11 +80,11 @@ TEST_F(RetentionTest, FindsExpiredFolders) {
   EXPECT_STREQ(found.expired[1].what, kResultsDeleted);
   EXPECT_THAT(found.without_record, ElementsAre(without_record));
   config.keep = {std::nullopt, 30'000};
-  EXPECT_THAT(find_expired_folders(config, records).expired, IsEmpty());
+  EXPECT_THAT(find_expired_run_folders(config, records).expired, IsEmpty());
 }
 
 /// Stations can share folders and records.
-TEST_F(RetentionTest, IgnoresOtherStationsAndLinks) {
+TEST_F(RetentionTest, FindExpiredRunFoldersIgnoresOtherStationsAndSymbolicLinks) {
   const std::string other = "20200101T000000Z-fedcba9876543210";
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   keep(other, "a", "2020-01-01T01:00:00Z", "attic");
@@ -92,56 +92,56 @@ TEST_F(RetentionTest, IgnoresOtherStationsAndLinks) {
   with_file("results/a/" + other);
   fs::create_directory_symlink(with_file("elsewhere"), folder / "captures" / ("a." + kOld));
   fs::create_directory_symlink(folder / "nowhere", folder / "results" / "a" / kOld);
-  const RetentionResult found = find_expired_folders(config, records);
+  const RetentionResult found = find_expired_run_folders(config, records);
   EXPECT_THAT(found.expired, IsEmpty());
   EXPECT_THAT(found.without_record, IsEmpty());
 }
 
-TEST_F(RetentionTest, DeletesFolderWithoutFollowingLinks) {
+TEST_F(RetentionTest, DeleteExpiredRunFolderKeepsTargetsOfSymbolicLinks) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path images = with_file("captures/a." + kOld), elsewhere = with_file("elsewhere");
   fs::create_directory_symlink(elsewhere, images / "link");
-  const RetentionResult found = find_expired_folders(config, records);
+  const RetentionResult found = find_expired_run_folders(config, records);
   ASSERT_THAT(found.expired, SizeIs(1));
   EXPECT_EQ(found.expired[0].bytes, 1000U);
   Spool spool(folder / "spool", (folder / "records.db").string());
-  delete_expired_folder(found.expired[0], config, spool);
+  delete_expired_run_folder(found.expired[0], config, spool);
   EXPECT_FALSE(fs::exists(images));
   EXPECT_TRUE(fs::exists(elsewhere / "check/0.png"));
   spool.deliver_waiting_runs();
-  const auto record = records.find(kOld);
+  const auto record = records.find_run_by_id(kOld);
   ASSERT_TRUE(record);
   ASSERT_THAT(record->events, SizeIs(1));
   EXPECT_EQ(record->events[0].what, kImagesDeleted);
   EXPECT_EQ(record->events[0].text, "kept 90 days, 0.0 MB");
-  EXPECT_THROW(delete_expired_folder(found.expired[0], config, spool), InputError)
+  EXPECT_THROW(delete_expired_run_folder(found.expired[0], config, spool), InputError)
       << "it is not there";
 }
 
 /// The golden unit's calibration can be among the results of the run that measured it.
-TEST_F(RetentionTest, KeepsFolderUsedByStation) {
+TEST_F(RetentionTest, FindExpiredRunFoldersExcludesFoldersUsedByStation) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path results = with_file("results/a/" + kOld), images = with_file("captures/a." + kOld);
   config.inputs = {folder.file("station.yaml", ""),
                    folder.file("results/a/" + kOld + "/calibration.yaml", "")};
-  const RetentionResult found = find_expired_folders(config, records);
+  const RetentionResult found = find_expired_run_folders(config, records);
   EXPECT_THAT(found.in_use, ElementsAre(results));
   ASSERT_THAT(found.expired, SizeIs(1));
   EXPECT_EQ(found.expired[0].folder, images);
   // Through a link, and by another name.
   fs::create_symlink(config.inputs[1], folder / "golden.yaml");
   config.inputs[1] = folder / "golden.yaml";
-  EXPECT_THAT(find_expired_folders(config, records).in_use, ElementsAre(results));
+  EXPECT_THAT(find_expired_run_folders(config, records).in_use, ElementsAre(results));
   config.inputs = {};
   config.spool = images / "spool";
-  EXPECT_THAT(find_expired_folders(config, records).in_use, ElementsAre(images));
+  EXPECT_THAT(find_expired_run_folders(config, records).in_use, ElementsAre(images));
 }
 
-TEST_F(RetentionTest, KeepsFolderUsedThroughLink) {
+TEST_F(RetentionTest, FindExpiredRunFoldersExcludesFoldersUsedThroughSymbolicLinks) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path results = with_file("results/a/" + kOld);
   const auto expect_in_use = [&](const std::string& why) {
-    EXPECT_THAT(find_expired_folders(config, records).in_use, ElementsAre(results)) << why;
+    EXPECT_THAT(find_expired_run_folders(config, records).in_use, ElementsAre(results)) << why;
   };
   fs::create_symlink(folder.file("elsewhere.yaml", ""), results / "golden.yaml");
   config.inputs = {results / "golden.yaml"};
@@ -153,57 +153,59 @@ TEST_F(RetentionTest, KeepsFolderUsedThroughLink) {
   config.inputs = {folder / "loop"};
   expect_in_use("cannot be followed");
   config.inputs = {folder / "elsewhere.yaml", folder / "none"};
-  ASSERT_THAT(find_expired_folders(config, records).in_use, IsEmpty());
+  ASSERT_THAT(find_expired_run_folders(config, records).in_use, IsEmpty());
   const std::string script = "results/a/" + kOld + "/hook.py";
   config.hook = Hook{{"python3", script, std::string(5000, 'x')}, folder / ""};
   folder.file(script, "");
   expect_in_use("a script of the hook");
 }
 
-TEST_F(RetentionTest, DeletesNothingIfCameraFolderBecameLink) {
+TEST_F(RetentionTest, DeleteExpiredRunFolderThrowsWhenCameraFolderBecameSymbolicLink) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   with_file("results/a/" + kOld);
   const fs::path kept = with_file("elsewhere/" + kOld);
-  const RetentionResult found = find_expired_folders(config, records);
+  const RetentionResult found = find_expired_run_folders(config, records);
   ASSERT_THAT(found.expired, SizeIs(1));
   fs::remove_all(folder / "results/a");
   fs::create_directory_symlink(folder / "elsewhere", folder / "results/a");
   Spool spool(folder / "spool", (folder / "records.db").string());
-  EXPECT_THAT(rejection_message([&] { delete_expired_folder(found.expired[0], config, spool); }),
-              HasSubstr("results/a: is a symbolic link"));
+  EXPECT_THAT(
+      rejection_message([&] { delete_expired_run_folder(found.expired[0], config, spool); }),
+      HasSubstr("results/a: is a symbolic link"));
   EXPECT_TRUE(fs::exists(kept / "check/0.png"));
 }
 
-TEST_F(RetentionTest, CheckClockIsNotBehindThrowsForClockYearsAhead) {
+TEST_F(RetentionTest, CheckClockThrowsWhenNewestRunIsOverYearBeforeClock) {
   const auto refusal = [&] {
-    return rejection_message([&] { check_clock_is_not_behind(config, records); });
+    return rejection_message([&] { check_clock_against_recorded_runs(config, records); });
   };
-  EXPECT_EQ(refusal(), "") << "no run";
+  EXPECT_EQ(rejection_message(), "") << "no run";
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   keep(make_run_id(), "a", get_current_utc(), "another");
-  EXPECT_THAT(refusal(),
+  EXPECT_THAT(rejection_message(),
               HasSubstr("the newest run ended 2020-01-01T01:00:00Z, more than a year before"));
   // The first run by such a clock does not make it right.
   const std::string today = get_current_utc();
   keep(make_run_id(), "a", today);
-  EXPECT_THAT(refusal(), HasSubstr("the runs since " + today + " ended more than a year after"));
+  EXPECT_THAT(rejection_message(),
+              HasSubstr("the runs since " + today + " ended more than a year after"));
   keep(make_run_id(), "a", utc_days_ago(6));
-  EXPECT_THAT(refusal(), HasSubstr("the runs since " + utc_days_ago(6)));
+  EXPECT_THAT(rejection_message(), HasSubstr("the runs since " + utc_days_ago(6)));
   keep(make_run_id(), "a", utc_days_ago(8));
-  EXPECT_EQ(refusal(), "");
+  EXPECT_EQ(rejection_message(), "");
 }
 
-TEST_F(RetentionTest, CheckClockIsNotBehindThrowsForClockBehindRun) {
+TEST_F(RetentionTest, CheckClockThrowsWhenRunEndedInFutureUnlessVoided) {
   keep(make_run_id(), "a", utc_days_ago(0));
-  EXPECT_EQ(rejection_message([&] { check_clock_is_not_behind(config, records); }), "");
+  EXPECT_EQ(rejection_message([&] { check_clock_against_recorded_runs(config, records); }), "");
   const std::string run = make_run_id(), coming = utc_days_ago(-20 * 366);
   keep(run, "a", coming);
-  EXPECT_THAT(rejection_message([&] { check_clock_is_not_behind(config, records); }),
+  EXPECT_THAT(rejection_message([&] { check_clock_against_recorded_runs(config, records); }),
               HasSubstr("the newest run ended " + coming + ", after the clock"));
-  RunRecord voided_run = *records.find(run);
+  RunRecord voided_run = *records.find_run_by_id(run);
   voided_run.events.push_back(make_run_event_now(kVoided, "wrong clock", "Ann"));
   records.store_run(voided_run);
-  EXPECT_EQ(rejection_message([&] { check_clock_is_not_behind(config, records); }), "");
+  EXPECT_EQ(rejection_message([&] { check_clock_against_recorded_runs(config, records); }), "");
 }
 
 }  // namespace

@@ -9,7 +9,7 @@ namespace {
 
 using testing::SizeIs;
 
-TEST(ListLibraryVersions, ReturnsLibrariesThatAffectResults) {
+TEST(ListLibraryVersions, ReturnsVersionsOfLibrariesThatAffectResults) {
   for (const char* library : {"OpenCV ", "AprilTag ", "mrcal ", "Ceres ", "Eigen "}) {
     EXPECT_THAT(list_library_versions(),
                 testing::ContainsRegex(std::string(library) + "[0-9]+\\.[0-9]"));
@@ -17,15 +17,15 @@ TEST(ListLibraryVersions, ReturnsLibrariesThatAffectResults) {
 }
 
 /// At the start of a second, two clocks can differ by a tick.
-TEST(SecondsSince, IsNotNegativeForNow) {
+TEST(ComputeSecondsSinceUtc, IsNotNegativeForCurrentTime) {
   const std::string begin = get_current_utc();
-  while (seconds_since(begin) < 1) {
+  while (compute_seconds_since_utc(begin) < 1) {
     const std::string now = get_current_utc();
-    ASSERT_GE(seconds_since(now), 0) << now;
+    ASSERT_GE(compute_seconds_since_utc(now), 0) << now;
   }
 }
 
-TEST(RunName, ContainsStartTime) {
+TEST(MakeRunId, ReturnsUniqueIdWithStartTime) {
   EXPECT_EQ(start_utc_of_run_id("20261121T134501Z-0123456789abcdef"), "2026-11-21T13:45:01Z");
   EXPECT_EQ(start_utc_of_run_id("run"), "");
   const std::string run = make_run_id();
@@ -39,7 +39,7 @@ TEST(RunName, ContainsStartTime) {
   }
 }
 
-TEST(EscapeRunTexts, KeepsLineBreaksInCausesAndCalibrationOnly) {
+TEST(EscapeRunTexts, KeepsLineBreaksOnlyInCausesAndCalibration) {
   RunRecord run;
   run.operator_name = "J\xf6rg\n";
   run.causes = "first\nsecond\n";
@@ -56,7 +56,7 @@ TEST(EscapeRunTexts, KeepsLineBreaksInCausesAndCalibrationOnly) {
   EXPECT_EQ(printed.events[0].who, "who\\x0a");
 }
 
-TEST(DescribeClockProblem, ReportsEndBeforeStart) {
+TEST(DescribeClockProblem, ReportsRunThatEndedBeforeItsStart) {
   RunRecord run;
   run.begun_utc = run.ended_utc = "2026-11-21T13:45:01Z";
   EXPECT_EQ(describe_clock_problem(run), "");

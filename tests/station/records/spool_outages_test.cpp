@@ -32,7 +32,7 @@ using testing::Not;
 using testing::SizeIs;
 using testing::StartsWith;
 
-TEST(Spool, LimitsWaitForLockedFile) {
+TEST(Spool, DeliverGivesUpOnLockedDatabaseWithin15Seconds) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   { const Records made(where); }
@@ -56,7 +56,7 @@ TEST(Spool, LimitsWaitForLockedFile) {
   Spool spool(folder / "spool", where);
   spool.store_run(numbered_run(1));
   EXPECT_LT(measure_seconds([&] { spool.deliver_waiting_runs(); }), 15);
-  EXPECT_THAT(spool.state(),
+  EXPECT_THAT(spool.describe_spool_state(),
               AllOf(StartsWith("runs are queued in the spool, 1 waiting"), HasSubstr("locked")));
   folder.file("done", "");
   other.join();
@@ -70,7 +70,7 @@ struct SmallDisk {
   ~SmallDisk() { ::umount2(folder.c_str(), MNT_DETACH); }
 };
 
-TEST(Spool, KeepsRunsOnFullDisk) {
+TEST(Spool, LosesNoRunWhenDiskOfRecordsIsFull) {
   const TemporaryFolder folder;
   const auto small = folder / "small";
   fs::create_directory(small);
@@ -81,13 +81,13 @@ TEST(Spool, KeepsRunsOnFullDisk) {
   const std::string where = (small / "records.db").string();
   {
     Spool spool(folder / "spool", where);
-    spool.check_storage();
+    spool.check_runs_can_be_stored();
     for (int i = 0; i < 40; ++i) spool.store_run(numbered_run(i));
     spool.deliver_waiting_runs();
     const std::size_t num_stored = whole_runs(where).size();
     EXPECT_LT(num_stored, 40u);
     EXPECT_THAT(spool.list_waiting_runs(), SizeIs(40 - num_stored));
-    EXPECT_THAT(spool.state(), HasSubstr("full"));
+    EXPECT_THAT(spool.describe_spool_state(), HasSubstr("full"));
     // Full records are readable.
     EXPECT_EQ(spool.find_other_camera_using_image("digest-0-1", "b"),
               (ImageUser{"camera-0", numbered_run(0).run}));
@@ -105,7 +105,7 @@ void kill_while_keeping(const TemporaryFolder& folder, const std::string& where,
   for (int i = 0; i < kills; ++i) {
     const pid_t child = start_child([&] {
       Spool spool(folder / "spool", where);
-      spool.check_storage();
+      spool.check_runs_can_be_stored();
       const int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
       for (int run = 1000 * i; run < 1000 * i + 1000; ++run) {
         spool.store_run(numbered_run(run));
@@ -119,8 +119,8 @@ void kill_while_keeping(const TemporaryFolder& folder, const std::string& where,
     kill_child(child);
   }
   Spool spool(folder / "spool", where);
-  spool.check_storage();
-  EXPECT_EQ(spool.state(), "");
+  spool.check_runs_can_be_stored();
+  EXPECT_EQ(spool.describe_spool_state(), "");
   const auto runs = whole_runs(where);
   std::istringstream kept(TemporaryFolder::read_content(log));
   int count = 0;
@@ -130,13 +130,13 @@ void kill_while_keeping(const TemporaryFolder& folder, const std::string& where,
   EXPECT_LE(runs.size(), static_cast<std::size_t>(count + kills));
 }
 
-TEST(Spool, KeepsRunsWhenKilled) {
+TEST(Spool, LosesNoRunWhenKilledRepeatedly) {
   const TemporaryFolder folder;
   kill_while_keeping(folder, (folder / "records.db").string(), 15);
 }
 
 /// A server that refuses access is not offline: somebody has to correct it; runs are kept.
-TEST(Spool, DistinguishesRefusedFromUnreachableServer) {
+TEST(Spool, StateDistinguishesServerRefusalFromUnreachableServer) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const TemporaryFolder folder;
   const PostgresServer server("right");
@@ -144,10 +144,10 @@ TEST(Spool, DistinguishesRefusedFromUnreachableServer) {
   const auto state_with = [&](const std::string& password, const std::string& database, int run) {
     Spool spool(folder / "spool",
                 "postgresql://vlp:" + password + "@" + server.address() + "/" + database);
-    spool.check_storage();
+    spool.check_runs_can_be_stored();
     spool.store_run(numbered_run(run));
     spool.deliver_waiting_runs();
-    return spool.state();
+    return spool.describe_spool_state();
   };
   const std::string refuses =
       "the server of the records answers, but refuses 'records' of station.yaml: ";
@@ -172,7 +172,7 @@ TEST(Spool, DistinguishesRefusedFromUnreachableServer) {
 }
 
 /// Operators need not understand SQL.
-TEST(Spool, OmitsSqlFromNotice) {
+TEST(Spool, NoticeAndStateForOperatorContainNoSql) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const TemporaryFolder folder;
   const PostgresServer server("right");
@@ -187,26 +187,27 @@ TEST(Spool, OmitsSqlFromNotice) {
   };
   // Its user has no right to the tables.
   Spool guest = open_spool("guest:guest", "guest");
-  guest.check_storage();
-  EXPECT_EQ(guest.make_operator_notice(),
+  guest.check_runs_can_be_stored();
+  EXPECT_EQ(guest.make_spool_notice_for_operator(),
             "records are offline (access refused); runs are kept, delivered automatically");
   guest.store_run(numbered_run(1));
   guest.deliver_waiting_runs();
-  EXPECT_EQ(guest.make_operator_notice(),
+  EXPECT_EQ(guest.make_spool_notice_for_operator(),
             "records are offline (access refused); 1 run kept, delivered automatically");
-  EXPECT_THAT(guest.state(), AllOf(HasSubstr("permission denied"), Not(HasSubstr("SELECT")),
-                                   Not(HasSubstr("UPDATE")), Not(HasSubstr("while"))));
+  EXPECT_THAT(guest.describe_spool_state(),
+              AllOf(HasSubstr("permission denied"), Not(HasSubstr("SELECT")),
+                    Not(HasSubstr("UPDATE")), Not(HasSubstr("while"))));
   server.stop();
   Spool offline = open_spool("vlp:right", "offline");
-  offline.check_storage();
+  offline.check_runs_can_be_stored();
   for (int run = 1; run <= 2; ++run) offline.store_run(numbered_run(run));
-  EXPECT_EQ(offline.make_operator_notice(),
+  EXPECT_EQ(offline.make_spool_notice_for_operator(),
             "records are offline; 2 runs kept, delivered automatically");
-  EXPECT_THAT(offline.state(), HasSubstr("cannot be reached"));
+  EXPECT_THAT(offline.describe_spool_state(), HasSubstr("cannot be reached"));
 }
 
 /// Server that accepts only TLS, with its own certificate.
-TEST(Spool, DeliversThroughTls) {
+TEST(Spool, DeliversOverTlsOnlyWithValidCertificate) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const TemporaryFolder folder;
   const PostgresServer server("right", PostgresServer::Tls::required);
@@ -215,10 +216,10 @@ TEST(Spool, DeliversThroughTls) {
   const auto state_with = [&](const std::string& options) {
     Spool spool(folder / "spool",
                 "postgresql://vlp:right@localhost:" + server.port() + "/postgres?" + options);
-    spool.check_storage();
+    spool.check_runs_can_be_stored();
     spool.store_run(numbered_run(++run));
     spool.deliver_waiting_runs();
-    return spool.state();
+    return spool.describe_spool_state();
   };
   EXPECT_EQ(state_with("sslmode=require"), "");
   EXPECT_EQ(state_with("sslmode=verify-full&sslrootcert=" + server.certificate().string()), "");
@@ -239,7 +240,7 @@ TEST(Spool, DeliversThroughTls) {
 
 /// Concurrent stations, each with its own spool. The number of runs is VLP_STATION_RUNS, each with
 /// a hook.
-TEST(Spool, KeepsRunsOfEightStationsOnOneServer) {
+TEST(Spool, DeliversAllRunsOfEightStationsToOneServer) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   constexpr int stations = 8;
   int each = 5;
@@ -256,7 +257,7 @@ TEST(Spool, KeepsRunsOfEightStationsOnOneServer) {
   for (int station = 0; station < stations; ++station) {
     children.push_back(start_child([&, station] {
       Spool spool = open_spool(station);
-      spool.check_storage();  // one of them makes the tables
+      spool.check_runs_can_be_stored();  // one of them makes the tables
       for (int i = 0; i < each; ++i) {
         RunRecord run = numbered_run(1000 * station + i);
         run.station = "station-" + std::to_string(station);
@@ -275,18 +276,18 @@ TEST(Spool, KeepsRunsOfEightStationsOnOneServer) {
     Spool spool = open_spool(station);
     std::cout << "station-" << station << ": " << spool.list_waiting_runs().size() << " waited\n";
     spool.deliver_waiting_runs();
-    EXPECT_EQ(spool.state(), "");
+    EXPECT_EQ(spool.describe_spool_state(), "");
   }
-  EXPECT_THAT(Records(server.uri()).list_runs({.has_open_hook = true}), IsEmpty());
+  EXPECT_THAT(Records(server.uri()).list_run_summaries({.has_open_hook = true}), IsEmpty());
   const auto count = static_cast<std::size_t>(stations * each);
   EXPECT_THAT(whole_runs(server.uri()), SizeIs(count));
-  const TrailCheck trail = Records(server.uri()).check("");
+  const TrailCheck trail = Records(server.uri()).check_records_by_audit_trail("");
   EXPECT_THAT(trail.problems, IsEmpty());
   EXPECT_EQ(trail.entries, 3 * count) << "of each run and its two events, once";
   EXPECT_THAT(server.log(), Not(HasSubstr("deadlock")));
 }
 
-TEST(Spool, KeepsRunsWhenServerStops) {
+TEST(Spool, DeliversAllRunsAfterServerStoppedDuringDelivery) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
@@ -302,24 +303,26 @@ TEST(Spool, KeepsRunsWhenServerStops) {
 
   // Stopped before the record; new units begin.
   Spool running = spool();
-  running.check_storage();
+  running.check_runs_can_be_stored();
   server.stop();
   running.store_run(numbered_run(-1));
   running.deliver_waiting_runs();
-  EXPECT_THAT(running.state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
-                                     HasSubstr("server of the records cannot be reached")));
+  EXPECT_THAT(running.describe_spool_state(),
+              AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
+                    HasSubstr("server of the records cannot be reached")));
   Spool begun = spool();
-  begun.check_storage();
+  begun.check_runs_can_be_stored();
   begun.store_run(numbered_run(-2));
   begun.deliver_waiting_runs();
-  EXPECT_THAT(begun.state(), StartsWith("runs are queued in the spool, 2 waiting: "));
+  EXPECT_THAT(begun.describe_spool_state(),
+              StartsWith("runs are queued in the spool, 2 waiting: "));
   server.start();
   deliver_to(2);
 
   // Frozen, with and without a connection: programs wait once, and report it.
   Spool connected = spool();
-  connected.check_storage();
-  EXPECT_EQ(connected.state(), "");
+  connected.check_runs_can_be_stored();
+  EXPECT_EQ(connected.describe_spool_state(), "");
   server.freeze();
   EXPECT_LT(measure_seconds([&] {
               EXPECT_EQ(connected.find_other_camera_using_image("digest-1-1", "b"), ImageUser{});
@@ -329,21 +332,24 @@ TEST(Spool, KeepsRunsWhenServerStops) {
   EXPECT_LT(measure_seconds([&] { connected.deliver_waiting_runs(); }), 1);
   EXPECT_FALSE(connected.find("another"));
   EXPECT_THAT(connected.last_offline_reason(), HasSubstr("has not answered for 2 s"));
-  EXPECT_THAT(connected.state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
-                                       HasSubstr("has not answered for 2 s")));
+  EXPECT_THAT(connected.describe_spool_state(),
+              AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
+                    HasSubstr("has not answered for 2 s")));
   Spool fresh = spool();
-  EXPECT_LT(measure_seconds([&] { fresh.check_storage(); }), 8);
-  EXPECT_THAT(fresh.state(), StartsWith("runs are queued in the spool, 1 waiting: "));
+  EXPECT_LT(measure_seconds([&] { fresh.check_runs_can_be_stored(); }), 8);
+  EXPECT_THAT(fresh.describe_spool_state(),
+              StartsWith("runs are queued in the spool, 1 waiting: "));
   server.thaw();
   deliver_to(3);
   // Once, even if several programs wait.
   Spool several = spool();
-  several.check_storage();
+  several.check_runs_can_be_stored();
   server.freeze();
   for (int i = 4; i < 10; ++i) several.store_run(numbered_run(-i));
   EXPECT_LT(measure_seconds([&] { several.deliver_waiting_runs(); }), 5);
-  EXPECT_THAT(several.state(), AllOf(StartsWith("runs are queued in the spool, 6 waiting: "),
-                                     HasSubstr("has not answered for 2 s")));
+  EXPECT_THAT(several.describe_spool_state(),
+              AllOf(StartsWith("runs are queued in the spool, 6 waiting: "),
+                    HasSubstr("has not answered for 2 s")));
   server.thaw();
   deliver_to(9);
 

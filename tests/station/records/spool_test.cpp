@@ -38,14 +38,14 @@ using testing::Not;
 using testing::SizeIs;
 using testing::StartsWith;
 
-TEST(ReadSpooledRun, ReturnsWrittenRun) {
+TEST(ReadSpooledRun, ReturnsAllFieldsOfSerializedRun) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
   for (const RunField& field : list_run_text_fields()) run.*field.text += "\"\\ \xc3\xbc{}";
   for (std::string* lines : {&run.causes, &run.calibration}) lines->append("\n\tof lines\n");
   run.images[1].refused = "too dark";
   const auto [read, records] =
-      read_spooled_run(folder.file("run.json", serialize_run({run, "records.db"})));
+      read_spooled_run(folder.file("run.json", serialize_spooled_run({run, "records.db"})));
   EXPECT_EQ(records, "records.db");
   for (const RunField& field : list_run_text_fields()) EXPECT_EQ(read.*field.text, run.*field.text);
   ASSERT_THAT(read.metrics, SizeIs(run.metrics.size()));
@@ -65,11 +65,12 @@ TEST(ReadSpooledRun, ReturnsWrittenRun) {
   EXPECT_EQ(read.images[29].sha256, run.images[29].sha256);
 }
 
-TEST(ReadSpooledRun, ReturnsPresentNamesOfMetrics) {
+TEST(ReadSpooledRun, ReplacesFormerMetricNamesByNewNames) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
   run.metrics = {{"check_lamps", "", 1, 0.95, Direction::at_least}};
-  const auto read = read_spooled_run(folder.file("run.json", serialize_run({run, "records.db"})));
+  const auto read =
+      read_spooled_run(folder.file("run.json", serialize_spooled_run({run, "records.db"})));
   ASSERT_THAT(read.run.metrics, SizeIs(1));
   EXPECT_EQ(read.run.metrics[0].name, "check_lamp_inlier_fraction");
 }
@@ -77,7 +78,7 @@ TEST(ReadSpooledRun, ReturnsPresentNamesOfMetrics) {
 TEST(ReadSpooledRun, ReadsFormerFormat) {
   const TemporaryFolder folder;
   const RunRecord run = numbered_run(1);
-  std::string text = serialize_run({run, "records.db"});
+  std::string text = serialize_spooled_run({run, "records.db"});
   for (const auto& [present, former] : {std::pair("vlp-run/2", "vlp-run/1"),
                                         {"\"metrics\"", "\"figures\""},
                                         {"\"rejection\"", "\"refused\""}}) {
@@ -92,19 +93,19 @@ TEST(ReadSpooledRun, ReadsFormerFormat) {
   EXPECT_EQ(read.metrics[0].name, run.metrics[0].name);
 }
 
-TEST(ReadSpooledRun, AcceptsNamesThatAreInvalidText) {
+TEST(ReadSpooledRun, EscapesImageNamesThatAreNotUtf8) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
   run.images[0].name = "\xff\x1b[31m.png";
-  EXPECT_EQ(read_spooled_run(folder.file("run.json", serialize_run({run, "records.db"})))
+  EXPECT_EQ(read_spooled_run(folder.file("run.json", serialize_spooled_run({run, "records.db"})))
                 .run.images[0]
                 .name,
             "\\xff\\x1b[31m.png");
 }
 
-TEST(ReadSpooledRun, ThrowsWithFileForInvalidRun) {
+TEST(ReadSpooledRun, ThrowsWithFileNameForInvalidRun) {
   const TemporaryFolder folder;
-  const std::string text = serialize_run({numbered_run(1), "records.db"});
+  const std::string text = serialize_spooled_run({numbered_run(1), "records.db"});
   for (const std::string& bad :
        {std::string("{}\n"), std::string("[]\n"), text.substr(0, text.size() / 2) + "\n",
         std::string(text).replace(text.find("vlp-run/2"), 9, "vlp-run/3"),
@@ -114,22 +115,22 @@ TEST(ReadSpooledRun, ThrowsWithFileForInvalidRun) {
   }
 }
 
-TEST(ReadSpooledRun, RejectsIdsOfOtherFolders) {
+TEST(ReadSpooledRun, RejectsIdsThatLeadToOtherFolders) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
   run.camera = "../..";
   const auto refusal = [&] {
     return rejection_message([&] {
-      read_spooled_run(folder.file("bad.json", serialize_run({run, "records.db"})));
+      read_spooled_run(folder.file("bad.json", serialize_spooled_run({run, "records.db"})));
     });
   };
-  EXPECT_THAT(refusal(), HasSubstr("its run or camera is no id"));
+  EXPECT_THAT(rejection_message(), HasSubstr("its run or camera is no id"));
   run = numbered_run(1);
   run.run = "../x";
-  EXPECT_THAT(refusal(), HasSubstr("its run or camera is no id"));
+  EXPECT_THAT(rejection_message(), HasSubstr("its run or camera is no id"));
   run = numbered_run(1);
   run.events.push_back({"../x", kHookDone, "", ""});
-  EXPECT_THAT(refusal(), HasSubstr("an event is no id"));
+  EXPECT_THAT(rejection_message(), HasSubstr("an event is no id"));
 }
 
 TEST(ReadSpooledRun, RejectsSpecialFilesAndDeepNesting) {
@@ -145,32 +146,34 @@ TEST(ReadSpooledRun, RejectsSpecialFilesAndDeepNesting) {
               HasSubstr("it has more than 16 levels"));
 }
 
-TEST(Spool, KeepsRunsUntilRecordsAreOnline) {
+TEST(Spool, DeliversStoredRunsWhenRecordsBecomeReachable) {
   const TemporaryFolder folder;
   const std::string where = (folder / "away/records.db").string();
   Spool spool(folder / "spool", where);
-  spool.check_storage();
-  EXPECT_THAT(spool.state(),
+  spool.check_runs_can_be_stored();
+  EXPECT_THAT(spool.describe_spool_state(),
               AllOf(StartsWith("runs are queued in the spool: "), HasSubstr("records.db")));
   for (int i = 0; i < 3; ++i) spool.store_run(numbered_run(i));
   spool.deliver_waiting_runs();
-  EXPECT_THAT(spool.state(), AllOf(StartsWith("runs are queued in the spool, 3 waiting: "),
-                                   HasSubstr("records.db")));
-  EXPECT_EQ(spool.find(numbered_run(1).run)->camera, "camera-1");
+  EXPECT_THAT(
+      spool.describe_spool_state(),
+      AllOf(StartsWith("runs are queued in the spool, 3 waiting: "), HasSubstr("records.db")));
+  EXPECT_EQ(spool.find_run_by_id(numbered_run(1).run)->camera, "camera-1");
   EXPECT_FALSE(spool.find("another"));
   // Checks continue with the locally known runs.
   EXPECT_EQ(spool.find_other_camera_using_image("digest-2-7", "camera-1"),
             (ImageUser{"camera-2", numbered_run(2).run}));
   EXPECT_EQ(spool.find_other_camera_using_image("digest-2-7", "camera-2"), ImageUser{});
-  EXPECT_THAT(spool.state(), HasSubstr("; 1 images were not looked up in the records"));
+  EXPECT_THAT(spool.describe_spool_state(),
+              HasSubstr("; 1 images were not looked up in the records"));
 
   fs::create_directory(folder / "away");
   Spool later(folder / "spool", where);
-  later.check_storage();
-  EXPECT_EQ(later.state(), "");
+  later.check_runs_can_be_stored();
+  EXPECT_EQ(later.describe_spool_state(), "");
   EXPECT_THAT(later.list_waiting_runs(), IsEmpty());
   EXPECT_THAT(whole_runs(where), SizeIs(3));
-  EXPECT_EQ(Records(where).find(numbered_run(1).run)->metrics[0].value, 0.1 + 0.2);
+  EXPECT_EQ(Records(where).find_run_by_id(numbered_run(1).run)->metrics[0].value, 0.1 + 0.2);
   EXPECT_EQ(later.find_other_camera_using_image("digest-2-7", "camera-1"),
             (ImageUser{"camera-2", numbered_run(2).run}));
   // A voided run owns no image, also while its event waits.
@@ -182,11 +185,11 @@ TEST(Spool, KeepsRunsUntilRecordsAreOnline) {
   EXPECT_EQ(later.find_other_camera_using_image("digest-2-7", "camera-1"), ImageUser{});
 }
 
-TEST(Spool, FindsGoldenRunOfImage) {
+TEST(Spool, FindGoldenRunUsingImageReturnsOnlyJudgedGoldenRuns) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.check_storage();
+  spool.check_runs_can_be_stored();
   RunRecord golden = numbered_run(1), invalid = numbered_run(2);
   golden.kind = invalid.kind = "golden";
   invalid.verdict = "INVALID";
@@ -201,49 +204,49 @@ TEST(Spool, FindsGoldenRunOfImage) {
 }
 
 /// Two evaluations of the same images are not two measurements.
-TEST(Spool, FindsRunThatUsedAllImages) {
+TEST(Spool, FindRunWithSameImagesReturnsJudgedRunWithSameImages) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.check_storage();
+  spool.check_runs_can_be_stored();
   const RunRecord earlier = numbered_run(1);
-  ASSERT_FALSE(earlier.is_invalid());
+  ASSERT_FALSE(earlier.is_verdict_invalid());
   RunRecord again = earlier;
   again.run = numbered_run(2).run;
   for (const std::string state : {"here", "in the records"}) {
     spool.store_run(earlier);
     if (state != "here") spool.deliver_waiting_runs();
-    EXPECT_EQ(spool.find_repeated_run(again), earlier.run) << state;
-    EXPECT_EQ(spool.find_repeated_run(earlier), "") << "itself, " << state;
+    EXPECT_EQ(spool.find_run_with_same_images(again), earlier.run) << state;
+    EXPECT_EQ(spool.find_run_with_same_images(earlier), "") << "itself, " << state;
     RunRecord fewer = again, other = again, camera = again, none = again;
     fewer.images.resize(kImagesOfARun / 2);
-    EXPECT_EQ(spool.find_repeated_run(fewer), earlier.run) << state;
+    EXPECT_EQ(spool.find_run_with_same_images(fewer), earlier.run) << state;
     other.images.back().sha256 = "another";
-    EXPECT_EQ(spool.find_repeated_run(other), "") << "one is new, " << state;
+    EXPECT_EQ(spool.find_run_with_same_images(other), "") << "one is new, " << state;
     other.images.back().refused = "blurred";
-    EXPECT_EQ(spool.find_repeated_run(other), earlier.run) << "and not used, " << state;
+    EXPECT_EQ(spool.find_run_with_same_images(other), earlier.run) << "and not used, " << state;
     camera.camera = "another";
-    EXPECT_EQ(spool.find_repeated_run(camera), "") << state;
+    EXPECT_EQ(spool.find_run_with_same_images(camera), "") << state;
     none.images.clear();
-    EXPECT_EQ(spool.find_repeated_run(none), "") << state;
+    EXPECT_EQ(spool.find_run_with_same_images(none), "") << state;
   }
   // Images of a run that did not count can be used again.
   RunRecord voided_run = earlier;
   voided_run.events = {make_run_event_now(kVoided, "wrong lamps", "Ann")};
   spool.store_run(voided_run);
-  EXPECT_EQ(spool.find_repeated_run(again), "");
+  EXPECT_EQ(spool.find_run_with_same_images(again), "");
   RunRecord invalid = numbered_run(3), invalid_again = numbered_run(3);
-  invalid.set_verdict({{"no captures.csv"}});
+  invalid.set_verdict_from_causes({{"no captures.csv"}});
   invalid_again.run = numbered_run(4).run;
   spool.store_run(invalid);
-  EXPECT_EQ(spool.find_repeated_run(invalid_again), "");
+  EXPECT_EQ(spool.find_run_with_same_images(invalid_again), "");
   spool.deliver_waiting_runs();
-  EXPECT_EQ(spool.find_repeated_run(again), "");
-  EXPECT_EQ(spool.find_repeated_run(invalid_again), "");
+  EXPECT_EQ(spool.find_run_with_same_images(again), "");
+  EXPECT_EQ(spool.find_run_with_same_images(invalid_again), "");
 }
 
 /// A waiting run with later events is one run.
-TEST(Spool, KeepsEventsOfRun) {
+TEST(Spool, KeepsLaterEventsInWaitingRun) {
   const TemporaryFolder folder;
   const std::string where = (folder / "away/records.db").string();
   Spool spool(folder / "spool", where);
@@ -259,65 +262,68 @@ TEST(Spool, KeepsEventsOfRun) {
   spool.store_run(run);
   EXPECT_THAT(list_open_hooks(spool, "station-1"), IsEmpty());
   spool.deliver_waiting_runs();
-  EXPECT_THAT(spool.state(), StartsWith("runs are queued in the spool, 1 waiting"));
+  EXPECT_THAT(spool.describe_spool_state(), StartsWith("runs are queued in the spool, 1 waiting"));
   ASSERT_THAT(spool.list_waiting_runs(), SizeIs(1));
   EXPECT_THAT(spool.list_waiting_runs()[0].events, SizeIs(3));
-  EXPECT_THAT(spool.find(run.run)->events, SizeIs(3));
+  EXPECT_THAT(spool.find_run_by_id(run.run)->events, SizeIs(3));
 
   fs::create_directory(folder / "away");
   Spool later(folder / "spool", where);
-  later.check_storage();
-  EXPECT_EQ(later.state(), "");
+  later.check_runs_can_be_stored();
+  EXPECT_EQ(later.describe_spool_state(), "");
   EXPECT_TRUE(fs::is_empty(folder / "spool"));
   EXPECT_THAT(whole_runs(where), SizeIs(1));
-  const auto kept = later.find(run.run);
+  const auto kept = later.find_run_by_id(run.run);
   ASSERT_THAT(kept->events, SizeIs(3));
   EXPECT_EQ(kept->events[1].text, "\"exit\" code 3");
   EXPECT_THAT(list_open_hooks(later, "station-1"), IsEmpty());
 }
 
-TEST(Spool, DeliversDespiteInvalidFiles) {
+TEST(Spool, DeliversValidRunsDespiteInvalidFilesInSpool) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.check_storage();
+  spool.check_runs_can_be_stored();
   spool.store_run(numbered_run(1));
   folder.file("spool/0.json", "{}\n");
   folder.file("spool/.1.json.tmp-1-0", "{");
   spool.deliver_waiting_runs();
   EXPECT_THAT(whole_runs(where), SizeIs(1));
-  EXPECT_THAT(spool.state(), AllOf(HasSubstr("0.json: is no run"), Not(HasSubstr("waiting"))));
+  EXPECT_THAT(spool.describe_spool_state(),
+              AllOf(HasSubstr("0.json: is no run"), Not(HasSubstr("waiting"))));
   fs::remove(where);  // offline
   Spool other(folder / "spool", where);
   other.store_run(numbered_run(2));
   other.deliver_waiting_runs();
-  EXPECT_THAT(other.state(),
+  EXPECT_THAT(other.describe_spool_state(),
               AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
                     HasSubstr("records.db"), HasSubstr("; "), HasSubstr("0.json: is no run")));
 }
 
-TEST(Spool, RetriesUnreadableFile) {
+TEST(Spool, ListsRunOnceItsTruncatedFileIsComplete) {
   const TemporaryFolder folder;
   const std::string where = (folder / "away/records.db").string();
   Spool spool(folder / "spool", where);
-  const std::string text = serialize_run({numbered_run(1), derive_database_identity(where)});
+  const std::string text =
+      serialize_spooled_run({numbered_run(1), derive_database_identity(where)});
   fs::create_directory(folder / "spool");
   folder.file("spool/1.json", text.substr(0, text.size() / 2));
   EXPECT_THAT(spool.list_waiting_runs(), IsEmpty());
-  EXPECT_THAT(spool.state(), AllOf(HasSubstr("1.json"), Not(HasSubstr("waiting"))));
+  EXPECT_THAT(spool.describe_spool_state(), AllOf(HasSubstr("1.json"), Not(HasSubstr("waiting"))));
   folder.file("spool/1.json", text);
   EXPECT_THAT(spool.list_waiting_runs(), SizeIs(1));
   EXPECT_EQ(spool.find_other_camera_using_image("digest-1-7", "b"),
             (ImageUser{"camera-1", numbered_run(1).run}));
-  EXPECT_THAT(spool.state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting"),
-                                   Not(HasSubstr("1.json"))));
+  EXPECT_THAT(
+      spool.describe_spool_state(),
+      AllOf(StartsWith("runs are queued in the spool, 1 waiting"), Not(HasSubstr("1.json"))));
 }
 
-TEST(Spool, StoresRunsInRecordsIfFolderCannotBeWritten) {
+TEST(Spool, StoresRunInRecordsWhenSpoolFolderCannotBeWritten) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder.file("spool", ""), where);
-  EXPECT_THAT(rejection_message([&] { spool.check_storage(); }),
+  EXPECT_THAT(rejection_message([&] { spool.check_runs_can_be_stored(); }),
               HasSubstr("spool: cannot be made"));
   { const Records made(where); }
   spool.store_run(numbered_run(1));
@@ -328,17 +334,18 @@ TEST(Spool, StoresRunsInRecordsIfFolderCannotBeWritten) {
                     HasSubstr("away/records.db")));
 }
 
-TEST(Spool, DeliversRunsToTheirRecords) {
+TEST(Spool, DeliversEachRunOnlyToItsOwnDatabase) {
   const TemporaryFolder folder;
   const std::string a = (folder / "a.db").string(), b = (folder / "b.db").string();
   { const Records made_a(a), made_b(b); }
   Spool of_a(folder / "spool", a), of_b(folder / "spool", b);
   of_a.store_run(numbered_run(1));
-  of_b.check_storage();
+  of_b.check_runs_can_be_stored();
   EXPECT_THAT(whole_runs(b), IsEmpty());
-  EXPECT_THAT(of_b.state(), AllOf(StartsWith("1 queued for another database"), HasSubstr("a.db")));
+  EXPECT_THAT(of_b.describe_spool_state(),
+              AllOf(StartsWith("1 queued for another database"), HasSubstr("a.db")));
   EXPECT_THAT(of_b.list_waiting_runs(), IsEmpty());
-  EXPECT_TRUE(of_b.find(numbered_run(1).run)) << "a run is not judged twice for that";
+  EXPECT_TRUE(of_b.find_run_by_id(numbered_run(1).run)) << "a run is not judged twice for that";
   EXPECT_EQ(of_b.find_other_camera_using_image("digest-1-7", "b"),
             (ImageUser{"camera-1", numbered_run(1).run}));
   of_b.store_run(numbered_run(2));
@@ -347,7 +354,7 @@ TEST(Spool, DeliversRunsToTheirRecords) {
   // The same records, by another name of the file.
   Spool(folder / "spool", (folder / "spool/../a.db").string()).deliver_waiting_runs();
   EXPECT_EQ(whole_runs(a), std::set<std::string>{numbered_run(1).run});
-  EXPECT_EQ(of_b.state(), "");
+  EXPECT_EQ(of_b.describe_spool_state(), "");
 }
 
 /// Runs `action` with another host name. Returns false if that is not possible.
@@ -376,60 +383,62 @@ TEST(Spool, DoesNotDeliverToOtherMachinesDatabase) {
       on_another_machine([&] { Spool(folder / "spool", where).store_run(numbered_run(1)); });
   if (!permitted) GTEST_SKIP() << "a process cannot have a machine's name of its own here";
   Spool here(folder / "spool", where);
-  here.check_storage();
+  here.check_runs_can_be_stored();
   EXPECT_THAT(whole_runs(where), IsEmpty());
-  EXPECT_EQ(here.state(), "1 queued for another database, such as another:" + where);
+  EXPECT_EQ(here.describe_spool_state(), "1 queued for another database, such as another:" + where);
   on_another_machine([&] { Spool(folder / "spool", where).deliver_waiting_runs(); });
   EXPECT_THAT(whole_runs(where), SizeIs(1));
-  EXPECT_EQ(here.state(), "");
+  EXPECT_EQ(here.describe_spool_state(), "");
 }
 
-TEST(Spool, KeepsSecondVerdictOfRun) {
+TEST(Spool, KeepsDifferentRunWithSameIdWaiting) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.check_storage();
+  spool.check_runs_can_be_stored();
   spool.store_run(numbered_run(1));
   spool.deliver_waiting_runs();
   spool.store_run(numbered_run(1));  // the same, as after a kill before its file was removed
   spool.deliver_waiting_runs();
-  EXPECT_EQ(spool.state(), "");
+  EXPECT_EQ(spool.describe_spool_state(), "");
   RunRecord again = numbered_run(1);
   again.ended_utc = "2026-11-21T14:50:01Z";
   spool.store_run(again);
   spool.store_run(numbered_run(2));
   spool.deliver_waiting_runs();
-  EXPECT_THAT(spool.state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
-                                   HasSubstr("has another run " + again.run)));
+  EXPECT_THAT(spool.describe_spool_state(),
+              AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
+                    HasSubstr("has another run " + again.run)));
   EXPECT_THAT(whole_runs(where), SizeIs(2));
-  EXPECT_EQ(Records(where).find(again.run)->ended_utc, numbered_run(1).ended_utc);
+  EXPECT_EQ(Records(where).find_run_by_id(again.run)->ended_utc, numbered_run(1).ended_utc);
 }
 
 /// A missing file can be on a share that is not mounted.
-TEST(Spool, CreatesDatabaseOnlyInPrepare) {
+TEST(Spool, CreatesDatabaseOnlyInCheckStorage) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
   spool.store_run(numbered_run(1));
   spool.deliver_waiting_runs();
   EXPECT_FALSE(spool.find("another"));
-  EXPECT_THAT(spool.state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
-                                   HasSubstr("records.db: there are no records")));
+  EXPECT_THAT(spool.describe_spool_state(),
+              AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
+                    HasSubstr("records.db: there are no records")));
   EXPECT_FALSE(fs::exists(where));
-  Spool(folder / "spool", where).check_storage();
+  Spool(folder / "spool", where).check_runs_can_be_stored();
   EXPECT_THAT(whole_runs(where), SizeIs(1));
 }
 
-TEST(Spool, ThrowsForInvalidConnectionString) {
+TEST(Spool, ConstructorThrowsForInvalidConnectionString) {
   EXPECT_THAT(rejection_message([&] { Spool("spool", "postgresql://vlp:a@b@/c"); }),
               HasSubstr("is not of the form"));
 }
 
-TEST(Spool, KeepsRunsOfConcurrentPrograms) {
+TEST(Spool, DeliversAllRunsOfConcurrentPrograms) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.check_storage();
+  spool.check_runs_can_be_stored();
   for (int i = 0; i < 25; ++i) spool.store_run(numbered_run(i));
   std::vector<pid_t> children;
   for (int program = 1; program <= 3; ++program) {
@@ -443,7 +452,7 @@ TEST(Spool, KeepsRunsOfConcurrentPrograms) {
   }
   EXPECT_TRUE(end_well(children));
   spool.deliver_waiting_runs();
-  EXPECT_EQ(spool.state(), "");
+  EXPECT_EQ(spool.describe_spool_state(), "");
   EXPECT_THAT(whole_runs(where), SizeIs(40));
 }
 

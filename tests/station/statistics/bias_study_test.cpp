@@ -49,7 +49,7 @@ std::vector<ReferenceValue> linearity_example() {
 
 /// The regression of the manual and of SPC for Excel's worked example of it ("Linearity and Bias
 /// Study", its biases with the sample's standard deviation), to their printed digits.
-TEST(BiasStudy, MatchesLinearityOfAiagManual) {
+TEST(BiasStudy, LinearityMatchesExampleOfAiagManual) {
   const BiasStudy study = analyze_bias_and_linearity(linearity_example());
   ASSERT_TRUE(study.linearity);
   const Linearity& line = *study.linearity;
@@ -64,7 +64,7 @@ TEST(BiasStudy, MatchesLinearityOfAiagManual) {
   EXPECT_NEAR(line.intercept.low, 0.591, 5e-4);
   EXPECT_NEAR(line.intercept.high, 0.882, 5e-4);
   EXPECT_LT(line.slope.p, 5e-4);
-  EXPECT_TRUE(line.slope.is_significant());
+  EXPECT_TRUE(line.slope.differs_significantly_from_zero());
   EXPECT_NEAR(line.residual_sd, 0.240, 5e-4);
   EXPECT_NEAR(100 * line.r_squared, 71.43, 0.005);
   EXPECT_EQ(line.slope.dof, 58);
@@ -85,7 +85,7 @@ TEST(BiasStudy, MatchesLinearityOfAiagManual) {
                 printed[i].standard_error > 0.1 ? 5e-4 : 5e-5);
     EXPECT_NEAR(bias.t, printed[i].t, std::abs(printed[i].t) < 1 ? 5e-4 : 0.005);
     EXPECT_NEAR(bias.p, printed[i].p, 5e-4);
-    EXPECT_EQ(bias.is_significant(), printed[i].p < 0.05);
+    EXPECT_EQ(bias.differs_significantly_from_zero(), printed[i].p < 0.05);
     EXPECT_EQ(study.units[i].reference, 2 * (static_cast<double>(i) + 1));
     EXPECT_EQ(study.units[i].count, 12U);
   }
@@ -96,17 +96,17 @@ TEST(BiasStudy, MatchesLinearityOfAiagManual) {
   EXPECT_NEAR(study.all.p, 0.089, 5e-4);
   EXPECT_NEAR(study.all.low, -0.1152, 1e-4);
   EXPECT_NEAR(study.all.high, 0.0085, 1e-4);
-  EXPECT_FALSE(study.all.is_significant());
+  EXPECT_FALSE(study.all.differs_significantly_from_zero());
   // Narrowest at the mean. At both ends 0 is outside the band, as in the manual's figure.
-  EXPECT_LT(line.confidence_band_at(6), line.confidence_band_at(2));
-  EXPECT_NEAR(line.confidence_band_at(2), line.confidence_band_at(10), 1e-12);
-  EXPECT_GT(line.predict_bias_at(2), line.confidence_band_at(2));
-  EXPECT_LT(line.predict_bias_at(10), -line.confidence_band_at(10));
+  EXPECT_LT(line.confidence_half_width_at(6), line.confidence_half_width_at(2));
+  EXPECT_NEAR(line.confidence_half_width_at(2), line.confidence_half_width_at(10), 1e-12);
+  EXPECT_GT(line.predict_bias_at(2), line.confidence_half_width_at(2));
+  EXPECT_LT(line.predict_bias_at(10), -line.confidence_half_width_at(10));
 }
 
 /// AIAG, Measurement Systems Analysis, 4th ed., the independent sample method: 15 readings of a
 /// part of 6.00.
-TEST(BiasStudy, MatchesBiasOfAiagManual) {
+TEST(BiasStudy, BiasMatchesExampleOfAiagManual) {
   const BiasStudy study = analyze_bias_and_linearity(values_of_unit(
       "part", 6, {5.8, 5.7, 5.9, 5.9, 6.0, 6.1, 6.0, 6.1, 6.4, 6.3, 6.0, 6.1, 6.2, 5.6, 6.0}));
   ASSERT_THAT(study.units, SizeIs(1));
@@ -119,13 +119,13 @@ TEST(BiasStudy, MatchesBiasOfAiagManual) {
   EXPECT_NEAR(part.bias.t, 0.1218, 5e-5);
   EXPECT_NEAR(part.bias.low, -0.1107, 1e-4);
   EXPECT_NEAR(part.bias.high, 0.1241, 5e-5);
-  EXPECT_FALSE(part.bias.is_significant());
+  EXPECT_FALSE(part.bias.differs_significantly_from_zero());
   EXPECT_FALSE(study.linearity) << "of one reference";
 }
 
 /// NIST, Statistical Reference Datasets, Norris: ozone monitors against NIST's own, with certified
 /// values of the straight line. Here the line is of the differences, one less steep.
-TEST(BiasStudy, MatchesCertifiedLineOfNist) {
+TEST(BiasStudy, LinearityMatchesCertifiedLineOfNist) {
   const std::vector<double> reference{0.2,   337.4, 118.2, 884.6, 10.1,  226.5, 666.3, 996.3, 448.6,
                                       777.0, 558.2, 0.4,   0.6,   775.5, 666.9, 338.0, 447.5, 11.6,
                                       556.0, 228.1, 995.8, 887.6, 120.2, 0.3,   0.3,   556.8, 339.1,
@@ -174,11 +174,11 @@ TEST(BiasStudy, IntervalsAndTestsHaveNominalRates) {
     }
     const BiasStudy none = analyze_bias_and_linearity(without),
                     with_bias = analyze_bias_and_linearity(with);
-    num_significant += none.all.is_significant() ? 1 : 0;
-    sloped += none.linearity->slope.is_significant() ? 1 : 0;
+    num_significant += none.all.differs_significantly_from_zero() ? 1 : 0;
+    sloped += none.linearity->slope.differs_significantly_from_zero() ? 1 : 0;
     held += with_bias.linearity->slope.low < -0.2 && with_bias.linearity->slope.high > -0.2 ? 1 : 0;
     in_band += std::abs(with_bias.linearity->predict_bias_at(3) + 0.3) <
-                       with_bias.linearity->confidence_band_at(3)
+                       with_bias.linearity->confidence_half_width_at(3)
                    ? 1
                    : 0;
   }
@@ -189,12 +189,12 @@ TEST(BiasStudy, IntervalsAndTestsHaveNominalRates) {
   EXPECT_NEAR(double(in_band) / studies, 0.95, 0.02);
 }
 
-TEST(BiasStudy, ReturnsZeroPForValuesWithoutScatter) {
+TEST(BiasStudy, PValueIsZeroForConstantBiasAndOneWithoutBias) {
   const BiasStudy study = analyze_bias_and_linearity(values_of_unit("a", 1, {1.5, 1.5, 1.5}));
   EXPECT_EQ(study.all.p, 0);
   EXPECT_EQ(study.all.t, std::numeric_limits<double>::infinity());
   EXPECT_EQ(study.all.low, 0.5);
-  EXPECT_TRUE(study.all.is_significant());
+  EXPECT_TRUE(study.all.differs_significantly_from_zero());
   // Ten times 0.9 does not add up to 9.
   const BiasStudy none =
       analyze_bias_and_linearity(values_of_unit("a", 0.9, std::vector<double>(10, 0.9)));
@@ -203,7 +203,7 @@ TEST(BiasStudy, ReturnsZeroPForValuesWithoutScatter) {
   EXPECT_EQ(none.all.p, 1);
 }
 
-TEST(BiasStudy, ThrowsForMissingValues) {
+TEST(BiasStudy, ThrowsWithoutValuesOrForUnitWithOneRun) {
   EXPECT_THAT(rejection_message<std::invalid_argument>([] { analyze_bias_and_linearity({}); }),
               HasSubstr("needs runs of reference units"));
   EXPECT_THAT(rejection_message<std::invalid_argument>([] {
@@ -212,7 +212,7 @@ TEST(BiasStudy, ThrowsForMissingValues) {
               HasSubstr("unit b has one run: a bias study needs two or more of each"));
 }
 
-TEST(WriteBiasPlot, WritesPlot) {
+TEST(WriteBiasPlot, ShowsBandForLinearityOnly) {
   const TemporaryFolder folder;
   const auto values = linearity_example();
   write_bias_plot(folder / "bias.svg", "tilt_deg", values, analyze_bias_and_linearity(values));

@@ -14,53 +14,53 @@ namespace {
 
 /// Montgomery, Introduction to Statistical Quality Control, interval of Cp: limits 38 and 62, s
 /// = 1.75 of 20 units; from the 2.29 that is printed before.
-TEST(Capability, MatchesPublishedIntervalOfCp) {
-  EXPECT_NEAR(compute_cp(62 - 38, 1.75, 19).value, 2.29, 0.005);
-  const CapabilityIndex cp = compute_cp(2.29 * 6, 1, 19);
+TEST(ComputeCpIndex, MatchesPublishedIntervalOfMontgomery) {
+  EXPECT_NEAR(compute_cp_index(62 - 38, 1.75, 19).value, 2.29, 0.005);
+  const CapabilityIndex cp = compute_cp_index(2.29 * 6, 1, 19);
   EXPECT_NEAR(cp.low, 1.57, 0.005);
   EXPECT_NEAR(cp.high, 3.01, 0.005);
 }
 
 /// NIST/SEMATECH e-Handbook of Statistical Methods, 6.1.6: limits 8 and 20, mean 16, s = 2.
-TEST(Capability, MatchesPublishedIndices) {
-  EXPECT_NEAR(compute_cp(20 - 8, 2, 49).value, 1.0, 1e-12);
-  EXPECT_NEAR(compute_cpk({8, 20}, 16, 2, 49, 50).value, 0.6667, 5e-5);
-  EXPECT_NEAR(compute_cpk({std::nullopt, 20}, 16, 2, 49, 50).value, 0.6667, 5e-5);
-  EXPECT_NEAR(compute_cpk({8, std::nullopt}, 16, 2, 49, 50).value, 1.3333, 5e-5);
+TEST(ComputeCpkIndex, CpAndCpkMatchPublishedIndicesOfNist) {
+  EXPECT_NEAR(compute_cp_index(20 - 8, 2, 49).value, 1.0, 1e-12);
+  EXPECT_NEAR(compute_cpk_index({8, 20}, 16, 2, 49, 50).value, 0.6667, 5e-5);
+  EXPECT_NEAR(compute_cpk_index({std::nullopt, 20}, 16, 2, 49, 50).value, 0.6667, 5e-5);
+  EXPECT_NEAR(compute_cpk_index({8, std::nullopt}, 16, 2, 49, 50).value, 1.3333, 5e-5);
 }
 
 /// By hand: 1 / (9 * 100) + 1 / (2 * 450) = 1 / 450.
-TEST(Capability, MatchesIntervalOfBissell) {
-  const CapabilityIndex cpk = compute_cpk({std::nullopt, 3}, 0, 1, 450, 100);
+TEST(ComputeCpkIndex, IntervalMatchesBissellFormula) {
+  const CapabilityIndex cpk = compute_cpk_index({std::nullopt, 3}, 0, 1, 450, 100);
   EXPECT_NEAR(cpk.value, 1, 1e-15);
   EXPECT_NEAR(cpk.high - cpk.value, 1.959964 / std::sqrt(450), 1e-7);
   EXPECT_NEAR(cpk.value - cpk.low, 1.959964 / std::sqrt(450), 1e-7);
 }
 
-TEST(Capability, DistinguishesDriftFromScatter) {
+TEST(ComputeProcessCapability, DriftReducesPpkButNotCpk) {
   std::vector<double> values;
   for (int i = 0; i < 40; ++i) values.push_back((i % 2 == 0 ? 0.9 : 1.1) + 0.05 * i);
-  const auto found = compute_capability(values, {std::nullopt, 5});
+  const auto found = compute_process_capability(values, {std::nullopt, 5});
   ASSERT_TRUE(found);
   EXPECT_FALSE(found->cp);
   EXPECT_NEAR(found->mean, 1 + 0.05 * 19.5, 1e-12);
   // Moving ranges 0.25 and 0.15, 20 and 19 times.
   EXPECT_NEAR(found->within_sd, (20 * 0.25 + 19 * 0.15) / 39 / 1.128, 1e-12);
   EXPECT_GT(found->cpk.value, 3 * found->ppk.value);
-  const auto two = compute_capability(values, {-1, 5});
+  const auto two = compute_process_capability(values, {-1, 5});
   ASSERT_TRUE(two->pp);
   EXPECT_NEAR(two->pp->value, 6 / (6 * two->overall_sd), 1e-12);
 }
 
-TEST(Capability, ReturnsNulloptForEqualValuesOrWithoutLimit) {
-  EXPECT_FALSE(compute_capability(std::vector<double>{1}, {0, 2}));
-  EXPECT_FALSE(compute_capability(std::vector<double>{1, 1, 1}, {0, 2}));
-  EXPECT_FALSE(compute_capability(std::vector<double>{1, 2}, {}));
+TEST(ComputeProcessCapability, ReturnsNulloptForEqualValuesOrWithoutLimits) {
+  EXPECT_FALSE(compute_process_capability(std::vector<double>{1}, {0, 2}));
+  EXPECT_FALSE(compute_process_capability(std::vector<double>{1, 1, 1}, {0, 2}));
+  EXPECT_FALSE(compute_process_capability(std::vector<double>{1, 2}, {}));
 }
 
 /// Coverage of the true index equals the confidence level; limits 4 sigmas above and 6 below the
 /// mean.
-TEST(Capability, IntervalsHaveNominalCoverage) {
+TEST(ComputeProcessCapability, IntervalsCoverTrueIndexIn95Percent) {
   Random random(11);
   constexpr int trials = 2000;
   constexpr std::size_t count = 50;
@@ -71,7 +71,7 @@ TEST(Capability, IntervalsHaveNominalCoverage) {
   for (int trial = 0; trial < trials; ++trial) {
     std::vector<double> values(count);
     for (double& value : values) value = 10 + 0.5 * random.normal();
-    const auto found = compute_capability(values, {7, 12});
+    const auto found = compute_process_capability(values, {7, 12});
     cpk += holds(found->cpk, 4.0 / 3);
     ppk += holds(found->ppk, 4.0 / 3);
     cp += holds(*found->cp, 5.0 / 3);

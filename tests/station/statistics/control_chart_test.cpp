@@ -48,7 +48,7 @@ std::vector<double> with(std::vector<double> values, std::size_t place, double v
   return values;
 }
 
-TEST(ControlChart, ComputesLimitsFromMovingRange) {
+TEST(ComputeControlChart, LimitsAre3SigmaOfMovingRangeAroundMean) {
   const ControlChart chart = compute_control_chart(std::vector<double>{1, 3, 2, 5});
   const double sigma = (2 + 1 + 3) / 3.0 / 1.128, mean = 11 / 4.0;
   EXPECT_DOUBLE_EQ(chart.mean, mean);
@@ -58,7 +58,7 @@ TEST(ControlChart, ComputesLimitsFromMovingRange) {
 }
 
 /// NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2: flow rates of ten batches.
-TEST(ControlChart, MatchesPublishedIndividualsChart) {
+TEST(ComputeControlChart, MatchesPublishedIndividualsChartOfNist) {
   const std::vector<double> flow{49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1};
   const ControlChart chart = compute_control_chart(flow);
   constexpr double printed = 5e-5;
@@ -70,7 +70,7 @@ TEST(ControlChart, MatchesPublishedIndividualsChart) {
 }
 
 /// NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.4.
-TEST(Ewma, MatchesPublishedMovingAverage) {
+TEST(ComputeEwma, MatchesPublishedAveragesAndLimitsOfNist) {
   const std::vector<double> values{52.0, 47.0, 53.0, 49.3, 50.1, 47.0, 51.0, 50.1, 51.2, 50.5,
                                    49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1};
   const Ewma average = compute_ewma(values, 50, 2.0539, 0.3);
@@ -90,7 +90,7 @@ struct RuleCase {
   std::vector<double> matches, fails;
 };
 
-TEST(ListControlChartRules, DetectPatternsUpToLastValue) {
+TEST(ListControlChartRules, RulesMatchOnlyTheirPatternEndingAtLastValue) {
   const std::vector<double> up{-0.4, -0.2, 0, 0.1, 0.2, 0.3};
   const std::vector<RuleCase> cases{
       {"western-electric-1", {3.01}, {3}},
@@ -124,7 +124,7 @@ TEST(ListControlChartRules, DetectPatternsUpToLastValue) {
 
 /// Mean values until the first false alarm, of known mean and sigma: Champ and Woodall 1987,
 /// Technometrics 29, 393-399, table 1.
-TEST(ListControlChartRules, MatchPublishedRunLengths) {
+TEST(ListControlChartRules, MeanRunLengthsToFalseAlarmMatchPublishedOnes) {
   const std::vector<std::pair<std::string, double>> published{
       {"1", 370.40}, {"12", 225.44}, {"13", 166.05}, {"14", 152.73}, {"1234", 91.75}};
   Random random(5);
@@ -148,7 +148,7 @@ TEST(ListControlChartRules, MatchPublishedRunLengths) {
   }
 }
 
-TEST(ChartAlarms, ReportsValueOutsideLimits) {
+TEST(FindControlChartAlarms, ReportsValueBeyondThreeSigmas) {
   std::vector<double> values;
   for (int i = 0; i < 20; ++i) values.push_back(i % 2 == 0 ? 1.0 : 1.1);
   values[13] = 3;
@@ -157,7 +157,7 @@ TEST(ChartAlarms, ReportsValueOutsideLimits) {
   EXPECT_THAT(find_indices(find_control_chart_alarms(values, {"nelson-1"})), ElementsAre(13));
 }
 
-TEST(ChartAlarms, ReportsDriftInsideLimits) {
+TEST(FindControlChartAlarms, ReportsShiftOfMeanInsideLimits) {
   std::vector<double> values;
   for (int i = 0; i < 24; ++i) values.push_back((i % 2 == 0 ? 1.0 : 1.1) + (i < 12 ? 0 : 0.3));
   EXPECT_THAT(find_control_chart_alarms(values, {"western-electric-1"}), IsEmpty());
@@ -169,7 +169,7 @@ TEST(ChartAlarms, ReportsDriftInsideLimits) {
   EXPECT_EQ(by_average.back().index, 23u);
 }
 
-TEST(ChartAlarms, AppliesAllRulesOfSet) {
+TEST(FindControlChartAlarms, AppliesAllRulesOfNamedSets) {
   const std::vector<double> values{0, 0.1, 0, 0.1, 0, 0.1, 0, 0.1, 5};
   std::vector<std::string> names;
   for (const ChartAlarm& alarm :
@@ -182,7 +182,7 @@ TEST(ChartAlarms, AppliesAllRulesOfSet) {
               HasSubstr("there is no rule western; the rules are western-electric-1 to -4"));
 }
 
-TEST(ChartAlarms, ReturnsNoneForEqualValues) {
+TEST(FindControlChartAlarms, ReturnsNoneForEqualValues) {
   for (const double value : {1.0, 0.1, 0.3, 1e-7}) {
     const std::vector<double> values(20, value);  // more than any rule uses
     EXPECT_EQ(compute_control_chart(values).mean, value);
@@ -191,7 +191,7 @@ TEST(ChartAlarms, ReturnsNoneForEqualValues) {
   }
 }
 
-TEST(ChartAlarms, CountsValueAtMeanOnNeitherSide) {
+TEST(FindControlChartAlarms, CountsValueAtMeanOnNeitherSide) {
   // Mean 1: seven below it, one at it, seven above.
   std::vector<double> values(7, 0.5);
   values.push_back(1);
@@ -200,7 +200,7 @@ TEST(ChartAlarms, CountsValueAtMeanOnNeitherSide) {
   EXPECT_THAT(find_control_chart_alarms(values, {"western-electric-4"}), IsEmpty());
 }
 
-TEST(WriteTrendPlot, WritesPlot) {
+TEST(WriteTrendPlot, ShowsAlarmsAndGateOnlyIfGiven) {
   const TemporaryFolder folder;
   std::vector<TrendPoint> points;
   std::vector<double> values;

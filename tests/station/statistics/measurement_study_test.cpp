@@ -30,8 +30,8 @@ std::vector<StudyValue> crossed(std::size_t stations, std::size_t repeats,
 
 /// AIAG, Measurement Systems Analysis, 4th ed., tables III-B 6 (values), A 3 (analysis of variance)
 /// and A 4 (parts of the variation): 10 parts, 3 appraisers, 3 trials.
-TEST(MeasurementStudy, MatchesAiagManual) {
-  const MeasurementStudy study = analyze_measurements(
+TEST(AnalyzeRepeatabilityAndReproducibility, MatchesGaugeStudyOfAiagManual) {
+  const MeasurementStudy study = analyze_repeatability_and_reproducibility(
       crossed(3, 3, {0.29,  0.41,  0.64,  0.08,  0.25,  0.07,  0.04,  -0.11, -0.15,     // 1
                      -0.56, -0.68, -0.58, -0.47, -1.22, -0.68, -1.38, -1.13, -0.96,     // 2
                      1.34,  1.17,  1.27,  1.19,  0.94,  1.34,  0.88,  1.09,  0.67,      // 3
@@ -57,22 +57,22 @@ TEST(MeasurementStudy, MatchesAiagManual) {
   EXPECT_TRUE(study.pooled);
   constexpr double last_digit = 1.5e-6;  // the manual's own rounding on the way
   EXPECT_NEAR(study.repeatability, 0.199933, last_digit);
-  EXPECT_NEAR(study.of_station, 0.226838, last_digit);
-  EXPECT_EQ(study.of_interaction, 0);
+  EXPECT_NEAR(study.station_sd, 0.226838, last_digit);
+  EXPECT_EQ(study.interaction_sd, 0);
   EXPECT_NEAR(study.grr, 0.302373, 2 * last_digit);
-  EXPECT_NEAR(study.of_unit, 1.042327, last_digit);
+  EXPECT_NEAR(study.unit_sd, 1.042327, last_digit);
   EXPECT_NEAR(study.total, 1.085, 5e-4);
   EXPECT_NEAR(100 * study.grr / study.total, 27.9, 0.05);
   EXPECT_NEAR(100 * study.repeatability / study.total, 18.4, 0.05);
-  EXPECT_NEAR(100 * study.of_station / study.total, 20.9, 0.05);
-  EXPECT_NEAR(100 * study.of_unit / study.total, 96.0, 0.05);
-  EXPECT_EQ(study.compute_distinct_categories(), 4);
+  EXPECT_NEAR(100 * study.station_sd / study.total, 20.9, 0.05);
+  EXPECT_NEAR(100 * study.unit_sd / study.total, 96.0, 0.05);
+  EXPECT_EQ(study.compute_number_of_distinct_categories(), 4);
 }
 
 /// Montgomery, Design and Analysis of Experiments, gauge study of 20 parts, 3 operators, 2
 /// measurements: the analysis of variance, and the parts of the reduced model.
-TEST(MeasurementStudy, MatchesTextbook) {
-  const MeasurementStudy study = analyze_measurements(crossed(
+TEST(AnalyzeRepeatabilityAndReproducibility, MatchesGaugeStudyOfMontgomery) {
+  const MeasurementStudy study = analyze_repeatability_and_reproducibility(crossed(
       3, 2, {21, 20, 20, 20, 19, 21, 24, 23, 24, 24, 23, 24, 20, 21, 19, 21, 20, 22, 27, 27,
              28, 26, 27, 28, 19, 18, 19, 18, 18, 21, 23, 21, 24, 21, 23, 22, 22, 21, 22, 24,
              22, 20, 19, 17, 18, 20, 19, 18, 24, 23, 25, 23, 24, 24, 25, 23, 26, 25, 24, 25,
@@ -90,46 +90,50 @@ TEST(MeasurementStudy, MatchesTextbook) {
   ASSERT_TRUE(study.interaction_p);
   EXPECT_NEAR(*study.interaction_p, 0.861, 5e-4);
   EXPECT_NEAR(std::pow(study.repeatability, 2), 0.88, 0.005);
-  EXPECT_NEAR(std::pow(study.of_station, 2), 0.0106, 5e-5);
-  EXPECT_NEAR(std::pow(study.of_unit, 2), 10.25, 0.005);
+  EXPECT_NEAR(std::pow(study.station_sd, 2), 0.0106, 5e-5);
+  EXPECT_NEAR(std::pow(study.unit_sd, 2), 10.25, 0.005);
   EXPECT_NEAR(std::pow(study.grr, 2), 0.89, 0.005);
 }
 
 /// Values of the same equations in NumPy and SciPy, because none are published.
-TEST(MeasurementStudy, KeepsSignificantInteraction) {
-  const MeasurementStudy study = analyze_measurements(
+TEST(AnalyzeRepeatabilityAndReproducibility, DoesNotPoolSignificantInteraction) {
+  const MeasurementStudy study = analyze_repeatability_and_reproducibility(
       crossed(2, 2, {10, 10.2, 12, 12.2, 11, 11.4, 10, 10.4, 15, 15.2, 14, 14.6}));
   EXPECT_FALSE(study.pooled);
   EXPECT_NEAR(*study.interaction_p, 0.0002923805372109052, 1e-12);
   EXPECT_NEAR(std::pow(study.repeatability, 2), 0.06666666666666661, 1e-12);
-  EXPECT_NEAR(std::pow(study.of_interaction, 2), 1.3733333333333282, 1e-12);
-  EXPECT_EQ(study.of_station, 0) << "-0.467 is none";
-  EXPECT_NEAR(std::pow(study.of_unit, 2), 4.150000000000005, 1e-12);
+  EXPECT_NEAR(std::pow(study.interaction_sd, 2), 1.3733333333333282, 1e-12);
+  EXPECT_EQ(study.station_sd, 0) << "-0.467 is none";
+  EXPECT_NEAR(std::pow(study.unit_sd, 2), 4.150000000000005, 1e-12);
   EXPECT_NEAR(std::pow(study.grr, 2), 0.06666666666666661 + 1.3733333333333282, 1e-12);
 }
 
 /// By hand: two units at 0 and 10, each measured twice, 1 apart: MS_e = 0.5, MS_unit = 100.
-TEST(MeasurementStudy, ComputesRepeatabilityForOneStation) {
-  const MeasurementStudy study = analyze_measurements(crossed(1, 2, {-0.5, 0.5, 9.5, 10.5}));
+TEST(AnalyzeRepeatabilityAndReproducibility, ComputesRepeatabilityForOneStation) {
+  const MeasurementStudy study =
+      analyze_repeatability_and_reproducibility(crossed(1, 2, {-0.5, 0.5, 9.5, 10.5}));
   EXPECT_EQ(study.stations, 1u);
   EXPECT_FALSE(study.interaction_p);
   EXPECT_DOUBLE_EQ(study.repeatability, std::sqrt(0.5));
-  EXPECT_EQ(study.of_station, 0);
-  EXPECT_DOUBLE_EQ(study.of_unit, std::sqrt((100 - 0.5) / 2));
-  EXPECT_EQ(study.compute_distinct_categories(), static_cast<int>(1.41 * std::sqrt(99.5)));
+  EXPECT_EQ(study.station_sd, 0);
+  EXPECT_DOUBLE_EQ(study.unit_sd, std::sqrt((100 - 0.5) / 2));
+  EXPECT_EQ(study.compute_number_of_distinct_categories(),
+            static_cast<int>(1.41 * std::sqrt(99.5)));
   const double sd = std::sqrt(0.5);
-  EXPECT_FALSE(study.compute_percent_of_tolerance({}));
-  EXPECT_DOUBLE_EQ(*study.compute_percent_of_tolerance({0, 20}), 100 * 6 * sd / 20);
-  EXPECT_DOUBLE_EQ(*study.compute_percent_of_tolerance({std::nullopt, 11}), 100 * 3 * sd / 6);
-  EXPECT_DOUBLE_EQ(*study.compute_percent_of_tolerance({1, std::nullopt}), 100 * 3 * sd / 4);
+  EXPECT_FALSE(study.compute_precision_to_tolerance_percent({}));
+  EXPECT_DOUBLE_EQ(*study.compute_precision_to_tolerance_percent({0, 20}), 100 * 6 * sd / 20);
+  EXPECT_DOUBLE_EQ(*study.compute_precision_to_tolerance_percent({std::nullopt, 11}),
+                   100 * 3 * sd / 6);
+  EXPECT_DOUBLE_EQ(*study.compute_precision_to_tolerance_percent({1, std::nullopt}),
+                   100 * 3 * sd / 4);
   // The mean, 5, is at the one limit or beyond it.
-  EXPECT_FALSE(study.compute_percent_of_tolerance({std::nullopt, 5}));
-  EXPECT_FALSE(study.compute_percent_of_tolerance({std::nullopt, 1}));
-  EXPECT_FALSE(study.compute_percent_of_tolerance({5, std::nullopt}));
-  EXPECT_FALSE(study.compute_percent_of_tolerance({11, std::nullopt}));
+  EXPECT_FALSE(study.compute_precision_to_tolerance_percent({std::nullopt, 5}));
+  EXPECT_FALSE(study.compute_precision_to_tolerance_percent({std::nullopt, 1}));
+  EXPECT_FALSE(study.compute_precision_to_tolerance_percent({5, std::nullopt}));
+  EXPECT_FALSE(study.compute_precision_to_tolerance_percent({11, std::nullopt}));
 }
 
-TEST(MeasurementStudy, RecoversSimulatedVarianceComponents) {
+TEST(AnalyzeRepeatabilityAndReproducibility, MeanVarianceComponentsMatchSimulatedOnes) {
   Random random(3);
   constexpr int studies = 400;
   constexpr std::size_t units = 10, stations = 3, repeats = 3;
@@ -143,10 +147,11 @@ TEST(MeasurementStudy, RecoversSimulatedVarianceComponents) {
         for (std::size_t r = 0; r < repeats; ++r) values.push_back(of_unit + of + random.normal());
       }
     }
-    const MeasurementStudy study = analyze_measurements(crossed(stations, repeats, values));
+    const MeasurementStudy study =
+        analyze_repeatability_and_reproducibility(crossed(stations, repeats, values));
     error += std::pow(study.repeatability, 2) / studies;
-    unit += std::pow(study.of_unit, 2) / studies;
-    station += std::pow(study.of_station, 2) / studies;
+    unit += std::pow(study.unit_sd, 2) / studies;
+    station += std::pow(study.station_sd, 2) / studies;
   }
   // Standard errors: sqrt(2 / dof / studies) of each mean square, 0.8 %, 2.4 %, 5 %.
   EXPECT_NEAR(error, 1, 0.03);
@@ -154,20 +159,23 @@ TEST(MeasurementStudy, RecoversSimulatedVarianceComponents) {
   EXPECT_NEAR(station, 4, 4 * 0.16);
 }
 
-TEST(MeasurementStudy, ThrowsForMissingValues) {
-  EXPECT_THAT(rejection_message<std::invalid_argument>([] { analyze_measurements({}); }),
+TEST(AnalyzeRepeatabilityAndReproducibility, ThrowsForMissingOrUnbalancedValues) {
+  EXPECT_THAT(rejection_message<std::invalid_argument>(
+                  [] { analyze_repeatability_and_reproducibility({}); }),
               HasSubstr("two units"));
   EXPECT_THAT(rejection_message<std::invalid_argument>([] {
-                analyze_measurements(crossed(1, 1, {1, 2}));
+                analyze_repeatability_and_reproducibility(crossed(1, 1, {1, 2}));
               }),
               HasSubstr("two or more"));
   auto values = crossed(2, 2, {1, 2, 3, 4, 5, 6, 7, 8});
   values.pop_back();
-  EXPECT_THAT(rejection_message<std::invalid_argument>([&] { analyze_measurements(values); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>(
+                  [&] { analyze_repeatability_and_reproducibility(values); }),
               HasSubstr("unit 101 has 1 runs on 1, 100 has 2 on 0"));
   values = crossed(2, 2, {1, 2, 3, 4, 5, 6, 7, 8});
   values.erase(values.begin(), values.begin() + 2);
-  EXPECT_THAT(rejection_message<std::invalid_argument>([&] { analyze_measurements(values); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>(
+                  [&] { analyze_repeatability_and_reproducibility(values); }),
               HasSubstr("unit 100 has 0 runs on 0, 100 has 2 on 1"));
 }
 

@@ -33,14 +33,14 @@ class RunMetrics : public testing::Test {
     records.store_run(run);
   }
   std::vector<TrendPoint> judged(const RunFilter& filter = {}) {
-    return load_judged_values(records, "rms_px", filter);
+    return load_metric_of_judged_runs(records, "rms_px", filter);
   }
 
   TemporaryFolder folder;
   Records records{(folder / "records.db").string()};
 };
 
-TEST_F(RunMetrics, JudgedValuesExcludesInvalidRuns) {
+TEST_F(RunMetrics, LoadMetricOfJudgedRunsExcludesInvalidRunsUnlessRequested) {
   EXPECT_THAT(extract_trend_values(judged()), ElementsAre(0.1, 2, 0.3));
   RunFilter two, invalid;
   two.last = 2;
@@ -49,7 +49,7 @@ TEST_F(RunMetrics, JudgedValuesExcludesInvalidRuns) {
   EXPECT_THAT(extract_trend_values(judged(invalid)), ElementsAre(0.4));
 }
 
-TEST_F(RunMetrics, FindGateLimitReturnsGateOfStationOrLastRun) {
+TEST_F(RunMetrics, FindGateLimitPrefersStationToLastRun) {
   EXPECT_EQ(find_gate_limit("rms_px", nullptr, records, judged()), 1);
   EXPECT_FALSE(find_gate_limit("coverage", nullptr, records, judged()))
       << "a figure without a gate";
@@ -63,32 +63,33 @@ TEST_F(RunMetrics, FindGateLimitReturnsGateOfStationOrLastRun) {
   EXPECT_EQ(make_tolerance_limits(find_run_metric("coverage"), 0.7).lower, 0.7);
 }
 
-using CheckPointsOfOneStation = RunMetrics;
+using CheckValuesAreOfOneStation = RunMetrics;
 
-TEST_F(CheckPointsOfOneStation, ThrowsForTwoStations) {
+TEST_F(CheckValuesAreOfOneStation, ThrowsForTwoStations) {
   auto points = judged();
-  EXPECT_NO_THROW(check_points_of_one_station(points));
-  EXPECT_NO_THROW(check_points_of_one_station({}));
+  EXPECT_NO_THROW(check_values_are_of_one_station(points));
+  EXPECT_NO_THROW(check_values_are_of_one_station({}));
   points[1].station = "station-2";
-  EXPECT_THROW(check_points_of_one_station(points), std::invalid_argument);
+  EXPECT_THROW(check_values_are_of_one_station(points), std::invalid_argument);
 }
 
-TEST_F(RunMetrics, StudyValuesSelectsUnitsWithRepeatedRuns) {
-  EXPECT_THAT(select_study_values(judged(), {}),
+TEST_F(RunMetrics, SelectValuesOfStudyUnitsReturnsRequestedOrRepeatedlyMeasuredUnits) {
+  EXPECT_THAT(select_values_of_study_units(judged(), {}),
               AllOf(SizeIs(2), testing::Each(Field(&StudyValue::unit, "a"))));
-  EXPECT_THAT(select_study_values(judged(), {"b"}), ElementsAre(Field(&StudyValue::unit, "b")));
+  EXPECT_THAT(select_values_of_study_units(judged(), {"b"}),
+              ElementsAre(Field(&StudyValue::unit, "b")));
   EXPECT_THAT(
       [&] {
-        select_study_values(judged(), {"c", "a", "d"});
+        select_values_of_study_units(judged(), {"c", "a", "d"});
       },
       testing::ThrowsMessage<std::invalid_argument>(HasSubstr("is of: c, d")));
-  const auto values = select_reference_values(judged(), {{"a", 0.2}});
+  const auto values = select_values_of_reference_units(judged(), {{"a", 0.2}});
   ASSERT_THAT(values, SizeIs(2));
   EXPECT_EQ(values[0].reference, 0.2);
-  EXPECT_THROW(select_reference_values(judged(), {{"c", 0.2}}), std::invalid_argument);
+  EXPECT_THROW(select_values_of_reference_units(judged(), {{"c", 0.2}}), std::invalid_argument);
 }
 
-TEST(RunMetric, ThrowsWithListOfMetricsForUnknownName) {
+TEST(FindRunMetric, ThrowsNamingNewNameOrKnownMetrics) {
   EXPECT_STREQ(find_run_metric("check_mean_mm").unit, "mm");
   EXPECT_EQ(rejection_message<std::invalid_argument>([] { find_run_metric("halves_px"); }),
             "metric 'halves_px' is now called 'split_half_px'");
@@ -98,16 +99,17 @@ TEST(RunMetric, ThrowsWithListOfMetricsForUnknownName) {
 }
 
 /// sample() has the same images in each run.
-TEST_F(RunMetrics, CheckRepetitionsThrowsForSameImages) {
+TEST_F(RunMetrics, CheckRunsShareNoImagesThrowsForSameImages) {
   const auto points = judged();
-  const auto values = select_study_values(points, {});
+  const auto values = select_values_of_study_units(points, {});
   ASSERT_THAT(values, SizeIs(2));
   EXPECT_THAT(rejection_message<std::invalid_argument>(
                   [&] { check_runs_share_no_images(records, points, values); }),
               HasSubstr("runs " + numbered_run_id(1) + " and " + numbered_run_id(3) +
                         " of camera a have the same images, which is no repetition"));
   EXPECT_EQ(rejection_message<std::invalid_argument>([&] {
-              check_runs_share_no_images(records, points, select_study_values(points, {"b"}));
+              check_runs_share_no_images(records, points,
+                                         select_values_of_study_units(points, {"b"}));
             }),
             "");
 }

@@ -24,16 +24,16 @@ using testing::StartsWith;
 
 struct LampFaults : ExampleRig {};
 
-TEST_F(LampFaults, ReturnsNoneForCorrectMap) {
-  EXPECT_THAT(describe_lamp_faults(frames, map, calibration), IsEmpty());
+TEST_F(LampFaults, DescribeLampMapFaultsReturnsNoneForCorrectMap) {
+  EXPECT_THAT(describe_lamp_map_faults(frames, map, calibration), IsEmpty());
 }
 
-TEST_F(LampFaults, ReportsSwappedLamps) {
+TEST_F(LampFaults, DescribeLampMapFaultsNamesSwappedLamps) {
   for (std::size_t a = 0; a < map.lamps.size(); ++a) {
     for (std::size_t b = a + 1; b < map.lamps.size(); ++b) {
       LampMap swapped = map;
       std::swap(swapped.lamps[a].position_m, swapped.lamps[b].position_m);
-      const auto faults = describe_lamp_faults(frames, swapped, calibration);
+      const auto faults = describe_lamp_map_faults(frames, swapped, calibration);
       ASSERT_EQ(faults.size(), 1u) << a << " " << b;
       EXPECT_THAT(faults[0], HasSubstr(std::to_string(map.lamps[a].id) + " and " +
                                        std::to_string(map.lamps[b].id) + " seem to be swapped"));
@@ -41,45 +41,45 @@ TEST_F(LampFaults, ReportsSwappedLamps) {
   }
 }
 
-TEST_F(LampFaults, ReportsDisplacedLamp) {
+TEST_F(LampFaults, DescribeLampMapFaultsNamesDisplacedLampAndDisplacement) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     LampMap moved = map;
     moved.lamps[i].position_m += Eigen::Vector3d(0.02, -0.01, 0);
-    EXPECT_THAT(describe_lamp_faults(frames, moved, calibration),
+    EXPECT_THAT(describe_lamp_map_faults(frames, moved, calibration),
                 ElementsAre("lamp " + std::to_string(map.lamps[i].id) +
                             " hangs 22 mm from where the map has it (x -20 mm, y +10 mm): moved, "
                             "or entered wrongly"));
   }
 }
 
-TEST_F(LampFaults, ReportsUndetectedLamp) {
+TEST_F(LampFaults, DescribeMissingLampsNamesNeverVisibleLamp) {
   const int id = map.lamps[2].id;
   for (Frame& frame : frames) {
     std::erase_if(frame.detections, [&](const Detection& lamp) { return lamp.lamp == id; });
   }
   EXPECT_THAT(describe_missing_lamps(frames, map),
               ElementsAre(HasSubstr("lamp " + std::to_string(id) + " is never visible")));
-  EXPECT_THAT(describe_lamp_faults(frames, map, calibration), IsEmpty())
+  EXPECT_THAT(describe_lamp_map_faults(frames, map, calibration), IsEmpty())
       << "it does not contradict the map";
   EXPECT_THAT(describe_missing_lamps(std::span(frames).first(2), map), IsEmpty())
       << "too few to tell";
 }
 
 /// For a known camera.
-TEST_F(LampFaults, ReportsSmallDisplacementWithSmallMinOffset) {
+TEST_F(LampFaults, DescribeLampMapFaultsNames4MmDisplacementWithSmallLimit) {
   constexpr double fits_px = 0.25;
-  EXPECT_THAT(describe_lamp_faults(frames, map, calibration, fits_px), IsEmpty());
+  EXPECT_THAT(describe_lamp_map_faults(frames, map, calibration, fits_px), IsEmpty());
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     LampMap moved = map;
     moved.lamps[i].position_m += Eigen::Vector3d(0.004, 0, 0);
-    EXPECT_THAT(describe_lamp_faults(frames, moved, calibration, fits_px),
+    EXPECT_THAT(describe_lamp_map_faults(frames, moved, calibration, fits_px),
                 ElementsAre(HasSubstr("lamp " + std::to_string(map.lamps[i].id) + " hangs ")));
   }
 }
 
 /// A light that is mistaken for a lamp is rejected, and its capture has a large residual. That does
 /// not mark the lamp as loose unless many captures agree.
-TEST_F(LampFaults, IgnoresSingleReflection) {
+TEST_F(LampFaults, DescribeLampMapFaultsNamesLampOnlyForManyContradictingCaptures) {
   constexpr double fits_px = 0.25;
   const int id = map.lamps[2].id;
   std::vector<Detection*> seen;
@@ -91,7 +91,7 @@ TEST_F(LampFaults, IgnoresSingleReflection) {
   ASSERT_GT(seen.size(), 20u);
   const std::size_t tenth = seen.size() / 10;
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    const auto faults = describe_lamp_faults(frames, map, calibration, fits_px);
+    const auto faults = describe_lamp_map_faults(frames, map, calibration, fits_px);
     if (i > tenth) {
       EXPECT_THAT(faults, ElementsAre(HasSubstr("lamp " + std::to_string(id) + " contradicts")))
           << i;
@@ -108,8 +108,8 @@ struct PlaceFault : LampFaults {
   PlaceFault() {
     const Positioner positioner(map, calibration);
     for (const Frame& frame : frames) {
-      const Fix fix = positioner.locate(frame.detections);
-      if (!fix.ok()) continue;
+      const Fix fix = positioner.compute_position_fix(frame.detections);
+      if (!fix.has_succeeded()) continue;
       Capture& place = places[frame.image];
       place.x_m = fix.estimate.pose.position_m.x() + 3e-4;
       place.y_m = fix.estimate.pose.position_m.y();
@@ -118,7 +118,7 @@ struct PlaceFault : LampFaults {
   CapturesTable places;
 };
 
-TEST_F(PlaceFault, ReportsSingleWrongPosition) {
+TEST_F(PlaceFault, DescribeWrongReferencePositionsNamesSingleWrongCapture) {
   EXPECT_EQ(describe_wrong_reference_positions(frames, map, calibration, places), "");
   for (const std::size_t which : {std::size_t{0}, std::size_t{17}, frames.size() - 1}) {
     CapturesTable wrong = places;
@@ -129,7 +129,7 @@ TEST_F(PlaceFault, ReportsSingleWrongPosition) {
   }
 }
 
-TEST_F(PlaceFault, ReportsSeveralWrongPositions) {
+TEST_F(PlaceFault, DescribeWrongReferencePositionsNamesSeveralWrongCaptures) {
   ASSERT_GT(frames.size(), 12U);
   CapturesTable wrong = places;
   for (std::size_t i = 0; i < 5; ++i) wrong.at(frames[i].image).y_m.value() += 0.052;
@@ -142,7 +142,7 @@ TEST_F(PlaceFault, ReportsSeveralWrongPositions) {
 }
 
 /// If half or more are wrong, the others are not reliable.
-TEST_F(PlaceFault, ReturnsEmptyIfMostPositionsAreWrong) {
+TEST_F(PlaceFault, DescribeWrongReferencePositionsIsEmptyWhenMostAreWrong) {
   CapturesTable wrong = places;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (i % 4 != 0) wrong.at(frames[i].image).y_m.value() += 0.02;
@@ -151,13 +151,13 @@ TEST_F(PlaceFault, ReturnsEmptyIfMostPositionsAreWrong) {
 }
 
 /// The zenith of another camera displaces all fixes by one offset in the frame of the camera.
-TEST_F(PlaceFault, FindCommonPositionOffsetReturnsFrame) {
+TEST_F(PlaceFault, FindCommonPositionOffsetDistinguishesCameraFromRoomFrame) {
   EXPECT_FALSE(find_common_position_offset(frames, map, calibration, places));
   const Positioner positioner(map, calibration);
   CapturesTable rotating = places, constant = places, scattered = places;
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    const Fix fix = positioner.locate(frames[i].detections);
-    if (!fix.ok()) continue;
+    const Fix fix = positioner.compute_position_fix(frames[i].detections);
+    if (!fix.has_succeeded()) continue;
     const double yaw_rad = fix.estimate.pose.yaw_rad;
     rotating.at(frames[i].image).x_m.value() += 0.03 * std::cos(yaw_rad);
     rotating.at(frames[i].image).y_m.value() += 0.03 * std::sin(yaw_rad);
@@ -167,28 +167,28 @@ TEST_F(PlaceFault, FindCommonPositionOffsetReturnsFrame) {
   const auto camera_offset = find_common_position_offset(frames, map, calibration, rotating);
   ASSERT_TRUE(camera_offset);
   EXPECT_TRUE(camera_offset->in_camera);
-  EXPECT_THAT(describe(*camera_offset),
+  EXPECT_THAT(describe_common_position_offset(*camera_offset),
               HasSubstr("are off by 30.0 mm in one direction of the camera (x -30.0 mm, y "));
   const auto world_offset = find_common_position_offset(frames, map, calibration, constant);
   ASSERT_TRUE(world_offset);
   EXPECT_FALSE(world_offset->in_camera);
-  EXPECT_THAT(describe(*world_offset),
+  EXPECT_THAT(describe_common_position_offset(*world_offset),
               HasSubstr("in one direction of the room (x -30.3 mm, y +0.0 mm): the known points"));
   EXPECT_FALSE(find_common_position_offset(frames, map, calibration, scattered));
 }
 
 struct LensFault : ExampleRig {};
 
-TEST_F(LensFault, ReturnsEmptyForCorrectLens) {
-  EXPECT_EQ(describe_contradiction_to_lens(frames, map, calibration), "");
+TEST_F(LensFault, DescribeContradictionToCalibratedLensIsEmptyForCorrectLens) {
+  EXPECT_EQ(describe_contradiction_to_calibrated_lens(frames, map, calibration), "");
   // A slightly different lens is not another lens.
   calibration.camera.intrinsics[0] *= 1.0005;
   calibration.camera.intrinsics[2] += 0.3;
-  EXPECT_EQ(describe_contradiction_to_lens(frames, map, calibration), "");
+  EXPECT_EQ(describe_contradiction_to_calibrated_lens(frames, map, calibration), "");
 }
 
 /// As if the boards were of another unit.
-TEST_F(LensFault, ReportsLensEstimatedFromLamps) {
+TEST_F(LensFault, DescribeContradictionToCalibratedLensStatesFocalLengthsOfLampsAndBoards) {
   auto& lens = calibration.camera.intrinsics;
   const double shown_px = std::sqrt(lens[0] * lens[1]);
   for (const double focal : {0.98, 1.02}) {
@@ -198,7 +198,7 @@ TEST_F(LensFault, ReportsLensEstimatedFromLamps) {
       lens[1] *= focal;
       lens[2] += off_px;
       lens[3] -= off_px;
-      const std::string fault = describe_contradiction_to_lens(frames, map, calibration);
+      const std::string fault = describe_contradiction_to_calibrated_lens(frames, map, calibration);
       EXPECT_THAT(fault, AllOf(StartsWith("lamps and boards are imaged by different lenses"),
                                HasSubstr(fmt::format("the boards a focal length of {:.1f} px",
                                                      std::sqrt(lens[0] * lens[1])))))
@@ -213,19 +213,20 @@ TEST_F(LensFault, ReportsLensEstimatedFromLamps) {
 }
 
 /// A displaced lamp is an error of the map.
-TEST_F(LensFault, ReturnsEmptyForDisplacedLamp) {
+TEST_F(LensFault, DescribeContradictionToCalibratedLensIsEmptyForDisplacedLamp) {
   for (Lamp& lamp : map.lamps) {
     const Eigen::Vector3d kept_m = lamp.position_m;
     lamp.position_m += Eigen::Vector3d(0.02, -0.01, 0);
-    EXPECT_EQ(describe_contradiction_to_lens(frames, map, calibration), "") << lamp.id;
+    EXPECT_EQ(describe_contradiction_to_calibrated_lens(frames, map, calibration), "") << lamp.id;
     lamp.position_m = kept_m;
   }
 }
 
-TEST_F(LensFault, ReturnsEmptyForTooFewCaptures) {
+TEST_F(LensFault, DescribeContradictionToCalibratedLensIsEmptyForTooFewCaptures) {
   calibration.camera.intrinsics[0] *= 1.02;
-  EXPECT_EQ(describe_contradiction_to_lens({}, map, calibration), "");
-  EXPECT_EQ(describe_contradiction_to_lens(std::span(frames).first(1), map, calibration), "");
+  EXPECT_EQ(describe_contradiction_to_calibrated_lens({}, map, calibration), "");
+  EXPECT_EQ(describe_contradiction_to_calibrated_lens(std::span(frames).first(1), map, calibration),
+            "");
 }
 
 /// Captures at known heights, equal to the fixes of the true camera.
@@ -233,8 +234,8 @@ struct OtherCamera : LensFault {
   OtherCamera() {
     const Positioner positioner(map, calibration);
     for (std::size_t i = 0; i < frames.size(); ++i) {
-      const Fix fix = positioner.locate(frames[i].detections);
-      if (!fix.ok()) continue;
+      const Fix fix = positioner.compute_position_fix(frames[i].detections);
+      if (!fix.has_succeeded()) continue;
       CapturesWithPositions& captures = i % 2 == 0 ? reference : check;
       captures.places[frames[i].image].z_m = fix.estimate.pose.position_m.z();
       captures.frames.push_back(frames[i]);
@@ -245,9 +246,9 @@ struct OtherCamera : LensFault {
     const Lens lens(calibration.camera.lens_model, calibration.camera.intrinsics);
     for (Frame& frame : check.frames) {
       for (Detection& lamp : frame.detections) {
-        const auto ray = lens.unproject(lamp.pixel);
+        const auto ray = lens.unproject_pixel(lamp.pixel);
         ASSERT_TRUE(ray);
-        const auto pixel = other.project(other_from_camera * ray->direction);
+        const auto pixel = other.project_point(other_from_camera * ray->direction);
         ASSERT_TRUE(pixel);
         lamp.pixel = *pixel;
       }
@@ -256,7 +257,7 @@ struct OtherCamera : LensFault {
   CapturesWithPositions reference, check;
 };
 
-TEST_F(OtherCamera, IsEmptyForTiltedUnit) {
+TEST_F(OtherCamera, DescribeDifferencesReturnEmptyTextForTiltedUnit) {
   ASSERT_GT(check.frames.size(), 10U);
   set_camera(Lens(calibration.camera.lens_model, calibration.camera.intrinsics),
              Eigen::AngleAxisd(0.005, Eigen::Vector3d(1, 2, 0).normalized()).toRotationMatrix());
@@ -264,7 +265,7 @@ TEST_F(OtherCamera, IsEmptyForTiltedUnit) {
   EXPECT_EQ(describe_lens_difference(check.frames, reference.frames, map, calibration), "");
 }
 
-TEST_F(OtherCamera, IsReportedForDifferentFocalLength) {
+TEST_F(OtherCamera, DescribeFocalLengthDifferenceReportsOnePercentShorterFocalLength) {
   auto intrinsics = calibration.camera.intrinsics;
   intrinsics[0] *= 0.99;
   intrinsics[1] *= 0.99;
@@ -276,7 +277,7 @@ TEST_F(OtherCamera, IsReportedForDifferentFocalLength) {
       << "no heights to compare";
 }
 
-TEST_F(OtherCamera, IsReportedForDifferentCenter) {
+TEST_F(OtherCamera, DescribeLensDifferenceReportsDisplacedPrincipalPoint) {
   auto intrinsics = calibration.camera.intrinsics;
   intrinsics[2] += 12;
   intrinsics[3] -= 8;

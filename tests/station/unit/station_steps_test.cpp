@@ -23,28 +23,31 @@ struct StationSteps : testing::Test {
   CapturesTable places = read_captures_csv(kExample + "truth.csv");
 };
 
-TEST_F(StationSteps, RunCheckStepLocatesAllKnownPoints) {
-  const StepResult result = run_check_step(config, calibration, frames, places);
-  EXPECT_TRUE(result.ok()) << result.why;
+TEST_F(StationSteps, CheckPositionAccuracyOnStationReturnsFixFractionOneForExactCaptures) {
+  const StepResult result = check_position_accuracy_on_station(config, calibration, frames, places);
+  EXPECT_TRUE(result.has_succeeded()) << result.why;
   EXPECT_EQ(result.metrics[0].name, "check_fix_fraction");
   EXPECT_EQ(result.metrics[0].value, 1);
 }
 
-TEST_F(StationSteps, FailForTooFewKnownPositions) {
+TEST_F(StationSteps, CheckAndDispersionStepsFailForTooFewKnownPositions) {
   places.erase(places.begin());
-  EXPECT_THAT(run_check_step(config, calibration, frames, places).why,
+  EXPECT_THAT(check_position_accuracy_on_station(config, calibration, frames, places).why,
               HasSubstr("1 of the 36 captures"));
-  EXPECT_THAT(run_dispersion_step(config, calibration, frames, places).why,
+  EXPECT_THAT(calibrate_dispersion_on_station(config, calibration, frames, places).why,
               HasSubstr("1 of the 36 captures"));
   config.sufficient.check_captures = 35;
-  EXPECT_TRUE(run_check_step(config, calibration, frames, places).ok());
-  EXPECT_THAT(run_check_step(config, calibration, {}, places).why, HasSubstr("have no position"));
+  EXPECT_TRUE(
+      check_position_accuracy_on_station(config, calibration, frames, places).has_succeeded());
+  EXPECT_THAT(check_position_accuracy_on_station(config, calibration, {}, places).why,
+              HasSubstr("have no position"));
 }
 
 /// Lamps below their heights in the map: horizontal positions are right, heights are wrong.
-TEST_F(StationSteps, RunCheckStepComputesHeightError) {
+TEST_F(StationSteps, CheckPositionAccuracyOnStationReturnsHeightErrorOfDisplacedLamps) {
   const auto height_mm = [&] {
-    const StepResult result = run_check_step(config, calibration, frames, places);
+    const StepResult result =
+        check_position_accuracy_on_station(config, calibration, frames, places);
     for (const auto& [name, value] : result.metrics) {
       if (name == "check_height_mm") return value;
     }

@@ -30,30 +30,32 @@ struct UnitImages : testing::Test {
     } else {
       folder.file(name, "no image");
     }
-    unit.add(StationStep::boards, {file});
+    unit.add_step_images(StationStep::boards, {file});
   }
-  const UnitStep& boards() const { return unit.step(StationStep::boards); }
-  std::string refusal(const std::string& name) const { return boards().images.at(name).refusal(); }
+  const UnitStep& boards() const { return unit.step_state(StationStep::boards); }
+  std::string refusal(const std::string& name) const {
+    return boards().images.at(name).rejection_message();
+  }
 
   StationConfig config = read_station_config(VLP_SOURCE_DIR "/datasets/station/station.yaml");
   TemporaryFolder folder;
   Unit unit{config, "unit", {"test", "0"}, 1};
 };
 
-TEST_F(UnitImages, DuplicateIsUsedWhenFirstIsRemoved) {
+TEST_F(UnitImages, UsesDuplicateImageWhenFirstIsRemoved) {
   add_image("a.png", true);
   add_image("b.png", true);
   EXPECT_EQ(refusal("a.png"), "");
   EXPECT_EQ(refusal("b.png"), "is the same image as a.png");
-  unit.remove_file(StationStep::boards, "a.png");
+  unit.remove_deleted_image(StationStep::boards, "a.png");
   EXPECT_EQ(refusal("b.png"), "");
   add_image("a.png", true);
   EXPECT_EQ(refusal("a.png"), "is the same image as b.png");
 }
 
-TEST_F(UnitImages, OverwrittenImageIsReplaced) {
+TEST_F(UnitImages, OverwrittenImageReplacesOldImageAndDiscardsResult) {
   add_image("a.png", true);
-  unit.solve_complete_steps(false);
+  unit.solve_completed_station_steps(false);
   ASSERT_TRUE(boards().result);  // a problem: one view makes no lens
   add_image("b.png", true);
   EXPECT_TRUE(boards().result) << "an image that is not used changes nothing";
@@ -63,27 +65,27 @@ TEST_F(UnitImages, OverwrittenImageIsReplaced) {
   EXPECT_EQ(refusal("b.png"), "");
 }
 
-TEST_F(UnitImages, RejectionRemainsWhenFileIsDiscarded) {
+TEST_F(UnitImages, DiscardedUnreadableImagesStillCountAsRefused) {
   add_image("a.png", true);
   for (const char* name : {"b.png", "c.png"}) {
     add_image(name, false);
     fs::remove(folder / name);
-    unit.discard_image(StationStep::boards, name);
+    unit.mark_image_discarded(StationStep::boards, name);
   }
   EXPECT_EQ(boards().num_consecutive_rejections, 0);
   add_image("d.png", true);
-  unit.discard_image(StationStep::boards, "d.png");  // same pose: no fault
+  unit.mark_image_discarded(StationStep::boards, "d.png");  // same pose: no fault
   EXPECT_FALSE(boards().images.contains("d.png"));
-  unit.remove_file(StationStep::boards, "a.png");
-  unit.solve_complete_steps(true);
+  unit.remove_deleted_image(StationStep::boards, "a.png");
+  unit.solve_completed_station_steps(true);
   EXPECT_THAT(find_causes_of_failure(unit),
               ElementsAre(testing::Field(&Cause::text, AllOf(HasSubstr("boards (0/1)"),
                                                              HasSubstr("2 of 2 images refused")))));
 }
 
-TEST_F(UnitImages, UnreadableImageIsRejected) {
+TEST_F(UnitImages, RejectsFolderAndMissingFileAsUnreadableImage) {
   fs::create_directory(folder / "a.png");
-  unit.add(StationStep::boards, {folder / "a.png", folder / "gone.png"});
+  unit.add_step_images(StationStep::boards, {folder / "a.png", folder / "gone.png"});
   EXPECT_EQ(refusal("a.png"), "cannot be read as an image");
   EXPECT_EQ(refusal("gone.png"), "cannot be read as an image");
 }

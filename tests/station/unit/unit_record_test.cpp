@@ -14,12 +14,12 @@ using testing::Field;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-TEST(FindCausesOfFailure, OrdersStationBeforeImagesBeforeMissingImages) {
+TEST(FindCausesOfFailure, OrdersStationFaultsBeforeRefusedBeforeMissingImages) {
   const StationConfig config = read_station_config(VLP_SOURCE_DIR "/datasets/station/station.yaml");
   const TemporaryFolder folder;
   Unit unit(config, "camera", {"test", "0"}, 1);
-  unit.add(StationStep::boards, {folder.file("0.png", "no image")});
-  unit.end_unit_early("the operator ended the run");
+  unit.add_step_images(StationStep::boards, {folder.file("0.png", "no image")});
+  unit.end_unit_before_completion("the operator ended the run");
   unit.invalidate_verdict("the golden unit failed");
   EXPECT_THAT(find_causes_of_failure(unit),
               ElementsAre(Field(&Cause::text, "the golden unit failed"),

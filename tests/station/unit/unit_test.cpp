@@ -29,37 +29,37 @@ struct UnitTest : testing::Test {
 
   void add_bad(int number) {
     const auto file = folder.file(std::to_string(100 + number) + ".png", "no image");
-    unit.add(StationStep::boards, {file});
+    unit.add_step_images(StationStep::boards, {file});
   }
 };
 
-TEST_F(UnitTest, StartsWithBoards) {
-  EXPECT_EQ(unit.current_step(), StationStep::boards);
-  EXPECT_FALSE(unit.calibration());
+TEST_F(UnitTest, StartsWithBoardsStepAndInvalidVerdict) {
+  EXPECT_EQ(unit.first_incomplete_step(), StationStep::boards);
+  EXPECT_FALSE(unit.latest_calibration());
   EXPECT_THAT(find_causes_of_failure(unit),
               ElementsAre(Field(&Cause::text, HasSubstr("boards: too few images"))));
-  EXPECT_EQ(decide_verdict(find_causes_of_failure(unit)), Verdict::invalid);
+  EXPECT_EQ(decide_verdict_from_causes(find_causes_of_failure(unit)), Verdict::invalid);
 }
 
-TEST_F(UnitTest, CannotPassAnyMoreAfterMaxConsecutiveRejections) {
+TEST_F(UnitTest, CanNoLongerPassAfterMaxConsecutiveRejections) {
   for (int i = 0; i < config.max_consecutive_rejections; ++i) {
-    EXPECT_FALSE(unit.cannot_pass_any_more()) << i;
+    EXPECT_FALSE(unit.can_no_longer_pass()) << i;
     add_bad(i);
   }
-  EXPECT_TRUE(unit.cannot_pass_any_more());
-  EXPECT_EQ(unit.step(StationStep::boards).count_used_images(), 0);
-  unit.solve_complete_steps(true);
+  EXPECT_TRUE(unit.can_no_longer_pass());
+  EXPECT_EQ(unit.step_state(StationStep::boards).count_used_images(), 0);
+  unit.solve_completed_station_steps(true);
   EXPECT_THAT(
       find_causes_of_failure(unit),
       ElementsAre(Field(&Cause::text, HasSubstr("12 of 12 images refused: 12 cannot be read"))));
-  EXPECT_EQ(decide_verdict(find_causes_of_failure(unit)), Verdict::invalid)
+  EXPECT_EQ(decide_verdict_from_causes(find_causes_of_failure(unit)), Verdict::invalid)
       << "images that cannot be read are no fault";
-  unit.remove_file(StationStep::boards, "100.png");
-  EXPECT_FALSE(unit.cannot_pass_any_more());
+  unit.remove_deleted_image(StationStep::boards, "100.png");
+  EXPECT_FALSE(unit.can_no_longer_pass());
 }
 
 /// As after a restart of a killed program: all images arrive at once, by name.
-TEST_F(UnitTest, IsNotHopelessIfOneImageOfBatchIsUsed) {
+TEST_F(UnitTest, CanStillPassWhenOneImageOfBatchIsUsed) {
   const auto valid_view = folder / "000.png";
   fs::copy_file(kView, valid_view);
   std::vector<fs::path> together{valid_view};
@@ -67,34 +67,35 @@ TEST_F(UnitTest, IsNotHopelessIfOneImageOfBatchIsUsed) {
     together.push_back(folder.file(std::to_string(100 + i) + ".png", "no image"));
   }
   // In two batches, as at the station.
-  unit.add(StationStep::boards, std::vector<fs::path>(together.begin(), together.end() - 1), true);
-  EXPECT_FALSE(unit.cannot_pass_any_more());
-  unit.add(StationStep::boards, {together.back()});
-  EXPECT_FALSE(unit.cannot_pass_any_more());
-  EXPECT_EQ(unit.step(StationStep::boards).num_consecutive_rejections, 0);
+  unit.add_step_images(StationStep::boards,
+                       std::vector<fs::path>(together.begin(), together.end() - 1), true);
+  EXPECT_FALSE(unit.can_no_longer_pass());
+  unit.add_step_images(StationStep::boards, {together.back()});
+  EXPECT_FALSE(unit.can_no_longer_pass());
+  EXPECT_EQ(unit.step_state(StationStep::boards).num_consecutive_rejections, 0);
   // Added one by one, their order is known.
   for (int i = 0; i < config.max_consecutive_rejections; ++i) add_bad(100 + i);
-  EXPECT_TRUE(unit.cannot_pass_any_more());
+  EXPECT_TRUE(unit.can_no_longer_pass());
 }
 
-TEST_F(UnitTest, CannotPassAnyMoreIfAllImagesOfBatchAreRejected) {
+TEST_F(UnitTest, CanNoLongerPassIfAllImagesOfBatchAreRejected) {
   std::vector<fs::path> together;
   for (int i = 0; i < config.max_consecutive_rejections; ++i) {
     together.push_back(folder.file(std::to_string(100 + i) + ".png", "no image"));
   }
-  unit.add(StationStep::boards, together);
-  EXPECT_TRUE(unit.cannot_pass_any_more());
+  unit.add_step_images(StationStep::boards, together);
+  EXPECT_TRUE(unit.can_no_longer_pass());
 }
 
-TEST_F(UnitTest, IsInvalidIfEndedEarly) {
-  unit.end_unit_early("the operator ended the run");
+TEST_F(UnitTest, VerdictIsInvalidWhenUnitIsEndedEarly) {
+  unit.end_unit_before_completion("the operator ended the run");
   EXPECT_THAT(
       find_causes_of_failure(unit),
       ElementsAre(Field(&Cause::text,
                         "boards: the operator ended the run before there was enough (0/36)")));
-  const RunRecord record = make_unit_record(unit, make_run_id(), {"test", "0"});
+  const RunRecord record = make_unit_run_record(unit, make_run_id(), {"test", "0"});
   EXPECT_EQ(record.verdict, "INVALID");
-  EXPECT_TRUE(record.is_invalid());
+  EXPECT_TRUE(record.is_verdict_invalid());
   std::string screen;
   for (const ScreenLine& line : make_verdict_screen(record)) screen += line.text + "\n";
   EXPECT_THAT(screen,
@@ -104,7 +105,7 @@ TEST_F(UnitTest, IsInvalidIfEndedEarly) {
 }
 
 /// Missing gates are described by the unfinished step, or by their names.
-TEST(VerdictScreen, NamesUnfinishedStepWhenGatesAreUnmeasured) {
+TEST(MakeVerdictScreen, NamesUnfinishedStepOrUnmeasuredGates) {
   const auto gates_line = [](const RunRecord& record) {
     for (const ScreenLine& line : make_verdict_screen(record)) {
       if (line.text.starts_with("Gates")) return line.text;
@@ -121,19 +122,19 @@ TEST(VerdictScreen, NamesUnfinishedStepWhenGatesAreUnmeasured) {
   const auto measure = [&](const std::vector<Metric>& metrics) {
     record.metrics = check_gates(gates, metrics);
   };
-  record.set_verdict({{"boards: no image can be used"}});
+  record.set_verdict_from_causes({{"boards: no image can be used"}});
   measure({{"blur_px", 0.5}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 4 gates, because boards did not finish");
   // A metric of a failed step, and one available before a step is solved.
-  record.set_verdict({{"boards (36/36): two halves"}});
+  record.set_verdict_from_causes({{"boards (36/36): two halves"}});
   measure({{"blur_px", 0.5}, {"rms_px", 0.1}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 3 gates, because boards did not finish");
-  record.set_verdict({{"the golden unit failed"}, {"rotation: no image can be used"}});
+  record.set_verdict_from_causes({{"the golden unit failed"}, {"rotation: no image can be used"}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 3 gates, because rotation did not finish");
-  record.set_verdict({{"check: no image can be used"}});
+  record.set_verdict_from_causes({{"check: no image can be used"}});
   measure({{"blur_px", 0.5}, {"rms_px", 0.1}, {"rotation_px", 0.1}, {"dispersion_mm", 0.1}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 1 gate, because check did not finish");
-  record.set_verdict({{"the station has moved"}});
+  record.set_verdict_from_causes({{"the station has moved"}});
   measure({{"rms_px", 0.1}, {"rotation_px", 0.1}, {"dispersion_mm", 0.1}, {"check_mean_mm", 1}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: blur_px");
   measure({{"blur_px", 0.5},
@@ -149,84 +150,86 @@ TEST(VerdictScreen, NamesUnfinishedStepWhenGatesAreUnmeasured) {
             "Gates    not measured: blur_px, rms_px, rotation_px, dispersion_mm");
 }
 
-TEST_F(UnitTest, RejectsImageOfAnotherUnit) {
-  unit.reject_images_of_other_cameras([](const std::string&) { return ImageUser{"0001", "R"}; });
+TEST_F(UnitTest, RejectsImageUsedByAnotherCamera) {
+  unit.set_image_owner_lookup([](const std::string&) { return ImageUser{"0001", "R"}; });
   fs::copy_file(kView, folder / "0.png");
-  unit.add(StationStep::boards, {folder / "0.png"});
+  unit.add_step_images(StationStep::boards, {folder / "0.png"});
   EXPECT_EQ(
-      unit.step(StationStep::boards).images.at("0.png").refusal(),
+      unit.step_state(StationStep::boards).images.at("0.png").rejection_message(),
       "already of camera 0001, run R: if its serial was wrong, 'vlp-station void R --station " +
           config.file.string() + " --operator NAME --reason WHY' frees its images");
-  unit.solve_complete_steps(true);
+  unit.solve_completed_station_steps(true);
   EXPECT_THAT(find_causes_of_failure(unit),
               ElementsAre(Field(&Cause::text,
                                 HasSubstr("1 already of camera 0001, run R: if its serial was "
                                           "wrong, 'vlp-station void R --station "))));
-  EXPECT_EQ(decide_verdict(find_causes_of_failure(unit)), Verdict::invalid);
+  EXPECT_EQ(decide_verdict_from_causes(find_causes_of_failure(unit)), Verdict::invalid);
 }
 
-TEST(RejectRepetition, ReportsEarlierRun) {
+TEST(InvalidateRunForReusedImages, MakesRecordInvalidAndNamesEarlierRun) {
   RunRecord record;
-  record.set_verdict({});
-  ASSERT_TRUE(record.has_passed());
-  reject_reused_images(record, "R1", "station.yaml");
-  EXPECT_TRUE(record.is_invalid());
-  EXPECT_EQ(record.first_cause(),
+  record.set_verdict_from_causes({});
+  ASSERT_TRUE(record.has_run_passed());
+  invalidate_run_for_reused_images(record, "R1", "station.yaml");
+  EXPECT_TRUE(record.is_verdict_invalid());
+  EXPECT_EQ(record.first_verdict_cause(),
             "all images are those of run R1, which is no repetition: take new ones, or "
             "'vlp-station void R1 --station station.yaml --operator NAME --reason WHY' if that run "
             "should not count");
 }
 
-TEST(DecideVerdict, ReturnsVerdictOfFirstCause) {
-  EXPECT_EQ(decide_verdict({}), Verdict::pass);
-  EXPECT_EQ(decide_verdict({{"decentered", true}, {"the operator left"}}), Verdict::fail);
-  EXPECT_EQ(decide_verdict({{"lamp 5 is loose"}, {"the fixes are off", true}}), Verdict::invalid);
+TEST(DecideVerdictFromCauses, ReturnsVerdictOfFirstCause) {
+  EXPECT_EQ(decide_verdict_from_causes({}), Verdict::pass);
+  EXPECT_EQ(decide_verdict_from_causes({{"decentered", true}, {"the operator left"}}),
+            Verdict::fail);
+  EXPECT_EQ(decide_verdict_from_causes({{"lamp 5 is loose"}, {"the fixes are off", true}}),
+            Verdict::invalid);
 }
 
-TEST_F(UnitTest, QueuesImagesUntilPreviousStepIsComplete) {
+TEST_F(UnitTest, QueuesImagesOfStepUntilPreviousStepIsComplete) {
   const auto file = folder.file("0.png", "no image");
-  unit.add(StationStep::check, {file});
-  unit.solve_complete_steps(false);
-  EXPECT_EQ(unit.step(StationStep::check).waiting.size(), 1u);
-  unit.remove_file(StationStep::check, "0.png");
-  EXPECT_TRUE(unit.step(StationStep::check).waiting.empty());
+  unit.add_step_images(StationStep::check, {file});
+  unit.solve_completed_station_steps(false);
+  EXPECT_EQ(unit.step_state(StationStep::check).waiting.size(), 1u);
+  unit.remove_deleted_image(StationStep::check, "0.png");
+  EXPECT_TRUE(unit.step_state(StationStep::check).waiting.empty());
 }
 
-TEST_F(UnitTest, ScreenFits80Columns) {
+TEST_F(UnitTest, ScreenLinesHaveAtMost80Characters) {
   add_bad(1);
   add_bad(2);
   for (const ScreenLine& line : make_station_screen(unit))
     EXPECT_LE(line.text.size(), 80u) << line.text;
-  const RunRecord record = make_unit_record(unit, make_run_id(), {"test", "0"});
-  EXPECT_FALSE(record.has_passed());
+  const RunRecord record = make_unit_run_record(unit, make_run_id(), {"test", "0"});
+  EXPECT_FALSE(record.has_run_passed());
   for (const ScreenLine& line : make_verdict_screen(record)) {
     EXPECT_LE(line.text.size(), 80u) << line.text;
   }
 }
 
-TEST_F(UnitTest, ReportContainsVerdict) {
-  RunRecord record = make_unit_record(unit, make_run_id(), {"test", "0"});
-  EXPECT_THAT(make_unit_report(record, "", {}),
+TEST_F(UnitTest, ReportStatesVerdictOrNoneForEditedRecord) {
+  RunRecord record = make_unit_run_record(unit, make_run_id(), {"test", "0"});
+  EXPECT_THAT(make_run_report_html(record, "", {}),
               AllOf(HasSubstr("<strong>INVALID</strong><p>boards: too few images"),
                     HasSubstr("not\u00a0reached"), Not(HasSubstr("NOT\u00a0MET"))));
   record.images = {{"boards", "7.png", "", "too dark"}};
-  EXPECT_THAT(make_unit_report(record, "", {}),
+  EXPECT_THAT(make_run_report_html(record, "", {}),
               AllOf(HasSubstr("boards/7.png"), HasSubstr("too dark")));
   record.metrics =
       check_gates({{"coverage", 0.7}, {"rms_px", 0.3}}, {{"coverage", 0.75}, {"rms_px", 0.1}});
   record.causes.clear();
   record.verdict = "PASS";
-  EXPECT_THAT(make_unit_report(record, "", {}),
+  EXPECT_THAT(make_run_report_html(record, "", {}),
               AllOf(HasSubstr("<strong>PASS"), HasSubstr("at least\u00a00.7"), HasSubstr("0.75"),
                     Not(HasSubstr("is not met")), Not(HasSubstr("confidence interval"))));
   // Once, with its meaning, among the gates.
-  const std::string page = make_unit_report(record, "", {});
+  const std::string page = make_run_report_html(record, "", {});
   EXPECT_EQ(page.find("coverage: share"), page.rfind("coverage: share"));
   // Edited in the database.
   record.metrics[1].value = 0.5;
-  EXPECT_THAT(find_verdict_problem(record),
+  EXPECT_THAT(describe_verdict_problem(record),
               HasSubstr("rms_px is 0.5 px, at most 0.3 px is required"));
-  EXPECT_THAT(make_unit_report(record, "", {}),
+  EXPECT_THAT(make_run_report_html(record, "", {}),
               AllOf(HasSubstr("NO VERDICT</strong><p>the record has PASS, but rms_px"),
                     Not(HasSubstr("<strong>PASS"))));
   for (const ScreenLine& line : make_verdict_screen(record)) {

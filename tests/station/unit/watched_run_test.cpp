@@ -41,42 +41,42 @@ class WatchedRunTest : public testing::Test {
   Spool spool{folder / "spool", (folder / "records.db").string()};
 };
 
-TEST_F(WatchedRunTest, WritesNoFrameThroughALinkThatCameLater) {
+TEST_F(WatchedRunTest, WritesNoFrameWhenFolderBecameSymbolicLink) {
   const fs::path video = folder / "black.avi";
   const cv::Mat frame(600, 800, CV_8UC1, cv::Scalar(0));
   if (!write_video(video, {frame, frame})) GTEST_SKIP() << "OpenCV writes no video here";
   StepSources sources({video.string()}, {800, 600});
   WatchedRun run(unit, spool);
-  sources.write_next_frame(unit, run);
-  ASSERT_TRUE(fs::exists(run.folder() / "boards/frame-000000.png"));
+  sources.write_next_frame_of_step(unit, run);
+  ASSERT_TRUE(fs::exists(run.run_folder() / "boards/frame-000000.png"));
   replace_by_link("captures/0001/boards");
-  EXPECT_THAT(rejection_message([&] { sources.write_next_frame(unit, run); }),
+  EXPECT_THAT(rejection_message([&] { sources.write_next_frame_of_step(unit, run); }),
               HasSubstr("boards: was moved or replaced while it was in use"));
   EXPECT_TRUE(fs::is_empty(folder / "elsewhere"));
 }
 
-TEST_F(WatchedRunTest, RemovesNoFileThroughALinkThatCameLater) {
+TEST_F(WatchedRunTest, DeleteRejectedImageFileKeepsFileBehindLaterSymbolicLink) {
   WatchedRun run(unit, spool);
   for (const char* name : {"captures/0001/boards/a.png", "elsewhere/a.png"}) folder.file(name, "a");
   replace_by_link("captures/0001/boards");
-  run.discard_image(StationStep::boards, "a.png");
+  run.delete_rejected_image_file(StationStep::boards, "a.png");
   EXPECT_FALSE(fs::exists(folder / "moved/a.png"));
   EXPECT_TRUE(fs::exists(folder / "elsewhere/a.png"));
 }
 
-TEST_F(WatchedRunTest, PutsAwayItsOwnFolderOnly) {
+TEST_F(WatchedRunTest, RenameFinishedRunFolderThrowsWhenFolderWasReplaced) {
   {
     const WatchedRun run(unit, spool);
     replace_by_link("captures/0001");
-    EXPECT_THAT(rejection_message([&] { run.rename_finished_folder(); }),
+    EXPECT_THAT(rejection_message([&] { run.rename_finished_run_folder(); }),
                 HasSubstr("0001: was moved or replaced while it was in use"));
-    EXPECT_TRUE(fs::is_symlink(run.folder()));
+    EXPECT_TRUE(fs::is_symlink(run.run_folder()));
   }
   fs::remove(folder / "captures/0001");
   fs::rename(folder / "moved", folder / "captures/0001");
   const WatchedRun again(unit, spool);
-  again.rename_finished_folder();
-  EXPECT_TRUE(fs::exists(folder / ("captures/0001." + again.run())));
+  again.rename_finished_run_folder();
+  EXPECT_TRUE(fs::exists(folder / ("captures/0001." + again.run_id())));
 }
 
 std::vector<std::string> names(const std::vector<std::filesystem::path>& files) {
@@ -85,7 +85,7 @@ std::vector<std::string> names(const std::vector<std::filesystem::path>& files) 
   return all;
 }
 
-TEST(WatchedFolder, ReportsImageAfterWritingEnds) {
+TEST(WatchedFolder, ReportsImageOnceItsContentNoLongerChanges) {
   const TemporaryFolder folder;
   WatchedFolder watched(folder / "");
   EXPECT_THAT(watched.poll_folder_changes().added, IsEmpty());
@@ -110,7 +110,7 @@ TEST(WatchedFolder, ReportsOverwrittenAndRemovedImages) {
   EXPECT_THAT(names(watched.poll_folder_changes().added), ElementsAre("a.png"));
 }
 
-TEST(WatchedFolder, IgnoresOtherFiles) {
+TEST(WatchedFolder, IgnoresHiddenEmptyAndNonImageFilesAndFolders) {
   const TemporaryFolder folder;
   folder.file(".a.png", "in the making");
   folder.file("captures.csv", "image\n");
@@ -121,7 +121,7 @@ TEST(WatchedFolder, IgnoresOtherFiles) {
   EXPECT_THAT(watched.poll_folder_changes().added, IsEmpty());
 }
 
-TEST(WatchedFolder, AcceptsMissingFolder) {
+TEST(WatchedFolder, ReportsImagesOfFolderCreatedLater) {
   const TemporaryFolder folder;
   WatchedFolder watched(folder / "later");
   EXPECT_THAT(watched.poll_folder_changes().added, IsEmpty());

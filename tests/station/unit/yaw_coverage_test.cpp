@@ -27,7 +27,7 @@ struct YawCoverageTest : testing::Test {
   std::vector<Frame> frames = read_detections(kExample + "turning.csv");
 };
 
-TEST_F(YawCoverageTest, IsCompleteForAllCaptures) {
+TEST_F(YawCoverageTest, IsSufficientForCapturesAroundFullTurn) {
   const YawCoverage map = compute_yaw_coverage(frames, config, calibration);
   ASSERT_THAT(map.heights, SizeIs(2));
   for (const auto& height : map.heights) {
@@ -38,7 +38,7 @@ TEST_F(YawCoverageTest, IsCompleteForAllCaptures) {
   EXPECT_TRUE(map.sufficient);
 }
 
-TEST_F(YawCoverageTest, ReportsMissingAngles) {
+TEST_F(YawCoverageTest, MarksMissingYawsAndIsInsufficient) {
   frames.erase(frames.begin() + 4, frames.begin() + 7);
   const YawCoverage map = compute_yaw_coverage(frames, config, calibration);
   ASSERT_THAT(map.heights, SizeIs(2));
@@ -48,7 +48,7 @@ TEST_F(YawCoverageTest, ReportsMissingAngles) {
 }
 
 // Not from the lowest capture, which depends on the last micrometers of the fixes.
-TEST_F(YawCoverageTest, StartsAtYawOfFirstCapture) {
+TEST_F(YawCoverageTest, FirstPartIsAtYawOfFirstCapture) {
   frames.resize(3);
   const auto forwards = compute_yaw_coverage(frames, config, calibration).heights.at(0).parts;
   std::reverse(frames.begin(), frames.end());
@@ -59,7 +59,7 @@ TEST_F(YawCoverageTest, StartsAtYawOfFirstCapture) {
   EXPECT_NE(forwards[11], backwards[11]);
 }
 
-TEST_F(YawCoverageTest, ReturnsAllHeights) {
+TEST_F(YawCoverageTest, ReturnsEachHeightAndRequiresConfiguredNumber) {
   frames.erase(frames.begin() + 12, frames.end());
   EXPECT_THAT(compute_yaw_coverage(frames, config, calibration).heights, SizeIs(1));
   EXPECT_FALSE(compute_yaw_coverage(frames, config, calibration).sufficient);
