@@ -16,8 +16,9 @@ namespace vlp {
 /// position minus the lever arm.
 enum class PlaceOf { camera, axis };
 
-/// Row of captures.csv: sensor data of one capture and the known pose of the camera. Optional
-/// values are std::nullopt if the field is empty or the column is missing.
+/// Row of captures.csv: sensor data of one capture, the known position of the camera or of the axis
+/// of rotation (`place`), and the camera's yaw. Optional values are std::nullopt if the field is
+/// empty or the column is missing.
 struct Capture {
   std::optional<double> time_s;
   /// Known position in the world, m, of the point `place`: the camera or the axis of rotation.

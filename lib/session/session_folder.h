@@ -21,9 +21,10 @@ namespace vlp {
 ///
 /// All functions throw InputError if a table cannot be read.
 
-/// Reads the captures.csv of a folder. For images in truth.csv, positions, heights and yaws are
-/// replaced by those of truth.csv, which are those of the camera and have no standard deviation.
-/// Returns rows by image name; an empty table if neither file exists.
+/// Reads the captures.csv of a folder. For images in truth.csv, positions are replaced by the
+/// camera's positions in truth.csv, which have no standard deviation. Heights and yaws are replaced
+/// where truth.csv has them. Images only in truth.csv are added. Returns rows by image name; an
+/// empty table if neither file exists.
 /// @throws InputError if a table cannot be read
 CapturesTable read_captures_with_truth(const std::filesystem::path& folder);
 /// Returns the table with the ground truth of the folder: truth.csv, or captures.csv if it has

@@ -74,7 +74,6 @@ class BoardWarp {
 class BoardPattern {
  public:
   /// Creates the pattern of a board.
-  /// Creates the pattern of a board.
   /// @throws std::invalid_argument if make_board_pattern() rejects the board
   explicit BoardPattern(const SceneBoard& board);
 

@@ -20,10 +20,10 @@ struct ViewPose {
 };
 
 /// Estimates camera_from_board of one view by minimizing the reprojection residuals of its corners,
-/// px.
+/// px, each times Corner::weight.
 ///
-/// @return pose and RMS residual; std::nullopt if fewer than four corners have a ray within 90
-///     degrees of their mean ray, or if neither pose can be projected
+/// @return pose and RMS of the weighted residuals; std::nullopt if fewer than four corners have a
+///     ray within 90 degrees of their mean ray, or if no pose projects all corners
 ///
 /// A plane has two poses that look almost the same: tilted to one side or to the other. Both are
 /// estimated in the undistorted image for a flat board (Collins and Bartoli, "Infinitesimal

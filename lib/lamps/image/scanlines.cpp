@@ -70,7 +70,7 @@ void fill_scanlines(const ImageView& image, const TileMask& lit, double dark,
   const TileMask turned = dilate_tile_mask(lit);
   for (int row = 0; row < turned.rows; ++row) {
     for (int column = 0; column < turned.columns; ++column) {
-      if (turned.row(row)[column] == 0) continue;
+      if (turned.tile_row(row)[column] == 0) continue;
       transpose(image, pixel_box_from_tile_box({column, row, 1, 1}, image.size()), pixels);
     }
   }

@@ -359,7 +359,7 @@ std::optional<OutlineShift> estimate_shift(const std::vector<RimPiece>& pieces) 
     if (!last) return std::nullopt;
     x -= last->step;
   }
-  return OutlineShift{x.template head<2>(), last->covariance(1).template topLeftCorner<2, 2>(),
+  return OutlineShift{x.template head<2>(), last->parameter_covariance(1).template topLeftCorner<2, 2>(),
                       last->sum_of_weights};
 }
 

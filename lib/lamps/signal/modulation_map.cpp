@@ -111,7 +111,7 @@ class Watershed {
     bool beside_border = false;
     for (int v = std::max(0, y - 1); v <= std::min(map_.steps - 1, y + 1); ++v) {
       for (int u = std::max(0, x - 1); u <= std::min(map_.cells - 1, x + 1); ++u) {
-        const int label = labels_[map.cell_index(v, u)];
+        const int label = labels_[map_.cell_index(v, u)];
         beside_border = beside_border || label == kBorder;
         if (label < 0) continue;
         const int other = find_root(label);
