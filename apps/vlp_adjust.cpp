@@ -29,7 +29,7 @@ struct Options {
   CaptureOptions images;  // without the sets
   std::vector<std::string> sets, turns;
   std::string refined_map;
-  std::optional<double> map_sd_m, place_sd_m, lens_sd_px;
+  std::optional<double> map_sd_m, position_sd_m, lens_sd_px;
   MotionOptions motion;
   std::optional<double> yaw_rate_sd_deg_per_s;
 };
@@ -49,7 +49,7 @@ AdjustSet read_set(const Options& options, const std::string& set, bool is_in_pl
     read.frames = collect_kept_lamp_frames(
         detect_lamps_in_captures(images, ImageUse::fixes, lamps, calibration).images);
     read.captures =
-        options.place_sd_m ? read_captures_with_truth(path) : read_captures_csv_of_folder(path);
+        options.position_sd_m ? read_captures_with_truth(path) : read_captures_csv_of_folder(path);
   } else {
     read.frames = read_detections(path);
     read.captures = read_captures_csv_of_folder(path.parent_path());
@@ -81,7 +81,7 @@ void run(const CLI::App& app, const Options& options) {
   input.calibration_file = images.calibration;
   if (images.frontend.readout) input.calibration.camera.readout = images.frontend.readout;
   input.map_sd_m = options.map_sd_m;
-  input.place_sd_m = options.place_sd_m;
+  input.position_sd_m = options.position_sd_m;
   input.lens_sd_px = options.lens_sd_px;
   input.motion = options.motion.make_motion_prior();
   input.yaw_rate_sd_rad_per_s = rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0));
@@ -102,12 +102,13 @@ void run(const CLI::App& app, const Options& options) {
   print_step_remarks(result);
   throw_if_step_failed(result);
   if (input.refine_map) {
-    write_refined_lamp_map(options.refined_map, result.found.refined, images.frontend.room);
+    write_refined_lamp_map(options.refined_map, result.adjustment.refined_map,
+                           images.frontend.room);
   }
   write_calibration(images.output, result.calibration);
   const auto& report = input.calibration.intrinsics_report;
   const bool lens_stated = input.lens_sd_px || (report && report->covariance);
-  print_joint_adjustment(result.found, input.calibration, lens_stated);
+  print_joint_adjustment(result.adjustment, input.calibration, lens_stated);
 }
 
 void add_options(CLI::App& app, Options& options) {
@@ -132,7 +133,7 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--map-sd-m", options.map_sd_m,
                  "Standard deviation per axis of lamp positions without sd_m, in m")
       ->check(make_finite_non_negative_validator());
-  app.add_option("--position-sd-m", options.place_sd_m,
+  app.add_option("--position-sd-m", options.position_sd_m,
                  "Standard deviation per axis of known positions without position_sd_m, in m. Also "
                  "uses truth.csv in folders of images (default: such positions are ignored)")
       ->check(make_finite_positive_validator());

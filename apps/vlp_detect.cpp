@@ -60,8 +60,8 @@ void run(const CaptureOptions& options, const std::string& captures) {
              found.images.size() - frames.size(), empty);
   fmt::print("lamps       {}\n", count(LightKind::lamp));
   fmt::print("no lamps    {} cut by the image border, {} unknown, {} steady, {} without outline\n",
-             count(LightKind::cut), count(LightKind::unknown), count(LightKind::steady),
-             count(LightKind::formless));
+             count(LightKind::truncated), count(LightKind::unknown), count(LightKind::unmodulated),
+             count(LightKind::no_outline));
   for (const auto& [kind, reason, lights] : count_rejected_lights_by_reason(found.images)) {
     fmt::print("  {:<8}  {}, {}: {}\n", lights, light_kind_name(kind), light_reason_name(reason),
                describe_light_reason(reason));

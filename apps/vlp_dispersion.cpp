@@ -30,7 +30,7 @@ const std::map<std::string, DispersionCircle> kCircles{{"mean", DispersionCircle
 
 struct Options {
   CaptureOptions images;
-  std::optional<std::array<double, 2>> station_m;
+  std::optional<std::array<double, 2>> reference_point_m;
   /// File captures.csv; empty: the one in the folder.
   std::string captures;
   std::string plot;
@@ -45,17 +45,19 @@ CapturesTable read_captures_table(const Options& options) {
   } else if (std::filesystem::is_directory(options.images.images)) {
     captures = read_captures_with_truth(options.images.images);
   }
-  if (!options.station_m) return captures;
+  if (!options.reference_point_m) return captures;
   for (auto& [image, capture] : captures) capture.x_m = capture.y_m = std::nullopt;
   return captures;
 }
 
 KnownPositions find_places(const Options& options, const std::vector<Frame>& frames,
                            const CapturesTable& captures) {
-  std::optional<Eigen::Vector2d> station_m;
-  if (options.station_m) station_m = Eigen::Vector2d(options.station_m->data());
+  std::optional<Eigen::Vector2d> reference_point_m;
+  if (options.reference_point_m)
+    reference_point_m = Eigen::Vector2d(options.reference_point_m->data());
   KnownPositions places = collect_captures_at_known_positions(
-      frames, captures, station_m, options.of == "axis" ? PlaceOf::axis : PlaceOf::camera);
+      frames, captures, reference_point_m,
+      options.of == "axis" ? MeasuredPoint::axis : MeasuredPoint::camera);
   if (places.captures.empty() && captures.empty()) {
     throw std::invalid_argument(
         "the positions of the captures are unknown; give --reference-point or --captures");
@@ -66,9 +68,9 @@ KnownPositions find_places(const Options& options, const std::vector<Frame>& fra
                      "no capture has a position; add columns x_m and y_m for these images, or give "
                      "--reference-point");
   }
-  if (places.without > 0) {
+  if (places.captures_without_position > 0) {
     spdlog::warn("{}: {} of {} captures have no position and are ignored; add x_m and y_m", table,
-                 places.without, frames.size());
+                 places.captures_without_position, frames.size());
   }
   return places;
 }
@@ -84,7 +86,7 @@ void run(const CLI::App& app, Options options) {
                                   inputs);
   const CapturesTable captures = read_captures_table(options);
   options.images.captures = captures;
-  const LampCaptures input = read_lamp_captures(options.images, ImageUse::places);
+  const LampCaptures input = read_lamp_captures(options.images, ImageUse::known_positions);
   check_map_contains_captured_lamps(input.frames, input.lamps, input.lamps_file);
   const KnownPositions places = find_places(options, input.frames, captures);
   const DispersionResult found = run_dispersion_calibration_step(
@@ -119,7 +121,7 @@ int main(int argc, char** argv) {
                             "Output file of the calibration with its dispersion, YAML"});
   auto* station =
       app.add_option(
-             "--reference-point", options.station_m,
+             "--reference-point", options.reference_point_m,
              "Known position of all captures in the world, in m. Overrides positions in tables")
           ->check(vlp::make_finite_validator())
           ->option_text("X_M Y_M");

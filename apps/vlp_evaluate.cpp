@@ -122,7 +122,7 @@ void check_options(const Options& options, const std::vector<Gate>& gates) {
   }
 }
 
-double station_m(const Options& options) {
+double compute_reference_point_radius_m(const Options& options) {
   if (options.same_point_mm) return 1e-3 * *options.same_point_mm;
   return compute_same_position_radius_m(
       options.calibration.empty() ? Calibration{} : read_calibration(options.calibration));
@@ -140,11 +140,11 @@ EvaluationInput read_input(const Options& options) {
   if (const auto& line_m = options.line_m; !line_m.empty()) {
     input.line_m = {Eigen::Vector2d{line_m[0], line_m[1]}, Eigen::Vector2d{line_m[2], line_m[3]}};
   }
-  input.station_m = station_m(options);
-  if (!options.compare.empty()) input.others = {options.compare, read_fixes(options.compare)};
+  input.reference_point_radius_m = compute_reference_point_radius_m(options);
+  if (!options.compare.empty()) input.other_fixes = {options.compare, read_fixes(options.compare)};
   if (options.noise_px > 0) {
-    input.limit = {read_lamps_of_room(options.lamps, options.room),
-                   read_calibration(options.calibration).camera, options.noise_px};
+    input.crlb_input = {read_lamps_of_room(options.lamps, options.room),
+                        read_calibration(options.calibration).camera, options.noise_px};
   }
   input.threads = options.threads;
   return input;
@@ -163,7 +163,7 @@ std::string render_report(const CLI::App& app, const Options& options, const Eva
     inputs.push_back(fixes);
   }
   for (const std::string& picture : options.report.pictures) {
-    report.page.pictures.push_back(read_report_plot(picture));
+    report.page.plots.push_back(read_report_plot(picture));
     inputs.push_back(picture);
   }
   report.page.evaluation = make_history_entry_from_command_line(app, inputs);
@@ -207,7 +207,7 @@ void run_evaluation(const CLI::App& app, const Options& options, const std::vect
     throw std::invalid_argument(
         "gate '" + gate.name +
         "': the metric has no value here; remove the gate or give what the metric needs: " +
-        find_metric_kind(gate.name)->meaning);
+        find_metric_kind(gate.name)->description);
   }
   std::string report, proposed;
   if (!options.report.file.empty()) report = render_report(app, options, input, found);

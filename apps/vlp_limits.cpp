@@ -114,9 +114,9 @@ void run(const Options& options) {
   const FloorLimits limits = find_floor_limits(options, lamps, grid);
   const auto summary = summarize_floor_limits(limits);
   const bool is_free = options.motion.max_speed_m_per_s || options.roll_pitch_sd_deg > 0;
-  if (!summary && is_free && std::any_of(limits.places.begin(), limits.places.end(), [](auto& one) {
-        return one.lamps > 1;
-      })) {
+  if (!summary && is_free &&
+      std::any_of(limits.positions.begin(), limits.positions.end(),
+                  [](auto& one) { return one.lamps > 1; })) {
     throw Undetermined(
         "motion and tilt cannot be estimated at any position of this floor: an unknown tilt needs "
         "four visible lamps, or three with a unique solution; lower the camera, widen the lens, "

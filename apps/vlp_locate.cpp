@@ -93,13 +93,13 @@ LocateInput make_input(const Options& options, const CapturesTable& captures) {
     input.calibration.camera.readout = readout;
   }
   input.sigma_px = options.sigma_px;
-  input.how.correction = kCorrections.at(options.correction);
+  input.positioner_options.correction = kCorrections.at(options.correction);
   if (const auto& mount = options.camera_on_robot) {
-    input.how.mount =
+    input.positioner_options.mount =
         CameraMount{{(*mount)[0], (*mount)[1], (*mount)[2]}, rad_from_deg((*mount)[3])};
   }
   input.inclination_sigma_rad = rad_from_deg(options.inclination_sigma_deg.value_or(0));
-  input.one_lamp = options.one_lamp;
+  input.allow_single_lamp = options.one_lamp;
   input.yaw_sd_rad = rad_from_deg(options.yaw_sd_deg.value_or(0));
   input.motion = options.motion.make_motion_prior();
   input.yaw_rate_sd_rad_per_s = rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0));
@@ -122,7 +122,7 @@ LocateResult locate_in_images(const Options& options, LocateInput input) {
                                         progress.update_progress_display(done, total);
                                       });
   }
-  print_detected_lights(found.seen);
+  print_detected_lights(found.observations);
   return found;
 }
 

@@ -46,7 +46,7 @@ void run(const Options& options) {
   {
     Progress progress(what);
     const auto show = [&](const SimulationSummary& so_far, std::size_t total) {
-      progress.update_progress_display(so_far.rendered + so_far.found, total, so_far.found);
+      progress.update_progress_display(so_far.rendered + so_far.existing, total, so_far.existing);
     };
     summary = options.archive
                   ? simulate_session_archive(scene, static_cast<std::size_t>(*options.archive),
@@ -54,7 +54,7 @@ void run(const Options& options) {
                   : render_scene_to_folder(scene, options.output, how, show);
   }
   for (const std::string& warning : summary.warnings) spdlog::warn("{}", warning);
-  fmt::print("rendered {} {}, {} existed; in {}\n", summary.rendered, what, summary.found,
+  fmt::print("rendered {} {}, {} existed; in {}\n", summary.rendered, what, summary.existing,
              options.output);
 }
 

@@ -37,7 +37,7 @@ struct Inputs {
   std::optional<Calibration> calibration;
   /// Labels of each folder; empty without a table.
   std::vector<std::vector<Frame>> labels;
-  DetectedLights seen;
+  DetectedLights lights;
 };
 
 /// Reads the labels in the folder of the images: the named table. If none is named and labels are
@@ -65,14 +65,14 @@ Inputs read_inputs(const Options& options) {
   }
   {
     Progress progress("images");
-    inputs.seen = detect_lights_in_folders(
+    inputs.lights = detect_lights_in_folders(
         {options.folders.begin(), options.folders.end()}, inputs.lamps, inputs.calibration,
         !options.row_time, options.frontend, [&](std::size_t done, std::size_t total) {
           progress.update_progress_display(done, total);
         });
   }
   StepResult remarks;
-  add_image_intake_remarks(inputs.seen.seen, remarks);
+  add_image_intake_remarks(inputs.lights.observations, remarks);
   print_step_remarks(remarks);
   return inputs;
 }
@@ -80,7 +80,7 @@ Inputs read_inputs(const Options& options) {
 void train(const Options& options) {
   const Inputs inputs = read_inputs(options);
   const TrainStepResult result =
-      train_lamp_classifier(inputs.seen, inputs.labels, inputs.lamps, options.folders.front());
+      train_lamp_classifier(inputs.lights, inputs.labels, inputs.lamps, options.folders.front());
   print_step_remarks(result);
   throw_if_step_failed(result);
   write_lamp_classifier(options.output, result.classifier);
@@ -96,12 +96,12 @@ void train_row_time(const CLI::App& app, const Options& options) {
   std::vector<std::string> files = options.folders;
   files.push_back(options.lamps);
   const RowTimeStepResult result = estimate_row_time_from_lights(
-      inputs.seen, inputs.labels, inputs.lamps, options.lamps, inputs.calibration,
+      inputs.lights, inputs.labels, inputs.lamps, options.lamps, inputs.calibration,
       make_history_entry_from_command_line(app, files));
   print_step_remarks(result);
   throw_if_step_failed(result);
   if (!options.output.empty()) write_calibration(options.output, result.calibration);
-  print_row_time(result.found, inputs.seen.camera.readout);
+  print_row_time(result.row_time, inputs.lights.camera.readout);
 }
 
 }  // namespace

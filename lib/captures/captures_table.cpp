@@ -61,13 +61,13 @@ CapturesTable read_captures_csv(const std::filesystem::path& file) {
         throw csv.make_cell_error(row, *place,
                                   "should be camera or axis: the point whose position is given");
       }
-      capture.place = whose == "axis" ? PlaceOf::axis : PlaceOf::camera;
+      capture.measured_point = whose == "axis" ? MeasuredPoint::axis : MeasuredPoint::camera;
     }
-    capture.place_sd_m = field(place_sd);
-    if (capture.place_sd_m && *capture.place_sd_m < 0) {
+    capture.position_sd_m = field(place_sd);
+    if (capture.position_sd_m && *capture.position_sd_m < 0) {
       throw csv.make_cell_error(row, *place_sd, "should not be negative");
     }
-    if (spot) capture.spot = csv.get_cell_text(row, *spot);
+    if (spot) capture.pivot = csv.get_cell_text(row, *spot);
     if (const auto angles = lean.read(csv, row, image)) {
       capture.inclination = Inclination{angles->x(), angles->y()};
     }

@@ -14,22 +14,22 @@ namespace vlp {
 
 /// Point with the known position: the camera, or the axis of rotation, which is at the camera's
 /// position minus the lever arm.
-enum class PlaceOf { camera, axis };
+enum class MeasuredPoint { camera, axis };
 
 /// Row of captures.csv: sensor data of one capture, the known position of the camera or of the axis
 /// of rotation (`place`), and the camera's yaw. Optional values are std::nullopt if the field is
 /// empty or the column is missing.
 struct Capture {
   std::optional<double> time_s;
-  /// Known position in the world, m, of the point `place`: the camera or the axis of rotation.
-  /// `yaw_rad` is the yaw of the camera.
+  /// Known position in the world, m, of the point `measured_point`: the camera or the axis of
+  /// rotation. `yaw_rad` is the yaw of the camera.
   std::optional<double> x_m, y_m, z_m, yaw_rad;
-  PlaceOf place = PlaceOf::camera;
+  MeasuredPoint measured_point = MeasuredPoint::camera;
   /// Standard deviation of the position per axis, if known.
-  std::optional<double> place_sd_m;
+  std::optional<double> position_sd_m;
   /// Name of the rotation in place to which the capture belongs (column pivot): captures of one
   /// name share axis and height. May be empty.
-  std::string spot;
+  std::string pivot;
   /// Reading of the inclination sensor: roll_rad and pitch_rad, both or neither.
   std::optional<Inclination> inclination;
   /// Odometry in the level frame of the robot, or, without a mount, of the camera: vx_m_per_s and

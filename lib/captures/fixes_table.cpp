@@ -144,8 +144,8 @@ constexpr std::array<AddedColumn, 11> kAddedColumns{
      {"vy_m_per_s", format_velocity<1>},
      {"roll_rad", format_roll_pitch<&Inclination::roll_rad>},
      {"pitch_rad", format_roll_pitch<&Inclination::pitch_rad>},
-     {"rejected", format_ids<&FixRow::rejected>},
-     {"outside_region", format_ids<&FixRow::outside_region>}}};
+     {"rejected", format_ids<&FixRow::rejected_lamps>},
+     {"outside_region", format_ids<&FixRow::lamps_outside_region>}}};
 
 std::vector<AddedColumn> find_used_columns(const std::vector<FixRow>& rows) {
   std::vector<AddedColumn> columns;
@@ -207,9 +207,9 @@ std::vector<FixRow> read_fixes(const std::filesystem::path& file) {
       throw csv.make_cell_error(row, status, "should be UTF-8");
     }
     if (read.status == "ok") read.fix = read_fix(csv, row, columns);
-    if (columns.rejected) read.rejected = read_id_list(csv, row, *columns.rejected);
+    if (columns.rejected) read.rejected_lamps = read_id_list(csv, row, *columns.rejected);
     if (columns.outside_region)
-      read.outside_region = read_id_list(csv, row, *columns.outside_region);
+      read.lamps_outside_region = read_id_list(csv, row, *columns.outside_region);
     read.time_s = csv.get_optional_cell_number(row, columns.time_s);
   }
   if (rows.empty()) throw InputError(file, "contains no fix");

@@ -39,9 +39,9 @@ struct FixRow {
   /// Line of the row in the file from which it was read.
   std::size_t line = 0;
   /// Ids of lamps rejected because the others contradict them.
-  std::vector<int> rejected = {};
+  std::vector<int> rejected_lamps = {};
   /// Ids of used lamps that are outside the calibrated region, IntrinsicsReport::region_px.
-  std::vector<int> outside_region = {};
+  std::vector<int> lamps_outside_region = {};
   /// Time of the capture, if known.
   std::optional<double> time_s = {};
 };

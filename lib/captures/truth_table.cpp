@@ -31,8 +31,8 @@ std::vector<TruthRow> read_truth_table(const std::filesystem::path& file) {
   return rows;
 }
 
-NearestOnPath find_nearest_point_on_path(const Path& path, const Eigen::Vector2d& position_m) {
-  NearestOnPath nearest{path.waypoints_m.front(), {}};
+PathPoint find_nearest_point_on_path(const Path& path, const Eigen::Vector2d& position_m) {
+  PathPoint nearest{path.waypoints_m.front(), {}};
   double min_squared_distance = std::numeric_limits<double>::infinity();
   std::size_t leg = 0;
   double leg_fraction = 0;

@@ -34,14 +34,14 @@ struct Path {
 };
 
 /// Point of a path closest to a position, horizontally.
-struct NearestOnPath {
+struct PathPoint {
   Eigen::Vector2d xy_m;
   /// Height interpolated between the waypoints; std::nullopt if the path has no heights.
   std::optional<double> z_m;
 };
 
 /// Returns the point of a path closest to a position.
-NearestOnPath find_nearest_point_on_path(const Path& path, const Eigen::Vector2d& position_m);
+PathPoint find_nearest_point_on_path(const Path& path, const Eigen::Vector2d& position_m);
 
 /// Reads a path. Columns: x_m, y_m and, optionally, z_m.
 /// @throws InputError as CsvTable; if a coordinate exceeds kMaxCoordinate_m; if there are fewer

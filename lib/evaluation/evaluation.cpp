@@ -33,10 +33,10 @@ std::optional<SignedErrorStatistics> compute_signed_statistics(
 
 void add_comparison(Evaluation& evaluation, const EvaluationInput& input,
                     const std::vector<FixError>& errors) {
-  if (!input.truth) check_same_images_in_fixes(input.fixes, *input.others);
-  const FixErrors others = compute_fix_errors(input, *input.others);
-  evaluation.comparison = compare_horizontal_errors(input.fixes.rows, errors, input.others->rows,
-                                                    others.errors, input.threads);
+  if (!input.truth) check_same_images_in_fixes(input.fixes, *input.other_fixes);
+  const FixErrors others = compute_fix_errors(input, *input.other_fixes);
+  evaluation.comparison = compare_horizontal_errors(
+      input.fixes.rows, errors, input.other_fixes->rows, others.errors, input.threads);
 }
 
 /// Returns the lower end of the difference's interval, negative if the fixes may be better. Returns
@@ -49,8 +49,9 @@ double compute_loss_against_reference_m(const Comparison& comparison) {
 
 }  // namespace
 
-FixErrors compute_fix_errors(const EvaluationInput& input, const FromFile<FixRow>& fixes) {
-  if (input.truth) return compute_fix_errors_against_truth(fixes, *input.truth, input.station_m);
+FixErrors compute_fix_errors(const EvaluationInput& input, const FileRows<FixRow>& fixes) {
+  if (input.truth)
+    return compute_fix_errors_against_truth(fixes, *input.truth, input.reference_point_radius_m);
   return compute_fix_errors_against_path(fixes.rows, make_reference_path(input));
 }
 
@@ -60,24 +61,25 @@ Evaluation evaluate_fix_accuracy(const EvaluationInput& input) {
   evaluation.reference = input.truth ? "truth" : input.path ? "path" : "line";
   evaluation.captures = captures;
   evaluation.fixes = errors.size();
-  evaluation.missing = missing;
+  evaluation.failures_by_status = missing;
   if (errors.empty()) return evaluation;
   add_horizontal(evaluation, errors, input.threads);
   evaluation.height_m = compute_signed_statistics(errors, &FixError::height_m);
   evaluation.yaw_rad = compute_signed_statistics(errors, &FixError::yaw_rad);
   evaluation.resampling_unit = "runs of fixes";
   if (input.truth) {
-    evaluation.stations = compute_bias_and_repeatability(errors, input.truth->rows);
-    evaluation.resampling_unit = evaluation.stations ? "reference points" : "captures";
+    evaluation.bias_and_repeatability = compute_bias_and_repeatability(errors, input.truth->rows);
+    evaluation.resampling_unit =
+        evaluation.bias_and_repeatability ? "reference points" : "captures";
     evaluation.normalized_errors = compute_normalized_errors(input.fixes.rows, errors);
   }
-  if (input.truth && input.limit) {
-    const auto& [lamps, camera, noise_px] = *input.limit;
-    evaluation.limit = compute_error_to_crlb_ratio(errors, input.truth->rows, lamps, camera,
-                                                   noise_px, input.threads);
+  if (input.truth && input.crlb_input) {
+    const auto& [lamps, camera, noise_px] = *input.crlb_input;
+    evaluation.crlb_ratio = compute_error_to_crlb_ratio(errors, input.truth->rows, lamps, camera,
+                                                        noise_px, input.threads);
   }
-  if (input.line_m) evaluation.fit = fit_line_to_fixes(input.fixes.rows, *input.line_m);
-  if (input.others) add_comparison(evaluation, input, errors);
+  if (input.line_m) evaluation.line_fit = fit_line_to_fixes(input.fixes.rows, *input.line_m);
+  if (input.other_fixes) add_comparison(evaluation, input, errors);
   return evaluation;
 }
 
@@ -91,17 +93,17 @@ std::vector<Metric> collect_evaluation_metrics(const Evaluation& evaluation) {
   add_mm("p90_mm", errors_m.p90);
   add_mm("max_mm", errors_m.max);
   add_mm("rms_mm", errors_m.rms);
-  if (const auto& stations = evaluation.stations) {
+  if (const auto& stations = evaluation.bias_and_repeatability) {
     add_mm("bias_mm", stations->bias_m);
-    add_mm("repeatability_mm", stations->scatter_m);
+    add_mm("repeatability_mm", stations->repeatability_m);
   }
-  if (evaluation.height_m) add_mm("height_rms_mm", evaluation.height_m->sizes.rms);
-  if (evaluation.yaw_rad) add("yaw_rms_deg", deg_from_rad(evaluation.yaw_rad->sizes.rms));
+  if (evaluation.height_m) add_mm("height_rms_mm", evaluation.height_m->magnitudes.rms);
+  if (evaluation.yaw_rad) add("yaw_rms_deg", deg_from_rad(evaluation.yaw_rad->magnitudes.rms));
   add("missing_fraction", evaluation.missing_fix_fraction());
   if (evaluation.normalized_errors)
     add("normalized_error_rms", evaluation.normalized_errors->horizontal);
-  if (evaluation.limit) add("crlb_ratio", evaluation.limit->horizontal);
-  if (const auto& fit = evaluation.fit) {
+  if (evaluation.crlb_ratio) add("crlb_ratio", evaluation.crlb_ratio->horizontal);
+  if (const auto& fit = evaluation.line_fit) {
     add_mm("fitted_mean_mm", fit->distances_m.mean);
     add_mm("fitted_p90_mm", fit->distances_m.p90);
     add_mm("fitted_max_mm", fit->distances_m.max);

@@ -21,33 +21,33 @@ namespace vlp {
 
 /// Fixes to evaluate and their reference: one of a ground truth, a path and a commanded line.
 struct EvaluationInput {
-  FromFile<FixRow> fixes;
-  std::optional<FromFile<TruthRow>> truth;
+  FileRows<FixRow> fixes;
+  std::optional<FileRows<TruthRow>> truth;
   std::optional<Path> path;
   std::optional<CommandedLine> line_m;
   /// Radius of a reference point, m: captures whose true positions are within this distance of its
   /// first capture belong to it.
-  double station_m = 1e-3;
+  double reference_point_radius_m = 1e-3;
   /// Other fixes to compare with.
-  std::optional<FromFile<FixRow>> others;
+  std::optional<FileRows<FixRow>> other_fixes;
   /// Lamps, camera and pixel noise for the theoretical limit (CRLB). Needs a ground truth with z_m
   /// and yaw_rad.
-  struct Limit {
+  struct CrlbInput {
     LampMap lamps;
     Camera camera;
     double noise_px;
   };
-  std::optional<Limit> limit;
+  std::optional<CrlbInput> crlb_input;
   int threads = 1;
 };
 
-/// Accuracy of fixes. Without any fix, only the members up to `missing` are valid.
+/// Accuracy of fixes. Without any fix, only the members up to `failures_by_status` are valid.
 struct Evaluation {
   /// Kind of the reference of the errors: "truth", "path" or "line".
   std::string reference;
   std::size_t captures = 0, fixes = 0;
   /// Number of captures without a fix, by the word of their status.
-  std::map<std::string, std::size_t> missing;
+  std::map<std::string, std::size_t> failures_by_status;
   double missing_fix_fraction() const {
     return static_cast<double>(captures - fixes) / static_cast<double>(captures);
   }
@@ -60,18 +60,18 @@ struct Evaluation {
   std::string resampling_unit;
   std::optional<SignedErrorStatistics> height_m, yaw_rad;
   /// Only with a ground truth, if reference points have two fixes or more.
-  std::optional<BiasAndRepeatability> stations;
+  std::optional<BiasAndRepeatability> bias_and_repeatability;
   /// Only with a commanded line, if the fixes determine a direction.
-  std::optional<LineFit> fit;
+  std::optional<LineFit> line_fit;
   /// Only with a ground truth.
   std::optional<NormalizedErrors> normalized_errors;
-  std::optional<CrlbRatio> limit;
+  std::optional<CrlbRatio> crlb_ratio;
   std::optional<Comparison> comparison;
 };
 
 /// Computes the errors of single fixes against the reference of `input`.
 /// @throws InputError if image names do not match
-FixErrors compute_fix_errors(const EvaluationInput& input, const FromFile<FixRow>& fixes);
+FixErrors compute_fix_errors(const EvaluationInput& input, const FileRows<FixRow>& fixes);
 
 /// Evaluates the fixes of `input`.
 /// @throws InputError if image names do not match

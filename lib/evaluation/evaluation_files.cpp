@@ -32,9 +32,9 @@ Json to_json(const ErrorStatistics& statistics, const KeyUnit& unit) {
 }
 
 Json to_json(const SignedErrorStatistics& statistics, const KeyUnit& unit) {
-  Json json = to_json(statistics.sizes, unit);
+  Json json = to_json(statistics.magnitudes, unit);
   json["bias" + std::string(unit.suffix)] = unit.factor * statistics.bias;
-  json["fixes"] = statistics.sizes.count;
+  json["fixes"] = statistics.magnitudes.count;
   return json;
 }
 
@@ -52,7 +52,7 @@ Json to_json(const std::vector<std::pair<double, double>>& distribution_m) {
 
 Json to_json(const BiasAndRepeatability& statistics) {
   Json list = Json::array();
-  for (const auto& station : statistics.stations) {
+  for (const auto& station : statistics.reference_points) {
     list.push_back({{"x_m", station.xy_m.x()},
                     {"y_m", station.xy_m.y()},
                     {"fixes", station.fixes},
@@ -60,10 +60,10 @@ Json to_json(const BiasAndRepeatability& statistics) {
                     {"bias_y_mm", kMmKeys.factor * station.bias_m.y()},
                     {"sd_mm", kMmKeys.factor * station.sd_m}});
   }
-  return {{"reference_points", statistics.stations.size()},
+  return {{"reference_points", statistics.reference_points.size()},
           {"fixes", statistics.fixes},
           {"bias_mm", kMmKeys.factor * statistics.bias_m},
-          {"repeatability_mm", kMmKeys.factor * statistics.scatter_m},
+          {"repeatability_mm", kMmKeys.factor * statistics.repeatability_m},
           {"list", list}};
 }
 
@@ -93,8 +93,8 @@ Json to_json(const Comparison& comparison) {
   Json json{{"verdict", comparison.comparison_verdict()},
             {"pairs", comparison.pairs},
             {"clusters", comparison.clusters},
-            {"only_in_fixes", comparison.only_these},
-            {"only_in_compared", comparison.only_others},
+            {"only_in_fixes", comparison.only_in_fixes},
+            {"only_in_compared", comparison.only_in_other_fixes},
             {"smaller_errors", comparison.smaller},
             {"larger_errors", comparison.larger}};
   if (comparison.pairs > 0) {
@@ -130,7 +130,7 @@ std::string format_evaluation_json(const Evaluation& evaluation,
             {"captures", evaluation.captures},
             {"fixes", evaluation.fixes},
             {"missing_fraction", evaluation.missing_fix_fraction()},
-            {"missing", evaluation.missing},
+            {"missing", evaluation.failures_by_status},
             {"horizontal", to_json(evaluation.horizontal_m, kMmKeys)}};
   if (const auto& intervals = evaluation.intervals_m) {
     json["horizontal"]["intervals_95"] = {{"resampling_unit", evaluation.resampling_unit},
@@ -144,15 +144,16 @@ std::string format_evaluation_json(const Evaluation& evaluation,
   json["horizontal"]["cdf"] = to_json(evaluation.distribution_m);
   if (evaluation.height_m) json["height"] = to_json(*evaluation.height_m, kMmKeys);
   if (evaluation.yaw_rad) json["yaw"] = to_json(*evaluation.yaw_rad, kDegKeys);
-  if (evaluation.stations) json["bias_and_repeatability"] = to_json(*evaluation.stations);
-  if (evaluation.fit) json["fitted_line"] = to_json(*evaluation.fit);
+  if (evaluation.bias_and_repeatability)
+    json["bias_and_repeatability"] = to_json(*evaluation.bias_and_repeatability);
+  if (evaluation.line_fit) json["fitted_line"] = to_json(*evaluation.line_fit);
   if (evaluation.normalized_errors)
     json["normalized_error_rms"] = to_json(*evaluation.normalized_errors);
-  if (evaluation.limit) {
-    json["crlb"] = {{"ratio", evaluation.limit->horizontal},
-                    {"rms_mm", kMmKeys.factor * evaluation.limit->limit_m},
-                    {"errors_below_crlb", evaluation.limit->are_errors_below_crlb()},
-                    {"fixes", evaluation.limit->fixes}};
+  if (evaluation.crlb_ratio) {
+    json["crlb"] = {{"ratio", evaluation.crlb_ratio->horizontal},
+                    {"rms_mm", kMmKeys.factor * evaluation.crlb_ratio->crlb_m},
+                    {"errors_below_crlb", evaluation.crlb_ratio->are_errors_below_crlb()},
+                    {"fixes", evaluation.crlb_ratio->fixes}};
   }
   if (evaluation.comparison) json["comparison"] = to_json(*evaluation.comparison);
   json["gates"] = to_json(gates);

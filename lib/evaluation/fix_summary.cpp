@@ -33,8 +33,8 @@ FixSummary summarize_fixes(std::span<const FixRow> rows) {
   const auto [min_lamps, max_lamps] = std::minmax_element(lamps.begin(), lamps.end());
   double sum = 0;
   for (const int count : lamps) sum += count;
-  summary.typical = {*min_lamps, *max_lamps, sum / static_cast<double>(lamps.size()), {}};
-  if (!residual_px.empty()) summary.typical->median_residual_px = lower_median(residual_px);
+  summary.statistics = {*min_lamps, *max_lamps, sum / static_cast<double>(lamps.size()), {}};
+  if (!residual_px.empty()) summary.statistics->median_residual_px = lower_median(residual_px);
   if (!yaw_rad.empty()) {
     summary.median_sd = {lower_median(horizontal_m), lower_median(height_m), lower_median(yaw_rad)};
   }

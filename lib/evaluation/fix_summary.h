@@ -25,7 +25,7 @@ struct FixSummary {
     /// Median over the fixes from three lamps or more; fewer lamps yield no residual.
     std::optional<double> median_residual_px;
   };
-  std::optional<FixStatistics> typical;
+  std::optional<FixStatistics> statistics;
   /// Medians of the reported standard deviations: horizontal (root of the sum of the squares of x
   /// and y), height, yaw. std::nullopt if no fix reports them.
   struct MedianSds {

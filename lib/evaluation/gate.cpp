@@ -33,9 +33,9 @@ std::string describe_invalid_limit(const MetricKind& kind, double limit) {
   constexpr int digits = 6;
   const std::string text = format_significant_digits(limit, digits);
   if (limit < 0) return "should not be negative, as no metric is below zero: " + text;
-  if (limit <= kind.largest) return "";
-  if (kind.largest > 1) {
-    return "should be at most " + with_unit(kind.largest, kind.unit) + ", not " + text;
+  if (limit <= kind.max_limit) return "";
+  if (kind.max_limit > 1) {
+    return "should be at most " + with_unit(kind.max_limit, kind.unit) + ", not " + text;
   }
   return "should be a fraction from 0 to 1, not " + text +
          (limit > 100
@@ -50,7 +50,7 @@ CheckedMetric make_checked_metric(const MetricKind& kind, const std::vector<Metr
 }  // namespace
 
 double CheckedMetric::acceptance_limit() const {
-  const double width = guard ? guard->guard_band_width() : 0;
+  const double width = guard_band ? guard_band->guard_band_width() : 0;
   return direction == Direction::at_least ? limit.value() + width : limit.value() - width;
 }
 
@@ -62,9 +62,9 @@ bool CheckedMetric::has_passed_gate() const {
 }
 
 std::optional<double> CheckedMetric::conformance_probability() const {
-  if (!limit || !value || !guard) return std::nullopt;
+  if (!limit || !value || !guard_band) return std::nullopt;
   const double room = direction == Direction::at_least ? *value - *limit : *limit - *value;
-  return std::erfc(-room / guard->standard_uncertainty / std::numbers::sqrt2) / 2;
+  return std::erfc(-room / guard_band->standard_uncertainty / std::numbers::sqrt2) / 2;
 }
 
 std::string describe_available_gates(const std::vector<MetricKind>& known) {
@@ -74,7 +74,7 @@ std::string describe_available_gates(const std::vector<MetricKind>& known) {
   for (const MetricKind& kind : known) {
     std::string name = kind.name;
     name.resize(width + 2, ' ');
-    text.append("  ").append(name).append(kind.meaning);
+    text.append("  ").append(name).append(kind.description);
     text.append(kind.direction == Direction::at_least ? ", at least\n" : "\n");
   }
   return text;
@@ -162,7 +162,7 @@ std::vector<CheckedMetric> check_gates(const std::vector<Gate>& gates,
   for (const Gate& gate : gates) {
     results.push_back(make_checked_metric(find_metric_kind(gate.metric).value(), metrics));
     results.back().limit = gate.limit;
-    results.back().guard = gate.guard;
+    results.back().guard_band = gate.guard_band;
   }
   return results;
 }
@@ -176,7 +176,7 @@ std::vector<CheckedMetric> check_all_metrics_against_gates(const std::vector<Gat
     for (const Gate& gate : gates) {
       if (gate.metric != kind.name) continue;
       result.limit = gate.limit;
-      result.guard = gate.guard;
+      result.guard_band = gate.guard_band;
     }
     if (result.value || result.limit) results.push_back(std::move(result));
   }
@@ -190,9 +190,9 @@ std::string describe_gate_result(const CheckedMetric& gate) {
 }
 
 std::string describe_guard_band(const CheckedMetric& gate) {
-  if (!gate.guard) return "";
+  if (!gate.guard_band) return "";
   return std::string(gate.direction == Direction::at_least ? " and" : " less") +
-         " a guard band of " + with_unit(gate.guard->guard_band_width(), gate.unit);
+         " a guard band of " + with_unit(gate.guard_band->guard_band_width(), gate.unit);
 }
 
 std::string describe_failed_gates(const std::vector<CheckedMetric>& gates) {

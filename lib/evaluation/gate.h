@@ -32,7 +32,7 @@ struct GuardBand {
 struct Gate {
   std::string metric;
   double limit;
-  std::optional<GuardBand> guard = {};
+  std::optional<GuardBand> guard_band = {};
 };
 
 /// Measured metric and its gate, if any.
@@ -44,7 +44,7 @@ struct CheckedMetric {
   /// Limit of the gate; std::nullopt if the metric has no gate.
   std::optional<double> limit;
   Direction direction;
-  std::optional<GuardBand> guard = {};
+  std::optional<GuardBand> guard_band = {};
 
   /// Returns the limit tightened by its guard band.
   /// @pre there is a gate

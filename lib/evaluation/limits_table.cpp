@@ -19,15 +19,15 @@ void write_floor_accuracy_limits(const std::filesystem::path& file, const FloorL
   header.emplace_back("horizontal_m");
   CsvWriter csv(file, header);
   const auto format = [](double value) { return format_significant_digits(value, digits); };
-  for (const FloorLimits::Place& place : limits.places) {
+  for (const FloorLimits::Position& place : limits.positions) {
     const auto& [position_m, yaw_rad] = place.camera;
     std::vector<std::string> row{format(position_m.x()), format(position_m.y()),
                                  format(position_m.z()), format(yaw_rad),
                                  std::to_string(place.lamps)};
-    if (!place.parts.empty()) {
+    if (!place.covariances.empty()) {
       const Eigen::Vector4d sd = place.total_pose_covariance().diagonal().cwiseMax(0).cwiseSqrt();
       for (const double sd_component : sd) row.push_back(format(sd_component));
-      for (const Matrix4& part : place.parts)
+      for (const Matrix4& part : place.covariances)
         row.push_back(format(compute_fix_sds(part).horizontal_m));
       row.push_back(format(compute_fix_sds(place.total_pose_covariance()).horizontal_m));
     }

@@ -38,14 +38,14 @@ struct MetricKind {
   const char* unit;
   MetricSource source;
   /// Description of the metric, and the data that it requires, human-readable.
-  const char* meaning;
+  const char* description;
   /// Probable cause of a failed gate, for humans: "the lens is decentered".
   const char* cause;
   Direction direction = Direction::at_most;
   /// Largest limit that a gate of this metric may have; 1 for a fraction.
-  double largest = 1e6;
+  double max_limit = 1e6;
   /// True for a property of the camera; false for one of the equipment or the procedure.
-  bool of_camera = true;
+  bool is_camera_property = true;
 };
 
 /// Returns the metrics of these sources, causes before effects.

@@ -64,9 +64,10 @@ std::vector<Gate> propose_gates_from_evaluation(const EvaluationInput& input,
   }
   const std::vector<FixError> errors = compute_fix_errors(input, input.fixes).errors;
   const auto height_m = compute_intervals(errors, &FixError::height_m, input.threads);
-  if (height_m) add("height_rms_mm", evaluation.height_m->sizes.rms, height_m->rms, millimeters);
+  if (height_m)
+    add("height_rms_mm", evaluation.height_m->magnitudes.rms, height_m->rms, millimeters);
   const auto yaw_rad = compute_intervals(errors, &FixError::yaw_rad, input.threads);
-  if (yaw_rad) add("yaw_rms_deg", evaluation.yaw_rad->sizes.rms, yaw_rad->rms, degrees);
+  if (yaw_rad) add("yaw_rms_deg", evaluation.yaw_rad->magnitudes.rms, yaw_rad->rms, degrees);
   constexpr double millionth = 1e-6;  // resolution of the written limit
   gates.push_back(
       {"missing_fraction", millionth * std::ceil(evaluation.missing_fix_fraction() / millionth)});

@@ -34,7 +34,7 @@ std::string make_missing_fixes_warning(const Evaluation& evaluation,
 }
 
 std::string make_crlb_warning(const Evaluation& evaluation) {
-  const auto& limit = evaluation.limit;
+  const auto& limit = evaluation.crlb_ratio;
   if (!limit || !limit->are_errors_below_crlb()) return "";
   constexpr int digits = 3;
   // [GATE-3] `limit: either` | smaller noise than `--noise-px`, or fixes from more than one level

@@ -42,7 +42,7 @@ cv::Rect find_board_region(const BoardDetection& seen, const cv::Mat& image) {
 
 /// Returns true if most of the tags that cannot be used are overexposed.
 bool are_tags_overexposed(const BoardDetection& seen) {
-  return 2 * seen.overexposed > seen.unusable;
+  return 2 * seen.num_overexposed_tags > seen.num_unusable_tags;
 }
 
 std::string describe_too_few_corners(const Board& board, const BoardDetection& seen) {
@@ -57,9 +57,9 @@ std::string describe_too_few_corners(const Board& board, const BoardDetection& s
   if (are_tags_overexposed(seen)) {
     // [LENS-1] `runs over the`
     message += fmt::format(", around {} more white is overexposed and runs over the corners",
-                           seen.overexposed);
-  } else if (seen.unusable > 0) {
-    message += fmt::format(", {} more are blurred, hidden or cut", seen.unusable);
+                           seen.num_overexposed_tags);
+  } else if (seen.num_unusable_tags > 0) {
+    message += fmt::format(", {} more are blurred, hidden or cut", seen.num_unusable_tags);
   }
   return message;
 }
@@ -87,7 +87,7 @@ void reject_other_sizes(std::vector<Observation>& images) {
 
 bool is_upside_down(const BoardView& view) {
   double down_px = 0;
-  for (const TagDetection& tag : view.seen.tags) {
+  for (const TagDetection& tag : view.detection.tags) {
     down_px +=
         (tag.corners_px[0] - tag.corners_px[3]).y() + (tag.corners_px[1] - tag.corners_px[2]).y();
   }
@@ -148,7 +148,7 @@ IntakeFailure explain_no_chessboard(const std::vector<fs::path>& images, const B
   std::array<int, 2> largest{0, 0};
   explain_from_sample_images(images, options, num_samples,
                              [&](const fs::path&, const cv::Mat& image) {
-                               const auto squares = count_chessboard_squares(image);
+                               const auto squares = detect_chessboard_size_in_squares(image);
                                if (squares[0] * squares[1] > largest[0] * largest[1])
                                  largest = squares;
                                return true;
@@ -181,8 +181,8 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
   }
   int unusable = 0, overexposed = 0;
   for (const BoardView& view : views) {
-    unusable += view.seen.unusable;
-    overexposed += view.seen.overexposed;
+    unusable += view.detection.num_unusable_tags;
+    overexposed += view.detection.num_overexposed_tags;
   }
   double white = 0;
   std::string description;
@@ -212,8 +212,9 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
                 "are they blurred, covered, cut off by the image border, or visible twice?",
                 unusable, views.size())};
   }
-  const auto foreign = std::find_if(views.begin(), views.end(),
-                                    [](const auto& view) { return !view.seen.foreign.empty(); });
+  const auto foreign = std::find_if(views.begin(), views.end(), [](const auto& view) {
+    return !view.detection.foreign_tags.empty();
+  });
   if (foreign != views.end()) {
     const std::string layout = check_board_layout(board, views, {}).problem;
     return {true,
@@ -221,7 +222,7 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
                         "{} to {} ({} of them in {}){}",
                         board.family, board.first_id,
                         board.first_id + static_cast<int>(list_board_tags(board).size()) - 1,
-                        foreign->seen.foreign.size(), foreign->image,
+                        foreign->detection.foreign_tags.size(), foreign->image,
                         layout.empty() ? "" : "; " + layout),
             board_file};
   }
@@ -234,9 +235,9 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
 /// Rejects corners that contradict their neighbors. A tag is rejected as a whole.
 void remove_corner_outliers(const BoardLattice& lattice, BoardView& view,
                             std::vector<std::string>& warnings) {
-  const auto blunders = find_corner_outliers(lattice.match_corners_to_flat_board(view.seen));
+  const auto blunders = find_corner_outliers(lattice.match_corners_to_flat_board(view.detection));
   if (blunders.empty()) return;
-  const auto corners = collect_detected_corners(view.seen);
+  const auto corners = collect_detected_corners(view.detection);
   const Eigen::Vector2d first = corners[blunders.front()].pixel;
   // [LENS-5] `neighbors predict them` | outliers: corners (for tags, the whole tag) or image
   //   rejected | check the image
@@ -245,14 +246,14 @@ void remove_corner_outliers(const BoardLattice& lattice, BoardView& view,
                   "at ({:.1f}, {:.1f}); rejected",
                   view.image, blunders.size(), corners.size(), first.x(), first.y()));
   for (auto i = blunders.rbegin(); i != blunders.rend(); ++i) {
-    if (!view.seen.points.empty()) {
-      view.seen.points.erase(view.seen.points.begin() + static_cast<std::ptrdiff_t>(*i));
+    if (!view.detection.points.empty()) {
+      view.detection.points.erase(view.detection.points.begin() + static_cast<std::ptrdiff_t>(*i));
       continue;
     }
     const bool is_removed = i != blunders.rbegin() && *(i - 1) / 4 == *i / 4;
     if (is_removed) continue;
-    view.seen.tags.erase(view.seen.tags.begin() + static_cast<std::ptrdiff_t>(*i / 4));
-    ++view.seen.unusable;
+    view.detection.tags.erase(view.detection.tags.begin() + static_cast<std::ptrdiff_t>(*i / 4));
+    ++view.detection.num_unusable_tags;
   }
 }
 
@@ -260,15 +261,16 @@ bool is_mrcal_table(const fs::path& file) { return file.extension() == ".vnl"; }
 
 /// Rejects an image with too few corners to determine the pose of the board.
 void reject_few_corners(const Board& board, const BoardLattice& lattice, Observation& image) {
-  const BoardDetection& seen = image.board->seen;
+  const BoardDetection& seen = image.board->detection;
   if (lattice.are_corners_sufficient_for_pose(seen)) return;
-  if (!seen.has_detected_corners() && !seen.foreign.empty()) {
+  if (!seen.has_detected_corners() && !seen.foreign_tags.empty()) {
     // [LENS-3] `the board does not have`, `not show the board` | other board, or wrong `first_id`,
     //   `cols`, `rows`, `id_order` | correct `board.yaml`
     return image.set_image_rejection(RejectionReason::other_board,
                                      "shows tags that the board does not have");
   }
-  if (!seen.has_detected_corners() && seen.unusable == 0 && board.kind != BoardKind::chessboard) {
+  if (!seen.has_detected_corners() && seen.num_unusable_tags == 0 &&
+      board.kind != BoardKind::chessboard) {
     return image.set_image_rejection(RejectionReason::no_board, "does not show the board");
   }
   image.set_image_rejection(
@@ -296,7 +298,8 @@ Observation BoardIntake::detect_board_in_image(const SourceImage& source) const 
     read_image_and_run_detection(source, options_, imager_px_, result, [&](const cv::Mat& image) {
       const ImageBlur blur = measure_image_blur(image);
       BoardView view{result.image_file_name(), result.size_px, detector_.detect_board(image)};
-      const double white = compute_saturated_fraction(image, find_board_region(view.seen, image));
+      const double white =
+          compute_saturated_fraction(image, find_board_region(view.detection, image));
       found = CachedView{std::move(view),
                          std::isfinite(blur.sigma_px) ? std::optional(blur.sigma_px) : std::nullopt,
                          blur.bright_fraction, white};
@@ -312,7 +315,7 @@ Observation BoardIntake::detect_board_in_image(const SourceImage& source) const 
 
 void BoardIntake::reject_unusable_board_image(Observation& image, double bright_fraction,
                                               double white_fraction) const {
-  const BoardDetection& seen = image.board->seen;
+  const BoardDetection& seen = image.board->detection;
   if (white_fraction > options_.max_white_fraction) {
     return image.set_image_rejection(
         RejectionReason::overexposed,
@@ -352,7 +355,7 @@ Observations detect_boards_in_images(const std::vector<fs::path>& images, const 
   reject_other_sizes(result.images);
   reject_repeated_images(result.images, ImageUse::boards, options);
   if (std::none_of(result.images.begin(), result.images.end(), [](const Observation& image) {
-        return image.board && image.board->seen.has_detected_corners();
+        return image.board && image.board->detection.has_detected_corners();
       })) {
     result.failure =
         explain_no_board(images, board, board_file, options, collect_views(result.images));
@@ -373,7 +376,7 @@ Observations read_board_views(const fs::path& file, const Board& board, const fs
   for (BoardView& view : is_mrcal_table(file) ? read_mrcal_corners(file, board, imager_px)
                                               : read_corner_table(file, board, imager_px)) {
     remove_corner_outliers(lattice, view, result.warnings);
-    is_seen = is_seen || view.seen.has_detected_corners();
+    is_seen = is_seen || view.detection.has_detected_corners();
     Observation image{view.image};
     image.size_px = view.imager_px;
     image.board = std::move(view);

@@ -115,22 +115,22 @@ void transfer_tag(NumberFile& file, TagDetection& tag) {
 void transfer_view(NumberFile& file, CachedView& cached) {
   BoardView& view = cached.view;
   for (int& size_px : view.imager_px) file.transfer_integer(size_px);
-  file.transfer_integer(view.seen.unusable);
-  file.transfer_integer(view.seen.overexposed);
+  file.transfer_integer(view.detection.num_unusable_tags);
+  file.transfer_integer(view.detection.num_overexposed_tags);
   double blur_px = cached.blur_px.value_or(-1);
   file.transfer(blur_px);
   cached.blur_px = blur_px < 0 ? std::nullopt : std::optional(blur_px);
   file.transfer(cached.bright_fraction);
   file.transfer(cached.white_fraction);
-  for (auto* tags : {&view.seen.tags, &view.seen.foreign}) {
+  for (auto* tags : {&view.detection.tags, &view.detection.foreign_tags}) {
     file.transfer_list(*tags, [&](TagDetection& tag) { transfer_tag(file, tag); });
   }
-  file.transfer_list(view.seen.points, [&](PointDetection& point) {
+  file.transfer_list(view.detection.points, [&](PointDetection& point) {
     file.transfer_integer(point.index);
     file.transfer(point.pixel.x());
     file.transfer(point.pixel.y());
   });
-  file.transfer_list(view.seen.curve_costs, [&](double& cost) { file.transfer(cost); });
+  file.transfer_list(view.detection.curve_costs, [&](double& cost) { file.transfer(cost); });
 }
 
 std::string compute_digest(const SourceImage& image) {

@@ -43,11 +43,11 @@ void add_labeled_lights(std::span<const Observation> images, const std::vector<F
     const auto frame = frames.find(image.image_file_name());
     if (frame == frames.end() || !image.is_image_kept()) continue;
     for (const Detection& label : frame->second->detections) {
-      ++labeled.labels;
+      ++labeled.num_labels;
       if (const Light* light = find_light_at_pixel(image, label.pixel)) {
         labeled.lights.push_back({label.lamp, light->stripes, number});
       } else {
-        ++labeled.without_light;
+        ++labeled.num_labels_without_light;
       }
     }
     ++number;

@@ -24,7 +24,7 @@ const Light* find_light_at_pixel(const Observation& image, const Eigen::Vector2d
 struct LabeledLights {
   std::vector<LabeledLight> lights;
   /// Number of labels in images that are used, and number of these labels without a light.
-  int labels = 0, without_light = 0;
+  int num_labels = 0, num_labels_without_light = 0;
 };
 
 /// Adds the lights of one folder; `labels` refers to its images by name.

@@ -37,8 +37,8 @@ constexpr double kMaxWhiteFraction = 0.65;
 constexpr std::size_t kMaxLines = 5;
 
 bool is_overexposed(const Light& light, const cv::Mat& image) {
-  const cv::Point low(static_cast<int>(light.low.x()), static_cast<int>(light.low.y()));
-  const cv::Point high(static_cast<int>(light.high.x()), static_cast<int>(light.high.y()));
+  const cv::Point low(static_cast<int>(light.box_min.x()), static_cast<int>(light.box_min.y()));
+  const cv::Point high(static_cast<int>(light.box_max.x()), static_cast<int>(light.box_max.y()));
   return light.kind == LightKind::unknown &&
          compute_saturated_fraction(image, {low, high}) > kMaxWhiteFraction;
 }
@@ -93,7 +93,7 @@ void reject_image_with_few_lamps(const cv::Mat& image, Observation& result) {
   result.set_image_rejection(
       RejectionReason::too_few_lamps,
       fmt::format("too few lamps: {} visible, {} cut off by the image border, {} lights unlike any",
-                  lamps, count(is_kind(LightKind::cut)), unknown));
+                  lamps, count(is_kind(LightKind::truncated)), unknown));
 }
 
 LampClassifier read_classifier(const LampImages& images, const fs::path& file,
@@ -202,8 +202,8 @@ std::string explain_no_lamp(const std::vector<Observation>& images, const LampMa
   std::string message = fmt::format(
       "no lamp was identified wholly in view in {} images ({} skipped; {} lamps are cut by the "
       "image's edge, {} lights flicker unlike any lamp of the map, {} are steady, {} have no form)",
-      images.size(), skipped, count(LightKind::cut), count(LightKind::unknown),
-      count(LightKind::steady), count(LightKind::formless));
+      images.size(), skipped, count(LightKind::truncated), count(LightKind::unknown),
+      count(LightKind::unmodulated), count(LightKind::no_outline));
   const auto reasons = count_rejected_lights_by_reason(images);
   if (reasons.empty()) {
     return message + ": are lamps lit and in view, and the exposure long enough?";
@@ -336,7 +336,7 @@ Observation LampIntake::detect_lamps_in_image(const SourceImage& source) const {
     if (!result.is_image_kept()) return;
     const auto level = levels_.find(result.image_file_name());
     const LightDetector detector =
-        level == levels_.end() ? detector_ : detector_.copy_detector_with_tilt(level->second);
+        level == levels_.end() ? detector_ : detector_.copy_detector_for_camera_tilt(level->second);
     if (can_turn_) {
       auto [readout, lights] = detect_lights_with_unknown_readout(detector, to_image_view(image));
       result.readout = readout;

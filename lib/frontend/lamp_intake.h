@@ -22,7 +22,7 @@
 namespace vlp {
 
 /// Rotations level_from_camera of images, by name; std::nullopt if unknown
-/// (LightDetector::copy_detector_with_tilt()).
+/// (LightDetector::copy_detector_for_camera_tilt()).
 using LevelRotations = std::map<std::string, std::optional<Eigen::Matrix3d>>;
 
 /// Computes the rotation level_from_camera from the inclination of a robot.

@@ -20,9 +20,9 @@ namespace vlp {
 namespace {
 
 std::string_view outline_name(const Light& light) {
-  if (light.kind == LightKind::formless) return "";
+  if (light.kind == LightKind::no_outline) return "";
   if (light.is_glow) return "glow";
-  if (!is_disc_light(light)) return get_lamp_shape_traits(light.shape).name;
+  if (!is_light_disc_shaped(light)) return get_lamp_shape_traits(light.shape).name;
   return light.is_uneven ? "rim" : "edge";
 }
 
@@ -56,8 +56,8 @@ std::vector<CountedReason> count_rejected_lights_by_reason(std::span<const Obser
   for (const auto& [what, count] : counts) reasons.push_back({what.first, what.second, count});
   std::stable_sort(reasons.begin(), reasons.end(),
                    [](const CountedReason& a, const CountedReason& b) {
-                     const bool form_a = a.kind != LightKind::formless;
-                     const bool form_b = b.kind != LightKind::formless;
+                     const bool form_a = a.kind != LightKind::no_outline;
+                     const bool form_b = b.kind != LightKind::no_outline;
                      return form_a != form_b ? form_a : a.lights > b.lights;
                    });
   return reasons;
@@ -66,10 +66,10 @@ std::vector<CountedReason> count_rejected_lights_by_reason(std::span<const Obser
 std::string_view light_kind_name(LightKind kind) {
   constexpr std::array<std::pair<LightKind, std::string_view>, 5> names{
       {{LightKind::lamp, "lamp"},
-       {LightKind::cut, "cut"},
+       {LightKind::truncated, "cut"},
        {LightKind::unknown, "unknown"},
-       {LightKind::steady, "steady"},
-       {LightKind::formless, "no_outline"}}};
+       {LightKind::unmodulated, "steady"},
+       {LightKind::no_outline, "no_outline"}}};
   return find_name(names, kind);
 }
 
@@ -79,7 +79,7 @@ std::string_view light_reason_name(LightReason reason) {
        // [LAMP-2] `overexposed` | most pixels of the light at full scale | expose shorter
        {LightReason::overexposed, "overexposed"},
        // [LAMP-3] `steady` | not modulated, or exposure too long for the frequency | expose shorter
-       {LightReason::steady, "steady"},
+       {LightReason::unmodulated, "steady"},
        // [LAMP-4] `too_few_periods` | too small, too far or too slow; few periods suffice only next
        //   to a lamp with more | go nearer, or raise the frequency
        {LightReason::too_few_periods, "too_few_periods"},
@@ -107,7 +107,7 @@ std::string describe_light_reason(LightReason reason) {
       return "its stripes match this lamp";
     case LightReason::overexposed:
       return "most of it is overexposed: if it is a lamp, expose shorter";
-    case LightReason::steady:
+    case LightReason::unmodulated:
       return fmt::format("its lines differ by less than {:.0f} %: if it is a lamp, expose shorter",
                          100 * kMinContrast);
     case LightReason::too_few_periods:
@@ -140,10 +140,10 @@ std::string describe_light(const Light& light) {
   if (light.lamp) line += fmt::format(" {}", *light.lamp);
   line +=
       fmt::format(": {}; radius {:.1f} px", describe_light_reason(light.reason), light.radius_px);
-  if (light.kind == LightKind::formless) return line;
+  if (light.kind == LightKind::no_outline) return line;
   const Stripes& stripes = light.stripes;
   line += fmt::format(
-      ", {} {:.0f} % {}, contrast {:.2f}", outline_name(light), 100 * light.roundness,
+      ", {} {:.0f} % {}, contrast {:.2f}", outline_name(light), 100 * light.inlier_fraction,
       get_lamp_shape_traits(light.shape).is_round ? "round" : "straight", stripes.contrast);
   if (!(stripes.period_lines > 0)) return line;
   return line + fmt::format(
@@ -161,14 +161,14 @@ void write_lights_table(const std::filesystem::path& file, std::span<const Obser
   for (const Observation& image : images) {
     for (const Light& light : image.lights) {
       const Stripes& stripes = light.stripes;
-      const bool form = light.kind != LightKind::formless;
+      const bool form = light.kind != LightKind::no_outline;
       const bool striped = form && stripes.period_lines > 0;
       csv.write_csv_row(
           {image.image_file_name(), light_kind_name(light.kind), light_reason_name(light.reason),
            lamp_name(light), format_fixed_decimals(light.pixel.x(), 4),
            format_fixed_decimals(light.pixel.y(), 4), number_if(form, light.sigma_px),
            format_fixed_decimals(light.radius_px, 4), outline_name(light),
-           number_if(form, light.rise_px), number_if(form, light.roundness),
+           number_if(form, light.rise_px), number_if(form, light.inlier_fraction),
            number_if(form, stripes.contrast), number_if(striped, stripes.period_lines),
            number_if(striped, stripes.periods), number_if(striped, stripes.periodicity_r2),
            number_if(striped, light.coherence), number_if(striped, stripes.duty)});
@@ -184,18 +184,18 @@ constexpr int kShift = 8;
 
 cv::Scalar choose_color(LightKind kind) {
   static const std::map<LightKind, cv::Scalar> colors{{LightKind::lamp, {80, 255, 80}},
-                                                      {LightKind::cut, {0, 220, 255}},
+                                                      {LightKind::truncated, {0, 220, 255}},
                                                       {LightKind::unknown, {60, 60, 255}},
-                                                      {LightKind::steady, {255, 160, 60}},
-                                                      {LightKind::formless, {170, 170, 170}}};
+                                                      {LightKind::unmodulated, {255, 160, 60}},
+                                                      {LightKind::no_outline, {170, 170, 170}}};
   return colors.at(kind);
 }
 
 std::string make_label(const Light& light) {
-  if (light.kind != LightKind::lamp && light.kind != LightKind::cut) {
+  if (light.kind != LightKind::lamp && light.kind != LightKind::truncated) {
     return fmt::format("{}: {}", light_kind_name(light.kind), light_reason_name(light.reason));
   }
-  return std::to_string(*light.lamp) + (light.kind == LightKind::cut ? " cut" : "");
+  return std::to_string(*light.lamp) + (light.kind == LightKind::truncated ? " cut" : "");
 }
 
 cv::Point to_fixed_point(const Eigen::Vector2d& pixel) {
@@ -217,17 +217,18 @@ cv::Mat brighten_image(const cv::Mat& image) {
 }
 
 /// Draws a text next to a light, on the side with enough space.
-void write_label(cv::Mat& picture, const Light& light, double size) {
+void write_label(cv::Mat& annotated_image, const Light& light, double size) {
   const std::string label = make_label(light);
   const int thickness = static_cast<int>(std::lround(size));
   const double scale = 0.5 * size;
   const cv::Size box = cv::getTextSize(label, cv::FONT_HERSHEY_SIMPLEX, scale, thickness, nullptr);
   const int gap = static_cast<int>(3 * size);
-  int left = static_cast<int>(light.high.x()) + gap;
-  if (left + box.width > picture.cols) left = static_cast<int>(light.low.x()) - gap - box.width;
+  int left = static_cast<int>(light.box_max.x()) + gap;
+  if (left + box.width > annotated_image.cols)
+    left = static_cast<int>(light.box_min.x()) - gap - box.width;
   const int bottom = std::clamp(static_cast<int>(light.pixel.y()) + box.height / 2, box.height,
-                                std::max(box.height, picture.rows - 1));
-  cv::putText(picture, label, {std::max(0, left), bottom}, cv::FONT_HERSHEY_SIMPLEX, scale,
+                                std::max(box.height, annotated_image.rows - 1));
+  cv::putText(annotated_image, label, {std::max(0, left), bottom}, cv::FONT_HERSHEY_SIMPLEX, scale,
               choose_color(light.kind), thickness, cv::LINE_AA);
 }
 
@@ -235,32 +236,33 @@ void write_label(cv::Mat& picture, const Light& light, double size) {
 
 cv::Mat render_annotated_image(const cv::Mat& image, const std::vector<Light>& lights,
                                Readout readout) {
-  cv::Mat picture = brighten_image(image);
-  const double size = std::max(1.0, picture.cols / 1000.0);  // of letters and crosses
+  cv::Mat annotated_image = brighten_image(image);
+  const double size = std::max(1.0, annotated_image.cols / 1000.0);  // of letters and crosses
   const int thickness = static_cast<int>(std::lround(size));
   for (const Light& light : lights) {
     const cv::Scalar color = choose_color(light.kind);
     for (const EdgePoint& edge : light.outline) {
       const Eigen::Vector2d at =
           readout == Readout::rows ? edge.pixel : Eigen::Vector2d(edge.pixel.reverse());
-      cv::circle(picture, to_fixed_point(at), to_fixed_point({size, 0}).x, color, cv::FILLED,
-                 cv::LINE_AA, kShift);
+      cv::circle(annotated_image, to_fixed_point(at), to_fixed_point({size, 0}).x, color,
+                 cv::FILLED, cv::LINE_AA, kShift);
     }
     const Eigen::Vector2d across(6 * size, 0), along(0, 6 * size);
-    cv::line(picture, to_fixed_point(light.pixel - across), to_fixed_point(light.pixel + across),
-             color, thickness, cv::LINE_AA, kShift);
-    cv::line(picture, to_fixed_point(light.pixel - along), to_fixed_point(light.pixel + along),
-             color, thickness, cv::LINE_AA, kShift);
-    write_label(picture, light, size);
+    cv::line(annotated_image, to_fixed_point(light.pixel - across),
+             to_fixed_point(light.pixel + across), color, thickness, cv::LINE_AA, kShift);
+    cv::line(annotated_image, to_fixed_point(light.pixel - along),
+             to_fixed_point(light.pixel + along), color, thickness, cv::LINE_AA, kShift);
+    write_label(annotated_image, light, size);
   }
-  return picture;
+  return annotated_image;
 }
 
 void write_annotated_image(const std::filesystem::path& folder,
-                           const std::filesystem::path& image_file, const cv::Mat& picture) {
+                           const std::filesystem::path& image_file,
+                           const cv::Mat& annotated_image) {
   std::filesystem::path file = folder / image_file.filename();
   file += ".png";
-  write_file(file, get_codecs().encode_image_file(".png", picture, {}));
+  write_file(file, get_codecs().encode_image_file(".png", annotated_image, {}));
 }
 
 }  // namespace vlp

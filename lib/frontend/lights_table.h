@@ -59,6 +59,6 @@ cv::Mat render_annotated_image(const cv::Mat& image, const std::vector<Light>& l
 /// appended.
 /// @throws InputError if the file cannot be written
 void write_annotated_image(const std::filesystem::path& folder,
-                           const std::filesystem::path& image_file, const cv::Mat& picture);
+                           const std::filesystem::path& image_file, const cv::Mat& annotated_image);
 
 }  // namespace vlp

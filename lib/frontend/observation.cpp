@@ -179,7 +179,7 @@ namespace {
 
 /// Returns the corners of the board, or the lamps by their ids, sorted by index.
 std::vector<PointDetection> get_points_in(const Observation& image) {
-  if (image.board) return collect_detected_corners(image.board->seen);
+  if (image.board) return collect_detected_corners(image.board->detection);
   std::vector<PointDetection> points;
   for (const Detection& lamp : collect_identified_lamps(image)) {
     points.push_back({static_cast<std::size_t>(lamp.lamp), lamp.pixel});
@@ -215,7 +215,7 @@ bool are_points_close(const std::vector<PointDetection>& a, const std::vector<Po
 }  // namespace
 
 int min_lamps_for_image_use(ImageUse use) {
-  return use == ImageUse::turn || use == ImageUse::places ? 2 : 0;
+  return use == ImageUse::rotation || use == ImageUse::known_positions ? 2 : 0;
 }
 
 void Selection::add_or_reject_image(Observation& image) {
@@ -229,7 +229,7 @@ void Selection::add_or_reject_image(Observation& image) {
     return image.set_image_rejection(RejectionReason::same_image,
                                      "is the same image as " + kept.name);
   }
-  if (use_ != ImageUse::places) {
+  if (use_ != ImageUse::known_positions) {
     for (const Kept& kept : kept_) {
       if (!are_points_close(points, kept.points, same_view_fraction_ * image.size_px[0])) continue;
       return image.set_image_rejection(

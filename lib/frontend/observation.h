@@ -142,10 +142,10 @@ Observations collect_observations_of_images(
 
 /// Use of a set of images, which determines the reasons for a rejection.
 enum class ImageUse {
-  boards,  // calibration of the lens: rejects repeated images and views
-  turn,    // rotation in place: rejects repeated images and views, and fewer than two lamps
-  places,  // captures at known positions: rejects repeated images, and fewer than two lamps
-  fixes    // captures to locate: rejects no image for its content
+  boards,           // calibration of the lens: rejects repeated images and views
+  rotation,         // rejects repeated images and views, and fewer than two lamps
+  known_positions,  // rejects repeated images, and fewer than two lamps
+  fixes             // captures to locate: rejects no image for its content
 };
 
 /// Filter for images that repeat an image in use. Two images show the same view if they share at

@@ -88,7 +88,7 @@ double clipped_fraction(const ImageView& lines, const Eigen::Vector2d& low,
 /// keep_best_light_of_lamp() compares sigmas without this error.
 void add_error_of_unknown_lens(const ImageSize& size, std::vector<Light>& lights) {
   for (Light& light : lights) {
-    if (light.kind == LightKind::formless) continue;
+    if (light.kind == LightKind::no_outline) continue;
     add_center_error(predict_center_sd_without_lens_px(light, size), light);
   }
 }
@@ -100,7 +100,7 @@ bool is_outline_sharp(const Light& light) { return light.rise_px <= kMaxRise * l
 
 bool has_clear_outline(const Light& light) {
   return !light.is_glow && !light.is_doubtful && is_outline_sharp(light) &&
-         light.roundness >= kMinRoundness;
+         light.inlier_fraction >= kMinInlierFraction;
 }
 
 /// Returns true if the center of one light is within the radius of the larger light.
@@ -113,7 +113,8 @@ std::optional<LightReason> find_reason_for_steady_light(const Light& light) {
   constexpr double min_clarity = 0.5, min_clipped = 0.5;
   const Stripes& stripes = light.stripes;
   if (!(stripes.contrast >= kMinContrast)) {
-    return light.clipped_fraction > min_clipped ? LightReason::overexposed : LightReason::steady;
+    return light.clipped_fraction > min_clipped ? LightReason::overexposed
+                                                : LightReason::unmodulated;
   }
   if (!(stripes.periods >= kMinPeriods)) return LightReason::too_few_periods;
   if (!(stripes.periodicity_r2 >= min_clarity)) return LightReason::no_clear_period;
@@ -162,11 +163,11 @@ Light make_light_without_outline(const ImageView& lines, const ModulatedLight& f
   light.sigma_px = std::clamp(found.center_sd_px, kMinSigma_px, kMaxSigma_px);
   light.radius_px = found.radius_px;
   const PixelBox& box = found.box;
-  light.low = shape.swap_image_and_scanline_axes({box.x - 0.5, box.y - 0.5});
-  light.high = shape.swap_image_and_scanline_axes(
+  light.box_min = shape.swap_image_and_scanline_axes({box.x - 0.5, box.y - 0.5});
+  light.box_max = shape.swap_image_and_scanline_axes(
       {std::min(box.end_column(), lines.width) - 0.5, std::min(box.end_row(), lines.height) - 0.5});
   light.rise_px = found.radius_px / 2;
-  light.roundness = 1;
+  light.inlier_fraction = 1;
   light.is_glow = true;
   return light;
 }
@@ -184,7 +185,7 @@ Light make_light_from_modulation(const ImageView& lines, const ModulatedLight& f
   std::optional<Rim> rim;
   if (!blob.runs.empty()) rim = fit_rim_of_light(lines, blob, background, shape);
   Light light = make_light_without_outline(lines, found, shape);
-  if (rim && rim->light.roundness >= kMinRoundness) {
+  if (rim && rim->light.inlier_fraction >= kMinInlierFraction) {
     // Without a clear rim either center may be correct.
     const double apart_px =
         rim->is_clear ? 0 : (rim->light.pixel - light.pixel).norm() / std::numbers::sqrt2;
@@ -192,9 +193,9 @@ Light make_light_from_modulation(const ImageView& lines, const ModulatedLight& f
     if (rim->is_clear || !is_round) light = std::move(rim->light);
     add_center_error(apart_px, light);
   }
-  light.by_modulation = true;
+  light.is_found_by_modulation = true;
   light.stripes = found.stripes;
-  light.peak = found.peak;
+  light.peak_level = found.peak_level;
   light.coherence = found.phase_coherence;
   return light;
 }
@@ -253,7 +254,7 @@ LightDetector::LightDetector(const LampMap& lamps, const DetectorCamera& camera,
   }
 }
 
-LightDetector LightDetector::copy_detector_with_tilt(
+LightDetector LightDetector::copy_detector_for_camera_tilt(
     const std::optional<Eigen::Matrix3d>& level_from_camera) const {
   DetectorCamera camera = camera_;
   if (level_from_camera) {
@@ -296,7 +297,7 @@ std::vector<LightPart> LightDetector::find_light_parts(const ImageView& lines, c
   }
   for (LightPart& part : parts) {
     if (part.light)
-      part.light->outside = double(remaining.size()) / double(part.light->outline.size());
+      part.light->outside_ratio = double(remaining.size()) / double(part.light->outline.size());
   }
   constexpr double min_edge_roundness = 0.5;
   // Each of several touching lights has an edge; their brightness may differ.
@@ -306,7 +307,7 @@ std::vector<LightPart> LightDetector::find_light_parts(const ImageView& lines, c
   const std::optional<Light>& first = parts.front().light;
   const bool has_edge =
       sharp_parts > 1 || (sharp_parts == 1 && first && is_outline_sharp(*first) &&
-                          first->roundness >= min_edge_roundness &&
+                          first->inlier_fraction >= min_edge_roundness &&
                           !is_blob_unevenly_lit(lines, blob, first->outline, background));
   for (LightPart& part : parts) {
     if (part.light) part.light->is_doubtful = !has_edge;
@@ -321,7 +322,7 @@ void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
   const auto is_conclusive = [&](const Light& light) {
     if (!has_clear_outline(light)) return false;
     const auto steady = find_reason_for_steady_light(light);
-    if (steady) return *steady == LightReason::steady || *steady == LightReason::overexposed;
+    if (steady) return *steady == LightReason::unmodulated || *steady == LightReason::overexposed;
     return identify_lamp_by_stripes(light.stripes).has_value();
   };
   std::vector<PixelBox> boxes;
@@ -352,7 +353,8 @@ void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
     if (has_choice) light.lamp = identify_lamp_by_stripes(light.stripes);
     const auto is_at_it = [&](const Light& other) { return are_at_same_position(other, light); };
     const auto is_better = [&](const Light& other) {
-      return is_at_it(other) && (!found.lamp || other.by_modulation || is_conclusive(other));
+      return is_at_it(other) &&
+             (!found.lamp || other.is_found_by_modulation || is_conclusive(other));
     };
     if (std::any_of(lights.begin(), lights.end(), is_better)) continue;
     std::erase_if(lights, is_at_it);
@@ -362,32 +364,33 @@ void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
 
 void LightDetector::refine_and_measure_light(const ImageView& lines, const Background& background,
                                              Light& light) const {
-  if (is_disc_light(light)) {
-    const DiscImage disc{shape_.swap_image_and_scanline_axes(light.low),
-                         shape_.swap_image_and_scanline_axes(light.high),
+  if (is_light_disc_shaped(light)) {
+    const DiscImage disc{shape_.swap_image_and_scanline_axes(light.box_min),
+                         shape_.swap_image_and_scanline_axes(light.box_max),
                          shape_.swap_image_and_scanline_axes(light.pixel)};
     auto outline = refine_disc_outline(lines, light.outline, disc, background);
     auto better =
         shape_.fit_light_to_outline(std::move(outline.points), background, outline.is_mottled);
     if (better && 2 * better->outline.size() > light.outline.size()) {
-      better->roundness = light.roundness;
-      better->outside = light.outside;
+      better->inlier_fraction = light.inlier_fraction;
+      better->outside_ratio = light.outside_ratio;
       better->is_doubtful = light.is_doubtful;
       light = std::move(*better);
     }
   }
-  const Eigen::Vector2d low = shape_.swap_image_and_scanline_axes(light.low),
-                        high = shape_.swap_image_and_scanline_axes(light.high);
+  const Eigen::Vector2d low = shape_.swap_image_and_scanline_axes(light.box_min),
+                        high = shape_.swap_image_and_scanline_axes(light.box_max);
   const auto chords =
-      is_disc_light(light)
+      is_light_disc_shaped(light)
           ? find_chords_in_ellipse(low, high, lines.size())
-          : find_chords_in_polygon(shape_.swap_image_and_scanline_axes(light.face), lines.size());
+          : find_chords_in_polygon(shape_.swap_image_and_scanline_axes(light.inner_polygon),
+                                   lines.size());
   const auto signal = compute_scanline_signal(lines, chords, background.level);
   light.stripes = measure_stripes(signal);
-  light.peak = signal.empty() ? 0 : *std::max_element(signal.begin(), signal.end());
+  light.peak_level = signal.empty() ? 0 : *std::max_element(signal.begin(), signal.end());
   if (light.stripes.period_lines > 0) {
-    light.coherence =
-        compute_stripe_coherence(lines, chords, background, light.stripes.period_lines);
+    light.coherence = compute_stripe_coherence_between_parts(lines, chords, background,
+                                                             light.stripes.period_lines);
   }
   if (light.stripes.contrast < kMinContrast)
     light.clipped_fraction = clipped_fraction(lines, low, high);
@@ -395,18 +398,18 @@ void LightDetector::refine_and_measure_light(const ImageView& lines, const Backg
 
 void LightDetector::correct_light_centers_for_motion(std::vector<Light>& lights) const {
   const auto has_sharp_circle = [](const Light& light) {
-    return !light.sums.empty() && !light.is_glow && !light.is_uneven;
+    return !light.outline_sums.empty() && !light.is_glow && !light.is_uneven;
   };
   std::vector<OutlineSums> sums;
   for (const Light& light : lights) {
-    if (has_sharp_circle(light)) sums.push_back(light.sums);
+    if (has_sharp_circle(light)) sums.push_back(light.outline_sums);
   }
   const auto shear = Shear::estimate_shear_from_outlines(sums);
   if (!shear) return;
   for (Light& light : lights) {
     if (!has_sharp_circle(light)) continue;
-    shape_.correct_light_for_motion(shear->predict_oval_from_motion(light.sums),
-                                    shear->motion_per_scanline(light.sums), light);
+    shape_.correct_light_for_motion(shear->predict_oval_from_motion(light.outline_sums),
+                                    shear->motion_per_scanline(light.outline_sums), light);
   }
 }
 
@@ -452,7 +455,7 @@ void reject_contradicting_periods(const LampMap& lamps, double row_time_s,
                                   std::vector<Light>& lights) {
   constexpr std::size_t min_lights = 3;
   const auto has_clear_period = [](const Light& light) {
-    return !light.by_modulation && are_stripes_reliable(light.stripes);
+    return !light.is_found_by_modulation && are_stripes_reliable(light.stripes);
   };
   std::vector<std::pair<Light*, double>> log_ratios;
   std::vector<double> clear_ones;
@@ -499,10 +502,10 @@ void keep_best_light_of_lamp(int lamp, std::vector<Light>& lights) {
       return claim->is_glow != claims[0]->is_glow;
     });
     std::sort(claims.begin(), alike_end,
-              [](const Light* a, const Light* b) { return a->peak > b->peak; });
+              [](const Light* a, const Light* b) { return a->peak_level > b->peak_level; });
     // The level of scanlines and the amplitude of cells are not comparable.
-    is_clear = claims[0]->by_modulation == claims[1]->by_modulation &&
-               claims[0]->peak > min_peak_ratio * claims[1]->peak;
+    is_clear = claims[0]->is_found_by_modulation == claims[1]->is_found_by_modulation &&
+               claims[0]->peak_level > min_peak_ratio * claims[1]->peak_level;
   }
   for (std::size_t i = is_clear ? 1 : 0; i < claims.size(); ++i) {
     reject(*claims[i], LightReason::reflection);
@@ -512,8 +515,8 @@ void keep_best_light_of_lamp(int lamp, std::vector<Light>& lights) {
 }  // namespace
 
 bool is_light_fully_in_view(const Light& light, const ImageSize& size) {
-  return light.low.minCoeff() > -0.5 && light.high.x() < size.width - 0.5 &&
-         light.high.y() < size.height - 0.5;
+  return light.box_min.minCoeff() > -0.5 && light.box_max.x() < size.width - 0.5 &&
+         light.box_max.y() < size.height - 0.5;
 }
 
 std::optional<int> LightDetector::identify_lamp_by_stripes(const Stripes& stripes) const {
@@ -542,16 +545,16 @@ void LightDetector::identify_lamps_of_lights(std::vector<Light>& lights,
   constexpr double max_rise_ratio = 5, max_outside = 0.25;
   double sharpest_px = std::numeric_limits<double>::infinity(), brightest = 0;
   for (Light& light : lights) {
-    if (light.kind == LightKind::formless) continue;
+    if (light.kind == LightKind::no_outline) continue;
     const auto steady = find_reason_for_steady_light(light);
-    light.kind = steady ? LightKind::steady : LightKind::unknown;
+    light.kind = steady ? LightKind::unmodulated : LightKind::unknown;
     light.reason = steady.value_or(LightReason::unknown_period);
     if (steady) {
       light.lamp.reset();
       continue;
     }
     if (!light.is_uneven && !light.is_glow) sharpest_px = std::min(sharpest_px, light.rise_px);
-    if (!light.by_modulation) light.lamp = identify_lamp_by_stripes(light.stripes);
+    if (!light.is_found_by_modulation) light.lamp = identify_lamp_by_stripes(light.stripes);
     if (!are_stripes_readable(light.stripes)) light.reason = LightReason::no_clear_period;
     if (!light.lamp) continue;
     const auto off = compute_log_aspect_ratio_difference(light, *light.lamp);
@@ -560,19 +563,19 @@ void LightDetector::identify_lamps_of_lights(std::vector<Light>& lights,
     } else if (shape_.has_known_lens()) {
       add_error_of_hidden_end(*off, shape_.is_camera_tilted() ? 0 : kUnknownTiltSd, light);
     }
-    if (light.lamp && !light.is_glow) brightest = std::max(brightest, light.peak);
+    if (light.lamp && !light.is_glow) brightest = std::max(brightest, light.peak_level);
   }
   for (Light& light : lights) {
     if (!light.lamp) continue;
     // The reflection of a lamp is modulated like the lamp. If too many edge points are not on the
     // lamp's outline, a circle through the others is not reliable.
-    const bool has_other_outline = light.outside > max_outside;
+    const bool has_other_outline = light.outside_ratio > max_outside;
     const bool is_soft = light.is_glow
-                             ? light.peak < min_peak_ratio * brightest
+                             ? light.peak_level < min_peak_ratio * brightest
                              : !light.is_uneven && light.rise_px > max_rise_ratio * sharpest_px;
     if (is_soft) {
       reject(light, LightReason::reflection);
-    } else if (has_other_outline || light.roundness < kMinRoundness) {
+    } else if (has_other_outline || light.inlier_fraction < kMinInlierFraction) {
       reject(light, LightReason::wrong_shape);
     }
   }
@@ -587,7 +590,7 @@ void LightDetector::identify_lamps_of_lights(std::vector<Light>& lights,
   for (Light& light : lights) {
     if (light.lamp && !sure) reject(light, LightReason::too_few_periods);
     if (!light.lamp) continue;
-    light.kind = is_light_fully_in_view(light, size) ? LightKind::lamp : LightKind::cut;
+    light.kind = is_light_fully_in_view(light, size) ? LightKind::lamp : LightKind::truncated;
     light.reason = LightReason::identified;
   }
 }

@@ -47,7 +47,7 @@ class LightDetector {
 
   /// Returns a copy of the detector for a camera with another tilt. If the tilt is unknown,
   /// ellipses are fitted in the image, as without a lens.
-  LightDetector copy_detector_with_tilt(
+  LightDetector copy_detector_for_camera_tilt(
       const std::optional<Eigen::Matrix3d>& level_from_camera) const;
 
   /// Returns a copy of the detector for images with another readout direction.

@@ -17,7 +17,7 @@ double sum_readout_direction_evidence(std::span<const Light> lights) {
   double sum = 0;
   for (const Light& light : lights) {
     if (!is_light_modulated(light)) continue;
-    sum += light.stripes.periodicity_r2 * light.stripes.contrast * light.roundness;
+    sum += light.stripes.periodicity_r2 * light.stripes.contrast * light.inlier_fraction;
   }
   return sum;
 }

@@ -15,7 +15,7 @@ namespace vlp {
 
 namespace {
 
-BodyState make_body_state(const FreePose& camera, const BodyProblem& problem) {
+BodyState make_body_state_from_camera_pose(const FreePose& camera, const BodyProblem& problem) {
   const Eigen::Matrix3d world_from_body = camera.camera_from_world.transpose();
   BodyState state{{camera.position_m - world_from_body * problem.arm_m,
                    std::atan2(world_from_body(1, 0), world_from_body(0, 0))},
@@ -56,8 +56,8 @@ bool LevelSightings::fill(const BodyObservations& frame, const Eigen::Matrix3d& 
   return true;
 }
 
-BodyState make_body_state(const Pose& camera, const BodyProblem& problem,
-                          const Eigen::Matrix3d& lean) {
+BodyState make_body_state_from_camera_pose(const Pose& camera, const BodyProblem& problem,
+                                           const Eigen::Matrix3d& lean) {
   BodyState state{camera, problem.prior.mean};
   state.pose.position_m -= rotation_about_z(camera.yaw_rad) * lean * problem.arm_m;
   return state;
@@ -77,7 +77,7 @@ InitialStates compute_initial_states(const BodyObservations& frame,
     const FreePose& pose = found.poses[static_cast<std::size_t>(i)];
     if (!is_below_lamps(pose, points_m)) continue;
     initial_states.states[static_cast<std::size_t>(initial_states.count++)] =
-        make_body_state(pose, problem);
+        make_body_state_from_camera_pose(pose, problem);
   }
   initial_states.status = initial_states.count > 0 ? FixStatus::ok
                           : found.count > 0        ? FixStatus::lamp_below_camera
@@ -99,7 +99,7 @@ InitialStates compute_level_state(const BodyObservations& frame, const BodyProbl
   if (!level.fill(frame, lean)) return {FixStatus::lamp_below_camera, 0, {}};
   const InitialPose start = compute_initial_pose(level.observations_span());
   if (start.status != FixStatus::ok) return {start.status, 0, {}};
-  return {FixStatus::ok, 1, {make_body_state(start.pose, problem, lean)}};
+  return {FixStatus::ok, 1, {make_body_state_from_camera_pose(start.pose, problem, lean)}};
 }
 
 /// Returns three lamps of the current frame that are far apart and far from collinear.

@@ -62,8 +62,8 @@ struct LevelSightings {
 };
 
 /// Returns the state of the body for a pose of the camera and the motion of the prior.
-BodyState make_body_state(const Pose& camera, const BodyProblem& problem,
-                          const Eigen::Matrix3d& lean);
+BodyState make_body_state_from_camera_pose(const Pose& camera, const BodyProblem& problem,
+                                           const Eigen::Matrix3d& lean);
 
 /// Computes the states below the lamps from three of them.
 InitialStates compute_initial_states(const BodyObservations& frame,

@@ -18,8 +18,8 @@ Eigen::Matrix3d make_shear_matrix(const Eigen::Vector2d& offset) {
 
 }  // namespace
 
-Eigen::Matrix3d compute_level_from_camera_rotation(const Calibration& calibration,
-                                                   Correction correction) {
+Eigen::Matrix3d compute_level_from_camera_matrix(const Calibration& calibration,
+                                                 Correction correction) {
   const auto& rotation = calibration.rotation_center;
   const auto& dispersion = calibration.dispersion;
   if (correction == Correction::rotation && !rotation) {

@@ -22,7 +22,7 @@ enum class Correction { none, rotation, dispersion, all };
 ///                             factor f / H that they lack).
 /// @throws std::invalid_argument if `correction` requires a part that is missing; if a part has
 ///     values that are not finite; if the zenith is not in front of the camera
-Eigen::Matrix3d compute_level_from_camera_rotation(const Calibration& calibration,
-                                                   Correction correction);
+Eigen::Matrix3d compute_level_from_camera_matrix(const Calibration& calibration,
+                                                 Correction correction);
 
 }  // namespace vlp

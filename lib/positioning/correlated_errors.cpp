@@ -24,8 +24,8 @@ void add_rotation_vectors(std::vector<Eigen::Matrix3d>& turns, const Calibration
   for (int axis = 0; axis < 2; ++axis) {
     const Eigen::Vector2d error = step * Eigen::Vector2d::Unit(axis);
     const Calibration less = with_error(calibration, -error), more = with_error(calibration, error);
-    turns.emplace_back((compute_level_from_camera_rotation(more, correction) -
-                        compute_level_from_camera_rotation(less, correction)) /
+    turns.emplace_back((compute_level_from_camera_matrix(more, correction) -
+                        compute_level_from_camera_matrix(less, correction)) /
                        (2 * step));
   }
 }
@@ -84,14 +84,16 @@ const Place* find_lamp_position_by_id(const std::vector<Place>& places, int id) 
 CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration,
                            Correction correction)
     : intrinsics_(count_intrinsics_with_covariance(calibration.camera)),
-      base_from_camera_(compute_level_from_camera_rotation(calibration, correction)),
+      base_from_camera_(compute_level_from_camera_matrix(calibration, correction)),
       camera_from_base_(base_from_camera_.inverse()) {
   const bool turned = calibration.rotation_center &&
                       (correction == Correction::rotation || correction == Correction::all);
   const bool shifted = calibration.dispersion &&
                        (correction == Correction::dispersion || correction == Correction::all);
-  if (turned) add_rotation_vectors(turns_, calibration, correction, perturb_zenith_direction);
-  if (shifted) add_rotation_vectors(turns_, calibration, correction, perturb_dispersion_offset);
+  if (turned)
+    add_rotation_vectors(rotation_derivatives_, calibration, correction, perturb_zenith_direction);
+  if (shifted)
+    add_rotation_vectors(rotation_derivatives_, calibration, correction, perturb_dispersion_offset);
   offset_ = intrinsics_ + (turned ? 2 : 0);
   assign_covariance_rows_to_lamps(lamps, calibration);
   set_lens_and_zenith_covariances(calibration);
@@ -111,7 +113,7 @@ void CommonErrors::assign_covariance_rows_to_lamps(std::span<const Lamp> lamps,
     if (adjusted != nullptr && is_lamp_at_position(lamp, adjusted->position_m)) return true;
     const auto* uncertain =
         has_dispersion_offset_errors()
-            ? find_lamp_position_by_id(calibration.dispersion->by_lamps, lamp.id)
+            ? find_lamp_position_by_id(calibration.dispersion->uncertain_lamps, lamp.id)
             : nullptr;
     return uncertain != nullptr && is_lamp_at_position(lamp, uncertain->position_m);
   };
@@ -143,11 +145,11 @@ void CommonErrors::set_lens_and_zenith_covariances(const Calibration& calibratio
   const auto& dispersion = calibration.dispersion;
   const auto& adjustment = calibration.adjustment;
   const auto& report = calibration.intrinsics_report;
-  // A part that was calibrated with the lens compensates its errors in part: without by_intrinsics
-  // these would count twice.
-  const bool lens_counts_once = has_zenith_errors() ? center->by_intrinsics.has_value()
+  // A part that was calibrated with the lens compensates its errors in part: without
+  // jacobian_wrt_intrinsics these would count twice.
+  const bool lens_counts_once = has_zenith_errors() ? center->jacobian_wrt_intrinsics.has_value()
                                 : has_dispersion_offset_errors()
-                                    ? dispersion->by_intrinsics.has_value()
+                                    ? dispersion->jacobian_wrt_intrinsics.has_value()
                                     : true;
   const bool lens = report && report->covariance && lens_counts_once;
   const bool zenith_stated = adjustment || (has_zenith_errors() && center->covariance);
@@ -206,29 +208,31 @@ void CommonErrors::propagate_errors_to_zenith_and_offset(std::span<const Lamp> l
   Eigen::MatrixXd derivatives = Eigen::MatrixXd::Zero(rows, covariance_.cols());
   derivatives.middleCols(intrinsics_, rows).setIdentity();
   if (has_zenith_errors() && !calibration.adjustment &&
-      calibration.rotation_center->by_intrinsics) {
-    derivatives.topLeftCorner(2, intrinsics_) = *calibration.rotation_center->by_intrinsics;
+      calibration.rotation_center->jacobian_wrt_intrinsics) {
+    derivatives.topLeftCorner(2, intrinsics_) =
+        *calibration.rotation_center->jacobian_wrt_intrinsics;
   }
   if (has_dispersion_offset_errors()) {
     const Dispersion& dispersion = *calibration.dispersion;
     covariance_.block<2, 2>(offset_, offset_) =
         normalized_point_from_pixel(dispersion.covariance, calibration.camera.focal_px());
     auto of_offset = derivatives.bottomRows<2>();
-    if (dispersion.by_intrinsics) of_offset.leftCols(intrinsics_) = *dispersion.by_intrinsics;
-    for (const Dispersion::UncertainLamp& uncertain : dispersion.by_lamps) {
+    if (dispersion.jacobian_wrt_intrinsics)
+      of_offset.leftCols(intrinsics_) = *dispersion.jacobian_wrt_intrinsics;
+    for (const Dispersion::UncertainLamp& uncertain : dispersion.uncertain_lamps) {
       if (const auto row = find_covariance_row_of_lamp(lamps, uncertain)) {
-        of_offset.middleCols<3>(*row) = uncertain.by_position;
+        of_offset.middleCols<3>(*row) = uncertain.jacobian_wrt_position;
       } else {
-        const Eigen::Matrix<double, 2, 3> move = uncertain.sd_m * uncertain.by_position;
+        const Eigen::Matrix<double, 2, 3> move = uncertain.sd_m * uncertain.jacobian_wrt_position;
         covariance_.block<2, 2>(offset_, offset_) += move * move.transpose();
       }
     }
     if (has_zenith_errors()) {
       // The offset compensates the error of the zenith.
-      const Eigen::Matrix2d by_zenith = dispersion.by_zenith
-                                            ? Eigen::Matrix2d(*dispersion.by_zenith)
-                                            : Eigen::Matrix2d(-Eigen::Matrix2d::Identity());
-      of_offset += by_zenith * Eigen::MatrixXd(derivatives.topRows<2>());
+      const Eigen::Matrix2d jacobian_wrt_zenith =
+          dispersion.jacobian_wrt_zenith ? Eigen::Matrix2d(*dispersion.jacobian_wrt_zenith)
+                                         : Eigen::Matrix2d(-Eigen::Matrix2d::Identity());
+      of_offset += jacobian_wrt_zenith * Eigen::MatrixXd(derivatives.topRows<2>());
     }
   }
   covariance_.middleRows(intrinsics_, rows) = derivatives * covariance_;
@@ -244,7 +248,7 @@ std::optional<Eigen::Index> CommonErrors::find_covariance_row_of_lamp(
   return is_stated ? row : std::nullopt;
 }
 
-CommonErrors CommonErrors::extract_covariance_of_error_source(CommonErrorSource part) const {
+CommonErrors CommonErrors::isolate_error_source(CommonErrorSource part) const {
   const std::array<Eigen::Index, kCommonErrorSources.size() + 1> rows{
       0, intrinsics_, offset_, num_shared_errors(), covariance_.rows()};
   CommonErrors one = *this;
@@ -274,8 +278,8 @@ CommonErrors::RayJacobian CommonErrors::compute_ray_error_jacobian(
     const Eigen::Matrix<double, 3, 2> d_ray_in_base = base_from_camera_.leftCols<2>() * d_ray;
     effect.leftCols(intrinsics_).noalias() = d_ray_in_base * seen->d_pixel_d_parameters;
   }
-  for (std::size_t i = 0; i < turns_.size(); ++i) {
-    effect.col(intrinsics_ + static_cast<Eigen::Index>(i)) = turns_[i] * ray;
+  for (std::size_t i = 0; i < rotation_derivatives_.size(); ++i) {
+    effect.col(intrinsics_ + static_cast<Eigen::Index>(i)) = rotation_derivatives_[i] * ray;
   }
   return effect;
 }
@@ -459,10 +463,10 @@ std::optional<Matrix2> compute_dispersion_offset_covariance(const Calibration& c
   if (!calibration.adjustment) {
     const Dispersion& dispersion = *calibration.dispersion;
     const auto& report = calibration.intrinsics_report;
-    if (report && report->covariance && !dispersion.by_intrinsics) return std::nullopt;
+    if (report && report->covariance && !dispersion.jacobian_wrt_intrinsics) return std::nullopt;
     const bool turned = calibration.rotation_center.has_value();
-    if (turned &&
-        !(errors.is_error_source_known(CommonErrorSource::zenith) && dispersion.by_zenith))
+    if (turned && !(errors.is_error_source_known(CommonErrorSource::zenith) &&
+                    dispersion.jacobian_wrt_zenith))
       return std::nullopt;
   }
   const Eigen::Index offset = errors.joint_error_covariance().rows() - 2;

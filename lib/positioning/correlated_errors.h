@@ -43,10 +43,12 @@ class CommonErrors {
  public:
   /// Takes C from the adjustment. Without an adjustment, propagates the errors through the
   /// sequential steps, with e_lens from the calibration with boards:
-  ///   e_zenith = own + by_intrinsics e_lens
-  ///   e_offset = own + by_intrinsics e_lens + by_zenith e_zenith + by_lamps e_lamps
-  /// by_zenith is -1 if it is not reported. The lens errors count if the first applied step reports
-  /// by_intrinsics, or if no step is applied. The lamp errors are the sd_m of the survey.
+  ///   e_zenith = own + jacobian_wrt_intrinsics e_lens
+  ///   e_offset = own + jacobian_wrt_intrinsics e_lens + jacobian_wrt_zenith e_zenith
+  ///              + jacobian_wrt_lamps e_lamps
+  /// jacobian_wrt_zenith is -1 if it is not reported. The lens errors count if the first applied
+  /// step reports jacobian_wrt_intrinsics, or if no step is applied. The lamp errors are the sd_m
+  /// of the survey.
   ///
   /// @param lamps  the lamps of the map, in the order to which indices refer
   ///
@@ -70,7 +72,7 @@ class CommonErrors {
   /// parts, in the order of kCommonErrorSources, already are. For sequential steps a part holds the
   /// errors of its own step. The part of the lens includes its effects on later steps. The part of
   /// the lamps excludes errors that an offset found with the same map compensates.
-  CommonErrors extract_covariance_of_error_source(CommonErrorSource part) const;
+  CommonErrors isolate_error_source(CommonErrorSource part) const;
   /// Returns the number of lamps of the adjustment that the map has at another position. Their
   /// correlation with the calibration is lost.
   int num_lamps_moved_since_calibration() const { return num_lamps_moved_since_calibration_; }
@@ -158,7 +160,7 @@ class CommonErrors {
   /// correlated errors follow, in the order of the map.
   const MatrixX& joint_error_covariance() const { return covariance_; }
   Eigen::Index num_intrinsics() const { return intrinsics_; }
-  Eigen::Index num_shared_errors() const { return intrinsics_ + std::ssize(turns_); }
+  Eigen::Index num_shared_errors() const { return intrinsics_ + std::ssize(rotation_derivatives_); }
 
  private:
   bool has_zenith_errors() const { return offset_ > intrinsics_; }
@@ -205,7 +207,7 @@ class CommonErrors {
   Eigen::Index intrinsics_, offset_ = 0;
   Eigen::Matrix3d base_from_camera_, camera_from_base_;
   /// Derivatives of base_from_camera with respect to the coordinates of zenith and offset.
-  std::vector<Eigen::Matrix3d> turns_;
+  std::vector<Eigen::Matrix3d> rotation_derivatives_;
   MatrixX covariance_;
   std::vector<LampErrors> lamps_;
   bool stated_ = false, complete_ = false;

@@ -23,7 +23,7 @@ std::optional<BodyObservation> make_noise_free_observation(
   if (!ray) return std::nullopt;
   const Eigen::Matrix3d level_from_camera = camera_from_level.transpose();
   const Eigen::Vector3d direction = level_from_camera * ray->direction;
-  const auto whitened = compute_whitened_pixel_from_ray(
+  const auto whitened = compute_whitened_pixel_jacobian_wrt_ray(
       direction, level_from_camera * ray->d_direction_d_pixel, noise_px);
   if (!whitened) return std::nullopt;
   return BodyObservation{lamp_m, direction.normalized(), *whitened, noise_px,

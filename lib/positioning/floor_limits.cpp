@@ -26,14 +26,14 @@ int count_positions_along(double min_m, double max_m, double step_m) {
   return static_cast<int>(places);
 }
 
-std::vector<FloorLimits::Place> make_positions_on(const FloorGrid& grid, double z_m,
-                                                  double yaw_rad) {
+std::vector<FloorLimits::Position> make_positions_on(const FloorGrid& grid, double z_m,
+                                                     double yaw_rad) {
   const int columns = count_positions_along(grid.x_min_m, grid.x_max_m, grid.step_m);
   const int rows = count_positions_along(grid.y_min_m, grid.y_max_m, grid.step_m);
   if (double{1} * columns * rows > 1e7) {
     throw std::invalid_argument("the floor has more than ten million places: take a larger step");
   }
-  std::vector<FloorLimits::Place> places;
+  std::vector<FloorLimits::Position> places;
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
       const Eigen::Vector3d position_m(grid.x_min_m + column * grid.step_m,
@@ -93,9 +93,9 @@ std::vector<Eigen::Vector3d> find_visible_lamps(const LampMap& map, const Camera
                                            camera.imager_px, Eigen::Matrix3d::Identity(), pose));
 }
 
-Matrix4 FloorLimits::Place::total_pose_covariance() const {
+Matrix4 FloorLimits::Position::total_pose_covariance() const {
   Matrix4 sum = Matrix4::Zero();
-  for (const Matrix4& part : parts) sum += part;
+  for (const Matrix4& part : covariances) sum += part;
   return sum;
 }
 
@@ -109,7 +109,7 @@ FloorLimits compute_accuracy_limits_on_floor(const LampMap& map, const Camera& c
        {Source{"principal point", "principal_point"}, {"tilt", "tilt"}, kLampMap}) {
     limits.sources.push_back(source);
   }
-  for (FloorLimits::Place& place : limits.places) {
+  for (FloorLimits::Position& place : limits.positions) {
     const auto lamps = find_fully_visible_lamp_indices(map, lens, camera.imager_px,
                                                        Eigen::Matrix3d::Identity(), place.camera);
     place.lamps = static_cast<int>(lamps.size());
@@ -119,8 +119,9 @@ FloorLimits compute_accuracy_limits_on_floor(const LampMap& map, const Camera& c
             ? compute_fix_error_budget(lamps_m, lens, place.camera, sources, prior, row_clock)
             : compute_fix_error_budget(lamps_m, lens, place.camera, sources);
     if (!budget) continue;
-    place.parts = split_covariance_by_image_source(*budget, prior);
-    place.parts.insert(place.parts.end(), {budget->center, budget->tilt, budget->lamp_map});
+    place.covariances = split_covariance_by_image_source(*budget, prior);
+    place.covariances.insert(place.covariances.end(),
+                             {budget->center, budget->tilt, budget->lamp_map});
   }
   return limits;
 }
@@ -133,7 +134,7 @@ FloorLimits compute_accuracy_limits_on_floor(const UnitErrors& unit, const Floor
   limits.sources.push_back({"zenith", "zenith"});
   if (unit.has_dispersion_offset_errors()) limits.sources.push_back({"offset", "offset"});
   limits.sources.push_back(kLampMap);
-  for (FloorLimits::Place& place : limits.places) {
+  for (FloorLimits::Position& place : limits.positions) {
     const auto lamps = unit.find_fully_visible_lamp_indices(place.camera);
     place.lamps = static_cast<int>(lamps.size());
     const auto budget =
@@ -141,10 +142,10 @@ FloorLimits compute_accuracy_limits_on_floor(const UnitErrors& unit, const Floor
             ? unit.compute_unit_fix_error_budget(place.camera, lamps, noise_px, prior)
             : unit.compute_unit_fix_error_budget(place.camera, lamps, noise_px);
     if (!budget) continue;
-    place.parts = split_covariance_by_image_source(*budget, prior);
-    place.parts.insert(place.parts.end(), {budget->lens, budget->zenith});
-    if (unit.has_dispersion_offset_errors()) place.parts.push_back(budget->offset);
-    place.parts.push_back(budget->lamp_map);
+    place.covariances = split_covariance_by_image_source(*budget, prior);
+    place.covariances.insert(place.covariances.end(), {budget->lens, budget->zenith});
+    if (unit.has_dispersion_offset_errors()) place.covariances.push_back(budget->offset);
+    place.covariances.push_back(budget->lamp_map);
   }
   return limits;
 }
@@ -166,8 +167,8 @@ FloorSummary::Row summarize_source(const FloorLimits::Source& source, const Floo
                                    const Covariance& covariance) {
   std::vector<double> horizontal_m, height_m, yaw_rad;
   double part = 0, whole = 0;
-  for (const FloorLimits::Place& place : limits.places) {
-    if (place.parts.empty()) continue;
+  for (const FloorLimits::Position& place : limits.positions) {
+    if (place.covariances.empty()) continue;
     const FixSds spread = compute_fix_sds(covariance(place));
     horizontal_m.push_back(spread.horizontal_m);
     height_m.push_back(spread.height_m);
@@ -196,18 +197,18 @@ const FloorSummary::Row& FloorSummary::largest_error_source() const {
 
 std::optional<FloorSummary> summarize_floor_limits(const FloorLimits& limits) {
   const auto with_fix =
-      std::count_if(limits.places.begin(), limits.places.end(),
-                    [](const FloorLimits::Place& place) { return !place.parts.empty(); });
+      std::count_if(limits.positions.begin(), limits.positions.end(),
+                    [](const FloorLimits::Position& place) { return !place.covariances.empty(); });
   if (with_fix == 0) return std::nullopt;
-  using Place = FloorLimits::Place;
+  using Position = FloorLimits::Position;
   FloorSummary summary{
       {},
       summarize_source({"total", "horizontal"}, limits,
-                       [](const Place& place) { return place.total_pose_covariance(); }),
+                       [](const Position& place) { return place.total_pose_covariance(); }),
       static_cast<std::size_t>(with_fix)};
   for (std::size_t i = 0; i < limits.sources.size(); ++i) {
-    summary.sources.push_back(summarize_source(limits.sources[i], limits,
-                                               [i](const Place& place) { return place.parts[i]; }));
+    summary.sources.push_back(summarize_source(
+        limits.sources[i], limits, [i](const Position& place) { return place.covariances[i]; }));
   }
   return summary;
 }

@@ -38,17 +38,17 @@ struct FloorLimits {
   std::vector<Source> sources;
 
   /// Predicted covariance of a fix at one position.
-  struct Place {
+  struct Position {
     Pose camera;
     /// Number of lamps that are fully visible.
     int lamps;
     /// Covariances of (X, Y, Z, yaw), one for each source. Empty if fewer than two lamps are
     /// visible, or if these do not determine all estimated quantities.
-    std::vector<Matrix4> parts;
+    std::vector<Matrix4> covariances;
 
     Matrix4 total_pose_covariance() const;
   };
-  std::vector<Place> places;
+  std::vector<Position> positions;
 };
 
 /// Returns the positions of the lamps that are fully visible to a level camera at `pose`. Such a
@@ -100,8 +100,8 @@ struct FloorSummary {
   };
   /// One row per source, in the order of FloorLimits::sources.
   std::vector<Row> sources;
-  Row together;
-  std::size_t places_with_fix;
+  Row total;
+  std::size_t positions_with_fix;
 
   /// Returns the source with the largest fraction, which has the greatest potential for
   /// improvement.

@@ -43,6 +43,6 @@ PoseEstimate compute_robot_pose_from_camera_pose(const PoseEstimate& camera,
                                                  const InclinationJacobian& d_pose_d_inclination,
                                                  double inclination_sigma_rad,
                                                  const CameraMount& mount,
-                                                 const InclinationRotation& lean);
+                                                 const InclinationRotation& rotation);
 
 }  // namespace vlp

@@ -102,7 +102,7 @@ ConsistentFix recheck_with_noise_threshold(FrameObservations& frame, const Consi
       std::sqrt(kMaxReducedChiSquared) * compute_max_point_sd(frame.observations_span()));
   if (!majority) return all;
   FrameObservations agreeing = frame;
-  agreeing.keep_only_observations(majority->agreeing);
+  agreeing.keep_only_observations(majority->inliers);
   const ConsistentFix solution = estimate_and_check_pose(
       agreeing.observations_span(), compute_residual_limit(agreeing, max_residual_share));
   const double remaining = compute_reduced_chi_squared(solution.fix.chi_squared, agreeing.size);
@@ -129,7 +129,7 @@ ConsistentFix estimate_pose_robust(FrameObservations& frame, double max_residual
   if (frame.size < 4) return all;
   const auto majority = find_largest_consistent_lamp_set(frame.observations_span(), limit);
   if (!majority) return all;
-  frame.keep_only_observations(majority->agreeing);
+  frame.keep_only_observations(majority->inliers);
   return estimate_and_check_pose(frame.observations_span(),
                                  compute_residual_limit(frame, max_residual_share));
 }
@@ -151,7 +151,7 @@ Vote find_pose_with_most_votes(std::span<const Sighting> sightings, const Pose& 
         (sightings[i].z - project_lamp_to_normalized_point(camera, sightings[i].lamp_m))
             .squaredNorm();
     if (!(square <= max_residual * max_residual)) continue;
-    result.consensus.agreeing.set(i);
+    result.consensus.inliers.set(i);
     ++result.consensus.count;
     result.sum_of_squares += square;
   }
@@ -311,8 +311,8 @@ std::optional<Agreeing> find_majority_if_level(const BodyObservations& frame,
   const auto majority =
       find_largest_consistent_lamp_set(level.observations_span(), limit_m * sum_z / sum_m);
   if (!majority) return std::nullopt;
-  return find_agreeing_observations(make_body_state(majority->pose, problem, lean), frame, problem,
-                                    limit_m);
+  return find_agreeing_observations(make_body_state_from_camera_pose(majority->pose, problem, lean),
+                                    frame, problem, limit_m);
 }
 
 /// Computes the fix of a majority of the lamps, and removes the others from the frame.

@@ -22,7 +22,7 @@ namespace vlp {
 /// `agreeing` has a bit per observation, by its index; `count` is the number of set bits.
 struct Consensus {
   Pose pose;
-  std::bitset<kMaxSightings> agreeing;
+  std::bitset<kMaxSightings> inliers;
   std::size_t count;
 };
 

@@ -267,7 +267,7 @@ std::optional<BodyFix> solve(std::span<const BodyObservation> sightings,
 
 }  // namespace
 
-std::optional<Eigen::Matrix<double, 2, 3>> compute_whitened_pixel_from_ray(
+std::optional<Eigen::Matrix<double, 2, 3>> compute_whitened_pixel_jacobian_wrt_ray(
     const Eigen::Vector3d& ray, const Eigen::Matrix<double, 3, 2>& d_ray_d_pixel, double sigma_px) {
   const double inverse_length = 1 / ray.norm();
   const Eigen::Vector3d unit_ray = inverse_length * ray;

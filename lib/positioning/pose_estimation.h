@@ -71,7 +71,7 @@ struct BodyObservation {
 
 /// Computes M of a pixel from its standard deviation and the derivative of its ray, which may have
 /// any length. Returns std::nullopt if the lens is not invertible there.
-std::optional<Eigen::Matrix<double, 2, 3>> compute_whitened_pixel_from_ray(
+std::optional<Eigen::Matrix<double, 2, 3>> compute_whitened_pixel_jacobian_wrt_ray(
     const Eigen::Vector3d& ray, const Eigen::Matrix<double, 3, 2>& d_ray_d_pixel, double sigma_px);
 
 /// Estimated state of a body with covariance and statistics of the residuals.

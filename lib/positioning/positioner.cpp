@@ -146,7 +146,7 @@ class Positioner::Impl {
       : lamps_(sorted_by_id(map.lamps)),
         lens_(calibration.camera.lens_model, calibration.camera.intrinsics),
         origin_m_(get_lamp_center(lamps_)),
-        base_from_camera_(compute_level_from_camera_rotation(calibration, options.correction)),
+        base_from_camera_(compute_level_from_camera_matrix(calibration, options.correction)),
         common_(lamps_, calibration, options.correction),
         mount_(options.mount.value_or(CameraMount{Eigen::Vector3d::Zero(), 0})),
         body_from_base_(rotation_about_z(mount_.yaw_in_robot_rad)),
@@ -357,7 +357,7 @@ class Positioner::Impl {
     const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
                          double sigma_px) {
       const Eigen::Vector3d direction = body_from_camera_ * ray.direction;
-      const auto whitened = compute_whitened_pixel_from_ray(
+      const auto whitened = compute_whitened_pixel_jacobian_wrt_ray(
           direction, body_from_camera_ * ray.d_direction_d_pixel, sigma_px);
       if (!whitened) return FixStatus::outside_lens;
       const double read_s =

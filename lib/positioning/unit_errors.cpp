@@ -39,13 +39,12 @@ UnitErrors::UnitErrors(const LampMap& map, const Calibration& calibration)
     : map_(map),
       camera_(calibration.camera),
       lens_(camera_.lens_model, camera_.intrinsics),
-      camera_from_level_(
-          compute_level_from_camera_rotation(calibration, Correction::all).inverse()),
+      camera_from_level_(compute_level_from_camera_matrix(calibration, Correction::all).inverse()),
       whole_(map_.lamps, calibration, Correction::all),
-      parts_{whole_.extract_covariance_of_error_source(CommonErrorSource::lens),
-             whole_.extract_covariance_of_error_source(CommonErrorSource::zenith),
-             whole_.extract_covariance_of_error_source(CommonErrorSource::offset),
-             whole_.extract_covariance_of_error_source(CommonErrorSource::lamps)},
+      parts_{whole_.isolate_error_source(CommonErrorSource::lens),
+             whole_.isolate_error_source(CommonErrorSource::zenith),
+             whole_.isolate_error_source(CommonErrorSource::offset),
+             whole_.isolate_error_source(CommonErrorSource::lamps)},
       has_offset_(calibration.dispersion.has_value()) {}
 
 std::vector<std::size_t> UnitErrors::find_fully_visible_lamp_indices(const Pose& level) const {

@@ -29,7 +29,7 @@ std::vector<std::size_t> find_fully_visible_lamp_indices(const LampMap& map, con
 
 /// Predicted covariances of the fix (X, Y, Z, yaw) of a calibrated camera, one per error source, in
 /// m and rad. `noise` is independent between images. `lens`, `zenith`, `offset` and `lamp_map` are
-/// common to all fixes of a camera (CommonErrors::extract_covariance_of_error_source()).
+/// common to all fixes of a camera (CommonErrors::isolate_error_source()).
 struct UnitBudget {
   Matrix4 noise, lens, zenith, offset, lamp_map;
   /// Increase of `noise` due to unknown motion, and the further increase due to unknown roll and

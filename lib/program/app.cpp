@@ -173,8 +173,8 @@ CLI::Validator make_renamed_option_value_validator() {
       "");
 }
 
-void add_threads_option(CLI::App& app, int& threads, const std::string& what) {
-  app.add_option("--threads", threads, what + " (default: one per core)")
+void add_threads_option(CLI::App& app, int& threads, const std::string& description) {
+  app.add_option("--threads", threads, description + " (default: one per core)")
       ->check(CLI::Range(1, 1024));
 }
 

@@ -48,7 +48,7 @@ CLI::Validator make_plot_file_validator();
 
 /// Adds --threads. `what` describes the parallel items in --help.
 void add_threads_option(CLI::App& app, int& threads,
-                        const std::string& what = "Number of images to process in parallel");
+                        const std::string& description = "Number of images to process in parallel");
 
 /// Throws std::invalid_argument if `output` is one of the input files.
 void check_output_is_not_input(const std::string& output, const std::vector<std::string>& inputs);

@@ -51,8 +51,9 @@ std::string describe_comparison(const Comparison& comparison) {
             " mm)";
   }
   return note + (comparison.pairs > 0 ? "; " : "") + std::to_string(comparison.pairs) +
-         " captures have a fix in both, " + std::to_string(comparison.only_these) +
-         " only in these fixes, " + std::to_string(comparison.only_others) + " only in the others.";
+         " captures have a fix in both, " + std::to_string(comparison.only_in_fixes) +
+         " only in these fixes, " + std::to_string(comparison.only_in_other_fixes) +
+         " only in the others.";
 }
 
 }  // namespace
@@ -63,32 +64,33 @@ std::vector<ReportStatistic> format_evaluation_statistics(const Evaluation& eval
       {"without a fix", std::to_string(evaluation.captures - evaluation.fixes), "", ""}};
   add_horizontal_statistics(figures, evaluation);
   if (const auto& height_m = evaluation.height_m) {
-    figures.push_back(make_length_statistic("height error, root mean square", height_m->sizes.rms));
+    figures.push_back(
+        make_length_statistic("height error, root mean square", height_m->magnitudes.rms));
     figures.push_back(make_length_statistic("height error, mean", height_m->bias));
   }
   if (const auto& yaw_rad = evaluation.yaw_rad) {
     figures.push_back({"yaw error, root mean square",
-                       format_number(deg_from_rad(yaw_rad->sizes.rms)), "degrees", ""});
+                       format_number(deg_from_rad(yaw_rad->magnitudes.rms)), "degrees", ""});
   }
-  if (const auto& stations = evaluation.stations) {
-    const std::string of = " (" + std::to_string(stations->stations.size()) +
+  if (const auto& stations = evaluation.bias_and_repeatability) {
+    const std::string of = " (" + std::to_string(stations->reference_points.size()) +
                            " reference points with " + std::to_string(stations->fixes) + " fixes)";
     figures.push_back(make_length_statistic("bias of the reference points, root mean square" + of,
                                             stations->bias_m));
-    figures.push_back(
-        make_length_statistic("repeatability at a reference point" + of, stations->scatter_m));
+    figures.push_back(make_length_statistic("repeatability at a reference point" + of,
+                                            stations->repeatability_m));
   }
   if (evaluation.normalized_errors) {
     figures.push_back({"error / reported standard deviation (1: correct)",
                        format_number(evaluation.normalized_errors->horizontal), "", ""});
   }
-  if (evaluation.limit) {
-    figures.push_back(make_length_statistic("theoretical limit", evaluation.limit->limit_m));
+  if (evaluation.crlb_ratio) {
+    figures.push_back(make_length_statistic("theoretical limit", evaluation.crlb_ratio->crlb_m));
     figures.push_back({"error / theoretical limit (1: optimal)",
-                       format_number(evaluation.limit->horizontal), "", ""});
+                       format_number(evaluation.crlb_ratio->horizontal), "", ""});
   }
-  if (evaluation.fit) {
-    const auto fit_statistics = format_line_drive_statistics("drive", *evaluation.fit);
+  if (evaluation.line_fit) {
+    const auto fit_statistics = format_line_drive_statistics("drive", *evaluation.line_fit);
     figures.insert(figures.end(), fit_statistics.begin(), fit_statistics.end());
   }
   return figures;
@@ -101,7 +103,7 @@ std::vector<std::string> make_evaluation_notes(const Evaluation& evaluation) {
                                                            : "from the commanded line";
   notes.push_back("Horizontal errors are distances " + std::string(reference) + ".");
   std::string missing;
-  for (const auto& [status, count] : evaluation.missing) {
+  for (const auto& [status, count] : evaluation.failures_by_status) {
     missing.append(missing.empty() ? "" : ", ").append(std::to_string(count) + " " + status);
   }
   if (!missing.empty()) notes.push_back("Captures without a fix: " + missing + ".");

@@ -48,9 +48,9 @@ std::vector<ReportPlot> make_position_error_plots(const EvaluationInput& input,
   if (!input.line_m) {
     pictures.push_back(
         render_report_plot(make_fix_error_plot_drawing(make_floor_plan(input, errors, lamps))));
-  } else if (evaluation.fit) {
+  } else if (evaluation.line_fit) {
     pictures.push_back(
-        plot_drive_along_line("Drive", input.fixes.rows, *input.line_m, *evaluation.fit));
+        plot_drive_along_line("Drive", input.fixes.rows, *input.line_m, *evaluation.line_fit));
   }
   CdfPlot::Curve curve{"fixes", {}, evaluation.horizontal_m.median, evaluation.horizontal_m.p90};
   curve.errors_m.reserve(errors.size());
@@ -75,7 +75,7 @@ std::optional<ReportPlot> make_fix_error_budget_plot(const std::vector<FixRow>& 
     if (!row.fix || !row.fix->sd || !row.fix->noise_sd || row.fix->inclination) continue;
     auto visible = unit.find_fully_visible_lamp_indices(row.fix->pose);
     std::erase_if(visible, [&](std::size_t lamp) {
-      const auto& rejected = row.rejected;
+      const auto& rejected = row.rejected_lamps;
       return std::find(rejected.begin(), rejected.end(), lamps.lamps[lamp].id) != rejected.end();
     });
     constexpr double arbitrary_px = 1;  // arbitrary: the proportions do not depend on it

@@ -78,8 +78,8 @@ std::string make_html_table(const HtmlTable& table) {
   html += "<tbody>\n";
   for (std::size_t number = 0; number < table.rows.size(); ++number) {
     const auto& row = table.rows[number];
-    const bool marked =
-        std::find(table.marked.begin(), table.marked.end(), number) != table.marked.end();
+    const bool marked = std::find(table.highlighted_rows.begin(), table.highlighted_rows.end(),
+                                  number) != table.highlighted_rows.end();
     html += marked ? "<tr class=\"marked\">" : "<tr>";
     for (std::size_t i = 0; i < row.size(); ++i) {
       html += i == 0 ? "<th scope=\"row\">" : "<td>";
@@ -91,20 +91,20 @@ std::string make_html_table(const HtmlTable& table) {
   return html + "</tbody>\n</table>\n</div>\n";
 }
 
-std::string make_html_figure(const ReportPlot& picture) {
-  const bool png = picture.image.rfind("\x89PNG", 0) == 0;
+std::string make_html_figure(const ReportPlot& plot) {
+  const bool png = plot.image.rfind("\x89PNG", 0) == 0;
   HtmlTable table{"", {}, {}};
-  if (!picture.table.empty()) {
-    table.header = picture.table.front();
-    table.rows.assign(picture.table.begin() + 1, picture.table.end());
+  if (!plot.table.empty()) {
+    table.header = plot.table.front();
+    table.rows.assign(plot.table.begin() + 1, plot.table.end());
   }
-  const std::string large = picture.part == ReportPart::camera ? " class=\"large\"" : "";
+  const std::string large = plot.part == ReportPart::camera ? " class=\"large\"" : "";
   return "<figure" + large +
          ">\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Picture\">"
          "<img alt=\"" +
-         escape_html_text(picture.alt) + "\" src=\"data:image/" + (png ? "png" : "svg+xml") +
-         ";base64," + encode_base64(picture.image) + "\"></div>\n" +
-         make_html_element("figcaption", picture.caption) + "</figure>\n" +
+         escape_html_text(plot.alt) + "\" src=\"data:image/" + (png ? "png" : "svg+xml") +
+         ";base64," + encode_base64(plot.image) + "\"></div>\n" +
+         make_html_element("figcaption", plot.caption) + "</figure>\n" +
          (table.rows.empty() ? "" : make_html_table(table));
 }
 

@@ -31,11 +31,11 @@ struct HtmlTable {
   std::string caption;
   std::vector<std::string> header;
   std::vector<std::vector<std::string>> rows;
-  std::vector<std::size_t> marked = {};
+  std::vector<std::size_t> highlighted_rows = {};
 };
 std::string make_html_table(const HtmlTable& table);
 
 /// Returns a figure with the embedded image, its caption, and its table below.
-std::string make_html_figure(const ReportPlot& picture);
+std::string make_html_figure(const ReportPlot& plot);
 
 }  // namespace vlp

@@ -41,7 +41,7 @@ std::string make_gates_table(const Report& report) {
   for (const auto& gate : report.gates) {
     const bool given = report.verdict.has_value();
     if (!gate.has_passed_gate() && (gate.value || !given))
-      table.marked.push_back(table.rows.size());
+      table.highlighted_rows.push_back(table.rows.size());
     table.rows.push_back(make_gate_table_row(gate, given));
   }
   return table.rows.empty() ? "" : make_html_table(table);
@@ -85,14 +85,14 @@ std::string verdict(const Report& report) {
 
 std::string make_facts_table(const Report& report) {
   HtmlTable table{"", {}, {}};
-  for (const auto& [label, value] : report.facts) table.rows.push_back({label, value});
+  for (const auto& [label, value] : report.properties) table.rows.push_back({label, value});
   return table.rows.empty() ? "" : make_html_table(table);
 }
 
 std::string format_rejected_images(const Report& report) {
-  if (report.refused.empty()) return "";
+  if (report.rejections.empty()) return "";
   HtmlTable table{"", {"image", "why it was not used"}, {}};
-  for (const auto& [image, reason] : report.refused) table.rows.push_back({image, reason});
+  for (const auto& [image, reason] : report.rejections) table.rows.push_back({image, reason});
   return make_html_table(table);
 }
 
@@ -115,7 +115,7 @@ std::string format_statistics(const Report& report) {
 
 std::string format_plots(const Report& report, ReportPart part) {
   std::string html;
-  for (const auto& picture : report.pictures) {
+  for (const auto& picture : report.plots) {
     if (picture.part == part) html += make_html_figure(picture);
   }
   return html;

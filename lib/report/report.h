@@ -47,7 +47,7 @@ struct Report {
   std::vector<std::string> notes;
   std::optional<Calibration> calibration;
   /// Plots in any order. Plots of the same part keep their order.
-  std::vector<ReportPlot> pictures;
+  std::vector<ReportPlot> plots;
   /// Provenance of the statistics; its part is "evaluation".
   std::optional<HistoryEntry> evaluation;
   /// Caution inside the verdict box about an issue that the verdict does not cover, for example
@@ -56,10 +56,10 @@ struct Report {
   /// Verdict that replaces the verdict of the gates. A gate without a value then counts as not
   /// reached.
   std::optional<ReportVerdict> verdict = {};
-  std::vector<ReportRejection> refused = {};
+  std::vector<ReportRejection> rejections = {};
   /// Label and value of the data that identify the measurement, such as operator and time, shown
   /// below the verdict.
-  std::vector<std::pair<std::string, std::string>> facts = {};
+  std::vector<std::pair<std::string, std::string>> properties = {};
 };
 
 /// Renders a report as one self-contained HTML page with embedded style and images, without

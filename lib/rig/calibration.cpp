@@ -182,10 +182,11 @@ RotationCenter read_rotation_center(YamlMap& map, std::size_t intrinsics) {
   };
   center.lever_arm_covariance =
       read_optional_covariance(map, check_lever_arm("lever_arm_covariance"));
-  center.by_intrinsics = read_optional_matrix<MatrixX>(map, "jacobian_intrinsics", 2, intrinsics);
-  center.lever_arm_by_zenith =
+  center.jacobian_wrt_intrinsics =
+      read_optional_matrix<MatrixX>(map, "jacobian_intrinsics", 2, intrinsics);
+  center.lever_arm_jacobian_wrt_zenith =
       read_optional_matrix<Matrix2>(map, check_lever_arm("lever_arm_jacobian_zenith"), 2, 2);
-  center.lever_arm_by_intrinsics = read_optional_matrix<MatrixX>(
+  center.lever_arm_jacobian_wrt_intrinsics = read_optional_matrix<MatrixX>(
       map, check_lever_arm("lever_arm_jacobian_intrinsics"), 2, intrinsics);
   return center;
 }
@@ -196,7 +197,7 @@ Dispersion::UncertainLamp read_uncertain_lamp(YamlMap& map) {
   lamp.position_m =
       Eigen::Vector3d(map.get_required_yaml_value("position_m").read_yaml_numbers(3).data());
   lamp.sd_m = map.get_required_yaml_value("sd_m").read_yaml_number_within(0, kMaxSd, "m");
-  lamp.by_position = read_matrix(map.get_required_yaml_value("by_position"), 2, 3);
+  lamp.jacobian_wrt_position = read_matrix(map.get_required_yaml_value("by_position"), 2, 3);
   return lamp;
 }
 
@@ -210,9 +211,9 @@ Dispersion read_dispersion(YamlMap& map, std::size_t intrinsics) {
       Eigen::Vector2d(map.get_required_yaml_value("center_m").read_yaml_numbers(2).data());
   dispersion.captures = map.get_required_yaml_value("captures").read_yaml_integer_within(1, kLarge);
   dispersion.covariance = read_optional_covariance(map, "covariance");
-  dispersion.by_intrinsics =
+  dispersion.jacobian_wrt_intrinsics =
       read_optional_matrix<MatrixX>(map, "jacobian_intrinsics", 2, intrinsics);
-  dispersion.by_zenith = read_optional_matrix<Matrix2>(map, "jacobian_zenith", 2, 2);
+  dispersion.jacobian_wrt_zenith = read_optional_matrix<Matrix2>(map, "jacobian_zenith", 2, 2);
   if (const auto value = map.get_optional_yaml_value("by_lamps")) {
     const auto items = value->read_yaml_list();
     if (items.size() > kMaxUncertainLamps)
@@ -220,15 +221,15 @@ Dispersion read_dispersion(YamlMap& map, std::size_t intrinsics) {
     for (const YamlValue& item : items) {
       const Dispersion::UncertainLamp lamp = item.convert_yaml_mapping(read_uncertain_lamp);
       const auto has_same_id = [&](const auto& earlier) { return earlier.id == lamp.id; };
-      if (std::ranges::any_of(dispersion.by_lamps, has_same_id))
+      if (std::ranges::any_of(dispersion.uncertain_lamps, has_same_id))
         throw item.make_yaml_error("occurs twice");
-      dispersion.by_lamps.push_back(lamp);
+      dispersion.uncertain_lamps.push_back(lamp);
     }
   }
   return dispersion;
 }
 
-Adjustment::Place read_adjusted_lamp_position(YamlMap& map) {
+Adjustment::AdjustedLamp read_adjusted_lamp_position(YamlMap& map) {
   return {map.get_required_yaml_value("id").read_yaml_integer_within(0, kLarge),
           Eigen::Vector3d(map.get_required_yaml_value("position_m").read_yaml_numbers(3).data())};
 }
@@ -345,9 +346,10 @@ void emit_rotation_center(YAML::Emitter& out, const RotationCenter& center) {
   emit_optional_matrix(out, "covariance", center.covariance);
   if (center.lever_arm_m) emit_yaml_numbers(out, "lever_arm_m", *center.lever_arm_m);
   emit_optional_matrix(out, "lever_arm_covariance", center.lever_arm_covariance);
-  emit_optional_matrix(out, "jacobian_intrinsics", center.by_intrinsics);
-  emit_optional_matrix(out, "lever_arm_jacobian_zenith", center.lever_arm_by_zenith);
-  emit_optional_matrix(out, "lever_arm_jacobian_intrinsics", center.lever_arm_by_intrinsics);
+  emit_optional_matrix(out, "jacobian_intrinsics", center.jacobian_wrt_intrinsics);
+  emit_optional_matrix(out, "lever_arm_jacobian_zenith", center.lever_arm_jacobian_wrt_zenith);
+  emit_optional_matrix(out, "lever_arm_jacobian_intrinsics",
+                       center.lever_arm_jacobian_wrt_intrinsics);
   out << YAML::EndMap;
 }
 
@@ -371,9 +373,9 @@ void emit_dispersion(YAML::Emitter& out, const Dispersion& dispersion) {
   emit_yaml_numbers(out, "center_m", dispersion.center_m);
   emit_yaml_integer(out, "captures", dispersion.captures);
   emit_optional_matrix(out, "covariance", dispersion.covariance);
-  emit_optional_matrix(out, "jacobian_intrinsics", dispersion.by_intrinsics);
-  emit_optional_matrix(out, "jacobian_zenith", dispersion.by_zenith);
-  if (!dispersion.by_lamps.empty()) emit_uncertain_lamps(out, dispersion.by_lamps);
+  emit_optional_matrix(out, "jacobian_intrinsics", dispersion.jacobian_wrt_intrinsics);
+  emit_optional_matrix(out, "jacobian_zenith", dispersion.jacobian_wrt_zenith);
+  if (!dispersion.uncertain_lamps.empty()) emit_uncertain_lamps(out, dispersion.uncertain_lamps);
   out << YAML::EndMap;
 }
 
@@ -445,7 +447,7 @@ std::vector<std::string> list_adjustment_parameter_names(const Camera& camera,
     names.emplace_back(distortion.name);
   }
   names.insert(names.end(), {"zenith_x", "zenith_y", "lever_arm_x_m", "lever_arm_y_m"});
-  for (const Adjustment::Place& lamp : adjustment.lamps) {
+  for (const Adjustment::AdjustedLamp& lamp : adjustment.lamps) {
     const std::string prefix = "lamp_" + std::to_string(lamp.id);
     for (const char* axis : {"_x_m", "_y_m", "_z_m"}) names.push_back(prefix + axis);
   }

@@ -86,13 +86,13 @@ struct RotationCenter {
   std::optional<Matrix2> lever_arm_covariance = {};
   /// Derivative of the zenith's normalized point (x/z, y/z) with respect to the intrinsics, one
   /// column each. `covariance` is from the captures alone, with the lens taken as exact.
-  std::optional<MatrixX> by_intrinsics = {};
+  std::optional<MatrixX> jacobian_wrt_intrinsics = {};
   /// Regression of the lever arm, in m, on the error of the zenith's normalized point, if the same
-  /// captures determine both. lever_arm_by_intrinsics: derivative of the lever arm, m, with respect
-  /// to the intrinsics, one column each. The remainder of lever_arm_covariance is independent of
-  /// both.
-  std::optional<Matrix2> lever_arm_by_zenith = {};
-  std::optional<MatrixX> lever_arm_by_intrinsics = {};
+  /// captures determine both. lever_arm_jacobian_wrt_intrinsics: derivative of the lever arm, m,
+  /// with respect to the intrinsics, one column each. The remainder of lever_arm_covariance is
+  /// independent of both.
+  std::optional<Matrix2> lever_arm_jacobian_wrt_zenith = {};
+  std::optional<MatrixX> lever_arm_jacobian_wrt_intrinsics = {};
 };
 
 /// Result of the dispersion calibration (Chen and Guan, section 3.2): remaining error of fixes that
@@ -111,8 +111,8 @@ struct Dispersion {
   std::optional<Matrix2> covariance = {};
   /// Derivatives of offset_px / f with respect to the intrinsics and to the zenith's normalized
   /// point.
-  std::optional<MatrixX> by_intrinsics = {};
-  std::optional<Matrix2> by_zenith = {};
+  std::optional<MatrixX> jacobian_wrt_intrinsics = {};
+  std::optional<Matrix2> jacobian_wrt_zenith = {};
   /// Lamp whose surveyed position affects the offset, with the derivative.
   struct UncertainLamp {
     int id;
@@ -120,20 +120,20 @@ struct Dispersion {
     Eigen::Vector3d position_m;
     double sd_m;
     /// Derivative of offset_px / f with respect to the position, per meter.
-    Eigen::Matrix<double, 2, 3, Eigen::DontAlign> by_position;
+    Eigen::Matrix<double, 2, 3, Eigen::DontAlign> jacobian_wrt_position;
   };
   /// Lamps of the map with a positive sd_m that appear in the captures.
-  std::vector<UncertainLamp> by_lamps = {};
+  std::vector<UncertainLamp> uncertain_lamps = {};
 };
 
 /// Result of one joint adjustment of many captures (vlp-adjust).
 struct Adjustment {
   /// Position of a lamp in the map that belongs to the covariance.
-  struct Place {
+  struct AdjustedLamp {
     int id;
     Eigen::Vector3d position_m;
   };
-  std::vector<Place> lamps;
+  std::vector<AdjustedLamp> lamps;
   /// Joint covariance of: intrinsics; the zenith's normalized point (x/z, y/z); the lever arm, x
   /// and y in meters; x, y and z of each lamp. Zero for quantities taken as exact.
   MatrixX covariance;

@@ -33,10 +33,12 @@ Eigen::Vector2d compute_normalized_zenith_point(const RotationCenter& center) {
 Calibration perturb_lens_intrinsics(Calibration calibration, const Eigen::VectorXd& error) {
   auto& intrinsics = calibration.camera.intrinsics;
   Eigen::Map<Eigen::VectorXd>(intrinsics.data(), error.size()) += error;
-  if (auto& center = calibration.rotation_center; center && center->lever_arm_by_intrinsics) {
-    *center->lever_arm_m += *center->lever_arm_by_intrinsics * error;
-    if (center->lever_arm_by_zenith && center->by_intrinsics) {
-      *center->lever_arm_m -= *center->lever_arm_by_zenith * (*center->by_intrinsics * error);
+  if (auto& center = calibration.rotation_center;
+      center && center->lever_arm_jacobian_wrt_intrinsics) {
+    *center->lever_arm_m += *center->lever_arm_jacobian_wrt_intrinsics * error;
+    if (center->lever_arm_jacobian_wrt_zenith && center->jacobian_wrt_intrinsics) {
+      *center->lever_arm_m -=
+          *center->lever_arm_jacobian_wrt_zenith * (*center->jacobian_wrt_intrinsics * error);
     }
   }
   move_principal_point_to_zenith(calibration);
@@ -47,7 +49,8 @@ Calibration perturb_zenith_direction(Calibration calibration, const Eigen::Vecto
   RotationCenter& center = *calibration.rotation_center;
   center.zenith_in_camera =
       (compute_normalized_zenith_point(center) + error).homogeneous().normalized();
-  if (center.lever_arm_by_zenith) *center.lever_arm_m += *center.lever_arm_by_zenith * error;
+  if (center.lever_arm_jacobian_wrt_zenith)
+    *center.lever_arm_m += *center.lever_arm_jacobian_wrt_zenith * error;
   move_principal_point_to_zenith(calibration);
   return calibration;
 }
@@ -61,9 +64,9 @@ std::optional<Matrix2> compute_dispersion_offset_covariance_with_map(
     const Dispersion& dispersion, const Eigen::Vector2d& focal_px) {
   if (!dispersion.covariance) return std::nullopt;
   Eigen::Matrix2d covariance = *dispersion.covariance;
-  for (const Dispersion::UncertainLamp& lamp : dispersion.by_lamps) {
+  for (const Dispersion::UncertainLamp& lamp : dispersion.uncertain_lamps) {
     const Eigen::Matrix<double, 2, 3> move_px =
-        lamp.sd_m * (focal_px.asDiagonal() * lamp.by_position);
+        lamp.sd_m * (focal_px.asDiagonal() * lamp.jacobian_wrt_position);
     covariance += move_px * move_px.transpose();
   }
   return Matrix2(covariance);

@@ -97,7 +97,7 @@ class YamlMap {
   /// Returns the list of a key by YamlValue::convert_yaml_mapping_list(); an empty list if the
   /// mapping lacks the key.
   template <typename Read>
-  auto convert_optional_yaml_mapping_list(const std::string& key, const Read& read) {
+  auto convert_yaml_mapping_list_or_empty(const std::string& key, const Read& read) {
     const auto value = get_optional_yaml_value(key);
     return value ? value->convert_yaml_mapping_list(read)
                  : decltype(value->convert_yaml_mapping_list(read))();

@@ -44,7 +44,7 @@ std::map<std::string, std::string> find_pivot_of_images(const AdjustSet& set,
 std::optional<KnownPosition> make_known_place(const Capture& capture, const AdjustSet& set,
                                               const AdjustStepInput& input, int& without_sd) {
   if (!capture.x_m || !capture.y_m) return std::nullopt;
-  const auto sd_m = capture.place_sd_m ? capture.place_sd_m : input.place_sd_m;
+  const auto sd_m = capture.position_sd_m ? capture.position_sd_m : input.position_sd_m;
   if (!sd_m) {
     ++without_sd;
     return std::nullopt;
@@ -52,7 +52,7 @@ std::optional<KnownPosition> make_known_place(const Capture& capture, const Adju
   if (!(*sd_m > 0)) {
     throw InputError(set.name, "position_sd_m is 0; state the standard deviation of the position");
   }
-  return KnownPosition{capture.place, {*capture.x_m, *capture.y_m}, capture.z_m, *sd_m};
+  return KnownPosition{capture.measured_point, {*capture.x_m, *capture.y_m}, capture.z_m, *sd_m};
 }
 
 AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepResult& result) {
@@ -91,12 +91,12 @@ AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepRe
       const Capture capture_entry = entry == set.captures.end() ? Capture{} : entry->second;
       AdjustmentCapture capture{set.name + "/" + frame.image, frame.detections,
                                 capture_entry.inclination};
-      if (!capture_entry.spot.empty()) {
-        capture.spot = set.name + "/" + capture_entry.spot;
+      if (!capture_entry.pivot.empty()) {
+        capture.pivot = set.name + "/" + capture_entry.pivot;
       } else if (const auto spot = turned.find(frame.image); spot != turned.end()) {
-        capture.spot = set.name + "/" + spot->second;
+        capture.pivot = set.name + "/" + spot->second;
       }
-      capture.place = make_known_place(capture_entry, set, input, without_sd);
+      capture.known_position = make_known_place(capture_entry, set, input, without_sd);
       capture.motion = find_capture_motion(capture_entry, input.motion, input.yaw_rate_sd_rad_per_s)
                            .value_or(KnownMotion());
       if (may_camera_move_during_readout(capture.motion))
@@ -114,9 +114,9 @@ AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepRe
 }
 
 void add_warnings(AdjustStepResult& result, const MapErrors& map_errors) {
-  const AdjustmentResult& found = result.found;
+  const AdjustmentResult& found = result.adjustment;
   for (const auto& lamp : found.lamps) {
-    if (!lamp.moved) continue;
+    if (!lamp.is_moved) continue;
     // The adjustment uses more data than the check of the map: heights, places, motion.
     for (const MapError& error : map_errors.errors) {
       if (error.lamps == std::vector<int>{lamp.id})
@@ -125,16 +125,16 @@ void add_warnings(AdjustStepResult& result, const MapErrors& map_errors) {
     result.warnings.push_back(
         describe_map_error({MapErrorKind::moved, {lamp.id}, lamp.correction_m, lamp.sd_m}));
   }
-  for (const auto& place : found.places) {
-    if (!place.wrong) continue;
+  for (const auto& place : found.known_positions) {
+    if (!place.is_outlier) continue;
     result.warnings.push_back(fmt::format(
         "{}: the position has an error of {:.1f} mm and is ignored{}", place.name,
         1e3 * place.residual_m.norm(),
-        place.of == PlaceOf::camera
+        place.measured_point == MeasuredPoint::camera
             ? ": is it that of the camera, and not of the rotation axis (reference_point: axis)?"
             : ""));
   }
-  if (found.lens_contradicted) {
+  if (found.lens_is_contradicted) {
     result.warnings.push_back(
         fmt::format("the captures contradict the lens: its correction has a chi-squared of {:.0f}, "
                     "{} is expected; is it the lens of this camera, with the same focus?",
@@ -179,8 +179,8 @@ AdjustStepResult run_joint_adjustment_step(const AdjustStepInput& input, History
   }
   const MapErrors map_errors = check_lamp_map_with_captures(captures, alone, result);
   if (!result.has_succeeded()) return result;
-  result.found = run_bundle_adjustment(all);
-  const AdjustmentResult& found = result.found;
+  result.adjustment = run_bundle_adjustment(all);
+  const AdjustmentResult& found = result.adjustment;
   if (!found.has_succeeded()) {
     result.set_step_failure(StepFailure::undetermined, found.undetermined);
     explain_failure_by_lamp_map_errors(captures, alone, result);
@@ -199,7 +199,7 @@ AdjustStepResult run_joint_adjustment_step(const AdjustStepInput& input, History
                         found.detections,
                         found.residual_px};
   for (const AdjustSet& set : input.sets) adjustment.sets.push_back(set.name);
-  for (const Lamp& lamp : (input.refine_map ? found.refined : input.lamps).lamps) {
+  for (const Lamp& lamp : (input.refine_map ? found.refined_map : input.lamps).lamps) {
     adjustment.lamps.push_back({lamp.id, lamp.position_m});
   }
   Calibration calibration = input.calibration;

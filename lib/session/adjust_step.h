@@ -19,7 +19,7 @@ struct AdjustSet {
   std::string name;
   std::vector<Frame> frames;
   CapturesTable captures;
-  /// True if the captures that name no pivot (Capture::spot) were taken during one rotation in
+  /// True if the captures that name no pivot (Capture::pivot) were taken during one rotation in
   /// place. They are then grouped by height, as in RotationCaptures. False: each of them has a
   /// position of its own.
   bool is_in_place_rotation = false;
@@ -40,7 +40,7 @@ struct AdjustStepInput {
   std::filesystem::path calibration_file;
   /// Standard deviations per axis, m, for lamps and for known positions without one of their own;
   /// std::nullopt: none.
-  std::optional<double> map_sd_m, place_sd_m;
+  std::optional<double> map_sd_m, position_sd_m;
   /// Standard deviation of a lens without a covariance (make_nominal_intrinsics_covariance()).
   /// std::nullopt: such a lens is exact.
   std::optional<double> lens_sd_px = {};
@@ -54,7 +54,7 @@ struct AdjustStepInput {
 
 /// Result of run_joint_adjustment_step().
 struct AdjustStepResult : StepResult {
-  AdjustmentResult found;
+  AdjustmentResult adjustment;
 };
 
 /// Adjusts the captures of all sets jointly (calibration/adjustment).

@@ -21,7 +21,7 @@ namespace vlp {
 KnownPositions collect_captures_at_known_positions(std::span<const Frame> frames,
                                                    const CapturesTable& table,
                                                    const std::optional<Eigen::Vector2d>& place_m,
-                                                   PlaceOf place_of) {
+                                                   MeasuredPoint measured_point) {
   KnownPositions places;
   for (const Frame& frame : frames) {
     const auto entry = table.find(frame.image);
@@ -29,12 +29,12 @@ KnownPositions collect_captures_at_known_positions(std::span<const Frame> frames
     if (capture_entry.x_m && capture_entry.y_m) {
       places.captures.push_back(
           {frame.detections, {*capture_entry.x_m, *capture_entry.y_m}, capture_entry.inclination});
-      places.of.push_back(capture_entry.place);
+      places.measured_points.push_back(capture_entry.measured_point);
     } else if (place_m) {
       places.captures.push_back({frame.detections, *place_m, capture_entry.inclination});
-      places.of.push_back(place_of);
+      places.measured_points.push_back(measured_point);
     } else {
-      ++places.without;
+      ++places.captures_without_position;
     }
   }
   return places;
@@ -57,7 +57,7 @@ std::vector<ReferencePointCapture> move_reference_points_to_camera(const KnownPo
   const Positioner positioner(lamps, leveled);
   const Eigen::Vector2d& arm_m = *leveled.rotation_center->lever_arm_m;
   for (std::size_t i = 0; i < captures.size(); ++i) {
-    if (places.of[i] != PlaceOf::axis) continue;
+    if (places.measured_points[i] != MeasuredPoint::axis) continue;
     const Fix fix = locate_capture(positioner, captures[i]);
     if (!fix.has_succeeded()) continue;
     captures[i].reference_point_m +=
@@ -126,9 +126,9 @@ void propagate_uncertainty(DispersionResult& result, const CapturesFor& captures
     const auto offset_for_lens_error = [&](const Eigen::VectorXd& error) {
       return offset_for(perturb_lens_intrinsics(input.calibration, error));
     };
-    dispersion.by_intrinsics =
+    dispersion.jacobian_wrt_intrinsics =
         estimate_solution_jacobian_wrt_errors(offset_for_lens_error, nominal, *report->covariance);
-    is_propagated = dispersion.by_intrinsics.has_value();
+    is_propagated = dispersion.jacobian_wrt_intrinsics.has_value();
   }
   if (const auto& center = input.calibration.rotation_center; center && center->covariance) {
     constexpr double min_step = 1e-5;  // smallest step: second-order error 1e-10
@@ -138,10 +138,10 @@ void propagate_uncertainty(DispersionResult& result, const CapturesFor& captures
     const auto offset_for_zenith_error = [&](const Eigen::VectorXd& error) {
       return offset_for(perturb_zenith_direction(input.calibration, error));
     };
-    const auto by_zenith = estimate_solution_jacobian_wrt_errors(
+    const auto jacobian_wrt_zenith = estimate_solution_jacobian_wrt_errors(
         offset_for_zenith_error, nominal, step * step * Eigen::Matrix2d::Identity());
-    if (by_zenith) dispersion.by_zenith = *by_zenith;
-    is_propagated = is_propagated && by_zenith;
+    if (jacobian_wrt_zenith) dispersion.jacobian_wrt_zenith = *jacobian_wrt_zenith;
+    is_propagated = is_propagated && jacobian_wrt_zenith;
   }
   if (is_propagated) return;
   result.warnings.emplace_back(
@@ -156,8 +156,9 @@ void add_lever_arm_covariance(Dispersion& dispersion, const LampCaptures& input,
   if (!center.lever_arm_covariance || !dispersion.covariance || !(height_m > 0)) return;
   const Eigen::Vector2d focal_px = input.calibration.camera.focal_px();
   Matrix2 covariance_m2 = *center.lever_arm_covariance;
-  if (center.lever_arm_by_zenith && center.covariance) {
-    const Matrix2 per_px = *center.lever_arm_by_zenith * focal_px.cwiseInverse().asDiagonal();
+  if (center.lever_arm_jacobian_wrt_zenith && center.covariance) {
+    const Matrix2 per_px =
+        *center.lever_arm_jacobian_wrt_zenith * focal_px.cwiseInverse().asDiagonal();
     covariance_m2 -= per_px * *center.covariance * per_px.transpose();
   }
   const Eigen::Vector2d px_per_m = focal_px / height_m;
@@ -215,8 +216,8 @@ DispersionResult run_dispersion_calibration_step(const LampCaptures& input,
   leveled.dispersion.reset();
   check_lamp_map_with_captures(input, leveled, result);
   if (!result.has_succeeded()) return result;
-  const bool of_axis =
-      std::find(places.of.begin(), places.of.end(), PlaceOf::axis) != places.of.end();
+  const bool of_axis = std::find(places.measured_points.begin(), places.measured_points.end(),
+                                 MeasuredPoint::axis) != places.measured_points.end();
   const auto& center = input.calibration.rotation_center;
   if (of_axis && !(center && center->lever_arm_m)) {
     result.set_step_failure(

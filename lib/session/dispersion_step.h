@@ -18,16 +18,17 @@ struct KnownPositions {
   std::vector<ReferencePointCapture> captures;
   /// Point whose position is known, for each capture in the order of `captures`: the camera or the
   /// axis of rotation.
-  std::vector<PlaceOf> of = {};
+  std::vector<MeasuredPoint> measured_points = {};
   /// Number of captures without a known position; they are not in `captures`.
-  std::size_t without = 0;
+  std::size_t captures_without_position = 0;
 };
 
 /// Collects the captures at known places, with the inclinations of the table. A place is that of
-/// the table, or `place_m` of the point `place_of` for captures without one in the table.
+/// the table, or `place_m` of the point `measured_point` for captures without one in the table.
 KnownPositions collect_captures_at_known_positions(
     std::span<const Frame> frames, const CapturesTable& table,
-    const std::optional<Eigen::Vector2d>& place_m = {}, PlaceOf place_of = PlaceOf::camera);
+    const std::optional<Eigen::Vector2d>& place_m = {},
+    MeasuredPoint measured_point = MeasuredPoint::camera);
 
 /// Result of run_dispersion_calibration_step().
 struct DispersionResult : StepResult {

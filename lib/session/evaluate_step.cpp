@@ -25,17 +25,17 @@ void add_line_drive(Report& report, const Drive& drive) {
   const std::string name = fixes.file.filename().string();
   const auto metrics = format_line_drive_statistics(name, *fit);
   report.metrics.insert(report.metrics.end(), metrics.begin(), metrics.end());
-  report.pictures.push_back(plot_drive_along_line(name, fixes.rows, commanded_m, *fit));
+  report.plots.push_back(plot_drive_along_line(name, fixes.rows, commanded_m, *fit));
 }
 
 void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
   const Evaluation& evaluation = result.evaluation;
-  if (input.limit && !evaluation.limit) {
+  if (input.crlb_input && !evaluation.crlb_ratio) {
     result.warnings.emplace_back(
         "no theoretical limit: the ground truth has no z_m and yaw_rad, or two lamps are visible "
         "from none of its positions");
   }
-  if (input.line_m && !evaluation.fit) {
+  if (input.line_m && !evaluation.line_fit) {
     result.warnings.emplace_back("no line is fitted: the fixes do not determine a direction");
   }
   if (std::string warning = make_crlb_warning(evaluation); !warning.empty()) {
@@ -61,9 +61,9 @@ EvaluateResult evaluate_fixes_against_truth(const EvaluationInput& input,
   result.evaluation = evaluate_fix_accuracy(input);
   const Evaluation& evaluation = result.evaluation;
   if (evaluation.fixes == 0) {
-    const auto& [status, count] =
-        *std::max_element(evaluation.missing.begin(), evaluation.missing.end(),
-                          [](const auto& a, const auto& b) { return a.second < b.second; });
+    const auto& [status, count] = *std::max_element(
+        evaluation.failures_by_status.begin(), evaluation.failures_by_status.end(),
+        [](const auto& a, const auto& b) { return a.second < b.second; });
     result.set_step_failure(StepFailure::undetermined,
                             fmt::format("none of {} captures has a fix ({} of them: {})",
                                         evaluation.captures, count, status),
@@ -89,12 +89,12 @@ std::string render_evaluation_report_html(EvaluationReport report_content) {
   for (const Drive& drive : report_content.drives) add_line_drive(report, drive);
   for (auto& picture : make_position_error_plots(
            report_content.input, report_content.result.evaluation, report_content.lamps)) {
-    report.pictures.push_back(std::move(picture));
+    report.plots.push_back(std::move(picture));
   }
   if (report.calibration) {
     auto budget = make_fix_error_budget_plot(report_content.input.fixes.rows, report_content.lamps,
                                              *report.calibration);
-    if (budget) report.pictures.push_back(std::move(*budget));
+    if (budget) report.plots.push_back(std::move(*budget));
   }
   if (report.evaluation) report.evaluation->part = "evaluation";
   return render_report_html(report);

@@ -33,7 +33,7 @@ EvaluateResult evaluate_fixes_against_truth(const EvaluationInput& input,
 
 /// Fixes of a drive along a commanded straight line, and the ends of this line in the world, m.
 struct Drive {
-  FromFile<FixRow> fixes;
+  FileRows<FixRow> fixes;
   CommandedLine commanded_m;
 };
 

@@ -7,9 +7,9 @@
 namespace vlp {
 
 std::optional<KnownMotion> find_capture_motion(const Capture& capture,
-                                               const std::optional<KnownMotion>& otherwise,
+                                               const std::optional<KnownMotion>& default_motion,
                                                double yaw_rate_sd_rad_per_s) {
-  if (!capture.velocity_m_per_s && !capture.yaw_rate_rad_per_s) return otherwise;
+  if (!capture.velocity_m_per_s && !capture.yaw_rate_rad_per_s) return default_motion;
   KnownMotion motion = otherwise.value_or(KnownMotion());
   if (capture.velocity_m_per_s) {
     motion.velocity_m_per_s = *capture.velocity_m_per_s;
@@ -24,16 +24,16 @@ std::optional<KnownMotion> find_capture_motion(const Capture& capture,
 
 std::vector<KnownMotion> find_capture_motions(std::span<const Frame> frames,
                                               const CapturesTable& captures,
-                                              const std::optional<KnownMotion>& otherwise,
+                                              const std::optional<KnownMotion>& default_motion,
                                               double yaw_rate_sd_rad_per_s) {
   std::vector<KnownMotion> motions;
   motions.reserve(frames.size());
   bool any = false;
   for (const Frame& frame : frames) {
     const auto entry = captures.find(frame.image);
-    const auto known = entry == captures.end()
-                           ? otherwise
-                           : find_capture_motion(entry->second, otherwise, yaw_rate_sd_rad_per_s);
+    const auto known = entry == captures.end() ? default_motion
+                                               : find_capture_motion(entry->second, default_motion,
+                                                                     yaw_rate_sd_rad_per_s);
     motions.push_back(known.value_or(KnownMotion()));
     any = any || may_camera_move_during_readout(motions.back());
   }

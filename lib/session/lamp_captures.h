@@ -28,20 +28,20 @@ struct LampCaptures {
 };
 
 /// Returns the motion of the camera in a capture: velocity and yaw rate of captures.csv, each
-/// replaced by that of `otherwise` if the table lacks it.
+/// replaced by that of `default_motion` if the table lacks it.
 ///
-/// @param otherwise              motion without a table; std::nullopt: the camera stands
+/// @param default_motion              motion without a table; std::nullopt: the camera stands
 /// @param yaw_rate_sd_rad_per_s  standard deviation of the table's yaw rate; the standard deviation
 ///                               of its velocity is in the table
 std::optional<KnownMotion> find_capture_motion(const Capture& capture,
-                                               const std::optional<KnownMotion>& otherwise,
+                                               const std::optional<KnownMotion>& default_motion,
                                                double yaw_rate_sd_rad_per_s);
 
 /// Returns find_capture_motion() for each frame; an empty vector if the camera stands in all of
 /// them.
 std::vector<KnownMotion> find_capture_motions(std::span<const Frame> frames,
                                               const CapturesTable& captures,
-                                              const std::optional<KnownMotion>& otherwise,
+                                              const std::optional<KnownMotion>& default_motion,
                                               double yaw_rate_sd_rad_per_s);
 
 /// Checks that the camera has row_time_s and readout, which motion compensation requires. Throws

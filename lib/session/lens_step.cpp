@@ -24,7 +24,7 @@ constexpr double kWholeImage = 0.999;
 IntrinsicsReport make_report(const LensEstimate& lens) {
   const IntrinsicsSolution& solution = lens.solution;
   std::optional<std::array<double, 2>> board_warp_m;
-  if (solution.solved_for.warp) {
+  if (solution.solved_parameters.warp) {
     const Eigen::Vector2d warp_m =
         solution.problem.warp_m.cwiseProduct(lens.lattice->board_to_part_warp_ratio());
     board_warp_m = {warp_m.x(), warp_m.y()};
@@ -49,23 +49,23 @@ Camera make_camera(Camera camera, const BoardProblem& problem) {
 /// Fails because no image can be used: another board, if the rejected images show one.
 void fail_without_views(const LensInput& input, LensResult& result) {
   std::vector<BoardView> views;
-  for (const Observation& image : input.seen.images) {
+  for (const Observation& image : input.observations.images) {
     if (image.board) views.push_back(*image.board);
   }
   const std::string layout = check_board_layout(input.board, views, {}).problem;
   if (!layout.empty())
     return result.set_step_failure(StepFailure::wrong_board, layout, input.board_file);
   result.set_step_failure(StepFailure::undetermined,
-                          describe_why_no_image_is_kept(input.seen.images));
+                          describe_why_no_image_is_kept(input.observations.images));
 }
 
 }  // namespace
 
 LensResult run_lens_calibration_step(LensInput input, HistoryEntry entry) {
   LensResult result;
-  add_image_intake_remarks(input.seen, result);
+  add_image_intake_remarks(input.observations, result);
   if (!result.has_succeeded()) return result;
-  LensViews views{collect_kept_board_views(input.seen.images),
+  LensViews views{collect_kept_board_views(input.observations.images),
                   input.board,
                   input.camera.lens_model,
                   input.held_out,
@@ -84,7 +84,7 @@ LensResult run_lens_calibration_step(LensInput input, HistoryEntry entry) {
   }
   if (!lens.has_succeeded()) {
     std::string problem = lens.problem;
-    const std::string rejections = summarize_image_rejections(input.seen.images);
+    const std::string rejections = summarize_image_rejections(input.observations.images);
     if (lens.status == LensStatus::too_few_views && !rejections.empty()) {
       problem += "; not used: " + rejections;
     }
@@ -109,7 +109,8 @@ std::vector<Metric> collect_lens_metrics(const LensEstimate& lens) {
                               {"coverage", lens.coverage.covered_fraction},
                               {"views", static_cast<double>(lens.solution.views.size())},
                               {"board_tilt_deg", deg_from_rad(lens.coverage.tilt_rad)}};
-  if (lens.report.halves) metrics.push_back({"split_half_px", lens.report.halves->rms_px});
+  if (lens.report.split_half_difference)
+    metrics.push_back({"split_half_px", lens.report.split_half_difference->rms_px});
   if (lens.print_px) metrics.push_back({"board_print_px", *lens.print_px});
   if (const auto& sharpness = lens.sharpness) {
     metrics.insert(metrics.end(), {{"mtf50", sharpness->mean_mtf50},

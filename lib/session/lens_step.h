@@ -17,7 +17,7 @@ namespace vlp {
 struct LensInput {
   /// Observations of the board in the images, one per image. Rejected images are not used but
   /// reported as skipped.
-  Observations seen;
+  Observations observations;
   Board board;
   std::filesystem::path board_file;
   /// Id, lens model, row time, readout and pixel pitch; imager and intrinsics are estimated.

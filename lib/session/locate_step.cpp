@@ -41,13 +41,15 @@ Sensors make_capture_sensor_readings(const std::string& image, const LocateInput
     sensors.inclination = capture.inclination;
     sensors.inclination_sigma_rad = input.inclination_sigma_rad;
   }
-  if (input.one_lamp && capture.z_m && capture.yaw_rad) {
+  if (input.allow_single_lamp && capture.z_m && capture.yaw_rad) {
     sensors.height_and_yaw = HeightAndYaw{*capture.z_m, *capture.yaw_rad,
                                           input.height_sd_m.value_or(0), input.yaw_sd_rad};
   }
   if (input.height_sd_m && capture.z_m) {
     // The height in the table is that of the camera.
-    const double above_m = input.how.mount ? input.how.mount->position_in_robot_m.z() : 0;
+    const double above_m = input.positioner_options.mount
+                               ? input.positioner_options.mount->position_in_robot_m.z()
+                               : 0;
     sensors.height = KnownHeight{*capture.z_m - above_m, *input.height_sd_m};
   }
   return sensors;
@@ -115,8 +117,9 @@ Fix locate_frame(const Frame& frame, const Positioner& positioner, const Earlier
   return positioner.compute_position_fix(frame.detections, sensors);
 }
 
-std::vector<Fix> locate_all_frames(const LocateInput& input, const PositionerOptions& how) {
-  const Positioner positioner(input.lamps, input.calibration, how);
+std::vector<Fix> locate_all_frames(const LocateInput& input,
+                                   const PositionerOptions& positioner_options) {
+  const Positioner positioner(input.lamps, input.calibration, positioner_options);
   const EarlierFrames frames(input);
   std::vector<Fix> fixes;
   fixes.reserve(input.frames.size());
@@ -178,7 +181,7 @@ FixRow make_fix_row(const Frame& frame, const CapturesTable& captures, const Fix
     }
   }
   const auto rejected = list_rejected(fix);
-  row.rejected.assign(rejected.begin(), rejected.end());
+  row.rejected_lamps.assign(rejected.begin(), rejected.end());
   return row;
 }
 
@@ -246,7 +249,7 @@ void warn_about_motion(LocateResult& result, const LocateInput& input, bool is_n
   LocateInput moving = input;
   moving.motion =
       KnownMotion::make_motion_prior_from_limits(max_speed_m_per_s, max_yaw_rate_rad_per_s);
-  const std::vector<Fix> fixes = locate_all_frames(moving, input.how);
+  const std::vector<Fix> fixes = locate_all_frames(moving, input.positioner_options);
   const auto standing_px = estimate_pixel_noise_px(sum_squared_residuals_of_fixes(result.fixes));
   const auto moving_px = estimate_pixel_noise_px(sum_squared_residuals_of_fixes(fixes));
   const std::size_t still_failed = input.frames.size() - count_fixes(fixes);
@@ -282,9 +285,10 @@ LocateInput scale_stated_noise(LocateInput input, const std::vector<Fix>& fixes,
 }
 
 /// Locates frames again, with scaled noise, from the lamps that their fixes use.
-void locate_with_scaled_noise(const LocateInput& input, const PositionerOptions& how, double factor,
-                              std::vector<Fix>& fixes) {
-  std::vector<Fix> rescaled = locate_all_frames(scale_stated_noise(input, fixes, factor), how);
+void locate_with_scaled_noise(const LocateInput& input, const PositionerOptions& positioner_options,
+                              double factor, std::vector<Fix>& fixes) {
+  std::vector<Fix> rescaled =
+      locate_all_frames(scale_stated_noise(input, fixes, factor), positioner_options);
   for (std::size_t i = 0; i < fixes.size(); ++i) {
     if (!fixes[i].has_succeeded() || !rescaled[i].has_succeeded()) continue;
     rescaled[i].rejected_lamps = fixes[i].rejected_lamps;
@@ -298,9 +302,9 @@ void locate_with_scaled_noise(const LocateInput& input, const PositionerOptions&
 /// one is too small. Returns true if the noise is known.
 bool locate_with_noise(const LocateInput& input, LocateResult& result) {
   // The reported errors of calibration and map contribute to the residuals.
-  PositionerOptions how = input.how;
-  how.computes_common_chi_squared = true;
-  result.fixes = locate_all_frames(input, how);
+  PositionerOptions positioner_options = input.positioner_options;
+  positioner_options.computes_common_chi_squared = true;
+  result.fixes = locate_all_frames(input, positioner_options);
   std::vector<Fix> stated, unstated;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
     (has_pixel_noise(input.frames[i]) ? stated : unstated).push_back(result.fixes[i]);
@@ -315,7 +319,7 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
     result.notes.push_back(fmt::format(
         "residuals are {:.2f} times the stated noise: sd follows the residuals", factor));
   }
-  how = input.how;
+  positioner_options = input.positioner_options;
   bool is_known = true;
   if (!unstated.empty()) {
     auto unstated_factor = estimate_noise_scale_factor(sum_squared_residuals_of_fixes(unstated));
@@ -325,10 +329,11 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
       unstated_factor = estimate_pixel_noise_px(sum_squared_residuals_of_fixes(result.fixes));
     is_known = unstated_factor.has_value();
     if (is_known) {
-      how.unstated_sigma_px =
-          std::clamp(how.unstated_sigma_px * *unstated_factor, kMinSigma_px, kMaxSigma_px);
-      result.notes.push_back(fmt::format(
-          "sigma_px is not stated: {:.3g} px estimated from the residuals", how.unstated_sigma_px));
+      positioner_options.unstated_sigma_px = std::clamp(
+          positioner_options.unstated_sigma_px * *unstated_factor, kMinSigma_px, kMaxSigma_px);
+      result.notes.push_back(
+          fmt::format("sigma_px is not stated: {:.3g} px estimated from the residuals",
+                      positioner_options.unstated_sigma_px));
     } else {
       // [FIX-12] `sd columns are empty` | no `sigma_px`, and no image with three lamps | state
       //   `sigma_px`
@@ -337,7 +342,7 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
     }
   }
   if (factor > 1 || (is_known && !unstated.empty())) {
-    locate_with_scaled_noise(input, how, factor, result.fixes);
+    locate_with_scaled_noise(input, positioner_options, factor, result.fixes);
   }
   return is_known;
 }
@@ -362,8 +367,8 @@ void mark_fixes_outside_valid_region(LocateResult& result, const LocateInput& in
     if (!result.fixes[i].has_succeeded()) continue;
     ++fixes;
     const auto& detections = input.frames[i].detections;
-    const auto& rejected = result.rows[i].rejected;
-    auto& lamps_outside = result.rows[i].outside_region;
+    const auto& rejected = result.rows[i].rejected_lamps;
+    auto& lamps_outside = result.rows[i].lamps_outside_region;
     for (const Detection& detection : detections) {
       if (polygon_contains(report->region_px, detection.pixel)) continue;
       if (find_lamp_by_id(input.lamps.lamps, detection.lamp) == nullptr) continue;
@@ -407,8 +412,9 @@ MapErrors find_errors_while_standing(const LocateInput& input, const std::vector
     frames.push_back(input.frames[i]);
     options.inclinations.push_back(body ? std::optional(body->inclination) : sensors.inclination);
   }
-  if (input.how.mount) options.yaw_in_robot_rad = input.how.mount->yaw_in_robot_rad;
-  if (input.lamp_offsets) options.max_captures = std::max<std::size_t>(frames.size(), 1);
+  if (input.positioner_options.mount)
+    options.yaw_in_robot_rad = input.positioner_options.mount->yaw_in_robot_rad;
+  if (input.compute_lamp_offsets) options.max_captures = std::max<std::size_t>(frames.size(), 1);
   return detect_misplaced_or_swapped_lamps(frames, input.lamps, input.calibration, options);
 }
 
@@ -419,7 +425,7 @@ void warn_about_rejected_lamps(LocateResult& result, const LocateInput& input,
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
     unknown += result.fixes[i].unknown_lamps;
     rejected += result.fixes[i].rejected_lamps;
-    for (const int id : result.rows[i].rejected) {
+    for (const int id : result.rows[i].rejected_lamps) {
       ++captures[id];
       result.details.push_back(fmt::format("{}: lamp {} contradicts the others and is rejected",
                                            input.frames[i].image, id));
@@ -463,18 +469,18 @@ LocateResult locate_camera_from_frames(const LocateInput& input) {
   }
   warn_about_image(result, input);
   mark_fixes_outside_valid_region(result, input);
-  const int elsewhere =
-      Positioner(input.lamps, input.calibration, input.how).num_lamps_moved_since_calibration();
+  const int elsewhere = Positioner(input.lamps, input.calibration, input.positioner_options)
+                            .num_lamps_moved_since_calibration();
   if (elsewhere > 0) result.warnings.push_back(describe_lamps_moved_since_calibration(elsewhere));
   warn_about_captures(result, input);
   const bool is_contradicted =
       std::any_of(result.fixes.begin(), result.fixes.end(),
                   [](const Fix& fix) { return !fix.has_succeeded() || fix.rejected_lamps > 0; });
   MapErrors map_errors;
-  if (input.lamp_offsets || is_contradicted)
+  if (input.compute_lamp_offsets || is_contradicted)
     map_errors = find_errors_while_standing(input, result.fixes);
   warn_about_rejected_lamps(result, input, map_errors);
-  if (input.lamp_offsets) {
+  if (input.compute_lamp_offsets) {
     result.lamp_offsets = std::move(map_errors.offsets);
     if (input.frames.size() > 1 && result.lamp_offsets.empty()) {
       // [FIX-13] `not tie all lamps` | note: lamps never visible next to two others; their
@@ -508,8 +514,8 @@ class TiltedCaptures {
   TiltedCaptures(LocateInput& input, const Redetector& redetect)
       : input_(input),
         redetect_(redetect),
-        base_from_camera_(
-            compute_level_from_camera_rotation(input.calibration, input.how.correction)) {
+        base_from_camera_(compute_level_from_camera_matrix(input.calibration,
+                                                           input.positioner_options.correction)) {
     for (std::size_t i = 0; i < input.frames.size(); ++i) {
       const Frame& frame = input.frames[i];
       if (make_capture_sensor_readings(frame.image, input).inclination_sigma_rad > 0) {
@@ -583,7 +589,8 @@ class TiltedCaptures {
       const Fix& fix = fixes_[capture.frame];
       capture.has_converged = capture.has_converged || !fix.has_succeeded() || !fix.body;
       if (capture.has_converged) continue;
-      const double yaw_in_robot_rad = input_.how.mount ? input_.how.mount->yaw_in_robot_rad : 0;
+      const double yaw_in_robot_rad =
+          input_.positioner_options.mount ? input_.positioner_options.mount->yaw_in_robot_rad : 0;
       capture.level = compute_level_rotation_from_inclination(fix.body->inclination,
                                                               yaw_in_robot_rad, base_from_camera_);
       levels.emplace(image_name(capture), *capture.level);
@@ -645,7 +652,7 @@ LocateResult locate_camera_from_images(const LampImages& images, ImageUse use, L
   const LampIntake without_pictures = intake.copy_intake_with_annotation_folder({});
   std::map<std::string, Observation> latest;
   const LevelRotations levels =
-      redetect_lamps_of_tilted_captures(input, [&](const LevelRotations& tilted) {
+      redetect_lamps_until_tilt_converges(input, [&](const LevelRotations& tilted) {
         const Observations repeated = detect_in_images_again(without_pictures, files, tilted);
         for (const Observation& image : repeated.images) {
           if (image.is_image_kept()) latest.insert_or_assign(image.image_file_name(), image);
@@ -670,11 +677,11 @@ LocateResult locate_camera_from_images(const LampImages& images, ImageUse use, L
                                          make_detector_camera(input.calibration),
                                          images.calibration_file.filename().string(), result);
   }
-  result.seen = std::move(seen);
+  result.observations = std::move(seen);
   return result;
 }
 
-LevelRotations redetect_lamps_of_tilted_captures(LocateInput& input, const Redetector& redetect) {
+LevelRotations redetect_lamps_until_tilt_converges(LocateInput& input, const Redetector& redetect) {
   return TiltedCaptures(input, redetect).iterate_until_tilt_converges();
 }
 

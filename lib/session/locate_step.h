@@ -29,14 +29,14 @@ struct LocateInput {
   /// Rows of captures.csv, by image name. Times, motions and inclinations are always used. Heights
   /// and yaws are used only with `one_lamp` or `height_sd_m`.
   CapturesTable captures = {};
-  PositionerOptions how = {};
+  PositionerOptions positioner_options = {};
   /// Standard deviation of the lamp positions in the image, per axis; overrides that of the
   /// detections.
   std::optional<double> sigma_px = {};
   /// Standard deviation of the angles of an inclination in `captures`, rad; 0: exact.
   double inclination_sigma_rad = 0;
   /// Uses height and yaw of `captures` if only one lamp is detected.
-  bool one_lamp = false;
+  bool allow_single_lamp = false;
   /// Standard deviation of the yaw of `captures` for fixes of one lamp; 0: exact. That of the
   /// height is height_sd_m.
   double yaw_sd_rad = 0;
@@ -52,7 +52,7 @@ struct LocateInput {
   std::optional<double> height_sd_m = {};
   /// If true, computes the offset of each lamp from its position in the map
   /// (StepResult::lamp_offsets).
-  bool lamp_offsets = false;
+  bool compute_lamp_offsets = false;
   /// Number of captures in a joint fix with a common velocity: the capture and those up to 0.2 s
   /// before it.
   int window_size = 1;
@@ -74,7 +74,7 @@ struct LocateResult : StepResult {
   std::vector<FixRow> rows;
   FixSummary summary;
   /// Observations of the images in which the lamps were detected (locate_camera_from_images()).
-  Observations seen = {};
+  Observations observations = {};
 };
 
 /// Estimates the fix of each frame.
@@ -91,7 +91,7 @@ LocateResult locate_camera_from_frames(const LocateInput& input);
 
 /// Detects the lamps in images (detect_lamps_in_images()) and locates the camera of each image.
 /// `input` holds everything except the frames. If the tilt of a camera is estimated, its lamps are
-/// detected again in the plane that is level by its fix (redetect_lamps_of_tilted_captures()).
+/// detected again in the plane that is level by its fix (redetect_lamps_until_tilt_converges()).
 ///
 /// Skipped images and remarks of the intake are part of the result. It fails as
 /// locate_camera_from_frames() does, or if no lamp is identified.
@@ -113,6 +113,6 @@ using Redetector = std::function<std::vector<Frame>(const LevelRotations&)>;
 /// discarded. A capture without a fix either way keeps the detection with more lamps.
 ///
 /// Replaces the frames of `input`. Returns the level rotations of the frames that changed.
-LevelRotations redetect_lamps_of_tilted_captures(LocateInput& input, const Redetector& redetect);
+LevelRotations redetect_lamps_until_tilt_converges(LocateInput& input, const Redetector& redetect);
 
 }  // namespace vlp

@@ -93,7 +93,7 @@ BodyObservations make_frame(const GroupedLights& image, std::vector<AssignedLigh
     const auto ray = lens.unproject_pixel(pixel);
     if (!ray) continue;
     const auto whitened =
-        compute_whitened_pixel_from_ray(ray->direction, ray->d_direction_d_pixel, sd_px);
+        compute_whitened_pixel_jacobian_wrt_ray(ray->direction, ray->d_direction_d_pixel, sd_px);
     if (!whitened) continue;
     frame.sightings[frame.size] = {lamp.position_m, ray->direction.normalized(), *whitened, sd_px,
                                    0};

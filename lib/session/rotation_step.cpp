@@ -27,17 +27,17 @@ std::string_view rotation_method_name(RotationMethod method) {
       ->first;
 }
 
-RotationFit fit_rotation(const RotationCaptures& spot, const Camera& camera,
+RotationFit fit_rotation(const RotationCaptures& rotation, const Camera& camera,
                          RotationMethod method) {
   switch (method) {
     case RotationMethod::axis:
-      return fit_rotation_axis(spot, camera);
+      return fit_rotation_axis(rotation, camera);
     case RotationMethod::joint:
-      return fit_rotation_center_to_all_lamps(spot, camera);
+      return fit_rotation_center_to_all_lamps(rotation, camera);
     case RotationMethod::circle:
       break;
   }
-  return fit_and_average_lamp_circle_centers(spot, camera).mean;
+  return fit_and_average_lamp_circle_centers(rotation, camera).mean;
 }
 
 /// Returns the zenith point and, if known, the lever arm.
@@ -64,8 +64,8 @@ void propagate_lens_errors(
   };
   if (const auto jacobian = estimate_solution_jacobian_wrt_errors(
           with_error, make_solution_vector(center), *report->covariance)) {
-    center.by_intrinsics = jacobian->topRows(2);
-    if (center.lever_arm_m) center.lever_arm_by_intrinsics = jacobian->bottomRows(2);
+    center.jacobian_wrt_intrinsics = jacobian->topRows(2);
+    if (center.lever_arm_m) center.lever_arm_jacobian_wrt_intrinsics = jacobian->bottomRows(2);
     return;
   }
   result.warnings.emplace_back(
@@ -89,10 +89,11 @@ bool has_same_observations(const RotationCaptures& a, const RotationCaptures& b)
 void propagate_lens_errors(RotationResult& result, const LampCaptures& input,
                            RotationMethod method) {
   const auto center_for = [&](const Camera& camera) -> std::optional<RotationCenter> {
-    const RotationCaptures spot =
+    const RotationCaptures rotation =
         find_in_place_rotation_captures(input.frames, input.lamps, camera);
-    if (spot.status != RotationStatus::ok || !has_same_observations(spot, result.spot)) return {};
-    const RotationFit fit = fit_rotation(spot, camera, method);
+    if (rotation.status != RotationStatus::ok || !has_same_observations(rotation, result.rotation))
+      return {};
+    const RotationFit fit = fit_rotation(rotation, camera, method);
     if (!fit.converged || fit.used_observations != result.fit.used_observations) return {};
     return fit.center;
   };
@@ -100,7 +101,7 @@ void propagate_lens_errors(RotationResult& result, const LampCaptures& input,
 }
 
 void add_warnings(RotationResult& result) {
-  const auto& heights = result.spot.heights;
+  const auto& heights = result.rotation.heights;
   if (!result.fit.center.lever_arm_m && heights.size() == 1) {
     result.warnings.push_back(
         fmt::format("at one height, under lamps of similar heights, lever arm and tilt cannot be "
@@ -119,7 +120,7 @@ void add_warnings(RotationResult& result) {
         "center has no standard deviation: add captures, four or more at each height");
   }
   constexpr double max_noise_ratio = 3;
-  const auto& median_sigma_px = result.spot.median_sigma_px;
+  const auto& median_sigma_px = result.rotation.median_sigma_px;
   if (median_sigma_px && result.fit.residual_px > max_noise_ratio * *median_sigma_px) {
     // [ROTATION-1] `the residuals ` | above the stated noise: lens or map inaccurate, camera beside
     //   the axis, or `sigma_px` too small | check lens, map and `sigma_px`
@@ -162,7 +163,7 @@ MapErrors find_lamp_map_errors(const LampCaptures& input, const Calibration& cal
   MapErrors all =
       detect_misplaced_or_swapped_lamps(input.frames, input.lamps, calibration, options);
   std::erase_if(all.errors, [](const MapError& error) {
-    return error.kind == MapErrorKind::moved || error.kind == MapErrorKind::unsteady;
+    return error.kind == MapErrorKind::moved || error.kind == MapErrorKind::inconsistent;
   });
   found.errors = std::move(all.errors);
   return found;
@@ -216,23 +217,23 @@ RotationResult run_rotation_calibration_step(const LampCaptures& input, Rotation
   check_lamp_map_with_captures(input, extract_camera_calibration(input.calibration), result);
   if (!result.has_succeeded()) return result;
   const Camera& camera = input.calibration.camera;
-  result.spot = find_in_place_rotation_captures(input.frames, input.lamps, camera);
-  for (const auto& [image, reason] : result.spot.rejected) {
+  result.rotation = find_in_place_rotation_captures(input.frames, input.lamps, camera);
+  for (const auto& [image, reason] : result.rotation.rejected_captures) {
     result.warnings.push_back(fmt::format("{}: rejected: {}", image, reason));
   }
-  if (result.spot.status != RotationStatus::ok) {
-    const bool map = result.spot.status == RotationStatus::other_map;
+  if (result.rotation.status != RotationStatus::ok) {
+    const bool map = result.rotation.status == RotationStatus::other_map;
     result.set_step_failure(map ? StepFailure::wrong_map : StepFailure::undetermined,
-                            std::string(describe_rotation_status(result.spot.status)),
+                            std::string(describe_rotation_status(result.rotation.status)),
                             map ? input.lamps_file : std::filesystem::path());
-    if (map || result.spot.status == RotationStatus::moved) {
+    if (map || result.rotation.status == RotationStatus::axis_moved) {
       explain_failure_by_lamp_map_errors(input, extract_camera_calibration(input.calibration),
                                          result);
     }
     return result;
   }
-  result.circles = fit_and_average_lamp_circle_centers(result.spot, camera);
-  result.fit = fit_rotation(result.spot, camera, method);
+  result.circles = fit_and_average_lamp_circle_centers(result.rotation, camera);
+  result.fit = fit_rotation(result.rotation, camera, method);
   if (!result.fit.converged) {
     const bool is_noise = method == RotationMethod::circle && result.circles.undetermined > 0;
     result.set_step_failure(
@@ -251,9 +252,10 @@ RotationResult run_rotation_calibration_step(const LampCaptures& input, Rotation
   result.calibration =
       add_rotation_center_to_calibration(input.calibration, result.fit.center, std::move(entry));
   const std::string title = fmt::format("{}, method {}", camera.id, rotation_method_name(method));
-  result.drawing = [title, spot = result.spot, circles = result.circles, fit = result.fit, camera] {
+  result.drawing = [title, rotation = result.rotation, circles = result.circles, fit = result.fit,
+                    camera] {
     return make_rotation_plot_drawing(
-        collect_rotation_plot_data(title, spot, circles, fit, camera));
+        collect_rotation_plot_data(title, rotation, circles, fit, camera));
   };
   return result;
 }
@@ -273,7 +275,7 @@ TiltResult run_tilt_calibration_step(const LampCaptures& input, bool refine_map,
   const auto leveled = [&](const Camera& camera) {
     return estimate_camera_tilt_from_lamps(input.frames, input.lamps, camera, options);
   };
-  TiltCalibration& leveling = result.leveling;
+  TiltCalibration& leveling = result.tilt;
   leveling = leveled(input.calibration.camera);
   if (!leveling.undetermined.empty()) {
     result.set_step_failure(StepFailure::undetermined, leveling.undetermined);

@@ -49,7 +49,7 @@ std::string format_height_m(double z_m);
 
 /// Result of run_rotation_calibration_step().
 struct RotationResult : StepResult {
-  RotationCaptures spot;
+  RotationCaptures rotation;
   RotationFit fit;
   CircleCenters circles;
 };
@@ -62,7 +62,7 @@ RotationResult run_rotation_calibration_step(const LampCaptures& input, Rotation
 
 /// Result of run_tilt_calibration_step().
 struct TiltResult : StepResult {
-  TiltCalibration leveling;
+  TiltCalibration tilt;
 };
 
 /// Estimates the tilt from captures taken anywhere (calibration/tilt/), and the lamp map if

@@ -67,7 +67,7 @@ std::vector<MeasuredPeriod> collect_lamp_periods(const std::vector<Observation>&
     if (!image.is_image_kept()) continue;  // excludes copies and images of another camera
     for (const Light& light : image.lights) {
       const bool is_measured = light.kind == LightKind::lamp && light.lamp &&
-                               !light.by_modulation && are_stripes_reliable(light.stripes);
+                               !light.is_found_by_modulation && are_stripes_reliable(light.stripes);
       if (!is_measured) continue;
       periods.push_back({light.stripes.period_lines, light.lamp});
     }
@@ -79,7 +79,7 @@ std::vector<MeasuredPeriod> collect_lamp_periods(const std::vector<Observation>&
 
 std::vector<std::span<const Observation>> DetectedLights::observations_by_folder() const {
   std::vector<std::span<const Observation>> folders;
-  std::span<const Observation> remaining = seen.images;
+  std::span<const Observation> remaining = observations.images;
   for (const std::size_t size : folder_sizes) {
     folders.push_back(remaining.first(size));
     remaining = remaining.subspan(size);
@@ -123,9 +123,9 @@ DetectedLights detect_lights_in_folders(const std::vector<fs::path>& folders, co
   Observations remarks;
   lights.camera.readout = estimate_readout_direction(images, readout, options, imager_px, remarks);
   const LampIntake intake(LightDetector(lamps, lights.camera), ImageUse::fixes, options, imager_px);
-  lights.seen = intake.detect_lamps_in_all_images(images, progress);
-  prepend_observation_messages(remarks, lights.seen);
-  check_any_image_readable(folders.front(), lights.seen.images);
+  lights.observations = intake.detect_lamps_in_all_images(images, progress);
+  prepend_observation_messages(remarks, lights.observations);
+  check_any_image_readable(folders.front(), lights.observations.images);
   return lights;
 }
 
@@ -192,20 +192,20 @@ RowTimeStepResult estimate_row_time_from_lights(const DetectedLights& seen,
   RowTimeStepResult result;
   const RowTimeResult estimate = select_row_time_by_periods_and_positions(
       seen.observations_by_folder(), labels, lamps, seen.camera.lens);
-  if (!estimate.found) {
+  if (!estimate.row_time) {
     result.set_step_failure(StepFailure::undetermined, estimate.problem);
     return result;
   }
-  result.found = *estimate.found;
-  result.metrics = make_row_time_metrics({result.found});
+  result.row_time = *estimate.row_time;
+  result.metrics = make_row_time_metrics({result.row_time});
   if (!calibration) return result;
   if (const auto& stated_s = calibration->camera.row_time_s) {
     std::string error =
-        describe_row_time_contradiction(result.found, {*stated_s, "the calibration"});
+        describe_row_time_contradiction(result.row_time, {*stated_s, "the calibration"});
     if (!error.empty()) result.warnings.push_back(std::move(error));
   }
   result.calibration = *calibration;
-  result.calibration.camera.row_time_s = result.found.row_time_s;
+  result.calibration.camera.row_time_s = result.row_time.row_time_s;
   result.calibration.camera.readout = seen.camera.readout;
   entry.part = "camera";
   auto& history = result.calibration.history;

@@ -24,8 +24,8 @@ namespace vlp {
 struct DetectedLights {
   /// Observations of all images, folder after folder, with their lights. `folder_sizes` has the
   /// number of images of each folder.
-  Observations seen;
-  /// Number of images of each folder, in the order of `seen`.
+  Observations observations;
+  /// Number of images of each folder, in the order of `observations`.
   std::vector<std::size_t> folder_sizes;
   DetectorCamera camera;
 
@@ -53,7 +53,7 @@ RowTimeResult select_row_time_by_periods_and_positions(
 
 /// Result of estimate_row_time_from_lights().
 struct RowTimeStepResult : StepResult {
-  RowTime found{};
+  RowTime row_time{};
 };
 
 /// Estimates the row time from lamps with a frequency in the map (estimate_row_time_candidates()).

@@ -143,8 +143,8 @@ class SessionRun {
                               results_.results_folder_path());
   }
 
-  std::vector<fs::path> line_drive_folders() const {
-    return options_.report ? session_.line_drive_folders() : std::vector<fs::path>();
+  std::vector<fs::path> folders_of_drives_along_lines() const {
+    return options_.report ? session_.folders_of_drives_along_lines() : std::vector<fs::path>();
   }
 
   /// Returns the steps of this session with their outputs.
@@ -165,7 +165,7 @@ class SessionRun {
         {"rotation", with_picture({"rotated.yaml"}, "rotation.svg")},
         {"dispersion", with_picture({"calibration.yaml"}, "dispersion.svg")}};
     if (session_.check_captures_folder()) steps.push_back({"check", {"check-fixes.csv"}});
-    for (const fs::path& line : line_drive_folders()) {
+    for (const fs::path& line : folders_of_drives_along_lines()) {
       steps.push_back({line.filename().string(), {fixes_file_path(line).filename().string()}});
     }
     steps.push_back({"evaluate", with_picture({"evaluation.json"}, "report.html")});
@@ -192,7 +192,7 @@ class SessionRun {
   /// Returns false if the step failed.
   bool run_or_reuse_step(const std::string& name, const std::vector<fs::path>& inputs,
                          const std::string& options, const std::function<Work()>& work) {
-    if (observer_.begins) observer_.begins(name);
+    if (observer_.on_step_started) observer_.on_step_started(name);
     const std::string key = compute_step_key(inputs, options);
     SessionStep done{name, false, {}};
     if (auto cached_result = results_.find_cached_step_result(name, key);
@@ -208,7 +208,7 @@ class SessionRun {
       done.result.gates = check_gates(find_step_gates(name), done.result.metrics);
     result_.gates.insert(result_.gates.end(), done.result.gates.begin(), done.result.gates.end());
     result_.steps.push_back(std::move(done));
-    if (observer_.ends) observer_.ends(result_.steps.back());
+    if (observer_.on_step_finished) observer_.on_step_finished(result_.steps.back());
     return result_.steps.back().result.has_succeeded();
   }
 
@@ -289,7 +289,7 @@ class SessionRun {
           input.board_file = session_.board_file();
           FrontendOptions options = options_.frontend;
           options.corner_cache = results_.corner_cache_folder();
-          input.seen =
+          input.observations =
               detect_boards_in_images(list_images(session_.board_images_folder()), input.board,
                                       session_.board_file(), options, observer_.progress);
           input.camera.id = options_.camera_id;
@@ -327,7 +327,7 @@ class SessionRun {
           RowTimeStepResult found = vlp::estimate_row_time_from_lights(
               seen, {{}}, lamps, lamps_file(), camera,
               make_step_history("--row-time", {session_.rotation_captures_folder(), lamps_file()}));
-          add_image_intake_remarks(seen.seen, found);
+          add_image_intake_remarks(seen.observations, found);
           return Work{found, [this, found] {
                         write_calibration(output_file_path("camera.yaml"), found.calibration);
                       }};
@@ -353,7 +353,7 @@ class SessionRun {
     seen = std::move(observed.images);
     add_row_time_contradiction_to_result(captures, seen, result);
     const auto& row_time_s = captures.calibration.camera.row_time_s;
-    if (use == ImageUse::turn && is_row_time_given() && row_time_s) {
+    if (use == ImageUse::rotation && is_row_time_given() && row_time_s) {
       result.metrics = make_row_time_metrics(check_row_time_against_lamps(
           seen, captures.lamps, {*row_time_s, describe_row_time_source()}));
     }
@@ -413,7 +413,7 @@ class SessionRun {
           make_session_lamp_images(session_.rotation_captures_folder(), captures, camera_file);
       images.captures.emplace();  // inclinations are ignored: the axis is level
       std::vector<Observation> seen;
-      const StepResult remarks = observe_lamp_images(images, ImageUse::turn, captures, seen);
+      const StepResult remarks = observe_lamp_images(images, ImageUse::rotation, captures, seen);
       if (!remarks.has_succeeded()) return Work{remarks};
       RotationResult found = run_rotation_calibration_step(captures, RotationMethod::axis,
                                                            make_step_history("", inputs));
@@ -433,8 +433,9 @@ class SessionRun {
     return run_or_reuse_step("dispersion", inputs, format_plot_setting(), [&] {
       LampCaptures captures{{}, read_lamps(), lamps_file(), read_calibration(rotated)};
       std::vector<Observation> seen;
-      const StepResult remarks = observe_lamp_images(
-          make_session_lamp_images(folder, captures, rotated), ImageUse::places, captures, seen);
+      const StepResult remarks =
+          observe_lamp_images(make_session_lamp_images(folder, captures, rotated),
+                              ImageUse::known_positions, captures, seen);
       if (!remarks.has_succeeded()) return Work{remarks};
       const KnownPositions places =
           collect_captures_at_known_positions(captures.frames, read_captures_with_truth(folder));
@@ -448,10 +449,10 @@ class SessionRun {
           make_step_history("", add_capture_tables(inputs, folder)));
       if (!found.has_succeeded()) add_row_time_contradiction_to_result(captures, seen, found);
       add(remarks, found);
-      if (places.without > 0) {
+      if (places.captures_without_position > 0) {
         found.warnings.push_back(
             fmt::format("{} of {} captures ignored: they have no position; add it to captures.csv",
-                        places.without, captures.frames.size()));
+                        places.captures_without_position, captures.frames.size()));
       }
       return Work{found, [this, found] {
                     write_picture(found, "dispersion.svg");
@@ -538,7 +539,7 @@ class SessionRun {
     if (const auto check = session_.check_captures_folder();
         check && !locate_check_and_drives(*check))
       return false;
-    for (const fs::path& line : line_drive_folders()) {
+    for (const fs::path& line : folders_of_drives_along_lines()) {
       if (!locate_check_and_drives(line)) return false;
     }
     return true;
@@ -550,11 +551,12 @@ class SessionRun {
         folder.filename().string(), list_lamp_inputs(folder, calibration), "", [&] {
           LocateInput input{
               {}, read_lamps(), read_calibration(calibration), read_captures_csv_of_folder(folder)};
-          input.lamp_offsets = session_.check_captures_folder() == folder;
+          input.compute_lamp_offsets = session_.check_captures_folder() == folder;
           const LampImages images{folder, input.lamps, lamps_file(), input.calibration,
                                   calibration};
-          const ImageUse use =
-              session_.check_captures_folder() == folder ? ImageUse::places : ImageUse::fixes;
+          const ImageUse use = session_.check_captures_folder() == folder
+                                   ? ImageUse::known_positions
+                                   : ImageUse::fixes;
           LocateResult found = locate_camera_from_images(images, use, std::move(input),
                                                          make_lamp_options(), observer_.progress);
           return Work{found, [this, folder, rows = found.rows] {
@@ -574,7 +576,7 @@ class SessionRun {
       if (options_.report && fs::exists(output_file_path(plot)))
         inputs.push_back(output_file_path(plot));
     }
-    for (const fs::path& line : line_drive_folders()) {
+    for (const fs::path& line : folders_of_drives_along_lines()) {
       inputs.push_back(fixes_file_path(line));
       for (const fs::path& table : add_capture_tables({}, line)) inputs.push_back(table);
     }
@@ -600,11 +602,11 @@ class SessionRun {
     input->fixes = {output_file_path("check-fixes.csv"),
                     read_fixes(output_file_path("check-fixes.csv"))};
     input->truth = {truth, read_truth_positions(truth.parent_path())};
-    input->station_m = compute_same_position_radius_m(*result_.calibration);
+    input->reference_point_radius_m = compute_same_position_radius_m(*result_.calibration);
     input->threads = options_.frontend.threads;
     EvaluateResult found = evaluate_fixes_against_truth(*input, gates);
     std::vector<Drive> drives;
-    for (const fs::path& line : line_drive_folders()) {
+    for (const fs::path& line : folders_of_drives_along_lines()) {
       const fs::path places = *find_truth_file(line), fixes = fixes_file_path(line);
       drives.push_back({{fixes, read_fixes(fixes)},
                         find_end_points_of_drive(places, read_truth_positions(line))});
@@ -633,7 +635,7 @@ class SessionRun {
               page.calibration = result_.calibration;
               for (const char* plot : kPlots) {
                 if (fs::exists(output_file_path(plot)))
-                  page.pictures.push_back(read_report_plot(output_file_path(plot)));
+                  page.plots.push_back(read_report_plot(output_file_path(plot)));
               }
               page.evaluation = make_step_history("", inputs);
               write_file(
@@ -648,7 +650,7 @@ class SessionRun {
     if (!last.result.has_succeeded()) {
       result_.verdict = Verdict::invalid;
       result_.failure = last.result.failure;
-      result_.reason = last.name + ": " + last.result.why;
+      result_.reason = last.name + ": " + last.result.message;
       results_.remove_outputs_of_later_steps(last.name);
     }
     const std::string missed = describe_failed_gates(result_.gates);

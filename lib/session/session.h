@@ -74,9 +74,9 @@ struct SessionResult {
 
 /// Callbacks for the progress of a run: start and end of each step, and images done.
 struct SessionObserver {
-  std::function<void(const std::string& step)> begins = {};
+  std::function<void(const std::string& step)> on_step_started = {};
   IntakeProgress progress = {};
-  std::function<void(const SessionStep& step)> ends = {};
+  std::function<void(const SessionStep& step)> on_step_finished = {};
 };
 
 /// Returns the metrics of the procedure, which its gates can limit.

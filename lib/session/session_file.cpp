@@ -158,7 +158,7 @@ Json make_gate_json(const CheckedMetric& gate) {
 
 Json make_step_result_json(const StepResult& result) {
   Json json{{"failure", step_failure_name(result.failure)},
-            {"message", result.why},
+            {"message", result.message},
             {"file", result.file_to_correct.string()},
             {"metrics", Json::array()},
             {"warnings", result.warnings},
@@ -248,7 +248,7 @@ std::string format_session_junit_xml(const SessionResult& result) {
     test.warnings = step.result.warnings;
     if (!step.result.has_succeeded()) {
       test.result = JUnitTest::Result::error;
-      test.message = step.result.why;
+      test.message = step.result.message;
       test.error_type = step_failure_name(step.result.failure);
     }
     tests.push_back(std::move(test));

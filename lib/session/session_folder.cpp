@@ -20,8 +20,8 @@ CapturesTable read_captures_with_truth(const fs::path& folder) {
     capture.y_m = row.xy_m.y();
     if (row.z_m) capture.z_m = row.z_m;
     if (row.yaw_rad) capture.yaw_rad = row.yaw_rad;
-    capture.place = PlaceOf::camera;
-    capture.place_sd_m.reset();
+    capture.measured_point = MeasuredPoint::camera;
+    capture.position_sd_m.reset();
   }
   return captures;
 }
@@ -31,7 +31,8 @@ std::optional<fs::path> find_truth_file(const fs::path& folder) {
   if (!fs::exists(folder / "captures.csv")) return std::nullopt;
   const CapturesTable captures = read_captures_csv(folder / "captures.csv");
   const bool places = std::any_of(captures.begin(), captures.end(), [](const auto& capture) {
-    return capture.second.x_m && capture.second.y_m && capture.second.place == PlaceOf::camera;
+    return capture.second.x_m && capture.second.y_m &&
+           capture.second.measured_point == MeasuredPoint::camera;
   });
   return places ? std::optional(folder / "captures.csv") : std::nullopt;
 }
@@ -40,7 +41,7 @@ std::vector<TruthRow> read_truth_positions(const fs::path& folder) {
   if (fs::exists(folder / "truth.csv")) return read_truth_table(folder / "truth.csv");
   std::vector<TruthRow> rows;
   for (const auto& [image, capture] : read_captures_csv_of_folder(folder)) {
-    if (!capture.x_m || !capture.y_m || capture.place == PlaceOf::axis) continue;
+    if (!capture.x_m || !capture.y_m || capture.measured_point == MeasuredPoint::axis) continue;
     rows.push_back({image, {*capture.x_m, *capture.y_m}, capture.z_m, capture.yaw_rad});
   }
   return rows;

@@ -74,7 +74,7 @@ std::string step_record_file_name(const std::string& step) {
 
 /// Returns true for the names of drives, which are folders of a session and steps.
 bool is_drive_name(std::string_view step) {
-  return step.starts_with("line-") && Id::is_valid_id(step);
+  return step.starts_with("line-") && Id::is_valid_name_of_camera_or_run(step);
 }
 
 SharedFolder make_steps_folder(const fs::path& results) {

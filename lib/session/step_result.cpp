@@ -99,8 +99,8 @@ void add_image_intake_remarks(const Observations& seen, StepResult& result) {
 }
 
 std::string format_failure_message(const StepResult& result) {
-  return result.file_to_correct.empty() ? result.why
-                                        : InputError(result.file_to_correct, result.why).what();
+  return result.file_to_correct.empty() ? result.message
+                                        : InputError(result.file_to_correct, result.message).what();
 }
 
 }  // namespace vlp

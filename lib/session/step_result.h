@@ -44,7 +44,7 @@ struct RejectedLamp {
 struct StepResult {
   StepFailure failure = StepFailure::none;
   /// Reason of the failure and the remedy, in one line; empty if the step succeeded.
-  std::string why = {};
+  std::string message = {};
   /// File to correct; empty if the captures are the cause.
   std::filesystem::path file_to_correct = {};
 
@@ -63,10 +63,10 @@ struct StepResult {
 
   bool has_succeeded() const { return failure == StepFailure::none; }
   /// Sets failure, message and file to correct.
-  void set_step_failure(StepFailure how, std::string words, std::filesystem::path file = {}) {
-    failure = how;
-    why = std::move(words);
-    subject = std::move(file);
+  void set_step_failure(StepFailure kind, std::string text, std::filesystem::path file = {}) {
+    failure = kind;
+    message = std::move(text);
+    file_to_correct = std::move(file);
   }
 };
 

@@ -105,7 +105,7 @@ TrainStepResult train_lamp_classifier(const DetectedLights& seen,
   for (std::size_t i = 0; i < labels.size(); ++i) {
     add_labeled_lights(folders[i], labels[i], labeled);
   }
-  if (labeled.labels == 0) {
+  if (labeled.num_labels == 0) {
     throw InputError(first_folder,
                      "the table names none of the images that can be used: image names have to be "
                      "equal, with their endings");

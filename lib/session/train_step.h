@@ -17,7 +17,7 @@ struct TrainStepResult : StepResult {
   LampClassifier classifier;
   /// Confusion matrix by cross-validation: identified lamp against labeled lamp. Each light is
   /// identified by a classifier that was trained without its image.
-  Confusion confusion;
+  ConfusionMatrix confusion;
 };
 
 /// Trains the lamp classifier with the lights that the labels of each folder identify. Warns of

@@ -100,7 +100,7 @@ void draw_camera(Scene& scene, const ArchiveVariation& variation, cv::RNG random
 }
 
 void draw_session(Scene& scene, const ArchiveVariation& variation, cv::RNG random) {
-  scene.seed = draw_random_seed(random);
+  scene.seed = draw_seed_from_generator(random);
   for (SceneLamp& lamp : scene.lamps) {
     for (double& part : lamp.map_error_m) {
       part += variation.map_error_m * random.uniform(-1.0, 1.0);
@@ -182,7 +182,7 @@ void damage_session_files(const ArchiveSession& session, const fs::path& folder)
       fs::remove_all(target);
       break;
     case ArchiveDamage::wrong_board: {
-      Board board = session.scene.board->print;
+      Board board = session.scene.board->pattern;
       board.family = board.family == "tag36h11" ? "tag25h9" : "tag36h11";
       write_board(target, board);
       break;
@@ -234,7 +234,7 @@ SimulationSummary simulate_session_archive(const Scene& scene, std::size_t sessi
       const bool rendered = render_archive_session(make_simulated_archive_session(scene, index),
                                                    output, options.provenance);
       const std::lock_guard lock(counting);
-      ++(rendered ? summary.rendered : summary.found);
+      ++(rendered ? summary.rendered : summary.existing);
       progress(summary, sessions);
     });
   } catch (const fs::filesystem_error& failure) {

@@ -82,9 +82,9 @@ void add_tag(const Board& board, const BoardTag& tag, const InkRadiances& ink,
 std::vector<Rectangle> make_rectangles(const SceneBoard& board) {
   const InkRadiances ink{board.white_e_per_s - board.surround_e_per_s,
                          board.black_e_per_s - board.surround_e_per_s};
-  const double margin_m = board.margin_m + compute_printed_margin_around_tags_m(board.print);
-  const Eigen::Vector2d field_m = compute_tag_field_size_m(board.print);
-  std::vector<Rectangle> all = make_board_pattern(board.print, ink);
+  const double margin_m = board.margin_m + compute_printed_margin_around_tags_m(board.pattern);
+  const Eigen::Vector2d field_m = compute_tag_field_size_m(board.pattern);
+  std::vector<Rectangle> all = make_board_pattern(board.pattern, ink);
   all.insert(all.begin(),
              {-margin_m, -margin_m, field_m.x() + margin_m, field_m.y() + margin_m, ink.white});
   return all;
@@ -136,7 +136,7 @@ double compute_printed_margin_around_tags_m(const Board& board) {
 }
 
 BoardWarp::BoardWarp(const SceneBoard& board)
-    : field_m_(compute_tag_field_size_m(board.print)), warp_m_(board.warp_m) {}
+    : field_m_(compute_tag_field_size_m(board.pattern)), warp_m_(board.warp_m) {}
 
 BoardWarp::Depth BoardWarp::compute_board_deflection(const Eigen::Vector2d& at_m) const {
   constexpr double max_offset = 1.5;  // outside the paper, where the parabola would bend back

@@ -188,7 +188,7 @@ LampShots read_lamp_captures(YamlMap& map, const Scene& scene, const Room& room)
   const auto repeat = map.get_optional_yaml_value("repeat");
   captures.repeat = repeat ? repeat->read_yaml_integer_within(1, kMaxCaptures) : 1;
   const auto known = map.get_optional_yaml_value("known");
-  captures.known = known && known->read_yaml_boolean();
+  captures.has_known_positions = known && known->read_yaml_boolean();
   check_capture_count(double(captures.pivots_m.size()) * double(captures.heights_m.size()) *
                           double(captures.yaws_rad.size()) * captures.repeat,
                       map);
@@ -206,8 +206,8 @@ BoardViews read_board_views(YamlMap& map) {
       map.get_required_yaml_value("tilt_deg").read_yaml_number_within(0, 80, "degrees"));
   views.roll_rad = rad_from_deg(
       map.get_required_yaml_value("roll_deg").read_yaml_number_within(0, 180, "degrees"));
-  views.spread = map.get_required_yaml_value("field_coverage")
-                     .read_yaml_number_within(0, 1, "(of the way to the image's edge)");
+  views.field_coverage = map.get_required_yaml_value("field_coverage")
+                             .read_yaml_number_within(0, 1, "(of the way to the image's edge)");
   views.velocity_m_per_s.setZero();
   if (const auto velocity = map.get_optional_yaml_value("velocity_m_per_s")) {
     views.velocity_m_per_s =

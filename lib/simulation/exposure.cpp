@@ -92,44 +92,45 @@ std::vector<cv::Mat1f> demosaic_bayer_image(const Bayer& bayer, const Sensor& se
   return colors;
 }
 
-double apply_tone_curve_to_gray_level(const ImageProcessing& picture, const Sensor& sensor,
+double apply_tone_curve_to_gray_level(const ImageProcessing& processing, const Sensor& sensor,
                                       double level_dn) {
   const double black = sensor.black_level_dn, white = sensor_white_level_dn(sensor);
   const double fraction = std::clamp((level_dn - black) / (white - black), 0.0, 1.0);
-  return white * std::pow(fraction, 1 / picture.gamma);
+  return white * std::pow(fraction, 1 / processing.gamma);
 }
 
-void apply_tone_curve_and_sharpening(const ImageProcessing& picture, const Sensor& sensor,
+void apply_tone_curve_and_sharpening(const ImageProcessing& processing, const Sensor& sensor,
                                      cv::Mat1f& levels) {
   for (float& level : levels) {
-    level = static_cast<float>(apply_tone_curve_to_gray_level(picture, sensor, double(level)));
+    level = static_cast<float>(apply_tone_curve_to_gray_level(processing, sensor, double(level)));
   }
-  if (!picture.sharpening) return;
-  const auto [amount, radius_px] = *picture.sharpening;
+  if (!processing.sharpening) return;
+  const auto [amount, radius_px] = *processing.sharpening;
   cv::Mat1f soft;
   cv::GaussianBlur(levels, soft, {}, radius_px, radius_px, cv::BORDER_REPLICATE);
   levels += amount * (levels - soft);
 }
 
-std::string image_file_extension(const std::optional<ImageProcessing>& picture) {
-  return picture && picture->jpeg_quality ? ".jpg" : ".png";
+std::string image_file_extension(const std::optional<ImageProcessing>& processing) {
+  return processing && processing->jpeg_quality ? ".jpg" : ".png";
 }
 
 std::vector<unsigned char> encode_image_as_jpeg_or_png(
-    const cv::Mat& image, const std::optional<ImageProcessing>& picture) {
+    const cv::Mat& image, const std::optional<ImageProcessing>& processing) {
   const std::string bytes =
-      picture && picture->jpeg_quality
+      processing && processing->jpeg_quality
           ? get_codecs().encode_image_file(".jpg", image,
-                                           {cv::IMWRITE_JPEG_QUALITY, *picture->jpeg_quality})
+                                           {cv::IMWRITE_JPEG_QUALITY, *processing->jpeg_quality})
           : get_codecs().encode_image_file(".png", image, {cv::IMWRITE_PNG_COMPRESSION, 1});
   return {bytes.begin(), bytes.end()};
 }
 
 cv::Mat simulate_sensor_image(const Sensor& sensor, const cv::Mat1f& mean_electrons,
-                              std::uint64_t seed, const std::optional<ImageProcessing>& picture) {
+                              std::uint64_t seed,
+                              const std::optional<ImageProcessing>& processing) {
   cv::RNG random(seed);
   cv::Mat1f electrons = mean_electrons.clone();
-  if (picture && picture->bayer) apply_filters(*picture->bayer, electrons);
+  if (processing && processing->bayer) apply_filters(*processing->bayer, electrons);
   if (sensor.shot_noise) {
     for (float& value : electrons) value = draw_poisson(value, random);
   }
@@ -142,22 +143,22 @@ cv::Mat simulate_sensor_image(const Sensor& sensor, const cv::Mat1f& mean_electr
   }
   const int type = sensor.bits == 8 ? CV_8U : CV_16U;
   cv::Mat image;
-  if (!picture) {
+  if (!processing) {
     electrons.convertTo(image, type, sensor.gain_dn_per_e, sensor.black_level_dn);
     return image;
   }
   cv::Mat1f levels;
   electrons.convertTo(levels, CV_32F, sensor.gain_dn_per_e, sensor.black_level_dn);
-  if (!picture->bayer) {
-    apply_tone_curve_and_sharpening(*picture, sensor, levels);
+  if (!processing->bayer) {
+    apply_tone_curve_and_sharpening(*processing, sensor, levels);
     levels.convertTo(image, type);
     return image;
   }
   // The analog-to-digital converter rounds before demosaicing.
   for (float& level : levels)
     level = std::clamp(std::round(level), 0.F, float(sensor_white_level_dn(sensor)));
-  auto colors = demosaic_bayer_image(*picture->bayer, sensor, levels);
-  for (cv::Mat1f& color : colors) apply_tone_curve_and_sharpening(*picture, sensor, color);
+  auto colors = demosaic_bayer_image(*processing->bayer, sensor, levels);
+  for (cv::Mat1f& color : colors) apply_tone_curve_and_sharpening(*processing, sensor, color);
   cv::Mat color_image;
   cv::merge(colors, color_image);
   color_image.convertTo(image, type);

@@ -27,30 +27,30 @@ std::vector<cv::Mat1f> demosaic_bayer_image(const Bayer& bayer, const Sensor& se
                                             const cv::Mat1f& levels);
 
 /// Applies the tone curve of ImageProcessing to one gray level, DN.
-double apply_tone_curve_to_gray_level(const ImageProcessing& picture, const Sensor& sensor,
+double apply_tone_curve_to_gray_level(const ImageProcessing& processing, const Sensor& sensor,
                                       double level_dn);
 
 /// Applies tone curve and sharpening of ImageProcessing to gray levels before rounding. Border
 /// pixels are replicated.
-void apply_tone_curve_and_sharpening(const ImageProcessing& picture, const Sensor& sensor,
+void apply_tone_curve_and_sharpening(const ImageProcessing& processing, const Sensor& sensor,
                                      cv::Mat1f& levels);
 
 /// Returns the file name extension of the images: ".jpg" or ".png".
-std::string image_file_extension(const std::optional<ImageProcessing>& picture);
+std::string image_file_extension(const std::optional<ImageProcessing>& processing);
 
 /// Encodes the image as JPEG, or losslessly as PNG.
 std::vector<unsigned char> encode_image_as_jpeg_or_png(
-    const cv::Mat& image, const std::optional<ImageProcessing>& picture);
+    const cv::Mat& image, const std::optional<ImageProcessing>& processing);
 
 /// Simulates a sensor (see Sensor) from the mean number of electrons of each pixel.
 ///
 /// Steps: color filters, shot noise (Poisson), overflow with bloom, read noise (normal), gain and
-/// black level. With `picture` also demosaicing, tone curve and sharpening; levels behind color
+/// black level. With `processing` also demosaicing, tone curve and sharpening; levels behind color
 /// filters are rounded before demosaicing. Last, rounding and the limits of 8 or 16 bits. The
 /// result has 8 or 16 bits; behind color filters it has three colors, blue first. The same seed
 /// yields the same image.
 cv::Mat simulate_sensor_image(const Sensor& sensor, const cv::Mat1f& mean_electrons,
                               std::uint64_t seed,
-                              const std::optional<ImageProcessing>& picture = {});
+                              const std::optional<ImageProcessing>& processing = {});
 
 }  // namespace vlp

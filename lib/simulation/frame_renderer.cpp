@@ -404,7 +404,7 @@ cv::Mat1f FrameRenderer::render_board_in_electrons(const BoardShot& shot) const 
   if (!shot.velocity_in_camera_m_per_s.isZero(0)) {
     const auto pose = [&](double time_s) { return shot.camera_from_board(time_s); };
     part.count = count_exposure_time_samples(compute_max_image_motion_px(
-        sample_surface_points(scene_.board->print), pose, shot.exposure_s, rays_));
+        sample_surface_points(scene_.board->pattern), pose, shot.exposure_s, rays_));
   }
   const auto surround = static_cast<float>(scene_.board->surround_e_per_s);
   const cv::Size pixels = rays_.make_constant_image_with_margin(0).size();

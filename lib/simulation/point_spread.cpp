@@ -123,16 +123,16 @@ void PointSpread::apply_lens_smear(const LensSmear& smear, cv::Mat1f& part,
 }
 
 void PointSpread::add_veiling_glare(cv::Mat1f& image) const {
-  if (optics_.veil == 0) return;
+  if (optics_.veiling_glare == 0) return;
   const double mean = cv::mean(image)[0];
-  image = (1 - optics_.veil) * image + optics_.veil * mean;
+  image = (1 - optics_.veiling_glare) * image + optics_.veiling_glare * mean;
 }
 
 float PointSpread::split_off_veiling_glare(cv::Mat1f& part) const {
-  if (optics_.veil == 0) return 0;
+  if (optics_.veiling_glare == 0) return 0;
   const double pixels = double(rays_.num_readout_lines()) * rays_.pixels_per_line();
-  const double scattered = optics_.veil * cv::sum(part)[0] / pixels;
-  part = part * (1 - optics_.veil);
+  const double scattered = optics_.veiling_glare * cv::sum(part)[0] / pixels;
+  part = part * (1 - optics_.veiling_glare);
   return static_cast<float>(scattered);
 }
 

@@ -80,7 +80,7 @@ cv::RNG make_seeded_random_generator(std::uint64_t seed, std::string_view name, 
   return cv::RNG(state[0] | std::uint64_t(state[1]) << 32);
 }
 
-std::uint64_t draw_random_seed(cv::RNG& random) {
+std::uint64_t draw_seed_from_generator(cv::RNG& random) {
   const std::uint64_t high = random.next();
   return high << 32 | random.next();
 }

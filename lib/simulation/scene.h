@@ -27,7 +27,7 @@ namespace vlp {
 cv::RNG make_seeded_random_generator(std::uint64_t seed, std::string_view name, std::size_t index);
 
 /// Draws a random number of 64 bits from `random`, for use as the seed of another generator.
-std::uint64_t draw_random_seed(cv::RNG& random);
+std::uint64_t draw_seed_from_generator(cv::RNG& random);
 
 /// Square wave that switches a lamp: lit while frac(frequency t + phase) < duty.
 struct SquareWave {
@@ -85,7 +85,7 @@ struct LampShots {
   double interval_s;
   /// True if captures.csv contains the exact camera position, as from a fixture that holds the
   /// camera itself.
-  bool known;
+  bool has_known_positions;
   /// Roll and pitch of the base at the first and at the last capture, linear in between, and their
   /// vibration.
   std::pair<double, double> roll_rad{0, 0}, pitch_rad{0, 0};
@@ -101,7 +101,7 @@ struct BoardViews {
   /// normal.
   double tilt_rad, roll_rad;
   /// Range of the board's center over the image: 0 for the image center, 1 up to the image edges.
-  double spread;
+  double field_coverage;
   /// Velocity of the board relative to the camera, in the camera frame.
   Eigen::Vector3d velocity_m_per_s;
 };
@@ -324,7 +324,7 @@ struct Optics {
   double vignetting_power;
   std::optional<Defocus> defocus = {};
   /// Fraction of the light of the whole scene that a veil spreads evenly over the image.
-  double veil = 0;
+  double veiling_glare = 0;
   std::vector<LensSmear> smears = {};
   std::vector<Dust> dust = {};
 };
@@ -391,7 +391,7 @@ struct Mount {
 
 /// Calibration board with its radiances and its warp.
 struct SceneBoard {
-  Board print;
+  Board pattern;
   double margin_m;
   /// Deflection into the paper at the center, along x and along y (calobject_warp of mrcal):
   ///   z = warp_x (1 - a^2) + warp_y (1 - b^2)
@@ -423,7 +423,7 @@ struct Scene {
   Camera camera;
   Optics optics;
   Sensor sensor;
-  std::optional<ImageProcessing> picture;
+  std::optional<ImageProcessing> processing;
   Mount mount;
   /// Radiance of the ceiling.
   double ambient_e_per_s;

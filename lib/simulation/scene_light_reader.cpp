@@ -254,16 +254,16 @@ std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room)
 
 Clutter read_scene_clutter(YamlMap& map, const std::vector<SceneLamp>& lamps, const Room& room) {
   Clutter clutter;
-  clutter.steady_lamps = map.convert_optional_yaml_mapping_list(
+  clutter.steady_lamps = map.convert_yaml_mapping_list_or_empty(
       "steady_lamps", [&](YamlMap& keys) { return read_steady_lamp(keys, room); });
-  clutter.windows = map.convert_optional_yaml_mapping_list("windows", read_panel);
-  clutter.reflections = map.convert_optional_yaml_mapping_list(
+  clutter.windows = map.convert_yaml_mapping_list_or_empty("windows", read_panel);
+  clutter.reflections = map.convert_yaml_mapping_list_or_empty(
       "reflections", [&](YamlMap& keys) { return read_reflection(keys, lamps, room); });
-  clutter.foreign_lights = map.convert_optional_yaml_mapping_list(
+  clutter.foreign_lights = map.convert_yaml_mapping_list_or_empty(
       "foreign_lights", [&](YamlMap& keys) { return read_foreign_light(keys, room); });
-  clutter.mirrors = map.convert_optional_yaml_mapping_list("mirrors", read_mirror);
-  clutter.blinds = map.convert_optional_yaml_mapping_list("blinds", read_venetian_blind);
-  clutter.signs = map.convert_optional_yaml_mapping_list("signs", read_sign);
+  clutter.mirrors = map.convert_yaml_mapping_list_or_empty("mirrors", read_mirror);
+  clutter.blinds = map.convert_yaml_mapping_list_or_empty("blinds", read_venetian_blind);
+  clutter.signs = map.convert_yaml_mapping_list_or_empty("signs", read_sign);
   clutter.ambient_flicker = map.convert_optional_yaml_mapping("ambient_flicker", read_mains);
   const double lowest_m = find_lowest_light_m(lamps, clutter);
   if (const auto occluders = map.get_optional_yaml_value("occluders")) {

@@ -85,8 +85,8 @@ Optics read_optics(YamlMap& map) {
           map.get_required_yaml_value("vignetting_power").read_yaml_number_within(0, 20, ""),
           map.convert_optional_yaml_mapping("defocus", read_defocus),
           map.get_optional_yaml_number("veil", 0, 1, "(of the light)").value_or(0),
-          map.convert_optional_yaml_mapping_list("smears", read_smear),
-          map.convert_optional_yaml_mapping_list("dust", read_dust)};
+          map.convert_yaml_mapping_list_or_empty("smears", read_smear),
+          map.convert_yaml_mapping_list_or_empty("dust", read_dust)};
 }
 
 Bloom read_bloom(YamlMap& map) {
@@ -156,12 +156,12 @@ Mount read_mount(YamlMap& map) {
 SceneBoard read_scene_board(YamlMap& map) {
   SceneBoard board;
   const YamlValue print = map.get_required_yaml_value("pattern");
-  board.print =
+  board.pattern =
       print.convert_yaml_mapping([](YamlMap& keys) { return read_board_from_yaml(keys); });
   board.margin_m = map.get_required_yaml_value("margin_m").read_yaml_number_within(0, 2, "m");
   constexpr double micrometers = 1e6;  // unit of the bound in messages
   const double tenth_m =
-      0.1 * compute_tag_pitch_m(board.print) * std::min(board.print.cols, board.print.rows);
+      0.1 * compute_tag_pitch_m(board.pattern) * std::min(board.pattern.cols, board.pattern.rows);
   const double max_warp_m = std::round(micrometers * tenth_m) / micrometers;
   board.warp_m = Eigen::Vector2d(map.get_required_yaml_value("warp_m")
                                      .read_yaml_numbers_within(2, -max_warp_m, max_warp_m, "m")
@@ -221,7 +221,7 @@ Scene read_scene_file(const std::filesystem::path& file) {
   scene.camera = document.get_required_yaml_value("camera").convert_yaml_mapping(read_scene_camera);
   scene.optics = document.get_required_yaml_value("optics").convert_yaml_mapping(read_optics);
   scene.sensor = document.get_required_yaml_value("sensor").convert_yaml_mapping(read_sensor);
-  scene.picture = document.convert_optional_yaml_mapping(
+  scene.processing = document.convert_optional_yaml_mapping(
       "processing", [&](YamlMap& map) { return read_image_processing(map, scene.sensor); });
   scene.mount = document.get_required_yaml_value("mount").convert_yaml_mapping(read_mount);
   scene.ambient_e_per_s = read_electron_rate(document, "ambient_e_per_s");

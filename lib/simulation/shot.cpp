@@ -19,7 +19,7 @@ namespace {
 std::string make_image_name(const Scene& scene, std::size_t index, std::size_t count) {
   const std::string number = std::to_string(index);
   const std::size_t digits = std::max<std::size_t>(4, std::to_string(count - 1).size());
-  return std::string(digits - number.size(), '0') + number + image_file_extension(scene.picture);
+  return std::string(digits - number.size(), '0') + number + image_file_extension(scene.processing);
 }
 
 Eigen::Matrix3d rotation(double angle_rad, const Eigen::Vector3d& axis) {
@@ -28,7 +28,7 @@ Eigen::Matrix3d rotation(double angle_rad, const Eigen::Vector3d& axis) {
 
 /// Indices of a capture's height, spot and yaw, and the time since the start of its pass.
 struct CaptureIndices {
-  std::size_t height, spot, yaw;
+  std::size_t height, pivot, yaw;
   double driven_s;
 };
 
@@ -70,8 +70,8 @@ Pose BaseMotion::camera_pose_at(double time_s) const {
 
 Inclination BaseMotion::base_inclination_at(double time_s) const {
   const double angle = phase_rad + 2 * std::numbers::pi * vibration.frequency_hz * time_s;
-  return {lean.roll_rad + vibration.amplitude_rad * std::sin(angle),
-          lean.pitch_rad + vibration.amplitude_rad * std::cos(angle)};
+  return {inclination.roll_rad + vibration.amplitude_rad * std::sin(angle),
+          inclination.pitch_rad + vibration.amplitude_rad * std::cos(angle)};
 }
 
 Eigen::Vector2d BaseMotion::camera_velocity_m_per_s() const {
@@ -110,7 +110,7 @@ LampShot make_simulated_lamp_capture(const Scene& scene, const CaptureSet& set, 
   shot.image = make_image_name(scene, index, count_captures_of_set(set));
   shot.time_s = static_cast<double>(index) * captures.interval_s;
   shot.exposure_s = set.exposure_s;
-  shot.motion.axis_m << captures.pivots_m[indices.spot], captures.heights_m[indices.height];
+  shot.motion.axis_m << captures.pivots_m[indices.pivot], captures.heights_m[indices.height];
   shot.motion.velocity_m_per_s.setZero();
   if (const auto& drive = captures.drive) {
     shot.motion.velocity_m_per_s =
@@ -125,7 +125,7 @@ LampShot make_simulated_lamp_capture(const Scene& scene, const CaptureSet& set, 
   const auto ramp = [&](const std::pair<double, double>& ends) {
     return ends.first + fraction * (ends.second - ends.first);
   };
-  shot.motion.lean = {ramp(captures.roll_rad), ramp(captures.pitch_rad)};
+  shot.motion.inclination = {ramp(captures.roll_rad), ramp(captures.pitch_rad)};
   shot.motion.vibration = captures.vibration;
   shot.motion.phase_rad = std::remainder(
       2 * std::numbers::pi * captures.vibration.frequency_hz * shot.time_s, 2 * std::numbers::pi);
@@ -137,7 +137,7 @@ LampShot make_simulated_lamp_capture(const Scene& scene, const CaptureSet& set, 
   for (const SceneLamp& lamp : scene.lamps) {
     shot.waves.push_back({lamp.frequency_hz, lamp.duty, draw_phase(lamp.phase, lamp.frequency_hz)});
   }
-  shot.noise_seed = draw_random_seed(random);
+  shot.noise_seed = draw_seed_from_generator(random);
   // Drawn last, so that the other random values equal those of a scene without such lights.
   for (const ForeignLight& light : scene.clutter.foreign_lights) {
     const double frequency_hz =
@@ -161,7 +161,7 @@ BoardShot make_simulated_board_capture(const Scene& scene, const CaptureSet& set
   const Eigen::Vector2d half((scene.camera.imager_px[0] - 1) / 2.0,
                              (scene.camera.imager_px[1] - 1) / 2.0);
   const Eigen::Vector2d offset =
-      views.spread * Eigen::Vector2d{fraction(), fraction()}.cwiseProduct(half);
+      views.field_coverage * Eigen::Vector2d{fraction(), fraction()}.cwiseProduct(half);
   const auto ray = find_last_ray(lens, half, offset);
   const Eigen::Vector3d sight =
       ray ? ray->direction.normalized() : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
@@ -178,11 +178,11 @@ BoardShot make_simulated_board_capture(const Scene& scene, const CaptureSet& set
   shot.camera_from_board_at_0.linear() =
       facing * rotation(tilt, tilt_axis) * rotation(roll, Eigen::Vector3d::UnitZ());
   Eigen::Vector3d middle_m(0, 0, 0);
-  middle_m.head<2>() = compute_tag_field_size_m(scene.board->print) / 2;
+  middle_m.head<2>() = compute_tag_field_size_m(scene.board->pattern) / 2;
   shot.camera_from_board_at_0.translation() =
       distance_m * sight - shot.camera_from_board_at_0.linear() * middle_m;
   shot.velocity_in_camera_m_per_s = views.velocity_m_per_s;
-  shot.noise_seed = draw_random_seed(random);
+  shot.noise_seed = draw_seed_from_generator(random);
   return shot;
 }
 

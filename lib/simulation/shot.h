@@ -47,7 +47,7 @@ struct BaseMotion {
   Mount mount;
   /// Roll and pitch of the base about the camera, in addition to the tilt of the mount, at time 0
   /// and without the vibration. The vibrations of roll and pitch are a quarter of a period apart.
-  Inclination lean{0, 0};
+  Inclination inclination{0, 0};
   Vibration vibration{0, 0};
   /// Phase of the vibration at time 0.
   double phase_rad = 0;
@@ -56,7 +56,7 @@ struct BaseMotion {
     return velocity_m_per_s.isZero(0) && turn_rate_rad_per_s == 0 && vibration.amplitude_rad == 0;
   }
   bool is_base_level() const {
-    return lean.roll_rad == 0 && lean.pitch_rad == 0 && vibration.amplitude_rad == 0;
+    return inclination.roll_rad == 0 && inclination.pitch_rad == 0 && vibration.amplitude_rad == 0;
   }
   Inclination base_inclination_at(double time_s) const;
   /// Returns the velocity of the camera, on its lever arm, in the world at time 0.

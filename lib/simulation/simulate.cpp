@@ -48,14 +48,14 @@ void write_common_files(const Scene& scene, const fs::path& output) {
     write_lamp_map(output / "lamps.yaml", make_scene_lamp_map(scene, true));
     write_lamp_map(output / "true_lamps.yaml", make_scene_lamp_map(scene, false));
   }
-  if (scene.board) write_board(output / "board.yaml", scene.board->print);
+  if (scene.board) write_board(output / "board.yaml", scene.board->pattern);
   write_calibration(output / "true_calibration.yaml", make_true_calibration(scene));
 }
 
 void write_image(const fs::path& file, const cv::Mat& lines, const Scene& scene) {
   const bool by_rows = scene.camera.readout == Readout::rows;
   const auto bytes =
-      encode_image_as_jpeg_or_png(by_rows ? lines : cv::Mat(lines.t()), scene.picture);
+      encode_image_as_jpeg_or_png(by_rows ? lines : cv::Mat(lines.t()), scene.processing);
   write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
@@ -65,7 +65,7 @@ bool render_capture(const Scene& scene, const FrameRenderer& renderer, const Cap
   const auto write = [&](const std::string& image, const auto& electrons, std::uint64_t seed) {
     if (fs::exists(folder / image)) return false;
     write_image(folder / image,
-                simulate_sensor_image(scene.sensor, electrons(), seed, scene.picture), scene);
+                simulate_sensor_image(scene.sensor, electrons(), seed, scene.processing), scene);
     return true;
   };
   if (set.board) {
@@ -85,7 +85,8 @@ double compute_level(const Scene& scene, const CaptureSet& set, double electron_
   const double level =
       sensor.black_level_dn +
       sensor.gain_dn_per_e * std::min(electron_rate_e_per_s * set.exposure_s, sensor.full_well_e);
-  return scene.picture ? apply_tone_curve_to_gray_level(*scene.picture, sensor, level) : level;
+  return scene.processing ? apply_tone_curve_to_gray_level(*scene.processing, sensor, level)
+                          : level;
 }
 
 std::string whole(double value) { return std::to_string(std::lround(value)); }
@@ -191,7 +192,7 @@ SimulationSummary render_scene_to_folder(const Scene& scene, const fs::path& out
     parallel_for(count_captures_of_set(set), options.threads, [&](std::size_t index) {
       const bool rendered = render_capture(scene, renderer, set, index, folder);
       const std::lock_guard lock(counting);
-      ++(rendered ? summary.rendered : summary.found);
+      ++(rendered ? summary.rendered : summary.existing);
       progress(summary, total);
     });
   }

@@ -38,7 +38,7 @@ struct SimulationSummary {
   std::vector<std::string> warnings;
   std::size_t rendered = 0;
   /// Number of complete images that existed from an earlier execution.
-  std::size_t found = 0;
+  std::size_t existing = 0;
 };
 
 /// Callback after each capture. Calls do not overlap.

@@ -98,7 +98,7 @@ GlowPoints sample_surface_points(const Glow& glow) {
 /// Image of a glow's center and the visible fraction of the glow, directly or by a mirror.
 struct GlowImage {
   Eigen::Vector2d pixel;
-  double in_view;
+  double visible_fraction;
 };
 
 template <typename Motion>
@@ -170,7 +170,7 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
   CsvWriter truth(folder / "truth.csv", columns);
   CsvWriter detections(folder / "true_detections.csv",
                        {"image", "lamp", "u_px", "v_px", "in_view"});
-  const bool known = set.lamps->known;
+  const bool known = set.lamps->has_known_positions;
   CsvWriter captures(
       folder / "captures.csv",
       known ? std::initializer_list<std::string_view>{"image", "time_s", "x_m", "y_m", "z_m"}
@@ -231,7 +231,7 @@ std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
   CsvWriter boards(folder / "true_boards.csv",
                    {"image", "x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"});
   std::vector<std::string> columns{"image", "tag", "corner", "u_px", "v_px"};
-  if (scene.board->print.has_chessboard_squares()) columns.erase(columns.begin() + 1);
+  if (scene.board->pattern.has_chessboard_squares()) columns.erase(columns.begin() + 1);
   CsvWriter corners(folder / "true_corners.csv", columns);
   std::size_t empty = 0;
   for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
@@ -264,7 +264,7 @@ std::vector<TrueLamp> find_true_lamps_in_image(const Scene& scene, const FrameRe
   std::vector<TrueLamp> lamps;
   for (const SceneLamp& lamp : scene.lamps) {
     const auto glow_image = find_glow_image(scene, renderer, shot, lamp.glow);
-    if (glow_image) lamps.push_back({lamp.id, glow_image->pixel, glow_image->in_view});
+    if (glow_image) lamps.push_back({lamp.id, glow_image->pixel, glow_image->visible_fraction});
   }
   return lamps;
 }
@@ -277,14 +277,14 @@ std::vector<TrueOtherLight> find_true_other_lights_in_image(const Scene& scene,
     for (const SceneLamp& lamp : scene.lamps) {
       const auto image = find_glow_image(scene, renderer, shot, lamp.glow, &mirror);
       if (!image) continue;
-      lights.push_back({"mirror_image", lamp.id, image->pixel, image->in_view});
+      lights.push_back({"mirror_image", lamp.id, image->pixel, image->visible_fraction});
     }
   }
   for (const ForeignLight& light : scene.clutter.foreign_lights) {
     const auto image = find_glow_image(scene, renderer, shot, light.glow);
     if (!image) continue;
     const bool is_pwm = std::holds_alternative<SquareWave>(light.wave);
-    lights.push_back({is_pwm ? "pwm" : "mains", {}, image->pixel, image->in_view});
+    lights.push_back({is_pwm ? "pwm" : "mains", {}, image->pixel, image->visible_fraction});
   }
   return lights;
 }
@@ -301,7 +301,7 @@ std::vector<TrueCorner> find_true_corners_in_image(const Scene& scene,
                                      camera_from_board, point_m);
     if (at && is_in_image(scene.camera, at->pixel)) corners.push_back({tag, corner, at->pixel});
   };
-  const Board& print = scene.board->print;
+  const Board& print = scene.board->pattern;
   if (print.has_chessboard_squares()) {
     const auto corners_m = list_chessboard_corners_m(print);
     for (std::size_t i = 0; i < corners_m.size(); ++i) add({}, static_cast<int>(i), corners_m[i]);

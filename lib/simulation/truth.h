@@ -21,7 +21,7 @@ struct TrueLamp {
   Eigen::Vector2d pixel;
   /// Fraction of the lamp that is inside the image and not hidden, from some 200 points spread over
   /// it.
-  double in_view;
+  double visible_fraction;
 };
 
 /// Returns the lamps that are at least partly in view and whose center the lens describes. The
@@ -40,7 +40,7 @@ struct TrueOtherLight {
   Eigen::Vector2d pixel;
   /// Fraction of the light that is inside the image, not hidden and, for a mirror image, within the
   /// pane.
-  double in_view;
+  double visible_fraction;
 };
 
 /// Returns the mirror images and foreign lights that are at least partly in view and whose center

@@ -116,7 +116,7 @@ std::string derive_database_identity(const std::string& where) {
          stated("service", " of the service ");
 }
 
-std::string make_database_connection_string(const std::string& where) {
+std::string make_soci_connection_string_from_address(const std::string& where) {
   std::string connection;
   for (const char c : where) {
     if (c == ' ') {
@@ -135,7 +135,7 @@ std::string make_database_connection_string(const std::string& where) {
 }
 
 bool is_database_server_responding(const std::string& where) {
-  const std::string connection = make_database_connection_string(where);
+  const std::string connection = make_soci_connection_string_from_address(where);
   const std::array keywords{"dbname", "sslmode", kPatience, static_cast<const char*>(nullptr)};
   const std::array values{connection.c_str(), "prefer", "2", static_cast<const char*>(nullptr)};
   return PQpingParams(keywords.data(), values.data(), 1) == PQPING_OK;

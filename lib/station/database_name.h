@@ -40,7 +40,7 @@ std::string derive_database_identity(const std::string& where);
 /// Returns a connection string for SOCI's PostgreSQL backend, with the connection timeout
 /// get_database_timeout_s(). SOCI 4.0 reads a string without a parameter as a database name and
 /// interprets blanks and quotes itself. Precondition: is_database_server_address().
-std::string make_database_connection_string(const std::string& where);
+std::string make_soci_connection_string_from_address(const std::string& where);
 
 /// Returns true if a server answers, regardless of user and database. A server that refuses a
 /// password, or does not support the requested TLS, answers, too. Waits at most two seconds.

@@ -42,11 +42,11 @@ CompletionCriteria read_completion_criteria(YamlMap map) {
   CompletionCriteria sufficient;
   read_optional_into(map, "board_views", sufficient.board_views);
   read_optional_into(map, "board_coverage", sufficient.board_coverage, 1, "(share)");
-  read_optional_into(map, "turn_captures", sufficient.turn_captures);
-  read_optional_into(map, "turn_heights", sufficient.turn_heights);
-  double arc_deg = deg_from_rad(sufficient.turn_arc_rad);
+  read_optional_into(map, "turn_captures", sufficient.rotation_captures);
+  read_optional_into(map, "turn_heights", sufficient.rotation_heights);
+  double arc_deg = deg_from_rad(sufficient.rotation_arc_rad);
   read_optional_into(map, "turn_arc_deg", arc_deg, 360, "degrees");
-  sufficient.turn_arc_rad = rad_from_deg(arc_deg);
+  sufficient.rotation_arc_rad = rad_from_deg(arc_deg);
   read_optional_into(map, "dispersion_captures", sufficient.dispersion_captures);
   read_optional_into(map, "check_captures", sufficient.check_captures);
   map.check_all_yaml_keys_read();
@@ -112,12 +112,12 @@ void read_guard_bands(YamlMap map, std::vector<Gate>& gates) {
     ++found;
     const double u = value->read_yaml_number_within(0, max_u, "(in the gate's unit)");
     if (!(u > 0)) throw value->make_yaml_error("should be above 0");
-    gate.guard = GuardBand{u, k};
+    gate.guard_band = GuardBand{u, k};
     const MetricKind kind = find_metric_kind(gate.metric).value();
     const double accepted =
-        CheckedMetric{gate.metric, "", {}, gate.limit, kind.direction, gate.guard}
+        CheckedMetric{gate.metric, "", {}, gate.limit, kind.direction, gate.guard_band}
             .acceptance_limit();
-    if (accepted >= 0 && accepted <= kind.largest) continue;
+    if (accepted >= 0 && accepted <= kind.max_limit) continue;
     throw value->make_yaml_error(
         "leaves no value within the gate: k times this uncertainty exceeds the limit; lower k");
   }
@@ -128,7 +128,7 @@ void read_guard_bands(YamlMap map, std::vector<Gate>& gates) {
 
 GoldenUnit read_golden(YamlMap map, Files& files) {
   const YamlValue camera = map.get_required_yaml_value("camera_id");
-  if (!Id::is_valid_id(camera.read_yaml_text()))
+  if (!Id::is_valid_name_of_camera_or_run(camera.read_yaml_text()))
     throw camera.make_yaml_error("is no id of a camera: it names a folder");
   GoldenUnit golden{camera.read_yaml_text(), {}, {}};
   const YamlValue calibration = map.get_required_yaml_value("calibration");
@@ -267,7 +267,7 @@ std::string read_records_address(const YamlValue& value, const fs::path& file) {
 /// Reads the camera type and the targets that it observes: board, lamps and known position.
 void read_camera_and_targets(YamlMap& document, Files& files, StationConfig& config) {
   const YamlValue type = document.get_required_yaml_value("camera_type");
-  config.type = read_row_time_and_readout(type, files).camera;
+  config.nominal_camera = read_row_time_and_readout(type, files).camera;
   config.type_file = fs::path(type.read_yaml_text()).filename().string();
   const YamlValue board = document.get_required_yaml_value("board");
   config.board = read_board(files(board));
@@ -285,7 +285,7 @@ void read_camera_and_targets(YamlMap& document, Files& files, StationConfig& con
 /// Reads the conditions of a verdict: completion, rejection of images, gates and golden unit.
 void read_verdict_conditions(YamlMap& document, Files& files, StationConfig& config) {
   if (const auto sufficient = document.get_optional_yaml_value("completion"))
-    config.sufficient = read_completion_criteria(sufficient->read_yaml_mapping());
+    config.completion = read_completion_criteria(sufficient->read_yaml_mapping());
   if (const auto refuse = document.get_optional_yaml_value("rejection"))
     read_rejection_limits(refuse->read_yaml_mapping(), config);
   config.gates = read_gates(document.get_required_yaml_value("gates"), list_unit_metrics());
@@ -293,11 +293,12 @@ void read_verdict_conditions(YamlMap& document, Files& files, StationConfig& con
     read_guard_bands(guard->read_yaml_mapping(), config.gates);
   }
   if (const auto golden = document.get_optional_yaml_value("golden")) {
-    config.golden = read_golden(golden->read_yaml_mapping(), files);
+    config.golden_unit = read_golden(golden->read_yaml_mapping(), files);
   }
   if (const auto due = document.get_optional_yaml_value("verify_due")) {
-    if (!config.golden) throw due->make_yaml_error("needs a golden unit: add the key 'golden'");
-    config.verify_due = read_verification_interval(due->read_yaml_mapping());
+    if (!config.golden_unit)
+      throw due->make_yaml_error("needs a golden unit: add the key 'golden'");
+    config.verification_interval = read_verification_interval(due->read_yaml_mapping());
   }
 }
 
@@ -324,7 +325,7 @@ void read_storage(YamlMap& document, StationConfig& config) {
   const auto spool = document.get_optional_yaml_value("spool");
   config.spool = spool ? resolve_path(*spool, file) : file.parent_path() / "spool";
   if (const auto keep = document.get_optional_yaml_value("retention"))
-    config.keep = read_retention(keep->read_yaml_mapping());
+    config.retention = read_retention(keep->read_yaml_mapping());
 }
 
 }  // namespace

@@ -23,9 +23,9 @@ struct CompletionCriteria {
   double board_coverage = 0.6;
   /// Number of captures at each height of the rotation, number of heights, and angular range
   /// covered at each height.
-  int turn_captures = 12;
-  int turn_heights = 2;
-  double turn_arc_rad = 5.2;
+  int rotation_captures = 12;
+  int rotation_heights = 2;
+  double rotation_arc_rad = 5.2;
   int dispersion_captures = 40;
   int check_captures = 36;
 };
@@ -69,7 +69,7 @@ struct StationConfig {
   std::filesystem::path file;
   /// Type of the cameras: imager, lens model, row time and readout, with the nominal lens as
   /// intrinsics.
-  Camera type;
+  Camera nominal_camera;
   /// File name of `type`, for messages.
   std::string type_file;
   Board board;
@@ -77,17 +77,17 @@ struct StationConfig {
   /// Position (x, y) of the camera in the world in the step `dispersion`, unless its captures.csv
   /// contains positions.
   std::optional<Eigen::Vector2d> dispersion_position_m;
-  CompletionCriteria sufficient;
+  CompletionCriteria completion;
   /// Acceptance limits of images.
   FrontendOptions frontend;
   /// Number of consecutive rejected images after which a step is aborted.
   int max_consecutive_rejections = 12;
   /// Gates, with guard bands if `guard_bands` contains standard uncertainties.
   std::vector<Gate> gates;
-  std::optional<GoldenUnit> golden;
+  std::optional<GoldenUnit> golden_unit;
   /// Limits after which the golden unit has to be measured again; std::nullopt: none. Requires a
   /// golden unit.
-  std::optional<VerificationInterval> verify_due;
+  std::optional<VerificationInterval> verification_interval;
   /// ECMAScript regular expression that the whole serial of a unit must match; empty if every
   /// serial is valid.
   std::string serial_pattern;
@@ -106,7 +106,7 @@ struct StationConfig {
   /// station.yaml.
   std::filesystem::path spool;
   std::optional<Hook> hook;
-  Retention keep;
+  Retention retention;
 };
 
 /// Returns the reason why a text is no valid camera id, which names folders; empty if it is valid.

@@ -17,7 +17,7 @@ void create_station_folder(const fs::path& folder) {
   if (error) throw InputError(folder, "cannot be made: " + error.message());
 }
 
-void check_folder_writable_and_space(const SharedFolder& folder, std::uintmax_t bytes) {
+void require_writable_folder_with_space(const SharedFolder& folder, std::uintmax_t bytes) {
   constexpr double megabyte = 1e6;
   std::error_code error;
   const fs::space_info space = fs::space(folder.folder_path(), error);

@@ -107,9 +107,9 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
                      const BoardDetector& detector, const Development& development) {
   scene.sensor = sensor_behind(scene.sensor, development.picture);
   LensInput input;
-  input.board = scene.board->print;
+  input.board = scene.board->pattern;
   input.camera = scene.camera;
-  input.seen.images.resize(electrons.size());
+  input.observations.images.resize(electrons.size());
   const auto threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   const double holds_e = std::min(scene.sensor.full_well_e, (sensor_white_level_dn(scene.sensor) -
                                                              scene.sensor.black_level_dn) /
@@ -121,17 +121,17 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
     cv::Mat1f lit;
     electrons[i].convertTo(lit, CV_32F, exposures);
     const cv::Mat image = developed(scene, lit, shot.noise_seed, development.picture);
-    input.seen.images[i] =
+    input.observations.images[i] =
         observed({shot.image, {image.cols, image.rows}, detector.detect_board(image)});
   });
   std::size_t tags = 0, usable = 0;
-  for (const BoardView& view : collect_kept_board_views(input.seen.images)) {
-    usable += view.seen.tags.size();
-    tags += view.seen.tags.size() + static_cast<std::size_t>(view.seen.unusable);
+  for (const BoardView& view : collect_kept_board_views(input.observations.images)) {
+    usable += view.detection.tags.size();
+    tags += view.detection.tags.size() + static_cast<std::size_t>(view.detection.num_unusable_tags);
   }
   const BoardLattice lattice(input.board);
-  for (Observation& image : input.seen.images) {
-    if (lattice.are_corners_sufficient_for_pose(image.board->seen)) continue;
+  for (Observation& image : input.observations.images) {
+    if (lattice.are_corners_sufficient_for_pose(image.board->detection)) continue;
     image.set_image_rejection(RejectionReason::too_few_corners, "shows too little of the board");
   }
   const LensResult result = run_lens_calibration_step(input, {});
@@ -154,7 +154,8 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
       difference->rms_px / result.lens.report.expected_rms_px,
       std::max(result.lens.report.uncertainty_worst_px, result.lens.report.uncertainty_beyond_px),
       result.lens.report.uncertainty_worst_px, result.lens.solution.rms_px,
-      upper_median(result.lens.solution.edge_shifts_px), result.lens.gamma, detected_percent, tags);
+      upper_median(result.lens.solution.edge_displacements_px), result.lens.gamma, detected_percent,
+      tags);
 }
 
 void try_seed(Scene scene, std::uint64_t seed, int views, const std::string& wanted) {
@@ -162,7 +163,7 @@ void try_seed(Scene scene, std::uint64_t seed, int views, const std::string& wan
   CaptureSet boards = *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
   if (views > 0) boards.board->count = views;
   const FrameRenderer renderer(scene);
-  const BoardDetector detector(scene.board->print);
+  const BoardDetector detector(scene.board->pattern);
   std::vector<cv::Mat1f> electrons(count_captures_of_set(boards));
   parallel_for(
       electrons.size(), static_cast<int>(std::thread::hardware_concurrency()), [&](std::size_t i) {

@@ -283,7 +283,7 @@ Trial try_lamps(const Cell& cell, Random& random) {
   }
   const TiltResult result = run_tilt_calibration_step(input, false, {});
   Trial trial = make_trial(result);
-  if (trial.has_result) add_center_errors(trial, result.leveling.center, room.center());
+  if (trial.has_result) add_center_errors(trial, result.tilt.center, room.center());
   return trial;
 }
 
@@ -305,7 +305,7 @@ Trial try_dispersion(const Cell& cell, Random& random, DispersionMethod method) 
     const Pose pose{{station_m.x(), station_m.y(), z_m}, room.draw_yaw(k)};
     exact.push_back({room.exact_detections(pose), station_m});
     places.captures.push_back({room.draw_noise(exact.back().detections), station_m});
-    places.of.push_back(PlaceOf::camera);
+    places.measured_points.push_back(MeasuredPoint::camera);
     input.frames.push_back({std::to_string(k), places.captures.back().detections});
   }
   const DispersionResult result =
@@ -343,9 +343,9 @@ Trial try_adjustment(const Cell& cell, Random& random) {
     measured.x_m = turn.axis_m.x() + kPlaceSd_m * random.normal();
     measured.y_m = turn.axis_m.y() + kPlaceSd_m * random.normal();
     measured.z_m = turn.heights_m[height] + kPlaceSd_m * random.normal();
-    measured.place = PlaceOf::axis;
-    measured.place_sd_m = kPlaceSd_m;
-    measured.spot = std::to_string(height);
+    measured.measured_point = MeasuredPoint::axis;
+    measured.position_sd_m = kPlaceSd_m;
+    measured.pivot = std::to_string(height);
     for (int k = 0; k < cell.captures; ++k) {
       const std::string image = std::to_string(set.frames.size());
       const Pose pose = turn.pose(height, room.draw_yaw(k));
@@ -357,8 +357,8 @@ Trial try_adjustment(const Cell& cell, Random& random) {
   const AdjustStepResult result = run_joint_adjustment_step(input, {});
   Trial trial = make_trial(result);
   if (!trial.has_result) return trial;
-  add_center_errors(trial, result.found.center, room.center());
-  add_lever_arm_errors(trial, result.found.center, turn.lever_arm_m);
+  add_center_errors(trial, result.adjustment.center, room.center());
+  add_lever_arm_errors(trial, result.adjustment.center, turn.lever_arm_m);
   return trial;
 }
 

@@ -137,8 +137,8 @@ class Trials {
         motion.yaw_rad = random.uniform(-3.1, 3.1);
         motion.velocity_m_per_s.setZero();
         motion.turn_rate_rad_per_s = 0;
-        motion.lean = {rad_from_deg(random.uniform(-max_deg, max_deg)),
-                       rad_from_deg(random.uniform(-max_deg, max_deg))};
+        motion.inclination = {rad_from_deg(random.uniform(-max_deg, max_deg)),
+                              rad_from_deg(random.uniform(-max_deg, max_deg))};
         const auto detections = detections_in(renderer, detector, shot);
         if (detections.size() < 4) continue;
         const Fix fix = positioner.compute_position_fix(detections, in_hand);
@@ -200,7 +200,7 @@ class Trials {
         captures_seen.push_back(std::move(seen));
         for (const TrueLamp& lamp : find_true_lamps_in_image(scene_, renderer, shot)) {
           for (const Detection& detection : detections) {
-            if (detection.lamp != lamp.id || lamp.in_view < 1) continue;
+            if (detection.lamp != lamp.id || lamp.visible_fraction < 1) continue;
             centers.add(detection.pixel - lamp.pixel, image_motion);
           }
         }

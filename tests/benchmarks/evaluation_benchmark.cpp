@@ -76,7 +76,7 @@ void evaluate_fixes(benchmark::State& state) {
       written(static_cast<std::size_t>(state.range(0)), static_cast<std::size_t>(state.range(1)));
   EvaluationInput input;
   input.fixes = {tables.fixes, read_fixes(tables.fixes)};
-  input.truth = FromFile<TruthRow>{tables.truth, read_truth_table(tables.truth)};
+  input.truth = FileRows<TruthRow>{tables.truth, read_truth_table(tables.truth)};
   input.threads = 2;
   for (auto _ : state) benchmark::DoNotOptimize(evaluate_fix_accuracy(input));
 }

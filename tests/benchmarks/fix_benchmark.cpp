@@ -73,7 +73,7 @@ void fix_with_the_common_part(benchmark::State& state) {
   SyntheticRig& rig = scene.rig;
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 1);
   rig.calibration.rotation_center->covariance = 1e-4 * Eigen::Matrix2d::Identity();
-  rig.calibration.rotation_center->by_intrinsics = MatrixX::Constant(2, 12, 1e-3);
+  rig.calibration.rotation_center->jacobian_wrt_intrinsics = MatrixX::Constant(2, 12, 1e-3);
   rig.calibration.intrinsics_report = IntrinsicsReport{40, 4000, 0, 0.1, {}, {}, {}};
   rig.calibration.intrinsics_report->covariance = 1e-6 * MatrixX::Identity(12, 12);
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.001;

@@ -47,10 +47,10 @@ std::vector<Light> detect_lights(const LightDetector& detector, const cv::Mat& i
 /// Returns the image of a shot as read from a file: gray, rows from the top.
 cv::Mat render_image(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot) {
   cv::Mat image = simulate_sensor_image(scene.sensor, renderer.render_lamps_in_electrons(shot),
-                                        shot.noise_seed, scene.picture);
+                                        shot.noise_seed, scene.processing);
   if (scene.camera.readout == Readout::columns) image = image.t();
-  if (!scene.picture) return image;
-  return cv::imdecode(encode_image_as_jpeg_or_png(image, scene.picture),
+  if (!scene.processing) return image;
+  return cv::imdecode(encode_image_as_jpeg_or_png(image, scene.processing),
                       cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
 }
 
@@ -129,7 +129,7 @@ class Score {
       extents.push_back(compute_extent(scene, renderer, shot, *in_scene, lamp.pixel));
     }
     for (std::size_t i = 0; i < truth.size(); ++i) {
-      if (truth[i].in_view == 1) add_lamp(truth[i], extents[i], lights);
+      if (truth[i].visible_fraction == 1) add_lamp(truth[i], extents[i], lights);
     }
     for (const Light& light : lights) {
       if (light.kind != LightKind::lamp) continue;
@@ -235,7 +235,7 @@ void try_shot(const Scene& scene, const FrameRenderer& renderer, const LightDete
       level_rotation_from_inclination(shot.motion.base_inclination_at(0)) *
       scene.mount.level_from_camera;
   score.add(scene, renderer, shot,
-            detect_lights(detector.copy_detector_with_tilt(level_from_camera), image));
+            detect_lights(detector.copy_detector_for_camera_tilt(level_from_camera), image));
 }
 
 LightDetector make_detector_for_image(const Scene& scene) {
@@ -318,7 +318,7 @@ class ForeignScene {
     set_.lamps->pivots_m = {{random_.uniform(-0.7, 0.7), random_.uniform(-0.3, 0.3)}};
     set_.lamps->heights_m = {random_.uniform(0.0, 0.7)};
     set_.lamps->yaws_rad = {random_.uniform(0.0, 2 * std::numbers::pi)};
-    scene_.seed = draw_random_seed(random_);
+    scene_.seed = draw_seed_from_generator(random_);
     draw_clutter();
     draw_random_scene_parts(scene_);
     return make_simulated_lamp_capture(scene_, set_, 0);

@@ -35,12 +35,12 @@ TEST(ReadCapturesCsv, ReadsReferencePointPositionSdAndPivotColumns) {
   const auto captures = read_captures_csv(folder.file(
       "captures.csv",
       "image,x_m,y_m,reference_point,position_sd_m,pivot\na,1,2,axis,0.001,s1\nb,1,2,,,\n"));
-  EXPECT_EQ(captures.at("a").place, PlaceOf::axis);
-  EXPECT_EQ(captures.at("a").place_sd_m, 0.001);
-  EXPECT_EQ(captures.at("a").spot, "s1");
-  EXPECT_EQ(captures.at("b").place, PlaceOf::camera);
-  EXPECT_FALSE(captures.at("b").place_sd_m);
-  EXPECT_TRUE(captures.at("b").spot.empty());
+  EXPECT_EQ(captures.at("a").measured_point, MeasuredPoint::axis);
+  EXPECT_EQ(captures.at("a").position_sd_m, 0.001);
+  EXPECT_EQ(captures.at("a").pivot, "s1");
+  EXPECT_EQ(captures.at("b").measured_point, MeasuredPoint::camera);
+  EXPECT_FALSE(captures.at("b").position_sd_m);
+  EXPECT_TRUE(captures.at("b").pivot.empty());
 }
 
 TEST(ReadCapturesCsv, RejectsFormerColumnStatingItsPresentName) {

@@ -123,8 +123,8 @@ TEST(WriteFixes, WritesNoiseSdsAndRejectedLampsOnlyWhenGiven) {
   FixRow whole = plain;
   whole.image = "b";
   whole.fix->noise_sd = Eigen::Vector4d(0.25, 0.25, 0.5, 0.125);
-  whole.rejected = {7, 12};
-  whole.outside_region = {3, 5};
+  whole.rejected_lamps = {7, 12};
+  whole.lamps_outside_region = {3, 5};
   write_fixes(folder / "plain.csv", {plain});
   EXPECT_THAT(folder.read_content(folder / "plain.csv"),
               testing::Not(testing::HasSubstr("x_noise_sd_m")));
@@ -138,10 +138,10 @@ TEST(WriteFixes, WritesNoiseSdsAndRejectedLampsOnlyWhenGiven) {
   ASSERT_TRUE(read[0].fix && read[1].fix);
   EXPECT_FALSE(read[0].fix->noise_sd);
   EXPECT_EQ(read[1].fix->noise_sd, whole.fix->noise_sd);
-  EXPECT_TRUE(read[0].rejected.empty());
-  EXPECT_EQ(read[1].rejected, whole.rejected);
-  EXPECT_TRUE(read[0].outside_region.empty());
-  EXPECT_EQ(read[1].outside_region, whole.outside_region);
+  EXPECT_TRUE(read[0].rejected_lamps.empty());
+  EXPECT_EQ(read[1].rejected_lamps, whole.rejected_lamps);
+  EXPECT_TRUE(read[0].lamps_outside_region.empty());
+  EXPECT_EQ(read[1].lamps_outside_region, whole.lamps_outside_region);
 }
 
 TEST(ReadFixes, RejectsInvalidIdsOfRejectedLamps) {

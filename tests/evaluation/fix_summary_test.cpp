@@ -26,11 +26,11 @@ TEST(SummarizeFixes, ReturnsCountsAndMediansOfFixes) {
   EXPECT_EQ(summary.fixes, 3);
   EXPECT_EQ(summary.failures_by_status.at("degenerate"), 2);
   EXPECT_EQ(summary.failures_by_status.at("too_few_lamps"), 1);
-  ASSERT_TRUE(summary.typical);
-  EXPECT_EQ(summary.typical->min_lamps, 2);
-  EXPECT_EQ(summary.typical->max_lamps, 5);
-  EXPECT_DOUBLE_EQ(summary.typical->mean_lamps, 10.0 / 3);
-  EXPECT_EQ(summary.typical->median_residual_px, 1);  // of 3 and 1, the lower
+  ASSERT_TRUE(summary.statistics);
+  EXPECT_EQ(summary.statistics->min_lamps, 2);
+  EXPECT_EQ(summary.statistics->max_lamps, 5);
+  EXPECT_DOUBLE_EQ(summary.statistics->mean_lamps, 10.0 / 3);
+  EXPECT_EQ(summary.statistics->median_residual_px, 1);  // of 3 and 1, the lower
   ASSERT_TRUE(summary.median_sd);
   EXPECT_EQ(summary.median_sd->horizontal_m, 10);
   EXPECT_EQ(summary.median_sd->height_m, 2);
@@ -38,11 +38,11 @@ TEST(SummarizeFixes, ReturnsCountsAndMediansOfFixes) {
 }
 
 TEST(SummarizeFixes, OmitsStatisticsWithoutFixesOrReportedSds) {
-  EXPECT_FALSE(summarize_fixes({}).typical);
+  EXPECT_FALSE(summarize_fixes({}).statistics);
   FixRow without_sd = row(3, 1, 1);
   without_sd.fix->sd.reset();
   const FixSummary summary = summarize_fixes({&without_sd, 1});
-  EXPECT_TRUE(summary.typical);
+  EXPECT_TRUE(summary.statistics);
   EXPECT_FALSE(summary.median_sd);
 }
 

@@ -27,7 +27,7 @@ Evaluation evaluation() {
                       {"b", "ok", FixRow::Fix{{{0, -2e-3, 0}, 0}, {}, 0}, 3},
                       {"c", "ok", FixRow::Fix{{{0, 6e-3, 0}, 0}, {}, 0}, 3},
                       {"d", "degenerate", {}, 0}};
-  input.truth = FromFile<TruthRow>{
+  input.truth = FileRows<TruthRow>{
       "truth.csv",
       {{"a", {0, 0}, 0, {}}, {"b", {0, 0}, {}, {}}, {"c", {0, 0}, {}, {}}, {"d", {0, 0}, {}, {}}}};
   return evaluate_fix_accuracy(input);

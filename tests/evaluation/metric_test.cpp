@@ -19,7 +19,7 @@ TEST(ListMetricKinds, ReturnsUniqueNamesAndNonEmptyDescriptions) {
   for (const MetricKind& kind : kinds) {
     EXPECT_TRUE(names.insert(kind.name).second) << kind.name;
     EXPECT_STRNE(kind.cause, "");
-    EXPECT_STRNE(kind.meaning, "");
+    EXPECT_STRNE(kind.description, "");
     EXPECT_EQ(find_metric_kind(kind.name).value().name, kind.name);
     const std::string unit = kind.unit;
     if (unit == "mm" || unit == "px" || unit == "deg") {

@@ -20,7 +20,7 @@ EvaluationInput draw_run(std::size_t count, unsigned seed, double height_scale =
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   EvaluationInput input;
-  input.truth = FromFile<TruthRow>{"truth.csv", {}};
+  input.truth = FileRows<TruthRow>{"truth.csv", {}};
   for (std::size_t i = 0; i < count; ++i) {
     const std::string image = std::to_string(i);
     const double x_m = static_cast<double>(i);

@@ -61,12 +61,12 @@ TEST(MakeSampleSizeWarnings, WarnsForFewerThanFiftyStations) {
 TEST(MakeCrlbWarning, WarnsIfErrorsAreSignificantlyBelowCrlb) {
   Evaluation limited = evaluation(1000);
   EXPECT_EQ(make_crlb_warning(limited), "");
-  limited.limit = CrlbRatio{0.609, 1e-3, 36, 1.0 / 12};
+  limited.crlb_ratio = CrlbRatio{0.609, 1e-3, 36, 1.0 / 12};
   EXPECT_THAT(make_crlb_warning(limited),
               AllOf(HasSubstr("0.609 times the theoretical limit: either the stated pixel noise is "
                               "too large, or the fixes use more information than one image"),
                     Not(HasSubstr("nothing beats"))));
-  limited.limit->horizontal = 0.9;
+  limited.crlb_ratio->horizontal = 0.9;
   EXPECT_EQ(make_crlb_warning(limited), "");
 }
 

@@ -61,7 +61,7 @@ TEST_F(BoardIntakeOfFolder, KeepsSharpImage) {
   const Observation image = observe(good);
   EXPECT_TRUE(image.is_image_kept()) << image.rejection->message;
   ASSERT_TRUE(image.board);
-  EXPECT_GE(image.board->seen.tags.size(), 20U);
+  EXPECT_GE(image.board->detection.tags.size(), 20U);
   EXPECT_EQ(image.size_px, (std::array{800, 600}));
   ASSERT_TRUE(image.blur_px);
   EXPECT_LT(*image.blur_px, 1.5);
@@ -151,7 +151,8 @@ TEST_F(BoardIntakeOfFolder, ReturnsSameCornersWithOneAndFourThreads) {
         << one.images[i].image_file_name();
     ASSERT_EQ(one.images[i].board.has_value(), four.images[i].board.has_value());
     if (!one.images[i].board) continue;
-    const auto &tags = one.images[i].board->seen.tags, &others = four.images[i].board->seen.tags;
+    const auto &tags = one.images[i].board->detection.tags,
+               &others = four.images[i].board->detection.tags;
     ASSERT_FALSE(tags.empty());
     ASSERT_EQ(tags.size(), others.size());
     ++compared;
@@ -203,7 +204,7 @@ TEST_F(BoardIntakeOfFolder, ThrowsIfNoImageIsReadable) {
                     HasSubstr("cannot be read as an image")));
 }
 
-TEST_F(BoardIntakeOfFolder, ReportsFailureIfNoImageShowsBoard) {
+TEST_F(BoardIntakeOfFolder, FailureNamesBoardFileIfTagsHaveOtherIds) {
   write("a.png", good);
   write("b.png", other);
   board.first_id += 100;
@@ -223,10 +224,10 @@ TEST_F(BoardIntakeOfFolder, ReturnsCachedDetectionButAppliesCurrentLimits) {
   const Observation cached = intake.detect_board_in_image(SourceImage(file));
   ASSERT_TRUE(detected.board && cached.board);
   ASSERT_TRUE(detected.blur_px);
-  ASSERT_FALSE(detected.board->seen.tags.empty());
+  ASSERT_FALSE(detected.board->detection.tags.empty());
   EXPECT_EQ(detected.blur_px, cached.blur_px);
   EXPECT_EQ(detected.size_px, cached.size_px);
-  EXPECT_EQ(detected.board->seen.tags.size(), cached.board->seen.tags.size());
+  EXPECT_EQ(detected.board->detection.tags.size(), cached.board->detection.tags.size());
   // The stored figures count, not the image.
   CornerCache(options.corner_cache, board)
       .store_cached_view(SourceImage(file), {*detected.board, 1.25, 0.9, 0.1});

@@ -33,7 +33,7 @@ TEST(CornerCache, TruncatedFileYieldsSameDetectionAndIsRewritten) {
     return BoardIntake(board, options).detect_board_in_image(SourceImage(image)).board.value();
   };
   const BoardView whole = view();
-  ASSERT_GE(whole.seen.tags.size(), 20U);
+  ASSERT_GE(whole.detection.tags.size(), 20U);
   const fs::path kept = fs::directory_iterator(folder / "cache")->path();
   const std::string text = TemporaryFolder::read_content(kept);
   std::size_t ends = 0;
@@ -42,8 +42,8 @@ TEST(CornerCache, TruncatedFileYieldsSameDetectionAndIsRewritten) {
     if (++ends % 9 != 1) continue;
     fs::resize_file(kept, end + 1);
     const BoardView again = view();
-    ASSERT_EQ(again.seen.tags.size(), whole.seen.tags.size()) << ends << " lines";
-    EXPECT_EQ(again.seen.tags.back().corners_px, whole.seen.tags.back().corners_px);
+    ASSERT_EQ(again.detection.tags.size(), whole.detection.tags.size()) << ends << " lines";
+    EXPECT_EQ(again.detection.tags.back().corners_px, whole.detection.tags.back().corners_px);
     EXPECT_EQ(TemporaryFolder::read_content(kept), text);
   }
   EXPECT_GT(ends, 0U);
@@ -70,9 +70,9 @@ TEST(CornerCache, FindReturnsStoredFitsForAllToneCurves) {
   }
   const BoardView view{
       "coded.png", {coded.cols, coded.rows}, BoardDetector(board).detect_board(coded)};
-  ASSERT_EQ(view.seen.curve_costs.size(), 5U);
-  const auto spoilt = std::ranges::find(view.seen.tags, whole.id, &TagDetection::id);
-  ASSERT_NE(spoilt, view.seen.tags.end());
+  ASSERT_EQ(view.detection.curve_costs.size(), 5U);
+  const auto spoilt = std::ranges::find(view.detection.tags, whole.id, &TagDetection::id);
+  ASSERT_NE(spoilt, view.detection.tags.end());
   ASSERT_EQ(spoilt->tone_curve_fits,
             std::vector<TagDetection::Outline>(
                 4, {spoilt->corners_px, spoilt->curvatures, spoilt->corner_sds_px}));
@@ -85,14 +85,14 @@ TEST(CornerCache, FindReturnsStoredFitsForAllToneCurves) {
   EXPECT_EQ(kept->blur_px, 0.8);
   EXPECT_EQ(kept->bright_fraction, 0.9);
   EXPECT_EQ(kept->white_fraction, 0.05);
-  EXPECT_EQ(kept->view.seen.curve_costs, view.seen.curve_costs);
-  ASSERT_EQ(kept->view.seen.tags.size(), view.seen.tags.size());
-  for (std::size_t i = 0; i < view.seen.tags.size(); ++i) {
-    EXPECT_EQ(kept->view.seen.tags[i].corners_px, view.seen.tags[i].corners_px);
-    EXPECT_EQ(kept->view.seen.tags[i].curvatures, view.seen.tags[i].curvatures);
-    EXPECT_EQ(kept->view.seen.tags[i].corner_sds_px, view.seen.tags[i].corner_sds_px);
-    EXPECT_EQ(kept->view.seen.tags[i].tone_curve_fits, view.seen.tags[i].tone_curve_fits);
-    EXPECT_EQ(kept->view.seen.tags[i].steps, view.seen.tags[i].steps);
+  EXPECT_EQ(kept->view.detection.curve_costs, view.detection.curve_costs);
+  ASSERT_EQ(kept->view.detection.tags.size(), view.detection.tags.size());
+  for (std::size_t i = 0; i < view.detection.tags.size(); ++i) {
+    EXPECT_EQ(kept->view.detection.tags[i].corners_px, view.detection.tags[i].corners_px);
+    EXPECT_EQ(kept->view.detection.tags[i].curvatures, view.detection.tags[i].curvatures);
+    EXPECT_EQ(kept->view.detection.tags[i].corner_sds_px, view.detection.tags[i].corner_sds_px);
+    EXPECT_EQ(kept->view.detection.tags[i].tone_curve_fits, view.detection.tags[i].tone_curve_fits);
+    EXPECT_EQ(kept->view.detection.tags[i].steps, view.detection.tags[i].steps);
   }
 }
 

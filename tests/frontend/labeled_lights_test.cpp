@@ -25,8 +25,8 @@ TEST(AddLabeledLights, AddsOneLightPerLabelOfTable) {
   LabeledLights labeled;
   const auto labels = read_detections(kSample + "/true_detections.csv");
   add_labeled_lights(images, labels, labeled);
-  EXPECT_EQ(labeled.labels, 12);
-  EXPECT_EQ(labeled.without_light, 0);
+  EXPECT_EQ(labeled.num_labels, 12);
+  EXPECT_EQ(labeled.num_labels_without_light, 0);
   ASSERT_EQ(labeled.lights.size(), 12);
   for (const LabeledLight& light : labeled.lights) {
     const double frequency_hz =
@@ -44,7 +44,7 @@ TEST(AddLabeledLights, CountsLabelsWithoutLight) {
   labels[0].detections[0].pixel.x() += 30;
   LabeledLights labeled;
   add_labeled_lights(sample_lights(), labels, labeled);
-  EXPECT_EQ(labeled.without_light, 1);
+  EXPECT_EQ(labeled.num_labels_without_light, 1);
   EXPECT_EQ(labeled.lights.size(), 11);
 }
 
@@ -54,7 +54,7 @@ TEST(AddLabeledLights, CountsLabelOfLightCutByBorderAsWithoutLight) {
   images[0].size_px = {int(labels[0].detections[0].pixel.x()), 600};
   LabeledLights labeled;
   add_labeled_lights(images, labels, labeled);
-  EXPECT_GT(labeled.without_light, 0);
+  EXPECT_GT(labeled.num_labels_without_light, 0);
 }
 
 TEST(CollectLightPeriods, ReturnsPeriodsOfAllLightsOrOnlyLabeledOnes) {

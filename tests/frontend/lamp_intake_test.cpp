@@ -21,7 +21,7 @@ struct LampIntakeOfImage : testing::Test {
   Calibration calibration = read_calibration(kRig + "/true_calibration.yaml");
   TemporaryFolder folder;
 
-  Observation observe(const cv::Mat& image, ImageUse use = ImageUse::places) const {
+  Observation observe(const cv::Mat& image, ImageUse use = ImageUse::known_positions) const {
     const auto file = folder / "0.png";
     cv::imwrite(file.string(), image);
     return LampIntake(LightDetector(lamps, make_detector_camera(calibration)), use, {},
@@ -92,7 +92,7 @@ TEST(DetectLampsInImages, RejectsRepeatedImagesUnlessUsedForFixes) {
   folder.file("d.png", "no image");
   const LampImages images{folder / "", read_lamp_map(kRig + "/lamps.yaml"), "lamps.yaml",
                           read_calibration(kRig + "/true_calibration.yaml"), "calibration.yaml"};
-  const Observations turn = detect_lamps_in_images(images, ImageUse::turn, {});
+  const Observations turn = detect_lamps_in_images(images, ImageUse::rotation, {});
   ASSERT_EQ(turn.images.size(), 4U);
   EXPECT_TRUE(turn.images[0].is_image_kept());
   ASSERT_FALSE(turn.images[1].is_image_kept());

@@ -27,7 +27,7 @@ Light light_of_kind(LightKind kind, LightReason reason) {
   light.pixel = {101.25, 79.5};
   light.sigma_px = 0.02;
   light.radius_px = 38;
-  light.roundness = 0.97;
+  light.inlier_fraction = 0.97;
   light.stripes.contrast = 0.9;
   light.stripes.period_lines = 11.25;
   light.stripes.periods = 6.1;
@@ -43,9 +43,9 @@ Observation image_with(const char* name, std::vector<Light> lights) {
 TEST(WriteLightsTable, WritesOneRowPerLight) {
   Light lamp = light_of_kind(LightKind::lamp, LightReason::identified);
   lamp.lamp = 4;
-  Light steady = light_of_kind(LightKind::steady, LightReason::overexposed);
+  Light steady = light_of_kind(LightKind::unmodulated, LightReason::overexposed);
   steady.stripes = {};
-  const Light formless = light_of_kind(LightKind::formless, LightReason::incomplete);
+  const Light formless = light_of_kind(LightKind::no_outline, LightReason::incomplete);
   const TemporaryFolder folder;
   write_lights_table(folder / "lights.csv",
                      std::vector{image_with("a, b.png", {lamp, steady}), image_with("none.png", {}),
@@ -82,20 +82,20 @@ TEST(CountRejectedLightsByReason, SortsByCountWithFormlessLightsLast) {
   Light lamp = light_of_kind(LightKind::lamp, LightReason::identified);
   lamp.lamp = 4;
   const Light soft = light_of_kind(LightKind::unknown, LightReason::reflection);
-  const Light even = light_of_kind(LightKind::steady, LightReason::steady);
-  const Light small = light_of_kind(LightKind::formless, LightReason::incomplete);
+  const Light even = light_of_kind(LightKind::unmodulated, LightReason::unmodulated);
+  const Light small = light_of_kind(LightKind::no_outline, LightReason::incomplete);
   const std::vector images{image_with("a.png", {small, small, lamp, soft, even}),
                            image_with("b.png", {small, even, lamp})};
   const auto reasons = count_rejected_lights_by_reason(images);
   ASSERT_EQ(reasons.size(), 3U);
-  EXPECT_EQ(reasons[0].reason, LightReason::steady);
+  EXPECT_EQ(reasons[0].reason, LightReason::unmodulated);
   EXPECT_EQ(reasons[0].lights, 2);
   EXPECT_EQ(reasons[1].reason, LightReason::reflection);
   EXPECT_EQ(reasons[1].kind, LightKind::unknown);
   EXPECT_EQ(reasons[2].reason, LightReason::incomplete) << "though it is the most frequent";
   EXPECT_EQ(reasons[2].lights, 3);
   EXPECT_EQ(count_lights_of_kind(images, LightKind::lamp), 2);
-  EXPECT_EQ(count_lights_of_kind(images, LightKind::cut), 0);
+  EXPECT_EQ(count_lights_of_kind(images, LightKind::truncated), 0);
 }
 
 TEST(LightReasonText, NameAndDescriptionAreUniqueForEachReason) {
@@ -131,10 +131,10 @@ cv::Mat drawn_lamp_at(const Eigen::Vector2d& center, double radius_px, double le
 TEST(LightDetector, ReportsOverexposedForClippedAndSteadyForUnmodulatedLamp) {
   const DrawnStripes steady{.period_lines = kReasonPeriod_lines, .duty = 1};
   for (const auto& [level, reason] :
-       {std::pair(0.7, LightReason::steady), {1.5, LightReason::overexposed}}) {
+       {std::pair(0.7, LightReason::unmodulated), {1.5, LightReason::overexposed}}) {
     const auto lights = lights_in_drawing(drawn_lamp_at({150.3, 99.6}, 38, level, steady));
     ASSERT_EQ(lights.size(), 1U);
-    EXPECT_EQ(lights[0].kind, LightKind::steady);
+    EXPECT_EQ(lights[0].kind, LightKind::unmodulated);
     EXPECT_EQ(lights[0].reason, reason) << level;
   }
 }
@@ -150,7 +150,7 @@ TEST(LightDetector, ReportsIncompleteOrWrongShapeForLightsWithoutOutline) {
         {cross, LightReason::wrong_shape}}) {
     const auto lights = lights_in_drawing(image);
     ASSERT_EQ(lights.size(), 1U) << light_reason_name(reason);
-    EXPECT_EQ(lights[0].kind, LightKind::formless);
+    EXPECT_EQ(lights[0].kind, LightKind::no_outline);
     EXPECT_EQ(light_reason_name(lights[0].reason), light_reason_name(reason));
     EXPECT_FALSE(lights[0].lamp);
     EXPECT_FALSE(is_light_modulated(lights[0]));

@@ -44,37 +44,38 @@ TEST(Selection, RejectsCopiesAndSameViewsDependingOnImageUse) {
   for (Eigen::Vector2d& pixel : far) pixel.x() += 8.1;
   const std::vector images{image_of_lamps("a", kPixels), image_of_lamps("b", kPixels),
                            image_of_lamps("c", near), image_of_lamps("d", far)};
-  EXPECT_EQ(select(images, ImageUse::turn),
+  EXPECT_EQ(select(images, ImageUse::rotation),
             (Reasons{{}, RejectionReason::same_image, RejectionReason::same_view, {}}));
-  EXPECT_EQ(select(images, ImageUse::places), (Reasons{{}, RejectionReason::same_image, {}, {}}));
+  EXPECT_EQ(select(images, ImageUse::known_positions),
+            (Reasons{{}, RejectionReason::same_image, {}, {}}));
   EXPECT_EQ(select(images, ImageUse::fixes), (Reasons{{}, {}, {}, {}}));
 }
 
 TEST(Selection, KeepsViewThatSharesOnlyHalfOfLamps) {
   auto fewer = kPixels;
   fewer.resize(2);  // half of the lamps
-  EXPECT_EQ(select({image_of_lamps("a", kPixels), image_of_lamps("b", fewer)}, ImageUse::turn),
+  EXPECT_EQ(select({image_of_lamps("a", kPixels), image_of_lamps("b", fewer)}, ImageUse::rotation),
             (Reasons{{}, {}}));
   fewer = kPixels;
   fewer.resize(3);  // three quarters
-  EXPECT_EQ(select({image_of_lamps("a", kPixels), image_of_lamps("b", fewer)}, ImageUse::turn),
+  EXPECT_EQ(select({image_of_lamps("a", kPixels), image_of_lamps("b", fewer)}, ImageUse::rotation),
             (Reasons{{}, RejectionReason::same_view}));
 }
 
 TEST(Selection, KeepsCopyOfRejectedImage) {
   auto images = std::vector{image_of_lamps("a", kPixels), image_of_lamps("b", kPixels)};
   images[0].set_image_rejection(RejectionReason::blurred, "blurred");
-  EXPECT_EQ(select(images, ImageUse::turn), (Reasons{RejectionReason::blurred, {}}));
+  EXPECT_EQ(select(images, ImageUse::rotation), (Reasons{RejectionReason::blurred, {}}));
 }
 
 TEST(Selection, KeepsImagesWithoutLamps) {
-  EXPECT_EQ(select({image_of_lamps("a", {}), image_of_lamps("b", {})}, ImageUse::turn),
+  EXPECT_EQ(select({image_of_lamps("a", {}), image_of_lamps("b", {})}, ImageUse::rotation),
             (Reasons{{}, {}}));
 }
 
 TEST(Selection, RejectsCopyOfImageAddedByKeep) {
   std::vector images{image_of_lamps("a", kPixels), image_of_lamps("b", kPixels)};
-  Selection selection(ImageUse::turn, {});
+  Selection selection(ImageUse::rotation, {});
   selection.add_kept_image(images[0]);
   selection.add_or_reject_image(images[1]);
   ASSERT_FALSE(images[1].is_image_kept());

@@ -208,11 +208,11 @@ TEST_F(VideoOfFrames, YieldsSameBoardCornersAsImages) {
     ASSERT_EQ(seen.size(), 2U);
     EXPECT_EQ(seen[1].image_file_name(), "film.avi#000001");
     ASSERT_TRUE(seen[0].board && seen[1].board);
-    ASSERT_EQ(seen[0].board->seen.tags.size(), of_image.tags.size());
+    ASSERT_EQ(seen[0].board->detection.tags.size(), of_image.tags.size());
     for (std::size_t i = 0; i < of_image.tags.size(); ++i) {
-      EXPECT_EQ(seen[0].board->seen.tags[i].corners_px, of_image.tags[i].corners_px);
+      EXPECT_EQ(seen[0].board->detection.tags[i].corners_px, of_image.tags[i].corners_px);
     }
-    EXPECT_NE(seen[1].board->seen.tags.at(0).corners_px, of_image.tags[0].corners_px);
+    EXPECT_NE(seen[1].board->detection.tags.at(0).corners_px, of_image.tags[0].corners_px);
     const fs::directory_iterator kept(folder / "cache");
     EXPECT_EQ(std::distance(begin(kept), end(kept)), 2);
   }

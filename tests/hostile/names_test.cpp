@@ -179,7 +179,7 @@ TEST_F(HostileNames, IdAcceptsOnlySinglePathComponents) {
   const fs::path root = "/results";
   for (int i = 0; i < kNames; ++i) {
     const std::string name = random_name(random);
-    if (!Id::is_valid_id(name)) {
+    if (!Id::is_valid_name_of_camera_or_run(name)) {
       const std::string refusal = rejection_message([&] { Id(name, "spool/a.json", "camera"); });
       ASSERT_NE(refusal, "");
       ASSERT_LT(refusal.size(), 300U);
@@ -210,7 +210,8 @@ TEST_F(HostileNames, SharedFolderOpensNoFileOutsideIt) {
       if (i % 1000 == 0) shared.replace_file_atomically(name, name);
       if (i % 10 == 0) shared.rename_file(name, "renamed");
       shared.remove_file(name);
-      if (Id::is_valid_id(name)) shared.open_or_create_subfolder({name, "test", "camera"});
+      if (Id::is_valid_name_of_camera_or_run(name))
+        shared.open_or_create_subfolder({name, "test", "camera"});
     } catch (const InputError&) {
       continue;
     }
@@ -246,7 +247,7 @@ TEST_F(HostileNames, SharedFolderFollowsNoLinkOutOfIt) {
     shared.replace_file_atomically(name, name);
     ASSERT_FALSE(fs::is_symlink(link)) << name;
     shared.remove_file(name);
-    if (!Id::is_valid_id(name)) continue;
+    if (!Id::is_valid_name_of_camera_or_run(name)) continue;
     ++folders;
     ASSERT_EQ(::symlink((folder / "outside").c_str(), link.c_str()), 0);
     const Id id{name, "test", "camera"};
@@ -272,7 +273,7 @@ TEST_F(HostileNames, ReadSpooledRunReturnsEscapedNames) {
     ASSERT_EQ(json.at("station"), escape_text_for_single_line(name));
     ASSERT_EQ(json.at("images")[0].at("image"), escape_text_for_single_line(name));
     const fs::path file = folder.file("run.json", text);
-    if (!Id::is_valid_id(escape_text_for_single_line(name))) {
+    if (!Id::is_valid_name_of_camera_or_run(escape_text_for_single_line(name))) {
       ASSERT_NE(rejection_message([&] { read_spooled_run(file); }), "");
       ++refused;
     } else {

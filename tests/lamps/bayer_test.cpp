@@ -11,7 +11,7 @@ namespace {
 
 Score score_behind_filters(const std::string& name, std::size_t step) {
   Scene scene = read_scene_file(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
-  scene.picture = ImageProcessing{1, {}, {}, Bayer{0.6, 0.55}};
+  scene.processing = ImageProcessing{1, {}, {}, Bayer{0.6, 0.55}};
   return Captures(std::move(scene), "check").score(step);
 }
 

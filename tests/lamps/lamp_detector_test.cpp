@@ -100,7 +100,7 @@ TEST(LampDetector, ThrowsForImagesThatDoNotMatchCamera) {
   EXPECT_THROW(LampDetector(lamp_map(), without), std::invalid_argument);
 }
 
-TEST(VlpDetect, ReturnsSameLampsAsLampDetector) {
+TEST(CFunctionVlpDetect, ReturnsSameLampsAsLampDetector) {
   const cv::Mat image = sample();
   const auto expected = LampDetector(lamp_map(), calibration()).detect_lamps(to_image_view(image));
   ASSERT_EQ(expected.size(), 6U);
@@ -125,7 +125,7 @@ TEST(VlpDetect, ReturnsSameLampsAsLampDetector) {
   }
 }
 
-TEST(VlpDetect, ReturnsRequiredCountWhenArrayIsTooSmall) {
+TEST(CFunctionVlpDetect, ReturnsRequiredCountWhenArrayIsTooSmall) {
   const cv::Mat image = sample();
   const Handle positioner = open(calibration());
   const vlp_image given = c_image(to_image_view(image));
@@ -140,7 +140,7 @@ TEST(VlpDetect, ReturnsRequiredCountWhenArrayIsTooSmall) {
   EXPECT_NE(vlp_describe_status(VLP_TOO_SMALL), std::string(vlp_describe_status(-99)));
 }
 
-TEST(VlpDetect, ReturnsBadArgumentForInvalidPointersOrImages) {
+TEST(CFunctionVlpDetect, ReturnsBadArgumentForInvalidPointersOrImages) {
   const cv::Mat image = sample();
   const Handle positioner = open(calibration());
   const vlp_image valid_image = c_image(to_image_view(image));
@@ -182,7 +182,7 @@ TEST(VlpDetect, ReturnsBadArgumentForInvalidPointersOrImages) {
   }));
 }
 
-TEST(VlpDetect, ReturnsRowTimeUnknownWithoutRowTime) {
+TEST(CFunctionVlpDetect, ReturnsRowTimeUnknownWithoutRowTime) {
   const cv::Mat image = sample();
   const vlp_image given = c_image(to_image_view(image));
   Calibration without = calibration();
@@ -213,7 +213,7 @@ std::string two_rooms() {
   return text + office;
 }
 
-TEST(VlpOpenRoom, YieldsOnlyLampsOfChosenRoomAndRequiresOne) {
+TEST(CFunctionVlpOpenRoom, YieldsOnlyLampsOfChosenRoomAndRequiresOne) {
   const TemporaryFolder folder;
   const std::string lamps = folder.file("lamps.yaml", two_rooms());
   const std::string camera = kRendered + "true_calibration.yaml";
@@ -258,7 +258,7 @@ std::vector<Level> pixels(int width, int height, int row, Next&& next) {
   return pixels;
 }
 
-TEST(VlpDetect, ReturnsOkForRandomImagesOfAnySize) {
+TEST(CFunctionVlpDetect, ReturnsOkForRandomImagesOfAnySize) {
   Random random(1);
   for (const Readout readout : {Readout::rows, Readout::columns}) {
     for (const auto& [width, height] : {std::array{1, 1},

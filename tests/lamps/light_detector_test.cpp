@@ -58,7 +58,7 @@ TEST(LightDetector, ClassifiesSteadyLightsAsSteadyAndReflectionAsUnknown) {
   EXPECT_GE(kinds[LightKind::lamp], 3);
   EXPECT_LE(kinds[LightKind::lamp], 6) << "and three of them partly hidden";
   EXPECT_GE(kinds[LightKind::unknown], 1) << "the reflection of lamp 5";
-  EXPECT_EQ(kinds[LightKind::steady], 2) << "the steady lamp and the window";
+  EXPECT_EQ(kinds[LightKind::unmodulated], 2) << "the steady lamp and the window";
 }
 
 TEST(LightDetector, ReportsCutForLampsAtImageBorder) {
@@ -71,7 +71,7 @@ TEST(LightDetector, ReportsCutForLampsAtImageBorder) {
       if (in_view > 0.9) continue;
       for (const Light& light : lights) {
         if (light.lamp != id) continue;
-        EXPECT_EQ(light.kind, LightKind::cut) << id << " in image " << i;
+        EXPECT_EQ(light.kind, LightKind::truncated) << id << " in image " << i;
         ++cut;
       }
     }

@@ -76,7 +76,7 @@ TEST(LightDetector, IdentifiesNoPanelsWhoseAspectRatioContradictsMap) {
   for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
     for (const Light& light :
          detector.detect_lights(to_image_view(captures.image(captures.shot(i))))) {
-      if (is_disc_light(light)) continue;
+      if (is_light_disc_shaped(light)) continue;
       EXPECT_FALSE(light.lamp);
       EXPECT_EQ(light.kind, LightKind::unknown);
       refused += light.reason == LightReason::wrong_shape;
@@ -94,7 +94,7 @@ TEST(LightDetector, PanelCenterErrorsStayWithinFourSigmaWithoutLens) {
     const LampShot shot = captures.shot(i);
     const auto truth = captures.truth(shot);
     for (const Light& light : detector.detect_lights(to_image_view(captures.image(shot)))) {
-      if (light.kind != LightKind::lamp || is_disc_light(light)) continue;
+      if (light.kind != LightKind::lamp || is_light_disc_shaped(light)) continue;
       const auto lamp = std::find_if(truth.begin(), truth.end(), [&](const TrueLamp& candidate) {
         return candidate.id == light.lamp;
       });
@@ -145,7 +145,7 @@ TEST(LightDetector, SigmaCoversErrorsOfPartlyHiddenPanels) {
     const auto truth = captures.truth(shot);
     for (const Light& light :
          captures.detector().detect_lights(to_image_view(captures.image(shot)))) {
-      if (light.kind != LightKind::lamp || is_disc_light(light)) continue;
+      if (light.kind != LightKind::lamp || is_light_disc_shaped(light)) continue;
       const auto lamp = std::find_if(truth.begin(), truth.end(), [&](const TrueLamp& candidate) {
         return candidate.id == light.lamp;
       });
@@ -172,7 +172,7 @@ TEST(LightDetector, ReportsNoLampForPanelsCutByImageBorder) {
     identified += static_cast<int>(std::count_if(
         lights.begin(), lights.end(), [](const Light& light) { return light.lamp.has_value(); }));
     for (const TrueLamp& lamp : captures.truth(shot)) {
-      if (!is_panel_or_tube(lamp.id) || lamp.in_view >= 1) continue;
+      if (!is_panel_or_tube(lamp.id) || lamp.visible_fraction >= 1) continue;
       ++cut;
       for (const Light& light : lights) {
         EXPECT_FALSE(light.lamp == lamp.id && light.kind == LightKind::lamp)
@@ -208,7 +208,7 @@ TEST(Positioner, ComputesFixWithinTwoMillimetersFromPanels) {
     std::vector<Detection> detections;
     for (const Light& light :
          captures.detector().detect_lights(to_image_view(captures.image(shot)))) {
-      if (light.kind != LightKind::lamp || is_disc_light(light)) continue;
+      if (light.kind != LightKind::lamp || is_light_disc_shaped(light)) continue;
       detections.push_back({*light.lamp, light.pixel, light.sigma_px});
     }
     if (detections.size() < 3) continue;

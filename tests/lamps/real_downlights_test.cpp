@@ -125,8 +125,8 @@ TEST_F(LightDetectorOnRealDownlights, StripePeriodsYieldTrueRowTime) {
   }
   const RowTimeResult result =
       select_row_time_candidate(estimate_row_time_candidates(periods, map()));
-  ASSERT_TRUE(result.found) << result.problem;
-  EXPECT_NEAR(result.found->row_time_s / 15.10e-6, 1, 0.002);
+  ASSERT_TRUE(result.row_time) << result.problem;
+  EXPECT_NEAR(result.row_time->row_time_s / 15.10e-6, 1, 0.002);
 }
 
 /// Same lamps from the side: a bright core near one edge, and crescents of the rim.

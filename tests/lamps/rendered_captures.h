@@ -51,10 +51,11 @@ class Captures {
     return make_simulated_lamp_capture(scene_, set_, index);
   }
   cv::Mat image(const LampShot& shot) const {
-    const cv::Mat lines = simulate_sensor_image(
-        scene_.sensor, renderer_.render_lamps_in_electrons(shot), shot.noise_seed, scene_.picture);
+    const cv::Mat lines =
+        simulate_sensor_image(scene_.sensor, renderer_.render_lamps_in_electrons(shot),
+                              shot.noise_seed, scene_.processing);
     const cv::Mat image = scene_.camera.readout == Readout::rows ? lines : cv::Mat(lines.t());
-    return cv::imdecode(encode_image_as_jpeg_or_png(image, scene_.picture),
+    return cv::imdecode(encode_image_as_jpeg_or_png(image, scene_.processing),
                         cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
   }
   std::vector<TrueLamp> truth(const LampShot& shot) const {

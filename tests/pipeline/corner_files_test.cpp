@@ -78,7 +78,7 @@ TEST_F(VlpIntrinsicsCornerFiles, YieldAccurateLensDespiteOneWrongCorner) {
   write_board(board, views.board);
   const auto lens_with = [&](const Eigen::Vector2d& wrong) {
     auto spoilt = seen;
-    spoilt[3].seen.tags[7].corners_px[2] = wrong;
+    spoilt[3].detection.tags[7].corners_px[2] = wrong;
     write_corner_table(table, spoilt, views.board);
     const auto result = calibrate(table.string(), board.string(), kSize);
     EXPECT_LE(result.exit_code, 1) << result.errors;

@@ -108,7 +108,7 @@ TEST_F(VlpDispersion, RequiresSeveralYawsUnlessMethodIsChenGuan) {
             3);
 }
 
-TEST_F(VlpDispersion, ErrorNamesCauseForUnusableCaptures) {
+TEST_F(VlpDispersion, ErrorNamesReferencePointLampMapOrMissingCaptures) {
   const auto far = dispersion(turn(6, 6.28), "--reference-point 100 -50");
   EXPECT_EQ(far.exit_code, 2);
   EXPECT_THAT(far.errors, HasSubstr("in the frame of the lamp map, and"));
@@ -153,7 +153,7 @@ TEST_F(VlpDispersion, WarnsToRunVlpRotationWithoutRotationCenter) {
 }
 
 /// From images: a camera whose tilt is not known at all, at the station of a scene.
-TEST(VlpDispersionOfRenderedImages, OffsetEqualsErrorOfRotationCenter) {
+TEST(VlpDispersionOfRenderedImages, OffsetIsNegativeErrorOfRotationCenter) {
   const TemporaryFolder folder;
   const std::string rendered = (folder / "rendered").string();
   const auto simulated = run_program("vlp-simulate -q " VLP_SOURCE_DIR

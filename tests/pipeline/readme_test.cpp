@@ -295,7 +295,7 @@ TEST(DocumentationPages, ChoosingGatesDefinesEachMetricOnce) {
       const auto kind = find_metric_kind(name);
       ASSERT_TRUE(kind) << name;
       EXPECT_EQ(kind->direction == Direction::at_least, at_least) << name;
-      EXPECT_EQ(kind->of_camera, of_camera) << name;
+      EXPECT_EQ(kind->is_camera_property, of_camera) << name;
     }
   }
   for (const MetricKind& kind : list_metric_kinds(

@@ -108,7 +108,7 @@ TEST_F(VlpEvaluateReport, RejectsInvalidInputsWithoutWritingReport) {
 /// A page that passes, small enough to be broken in many ways.
 std::string good_page() {
   Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, Direction::at_most}}, {}, {}, {}, {}, {}};
-  report.pictures = {render_report_plot(
+  report.plots = {render_report_plot(
       make_error_cdf_plot_drawing(CdfPlot{"errors", {{"fixes", {0.001, 0.002}, 0.001, 0.002}}}))};
   return render_report_html(report);
 }

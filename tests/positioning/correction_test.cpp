@@ -26,22 +26,22 @@ class LevelFromCamera : public testing::Test {
 
 TEST_F(LevelFromCamera, ReturnsIdentityWhenCalibrationHasNoCorrections) {
   for (const Correction correction : {Correction::none, Correction::all}) {
-    EXPECT_EQ(compute_level_from_camera_rotation(calibration, correction),
+    EXPECT_EQ(compute_level_from_camera_matrix(calibration, correction),
               Eigen::Matrix3d::Identity());
   }
 }
 
 TEST_F(LevelFromCamera, ThrowsWhenRequestedCorrectionIsMissing) {
-  EXPECT_THROW(compute_level_from_camera_rotation(calibration, Correction::rotation),
+  EXPECT_THROW(compute_level_from_camera_matrix(calibration, Correction::rotation),
                std::invalid_argument);
-  EXPECT_THROW(compute_level_from_camera_rotation(calibration, Correction::dispersion),
+  EXPECT_THROW(compute_level_from_camera_matrix(calibration, Correction::dispersion),
                std::invalid_argument);
 }
 
 TEST_F(LevelFromCamera, MapsZenithToOriginForTiltModel) {
   calibration.rotation_center = tilted_by(calibration.camera, 0.05, 2);
   const Eigen::Vector3d& zenith = calibration.rotation_center->zenith_in_camera;
-  const auto matrix = compute_level_from_camera_rotation(calibration, Correction::rotation);
+  const auto matrix = compute_level_from_camera_matrix(calibration, Correction::rotation);
   EXPECT_THAT(seen_at(matrix, zenith.hnormalized()), IsNear(Eigen::Vector2d(0, 0), 1e-15));
 }
 
@@ -50,29 +50,28 @@ TEST_F(LevelFromCamera, SubtractsCenterInUndistortedPlaneForShiftModel) {
   calibration.rotation_center = {
       RotationModel::shift, principal + Eigen::Vector2d(9, -4), {0, 0, 1}, {}};
   const Eigen::Vector2d moved =
-      seen_at(compute_level_from_camera_rotation(calibration, Correction::all), z);
+      seen_at(compute_level_from_camera_matrix(calibration, Correction::all), z);
   EXPECT_THAT(moved, IsNear(z - Eigen::Vector2d(9, -4).cwiseQuotient(focal_px), 1e-15));
 }
 
 TEST_F(LevelFromCamera, SubtractsDispersionWhenThereIsNoRotationCenter) {
   calibration.dispersion = {{3, 5}, 0.01, {0, 0}, 12};
   const Eigen::Vector2d expected = z - Eigen::Vector2d(3, 5).cwiseQuotient(focal_px);
-  EXPECT_THAT(seen_at(compute_level_from_camera_rotation(calibration, Correction::dispersion), z),
+  EXPECT_THAT(seen_at(compute_level_from_camera_matrix(calibration, Correction::dispersion), z),
               IsNear(expected, 1e-15));
-  EXPECT_EQ(compute_level_from_camera_rotation(calibration, Correction::none),
+  EXPECT_EQ(compute_level_from_camera_matrix(calibration, Correction::none),
             Eigen::Matrix3d::Identity());
-  EXPECT_THROW(compute_level_from_camera_rotation(calibration, Correction::rotation),
+  EXPECT_THROW(compute_level_from_camera_matrix(calibration, Correction::rotation),
                std::invalid_argument);
 }
 
 TEST_F(LevelFromCamera, ReturnsRotationForDispersionAfterTilt) {
   calibration.rotation_center = tilted_by(calibration.camera, 0.05, 2);
   calibration.dispersion = {{3, 5}, 0.01, {0, 0}, 12};
-  const Eigen::Matrix3d matrix = compute_level_from_camera_rotation(calibration, Correction::all);
+  const Eigen::Matrix3d matrix = compute_level_from_camera_matrix(calibration, Correction::all);
   EXPECT_THAT(Eigen::Matrix3d(matrix * matrix.transpose()),
               IsNear(Eigen::Matrix3d::Identity(), 1e-14));
-  const Eigen::Matrix3d tilt =
-      compute_level_from_camera_rotation(calibration, Correction::rotation);
+  const Eigen::Matrix3d tilt = compute_level_from_camera_matrix(calibration, Correction::rotation);
   const Eigen::Vector2d offset = Eigen::Vector2d(3, 5).cwiseQuotient(focal_px);
   const Eigen::Vector3d ray = tilt.transpose() * Eigen::Vector3d(offset.x(), offset.y(), 1);
   EXPECT_THAT(seen_at(matrix, ray.hnormalized()), IsNear(Eigen::Vector2d(0, 0), 1e-15));

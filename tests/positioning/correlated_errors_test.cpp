@@ -163,10 +163,10 @@ TEST_F(CommonErrorsTest, LensErrorsAreUnknownWithoutDerivativesOfAppliedCorrecti
        {Correction::none, Correction::rotation, Correction::dispersion, Correction::all}) {
     EXPECT_TRUE(stated(correction));
   }
-  rig.calibration.rotation_center->by_intrinsics.reset();
+  rig.calibration.rotation_center->jacobian_wrt_intrinsics.reset();
   EXPECT_FALSE(stated(Correction::rotation) || stated(Correction::all));
   EXPECT_TRUE(stated(Correction::dispersion));
-  rig.calibration.dispersion->by_intrinsics.reset();
+  rig.calibration.dispersion->jacobian_wrt_intrinsics.reset();
   EXPECT_FALSE(stated(Correction::dispersion));
   EXPECT_TRUE(stated(Correction::none));
 }
@@ -184,12 +184,12 @@ TEST_F(CommonErrorsTest, FixCovarianceIncludesSurveySdOfLamps) {
 TEST_F(CommonErrorsTest, FixCovarianceIsUnchangedByLampsWithZeroDerivative) {
   rig.calibrate_in_a_row();
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
-  rig.calibration.dispersion->by_lamps.clear();
+  rig.calibration.dispersion->uncertain_lamps.clear();
   const auto detections = seen_from(rig, 0.1);
   const Fix without = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
   const CommonErrors small(rig.map.lamps, rig.calibration, Correction::all);
   for (const Lamp& lamp : rig.map.lamps) {
-    rig.calibration.dispersion->by_lamps.push_back(
+    rig.calibration.dispersion->uncertain_lamps.push_back(
         {lamp.id, lamp.position_m, *lamp.sd_m, Eigen::Matrix<double, 2, 3>::Zero()});
   }
   const CommonErrors large(rig.map.lamps, rig.calibration, Correction::all);
@@ -200,9 +200,8 @@ TEST_F(CommonErrorsTest, FixCovarianceIsUnchangedByLampsWithZeroDerivative) {
   ASSERT_TRUE(with.has_succeeded() && without.has_succeeded());
   const double scale = with.estimate.covariance.norm();
   EXPECT_THAT(without.estimate.covariance, IsNear(with.estimate.covariance, 1e-12 * scale));
-  EXPECT_TRUE(
-      small.are_any_errors_known() &&
-      small.extract_covariance_of_error_source(CommonErrorSource::lamps).are_any_errors_known());
+  EXPECT_TRUE(small.are_any_errors_known() &&
+              small.isolate_error_source(CommonErrorSource::lamps).are_any_errors_known());
 }
 
 /// The offset depends on a lamp of the adjustment, whose error is not in the survey.
@@ -212,8 +211,8 @@ TEST_F(CommonErrorsTest, OffsetCovarianceIncludesErrorOfAdjustedLamp) {
   by_position << 0.5, -0.1, 0.2, 0.1, 0.6, -0.3;
   Dispersion& dispersion = rig.calibration.dispersion.emplace();
   dispersion = {{0.4, -0.3}, 0.001, {0, 0}, 12};
-  dispersion.by_zenith = Eigen::Matrix2d::Zero();
-  dispersion.by_lamps = {{2, rig.map.lamps[1].position_m, 0.001, by_position}};
+  dispersion.jacobian_wrt_zenith = Eigen::Matrix2d::Zero();
+  dispersion.uncertain_lamps = {{2, rig.map.lamps[1].position_m, 0.001, by_position}};
   const CommonErrors errors(rig.map.lamps, rig.calibration, Correction::all);
   const Eigen::Matrix3d lamp = rig.calibration.adjustment->covariance.block<3, 3>(19, 19);
   ASSERT_EQ(errors.joint_error_covariance().rows(), 12 + 2 + 2 + 24);
@@ -371,7 +370,7 @@ class ComputeDispersionOffsetCovariance : public StepCovariance {};
 
 TEST_F(ComputeZenithCovariance, SumsCovariancesOfCapturesAndLensUnlessAdjusted) {
   const RotationCenter& center = *calibration.rotation_center;
-  const MatrixX by_lens = *center.by_intrinsics;
+  const MatrixX by_lens = *center.jacobian_wrt_intrinsics;
   expect_equal(compute_zenith_covariance(calibration),
                per_focal(*center.covariance) + by_lens * lens() * by_lens.transpose());
   calibration.intrinsics_report.reset();
@@ -382,7 +381,7 @@ TEST_F(ComputeZenithCovariance, SumsCovariancesOfCapturesAndLensUnlessAdjusted) 
 }
 
 TEST_F(ComputeZenithCovariance, ReturnsNulloptWithoutCovarianceOrLensDerivatives) {
-  calibration.rotation_center->by_intrinsics.reset();
+  calibration.rotation_center->jacobian_wrt_intrinsics.reset();
   EXPECT_FALSE(compute_zenith_covariance(calibration));
   SetUp();
   calibration.rotation_center->covariance.reset();
@@ -393,14 +392,15 @@ TEST_F(ComputeDispersionOffsetCovariance, SumsCovariancesOfCapturesLensZenithAnd
   Dispersion& dispersion = *calibration.dispersion;
   Eigen::Matrix<double, 2, 3> by_position;
   by_position << 0.5, -0.1, 0.2, 0.1, 0.6, -0.3;
-  dispersion.by_lamps = {{1, rig.map.lamps[0].position_m, 0.002, by_position}};
+  dispersion.uncertain_lamps = {{1, rig.map.lamps[0].position_m, 0.002, by_position}};
   const Eigen::Vector2d focal_px = calibration.camera.focal_px();
-  const MatrixX by_lens = *dispersion.by_intrinsics +
-                          *dispersion.by_zenith * *calibration.rotation_center->by_intrinsics;
+  const MatrixX by_lens =
+      *dispersion.jacobian_wrt_intrinsics +
+      *dispersion.jacobian_wrt_zenith * *calibration.rotation_center->jacobian_wrt_intrinsics;
   const Eigen::Matrix2d expected =
       per_focal(*dispersion.covariance) + by_lens * lens() * by_lens.transpose() +
-      *dispersion.by_zenith * per_focal(*calibration.rotation_center->covariance) *
-          dispersion.by_zenith->transpose() +
+      *dispersion.jacobian_wrt_zenith * per_focal(*calibration.rotation_center->covariance) *
+          dispersion.jacobian_wrt_zenith->transpose() +
       0.002 * 0.002 * by_position * by_position.transpose();
   expect_equal(compute_dispersion_offset_covariance(calibration),
                focal_px.asDiagonal() * expected * focal_px.asDiagonal());
@@ -408,10 +408,10 @@ TEST_F(ComputeDispersionOffsetCovariance, SumsCovariancesOfCapturesLensZenithAnd
 
 TEST_F(ComputeDispersionOffsetCovariance, ReturnsNulloptWithoutRequiredCovariancesOrDerivatives) {
   EXPECT_TRUE(compute_dispersion_offset_covariance(calibration));
-  calibration.dispersion->by_zenith.reset();
+  calibration.dispersion->jacobian_wrt_zenith.reset();
   EXPECT_FALSE(compute_dispersion_offset_covariance(calibration));
   SetUp();
-  calibration.dispersion->by_intrinsics.reset();
+  calibration.dispersion->jacobian_wrt_intrinsics.reset();
   EXPECT_FALSE(compute_dispersion_offset_covariance(calibration));
   SetUp();
   calibration.dispersion->covariance.reset();
@@ -421,7 +421,7 @@ TEST_F(ComputeDispersionOffsetCovariance, ReturnsNulloptWithoutRequiredCovarianc
   EXPECT_FALSE(compute_dispersion_offset_covariance(calibration));
   calibration.rotation_center.reset();
   calibration.intrinsics_report.reset();
-  calibration.dispersion->by_intrinsics.reset();
+  calibration.dispersion->jacobian_wrt_intrinsics.reset();
   const auto alone = compute_dispersion_offset_covariance(calibration);
   expect_equal(alone, *calibration.dispersion->covariance);
 }

@@ -59,11 +59,11 @@ TEST(ComputeAccuracyLimitsOnFloor, ReturnsPlacesOfGridRowByRow) {
   const LampMap map = synthetic_lamps();
   const auto limits = compute_accuracy_limits_on_floor(map, pinhole_camera(),
                                                        {0, 0.3, -0.1, 0.1, 0.1}, 0.2, 0, kNoise);
-  ASSERT_EQ(limits.places.size(), 4 * 3);
+  ASSERT_EQ(limits.positions.size(), 4 * 3);
   ASSERT_FALSE(limits.sources.empty());
-  EXPECT_THAT(limits.places[5].camera.position_m, IsNear(Eigen::Vector3d(0.1, 0, 0.2), 1e-15));
-  for (const auto& place : limits.places) {
-    EXPECT_EQ(place.parts.size(), place.lamps >= 2 ? limits.sources.size() : 0);
+  EXPECT_THAT(limits.positions[5].camera.position_m, IsNear(Eigen::Vector3d(0.1, 0, 0.2), 1e-15));
+  for (const auto& place : limits.positions) {
+    EXPECT_EQ(place.covariances.size(), place.lamps >= 2 ? limits.sources.size() : 0);
   }
 }
 
@@ -82,23 +82,23 @@ TEST(ComputeAccuracyLimitsOnFloor, TotalVarianceIncreasesWhenMotionAndTiltAreEst
   ASSERT_EQ(limits.sources.size(), 6);
   EXPECT_EQ(limits.sources[1].key, "motion");
   EXPECT_EQ(limits.sources[2].key, "roll_pitch");
-  ASSERT_EQ(standing.places.size(), limits.places.size());
+  ASSERT_EQ(standing.positions.size(), limits.positions.size());
   int with_fix = 0, without = 0;
-  for (std::size_t i = 0; i < limits.places.size(); ++i) {
-    const auto& place = limits.places[i];
-    EXPECT_EQ(place.lamps, standing.places[i].lamps);
-    if (place.parts.empty()) {
+  for (std::size_t i = 0; i < limits.positions.size(); ++i) {
+    const auto& place = limits.positions[i];
+    EXPECT_EQ(place.lamps, standing.positions[i].lamps);
+    if (place.covariances.empty()) {
       EXPECT_LT(place.lamps, 4);
       ++without;
       continue;
     }
     ++with_fix;
-    ASSERT_EQ(place.parts.size(), 6);
-    ASSERT_FALSE(standing.places[i].parts.empty());
+    ASSERT_EQ(place.covariances.size(), 6);
+    ASSERT_FALSE(standing.positions[i].covariances.empty());
     // Additional estimated states increase the covariance.
-    EXPECT_THAT(place.parts[0], IsNear(standing.places[i].parts[0], 1e-12));
+    EXPECT_THAT(place.covariances[0], IsNear(standing.positions[i].covariances[0], 1e-12));
     EXPECT_GT(place.total_pose_covariance()(0, 0),
-              standing.places[i].total_pose_covariance()(0, 0));
+              standing.positions[i].total_pose_covariance()(0, 0));
   }
   EXPECT_GT(with_fix, 0);
   EXPECT_GT(without, 0) << "some see too few lamps for roll and pitch";
@@ -110,15 +110,15 @@ TEST(ComputeAccuracyLimitsOnFloor, NoiseCovarianceMatchesScatterOfFixesWithFishe
   SyntheticRig rig{synthetic_lamps(), {fisheye_camera(), {}, {}, {}, {}}, {}, {}};
   const auto limits =
       compute_accuracy_limits_on_floor(rig.map, rig.calibration.camera, grid, 0.2, 0.5, kNoise);
-  ASSERT_EQ(limits.places.size(), 4);
+  ASSERT_EQ(limits.positions.size(), 4);
   const Positioner positioner(rig.map, rig.calibration);
   Random random{23};
-  for (const auto& place : limits.places) {
+  for (const auto& place : limits.positions) {
     EXPECT_EQ(place.lamps, 8);
-    ASSERT_FALSE(place.parts.empty());
+    ASSERT_FALSE(place.covariances.empty());
     rig.camera = place.camera;
     const auto exact = seen_from(rig, kNoise.noise_px);
-    Scatter scatter(place.camera, place.parts[0]);
+    Scatter scatter(place.camera, place.covariances[0]);
     for (int i = 0; i < draws; ++i) {
       scatter.add(positioner.compute_position_fix(with_noise(exact, random)).estimate.pose);
     }
@@ -130,9 +130,9 @@ TEST(ComputeAccuracyLimitsOnFloor, NoiseCovarianceMatchesScatterOfFixesWithFishe
 TEST(ComputeAccuracyLimitsOnFloor, ReturnsNoCovariancesForPlaceWithoutVisibleLamps) {
   const auto limits = compute_accuracy_limits_on_floor(synthetic_lamps(), pinhole_camera(),
                                                        {50, 50, 0, 0, 1}, 0, 0, kNoise);
-  ASSERT_EQ(limits.places.size(), 1);
-  EXPECT_EQ(limits.places[0].lamps, 0);
-  EXPECT_TRUE(limits.places[0].parts.empty());
+  ASSERT_EQ(limits.positions.size(), 1);
+  EXPECT_EQ(limits.positions[0].lamps, 0);
+  EXPECT_TRUE(limits.positions[0].covariances.empty());
 }
 
 TEST(ComputeAccuracyLimitsOnFloor, ThrowsOnInvalidGrid) {

@@ -99,7 +99,7 @@ TEST(Positioner, LocateAllocatesNoMemoryWithSplinedLens) {
   EXPECT_EQ(allocations, before);
 }
 
-TEST(VlpLocate, CFunctionAllocatesNoMemory) {
+TEST(CFunctionVlpLocate, AllocatesNoMemory) {
   const SyntheticRig rig = tilted_rig();
   const TemporaryFolder folder;
   const std::string lamps = folder / "lamps.yaml", calibration = folder / "calibration.yaml";

@@ -44,7 +44,7 @@ TEST(FindLargestConsistentLampSet, ReturnsNulloptWhenFewerThanThreeLampsAgree) {
   seen[0].z.x() += 0.1, seen[1].z.y() -= 0.15;
   const auto consensus = find_largest_consistent_lamp_set(seen, 0.01);
   ASSERT_TRUE(consensus);
-  EXPECT_EQ(consensus->agreeing.to_ulong(), 0b11100u);
+  EXPECT_EQ(consensus->inliers.to_ulong(), 0b11100u);
   EXPECT_FALSE(find_largest_consistent_lamp_set(std::span(seen).first(4), 0.01)) << "two of four";
 }
 

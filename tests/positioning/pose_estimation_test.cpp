@@ -89,7 +89,7 @@ void expect_state(const Fix& fix, const BodyState& state, double tolerance) {
   EXPECT_NEAR(wrap_angle_rad(fix.body->inclination.pitch_rad - lean.pitch_rad), 0, tolerance);
 }
 
-class PositionerNoiselessBody : public testing::TestWithParam<Estimated> {
+class PositionerNoiselessMovingCamera : public testing::TestWithParam<Estimated> {
  protected:
   Random random{41};
 
@@ -105,21 +105,21 @@ class PositionerNoiselessBody : public testing::TestWithParam<Estimated> {
   int fixes = 0;
 };
 
-TEST_P(PositionerNoiselessBody, MatchesTruthForLampsAtOneHeight) {
+TEST_P(PositionerNoiselessMovingCamera, MatchesTruthForLampsAtOneHeight) {
   for (int i = 0; i < 60; ++i) {
     expect_exact({{}, rolling_calibration(), random_state(random, 0.1), {}}, 7, true, 0.4);
   }
   EXPECT_GT(fixes, 40);
 }
 
-TEST_P(PositionerNoiselessBody, MatchesTruthForLampsAtManyHeights) {
+TEST_P(PositionerNoiselessMovingCamera, MatchesTruthForLampsAtManyHeights) {
   for (int i = 0; i < 60; ++i) {
     expect_exact({{}, rolling_calibration(), random_state(random, 0.1), {}}, 7, false, 0.4);
   }
   EXPECT_GT(fixes, 40);
 }
 
-TEST_P(PositionerNoiselessBody, MatchesTruthWithColumnReadoutAndCalibratedTilt) {
+TEST_P(PositionerNoiselessMovingCamera, PoseAndMotionMatchTruthWithColumnReadoutAndCalibratedTilt) {
   for (int i = 0; i < 40; ++i) {
     BodyRig rig{{}, rolling_calibration(), random_state(random, 0.1), {}};
     rig.calibration.camera.readout = Readout::columns;
@@ -129,7 +129,7 @@ TEST_P(PositionerNoiselessBody, MatchesTruthWithColumnReadoutAndCalibratedTilt) 
   EXPECT_GT(fixes, 25);
 }
 
-TEST_P(PositionerNoiselessBody, MatchesRobotPoseWithCameraMount) {
+TEST_P(PositionerNoiselessMovingCamera, MatchesRobotPoseWithCameraMount) {
   for (int i = 0; i < 40; ++i) {
     BodyRig rig{{}, rolling_calibration(), random_state(random, 0.1), {}};
     rig.mount = CameraMount{{0.3, -0.1, 0.2}, 0.1 * i};
@@ -138,7 +138,7 @@ TEST_P(PositionerNoiselessBody, MatchesRobotPoseWithCameraMount) {
   EXPECT_GT(fixes, 25);
 }
 
-TEST_P(PositionerNoiselessBody, MatchesTruthForTiltUpTo80Degrees) {
+TEST_P(PositionerNoiselessMovingCamera, MatchesTruthForTiltUpTo80Degrees) {
   for (int i = 0; i < 80; ++i) {
     BodyRig rig{{}, rolling_calibration(), random_state(random, 0), {}};
     rig.body.motion.inclination.roll_rad = rad_from_deg(random.uniform(-80, 80));
@@ -150,7 +150,7 @@ TEST_P(PositionerNoiselessBody, MatchesTruthForTiltUpTo80Degrees) {
 }
 
 /// A correct prior does not change the fix, even if the lamps hardly determine the state.
-TEST_P(PositionerNoiselessBody, MatchesTruthForFewLampsWithTruePriorMean) {
+TEST_P(PositionerNoiselessMovingCamera, MatchesTruthForFewLampsWithTruePriorMean) {
   for (int i = 0; i < 60; ++i) {
     BodyRig rig{{}, rolling_calibration(), random_state(random, 0.1), {}};
     const std::size_t lamps = 2 + random.index(3);
@@ -169,8 +169,8 @@ TEST_P(PositionerNoiselessBody, MatchesTruthForFewLampsWithTruePriorMean) {
   EXPECT_GT(fixes, 40);
 }
 
-INSTANTIATE_TEST_SUITE_P(Estimates, PositionerNoiselessBody, testing::ValuesIn(kCombinations),
-                         name_of_combination);
+INSTANTIATE_TEST_SUITE_P(Estimates, PositionerNoiselessMovingCamera,
+                         testing::ValuesIn(kCombinations), name_of_combination);
 
 TEST(EvaluatedState, LampInBodyDerivativesMatchFiniteDifferences) {
   // Central differences: step^2 and rounding / step, times a second at most.
@@ -208,7 +208,7 @@ TEST(WhitenedPixelFromRay, MapsRayDisplacementToPixelDisplacement) {
     const auto ray = lens.unproject_pixel(pixel);
     ASSERT_TRUE(ray);
     const auto matrix =
-        compute_whitened_pixel_from_ray(ray->direction, ray->d_direction_d_pixel, sigma_px);
+        compute_whitened_pixel_jacobian_wrt_ray(ray->direction, ray->d_direction_d_pixel, sigma_px);
     ASSERT_TRUE(matrix);
     const Eigen::Vector3d unit_ray = ray->direction.normalized();
     EXPECT_THAT(Eigen::Vector2d(*matrix * unit_ray), IsNear(Eigen::Vector2d(0, 0), 1e-9));
@@ -225,7 +225,7 @@ TEST(ComputeBodyStateChiSquared, SumsPixelAndPriorTermsUnlessLampIsBehind) {
   Eigen::Matrix<double, 3, 2> d_ray_d_pixel = Eigen::Matrix<double, 3, 2>::Zero();
   d_ray_d_pixel.topRows<2>().diagonal().setConstant(1 / focal_px);
   const Eigen::Vector3d axis(0, 0, 1);
-  const auto whitened = compute_whitened_pixel_from_ray(axis, d_ray_d_pixel, sigma_px);
+  const auto whitened = compute_whitened_pixel_jacobian_wrt_ray(axis, d_ray_d_pixel, sigma_px);
   ASSERT_TRUE(whitened);
   // The lamp is 2 m above the camera, and 25 px and 50 px away from the optical axis.
   std::vector<BodyObservation> seen{{{0.1, 0.2, 2.5}, axis, *whitened, sigma_px, 0}};

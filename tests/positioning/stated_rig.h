@@ -50,19 +50,19 @@ struct StatedRig : SyntheticRig {
     IntrinsicsReport& report = calibration.intrinsics_report.emplace();
     report.covariance = mixed(lens_scale(1), random);
     RotationCenter& center = *calibration.rotation_center;
-    const auto by_intrinsics = [&] {
+    const auto jacobian_wrt_intrinsics = [&] {
       MatrixX effect(2, 12);
       for (double& one : effect.reshaped()) one = random.normal();
       effect.leftCols<4>() *= 1e-3;
       return effect;
     };
     center.covariance = mixed(Eigen::Vector2d(0.05, 0.05), random);
-    center.by_intrinsics = by_intrinsics();
+    center.jacobian_wrt_intrinsics = jacobian_wrt_intrinsics();
     Dispersion& dispersion = calibration.dispersion.emplace();
     dispersion = {{0.4, -0.3}, 0.001, {0, 0}, 12};
     dispersion.covariance = mixed(Eigen::Vector2d(0.03, 0.03), random);
-    dispersion.by_intrinsics = by_intrinsics();
-    dispersion.by_zenith = -0.9 * Eigen::Matrix2d::Identity();
+    dispersion.jacobian_wrt_intrinsics = jacobian_wrt_intrinsics();
+    dispersion.jacobian_wrt_zenith = -0.9 * Eigen::Matrix2d::Identity();
     for (Lamp& lamp : map.lamps) lamp.sd_m = 0.0005;
   }
 };

@@ -51,7 +51,7 @@ UnitBudget compute_unit_fix_error_budget(const StatedRig& rig) {
 std::vector<Detection> make_detections(const StatedRig& rig) {
   const Lens lens(rig.calibration.camera.lens_model, rig.calibration.camera.intrinsics);
   const Eigen::Matrix3d camera_from_level =
-      compute_level_from_camera_rotation(rig.calibration, Correction::all).inverse();
+      compute_level_from_camera_matrix(rig.calibration, Correction::all).inverse();
   std::vector<Detection> detections;
   for (const Lamp& lamp : rig.map.lamps) {
     const auto pixel =
@@ -121,7 +121,7 @@ TEST_P(UnitErrorsParts, CovariancesOfErrorSourcesSumToJointCovariance) {
   ASSERT_GT(whole.rows(), 0);
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(whole.rows(), whole.cols());
   for (const CommonErrorSource part : kCommonErrorSources)
-    sum += unit.common_errors().extract_covariance_of_error_source(part).joint_error_covariance();
+    sum += unit.common_errors().isolate_error_source(part).joint_error_covariance();
   const Eigen::VectorXd inverse_sd = whole.diagonal().cwiseSqrt().cwiseInverse();
   EXPECT_THAT(inverse_sd.asDiagonal() * (sum - whole) * inverse_sd.asDiagonal(),
               IsNear(Eigen::MatrixXd::Zero(whole.rows(), whole.cols()), 1e-13));
@@ -279,7 +279,7 @@ TEST(FloorSummary, LargestErrorSourceIsOneWithLargestVariance) {
     const FloorLimits limits = compute_accuracy_limits_on_floor(
         UnitErrors(rig.map, rig.calibration), {-0.2, 0.2, -0.1, 0.1, 0.1}, 0, 0.4, noise_px);
     EXPECT_EQ(limits.sources.size(), 5U);
-    EXPECT_EQ(limits.places.size(), 15U);
+    EXPECT_EQ(limits.positions.size(), 15U);
     return summarize_floor_limits(limits).value();
   };
   EXPECT_EQ(summary_of(0.01, 0.1).largest_error_source().source.key, "lamp_map");

@@ -327,7 +327,7 @@ TEST_F(CInterface, VlpLastErrorNamesInvalidFileOrOption) {
   EXPECT_THAT(vlp_last_error(), HasSubstr("xxx"));
 }
 
-TEST(VlpDescribeStatus, ReturnsDifferentTextForEachCode) {
+TEST(CFunctionVlpDescribeStatus, ReturnsDifferentTextForEachCode) {
   std::set<std::string> texts;
   for (int code = VLP_TOO_SMALL; code <= VLP_ROW_TIME_UNKNOWN; ++code) {
     texts.insert(vlp_describe_status(code));

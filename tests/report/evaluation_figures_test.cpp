@@ -26,12 +26,12 @@ Evaluation evaluation() {
   evaluation.resampling_unit = "captures";
   evaluation.captures = 10;
   evaluation.fixes = 8;
-  evaluation.missing = {{"degenerate", 1}, {"no row", 1}};
+  evaluation.failures_by_status = {{"degenerate", 1}, {"no row", 1}};
   evaluation.horizontal_m = {8, 0.001, 0.002, 0.003, 0.004, 0.005};
   return evaluation;
 }
 
-TEST(MakeReportStatistics, FormatsErrorsInMillimetersAndOmitsMissingIntervals) {
+TEST(FormatEvaluationStatistics, FormatsErrorsInMillimetersAndOmitsMissingIntervals) {
   EXPECT_THAT(
       texts(format_evaluation_statistics(evaluation())),
       ElementsAre("captures | 10 |  | ", "without a fix | 2 |  | ",
@@ -41,7 +41,7 @@ TEST(MakeReportStatistics, FormatsErrorsInMillimetersAndOmitsMissingIntervals) {
                   "horizontal error, largest | 4 | mm | "));
 }
 
-TEST(MakeReportStatistics, AddsIntervalToEachStatisticThatHasOne) {
+TEST(FormatEvaluationStatistics, AddsIntervalToEachStatisticThatHasOne) {
   Evaluation full = evaluation();
   full.intervals_m = {{0.001, 0.002}, {0.003, 0.004}, Interval{0.005, 0.006}, {0.007, 0.008}, 5};
   full.resampling_unit = "reference points";
@@ -69,7 +69,7 @@ TEST(MakeEvaluationNotes, StatesReferenceMissingFixesAndMissingIntervals) {
                                  "Caution: there are too few captures with a fix for intervals."));
 }
 
-TEST(MakeReportStatistics, LabelsOfLineFitBeginWithFileName) {
+TEST(FormatEvaluationStatistics, LabelsOfLineFitBeginWithFileName) {
   LineFit fit{};
   fit.distances_m = {1001, 0.001, 0.002, 0.003, 0.004, 0.005};
   fit.jitter_m = 0.006;

@@ -115,7 +115,7 @@ TEST(MakeFixErrorBudgetPlot, ExcludesErrorsOfLampsRejectedByFix) {
   auto fixes = room.fixes();
   EXPECT_THAT(make_fix_error_budget_plot(fixes, room.lamps, room.calibration).value().alt,
               HasSubstr("zenith 0 %"));
-  for (FixRow& row : fixes) row.rejected = {1};
+  for (FixRow& row : fixes) row.rejected_lamps = {1};
   EXPECT_THAT(make_fix_error_budget_plot(fixes, room.lamps, room.calibration).value().alt,
               testing::Not(HasSubstr("zenith 0 %")));
 }

@@ -10,7 +10,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-TEST(RenderReportHtml, BeginsWithVerdictAndMarksFailedGates) {
+TEST(RenderReportHtml, ShowsVerdictAfterTitleAndMarksFailedGates) {
   Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, Direction::at_most}}, {}, {}, {}, {}, {}};
   EXPECT_THAT(render_report_html(report), HasSubstr("<strong>PASS</strong>"));
   report.gates.push_back({"p90_mm", "mm", 2.5, 2, Direction::at_most});
@@ -23,9 +23,8 @@ TEST(RenderReportHtml, BeginsWithVerdictAndMarksFailedGates) {
 
 TEST(RenderReportHtml, HasFactsAndFloorPlanBeforeGates) {
   Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, Direction::at_most}}, {}, {}, {}, {}, {}};
-  report.facts = {{"operator", "<Ann>"}};
-  report.pictures = {
-      {ReportPart::floor, "<svg>", "the floor", "a plan", {{"image"}, {"0007.png"}}}};
+  report.properties = {{"operator", "<Ann>"}};
+  report.plots = {{ReportPart::floor, "<svg>", "the floor", "a plan", {{"image"}, {"0007.png"}}}};
   const std::string html = render_report_html(report);
   const auto verdict = html.find("<strong>PASS"), fact = html.find("&lt;Ann&gt;"),
              floor = html.find("the floor"), worst = html.find("0007.png"),
@@ -70,7 +69,7 @@ TEST(RenderReportHtml, EscapesMarkupInAllTexts) {
   Report report{
       evil, {{evil, evil, 1, 2, Direction::at_most}}, {{evil, evil, evil, evil}}, {evil}, {}, {},
       {}};
-  report.pictures = {{ReportPart::other, "<svg>", evil, evil}};
+  report.plots = {{ReportPart::other, "<svg>", evil, evil}};
   report.evaluation = HistoryEntry{evil, evil, evil, evil, {{evil, evil}}};
   Calibration calibration;
   calibration.camera = {evil, {800, 600}, LensModel::pinhole, {1, 1, 1, 1}, {}, {}, {}};
@@ -117,8 +116,8 @@ TEST(RenderReportHtml, ShowsValidRegionButNoViewsForImportedLens) {
 
 TEST(RenderReportHtml, OrdersPlotsByReportPart) {
   Report report{"a", {}, {}, {}, {}, {}, {}};
-  report.pictures = {{ReportPart::distribution, "<svg>", "second", "b"},
-                     {ReportPart::camera, "\x89PNG", "first", "a"}};
+  report.plots = {{ReportPart::distribution, "<svg>", "second", "b"},
+                  {ReportPart::camera, "\x89PNG", "first", "a"}};
   const std::string html = render_report_html(report);
   ASSERT_NE(html.find("second"), std::string::npos);
   EXPECT_LT(html.find("first"), html.find("second"));

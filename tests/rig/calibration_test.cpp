@@ -55,10 +55,10 @@ TEST(WriteCalibration, RoundTripsCovariancesDerivativesAndAdjustment) {
   Eigen::MatrixXd covariance = 0.01 * root * root.transpose();
   covariance = 0.5 * (covariance + covariance.transpose()).eval();  // to the last bit
   calibration.intrinsics_report->covariance = covariance.topLeftCorner(8, 8);
-  calibration.rotation_center->by_intrinsics = root.topLeftCorner(2, 8);
-  calibration.dispersion->by_zenith = Matrix2{{-1, 0.1}, {0, -1}};
-  calibration.dispersion->by_lamps = {{3, {1, 2, 3}, 0.002, root.topLeftCorner(2, 3)},
-                                      {7, {-1, 0, 3}, 0.001, root.topRightCorner(2, 3)}};
+  calibration.rotation_center->jacobian_wrt_intrinsics = root.topLeftCorner(2, 8);
+  calibration.dispersion->jacobian_wrt_zenith = Matrix2{{-1, 0.1}, {0, -1}};
+  calibration.dispersion->uncertain_lamps = {{3, {1, 2, 3}, 0.002, root.topLeftCorner(2, 3)},
+                                             {7, {-1, 0, 3}, 0.001, root.topRightCorner(2, 3)}};
   calibration.adjustment = Adjustment{
       {{3, {1, 2, 3}}, {7, {-1, 0, 3}}}, covariance, {"rotation", "survey"}, 12, 70, 0.05};
   expect_kept(calibration);
@@ -156,12 +156,14 @@ TEST(WriteCalibration, RoundTripsCovariancesOfSplinedLensCore) {
   auto& report = *calibration.intrinsics_report;
   if (report.covariance) report.covariance = MatrixX(report.covariance->topLeftCorner(4, 4));
   auto& center = *calibration.rotation_center;
-  if (center.by_intrinsics) center.by_intrinsics = first(center.by_intrinsics);
-  if (center.lever_arm_by_intrinsics) {
-    center.lever_arm_by_intrinsics = first(center.lever_arm_by_intrinsics);
+  if (center.jacobian_wrt_intrinsics)
+    center.jacobian_wrt_intrinsics = first(center.jacobian_wrt_intrinsics);
+  if (center.lever_arm_jacobian_wrt_intrinsics) {
+    center.lever_arm_jacobian_wrt_intrinsics = first(center.lever_arm_jacobian_wrt_intrinsics);
   }
-  if (calibration.dispersion->by_intrinsics) {
-    calibration.dispersion->by_intrinsics = first(calibration.dispersion->by_intrinsics);
+  if (calibration.dispersion->jacobian_wrt_intrinsics) {
+    calibration.dispersion->jacobian_wrt_intrinsics =
+        first(calibration.dispersion->jacobian_wrt_intrinsics);
   }
   calibration.adjustment.reset();
   std::erase_if(calibration.history, [](const auto& entry) { return entry.part == "adjustment"; });

@@ -128,7 +128,7 @@ TEST(ReadLampMap, ReportsUnitOfValueOutOfRange) {
   EXPECT_THAT(refusal_of_lamp(lamp + "duty: 0"), HasSubstr(place + "duty: 0 (a fraction of the"));
 }
 
-TEST(ReadLampMap, RejectsLampsThatAreNoListOfMappings) {
+TEST(ReadLampMap, RejectsLampsThatAreNotNonEmptyListOfMappings) {
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\nlamps: []\n"),
             "lamps.yaml:2: lamps: contains no lamp");
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\n\nlamps:\n\n# none\n"),

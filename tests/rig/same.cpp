@@ -68,7 +68,7 @@ void expect_same(const RotationCenter& found, const RotationCenter& expected) {
   EXPECT_EQ(found.covariance, expected.covariance);
   EXPECT_EQ(found.lever_arm_m, expected.lever_arm_m);
   EXPECT_EQ(found.lever_arm_covariance, expected.lever_arm_covariance);
-  EXPECT_EQ(found.by_intrinsics, expected.by_intrinsics);
+  EXPECT_EQ(found.jacobian_wrt_intrinsics, expected.jacobian_wrt_intrinsics);
 }
 
 void expect_same(const Dispersion& found, const Dispersion& expected) {
@@ -77,14 +77,15 @@ void expect_same(const Dispersion& found, const Dispersion& expected) {
   EXPECT_EQ(found.center_m, expected.center_m);
   EXPECT_EQ(found.captures, expected.captures);
   EXPECT_EQ(found.covariance, expected.covariance);
-  EXPECT_EQ(found.by_intrinsics, expected.by_intrinsics);
-  EXPECT_EQ(found.by_zenith, expected.by_zenith);
-  ASSERT_EQ(found.by_lamps.size(), expected.by_lamps.size());
-  for (std::size_t i = 0; i < found.by_lamps.size(); ++i) {
-    EXPECT_EQ(found.by_lamps[i].id, expected.by_lamps[i].id);
-    EXPECT_EQ(found.by_lamps[i].position_m, expected.by_lamps[i].position_m);
-    EXPECT_EQ(found.by_lamps[i].sd_m, expected.by_lamps[i].sd_m);
-    EXPECT_EQ(found.by_lamps[i].by_position, expected.by_lamps[i].by_position);
+  EXPECT_EQ(found.jacobian_wrt_intrinsics, expected.jacobian_wrt_intrinsics);
+  EXPECT_EQ(found.jacobian_wrt_zenith, expected.jacobian_wrt_zenith);
+  ASSERT_EQ(found.uncertain_lamps.size(), expected.uncertain_lamps.size());
+  for (std::size_t i = 0; i < found.uncertain_lamps.size(); ++i) {
+    EXPECT_EQ(found.uncertain_lamps[i].id, expected.uncertain_lamps[i].id);
+    EXPECT_EQ(found.uncertain_lamps[i].position_m, expected.uncertain_lamps[i].position_m);
+    EXPECT_EQ(found.uncertain_lamps[i].sd_m, expected.uncertain_lamps[i].sd_m);
+    EXPECT_EQ(found.uncertain_lamps[i].jacobian_wrt_position,
+              expected.uncertain_lamps[i].jacobian_wrt_position);
   }
 }
 

@@ -23,7 +23,7 @@ LensInput views_with_edges(double shift_px) {
   for (int i = 0; i < 20; ++i) {
     BoardDetection seen = views.random_view(random, 0.05);
     for (TagDetection& tag : seen.tags) tag = shrunk(tag, shift_px);
-    input.seen.images.push_back(observed({std::to_string(i), views.imager_px, seen}));
+    input.observations.images.push_back(observed({std::to_string(i), views.imager_px, seen}));
   }
   return input;
 }
@@ -31,7 +31,7 @@ LensInput views_with_edges(double shift_px) {
 TEST(RunLensCalibrationStep, WarnsOfSixTenthsButNotThreeTenthsPixelEdgeDisplacement) {
   EXPECT_THAT(run_lens_calibration_step(views_with_edges(0.3), {}).warnings, IsEmpty());
   const LensResult result = run_lens_calibration_step(views_with_edges(0.6), {});
-  ASSERT_TRUE(result.has_succeeded()) << result.why;
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_THAT(result.warnings, Contains(HasSubstr("0.60 px towards the dark")));
   EXPECT_THAT(result.warnings, Contains(HasSubstr("is tag_spacing of board.yaml right?")));
 }

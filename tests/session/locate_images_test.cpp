@@ -68,7 +68,7 @@ TEST(RedetectLampsOfTiltedCaptures, ReducesPositionErrorBelow100MicrometersForUn
   LeaningRig rig;
   LocateInput input = rig.input(1.6);
   EXPECT_GT(error_m(input), 0.01);
-  const LevelRotations levels = redetect_lamps_of_tilted_captures(input, rig.redetector());
+  const LevelRotations levels = redetect_lamps_until_tilt_converges(input, rig.redetector());
   EXPECT_LT(error_m(input), 1e-4);
   ASSERT_EQ(levels.size(), 1U);
   EXPECT_TRUE(levels.at("a"));
@@ -83,11 +83,11 @@ TEST(RedetectLampsOfTiltedCaptures, SkipsCapturesOnlyWhenInclinationIsExact) {
   LocateInput input = rig.input(0);
   input.captures["a"].inclination = Inclination{rad_from_deg(16), rad_from_deg(-12)};
   const double before_m = error_m(input);
-  EXPECT_THAT(redetect_lamps_of_tilted_captures(input, rig.redetector()), IsEmpty());
+  EXPECT_THAT(redetect_lamps_until_tilt_converges(input, rig.redetector()), IsEmpty());
   EXPECT_THAT(rig.looks, IsEmpty());
   EXPECT_EQ(error_m(input), before_m);
   input.inclination_sigma_rad = rad_from_deg(0.5);
-  redetect_lamps_of_tilted_captures(input, rig.redetector());
+  redetect_lamps_until_tilt_converges(input, rig.redetector());
   EXPECT_LT(error_m(input), 1e-4) << "but for a sensor that is not exact";
 }
 
@@ -95,7 +95,7 @@ TEST(RedetectLampsOfTiltedCaptures, KeepsDetectionsWithMoreLampsWhenFixFails) {
   LeaningRig rig;
   rig.shown_by_ellipses_alone = true;
   LocateInput input = rig.input(1.6);
-  const LevelRotations levels = redetect_lamps_of_tilted_captures(input, rig.redetector());
+  const LevelRotations levels = redetect_lamps_until_tilt_converges(input, rig.redetector());
   EXPECT_THAT(rig.looks, ElementsAre(-1));
   EXPECT_EQ(input.frames[0].detections.size(), 2U);
   ASSERT_EQ(levels.size(), 1U);

@@ -94,7 +94,7 @@ TEST(LocateCameraFromFrames, LampOffsetsEqualDisplacementOfMovedLamp) {
   input.frames.push_back({"twice", input.frames.back().detections});
   input.frames.back().detections.push_back(input.frames.back().detections.front());
   EXPECT_THAT(locate_camera_from_frames(input).lamp_offsets, IsEmpty()) << "was not asked";
-  input.lamp_offsets = true;
+  input.compute_lamp_offsets = true;
   const auto offsets = locate_camera_from_frames(input).lamp_offsets;
   ASSERT_EQ(offsets.size(), rig.map.lamps.size());
   for (const LampOffset& offset : offsets) {
@@ -143,7 +143,7 @@ TEST(LocateCameraFromFrames, WarnsOfMovedLampAndItsDisplacement) {
   ASSERT_EQ(found.rejected_lamps.size(), 1U);
   EXPECT_EQ(found.rejected_lamps[0].lamp, 2);
   for (std::size_t i = 0; i < 36; ++i) {
-    EXPECT_THAT(found.rows[i].rejected,
+    EXPECT_THAT(found.rows[i].rejected_lamps,
                 testing::ElementsAreArray(std::vector<int>(i < 12 ? 1U : 0U, 2)));
   }
   EXPECT_THAT(locate_camera_from_frames(room_with_a_moved_lamp(0)).rejected_lamps, IsEmpty());
@@ -178,7 +178,7 @@ TEST(LocateCameraFromFrames, WarnsOfLampsOutsideValidRegionOfLens) {
     for (const Detection& one : input.frames[i].detections) {
       if (one.pixel.x() > right_px) beyond.push_back(one.lamp);
     }
-    EXPECT_EQ(marked.rows[i].outside_region, beyond);
+    EXPECT_EQ(marked.rows[i].lamps_outside_region, beyond);
   }
 }
 
@@ -187,7 +187,7 @@ TEST(LocateCameraFromFrames, ReturnsUndeterminedIfNoFrameHasFix) {
   for (Frame& frame : input.frames) frame.detections.resize(1);
   const LocateResult found = locate_camera_from_frames(input);
   EXPECT_EQ(found.failure, StepFailure::undetermined);
-  EXPECT_THAT(found.why, HasSubstr("no frame has a fix; the first: "));
+  EXPECT_THAT(found.message, HasSubstr("no frame has a fix; the first: "));
 }
 
 /// The rig of the positioning's tests, driving along a line with a capture every 0.1 s.

@@ -55,7 +55,7 @@ class MovedLamp : public testing::Test {
     KnownPositions places;
     for (const Frame& frame : dispersion.frames) {
       places.captures.push_back({frame.detections, {0, 0}});
-      places.of.push_back(PlaceOf::camera);
+      places.measured_points.push_back(MeasuredPoint::camera);
     }
     return run_dispersion_calibration_step(dispersion, places, DispersionMethod::camera,
                                            DispersionCircle::mean, {});
@@ -122,7 +122,7 @@ TEST_F(MovedLamp, DispersionStepFailsWithMovedLampAsCause) {
 TEST_F(MovedLamp, NoStepWarnsOfLampWhenMapIsCorrect) {
   take_captures({0, 0});
   for (const StepResult& result : {rotate(), disperse(), level(), locate(), adjust()}) {
-    EXPECT_TRUE(result.has_succeeded()) << result.why;
+    EXPECT_TRUE(result.has_succeeded()) << result.message;
     EXPECT_THAT(result.warnings, Each(Not(HasSubstr("lamp "))));
   }
 }
@@ -161,7 +161,7 @@ TEST(RunTiltCalibrationStep, FailsWithWrongMapForMirroredMapOfLargeRoom) {
   EXPECT_TRUE(run_tilt_calibration_step(input, false, {}).has_succeeded());
   for (Lamp& lamp : input.lamps.lamps) lamp.position_m.y() *= -1;
   const TiltResult result = run_tilt_calibration_step(input, false, {});
-  EXPECT_EQ(result.failure, StepFailure::wrong_map) << result.why;
+  EXPECT_EQ(result.failure, StepFailure::wrong_map) << result.message;
 }
 
 }  // namespace

@@ -21,11 +21,11 @@ LensResult solve_with_grid(const SplineGrid& grid) {
   const BoardLattice lattice(views.board);
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::off};
   input.camera.lens_model = lens_model_for_spline_grid(grid);
-  while (input.seen.images.size() < count) {
+  while (input.observations.images.size() < count) {
     const BoardDetection seen = wide_view(views, random, noise_px);
     if (!has_enough_tags(seen, lattice)) continue;
-    input.seen.images.push_back(
-        observed({std::to_string(input.seen.images.size()) + ".png", kWideImager, seen}));
+    input.observations.images.push_back(
+        observed({std::to_string(input.observations.images.size()) + ".png", kWideImager, seen}));
   }
   return run_lens_calibration_step(input, {});
 }
@@ -34,18 +34,18 @@ TEST(RunLensCalibrationStep, ProposesWiderSplineGridWhenGridIsTooNarrow) {
   const LensResult result = solve_with_grid({3, 12, 12, 100});
   ASSERT_FALSE(result.has_succeeded());
   EXPECT_THAT(
-      result.why,
+      result.message,
       HasSubstr(
           "control points of LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny=12_fov_x_deg=100 "
           "extend to 50 degrees off axis horizontally and 50 vert"));
-  EXPECT_THAT(result.why,
+  EXPECT_THAT(result.message,
               HasSubstr(": use --lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny="));
 }
 
 TEST(RunLensCalibrationStep, ProposesMoreGridRowsForVerticalFieldOfView) {
   const LensResult result = solve_with_grid({3, 12, 5, 230});
   ASSERT_FALSE(result.has_succeeded());
-  EXPECT_THAT(result.why,
+  EXPECT_THAT(result.message,
               testing::ContainsRegex(
                   "use --lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny=10_fov_x_deg=230"));
 }
@@ -58,11 +58,11 @@ TEST(RunLensCalibrationStep, ProposesSolvableGridWhenGridIsTooWide) {
                        {LensModel::pinhole, std::array{4600.0, 4600.0, 395.0, 301.0}}};
   const BoardLattice lattice(views.board);
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::off};
-  while (input.seen.images.size() < count) {
+  while (input.observations.images.size() < count) {
     const BoardDetection seen = views.random_view(random, noise_px);
     if (!lattice.are_corners_sufficient_for_pose(seen)) continue;
-    input.seen.images.push_back(
-        observed({std::to_string(input.seen.images.size()) + ".png", views.imager_px, seen}));
+    input.observations.images.push_back(observed(
+        {std::to_string(input.observations.images.size()) + ".png", views.imager_px, seen}));
   }
   input.camera.lens_model = lens_model_for_spline_grid({3, 10, 10, 350});
   const LensResult result = run_lens_calibration_step(input, {});
@@ -70,10 +70,11 @@ TEST(RunLensCalibrationStep, ProposesSolvableGridWhenGridIsTooWide) {
   const std::string take =
       " do not cover the field of view, 5 degrees off axis horizontally and 4 vertically: use "
       "--lens ";
-  EXPECT_THAT(result.why, HasSubstr("views with the board: the control points of LENSMODEL_"));
-  EXPECT_THAT(result.why, HasSubstr(take));
-  const auto model = lens_model_from_name(result.why.substr(result.why.find(take) + take.size()));
-  ASSERT_TRUE(model) << result.why;
+  EXPECT_THAT(result.message, HasSubstr("views with the board: the control points of LENSMODEL_"));
+  EXPECT_THAT(result.message, HasSubstr(take));
+  const auto model =
+      lens_model_from_name(result.message.substr(result.message.find(take) + take.size()));
+  ASSERT_TRUE(model) << result.message;
   input.camera.lens_model = *model;
   EXPECT_TRUE(run_lens_calibration_step(input, {}).has_succeeded());
 }

@@ -98,13 +98,13 @@ struct Images {
   void expect_true_row_time(bool with_lens = true) const {
     ASSERT_EQ(candidates().candidates.size(), 2U);
     const RowTimeResult result = chosen(with_lens);
-    ASSERT_TRUE(result.found) << result.problem;
-    EXPECT_NEAR(result.found->row_time_s, kRowTime_s, 1e-9 * kRowTime_s);
+    ASSERT_TRUE(result.row_time) << result.problem;
+    EXPECT_NEAR(result.row_time->row_time_s, kRowTime_s, 1e-9 * kRowTime_s);
   }
   void expect_undecided(bool with_lens = true) const {
     ASSERT_GE(candidates().candidates.size(), 2U);
     const RowTimeResult result = chosen(with_lens);
-    EXPECT_FALSE(result.found);
+    EXPECT_FALSE(result.row_time);
     EXPECT_THAT(result.problem, HasSubstr("fit a row time of"));
     EXPECT_THAT(result.problem, HasSubstr("neither duties nor positions of the lamps decide"));
   }

@@ -52,7 +52,7 @@ TEST_F(SessionResultsTest, CachesUndeterminedResultButNotBadInput) {
   EXPECT_FALSE(cached_result.find_cached_step_result("lens", "key"));
   cached_result.store_step_result("lens", "key", undetermined);
   ASSERT_TRUE(cached_result.find_cached_step_result("lens", "key"));
-  EXPECT_EQ(cached_result.find_cached_step_result("lens", "key")->why, "too few");
+  EXPECT_EQ(cached_result.find_cached_step_result("lens", "key")->message, "too few");
 }
 
 TEST_F(SessionResultsTest, SetStepsAndRemoveStaleFilesRemovesOutputsOfStepsNotPlanned) {

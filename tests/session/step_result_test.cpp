@@ -64,7 +64,7 @@ TEST(AddImageIntakeRemarks, CopiesFailureAndPrependsWarnings) {
   result.warnings = {"later"};
   add_image_intake_remarks(seen, result);
   EXPECT_EQ(result.failure, StepFailure::wrong_board);
-  EXPECT_EQ(result.subject, "board.yaml");
+  EXPECT_EQ(result.file_to_correct, "board.yaml");
   EXPECT_THAT(result.warnings, ElementsAre("dark", "later"));
 }
 

@@ -27,12 +27,12 @@ struct CalibrationChain {
   LampCaptures turns;
   KnownPositions known;
 
-  CalibrationChain(Random& random, double lens_px, PlaceOf of = PlaceOf::camera) {
+  CalibrationChain(Random& random, double lens_px, MeasuredPoint of = MeasuredPoint::camera) {
     for (const double z_m : {0.0, 0.4}) survey.turn({0.1, -0.05, z_m}, 9);
     const std::size_t on_the_spot = survey.input.captures.size();
     const Eigen::Vector3d place_m(-0.2, 0.1, 0);
     for (int k = 0; k < 6; ++k) {
-      if (of == PlaceOf::camera) {
+      if (of == MeasuredPoint::camera) {
         survey.stand({place_m, 1.0 * k});
         continue;
       }
@@ -53,14 +53,14 @@ struct CalibrationChain {
         turns.frames.push_back({captures[i].name, captures[i].detections});
       } else {
         known.captures.push_back({captures[i].detections, place_m.head<2>()});
-        known.of.push_back(of);
+        known.measured_points.push_back(of);
       }
     }
   }
 
   Calibration calibrated() const {
     const RotationResult rotation = run_rotation_calibration_step(turns, RotationMethod::axis, {});
-    EXPECT_TRUE(rotation.has_succeeded()) << rotation.why;
+    EXPECT_TRUE(rotation.has_succeeded()) << rotation.message;
     LampCaptures leveled = turns;
     leveled.calibration = rotation.calibration;
     const DispersionResult dispersion = run_dispersion_calibration_step(
@@ -73,8 +73,8 @@ struct CalibrationChain {
 TEST(SequentialCalibration, HasNoLensJacobianWithoutLensCovariance) {
   Random random(1);
   const Calibration calibration = CalibrationChain(random, 0).calibrated();
-  EXPECT_FALSE(calibration.rotation_center->by_intrinsics);
-  EXPECT_FALSE(calibration.dispersion->by_intrinsics);
+  EXPECT_FALSE(calibration.rotation_center->jacobian_wrt_intrinsics);
+  EXPECT_FALSE(calibration.dispersion->jacobian_wrt_intrinsics);
 }
 
 TEST(SequentialCalibration, LensJacobiansPredictChangeOfZenithAndOffset) {
@@ -94,14 +94,14 @@ TEST(SequentialCalibration, LensJacobiansPredictChangeOfZenithAndOffset) {
   const Calibration moved = row.calibrated();
   const Eigen::Vector2d zenith = compute_normalized_zenith_point(*moved.rotation_center) -
                                  compute_normalized_zenith_point(*exact.rotation_center);
-  const Eigen::Vector2d zenith_said = *exact.rotation_center->by_intrinsics * error;
+  const Eigen::Vector2d zenith_said = *exact.rotation_center->jacobian_wrt_intrinsics * error;
   EXPECT_GT(zenith.norm(), 1e-6);
   EXPECT_LT((zenith - zenith_said).norm(), 0.02 * zenith.norm());
   const Eigen::Vector2d offset =
       moved.dispersion->offset_px.cwiseQuotient(moved.camera.focal_px()) -
       exact.dispersion->offset_px.cwiseQuotient(exact.camera.focal_px());
-  const Eigen::Vector2d offset_said =
-      *exact.dispersion->by_intrinsics * error + *exact.dispersion->by_zenith * zenith;
+  const Eigen::Vector2d offset_said = *exact.dispersion->jacobian_wrt_intrinsics * error +
+                                      *exact.dispersion->jacobian_wrt_zenith * zenith;
   EXPECT_GT(offset.norm(), 1e-6);
   // The effects of lens and zenith mostly cancel.
   EXPECT_LT((offset - offset_said).norm(), 0.02 * zenith.norm());
@@ -129,10 +129,10 @@ TEST(RunRotationCalibrationStep, CircleMethodLensErrorIsWithin50PercentOfJoint) 
     const RotationResult joint = run_rotation_calibration_step(turn, RotationMethod::joint, {});
     ASSERT_TRUE(joint.has_succeeded());
     ASSERT_TRUE(circle.has_succeeded());
-    ASSERT_TRUE(joint.fit.center.by_intrinsics);
-    ASSERT_TRUE(circle.fit.center.by_intrinsics);
+    ASSERT_TRUE(joint.fit.center.jacobian_wrt_intrinsics);
+    ASSERT_TRUE(circle.fit.center.jacobian_wrt_intrinsics);
     const auto compute_sd = [&](const RotationFit& fit) {
-      const auto& jacobian = *fit.center.by_intrinsics;
+      const auto& jacobian = *fit.center.jacobian_wrt_intrinsics;
       return std::sqrt((jacobian * covariance * jacobian.transpose()).trace());
     };
     EXPECT_LT(compute_sd(circle.fit), 1.5 * compute_sd(joint.fit)) << seed;
@@ -156,13 +156,13 @@ TEST(RunTiltCalibrationStep, LensJacobianPredictsChangeOfZenith) {
       drive.frames.push_back({capture.name, capture.detections});
     }
     const TiltResult result = run_tilt_calibration_step(drive, false, {});
-    EXPECT_TRUE(result.has_succeeded()) << result.why;
+    EXPECT_TRUE(result.has_succeeded()) << result.message;
     return *result.calibration.rotation_center;
   };
-  EXPECT_FALSE(leveled().by_intrinsics);
+  EXPECT_FALSE(leveled().jacobian_wrt_intrinsics);
   calibration.intrinsics_report = IntrinsicsReport{40, 4000, 0, 0.1, {}, {}, covariance};
   const RotationCenter exact = leveled();
-  ASSERT_TRUE(exact.by_intrinsics);
+  ASSERT_TRUE(exact.jacobian_wrt_intrinsics);
   const auto before =
       Eigen::Map<const Eigen::VectorXd>(calibration.camera.intrinsics.data(), covariance.rows())
           .eval();
@@ -173,10 +173,10 @@ TEST(RunTiltCalibrationStep, LensJacobianPredictsChangeOfZenith) {
   const Eigen::Vector2d moved =
       compute_normalized_zenith_point(leveled()) - compute_normalized_zenith_point(exact);
   EXPECT_GT(moved.norm(), 1e-6);
-  EXPECT_LT((moved - *exact.by_intrinsics * error).norm(), 0.05 * moved.norm());
+  EXPECT_LT((moved - *exact.jacobian_wrt_intrinsics * error).norm(), 0.05 * moved.norm());
 }
 
-class SequentialCalibrationFixes : public testing::TestWithParam<PlaceOf> {};
+class SequentialCalibrationFixes : public testing::TestWithParam<MeasuredPoint> {};
 
 TEST_P(SequentialCalibrationFixes, FixCovarianceMatchesErrorsOfFixes) {
   constexpr int trials = 40;
@@ -219,7 +219,7 @@ TEST_P(SequentialCalibrationFixes, FixCovarianceMatchesErrorsOfFixes) {
   EXPECT_NEAR(offset, 1, 0.45);
   // For a place of the camera, the offset compensates the zenith error, which its captures cannot
   // determine.
-  if (GetParam() == PlaceOf::camera) {
+  if (GetParam() == MeasuredPoint::camera) {
     EXPECT_GT(offset_alone, 2);
   }
   std::printf("zenith %.2f, offset %.2f (%.2f of its captures alone)\n", zenith, offset,
@@ -229,9 +229,10 @@ TEST_P(SequentialCalibrationFixes, FixCovarianceMatchesErrorsOfFixes) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Places, SequentialCalibrationFixes,
-                         testing::Values(PlaceOf::camera, PlaceOf::axis), [](const auto& one) {
-                           return one.param == PlaceOf::camera ? "FromAPlaceOfTheCamera"
-                                                               : "FromAPlaceOfTheAxis";
+                         testing::Values(MeasuredPoint::camera, MeasuredPoint::axis),
+                         [](const auto& one) {
+                           return one.param == MeasuredPoint::camera ? "FromAPlaceOfTheCamera"
+                                                                     : "FromAPlaceOfTheAxis";
                          });
 
 }  // namespace

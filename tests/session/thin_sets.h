@@ -116,11 +116,11 @@ inline ThinSet thin_set(const Thin& thin, bool kalibr, bool shrinks, Random& ran
       for (TagDetection& tag : seen.tags) tag = shrunk(tag, shift_px);
       std::string name = std::to_string(place);
       name.append("-").append(std::to_string(copy)).append(".png");
-      input.seen.images.push_back(observed({name, views.imager_px, seen}));
+      input.observations.images.push_back(observed({name, views.imager_px, seen}));
     }
     if (any) ++place;
   }
-  reject_repeated_images(input.seen.images, ImageUse::boards, {});
+  reject_repeated_images(input.observations.images, ImageUse::boards, {});
   return {std::move(input), lens};
 }
 

@@ -25,8 +25,9 @@ struct Training {
     options.readout = Readout::rows;
     const DetectedLights one = detect_lights_in_folders({kSample}, lamps, {}, false, options);
     for (std::size_t i = 0; i < folders; ++i) {
-      seen.seen.images.insert(seen.seen.images.end(), one.seen.images.begin(),
-                              one.seen.images.end());
+      seen.observations.images.insert(seen.observations.images.end(),
+                                      one.observations.images.begin(),
+                                      one.observations.images.end());
     }
     seen.folder_sizes.assign(folders, one.folder_sizes[0]);
     labels.assign(folders, read_detections(kSample + "/true_detections.csv"));
@@ -37,19 +38,19 @@ struct Training {
 TEST(TrainLampClassifier, ReturnsUndeterminedForTooFewLightsPerLamp) {
   const TrainStepResult result = Training(1).trained();
   EXPECT_EQ(result.failure, StepFailure::undetermined);
-  EXPECT_THAT(result.why, HasSubstr("too few labeled lights of lamps 1 (has 2), 2 (has 2)"));
+  EXPECT_THAT(result.message, HasSubstr("too few labeled lights of lamps 1 (has 2), 2 (has 2)"));
 }
 
 TEST(TrainLampClassifier, CrossValidationIdentifiesAllLamps) {
   const TrainStepResult result = Training(kMinExamples).trained();
-  ASSERT_TRUE(result.has_succeeded()) << result.why;
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_EQ(result.classifier.lamps.size(), 6U);
-  EXPECT_EQ(result.labeled.labels, 12 * kMinExamples);
+  EXPECT_EQ(result.labeled.num_labels, 12 * kMinExamples);
   EXPECT_EQ(result.confusion.counts.sum(), 12 * kMinExamples);
   EXPECT_EQ(result.confusion.count_wrongly_identified(), 0);
 }
 
-TEST(TrainLampClassifier, ThrowsForLabelsOfUnknownImageOrLamp) {
+TEST(TrainLampClassifier, ThrowsForLabelOfUnknownLampOrIfNoLabeledImageExists) {
   Training training(1);
   training.lamps.lamps.pop_back();
   EXPECT_THAT(rejection_message<std::invalid_argument>([&] { training.trained(); }),

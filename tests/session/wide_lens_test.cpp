@@ -28,11 +28,11 @@ LensInput make_wide_set(double reach_deg, LensModel model) {
   Random random(71);
   WideBoards boards;
   boards.reach_rad = rad_from_deg(reach_deg);
-  while (input.seen.images.size() < count) {
+  while (input.observations.images.size() < count) {
     const BoardDetection seen = wide_view(views, random, noise_px, boards);
     if (!has_enough_tags(seen, lattice)) continue;
-    input.seen.images.push_back(
-        observed({std::to_string(input.seen.images.size()), views.imager_px, seen}));
+    input.observations.images.push_back(
+        observed({std::to_string(input.observations.images.size()), views.imager_px, seen}));
   }
   return input;
 }
@@ -42,11 +42,11 @@ class RunLensStepWideField : public testing::TestWithParam<LensModel> {};
 TEST_P(RunLensStepWideField, ProposesFisheyeWhenBoardIsBeyondRaysOfModel) {
   const LensResult result = run_lens_calibration_step(make_wide_set(180, GetParam()), {});
   EXPECT_EQ(result.failure, StepFailure::undetermined);
-  EXPECT_THAT(result.why, AllOf(HasSubstr("30 views with the board: it is visible up to 10"),
-                                HasSubstr("degrees off axis, where " +
-                                          std::string(lens_model_name(GetParam())) +
-                                          " has no rays: use --lens OPENCV_FISHEYE"),
-                                Not(HasSubstr("add views"))));
+  EXPECT_THAT(result.message, AllOf(HasSubstr("30 views with the board: it is visible up to 10"),
+                                    HasSubstr("degrees off axis, where " +
+                                              std::string(lens_model_name(GetParam())) +
+                                              " has no rays: use --lens OPENCV_FISHEYE"),
+                                    Not(HasSubstr("add views"))));
 }
 
 /// Up to 87 degrees: the errors of a lens that passes match the reported ones in the calibrated
@@ -57,7 +57,7 @@ TEST_P(RunLensStepWideField, LensErrorsAreWithinThreeSigmasIfGatesPass) {
   for (const double reach_deg : {60, 75, 87}) {
     const LensResult result = run_lens_calibration_step(make_wide_set(reach_deg, GetParam()), {});
     if (!result.has_succeeded()) {
-      EXPECT_THAT(result.why, HasSubstr("use --lens OPENCV_FISHEYE"));
+      EXPECT_THAT(result.message, HasSubstr("use --lens OPENCV_FISHEYE"));
       continue;
     }
     if (reach_deg > 60) {
@@ -90,9 +90,9 @@ INSTANTIATE_TEST_SUITE_P(Models, RunLensStepWideField,
 TEST(RunLensCalibrationStep, ProposesFisheyeInsteadOfBoardErrorForUnsuitableModel) {
   const LensResult result = run_lens_calibration_step(make_wide_set(87, LensModel::opencv5), {});
   ASSERT_EQ(result.failure, StepFailure::undetermined);
-  EXPECT_THAT(result.why, AllOf(HasSubstr("OPENCV_FISHEYE fits with 0.05 px"),
-                                HasSubstr("use --lens OPENCV_FISHEYE"),
-                                Not(HasSubstr("board.yaml")), Not(HasSubstr("cannot be"))));
+  EXPECT_THAT(result.message, AllOf(HasSubstr("OPENCV_FISHEYE fits with 0.05 px"),
+                                    HasSubstr("use --lens OPENCV_FISHEYE"),
+                                    Not(HasSubstr("board.yaml")), Not(HasSubstr("cannot be"))));
 }
 
 TEST(RunLensCalibrationStep, ValidRegionCoversImageWhenModelFits) {
@@ -102,11 +102,11 @@ TEST(RunLensCalibrationStep, ValidRegionCoversImageWhenModelFits) {
   input.camera.lens_model = LensModel::opencv8;
   Random random(5);
   for (int i = 0; i < count; ++i) {
-    input.seen.images.push_back(
+    input.observations.images.push_back(
         observed({std::to_string(i), views.imager_px, views.random_view(random, 0.05)}));
   }
   const LensResult result = run_lens_calibration_step(input, {});
-  ASSERT_TRUE(result.has_succeeded()) << result.why;
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_FALSE(result.lens.solution.other_model_fits);
   EXPECT_FALSE(result.lens.better_model);
   EXPECT_THAT(result.warnings, testing::IsEmpty());

@@ -87,7 +87,7 @@ class FrameRendererBoard : public testing::TestWithParam<View> {
     scene_.camera = GetParam().camera;
     scene_.board = plain_board();
     scene_.board->warp_m = GetParam().warp_m;
-    if (GetParam().kalibr_border) scene_.board->print.border_bits = 2;
+    if (GetParam().kalibr_border) scene_.board->pattern.border_bits = 2;
   }
   Scene scene_ = plain_scene();
   // Small rotation, so that the edges of the tags keep their directions.
@@ -132,8 +132,8 @@ TEST_P(FrameRendererBoard, TrueCornersMatchMrcalProjection) {
   const MrcalOracle mrcal(std::string(lens_model_name(scene_.camera.lens_model)),
                           scene_.camera.intrinsics);
   const BoardShot shot = make_simulated_board_capture(scene_, views_, 1);
-  const auto layout = list_board_tags(scene_.board->print);
-  const Eigen::Vector2d field_m = compute_tag_field_size_m(scene_.board->print);
+  const auto layout = list_board_tags(scene_.board->pattern);
+  const Eigen::Vector2d field_m = compute_tag_field_size_m(scene_.board->pattern);
   const auto truth = find_true_corners_in_image(scene_, renderer, shot);
   ASSERT_FALSE(truth.empty());
   for (const auto& [tag, corner, pixel] : truth) {

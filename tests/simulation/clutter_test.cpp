@@ -26,7 +26,7 @@ class FrameRendererClutter : public testing::Test {
     const FrameRenderer renderer(scene_);
     return find_true_lamps_in_image(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0))
         .at(0)
-        .in_view;
+        .visible_fraction;
   }
   Scene scene_ = plain_scene();
 };

@@ -184,7 +184,7 @@ TEST_F(FrameRendererForeignLight, ForeignLightsInViewAreListedAsOtherLightsNotLa
   EXPECT_EQ(lights[1].kind, "mains");
   EXPECT_FALSE(lights[0].lamp);
   EXPECT_NEAR(lights[0].pixel.x(), 499.5, 1e-6);
-  EXPECT_EQ(lights[0].in_view, 1);
+  EXPECT_EQ(lights[0].visible_fraction, 1);
   EXPECT_EQ(find_true_lamps_in_image(scene_, renderer, shot()).size(), 1U);
   EXPECT_EQ(make_scene_lamp_map(scene_, true).lamps.size(), 1U);
 }
@@ -197,7 +197,7 @@ TEST_F(FrameRendererForeignLight, WriteTruthTablesListsForeignLightInTrueOtherLi
   set.lamps->yaw_jitter_rad = set.lamps->turn_rate_rad_per_s = 0;
   set.lamps->repeat = 1;
   set.lamps->interval_s = 1;
-  set.lamps->known = false;
+  set.lamps->has_known_positions = false;
   const TemporaryFolder folder;
   write_truth_tables(scene_, FrameRenderer(scene_), set, folder / "");
   EXPECT_FALSE(std::filesystem::exists(folder / "true_other_lights.csv")) << "there are none";

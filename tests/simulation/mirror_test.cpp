@@ -85,7 +85,7 @@ TEST_F(FrameRendererMirror, MirrorImageIsCutAtBorderOfPane) {
   EXPECT_NEAR(half.sum / measure_brightness(behind_pane(rendered())).sum, 0.5, 0.002);
   EXPECT_NEAR(half.centroid_px.y() - 299.5, 4 * 30 / (3 * M_PI), 0.2);
   ASSERT_EQ(lights.size(), 1U);
-  EXPECT_NEAR(lights[0].in_view, 0.5, 0.02);
+  EXPECT_NEAR(lights[0].visible_fraction, 0.5, 0.02);
   pane() = {{0.4, -1, 0}, {0, 2, 0}, {0, 0, 0.7}, 0};
   EXPECT_EQ(measure_brightness(behind_pane(rendered())).sum, 0) << "below the rays";
   EXPECT_TRUE(truth().empty());
@@ -134,7 +134,7 @@ TEST_F(FrameRendererMirror, MirrorImageIsListedAsOtherLightNotAsLamp) {
   EXPECT_EQ(lights[0].kind, "mirror_image");
   EXPECT_EQ(lights[0].lamp, 1);
   EXPECT_LT((lights[0].pixel - Eigen::Vector2d(399.5 + 500 * 0.8 / 1.5, 299.5)).norm(), 1e-6);
-  EXPECT_EQ(lights[0].in_view, 1);
+  EXPECT_EQ(lights[0].visible_fraction, 1);
   const FrameRenderer renderer(scene_);
   const auto lamps = find_true_lamps_in_image(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0));
   ASSERT_EQ(lamps.size(), 1U);

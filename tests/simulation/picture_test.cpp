@@ -43,7 +43,7 @@ TEST(ApplyToneCurveToGrayLevel, MapsBlackLevelToZeroAndClipsAtWhite) {
   EXPECT_EQ(apply_tone_curve_to_gray_level(picture, sensor, 65535), 65535);
 }
 
-TEST(SimulateSensorImage, GammaOneLeavesImageUnchanged) {
+TEST(SimulateSensorImage, GammaOneGivesSameImageAsNoProcessing) {
   const Sensor noisy{16, 0.5, 0, 60000, 0, true, {}};
   const cv::Mat1f electrons = step(300, 3000);
   EXPECT_TRUE(same(simulate_sensor_image(noisy, electrons, 1, ImageProcessing{1, {}, {}}),
@@ -164,7 +164,7 @@ TEST(MakeSimulatedLampCapture, ImageNameIsPngUnlessJpegQualityIsGiven) {
   const LampShots captures{{0}, {{0, 0}}, {}, {0}, 0, 0, 1, 0.5, false};
   const CaptureSet set{"one", 5e-5, captures, {}};
   EXPECT_EQ(make_simulated_lamp_capture(scene, set, 0).image, "0000.png");
-  scene.picture = ImageProcessing{2.2, {}, 90};
+  scene.processing = ImageProcessing{2.2, {}, 90};
   EXPECT_EQ(make_simulated_lamp_capture(scene, set, 0).image, "0000.jpg");
 }
 

@@ -97,7 +97,7 @@ TEST_P(FrameRendererRectangle, TrueLampPixelIsProjectedRectangleCenter) {
   const LampShot shot = shot_at(scene_, {0.35, -0.2, 0.1}, 0.4);
   const auto truth = find_true_lamps_in_image(scene_, renderer, shot);
   ASSERT_EQ(truth.size(), 1U);
-  EXPECT_EQ(truth[0].in_view, 1);
+  EXPECT_EQ(truth[0].visible_fraction, 1);
   const auto center = projected(shot, {scene_.lamps[0].glow.position_m})[0];
   EXPECT_LT((truth[0].pixel - center).norm(), 1e-6);
 }
@@ -107,8 +107,8 @@ TEST_P(FrameRendererRectangle, VisibleFractionIsBetweenZeroAndOneAtImageEdge) {
   const LampShot shot = shot_at(scene_, {1.2, 0, 0.1}, 0);
   const auto truth = find_true_lamps_in_image(scene_, renderer, shot);
   ASSERT_EQ(truth.size(), 1U);
-  EXPECT_GT(truth[0].in_view, 0);
-  EXPECT_LT(truth[0].in_view, 1);
+  EXPECT_GT(truth[0].visible_fraction, 0);
+  EXPECT_LT(truth[0].visible_fraction, 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(

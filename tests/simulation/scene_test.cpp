@@ -77,7 +77,7 @@ TEST(ReadSceneFile, ReadsClutterAndBoard) {
   EXPECT_EQ(clutter.reflections.at(0).glow.rim_to_center_ratio, 0) << "it fades towards its rim";
   EXPECT_EQ(clutter.occluders.at(0).corner_m, Vector3d(-0.7, -0.2, 1.4));
   ASSERT_TRUE(scene.board);
-  EXPECT_EQ(scene.board->print.first_id, 9);
+  EXPECT_EQ(scene.board->pattern.first_id, 9);
   EXPECT_EQ(scene.board->margin_m, 0.02);
   EXPECT_EQ(scene.board->warp_m, Vector2d(0.0003, -0.0002));
   EXPECT_EQ(scene.board->white_e_per_s, 2.4e6);
@@ -113,13 +113,13 @@ TEST(ReadSceneFile, ReadsRecessesAndHalosOnlyWhereGiven) {
 }
 
 TEST(ReadSceneFile, ReadsImageProcessingOnlyIfGiven) {
-  const ImageProcessing picture = read_scene_text(kSceneYaml).picture.value();
+  const ImageProcessing picture = read_scene_text(kSceneYaml).processing.value();
   EXPECT_EQ(picture.gamma, 2.2);
   ASSERT_TRUE(picture.sharpening);
   EXPECT_EQ(picture.sharpening->amount, 0.6);
   EXPECT_EQ(picture.sharpening->radius_px, 1.5);
   EXPECT_EQ(picture.jpeg_quality, 90);
-  EXPECT_FALSE(read_scene_text(scene_with("processing: ", "# ")).picture);
+  EXPECT_FALSE(read_scene_text(scene_with("processing: ", "# ")).processing);
 }
 
 TEST(ReadSceneFile, ReadsSpotsHeightsAndYawsInOrderOfFile) {
@@ -135,7 +135,7 @@ TEST(ReadSceneFile, ReadsSpotsHeightsAndYawsInOrderOfFile) {
   EXPECT_EQ(set.lamps->repeat, 3);
   EXPECT_EQ(set.lamps->interval_s, 0.5);
   EXPECT_EQ(set.lamps->turn_rate_rad_per_s, 0);
-  EXPECT_TRUE(set.lamps->known);
+  EXPECT_TRUE(set.lamps->has_known_positions);
   EXPECT_EQ(count_captures_of_set(set), 2U * 2 * 2 * 3);
 }
 
@@ -153,7 +153,7 @@ TEST(ReadSceneFile, OrdersSpotsOfGridRowByRow) {
   EXPECT_NEAR(captures.yaw_jitter_rad, rad_from_deg(9), kRounding);
   EXPECT_NEAR(captures.turn_rate_rad_per_s, quarter_rad, kRounding);
   EXPECT_EQ(captures.repeat, 1);
-  EXPECT_FALSE(captures.known);
+  EXPECT_FALSE(captures.has_known_positions);
 }
 
 TEST(ReadSceneFile, ReturnsEquidistantDrivePositionsUpToItsEnd) {
@@ -180,7 +180,7 @@ TEST(ReadSceneFile, ReadsLimitsOfBoardViews) {
   EXPECT_EQ(set.board->distance_m, std::pair(0.2, 0.4));
   EXPECT_NEAR(set.board->tilt_rad, std::numbers::pi / 4, kRounding);
   EXPECT_NEAR(set.board->roll_rad, std::numbers::pi, kRounding);
-  EXPECT_EQ(set.board->spread, 0.75);
+  EXPECT_EQ(set.board->field_coverage, 0.75);
   EXPECT_EQ(set.board->velocity_m_per_s, Vector3d(0.1, 0, 0.2));
 }
 

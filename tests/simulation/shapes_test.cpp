@@ -96,7 +96,7 @@ TEST(RectanglePattern, IntegralOverRandomTriangleMatchesSampling) {
   }
 }
 
-TEST(RectanglePattern, IntegralIsExactAlongItsLines) {
+TEST(RectanglePattern, IntegralIsExactForTrianglesWithSidesOnEdges) {
   const RectanglePattern square({{0, 0, 2, 3, 0.5}});
   EXPECT_DOUBLE_EQ(integral_over(square, {{{0, 0}, {2, 0}, {2, 3}}}), 1.5);
   EXPECT_DOUBLE_EQ(integral_over(square, {{{2, 3}, {0, 3}, {0, 0}}}), 1.5);

@@ -119,7 +119,7 @@ TEST(MakeSimulatedBoardCapture, DistanceTiltAndOffsetStayWithinAndReachLimits) {
         make_simulated_board_capture(scene, set, i).camera_from_board(0);
     EXPECT_NEAR(camera_from_board.linear().determinant(), 1, 1e-12);
     Eigen::Vector3d middle_m(0, 0, 0);
-    middle_m.head<2>() = compute_tag_field_size_m(scene.board->print) / 2;
+    middle_m.head<2>() = compute_tag_field_size_m(scene.board->pattern) / 2;
     const Eigen::Vector3d middle = camera_from_board * middle_m;
     const double tilt =
         std::acos(std::min(1.0, middle.normalized().dot(camera_from_board.linear().col(2))));
@@ -150,7 +150,7 @@ TEST(MakeSimulatedBoardCapture, PlacesBoardAtLastRayWhereLensHasNone) {
   int at_the_rim = 0;
   for (std::size_t i = 0; i < 300; ++i) {
     Eigen::Vector3d middle_m(0, 0, 0);
-    middle_m.head<2>() = compute_tag_field_size_m(scene.board->print) / 2;
+    middle_m.head<2>() = compute_tag_field_size_m(scene.board->pattern) / 2;
     const Eigen::Vector3d sight =
         make_simulated_board_capture(scene, set, i).camera_from_board(0) * middle_m;
     const double off_axis_rad = std::atan2(sight.head<2>().norm(), sight.z());
@@ -166,7 +166,7 @@ TEST(BaseMotion, InclinationIsSumOfRollPitchAndVibration) {
   const Mount mount{Eigen::Matrix3d::Identity(), {0.1, 0}};
   BaseMotion motion{{1, 2, 0.5}, {0.5, 0}, 0.3, 0.2, mount};
   EXPECT_TRUE(motion.is_base_level());
-  motion.lean = {0.2, -0.1};
+  motion.inclination = {0.2, -0.1};
   EXPECT_FALSE(motion.is_base_level());
   const Eigen::Isometry3d pose = motion.world_from_camera(0);
   EXPECT_TRUE(pose.linear().isApprox(

@@ -69,15 +69,15 @@ class FrameRendererTags : public testing::Test {
 };
 
 TEST_F(FrameRendererTags, AprilTagDetectsPlainTagsAtTrueCorners) {
-  scene_.board->print.id_order = {true, BoardCorner::bottom_right};
+  scene_.board->pattern.id_order = {true, BoardCorner::bottom_right};
   apriltag_family_t* family = tag36h11_create();
   expect_all_read(scene_, family);
   tag36h11_destroy(family);
 }
 
 TEST_F(FrameRendererTags, AprilTagDetectsTagsWithOuterBitsAtTrueCorners) {
-  scene_.board->print.family = "tagStandard41h12";
-  scene_.board->print.first_id = 100;
+  scene_.board->pattern.family = "tagStandard41h12";
+  scene_.board->pattern.first_id = 100;
   apriltag_family_t* family = tagStandard41h12_create();
   expect_all_read(scene_, family);
   tagStandard41h12_destroy(family);

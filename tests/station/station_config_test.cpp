@@ -40,12 +40,12 @@ class ReadStationConfig : public testing::Test {
 TEST_F(ReadStationConfig, ReturnsContentOfReferencedFiles) {
   const StationConfig config = read_station_config(folder / "station.yaml");
   EXPECT_EQ(config.station, "station-1");
-  EXPECT_EQ(config.type.imager_px[0], 800);
+  EXPECT_EQ(config.nominal_camera.imager_px[0], 800);
   EXPECT_THAT(config.lamps.lamps, SizeIs(6));
   EXPECT_EQ(config.board.cols, 6);
-  EXPECT_EQ(config.sufficient.dispersion_captures, 40);
+  EXPECT_EQ(config.completion.dispersion_captures, 40);
   EXPECT_EQ(config.records, (folder / "records.db").string());
-  EXPECT_FALSE(config.golden);
+  EXPECT_FALSE(config.golden_unit);
 }
 
 /// The keys commented out with '#' are valid.
@@ -59,16 +59,16 @@ TEST_F(ReadStationConfig, AcceptsCommentedOutOptionalKeysOfExample) {
               "\n# (golden:|verify_due:|serial_pattern:|void_operators:|hook:|retention:| {9})"),
           "\n$1"));
   const StationConfig config = read_station_config(folder / "station.yaml");
-  ASSERT_TRUE(config.golden);
-  EXPECT_THAT(config.golden->gates, SizeIs(7));
-  ASSERT_TRUE(config.verify_due);
-  EXPECT_EQ(config.verify_due->units, 200);
+  ASSERT_TRUE(config.golden_unit);
+  EXPECT_THAT(config.golden_unit->gates, SizeIs(7));
+  ASSERT_TRUE(config.verification_interval);
+  EXPECT_EQ(config.verification_interval->units, 200);
   EXPECT_EQ(describe_serial_number_problem(config, "0001"), "");
   EXPECT_NE(describe_serial_number_problem(config, "x1"), "");
   EXPECT_EQ(config.void_operators, (std::vector<std::string>{"Ann", "Bea"}));
   ASSERT_TRUE(config.hook);
   EXPECT_THAT(config.hook->command, SizeIs(3));
-  EXPECT_EQ(config.keep.images_days, 90);
+  EXPECT_EQ(config.retention.images_days, 90);
 }
 
 TEST_F(ReadStationConfig, RejectsUnknownGateWithLine) {
@@ -94,10 +94,10 @@ TEST_F(ReadStationConfig, ReadsGuardBandsAndRejectsUnsuitableOnes) {
          "\nguard_bands: {k: 1.645, standard_uncertainties: {check_mean_mm: 0.02}}"
          "\nrecords: records.db");
   for (const Gate& gate : read_station_config(folder / "station.yaml").gates) {
-    ASSERT_EQ(gate.guard.has_value(), gate.metric == "check_mean_mm") << gate.metric;
-    if (!gate.guard) continue;
-    EXPECT_EQ(gate.guard->standard_uncertainty, 0.02);
-    EXPECT_EQ(gate.guard->k, 1.645);
+    ASSERT_EQ(gate.guard_band.has_value(), gate.metric == "check_mean_mm") << gate.metric;
+    if (!gate.guard_band) continue;
+    EXPECT_EQ(gate.guard_band->standard_uncertainty, 0.02);
+    EXPECT_EQ(gate.guard_band->k, 1.645);
   }
   const auto refused = [&](const std::string& from, const std::string& to) {
     const std::string before = TemporaryFolder::read_content(folder / "station.yaml");
@@ -173,10 +173,10 @@ TEST_F(ReadStationConfig, RejectsVerifyDueWithoutGoldenUnitAndZeroLimits) {
          "records: records.db\n"
          "golden: {camera_id: g, calibration: golden.yaml, gates: {tilt_deg: 1}}");
   const StationConfig config = read_station_config(folder / "station.yaml");
-  EXPECT_EQ(config.verify_due->hours, 24);
-  EXPECT_EQ(config.verify_due->units, 200);
-  EXPECT_EQ(config.keep.images_days, 90);
-  EXPECT_FALSE(config.keep.results_days);
+  EXPECT_EQ(config.verification_interval->hours, 24);
+  EXPECT_EQ(config.verification_interval->units, 200);
+  EXPECT_EQ(config.retention.images_days, 90);
+  EXPECT_FALSE(config.retention.results_days);
   change("station.yaml", "{hours: 24, units: 200}", "{}");
   EXPECT_THAT(rejection_message(), HasSubstr("verify_due: should have hours or units"));
   change("station.yaml", "verify_due: {}", "verify_due: {hours: 0}");
@@ -193,7 +193,7 @@ TEST_F(ReadStationConfig, RejectsGoldenCalibrationWithoutRowTime) {
   change("station.yaml", "records: records.db",
          "records: records.db\n"
          "golden: {camera_id: g, calibration: golden.yaml, gates: {tilt_deg: 1}}");
-  EXPECT_TRUE(read_station_config(folder / "station.yaml").golden);
+  EXPECT_TRUE(read_station_config(folder / "station.yaml").golden_unit);
   change("golden.yaml", "  row_time_s: 0.00003\n", "");
   EXPECT_THAT(rejection_message(), AllOf(HasSubstr("golden.calibration"), HasSubstr("row_time_s")));
 }

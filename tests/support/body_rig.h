@@ -53,7 +53,7 @@ inline Eigen::Isometry3d world_from_body(const BodyState& state, double time_s) 
 
 inline Eigen::Isometry3d body_from_camera(const BodyRig& rig) {
   Eigen::Isometry3d body_from_camera = Eigen::Isometry3d::Identity();
-  body_from_camera.linear() = compute_level_from_camera_rotation(rig.calibration, Correction::all);
+  body_from_camera.linear() = compute_level_from_camera_matrix(rig.calibration, Correction::all);
   if (!rig.mount) return body_from_camera;
   const Eigen::Matrix3d robot_from_level = rotation_about_z(rig.mount->yaw_in_robot_rad);
   body_from_camera.linear() = robot_from_level * body_from_camera.linear();

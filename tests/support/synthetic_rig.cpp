@@ -72,7 +72,7 @@ std::vector<Detection> seen_from(const SyntheticRig& rig, double sigma_px) {
   const Camera& camera = rig.calibration.camera;
   const Lens lens(camera.lens_model, camera.intrinsics);
   Eigen::Matrix3d level_from_camera =
-      vlp::compute_level_from_camera_rotation(rig.calibration, Correction::all);
+      vlp::compute_level_from_camera_matrix(rig.calibration, Correction::all);
   if (rig.inclination) {
     level_from_camera = level_rotation_from_inclination(*rig.inclination) * level_from_camera;
   }

@@ -42,8 +42,8 @@ constexpr double kMinNoise_px = 1e-4;
 struct AssembledProblem {
   AdjustmentProblem problem;
   Eigen::Vector3d origin_m;
-  std::vector<AdjustmentResult::Place> places = {};
-  std::vector<double> place_sd_m = {};
+  std::vector<AdjustmentResult::PositionResidual> known_positions = {};
+  std::vector<double> position_sd_m = {};
   std::vector<bool> lamp_seen = {};
   int rejected_captures = 0;
   bool noise_is_stated = true;
@@ -116,7 +116,7 @@ Eigen::Matrix2d d_undistorted_pixel_d_pixel(const Lens& lens, const Lens::Ray& r
 }
 
 /// Key of a known position that captures have in common: their spot, or the position itself.
-using PlaceKey = std::tuple<std::string, double, double, double, PlaceOf>;
+using PlaceKey = std::tuple<std::string, double, double, double, MeasuredPoint>;
 
 /// Lamps of a capture that the map has, in the order of their detections.
 struct CaptureLamps {
@@ -162,16 +162,17 @@ class ProblemAssembler {
       problem_.sightings.push_back(term);
       all_.lamp_seen[term.lamp] = true;
     }
-    if (capture.place) add_known_position(capture, *capture.place, index);
+    if (capture.known_position) add_known_position(capture, *capture.known_position, index);
   }
 
   /// Returns the problem; the standard deviation of a position is that of all its captures
   /// together.
   AssembledProblem finish() && {
-    for (auto& place : problem_.places) {
-      place.sd_m *= std::sqrt(static_cast<double>(all_.places[place.place].captures));
+    for (auto& place : problem_.position_observations) {
+      place.sd_m *=
+          std::sqrt(static_cast<double>(all_.known_positions[place.known_position].captures));
     }
-    problem_.place_used.assign(all_.places.size(), true);
+    problem_.is_known_position_used.assign(all_.known_positions.size(), true);
     if (input_.frees_map_shape) problem_.gauge = make_gauge(lamps_m_, all_.lamp_seen);
     for (std::size_t i = 0; i < sums_m_.size(); ++i) {
       problem_.state_vector().segment<3>(problem_.state_vector_layout().pivot_state_index(i)) =
@@ -184,7 +185,7 @@ class ProblemAssembler {
   static std::map<std::string, std::size_t> list_pivots(const AdjustmentInput& input) {
     std::map<std::string, std::size_t> pivots;
     for (const AdjustmentCapture& capture : input.captures) {
-      if (!capture.spot.empty()) pivots.emplace(capture.spot, pivots.size());
+      if (!capture.pivot.empty()) pivots.emplace(capture.pivot, pivots.size());
     }
     return pivots;
   }
@@ -253,8 +254,8 @@ class ProblemAssembler {
   /// Adds the axis of a pose to the mean of its pivot. Returns the index of the pivot, if there is
   /// one.
   std::optional<std::size_t> add_to_pivot(const AdjustmentCapture& capture, const Pose& pose) {
-    if (capture.spot.empty()) return std::nullopt;
-    const std::size_t pivot = pivots_.at(capture.spot);
+    if (capture.pivot.empty()) return std::nullopt;
+    const std::size_t pivot = pivots_.at(capture.pivot);
     const Eigen::Matrix2d turn = rotation_about_z(pose.yaw_rad).topLeftCorner<2, 2>();
     sums_m_[pivot] += pose.position_m;
     sums_m_[pivot].head<2>() -= turn * lever_arm_m_;
@@ -265,21 +266,23 @@ class ProblemAssembler {
 
   void add_known_position(const AdjustmentCapture& capture, const KnownPosition& place,
                           std::size_t capture_index) {
-    const PlaceKey key = capture.spot.empty() ? PlaceKey{"", place.xy_m.x(), place.xy_m.y(),
-                                                         place.z_m.value_or(kInfinite), place.of}
-                                              : PlaceKey{capture.spot, 0, 0, 0, place.of};
-    const auto [entry, is_new] = place_of_key_.emplace(key, all_.places.size());
+    const PlaceKey key = capture.pivot.empty()
+                             ? PlaceKey{"", place.xy_m.x(), place.xy_m.y(),
+                                        place.z_m.value_or(kInfinite), place.measured_point}
+                             : PlaceKey{capture.pivot, 0, 0, 0, place.measured_point};
+    const auto [entry, is_new] = place_of_key_.emplace(key, all_.known_positions.size());
     if (is_new) {
-      all_.places.push_back({capture.spot.empty() ? capture.name : capture.spot, place.of, 0,
-                             Eigen::Vector3d::Zero(), false});
-      all_.place_sd_m.push_back(place.sd_m);
+      all_.known_positions.push_back({capture.pivot.empty() ? capture.name : capture.pivot,
+                                      place.measured_point, 0, Eigen::Vector3d::Zero(), false});
+      all_.position_sd_m.push_back(place.sd_m);
     }
-    ++all_.places[entry->second].captures;
+    ++all_.known_positions[entry->second].captures;
     Eigen::Vector3d stated_m(place.xy_m.x(), place.xy_m.y(), place.z_m.value_or(0));
     stated_m -= all_.origin_m;
-    problem_.has_lever_arm |= place.of == PlaceOf::axis;
-    problem_.places.push_back({capture_index, entry->second, place.of == PlaceOf::axis, stated_m,
-                               place.z_m ? 3 : 2, place.sd_m});
+    problem_.has_lever_arm |= place.measured_point == MeasuredPoint::axis;
+    problem_.position_observations.push_back({capture_index, entry->second,
+                                              place.measured_point == MeasuredPoint::axis, stated_m,
+                                              place.z_m ? 3 : 2, place.sd_m});
   }
 
   const AdjustmentInput& input_;
@@ -343,17 +346,17 @@ bool update_inliers(AdjustmentProblem& problem, bool noise_is_stated, double deg
 /// Computes the residuals of the known positions, adjusted minus measured, as means over their
 /// captures.
 void compute_reference_position_residuals(AssembledProblem& all) {
-  for (auto& place : all.places) place.residual_m.setZero();
-  for (const auto& seen : all.problem.places) {
-    auto& place = all.places[seen.place];
+  for (auto& place : all.known_positions) place.residual_m.setZero();
+  for (const auto& seen : all.problem.position_observations) {
+    auto& place = all.known_positions[seen.known_position];
     place.residual_m.head(seen.size) +=
-        (all.problem.predict_camera_or_axis_position(seen) - seen.stated_m).head(seen.size) /
+        (all.problem.predict_camera_or_axis_position(seen) - seen.measured_m).head(seen.size) /
         place.captures;
   }
 }
 
 double compute_normalized_residual(const AssembledProblem& all, std::size_t place) {
-  return all.places[place].residual_m.norm() / all.place_sd_m[place];
+  return all.known_positions[place].residual_m.norm() / all.position_sd_m[place];
 }
 
 /// Returns the squared correction r of a lamp, adjusted minus surveyed, normalized by its expected
@@ -407,8 +410,9 @@ class Contradictions {
       }
     }
     compute_reference_position_residuals(all_);
-    for (std::size_t i = 0; i < all_.places.size(); ++i) {
-      all_.problem.place_used[i] = compute_normalized_residual(all_, i) <= kMaxPlaceSigmas;
+    for (std::size_t i = 0; i < all_.known_positions.size(); ++i) {
+      all_.problem.is_known_position_used[i] =
+          compute_normalized_residual(all_, i) <= kMaxPlaceSigmas;
     }
   }
 
@@ -416,22 +420,23 @@ class Contradictions {
   /// solution. Returns true if anything changes.
   bool refine(const Eigen::MatrixXd& covariance) {
     compute_reference_position_residuals(all_);
-    for (std::size_t i = 0; i < all_.places.size(); ++i) {
-      if (reinstated_places_.contains(i) || all_.problem.place_used[i]) continue;
+    for (std::size_t i = 0; i < all_.known_positions.size(); ++i) {
+      if (reinstated_places_.contains(i) || all_.problem.is_known_position_used[i]) continue;
       if (compute_normalized_residual(all_, i) > kMaxPlaceSigmas) continue;
       reinstated_places_.insert(i);
-      all_.problem.place_used[i] = true;
+      all_.problem.is_known_position_used[i] = true;
       return true;
     }
-    std::size_t worst_place = all_.places.size();
+    std::size_t worst_place = all_.known_positions.size();
     double worst = kMaxPlaceSigmas;
-    for (std::size_t i = 0; i < all_.places.size(); ++i) {
-      if (!all_.problem.place_used[i] || compute_normalized_residual(all_, i) <= worst) continue;
+    for (std::size_t i = 0; i < all_.known_positions.size(); ++i) {
+      if (!all_.problem.is_known_position_used[i] || compute_normalized_residual(all_, i) <= worst)
+        continue;
       worst = compute_normalized_residual(all_, i);
       worst_place = i;
     }
-    if (worst_place < all_.places.size()) {
-      all_.problem.place_used[worst_place] = false;
+    if (worst_place < all_.known_positions.size()) {
+      all_.problem.is_known_position_used[worst_place] = false;
       return true;
     }
     std::size_t worst_lamp = sd_m_.size();
@@ -495,11 +500,11 @@ std::optional<AdjustmentProblem::GlobalCovariance> refine_adjustment(
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     if (!problem.solve_adjustment(false)) return std::nullopt;
     const auto found = problem.compute_global_unknowns_covariance();
-    const double ratio = compute_noise_ratio(problem, found.freedom);
-    bool changed = update_inliers(problem, all.noise_is_stated, found.freedom);
+    const double ratio = compute_noise_ratio(problem, found.degrees_of_freedom);
+    bool changed = update_inliers(problem, all.noise_is_stated, found.degrees_of_freedom);
     if (!changed) changed = contradictions.refine(found.matrix);
     constexpr double rounding = 1e-6;
-    if (found.freedom > rounding) {
+    if (found.degrees_of_freedom > rounding) {
       const double scale = problem.noise_scale * ratio;
       const double next = std::max(scale, all.noise_is_stated ? 1 : kMinNoise_px);
       constexpr double tolerance = 0.01;
@@ -522,7 +527,7 @@ Eigen::MatrixXd compute_covariance_for_image_noise(AssembledProblem& all) {
     sighting.whitening = Eigen::Matrix2d::Identity() / sighting.sigma_px;
   }
   const double ratio =
-      compute_noise_ratio(problem, problem.compute_global_unknowns_covariance().freedom);
+      compute_noise_ratio(problem, problem.compute_global_unknowns_covariance().degrees_of_freedom);
   problem.noise_scale = std::max(problem.noise_scale * ratio, kMinNoise_px);
   return problem.compute_global_unknowns_covariance().matrix;
 }
@@ -554,7 +559,7 @@ bool solve_robustly(AssembledProblem& all, Contradictions& contradictions) {
   if (!problem.solve_adjustment(true) || !problem.solve_adjustment(true)) return false;
   contradictions.reject_far_observations();
   update_inliers(problem, all.noise_is_stated,
-                 problem.compute_global_unknowns_covariance().freedom);
+                 problem.compute_global_unknowns_covariance().degrees_of_freedom);
   return true;
 }
 
@@ -585,7 +590,7 @@ double compute_mean_height_m(const AdjustmentProblem& problem) {
     if (!sighting.used) continue;
     const auto& capture = problem.captures[sighting.capture];
     sum_m += state[at.lamp_state_index(sighting.lamp) + 2] -
-             state[(capture.spot ? at.pivot_state_index(*capture.spot) : capture.local) + 2];
+             state[(capture.pivot ? at.pivot_state_index(*capture.pivot) : capture.local) + 2];
     ++count;
   }
   return sum_m / std::max(1, count);
@@ -644,11 +649,12 @@ void set_adjusted_joint_covariance(const AdjustmentProblem& problem,
                                    AdjustmentResult& result) {
   const AdjustmentLayout& at = problem.state_vector_layout();
   const Eigen::Index intrinsics = count_intrinsics_with_covariance(result.camera);
-  const Eigen::Index rows = intrinsics + at.spots - at.zenith;
+  const Eigen::Index rows = intrinsics + at.pivots - at.zenith;
   Eigen::MatrixXd from_state = Eigen::MatrixXd::Zero(rows, at.global);
   from_state.block(0, at.lens, intrinsics, at.lens_size) =
       problem.lens_parametrization().directions;
-  from_state.block(intrinsics, at.zenith, at.spots - at.zenith, at.spots - at.zenith).setIdentity();
+  from_state.block(intrinsics, at.zenith, at.pivots - at.zenith, at.pivots - at.zenith)
+      .setIdentity();
   if (!has_lever_arm) from_state.middleRows<2>(intrinsics + 2).setZero();
   result.refined_covariance = from_state * covariance * from_state.transpose();
   result.refined_covariance =
@@ -666,7 +672,7 @@ void set_adjusted_map(const AssembledProblem& all, const Contradictions& contrad
   const Eigen::VectorXd& state = problem.state_vector();
   const Eigen::Index first_lamp = count_intrinsics_with_covariance(result.camera) + 4;
   for (std::size_t i = 0; i < problem.lamps.size(); ++i) {
-    Lamp& lamp = result.refined.lamps[i];
+    Lamp& lamp = result.refined_map.lamps[i];
     const Eigen::Index row = first_lamp + 3 * static_cast<Eigen::Index>(i);
     const double surveyed_sd_m = contradictions.expected_lamp_sd_m(i);
     const Eigen::Vector3d correction_m =
@@ -703,11 +709,11 @@ void set_adjusted_map(const AssembledProblem& all, const Contradictions& contrad
 /// Sets the known positions, and the properties of the map that only the survey determines.
 void set_position_residuals(AssembledProblem& all, AdjustmentResult& result) {
   compute_reference_position_residuals(all);
-  result.places = all.places;
+  result.known_positions = all.known_positions;
   std::size_t places_used = 0;
-  for (std::size_t i = 0; i < all.places.size(); ++i) {
-    result.places[i].wrong = !all.problem.place_used[i];
-    if (all.problem.place_used[i]) ++places_used;
+  for (std::size_t i = 0; i < all.known_positions.size(); ++i) {
+    result.known_positions[i].is_outlier = !all.problem.is_known_position_used[i];
+    if (all.problem.is_known_position_used[i]) ++places_used;
   }
   if (places_used < 3) {
     constexpr std::array<const char*, 3> undetermined_parts{
@@ -738,7 +744,7 @@ void set_adjusted_lens(const AdjustmentProblem& problem, const Eigen::MatrixXd& 
       result.lens_chi_squared += along * along / determined.values[i];
       ++result.lens_degrees_of_freedom;
     }
-    result.lens_contradicted =
+    result.lens_is_contradicted =
         result.lens_degrees_of_freedom > 0 &&
         result.lens_chi_squared >
             compute_chi_squared_bound(kSigmasOfOneInTenThousand, result.lens_degrees_of_freedom);
@@ -777,7 +783,7 @@ AdjustmentResult run_bundle_adjustment(const AdjustmentInput& input,
   result.rejected_captures = all.rejected_captures;
   result.rejected_detections = static_cast<int>(problem.sightings.size());
   result.camera = input.calibration.camera;
-  result.refined = input.lamps;
+  result.refined_map = input.lamps;
   if (problem.captures.empty()) {
     result.undetermined = "no capture shows two lamps of the map clearly enough for a fix";
     return result;
@@ -791,7 +797,7 @@ AdjustmentResult run_bundle_adjustment(const AdjustmentInput& input,
     return result;
   }
   const Eigen::MatrixXd& covariance = adjusted->matrix;
-  set_detection_residuals(problem, all.noise_is_stated, adjusted->freedom, result);
+  set_detection_residuals(problem, all.noise_is_stated, adjusted->degrees_of_freedom, result);
   bool has_lever_arm = false;
   result.undetermined = explain_undetermined(problem, covariance, compute_mean_height_m(problem),
                                              limits, has_lever_arm);

@@ -37,10 +37,11 @@
 ///   - positions of the camera or of the axis with their standard deviation
 namespace vlp {
 
-/// Measured position of the camera or of the rotation axis (`of`), in the world frame. `xy_m` is
-/// horizontal, in m. `z_m` is the height of the camera; std::nullopt if it was not measured.
+/// Measured position of the camera or of the rotation axis (`measured_point`), in the world frame.
+/// `xy_m` is horizontal, in m. `z_m` is the height of the camera; std::nullopt if it was not
+/// measured.
 struct KnownPosition {
-  PlaceOf of;
+  MeasuredPoint measured_point;
   Eigen::Vector2d xy_m;
   std::optional<double> z_m;
   /// Standard deviation of each coordinate; positive. A position that is measured once counts once:
@@ -56,8 +57,8 @@ struct AdjustmentCapture {
   std::optional<Inclination> inclination = {};
   /// Name of the spot. Captures of one spot rotate about one axis at one height; empty: the capture
   /// has a position of its own.
-  std::string spot = {};
-  std::optional<KnownPosition> place = {};
+  std::string pivot = {};
+  std::optional<KnownPosition> known_position = {};
   /// Motion of the camera; on a spot only the yaw rate is used. Requires row time and readout
   /// direction of the camera.
   KnownMotion motion = {};
@@ -108,7 +109,7 @@ struct AdjustmentResult {
   RotationCenter center;
   /// Adjusted lamp map. Lamps that are not detected, or that are exact, keep their positions. sd_m
   /// is the RMS over the axes.
-  LampMap refined;
+  LampMap refined_map;
   /// Correction of one lamp, adjusted minus surveyed position, in the world, and its standard
   /// deviation per axis.
   struct LampCorrection {
@@ -116,34 +117,34 @@ struct AdjustmentResult {
     Eigen::Vector3d correction_m, sd_m;
     /// True if the difference between adjusted and surveyed position exceeds all uncertainties. The
     /// survey of this lamp is then ignored.
-    bool moved;
+    bool is_moved;
   };
   /// Corrections of the detected lamps.
   std::vector<LampCorrection> lamps;
-  /// Joint covariance (Adjustment::covariance) for `refined`, and for the surveyed map. The latter
-  /// has the same estimates with the errors of the survey in the positions of the lamps.
+  /// Joint covariance (Adjustment::covariance) for `refined_map`, and for the surveyed map. The
+  /// latter has the same estimates with the errors of the survey in the positions of the lamps.
   Eigen::MatrixXd refined_covariance, surveyed_covariance;
 
   /// Known position of the camera or of the axis, with its residual after the adjustment.
-  struct Place {
+  struct PositionResidual {
     /// Name of the spot, or of the first capture with this position.
     std::string name;
-    PlaceOf of;
+    MeasuredPoint measured_point;
     /// Number of captures with this position.
     int captures;
     /// Adjusted minus measured position: x, y, and z if it was measured.
     Eigen::Vector3d residual_m;
     /// True if the position contradicts the other data and is rejected.
-    bool wrong;
+    bool is_outlier;
   };
-  std::vector<Place> places;
+  std::vector<PositionResidual> known_positions;
   /// Squared correction of the lens, normalized by its covariance, over the directions that
   /// captures determine.
   double lens_chi_squared = 0;
   /// Number of directions of the lens in `lens_chi_squared`, which is its expectation.
   int lens_degrees_of_freedom = 0;
   /// True if `lens_chi_squared` exceeds its bound of one in ten thousand.
-  bool lens_contradicted = false;
+  bool lens_is_contradicted = false;
 
   /// Number of captures that are used, and of captures without a fix, with fewer than two lamps of
   /// the map, or without an inlier.

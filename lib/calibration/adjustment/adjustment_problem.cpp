@@ -50,8 +50,8 @@ ZenithRotation rotate_level_point_to_camera(const Eigen::Vector2d& zenith,
 
 LensParametrization::LensParametrization(const Camera& camera,
                                          const std::optional<MatrixX>& covariance)
-    : start(Eigen::Map<const Eigen::VectorXd>(camera.intrinsics.data(),
-                                              std::ssize(camera.intrinsics))),
+    : nominal_intrinsics(Eigen::Map<const Eigen::VectorXd>(camera.intrinsics.data(),
+                                                           std::ssize(camera.intrinsics))),
       directions(count_intrinsics_with_covariance(camera), 0) {
   if (!covariance) return;
   // Scales pixels and coefficients by their standard deviations to make them comparable.
@@ -70,14 +70,14 @@ LensParametrization::LensParametrization(const Camera& camera,
                values.tail(kept).cwiseMax(0).cwiseSqrt().asDiagonal();
 }
 
-AdjustmentProblem::AdjustmentProblem(LensModel model, LensParametrization freedom,
+AdjustmentProblem::AdjustmentProblem(LensModel model, LensParametrization lens,
                                      std::size_t lamp_count, std::size_t spot_count)
-    : model_(model), freedom_(std::move(freedom)) {
-  layout_.lens_size = freedom_.directions.cols();
+    : model_(model), lens_parametrization_(std::move(lens)) {
+  layout_.lens_size = lens_parametrization_.directions.cols();
   layout_.zenith = layout_.lens_size;
   layout_.lever_arm = layout_.zenith + 2;
   layout_.lamps = layout_.lever_arm + 2;
-  layout_.spots = layout_.lamp_state_index(lamp_count);
+  layout_.pivots = layout_.lamp_state_index(lamp_count);
   layout_.global = layout_.pivot_state_index(spot_count);
   state_ = Eigen::VectorXd::Zero(layout_.global);
 }
@@ -87,7 +87,7 @@ void AdjustmentProblem::add_capture_with_initial_pose(const Capture& capture, co
   added.local = state_.size();
   captures.push_back(added);
   state_.conservativeResize(state_.size() + capture.size());
-  if (!capture.spot) state_.segment<3>(added.local) = start.position_m;
+  if (!capture.pivot) state_.segment<3>(added.local) = start.position_m;
   Eigen::Index next = added.local + capture.num_pose_unknowns();
   state_[next - 1] = start.yaw_rad;
   if (capture.is_velocity_estimated()) {
@@ -98,11 +98,12 @@ void AdjustmentProblem::add_capture_with_initial_pose(const Capture& capture, co
 }
 
 std::vector<double> AdjustmentProblem::current_intrinsics() const {
-  std::vector<double> values(static_cast<std::size_t>(freedom_.start.size()));
+  std::vector<double> values(
+      static_cast<std::size_t>(lens_parametrization_.nominal_intrinsics.size()));
   Eigen::Map<Eigen::VectorXd> changed(values.data(), std::ssize(values));
-  changed = freedom_.start;
-  changed.head(freedom_.directions.rows()).noalias() +=
-      freedom_.directions * state_.segment(layout_.lens, layout_.lens_size);
+  changed = lens_parametrization_.nominal_intrinsics;
+  changed.head(lens_parametrization_.directions.rows()).noalias() +=
+      lens_parametrization_.directions * state_.segment(layout_.lens, layout_.lens_size);
   return values;
 }
 
@@ -122,11 +123,11 @@ CapturePose compute_capture_pose(const Eigen::VectorXd& state, const AdjustmentL
   const Eigen::Index motion = capture.local + capture.num_pose_unknowns();
   const double yaw_rad = state[motion - 1];
   const Eigen::Index position =
-      capture.spot ? layout.pivot_state_index(*capture.spot) : capture.local;
+      capture.pivot ? layout.pivot_state_index(*capture.pivot) : capture.local;
   CapturePose camera{state.segment<3>(position), rotation_about_z(-yaw_rad),
                      capture.motion.velocity_m_per_s, capture.motion.yaw_rate_rad_per_s};
   // The axis is stationary.
-  if (capture.spot) camera.velocity_m_per_s.setZero();
+  if (capture.pivot) camera.velocity_m_per_s.setZero();
   if (capture.is_velocity_estimated()) camera.velocity_m_per_s = state.segment<2>(motion);
   if (capture.is_yaw_rate_estimated()) {
     camera.yaw_rate_rad_per_s = state[capture.local + capture.size() - 1];
@@ -138,7 +139,7 @@ CapturePose compute_capture_pose(const Eigen::VectorXd& state, const AdjustmentL
 /// is the axis', elsewhere the camera's.
 double arm_factor(const AdjustmentProblem::PositionObservation& place,
                   const AdjustmentProblem::Capture& capture) {
-  return (place.of_axis ? 0 : 1) - (capture.spot ? 0 : 1);
+  return (place.is_axis_position ? 0 : 1) - (capture.pivot ? 0 : 1);
 }
 
 }  // namespace
@@ -156,7 +157,7 @@ std::optional<AdjustmentResidual> AdjustmentProblem::linearize_lamp_observation(
   rotated.head<2>() -= camera.velocity_m_per_s * time_s;
   rotated = (readout_from_middle * rotated).eval();
   Eigen::Vector3d level = rotated;
-  if (capture.spot) level.head<2>() -= state_.segment<2>(layout_.lever_arm);
+  if (capture.pivot) level.head<2>() -= state_.segment<2>(layout_.lever_arm);
   const ZenithRotation turn = rotate_level_point_to_camera(state_.segment<2>(layout_.zenith),
                                                            capture.base_from_level * level);
   const auto seen = lens.project_point_with_jacobians(turn.x_in_camera);
@@ -168,7 +169,7 @@ std::optional<AdjustmentResidual> AdjustmentProblem::linearize_lamp_observation(
   const Matrix23 by_lamp = by_lamp_in_level * camera.level_from_world;
   Eigen::MatrixXd by_local(2, capture.size());
   Eigen::Index next = capture.num_pose_unknowns();
-  if (!capture.spot) by_local.leftCols<3>() = -by_lamp;
+  if (!capture.pivot) by_local.leftCols<3>() = -by_lamp;
   by_local.col(next - 1) =
       by_lamp_in_level * Eigen::Vector3d(lamp_at_mid_exposure.y(), -lamp_at_mid_exposure.x(), 0);
   if (capture.is_velocity_estimated()) {
@@ -179,14 +180,15 @@ std::optional<AdjustmentResidual> AdjustmentProblem::linearize_lamp_observation(
     by_local.col(next) = time_s * (by_level * Eigen::Vector3d(rotated.y(), -rotated.x(), 0));
   }
   AdjustmentResidual at{weight * (sighting.pixel - seen->pixel), {{capture.local, by_local}}};
-  if (capture.spot) {
-    at.parts.push_back({layout_.pivot_state_index(*capture.spot), -by_lamp});
-    at.parts.push_back({layout_.lever_arm, -by_level.leftCols<2>()});
+  if (capture.pivot) {
+    at.blocks.push_back({layout_.pivot_state_index(*capture.pivot), -by_lamp});
+    at.blocks.push_back({layout_.lever_arm, -by_level.leftCols<2>()});
   }
-  at.parts.push_back({layout_.zenith, by_camera * turn.jacobian_wrt_zenith});
-  at.parts.push_back({lamp, by_lamp});
+  at.blocks.push_back({layout_.zenith, by_camera * turn.jacobian_wrt_zenith});
+  at.blocks.push_back({lamp, by_lamp});
   if (layout_.lens_size > 0) {
-    at.parts.push_back({layout_.lens, -weight * seen->d_pixel_d_parameters * freedom_.directions});
+    at.blocks.push_back(
+        {layout_.lens, -weight * seen->d_pixel_d_parameters * lens_parametrization_.directions});
   }
   return at;
 }
@@ -209,17 +211,17 @@ AdjustmentResidual AdjustmentProblem::linearize_known_position(
   const Eigen::Vector3d position_m = predict_camera_or_axis_position(place);
   const Eigen::Vector3d arm_m = position_m - camera.position_m;
   Eigen::MatrixXd by_local = Eigen::MatrixXd::Zero(3, capture.size());
-  if (!capture.spot) by_local.leftCols<3>().setIdentity();
+  if (!capture.pivot) by_local.leftCols<3>().setIdentity();
   by_local.col(capture.num_pose_unknowns() - 1) << -arm_m.y(), arm_m.x(), 0;
-  AdjustmentResidual at{position_m - place.stated_m, {{capture.local, by_local}}};
-  if (capture.spot)
-    at.parts.push_back({layout_.pivot_state_index(*capture.spot), Eigen::Matrix3d::Identity()});
+  AdjustmentResidual at{position_m - place.measured_m, {{capture.local, by_local}}};
+  if (capture.pivot)
+    at.blocks.push_back({layout_.pivot_state_index(*capture.pivot), Eigen::Matrix3d::Identity()});
   if (factor != 0) {
-    at.parts.push_back(
+    at.blocks.push_back(
         {layout_.lever_arm, factor * camera.level_from_world.transpose().leftCols<2>()});
   }
   at.value = (at.value.head(place.size) / place.sd_m).eval();
-  for (auto& [first, jacobian] : at.parts) {
+  for (auto& [first, jacobian] : at.blocks) {
     jacobian = (jacobian.topRows(place.size) / place.sd_m).eval();
   }
   return at;
@@ -240,7 +242,7 @@ AdjustmentResidual AdjustmentProblem::linearize_motion_prior(const Capture& capt
     weights[size - 1] = 1 / known.yaw_rate_sd_rad_per_s;
   }
   at.value.array() *= weights.array();
-  at.parts.front().jacobian.rightCols(size) = weights.asDiagonal();
+  at.blocks.front().jacobian.rightCols(size) = weights.asDiagonal();
   return at;
 }
 
@@ -251,13 +253,13 @@ AdjustmentResidual AdjustmentProblem::linearize_gauge_constraint() const {
         gauge.middleRows<3>(3 * static_cast<Eigen::Index>(i)).transpose();
     if (by_lamp.isZero(0)) continue;  // not detected
     at.value += by_lamp * (state_.segment<3>(layout_.lamp_state_index(i)) - lamps[i].surveyed_m);
-    at.parts.push_back({layout_.lamp_state_index(i), by_lamp});
+    at.blocks.push_back({layout_.lamp_state_index(i), by_lamp});
   }
   return at;
 }
 
 bool AdjustmentProblem::is_lamp_position_exact(Eigen::Index first) const {
-  return first >= layout_.lamps && first < layout_.spots &&
+  return first >= layout_.lamps && first < layout_.pivots &&
          lamps[static_cast<std::size_t>(first - layout_.lamps) / 3].sd_m == 0;
 }
 
@@ -291,8 +293,8 @@ std::vector<AdjustmentProblem::Term> AdjustmentProblem::make_least_squares_terms
                      true});
   }
   if (gauge.cols() > 0) terms.push_back({[this] { return linearize_gauge_constraint(); }});
-  for (const PositionObservation& place : places) {
-    if (!place_used[place.place] || !capture_used[place.capture]) continue;
+  for (const PositionObservation& place : position_observations) {
+    if (!is_known_position_used[place.known_position] || !capture_used[place.capture]) continue;
     terms.push_back(
         {[this, &place] { return linearize_known_position(place); }, true, false, place.capture});
   }
@@ -325,7 +327,7 @@ class TermCost : public ceres::CostFunction {
   TermCost(Linearize linearize, const AdjustmentResidual& start)
       : linearize_(std::move(linearize)) {
     set_num_residuals(static_cast<int>(start.value.size()));
-    for (const auto& [first, jacobian] : start.parts) {
+    for (const auto& [first, jacobian] : start.blocks) {
       mutable_parameter_block_sizes()->push_back(static_cast<int32_t>(jacobian.cols()));
     }
   }
@@ -333,8 +335,8 @@ class TermCost : public ceres::CostFunction {
     const auto at = linearize_();
     if (!at) return false;
     Eigen::Map<Eigen::VectorXd>(residuals, at->value.size()) = at->value;
-    for (std::size_t i = 0; jacobians != nullptr && i < at->parts.size(); ++i) {
-      const Eigen::MatrixXd& jacobian = at->parts[i].jacobian;
+    for (std::size_t i = 0; jacobians != nullptr && i < at->blocks.size(); ++i) {
+      const Eigen::MatrixXd& jacobian = at->blocks[i].jacobian;
       if (jacobians[i] == nullptr) continue;
       Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
           jacobians[i], jacobian.rows(), jacobian.cols()) = jacobian;
@@ -360,7 +362,7 @@ bool AdjustmentProblem::solve_adjustment(bool robust) {
     const auto start = term.linearize();
     if (!start) return false;
     std::vector<double*> blocks;
-    for (const auto& [first, jacobian] : start->parts) {
+    for (const auto& [first, jacobian] : start->blocks) {
       double* const block = blocks.emplace_back(state_.data() + first);
       ceres.AddParameterBlock(block, static_cast<int>(jacobian.cols()));
       order->AddElementToGroup(block, first < layout_.global ? 1 : 0);
@@ -391,7 +393,7 @@ Eigen::MatrixXd AdjustmentProblem::make_weak_prior_information_matrix() const {
   Eigen::VectorXd information = Eigen::VectorXd::Zero(layout_.global);
   information.segment<2>(layout_.zenith).setConstant(1 / (guess_rad * guess_rad));
   information.segment<2>(layout_.lever_arm).setConstant(1 / (guess_m * guess_m));
-  information.tail(layout_.global - layout_.spots).setConstant(1 / (guess_m * guess_m));
+  information.tail(layout_.global - layout_.pivots).setConstant(1 / (guess_m * guess_m));
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     if (std::isinf(lamps[i].sd_m)) {
       information.segment<3>(layout_.lamp_state_index(i)).setConstant(1 / (guess_m * guess_m));
@@ -420,7 +422,7 @@ struct CaptureRows {
     residuals.push_back(residual);
     rows += residual.value.size();
     if (is_detection) detection_rows = rows;
-    for (const auto& [first, jacobian] : residual.parts) {
+    for (const auto& [first, jacobian] : residual.blocks) {
       for (Eigen::Index i = 0; first < local && i < jacobian.cols(); ++i)
         unknowns.insert(first + i);
     }
@@ -476,13 +478,13 @@ AdjustmentProblem::GlobalCovariance AdjustmentProblem::compute_global_unknowns_c
   for (const Term& term : make_least_squares_terms(lens)) {
     auto at = term.linearize();
     if (!at) continue;
-    std::erase_if(at->parts, [&](const auto& part) { return is_lamp_position_exact(part.first); });
+    std::erase_if(at->blocks, [&](const auto& part) { return is_lamp_position_exact(part.first); });
     if (term.capture) {
       rows[*term.capture].add(*at, term.is_detection, captures[*term.capture].local);
       continue;
     }
-    for (const auto& [row, a] : at->parts) {
-      for (const auto& [column, b] : at->parts) {
+    for (const auto& [row, a] : at->blocks) {
+      for (const auto& [column, b] : at->blocks) {
         information.block(row, column, a.cols(), b.cols()) += a.transpose() * b;
       }
     }

@@ -29,7 +29,7 @@ struct AdjustmentLayout {
   Eigen::Index lever_arm = 0;
   /// Indices of the positions of the lamps and of the spots, in the world, m. Each has three
   /// coordinates; those of a spot are x, y of the axis and z of the camera.
-  Eigen::Index lamps = 0, spots = 0;
+  Eigen::Index lamps = 0, pivots = 0;
   /// Number of global unknowns, and index of the first local unknown.
   Eigen::Index global = 0;
 
@@ -37,7 +37,7 @@ struct AdjustmentLayout {
     return lamps + 3 * static_cast<Eigen::Index>(i);
   }
   Eigen::Index pivot_state_index(std::size_t i) const {
-    return spots + 3 * static_cast<Eigen::Index>(i);
+    return pivots + 3 * static_cast<Eigen::Index>(i);
   }
 };
 
@@ -45,7 +45,7 @@ struct AdjustmentLayout {
 /// covariance. Comprises the intrinsics that have errors (count_intrinsics_with_covariance()).
 /// Omits directions in which the covariance is numeric noise.
 struct LensParametrization {
-  Eigen::VectorXd start;
+  Eigen::VectorXd nominal_intrinsics;
   Eigen::MatrixXd directions;
 
   LensParametrization(const Camera& camera, const std::optional<MatrixX>& covariance);
@@ -54,12 +54,12 @@ struct LensParametrization {
 /// Whitened residual with its derivatives with respect to blocks of the state.
 struct AdjustmentResidual {
   Eigen::VectorXd value;
-  struct Part {
+  struct Block {
     /// Index of the first unknown of the block.
     Eigen::Index first;
     Eigen::MatrixXd jacobian;
   };
-  std::vector<Part> parts;
+  std::vector<Block> blocks;
 };
 
 /// Unknowns, observations and priors of an adjustment.
@@ -80,7 +80,7 @@ class AdjustmentProblem {
   /// Capture with the location of its local unknowns.
   struct Capture {
     /// Index of the spot of the capture; std::nullopt if the capture has a position of its own.
-    std::optional<std::size_t> spot;
+    std::optional<std::size_t> pivot;
     /// Rotation from the level frame to the frame of the base.
     Eigen::Matrix3d base_from_level;
     /// Motion of the camera; on a spot only the yaw rate is used.
@@ -89,9 +89,9 @@ class AdjustmentProblem {
     /// a spot. Velocity and yaw rate follow if these are not known exactly.
     Eigen::Index local = 0;
 
-    bool is_velocity_estimated() const { return !spot && motion.velocity_sd_m_per_s > 0; }
+    bool is_velocity_estimated() const { return !pivot && motion.velocity_sd_m_per_s > 0; }
     bool is_yaw_rate_estimated() const { return motion.yaw_rate_sd_rad_per_s > 0; }
-    Eigen::Index num_pose_unknowns() const { return spot ? 1 : 4; }
+    Eigen::Index num_pose_unknowns() const { return pivot ? 1 : 4; }
     Eigen::Index num_motion_unknowns() const {
       return (is_velocity_estimated() ? 2 : 0) + (is_yaw_rate_estimated() ? 1 : 0);
     }
@@ -105,9 +105,9 @@ class AdjustmentProblem {
   };
   /// Observation of a known position by one capture.
   struct PositionObservation {
-    std::size_t capture, place;
-    bool of_axis;
-    Eigen::Vector3d stated_m;
+    std::size_t capture, known_position;
+    bool is_axis_position;
+    Eigen::Vector3d measured_m;
     /// Number of coordinates: 3, or 2 without a height.
     Eigen::Index size;
     /// Effective standard deviation: that of the known position times the square root of its number
@@ -115,8 +115,8 @@ class AdjustmentProblem {
     double sd_m;
   };
 
-  AdjustmentProblem(LensModel model, LensParametrization freedom, std::size_t lamps,
-                    std::size_t spots);
+  AdjustmentProblem(LensModel model, LensParametrization lens, std::size_t lamps,
+                    std::size_t pivots);
 
   /// Adds a capture and its local unknowns, with the initial pose `start`.
   void add_capture_with_initial_pose(const Capture& capture, const Pose& start);
@@ -131,8 +131,8 @@ class AdjustmentProblem {
   /// Directions of the lamps' coordinates that stay as surveyed, one column each, divided by the
   /// standard deviation of this constraint. Without columns there is no constraint.
   Eigen::MatrixXd gauge;
-  std::vector<PositionObservation> places;
-  std::vector<bool> place_used;
+  std::vector<PositionObservation> position_observations;
+  std::vector<bool> is_known_position_used;
   /// True if some residual depends on the lever arm.
   bool has_lever_arm = false;
   /// Factor by which all sigma_px are multiplied.
@@ -162,13 +162,13 @@ class AdjustmentProblem {
     Eigen::MatrixXd matrix;
     /// Degrees of freedom of the detections that are used: the number of their coordinates minus
     /// the trace of their hat matrix.
-    double freedom;
+    double degrees_of_freedom;
   };
   /// Computes the covariance of the global unknowns at the current state, after marginalization of
   /// the local ones.
   GlobalCovariance compute_global_unknowns_covariance() const;
 
-  const LensParametrization& lens_parametrization() const { return freedom_; }
+  const LensParametrization& lens_parametrization() const { return lens_parametrization_; }
 
  private:
   /// Residual of the least-squares problem: a detection, another observation, or a prior.
@@ -192,7 +192,7 @@ class AdjustmentProblem {
   Eigen::MatrixXd make_weak_prior_information_matrix() const;
 
   LensModel model_;
-  LensParametrization freedom_;
+  LensParametrization lens_parametrization_;
   AdjustmentLayout layout_;
   Eigen::VectorXd state_;
 };

@@ -12,10 +12,11 @@ namespace vlp {
 namespace {
 
 /// Sets the fixes and circles before and after the correction.
-void set_fixes_before_and_after(DispersionFit& fit, const ReferencePointFixes& station,
+void set_fixes_before_and_after(DispersionFit& fit, const ReferencePointFixes& reference_fixes,
                                 const std::vector<bool>& used, DispersionCircle kind) {
-  const OptionalFixes before = station.compute_capture_fixes_at_offset({0, 0}),
-                      after = station.compute_capture_fixes_at_offset(fit.dispersion.offset_px);
+  const OptionalFixes before = reference_fixes.compute_capture_fixes_at_offset({0, 0}),
+                      after =
+                          reference_fixes.compute_capture_fixes_at_offset(fit.dispersion.offset_px);
   std::vector<Eigen::Vector2d> before_m, after_m;
   for (std::size_t i = 0; i < before.size(); ++i) {
     if (!before[i] || !after[i]) continue;
@@ -46,33 +47,33 @@ std::vector<Dispersion::UncertainLamp> make_uncertain_lamps(const LampDerivative
   for (std::size_t i = 0; i < derivatives.lamps.size(); ++i) {
     const Lamp& lamp = derivatives.lamps[i];
     const auto by_position_px =
-        derivatives.by_positions.block<2, 3>(0, 3 * static_cast<Eigen::Index>(i));
+        derivatives.jacobian_wrt_positions.block<2, 3>(0, 3 * static_cast<Eigen::Index>(i));
     lamps.push_back({lamp.id, lamp.position_m, *lamp.sd_m,
                      focal_px.cwiseInverse().asDiagonal() * by_position_px});
   }
   return lamps;
 }
 
-void fit_chen_guan_offset(DispersionFit& fit, const ReferencePointFixes& station,
+void fit_chen_guan_offset(DispersionFit& fit, const ReferencePointFixes& reference_fixes,
                           const Eigen::Vector2d& focal_px, DispersionCircle kind) {
   const ChenGuanOffset found =
-      estimate_dispersion_offset_by_chen_guan(station, focal_px, kind, fit.noise_is_stated);
+      estimate_dispersion_offset_by_chen_guan(reference_fixes, focal_px, kind, fit.noise_is_stated);
   fit.status = found.status;
   if (found.status != DispersionStatus::ok) return;
   fit.dispersion.offset_px = found.offset_px;
   fit.dispersion.covariance = found.covariance;
-  fit.dispersion.by_lamps = make_uncertain_lamps(found.by_lamps, focal_px);
-  set_fixes_before_and_after(fit, station, found.used, kind);
+  fit.dispersion.uncertain_lamps = make_uncertain_lamps(found.lamp_derivatives, focal_px);
+  set_fixes_before_and_after(fit, reference_fixes, found.used, kind);
 }
 
-void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& station,
+void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& reference_fixes,
                        const Eigen::Vector2d& focal_px, DispersionCircle kind) {
-  const auto separation = separate_camera_and_world_offsets(station);
+  const auto separation = separate_camera_and_world_offsets(reference_fixes);
   if (!separation) {
     fit.status = DispersionStatus::diverged;
     return;
   }
-  const OptionalFixes fixes = station.compute_capture_fixes_at_offset({0, 0});
+  const OptionalFixes fixes = reference_fixes.compute_capture_fixes_at_offset({0, 0});
   if (compute_mean_fix(fixes, separation->used).count < 3) {
     fit.status = DispersionStatus::too_few_captures;
     return;
@@ -81,23 +82,23 @@ void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& station,
     fit.status = DispersionStatus::single_yaw;
     return;
   }
-  if (separation->freedom <= 0) {
+  if (separation->degrees_of_freedom <= 0) {
     fit.status = DispersionStatus::too_few_captures;
     return;
   }
   const double factor = compute_small_sample_variance_factor(
-      separation->variance_factor, separation->freedom, fit.noise_is_stated);
+      separation->variance_factor, separation->degrees_of_freedom, fit.noise_is_stated);
   fit.dispersion.offset_px = separation->offset_px;
   Matrix2 covariance = factor * separation->covariance.topLeftCorner<2, 2>();
   covariance(1, 0) = covariance(0, 1);
   fit.dispersion.covariance = covariance;
-  fit.dispersion.by_lamps = make_uncertain_lamps(separation->by_lamps, focal_px);
+  fit.dispersion.uncertain_lamps = make_uncertain_lamps(separation->lamp_derivatives, focal_px);
   const Eigen::MatrixXd world_changes_m =
-      separation->by_lamps.scale_jacobian_by_lamp_sds().bottomRows<2>();
+      separation->lamp_derivatives.scale_jacobian_by_lamp_sds().bottomRows<2>();
   fit.world_offset_m = separation->world_m;
   fit.world_covariance = factor * separation->covariance.bottomRightCorner<2, 2>() +
                          world_changes_m * world_changes_m.transpose();
-  set_fixes_before_and_after(fit, station, separation->used, kind);
+  set_fixes_before_and_after(fit, reference_fixes, separation->used, kind);
 }
 
 }  // namespace
@@ -105,13 +106,13 @@ void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& station,
 DispersionFit estimate_heading_dependent_offset(std::span<const ReferencePointCapture> captures,
                                                 const LampMap& map, const Calibration& calibration,
                                                 DispersionMethod method, DispersionCircle circle) {
-  const ReferencePointFixes station(captures, map, calibration);
-  const OptionalFixes fixes = station.compute_capture_fixes_at_offset({0, 0});
+  const ReferencePointFixes reference_fixes(captures, map, calibration);
+  const OptionalFixes fixes = reference_fixes.compute_capture_fixes_at_offset({0, 0});
   const auto count =
       std::count_if(fixes.begin(), fixes.end(), [](const auto& fix) { return fix.has_value(); });
   DispersionFit fit;
   fit.captures_without_fix = static_cast<int>(std::ssize(fixes) - count);
-  fit.no_fix_status = station.first_failed_fix_status();
+  fit.no_fix_status = reference_fixes.first_failed_fix_status();
   fit.noise_is_stated = all_have_sigma(captures);
   if (count == 0) return fit;
   const bool paper = method == DispersionMethod::chen_guan;
@@ -126,9 +127,9 @@ DispersionFit estimate_heading_dependent_offset(std::span<const ReferencePointCa
     fit.status = DispersionStatus::ok;
     const Eigen::Vector2d focal_px = calibration.camera.focal_px();
     if (paper) {
-      fit_chen_guan_offset(fit, station, focal_px, circle);
+      fit_chen_guan_offset(fit, reference_fixes, focal_px, circle);
     } else {
-      fit_camera_offset(fit, station, focal_px, circle);
+      fit_camera_offset(fit, reference_fixes, focal_px, circle);
     }
   }
   return fit;

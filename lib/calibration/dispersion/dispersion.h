@@ -65,8 +65,8 @@ struct DispersionFit {
   bool noise_is_stated = false;
 
   /// Offset with its uncertainty; the circle is that of `before`. The covariance follows from the
-  /// scatter of the fixes and their noise (compute_small_sample_variance_factor()), `by_lamps` from
-  /// the map's sd_m. Both are absent for the enclosing circle.
+  /// scatter of the fixes and their noise (compute_small_sample_variance_factor()),
+  /// `uncertain_lamps` from the map's sd_m. Both are absent for the enclosing circle.
   Dispersion dispersion = {{0, 0}, 0, {0, 0}, 0, {}};
   /// Mean error of the corrected fixes, fixed in the world: fix minus reference point. Caused by
   /// errors of the reference point or the lamp map. Absent for method `chen_guan`, which assumes

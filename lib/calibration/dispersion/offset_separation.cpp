@@ -82,8 +82,8 @@ std::optional<Eigen::Vector4d> apply_least_squares_step(const std::vector<Equati
   at.offset_px += step.head<2>();
   at.world_m += step.tail<2>();
   at.covariance = information.inverse();
-  at.freedom = 2 * count - 4;
-  at.variance_factor = at.freedom > 0 ? chi_squared / at.freedom : 0;
+  at.degrees_of_freedom = 2 * count - 4;
+  at.variance_factor = at.degrees_of_freedom > 0 ? chi_squared / at.degrees_of_freedom : 0;
   return step;
 }
 
@@ -151,14 +151,14 @@ std::optional<bool> solve_without_outliers(const ReferencePointFixes& fixes, Off
 LampDerivatives propagate_map_errors(const ReferencePointFixes& fixes, const OffsetSeparation& at) {
   LampDerivatives derivatives = fixes.compute_fix_jacobian_wrt_lamps(at.offset_px);
   if (derivatives.lamps.empty()) return derivatives;
-  const Eigen::MatrixXd& d_fixes = derivatives.by_positions;
+  const Eigen::MatrixXd& d_fixes = derivatives.jacobian_wrt_positions;
   Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(4, d_fixes.cols());
   for (const Equation& equation : linearize_fix_equations(fixes, at)) {
     if (!at.used[equation.capture]) continue;
     const auto row = 2 * static_cast<Eigen::Index>(equation.capture);
     gradient += equation.jacobian.transpose() * equation.whitening * d_fixes.middleRows<2>(row);
   }
-  derivatives.by_positions = -at.covariance * gradient;
+  derivatives.jacobian_wrt_positions = -at.covariance * gradient;
   return derivatives;
 }
 
@@ -175,16 +175,16 @@ std::optional<OffsetSeparation> separate_camera_and_world_offsets(
     if (!changed) return std::nullopt;
     if (!*changed) break;
   }
-  result.by_lamps = propagate_map_errors(fixes, result);
+  result.lamp_derivatives = propagate_map_errors(fixes, result);
   return result;
 }
 
 namespace {
 
-std::vector<Eigen::Vector2d> compute_errors(const ReferencePointFixes& station,
+std::vector<Eigen::Vector2d> compute_errors(const ReferencePointFixes& reference_fixes,
                                             const Eigen::Vector2d& offset_px,
                                             const std::vector<bool>& used) {
-  const OptionalFixes fixes = station.compute_capture_fixes_at_offset(offset_px);
+  const OptionalFixes fixes = reference_fixes.compute_capture_fixes_at_offset(offset_px);
   std::vector<Eigen::Vector2d> errors_m;
   for (std::size_t i = 0; i < fixes.size(); ++i) {
     if (fixes[i] && used[i]) errors_m.push_back(fixes[i]->error_m);
@@ -200,7 +200,7 @@ Eigen::Vector2d compute_mean_point(const std::vector<Eigen::Vector2d>& points) {
 
 /// Differentiates the mean fix with respect to the offset, numerically. The result is not finite if
 /// there is no fix.
-Eigen::Matrix2d differentiate_mean_fix_by_offset(const ReferencePointFixes& station,
+Eigen::Matrix2d differentiate_mean_fix_by_offset(const ReferencePointFixes& reference_fixes,
                                                  const Eigen::Vector2d& at_px,
                                                  const std::vector<bool>& used) {
   constexpr double step_px =
@@ -208,9 +208,10 @@ Eigen::Matrix2d differentiate_mean_fix_by_offset(const ReferencePointFixes& stat
   Eigen::Matrix2d derivative;
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
     const Eigen::Vector2d step = step_px * Eigen::Vector2d::Unit(axis);
-    derivative.col(axis) = (compute_mean_point(compute_errors(station, at_px + step, used)) -
-                            compute_mean_point(compute_errors(station, at_px - step, used))) /
-                           (2 * step_px);
+    derivative.col(axis) =
+        (compute_mean_point(compute_errors(reference_fixes, at_px + step, used)) -
+         compute_mean_point(compute_errors(reference_fixes, at_px - step, used))) /
+        (2 * step_px);
   }
   return derivative;
 }
@@ -264,18 +265,18 @@ Eigen::Matrix2d estimate_covariance_of_mean(const std::vector<Eigen::Vector2d>& 
 
 /// Computes the derivatives of the offset with respect to the positions of the lamps. The offset
 /// compensates the mean change of the fixes.
-LampDerivatives compute_offset_derivatives(const ReferencePointFixes& station,
+LampDerivatives compute_offset_derivatives(const ReferencePointFixes& reference_fixes,
                                            const ChenGuanOffset& found,
                                            const Eigen::Matrix2d& image_from_floor) {
-  LampDerivatives derivatives = station.compute_fix_jacobian_wrt_lamps(found.offset_px);
-  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(2, derivatives.by_positions.cols());
+  LampDerivatives derivatives = reference_fixes.compute_fix_jacobian_wrt_lamps(found.offset_px);
+  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(2, derivatives.jacobian_wrt_positions.cols());
   double count = 0;
   for (std::size_t i = 0; i < found.used.size(); ++i) {
     if (!found.used[i]) continue;
-    mean += derivatives.by_positions.middleRows<2>(2 * static_cast<Eigen::Index>(i));
+    mean += derivatives.jacobian_wrt_positions.middleRows<2>(2 * static_cast<Eigen::Index>(i));
     ++count;
   }
-  derivatives.by_positions = -image_from_floor * mean / count;
+  derivatives.jacobian_wrt_positions = -image_from_floor * mean / count;
   return derivatives;
 }
 
@@ -291,11 +292,11 @@ Circle fit_circle_to_dispersed_fixes(const std::vector<Eigen::Vector2d>& points,
   return circle;
 }
 
-ChenGuanOffset estimate_dispersion_offset_by_chen_guan(const ReferencePointFixes& station,
+ChenGuanOffset estimate_dispersion_offset_by_chen_guan(const ReferencePointFixes& reference_fixes,
                                                        const Eigen::Vector2d& focal_px,
                                                        DispersionCircle kind,
                                                        bool noise_is_stated) {
-  const OptionalFixes fixes = station.compute_capture_fixes_at_offset({0, 0});
+  const OptionalFixes fixes = reference_fixes.compute_capture_fixes_at_offset({0, 0});
   const std::vector<bool> used = flag_fixes_near_median(fixes);
   const MeanFix mean_fix = compute_mean_fix(fixes, used);
   if (!mean_fix.are_capture_yaws_similar()) return {.status = DispersionStatus::several_yaws};
@@ -307,11 +308,12 @@ ChenGuanOffset estimate_dispersion_offset_by_chen_guan(const ReferencePointFixes
   constexpr double tolerance_m = 1e-10;  // far below any noise
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    const auto errors_m = compute_errors(station, offset_px, used);
+    const auto errors_m = compute_errors(reference_fixes, offset_px, used);
     if (errors_m.size() < 2) break;
     const Eigen::Vector2d center_m = fit_circle_to_dispersed_fixes(errors_m, kind).center;
     if (iteration > 0) {
-      image_from_floor = differentiate_mean_fix_by_offset(station, offset_px, used).inverse();
+      image_from_floor =
+          differentiate_mean_fix_by_offset(reference_fixes, offset_px, used).inverse();
       if (!image_from_floor.allFinite()) break;
     }
     if (center_m.norm() > tolerance_m) {
@@ -321,12 +323,12 @@ ChenGuanOffset estimate_dispersion_offset_by_chen_guan(const ReferencePointFixes
     ChenGuanOffset found{.status = DispersionStatus::ok, .offset_px = offset_px, .used = used};
     if (kind == DispersionCircle::mean) {
       const Eigen::Matrix2d noise_m2 = compute_mean_noise(
-          station.compute_capture_fixes_at_offset(offset_px), used, noise_is_stated);
+          reference_fixes.compute_capture_fixes_at_offset(offset_px), used, noise_is_stated);
       const Eigen::Matrix2d mean_covariance_m2 = estimate_covariance_of_mean(errors_m, noise_m2);
       Matrix2 covariance = image_from_floor * mean_covariance_m2 * image_from_floor.transpose();
       covariance(1, 0) = covariance(0, 1);
       found.covariance = covariance;
-      found.by_lamps = compute_offset_derivatives(station, found, image_from_floor);
+      found.lamp_derivatives = compute_offset_derivatives(reference_fixes, found, image_from_floor);
     }
     return found;
   }

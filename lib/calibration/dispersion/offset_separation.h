@@ -23,11 +23,11 @@ struct OffsetSeparation {
   Eigen::Matrix4d covariance;
   /// Derivatives of (offset_px, world_m) with respect to the positions of the lamps, rows as in
   /// `covariance`.
-  LampDerivatives by_lamps = {};
+  LampDerivatives lamp_derivatives = {};
   /// Variance factor: squared residuals divided by their expectation. It is 0 without redundancy.
   double variance_factor;
   /// Number of rows of the used fixes minus the number of unknowns.
-  int freedom = 0;
+  int degrees_of_freedom = 0;
   /// True for each capture whose fix is used.
   std::vector<bool> used;
 };
@@ -63,7 +63,7 @@ struct ChenGuanOffset {
   std::optional<Matrix2> covariance = {};
   /// Derivatives of offset_px with respect to the positions of the lamps; empty without a
   /// covariance.
-  LampDerivatives by_lamps = {};
+  LampDerivatives lamp_derivatives = {};
   /// True for each capture whose fix is used.
   std::vector<bool> used = {};
 };
@@ -79,7 +79,7 @@ struct ChenGuanOffset {
 /// is applied as a shift and all lamps have one height. After a rotation center of model `tilt` the
 /// offset is applied as a rotation, which moves fixes by more. The offset is therefore corrected by
 /// the remaining D until it vanishes.
-ChenGuanOffset estimate_dispersion_offset_by_chen_guan(const ReferencePointFixes& station,
+ChenGuanOffset estimate_dispersion_offset_by_chen_guan(const ReferencePointFixes& reference_fixes,
                                                        const Eigen::Vector2d& focal_px,
                                                        DispersionCircle kind, bool noise_is_stated);
 

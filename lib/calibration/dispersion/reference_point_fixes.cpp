@@ -41,7 +41,7 @@ Fix locate_camera_of_capture(const Positioner& positioner, const ReferencePointC
 }  // namespace
 
 Eigen::MatrixXd LampDerivatives::scale_jacobian_by_lamp_sds() const {
-  Eigen::MatrixXd moves = by_positions;
+  Eigen::MatrixXd moves = jacobian_wrt_positions;
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     moves.middleCols<3>(3 * static_cast<Eigen::Index>(i)) *= *lamps[i].sd_m;
   }
@@ -99,12 +99,13 @@ LampDerivatives ReferencePointFixes::compute_fix_jacobian_wrt_lamps(
   }
   derivatives.lamps.reserve(uncertain.size());
   for (const std::size_t lamp : uncertain) derivatives.lamps.push_back(map_.lamps[lamp]);
-  Eigen::MatrixXd& by_positions = derivatives.by_positions;
-  by_positions = Eigen::MatrixXd::Zero(2 * std::ssize(captures_), 3 * std::ssize(uncertain));
+  Eigen::MatrixXd& jacobian_wrt_positions = derivatives.jacobian_wrt_positions;
+  jacobian_wrt_positions =
+      Eigen::MatrixXd::Zero(2 * std::ssize(captures_), 3 * std::ssize(uncertain));
   if (uncertain.empty()) return derivatives;
   const auto here = compute_capture_fixes_at_offset(offset_px);
   LampMap moved = map_;
-  for (Eigen::Index column = 0; column < by_positions.cols(); ++column) {
+  for (Eigen::Index column = 0; column < jacobian_wrt_positions.cols(); ++column) {
     const std::size_t lamp = uncertain[static_cast<std::size_t>(column / 3)];
     double& coordinate_m = moved.lamps[lamp].position_m[column % 3];
     // A small step, so that no lamp is rejected for it.
@@ -115,7 +116,7 @@ LampDerivatives ReferencePointFixes::compute_fix_jacobian_wrt_lamps(
     coordinate_m = map_.lamps[lamp].position_m[column % 3];
     for (std::size_t i = 0; i < here.size(); ++i) {
       if (!here[i] || !there[i]) continue;
-      by_positions.block<2, 1>(2 * static_cast<Eigen::Index>(i), column) =
+      jacobian_wrt_positions.block<2, 1>(2 * static_cast<Eigen::Index>(i), column) =
           (there[i]->error_m - here[i]->error_m) / step_m;
     }
   }
@@ -190,9 +191,9 @@ double compute_small_sample_variance_factor(double ratio, double degrees_of_free
   assert(degrees_of_freedom > 0);
   const double from_residuals = ratio * compute_student_factor(degrees_of_freedom);
   if (!noise_is_stated) return from_residuals;
-  const double total_freedom = kStatedFreedom + degrees_of_freedom;
-  const double combined = (kStatedFreedom + degrees_of_freedom * ratio) / total_freedom *
-                          compute_student_factor(total_freedom);
+  const double total_freedom = kGivenNoiseDegreesOfFreedom + degrees_of_freedom;
+  const double combined = (kGivenNoiseDegreesOfFreedom + degrees_of_freedom * ratio) /
+                          total_freedom * compute_student_factor(total_freedom);
   const double factor = std::max(1.0, combined);
   const double weight = compute_yaw_contradiction(pooled_ratio.value_or(ratio), degrees_of_freedom);
   return factor * std::pow(std::max(1.0, from_residuals / factor), weight);

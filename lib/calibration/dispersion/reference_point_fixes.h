@@ -17,7 +17,7 @@ namespace vlp {
 struct LampDerivatives {
   std::vector<Lamp> lamps;
   /// Matrix of the derivatives: one row for each quantity, three columns (x, y, z) for each lamp.
-  Eigen::MatrixXd by_positions;
+  Eigen::MatrixXd jacobian_wrt_positions;
 
   /// Returns the changes of the quantities for errors of one standard deviation, one column per
   /// lamp coordinate.
@@ -97,7 +97,7 @@ bool are_all_fixes_far_from_reference_point(const OptionalFixes& fixes);
 
 /// Degrees of freedom assigned to given noise: its standard deviation is accurate to 29 %, 1 /
 /// sqrt(12).
-inline constexpr double kStatedFreedom = 6;
+inline constexpr double kGivenNoiseDegreesOfFreedom = 6;
 
 /// Computes the factor of a variance, so that 1.96 standard deviations cover about 95 % of the
 /// errors.
@@ -105,7 +105,7 @@ inline constexpr double kStatedFreedom = 6;
 /// The residuals have the variance s^2 = `ratio` times the nominal one, with nu degrees of freedom;
 /// q(m) = (t_m / 1.96)^2 with a bound t_m of Student's t at 97.5 % (compute_t_squared_bound). If
 /// the noise is not stated the factor is ratio q(nu). Given noise counts as an estimate with n =
-/// kStatedFreedom:
+/// kGivenNoiseDegreesOfFreedom:
 ///   f = max(1, (n + nu ratio) / (n + nu) q(n + nu)),
 /// and if the residuals contradict it, f (ratio q(nu) / f)^w where that is larger: w rises from 0
 /// to 1 with chi-squared between its bounds of 20 % and 5 %, so that the factor is continuous.

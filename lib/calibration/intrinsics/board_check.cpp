@@ -58,7 +58,7 @@ std::vector<Step> collect_tag_center_steps(std::span<const BoardView> views,
   for (const BoardView& view : views) {
     std::vector<TagDetection> tags;
     std::vector<double> widths_px;
-    for (const auto* seen : {&view.seen.tags, &view.seen.foreign}) {
+    for (const auto* seen : {&view.detection.tags, &view.detection.foreign_tags}) {
       for (const TagDetection& tag : *seen) {
         const auto straight = undistort_tag(tag, lens);
         if (!straight) continue;

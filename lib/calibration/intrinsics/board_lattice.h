@@ -49,7 +49,7 @@ class BoardLattice {
     /// Factor by which a solve multiplies the residual of the corner.
     double weight = 1;
     /// Curvature of the tag's edge from this corner to the tag's next corner.
-    EdgeCurvature bow = {};
+    EdgeCurvature curvature = {};
     /// Standard deviation from pixel noise (TagDetection::corner_sds_px), px; 0 if unknown.
     double sd_px = 0;
   };

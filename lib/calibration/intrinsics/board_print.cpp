@@ -32,7 +32,7 @@ std::vector<Eigen::Vector3d> make_board_points(const BoardProblem& problem) {
 
 }  // namespace
 
-std::optional<PrintEffect> compute_board_aspect_error_effect_on_lens(
+std::optional<AspectErrorEffect> compute_board_aspect_error_effect_on_lens(
     const IntrinsicsSolution& solution, double print_sd, const ImageRegion& region) {
   const double aspect_error = std::numbers::sqrt2 * print_sd;
   const Lens lens = solution.fitted_lens();
@@ -52,7 +52,7 @@ std::optional<PrintEffect> compute_board_aspect_error_effect_on_lens(
       measured.head<2>() += *stated - *printed;
     }
   }
-  if (!solve_lens_parameters(problem, solution.solved_for)) return {};
+  if (!solve_lens_parameters(problem, solution.solved_parameters)) return {};
   const Lens printed(problem.lens_model, problem.intrinsics);
   const auto everywhere = compute_projection_difference(lens, printed, problem.imager_px,
                                                         [](const Eigen::Vector2d&) { return 1.0; });
@@ -64,7 +64,7 @@ std::optional<PrintEffect> compute_board_aspect_error_effect_on_lens(
       });
   if (!everywhere || !in_region) return {};
   const auto count = static_cast<Eigen::Index>(problem.intrinsics.size());
-  return PrintEffect{
+  return AspectErrorEffect{
       Eigen::Map<const Eigen::VectorXd>(problem.intrinsics.data(), count) -
           Eigen::Map<const Eigen::VectorXd>(solution.problem.intrinsics.data(), count),
       everywhere->rms_px, in_region->mean_px, in_region->worst_px};

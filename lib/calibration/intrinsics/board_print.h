@@ -12,7 +12,7 @@ namespace vlp {
 
 /// Effect of an aspect error of the printed board on a lens: the change if the board is wider than
 /// stated, at the stated height.
-struct PrintEffect {
+struct AspectErrorEffect {
   /// Change of each intrinsic, in the order of the lens model, due to an error of the board's
   /// aspect. The error is one standard deviation: the board is wider than stated by the fraction
   /// sqrt(2) print_sd.
@@ -34,7 +34,7 @@ struct PrintEffect {
 /// @param print_sd  Board::print_sd, > 0
 /// @param region    region where the lens is known (CalibrationReport::region)
 /// @return std::nullopt if that solve fails
-std::optional<PrintEffect> compute_board_aspect_error_effect_on_lens(
+std::optional<AspectErrorEffect> compute_board_aspect_error_effect_on_lens(
     const IntrinsicsSolution& solution, double print_sd, const ImageRegion& region = {});
 
 }  // namespace vlp

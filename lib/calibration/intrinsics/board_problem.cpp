@@ -116,7 +116,7 @@ class BoardCost : public ceres::CostFunction {
   std::vector<std::size_t> inliers_;
 };
 
-bool solve_without_reweighting(BoardProblem& problem, const SolveOptions& what) {
+bool solve_without_reweighting(BoardProblem& problem, const SolveOptions& solve_options) {
   std::vector<std::array<double, 6>> poses;
   for (const BoardPose& pose : problem.poses) {
     poses.push_back({pose.rotation.x(), pose.rotation.y(), pose.rotation.z(),
@@ -138,10 +138,10 @@ bool solve_without_reweighting(BoardProblem& problem, const SolveOptions& what) 
   if (residuals < intrinsics.size() + 6 * poses.size()) return false;
   order->AddElementToGroup(intrinsics.data(), 1);
   order->AddElementToGroup(warp_m.data(), 1);
-  if (!what.warp) equations.SetParameterBlockConstant(warp_m.data());
-  if (!what.core) {
+  if (!solve_options.warp) equations.SetParameterBlockConstant(warp_m.data());
+  if (!solve_options.core) {
     equations.SetParameterBlockConstant(intrinsics.data());
-  } else if (!what.distortions && intrinsics.size() > 4) {
+  } else if (!solve_options.distortions && intrinsics.size() > 4) {
     std::vector<int> fixed;
     for (int i = 4; i < static_cast<int>(intrinsics.size()); ++i) fixed.push_back(i);
     equations.SetManifold(intrinsics.data(),
@@ -231,46 +231,48 @@ bool is_lens_model_supported_by_mrcal(LensModel model) {
   return lens_model_name(model).starts_with("LENSMODEL_");
 }
 
-bool solve_board_problem(BoardProblem& problem, const SolveOptions& what) {
+bool solve_board_problem(BoardProblem& problem, const SolveOptions& solve_options) {
   if (!is_lens_model_supported_by_mrcal(problem.lens_model))
-    return solve_board_problem_by_ceres(problem, what) && is_valid_lens(problem);
+    return solve_board_problem_by_ceres(problem, solve_options) && is_valid_lens(problem);
   constexpr double max_rms_ratio = 1.05;
   const BoardProblem start = problem;
-  if (!solve_board_problem_by_mrcal(problem, what) || !is_valid_lens(problem)) return false;
+  if (!solve_board_problem_by_mrcal(problem, solve_options) || !is_valid_lens(problem))
+    return false;
   const InlierFit left(problem);
   if (left.projects_all || is_splined_lens_model(problem.lens_model) ||
       !InlierFit(start).projects_all)
     return true;
   BoardProblem without_poles = start;
-  if (solve_board_problem_by_ceres(without_poles, what) &&
+  if (solve_board_problem_by_ceres(without_poles, solve_options) &&
       !(InlierFit(without_poles).rms_px > max_rms_ratio * left.rms_px)) {
     problem = std::move(without_poles);
   }
   return true;
 }
 
-Linearization linearize_board_problem(const BoardProblem& problem, const SolveOptions& what) {
+Linearization linearize_board_problem(const BoardProblem& problem,
+                                      const SolveOptions& solve_options) {
   return is_lens_model_supported_by_mrcal(problem.lens_model)
-             ? linearize_board_problem_by_mrcal(problem, what)
-             : linearize_board_problem_analytically(problem, what);
+             ? linearize_board_problem_by_mrcal(problem, solve_options)
+             : linearize_board_problem_analytically(problem, solve_options);
 }
 
-bool solve_board_problem_by_ceres(BoardProblem& problem, const SolveOptions& what) {
-  if (!solve_without_reweighting(problem, what)) return false;
+bool solve_board_problem_by_ceres(BoardProblem& problem, const SolveOptions& solve_options) {
+  if (!solve_without_reweighting(problem, solve_options)) return false;
   constexpr int max_iterations = 10;
   for (int iteration = 0;
-       what.without_outliers && iteration < max_iterations && mark_outlier_points(problem);
+       solve_options.reject_outliers && iteration < max_iterations && mark_outlier_points(problem);
        ++iteration) {
-    if (!solve_without_reweighting(problem, what)) return false;
+    if (!solve_without_reweighting(problem, solve_options)) return false;
   }
   return true;
 }
 
 Linearization linearize_board_problem_analytically(const BoardProblem& problem,
-                                                   const SolveOptions& what) {
+                                                   const SolveOptions& solve_options) {
   const auto intrinsics = static_cast<Eigen::Index>(problem.intrinsics.size());
   const auto boards = static_cast<Eigen::Index>(problem.poses.size());
-  const Eigen::Index warp = intrinsics + 6 * boards, states = warp + (what.warp ? 2 : 0);
+  const Eigen::Index warp = intrinsics + 6 * boards, states = warp + (solve_options.warp ? 2 : 0);
   const auto rows = static_cast<Eigen::Index>(2 * problem.points.size());
   const std::size_t count = problem.num_points_per_board();
   const Lens lens(problem.lens_model, problem.intrinsics);
@@ -301,7 +303,7 @@ Linearization linearize_board_problem_analytically(const BoardProblem& problem,
     add(0, (weight * point->projection.d_pixel_d_parameters).eval());
     add(intrinsics + 6 * static_cast<Eigen::Index>(i / count),
         (weight * point->d_pixel_d_pose).eval());
-    if (what.warp) add(warp, (weight * point->d_pixel_d_warp).eval());
+    if (solve_options.warp) add(warp, (weight * point->d_pixel_d_warp).eval());
   }
   for (double& each : result.scale) each = each > 0 ? 1 / std::sqrt(each) : 1;
   result.jacobian_transposed.resize(states, rows);

@@ -63,7 +63,7 @@ struct SolveOptions {
   bool core = false;         // fx fy cx cy
   bool distortions = false;  // regularized as in mrcal
   bool warp = false;
-  bool without_outliers = false;  // gives outliers a negative weight
+  bool reject_outliers = false;  // gives outliers a negative weight
 };
 
 /// Minimizes the residuals in place: by mrcal_optimize, or by Ceres for models that mrcal lacks.
@@ -77,7 +77,7 @@ struct SolveOptions {
 ///
 /// @return false if the solve fails: no lens of the model can project the points, too few points
 ///     for the unknowns, or a focal length that is not positive
-bool solve_board_problem(BoardProblem& problem, const SolveOptions& what);
+bool solve_board_problem(BoardProblem& problem, const SolveOptions& solve_options);
 
 /// Residuals and Jacobian of a problem. State and Jacobian are packed: the state is divided by
 /// `scale`, so that its entries have similar magnitudes.
@@ -97,18 +97,19 @@ struct Linearization {
   Eigen::Index first_intrinsic, poses;
 };
 /// Linearizes a problem at its current parameters.
-Linearization linearize_board_problem(const BoardProblem& problem, const SolveOptions& what);
+Linearization linearize_board_problem(const BoardProblem& problem,
+                                      const SolveOptions& solve_options);
 
 /// Returns true if mrcal has the lens model.
 bool is_lens_model_supported_by_mrcal(LensModel model);
 /// Implementations of solve_board_problem() and linearize_board_problem() by mrcal and by Ceres.
-bool solve_board_problem_by_mrcal(BoardProblem& problem, const SolveOptions& what);
-bool solve_board_problem_by_ceres(BoardProblem& problem, const SolveOptions& what);
+bool solve_board_problem_by_mrcal(BoardProblem& problem, const SolveOptions& solve_options);
+bool solve_board_problem_by_ceres(BoardProblem& problem, const SolveOptions& solve_options);
 Linearization linearize_board_problem_by_mrcal(const BoardProblem& problem,
-                                               const SolveOptions& what);
+                                               const SolveOptions& solve_options);
 /// Linearizes with analytic Jacobians, with respect to all intrinsics and poses, and to the warp if
-/// what.warp.
+/// solve_options.warp.
 Linearization linearize_board_problem_analytically(const BoardProblem& problem,
-                                                   const SolveOptions& what);
+                                                   const SolveOptions& solve_options);
 
 }  // namespace vlp

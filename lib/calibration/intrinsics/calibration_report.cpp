@@ -106,7 +106,8 @@ CalibrationReport compute_lens_calibration_report(const IntrinsicsSolution& solu
                                                  lens, input.imager_px, covariance, report.region));
     }
   }
-  report.halves = compare_lenses_of_view_halves(solution, input, uncertainty, report.region);
+  report.split_half_difference =
+      compare_lenses_of_view_halves(solution, input, uncertainty, report.region);
   return report;
 }
 
@@ -153,8 +154,8 @@ ViewCoverage compute_board_view_coverage(const IntrinsicsSolution& solution,
     for (const auto& corner : input.views[view]) {
       const double u = corner.pixel.x(), v = corner.pixel.y();
       ++coverage.corners[static_cast<std::size_t>(
-          ImageCoverage::cell_index_along_edge(v, height, 3) * 3 +
-          ImageCoverage::cell_index_along_edge(u, width, 3))];
+          ImageCoverage::image_cell_index_along_axis(v, height, 3) * 3 +
+          ImageCoverage::image_cell_index_along_axis(u, width, 3))];
       parts.add_corner_pixel(corner.pixel);
     }
   }

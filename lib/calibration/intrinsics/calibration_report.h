@@ -42,7 +42,7 @@ struct CalibrationReport {
   /// fits and the errors of tags are independent, and larger otherwise. For splined lenses only
   /// pixels that both halves determine are compared. std::nullopt if a half does not determine a
   /// lens.
-  std::optional<ProjectionDifference> halves;
+  std::optional<ProjectionDifference> split_half_difference;
 };
 /// Computes the report of a solution; solves twice for `halves`. `input`: input of its solve.
 /// @pre solution.has_succeeded()

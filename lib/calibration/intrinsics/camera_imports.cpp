@@ -131,7 +131,7 @@ ImageRegion parse_mrcal_region(const fs::path& file, const std::string& text) {
   return region;
 }
 
-AnyCamera parse_mrcal_camera(const fs::path& file, const std::string& text) {
+ImportedCamera parse_mrcal_camera(const fs::path& file, const std::string& text) {
   // The inputs of the optimization are long and not needed.
   const std::string literal = strip_comments(text);
   const std::string head = literal.substr(0, literal.find("'optimization_inputs'"));
@@ -315,9 +315,9 @@ void set_lens_differences(const Lens& from, const Lens& to, const std::array<int
 
 }  // namespace
 
-AnyCamera read_camera_of_any_format(const fs::path& file) {
+ImportedCamera read_camera_of_any_format(const fs::path& file) {
   std::string text = read_file(file, kMaxCameraBytes);
-  AnyCamera found;
+  ImportedCamera found;
   Camera& camera = found.camera;
   if (text.find("'lensmodel'") != std::string::npos ||
       text.find("\"lensmodel\"") != std::string::npos) {

@@ -10,7 +10,7 @@
 namespace vlp {
 
 /// Camera from a file of any supported format.
-struct AnyCamera {
+struct ImportedCamera {
   Camera camera;
   /// Polygon of the image region where the lens is calibrated, px: region_px of a calibration, or
   /// valid_intrinsics_region of mrcal. Empty if the file has none.
@@ -24,7 +24,7 @@ struct AnyCamera {
 ///   ROS camera_info: plumb_bob, rational_polynomial, equidistant
 ///   Kalibr's camchain, its cam0: pinhole with radtan, equidistant or none
 /// @throws InputError, also for skewed camera matrices and for an empty valid_intrinsics_region
-AnyCamera read_camera_of_any_format(const std::filesystem::path& file);
+ImportedCamera read_camera_of_any_format(const std::filesystem::path& file);
 
 /// Camera whose lens was replaced by one of another model.
 struct FittedCamera {

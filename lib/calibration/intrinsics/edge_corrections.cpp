@@ -87,7 +87,7 @@ double correct_corners_for_edge_curvature(std::vector<BoardLattice::Corner>& cor
   double max_displacement_px = 0;
   for (std::size_t first = 0; first + 4 <= corners.size(); first += 4) {
     const auto tag = corners.begin() + static_cast<std::ptrdiff_t>(first);
-    if (!std::all_of(tag, tag + 4, [](const auto& corner) { return corner.bow.reach > 0; })) {
+    if (!std::all_of(tag, tag + 4, [](const auto& corner) { return corner.curvature.reach > 0; })) {
       continue;
     }
     const Eigen::Vector2d inside = (tag[0].pixel + tag[1].pixel + tag[2].pixel + tag[3].pixel) / 4;
@@ -98,7 +98,7 @@ double correct_corners_for_edge_curvature(std::vector<BoardLattice::Corner>& cor
                  next = static_cast<std::ptrdiff_t>((k + 1) % 4);
       const Chord chord(tag[at].pixel, tag[next].pixel, inside);
       outwards[k] = chord.outwards;
-      edges[k] = compute_displaced_edge(chord, tag[at].bow, lens);
+      edges[k] = compute_displaced_edge(chord, tag[at].curvature, lens);
     }
     if (!std::all_of(edges.begin(), edges.end(), [](const auto& edge) { return edge; })) continue;
     std::array<Eigen::Vector2d, 4> steps;
@@ -117,7 +117,7 @@ double correct_corners_for_edge_curvature(std::vector<BoardLattice::Corner>& cor
     for (std::size_t k = 0; k < 4; ++k) {
       BoardLattice::Corner& corner = tag[static_cast<std::ptrdiff_t>(k)];
       corner.pixel += steps[k];
-      corner.bow = edges[k]->bow;
+      corner.curvature = edges[k]->curvature;
       max_displacement_px = std::max(max_displacement_px, steps[k].norm());
     }
   }

@@ -17,8 +17,8 @@ class ImageCoverage {
   explicit ImageCoverage(const std::array<int, 2>& imager_px) : imager_px_(imager_px) {}
 
   void add_corner_pixel(const Eigen::Vector2d& pixel) {
-    ++corners_[flat_cell_index(cell_index_along_edge(pixel.x(), imager_px_[0], kCols),
-                               cell_index_along_edge(pixel.y(), imager_px_[1], kRows))];
+    ++corners_[flat_cell_index(image_cell_index_along_axis(pixel.x(), imager_px_[0], kCols),
+                               image_cell_index_along_axis(pixel.y(), imager_px_[1], kRows))];
   }
   int count_corners_in_cell(int col, int row) const { return corners_[flat_cell_index(col, row)]; }
 
@@ -31,7 +31,7 @@ class ImageCoverage {
   }
 
   /// Returns the number of the part, of `parts` along an edge of `size_px`, that a pixel is in.
-  static int cell_index_along_edge(double pixel, int size_px, int parts) {
+  static int image_cell_index_along_axis(double pixel, int size_px, int parts) {
     return std::clamp(static_cast<int>(pixel / size_px * parts), 0, parts - 1);
   }
 

@@ -63,16 +63,16 @@ InconsistentViews find_views_inconsistent_with_lens(const IntrinsicsSolution& so
     found.worst_px = std::max(found.worst_px, fits[i].median_px);
   }
   // A single view without a pose may be shaken or misdetected, and is not in the lens.
-  if (solution.dropped.size() + found.views.size() > 1) {
-    for (const auto& dropped : solution.dropped) {
+  if (solution.dropped_views.size() + found.views.size() > 1) {
+    for (const auto& dropped : solution.dropped_views) {
       found.views.push_back(dropped.view);
       found.worst_px = std::numeric_limits<double>::infinity();
     }
   }
   std::sort(found.views.begin(), found.views.end());
-  const std::size_t all = solution.views.size() + solution.dropped.size();
-  found.others = all - found.views.size();
-  if (found.views.size() >= found.others) return {};
+  const std::size_t all = solution.views.size() + solution.dropped_views.size();
+  found.num_other_views = all - found.views.size();
+  if (found.views.size() >= found.num_other_views) return {};
   return found;
 }
 
@@ -93,8 +93,8 @@ std::string describe_inconsistent_views(const InconsistentViews& found,
   // [FILE-9] `taken by another camera?` | residuals three times those of the other images, or no
   //   pose: other camera, or lens touched | remove these images
   return fmt::format("{} board image{} not fit the other {}: {}{}; {} taken by another camera?",
-                     found.views.size(), is_one ? " does" : "s do", found.others, names, residuals,
-                     is_one ? "was it" : "were they");
+                     found.views.size(), is_one ? " does" : "s do", found.num_other_views, names,
+                     residuals, is_one ? "was it" : "were they");
 }
 
 }  // namespace vlp

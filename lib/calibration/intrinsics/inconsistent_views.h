@@ -16,7 +16,7 @@ struct InconsistentViews {
   /// fit.
   std::vector<std::size_t> views;
   /// Number of the other views, which fit.
-  std::size_t others = 0;
+  std::size_t num_other_views = 0;
   /// Median residual of a corner, px: in the worst of the views, and in the typical view. The worst
   /// is infinite for a view that fits no pose.
   double worst_px = 0, typical_px = 0;

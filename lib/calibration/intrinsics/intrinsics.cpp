@@ -195,12 +195,12 @@ class IntrinsicsSolver {
 
   IntrinsicsInput input_;
   /// Mean shift by which the corners of each view of the input were corrected, px.
-  std::vector<double> edge_shifts_px_;
+  std::vector<double> edge_displacements_px_;
   /// Parameters to estimate; the warp only after solve_board_warp().
-  SolveOptions solved_for_{true, true, false, false};
+  SolveOptions solved_parameters_{true, true, false, false};
   InitialPoses initial_poses_;
   std::vector<std::size_t> used_;
-  std::vector<IntrinsicsSolution::Dropped> dropped_;
+  std::vector<IntrinsicsSolution::DroppedView> dropped_;
   BoardProblem problem_{};
   /// Splined lenses only: parameters of OPENCV_FISHEYE fitted to the same corners, regardless of
   /// the quality of its fit; empty if it was not fitted.
@@ -212,7 +212,7 @@ class IntrinsicsSolver {
 
 IntrinsicsSolver::IntrinsicsSolver(const IntrinsicsInput& input) : input_(input) {
   for (std::size_t i = 0; i < input.views.size(); ++i) used_.push_back(i);
-  edge_shifts_px_.assign(input.views.size(), 0);
+  edge_displacements_px_.assign(input.views.size(), 0);
 }
 
 bool IntrinsicsSolver::solve_intrinsics_from_focal_length(double focal_px) {
@@ -274,7 +274,7 @@ bool IntrinsicsSolver::rotate_camera_frame_to_optical_axis() {
         fit_rotation_between_lenses(lens(), Lens(LensModel::fisheye, symmetric_), pixels);
     if (!start) return true;
     rotate_all_board_poses(symmetric.poses, *start);
-    if (!vlp::solve(symmetric, {true, true, solved_for_.warp, false})) return true;
+    if (!vlp::solve(symmetric, {true, true, solved_parameters_.warp, false})) return true;
     const Lens fisheye(LensModel::fisheye, symmetric.intrinsics);
     symmetric_ = symmetric.intrinsics;
     const auto new_from_old = fit_rotation_between_lenses(lens(), fisheye, pixels);
@@ -285,7 +285,7 @@ bool IntrinsicsSolver::rotate_camera_frame_to_optical_axis() {
       if (const auto seen = lens().project_point(new_from_old->transpose() * ray)) pixel = *seen;
     }
     rotate_all_board_poses(problem_.poses, *new_from_old);
-    if (!solve(solved_for_)) return false;
+    if (!solve(solved_parameters_)) return false;
   }
   return true;
 }
@@ -295,7 +295,7 @@ bool IntrinsicsSolver::refine_intrinsics() {
   constexpr std::size_t core = 4;
   problem_.lens_model = input_.lens_model;
   // The core of a splined lens would only compensate the control points; mrcal fixes it, too.
-  if (is_splined_lens_model(input_.lens_model)) solved_for_.core = false;
+  if (is_splined_lens_model(input_.lens_model)) solved_parameters_.core = false;
   const std::size_t given = problem_.intrinsics.size();
   problem_.intrinsics.resize(num_lens_parameters(input_.lens_model), 0);
   const auto distortions = list_distortion_names_and_initial_values(input_.lens_model);
@@ -304,7 +304,7 @@ bool IntrinsicsSolver::refine_intrinsics() {
   }
   bool convergence = false;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    if (!solve(solved_for_)) return false;
+    if (!solve(solved_parameters_)) return false;
     convergence = !reestimate_poses_and_drop_bad_views();
     if (convergence) break;
     if (used_.size() < kMinViews) return false;
@@ -315,7 +315,7 @@ bool IntrinsicsSolver::refine_intrinsics() {
   } else if (convergence) {
     return can_lens_project_most_views();
   }
-  return solve(solved_for_) && can_lens_project_most_views();
+  return solve(solved_parameters_) && can_lens_project_most_views();
 }
 
 bool IntrinsicsSolver::scale_spline_regularization_to_noise() {
@@ -326,7 +326,7 @@ bool IntrinsicsSolver::scale_spline_regularization_to_noise() {
     const double noise_px = std::clamp(make_intrinsics_solution().rms_px, min_px, 1.0);
     if (std::abs(noise_px / problem_.noise_px - 1) < convergence) break;
     problem_.noise_px = noise_px;
-    if (!solve(solved_for_)) return false;
+    if (!solve(solved_parameters_)) return false;
   }
   return true;
 }
@@ -355,7 +355,7 @@ bool IntrinsicsSolver::correct_edge_curvature_and_solve_again() {
     max_px = std::max(max_px, correct_corners_for_edge_curvature(view, lens));
   if (max_px < tolerance_px) return true;
   copy_corners_to_board_problem();
-  return solve(solved_for_);
+  return solve(solved_parameters_);
 }
 
 bool IntrinsicsSolver::correct_edge_displacements_and_solve_again(DisplacementForm form) {
@@ -372,11 +372,11 @@ bool IntrinsicsSolver::correct_edge_displacements_and_solve_again(DisplacementFo
       return true;
     }
     for (std::size_t view = 0; view < input_.views.size(); ++view) {
-      edge_shifts_px_[view] +=
+      edge_displacements_px_[view] +=
           correct_corners_for_edge_displacement(input_.views[view], shifts[view]);
     }
     copy_corners_to_board_problem();
-    if (!solve(solved_for_)) return false;
+    if (!solve(solved_parameters_)) return false;
   }
   return true;
 }
@@ -388,13 +388,13 @@ bool IntrinsicsSolver::solve_board_warp() {
     return solution.rms_px * solution.rms_px * 2 * solution.corners;
   };
   const IntrinsicsSolution flat = make_intrinsics_solution();
-  solved_for_.warp = true;
-  if (!solve(solved_for_)) return false;
+  solved_parameters_.warp = true;
+  if (!solve(solved_parameters_)) return false;
   const IntrinsicsSolution with_warp = make_intrinsics_solution();
   if (input_.warp == WarpChoice::automatic &&
       squares(flat) - squares(with_warp) <= min_reduction * with_warp.rms_px * with_warp.rms_px) {
     problem_ = flat.problem;
-    solved_for_.warp = false;
+    solved_parameters_.warp = false;
   }
   return true;
 }
@@ -417,22 +417,23 @@ bool IntrinsicsSolver::reweight_corners_by_variance() {
     for (auto& corner : view) corner.weight = weights.at(corner.sd_px);
   }
   copy_corners_to_board_problem();
-  return solve(solved_for_);
+  return solve(solved_parameters_);
 }
 
 bool IntrinsicsSolver::reject_corner_outliers() {
   // Without noise, residuals are caused by the regularization and are not outliers.
   constexpr double exact_px = 0.005;
   if (make_intrinsics_solution().rms_px < exact_px) return true;
-  SolveOptions without_outliers = solved_for_;
-  without_outliers.without_outliers = true;
+  SolveOptions without_outliers = solved_parameters_;
+  without_outliers.reject_outliers = true;
   return solve(without_outliers) && std::isfinite(make_intrinsics_solution().rms_px);
 }
 
 IntrinsicsSolution IntrinsicsSolver::make_intrinsics_solution() const {
   IntrinsicsSolution result{IntrinsicsStatus::ok, problem_, used_, dropped_, {}, 0, 0, 0};
-  result.solved_for = solved_for_;
-  for (const std::size_t view : used_) result.edge_shifts_px.push_back(edge_shifts_px_[view]);
+  result.solved_parameters = solved_parameters_;
+  for (const std::size_t view : used_)
+    result.edge_displacements_px.push_back(edge_displacements_px_[view]);
   result.update_lens_fit_statistics();
   return result;
 }
@@ -638,7 +639,7 @@ IntrinsicsSolution solve_intrinsics_from_half_of_views(const IntrinsicsSolution&
   const std::size_t points = parts * all.num_points_per_board();
   IntrinsicsSolution half = whole;
   half.views.clear();
-  half.edge_shifts_px.clear();
+  half.edge_displacements_px.clear();
   half.problem.poses.clear();
   half.problem.points.clear();
   const auto copy_part = [](const auto& from, std::size_t view, std::size_t count, auto& to) {
@@ -647,14 +648,14 @@ IntrinsicsSolution solve_intrinsics_from_half_of_views(const IntrinsicsSolution&
   };
   for (std::size_t view = first; view < whole.views.size(); view += 2) {
     copy_part(whole.views, view, 1, half.views);
-    copy_part(whole.edge_shifts_px, view, 1, half.edge_shifts_px);
+    copy_part(whole.edge_displacements_px, view, 1, half.edge_displacements_px);
     copy_part(all.poses, view, parts, half.problem.poses);
     copy_part(all.points, view, points, half.problem.points);
   }
   if (half.views.size() < IntrinsicsSolver::kMinViews) {
     return make_failure(IntrinsicsStatus::too_few_views);
   }
-  if (!solve_lens_parameters(half.problem, half.solved_for)) {
+  if (!solve_lens_parameters(half.problem, half.solved_parameters)) {
     return make_failure(IntrinsicsStatus::no_solution);
   }
   if (are_all_boards_parallel(half.problem)) return make_failure(IntrinsicsStatus::all_parallel);

@@ -46,14 +46,14 @@ struct IntrinsicsSolution {
   /// Indices in IntrinsicsInput::views of the views in the solution.
   std::vector<std::size_t> views;
   /// View of the input that fits no pose with the lens of the other views, and its RMS residual.
-  struct Dropped {
+  struct DroppedView {
     std::size_t view;
     double rms_px;
   };
-  std::vector<Dropped> dropped;
+  std::vector<DroppedView> dropped_views;
   /// Mean shift of the tag edges towards the dark in each of `views`, px. The corners are corrected
   /// for it (estimate_tag_edge_displacements()).
-  std::vector<double> edge_shifts_px;
+  std::vector<double> edge_displacements_px;
   /// RMS of the weighted residuals per axis, without outliers: sqrt(sum of squares / (2 corners)),
   /// px.
   double rms_px;
@@ -66,7 +66,7 @@ struct IntrinsicsSolution {
   Lens fitted_lens() const { return Lens(problem.lens_model, problem.intrinsics); }
   /// Estimated parameters: the intrinsics (splined lenses: without the core), and the warp if
   /// selected.
-  SolveOptions solved_for{true, true, true, false};
+  SolveOptions solved_parameters{true, true, true, false};
   /// True if another lens model fits the corners equally well. The lens is then undetermined
   /// outside the region of the corners.
   bool other_model_fits = false;

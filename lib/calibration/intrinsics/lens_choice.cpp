@@ -142,9 +142,9 @@ std::optional<LensChoice> select_lens_model(const IntrinsicsInput& input) {
   constexpr double errors = 2;
   const Squares* best = nullptr;
   for (std::size_t i = 0; i < kModels.size(); ++i) {
-    choice.tried.push_back({kModels[i]});
+    choice.candidates.push_back({kModels[i]});
     if (!squares[i]) continue;
-    choice.tried.back().rms_px = std::sqrt(mean_square(*squares[i]));
+    choice.candidates.back().rms_px = std::sqrt(mean_square(*squares[i]));
     if (best == nullptr || compute_mean_log_residual_ratio(*squares[i], *best).mean < 0)
       best = &*squares[i];
   }
@@ -166,7 +166,7 @@ std::string describe_lens_model_choice(const LensChoice& choice) {
         "the board is visible up to {:.0f} degrees off axis, where no LENSMODEL_OPENCVn has rays",
         deg_from_rad(choice.beyond_right_angle_rad));
   }
-  for (const auto& [model, rms_px] : choice.tried) {
+  for (const auto& [model, rms_px] : choice.candidates) {
     const std::string left =
         std::isfinite(rms_px) ? fmt::format("{:.3f} px", rms_px) : std::string("no lens");
     if (model == choice.model) {

@@ -34,7 +34,7 @@ struct FisheyeFit {
 struct LensChoice {
   LensModel model;
   /// Candidates in the order of their number of parameters; OPENCV4 before OPENCV_FISHEYE.
-  std::vector<LensCandidate> tried;
+  std::vector<LensCandidate> candidates;
   /// Largest angle of a corner off the axis of OPENCV_FISHEYE if it is at least a right angle,
   /// where no OPENCVn has rays; 0 otherwise.
   double beyond_right_angle_rad = 0;

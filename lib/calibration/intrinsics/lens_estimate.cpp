@@ -45,7 +45,7 @@ SplitViews split_off_held_out_views(const LensViews& input, LensEstimate& result
     ++count;
     const bool is_held_out = input.held_out > 0 && count % input.held_out == 0;
     auto& part = is_held_out ? split.held_out : split.solved;
-    part.views.push_back(empty.lattice.match_corners_to_flat_board(view.seen));
+    part.views.push_back(empty.lattice.match_corners_to_flat_board(view.detection));
     if (!is_held_out) result.images.push_back(view.image);
   }
   if (input.held_out > 0 && split.held_out.views.empty()) {
@@ -122,7 +122,7 @@ std::string explain_unsuitable_grid(IntrinsicsInput input) {
       splined_lens_model_name(grid), angle_deg(grid_reach.x()), angle_deg(grid_reach.y()),
       angle_deg(reach.farthest.x()), angle_deg(reach.farthest.y()),
       splined_lens_model_name(
-          extend_spline_grid(grid, grid_reach.cwiseMax(margin * reach.farthest))));
+          resize_spline_grid_to_reach(grid, grid_reach.cwiseMax(margin * reach.farthest))));
 }
 
 std::string recommend_model(LensModel requested, const IntrinsicsSolution& other) {
@@ -204,7 +204,7 @@ void recommend_fisheye(const FisheyeFit& fisheye, LensEstimate& result) {
 /// Warns of a displacement of the edges that a wrong gap between the tags causes, not a camera.
 void warn_about_edge_displacement(const IntrinsicsSolution& solution, LensEstimate& result) {
   constexpr double max_shift_px = 0.4;  // cameras, sharpened and at three times white: 0.25
-  const double shift_px = upper_median(solution.edge_shifts_px);
+  const double shift_px = upper_median(solution.edge_displacements_px);
   if (std::abs(shift_px) <= max_shift_px) return;
   // [LENS-4] `that is in focus makes`
   result.warnings.push_back(fmt::format(
@@ -215,7 +215,7 @@ void warn_about_edge_displacement(const IntrinsicsSolution& solution, LensEstima
 
 void warn_about_dropped_views(LensEstimate& result) {
   const LensModel model = result.solution.problem.lens_model;
-  for (const auto& [view, rms_px] : result.solution.dropped) {
+  for (const auto& [view, rms_px] : result.solution.dropped_views) {
     if (!std::isfinite(rms_px) && is_splined_lens_model(model)) {
       result.warnings.push_back(
           fmt::format("{}: dropped, as the board is where {} has no control points; use a larger "
@@ -277,7 +277,7 @@ void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& f
   result.held_out = evaluate_lens_on_held_out_views(solution, views.held_out);
   result.lattice = views.solved.lattice;
   result.sharpness = measure_lens_sharpness(result.views, views.solved.imager_px);
-  std::optional<PrintEffect> print;
+  std::optional<AspectErrorEffect> print;
   if (print_sd > 0)
     print = compute_board_aspect_error_effect_on_lens(solution, print_sd, result.report.region);
   if (print) {
@@ -358,7 +358,7 @@ LensEstimate estimate_lens(LensViews input) {
   warn_about_dropped_views(result);
   const BoardCheck exact =
       check_board_layout(input.board, result.views, result.solution.fitted_lens(),
-                         upper_median(result.solution.edge_shifts_px));
+                         upper_median(result.solution.edge_displacements_px));
   if (!exact.problem.empty()) {
     fail(result, LensStatus::wrong_board, exact.problem);
     return result;

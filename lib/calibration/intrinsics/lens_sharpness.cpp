@@ -37,8 +37,10 @@ class ViewValues {
            const Statistic& statistic) {
     std::vector<std::vector<double>> values_by_part(parts_.size());
     for (std::size_t i = 0; i < values.size(); ++i) {
-      const int col = ImageCoverage::cell_index_along_edge(at_px[i].x(), imager_px_[0], cols_);
-      const int row = ImageCoverage::cell_index_along_edge(at_px[i].y(), imager_px_[1], rows_);
+      const int col =
+          ImageCoverage::image_cell_index_along_axis(at_px[i].x(), imager_px_[0], cols_);
+      const int row =
+          ImageCoverage::image_cell_index_along_axis(at_px[i].y(), imager_px_[1], rows_);
       values_by_part[static_cast<std::size_t>(row * cols_ + col)].push_back(values[i]);
     }
     for (std::size_t i = 0; i < parts_.size(); ++i) {
@@ -202,7 +204,7 @@ void fill_sharpness_maps(std::span<const BoardView> views, const std::array<int,
   ViewValues blurs(result.mtf50, imager_px), ratios(result.black_to_white, imager_px);
   ViewValues lights(result.light, imager_px);
   for (const BoardView& view : views) {
-    const std::vector<MeasuredEdge> edges = collect_edges(view.seen);
+    const std::vector<MeasuredEdge> edges = collect_edges(view.detection);
     std::vector<Eigen::Vector2d> at_px;
     std::vector<double> blurs_px, black_to_white;
     at_px.reserve(edges.size());

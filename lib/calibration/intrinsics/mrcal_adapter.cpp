@@ -34,7 +34,7 @@ static_assert(sizeof(Eigen::Vector2d) == sizeof(mrcal_calobject_warp_t));
 /// Arguments of mrcal for a problem.
 struct Arguments {
   /// `fixed_rays`: rays of the problem, as points that do not move.
-  Arguments(const BoardProblem& problem, const SolveOptions& what,
+  Arguments(const BoardProblem& problem, const SolveOptions& solve_options,
             std::span<const BoardProblem::FixedRay> fixed_rays = {})
       : frames(static_cast<int>(problem.poses.size())), fixed(static_cast<int>(fixed_rays.size())) {
     const std::string name(lens_model_name(problem.lens_model));
@@ -42,12 +42,12 @@ struct Arguments {
       // [LENS-7] `mrcal does not support`
       throw std::runtime_error("mrcal does not support " + name);
     }
-    selections.do_optimize_intrinsics_core = what.core;
-    selections.do_optimize_intrinsics_distortions = what.distortions;
+    selections.do_optimize_intrinsics_core = solve_options.core;
+    selections.do_optimize_intrinsics_distortions = solve_options.distortions;
     selections.do_optimize_frames = true;
-    selections.do_optimize_calobject_warp = what.warp;
-    selections.do_apply_regularization = what.distortions;
-    selections.do_apply_outlier_rejection = what.without_outliers;
+    selections.do_optimize_calobject_warp = solve_options.warp;
+    selections.do_apply_regularization = solve_options.distortions;
+    selections.do_apply_outlier_rejection = solve_options.reject_outliers;
     for (int frame = 0; frame < frames; ++frame) observations.push_back({{0, -1}, frame});
     for (const auto& [pixel, ray] : fixed_rays) {
       mrcal_observation_point_t seen{{0, -1}, static_cast<int>(points.size()), {}};
@@ -122,8 +122,8 @@ void with_suppressed_output(const Work& work) {
   }
 }
 
-bool solve_with_mrcal(BoardProblem& problem, const SolveOptions& what) {
-  Arguments args(problem, what, problem.fixed_rays);
+bool solve_with_mrcal(BoardProblem& problem, const SolveOptions& solve_options) {
+  Arguments args(problem, solve_options, problem.fixed_rays);
   if (args.measurements < args.states) return false;
   Eigen::VectorXd state(args.states), residuals(args.measurements);
   auto points = make_weighted_points(problem);
@@ -145,8 +145,8 @@ bool solve_with_mrcal(BoardProblem& problem, const SolveOptions& what) {
   return stats.rms_reproj_error__pixels >= 0 && residuals.allFinite();
 }
 
-Linearization linearize_with_mrcal(const BoardProblem& problem, const SolveOptions& what) {
-  const Arguments args(problem, what);
+Linearization linearize_with_mrcal(const BoardProblem& problem, const SolveOptions& solve_options) {
+  const Arguments args(problem, solve_options);
   const int entries =
       _mrcal_num_j_nonzero(args.frames, 0, problem.cols, problem.rows, 1, 0, args.frames, 0, 0,
                            args.observations.data(), nullptr, args.selections, &args.lens);
@@ -194,7 +194,7 @@ Linearization linearize_with_mrcal(const BoardProblem& problem, const SolveOptio
   result.scale.setOnes(args.states);
   unpack_mrcal_state(mrcal_unpack_solver_state_vector, result.scale.data(), args);
   constexpr Eigen::Index core = 4;
-  result.first_intrinsic = what.core ? 0 : core;
+  result.first_intrinsic = solve_options.core ? 0 : core;
   result.poses = mrcal_state_index_frames(0, 1, 0, args.frames, 0, 0, args.frames, args.selections,
                                           &args.lens);
   return result;

@@ -212,8 +212,8 @@ std::vector<BoardView> read_mrcal_corners(const std::filesystem::path& file, con
     }
     for (std::size_t i = from; i < end; ++i) {
       if (!table.rows[i].pixel) continue;
-      view.seen.points.push_back({lattice.point_detection_index(part, i - from),
-                                  *table.rows[i].pixel, table.rows[i].weight});
+      view.detection.points.push_back({lattice.point_detection_index(part, i - from),
+                                       *table.rows[i].pixel, table.rows[i].weight});
     }
     if (!none) {
       if (images.empty()) first_line = line;
@@ -224,13 +224,13 @@ std::vector<BoardView> read_mrcal_corners(const std::filesystem::path& file, con
   }
   if (images.empty()) return views;
   for (BoardView& view : views) {
-    std::sort(view.seen.points.begin(), view.seen.points.end(),
+    std::sort(view.detection.points.begin(), view.detection.points.end(),
               [](const PointDetection& a, const PointDetection& b) { return a.index < b.index; });
   }
   check_row_length(board, lattice, table, images, first_line);
   if (lattice.num_lattice_parts() == 1) {
     for (BoardView& view : views) {
-      renumber_lattice_points(view.seen.points, lattice.lattice_cols(), lattice.lattice_rows(),
+      renumber_lattice_points(view.detection.points, lattice.lattice_cols(), lattice.lattice_rows(),
                               board.kind == BoardKind::chessboard);
     }
   }

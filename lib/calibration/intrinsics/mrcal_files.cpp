@@ -51,11 +51,11 @@ std::string format_mrcal_optimization_inputs(const IntrinsicsSolution& solution)
   archive.add_npz_array("calobject_warp", {2}, std::span(problem.warp_m.data(), 2));
   archive.add_npz_array("imagersizes", {1, 2}, imager);
   archive.add_npz_array("calibration_object_spacing", problem.spacing_m);
-  archive.add_npz_array("do_optimize_intrinsics_core", solution.solved_for.core);
+  archive.add_npz_array("do_optimize_intrinsics_core", solution.solved_parameters.core);
   archive.add_npz_array("do_optimize_intrinsics_distortions", problem.intrinsics.size() > 4);
   archive.add_npz_array("do_optimize_extrinsics", true);
   archive.add_npz_array("do_optimize_frames", true);
-  archive.add_npz_array("do_optimize_calobject_warp", solution.solved_for.warp);
+  archive.add_npz_array("do_optimize_calobject_warp", solution.solved_parameters.warp);
   archive.add_npz_array("do_apply_regularization", problem.intrinsics.size() > 4);
   archive.add_npz_array("do_apply_outlier_rejection", true);
   archive.add_npz_array("verbose", false);

@@ -20,13 +20,13 @@ const MrcalFunctions& mrcal_functions() {
 
 }  // namespace
 
-bool solve_board_problem_by_mrcal(BoardProblem& problem, const SolveOptions& what) {
-  return mrcal_functions().solve(problem, what);
+bool solve_board_problem_by_mrcal(BoardProblem& problem, const SolveOptions& solve_options) {
+  return mrcal_functions().solve(problem, solve_options);
 }
 
 Linearization linearize_board_problem_by_mrcal(const BoardProblem& problem,
-                                               const SolveOptions& what) {
-  return mrcal_functions().linearize(problem, what);
+                                               const SolveOptions& solve_options) {
+  return mrcal_functions().linearize(problem, solve_options);
 }
 
 }  // namespace vlp

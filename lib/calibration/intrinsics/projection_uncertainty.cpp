@@ -89,7 +89,7 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
       is_determined_(false),
       regularization_bias_(Eigen::VectorXd::Zero(std::ssize(solution.problem.intrinsics))) {
   const BoardProblem& problem = solution.problem;
-  const Linearization at = linearize_board_problem(problem, solution.solved_for);
+  const Linearization at = linearize_board_problem(problem, solution.solved_parameters);
   const Eigen::SparseMatrix<double>& jt = at.jacobian_transposed;
   const Eigen::SparseMatrix<double> normal = jt * jt.transpose();
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);

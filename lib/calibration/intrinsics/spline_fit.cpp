@@ -135,11 +135,12 @@ std::string describe_too_coarse_spline_grid(const Lens& lens, const std::array<i
     farthest = farthest.cwiseMax(x.head<2>().cwiseAbs() * (2 / (x.norm() + x.z())));
   }
   SplineGrid finer = spline_grid_of_lens_model(model);
-  LensModel other = lens_model_for_spline_grid(extend_spline_grid(finer, extension * farthest));
+  LensModel other =
+      lens_model_for_spline_grid(resize_spline_grid_to_reach(finer, extension * farthest));
   while (!fit_splined_lens_to_lens(lens, imager_px, other, core) &&
          2 * finer.nx <= SplineGrid::kMaxKnots) {
     finer.nx *= 2;
-    other = lens_model_for_spline_grid(extend_spline_grid(finer, extension * farthest));
+    other = lens_model_for_spline_grid(resize_spline_grid_to_reach(finer, extension * farthest));
   }
   const bool helps = fit_splined_lens_to_lens(lens, imager_px, other, core).has_value();
   const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
@@ -150,7 +151,7 @@ std::string describe_too_coarse_spline_grid(const Lens& lens, const std::array<i
       helps ? fmt::format("--lens {}", lens_model_name(other)) : "another model");
 }
 
-SplineGrid extend_spline_grid(const SplineGrid& grid, const Eigen::Vector2d& u) {
+SplineGrid resize_spline_grid_to_reach(const SplineGrid& grid, const Eigen::Vector2d& u) {
   constexpr double numeric_tolerance = 1e-9;  // keeps a grid that is wide enough
   const auto ceil_and_clamp = [](double min_value, double value, double max_value) {
     return static_cast<int>(std::clamp(std::ceil(value - numeric_tolerance), min_value, max_value));

@@ -39,7 +39,7 @@ std::string describe_too_coarse_spline_grid(const Lens& lens, const std::array<i
 
 /// Returns a grid that extends to `u` off the axis along x and y, in the stereographic plane,
 /// within the bounds of grids. Its order and number of control points along x are those of `grid`.
-SplineGrid extend_spline_grid(const SplineGrid& grid, const Eigen::Vector2d& u);
+SplineGrid resize_spline_grid_to_reach(const SplineGrid& grid, const Eigen::Vector2d& u);
 
 /// Computes the core of a splined lens in the frame of a lens that minimizes the control points, by
 /// least squares over the pixels. The core has the center of the lens, and the focal lengths of the

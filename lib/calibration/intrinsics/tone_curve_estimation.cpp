@@ -39,7 +39,8 @@ std::vector<const BoardDetection*> select_detections(const std::vector<BoardView
   constexpr std::size_t max_views = 24;
   std::vector<const BoardDetection*> sufficient;
   for (const BoardView& view : views) {
-    if (lattice.are_corners_sufficient_for_pose(view.seen)) sufficient.push_back(&view.seen);
+    if (lattice.are_corners_sufficient_for_pose(view.detection))
+      sufficient.push_back(&view.detection);
   }
   if (sufficient.size() <= max_views) return sufficient;
   std::vector<const BoardDetection*> selected;
@@ -95,7 +96,7 @@ std::optional<ValuesPerGamma> compute_residual_noise_ratios(const std::vector<Bo
     // The other curves are solved with the same model, warp and views, so that ratios are
     // comparable.
     input.lens_model = solution.problem.lens_model;
-    input.warp = solution.solved_for.warp ? WarpChoice::on : WarpChoice::off;
+    input.warp = solution.solved_parameters.warp ? WarpChoice::on : WarpChoice::off;
     std::vector<const BoardDetection*> kept;
     for (const std::size_t view : solution.views) kept.push_back(selected[view]);
     selected = std::move(kept);
@@ -103,10 +104,10 @@ std::optional<ValuesPerGamma> compute_residual_noise_ratios(const std::vector<Bo
   return ratios;
 }
 
-bool has_gray_level_costs(const BoardView& view) { return !view.seen.curve_costs.empty(); }
+bool has_gray_level_costs(const BoardView& view) { return !view.detection.curve_costs.empty(); }
 
 bool may_have_tone_curve(const BoardView& view) {
-  return std::ranges::any_of(view.seen.tags,
+  return std::ranges::any_of(view.detection.tags,
                              [](const TagDetection& tag) { return !tag.tone_curve_fits.empty(); });
 }
 

@@ -58,7 +58,7 @@ ReducedEquations compute_reduced_equations(const Linearization& at, const Layout
 
 Eigen::MatrixXd estimate_intrinsics_covariance_by_jackknife(const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
-  const Linearization at = linearize_board_problem(problem, solution.solved_for);
+  const Linearization at = linearize_board_problem(problem, solution.solved_parameters);
   const auto views = static_cast<Eigen::Index>(solution.views.size());
   const auto boards = static_cast<Eigen::Index>(problem.poses.size());
   const auto intrinsics = static_cast<Eigen::Index>(problem.intrinsics.size());

@@ -150,7 +150,7 @@ struct MapCaptures {
     const bool tilt_is_free = !calibration.rotation_center;
     Eigen::Matrix3d base_from_camera =
         tilt_is_free ? Eigen::Matrix3d::Identity()
-                     : compute_level_from_camera_rotation(calibration, Correction::all);
+                     : compute_level_from_camera_matrix(calibration, Correction::all);
     LampPositions positions_m;
     for (const Lamp& lamp : map.lamps) positions_m[lamp.id] = lamp.position_m.head<2>();
     std::optional<LampDisplacements> found;
@@ -447,8 +447,8 @@ std::optional<MapError> find_lamp_at_varying_position(const LampDisplacements& f
         upper_median(outliers_m) < std::max(min_outlier_m, survey_m)) {
       continue;
     }
-    MapError error{MapErrorKind::unsteady, {lamp}};
-    error.contradicting = static_cast<int>(count);
+    MapError error{MapErrorKind::inconsistent, {lamp}};
+    error.contradicting_captures = static_cast<int>(count);
     error.captures = static_cast<int>(captures);
     return error;
   }
@@ -479,11 +479,11 @@ std::string describe_map_error(const MapError& error) {
   switch (error.kind) {
     case MapErrorKind::moved:
       return describe_offset(error.lamps[0], error.offset_m);
-    case MapErrorKind::unsteady:
+    case MapErrorKind::inconsistent:
       return fmt::format(
           "lamp {} contradicts the other lamps in {} of {} captures, in varying directions: it is "
           "confused with another light, was moved between captures, or has a wrong height",
-          error.lamps[0], error.contradicting, error.captures);
+          error.lamps[0], error.contradicting_captures, error.captures);
     case MapErrorKind::swapped:
       return fmt::format(
           "lamps {} and {} seem to be swapped: the captures fit the map if their positions or ids "
@@ -496,7 +496,7 @@ std::string describe_map_error(const MapError& error) {
       return "most captures contradict the lamp map: is it the map of this room, and the "
              "calibration of this camera?";
     // [STATION-19] `is never visible`
-    case MapErrorKind::unseen:
+    case MapErrorKind::undetected:
       return fmt::format("lamp {} is never visible: is it lit, and not overexposed?",
                          error.lamps[0]);
   }
@@ -565,7 +565,7 @@ std::vector<MapError> find_undetected_lamps(std::span<const Frame> frames, const
   }
   std::vector<MapError> unseen;
   for (const Lamp& lamp : map.lamps) {
-    if (!seen.contains(lamp.id)) unseen.push_back({MapErrorKind::unseen, {lamp.id}});
+    if (!seen.contains(lamp.id)) unseen.push_back({MapErrorKind::undetected, {lamp.id}});
   }
   return unseen;
 }

@@ -21,12 +21,12 @@ namespace vlp {
 
 /// Kind of error of a lamp map, found by comparing the map with captures.
 enum class MapErrorKind {
-  moved,       // the position of a lamp is wrong
-  unsteady,    // a lamp contradicts the others in some captures, in varying directions
-  swapped,     // positions or ids of two lamps are exchanged
-  mirrored,    // the map is the mirror image of the room
-  other_room,  // the lamps are far from their map positions for none of the causes above
-  unseen       // no capture contains the lamp
+  moved,         // the position of a lamp is wrong
+  inconsistent,  // a lamp contradicts the others in some captures, in varying directions
+  swapped,       // positions or ids of two lamps are exchanged
+  mirrored,      // the map is the mirror image of the room
+  other_room,    // the lamps are far from their map positions for none of the causes above
+  undetected     // no capture contains the lamp
 };
 
 /// Error of the map, of one lamp or of several.
@@ -37,8 +37,8 @@ struct MapError {
   /// Kind `moved`: true position of the lamp minus its position in the map, in the world. z is 0
   /// except in results of an adjustment (calibration/adjustment).
   Eigen::Vector3d offset_m{0, 0, 0}, sd_m{0, 0, 0};
-  /// Kind `unsteady`: number of captures that contradict, and of captures that contain the lamp.
-  int contradicting = 0, captures = 0;
+  /// Kind `inconsistent`: number of captures that contradict, and of captures that contain it.
+  int contradicting_captures = 0, captures = 0;
 };
 
 /// Describes the error in one line: ids, offset in millimeters, direction, remedy.

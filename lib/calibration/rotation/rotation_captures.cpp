@@ -109,7 +109,7 @@ RotationStatus find_rotation_status(const std::vector<PivotArc>& arcs) {
     if (pivot.determines_center()) return RotationStatus::ok;
     if (pivot.captures < kMinCaptures) continue;
     has_rotation = has_rotation || pivot.arc_rad > max_equal_yaw_rad;
-    status = has_rotation ? RotationStatus::short_arc : RotationStatus::alike;
+    status = has_rotation ? RotationStatus::short_arc : RotationStatus::single_yaw;
   }
   return status;
 }
@@ -185,7 +185,7 @@ class RotationSearch {
         return status;
     }
     if (median_residual_m() > 0.05 * compute_median_pivot_height(fixes_, 0))
-      return RotationStatus::moved;
+      return RotationStatus::axis_moved;
     reject_corner_outliers();
     locate(PositionerOptions().max_residual_share);
     cluster_fixes_by_height(fixes_, height_noise_m_);
@@ -213,7 +213,7 @@ class RotationSearch {
     }
     for (std::size_t i = 0; i < frames_.size(); ++i) {
       if (!rejection_reasons_[i].empty())
-        pivot.rejected.push_back({frames_[i].image, rejection_reasons_[i]});
+        pivot.rejected_captures.push_back({frames_[i].image, rejection_reasons_[i]});
     }
     return pivot;
   }
@@ -272,7 +272,7 @@ class RotationSearch {
     const Eigen::Vector3d up(-model_fit_.delta.x(), -model_fit_.delta.y(), 1);
     current_zenith() = (level_rotation_from_zenith(current_zenith()).transpose() * up).normalized();
     // Three captures and a lever arm have no redundancy: noise can move the zenith anywhere.
-    return current_zenith().z() > 0 ? RotationStatus::ok : RotationStatus::moved;
+    return current_zenith().z() > 0 ? RotationStatus::ok : RotationStatus::axis_moved;
   }
 
   bool has_converged() const {
@@ -378,12 +378,12 @@ std::string_view describe_rotation_status(RotationStatus status) {
     case RotationStatus::too_few_captures:
       return "each height needs three captures or more: add captures of a rotation in place, "
              "preferably twelve over a full turn";
-    case RotationStatus::alike:
+    case RotationStatus::single_yaw:
       return "the captures have the same yaw: turn the camera in place between captures";
     case RotationStatus::short_arc:
       return "the captures span less than 90 degrees: add captures over more of the turn, "
              "preferably a full one";
-    case RotationStatus::moved:
+    case RotationStatus::axis_moved:
       return "the captures are not of one rotation in place: take them while rotating about one "
              "vertical axis, without driving";
   }

@@ -57,9 +57,9 @@ enum class RotationStatus {
   other_map,         // no lamp of the map is detected, or the detected lamps contradict it
   too_few_lamps,     // fewer than two lamps, or than two in each capture
   too_few_captures,  // fewer than three at any height
-  alike,             // all captures at one yaw
+  single_yaw,        // all captures at one yaw
   short_arc,         // less than 90 degrees at every height
-  moved              // the axis moves between captures
+  axis_moved         // the axis moves between captures
 };
 
 /// Describes the status and the remedy, human-readable.
@@ -99,7 +99,7 @@ struct RotationCaptures {
     std::string reason;
   };
   /// Captures that are not used.
-  std::vector<RejectedCapture> rejected;
+  std::vector<RejectedCapture> rejected_captures;
 };
 
 /// Smallest gap between two heights, as a fraction of the distance from the lamps. Distances of

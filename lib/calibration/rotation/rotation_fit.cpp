@@ -260,7 +260,7 @@ RotationFit fit_axis(const RotationCaptures& rotation, const Camera& camera, boo
                                                        zenith_covariance);
   if (lever_arm) result.center.lever_arm_m = state.lever_arm_m;
   result.center.lever_arm_covariance = arm_covariance;
-  result.center.lever_arm_by_zenith = arm_by_zenith;
+  result.center.lever_arm_jacobian_wrt_zenith = arm_by_zenith;
   set_residual_statistics(result, fit, rotation);
   result.yaws_rad = std::move(state.yaws_rad);
   return result;

@@ -238,7 +238,7 @@ TiltCalibration estimate_camera_tilt_from_lamps(std::span<const Frame> frames, c
   if (options.refine_map) {
     result.corrections = found.lamps;
     for (std::size_t i = 0; i < map.lamps.size(); ++i) {
-      result.map.lamps[i].position_m = found.refined.lamps[i].position_m;
+      result.map.lamps[i].position_m = found.refined_map.lamps[i].position_m;
     }
   }
   result.undetermined = explain_uncertainty(result, camera.focal_px(), options);

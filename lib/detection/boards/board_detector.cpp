@@ -98,14 +98,14 @@ BoardDetection BoardDetector::detect_board(const cv::Mat& image) const {
   }
   std::map<int, std::vector<TagDetection>> found;
   for (const TagDetection& tag : finder_->detect_tags(levels)) {
-    (ids_.contains(tag.id) ? found[tag.id] : seen.foreign).push_back(tag);
+    (ids_.contains(tag.id) ? found[tag.id] : seen.foreign_tags).push_back(tag);
   }
   std::vector<TagDetection> once;
   for (const auto& [id, same] : found) {
     if (same.size() == 1) once.push_back(same.front());
   }
   if (squares_) {
-    seen.unusable = static_cast<int>(found.size() - once.size());
+    seen.num_unusable_tags = static_cast<int>(found.size() - once.size());
     seen.tags = once;
     seen.points = squares_->detect_corners_near_markers(seen.tags, gray);
     return seen;
@@ -121,7 +121,7 @@ BoardDetection BoardDetector::detect_board(const cv::Mat& image) const {
       if (found[tag.id].size() <= 1) seen.tags.push_back(tag);
     }
   }
-  for (auto* tags : {&seen.tags, &seen.foreign}) {
+  for (auto* tags : {&seen.tags, &seen.foreign_tags}) {
     std::erase_if(*tags, [&](const TagDetection& tag) { return !is_inside(tag, levels); });
   }
   std::sort(seen.tags.begin(), seen.tags.end(),
@@ -130,8 +130,8 @@ BoardDetection BoardDetector::detect_board(const cv::Mat& image) const {
     const bool used = std::any_of(seen.tags.begin(), seen.tags.end(),
                                   [id = id](const TagDetection& tag) { return tag.id == id; });
     if (used) continue;
-    ++seen.unusable;
-    seen.overexposed += is_tag_overexposed(same.front(), levels) ? 1 : 0;
+    ++seen.num_unusable_tags;
+    seen.num_overexposed_tags += is_tag_overexposed(same.front(), levels) ? 1 : 0;
   }
   return seen;
 }

@@ -95,13 +95,13 @@ struct BoardDetection {
   std::vector<TagDetection> tags;
   /// Tags of the family that the board does not have, in the order of detection. Corners are
   /// accurate to 1 to 2 px.
-  std::vector<TagDetection> foreign = {};
+  std::vector<TagDetection> foreign_tags = {};
   /// Number of rejected tags of the board: detected twice, or with a corner that cannot be measured
   /// to a fraction of a pixel (at the image border, occluded, blurred, overexposed).
-  int unusable = 0;
+  int num_unusable_tags = 0;
   /// Number of rejected tags with more than 10 % white pixels (level 254 or 255 of 8 bits) in their
   /// bounding box.
-  int overexposed = 0;
+  int num_overexposed_tags = 0;
   /// Points sorted by index, of boards of squares and from files of corners without tags.
   std::vector<PointDetection> points = {};
   /// Negative log-likelihood of the edges of tags for the tone curves of kGammas, up to a constant.
@@ -118,7 +118,7 @@ struct BoardView {
   /// File name of the image, without its folder.
   std::string image;
   std::array<int, 2> imager_px;
-  BoardDetection seen;
+  BoardDetection detection;
 };
 
 /// Returns the corners that a calibration uses: the points, or else the corners of the tags. Their

@@ -35,9 +35,9 @@ void complete_detection(BoardDetection& seen, const std::set<int>& ids) {
     const bool is_of_board = ids.contains(tag.id);
     if (std::ranges::all_of(tag.corners_px,
                             [](const auto& corner) { return corner.allFinite(); })) {
-      (is_of_board ? seen.tags : seen.foreign).push_back(tag);
+      (is_of_board ? seen.tags : seen.foreign_tags).push_back(tag);
     } else if (is_of_board) {
-      ++seen.unusable;
+      ++seen.num_unusable_tags;
     }
   }
   std::ranges::sort(seen.tags, {}, &TagDetection::id);
@@ -82,7 +82,8 @@ std::string describe_wrong_rows(const Board& board, std::span<const BoardView> v
   std::vector<LatticePixels> pixels;
   for (const BoardView& view : views) {
     pixels.emplace_back(cols * rows);
-    for (const PointDetection& point : view.seen.points) pixels.back()[point.index] = point.pixel;
+    for (const PointDetection& point : view.detection.points)
+      pixels.back()[point.index] = point.pixel;
   }
   const std::size_t row_length = estimate_points_per_lattice_row(pixels, cols);
   if (row_length == cols) return "";
@@ -156,7 +157,7 @@ class CornerTableReader {
       if (outside_++ == 0) first_outside_ = csv_.make_cell_error(row, u_px_, words);
     }
     const int corner = read_number(row);
-    if (!add(row, corner, pixel, views_[entry->second].seen)) {
+    if (!add(row, corner, pixel, views_[entry->second].detection)) {
       throw csv_.make_cell_error(row, number_,
                                  fmt::format("{} occurs twice in image '{}'", corner, name));
     }
@@ -220,9 +221,9 @@ std::vector<BoardView> read_corner_table(const std::filesystem::path& file, cons
   std::set<int> ids;
   for (const BoardTag& tag : list_board_tags(board)) ids.insert(tag.id);
   for (BoardView& view : views) {
-    complete_detection(view.seen, ids);
+    complete_detection(view.detection, ids);
     if (!board.has_chessboard_squares()) continue;
-    renumber_lattice_points(view.seen.points, board.cols - 1, board.rows - 1,
+    renumber_lattice_points(view.detection.points, board.cols - 1, board.rows - 1,
                             board.kind == BoardKind::chessboard);
   }
   return views;
@@ -240,8 +241,8 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
   }
   CsvWriter csv(file, header);
   for (const BoardView& view : views) {
-    const BoardDetection& seen = view.seen;
-    if (squares ? seen.points.empty() : seen.tags.empty() && seen.foreign.empty()) {
+    const BoardDetection& seen = view.detection;
+    if (squares ? seen.points.empty() : seen.tags.empty() && seen.foreign_tags.empty()) {
       std::vector<std::string> empty(header.size());
       empty.front() = view.image;
       csv.write_csv_row(empty);
@@ -254,7 +255,7 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
       }
       continue;
     }
-    for (const auto* each : {&seen.tags, &seen.foreign}) {
+    for (const auto* each : {&seen.tags, &seen.foreign_tags}) {
       for (const TagDetection& tag : *each) {
         for (std::size_t k = 0; k < 4; ++k) {
           csv.write_csv_row({view.image, std::to_string(tag.id), std::to_string(k),

@@ -16,7 +16,7 @@ EdgeField::EdgeField(std::span<const EdgeSample> samples, Terms terms) {
   constexpr std::size_t min_samples = 32;  // four edges of eight tags
   constexpr int max_iterations = 6;
   constexpr double median_of_normal = 0.6745, huber_threshold = 3, min_excess_sd = 0.01;
-  terms_ = samples.size() < min_samples ? 1 : terms == Terms::place ? 6 : kMaxTerms;
+  terms_ = samples.size() < min_samples ? 1 : terms == Terms::position ? 6 : kMaxTerms;
   const auto count = static_cast<double>(samples.size());
   for (const EdgeSample& sample : samples) middle_px_ += sample.at_px / count;
   for (const EdgeSample& sample : samples) {

@@ -24,7 +24,7 @@ struct EdgeSample {
 /// least squares, which is robust to outliers.
 class EdgeField {
  public:
-  enum class Terms { place, place_and_direction };
+  enum class Terms { position, position_and_direction };
 
   /// Fits the model; only a constant for fewer than 32 samples.
   /// @pre There is at least one sample.

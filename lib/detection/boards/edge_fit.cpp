@@ -246,7 +246,7 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
                  p[1] + outside * p[2],
                  p[1] - outside * p[2],
                  {prior.gamma, p[1], p[2], p.template segment<2>(3)}};
-  const double rms = std::sqrt(result.squares / static_cast<double>(pixels.size()));
+  const double rms = std::sqrt(result.sum_of_squares / static_cast<double>(pixels.size()));
   const double bright = EncodedLevel(p[1] + p[2], prior.gamma).level;
   const double contrast = std::abs(bright - EncodedLevel(p[1] - p[2], prior.gamma).level) / 2;
   const bool is_accepted = p.allFinite() && p[0] > min_blur_px && p[0] < max_blur_px &&
@@ -265,11 +265,12 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
 
 }  // namespace
 
-Eigen::Vector2d EdgeCurve::compute_curve_distance_gradient(const Eigen::Vector2d& x) const {
-  const double w = along.dot(x - middle) / half_px;
+Eigen::Vector2d EdgeCurve::compute_gradient_of_curve_distance_wrt_pixel(
+    const Eigen::Vector2d& x) const {
+  const double w = along.dot(x - middle) / half_length_px;
   const Coefficients& c = coefficients;
   const double slope = c[1] + w * (2 * c[2] + w * 3 * c[3]);
-  return across - slope / half_px * along;
+  return across - slope / half_length_px * along;
 }
 
 Eigen::Vector2d find_edge_intersection(const EdgeCurve& a, const EdgeCurve& b,
@@ -277,8 +278,8 @@ Eigen::Vector2d find_edge_intersection(const EdgeCurve& a, const EdgeCurve& b,
   constexpr int steps = 4;
   for (int i = 0; i < steps; ++i) {
     Eigen::Matrix2d gradients;
-    gradients << a.compute_curve_distance_gradient(point).transpose(),
-        b.compute_curve_distance_gradient(point).transpose();
+    gradients << a.compute_gradient_of_curve_distance_wrt_pixel(point).transpose(),
+        b.compute_gradient_of_curve_distance_wrt_pixel(point).transpose();
     point -= gradients.inverse() *
              Eigen::Vector2d(a.distance_from_curve_px(point), b.distance_from_curve_px(point));
   }

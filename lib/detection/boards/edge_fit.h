@@ -21,13 +21,13 @@ struct EdgePixel {
 };
 
 /// Curve v = a + b w + c w^2 + d w^3 relative to a straight line. The coordinates of a pixel x are
-///   w = along.(x - middle) / half_px,  v = across.(x - middle).
+///   w = along.(x - middle) / half_length_px,  v = across.(x - middle).
 struct EdgeCurve {
   static constexpr int kTerms = 3, kMaxTerms = 4;
   using Coefficients = Eigen::Matrix<double, kMaxTerms, 1>;
 
   Eigen::Vector2d middle, along, across;
-  double half_px;
+  double half_length_px;
   Coefficients coefficients = Coefficients::Zero();
   /// True if d is fitted; otherwise it is 0.
   bool cubic = false;
@@ -39,11 +39,11 @@ struct EdgeCurve {
   }
   /// Returns the distance of a point from the curve in px along v, positive outwards.
   double distance_from_curve_px(const Eigen::Vector2d& x) const {
-    return across.dot(x - middle) - curve_displacement_px(along.dot(x - middle) / half_px);
+    return across.dot(x - middle) - curve_displacement_px(along.dot(x - middle) / half_length_px);
   }
   /// Returns the gradient of distance_from_curve_px() with respect to the pixel (u, v);
   /// dimensionless.
-  Eigen::Vector2d compute_curve_distance_gradient(const Eigen::Vector2d& x) const;
+  Eigen::Vector2d compute_gradient_of_curve_distance_wrt_pixel(const Eigen::Vector2d& x) const;
 };
 
 /// Computes the intersection of two curves by Newton's method from a nearby point.
@@ -69,7 +69,7 @@ struct EdgeLight {
 /// Result of fit_edge_curve_and_blur().
 struct EdgeFit {
   /// Sum of the squared residuals, in gray levels squared.
-  double squares;
+  double sum_of_squares;
   std::size_t pixels;
   /// True if the brighter side is saturated.
   bool is_saturated;

@@ -15,7 +15,7 @@ constexpr int kMinTags = 4;
 
 /// Returns the number of usable tags, including those of other ids.
 int count_detected_tags(const BoardDetection& seen) {
-  return static_cast<int>(seen.tags.size() + seen.foreign.size());
+  return static_cast<int>(seen.tags.size() + seen.foreign_tags.size());
 }
 
 BoardDetection detect_board(const cv::Mat& image, const Board& board) {
@@ -58,7 +58,7 @@ std::string describe_markers(const std::string& dictionary, const BoardDetection
   const std::string begin = "the image shows markers of ";
   if (!dictionary.ends_with("_1000")) return begin + dictionary;
   int largest = 0;
-  for (const auto* tags : {&seen.tags, &seen.foreign}) {
+  for (const auto* tags : {&seen.tags, &seen.foreign_tags}) {
     for (const TagDetection& tag : *tags) largest = std::max(largest, tag.id);
   }
   return begin + dictionary.substr(0, dictionary.rfind('_')) + ", the largest of id " +
@@ -84,7 +84,7 @@ std::string describe_tags_of_other_kinds(const Board& board, const cv::Mat& imag
   // Damaged tags of the board can look like tags of other families. Another family therefore needs
   // at least as many tags as the board's family has with unusable ones, and more than without them.
   const BoardDetection stated = detect_board(image, board);
-  const int num_unusable = charuco ? 0 : std::max(0, stated.unusable - 1);
+  const int num_unusable = charuco ? 0 : std::max(0, stated.num_unusable_tags - 1);
   int max_count = std::max(kMinTags - 1, count_detected_tags(stated) + num_unusable);
   std::string found;
   for (const Board& other : charuco ? list_other_markers(board) : list_other_tags(board)) {

@@ -151,7 +151,7 @@ std::vector<PointDetection> SquareCorners::detect_corners_near_markers(
   return refine_corner_guesses(guesses, image);
 }
 
-std::array<int, 2> count_chessboard_squares(const cv::Mat& image) {
+std::array<int, 2> detect_chessboard_size_in_squares(const cv::Mat& image) {
   constexpr int min_px = 10;
   if (std::min(image.cols, image.rows) < min_px) return {0, 0};
   const cv::Mat1b levels =
@@ -184,7 +184,7 @@ TouchingTags::TouchingTags(const Board& board)
       family_(make_tag_family(board.family)),
       border_bits_(board.border_bits),
       tag_size_m_(board.tag_size_m) {
-  const double width = tag_width_in_bits(*family_, border_bits_);
+  const double width = tag_width_with_border_in_bits(*family_, border_bits_);
   free_fraction_ = std::min(board.tag_spacing, border_bits_ / width);
 }
 

@@ -51,7 +51,7 @@ class SquareCorners {
 
 /// Counts the squares of a chessboard that an image of 8 or 16 bits shows, along both edges of the
 /// board. Returns {0, 0} if it shows no chessboard.
-std::array<int, 2> count_chessboard_squares(const cv::Mat& image);
+std::array<int, 2> detect_chessboard_size_in_squares(const cv::Mat& image);
 
 /// Refinement of tags whose corners touch black squares, and detection of tags that the first
 /// detector missed.

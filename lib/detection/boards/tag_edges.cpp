@@ -57,10 +57,10 @@ std::vector<EdgePixel> collect_pixels_near_edge(const cv::Mat1b& image,
                   &previous = approximate[(k + 3) % 4];
   const double free_px =
       std::clamp(free_blurs * blur_px, free_blurs * kRoughBlur_px,
-                 std::max(free_blurs * kRoughBlur_px, max_free_fraction * 2 * edge.half_px));
+                 std::max(free_blurs * kRoughBlur_px, max_free_fraction * 2 * edge.half_length_px));
   const double reach_px = std::max(band.inside_px, band.outside_px) + edge.coefficients.lpNorm<1>();
   const Eigen::Vector2d wide =
-      edge.along.cwiseAbs() * edge.half_px + edge.across.cwiseAbs() * reach_px;
+      edge.along.cwiseAbs() * edge.half_length_px + edge.across.cwiseAbs() * reach_px;
   const Eigen::Array2i last(image.cols - 1, image.rows - 1);
   const Eigen::Vector2i roi_min = (edge.middle - wide).array().ceil().cast<int>().max(0);
   const Eigen::Vector2i roi_max = (edge.middle + wide).array().floor().cast<int>().min(last);
@@ -68,7 +68,7 @@ std::vector<EdgePixel> collect_pixels_near_edge(const cv::Mat1b& image,
   for (int row = roi_min.y(); row <= roi_max.y(); ++row) {
     for (int column = roi_min.x(); column <= roi_max.x(); ++column) {
       const Eigen::Vector2d at(column, row);
-      const double w = edge.along.dot(at - edge.middle) / edge.half_px;
+      const double w = edge.along.dot(at - edge.middle) / edge.half_length_px;
       const double v = edge.across.dot(at - edge.middle),
                    offset_px = v - edge.curve_displacement_px(w);
       if (offset_px < -band.inside_px || offset_px > band.outside_px) continue;
@@ -76,7 +76,7 @@ std::vector<EdgePixel> collect_pixels_near_edge(const cv::Mat1b& image,
           previous.distance_from_curve_px(at) > -free_px)
         continue;
       pixels.push_back({w, v, static_cast<double>(image(row, column)), pattern.stripe_width_px(w),
-                        pattern.predict_white_level(w, edge.half_px, blur_px)});
+                        pattern.predict_white_level(w, edge.half_length_px, blur_px)});
     }
   }
   return pixels;
@@ -130,11 +130,11 @@ EdgeCurvature compute_curvature(const EdgeCurve& edge, const Eigen::Vector2d& fr
   const Eigen::Vector2d chord = to - from, along = chord.normalized();
   Eigen::Vector2d across(-along.y(), along.x());
   if (across.dot(edge.across) < 0) across = -across;
-  const double begin = edge.along.dot(from - edge.middle) / edge.half_px,
-               end = edge.along.dot(to - edge.middle) / edge.half_px;
+  const double begin = edge.along.dot(from - edge.middle) / edge.half_length_px,
+               end = edge.along.dot(to - edge.middle) / edge.half_length_px;
   const auto off_px = [&](double w) {
     const double at = (begin + end + w * (end - begin)) / 2;
-    const Eigen::Vector2d x = edge.middle + edge.along * (at * edge.half_px) +
+    const Eigen::Vector2d x = edge.middle + edge.along * (at * edge.half_length_px) +
                               edge.across * edge.curve_displacement_px(at);
     return across.dot(x - from);
   };
@@ -151,7 +151,7 @@ EdgeCurvature compute_curvature(const EdgeCurve& edge, const Eigen::Vector2d& fr
 double compute_intersection_sd_px(const EdgeCurve& a, const EdgeFit& fit_a, const EdgeCurve& b,
                                   const EdgeFit& fit_b) {
   const auto variance = [](const EdgeFit& fit) {
-    return fit.squares / static_cast<double>(fit.pixels) * fit.end_variance;
+    return fit.sum_of_squares / static_cast<double>(fit.pixels) * fit.end_variance;
   };
   const double sine = a.along.x() * b.along.y() - a.along.y() * b.along.x();
   return std::sqrt((variance(fit_a) + variance(fit_b)) / 2) / std::abs(sine);
@@ -179,8 +179,8 @@ TagEdges::TagEdges(const TagDetection& tag, const cv::Mat1b& image, const TagGeo
     const Eigen::Vector2d from = corners[k], to = corners[(k + 1) % 4];
     EdgeCurve& edge = approximate_[k];
     edge.middle = (from + to) / 2;
-    edge.half_px = (to - from).norm() / 2;
-    edge.along = (to - from) / (2 * edge.half_px);
+    edge.half_length_px = (to - from).norm() / 2;
+    edge.along = (to - from) / (2 * edge.half_length_px);
     edge.across = {-edge.along.y(), edge.along.x()};
     if (edge.across.dot(edge.middle - middle) < 0) edge.across = -edge.across;
     for (const std::size_t other : {k + 2, k + 3}) {
@@ -222,7 +222,7 @@ void TagEdges::predict_neighbor_patterns(const TagGeometry& print) {
     const auto at = [&](double along) {
       const Eigen::Vector2d x =
           (px_from_bits * Eigen::Vector3d(along, deep, 1)).hnormalized() - edge.middle;
-      return Eigen::Vector2d(edge.along.dot(x) / edge.half_px, edge.across.dot(x));
+      return Eigen::Vector2d(edge.along.dot(x) / edge.half_length_px, edge.across.dot(x));
     };
     const Eigen::Vector2d from = at(0), to = at(width);
     patterns_[k].by_along_px = (from.y() - to.y()) / (to.x() - from.x());
@@ -321,7 +321,7 @@ struct TagSelection {
   std::pair<double, double> sum_squares() const {
     double squares = 0, pixels = 0;
     for_each_edge([&](const EdgeCurve&, const EdgeFit& fit) {
-      squares += fit.squares;
+      squares += fit.sum_of_squares;
       pixels += static_cast<double>(fit.pixels);
     });
     return {squares, pixels};
@@ -381,7 +381,7 @@ EdgeModels::EdgeModels(const TagSelection& tags) {
     blurs.push_back({edge.middle, edge.along, edge.blur_px,
                      noise_ * std::sqrt(fit.blur_variance) / edge.blur_px});
   });
-  blur_ = fit_edge_field(std::move(blurs), EdgeField::Terms::place_and_direction);
+  blur_ = fit_edge_field(std::move(blurs), EdgeField::Terms::position_and_direction);
 }
 
 void EdgeModels::fit_light(const TagSelection& tags) {
@@ -390,7 +390,7 @@ void EdgeModels::fit_light(const TagSelection& tags) {
     lights.push_back({edge.middle, edge.along, fit.bright_light,
                       noise_ * std::sqrt(fit.bright_variance) / fit.bright_light});
   });
-  light_ = fit_edge_field(std::move(lights), EdgeField::Terms::place);
+  light_ = fit_edge_field(std::move(lights), EdgeField::Terms::position);
 }
 
 EdgePrior EdgeModels::make_prior(const EdgeCurve& edge, double gamma) const {

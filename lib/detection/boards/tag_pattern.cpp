@@ -32,7 +32,7 @@ TagFamily make_tag_family(const std::string& name) {
   throw std::invalid_argument("there is no tag family " + name);
 }
 
-int tag_width_in_bits(const apriltag_family_t& family, int border_bits) {
+int tag_width_with_border_in_bits(const apriltag_family_t& family, int border_bits) {
   return family.width_at_border + 2 * (border_bits - 1);
 }
 
@@ -43,7 +43,7 @@ bool is_tag_bit_white(const apriltag_family_t& family, int id, uint32_t bit) {
 bool image_matches_tag_bits(const TagDetection& tag, const cv::Mat1f& levels,
                             const apriltag_family_t& family, int border_bits) {
   constexpr int max_wrong = 2;
-  const double width = tag_width_in_bits(family, border_bits);
+  const double width = tag_width_with_border_in_bits(family, border_bits);
   const std::array<Eigen::Vector2d, 4> square{{{0, width}, {width, width}, {width, 0}, {0, 0}}};
   std::array<PlanePair, 4> pairs;
   for (std::size_t k = 0; k < 4; ++k) pairs[k] = {square[k], tag.corners_px[k]};
@@ -70,7 +70,7 @@ bool image_matches_tag_bits(const TagDetection& tag, const cv::Mat1f& levels,
 
 TagGeometry::TagGeometry(const Board& board)
     : family_(make_tag_family(board.family)),
-      width_(tag_width_in_bits(*family_, board.border_bits)),
+      width_(tag_width_with_border_in_bits(*family_, board.border_bits)),
       inside_(board.border_bits),
       outside_(family_->reversed_border ? 1 : board.tag_spacing * width_) {}
 

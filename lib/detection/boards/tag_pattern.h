@@ -26,7 +26,7 @@ TagFamily make_tag_family(const std::string& name);
 
 /// Returns the edge length of a tag's square, with its border, in bits. The border is `border_bits`
 /// wide on each side instead of one bit as in the family.
-int tag_width_in_bits(const apriltag_family_t& family, int border_bits);
+int tag_width_with_border_in_bits(const apriltag_family_t& family, int border_bits);
 
 /// Returns true if bit `bit` (below family.nbits) of the tag `id` is white.
 bool is_tag_bit_white(const apriltag_family_t& family, int id, uint32_t bit);

@@ -64,7 +64,7 @@ ValuesPerGamma sum_tone_curve_costs(const std::vector<BoardView>& views) {
   constexpr double max_cost = 1000;
   ValuesPerGamma sums{};
   for (const BoardView& view : views) {
-    const auto& costs = view.seen.curve_costs;
+    const auto& costs = view.detection.curve_costs;
     if (costs.empty()) continue;
     const double best = *std::min_element(costs.begin(), costs.end());
     for (std::size_t i = 0; i < sums.size(); ++i) {
@@ -88,8 +88,8 @@ double correct_views_for_tone_curve(std::vector<BoardView>& views, const ValuesP
   const double fraction =
       (log_gamma - parabola.x(lower)) / (parabola.x(lower + 1) - parabola.x(lower));
   for (BoardView& view : views) {
-    view.seen.curve_costs.clear();
-    for (TagDetection& tag : view.seen.tags) {
+    view.detection.curve_costs.clear();
+    for (TagDetection& tag : view.detection.tags) {
       std::vector<TagDetection::Outline> fits{
           {tag.corners_px, tag.curvatures, tag.corner_sds_px, tag.steps}};
       fits.insert(fits.end(), tag.tone_curve_fits.begin(), tag.tone_curve_fits.end());

@@ -50,7 +50,7 @@ Comparison compare_horizontal_errors(const std::vector<FixRow>& fixes,
   for (const FixError& error : errors) {
     const auto other = images.find_name_index(fixes[error.fix].image);
     if (!other) {
-      ++comparison.only_these;
+      ++comparison.only_in_fixes;
       continue;
     }
     const double other_m = other_errors[*other].horizontal_m.norm();
@@ -63,7 +63,7 @@ Comparison compare_horizontal_errors(const std::vector<FixRow>& fixes,
     comparison.larger += difference_m > 0 ? 1 : 0;
   }
   comparison.pairs = differences_m.size();
-  comparison.only_others = other_errors.size() - comparison.pairs;
+  comparison.only_in_other_fixes = other_errors.size() - comparison.pairs;
   if (comparison.pairs > 0) {
     const auto pairs = static_cast<double>(comparison.pairs);
     comparison.mean_difference_m /= pairs;

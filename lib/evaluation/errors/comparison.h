@@ -28,7 +28,7 @@ inline constexpr double kMinDifferenceFraction = 0.01;
 /// Comparison of two sets of fixes of the same captures, by horizontal errors.
 struct Comparison {
   /// Number of captures with a fix in both, in the first only, in the second only.
-  std::size_t pairs = 0, only_these = 0, only_others = 0;
+  std::size_t pairs = 0, only_in_fixes = 0, only_in_other_fixes = 0;
   /// Number of pairs in which the first error is smaller, and in which it is larger, than the
   /// second.
   std::size_t smaller = 0, larger = 0;

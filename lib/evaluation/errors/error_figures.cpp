@@ -93,17 +93,17 @@ std::optional<BiasAndRepeatability> compute_bias_and_repeatability(
     if (station.fixes < 2) continue;
     const auto fixes = static_cast<double>(station.fixes);
     const Eigen::Vector2d bias_m = station.errors_m / fixes;
-    statistics.stations.push_back({truth[station.first_truth].xy_m, station.fixes, bias_m,
-                                   std::sqrt(station.squared_deviations_m2 / (fixes - 1))});
+    statistics.reference_points.push_back({truth[station.first_truth].xy_m, station.fixes, bias_m,
+                                           std::sqrt(station.squared_deviations_m2 / (fixes - 1))});
     statistics.fixes += station.fixes;
     squared_deviations_m2 += station.squared_deviations_m2;
     squared_biases_m2 += fixes * bias_m.squaredNorm();
   }
-  if (statistics.stations.empty()) return std::nullopt;
-  const auto stations = static_cast<double>(statistics.stations.size());
+  if (statistics.reference_points.empty()) return std::nullopt;
+  const auto stations = static_cast<double>(statistics.reference_points.size());
   const auto fixes = static_cast<double>(statistics.fixes);
   const double scatter_m2 = squared_deviations_m2 / (fixes - stations);
-  statistics.scatter_m = std::sqrt(scatter_m2);
+  statistics.repeatability_m = std::sqrt(scatter_m2);
   statistics.bias_m = std::sqrt(std::max(0.0, squared_biases_m2 - stations * scatter_m2) / fixes);
   return statistics;
 }

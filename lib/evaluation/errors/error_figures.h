@@ -34,7 +34,7 @@ ErrorStatistics compute_error_statistics(std::vector<double> errors);
 /// absolute values.
 struct SignedErrorStatistics {
   double bias;
-  ErrorStatistics sizes;
+  ErrorStatistics magnitudes;
 };
 SignedErrorStatistics compute_signed_error_statistics(std::vector<double> errors);
 
@@ -45,7 +45,7 @@ std::vector<std::pair<double, double>> compute_error_percentiles(std::vector<dou
 /// Bias and repeatability over the reference points with two fixes or more.
 struct BiasAndRepeatability {
   /// Reference point and the statistics of its fixes.
-  struct Station {
+  struct ReferencePoint {
     /// True position (x, y) of the reference point's first capture, in the world.
     Eigen::Vector2d xy_m;
     std::size_t fixes;
@@ -55,11 +55,11 @@ struct BiasAndRepeatability {
     double sd_m;
   };
   /// Reference points with two fixes or more, in the order of the ground truth.
-  std::vector<Station> stations;
+  std::vector<ReferencePoint> reference_points;
   std::size_t fixes;
-  /// Repeatability within reference points, sqrt(sum |e - bias of its station|^2 / (fixes -
+  /// Repeatability within reference points, sqrt(sum |e - bias of its reference point|^2 / (fixes -
   /// stations)).
-  double scatter_m;
+  double repeatability_m;
   /// RMS bias of the reference points, weighted by fixes and corrected for the scatter of the
   /// means: sqrt((sum |bias|^2 - stations scatter^2) / fixes), where the sum is over the fixes. Not
   /// below zero.

@@ -40,7 +40,7 @@ struct CrlbRatio {
   /// partly visible lamps are additional information and not included.
   double horizontal;
   /// RMS of the horizontal limit over those fixes, x and y together: sqrt(mean (var x + var y)).
-  double limit_m;
+  double crlb_m;
   /// Number of fixes at whose true pose there is a limit.
   std::size_t fixes;
   /// Standard deviation of `horizontal` where its expectation is 1: sqrt(sum 2 tr C^2) / (2 sum tr

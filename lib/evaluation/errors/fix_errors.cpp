@@ -15,7 +15,7 @@ namespace {
 /// Returns the row of `table` for the image of each fix. Throws InputError if an image has none;
 /// `hint` follows the name of the table's file in the message, `question` ends it.
 template <typename Row>
-std::vector<std::size_t> match_rows(const FromFile<FixRow>& fixes, const FromFile<Row>& table,
+std::vector<std::size_t> match_rows(const FileRows<FixRow>& fixes, const FileRows<Row>& table,
                                     const std::string& hint, const std::string& question) {
   NameIndex images(table.rows.size());
   for (const Row& row : table.rows) images.insert_unique_name(row.image);
@@ -38,31 +38,31 @@ std::vector<std::size_t> match_rows(const FromFile<FixRow>& fixes, const FromFil
                        " images are not: " + question);
 }
 
-std::vector<std::size_t> group_captures(const std::vector<TruthRow>& truth, double station_m) {
+std::vector<std::size_t> group_captures(const std::vector<TruthRow>& truth, double radius_m) {
   std::vector<Eigen::Vector3d> places_m;
   places_m.reserve(truth.size());
   for (const TruthRow& row : truth) {
     places_m.emplace_back(row.xy_m.x(), row.xy_m.y(), row.z_m.value_or(0));
   }
-  return assign_positions_to_reference_points(places_m, station_m);
+  return assign_positions_to_reference_points(places_m, radius_m);
 }
 
 }  // namespace
 
-FixErrors compute_fix_errors_against_truth(const FromFile<FixRow>& fixes,
-                                           const FromFile<TruthRow>& truth, double station_m) {
+FixErrors compute_fix_errors_against_truth(const FileRows<FixRow>& fixes,
+                                           const FileRows<TruthRow>& truth, double radius_m) {
   const std::string hint =
       truth.rows.empty() ? "" : ", whose first is '" + truth.rows.front().image + "'";
   const std::vector<std::size_t> truth_rows =
       match_rows(fixes, truth, hint, "is it the truth of these captures?");
-  const std::vector<std::size_t> stations = group_captures(truth.rows, station_m);
+  const std::vector<std::size_t> stations = group_captures(truth.rows, radius_m);
   FixErrors result;
   result.captures = truth.rows.size();
   result.errors.reserve(fixes.rows.size());
   for (std::size_t i = 0; i < fixes.rows.size(); ++i) {
     const FixRow& row = fixes.rows[i];
     if (!row.fix) {
-      ++result.missing[row.status];
+      ++result.failures_by_status[row.status];
       continue;
     }
     const TruthRow& true_row = truth.rows[truth_rows[i]];
@@ -78,7 +78,7 @@ FixErrors compute_fix_errors_against_truth(const FromFile<FixRow>& fixes,
     result.errors.push_back(error);
   }
   if (truth.rows.size() > fixes.rows.size()) {
-    result.missing["no row"] = truth.rows.size() - fixes.rows.size();
+    result.failures_by_status["no row"] = truth.rows.size() - fixes.rows.size();
   }
   return result;
 }
@@ -88,11 +88,11 @@ FixErrors compute_fix_errors_against_path(const std::vector<FixRow>& fixes, cons
   result.captures = fixes.size();
   for (std::size_t i = 0; i < fixes.size(); ++i) {
     if (!fixes[i].fix) {
-      ++result.missing[fixes[i].status];
+      ++result.failures_by_status[fixes[i].status];
       continue;
     }
     const Eigen::Vector3d& place_m = fixes[i].fix->pose.position_m;
-    const NearestOnPath nearest = find_nearest_point_on_path(path, place_m.head<2>());
+    const PathPoint nearest = find_nearest_point_on_path(path, place_m.head<2>());
     FixError error{i, place_m.head<2>() - nearest.xy_m, {}, {}, 0};
     if (nearest.z_m) error.height_m = place_m.z() - *nearest.z_m;
     result.errors.push_back(error);
@@ -102,7 +102,7 @@ FixErrors compute_fix_errors_against_path(const std::vector<FixRow>& fixes, cons
   return result;
 }
 
-void check_same_images_in_fixes(const FromFile<FixRow>& fixes, const FromFile<FixRow>& others) {
+void check_same_images_in_fixes(const FileRows<FixRow>& fixes, const FileRows<FixRow>& others) {
   const std::string question = "are both of the same captures?";
   match_rows(others, fixes, "", question);
   match_rows(fixes, others, "", question);

@@ -53,14 +53,14 @@ struct FixErrors {
   /// Number of captures that should have a fix.
   std::size_t captures = 0;
   /// Number of captures without a fix, by the word of their status.
-  std::map<std::string, std::size_t> missing;
+  std::map<std::string, std::size_t> failures_by_status;
   /// Errors in the order of the fixes.
   std::vector<FixError> errors;
 };
 
 /// Table with the file it was read from, for messages about its rows.
 template <typename Row>
-struct FromFile {
+struct FileRows {
   std::filesystem::path file;
   std::vector<Row> rows;
 };
@@ -69,11 +69,11 @@ struct FromFile {
 ///
 /// The captures are those of the ground truth. Captures without a row in the fixes are missing with
 /// the status "no row". Clusters are reference points: captures whose true positions are within
-/// `station_m`.
+/// `radius_m`.
 /// @throws InputError if images of the fixes are not in the ground truth, with the count and the
 /// line of the first
-FixErrors compute_fix_errors_against_truth(const FromFile<FixRow>& fixes,
-                                           const FromFile<TruthRow>& truth, double station_m);
+FixErrors compute_fix_errors_against_truth(const FileRows<FixRow>& fixes,
+                                           const FileRows<TruthRow>& truth, double radius_m);
 
 /// Maximum number of clusters along a path, see compute_fix_errors_against_path().
 inline constexpr std::size_t kPathRuns = 30;
@@ -88,6 +88,6 @@ FixErrors compute_fix_errors_against_path(const std::vector<FixRow>& fixes, cons
 
 /// @throws InputError if the two files do not have rows of the same images, with the count and the
 /// line of the first
-void check_same_images_in_fixes(const FromFile<FixRow>& fixes, const FromFile<FixRow>& others);
+void check_same_images_in_fixes(const FileRows<FixRow>& fixes, const FileRows<FixRow>& others);
 
 }  // namespace vlp

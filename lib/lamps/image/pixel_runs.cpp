@@ -27,7 +27,7 @@ void add_runs_of_row(const Level* pixels, int columns, int row, Level threshold,
   constexpr int max_gap = 2, min_width = 3;
   PixelRun run{row, 0, -1};  // empty
   const auto finish = [&] {
-    if (run.run_width_px() >= min_width) runs.push_back(run);
+    if (run.pixel_run_width_px() >= min_width) runs.push_back(run);
     run.end = -1;
   };
   for (const int tile : tiles) {
@@ -99,10 +99,10 @@ PixelBox Blob::blob_bounding_box() const {
   return {begin, first_blob_row(), end - begin, last_blob_row() + 1 - first_blob_row()};
 }
 
-double mean_run_level(const ImageView& image, const PixelRun& run) {
+double mean_level_of_pixel_run(const ImageView& image, const PixelRun& run) {
   return visit_levels(image, [&](auto level) {
     const auto* row = image.row_pixels<decltype(level)>(run.row);
-    return std::accumulate(row + run.begin, row + run.end, 0.0) / run.run_width_px();
+    return std::accumulate(row + run.begin, row + run.end, 0.0) / run.pixel_run_width_px();
   });
 }
 

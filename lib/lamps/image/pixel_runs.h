@@ -14,12 +14,12 @@ namespace vlp {
 struct PixelRun {
   int row, begin, end;
 
-  int run_width_px() const { return end - begin; }
+  int pixel_run_width_px() const { return end - begin; }
 };
 
 /// Returns the mean gray level of the pixels of a run. The dark level is not subtracted.
 /// @pre The run is not empty and lies in the image.
-double mean_run_level(const ImageView& image, const PixelRun& run);
+double mean_level_of_pixel_run(const ImageView& image, const PixelRun& run);
 
 /// Finds the runs of pixels above `threshold`, row by row. Gaps of up to two pixels do not end a
 /// run; runs of less than three pixels are discarded as noise. Searches the nonzero tiles of `lit`,

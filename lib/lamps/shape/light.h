@@ -15,11 +15,11 @@ namespace vlp {
 
 /// Class of a light in an image.
 enum class LightKind {
-  lamp,     ///< identified and fully inside the image: usable for a position fix
-  cut,      ///< identified, but cut by the image border
-  unknown,  ///< modulated, but not identified as one lamp of the map, see LightReason
-  steady,   ///< not modulated
-  formless  ///< bright, but neither modulated nor with a known outline
+  lamp,         ///< identified and fully inside the image: usable for a position fix
+  truncated,    ///< identified, but cut by the image border
+  unknown,      ///< modulated, but not identified as one lamp of the map, see LightReason
+  unmodulated,  ///< not modulated
+  no_outline    ///< bright, but neither modulated nor with a known outline
 };
 
 /// Reason for the class of a light: the check that rejected it as a lamp, or `identified`. The
@@ -28,7 +28,7 @@ enum class LightKind {
 enum class LightReason {
   identified,       ///< a lamp, possibly cut by the image border
   overexposed,      ///< steady: contrast below kMinContrast, most pixels at full scale
-  steady,           ///< steady: contrast below kMinContrast
+  unmodulated,      ///< steady: contrast below kMinContrast
   too_few_periods,  ///< below kMinPeriods, or no lamp of the image has kMinReliablePeriods
   no_clear_period,  ///< no period fits, its parts differ, or its stripes are irregular
   unknown_period,   ///< no lamp or several have its period, or other lamps contradict it
@@ -57,18 +57,18 @@ struct Light {
   Eigen::Vector2d plane_center;
   Matrix2 unit_from_plane;
   /// Top left and bottom right corner of the bounding box of the outline, (u, v).
-  Eigen::Vector2d low, high;
+  Eigen::Vector2d box_min, box_max;
   Stripes stripes;
-  /// Result of compute_stripe_coherence(), or ModulatedLight::phase_coherence if `by_modulation`. 0
-  /// if the stripes have no period.
+  /// Result of compute_stripe_coherence_between_parts(), or ModulatedLight::phase_coherence if
+  /// `is_found_by_modulation`. 0 if the stripes have no period.
   double coherence;
   /// Steady lights only: fraction of the pixels in the middle that have the level of the light's
   /// brightest pixel. 0 if this level is not full scale.
   double clipped_fraction;
   /// Level of the brightest scanlines above the dark level, in gray levels.
-  double peak;
+  double peak_level;
   /// True if the light was found by its modulation, which then also determined its stripes.
-  bool by_modulation;
+  bool is_found_by_modulation;
   /// True if the light has no outline; its center is then the centroid of the lit area.
   bool is_glow;
   /// True if the outline may differ from the outline of the lamp: blurred, partly visible, or that
@@ -80,30 +80,30 @@ struct Light {
   /// Width of the edge from 25 % to 75 % of the level, in pixels.
   double rise_px;
   /// Polygon inside the edges of the light, as pixels (u, v); empty for discs.
-  std::vector<Eigen::Vector2d> face;
+  std::vector<Eigen::Vector2d> inner_polygon;
   /// Ratio of the long to the short axis in the plane of LightShape, and the standard deviation of
   /// its logarithm; 1 and 0 for discs.
   double aspect = 1, aspect_sd = 0;
   /// Discs: fraction of the blob's edge points that lie on the circle. Rectangles: fraction of the
   /// pixels along the worst edge that agree with the edge model.
-  double roundness;
+  double inlier_fraction;
   /// Ratio of the number of the blob's edge points outside all lights of the blob to the number of
   /// edge points on the outline.
-  double outside;
+  double outside_ratio;
   /// Points of the outline, (column, line): (v, u) for readout along columns.
   std::vector<EdgePoint> outline;
   /// Normal equations of the circle fit in the level plane; empty for other outlines.
-  OutlineSums sums;
+  OutlineSums outline_sums;
 };
 
-/// Minimum of Light::roundness for an identified lamp.
-inline constexpr double kMinRoundness = 0.45;
+/// Minimum of Light::inlier_fraction for an identified lamp.
+inline constexpr double kMinInlierFraction = 0.45;
 
-inline bool is_disc_light(const Light& light) { return light.shape == ShapeKind::disc; }
+inline bool is_light_disc_shaped(const Light& light) { return light.shape == ShapeKind::disc; }
 
 /// Returns true if a light is modulated: it may be a lamp of this map or of another one.
 inline bool is_light_modulated(const Light& light) {
-  return light.kind != LightKind::steady && light.kind != LightKind::formless;
+  return light.kind != LightKind::unmodulated && light.kind != LightKind::no_outline;
 }
 
 }  // namespace vlp

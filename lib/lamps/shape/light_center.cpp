@@ -115,15 +115,15 @@ std::optional<RobustEllipse> fit_circle_or_ellipse(const WeightedOutline& outlin
 bool set_center_and_box(const RobustEllipse& fit, const LightShape& shape, Light& light) {
   const auto pixel = shape.pixel_from_level_plane_point(fit.center);
   if (!pixel) return false;
-  light.pixel = light.low = light.high = *pixel;
+  light.pixel = light.box_min = light.box_max = *pixel;
   for (int i = 0; i < 16; ++i) {
     const double angle = std::numbers::pi / 8 * i;
     const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
     const auto rim =
         shape.pixel_from_level_plane_point(fit.center + fit.rim_from_circle * direction);
     if (!rim) return false;
-    light.low = light.low.cwiseMin(*rim);
-    light.high = light.high.cwiseMax(*rim);
+    light.box_min = light.box_min.cwiseMin(*rim);
+    light.box_max = light.box_max.cwiseMax(*rim);
   }
   return true;
 }
@@ -175,13 +175,13 @@ std::optional<Light> LightShape::fit_light_to_outline(std::vector<EdgePoint> out
       limit_center_sd(compute_center_sd(fit->center_covariance, num_correlated) / weighted.per_px);
   if (!sigma_px) return std::nullopt;
   light.sigma_px = *sigma_px;
-  light.roundness = double(fit->count) / double(edges.size());
+  light.inlier_fraction = double(fit->count) / double(edges.size());
   for (std::size_t i = 0; i < edges.size(); ++i) {
     if (selected[i]) light.outline.push_back(edges[i]);
   }
   if (camera_.lens) {
     const Circle circle = fit->to_circle();
-    light.sums = {
+    light.outline_sums = {
         weighted.points, weighted.weights, selected, circle, compute_scanline_gradient(circle),
         num_correlated};
   }
@@ -218,9 +218,9 @@ Eigen::Vector2d LightShape::compute_readout_center_offset(
 
 void LightShape::correct_light_for_motion(const Oval& oval, const Eigen::Vector2d& motion_per_line,
                                           Light& light) const {
-  const auto estimate = light.sums.solve_outline_with_oval_prior(oval);
+  const auto estimate = light.outline_sums.solve_outline_with_oval_prior(oval);
   if (!estimate) return;
-  const Circle& circle = light.sums.fitted_circle();
+  const Circle& circle = light.outline_sums.fitted_circle();
   const auto pixel =
       pixel_from_level_plane_point(circle.center + circle.radius * estimate->p.head<2>() -
                                    compute_readout_center_offset(circle, motion_per_line));
@@ -235,9 +235,9 @@ std::vector<EdgePoint> LightShape::find_outline_points_outside(
     const Light& light, const std::vector<EdgePoint>& outline) const {
   // Uses the axis-aligned ellipse in the box, although the ellipse of the light may be rotated.
   constexpr double clear = 1.1, clear_px = 1.5;
-  const Eigen::Vector2d center = (light.low + light.high) / 2;
+  const Eigen::Vector2d center = (light.box_min + light.box_max) / 2;
   const Eigen::Vector2d half =
-      clear * (light.high - light.low) / 2 + Eigen::Vector2d(clear_px, clear_px);
+      clear * (light.box_max - light.box_min) / 2 + Eigen::Vector2d(clear_px, clear_px);
   std::vector<EdgePoint> result;
   std::copy_if(
       outline.begin(), outline.end(), std::back_inserter(result), [&](const EdgePoint& edge) {

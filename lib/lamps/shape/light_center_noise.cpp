@@ -58,7 +58,7 @@ double count_points_per_stripe(const std::vector<EdgePoint>& outline) {
   std::array<double, 2> last{-1e9, -1e9};
   double stripes = 0;
   for (const EdgePoint& point : outline) {
-    double& row = last[point.begins ? 0 : 1];
+    double& row = last[point.is_run_begin ? 0 : 1];
     if (point.pixel.y() - row > next) ++stripes;
     row = point.pixel.y();
   }

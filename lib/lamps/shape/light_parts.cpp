@@ -11,7 +11,7 @@ namespace vlp {
 namespace {
 
 bool contains_point(const Light& light, const Eigen::Vector2d& pixel) {
-  if (!is_disc_light(light)) return polygon_contains(light.face, pixel);
+  if (!is_light_disc_shaped(light)) return polygon_contains(light.inner_polygon, pixel);
   return (light.pixel - pixel).norm() < light.radius_px;
 }
 
@@ -24,7 +24,7 @@ bool may_belong_together(const PixelBox& a, const PixelBox& b) {
 /// Returns true if a part is not a piece of a light that an occluder splits.
 bool make_whole_light(const LightPart& part) {
   return part.light &&
-         (part.light->is_glow || part.light->is_uneven || !is_disc_light(*part.light));
+         (part.light->is_glow || part.light->is_uneven || !is_light_disc_shaped(*part.light));
 }
 
 std::size_t count_points(const LightPart& part) {
@@ -57,7 +57,7 @@ LightReason find_formless_reason(const LightPart& part, const ImageSize& size) {
 }
 
 bool do_lights_overlap(const Light& a, const Light& b) {
-  if (is_disc_light(a) && is_disc_light(b)) {
+  if (is_light_disc_shaped(a) && is_light_disc_shaped(b)) {
     return (a.pixel - b.pixel).norm() < std::max(a.radius_px, b.radius_px);
   }
   return contains_point(a, b.pixel) || contains_point(b, a.pixel);
@@ -121,12 +121,13 @@ std::vector<Light> make_lights_without_outline(std::vector<LightPart> parts,
     const PixelBox& box = part.box;
     if (std::min(box.width, box.height) < min_px) continue;
     Light light{};
-    light.kind = LightKind::formless;
+    light.kind = LightKind::no_outline;
     light.reason = find_formless_reason(part, size);
-    light.low = shape.swap_image_and_scanline_axes({box.x - 0.5, box.y - 0.5});
-    light.high = shape.swap_image_and_scanline_axes({box.end_column() - 0.5, box.end_row() - 0.5});
-    light.pixel = (light.low + light.high) / 2;
-    light.radius_px = (light.high - light.low).mean() / 2;
+    light.box_min = shape.swap_image_and_scanline_axes({box.x - 0.5, box.y - 0.5});
+    light.box_max =
+        shape.swap_image_and_scanline_axes({box.end_column() - 0.5, box.end_row() - 0.5});
+    light.pixel = (light.box_min + light.box_max) / 2;
+    light.radius_px = (light.box_max - light.box_min).mean() / 2;
     const bool inside = std::any_of(lights.begin(), lights.end(), [&](const Light& other) {
       return contains_point(other, light.pixel);
     });

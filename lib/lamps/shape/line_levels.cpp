@@ -18,7 +18,7 @@ struct ChordSums {
 };
 
 ChordSums sum_chord_levels(const ImageView& lines, const PixelRun& chord, double dark) {
-  const double count = chord.run_width_px(), middle = (chord.begin + chord.end - 1) / 2.0;
+  const double count = chord.pixel_run_width_px(), middle = (chord.begin + chord.end - 1) / 2.0;
   double sum = 0, moment = 0;
   for (int column = chord.begin; column < chord.end; ++column) {
     const double level = lines.gray_level_at_pixel(column, chord.row) - dark;
@@ -53,7 +53,7 @@ LineLevels::LineLevels(const ImageView& lines, const std::vector<PixelRun>& chor
   if (!(brightest_ > 0)) brightest_ = 1;
   measured_.reserve(signal.size());
   for (std::size_t i = 0; i < signal.size(); ++i) {
-    const double noise = background.noise / brightest_ / std::sqrt(chords[i].run_width_px());
+    const double noise = background.noise / brightest_ / std::sqrt(chords[i].pixel_run_width_px());
     const double level = signal[i] / brightest_;
     measured_.push_back({level, std::hypot(noise, unevenness * level)});
   }
@@ -64,7 +64,7 @@ LineLevels::LineLevels(const ImageView& lines, const std::vector<PixelRun>& chor
                period_lines_;
 }
 
-std::optional<LineLevel> LineLevels::scanline_level(int line) const {
+std::optional<LineLevel> LineLevels::relative_scanline_level(int line) const {
   const int last = first_ + static_cast<int>(measured_.size()) - 1;
   if (line >= first_ && line <= last) return measured_[static_cast<std::size_t>(line - first_)];
   if (period_lines_ > 0) {

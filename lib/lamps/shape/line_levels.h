@@ -34,7 +34,7 @@ class LineLevels {
 
   /// Returns the brightest level above the dark level, in gray levels.
   double max_level_above_dark() const { return brightest_; }
-  std::optional<LineLevel> scanline_level(int line) const;
+  std::optional<LineLevel> relative_scanline_level(int line) const;
   /// Returns the period of the stripes; 0 for steady light.
   double stripe_period_lines() const { return period_lines_; }
   /// Returns the ratio of the level at a column to that at the middle column.

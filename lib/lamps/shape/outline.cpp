@@ -66,7 +66,9 @@ void add_edge(const Profile& profile, int width, double dark, std::vector<EdgePo
 class RimEllipse {
  public:
   explicit RimEllipse(const DiscImage& disc)
-      : disc_(disc), center_((disc.low + disc.high) / 2), half_((disc.high - disc.low) / 2) {}
+      : disc_(disc),
+        center_((disc.box_min + disc.box_max) / 2),
+        half_((disc.box_max - disc.box_min) / 2) {}
 
   /// Returns the outward normal of the rim. @pre The point is near the rim.
   Eigen::Vector2d compute_outline_normal(const Eigen::Vector2d& point) const {
@@ -82,7 +84,7 @@ class RimEllipse {
   }
   /// Returns the distance from the image of the disc's center to the rim's first or last column.
   double compute_half_width_px(bool begins) const {
-    return begins ? disc_.center.x() - disc_.low.x() : disc_.high.x() - disc_.center.x();
+    return begins ? disc_.center.x() - disc_.box_min.x() : disc_.box_max.x() - disc_.center.x();
   }
   /// Returns the outward distance from the image of the disc's center.
   double distance_outwards_px(double column, bool begins) const {
@@ -121,7 +123,7 @@ struct InnerLevel {
   /// Level at the middle above the dark level, and its change per pixel inwards.
   double level, slope;
 
-  int edge_direction() const { return point.begins ? 1 : -1; }
+  int edge_direction() const { return point.is_run_begin ? 1 : -1; }
   double normal_cosine() const { return std::abs(normal.x()); }
   double edge_column(double i) const { return origin + edge_direction() * i; }
 };
@@ -212,7 +214,7 @@ double estimate_curvature(const std::vector<InnerLevel>& levels, const RimEllips
   constexpr double maximum = 0.8;
   std::array<std::vector<double>, 2> curvatures;
   for (const InnerLevel& inner : levels) {
-    const bool begins = inner.point.begins;
+    const bool begins = inner.point.is_run_begin;
     const double width_px = rim.compute_half_width_px(begins);
     const double fraction =
         rim.distance_outwards_px(inner.edge_column(inner.middle), begins) / width_px;
@@ -239,7 +241,7 @@ bool has_uneven_inner_levels(const ImageView& image, const std::vector<InnerLeve
   for (const InnerLevel& inner : levels) {
     const auto profile = make_profile(image, inner);
     const double quadratic =
-        inner.level * curvature / std::pow(rim.compute_half_width_px(inner.point.begins), 2);
+        inner.level * curvature / std::pow(rim.compute_half_width_px(inner.point.is_run_begin), 2);
     double before = 0;
     for (int i = inner.first; i < inner.first + kSamples; ++i) {
       const double away = i - inner.middle;
@@ -278,7 +280,7 @@ RefinedOutline refine_disc_outline(const ImageView& image, const std::vector<Edg
       {}, inside_only && has_uneven_inner_levels(image, levels, rim, curvature, dark)};
   result.points.reserve(levels.size());
   for (const InnerLevel& inner : levels) {
-    const bool begins = inner.point.begins;
+    const bool begins = inner.point.is_run_begin;
     const double back = inner.middle - kBefore, width_px = rim.compute_half_width_px(begins);
     const double quadratic = curvature * (back * back - kVariance) / (width_px * width_px);
     const double level = inner.level * (1 + quadratic) - inner.slope * back;
@@ -313,11 +315,11 @@ RefinedOutline refine_disc_outline(const ImageView& image, const std::vector<Edg
 std::vector<EdgePoint> select_outermost_edge_points(std::vector<EdgePoint> points) {
   const auto further_out = [](const EdgePoint& a, const EdgePoint& b) {
     if (a.pixel.y() != b.pixel.y()) return a.pixel.y() < b.pixel.y();
-    if (a.begins != b.begins) return a.begins;
-    return a.begins ? a.pixel.x() < b.pixel.x() : a.pixel.x() > b.pixel.x();
+    if (a.is_run_begin != b.is_run_begin) return a.is_run_begin;
+    return a.is_run_begin ? a.pixel.x() < b.pixel.x() : a.pixel.x() > b.pixel.x();
   };
   const auto same_side = [](const EdgePoint& a, const EdgePoint& b) {
-    return a.pixel.y() == b.pixel.y() && a.begins == b.begins;
+    return a.pixel.y() == b.pixel.y() && a.is_run_begin == b.is_run_begin;
   };
   std::sort(points.begin(), points.end(), further_out);
   points.erase(std::unique(points.begin(), points.end(), same_side), points.end());
@@ -330,9 +332,9 @@ std::vector<EdgePoint> find_blob_outline(const ImageView& image, const Blob& blo
   std::vector<EdgePoint> points;
   points.reserve(2 * blob.runs.size());
   for (const PixelRun& run : blob.runs) {
-    if (run.run_width_px() < min_width) continue;
-    add_edge({image, run.row, run.begin, 1}, run.run_width_px(), background.level, points);
-    add_edge({image, run.row, run.end - 1, -1}, run.run_width_px(), background.level, points);
+    if (run.pixel_run_width_px() < min_width) continue;
+    add_edge({image, run.row, run.begin, 1}, run.pixel_run_width_px(), background.level, points);
+    add_edge({image, run.row, run.end - 1, -1}, run.pixel_run_width_px(), background.level, points);
   }
   // Between the stripes of a saturated lamp, spilled charge has no outline of its own.
   constexpr double min_fraction = 0.35;

@@ -22,12 +22,12 @@ struct EdgePoint {
   /// Width of the edge from 25 % to 75 % of the level, in pixels along the row.
   double rise_px;
   /// True if the light begins at this point of the row, false if it ends.
-  bool begins;
+  bool is_run_begin;
 };
 
 /// Image of a disc: bounding box of its rim and image of its center, (column, row) each.
 struct DiscImage {
-  Eigen::Vector2d low, high, center;
+  Eigen::Vector2d box_min, box_max, center;
 };
 
 /// Result of refine_disc_outline(): the outline of a light with refined points.

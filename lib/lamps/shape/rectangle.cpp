@@ -224,10 +224,10 @@ std::optional<FirstCorners> find_corners_of_curved_sides(
   const double length = (side.to - side.from).norm();
   std::optional<FirstCorners> best;
   std::vector<Eigen::Vector2d> straight = points;
-  for (double bow_px = -max_px; bow_px <= max_px; bow_px += step_px) {
+  for (double sagitta_px = -max_px; sagitta_px <= max_px; sagitta_px += step_px) {
     for (std::size_t i = 0; i < points.size(); ++i) {
       const double along = 2 * (points[i] - side.from).dot(side.edge_direction()) / length - 1;
-      straight[i] = points[i] - bow_px * (1 - along * along) * side.inward_normal();
+      straight[i] = points[i] - sagitta_px * (1 - along * along) * side.inward_normal();
     }
     const auto corners = find_first_corners(straight, 1);
     if (corners && (!best || corners->near > best->near)) best = corners;
@@ -262,7 +262,7 @@ CenterOffset estimate_center_offset(const std::array<StraightEdge, 4>& edges,
     const double variance =
         curvature_sd_ratio * curvature_sd_ratio * edge.covariance_px.trace() / 2;
     information += slope * slope / variance;
-    moment += slope * edge.bow_px / variance;
+    moment += slope * edge.sagitta_px / variance;
     d_shift_d_k -= half_square / 2 * (center - middle);
   }
   const double k = moment / information;
@@ -410,36 +410,36 @@ std::optional<Light> fit_light(std::array<StraightEdge, 4>& edges, double per_px
     *pixel += behind.shift;
     lens_sd_px = behind.sd_px;
   }
-  light.pixel = light.low = light.high = *pixel;
+  light.pixel = light.box_min = light.box_max = *pixel;
   for (const Eigen::Vector2d& at : around) {
-    light.low = light.low.cwiseMin(at);
-    light.high = light.high.cwiseMax(at);
+    light.box_min = light.box_min.cwiseMin(at);
+    light.box_max = light.box_max.cwiseMax(at);
   }
   light.radius_px = std::sqrt(compute_polygon_area(around) / std::numbers::pi);
-  double bow_px = 0, end_sd_px = 0;
-  light.roundness = 1;
+  double sagitta_px = 0, end_sd_px = 0;
+  light.inlier_fraction = 1;
   for (StraightEdge& edge : edges) {
     end_sd_px = std::max(end_sd_px, std::sqrt(edge.covariance_px.diagonal().maxCoeff()));
-    bow_px = std::max(bow_px, std::abs(edge.bow_px));
+    sagitta_px = std::max(sagitta_px, std::abs(edge.sagitta_px));
     light.rise_px = std::max(light.rise_px, edge.points.empty() ? 0 : edge.points[0].rise_px);
-    light.roundness = std::min(light.roundness, edge.fraction);
+    light.inlier_fraction = std::min(light.inlier_fraction, edge.explained_fraction);
     light.outline.insert(light.outline.end(), edge.points.begin(), edge.points.end());
   }
-  light.low.array() -= 2 * end_sd_px;
-  light.high.array() += 2 * end_sd_px;
+  light.box_min.array() -= 2 * end_sd_px;
+  light.box_max.array() += 2 * end_sd_px;
   const auto sigma_px = limit_center_sd(std::hypot(compute_center_sd(*covariance), lens_sd_px));
   if (!sigma_px) return std::nullopt;
   light.sigma_px = *sigma_px;
   const auto outliers = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& at) {
     return std::any_of(sides.begin(), sides.end(), [&](const Side& side) {
-      return (at - side.from).dot(side.inward_normal()) < -(outlier_px + bow_px) * per_px;
+      return (at - side.from).dot(side.inward_normal()) < -(outlier_px + sagitta_px) * per_px;
     });
   });
-  light.outside = double(outliers) / double(points.size());
-  light.face = make_polygon(sides, outlier_px * per_px, shape);
+  light.outside_ratio = double(outliers) / double(points.size());
+  light.inner_polygon = make_polygon(sides, outlier_px * per_px, shape);
   light.aspect = compute_aspect(sides);
   light.aspect_sd = compute_aspect_sd(edges, per_px);
-  return light.face.empty() ? std::nullopt : std::optional(std::move(light));
+  return light.inner_polygon.empty() ? std::nullopt : std::optional(std::move(light));
 }
 
 /// Edges of a rectangle in the order of its sides; std::nullopt for edges that are not found.
@@ -529,8 +529,8 @@ bool add_hidden_edges(const EdgeImage& image, const Sides& sides, EdgeSearch sea
     // Twice the sd, because apply_right_angles() uses the angles again.
     const double slant_sd_px = std::sqrt(difference.dot(get_block(ends, i) * difference));
     const auto find = [&](double offset_px, double offset_sd_px) {
-      return estimate_edge_hidden_by_dark_stripe(image, side, search,
-                                                 {offset_px, offset_sd_px, slant_sd_px});
+      return estimate_position_of_edge_in_dark_stripe(image, side, search,
+                                                      {offset_px, offset_sd_px, slant_sd_px});
     };
     edges[i] = find(0, std::numeric_limits<double>::infinity());
     if (!edges[i]) return false;
@@ -598,7 +598,7 @@ struct FittedRectangle {
   std::array<StraightEdge, 4> edges;
   Corners corners;
   /// Largest curvature of an edge, and the blur of the most certain edge.
-  double bow_px, blur_px;
+  double sagitta_px, blur_px;
 };
 
 /// Returns std::nullopt if the edges do not form a rectangle.
@@ -609,7 +609,7 @@ std::optional<FittedRectangle> assemble_rectangle(FoundEdges found) {
   for (std::size_t i = 0; i < 4; ++i) {
     result.edges[i] = std::move(*found[i]);
     sides[i] = result.edges[i].side;
-    result.bow_px = std::max(result.bow_px, std::abs(result.edges[i].bow_px));
+    result.sagitta_px = std::max(result.sagitta_px, std::abs(result.edges[i].sagitta_px));
   }
   const auto corners = is_rectangular(sides) ? find_corners(sides) : std::nullopt;
   if (!corners) return std::nullopt;
@@ -664,7 +664,7 @@ std::optional<Light> fit_rectangular_light(const ImageView& lines, const Blob& b
   const auto is_rather_round = [&](const Sides& sides) {
     if (compute_aspect(sides) > min_aspect) return false;
     const auto disc = shape.fit_light_to_outline(outline, background);
-    return disc && disc->roundness >= first->near;
+    return disc && disc->inlier_fraction >= first->near;
   };
   FittedRectangle rectangle{{}, first->corners, 0, 0};
   struct Pass {
@@ -676,11 +676,11 @@ std::optional<Light> fit_rectangular_light(const ImageView& lines, const Blob& b
     const double min_side =
         std::min((sides[0].to - sides[0].from).norm(), (sides[1].to - sides[1].from).norm());
     if (!(min_side > min_px * per_px) || compute_aspect(sides) > max_aspect) return std::nullopt;
-    const double inset = std::min((inset_px + rectangle.bow_px) * per_px, min_side / 3);
+    const double inset = std::min((inset_px + rectangle.sagitta_px) * per_px, min_side / 3);
     const auto chords = find_chords_inside_sides(sides, inset, lines.size(), shape);
     if (chords.empty()) return std::nullopt;
     const LineLevels levels(lines, chords, background);
-    search.reach_px = std::min(search.reach_px + rectangle.bow_px, min_side / per_px / 2);
+    search.reach_px = std::min(search.reach_px + rectangle.sagitta_px, min_side / per_px / 2);
     search.blur_px = rectangle.blur_px;
     const EdgeImage image{lines, levels, background.level, per_px, shape};
     FoundEdges found_edges;

@@ -37,8 +37,8 @@ inline constexpr double kUnknownTiltSd = 0.06;
 /// The offset is subtracted, and its uncertainty is included in sigma_px.
 ///
 /// With a lens, one edge or two opposite ones may be hidden by a dark stripe along them, see
-/// estimate_edge_hidden_by_dark_stripe(). The direction of a hidden edge follows from the other
-/// edges. The position of a single hidden edge also follows from the aspect ratio if one of
+/// estimate_position_of_edge_in_dark_stripe(). The direction of a hidden edge follows from the
+/// other edges. The position of a single hidden edge also follows from the aspect ratio if one of
 /// `sizes_m` agrees with the stripes. Right angles correct all edges, within the uncertainty of the
 /// tilt.
 ///

@@ -269,8 +269,8 @@ Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_
 
 /// Returns the ellipse of a light's outline, linearized at its center.
 Ellipse make_ellipse(const Light& light, const LightShape& shape) {
-  const Eigen::Vector2d low = shape.swap_image_and_scanline_axes(light.low),
-                        high = shape.swap_image_and_scanline_axes(light.high);
+  const Eigen::Vector2d low = shape.swap_image_and_scanline_axes(light.box_min),
+                        high = shape.swap_image_and_scanline_axes(light.box_max);
   const Eigen::Vector2d center = (low + high) / 2;
   Matrix2 unit_from_pixel;
   const auto at = shape.level_plane_point_from_pixel(shape.swap_image_and_scanline_axes(center));
@@ -350,7 +350,7 @@ double measure_bright_level(const ImageView& image, const Blob& blob, double dar
   for (const PixelRun& run : blob.runs) {
     int& level = levels.emplace_back(0);
     for (const int quarters : {1, 2, 3}) {
-      const int column = run.begin + quarters * (run.run_width_px() / 4);
+      const int column = run.begin + quarters * (run.pixel_run_width_px() / 4);
       level = std::max(level, image.gray_level_at_pixel(column, run.row));
     }
   }
@@ -370,29 +370,30 @@ std::optional<Light> fit_light_to_steps(const ImageView& image, const std::vecto
   // Consumer cameras code approximately light^(1 / 2.2); others barely have the bit depth to record
   // a rim. The difference to the center with another gamma estimates the error from the tone curve.
   constexpr double gamma = 2, other_gamma = 1.8;
-  StepImageModel picture{first_blur_px, gamma};
+  StepImageModel image_model{first_blur_px, gamma};
   for (int iteration = 1; iteration < num_iterations; ++iteration) {
-    auto steps = fit_brightness_steps_at_rim(image, light, lit_lines, background, picture,
+    auto steps = fit_brightness_steps_at_rim(image, light, lit_lines, background, image_model,
                                              iteration > 1, shape);
     if (!estimate_outline_offset(steps.pieces, shape.has_known_lens())) return std::nullopt;
-    picture.blur_px = steps.blur_px;
+    image_model.blur_px = steps.blur_px;
     auto better = shape.fit_light_to_outline(std::move(steps.points), background);
     if (!better || 2 * better->outline.size() < light.outline.size()) return std::nullopt;
     light = std::move(*better);
   }
   const auto steps =
-      fit_brightness_steps_at_rim(image, light, lit_lines, background, picture, true, shape);
+      fit_brightness_steps_at_rim(image, light, lit_lines, background, image_model, true, shape);
   const auto shift = estimate_outline_offset(steps.pieces, shape.has_known_lens());
-  picture.gamma = other_gamma;
+  image_model.gamma = other_gamma;
   const auto other = estimate_outline_offset(
-      fit_brightness_steps_at_rim(image, light, lit_lines, background, picture, true, shape).pieces,
+      fit_brightness_steps_at_rim(image, light, lit_lines, background, image_model, true, shape)
+          .pieces,
       shape.has_known_lens());
   if (!shift || !other ||
       !(shift->num_inliers > min_inlier_fraction * double(steps.num_examined))) {
     return std::nullopt;
   }
-  light.pixel += shape.swap_image_and_scanline_axes(shift->px);
-  light.sigma_px = compute_center_sd(shift->covariance, 1, shift->px - other->px);
+  light.pixel += shape.swap_image_and_scanline_axes(shift->offset_px);
+  light.sigma_px = compute_center_sd(shift->covariance, 1, shift->offset_px - other->offset_px);
   return light;
 }
 
@@ -404,7 +405,7 @@ bool is_blob_unevenly_lit(const ImageView& image, const Blob& blob,
   constexpr int min_width = 8;
   if (outline.empty()) return false;
   const auto wide = std::count_if(blob.runs.begin(), blob.runs.end(), [](const PixelRun& run) {
-    return run.run_width_px() >= min_width;
+    return run.pixel_run_width_px() >= min_width;
   });
   if (double(outline.size()) < min_ends * 2 * double(wide)) return true;
   std::vector<double> levels;
@@ -452,7 +453,7 @@ std::optional<Rim> fit_rim_of_light(const ImageView& image, const Blob& blob,
     is_clear = jackknife_px.has_value();
   }
   light->is_uneven = true;
-  light->roundness = rim_fraction;
+  light->inlier_fraction = rim_fraction;
   return Rim{std::move(*light), is_clear};
 }
 

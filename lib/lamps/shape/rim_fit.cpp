@@ -130,8 +130,8 @@ class CrossedOutline {
   CrossedOutline(const Light& light, const LightShape& shape)
       : light_(light),
         shape_(shape),
-        low_(shape.swap_image_and_scanline_axes(light.low)),
-        high_(shape.swap_image_and_scanline_axes(light.high)) {}
+        low_(shape.swap_image_and_scanline_axes(light.box_min)),
+        high_(shape.swap_image_and_scanline_axes(light.box_max)) {}
 
   /// Returns the depth of a pixel behind the outline.
   double depth_behind_outline_px(double column, double line) const {
@@ -245,7 +245,7 @@ std::vector<CurveDistance<kStepUnknowns>> compute_step_residuals(
 }
 
 std::optional<Step> fit_step_of_piece(const Piece& piece, double dark,
-                                      const StepImageModel& picture, bool blur_known) {
+                                      const StepImageModel& image_model, bool blur_known) {
   constexpr int max_iterations = 12;
   constexpr double min_step_sds = 1e-4;  // a smaller step, in standard deviations, is the last one
   constexpr double farthest_px = 3;
@@ -256,9 +256,9 @@ std::optional<Step> fit_step_of_piece(const Piece& piece, double dark,
   const auto levels = measure_side_levels(piece.samples);
   if (!levels) return std::nullopt;
   const auto [out, in] = *levels;
-  StepModel model{{}, picture.gamma, std::pow(std::max(0.5, dark), picture.gamma)};
-  model.x << 0, picture.gamma * std::log(out), 0, picture.gamma * std::log(in), 0, 0,
-      std::log(picture.blur_px);
+  StepModel model{{}, image_model.gamma, std::pow(std::max(0.5, dark), image_model.gamma)};
+  model.x << 0, image_model.gamma * std::log(out), 0, image_model.gamma * std::log(in), 0, 0,
+      std::log(image_model.blur_px);
   const double known_blur = model.x[kLogBlur];
   struct Prior {
     StepUnknown unknown;
@@ -297,30 +297,31 @@ std::optional<Step> fit_step_of_piece(const Piece& piece, double dark,
 
 RimSteps fit_brightness_steps_at_rim(const ImageView& image, const Light& light,
                                      const std::vector<int>& lit_lines,
-                                     const Background& background, const StepImageModel& picture,
-                                     bool blur_known, const LightShape& shape) {
+                                     const Background& background,
+                                     const StepImageModel& image_model, bool blur_known,
+                                     const LightShape& shape) {
   constexpr double piece_radius_fraction = 0.2, min_lines = 6, max_sd_px = 0.5;
   constexpr double min_reach_px = 7, reach_blur_ratio = 4;
   constexpr double blur_sd_fraction = 0.05;  // effect of sharpening and compression
   constexpr std::size_t min_crossings = 3;
-  const double reach_px = std::max(min_reach_px, reach_blur_ratio * picture.blur_px);
+  const double reach_px = std::max(min_reach_px, reach_blur_ratio * image_model.blur_px);
   const CrossedOutline outline(light, shape);
-  const Levels levels(image, shape.swap_image_and_scanline_axes(light.low),
-                      shape.swap_image_and_scanline_axes(light.high));
+  const Levels levels(image, shape.swap_image_and_scanline_axes(light.box_min),
+                      shape.swap_image_and_scanline_axes(light.box_max));
   const int limit = static_cast<int>(std::max(min_lines, piece_radius_fraction * light.radius_px));
-  RimSteps result{{}, 0, {}, picture.blur_px};
+  RimSteps result{{}, 0, {}, image_model.blur_px};
   double log_blur = 0, weight = 0;
   for (const std::vector<int>& lines : split_into_pieces(lit_lines, limit)) {
     for (const bool begins : {true, false}) {
       const Piece piece = sample_outline_piece(levels, lines, begins, outline, reach_px);
       if (piece.crossings.size() < min_crossings) continue;
       ++result.num_examined;
-      const auto step =
-          fit_step_of_piece(piece, levels.to_relative_level(background.level), picture, blur_known);
+      const auto step = fit_step_of_piece(piece, levels.to_relative_level(background.level),
+                                          image_model, blur_known);
       if (!step || !(step->sd_px < max_sd_px)) continue;
       log_blur += step->log_blur / std::pow(step->log_blur_sd, 2);
       weight += 1 / std::pow(step->log_blur_sd, 2);
-      const double sd_px = std::hypot(step->sd_px, blur_sd_fraction * picture.blur_px);
+      const double sd_px = std::hypot(step->sd_px, blur_sd_fraction * image_model.blur_px);
       const Crossing& middle = piece.crossings[piece.crossings.size() / 2];
       result.pieces.push_back({outline.inward_normal(middle), step->at_px, sd_px});
       for (const Crossing& crossing : piece.crossings) {
@@ -339,7 +340,7 @@ RimSteps fit_brightness_steps_at_rim(const ImageView& image, const Light& light,
 namespace {
 
 template <int N>
-std::optional<OutlineShift> estimate_shift(const std::vector<RimPiece>& pieces) {
+std::optional<OutlineOffset> estimate_shift(const std::vector<RimPiece>& pieces) {
   constexpr int num_iterations = 8;
   constexpr double tolerance = 10;  // its tenth, the smallest scale, is one standard deviation
   const std::vector<double> weights(pieces.size(), 1);
@@ -359,14 +360,15 @@ std::optional<OutlineShift> estimate_shift(const std::vector<RimPiece>& pieces) 
     if (!last) return std::nullopt;
     x -= last->step;
   }
-  return OutlineShift{x.template head<2>(), last->parameter_covariance(1).template topLeftCorner<2, 2>(),
-                      last->sum_of_weights};
+  return OutlineOffset{x.template head<2>(),
+                       last->parameter_covariance(1).template topLeftCorner<2, 2>(),
+                       last->sum_of_weights};
 }
 
 }  // namespace
 
-std::optional<OutlineShift> estimate_outline_offset(const std::vector<RimPiece>& pieces,
-                                                    bool round) {
+std::optional<OutlineOffset> estimate_outline_offset(const std::vector<RimPiece>& pieces,
+                                                     bool round) {
   return round ? estimate_shift<3>(pieces) : estimate_shift<5>(pieces);
 }
 

@@ -19,11 +19,11 @@ struct StepImageModel {
   double blur_px, gamma;
 };
 
-/// Piece of a rim that neighboring scanlines cross, with the step of light found there. `inwards`
-/// is the unit normal (column, line) towards the center. `step_depth_px` is the distance of the
-/// step from the outline, px, positive inwards; `sd_px` is its standard deviation.
+/// Piece of a rim that neighboring scanlines cross, with the step of light found there.
+/// `inward_normal` is the unit normal (column, line) towards the center. `step_depth_px` is the
+/// distance of the step from the outline, px, positive inwards; `sd_px` is its standard deviation.
 struct RimPiece {
-  Eigen::Vector2d inwards;
+  Eigen::Vector2d inward_normal;
   double step_depth_px, sd_px;
 };
 
@@ -52,12 +52,13 @@ struct RimSteps {
 /// unless `blur_known`.
 RimSteps fit_brightness_steps_at_rim(const ImageView& image, const Light& light,
                                      const std::vector<int>& lit_lines,
-                                     const Background& background, const StepImageModel& picture,
-                                     bool blur_known, const LightShape& shape);
+                                     const Background& background,
+                                     const StepImageModel& image_model, bool blur_known,
+                                     const LightShape& shape);
 
 /// Offset of an outline, (column, line), estimated from its pieces, and its covariance.
-struct OutlineShift {
-  Eigen::Vector2d px;
+struct OutlineOffset {
+  Eigen::Vector2d offset_px;
   Matrix2 covariance;
   /// Sum of the weights of the pieces, about the number of inliers.
   double num_inliers;
@@ -67,7 +68,7 @@ struct OutlineShift {
 /// its change of size, and its ovality unless the outline is `round` in the plane of LightShape. If
 /// the scatter of the pieces exceeds their standard deviations, these are scaled. Returns
 /// std::nullopt if there are too few pieces.
-std::optional<OutlineShift> estimate_outline_offset(const std::vector<RimPiece>& pieces,
-                                                    bool round);
+std::optional<OutlineOffset> estimate_outline_offset(const std::vector<RimPiece>& pieces,
+                                                     bool round);
 
 }  // namespace vlp

@@ -104,7 +104,7 @@ class Samples {
   /// Returns true if a scanline is not dark.
   bool is_scanline_lit(int line) const {
     constexpr double minimum = 0.1;
-    const auto lit = image_.levels.scanline_level(line);
+    const auto lit = image_.levels.relative_scanline_level(line);
     return lit && lit->level > minimum;
   }
 
@@ -148,7 +148,7 @@ class Samples {
         if (can_leave_image_) continue;
         return false;
       }
-      const auto lit = image_.levels.scanline_level(row);
+      const auto lit = image_.levels.relative_scanline_level(row);
       if (!lit) continue;
       const Eigen::Vector2d away = *here + plane_from_pixel * (pixel - middle) - side_.from;
       const double fraction = image_.levels.relative_level_at_column(column);
@@ -301,7 +301,7 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
   edge.side = {side.from + x[kFrom] * inwards, side.to + x[kTo] * inwards};
   edge.covariance_px = *covariance;
   edge.blur_px = x[kBlur];
-  edge.bow_px = x[kBow];
+  edge.sagitta_px = x[kBow];
   if (!(edge.covariance_px.diagonal().maxCoeff() < max_sd_px * max_sd_px)) return std::nullopt;
   int close = 0, like = 0;
   for (const Sample& sample : samples) {
@@ -309,8 +309,8 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
     ++close;
     like += std::abs(model.residual(sample).error) < explained * sample.lit.level + 0.02;
   }
-  edge.fraction = close > 0 ? double(like) / close : 0;
-  if (edge.fraction < min_fraction) return std::nullopt;
+  edge.explained_fraction = close > 0 ? double(like) / close : 0;
+  if (edge.explained_fraction < min_fraction) return std::nullopt;
   return edge;
 }
 
@@ -439,7 +439,7 @@ std::optional<StraightEdge> fit_straight_edge(const EdgeImage& image, const Side
     const auto pixel = shape.pixel_from_level_plane_point(found.from + t * (found.to - found.from));
     if (!pixel) continue;
     const Eigen::Vector2d at = shape.swap_image_and_scanline_axes(*pixel);
-    const auto lit = levels.scanline_level(static_cast<int>(std::lround(at.y())));
+    const auto lit = levels.relative_scanline_level(static_cast<int>(std::lround(at.y())));
     if (!lit || lit->level < min_lit) continue;
     edge->points.push_back(
         {at, lit->level * levels.max_level_above_dark(), rise_of_blur * edge->blur_px, false});
@@ -447,10 +447,10 @@ std::optional<StraightEdge> fit_straight_edge(const EdgeImage& image, const Side
   return edge;
 }
 
-std::optional<StraightEdge> estimate_edge_hidden_by_dark_stripe(const EdgeImage& image,
-                                                                const Side& side,
-                                                                const EdgeSearch& search,
-                                                                const HiddenEdgePrior& prior) {
+std::optional<StraightEdge> estimate_position_of_edge_in_dark_stripe(const EdgeImage& image,
+                                                                     const Side& side,
+                                                                     const EdgeSearch& search,
+                                                                     const HiddenEdgePrior& prior) {
   constexpr double min_fraction = 0.8;
   const Samples all(image, side, search, true);
   if (all.samples.empty()) return std::nullopt;

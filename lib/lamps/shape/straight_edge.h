@@ -47,9 +47,9 @@ struct StraightEdge {
   /// Standard deviation of the blur across the edge.
   double blur_px;
   /// Sagitta of the edge: distance of its middle from the line through its ends, px; 0 with a lens.
-  double bow_px;
+  double sagitta_px;
   /// Fraction of the pixels next to the edge that the model explains.
-  double fraction;
+  double explained_fraction;
   /// Points (column, row) where lit scanlines cross the edge.
   std::vector<EdgePoint> points;
 };
@@ -105,9 +105,9 @@ std::optional<StraightEdge> fit_straight_edge(const EdgeImage& image, const Side
 /// of the pixels on lit scanlines. The edge may lie outside the image; it has no `points`.
 ///
 /// @pre search.blur_px > 0
-std::optional<StraightEdge> estimate_edge_hidden_by_dark_stripe(const EdgeImage& image,
-                                                                const Side& side,
-                                                                const EdgeSearch& search,
-                                                                const HiddenEdgePrior& prior);
+std::optional<StraightEdge> estimate_position_of_edge_in_dark_stripe(const EdgeImage& image,
+                                                                     const Side& side,
+                                                                     const EdgeSearch& search,
+                                                                     const HiddenEdgePrior& prior);
 
 }  // namespace vlp

@@ -140,12 +140,13 @@ std::vector<LampDistance> find_inseparable_lamps(const LampClassifier& classifie
   return pairs;
 }
 
-Confusion cross_validate_lamp_classifier(std::span<const LabeledLight> lights,
-                                         const TrainClassifier& train) {
+ConfusionMatrix cross_validate_lamp_classifier(std::span<const LabeledLight> lights,
+                                               const TrainClassifier& train) {
   std::set<int> lamps;
   for (const LabeledLight& light : lights) lamps.insert(light.lamp);
   const auto unknown = static_cast<Eigen::Index>(lamps.size());
-  Confusion confusion{{lamps.begin(), lamps.end()}, Eigen::MatrixXi::Zero(unknown, unknown + 1)};
+  ConfusionMatrix confusion{{lamps.begin(), lamps.end()},
+                            Eigen::MatrixXi::Zero(unknown, unknown + 1)};
   const auto index_of = [&](int lamp) -> Eigen::Index {
     const auto place = std::ranges::find(confusion.lamps, lamp);
     return place - confusion.lamps.begin();

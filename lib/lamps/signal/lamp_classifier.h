@@ -99,7 +99,7 @@ struct LampDistance {
 std::vector<LampDistance> find_inseparable_lamps(const LampClassifier& classifier);
 
 /// Confusion matrix of a classifier for lights of known lamps.
-struct Confusion {
+struct ConfusionMatrix {
   /// Ids of the lamps, sorted.
   std::vector<int> lamps;
   /// Number of lights by lamp (row) and by result (column); the last column is "unknown".
@@ -121,8 +121,8 @@ using TrainClassifier = std::function<LampClassifier(std::span<const LabeledLigh
 /// Computes the confusion matrix by cross-validation. `train` makes a classifier of all images but
 /// every fifth one; this classifier is applied to the lights of the held-out images. The folds are
 /// deterministic. `lights` as for fit_lamp_classifier().
-Confusion cross_validate_lamp_classifier(std::span<const LabeledLight> lights,
-                                         const TrainClassifier& train);
+ConfusionMatrix cross_validate_lamp_classifier(std::span<const LabeledLight> lights,
+                                               const TrainClassifier& train);
 
 /// Reads a file of format `vlp-classifier/1`. Its keys are the names of the fields above, and
 /// `features`, which has to be kLampFeatures.

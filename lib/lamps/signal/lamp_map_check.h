@@ -60,7 +60,7 @@ std::string explain_why_room_is_needed(const LampMapFile& lamps, const std::stri
 struct AmbiguousLamps {
   int first, second;
   /// Ratio of their frequencies minus 1, and the minimum of it that would be sufficient.
-  double gap, needed;
+  double frequency_gap, required_gap;
 };
 
 /// Returns the pairs of lamps that identify_lamp_by_frequency() may fail to identify. Their

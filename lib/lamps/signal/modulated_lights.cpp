@@ -51,8 +51,8 @@ double compute_log_ratio(const PeriodFit& better, const PeriodFit& worse) {
       worse.periods > 0 ? std::min(better.periods, worse.periods) : better.periods;
   const double values = periods * std::min(values_per_period, better.period_lines);
   return std::max(1.0, values - unknowns) / 2 *
-         std::log(std::max(worse.unexplained, min_unexplained) /
-                  std::max(better.unexplained, min_unexplained));
+         std::log(std::max(worse.unexplained_fraction, min_unexplained) /
+                  std::max(better.unexplained_fraction, min_unexplained));
 }
 
 /// Computes the brightness of a region along the readout direction, in the region and
@@ -92,7 +92,7 @@ PeriodFit fit_period_of_lamp(const LineProfile& profile, double period_lines) {
   const auto improve = [&](double drift) {
     if (std::abs(drift) > kLampDrift) return;
     const PeriodFit fit = fit_periodic_signal(profile, period_lines * (1 + drift));
-    if (fit.unexplained < best.unexplained) best = fit;
+    if (fit.unexplained_fraction < best.unexplained_fraction) best = fit;
   };
   for (double step = kLampDrift; step > finest; step /= 2) {
     const double middle = best.period_lines / period_lines - 1;
@@ -103,9 +103,10 @@ PeriodFit fit_period_of_lamp(const LineProfile& profile, double period_lines) {
 }
 
 std::size_t find_best_matching_lamp(const RegionCandidate& candidate) {
-  const auto best = std::min_element(
-      candidate.lamp_fits.begin(), candidate.lamp_fits.end(),
-      [](const PeriodFit& a, const PeriodFit& b) { return a.unexplained < b.unexplained; });
+  const auto best = std::min_element(candidate.lamp_fits.begin(), candidate.lamp_fits.end(),
+                                     [](const PeriodFit& a, const PeriodFit& b) {
+                                       return a.unexplained_fraction < b.unexplained_fraction;
+                                     });
   return std::size_t(best - candidate.lamp_fits.begin());
 }
 
@@ -133,7 +134,7 @@ void assign_lamp(const Claims& claims, RegionCandidate& candidate) {
   if (candidate.lamp_fits.empty() || !candidate.is_modulated || candidate.is_other_period) return;
   const std::size_t best = find_best_matching_lamp(candidate);
   const PeriodFit& fit = candidate.lamp_fits[best];
-  if (fit.unexplained > kMaxUnexplained) return;
+  if (fit.unexplained_fraction > kMaxUnexplained) return;
   for (std::size_t i = 0; i < candidate.lamp_fits.size(); ++i) {
     const PeriodFit& other = candidate.lamp_fits[i];
     if (i == best || compute_log_ratio(fit, other) > kMinLogRatio) continue;
@@ -198,9 +199,10 @@ RegionCandidate examine_region(const CellLevels& cells, const ModulationMap& map
   // Few periods are significant only if they match a lamp.
   const bool has_lamp_period = !lamp_periods_lines.empty() && !candidate.is_other_period;
   const double min_periods = has_lamp_period ? kMinPeriods : kMinReliablePeriods;
-  candidate.is_modulated =
-      candidate.fit.unexplained < kMaxUnexplained && candidate.fit.depth > kMinLightDepth &&
-      candidate.phase_coherence > kMinPhaseCoherence && count_periods(candidate) > min_periods;
+  candidate.is_modulated = candidate.fit.unexplained_fraction < kMaxUnexplained &&
+                           candidate.fit.depth > kMinLightDepth &&
+                           candidate.phase_coherence > kMinPhaseCoherence &&
+                           count_periods(candidate) > min_periods;
   return candidate;
 }
 
@@ -251,7 +253,7 @@ Stripes measure_candidate_stripes(const RegionCandidate& candidate) {
   if (!(std::abs(stripes.period_lines / fit.period_lines - 1) < 2 * kLampDrift)) {
     stripes.period_lines = fit.period_lines;
   }
-  stripes.periodicity_r2 = 1 - fit.unexplained;
+  stripes.periodicity_r2 = 1 - fit.unexplained_fraction;
   stripes.periods = count_periods(candidate);
   stripes.is_regular = true;
   return stripes;
@@ -262,7 +264,8 @@ ModulatedLight make_light(const ModulationMap& map,
   // The whole area, and the areas above a quarter and a half of the brightest level.
   constexpr std::array<double, 3> fractions{0, 0.25, 0.5};
   const RegionCandidate& brightest = **std::max_element(
-      parts.begin(), parts.end(), [](auto* a, auto* b) { return a->region.peak < b->region.peak; });
+      parts.begin(), parts.end(),
+      [](auto* a, auto* b) { return a->region.peak_amplitude < b->region.peak_amplitude; });
   ModulatedLight light{brightest.region.box,
                        {},
                        0,
@@ -276,13 +279,15 @@ ModulatedLight make_light(const ModulationMap& map,
                        0};
   constexpr double min_duty = 0.1;
   const double duty = std::clamp(light.stripes.duty, min_duty, 1 - min_duty);
-  light.peak = std::numbers::pi / 2 / std::sin(std::numbers::pi * duty) * brightest.region.peak;
+  light.peak_level =
+      std::numbers::pi / 2 / std::sin(std::numbers::pi * duty) * brightest.region.peak_amplitude;
   std::array<LitArea, fractions.size()> areas;
   for (const RegionCandidate* part : parts) {
     // Darker parts are light that the lamp casts on its surroundings.
-    if (part->region.peak < double(kBorderFraction) * brightest.region.peak) continue;
+    if (part->region.peak_amplitude < double(kBorderFraction) * brightest.region.peak_amplitude)
+      continue;
     light.box = enclosing_box(light.box, part->region.box);
-    add_region_area(map, part->region, brightest.region.peak, fractions, areas);
+    add_region_area(map, part->region, brightest.region.peak_amplitude, fractions, areas);
   }
   light.energy = areas[0].energy;
   light.center = areas[0].center();
@@ -391,7 +396,8 @@ std::vector<ModulatedLight> find_modulated_lights(const ImageView& lines,
     for (const RegionCandidate& candidate : each.candidates) {
       if (!candidate.lamp) continue;
       const RegionCandidate*& claim = claims[*candidate.lamp];
-      if (claim == nullptr || claim->region.peak < candidate.region.peak) claim = &candidate;
+      if (claim == nullptr || claim->region.peak_amplitude < candidate.region.peak_amplitude)
+        claim = &candidate;
     }
   }
   for (BoxSearch& each : searches) {

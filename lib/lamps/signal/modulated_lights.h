@@ -40,7 +40,7 @@ struct ModulatedLight {
   double phase_coherence;
   /// Level of its brightest scanlines above the dark level, in gray levels. The fundamental of a
   /// square wave between 0 and this level has the amplitude (2 / pi) sin(pi duty) times the level.
-  double peak;
+  double peak_level;
   /// Sum of the modulation amplitudes of its cells, in gray levels.
   double energy;
 };

@@ -72,7 +72,7 @@ struct ModulatedRegion {
     int step, begin, end;
   };
   PixelBox box;
-  double peak;  ///< largest amplitude, in gray levels
+  double peak_amplitude;  ///< largest amplitude, in gray levels
   std::vector<Span> spans;
   int cells;
 };

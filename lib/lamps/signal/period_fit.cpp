@@ -97,7 +97,7 @@ PeriodFit fit_periodic_signal(const LineProfile& profile, double period_lines) {
   const Cholesky<2 * kHarmonics> factor(normal);
   if (!factor.has_full_rank(1e-9)) return fit;
   const HarmonicCoefficients coefficients = factor.solve_normal_equations(normal.gradient);
-  fit.unexplained =
+  fit.unexplained_fraction =
       std::clamp(1 - multiply_harmonics(coefficients, normal.gradient) / squares, 0.0, 1.0);
   fit.depth = std::hypot(coefficients[0], coefficients[1]);
   fit.phase_rad = std::atan2(coefficients[1], coefficients[0]);
@@ -128,7 +128,7 @@ PeriodFit find_best_fitting_period(const LineProfile& profile, double min_period
   constexpr double max_periods = 100;
   const auto improve = [&](double period_lines) {
     const PeriodFit fit = fit_periodic_signal(profile, period_lines);
-    if (fit.unexplained < best.unexplained) best = fit;
+    if (fit.unexplained_fraction < best.unexplained_fraction) best = fit;
   };
   for (double period = std::max(min_period_lines, lines / max_periods);
        period < lines / min_periods; period *= 1 + step_fraction * period / lines) {

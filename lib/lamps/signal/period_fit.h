@@ -18,7 +18,7 @@ struct LineProfile {
 struct PeriodFit {
   double period_lines;
   /// Fraction of the variance of the normalized profile that the fit does not explain, 0 to 1.
-  double unexplained = 1;
+  double unexplained_fraction = 1;
   /// Ratio of the amplitude of the fundamental to the mean: 4 / pi for a square wave of duty 0.5.
   double depth = 0;
   /// Phase p of the fundamental, cos(2 pi line / period - p), in rad.

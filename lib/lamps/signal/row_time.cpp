@@ -222,7 +222,7 @@ std::string format_microseconds(double row_time_s) {
 
 }  // namespace
 
-std::vector<PeriodGroup> group_lights_by_period(std::span<const MeasuredPeriod> lights) {
+std::vector<PeriodGroup> group_lights_by_lamp_or_period(std::span<const MeasuredPeriod> lights) {
   std::map<int, std::vector<std::size_t>> labeled;
   std::vector<std::size_t> others;
   for (std::size_t i = 0; i < lights.size(); ++i) {
@@ -249,7 +249,7 @@ std::vector<PeriodGroup> group_lights_by_period(std::span<const MeasuredPeriod> 
 
 RowTimeCandidates estimate_row_time_candidates(std::span<const MeasuredPeriod> lights,
                                                const LampMap& lamps) {
-  RowTimeCandidates found{group_lights_by_period(lights), {}, {}};
+  RowTimeCandidates found{group_lights_by_lamp_or_period(lights), {}, {}};
   if (found.groups.empty()) {
     found.problem =
         "no light has clear stripes: add captures with lamps nearer, larger or sharper, and with a "

@@ -28,7 +28,7 @@ struct PeriodGroup {
   /// the period).
   double log_period;
   double sd;
-  /// Indices of the lights of the group in the input of group_lights_by_period().
+  /// Indices of the lights of the group in the input of group_lights_by_lamp_or_period().
   std::vector<std::size_t> lights;
   std::optional<int> lamp;
   /// Median of the measured duties; std::nullopt if there is none.
@@ -38,7 +38,7 @@ struct PeriodGroup {
 /// Groups lights with a label by their lamp. Groups the others by density of their periods: within
 /// 1.5 % of the period with most neighbors. Discards groups with less than 10 % of the lights of
 /// the largest group, or with less than 2 % of these lights. These are partly hidden lights.
-std::vector<PeriodGroup> group_lights_by_period(std::span<const MeasuredPeriod> lights);
+std::vector<PeriodGroup> group_lights_by_lamp_or_period(std::span<const MeasuredPeriod> lights);
 
 struct RowTime {
   double row_time_s;
@@ -70,7 +70,7 @@ struct RowTimeCandidates {
 
 /// Row time, or the reason for its lack with a remedy.
 struct RowTimeResult {
-  std::optional<RowTime> found;
+  std::optional<RowTime> row_time;
   std::string problem;
 };
 

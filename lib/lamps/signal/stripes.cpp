@@ -185,9 +185,10 @@ std::vector<PartLevels> measure_parts(const ImageView& image, const std::vector<
   for (const PixelRun& chord : chords) {
     PartLevels& line = levels.emplace_back();
     for (int part = 0; part < parts; ++part) {
-      const int from = chord.begin + chord.run_width_px() * part / parts;
-      const int to = std::max(from + 1, chord.begin + chord.run_width_px() * (part + 1) / parts);
-      line[part] = mean_run_level(image, {chord.row, from, to}) - dark;
+      const int from = chord.begin + chord.pixel_run_width_px() * part / parts;
+      const int to =
+          std::max(from + 1, chord.begin + chord.pixel_run_width_px() * (part + 1) / parts);
+      line[part] = mean_level_of_pixel_run(image, {chord.row, from, to}) - dark;
     }
   }
   return levels;
@@ -224,8 +225,9 @@ std::vector<double> compute_scanline_signal(const ImageView& image,
   return signal;
 }
 
-double compute_stripe_coherence(const ImageView& lines, const std::vector<PixelRun>& chords,
-                                const Background& background, double period_lines) {
+double compute_stripe_coherence_between_parts(const ImageView& lines,
+                                              const std::vector<PixelRun>& chords,
+                                              const Background& background, double period_lines) {
   constexpr double fraction = 0.05;
   constexpr std::size_t min_values = 3;
   const std::vector<PartLevels> levels = measure_parts(lines, chords, background.level);

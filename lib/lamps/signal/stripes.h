@@ -97,7 +97,8 @@ inline constexpr double kMinCoherence = 0.85;
 /// Consider independent parts with three independent scanlines, as in one and a half periods. Each
 /// reaches kMinCoherence with a probability of (1 - 0.85) / 2, four of five together with 1.5e-4.
 /// Tilted bars reach it within 7 degrees if a light shows two of them.
-double compute_stripe_coherence(const ImageView& lines, const std::vector<PixelRun>& chords,
-                                const Background& background, double period_lines);
+double compute_stripe_coherence_between_parts(const ImageView& lines,
+                                              const std::vector<PixelRun>& chords,
+                                              const Background& background, double period_lines);
 
 }  // namespace vlp

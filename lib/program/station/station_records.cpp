@@ -189,7 +189,7 @@ void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
   const auto line = [](const char* name, const EstimateTest& estimate) {
     fmt::print("{:<36}{}\n", name, format_estimate_test(estimate));
   };
-  line("all", study.all);
+  line("all", study.overall_bias);
   if (study.linearity) {
     const Linearity& linearity = *study.linearity;
     fmt::print("\nbias = intercept + slope x reference\n");
@@ -274,8 +274,8 @@ void print_station_run_details(const StationRecordsOptions& options) {
   }
   fmt::print("images     {}, {} used\n", record.images.size(), record.count_used_images());
   for (const RunEvent& event : record.events) {
-    const std::string who = event.who.empty() ? "" : event.who + ": ";
-    print_line(fmt::format("{:<11} {} {}{}", event.what, event.event_time_utc(), who, event.text));
+    const std::string who = event.author.empty() ? "" : event.author + ": ";
+    print_line(fmt::format("{:<11} {} {}{}", event.kind, event.event_time_utc(), who, event.text));
   }
 }
 
@@ -283,7 +283,7 @@ void restore_run_files(const StationRecordsOptions& options) {
   const std::filesystem::path results = find_results_folder(options);
   const auto known = open_runs(options);
   const RunRecord record = load_run_of_archive_session(*known, options);
-  const std::string no_verdict = describe_verdict_problem(record);
+  const std::string no_verdict = describe_why_verdict_is_void_or_edited(record);
   if (!no_verdict.empty()) throw InputError(record.run, no_verdict);
   print_line(publish_run_files(record, {}, results, ExistingReport::replace).string());
 }
@@ -298,7 +298,7 @@ void write_calibration_certificate(const StationRecordsOptions& options) {
 void list_or_delete_expired_run_folders(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
   const StationConfig& config = *known->station_config();
-  if (!config.keep.images_days && !config.keep.results_days) {
+  if (!config.retention.images_days && !config.retention.results_days) {
     throw InputError(options.station, "nothing expires; add the key 'retention'");
   }
   check_clock_against_recorded_runs(config, known->station_records());
@@ -320,12 +320,12 @@ void list_or_delete_expired_run_folders(const StationRecordsOptions& options) {
                            expired.run.ended_utc, expired.run.verdict,
                            options.remove ? "(deleted)" : ""));
   }
-  for (const auto& folder : found.without_record) {
+  for (const auto& folder : found.folders_without_record) {
     // [STATION-11] `records: left`, `names: left` | `clean`: folder without a run, of other
     //   records, or with a file that the station uses | move that file elsewhere, repeat
     spdlog::warn("{}: belongs to no run of the records: left", folder.string());
   }
-  for (const auto& folder : found.in_use) {
+  for (const auto& folder : found.folders_in_use) {
     spdlog::warn("{}: contains a file that station.yaml names: left; move that file elsewhere",
                  folder.string());
   }
@@ -421,7 +421,7 @@ void import_archive_sessions_as_runs(const StationRecordsOptions& options) {
 }
 
 void print_metric_trend(const StationRecordsOptions& options) {
-  const MetricKind kind = find_run_metric(options.metric);
+  const MetricKind kind = find_run_metric_kind(options.metric);
   const auto known = open_runs(options);
   check_output_option(options, *known);
   Records& records = known->station_records();
@@ -448,7 +448,7 @@ void print_metric_trend(const StationRecordsOptions& options) {
   for (const ChartAlarm& alarm : alarms) {
     const TrendPoint& point = points[alarm.index];
     print_line(fmt::format("{} {} {} {:.4g}  {}: {}", point.ended_utc, point.run, point.camera,
-                           point.value, alarm.rule, alarm.meaning));
+                           point.value, alarm.rule, alarm.description));
   }
   if (alarms.empty()) return;
   throw GateNotMet(fmt::format("{}: {} alarms, the last {} at {}", options.metric, alarms.size(),
@@ -456,8 +456,8 @@ void print_metric_trend(const StationRecordsOptions& options) {
 }
 
 void print_process_capability(const StationRecordsOptions& options) {
-  std::vector<MetricKind> kinds = list_run_metrics();
-  if (!options.metric.empty()) kinds = {find_run_metric(options.metric)};
+  std::vector<MetricKind> kinds = list_run_metric_kinds();
+  if (!options.metric.empty()) kinds = {find_run_metric_kind(options.metric)};
   const auto known = open_runs(options);
   Records& records = known->station_records();
   const RunFilter filter = make_filter_of_comparable_runs(options, *known);
@@ -490,7 +490,7 @@ void print_process_capability(const StationRecordsOptions& options) {
 }
 
 void print_gauge_study(const StationRecordsOptions& options) {
-  const MetricKind kind = find_run_metric(options.metric);
+  const MetricKind kind = find_run_metric_kind(options.metric);
   if (!options.references.empty()) return print_bias(kind, options);
   const auto known = open_runs(options);
   Records& records = known->station_records();

@@ -55,10 +55,10 @@ std::string make_spool_notice(Spool& spool) {
 
 /// Logs the arrived images and the completed steps, for use without a terminal. `num_done` is the
 /// number of steps that were logged as completed.
-void log_arrivals(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals,
+void log_arrivals(const Unit& unit, const std::vector<WatchedRun::ImageChange>& arrivals,
                   std::size_t& num_done) {
-  for (const auto& [step, image, gone] : arrivals) {
-    if (!gone) spdlog::info("{}", describe_last_image_result(unit, step, image));
+  for (const auto& [step, image, is_removed] : arrivals) {
+    if (!is_removed) spdlog::info("{}", describe_last_image_result(unit, step, image));
   }
   for (;
        num_done < kStationSteps.size() && unit.step_state(kStationSteps[num_done]).is_step_solved();
@@ -68,9 +68,9 @@ void log_arrivals(const Unit& unit, const std::vector<WatchedRun::Arrival>& arri
 }
 
 /// Returns true if an image arrived. Of the frames of a source, only used ones are considered.
-bool has_image_arrived(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals,
+bool has_image_arrived(const Unit& unit, const std::vector<WatchedRun::ImageChange>& arrivals,
                        bool of_source) {
-  return std::ranges::any_of(arrivals, [&](const WatchedRun::Arrival& arrival) {
+  return std::ranges::any_of(arrivals, [&](const WatchedRun::ImageChange& arrival) {
     const auto& images = unit.step_state(arrival.step).images;
     const auto image = images.find(arrival.image);
     return !of_source || image == images.end() || image->second.is_image_used();
@@ -158,7 +158,7 @@ void store_and_report_run(
   try {
     spool.store_run(record);
   } catch (const InputError&) {
-    lines.push_back({"NOT RECORDED: repeat the run when it can be stored", ScreenLineStyle::bad});
+    lines.push_back({"NOT RECORDED: repeat the run when it can be stored", ScreenLineStyle::fail});
     terminal.print_permanent_lines(lines);
     throw;
   }
@@ -279,7 +279,7 @@ RunRecord run_with_given_folder(const StationRunOptions& options, const StationC
 
 RunRecord run_with_watched_folders(const StationRunOptions& options, const StationConfig& config,
                                    Spool& spool) {
-  StepSources sources(options.sources, config.type.imager_px);
+  StepSources sources(options.sources, config.nominal_camera.imager_px);
   Unit unit(config, options.camera_id, kProgram, options.threads);
   prepare_station_run(unit, spool, config);
   WatchedRun watched(unit, spool);
@@ -319,14 +319,15 @@ void measure_camera_unit(const StationRunOptions& options) {
 
 void verify_station_with_golden_unit(const StationRunOptions& options) {
   const StationConfig config = read_station_config(options.station);
-  if (!config.golden) throw InputError(options.station, "has no golden unit: add the key 'golden'");
+  if (!config.golden_unit)
+    throw InputError(options.station, "has no golden unit: add the key 'golden'");
   Spool spool(config.spool, config.records);
-  prepare_station_run(spool, config, config.golden->camera_id);
-  const fs::path arrived = config.captures / config.golden->camera_id;
+  prepare_station_run(spool, config, config.golden_unit->camera_id);
+  const fs::path arrived = config.captures / config.golden_unit->camera_id;
   const bool batch = !options.batch.empty();
   auto [record, pictures] = verify_station_from_golden_images(
       config, batch ? fs::path(options.batch) : arrived, make_run_id(), kProgram, options.threads);
-  if (config.verify_due) {
+  if (config.verification_interval) {
     invalidate_run_if_images_reused(record, [&](const std::string& sha256) {
       return spool.find_golden_run_using_image(sha256);
     });
@@ -358,7 +359,7 @@ void rerun_unfinished_hooks(const StationRunOptions& options) {
     auto record = spool.find_run_by_id(run.run);
     // Another program can have called it.
     if (!record || !is_hook_pending(*record)) continue;
-    if (!lock.is_hook_lock_held()) {
+    if (!lock.has_acquired_hook_lock()) {
       report("is being run");
       continue;
     }

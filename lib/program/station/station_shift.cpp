@@ -58,14 +58,14 @@ std::optional<std::string> read_serial(const StationConfig& config, Terminal& te
   std::string problem;
   for (;;) {
     std::vector<ScreenLine> prompt;
-    if (!golden.empty()) prompt.push_back({"Station  " + golden, ScreenLineStyle::bad});
-    if (!problem.empty()) prompt.push_back({"Wrong    " + problem, ScreenLineStyle::bad});
+    if (!golden.empty()) prompt.push_back({"Station  " + golden, ScreenLineStyle::fail});
+    if (!problem.empty()) prompt.push_back({"Wrong    " + problem, ScreenLineStyle::fail});
     prompt.push_back({"Next     scan a unit's serial; q: end"});
     prompt.push_back({"Serial   "});
     auto line = terminal.read_input_line(prompt);
     if (!line || *line == kQuit) return std::nullopt;
     if (line->empty()) continue;
-    const bool is_golden = config.golden && *line == config.golden->camera_id;
+    const bool is_golden = config.golden_unit && *line == config.golden_unit->camera_id;
     problem = is_golden ? "" : describe_serial_number_problem(config, *line);
     if (problem.empty()) return line;
     // Without a screen, the prompt does not print the problem.
@@ -140,7 +140,7 @@ void measure_units_with_scanned_ids(StationRunOptions options) {
     const auto serial = read_serial(config, terminal);
     if (!serial) break;
     options.camera_id = *serial;
-    const bool golden = config.golden && *serial == config.golden->camera_id;
+    const bool golden = config.golden_unit && *serial == config.golden_unit->camera_id;
     const int code = run_process(make_command(options, golden));
     terminal.discard_typed_keys();
     if (!golden) {

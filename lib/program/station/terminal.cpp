@@ -47,13 +47,13 @@ void restore_and_raise(int signal) {
   errno = error_before;
 }
 
-const char* color_code(ScreenLineStyle tone) {
-  switch (tone) {
+const char* color_code(ScreenLineStyle style) {
+  switch (style) {
     case ScreenLineStyle::heading:
       return "\x1b[1m";
-    case ScreenLineStyle::good:
+    case ScreenLineStyle::pass:
       return "\x1b[32m";
-    case ScreenLineStyle::bad:
+    case ScreenLineStyle::fail:
       return "\x1b[31m";
     case ScreenLineStyle::plain:
       break;
@@ -124,8 +124,8 @@ void Terminal::redraw_terminal_screen(const std::vector<ScreenLine>& lines) {
   std::string text;
   for (std::size_t i = 0; i < num_lines; ++i) {
     // The last line lists the keys and is always drawn.
-    const auto& [line, tone] = i + 1 == num_lines ? lines.back() : lines[i];
-    text += colorize_text(truncate_utf8_text(escape_text_for_single_line(line), columns), tone) +
+    const auto& [line, style] = i + 1 == num_lines ? lines.back() : lines[i];
+    text += colorize_text(truncate_utf8_text(escape_text_for_single_line(line), columns), style) +
             "\x1b[K\n";
   }
   replace_drawn_terminal_text(text, num_lines);
@@ -133,9 +133,9 @@ void Terminal::redraw_terminal_screen(const std::vector<ScreenLine>& lines) {
 
 void Terminal::print_permanent_lines(const std::vector<ScreenLine>& lines) {
   std::string text;
-  for (const auto& [line, tone] : lines) {
-    text +=
-        colorize_text(escape_text_for_single_line(line), tone) + (interactive_ ? "\x1b[K\n" : "\n");
+  for (const auto& [line, style] : lines) {
+    text += colorize_text(escape_text_for_single_line(line), style) +
+            (interactive_ ? "\x1b[K\n" : "\n");
   }
   if (!interactive_) {
     fmt::print("{}", text);
@@ -147,8 +147,8 @@ void Terminal::print_permanent_lines(const std::vector<ScreenLine>& lines) {
   last_text_.clear();
 }
 
-std::string Terminal::colorize_text(const std::string& text, ScreenLineStyle tone) const {
-  return has_color_ ? fmt::format("{}{}\x1b[0m", color_code(tone), text) : text;
+std::string Terminal::colorize_text(const std::string& text, ScreenLineStyle style) const {
+  return has_color_ ? fmt::format("{}{}\x1b[0m", color_code(style), text) : text;
 }
 
 std::optional<char> Terminal::wait_for_key(int wait_ms) const {

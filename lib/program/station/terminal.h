@@ -53,7 +53,7 @@ class Terminal {
   };
   static Size query_terminal_size();
   void replace_drawn_terminal_text(const std::string& text, std::size_t lines);
-  std::string colorize_text(const std::string& text, ScreenLineStyle tone) const;
+  std::string colorize_text(const std::string& text, ScreenLineStyle style) const;
 
   bool interactive_, has_color_, reads_keys_ = false;
   std::size_t num_drawn_lines_ = 0;

@@ -36,15 +36,15 @@ void print_lever_arm(const RotationCenter& center) {
   }
 }
 
-void print_residuals(const RotationFit& fit, const RotationCaptures& spot) {
+void print_residuals(const RotationFit& fit, const RotationCaptures& rotation) {
   fmt::print("residual    {:.4f} px per axis, of {} detections\n", fit.residual_px,
-             spot.observations.size() - fit.outliers.size());
+             rotation.observations.size() - fit.outliers.size());
   fmt::print("outliers    {}\n", fit.outliers.size());
   for (const auto& [index, distance_px] : fit.outliers) {
-    const RotationObservation& observation = spot.observations[index];
+    const RotationObservation& observation = rotation.observations[index];
     fmt::print("  outlier   {} lamp {}: residual {:.2f} px\n",
-               escape_text_for_single_line(spot.captures[observation.capture].image),
-               spot.lamps[observation.lamp].id, distance_px);
+               escape_text_for_single_line(rotation.captures[observation.capture].image),
+               rotation.lamps[observation.lamp].id, distance_px);
   }
 }
 
@@ -59,12 +59,12 @@ void print_lens_calibration(const IntrinsicsSolution& solution, const Calibratio
                             const ViewCoverage& coverage, const HeldOutFit& held_out) {
   const auto& parameters = solution.problem.intrinsics;
   fmt::print("views         {} used, {} rejected\n", solution.views.size(),
-             solution.dropped.size());
+             solution.dropped_views.size());
   fmt::print("corners       {}, {} outliers\n", solution.corners, solution.outliers);
   fmt::print("rms           {:.3f} px per axis\n", solution.rms_px);
-  if (std::any_of(solution.edge_shifts_px.begin(), solution.edge_shifts_px.end(),
+  if (std::any_of(solution.edge_displacements_px.begin(), solution.edge_displacements_px.end(),
                   [](double shift_px) { return shift_px != 0; })) {
-    const double shift_px = upper_median(solution.edge_shifts_px);
+    const double shift_px = upper_median(solution.edge_displacements_px);
     fmt::print("edges         displaced by {:.3f} px towards the {}, corrected\n",
                std::abs(shift_px), shift_px < 0 ? "light" : "dark");
   }
@@ -90,9 +90,9 @@ void print_lens_calibration(const IntrinsicsSolution& solution, const Calibratio
   fmt::print(
       "true lens     expected difference {:.3f} px rms per axis from noise, {:.3f} from views\n",
       report.expected_rms_px, report.expected_by_views_rms_px);
-  if (report.halves) {
+  if (report.split_half_difference) {
     fmt::print("halves        difference {:.3f} px rms per axis, {:.3f} px maximum\n",
-               report.halves->rms_px, report.halves->worst_px);
+               report.split_half_difference->rms_px, report.split_half_difference->worst_px);
   }
   if (held_out.views > 0) {
     fmt::print("held out      {} views, {} corners, {:.3f} px rms per axis\n", held_out.views,
@@ -117,15 +117,15 @@ void print_rotation_center(const RotationCenter& center, const Camera& camera) {
              sd_rad ? fmt::format(", sd {:.4f} deg", deg_from_rad(*sd_rad)) : "");
 }
 
-void print_rotation_calibration(const RotationFit& fit, const RotationCaptures& spot,
+void print_rotation_calibration(const RotationFit& fit, const RotationCaptures& rotation,
                                 const CircleCenters& circles, const Camera& camera) {
-  fmt::print("captures    {} of {}\n", spot.captures.size(),
-             spot.captures.size() + spot.rejected.size());
-  for (const RotationHeight& height : spot.heights) {
+  fmt::print("captures    {} of {}\n", rotation.captures.size(),
+             rotation.captures.size() + rotation.rejected_captures.size());
+  for (const RotationHeight& height : rotation.heights) {
     fmt::print("  height    {} m: {} captures over {:.0f} deg\n", format_height_m(height.z_m),
                height.captures, deg_from_rad(height.arc_rad));
   }
-  fmt::print("lamps       {}\n", spot.lamps.size());
+  fmt::print("lamps       {}\n", rotation.lamps.size());
   print_rotation_center(fit.center, camera);
   print_lever_arm(fit.center);
   if (circles.circles.empty()) {
@@ -134,11 +134,11 @@ void print_rotation_calibration(const RotationFit& fit, const RotationCaptures& 
     fmt::print("circles     {}, their centers spread by {:.3f} px\n", circles.circles.size(),
                circles.spread_px);
   }
-  print_residuals(fit, spot);
+  print_residuals(fit, rotation);
   fmt::print("\n{:>10} {:>10}  image\n", "z (m)", "yaw (deg)");
-  for (std::size_t i = 0; i < spot.captures.size(); ++i) {
-    const RotationCapture& capture = spot.captures[i];
-    fmt::print("{:>10} {:10.3f}  {}\n", format_height_m(spot.heights[capture.height].z_m),
+  for (std::size_t i = 0; i < rotation.captures.size(); ++i) {
+    const RotationCapture& capture = rotation.captures[i];
+    fmt::print("{:>10} {:10.3f}  {}\n", format_height_m(rotation.heights[capture.height].z_m),
                deg_from_rad(wrap_angle_rad(fit.yaws_rad[i])),
                escape_text_for_single_line(capture.image));
   }
@@ -220,10 +220,10 @@ void print_joint_adjustment(const AdjustmentResult& found, const Calibration& be
                    : "treated as exact: the calibration has no lens covariance (see --lens-sd-px)");
   }
   fmt::print("residual    {:.4f} px per axis\n", found.residual_px);
-  for (const auto& place : found.places) {
+  for (const auto& place : found.known_positions) {
     fmt::print("position    {}: error {:.3f} {:.3f} {:.3f} mm{}\n", place.name,
                1e3 * place.residual_m.x(), 1e3 * place.residual_m.y(), 1e3 * place.residual_m.z(),
-               place.wrong ? ", rejected" : "");
+               place.is_outlier ? ", rejected" : "");
   }
   print_lamp_corrections_header();
   for (const auto& [id, correction_m, sd_m, moved] : found.lamps) {

@@ -23,7 +23,7 @@ void print_rotation_center(const RotationCenter& center, const Camera& camera);
 
 /// Prints the result of a rotation in place to stdout, and a note if the lever arm is not
 /// observable.
-void print_rotation_calibration(const RotationFit& fit, const RotationCaptures& spot,
+void print_rotation_calibration(const RotationFit& fit, const RotationCaptures& rotation,
                                 const CircleCenters& circles, const Camera& camera);
 
 /// Prints the circles of the fixes before and after the correction, and the errors of camera and

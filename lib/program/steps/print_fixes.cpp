@@ -54,18 +54,18 @@ void print_horizontal(const Evaluation& evaluation) {
 void print_height_and_yaw(const Evaluation& evaluation) {
   if (const auto& height_m = evaluation.height_m) {
     fmt::print("height      rms {:.3f} mm, max {:.3f} mm, bias {:+.3f} mm\n",
-               convert_m_to_mm(height_m->sizes.rms), convert_m_to_mm(height_m->sizes.max),
+               convert_m_to_mm(height_m->magnitudes.rms), convert_m_to_mm(height_m->magnitudes.max),
                convert_m_to_mm(height_m->bias));
   }
   if (const auto& yaw_rad = evaluation.yaw_rad) {
     fmt::print("yaw         rms {:.4f} deg, max {:.4f} deg, bias {:+.4f} deg\n",
-               deg_from_rad(yaw_rad->sizes.rms), deg_from_rad(yaw_rad->sizes.max),
+               deg_from_rad(yaw_rad->magnitudes.rms), deg_from_rad(yaw_rad->magnitudes.max),
                deg_from_rad(yaw_rad->bias));
   }
 }
 
 void print_bias_and_repeatability(const BiasAndRepeatability& statistics) {
-  const auto& stations = statistics.stations;
+  const auto& stations = statistics.reference_points;
   const auto worst_bias = std::max_element(
       stations.begin(), stations.end(),
       [](const auto& a, const auto& b) { return a.bias_m.norm() < b.bias_m.norm(); });
@@ -74,7 +74,7 @@ void print_bias_and_repeatability(const BiasAndRepeatability& statistics) {
                        [](const auto& a, const auto& b) { return a.sd_m < b.sd_m; });
   fmt::print("ref. points {} with {} fixes: bias {:.3f} mm rms, repeatability {:.3f} mm\n",
              stations.size(), statistics.fixes, convert_m_to_mm(statistics.bias_m),
-             convert_m_to_mm(statistics.scatter_m));
+             convert_m_to_mm(statistics.repeatability_m));
   fmt::print(
       "  worst     bias {:.3f} mm at ({:.3f}, {:.3f}) m; sd {:.3f} mm at ({:.3f}, {:.3f}) m\n",
       convert_m_to_mm(worst_bias->bias_m.norm()), worst_bias->xy_m.x(), worst_bias->xy_m.y(),
@@ -107,9 +107,9 @@ void print_normalized_errors_and_crlb(const Evaluation& evaluation) {
       fmt::print(", yaw {:.1f} %", percent * *fraction);
     fmt::print(" (errors within 1.96 sd; correlated within one calibration)\n");
   }
-  if (const auto& limit = evaluation.limit) {
+  if (const auto& limit = evaluation.crlb_ratio) {
     fmt::print("limit       {:.3f} mm rms, error / limit {:.3f} ({})\n",
-               convert_m_to_mm(limit->limit_m), limit->horizontal,
+               convert_m_to_mm(limit->crlb_m), limit->horizontal,
                limit->are_errors_below_crlb() ? "below the limit: see the warning"
                                               : "1: optimal for one level image");
   }
@@ -127,8 +127,8 @@ void print_comparison(const Comparison& comparison) {
   fmt::print(
       "\n  captures  {} in both: {} with a smaller error, {} with a larger; {} only in the "
       "fixes, {} only in --compare\n",
-      comparison.pairs, comparison.smaller, comparison.larger, comparison.only_these,
-      comparison.only_others);
+      comparison.pairs, comparison.smaller, comparison.larger, comparison.only_in_fixes,
+      comparison.only_in_other_fixes);
 }
 
 /// Returns the remedy that reduces an error source.
@@ -150,7 +150,7 @@ void print_position_fix_summary(const FixSummary& summary) {
   for (const auto& [status, count] : summary.failures_by_status) {
     fmt::print("  no fix    {} {}\n", count, status);
   }
-  if (const auto& typical = summary.typical) {
+  if (const auto& typical = summary.statistics) {
     fmt::print("lamps       {:.1f} a fix ({} to {})\n", typical->mean_lamps, typical->min_lamps,
                typical->max_lamps);
     if (const auto& residual_px = typical->median_residual_px) {
@@ -167,13 +167,14 @@ void print_fix_error_evaluation(const Evaluation& evaluation,
                                 const std::vector<CheckedMetric>& gates) {
   fmt::print("captures    {}\nfixes       {}\nmissing     {:.3g} %\n", evaluation.captures,
              evaluation.fixes, 100 * evaluation.missing_fix_fraction());
-  for (const auto& [status, count] : evaluation.missing) {
+  for (const auto& [status, count] : evaluation.failures_by_status) {
     fmt::print("  no fix    {} {}\n", count, status);
   }
   print_horizontal(evaluation);
   print_height_and_yaw(evaluation);
-  if (evaluation.stations) print_bias_and_repeatability(*evaluation.stations);
-  if (evaluation.fit) print_line_fit(*evaluation.fit);
+  if (evaluation.bias_and_repeatability)
+    print_bias_and_repeatability(*evaluation.bias_and_repeatability);
+  if (evaluation.line_fit) print_line_fit(*evaluation.line_fit);
   print_normalized_errors_and_crlb(evaluation);
   if (evaluation.comparison) print_comparison(*evaluation.comparison);
   if (!gates.empty()) fmt::print("\n");
@@ -187,10 +188,10 @@ void print_fix_error_evaluation(const Evaluation& evaluation,
 void print_floor_error_budget(const FloorSummary& summary, const FloorLimits& limits,
                               bool is_free) {
   const auto in_view =
-      std::count_if(limits.places.begin(), limits.places.end(),
-                    [](const FloorLimits::Place& place) { return place.lamps > 1; });
-  fmt::print("positions   {}, two lamps or more visible at {}{}\n\n", limits.places.size(), in_view,
-             is_free ? fmt::format(", a fix at {}", summary.places_with_fix) : "");
+      std::count_if(limits.positions.begin(), limits.positions.end(),
+                    [](const FloorLimits::Position& place) { return place.lamps > 1; });
+  fmt::print("positions   {}, two lamps or more visible at {}{}\n\n", limits.positions.size(),
+             in_view, is_free ? fmt::format(", a fix at {}", summary.positions_with_fix) : "");
   fmt::print("{:15} {:>21} {:>21} {:>21}\n", "one sigma", "horizontal (mm)", "height (mm)",
              "yaw (deg)");
   fmt::print("{:15}", "source");
@@ -203,7 +204,7 @@ void print_floor_error_budget(const FloorSummary& summary, const FloorLimits& li
                1e3 * worst.height_m, deg_from_rad(median.yaw_rad), deg_from_rad(worst.yaw_rad));
   };
   for (const FloorSummary::Row& row : summary.sources) print(row);
-  print(summary.together);
+  print(summary.total);
 }
 
 void print_largest_error_source(const FloorSummary& summary) {

@@ -12,11 +12,11 @@ void print_labeled_lights(const LabeledLights& labeled, const LampClassifier& cl
   for (const auto& lamp : classifier.lamps) used += lamp.examples;
   const auto lights = static_cast<int>(labeled.lights.size());
   fmt::print("labels      {}\n  no light  {}\n  rejected  {} unlike the others of their lamp\n",
-             labeled.labels, labeled.without_light, lights - used);
+             labeled.num_labels, labeled.num_labels_without_light, lights - used);
   fmt::print("trained on  {} lights of {} lamps\n", used, classifier.lamps.size());
 }
 
-void print_confusion(const Confusion& confusion) {
+void print_confusion(const ConfusionMatrix& confusion) {
   fmt::print("identification of held-out lights (5-fold cross-validation over the images)\n  {:>8}",
              "lamp");
   for (const int lamp : confusion.lamps) fmt::print(" {:>6}", lamp);

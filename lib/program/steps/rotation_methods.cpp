@@ -69,10 +69,10 @@ void run_tilt_calibration_program(const CLI::App& app, CaptureOptions images,
   print_step_remarks(result);
   throw_if_step_failed(result);
   if (!refined_map.empty()) {
-    write_refined_lamp_map(refined_map, result.leveling.map, images.frontend.room);
+    write_refined_lamp_map(refined_map, result.tilt.map, images.frontend.room);
   }
   write_calibration(images.output, result.calibration);
-  print_tilt_calibration(result.leveling, input.calibration.camera);
+  print_tilt_calibration(result.tilt, input.calibration.camera);
 }
 
 void run_rotation_center_program(const CLI::App& app, CaptureOptions images,
@@ -80,7 +80,7 @@ void run_rotation_center_program(const CLI::App& app, CaptureOptions images,
   const std::vector<std::string> inputs = list_capture_input_files(images);
   check_output_files_are_distinct({{"--output", images.output}, {"--plot", plot}}, inputs);
   images.captures.emplace();  // inclinations are ignored: the axis defines the level direction
-  const LampCaptures input = read_lamp_captures(images, ImageUse::turn);
+  const LampCaptures input = read_lamp_captures(images, ImageUse::rotation);
   const auto* const named = std::ranges::find(kRotationMethods, method,
                                               &std::pair<std::string_view, RotationMethod>::first);
   const RotationResult found = run_rotation_calibration_step(
@@ -89,7 +89,7 @@ void run_rotation_center_program(const CLI::App& app, CaptureOptions images,
   throw_if_step_failed(found);
   if (!plot.empty()) write_plot(plot, found.drawing());
   write_calibration(images.output, found.calibration);
-  print_rotation_calibration(found.fit, found.spot, found.circles, input.calibration.camera);
+  print_rotation_calibration(found.fit, found.rotation, found.circles, input.calibration.camera);
 }
 
 }  // namespace vlp

@@ -331,7 +331,7 @@ IntrinsicsPlot collect_intrinsics_plot_data(const std::string& title,
   return plot;
 }
 
-RotationPlot collect_rotation_plot_data(const std::string& title, const RotationCaptures& spot,
+RotationPlot collect_rotation_plot_data(const std::string& title, const RotationCaptures& rotation,
                                         const CircleCenters& circles, const RotationFit& fit,
                                         const Camera& camera) {
   RotationPlot plot{title,
@@ -340,13 +340,14 @@ RotationPlot collect_rotation_plot_data(const std::string& title, const Rotation
                     undistorted_pixel_from_normalized_point(camera, Eigen::Vector2d::Zero())};
   for (const auto& [lamp, height, circle] : circles.circles) {
     const Eigen::Vector2d radii_px = camera.focal_px();
-    plot.traces.push_back({spot.lamps[lamp].id,
+    plot.traces.push_back({rotation.lamps[lamp].id,
                            {},
                            undistorted_pixel_from_normalized_point(camera, circle.circle.center),
                            circle.circle.radius * radii_px});
-    for (const RotationObservation& observation : spot.observations) {
-      if (observation.lamp != lamp || spot.captures[observation.capture].height != height) continue;
-      plot.traces.back().places_px.push_back(
+    for (const RotationObservation& observation : rotation.observations) {
+      if (observation.lamp != lamp || rotation.captures[observation.capture].height != height)
+        continue;
+      plot.traces.back().positions_px.push_back(
           undistorted_pixel_from_normalized_point(camera, observation.ray.hnormalized()));
     }
   }

@@ -39,7 +39,7 @@ struct RotationPlot {
   /// Positions of a lamp at one camera height, with the fitted ellipse.
   struct Trace {
     int lamp;
-    std::vector<Eigen::Vector2d> places_px;
+    std::vector<Eigen::Vector2d> positions_px;
     Eigen::Vector2d center_px;
     Eigen::Vector2d radii_px;
   };
@@ -56,7 +56,7 @@ Drawing make_rotation_plot_drawing(const RotationPlot& plot);
 /// Residuals and uncertainty of a lens calibration over the image.
 struct IntrinsicsPlot {
   struct Corner {
-    Eigen::Vector2d seen_px;
+    Eigen::Vector2d detected_px;
     /// Detected minus projected position.
     Eigen::Vector2d residual_px;
     bool outlier;
@@ -96,7 +96,7 @@ IntrinsicsPlot collect_intrinsics_plot_data(const std::string& title,
                                             const std::optional<LensSharpness>& sharpness);
 
 /// Collects the lamps of a rotation in place with their circles, and the rotation center.
-RotationPlot collect_rotation_plot_data(const std::string& title, const RotationCaptures& spot,
+RotationPlot collect_rotation_plot_data(const std::string& title, const RotationCaptures& rotation,
                                         const CircleCenters& circles, const RotationFit& fit,
                                         const Camera& camera);
 

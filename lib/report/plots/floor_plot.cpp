@@ -12,18 +12,18 @@ namespace vlp {
 FloorPlot collect_floor_plot_data(const FloorLimits& limits, const std::string& title,
                                   double step_m) {
   FloorPlot plot{title, "horizontal standard deviation (mm)", step_m, {}};
-  for (const FloorLimits::Place& place : limits.places) {
-    plot.places.push_back({place.camera.position_m.head<2>(), {}});
-    if (place.parts.empty()) continue;
-    plot.places.back().value = 1e3 * compute_fix_sds(place.total_pose_covariance()).horizontal_m;
+  for (const FloorLimits::Position& place : limits.positions) {
+    plot.positions.push_back({place.camera.position_m.head<2>(), {}});
+    if (place.covariances.empty()) continue;
+    plot.positions.back().value = 1e3 * compute_fix_sds(place.total_pose_covariance()).horizontal_m;
   }
   return plot;
 }
 
-void write_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot,
+void write_floor_plot(const std::filesystem::path& file, const FloorPlot& plot,
                       const LampMap& lamps) {
   std::string places, on_floor;
-  for (const auto& place : plot.places) {
+  for (const auto& place : plot.positions) {
     if (place.value)
       places += format_gnuplot_data_row({place.xy_m.x(), place.xy_m.y(), *place.value});
   }
@@ -52,7 +52,7 @@ void write_floor_plot(const std::filesystem::path& picture, const FloorPlot& plo
       "$lamps using 1:2 with points pointtype 6 pointsize 1.2 linewidth 2 linecolor rgb 'black' "
       "title 'lamps', "
       "$lamps using 1:2:(sprintf('%d', int($3))) with labels boxed offset 0,1.2 notitle\n";
-  write_plot(picture, {"limits", 900, 700, commands});
+  write_plot(file, {"limits", 900, 700, commands});
 }
 
 }  // namespace vlp

@@ -15,7 +15,7 @@ namespace vlp {
 
 /// Quantity over the floor, for a color map with the lamps on it.
 struct FloorPlot {
-  struct Place {
+  struct Position {
     Eigen::Vector2d xy_m;
     /// Value of the plotted quantity at the floor position xy_m, in the unit that FloorPlot::label
     /// names. std::nullopt leaves the position blank.
@@ -26,7 +26,7 @@ struct FloorPlot {
   std::string label;
   /// Distance between neighboring positions.
   double step_m;
-  std::vector<Place> places;
+  std::vector<Position> positions;
 };
 
 /// Collects the horizontal standard deviation from all sources, in mm; blank where no fix is
@@ -34,9 +34,9 @@ struct FloorPlot {
 FloorPlot collect_floor_plot_data(const FloorLimits& limits, const std::string& title,
                                   double step_m);
 
-/// Writes the plot as .png or .svg, by the extension of `picture`.
+/// Writes the plot as .png or .svg, by the extension of `file`.
 /// @throws InputError as write_plot()
-void write_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot,
+void write_floor_plot(const std::filesystem::path& file, const FloorPlot& plot,
                       const LampMap& lamps);
 
 }  // namespace vlp

@@ -42,17 +42,17 @@ class Descriptor {
   int number_;
 };
 
-[[noreturn]] void fail_without_script(const fs::path& picture) {
-  throw InputError(picture, std::string("cannot be drawn: gnuplot's script cannot be made: ") +
-                                std::strerror(errno));
+[[noreturn]] void fail_without_script(const fs::path& file) {
+  throw InputError(file, std::string("cannot be drawn: gnuplot's script cannot be made: ") +
+                             std::strerror(errno));
 }
 
 /// Writes the script into memory that gnuplot reads as its stdin, which avoids a temporary file.
-void write_script(const Descriptor& script, std::string_view text, const fs::path& picture) {
+void write_script(const Descriptor& script, std::string_view text, const fs::path& file) {
   while (!text.empty()) {
     const ssize_t count = ::write(script.number(), text.data(), text.size());
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) fail_without_script(picture);
+    if (count < 0) fail_without_script(file);
     text.remove_prefix(static_cast<std::size_t>(count));
   }
   ::lseek(script.number(), 0, SEEK_SET);
@@ -94,24 +94,24 @@ bool has_gnuplot_succeeded(pid_t process) {
   return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-/// Renders a drawing with a gnuplot terminal. `picture` appears in messages only.
+/// Renders a drawing with a gnuplot terminal. `file` appears in messages only.
 std::string render_with_terminal(const std::string& terminal, const Drawing& drawing,
-                                 const fs::path& picture) {
+                                 const fs::path& file) {
   const Descriptor script(::memfd_create("vlp-plot", MFD_CLOEXEC));
   int ends[2] = {-1, -1};
-  if (script.number() < 0 || ::pipe2(ends, O_CLOEXEC) != 0) fail_without_script(picture);
+  if (script.number() < 0 || ::pipe2(ends, O_CLOEXEC) != 0) fail_without_script(file);
   const Descriptor output(ends[0]);
   Descriptor input(ends[1]);
   write_script(script,
                "set terminal " + terminal + " size " + std::to_string(drawing.width_px) + "," +
                    std::to_string(drawing.height_px) + "\n" + drawing.commands,
-               picture);
+               file);
   const auto process = start_gnuplot(script.number(), input.number());
-  if (!process) throw InputError(picture, "cannot be drawn: gnuplot cannot be started");
+  if (!process) throw InputError(file, "cannot be drawn: gnuplot cannot be started");
   input.close();  // leaves gnuplot's end as the only one
   std::string image = read_all_output(output);
   if (!has_gnuplot_succeeded(*process) || image.empty()) {
-    throw InputError(picture, "cannot be drawn: gnuplot failed; is it installed?");
+    throw InputError(file, "cannot be drawn: gnuplot failed; is it installed?");
   }
   return image;
 }
@@ -124,13 +124,13 @@ std::string make_svg_terminal(const Drawing& drawing) {
 
 }  // namespace
 
-void write_plot(const fs::path& picture, const Drawing& drawing) {
-  if (picture.extension() == ".png") {
-    write_file(picture, render_with_terminal("pngcairo font 'DejaVu Sans,13'", drawing, picture));
-  } else if (picture.extension() == ".svg") {
-    write_file(picture, render_with_terminal(make_svg_terminal(drawing), drawing, picture));
+void write_plot(const fs::path& file, const Drawing& drawing) {
+  if (file.extension() == ".png") {
+    write_file(file, render_with_terminal("pngcairo font 'DejaVu Sans,13'", drawing, file));
+  } else if (file.extension() == ".svg") {
+    write_file(file, render_with_terminal(make_svg_terminal(drawing), drawing, file));
   } else {
-    throw InputError(picture, "a picture's name should end in .png or .svg");
+    throw InputError(file, "a picture's name should end in .png or .svg");
   }
 }
 

@@ -20,11 +20,11 @@ struct Drawing {
   std::vector<std::vector<std::string>> table = {};
 };
 
-/// Renders into the file `picture`, .png or .svg by its extension; the file is written atomically.
+/// Renders into the file `file`, .png or .svg by its extension; the file is written atomically.
 /// The same commands yield the same bytes.
 /// @throws InputError if the extension is another one, gnuplot is missing or fails, or the file
 /// cannot be written
-void write_plot(const std::filesystem::path& picture, const Drawing& drawing);
+void write_plot(const std::filesystem::path& file, const Drawing& drawing);
 
 /// Renders as SVG text.
 /// @throws InputError if gnuplot is missing or fails

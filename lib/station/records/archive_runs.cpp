@@ -101,7 +101,7 @@ ReprocessedArchive read_reprocessed_archive_sessions(const fs::path& results) {
       run.camera = Id(text(row, "camera"), line, "camera").id_text();
       session = run.camera + "/" + Id(text(row, "session"), line, "session").id_text();
     } catch (const InputError& error) {
-      archive.refused.emplace_back(error.what());
+      archive.rejected_sessions.emplace_back(error.what());
       continue;
     }
     run.begun_utc = run.ended_utc = parse_date(date);

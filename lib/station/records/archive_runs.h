@@ -26,7 +26,7 @@ struct ReprocessedArchive {
   /// of the session.
   std::size_t undated = 0, crashed = 0;
   /// Messages about rows that are skipped because their names are no valid ids.
-  std::vector<std::string> refused;
+  std::vector<std::string> rejected_sessions;
 };
 
 /// Reads the sessions of an archive from RESULTS/summary.csv of scripts/reprocess.sh. Throws

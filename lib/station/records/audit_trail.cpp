@@ -47,10 +47,10 @@ std::string compute_digest(const RunRecord& run) {
       content.add("gate");
       content.add(*metric.limit);
     }
-    if (!metric.guard) continue;
+    if (!metric.guard_band) continue;
     content.add("guard");
-    content.add(metric.guard->standard_uncertainty);
-    content.add(metric.guard->k);
+    content.add(metric.guard_band->standard_uncertainty);
+    content.add(metric.guard_band->k);
   }
   // Databases sort names differently.
   auto images = run.images;
@@ -64,7 +64,7 @@ std::string compute_digest(const RunRecord& run) {
 
 std::string compute_digest(const std::string& run, const RunEvent& event) {
   DigestInput content;
-  for (const std::string* text : {&run, &event.event, &event.what, &event.who, &event.text}) {
+  for (const std::string* text : {&run, &event.event, &event.kind, &event.author, &event.text}) {
     content.add(*text);
   }
   return content.compute_sha256();

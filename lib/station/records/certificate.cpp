@@ -106,7 +106,7 @@ std::string make_results_section(const RunRecord& record, const Calibration& cal
 /// Returns "rms_px: residuals of the board's corners, ..." for readers of the certificate only.
 std::string describe_requirement(const std::string& metric) {
   const auto kind = find_metric_kind(metric);
-  return kind ? metric + ": " + kind->meaning : metric;
+  return kind ? metric + ": " + kind->description : metric;
 }
 
 /// Makes the table of the gates: metric, limit, and conformity with its decision rule.
@@ -117,7 +117,7 @@ std::string make_conformity_table(const RunRecord& record) {
     if (!metric.limit) continue;
     std::string measured = metric.value ? format_significant_digits(*metric.value, digits) : "none";
     std::string rule = "simple", outcome = metric.has_passed_gate() ? "yes" : "no";
-    if (const auto& guard = metric.guard) {
+    if (const auto& guard = metric.guard_band) {
       if (metric.value) {
         measured = format_certified_value(
             CertifiedValue{"", metric.unit, *metric.value, guard->standard_uncertainty});
@@ -129,7 +129,7 @@ std::string make_conformity_table(const RunRecord& record) {
     } else if (metric.value) {
       measured = append_unit(measured, metric.unit);
     }
-    if (!metric.has_passed_gate()) table.marked.push_back(table.rows.size());
+    if (!metric.has_passed_gate()) table.highlighted_rows.push_back(table.rows.size());
     table.rows.push_back(
         {describe_requirement(metric.name), measured,
          describe_limit_direction(metric.direction) + " " +
@@ -150,7 +150,8 @@ std::string make_conformity_table(const RunRecord& record) {
 std::string digest_images(const RunRecord& record, const std::string& step) {
   std::string text;
   for (const RunRecord::Image& image : record.images) {
-    if (image.step == step && image.refused.empty()) text += image.name + " " + image.sha256 + "\n";
+    if (image.step == step && image.rejection.empty())
+      text += image.name + " " + image.sha256 + "\n";
   }
   return text.empty() ? "" : compute_text_sha256(text);
 }
@@ -231,7 +232,7 @@ void check_run_is_certifiable(const RunRecord& record) {
     return InputError(record.run, why + ": it has no certificate");
   };
   if (record.kind != "unit") throw none("is a run of the golden unit, which measures the station");
-  const std::string no_verdict = describe_verdict_problem(record);
+  const std::string no_verdict = describe_why_verdict_is_void_or_edited(record);
   if (!no_verdict.empty()) throw none(no_verdict);
   if (record.is_verdict_invalid())
     throw none("was not judged (" + record.first_verdict_cause() + ")");

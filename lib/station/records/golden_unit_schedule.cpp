@@ -118,8 +118,8 @@ void add_gates(const std::vector<Gate>& gates, Lines& lines) {
   for (const Gate& gate : gates) {
     lines.add("gate", gate.metric);
     lines.add("limit", gate.limit);
-    if (!gate.guard) continue;
-    lines.add({{"u", gate.guard->standard_uncertainty}, {"k", gate.guard->k}});
+    if (!gate.guard_band) continue;
+    lines.add({{"u", gate.guard_band->standard_uncertainty}, {"k", gate.guard_band->k}});
   }
 }
 
@@ -128,21 +128,21 @@ void add_gates(const std::vector<Gate>& gates, Lines& lines) {
 std::string compute_measurement_settings_digest(const StationConfig& config) {
   Lines lines;
   Calibration type;
-  type.camera = config.type;
+  type.camera = config.nominal_camera;
   lines.add("camera_type", format_calibration_yaml(type));
   add_board(config.board, lines);
   add_lamps(config.lamps, lines);
   if (const auto& place_m = config.dispersion_position_m) {
     lines.add({{"station_x_m", place_m->x()}, {"station_y_m", place_m->y()}});
   }
-  const CompletionCriteria& sufficient = config.sufficient;
-  lines.add({{"board_views", sufficient.board_views},
-             {"board_coverage", sufficient.board_coverage},
-             {"turn_captures", sufficient.turn_captures},
-             {"turn_heights", sufficient.turn_heights},
-             {"turn_arc_rad", sufficient.turn_arc_rad},
-             {"dispersion_captures", sufficient.dispersion_captures},
-             {"check_captures", sufficient.check_captures}});
+  const CompletionCriteria& completion = config.completion;
+  lines.add({{"board_views", completion.board_views},
+             {"board_coverage", completion.board_coverage},
+             {"turn_captures", completion.rotation_captures},
+             {"turn_heights", completion.rotation_heights},
+             {"turn_arc_rad", completion.rotation_arc_rad},
+             {"dispersion_captures", completion.dispersion_captures},
+             {"check_captures", completion.check_captures}});
   const FrontendOptions& limits = config.frontend;
   lines.add({{"blur_px", limits.max_blur_px},
              {"dark_fraction", limits.min_bright_fraction},
@@ -153,7 +153,7 @@ std::string compute_measurement_settings_digest(const StationConfig& config) {
     lines.add("white_fraction", limits.max_white_fraction);
   }
   add_gates(config.gates, lines);
-  if (const auto& golden = config.golden) {
+  if (const auto& golden = config.golden_unit) {
     lines.add("golden", golden->camera_id);
     lines.add("calibration", format_calibration_yaml(golden->calibration));
     add_gates(golden->gates, lines);
@@ -163,7 +163,7 @@ std::string compute_measurement_settings_digest(const StationConfig& config) {
 
 std::string describe_golden_unit_problem(const StationConfig& config, GoldenCheckTime at) {
   constexpr const char* verify = "'vlp-station verify' is due";
-  if (!config.verify_due) return "";
+  if (!config.verification_interval) return "";
   const fs::path file = config.spool / make_note_name(config);
   std::error_code none;
   if (fs::symlink_status(file, none).type() == fs::file_type::not_found) {
@@ -205,8 +205,8 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
   }
   if (at == GoldenCheckTime::verdict) return "";
   constexpr double second_per_hour = 3600;
-  const double age_h = compute_seconds_since_utc(ended_utc) / second_per_hour;
-  const auto& due = *config.verify_due;
+  const double age_h = compute_age_of_utc_s(ended_utc) / second_per_hour;
+  const auto& due = *config.verification_interval;
   if (due.hours && !(age_h >= 0 && age_h <= *due.hours)) {
     // [STATION-3] `golden unit was measured`
     return fmt::format("the golden unit was measured {} (run {}), not within {:g} h: {}", ended_utc,
@@ -221,7 +221,7 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
 }
 
 void record_run_in_golden_unit_note(const StationConfig& config, const RunRecord& record) {
-  if (!config.verify_due || record.is_verdict_invalid()) return;
+  if (!config.verification_interval || record.is_verdict_invalid()) return;
   create_station_folder(config.spool);
   const SharedFolder spool(config.spool);
   const std::string note = make_note_name(config);

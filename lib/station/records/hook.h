@@ -31,7 +31,7 @@ class HookLock {
   HookLock& operator=(const HookLock&) = delete;
 
   /// Returns true unless another program is running the hook.
-  bool is_hook_lock_held() const { return held_; }
+  bool has_acquired_hook_lock() const { return held_; }
   /// Returns the file descriptor of the lock; negative if there is no lock file. A process that has
   /// the descriptor holds the lock.
   int lock_file_descriptor() const { return descriptor_; }

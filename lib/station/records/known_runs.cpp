@@ -176,7 +176,7 @@ VoidedRun void_recorded_run(KnownRuns& known, const std::string& run,
   if (station != nullptr && station->hook) {
     lock.emplace(known.station_spool()->spool_folder(), record.run);
     // The result of that hook would be mistaken for that of the hook about the voiding.
-    if (!lock->is_hook_lock_held()) {
+    if (!lock->has_acquired_hook_lock()) {
       throw InputError(record.run, "its hook is being run: void it when that has ended");
     }
     record = known.find_run_by_id(run);  // it can have been voided before the lock was acquired
@@ -187,12 +187,12 @@ VoidedRun void_recorded_run(KnownRuns& known, const std::string& run,
   std::string repeated;
   if (const RunEvent* event = find_voiding_event(record)) {
     repeated =
-        fmt::format("run {} was voided before, by {}: {}", record.run, event->who, event->text);
+        fmt::format("run {} was voided before, by {}: {}", record.run, event->author, event->text);
   } else {
     record.events.push_back(make_run_event_now(kVoided, escape_text_for_single_line(reason), who));
   }
-  const bool calls_hook = lock && find_last_event_of_kind(record, kHookRequested) <
-                                      find_last_event_of_kind(record, kVoided);
+  const bool calls_hook = lock && find_index_of_last_event_of_kind(record, kHookRequested) <
+                                      find_index_of_last_event_of_kind(record, kVoided);
   if (calls_hook) record.events.push_back(make_hook_requested_event(*station->hook, who));
   bool is_any_done = repeated.empty() || calls_hook;
   Spool* spool = known.station_spool();

@@ -49,7 +49,7 @@ fs::path write_calibration(const RunRecord& record, const SharedFolder& folder) 
 }
 
 ReportVerdict make_verdict_box(const RunRecord& record) {
-  const std::string no_verdict = describe_verdict_problem(record);
+  const std::string no_verdict = describe_why_verdict_is_void_or_edited(record);
   ReportVerdict verdict{record.verdict,
                         record.has_run_passed()       ? Verdict::pass
                         : record.is_verdict_invalid() ? Verdict::invalid
@@ -63,7 +63,7 @@ ReportVerdict make_verdict_box(const RunRecord& record) {
 
 std::string describe_meaning(const CheckedMetric& metric) {
   const auto kind = find_metric_kind(metric.name);
-  return kind ? kind->meaning : "a metric of another version of the program";
+  return kind ? kind->description : "a metric of another version of the program";
 }
 
 }  // namespace
@@ -71,7 +71,7 @@ std::string describe_meaning(const CheckedMetric& metric) {
 void check_results_folder_writable(const fs::path& results, const std::string& camera) {
   constexpr std::uintmax_t room_bytes = 8'000'000;
   create_station_folder(results);
-  check_folder_writable_and_space(
+  require_writable_folder_with_space(
       SharedFolder(results).open_or_create_subfolder({camera, results, "camera"}), room_bytes);
 }
 
@@ -126,19 +126,19 @@ std::string make_run_report_html(const RunRecord& record, const std::filesystem:
   for (const auto& [step, image, sha256, refused] : record.images) {
     if (refused.empty()) continue;
     std::string where = step;
-    report.refused.push_back({where.append("/").append(image), refused});
+    report.rejections.push_back({where.append("/").append(image), refused});
   }
-  report.facts = {{"run", record.run},
-                  {"begun, ended (UTC)", record.begun_utc + ", " + record.ended_utc},
-                  {"operator", record.operator_name},
-                  {"shift", record.shift},
-                  {"images", std::to_string(record.images.size()) + ", " +
-                                 std::to_string(record.count_used_images()) + " used"}};
-  std::erase_if(report.facts, [](const auto& fact) { return fact.second.empty(); });
+  report.properties = {{"run", record.run},
+                       {"begun, ended (UTC)", record.begun_utc + ", " + record.ended_utc},
+                       {"operator", record.operator_name},
+                       {"shift", record.shift},
+                       {"images", std::to_string(record.images.size()) + ", " +
+                                      std::to_string(record.count_used_images()) + " used"}};
+  std::erase_if(report.properties, [](const auto& fact) { return fact.second.empty(); });
   report.notes.push_back(record.program + "; " + record.libraries + "; station configuration " +
                          record.config_sha256 + ".");
   if (!calibration.empty()) report.calibration = read_calibration(calibration);
-  report.pictures = pictures;
+  report.plots = pictures;
   return render_report_html(report);
 }
 

@@ -153,7 +153,7 @@ void read_run_metrics(soci::session& sql, RunRecord& record) {
     metric.limit = has_gate == soci::i_ok ? std::optional(gate) : std::nullopt;
     metric.direction = at_least != 0 ? Direction::at_least : Direction::at_most;
     const bool guarded = has_u == soci::i_ok && has_k == soci::i_ok;
-    metric.guard = guarded ? std::optional(guard) : std::nullopt;
+    metric.guard_band = guarded ? std::optional(guard) : std::nullopt;
     record.metrics.push_back(metric);
   }
 }
@@ -224,13 +224,13 @@ std::optional<RunRecord> load_complete_run(soci::session& sql, const std::string
       (sql.prepare << "SELECT step, image, sha256, refused FROM images WHERE run = :run ORDER "
                       "BY step, image",
        soci::into(image.step), soci::into(image.name), soci::into(image.sha256),
-       soci::into(image.refused), soci::use(run));
+       soci::into(image.rejection), soci::use(run));
   images.execute();
   while (images.fetch()) found->images.push_back(image);
   RunEvent event;
   soci::statement events =
       (sql.prepare << "SELECT event, what, who, text FROM events WHERE run = :run ORDER BY event",
-       soci::into(event.event), soci::into(event.what), soci::into(event.who),
+       soci::into(event.event), soci::into(event.kind), soci::into(event.author),
        soci::into(event.text), soci::use(run));
   events.execute();
   while (events.fetch()) found->events.push_back(event);

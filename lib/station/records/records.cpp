@@ -53,7 +53,7 @@ void configure_connection(soci::session& sql, int timeout_s) {
 
 void open_database_session(soci::session& sql, const std::string& where) {
   if (is_database_server_address(where)) {
-    sql.open(soci::postgresql, make_database_connection_string(where));
+    sql.open(soci::postgresql, make_soci_connection_string_from_address(where));
   } else {
     if (where.find('"') != std::string::npos) {
       throw InputError(where, "the name of a database cannot have a quote (\"): rename its folder");
@@ -241,8 +241,8 @@ void insert_metrics(soci::session& sql, const RunRecord& record, ConnectionWatch
     const double value = metric.value.value_or(0), gate = metric.limit.value_or(0);
     soci::indicator has_value = metric.value ? soci::i_ok : soci::i_null;
     soci::indicator has_gate = metric.limit ? soci::i_ok : soci::i_null;
-    const auto [uncertainty, guard_k] = metric.guard.value_or(GuardBand{});
-    soci::indicator has_guard = metric.guard ? soci::i_ok : soci::i_null;
+    const auto [uncertainty, guard_k] = metric.guard_band.value_or(GuardBand{});
+    soci::indicator has_guard = metric.guard_band ? soci::i_ok : soci::i_null;
     const int at_least = metric.direction == Direction::at_least ? 1 : 0,
               passed = metric.has_passed_gate() ? 1 : 0;
     ++place;
@@ -275,8 +275,8 @@ std::vector<RunEvent> insert_events(soci::session& sql, const RunRecord& record,
     soci::statement insert =
         (sql.prepare << "INSERT INTO events (event, run, what, text, who) VALUES (:event, :run, "
                         ":what, :text, :who) ON CONFLICT (event) DO NOTHING",
-         soci::use(event.event), soci::use(record.run), soci::use(event.what),
-         soci::use(event.text), soci::use(event.who));
+         soci::use(event.event), soci::use(record.run), soci::use(event.kind),
+         soci::use(event.text), soci::use(event.author));
     insert.execute(true);
     if (insert.get_affected_rows() > 0) added.push_back(event);
     watch.on_progress();

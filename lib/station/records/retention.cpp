@@ -27,7 +27,7 @@ constexpr std::size_t kRunLength = 33;  // of make_run_id()
 
 bool is_older(const std::string& utc, int days) {
   constexpr double seconds_per_day = 86'400;
-  return compute_seconds_since_utc(utc) > days * seconds_per_day;  // false for an invalid time
+  return compute_age_of_utc_s(utc) > days * seconds_per_day;  // false for an invalid time
 }
 
 std::vector<fs::path> list_folders_in(const fs::path& folder) {
@@ -111,10 +111,10 @@ void add_if_expired(RetentionResult& found, Records& records, const StationConfi
   if (run.size() != kRunLength || !is_older(start_utc_of_run_id(run), days)) return;
   auto record = records.find_run_by_id(run);
   if (!record || record->camera != camera) {
-    found.without_record.push_back(folder);
+    found.folders_without_record.push_back(folder);
   } else if (record->station == config.station && is_older(record->ended_utc, days)) {
     if (is_in_use(folder, config)) {
-      found.in_use.push_back(folder);
+      found.folders_in_use.push_back(folder);
       return;
     }
     found.expired.push_back(
@@ -132,7 +132,7 @@ SharedFolder open_existing(const SharedFolder& parent, const Id& name) {
 /// Opens the folder that contains an expired one, starting at the folder named in station.yaml,
 /// without following links.
 SharedFolder open_parent(const ExpiredFolder& expired, const StationConfig& config) {
-  if (expired.what == std::string_view(kImagesDeleted)) return SharedFolder(config.captures);
+  if (expired.event_kind == std::string_view(kImagesDeleted)) return SharedFolder(config.captures);
   return open_existing(SharedFolder(config.results),
                        {expired.run.camera, "the record of a run", "camera"});
 }
@@ -141,7 +141,7 @@ SharedFolder open_parent(const ExpiredFolder& expired, const StationConfig& conf
 
 RetentionResult find_expired_run_folders(const StationConfig& config, Records& records) {
   RetentionResult found;
-  if (const auto& days = config.keep.images_days) {
+  if (const auto& days = config.retention.images_days) {
     for (const fs::path& folder : list_folders_in(config.captures)) {
       const std::string name = folder.filename().string();
       if (name.size() < kRunLength + 2) continue;
@@ -151,7 +151,7 @@ RetentionResult find_expired_run_folders(const StationConfig& config, Records& r
                      kImagesDeleted, *days);
     }
   }
-  if (const auto& days = config.keep.results_days) {
+  if (const auto& days = config.retention.results_days) {
     for (const fs::path& camera : list_folders_in(config.results)) {
       for (const fs::path& folder : list_folders_in(camera)) {
         add_if_expired(found, records, config, folder, camera.filename().string(),
@@ -169,19 +169,19 @@ void check_clock_against_recorded_runs(const StationConfig& config, Records& rec
   constexpr int trusted_days = 7;             // within them a wrong clock is noticed
   std::vector<std::string> ended;
   for (const RunSummary& run : records.list_run_summaries({.station = config.station})) {
-    const bool is_time = !std::isnan(compute_seconds_since_utc(run.ended_utc));
+    const bool is_time = !std::isnan(compute_age_of_utc_s(run.ended_utc));
     if (run.voided.empty() && is_time) ended.push_back(run.ended_utc);
   }
   std::sort(ended.begin(), ended.end());
   if (ended.empty()) return;
   const std::string& newest = ended.back();
-  if (compute_seconds_since_utc(newest) < -max_ahead_s) {
+  if (compute_age_of_utc_s(newest) < -max_ahead_s) {
     throw InputError(config.file,
                      fmt::format("the newest run ended {}, after the clock, {}: set the clock, or, "
                                  "if it is right, void the runs with wrong dates",
                                  newest, get_current_utc()));
   }
-  if (compute_seconds_since_utc(newest) > max_idle_s) {
+  if (compute_age_of_utc_s(newest) > max_idle_s) {
     throw InputError(
         config.file,
         fmt::format("the newest run ended {}, more than a year before the clock, {}: set "
@@ -189,9 +189,9 @@ void check_clock_against_recorded_runs(const StationConfig& config, Records& rec
                     newest, get_current_utc()));
   }
   for (std::size_t i = ended.size() - 1; i > 0; --i) {
-    const double age_s = compute_seconds_since_utc(ended[i]);
+    const double age_s = compute_age_of_utc_s(ended[i]);
     if (age_s > trusted_days * day_s) return;
-    if (compute_seconds_since_utc(ended[i - 1]) - age_s < max_idle_s) continue;
+    if (compute_age_of_utc_s(ended[i - 1]) - age_s < max_idle_s) continue;
     throw InputError(config.file,
                      fmt::format("the runs since {} ended more than a year after those before: set "
                                  "the clock and void them, or, if it is right, clean again when "
@@ -205,11 +205,11 @@ void delete_expired_run_folder(const ExpiredFolder& expired, const StationConfig
   const SharedFolder parent = open_parent(expired, config);
   const Id name(expired.folder.filename().string(), expired.folder, "run");
   open_existing(parent, name).remove_all_folder_entries();
-  if (find_last_event_of_kind(expired.run, expired.what) < 0) {
+  if (find_index_of_last_event_of_kind(expired.run, expired.event_kind) < 0) {
     constexpr double megabyte = 1e6;
     RunRecord run = expired.run;
     run.events.push_back(make_run_event_now(
-        expired.what,
+        expired.event_kind,
         fmt::format("kept {} days, {:.1f} MB", expired.days, double(expired.bytes) / megabyte)));
     spool.store_run(run);
   }

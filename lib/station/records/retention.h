@@ -17,7 +17,7 @@ struct ExpiredFolder {
   std::filesystem::path folder;
   /// Kind of the event that is added to the run after the deletion of the folder: kImagesDeleted or
   /// kResultsDeleted.
-  const char* what;
+  const char* event_kind;
   /// Retention time, days.
   int days;
   std::uintmax_t bytes;
@@ -28,9 +28,9 @@ struct RetentionResult {
   /// Folders to delete, by name, images first.
   std::vector<ExpiredFolder> expired;
   /// Folders of the same age without a run in the records; not deleted.
-  std::vector<std::filesystem::path> without_record;
+  std::vector<std::filesystem::path> folders_without_record;
   /// Folders of the same age that contain files named in station.yaml; not deleted.
-  std::vector<std::filesystem::path> in_use;
+  std::vector<std::filesystem::path> folders_in_use;
 };
 
 /// Finds the folders of a station's runs whose retention time has expired, by StationConfig::keep

@@ -67,18 +67,18 @@ std::string describe_account() {
 
 }  // namespace
 
-void RunRecord::set_verdict_from_causes(std::vector<Cause> why) {
+void RunRecord::set_verdict_from_causes(std::vector<Cause> new_causes) {
   if (std::string problem = describe_clock_problem(*this); !problem.empty()) {
-    why.insert(why.begin(), {std::move(problem), false});
+    new_causes.insert(new_causes.begin(), {std::move(problem), false});
   }
-  verdict = run_verdict_name(decide_verdict_from_causes(why));
+  verdict = run_verdict_name(decide_verdict_from_causes(new_causes));
   causes.clear();
-  for (const Cause& cause : why) causes.append(cause.text).append("\n");
+  for (const Cause& cause : new_causes) causes.append(cause.text).append("\n");
 }
 
-void RunRecord::invalidate_verdict(const std::string& why) {
+void RunRecord::invalidate_verdict(const std::string& reason) {
   verdict = run_verdict_name(Verdict::invalid);
-  causes = why + "\n" + causes;
+  causes = reason + "\n" + causes;
 }
 
 const CheckedMetric* RunRecord::find_metric_by_name(std::string_view name) const {
@@ -91,13 +91,13 @@ std::ptrdiff_t RunRecord::count_used_images() const {
 }
 
 const RunEvent* find_voiding_event(const RunRecord& record) {
-  const auto event = std::ranges::find(record.events, kVoided, &RunEvent::what);
+  const auto event = std::ranges::find(record.events, kVoided, &RunEvent::kind);
   return event == record.events.end() ? nullptr : &*event;
 }
 
-std::ptrdiff_t find_last_event_of_kind(const RunRecord& record, const char* what) {
+std::ptrdiff_t find_index_of_last_event_of_kind(const RunRecord& record, const char* kind) {
   const auto event = std::find_if(record.events.rbegin(), record.events.rend(),
-                                  [&](const RunEvent& each) { return each.what == what; });
+                                  [&](const RunEvent& each) { return each.kind == kind; });
   return record.events.rend() - event - 1;
 }
 
@@ -125,9 +125,9 @@ bool uses_images_of_earlier_run(const RunRecord& run, const RunRecord& earlier) 
          });
 }
 
-std::string describe_verdict_problem(const RunRecord& record) {
+std::string describe_why_verdict_is_void_or_edited(const RunRecord& record) {
   if (const RunEvent* event = find_voiding_event(record)) {
-    return fmt::format("was voided by {}: {}", event->who, event->text);
+    return fmt::format("was voided by {}: {}", event->author, event->text);
   }
   if (!record.has_run_passed()) return "";
   // [STATION-15] `changed by hand`
@@ -160,7 +160,7 @@ std::string RunEvent::event_time_utc() const {
   return start_utc_of_run_id(event.substr(0, event.find('.')) + "Z");
 }
 
-RunEvent make_run_event_now(const std::string& what, const std::string& text,
+RunEvent make_run_event_now(const std::string& kind, const std::string& text,
                             const std::string& operator_name) {
   std::random_device random;
   using std::chrono::microseconds;
@@ -169,12 +169,12 @@ RunEvent make_run_event_now(const std::string& what, const std::string& text,
   const auto part = now.time_since_epoch().count() % microseconds_per_second;
   return {format_utc(std::chrono::system_clock::to_time_t(now), "%Y%m%dT%H%M%S") +
               fmt::format(".{:06d}Z-{:08x}", part, random()),
-          what, text,
+          kind, text,
           operator_name.empty() ? describe_account()
                                 : fmt::format("{} ({})", operator_name, describe_account())};
 }
 
-double compute_seconds_since_utc(const std::string& utc) {
+double compute_age_of_utc_s(const std::string& utc) {
   const auto time = parse_utc(utc);
   return time ? std::difftime(current_time_s(), *time) : std::numeric_limits<double>::quiet_NaN();
 }
@@ -227,11 +227,11 @@ RunRecord escape_run_texts(RunRecord run) {
   }
   for (RunRecord::Image& image : run.images) {
     image.name = escape_text_for_single_line(image.name);
-    image.refused = escape_text_for_single_line(image.refused);
+    image.rejection = escape_text_for_single_line(image.rejection);
   }
   for (RunEvent& event : run.events) {
     event.text = escape_text_for_single_line(event.text);
-    event.who = escape_text_for_single_line(event.who);
+    event.author = escape_text_for_single_line(event.author);
   }
   return run;
 }
@@ -243,8 +243,9 @@ std::string describe_clock_problem(const RunRecord& run) {
       run.ended_utc, run.begun_utc);
 }
 
-RunRecord make_run_record(const char* kind, const StationConfig& config, const std::string& camera,
-                          const std::string& run, const ProgramVersion& program) {
+RunRecord make_common_run_record(const char* kind, const StationConfig& config,
+                                 const std::string& camera, const std::string& run,
+                                 const ProgramVersion& program) {
   RunRecord record;
   record.run = run;
   record.kind = kind;
@@ -314,9 +315,9 @@ Json json_number_or_null(const std::optional<double>& value) {
 }
 
 void add_guard_band(const CheckedMetric& metric, Json& json) {
-  if (!metric.guard) return;
-  json["uncertainty"] = metric.guard->standard_uncertainty;
-  json["guard_k"] = metric.guard->k;
+  if (!metric.guard_band) return;
+  json["uncertainty"] = metric.guard_band->standard_uncertainty;
+  json["guard_k"] = metric.guard_band->k;
 }
 
 /// Adds the images and the events of a run.
@@ -328,8 +329,10 @@ void add_images_and_events(const RunRecord& run, Json& json) {
   }
   json["events"] = Json::array();
   for (const RunEvent& event : run.events) {
-    json["events"].push_back(
-        {{"event", event.event}, {"what", event.what}, {"text", event.text}, {"who", event.who}});
+    json["events"].push_back({{"event", event.event},
+                              {"what", event.kind},
+                              {"text", event.text},
+                              {"who", event.author}});
   }
 }
 
@@ -347,7 +350,7 @@ Json to_json(const RunRecord& run) {
               {"at_least", metric.direction == Direction::at_least},
               {"passed", metric.has_passed_gate()}};
     add_guard_band(metric, figure);
-    if (metric.guard) {
+    if (metric.guard_band) {
       figure["conformance_probability"] = json_number_or_null(metric.conformance_probability());
     }
   }
@@ -378,7 +381,8 @@ SpooledRun parse_run(const Json& json) {
   if (run.run.empty() || run.verdict.empty()) throw std::runtime_error("no run, or no verdict");
   // Both name folders and files.
   for (const std::string& id : {run.run, run.camera}) {
-    if (!Id::is_valid_id(id)) throw std::runtime_error("its run or camera is no id");
+    if (!Id::is_valid_name_of_camera_or_run(id))
+      throw std::runtime_error("its run or camera is no id");
   }
   for (const Json& metric : json.at(is_former ? "figures" : "metrics")) {
     run.metrics.push_back(
@@ -394,7 +398,8 @@ SpooledRun parse_run(const Json& json) {
   for (const Json& event : json.value("events", Json::array())) {
     run.events.push_back(
         {event.at("event"), event.at("what"), event.at("text"), event.value("who", "")});
-    if (!Id::is_valid_id(run.events.back().event)) throw std::runtime_error("an event is no id");
+    if (!Id::is_valid_name_of_camera_or_run(run.events.back().event))
+      throw std::runtime_error("an event is no id");
   }
   return spooled;
 }

@@ -21,11 +21,11 @@ struct RunEvent {
   /// Unique id that sorts chronologically: 20261121T134501.123456Z-01234567.
   std::string event;
   /// Kind of the event: one of the constants below.
-  std::string what;
+  std::string kind;
   /// Reason or result, human-readable.
   std::string text;
   /// Operator, if given, with account and machine of the program.
-  std::string who = {};
+  std::string author = {};
 
   /// Returns the time of the event, as 2026-11-21T13:45:01Z.
   std::string event_time_utc() const;
@@ -35,9 +35,9 @@ inline constexpr const char *kHookRequested = "hook wanted", *kHookDone = "hook 
                             *kResultsDeleted = "results deleted", *kVoided = "voided",
                             *kUnchecked = "unchecked";
 
-/// Makes an event of the current time. RunEvent::who is this program's account, or "Ann
+/// Makes an event of the current time. RunEvent::author is this program's account, or "Ann
 /// (vlp@station-7)" with an operator.
-RunEvent make_run_event_now(const std::string& what, const std::string& text,
+RunEvent make_run_event_now(const std::string& kind, const std::string& text,
                             const std::string& operator_name = "");
 
 /// Record of a run.
@@ -62,9 +62,9 @@ struct RunRecord {
   struct Image {
     std::string step, name, sha256;
     /// Reason why the image was not used; empty if it was.
-    std::string refused;
+    std::string rejection;
 
-    bool is_image_used() const { return refused.empty(); }
+    bool is_image_used() const { return rejection.empty(); }
   };
   std::vector<Image> images;
   /// Events, in chronological order.
@@ -78,11 +78,11 @@ struct RunRecord {
   bool is_verdict_invalid() const { return verdict == run_verdict_name(Verdict::invalid); }
   /// Returns the first cause, in one line; empty if the run passed.
   std::string first_verdict_cause() const { return causes.substr(0, causes.find('\n')); }
-  /// Sets verdict and causes from `why`, the most important cause first. A wrong clock
+  /// Sets verdict and causes from `new_causes`, the most important cause first. A wrong clock
   /// (describe_clock_problem()) precedes all.
-  void set_verdict_from_causes(std::vector<Cause> why);
+  void set_verdict_from_causes(std::vector<Cause> new_causes);
   /// Makes the run INVALID for another reason, which precedes the others.
-  void invalidate_verdict(const std::string& why);
+  void invalidate_verdict(const std::string& reason);
 };
 
 /// Run that used an image; empty if none did.
@@ -107,12 +107,12 @@ bool uses_images_of_earlier_run(const RunRecord& run, const RunRecord& earlier);
 const RunEvent* find_voiding_event(const RunRecord& record);
 
 /// Returns the index of the last event of a kind; -1 if there is none.
-std::ptrdiff_t find_last_event_of_kind(const RunRecord& record, const char* what);
+std::ptrdiff_t find_index_of_last_event_of_kind(const RunRecord& record, const char* kind);
 
 /// Returns the reason why the verdict of a record is not valid; empty if it is valid. The verdict
 /// is not valid if the run was voided, or if it is PASS despite a failed gate or a cause. The
 /// latter shows that the record was edited.
-std::string describe_verdict_problem(const RunRecord& record);
+std::string describe_why_verdict_is_void_or_edited(const RunRecord& record);
 
 /// Text member of a record: a column of the table of runs and a key of its JSON.
 struct RunField {
@@ -125,8 +125,8 @@ struct RunField {
 };
 
 /// Returns all text members of a record, in order. A new text requires a member of RunRecord, an
-/// entry in list_run_text_fields(), code that sets it (make_run_record() or the program), and a
-/// migration in record_tables.cpp.
+/// entry in list_run_text_fields(), code that sets it (make_common_run_record() or the program),
+/// and a migration in record_tables.cpp.
 std::span<const RunField> list_run_text_fields();
 
 /// Returns the id of a run that starts now, 20261121T134501Z-0123456789abcdef: UTC and 16 random
@@ -142,7 +142,7 @@ std::string get_current_utc();
 std::string describe_utc_problem(const std::string& text);
 /// Returns the time since a UTC as 2026-11-21T13:45:01Z, s: negative for a future time, NaN for an
 /// invalid text.
-double compute_seconds_since_utc(const std::string& utc);
+double compute_age_of_utc_s(const std::string& utc);
 
 /// Returns the run with texts that are safe for terminals, reports and the spool:
 /// escape_text_for_terminal(), and escape_text_for_single_line() for operators and for names of
@@ -155,8 +155,9 @@ std::string describe_clock_problem(const RunRecord& run);
 
 /// Makes the common part of the records of units and golden units for a run that ends now: all
 /// members except verdict, inputs and operator.
-RunRecord make_run_record(const char* kind, const StationConfig& config, const std::string& camera,
-                          const std::string& run, const ProgramVersion& program);
+RunRecord make_common_run_record(const char* kind, const StationConfig& config,
+                                 const std::string& camera, const std::string& run,
+                                 const ProgramVersion& program);
 
 /// Returns OpenCV, Ceres, mrcal and other libraries with their versions.
 std::string list_library_versions();

@@ -147,7 +147,7 @@ void Spool::suspend_database_access(const InputError& error) {
 
 void Spool::check_runs_can_be_stored() {
   create_station_folder(folder_);
-  check_folder_writable_and_space(SharedFolder(folder_), kRequiredSpace_bytes);
+  require_writable_folder_with_space(SharedFolder(folder_), kRequiredSpace_bytes);
   remove_stale_files(folder_);
   try {
     if (!records_) records_ = std::make_unique<Records>(where_);

@@ -108,13 +108,14 @@ BiasStudy analyze_bias_and_linearity(const std::vector<ReferenceValue>& values) 
   }
   const auto count = static_cast<double>(values.size());
   const double dof = count - static_cast<double>(by_unit.size());
-  study.all = test_estimate(compute_mean(differences), std::sqrt(within / dof / count), dof);
+  study.overall_bias =
+      test_estimate(compute_mean(differences), std::sqrt(within / dof / count), dof);
   const bool differ = study.units.front().reference < study.units.back().reference;
   if (differ) study.linearity = fit_line(references, differences);
   return study;
 }
 
-void write_bias_plot(const std::filesystem::path& picture, const std::string& title,
+void write_bias_plot(const std::filesystem::path& file, const std::string& title,
                      const std::vector<ReferenceValue>& values, const BiasStudy& study) {
   std::string data, means, line;
   for (const auto& [unit, reference, value] : values) {
@@ -152,7 +153,7 @@ void write_bias_plot(const std::filesystem::path& picture, const std::string& ti
         "$line using 1:4 with lines dashtype 2 linecolor rgb '{}' notitle",
         green, vermilion, vermilion);
   }
-  write_plot(picture, {"bias", 1000, 480, commands + "\n"});
+  write_plot(file, {"bias", 1000, 480, commands + "\n"});
 }
 
 }  // namespace vlp

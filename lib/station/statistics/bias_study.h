@@ -63,7 +63,7 @@ struct BiasStudy {
   /// Biases by unit, by increasing reference.
   std::vector<UnitBias> units;
   /// Bias of all values. It is meaningful only if the slope is not significant.
-  EstimateTest all;
+  EstimateTest overall_bias;
   std::optional<Linearity> linearity;
 };
 
@@ -73,7 +73,7 @@ BiasStudy analyze_bias_and_linearity(const std::vector<ReferenceValue>& values);
 
 /// Plots the differences over the references, the mean of each unit, the line and its band, as .png
 /// or .svg. Throws InputError.
-void write_bias_plot(const std::filesystem::path& picture, const std::string& title,
+void write_bias_plot(const std::filesystem::path& file, const std::string& title,
                      const std::vector<ReferenceValue>& values, const BiasStudy& study);
 
 }  // namespace vlp

@@ -153,7 +153,7 @@ std::vector<ChartAlarm> find_control_chart_alarms(std::span<const double> values
     };
     for (const ChartRule& rule : kRules) {
       if (is_selected(rule.name) && rule.matches(Sigmas(sigmas).first(i + 1))) {
-        alarms.push_back({rule.name, rule.meaning, i});
+        alarms.push_back({rule.name, rule.description, i});
       }
     }
     const bool is_outside =
@@ -165,7 +165,7 @@ std::vector<ChartAlarm> find_control_chart_alarms(std::span<const double> values
   return alarms;
 }
 
-void write_trend_plot(const std::filesystem::path& picture, const std::string& title,
+void write_trend_plot(const std::filesystem::path& file, const std::string& title,
                       std::span<const TrendPoint> points, std::span<const ChartAlarm> alarms,
                       std::optional<double> gate) {
   const std::vector<double> values = extract_trend_values(points);
@@ -203,7 +203,7 @@ void write_trend_plot(const std::filesystem::path& picture, const std::string& t
         "title 'alarms'",
         vermilion);
   }
-  write_plot(picture, {"trend", 1000, 480, commands + "\n"});
+  write_plot(file, {"trend", 1000, 480, commands + "\n"});
 }
 
 }  // namespace vlp

@@ -31,7 +31,7 @@ struct ChartRule {
   /// Name: "western-electric-1" to -4 (Statistical Quality Control Handbook, 1956), "nelson-1" to
   /// -8 (Nelson 1984, J. Quality Technology 16, 237-239).
   const char* name;
-  const char* meaning;
+  const char* description;
   /// Returns true if the pattern ends at the last value.
   bool (*matches)(std::span<const double> sigmas);
 };
@@ -50,7 +50,7 @@ Ewma compute_ewma(std::span<const double> values, double target, double sigma, d
 
 /// Alarm of a control chart. `index` is the value at which the pattern of the rule ends.
 struct ChartAlarm {
-  std::string rule, meaning;
+  std::string rule, description;
   std::size_t index;
 };
 
@@ -62,7 +62,7 @@ std::vector<ChartAlarm> find_control_chart_alarms(std::span<const double> values
 
 /// Plots values in their order with mean, limits, alarms and the gate, if any, as .png or .svg.
 /// Throws InputError as write_plot().
-void write_trend_plot(const std::filesystem::path& picture, const std::string& title,
+void write_trend_plot(const std::filesystem::path& file, const std::string& title,
                       std::span<const TrendPoint> points, std::span<const ChartAlarm> alarms,
                       std::optional<double> gate);
 

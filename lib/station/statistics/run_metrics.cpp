@@ -12,15 +12,15 @@
 
 namespace vlp {
 
-std::vector<MetricKind> list_run_metrics() {
+std::vector<MetricKind> list_run_metric_kinds() {
   auto kinds = list_unit_metrics();
   const auto fix_metrics = list_metric_kinds({MetricSource::evaluation});
   kinds.insert(kinds.end(), fix_metrics.begin(), fix_metrics.end());
   return kinds;
 }
 
-MetricKind find_run_metric(const std::string& name) {
-  const auto kinds = list_run_metrics();
+MetricKind find_run_metric_kind(const std::string& name) {
+  const auto kinds = list_run_metric_kinds();
   const auto kind = std::ranges::find(kinds, name, &MetricKind::name);
   if (kind != kinds.end()) return *kind;
   const std::string_view present = find_current_name_for_former(NameKind::metric, name);

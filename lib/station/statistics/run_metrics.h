@@ -20,9 +20,9 @@ namespace vlp {
 /// Returns the kinds of all metrics that runs can have: those of units at a station
 /// (list_unit_metrics()), followed by the errors of fixes, which sessions of archives have
 /// (archive_runs.h).
-std::vector<MetricKind> list_run_metrics();
+std::vector<MetricKind> list_run_metric_kinds();
 /// Returns the metric of this name. Throws std::invalid_argument that lists the valid names.
-MetricKind find_run_metric(const std::string& name);
+MetricKind find_run_metric_kind(const std::string& name);
 
 /// Returns the values of a metric in judged runs, or in runs of the verdict that the filter
 /// selects.

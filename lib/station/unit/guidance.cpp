@@ -20,13 +20,16 @@ namespace {
 /// Computes the coverage of the views as in vlp-intrinsics, with poses from the nominal lens.
 ViewCoverage compute_coverage(const Unit& unit) {
   const StationConfig& config = unit.station_config();
-  const Lens nominal(config.type.lens_model, config.type.intrinsics);
-  IntrinsicsInput input{
-      BoardLattice(config.board), {}, config.type.imager_px, config.type.lens_model};
+  const Lens nominal(config.nominal_camera.lens_model, config.nominal_camera.intrinsics);
+  IntrinsicsInput input{BoardLattice(config.board),
+                        {},
+                        config.nominal_camera.imager_px,
+                        config.nominal_camera.lens_model};
   IntrinsicsSolution poses{};
   for (const UnitImage* image : list_used_images(unit.step_state(StationStep::boards))) {
     poses.views.push_back(input.views.size());
-    input.views.push_back(input.lattice.match_corners_to_flat_board(image->seen.board->seen));
+    input.views.push_back(
+        input.lattice.match_corners_to_flat_board(image->observation.board->detection));
     const auto pose = estimate_board_view_pose(input.views.back(), nominal);
     if (pose) poses.problem.poses.push_back(pose->camera_from_board);
   }
@@ -35,17 +38,17 @@ ViewCoverage compute_coverage(const Unit& unit) {
 
 std::string describe_missing_angles(const YawCoverage::Height& height) {
   std::string angles;
-  for (std::size_t part = 0; part < height.parts.size(); ++part) {
-    if (height.parts[part]) continue;
-    angles += fmt::format(" {:.0f}", 360.0 * double(part) / double(height.parts.size()));
+  for (std::size_t part = 0; part < height.covered_sectors.size(); ++part) {
+    if (height.covered_sectors[part]) continue;
+    angles += fmt::format(" {:.0f}", 360.0 * double(part) / double(height.covered_sectors.size()));
   }
   return angles;
 }
 
 /// Returns a map of the corners over the image: '#' many, '+' some, '.' none.
 std::vector<std::string> draw_board_map(const Unit& unit) {
-  const ImageCoverage coverage = compute_board_coverage(unit.step_state(StationStep::boards),
-                                                        unit.station_config().type.imager_px);
+  const ImageCoverage coverage = compute_board_coverage(
+      unit.step_state(StationStep::boards), unit.station_config().nominal_camera.imager_px);
   constexpr int many = 20;
   std::vector<std::string> lines;
   const std::string edge = "  +-----------------+";
@@ -61,12 +64,12 @@ std::vector<std::string> draw_board_map(const Unit& unit) {
   lines.push_back(edge);
   lines[1] += fmt::format("   {:.0f} % of the image have corners, {:.0f} % wanted",
                           100 * coverage.covered_image_fraction(),
-                          100 * unit.station_config().sufficient.board_coverage);
+                          100 * unit.station_config().completion.board_coverage);
   lines[3] += "   # many corners   + some   . none";
   const UnitStep& boards = unit.step_state(StationStep::boards);
-  const auto last = boards.images.find(boards.last);
-  if (last == boards.images.end() || !last->second.seen.board) return lines;
-  if (const auto mtf50 = compute_median_edge_mtf50(last->second.seen.board->seen)) {
+  const auto last = boards.images.find(boards.last_image);
+  if (last == boards.images.end() || !last->second.observation.board) return lines;
+  if (const auto mtf50 = compute_median_edge_mtf50(last->second.observation.board->detection)) {
     lines[5] += fmt::format("   sharpness of the last image: MTF50 {:.3f} cycles/px", *mtf50);
   }
   return lines;
@@ -85,7 +88,7 @@ std::vector<std::string> describe_rotation_coverage(const Unit& unit) {
   std::vector<std::string> lines;
   for (const YawCoverage::Height& height : compute_yaw_coverage_of_unit(unit).heights) {
     std::string parts;
-    for (const bool there : height.parts) parts += there ? '#' : '.';
+    for (const bool there : height.covered_sectors) parts += there ? '#' : '.';
     const double z_m = std::round(100 * height.z_m) / 100 + 0.0;  // without negative zero
     lines.push_back(fmt::format("  height {:5.2f} m  [{}]  {} captures over {:.0f} degrees", z_m,
                                 parts, height.captures, deg_from_rad(height.arc_rad)));
@@ -99,7 +102,7 @@ std::vector<std::string> describe_rotation_coverage(const Unit& unit) {
 std::string describe_lamps(const Unit& unit, const UnitStep& step) {
   std::map<int, int> seen;
   for (const UnitImage* image : list_used_images(step)) {
-    for (const Detection& lamp : collect_identified_lamps(image->seen)) ++seen[lamp.lamp];
+    for (const Detection& lamp : collect_identified_lamps(image->observation)) ++seen[lamp.lamp];
   }
   std::string there, missing;
   for (const Lamp& lamp : unit.station_config().lamps.lamps) {
@@ -112,10 +115,10 @@ std::string describe_lamps(const Unit& unit, const UnitStep& step) {
 }  // namespace
 
 std::string format_step_image_count(const Unit& unit, StationStep step) {
-  const CompletionCriteria& sufficient = unit.station_config().sufficient;
-  const std::array wanted{sufficient.board_views,
-                          sufficient.turn_captures * sufficient.turn_heights,
-                          sufficient.dispersion_captures, sufficient.check_captures};
+  const CompletionCriteria& completion = unit.station_config().completion;
+  const std::array wanted{completion.board_views,
+                          completion.rotation_captures * completion.rotation_heights,
+                          completion.dispersion_captures, completion.check_captures};
   return fmt::format("{}/{}", unit.step_state(step).count_used_images(),
                      wanted[static_cast<std::size_t>(step)]);
 }
@@ -131,7 +134,7 @@ std::vector<std::string> describe_step_progress(const Unit& unit, StationStep st
 std::string describe_next_operator_action(const Unit& unit, StationStep step) {
   const UnitStep& state = unit.step_state(step);
   if (state.result && !state.result->has_succeeded()) {
-    return state.result->why + "; add images, or empty the folder of the step and repeat it";
+    return state.result->message + "; add images, or empty the folder of the step and repeat it";
   }
   switch (step) {
     case StationStep::boards:

@@ -60,7 +60,7 @@ std::vector<PositionError> compute_position_errors(std::span<const Frame> frames
   std::vector<PositionError> errors;
   for (const auto& [i, fix] : locate_by_three_lamps(frames, map, calibration)) {
     const auto entry = places.find(frames[i].image);
-    if (entry == places.end() || entry->second.place == PlaceOf::axis) continue;
+    if (entry == places.end() || entry->second.measured_point == MeasuredPoint::axis) continue;
     const Capture& place = entry->second;
     if (!place.x_m || !place.y_m) continue;
     const auto& pose = fix.estimate.pose;
@@ -112,8 +112,8 @@ std::optional<HeightErrors> compute_height_errors(const CapturesWithPositions& c
   constexpr std::size_t min_heights = 5;  // fewer make the median unreliable
   std::vector<double> errors_m, sds_m;
   for (const auto& [i, fix] : locate_by_three_lamps(captures.frames, map, calibration)) {
-    const auto place = captures.places.find(captures.frames[i].image);
-    if (place == captures.places.end() || !place->second.z_m) continue;
+    const auto place = captures.positions.find(captures.frames[i].image);
+    if (place == captures.positions.end() || !place->second.z_m) continue;
     errors_m.push_back(fix.estimate.pose.position_m.z() - *place->second.z_m);
     sds_m.push_back(std::sqrt(fix.estimate.covariance(2, 2)));
   }

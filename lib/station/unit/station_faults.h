@@ -83,7 +83,7 @@ std::string describe_contradiction_to_calibrated_lens(std::span<const Frame> fra
 /// Captures of lamps with their known heights.
 struct CapturesWithPositions {
   std::vector<Frame> frames;
-  CapturesTable places;
+  CapturesTable positions;
 };
 
 /// Describes a difference between the median height errors of two sets of captures in one line.

@@ -22,24 +22,24 @@ constexpr std::size_t kColumns = 80;
 
 /// Adds a text in lines of the screen's width, the first one with a label.
 void add_wrapped_lines(std::vector<ScreenLine>& lines, const std::string& label,
-                       const std::string& text, ScreenLineStyle tone) {
+                       const std::string& text, ScreenLineStyle style) {
   std::istringstream words(text);
   std::string line = fmt::format("{:<9}", label), word;
   const std::size_t indent = line.size();
   while (words >> word) {
     if (line.size() > indent && line.size() + 1 + word.size() > kColumns) {
-      lines.push_back({line, tone});
+      lines.push_back({line, style});
       line = std::string(indent, ' ');
     }
     line += (line.size() > indent ? " " : "") + word;
   }
-  lines.push_back({line.substr(0, kColumns), tone});
+  lines.push_back({line.substr(0, kColumns), style});
 }
 
 /// Returns a problem as lines; no line if it is empty.
 std::vector<ScreenLine> make_problem_lines(const std::string& label, const std::string& problem) {
   std::vector<ScreenLine> lines;
-  if (!problem.empty()) add_wrapped_lines(lines, label, problem, ScreenLineStyle::bad);
+  if (!problem.empty()) add_wrapped_lines(lines, label, problem, ScreenLineStyle::fail);
   return lines;
 }
 
@@ -89,7 +89,7 @@ ScreenLine make_gate_line(const CheckedMetric& metric) {
   }
   return {
       fmt::format("{:<28}{:>12}{:>14} {:<4} {}", metric.name, value, limit, metric.unit, outcome),
-      metric.has_passed_gate() ? ScreenLineStyle::plain : ScreenLineStyle::bad};
+      metric.has_passed_gate() ? ScreenLineStyle::plain : ScreenLineStyle::fail};
 }
 
 const std::array kPass{"  ####     #     ####    #### ", "  #   #   # #   #       #     ",
@@ -122,7 +122,7 @@ std::vector<ScreenLine> make_station_screen(const Unit& unit) {
   lines.push_back({steps.substr(0, kColumns)});
   if (!unit.invalid_verdict_reason().empty()) {
     add_wrapped_lines(lines, "Station", unit.invalid_verdict_reason() + "; no unit passes",
-                      ScreenLineStyle::bad);
+                      ScreenLineStyle::fail);
   }
   lines.push_back({""});
   if (!current) return lines;
@@ -133,22 +133,23 @@ std::vector<ScreenLine> make_station_screen(const Unit& unit) {
   }
   add_wrapped_lines(lines, "Next", describe_next_operator_action(unit, *current),
                     ScreenLineStyle::plain);
-  if (const auto image = state.images.find(state.last); image != state.images.end()) {
-    add_wrapped_lines(lines, "Last", image->first + ": " + describe_outcome(image->second),
-                      image->second.is_image_used() ? ScreenLineStyle::good : ScreenLineStyle::bad);
+  if (const auto image = state.images.find(state.last_image); image != state.images.end()) {
+    add_wrapped_lines(
+        lines, "Last", image->first + ": " + describe_outcome(image->second),
+        image->second.is_image_used() ? ScreenLineStyle::pass : ScreenLineStyle::fail);
   }
   for (const CheckedMetric& metric : unit.collect_unit_metrics()) {
     // Blur of all current views: a few views can be misleading.
     const bool known = metric.value && metric.name != "blur_px";
     if (known && !metric.has_passed_gate())
-      add_wrapped_lines(lines, "Fails", describe_failed_gate(metric), ScreenLineStyle::bad);
+      add_wrapped_lines(lines, "Fails", describe_failed_gate(metric), ScreenLineStyle::fail);
   }
   if (state.num_consecutive_rejections > 1) {
     add_wrapped_lines(
         lines, "Refused",
         fmt::format("{} in a row; after {} the run ends", state.num_consecutive_rejections,
                     unit.station_config().max_consecutive_rejections),
-        ScreenLineStyle::bad);
+        ScreenLineStyle::fail);
   }
   return lines;
 }
@@ -174,9 +175,9 @@ std::vector<ScreenLine> make_pending_hook_lines(const RunRecord& record) {
 }
 
 std::vector<ScreenLine> make_verdict_screen(const RunRecord& record) {
-  const std::string no_verdict = describe_verdict_problem(record);
+  const std::string no_verdict = describe_why_verdict_is_void_or_edited(record);
   const bool passed = record.has_run_passed() && no_verdict.empty();
-  const ScreenLineStyle tone = passed ? ScreenLineStyle::good : ScreenLineStyle::bad;
+  const ScreenLineStyle style = passed ? ScreenLineStyle::pass : ScreenLineStyle::fail;
   std::vector<ScreenLine> lines{
       {fmt::format("{:<28}{:>12}{:>14}", "gate", "value", "limit"), ScreenLineStyle::heading}};
   for (const CheckedMetric& metric : record.metrics) {
@@ -188,16 +189,16 @@ std::vector<ScreenLine> make_verdict_screen(const RunRecord& record) {
   std::istringstream causes(record.causes);
   if (!record.causes.empty()) lines.push_back({""});
   for (std::string cause; std::getline(causes, cause);) {
-    add_wrapped_lines(lines, "Cause", cause, ScreenLineStyle::bad);
+    add_wrapped_lines(lines, "Cause", cause, ScreenLineStyle::fail);
   }
-  if (!no_verdict.empty()) add_wrapped_lines(lines, "Cause", no_verdict, ScreenLineStyle::bad);
+  if (!no_verdict.empty()) add_wrapped_lines(lines, "Cause", no_verdict, ScreenLineStyle::fail);
   // Last, so that it is visible on a terminal of 24 lines.
   lines.push_back({""});
   const std::span<const char* const> banner = passed                        ? std::span(kPass)
                                               : record.is_verdict_invalid() ? std::span(kInvalid)
                                                                             : std::span(kFail);
   if (no_verdict.empty()) {
-    for (const char* row : banner) lines.push_back({row, tone});
+    for (const char* row : banner) lines.push_back({row, style});
   }
   lines.push_back({""});
   const std::string word = no_verdict.empty() ? record.verdict : "NO VERDICT";

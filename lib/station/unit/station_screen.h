@@ -11,12 +11,12 @@
 namespace vlp {
 
 /// Style of a line on terminals with color.
-enum class ScreenLineStyle { plain, heading, good, bad };
+enum class ScreenLineStyle { plain, heading, pass, fail };
 
 /// Line of the operator's screen: text of at most 80 ASCII characters, and style.
 struct ScreenLine {
   std::string text;
-  ScreenLineStyle tone = ScreenLineStyle::plain;
+  ScreenLineStyle style = ScreenLineStyle::plain;
 };
 
 /// Returns the operator's screen while a unit is processed: the steps, progress of the current

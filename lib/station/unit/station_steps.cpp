@@ -26,7 +26,7 @@ constexpr double kMillimetersPerMeter = 1e3;
 
 /// Prepends the failed part to the reason.
 StepResult add_step_name(const char* what, StepResult result) {
-  if (!result.has_succeeded()) result.why = fmt::format("{}: {}", what, result.why);
+  if (!result.has_succeeded()) result.message = fmt::format("{}: {}", what, result.message);
   return result;
 }
 
@@ -89,7 +89,7 @@ KnownPoints select_known_points(const std::vector<Frame>& frames, const Captures
     const auto entry = places.find(frame.image);
     if (entry == places.end() || !entry->second.x_m || !entry->second.y_m) continue;
     const Capture& place = entry->second;
-    if (place.place == PlaceOf::axis) continue;
+    if (place.measured_point == MeasuredPoint::axis) continue;
     known.frames.push_back(frame);
     known.truth.push_back({frame.image, {*place.x_m, *place.y_m}, place.z_m, place.yaw_rad});
   }
@@ -126,7 +126,7 @@ void add_position_error_metrics(const EvaluationInput& input, const Evaluation& 
   const double offset_m = sum_m.norm() / static_cast<double>(evaluation.fixes);
   result.metrics.push_back({"check_offset_mm", kMillimetersPerMeter * offset_m});
   if (const auto& height_m = evaluation.height_m) {
-    result.metrics.push_back({"check_height_mm", kMillimetersPerMeter * height_m->sizes.rms});
+    result.metrics.push_back({"check_height_mm", kMillimetersPerMeter * height_m->magnitudes.rms});
   }
 }
 
@@ -134,13 +134,13 @@ void add_position_error_metrics(const EvaluationInput& input, const Evaluation& 
 
 StepResult calibrate_lens_on_station(const StationConfig& config, const std::string& camera_id,
                                      Observations seen) {
-  LensInput input{std::move(seen), config.board, {}, config.type};
+  LensInput input{std::move(seen), config.board, {}, config.nominal_camera};
   input.camera.id = camera_id;
   LensResult result = run_lens_calibration_step(std::move(input), {});
   result.skipped.clear();  // the station reports images itself
   if (result.failure == StepFailure::wrong_board)
     return add_step_name("wrong board", std::move(result));
-  if (result.has_succeeded()) add_nominal_differences(config.type, result);
+  if (result.has_succeeded()) add_nominal_differences(config.nominal_camera, result);
   // A lens from images of two cameras fits neither of them. The operator has to remove the wrong
   // images.
   if (result.has_succeeded() && !result.lens.inconsistent_views.empty()) {
@@ -166,7 +166,7 @@ StepResult calibrate_dispersion_on_station(const StationConfig& config,
   const KnownPositions known =
       collect_captures_at_known_positions(frames, places, config.dispersion_position_m);
   std::string problem = describe_positions_problem(known.captures.size(), frames.size(),
-                                                   config.sufficient.dispersion_captures);
+                                                   config.completion.dispersion_captures);
   if (!problem.empty()) {
     StepResult result;
     result.set_step_failure(StepFailure::wrong_place, std::move(problem));
@@ -187,7 +187,7 @@ StepResult check_position_accuracy_on_station(const StationConfig& config,
   StepResult result;
   KnownPoints known = select_known_points(frames, places);
   std::string problem = describe_positions_problem(known.frames.size(), frames.size(),
-                                                   config.sufficient.check_captures);
+                                                   config.completion.check_captures);
   if (!problem.empty()) {
     result.set_step_failure(StepFailure::wrong_place, std::move(problem));
     return result;
@@ -203,13 +203,13 @@ StepResult check_position_accuracy_on_station(const StationConfig& config,
   EvaluationInput input;
   input.fixes = {"check", located.rows};
   input.truth = {"check", std::move(known.truth)};
-  input.station_m = compute_same_position_radius_m(calibration);
+  input.reference_point_radius_m = compute_same_position_radius_m(calibration);
   const EvaluateResult errors = evaluate_fixes_against_truth(input, {});
   result.drawing = [input, lamps = config.lamps] {
     return draw_fix_errors_on_floor_plan(input, lamps);
   };
   add_position_error_metrics(input, errors.evaluation, result);
-  if (const auto& typical = located.summary.typical; typical && typical->median_residual_px) {
+  if (const auto& typical = located.summary.statistics; typical && typical->median_residual_px) {
     result.metrics.push_back({"check_residual_px", *typical->median_residual_px});
   }
   return result;

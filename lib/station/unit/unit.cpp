@@ -30,7 +30,7 @@ Eigen::Matrix3d find_level_rotation(const LevelRotations& levels, const std::str
 /// Returns the use of the images of a step.
 ImageUse find_image_use(StationStep step) {
   if (step == StationStep::boards) return ImageUse::boards;
-  return step == StationStep::rotation ? ImageUse::turn : ImageUse::places;
+  return step == StationStep::rotation ? ImageUse::rotation : ImageUse::known_positions;
 }
 
 }  // namespace
@@ -40,23 +40,23 @@ Unit::Unit(const StationConfig& config, std::string camera_id, ProgramVersion pr
       camera_id_(std::move(camera_id)),
       program_(std::move(program)),
       threads_(threads),
-      boards_(config.board, config.frontend, config.type.imager_px) {}
+      boards_(config.board, config.frontend, config.nominal_camera.imager_px) {}
 
 void Unit::reread_capture_tables(StationStep step) {
   if (step != StationStep::dispersion && step != StationStep::check) return;
-  reprocess_images_of_step(step);
+  reprocess_images_with_changed_inclination(step);
   mutable_step_state(step).result.reset();
   reset_steps_after(step);
 }
 
 /// Processes the images again whose inclination changed. They are not counted again.
-void Unit::reprocess_images_of_step(StationStep step) {
+void Unit::reprocess_images_with_changed_inclination(StationStep step) {
   const LevelRotations levels = find_level_rotations_of_images(step);
   UnitStep& state = mutable_step_state(step);
   std::vector<fs::path> again;
   for (const auto& [name, image] : state.images) {
     if (!image.discarded && find_level_rotation(levels, name) != image.level)
-      again.push_back(image.seen.file);
+      again.push_back(image.observation.file);
   }
   if (again.empty() || !calibration_before_step(step)) return;
   const int refused = state.num_rejected_in_batch;
@@ -76,7 +76,7 @@ void Unit::solve_steps_in_order(bool all_in) {
   for (const StationStep step : kStationSteps) {
     UnitStep& state = mutable_step_state(step);
     if (!calibration_before_step(step)) return;
-    const auto waiting = std::exchange(state.waiting, {});
+    const auto waiting = std::exchange(state.pending_images, {});
     if (!waiting.empty()) {
       process_image_files(step, waiting);
       count_consecutive_rejections(step);
@@ -85,7 +85,7 @@ void Unit::solve_steps_in_order(bool all_in) {
     state.sufficient = has_sufficient_images(step);
     if (!state.sufficient && !all_in) return;
     state.result = solve_station_step(step, all_in);
-    state.picture = state.result->drawing ? render_plot_async(state.result->drawing) : StepPlot{};
+    state.plot = state.result->drawing ? render_plot_async(state.result->drawing) : StepPlot{};
     if (!state.result->has_succeeded()) return;
   }
 }
@@ -107,8 +107,8 @@ std::optional<StationStep> Unit::first_incomplete_step() const {
 std::vector<ReportPlot> Unit::collect_report_plots() const {
   std::vector<ReportPlot> pictures;
   for (const UnitStep& state : steps_) {
-    if (!state.result || !state.picture.valid()) continue;
-    if (const auto& picture = state.picture.get()) pictures.push_back(*picture);
+    if (!state.result || !state.plot.valid()) continue;
+    if (const auto& picture = state.plot.get()) pictures.push_back(*picture);
   }
   return pictures;
 }
@@ -132,7 +132,7 @@ void Unit::add_step_images(StationStep step, const std::vector<fs::path>& files,
   if (files.empty()) return;
   state.folder = files.front().parent_path();
   if (!calibration_before_step(step)) {
-    state.waiting.insert(state.waiting.end(), files.begin(), files.end());
+    state.pending_images.insert(state.pending_images.end(), files.begin(), files.end());
     return;
   }
   process_image_files(step, files);
@@ -168,28 +168,29 @@ void Unit::process_image_files(StationStep step, const std::vector<fs::path>& fi
   if (step != StationStep::boards) {
     lamps.emplace(
         LightDetector(config_.lamps, make_detector_camera(*calibration_before_step(step))),
-        find_image_use(step), config_.frontend, config_.type.imager_px, levels);
+        find_image_use(step), config_.frontend, config_.nominal_camera.imager_px, levels);
   }
   process_images_in_parallel(files.size(), threads_, [&](std::size_t i) {
     images[i] = observe_unit_image(files[i], [&](const SourceImage& source) {
       return lamps ? lamps->detect_lamps_in_image(source) : boards_.detect_board_in_image(source);
     });
-    images[i].level = find_level_rotation(levels, images[i].seen.image_file_name());
+    images[i].level = find_level_rotation(levels, images[i].observation.image_file_name());
   });
   for (UnitImage& image : images) {
     const ImageUser owner = owner_ && !image.sha256.empty() ? owner_(image.sha256) : ImageUser();
     if (!owner.has_no_run()) {
-      image.seen.set_image_rejection(RejectionReason::used_elsewhere,
-                                     "already of " + describe_run_using_image(owner, config_.file));
+      image.observation.set_image_rejection(
+          RejectionReason::used_elsewhere,
+          "already of " + describe_run_using_image(owner, config_.file));
     }
-    mutable_step_state(step).last = image.seen.image_file_name();
+    mutable_step_state(step).last_image = image.observation.image_file_name();
     add_image_to_step(step, std::move(image));
   }
 }
 
 void Unit::add_image_to_step(StationStep step, UnitImage image) {
   UnitStep& state = mutable_step_state(step);
-  const std::string name = image.seen.image_file_name();
+  const std::string name = image.observation.image_file_name();
   remove_image_from_step(step, name);  // it was overwritten
   if (image.is_image_used()) reject_image_if_redundant(step, image);
   const bool used = image.is_image_used();
@@ -208,16 +209,18 @@ void Unit::reject_image_if_redundant(StationStep step, UnitImage& image) const {
   for (const UnitStep& any : steps_) {
     for (const UnitImage* other : list_used_images(any)) {
       if (image.sha256.empty() || other->sha256 != image.sha256) continue;
-      return image.seen.set_image_rejection(
-          RejectionReason::same_image, "is the same image as " + other->seen.image_file_name());
+      return image.observation.set_image_rejection(
+          RejectionReason::same_image,
+          "is the same image as " + other->observation.image_file_name());
     }
   }
   Selection selection(find_image_use(step), config_.frontend);
   for (const UnitImage* other : list_used_images(this->step_state(step)))
-    selection.add_kept_image(other->seen);
-  selection.add_or_reject_image(image.seen);
+    selection.add_kept_image(other->observation);
+  selection.add_or_reject_image(image.observation);
   if (!image.is_image_used() || !this->step_state(step).is_step_solved()) return;
-  image.seen.set_image_rejection(RejectionReason::not_needed, "not needed: the step has enough");
+  image.observation.set_image_rejection(RejectionReason::not_needed,
+                                        "not needed: the step has enough");
 }
 
 /// Removes an image and the results that depend on it. Images that were redundant because of it are
@@ -237,14 +240,15 @@ void Unit::remove_image_from_step(StationStep step, const std::string& name) {
   }
   std::erase_if(state.images, [](const auto& known) { return known.second.is_image_redundant(); });
   for (UnitImage& known : again) {
-    known.seen.rejection.reset();
+    known.observation.rejection.reset();
     add_image_to_step(step, std::move(known));
   }
 }
 
 void Unit::remove_deleted_image(StationStep step, const std::string& name) {
   UnitStep& state = mutable_step_state(step);
-  std::erase_if(state.waiting, [&](const fs::path& file) { return file.filename() == name; });
+  std::erase_if(state.pending_images,
+                [&](const fs::path& file) { return file.filename() == name; });
   if (state.images.contains(name)) state.num_consecutive_rejections = 0;
   remove_image_from_step(step, name);
 }
@@ -267,7 +271,7 @@ void Unit::reset_steps_after(StationStep step) {
     if (later <= step) continue;
     UnitStep& state = mutable_step_state(later);
     for (const auto& [name, image] : state.images) {
-      if (!image.discarded) state.waiting.push_back(image.seen.file);
+      if (!image.discarded) state.pending_images.push_back(image.observation.file);
     }
     std::erase_if(state.images, [](const auto& image) { return !image.second.discarded; });
     state.result.reset();
@@ -277,20 +281,20 @@ void Unit::reset_steps_after(StationStep step) {
 
 bool Unit::has_sufficient_images(StationStep step) const {
   const UnitStep& state = this->step_state(step);
-  const CompletionCriteria& sufficient = config_.sufficient;
+  const CompletionCriteria& completion = config_.completion;
   switch (step) {
     case StationStep::boards:
-      return state.count_used_images() >= sufficient.board_views &&
-             compute_board_coverage(state, config_.type.imager_px).covered_image_fraction() >=
-                 sufficient.board_coverage;
+      return state.count_used_images() >= completion.board_views &&
+             compute_board_coverage(state, config_.nominal_camera.imager_px)
+                     .covered_image_fraction() >= completion.board_coverage;
     case StationStep::rotation:
       return compute_yaw_coverage(collect_frames_of_used_images(state), config_,
                                   *calibration_before_step(step))
           .sufficient;
     case StationStep::dispersion:
-      return state.count_used_images() >= sufficient.dispersion_captures;
+      return state.count_used_images() >= completion.dispersion_captures;
     case StationStep::check:
-      return state.count_used_images() >= sufficient.check_captures;
+      return state.count_used_images() >= completion.check_captures;
   }
   return false;
 }
@@ -359,7 +363,7 @@ std::vector<Observation> collect_lamp_observations(const Unit& unit) {
 }
 
 GivenRowTime make_configured_row_time(const StationConfig& config) {
-  return {config.type.row_time_s.value(), config.type_file};
+  return {config.nominal_camera.row_time_s.value(), config.type_file};
 }
 
 std::optional<Calibration> Unit::latest_calibration() const {

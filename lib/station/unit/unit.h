@@ -59,15 +59,15 @@ class Unit {
   void set_image_owner_lookup(std::function<ImageUser(const std::string& sha256)> owner) {
     owner_ = std::move(owner);
   }
-  /// Ends an incomplete unit: no more images arrive. `why` is human-readable, as "the operator
+  /// Ends an incomplete unit: no more images arrive. `reason` is human-readable, as "the operator
   /// ended the run".
-  void end_unit_before_completion(std::string why) { ended_ = std::move(why); }
+  void end_unit_before_completion(std::string reason) { ended_ = std::move(reason); }
   /// The reason given to end_unit_before_completion(); empty if the unit was not ended early.
   const std::string& early_end_reason() const { return ended_; }
 
-  /// Makes the verdict of this unit not count, because of the station. `why`, human-readable,
+  /// Makes the verdict of this unit not count, because of the station. `reason`, human-readable,
   /// becomes the first of its causes; empty if the verdict counts.
-  void invalidate_verdict(std::string why) { invalid_reason_ = std::move(why); }
+  void invalidate_verdict(std::string reason) { invalid_reason_ = std::move(reason); }
   const std::string& invalid_verdict_reason() const { return invalid_reason_; }
 
   const UnitStep& step_state(StationStep step) const { return steps_[step_index(step)]; }
@@ -96,7 +96,7 @@ class Unit {
   void solve_steps_in_order(bool all_in);
   void process_image_files(StationStep step, const std::vector<std::filesystem::path>& files);
   LevelRotations find_level_rotations_of_images(StationStep step) const;
-  void reprocess_images_of_step(StationStep step);
+  void reprocess_images_with_changed_inclination(StationStep step);
   void add_image_to_step(StationStep step, UnitImage image);
   void count_consecutive_rejections(StationStep step);
   void reject_image_if_redundant(StationStep step, UnitImage& image) const;

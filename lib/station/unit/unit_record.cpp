@@ -42,16 +42,16 @@ struct RejectionSummary {
 
 /// Returns the minimum number of images for a fault of the camera; fewer can be accidental.
 int min_images_to_blame_camera(const StationConfig& config) {
-  return std::min(config.max_consecutive_rejections, (config.sufficient.board_views + 1) / 2);
+  return std::min(config.max_consecutive_rejections, (config.completion.board_views + 1) / 2);
 }
 
 RejectionSummary summarize_refusals(const UnitStep& state, const StationConfig& config) {
   std::vector<Observation> rejected;
   for (const auto& [name, image] : state.images) {
-    if (image.is_image_used() || image.seen.rejection->reason == RejectionReason::not_needed)
+    if (image.is_image_used() || image.observation.rejection->reason == RejectionReason::not_needed)
       continue;
-    rejected.push_back({image.seen.file});
-    rejected.back().rejection = image.seen.rejection;
+    rejected.push_back({image.observation.file});
+    rejected.back().rejection = image.observation.rejection;
   }
   if (rejected.empty() || std::cmp_less(rejected.size(), state.count_used_images())) return {};
   const auto blurred = std::ranges::count_if(rejected, [](const Observation& image) {
@@ -75,7 +75,8 @@ std::vector<Cause> find_step_problems(const Unit& unit, StationStep step) {
   }
   const bool failed =
       state.result && !state.result->has_succeeded() && state.count_used_images() > 0;
-  if (failed) causes.push_back({fmt::format("{}: {}", station_step_name(step), state.result->why)});
+  if (failed)
+    causes.push_back({fmt::format("{}: {}", station_step_name(step), state.result->message)});
   const bool is_explained = failed || !refused.text.empty();
   if (state.sufficient || (is_explained && unit.early_end_reason().empty())) return causes;
   // [STATION-16] `before there was`, `too much alike` | INVALID: step ended, or images refused, too
@@ -115,7 +116,7 @@ std::vector<Cause> find_step_causes(const Unit& unit, StationStep step,
     append_causes(causes, describe_failures(metrics, of_camera, [&](const CheckedMetric& metric) {
                     return find_metric_value(state.result->metrics, metric.name) &&
                            !metric.has_passed_gate() &&
-                           find_metric_kind(metric.name)->of_camera == of_camera;
+                           find_metric_kind(metric.name)->is_camera_property == of_camera;
                   }));
   }
   return causes;
@@ -124,8 +125,8 @@ std::vector<Cause> find_step_causes(const Unit& unit, StationStep step,
 /// Returns true if most of the board images show another board.
 bool is_other_board(const UnitStep& boards) {
   const auto other = std::ranges::count_if(boards.images, [](const auto& entry) {
-    const auto& board = entry.second.seen.board;
-    return board && !board->seen.foreign.empty();
+    const auto& board = entry.second.observation.board;
+    return board && !board->detection.foreign_tags.empty();
   });
   return 2 * other > static_cast<std::ptrdiff_t>(boards.images.size());
 }
@@ -133,7 +134,7 @@ bool is_other_board(const UnitStep& boards) {
 /// Returns true if there are enough views to distinguish blur from a shaky hand.
 bool is_blur_known(const UnitStep& boards, const StationConfig& config) {
   return boards.sufficient || std::ranges::count_if(boards.images, [](const auto& entry) {
-                                return entry.second.seen.blur_px.has_value();
+                                return entry.second.observation.blur_px.has_value();
                               }) >= min_images_to_blame_camera(config);
 }
 
@@ -173,11 +174,11 @@ std::vector<Cause> find_check_faults(const Unit& unit, const Calibration& calibr
                                        read_captures_with_truth(check.folder)};
   // A common offset is no fault of single captures; one that rotates is a fault of the camera.
   const auto offset =
-      find_common_position_offset(captures.frames, lamps, calibration, captures.places);
+      find_common_position_offset(captures.frames, lamps, calibration, captures.positions);
   if (offset && !offset->in_camera) return {{describe_common_position_offset(*offset)}};
   if (!offset) {
     std::string fault =
-        describe_wrong_reference_positions(captures.frames, lamps, calibration, captures.places);
+        describe_wrong_reference_positions(captures.frames, lamps, calibration, captures.positions);
     if (!fault.empty()) return {{std::move(fault)}};
   }
   const UnitStep& dispersion = unit.step_state(StationStep::dispersion);
@@ -229,7 +230,8 @@ std::vector<Cause> find_station_faults(const Unit& unit) {
 
 RunRecord make_unit_run_record(const Unit& unit, const std::string& run,
                                const ProgramVersion& program) {
-  RunRecord record = make_run_record("unit", unit.station_config(), unit.camera_id(), run, program);
+  RunRecord record =
+      make_common_run_record("unit", unit.station_config(), unit.camera_id(), run, program);
   if (const auto calibration = unit.latest_calibration()) {
     record.calibration = format_calibration_yaml(*calibration);
   }
@@ -242,14 +244,14 @@ RunRecord make_unit_run_record(const Unit& unit, const std::string& run,
       record.images.push_back({.step = station_step_name(step),
                                .name = name,
                                .sha256 = image.sha256,
-                               .refused = std::move(refused)});
+                               .rejection = std::move(refused)});
     }
-    for (const auto& file : unit.step_state(step).waiting) {
+    for (const auto& file : unit.step_state(step).pending_images) {
       // [STATION-16] `not looked at:`
       record.images.push_back({.step = station_step_name(step),
                                .name = file.filename().string(),
                                .sha256 = compute_file_sha256(file),
-                               .refused = "not looked at: a step before is not done"});
+                               .rejection = "not looked at: a step before is not done"});
     }
   }
   return record;

@@ -21,10 +21,11 @@ UnitImage observe_unit_image(const std::filesystem::path& file,
   UnitImage image;
   try {
     image.sha256 = compute_file_sha256(file);
-    image.seen = observe(SourceImage(file));
+    image.observation = observe(SourceImage(file));
   } catch (const InputError&) {
-    image.seen = {file};
-    image.seen.set_image_rejection(RejectionReason::unreadable, "cannot be read as an image");
+    image.observation = {file};
+    image.observation.set_image_rejection(RejectionReason::unreadable,
+                                          "cannot be read as an image");
   }
   return image;
 }
@@ -36,14 +37,15 @@ int UnitStep::count_used_images() const {
 
 Observations collect_step_observations(const UnitStep& step) {
   Observations seen;
-  for (const auto& [name, image] : step.images) seen.images.push_back(image.seen);
+  for (const auto& [name, image] : step.images) seen.images.push_back(image.observation);
   return seen;
 }
 
 std::vector<Frame> collect_frames_of_used_images(const UnitStep& step) {
   std::vector<Frame> frames;
   for (const UnitImage* image : list_used_images(step)) {
-    frames.push_back({image->seen.image_file_name(), collect_identified_lamps(image->seen)});
+    frames.push_back(
+        {image->observation.image_file_name(), collect_identified_lamps(image->observation)});
   }
   return frames;
 }
@@ -59,8 +61,9 @@ std::vector<const UnitImage*> list_used_images(const UnitStep& step) {
 ImageCoverage compute_board_coverage(const UnitStep& step, const std::array<int, 2>& imager_px) {
   ImageCoverage coverage(imager_px);
   for (const UnitImage* image : list_used_images(step)) {
-    if (!image->seen.board) continue;
-    for (const PointDetection& corner : collect_detected_corners(image->seen.board->seen))
+    if (!image->observation.board) continue;
+    for (const PointDetection& corner :
+         collect_detected_corners(image->observation.board->detection))
       coverage.add_corner_pixel(corner.pixel);
   }
   return coverage;
@@ -99,7 +102,7 @@ std::vector<LocatedFrame> locate_camera_in_frames(const std::vector<Frame>& fram
 YawCoverage compute_yaw_coverage(const std::vector<Frame>& frames, const StationConfig& config,
                                  const Calibration& calibration) {
   constexpr double same_height = 0.06;  // find_in_place_rotation_captures() decides
-  const auto parts = static_cast<std::size_t>(config.sufficient.turn_captures);
+  const auto parts = static_cast<std::size_t>(config.completion.rotation_captures);
   const auto located = locate_camera_in_frames(frames, config, calibration);
   YawCoverage map;
   for (std::size_t begin = 0, end = 0; begin < located.size(); begin = end) {
@@ -120,12 +123,12 @@ YawCoverage compute_yaw_coverage(const std::vector<Frame>& frames, const Station
     }
     height.captures = static_cast<int>(yaws_rad.size());
     height.arc_rad = compute_angular_range(yaws_rad);
-    height.is_complete = height.captures >= config.sufficient.turn_captures &&
-                         height.arc_rad >= config.sufficient.turn_arc_rad;
+    height.is_complete = height.captures >= config.completion.rotation_captures &&
+                         height.arc_rad >= config.completion.rotation_arc_rad;
     map.heights.push_back(std::move(height));
   }
   map.sufficient = std::ranges::count_if(map.heights, &YawCoverage::Height::is_complete) >=
-                   config.sufficient.turn_heights;
+                   config.completion.rotation_heights;
   return map;
 }
 
@@ -133,7 +136,7 @@ std::optional<double> compute_median_blur_px(const UnitStep& boards) {
   std::vector<double> blurs_px;
   for (const auto& [name, image] : boards.images) {
     const bool counts = image.is_image_used() || !boards.sufficient;
-    if (counts && image.seen.blur_px) blurs_px.push_back(*image.seen.blur_px);
+    if (counts && image.observation.blur_px) blurs_px.push_back(*image.observation.blur_px);
   }
   if (blurs_px.empty()) return std::nullopt;
   return upper_median(std::move(blurs_px));

@@ -44,20 +44,22 @@ StepPlot render_plot_async(std::function<Drawing()> drawing);
 
 /// Image of a unit, with its observation.
 struct UnitImage {
-  Observation seen;
+  Observation observation;
   std::string sha256;
   /// The file no longer exists: a frame of a camera or a video that was rejected.
   bool discarded = false;
   /// Rotation level_from_camera with which the lamps were detected; zero for the calibrated one.
   Eigen::Matrix3d level = Eigen::Matrix3d::Zero();
 
-  bool is_image_used() const { return seen.is_image_kept(); }
+  bool is_image_used() const { return observation.is_image_kept(); }
   /// Returns true for an image without a fault that is redundant because of others.
   bool is_image_redundant() const {
-    return !is_image_used() && vlp::is_redundancy_rejection(seen.rejection->reason);
+    return !is_image_used() && vlp::is_redundancy_rejection(observation.rejection->reason);
   }
   /// Reason for the rejection, in one line; empty if the image is used.
-  std::string rejection_message() const { return is_image_used() ? "" : seen.rejection->message; }
+  std::string rejection_message() const {
+    return is_image_used() ? "" : observation.rejection->message;
+  }
 };
 
 /// Observes an image file by `observe`, the intake of a step. A file that cannot be read is
@@ -72,20 +74,20 @@ struct UnitStep {
   /// Images, by name.
   std::map<std::string, UnitImage> images = {};
   /// Images that wait for the previous step.
-  std::vector<std::filesystem::path> waiting = {};
+  std::vector<std::filesystem::path> pending_images = {};
   /// True if the images meet the station's completion criterion for this step.
   bool sufficient = false;
   /// Result of the step, once it was solved; std::nullopt before.
   std::optional<StepResult> result = {};
   /// Plot of the result, if it has one.
-  StepPlot picture = {};
+  StepPlot plot = {};
   /// Number of consecutive rejected images at the end.
   int num_consecutive_rejections = 0;
   /// Number of rejected images of an incomplete batch.
   int num_rejected_in_batch = 0;
   bool is_any_used_in_batch = false;
   /// Name of the last image that was processed.
-  std::string last = {};
+  std::string last_image = {};
 
   bool is_step_solved() const { return sufficient && result && result->has_succeeded(); }
   int count_used_images() const;
@@ -107,9 +109,9 @@ struct YawCoverage {
     double z_m;
     int captures;
     double arc_rad;
-    /// Yaw sectors with at least one capture at this height: `turn_captures` sectors of equal size
-    /// over the full rotation, in order of increasing yaw. The first one is centered at the yaw of
-    /// the first capture.
+    /// Yaw sectors with at least one capture at this height: `rotation_captures` sectors of equal
+    /// size over the full rotation, in order of increasing yaw. The first one is centered at the
+    /// yaw of the first capture.
     std::vector<bool> parts;
     /// True if captures and angular range meet the station's criteria.
     bool is_complete = false;

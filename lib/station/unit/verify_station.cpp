@@ -28,12 +28,12 @@ namespace fs = std::filesystem;
 class Verification {
  public:
   Verification(const StationConfig& config, const fs::path& folder, int threads)
-      : config_(config), golden_(*config.golden), folder_(folder), threads_(threads) {
-    config_.type = golden_.calibration.camera;
+      : config_(config), golden_(*config.golden_unit), folder_(folder), threads_(threads) {
+    config_.nominal_camera = golden_.calibration.camera;
   }
 
   void check_golden_boards() {
-    const BoardIntake intake(config_.board, config_.frontend, config_.type.imager_px);
+    const BoardIntake intake(config_.board, config_.frontend, config_.nominal_camera.imager_px);
     const UnitStep step = observe_folder(
         folder_ / "boards", ImageUse::boards,
         [&](const SourceImage& image) { return intake.detect_board_in_image(image); });
@@ -46,12 +46,13 @@ class Verification {
   void check_golden_lamp_captures(StationStep station_step) {
     const fs::path folder = folder_ / station_step_name(station_step);
     const LampIntake intake(LightDetector(config_.lamps, make_detector_camera(golden_.calibration)),
-                            ImageUse::places, config_.frontend, config_.type.imager_px,
+                            ImageUse::known_positions, config_.frontend,
+                            config_.nominal_camera.imager_px,
                             compute_level_rotations_of_images(read_captures_csv_of_folder(folder),
                                                               golden_.calibration, 0));
-    const UnitStep step = observe_folder(folder, ImageUse::places, [&](const SourceImage& image) {
-      return intake.detect_lamps_in_image(image);
-    });
+    const UnitStep step = observe_folder(
+        folder, ImageUse::known_positions,
+        [&](const SourceImage& image) { return intake.detect_lamps_in_image(image); });
     std::ranges::move(collect_step_observations(step).images, std::back_inserter(lamp_images_));
     const auto frames = collect_frames_of_used_images(step);
     frames_.insert(frames_.end(), frames.begin(), frames.end());
@@ -71,10 +72,11 @@ class Verification {
   }
 
   RunRecord make_verification_record(const std::string& run, const ProgramVersion& program) {
-    const GivenRowTime stated{*config_.type.row_time_s, "the calibration of the golden unit"};
+    const GivenRowTime stated{*config_.nominal_camera.row_time_s,
+                              "the calibration of the golden unit"};
     const RowTimeCheck row_time = check_row_time_against_lamps(lamp_images_, config_.lamps, stated);
     for (const Metric& metric : make_row_time_metrics(row_time)) values_.push_back(metric);
-    RunRecord record = make_run_record("golden", config_, golden_.camera_id, run, program);
+    RunRecord record = make_common_run_record("golden", config_, golden_.camera_id, run, program);
     record.metrics = check_all_metrics_against_gates(golden_.gates, values_, list_unit_metrics());
     record.images = images_;
     for (const CheckedMetric& metric : record.metrics) {
@@ -137,8 +139,8 @@ class Verification {
     step.folder = folder;
     Selection selection(use, config_.frontend);
     for (UnitImage& image : images) {
-      selection.add_or_reject_image(image.seen);
-      std::string name = image.seen.image_file_name();
+      selection.add_or_reject_image(image.observation);
+      std::string name = image.observation.image_file_name();
       step.images.emplace(std::move(name), std::move(image));
     }
     return step;
@@ -147,7 +149,7 @@ class Verification {
     if (!result.has_succeeded()) {
       const bool is_station_fault =
           result.failure == StepFailure::wrong_board || result.failure == StepFailure::wrong_map;
-      causes_.push_back({fmt::format("{}: {}", step, result.why), is_station_fault});
+      causes_.push_back({fmt::format("{}: {}", step, result.message), is_station_fault});
     }
     values_.insert(values_.end(), result.metrics.begin(), result.metrics.end());
     if (result.drawing) plots_.push_back(render_plot_async(result.drawing));
@@ -157,7 +159,7 @@ class Verification {
       images_.push_back({.step = station_step_name(station_step),
                          .name = name,
                          .sha256 = image.sha256,
-                         .refused = image.rejection_message()});
+                         .rejection = image.rejection_message()});
     }
   }
 
@@ -193,7 +195,7 @@ void invalidate_run_if_images_reused(
     RunRecord& record,
     const std::function<std::string(const std::string& sha256)>& find_golden_run_using_image) {
   for (const RunRecord::Image& image : record.images) {
-    if (!image.refused.empty()) continue;
+    if (!image.rejection.empty()) continue;
     const std::string run = find_golden_run_using_image(image.sha256);
     if (run.empty()) continue;
     record.invalidate_verdict(fmt::format("image {}/{} was used in golden run {}: measure it again",

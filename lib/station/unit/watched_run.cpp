@@ -106,8 +106,8 @@ void WatchedRun::start_or_continue_run(Spool& spool) {
   rename_finished_run_folder();
 }
 
-std::vector<WatchedRun::Arrival> WatchedRun::process_folder_changes(std::size_t max_images) {
-  std::vector<Arrival> arrivals;
+std::vector<WatchedRun::ImageChange> WatchedRun::process_folder_changes(std::size_t max_images) {
+  std::vector<ImageChange> arrivals;
   bool reread = false;
   for (const StationStep step : kStationSteps) {
     auto& [folder, images, waiting, known_tables] = steps_[static_cast<std::size_t>(step)];
@@ -118,7 +118,7 @@ std::vector<WatchedRun::Arrival> WatchedRun::process_folder_changes(std::size_t 
       reread = true;
     }
     const auto changes = images.poll_folder_changes();
-    for (const std::string& name : changes.gone) {
+    for (const std::string& name : changes.removed) {
       std::erase_if(waiting, [&](const fs::path& file) { return file.filename() == name; });
       unit_.remove_deleted_image(step, name);
       arrivals.push_back({step, name, true});
@@ -186,7 +186,7 @@ WatchedFolder::Changes WatchedFolder::poll_folder_changes() {
     file.is_reported = same;
   }
   for (const auto& [name, file] : files_) {
-    if (!now.contains(name)) changes.gone.push_back(name);
+    if (!now.contains(name)) changes.removed.push_back(name);
   }
   files_ = std::move(now);
   return changes;

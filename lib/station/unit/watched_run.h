@@ -26,7 +26,7 @@ class WatchedFolder {
     /// overwritten is new again.
     std::vector<std::filesystem::path> added;
     /// Names of the images that were deleted since the last call.
-    std::vector<std::string> gone;
+    std::vector<std::string> removed;
   };
   /// Returns the changes since the last call. An image is new if file, size and time are the same
   /// in two successive calls, so that it is no longer being written. Ignores names that begin with
@@ -74,14 +74,14 @@ class WatchedRun {
   /// published and moved away, and no images are left to process.
   const std::optional<RunRecord>& finished_run_record() const { return finished_; }
 
-  struct Arrival {
+  struct ImageChange {
     StationStep step;
     std::string image;
-    bool gone;
+    bool is_removed;
   };
   /// Processes changes, at most `max_images` images, and solves the steps that are complete.
   /// Returns the changes.
-  std::vector<Arrival> process_folder_changes(std::size_t max_images);
+  std::vector<ImageChange> process_folder_changes(std::size_t max_images);
 
   /// Deletes the file of a rejected image; its rejection remains (Unit::mark_image_discarded()).
   /// Throws InputError if it cannot be deleted.

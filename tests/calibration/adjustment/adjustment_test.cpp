@@ -15,7 +15,7 @@ using testing::HasSubstr;
 std::vector<int> moved_lamps(const AdjustmentResult& result) {
   std::vector<int> ids;
   for (const auto& lamp : result.lamps) {
-    if (lamp.moved) ids.push_back(lamp.id);
+    if (lamp.is_moved) ids.push_back(lamp.id);
   }
   return ids;
 }
@@ -30,11 +30,11 @@ TEST(RunBundleAdjustment, RecoversZenithLeverArmAndLampsExactlyWithoutNoise) {
   EXPECT_THAT(found.center.zenith_in_camera,
               IsNear(survey.truth.calibration.rotation_center->zenith_in_camera, 1e-9));
   ASSERT_TRUE(found.center.lever_arm_m);
-  ASSERT_EQ(found.refined.lamps.size(), 8U);
+  ASSERT_EQ(found.refined_map.lamps.size(), 8U);
   ASSERT_EQ(found.lamps.size(), 8U);
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-9));
   for (std::size_t i = 0; i < 8; ++i) {
-    EXPECT_THAT(survey.misplaced(i, found.refined), IsNear(Eigen::Vector3d(0, 0, 0), 1e-9));
+    EXPECT_THAT(survey.misplaced(i, found.refined_map), IsNear(Eigen::Vector3d(0, 0, 0), 1e-9));
   }
   EXPECT_LT(found.residual_px, 1e-8);
   EXPECT_EQ(found.noise_scale, 1);
@@ -49,14 +49,14 @@ TEST(RunBundleAdjustment, ReducesMapErrorsOfMillimetersOrCentimetersToSubmillime
     survey.add_noise(random, true, true, true);
     const AdjustmentResult found = run_bundle_adjustment(survey.input);
     ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
-    ASSERT_EQ(found.refined.lamps.size(), 8U);
+    ASSERT_EQ(found.refined_map.lamps.size(), 8U);
     ASSERT_EQ(found.lamps.size(), 8U);
     double worst_xy_m = 0, worst_z_m = 0;
     for (std::size_t i = 0; i < 8; ++i) {
-      const Eigen::Vector3d error_m = survey.misplaced(i, found.refined);
+      const Eigen::Vector3d error_m = survey.misplaced(i, found.refined_map);
       worst_xy_m = std::max(worst_xy_m, error_m.head<2>().norm());
       worst_z_m = std::max(worst_z_m, std::abs(error_m.z()));
-      EXPECT_NEAR(found.refined.lamps[i].sd_m.value(), 1e-4, 1e-4);
+      EXPECT_NEAR(found.refined_map.lamps[i].sd_m.value(), 1e-4, 1e-4);
     }
     RecordProperty("xy_um", static_cast<int>(1e6 * worst_xy_m));
     EXPECT_LT(worst_xy_m, 2.5e-4) << sd_m;
@@ -75,7 +75,7 @@ TEST(RunBundleAdjustment, ReportsAndRelocatesOnlyLampMovedByCentimeters) {
     const AdjustmentResult found = run_bundle_adjustment(survey.input);
     ASSERT_TRUE(found.has_succeeded());
     EXPECT_EQ(moved_lamps(found), std::vector<int>{2});
-    EXPECT_THAT(survey.misplaced(1, found.refined), IsNear(Eigen::Vector3d(0, 0, 0), 5e-4));
+    EXPECT_THAT(survey.misplaced(1, found.refined_map), IsNear(Eigen::Vector3d(0, 0, 0), 5e-4));
   }
 }
 
@@ -92,7 +92,7 @@ TEST(RunBundleAdjustment, ReportsAndRelocatesAnyLampMovedByThreeMillimeters) {
     const AdjustmentResult found = run_bundle_adjustment(survey.input);
     ASSERT_TRUE(found.has_succeeded());
     EXPECT_EQ(moved_lamps(found), std::vector<int>{static_cast<int>(moved) + 1});
-    EXPECT_THAT(survey.misplaced(moved, found.refined), IsNear(Eigen::Vector3d(0, 0, 0), 5e-4));
+    EXPECT_THAT(survey.misplaced(moved, found.refined_map), IsNear(Eigen::Vector3d(0, 0, 0), 5e-4));
   }
 }
 
@@ -103,11 +103,11 @@ TEST(RunBundleAdjustment, RecoversAllLampsExactlyWhenOneIsMoved) {
   survey.input.lamps.lamps[4].position_m += Eigen::Vector3d(0.02, -0.02, 0);
   const AdjustmentResult found = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
-  ASSERT_EQ(found.refined.lamps.size(), 8U);
+  ASSERT_EQ(found.refined_map.lamps.size(), 8U);
   EXPECT_EQ(moved_lamps(found), std::vector<int>{5});
   // Without the survey of the moved lamp, the other lamps are exact.
   for (std::size_t i = 0; i < 8; ++i) {
-    EXPECT_THAT(survey.misplaced(i, found.refined), IsNear(Eigen::Vector3d(0, 0, 0), 1e-7));
+    EXPECT_THAT(survey.misplaced(i, found.refined_map), IsNear(Eigen::Vector3d(0, 0, 0), 1e-7));
   }
   EXPECT_THAT(found.notes, testing::Contains(HasSubstr("0 known positions")));
 }
@@ -128,13 +128,14 @@ TEST(RunBundleAdjustment, MarksOnlyKnownPositionWithTwoCentimeterErrorAsWrong) {
   Survey survey;
   survey.five_places(1e-4);
   for (auto& capture : survey.input.captures) {
-    if (capture.spot == "spot-24") capture.place->xy_m.x() += 0.02;
+    if (capture.pivot == "spot-24") capture.known_position->xy_m.x() += 0.02;
   }
   const AdjustmentResult found = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(found.has_succeeded());
-  ASSERT_EQ(found.places.size(), 5U);
-  for (const auto& place : found.places) EXPECT_EQ(place.wrong, place.name == "spot-24");
-  EXPECT_THAT(found.places[2].residual_m, IsNear(Eigen::Vector3d(-0.02, 0, 0), 1e-6));
+  ASSERT_EQ(found.known_positions.size(), 5U);
+  for (const auto& place : found.known_positions)
+    EXPECT_EQ(place.is_outlier, place.name == "spot-24");
+  EXPECT_THAT(found.known_positions[2].residual_m, IsNear(Eigen::Vector3d(-0.02, 0, 0), 1e-6));
 }
 
 TEST(RunBundleAdjustment, ReportsContradictedLensWhenFocalLengthErrorExceedsCovariance) {
@@ -146,12 +147,12 @@ TEST(RunBundleAdjustment, ReportsContradictedLensWhenFocalLengthErrorExceedsCova
   survey.five_places(1e-4);
   const AdjustmentResult right = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(right.has_succeeded());
-  EXPECT_FALSE(right.lens_contradicted);
+  EXPECT_FALSE(right.lens_is_contradicted);
   EXPECT_LT(right.lens_chi_squared, 1e-3);
   camera.intrinsics[0] += 30 * std::sqrt(covariance(0, 0));
   const AdjustmentResult wrong = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(wrong.has_succeeded());
-  EXPECT_TRUE(wrong.lens_contradicted)
+  EXPECT_TRUE(wrong.lens_is_contradicted)
       << wrong.lens_chi_squared << " of " << wrong.lens_degrees_of_freedom;
 }
 
@@ -187,7 +188,7 @@ TEST(RunBundleAdjustment, RecoversFocalLengthsAndPrincipalPointFromWrongInitialL
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   ASSERT_TRUE(found.center.lever_arm_m);
   ASSERT_EQ(found.lamps.size(), 8U);
-  EXPECT_FALSE(found.lens_contradicted);
+  EXPECT_FALSE(found.lens_is_contradicted);
   EXPECT_TRUE(moved_lamps(found).empty());
   EXPECT_LT(found.residual_px, 1.1 * survey.sigma_px);
   for (std::size_t i = 0; i < 4; ++i) {

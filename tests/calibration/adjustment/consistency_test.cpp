@@ -41,7 +41,7 @@ Unit calibrated(Survey& survey, const Case& the, Random& random) {
   survey.add_noise(random, true, true, true);
   const AdjustmentResult found = run_bundle_adjustment(survey.input);
   EXPECT_TRUE(found.has_succeeded()) << found.undetermined;
-  const LampMap map = the.refined ? found.refined : survey.input.lamps;
+  const LampMap map = the.refined ? found.refined_map : survey.input.lamps;
   Adjustment adjustment{{},
                         the.refined ? found.refined_covariance : found.surveyed_covariance,
                         {"made up"},

@@ -25,7 +25,8 @@ Survey small_survey(double map_sd_m, bool lens, Random& random) {
   survey.turn({-0.4, -0.2, 0}, 4, 2e-4);
   survey.turn({0.4, 0.2, 0.2}, 5);
   survey.stand({{0.1, -0.2, 0.1}, 1.2});
-  survey.input.captures.back().place = KnownPosition{PlaceOf::camera, {0.1, -0.2}, 0.1, 3e-4};
+  survey.input.captures.back().known_position =
+      KnownPosition{MeasuredPoint::camera, {0.1, -0.2}, 0.1, 3e-4};
   survey.truth.inclination = Inclination{0.03, -0.02};
   survey.stand({{-0.2, 0.1, 0}, -2});
   survey.input.captures.back().inclination = survey.truth.inclination;
@@ -63,16 +64,16 @@ class DenseAdjustment {
     int k = 0;
     for (const AdjustmentCapture& capture : input_.captures) {
       LocalUnknowns local{};
-      if (capture.spot.empty()) {
+      if (capture.pivot.empty()) {
         local.at = std::ssize(start);
         const Pose pose = k == 9 ? Pose{{0.1, -0.2, 0.1}, 1.2} : Pose{{-0.2, 0.1, 0}, -2};
         start.insert(start.end(), pose.position_m.begin(), pose.position_m.end());
         start.push_back(pose.yaw_rad);
         local.yaw = local.at + 3;
       } else {
-        const auto [spot, fresh] = spots.emplace(capture.spot, std::ssize(start));
+        const auto [spot, fresh] = spots.emplace(capture.pivot, std::ssize(start));
         if (fresh) {
-          const Eigen::Vector3d& axis_m = axes.at(capture.spot);
+          const Eigen::Vector3d& axis_m = axes.at(capture.pivot);
           start.insert(start.end(), axis_m.begin(), axis_m.end());
         }
         local.at = spot->second;
@@ -171,11 +172,11 @@ class DenseAdjustment {
             lens.project_point(camera_from_base * (level_from_base.inverse() * level)).value();
         add(Eigen::Vector2d((detection.pixel - pixel) / *detection.sigma_px));
       }
-      if (!capture.place || (local.on_spot && axis_counted[capture.spot])) continue;
-      axis_counted[capture.spot] = true;
+      if (!capture.known_position || (local.on_spot && axis_counted[capture.pivot])) continue;
+      axis_counted[capture.pivot] = true;
       Eigen::Vector3d stated_m;
-      stated_m << capture.place->xy_m, *capture.place->z_m;
-      add(Eigen::Vector3d((axis_m - stated_m) / capture.place->sd_m));
+      stated_m << capture.known_position->xy_m, *capture.known_position->z_m;
+      add(Eigen::Vector3d((axis_m - stated_m) / capture.known_position->sd_m));
     }
     if (!map_is_exact()) {
       for (Eigen::Index i = 0; i < lamp_count(); ++i) {
@@ -221,7 +222,7 @@ TEST_P(RunBundleAdjustmentReference, ParametersAndCovarianceMatchDenseLeastSquar
   ASSERT_EQ(found.rejected_detections, 0);
   ASSERT_EQ(found.noise_scale, 1);
   ASSERT_TRUE(found.center.lever_arm_m);
-  ASSERT_EQ(found.refined.lamps.size(), 8U);
+  ASSERT_EQ(found.refined_map.lamps.size(), 8U);
   DenseAdjustment dense(survey);
   dense.solve();
 
@@ -233,7 +234,7 @@ TEST_P(RunBundleAdjustmentReference, ParametersAndCovarianceMatchDenseLeastSquar
       Eigen::VectorXd::Zero(24);
   for (Eigen::Index i = 0; i < 8; ++i) {
     values.tail<24>().segment<3>(3 * i) =
-        found.refined.lamps[static_cast<std::size_t>(i)].position_m;
+        found.refined_map.lamps[static_cast<std::size_t>(i)].position_m;
   }
   const Eigen::MatrixXd covariance = dense.covariance();
   const Eigen::VectorXd sd = covariance.diagonal().cwiseSqrt();
@@ -323,9 +324,9 @@ TEST_F(AdjustmentDerivatives, LinearizeJacobiansMatchFiniteDifferences) {
       const Eigen::Index local = problem.captures[capture].local;
       std::vector<Eigen::Index> blocks{local, at.zenith, at.lamp_state_index(lamp), at.lens};
       if (capture == 0) blocks.insert(blocks.begin() + 1, {at.pivot_state_index(0), at.lever_arm});
-      ASSERT_EQ(found->parts.size(), blocks.size());
+      ASSERT_EQ(found->blocks.size(), blocks.size());
       for (std::size_t i = 0; i < blocks.size(); ++i) {
-        const auto& [first, jacobian] = found->parts[i];
+        const auto& [first, jacobian] = found->blocks[i];
         EXPECT_EQ(first, blocks[i]);
         const Eigen::MatrixXd expected = differences(first, jacobian.cols(), residual);
         EXPECT_THAT(jacobian, IsNear(expected, 1e-6 * (1 + expected.cwiseAbs().maxCoeff())));

@@ -28,7 +28,8 @@ AdjustmentInput tracked_drive(const BodyRig& rig, const MovingCaptures& captures
     AdjustmentCapture capture{captures.frames[i].image, captures.frames[i].detections};
     Eigen::Vector3d arm_m(kArm_m.x(), kArm_m.y(), 0);
     const Eigen::Vector3d axis_m = camera.position_m - rotation_about_z(camera.yaw_rad) * arm_m;
-    capture.place = KnownPosition{PlaceOf::axis, axis_m.head<2>(), axis_m.z(), kPlaceSd_m};
+    capture.known_position =
+        KnownPosition{MeasuredPoint::axis, axis_m.head<2>(), axis_m.z(), kPlaceSd_m};
     if (!motions.empty()) capture.motion = motions[i];
     input.captures.push_back(capture);
   }
@@ -77,7 +78,7 @@ TEST(RunBundleAdjustment, RecoversZenithAndLeverArmWhileRotatingWithKnownYawRate
         rig.body.motion = {
             rate_rad_per_s * Eigen::Vector2d(-kArm_m.y(), kArm_m.x()), rate_rad_per_s, {0, 0}};
         AdjustmentCapture capture{std::to_string(input.captures.size()), seen_from(rig, 0.03)};
-        capture.spot = axis_m.z() > 0 ? "high" : "low";
+        capture.pivot = axis_m.z() > 0 ? "high" : "low";
         capture.motion.yaw_rate_rad_per_s = stated_rad_per_s;
         input.captures.push_back(capture);
       }
@@ -127,8 +128,8 @@ TEST(RunBundleAdjustment, ZenithAndLeverArmErrorsMatchCovarianceForMovingCamera)
           for (double& one : input.lamps.lamps[k].position_m) one += 0.001 * random.normal();
         }
         for (AdjustmentCapture& capture : input.captures) {
-          for (double& one : capture.place->xy_m) one += kPlaceSd_m * random.normal();
-          *capture.place->z_m += kPlaceSd_m * random.normal();
+          for (double& one : capture.known_position->xy_m) one += kPlaceSd_m * random.normal();
+          *capture.known_position->z_m += kPlaceSd_m * random.normal();
         }
         const AdjustmentResult found = run_bundle_adjustment(input);
         EXPECT_TRUE(found.has_succeeded() && found.center.lever_arm_m) << found.undetermined;

@@ -21,12 +21,12 @@ constexpr double kNoise_px = 0.3;
 struct PlaceCase {
   const char* name;
   /// Standard deviation of the known positions; 0: no position is known.
-  double place_sd_m;
+  double position_sd_m;
   bool has_height;
   /// Captures rotate in place, three per spot; otherwise each has a position of its own.
   bool on_spots;
   /// Known positions are those of the rotation axis instead of the camera; on spots only.
-  PlaceOf of;
+  MeasuredPoint of;
   std::optional<double> reported_sigma_px;
 };
 
@@ -46,13 +46,13 @@ Survey make_survey(const PlaceCase& variant, Random& random) {
     const Eigen::Vector3d position_m(random.uniform(-0.6, 0.6), random.uniform(-0.3, 0.3),
                                      random.uniform(0, 0.3));
     if (variant.on_spots) {
-      survey.turn(position_m, captures_per_spot, variant.place_sd_m, variant.of);
+      survey.turn(position_m, captures_per_spot, variant.position_sd_m, variant.of);
       continue;
     }
     survey.stand({position_m, random.uniform(-3, 3)});
-    if (variant.place_sd_m > 0) {
-      survey.input.captures.back().place =
-          KnownPosition{PlaceOf::camera, position_m.head<2>(), position_m.z(), variant.place_sd_m};
+    if (variant.position_sd_m > 0) {
+      survey.input.captures.back().known_position = KnownPosition{
+          MeasuredPoint::camera, position_m.head<2>(), position_m.z(), variant.position_sd_m};
     }
   }
   for (auto& capture : survey.input.captures) {
@@ -65,7 +65,7 @@ Survey make_survey(const PlaceCase& variant, Random& random) {
   // The position error is independent per capture, or per spot for captures on spots.
   survey.add_noise(random, true, true, true);
   for (auto& capture : survey.input.captures) {
-    if (capture.place && !variant.has_height) capture.place->z_m.reset();
+    if (capture.known_position && !variant.has_height) capture.known_position->z_m.reset();
     for (Detection& detection : capture.detections) detection.sigma_px = variant.reported_sigma_px;
   }
   return survey;
@@ -100,19 +100,19 @@ TEST_P(RunBundleAdjustmentNoise, NoiseAndZenithSdMatchTruthForAnyKnownPositions)
 
 INSTANTIATE_TEST_SUITE_P(
     Places, RunBundleAdjustmentNoise,
-    testing::Values(PlaceCase{"None", 0, false, false, PlaceOf::camera, {}},
-                    PlaceCase{"Coarse", 0.05, false, false, PlaceOf::camera, {}},
-                    PlaceCase{"CoarseWithHeight", 0.05, true, false, PlaceOf::camera, {}},
-                    PlaceCase{"Exact", 1e-4, false, false, PlaceOf::camera, {}},
-                    PlaceCase{"ExactWithHeight", 1e-4, true, false, PlaceOf::camera, {}},
-                    PlaceCase{"CoarseOfAxes", 0.05, true, true, PlaceOf::axis, {}},
-                    PlaceCase{"ExactOfAxes", 1e-4, true, true, PlaceOf::axis, {}},
-                    PlaceCase{"ExactOfCameraOnSpots", 1e-4, true, true, PlaceOf::camera, {}},
-                    PlaceCase{"CoarseWithReportedSigmaTooSmall", 0.05, true, false, PlaceOf::camera,
-                              0.15},
+    testing::Values(PlaceCase{"None", 0, false, false, MeasuredPoint::camera, {}},
+                    PlaceCase{"Coarse", 0.05, false, false, MeasuredPoint::camera, {}},
+                    PlaceCase{"CoarseWithHeight", 0.05, true, false, MeasuredPoint::camera, {}},
+                    PlaceCase{"Exact", 1e-4, false, false, MeasuredPoint::camera, {}},
+                    PlaceCase{"ExactWithHeight", 1e-4, true, false, MeasuredPoint::camera, {}},
+                    PlaceCase{"CoarseOfAxes", 0.05, true, true, MeasuredPoint::axis, {}},
+                    PlaceCase{"ExactOfAxes", 1e-4, true, true, MeasuredPoint::axis, {}},
+                    PlaceCase{"ExactOfCameraOnSpots", 1e-4, true, true, MeasuredPoint::camera, {}},
+                    PlaceCase{"CoarseWithReportedSigmaTooSmall", 0.05, true, false,
+                              MeasuredPoint::camera, 0.15},
                     // The difference is not significant in one run.
                     PlaceCase{"CoarseWithReportedSigmaSlightlyTooSmall", 0.05, true, false,
-                              PlaceOf::camera, 0.24}),
+                              MeasuredPoint::camera, 0.24}),
     [](const auto& variant) { return variant.param.name; });
 
 }  // namespace

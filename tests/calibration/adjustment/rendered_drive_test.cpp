@@ -103,7 +103,8 @@ class RenderedDriveCalibration : public testing::Test {
     for (std::size_t i = 0; i < drive.frames.size(); ++i) {
       const Eigen::Vector3d& place_m = drive.places_m[i];
       AdjustmentCapture capture{drive.frames[i].image, drive.frames[i].detections};
-      capture.place = KnownPosition{PlaceOf::axis, place_m.head<2>(), place_m.z(), kPlaceSd_m};
+      capture.known_position =
+          KnownPosition{MeasuredPoint::axis, place_m.head<2>(), place_m.z(), kPlaceSd_m};
       if (!motions.empty()) capture.motion = motions[i];
       input.captures.push_back(capture);
     }

@@ -34,7 +34,7 @@ Means over_trials(double map_sd_m, bool places_are_wrong, int trials) {
     Calibration calibration = survey.input.calibration;
     calibration.camera = found.camera;
     calibration.rotation_center = found.center;
-    const Positioner positioner(found.refined, calibration);
+    const Positioner positioner(found.refined_map, calibration);
     for (int k = 0; k < checks; ++k) {
       const double x_m = random.uniform(-0.6, 0.6), y_m = random.uniform(-0.3, 0.3);
       const double z_m = random.uniform(0, 0.3), yaw_rad = random.uniform(-3, 3);
@@ -48,7 +48,7 @@ Means over_trials(double map_sd_m, bool places_are_wrong, int trials) {
     }
     Eigen::VectorXd errors_m(24);
     for (std::size_t i = 0; i < 8; ++i) {
-      const Eigen::Vector3d error_m = survey.misplaced(i, found.refined);
+      const Eigen::Vector3d error_m = survey.misplaced(i, found.refined_map);
       errors_m.segment<3>(3 * static_cast<Eigen::Index>(i)) = error_m;
       sums.map_xy_m += error_m.head<2>().norm() / (8 * trials);
       sums.map_z_m += std::abs(error_m.z()) / (8 * trials);

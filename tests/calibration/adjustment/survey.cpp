@@ -29,17 +29,18 @@ Survey::Survey(double map_sd_m)
   input.calibration.camera = truth.calibration.camera;
 }
 
-void Survey::turn(const Eigen::Vector3d& axis_m, int captures, double place_sd_m, PlaceOf of) {
+void Survey::turn(const Eigen::Vector3d& axis_m, int captures, double position_sd_m,
+                  MeasuredPoint of) {
   const std::string spot = "spot-" + std::to_string(input.captures.size());
   for (int k = 0; k < captures; ++k) {
     const double yaw_rad = 0.3 + 2 * std::numbers::pi * k / captures;
     const Eigen::Vector2d arm_m = rotation_about_z(yaw_rad).topLeftCorner<2, 2>() * lever_arm_m;
     truth.camera = {axis_m + Eigen::Vector3d(arm_m.x(), arm_m.y(), 0), yaw_rad};
     AdjustmentCapture capture{spot + "/" + std::to_string(k), seen_from(truth, sigma_px)};
-    capture.spot = spot;
-    if (place_sd_m > 0) {
-      const Eigen::Vector3d stated_m = of == PlaceOf::axis ? axis_m : truth.camera.position_m;
-      capture.place = KnownPosition{of, stated_m.head<2>(), stated_m.z(), place_sd_m};
+    capture.pivot = spot;
+    if (position_sd_m > 0) {
+      const Eigen::Vector3d stated_m = of == MeasuredPoint::axis ? axis_m : truth.camera.position_m;
+      capture.known_position = KnownPosition{of, stated_m.head<2>(), stated_m.z(), position_sd_m};
     }
     input.captures.push_back(capture);
   }
@@ -51,10 +52,10 @@ void Survey::stand(const Pose& camera) {
       {"capture-" + std::to_string(input.captures.size()), seen_from(truth, sigma_px)});
 }
 
-void Survey::five_places(double place_sd_m) {
+void Survey::five_places(double position_sd_m) {
   const std::vector<Eigen::Vector3d> axes_m{
       {0, 0, 0}, {0.5, 0.25, 0}, {-0.5, 0.25, 0.1}, {-0.5, -0.25, 0}, {0.5, -0.25, 0.2}};
-  for (const Eigen::Vector3d& axis_m : axes_m) turn(axis_m, 12, place_sd_m);
+  for (const Eigen::Vector3d& axis_m : axes_m) turn(axis_m, 12, position_sd_m);
 }
 
 void Survey::add_noise(Random& random, bool pixels, bool map, bool axes) {
@@ -62,13 +63,13 @@ void Survey::add_noise(Random& random, bool pixels, bool map, bool axes) {
   Eigen::Vector3d error_m = Eigen::Vector3d::Zero();
   for (AdjustmentCapture& capture : input.captures) {
     if (pixels) capture.detections = with_noise(std::move(capture.detections), random);
-    if (!axes || !capture.place) continue;
-    if (capture.spot != spot) {
-      for (double& one : error_m) one = capture.place->sd_m * random.normal();
+    if (!axes || !capture.known_position) continue;
+    if (capture.pivot != spot) {
+      for (double& one : error_m) one = capture.known_position->sd_m * random.normal();
     }
-    spot = capture.spot;
-    capture.place->xy_m += error_m.head<2>();
-    *capture.place->z_m += error_m.z();
+    spot = capture.pivot;
+    capture.known_position->xy_m += error_m.head<2>();
+    *capture.known_position->z_m += error_m.z();
   }
   if (!map) return;
   for (Lamp& lamp : input.lamps.lamps) {

@@ -18,14 +18,14 @@ struct Survey {
 
   explicit Survey(double map_sd_m = 0.002);
 
-  /// Adds a rotation in place about the axis: `captures` yaws over the full circle. If `place_sd_m`
-  /// is positive, the position of the axis or of the camera is known.
-  void turn(const Eigen::Vector3d& axis_m, int captures, double place_sd_m = 0,
-            PlaceOf of = PlaceOf::axis);
+  /// Adds a rotation in place about the axis: `captures` yaws over the full circle. If
+  /// `position_sd_m` is positive, the position of the axis or of the camera is known.
+  void turn(const Eigen::Vector3d& axis_m, int captures, double position_sd_m = 0,
+            MeasuredPoint of = MeasuredPoint::axis);
   /// Adds a capture with a position of its own that is not known.
   void stand(const Pose& camera);
   /// Adds five rotations about known axes, twelve captures each.
-  void five_places(double place_sd_m);
+  void five_places(double position_sd_m);
 
   /// Adds noise to pixels, known positions and lamps of the map, according to their standard
   /// deviations.

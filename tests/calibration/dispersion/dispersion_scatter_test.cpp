@@ -334,12 +334,12 @@ TEST_P(PositionerAfterDispersion, FixCovarianceMatchesErrorsUnderSameAndOtherLam
     const auto fit =
         estimate_heading_dependent_offset(captures, surveyed, station.believed, GetParam());
     ASSERT_EQ(fit.status, DispersionStatus::ok);
-    ASSERT_EQ(fit.dispersion.by_lamps.size(), 8U);
+    ASSERT_EQ(fit.dispersion.uncertain_lamps.size(), 8U);
     Calibration calibration = station.believed;
     calibration.dispersion = fit.dispersion;
     const Positioner positioner(surveyed, calibration);
     // Simulates independent errors of offset and map.
-    for (auto& lamp : calibration.dispersion->by_lamps) lamp.position_m.z() += 1;
+    for (auto& lamp : calibration.dispersion->uncertain_lamps) lamp.position_m.z() += 1;
     const Positioner independent(surveyed, calibration);
     for (PlaceConsistency& place : places) {
       rig.camera = place.camera;

@@ -43,7 +43,7 @@ TEST(EstimateHeadingDependentOffset, CameraMethodRecoversWorldOffsetAndCorrectsF
   }
 }
 
-TEST(EstimateHeadingDependentOffset, CameraMethodReturnsTrueOffsetForShiftedCenter) {
+TEST(EstimateHeadingDependentOffset, CameraMethodReturnsPrincipalPointErrorWithoutRotationCenter) {
   Station station(0);
   station.believed.rotation_center.reset();
   station.rig.calibration.rotation_center.reset();

@@ -101,8 +101,8 @@ TEST_P(CheckBoardLayout, ReportsDetectedRowsAndFirstIdFromForeignTags) {
   Board board = views_.board;
   board.rows = 4;
   for (BoardView& view : seen_) {
-    auto& tags = view.seen.tags;
-    std::copy_if(tags.begin(), tags.end(), std::back_inserter(view.seen.foreign),
+    auto& tags = view.detection.tags;
+    std::copy_if(tags.begin(), tags.end(), std::back_inserter(view.detection.foreign_tags),
                  [](const TagDetection& tag) { return tag.id >= 24; });
     std::erase_if(tags, [](const TagDetection& tag) { return tag.id >= 24; });
   }
@@ -117,10 +117,10 @@ TEST_P(CheckBoardLayout, ReportsNoProblemForSingleForeignTags) {
   for (const int id : {100, 31}) {
     auto views = seen_;
     for (BoardView& view : views) {
-      TagDetection stray = view.seen.tags.front();
+      TagDetection stray = view.detection.tags.front();
       stray.id = id;
       for (auto& corner : stray.corners_px) corner += Eigen::Vector2d(-150, 40);
-      view.seen.foreign.push_back(stray);
+      view.detection.foreign_tags.push_back(stray);
     }
     EXPECT_THAT(check_board_layout(views_.board, views, {}).problem, IsEmpty()) << id;
   }
@@ -129,16 +129,16 @@ TEST_P(CheckBoardLayout, ReportsNoProblemForSingleForeignTags) {
 TEST_P(CheckBoardLayout, ReportsNoProblemForTagsOfSecondBoard) {
   for (BoardView& view : seen_) {
     Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
-    for (const TagDetection& tag : view.seen.tags) {
+    for (const TagDetection& tag : view.detection.tags) {
       for (const auto& corner : tag.corners_px) {
         low = low.cwiseMin(corner);
         high = high.cwiseMax(corner);
       }
     }
-    for (TagDetection tag : view.seen.tags) {
+    for (TagDetection tag : view.detection.tags) {
       tag.id += 30;
       for (auto& corner : tag.corners_px) corner.x() += 1.1 * (high - low).x();
-      view.seen.foreign.push_back(tag);
+      view.detection.foreign_tags.push_back(tag);
     }
   }
   EXPECT_THAT(problem(views_.board), IsEmpty());
@@ -146,7 +146,7 @@ TEST_P(CheckBoardLayout, ReportsNoProblemForTagsOfSecondBoard) {
 
 TEST_P(CheckBoardLayout, SuggestsAnotherBoardWhenTagIdsArePermuted) {
   for (BoardView& view : seen_) {
-    for (TagDetection& tag : view.seen.tags) tag.id = tag.id * 7 % 30;
+    for (TagDetection& tag : view.detection.tags) tag.id = tag.id * 7 % 30;
   }
   EXPECT_THAT(problem(views_.board), HasSubstr("is it another board?"));
 }

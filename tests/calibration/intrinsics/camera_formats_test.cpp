@@ -135,7 +135,7 @@ TEST(FormatOpencvCamera, ExportedCameraProjectsToSamePixelsInOpencv) {
 
 class ReadCameraFormats : public testing::Test {
  protected:
-  AnyCamera read(const std::string& text) const {
+  ImportedCamera read(const std::string& text) const {
     return read_camera_of_any_format(folder_.file("camera.txt", text));
   }
   std::string refusal(const std::string& text) const {
@@ -159,7 +159,7 @@ TEST_F(ReadCameraFormats, CameraReadFromOpencvFileProjectsAsInOpencv) {
       if (size == 14 && model != LensModel::opencv12) continue;
       coefficients.resize(size, 0);  // 14: with a sensor that is not tilted
       cv.distortions = cv::Mat(coefficients, true);
-      const AnyCamera found = read(written_by_opencv(cv, fisheye));
+      const ImportedCamera found = read(written_by_opencv(cv, fisheye));
       EXPECT_EQ(found.camera.lens_model, model);
       EXPECT_EQ(found.camera.imager_px, camera.imager_px);
       const auto points = points_before(camera, kOpencvsWidest_deg);
@@ -358,7 +358,7 @@ class MrcalCameramodel : public ReadCameraFormats {
     for (double u = 0, v = 0; numbers >> u >> v;) pixels.emplace_back(u, v);
     return pixels;
   }
-  AnyCamera written_by_mrcal(const std::string& text) const {
+  ImportedCamera written_by_mrcal(const std::string& text) const {
     printed(folder_.file("ours.cameramodel", text),
             "m.write(at('theirs.cameramodel'), note = \"of 'lensmodel': 'LENSMODEL_CAHVOR'\")\n");
     return read_camera_of_any_format(folder_ / "theirs.cameramodel");
@@ -413,9 +413,10 @@ TEST_F(MrcalCameramodel, WritesValidRegionOfSolutionReadableByMrcal) {
   mrcals.pop_back();
   EXPECT_EQ(mrcals, expected);
 
-  const AnyCamera ours = read_camera_of_any_format(file);
+  const ImportedCamera ours = read_camera_of_any_format(file);
   EXPECT_EQ(ours.region, expected);
-  const AnyCamera theirs = written_by_mrcal(format_mrcal_cameramodel(ours.camera, ours.region));
+  const ImportedCamera theirs =
+      written_by_mrcal(format_mrcal_cameramodel(ours.camera, ours.region));
   ASSERT_EQ(theirs.region.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
     EXPECT_THAT(theirs.region[i], IsNear(expected[i], 1e-6));  // it writes 10 digits
@@ -446,7 +447,7 @@ TEST_F(ReadCameraFormats, ReturnsParametersOfSplinedLensWithLargestGrid) {
   for (std::size_t i = 4; i < num_lens_parameters(model); ++i) {
     camera.intrinsics.push_back(1 / (static_cast<double>(i) + 3));
   }
-  const AnyCamera back = read(format_mrcal_cameramodel(camera));
+  const ImportedCamera back = read(format_mrcal_cameramodel(camera));
   EXPECT_EQ(back.camera.intrinsics, camera.intrinsics);
 }
 

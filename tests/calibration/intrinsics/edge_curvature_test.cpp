@@ -98,7 +98,7 @@ TEST(CorrectCornersForEdgeCurvature, MovesCornersToTruePositionsDespiteCurvature
 
 TEST(CorrectCornersForEdgeCurvature, KeepsCornersOfTagWithUnmeasuredEdgeCurvature) {
   Tag tag = tag_with_errors({0.1, 0.1, 0.1, 0.1});
-  tag.seen[2].bow.reach = 0;
+  tag.seen[2].curvature.reach = 0;
   const auto before = tag.seen;
   EXPECT_EQ(correct_corners_for_edge_curvature(tag.seen, synthetic_lens()), 0);
   for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(tag.seen[k].pixel, before[k].pixel);
@@ -109,8 +109,8 @@ TEST(CorrectCornersForEdgeCurvature, ReducesCornerErrorsOfRenderedBoardByQuarter
   const Scene scene = read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
   const CaptureSet views = *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
   const FrameRenderer renderer(scene);
-  const BoardDetector detector(scene.board->print);
-  const BoardLattice lattice(scene.board->print);
+  const BoardDetector detector(scene.board->pattern);
+  const BoardLattice lattice(scene.board->pattern);
   const Lens lens(scene.camera.lens_model, scene.camera.intrinsics);
   std::array<double, 2> squares{}, of_tags{};
   double stated = 0;

@@ -37,7 +37,7 @@ class EstimateTagEdgeDisplacements : public testing::TestWithParam<double> {
   IntrinsicsInput make_input(const std::vector<BoardView>& seen) const {
     IntrinsicsInput input{BoardLattice(board()), {}, {800, 600}, LensModel::opencv8};
     for (const BoardView& view : seen)
-      input.views.push_back(input.lattice.match_corners_to_flat_board(view.seen));
+      input.views.push_back(input.lattice.match_corners_to_flat_board(view.detection));
     return input;
   }
 };
@@ -59,8 +59,8 @@ TEST_P(EstimateTagEdgeDisplacements, SolveIntrinsicsRecoversEdgeShiftAndTrueLens
   const auto input = make_input(shrunk_views(16, 0.03, 0.35));
   const IntrinsicsSolution solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.has_succeeded());
-  ASSERT_EQ(solution.edge_shifts_px.size(), 16U);
-  for (const double shift_px : solution.edge_shifts_px) EXPECT_NEAR(shift_px, 0.35, 0.03);
+  ASSERT_EQ(solution.edge_displacements_px.size(), 16U);
+  for (const double shift_px : solution.edge_displacements_px) EXPECT_NEAR(shift_px, 0.35, 0.03);
   EXPECT_NEAR(solution.rms_px, 0.03, 0.004);
   const auto difference =
       compute_projection_difference(synthetic_lens(), solution.fitted_lens(), {800, 600}, even);
@@ -71,13 +71,13 @@ TEST_P(EstimateTagEdgeDisplacements, SolveIntrinsicsRecoversEdgeShiftAndTrueLens
 TEST_P(EstimateTagEdgeDisplacements, SolveIntrinsicsEstimatesNoWarpWhenEdgeShiftVaries) {
   auto seen = shrunk_views(16, 0.03, 0);
   for (BoardView& view : seen) {
-    for (TagDetection& tag : view.seen.tags) {
+    for (TagDetection& tag : view.detection.tags) {
       tag = shrunk(tag, 0.3 + 0.1 * (tag.corners_px[0].x() - 400) / 400);
     }
   }
   const IntrinsicsSolution solution = solve_intrinsics(make_input(seen));
   ASSERT_TRUE(solution.has_succeeded());
-  EXPECT_FALSE(solution.solved_for.warp);
+  EXPECT_FALSE(solution.solved_parameters.warp);
   EXPECT_NEAR(solution.rms_px, 0.03, 0.004);
   const auto difference =
       compute_projection_difference(synthetic_lens(), solution.fitted_lens(), {800, 600}, even);
@@ -105,7 +105,7 @@ TEST(EdgeDisplacement, SolveEstimatesWarpInsteadOfEdgeShiftsForWarpedBoard) {
   const auto input = wide_input(false, 40, random, noise_px, {6e-4, 9e-4}, boards);
   const IntrinsicsSolution solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.has_succeeded());
-  EXPECT_TRUE(solution.solved_for.warp);
+  EXPECT_TRUE(solution.solved_parameters.warp);
   EXPECT_NEAR(solution.rms_px, 0.0165, 0.0005);  // 0.0176 with such shifts left in
   const auto difference =
       compute_projection_difference(wide_lens(), solution.fitted_lens(), kWideImager, even);
@@ -113,7 +113,7 @@ TEST(EdgeDisplacement, SolveEstimatesWarpInsteadOfEdgeShiftsForWarpedBoard) {
   EXPECT_LT(difference->rms_px, 0.006);  // 0.0144
 }
 
-TEST(EstimateTagEdgeDisplacements, ReturnsZeroForTouchingSquares) {
+TEST(EstimateTagEdgeDisplacements, ReturnsZeroForTagsWithCornerSquares) {
   const SyntheticViews views{synthetic_board(true), synthetic_lens()};
   Random random(3);
   const auto input = views.input(4, random, 0.1);

@@ -38,8 +38,8 @@ TEST_P(SolveWideLens, LensMatchesTruthUpTo94DegreesWithNoisyCorners) {
   EXPECT_LT(up_to(94, solution.fitted_lens()).worst_px, 0.1);
   const CalibrationReport report = compute_lens_calibration_report(solution, input);
   EXPECT_LT(report.uncertainty_worst_px, 0.4);  // at the rim, beyond 94 degrees
-  ASSERT_TRUE(report.halves);
-  EXPECT_LT(report.halves->rms_px, 0.1);
+  ASSERT_TRUE(report.split_half_difference);
+  EXPECT_LT(report.split_half_difference->rms_px, 0.1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Boards, SolveWideLens, testing::Bool(),

@@ -46,7 +46,7 @@ TEST(FindViewsInconsistentWithLens, ReturnsViewsOfOtherCamera) {
     ASSERT_TRUE(solution.has_succeeded());
     const InconsistentViews found = find_views_inconsistent_with_lens(solution);
     EXPECT_THAT(found.views, ElementsAreArray(foreign));
-    EXPECT_EQ(found.others, kViews - foreign.size());
+    EXPECT_EQ(found.num_other_views, kViews - foreign.size());
     EXPECT_GT(found.worst_px, 3 * found.typical_px);
     EXPECT_THAT(describe_inconsistent_views(found, image_names()),
                 HasSubstr(std::to_string(foreign.size()) + " board images do not fit the other " +
@@ -74,7 +74,7 @@ TEST(FindViewsInconsistentWithLens, ReturnsViewsDroppedBySolveOnlyIfSeveral) {
   for (auto& corner : input.views[4]) corner.pixel.x() += 60 * std::sin(corner.pixel.y() / 15);
   const IntrinsicsSolution one = solve_intrinsics(input);
   ASSERT_TRUE(one.has_succeeded());
-  ASSERT_EQ(one.dropped.size(), 1U);
+  ASSERT_EQ(one.dropped_views.size(), 1U);
   EXPECT_THAT(find_views_inconsistent_with_lens(one).views, testing::IsEmpty());
   for (auto& corner : input.views[7]) corner.pixel.x() += 60 * std::sin(corner.pixel.y() / 15);
   const IntrinsicsSolution two = solve_intrinsics(input);

@@ -62,9 +62,9 @@ TEST_P(SolveIntrinsics, DropsViewWithDistortedCorners) {
   for (auto& corner : bad) corner.pixel.x() += 60 * std::sin(corner.pixel.y() / 15);
   const IntrinsicsSolution solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.has_succeeded());
-  ASSERT_EQ(solution.dropped.size(), 1U);
-  EXPECT_EQ(solution.dropped[0].view, 4U);
-  EXPECT_GT(solution.dropped[0].rms_px, 3);
+  ASSERT_EQ(solution.dropped_views.size(), 1U);
+  EXPECT_EQ(solution.dropped_views[0].view, 4U);
+  EXPECT_GT(solution.dropped_views[0].rms_px, 3);
   EXPECT_EQ(solution.views.size(), 11U);
   EXPECT_LT(difference(solution, views_).mean_px, 0.15);
 }
@@ -102,7 +102,7 @@ TEST(SolveIntrinsicsOfPartialBoards, MatchesTrueLensForBoardsTiltedUpTo60Degrees
     const int count = 8 + static_cast<int>(random.index(20));
     const IntrinsicsSolution solution = solve_intrinsics(views.input(count, random, 0.05));
     ASSERT_TRUE(solution.has_succeeded()) << set;
-    EXPECT_TRUE(solution.dropped.empty()) << set;
+    EXPECT_TRUE(solution.dropped_views.empty()) << set;
     EXPECT_LT(solution.rms_px, 0.06) << set;
     EXPECT_LT(difference(solution, views).mean_px, 0.2) << set;
   }

@@ -40,9 +40,9 @@ Lens fisheye_lens() {
 
 double find_rms(const LensChoice& choice, LensModel model) {
   const auto found =
-      std::find_if(choice.tried.begin(), choice.tried.end(),
+      std::find_if(choice.candidates.begin(), choice.candidates.end(),
                    [model](const LensCandidate& tried) { return tried.model == model; });
-  return found == choice.tried.end() ? INFINITY : found->rms_px;
+  return found == choice.candidates.end() ? INFINITY : found->rms_px;
 }
 
 void expect_chosen(const Lens& lens) {
@@ -53,7 +53,7 @@ void expect_chosen(const Lens& lens) {
       << describe_lens_model_choice(*choice);
   // Noise, and errors outside the region of the other views.
   EXPECT_NEAR(find_rms(*choice, choice->model), kNoise_px, 0.25 * kNoise_px);
-  EXPECT_EQ(choice->tried.size(), 5U);
+  EXPECT_EQ(choice->candidates.size(), 5U);
   EXPECT_TRUE(describe_lens_model_choice(*choice).starts_with(lens_model_name(lens.lens_model())))
       << describe_lens_model_choice(*choice);
 }
@@ -114,8 +114,8 @@ TEST(SelectLensModel, ReturnsFisheyeForCornersBeyondRightAngle) {
   EXPECT_EQ(choice->model, LensModel::fisheye);
   EXPECT_GT(choice->beyond_right_angle_rad, 1.58);
   EXPECT_LT(choice->beyond_right_angle_rad, 2);
-  ASSERT_FALSE(choice->tried.empty());
-  for (const LensCandidate& tried : choice->tried) {
+  ASSERT_FALSE(choice->candidates.empty());
+  for (const LensCandidate& tried : choice->candidates) {
     EXPECT_EQ(std::isfinite(tried.rms_px), tried.model == LensModel::fisheye);
   }
   EXPECT_EQ(select_lens_model(seen_through(fisheye_lens(), 8)).value().beyond_right_angle_rad, 0);

@@ -37,7 +37,7 @@ std::vector<BoardView> make_views(const StepAt& step_at, int count = 24) {
         tag.steps[k] = step_at(at_px, view);
         tag.steps[k].blur_px *= 1 + noise(random);
       }
-      added.seen.tags.push_back(std::move(tag));
+      added.detection.tags.push_back(std::move(tag));
     }
   }
   return views;
@@ -146,10 +146,10 @@ TEST(MeasureLensSharpness, ReturnsNanShadowForFewerThanEightTagsPerView) {
   std::vector<BoardView> views;
   for (std::size_t i = 0; i < dense.size(); ++i) {
     BoardView& view = views.emplace_back(dense[i]);
-    std::erase_if(view.seen.tags, [&](const TagDetection& tag) {
+    std::erase_if(view.detection.tags, [&](const TagDetection& tag) {
       return static_cast<std::size_t>(tag.id) % 28 != i % 28;
     });
-    ASSERT_LT(view.seen.tags.size(), 8U);
+    ASSERT_LT(view.detection.tags.size(), 8U);
   }
   const auto found = measure_lens_sharpness(views, kSharpnessImager_px);
   ASSERT_TRUE(found);
@@ -160,14 +160,14 @@ TEST(MeasureLensSharpness, ReturnsNanShadowForFewerThanEightTagsPerView) {
 TEST(MeasureLensSharpness, ReturnsNulloptWhenTagsHaveNoEdgeSteps) {
   auto views = make_views(even_step, 6);
   for (BoardView& view : views) {
-    for (TagDetection& tag : view.seen.tags) tag.steps = {};
+    for (TagDetection& tag : view.detection.tags) tag.steps = {};
   }
   EXPECT_FALSE(measure_lens_sharpness(views, kSharpnessImager_px));
 }
 
 TEST(ComputeMedianEdgeMtf50, MatchesMtf50OfUniformEdgeBlur) {
   const auto views = make_views(even_step, 1);
-  const auto found = compute_median_edge_mtf50(views[0].seen);
+  const auto found = compute_median_edge_mtf50(views[0].detection);
   ASSERT_TRUE(found);
   EXPECT_NEAR(*found, compute_mtf50_of_gaussian_blur(kLensBlur_px), 0.01 * *found);
 }

@@ -17,7 +17,7 @@ IntrinsicsInput make_input(const Board& board, const std::vector<BoardView>& vie
                            LensModel model) {
   IntrinsicsInput input{BoardLattice(board), {}, kImager_px, model};
   for (const BoardView& view : views)
-    input.views.push_back(input.lattice.match_corners_to_flat_board(view.seen));
+    input.views.push_back(input.lattice.match_corners_to_flat_board(view.detection));
   return input;
 }
 
@@ -42,7 +42,7 @@ TEST_P(WriteMrcalCorners, RereadCornersYieldSameLensAsOriginalSolve) {
   std::size_t corners = 0;
   for (std::size_t i = 0; i < read.size(); ++i) {
     EXPECT_EQ(read[i].image, names[solution.views[i]]);
-    corners += read[i].seen.points.size();
+    corners += read[i].detection.points.size();
   }
   EXPECT_EQ(corners, static_cast<std::size_t>(solution.corners));
   const IntrinsicsSolution again =
@@ -69,7 +69,7 @@ TEST_P(WriteMrcalCorners, AppendsNumbersToRepeatedImageNames) {
   std::vector<std::string> found;
   for (const BoardView& view :
        read_mrcal_corners(folder / "corners.vnl", views.board, kImager_px)) {
-    EXPECT_TRUE(view.seen.has_detected_corners());
+    EXPECT_TRUE(view.detection.has_detected_corners());
     found.push_back(view.image);
   }
   EXPECT_EQ(found, (std::vector<std::string>{"0.png", "1.png", "0.png-2", "1.png-2", "1.png-2-2",
@@ -105,16 +105,16 @@ TEST(ReadMrcalCorners, ReturnsWeightsFromLevelOrWeightColumn) {
   };
   const auto by_level = read("# filename x y level\n");
   ASSERT_EQ(by_level.size(), 2U);
-  EXPECT_FALSE(by_level[1].seen.has_detected_corners());
-  ASSERT_EQ(by_level[0].seen.points.size(), 11U);
-  EXPECT_EQ(by_level[0].seen.points[0].index, 1U);
-  EXPECT_EQ(by_level[0].seen.points[0].weight, 1);  // mrcal takes the whole part
-  EXPECT_EQ(by_level[0].seen.points[1].weight, 0.5);
+  EXPECT_FALSE(by_level[1].detection.has_detected_corners());
+  ASSERT_EQ(by_level[0].detection.points.size(), 11U);
+  EXPECT_EQ(by_level[0].detection.points[0].index, 1U);
+  EXPECT_EQ(by_level[0].detection.points[0].weight, 1);  // mrcal takes the whole part
+  EXPECT_EQ(by_level[0].detection.points[1].weight, 0.5);
   const auto by_weight = read("# filename x y weight\n");
   ASSERT_EQ(by_weight.size(), 2U);
-  ASSERT_EQ(by_weight[0].seen.points.size(), 11U);
-  EXPECT_EQ(by_weight[0].seen.points[0].weight, 0.5);
-  EXPECT_EQ(by_weight[0].seen.points[1].weight, 1);
+  ASSERT_EQ(by_weight[0].detection.points.size(), 11U);
+  EXPECT_EQ(by_weight[0].detection.points[0].weight, 0.5);
+  EXPECT_EQ(by_weight[0].detection.points[1].weight, 1);
 }
 
 TEST(ReadMrcalCorners, ThrowsForWeightAbove1000) {
@@ -142,7 +142,7 @@ TEST(ReadMrcalCorners, ReturnsWeightsWrittenByWriteMrcalCorners) {
     write_mrcal_corners(file, solution, names);
     std::size_t corners = 0;
     for (const BoardView& view : read_mrcal_corners(file, views.board, kImager_px)) {
-      for (const PointDetection& point : view.seen.points) {
+      for (const PointDetection& point : view.detection.points) {
         EXPECT_TRUE(point.weight == most || point.weight == most / 4) << point.weight;
         ++corners;
       }

@@ -100,10 +100,10 @@ TEST(ComputeLensCalibrationReport, DifferenceOfHalvesMatchesTwiceExpectedRms) {
   const IntrinsicsSolution solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.has_succeeded());
   const CalibrationReport report = compute_lens_calibration_report(solution, input);
-  ASSERT_TRUE(report.halves);
+  ASSERT_TRUE(report.split_half_difference);
   // Twice the difference from the truth, within a factor for the few degrees of freedom.
-  EXPECT_LT(report.halves->rms_px, 2.5 * 2 * report.expected_rms_px);
-  EXPECT_GT(report.halves->rms_px, 0.3 * 2 * report.expected_rms_px);
+  EXPECT_LT(report.split_half_difference->rms_px, 2.5 * 2 * report.expected_rms_px);
+  EXPECT_GT(report.split_half_difference->rms_px, 0.3 * 2 * report.expected_rms_px);
 }
 
 TEST(EvaluateLensOnHeldOutViews, RmsOfHeldOutViewsMatchesCornerNoise) {

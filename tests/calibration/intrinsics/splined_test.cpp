@@ -34,15 +34,15 @@ TEST(SolveSplinedLens, MatchesTrueLensUpTo94DegreesOffAxis) {
   const IntrinsicsSolution solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.has_succeeded()) << describe_intrinsics_status(solution.status);
   EXPECT_EQ(solution.views.size(), 40U);
-  EXPECT_FALSE(solution.solved_for.core);
+  EXPECT_FALSE(solution.solved_parameters.core);
   EXPECT_NEAR(solution.rms_px, noise_px, 0.003);
   EXPECT_NEAR(solution.problem.noise_px, noise_px, 0.005);
   EXPECT_LT(up_to(90, solution.fitted_lens()).mean_px, 0.03);
   EXPECT_LT(up_to(94, solution.fitted_lens()).worst_px, 0.1);
   const CalibrationReport report = compute_lens_calibration_report(solution, input);
   EXPECT_LT(report.uncertainty_mean_px, 0.05);
-  ASSERT_TRUE(report.halves);
-  EXPECT_LT(report.halves->mean_px, 0.1);
+  ASSERT_TRUE(report.split_half_difference);
+  EXPECT_LT(report.split_half_difference->mean_px, 0.1);
   // The frame is that of the true lens, which is symmetric.
   const auto turn = fit_rotation_between_lenses(wide_lens(), solution.fitted_lens(),
                                                 collect_inlier_corner_pixels(solution.problem));

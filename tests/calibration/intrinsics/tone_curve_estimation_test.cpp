@@ -45,9 +45,9 @@ struct CodedCamera {
   std::vector<BoardView> views(int count, std::uint64_t seed) const {
     auto views = uncoded(count, seed);
     for (BoardView& view : views) {
-      for (TagDetection& tag : view.seen.tags) tag = coded(tag);
+      for (TagDetection& tag : view.detection.tags) tag = coded(tag);
       for (const double each : kGammas) {
-        view.seen.curve_costs.push_back(500 * std::pow(std::log(each / levels_gamma), 2));
+        view.detection.curve_costs.push_back(500 * std::pow(std::log(each / levels_gamma), 2));
       }
     }
     return views;
@@ -70,11 +70,11 @@ struct CodedCamera {
 double worst_px(const std::vector<BoardView>& views, const std::vector<BoardView>& truth) {
   double worst_px = -1;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    for (std::size_t tag = 0; tag < views[i].seen.tags.size(); ++tag) {
+    for (std::size_t tag = 0; tag < views[i].detection.tags.size(); ++tag) {
       for (std::size_t k = 0; k < 4; ++k) {
-        worst_px = std::max(
-            worst_px,
-            (views[i].seen.tags[tag].corners_px[k] - truth[i].seen.tags[tag].corners_px[k]).norm());
+        worst_px = std::max(worst_px, (views[i].detection.tags[tag].corners_px[k] -
+                                       truth[i].detection.tags[tag].corners_px[k])
+                                          .norm());
       }
     }
   }
@@ -91,7 +91,7 @@ TEST(EstimateAndCorrectToneCurve, ReturnsTrueGammaWhenGrayValuesIndicateAnother)
     EXPECT_NEAR(std::log(estimate_and_correct_tone_curve(views, synthetic_board(false)) / gamma), 0,
                 0.04);
     EXPECT_LT(worst_px(views, truth), 0.05);
-    EXPECT_TRUE(views[0].seen.tags[0].tone_curve_fits.empty());
+    EXPECT_TRUE(views[0].detection.tags[0].tone_curve_fits.empty());
   }
 }
 
@@ -107,7 +107,7 @@ TEST(EstimateAndCorrectToneCurve, ReturnsOneWhenOnlyGrayValuesIndicateCurve) {
   auto views = CodedCamera{1, 1.46}.views(16, 2);
   const auto before = views;
   EXPECT_EQ(estimate_and_correct_tone_curve(views, synthetic_board(false)), 1);
-  EXPECT_EQ(views[5].seen.tags[3].corners_px, before[5].seen.tags[3].corners_px);
+  EXPECT_EQ(views[5].detection.tags[3].corners_px, before[5].detection.tags[3].corners_px);
 }
 
 /// With any curve the corners then lie on a board, once the shift is corrected.
@@ -123,7 +123,7 @@ TEST(EstimateAndCorrectToneCurve, ReturnsGammaOfGrayValuesWithoutLensOrCornerNoi
   const Board board = synthetic_board(false);
   auto without_noise = CodedCamera{2, 1.5}.views(8, 4), of_another = without_noise;
   for (BoardView& view : without_noise) {
-    for (TagDetection& tag : view.seen.tags) {
+    for (TagDetection& tag : view.detection.tags) {
       tag.corner_sds_px.fill(0);
       for (auto& outline : tag.tone_curve_fits) outline.corner_sds_px.fill(0);
     }
@@ -142,8 +142,8 @@ TEST(EstimateAndCorrectToneCurve, ReturnsGammaOfGrayValuesIfHalfOfViewsLackCurve
   auto views = CodedCamera{1, 1.5}.views(4, 5);
   for (const BoardView& view : CodedCamera{1, 1}.views(4, 6)) {
     views.push_back(view);
-    views.back().seen.curve_costs = {0, 40};
-    for (TagDetection& tag : views.back().seen.tags) tag.tone_curve_fits.clear();
+    views.back().detection.curve_costs = {0, 40};
+    for (TagDetection& tag : views.back().detection.tags) tag.tone_curve_fits.clear();
   }
   const double by_levels = estimate_tone_curve_gamma(sum_tone_curve_costs(views));
   EXPECT_GT(by_levels, 1.2);
@@ -153,9 +153,9 @@ TEST(EstimateAndCorrectToneCurve, ReturnsGammaOfGrayValuesIfHalfOfViewsLackCurve
 TEST(EstimateAndCorrectToneCurve, ReturnsOneWhenViewsAreAlreadyCorrected) {
   auto views = CodedCamera{2, 2}.views(8, 7);
   estimate_and_correct_tone_curve(views, synthetic_board(false));
-  const auto once = views[0].seen.tags[0].corners_px;
+  const auto once = views[0].detection.tags[0].corners_px;
   EXPECT_EQ(estimate_and_correct_tone_curve(views, synthetic_board(false)), 1);
-  EXPECT_EQ(views[0].seen.tags[0].corners_px, once);
+  EXPECT_EQ(views[0].detection.tags[0].corners_px, once);
 }
 
 TEST(EstimateLens, ReturnsAllViewsCorrectedForEstimatedToneCurve) {
@@ -172,12 +172,13 @@ TEST(EstimateLens, ReturnsAllViewsCorrectedForEstimatedToneCurve) {
   EXPECT_EQ(lens.gamma, gamma);
   ASSERT_EQ(lens.views.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
-    ASSERT_EQ(lens.views[i].seen.tags.size(), expected[i].seen.tags.size());
-    for (std::size_t k = 0; k < expected[i].seen.tags.size(); ++k) {
-      EXPECT_EQ(lens.views[i].seen.tags[k].corners_px, expected[i].seen.tags[k].corners_px);
+    ASSERT_EQ(lens.views[i].detection.tags.size(), expected[i].detection.tags.size());
+    for (std::size_t k = 0; k < expected[i].detection.tags.size(); ++k) {
+      EXPECT_EQ(lens.views[i].detection.tags[k].corners_px,
+                expected[i].detection.tags[k].corners_px);
     }
   }
-  EXPECT_NE(expected[0].seen.tags[0].corners_px, views[0].seen.tags[0].corners_px);
+  EXPECT_NE(expected[0].detection.tags[0].corners_px, views[0].detection.tags[0].corners_px);
 }
 
 }  // namespace

@@ -26,9 +26,9 @@ TEST(FindInPlaceRotationCaptures, ReturnsShortArcStatusForArcOf80Degrees) {
 TEST(FindInPlaceRotationCaptures, ReturnsAlikeStatusForCapturesAtOneYaw) {
   RotationScene scene;
   scene.arc_rad = 1e-3;
-  EXPECT_EQ(find_status(scene), RotationStatus::alike);
+  EXPECT_EQ(find_status(scene), RotationStatus::single_yaw);
   Random random(3);
-  EXPECT_EQ(find_status(scene, with_noise(scene.frames(0.3), random)), RotationStatus::alike);
+  EXPECT_EQ(find_status(scene, with_noise(scene.frames(0.3), random)), RotationStatus::single_yaw);
 }
 
 TEST(FindInPlaceRotationCaptures, ReturnsTooFewCapturesStatusForOneOrTwoCaptures) {
@@ -81,7 +81,7 @@ TEST(FindInPlaceRotationCaptures, ReturnsMovedStatusWhenAxisMovesBetweenCaptures
     scene.axis_m = {-0.3 + 0.05 * k, 0.1 * (k % 3)};
     frames.push_back(scene.frames()[static_cast<std::size_t>(k)]);
   }
-  EXPECT_EQ(find_status(scene, frames), RotationStatus::moved);
+  EXPECT_EQ(find_status(scene, frames), RotationStatus::axis_moved);
 }
 
 }  // namespace

@@ -38,7 +38,7 @@ TEST(FindInPlaceRotationCaptures, ReturnsTrueHeightsYawsAxesAndLeverArm) {
   EXPECT_EQ(rotation.captures[23].height, 1U);
   EXPECT_NEAR(rotation.captures[0].yaw_rad, scene.first_rad, 1e-3);
   EXPECT_THAT(rotation.lever_arm_m, IsNear(scene.lever_arm_m, 1e-4));
-  EXPECT_TRUE(rotation.rejected.empty());
+  EXPECT_TRUE(rotation.rejected_captures.empty());
 }
 
 TEST(FindInPlaceRotationCaptures, YieldsExactAxisFromTwoLampsAndThreeCaptures) {
@@ -71,8 +71,8 @@ TEST(FindInPlaceRotationCaptures, RejectsCapturesOfHeightWithOnlyTwoCaptures) {
       find_in_place_rotation_captures(frames, scene.map, scene.camera);
   ASSERT_EQ(rotation.status, RotationStatus::ok);
   EXPECT_EQ(rotation.heights.size(), 1U);
-  ASSERT_EQ(rotation.rejected.size(), 2U);
-  EXPECT_EQ(rotation.rejected[1].image, "13.png");
+  ASSERT_EQ(rotation.rejected_captures.size(), 2U);
+  EXPECT_EQ(rotation.rejected_captures[1].image, "13.png");
 }
 
 /// One third of the captures with a large error of one lamp and the noise of a poor detector.
@@ -89,7 +89,7 @@ TEST(FitRotationAxis, RejectsDisplacedDetectionsInThirdOfCaptures) {
   const RotationCaptures rotation =
       find_in_place_rotation_captures(frames, scene.map, scene.camera);
   ASSERT_EQ(rotation.status, RotationStatus::ok);
-  EXPECT_TRUE(rotation.rejected.empty());
+  EXPECT_TRUE(rotation.rejected_captures.empty());
   const RotationFit found = fit_rotation_axis(rotation, scene.camera);
   expect_axis(found, scene, 0.01);
   std::vector<std::pair<std::string, int>> named;
@@ -112,8 +112,8 @@ TEST(FindInPlaceRotationCaptures, RejectsCaptureWithMisidentifiedLamp) {
   const RotationCaptures rotation =
       find_in_place_rotation_captures(frames, scene.map, scene.camera);
   ASSERT_EQ(rotation.status, RotationStatus::ok);
-  ASSERT_EQ(rotation.rejected.size(), 1U);
-  EXPECT_EQ(rotation.rejected[0].image, "4.png");
+  ASSERT_EQ(rotation.rejected_captures.size(), 1U);
+  EXPECT_EQ(rotation.rejected_captures[0].image, "4.png");
   expect_axis(fit_rotation_axis(rotation, scene.camera), scene, 1e-6);
 }
 

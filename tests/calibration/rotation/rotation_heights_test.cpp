@@ -57,7 +57,7 @@ TEST(FindInPlaceRotationCaptures, SeparatesFourHeightsWithinTwentyCentimeters) {
     Random random(static_cast<unsigned>(seed));
     const RotationCaptures rotation = find_captures(scene, with_noise(scene.frames(0.1), random));
     EXPECT_EQ(rotation.heights.size(), 4U);
-    EXPECT_TRUE(rotation.rejected.empty());
+    EXPECT_TRUE(rotation.rejected_captures.empty());
   }
 }
 

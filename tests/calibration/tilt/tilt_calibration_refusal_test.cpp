@@ -34,7 +34,8 @@ TEST_F(EstimateTiltFromLampsFailure, ReportsUndeterminedForNoneOrOneCapture) {
   EXPECT_THAT(rejection_message(drive(rig, 1, random, 0.1)), HasSubstr("there is one"));
 }
 
-TEST_F(EstimateTiltFromLampsFailure, ReportsNoUsableCaptureForTwoUnknownOrMirroredLamps) {
+TEST_F(EstimateTiltFromLampsFailure,
+       ReportsNoUsableCaptureForTwoLampsPerCaptureUnknownIdsOrMirroredMap) {
   auto frames = drive(rig, 20, random, 0.1);
   for (Frame& frame : frames) frame.detections.resize(2);
   EXPECT_THAT(rejection_message(frames), HasSubstr("there is none"));

@@ -26,7 +26,7 @@ struct Types {
   Dispersion dispersion;
   Dispersion::UncertainLamp uncertain_lamp;
   Adjustment adjustment;
-  Adjustment::Place place;
+  Adjustment::AdjustedLamp place;
   HistoryEntry entry;
   HistoryEntry::Input input;
   Detection detection;

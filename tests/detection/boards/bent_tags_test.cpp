@@ -52,7 +52,7 @@ TEST(BoardDetector, LocatesCornersOfCurvedTagsWithinHundredthsOfPixel) {
   CaptureSet views = *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
   views.board->distance_m = {0.1, 0.2};
   const FrameRenderer renderer(scene);
-  const BoardDetector detector(scene.board->print);
+  const BoardDetector detector(scene.board->pattern);
   Errors of_long, of_others;
   for (std::size_t index = 0; index < 6; ++index) {
     const BoardShot shot = make_simulated_board_capture(scene, views, index);

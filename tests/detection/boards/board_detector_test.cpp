@@ -55,8 +55,8 @@ class BoardDetectorOnRenderedBoard : public testing::TestWithParam<const char*> 
 TEST_P(BoardDetectorOnRenderedBoard, DetectsAllTagsWithAccurateCorners) {
   const BoardDetection seen = BoardDetector(board).detect_board(image);
   EXPECT_EQ(seen.tags.size(), find_true_corners().size());
-  EXPECT_TRUE(seen.foreign.empty());
-  EXPECT_EQ(seen.unusable, 0);
+  EXPECT_TRUE(seen.foreign_tags.empty());
+  EXPECT_EQ(seen.num_unusable_tags, 0);
   EXPECT_LT(rms_px(seen), 0.03);  // 0.019 and 0.013 over all views; 0.5 with the origin wrong
 }
 
@@ -98,7 +98,7 @@ TEST_P(BoardDetectorOnRenderedBoard, ReportsTagsWithOtherIdsAsForeign) {
   other.first_id = 100;
   const BoardDetection seen = BoardDetector(other).detect_board(image);
   EXPECT_TRUE(seen.tags.empty());
-  EXPECT_GT(seen.foreign.size(), 10U);
+  EXPECT_GT(seen.foreign_tags.size(), 10U);
 }
 
 TEST_P(BoardDetectorOnRenderedBoard, RejectsTagsDetectedTwice) {
@@ -106,7 +106,7 @@ TEST_P(BoardDetectorOnRenderedBoard, RejectsTagsDetectedTwice) {
   cv::hconcat(image, image, twice);
   const BoardDetection seen = BoardDetector(board).detect_board(twice);
   EXPECT_TRUE(seen.tags.empty()) << seen.tags.size();
-  EXPECT_GT(seen.unusable, 20);
+  EXPECT_GT(seen.num_unusable_tags, 20);
 }
 
 TEST_P(BoardDetectorOnRenderedBoard, ReturnsNoTagsForTinyImages) {

@@ -48,7 +48,7 @@ struct Step {
     edge.middle = {100, 100};
     edge.along = {1, 0};
     edge.across = {0, 1};
-    edge.half_px = 20;
+    edge.half_length_px = 20;
     return edge;
   }
 
@@ -66,7 +66,7 @@ TEST(FitEdgeCurveAndBlur, RecoversEdgeExactlyWithoutNoise) {
   const auto fit = fit_edge_curve_and_blur(edge, step.pixels(), {});
   ASSERT_TRUE(fit);
   step.expect_found(edge, 1e-3);
-  EXPECT_LT(fit->squares, 1e-3);
+  EXPECT_LT(fit->sum_of_squares, 1e-3);
   EXPECT_FALSE(fit->is_saturated);
 }
 
@@ -79,7 +79,7 @@ TEST(FitEdgeCurveAndBlur, RecoversEdgeExactlyWithGivenToneCurve) {
     EdgeCurve without = step.start();
     const auto wrong = fit_edge_curve_and_blur(without, step.pixels(), {});
     ASSERT_TRUE(wrong);
-    EXPECT_GT(wrong->squares, 100);
+    EXPECT_GT(wrong->sum_of_squares, 100);
   }
 }
 

@@ -53,19 +53,19 @@ struct Found {
 Found measure(const Scene& scene, std::size_t count, double min_side_px = 0) {
   const CaptureSet set = *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
   const FrameRenderer renderer(scene);
-  const BoardDetector detector(scene.board->print);
+  const BoardDetector detector(scene.board->pattern);
   std::vector<BoardView> views;
   views.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     const BoardShot shot = make_simulated_board_capture(scene, set, i);
     const cv::Mat image = simulate_sensor_image(
-        scene.sensor, renderer.render_board_in_electrons(shot), i, scene.picture);
+        scene.sensor, renderer.render_board_in_electrons(shot), i, scene.processing);
     views.push_back({shot.image, scene.camera.imager_px, detector.detect_board(image)});
   }
   correct_views_for_tone_curve(views, sum_tone_curve_costs(views));
   std::vector<double> blurs_px, ratios;
   for (const BoardView& view : views) {
-    for (const TagDetection& tag : view.seen.tags) {
+    for (const TagDetection& tag : view.detection.tags) {
       for (std::size_t k = 0; k < tag.steps.size(); ++k) {
         const EdgeStep& step = tag.steps[k];
         const double side_px = (tag.corners_px[(k + 1) % 4] - tag.corners_px[k]).norm();
@@ -117,7 +117,7 @@ TEST(EdgeSteps, MedianMtf50MatchesRenderedBlurWithToneCurve) {
   for (const double sigma_px : {0.7, 1.4}) {
     Scene scene = station_scene();
     scene.optics.blur_px = sigma_px;
-    scene.picture.emplace().gamma = 2.2;
+    scene.processing.emplace().gamma = 2.2;
     const Found found = measure(scene, 6);
     ASSERT_GT(found.edges, 100U) << sigma_px;
     const double truth =
@@ -131,7 +131,7 @@ TEST(EdgeSteps, MedianMtf50MatchesRenderedBlurWithToneCurve) {
 TEST(EdgeSteps, BlackToWhiteRatioMoreThanDoublesUnderVeil) {
   const double clean = measure(station_scene(), 3).black_to_white;
   Scene veiled = station_scene();
-  veiled.optics.veil = 0.25;
+  veiled.optics.veiling_glare = 0.25;
   const Found found = measure(veiled, 3);
   ASSERT_GT(found.edges, 100U);
   EXPECT_NEAR(clean, 0.08, 0.02);  // 1.5e5 / 2.4e6, and the black level of the sensor

@@ -35,7 +35,7 @@ class BoardDetectorYield : public testing::TestWithParam<Pictures> {
  protected:
   const Scene scene =
       read_scene_file(std::string(VLP_SOURCE_DIR "/datasets/") + GetParam().scene + "/scene.yaml");
-  const Board& board = scene.board->print;
+  const Board& board = scene.board->pattern;
 
   cv::Mat image(const FrameRenderer& renderer, const CaptureSet& set, std::size_t index) const {
     const BoardShot shot = make_simulated_board_capture(scene, set, index);

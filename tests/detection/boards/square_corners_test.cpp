@@ -96,7 +96,7 @@ TEST(SquareCorners, DetectsAllCornersOfOpencvCharucoBoard) {
     const cv::Mat image = drawn_by_opencv(board);
     const BoardDetection seen = BoardDetector(board).detect_board(image);
     EXPECT_EQ(seen.tags.size(), list_board_tags(board).size());
-    EXPECT_TRUE(seen.foreign.empty());
+    EXPECT_TRUE(seen.foreign_tags.empty());
     expect_all_corners(board, seen);
   }
 }
@@ -157,7 +157,7 @@ TEST(SquareCorners, DetectsChessboardAccuratelyInLargeImage) {
   BoardDetection seen = BoardDetector(board).detect_board(image);
   for (PointDetection& point : seen.points) point.pixel -= Eigen::Vector2d(at.x, at.y);
   expect_all_corners(board, seen);
-  auto shown = count_chessboard_squares(image);  // either way around
+  auto shown = detect_chessboard_size_in_squares(image);  // either way around
   std::sort(shown.begin(), shown.end());
   EXPECT_EQ(shown, (std::array{6, 9}));
 }
@@ -174,7 +174,7 @@ TEST(SquareCorners, ReturnsNoCornersForIncompleteChessboard) {
 
 TEST(OtherTags, ChessboardSquaresAreCountedAndMarkerDictionaryIsNamed) {
   const cv::Mat image = drawn_chessboard(squares(BoardKind::chessboard, 9, 6));
-  const auto [cols, rows] = count_chessboard_squares(image);
+  const auto [cols, rows] = detect_chessboard_size_in_squares(image);
   EXPECT_EQ(std::max(cols, rows), 9);
   EXPECT_EQ(std::min(cols, rows), 6);
   Board charuco = squares(BoardKind::charuco, 7, 5);

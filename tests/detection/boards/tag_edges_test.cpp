@@ -52,7 +52,7 @@ template <typename Wanted>
 CornerErrors measure_errors(const Scene& scene, const CaptureSet& views, std::size_t images,
                             Wanted wanted) {
   const FrameRenderer renderer(scene);
-  const BoardDetector detector(scene.board->print);
+  const BoardDetector detector(scene.board->pattern);
   CornerErrors errors;
   for (std::size_t index = 0; index < images; ++index) {
     const BoardShot shot = make_simulated_board_capture(scene, views, index);
@@ -61,7 +61,7 @@ CornerErrors measure_errors(const Scene& scene, const CaptureSet& views, std::si
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
     }
     const cv::Mat image = simulate_sensor_image(
-        scene.sensor, renderer.render_board_in_electrons(shot), index, scene.picture);
+        scene.sensor, renderer.render_board_in_electrons(shot), index, scene.processing);
     for (const TagDetection& tag : detector.detect_board(image).tags) {
       if (wanted(truth[tag.id])) errors.add(tag.corners_px, truth[tag.id]);
     }

@@ -31,10 +31,10 @@ BoardView image(double gamma, double clearly) {
   TagDetection tag{7, corners(0), curvatures(0), sds(0)};
   for (const double each : kGammas) {
     const double x = std::log(each);
-    view.seen.curve_costs.push_back(300 + clearly * std::pow(x - std::log(gamma), 2));
+    view.detection.curve_costs.push_back(300 + clearly * std::pow(x - std::log(gamma), 2));
     if (each != 1) tag.tone_curve_fits.push_back({corners(x), curvatures(x), sds(x)});
   }
-  view.seen.tags.push_back(tag);
+  view.detection.tags.push_back(tag);
   return view;
 }
 
@@ -47,26 +47,26 @@ TEST(CorrectViewsForToneCurve, InterpolatesCornersAndCurvaturesAtEstimatedGamma)
     std::vector<BoardView> images{image(gamma, 500)};
     EXPECT_NEAR(apply_curve_of_levels(images), gamma, 1e-9);
     const double x = std::log(gamma);
-    EXPECT_NEAR(images[0].seen.tags[0].corners_px[3].x(), 100 - 0.5 * x + 0.1 * x * x, 1e-9);
-    EXPECT_NEAR(images[0].seen.tags[0].corners_px[3].y(), 50 + 0.3 * x, 1e-9);
-    const EdgeCurvature& bow = images[0].seen.tags[0].curvatures[2];
+    EXPECT_NEAR(images[0].detection.tags[0].corners_px[3].x(), 100 - 0.5 * x + 0.1 * x * x, 1e-9);
+    EXPECT_NEAR(images[0].detection.tags[0].corners_px[3].y(), 50 + 0.3 * x, 1e-9);
+    const EdgeCurvature& bow = images[0].detection.tags[0].curvatures[2];
     EXPECT_NEAR(bow.quadratic_px, 0.2 + 0.05 * x, 1e-9);
     EXPECT_NEAR(bow.cubic_px, -0.01 * x, 1e-9);
     EXPECT_EQ(bow.reach, 0.8);
-    EXPECT_NEAR(images[0].seen.tags[0].corner_sds_px[1], 0.02 + 0.01 * x, 1e-9);
+    EXPECT_NEAR(images[0].detection.tags[0].corner_sds_px[1], 0.02 + 0.01 * x, 1e-9);
   }
 }
 
 TEST(CorrectViewsForToneCurve, InterpolatesCornerSdsLinearlyInLogGamma) {
   std::vector<BoardView> images{image(1.8, 500)};
-  TagDetection& tag = images[0].seen.tags[0];
+  TagDetection& tag = images[0].detection.tags[0];
   const double at = std::log(1.8 / 1.6) / std::log(2.0 / 1.6);
   for (std::size_t i = 0; i < 4; ++i)
     tag.tone_curve_fits[i].corner_sds_px[0] = std::array{0.024, 0.024, 0.026, 0.19}[i];
   tag.tone_curve_fits[2].corner_sds_px[1] = 0;  // unknown for one of the tone curves
   apply_curve_of_levels(images);
-  EXPECT_NEAR(images[0].seen.tags[0].corner_sds_px[0], 0.024 + at * 0.002, 1e-9);
-  EXPECT_EQ(images[0].seen.tags[0].corner_sds_px[1], 0);
+  EXPECT_NEAR(images[0].detection.tags[0].corner_sds_px[0], 0.024 + at * 0.002, 1e-9);
+  EXPECT_EQ(images[0].detection.tags[0].corner_sds_px[1], 0);
 }
 
 TEST(CorrectViewsForToneCurve, CorrectsAllViewsForOneCommonGamma) {
@@ -74,7 +74,7 @@ TEST(CorrectViewsForToneCurve, CorrectsAllViewsForOneCommonGamma) {
   const double gamma = apply_curve_of_levels(images);
   EXPECT_NEAR(gamma, 1.76, 0.03);
   for (const BoardView& each : images) {
-    EXPECT_NEAR(each.seen.tags[0].corners_px[0].y(), 50 + 0.3 * std::log(gamma), 1e-9);
+    EXPECT_NEAR(each.detection.tags[0].corners_px[0].y(), 50 + 0.3 * std::log(gamma), 1e-9);
   }
 }
 
@@ -82,31 +82,31 @@ TEST(CorrectViewsForToneCurve, KeepsCornersWhenOnlyOneOfManyViewsShowsCurve) {
   std::vector<BoardView> images(12, image(1, 500));
   images.push_back(image(2.4, 1e7));
   EXPECT_EQ(apply_curve_of_levels(images), 1);
-  EXPECT_EQ(images.back().seen.tags[0].corners_px[0].x(), 100);
+  EXPECT_EQ(images.back().detection.tags[0].corners_px[0].x(), 100);
 }
 
 TEST(CorrectViewsForToneCurve, KeepsCornersWhenGammaIsCloseToOne) {
   std::vector<BoardView> images{image(1.15, 500)};
   EXPECT_EQ(apply_curve_of_levels(images), 1);
-  EXPECT_EQ(images[0].seen.tags[0].corners_px[0].x(), 100);
+  EXPECT_EQ(images[0].detection.tags[0].corners_px[0].x(), 100);
 }
 
 TEST(CorrectViewsForToneCurve, KeepsOnlyCornersOfViewsWithoutToneCurve) {
   BoardView plain = image(1, 500);
-  plain.seen.curve_costs.resize(2);
-  plain.seen.tags[0].tone_curve_fits.clear();
+  plain.detection.curve_costs.resize(2);
+  plain.detection.tags[0].tone_curve_fits.clear();
   std::vector<BoardView> images{plain, image(2, 500), image(2, 500), {"none", {200, 100}, {}}};
   EXPECT_GT(apply_curve_of_levels(images), 1.5);
-  EXPECT_EQ(images[0].seen.tags[0].corners_px[0].x(), 100);
-  EXPECT_LT(images[1].seen.tags[0].corners_px[0].x(), 99.8);
+  EXPECT_EQ(images[0].detection.tags[0].corners_px[0].x(), 100);
+  EXPECT_LT(images[1].detection.tags[0].corners_px[0].x(), 99.8);
 }
 
 TEST(CorrectViewsForToneCurve, KeepsCornersWhenRepeated) {
   std::vector<BoardView> images{image(2, 500)};
   apply_curve_of_levels(images);
-  const auto once = images[0].seen.tags[0].corners_px;
+  const auto once = images[0].detection.tags[0].corners_px;
   EXPECT_EQ(apply_curve_of_levels(images), 1);
-  EXPECT_EQ(images[0].seen.tags[0].corners_px, once);
+  EXPECT_EQ(images[0].detection.tags[0].corners_px, once);
 }
 
 TEST(CorrectViewsForToneCurve, EstimatesGammaOfOneWithoutViewsOrTags) {

@@ -23,12 +23,12 @@ TEST(ComputeBiasAndRepeatability, ReturnsTrueBiasAndScatterOfEachStation) {
   errors.push_back({4, {1, 1}, {}, {}, 2, 0});  // alone at its station
   const auto statistics = compute_bias_and_repeatability(errors, {{"a", {5, 6}, {}, {}}});
   ASSERT_TRUE(statistics);
-  ASSERT_EQ(statistics->stations.size(), 2);
+  ASSERT_EQ(statistics->reference_points.size(), 2);
   EXPECT_EQ(statistics->fixes, 4);
-  EXPECT_EQ(statistics->stations[0].xy_m, Eigen::Vector2d(5, 6));
-  EXPECT_THAT(statistics->stations[1].bias_m, IsNear(Eigen::Vector2d(-3e-3, 0), 1e-15));
-  EXPECT_NEAR(statistics->stations[0].sd_m, std::sqrt(32e-6), 1e-12);
-  EXPECT_NEAR(statistics->scatter_m, std::sqrt(32e-6), 1e-12);
+  EXPECT_EQ(statistics->reference_points[0].xy_m, Eigen::Vector2d(5, 6));
+  EXPECT_THAT(statistics->reference_points[1].bias_m, IsNear(Eigen::Vector2d(-3e-3, 0), 1e-15));
+  EXPECT_NEAR(statistics->reference_points[0].sd_m, std::sqrt(32e-6), 1e-12);
+  EXPECT_NEAR(statistics->repeatability_m, std::sqrt(32e-6), 1e-12);
   EXPECT_EQ(statistics->bias_m, 0);  // 9 of bias^2, and 16 that chance puts there
 }
 
@@ -42,7 +42,7 @@ TEST(ComputeBiasAndRepeatability, MatchesTrueBiasWhenScatterExceedsIt) {
   const auto statistics = compute_bias_and_repeatability(errors, {{"a", {0, 0}, {}, {}}});
   ASSERT_TRUE(statistics);
   // Means of four scatter by as much as the bias is; standard errors are 0.02 and 0.03 mm.
-  EXPECT_NEAR(statistics->scatter_m, 2e-3 * std::sqrt(2), 0.06e-3);
+  EXPECT_NEAR(statistics->repeatability_m, 2e-3 * std::sqrt(2), 0.06e-3);
   EXPECT_NEAR(statistics->bias_m, 1e-3, 0.1e-3);
 }
 

@@ -109,14 +109,14 @@ TEST(CompareHorizontalErrors, CountsPairsAndFixesMissingInEitherRun) {
   EXPECT_EQ(comparison.pairs, 6);
   EXPECT_EQ(comparison.clusters, 6);
   EXPECT_EQ(comparison.larger, 6);
-  EXPECT_EQ(comparison.only_these, 1);
-  EXPECT_EQ(comparison.only_others, 3);
+  EXPECT_EQ(comparison.only_in_fixes, 1);
+  EXPECT_EQ(comparison.only_in_other_fixes, 3);
   EXPECT_NEAR(comparison.mean_difference_m, 1e-2, 2e-4);
 }
 
 TEST(CheckSameImagesInFixes, ThrowsNamingImageMissingInOtherFile) {
-  const FromFile<FixRow> fixes{"a.csv", {fix_at("a", 0, 0)}};
-  const FromFile<FixRow> others{"b.csv", {fix_at("a", 0, 0), fix_at("b", 0, 0)}};
+  const FileRows<FixRow> fixes{"a.csv", {fix_at("a", 0, 0)}};
+  const FileRows<FixRow> others{"b.csv", {fix_at("a", 0, 0), fix_at("b", 0, 0)}};
   EXPECT_THAT(rejection_message([&] { check_same_images_in_fixes(fixes, others); }),
               HasSubstr("b.csv:1: image: 'b' is not in a.csv; 1 of 2"));
   EXPECT_EQ(rejection_message([&] { check_same_images_in_fixes(fixes, fixes); }), "");

@@ -30,8 +30,8 @@ TEST(ComputeErrorStatistics, EachStatisticEqualsSingleError) {
 TEST(ComputeSignedErrorStatistics, ReturnsMeanAsBiasAndMagnitudeStatistics) {
   const SignedErrorStatistics statistics = compute_signed_error_statistics({-3, 1, -1});
   EXPECT_EQ(statistics.bias, -1);
-  EXPECT_EQ(statistics.sizes.median, 1);
-  EXPECT_EQ(statistics.sizes.max, 3);
+  EXPECT_EQ(statistics.magnitudes.median, 1);
+  EXPECT_EQ(statistics.magnitudes.max, 3);
 }
 
 TEST(ComputeErrorPercentiles, Returns100PercentilesWithP90OfErrorStatistics) {

@@ -67,7 +67,7 @@ TEST(ComputeErrorToCrlbRatio, MatchesClosedFormLimitForFourLamps) {
                                   truth, four_lamps(), pinhole(), 0.1, 2);
   ASSERT_TRUE(ratio);
   EXPECT_EQ(ratio->fixes, 1);
-  EXPECT_NEAR(ratio->limit_m, limit_m, 1e-9);
+  EXPECT_NEAR(ratio->crlb_m, limit_m, 1e-9);
   EXPECT_NEAR(ratio->horizontal, 3, 1e-6);
   EXPECT_NEAR(ratio->sd, 1 / std::sqrt(4.0), 1e-6);
 }

@@ -14,15 +14,16 @@ namespace {
 using testing::HasSubstr;
 
 TEST(ComputeFixErrorsAgainstTruth, PairsFixesAndTruthByImageName) {
-  const FromFile<FixRow> fixes{
+  const FileRows<FixRow> fixes{
       "fixes.csv",
       {fix_at("b", 1.003, 2.004, 0.5, 3.1), no_fix("c", "degenerate"), fix_at("a", 0, 0, 0.1)}};
-  const FromFile<TruthRow> truth{
+  const FileRows<TruthRow> truth{
       "truth.csv",
       {{"a", {0, 0}, 0, 0}, {"b", {1, 2}, 0.4, -3.1}, {"c", {0, 0}, 0, 0}, {"d", {0, 0}, 0, 0}}};
   const FixErrors errors = compute_fix_errors_against_truth(fixes, truth, 1e-3);
   EXPECT_EQ(errors.captures, 4);
-  EXPECT_EQ(errors.missing, (std::map<std::string, std::size_t>{{"degenerate", 1}, {"no row", 1}}));
+  EXPECT_EQ(errors.failures_by_status,
+            (std::map<std::string, std::size_t>{{"degenerate", 1}, {"no row", 1}}));
   ASSERT_EQ(errors.errors.size(), 2);
   EXPECT_THAT(errors.errors[0].horizontal_m, IsNear(Eigen::Vector2d(0.003, 0.004), 1e-12));
   EXPECT_NEAR(errors.errors[0].height_m.value(), 0.1, 1e-12);
@@ -32,9 +33,9 @@ TEST(ComputeFixErrorsAgainstTruth, PairsFixesAndTruthByImageName) {
 }
 
 TEST(ComputeFixErrorsAgainstTruth, ThrowsForFixesOfImagesMissingInTruth) {
-  FromFile<FixRow> fixes{"fixes.csv", {fix_at("a", 0, 0), fix_at("x", 0, 0), fix_at("y", 0, 0)}};
+  FileRows<FixRow> fixes{"fixes.csv", {fix_at("a", 0, 0), fix_at("x", 0, 0), fix_at("y", 0, 0)}};
   fixes.rows[1].line = 17;
-  const FromFile<TruthRow> truth{"truth.csv", {{"a", {0, 0}, {}, {}}}};
+  const FileRows<TruthRow> truth{"truth.csv", {{"a", {0, 0}, {}, {}}}};
   const std::string refusal =
       rejection_message([&] { compute_fix_errors_against_truth(fixes, truth, 1e-3); });
   EXPECT_THAT(refusal, HasSubstr("fixes.csv:17: image: 'x' is not in truth.csv"));

@@ -32,7 +32,7 @@ TEST(FindBlobOutline, ReturnsSideLevelAndRiseOfEdges) {
   ASSERT_GT(points.size(), 140U);
   int steep = 0;
   for (const EdgePoint& point : points) {
-    EXPECT_EQ(point.begins, point.pixel.x() < disc.center.x());
+    EXPECT_EQ(point.is_run_begin, point.pixel.x() < disc.center.x());
     EXPECT_EQ(point.pixel.y(), std::round(point.pixel.y()));
     if (disc.cosine(point.pixel) < 0.9) continue;
     ++steep;
@@ -53,8 +53,8 @@ TEST(FindBlobOutline, ReturnsNoPointsAtImageBorderForCutDisc) {
       EXPECT_GT(point.pixel.x(), 2);
       EXPECT_LT(point.pixel.x(), 197);
     }
-    EXPECT_TRUE(
-        std::ranges::any_of(points, [&](const EdgePoint& point) { return point.begins != left; }));
+    EXPECT_TRUE(std::ranges::any_of(
+        points, [&](const EdgePoint& point) { return point.is_run_begin != left; }));
   }
   EXPECT_TRUE(outline_in(cv::Mat(160, 200, CV_8U, cv::Scalar(9))).empty());
 }
@@ -77,7 +77,7 @@ TEST(SelectOutermostEdgePoints, ReturnsFirstBeginAndLastEndOfEachRow) {
                                                     {{60, 6}, 1, 1, false}});
   const auto is = [](double column, double row, bool begins) {
     return testing::AllOf(testing::Field(&EdgePoint::pixel, Vector2d(column, row)),
-                          testing::Field(&EdgePoint::begins, begins));
+                          testing::Field(&EdgePoint::is_run_begin, begins));
   };
   EXPECT_THAT(points, testing::ElementsAre(is(20, 4, true), is(12, 5, true), is(40, 5, false),
                                            is(60, 6, false)));

@@ -57,8 +57,8 @@ TEST(RefineDiscOutline, MeanPointOffsetIsSmallForSmallDiscsWithGradient) {
       const DrawnDisc disc{.radius_px = radius_px, .change = change};
       std::array<double, 2> sums_px{}, counts{};
       for (const EdgePoint& point : refined_in(disc.image(CV_16U), disc)) {
-        sums_px.at(point.begins) += disc.off(point.pixel);
-        ++counts.at(point.begins);
+        sums_px.at(point.is_run_begin) += disc.off(point.pixel);
+        ++counts.at(point.is_run_begin);
       }
       const double left_px = sums_px[1] / counts[1], right_px = sums_px[0] / counts[0];
       EXPECT_NEAR(left_px, 0, 0.06) << radius_px << ", " << change;

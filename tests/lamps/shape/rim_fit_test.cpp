@@ -35,7 +35,7 @@ TEST(EstimateOutlineOffset, ReturnsExactOffsetWithoutNoise) {
   for (const bool round : {true, false}) {
     const auto shift = estimate_outline_offset(pieces_of_circle(12, 0, random), round);
     ASSERT_TRUE(shift);
-    EXPECT_LT((shift->px - kShift).norm(), 1e-9);
+    EXPECT_LT((shift->offset_px - kShift).norm(), 1e-9);
     EXPECT_NEAR(shift->num_inliers, 12, 1e-6);
   }
 }
@@ -49,7 +49,7 @@ TEST(EstimateOutlineOffset, OffsetCovarianceMatchesScatter) {
       for (int i = 0; i < draws; ++i) {
         const auto shift = estimate_outline_offset(pieces_of_circle(24, noise, random), round);
         ASSERT_TRUE(shift);
-        squares += (shift->px - kShift).squaredNorm();
+        squares += (shift->offset_px - kShift).squaredNorm();
         stated += shift->covariance.trace();
       }
       // A scatter below the given standard deviations does not reduce the covariance.
@@ -64,7 +64,7 @@ TEST(EstimateOutlineOffset, OffsetIsAccurateDespiteOneOutlierPiece) {
   pieces[3].step_depth_px += 2;
   const auto shift = estimate_outline_offset(pieces, true);
   ASSERT_TRUE(shift);
-  EXPECT_LT((shift->px - kShift).norm(), 4 * std::sqrt(shift->covariance.trace()));
+  EXPECT_LT((shift->offset_px - kShift).norm(), 4 * std::sqrt(shift->covariance.trace()));
   EXPECT_LT(shift->num_inliers, 13);
 }
 

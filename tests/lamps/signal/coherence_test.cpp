@@ -19,7 +19,7 @@ const cv::Size kPictureSize(200, 160);
 double coherence_in(const cv::Mat& pixels, const DrawnLamp& lamp) {
   const ImageView image = to_image_view(pixels);
   const Eigen::Vector2d half(lamp.radius_px, lamp.radius_px);
-  return compute_stripe_coherence(
+  return compute_stripe_coherence_between_parts(
       image, find_chords_in_ellipse(lamp.center - half, lamp.center + half, image.size()),
       estimate_image_background(image), lamp.stripes.period_lines);
 }
@@ -75,9 +75,9 @@ TEST(ComputeStripeCoherence, HardlyEverExceedsMinimumForIndependentParts) {
       }
     }
     const ImageView image = to_image_view(pixels);
-    coherent +=
-        compute_stripe_coherence(image, find_chords_in_ellipse({40, 40}, {80, 80}, image.size()),
-                                 {10, 1, 14.5}, 4 * patch) > kMinCoherence;
+    coherent += compute_stripe_coherence_between_parts(
+                    image, find_chords_in_ellipse({40, 40}, {80, 80}, image.size()), {10, 1, 14.5},
+                    4 * patch) > kMinCoherence;
   }
   EXPECT_LE(coherent, 10);
 }
@@ -88,8 +88,8 @@ TEST(ComputeStripeCoherence, ReturnsZeroForTooFewScanlines) {
   const cv::Mat pixels(120, 120, CV_8U, cv::Scalar(10));
   const ImageView image = to_image_view(pixels);
   EXPECT_EQ(
-      compute_stripe_coherence(image, find_chords_in_ellipse({200, 20}, {240, 60}, image.size()),
-                               {10, 1, 14.5}, 8),
+      compute_stripe_coherence_between_parts(
+          image, find_chords_in_ellipse({200, 20}, {240, 60}, image.size()), {10, 1, 14.5}, 8),
       0);
 }
 

@@ -35,8 +35,8 @@ std::vector<LabeledLight> make_lights(const std::vector<LampSpec>& lamps, std::s
 }
 
 /// Returns the confusion matrix of a classifier for lights of lamps that may differ from its own.
-Confusion compute_confusion_matrix(const LampClassifier& classifier,
-                                   std::span<const LabeledLight> lights) {
+ConfusionMatrix compute_confusion_matrix(const LampClassifier& classifier,
+                                         std::span<const LabeledLight> lights) {
   return cross_validate_lamp_classifier(lights,
                                         [&](std::span<const LabeledLight>) { return classifier; });
 }
@@ -49,7 +49,8 @@ TEST(LampClassifier, IdentifiesNearlyAllLightsOfTrainedLamps) {
   const LampClassifier classifier = fit_lamp_classifier(make_lights(kLamps, 30, 1));
   ASSERT_EQ(classifier.lamps.size(), 3);
   EXPECT_EQ(classifier.lamps[0].lamp, 4);
-  const Confusion confusion = compute_confusion_matrix(classifier, make_lights(kLamps, 100, 2));
+  const ConfusionMatrix confusion =
+      compute_confusion_matrix(classifier, make_lights(kLamps, 100, 2));
   EXPECT_EQ(confusion.lamps, (std::vector<int>{4, 7, 9}));
   EXPECT_EQ(confusion.count_wrongly_identified(), 0);
   EXPECT_GE(confusion.count_correctly_identified(), 297);
@@ -59,7 +60,8 @@ TEST(LampClassifier, IdentifiesNearlyAllLightsOfTrainedLamps) {
 
 TEST(LampClassifier, SeparatesLampsOfEqualPeriodByDuty) {
   const LampClassifier classifier = fit_lamp_classifier(make_lights(kTwins, 40, 1));
-  const Confusion confusion = compute_confusion_matrix(classifier, make_lights(kTwins, 100, 2));
+  const ConfusionMatrix confusion =
+      compute_confusion_matrix(classifier, make_lights(kTwins, 100, 2));
   EXPECT_EQ(confusion.count_wrongly_identified(), 0);
   EXPECT_GE(confusion.count_correctly_identified(), 150) << confusion.counts;
 }
@@ -67,7 +69,7 @@ TEST(LampClassifier, SeparatesLampsOfEqualPeriodByDuty) {
 TEST(LampClassifier, ReportsUnknownForUntrainedLamps) {
   const LampClassifier classifier = fit_lamp_classifier(make_lights(kLamps, 30, 1));
   ASSERT_EQ(classifier.lamps.size(), 3);
-  const Confusion confusion =
+  const ConfusionMatrix confusion =
       compute_confusion_matrix(classifier, make_lights({{5, 11.9, 0.5}, {6, 6, 0.5}}, 50, 2));
   EXPECT_EQ(confusion.count_unidentified(), 100);
 }
@@ -75,7 +77,7 @@ TEST(LampClassifier, ReportsUnknownForUntrainedLamps) {
 TEST(LampClassifier, ReportsUnknownForInseparableLamps) {
   const std::vector<LampSpec> similar_lamps{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 13.35, 0.5}};
   const LampClassifier classifier = fit_lamp_classifier(make_lights(similar_lamps, 30, 1));
-  const Confusion confusion =
+  const ConfusionMatrix confusion =
       compute_confusion_matrix(classifier, make_lights(similar_lamps, 100, 2));
   EXPECT_EQ(confusion.counts(0, 0), 100);
   EXPECT_GE(confusion.count_unidentified(), 190);
@@ -93,12 +95,13 @@ TEST(FitLampClassifier, ExcludesWronglyLabeledLightsFromTraining) {
   for (const auto& lamp : classifier.lamps) used += lamp.examples;
   EXPECT_LE(used, 87);
   EXPECT_GE(used, 80);
-  const Confusion confusion = compute_confusion_matrix(classifier, make_lights(kLamps, 100, 2));
+  const ConfusionMatrix confusion =
+      compute_confusion_matrix(classifier, make_lights(kLamps, 100, 2));
   EXPECT_EQ(confusion.count_wrongly_identified(), 0);
   EXPECT_GE(confusion.count_correctly_identified(), 297);
 }
 
-TEST(LampClassifier, RejectsDeviatingPeriodWhenStripesAreUnclear) {
+TEST(LampClassifier, AcceptsDeviatingPeriodOfClearStripesButRejectsItOfUnclear) {
   const LampClassifier classifier = fit_lamp_classifier(make_lights(kLamps, 30, 1));
   Stripes stripes = make_lights(kLamps, 1, 3)[1].stripes;
   ASSERT_EQ(identify_lamp_by_classifier(classifier, stripes), 7);
@@ -123,7 +126,7 @@ TEST(FitLampClassifier, ReturnsSameClassifierForReversedOrderOfLights) {
 }
 
 TEST(CrossValidateLampClassifier, CountsEachLightOnce) {
-  const Confusion confusion =
+  const ConfusionMatrix confusion =
       cross_validate_lamp_classifier(make_lights(kLamps, 40, 1), fit_lamp_classifier);
   EXPECT_EQ(confusion.counts.sum(), 120);
   EXPECT_EQ(confusion.count_wrongly_identified(), 0);
@@ -136,7 +139,7 @@ TEST(CrossValidateLampClassifier, ExcludesHeldOutImagesFromTraining) {
   auto lights = make_lights(kLamps, 40, 1);
   std::erase_if(lights,
                 [](const LabeledLight& light) { return light.lamp == 9 && light.image % 5 != 0; });
-  const Confusion confusion = cross_validate_lamp_classifier(lights, fit_lamp_classifier);
+  const ConfusionMatrix confusion = cross_validate_lamp_classifier(lights, fit_lamp_classifier);
   EXPECT_EQ(confusion.counts(2, 2), 0);
   EXPECT_EQ(confusion.counts(2, 3), 8);
 }
@@ -147,7 +150,8 @@ TEST(CrossValidateLampClassifier, MisidentifiesLampsWhenTrainingFunctionSwapsThe
     std::swap(classifier.lamps.front().lamp, classifier.lamps.back().lamp);
     return classifier;
   };
-  const Confusion confusion = cross_validate_lamp_classifier(make_lights(kLamps, 40, 1), mistaken);
+  const ConfusionMatrix confusion =
+      cross_validate_lamp_classifier(make_lights(kLamps, 40, 1), mistaken);
   EXPECT_GE(confusion.count_wrongly_identified(), 78);
 }
 

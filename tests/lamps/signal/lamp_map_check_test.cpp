@@ -72,8 +72,8 @@ TEST(FindAmbiguousLamps, ReturnsPairOfLampsWithNearlyEqualFrequencies) {
   ASSERT_EQ(pairs.size(), 1);
   EXPECT_EQ(pairs[0].first, 2);
   EXPECT_EQ(pairs[0].second, 3);
-  EXPECT_NEAR(pairs[0].gap, 0.012, 1e-9);
-  EXPECT_GT(pairs[0].needed, kLampDrift);
+  EXPECT_NEAR(pairs[0].frequency_gap, 0.012, 1e-9);
+  EXPECT_GT(pairs[0].required_gap, kLampDrift);
 }
 
 TEST(FindAmbiguousLamps, ReturnsNoneForEqualFrequenciesWithDifferentDuties) {
@@ -128,7 +128,7 @@ TEST(FindAmbiguousLamps, ReportedNeededDifferenceSufficesForIdentification) {
   conditions.exposure_s.reset();
   const auto pairs = find_ambiguous_lamps({{lamp(1, 2500), lamp(2, 2501)}}, conditions);
   ASSERT_EQ(pairs.size(), 1);
-  const auto needed = pairs[0].needed;
+  const auto needed = pairs[0].required_gap;
   const LampMap map{{lamp(1, 2500), lamp(2, 2500 * (1 + needed))}};
   Random random(6);
   int right = 0, wrong = 0;

@@ -32,7 +32,7 @@ LineProfile make_profile(double period_lines, double sigma_lines, double noise =
 TEST(FitPeriodicSignal, ReturnsSmallUnexplainedFractionForSquareWaveWithEnvelope) {
   for (const double period : {9.0, 15.0, 26.5}) {
     const PeriodFit fit = fit_periodic_signal(make_profile(period, 2 * period), period);
-    EXPECT_LT(fit.unexplained, 0.12) << period;
+    EXPECT_LT(fit.unexplained_fraction, 0.12) << period;
     EXPECT_NEAR(fit.depth, 4 / std::numbers::pi, 0.2) << period;
     EXPECT_GT(fit.periods, 4) << period;
   }
@@ -40,14 +40,14 @@ TEST(FitPeriodicSignal, ReturnsSmallUnexplainedFractionForSquareWaveWithEnvelope
 
 TEST(FitPeriodicSignal, ReturnsLargeUnexplainedFractionForOtherPeriod) {
   const LineProfile profile = make_profile(20, 40);
-  EXPECT_GT(fit_periodic_signal(profile, 25).unexplained, 0.6);
-  EXPECT_GT(fit_periodic_signal(profile, 16).unexplained, 0.6);
+  EXPECT_GT(fit_periodic_signal(profile, 25).unexplained_fraction, 0.6);
+  EXPECT_GT(fit_periodic_signal(profile, 16).unexplained_fraction, 0.6);
 }
 
 TEST(FitPeriodicSignal, ReturnsUnexplainedFractionOneWithoutSignal) {
-  EXPECT_EQ(fit_periodic_signal({0, 1, {}}, 10).unexplained, 1);
-  EXPECT_EQ(fit_periodic_signal({0, 1, std::vector<double>(50, 0)}, 10).unexplained, 1);
-  EXPECT_EQ(fit_periodic_signal({0, 1, std::vector<double>(50, 3)}, 100).unexplained, 1)
+  EXPECT_EQ(fit_periodic_signal({0, 1, {}}, 10).unexplained_fraction, 1);
+  EXPECT_EQ(fit_periodic_signal({0, 1, std::vector<double>(50, 0)}, 10).unexplained_fraction, 1);
+  EXPECT_EQ(fit_periodic_signal({0, 1, std::vector<double>(50, 3)}, 100).unexplained_fraction, 1)
       << "half a period";
 }
 
@@ -55,7 +55,7 @@ TEST(FindBestFittingPeriod, ReturnsTruePeriodInNoise) {
   for (const double period : {9.0, 15.0, 26.5}) {
     const PeriodFit fit = find_best_fitting_period(make_profile(period, 2 * period, 5), 4);
     EXPECT_NEAR(fit.period_lines / period, 1, 0.01) << period;
-    EXPECT_LT(fit.unexplained, 0.3) << period;
+    EXPECT_LT(fit.unexplained_fraction, 0.3) << period;
   }
 }
 
@@ -65,7 +65,7 @@ TEST(FindBestFittingPeriod, ReturnsLargeUnexplainedFractionForPureNoise) {
   for (int i = 0; i < 50; ++i) {
     LineProfile profile{0, 1, {}};
     for (int k = 0; k < 200; ++k) profile.levels.push_back(50 + 5 * random.normal());
-    explained += find_best_fitting_period(profile, 4).unexplained < 0.45;
+    explained += find_best_fitting_period(profile, 4).unexplained_fraction < 0.45;
   }
   EXPECT_EQ(explained, 0);
 }

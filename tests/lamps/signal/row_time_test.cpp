@@ -43,10 +43,10 @@ TEST(EstimateRowTimeCandidates, ReturnsExactRowTimeWithoutNoise) {
   std::vector<MeasuredPeriod> lights;
   for (const Lamp& lamp : kMap.lamps) add(lights, *lamp.frequency_hz, 1, 0, random);
   const auto result = find_row_time(lights, kMap);
-  ASSERT_TRUE(result.found) << result.problem;
-  EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-12 * kTrue_s);
-  EXPECT_EQ(result.found->lamps, 5);
-  EXPECT_EQ(result.found->lights, 5);
+  ASSERT_TRUE(result.row_time) << result.problem;
+  EXPECT_NEAR(result.row_time->row_time_s, kTrue_s, 1e-12 * kTrue_s);
+  EXPECT_EQ(result.row_time->lamps, 5);
+  EXPECT_EQ(result.row_time->lights, 5);
 }
 
 TEST(EstimateRowTimeCandidates, RowTimeSdMatchesScatter) {
@@ -60,8 +60,8 @@ TEST(EstimateRowTimeCandidates, RowTimeSdMatchesScatter) {
       add(lights, *lamp.frequency_hz * std::exp(0.005 * random.normal()), 20, 0.002, random);
     }
     const auto result = find_row_time(lights, kMap);
-    ASSERT_TRUE(result.found) << result.problem;
-    chi_square += std::pow((result.found->row_time_s - kTrue_s) / result.found->sd_s, 2);
+    ASSERT_TRUE(result.row_time) << result.problem;
+    chi_square += std::pow((result.row_time->row_time_s - kTrue_s) / result.row_time->sd_s, 2);
   }
   // The scatter of five lamps is known to a third: Student's t has a variance of 2.
   EXPECT_GT(chi_square / draws, 0.7);
@@ -75,9 +75,9 @@ TEST(EstimateRowTimeCandidates, RowTimeIsAccurateDespiteOneWrongLampFrequency) {
     lights.push_back({1 / (frequency_hz * kTrue_s), {}});
   }
   const auto result = find_row_time(lights, kMap);
-  ASSERT_TRUE(result.found) << result.problem;
-  EXPECT_NEAR(result.found->row_time_s / kTrue_s, 1, 0.006);
-  EXPECT_LT(std::abs(result.found->row_time_s - kTrue_s), 3 * result.found->sd_s);
+  ASSERT_TRUE(result.row_time) << result.problem;
+  EXPECT_NEAR(result.row_time->row_time_s / kTrue_s, 1, 0.006);
+  EXPECT_LT(std::abs(result.row_time->row_time_s - kTrue_s), 3 * result.row_time->sd_s);
 }
 
 TEST(EstimateRowTimeCandidates, RowTimeIsAccurateDespiteLightsMissingInMap) {
@@ -87,24 +87,24 @@ TEST(EstimateRowTimeCandidates, RowTimeIsAccurateDespiteLightsMissingInMap) {
   add(lights, 2700, 20, 0.002, random);  // a lamp that the map lacks
   for (int i = 0; i < 30; ++i) lights.push_back({random.uniform(5, 40), {}});
   const auto result = find_row_time(lights, kMap);
-  ASSERT_TRUE(result.found) << result.problem;
-  EXPECT_NEAR(result.found->row_time_s / kTrue_s, 1, 0.001);
-  EXPECT_EQ(result.found->lamps, 5);
+  ASSERT_TRUE(result.row_time) << result.problem;
+  EXPECT_NEAR(result.row_time->row_time_s / kTrue_s, 1, 0.001);
+  EXPECT_EQ(result.row_time->lamps, 5);
 }
 
 TEST(EstimateRowTimeCandidates, ReturnsRowTimeWithoutLabelsForSingleFrequency) {
   const auto result = find_row_time(std::vector<MeasuredPeriod>{{1 / (2500 * kTrue_s), {}}},
                                     make_lamp_map({2500, 2500}));
-  ASSERT_TRUE(result.found) << result.problem;
-  EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-12);
-  EXPECT_EQ(result.found->lamps, 1);
+  ASSERT_TRUE(result.row_time) << result.problem;
+  EXPECT_NEAR(result.row_time->row_time_s, kTrue_s, 1e-12);
+  EXPECT_EQ(result.row_time->lamps, 1);
 }
 
 void expect_ambiguous(const std::vector<double>& seen_hz, const LampMap& map) {
   std::vector<MeasuredPeriod> lights;
   for (const double frequency_hz : seen_hz) lights.push_back({1 / (frequency_hz * kTrue_s), {}});
   const auto result = find_row_time(lights, map);
-  EXPECT_FALSE(result.found);
+  EXPECT_FALSE(result.row_time);
   EXPECT_THAT(result.problem, HasSubstr("add captures with more lamps, or a table"));
 }
 
@@ -156,14 +156,14 @@ TEST(EstimateRowTimeCandidates, ResolvesAmbiguityByDifferentDutiesOfAllLamps) {
   // Blur and saturation may change duties by this amount.
   for (MeasuredPeriod& light : lights) *light.duty += 0.08;
   const auto result = find_row_time(lights, even);
-  ASSERT_TRUE(result.found) << result.problem;
-  EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-9 * kTrue_s);
+  ASSERT_TRUE(result.row_time) << result.problem;
+  EXPECT_NEAR(result.row_time->row_time_s, kTrue_s, 1e-9 * kTrue_s);
   // If one lamp has no duty, no duties are used.
   even.lamps[0].duty.reset();
-  EXPECT_FALSE(find_row_time(lights, even).found);
+  EXPECT_FALSE(find_row_time(lights, even).row_time);
   // Equal duties do not resolve the ambiguity.
   for (Lamp& lamp : even.lamps) lamp.duty = 0.5;
-  EXPECT_FALSE(find_row_time(with_duties(even, {1, 2, 3}), even).found);
+  EXPECT_FALSE(find_row_time(with_duties(even, {1, 2, 3}), even).row_time);
 }
 
 TEST(SelectRowTimeCandidate, SelectsCandidateWithClearlyLowerPositionCost) {
@@ -174,11 +174,11 @@ TEST(SelectRowTimeCandidate, SelectsCandidateWithClearlyLowerPositionCost) {
     std::vector<double> costs{30, 30};
     costs[right] = 2;
     const auto result = select_row_time_candidate(found, costs);
-    ASSERT_TRUE(result.found) << result.problem;
-    EXPECT_EQ(result.found->row_time_s, found.candidates[right].row_time.row_time_s);
+    ASSERT_TRUE(result.row_time) << result.problem;
+    EXPECT_EQ(result.row_time->row_time_s, found.candidates[right].row_time.row_time_s);
   }
   const auto undecided = select_row_time_candidate(found, std::vector<double>{2, 5});
-  EXPECT_FALSE(undecided.found);
+  EXPECT_FALSE(undecided.row_time);
   EXPECT_THAT(undecided.problem, HasSubstr("fit a row time of"));
 }
 
@@ -186,8 +186,8 @@ TEST(EstimateRowTimeCandidates, ResolvesAmbiguityByLabels) {
   const LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
   const std::vector<MeasuredPeriod> lights{{1 / (2000 * kTrue_s), 2}, {1 / (2500 * kTrue_s), 3}};
   const auto result = find_row_time(lights, even);
-  ASSERT_TRUE(result.found) << result.problem;
-  EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-12);
+  ASSERT_TRUE(result.row_time) << result.problem;
+  EXPECT_NEAR(result.row_time->row_time_s, kTrue_s, 1e-12);
 }
 
 TEST(SelectRowTimeCandidate, ReturnsProblemWithoutMatchingLights) {
@@ -198,7 +198,7 @@ TEST(SelectRowTimeCandidate, ReturnsProblemWithoutMatchingLights) {
   std::vector<MeasuredPeriod> lights;
   for (const double period : {5.0, 7.3, 11.9, 19.1, 30.7, 46.0}) lights.push_back({period, {}});
   const auto result = find_row_time(lights, make_lamp_map({2000, 2200}));
-  EXPECT_FALSE(result.found);
+  EXPECT_FALSE(result.row_time);
   EXPECT_NE(result.problem, "");
 }
 
@@ -208,7 +208,7 @@ TEST(GroupLightsByPeriod, GroupsRepeatedPeriodsAndIgnoresSingleOnes) {
   add(lights, 2000, 40, 0.003, random);
   add(lights, 2500, 30, 0.003, random);
   for (int i = 0; i < 5; ++i) lights.push_back({random.uniform(30, 60), {}});
-  const auto groups = group_lights_by_period(lights);
+  const auto groups = group_lights_by_lamp_or_period(lights);
   ASSERT_EQ(groups.size(), 2);
   EXPECT_EQ(groups[0].lights.size(), 40);
   EXPECT_NEAR(std::exp(groups[0].log_period) * 2000 * kTrue_s, 1, 0.002);

@@ -76,7 +76,7 @@ TEST_F(IntrinsicsPlotTest, RendersUnknownSdsAndStatesWhenAllAreUnknown) {
 
 TEST_F(IntrinsicsPlotTest, RendersConstantMapAndZeroResiduals) {
   plot.sd_px.assign(9, 0.2);
-  for (auto& corner : plot.corners) corner = {corner.seen_px, {0, 0}, false};
+  for (auto& corner : plot.corners) corner = {corner.detected_px, {0, 0}, false};
   EXPECT_THAT(render_plot_as_svg(plot),
               AllOf(HasSubstr("3 corners"), HasSubstr("1 times as long")));
 }

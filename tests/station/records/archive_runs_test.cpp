@@ -114,7 +114,7 @@ TEST_F(ArchiveRuns, StoreRunKeepsOneCopyOfRunsReadTwice) {
   EXPECT_EQ(find_gate_limit("rms_px", nullptr, records,
                             load_metric_of_judged_runs(records, "rms_px", {})),
             1);
-  EXPECT_STREQ(find_run_metric("mean_mm").unit, "mm");
+  EXPECT_STREQ(find_run_metric_kind("mean_mm").unit, "mm");
   EXPECT_TRUE(records.check_records_by_audit_trail("").problems.empty());
 }
 
@@ -133,8 +133,9 @@ TEST_F(ArchiveRuns, SkipsAndListsRowsWithInvalidCameraIds) {
   row("..,s1,pass,2026-03-19,,1.2.3,key");
   const ReprocessedArchive archive = read_reprocessed_archive_sessions(folder / "archive");
   EXPECT_EQ(archive.sessions.size(), before);
-  ASSERT_EQ(archive.refused.size(), 1U);
-  EXPECT_THAT(archive.refused.front(), HasSubstr("summary.csv:8: '..' is no id of a camera"));
+  ASSERT_EQ(archive.rejected_sessions.size(), 1U);
+  EXPECT_THAT(archive.rejected_sessions.front(),
+              HasSubstr("summary.csv:8: '..' is no id of a camera"));
 }
 
 TEST_F(ArchiveRuns, RejectsSymbolicLinkInPlaceOfCalibration) {

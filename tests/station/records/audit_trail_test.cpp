@@ -196,10 +196,10 @@ void check_sealing(const std::string& where) {
   EXPECT_EQ(run.operator_name, "Ann");
   ASSERT_THAT(run.events, SizeIs(2));
   EXPECT_EQ(run.events[1].text, "exit code 3");
-  EXPECT_EQ(run.events[1].who, "");
+  EXPECT_EQ(run.events[1].author, "");
   run.events.push_back(make_run_event_now(kHookDone, "", "Bob"));
   records.store_run(run);
-  EXPECT_THAT(records.find_run_by_id(run.run)->events[2].who, StartsWith("Bob ("));
+  EXPECT_THAT(records.find_run_by_id(run.run)->events[2].author, StartsWith("Bob ("));
   EXPECT_EQ(records.check_records_by_audit_trail(sealed.last_digest).entries, 4U);
   EXPECT_THAT(records.check_records_by_audit_trail(sealed.last_digest).problems, IsEmpty());
   run_database_client(where, "UPDATE events SET text = 'label 7' WHERE what = 'hook failed';\n");

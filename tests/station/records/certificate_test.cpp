@@ -81,11 +81,11 @@ TEST(CollectCertifiedValues, ReturnsStandardUncertaintiesOfCalibration) {
   // Now it is known to be zero, so that only the contribution of the captures remains.
   Calibration known = calibration;
   const auto lens = static_cast<Eigen::Index>(known.camera.intrinsics.size());
-  known.rotation_center->by_intrinsics = MatrixX::Zero(2, lens);
+  known.rotation_center->jacobian_wrt_intrinsics = MatrixX::Zero(2, lens);
   const double zenith_deg = 0.05 / 520 * 180 / std::numbers::pi;
   EXPECT_NEAR(collect_certified_values(known)[6].standard_uncertainty.value(), zenith_deg, 1e-12);
   // The zenith depends on the principal point, whose standard deviation is 0.03 px.
-  known.rotation_center->by_intrinsics->operator()(0, 2) = 1 / 520.0;
+  known.rotation_center->jacobian_wrt_intrinsics->operator()(0, 2) = 1 / 520.0;
   EXPECT_NEAR(collect_certified_values(known)[6].standard_uncertainty.value(),
               std::hypot(0.05, 0.03) / 520 * 180 / std::numbers::pi, 1e-12);
   // A calibration without uncertainties.

@@ -44,10 +44,10 @@ class DescribeGoldenUnitProblem : public testing::Test {
   DescribeGoldenUnitProblem() {
     config.station = "a/station";
     config.spool = folder / "spool";
-    config.type.imager_px = {800, 600};
-    config.type.lens_model = LensModel::opencv8;
-    config.type.intrinsics = {520, 520, 399.5, 299.5, 0, 0, 0, 0, 0, 0, 0, 0};
-    config.verify_due = VerificationInterval{24, 2};
+    config.nominal_camera.imager_px = {800, 600};
+    config.nominal_camera.lens_model = LensModel::opencv8;
+    config.nominal_camera.intrinsics = {520, 520, 399.5, 299.5, 0, 0, 0, 0, 0, 0, 0, 0};
+    config.verification_interval = VerificationInterval{24, 2};
   }
   void note(const std::string& kind, const std::string& verdict,
             const std::string& ended_utc = get_current_utc()) const {
@@ -93,7 +93,7 @@ TEST_F(DescribeGoldenUnitProblem, ReportsPassOlderThanHourLimitOrInFuture) {
   EXPECT_THAT(problem(), HasSubstr("measured 2026-01-01T00:00:00Z (run RUN), not within 24 h"));
   note("golden", "PASS", "9999-01-01T00:00:00Z");  // with a clock that was set back later
   EXPECT_THAT(problem(), HasSubstr("not within 24 h"));
-  config.verify_due->hours.reset();
+  config.verification_interval->hours.reset();
   EXPECT_EQ(problem(), "");
 }
 
@@ -203,7 +203,7 @@ TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnitWhenItsRunIsVoided)
 }
 
 TEST_F(DescribeGoldenUnitProblem, ReturnsEmptyTextWithoutVerifyDueSetting) {
-  config.verify_due.reset();
+  config.verification_interval.reset();
   note("golden", "FAIL");
   EXPECT_EQ(problem(), "");
   EXPECT_FALSE(std::filesystem::exists(config.spool));

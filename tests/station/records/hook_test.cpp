@@ -50,7 +50,7 @@ class RunStationHook : public testing::Test {
 
 TEST_F(RunStationHook, PassesRunAsJsonOnStdinInHookFolder) {
   const RunEvent event = run("cat >seen.json; echo first; echo label 7; echo");
-  EXPECT_EQ(event.what, kHookDone);
+  EXPECT_EQ(event.kind, kHookDone);
   EXPECT_EQ(event.text, "label 7");
   const std::string seen = TemporaryFolder::read_content(folder / "seen.json");
   EXPECT_EQ(seen, format_hook_json(judged_run()));
@@ -64,24 +64,24 @@ TEST_F(RunStationHook, SucceedsIfHookIgnoresInputOrLeavesChildren) {
   // Remaining children do not delay the caller.
   EXPECT_EQ(run("sleep 10 & echo printed").text, "printed");
   EXPECT_LT(took_s, 5);
-  EXPECT_EQ(run("exec >&- 2>&-; sleep 0.1").what, kHookDone);
+  EXPECT_EQ(run("exec >&- 2>&-; sleep 0.1").kind, kHookDone);
 }
 
 TEST_F(RunStationHook, DescribesExitCodeSignalOrStartFailure) {
-  EXPECT_EQ(run("echo the printer is out of labels; exit 3").what, kHookFailed);
+  EXPECT_EQ(run("echo the printer is out of labels; exit 3").kind, kHookFailed);
   EXPECT_EQ(run("echo the printer is out of labels; exit 3").text,
             "exit code 3: the printer is out of labels");
   EXPECT_EQ(run("kill -9 $$").text, "ended by signal 9");
   EXPECT_EQ(run("printf '\\033[31m\\377'; exit 1").text, "exit code 1: \\x1b[31m\\xff");
   const RunEvent missing = run_station_hook({{"/nowhere/label"}, folder / ".", 1}, judged_run(),
                                             HookLock(folder / ".", judged_run().run));
-  EXPECT_EQ(missing.what, kHookFailed);
+  EXPECT_EQ(missing.kind, kHookFailed);
   EXPECT_THAT(missing.text, HasSubstr("/nowhere/label cannot be started: No such file"));
 }
 
 TEST_F(RunStationHook, KillsHookAndChildrenAtTimeLimit) {
   const RunEvent event = run("sleep 100 & echo $! >child; echo waits; wait", 0.3);
-  EXPECT_EQ(event.what, kHookFailed);
+  EXPECT_EQ(event.kind, kHookFailed);
   EXPECT_EQ(event.text, "no end within 0.3 s, killed: waits");
   EXPECT_LT(took_s, 5);
   std::string child = TemporaryFolder::read_content(folder / "child");
@@ -96,7 +96,7 @@ TEST_F(RunStationHook, KillsHookAndChildrenAtTimeLimit) {
 }
 
 TEST_F(RunStationHook, KillsHookThatFloodsOutputOrLeavesProcessGroup) {
-  EXPECT_EQ(run("exec cat /dev/zero", 0.3).what, kHookFailed);
+  EXPECT_EQ(run("exec cat /dev/zero", 0.3).kind, kHookFailed);
   EXPECT_LT(took_s, 5);
   const RunEvent event =
       run("exec python3 -c 'import os, time; os.setpgid(0, os.getpgid(os.getppid())); "
@@ -135,9 +135,9 @@ TEST_F(RunStationHook, HookKeepsLockWhenStationIsKilled) {
   };
   ASSERT_TRUE(wait_for([&] { return std::filesystem::exists(folder / "begun"); }));
   kill_child(station);
-  EXPECT_FALSE(HookLock(folder / ".", name).is_hook_lock_held());
+  EXPECT_FALSE(HookLock(folder / ".", name).has_acquired_hook_lock());
   folder.file("end", "");
-  EXPECT_TRUE(wait_for([&] { return HookLock(folder / ".", name).is_hook_lock_held(); }));
+  EXPECT_TRUE(wait_for([&] { return HookLock(folder / ".", name).has_acquired_hook_lock(); }));
 }
 
 /// The parent of this program can ignore signals and leave files open.
@@ -148,7 +148,7 @@ TEST_F(RunStationHook, HookInheritsNoIgnoredSignalsOrOpenFiles) {
   const int open = ::open("/dev/null", O_RDONLY), far = ::fcntl(open, F_DUPFD, 57);
   EXPECT_EQ(run("kill -INT $$").text, "ended by signal 2");
   EXPECT_EQ(run("kill -PIPE $$").text, "ended by signal 13");
-  EXPECT_EQ(run("test ! -e /proc/self/fd/" + std::to_string(far)).what, kHookDone);
+  EXPECT_EQ(run("test ! -e /proc/self/fd/" + std::to_string(far)).kind, kHookDone);
   ::close(open);
   ::close(far);
   std::signal(SIGINT, interrupt);
@@ -161,7 +161,7 @@ TEST_F(RunStationHook, IsHookPendingUntilRequestedHookSucceeds) {
   EXPECT_EQ(describe_pending_hook(run), "");
   run.events.push_back(make_hook_requested_event({{"label", "it"}, {}, 1}, "Ann"));
   EXPECT_EQ(run.events.back().text, "label it");
-  EXPECT_THAT(run.events.back().who, testing::MatchesRegex("Ann [(][^@]+@[^@]*[)]"));
+  EXPECT_THAT(run.events.back().author, testing::MatchesRegex("Ann [(][^@]+@[^@]*[)]"));
   EXPECT_TRUE(is_hook_pending(run));
   EXPECT_EQ(describe_pending_hook(run), "was not run to its end");
   run.events.push_back(make_run_event_now(kHookFailed, "exit code 3"));
@@ -181,11 +181,11 @@ TEST_F(RunStationHook, SecondHookLockOfSameRunIsNotHeld) {
   const std::string name = judged_run().run;
   {
     const HookLock first_lock(folder / ".", name), other(folder / ".", name);
-    EXPECT_TRUE(first_lock.is_hook_lock_held());
-    EXPECT_FALSE(other.is_hook_lock_held());
-    EXPECT_TRUE(HookLock(folder / ".", "another").is_hook_lock_held());
+    EXPECT_TRUE(first_lock.has_acquired_hook_lock());
+    EXPECT_FALSE(other.has_acquired_hook_lock());
+    EXPECT_TRUE(HookLock(folder / ".", "another").has_acquired_hook_lock());
   }
-  EXPECT_TRUE(HookLock(folder / ".", name).is_hook_lock_held());
+  EXPECT_TRUE(HookLock(folder / ".", name).has_acquired_hook_lock());
   EXPECT_TRUE(std::filesystem::is_empty(folder / "."));
 }
 

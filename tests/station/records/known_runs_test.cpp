@@ -166,7 +166,7 @@ TEST_F(KnownRunsTest, VoidRunRecordsOperatorAndReasonAndThrowsSecondTime) {
   }
   const auto record = Records(config.records).find_run_by_id(run);
   ASSERT_THAT(record->events, SizeIs(1));
-  EXPECT_THAT(record->events[0].who, testing::StartsWith("Ann ("));
+  EXPECT_THAT(record->events[0].author, testing::StartsWith("Ann ("));
 }
 
 TEST_F(KnownRunsTest, VoidRunRenamesCalibrationOfPassedRun) {
@@ -201,7 +201,7 @@ TEST_F(KnownRunsTest, VoidRunCallsHookForRunVoidedWithoutStation) {
   KnownRuns known(config);
   const VoidedRun finished = void_recorded_run(known, run, "Ben", "again");
   EXPECT_EQ(finished.problem, "");
-  EXPECT_EQ(finished.run.events.back().what, kHookDone);
+  EXPECT_EQ(finished.run.events.back().kind, kHookDone);
   EXPECT_THAT(TemporaryFolder::read_content(folder / "told.json"), HasSubstr("wrong serial"));
   EXPECT_THROW(void_recorded_run(known, run, "Ben", "again"), std::invalid_argument)
       << "nothing is left";
@@ -217,7 +217,7 @@ TEST_F(KnownRunsTest, VoidRunCallsHookWithVoidedEvent) {
         void_recorded_run(known, run, "Ann", "wrong serial");
     EXPECT_EQ(problem, "");
     EXPECT_EQ(files_problem, "");
-    EXPECT_EQ(record.events.back().what, kHookDone);
+    EXPECT_EQ(record.events.back().kind, kHookDone);
     EXPECT_THAT(list_open_hooks(known, config.station), IsEmpty());
   }
   EXPECT_THAT(TemporaryFolder::read_content(folder / "told.json"),

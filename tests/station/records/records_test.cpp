@@ -74,10 +74,10 @@ void check_events(Records& records) {
   ASSERT_THAT(found->events, SizeIs(3));
   EXPECT_EQ(found->events[0].event, wanted.event);
   EXPECT_EQ(found->events[0].text, "label 'x'");
-  EXPECT_EQ(found->events[0].who, wanted.who);
-  EXPECT_THAT(wanted.who, HasSubstr("@"));
+  EXPECT_EQ(found->events[0].author, wanted.author);
+  EXPECT_THAT(wanted.author, HasSubstr("@"));
   EXPECT_EQ(found->events[1].text, "exit code 3");
-  EXPECT_EQ(found->events[2].what, kHookDone);
+  EXPECT_EQ(found->events[2].kind, kHookDone);
 }
 
 /// Part of check_records(): a voided run remains, but is not counted.
@@ -88,7 +88,7 @@ void check_voided(Records& records) {
   records.store_run(run);
   const auto found = records.find_run_by_id(run.run);
   ASSERT_TRUE(found);
-  EXPECT_THAT(describe_verdict_problem(*found),
+  EXPECT_THAT(describe_why_verdict_is_void_or_edited(*found),
               testing::MatchesRegex("was voided by Ann [(].*@.*: wrong serial"));
   EXPECT_THAT(records.load_metric_trend("rms_px", {}), SizeIs(before - 1));
   EXPECT_EQ(records.list_run_summaries({})[0].run, run.run);
@@ -142,15 +142,15 @@ void check_records(const std::string& where) {
   EXPECT_EQ(found->metrics[0].value, 1.5);
   EXPECT_FALSE(found->metrics[0].has_passed_gate());
   EXPECT_EQ(found->metrics[0].unit, "px");
-  ASSERT_TRUE(found->metrics[0].guard);
-  EXPECT_EQ(found->metrics[0].guard->standard_uncertainty, 0.1 + 0.2);  // to the last bit
-  EXPECT_EQ(found->metrics[0].guard->k, 1.5);
-  EXPECT_FALSE(found->metrics[1].guard);
+  ASSERT_TRUE(found->metrics[0].guard_band);
+  EXPECT_EQ(found->metrics[0].guard_band->standard_uncertainty, 0.1 + 0.2);  // to the last bit
+  EXPECT_EQ(found->metrics[0].guard_band->k, 1.5);
+  EXPECT_FALSE(found->metrics[1].guard_band);
   EXPECT_FALSE(found->metrics[1].limit);
   EXPECT_EQ(found->metrics[1].direction, Direction::at_least);
   EXPECT_FALSE(found->metrics[2].value);
   ASSERT_THAT(found->images, SizeIs(2));
-  EXPECT_EQ(found->images[1].refused, "too dark");
+  EXPECT_EQ(found->images[1].rejection, "too dark");
 
   RunFilter of_a;
   of_a.camera = "a";
@@ -247,12 +247,12 @@ void check_migration(const std::string& where) {
   EXPECT_THAT(records.load_metric_trend("world_offset_mm", {}), SizeIs(1));
   EXPECT_THAT(records.load_metric_trend("world_mm", {}), SizeIs(1));
   EXPECT_EQ(found->metrics[4].unit, "%");
-  EXPECT_FALSE(found->metrics[0].guard);
+  EXPECT_FALSE(found->metrics[0].guard_band);
   EXPECT_THAT(found->images, SizeIs(1));
   records.store_run(make_sample_record(numbered_run_id(5), "b", 0.1));
   EXPECT_THAT(records.list_run_summaries({}), SizeIs(2));
   EXPECT_EQ(records.find_run_by_id(numbered_run_id(5))->metrics[0].unit, "px");
-  EXPECT_TRUE(records.find_run_by_id(numbered_run_id(5))->metrics[0].guard);
+  EXPECT_TRUE(records.find_run_by_id(numbered_run_id(5))->metrics[0].guard_band);
   EXPECT_THAT(found->events, IsEmpty());
   check_events(records);
   EXPECT_THAT(records.check_records_by_audit_trail("").problems, IsEmpty());

@@ -33,7 +33,7 @@ class RetentionTest : public testing::Test {
   RetentionTest() {
     config.captures = folder / "captures";
     config.results = folder / "results";
-    config.keep = {90, 730};
+    config.retention = {90, 730};
     config.station = "hall";
   }
   void keep(const std::string& run, const std::string& camera, const std::string& ended_utc,
@@ -74,12 +74,12 @@ TEST_F(RetentionTest, FindExpiredRunFoldersReturnsFoldersOlderThanRetention) {
   const RetentionResult found = find_expired_run_folders(config, records);
   ASSERT_THAT(found.expired, SizeIs(2));
   EXPECT_EQ(found.expired[0].folder, images);
-  EXPECT_STREQ(found.expired[0].what, kImagesDeleted);
+  EXPECT_STREQ(found.expired[0].event_kind, kImagesDeleted);
   EXPECT_EQ(found.expired[0].bytes, 1000U);
   EXPECT_EQ(found.expired[1].folder, results);
-  EXPECT_STREQ(found.expired[1].what, kResultsDeleted);
-  EXPECT_THAT(found.without_record, ElementsAre(without_record));
-  config.keep = {std::nullopt, 30'000};
+  EXPECT_STREQ(found.expired[1].event_kind, kResultsDeleted);
+  EXPECT_THAT(found.folders_without_record, ElementsAre(without_record));
+  config.retention = {std::nullopt, 30'000};
   EXPECT_THAT(find_expired_run_folders(config, records).expired, IsEmpty());
 }
 
@@ -94,7 +94,7 @@ TEST_F(RetentionTest, FindExpiredRunFoldersIgnoresOtherStationsAndSymbolicLinks)
   fs::create_directory_symlink(folder / "nowhere", folder / "results" / "a" / kOld);
   const RetentionResult found = find_expired_run_folders(config, records);
   EXPECT_THAT(found.expired, IsEmpty());
-  EXPECT_THAT(found.without_record, IsEmpty());
+  EXPECT_THAT(found.folders_without_record, IsEmpty());
 }
 
 TEST_F(RetentionTest, DeleteExpiredRunFolderKeepsTargetsOfSymbolicLinks) {
@@ -112,7 +112,7 @@ TEST_F(RetentionTest, DeleteExpiredRunFolderKeepsTargetsOfSymbolicLinks) {
   const auto record = records.find_run_by_id(kOld);
   ASSERT_TRUE(record);
   ASSERT_THAT(record->events, SizeIs(1));
-  EXPECT_EQ(record->events[0].what, kImagesDeleted);
+  EXPECT_EQ(record->events[0].kind, kImagesDeleted);
   EXPECT_EQ(record->events[0].text, "kept 90 days, 0.0 MB");
   EXPECT_THROW(delete_expired_run_folder(found.expired[0], config, spool), InputError)
       << "it is not there";
@@ -125,23 +125,24 @@ TEST_F(RetentionTest, FindExpiredRunFoldersExcludesFoldersUsedByStation) {
   config.inputs = {folder.file("station.yaml", ""),
                    folder.file("results/a/" + kOld + "/calibration.yaml", "")};
   const RetentionResult found = find_expired_run_folders(config, records);
-  EXPECT_THAT(found.in_use, ElementsAre(results));
+  EXPECT_THAT(found.folders_in_use, ElementsAre(results));
   ASSERT_THAT(found.expired, SizeIs(1));
   EXPECT_EQ(found.expired[0].folder, images);
   // Through a link, and by another name.
   fs::create_symlink(config.inputs[1], folder / "golden.yaml");
   config.inputs[1] = folder / "golden.yaml";
-  EXPECT_THAT(find_expired_run_folders(config, records).in_use, ElementsAre(results));
+  EXPECT_THAT(find_expired_run_folders(config, records).folders_in_use, ElementsAre(results));
   config.inputs = {};
   config.spool = images / "spool";
-  EXPECT_THAT(find_expired_run_folders(config, records).in_use, ElementsAre(images));
+  EXPECT_THAT(find_expired_run_folders(config, records).folders_in_use, ElementsAre(images));
 }
 
 TEST_F(RetentionTest, FindExpiredRunFoldersExcludesFoldersUsedThroughSymbolicLinks) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path results = with_file("results/a/" + kOld);
   const auto expect_in_use = [&](const std::string& why) {
-    EXPECT_THAT(find_expired_run_folders(config, records).in_use, ElementsAre(results)) << why;
+    EXPECT_THAT(find_expired_run_folders(config, records).folders_in_use, ElementsAre(results))
+        << why;
   };
   fs::create_symlink(folder.file("elsewhere.yaml", ""), results / "golden.yaml");
   config.inputs = {results / "golden.yaml"};
@@ -153,7 +154,7 @@ TEST_F(RetentionTest, FindExpiredRunFoldersExcludesFoldersUsedThroughSymbolicLin
   config.inputs = {folder / "loop"};
   expect_in_use("cannot be followed");
   config.inputs = {folder / "elsewhere.yaml", folder / "none"};
-  ASSERT_THAT(find_expired_run_folders(config, records).in_use, IsEmpty());
+  ASSERT_THAT(find_expired_run_folders(config, records).folders_in_use, IsEmpty());
   const std::string script = "results/a/" + kOld + "/hook.py";
   config.hook = Hook{{"python3", script, std::string(5000, 'x')}, folder / ""};
   folder.file(script, "");

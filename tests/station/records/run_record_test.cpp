@@ -19,9 +19,9 @@ TEST(ListLibraryVersions, ReturnsVersionsOfLibrariesThatAffectResults) {
 /// At the start of a second, two clocks can differ by a tick.
 TEST(ComputeSecondsSinceUtc, IsNotNegativeForCurrentTime) {
   const std::string begin = get_current_utc();
-  while (compute_seconds_since_utc(begin) < 1) {
+  while (compute_age_of_utc_s(begin) < 1) {
     const std::string now = get_current_utc();
-    ASSERT_GE(compute_seconds_since_utc(now), 0) << now;
+    ASSERT_GE(compute_age_of_utc_s(now), 0) << now;
   }
 }
 
@@ -51,9 +51,9 @@ TEST(EscapeRunTexts, KeepsLineBreaksOnlyInCausesAndCalibration) {
   EXPECT_EQ(printed.causes, run.causes);
   EXPECT_EQ(printed.calibration, run.calibration);
   EXPECT_EQ(printed.images[0].name, "a\\x0a.png");
-  EXPECT_EQ(printed.images[0].refused, "\\x1b");
+  EXPECT_EQ(printed.images[0].rejection, "\\x1b");
   EXPECT_EQ(printed.events[0].text, "why\\x0a");
-  EXPECT_EQ(printed.events[0].who, "who\\x0a");
+  EXPECT_EQ(printed.events[0].author, "who\\x0a");
 }
 
 TEST(DescribeClockProblem, ReportsRunThatEndedBeforeItsStart) {

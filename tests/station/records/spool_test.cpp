@@ -43,7 +43,7 @@ TEST(ReadSpooledRun, ReturnsAllFieldsOfSerializedRun) {
   RunRecord run = numbered_run(1);
   for (const RunField& field : list_run_text_fields()) run.*field.text += "\"\\ \xc3\xbc{}";
   for (std::string* lines : {&run.causes, &run.calibration}) lines->append("\n\tof lines\n");
-  run.images[1].refused = "too dark";
+  run.images[1].rejection = "too dark";
   const auto [read, records] =
       read_spooled_run(folder.file("run.json", serialize_spooled_run({run, "records.db"})));
   EXPECT_EQ(records, "records.db");
@@ -55,13 +55,13 @@ TEST(ReadSpooledRun, ReturnsAllFieldsOfSerializedRun) {
     EXPECT_EQ(read.metrics[i].value, run.metrics[i].value);  // to the last bit
     EXPECT_EQ(read.metrics[i].limit, run.metrics[i].limit);
     EXPECT_EQ(read.metrics[i].direction, run.metrics[i].direction);
-    ASSERT_EQ(read.metrics[i].guard.has_value(), i == 0);
-    if (!read.metrics[i].guard) continue;
-    EXPECT_EQ(read.metrics[i].guard->standard_uncertainty, 0.01);
-    EXPECT_EQ(read.metrics[i].guard->k, 1.645);
+    ASSERT_EQ(read.metrics[i].guard_band.has_value(), i == 0);
+    if (!read.metrics[i].guard_band) continue;
+    EXPECT_EQ(read.metrics[i].guard_band->standard_uncertainty, 0.01);
+    EXPECT_EQ(read.metrics[i].guard_band->k, 1.645);
   }
   ASSERT_THAT(read.images, SizeIs(run.images.size()));
-  EXPECT_EQ(read.images[1].refused, "too dark");
+  EXPECT_EQ(read.images[1].rejection, "too dark");
   EXPECT_EQ(read.images[29].sha256, run.images[29].sha256);
 }
 
@@ -88,7 +88,7 @@ TEST(ReadSpooledRun, ReadsFormerFormat) {
   }
   const RunRecord read = read_spooled_run(folder.file("run.json", text)).run;
   ASSERT_THAT(read.images, SizeIs(run.images.size()));
-  EXPECT_EQ(read.images[1].refused, run.images[1].refused);
+  EXPECT_EQ(read.images[1].rejection, run.images[1].rejection);
   ASSERT_THAT(read.metrics, SizeIs(run.metrics.size()));
   EXPECT_EQ(read.metrics[0].name, run.metrics[0].name);
 }
@@ -223,7 +223,7 @@ TEST(Spool, FindRunWithSameImagesReturnsJudgedRunWithSameImages) {
     EXPECT_EQ(spool.find_run_with_same_images(fewer), earlier.run) << state;
     other.images.back().sha256 = "another";
     EXPECT_EQ(spool.find_run_with_same_images(other), "") << "one is new, " << state;
-    other.images.back().refused = "blurred";
+    other.images.back().rejection = "blurred";
     EXPECT_EQ(spool.find_run_with_same_images(other), earlier.run) << "and not used, " << state;
     camera.camera = "another";
     EXPECT_EQ(spool.find_run_with_same_images(camera), "") << state;

@@ -90,13 +90,13 @@ TEST(BiasStudy, LinearityMatchesExampleOfAiagManual) {
     EXPECT_EQ(study.units[i].count, 12U);
   }
   // Bias of all values together; its interval is that of JMP's documentation on the same data.
-  EXPECT_NEAR(study.all.value, -0.0533, 5e-5);
-  EXPECT_NEAR(study.all.standard_error, 0.0308, 5e-5);
-  EXPECT_NEAR(study.all.t, -1.729, 2e-3);
-  EXPECT_NEAR(study.all.p, 0.089, 5e-4);
-  EXPECT_NEAR(study.all.low, -0.1152, 1e-4);
-  EXPECT_NEAR(study.all.high, 0.0085, 1e-4);
-  EXPECT_FALSE(study.all.differs_significantly_from_zero());
+  EXPECT_NEAR(study.overall_bias.value, -0.0533, 5e-5);
+  EXPECT_NEAR(study.overall_bias.standard_error, 0.0308, 5e-5);
+  EXPECT_NEAR(study.overall_bias.t, -1.729, 2e-3);
+  EXPECT_NEAR(study.overall_bias.p, 0.089, 5e-4);
+  EXPECT_NEAR(study.overall_bias.low, -0.1152, 1e-4);
+  EXPECT_NEAR(study.overall_bias.high, 0.0085, 1e-4);
+  EXPECT_FALSE(study.overall_bias.differs_significantly_from_zero());
   // Narrowest at the mean. At both ends 0 is outside the band, as in the manual's figure.
   EXPECT_LT(line.confidence_half_width_at(6), line.confidence_half_width_at(2));
   EXPECT_NEAR(line.confidence_half_width_at(2), line.confidence_half_width_at(10), 1e-12);
@@ -174,7 +174,7 @@ TEST(BiasStudy, IntervalsAndTestsHaveNominalRates) {
     }
     const BiasStudy none = analyze_bias_and_linearity(without),
                     with_bias = analyze_bias_and_linearity(with);
-    num_significant += none.all.differs_significantly_from_zero() ? 1 : 0;
+    num_significant += none.overall_bias.differs_significantly_from_zero() ? 1 : 0;
     sloped += none.linearity->slope.differs_significantly_from_zero() ? 1 : 0;
     held += with_bias.linearity->slope.low < -0.2 && with_bias.linearity->slope.high > -0.2 ? 1 : 0;
     in_band += std::abs(with_bias.linearity->predict_bias_at(3) + 0.3) <
@@ -191,16 +191,16 @@ TEST(BiasStudy, IntervalsAndTestsHaveNominalRates) {
 
 TEST(BiasStudy, PValueIsZeroForConstantBiasAndOneWithoutBias) {
   const BiasStudy study = analyze_bias_and_linearity(values_of_unit("a", 1, {1.5, 1.5, 1.5}));
-  EXPECT_EQ(study.all.p, 0);
-  EXPECT_EQ(study.all.t, std::numeric_limits<double>::infinity());
-  EXPECT_EQ(study.all.low, 0.5);
-  EXPECT_TRUE(study.all.differs_significantly_from_zero());
+  EXPECT_EQ(study.overall_bias.p, 0);
+  EXPECT_EQ(study.overall_bias.t, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(study.overall_bias.low, 0.5);
+  EXPECT_TRUE(study.overall_bias.differs_significantly_from_zero());
   // Ten times 0.9 does not add up to 9.
   const BiasStudy none =
       analyze_bias_and_linearity(values_of_unit("a", 0.9, std::vector<double>(10, 0.9)));
   EXPECT_EQ(none.units[0].bias.value, 0);
   EXPECT_EQ(none.units[0].bias.p, 1);
-  EXPECT_EQ(none.all.p, 1);
+  EXPECT_EQ(none.overall_bias.p, 1);
 }
 
 TEST(BiasStudy, ThrowsWithoutValuesOrForUnitWithOneRun) {

@@ -58,9 +58,9 @@ TEST_F(RunMetrics, FindGateLimitPrefersStationToLastRun) {
   station.gates = {{"rms_px", 0.7}};
   EXPECT_EQ(find_gate_limit("rms_px", &station, records, judged()), 0.7);
   EXPECT_FALSE(find_gate_limit("tilt_deg", &station, records, judged()));
-  EXPECT_EQ(make_tolerance_limits(find_run_metric("rms_px"), 0.7).upper, 0.7);
-  EXPECT_FALSE(make_tolerance_limits(find_run_metric("rms_px"), 0.7).lower);
-  EXPECT_EQ(make_tolerance_limits(find_run_metric("coverage"), 0.7).lower, 0.7);
+  EXPECT_EQ(make_tolerance_limits(find_run_metric_kind("rms_px"), 0.7).upper, 0.7);
+  EXPECT_FALSE(make_tolerance_limits(find_run_metric_kind("rms_px"), 0.7).lower);
+  EXPECT_EQ(make_tolerance_limits(find_run_metric_kind("coverage"), 0.7).lower, 0.7);
 }
 
 using CheckValuesAreOfOneStation = RunMetrics;
@@ -90,10 +90,10 @@ TEST_F(RunMetrics, SelectValuesOfStudyUnitsReturnsRequestedOrRepeatedlyMeasuredU
 }
 
 TEST(FindRunMetric, ThrowsNamingNewNameOrKnownMetrics) {
-  EXPECT_STREQ(find_run_metric("check_mean_mm").unit, "mm");
-  EXPECT_EQ(rejection_message<std::invalid_argument>([] { find_run_metric("halves_px"); }),
+  EXPECT_STREQ(find_run_metric_kind("check_mean_mm").unit, "mm");
+  EXPECT_EQ(rejection_message<std::invalid_argument>([] { find_run_metric_kind("halves_px"); }),
             "metric 'halves_px' is now called 'split_half_px'");
-  EXPECT_THAT([] { find_run_metric("rms_um"); },
+  EXPECT_THAT([] { find_run_metric_kind("rms_um"); },
               testing::ThrowsMessage<std::invalid_argument>(
                   AllOf(HasSubstr("there is no metric rms_um"), HasSubstr("rms_px"))));
 }

@@ -237,7 +237,7 @@ struct OtherCamera : LensFault {
       const Fix fix = positioner.compute_position_fix(frames[i].detections);
       if (!fix.has_succeeded()) continue;
       CapturesWithPositions& captures = i % 2 == 0 ? reference : check;
-      captures.places[frames[i].image].z_m = fix.estimate.pose.position_m.z();
+      captures.positions[frames[i].image].z_m = fix.estimate.pose.position_m.z();
       captures.frames.push_back(frames[i]);
     }
   }
@@ -272,7 +272,7 @@ TEST_F(OtherCamera, DescribeFocalLengthDifferenceReportsOnePercentShorterFocalLe
   set_camera(Lens(calibration.camera.lens_model, intrinsics), Eigen::Matrix3d::Identity());
   EXPECT_THAT(describe_focal_length_difference(check, reference, map, calibration),
               HasSubstr("its focal length differs: the heights have an error of "));
-  reference.places.clear();
+  reference.positions.clear();
   EXPECT_EQ(describe_focal_length_difference(check, reference, map, calibration), "")
       << "no heights to compare";
 }

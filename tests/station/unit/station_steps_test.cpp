@@ -14,8 +14,8 @@ using testing::HasSubstr;
 struct StationSteps : testing::Test {
   StationSteps() {
     config.lamps = read_lamp_map(kExample + "lamps.yaml");
-    config.sufficient.check_captures = 36;
-    config.sufficient.dispersion_captures = 36;
+    config.completion.check_captures = 36;
+    config.completion.dispersion_captures = 36;
   }
   StationConfig config{};
   Calibration calibration = read_calibration(kExample + "calibration.yaml");
@@ -25,21 +25,21 @@ struct StationSteps : testing::Test {
 
 TEST_F(StationSteps, CheckPositionAccuracyOnStationReturnsFixFractionOneForExactCaptures) {
   const StepResult result = check_position_accuracy_on_station(config, calibration, frames, places);
-  EXPECT_TRUE(result.has_succeeded()) << result.why;
+  EXPECT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_EQ(result.metrics[0].name, "check_fix_fraction");
   EXPECT_EQ(result.metrics[0].value, 1);
 }
 
 TEST_F(StationSteps, CheckAndDispersionStepsFailForTooFewKnownPositions) {
   places.erase(places.begin());
-  EXPECT_THAT(check_position_accuracy_on_station(config, calibration, frames, places).why,
+  EXPECT_THAT(check_position_accuracy_on_station(config, calibration, frames, places).message,
               HasSubstr("1 of the 36 captures"));
-  EXPECT_THAT(calibrate_dispersion_on_station(config, calibration, frames, places).why,
+  EXPECT_THAT(calibrate_dispersion_on_station(config, calibration, frames, places).message,
               HasSubstr("1 of the 36 captures"));
-  config.sufficient.check_captures = 35;
+  config.completion.check_captures = 35;
   EXPECT_TRUE(
       check_position_accuracy_on_station(config, calibration, frames, places).has_succeeded());
-  EXPECT_THAT(check_position_accuracy_on_station(config, calibration, {}, places).why,
+  EXPECT_THAT(check_position_accuracy_on_station(config, calibration, {}, places).message,
               HasSubstr("have no position"));
 }
 

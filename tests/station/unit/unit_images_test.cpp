@@ -18,8 +18,8 @@ using testing::HasSubstr;
 /// One view completes the boards but does not determine a lens.
 struct UnitImages : testing::Test {
   UnitImages() {
-    config.sufficient.board_views = 1;
-    config.sufficient.board_coverage = 0;
+    config.completion.board_views = 1;
+    config.completion.board_coverage = 0;
   }
   /// Adds the only view, or an invalid file, under this name.
   void add_image(const std::string& name, bool is_valid) {
@@ -53,7 +53,7 @@ TEST_F(UnitImages, UsesDuplicateImageWhenFirstIsRemoved) {
   EXPECT_EQ(refusal("a.png"), "is the same image as b.png");
 }
 
-TEST_F(UnitImages, OverwrittenImageReplacesOldImageAndDiscardsResult) {
+TEST_F(UnitImages, OverwrittenImageReplacesOldImageAndDiscardsStepResult) {
   add_image("a.png", true);
   unit.solve_completed_station_steps(false);
   ASSERT_TRUE(boards().result);  // a problem: one view makes no lens

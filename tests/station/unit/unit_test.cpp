@@ -190,9 +190,9 @@ TEST_F(UnitTest, QueuesImagesOfStepUntilPreviousStepIsComplete) {
   const auto file = folder.file("0.png", "no image");
   unit.add_step_images(StationStep::check, {file});
   unit.solve_completed_station_steps(false);
-  EXPECT_EQ(unit.step_state(StationStep::check).waiting.size(), 1u);
+  EXPECT_EQ(unit.step_state(StationStep::check).pending_images.size(), 1u);
   unit.remove_deleted_image(StationStep::check, "0.png");
-  EXPECT_TRUE(unit.step_state(StationStep::check).waiting.empty());
+  EXPECT_TRUE(unit.step_state(StationStep::check).pending_images.empty());
 }
 
 TEST_F(UnitTest, ScreenLinesHaveAtMost80Characters) {
@@ -227,7 +227,7 @@ TEST_F(UnitTest, ReportStatesVerdictOrNoneForEditedRecord) {
   EXPECT_EQ(page.find("coverage: share"), page.rfind("coverage: share"));
   // Edited in the database.
   record.metrics[1].value = 0.5;
-  EXPECT_THAT(describe_verdict_problem(record),
+  EXPECT_THAT(describe_why_verdict_is_void_or_edited(record),
               HasSubstr("rms_px is 0.5 px, at most 0.3 px is required"));
   EXPECT_THAT(make_run_report_html(record, "", {}),
               AllOf(HasSubstr("NO VERDICT</strong><p>the record has PASS, but rms_px"),

@@ -19,9 +19,9 @@ TEST(VerifyStation, RecordStartsAtTimeOfRunId) {
   std::filesystem::create_directory(folder / "check");
   folder.file("check/0000.png", "no image");
   StationConfig config = read_station_config(VLP_SOURCE_DIR "/datasets/station/station.yaml");
-  config.golden = {.camera_id = "golden",
-                   .calibration = read_calibration(kExample + "calibration.yaml"),
-                   .gates = {{"check_fix_fraction", 0.9}}};
+  config.golden_unit = {.camera_id = "golden",
+                        .calibration = read_calibration(kExample + "calibration.yaml"),
+                        .gates = {{"check_fix_fraction", 0.9}}};
   const std::string run = "20200102T030405Z-0123456789abcdef", before = get_current_utc();
   const RunRecord record =
       verify_station_from_golden_images(config, folder / "", run, {"test", "0"}, 1).record;

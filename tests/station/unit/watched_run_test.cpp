@@ -106,7 +106,7 @@ TEST(WatchedFolder, ReportsOverwrittenAndRemovedImages) {
   EXPECT_THAT(names(watched.poll_folder_changes().added), ElementsAre("a.png", "b.png"));
   folder.file("a.png", "another");
   std::filesystem::remove(folder / "b.png");
-  EXPECT_THAT(watched.poll_folder_changes().gone, ElementsAre("b.png"));
+  EXPECT_THAT(watched.poll_folder_changes().removed, ElementsAre("b.png"));
   EXPECT_THAT(names(watched.poll_folder_changes().added), ElementsAre("a.png"));
 }
 
