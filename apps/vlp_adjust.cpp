@@ -94,7 +94,7 @@ void run(const CLI::App& app, const Options& options) {
   }
   std::vector<std::string> paths = options.sets;
   paths.insert(paths.end(), options.turns.begin(), options.turns.end());
-  make_adjust_set_names_unique(input.sets, paths);
+  replace_duplicate_set_names_by_paths(input.sets, paths);
   for (const AdjustSet& set : input.sets)
     check_map_contains_captured_lamps(set.frames, input.lamps, input.lamps_file);
   const AdjustStepResult result =

@@ -29,7 +29,7 @@ struct Options {
 
 constexpr double kMillimetersPerMeter = 1000;
 
-Board board_of_squares(const Options& options) {
+Board make_board_of_squares(const Options& options) {
   constexpr int cols = 10, rows = 7;
   Board board{"", options.cols.value_or(cols),   options.rows.value_or(rows), 0, 1, 1, false,
               0,  {false, BoardCorner::top_left}};
@@ -42,7 +42,7 @@ Board board_of_squares(const Options& options) {
 }
 
 Board make_board(const Options& options) {
-  if (options.chessboard || options.charuco) return board_of_squares(options);
+  if (options.chessboard || options.charuco) return make_board_of_squares(options);
   constexpr int cols = 6, rows = 5;
   constexpr double lattice = 1, kalibr = 0.3;
   const IdOrder order{false, options.kalibr ? BoardCorner::bottom_left : BoardCorner::top_left};

@@ -50,8 +50,8 @@ CapturesTable read_captures_table(const Options& options) {
   return captures;
 }
 
-KnownPositions find_places(const Options& options, const std::vector<Frame>& frames,
-                           const CapturesTable& captures) {
+KnownPositions collect_known_positions(const Options& options, const std::vector<Frame>& frames,
+                                       const CapturesTable& captures) {
   std::optional<Eigen::Vector2d> reference_point_m;
   if (options.reference_point_m)
     reference_point_m = Eigen::Vector2d(options.reference_point_m->data());
@@ -88,7 +88,7 @@ void run(const CLI::App& app, Options options) {
   options.images.captures = captures;
   const LampCaptures input = read_lamp_captures(options.images, ImageUse::known_positions);
   check_map_contains_captured_lamps(input.frames, input.lamps, input.lamps_file);
-  const KnownPositions places = find_places(options, input.frames, captures);
+  const KnownPositions places = collect_known_positions(options, input.frames, captures);
   const DispersionResult found = run_dispersion_calibration_step(
       input, places, kMethods.at(options.method), kCircles.at(options.circle),
       make_history_entry_from_command_line(app, inputs));
@@ -119,7 +119,7 @@ int main(int argc, char** argv) {
                            {"Folder of images taken at known positions, or their detections.csv",
                             "Calibration of the camera. Its rotation_center is applied",
                             "Output file of the calibration with its dispersion, YAML"});
-  auto* station =
+  auto* reference_point =
       app.add_option(
              "--reference-point", options.reference_point_m,
              "Known position of all captures in the world, in m. Overrides positions in tables")
@@ -128,18 +128,18 @@ int main(int argc, char** argv) {
   app.add_option("--position-of", options.of,
                  "Point to which --reference-point refers: camera (default), or axis, the rotation "
                  "axis at the distance of the lever arm")
-      ->needs(station)
+      ->needs(reference_point)
       ->check(CLI::IsMember({"camera", "axis"}))
       ->option_text("camera|axis");
   app.add_option("--captures", options.captures,
                  "Table of captures, captures.csv: image, x_m, y_m [, reference_point, roll_rad, "
                  "pitch_rad] (default: captures.csv and truth.csv in the folder)")
-      ->excludes(station);
+      ->excludes(reference_point);
   app.add_option("--method", options.method,
                  "Method. camera (default): separates errors that rotate with the camera from "
                  "errors in the world; needs several yaws. chen-guan: moves the circle center to "
                  "the reference point; needs one yaw and an exact lamp map and reference point")
-      ->check(vlp::make_renamed_option_value_validator())
+      ->check(vlp::make_validator_rejecting_former_option_values())
       ->check(CLI::IsMember({"camera", "chen-guan"}))
       ->option_text("camera|chen-guan");
   app.add_option("--circle", options.circle,

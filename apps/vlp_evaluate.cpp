@@ -66,15 +66,16 @@ void check_line(const std::string& option, const std::array<double, 4>& line_m) 
   }
 }
 
-std::vector<MetricKind> known_metrics() {
+std::vector<MetricKind> list_evaluation_metric_kinds() {
   return list_metric_kinds({MetricSource::evaluation, MetricSource::reference});
 }
 
 /// Returns the gates of the file and of the command line, which takes precedence.
 std::vector<Gate> parse_gates(const Options& options) {
   std::vector<Gate> gates;
-  if (!options.gates_file.empty()) gates = read_gates(options.gates_file, known_metrics());
-  return merge_gates(std::move(gates), parse_gates(options.gates, known_metrics()));
+  if (!options.gates_file.empty())
+    gates = read_gates(options.gates_file, list_evaluation_metric_kinds());
+  return merge_gates(std::move(gates), parse_gates(options.gates, list_evaluation_metric_kinds()));
 }
 
 /// Returns the input files, without those of the report; names may be empty.
@@ -171,7 +172,7 @@ std::string render_report(const CLI::App& app, const Options& options, const Eva
 }
 
 /// Returns the text of the file of proposed gates. Throws Undetermined if there are too few units.
-std::string make_proposed_gates(const EvaluationInput& input, const Evaluation& evaluation) {
+std::string format_proposed_gates(const EvaluationInput& input, const Evaluation& evaluation) {
   const std::vector<Gate> gates = propose_gates_from_evaluation(input, evaluation);
   if (gates.empty()) {
     // [GATE-2] `to propose gates`
@@ -211,7 +212,7 @@ void run_evaluation(const CLI::App& app, const Options& options, const std::vect
   }
   std::string report, proposed;
   if (!options.report.file.empty()) report = render_report(app, options, input, found);
-  if (!options.proposed_gates.empty()) proposed = make_proposed_gates(input, found.evaluation);
+  if (!options.proposed_gates.empty()) proposed = format_proposed_gates(input, found.evaluation);
   if (!options.json.empty())
     write_file(options.json, format_evaluation_json(found.evaluation, found.gates));
   if (!options.junit.empty()) {
@@ -336,6 +337,6 @@ int main(int argc, char** argv) {
       vlp::kName);
   vlp::Options options;
   vlp::add_options(app, options);
-  app.footer("Gates:\n" + vlp::describe_available_gates(vlp::known_metrics()));
+  app.footer("Gates:\n" + vlp::describe_available_gates(vlp::list_evaluation_metric_kinds()));
   return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(app, options); });
 }

@@ -48,8 +48,8 @@ std::string make_title(const Options& options) {
 }
 
 /// Returns the errors that calibration and map report.
-UnitErrors stated_errors(const Options& options, const LampMap& lamps,
-                         const Calibration& calibration) {
+UnitErrors make_reported_errors(const Options& options, const LampMap& lamps,
+                                const Calibration& calibration) {
   UnitErrors unit(lamps, calibration);
   if (!unit.common_errors().are_any_errors_known()) {
     throw InputError(options.calibration,
@@ -61,7 +61,7 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
                                                                       "lamp map"};
   std::string unstated;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (unit.common_errors().is_error_source_known(kCommonErrorSources[i])) continue;
+    if (unit.common_errors().is_error_source_known_or_absent(kCommonErrorSources[i])) continue;
     unstated.append(unstated.empty() ? "" : ", ").append(names[i]);
   }
   if (!unstated.empty()) {
@@ -93,7 +93,7 @@ FloorLimits find_floor_limits(const Options& options, const LampMap& lamps, cons
   const BodyPrior prior = make_body_prior(options, calibration.camera);
   const double yaw_rad = rad_from_deg(options.yaw_deg);
   if (options.stated) {
-    return compute_accuracy_limits_on_floor(stated_errors(options, lamps, calibration), grid,
+    return compute_accuracy_limits_on_floor(make_reported_errors(options, lamps, calibration), grid,
                                             options.height_m, yaw_rad, options.noise_px, prior);
   }
   return compute_accuracy_limits_on_floor(

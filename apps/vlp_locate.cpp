@@ -141,7 +141,7 @@ void run(Options options) {
     found = locate_in_images(options, std::move(input));
   } else {
     input.frames = read_captures_from_detections_file(options.images);
-    found = locate_camera_from_frames(input);
+    found = locate_camera_from_detections(input);
   }
   print_step_remarks(found);
   if (found.rows.empty()) throw_if_step_failed(found);

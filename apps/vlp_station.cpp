@@ -15,7 +15,7 @@
 namespace vlp {
 namespace {
 
-void add_operator(CLI::App& command, StationRunOptions& options) {
+void add_operator_options(CLI::App& command, StationRunOptions& options) {
   command.add_option(
       "--operator", options.operator_name,
       "Name of the operator, for the record (default: asked at the beginning of a shift)");
@@ -23,7 +23,7 @@ void add_operator(CLI::App& command, StationRunOptions& options) {
                      "Name of the work shift, for the record (default: asked at its beginning)");
 }
 
-void add_run(CLI::App& app, StationRunOptions& options) {
+void add_run_command(CLI::App& app, StationRunOptions& options) {
   CLI::App* run = app.add_subcommand(
       "run",
       "Measure a unit up to its verdict or, without --camera-id, one unit after another (a shift)");
@@ -47,11 +47,11 @@ void add_run(CLI::App& app, StationRunOptions& options) {
                   "Time without a new image until the verdict, in s. With --source, rejected "
                   "frames do not count as new")
       ->check(make_finite_positive_validator());
-  add_operator(*run, options);
+  add_operator_options(*run, options);
   add_threads_option(*run, options.threads);
 }
 
-void add_verify(CLI::App& app, StationRunOptions& options) {
+void add_verify_command(CLI::App& app, StationRunOptions& options) {
   CLI::App* verify = app.add_subcommand("verify", "Measure the golden unit to check the station");
   verify->add_option("--station", options.station, "Station configuration, station.yaml")
       ->required();
@@ -59,18 +59,18 @@ void add_verify(CLI::App& app, StationRunOptions& options) {
       "--batch", options.batch,
       "Folder with images of the golden unit: check and, optionally, dispersion and boards "
       "(default: images in the station's folder, which are moved away afterwards)");
-  add_operator(*verify, options);
+  add_operator_options(*verify, options);
   add_threads_option(*verify, options.threads);
 }
 
-void add_hook(CLI::App& app, StationRunOptions& options) {
+void add_hook_command(CLI::App& app, StationRunOptions& options) {
   CLI::App* hook =
       app.add_subcommand("hook", "Run the hook again for runs whose hook failed or did not finish");
   hook->add_option("--station", options.station, "Station configuration, station.yaml")->required();
 }
 
 /// Refuses a password: all users of the machine see command lines.
-std::string find_password(const std::string& where) {
+std::string describe_password_problem(const std::string& where) {
   return contains_database_password(where)
              ? "a password on the command line is visible to all users of the "
                "machine; set the variable PGPASSWORD, or PGPASSFILE to a file"
@@ -86,7 +86,7 @@ CLI::App* add_records_location(CLI::App& app, const char* name, const char* what
       ->add_option(
           "--records", options.records,
           "Database of records, instead of --station: SQLite file, or postgresql://USER@HOST/NAME")
-      ->check(find_password);
+      ->check(describe_password_problem);
   return command;
 }
 
@@ -130,30 +130,31 @@ void add_commands_of_a_run(CLI::App& app, StationRecordsOptions& options) {
   restore->add_option("run", options.run, "Id of the run")->required();
   restore->add_option("-o,--output", options.output,
                       "Output folder (default: results of the station). Files go to CAMERA/RUN/");
-  auto* certified = add_records_command(
+  auto* certificate = add_records_command(
       app, "certificate",
       "Write the certificate of a run, certificate.html: values with expanded uncertainty, "
       "conformity, traceability",
       options);
-  certified->add_option("run", options.run, "Id of the run")->required();
-  certified->add_option("-o,--output", options.output,
-                        "Output folder (default: results of the station). Files go to CAMERA/RUN/");
+  certificate->add_option("run", options.run, "Id of the run")->required();
+  certificate->add_option(
+      "-o,--output", options.output,
+      "Output folder (default: results of the station). Files go to CAMERA/RUN/");
 }
 
 /// Adds the commands that check or change records and results.
-void add_upkeep(CLI::App& app, StationRecordsOptions& options) {
+void add_upkeep_commands(CLI::App& app, StationRecordsOptions& options) {
   CLI::App* clean = app.add_subcommand("clean",
                                        "List or delete images and results of old runs ('retention' "
                                        "in station.yaml). Records are kept");
   clean->add_option("--station", options.station, "Station configuration, station.yaml")
       ->required();
   clean->add_flag("--delete", options.remove, "Delete the folders (default: only list them)");
-  CLI::App* verify_records_by_audit_trail =
+  CLI::App* verify_command =
       add_records_location(app, "verify-records",
                            "Check that the records are unchanged. Lists runs that were changed, "
                            "removed or added by hand; exit code 1 if there are any",
                            options);
-  verify_records_by_audit_trail->add_option(
+  verify_command->add_option(
       "--expected-digest", options.expected_digest,
       "Last digest printed by an earlier verify-records. The trail must still contain it");
   CLI::App* voided = add_records_location(
@@ -167,7 +168,7 @@ void add_upkeep(CLI::App& app, StationRecordsOptions& options) {
 }
 
 /// Adds the commands that move runs into and out of records.
-void add_transfer(CLI::App& app, StationRecordsOptions& options) {
+void add_transfer_commands(CLI::App& app, StationRecordsOptions& options) {
   auto* exported = add_records_command(app, "export", "Write runs to a CSV or JSON file", options);
   exported->add_option("-o,--output", options.output, "Output file, .csv or .json")->required();
   CLI::App* imported = app.add_subcommand(
@@ -181,13 +182,13 @@ void add_transfer(CLI::App& app, StationRecordsOptions& options) {
           "--records", options.records,
           "Database of records: SQLite file, created if missing, or postgresql://USER@HOST/NAME")
       ->required()
-      ->check(find_password);
+      ->check(describe_password_problem);
 }
 
 constexpr const char* kMetricHelp = "Metric, such as rms_px or check_mean_mm";
 
 /// Adds the statistics over runs: trend, capability, study.
-void add_statistics(CLI::App& app, StationRecordsOptions& options) {
+void add_statistics_commands(CLI::App& app, StationRecordsOptions& options) {
   auto* trend = add_records_command(
       app, "trend",
       "Print the control chart of a metric over the runs; exit code 1 if there is an alarm. Uses "
@@ -200,12 +201,12 @@ void add_statistics(CLI::App& app, StationRecordsOptions& options) {
                    "Alarm rules: western-electric (four rules, default), nelson (eight rules), a "
                    "single rule as nelson-3, or ewma")
       ->option_text("RULE ...");
-  auto* capable = add_records_command(app, "capability",
-                                      "Print Cpk and Ppk, with 95 % intervals, of metrics that "
-                                      "have gates. Uses judged units of the station",
-                                      options);
-  capable->add_option("metric", options.metric,
-                      "Metric, such as rms_px or check_mean_mm (default: all with gates)");
+  auto* capability = add_records_command(app, "capability",
+                                         "Print Cpk and Ppk, with 95 % intervals, of metrics that "
+                                         "have gates. Uses judged units of the station",
+                                         options);
+  capability->add_option("metric", options.metric,
+                         "Metric, such as rms_px or check_mean_mm (default: all with gates)");
   auto* study = add_records_command(
       app, "study",
       "Print repeatability and reproducibility (%GRR, ndc) of a metric. Needs units with equally "
@@ -275,13 +276,13 @@ int main(int argc, char** argv) {
   vlp::StationRunOptions run;
   vlp::StationRecordsOptions records;
   run.threads = vlp::count_cpu_cores();
-  vlp::add_run(app, run);
-  vlp::add_verify(app, run);
-  vlp::add_hook(app, run);
+  vlp::add_run_command(app, run);
+  vlp::add_verify_command(app, run);
+  vlp::add_hook_command(app, run);
   vlp::add_commands_of_a_run(app, records);
-  vlp::add_upkeep(app, records);
-  vlp::add_transfer(app, records);
-  vlp::add_statistics(app, records);
+  vlp::add_upkeep_commands(app, records);
+  vlp::add_transfer_commands(app, records);
+  vlp::add_statistics_commands(app, records);
   return vlp::parse_arguments_and_run(app, argc, argv,
                                       [&] { vlp::run_command(app, run, records); });
 }

@@ -34,7 +34,8 @@ class Opencv : public LensFamily {
     const double radius = distortion_.compute_max_valid_distortion_radius();
     valid_radius_squared_ = radius * radius;
   }
-  std::optional<Eigen::Vector2d> project_to_plane(const Eigen::Vector3d& x) const override {
+  std::optional<Eigen::Vector2d> project_to_normalized_image_plane(
+      const Eigen::Vector3d& x) const override {
     const Eigen::Vector2d z = x.head<2>() / x.z();
     if (!(x.z() > 0) || !(z.squaredNorm() <= valid_radius_squared_)) return std::nullopt;
     return distortion_(z).distorted;
@@ -45,7 +46,8 @@ class Opencv : public LensFamily {
     return {distortion_(z).d_distorted_d_z * perspective_division_jacobian(z, inverse_depth),
             distortion_.distortion_coefficient_jacobian(z).leftCols(distortions_)};
   }
-  std::optional<Ray> unproject_plane_position(const Eigen::Vector2d& plane) const override {
+  std::optional<Ray> unproject_normalized_image_position(
+      const Eigen::Vector2d& plane) const override {
     Eigen::Matrix2d d_plane_d_z;
     const auto z = undistort_point_newton(plane, d_plane_d_z);
     if (!z) return std::nullopt;
@@ -123,7 +125,8 @@ struct StereographicPoint {
 
 class Stereographic : public LensFamily {
  public:
-  std::optional<Eigen::Vector2d> project_to_plane(const Eigen::Vector3d& x) const override {
+  std::optional<Eigen::Vector2d> project_to_normalized_image_plane(
+      const Eigen::Vector3d& x) const override {
     const StereographicPoint at(x);
     if (!(at.depth > 0)) return std::nullopt;
     return at.plane;
@@ -131,7 +134,8 @@ class Stereographic : public LensFamily {
   Jacobians compute_projection_jacobians(const Eigen::Vector3d& x) const override {
     return {StereographicPoint(x).compute_projection_jacobian(x), {}};
   }
-  std::optional<Ray> unproject_plane_position(const Eigen::Vector2d& plane) const override {
+  std::optional<Ray> unproject_normalized_image_position(
+      const Eigen::Vector2d& plane) const override {
     Ray ray;
     ray.direction << plane, 1 - plane.squaredNorm() / 4;
     if (!ray.direction.allFinite()) return std::nullopt;
@@ -145,7 +149,8 @@ class Splined : public LensFamily {
   Splined(const SplineGrid& grid, std::span<const double> control_points)
       : surface_(grid, control_points) {}
 
-  std::optional<Eigen::Vector2d> project_to_plane(const Eigen::Vector3d& x) const override {
+  std::optional<Eigen::Vector2d> project_to_normalized_image_plane(
+      const Eigen::Vector3d& x) const override {
     const StereographicPoint at(x);
     if (!(at.depth > 0) || !surface_.is_spline_defined_at(at.plane)) return std::nullopt;
     return surface_.distort_point(at.plane);
@@ -154,7 +159,7 @@ class Splined : public LensFamily {
     const StereographicPoint at(x);
     return {surface_(at.plane).d_distorted_d_u * at.compute_projection_jacobian(x), {}};
   }
-  std::vector<DistortionDerivative> compute_distortion_derivatives(
+  std::vector<DistortionDerivative> compute_projection_derivatives_wrt_distortions(
       const Eigen::Vector3d& x) const override {
     const SplineSurface::Weights at = surface_.control_point_weights(StereographicPoint(x).plane);
     const SplineGrid& grid = surface_.spline_grid();
@@ -170,7 +175,8 @@ class Splined : public LensFamily {
     }
     return derivatives;
   }
-  std::optional<Ray> unproject_plane_position(const Eigen::Vector2d& plane) const override {
+  std::optional<Ray> unproject_normalized_image_position(
+      const Eigen::Vector2d& plane) const override {
     Eigen::Matrix2d d_plane_d_u;
     const auto u = surface_.undistort_point(plane, d_plane_d_u);
     if (!u) return std::nullopt;
@@ -189,7 +195,8 @@ class OpencvFisheye : public LensFamily {
  public:
   explicit OpencvFisheye(std::span<const double> k)
       : fisheye_{{k[0], k[1], k[2], k[3]}}, angles_(fisheye_) {}
-  std::optional<Eigen::Vector2d> project_to_plane(const Eigen::Vector3d& x) const override {
+  std::optional<Eigen::Vector2d> project_to_normalized_image_plane(
+      const Eigen::Vector3d& x) const override {
     const double axis_distance = x.head<2>().norm();
     const double angle_rad = std::atan2(axis_distance, x.z());
     if (!x.allFinite() || !(angle_rad <= angles_.max_valid_fisheye_angle_rad()) ||
@@ -200,7 +207,8 @@ class OpencvFisheye : public LensFamily {
            (fisheye_.fisheye_radius_from_angle(angle_rad) / std::max(axis_distance, kOnAxis));
   }
   Jacobians compute_projection_jacobians(const Eigen::Vector3d& x) const override;
-  std::optional<Ray> unproject_plane_position(const Eigen::Vector2d& plane) const override;
+  std::optional<Ray> unproject_normalized_image_position(
+      const Eigen::Vector2d& plane) const override;
 
  private:
   /// Distance from the axis below which the direction away from it is not defined.
@@ -234,7 +242,7 @@ LensFamily::Jacobians OpencvFisheye::compute_projection_jacobians(const Eigen::V
   return result;
 }
 
-std::optional<LensFamily::Ray> OpencvFisheye::unproject_plane_position(
+std::optional<LensFamily::Ray> OpencvFisheye::unproject_normalized_image_position(
     const Eigen::Vector2d& plane) const {
   const double distance = plane.norm();
   const double angle_rad = angles_(distance);
@@ -290,7 +298,7 @@ Lens::Lens(LensModel model, std::span<const double> parameters) : model_(model) 
 }
 
 std::optional<Eigen::Vector2d> Lens::project_point(const Eigen::Vector3d& x_in_camera) const {
-  const auto plane = family_->project_to_plane(x_in_camera);
+  const auto plane = family_->project_to_normalized_image_plane(x_in_camera);
   if (!plane) return std::nullopt;
   Eigen::Vector2d pixel = focal_px_.cwiseProduct(*plane) + center_px_;
   if (!pixel.allFinite()) return std::nullopt;
@@ -320,7 +328,7 @@ std::optional<Lens::SparseJacobian> Lens::compute_pixel_jacobian_wrt_intrinsics(
   if (!projection) return std::nullopt;
   constexpr Eigen::Index core = 4;
   const auto& dense = projection->d_pixel_d_parameters;
-  const auto sparse = family_->compute_distortion_derivatives(x_in_camera);
+  const auto sparse = family_->compute_projection_derivatives_wrt_distortions(x_in_camera);
   SparseJacobian result{{}, Eigen::Matrix2Xd::Zero(2, dense.cols() + std::ssize(sparse))};
   result.d_pixel.leftCols(dense.cols()) = dense;
   for (Eigen::Index i = 0; i < dense.cols(); ++i) result.parameters.push_back(i);
@@ -334,7 +342,7 @@ std::optional<Lens::SparseJacobian> Lens::compute_pixel_jacobian_wrt_intrinsics(
 std::optional<Lens::Ray> Lens::unproject_pixel(const Eigen::Vector2d& pixel) const {
   const Eigen::Vector2d plane = (pixel - center_px_).cwiseQuotient(focal_px_);
   if (!plane.allFinite()) return std::nullopt;
-  const auto ray = family_->unproject_plane_position(plane);
+  const auto ray = family_->unproject_normalized_image_position(plane);
   if (!ray) return std::nullopt;
   return Ray{ray->direction, ray->d_direction_d_plane * focal_px_.cwiseInverse().asDiagonal()};
 }

@@ -35,8 +35,8 @@ enum class LensModel { pinhole, stereographic, opencv4, opencv5, opencv8, opencv
 /// "OPENCV_FISHEYE" for `fisheye`. The view stays valid until the program ends.
 std::string_view lens_model_name(LensModel model);
 
-/// Returns the model with this name (to_string()); std::nullopt for other names. A splined lens
-/// must be within the bounds of SplineGrid, and its name written as mrcal writes it.
+/// Returns the model with this name (lens_model_name()); std::nullopt for other names. A splined
+/// lens must be within the bounds of SplineGrid, and its name written as mrcal writes it.
 std::optional<LensModel> lens_model_from_name(std::string_view name);
 
 /// Returns all names, separated by commas, for messages. One example stands for the splined lenses.

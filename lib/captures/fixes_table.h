@@ -17,7 +17,7 @@ namespace vlp {
 struct FixRow {
   std::string image;
   /// Status of the fix in the file: "ok", or the reason of failure as a word, for example
-  /// "too_few_lamps" (to_string(FixStatus)).
+  /// "too_few_lamps" (fix_status_name()).
   std::string status;
   struct Fix {
     Pose pose;

@@ -66,7 +66,7 @@ void SharedFolder::check_folder_not_replaced() const {
   throw InputError(path_, "was moved or replaced while it was in use: restore it, then run again");
 }
 
-fs::path SharedFolder::opened_folder_path() const {
+fs::path SharedFolder::path_of_open_folder_descriptor() const {
   return "/proc/self/fd/" + std::to_string(descriptor_);
 }
 
@@ -140,7 +140,7 @@ std::optional<std::string> SharedFolder::read_file_if_exists(const std::string& 
 
 void SharedFolder::replace_file_atomically(const std::string& name,
                                            std::string_view content) const {
-  AtomicFileWriter file(opened_folder_path(), name, checked_folder_entry_path(name));
+  AtomicFileWriter file(path_of_open_folder_descriptor(), name, checked_folder_entry_path(name));
   file.write(content);
   file.save_file();
 }
@@ -170,7 +170,7 @@ void SharedFolder::remove_subfolder(const Id& name) const {
 void SharedFolder::remove_all_folder_entries() const {
   std::error_code error;
   std::vector<fs::path> entries;
-  for (fs::directory_iterator entry(opened_folder_path(), error);
+  for (fs::directory_iterator entry(path_of_open_folder_descriptor(), error);
        !error && entry != fs::directory_iterator(); entry.increment(error)) {
     entries.push_back(entry->path());
   }

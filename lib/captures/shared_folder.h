@@ -61,7 +61,7 @@ class SharedFolder {
   SharedFolder(std::filesystem::path path, int descriptor);
   std::filesystem::path checked_folder_entry_path(const std::string& name) const;
   /// Returns a path of the open folder, whose name may refer to another one by now.
-  std::filesystem::path opened_folder_path() const;
+  std::filesystem::path path_of_open_folder_descriptor() const;
 
   std::filesystem::path path_;
   int descriptor_;

@@ -16,7 +16,7 @@ struct FixSummary {
   std::size_t frames = 0;
   std::size_t fixes = 0;
   /// Number of frames without a fix, by the word of their status, for example "too_few_lamps"
-  /// (to_string(FixStatus)). Statuses that do not occur are missing.
+  /// (fix_status_name()). Statuses that do not occur are missing.
   std::map<std::string, std::size_t> failures_by_status;
   /// Statistics over the frames with a fix; std::nullopt if there are none.
   struct FixStatistics {

@@ -33,7 +33,7 @@ std::string make_missing_fixes_warning(const Evaluation& evaluation,
          " no fix, and there is no gate 'missing_fraction'";
 }
 
-std::string make_crlb_warning(const Evaluation& evaluation) {
+std::string make_errors_below_crlb_warning(const Evaluation& evaluation) {
   const auto& limit = evaluation.crlb_ratio;
   if (!limit || !limit->are_errors_below_crlb()) return "";
   constexpr int digits = 3;

@@ -20,7 +20,7 @@ std::string make_missing_fixes_warning(const Evaluation& evaluation,
 /// (CrlbRatio::are_errors_below_crlb()), one line without a full stop. Empty otherwise. The assumed
 /// pixel noise is then too large, or the fixes use more information than one image of a level
 /// camera.
-std::string make_crlb_warning(const Evaluation& evaluation);
+std::string make_errors_below_crlb_warning(const Evaluation& evaluation);
 
 /// Returns warnings about intervals and verdicts from few stations or captures, one line each
 /// without a full stop. For a comparison, clusters of the pairs count. Returns none for 50 clusters

@@ -22,7 +22,7 @@ enum class Verdict {
 };
 
 /// Returns PASS, FAIL or INVALID.
-constexpr const char* to_string(Verdict verdict) {
+constexpr const char* verdict_name(Verdict verdict) {
   constexpr std::array names{"PASS", "FAIL", "INVALID"};
   return names[static_cast<std::size_t>(verdict)];
 }
@@ -38,14 +38,14 @@ struct Cause {
   std::string text;
   /// True if the camera itself is the reason: a metric outside its gate, or blur. False for the
   /// measuring equipment and its use.
-  bool of_camera = false;
+  bool is_camera_fault = false;
 };
 
 /// Returns the verdict of the first cause, because later causes can follow from it; PASS without
 /// causes.
 inline Verdict decide_verdict_from_causes(const std::vector<Cause>& causes) {
   if (causes.empty()) return Verdict::pass;
-  return causes.front().of_camera ? Verdict::fail : Verdict::invalid;
+  return causes.front().is_camera_fault ? Verdict::fail : Verdict::invalid;
 }
 
 }  // namespace vlp

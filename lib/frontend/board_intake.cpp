@@ -191,7 +191,7 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
   explain_from_sample_images(
       images, options, num_samples, [&](const fs::path& file, const cv::Mat& image) {
         white = std::max(white, compute_saturated_fraction(image, cv::Rect({}, image.size())));
-        description = describe_tags_of_other_kinds(board, image);
+        description = find_and_describe_tags_of_other_kinds(board, image);
         described_file = file;
         return description.empty();
       });
@@ -235,7 +235,8 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
 /// Rejects corners that contradict their neighbors. A tag is rejected as a whole.
 void remove_corner_outliers(const BoardLattice& lattice, BoardView& view,
                             std::vector<std::string>& warnings) {
-  const auto blunders = find_corner_outliers(lattice.match_corners_to_flat_board(view.detection));
+  const auto blunders =
+      find_corner_outliers(lattice.list_corners_with_board_positions(view.detection));
   if (blunders.empty()) return;
   const auto corners = collect_detected_corners(view.detection);
   const Eigen::Vector2d first = corners[blunders.front()].pixel;

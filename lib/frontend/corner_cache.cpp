@@ -25,7 +25,7 @@ std::string describe_settings(const Board& board) {
       fmt::format("13 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
                   board.rows, format_shortest_exact_number(board.tag_size_m),
                   format_shortest_exact_number(board.tag_spacing), board.border_bits,
-                  board.corner_squares, board.first_id, to_string(board.id_order));
+                  board.corner_squares, board.first_id, id_order_name(board.id_order));
   if (board.has_chessboard_squares()) {
     settings +=
         fmt::format(" {} {} {}", static_cast<int>(board.kind),

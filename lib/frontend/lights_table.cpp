@@ -217,7 +217,7 @@ cv::Mat brighten_image(const cv::Mat& image) {
 }
 
 /// Draws a text next to a light, on the side with enough space.
-void write_label(cv::Mat& annotated_image, const Light& light, double size) {
+void draw_label(cv::Mat& annotated_image, const Light& light, double size) {
   const std::string label = make_label(light);
   const int thickness = static_cast<int>(std::lround(size));
   const double scale = 0.5 * size;
@@ -252,7 +252,7 @@ cv::Mat render_annotated_image(const cv::Mat& image, const std::vector<Light>& l
              to_fixed_point(light.pixel + across), color, thickness, cv::LINE_AA, kShift);
     cv::line(annotated_image, to_fixed_point(light.pixel - along),
              to_fixed_point(light.pixel + along), color, thickness, cv::LINE_AA, kShift);
-    write_label(annotated_image, light, size);
+    draw_label(annotated_image, light, size);
   }
   return annotated_image;
 }

@@ -218,7 +218,7 @@ int min_lamps_for_image_use(ImageUse use) {
   return use == ImageUse::rotation || use == ImageUse::known_positions ? 2 : 0;
 }
 
-void Selection::add_or_reject_image(Observation& image) {
+void Selection::add_image_or_reject_as_repeated(Observation& image) {
   if (!image.is_image_kept() || use_ == ImageUse::fixes) return;
   std::vector<PointDetection> points = get_points_in(image);
   if (points.empty()) return;
@@ -246,7 +246,7 @@ void Selection::add_kept_image(const Observation& image) {
 void reject_repeated_images(std::vector<Observation>& images, ImageUse use,
                             const FrontendOptions& options) {
   Selection selection(use, options);
-  for (Observation& image : images) selection.add_or_reject_image(image);
+  for (Observation& image : images) selection.add_image_or_reject_as_repeated(image);
 }
 
 }  // namespace vlp

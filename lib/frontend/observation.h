@@ -158,7 +158,7 @@ class Selection {
 
   /// Rejects the image if it repeats one that was added or kept before. Does not change images that
   /// are already rejected or have no corners or lamps.
-  void add_or_reject_image(Observation& image);
+  void add_image_or_reject_as_repeated(Observation& image);
 
   /// Adds an image that is used anyway. Later images that repeat it are rejected.
   void add_kept_image(const Observation& image);

@@ -56,7 +56,8 @@ inline double estimate_robust_variance_2d(std::vector<double> squares, double de
 /// the variance is known.
 inline double compute_squared_outlier_bound_1d(double sigmas, double degrees_of_freedom) {
   constexpr double m_per_residual = 0.367540;  // 2 (2 q phi(q))^2
-  return compute_t_squared_bound(sigmas, m_per_residual * std::max(degrees_of_freedom, 1.0));
+  return compute_squared_student_t_bound(sigmas,
+                                         m_per_residual * std::max(degrees_of_freedom, 1.0));
 }
 
 /// Computes the same bound for planar residuals, in units of estimate_robust_variance_2d().

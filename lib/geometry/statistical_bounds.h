@@ -22,7 +22,7 @@ inline constexpr double kSigmasOfOneInTenThousand = 3.719;
 ///   m (exp((sigmas (8 m + 3) / (8 m + 1))^2 / m) - 1)
 /// Source: Wallace, Bounds on normal approximations to Student's and the chi-square distributions
 /// (1959).
-inline double compute_t_squared_bound(double sigmas, double m) {
+inline double compute_squared_student_t_bound(double sigmas, double m) {
   const double z = sigmas * (8 * m + 3) / (8 * m + 1);
   return m * std::expm1(z * z / m);
 }

@@ -89,7 +89,7 @@ double clipped_fraction(const ImageView& lines, const Eigen::Vector2d& low,
 void add_error_of_unknown_lens(const ImageSize& size, std::vector<Light>& lights) {
   for (Light& light : lights) {
     if (light.kind == LightKind::no_outline) continue;
-    add_center_error(predict_center_sd_without_lens_px(light, size), light);
+    add_error_to_center_sigma(predict_center_sd_without_lens_px(light, size), light);
   }
 }
 
@@ -145,8 +145,8 @@ Blob clip(std::span<const Blob> blobs, const PixelBox& box) {
 
 /// Returns the lit pixels of a light: the blob of which the light is the largest part, or the runs
 /// near its box.
-Blob find_pixels_above_level(const PixelBox& box, std::span<const Blob> blobs,
-                             const ImageSize& size) {
+Blob find_lit_pixels_of_light(const PixelBox& box, std::span<const Blob> blobs,
+                              const ImageSize& size) {
   constexpr int max_area_ratio = 4;
   for (const Blob& blob : blobs) {
     const PixelBox whole = blob.blob_bounding_box();
@@ -181,7 +181,7 @@ Light make_light_without_outline(const ImageView& lines, const ModulatedLight& f
 Light make_light_from_modulation(const ImageView& lines, const ModulatedLight& found,
                                  std::span<const Blob> blobs, const Background& background,
                                  const LightShape& shape) {
-  const Blob blob = find_pixels_above_level(found.box, blobs, lines.size());
+  const Blob blob = find_lit_pixels_of_light(found.box, blobs, lines.size());
   std::optional<Rim> rim;
   if (!blob.runs.empty()) rim = fit_rim_of_light(lines, blob, background, shape);
   Light light = make_light_without_outline(lines, found, shape);
@@ -191,7 +191,7 @@ Light make_light_from_modulation(const ImageView& lines, const ModulatedLight& f
         rim->is_clear ? 0 : (rim->light.pixel - light.pixel).norm() / std::numbers::sqrt2;
     const bool is_round = found.asymmetry_px < kMaxEccentricity * found.radius_px;
     if (rim->is_clear || !is_round) light = std::move(rim->light);
-    add_center_error(apart_px, light);
+    add_error_to_center_sigma(apart_px, light);
   }
   light.is_found_by_modulation = true;
   light.stripes = found.stripes;
@@ -290,8 +290,8 @@ std::vector<LightPart> LightDetector::find_light_parts(const ImageView& lines, c
     auto light = shape_.fit_light_to_outline(remaining, background);
     if (!light && !parts.empty()) break;
     auto outline = std::move(remaining);
-    remaining =
-        light ? shape_.find_outline_points_outside(*light, outline) : std::vector<EdgePoint>();
+    remaining = light ? shape_.find_outline_points_outside_light(*light, outline)
+                      : std::vector<EdgePoint>();
     parts.push_back({std::move(light), std::move(outline), box});
     if (remaining.empty()) break;
   }
@@ -561,7 +561,8 @@ void LightDetector::identify_lamps_of_lights(std::vector<Light>& lights,
     if (!off) {
       reject(light, LightReason::wrong_shape);
     } else if (shape_.has_known_lens()) {
-      add_error_of_hidden_end(*off, shape_.is_camera_tilted() ? 0 : kUnknownTiltSd, light);
+      add_hidden_end_error_to_center_sigma(*off, shape_.is_camera_tilted() ? 0 : kUnknownTiltSd,
+                                           light);
     }
     if (light.lamp && !light.is_glow) brightest = std::max(brightest, light.peak_level);
   }

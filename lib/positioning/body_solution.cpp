@@ -46,7 +46,8 @@ bool has_fix(const BodySolution& solution) {
          solution.status == FixStatus::undetermined;
 }
 
-bool LevelSightings::fill(const BodyObservations& frame, const Eigen::Matrix3d& level_from_body) {
+bool LevelSightings::set_sightings_in_level_frame(const BodyObservations& frame,
+                                                  const Eigen::Matrix3d& level_from_body) {
   for (; size < frame.num_current; ++size) {
     const BodyObservation& seen = frame.sightings[size];
     const Eigen::Vector3d ray = level_from_body * seen.ray;
@@ -63,9 +64,9 @@ BodyState make_body_state_from_camera_pose(const Pose& camera, const BodyProblem
   return state;
 }
 
-InitialStates compute_initial_states(const BodyObservations& frame,
-                                     const std::array<std::size_t, 3>& lamps,
-                                     const BodyProblem& problem) {
+InitialStates compute_initial_body_states_from_three_lamps(const BodyObservations& frame,
+                                                           const std::array<std::size_t, 3>& lamps,
+                                                           const BodyProblem& problem) {
   std::array<Eigen::Vector3d, 3> points_m, rays;
   for (std::size_t i = 0; i < 3; ++i) {
     points_m[i] = frame.sightings[lamps[i]].lamp_m;
@@ -85,7 +86,7 @@ InitialStates compute_initial_states(const BodyObservations& frame,
   return initial_states;
 }
 
-bool is_determined(const BodyObservations& frame, const BodyFix& fix) {
+bool is_body_position_determined(const BodyObservations& frame, const BodyFix& fix) {
   constexpr double max_sd_fraction = 0.25;
   const double limit_m = max_sd_fraction * compute_mean_lamp_distance_m(frame, fix.state);
   return fix.covariance.diagonal().head<3>().maxCoeff() < limit_m * limit_m;
@@ -96,7 +97,8 @@ namespace {
 InitialStates compute_level_state(const BodyObservations& frame, const BodyProblem& problem) {
   const Eigen::Matrix3d lean = level_rotation_from_inclination(problem.prior.mean.inclination);
   LevelSightings level;
-  if (!level.fill(frame, lean)) return {FixStatus::lamp_below_camera, 0, {}};
+  if (!level.set_sightings_in_level_frame(frame, lean))
+    return {FixStatus::lamp_below_camera, 0, {}};
   const InitialPose start = compute_initial_pose(level.observations_span());
   if (start.status != FixStatus::ok) return {start.status, 0, {}};
   return {FixStatus::ok, 1, {make_body_state_from_camera_pose(start.pose, problem, lean)}};
@@ -165,7 +167,7 @@ BodySolution find_best_body_solution(const InitialStates& initial_states,
     if (fix->chi_squared < best->chi_squared) best = fix;
   }
   if (!best) return {FixStatus::degenerate, {}};
-  if (!is_determined(frame, *best)) return {FixStatus::undetermined, *best};
+  if (!is_body_position_determined(frame, *best)) return {FixStatus::undetermined, *best};
   const double freedom = std::max(1.0, 2 * static_cast<double>(frame.size) - 4);
   const double scale = std::max(1.0, best->chi_squared / freedom);
   const bool ambiguous = second - best->chi_squared < unlikely * scale;
@@ -187,7 +189,7 @@ std::optional<BodySolution> estimate_body_with_free_tilt(const BodyObservations&
        ++i, third = (third + 1) % frame.num_current) {
     if (third == first || third == second) continue;
     const InitialStates initial_states =
-        compute_initial_states(frame, {first, second, third}, problem);
+        compute_initial_body_states_from_three_lamps(frame, {first, second, third}, problem);
     const BodySolution solution = initial_states.count > 0
                                       ? find_best_body_solution(initial_states, frame, problem)
                                       : BodySolution{initial_states.status, {}};
@@ -204,8 +206,8 @@ std::optional<BodySolution> estimate_body_with_free_tilt(const BodyObservations&
 
 }  // namespace
 
-BodySolution estimate_body_from_all_lamps(const BodyObservations& frame,
-                                          const BodyProblem& problem) {
+BodySolution estimate_body_state_from_all_lamps(const BodyObservations& frame,
+                                                const BodyProblem& problem) {
   if (problem.is_roll_pitch_estimated()) {
     if (const auto solution = estimate_body_with_free_tilt(frame, problem);
         solution && has_fix(*solution)) {

@@ -51,14 +51,15 @@ struct InitialStates {
 };
 
 /// Observations of the current frame by a camera with the inclination of the prior, rotated to the
-/// level frame. fill() returns false if a lamp is not above the horizon.
+/// level frame. set_sightings_in_level_frame() returns false if a lamp is not above the horizon.
 struct LevelSightings {
   std::array<Sighting, kMaxSightings> sightings;
   std::size_t size = 0;
 
   std::span<const Sighting> observations_span() const { return {sightings.data(), size}; }
 
-  bool fill(const BodyObservations& frame, const Eigen::Matrix3d& level_from_body);
+  bool set_sightings_in_level_frame(const BodyObservations& frame,
+                                    const Eigen::Matrix3d& level_from_body);
 };
 
 /// Returns the state of the body for a pose of the camera and the motion of the prior.
@@ -66,18 +67,18 @@ BodyState make_body_state_from_camera_pose(const Pose& camera, const BodyProblem
                                            const Eigen::Matrix3d& lean);
 
 /// Computes the states below the lamps from three of them.
-InitialStates compute_initial_states(const BodyObservations& frame,
-                                     const std::array<std::size_t, 3>& lamps,
-                                     const BodyProblem& problem);
+InitialStates compute_initial_body_states_from_three_lamps(const BodyObservations& frame,
+                                                           const std::array<std::size_t, 3>& lamps,
+                                                           const BodyProblem& problem);
 
 /// Returns true if the standard deviation of the position is at most a quarter of the mean distance
 /// to the lamps.
-bool is_determined(const BodyObservations& frame, const BodyFix& fix);
+bool is_body_position_determined(const BodyObservations& frame, const BodyFix& fix);
 
 /// Computes the fix of all lamps, assuming that the identities are correct. Initial states: the
 /// pose of a level camera (compute_initial_pose()), or if roll and pitch are estimated the poses
 /// from the three lamps that are farthest apart (compute_poses_from_three_lamps()).
-BodySolution estimate_body_from_all_lamps(const BodyObservations& frame,
-                                          const BodyProblem& problem);
+BodySolution estimate_body_state_from_all_lamps(const BodyObservations& frame,
+                                                const BodyProblem& problem);
 
 }  // namespace vlp

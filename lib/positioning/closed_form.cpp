@@ -148,7 +148,8 @@ std::optional<Pose> compute_pose_at_known_height_and_yaw(const Sighting& sightin
   return Pose{{s.x(), s.y(), known.z_m}, known.yaw_rad};
 }
 
-Matrix4 compute_one_lamp_pixel_noise_covariance(const Sighting& sighting, const Pose& pose) {
+Matrix4 compute_one_lamp_fix_covariance_from_pixel_noise(const Sighting& sighting,
+                                                         const Pose& pose) {
   const Eigen::Matrix2d d_pixel_d_xy =
       sighting.d_pixel_d_z *
       project_lamp_with_jacobian(LevelPose(pose), sighting.lamp_m).d_z_d_state.leftCols<2>();
@@ -159,9 +160,9 @@ Matrix4 compute_one_lamp_pixel_noise_covariance(const Sighting& sighting, const 
   return covariance;
 }
 
-Matrix4 compute_one_lamp_sensor_covariance(const Sighting& sighting, const Pose& pose,
-                                           const HeightAndYaw& known,
-                                           const MotionAtReadout& readout) {
+Matrix4 compute_one_lamp_fix_covariance_from_sensors(const Sighting& sighting, const Pose& pose,
+                                                     const HeightAndYaw& known,
+                                                     const MotionAtReadout& readout) {
   const double height_m = sighting.lamp_m.z() - pose.position_m.z();
   const double time_s = readout.time_s;
   const Eigen::Rotation2Dd world_from_level(pose.yaw_rad);
@@ -184,8 +185,8 @@ Matrix4 compute_one_lamp_sensor_covariance(const Sighting& sighting, const Pose&
   return by_sd * by_sd.transpose();
 }
 
-Eigen::Matrix<double, 4, 3> compute_one_lamp_rotation_jacobian(const Sighting& sighting,
-                                                               const Pose& pose) {
+Eigen::Matrix<double, 4, 3> compute_one_lamp_fix_jacobian_wrt_level_rotation(
+    const Sighting& sighting, const Pose& pose) {
   Eigen::Matrix<double, 2, 3> d_z;
   d_z << compute_normalized_point_jacobian_wrt_tilt(sighting.z),
       Eigen::Vector2d(-sighting.z.y(), sighting.z.x());

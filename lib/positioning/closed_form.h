@@ -72,19 +72,20 @@ std::optional<Pose> compute_pose_at_known_height_and_yaw(const Sighting& sightin
 
 /// Returns the covariance of (X, Y, Zs, g), in m and rad, from the pixel noise alone.
 /// @pre compute_pose_at_known_height_and_yaw() computed `pose`
-Matrix4 compute_one_lamp_pixel_noise_covariance(const Sighting& sighting, const Pose& pose);
+Matrix4 compute_one_lamp_fix_covariance_from_pixel_noise(const Sighting& sighting,
+                                                         const Pose& pose);
 
 /// Returns the covariance of (X, Y, Zs, g), in m and rad, from the errors of height, yaw and
 /// motion.
 /// @pre compute_pose_at_known_height_and_yaw() computed `pose`
-Matrix4 compute_one_lamp_sensor_covariance(const Sighting& sighting, const Pose& pose,
-                                           const HeightAndYaw& known,
-                                           const MotionAtReadout& readout);
+Matrix4 compute_one_lamp_fix_covariance_from_sensors(const Sighting& sighting, const Pose& pose,
+                                                     const HeightAndYaw& known,
+                                                     const MotionAtReadout& readout);
 
 /// Returns the derivative of (X, Y, Zs, g), in m and rad, with respect to a small rotation of the
 /// level frame, in rad. The columns are the x, y and z axis of the rotation.
 /// @pre compute_pose_at_known_height_and_yaw() computed `pose`
-Eigen::Matrix<double, 4, 3> compute_one_lamp_rotation_jacobian(const Sighting& sighting,
-                                                               const Pose& pose);
+Eigen::Matrix<double, 4, 3> compute_one_lamp_fix_jacobian_wrt_level_rotation(
+    const Sighting& sighting, const Pose& pose);
 
 }  // namespace vlp

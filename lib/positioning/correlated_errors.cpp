@@ -18,8 +18,8 @@ namespace {
 
 /// Returns the derivatives of the rotation by the two coordinates of an error.
 template <typename With>
-void add_rotation_vectors(std::vector<Eigen::Matrix3d>& turns, const Calibration& calibration,
-                          Correction correction, With with_error) {
+void add_rotation_derivatives(std::vector<Eigen::Matrix3d>& turns, const Calibration& calibration,
+                              Correction correction, With with_error) {
   constexpr double step = 1e-5;  // central differences have errors of second order: 1e-10
   for (int axis = 0; axis < 2; ++axis) {
     const Eigen::Vector2d error = step * Eigen::Vector2d::Unit(axis);
@@ -58,8 +58,8 @@ Eigen::MatrixXd compute_posterior_covariance(const Eigen::MatrixXd& covariance, 
 }
 
 /// Converts a covariance in px^2 to units of the normalized plane.
-Eigen::Matrix2d normalized_point_from_pixel(const std::optional<Matrix2>& covariance_px,
-                                            const Eigen::Vector2d& focal_px) {
+Eigen::Matrix2d convert_covariance_to_normalized_plane(const std::optional<Matrix2>& covariance_px,
+                                                       const Eigen::Vector2d& focal_px) {
   if (!covariance_px) return Eigen::Matrix2d::Zero();
   const Eigen::Vector2d inverse = focal_px.cwiseInverse();
   return inverse.asDiagonal() * *covariance_px * inverse.asDiagonal();
@@ -91,9 +91,11 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
   const bool shifted = calibration.dispersion &&
                        (correction == Correction::dispersion || correction == Correction::all);
   if (turned)
-    add_rotation_vectors(rotation_derivatives_, calibration, correction, perturb_zenith_direction);
+    add_rotation_derivatives(rotation_derivatives_, calibration, correction,
+                             add_error_to_calibrated_zenith);
   if (shifted)
-    add_rotation_vectors(rotation_derivatives_, calibration, correction, perturb_dispersion_offset);
+    add_rotation_derivatives(rotation_derivatives_, calibration, correction,
+                             add_error_to_calibrated_dispersion_offset);
   offset_ = intrinsics_ + (turned ? 2 : 0);
   assign_covariance_rows_to_lamps(lamps, calibration);
   set_lens_and_zenith_covariances(calibration);
@@ -161,7 +163,7 @@ void CommonErrors::set_lens_and_zenith_covariances(const Calibration& calibratio
   }
   if (has_zenith_errors() && !adjustment) {
     covariance_.block<2, 2>(intrinsics_, intrinsics_) =
-        normalized_point_from_pixel(center->covariance, calibration.camera.focal_px());
+        convert_covariance_to_normalized_plane(center->covariance, calibration.camera.focal_px());
   }
 }
 
@@ -214,8 +216,8 @@ void CommonErrors::propagate_errors_to_zenith_and_offset(std::span<const Lamp> l
   }
   if (has_dispersion_offset_errors()) {
     const Dispersion& dispersion = *calibration.dispersion;
-    covariance_.block<2, 2>(offset_, offset_) =
-        normalized_point_from_pixel(dispersion.covariance, calibration.camera.focal_px());
+    covariance_.block<2, 2>(offset_, offset_) = convert_covariance_to_normalized_plane(
+        dispersion.covariance, calibration.camera.focal_px());
     auto of_offset = derivatives.bottomRows<2>();
     if (dispersion.jacobian_wrt_intrinsics)
       of_offset.leftCols(intrinsics_) = *dispersion.jacobian_wrt_intrinsics;
@@ -268,7 +270,7 @@ CommonErrors CommonErrors::isolate_error_source(CommonErrorSource part) const {
   return one;
 }
 
-CommonErrors::RayJacobian CommonErrors::compute_ray_error_jacobian(
+CommonErrors::RayJacobian CommonErrors::compute_ray_jacobian_wrt_errors(
     const Eigen::Vector3d& ray_in_base, const Lens& lens) const {
   RayJacobian effect = RayJacobian::Zero(3, num_shared_errors());
   const Eigen::Vector3d ray = camera_from_base_ * ray_in_base;
@@ -284,7 +286,7 @@ CommonErrors::RayJacobian CommonErrors::compute_ray_error_jacobian(
   return effect;
 }
 
-CommonErrors::Effect CommonErrors::compute_observation_error_jacobians(
+CommonErrors::Effect CommonErrors::compute_observation_jacobians_wrt_errors(
     const Sighting& sighting, const LevelPose& pose, const Lens& lens,
     const Eigen::Matrix3d& level_from_base) const {
   // Derivative of z by the direction, which has z = 1.
@@ -294,8 +296,8 @@ CommonErrors::Effect CommonErrors::compute_observation_error_jacobians(
   Effect effect;
   effect.jacobian_wrt_lamp =
       project_lamp_with_jacobian(pose, sighting.lamp_m).d_z_d_state.leftCols<3>();
-  effect.jacobian_wrt_shared = d_z_d_base.lazyProduct(
-      compute_ray_error_jacobian(level_from_base.transpose() * sighting.z.homogeneous(), lens));
+  effect.jacobian_wrt_shared = d_z_d_base.lazyProduct(compute_ray_jacobian_wrt_errors(
+      level_from_base.transpose() * sighting.z.homogeneous(), lens));
   return effect;
 }
 
@@ -307,7 +309,7 @@ CommonErrors::Gain CommonErrors::compute_gain_from_errors_to_fix(
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     const Sighting& sighting = sightings[i];
     const Effect effect =
-        compute_observation_error_jacobians(sighting, pose, lens, level_from_base);
+        compute_observation_jacobians_wrt_errors(sighting, pose, lens, level_from_base);
     Eigen::Matrix<double, 4, 2> d_fix_d_z;
     if (sightings.size() == 1) {
       // compute_pose_at_known_height_and_yaw(): s = p - H e^{jg} z.
@@ -326,7 +328,7 @@ CommonErrors::Gain CommonErrors::compute_gain_from_errors_to_fix(
   return gain;
 }
 
-CommonErrors::BodyEffect CommonErrors::compute_observation_error_jacobians(
+CommonErrors::BodyEffect CommonErrors::compute_observation_jacobians_wrt_errors(
     const BodyObservation& sighting, const EvaluatedState& body, const Eigen::Vector3d& arm_m,
     const Lens& lens, const Eigen::Matrix3d& body_from_base) const {
   const Eigen::Matrix<double, 2, 3> d_pixel = d_whitened_pixel_d_lamp_position(
@@ -336,7 +338,7 @@ CommonErrors::BodyEffect CommonErrors::compute_observation_error_jacobians(
       d_pixel.lazyProduct(body.d_lamp_position_in_body_d_state(sighting.lamp_m, sighting.time_s));
   const Eigen::Matrix<double, 2, 3> by_ray = sighting.whitened_pixel_from_ray * body_from_base;
   effect.by_errors.jacobian_wrt_shared = by_ray.lazyProduct(
-      compute_ray_error_jacobian(body_from_base.transpose() * sighting.ray, lens));
+      compute_ray_jacobian_wrt_errors(body_from_base.transpose() * sighting.ray, lens));
   effect.by_errors.jacobian_wrt_lamp = effect.jacobian_wrt_state.leftCols<3>();
   return effect;
 }
@@ -349,7 +351,7 @@ CommonErrors::BodyGain CommonErrors::compute_gain_from_errors_to_fix(
   BodyGain whole(num_shared_errors());
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     const auto [by_state, by_errors] =
-        compute_observation_error_jacobians(sightings[i], body, arm_m, lens, body_from_base);
+        compute_observation_jacobians_wrt_errors(sightings[i], body, arm_m, lens, body_from_base);
     const Eigen::Matrix<double, kBodyStates, 2> gain =
         fix.covariance.lazyProduct(by_state.transpose());
     whole.jacobian_wrt_shared.noalias() += gain.lazyProduct(by_errors.jacobian_wrt_shared);
@@ -384,35 +386,33 @@ Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::propagate_
   return sum;
 }
 
-double CommonErrors::compute_expected_chi_squared(std::span<const Sighting> sightings,
-                                                  std::span<const std::size_t> lamps,
-                                                  const PoseEstimate& camera, const Matrix4& common,
-                                                  const Lens& lens,
-                                                  const Eigen::Matrix3d& level_from_base) const {
+double CommonErrors::compute_expected_chi_squared_of_common_errors(
+    std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
+    const PoseEstimate& camera, const Matrix4& common, const Lens& lens,
+    const Eigen::Matrix3d& level_from_base) const {
   const LevelPose pose(camera.pose);
   double sum = -(camera.covariance.inverse() * common).trace();
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     const Eigen::Matrix2d whitening = sightings[i].d_pixel_d_z / sightings[i].sigma_px;
     const Effect effect =
-        compute_observation_error_jacobians(sightings[i], pose, lens, level_from_base);
+        compute_observation_jacobians_wrt_errors(sightings[i], pose, lens, level_from_base);
     sum += (whitening * compute_observation_covariance(effect, lamps[i]) * whitening.transpose())
                .trace();
   }
   return sum;
 }
 
-double CommonErrors::compute_expected_chi_squared(std::span<const BodyObservation> sightings,
-                                                  std::span<const std::size_t> lamps,
-                                                  const Eigen::Vector3d& arm_m, const BodyFix& fix,
-                                                  const BodyCovariance& common, const Lens& lens,
-                                                  const Eigen::Matrix3d& body_from_base) const {
+double CommonErrors::compute_expected_chi_squared_of_common_errors(
+    std::span<const BodyObservation> sightings, std::span<const std::size_t> lamps,
+    const Eigen::Vector3d& arm_m, const BodyFix& fix, const BodyCovariance& common,
+    const Lens& lens, const Eigen::Matrix3d& body_from_base) const {
   const EvaluatedState body(fix.state);
   Eigen::Matrix<double, kBodyStates, kBodyStates> information;
   information.setZero();
   double sum = 0;
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     const auto [by_state, by_errors] =
-        compute_observation_error_jacobians(sightings[i], body, arm_m, lens, body_from_base);
+        compute_observation_jacobians_wrt_errors(sightings[i], body, arm_m, lens, body_from_base);
     sum += compute_observation_covariance(by_errors, lamps[i]).trace();
     information += by_state.transpose() * by_state;
   }
@@ -441,14 +441,15 @@ namespace {
 /// Returns true if the calibration reports errors of its lens that `errors` lacks.
 bool lacks_lens_covariance(const CommonErrors& errors, const Calibration& calibration) {
   const auto& report = calibration.intrinsics_report;
-  return report && report->covariance && !errors.is_error_source_known(CommonErrorSource::lens);
+  return report && report->covariance &&
+         !errors.is_error_source_known_or_absent(CommonErrorSource::lens);
 }
 
 }  // namespace
 
 std::optional<Matrix2> compute_zenith_covariance(const Calibration& calibration) {
   const CommonErrors errors({}, calibration, Correction::all);
-  if (!errors.is_error_source_known(CommonErrorSource::zenith) ||
+  if (!errors.is_error_source_known_or_absent(CommonErrorSource::zenith) ||
       lacks_lens_covariance(errors, calibration))
     return std::nullopt;
   const Eigen::Index zenith = count_intrinsics_with_covariance(calibration.camera);
@@ -457,7 +458,7 @@ std::optional<Matrix2> compute_zenith_covariance(const Calibration& calibration)
 
 std::optional<Matrix2> compute_dispersion_offset_covariance(const Calibration& calibration) {
   const CommonErrors errors({}, calibration, Correction::all);
-  if (!errors.is_error_source_known(CommonErrorSource::offset) ||
+  if (!errors.is_error_source_known_or_absent(CommonErrorSource::offset) ||
       lacks_lens_covariance(errors, calibration))
     return std::nullopt;
   if (!calibration.adjustment) {
@@ -465,7 +466,7 @@ std::optional<Matrix2> compute_dispersion_offset_covariance(const Calibration& c
     const auto& report = calibration.intrinsics_report;
     if (report && report->covariance && !dispersion.jacobian_wrt_intrinsics) return std::nullopt;
     const bool turned = calibration.rotation_center.has_value();
-    if (turned && !(errors.is_error_source_known(CommonErrorSource::zenith) &&
+    if (turned && !(errors.is_error_source_known_or_absent(CommonErrorSource::zenith) &&
                     dispersion.jacobian_wrt_zenith))
       return std::nullopt;
   }

@@ -62,7 +62,7 @@ class CommonErrors {
   /// a wrong lamp be identified by them.
   bool are_lens_zenith_and_lamp_errors_known() const { return complete_; }
   /// Returns true if the errors of the part are known, or if the calibration lacks the part.
-  bool is_error_source_known(CommonErrorSource part) const {
+  bool is_error_source_known_or_absent(CommonErrorSource part) const {
     return part_stated_[static_cast<std::size_t>(part)];
   }
   /// Returns one part of C, with the others taken as exact. The parts add up to C, and no part
@@ -80,8 +80,8 @@ class CommonErrors {
   /// Derivative of the ray of a pixel with respect to the shared errors, one column each. The ray
   /// is along the axes of the base, the camera frame after correction of its tilt.
   using RayJacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 20>;
-  RayJacobian compute_ray_error_jacobian(const Eigen::Vector3d& ray_in_base,
-                                         const Lens& lens) const;
+  RayJacobian compute_ray_jacobian_wrt_errors(const Eigen::Vector3d& ray_in_base,
+                                              const Lens& lens) const;
 
   /// Derivatives of the normalized point z of one lamp with respect to the shared errors and to the
   /// error of the lamp's position, m. Two rows each.
@@ -91,9 +91,9 @@ class CommonErrors {
   };
   /// Returns the derivatives for an observation by a camera at `pose`. Its rotation
   /// level_from_camera is level_from_base base_from_camera.
-  Effect compute_observation_error_jacobians(const Sighting& sighting, const LevelPose& pose,
-                                             const Lens& lens,
-                                             const Eigen::Matrix3d& level_from_base) const;
+  Effect compute_observation_jacobians_wrt_errors(const Sighting& sighting, const LevelPose& pose,
+                                                  const Lens& lens,
+                                                  const Eigen::Matrix3d& level_from_base) const;
 
   template <int States>
   /// G: derivatives of the states of a fix with respect to the shared errors and to the errors of
@@ -137,16 +137,14 @@ class CommonErrors {
   /// `common` = G C G' of the fix:
   ///   tr(R C R') = tr(W J_c C J_c') - tr(N common),   R = W^1/2 (J_c - J G),   N = J' W J.
   /// For a body with priors of information P, N + 2 P takes the place of N.
-  double compute_expected_chi_squared(std::span<const Sighting> sightings,
-                                      std::span<const std::size_t> lamps,
-                                      const PoseEstimate& camera, const Matrix4& common,
-                                      const Lens& lens,
-                                      const Eigen::Matrix3d& level_from_base) const;
-  double compute_expected_chi_squared(std::span<const BodyObservation> sightings,
-                                      std::span<const std::size_t> lamps,
-                                      const Eigen::Vector3d& arm_m, const BodyFix& fix,
-                                      const BodyCovariance& common, const Lens& lens,
-                                      const Eigen::Matrix3d& body_from_base) const;
+  double compute_expected_chi_squared_of_common_errors(
+      std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
+      const PoseEstimate& camera, const Matrix4& common, const Lens& lens,
+      const Eigen::Matrix3d& level_from_base) const;
+  double compute_expected_chi_squared_of_common_errors(
+      std::span<const BodyObservation> sightings, std::span<const std::size_t> lamps,
+      const Eigen::Vector3d& arm_m, const BodyFix& fix, const BodyCovariance& common,
+      const Lens& lens, const Eigen::Matrix3d& body_from_base) const;
   /// Returns G C G', the covariance of the states of a fix from the common errors, in the units of
   /// the states.
   template <int States>
@@ -179,10 +177,11 @@ class CommonErrors {
     Eigen::Matrix<double, 2, kBodyStates> jacobian_wrt_state;
     Effect by_errors;
   };
-  BodyEffect compute_observation_error_jacobians(const BodyObservation& sighting,
-                                                 const EvaluatedState& body,
-                                                 const Eigen::Vector3d& arm_m, const Lens& lens,
-                                                 const Eigen::Matrix3d& body_from_base) const;
+  BodyEffect compute_observation_jacobians_wrt_errors(const BodyObservation& sighting,
+                                                      const EvaluatedState& body,
+                                                      const Eigen::Vector3d& arm_m,
+                                                      const Lens& lens,
+                                                      const Eigen::Matrix3d& body_from_base) const;
   /// Gives rows to the lamps that are correlated with other errors, and sets the size of the joint
   /// covariance.
   void assign_covariance_rows_to_lamps(std::span<const Lamp> lamps, const Calibration& calibration);

@@ -102,7 +102,7 @@ ConsistentFix recheck_with_noise_threshold(FrameObservations& frame, const Consi
       std::sqrt(kMaxReducedChiSquared) * compute_max_point_sd(frame.observations_span()));
   if (!majority) return all;
   FrameObservations agreeing = frame;
-  agreeing.keep_only_observations(majority->inliers);
+  agreeing.keep_only_selected_observations(majority->inliers);
   const ConsistentFix solution = estimate_and_check_pose(
       agreeing.observations_span(), compute_residual_limit(agreeing, max_residual_share));
   const double remaining = compute_reduced_chi_squared(solution.fix.chi_squared, agreeing.size);
@@ -129,7 +129,7 @@ ConsistentFix estimate_pose_robust(FrameObservations& frame, double max_residual
   if (frame.size < 4) return all;
   const auto majority = find_largest_consistent_lamp_set(frame.observations_span(), limit);
   if (!majority) return all;
-  frame.keep_only_observations(majority->inliers);
+  frame.keep_only_selected_observations(majority->inliers);
   return estimate_and_check_pose(frame.observations_span(),
                                  compute_residual_limit(frame, max_residual_share));
 }
@@ -260,7 +260,7 @@ bool is_consistent(const BodySolution& solution, const BodyObservations& frame,
 
 BodyObservations select_lamps(const BodyObservations& frame, const Agreeing& agreeing) {
   BodyObservations remaining = frame;
-  remaining.keep_only_observations(agreeing);
+  remaining.keep_only_selected_observations(agreeing);
   return remaining;
 }
 
@@ -282,7 +282,8 @@ std::optional<Agreeing> find_majority_with_free_tilt(const BodyObservations& fra
     for (std::size_t j = i + 1; j < n; ++j) {
       for (std::size_t k = j + 1; k < n; ++k) {
         if (turn++ % stride != 0) continue;
-        const InitialStates initial_states = compute_initial_states(frame, {i, j, k}, problem);
+        const InitialStates initial_states =
+            compute_initial_body_states_from_three_lamps(frame, {i, j, k}, problem);
         for (std::size_t m = 0; static_cast<int>(m) < initial_states.count; ++m) {
           const Agreeing agreeing =
               find_agreeing_observations(initial_states.states[m], frame, problem, limit_m);
@@ -300,7 +301,7 @@ std::optional<Agreeing> find_majority_if_level(const BodyObservations& frame,
                                                const BodyProblem& problem, double limit_m) {
   const Eigen::Matrix3d lean = level_rotation_from_inclination(problem.prior.mean.inclination);
   LevelSightings level;
-  if (!level.fill(frame, lean)) return std::nullopt;
+  if (!level.set_sightings_in_level_frame(frame, lean)) return std::nullopt;
   // The limit is converted to z by the ratio of the distances between lamps.
   double sum_z = 0, sum_m = 0;
   const Sighting& first = level.sightings[0];
@@ -334,7 +335,7 @@ BodySolution estimate_body_from_majority(BodyObservations& frame, const BodyProb
     if (2 * agreeing->count() <= frame.size) return none;
     BodyObservations remaining = select_lamps(frame, *agreeing);
     if (remaining.num_current < 2) return none;
-    const BodySolution solution = estimate_body_from_all_lamps(remaining, problem);
+    const BodySolution solution = estimate_body_state_from_all_lamps(remaining, problem);
     if (solution.status != FixStatus::ok) return {solution.status, solution.fix};
     const Agreeing now_agreeing =
         find_agreeing_observations(solution.fix.state, frame, problem, limit_m);
@@ -383,7 +384,8 @@ std::optional<BodySolution> reject_moved_lamps(BodyObservations& frame, const Bo
       const double of_second = compute_reduced_chi_squared(second, remaining.size);
       if (of_second < kMaxReducedChiSquared ||
           kClearGain * excess > compute_reduced_chi_squared(all.fix.chi_squared, frame.size) ||
-          !is_within_prior(problem.prior, best->state.motion) || !is_determined(remaining, *best)) {
+          !is_within_prior(problem.prior, best->state.motion) ||
+          !is_body_position_determined(remaining, *best)) {
         return std::nullopt;
       }
       frame = remaining;
@@ -400,14 +402,14 @@ BodySolution estimate_body_state_robust(BodyObservations& frame,
                                         const BodyPrior& prior, double max_residual_share) {
   const BodyProblem problem{arm_in_body_m, prior};
   const double limit_m = compute_residual_limit(frame, max_residual_share);
-  const BodySolution all = estimate_body_from_all_lamps(frame, problem);
+  const BodySolution all = estimate_body_state_from_all_lamps(frame, problem);
   if (frame.size < 3) return all;
   if (is_consistent(all, frame, problem, limit_m)) {
     if (all.status != FixStatus::ok ||
         compute_reduced_chi_squared(all.fix.chi_squared, frame.size) <= kMaxReducedChiSquared)
       return all;
     const BodySolution mirror_image =
-        estimate_body_from_all_lamps(mirror_lamp_positions(frame), problem);
+        estimate_body_state_from_all_lamps(mirror_lamp_positions(frame), problem);
     if (mirror_image.status == FixStatus::ok &&
         kClearGain * compute_reduced_chi_squared(mirror_image.fix.chi_squared, frame.size) <
             compute_reduced_chi_squared(all.fix.chi_squared, frame.size)) {
@@ -419,7 +421,7 @@ BodySolution estimate_body_state_robust(BodyObservations& frame,
     return reject_moved_lamps(frame, problem, all).value_or(all);
   }
   const BodyObservations mirror_frame = mirror_lamp_positions(frame);
-  const BodySolution mirror_image = estimate_body_from_all_lamps(mirror_frame, problem);
+  const BodySolution mirror_image = estimate_body_state_from_all_lamps(mirror_frame, problem);
   if (mirror_image.status == FixStatus::ok &&
       is_consistent(mirror_image, mirror_frame, problem, limit_m)) {
     return {FixStatus::mirrored_map, {}};

@@ -203,8 +203,8 @@ bool is_step_negligible(const BodyVector& step, double scale_m, bool whole) {
 }
 
 template <typename S>
-BodyFix finished(const Linearized<S>& normal, const Cholesky<S::kCount>& factor,
-                 const BodyVector& weights, const BodyState& state, double lamps) {
+BodyFix make_body_fix(const Linearized<S>& normal, const Cholesky<S::kCount>& factor,
+                      const BodyVector& weights, const BodyState& state, double lamps) {
   BodyFix fix;
   fix.state = state;
   fix.state.pose.yaw_rad = wrap_angle_rad(state.pose.yaw_rad);
@@ -248,7 +248,7 @@ std::optional<BodyFix> solve(std::span<const BodyObservation> sightings,
       const BodyState next_state = apply_body_step(at.state, step);
       if (is_step_negligible(step, scale_m, halving == 0)) {
         const auto lamps = static_cast<double>(sightings.size());
-        std::optional<BodyFix> fix = finished<S>(normal, factor, weights, next_state, lamps);
+        std::optional<BodyFix> fix = make_body_fix<S>(normal, factor, weights, next_state, lamps);
         if (!fix->covariance.allFinite()) fix.reset();
         return fix;
       }

@@ -34,8 +34,8 @@ struct LampObservations {
 
   /// Removes all observations except those in `kept`. The removed ones among the first
   /// `num_reported` count as rejected.
-  void keep_only_observations(const std::bitset<kMaxSightings>& kept,
-                              std::size_t num_reported = kMaxSightings) {
+  void keep_only_selected_observations(const std::bitset<kMaxSightings>& kept,
+                                       std::size_t num_reported = kMaxSightings) {
     std::size_t next = 0;
     for (std::size_t i = 0; i < size; ++i) {
       if (kept[i]) {
@@ -64,10 +64,10 @@ struct BodyObservations : LampObservations<BodyObservation> {
 
   /// Removes all observations except those in `kept`. The removed ones of the current frame count
   /// as rejected.
-  void keep_only_observations(const std::bitset<kMaxSightings>& kept) {
+  void keep_only_selected_observations(const std::bitset<kMaxSightings>& kept) {
     std::size_t kept_current = 0;
     for (std::size_t i = 0; i < num_current; ++i) kept_current += kept[i];
-    LampObservations::keep_only_observations(kept, num_current);
+    LampObservations::keep_only_selected_observations(kept, num_current);
     num_current = kept_current;
   }
 };

@@ -202,10 +202,11 @@ class Positioner::Impl {
       known.z_m -= origin_m_.z();
       const auto pose = compute_pose_at_known_height_and_yaw(sighting, known, *readout);
       if (!pose) return make_fix_without_pose(FixStatus::lamp_below_camera, frame.unknown_lamps);
-      fix.estimate = {*pose, compute_one_lamp_pixel_noise_covariance(sighting, *pose)};
+      fix.estimate = {*pose, compute_one_lamp_fix_covariance_from_pixel_noise(sighting, *pose)};
       height_and_yaw_covariance =
-          compute_one_lamp_sensor_covariance(sighting, *pose, known, *readout);
-      d_pose_d_inclination = compute_one_lamp_rotation_jacobian(sighting, *pose) * lean.error_axes;
+          compute_one_lamp_fix_covariance_from_sensors(sighting, *pose, known, *readout);
+      d_pose_d_inclination =
+          compute_one_lamp_fix_jacobian_wrt_level_rotation(sighting, *pose) * lean.error_axes;
     } else {
       return make_fix_without_pose(FixStatus::too_few_lamps, frame.unknown_lamps);
     }
@@ -282,8 +283,8 @@ class Positioner::Impl {
     std::array<Matrix2, max_lamps> common;
     for (std::size_t i = 0; i < frame.size; ++i) {
       common[i] = common_.compute_observation_covariance(
-          common_.compute_observation_error_jacobians(frame.sightings[i], pose, lens_,
-                                                      level_from_base),
+          common_.compute_observation_jacobians_wrt_errors(frame.sightings[i], pose, lens_,
+                                                           level_from_base),
           find_lamp_index_by_id(frame.ids[i]));
     }
     const OutlierLamps wrong =
@@ -292,7 +293,7 @@ class Positioner::Impl {
     std::bitset<kMaxSightings> kept;
     kept.set();
     for (std::size_t i = 0; i < wrong.count; ++i) kept.reset(wrong.lamps[i]);
-    frame.keep_only_observations(kept);
+    frame.keep_only_selected_observations(kept);
     solution =
         estimate_and_check_pose(frame.observations_span(), std::numeric_limits<double>::infinity());
   }
@@ -307,7 +308,7 @@ class Positioner::Impl {
         common_.propagate_covariance_to_fix(common_.compute_gain_from_errors_to_fix(
             frame.observations_span(), in_map, fix.estimate, lens_, level_from_base));
     if (computes_common_chi_squared_ && fix.redundancy > 0) {
-      fix.common_chi_squared = common_.compute_expected_chi_squared(
+      fix.common_chi_squared = common_.compute_expected_chi_squared_of_common_errors(
           frame.observations_span(), in_map, fix.estimate, common, lens_, level_from_base);
     }
     return common;
@@ -323,7 +324,7 @@ class Positioner::Impl {
         common_.propagate_covariance_to_fix(common_.compute_gain_from_errors_to_fix(
             frame.observations_span(), in_map, arm_m, solution, lens_, body_from_base_));
     if (computes_common_chi_squared_ && fix.redundancy > 0) {
-      fix.common_chi_squared = common_.compute_expected_chi_squared(
+      fix.common_chi_squared = common_.compute_expected_chi_squared_of_common_errors(
           frame.observations_span(), in_map, arm_m, solution, common, lens_, body_from_base_);
     }
     return common;

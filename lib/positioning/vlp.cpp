@@ -211,7 +211,7 @@ int32_t vlp_open_room(const char* lamps_yaml, const char* room, const char* cali
     std::optional<LampDetector> detector;
     if (calibration.camera.row_time_s) detector.emplace(lamps.map, calibration);
     std::string room_error =
-        explain_why_room_is_needed(lamps, "the argument room of vlp_open_room()");
+        explain_why_room_must_be_chosen(lamps, "the argument room of vlp_open_room()");
     if (!room_error.empty()) room_error = InputError(lamps_yaml, room_error).what();
     *positioner = new vlp_positioner{Positioner(lamps.map, calibration, chosen),
                                      std::move(detector), std::move(room_error)};

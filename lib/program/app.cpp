@@ -164,7 +164,7 @@ CLI::Validator make_plot_file_validator() {
   return make_ending_validator({".png", ".svg"}, "a picture's name should end in .png or .svg");
 }
 
-CLI::Validator make_renamed_option_value_validator() {
+CLI::Validator make_validator_rejecting_former_option_values() {
   return CLI::Validator(
       [](const std::string& text) {
         const std::string_view present = find_current_name_for_former(NameKind::value, text);

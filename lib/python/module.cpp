@@ -348,7 +348,8 @@ ImageDetector make_detector(const LampMapFile& lamps, const Calibration& calibra
   std::optional<LampClassifier> trained;
   if (classifier) {
     trained = read_lamp_classifier(*classifier);
-  } else if (const auto error = explain_why_room_is_needed(lamps, "the argument room of LampMap");
+  } else if (const auto error =
+                 explain_why_room_must_be_chosen(lamps, "the argument room of LampMap");
              !error.empty()) {
     throw InputError(lamps.file, error);
   }

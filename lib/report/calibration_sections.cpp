@@ -109,8 +109,8 @@ std::string make_dispersion_html_table(const Dispersion& dispersion,
          mm(dispersion.center_m.x()) + ", " + mm(dispersion.center_m.y()) + " mm"},
         {"offset subtracted from the image",
          format_pair(dispersion.offset_px, "px") +
-             format_sds(compute_dispersion_offset_covariance_with_map(dispersion, focal_px), 1,
-                        "px")}}});
+             format_sds(compute_dispersion_offset_covariance_with_map_errors(dispersion, focal_px),
+                        1, "px")}}});
 }
 
 std::string make_calibration_history_html_list(const std::vector<HistoryEntry>& entries) {

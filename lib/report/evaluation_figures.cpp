@@ -112,7 +112,7 @@ std::vector<std::string> make_evaluation_notes(const Evaluation& evaluation) {
                     " " + evaluation.resampling_unit + ".");
   }
   if (evaluation.comparison) notes.push_back(describe_comparison(*evaluation.comparison));
-  if (const std::string warning = make_crlb_warning(evaluation); !warning.empty()) {
+  if (const std::string warning = make_errors_below_crlb_warning(evaluation); !warning.empty()) {
     notes.push_back("Caution: " + warning + ".");
   }
   for (const std::string& warning : make_sample_size_warnings(evaluation)) {

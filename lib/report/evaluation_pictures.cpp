@@ -50,7 +50,7 @@ std::vector<ReportPlot> make_position_error_plots(const EvaluationInput& input,
         render_report_plot(make_fix_error_plot_drawing(make_floor_plan(input, errors, lamps))));
   } else if (evaluation.line_fit) {
     pictures.push_back(
-        plot_drive_along_line("Drive", input.fixes.rows, *input.line_m, *evaluation.line_fit));
+        make_line_drive_plot("Drive", input.fixes.rows, *input.line_m, *evaluation.line_fit));
   }
   CdfPlot::Curve curve{"fixes", {}, evaluation.horizontal_m.median, evaluation.horizontal_m.p90};
   curve.errors_m.reserve(errors.size());
@@ -104,8 +104,8 @@ std::optional<ReportPlot> make_fix_error_budget_plot(const std::vector<FixRow>& 
   return picture;
 }
 
-ReportPlot plot_drive_along_line(const std::string& title, const std::vector<FixRow>& fixes,
-                                 const CommandedLine& commanded_m, const LineFit& fit) {
+ReportPlot make_line_drive_plot(const std::string& title, const std::vector<FixRow>& fixes,
+                                const CommandedLine& commanded_m, const LineFit& fit) {
   TrackPlot plot{title, commanded_m, {}, fit.line_m};
   for (const FixRow& row : fixes) {
     if (row.fix) plot.fixes_m.push_back(get_fix_position_m(row));

@@ -42,7 +42,7 @@ std::optional<ReportPlot> make_fix_error_budget_plot(const std::vector<FixRow>& 
 
 /// Returns a plot of a drive along a commanded line.
 /// @pre `fit` is the line fit of `fixes`
-ReportPlot plot_drive_along_line(const std::string& title, const std::vector<FixRow>& fixes,
-                                 const CommandedLine& commanded_m, const LineFit& fit);
+ReportPlot make_line_drive_plot(const std::string& title, const std::vector<FixRow>& fixes,
+                                const CommandedLine& commanded_m, const LineFit& fit);
 
 }  // namespace vlp

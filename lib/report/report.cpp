@@ -74,11 +74,11 @@ std::string format_gate_verdict(const std::vector<CheckedMetric>& gates,
                                  : std::to_string(missed) + " of " + count + of_gates +
                                        (missed == 1 ? " is" : " are") + " not met.";
   const Verdict verdict = missed == 0 ? Verdict::pass : Verdict::fail;
-  return make_verdict_box(verdict, to_string(verdict),
+  return make_verdict_box(verdict, verdict_name(verdict),
                           reason + (caution.empty() ? "" : make_html_element("p", caution)));
 }
 
-std::string verdict(const Report& report) {
+std::string format_report_verdict(const Report& report) {
   return report.verdict ? format_verdict(*report.verdict)
                         : format_gate_verdict(report.gates, report.caution);
 }
@@ -145,7 +145,7 @@ std::string render_report_html(const Report& report) {
   const auto pictures = [&](ReportPart part) { return format_plots(report, part); };
   return make_html_page(
       report.title,
-      verdict(report) + make_facts_table(report) +
+      format_report_verdict(report) + make_facts_table(report) +
           make_html_section("Fixes on the floor", pictures(ReportPart::floor)) +
           make_html_section("Gates", make_gates_table(report)) +
           make_html_section("Figures", format_statistics(report)) +

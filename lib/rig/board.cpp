@@ -54,14 +54,14 @@ IdOrder read_id_order(const YamlValue& value) {
 }
 
 /// Returns a board of squares without tags.
-Board read_board_of_squares(BoardKind kind) {
+Board make_board_of_squares(BoardKind kind) {
   Board board{"", 0, 0, 0, 1, 1, false, 0, {false, BoardCorner::top_left}};
   board.kind = kind;
   return board;
 }
 
 Board read_squares(YamlMap& map, BoardKind kind) {
-  Board board = read_board_of_squares(kind);
+  Board board = make_board_of_squares(kind);
   board.cols =
       map.get_required_yaml_value("cols").read_yaml_integer_within(kMinSquares, kMaxSquares);
   board.rows =
@@ -94,7 +94,7 @@ Board read_squares(YamlMap& map, BoardKind kind) {
 
 /// Reads Kalibr's checkerboard, which counts corners.
 Board read_kalibr_checkerboard(YamlMap& map) {
-  Board board = read_board_of_squares(BoardKind::chessboard);
+  Board board = make_board_of_squares(BoardKind::chessboard);
   board.cols = map.get_required_yaml_value("targetCols")
                    .read_yaml_integer_within(kMinSquares - 1, kMaxSquares - 1) +
                1;

@@ -11,7 +11,7 @@ namespace vlp {
 namespace {
 
 /// Updates center_px to the pixel of the zenith in the undistorted image.
-void move_principal_point_to_zenith(Calibration& calibration) {
+void update_center_pixel_from_zenith(Calibration& calibration) {
   if (!calibration.rotation_center) return;
   RotationCenter& center = *calibration.rotation_center;
   center.center_px =
@@ -30,7 +30,8 @@ Eigen::Vector2d compute_normalized_zenith_point(const RotationCenter& center) {
   return center.zenith_in_camera.hnormalized();
 }
 
-Calibration perturb_lens_intrinsics(Calibration calibration, const Eigen::VectorXd& error) {
+Calibration add_error_to_calibrated_intrinsics(Calibration calibration,
+                                               const Eigen::VectorXd& error) {
   auto& intrinsics = calibration.camera.intrinsics;
   Eigen::Map<Eigen::VectorXd>(intrinsics.data(), error.size()) += error;
   if (auto& center = calibration.rotation_center;
@@ -41,26 +42,27 @@ Calibration perturb_lens_intrinsics(Calibration calibration, const Eigen::Vector
           *center->lever_arm_jacobian_wrt_zenith * (*center->jacobian_wrt_intrinsics * error);
     }
   }
-  move_principal_point_to_zenith(calibration);
+  update_center_pixel_from_zenith(calibration);
   return calibration;
 }
 
-Calibration perturb_zenith_direction(Calibration calibration, const Eigen::Vector2d& error) {
+Calibration add_error_to_calibrated_zenith(Calibration calibration, const Eigen::Vector2d& error) {
   RotationCenter& center = *calibration.rotation_center;
   center.zenith_in_camera =
       (compute_normalized_zenith_point(center) + error).homogeneous().normalized();
   if (center.lever_arm_jacobian_wrt_zenith)
     *center.lever_arm_m += *center.lever_arm_jacobian_wrt_zenith * error;
-  move_principal_point_to_zenith(calibration);
+  update_center_pixel_from_zenith(calibration);
   return calibration;
 }
 
-Calibration perturb_dispersion_offset(Calibration calibration, const Eigen::Vector2d& error) {
+Calibration add_error_to_calibrated_dispersion_offset(Calibration calibration,
+                                                      const Eigen::Vector2d& error) {
   calibration.dispersion->offset_px += error.cwiseProduct(calibration.camera.focal_px());
   return calibration;
 }
 
-std::optional<Matrix2> compute_dispersion_offset_covariance_with_map(
+std::optional<Matrix2> compute_dispersion_offset_covariance_with_map_errors(
     const Dispersion& dispersion, const Eigen::Vector2d& focal_px) {
   if (!dispersion.covariance) return std::nullopt;
   Eigen::Matrix2d covariance = *dispersion.covariance;

@@ -23,21 +23,23 @@ Eigen::Vector2d compute_normalized_zenith_point(const RotationCenter& center);
 /// Returns the calibration with `error` added to its first count_intrinsics_with_covariance()
 /// intrinsics. The zenith does not change; center_px is updated. The lever arm changes by its
 /// derivative with respect to the intrinsics, without the part through the zenith.
-Calibration perturb_lens_intrinsics(Calibration calibration, const Eigen::VectorXd& error);
+Calibration add_error_to_calibrated_intrinsics(Calibration calibration,
+                                               const Eigen::VectorXd& error);
 
 /// Returns the calibration with `error` added to the zenith's normalized point (x/z, y/z).
 /// center_px and the correlated lever arm are updated.
 /// @pre there is a rotation center
-Calibration perturb_zenith_direction(Calibration calibration, const Eigen::Vector2d& error);
+Calibration add_error_to_calibrated_zenith(Calibration calibration, const Eigen::Vector2d& error);
 
 /// Returns the calibration with `error` added to offset_px / f, the dispersion offset in focal
 /// lengths.
 /// @pre there is a dispersion
-Calibration perturb_dispersion_offset(Calibration calibration, const Eigen::Vector2d& error);
+Calibration add_error_to_calibrated_dispersion_offset(Calibration calibration,
+                                                      const Eigen::Vector2d& error);
 
 /// Computes the covariance of offset_px from captures and lamp map, in px^2, with lens and zenith
 /// taken as exact. Returns std::nullopt without Dispersion::covariance.
-std::optional<Matrix2> compute_dispersion_offset_covariance_with_map(
+std::optional<Matrix2> compute_dispersion_offset_covariance_with_map_errors(
     const Dispersion& dispersion, const Eigen::Vector2d& focal_px);
 
 }  // namespace vlp

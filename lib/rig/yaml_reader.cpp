@@ -152,19 +152,19 @@ std::optional<YamlValue> YamlMap::get_optional_yaml_value(const std::string& key
     const std::size_t line = is_null ? entry.line : entry.value->line;
     return YamlValue(entry.value, file_, prefix_.empty() ? key : prefix_ + "." + key, line);
   }
-  check_key_not_renamed(key);
+  check_former_name_of_key_absent(key);
   return std::nullopt;
 }
 
 bool YamlMap::has_yaml_key(const std::string& key) const {
   const bool found = std::any_of(entries_.begin(), entries_.end(),
                                  [&](const Entry& entry) { return entry.key == key; });
-  if (!found) check_key_not_renamed(key);
+  if (!found) check_former_name_of_key_absent(key);
   return found;
 }
 
 /// Throws InputError if an entry has the former name of `key`, which may be that of a metric.
-void YamlMap::check_key_not_renamed(std::string_view key) const {
+void YamlMap::check_former_name_of_key_absent(std::string_view key) const {
   for (const NameKind kind : {NameKind::key, NameKind::metric}) {
     const std::string_view former = find_former_name_for_current(kind, key);
     for (const Entry& entry : entries_) {
@@ -192,7 +192,7 @@ YamlValue YamlMap::get_required_yaml_value(const std::string& key) {
 void YamlMap::check_all_yaml_keys_read() const {
   for (const Entry& entry : entries_) {
     if (std::find(known_.begin(), known_.end(), entry.key) != known_.end()) continue;
-    for (const std::string& name : known_) check_key_not_renamed(name);
+    for (const std::string& name : known_) check_former_name_of_key_absent(name);
     std::string names;
     for (const std::string& name : known_) names += (names.empty() ? "" : ", ") + name;
     throw make_yaml_error(entry.line, "key " + quote_text_for_message(entry.key) +

@@ -111,7 +111,7 @@ class YamlMap {
 
  private:
   InputError make_yaml_error(std::size_t line, const std::string& problem) const;
-  void check_key_not_renamed(std::string_view key) const;
+  void check_former_name_of_key_absent(std::string_view key) const;
 
   struct Entry {
     std::string key;

@@ -152,8 +152,8 @@ void add_warnings(AdjustStepResult& result, const MapErrors& map_errors) {
 
 }  // namespace
 
-void make_adjust_set_names_unique(std::vector<AdjustSet>& sets,
-                                  const std::vector<std::string>& paths) {
+void replace_duplicate_set_names_by_paths(std::vector<AdjustSet>& sets,
+                                          const std::vector<std::string>& paths) {
   std::vector<std::string> names;
   names.reserve(sets.size());
   for (const AdjustSet& set : sets) names.push_back(set.name);
@@ -168,7 +168,7 @@ void make_adjust_set_names_unique(std::vector<AdjustSet>& sets,
 
 AdjustStepResult run_joint_adjustment_step(const AdjustStepInput& input, HistoryEntry entry) {
   AdjustStepResult result;
-  const Calibration alone = extract_camera_calibration(input.calibration);
+  const Calibration alone = extract_camera_only_calibration(input.calibration);
   const AdjustmentInput all = make_adjustment_input(input, result);
   // The check of the map assumes level captures: it skips inclined ones.
   LampCaptures captures{{}, all.lamps, input.lamps_file, input.calibration};

@@ -28,8 +28,8 @@ struct AdjustSet {
 /// Replaces the names of sets that share one name by their paths, because a spot is identified by
 /// the name of its set. `paths` are in the order of `sets`. Throws std::invalid_argument if a path
 /// occurs twice.
-void make_adjust_set_names_unique(std::vector<AdjustSet>& sets,
-                                  const std::vector<std::string>& paths);
+void replace_duplicate_set_names_by_paths(std::vector<AdjustSet>& sets,
+                                          const std::vector<std::string>& paths);
 
 /// Input of run_joint_adjustment_step().
 struct AdjustStepInput {

@@ -114,8 +114,8 @@ void propagate_uncertainty(DispersionResult& result, const CapturesFor& captures
                            DispersionCircle circle) {
   Dispersion& dispersion = result.fit.dispersion;
   const auto offset_for = [&](const Calibration& perturbed) -> std::optional<Eigen::VectorXd> {
-    const DispersionFit fit = estimate_heading_dependent_offset(
-        captures_for(perturbed), input.lamps, perturbed, method, circle);
+    const DispersionFit fit =
+        estimate_dispersion_offset(captures_for(perturbed), input.lamps, perturbed, method, circle);
     if (fit.status != DispersionStatus::ok) return {};
     return Eigen::VectorXd(fit.dispersion.offset_px.cwiseQuotient(perturbed.camera.focal_px()));
   };
@@ -124,7 +124,7 @@ void propagate_uncertainty(DispersionResult& result, const CapturesFor& captures
   bool is_propagated = true;
   if (const auto& report = input.calibration.intrinsics_report; report && report->covariance) {
     const auto offset_for_lens_error = [&](const Eigen::VectorXd& error) {
-      return offset_for(perturb_lens_intrinsics(input.calibration, error));
+      return offset_for(add_error_to_calibrated_intrinsics(input.calibration, error));
     };
     dispersion.jacobian_wrt_intrinsics =
         estimate_solution_jacobian_wrt_errors(offset_for_lens_error, nominal, *report->covariance);
@@ -136,7 +136,7 @@ void propagate_uncertainty(DispersionResult& result, const CapturesFor& captures
         std::sqrt(center->covariance->trace()) / input.calibration.camera.focal_px().x();
     const double step = std::max(min_step, sd);
     const auto offset_for_zenith_error = [&](const Eigen::VectorXd& error) {
-      return offset_for(perturb_zenith_direction(input.calibration, error));
+      return offset_for(add_error_to_calibrated_zenith(input.calibration, error));
     };
     const auto jacobian_wrt_zenith = estimate_solution_jacobian_wrt_errors(
         offset_for_zenith_error, nominal, step * step * Eigen::Matrix2d::Identity());
@@ -233,8 +233,7 @@ DispersionResult run_dispersion_calibration_step(const LampCaptures& input,
     return move_reference_points_to_camera(places, input.lamps, without);
   };
   const std::vector<ReferencePointCapture> captures = captures_for(leveled);
-  result.fit =
-      estimate_heading_dependent_offset(captures, input.lamps, input.calibration, method, circle);
+  result.fit = estimate_dispersion_offset(captures, input.lamps, input.calibration, method, circle);
   const DispersionFit& fit = result.fit;
   if (fit.status != DispersionStatus::ok) {
     set_dispersion_failure(result, input, leveled);

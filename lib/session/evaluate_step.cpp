@@ -25,7 +25,7 @@ void add_line_drive(Report& report, const Drive& drive) {
   const std::string name = fixes.file.filename().string();
   const auto metrics = format_line_drive_statistics(name, *fit);
   report.metrics.insert(report.metrics.end(), metrics.begin(), metrics.end());
-  report.plots.push_back(plot_drive_along_line(name, fixes.rows, commanded_m, *fit));
+  report.plots.push_back(make_line_drive_plot(name, fixes.rows, commanded_m, *fit));
 }
 
 void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
@@ -38,7 +38,7 @@ void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
   if (input.line_m && !evaluation.line_fit) {
     result.warnings.emplace_back("no line is fitted: the fixes do not determine a direction");
   }
-  if (std::string warning = make_crlb_warning(evaluation); !warning.empty()) {
+  if (std::string warning = make_errors_below_crlb_warning(evaluation); !warning.empty()) {
     result.warnings.push_back(std::move(warning));
   }
   if (!result.caution.empty()) result.warnings.push_back(result.caution);

@@ -457,8 +457,8 @@ void warn_about_rejected_lamps(LocateResult& result, const LocateInput& input,
 
 }  // namespace
 
-LocateResult locate_camera_from_frames(const LocateInput& input) {
-  if (input.sigma_px) return locate_camera_from_frames(apply_given_pixel_noise(input));
+LocateResult locate_camera_from_detections(const LocateInput& input) {
+  if (input.sigma_px) return locate_camera_from_detections(apply_given_pixel_noise(input));
   check_motion(input);
   LocateResult result;
   const bool noise_known = locate_with_noise(input, result);
@@ -526,7 +526,7 @@ class TiltedCaptures {
 
   LevelRotations iterate_until_tilt_converges() {
     if (captures_.empty()) return {};
-    fixes_ = locate_camera_from_frames(input_).fixes;
+    fixes_ = locate_camera_from_detections(input_).fixes;
     initialize_tilt_from_ellipses();
     constexpr int max_iterations = 6;
     for (int i = 0; i < max_iterations && redetect_in_level_planes(); ++i) {
@@ -555,7 +555,7 @@ class TiltedCaptures {
         input_.frames[capture.frame].detections = std::move(frame->detections);
       }
     }
-    fixes_ = locate_camera_from_frames(input_).fixes;
+    fixes_ = locate_camera_from_detections(input_).fixes;
   }
 
   void initialize_tilt_from_ellipses() {
@@ -668,7 +668,7 @@ LocateResult locate_camera_from_images(const LampImages& images, ImageUse use, L
   LocateResult result;
   if (has_detections(input.frames)) {
     seen.failure.reset();
-    result = locate_camera_from_frames(input);
+    result = locate_camera_from_detections(input);
   }
   add_image_intake_remarks(seen, result);
   // A classifier identifies lamps without the row time: it is no reason why there is no result.

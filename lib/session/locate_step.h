@@ -20,7 +20,7 @@
 
 namespace vlp {
 
-/// Input of locate_camera_from_frames(): captures, lamp map, calibration, and options of the
+/// Input of locate_camera_from_detections(): captures, lamp map, calibration, and options of the
 /// positioner.
 struct LocateInput {
   std::vector<Frame> frames;
@@ -66,7 +66,7 @@ Sensors make_capture_sensor_readings(const std::string& image, const LocateInput
 std::size_t count_detections_outside_image(std::span<const Frame> frames,
                                            const std::array<int, 2>& imager_px);
 
-/// Result of locate_camera_from_frames().
+/// Result of locate_camera_from_detections().
 struct LocateResult : StepResult {
   /// Fix of each frame, in the order of LocateInput::frames.
   std::vector<Fix> fixes;
@@ -87,15 +87,15 @@ struct LocateResult : StepResult {
 /// Warnings: residuals larger than the reported noise explains; detections outside the image or the
 /// calibrated region (region_px); images missing in `captures`; rejected lamps.
 /// @throws std::invalid_argument if a camera moves and its calibration lacks row_time_s or readout
-LocateResult locate_camera_from_frames(const LocateInput& input);
+LocateResult locate_camera_from_detections(const LocateInput& input);
 
 /// Detects the lamps in images (detect_lamps_in_images()) and locates the camera of each image.
 /// `input` holds everything except the frames. If the tilt of a camera is estimated, its lamps are
 /// detected again in the plane that is level by its fix (redetect_lamps_until_tilt_converges()).
 ///
 /// Skipped images and remarks of the intake are part of the result. It fails as
-/// locate_camera_from_frames() does, or if no lamp is identified.
-/// @throws as detect_lamps_in_images() and locate_camera_from_frames()
+/// locate_camera_from_detections() does, or if no lamp is identified.
+/// @throws as detect_lamps_in_images() and locate_camera_from_detections()
 LocateResult locate_camera_from_images(const LampImages& images, ImageUse use, LocateInput input,
                                        const FrontendOptions& options,
                                        const IntakeProgress& progress = {});

@@ -156,10 +156,9 @@ std::vector<bool> find_unique_lamps(const RowTimeCandidates& found) {
 
 }  // namespace
 
-std::vector<double> compute_row_time_position_costs(const RowTimeCandidates& found,
-                                                    std::span<const GroupedLights> images,
-                                                    const LampMap& lamps,
-                                                    const std::optional<Lens>& lens) {
+std::vector<double> compute_position_costs_of_row_time_candidates(
+    const RowTimeCandidates& found, std::span<const GroupedLights> images, const LampMap& lamps,
+    const std::optional<Lens>& lens) {
   const std::vector<bool> unique = find_unique_lamps(found);
   const Tolerance& tolerance = lens ? kWithLens : kWithoutLens;
   // Squared residuals of the images by candidate and group.

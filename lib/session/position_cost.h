@@ -60,9 +60,8 @@ struct GroupedLights {
 ///     sum over groups of log(1 + median over images of r^2).
 ///
 /// An error of the map or of the lens is the same in all images; therefore images are not summed.
-std::vector<double> compute_row_time_position_costs(const RowTimeCandidates& found,
-                                                    std::span<const GroupedLights> images,
-                                                    const LampMap& lamps,
-                                                    const std::optional<Lens>& lens);
+std::vector<double> compute_position_costs_of_row_time_candidates(
+    const RowTimeCandidates& found, std::span<const GroupedLights> images, const LampMap& lamps,
+    const std::optional<Lens>& lens);
 
 }  // namespace vlp

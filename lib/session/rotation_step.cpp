@@ -57,8 +57,9 @@ void propagate_lens_errors(
   const auto& report = input.calibration.intrinsics_report;
   if (!report || !report->covariance) return;
   const auto with_error = [&](const Eigen::VectorXd& error) -> std::optional<Eigen::VectorXd> {
-    const auto moved = center_for(
-        perturb_lens_intrinsics(extract_camera_calibration(input.calibration), error).camera);
+    const auto moved = center_for(add_error_to_calibrated_intrinsics(
+                                      extract_camera_only_calibration(input.calibration), error)
+                                      .camera);
     if (!moved || moved->lever_arm_m.has_value() != center.lever_arm_m.has_value()) return {};
     return make_solution_vector(*moved);
   };
@@ -179,7 +180,7 @@ std::string format_height_m(double z_m) {
   return text == "-0.000" ? "0.000" : text;
 }
 
-Calibration extract_camera_calibration(const Calibration& calibration) {
+Calibration extract_camera_only_calibration(const Calibration& calibration) {
   Calibration alone;
   alone.camera = calibration.camera;
   return alone;
@@ -214,7 +215,7 @@ void explain_failure_by_lamp_map_errors(const LampCaptures& input, const Calibra
 RotationResult run_rotation_calibration_step(const LampCaptures& input, RotationMethod method,
                                              HistoryEntry entry) {
   RotationResult result;
-  check_lamp_map_with_captures(input, extract_camera_calibration(input.calibration), result);
+  check_lamp_map_with_captures(input, extract_camera_only_calibration(input.calibration), result);
   if (!result.has_succeeded()) return result;
   const Camera& camera = input.calibration.camera;
   result.rotation = find_in_place_rotation_captures(input.frames, input.lamps, camera);
@@ -227,7 +228,7 @@ RotationResult run_rotation_calibration_step(const LampCaptures& input, Rotation
                             std::string(describe_rotation_status(result.rotation.status)),
                             map ? input.lamps_file : std::filesystem::path());
     if (map || result.rotation.status == RotationStatus::axis_moved) {
-      explain_failure_by_lamp_map_errors(input, extract_camera_calibration(input.calibration),
+      explain_failure_by_lamp_map_errors(input, extract_camera_only_calibration(input.calibration),
                                          result);
     }
     return result;
@@ -242,7 +243,7 @@ RotationResult run_rotation_calibration_step(const LampCaptures& input, Rotation
                    "other yaws, preferably twelve over a full turn, or use --method joint"
                  : "no rotation center fits the captures: take them at one position per height, "
                    "over more of the turn, with more visible lamps, and check lens and lamp map");
-    explain_failure_by_lamp_map_errors(input, extract_camera_calibration(input.calibration),
+    explain_failure_by_lamp_map_errors(input, extract_camera_only_calibration(input.calibration),
                                        result);
     return result;
   }
@@ -263,7 +264,7 @@ RotationResult run_rotation_calibration_step(const LampCaptures& input, Rotation
 TiltResult run_tilt_calibration_step(const LampCaptures& input, bool refine_map,
                                      HistoryEntry entry) {
   TiltResult result;
-  const Calibration alone = extract_camera_calibration(input.calibration);
+  const Calibration alone = extract_camera_only_calibration(input.calibration);
   check_lamp_map_with_captures(input, alone, result);
   if (!result.has_succeeded()) return result;
   TiltCalibrationOptions options;

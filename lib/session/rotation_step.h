@@ -17,7 +17,7 @@ namespace vlp {
 
 /// Returns a calibration with the camera of `calibration` only, without rotation center and
 /// dispersion.
-Calibration extract_camera_calibration(const Calibration& calibration);
+Calibration extract_camera_only_calibration(const Calibration& calibration);
 
 /// Checks the lamp map with the captures of a stationary camera or, if these show no error, with
 /// all captures (calibration/map/map_errors.h). Adds a warning to `result` for each error that

@@ -96,8 +96,8 @@ RowTimeResult select_row_time_by_periods_and_positions(
       std::vector<MeasuredPeriod>(periods.lights.begin(), periods.lights.end()), lamps);
   if (found.candidates.size() < 2) return select_row_time_candidate(found);
   const auto images = periods.group_lights(found.groups);
-  return select_row_time_candidate(found,
-                                   compute_row_time_position_costs(found, images, lamps, lens));
+  return select_row_time_candidate(
+      found, compute_position_costs_of_row_time_candidates(found, images, lamps, lens));
 }
 
 DetectedLights detect_lights_in_folders(const std::vector<fs::path>& folders, const LampMap& lamps,

@@ -43,7 +43,7 @@ DetectedLights detect_lights_in_folders(const std::vector<std::filesystem::path>
                                         const IntakeProgress& progress = {});
 
 /// Chooses a row time by periods and duty cycles of the lights in the images of each folder. Also
-/// uses their positions if several row times fit (compute_row_time_position_costs()).
+/// uses their positions if several row times fit (compute_position_costs_of_row_time_candidates()).
 ///
 /// @param labels  lights of each folder that are lamps; empty: all lights
 RowTimeResult select_row_time_by_periods_and_positions(
@@ -58,8 +58,8 @@ struct RowTimeStepResult : StepResult {
 
 /// Estimates the row time from lamps with a frequency in the map (estimate_row_time_candidates()).
 /// If several row times explain their periods, chooses by their positions
-/// (compute_row_time_position_costs()). Adds row time and readout direction to the camera of
-/// `calibration`, if given, and warns if it states another row time
+/// (compute_position_costs_of_row_time_candidates()). Adds row time and readout direction to the
+/// camera of `calibration`, if given, and warns if it states another row time
 /// (describe_row_time_contradiction()). Failure: undetermined. Throws InputError if no lamp has a
 /// frequency.
 RowTimeStepResult estimate_row_time_from_lights(const DetectedLights& seen,

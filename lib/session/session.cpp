@@ -70,13 +70,12 @@ constexpr std::array<std::pair<MetricSource, std::string_view>, 5> kStepsOfMetri
 constexpr std::array kPlots{"lens.svg", "rotation.svg", "dispersion.svg"};
 
 /// Returns the gates of the session: those of the lens, if it is estimated, and those of its file.
-std::vector<Gate> select_gates_of_step(const SessionFolder& session,
-                                       const SessionOptions& options) {
+std::vector<Gate> read_session_gates(const SessionFolder& session, const SessionOptions& options) {
   std::vector<Gate> gates;
   if (!session.camera_calibration_file()) gates = make_default_lens_gates();
   const fs::path file = session.gates_file().value_or(options.gates_file);
   if (file.empty()) return gates;
-  return merge_gates(std::move(gates), read_gates(file, list_session_metrics()));
+  return merge_gates(std::move(gates), read_gates(file, list_session_metric_kinds()));
 }
 
 /// Result of a step, and the function that writes its outputs.
@@ -164,7 +163,7 @@ class SessionRun {
         {"row-time", {"camera.yaml"}},
         {"rotation", with_picture({"rotated.yaml"}, "rotation.svg")},
         {"dispersion", with_picture({"calibration.yaml"}, "dispersion.svg")}};
-    if (session_.check_captures_folder()) steps.push_back({"check", {"check-fixes.csv"}});
+    if (session_.accuracy_check_captures_folder()) steps.push_back({"check", {"check-fixes.csv"}});
     for (const fs::path& line : folders_of_drives_along_lines()) {
       steps.push_back({line.filename().string(), {fixes_file_path(line).filename().string()}});
     }
@@ -314,7 +313,7 @@ class SessionRun {
         });
   }
 
-  bool estimate_row_time_from_lights(const fs::path& camera_file) {
+  bool run_row_time(const fs::path& camera_file) {
     return run_or_reuse_step(
         "row-time", {session_.rotation_captures_folder(), lamps_file(), camera_file}, "", [&] {
           const LampMap lamps = read_lamps();
@@ -385,7 +384,7 @@ class SessionRun {
   }
 
   /// Adds the remarks and metrics of the images to the result of a step.
-  static void add(const StepResult& remarks, StepResult& result) {
+  static void add_image_remarks(const StepResult& remarks, StepResult& result) {
     result.metrics.insert(result.metrics.end(), remarks.metrics.begin(), remarks.metrics.end());
     result.skipped = remarks.skipped;
     result.notes.insert(result.notes.begin(), remarks.notes.begin(), remarks.notes.end());
@@ -418,7 +417,7 @@ class SessionRun {
       RotationResult found = run_rotation_calibration_step(captures, RotationMethod::axis,
                                                            make_step_history("", inputs));
       if (!found.has_succeeded()) add_row_time_contradiction_to_result(captures, seen, found);
-      add(remarks, found);
+      add_image_remarks(remarks, found);
       return Work{found, [this, found] {
                     write_picture(found, "rotation.svg");
                     write_calibration(output_file_path("rotated.yaml"), found.calibration);
@@ -448,7 +447,7 @@ class SessionRun {
           captures, places, DispersionMethod::camera, DispersionCircle::mean,
           make_step_history("", add_capture_tables(inputs, folder)));
       if (!found.has_succeeded()) add_row_time_contradiction_to_result(captures, seen, found);
-      add(remarks, found);
+      add_image_remarks(remarks, found);
       if (places.captures_without_position > 0) {
         found.warnings.push_back(
             fmt::format("{} of {} captures ignored: they have no position; add it to captures.csv",
@@ -485,7 +484,7 @@ class SessionRun {
             "there is no step row-time in this session, as the row time is known or there is a "
             "classifier; leave it out of --redo");
       }
-    } else if (!estimate_row_time_from_lights(camera)) {
+    } else if (!run_row_time(camera)) {
       return false;
     } else {
       camera = output_file_path("camera.yaml");
@@ -536,25 +535,25 @@ class SessionRun {
   }
 
   bool locate_check_and_drives() {
-    if (const auto check = session_.check_captures_folder();
-        check && !locate_check_and_drives(*check))
+    if (const auto check = session_.accuracy_check_captures_folder();
+        check && !locate_folder(*check))
       return false;
     for (const fs::path& line : folders_of_drives_along_lines()) {
-      if (!locate_check_and_drives(line)) return false;
+      if (!locate_folder(line)) return false;
     }
     return true;
   }
 
-  bool locate_check_and_drives(const fs::path& folder) {
+  bool locate_folder(const fs::path& folder) {
     const fs::path calibration = output_file_path("calibration.yaml");
     return run_or_reuse_step(
         folder.filename().string(), list_lamp_inputs(folder, calibration), "", [&] {
           LocateInput input{
               {}, read_lamps(), read_calibration(calibration), read_captures_csv_of_folder(folder)};
-          input.compute_lamp_offsets = session_.check_captures_folder() == folder;
+          input.compute_lamp_offsets = session_.accuracy_check_captures_folder() == folder;
           const LampImages images{folder, input.lamps, lamps_file(), input.calibration,
                                   calibration};
-          const ImageUse use = session_.check_captures_folder() == folder
+          const ImageUse use = session_.accuracy_check_captures_folder() == folder
                                    ? ImageUse::known_positions
                                    : ImageUse::fixes;
           LocateResult found = locate_camera_from_images(images, use, std::move(input),
@@ -569,7 +568,7 @@ class SessionRun {
     std::optional<fs::path> truth;
     std::vector<fs::path> inputs{output_file_path("check-fixes.csv"), lamps_file(),
                                  output_file_path("calibration.yaml")};
-    if (const auto check = session_.check_captures_folder()) {
+    if (const auto check = session_.accuracy_check_captures_folder()) {
       for (const fs::path& table : add_capture_tables({}, *check)) inputs.push_back(table);
     }
     for (const char* plot : kPlots) {
@@ -584,7 +583,7 @@ class SessionRun {
     std::string limits;
     for (const Gate& gate : gates_) limits += fmt::format("{} {}\n", gate.metric, gate.limit);
     run_or_reuse_step("evaluate", inputs, format_plot_setting() + limits, [&] {
-      const auto check = session_.check_captures_folder();
+      const auto check = session_.accuracy_check_captures_folder();
       if (check) truth = find_truth_file(*check);
       if (truth) return evaluate_check(*truth, inputs, gates);
       Work skipped_work;
@@ -673,7 +672,7 @@ class SessionRun {
 
 }  // namespace
 
-std::vector<MetricKind> list_session_metrics() {
+std::vector<MetricKind> list_session_metric_kinds() {
   return list_metric_kinds({MetricSource::lens, MetricSource::rotation, MetricSource::dispersion,
                             MetricSource::evaluation});
 }
@@ -681,7 +680,7 @@ std::vector<MetricKind> list_session_metrics() {
 SessionResult run_calibration_session(const fs::path& session, const fs::path& results,
                                       const SessionOptions& options,
                                       const SessionObserver& observer) {
-  if (!options.gates_file.empty()) read_gates(options.gates_file, list_session_metrics());
+  if (!options.gates_file.empty()) read_gates(options.gates_file, list_session_metric_kinds());
   if (!fs::is_directory(session)) throw InputError(session, "is not a folder of captures");
   if (is_session_or_captures_folder(session, results)) {
     throw InputError(results, "contains captures: choose another folder for the results");
@@ -691,7 +690,7 @@ SessionResult run_calibration_session(const fs::path& session, const fs::path& r
   std::vector<Gate> gates;
   try {
     folder.emplace(session);
-    gates = select_gates_of_step(*folder, options);
+    gates = read_session_gates(*folder, options);
   } catch (const InputError& error) {
     SessionResult result;
     result.verdict = Verdict::invalid;

@@ -39,9 +39,9 @@ struct SessionOptions {
   bool choose_lens_model = false;
   /// Threads, limits for images, row time and readout direction of the camera.
   FrontendOptions frontend = {};
-  /// File in format vlp-gates/1 with gates of list_session_metrics(), for a session without its own
-  /// gates.yaml; may be empty. Its gates are added to make_default_lens_gates(), or replace the
-  /// gates of the same metric.
+  /// File in format vlp-gates/1 with gates of list_session_metric_kinds(), for a session without
+  /// its own gates.yaml; may be empty. Its gates are added to make_default_lens_gates(), or replace
+  /// the gates of the same metric.
   std::filesystem::path gates_file = {};
   /// Makes plots, drives along lines and report.html, which take longer than all other results.
   bool report = true;
@@ -80,7 +80,7 @@ struct SessionObserver {
 };
 
 /// Returns the metrics of the procedure, which its gates can limit.
-std::vector<MetricKind> list_session_metrics();
+std::vector<MetricKind> list_session_metric_kinds();
 
 /// Runs the whole procedure: calibrates a camera from the folder of a session, checks it, and
 /// writes a report. All outputs are written into `results`, which is created if it does not exist.

@@ -66,7 +66,7 @@ class SessionFolder {
   std::optional<std::filesystem::path> dispersion_captures_folder() const {
     return find_session_file_or_folder("dispersion");
   }
-  std::optional<std::filesystem::path> check_captures_folder() const {
+  std::optional<std::filesystem::path> accuracy_check_captures_folder() const {
     return find_session_file_or_folder("check");
   }
   std::optional<std::filesystem::path> lamp_classifier_file() const {

@@ -81,8 +81,9 @@ class BoardPattern {
   /// is none.
   Eigen::Vector2d intersect_ray_with_shape(const Eigen::Vector3d& origin,
                                            const Eigen::Vector3d& direction) const;
-  double integrate_shape_along_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
-    return mosaic_.integrate_shape_along_edge(p, q);
+  double compute_edge_contribution_to_area_integral(const Eigen::Vector2d& p,
+                                                    const Eigen::Vector2d& q) const {
+    return mosaic_.compute_edge_contribution_to_area_integral(p, q);
   }
   std::optional<double> find_constant_value_in_quadrilateral(
       const std::array<Eigen::Vector2d, 4>& corners) const {

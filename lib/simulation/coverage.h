@@ -33,16 +33,18 @@ inline double cross_product_2d(const Eigen::Vector2d& a, const Eigen::Vector2d& 
 /// pattern g over the element: a pixel or, with `per_px` 2, a quarter of one.
 ///
 /// The mean is exact for the element's image on the pattern, a quadrilateral Q. By Green's theorem
-/// the integral of g over Q is the sum of shape.integrate_shape_along_edge(p, q) over its edges. An
-/// edge integral is the integral along the edge of any G(x, y) that Green's theorem turns into g.
+/// the integral of g over Q is the sum of shape.compute_edge_contribution_to_area_integral(p, q)
+/// over its edges. An edge integral is the integral along the edge of any G(x, y) that Green's
+/// theorem turns into g.
 ///
 /// Reason for quarters of pixels: a lens blurs the light before pixels integrate it. Blurring pixel
 /// means instead would displace an edge by 0.01 px. Rays within a pixel are interpolated linearly
 /// between those of its corners.
 ///
 /// A shape has intersect_ray_with_shape(origin, direction) in its frame and
-/// integrate_shape_along_edge(p, q). Its find_constant_value_in_quadrilateral(corners) is the value
-/// of the pattern if it is constant over a whole quadrilateral.
+/// compute_edge_contribution_to_area_integral(p, q). Its
+/// find_constant_value_in_quadrilateral(corners) is the value of the pattern if it is constant over
+/// a whole quadrilateral.
 template <typename Shape>
 void add_shape_to_image(const PixelRays& rays, const PixelWindow& window,
                         const TargetFromCamera& target_from_camera, const Shape& shape,
@@ -51,7 +53,7 @@ void add_shape_to_image(const PixelRays& rays, const PixelWindow& window,
     double integral, area;
   };
   const auto edge = [&](const Eigen::Vector2d& p, const Eigen::Vector2d& q) {
-    return Edge{shape.integrate_shape_along_edge(p, q), cross_product_2d(p, q) / 2};
+    return Edge{shape.compute_edge_contribution_to_area_integral(p, q), cross_product_2d(p, q) / 2};
   };
   const auto corner_ray = [&](int row, int column) -> Eigen::Vector3d {
     const int line = window.line_begin + row / per_px, place = window.place_begin + column / per_px;

@@ -190,7 +190,7 @@ class LampFrame {
       patch = patch.mul(window.crop_image_to_window(transmittance_, rays_.image_margin_px()));
     optics_.apply_point_spread(patch, {window.line_begin, window.place_begin});
     // Light that a veil scatters to all pixels.
-    if (const float scattered_e_per_s = optics_.split_off_veiling_glare(patch);
+    if (const float scattered_e_per_s = optics_.extract_veiling_glare_per_pixel(patch);
         scattered_e_per_s != 0) {
       for (int row = 0; row < image.rows; ++row) {
         image.row(row) += compute_mean_light_fraction(source.wave, row - rays_.image_margin_px()) *

@@ -128,7 +128,7 @@ void PointSpread::add_veiling_glare(cv::Mat1f& image) const {
   image = (1 - optics_.veiling_glare) * image + optics_.veiling_glare * mean;
 }
 
-float PointSpread::split_off_veiling_glare(cv::Mat1f& part) const {
+float PointSpread::extract_veiling_glare_per_pixel(cv::Mat1f& part) const {
   if (optics_.veiling_glare == 0) return 0;
   const double pixels = double(rays_.num_readout_lines()) * rays_.pixels_per_line();
   const double scattered = optics_.veiling_glare * cv::sum(part)[0] / pixels;

@@ -41,7 +41,7 @@ class PointSpread {
 
   /// Removes the fraction scattered by the veil from the light of a part of the scene. Returns the
   /// amount that each pixel of the image receives of it.
-  float split_off_veiling_glare(cv::Mat1f& part) const;
+  float extract_veiling_glare_per_pixel(cv::Mat1f& part) const;
 
  private:
   void apply_defocus_blur(cv::Mat1f& part, const SpreadWindow& window) const;

@@ -68,7 +68,7 @@ RectanglePattern::RectanglePattern(const std::vector<Rectangle>& rectangles) {
   stride_ = x_m_.size() + 1;
   values_.assign(stride_ * (y_m_.size() + 1), 0);
   for (const Rectangle& rectangle : rectangles) fill_pattern_rectangle(rectangle);
-  accumulate_row_sums();
+  compute_cumulative_row_integrals();
 }
 
 void RectanglePattern::fill_pattern_rectangle(const Rectangle& rectangle) {
@@ -83,7 +83,7 @@ void RectanglePattern::fill_pattern_rectangle(const Rectangle& rectangle) {
   }
 }
 
-void RectanglePattern::accumulate_row_sums() {
+void RectanglePattern::compute_cumulative_row_integrals() {
   sums_.assign(values_.size(), 0);
   for (std::size_t i = 0; i < values_.size(); ++i) {
     const std::size_t column = i % stride_;
@@ -99,8 +99,8 @@ double RectanglePattern::integrate_pattern_row_up_to(int column, int row, double
   return sums_[i] + values_[i] * (x - x_m_[static_cast<std::size_t>(column) - 1]);
 }
 
-double RectanglePattern::integrate_shape_along_edge(const Eigen::Vector2d& p,
-                                                    const Eigen::Vector2d& q) const {
+double RectanglePattern::compute_edge_contribution_to_area_integral(
+    const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
   const Eigen::Vector2d displacement = q - p;
   if (!displacement.allFinite()) return std::numeric_limits<double>::quiet_NaN();
   CellTraversal x(x_m_, p.x(), displacement.x()), y(y_m_, p.y(), displacement.y());
@@ -154,7 +154,8 @@ std::optional<double> Disc::find_constant_value_in_quadrilateral(
   return outside ? std::optional(0.0) : std::nullopt;
 }
 
-double Disc::integrate_shape_along_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
+double Disc::compute_edge_contribution_to_area_integral(const Eigen::Vector2d& p,
+                                                        const Eigen::Vector2d& q) const {
   if (p.squaredNorm() <= 1 && q.squaredNorm() <= 1)
     return integrate_disc_radiance_in_triangle(p, q);
   // |p + t (q - p)| = 1

@@ -31,7 +31,8 @@ class RectanglePattern {
 
   /// Returns the integral of G dy along the edge from p to q. G(x, y) is the integral of the
   /// pattern along the row from minus infinity to x.
-  double integrate_shape_along_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
+  double compute_edge_contribution_to_area_integral(const Eigen::Vector2d& p,
+                                                    const Eigen::Vector2d& q) const;
 
   /// Returns the value of the pattern over a quadrilateral; std::nullopt if a line of the pattern
   /// lies between its corners.
@@ -40,7 +41,7 @@ class RectanglePattern {
 
  private:
   void fill_pattern_rectangle(const Rectangle& rectangle);
-  void accumulate_row_sums();
+  void compute_cumulative_row_integrals();
   std::size_t flat_cell_index(int column, int row) const {
     return static_cast<std::size_t>(row) * stride_ + static_cast<std::size_t>(column);
   }
@@ -73,7 +74,8 @@ class Disc {
   /// radius. add_shape_to_image() needs no other triangles.
   ///   Triangle inside: the area (p x q) / 2; of r^2, (p x q) (p p + p q + q q) / 12.
   ///   Sector of angle a: the area a / 2; of r^2, a / 4.
-  double integrate_shape_along_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
+  double compute_edge_contribution_to_area_integral(const Eigen::Vector2d& p,
+                                                    const Eigen::Vector2d& q) const;
 
  private:
   double integrate_disc_radiance_in_triangle(const Eigen::Vector2d& p,

@@ -100,7 +100,8 @@ std::size_t count_captures_of_set(const CaptureSet& set) {
          static_cast<std::size_t>(lamps.repeat);
 }
 
-LampShot make_simulated_lamp_capture(const Scene& scene, const CaptureSet& set, std::size_t index) {
+LampShot make_lamp_capture_parameters(const Scene& scene, const CaptureSet& set,
+                                      std::size_t index) {
   const LampShots& captures = *set.lamps;
   cv::RNG random = make_seeded_random_generator(scene.seed, set.folder, index);
   const CaptureIndices indices = find_capture_indices(captures, index);
@@ -149,8 +150,8 @@ LampShot make_simulated_lamp_capture(const Scene& scene, const CaptureSet& set, 
   return shot;
 }
 
-BoardShot make_simulated_board_capture(const Scene& scene, const CaptureSet& set,
-                                       std::size_t index) {
+BoardShot make_board_capture_parameters(const Scene& scene, const CaptureSet& set,
+                                        std::size_t index) {
   const BoardViews& views = *set.board;
   const Lens lens(scene.camera.lens_model, scene.camera.intrinsics);
   cv::RNG random = make_seeded_random_generator(scene.seed, set.folder, index);

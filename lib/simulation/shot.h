@@ -96,8 +96,8 @@ std::size_t count_captures_of_set(const CaptureSet& set);
 
 /// Returns capture `index` of a set. It depends on the scene, its seed, the set's folder and the
 /// index alone.
-LampShot make_simulated_lamp_capture(const Scene& scene, const CaptureSet& set, std::size_t index);
-BoardShot make_simulated_board_capture(const Scene& scene, const CaptureSet& set,
-                                       std::size_t index);
+LampShot make_lamp_capture_parameters(const Scene& scene, const CaptureSet& set, std::size_t index);
+BoardShot make_board_capture_parameters(const Scene& scene, const CaptureSet& set,
+                                        std::size_t index);
 
 }  // namespace vlp

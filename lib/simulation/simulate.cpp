@@ -69,11 +69,11 @@ bool render_capture(const Scene& scene, const FrameRenderer& renderer, const Cap
     return true;
   };
   if (set.board) {
-    const BoardShot shot = make_simulated_board_capture(scene, set, index);
+    const BoardShot shot = make_board_capture_parameters(scene, set, index);
     return write(
         shot.image, [&] { return renderer.render_board_in_electrons(shot); }, shot.noise_seed);
   }
-  const LampShot shot = make_simulated_lamp_capture(scene, set, index);
+  const LampShot shot = make_lamp_capture_parameters(scene, set, index);
   return write(
       shot.image, [&] { return renderer.render_lamps_in_electrons(shot); }, shot.noise_seed);
 }

@@ -158,7 +158,7 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
   // Columns that no capture of the set needs are omitted.
   bool moves = false, has_roll_pitch = false;
   for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
-    const BaseMotion motion = make_simulated_lamp_capture(scene, set, i).motion;
+    const BaseMotion motion = make_lamp_capture_parameters(scene, set, i).motion;
     moves = moves || !motion.is_base_at_rest();
     has_roll_pitch = has_roll_pitch || !motion.is_base_level();
   }
@@ -177,7 +177,7 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
             : std::initializer_list<std::string_view>{"image", "time_s"});
   std::size_t empty = 0;
   for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
-    const LampShot shot = make_simulated_lamp_capture(scene, set, i);
+    const LampShot shot = make_lamp_capture_parameters(scene, set, i);
     const auto& [position_m, yaw_rad] = shot.motion.camera_pose_at(0);
     const std::string x = length(position_m.x()), y = length(position_m.y());
     const std::string z = length(position_m.z()), time = format_fixed_decimals(shot.time_s, 9);
@@ -216,7 +216,7 @@ void write_other_lights(const Scene& scene, const FrameRenderer& renderer, const
   CsvWriter table(folder / "true_other_lights.csv",
                   {"image", "kind", "lamp", "u_px", "v_px", "in_view"});
   for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
-    const LampShot shot = make_simulated_lamp_capture(scene, set, i);
+    const LampShot shot = make_lamp_capture_parameters(scene, set, i);
     for (const auto& [kind, lamp, at_px, in_view] :
          find_true_other_lights_in_image(scene, renderer, shot)) {
       table.write_csv_row({shot.image, kind, lamp ? std::to_string(*lamp) : "", pixel(at_px.x()),
@@ -235,7 +235,7 @@ std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
   CsvWriter corners(folder / "true_corners.csv", columns);
   std::size_t empty = 0;
   for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
-    const BoardShot shot = make_simulated_board_capture(scene, set, i);
+    const BoardShot shot = make_board_capture_parameters(scene, set, i);
     const Eigen::Isometry3d camera_from_board = shot.camera_from_board(0);
     const Eigen::Vector3d place_m = camera_from_board.translation();
     const Eigen::AngleAxisd rotation(camera_from_board.linear());

@@ -28,14 +28,14 @@ fs::path resolve_path(const YamlValue& value, const fs::path& file) {
   return path.is_absolute() ? path : file.parent_path() / path;
 }
 
-void read_optional_into(YamlMap& map, const char* key, int& metric) {
+void read_optional_into(YamlMap& map, const char* key, int& target) {
   if (const auto value = map.get_optional_yaml_value(key))
-    metric = value->read_yaml_integer_within(1, kMany);
+    target = value->read_yaml_integer_within(1, kMany);
 }
-void read_optional_into(YamlMap& map, const char* key, double& metric, double max,
+void read_optional_into(YamlMap& map, const char* key, double& target, double max,
                         const char* unit) {
   if (const auto value = map.get_optional_yaml_value(key))
-    metric = value->read_yaml_number_within(0, max, unit);
+    target = value->read_yaml_number_within(0, max, unit);
 }
 
 CompletionCriteria read_completion_criteria(YamlMap map) {
@@ -137,7 +137,7 @@ GoldenUnit read_golden(YamlMap map, Files& files) {
     throw calibration.make_yaml_error(
         "should be a complete calibration: it has no rotation_center");
   }
-  golden.gates = read_gates(map.get_required_yaml_value("gates"), list_unit_metrics());
+  golden.gates = read_gates(map.get_required_yaml_value("gates"), list_unit_metric_kinds());
   map.check_all_yaml_keys_read();
   return golden;
 }
@@ -288,7 +288,7 @@ void read_verdict_conditions(YamlMap& document, Files& files, StationConfig& con
     config.completion = read_completion_criteria(sufficient->read_yaml_mapping());
   if (const auto refuse = document.get_optional_yaml_value("rejection"))
     read_rejection_limits(refuse->read_yaml_mapping(), config);
-  config.gates = read_gates(document.get_required_yaml_value("gates"), list_unit_metrics());
+  config.gates = read_gates(document.get_required_yaml_value("gates"), list_unit_metric_kinds());
   if (const auto guard = document.get_optional_yaml_value("guard_bands")) {
     read_guard_bands(guard->read_yaml_mapping(), config.gates);
   }
@@ -341,7 +341,7 @@ std::string describe_serial_number_problem(const StationConfig& config, const st
   return describe_serial_pattern_mismatch(serial, config.serial_pattern);
 }
 
-std::vector<MetricKind> list_unit_metrics() {
+std::vector<MetricKind> list_unit_metric_kinds() {
   return list_metric_kinds({MetricSource::station, MetricSource::lens, MetricSource::rotation,
                             MetricSource::dispersion});
 }

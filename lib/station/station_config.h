@@ -117,7 +117,7 @@ std::string describe_camera_id_problem(const std::string& camera_id);
 std::string describe_serial_number_problem(const StationConfig& config, const std::string& serial);
 
 /// Returns the metrics of a unit, including all metrics that its gates can limit.
-std::vector<MetricKind> list_unit_metrics();
+std::vector<MetricKind> list_unit_metric_kinds();
 
 /// Reads a station's configuration.
 ///

@@ -162,7 +162,9 @@ bool compare(const Case& test_case, int num_repetitions) {
   }
   const ProjectionUncertainty uncertainty(solution);
   const auto known = [&](const Eigen::Vector2d& pixel) {
-    return uncertainty.max_projection_sd_px(pixel) <= test_case.known_px ? 1.0 : INFINITY;
+    return uncertainty.projection_sd_along_worst_direction_px(pixel) <= test_case.known_px
+               ? 1.0
+               : INFINITY;
   };
   const auto difference =
       compute_projection_difference(read_lens(model.str(), test_case.input.lens_model),

@@ -117,7 +117,7 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
   const double white_e = scene.board->white_e_per_s * boards.exposure_s;
   const double exposures = development.white > 0 ? development.white * holds_e / white_e : 1;
   parallel_for(electrons.size(), threads, [&](std::size_t i) {
-    const BoardShot shot = make_simulated_board_capture(scene, boards, i);
+    const BoardShot shot = make_board_capture_parameters(scene, boards, i);
     cv::Mat1f lit;
     electrons[i].convertTo(lit, CV_32F, exposures);
     const cv::Mat image = developed(scene, lit, shot.noise_seed, development.picture);
@@ -168,7 +168,7 @@ void try_seed(Scene scene, std::uint64_t seed, int views, const std::string& wan
   parallel_for(
       electrons.size(), static_cast<int>(std::thread::hardware_concurrency()), [&](std::size_t i) {
         electrons[i] =
-            renderer.render_board_in_electrons(make_simulated_board_capture(scene, boards, i));
+            renderer.render_board_in_electrons(make_board_capture_parameters(scene, boards, i));
       });
   fmt::print("seed {}, {} views\n", seed, electrons.size());
   for (const Development& development : developments()) {

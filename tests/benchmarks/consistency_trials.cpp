@@ -240,7 +240,8 @@ void add_lever_arm_errors(Trial& trial, const RotationCenter& found, const Eigen
 Trial try_rotation(const Cell& cell, Random& random, RotationMethod method, double tilt_rad,
                    const Turn& turn) {
   Room room(cell, tilt_rad, random);
-  LampCaptures input{{}, room.surveyed_map(), {}, extract_camera_calibration(room.calibration())};
+  LampCaptures input{
+      {}, room.surveyed_map(), {}, extract_camera_only_calibration(room.calibration())};
   for (std::size_t height = 0; height < turn.heights_m.size(); ++height) {
     for (int k = 0; k < cell.captures; ++k) {
       const Pose pose = turn.pose(height, room.draw_yaw(k));
@@ -277,7 +278,8 @@ Trial try_axis(const Cell& cell, Random& random) {
 
 Trial try_lamps(const Cell& cell, Random& random) {
   Room room(cell, kTilt_rad, random);
-  LampCaptures input{{}, room.surveyed_map(), {}, extract_camera_calibration(room.calibration())};
+  LampCaptures input{
+      {}, room.surveyed_map(), {}, extract_camera_only_calibration(room.calibration())};
   for (int k = 0; k < cell.captures; ++k) {
     input.frames.push_back({std::to_string(k), room.draw_detections(room.draw_pose(k))});
   }
@@ -291,7 +293,7 @@ Trial try_lamps(const Cell& cell, Random& random) {
 /// the same captures without noise, with the true map.
 Trial try_dispersion(const Cell& cell, Random& random, DispersionMethod method) {
   constexpr double zenith_error_rad = 0.01;
-  const Eigen::Vector2d station_m(0.05, -0.1);
+  const Eigen::Vector2d reference_point_m(0.05, -0.1);
   const bool has_two_heights = method == DispersionMethod::camera;
   Room room(cell, kTilt_rad, random);
   Calibration believed = room.calibration();
@@ -302,21 +304,20 @@ Trial try_dispersion(const Cell& cell, Random& random, DispersionMethod method) 
   KnownPositions places;
   for (int k = 0; k < cell.captures; ++k) {
     const double z_m = has_two_heights ? height_m(k) : 0;
-    const Pose pose{{station_m.x(), station_m.y(), z_m}, room.draw_yaw(k)};
-    exact.push_back({room.exact_detections(pose), station_m});
-    places.captures.push_back({room.draw_noise(exact.back().detections), station_m});
+    const Pose pose{{reference_point_m.x(), reference_point_m.y(), z_m}, room.draw_yaw(k)};
+    exact.push_back({room.exact_detections(pose), reference_point_m});
+    places.captures.push_back({room.draw_noise(exact.back().detections), reference_point_m});
     places.measured_points.push_back(MeasuredPoint::camera);
     input.frames.push_back({std::to_string(k), places.captures.back().detections});
   }
   const DispersionResult result =
       run_dispersion_calibration_step(input, places, method, DispersionCircle::mean, {});
   Trial trial = make_trial(result);
-  const DispersionFit truth =
-      estimate_heading_dependent_offset(exact, room.true_map(), believed, method);
+  const DispersionFit truth = estimate_dispersion_offset(exact, room.true_map(), believed, method);
   if (!trial.has_result || truth.status != DispersionStatus::ok) return trial;
   const Dispersion& found = result.fit.dispersion;
   const auto covariance_px2 =
-      compute_dispersion_offset_covariance_with_map(found, believed.camera.focal_px());
+      compute_dispersion_offset_covariance_with_map_errors(found, believed.camera.focal_px());
   if (!covariance_px2) return trial;
   trial.errors.push_back(normalize(found.offset_px - truth.dispersion.offset_px, *covariance_px2));
   return trial;
@@ -336,7 +337,7 @@ Trial try_adjustment(const Cell& cell, Random& random) {
   Room room(cell, kTilt_rad, random);
   AdjustStepInput input;
   input.lamps = room.surveyed_map();
-  input.calibration = extract_camera_calibration(room.calibration());
+  input.calibration = extract_camera_only_calibration(room.calibration());
   AdjustSet set{.name = "turns", .frames = {}, .captures = {}};
   for (std::size_t height = 0; height < turn.heights_m.size(); ++height) {
     Capture measured;
@@ -371,7 +372,7 @@ Trial try_fixes(const Cell& cell, Random& random) {
     truth.push_back(room.draw_pose(k));
     input.frames.push_back({std::to_string(k), room.draw_detections(truth.back())});
   }
-  const LocateResult result = locate_camera_from_frames(input);
+  const LocateResult result = locate_camera_from_detections(input);
   Trial trial = make_trial(result);
   if (!trial.has_result) return trial;
   trial.errors.resize(3);

@@ -24,7 +24,7 @@ struct Captures {
     cv::setNumThreads(1);
     scene.lamps.resize(4);
     const FrameRenderer renderer(scene);
-    const LampShot shot = make_simulated_lamp_capture(scene, scene.sets.at(0), 0);
+    const LampShot shot = make_lamp_capture_parameters(scene, scene.sets.at(0), 0);
     frame = simulate_sensor_image(scene.sensor, renderer.render_lamps_in_electrons(shot), 1);
     scene.lamps.clear();
     const cv::Mat dark = simulate_sensor_image(

@@ -130,8 +130,8 @@ class Trials {
       Random random(72);
       Errors errors, again;
       for (int i = 0; i < captures; ++i) {
-        LampShot shot = make_simulated_lamp_capture(scene_, scene_.sets.at(0),
-                                                    static_cast<std::size_t>(i) % 12);
+        LampShot shot = make_lamp_capture_parameters(scene_, scene_.sets.at(0),
+                                                     static_cast<std::size_t>(i) % 12);
         BaseMotion& motion = shot.motion;
         motion.axis_m = {random.uniform(-0.5, 0.5), random.uniform(-0.3, 0.3), 0};
         motion.yaw_rad = random.uniform(-3.1, 3.1);
@@ -172,8 +172,8 @@ class Trials {
       CenterErrors centers;
       std::vector<DrivenCapture> captures_seen;
       for (int i = 0; i < captures; ++i) {
-        LampShot shot = make_simulated_lamp_capture(scene_, scene_.sets.at(0),
-                                                    static_cast<std::size_t>(i) % 12);
+        LampShot shot = make_lamp_capture_parameters(scene_, scene_.sets.at(0),
+                                                     static_cast<std::size_t>(i) % 12);
         BaseMotion& motion = shot.motion;
         motion.axis_m.x() = random.uniform(-0.3, 0.3);
         motion.axis_m.y() = random.uniform(-0.12, 0.12);

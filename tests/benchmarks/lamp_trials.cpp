@@ -262,7 +262,7 @@ void try_scene(Scene scene, std::uint64_t seed, int images, bool new_seed_in_eac
     const auto wanted = static_cast<std::size_t>(images) / sets.size() + 1;
     const std::size_t step = std::max<std::size_t>(1, count_captures_of_set(set) / wanted);
     try_shot(scene, renderer, detector,
-             make_simulated_lamp_capture(scene, set, index * step % count_captures_of_set(set)),
+             make_lamp_capture_parameters(scene, set, index * step % count_captures_of_set(set)),
              score);
   }
 }
@@ -321,7 +321,7 @@ class ForeignScene {
     scene_.seed = draw_seed_from_generator(random_);
     draw_clutter();
     draw_random_scene_parts(scene_);
-    return make_simulated_lamp_capture(scene_, set_, 0);
+    return make_lamp_capture_parameters(scene_, set_, 0);
   }
 
   const Scene& scene() const { return scene_; }

@@ -28,20 +28,20 @@ const Rig& rig() {
 }
 
 void lamp_light(benchmark::State& state) {
-  const LampShot shot = make_simulated_lamp_capture(rig().scene, rig().set("check"), 100);
+  const LampShot shot = make_lamp_capture_parameters(rig().scene, rig().set("check"), 100);
   for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.render_lamps_in_electrons(shot));
 }
 
 void board_light(benchmark::State& state) {
-  const BoardShot shot = make_simulated_board_capture(rig().scene, rig().set("boards"), 3);
+  const BoardShot shot = make_board_capture_parameters(rig().scene, rig().set("boards"), 3);
   for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.render_board_in_electrons(shot));
 }
 
 cv::Mat1f electrons(bool board) {
   return board ? rig().renderer.render_board_in_electrons(
-                     make_simulated_board_capture(rig().scene, rig().set("boards"), 3))
+                     make_board_capture_parameters(rig().scene, rig().set("boards"), 3))
                : rig().renderer.render_lamps_in_electrons(
-                     make_simulated_lamp_capture(rig().scene, rig().set("check"), 100));
+                     make_lamp_capture_parameters(rig().scene, rig().set("check"), 100));
 }
 
 void sensor(benchmark::State& state, bool board) {

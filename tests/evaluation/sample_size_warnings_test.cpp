@@ -58,16 +58,16 @@ TEST(MakeSampleSizeWarnings, WarnsForFewerThanFiftyStations) {
               ElementsAre("there are too few reference points with a fix for intervals"));
 }
 
-TEST(MakeCrlbWarning, WarnsIfErrorsAreSignificantlyBelowCrlb) {
+TEST(MakeErrorsBelowCrlbWarning, WarnsIfErrorsAreSignificantlyBelowCrlb) {
   Evaluation limited = evaluation(1000);
-  EXPECT_EQ(make_crlb_warning(limited), "");
+  EXPECT_EQ(make_errors_below_crlb_warning(limited), "");
   limited.crlb_ratio = CrlbRatio{0.609, 1e-3, 36, 1.0 / 12};
-  EXPECT_THAT(make_crlb_warning(limited),
+  EXPECT_THAT(make_errors_below_crlb_warning(limited),
               AllOf(HasSubstr("0.609 times the theoretical limit: either the stated pixel noise is "
                               "too large, or the fixes use more information than one image"),
                     Not(HasSubstr("nothing beats"))));
   limited.crlb_ratio->horizontal = 0.9;
-  EXPECT_EQ(make_crlb_warning(limited), "");
+  EXPECT_EQ(make_errors_below_crlb_warning(limited), "");
 }
 
 TEST(MakeSampleSizeWarnings, WarnsForFewerThanFiftyStationsInComparison) {

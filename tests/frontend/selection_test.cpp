@@ -77,7 +77,7 @@ TEST(Selection, RejectsCopyOfImageAddedByKeep) {
   std::vector images{image_of_lamps("a", kPixels), image_of_lamps("b", kPixels)};
   Selection selection(ImageUse::rotation, {});
   selection.add_kept_image(images[0]);
-  selection.add_or_reject_image(images[1]);
+  selection.add_image_or_reject_as_repeated(images[1]);
   ASSERT_FALSE(images[1].is_image_kept());
   EXPECT_EQ(images[1].rejection->message, "is the same image as a");
 }

@@ -48,7 +48,7 @@ class Captures {
   double max_error_px = 5;
 
   LampShot shot(std::size_t index) const {
-    return make_simulated_lamp_capture(scene_, set_, index);
+    return make_lamp_capture_parameters(scene_, set_, index);
   }
   cv::Mat image(const LampShot& shot) const {
     const cv::Mat lines =

@@ -76,9 +76,9 @@ TEST_P(CommonErrorsOfFix, CommonCovarianceMatchesFiniteDifferencesOfFix) {
     LampMap map = rig.map;
     Calibration other = rig.calibration;
     if (parameter < 12) {
-      other = perturb_lens_intrinsics(other, by * Eigen::VectorXd::Unit(12, parameter));
+      other = add_error_to_calibrated_intrinsics(other, by * Eigen::VectorXd::Unit(12, parameter));
     } else if (parameter < 14) {
-      other = perturb_zenith_direction(other, by * Eigen::Vector2d::Unit(parameter - 12));
+      other = add_error_to_calibrated_zenith(other, by * Eigen::Vector2d::Unit(parameter - 12));
     } else if (parameter >= 16) {
       map.lamps[static_cast<std::size_t>(parameter - 16) / 3].position_m[(parameter - 16) % 3] +=
           by;
@@ -137,8 +137,8 @@ TEST_F(CommonErrorsTest, FixCovarianceMatchesFiniteDifferencesWhenOnlyLensIsUnce
   const MatrixX covariance = *rig.calibration.intrinsics_report->covariance;
   const auto detections = seen_from(rig, 0.1);
   const auto fix_with = [&](Eigen::Index parameter, double by) {
-    const Calibration other =
-        perturb_lens_intrinsics(rig.calibration, by * Eigen::VectorXd::Unit(12, parameter));
+    const Calibration other = add_error_to_calibrated_intrinsics(
+        rig.calibration, by * Eigen::VectorXd::Unit(12, parameter));
     return to_states(Positioner(rig.map, other).compute_position_fix(detections));
   };
   Eigen::MatrixXd by_parameters(kBodyStates, 12);
@@ -156,7 +156,7 @@ TEST_F(CommonErrorsTest, FixCovarianceMatchesFiniteDifferencesWhenOnlyLensIsUnce
 TEST_F(CommonErrorsTest, LensErrorsAreUnknownWithoutDerivativesOfAppliedCorrection) {
   const auto stated = [&](Correction correction) {
     return CommonErrors(rig.map.lamps, rig.calibration, correction)
-        .is_error_source_known(CommonErrorSource::lens);
+        .is_error_source_known_or_absent(CommonErrorSource::lens);
   };
   rig.calibrate_in_a_row();
   for (const Correction correction :

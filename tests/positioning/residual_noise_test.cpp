@@ -68,7 +68,7 @@ TEST(EstimateBirgeRatio, IsOneForSmallResidualsOrFewDegreesOfFreedom) {
 }
 
 /// Mean of chi_squared over fixes of a rig whose lamps have random offsets from the map.
-class ComputeExpectedChiSquared : public testing::Test {
+class ComputeExpectedChiSquaredOfCommonErrors : public testing::Test {
  protected:
   void SetUp() override {
     rig.map = synthetic_lamps();
@@ -105,15 +105,17 @@ class ComputeExpectedChiSquared : public testing::Test {
   Random random{5};
 };
 
-TEST_F(ComputeExpectedChiSquared, MatchesMeanChiSquaredOfStandingCamera) { expect_mean({}); }
+TEST_F(ComputeExpectedChiSquaredOfCommonErrors, MatchesMeanChiSquaredOfStandingCamera) {
+  expect_mean({});
+}
 
-TEST_F(ComputeExpectedChiSquared, MatchesMeanChiSquaredWithEstimatedTilt) {
+TEST_F(ComputeExpectedChiSquaredOfCommonErrors, MatchesMeanChiSquaredWithEstimatedTilt) {
   Sensors sensors;
   sensors.inclination_sigma_rad = 0.01;
   expect_mean(sensors);
 }
 
-TEST_F(ComputeExpectedChiSquared, CommonChiSquaredOfFixIsZeroUnlessRequested) {
+TEST_F(ComputeExpectedChiSquaredOfCommonErrors, CommonChiSquaredOfFixIsZeroUnlessRequested) {
   const Fix fix =
       Positioner(rig.map, rig.calibration).compute_position_fix(seen_from(rig, kPixelSd_px));
   ASSERT_TRUE(fix.has_succeeded());

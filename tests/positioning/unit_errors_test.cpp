@@ -193,8 +193,9 @@ TEST(UnitErrors, BudgetMatchesFixErrorsOfRandomlyDrawnCalibrations) {
     Eigen::VectorXd draw(root.cols());
     for (double& one : draw) one = random.normal();
     const Eigen::VectorXd error = root * draw;
-    Calibration calibration = perturb_zenith_direction(
-        perturb_lens_intrinsics(rig.calibration, error.head<12>()), error.segment<2>(12));
+    Calibration calibration = add_error_to_calibrated_zenith(
+        add_error_to_calibrated_intrinsics(rig.calibration, error.head<12>()),
+        error.segment<2>(12));
     calibration.adjustment.reset();
     LampMap map = rig.map;
     for (std::size_t i = 0; i < 8; ++i) {
@@ -224,7 +225,9 @@ TEST(ComputeFixSds, ReturnsZeroForTinyNegativeVariances) {
 TEST(UnitErrors, AreErrorsKnownIsFalseForSourcesWithoutSd) {
   StatedRig rig;
   const auto stated = [&](CommonErrorSource part) {
-    return UnitErrors(rig.map, rig.calibration).common_errors().is_error_source_known(part);
+    return UnitErrors(rig.map, rig.calibration)
+        .common_errors()
+        .is_error_source_known_or_absent(part);
   };
   EXPECT_FALSE(UnitErrors(rig.map, rig.calibration).common_errors().are_any_errors_known());
   EXPECT_FALSE(stated(CommonErrorSource::lens) || stated(CommonErrorSource::zenith) ||

@@ -55,7 +55,7 @@ std::string said_of(std::vector<std::string> arguments) {
   std::string method, digest;
   app.add_option("--roll-pitch-sd-deg", sd_deg);
   app.add_option("--method", method)
-      ->check(make_renamed_option_value_validator())
+      ->check(make_validator_rejecting_former_option_values())
       ->check(CLI::IsMember({"camera", "chen-guan"}));
   app.add_subcommand("verify", "Verifies")->add_option("--expected-digest", digest);
   testing::internal::CaptureStderr();

@@ -21,8 +21,9 @@ Calibration leaning() {
   return calibration;
 }
 
-TEST(PerturbLensIntrinsics, ChangesIntrinsicsAndRotationCenterPixelButNotZenith) {
-  const Calibration moved = perturb_lens_intrinsics(leaning(), Eigen::Vector4d(10, -5, 1, 2));
+TEST(AddErrorToCalibratedIntrinsics, ChangesIntrinsicsAndRotationCenterPixelButNotZenith) {
+  const Calibration moved =
+      add_error_to_calibrated_intrinsics(leaning(), Eigen::Vector4d(10, -5, 1, 2));
   EXPECT_EQ(moved.camera.intrinsics, (std::vector<double>{510, 505, 401, 302}));
   ASSERT_TRUE(moved.rotation_center);
   EXPECT_EQ(moved.rotation_center->zenith_in_camera, leaning().rotation_center->zenith_in_camera);
@@ -30,11 +31,12 @@ TEST(PerturbLensIntrinsics, ChangesIntrinsicsAndRotationCenterPixelButNotZenith)
               IsNear(Eigen::Vector2d(401 + 0.02 * 510, 302 - 0.01 * 505), 1e-9));
   Calibration alone = leaning();
   alone.rotation_center.reset();
-  EXPECT_FALSE(perturb_lens_intrinsics(alone, Eigen::Vector4d(1, 0, 0, 0)).rotation_center);
+  EXPECT_FALSE(
+      add_error_to_calibrated_intrinsics(alone, Eigen::Vector4d(1, 0, 0, 0)).rotation_center);
 }
 
-TEST(PerturbZenithDirection, AddsErrorToNormalizedZenithPointAndMovesPixel) {
-  const Calibration moved = perturb_zenith_direction(leaning(), {0.001, 0.002});
+TEST(AddErrorToCalibratedZenith, AddsErrorToNormalizedZenithPointAndMovesPixel) {
+  const Calibration moved = add_error_to_calibrated_zenith(leaning(), {0.001, 0.002});
   ASSERT_TRUE(moved.rotation_center);
   EXPECT_THAT(compute_normalized_zenith_point(*moved.rotation_center),
               IsNear(Eigen::Vector2d(0.021, -0.008), 1e-15));
@@ -43,8 +45,8 @@ TEST(PerturbZenithDirection, AddsErrorToNormalizedZenithPointAndMovesPixel) {
               IsNear(Eigen::Vector2d(400 + 0.021 * 500, 300 - 0.008 * 510), 1e-9));
 }
 
-TEST(PerturbDispersionOffset, AddsErrorTimesFocalLengthToDispersionOffset) {
-  const Calibration moved = perturb_dispersion_offset(leaning(), {0.001, -0.002});
+TEST(AddErrorToCalibratedDispersionOffset, AddsErrorTimesFocalLengthToDispersionOffset) {
+  const Calibration moved = add_error_to_calibrated_dispersion_offset(leaning(), {0.001, -0.002});
   ASSERT_TRUE(moved.dispersion && moved.rotation_center);
   EXPECT_THAT(moved.dispersion->offset_px, IsNear(Eigen::Vector2d(1, -1.22), 1e-12));
   EXPECT_EQ(moved.rotation_center->center_px, leaning().rotation_center->center_px);

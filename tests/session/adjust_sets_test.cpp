@@ -8,14 +8,14 @@
 namespace vlp {
 namespace {
 
-TEST(MakeAdjustSetNamesUnique, UsesPathsForEqualNames) {
+TEST(ReplaceDuplicateSetNamesByPaths, UsesPathsForEqualNames) {
   std::vector<AdjustSet> sets{{"check", {}, {}}, {"rotation", {}, {}}, {"check", {}, {}}};
-  make_adjust_set_names_unique(sets, {"a/check", "a/rotation", "b/check"});
+  replace_duplicate_set_names_by_paths(sets, {"a/check", "a/rotation", "b/check"});
   EXPECT_EQ(sets[0].name, "a/check");
   EXPECT_EQ(sets[1].name, "rotation");
   EXPECT_EQ(sets[2].name, "b/check");
   EXPECT_THAT(rejection_message<std::invalid_argument>([&] {
-                make_adjust_set_names_unique(sets, {"a/check", "a/rotation", "a/check"});
+                replace_duplicate_set_names_by_paths(sets, {"a/check", "a/rotation", "a/check"});
               }),
               testing::StartsWith("a/check is named twice"));
 }

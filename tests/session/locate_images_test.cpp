@@ -60,7 +60,7 @@ class LeaningRig {
 };
 
 double error_m(const LocateInput& input) {
-  const LocateResult found = locate_camera_from_frames(input);
+  const LocateResult found = locate_camera_from_detections(input);
   return found.has_succeeded() ? found.rows[0].fix->pose.position_m.norm() : 1;
 }
 

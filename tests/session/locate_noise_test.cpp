@@ -67,7 +67,7 @@ TEST_P(LocateCameraInFramesNoise, ReportedSdsMatchErrorsOfFixes) {
   Eigen::Vector4d squares = Eigen::Vector4d::Zero();
   int fixes = 0, within = 0;
   for (int i = 0; i < draws; ++i) {
-    const LocateResult found = locate_camera_from_frames(draw_captures());
+    const LocateResult found = locate_camera_from_detections(draw_captures());
     ASSERT_TRUE(found.has_succeeded());
     for (std::size_t k = 0; k < truth.size(); ++k) {
       const auto& fix = found.rows[k].fix;
@@ -100,7 +100,7 @@ INSTANTIATE_TEST_SUITE_P(Rooms, LocateCameraInFramesNoise,
                                          Case{"MapErrorsNotStated", 0.002, Noise::not_stated}),
                          [](const auto& one) { return one.param.name; });
 
-TEST(LocateCameraFromFrames, NotesThatSdFollowsResidualsAboveGivenNoise) {
+TEST(LocateCameraFromDetections, NotesThatSdFollowsResidualsAboveGivenNoise) {
   SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
   Random random(3);
   LocateInput input{{}, rig.map, rig.calibration};
@@ -109,7 +109,7 @@ TEST(LocateCameraFromFrames, NotesThatSdFollowsResidualsAboveGivenNoise) {
     input.frames.push_back({std::to_string(k), with_noise(seen_from(rig, kNoise_px), random)});
     for (Detection& detection : input.frames.back().detections) detection.sigma_px = kNoise_px / 2;
   }
-  const LocateResult found = locate_camera_from_frames(input);
+  const LocateResult found = locate_camera_from_detections(input);
   ASSERT_TRUE(found.has_succeeded());
   ASSERT_EQ(found.notes.size(), 1U);
   EXPECT_NE(found.notes[0].find("times the stated noise: sd follows the residuals"),

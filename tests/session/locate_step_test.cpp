@@ -22,15 +22,15 @@ LocateInput example() {
           read_calibration(kExample + "calibration.yaml")};
 }
 
-TEST(LocateCameraFromFrames, ReturnsFixForEachFrameOfExample) {
-  const LocateResult found = locate_camera_from_frames(example());
+TEST(LocateCameraFromDetections, ReturnsFixForEachFrameOfExample) {
+  const LocateResult found = locate_camera_from_detections(example());
   EXPECT_TRUE(found.has_succeeded());
   EXPECT_EQ(found.summary.fixes, found.rows.size());
   EXPECT_THAT(found.warnings, IsEmpty());
   EXPECT_THAT(found.rejected_lamps, IsEmpty());
 }
 
-TEST(LocateCameraFromFrames, CountsCapturesWithRejectedLamps) {
+TEST(LocateCameraFromDetections, CountsCapturesWithRejectedLamps) {
   LocateInput input = example();
   int moved = 0;
   for (Frame& frame : input.frames) {
@@ -39,7 +39,7 @@ TEST(LocateCameraFromFrames, CountsCapturesWithRejectedLamps) {
     ++moved;
   }
   ASSERT_EQ(moved, 3);
-  const LocateResult found = locate_camera_from_frames(input);
+  const LocateResult found = locate_camera_from_detections(input);
   int captures = 0;
   for (const auto& [lamp, count] : found.rejected_lamps) captures += count;
   EXPECT_EQ(captures, 3);
@@ -59,18 +59,18 @@ LocateInput drive_without_stated_motion(double sigma_px) {
   return input;
 }
 
-TEST(LocateCameraFromFrames, WarnsOfMovingCameraUnlessMotionIsGiven) {
+TEST(LocateCameraFromDetections, WarnsOfMovingCameraUnlessMotionIsGiven) {
   LocateInput input = drive_without_stated_motion(0.02);
-  const LocateResult found = locate_camera_from_frames(input);
+  const LocateResult found = locate_camera_from_detections(input);
   EXPECT_THAT(found.warnings,
               testing::Contains(HasSubstr("the images fit a moving camera, at 1 m/s: state "
                                           "velocities in captures.csv, or --max-speed-m-per-s")));
   input.motion = KnownMotion::make_motion_prior_from_limits(3, 0);
-  EXPECT_THAT(locate_camera_from_frames(input).warnings,
+  EXPECT_THAT(locate_camera_from_detections(input).warnings,
               Not(testing::Contains(HasSubstr("moves"))));
 }
 
-TEST(LocateCameraFromFrames, DoesNotWarnOfMotionWhenStandingWithMovedLamp) {
+TEST(LocateCameraFromDetections, DoesNotWarnOfMotionWhenStandingWithMovedLamp) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   LocateInput input{{}, rig.map, rig.calibration};
   input.lamps.lamps.front().position_m.x() += 0.02;
@@ -78,11 +78,11 @@ TEST(LocateCameraFromFrames, DoesNotWarnOfMotionWhenStandingWithMovedLamp) {
     rig.body.pose = {{0.05 * i - 0.3, -0.02 * i, 0}, 0.5 * i};
     input.frames.push_back({std::to_string(i), seen_from(rig, 0.02)});
   }
-  EXPECT_THAT(locate_camera_from_frames(input).warnings,
+  EXPECT_THAT(locate_camera_from_detections(input).warnings,
               Not(testing::Contains(HasSubstr("moves"))));
 }
 
-TEST(LocateCameraFromFrames, LampOffsetsEqualDisplacementOfMovedLamp) {
+TEST(LocateCameraFromDetections, LampOffsetsEqualDisplacementOfMovedLamp) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   LocateInput input{{}, rig.map, rig.calibration};
   const Eigen::Vector2d moved_m(1e-3, -2e-3);
@@ -93,9 +93,9 @@ TEST(LocateCameraFromFrames, LampOffsetsEqualDisplacementOfMovedLamp) {
   }
   input.frames.push_back({"twice", input.frames.back().detections});
   input.frames.back().detections.push_back(input.frames.back().detections.front());
-  EXPECT_THAT(locate_camera_from_frames(input).lamp_offsets, IsEmpty()) << "was not asked";
+  EXPECT_THAT(locate_camera_from_detections(input).lamp_offsets, IsEmpty()) << "was not asked";
   input.compute_lamp_offsets = true;
-  const auto offsets = locate_camera_from_frames(input).lamp_offsets;
+  const auto offsets = locate_camera_from_detections(input).lamp_offsets;
   ASSERT_EQ(offsets.size(), rig.map.lamps.size());
   for (const LampOffset& offset : offsets) {
     const auto seen =
@@ -135,8 +135,8 @@ LocateInput room_with_a_moved_lamp(double by_m) {
   return input;
 }
 
-TEST(LocateCameraFromFrames, WarnsOfMovedLampAndItsDisplacement) {
-  const LocateResult found = locate_camera_from_frames(room_with_a_moved_lamp(0.03));
+TEST(LocateCameraFromDetections, WarnsOfMovedLampAndItsDisplacement) {
+  const LocateResult found = locate_camera_from_detections(room_with_a_moved_lamp(0.03));
   EXPECT_THAT(found.warnings,
               testing::Contains("lamp 2 hangs 30 mm from where the map has it (x +30 mm, y +0 mm): "
                                 "moved, or entered wrongly"));
@@ -146,30 +146,30 @@ TEST(LocateCameraFromFrames, WarnsOfMovedLampAndItsDisplacement) {
     EXPECT_THAT(found.rows[i].rejected_lamps,
                 testing::ElementsAreArray(std::vector<int>(i < 12 ? 1U : 0U, 2)));
   }
-  EXPECT_THAT(locate_camera_from_frames(room_with_a_moved_lamp(0)).rejected_lamps, IsEmpty());
+  EXPECT_THAT(locate_camera_from_detections(room_with_a_moved_lamp(0)).rejected_lamps, IsEmpty());
 }
 
-TEST(LocateCameraFromFrames, InclinationOfCapturesTableChangesFix) {
+TEST(LocateCameraFromDetections, InclinationOfCapturesTableChangesFix) {
   LocateInput input = example();
-  const double x_m = locate_camera_from_frames(input).rows[0].fix->pose.position_m.x();
+  const double x_m = locate_camera_from_detections(input).rows[0].fix->pose.position_m.x();
   Capture leaning;
   leaning.inclination = Inclination{0.01, 0};
   input.captures[input.frames[0].image] = leaning;
-  const LocateResult found = locate_camera_from_frames(input);
+  const LocateResult found = locate_camera_from_detections(input);
   EXPECT_GT(std::abs(found.rows[0].fix->pose.position_m.x() - x_m) +
                 std::abs(found.rows[0].fix->pose.position_m.y()),
             0.001);
   EXPECT_THAT(found.warnings, testing::Contains(HasSubstr("images are not in captures.csv")));
 }
 
-TEST(LocateCameraFromFrames, WarnsOfLampsOutsideValidRegionOfLens) {
+TEST(LocateCameraFromDetections, WarnsOfLampsOutsideValidRegionOfLens) {
   LocateInput input = example();
   IntrinsicsReport& report = input.calibration.intrinsics_report.emplace();
   report.region_px = {{-1e4, -1e4}, {1e4, -1e4}, {1e4, 1e4}, {-1e4, 1e4}};
-  EXPECT_THAT(locate_camera_from_frames(input).warnings, IsEmpty());
+  EXPECT_THAT(locate_camera_from_detections(input).warnings, IsEmpty());
   const double right_px = input.frames[0].detections[0].pixel.x() - 1;
   report.region_px = {{-1e4, -1e4}, {right_px, -1e4}, {right_px, 1e4}, {-1e4, 1e4}};
-  const LocateResult marked = locate_camera_from_frames(input);
+  const LocateResult marked = locate_camera_from_detections(input);
   EXPECT_THAT(marked.warnings,
               ElementsAre(HasSubstr("fixes use lamps outside the valid region of the lens")));
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
@@ -182,10 +182,10 @@ TEST(LocateCameraFromFrames, WarnsOfLampsOutsideValidRegionOfLens) {
   }
 }
 
-TEST(LocateCameraFromFrames, ReturnsUndeterminedIfNoFrameHasFix) {
+TEST(LocateCameraFromDetections, ReturnsUndeterminedIfNoFrameHasFix) {
   LocateInput input = example();
   for (Frame& frame : input.frames) frame.detections.resize(1);
-  const LocateResult found = locate_camera_from_frames(input);
+  const LocateResult found = locate_camera_from_detections(input);
   EXPECT_EQ(found.failure, StepFailure::undetermined);
   EXPECT_THAT(found.message, HasSubstr("no frame has a fix; the first: "));
 }
@@ -206,7 +206,7 @@ LocateInput drive(double speed_m_per_s) {
 }
 
 double worst_error_m(const LocateInput& input, double speed_m_per_s) {
-  const LocateResult found = locate_camera_from_frames(input);
+  const LocateResult found = locate_camera_from_detections(input);
   double worst_m = 0;
   for (std::size_t i = 0; i < found.rows.size(); ++i) {
     if (!found.rows[i].fix) return 1;
@@ -216,57 +216,57 @@ double worst_error_m(const LocateInput& input, double speed_m_per_s) {
   return worst_m;
 }
 
-TEST(LocateCameraFromFrames, EstimatesTrueVelocityWithMotionPrior) {
+TEST(LocateCameraFromDetections, EstimatesTrueVelocityWithMotionPrior) {
   LocateInput input = drive(1);
   EXPECT_GT(worst_error_m(input, 1), 4e-3);
   input.motion = KnownMotion::make_motion_prior_from_limits(200, 200);  // of no weight
   EXPECT_LT(worst_error_m(input, 1), 1e-6);
-  const LocateResult found = locate_camera_from_frames(input);
+  const LocateResult found = locate_camera_from_detections(input);
   EXPECT_NEAR(found.rows[1].fix->velocity_m_per_s->x(), 1, 1e-4);
   EXPECT_NEAR(found.rows[1].fix->velocity_m_per_s->y(), 0, 1e-4);
   EXPECT_EQ(found.rows[1].time_s, 10.1);
   EXPECT_FALSE(found.rows[1].fix->inclination);
 }
 
-TEST(LocateCameraFromFrames, LocatesMovingCameraExactlyWithOdometry) {
+TEST(LocateCameraFromDetections, LocatesMovingCameraExactlyWithOdometry) {
   LocateInput input = drive(1);
   for (auto& [image, capture] : input.captures) {
     capture.velocity_m_per_s = Eigen::Rotation2Dd(-0.3) * Eigen::Vector2d(1, 0);
   }
   EXPECT_LT(worst_error_m(input, 1), 1e-9);
-  EXPECT_NEAR(locate_camera_from_frames(input).rows[0].fix->velocity_m_per_s->x(), 1, 1e-9);
+  EXPECT_NEAR(locate_camera_from_detections(input).rows[0].fix->velocity_m_per_s->x(), 1, 1e-9);
 }
 
-TEST(LocateCameraFromFrames, WindowOfTwoFramesReducesHeightErrorWithTwoLamps) {
+TEST(LocateCameraFromDetections, WindowOfTwoFramesReducesHeightErrorWithTwoLamps) {
   LocateInput input = drive(1);
   for (Frame& frame : input.frames) frame.detections.resize(2);
   input.motion = KnownMotion::make_motion_prior_from_limits(2, 0);
   const double alone_m = worst_error_m(input, 1);
-  const double alone_sd_m = (*locate_camera_from_frames(input).rows[2].fix->sd)[2];
+  const double alone_sd_m = (*locate_camera_from_detections(input).rows[2].fix->sd)[2];
   input.window_size = 2;
-  const LocateResult found = locate_camera_from_frames(input);
+  const LocateResult found = locate_camera_from_detections(input);
   EXPECT_GT(alone_m, 1e-3);
   EXPECT_LT(std::abs(found.rows[2].fix->pose.position_m.z()), 1e-4);
   EXPECT_LT((*found.rows[2].fix->sd)[2], 0.2 * alone_sd_m);
 }
 
-TEST(LocateCameraFromFrames, ThrowsForMotionWithoutRowTime) {
+TEST(LocateCameraFromDetections, ThrowsForMotionWithoutRowTime) {
   LocateInput input = drive(1);
   input.motion = KnownMotion::make_motion_prior_from_limits(2, 0);
   input.calibration.camera.row_time_s.reset();
-  EXPECT_THROW(locate_camera_from_frames(input), std::invalid_argument);
+  EXPECT_THROW(locate_camera_from_detections(input), std::invalid_argument);
   input.motion.reset();
-  EXPECT_NO_THROW(locate_camera_from_frames(input));
+  EXPECT_NO_THROW(locate_camera_from_detections(input));
   input.captures["a"].velocity_m_per_s = Eigen::Vector2d(1, 0);
-  EXPECT_THROW(locate_camera_from_frames(input), std::invalid_argument);
+  EXPECT_THROW(locate_camera_from_detections(input), std::invalid_argument);
 }
 
-TEST(LocateCameraFromFrames, EstimatesTrueTiltWithoutInclinationSensor) {
+TEST(LocateCameraFromDetections, EstimatesTrueTiltWithoutInclinationSensor) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   rig.body.motion.inclination = {0.1, -0.08};
   LocateInput input{{{"a", seen_from(rig, 0.05)}}, rig.map, rig.calibration};
   input.roll_pitch_sd_rad = 1.6;
-  const LocateResult found = locate_camera_from_frames(input);
+  const LocateResult found = locate_camera_from_detections(input);
   ASSERT_TRUE(found.rows[0].fix);
   EXPECT_LT(found.rows[0].fix->pose.position_m.norm(), 1e-5);
   EXPECT_NEAR(found.rows[0].fix->inclination->roll_rad, 0.1, 1e-5);

@@ -64,7 +64,7 @@ class MovedLamp : public testing::Test {
     return run_tilt_calibration_step({check, map, kFile, camera}, false, {});
   }
   StepResult locate() const {
-    return locate_camera_from_frames({check, map, dispersion.calibration});
+    return locate_camera_from_detections({check, map, dispersion.calibration});
   }
   StepResult adjust() const {
     return run_joint_adjustment_step(

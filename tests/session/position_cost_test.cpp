@@ -90,7 +90,7 @@ struct Images {
     }
     std::optional<Lens> lens;
     if (with_lens) lens.emplace(calibration.camera.lens_model, calibration.camera.intrinsics);
-    return compute_row_time_position_costs(found, grouped, map, lens);
+    return compute_position_costs_of_row_time_candidates(found, grouped, map, lens);
   }
   RowTimeResult chosen(bool with_lens = true) const {
     return select_row_time_candidate(candidates(), costs(with_lens));
@@ -110,7 +110,7 @@ struct Images {
   }
 };
 
-TEST(ComputeRowTimePositionCosts, IsNearZeroOnlyForTrueRowTime) {
+TEST(ComputePositionCostsOfRowTimeCandidates, IsNearZeroOnlyForTrueRowTime) {
   for (const std::vector<int>& seen : {std::vector{2, 3, 4, 5, 6}, {1, 2, 3, 4, 5}}) {
     Images images(mixed_rows());
     for (int k = 0; k < 5; ++k) images.add(seen, k);
@@ -122,21 +122,21 @@ TEST(ComputeRowTimePositionCosts, IsNearZeroOnlyForTrueRowTime) {
   }
 }
 
-TEST(ComputeRowTimePositionCosts, SelectsTrueRowTimeWhenOnlyOneLampDiffers) {
+TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenOnlyOneLampDiffers) {
   Images images(two_rows());
   for (int k = 0; k < 5; ++k) images.add({2, 3, 4, 5, 6}, k);
   images.expect_true_row_time(true);
   images.expect_true_row_time(false);
 }
 
-TEST(ComputeRowTimePositionCosts, SelectsTrueRowTimeForTiltedCamera) {
+TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeForTiltedCamera) {
   Images images(mixed_rows());
   for (int k = 0; k < 5; ++k) images.add({2, 3, 4, 5, 6}, k, {0.3, -0.2});
   images.expect_true_row_time();
 }
 
 /// Each image shows three lamps.
-TEST(ComputeRowTimePositionCosts, SelectsTrueRowTimeFromImagesOfThreeLamps) {
+TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeFromImagesOfThreeLamps) {
   Images images(mixed_rows());
   for (int k = 0; k < 3; ++k) {
     images.add({2, 3, 4}, k);
@@ -146,7 +146,7 @@ TEST(ComputeRowTimePositionCosts, SelectsTrueRowTimeFromImagesOfThreeLamps) {
   images.expect_true_row_time(true);
 }
 
-TEST(ComputeRowTimePositionCosts, IsZeroForImagesOfTwoLamps) {
+TEST(ComputePositionCostsOfRowTimeCandidates, IsZeroForImagesOfTwoLamps) {
   Images images(mixed_rows());
   for (int k = 0; k < 5; ++k) {
     images.add({2, 3}, k);
@@ -156,7 +156,7 @@ TEST(ComputeRowTimePositionCosts, IsZeroForImagesOfTwoLamps) {
   images.expect_undecided();
 }
 
-TEST(ComputeRowTimePositionCosts, SelectsTrueRowTimeWhenLampMoved) {
+TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenLampMoved) {
   Images images(mixed_rows());
   LampMap moved = images.map;
   moved.lamps[3].position_m += Eigen::Vector3d(0.25, -0.1, 0);
@@ -166,7 +166,7 @@ TEST(ComputeRowTimePositionCosts, SelectsTrueRowTimeWhenLampMoved) {
 }
 
 /// A light between the lamps that has the period of the lamp that is not lit.
-TEST(ComputeRowTimePositionCosts, SelectsTrueRowTimeDespiteForeignLight) {
+TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeDespiteForeignLight) {
   Images images(mixed_rows());
   LampMap other = images.map;
   other.lamps[5].position_m = {-0.2, 0.1, 1.6};
@@ -175,7 +175,7 @@ TEST(ComputeRowTimePositionCosts, SelectsTrueRowTimeDespiteForeignLight) {
 }
 
 /// Around a circle each assignment is a turn of the other.
-TEST(ComputeRowTimePositionCosts, DoesNotDecideForRotationallySymmetricMap) {
+TEST(ComputePositionCostsOfRowTimeCandidates, DoesNotDecideForRotationallySymmetricMap) {
   std::vector<Eigen::Vector3d> circle_m;
   for (int i = 0; i < 6; ++i) {
     const double angle_rad = i * std::numbers::pi / 3;
@@ -191,7 +191,7 @@ TEST(ComputeRowTimePositionCosts, DoesNotDecideForRotationallySymmetricMap) {
 
 /// In a zigzag each assignment is the other's mirror image, moved along: lamps 2 to 5 have the
 /// distances of lamps 1 to 4.
-TEST(ComputeRowTimePositionCosts, SelectsTrueRowTimeWhenOtherAssignmentIsMirrored) {
+TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenOtherAssignmentIsMirrored) {
   const LampMap zigzag = with_even_ratios(
       {{-0.8, -0.2, 1.6}, {-0.4, 0.2, 1.6}, {0, -0.2, 1.6}, {0.4, 0.2, 1.6}, {0.8, -0.2, 1.6}});
   Images images(zigzag);
@@ -200,7 +200,7 @@ TEST(ComputeRowTimePositionCosts, SelectsTrueRowTimeWhenOtherAssignmentIsMirrore
   images.expect_true_row_time(false);
 }
 
-TEST(ComputeRowTimePositionCosts, DoesNotDecideForMapOfAnotherRoom) {
+TEST(ComputePositionCostsOfRowTimeCandidates, DoesNotDecideForMapOfAnotherRoom) {
   Images images(mixed_rows());
   LampMap room = images.map;
   for (Lamp& lamp : room.lamps) lamp.position_m.y() *= -1;
@@ -210,7 +210,7 @@ TEST(ComputeRowTimePositionCosts, DoesNotDecideForMapOfAnotherRoom) {
 }
 
 /// A group that may be either of two lamps takes no part.
-TEST(ComputeRowTimePositionCosts, SelectsTrueRowTimeWhenTwoLampsShareFrequency) {
+TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenTwoLampsShareFrequency) {
   LampMap map = mixed_rows();
   map.lamps.push_back({7, {0.3, 0.5, 1.6}, {}, map.lamps[0].frequency_hz, {}});
   Images images(map);

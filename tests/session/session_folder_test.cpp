@@ -76,7 +76,7 @@ TEST(SessionFolder, ConstructorNamesMissingFileOrFolder) {
   folder.file("unit/camera.yaml", "\n");
   const SessionFolder known(folder / "unit");
   EXPECT_TRUE(known.camera_calibration_file());
-  EXPECT_FALSE(known.check_captures_folder());
+  EXPECT_FALSE(known.accuracy_check_captures_folder());
 }
 
 TEST(SessionFolder, LineDriveFoldersAreThoseWithPositions) {

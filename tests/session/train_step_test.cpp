@@ -47,7 +47,7 @@ TEST(TrainLampClassifier, CrossValidationIdentifiesAllLamps) {
   EXPECT_EQ(result.classifier.lamps.size(), 6U);
   EXPECT_EQ(result.labeled.num_labels, 12 * kMinExamples);
   EXPECT_EQ(result.confusion.counts.sum(), 12 * kMinExamples);
-  EXPECT_EQ(result.confusion.count_wrongly_identified(), 0);
+  EXPECT_EQ(result.confusion.count_wrongly_identified_lights(), 0);
 }
 
 TEST(TrainLampClassifier, ThrowsForLabelOfUnknownLampOrIfNoLabeledImageExists) {

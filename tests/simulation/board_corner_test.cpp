@@ -99,7 +99,7 @@ TEST_P(FrameRendererBoard, RenderedCornersMatchTrueCorners) {
   double worst_px = 0, squares = 0;
   int corners = 0;
   for (std::size_t index = 0; index < 6; ++index) {
-    const BoardShot shot = make_simulated_board_capture(scene_, views_, index);
+    const BoardShot shot = make_board_capture_parameters(scene_, views_, index);
     const cv::Mat1d image(renderer.render_board_in_electrons(shot) / 1e3);
     const cv::Mat1d transposed(image.t());
     std::map<int, std::map<int, Eigen::Vector2d>> tags;
@@ -131,7 +131,7 @@ TEST_P(FrameRendererBoard, TrueCornersMatchMrcalProjection) {
   const FrameRenderer renderer(scene_);
   const MrcalOracle mrcal(std::string(lens_model_name(scene_.camera.lens_model)),
                           scene_.camera.intrinsics);
-  const BoardShot shot = make_simulated_board_capture(scene_, views_, 1);
+  const BoardShot shot = make_board_capture_parameters(scene_, views_, 1);
   const auto layout = list_board_tags(scene_.board->pattern);
   const Eigen::Vector2d field_m = compute_tag_field_size_m(scene_.board->pattern);
   const auto truth = find_true_corners_in_image(scene_, renderer, shot);
@@ -174,7 +174,7 @@ TEST(FrameRenderer, BlursBoardEdgeBeforePixelIntegration) {
   scene.optics.blur_px = sigma_px;
   scene.board = plain_board();
   const FrameRenderer renderer(scene);
-  const BoardShot shot = make_simulated_board_capture(scene, board_views(1, 0.171, 0, 0, 0), 0);
+  const BoardShot shot = make_board_capture_parameters(scene, board_views(1, 0.171, 0, 0, 0), 0);
   const cv::Mat1f image(renderer.render_board_in_electrons(shot) / 1e3);
   double worst = 0;
   int edges = 0;
@@ -203,7 +203,7 @@ double level_at(const Eigen::Vector2d& pixel, double vignetting_power) {
   scene.optics.vignetting_power = vignetting_power;
   scene.board = plain_board();
   const cv::Mat1f image = FrameRenderer(scene).render_board_in_electrons(
-      make_simulated_board_capture(scene, board_views(1, 5, 0, 0, 0), 0));
+      make_board_capture_parameters(scene, board_views(1, 5, 0, 0, 0), 0));
   return image(static_cast<int>(pixel.y()), static_cast<int>(pixel.x()));
 }
 

@@ -212,7 +212,7 @@ TEST_F(FrameRendererForeignLight, WriteTruthTablesListsForeignLightInTrueOtherLi
             "0000.png,pwm,,499.500000,299.500000,1\n");
 }
 
-TEST(MakeSimulatedLampCapture, ForeignLightPhasesDoNotChangeOtherRandomValues) {
+TEST(MakeLampCaptureParameters, ForeignLightPhasesDoNotChangeOtherRandomValues) {
   Scene scene = plain_scene();
   scene.lamps[0].phase.reset();
   CaptureSet set{"check", 5e-5, LampShots{}, {}};
@@ -222,13 +222,13 @@ TEST(MakeSimulatedLampCapture, ForeignLightPhasesDoNotChangeOtherRandomValues) {
   set.lamps->yaw_jitter_rad = set.lamps->turn_rate_rad_per_s = 0;
   set.lamps->repeat = 3;
   set.lamps->interval_s = 0.25;
-  const LampShot without = make_simulated_lamp_capture(scene, set, 1);
+  const LampShot without = make_lamp_capture_parameters(scene, set, 1);
   scene.clutter.foreign_lights = {
       {{{0.3, 0, 1.6}, make_disc_lamp_shape(0.12), 1e9, 1}, SquareWave{500, 0.3, 0}, {}},
       {{{0, 0.3, 1.6}, make_disc_lamp_shape(0.12), 1e9, 1}, RectifiedSine{101, 1, 0}, 0.5}};
   scene.clutter.ambient_flicker = RectifiedSine{100, 0.5, 0};
-  const LampShot with = make_simulated_lamp_capture(scene, set, 1),
-                 next = make_simulated_lamp_capture(scene, set, 2);
+  const LampShot with = make_lamp_capture_parameters(scene, set, 1),
+                 next = make_lamp_capture_parameters(scene, set, 2);
   EXPECT_EQ(with.waves.at(0).phase, without.waves.at(0).phase);
   EXPECT_EQ(with.noise_seed, without.noise_seed);
   ASSERT_EQ(with.foreign_waves.size(), 2U);

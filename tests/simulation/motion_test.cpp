@@ -149,7 +149,7 @@ TEST(FrameRendererMotion, TotalLightAndCentroidOfBoardAreUnchangedByMotion) {
   scene.board = plain_board();
   scene.board->surround_e_per_s = 0;
   const FrameRenderer renderer(scene);
-  BoardShot shot = make_simulated_board_capture(scene, board_views(1, 0.5, 0, 0, 0), 0);
+  BoardShot shot = make_board_capture_parameters(scene, board_views(1, 0.5, 0, 0, 0), 0);
   shot.exposure_s = 0.01;
   const Brightness at_rest = measure_brightness(renderer.render_board_in_electrons(shot));
   shot.velocity_in_camera_m_per_s = {0.01, 0, 0};

@@ -159,13 +159,13 @@ TEST(EncodeImageAsJpegOrPng, JpegHasLessLossAtHigherQuality) {
   EXPECT_LT(loss, 0.5 * coarse_loss);
 }
 
-TEST(MakeSimulatedLampCapture, ImageNameIsPngUnlessJpegQualityIsGiven) {
+TEST(MakeLampCaptureParameters, ImageNameIsPngUnlessJpegQualityIsGiven) {
   Scene scene = plain_scene();
   const LampShots captures{{0}, {{0, 0}}, {}, {0}, 0, 0, 1, 0.5, false};
   const CaptureSet set{"one", 5e-5, captures, {}};
-  EXPECT_EQ(make_simulated_lamp_capture(scene, set, 0).image, "0000.png");
+  EXPECT_EQ(make_lamp_capture_parameters(scene, set, 0).image, "0000.png");
   scene.processing = ImageProcessing{2.2, {}, 90};
-  EXPECT_EQ(make_simulated_lamp_capture(scene, set, 0).image, "0000.jpg");
+  EXPECT_EQ(make_lamp_capture_parameters(scene, set, 0).image, "0000.jpg");
 }
 
 }  // namespace

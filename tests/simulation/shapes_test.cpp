@@ -15,7 +15,7 @@ template <typename Shape>
 double integral_over(const Shape& shape, const std::array<Eigen::Vector2d, 3>& triangle) {
   double sum = 0;
   for (std::size_t i = 0; i < 3; ++i) {
-    sum += shape.integrate_shape_along_edge(triangle[i], triangle[(i + 1) % 3]);
+    sum += shape.compute_edge_contribution_to_area_integral(triangle[i], triangle[(i + 1) % 3]);
   }
   return sum;
 }

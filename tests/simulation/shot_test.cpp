@@ -19,15 +19,15 @@ CaptureSet turning() {
   return {"turning", 5e-5, captures, {}};
 }
 
-TEST(MakeSimulatedLampCapture, IteratesRepeatsFastestAndHeightsSlowest) {
+TEST(MakeLampCaptureParameters, IteratesRepeatsFastestAndHeightsSlowest) {
   const Scene scene = plain_scene();
   const CaptureSet set = turning();
   ASSERT_EQ(count_captures_of_set(set), 2 * 2 * 3 * 2);
   const auto axis = [&](std::size_t index) {
-    return make_simulated_lamp_capture(scene, set, index).motion.axis_m;
+    return make_lamp_capture_parameters(scene, set, index).motion.axis_m;
   };
   const auto yaw = [&](std::size_t index) {
-    return make_simulated_lamp_capture(scene, set, index).motion.yaw_rad;
+    return make_lamp_capture_parameters(scene, set, index).motion.yaw_rad;
   };
   EXPECT_EQ(axis(0), Eigen::Vector3d(0.1, 0.2, 0));
   EXPECT_EQ(axis(5), Eigen::Vector3d(0.1, 0.2, 0));
@@ -37,49 +37,49 @@ TEST(MakeSimulatedLampCapture, IteratesRepeatsFastestAndHeightsSlowest) {
   EXPECT_NEAR(yaw(1), 0, 0.2);
   EXPECT_NEAR(yaw(2), 2, 0.2);
   EXPECT_NE(yaw(0), yaw(1));
-  EXPECT_EQ(make_simulated_lamp_capture(scene, set, 7).time_s, 3.5);
-  EXPECT_EQ(make_simulated_lamp_capture(scene, set, 7).image, "0007.png");
+  EXPECT_EQ(make_lamp_capture_parameters(scene, set, 7).time_s, 3.5);
+  EXPECT_EQ(make_lamp_capture_parameters(scene, set, 7).image, "0007.png");
 }
 
-TEST(MakeSimulatedLampCapture, YawJitterDependsOnSeedFolderAndIndex) {
+TEST(MakeLampCaptureParameters, YawJitterDependsOnSeedFolderAndIndex) {
   Scene scene = plain_scene();
   CaptureSet set = turning();
-  std::set<double> yaws{make_simulated_lamp_capture(scene, set, 3).motion.yaw_rad};
-  EXPECT_TRUE(yaws.contains(make_simulated_lamp_capture(scene, set, 3).motion.yaw_rad));
-  yaws.insert(make_simulated_lamp_capture(scene, set, 9).motion.yaw_rad);
+  std::set<double> yaws{make_lamp_capture_parameters(scene, set, 3).motion.yaw_rad};
+  EXPECT_TRUE(yaws.contains(make_lamp_capture_parameters(scene, set, 3).motion.yaw_rad));
+  yaws.insert(make_lamp_capture_parameters(scene, set, 9).motion.yaw_rad);
   set.folder = "other";
-  yaws.insert(make_simulated_lamp_capture(scene, set, 3).motion.yaw_rad);
+  yaws.insert(make_lamp_capture_parameters(scene, set, 3).motion.yaw_rad);
   scene.seed = 2;
-  yaws.insert(make_simulated_lamp_capture(scene, set, 3).motion.yaw_rad);
+  yaws.insert(make_lamp_capture_parameters(scene, set, 3).motion.yaw_rad);
   EXPECT_EQ(yaws.size(), 4);
 }
 
-TEST(MakeSimulatedLampCapture, AdvancesGivenPhaseByTimeAndDrawsMissingOne) {
+TEST(MakeLampCaptureParameters, AdvancesGivenPhaseByTimeAndDrawsMissingOne) {
   Scene scene = plain_scene();
   scene.lamps[0].frequency_hz = 1000.5;
   scene.lamps[0].phase = 0.25;
   const CaptureSet set = turning();
-  EXPECT_NEAR(make_simulated_lamp_capture(scene, set, 1).waves[0].phase, 0.5,
+  EXPECT_NEAR(make_lamp_capture_parameters(scene, set, 1).waves[0].phase, 0.5,
               1e-9);  // 500.25 + 0.25 periods on
   scene.lamps[0].phase.reset();
   std::set<double> phases;
   for (std::size_t i = 0; i < 24; ++i)
-    phases.insert(make_simulated_lamp_capture(scene, set, i).waves[0].phase);
+    phases.insert(make_lamp_capture_parameters(scene, set, i).waves[0].phase);
   EXPECT_EQ(phases.size(), 24);
   EXPECT_LT(*phases.begin(), 0.3);
   EXPECT_GT(*phases.rbegin(), 0.7);
 }
 
-TEST(MakeSimulatedLampCapture, MovesAlongDriveAtItsSpeed) {
+TEST(MakeLampCaptureParameters, MovesAlongDriveAtItsSpeed) {
   const Scene scene = plain_scene();
   CaptureSet set = turning();
   set.lamps->drive = StraightDrive{{0, 0}, {0.3, 0.4}, 0.1};
-  const Pose before = make_simulated_lamp_capture(scene, set, 0).motion.camera_pose_at(-1);
-  const Pose after = make_simulated_lamp_capture(scene, set, 0).motion.camera_pose_at(1);
+  const Pose before = make_lamp_capture_parameters(scene, set, 0).motion.camera_pose_at(-1);
+  const Pose after = make_lamp_capture_parameters(scene, set, 0).motion.camera_pose_at(1);
   EXPECT_TRUE((after.position_m - before.position_m).isApprox(Eigen::Vector3d(0.12, 0.16, 0)));
 }
 
-TEST(MakeSimulatedLampCapture, ContinuesMotionOfPreviousCaptureOnDrive) {
+TEST(MakeLampCaptureParameters, ContinuesMotionOfPreviousCaptureOnDrive) {
   const Scene scene = plain_scene();
   const StraightDrive drive{{0, 0}, {0.3, 0.4}, 0.1};
   LampShots captures{{0, 0.3}, {}, drive, {0, 2}, 0, 0.4, 2, 0.5, false};
@@ -88,15 +88,15 @@ TEST(MakeSimulatedLampCapture, ContinuesMotionOfPreviousCaptureOnDrive) {
   ASSERT_EQ(count_captures_of_set(set), 88);
   for (std::size_t i = 0; i + 1 < 88; ++i) {
     if (i % 11 == 10) continue;  // the next pass begins
-    const LampShot before = make_simulated_lamp_capture(scene, set, i),
-                   after = make_simulated_lamp_capture(scene, set, i + 1);
+    const LampShot before = make_lamp_capture_parameters(scene, set, i),
+                   after = make_lamp_capture_parameters(scene, set, i + 1);
     const Pose expected = before.motion.camera_pose_at(after.time_s - before.time_s);
     EXPECT_TRUE(after.motion.camera_pose_at(0).position_m.isApprox(expected.position_m, 1e-12));
     EXPECT_NEAR(after.motion.yaw_rad, expected.yaw_rad, 1e-12);
   }
-  EXPECT_EQ(make_simulated_lamp_capture(scene, set, 11).motion.axis_m, Eigen::Vector3d(0, 0, 0));
-  EXPECT_EQ(make_simulated_lamp_capture(scene, set, 22).motion.yaw_rad, 2);
-  EXPECT_EQ(make_simulated_lamp_capture(scene, set, 44).motion.axis_m, Eigen::Vector3d(0, 0, 0.3));
+  EXPECT_EQ(make_lamp_capture_parameters(scene, set, 11).motion.axis_m, Eigen::Vector3d(0, 0, 0));
+  EXPECT_EQ(make_lamp_capture_parameters(scene, set, 22).motion.yaw_rad, 2);
+  EXPECT_EQ(make_lamp_capture_parameters(scene, set, 44).motion.axis_m, Eigen::Vector3d(0, 0, 0.3));
 }
 
 TEST(BaseMotion, PoseRotatesLeverArmAboutAxis) {
@@ -107,7 +107,7 @@ TEST(BaseMotion, PoseRotatesLeverArmAboutAxis) {
   EXPECT_NEAR(motion.camera_pose_at(1).yaw_rad, rad_from_deg(90), 1e-15);
 }
 
-TEST(MakeSimulatedBoardCapture, DistanceTiltAndOffsetStayWithinAndReachLimits) {
+TEST(MakeBoardCaptureParameters, DistanceTiltAndOffsetStayWithinAndReachLimits) {
   Scene scene = plain_scene();
   scene.board = plain_board();
   CaptureSet set = board_views(300, 0, rad_from_deg(40), rad_from_deg(30), 0.5);
@@ -116,7 +116,7 @@ TEST(MakeSimulatedBoardCapture, DistanceTiltAndOffsetStayWithinAndReachLimits) {
   double farthest_m = 0, max_tilt = 0, max_offset = 0;
   for (std::size_t i = 0; i < 300; ++i) {
     const Eigen::Isometry3d camera_from_board =
-        make_simulated_board_capture(scene, set, i).camera_from_board(0);
+        make_board_capture_parameters(scene, set, i).camera_from_board(0);
     EXPECT_NEAR(camera_from_board.linear().determinant(), 1, 1e-12);
     Eigen::Vector3d middle_m(0, 0, 0);
     middle_m.head<2>() = compute_tag_field_size_m(scene.board->pattern) / 2;
@@ -138,7 +138,7 @@ TEST(MakeSimulatedBoardCapture, DistanceTiltAndOffsetStayWithinAndReachLimits) {
 }
 
 // A circle of 353 px in an image of 800 x 600, whose corners have no ray.
-TEST(MakeSimulatedBoardCapture, PlacesBoardAtLastRayWhereLensHasNone) {
+TEST(MakeBoardCaptureParameters, PlacesBoardAtLastRayWhereLensHasNone) {
   Scene scene = plain_scene();
   scene.camera = {
       "fisheye", {800, 600}, LensModel::fisheye, {290, 290, 399.5, 299.5, -0.1, 0, 0, 0},
@@ -152,7 +152,7 @@ TEST(MakeSimulatedBoardCapture, PlacesBoardAtLastRayWhereLensHasNone) {
     Eigen::Vector3d middle_m(0, 0, 0);
     middle_m.head<2>() = compute_tag_field_size_m(scene.board->pattern) / 2;
     const Eigen::Vector3d sight =
-        make_simulated_board_capture(scene, set, i).camera_from_board(0) * middle_m;
+        make_board_capture_parameters(scene, set, i).camera_from_board(0) * middle_m;
     const double off_axis_rad = std::atan2(sight.head<2>().norm(), sight.z());
     EXPECT_LE(off_axis_rad, last_rad + 1e-6);
     if (off_axis_rad > last_rad - 1e-3) ++at_the_rim;

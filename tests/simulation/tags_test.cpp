@@ -43,7 +43,7 @@ void expect_all_read(const Scene& scene, apriltag_family_t* family) {
   const FrameRenderer renderer(scene);
   const CaptureSet views = board_views(4, 0.28, rad_from_deg(35), rad_from_deg(180), 0);
   for (std::size_t index = 0; index < 4; ++index) {
-    const BoardShot shot = make_simulated_board_capture(scene, views, index);
+    const BoardShot shot = make_board_capture_parameters(scene, views, index);
     const Corners found = detected(
         simulate_sensor_image(scene.sensor, renderer.render_board_in_electrons(shot), 1), family);
     const auto truth = find_true_corners_in_image(scene, renderer, shot);

@@ -143,7 +143,7 @@ class ProblemAssembler {
   }
 
   /// Adds a capture with its known position; counts it as rejected if it determines no pose.
-  void add_capture_with_initial_pose(const AdjustmentCapture& capture) {
+  void add_capture_or_count_as_rejected(const AdjustmentCapture& capture) {
     const InclinationRotation inclination =
         capture.inclination ? compute_inclination_rotation(*capture.inclination, 0)
                             : InclinationRotation();
@@ -303,7 +303,7 @@ class ProblemAssembler {
 AssembledProblem assemble_adjustment_problem(const AdjustmentInput& input) {
   ProblemAssembler assembler(input);
   for (const AdjustmentCapture& capture : input.captures)
-    assembler.add_capture_with_initial_pose(capture);
+    assembler.add_capture_or_count_as_rejected(capture);
   return std::move(assembler).finish();
 }
 

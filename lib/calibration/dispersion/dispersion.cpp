@@ -14,9 +14,9 @@ namespace {
 /// Sets the fixes and circles before and after the correction.
 void set_fixes_before_and_after(DispersionFit& fit, const ReferencePointFixes& reference_fixes,
                                 const std::vector<bool>& used, DispersionCircle kind) {
-  const OptionalFixes before = reference_fixes.compute_capture_fixes_at_offset({0, 0}),
-                      after =
-                          reference_fixes.compute_capture_fixes_at_offset(fit.dispersion.offset_px);
+  const OptionalFixes before = reference_fixes.compute_capture_fixes_with_dispersion_offset({0, 0}),
+                      after = reference_fixes.compute_capture_fixes_with_dispersion_offset(
+                          fit.dispersion.offset_px);
   std::vector<Eigen::Vector2d> before_m, after_m;
   for (std::size_t i = 0; i < before.size(); ++i) {
     if (!before[i] || !after[i]) continue;
@@ -73,7 +73,7 @@ void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& reference_
     fit.status = DispersionStatus::diverged;
     return;
   }
-  const OptionalFixes fixes = reference_fixes.compute_capture_fixes_at_offset({0, 0});
+  const OptionalFixes fixes = reference_fixes.compute_capture_fixes_with_dispersion_offset({0, 0});
   if (compute_mean_fix(fixes, separation->used).count < 3) {
     fit.status = DispersionStatus::too_few_captures;
     return;
@@ -103,11 +103,11 @@ void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& reference_
 
 }  // namespace
 
-DispersionFit estimate_heading_dependent_offset(std::span<const ReferencePointCapture> captures,
-                                                const LampMap& map, const Calibration& calibration,
-                                                DispersionMethod method, DispersionCircle circle) {
+DispersionFit estimate_dispersion_offset(std::span<const ReferencePointCapture> captures,
+                                         const LampMap& map, const Calibration& calibration,
+                                         DispersionMethod method, DispersionCircle circle) {
   const ReferencePointFixes reference_fixes(captures, map, calibration);
-  const OptionalFixes fixes = reference_fixes.compute_capture_fixes_at_offset({0, 0});
+  const OptionalFixes fixes = reference_fixes.compute_capture_fixes_with_dispersion_offset({0, 0});
   const auto count =
       std::count_if(fixes.begin(), fixes.end(), [](const auto& fix) { return fix.has_value(); });
   DispersionFit fit;

@@ -25,7 +25,7 @@ struct ReferencePointCapture {
   std::optional<Inclination> inclination = {};
 };
 
-/// Method of estimate_heading_dependent_offset().
+/// Method of estimate_dispersion_offset().
 enum class DispersionMethod {
   /// Separates errors that rotate with the camera from errors that are fixed in the world. Requires
   /// captures at various yaws.
@@ -53,7 +53,7 @@ enum class DispersionStatus {
 /// Describes the status and the remedy, human-readable.
 std::string_view describe_dispersion_status(DispersionStatus status);
 
-/// Result of estimate_heading_dependent_offset(). Members after `noise_is_stated` are valid only if
+/// Result of estimate_dispersion_offset(). Members after `noise_is_stated` are valid only if
 /// the status is `ok`.
 struct DispersionFit {
   DispersionStatus status = DispersionStatus::no_fix;
@@ -110,9 +110,9 @@ struct DispersionFit {
 /// existing dispersion of `calibration` is ignored.
 ///
 /// Source: Chen and Guan, section 3.2.
-DispersionFit estimate_heading_dependent_offset(std::span<const ReferencePointCapture> captures,
-                                                const LampMap& map, const Calibration& calibration,
-                                                DispersionMethod method,
-                                                DispersionCircle circle = DispersionCircle::mean);
+DispersionFit estimate_dispersion_offset(std::span<const ReferencePointCapture> captures,
+                                         const LampMap& map, const Calibration& calibration,
+                                         DispersionMethod method,
+                                         DispersionCircle circle = DispersionCircle::mean);
 
 }  // namespace vlp

@@ -33,11 +33,11 @@ std::vector<Equation> linearize_fix_equations(const ReferencePointFixes& fixes,
   constexpr double step_px =
       0.25;  // fixes are smooth over this step, which is far above their rounding
   const Eigen::Vector2d along_u(step_px, 0), along_v(0, step_px);
-  const Fixes here = fixes.compute_capture_fixes_at_offset(at.offset_px);
-  const Fixes right = fixes.compute_capture_fixes_at_offset(at.offset_px + along_u),
-              left = fixes.compute_capture_fixes_at_offset(at.offset_px - along_u);
-  const Fixes down = fixes.compute_capture_fixes_at_offset(at.offset_px + along_v),
-              up = fixes.compute_capture_fixes_at_offset(at.offset_px - along_v);
+  const Fixes here = fixes.compute_capture_fixes_with_dispersion_offset(at.offset_px);
+  const Fixes right = fixes.compute_capture_fixes_with_dispersion_offset(at.offset_px + along_u),
+              left = fixes.compute_capture_fixes_with_dispersion_offset(at.offset_px - along_u);
+  const Fixes down = fixes.compute_capture_fixes_with_dispersion_offset(at.offset_px + along_v),
+              up = fixes.compute_capture_fixes_with_dispersion_offset(at.offset_px - along_v);
   std::vector<Equation> equations;
   equations.reserve(here.size());
   for (std::size_t i = 0; i < here.size(); ++i) {
@@ -167,7 +167,7 @@ LampDerivatives propagate_map_errors(const ReferencePointFixes& fixes, const Off
 std::optional<OffsetSeparation> separate_camera_and_world_offsets(
     const ReferencePointFixes& fixes) {
   OffsetSeparation result;
-  result.used.resize(fixes.compute_capture_fixes_at_offset(result.offset_px).size());
+  result.used.resize(fixes.compute_capture_fixes_with_dispersion_offset(result.offset_px).size());
   if (!solve_approximately(fixes, result)) return std::nullopt;
   constexpr int max_iterations = 10;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
@@ -184,7 +184,8 @@ namespace {
 std::vector<Eigen::Vector2d> compute_errors(const ReferencePointFixes& reference_fixes,
                                             const Eigen::Vector2d& offset_px,
                                             const std::vector<bool>& used) {
-  const OptionalFixes fixes = reference_fixes.compute_capture_fixes_at_offset(offset_px);
+  const OptionalFixes fixes =
+      reference_fixes.compute_capture_fixes_with_dispersion_offset(offset_px);
   std::vector<Eigen::Vector2d> errors_m;
   for (std::size_t i = 0; i < fixes.size(); ++i) {
     if (fixes[i] && used[i]) errors_m.push_back(fixes[i]->error_m);
@@ -296,7 +297,7 @@ ChenGuanOffset estimate_dispersion_offset_by_chen_guan(const ReferencePointFixes
                                                        const Eigen::Vector2d& focal_px,
                                                        DispersionCircle kind,
                                                        bool noise_is_stated) {
-  const OptionalFixes fixes = reference_fixes.compute_capture_fixes_at_offset({0, 0});
+  const OptionalFixes fixes = reference_fixes.compute_capture_fixes_with_dispersion_offset({0, 0});
   const std::vector<bool> used = flag_fixes_near_median(fixes);
   const MeanFix mean_fix = compute_mean_fix(fixes, used);
   if (!mean_fix.are_capture_yaws_similar()) return {.status = DispersionStatus::several_yaws};
@@ -323,7 +324,8 @@ ChenGuanOffset estimate_dispersion_offset_by_chen_guan(const ReferencePointFixes
     ChenGuanOffset found{.status = DispersionStatus::ok, .offset_px = offset_px, .used = used};
     if (kind == DispersionCircle::mean) {
       const Eigen::Matrix2d noise_m2 = compute_mean_noise(
-          reference_fixes.compute_capture_fixes_at_offset(offset_px), used, noise_is_stated);
+          reference_fixes.compute_capture_fixes_with_dispersion_offset(offset_px), used,
+          noise_is_stated);
       const Eigen::Matrix2d mean_covariance_m2 = estimate_covariance_of_mean(errors_m, noise_m2);
       Matrix2 covariance = image_from_floor * mean_covariance_m2 * image_from_floor.transpose();
       covariance(1, 0) = covariance(0, 1);

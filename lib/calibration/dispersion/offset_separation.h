@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-/// Errors of camera and world from estimate_heading_dependent_offset(), method `camera`.
+/// Errors of camera and world from estimate_dispersion_offset(), method `camera`.
 struct OffsetSeparation {
   /// Offset (u, v) of the dispersion in the undistorted image, px. It rotates with the camera,
   /// unlike `world_m`.

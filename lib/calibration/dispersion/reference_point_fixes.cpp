@@ -60,13 +60,14 @@ ReferencePointFixes::ReferencePointFixes(std::span<const ReferencePointCapture> 
 }
 
 std::vector<std::optional<ReferencePointFixes::Estimate>>
-ReferencePointFixes::compute_capture_fixes_at_offset(const Eigen::Vector2d& offset_px) const {
-  return compute_capture_fixes_at_offset(offset_px, map_);
+ReferencePointFixes::compute_capture_fixes_with_dispersion_offset(
+    const Eigen::Vector2d& offset_px) const {
+  return compute_capture_fixes_with_dispersion_offset(offset_px, map_);
 }
 
 std::vector<std::optional<ReferencePointFixes::Estimate>>
-ReferencePointFixes::compute_capture_fixes_at_offset(const Eigen::Vector2d& offset_px,
-                                                     const LampMap& map) const {
+ReferencePointFixes::compute_capture_fixes_with_dispersion_offset(const Eigen::Vector2d& offset_px,
+                                                                  const LampMap& map) const {
   Calibration calibration = calibration_;
   calibration.dispersion = Dispersion{offset_px, 0, {0, 0}, 1, {}};
   const Positioner positioner(map, calibration);
@@ -103,7 +104,7 @@ LampDerivatives ReferencePointFixes::compute_fix_jacobian_wrt_lamps(
   jacobian_wrt_positions =
       Eigen::MatrixXd::Zero(2 * std::ssize(captures_), 3 * std::ssize(uncertain));
   if (uncertain.empty()) return derivatives;
-  const auto here = compute_capture_fixes_at_offset(offset_px);
+  const auto here = compute_capture_fixes_with_dispersion_offset(offset_px);
   LampMap moved = map_;
   for (Eigen::Index column = 0; column < jacobian_wrt_positions.cols(); ++column) {
     const std::size_t lamp = uncertain[static_cast<std::size_t>(column / 3)];
@@ -112,7 +113,7 @@ LampDerivatives ReferencePointFixes::compute_fix_jacobian_wrt_lamps(
     constexpr double max_step_m = 1e-4;
     const double step_m = std::min(*map_.lamps[lamp].sd_m, max_step_m);
     coordinate_m += step_m;
-    const auto there = compute_capture_fixes_at_offset(offset_px, moved);
+    const auto there = compute_capture_fixes_with_dispersion_offset(offset_px, moved);
     coordinate_m = map_.lamps[lamp].position_m[column % 3];
     for (std::size_t i = 0; i < here.size(); ++i) {
       if (!here[i] || !there[i]) continue;
@@ -130,13 +131,13 @@ constexpr double kMaxErrorFraction = 0.2;  // of the lamps' height
 /// Computes q of compute_small_sample_variance_factor().
 double compute_student_factor(double degrees_of_freedom) {
   constexpr double sigmas_of_95_percent = 1.96;
-  return compute_t_squared_bound(sigmas_of_95_percent, degrees_of_freedom) /
+  return compute_squared_student_t_bound(sigmas_of_95_percent, degrees_of_freedom) /
          (sigmas_of_95_percent * sigmas_of_95_percent);
 }
 
 /// Computes the weight of residuals that contradict given noise: 0 up to the ratio that 20 % of
 /// all residuals exceed, 1 from that of 5 %, linear in between.
-double compute_yaw_contradiction(double ratio, double degrees_of_freedom) {
+double compute_noise_contradiction_weight(double ratio, double degrees_of_freedom) {
   constexpr double sigmas_of_20_percent = 0.8416, sigmas_of_5_percent = 1.6449;
   const double first =
       compute_chi_squared_bound(sigmas_of_20_percent, degrees_of_freedom) / degrees_of_freedom;
@@ -195,7 +196,8 @@ double compute_small_sample_variance_factor(double ratio, double degrees_of_free
   const double combined = (kGivenNoiseDegreesOfFreedom + degrees_of_freedom * ratio) /
                           total_freedom * compute_student_factor(total_freedom);
   const double factor = std::max(1.0, combined);
-  const double weight = compute_yaw_contradiction(pooled_ratio.value_or(ratio), degrees_of_freedom);
+  const double weight =
+      compute_noise_contradiction_weight(pooled_ratio.value_or(ratio), degrees_of_freedom);
   return factor * std::pow(std::max(1.0, from_residuals / factor), weight);
 }
 

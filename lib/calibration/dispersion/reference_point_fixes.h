@@ -47,7 +47,7 @@ class ReferencePointFixes {
                       const Calibration& calibration);
 
   /// Returns the fix of each capture; std::nullopt for captures without a fix.
-  std::vector<std::optional<Estimate>> compute_capture_fixes_at_offset(
+  std::vector<std::optional<Estimate>> compute_capture_fixes_with_dispersion_offset(
       const Eigen::Vector2d& offset_px) const;
   /// Computes the derivatives of the fixes, in m, with respect to the positions of the lamps that
   /// are detected and have an sd_m above zero. Differentiates numerically, one coordinate at a
@@ -57,7 +57,7 @@ class ReferencePointFixes {
   FixStatus first_failed_fix_status() const { return first_failure_; }
 
  private:
-  std::vector<std::optional<Estimate>> compute_capture_fixes_at_offset(
+  std::vector<std::optional<Estimate>> compute_capture_fixes_with_dispersion_offset(
       const Eigen::Vector2d& offset_px, const LampMap& map) const;
 
   std::span<const ReferencePointCapture> captures_;
@@ -103,9 +103,9 @@ inline constexpr double kGivenNoiseDegreesOfFreedom = 6;
 /// errors.
 ///
 /// The residuals have the variance s^2 = `ratio` times the nominal one, with nu degrees of freedom;
-/// q(m) = (t_m / 1.96)^2 with a bound t_m of Student's t at 97.5 % (compute_t_squared_bound). If
-/// the noise is not stated the factor is ratio q(nu). Given noise counts as an estimate with n =
-/// kGivenNoiseDegreesOfFreedom:
+/// q(m) = (t_m / 1.96)^2 with a bound t_m of Student's t at 97.5 %
+/// (compute_squared_student_t_bound). If the noise is not stated the factor is ratio q(nu). Given
+/// noise counts as an estimate with n = kGivenNoiseDegreesOfFreedom:
 ///   f = max(1, (n + nu ratio) / (n + nu) q(n + nu)),
 /// and if the residuals contradict it, f (ratio q(nu) / f)^w where that is larger: w rises from 0
 /// to 1 with chi-squared between its bounds of 20 % and 5 %, so that the factor is continuous.

@@ -270,7 +270,7 @@ std::string describe_layout_problem(const Board& board, const std::vector<Step>&
   if (found) {
     std::string text = "the images show cols " + std::to_string(found->cols);
     text.append(", rows ").append(std::to_string(found->rows));
-    text.append(", id_order ").append(to_string(found->id_order));
+    text.append(", id_order ").append(id_order_name(found->id_order));
     if (found->first_id != board.first_id) {
       text.append(", first_id ").append(std::to_string(found->first_id));
     }

@@ -69,7 +69,7 @@ BoardLattice::BoardLattice(const Board& board)
   board_warp_ratio_ = (field_m_.array() / part_m).square();
 }
 
-std::vector<BoardLattice::Corner> BoardLattice::match_corners_to_flat_board(
+std::vector<BoardLattice::Corner> BoardLattice::list_corners_with_board_positions(
     const BoardDetection& seen) const {
   constexpr int right[] = {0, 1, 1, 0}, down[] = {1, 1, 0, 0};  // bottom left, bottom right, ...
   std::vector<Corner> all;

@@ -25,7 +25,7 @@ class BoardLattice {
   explicit BoardLattice(const Board& board);
 
   /// Number of parts into which the board is divided: 1 or 4.
-  std::size_t num_lattice_parts() const { return parts_; }
+  std::size_t num_board_parts() const { return parts_; }
   /// Number of points along the width and the height of a part.
   int lattice_cols() const { return cols_; }
   int lattice_rows() const { return rows_; }
@@ -55,9 +55,9 @@ class BoardLattice {
   };
   /// Returns all corners of a detection on a flat board, in the order of `seen`: its points, or
   /// four corners of each tag.
-  std::vector<Corner> match_corners_to_flat_board(const BoardDetection& seen) const;
+  std::vector<Corner> list_corners_with_board_positions(const BoardDetection& seen) const;
   /// Returns the PointDetection::index of a point: part by part, row by row.
-  std::size_t point_detection_index(std::size_t part, std::size_t point) const {
+  std::size_t point_index_on_board(std::size_t part, std::size_t point) const {
     return part * num_points_per_part() + point;
   }
   /// Returns the index of the tag of a point. The corners of a tag share its edges and therefore

@@ -31,7 +31,7 @@ void add_uncertainty_over_image(const ProjectionUncertainty& uncertainty, const 
     const bool can_end =
         lens.lens_model() == LensModel::fisheye || is_splined_lens_model(lens.lens_model());
     if (can_end && !lens.unproject_pixel(pixel)) continue;
-    const double sigma_px = uncertainty.max_projection_sd_px(pixel);
+    const double sigma_px = uncertainty.projection_sd_along_worst_direction_px(pixel);
     if (!polygon_contains(report.region, pixel)) {
       report.uncertainty_beyond_px = std::max(report.uncertainty_beyond_px, sigma_px);
       continue;
@@ -58,11 +58,11 @@ std::optional<ProjectionDifference> compare_lenses_of_view_halves(
   constexpr double max_ratio = 3;  // typically sqrt(2)
   return compute_projection_difference(
       even.fitted_lens(), odd.fitted_lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
-        const double sigma_px = uncertainty.max_projection_sd_px(pixel);
+        const double sigma_px = uncertainty.projection_sd_along_worst_direction_px(pixel);
         const bool is_determined =
             polygon_contains(region, pixel) &&
             std::ranges::none_of(halves, [&](const ProjectionUncertainty& half) {
-              return half.max_projection_sd_px(pixel) > max_ratio * sigma_px;
+              return half.projection_sd_along_worst_direction_px(pixel) > max_ratio * sigma_px;
             });
         return is_determined ? sigma_px : std::numeric_limits<double>::infinity();
       });
@@ -156,7 +156,7 @@ ViewCoverage compute_board_view_coverage(const IntrinsicsSolution& solution,
       ++coverage.corners[static_cast<std::size_t>(
           ImageCoverage::image_cell_index_along_axis(v, height, 3) * 3 +
           ImageCoverage::image_cell_index_along_axis(u, width, 3))];
-      parts.add_corner_pixel(corner.pixel);
+      parts.add_corner_to_coverage(corner.pixel);
     }
   }
   coverage.covered_fraction = parts.covered_image_fraction();

@@ -20,15 +20,16 @@ struct CalibrationReport {
   /// `region_fraction` is its area as a fraction of the image, 0 to 1.
   ImageRegion region;
   double region_fraction;
-  /// Mean and maximum of ProjectionUncertainty::max_projection_sd_px() by tags, px, over the
-  /// make_regular_pixel_grid() of the region.
+  /// Mean and maximum of ProjectionUncertainty::projection_sd_along_worst_direction_px() by tags,
+  /// px, over the make_regular_pixel_grid() of the region.
   ///
   /// The maximum is at least estimate_expected_max_projection_difference_px() over the region for
   /// each of three covariances: by tags, by independent corners and by views. Splined lenses are
   /// excluded from this rule. If another lens model fits equally well, estimate_lens() raises the
   /// maximum to the largest difference between the two lenses.
   double uncertainty_mean_px, uncertainty_worst_px;
-  /// Maximum of ProjectionUncertainty::max_projection_sd_px() outside the region, px.
+  /// Maximum of ProjectionUncertainty::projection_sd_along_worst_direction_px() outside the region,
+  /// px.
   double uncertainty_beyond_px;
   /// Standard deviation of fx, px: from the noise of the tags, and from
   /// estimate_intrinsics_covariance_by_jackknife().

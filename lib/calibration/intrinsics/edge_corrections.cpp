@@ -49,7 +49,7 @@ std::optional<double> compute_edge_sagitta_by_lens(const Chord& chord,
 /// Outward displacements of the ends of an edge, and the curvature by the lens.
 struct DisplacedEdge {
   std::array<double, 2> outwards_px;
-  EdgeCurvature bow;
+  EdgeCurvature curvature;
 };
 
 std::optional<DisplacedEdge> compute_displaced_edge(const Chord& chord, const EdgeCurvature& seen,
@@ -69,7 +69,7 @@ std::optional<DisplacedEdge> compute_displaced_edge(const Chord& chord, const Ed
     const double w = seen.reach * place;
     const auto lens_offset = lens_at(w);
     if (!lens_offset) return {};
-    const double difference = seen.at(w) - *lens_offset;
+    const double difference = seen.curve_offset_from_straight_line_px(w) - *lens_offset;
     mean += weight / 2 * difference;
     slope += 3 * weight / 2 * difference * place / seen.reach;
   }
@@ -220,7 +220,7 @@ double correct_corners_for_edge_displacement(std::vector<BoardLattice::Corner>& 
                                              const EdgeDisplacement& shift) {
   double sum_px = 0;
   for (auto& corner : corners) {
-    const double shift_px = shift.at(corner.pixel);
+    const double shift_px = shift.inward_displacement_at_pixel_px(corner.pixel);
     corner.pixel -= shift_px * corner.d_pixel_d_edge_shift;
     sum_px += shift_px;
   }

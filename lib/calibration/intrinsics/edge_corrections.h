@@ -14,8 +14,8 @@ namespace vlp {
 /// Corrects the corners of tags in one view for the measured curvature of their edges. Replaces the
 /// curvature by that of the lens, which projects straight edges, and moves each corner accordingly.
 ///
-/// @param corners  four corners per tag, in the order of BoardLattice::Corner; pixel and bow are
-///     changed
+/// @param corners  four corners per tag, in the order of BoardLattice::Corner; pixel and edge
+///     curvature are changed
 /// @return         largest displacement of a corner, px; 0 if none is corrected
 ///
 /// The lens determines the curvature of an edge a hundred times more accurately than the edge
@@ -41,7 +41,7 @@ struct EdgeDisplacement {
   double radius_px = 1;
 
   /// Returns the inward displacement of a tag edge at a pixel of the image, px. Negative: outwards.
-  double at(const Eigen::Vector2d& pixel) const {
+  double inward_displacement_at_pixel_px(const Eigen::Vector2d& pixel) const {
     const Eigen::Vector2d x = (pixel - middle) / radius_px;
     return coefficients.dot(Eigen::Vector4d(1, x.x(), x.y(), x.squaredNorm()));
   }

@@ -16,7 +16,7 @@ class ImageCoverage {
 
   explicit ImageCoverage(const std::array<int, 2>& imager_px) : imager_px_(imager_px) {}
 
-  void add_corner_pixel(const Eigen::Vector2d& pixel) {
+  void add_corner_to_coverage(const Eigen::Vector2d& pixel) {
     ++corners_[flat_cell_index(image_cell_index_along_axis(pixel.x(), imager_px_[0], kCols),
                                image_cell_index_along_axis(pixel.y(), imager_px_[1], kRows))];
   }

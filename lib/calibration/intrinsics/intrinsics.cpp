@@ -244,8 +244,8 @@ void IntrinsicsSolver::initialize_spline_from_symmetric_lens() {
       initial_poses_.poses[view] = pose->camera_from_board;
     }
   }
-  const std::vector<double> core =
-      fit_splined_lens_core(fisheye, collect_inlier_corner_pixels(symmetric.problem_));
+  const std::vector<double> core = fit_core_intrinsics_of_splined_lens(
+      fisheye, collect_inlier_corner_pixels(symmetric.problem_));
   // With too few control points, STEREOGRAPHIC with that core is used.
   problem_.intrinsics =
       fit_splined_lens_to_lens(fisheye, input_.imager_px, input_.lens_model, core).value_or(core);
@@ -333,7 +333,7 @@ bool IntrinsicsSolver::scale_spline_regularization_to_noise() {
 
 std::size_t IntrinsicsSolver::find_problem_index_of_corner(
     std::size_t used, const BoardLattice::Corner& corner) const {
-  return (used * input_.lattice.num_lattice_parts() + corner.part) *
+  return (used * input_.lattice.num_board_parts() + corner.part) *
              input_.lattice.num_points_per_part() +
          corner.point;
 }
@@ -460,10 +460,10 @@ void IntrinsicsSolver::assemble_board_problem(const Lens& lens) {
   problem_.rows = lattice.lattice_rows();
   problem_.spacing_m = lattice.point_spacing_m();
   problem_.poses.clear();
-  problem_.points.assign(used_.size() * lattice.num_lattice_parts() * lattice.num_points_per_part(),
+  problem_.points.assign(used_.size() * lattice.num_board_parts() * lattice.num_points_per_part(),
                          {-1, -1, BoardProblem::kUnseen});
   for (std::size_t i = 0; i < used_.size(); ++i) {
-    for (std::size_t part = 0; part < lattice.num_lattice_parts(); ++part) {
+    for (std::size_t part = 0; part < lattice.num_board_parts(); ++part) {
       problem_.poses.push_back(
           lattice.compute_board_part_pose(initial_poses_.poses[used_[i]], part));
     }
@@ -482,8 +482,7 @@ bool IntrinsicsSolver::can_lens_project_most_views() const {
 
 std::vector<double> IntrinsicsSolver::compute_view_residual_rms_px() const {
   const auto residuals = compute_reprojection_residuals(problem_);
-  const std::size_t count =
-      input_.lattice.num_lattice_parts() * input_.lattice.num_points_per_part();
+  const std::size_t count = input_.lattice.num_board_parts() * input_.lattice.num_points_per_part();
   std::vector<double> rms;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     double squares = 0;

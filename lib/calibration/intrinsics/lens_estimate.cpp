@@ -45,7 +45,7 @@ SplitViews split_off_held_out_views(const LensViews& input, LensEstimate& result
     ++count;
     const bool is_held_out = input.held_out > 0 && count % input.held_out == 0;
     auto& part = is_held_out ? split.held_out : split.solved;
-    part.views.push_back(empty.lattice.match_corners_to_flat_board(view.detection));
+    part.views.push_back(empty.lattice.list_corners_with_board_positions(view.detection));
     if (!is_held_out) result.images.push_back(view.image);
   }
   if (input.held_out > 0 && split.held_out.views.empty()) {
@@ -110,7 +110,8 @@ std::string explain_unsuitable_grid(IntrinsicsInput input) {
   const BoardExtent reach = measure_board_extent(solution, grid_reach);
   if (10 * reach.boards_within >= 9 * reach.boards) {
     const Lens lens = solution.fitted_lens();
-    const auto core = fit_splined_lens_core(lens, collect_inlier_corner_pixels(solution.problem));
+    const auto core =
+        fit_core_intrinsics_of_splined_lens(lens, collect_inlier_corner_pixels(solution.problem));
     return fit_splined_lens_to_lens(lens, input.imager_px, splined, core)
                ? ""
                : describe_too_coarse_spline_grid(lens, input.imager_px, splined, core);

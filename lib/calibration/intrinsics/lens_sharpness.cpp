@@ -94,7 +94,7 @@ std::vector<double> compute_relative_lights(const std::vector<MeasuredEdge>& edg
   }
   const EdgeField field(edge_values, EdgeField::Terms::place);
   for (const auto& [middle_px, along, step] : edges) {
-    lights.push_back(step.bright / field.predict_edge_property(middle_px, along));
+    lights.push_back(step.bright / field.evaluate_field_at_edge(middle_px, along));
   }
   return lights;
 }

@@ -133,7 +133,7 @@ std::string describe_size(const Board& board, const BoardLattice& lattice) {
 std::string describe_wrong_count(const Board& board, const BoardLattice& lattice,
                                  std::size_t rows) {
   std::string words = fmt::format("{} rows, but {}", rows, describe_size(board, lattice));
-  if (lattice.num_lattice_parts() > 1) words += " of each kind";
+  if (lattice.num_board_parts() > 1) words += " of each kind";
   if (board.has_chessboard_squares() && rows == static_cast<std::size_t>(board.cols * board.rows)) {
     words += fmt::format(
         "; cols and rows of board.yaml count squares, not the corners between them: cols {}, rows "
@@ -156,7 +156,7 @@ struct PartOfImage {
 PartOfImage parse_part_of_image_name(const BoardLattice& lattice, const CornerTable& table,
                                      std::size_t line, std::string_view name) {
   PartOfImage found{std::string(name), 0};
-  if (lattice.num_lattice_parts() == 1) return found;
+  if (lattice.num_board_parts() == 1) return found;
   const auto ending = name.rfind("-corner");
   if (ending == name.npos || ending + 8 != name.size() || name.back() < '0' || name.back() > '3') {
     throw table.error(line,
@@ -212,7 +212,7 @@ std::vector<BoardView> read_mrcal_corners(const std::filesystem::path& file, con
     }
     for (std::size_t i = from; i < end; ++i) {
       if (!table.rows[i].pixel) continue;
-      view.detection.points.push_back({lattice.point_detection_index(part, i - from),
+      view.detection.points.push_back({lattice.point_index_on_board(part, i - from),
                                        *table.rows[i].pixel, table.rows[i].weight});
     }
     if (!none) {
@@ -228,7 +228,7 @@ std::vector<BoardView> read_mrcal_corners(const std::filesystem::path& file, con
               [](const PointDetection& a, const PointDetection& b) { return a.index < b.index; });
   }
   check_row_length(board, lattice, table, images, first_line);
-  if (lattice.num_lattice_parts() == 1) {
+  if (lattice.num_board_parts() == 1) {
     for (BoardView& view : views) {
       renumber_lattice_points(view.detection.points, lattice.lattice_cols(), lattice.lattice_rows(),
                               board.kind == BoardKind::chessboard);

@@ -31,7 +31,7 @@ double compute_residual_sd(const BoardProblem& problem, const Eigen::VectorXd& r
 Eigen::MatrixXd sum_rows_by_tag(const Eigen::MatrixXd& by_residual,
                                 const Eigen::VectorXd& residuals_px, const BoardLattice& lattice) {
   const std::size_t points = lattice.num_points_per_part(),
-                    points_per_view = lattice.num_lattice_parts() * points;
+                    points_per_view = lattice.num_board_parts() * points;
   const Eigen::Index corners = residuals_px.size() / 2;
   const auto views = static_cast<std::size_t>(corners) / points_per_view;
   Eigen::MatrixXd sums =
@@ -135,7 +135,8 @@ Eigen::Matrix2d ProjectionUncertainty::projection_covariance(const Eigen::Vector
   return gradient * state_covariance * gradient.transpose();
 }
 
-double ProjectionUncertainty::max_projection_sd_px(const Eigen::Vector2d& pixel) const {
+double ProjectionUncertainty::projection_sd_along_worst_direction_px(
+    const Eigen::Vector2d& pixel) const {
   const Eigen::Matrix2d c = projection_covariance(pixel);
   if (!c.allFinite()) return std::numeric_limits<double>::infinity();
   const double mean = c.trace() / 2, half = (c(0, 0) - c(1, 1)) / 2;

@@ -47,7 +47,7 @@ class ProjectionUncertainty {
   Eigen::Matrix2d projection_covariance(const Eigen::Vector2d& pixel) const;
 
   /// Returns the standard deviation in the direction in which it is largest, px.
-  double max_projection_sd_px(const Eigen::Vector2d& pixel) const;
+  double projection_sd_along_worst_direction_px(const Eigen::Vector2d& pixel) const;
 
   /// Returns the covariance of the intrinsics; 0 for the core of splined lenses, which is not
   /// estimated.

@@ -47,7 +47,7 @@ void add_smoothness_equations(Equations& equations, const SplineGrid& grid) {
 
 /// Returns true if a surface without second differences is determined by its values at these
 /// points.
-bool determine_bilinear_surface(const std::vector<Eigen::Vector2d>& positions) {
+bool is_bilinear_surface_determined(const std::vector<Eigen::Vector2d>& positions) {
   constexpr Eigen::Index unknowns = 4;
   if (std::ssize(positions) < unknowns) return false;
   Eigen::Array2d min_value = positions.front(), max_value = min_value;
@@ -104,7 +104,7 @@ std::optional<std::vector<double>> fit_splined_lens_to_lens(
       equations.right.emplace_back(((pixel->array() - center_px) / focal_px).matrix() - u);
     }
   }
-  if (!determine_bilinear_surface(positions)) return {};
+  if (!is_bilinear_surface_determined(positions)) return {};
   const auto points = static_cast<Eigen::Index>(grid.num_control_points());
   Eigen::SparseMatrix<double> left(equations.next(), points);
   left.setFromTriplets(equations.entries.begin(), equations.entries.end());
@@ -166,8 +166,8 @@ SplineGrid resize_spline_grid_to_reach(const SplineGrid& grid, const Eigen::Vect
   return wide;
 }
 
-std::vector<double> fit_splined_lens_core(const Lens& lens,
-                                          std::span<const Eigen::Vector2d> pixels) {
+std::vector<double> fit_core_intrinsics_of_splined_lens(const Lens& lens,
+                                                        std::span<const Eigen::Vector2d> pixels) {
   Eigen::Array2d products(0, 0), squares(0, 0);
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto ray = lens.unproject_pixel(pixel);

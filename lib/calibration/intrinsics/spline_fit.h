@@ -45,7 +45,7 @@ SplineGrid resize_spline_grid_to_reach(const SplineGrid& grid, const Eigen::Vect
 /// least squares over the pixels. The core has the center of the lens, and the focal lengths of the
 /// stereographic lens around it.
 /// @pre the lens has rays at some of the pixels
-std::vector<double> fit_splined_lens_core(const Lens& lens,
-                                          std::span<const Eigen::Vector2d> pixels);
+std::vector<double> fit_core_intrinsics_of_splined_lens(const Lens& lens,
+                                                        std::span<const Eigen::Vector2d> pixels);
 
 }  // namespace vlp

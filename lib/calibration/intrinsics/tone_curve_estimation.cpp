@@ -84,8 +84,8 @@ std::optional<ValuesPerGamma> compute_residual_noise_ratios(const std::vector<Bo
   for (std::size_t curve = 0; curve < ratios.size(); ++curve) {
     input.views.clear();
     for (const BoardDetection* seen : selected) {
-      input.views.push_back(
-          input.lattice.match_corners_to_flat_board(correct_corners_for_tone_curve(*seen, curve)));
+      input.views.push_back(input.lattice.list_corners_with_board_positions(
+          correct_corners_for_tone_curve(*seen, curve)));
     }
     const IntrinsicsSolution solution =
         curve == 0 ? solve_better_fitting_model(input) : solve_intrinsics(input);

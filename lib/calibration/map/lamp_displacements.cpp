@@ -177,8 +177,8 @@ std::optional<LampDisplacements> solve_lamp_displacements(const LampMap& map,
 /// Removes outliers and adds them to `outliers_m`. Removes the largest residual of each view if it
 /// exceeds half the largest of all, because an outlier also changes the residuals of other
 /// detections. Returns true if any was removed.
-bool reject_corner_outliers(std::vector<CeilingView>& views, const LampDisplacements& found,
-                            std::map<int, std::vector<double>>& outliers_m) {
+bool reject_detection_outliers(std::vector<CeilingView>& views, const LampDisplacements& found,
+                               std::map<int, std::vector<double>>& outliers_m) {
   constexpr double max_sigmas = 6, numeric_tolerance_m = 1e-7;
   std::vector<double> squares_m2;
   for (const Eigen::VectorXd& residuals_m : found.residuals_m) {
@@ -219,7 +219,7 @@ std::optional<LampDisplacements> estimate_lamp_displacements(const LampMap& map,
   remove_unconnected_detections(views);
   const std::size_t detections = count_detections(views);
   std::optional<LampDisplacements> found = solve_lamp_displacements(map, views, tilt_is_free);
-  while (found && reject_corner_outliers(views, *found, outliers_m)) {
+  while (found && reject_detection_outliers(views, *found, outliers_m)) {
     remove_unconnected_detections(views);
     found = solve_lamp_displacements(map, views, tilt_is_free);
   }

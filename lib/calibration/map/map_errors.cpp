@@ -240,7 +240,7 @@ class DisplacementTest {
   }
 
   /// Returns the bound of a drop of chi^2 if `tests` sets of `free` lamps are tested together.
-  double compute_displacement_bound(std::size_t free, double tests) const {
+  double compute_chi_squared_drop_bound(std::size_t free, double tests) const {
     const double exponent = -2 * std::log(kFalseAlarm / tests);
     if (variance_is_known_) return exponent;
     const double freedom =
@@ -274,8 +274,8 @@ class DisplacementTest {
     for (std::size_t k = 0; k < free.size(); ++k) {
       sets *= static_cast<double>(lamps_ - k) / static_cast<double>(k + 1);
     }
-    const double limit =
-        fit_map_errors(free, added_m2).chi_squared + compute_displacement_bound(free.size(), sets);
+    const double limit = fit_map_errors(free, added_m2).chi_squared +
+                         compute_chi_squared_drop_bound(free.size(), sets);
     return std::all_of(free.begin(), free.end(), [&](std::size_t lamp) {
       std::vector<std::size_t> other = free;
       std::erase(other, lamp);
@@ -390,7 +390,7 @@ std::optional<MapError> find_swapped_lamps(const MapCaptures& captures, const La
   const double added_m2 = test.compute_added_variance_m2({});
   const auto count = static_cast<double>(map.lamps.size());
   const double limit = test.fit_map_errors({}, added_m2).chi_squared +
-                       test.compute_displacement_bound(0, 1 + count * (count - 1) / 2);
+                       test.compute_chi_squared_drop_bound(0, 1 + count * (count - 1) / 2);
   const auto is_worse = [&](const std::optional<LampDisplacements>& other) {
     return !other || DisplacementTest(*other, map).fit_map_errors({}, added_m2).chi_squared > limit;
   };

@@ -112,8 +112,8 @@ void reject_gross_outliers(Trace& trace, double focal_px, std::vector<RotationOu
 
 /// Rejects the point that is farthest from the circle if the circle through the other points
 /// contradicts it (Student's t of the deleted residual). Returns true if a point was rejected.
-bool reject_worst_trace(Trace& trace, const Circle& circle, double focal_px,
-                        std::vector<RotationOutlier>& outliers) {
+bool reject_worst_point_of_trace(Trace& trace, const Circle& circle, double focal_px,
+                                 std::vector<RotationOutlier>& outliers) {
   constexpr double rounding = 1e-9;
   const std::vector<double> off = compute_distances(circle, trace.points);
   const auto worst =
@@ -127,7 +127,7 @@ bool reject_worst_trace(Trace& trace, const Circle& circle, double focal_px,
   const double variance =
       std::max(fit->rms * fit->rms * count / freedom, rounding * rounding) * (1 + 3 / count);
   const double distance = compute_distances(fit->circle, {trace.points[worst]}).front();
-  if (distance * distance <= compute_t_squared_bound(kOutlierSigmas, freedom) * variance)
+  if (distance * distance <= compute_squared_student_t_bound(kOutlierSigmas, freedom) * variance)
     return false;
   reject(trace, worst, distance * focal_px, outliers);
   return true;
@@ -140,7 +140,7 @@ std::optional<CircleFit> fit_trimmed_circle(Trace& trace, double focal_px,
   if (trace.points.size() >= kMinPointsToTest) reject_gross_outliers(trace, focal_px, outliers);
   auto fit = fit_circle(trace.points);
   while (fit && trace.points.size() >= kMinPointsToTest &&
-         reject_worst_trace(trace, fit->circle, focal_px, outliers)) {
+         reject_worst_point_of_trace(trace, fit->circle, focal_px, outliers)) {
     fit = fit_circle(trace.points);
   }
   return fit;
@@ -155,7 +155,8 @@ std::optional<CircleFit> fit_trimmed_circle(Trace& trace, double focal_px,
 /// smallest eigenvalue of M contains only noise.
 ///
 /// @param noise  standard deviation of a coordinate, in the unit of the points
-bool is_determined(const Circle& circle, const std::vector<Eigen::Vector2d>& points, double noise) {
+bool is_circle_center_determined(const Circle& circle, const std::vector<Eigen::Vector2d>& points,
+                                 double noise) {
   // A standard deviation from M is then about 1 / sqrt(1 - 0.25) = 1.15 times too small.
   constexpr double max_noise_fraction = 0.25;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
@@ -250,7 +251,7 @@ CircleCenters fit_and_average_lamp_circle_centers(const RotationCaptures& rotati
     for (std::size_t i = 0; i < height.circles.size() && noise; ++i) {
       const LampCircle& circle = height.circles[i];
       const Trace& trace = height.traces[i];
-      if (!is_determined(circle.fit.circle, trace.points, *noise)) continue;
+      if (!is_circle_center_determined(circle.fit.circle, trace.points, *noise)) continue;
       determined.push_back(circle);
       observations.insert(observations.end(), trace.observations.begin(), trace.observations.end());
     }

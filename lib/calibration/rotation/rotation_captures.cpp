@@ -186,7 +186,7 @@ class RotationSearch {
     }
     if (median_residual_m() > 0.05 * compute_median_pivot_height(fixes_, 0))
       return RotationStatus::axis_moved;
-    reject_corner_outliers();
+    reject_fix_outliers();
     locate(PositionerOptions().max_residual_share);
     cluster_fixes_by_height(fixes_, height_noise_m_);
     return fit_rotation_to_fixes(false);
@@ -280,7 +280,7 @@ class RotationSearch {
     return model_fit_.delta.norm() < tolerance_rad;
   }
 
-  void reject_corner_outliers() {
+  void reject_fix_outliers() {
     const double max_residual_m =
         std::max(8 * median_residual_m(), 0.01 * compute_median_pivot_height(fixes_, 0));
     for (std::size_t i = 0; i < fixes_.fixes.size(); ++i) {

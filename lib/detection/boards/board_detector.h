@@ -27,7 +27,7 @@ class SquareCorners;
 struct EdgeCurvature {
   double quadratic_px = 0, cubic_px = 0, reach = 0;
 
-  double curve_displacement_px(double w) const {
+  double curve_offset_from_straight_line_px(double w) const {
     return (w * w - 1) * (quadratic_px + cubic_px * w);
   }
   bool operator==(const EdgeCurvature&) const = default;
@@ -82,7 +82,7 @@ struct TagDetection {
 struct PointDetection {
   /// Index of the point on the board. Boards of squares: row by row from the top left, as OpenCV
   /// counts the corners of a ChArUco board. Boards of AprilTags, whose points come from a file: as
-  /// BoardLattice::point_detection_index().
+  /// BoardLattice::point_index_on_board().
   std::size_t index;
   Eigen::Vector2d pixel;
   /// Factor by which a solve multiplies the residual of the point.
@@ -143,7 +143,7 @@ void load_tag_family_decoder(const std::string& name);
 ///
 /// AprilTags with corner squares, which touch each other, are detected by OpenCV's ArUco module.
 /// Missing tags are then predicted from their neighbors. Corners are the intersections of the
-/// squares' edges (fit_edge_crossing()).
+/// squares' edges (fit_edge_intersection_at_corner()).
 class BoardDetector {
  public:
   /// Creates the detector of a board.

@@ -47,9 +47,8 @@ std::optional<Eigen::Vector2d> find_saddle_point(const cv::Mat1f& smoothed,
 ///   light   gradient of the illumination (vignetting), which would bias a fit without it
 /// On rendered boards the corner is accurate to 0.01 px, a sixth of the error of
 /// find_saddle_point().
-std::optional<Eigen::Vector2d> fit_edge_crossing(const cv::Mat1b& image,
-                                                 const Eigen::Vector2d& guess_px,
-                                                 const std::array<Eigen::Vector2d, 2>& along,
-                                                 double radius_px);
+std::optional<Eigen::Vector2d> fit_edge_intersection_at_corner(
+    const cv::Mat1b& image, const Eigen::Vector2d& guess_px,
+    const std::array<Eigen::Vector2d, 2>& along, double radius_px);
 
 }  // namespace vlp

@@ -68,8 +68,8 @@ EdgeField::Row EdgeField::model_terms_at_edge(const Eigen::Vector2d& at_px,
   return row;
 }
 
-double EdgeField::predict_edge_property(const Eigen::Vector2d& at_px,
-                                        const Eigen::Vector2d& along) const {
+double EdgeField::evaluate_field_at_edge(const Eigen::Vector2d& at_px,
+                                         const Eigen::Vector2d& along) const {
   return std::exp(model_terms_at_edge(at_px, along).dot(coefficients_));
 }
 

@@ -30,10 +30,10 @@ class EdgeField {
   /// @pre There is at least one sample.
   EdgeField(std::span<const EdgeSample> samples, Terms terms);
 
-  double predict_edge_property(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
+  double evaluate_field_at_edge(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
   /// Relative standard deviation of the edges from the model that exceeds their own standard
   /// deviations.
-  double unexplained_edge_sd() const { return excess_sd_; }
+  double excess_relative_sd_of_edges() const { return excess_sd_; }
 
  private:
   static constexpr Eigen::Index kMaxTerms = 8;

@@ -181,7 +181,7 @@ struct EdgeSides {
     constexpr double white = 254;
     double ins = 0, outs = 0, whites_in = 0, whites_out = 0;
     for (const EdgePixel& pixel : pixels) {
-      const bool inside = pixel.across_px < edge.curve_displacement_px(pixel.along);
+      const bool inside = pixel.across_px < edge.curve_offset_from_straight_line_px(pixel.along);
       (inside ? in : out) += convert_level_to_light(pixel.level, gamma);
       (inside ? ins : outs) += 1;
       if (pixel.level >= white) (inside ? whites_in : whites_out) += 1;

@@ -33,13 +33,14 @@ struct EdgeCurve {
   bool cubic = false;
   double blur_px = 0.8;
 
-  double curve_displacement_px(double w) const {
+  double curve_offset_from_straight_line_px(double w) const {
     const Coefficients& c = coefficients;
     return c[0] + w * (c[1] + w * (c[2] + w * c[3]));
   }
   /// Returns the distance of a point from the curve in px along v, positive outwards.
   double distance_from_curve_px(const Eigen::Vector2d& x) const {
-    return across.dot(x - middle) - curve_displacement_px(along.dot(x - middle) / half_length_px);
+    return across.dot(x - middle) -
+           curve_offset_from_straight_line_px(along.dot(x - middle) / half_length_px);
   }
   /// Returns the gradient of distance_from_curve_px() with respect to the pixel (u, v);
   /// dimensionless.

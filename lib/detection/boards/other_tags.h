@@ -13,6 +13,6 @@ namespace vlp {
 /// another family or border width, or markers of another dictionary. Takes about a second per
 /// image.
 /// @return the pattern in one line for a message; empty if none is detected, and for chessboards
-std::string describe_tags_of_other_kinds(const Board& board, const cv::Mat& image);
+std::string find_and_describe_tags_of_other_kinds(const Board& board, const cv::Mat& image);
 
 }  // namespace vlp

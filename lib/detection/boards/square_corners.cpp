@@ -67,9 +67,9 @@ std::vector<PointDetection> SquareCorners::refine_corner_guesses(const std::vect
     const auto saddle = find_saddle_point(image.smoothed, pixel, reach_px, radius_px);
     if (!saddle) continue;
     const double fit_px = std::clamp(free_px * fit_fraction, min_fit_px, max_fit_px);
-    const Eigen::Vector2d at =
-        fit_edge_crossing(image.sharp, *saddle, {next[0] - pixel, next[1] - pixel}, fit_px)
-            .value_or(*saddle);
+    const Eigen::Vector2d at = fit_edge_intersection_at_corner(
+                                   image.sharp, *saddle, {next[0] - pixel, next[1] - pixel}, fit_px)
+                                   .value_or(*saddle);
     if (at.x() < edge_px || at.y() < edge_px || at.x() >= image.sharp.cols - edge_px ||
         at.y() >= image.sharp.rows - edge_px) {
       continue;
@@ -203,7 +203,7 @@ std::optional<TagDetection> TouchingTags::refine_tag_corners(TagDetection tag,
   const double fit_px = std::clamp(free_px * fit_fraction, min_fit_px, max_fit_px);
   const auto saddles = tag.corners_px;
   for (std::size_t k = 0; k < 4; ++k) {
-    const auto found = fit_edge_crossing(
+    const auto found = fit_edge_intersection_at_corner(
         image.sharp, saddles[k],
         {saddles[(k + 1) % 4] - saddles[k], saddles[(k + 3) % 4] - saddles[k]}, fit_px);
     if (found) tag.corners_px[k] = *found;

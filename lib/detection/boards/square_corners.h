@@ -16,8 +16,8 @@
 namespace vlp {
 
 /// Detector of the corners where the squares of a chessboard or of a ChArUco board touch. Corners
-/// are the intersections of the edges (fit_edge_crossing()), or the saddle points if their fit
-/// fails. Safe to share between threads.
+/// are the intersections of the edges (fit_edge_intersection_at_corner()), or the saddle points if
+/// their fit fails. Safe to share between threads.
 class SquareCorners {
  public:
   explicit SquareCorners(const Board& board);

@@ -70,7 +70,7 @@ std::vector<EdgePixel> collect_pixels_near_edge(const cv::Mat1b& image,
       const Eigen::Vector2d at(column, row);
       const double w = edge.along.dot(at - edge.middle) / edge.half_length_px;
       const double v = edge.across.dot(at - edge.middle),
-                   offset_px = v - edge.curve_displacement_px(w);
+                   offset_px = v - edge.curve_offset_from_straight_line_px(w);
       if (offset_px < -band.inside_px || offset_px > band.outside_px) continue;
       if (next.distance_from_curve_px(at) > -free_px ||
           previous.distance_from_curve_px(at) > -free_px)
@@ -135,7 +135,7 @@ EdgeCurvature compute_curvature(const EdgeCurve& edge, const Eigen::Vector2d& fr
   const auto off_px = [&](double w) {
     const double at = (begin + end + w * (end - begin)) / 2;
     const Eigen::Vector2d x = edge.middle + edge.along * (at * edge.half_length_px) +
-                              edge.across * edge.curve_displacement_px(at);
+                              edge.across * edge.curve_offset_from_straight_line_px(at);
     return across.dot(x - from);
   };
   // Half extent of evenly distributed pixels with the same mean square.
@@ -189,9 +189,10 @@ TagEdges::TagEdges(const TagDetection& tag, const cv::Mat1b& image, const TagGeo
   }
   edges_ = approximate_;
   predict_neighbor_patterns(print);
-  const double bit_px = width_px_ / print.tag_width();
-  band_ = {std::clamp(print.inner_stripe_width() * bit_px - away_px, min_px, max_px),
-           std::clamp(print.outer_stripe_width() * bit_px - away_px, min_px, max_px)};
+  const double bit_px = width_px_ / print.width_of_tag_with_border_bits();
+  band_ = {
+      std::clamp(print.stripe_width_inside_tag_edge_bits() * bit_px - away_px, min_px, max_px),
+      std::clamp(print.stripe_width_outside_tag_edge_bits() * bit_px - away_px, min_px, max_px)};
   const auto fit_without_curve = [&] {
     collect_all_pixels(image, kRoughBlur_px);
     fit([](const EdgeCurve&) { return EdgePrior(); });
@@ -211,9 +212,10 @@ TagEdges::TagEdges(const TagDetection& tag, const cv::Mat1b& image, const TagGeo
 }
 
 void TagEdges::predict_neighbor_patterns(const TagGeometry& print) {
-  const double width = print.tag_width(), deep = print.inner_stripe_width();
+  const double width = print.width_of_tag_with_border_bits(),
+               deep = print.stripe_width_inside_tag_edge_bits();
   const std::array<Eigen::Vector2d, 4> square{{{0, 0}, {width, 0}, {width, width}, {0, width}}};
-  const TagGeometry::Sides white = print.find_white_bit_segments(tag_.id);
+  const TagGeometry::Sides white = print.find_white_bit_segments_along_tag_edges(tag_.id);
   for (std::size_t k = 0; k < 4; ++k) {
     std::array<PlanePair, 4> pairs;
     for (std::size_t i = 0; i < 4; ++i) pairs[i] = {square[i], tag_.corners_px[(k + i) % 4]};
@@ -396,12 +398,12 @@ void EdgeModels::fit_light(const TagSelection& tags) {
 EdgePrior EdgeModels::make_prior(const EdgeCurve& edge, double gamma) const {
   EdgePrior prior{gamma};
   if (blur_) {
-    prior.blur_px = blur_->predict_edge_property(edge.middle, edge.along);
-    prior.blur_weight = noise_ / (blur_->unexplained_edge_sd() * prior.blur_px);
+    prior.blur_px = blur_->evaluate_field_at_edge(edge.middle, edge.along);
+    prior.blur_weight = noise_ / (blur_->excess_relative_sd_of_edges() * prior.blur_px);
   }
   if (light_) {
-    prior.bright_light = light_->predict_edge_property(edge.middle, edge.along);
-    prior.bright_weight = noise_ / (light_->unexplained_edge_sd() * prior.bright_light);
+    prior.bright_light = light_->evaluate_field_at_edge(edge.middle, edge.along);
+    prior.bright_weight = noise_ / (light_->excess_relative_sd_of_edges() * prior.bright_light);
   }
   return prior;
 }

@@ -74,7 +74,7 @@ TagGeometry::TagGeometry(const Board& board)
       inside_(board.border_bits),
       outside_(family_->reversed_border ? 1 : board.tag_spacing * width_) {}
 
-TagGeometry::Sides TagGeometry::find_white_bit_segments(int id) const {
+TagGeometry::Sides TagGeometry::find_white_bit_segments_along_tag_edges(int id) const {
   Sides sides;
   if (family_->reversed_border) return sides;
   const int last = static_cast<int>(width_) - 1, border = static_cast<int>(inside_);

@@ -56,13 +56,13 @@ class TagGeometry {
   explicit TagGeometry(const Board& board);
 
   /// Width of a tag with its border, in bits.
-  double tag_width() const { return width_; }
+  double width_of_tag_with_border_bits() const { return width_; }
   /// Width of the uniform stripe along an edge, inside and outside the tag, in bits.
-  double inner_stripe_width() const { return inside_; }
-  double outer_stripe_width() const { return outside_; }
+  double stripe_width_inside_tag_edge_bits() const { return inside_; }
+  double stripe_width_outside_tag_edge_bits() const { return outside_; }
   /// Returns the segments in which white bits adjoin the black stripe inside the edge. Empty for
   /// families with a white border.
-  Sides find_white_bit_segments(int id) const;
+  Sides find_white_bit_segments_along_tag_edges(int id) const;
 
  private:
   TagFamily family_;

@@ -170,7 +170,7 @@ std::optional<Light> LightShape::fit_light_to_outline(std::vector<EdgePoint> out
   const std::vector<EdgePoint>& edges = weighted.edges;
   const std::vector<bool> selected = select_points_on_circle(edges, fit->inliers);
   const double num_correlated =
-      is_mottled ? estimate_correlated_points(weighted.points, edges, selected, *fit) : 1;
+      is_mottled ? estimate_num_correlated_points(weighted.points, edges, selected, *fit) : 1;
   const auto sigma_px =
       limit_center_sd(compute_center_sd(fit->center_covariance, num_correlated) / weighted.per_px);
   if (!sigma_px) return std::nullopt;
@@ -181,15 +181,18 @@ std::optional<Light> LightShape::fit_light_to_outline(std::vector<EdgePoint> out
   }
   if (camera_.lens) {
     const Circle circle = fit->to_circle();
-    light.outline_sums = {
-        weighted.points, weighted.weights, selected, circle, compute_scanline_gradient(circle),
-        num_correlated};
+    light.outline_sums = {weighted.points,
+                          weighted.weights,
+                          selected,
+                          circle,
+                          compute_scanline_gradient_wrt_position(circle),
+                          num_correlated};
   }
   light.rise_px = compute_median_rise_px(light.outline);
   return light;
 }
 
-Eigen::Vector2d LightShape::compute_scanline_gradient(const Circle& circle) const {
+Eigen::Vector2d LightShape::compute_scanline_gradient_wrt_position(const Circle& circle) const {
   const auto line = [&](double x, double y) {
     const auto pixel =
         pixel_from_level_plane_point(circle.center + circle.radius / 2 * Eigen::Vector2d(x, y));
@@ -199,7 +202,7 @@ Eigen::Vector2d LightShape::compute_scanline_gradient(const Circle& circle) cons
   return Eigen::Vector2d(line(1, 0) - line(-1, 0), line(0, 1) - line(0, -1)) / circle.radius;
 }
 
-Eigen::Vector2d LightShape::compute_readout_center_offset(
+Eigen::Vector2d LightShape::compute_center_offset_from_curved_scanlines(
     const Circle& circle, const Eigen::Vector2d& motion_per_line) const {
   constexpr int directions = 16;
   const auto center = pixel_from_level_plane_point(circle.center);
@@ -221,9 +224,9 @@ void LightShape::correct_light_for_motion(const Oval& oval, const Eigen::Vector2
   const auto estimate = light.outline_sums.solve_outline_with_oval_prior(oval);
   if (!estimate) return;
   const Circle& circle = light.outline_sums.fitted_circle();
-  const auto pixel =
-      pixel_from_level_plane_point(circle.center + circle.radius * estimate->p.head<2>() -
-                                   compute_readout_center_offset(circle, motion_per_line));
+  const auto pixel = pixel_from_level_plane_point(
+      circle.center + circle.radius * estimate->p.head<2>() -
+      compute_center_offset_from_curved_scanlines(circle, motion_per_line));
   if (!pixel) return;
   light.pixel = *pixel;
   const double sigma_px =
@@ -231,7 +234,7 @@ void LightShape::correct_light_for_motion(const Oval& oval, const Eigen::Vector2
   light.sigma_px = std::clamp(sigma_px, kMinSigma_px, kMaxSigma_px);
 }
 
-std::vector<EdgePoint> LightShape::find_outline_points_outside(
+std::vector<EdgePoint> LightShape::find_outline_points_outside_light(
     const Light& light, const std::vector<EdgePoint>& outline) const {
   // Uses the axis-aligned ellipse in the box, although the ellipse of the light may be rotated.
   constexpr double clear = 1.1, clear_px = 1.5;

@@ -57,8 +57,8 @@ class LightShape {
                                 Light& light) const;
 
   /// Returns the outline points outside a light, beyond a margin of 10 % and 1.5 px.
-  std::vector<EdgePoint> find_outline_points_outside(const Light& light,
-                                                     const std::vector<EdgePoint>& outline) const;
+  std::vector<EdgePoint> find_outline_points_outside_light(
+      const Light& light, const std::vector<EdgePoint>& outline) const;
 
   /// Converts (u, v) of the image to (column, line), and back.
   Eigen::Vector2d swap_image_and_scanline_axes(const Eigen::Vector2d& at) const;
@@ -75,15 +75,15 @@ class LightShape {
  private:
   /// Returns the derivative of the scanline at which a point near the circle is read with respect
   /// to its x, y.
-  Eigen::Vector2d compute_scanline_gradient(const Circle& circle) const;
+  Eigen::Vector2d compute_scanline_gradient_wrt_position(const Circle& circle) const;
 
   /// Returns the center error of a circle's outline that lens distortion of the scanlines causes:
   /// on average the outline is read later, or earlier, than the center. The outline in direction a
   /// is displaced by m (l(a) - l). m is the motion per scanline, l(a) the scanline of the outline,
   /// and l that of the center. The error is the component along a that varies as cos a and sin a.
   /// Partly visible outlines are treated as complete ones.
-  Eigen::Vector2d compute_readout_center_offset(const Circle& circle,
-                                                const Eigen::Vector2d& motion_per_line) const;
+  Eigen::Vector2d compute_center_offset_from_curved_scanlines(
+      const Circle& circle, const Eigen::Vector2d& motion_per_line) const;
 
   DetectorCamera camera_;
 };

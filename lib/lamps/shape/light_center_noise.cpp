@@ -25,13 +25,13 @@ std::optional<double> limit_center_sd(double sigma_px) {
   return std::max(kMinSigma_px, sigma_px);
 }
 
-void add_center_error(double sd_px, Light& light) {
+void add_error_to_center_sigma(double sd_px, Light& light) {
   light.sigma_px = std::min(std::hypot(light.sigma_px, sd_px), kMaxSigma_px);
 }
 
-double estimate_correlated_points(const std::vector<Eigen::Vector2d>& points,
-                                  const std::vector<EdgePoint>& outline,
-                                  const std::vector<bool>& counted, const RobustEllipse& fit) {
+double estimate_num_correlated_points(const std::vector<Eigen::Vector2d>& points,
+                                      const std::vector<EdgePoint>& outline,
+                                      const std::vector<bool>& counted, const RobustEllipse& fit) {
   constexpr double neighbors_px = 4, unknowns = 3;
   const Matrix2 circle_from_rim = fit.rim_from_circle.inverse();
   std::vector<double> errors(points.size(), 0);
@@ -53,7 +53,7 @@ double estimate_correlated_points(const std::vector<Eigen::Vector2d>& points,
   return std::max(1.0, 1 + products / squares + taken);
 }
 
-double count_points_per_stripe(const std::vector<EdgePoint>& outline) {
+double count_outline_points_per_stripe(const std::vector<EdgePoint>& outline) {
   constexpr double next = 2.5;
   std::array<double, 2> last{-1e9, -1e9};
   double stripes = 0;
@@ -65,8 +65,9 @@ double count_points_per_stripe(const std::vector<EdgePoint>& outline) {
   return double(outline.size()) / std::max(1.0, stripes);
 }
 
-std::optional<double> estimate_jackknife_sd_px(const Light& light, const Background& background,
-                                               const LightShape& shape) {
+std::optional<double> estimate_center_sd_by_jackknife_px(const Light& light,
+                                                         const Background& background,
+                                                         const LightShape& shape) {
   constexpr std::size_t pieces = 8;
   const Eigen::Vector2d center = shape.swap_image_and_scanline_axes(light.pixel);
   std::vector<EdgePoint> outline = light.outline;
@@ -93,12 +94,12 @@ std::optional<double> estimate_jackknife_sd_px(const Light& light, const Backgro
   return std::sqrt(double(pieces - 1) / double(pieces) * squares / 2);
 }
 
-void add_error_of_hidden_end(double off, double tilt_sd, Light& light) {
+void add_hidden_end_error_to_center_sigma(double off, double tilt_sd, Light& light) {
   constexpr double clear = 3;
   if (!(off > tilt_sd + clear * light.aspect_sd)) return;
   const double length_px =
       std::sqrt(std::numbers::pi * light.aspect) * light.radius_px;  // its area has that radius
-  add_center_error(off * length_px / 2 / std::numbers::sqrt2, light);
+  add_error_to_center_sigma(off * length_px / 2 / std::numbers::sqrt2, light);
 }
 
 double predict_center_sd_without_lens_px(const Light& light, const ImageSize& image) {

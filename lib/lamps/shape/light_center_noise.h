@@ -36,7 +36,7 @@ double compute_center_sd(const Matrix2& covariance, double num_correlated = 1,
 std::optional<double> limit_center_sd(double sigma_px);
 
 /// Adds an independent error of the center to Light::sigma_px, up to kMaxSigma_px.
-void add_center_error(double sd_px, Light& light);
+void add_error_to_center_sigma(double sd_px, Light& light);
 
 /// Returns the number of points with a common error. It is the sum of the products of the errors of
 /// neighboring points, including their own squares, divided by the sum of squares. For independent
@@ -46,20 +46,21 @@ void add_center_error(double sd_px, Light& light);
 /// @param points   outline in the plane of the fit
 /// @param outline  the same points in the image
 /// @param counted  points that are used
-double estimate_correlated_points(const std::vector<Eigen::Vector2d>& points,
-                                  const std::vector<EdgePoint>& outline,
-                                  const std::vector<bool>& counted, const RobustEllipse& fit);
+double estimate_num_correlated_points(const std::vector<Eigen::Vector2d>& points,
+                                      const std::vector<EdgePoint>& outline,
+                                      const std::vector<bool>& counted, const RobustEllipse& fit);
 
 /// Returns the number of points with a common error: those of a stripe, on consecutive scanlines.
-double count_points_per_stripe(const std::vector<EdgePoint>& outline);
+double count_outline_points_per_stripe(const std::vector<EdgePoint>& outline);
 
 /// Returns the standard deviation per axis of a light's center by the delete-a-group jackknife
 /// (Efron and Tibshirani 1993, section 11.5): its outline is fitted again without each of its
 /// pieces. A piece on another edge than the others moves the center by more than the scatter of its
 /// points. Outliers of the fit are excluded beforehand. Returns std::nullopt if the outline without
 /// one of the pieces has no center.
-std::optional<double> estimate_jackknife_sd_px(const Light& light, const Background& background,
-                                               const LightShape& shape);
+std::optional<double> estimate_center_sd_by_jackknife_px(const Light& light,
+                                                         const Background& background,
+                                                         const LightShape& shape);
 
 /// Adds the error of a partly hidden light to its sigma. If the aspect ratio differs from that of
 /// the lamp, an object may hide one end: the center of the visible part is offset by half of the
@@ -67,7 +68,7 @@ std::optional<double> estimate_jackknife_sd_px(const Light& light, const Backgro
 ///
 /// @param off      difference of the log aspect ratios of light and lamp
 /// @param tilt_sd  standard deviation of the log aspect ratio from an unknown tilt
-void add_error_of_hidden_end(double off, double tilt_sd, Light& light);
+void add_hidden_end_error_to_center_sigma(double off, double tilt_sd, Light& light);
 
 /// Predicts the error of a lamp's center if the lens is unknown, as a standard deviation per axis,
 /// px. The cause is that the center of an outline is not the image of the lamp's center. Returns 0

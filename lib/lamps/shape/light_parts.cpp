@@ -22,7 +22,7 @@ bool may_belong_together(const PixelBox& a, const PixelBox& b) {
 }
 
 /// Returns true if a part is not a piece of a light that an occluder splits.
-bool make_whole_light(const LightPart& part) {
+bool is_whole_light(const LightPart& part) {
   return part.light &&
          (part.light->is_glow || part.light->is_uneven || !is_light_disc_shaped(*part.light));
 }
@@ -64,7 +64,7 @@ bool do_lights_overlap(const Light& a, const Light& b) {
 }
 
 /// Removes lights that overlap one with more outline points, because they are pieces of it.
-std::vector<Light> remove_lights_inside_others(std::vector<Light> found) {
+std::vector<Light> remove_lights_overlapping_larger_ones(std::vector<Light> found) {
   std::stable_sort(found.begin(), found.end(), [](const Light& a, const Light& b) {
     return a.outline.size() > b.outline.size();
   });
@@ -87,7 +87,7 @@ std::vector<Light> join_parts_of_one_light(std::vector<LightPart>& parts, const 
   int tries = 0;
   for (std::size_t i = 0; i < parts.size() && tries < max_tries; ++i) {
     for (std::size_t j = i + 1; j < parts.size() && tries < max_tries; ++j) {
-      if (make_whole_light(parts[i]) || make_whole_light(parts[j]) ||
+      if (is_whole_light(parts[i]) || is_whole_light(parts[j]) ||
           !may_belong_together(parts[i].box, parts[j].box))
         continue;
       ++tries;
@@ -109,7 +109,7 @@ std::vector<Light> join_parts_of_one_light(std::vector<LightPart>& parts, const 
     if (part.light) found.push_back(std::move(*part.light));
   }
   std::erase_if(parts, [](const LightPart& part) { return part.light.has_value(); });
-  return remove_lights_inside_others(std::move(found));
+  return remove_lights_overlapping_larger_ones(std::move(found));
 }
 
 std::vector<Light> make_lights_without_outline(std::vector<LightPart> parts,

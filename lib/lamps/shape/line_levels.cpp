@@ -47,7 +47,7 @@ LineLevels::LineLevels(const ImageView& lines, const std::vector<PixelRun>& chor
   std::vector<double> signal;
   signal.reserve(sums.size());
   for (const ChordSums& line : sums) {
-    signal.push_back(std::max(0.0, line.mean / relative_level_at_column(line.middle)));
+    signal.push_back(std::max(0.0, line.mean / level_at_column_relative_to_middle(line.middle)));
     brightest_ = std::max(brightest_, signal.back());
   }
   if (!(brightest_ > 0)) brightest_ = 1;
@@ -68,7 +68,7 @@ std::optional<LineLevel> LineLevels::relative_scanline_level(int line) const {
   const int last = first_ + static_cast<int>(measured_.size()) - 1;
   if (line >= first_ && line <= last) return measured_[static_cast<std::size_t>(line - first_)];
   if (period_lines_ > 0) {
-    const LineLevel level = predict_scanline_level(line);
+    const LineLevel level = predict_relative_scanline_level(line);
     return level.sd < 1 ? std::optional(level) : std::nullopt;
   }
   constexpr int nearest = 6;
@@ -80,7 +80,7 @@ std::optional<LineLevel> LineLevels::relative_scanline_level(int line) const {
   return LineLevel{sum / nearest, steady_sd};
 }
 
-LineLevel LineLevels::predict_scanline_level(int line) const {
+LineLevel LineLevels::predict_relative_scanline_level(int line) const {
   constexpr int max_periods = 4;
   constexpr double lamp_sd = 0.01, alone_sd = 0.05;  // repeatability of the stripes of a lamp
   constexpr double missed = 1.5;  // interpolation error between two lines at the edge of a stripe

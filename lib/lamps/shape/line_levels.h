@@ -38,12 +38,12 @@ class LineLevels {
   /// Returns the period of the stripes; 0 for steady light.
   double stripe_period_lines() const { return period_lines_; }
   /// Returns the ratio of the level at a column to that at the middle column.
-  double relative_level_at_column(double column) const {
+  double level_at_column_relative_to_middle(double column) const {
     return std::max(0.1, 1 + slope_ * (column - middle_));
   }
 
  private:
-  LineLevel predict_scanline_level(int line) const;
+  LineLevel predict_relative_scanline_level(int line) const;
 
   int first_;
   double brightest_ = 0, middle_ = 0, slope_ = 0;

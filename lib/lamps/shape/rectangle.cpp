@@ -368,8 +368,8 @@ std::optional<Matrix2> center_covariance(const Sides& sides, const EndsCovarianc
 
 /// Returns true if the outline extends into the corners, unlike that of a disc: (2 u / length)^2 +
 /// (2 v / width)^2 is 1 on an ellipse inside the sides, and up to 2 on the sides.
-bool has_detected_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
-                          const Eigen::Vector2d& center) {
+bool does_outline_reach_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
+                                const Eigen::Vector2d& center) {
   constexpr double beyond = 1.35, min_fraction = 0.1;
   const auto off_middle = [&](const Eigen::Vector2d& at, std::size_t i) {
     const double length = (sides[i].to - sides[i].from).norm();
@@ -396,7 +396,7 @@ std::optional<Light> fit_light(std::array<StraightEdge, 4>& edges, double per_px
   const auto corners = find_corners(sides);
   if (!corners || !is_rectangular(sides)) return std::nullopt;
   const auto center = find_center(sides);
-  if (!center || !has_detected_corners(points, sides, *center)) return std::nullopt;
+  if (!center || !does_outline_reach_corners(points, sides, *center)) return std::nullopt;
   const auto covariance = center_covariance(sides, ends, per_px, shape);
   sides = make_sides(*corners);
   auto pixel = shape.pixel_from_level_plane_point(*center);

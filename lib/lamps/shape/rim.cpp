@@ -447,8 +447,9 @@ std::optional<Rim> fit_rim_of_light(const ImageView& image, const Blob& blob,
   if (fitted) {
     light = std::move(fitted);
   } else {
-    const double scatter_px = light->sigma_px * std::sqrt(count_points_per_stripe(light->outline));
-    const auto jackknife_px = estimate_jackknife_sd_px(*light, background, shape);
+    const double scatter_px =
+        light->sigma_px * std::sqrt(count_outline_points_per_stripe(light->outline));
+    const auto jackknife_px = estimate_center_sd_by_jackknife_px(*light, background, shape);
     light->sigma_px = std::max(scatter_px, jackknife_px.value_or(0));
     is_clear = jackknife_px.has_value();
   }

@@ -150,7 +150,7 @@ class CrossedOutline {
     return Eigen::Vector2d(at.per_column, per_line).normalized();
   }
 
-  std::optional<Crossing> find_level_crossing(int line, bool begins) const {
+  std::optional<Crossing> find_outline_crossing(int line, bool begins) const {
     constexpr double flattest = 0.3;
     const Eigen::Vector2d center = (low_ + high_) / 2, half = (high_ - low_) / 2;
     const double up = (line - center.y()) / half.y();
@@ -187,7 +187,7 @@ Piece sample_outline_piece(const Levels& levels, const std::vector<int>& lines, 
   Piece piece;
   const int middle_line = lines[lines.size() / 2];
   for (const int line : lines) {
-    const auto crossing = outline.find_level_crossing(line, begins);
+    const auto crossing = outline.find_outline_crossing(line, begins);
     if (!crossing) continue;
     piece.crossings.push_back(*crossing);
     const int middle = static_cast<int>(std::lround(crossing->column));

@@ -15,7 +15,8 @@ constexpr double kModelDeviation = 0.15;
 
 /// Returns the derivative of the oval with respect to the motion (v, w) / 2.
 Eigen::Matrix<double, 2, 3> compute_d_oval_d_motion(const OutlineSums& light) {
-  const Eigen::Vector2d &slope = light.scanline_gradient(), &at = light.fitted_circle().center;
+  const Eigen::Vector2d &slope = light.scanline_gradient_wrt_position(),
+                        &at = light.fitted_circle().center;
   const Eigen::Matrix2d times_slope{{slope.x(), -slope.y()}, {slope.y(), slope.x()}};
   Eigen::Matrix<double, 2, 3> result;
   result << times_slope, times_slope * Eigen::Vector2d(-at.y(), at.x());

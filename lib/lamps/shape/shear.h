@@ -52,7 +52,7 @@ class OutlineSums {
 
   bool empty() const { return count_ == 0; }
   const Circle& fitted_circle() const { return circle_; }
-  const Eigen::Vector2d& scanline_gradient() const { return line_slope_; }
+  const Eigen::Vector2d& scanline_gradient_wrt_position() const { return line_slope_; }
 
  private:
   Circle circle_{Eigen::Vector2d::Zero(), 1};

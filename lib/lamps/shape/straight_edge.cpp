@@ -151,7 +151,7 @@ class Samples {
       const auto lit = image_.levels.relative_scanline_level(row);
       if (!lit) continue;
       const Eigen::Vector2d away = *here + plane_from_pixel * (pixel - middle) - side_.from;
-      const double fraction = image_.levels.relative_level_at_column(column);
+      const double fraction = image_.levels.level_at_column_relative_to_middle(column);
       samples.push_back({row,
                          {fraction * lit->level, fraction * lit->sd},
                          (image_.lines.gray_level_at_pixel(column, row) - image_.dark) /

@@ -35,10 +35,10 @@ void standardize_classes(std::span<const LabeledLight> lights, LampClassifier& c
   classifier.scale.setZero();
   const auto n = static_cast<double>(lights.size());
   for (const LabeledLight& light : lights)
-    classifier.mean += compute_classifier_features(light.stripes) / n;
+    classifier.mean += compute_stripe_features_for_classifier(light.stripes) / n;
   for (const LabeledLight& light : lights) {
     classifier.scale +=
-        (compute_classifier_features(light.stripes) - classifier.mean).cwiseAbs2() / n;
+        (compute_stripe_features_for_classifier(light.stripes) - classifier.mean).cwiseAbs2() / n;
   }
   constexpr double minimum = 1e-6;  // for a constant feature
   classifier.scale = classifier.scale.cwiseSqrt().cwiseMax(minimum);
@@ -53,7 +53,8 @@ void fit(std::span<const LabeledLight> lights, const std::vector<bool>& used,
     auto& lamp = lamps.try_emplace(lights[i].lamp, none).first->second;
     if (!used[i]) continue;
     ++lamp.examples;
-    lamp.center += standardize_features(classifier, compute_classifier_features(lights[i].stripes));
+    lamp.center +=
+        standardize_features(classifier, compute_stripe_features_for_classifier(lights[i].stripes));
   }
   for (auto& [id, lamp] : lamps) lamp.center /= std::max(1, lamp.examples);
   classifier.covariance.setZero();
@@ -61,7 +62,8 @@ void fit(std::span<const LabeledLight> lights, const std::vector<bool>& used,
   for (std::size_t i = 0; i < lights.size(); ++i) {
     if (!used[i]) continue;
     const LampFeatures off =
-        standardize_features(classifier, compute_classifier_features(lights[i].stripes)) -
+        standardize_features(classifier,
+                             compute_stripe_features_for_classifier(lights[i].stripes)) -
         lamps.at(lights[i].lamp).center;
     classifier.covariance += off * off.transpose();
     ++count;
@@ -79,7 +81,7 @@ void fit(std::span<const LabeledLight> lights, const std::vector<bool>& used,
 
 }  // namespace
 
-LampFeatures compute_classifier_features(const Stripes& stripes) {
+LampFeatures compute_stripe_features_for_classifier(const Stripes& stripes) {
   assert(stripes.period_lines > 0);
   return {std::log(stripes.period_lines), stripes.duty, stripes.count_per_line, stripes.lit_area};
 }
@@ -95,7 +97,8 @@ LampClassifier fit_lamp_classifier(std::span<const LabeledLight> lights) {
     for (const auto& lamp : classifier.lamps) centers[lamp.lamp] = lamp.center;
     for (std::size_t i = 0; i < lights.size(); ++i) {
       const LampFeatures off =
-          standardize_features(classifier, compute_classifier_features(lights[i].stripes)) -
+          standardize_features(classifier,
+                               compute_stripe_features_for_classifier(lights[i].stripes)) -
           centers.at(lights[i].lamp);
       constexpr double trimmed = 9;  // stricter than in use: outliers widen the covariance
       used[i] = compute_distance_squared(classifier.covariance, off) < trimmed;
@@ -107,7 +110,8 @@ LampClassifier fit_lamp_classifier(std::span<const LabeledLight> lights) {
 std::optional<int> identify_lamp_by_classifier(const LampClassifier& classifier,
                                                const Stripes& stripes) {
   constexpr double min_probability = 0.99, farthest = 6, farthest_unclear = 3;
-  const LampFeatures z = standardize_features(classifier, compute_classifier_features(stripes));
+  const LampFeatures z =
+      standardize_features(classifier, compute_stripe_features_for_classifier(stripes));
   const Eigen::LLT<Eigen::Matrix4d> factor(classifier.covariance);
   if (!are_stripes_readable(stripes)) return std::nullopt;
   double nearest = std::pow(are_stripes_reliable(stripes) ? farthest : farthest_unclear, 2);

@@ -32,7 +32,7 @@ inline constexpr std::array<std::string_view, 4> kLampFeatures{"log_period_lines
                                                                "count_per_line", "lit_area"};
 
 /// Returns the features of a light's stripes. @pre The stripes have a period.
-LampFeatures compute_classifier_features(const Stripes& stripes);
+LampFeatures compute_stripe_features_for_classifier(const Stripes& stripes);
 
 /// Training example: stripes of a light and the id of its lamp.
 struct LabeledLight {
@@ -105,12 +105,12 @@ struct ConfusionMatrix {
   /// Number of lights by lamp (row) and by result (column); the last column is "unknown".
   Eigen::MatrixXi counts;
 
-  int count_correctly_identified() const { return counts.diagonal().sum(); }
+  int count_correctly_identified_lights() const { return counts.diagonal().sum(); }
   /// Returns the number of lights that are identified as another lamp.
-  int count_wrongly_identified() const {
-    return counts.sum() - count_correctly_identified() - count_unidentified();
+  int count_wrongly_identified_lights() const {
+    return counts.sum() - count_correctly_identified_lights() - count_unidentified_lights();
   }
-  int count_unidentified() const { return counts.rightCols<1>().sum(); }
+  int count_unidentified_lights() const { return counts.rightCols<1>().sum(); }
 };
 
 /// Number of folds of the cross-validation.

@@ -55,7 +55,7 @@ bool are_lamps_indistinguishable(const Lamp& a, const Lamp& b) {
          have_similar_duties(a, b);
 }
 
-std::string explain_why_room_is_needed(const LampMapFile& lamps, const std::string& argument) {
+std::string explain_why_room_must_be_chosen(const LampMapFile& lamps, const std::string& argument) {
   const auto& [file, map, rooms] = lamps;
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     for (std::size_t j = i + 1; j < map.lamps.size(); ++j) {

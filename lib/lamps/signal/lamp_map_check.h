@@ -54,7 +54,7 @@ bool are_lamps_indistinguishable(const Lamp& a, const Lamp& b);
 ///
 /// @param argument  where the room is chosen, such as "the argument room of vlp_open_room()"
 /// @return          the message with the names of the rooms; empty if no room is needed
-std::string explain_why_room_is_needed(const LampMapFile& lamps, const std::string& argument);
+std::string explain_why_room_must_be_chosen(const LampMapFile& lamps, const std::string& argument);
 
 /// Two lamps that cannot be distinguished reliably.
 struct AmbiguousLamps {

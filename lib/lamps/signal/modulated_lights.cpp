@@ -65,7 +65,8 @@ LineProfile compute_profile(const CellLevels& cells, const ModulationMap& map,
   for (const auto& [step, begin, end] : region.spans) {
     for (int x = begin; x < end; x += kCellWidth_px) {
       const int cell = (x - cells.box.x) / kCellWidth_px;
-      weights[std::size_t(cell - first_cell)] += map.amplitude[map.cell_index(step, cell)];
+      weights[std::size_t(cell - first_cell)] +=
+          map.amplitude[map.modulation_cell_index(step, cell)];
     }
   }
   const auto bin_at = [&](double line) {
@@ -77,7 +78,7 @@ LineProfile compute_profile(const CellLevels& cells, const ModulationMap& map,
   LineProfile profile{
       cells.box.y + (begin + 0.5) * cells.lines_per_bin - 0.5, cells.lines_per_bin, {}};
   for (int bin = begin; bin < end; ++bin) {
-    const float* row = cells.bin_levels(bin) + first_cell;
+    const float* row = cells.cell_levels_of_bin(bin) + first_cell;
     double sum = 0;
     for (std::size_t c = 0; c < weights.size(); ++c) sum += double(weights[c]) * double(row[c]);
     profile.levels.push_back(std::max(0.0, sum));
@@ -152,7 +153,8 @@ double compute_phase_coherence(const CellLevels& cells, const ModulationMap& map
   std::complex<double> sum;
   double amplitudes = 0;
   for (const auto& [step, begin, end] : region.spans) {
-    const double middle = (map.scanline_of_step(step) + 0.5 - cells.box.y) / cells.lines_per_bin;
+    const double middle =
+        (map.middle_scanline_of_step(step) + 0.5 - cells.box.y) / cells.lines_per_bin;
     const int first = std::max(0, static_cast<int>(std::ceil(middle - period)));
     const int last = std::min(cells.bins, static_cast<int>(std::floor(middle + period)));
     for (int x = begin; x < end; x += kCellWidth_px) {
@@ -160,7 +162,7 @@ double compute_phase_coherence(const CellLevels& cells, const ModulationMap& map
       std::complex<double> z;
       for (int bin = first; bin < last; ++bin) {
         const double weight = std::max(0.0, period - std::abs(bin + 0.5 - middle));
-        z += std::polar(weight * double(cells.bin_levels(bin)[cell]),
+        z += std::polar(weight * double(cells.cell_levels_of_bin(bin)[cell]),
                         -2 * std::numbers::pi * (bin + 0.5) / period);
       }
       sum += z;
@@ -231,9 +233,10 @@ template <std::size_t n>
 void add_region_area(const ModulationMap& map, const ModulatedRegion& region, double peak,
                      const std::array<double, n>& fractions, std::array<LitArea, n>& areas) {
   for (const auto& [step, begin, end] : region.spans) {
-    const double line = map.scanline_of_step(step);
+    const double line = map.middle_scanline_of_step(step);
     for (int x = begin; x < end; x += kCellWidth_px) {
-      const double amplitude = map.amplitude[map.cell_index(step, (x - map.box.x) / kCellWidth_px)];
+      const double amplitude =
+          map.amplitude[map.modulation_cell_index(step, (x - map.box.x) / kCellWidth_px)];
       for (std::size_t i = 0; i < n; ++i) {
         if (amplitude < fractions[i] * peak) continue;
         areas[i].sum += Eigen::Vector2d(x + (kCellWidth_px - 1) / 2.0, line);

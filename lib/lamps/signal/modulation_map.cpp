@@ -111,7 +111,7 @@ class Watershed {
     bool beside_border = false;
     for (int v = std::max(0, y - 1); v <= std::min(map_.steps - 1, y + 1); ++v) {
       for (int u = std::max(0, x - 1); u <= std::min(map_.cells - 1, x + 1); ++u) {
-        const int label = labels_[map_.cell_index(v, u)];
+        const int label = labels_[map_.modulation_cell_index(v, u)];
         beside_border = beside_border || label == kBorder;
         if (label < 0) continue;
         const int other = find_root(label);
@@ -179,7 +179,7 @@ ModulationMap compute_modulation_map(const CellLevels& cells,
                     kBinsPerStep * cells.lines_per_bin,
                     {},
                     {}};
-  map.amplitude.assign(map.cell_index(map.steps, 0), 0);
+  map.amplitude.assign(map.modulation_cell_index(map.steps, 0), 0);
   map.mean.assign(map.amplitude.size(), 0);
   const Eigen::ArrayXf bins = Eigen::ArrayXf::LinSpaced(cells.bins, 0, float(cells.bins - 1));
   for (const double period_lines : periods_lines) {
@@ -191,7 +191,7 @@ ModulationMap compute_modulation_map(const CellLevels& cells,
     for (int step = 0; step < map.steps; ++step) {
       const int bin = std::min(step * kBinsPerStep + kBinsPerStep / 2, cells.bins - 1);
       for (int cell = 0; cell < map.cells; ++cell) {
-        const std::size_t k = map.cell_index(step, cell);
+        const std::size_t k = map.modulation_cell_index(step, cell);
         const float amplitude = 2 * std::hypot(real(bin, cell), imaginary(bin, cell));
         if (amplitude <= map.amplitude[k]) continue;
         map.amplitude[k] = amplitude;
@@ -227,7 +227,7 @@ std::vector<ModulatedRegion> find_modulated_regions(const ModulationMap& map,
   std::vector<ModulatedRegion> regions;
   for (int step = 0; step < map.steps; ++step) {
     for (int cell = 0; cell < map.cells; ++cell) {
-      const int basin = watershed.find_basin_of_cell(map.cell_index(step, cell));
+      const int basin = watershed.find_basin_of_cell(map.modulation_cell_index(step, cell));
       if (basin < 0) continue;
       int& region = region_indices[std::size_t(basin)];
       if (region < 0) {

@@ -23,7 +23,9 @@ struct CellLevels {
   /// Mean level of each cell above the dark level, in gray levels, by bin and cell.
   std::vector<float> levels;
 
-  const float* bin_levels(int bin) const { return levels.data() + std::ptrdiff_t(bin) * cells; }
+  const float* cell_levels_of_bin(int bin) const {
+    return levels.data() + std::ptrdiff_t(bin) * cells;
+  }
 };
 
 /// Averages the pixels of `box` over cells. Subtracts `dark_level`; darker cells are 0.
@@ -39,8 +41,10 @@ struct ModulationMap {
   std::vector<float> amplitude, mean;
 
   /// Returns the middle of a step's bin, as a scanline of the image.
-  double scanline_of_step(int step) const { return box.y + (step + 0.75) * lines_per_step - 0.5; }
-  std::size_t cell_index(int step, int cell) const {
+  double middle_scanline_of_step(int step) const {
+    return box.y + (step + 0.75) * lines_per_step - 0.5;
+  }
+  std::size_t modulation_cell_index(int step, int cell) const {
     return std::size_t(step) * std::size_t(cells) + std::size_t(cell);
   }
 };

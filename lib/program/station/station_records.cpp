@@ -84,7 +84,7 @@ RunFilter make_filter_of_options(const StationRecordsOptions& options, const Kno
 }
 
 /// Returns the named run, or the last that the filter accepts.
-RunRecord load_run_of_archive_session(KnownRuns& known, const StationRecordsOptions& options) {
+RunRecord load_selected_run(KnownRuns& known, const StationRecordsOptions& options) {
   RunRecord run = options.run.empty() ? known.find_last_run(make_filter_of_options(options, known))
                                       : known.find_run_by_id(options.run);
   warn_if_unavailable(known);
@@ -260,7 +260,7 @@ void print_station_run_list(const StationRecordsOptions& options) {
 
 void print_station_run_details(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
-  const RunRecord record = load_run_of_archive_session(*known, options);
+  const RunRecord record = load_selected_run(*known, options);
   for (const ScreenLine& line : make_verdict_screen(record)) print_line(line.text);
   fmt::print("\nmetrics without a gate\n");
   for (const CheckedMetric& metric : record.metrics) {
@@ -282,7 +282,7 @@ void print_station_run_details(const StationRecordsOptions& options) {
 void restore_run_files(const StationRecordsOptions& options) {
   const std::filesystem::path results = find_results_folder(options);
   const auto known = open_runs(options);
-  const RunRecord record = load_run_of_archive_session(*known, options);
+  const RunRecord record = load_selected_run(*known, options);
   const std::string no_verdict = describe_why_verdict_is_void_or_edited(record);
   if (!no_verdict.empty()) throw InputError(record.run, no_verdict);
   print_line(publish_run_files(record, {}, results, ExistingReport::replace).string());
@@ -291,7 +291,7 @@ void restore_run_files(const StationRecordsOptions& options) {
 void write_calibration_certificate(const StationRecordsOptions& options) {
   const std::filesystem::path results = find_results_folder(options);
   const auto known = open_runs(options);
-  const RunRecord record = load_run_of_archive_session(*known, options);
+  const RunRecord record = load_selected_run(*known, options);
   print_line(write_calibration_certificate(record, results).string());
 }
 

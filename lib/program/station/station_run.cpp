@@ -205,7 +205,7 @@ void prepare_station_run(Spool& spool, const StationConfig& config, const std::s
 void prepare_station_run(Unit& unit, Spool& spool, const StationConfig& config) {
   prepare_station_run(spool, config, unit.camera_id());
   unit.set_image_owner_lookup([&spool, camera = unit.camera_id()](const std::string& sha256) {
-    return spool.find_other_camera_using_image(sha256, camera);
+    return spool.find_run_of_other_camera_using_image(sha256, camera);
   });
   unit.invalidate_verdict(describe_golden_unit_problem(config));
 }

@@ -153,7 +153,8 @@ void print_dispersion_calibration(const DispersionFit& fit, const Eigen::Vector2
   print_circle("before", fit.before);
   print_circle("after", fit.after);
   fmt::print("offset      {:.4f} {:.4f} px", found.offset_px.x(), found.offset_px.y());
-  if (const auto covariance_px2 = compute_dispersion_offset_covariance_with_map(found, focal_px)) {
+  if (const auto covariance_px2 =
+          compute_dispersion_offset_covariance_with_map_errors(found, focal_px)) {
     fmt::print(", sd {:.4f} {:.4f} px", std::sqrt((*covariance_px2)(0, 0)),
                std::sqrt((*covariance_px2)(1, 1)));
   }

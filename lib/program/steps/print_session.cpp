@@ -14,7 +14,8 @@
 namespace vlp {
 namespace {
 
-std::optional<double> find(const SessionResult& result, const std::string& name) {
+std::optional<double> find_session_metric_value(const SessionResult& result,
+                                                const std::string& name) {
   for (const SessionStep& step : result.steps) {
     if (const auto value = find_metric_value(step.result.metrics, name)) return value;
   }
@@ -59,7 +60,8 @@ void print_session_result(const SessionResult& result, const std::string& result
       MetricRow{"missing", "missing_fraction", "fraction of the captures"}};
   fmt::print("\n");
   for (const auto& [label, name, unit] : metric_rows) {
-    if (const auto value = find(result, name)) fmt::print("{:11} {:.4g} {}\n", label, *value, unit);
+    if (const auto value = find_session_metric_value(result, name))
+      fmt::print("{:11} {:.4g} {}\n", label, *value, unit);
   }
   for (const CheckedMetric& gate : result.gates) {
     if (!gate.has_passed_gate()) fmt::print("NOT MET     {}\n", describe_gate_result(gate));

@@ -30,8 +30,8 @@ void print_confusion(const ConfusionMatrix& confusion) {
   }
   const int all = confusion.counts.sum();
   fmt::print("correct     {:.2f} %\n  wrong     {}\n  unknown   {}\n",
-             100.0 * confusion.count_correctly_identified() / all,
-             confusion.count_wrongly_identified(), confusion.count_unidentified());
+             100.0 * confusion.count_correctly_identified_lights() / all,
+             confusion.count_wrongly_identified_lights(), confusion.count_unidentified_lights());
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ std::string make_point_data_block(const std::string& name,
 
 /// Returns a circle and the corners of its bounding box, because gnuplot's autoscaling ignores
 /// circles.
-std::string circle(const std::string& name, const Circle& circle_m) {
+std::string make_circle_data_blocks(const std::string& name, const Circle& circle_m) {
   const Eigen::Vector2d half(circle_m.radius, circle_m.radius);
   const std::vector<Eigen::Vector2d> corners{circle_m.center - half, circle_m.center + half};
   return make_gnuplot_data_block(
@@ -189,9 +189,9 @@ std::string format_mtf50_map(const IntrinsicsPlot& plot) {
 
 Drawing make_dispersion_plot_drawing(const DispersionPlot& plot) {
   std::string commands = make_point_data_block("before", plot.before.errors_m) +
-                         circle("before_circle", plot.before.circle) +
+                         make_circle_data_blocks("before_circle", plot.before.circle) +
                          make_point_data_block("after", plot.after.errors_m) +
-                         circle("after_circle", plot.after.circle) +
+                         make_circle_data_blocks("after_circle", plot.after.circle) +
                          make_point_data_block("outliers", plot.outliers_m) +
                          make_common_gnuplot_settings() + make_gnuplot_title_command(plot.title) +
                          "set xlabel 'fix minus reference point, x (mm)'\n"
@@ -322,7 +322,7 @@ IntrinsicsPlot collect_intrinsics_plot_data(const std::string& title,
   const ProjectionUncertainty uncertainty(solution, lattice);
   for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(problem.imager_px)) {
     if (pixel.y() == 0) ++plot.cols;
-    plot.sd_px.push_back(uncertainty.max_projection_sd_px(pixel));
+    plot.sd_px.push_back(uncertainty.projection_sd_along_worst_direction_px(pixel));
   }
   if (sharpness) {
     plot.mtf50_cols = sharpness->mtf50.cols;

@@ -244,7 +244,7 @@ RunEvent run_station_hook(const Hook& hook, const RunRecord& record, const HookL
   std::signal(SIGCHLD, SIG_DFL);  // if SIGCHLD is ignored, no status is available
   const Subreaper subreaper;
   if (const int error =
-          start_process(hook, input.get(), to.get(), lock.lock_file_descriptor(), process.id);
+          start_process(hook, input.get(), to.get(), lock.descriptor_of_lock_file(), process.id);
       error != 0) {
     return make_hook_failed_event(hook.command.front() +
                                   " cannot be started: " + std::generic_category().message(error));

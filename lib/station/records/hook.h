@@ -34,7 +34,7 @@ class HookLock {
   bool has_acquired_hook_lock() const { return held_; }
   /// Returns the file descriptor of the lock; negative if there is no lock file. A process that has
   /// the descriptor holds the lock.
-  int lock_file_descriptor() const { return descriptor_; }
+  int descriptor_of_lock_file() const { return descriptor_; }
 
  private:
   std::filesystem::path file_;

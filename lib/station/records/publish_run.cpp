@@ -21,10 +21,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Id describe_camera(const RunRecord& record) {
+Id make_camera_folder_id(const RunRecord& record) {
   return {record.camera, "the record of a run", "camera"};
 }
-Id describe_run(const RunRecord& record) { return {record.run, "the record of a run", "run"}; }
+Id make_run_folder_id(const RunRecord& record) {
+  return {record.run, "the record of a run", "run"};
+}
 
 /// Returns true if a file has this content. A longer one, a link and a pipe do not.
 bool has_file_content(const SharedFolder& folder, const std::string& name,
@@ -48,7 +50,7 @@ fs::path write_calibration(const RunRecord& record, const SharedFolder& folder) 
   return file;
 }
 
-ReportVerdict make_verdict_box(const RunRecord& record) {
+ReportVerdict make_report_verdict(const RunRecord& record) {
   const std::string no_verdict = describe_why_verdict_is_void_or_edited(record);
   ReportVerdict verdict{record.verdict,
                         record.has_run_passed()       ? Verdict::pass
@@ -90,9 +92,9 @@ bool rename_files_of_voided_run(const RunRecord& record, const fs::path& results
                              std::pair("replaced-report.html", "voided-replaced-report.html")};
   std::error_code missing;
   if (!fs::is_directory(results, missing)) return false;
-  const auto camera = SharedFolder(results).open_subfolder_if_exists(describe_camera(record));
+  const auto camera = SharedFolder(results).open_subfolder_if_exists(make_camera_folder_id(record));
   const auto folder =
-      camera ? camera->open_subfolder_if_exists(describe_run(record)) : std::nullopt;
+      camera ? camera->open_subfolder_if_exists(make_run_folder_id(record)) : std::nullopt;
   if (!folder) return false;
   bool is_any_renamed = false;
   for (const auto& [name, voided_name] : names) {
@@ -102,7 +104,7 @@ bool rename_files_of_voided_run(const RunRecord& record, const fs::path& results
 }
 
 SharedFolder open_run_results_folder(const RunRecord& record, const fs::path& results) {
-  const Id camera = describe_camera(record), run = describe_run(record);
+  const Id camera = make_camera_folder_id(record), run = make_run_folder_id(record);
   create_station_folder(results);
   return SharedFolder(results).open_or_create_subfolder(camera).open_or_create_subfolder(run);
 }
@@ -111,7 +113,7 @@ std::string make_run_report_html(const RunRecord& record, const std::filesystem:
                                  const std::vector<ReportPlot>& pictures) {
   Report report;
   report.title = "Camera " + record.camera + " on " + record.station;
-  report.verdict = make_verdict_box(record);
+  report.verdict = make_report_verdict(record);
   constexpr int digits = 4;
   for (const CheckedMetric& metric : record.metrics) {
     const std::string name = metric.name + ": " + describe_meaning(metric);

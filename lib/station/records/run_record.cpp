@@ -101,7 +101,8 @@ std::ptrdiff_t find_index_of_last_event_of_kind(const RunRecord& record, const c
   return record.events.rend() - event - 1;
 }
 
-std::string format_void_command(const std::string& run, const std::filesystem::path& station_file) {
+std::string format_run_voiding_command(const std::string& run,
+                                       const std::filesystem::path& station_file) {
   return fmt::format("vlp-station void {} --station {} --operator NAME --reason WHY", run,
                      station_file.string());
 }
@@ -110,7 +111,7 @@ std::string describe_run_using_image(const ImageUser& owner,
                                      const std::filesystem::path& station_file) {
   // [STATION-6] `if its serial was`
   return fmt::format("camera {}, run {}: if its serial was wrong, '{}' frees its images",
-                     owner.camera, owner.run, format_void_command(owner.run, station_file));
+                     owner.camera, owner.run, format_run_voiding_command(owner.run, station_file));
 }
 
 bool uses_images_of_earlier_run(const RunRecord& run, const RunRecord& earlier) {
@@ -275,9 +276,9 @@ std::string join_lines(std::string text) {
   return joined;
 }
 
-/// Returns list_unit_metrics() and the other metrics of these runs.
+/// Returns list_unit_metric_kinds() and the other metrics of these runs.
 std::vector<MetricKind> list_columns(const std::vector<RunRecord>& runs) {
-  auto kinds = list_unit_metrics();
+  auto kinds = list_unit_metric_kinds();
   for (const MetricKind& kind : list_metric_kinds({MetricSource::evaluation})) {
     const auto has_kind = [&](const RunRecord& run) {
       return run.find_metric_by_name(kind.name) != nullptr;

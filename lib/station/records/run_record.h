@@ -94,7 +94,8 @@ struct ImageUser {
 };
 
 /// Returns the command that voids a run of the station of this file, with all its options.
-std::string format_void_command(const std::string& run, const std::filesystem::path& station_file);
+std::string format_run_voiding_command(const std::string& run,
+                                       const std::filesystem::path& station_file);
 
 /// Describes the owner of an image, and how to free it if the owner's serial was wrong.
 std::string describe_run_using_image(const ImageUser& owner,

@@ -325,8 +325,8 @@ std::optional<RunSummary> Spool::find_run_that_used_image(
   return std::nullopt;
 }
 
-ImageUser Spool::find_other_camera_using_image(const std::string& sha256,
-                                               const std::string& other_than_camera) {
+ImageUser Spool::find_run_of_other_camera_using_image(const std::string& sha256,
+                                                      const std::string& other_than_camera) {
   const auto run = find_run_that_used_image(sha256, [&](const RunSummary& user) {
     return user.camera != other_than_camera && user.voided.empty();
   });

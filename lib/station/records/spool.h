@@ -78,8 +78,8 @@ class Spool {
   std::vector<RunSummary> list_run_summaries(const RunFilter& filter);
   /// Returns the first run of another camera, not voided, that uses an image of this digest; empty
   /// if none does. Searches all runs of the spool and the records.
-  ImageUser find_other_camera_using_image(const std::string& sha256,
-                                          const std::string& other_than_camera);
+  ImageUser find_run_of_other_camera_using_image(const std::string& sha256,
+                                                 const std::string& other_than_camera);
   /// Returns the first judged run of the same unit, not voided, that used all images of `run`
   /// (uses_images_of_earlier_run()). Searches the waiting runs and the records. Returns an empty
   /// string if there is none, and std::nullopt if the records do not answer and no waiting run

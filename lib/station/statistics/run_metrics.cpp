@@ -13,7 +13,7 @@
 namespace vlp {
 
 std::vector<MetricKind> list_run_metric_kinds() {
-  auto kinds = list_unit_metrics();
+  auto kinds = list_unit_metric_kinds();
   const auto fix_metrics = list_metric_kinds({MetricSource::evaluation});
   kinds.insert(kinds.end(), fix_metrics.begin(), fix_metrics.end());
   return kinds;

@@ -18,7 +18,7 @@
 namespace vlp {
 
 /// Returns the kinds of all metrics that runs can have: those of units at a station
-/// (list_unit_metrics()), followed by the errors of fixes, which sessions of archives have
+/// (list_unit_metric_kinds()), followed by the errors of fixes, which sessions of archives have
 /// (archive_runs.h).
 std::vector<MetricKind> list_run_metric_kinds();
 /// Returns the metric of this name. Throws std::invalid_argument that lists the valid names.

@@ -43,7 +43,8 @@ void StepSources::write_next_frame_of_step(const Unit& unit, WatchedRun& run) {
 
 bool StepSources::has_step_source_ended(const Unit& unit) const {
   const auto step = unit.first_incomplete_step();
-  return step && last_.empty() && by_step_.contains(*step) && by_step_.at(*step)->ended();
+  return step && last_.empty() && by_step_.contains(*step) &&
+         by_step_.at(*step)->has_source_ended();
 }
 
 std::filesystem::path FrameSource::save_next_source_frame(const SharedFolder& folder) {

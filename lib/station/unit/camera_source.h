@@ -29,7 +29,7 @@ class FrameSource {
   /// folder leads elsewhere by now, or if a camera delivers no frame.
   std::filesystem::path save_next_source_frame(const SharedFolder& folder);
 
-  bool ended() const { return ended_; }
+  bool has_source_ended() const { return ended_; }
 
  private:
   std::string source_;

@@ -29,7 +29,7 @@ ViewCoverage compute_coverage(const Unit& unit) {
   for (const UnitImage* image : list_used_images(unit.step_state(StationStep::boards))) {
     poses.views.push_back(input.views.size());
     input.views.push_back(
-        input.lattice.match_corners_to_flat_board(image->observation.board->detection));
+        input.lattice.list_corners_with_board_positions(image->observation.board->detection));
     const auto pose = estimate_board_view_pose(input.views.back(), nominal);
     if (pose) poses.problem.poses.push_back(pose->camera_from_board);
   }
@@ -79,8 +79,9 @@ std::vector<std::string> draw_board_map(const Unit& unit) {
 YawCoverage compute_yaw_coverage_of_unit(const Unit& unit) {
   const auto& lens = unit.step_state(StationStep::boards).result;
   if (!lens || !lens->has_succeeded()) return {};
-  return compute_yaw_coverage(collect_frames_of_used_images(unit.step_state(StationStep::rotation)),
-                              unit.station_config(), lens->calibration);
+  return compute_yaw_coverage(
+      collect_lamp_detections_of_used_images(unit.step_state(StationStep::rotation)),
+      unit.station_config(), lens->calibration);
 }
 
 /// Returns the heights of the rotation with covered and missing angles, as lines.

@@ -194,7 +194,7 @@ StepResult check_position_accuracy_on_station(const StationConfig& config,
   }
   result.calibration = calibration;
   const LocateResult located =
-      locate_camera_from_frames({known.frames, config.lamps, calibration, places});
+      locate_camera_from_detections({known.frames, config.lamps, calibration, places});
   add_check_fractions(located, known.frames, config.lamps, result);
   result.rejected_lamps = located.rejected_lamps;
   result.warnings = located.warnings;

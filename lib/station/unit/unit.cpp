@@ -42,7 +42,7 @@ Unit::Unit(const StationConfig& config, std::string camera_id, ProgramVersion pr
       threads_(threads),
       boards_(config.board, config.frontend, config.nominal_camera.imager_px) {}
 
-void Unit::reread_capture_tables(StationStep step) {
+void Unit::reprocess_step_with_changed_tables(StationStep step) {
   if (step != StationStep::dispersion && step != StationStep::check) return;
   reprocess_images_with_changed_inclination(step);
   mutable_step_state(step).result.reset();
@@ -79,7 +79,7 @@ void Unit::solve_steps_in_order(bool all_in) {
     const auto waiting = std::exchange(state.pending_images, {});
     if (!waiting.empty()) {
       process_image_files(step, waiting);
-      count_consecutive_rejections(step);
+      update_consecutive_rejection_count(step);
     }
     if (state.result && (state.result->has_succeeded() || !all_in)) continue;
     state.sufficient = has_sufficient_images(step);
@@ -120,7 +120,7 @@ bool Unit::can_no_longer_pass() const {
   if (state.num_consecutive_rejections >= config_.max_consecutive_rejections) return true;
   const bool stuck = state.sufficient && state.result && !state.result->has_succeeded();
   if (!stuck || *step == StationStep::boards) return false;
-  const auto frames = collect_frames_of_used_images(state);
+  const auto frames = collect_lamp_detections_of_used_images(state);
   return !describe_lamp_map_faults(frames, config_.lamps, *calibration_before_step(*step))
               .empty() ||
          !describe_missing_lamps(frames, config_.lamps).empty();
@@ -136,11 +136,11 @@ void Unit::add_step_images(StationStep step, const std::vector<fs::path>& files,
     return;
   }
   process_image_files(step, files);
-  if (!more_to_come) count_consecutive_rejections(step);
+  if (!more_to_come) update_consecutive_rejection_count(step);
 }
 
 /// Updates the number of consecutive rejections after a batch.
-void Unit::count_consecutive_rejections(StationStep step) {
+void Unit::update_consecutive_rejection_count(StationStep step) {
   UnitStep& state = mutable_step_state(step);
   const int refused = std::exchange(state.num_rejected_in_batch, 0);
   const bool used = std::exchange(state.is_any_used_in_batch, false);
@@ -217,7 +217,7 @@ void Unit::reject_image_if_redundant(StationStep step, UnitImage& image) const {
   Selection selection(find_image_use(step), config_.frontend);
   for (const UnitImage* other : list_used_images(this->step_state(step)))
     selection.add_kept_image(other->observation);
-  selection.add_or_reject_image(image.observation);
+  selection.add_image_or_reject_as_repeated(image.observation);
   if (!image.is_image_used() || !this->step_state(step).is_step_solved()) return;
   image.observation.set_image_rejection(RejectionReason::not_needed,
                                         "not needed: the step has enough");
@@ -288,7 +288,7 @@ bool Unit::has_sufficient_images(StationStep step) const {
              compute_board_coverage(state, config_.nominal_camera.imager_px)
                      .covered_image_fraction() >= completion.board_coverage;
     case StationStep::rotation:
-      return compute_yaw_coverage(collect_frames_of_used_images(state), config_,
+      return compute_yaw_coverage(collect_lamp_detections_of_used_images(state), config_,
                                   *calibration_before_step(step))
           .sufficient;
     case StationStep::dispersion:
@@ -313,17 +313,17 @@ StepResult Unit::solve_station_step(StationStep step, bool all_in) const {
         result = calibrate_lens_on_station(config_, camera_id_, collect_step_observations(state));
         break;
       case StationStep::rotation:
-        result =
-            calibrate_rotation_on_station(config_, before, collect_frames_of_used_images(state));
+        result = calibrate_rotation_on_station(config_, before,
+                                               collect_lamp_detections_of_used_images(state));
         break;
       case StationStep::dispersion:
-        result =
-            calibrate_dispersion_on_station(config_, before, collect_frames_of_used_images(state),
-                                            read_captures_with_truth(state.folder));
+        result = calibrate_dispersion_on_station(config_, before,
+                                                 collect_lamp_detections_of_used_images(state),
+                                                 read_captures_with_truth(state.folder));
         break;
       case StationStep::check:
         return check_position_accuracy_on_station(config_, before,
-                                                  collect_frames_of_used_images(state),
+                                                  collect_lamp_detections_of_used_images(state),
                                                   read_captures_with_truth(state.folder));
     }
   } catch (const InputError& error) {  // the table may be incomplete
@@ -385,7 +385,7 @@ std::vector<CheckedMetric> Unit::collect_unit_metrics() const {
   }
   const auto row_time = make_row_time_metrics(row_time_);
   values.insert(values.end(), row_time.begin(), row_time.end());
-  return check_all_metrics_against_gates(config_.gates, values, list_unit_metrics());
+  return check_all_metrics_against_gates(config_.gates, values, list_unit_metric_kinds());
 }
 
 }  // namespace vlp

@@ -49,7 +49,7 @@ class Unit {
   /// consecutive, because a moving camera blurs images. A redundant image is removed.
   void mark_image_discarded(StationStep step, const std::string& name);
   /// Handles a change of the step's captures.csv or truth.csv.
-  void reread_capture_tables(StationStep step);
+  void reprocess_step_with_changed_tables(StationStep step);
   /// Solves the steps that are complete. If `all_in`, no more images arrive, and incomplete steps
   /// are solved, too. An unreadable captures.csv then throws InputError; otherwise it is the step's
   /// problem.
@@ -98,7 +98,7 @@ class Unit {
   LevelRotations find_level_rotations_of_images(StationStep step) const;
   void reprocess_images_with_changed_inclination(StationStep step);
   void add_image_to_step(StationStep step, UnitImage image);
-  void count_consecutive_rejections(StationStep step);
+  void update_consecutive_rejection_count(StationStep step);
   void reject_image_if_redundant(StationStep step, UnitImage& image) const;
   void remove_image_from_step(StationStep step, const std::string& name);
   void reset_steps_after(StationStep step);

@@ -45,7 +45,7 @@ int min_images_to_blame_camera(const StationConfig& config) {
   return std::min(config.max_consecutive_rejections, (config.completion.board_views + 1) / 2);
 }
 
-RejectionSummary summarize_refusals(const UnitStep& state, const StationConfig& config) {
+RejectionSummary summarize_rejections(const UnitStep& state, const StationConfig& config) {
   std::vector<Observation> rejected;
   for (const auto& [name, image] : state.images) {
     if (image.is_image_used() || image.observation.rejection->reason == RejectionReason::not_needed)
@@ -68,7 +68,7 @@ std::vector<Cause> find_step_problems(const Unit& unit, StationStep step) {
   if (state.is_step_solved()) return {};
   std::vector<Cause> causes;
   const std::string count = format_step_image_count(unit, step);
-  const RejectionSummary refused = summarize_refusals(state, unit.station_config());
+  const RejectionSummary refused = summarize_rejections(state, unit.station_config());
   if (!refused.text.empty()) {
     causes.push_back({fmt::format("{} ({}): {}", station_step_name(step), count, refused.text),
                       refused.are_blurred});
@@ -170,7 +170,7 @@ std::vector<Cause> find_check_faults(const Unit& unit, const Calibration& calibr
   const UnitStep& check = unit.step_state(StationStep::check);
   if (!is_step_result_valid(check)) return {};
   const LampMap& lamps = unit.station_config().lamps;
-  const CapturesWithPositions captures{collect_frames_of_used_images(check),
+  const CapturesWithPositions captures{collect_lamp_detections_of_used_images(check),
                                        read_captures_with_truth(check.folder)};
   // A common offset is no fault of single captures; one that rotates is a fault of the camera.
   const auto offset =
@@ -182,7 +182,7 @@ std::vector<Cause> find_check_faults(const Unit& unit, const Calibration& calibr
     if (!fault.empty()) return {{std::move(fault)}};
   }
   const UnitStep& dispersion = unit.step_state(StationStep::dispersion);
-  const CapturesWithPositions reference{collect_frames_of_used_images(dispersion),
+  const CapturesWithPositions reference{collect_lamp_detections_of_used_images(dispersion),
                                         read_captures_with_truth(dispersion.folder)};
   std::string other = describe_focal_length_difference(captures, reference, lamps, calibration);
   // Without an offset, residuals can be caused by a lens that is inaccurate near the corners.
@@ -209,7 +209,7 @@ std::vector<Cause> find_station_faults(const Unit& unit) {
   if (!row_time.empty()) return {{std::move(row_time)}};
   std::vector<Frame> frames;
   for (const StationStep step : kLampSteps) {
-    for (Frame& frame : collect_frames_of_used_images(unit.step_state(step)))
+    for (Frame& frame : collect_lamp_detections_of_used_images(unit.step_state(step)))
       frames.push_back(std::move(frame));
   }
   std::vector<Cause> causes;
@@ -264,7 +264,7 @@ void invalidate_run_for_reused_images(RunRecord& record, const std::string& earl
   record.invalidate_verdict(fmt::format(
       "all images are those of run {}, which is no repetition: take new ones, or '{}' if that run "
       "should not count",
-      earlier, format_void_command(earlier, station_file)));
+      earlier, format_run_voiding_command(earlier, station_file)));
 }
 
 std::vector<Cause> find_causes_of_failure(const Unit& unit) {

@@ -41,7 +41,7 @@ Observations collect_step_observations(const UnitStep& step) {
   return seen;
 }
 
-std::vector<Frame> collect_frames_of_used_images(const UnitStep& step) {
+std::vector<Frame> collect_lamp_detections_of_used_images(const UnitStep& step) {
   std::vector<Frame> frames;
   for (const UnitImage* image : list_used_images(step)) {
     frames.push_back(
@@ -64,7 +64,7 @@ ImageCoverage compute_board_coverage(const UnitStep& step, const std::array<int,
     if (!image->observation.board) continue;
     for (const PointDetection& corner :
          collect_detected_corners(image->observation.board->detection))
-      coverage.add_corner_pixel(corner.pixel);
+      coverage.add_corner_to_coverage(corner.pixel);
   }
   return coverage;
 }
@@ -119,7 +119,7 @@ YawCoverage compute_yaw_coverage(const std::vector<Frame>& frames, const Station
       const double turned = (located_frame.yaw_rad - first.yaw_rad) / kTurn_rad;
       const double fraction = turned - std::floor(turned);
       const auto part = static_cast<std::size_t>(std::lround(fraction * double(parts)));
-      height.parts[part % parts] = true;
+      height.covered_sectors[part % parts] = true;
     }
     height.captures = static_cast<int>(yaws_rad.size());
     height.arc_rad = compute_angular_range(yaws_rad);

@@ -96,7 +96,7 @@ struct UnitStep {
 /// Returns the observations of the images, by name.
 Observations collect_step_observations(const UnitStep& step);
 /// Returns the frames of the images that are used, by name.
-std::vector<Frame> collect_frames_of_used_images(const UnitStep& step);
+std::vector<Frame> collect_lamp_detections_of_used_images(const UnitStep& step);
 /// Returns the images that are used, by name.
 std::vector<const UnitImage*> list_used_images(const UnitStep& step);
 
@@ -112,7 +112,7 @@ struct YawCoverage {
     /// Yaw sectors with at least one capture at this height: `rotation_captures` sectors of equal
     /// size over the full rotation, in order of increasing yaw. The first one is centered at the
     /// yaw of the first capture.
-    std::vector<bool> parts;
+    std::vector<bool> covered_sectors;
     /// True if captures and angular range meet the station's criteria.
     bool is_complete = false;
   };

@@ -54,7 +54,7 @@ class Verification {
         folder, ImageUse::known_positions,
         [&](const SourceImage& image) { return intake.detect_lamps_in_image(image); });
     std::ranges::move(collect_step_observations(step).images, std::back_inserter(lamp_images_));
-    const auto frames = collect_frames_of_used_images(step);
+    const auto frames = collect_lamp_detections_of_used_images(step);
     frames_.insert(frames_.end(), frames.begin(), frames.end());
     const auto places = read_captures_with_truth(step.folder);
     if (station_step == StationStep::check) {
@@ -77,7 +77,8 @@ class Verification {
     const RowTimeCheck row_time = check_row_time_against_lamps(lamp_images_, config_.lamps, stated);
     for (const Metric& metric : make_row_time_metrics(row_time)) values_.push_back(metric);
     RunRecord record = make_common_run_record("golden", config_, golden_.camera_id, run, program);
-    record.metrics = check_all_metrics_against_gates(golden_.gates, values_, list_unit_metrics());
+    record.metrics =
+        check_all_metrics_against_gates(golden_.gates, values_, list_unit_metric_kinds());
     record.images = images_;
     for (const CheckedMetric& metric : record.metrics) {
       // The station is under test, and fails by its metrics.
@@ -139,7 +140,7 @@ class Verification {
     step.folder = folder;
     Selection selection(use, config_.frontend);
     for (UnitImage& image : images) {
-      selection.add_or_reject_image(image.observation);
+      selection.add_image_or_reject_as_repeated(image.observation);
       std::string name = image.observation.image_file_name();
       step.images.emplace(std::move(name), std::move(image));
     }

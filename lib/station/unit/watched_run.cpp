@@ -114,7 +114,7 @@ std::vector<WatchedRun::ImageChange> WatchedRun::process_folder_changes(std::siz
     std::string tables = make_table_state(images.watched_folder());
     if (tables != known_tables) {
       known_tables = std::move(tables);
-      unit_.reread_capture_tables(step);
+      unit_.reprocess_step_with_changed_tables(step);
       reread = true;
     }
     const auto changes = images.poll_folder_changes();

@@ -47,7 +47,7 @@ class RenderedDriveCalibration : public testing::Test {
     Drive drive;
     for (int i = 0; i < kCaptures; ++i) {
       LampShot shot =
-          make_simulated_lamp_capture(scene, scene.sets.at(0), static_cast<std::size_t>(i) % 12);
+          make_lamp_capture_parameters(scene, scene.sets.at(0), static_cast<std::size_t>(i) % 12);
       BaseMotion& motion = shot.motion;
       motion.axis_m = {random.uniform(-0.3, 0.3), random.uniform(-0.12, 0.12), i % 2 ? 0.3 : 0.0};
       motion.yaw_rad = random.uniform(-3.1, 3.1);

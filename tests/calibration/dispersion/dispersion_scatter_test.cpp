@@ -24,7 +24,7 @@ void expect_consistent(const Station& station, const std::vector<ReferencePointC
                        DispersionMethod method, bool stated) {
   Random random(41);
   const auto reference =
-      estimate_heading_dependent_offset(exact, station.rig.map, station.believed, method);
+      estimate_dispersion_offset(exact, station.rig.map, station.believed, method);
   ASSERT_EQ(reference.status, DispersionStatus::ok);
   Eigen::Array4d scatter = Eigen::Array4d::Zero(), reported = scatter;
   const bool world = method == DispersionMethod::camera;
@@ -37,7 +37,7 @@ void expect_consistent(const Station& station, const std::vector<ReferencePointC
       }
     }
     const auto fit =
-        estimate_heading_dependent_offset(captures, station.rig.map, station.believed, method);
+        estimate_dispersion_offset(captures, station.rig.map, station.believed, method);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     Eigen::Array4d error = Eigen::Array4d::Zero(), variance = error;
     error.head<2>() = fit.dispersion.offset_px - reference.dispersion.offset_px;
@@ -56,26 +56,26 @@ void expect_consistent(const Station& station, const std::vector<ReferencePointC
   }
 }
 
-TEST(EstimateHeadingDependentOffset, CameraMethodCovarianceMatchesScatterOverFullTurn) {
+TEST(EstimateDispersionOffset, CameraMethodCovarianceMatchesScatterOverFullTurn) {
   Station station(0.01);
   const auto exact = station.captures(16, true, {0.003, 0.001}, 0.1);
   expect_consistent(station, exact, DispersionMethod::camera, true);
 }
 
-TEST(EstimateHeadingDependentOffset, CameraMethodCovarianceMatchesScatterWithoutGivenNoise) {
+TEST(EstimateDispersionOffset, CameraMethodCovarianceMatchesScatterWithoutGivenNoise) {
   Station station(0.01);
   const auto exact = station.captures(16, true, {0.003, 0.001}, 0.1);
   expect_consistent(station, exact, DispersionMethod::camera, false);
 }
 
-TEST(EstimateHeadingDependentOffset, CameraMethodCovarianceMatchesScatterOver135Degrees) {
+TEST(EstimateDispersionOffset, CameraMethodCovarianceMatchesScatterOver135Degrees) {
   Station station(0.01);
   auto exact = station.captures(24, true, {0.003, 0.001}, 0.1);
   exact.resize(10);
   expect_consistent(station, exact, DispersionMethod::camera, true);
 }
 
-TEST(EstimateHeadingDependentOffset, PaperMethodCovarianceMatchesScatterAtOneYaw) {
+TEST(EstimateDispersionOffset, PaperMethodCovarianceMatchesScatterAtOneYaw) {
   Station station(0.01);
   expect_consistent(station, station.captures_at(0.7, 30), DispersionMethod::chen_guan, true);
 }
@@ -90,17 +90,17 @@ struct FewCaptures {
   double placement_sd_m;
 };
 
-class EstimateHeadingDependentOffsetWithFewCaptures : public testing::TestWithParam<FewCaptures> {};
+class EstimateDispersionOffsetWithFewCaptures : public testing::TestWithParam<FewCaptures> {};
 
 /// 600 draws of two axes determine an RMS to 3 % and the fraction of 5 % to 0.6 %. Few captures do
 /// not determine their scatter. The test therefore checks the 95 % interval, and that standard
 /// deviations are not too small.
-TEST_P(EstimateHeadingDependentOffsetWithFewCaptures, PaperMethodIntervalCoversOffsetErrors) {
+TEST_P(EstimateDispersionOffsetWithFewCaptures, PaperMethodIntervalCoversOffsetErrors) {
   const FewCaptures& few = GetParam();
   Station station(0.01);
   const auto exact = station.captures_at(0.7, few.count);
-  const auto reference = estimate_heading_dependent_offset(exact, station.rig.map, station.believed,
-                                                           DispersionMethod::chen_guan);
+  const auto reference = estimate_dispersion_offset(exact, station.rig.map, station.believed,
+                                                    DispersionMethod::chen_guan);
   ASSERT_EQ(reference.status, DispersionStatus::ok);
   Random random(43);
   double squares = 0;
@@ -115,8 +115,8 @@ TEST_P(EstimateHeadingDependentOffsetWithFewCaptures, PaperMethodIntervalCoversO
         if (!few.noise_is_stated) detection.sigma_px.reset();
       }
     }
-    const auto fit = estimate_heading_dependent_offset(captures, station.rig.map, station.believed,
-                                                       DispersionMethod::chen_guan);
+    const auto fit = estimate_dispersion_offset(captures, station.rig.map, station.believed,
+                                                DispersionMethod::chen_guan);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     ASSERT_TRUE(fit.dispersion.covariance);
     EXPECT_EQ(fit.dispersion.captures, few.count);
@@ -137,7 +137,7 @@ TEST_P(EstimateHeadingDependentOffsetWithFewCaptures, PaperMethodIntervalCoversO
   EXPECT_LT(fraction, 0.07);
 }
 
-INSTANTIATE_TEST_SUITE_P(Paper, EstimateHeadingDependentOffsetWithFewCaptures,
+INSTANTIATE_TEST_SUITE_P(Paper, EstimateDispersionOffsetWithFewCaptures,
                          testing::Values(FewCaptures{"Two", 2, true, 0},
                                          FewCaptures{"Three", 3, true, 0},
                                          FewCaptures{"Eight", 8, true, 0},
@@ -176,15 +176,15 @@ std::vector<ReferencePointCapture> make_captures(Station& station, const Capture
   return made;
 }
 
-class EstimateHeadingDependentOffsetUncertainty : public testing::TestWithParam<Captures> {};
+class EstimateDispersionOffsetUncertainty : public testing::TestWithParam<Captures> {};
 
 /// 600 draws of two axes determine an RMS to 3 % and the fraction of 5 % to 0.6 %.
-TEST_P(EstimateHeadingDependentOffsetUncertainty, Offset95PercentIntervalCoversErrorAtNominalRate) {
+TEST_P(EstimateDispersionOffsetUncertainty, Offset95PercentIntervalCoversErrorAtNominalRate) {
   const Captures& cell = GetParam();
   Station station(0.01);
   const auto exact = make_captures(station, cell);
   const auto truth =
-      estimate_heading_dependent_offset(exact, station.rig.map, station.believed, cell.method);
+      estimate_dispersion_offset(exact, station.rig.map, station.believed, cell.method);
   ASSERT_EQ(truth.status, DispersionStatus::ok);
   Random random(44);
   double squares = 0, world_squares = 0;
@@ -204,10 +204,9 @@ TEST_P(EstimateHeadingDependentOffsetUncertainty, Offset95PercentIntervalCoversE
                                  : std::nullopt;
       }
     }
-    const auto fit =
-        estimate_heading_dependent_offset(captures, surveyed, station.believed, cell.method);
+    const auto fit = estimate_dispersion_offset(captures, surveyed, station.believed, cell.method);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
-    const auto covariance_px2 = compute_dispersion_offset_covariance_with_map(
+    const auto covariance_px2 = compute_dispersion_offset_covariance_with_map_errors(
         fit.dispersion, station.believed.camera.focal_px());
     ASSERT_TRUE(covariance_px2);
     for (Eigen::Index axis = 0; axis < 2; ++axis) {
@@ -242,7 +241,7 @@ TEST_P(EstimateHeadingDependentOffsetUncertainty, Offset95PercentIntervalCoversE
 
 constexpr DispersionMethod kCamera = DispersionMethod::camera, kPaper = DispersionMethod::chen_guan;
 INSTANTIATE_TEST_SUITE_P(
-    Captures, EstimateHeadingDependentOffsetUncertainty,
+    Captures, EstimateDispersionOffsetUncertainty,
     testing::Values(Captures{"PaperThreeUnderMapErrors", kPaper, 3, 2e-3, 1},
                     Captures{"PaperTwelveUnderMapErrors", kPaper, 12, 2e-3, 1},
                     Captures{"PaperTwelveUnderMapErrorsNoiseNotStated", kPaper, 12, 2e-3, {}},
@@ -331,8 +330,7 @@ TEST_P(PositionerAfterDispersion, FixCovarianceMatchesErrorsUnderSameAndOtherLam
   for (int draw = 0; draw < draws; ++draw) {
     const LampMap surveyed = draw_survey(rig.map, random);
     const auto captures = draw_captures(rig, GetParam(), random);
-    const auto fit =
-        estimate_heading_dependent_offset(captures, surveyed, station.believed, GetParam());
+    const auto fit = estimate_dispersion_offset(captures, surveyed, station.believed, GetParam());
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     ASSERT_EQ(fit.dispersion.uncertain_lamps.size(), 8U);
     Calibration calibration = station.believed;

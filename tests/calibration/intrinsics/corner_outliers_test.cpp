@@ -21,7 +21,8 @@ TEST(FindCornerOutliers, ReturnsOnlyTheOneDisplacedCorner) {
     Random random(11);
     int compared = 0;
     for (int view = 0; view < 40; ++view) {
-      const auto seen = lattice.match_corners_to_flat_board(views.random_view(random, noise_px));
+      const auto seen =
+          lattice.list_corners_with_board_positions(views.random_view(random, noise_px));
       ASSERT_THAT(find_corner_outliers(seen), IsEmpty());
       auto spoilt = seen;
       const std::size_t wrong = random.index(seen.size());
@@ -40,7 +41,7 @@ TEST(FindCornerOutliers, ReturnsNoneWhenAllCornersAreRandom) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(12);
   auto corners =
-      BoardLattice(views.board).match_corners_to_flat_board(views.random_view(random, 0));
+      BoardLattice(views.board).list_corners_with_board_positions(views.random_view(random, 0));
   for (auto& corner : corners) corner.pixel = {random.uniform(0, 800), random.uniform(0, 600)};
   EXPECT_THAT(find_corner_outliers(corners), IsEmpty());
   EXPECT_THAT(find_corner_outliers({}), IsEmpty());

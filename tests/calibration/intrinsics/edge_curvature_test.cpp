@@ -116,14 +116,14 @@ TEST(CorrectCornersForEdgeCurvature, ReducesCornerErrorsOfRenderedBoardByQuarter
   double stated = 0;
   std::size_t corners = 0;
   for (std::size_t index = 0; index < 8; ++index) {
-    const BoardShot shot = make_simulated_board_capture(scene, views, index);
+    const BoardShot shot = make_board_capture_parameters(scene, views, index);
     std::map<int, TagDetection::Corners> truth;
     for (const auto& [tag, corner, pixel] : find_true_corners_in_image(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
     }
     const BoardDetection seen = detector.detect_board(
         simulate_sensor_image(scene.sensor, renderer.render_board_in_electrons(shot), index));
-    auto all = lattice.match_corners_to_flat_board(seen);
+    auto all = lattice.list_corners_with_board_positions(seen);
     for (const std::size_t pass : {0U, 1U}) {
       for (std::size_t i = 0; i < seen.tags.size(); ++i) {
         Eigen::Vector2d sum(0, 0);

@@ -37,7 +37,7 @@ class EstimateTagEdgeDisplacements : public testing::TestWithParam<double> {
   IntrinsicsInput make_input(const std::vector<BoardView>& seen) const {
     IntrinsicsInput input{BoardLattice(board()), {}, {800, 600}, LensModel::opencv8};
     for (const BoardView& view : seen)
-      input.views.push_back(input.lattice.match_corners_to_flat_board(view.detection));
+      input.views.push_back(input.lattice.list_corners_with_board_positions(view.detection));
     return input;
   }
 };

@@ -88,7 +88,7 @@ TEST(SelectLensModel, RejectsOpencv4IfFewViewsLieFarFromCenter) {
   while (input.views.size() < all) {
     const BoardDetection seen = views.random_view(random, kNoise_px);
     if (!input.lattice.are_corners_sufficient_for_pose(seen)) continue;
-    auto corners = input.lattice.match_corners_to_flat_board(seen);
+    auto corners = input.lattice.list_corners_with_board_positions(seen);
     const bool inner = std::all_of(corners.begin(), corners.end(), [&](const auto& corner) {
       return (corner.pixel - middle).norm() < inner_px;
     });

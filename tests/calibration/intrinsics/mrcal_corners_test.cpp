@@ -17,7 +17,7 @@ IntrinsicsInput make_input(const Board& board, const std::vector<BoardView>& vie
                            LensModel model) {
   IntrinsicsInput input{BoardLattice(board), {}, kImager_px, model};
   for (const BoardView& view : views)
-    input.views.push_back(input.lattice.match_corners_to_flat_board(view.detection));
+    input.views.push_back(input.lattice.list_corners_with_board_positions(view.detection));
   return input;
 }
 

@@ -23,8 +23,8 @@ TEST(ProjectionUncertainty, MaxDirectionSdIsLargerForFrontalThanTiltedViews) {
   ASSERT_TRUE(tilted.has_succeeded());
   ASSERT_TRUE(frontal.has_succeeded());
   const Eigen::Vector2d place(700, 80);
-  EXPECT_GT(ProjectionUncertainty(frontal).max_projection_sd_px(place),
-            5 * ProjectionUncertainty(tilted).max_projection_sd_px(place));
+  EXPECT_GT(ProjectionUncertainty(frontal).projection_sd_along_worst_direction_px(place),
+            5 * ProjectionUncertainty(tilted).projection_sd_along_worst_direction_px(place));
 }
 
 TEST(ProjectionUncertainty, IntrinsicsRegularizationBiasMatchesFocalLengthError) {
@@ -73,7 +73,8 @@ TEST(ProjectionUncertainty, MaxDirectionSdMatchesMrcalForIndependentCorners) {
                     "float), *m.intrinsics()), m, atinfinity = True, "
                     "what = 'worstdirection-stdev'))\"");
     ASSERT_EQ(mrcals.exit_code, 0) << mrcals.errors;
-    const double ours = ProjectionUncertainty(solution).max_projection_sd_px({790, 10});
+    const double ours =
+        ProjectionUncertainty(solution).projection_sd_along_worst_direction_px({790, 10});
     EXPECT_NEAR(std::stod(mrcals.output), ours, 1e-6 * ours);
   }
 }
@@ -87,8 +88,9 @@ TEST(ProjectionUncertainty, SdByTagsMatchesSdByCornersForIndependentErrors) {
     ASSERT_TRUE(solution.has_succeeded());
     const ProjectionUncertainty by_corners(solution), by_tags(solution, input.lattice);
     for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(400, 300), Eigen::Vector2d(40, 80)}) {
-      EXPECT_NEAR(by_tags.max_projection_sd_px(pixel) / by_corners.max_projection_sd_px(pixel), 1,
-                  0.2);
+      EXPECT_NEAR(by_tags.projection_sd_along_worst_direction_px(pixel) /
+                      by_corners.projection_sd_along_worst_direction_px(pixel),
+                  1, 0.2);
     }
   }
 }

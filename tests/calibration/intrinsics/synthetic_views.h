@@ -116,7 +116,7 @@ struct SyntheticViews {
     while (static_cast<int>(input.views.size()) < views) {
       const BoardDetection seen = random_view(random, noise_px);
       if (input.lattice.are_corners_sufficient_for_pose(seen))
-        input.views.push_back(input.lattice.match_corners_to_flat_board(seen));
+        input.views.push_back(input.lattice.list_corners_with_board_positions(seen));
     }
     return input;
   }

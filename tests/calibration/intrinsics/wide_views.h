@@ -70,7 +70,7 @@ inline IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double
   while (static_cast<int>(input.views.size()) < count) {
     const BoardDetection seen = wide_view(views, random, noise_px, boards);
     if (has_enough_tags(seen, input.lattice))
-      input.views.push_back(input.lattice.match_corners_to_flat_board(seen));
+      input.views.push_back(input.lattice.list_corners_with_board_positions(seen));
   }
   return input;
 }

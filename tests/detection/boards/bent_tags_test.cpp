@@ -55,7 +55,7 @@ TEST(BoardDetector, LocatesCornersOfCurvedTagsWithinHundredthsOfPixel) {
   const BoardDetector detector(scene.board->pattern);
   Errors of_long, of_others;
   for (std::size_t index = 0; index < 6; ++index) {
-    const BoardShot shot = make_simulated_board_capture(scene, views, index);
+    const BoardShot shot = make_board_capture_parameters(scene, views, index);
     std::map<int, Corners> truth;
     std::map<int, int> seen_corners;
     for (const auto& [tag, corner, pixel] : find_true_corners_in_image(scene, renderer, shot)) {

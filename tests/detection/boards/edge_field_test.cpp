@@ -36,19 +36,19 @@ TEST(EdgeField, ReturnsSampleValuesExactlyWithoutNoise) {
   const auto all = make_samples(60, 0, 0);
   const EdgeField field(all, EdgeField::Terms::position_and_direction);
   for (const EdgeSample& sample : all) {
-    EXPECT_NEAR(field.predict_edge_property(sample.at_px, sample.along) / sample.value, 1, 1e-6);
+    EXPECT_NEAR(field.evaluate_field_at_edge(sample.at_px, sample.along) / sample.value, 1, 1e-6);
   }
 }
 
-TEST(EdgeField, UnexplainedEdgeSdMatchesScatterBeyondNoise) {
+TEST(EdgeField, ExcessRelativeSdOfEdgesMatchesScatterBeyondNoise) {
   for (const double excess_sd : {0.05, 0.2}) {
     const EdgeField field(make_samples(300, excess_sd), EdgeField::Terms::position_and_direction);
-    EXPECT_NEAR(field.unexplained_edge_sd() / excess_sd, 1, 0.15);
+    EXPECT_NEAR(field.excess_relative_sd_of_edges() / excess_sd, 1, 0.15);
   }
   const EdgeField alike(make_samples(300, 0), EdgeField::Terms::position_and_direction);
-  EXPECT_LE(alike.unexplained_edge_sd(), 0.012);
+  EXPECT_LE(alike.excess_relative_sd_of_edges(), 0.012);
   const EdgeField without_direction(make_samples(300, 0), EdgeField::Terms::position);
-  EXPECT_GT(without_direction.unexplained_edge_sd(), 0.05);
+  EXPECT_GT(without_direction.excess_relative_sd_of_edges(), 0.05);
 }
 
 TEST(EdgeField, ReturnsTrueBlurDespiteOutliersAmongSamples) {
@@ -56,19 +56,19 @@ TEST(EdgeField, ReturnsTrueBlurDespiteOutliersAmongSamples) {
   for (std::size_t i = 0; i < all.size(); i += 8) all[i].value *= 4;
   const EdgeField field(all, EdgeField::Terms::position_and_direction);
   const EdgeSample& sample = all[1];
-  EXPECT_NEAR(
-      field.predict_edge_property(sample.at_px, sample.along) / blur_px(sample.at_px, sample.along),
-      1, 0.03);
+  EXPECT_NEAR(field.evaluate_field_at_edge(sample.at_px, sample.along) /
+                  blur_px(sample.at_px, sample.along),
+              1, 0.03);
 }
 
 TEST(EdgeField, ReturnsOneValueEverywhereForThreeSamples) {
   const std::vector<EdgeSample> few{
       {{10, 10}, {1, 0}, 0.5, 0.1}, {{90, 10}, {1, 0}, 0.8, 0.1}, {{50, 80}, {0, 1}, 2.0, 0.1}};
   const EdgeField field(few, EdgeField::Terms::position);
-  EXPECT_EQ(field.predict_edge_property({0, 0}, {1, 0}),
-            field.predict_edge_property({500, 700}, {0, 1}));
-  EXPECT_NEAR(field.predict_edge_property({0, 0}, {1, 0}), 0.9, 0.2);
-  EXPECT_GT(field.unexplained_edge_sd(), 0.3);
+  EXPECT_EQ(field.evaluate_field_at_edge({0, 0}, {1, 0}),
+            field.evaluate_field_at_edge({500, 700}, {0, 1}));
+  EXPECT_NEAR(field.evaluate_field_at_edge({0, 0}, {1, 0}), 0.9, 0.2);
+  EXPECT_GT(field.excess_relative_sd_of_edges(), 0.3);
 }
 
 }  // namespace

@@ -57,7 +57,7 @@ Found measure(const Scene& scene, std::size_t count, double min_side_px = 0) {
   std::vector<BoardView> views;
   views.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const BoardShot shot = make_simulated_board_capture(scene, set, i);
+    const BoardShot shot = make_board_capture_parameters(scene, set, i);
     const cv::Mat image = simulate_sensor_image(
         scene.sensor, renderer.render_board_in_electrons(shot), i, scene.processing);
     views.push_back({shot.image, scene.camera.imager_px, detector.detect_board(image)});

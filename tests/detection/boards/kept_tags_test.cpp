@@ -38,7 +38,7 @@ class BoardDetectorYield : public testing::TestWithParam<Pictures> {
   const Board& board = scene.board->pattern;
 
   cv::Mat image(const FrameRenderer& renderer, const CaptureSet& set, std::size_t index) const {
-    const BoardShot shot = make_simulated_board_capture(scene, set, index);
+    const BoardShot shot = make_board_capture_parameters(scene, set, index);
     const auto& picture = GetParam().picture;
     const cv::Mat exposed = simulate_sensor_image(
         scene.sensor, renderer.render_board_in_electrons(shot), shot.noise_seed, picture);

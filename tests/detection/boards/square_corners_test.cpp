@@ -180,7 +180,7 @@ TEST(OtherTags, ChessboardSquaresAreCountedAndMarkerDictionaryIsNamed) {
   Board charuco = squares(BoardKind::charuco, 7, 5);
   const cv::Mat markers = drawn_by_opencv(charuco);
   charuco.family = "DICT_4X4_50";
-  EXPECT_EQ(describe_tags_of_other_kinds(charuco, markers),
+  EXPECT_EQ(find_and_describe_tags_of_other_kinds(charuco, markers),
             "the image shows markers of DICT_5X5, the largest of id 16");
 }
 

@@ -55,7 +55,7 @@ CornerErrors measure_errors(const Scene& scene, const CaptureSet& views, std::si
   const BoardDetector detector(scene.board->pattern);
   CornerErrors errors;
   for (std::size_t index = 0; index < images; ++index) {
-    const BoardShot shot = make_simulated_board_capture(scene, views, index);
+    const BoardShot shot = make_board_capture_parameters(scene, views, index);
     std::map<int, TagDetection::Corners> truth;
     for (const auto& [tag, corner, pixel] : find_true_corners_in_image(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;

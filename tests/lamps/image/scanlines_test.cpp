@@ -147,7 +147,7 @@ TEST(MakeScanlineImage, YieldsSameLightsForTransposedImage) {
       *std::find_if(scene.sets.begin(), scene.sets.end(),
                     [](const CaptureSet& any) { return any.folder == "check"; });
   for (std::size_t i = 0; i < 3; ++i) {
-    const LampShot shot = make_simulated_lamp_capture(scene, set, i * 7);
+    const LampShot shot = make_lamp_capture_parameters(scene, set, i * 7);
     const cv::Mat image = simulate_sensor_image(
         scene.sensor, renderer.render_lamps_in_electrons(shot), shot.noise_seed);
     const auto upright = by_rows.detect_lights(to_image_view(image));

@@ -55,7 +55,8 @@ TEST_F(LightShapeOfMovingDisc, CorrectedCenterMatchesPositionAtReadoutOfCenterRo
        {Vector2d(2.4e-5, 0), Vector2d(0, 2.4e-5), Vector2d(-1.5e-5, 2e-5)}) {
     auto light = shape.fit_light_to_outline(outline(motion), dark);
     ASSERT_TRUE(light);
-    const Vector2d oval = complex_product(light->outline_sums.scanline_gradient(), motion) / 2;
+    const Vector2d oval =
+        complex_product(light->outline_sums.scanline_gradient_wrt_position(), motion) / 2;
     Light unshifted = *light;
     shape.correct_light_for_motion({oval, 1e-12 * Matrix2::Identity()}, motion, *light);
     shape.correct_light_for_motion({oval, 1e-12 * Matrix2::Identity()}, Vector2d::Zero(),

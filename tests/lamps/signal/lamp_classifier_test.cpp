@@ -52,9 +52,10 @@ TEST(LampClassifier, IdentifiesNearlyAllLightsOfTrainedLamps) {
   const ConfusionMatrix confusion =
       compute_confusion_matrix(classifier, make_lights(kLamps, 100, 2));
   EXPECT_EQ(confusion.lamps, (std::vector<int>{4, 7, 9}));
-  EXPECT_EQ(confusion.count_wrongly_identified(), 0);
-  EXPECT_GE(confusion.count_correctly_identified(), 297);
-  EXPECT_EQ(confusion.count_correctly_identified() + confusion.count_unidentified(), 300);
+  EXPECT_EQ(confusion.count_wrongly_identified_lights(), 0);
+  EXPECT_GE(confusion.count_correctly_identified_lights(), 297);
+  EXPECT_EQ(confusion.count_correctly_identified_lights() + confusion.count_unidentified_lights(),
+            300);
   EXPECT_TRUE(find_inseparable_lamps(classifier).empty());
 }
 
@@ -62,8 +63,8 @@ TEST(LampClassifier, SeparatesLampsOfEqualPeriodByDuty) {
   const LampClassifier classifier = fit_lamp_classifier(make_lights(kTwins, 40, 1));
   const ConfusionMatrix confusion =
       compute_confusion_matrix(classifier, make_lights(kTwins, 100, 2));
-  EXPECT_EQ(confusion.count_wrongly_identified(), 0);
-  EXPECT_GE(confusion.count_correctly_identified(), 150) << confusion.counts;
+  EXPECT_EQ(confusion.count_wrongly_identified_lights(), 0);
+  EXPECT_GE(confusion.count_correctly_identified_lights(), 150) << confusion.counts;
 }
 
 TEST(LampClassifier, ReportsUnknownForUntrainedLamps) {
@@ -71,7 +72,7 @@ TEST(LampClassifier, ReportsUnknownForUntrainedLamps) {
   ASSERT_EQ(classifier.lamps.size(), 3);
   const ConfusionMatrix confusion =
       compute_confusion_matrix(classifier, make_lights({{5, 11.9, 0.5}, {6, 6, 0.5}}, 50, 2));
-  EXPECT_EQ(confusion.count_unidentified(), 100);
+  EXPECT_EQ(confusion.count_unidentified_lights(), 100);
 }
 
 TEST(LampClassifier, ReportsUnknownForInseparableLamps) {
@@ -80,7 +81,7 @@ TEST(LampClassifier, ReportsUnknownForInseparableLamps) {
   const ConfusionMatrix confusion =
       compute_confusion_matrix(classifier, make_lights(similar_lamps, 100, 2));
   EXPECT_EQ(confusion.counts(0, 0), 100);
-  EXPECT_GE(confusion.count_unidentified(), 190);
+  EXPECT_GE(confusion.count_unidentified_lights(), 190);
   const auto pairs = find_inseparable_lamps(classifier);
   ASSERT_EQ(pairs.size(), 1);
   EXPECT_EQ(pairs[0].first, 7);
@@ -97,8 +98,8 @@ TEST(FitLampClassifier, ExcludesWronglyLabeledLightsFromTraining) {
   EXPECT_GE(used, 80);
   const ConfusionMatrix confusion =
       compute_confusion_matrix(classifier, make_lights(kLamps, 100, 2));
-  EXPECT_EQ(confusion.count_wrongly_identified(), 0);
-  EXPECT_GE(confusion.count_correctly_identified(), 297);
+  EXPECT_EQ(confusion.count_wrongly_identified_lights(), 0);
+  EXPECT_GE(confusion.count_correctly_identified_lights(), 297);
 }
 
 TEST(LampClassifier, AcceptsDeviatingPeriodOfClearStripesButRejectsItOfUnclear) {
@@ -129,8 +130,8 @@ TEST(CrossValidateLampClassifier, CountsEachLightOnce) {
   const ConfusionMatrix confusion =
       cross_validate_lamp_classifier(make_lights(kLamps, 40, 1), fit_lamp_classifier);
   EXPECT_EQ(confusion.counts.sum(), 120);
-  EXPECT_EQ(confusion.count_wrongly_identified(), 0);
-  EXPECT_GE(confusion.count_correctly_identified(), 117);
+  EXPECT_EQ(confusion.count_wrongly_identified_lights(), 0);
+  EXPECT_GE(confusion.count_correctly_identified_lights(), 117);
 }
 
 TEST(CrossValidateLampClassifier, ExcludesHeldOutImagesFromTraining) {
@@ -152,27 +153,28 @@ TEST(CrossValidateLampClassifier, MisidentifiesLampsWhenTrainingFunctionSwapsThe
   };
   const ConfusionMatrix confusion =
       cross_validate_lamp_classifier(make_lights(kLamps, 40, 1), mistaken);
-  EXPECT_GE(confusion.count_wrongly_identified(), 78);
+  EXPECT_GE(confusion.count_wrongly_identified_lights(), 78);
 }
 
-TEST(ComputeClassifierFeatures, ReturnsLogPeriodDutyCountAndLitArea) {
+TEST(ComputeStripeFeaturesForClassifier, ReturnsLogPeriodDutyCountAndLitArea) {
   Stripes stripes{};
   stripes.period_lines = 12;
   stripes.duty = 0.4;
   stripes.count_per_line = 0.08;
   stripes.lit_area = 0.45;
-  EXPECT_EQ(compute_classifier_features(stripes), LampFeatures(std::log(12), 0.4, 0.08, 0.45));
+  EXPECT_EQ(compute_stripe_features_for_classifier(stripes),
+            LampFeatures(std::log(12), 0.4, 0.08, 0.45));
   EXPECT_EQ(kLampFeatures[0], "log_period_lines");
 }
 
-TEST(ComputeClassifierFeatures, MeanFeaturesAreIndependentOfNumberOfScanlines) {
+TEST(ComputeStripeFeaturesForClassifier, MeanFeaturesAreIndependentOfNumberOfScanlines) {
   Random random(7);
   for (const int lines : {60, 90, 120, 180}) {
     for (const double duty : {0.35, 0.6}) {
       LampFeatures mean = LampFeatures::Zero();
       constexpr int draws = 100;
       for (int draw = 0; draw < draws; ++draw) {
-        mean += compute_classifier_features(
+        mean += compute_stripe_features_for_classifier(
                     measure_stripes(noisy_square_wave(lines, 10.3, duty, 1, 0, random))) /
                 draws;
       }

@@ -94,31 +94,32 @@ TEST(FindAmbiguousLamps, RequiresLargerDifferenceForFewerLinesOrUnknownExposure)
   EXPECT_EQ(find_ambiguous_lamps(map, far).size(), 1);
 }
 
-TEST(ExplainWhyRoomIsNeeded, NamesLampsSharingFrequencyAndAllRooms) {
+TEST(ExplainWhyRoomMustBeChosen, NamesLampsSharingFrequencyAndAllRooms) {
   LampMapFile lamps{"lamps.yaml", {{lamp(1, 2000), lamp(2, 2500), lamp(7, 2010)}}, {"b", "b", "a"}};
-  const std::string message = explain_why_room_is_needed(lamps, "--room");
+  const std::string message = explain_why_room_must_be_chosen(lamps, "--room");
   EXPECT_EQ(
       message,
       "lamps 1 and 7 share a frequency in two rooms: choose a room with --room; the map has: a, b");
   lamps.map.lamps[2].frequency_hz = 3000;
-  EXPECT_EQ(explain_why_room_is_needed(lamps, "--room"), "");
+  EXPECT_EQ(explain_why_room_must_be_chosen(lamps, "--room"), "");
 }
 
-TEST(ExplainWhyRoomIsNeeded, IsEmptyWhenChoosingRoomWouldNotHelp) {
+TEST(ExplainWhyRoomMustBeChosen, IsEmptyWhenChoosingRoomWouldNotHelp) {
   const LampMap map{{lamp(1, 2000), lamp(2, 2000)}};
-  EXPECT_EQ(explain_why_room_is_needed({"lamps.yaml", map, {"hall", "hall"}}, "--room"), "");
-  EXPECT_EQ(explain_why_room_is_needed({"lamps.yaml", map, {"", ""}}, "--room"), "");
+  EXPECT_EQ(explain_why_room_must_be_chosen({"lamps.yaml", map, {"hall", "hall"}}, "--room"), "");
+  EXPECT_EQ(explain_why_room_must_be_chosen({"lamps.yaml", map, {"", ""}}, "--room"), "");
   const LampMap duties{{lamp(1, 2000, 0.3), lamp(2, 2000, 0.7)}};
-  EXPECT_EQ(explain_why_room_is_needed({"lamps.yaml", duties, {"hall", "office"}}, "--room"), "");
+  EXPECT_EQ(explain_why_room_must_be_chosen({"lamps.yaml", duties, {"hall", "office"}}, "--room"),
+            "");
 }
 
-TEST(ExplainWhyRoomIsNeeded, ListsTenRoomsAtMost) {
+TEST(ExplainWhyRoomMustBeChosen, ListsTenRoomsAtMost) {
   LampMapFile lamps;
   for (int i = 0; i < 12; ++i) {
     lamps.map.lamps.push_back(lamp(i, 2000));
     lamps.rooms.push_back("r" + std::to_string(10 + i));
   }
-  EXPECT_THAT(explain_why_room_is_needed(lamps, "--room"),
+  EXPECT_THAT(explain_why_room_must_be_chosen(lamps, "--room"),
               testing::EndsWith("r18, r19 and 2 more"));
 }
 

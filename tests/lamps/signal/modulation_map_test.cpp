@@ -41,15 +41,16 @@ TEST(AveragePixelsOverCells, ReturnsMeanMinusDarkPerCellAndScanlineBin) {
   const CellLevels cells = average_pixels_over_cells(to_image_view(image), {0, 0, 19, 4}, 3, 2);
   ASSERT_EQ(cells.cells, 3);
   ASSERT_EQ(cells.bins, 2);
-  EXPECT_FLOAT_EQ(cells.bin_levels(0)[0], 7 + 1);  // 16 more in 16 pixels
-  EXPECT_FLOAT_EQ(cells.bin_levels(0)[1], 7);
-  EXPECT_FLOAT_EQ(cells.bin_levels(1)[2], 7 + 5);  // 30 more in the 6 pixels that the last cell has
+  EXPECT_FLOAT_EQ(cells.cell_levels_of_bin(0)[0], 7 + 1);  // 16 more in 16 pixels
+  EXPECT_FLOAT_EQ(cells.cell_levels_of_bin(0)[1], 7);
+  EXPECT_FLOAT_EQ(cells.cell_levels_of_bin(1)[2],
+                  7 + 5);  // 30 more in the 6 pixels that the last cell has
 }
 
 TEST(ComputeModulationMap, ReturnsMeanAndFundamentalAmplitudeOfSquareWave) {
   for (const int lines_per_bin : {1, 2}) {
     const ModulationMap map = make_map(square_wave(12, 20, 100), lines_per_bin);
-    const std::size_t middle = map.cell_index(map.steps / 2, map.cells / 2);
+    const std::size_t middle = map.modulation_cell_index(map.steps / 2, map.cells / 2);
     EXPECT_NEAR(map.mean[middle], 60, 0.5);
     EXPECT_NEAR(map.amplitude[middle], 40 * 4 / std::numbers::pi, 3);
   }
@@ -59,7 +60,7 @@ TEST(ComputeModulationMap, ReturnsNearlyZeroAmplitudeForLinearRamp) {
   cv::Mat1b image(160, 64);
   for (int row = 0; row < image.rows; ++row) image.row(row).setTo(20 + row);
   const ModulationMap map = make_map(image);
-  EXPECT_LT(map.amplitude[map.cell_index(map.steps / 2, map.cells / 2)], 0.5);
+  EXPECT_LT(map.amplitude[map.modulation_cell_index(map.steps / 2, map.cells / 2)], 0.5);
 }
 
 TEST(ComputeMinSignificantAmplitude, IsExceededByNoiseAtExpectedRate) {
@@ -79,7 +80,7 @@ TEST(ComputeMinSignificantAmplitude, IsExceededByNoiseAtExpectedRate) {
     // Steps a window apart are independent; ends are not whole.
     for (int step = 12; step < map.steps - 12; step += 12) {
       for (int cell = 0; cell < map.cells; ++cell) {
-        above += map.amplitude[map.cell_index(step, cell)] >
+        above += map.amplitude[map.modulation_cell_index(step, cell)] >
                  fraction * compute_min_significant_amplitude(noise, 12);
         ++count;
       }

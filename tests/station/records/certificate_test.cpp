@@ -47,7 +47,7 @@ RunRecord certified_run() {
   record.verdict = run_verdict_name(Verdict::pass);
   record.metrics = check_all_metrics_against_gates(
       {{"rms_px", 0.3}, {"check_mean_mm", 1, GuardBand{0.02, 1.645}}},
-      {{"rms_px", 0.123456}, {"check_mean_mm", 0.9600001}}, list_unit_metrics());
+      {{"rms_px", 0.123456}, {"check_mean_mm", 0.9600001}}, list_unit_metric_kinds());
   return record;
 }
 

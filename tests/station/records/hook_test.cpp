@@ -193,8 +193,8 @@ TEST(HookLock, CreatesNoFileThroughSymbolicLink) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "spool");
   std::filesystem::create_symlink(folder / "elsewhere", folder / "spool/.hook-run");
-  EXPECT_LT(HookLock(folder / "spool", "run").lock_file_descriptor(), 0);
-  EXPECT_LT(HookLock(folder / "spool", "/../../elsewhere").lock_file_descriptor(), 0);
+  EXPECT_LT(HookLock(folder / "spool", "run").descriptor_of_lock_file(), 0);
+  EXPECT_LT(HookLock(folder / "spool", "/../../elsewhere").descriptor_of_lock_file(), 0);
   EXPECT_FALSE(std::filesystem::exists(folder / "elsewhere"));
 }
 

@@ -33,7 +33,7 @@ inline RunRecord numbered_run(int number) {
   run.calibration = "format: vlp-calibration/1\n";
   run.metrics = check_all_metrics_against_gates(
       {{"rms_px", 1, GuardBand{0.01, 1.645}}, {"tilt_deg", 2}},
-      {{"rms_px", 0.1 + 0.2}, {"coverage", 1.0 / 3}}, list_unit_metrics());
+      {{"rms_px", 0.1 + 0.2}, {"coverage", 1.0 / 3}}, list_unit_metric_kinds());
   for (std::size_t i = 0; i < kImagesOfARun; ++i) {
     run.images.push_back({"boards", std::to_string(1000 + i) + ".png",
                           "digest-" + std::to_string(number) + "-" + std::to_string(i), ""});

@@ -89,7 +89,7 @@ TEST(Spool, LosesNoRunWhenDiskOfRecordsIsFull) {
     EXPECT_THAT(spool.list_waiting_runs(), SizeIs(40 - num_stored));
     EXPECT_THAT(spool.describe_spool_state(), HasSubstr("full"));
     // Full records are readable.
-    EXPECT_EQ(spool.find_other_camera_using_image("digest-0-1", "b"),
+    EXPECT_EQ(spool.find_run_of_other_camera_using_image("digest-0-1", "b"),
               (ImageUser{"camera-0", numbered_run(0).run}));
   }
   ASSERT_EQ(::mount("none", small.c_str(), "tmpfs", MS_REMOUNT, "size=8m"), 0);
@@ -325,7 +325,8 @@ TEST(Spool, DeliversAllRunsAfterServerStoppedDuringDelivery) {
   EXPECT_EQ(connected.describe_spool_state(), "");
   server.freeze();
   EXPECT_LT(measure_seconds([&] {
-              EXPECT_EQ(connected.find_other_camera_using_image("digest-1-1", "b"), ImageUser{});
+              EXPECT_EQ(connected.find_run_of_other_camera_using_image("digest-1-1", "b"),
+                        ImageUser{});
             }),
             8);
   connected.store_run(numbered_run(-3));

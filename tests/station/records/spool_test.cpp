@@ -161,9 +161,9 @@ TEST(Spool, DeliversStoredRunsWhenRecordsBecomeReachable) {
   EXPECT_EQ(spool.find_run_by_id(numbered_run(1).run)->camera, "camera-1");
   EXPECT_FALSE(spool.find("another"));
   // Checks continue with the locally known runs.
-  EXPECT_EQ(spool.find_other_camera_using_image("digest-2-7", "camera-1"),
+  EXPECT_EQ(spool.find_run_of_other_camera_using_image("digest-2-7", "camera-1"),
             (ImageUser{"camera-2", numbered_run(2).run}));
-  EXPECT_EQ(spool.find_other_camera_using_image("digest-2-7", "camera-2"), ImageUser{});
+  EXPECT_EQ(spool.find_run_of_other_camera_using_image("digest-2-7", "camera-2"), ImageUser{});
   EXPECT_THAT(spool.describe_spool_state(),
               HasSubstr("; 1 images were not looked up in the records"));
 
@@ -174,15 +174,15 @@ TEST(Spool, DeliversStoredRunsWhenRecordsBecomeReachable) {
   EXPECT_THAT(later.list_waiting_runs(), IsEmpty());
   EXPECT_THAT(whole_runs(where), SizeIs(3));
   EXPECT_EQ(Records(where).find_run_by_id(numbered_run(1).run)->metrics[0].value, 0.1 + 0.2);
-  EXPECT_EQ(later.find_other_camera_using_image("digest-2-7", "camera-1"),
+  EXPECT_EQ(later.find_run_of_other_camera_using_image("digest-2-7", "camera-1"),
             (ImageUser{"camera-2", numbered_run(2).run}));
   // A voided run owns no image, also while its event waits.
   RunRecord voided_run = numbered_run(2);
   voided_run.events = {make_run_event_now(kVoided, "wrong serial", "Ann")};
   later.store_run(voided_run);
-  EXPECT_EQ(later.find_other_camera_using_image("digest-2-7", "camera-1"), ImageUser{});
+  EXPECT_EQ(later.find_run_of_other_camera_using_image("digest-2-7", "camera-1"), ImageUser{});
   later.deliver_waiting_runs();
-  EXPECT_EQ(later.find_other_camera_using_image("digest-2-7", "camera-1"), ImageUser{});
+  EXPECT_EQ(later.find_run_of_other_camera_using_image("digest-2-7", "camera-1"), ImageUser{});
 }
 
 TEST(Spool, FindGoldenRunUsingImageReturnsOnlyJudgedGoldenRuns) {
@@ -312,7 +312,7 @@ TEST(Spool, ListsRunOnceItsTruncatedFileIsComplete) {
   EXPECT_THAT(spool.describe_spool_state(), AllOf(HasSubstr("1.json"), Not(HasSubstr("waiting"))));
   folder.file("spool/1.json", text);
   EXPECT_THAT(spool.list_waiting_runs(), SizeIs(1));
-  EXPECT_EQ(spool.find_other_camera_using_image("digest-1-7", "b"),
+  EXPECT_EQ(spool.find_run_of_other_camera_using_image("digest-1-7", "b"),
             (ImageUser{"camera-1", numbered_run(1).run}));
   EXPECT_THAT(
       spool.describe_spool_state(),
@@ -346,7 +346,7 @@ TEST(Spool, DeliversEachRunOnlyToItsOwnDatabase) {
               AllOf(StartsWith("1 queued for another database"), HasSubstr("a.db")));
   EXPECT_THAT(of_b.list_waiting_runs(), IsEmpty());
   EXPECT_TRUE(of_b.find_run_by_id(numbered_run(1).run)) << "a run is not judged twice for that";
-  EXPECT_EQ(of_b.find_other_camera_using_image("digest-1-7", "b"),
+  EXPECT_EQ(of_b.find_run_of_other_camera_using_image("digest-1-7", "b"),
             (ImageUser{"camera-1", numbered_run(1).run}));
   of_b.store_run(numbered_run(2));
   of_b.deliver_waiting_runs();

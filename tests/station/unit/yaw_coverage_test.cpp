@@ -32,7 +32,7 @@ TEST_F(YawCoverageTest, IsSufficientForCapturesAroundFullTurn) {
   ASSERT_THAT(map.heights, SizeIs(2));
   for (const auto& height : map.heights) {
     EXPECT_EQ(height.captures, 12);
-    EXPECT_THAT(height.parts, Each(true));
+    EXPECT_THAT(height.covered_sectors, Each(true));
     EXPECT_GT(height.arc_rad, 1.6 * std::numbers::pi);
   }
   EXPECT_TRUE(map.sufficient);
@@ -42,7 +42,8 @@ TEST_F(YawCoverageTest, MarksMissingYawsAndIsInsufficient) {
   frames.erase(frames.begin() + 4, frames.begin() + 7);
   const YawCoverage map = compute_yaw_coverage(frames, config, calibration);
   ASSERT_THAT(map.heights, SizeIs(2));
-  const auto& parts = map.heights[0].captures == 9 ? map.heights[0].parts : map.heights[1].parts;
+  const auto& parts = map.heights[0].captures == 9 ? map.heights[0].covered_sectors
+                                                   : map.heights[1].covered_sectors;
   EXPECT_EQ(std::count(parts.begin(), parts.end(), false), 3);
   EXPECT_FALSE(map.sufficient);
 }
@@ -50,9 +51,11 @@ TEST_F(YawCoverageTest, MarksMissingYawsAndIsInsufficient) {
 // Not from the lowest capture, which depends on the last micrometers of the fixes.
 TEST_F(YawCoverageTest, FirstPartIsAtYawOfFirstCapture) {
   frames.resize(3);
-  const auto forwards = compute_yaw_coverage(frames, config, calibration).heights.at(0).parts;
+  const auto forwards =
+      compute_yaw_coverage(frames, config, calibration).heights.at(0).covered_sectors;
   std::reverse(frames.begin(), frames.end());
-  const auto backwards = compute_yaw_coverage(frames, config, calibration).heights.at(0).parts;
+  const auto backwards =
+      compute_yaw_coverage(frames, config, calibration).heights.at(0).covered_sectors;
   EXPECT_EQ(std::count(forwards.begin(), forwards.end(), true), 3);
   EXPECT_TRUE(forwards[0] && backwards[0]);
   EXPECT_NE(forwards[1], backwards[1]);
