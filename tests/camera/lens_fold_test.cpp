@@ -106,7 +106,7 @@ TEST_P(FoldingLens, ProjectReturnsNulloptBeyondFold) {
 INSTANTIATE_TEST_SUITE_P(Lenses, FoldingLens, testing::ValuesIn(kFoldedLenses),
                          [](const auto& test) { return std::string(test.param.name); });
 
-TEST(Unproject, ReturnsNulloptOnlyBeyondFoldOfBarrelLens) {
+TEST(UnprojectPixel, ReturnsNulloptOnlyBeyondFoldOfBarrelLens) {
   // r (1 - 0.4 r^2) is largest at r = 1 / sqrt(1.2), where it is two thirds of r.
   const Lens lens(LensModel::opencv4, parameters_with(LensModel::opencv4, {-0.4}));
   const double edge_px = 520 * 2 / 3.0 / std::sqrt(1.2);
@@ -123,7 +123,7 @@ TEST(Unproject, ReturnsNulloptOnlyBeyondFoldOfBarrelLens) {
   }
 }
 
-TEST(Unproject, ReturnsTrueRayIfInitialPointLiesBeyondLaterFold) {
+TEST(UnprojectPixel, ReturnsTrueRayIfInitialGuessLiesBeyondLaterFold) {
   // No fold up to r = 10, but one at 12.9, behind which 'distorted' lies as a first guess.
   const Lens lens(LensModel::opencv4,
                   parameters_with(LensModel::opencv4, {0.277, -1e-3, -9e-3, -8e-3}));

@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-TEST(LensModelToString, ReturnsLensModelNamesOfMrcal) {
+TEST(LensModelName, ReturnsLensModelNamesOfMrcal) {
   EXPECT_EQ(lens_model_name(LensModel::pinhole), "LENSMODEL_PINHOLE");
   EXPECT_EQ(lens_model_name(LensModel::stereographic), "LENSMODEL_STEREOGRAPHIC");
   EXPECT_EQ(lens_model_name(LensModel::opencv4), "LENSMODEL_OPENCV4");
@@ -18,7 +18,7 @@ TEST(LensModelToString, ReturnsLensModelNamesOfMrcal) {
   EXPECT_EQ(lens_model_name(LensModel::opencv12), "LENSMODEL_OPENCV12");
 }
 
-TEST(LensModelFromName, InvertsToStringForEachModel) {
+TEST(LensModelFromName, InvertsLensModelNameForEachModel) {
   for (const LensModel model : kEveryModel)
     EXPECT_EQ(lens_model_from_name(lens_model_name(model)), model);
 }

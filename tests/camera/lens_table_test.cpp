@@ -39,7 +39,7 @@ TEST(ListDistortionNamesAndInitialValues, ReturnsNamesInParameterOrder) {
               ElementsAre());
 }
 
-TEST(ListDistortionNamesAndInitialValues, FisheyeStartValuesProjectNearlyStereographically) {
+TEST(ListDistortionNamesAndInitialValues, FisheyeInitialValuesProjectNearlyStereographically) {
   std::vector<double> parameters{400, 400, 320, 240};
   const Lens stereographic(LensModel::stereographic, parameters);
   for (const LensDistortion& distortion :

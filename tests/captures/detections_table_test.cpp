@@ -43,7 +43,7 @@ TEST_F(ReadDetections, ReturnsSigmaOnlyForRowsThatContainIt) {
   EXPECT_FALSE(frames[0].detections[1].sigma_px);
 }
 
-TEST_F(ReadDetections, ReturnsFramesWrittenByWriteDetections) {
+TEST_F(ReadDetections, ReturnsDetectionsWrittenByWriteDetections) {
   const std::vector<Frame> frames{{"a, b.png", {{3, {1.25, -7.5}, 0.05}, {4, {100, 200}, {}}}},
                                   {"c.png", {{3, {0.0625, 2}, 1.5}}}};
   write_detections(folder / "e.csv", frames);

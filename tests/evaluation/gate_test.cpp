@@ -139,7 +139,7 @@ TEST(MergeGates, ReplacesLimitsAndAppendsNewGates) {
   EXPECT_EQ(gates[2].metric, "coverage");
 }
 
-TEST(CheckGates, FailsGateOnWorseErrorsOnlyWithEnoughClusters) {
+TEST(CheckGates, FailsComparisonGateOnlyForEnoughClustersAndRelevantDifference) {
   Evaluation compared = evaluation();
   compared.comparison = Comparison{};
   const auto passed = [&] {
@@ -159,7 +159,7 @@ TEST(CheckGates, FailsGateOnWorseErrorsOnlyWithEnoughClusters) {
   EXPECT_TRUE(passed());
 }
 
-TEST(ParseGate, RejectsLimitsOutsideRangeOfMetric) {
+TEST(ParseGate, RejectsLimitOutsideRangeAndFormerOrUnknownMetric) {
   const auto known = list_metric_kinds({MetricSource::lens, MetricSource::evaluation});
   const auto words = [&](const char* text) -> std::string {
     try {
@@ -233,7 +233,7 @@ TEST(ReadGates, ReturnsGatesOfFileAndRejectsInvalidFiles) {
   EXPECT_THAT(refusal("gates: {}\n"), HasSubstr("contains no gate"));
 }
 
-TEST(EvaluationToJson, WritesMetricsWithUnitsInKeys) {
+TEST(FormatEvaluationJson, WritesMetricsWithUnitsInKeys) {
   const auto json = nlohmann::json::parse(
       format_evaluation_json(evaluation(), check_gates({{"max_mm", 5}, {"missing_fraction", 1}},
                                                        collect_evaluation_metrics(evaluation()))));
@@ -248,7 +248,7 @@ TEST(EvaluationToJson, WritesMetricsWithUnitsInKeys) {
   EXPECT_EQ(json["passed"], false);
 }
 
-TEST(EvaluationToJson, OmitsMissingP90IntervalAndStatesTooFewClusters) {
+TEST(FormatEvaluationJson, OmitsMissingP90IntervalAndStatesTooFewClusters) {
   Evaluation few = evaluation();
   const Interval interval{0.001, 0.002};
   few.intervals_m = {interval, interval, {}, interval, 19};

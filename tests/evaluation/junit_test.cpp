@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-TEST(MakeJUnitTests, MarksOnlyGatesThatDidNotPassAsFailed) {
+TEST(MakeJunitTestsFromGates, MarksOnlyGatesThatDidNotPassAsFailed) {
   const std::vector<CheckedMetric> gates{{"mean_mm", "mm", 1.25, 1, Direction::at_most},
                                          {"missing_fraction", "", 0, 0, Direction::at_most},
                                          {"split_half_px", "px", {}, 1, Direction::at_most}};
@@ -26,7 +26,7 @@ TEST(MakeJUnitTests, MarksOnlyGatesThatDidNotPassAsFailed) {
   EXPECT_THAT(tests[2].message, testing::HasSubstr("split_half_px is not known, at most 1 px is"));
 }
 
-TEST(FormatJUnit, WritesEachResultWithMessageAndWarnings) {
+TEST(FormatJunitXml, WritesEachResultWithMessageAndWarnings) {
   const std::vector<JUnitTest> tests{
       {"lens", JUnitTest::Result::passed, "", "", {"one", "two & three"}},
       {"mean_mm", JUnitTest::Result::failed, "mean_mm is <2>"},

@@ -81,7 +81,7 @@ TEST(ProposeGatesFromEvaluation, ReturnsNoGatesForFewerThanFivePositions) {
   EXPECT_TRUE(propose_gates_from_evaluation(input, evaluate_fix_accuracy(input)).empty());
 }
 
-TEST(FormatGates, RunPassesItsOwnProposedGatesDespiteMissingFixes) {
+TEST(ProposeGatesFromEvaluation, RunPassesItsOwnGatesDespiteMissingFixes) {
   EvaluationInput input = draw_run(21, 1);
   for (std::size_t i = 0; i < 7; ++i) input.fixes.rows[3 * i].fix.reset();
   const Evaluation evaluation = evaluate_fix_accuracy(input);

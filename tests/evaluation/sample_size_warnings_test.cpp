@@ -42,7 +42,7 @@ TEST(MakeMissingFixesWarning, WarnsIfNoneOfTheGatesLimitsMissingFixes) {
   EXPECT_EQ(make_missing_fixes_warning(all, {mean}), "");
 }
 
-TEST(MakeSampleSizeWarnings, WarnsForFewerThanFiftyStations) {
+TEST(MakeSampleSizeWarnings, WarnsForFewerThanFiftyReferencePoints) {
   EXPECT_THAT(make_sample_size_warnings(evaluation(50)), IsEmpty());
   EXPECT_THAT(
       make_sample_size_warnings(evaluation(49)),
@@ -70,7 +70,7 @@ TEST(MakeErrorsBelowCrlbWarning, WarnsIfErrorsAreSignificantlyBelowCrlb) {
   EXPECT_EQ(make_errors_below_crlb_warning(limited), "");
 }
 
-TEST(MakeSampleSizeWarnings, WarnsForFewerThanFiftyStationsInComparison) {
+TEST(MakeSampleSizeWarnings, WarnsForFewerThanFiftyReferencePointsInComparison) {
   Evaluation compared = evaluation(1000);
   compared.comparison = Comparison{};
   compared.comparison->clusters = 8;

@@ -48,7 +48,7 @@ struct LampIntakeOfImage : testing::Test {
 };
 
 /// Independent of false detections in the noise.
-TEST_F(LampIntakeOfImage, RejectsImageBelowNoiseAsTooDark) {
+TEST_F(LampIntakeOfImage, RejectsImageWithoutLightAboveNoiseAsTooDark) {
   EXPECT_THAT(refusal(ceiling(2, 0.5, 2)), StartsWith("too dark: the brightest is "));
   EXPECT_THAT(refusal(ceiling(20, 3, 5)), StartsWith("too dark: the brightest is "));
   EXPECT_THAT(refusal(ceiling(0, 0, 0)), StartsWith("too dark: the brightest is 0 times"));

@@ -79,7 +79,7 @@ TEST(SummarizeImageRejections, CountsReasonsAndNamesRemedyOfMajority) {
             "1 overexposed, 1 blurred");
 }
 
-TEST(RejectionReasonToString, ReturnsUniqueNonEmptyNameForEachReason) {
+TEST(RejectionReasonPhrase, ReturnsUniqueNonEmptyPhraseForEachReason) {
   std::set<std::string_view> names;
   int count = 0;
   for (auto reason = RejectionReason::unreadable; reason <= RejectionReason::used_elsewhere;

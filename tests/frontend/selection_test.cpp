@@ -73,7 +73,7 @@ TEST(Selection, KeepsImagesWithoutLamps) {
             (Reasons{{}, {}}));
 }
 
-TEST(Selection, RejectsCopyOfImageAddedByKeep) {
+TEST(Selection, RejectsCopyOfImageAddedByAddKeptImage) {
   std::vector images{image_of_lamps("a", kPixels), image_of_lamps("b", kPixels)};
   Selection selection(ImageUse::rotation, {});
   selection.add_kept_image(images[0]);

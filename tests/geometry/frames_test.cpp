@@ -90,7 +90,7 @@ TEST(LevelRotationFromInclination, PitchLowersXAxisAndRollRaisesYAxis) {
               IsNear(Vector3d::UnitX(), 0));
 }
 
-TEST(LevelRotationFromInclination, AppliesPitchBeforeRoll) {
+TEST(LevelRotationFromInclination, ReturnsPitchRotationTimesRollRotation) {
   const double roll_rad = 0.2, pitch_rad = 0.3;
   const double sr = std::sin(roll_rad), cr = std::cos(roll_rad);
   const double sp = std::sin(pitch_rad), cp = std::cos(pitch_rad);
@@ -110,14 +110,14 @@ TEST(LevelRotationFromInclination, ReturnsProperRotationMatrix) {
   }
 }
 
-TEST(LevelFromWorld, TransformsKnownPointToLevelFrameOfTurnedCamera) {
+TEST(LevelPointFromWorld, TransformsKnownPointToLevelFrameOfTurnedCamera) {
   // One meter along world y from the camera, which is turned by a quarter from x to y: the
   // point is on its x axis.
   const Vector3d x_in_level = level_point_from_world({{2, 3, 0.5}, pi / 2}, {2, 4, 2.5});
   EXPECT_THAT(x_in_level, IsNear(Vector3d(1, 0, 2), 1e-15));
 }
 
-TEST(LevelFromWorld, InvertsTransformFromLevelToWorldFrame) {
+TEST(LevelPointFromWorld, InvertsTransformFromLevelToWorldFrame) {
   Random random(5);
   const auto point = [&random] {
     return Vector3d(random.uniform(-5, 5), random.uniform(-5, 5), random.uniform(-5, 5));

@@ -76,7 +76,7 @@ TEST(ComputeChiSquaredBound, IsExceededAsRarelyAsSigmasOfNormalDistribution) {
   }
 }
 
-TEST(StatisticalBounds, ApproachSigmasOfNormalDistributionForManyFreedoms) {
+TEST(StatisticalBounds, ApproachSigmasOfNormalDistributionForManyDegreesOfFreedom) {
   constexpr double m = 1e9;
   for (const double sigmas : kSigmas) {
     EXPECT_NEAR(compute_squared_student_t_bound(sigmas, m), sigmas * sigmas, 1e-6);

@@ -328,7 +328,7 @@ TEST(EveryProgram, ReportsErrorWhenHelpCannotBeWritten) {
 }
 
 /// Formats whose size is not read from their header are not decoded.
-TEST(DetectPrograms, RejectUnsupportedImageFormats) {
+TEST(ImageReadingPrograms, RejectUnsupportedImageFormats) {
   std::size_t formats = 0;
   for (const char* ending : {".webp", ".jp2", ".ras", ".hdr"}) {
     std::vector<unsigned char> bytes;

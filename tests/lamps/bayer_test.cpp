@@ -15,7 +15,7 @@ Score score_behind_filters(const std::string& name, std::size_t step) {
   return Captures(std::move(scene), "check").score(step);
 }
 
-TEST(LightDetector, LocatesDiscsAccuratelyBehindColorFilters) {
+TEST(LightDetector, LocatesDiscsAccuratelyInRawBayerImages) {
   for (const auto& [scene, step, max_missed] : {std::tuple("paper-rig", 12, 0), {"wide", 16, 4}}) {
     const Score score = score_behind_filters(scene, std::size_t(step));
     EXPECT_GT(score.lamps, 90) << scene;
@@ -26,7 +26,7 @@ TEST(LightDetector, LocatesDiscsAccuratelyBehindColorFilters) {
   }
 }
 
-TEST(LightDetector, LocatesPanelsAndTubesAccuratelyBehindColorFilters) {
+TEST(LightDetector, LocatesPanelsAndTubesAccuratelyInRawBayerImages) {
   const Score score = score_behind_filters("panels", 11);
   EXPECT_GT(score.lamps, 85);
   EXPECT_EQ(score.wrong, 0);

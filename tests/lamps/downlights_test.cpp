@@ -7,7 +7,7 @@
 namespace vlp {
 namespace {
 
-TEST(LightDetector, LocatesRenderedDownlightsWithinTenthOfPixel) {
+TEST(LightDetector, LocatesRenderedDownlightsWithRmsErrorBelowTenthOfPixel) {
   const Score score = Captures("downlights", "check").score(1);
   testing::Test::RecordProperty("rms_px", testing::PrintToString(score.rms_px()));
   testing::Test::RecordProperty("worst_px", testing::PrintToString(score.worst_px));

@@ -85,7 +85,7 @@ TEST(LightDetector, IdentifiesNoPanelsWhoseAspectRatioContradictsMap) {
   EXPECT_GT(refused, 6);
 }
 
-TEST(LightDetector, PanelCenterErrorsStayWithinFourSigmaWithoutLens) {
+TEST(LightDetector, PanelCenterErrorsStayWithinFourSigmaForUnknownLens) {
   const Captures captures("panels", "check");
   const LightDetector detector(captures.lamps(), {Readout::rows, 3e-5, std::nullopt});
   double squares = 0;

@@ -41,7 +41,7 @@ TEST(LightDetectorOnRealImages, ReportsNoLampsInPhotographsWithoutLamps) {
   }
 }
 
-TEST(LightDetectorOnRealImages, ReportsNoLampsOnBoardsForAnyRowTime) {
+TEST(LightDetectorOnRealImages, ReportsNoLampsOnBoardsForFourRowTimes) {
   const auto folder = real_data("kalibr-aprilgrid-stereo");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   for (const char* camera : {"cam0", "cam1"}) {

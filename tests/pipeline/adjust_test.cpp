@@ -186,7 +186,7 @@ TEST_F(VlpAdjust, RejectsCalibrationThatIsAlreadyAdjusted) {
   EXPECT_THAT(result.errors, HasSubstr("is adjusted already"));
 }
 
-TEST_F(VlpAdjust, AsksForSecondHeightWhenUndetermined) {
+TEST_F(VlpAdjust, AsksForSecondHeightForOneCaptureOfTwoLamps) {
   frames.resize(1);
   frames[0].detections.resize(2);
   captures = "image,pivot\n0,s\n";

@@ -424,7 +424,7 @@ TEST_F(SingleStepPrograms, WriteSameResultsAsVlpCalibrateWithClassifier) {
   expect_same_results();
 }
 
-TEST_F(VlpCalibrateSmallSession, RunsOnlyStepNamedByRedoAgain) {
+TEST_F(VlpCalibrateSmallSession, RedoOptionRunsOnlyNamedStepAgain) {
   ASSERT_EQ(calibrate().exit_code, 0);
   const std::string session = result("session.json");
   const auto again = calibrate("--row-time-s 3e-5 --readout rows --redo check");

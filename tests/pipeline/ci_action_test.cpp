@@ -44,7 +44,7 @@ class CiAction : public testing::Test {
   }
 };
 
-TEST_F(CiAction, PassesAndComparesOnlyIfAcceptedFixesAreGiven) {
+TEST_F(CiAction, PassesWithAndWithoutAcceptedFixesAndComparesOnlyWithThem) {
   const auto first = run_action("results=accepted");
   ASSERT_EQ(first.exit_code, 0) << first.output << first.errors;
   EXPECT_THAT(content("accepted/junit.xml"),

@@ -269,7 +269,7 @@ TEST_F(VlpDetect, SkipsAndCountsUnusableImages) {
   EXPECT_EQ(CsvTable(folder / "found.csv").num_rows(), 12);
 }
 
-TEST_F(VlpDetect, ReportsErrorInOneLineIfNoLampIsFound) {
+TEST_F(VlpDetect, ReportsErrorInOneLineForMissingFolderNoImageOrNoLamp) {
   const auto refused = [&](const std::string& images, int exit_code, const std::string& message) {
     const auto result = detect(images);
     EXPECT_EQ(result.exit_code, exit_code);

@@ -93,7 +93,7 @@ TEST_F(VlpDispersion, ReadsCapturePositionsFromCapturesCsv) {
               HasSubstr("the positions of the captures are unknown"));
 }
 
-TEST_F(VlpDispersion, RequiresSeveralYawsUnlessMethodIsChenGuan) {
+TEST_F(VlpDispersion, RequiresOneYawForChenGuanMethodAndSeveralYawsOtherwise) {
   const auto refused = dispersion(turn(6, 0), "--reference-point 0.1 -0.05");
   EXPECT_EQ(refused.exit_code, 3);
   EXPECT_THAT(refused.errors, HasSubstr("turn the camera at the reference point"));

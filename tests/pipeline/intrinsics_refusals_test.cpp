@@ -148,7 +148,7 @@ TEST_F(VlpIntrinsicsErrors, SkipsInvalidImagesAndOtherSizes) {
               HasSubstr("2.png: is 640 x 480 px, the camera's images are 800 x 600 px; skipped"));
 }
 
-TEST_F(VlpIntrinsicsErrors, RejectsKalibrFormatForOpencv8LensWithoutOutput) {
+TEST_F(VlpIntrinsicsErrors, RejectsKalibrFormatForOpencv8LensAndWritesNoOutput) {
   const std::string kalibr = (folder / "kalibr.yaml").string();
   const auto result =
       calibrate(kRig + "/sample-boards", kRig + "/board.yaml", "--kalibr " + kalibr);

@@ -129,7 +129,7 @@ class TiltedCamera : public testing::Test {
   }
 };
 
-TEST_F(TiltedCamera, FixesAreWithinOneMillimeterUpToUnknownTiltOf50Degrees) {
+TEST_F(TiltedCamera, FixesAreWithinOneMillimeterForUnknownTiltUpTo50Degrees) {
   for (const int tilt_deg : {5, 15, 30, 50}) add_set(tilt_deg);
   render();
   for (const int tilt_deg : {5, 15, 30, 50})
@@ -156,7 +156,7 @@ TEST_F(TiltedCamera, FixesAreWithinOneMillimeterWithInclinationSensor) {
 }
 
 /// A camera of 3 Mpx close to large lamps, which show enough stripes from aside.
-TEST_F(TiltedCamera, FixesAreWithinThreeMillimetersUpToUnknownTiltOf80Degrees) {
+TEST_F(TiltedCamera, FixesAreWithinThreeMillimetersForUnknownTiltUpTo80Degrees) {
   std::string scene = kScene;
   const auto replace = [&](const std::string& from, const std::string& to) {
     const auto at = scene.find(from);

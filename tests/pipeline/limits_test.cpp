@@ -90,7 +90,7 @@ TEST(VlpLimits, HorizontalErrorIncludesMotionAndRollAndPitch) {
   EXPECT_GT(with_fix, 0);
 }
 
-TEST(VlpLimits, RequiresRowTimeForMovingCamera) {
+TEST(VlpLimits, RequiresRowTimeForMotionAndMoreThanTwoLampsForTilt) {
   const TemporaryFolder folder;
   Calibration calibration{synthetic_camera(), {}, {}, {}, {}};
   write_calibration(folder / "camera.yaml", calibration);

@@ -64,7 +64,7 @@ double error_m(const LocateInput& input) {
   return found.has_succeeded() ? found.rows[0].fix->pose.position_m.norm() : 1;
 }
 
-TEST(RedetectLampsOfTiltedCaptures, ReducesPositionErrorBelow100MicrometersForUnknownTilt) {
+TEST(RedetectLampsUntilTiltConverges, ReducesPositionErrorBelow100MicrometersForUnknownTilt) {
   LeaningRig rig;
   LocateInput input = rig.input(1.6);
   EXPECT_GT(error_m(input), 0.01);
@@ -78,7 +78,7 @@ TEST(RedetectLampsOfTiltedCaptures, ReducesPositionErrorBelow100MicrometersForUn
   EXPECT_LT(rig.looks.back(), 0.01);
 }
 
-TEST(RedetectLampsOfTiltedCaptures, SkipsCapturesOnlyWhenInclinationIsExact) {
+TEST(RedetectLampsUntilTiltConverges, SkipsCapturesOnlyWhenInclinationIsExact) {
   LeaningRig rig;
   LocateInput input = rig.input(0);
   input.captures["a"].inclination = Inclination{rad_from_deg(16), rad_from_deg(-12)};
@@ -91,7 +91,7 @@ TEST(RedetectLampsOfTiltedCaptures, SkipsCapturesOnlyWhenInclinationIsExact) {
   EXPECT_LT(error_m(input), 1e-4) << "but for a sensor that is not exact";
 }
 
-TEST(RedetectLampsOfTiltedCaptures, KeepsDetectionsWithMoreLampsWhenFixFails) {
+TEST(RedetectLampsUntilTiltConverges, KeepsDetectionsWithMoreLampsWhenFixFails) {
   LeaningRig rig;
   rig.shown_by_ellipses_alone = true;
   LocateInput input = rig.input(1.6);

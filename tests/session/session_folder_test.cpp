@@ -79,7 +79,7 @@ TEST(SessionFolder, ConstructorNamesMissingFileOrFolder) {
   EXPECT_FALSE(known.accuracy_check_captures_folder());
 }
 
-TEST(SessionFolder, LineDriveFoldersAreThoseWithPositions) {
+TEST(SessionFolder, FoldersOfDrivesAlongLinesAreThoseWithPositions) {
   const TemporaryFolder folder;
   for (const char* name : {"unit/rotation", "unit/line-y", "unit/line-x", "unit/line-z"}) {
     fs::create_directories(folder / name);

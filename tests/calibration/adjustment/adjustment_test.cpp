@@ -112,7 +112,7 @@ TEST(RunBundleAdjustment, RecoversAllLampsExactlyWhenOneIsMoved) {
   EXPECT_THAT(found.notes, testing::Contains(HasSubstr("0 known positions")));
 }
 
-TEST(RunBundleAdjustment, ReportsUndeterminedUntilSecondHeightIsAdded) {
+TEST(RunBundleAdjustment, AsksForSecondHeightForOneCaptureOfTwoLampsAndSucceedsWithIt) {
   Survey survey;
   survey.turn({0, 0, 0}, 1);
   survey.input.captures[0].detections.resize(2);

@@ -307,7 +307,7 @@ class AdjustmentDerivatives : public testing::Test {
   }
 };
 
-TEST_F(AdjustmentDerivatives, LinearizeJacobiansMatchFiniteDifferences) {
+TEST_F(AdjustmentDerivatives, LampObservationJacobiansMatchFiniteDifferences) {
   const AdjustmentLayout& at = problem.state_vector_layout();
   for (const std::size_t capture : {0U, 1U}) {
     for (const std::size_t lamp : {0U, 1U}) {

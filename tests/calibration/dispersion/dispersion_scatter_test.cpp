@@ -75,7 +75,7 @@ TEST(EstimateDispersionOffset, CameraMethodCovarianceMatchesScatterOver135Degree
   expect_consistent(station, exact, DispersionMethod::camera, true);
 }
 
-TEST(EstimateDispersionOffset, PaperMethodCovarianceMatchesScatterAtOneYaw) {
+TEST(EstimateDispersionOffset, ChenGuanMethodCovarianceMatchesScatterAtOneYaw) {
   Station station(0.01);
   expect_consistent(station, station.captures_at(0.7, 30), DispersionMethod::chen_guan, true);
 }
@@ -95,7 +95,7 @@ class EstimateDispersionOffsetWithFewCaptures : public testing::TestWithParam<Fe
 /// 600 draws of two axes determine an RMS to 3 % and the fraction of 5 % to 0.6 %. Few captures do
 /// not determine their scatter. The test therefore checks the 95 % interval, and that standard
 /// deviations are not too small.
-TEST_P(EstimateDispersionOffsetWithFewCaptures, PaperMethodIntervalCoversOffsetErrors) {
+TEST_P(EstimateDispersionOffsetWithFewCaptures, ChenGuanMethodIntervalCoversOffsetErrors) {
   const FewCaptures& few = GetParam();
   Station station(0.01);
   const auto exact = station.captures_at(0.7, few.count);
@@ -385,7 +385,7 @@ TEST(ComputeSmallSampleVarianceFactor, IncreasesContinuouslyWithResiduals) {
   }
 }
 
-TEST(ComputeSmallSampleVarianceFactor, ApproachesResidualRatioFlooredAtOneForGivenNoise) {
+TEST(ComputeSmallSampleVarianceFactor, ApproachesResidualRatioAndIsAtLeastOneForGivenNoise) {
   constexpr double many = 1e5;
   EXPECT_NEAR(compute_small_sample_variance_factor(0.5, many, false), 0.5, 1e-3);
   EXPECT_NEAR(compute_small_sample_variance_factor(2, many, false), 2, 1e-3);

@@ -58,7 +58,7 @@ TEST(EstimateDispersionOffset, CameraMethodReturnsPrincipalPointErrorWithoutRota
 }
 
 /// The paper's equations are exact for a shift and lamps of one height, at any yaw.
-TEST(EstimateDispersionOffset, PaperMethodReturnsTrueOffsetAtOneYaw) {
+TEST(EstimateDispersionOffset, ChenGuanMethodReturnsTrueOffsetAtOneYaw) {
   for (const DispersionCircle circle : {DispersionCircle::mean, DispersionCircle::enclosing}) {
     Station station(0);
     station.believed.rotation_center.reset();
@@ -79,7 +79,7 @@ TEST(EstimateDispersionOffset, PaperMethodReturnsTrueOffsetAtOneYaw) {
 
 /// After a rotation center of model `tilt` the offset is applied as a rotation. The factor f / H
 /// and the yaw alone would leave 10 % of 16 mm.
-TEST(EstimateDispersionOffset, PaperMethodCentersFixesOnReferencePointForTiltedCamera) {
+TEST(EstimateDispersionOffset, ChenGuanMethodCentersFixesAtReferencePointIfCameraIsTilted) {
   for (const DispersionCircle circle : {DispersionCircle::mean, DispersionCircle::enclosing}) {
     Station station(0.01);
     Random random(3);
@@ -95,7 +95,7 @@ TEST(EstimateDispersionOffset, PaperMethodCentersFixesOnReferencePointForTiltedC
   }
 }
 
-TEST(EstimateDispersionOffset, PaperMethodAttributesReferencePointErrorToCamera) {
+TEST(EstimateDispersionOffset, ChenGuanMethodAttributesReferencePointErrorToCamera) {
   Station station(0);
   station.believed.rotation_center.reset();
   station.rig.calibration.rotation_center.reset();
@@ -109,7 +109,7 @@ TEST(EstimateDispersionOffset, PaperMethodAttributesReferencePointErrorToCamera)
   }
 }
 
-TEST(EstimateDispersionOffset, RejectsQuarterOfFixesWithFiveCentimeterErrors) {
+TEST(EstimateDispersionOffset, RejectsQuarterOfCapturesWithReferencePointErrors) {
   Station station(0.01);
   Random random(2);
   for (const auto method : {DispersionMethod::camera, DispersionMethod::chen_guan}) {
@@ -144,7 +144,7 @@ TEST(EstimateDispersionOffset, ReducesFixCircleToZeroWithInclinationSensor) {
   EXPECT_LT(fit.after.radius, 1e-9);
 }
 
-TEST(EstimateDispersionOffset, ReturnsStatusNamingReasonForEachKindOfUnusableCaptures) {
+TEST(EstimateDispersionOffset, StatusNamesTooFewCapturesWrongYawsFarReferenceOrOtherMap) {
   Station station(0.01);
   const auto find_status = [&](const std::vector<ReferencePointCapture>& captures,
                                DispersionMethod method = DispersionMethod::camera) {

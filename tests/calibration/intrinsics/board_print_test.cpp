@@ -29,7 +29,7 @@ IntrinsicsSolution solve_stretched(bool kalibr, double factor) {
 }
 
 /// Compares full solves with a wider board and with the board as stated.
-TEST_P(ComputeBoardAspectErrorEffectOnLens, MatchesLensChangeOfSolveWithWiderBoard) {
+TEST_P(ComputeBoardAspectErrorEffectOnLens, MatchesNegativeLensChangeOfSolveWithWiderBoard) {
   const IntrinsicsSolution stated = solve_stretched(GetParam(), 1);
   const IntrinsicsSolution wider = solve_stretched(GetParam(), 1 + std::sqrt(2) * kPrintSd);
   ASSERT_TRUE(stated.has_succeeded() && wider.has_succeeded());

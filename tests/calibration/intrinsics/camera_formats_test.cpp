@@ -231,7 +231,7 @@ Eigen::Vector2d kalibr_pixel(const YAML::Node& cam, const Eigen::Vector3d& point
   return {in[0] * plane.x + in[2], in[1] * plane.y + in[3]};
 }
 
-TEST_F(ReadCameraFormats, ExportedRosFileMatchesProjectionByRosFormulas) {
+TEST_F(ReadCameraFormats, CameraExportedToRosFileMatchesProjectionByRosFormulas) {
   for (const LensModel model : {LensModel::pinhole, LensModel::opencv4, LensModel::opencv5,
                                 LensModel::opencv8, LensModel::fisheye}) {
     const Camera camera = make_camera(model);
@@ -278,7 +278,7 @@ TEST_F(ReadCameraFormats, CameraReadFromRosFileMatchesProjectionByRosFormulas) {
   }
 }
 
-TEST_F(ReadCameraFormats, ExportedKalibrFileMatchesProjectionByKalibrFormulas) {
+TEST_F(ReadCameraFormats, CameraExportedToKalibrFileMatchesProjectionByKalibrFormulas) {
   for (const LensModel model : {LensModel::pinhole, LensModel::opencv4, LensModel::fisheye}) {
     const Camera camera = make_camera(model);
     const std::string text = format_kalibr_camchain(camera);
@@ -423,7 +423,7 @@ TEST_F(MrcalCameramodel, WritesValidRegionOfSolutionReadableByMrcal) {
   }
 }
 
-TEST_F(ReadCameraFormats, ReturnsValidRegionOfCameramodelAndRejectsInvalidOnes) {
+TEST_F(ReadCameraFormats, ReturnsValidRegionOfCameramodelAndRejectsMalformedRegions) {
   const Camera camera = make_camera(LensModel::opencv8);
   const ImageRegion bent{{10, 20}, {700, 15.5}, {420, 300}, {700, 590}, {12, 580}};
   const std::string text = format_mrcal_cameramodel(camera, bent);

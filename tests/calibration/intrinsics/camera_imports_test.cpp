@@ -50,7 +50,7 @@ TEST_F(ReadCameraOfAnyFormat, ReturnsExportedCameraExactlyFromEachFormat) {
   }
 }
 
-TEST_F(ReadCameraOfAnyFormat, ReturnsSplinedLensExactlyFromCameramodelOnly) {
+TEST_F(ReadCameraOfAnyFormat, ReturnsSplinedLensExactlyFromCameramodelTheOnlyFormatForIt) {
   const Camera camera = splined_camera();
   comes_back(camera, format_mrcal_cameramodel(camera), camera.lens_model);
   for (const auto& format_camera :
@@ -62,7 +62,7 @@ TEST_F(ReadCameraOfAnyFormat, ReturnsSplinedLensExactlyFromCameramodelOnly) {
   EXPECT_THAT(refusal(short_one), testing::HasSubstr("takes 312 parameters, not 290"));
 }
 
-TEST(ConvertCameraToLensModel, KeepsFisheyePixelsWithinFiveMillipixelsThroughSplinedLens) {
+TEST(ConvertCameraToLensModel, ConvertsFisheyeToSplinedLensAndBackWithinFiveMillipixels) {
   const auto wide = convert_camera_to_lens_model(make_camera(LensModel::fisheye),
                                                  lens_model_for_spline_grid({3, 20, 16, 190}));
   EXPECT_LT(wide.worst_px, 0.002);

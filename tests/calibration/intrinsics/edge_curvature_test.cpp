@@ -82,7 +82,7 @@ Tag tag_with_errors(const std::array<double, 4>& error_px) {
   return tag;
 }
 
-TEST(CorrectCornersForEdgeCurvature, MovesCornersToTruePositionsDespiteCurvatureErrors) {
+TEST(CorrectCornersForEdgeCurvature, RemovesCornerErrorsCausedByCurvatureErrors) {
   for (const std::array<double, 4> errors_px :
        {std::array{0.0, 0.0, 0.0, 0.0}, {0.1, 0.0, 0.0, 0.0}, {0.06, -0.1, 0.03, 0.08}}) {
     Tag tag = tag_with_errors(errors_px);

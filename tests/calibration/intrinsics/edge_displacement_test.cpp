@@ -14,7 +14,7 @@ namespace vlp {
 namespace {
 
 /// Board of separate tags, with gaps as wide as a tag or narrower.
-class EstimateTagEdgeDisplacements : public testing::TestWithParam<double> {
+class TagsWithDisplacedEdges : public testing::TestWithParam<double> {
  protected:
   Board board() const {
     Board board = synthetic_board(false);
@@ -42,7 +42,7 @@ class EstimateTagEdgeDisplacements : public testing::TestWithParam<double> {
   }
 };
 
-TEST_P(EstimateTagEdgeDisplacements, ReturnsTrueEdgeDisplacementOfEachView) {
+TEST_P(TagsWithDisplacedEdges, YieldTrueEdgeDisplacementOfEachView) {
   const auto input = make_input(shrunk_views(6, 0, 0.3));
   const auto shifts = estimate_tag_edge_displacements(input.views, synthetic_lens());
   ASSERT_EQ(shifts.size(), 6U);
@@ -55,7 +55,7 @@ TEST_P(EstimateTagEdgeDisplacements, ReturnsTrueEdgeDisplacementOfEachView) {
     EXPECT_NEAR(shift.displacement_px_at_pixel(shift.middle), 0, 1e-6);
 }
 
-TEST_P(EstimateTagEdgeDisplacements, SolveIntrinsicsRecoversEdgeShiftAndTrueLens) {
+TEST_P(TagsWithDisplacedEdges, SolveIntrinsicsRecoversEdgeShiftAndTrueLens) {
   const auto input = make_input(shrunk_views(16, 0.03, 0.35));
   const IntrinsicsSolution solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.has_succeeded());
@@ -68,7 +68,7 @@ TEST_P(EstimateTagEdgeDisplacements, SolveIntrinsicsRecoversEdgeShiftAndTrueLens
   EXPECT_LT(difference->mean_px, 0.03);
 }
 
-TEST_P(EstimateTagEdgeDisplacements, SolveIntrinsicsEstimatesNoWarpWhenEdgeShiftVaries) {
+TEST_P(TagsWithDisplacedEdges, SolveIntrinsicsEstimatesNoWarpWhenEdgeShiftVaries) {
   auto seen = shrunk_views(16, 0.03, 0);
   for (BoardView& view : seen) {
     for (TagDetection& tag : view.detection.tags) {
@@ -85,7 +85,7 @@ TEST_P(EstimateTagEdgeDisplacements, SolveIntrinsicsEstimatesNoWarpWhenEdgeShift
   EXPECT_LT(difference->mean_px, 0.03);
 }
 
-TEST_P(EstimateTagEdgeDisplacements, CheckBoardLayoutAcceptsTrueSpacingDespiteEdgeShift) {
+TEST_P(TagsWithDisplacedEdges, CheckBoardLayoutAcceptsTrueSpacingDespiteEdgeShift) {
   const auto seen = shrunk_views(10, 0.03, 0.4);
   EXPECT_EQ(check_board_layout(board(), seen, {}).problem, "");
   EXPECT_EQ(check_board_layout(board(), seen, synthetic_lens()).problem, "");
@@ -94,11 +94,11 @@ TEST_P(EstimateTagEdgeDisplacements, CheckBoardLayoutAcceptsTrueSpacingDespiteEd
   EXPECT_NE(check_board_layout(other, seen, synthetic_lens()).problem, "");
 }
 
-INSTANTIATE_TEST_SUITE_P(Spacings, EstimateTagEdgeDisplacements, testing::Values(1.0, 0.4),
+INSTANTIATE_TEST_SUITE_P(Spacings, TagsWithDisplacedEdges, testing::Values(1.0, 0.4),
                          [](const auto& gap) { return gap.param == 1 ? "OneTag" : "Narrow"; });
 
 /// A warped board that is assumed flat looks as if edges shifted inwards here and outwards there.
-TEST(EdgeDisplacement, SolveEstimatesWarpInsteadOfEdgeShiftsForWarpedBoard) {
+TEST(SolveIntrinsicsOfWarpedBoard, EstimatesWarpInsteadOfEdgeShifts) {
   constexpr double noise_px = 0.017;
   Random random(12);
   const WideBoards boards{0.1, 0.2};

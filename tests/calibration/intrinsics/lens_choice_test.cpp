@@ -77,7 +77,7 @@ TEST(SelectLensModel, ReturnsOpencv8ForRationalLensDespiteOneBadView) {
   EXPECT_NEAR(find_rms(*choice, choice->model), kNoise_px, 0.4 * kNoise_px);
 }
 
-TEST(SelectLensModel, RejectsOpencv4IfFewViewsLieFarFromCenter) {
+TEST(SelectLensModel, RejectsOpencv4ForRationalLensEvenIfFewViewsLieFarFromCenter) {
   constexpr std::size_t all = 30, far = 6;
   constexpr double inner_px = 220;
   SyntheticViews views{synthetic_board(false), rational_lens()};
@@ -121,7 +121,7 @@ TEST(SelectLensModel, ReturnsFisheyeForCornersBeyondRightAngle) {
   EXPECT_EQ(select_lens_model(seen_through(fisheye_lens(), 8)).value().beyond_right_angle_rad, 0);
 }
 
-TEST(DescribeLensChoice, StatesOffAxisAngleWhenBoardIsBeyondRightAngle) {
+TEST(DescribeLensModelChoice, StatesOffAxisAngleWhenBoardIsBeyondRightAngle) {
   const LensChoice choice{
       LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}, 1.7};
   EXPECT_EQ(describe_lens_model_choice(choice),
@@ -129,7 +129,7 @@ TEST(DescribeLensChoice, StatesOffAxisAngleWhenBoardIsBeyondRightAngle) {
             "off axis, where no LENSMODEL_OPENCVn has rays");
 }
 
-TEST(DescribeLensChoice, ListsModelsForWhichNoLensWasFound) {
+TEST(DescribeLensModelChoice, ListsModelsForWhichNoLensWasFound) {
   const LensChoice choice{LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}};
   EXPECT_EQ(describe_lens_model_choice(choice),
             "OPENCV_FISHEYE, 0.051 px rms in held-out views; LENSMODEL_OPENCV4 no lens");

@@ -14,7 +14,7 @@ namespace vlp {
 namespace {
 
 /// mrcal reports outliers on stderr. Only the messages of other threads may appear there.
-TEST(SolveBoardProblemByMrcal, SuppressesMrcalMessagesButKeepsStderrOfOtherThreads) {
+TEST(SolveIntrinsicsByMrcal, SuppressesMrcalMessagesButKeepsStderrOfOtherThreads) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(7);
   IntrinsicsInput input = views.input(15, random, 0.05);

@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-TEST(ProjectionUncertainty, MaxDirectionSdIsLargerForFrontalThanTiltedViews) {
+TEST(ProjectionUncertainty, MaxProjectionSdIsLargerForFrontalThanForTiltedViews) {
   SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(3);
   const auto tilted = solve_intrinsics(views.input(12, random, 0.1));
@@ -27,7 +27,7 @@ TEST(ProjectionUncertainty, MaxDirectionSdIsLargerForFrontalThanTiltedViews) {
             5 * ProjectionUncertainty(tilted).projection_sd_along_worst_direction_px(place));
 }
 
-TEST(ProjectionUncertainty, IntrinsicsRegularizationBiasMatchesFocalLengthError) {
+TEST(ProjectionUncertainty, IntrinsicsRegularizationBiasMatchesNegativeFocalLengthError) {
   // 110 degrees: the coefficients are far from zero, and the corner noise is a fiftieth of that for
   // which mrcal scales the regularization.
   const std::array wide{416.7,  416.9,  398.2,     302.1,   0.733348, 0.0897113,
@@ -55,7 +55,7 @@ TEST(ProjectionUncertainty, IntrinsicsRegularizationBiasIsZeroForFisheye) {
             Eigen::VectorXd::Zero(8));
 }
 
-TEST(ProjectionUncertainty, MaxDirectionSdMatchesMrcalForIndependentCorners) {
+TEST(ProjectionUncertainty, MaxProjectionSdMatchesMrcalForIndependentCorners) {
   if (run_program("/usr/bin/python3 -c 'import mrcal'").exit_code != 0) {
     GTEST_SKIP() << "mrcal for Python is not installed";
   }

@@ -119,7 +119,7 @@ TEST(EstimateAndCorrectToneCurve, ReturnsGammaOfGrayValuesWhenAllEdgesShiftEqual
   }
 }
 
-TEST(EstimateAndCorrectToneCurve, ReturnsGammaOfGrayValuesWithoutLensOrCornerNoise) {
+TEST(EstimateAndCorrectToneCurve, ReturnsGammaOfGrayValuesIfCornerSdsAreUnknownOrNoLensFits) {
   const Board board = synthetic_board(false);
   auto without_noise = CodedCamera{2, 1.5}.views(8, 4), of_another = without_noise;
   for (BoardView& view : without_noise) {
@@ -138,7 +138,7 @@ TEST(EstimateAndCorrectToneCurve, ReturnsGammaOfGrayValuesWithoutLensOrCornerNoi
   EXPECT_EQ(estimate_and_correct_tone_curve(none, board), 1);
 }
 
-TEST(EstimateAndCorrectToneCurve, ReturnsGammaOfGrayValuesIfHalfOfViewsLackCurve) {
+TEST(EstimateAndCorrectToneCurve, ReturnsGammaOfGrayValuesIfHalfOfViewsLackToneCurveFits) {
   auto views = CodedCamera{1, 1.5}.views(4, 5);
   for (const BoardView& view : CodedCamera{1, 1}.views(4, 6)) {
     views.push_back(view);

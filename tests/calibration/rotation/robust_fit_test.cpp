@@ -43,7 +43,7 @@ Matrix2 covariance_with(const std::vector<std::size_t>& order) {
   return at ? at->covariance(offset, offset) : Matrix2(Matrix2::Zero());
 }
 
-TEST(RobustFit, ReturnsIdenticalCovarianceForAnyMemoryOrder) {
+TEST(RobustFit, CovarianceIsIdenticalForAnyMemoryOrderOfParameters) {
   std::vector<std::size_t> order(13);
   std::iota(order.begin(), order.end(), 0);
   const Matrix2 expected = covariance_with(order);

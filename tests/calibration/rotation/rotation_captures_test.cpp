@@ -41,7 +41,7 @@ TEST(FindInPlaceRotationCaptures, ReturnsTrueHeightsYawsAxesAndLeverArm) {
   EXPECT_TRUE(rotation.rejected_captures.empty());
 }
 
-TEST(FindInPlaceRotationCaptures, YieldsExactAxisFromTwoLampsAndThreeCaptures) {
+TEST(FitRotationAxis, ReturnsExactAxisFromTwoLampsAndThreeCaptures) {
   RotationScene scene;
   scene.tilt_rad = rad_from_deg(10);
   scene.map = make_lamp_map({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}});
@@ -50,14 +50,14 @@ TEST(FindInPlaceRotationCaptures, YieldsExactAxisFromTwoLampsAndThreeCaptures) {
   expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
 }
 
-TEST(FindInPlaceRotationCaptures, YieldsExactAxisForLampsAtSeveralHeights) {
+TEST(FitRotationAxis, ReturnsExactAxisForLampsAtSeveralHeights) {
   RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.map =
       make_lamp_map({{-0.5, -0.35, 1.6}, {0.5, 0.2, 1.4}, {-0.4, 0.3, 1.8}, {0.1, -0.4, 1.5}});
   expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
 }
 
-TEST(FindInPlaceRotationCaptures, YieldsExactAxisForQuarterRotation) {
+TEST(FitRotationAxis, ReturnsExactAxisForQuarterRotation) {
   RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.arc_rad = rad_from_deg(105);  // minus the uneven steps at the ends
   expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);

@@ -55,7 +55,7 @@ class BoardDetectorYield : public testing::TestWithParam<Pictures> {
   }
 };
 
-TEST_P(BoardDetectorYield, KeepsAtLeast95PercentOfTagsOfTagFinder) {
+TEST_P(BoardDetectorYield, KeepsAtLeast95PercentOfTagsThatTagFinderDetects) {
   constexpr std::size_t views = 36, apart = 3;
   CaptureSet set = *std::find_if(scene.sets.begin(), scene.sets.end(),
                                  [](const CaptureSet& each) { return each.folder == "boards"; });

@@ -133,7 +133,7 @@ TEST(SquareCorners, KeepsOnlyAccurateCornersWhenOneMarkerIsDisplaced) {
   }
 }
 
-TEST(SquareCorners, CountsChessboardCornersFromTopLeftOfImage) {
+TEST(SquareCorners, NumbersChessboardCornersFromTopLeftOfImage) {
   for (const auto& [cols, rows] : {std::pair(9, 6), std::pair(9, 7), std::pair(8, 8)}) {
     SCOPED_TRACE(cols * 10 + rows);
     const Board board = squares(BoardKind::chessboard, cols, rows);
@@ -172,7 +172,7 @@ TEST(SquareCorners, ReturnsNoCornersForIncompleteChessboard) {
   EXPECT_TRUE(BoardDetector(board).detect_board(image).points.empty());
 }
 
-TEST(OtherTags, ChessboardSquaresAreCountedAndMarkerDictionaryIsNamed) {
+TEST(OtherBoardKinds, ChessboardSizeIsDetectedAndMarkerDictionaryIsNamed) {
   const cv::Mat image = drawn_chessboard(squares(BoardKind::chessboard, 9, 6));
   const auto [cols, rows] = detect_chessboard_size_in_squares(image);
   EXPECT_EQ(std::max(cols, rows), 9);
@@ -184,7 +184,7 @@ TEST(OtherTags, ChessboardSquaresAreCountedAndMarkerDictionaryIsNamed) {
             "the image shows markers of DICT_5X5, the largest of id 16");
 }
 
-TEST(RenumberLatticePoints, ReversesRowsCountedUpwards) {
+TEST(RenumberLatticePoints, ReversesRowsThatAreNumberedUpwards) {
   std::vector<PointDetection> points;
   for (std::size_t i = 0; i < 12; ++i) {
     points.push_back({i, {10.0 * static_cast<double>(i % 4), -10.0 * static_cast<double>(i / 4)}});

@@ -91,7 +91,7 @@ TEST(CorrectViewsForToneCurve, KeepsCornersWhenGammaIsCloseToOne) {
   EXPECT_EQ(images[0].detection.tags[0].corners_px[0].x(), 100);
 }
 
-TEST(CorrectViewsForToneCurve, KeepsOnlyCornersOfViewsWithoutToneCurve) {
+TEST(CorrectViewsForToneCurve, ChangesNoCornersOfViewsWithoutToneCurveFits) {
   BoardView plain = image(1, 500);
   plain.detection.curve_costs.resize(2);
   plain.detection.tags[0].tone_curve_fits.clear();

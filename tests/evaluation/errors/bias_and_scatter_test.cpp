@@ -13,7 +13,7 @@ namespace vlp {
 namespace {
 
 /// Two stations with biases of 3 mm and -3 mm along x and fixes 4 mm to either side along y.
-TEST(ComputeBiasAndRepeatability, ReturnsTrueBiasAndScatterOfEachStation) {
+TEST(ComputeBiasAndRepeatability, ReturnsTrueBiasAndScatterOfEachReferencePoint) {
   std::vector<FixError> errors;
   for (const std::size_t station : {0U, 1U}) {
     for (const double side : {-4e-3, 4e-3}) {

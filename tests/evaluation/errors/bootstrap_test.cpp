@@ -71,7 +71,7 @@ TEST(BootstrapErrorIntervals, CoversTrueStatisticsAtNominalRate) {
   }
 }
 
-TEST(BootstrapErrorIntervals, CoversTrueStatisticsAtNominalRateWithStationBias) {
+TEST(BootstrapErrorIntervals, CoversTrueStatisticsAtNominalRateWithBiasPerCluster) {
   for (const int count : count_covered(100, 3, 1, 0.3)) {
     EXPECT_GE(count, 270);
     EXPECT_LE(count, 297);

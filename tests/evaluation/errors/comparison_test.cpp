@@ -48,7 +48,7 @@ TEST(CompareHorizontalErrors, ReturnsBetterOrWorseForSmallPairedDifferences) {
             "equivalent");
 }
 
-TEST(CompareHorizontalErrors, ReturnsTheSameForDifferencesBelowOnePercent) {
+TEST(CompareHorizontalErrors, ReturnsEquivalentForDifferencesBelowOnePercent) {
   // For errors of 15 mm on average 1 % is 0.15 mm; the mean difference has an uncertainty of 0.01
   // mm.
   EXPECT_EQ(compare_pairs(pairs(100, 1e-4)), "equivalent");
@@ -74,7 +74,7 @@ TEST(CompareHorizontalErrors, ReturnsTheSameForDifferencesBelowOnePercent) {
   EXPECT_EQ(comparison.describe_comparison_result(), "inconclusive, too few");
 }
 
-TEST(CompareHorizontalErrors, ReturnsNoEvidenceForFewClustersDespiteManyPairs) {
+TEST(CompareHorizontalErrors, ReturnsInconclusiveForFewClustersDespiteManyPairs) {
   Pairs all = pairs(100, 1e-2);
   for (FixError& error : all.errors) error.cluster = 3 * (error.cluster % 19);
   const Comparison comparison =
@@ -85,7 +85,7 @@ TEST(CompareHorizontalErrors, ReturnsNoEvidenceForFewClustersDespiteManyPairs) {
   EXPECT_GT(comparison.interval_m->low, 0);
 }
 
-TEST(Comparison, VerdictRequiresWholeIntervalOnOneSide) {
+TEST(Comparison, VerdictRequiresWholeIntervalOnOneSideOfZero) {
   Comparison comparison;
   EXPECT_EQ(comparison.comparison_verdict(), "inconclusive");
   comparison.clusters = kMinClustersCompared;

@@ -72,7 +72,7 @@ TEST(ComputeErrorToCrlbRatio, MatchesClosedFormLimitForFourLamps) {
   EXPECT_NEAR(ratio->sd, 1 / std::sqrt(4.0), 1e-6);
 }
 
-TEST(CrlbRatio, AreErrorsBelowCrlbOnlyForSignificantlySmallerErrors) {
+TEST(CrlbRatio, AreErrorsBelowCrlbIsTrueOnlyForSignificantlySmallerErrors) {
   Random random(3);
   constexpr int trials = 2000, fixes = 50;
   const auto count_below_limit = [&](double stated) {
@@ -92,7 +92,7 @@ TEST(CrlbRatio, AreErrorsBelowCrlbOnlyForSignificantlySmallerErrors) {
 
 /// Every sixth camera is 10 m below the lamps, the others 2 m: their limit is five times as large,
 /// and a few fixes make up most of the ratio.
-TEST(CrlbRatio, AreErrorsBelowCrlbHardlyEverByChanceForUnequalLimits) {
+TEST(CrlbRatio, AreErrorsBelowCrlbIsHardlyEverTrueByChanceForUnequalLimits) {
   Random random(4);
   constexpr int trials = 300;
   constexpr std::size_t fixes = 60;

@@ -78,7 +78,7 @@ TEST(GroupPixelRunsIntoBlobs, JoinsBlobsConnectedByOneRun) {
   EXPECT_EQ(blobs[0].runs.size(), runs.size());
 }
 
-TEST(GroupPixelRunsIntoBlobs, JoinsBlobsWithDifferentLastRowsWithinMaxDarkRows) {
+TEST(GroupPixelRunsIntoBlobs, JoinsBlobsByRunOnlyIfBothEndWithinMaxDarkRows) {
   // A stripe of one blob ends before the run that joins both.
   const auto runs = joined({rows(10, 14, 20, 40), rows(10, 18, 50, 70), rows(19, 20, 35, 55)});
   EXPECT_EQ(group_pixel_runs_into_blobs(runs, 3).size(), 2U);

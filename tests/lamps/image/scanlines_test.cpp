@@ -131,7 +131,7 @@ bool before(const Light& a, const Light& b) {
   return a.pixel.x() != b.pixel.x() ? a.pixel.x() < b.pixel.x() : a.pixel.y() < b.pixel.y();
 }
 
-TEST(MakeScanlineImage, YieldsSameLightsForTransposedImage) {
+TEST(LightDetector, DetectsSameLightsInTransposedImageWithColumnReadout) {
   Scene scene = read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
   // The sample for the background uses other pixels of a transposed image; they must have the same
   // levels.

@@ -25,7 +25,7 @@ TEST(FindBlobOutline, PointsLieOnCircleOfDisc) {
   }
 }
 
-TEST(FindBlobOutline, ReturnsSideLevelAndRiseOfEdges) {
+TEST(FindBlobOutline, ReturnsLevelRiseAndSideOfEdges) {
   const DrawnDisc disc;
   const double rise_px = 2 * 0.6745 * disc.blur_px;  // between the quartiles of a normal curve
   const auto points = outline_in(disc.image(CV_16U));

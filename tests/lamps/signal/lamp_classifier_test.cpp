@@ -156,7 +156,7 @@ TEST(CrossValidateLampClassifier, MisidentifiesLampsWhenTrainingFunctionSwapsThe
   EXPECT_GE(confusion.count_wrongly_identified_lights(), 78);
 }
 
-TEST(ComputeStripeFeaturesForClassifier, ReturnsLogPeriodDutyCountAndLitArea) {
+TEST(ComputeStripeFeaturesForClassifier, ReturnsLogPeriodLitAreaDutyAndStripesPerLine) {
   Stripes stripes{};
   stripes.period_lines = 12;
   stripes.duty = 0.4;

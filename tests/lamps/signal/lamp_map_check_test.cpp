@@ -56,7 +56,7 @@ TEST(PredictRelativePeriodSd, ReturnsInfinityForTooFewPeriods) {
   EXPECT_EQ(predict_relative_period_sd(40, 50, 1), std::numeric_limits<double>::infinity());
 }
 
-TEST(CountScanlinesOnLamp, ReturnsScanlinesOrNulloptForUnknownSizeOrLampBelow) {
+TEST(CountScanlinesOnLamp, ReturnsScanlinesOrNulloptForUnknownSizeOrLampBelowCamera) {
   EXPECT_NEAR(count_scanlines_on_lamp(lamp(1, 2000), kConditions).value(), 58.5, 1e-9);
   Lamp unknown = lamp(1, 2000);
   unknown.shape.size_m.reset();

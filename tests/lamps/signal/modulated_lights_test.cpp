@@ -106,7 +106,7 @@ TEST(FindModulatedLights, CenterSdCoversOffsetOfBrightCore) {
   EXPECT_LT(squares / count, 1.5);
 }
 
-TEST(FindModulatedLights, ReturnsNoneForSteadyLightNoiseAndEmptyBoxes) {
+TEST(FindModulatedLights, ReturnsNoneForSteadyLightNoiseAndTinyImages) {
   const DrawnLamp steady{.center = {203.3, 131.6}, .radius_px = 70, .stripes = {.duty = 1}};
   EXPECT_TRUE(
       find_lights(render_lamps({steady}, kSearchSize, CV_8U, 1), kLampPeriods_lines).empty());

@@ -63,7 +63,7 @@ TEST(ComputeModulationMap, ReturnsNearlyZeroAmplitudeForLinearRamp) {
   EXPECT_LT(map.amplitude[map.modulation_cell_index(map.steps / 2, map.cells / 2)], 0.5);
 }
 
-TEST(ComputeMinSignificantAmplitude, IsExceededByNoiseAtExpectedRate) {
+TEST(ComputeMinSignificantAmplitude, NoiseExceedsFractionOfThresholdAtExpectedRate) {
   // The squared amplitude is exponentially distributed: a threshold lower by a factor has the
   // probability 1e-9 to the power of its square.
   constexpr double noise = 3, fraction = 0.4;

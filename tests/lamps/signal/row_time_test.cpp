@@ -202,7 +202,7 @@ TEST(SelectRowTimeCandidate, ReturnsProblemWithoutMatchingLights) {
   EXPECT_NE(result.problem, "");
 }
 
-TEST(GroupLightsByPeriod, GroupsRepeatedPeriodsAndIgnoresSingleOnes) {
+TEST(GroupLightsByLampOrPeriod, GroupsRepeatedPeriodsAndIgnoresSingleOnes) {
   Random random(4);
   std::vector<MeasuredPeriod> lights;
   add(lights, 2000, 40, 0.003, random);

@@ -17,7 +17,7 @@ TEST(ListLibraryVersions, ReturnsVersionsOfLibrariesThatAffectResults) {
 }
 
 /// At the start of a second, two clocks can differ by a tick.
-TEST(ComputeSecondsSinceUtc, IsNotNegativeForCurrentTime) {
+TEST(ComputeAgeOfUtc, IsNotNegativeForCurrentTime) {
   const std::string begin = get_current_utc();
   while (compute_age_of_utc_s(begin) < 1) {
     const std::string now = get_current_utc();
