@@ -264,11 +264,11 @@ class OverTime(unittest.TestCase):
         made_up = Fleet(1, moved=[(0, 2, 150, complex(3, -4))])
         made_up.chance = unittest.mock.Mock(gauss=lambda mean, sd: mean, uniform=lambda low, high: 1)
         room = fleet.make_rooms(fleet_rows(made_up)[1])[0]
-        _, lamp, k, change, _ = room.largest(0)
+        _, lamp, k, change, _ = room.find_largest_step(0)
         self.assertEqual(lamp, 2)
         self.assertAlmostEqual(abs(change - complex(3, -4)), 0, places=4)
-        room.take_off(lamp, room.series[lamp][k][0], change)
-        self.assertLess(room.largest(0)[0], 1e-3)
+        room.remove_displacement(lamp, room.series[lamp][k][0], change)
+        self.assertLess(room.find_largest_step(0)[0], 1e-3)
 
 
 if __name__ == "__main__":
