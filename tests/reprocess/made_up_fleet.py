@@ -64,8 +64,8 @@ class Fleet:
             drift = self.drifts.get(camera, {}).get(name, (0, 0))
             since, jump = self.broken.get(camera, (0, {}))
             jump = jump.get(name, (0, 0)) if session >= since else (0, 0)
-            elapsed_fraction = self.day(camera, session) / 365
-            values = [nominal[name][i] + drift[i] * elapsed_fraction + jump[i] + self.chance.gauss(0, scatter) for i in (0, 1)]
+            elapsed = self.day(camera, session) / 365
+            values = [nominal[name][i] + drift[i] * elapsed + jump[i] + self.chance.gauss(0, scatter) for i in (0, 1)]
             calibration |= {f"{name}_{unit}": values, f"{name}_sd_{unit}": [sd, sd]}
         room = self.room(camera, session)
         offsets = self.offsets(room, self.day(camera, session))
