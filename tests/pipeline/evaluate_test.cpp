@@ -219,7 +219,7 @@ TEST_F(VlpEvaluate, WarnsOfErrorsBelowCrlb) {
   EXPECT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("(below the limit: see the warning)"));
   EXPECT_THAT(result.errors, HasSubstr("or the fixes use more information than one"));
-  EXPECT_THAT(content("e.json"), HasSubstr("\"beaten\": true"));
+  EXPECT_THAT(content("e.json"), HasSubstr("\"errors_below_crlb\": true"));
   EXPECT_EQ(problems_by_schema("evaluation", {folder / "e.json"}), "");
 }
 
