@@ -33,19 +33,19 @@ void check_height(const YamlValue& item, double height_m, const Scene& scene) {
   for (const ForeignLight& light : clutter.foreign_lights) check(light.glow, "a foreign light");
 }
 
-/// Rejects a spot that does not leave space in the room for a rotation of the camera about it.
-void check_pivot(const Eigen::Vector2d& spot_m, const Room& room, double lever_arm_m,
+/// Rejects a pivot that does not leave space in the room for a rotation of the camera about it.
+void check_pivot(const Eigen::Vector2d& pivot_m, const Room& room, double lever_arm_m,
                  const YamlValue& value) {
-  const Eigen::Array2d spot = spot_m.array();
-  const bool inside = (spot - lever_arm_m >= room.min_m.head<2>().array()).all() &&
-                      (spot + lever_arm_m <= room.max_m.head<2>().array()).all();
+  const Eigen::Array2d pivot = pivot_m.array();
+  const bool inside = (pivot - lever_arm_m >= room.min_m.head<2>().array()).all() &&
+                      (pivot + lever_arm_m <= room.max_m.head<2>().array()).all();
   if (!inside) throw value.make_yaml_error("moves the camera outside the room");
 }
 
 Eigen::Vector2d read_pivot(const YamlValue& value, const Room& room, double lever_arm_m) {
-  const Eigen::Vector2d spot_m(value.read_yaml_numbers(2).data());
-  check_pivot(spot_m, room, lever_arm_m, value);
-  return spot_m;
+  const Eigen::Vector2d pivot_m(value.read_yaml_numbers(2).data());
+  check_pivot(pivot_m, room, lever_arm_m, value);
+  return pivot_m;
 }
 
 std::vector<Eigen::Vector2d> read_grid(const YamlValue& value, const Room& room,
@@ -57,14 +57,14 @@ std::vector<Eigen::Vector2d> read_grid(const YamlValue& value, const Room& room,
   const int rows = map.get_required_yaml_value("rows").read_yaml_integer_within(2, 1000);
   map.check_all_yaml_keys_read();
   for (const std::size_t end : {0U, 1U}) check_pivot({x[end], y[end]}, room, lever_arm_m, value);
-  std::vector<Eigen::Vector2d> spots;
+  std::vector<Eigen::Vector2d> pivots;
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
-      spots.emplace_back(x[0] + (x[1] - x[0]) * column / (columns - 1),
-                         y[0] + (y[1] - y[0]) * row / (rows - 1));
+      pivots.emplace_back(x[0] + (x[1] - x[0]) * column / (columns - 1),
+                          y[0] + (y[1] - y[0]) * row / (rows - 1));
     }
   }
-  return spots;
+  return pivots;
 }
 
 StraightDrive read_straight_drive(const YamlValue& value, const Room& room, double lever_arm_m) {
@@ -97,17 +97,17 @@ std::vector<Eigen::Vector2d> compute_positions_along(const StraightDrive& drive,
 void read_capture_positions(YamlMap& map, const Scene& scene, const Room& room,
                             LampShots& captures) {
   const double lever_arm_m = scene.mount.lever_arm_m.norm();
-  const auto spots = map.get_optional_yaml_value("pivots_m"),
+  const auto pivots = map.get_optional_yaml_value("pivots_m"),
              grid = map.get_optional_yaml_value("grid");
   const auto drive = map.get_optional_yaml_value("drive");
-  if (spots.has_value() + grid.has_value() + drive.has_value() != 1) {
+  if (pivots.has_value() + grid.has_value() + drive.has_value() != 1) {
     throw map.make_yaml_error("needs one of the keys pivots_m, grid, drive, views");
   }
-  if (spots) {
-    for (const YamlValue& spot : spots->read_yaml_list()) {
-      captures.pivots_m.push_back(read_pivot(spot, room, lever_arm_m));
+  if (pivots) {
+    for (const YamlValue& pivot : pivots->read_yaml_list()) {
+      captures.pivots_m.push_back(read_pivot(pivot, room, lever_arm_m));
     }
-    if (captures.pivots_m.empty()) throw spots->make_yaml_error("contains no pivot");
+    if (captures.pivots_m.empty()) throw pivots->make_yaml_error("contains no pivot");
   } else if (grid) {
     captures.pivots_m = read_grid(*grid, room, lever_arm_m);
   } else {

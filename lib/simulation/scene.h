@@ -437,7 +437,7 @@ struct Scene {
 /// Reads `vlp-scene/1`; datasets/README.md lists the keys, and the scenes there explain them.
 /// Angles in the file are in degrees.
 /// @throws InputError with line and key: unknown or missing keys, invalid values, a lamp that is
-/// not above the camera, a spot outside the room
+/// not above the camera, a pivot outside the room
 Scene read_scene_file(const std::filesystem::path& file);
 
 /// Draws the random parts of a scene that are the same in all captures, from its seed: the hot

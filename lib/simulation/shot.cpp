@@ -26,22 +26,22 @@ Eigen::Matrix3d rotation(double angle_rad, const Eigen::Vector3d& axis) {
   return Eigen::AngleAxisd(angle_rad, axis.normalized()).toRotationMatrix();
 }
 
-/// Indices of a capture's height, spot and yaw, and the time since the start of its pass.
+/// Indices of a capture's height, pivot and yaw, and the time since the start of its pass.
 struct CaptureIndices {
   std::size_t height, pivot, yaw;
   double driven_s;
 };
 
 CaptureIndices find_capture_indices(const LampShots& captures, std::size_t index) {
-  const std::size_t spots = captures.pivots_m.size(), yaws = captures.yaws_rad.size();
+  const std::size_t pivots = captures.pivots_m.size(), yaws = captures.yaws_rad.size();
   const auto repeat = static_cast<std::size_t>(captures.repeat);
   if (captures.drive) {
-    const std::size_t turned = index / spots / repeat;
-    return {turned / yaws, index % spots, turned % yaws,
-            static_cast<double>(index % spots) * captures.interval_s};
+    const std::size_t turned = index / pivots / repeat;
+    return {turned / yaws, index % pivots, turned % yaws,
+            static_cast<double>(index % pivots) * captures.interval_s};
   }
   const std::size_t turned = index / repeat;
-  return {turned / yaws / spots, turned / yaws % spots, turned % yaws, 0};
+  return {turned / yaws / pivots, turned / yaws % pivots, turned % yaws, 0};
 }
 
 /// Returns the ray of the pixel at the offset `offset` from `middle`. If that pixel has no ray,
