@@ -83,9 +83,9 @@ std::vector<Eigen::Vector2d> compute_reprojection_residuals(const BoardProblem& 
   return residuals;
 }
 
-bool solve_lens_parameters(BoardProblem& problem, SolveOptions what) {
-  what.distortions = what.distortions && problem.intrinsics.size() > 4;
-  return solve(problem, what);
+bool solve_lens_parameters(BoardProblem& problem, SolveOptions solve_options) {
+  solve_options.distortions = solve_options.distortions && problem.intrinsics.size() > 4;
+  return solve_board_problem(problem, solve_options);
 }
 
 namespace {
@@ -165,8 +165,8 @@ class IntrinsicsSolver {
   /// A view of the input and a corner of it.
   using CornerOfView = std::pair<std::size_t, std::size_t>;
 
-  Lens lens() const { return Lens(problem_.lens_model, problem_.intrinsics); }
-  bool solve(SolveOptions what);
+  Lens current_lens() const { return Lens(problem_.lens_model, problem_.intrinsics); }
+  bool solve_current_board_problem(SolveOptions solve_options);
   /// Estimates the pose of every view with a lens. Views without a pose are unused until the next
   /// call.
   void initialize_board_poses(const Lens& lens);
@@ -224,8 +224,8 @@ bool IntrinsicsSolver::solve_intrinsics_from_focal_length(double focal_px) {
     initialize_board_poses(lens);
     if (used_.size() < kMinViews) return false;
     assemble_board_problem(lens);
-    if (!solve({true, false, false, false})) return false;
-    lens = this->lens();
+    if (!solve_current_board_problem({true, false, false, false})) return false;
+    lens = this->current_lens();
     if (std::abs(lens.focal_px().x() / before_px - 1) < convergence) break;
   }
   return true;
@@ -238,7 +238,7 @@ void IntrinsicsSolver::initialize_spline_from_symmetric_lens() {
   if (!symmetric.refine_intrinsics()) return;  // keeps STEREOGRAPHIC
   symmetric_ = symmetric.problem_.intrinsics;
   displaced_corners_ = symmetric.find_corners_of_outlier_tags();
-  const Lens fisheye = symmetric.fitted_lens();
+  const Lens fisheye = symmetric.current_lens();
   for (const std::size_t view : used_) {
     if (const auto pose = estimate_board_view_pose(input_.views[view], fisheye)) {
       initial_poses_.poses[view] = pose->camera_from_board;
@@ -258,7 +258,7 @@ void IntrinsicsSolver::initialize_spline_from_symmetric_lens() {
     if (const auto ray = fisheye.unproject_pixel(pixel))
       problem_.fixed_rays.push_back({pixel, ray->direction});
   }
-  assemble_board_problem(lens());
+  assemble_board_problem(current_lens());
 }
 
 bool IntrinsicsSolver::rotate_camera_frame_to_optical_axis() {
@@ -271,21 +271,23 @@ bool IntrinsicsSolver::rotate_camera_frame_to_optical_axis() {
     symmetric.lens_model = LensModel::fisheye;
     symmetric.intrinsics = symmetric_;
     const auto start =
-        fit_rotation_between_lenses(lens(), Lens(LensModel::fisheye, symmetric_), pixels);
+        fit_rotation_between_lenses(current_lens(), Lens(LensModel::fisheye, symmetric_), pixels);
     if (!start) return true;
     rotate_all_board_poses(symmetric.poses, *start);
-    if (!vlp::solve(symmetric, {true, true, solved_parameters_.warp, false})) return true;
+    if (!vlp::solve_board_problem(symmetric, {true, true, solved_parameters_.warp, false}))
+      return true;
     const Lens fisheye(LensModel::fisheye, symmetric.intrinsics);
     symmetric_ = symmetric.intrinsics;
-    const auto new_from_old = fit_rotation_between_lenses(lens(), fisheye, pixels);
+    const auto new_from_old = fit_rotation_between_lenses(current_lens(), fisheye, pixels);
     if (!new_from_old) return true;
     const double turned_rad = Eigen::AngleAxisd(*new_from_old).angle();
     if (turned_rad < tolerance_rad) return true;
     for (auto& [pixel, ray] : problem_.fixed_rays) {
-      if (const auto seen = lens().project_point(new_from_old->transpose() * ray)) pixel = *seen;
+      if (const auto seen = current_lens().project_point(new_from_old->transpose() * ray))
+        pixel = *seen;
     }
     rotate_all_board_poses(problem_.poses, *new_from_old);
-    if (!solve(solved_parameters_)) return false;
+    if (!solve_current_board_problem(solved_parameters_)) return false;
   }
   return true;
 }
@@ -304,18 +306,18 @@ bool IntrinsicsSolver::refine_intrinsics() {
   }
   bool convergence = false;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    if (!solve(solved_parameters_)) return false;
+    if (!solve_current_board_problem(solved_parameters_)) return false;
     convergence = !reestimate_poses_and_drop_bad_views();
     if (convergence) break;
     if (used_.size() < kMinViews) return false;
-    assemble_board_problem(lens());
+    assemble_board_problem(current_lens());
   }
   if (reinstate_dropped_views()) {
-    assemble_board_problem(lens());
+    assemble_board_problem(current_lens());
   } else if (convergence) {
     return can_lens_project_most_views();
   }
-  return solve(solved_parameters_) && can_lens_project_most_views();
+  return solve_current_board_problem(solved_parameters_) && can_lens_project_most_views();
 }
 
 bool IntrinsicsSolver::scale_spline_regularization_to_noise() {
@@ -326,7 +328,7 @@ bool IntrinsicsSolver::scale_spline_regularization_to_noise() {
     const double noise_px = std::clamp(make_intrinsics_solution().rms_px, min_px, 1.0);
     if (std::abs(noise_px / problem_.noise_px - 1) < convergence) break;
     problem_.noise_px = noise_px;
-    if (!solve(solved_parameters_)) return false;
+    if (!solve_current_board_problem(solved_parameters_)) return false;
   }
   return true;
 }
@@ -350,12 +352,12 @@ void IntrinsicsSolver::copy_corners_to_board_problem() {
 bool IntrinsicsSolver::correct_edge_curvature_and_solve_again() {
   constexpr double tolerance_px = 0.002;
   double max_px = 0;
-  const Lens lens = this->lens();
+  const Lens lens = this->current_lens();
   for (auto& view : input_.views)
     max_px = std::max(max_px, correct_corners_for_edge_curvature(view, lens));
   if (max_px < tolerance_px) return true;
   copy_corners_to_board_problem();
-  return solve(solved_parameters_);
+  return solve_current_board_problem(solved_parameters_);
 }
 
 bool IntrinsicsSolver::correct_edge_displacements_and_solve_again(DisplacementForm form) {
@@ -365,7 +367,7 @@ bool IntrinsicsSolver::correct_edge_displacements_and_solve_again(DisplacementFo
     auto views = input_.views;
     for (auto& view : views)
       view = input_.lattice.apply_warp_to_board_corners(std::move(view), problem_.warp_m);
-    const auto shifts = estimate_tag_edge_displacements(views, lens(), form);
+    const auto shifts = estimate_tag_edge_displacements(views, current_lens(), form);
     if (std::all_of(shifts.begin(), shifts.end(), [](const EdgeDisplacement& shift) {
           return shift.coefficients.lpNorm<Eigen::Infinity>() < tolerance_px;
         })) {
@@ -376,7 +378,7 @@ bool IntrinsicsSolver::correct_edge_displacements_and_solve_again(DisplacementFo
           correct_corners_for_edge_displacement(input_.views[view], shifts[view]);
     }
     copy_corners_to_board_problem();
-    if (!solve(solved_parameters_)) return false;
+    if (!solve_current_board_problem(solved_parameters_)) return false;
   }
   return true;
 }
@@ -389,7 +391,7 @@ bool IntrinsicsSolver::solve_board_warp() {
   };
   const IntrinsicsSolution flat = make_intrinsics_solution();
   solved_parameters_.warp = true;
-  if (!solve(solved_parameters_)) return false;
+  if (!solve_current_board_problem(solved_parameters_)) return false;
   const IntrinsicsSolution with_warp = make_intrinsics_solution();
   if (input_.warp == WarpChoice::automatic &&
       squares(flat) - squares(with_warp) <= min_reduction * with_warp.rms_px * with_warp.rms_px) {
@@ -414,10 +416,10 @@ bool IntrinsicsSolver::reweight_corners_by_variance() {
   }
   const CornerWeights weights(known, unknown);
   for (auto& view : input_.views) {
-    for (auto& corner : view) corner.weight = weights.at(corner.sd_px);
+    for (auto& corner : view) corner.weight = weights.corner_weight(corner.sd_px);
   }
   copy_corners_to_board_problem();
-  return solve(solved_parameters_);
+  return solve_current_board_problem(solved_parameters_);
 }
 
 bool IntrinsicsSolver::reject_corner_outliers() {
@@ -426,7 +428,8 @@ bool IntrinsicsSolver::reject_corner_outliers() {
   if (make_intrinsics_solution().rms_px < exact_px) return true;
   SolveOptions without_outliers = solved_parameters_;
   without_outliers.reject_outliers = true;
-  return solve(without_outliers) && std::isfinite(make_intrinsics_solution().rms_px);
+  return solve_current_board_problem(without_outliers) &&
+         std::isfinite(make_intrinsics_solution().rms_px);
 }
 
 IntrinsicsSolution IntrinsicsSolver::make_intrinsics_solution() const {
@@ -438,7 +441,9 @@ IntrinsicsSolution IntrinsicsSolver::make_intrinsics_solution() const {
   return result;
 }
 
-bool IntrinsicsSolver::solve(SolveOptions what) { return solve_lens_parameters(problem_, what); }
+bool IntrinsicsSolver::solve_current_board_problem(SolveOptions solve_options) {
+  return solve_lens_parameters(problem_, solve_options);
+}
 
 void IntrinsicsSolver::initialize_board_poses(const Lens& lens) {
   initial_poses_ = estimate_initial_board_poses(input_, lens);
@@ -563,7 +568,7 @@ bool IntrinsicsSolver::reestimate_poses_and_drop_bad_views() {
   const double limit_px = compute_max_view_rms(rms);
   const double worst_px = *std::max_element(rms.begin(), rms.end());
   if (worst_px <= limit_px) return false;
-  const Lens lens = this->lens();
+  const Lens lens = this->current_lens();
   std::vector<std::size_t> kept;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     const auto pose = estimate_board_view_pose(input_.views[used_[i]], lens);
@@ -582,7 +587,7 @@ bool IntrinsicsSolver::reestimate_poses_and_drop_bad_views() {
 
 bool IntrinsicsSolver::reinstate_dropped_views() {
   const double limit_px = compute_max_view_rms(compute_view_residual_rms_px());
-  const Lens lens = this->lens();
+  const Lens lens = this->current_lens();
   const std::size_t before = dropped_.size();
   std::erase_if(dropped_, [&](const auto& dropped) {
     const auto pose = estimate_board_view_pose(input_.views[dropped.view], lens);

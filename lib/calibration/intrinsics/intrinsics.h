@@ -120,7 +120,7 @@ IntrinsicsSolution solve_intrinsics_from_half_of_views(const IntrinsicsSolution&
 /// outliers. NaN for points that were not seen or cannot be projected.
 std::vector<Eigen::Vector2d> compute_reprojection_residuals(const BoardProblem& problem);
 
-/// Calls solve(), without the distortions if the model has none.
-bool solve_lens_parameters(BoardProblem& problem, SolveOptions what);
+/// Calls solve_board_problem(), without the distortions if the model has none.
+bool solve_lens_parameters(BoardProblem& problem, SolveOptions solve_options);
 
 }  // namespace vlp

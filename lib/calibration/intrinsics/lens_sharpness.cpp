@@ -92,7 +92,7 @@ std::vector<double> compute_relative_lights(const std::vector<MeasuredEdge>& edg
   for (const auto& [middle_px, along, step] : edges) {
     edge_values.push_back({middle_px, along, step.bright, 0});
   }
-  const EdgeField field(edge_values, EdgeField::Terms::place);
+  const EdgeField field(edge_values, EdgeField::Terms::position);
   for (const auto& [middle_px, along, step] : edges) {
     lights.push_back(step.bright / field.evaluate_field_at_edge(middle_px, along));
   }

@@ -306,7 +306,7 @@ void write_csv(const std::filesystem::path& file, const std::vector<RunRecord>& 
       const bool has_value = metric != nullptr && metric->value;
       row.push_back(has_value ? format_significant_digits(*metric->value, kDigits) : "");
     }
-    csv.row(row);
+    csv.write_csv_row(row);
   }
   csv.save_file();
 }
@@ -337,7 +337,7 @@ void add_images_and_events(const RunRecord& run, Json& json) {
   }
 }
 
-Json to_json(const RunRecord& run) {
+Json make_run_json(const RunRecord& run) {
   Json json;
   for (const RunField& field : list_run_text_fields()) {
     json[field.name] = field.in_csv ? join_lines(run.*field.text) : run.*field.text;
@@ -449,7 +449,7 @@ SpooledRun read_spooled_run(const std::filesystem::path& file) {
 std::string format_hook_json(const RunRecord& run) {
   Json json;
   json["event"] = find_voiding_event(run) != nullptr ? "voided" : "verdict";
-  json.update(to_json(run));
+  json.update(make_run_json(run));
   return serialize(json);
 }
 
@@ -457,7 +457,7 @@ void export_runs_to_file(const std::filesystem::path& file, const std::vector<Ru
   if (file.extension() == ".csv") return write_csv(file, runs);
   if (file.extension() != ".json") throw InputError(file, "should end in .csv or .json");
   Json all = Json::array();
-  for (const RunRecord& run : runs) all.push_back(to_json(run));
+  for (const RunRecord& run : runs) all.push_back(make_run_json(run));
   write_file(file, serialize(all));
 }
 

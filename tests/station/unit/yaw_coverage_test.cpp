@@ -19,8 +19,8 @@ using testing::SizeIs;
 struct YawCoverageTest : testing::Test {
   YawCoverageTest() {
     config.lamps = read_lamp_map(kExample + "lamps.yaml");
-    config.completion.turn_captures = 12;
-    config.completion.turn_heights = 2;
+    config.completion.rotation_captures = 12;
+    config.completion.rotation_heights = 2;
   }
   StationConfig config{};
   Calibration calibration = read_calibration(kExample + "calibration.yaml");
@@ -66,7 +66,7 @@ TEST_F(YawCoverageTest, ReturnsEachHeightAndRequiresConfiguredNumber) {
   frames.erase(frames.begin() + 12, frames.end());
   EXPECT_THAT(compute_yaw_coverage(frames, config, calibration).heights, SizeIs(1));
   EXPECT_FALSE(compute_yaw_coverage(frames, config, calibration).sufficient);
-  config.completion.turn_heights = 1;
+  config.completion.rotation_heights = 1;
   EXPECT_TRUE(compute_yaw_coverage(frames, config, calibration).sufficient);
   EXPECT_THAT(compute_yaw_coverage({}, config, calibration).heights, SizeIs(0));
 }
