@@ -32,7 +32,7 @@ class ReadStationConfig : public testing::Test {
     folder.file(name, text.replace(at, from.size(), to));
   }
   std::string rejection_message() const {
-    return rejection_message([&] { read_station_config(folder / "station.yaml"); });
+    return vlp::rejection_message([&] { read_station_config(folder / "station.yaml"); });
   }
   TemporaryFolder folder;
 };
