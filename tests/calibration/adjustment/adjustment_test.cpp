@@ -169,7 +169,7 @@ TEST(MakeNominalIntrinsicsCovariance, ReturnsVariancesThatMatchGivenImageDisplac
   EXPECT_EQ(covariance(0, 1), 0);
 }
 
-/// Lens of another camera: focal lengths 4 % too small, different distortion.
+/// Initial lens of another camera: focal lengths 4 % and 3 % too small, and different distortion.
 TEST(RunBundleAdjustment, RecoversFocalLengthsAndPrincipalPointFromWrongInitialLens) {
   Random random(8);
   Survey survey(0.002);

@@ -172,5 +172,22 @@ TEST(ComputeMedianEdgeMtf50, MatchesMtf50OfUniformEdgeBlur) {
   EXPECT_NEAR(*found, compute_mtf50_of_gaussian_blur(kLensBlur_px), 0.01 * *found);
 }
 
+TEST(ComputeMedianEdgeMtf50, ReturnsMtf50OfUpperMedianBlur) {
+  BoardDetection seen = make_views(even_step, 1)[0].seen;
+  seen.tags.resize(2);
+  const std::array blurs_px{2.0, 0.5, 0.7, 1.1, 9.0, 0.9, 0.4, 3.0};
+  for (std::size_t i = 0; i < blurs_px.size(); ++i) {
+    seen.tags[i / 4].steps[i % 4].blur_px = blurs_px[i];
+  }
+  const auto found = compute_median_edge_mtf50(seen);
+  ASSERT_TRUE(found);
+  EXPECT_DOUBLE_EQ(*found, compute_mtf50_of_gaussian_blur(1.1));
+
+  seen.tags[0].steps[0].blur_px = 0;  // not measured
+  const auto of_seven = compute_median_edge_mtf50(seen);
+  ASSERT_TRUE(of_seven);
+  EXPECT_DOUBLE_EQ(*of_seven, compute_mtf50_of_gaussian_blur(0.9));
+}
+
 }  // namespace
 }  // namespace vlp

@@ -37,6 +37,14 @@ TEST(FindInPlaceRotationCaptures, ReturnsTrueHeightsYawsAxesAndLeverArm) {
   EXPECT_EQ(rotation.captures[0].height, 0U);
   EXPECT_EQ(rotation.captures[23].height, 1U);
   EXPECT_NEAR(rotation.captures[0].yaw_rad, scene.first_rad, 1e-3);
+  for (std::size_t i = 0; i < rotation.captures.size(); ++i) {
+    const RotationCapture& capture = rotation.captures[i];
+    ASSERT_EQ(capture.image, std::to_string(i) + ".png");
+    const double height = i < 12 ? 0 : 1, k = static_cast<double>(i % 12);
+    const double yaw_rad = scene.first_rad + height +
+                           scene.arc_rad * (k + 0.3 * std::sin(5 * k + height)) / (12 - 0.7);
+    EXPECT_NEAR(wrap_angle_rad(capture.yaw_rad - yaw_rad), 0, 1e-3) << capture.image;
+  }
   EXPECT_THAT(rotation.lever_arm_m, IsNear(scene.lever_arm_m, 1e-4));
   EXPECT_TRUE(rotation.rejected_captures.empty());
 }
