@@ -133,8 +133,17 @@ TEST(SplinedLensWithRandomControlPoints, UnprojectReturnsRaysOnlyWithoutFold) {
 
 TEST(SplinedLensWithExtremeControlPoints, ProjectAndUnprojectReturnOnlyFiniteResults) {
   const LensModel model = lens_model_for_spline_grid({3, 5, 4, 90});
+  std::vector<std::vector<double>> lenses;
   for (const double all : {0.0, -1.0, 1e150, -1e300}) {
-    std::vector<double> parameters(num_lens_parameters(model), all);
+    lenses.emplace_back(num_lens_parameters(model), all);
+  }
+  Random random(63);
+  for (int trial = 0; trial < 20; ++trial) {
+    for (double& value : lenses.emplace_back(num_lens_parameters(model))) {
+      value = random.uniform(-1e3, 1e3);
+    }
+  }
+  for (std::vector<double>& parameters : lenses) {
     std::fill_n(parameters.begin(), 4, 500);
     const Lens lens(model, parameters);
     for (const double pixel : {-1e9, 0.0, 500.0, 1e300}) {

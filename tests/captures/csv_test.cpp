@@ -115,12 +115,20 @@ TEST_F(CsvTableTest, ReturnsFormulasThatCsvWriterEscapes) {
   }
 }
 
-TEST_F(CsvTableTest, CsvWriterWritesNumbersWithoutEscape) {
-  CsvWriter writer(folder / "b.csv", {"a", "b", "c", "d", "e", "f"});
-  writer.write_csv_row({"-0.5", "+1.5e-3", "-", "'quoted'", "a=b", "-inf"});
+TEST_F(CsvTableTest, ReadsNumbersThatCsvWriterWritesWithoutEscape) {
+  const std::vector<std::string> columns{"a", "b", "c", "d", "e", "f"};
+  const std::vector<std::string> fields{"-0.5", "+1.5e-3", "-", "'quoted'", "a=b", "-inf"};
+  CsvWriter writer(folder / "b.csv", columns);
+  writer.write_csv_row(fields);
   writer.save_file();
   EXPECT_EQ(folder.read_content(folder / "b.csv"),
             "a,b,c,d,e,f\n-0.5,+1.5e-3,-,'quoted',a=b,-inf\n");
+  const CsvTable table(folder / "b.csv");
+  ASSERT_EQ(table.num_rows(), 1U);
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    EXPECT_EQ(table.get_cell_text(0, table.get_required_column(columns[i])), fields[i]);
+  }
+  EXPECT_EQ(table.get_cell_number(0, table.get_required_column("a")), -0.5);
 }
 
 TEST_F(CsvTableTest, RejectsDuplicateColumnAmong200000Columns) {

@@ -29,11 +29,16 @@ TEST(EigendecomposeSymmetricMatrix, AscendingEigenvaluesAndVectorsReconstructMat
   expect_same(eigendecompose_symmetric_matrix(four), four);
 }
 
-TEST(EigendecomposeSymmetricMatrix, ReturnsNoPositiveSmallestEigenvalueForNanMatrix) {
+TEST(EigendecomposeSymmetricMatrix, ReturnsNanForNanMatrix) {
   const Eigen::MatrixXd none =
       Eigen::MatrixXd::Constant(3, 3, std::numeric_limits<double>::quiet_NaN());
-  EXPECT_FALSE(eigendecompose_symmetric_matrix(none).values.minCoeff() > 0);
-  EXPECT_EQ(eigendecompose_symmetric_matrix(none).vectors.cols(), 3);
+  const auto eigen = eigendecompose_symmetric_matrix(none);
+  EXPECT_FALSE(eigen.values.minCoeff() > 0);
+  ASSERT_EQ(eigen.values.size(), 3);
+  ASSERT_EQ(eigen.vectors.rows(), 3);
+  ASSERT_EQ(eigen.vectors.cols(), 3);
+  EXPECT_TRUE(eigen.values.array().isNaN().all());
+  EXPECT_TRUE(eigen.vectors.array().isNaN().all());
 }
 
 TEST(InvertPositiveDefiniteMatrix, ReturnsInverseOrNulloptIfNotPositiveDefinite) {

@@ -102,7 +102,7 @@ TEST(FitLampClassifier, ExcludesWronglyLabeledLightsFromTraining) {
   EXPECT_GE(confusion.count_correctly_identified_lights(), 297);
 }
 
-TEST(LampClassifier, AcceptsDeviatingPeriodOfClearStripesButRejectsItOfUnclear) {
+TEST(LampClassifier, AcceptsUnclearStripesOnlyCloseToTrainedLamp) {
   const LampClassifier classifier = fit_lamp_classifier(make_lights(kLamps, 30, 1));
   Stripes stripes = make_lights(kLamps, 1, 3)[1].stripes;
   ASSERT_EQ(identify_lamp_by_classifier(classifier, stripes), 7);
@@ -110,6 +110,18 @@ TEST(LampClassifier, AcceptsDeviatingPeriodOfClearStripesButRejectsItOfUnclear) 
   EXPECT_EQ(identify_lamp_by_classifier(classifier, stripes), 7);
   stripes.periodicity_r2 = 0.6;
   EXPECT_EQ(identify_lamp_by_classifier(classifier, stripes), std::nullopt);
+
+  ASSERT_EQ(classifier.lamps.size(), 3);
+  ASSERT_EQ(classifier.lamps[1].lamp, 7);
+  const LampFeatures features =
+      classifier.mean + classifier.scale.cwiseProduct(classifier.lamps[1].center);
+  stripes.period_lines = std::exp(features[0]);
+  stripes.duty = features[1];
+  stripes.count_per_line = features[2];
+  stripes.lit_area = features[3];
+  stripes.is_regular = true;
+  ASSERT_FALSE(are_stripes_reliable(stripes));
+  EXPECT_EQ(identify_lamp_by_classifier(classifier, stripes), 7);
 }
 
 TEST(FitLampClassifier, ReturnsSameClassifierForReversedOrderOfLights) {
