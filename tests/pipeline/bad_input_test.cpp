@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <vector>
 
 #include "support/datasets.h"
 #include "support/program.h"
@@ -89,13 +90,81 @@ TEST(VlpLocateOutput, ErrorNamesOutputFileThatCannotBeWritten) {
   EXPECT_THAT(result.errors, HasSubstr("/no/such/folder/fixes.csv: cannot be written"));
 }
 
-TEST(VlpLocateUsage, ErrorPointsToHelpForInvalidOptions) {
+TEST(VlpLocateUsage, ReportsErrorInOneLineThatPointsToHelp) {
   for (const std::string options : {"", "--nonsense", "a b c", "--correction some"}) {
     const auto result = run_program("vlp-locate " + options);
     EXPECT_EQ(result.exit_code, 2) << options;
     EXPECT_THAT(result.errors, HasSubstr("see vlp-locate --help"));
+    EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1) << result.errors;
   }
   EXPECT_THAT(run_program("vlp-locate --nonsense").errors, HasSubstr("unknown: --nonsense; see"));
+}
+
+/// Command line with all required arguments but one.
+struct MissingArgument {
+  std::string command;
+  std::string argument;
+};
+
+TEST(ProgramUsage, ErrorNamesMissingRequiredArgumentInOneLine) {
+  for (const auto& [command, argument] : std::vector<MissingArgument>{
+           {"vlp-adjust --calibration c -o o", "--lamps"},
+           {"vlp-adjust --lamps l -o o", "--calibration"},
+           {"vlp-adjust --lamps l --calibration c", "--output"},
+           {"vlp-board", "--output"},
+           {"vlp-calibrate -o o", "session"},
+           {"vlp-calibrate s", "--output"},
+           {"vlp-convert -o o", "input"},
+           {"vlp-convert i", "--output"},
+           {"vlp-detect --lamps l -o o", "images"},
+           {"vlp-detect i -o o", "--lamps"},
+           {"vlp-detect i --lamps l", "--output"},
+           {"vlp-dispersion --lamps l --calibration c -o o", "images"},
+           {"vlp-dispersion i --calibration c -o o", "--lamps"},
+           {"vlp-dispersion i --lamps l -o o", "--calibration"},
+           {"vlp-dispersion i --lamps l --calibration c", "--output"},
+           {"vlp-evaluate --truth t", "fixes"},
+           {"vlp-intrinsics --board b -o o", "images"},
+           {"vlp-intrinsics i -o o", "--board"},
+           {"vlp-intrinsics i --board b", "--output"},
+           {"vlp-limits --calibration c --height-m 0 --noise-px 1", "--lamps"},
+           {"vlp-limits --lamps l --height-m 0 --noise-px 1", "--calibration"},
+           {"vlp-limits --lamps l --calibration c --noise-px 1", "--height-m"},
+           {"vlp-limits --lamps l --calibration c --height-m 0", "--noise-px"},
+           {"vlp-locate --lamps l --calibration c -o o", "images"},
+           {"vlp-locate i --calibration c -o o", "--lamps"},
+           {"vlp-locate i --lamps l -o o", "--calibration"},
+           {"vlp-locate i --lamps l --calibration c", "--output"},
+           {"vlp-rotation --lamps l --calibration c -o o", "images"},
+           {"vlp-rotation i --calibration c -o o", "--lamps"},
+           {"vlp-rotation i --lamps l -o o", "--calibration"},
+           {"vlp-rotation i --lamps l --calibration c", "--output"},
+           {"vlp-simulate -o o", "scene"},
+           {"vlp-simulate s", "--output"},
+           {"vlp-station run", "--station"},
+           {"vlp-station verify", "--station"},
+           {"vlp-station hook", "--station"},
+           {"vlp-station restore", "run"},
+           {"vlp-station certificate", "run"},
+           {"vlp-station clean", "--station"},
+           {"vlp-station void --operator o --reason r", "run"},
+           {"vlp-station void 1 --reason r", "--operator"},
+           {"vlp-station void 1 --operator o", "--reason"},
+           {"vlp-station export", "--output"},
+           {"vlp-station import --records r.db", "results"},
+           {"vlp-station import r", "--records"},
+           {"vlp-station trend", "metric"},
+           {"vlp-station study", "metric"},
+           {"vlp-train --lamps l", "folders"},
+           {"vlp-train f", "--lamps"}}) {
+    const auto result = run_program(command);
+    const std::string program = command.substr(0, command.find(' '));
+    EXPECT_EQ(result.exit_code, 2) << command;
+    EXPECT_EQ(result.output, "") << command;
+    EXPECT_EQ(result.errors,
+              program + ": error: " + argument + " is required; see " + program + " --help\n")
+        << command;
+  }
 }
 
 }  // namespace

@@ -138,10 +138,13 @@ TEST_F(VlpDispersion, WritesPlotAsSvgFile) {
   const auto result =
       dispersion(turn(12, 6.28), "--reference-point 0.1 -0.05 --plot " + path("picture.svg"));
   ASSERT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(TemporaryFolder::read_content(folder / "picture.svg"), HasSubstr("<svg"));
+  const std::string svg = TemporaryFolder::read_content(folder / "picture.svg");
+  for (const char* part : {"<svg", "before", "after", "reference point", "</svg>"}) {
+    EXPECT_THAT(svg, HasSubstr(part));
+  }
 }
 
-TEST_F(VlpDispersion, WarnsToRunVlpRotationWithoutRotationCenter) {
+TEST_F(VlpDispersion, KeepsCameraAndWarnsToRunVlpRotationWithoutRotationCenter) {
   rig.calibration.rotation_center.reset();
   believed.rotation_center.reset();
   believed.dispersion.reset();
@@ -150,10 +153,16 @@ TEST_F(VlpDispersion, WarnsToRunVlpRotationWithoutRotationCenter) {
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.errors, HasSubstr("run vlp-rotation first"));
   EXPECT_THAT(result.output, Not(HasSubstr("nan")));
+  const Calibration written = read_calibration(folder / "calibration.yaml");
+  EXPECT_EQ(written.camera.intrinsics, believed.camera.intrinsics);
+  EXPECT_EQ(written.camera.imager_px, believed.camera.imager_px);
+  EXPECT_FALSE(written.rotation_center);
+  EXPECT_TRUE(written.dispersion);
 }
 
-/// From images: a camera whose tilt is not known at all, at the station of a scene.
-TEST(VlpDispersionOfRenderedImages, OffsetIsNegativeErrorOfRotationCenter) {
+/// From images at the reference point of a scene: a camera whose rotation center has an error of
+/// 2 px and -3 px.
+TEST(VlpDispersionOfRenderedImages, OffsetEqualsErrorOfRotationCenter) {
   const TemporaryFolder folder;
   const std::string rendered = (folder / "rendered").string();
   const auto simulated = run_program("vlp-simulate -q " VLP_SOURCE_DIR

@@ -268,6 +268,10 @@ TEST_F(VlpEvaluate, ReturnsTwoForBadUsage) {
     EXPECT_EQ(evaluate(options).exit_code, 2) << options;
   }
   EXPECT_THAT(with_truth("--gate mean=1").errors, HasSubstr("the gates are: mean_mm, median_mm"));
+  const auto without_fixes = run_program("cd '" + path("") + "' && vlp-evaluate --truth truth.csv");
+  EXPECT_EQ(without_fixes.exit_code, 2);
+  EXPECT_EQ(without_fixes.errors,
+            "vlp-evaluate: error: fixes is required; see vlp-evaluate --help\n");
 }
 
 TEST_F(VlpEvaluate, WritesIdenticalJsonForOneAndFourThreads) {

@@ -158,11 +158,15 @@ TEST_F(VlpIntrinsicsErrors, RejectsKalibrFormatForOpencv8LensAndWritesNoOutput) 
   EXPECT_FALSE(fs::exists(kalibr));
 }
 
-TEST_F(VlpIntrinsicsErrors, SkipsHugeImageAndReportsNoTagInTinyImage) {
+TEST_F(VlpIntrinsicsErrors, SkipsTinyAndHugeImages) {
   const std::string images = copies({"0.png"});
   cv::imwrite((folder / "images/1.png").string(), cv::Mat(600, 801, CV_8UC1, cv::Scalar(7)));
+  cv::imwrite((folder / "images/2.png").string(), cv::Mat(1, 800, CV_8UC1, cv::Scalar(7)));
   const auto huge = calibrate(images, kRig + "/board.yaml", "--max-mpx 0.4802");
+  EXPECT_EQ(huge.exit_code, 3) << "one view is left";
   EXPECT_THAT(huge.errors, HasSubstr("1.png: is 801 x 600 px, more than the 0.4802 million"));
+  EXPECT_THAT(huge.errors,
+              HasSubstr("2.png: is 800 x 1 px, the camera's images are 800 x 600 px; skipped"));
   fs::create_directory(folder / "tiny");
   cv::imwrite((folder / "tiny/0.png").string(), cv::Mat(1, 800, CV_8UC1, cv::Scalar(7)));
   const auto tiny = calibrate((folder / "tiny").string(), kRig + "/board.yaml");

@@ -23,13 +23,27 @@ const std::string kLimits = "vlp-limits --lamps " VLP_SOURCE_DIR
                             "/datasets/example/lamps.yaml --calibration " VLP_SOURCE_DIR
                             "/datasets/example/calibration.yaml --height-m 0 --noise-px 0.1 ";
 
-TEST(VlpLimits, PrintsRowForEachErrorSource) {
+TEST(VlpLimits, PrintsErrorOfEachSourceAndTotal) {
   const auto result =
       run_program(kLimits + "--principal-point-px 1 --tilt-deg 0.5 --lamp-map-mm 1");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   for (const char* row : {"noise", "principal point", "tilt", "lamp map", "total"}) {
     EXPECT_THAT(result.output, HasSubstr(std::string("\n") + row));
   }
+  // Median over the floor, the first number of a row.
+  const auto horizontal_mm = [&](const std::string& row) {
+    const auto at = result.output.find("\n" + row);
+    return at == std::string::npos ? -1 : std::stod(result.output.substr(at + 1 + row.size()));
+  };
+  // 0.1 px and 1 px are about 0.2 mm and 5 mm, half a degree on each of two axes is about 20 mm.
+  EXPECT_NEAR(horizontal_mm("noise"), 0.24, 0.05);
+  EXPECT_NEAR(horizontal_mm("principal point"), 4.6, 0.5);
+  EXPECT_NEAR(horizontal_mm("tilt"), 20.6, 1);
+  EXPECT_NEAR(horizontal_mm("lamp map"), 0.77, 0.1);
+  EXPECT_NEAR(horizontal_mm("total"),
+              std::hypot(horizontal_mm("principal point"), horizontal_mm("tilt"),
+                         std::hypot(horizontal_mm("noise"), horizontal_mm("lamp map"))),
+              0.2);
 }
 
 TEST(VlpLimits, WritesErrorMapAsCsvAndPng) {

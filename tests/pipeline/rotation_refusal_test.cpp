@@ -85,9 +85,12 @@ TEST_F(VlpRotationErrors, ExitsWith2ForLampMapOfAnotherRoom) {
                  2, "is it the map of this room?");
 }
 
-TEST_F(VlpRotationErrors, RejectsPlotPathEqualToLampMap) {
+TEST_F(VlpRotationErrors, RejectsPlotPathEqualToLampMapAndKeepsMap) {
   const std::string input = kExample + "lamps.yaml";
-  EXPECT_EQ(rotation(kExample + "turning.csv", "--plot " + input).exit_code, 2);
+  const std::string before = TemporaryFolder::read_content(input);
+  expect_refusal(rotation(kExample + "turning.csv", "--plot " + input), 2,
+                 "is also an input and would be overwritten");
+  EXPECT_EQ(TemporaryFolder::read_content(input), before);
 }
 
 }  // namespace

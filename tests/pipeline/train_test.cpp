@@ -245,6 +245,13 @@ TEST_F(VlpTrain, ProgramsRejectClassifierOfOtherLampsOrRowTime) {
   EXPECT_THAT(refusal(kLamps, " --calibration " + folder.file("other.yaml", calibration).string()),
               HasSubstr("trained.yaml: row_time_s is 3e-05"));
   EXPECT_THAT(refusal(kLamps + " --classifier none.yaml", kCalibration), HasSubstr("--classifier"));
+  const auto located = run_program(
+      "vlp-locate " + kRig +
+      "/sample --lamps " VLP_SOURCE_DIR "/datasets/wide/rendered/lamps.yaml" + kCalibration +
+      " --classifier " + output.string() + " -o " + (folder / "fixes.csv").string());
+  EXPECT_EQ(located.exit_code, 2);
+  EXPECT_THAT(located.errors, HasSubstr("trained.yaml: lamp 1 is not in"));
+  EXPECT_FALSE(fs::exists(folder / "fixes.csv"));
   const auto table =
       run_program("vlp-locate " + kRig + "/sample/true_detections.csv" + kLamps + kCalibration +
                   " --classifier " + output.string() + " -o " + (folder / "fixes.csv").string());
