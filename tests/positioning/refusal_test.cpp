@@ -158,13 +158,14 @@ TEST_F(PositionerStatus, ConstructorThrowsForInvalidMapCalibrationOrOptions) {
 }
 
 TEST(FixStatus, HasNameAndExplanationForEachValue) {
-  for (int i = 0; i <= static_cast<int>(FixStatus::mirrored_map); ++i) {
+  for (int i = 0; i <= static_cast<int>(FixStatus::row_time_unknown); ++i) {
     const auto status = static_cast<FixStatus>(i);
     EXPECT_FALSE(fix_status_name(status).empty());
     EXPECT_FALSE(describe_fix_status(status).empty());
   }
   EXPECT_EQ(fix_status_name(FixStatus::ok), "ok");
   EXPECT_EQ(fix_status_name(FixStatus::mirrored_map), "mirrored_map");
+  EXPECT_EQ(fix_status_name(FixStatus::row_time_unknown), "row_time_unknown");
 }
 
 }  // namespace

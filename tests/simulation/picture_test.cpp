@@ -139,7 +139,7 @@ TEST(EncodeImageAsJpegOrPng, ReturnsLosslessPngWithoutJpegQuality) {
   }
 }
 
-TEST(EncodeImageAsJpegOrPng, JpegHasLessLossAtHigherQuality) {
+TEST(EncodeImageAsJpegOrPng, ReturnsJpegOfGivenQuality) {
   const Sensor noisy{8, 0.5, 5, 60000, 8, true, {}};
   const cv::Mat image = simulate_sensor_image(noisy, step(50, 400), 1);
   const ImageProcessing coarse{1, {}, 30}, fine{1, {}, 95};
@@ -148,6 +148,9 @@ TEST(EncodeImageAsJpegOrPng, JpegHasLessLossAtHigherQuality) {
   EXPECT_EQ(bytes.at(0), 0xff);
   EXPECT_EQ(bytes.at(1), 0xd8);
   EXPECT_EQ(encode_image_as_jpeg_or_png(image, fine), bytes);
+  std::vector<unsigned char> expected;
+  ASSERT_TRUE(cv::imencode(".jpg", image, expected, {cv::IMWRITE_JPEG_QUALITY, 95}));
+  EXPECT_EQ(bytes, expected);
   EXPECT_GT(bytes.size(), encode_image_as_jpeg_or_png(image, coarse).size());
   const cv::Mat found = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
   EXPECT_EQ(found.type(), CV_8U);

@@ -76,7 +76,32 @@ TEST_F(ReadStationConfig, RejectsUnknownGateWithLine) {
   EXPECT_THAT(rejection_message(), AllOf(HasSubstr("station.yaml:"), HasSubstr("rms_mm")));
 }
 
-TEST_F(ReadStationConfig, RejectsCoverageFractionsAboveOne) {
+TEST_F(ReadStationConfig, RejectsImplausibleValues) {
+  struct Implausible {
+    const char *message, *from, *to;
+  };
+  for (const auto& [message, from, to] :
+       {Implausible{"gates.coverage: should be a fraction from 0 to 1, not 7", "\n  coverage: 0.7",
+                    "\n  coverage: 7"},
+        {"gates.check_fix_fraction", "check_fix_fraction: 0.9", "check_fix_fraction: 1.9"},
+        {"gates.rms_px", "rms_px: 0.014", "rms_px: -0.014"},
+        {"completion.board_coverage", "board_coverage: 0.7", "board_coverage: 70"},
+        {"completion.board_views", "board_views: 36", "board_views: 0"},
+        {"completion.turn_captures", "turn_captures: 12", "turn_captures: 10001"},
+        {"completion.turn_arc_deg", "turn_arc_deg: 300", "turn_arc_deg: 361"},
+        {"completion.check_captures", "check_captures: 36", "check_captures: 3.6"},
+        {"rejection.blur_px", "{blur_px: 2", "{blur_px: 101"},
+        {"rejection.dark_fraction", "dark_fraction: 0.1", "dark_fraction: 1.1"},
+        {"rejection.same_pose_fraction", "same_pose_fraction: 0.01", "same_pose_fraction: -0.01"},
+        {"rejection.max_consecutive_rejections", "max_consecutive_rejections: 12",
+         "max_consecutive_rejections: 0"}}) {
+    const std::string before = TemporaryFolder::read_content(folder / "station.yaml");
+    change("station.yaml", from, to);
+    EXPECT_THAT(rejection_message(), HasSubstr(message)) << to;
+    folder.file("station.yaml", before);
+  }
+  EXPECT_NO_THROW(read_station_config(folder / "station.yaml"));
+
   change("station.yaml", "\n  coverage: 0.7", "\n  coverage: 7");
   EXPECT_THAT(rejection_message(),
               HasSubstr("gates.coverage: should be a fraction from 0 to 1, not 7"));
