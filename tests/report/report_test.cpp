@@ -19,6 +19,8 @@ TEST(RenderReportHtml, ShowsVerdictAfterTitleAndMarksFailedGates) {
   EXPECT_THAT(html, HasSubstr("<tr class=\"marked\"><th scope=\"row\">p90_mm</th>"
                               "<td>2.5\u00a0mm</td><td>at most\u00a02\u00a0mm</td>"));
   EXPECT_LT(html.find("<h1>unit 7</h1>"), html.find("FAIL</strong>"));
+  EXPECT_LT(html.find("FAIL</strong>"), html.find("<table>"));
+  EXPECT_LT(html.find("<table>"), html.find("mean_mm</th>"));
 }
 
 TEST(RenderReportHtml, HasFactsAndFloorPlanBeforeGates) {

@@ -7,6 +7,7 @@
 namespace vlp {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -39,8 +40,11 @@ TEST(CdfPlot, ThinsManyErrorsButKeepsLargest) {
 }
 
 TEST(CdfPlot, RendersAllZeroErrors) {
-  EXPECT_THAT(render_plot_as_svg(make_error_cdf_plot_drawing(CdfPlot{"a", {{"b", {0, 0}, 0, 0}}})),
-              HasSubstr("<svg"));
+  const Drawing drawing = make_error_cdf_plot_drawing(CdfPlot{"a", {{"b", {0, 0}, 0, 0}}});
+  EXPECT_THAT(drawing.commands, HasSubstr("\n0 0 \n0 50 \n0 100 \n"));
+  EXPECT_THAT(drawing.commands, HasSubstr("\n0 50 \n0 90 \n"));
+  EXPECT_THAT(render_plot_as_svg(drawing),
+              AllOf(HasSubstr("<svg"), HasSubstr("b: p50 0 mm, p90 0 mm")));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 namespace vlp {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
@@ -46,7 +47,11 @@ TEST_F(DispersionPlotTest, LabelsOutliersOnlyIfThereAreAny) {
 TEST_F(DispersionPlotTest, RendersSingleFixBeforeAndAfter) {
   plot.before = {{{0.01, 0}}, {{0.01, 0}, 0}};
   plot.after = {{{0, 0}}, {{0, 0}, 0}};
-  EXPECT_THAT(rendered("a.svg"), HasSubstr("<svg"));
+  EXPECT_THAT(
+      make_dispersion_plot_drawing(plot).commands,
+      AllOf(HasSubstr("$before << END\n10 0 \nEND\n"), HasSubstr("$after << END\n0 0 \nEND\n")));
+  EXPECT_THAT(rendered("a.svg"), AllOf(HasSubstr("<svg"), HasSubstr("before"), HasSubstr("after"),
+                                       HasSubstr("reference point")));
 }
 
 }  // namespace

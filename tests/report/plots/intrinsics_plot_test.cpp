@@ -64,11 +64,12 @@ TEST_F(IntrinsicsPlotTest, RendersReproduciblePngOrSvgByExtension) {
       HasSubstr("a.gif: a picture's name should end in .png or .svg"));
 }
 
-TEST_F(IntrinsicsPlotTest, RendersUnknownSdsAndStatesWhenAllAreUnknown) {
+TEST_F(IntrinsicsPlotTest, LeavesUnknownSdsBlankAndStatesWhenAllAreUnknown) {
   const std::string whole = render_plot_as_svg(plot);
   plot.sd_px[0] = std::numeric_limits<double>::infinity();
   const std::string part = render_plot_as_svg(plot);
   EXPECT_NE(part, whole);
+  EXPECT_THAT(make_intrinsics_plot_drawing(plot).commands, HasSubstr("$map << END\n0 0 NaN\n"));
   EXPECT_THAT(part, HasSubstr("0.05"));
   plot.sd_px.assign(9, std::nan(""));
   EXPECT_THAT(render_plot_as_svg(plot), AllOf(HasSubstr("not determined"), HasSubstr("2 corners")));

@@ -7,6 +7,7 @@
 namespace vlp {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 TEST(TrackPlot, DistancesToLeftOfCommandedLineArePositive) {
@@ -34,7 +35,10 @@ TEST(TrackPlot, ThinsManyFixesAndStatesStep) {
 
 TEST(TrackPlot, RendersFixExactlyOnLine) {
   const TrackPlot plot{"", {{{0, 0}, {1, 0}}}, {{0.5, 0}}, {{{0, 0}, {1, 0}}}};
-  EXPECT_THAT(render_plot_as_svg(make_line_drive_plot_drawing(plot)), HasSubstr("<svg"));
+  const Drawing drawing = make_line_drive_plot_drawing(plot);
+  EXPECT_THAT(drawing.commands, HasSubstr("$fixes << END\n0.5 0 0.5 0 \nEND\n"));
+  EXPECT_THAT(render_plot_as_svg(drawing),
+              AllOf(HasSubstr("<svg"), HasSubstr("fixes"), HasSubstr("fitted line")));
 }
 
 }  // namespace
