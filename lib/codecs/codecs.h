@@ -12,9 +12,10 @@
 /// library is therefore linked to them and loaded at the first image.
 namespace vlp {
 
-/// Reader of the frames of a video or a camera: interface of cv::VideoCapture. Members, backends
-/// (`api`, for example cv::CAP_FFMPEG) and properties (for example cv::CAP_PROP_FPS) are those of
-/// OpenCV.
+/// Abstract interface to cv::VideoCapture, which reads the frames of a video or a camera. The
+/// members have the arguments and results of its open(), grab(), retrieve(), get() and set():
+/// `api` is a backend (for example cv::CAP_FFMPEG), `property` one of cv::VideoCaptureProperties.
+/// set_video_property() has no result.
 class VideoReader {
  public:
   VideoReader() = default;

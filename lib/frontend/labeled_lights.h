@@ -19,8 +19,9 @@ namespace vlp {
 /// there is none.
 const Light* find_light_at_pixel(const Observation& image, const Eigen::Vector2d& pixel);
 
-/// Lights of all images with the lamp ids that a table of labels gives for their positions
-/// (add_labeled_lights()).
+/// Lights to which a table of labels assigns a lamp id, accumulated over folders by
+/// add_labeled_lights(). Covers only images that are not rejected; lights without a label are
+/// omitted. Also counts the labels.
 struct LabeledLights {
   std::vector<LabeledLight> lights;
   /// Number of labels in images that are used, and number of these labels without a light.

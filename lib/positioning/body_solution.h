@@ -19,7 +19,8 @@ inline double compute_reduced_chi_squared(double chi_squared, std::size_t lamps)
 }
 
 /// Largest reduced chi-squared that the reported noise explains: residuals of five standard
-/// deviations.
+/// deviations. A larger value does not reject a fix. It starts the tests of a mirrored map and of
+/// outlier lamps, which can replace the fix or reject it.
 inline constexpr double kMaxReducedChiSquared = 25;
 
 /// Arm of the camera and prior of the motion.

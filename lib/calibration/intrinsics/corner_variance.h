@@ -48,7 +48,6 @@ CornerVariance estimate_corner_variance_components(std::span<const CornerError> 
 class CornerWeights {
  public:
   /// Estimates the weights from the residuals of all corners.
-  /// Estimates the weights from the residuals of all corners.
   /// @param known    corners with a predicted standard deviation; at least one, not all residuals 0
   /// @param unknown  corners without one
   CornerWeights(std::span<const CornerError> known, std::span<const CornerError> unknown);

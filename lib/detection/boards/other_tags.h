@@ -9,9 +9,9 @@
 
 namespace vlp {
 
-/// Searches an image without tags of `board` for another pattern: the mirrored board, tags of
-/// another family or border width, or markers of another dictionary. Takes about a second per
-/// image.
+/// Searches an image with none or few tags of `board` for another pattern: the mirrored board, tags
+/// of another family or border width, or markers of another dictionary. Tags of another kind count
+/// only if there are more of them than tags of the board. Takes about a second per image.
 /// @return the pattern in one line for a message; empty if none is detected, and for chessboards
 std::string find_and_describe_tags_of_other_kinds(const Board& board, const cv::Mat& image);
 

@@ -20,8 +20,9 @@ struct CertifiedValue {
 
 /// Returns the values of a calibration for a certificate, with standard uncertainties if known. The
 /// values are focal length, principal point, rotation center, zenith, lever arm and dispersion
-/// offset. Each has two entries, along x and y. Lengths in the image are in px, the zenith is in
-/// degrees, the lever arm in mm.
+/// offset. Each has two entries, along x and y. Focal length, principal point, rotation center
+/// and dispersion offset are in px, the lever arm is in mm. The zenith is in degrees: 180/pi times
+/// its point (x/z, y/z) in the camera.
 ///
 /// The uncertainties are estimated from the scatter of the captures. Those of zenith and dispersion
 /// include the contributions of the earlier steps. The board is assumed exact unless it has

@@ -18,7 +18,7 @@ namespace vlp {
 
 /// Event of a run after its verdict. Events are only added, never changed or removed.
 struct RunEvent {
-  /// Unique id that sorts chronologically: 20261121T134501.123456Z-01234567.
+  /// Id of this event, unique; ids sort chronologically: 20261121T134501.123456Z-01234567.
   std::string event;
   /// Kind of the event: one of the constants below.
   std::string kind;

@@ -25,6 +25,9 @@ namespace vlp {
 StepResult calibrate_lens_on_station(const StationConfig& config, const std::string& camera_id,
                                      Observations seen);
 
+/// Calibrates the rotation center from captures of a rotation in place
+/// (run_rotation_calibration_step() with RotationMethod::axis). Fails with `undetermined` also if
+/// some captures do not fit the result, as with images of two cameras.
 StepResult calibrate_rotation_on_station(const StationConfig& config,
                                          const Calibration& calibration,
                                          const std::vector<Frame>& frames);
