@@ -162,7 +162,7 @@ TEST_F(VlpDispersion, KeepsCameraAndWarnsToRunVlpRotationWithoutRotationCenter) 
 
 /// From images at the reference point of a scene: a camera whose rotation center has an error of
 /// 2 px and -3 px.
-TEST(VlpDispersionOfRenderedImages, OffsetEqualsErrorOfRotationCenter) {
+TEST(VlpDispersionOfRenderedImages, OffsetIsNegativeErrorOfRotationCenter) {
   const TemporaryFolder folder;
   const std::string rendered = (folder / "rendered").string();
   const auto simulated = run_program("vlp-simulate -q " VLP_SOURCE_DIR

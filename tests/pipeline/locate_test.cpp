@@ -131,7 +131,7 @@ TEST_F(VlpLocate, WritesRobotPoseWithCameraOnRobotOption) {
   EXPECT_NEAR(figure(0, "z_m"), 0.05 - 0.2, 1e-5);
 }
 
-TEST_F(VlpLocate, AppliesTiltCorrectionUnlessOptionIsNone) {
+TEST_F(VlpLocate, AppliesTiltCorrectionUnlessCorrectionOptionIsNone) {
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.03, 1);
   const auto seen_tilted = seen(4);
   locate({{"a", seen_tilted}});

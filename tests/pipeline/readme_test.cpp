@@ -272,7 +272,7 @@ TEST(DocumentationPages, NamedOptionsExistInHelpOfTheirPrograms) {
   EXPECT_GT(checked, 60U);
 }
 
-TEST(NamedOptions, ReturnsOptionsWithoutArgumentsAndFileNames) {
+TEST(NamedOptions, ReturnsOptionNamesOfCommandTextWithoutValues) {
   EXPECT_THAT(named_options("vlp-locate FOLDER --camera-on-robot"),
               testing::ElementsAre("--camera-on-robot"));
   EXPECT_THAT(named_options("--gate missing_fraction=0 --json=out/no--option.json"),
@@ -283,7 +283,7 @@ TEST(NamedOptions, ReturnsOptionsWithoutArgumentsAndFileNames) {
 
 /// Each metric has one row in "Choosing gates", marked if its gate is a minimum or not of the
 /// camera.
-TEST(DocumentationPages, ChoosingGatesDefinesEachMetricOnce) {
+TEST(DocumentationPages, ChoosingGatesPageHasOneRowForEachMetric) {
   std::vector<std::string> defined, kinds;
   for (const std::string& line : lines_in(kSource / "apps/choosing-gates.md")) {
     if (!line.starts_with("| `")) continue;
@@ -407,7 +407,7 @@ std::string read_section(const fs::path& page, const std::string& heading) {
   return std::regex_replace(text, std::regex(" +"), " ");
 }
 
-TEST(DocumentationPages, AnswersAreWithinTwoLinksOfReadme) {
+TEST(DocumentationPages, AnswersToUserQuestionsAreWithinTwoLinksOfReadme) {
   std::set<std::string> reached{"README.md"};
   for (int click = 0; click < 2; ++click) {
     for (const std::string& page : std::set(reached)) {
@@ -425,7 +425,7 @@ TEST(DocumentationPages, AnswersAreWithinTwoLinksOfReadme) {
   }
 }
 
-TEST(DocumentationPages, EachJsonDocumentHasSchema) {
+TEST(DocumentationPages, EachSourceThatWritesJsonIsNamedInSchema) {
   std::set<std::string> writers, have_schemas;
   for (const fs::path& file : find_files({".cpp", ".h", ".py", ".sh"})) {
     const std::string name = name_of_page(file);

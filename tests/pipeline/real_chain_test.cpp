@@ -107,7 +107,7 @@ TEST_F(VlpLocateRealLamps, HeightErrorIsBelow20MmWithThreeLamps) {
 }
 
 /// Another phone, calibrated from its own photographs: what it would reach under those lamps.
-TEST_F(VlpIntrinsics, VlpLimitsSdsMatchPinholeFormulaForCalibratedPhone) {
+TEST_F(VlpIntrinsics, PhoneCalibrationGivesVlpLimitsSdsOfPinholeFormula) {
   const auto board = real_data("apriltag-lattice-phone"), luxapose = real_data("luxapose");
   if (board.empty() || luxapose.empty()) GTEST_SKIP() << "no real captures here";
   const auto calibrated = calibrate(board.string(), (board / "board.yaml").string());

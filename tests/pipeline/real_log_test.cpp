@@ -129,7 +129,7 @@ TEST_F(RealLog, VlpEvaluateMeanErrorHalvesAfterLeveling) {
 /// The robot stands level; a tilt estimated per image adds errors. Mean error and 90 % quantile
 /// with a free tilt: 36.4 and 67.3 mm, as for OpenCV's PnP on the same points; with one tilt
 /// calibration for all images: 32.6 and 61.9 mm. A free tilt makes the calibrated tilt irrelevant.
-TEST_F(RealLog, MeanErrorIsLargerWithTiltPerImageThanLeveled) {
+TEST_F(RealLog, MeanErrorIsLargerWithTiltOfEachImageThanWithOneTiltForAll) {
   const auto evaluate = [&] {
     const auto result =
         run_program("vlp-evaluate " + path("fixes.csv") + "--path " + in_log("path.csv"));
@@ -198,7 +198,7 @@ double path_over_fixes(const std::vector<Eigen::Vector2d>& driven,
 /// the lens estimated from the log, the lengths agree within 2 %, and the estimated pixels are
 /// square without a constraint. The residuals then exceed the rounding to whole pixels (0.41 px,
 /// both axes) only slightly, and the distances match the reported uncertainty of the fixes.
-TEST_F(RealLog, PathLengthMatchesAdjustedButNotGivenLens) {
+TEST_F(RealLog, FixesMatchPathLengthOnlyWithLensAdjustedToLog) {
   ASSERT_EQ(level().exit_code, 0);
   keep_every_third_frame();
   const auto adjusted = [&](const std::string& options) {

@@ -116,7 +116,7 @@ TEST_F(VlpRotation, MethodsJointAndCircleEstimateCenterWithin5Px) {
   EXPECT_EQ(rotation(kExample + "turning.csv", "--method guess").exit_code, 2);
 }
 
-TEST_F(VlpRotation, CircleMethodWarnsOfMissingSdForThreePoints) {
+TEST_F(VlpRotation, CircleMethodWarnsOfMissingSdForThreePointsPerCircle) {
   const auto result =
       rotation(captures([](std::size_t i) { return i % 4 == 0; }), "--method circle");
   ASSERT_EQ(result.exit_code, 0) << result.errors;

@@ -44,7 +44,7 @@ class RunProgramForEachStdinLine : public testing::Test {
   TemporaryFolder folder;
 };
 
-TEST_F(RunProgramForEachStdinLine, ReportsExitCodeAndErrorsOfSeparateProgramRun) {
+TEST_F(RunProgramForEachStdinLine, ReportsSameExitCodeAndErrorsAsSeparateProgramRun) {
   const auto [code, output, errors] = run(line("nowhere's") + line("\n"));
   EXPECT_EQ(code, 0);
   EXPECT_EQ(errors, "");

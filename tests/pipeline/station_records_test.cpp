@@ -103,7 +103,7 @@ TEST_F(VlpStationRecords, VerifyRecordsFailsWhenRunWasChanged) {
 }
 
 /// A voided run, with operator and reason.
-TEST_F(VlpStationRecords, VoidRecordsOperatorAndReasonAndRemovesVerdict) {
+TEST_F(VlpStationRecords, VoidCommandStoresOperatorAndReasonAndRemovesVerdict) {
   prepare("0001");
   ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
   const std::string listed = records("list").output;
@@ -129,7 +129,7 @@ TEST_F(VlpStationRecords, VoidRecordsOperatorAndReasonAndRemovesVerdict) {
 }
 
 /// The recipe of apps/vlp-station.md, "Backup", with SQLite and with PostgreSQL.
-TEST_F(VlpStationRecords, ShowIsUnchangedAfterRestoreFromBackup) {
+TEST_F(VlpStationRecords, OutputOfShowCommandIsUnchangedAfterRestoreFromBackup) {
   const std::string backup = (folder / "backup").string(), here = (folder / "station").string();
   fs::create_directory(backup);
   prepare("0001");
@@ -170,7 +170,7 @@ TEST_F(VlpStationRecords, ShowIsUnchangedAfterRestoreFromBackup) {
 }
 
 /// A station that is watched: exit code 1 for an alarm, of what can be compared.
-TEST_F(VlpStationRecords, TrendExitsWith1ForOutlierAmongComparableRuns) {
+TEST_F(VlpStationRecords, TrendAndStudiesUseComparableRunsAndTrendExitsWith1ForOutlier) {
   render_four_boards();
   ASSERT_EQ(run_program(batch()).exit_code, 3);  // makes the tables
   const auto add = [&](int first, const std::string& of, const std::string& kind,

@@ -113,7 +113,7 @@ TEST_F(VlpStationShift, MeasuresUnitsFromStdinSequentiallyDespiteFaults) {
 }
 
 /// The golden unit's serial is a `verify` of what has arrived, and no unit of the shift.
-TEST_F(VlpStationShift, VerifiesScannedGoldenUnitBeforeUnitsWhenDue) {
+TEST_F(VlpStationShift, ScannedGoldenUnitIsVerifiedAndNotCountedAsUnit) {
   render("check");
   fs::copy_file(folder / "unit/true_calibration.yaml", folder / "station/golden.yaml");
   change("station.yaml", "# The images of a unit",

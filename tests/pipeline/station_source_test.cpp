@@ -58,7 +58,7 @@ TEST_F(VlpStationSource, ReportsBlurWhenAllVideoFramesAreRejected) {
   EXPECT_THAT(records("show").output, HasSubstr("images     10, 0 used"));
 }
 
-TEST_F(VlpStationSource, LeavesNoCapturesWhenSourceCannotBeOpened) {
+TEST_F(VlpStationSource, CreatesNoCapturesFolderWhenSourceCannotBeOpened) {
   const auto camera = run_program(run("0001", "--source boards=/dev/video99"));
   EXPECT_EQ(camera.exit_code, 2);
   EXPECT_EQ(camera.errors,

@@ -207,7 +207,7 @@ TEST_F(VlpStation, NamesMovedLampSwappedLampsAndWrongBoard) {
 }
 
 /// Faults of the operator or the station do not fail a unit.
-TEST_F(VlpStation, ReturnsInvalidNotFailForStationFaults) {
+TEST_F(VlpStation, ReturnsInvalidNotFailForWrongPositionsOrImagesInWrongFolder) {
   render();
   const auto table = folder / "unit/check/captures.csv", truth = folder / "unit/check/truth.csv";
   fs::rename(table, folder / "captures.csv");
@@ -253,7 +253,7 @@ TEST_F(VlpStation, ReturnsInvalidNotFailForStationFaults) {
 
 /// Row times with which lamps are still identified, with which none is, and with which each is
 /// taken for its neighbor.
-TEST_F(VlpStation, ReturnsInvalidAndMeasuredRowTimeForWrongTypeFile) {
+TEST_F(VlpStation, ReturnsInvalidAndMeasuredRowTimeForWrongRowTimeOfCameraType) {
   render();
   std::string stated = "row_time_s: 3.0e-05";
   for (const char* wrong_us : {"28.5", "33", "37.5"}) {
@@ -354,7 +354,7 @@ TEST_F(VlpStation, RecordsVerdictAndRestoresFilesThatCouldNotBeWritten) {
 }
 
 /// Repetitions of evaluated units are found in the records.
-TEST_F(VlpStation, WarnsThatRepetitionIsUncheckedWhileRecordsAreOffline) {
+TEST_F(VlpStation, WarnsThatReuseOfImagesIsUncheckedWhileRecordsAreOffline) {
   change("station.yaml", "records: records.db", "records: share/records.db");
   render();
   const auto passed = run_program(batch());
@@ -435,7 +435,7 @@ TEST_F(VlpStation, RefusesOverexposedAndTooDarkLampImages) {
 }
 
 /// The lamps do not turn about one axis, and the fixes scatter: because of that.
-TEST_F(VlpStation, ReturnsInvalidWhenAllLampImagesShowAnotherLens) {
+TEST_F(VlpStation, ReturnsInvalidWhenLampImagesAreOfOtherLensThanBoardImages) {
   render("boards");
   change("scene.yaml", "[520, 520.6, 402.3, 297.4", "[508, 508.4, 407.3, 304.4");
   render_after_the_boards("rotation,dispersion,check");
@@ -474,7 +474,7 @@ TEST_F(VlpStation, ReturnsInvalidAndNamesBoardImagesOfAnotherUnit) {
 }
 
 /// Images of another unit among those of the check, or all of them.
-TEST_F(VlpStation, ReturnsInvalidWhenCheckImagesShowAnotherUnit) {
+TEST_F(VlpStation, ReturnsInvalidWhenSomeOrAllCheckImagesAreOfAnotherUnit) {
   render();
   fs::rename(folder / "unit", folder / "first");
   change("scene.yaml", "[520, 520.6, 402.3, 297.4", "[516, 516.5, 399.1, 301.0");

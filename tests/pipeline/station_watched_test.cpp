@@ -53,7 +53,7 @@ TEST_F(VlpStationWatched, PrintsReasonForEachRejectedImage) {
 }
 
 /// All that is there when a run goes on comes at once: its order is no order.
-TEST_F(VlpStationWatched, TakesGoodImageAfterManyUnreadableExistingImages) {
+TEST_F(VlpStationWatched, AcceptsGoodImageAmongManyUnreadableExistingImages) {
   const auto at = captures("a") / "boards";
   fs::create_directories(at);
   for (int i = 0; i < 13; ++i) std::ofstream(at / ("bad-" + std::to_string(i) + ".png")) << "none";

@@ -80,7 +80,7 @@ TEST_F(VlpDetectVideo, YieldsSameDetectionsAsImages) {
               Not(HasSubstr("drive.avi#000001")));
 }
 
-TEST_F(VlpDetectVideo, RejectsUnusableVideosInOneLine) {
+TEST_F(VlpDetectVideo, RejectsUnusableVideosWithOneLineErrorAndWarnsOfTruncatedOne) {
   const auto refused = [&](const std::string& images, const std::string& options,
                            const std::string& message) {
     const auto result = detect(images, "found.csv", options);

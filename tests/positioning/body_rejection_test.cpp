@@ -15,7 +15,7 @@ constexpr double kBodyNoise_px = 0.1;
 /// Standard deviation of roll and pitch of a hand-held camera.
 constexpr double kAny_rad = 1.6;
 
-class PositionerLocateBody : public testing::Test {
+class PositionerMovingOrTiltedCamera : public testing::Test {
  protected:
   BodyRig rig{synthetic_lamps(),
               rolling_calibration(),
@@ -55,7 +55,7 @@ class PositionerLocateBody : public testing::Test {
   }
 };
 
-TEST_F(PositionerLocateBody, EqualsFixWithoutMotionWhenMotionIsExactlyZero) {
+TEST_F(PositionerMovingOrTiltedCamera, EqualsFixWithoutMotionWhenMotionIsExactlyZero) {
   stand();
   Sensors standing;
   standing.motion = KnownMotion();
@@ -67,7 +67,7 @@ TEST_F(PositionerLocateBody, EqualsFixWithoutMotionWhenMotionIsExactlyZero) {
   EXPECT_FALSE(with.body.has_value());
 }
 
-TEST_F(PositionerLocateBody, ReturnsRowTimeUnknownForMotionWithoutReadoutTiming) {
+TEST_F(PositionerMovingOrTiltedCamera, ReturnsRowTimeUnknownForMotionWithoutReadoutTiming) {
   auto detections = seen();
   rig.calibration.camera.row_time_s.reset();
   EXPECT_EQ(locate(detections, driving()).status, FixStatus::row_time_unknown);
@@ -77,7 +77,7 @@ TEST_F(PositionerLocateBody, ReturnsRowTimeUnknownForMotionWithoutReadoutTiming)
   EXPECT_TRUE(locate(detections, leaning()).has_succeeded());
 }
 
-TEST_F(PositionerLocateBody, ReturnsFixWithTimeOfSensors) {
+TEST_F(PositionerMovingOrTiltedCamera, ReturnsFixWithTimeOfSensors) {
   Sensors sensors = driving();
   sensors.time_s = 17.25;
   EXPECT_EQ(locate(seen(), sensors).time_s, 17.25);
@@ -86,7 +86,7 @@ TEST_F(PositionerLocateBody, ReturnsFixWithTimeOfSensors) {
   EXPECT_EQ(locate(seen(), sensors).time_s, 17.25);
 }
 
-TEST_F(PositionerLocateBody, ReturnsNotFiniteForNanOrInvalidSdOfSensors) {
+TEST_F(PositionerMovingOrTiltedCamera, ReturnsNotFiniteForNanOrInvalidSdOfSensors) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (int which = 0; which < 6; ++which) {
     Sensors sensors = driving();
@@ -101,7 +101,7 @@ TEST_F(PositionerLocateBody, ReturnsNotFiniteForNanOrInvalidSdOfSensors) {
 }
 
 /// Two lamps do not determine roll and pitch. The covariance includes the unknown velocity.
-TEST_F(PositionerLocateBody, ReturnsUndeterminedForTwoLampsWithFreeTilt) {
+TEST_F(PositionerMovingOrTiltedCamera, ReturnsUndeterminedForTwoLampsWithFreeTilt) {
   auto detections = seen();
   detections.resize(2);
   EXPECT_EQ(locate(detections, leaning()).status, FixStatus::undetermined);
@@ -111,7 +111,7 @@ TEST_F(PositionerLocateBody, ReturnsUndeterminedForTwoLampsWithFreeTilt) {
   EXPECT_GT(std::sqrt(fix.estimate.covariance(2, 2)), 0.003);
 }
 
-TEST_F(PositionerLocateBody, ReturnsUndeterminedForCollinearLampsWithFreeTilt) {
+TEST_F(PositionerMovingOrTiltedCamera, ReturnsUndeterminedForCollinearLampsWithFreeTilt) {
   rig.map = make_lamp_map({{-0.7, 0.1, 1.6}, {0, 0.1, 1.6}, {0.7, 0.1, 1.6}});
   stand();
   EXPECT_EQ(locate(seen(), leaning()).status, FixStatus::undetermined);
@@ -121,7 +121,7 @@ TEST_F(PositionerLocateBody, ReturnsUndeterminedForCollinearLampsWithFreeTilt) {
 }
 
 /// Three lamps fit several poses of a camera with unknown tilt; a known height selects one.
-TEST_F(PositionerLocateBody, KnownHeightResolvesMostAmbiguitiesOfThreeLamps) {
+TEST_F(PositionerMovingOrTiltedCamera, KnownHeightResolvesMostAmbiguitiesOfThreeLamps) {
   int ambiguous = 0, num_resolved = 0;
   for (int i = 0; i < 200; ++i) {
     rig.body.pose.position_m = {random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.3), 0};
@@ -143,7 +143,7 @@ TEST_F(PositionerLocateBody, KnownHeightResolvesMostAmbiguitiesOfThreeLamps) {
   EXPECT_GT(num_resolved, ambiguous / 2);
 }
 
-TEST_F(PositionerLocateBody, RejectsMisidentifiedLampAndReturnsTruth) {
+TEST_F(PositionerMovingOrTiltedCamera, RejectsMisidentifiedLampAndReturnsTruth) {
   for (const bool leans : {false, true}) {
     if (leans) lean();
     for (std::size_t wrong = 0; wrong < 5; ++wrong) {
@@ -165,7 +165,7 @@ TEST_F(PositionerLocateBody, RejectsMisidentifiedLampAndReturnsTruth) {
   }
 }
 
-TEST_F(PositionerLocateBody, ReturnsNoFixWhenAllLampsContradict) {
+TEST_F(PositionerMovingOrTiltedCamera, ReturnsNoFixWhenAllLampsContradict) {
   for (const Sensors& sensors : {driving(), leaning(), held()}) {
     auto detections = seen();
     ASSERT_EQ(detections.size(), 8);
@@ -174,7 +174,7 @@ TEST_F(PositionerLocateBody, ReturnsNoFixWhenAllLampsContradict) {
   }
 }
 
-TEST_F(PositionerLocateBody, ReturnsMirroredMapForMirroredLampMap) {
+TEST_F(PositionerMovingOrTiltedCamera, ReturnsMirroredMapForMirroredLampMap) {
   const auto mirrored = [](LampMap map) {
     for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;
     return map;
@@ -189,7 +189,7 @@ TEST_F(PositionerLocateBody, ReturnsMirroredMapForMirroredLampMap) {
 }
 
 /// In a room and in a hall of ten times its size.
-TEST_F(PositionerLocateBody, RejectsTwoSwappedLampsAndReturnsTruth) {
+TEST_F(PositionerMovingOrTiltedCamera, RejectsTwoSwappedLampsAndReturnsTruth) {
   for (const double scale : {1, 10}) {
     for (Lamp& lamp : rig.map.lamps) lamp.position_m *= scale;
     rig.body.pose.position_m *= scale;
@@ -208,7 +208,7 @@ TEST_F(PositionerLocateBody, RejectsTwoSwappedLampsAndReturnsTruth) {
 }
 
 /// A lamp 36 mm away from its position in the map.
-TEST_F(PositionerLocateBody, RejectsLampMovedBy36MmAndReturnsTruth) {
+TEST_F(PositionerMovingOrTiltedCamera, RejectsLampMovedBy36MmAndReturnsTruth) {
   for (const bool leans : {false, true}) {
     if (leans) lean();
     const LampMap map = rig.map;
@@ -222,7 +222,7 @@ TEST_F(PositionerLocateBody, RejectsLampMovedBy36MmAndReturnsTruth) {
 }
 
 /// A velocity above the maximum indicates another error.
-TEST_F(PositionerLocateBody, ReturnsInconsistentForSpeedFarAboveMaximum) {
+TEST_F(PositionerMovingOrTiltedCamera, ReturnsInconsistentForSpeedFarAboveMaximum) {
   rig.body.motion.velocity_m_per_s = {3, 0};
   Sensors slow;
   slow.motion = KnownMotion::make_motion_prior_from_limits(0.2, 3);
@@ -230,7 +230,7 @@ TEST_F(PositionerLocateBody, ReturnsInconsistentForSpeedFarAboveMaximum) {
 }
 
 /// The lamps determine each state to a few percent of its prior.
-TEST_F(PositionerLocateBody, ReturnsInconsistentForStateBeyondFiveSigmasOfPrior) {
+TEST_F(PositionerMovingOrTiltedCamera, ReturnsInconsistentForStateBeyondFiveSigmasOfPrior) {
   Sensors known;
   known.motion = KnownMotion{{0, 0}, 0, 0.4, 0.4};
   known.inclination_sigma_rad = 0.02;
@@ -249,7 +249,7 @@ TEST_F(PositionerLocateBody, ReturnsInconsistentForStateBeyondFiveSigmasOfPrior)
 }
 
 /// A tilted camera with a level prior is inconsistent; with free roll and pitch it is located.
-TEST_F(PositionerLocateBody, ReturnsInconsistentForTiltedCameraUnlessTiltIsFree) {
+TEST_F(PositionerMovingOrTiltedCamera, ReturnsInconsistentForTiltedCameraUnlessTiltIsFree) {
   rig.body.motion = {{0, 0}, 0, {0.7, -0.5}};
   rig.map = draw_lamps_in_view(rig, 6, true, 0.3, random);
   EXPECT_EQ(locate(seen(), {}).status, FixStatus::inconsistent);
@@ -257,7 +257,7 @@ TEST_F(PositionerLocateBody, ReturnsInconsistentForTiltedCameraUnlessTiltIsFree)
   expect_truth(locate(seen(), leaning()));
 }
 
-TEST_F(PositionerLocateBody, MatchesTruthForLargeNationalCoordinates) {
+TEST_F(PositionerMovingOrTiltedCamera, MatchesTruthForLargeNationalCoordinates) {
   const Eigen::Vector3d origin_m(4.5e5, 5e6, 120);
   for (Lamp& lamp : rig.map.lamps) lamp.position_m += origin_m;
   rig.body.pose.position_m += origin_m;
@@ -269,7 +269,7 @@ TEST_F(PositionerLocateBody, MatchesTruthForLargeNationalCoordinates) {
 
 /// Noise of 2.5 times the reported one: a lamp is rejected only if that explains the residuals a
 /// hundred times better.
-TEST_F(PositionerLocateBody, RejectsOutlierOnlyWhenFarAboveUnderstatedNoise) {
+TEST_F(PositionerMovingOrTiltedCamera, RejectsOutlierOnlyWhenFarAboveUnderstatedNoise) {
   for (const auto& [moved_px, rejected] : {std::pair(7.0, 0), {25.0, 1}}) {
     auto detections = with_noise(seen_from(rig, 2.5 * kBodyNoise_px), random);
     ASSERT_EQ(detections.size(), 8);
@@ -283,7 +283,7 @@ TEST_F(PositionerLocateBody, RejectsOutlierOnlyWhenFarAboveUnderstatedNoise) {
 }
 
 /// Three lamps determine position and tilt exactly: without any of four the others agree.
-TEST_F(PositionerLocateBody, KeepsMovedLampOfFourWithFreeTilt) {
+TEST_F(PositionerMovingOrTiltedCamera, KeepsMovedLampOfFourWithFreeTilt) {
   stand();
   for (std::size_t moved = 0; moved < 4; ++moved) {
     auto detections = seen_from(rig, kBodyNoise_px);
@@ -297,7 +297,7 @@ TEST_F(PositionerLocateBody, KeepsMovedLampOfFourWithFreeTilt) {
   }
 }
 
-TEST_F(PositionerLocateBody, CountsLampsAndSightingsOfEarlierFrames) {
+TEST_F(PositionerMovingOrTiltedCamera, CountsLampsAndSightingsOfEarlierFrames) {
   stand();
   auto before = seen_from(rig, kBodyNoise_px);
   ASSERT_EQ(before.size(), 8);
@@ -315,7 +315,7 @@ TEST_F(PositionerLocateBody, CountsLampsAndSightingsOfEarlierFrames) {
   EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.body.pose.position_m, 1e-8));
 }
 
-TEST_F(PositionerLocateBody, MatchesTruthOfMovingBodyWithEarlierFrame) {
+TEST_F(PositionerMovingOrTiltedCamera, PositionAndYawRateMatchTruthWithEarlierFrame) {
   const double before_s = 0.05;
   const auto now = seen_from(rig, kBodyNoise_px), before = seen_from(rig, kBodyNoise_px, -before_s);
   ASSERT_TRUE(now.size() == 8 && before.size() == 8);

@@ -17,35 +17,35 @@ Eigen::Vector2d seen_at(const Eigen::Matrix3d& level_from_camera, const Eigen::V
   return (level_from_camera * z.homogeneous()).eval().hnormalized();
 }
 
-class LevelFromCamera : public testing::Test {
+class ComputeLevelFromCameraMatrix : public testing::Test {
  protected:
   Calibration calibration{synthetic_camera(), {}, {}, {}, {}};
   Eigen::Vector2d focal_px = calibration.camera.focal_px();
   Eigen::Vector2d z{0.3, -0.2};
 };
 
-TEST_F(LevelFromCamera, ReturnsIdentityWhenCalibrationHasNoCorrections) {
+TEST_F(ComputeLevelFromCameraMatrix, ReturnsIdentityWhenCalibrationHasNoCorrections) {
   for (const Correction correction : {Correction::none, Correction::all}) {
     EXPECT_EQ(compute_level_from_camera_matrix(calibration, correction),
               Eigen::Matrix3d::Identity());
   }
 }
 
-TEST_F(LevelFromCamera, ThrowsWhenRequestedCorrectionIsMissing) {
+TEST_F(ComputeLevelFromCameraMatrix, ThrowsWhenRequestedCorrectionIsMissing) {
   EXPECT_THROW(compute_level_from_camera_matrix(calibration, Correction::rotation),
                std::invalid_argument);
   EXPECT_THROW(compute_level_from_camera_matrix(calibration, Correction::dispersion),
                std::invalid_argument);
 }
 
-TEST_F(LevelFromCamera, MapsZenithToOriginForTiltModel) {
+TEST_F(ComputeLevelFromCameraMatrix, MapsZenithToOriginForTiltModel) {
   calibration.rotation_center = tilted_by(calibration.camera, 0.05, 2);
   const Eigen::Vector3d& zenith = calibration.rotation_center->zenith_in_camera;
   const auto matrix = compute_level_from_camera_matrix(calibration, Correction::rotation);
   EXPECT_THAT(seen_at(matrix, zenith.hnormalized()), IsNear(Eigen::Vector2d(0, 0), 1e-15));
 }
 
-TEST_F(LevelFromCamera, SubtractsCenterInUndistortedPlaneForShiftModel) {
+TEST_F(ComputeLevelFromCameraMatrix, SubtractsOffsetOfRotationCenterForShiftModel) {
   const Eigen::Vector2d principal = calibration.camera.principal_point_px();
   calibration.rotation_center = {
       RotationModel::shift, principal + Eigen::Vector2d(9, -4), {0, 0, 1}, {}};
@@ -54,7 +54,7 @@ TEST_F(LevelFromCamera, SubtractsCenterInUndistortedPlaneForShiftModel) {
   EXPECT_THAT(moved, IsNear(z - Eigen::Vector2d(9, -4).cwiseQuotient(focal_px), 1e-15));
 }
 
-TEST_F(LevelFromCamera, SubtractsDispersionWhenThereIsNoRotationCenter) {
+TEST_F(ComputeLevelFromCameraMatrix, SubtractsDispersionOffsetWithoutRotationCenter) {
   calibration.dispersion = {{3, 5}, 0.01, {0, 0}, 12};
   const Eigen::Vector2d expected = z - Eigen::Vector2d(3, 5).cwiseQuotient(focal_px);
   EXPECT_THAT(seen_at(compute_level_from_camera_matrix(calibration, Correction::dispersion), z),
@@ -65,7 +65,7 @@ TEST_F(LevelFromCamera, SubtractsDispersionWhenThereIsNoRotationCenter) {
                std::invalid_argument);
 }
 
-TEST_F(LevelFromCamera, ReturnsRotationForDispersionAfterTilt) {
+TEST_F(ComputeLevelFromCameraMatrix, ReturnsRotationForTiltFollowedByDispersionOffset) {
   calibration.rotation_center = tilted_by(calibration.camera, 0.05, 2);
   calibration.dispersion = {{3, 5}, 0.01, {0, 0}, 12};
   const Eigen::Matrix3d matrix = compute_level_from_camera_matrix(calibration, Correction::all);

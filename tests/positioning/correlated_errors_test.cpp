@@ -153,7 +153,7 @@ TEST_F(CommonErrorsTest, FixCovarianceMatchesFiniteDifferencesWhenOnlyLensIsUnce
 }
 
 /// A part without derivatives by the lens hides the errors of the lens.
-TEST_F(CommonErrorsTest, LensErrorsAreUnknownWithoutDerivativesOfAppliedCorrection) {
+TEST_F(CommonErrorsTest, LensErrorsAreUnknownIfAppliedCorrectionHasNoJacobianWrtLens) {
   const auto stated = [&](Correction correction) {
     return CommonErrors(rig.map.lamps, rig.calibration, correction)
         .is_error_source_known_or_absent(CommonErrorSource::lens);
@@ -181,7 +181,7 @@ TEST_F(CommonErrorsTest, FixCovarianceIncludesSurveySdOfLamps) {
 }
 
 /// Lamps of a dispersion have rows in the joint covariance; a derivative of 0 adds no error to it.
-TEST_F(CommonErrorsTest, FixCovarianceIsUnchangedByLampsWithZeroDerivative) {
+TEST_F(CommonErrorsTest, FixCovarianceIsUnchangedByDispersionLampsWithZeroJacobian) {
   rig.calibrate_in_a_row();
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
   rig.calibration.dispersion->uncertain_lamps.clear();
@@ -205,7 +205,7 @@ TEST_F(CommonErrorsTest, FixCovarianceIsUnchangedByLampsWithZeroDerivative) {
 }
 
 /// The offset depends on a lamp of the adjustment, whose error is not in the survey.
-TEST_F(CommonErrorsTest, OffsetCovarianceIncludesErrorOfAdjustedLamp) {
+TEST_F(CommonErrorsTest, DispersionOffsetCovarianceIncludesErrorOfAdjustedLamp) {
   rig.adjust(1);
   Eigen::Matrix<double, 2, 3> by_position;
   by_position << 0.5, -0.1, 0.2, 0.1, 0.6, -0.3;
@@ -227,7 +227,7 @@ TEST_F(CommonErrorsTest, OffsetCovarianceIncludesErrorOfAdjustedLamp) {
             1);
 }
 
-TEST_F(CommonErrorsTest, LocateRejectsLampMovedBeyondItsSurveySd) {
+TEST_F(CommonErrorsTest, PositionFixRejectsLampMovedFarBeyondItsSd) {
   rig.adjust(0.3);
   Random random(8);
   for (const double off_m : {0.01, 0.03}) {
@@ -244,7 +244,7 @@ TEST_F(CommonErrorsTest, LocateRejectsLampMovedBeyondItsSurveySd) {
   }
 }
 
-TEST_F(CommonErrorsTest, LocateKeepsLampMovedWithinItsSurveySd) {
+TEST_F(CommonErrorsTest, PositionFixKeepsLampMovedByAboutItsSd) {
   rig.adjust(3);
   Random random(9);
   for (std::size_t moved = 0; moved < 8; ++moved) {
@@ -301,7 +301,7 @@ class FindOutlierLamps : public testing::Test {
   }
 };
 
-TEST_F(FindOutlierLamps, RejectsLampWhenChiSquaredExceedsBound) {
+TEST_F(FindOutlierLamps, ReturnsLampWhoseChiSquaredExceedsBound) {
   for (const std::size_t count : {4u, 5u, 8u}) {
     SCOPED_TRACE(count);
     see_lamps(count);
@@ -334,7 +334,7 @@ TEST_F(FindOutlierLamps, ReturnsTwoOutliersOfEightLargestFirst) {
   EXPECT_EQ(found.lamps[1], 5);
 }
 
-TEST_F(CommonErrorsTest, LocateRejectsLampMovedBy30MmAmongFour) {
+TEST_F(CommonErrorsTest, PositionFixRejectsLampMovedBy30MmAmongFour) {
   rig.adjust(0.3);
   SyntheticRig room = rig;
   room.map.lamps[1].position_m.x() += 0.03;

@@ -245,7 +245,7 @@ TEST(FixCovariance, MatchesScatterForOneLampWithUncertainSensors) {
   expect_efficient(scatter);
 }
 
-TEST(PositionerLocate, ReturnsRowTimeUnknownForMovingCameraWithoutRowTime) {
+TEST(Positioner, ReturnsRowTimeUnknownForMovingCameraWithoutRowTime) {
   const SyntheticRig rig = make_rig(1);
   Sensors sensors;
   sensors.height_and_yaw = HeightAndYaw{0.1, 0.9};
@@ -255,7 +255,7 @@ TEST(PositionerLocate, ReturnsRowTimeUnknownForMovingCameraWithoutRowTime) {
       FixStatus::row_time_unknown);
 }
 
-TEST(PositionerLocate, ReturnsTruePositionFromOneLampOnRotatingRobot) {
+TEST(Positioner, ReturnsTruePositionOfRotatingRobotThatSeesOneLamp) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {{{0.15, -0.1, 0.1}, 0.9}, {}}, {}};
   rig.mount = CameraMount{{0.3, -0.2, 0.5}, 0.7};
   rig.body.motion = {{0.5, 0.2}, 1.5, {0, 0}};
@@ -272,7 +272,7 @@ TEST(PositionerLocate, ReturnsTruePositionFromOneLampOnRotatingRobot) {
 
 /// With a pinhole lens all pixels have equal weights, and the closed forms are the least-squares
 /// fix.
-TEST(FixCovariance, ClosedFormsReachCramerRaoBoundWithPinhole) {
+TEST(FixCovariance, ScatterOfClosedFormPosesReachesCramerRaoBoundWithPinhole) {
   for (const std::size_t lamps : {2u, 3u}) {
     SyntheticRig rig = make_rig(lamps);
     rig.calibration.camera.lens_model = LensModel::pinhole;

@@ -70,7 +70,7 @@ class ErrorBudgetTerm : public testing::Test {
   }
 };
 
-TEST_F(ErrorBudgetTerm, CenterCovarianceMatchesScatterOfFixes) {
+TEST_F(ErrorBudgetTerm, PrincipalPointCovarianceMatchesScatterOfFixes) {
   rig.map.lamps.resize(3);
   const Positioner positioner(rig.map, rig.calibration);
   // The covariance of four states from two errors is singular; yaw and height barely change.
@@ -210,7 +210,7 @@ TEST_P(ErrorBudgetWithPrior, NoiseMotionAndRollPitchTermsSumToFixCovariance) {
 }
 
 /// The effects of single errors on fixes match the budget.
-TEST_P(ErrorBudgetWithPrior, CenterTiltAndMapTermsMatchErrorsOfFixes) {
+TEST_P(ErrorBudgetWithPrior, PrincipalPointTiltAndLampMapTermsMatchErrorsOfFixes) {
   const auto found = budget(prior(GetParam()));
   ASSERT_TRUE(found);
   const auto exact = seen_from(rig, kNoise_px);

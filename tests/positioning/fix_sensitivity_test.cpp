@@ -155,7 +155,7 @@ TEST_F(FixSensitivity, FixCovarianceMatchesFiniteDifferencesWhenSigmaIsUnset) {
   }
 }
 
-TEST_F(FixSensitivity, FixCovarianceMatchesFiniteDifferencesForExactlyInclinedRobot) {
+TEST_F(FixSensitivity, FixCovarianceMatchesFiniteDifferencesForExactlyKnownInclination) {
   stand_level();
   rig.body.motion.inclination = {0.08, -0.05};
   rig.mount = CameraMount{{0.3, -0.2, 0.4}, 0.5};

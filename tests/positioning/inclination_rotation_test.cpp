@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-TEST(ComputeInclinationRotation, ErrorAxesMatchFiniteDifferencesByRollAndPitch) {
+TEST(ComputeInclinationRotation, RollAndPitchErrorAxesMatchFiniteDifferences) {
   constexpr double step = 1e-5, yaw_rad = 0.6;
   const Inclination inclination{0.2, -0.3};
   const InclinationRotation found = compute_inclination_rotation(inclination, yaw_rad);

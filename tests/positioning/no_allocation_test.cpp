@@ -54,7 +54,7 @@ SyntheticRig tilted_rig() {
 
 static_assert(noexcept(std::declval<const Positioner&>().compute_position_fix({}, {})));
 
-TEST(Positioner, LocateAllocatesNoMemory) {
+TEST(Positioner, PositionFixAllocatesNoMemory) {
   const SyntheticRig rig = tilted_rig();
   PositionerOptions options;
   options.mount = CameraMount{{0.1, 0.2, 0.3}, 0.4};
@@ -89,7 +89,7 @@ TEST(Positioner, LocateAllocatesNoMemory) {
   EXPECT_EQ(allocations, before + 1) << "the counter does not count";
 }
 
-TEST(Positioner, LocateAllocatesNoMemoryWithSplinedLens) {
+TEST(Positioner, PositionFixAllocatesNoMemoryWithSplinedLens) {
   SyntheticRig rig = tilted_rig();
   rig.calibration.camera = splined_camera();
   const Positioner positioner(rig.map, rig.calibration);
@@ -123,7 +123,7 @@ TEST(CFunctionVlpLocate, AllocatesNoMemory) {
   vlp_close(positioner);
 }
 
-TEST(Positioner, LocateReturnsEqualFixesFromConcurrentThreads) {
+TEST(Positioner, ComputesEqualFixesInConcurrentThreads) {
   const SyntheticRig rig = tilted_rig();
   const Positioner positioner(rig.map, rig.calibration);
   const auto detections = seen_from(rig);

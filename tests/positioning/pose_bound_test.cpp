@@ -57,7 +57,7 @@ TEST(IsMotionEstimated, ReturnsTrueWhenVelocityOrYawRateIsUncertain) {
 
 /// Four or five lamps of a ceiling, tilt of up to 80 degrees known from the image alone: errors at
 /// most 1.5 times the bound of six states.
-TEST(BodyPoseBound, FixErrorsAreAtMost150PercentOfBoundForAnyTilt) {
+TEST(Positioner, FixErrorsAreAtMost150PercentOfCramerRaoBoundForTiltUpTo80Degrees) {
   Random random(81);
   Sensors in_hand;
   in_hand.inclination_sigma_rad = 1.6;
@@ -94,7 +94,7 @@ TEST(BodyPoseBound, FixErrorsAreAtMost150PercentOfBoundForAnyTilt) {
 
 /// A camera at rest with a prior of up to 2 m/s: its errors are 0.9 to 1.1 of the reported standard
 /// deviations, with four lamps and with eight.
-TEST(BodyPoseBound, FixErrorsMatchReportedSdsWithUnknownMotion) {
+TEST(Positioner, FixErrorsMatchReportedSdsWithUnknownMotion) {
   Random random(82);
   Sensors might_drive;
   might_drive.motion = KnownMotion::make_motion_prior_from_limits(2, rad_from_deg(180));

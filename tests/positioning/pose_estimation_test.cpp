@@ -172,7 +172,7 @@ TEST_P(PositionerNoiselessMovingCamera, MatchesTruthForFewLampsWithTruePriorMean
 INSTANTIATE_TEST_SUITE_P(Estimates, PositionerNoiselessMovingCamera,
                          testing::ValuesIn(kCombinations), name_of_combination);
 
-TEST(EvaluatedState, LampInBodyDerivativesMatchFiniteDifferences) {
+TEST(EvaluatedState, DerivativesOfLampPositionInBodyFrameMatchFiniteDifferences) {
   // Central differences: step^2 and rounding / step, times a second at most.
   constexpr double step = 1e-6, tolerance = 1e-8;
   Random random(5);
@@ -200,7 +200,7 @@ TEST(EvaluatedState, LampInBodyDerivativesMatchFiniteDifferences) {
   }
 }
 
-TEST(WhitenedPixelFromRay, MapsRayDisplacementToPixelDisplacement) {
+TEST(ComputeWhitenedPixelJacobianWrtRay, MapsRayDisplacementToPixelDisplacement) {
   const Camera camera = synthetic_camera();
   const Lens lens(camera.lens_model, camera.intrinsics);
   constexpr double step_px = 1e-3, sigma_px = 0.25;
@@ -377,7 +377,7 @@ class BodyScatter {
 constexpr int kBodyDraws = 4000;
 constexpr double kBodyScatterTolerance = 0.05;
 
-class BodyFixCovariance : public testing::TestWithParam<Estimated> {
+class MovingCameraFixCovariance : public testing::TestWithParam<Estimated> {
  protected:
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
 
@@ -386,7 +386,7 @@ class BodyFixCovariance : public testing::TestWithParam<Estimated> {
   }
 };
 
-TEST_P(BodyFixCovariance, MatchesScatterOfFixesWithLampsAlone) {
+TEST_P(MovingCameraFixCovariance, MatchesScatterOfFixesWithLampsAlone) {
   const auto exact = seen_from(rig, 0.05);
   ASSERT_EQ(exact.size(), 8);
   const Positioner positioner = rig.positioner();
@@ -406,7 +406,7 @@ TEST_P(BodyFixCovariance, MatchesScatterOfFixesWithLampsAlone) {
 }
 
 /// Odometry and inclination sensor with errors of the reported size.
-TEST_P(BodyFixCovariance, MatchesScatterOfFixesWithLampsAndSensors) {
+TEST_P(MovingCameraFixCovariance, MatchesScatterOfFixesWithLampsAndSensors) {
   rig.mount = CameraMount{{0.2, -0.1, 0.3}, 0.5};
   auto exact = seen_from(rig, 0.05);
   ASSERT_GE(exact.size(), 4);
@@ -439,10 +439,10 @@ TEST_P(BodyFixCovariance, MatchesScatterOfFixesWithLampsAndSensors) {
   scatter.expect(stated.body->covariance, kBodyScatterTolerance);
 }
 
-INSTANTIATE_TEST_SUITE_P(Estimates, BodyFixCovariance, testing::ValuesIn(kCombinations),
+INSTANTIATE_TEST_SUITE_P(Estimates, MovingCameraFixCovariance, testing::ValuesIn(kCombinations),
                          name_of_combination);
 
-TEST(PositionerLocate, RedundancyMatchesMeanSquaredPixelResidualOfBodyFix) {
+TEST(Positioner, RedundancyMatchesMeanSquaredPixelResidualForMovingCamera) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   rig.body = {{{0.1, -0.05, 0.05}, 0.7}, {{0.8, -0.5}, 0.6, {0.03, -0.05}}};
   const auto exact = seen_from(rig, 0.05);

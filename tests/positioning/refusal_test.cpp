@@ -98,7 +98,7 @@ TEST_F(PositionerStatus, ReturnsOutsideLensForUnreachablePixel) {
   EXPECT_EQ(status(detections), FixStatus::outside_lens);
 }
 
-TEST_F(PositionerStatus, ReturnsLampBelowCameraForHeightOrInclinationAboveLamps) {
+TEST_F(PositionerStatus, ReturnsLampBelowCameraForHeightAboveLampsOrUpsideDownCamera) {
   EXPECT_EQ(status(seen(1), {{}, 0, HeightAndYaw{1.6, 0}}), FixStatus::lamp_below_camera);
   EXPECT_EQ(status(seen(1), {{}, 0, HeightAndYaw{2.0, 0}}), FixStatus::lamp_below_camera);
   // An inclination that points the lamps' rays below the horizon.

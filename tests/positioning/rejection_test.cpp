@@ -237,7 +237,7 @@ TEST_F(PositionerOutlierRejection, ReturnsInconsistentForMapOfAnotherRoom) {
   EXPECT_EQ(locate(detections).status, FixStatus::inconsistent);
 }
 
-TEST_F(PositionerOutlierRejection, ReturnsMirroredMapForMirroredLampsAtAnyHeights) {
+TEST_F(PositionerOutlierRejection, ReturnsMirroredMapForMirroredLampsAtEqualOrDifferentHeights) {
   for (const bool equal_heights : {true, false}) {
     rig.map = synthetic_lamps();
     for (std::size_t i = 0; i < 8 && !equal_heights; ++i) {

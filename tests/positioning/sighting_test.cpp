@@ -28,7 +28,7 @@ TEST(ProjectLampToNormalizedPoint, MatchesProjectionOfLampInLevelFrame) {
   }
 }
 
-TEST(ProjectLampWithJacobian, DerivativesByPoseMatchFiniteDifferences) {
+TEST(ProjectLampWithJacobian, JacobianWrtPoseMatchesFiniteDifferences) {
   const Pose pose{{0.3, -0.7, 0.4}, 2.2};
   const Eigen::Vector3d lamp(1.1, 0.4, 2.5);
   const auto jacobian = project_lamp_with_jacobian(LevelPose(pose), lamp).d_z_d_state;

@@ -222,7 +222,7 @@ TEST(ComputeFixSds, ReturnsZeroForTinyNegativeVariances) {
   EXPECT_EQ(spread.yaw_rad, 0);
 }
 
-TEST(UnitErrors, AreErrorsKnownIsFalseForSourcesWithoutSd) {
+TEST(UnitErrors, IsErrorSourceKnownOrAbsentIsFalseForSourcesWithoutSd) {
   StatedRig rig;
   const auto stated = [&](CommonErrorSource part) {
     return UnitErrors(rig.map, rig.calibration)
@@ -263,7 +263,7 @@ TEST(UnitErrors, BudgetIsNulloptUnlessThereAre2To256Lamps) {
   }
 }
 
-TEST(UnitErrors, FindVisibleLampsAppliesCalibratedTilt) {
+TEST(UnitErrors, FindFullyVisibleLampIndicesAppliesCalibratedTilt) {
   StatedRig rig;
   rig.map = make_lamp_map({{0, 0, 1.6}, {0.1, 0, 1.6}});
   rig.camera = {{0, 0, 0}, 0};

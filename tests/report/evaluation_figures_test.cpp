@@ -69,7 +69,7 @@ TEST(MakeEvaluationNotes, StatesReferenceMissingFixesAndMissingIntervals) {
                                  "Caution: there are too few captures with a fix for intervals."));
 }
 
-TEST(FormatEvaluationStatistics, LabelsOfLineFitBeginWithFileName) {
+TEST(FormatLineDriveStatistics, LabelsBeginWithFileName) {
   LineFit fit{};
   fit.distances_m = {1001, 0.001, 0.002, 0.003, 0.004, 0.005};
   fit.jitter_m = 0.006;

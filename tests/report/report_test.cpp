@@ -23,7 +23,7 @@ TEST(RenderReportHtml, ShowsVerdictAfterTitleAndMarksFailedGates) {
   EXPECT_LT(html.find("<table>"), html.find("mean_mm</th>"));
 }
 
-TEST(RenderReportHtml, HasFactsAndFloorPlanBeforeGates) {
+TEST(RenderReportHtml, ShowsPropertiesAndFloorPlanBeforeGates) {
   Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, Direction::at_most}}, {}, {}, {}, {}, {}};
   report.properties = {{"operator", "<Ann>"}};
   report.plots = {{ReportPart::floor, "<svg>", "the floor", "a plan", {{"image"}, {"0007.png"}}}};

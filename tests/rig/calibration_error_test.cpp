@@ -35,7 +35,7 @@ TEST(AddErrorToCalibratedIntrinsics, ChangesIntrinsicsAndRotationCenterPixelButN
       add_error_to_calibrated_intrinsics(alone, Eigen::Vector4d(1, 0, 0, 0)).rotation_center);
 }
 
-TEST(AddErrorToCalibratedZenith, AddsErrorToNormalizedZenithPointAndMovesPixel) {
+TEST(AddErrorToCalibratedZenith, AddsErrorToNormalizedZenithPointAndMovesCenterPixel) {
   const Calibration moved = add_error_to_calibrated_zenith(leaning(), {0.001, 0.002});
   ASSERT_TRUE(moved.rotation_center);
   EXPECT_THAT(compute_normalized_zenith_point(*moved.rotation_center),

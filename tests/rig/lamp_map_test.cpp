@@ -28,7 +28,7 @@ TEST(WriteLampMap, WritesExpectedYamlByteForByte) {
   EXPECT_EQ(folder.read_content(folder / "lamps.yaml"), kLampsYaml);
 }
 
-TEST(ReadLampMap, UsesSdOfLampBeforeSdOfMap) {
+TEST(ReadLampMap, PrefersSdOfLampToSdOfMap) {
   const TemporaryFolder folder;
   const LampMap map = read_lamp_map(folder.file("lamps.yaml", R"(format: vlp-lamps/1
 sd_m: 0.002

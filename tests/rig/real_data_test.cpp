@@ -19,7 +19,7 @@ class RealFiles : public testing::Test {
   const std::filesystem::path data = VLP_REAL_DATA_DIR;
 };
 
-TEST_F(RealFiles, ReadLampFromYamlMapReturnsLampsOfRealMaps) {
+TEST_F(RealFiles, ReadLampMapReturnsLampsOfRealMaps) {
   const LampMap log = read_lamp_map(data / "ceiling-lamps-log" / "lamps.yaml");
   ASSERT_EQ(log.lamps.size(), 8U);
   EXPECT_EQ(log.lamps[7].id, 8);

@@ -31,7 +31,7 @@ TEST(FindCurrentNameForFormer, ReturnsNewNameForFormerNameOfSameKind) {
   EXPECT_EQ(find_current_name_for_former(NameKind::key, "rms_px"), "");
 }
 
-TEST(FindFormerNameForCurrent, InvertsFindPresentName) {
+TEST(FindFormerNameForCurrent, InvertsFindCurrentNameForFormer) {
   EXPECT_EQ(find_former_name_for_current(NameKind::metric, "missing_fraction"), "missing");
   EXPECT_EQ(find_former_name_for_current(NameKind::column, "missing_fraction"), "");
 }

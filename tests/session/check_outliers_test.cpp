@@ -33,7 +33,7 @@ TEST(DescribePositionErrorOutliers, NamesConsecutiveCapturesAsRanges) {
             "captures 100, 102, 103, 105, 107, 109 and 1 more groups");
 }
 
-TEST(DescribePositionErrorOutliers, EndsRangeAtCaptureWithoutError) {
+TEST(DescribePositionErrorOutliers, EndsRangeAtCaptureMissingInList) {
   auto errors = errors_with({0, 1, 2, 3, 4, 5});
   errors.erase(errors.begin() + 3);
   const std::string outliers = describe_position_error_outliers(errors);

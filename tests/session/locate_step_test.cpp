@@ -149,16 +149,16 @@ TEST(LocateCameraFromDetections, WarnsOfMovedLampAndItsDisplacement) {
   EXPECT_THAT(locate_camera_from_detections(room_with_a_moved_lamp(0)).rejected_lamps, IsEmpty());
 }
 
-TEST(LocateCameraFromFrames, RollOfCapturesTableMovesFixAlongY) {
+TEST(LocateCameraFromDetections, RollOfCapturesTableMovesFixAlongY) {
   LocateInput input = example();
-  const LocateResult level = locate_camera_from_frames(input);
+  const LocateResult level = locate_camera_from_detections(input);
   ASSERT_FALSE(level.rows.empty());
   ASSERT_TRUE(level.rows[0].fix);
   const Eigen::Vector3d level_m = level.rows[0].fix->pose.position_m;
   Capture leaning;
   leaning.inclination = Inclination{0.01, 0};
   input.captures[input.frames[0].image] = leaning;
-  const LocateResult found = locate_camera_from_frames(input);
+  const LocateResult found = locate_camera_from_detections(input);
   ASSERT_TRUE(found.rows[0].fix);
   // The yaw is 0 and the lamps are 1.6 m above: a roll displaces the fix by 1.6 m sin(roll).
   const Eigen::Vector3d moved_m = found.rows[0].fix->pose.position_m - level_m;

@@ -122,7 +122,7 @@ TEST(ComputePositionCostsOfRowTimeCandidates, IsNearZeroOnlyForTrueRowTime) {
   }
 }
 
-TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenOnlyOneLampDiffers) {
+TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenOtherMisplacesOnlyOneLamp) {
   Images images(two_rows());
   for (int k = 0; k < 5; ++k) images.add({2, 3, 4, 5, 6}, k);
   images.expect_true_row_time(true);
@@ -200,7 +200,7 @@ TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenOtherAssignm
   images.expect_true_row_time(false);
 }
 
-TEST(ComputePositionCostsOfRowTimeCandidates, DoesNotDecideForMapOfAnotherRoom) {
+TEST(ComputePositionCostsOfRowTimeCandidates, DoesNotDecideForMirroredMap) {
   Images images(mixed_rows());
   LampMap room = images.map;
   for (Lamp& lamp : room.lamps) lamp.position_m.y() *= -1;

@@ -64,7 +64,7 @@ TEST(WriteStepRecord, MatchesJsonSchemaForEachFailure) {
   EXPECT_EQ(problems_by_schema("step", files), "");
 }
 
-TEST(ReadStepRecord, ReturnsNulloptForMissingTruncatedOrOtherVersion) {
+TEST(ReadStepRecord, ReturnsNulloptForMissingOrTruncatedFileOrOtherVersion) {
   const TemporaryFolder folder;
   EXPECT_FALSE(read_step_record(folder / "none.json"));
   write_step_record(folder / "s.json", {"key", "outputs", sample()});
@@ -77,7 +77,7 @@ TEST(ReadStepRecord, ReturnsNulloptForMissingTruncatedOrOtherVersion) {
   EXPECT_FALSE(read_step_record(folder.file("other.json", other)));
 }
 
-TEST(StepFailureFromName, InvertsToStringForEachValue) {
+TEST(StepFailureFromName, InvertsStepFailureNameForEachValue) {
   for (const auto failure :
        {StepFailure::none, StepFailure::bad_input, StepFailure::undetermined,
         StepFailure::wrong_board, StepFailure::wrong_map, StepFailure::wrong_place}) {

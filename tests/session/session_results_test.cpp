@@ -100,7 +100,7 @@ TEST_F(SessionResultsTest, KeepsForeignFilesAndRejectsThemAsOutputs) {
       ThrowsMessage<InputError>(HasSubstr("holds lens.svg, which is not of vlp-calibrate")));
 }
 
-TEST_F(SessionResultsTest, RemovesNoFileOutsideResultsFolderByForgedList) {
+TEST_F(SessionResultsTest, RemovesNoFileOutsideResultsFolderDespiteForgedOutputList) {
   folder.file("outside.txt", "mine");
   { const SessionResults taken(results, session); }
   folder.file("results/steps/outputs", "../outside.txt\nsteps/../../outside.txt\n" +
@@ -111,7 +111,7 @@ TEST_F(SessionResultsTest, RemovesNoFileOutsideResultsFolderByForgedList) {
   EXPECT_TRUE(fs::exists(folder / "outside.txt"));
 }
 
-TEST_F(SessionResultsTest, RemovesOnlyKnownOutputNamesByForgedList) {
+TEST_F(SessionResultsTest, RemovesOnlyKnownOutputNamesOfForgedOutputList) {
   { const SessionResults taken(results, session); }
   folder.file("results/mine.txt", "mine");
   folder.file("results/line-x", "mine");
@@ -145,7 +145,7 @@ TEST_F(SessionResultsTest, KeepsListingOutputsThatCouldNotBeRemoved) {
   EXPECT_FALSE(fs::exists(results / "lens.svg"));
 }
 
-TEST_F(SessionResultsTest, SetStepsAndRemoveStaleFilesAcceptsPlannedOutputsWithoutOutputList) {
+TEST_F(SessionResultsTest, SetStepsAndRemoveStaleFilesAcceptsPlannedOutputsIfListIsMissing) {
   { const SessionResults taken(results, session); }
   fs::remove(results / "steps/outputs");
   folder.file("results/line-x-fixes.csv", "of a drive whose step is not recorded");
@@ -179,7 +179,7 @@ TEST_F(SessionResultsTest, RejectsSymbolicLinkInPlaceOfOutput) {
   EXPECT_EQ(TemporaryFolder::read_content(folder / "mine.txt"), "mine");
 }
 
-TEST_F(SessionResultsTest, RemovesOutputsByStepRecordsWithoutOutputList) {
+TEST_F(SessionResultsTest, RemovesOutputsOfRecordedStepsIfOutputListIsMissing) {
   {
     SessionResults before(results, session);
     std::vector<StepOutputs> with_drive = kPlan;

@@ -109,7 +109,7 @@ TEST(SequentialCalibration, LensJacobiansPredictChangeOfZenithAndOffset) {
 
 /// Rotations at yaws that barely determine the circles. A lens error changes the set of determined
 /// circles, which moves their mean by up to 14 times the effect of the error itself.
-TEST(RunRotationCalibrationStep, CircleMethodLensErrorIsWithin50PercentOfJoint) {
+TEST(RunRotationCalibrationStep, CircleMethodErrorFromLensIsWithin50PercentOfJointMethod) {
   constexpr double spread_rad = 6e-4;  // a few times what the noise turns a lamp by
   for (const unsigned seed : {44U, 127U, 144U, 223U, 227U}) {
     Random random(seed);

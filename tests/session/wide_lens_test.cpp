@@ -37,9 +37,9 @@ LensInput make_wide_set(double reach_deg, LensModel model) {
   return input;
 }
 
-class RunLensStepWideField : public testing::TestWithParam<LensModel> {};
+class RunLensCalibrationStepWithWideLens : public testing::TestWithParam<LensModel> {};
 
-TEST_P(RunLensStepWideField, ProposesFisheyeWhenBoardIsBeyondRaysOfModel) {
+TEST_P(RunLensCalibrationStepWithWideLens, ProposesFisheyeWhenBoardIsBeyondRaysOfModel) {
   const LensResult result = run_lens_calibration_step(make_wide_set(180, GetParam()), {});
   EXPECT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.message, AllOf(HasSubstr("30 views with the board: it is visible up to 10"),
@@ -51,7 +51,7 @@ TEST_P(RunLensStepWideField, ProposesFisheyeWhenBoardIsBeyondRaysOfModel) {
 
 /// Up to 87 degrees: the errors of a lens that passes match the reported ones in the calibrated
 /// region.
-TEST_P(RunLensStepWideField, LensErrorsAreWithinThreeSigmasIfGatesPass) {
+TEST_P(RunLensCalibrationStepWithWideLens, LensErrorsAreWithinThreeSigmasIfGatesPass) {
   constexpr double sigmas = 3;
   int compared = 0;
   for (const double reach_deg : {60, 75, 87}) {
@@ -80,14 +80,14 @@ TEST_P(RunLensStepWideField, LensErrorsAreWithinThreeSigmasIfGatesPass) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Models, RunLensStepWideField,
+INSTANTIATE_TEST_SUITE_P(Models, RunLensCalibrationStepWithWideLens,
                          testing::Values(LensModel::opencv8, LensModel::opencv12),
                          [](const auto& instance) {
                            return instance.param == LensModel::opencv8 ? "Opencv8" : "Opencv12";
                          });
 
 /// OPENCV5 does not fit a lens of this width; detecting this takes seconds.
-TEST(RunLensCalibrationStep, ProposesFisheyeInsteadOfBoardErrorForUnsuitableModel) {
+TEST(RunLensCalibrationStep, ProposesFisheyeForUnsuitableModelWithoutBlamingBoard) {
   const LensResult result = run_lens_calibration_step(make_wide_set(87, LensModel::opencv5), {});
   ASSERT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.message, AllOf(HasSubstr("OPENCV_FISHEYE fits with 0.05 px"),

@@ -95,7 +95,7 @@ TEST(ReadSceneCaptureSet, RejectsNoneOrTwoKeysForYaws) {
             "scene.yaml:26: captures[1]: " + problem);
 }
 
-TEST(ReadSceneCaptureSet, RejectsEmptyListOfSpotsHeightsYawsOrCaptures) {
+TEST(ReadSceneCaptureSet, RejectsEmptyListOfPivotsHeightsYawsOrCaptures) {
   EXPECT_EQ(refusal_with("[[0.1, -0.05], [-0.2, 0.3]]", "[]"),
             "scene.yaml:25: captures[0].pivots_m: contains no pivot");
   EXPECT_EQ(refusal_with("heights_m: [0, 0.2]", "heights_m: []"),

@@ -22,9 +22,9 @@ Statistics measured(const Sensor& sensor, double electrons, std::uint64_t seed =
   return {mean[0], deviation[0] * deviation[0]};
 }
 
-class ExposeNoise : public testing::TestWithParam<double> {};
+class SimulateSensorImageNoise : public testing::TestWithParam<double> {};
 
-TEST_P(ExposeNoise, SimulateSensorImageMeanAndVarianceMatchNoiseModel) {
+TEST_P(SimulateSensorImageNoise, MeanAndVarianceMatchNoiseModel) {
   const double electrons = GetParam();
   for (const double read_noise_e : {0.0, 7.0}) {
     const Sensor sensor{16, 2, 100, 1e6, read_noise_e, true, {}};
@@ -37,7 +37,7 @@ TEST_P(ExposeNoise, SimulateSensorImageMeanAndVarianceMatchNoiseModel) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Means, ExposeNoise,
+INSTANTIATE_TEST_SUITE_P(Means, SimulateSensorImageNoise,
                          testing::Values(0.05, 0.7, 3, 10, 15.9, 16.1, 40, 300, 10000));
 
 TEST(SimulateSensorImage, SlopeOfVarianceOverMeanIsGain) {

@@ -41,7 +41,7 @@ double mean_over_line(int line, double exposure_s, const Function& function) {
   return sum / samples;
 }
 
-TEST(RectifiedSine, LitFractionMatchesNumericalMean) {
+TEST(RectifiedSine, MeanLightFractionMatchesNumericalMean) {
   const RectifiedSine wave{100, 0.4, 0.3};
   const auto mean_until = [&](double end_s) {
     constexpr int samples = 100000;
@@ -189,7 +189,7 @@ TEST_F(FrameRendererForeignLight, ForeignLightsInViewAreListedAsOtherLightsNotLa
   EXPECT_EQ(make_scene_lamp_map(scene_, true).lamps.size(), 1U);
 }
 
-TEST_F(FrameRendererForeignLight, WriteTruthTablesListsForeignLightInTrueOtherLights) {
+TEST_F(FrameRendererForeignLight, WriteTruthTablesListsForeignLightAndMirrorImage) {
   CaptureSet set{"check", 5e-5, LampShots{}, {}};
   set.lamps->heights_m = {0.1};
   set.lamps->pivots_m = {Eigen::Vector2d::Zero()};

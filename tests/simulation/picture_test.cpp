@@ -24,7 +24,7 @@ cv::Mat1f step(double left, double right) {
 
 bool same(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF) == 0; }
 
-TEST(SimulateSensorImage, AppliesGammaToBothLevelsOfStep) {
+TEST(SimulateSensorImage, AppliesGammaToBothLevelsOfStepEdge) {
   const cv::Mat image =
       simulate_sensor_image(kSensor, step(20, 200), 1, ImageProcessing{2.2, {}, {}});
   EXPECT_EQ(image.at<std::uint8_t>(10, 19), std::lround(255 * std::pow(10 / 255.0, 1 / 2.2)));

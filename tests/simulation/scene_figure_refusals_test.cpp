@@ -153,7 +153,7 @@ TEST(ReadSceneFile, RejectsChipsOutOfRangeOrLargerThanDisc) {
             chips + "width_m: is more than twice pitch_m: such chips are an even disc");
 }
 
-TEST(ReadSceneFile, RejectsRandomChipsOutOfRangeOrNextToChips) {
+TEST(ReadSceneFile, RejectsRandomChipsOutOfRangeOrTogetherWithChips) {
   const auto with = [](const std::string& keys) {
     return refusal_with("rim_to_center_ratio: 0.8}", "rim_to_center_ratio: 0.8, " + keys + "}");
   };

@@ -122,7 +122,7 @@ TEST(ReadSceneFile, ReadsImageProcessingOnlyIfGiven) {
   EXPECT_FALSE(read_scene_text(scene_with("processing: ", "# ")).processing);
 }
 
-TEST(ReadSceneFile, ReadsSpotsHeightsAndYawsInOrderOfFile) {
+TEST(ReadSceneFile, ReadsPivotsHeightsAndYawsInOrderOfFile) {
   const CaptureSet set = read_scene_text(kSceneYaml).sets.at(0);
   EXPECT_EQ(set.folder, "spots");
   EXPECT_EQ(set.exposure_s, 5e-5);
@@ -139,7 +139,7 @@ TEST(ReadSceneFile, ReadsSpotsHeightsAndYawsInOrderOfFile) {
   EXPECT_EQ(count_captures_of_set(set), 2U * 2 * 2 * 3);
 }
 
-TEST(ReadSceneFile, OrdersSpotsOfGridRowByRow) {
+TEST(ReadSceneFile, OrdersPivotsOfGridRowByRow) {
   const LampShots captures = read_scene_text(kSceneYaml).sets.at(1).lamps.value();
   const std::vector<Vector2d> expected{{-0.6, 0.3},  {0, 0.3},  {0.6, 0.3},
                                        {-0.6, -0.3}, {0, -0.3}, {0.6, -0.3}};

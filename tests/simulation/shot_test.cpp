@@ -162,7 +162,7 @@ TEST(MakeBoardCaptureParameters, PlacesBoardAtLastRayWhereLensHasNone) {
   EXPECT_LT(at_the_rim, 0.27 * 300);
 }
 
-TEST(BaseMotion, InclinationIsSumOfRollPitchAndVibration) {
+TEST(BaseMotion, BaseInclinationIsGivenInclinationPlusVibration) {
   const Mount mount{Eigen::Matrix3d::Identity(), {0.1, 0}};
   BaseMotion motion{{1, 2, 0.5}, {0.5, 0}, 0.3, 0.2, mount};
   EXPECT_TRUE(motion.is_base_level());

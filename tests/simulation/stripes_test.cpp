@@ -118,7 +118,7 @@ TEST(FrameRenderer, RowBrightnessIsLitFractionOfRowExposure) {
   }
 }
 
-TEST(FrameRenderer, ImageIsTransposedForColumnReadout) {
+TEST(FrameRenderer, ElectronImageIsTransposedForColumnReadout) {
   Scene scene = plain_scene();
   scene.camera.readout = Readout::columns;
   scene.lamps[0].duty = 0.5;

@@ -49,7 +49,7 @@ TEST_F(ReadStationConfig, ReturnsContentOfReferencedFiles) {
 }
 
 /// The keys commented out with '#' are valid.
-TEST_F(ReadStationConfig, AcceptsCommentedOutOptionalKeysOfExample) {
+TEST_F(ReadStationConfig, AcceptsOptionalKeysOfExampleWhenUncommented) {
   folder.file("golden.yaml", TemporaryFolder::read_content(kExample + "calibration.yaml"));
   folder.file(
       "station.yaml",

@@ -173,7 +173,7 @@ TEST(ComputeMedianEdgeMtf50, MatchesMtf50OfUniformEdgeBlur) {
 }
 
 TEST(ComputeMedianEdgeMtf50, ReturnsMtf50OfUpperMedianBlur) {
-  BoardDetection seen = make_views(even_step, 1)[0].seen;
+  BoardDetection seen = make_views(even_step, 1)[0].detection;
   seen.tags.resize(2);
   const std::array blurs_px{2.0, 0.5, 0.7, 1.1, 9.0, 0.9, 0.4, 3.0};
   for (std::size_t i = 0; i < blurs_px.size(); ++i) {

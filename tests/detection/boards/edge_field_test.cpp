@@ -64,13 +64,13 @@ TEST(EdgeField, ReturnsTrueBlurDespiteOutliersAmongSamples) {
 TEST(EdgeField, ReturnsGeometricMeanEverywhereForThreeSamples) {
   const std::vector<EdgeSample> few{
       {{10, 10}, {1, 0}, 0.5, 0.1}, {{90, 10}, {1, 0}, 0.8, 0.1}, {{50, 80}, {0, 1}, 2.0, 0.1}};
-  const EdgeField field(few, EdgeField::Terms::place);
-  EXPECT_EQ(field.predict_edge_property({0, 0}, {1, 0}),
-            field.predict_edge_property({500, 700}, {0, 1}));
-  EXPECT_NEAR(field.predict_edge_property({0, 0}, {1, 0}), 0.9, 0.2);
+  const EdgeField field(few, EdgeField::Terms::position);
+  EXPECT_EQ(field.evaluate_field_at_edge({0, 0}, {1, 0}),
+            field.evaluate_field_at_edge({500, 700}, {0, 1}));
+  EXPECT_NEAR(field.evaluate_field_at_edge({0, 0}, {1, 0}), 0.9, 0.2);
   // The samples have equal weights: no residual exceeds three standard deviations.
-  EXPECT_NEAR(field.predict_edge_property({0, 0}, {1, 0}), std::cbrt(0.5 * 0.8 * 2.0), 1e-6);
-  EXPECT_GT(field.unexplained_edge_sd(), 0.3);
+  EXPECT_NEAR(field.evaluate_field_at_edge({0, 0}, {1, 0}), std::cbrt(0.5 * 0.8 * 2.0), 1e-6);
+  EXPECT_GT(field.excess_relative_sd_of_edges(), 0.3);
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ TEST(ComputeModulationMap, ReturnsMeanAndFundamentalAmplitudeOfSquareWave) {
 
 TEST(ComputeModulationMap, ReturnsNearlyZeroAmplitudeForSteadyLightAndLinearRamp) {
   const ModulationMap steady = make_map(cv::Mat1b(160, 64, std::uint8_t(200)));
-  const std::size_t middle = steady.cell_index(steady.steps / 2, steady.cells / 2);
+  const std::size_t middle = steady.modulation_cell_index(steady.steps / 2, steady.cells / 2);
   EXPECT_LT(steady.amplitude[middle], 0.1);
 
   cv::Mat1b image(160, 64);

@@ -52,7 +52,7 @@ TEST(InputDigests, ImageFolderDigestMatchesSha256sumOfItsImages) {
   EXPECT_EQ(InputDigests().compute_image_folder_digest(folder / ""), oracle.output.substr(0, 64));
 }
 
-TEST(MakeHistoryEntryFromCommandLine, OmitsFoldersOfMachineFromOptionsAndInputs) {
+TEST(MakeHistoryEntryFromCommandLine, OmitsFoldersAndOptionsThatDoNotAffectResult) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "spot");
   folder.file("spot/0.png", "an image");

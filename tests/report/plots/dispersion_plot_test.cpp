@@ -44,7 +44,7 @@ TEST_F(DispersionPlotTest, LabelsOutliersOnlyIfThereAreAny) {
   EXPECT_THAT(rendered("a.svg"), HasSubstr("rejected"));
 }
 
-TEST_F(DispersionPlotTest, RendersSingleFixBeforeAndAfter) {
+TEST_F(DispersionPlotTest, RendersSingleFixBeforeAndAfterCorrection) {
   plot.before = {{{0.01, 0}}, {{0.01, 0}, 0}};
   plot.after = {{{0, 0}}, {{0, 0}, 0}};
   EXPECT_THAT(

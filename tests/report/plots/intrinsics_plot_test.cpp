@@ -75,14 +75,14 @@ TEST_F(IntrinsicsPlotTest, LeavesUnknownSdsBlankAndStatesWhenAllAreUnknown) {
   EXPECT_THAT(render_plot_as_svg(plot), AllOf(HasSubstr("not determined"), HasSubstr("2 corners")));
 }
 
-TEST_F(IntrinsicsPlotTest, RendersConstantMapAndZeroResiduals) {
+TEST_F(IntrinsicsPlotTest, RendersConstantSdMapAndZeroResiduals) {
   plot.sd_px.assign(9, 0.2);
   for (auto& corner : plot.corners) corner = {corner.detected_px, {0, 0}, false};
   EXPECT_THAT(render_plot_as_svg(plot),
               AllOf(HasSubstr("3 corners"), HasSubstr("1 times as long")));
 }
 
-TEST(ChooseResidualMagnification, ReturnsRoundNumberWithinBounds) {
+TEST(ChooseResidualMagnification, ReturnsRoundNumberThatScalesRmsTo1To2Point5PercentOfWidth) {
   EXPECT_DOUBLE_EQ(choose_residual_magnification(0.1, 800), 200);
   EXPECT_DOUBLE_EQ(choose_residual_magnification(0.11, 800), 100);
   EXPECT_DOUBLE_EQ(choose_residual_magnification(1, 4000), 100);

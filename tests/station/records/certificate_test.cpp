@@ -51,7 +51,7 @@ RunRecord certified_run() {
   return record;
 }
 
-TEST(CertifiedValue, DescribeStatesTwiceTheSdWithTwoDigits) {
+TEST(FormatCertifiedValue, StatesTwiceTheSdWithTwoDigits) {
   const auto words = [](double value, std::optional<double> u) {
     return format_certified_value(CertifiedValue{"", "px", value, u});
   };

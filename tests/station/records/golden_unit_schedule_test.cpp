@@ -64,7 +64,7 @@ class DescribeGoldenUnitProblem : public testing::Test {
   StationConfig config{};
 };
 
-TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnitUntilItPassesHere) {
+TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnitUntilItPassesOnThisStation) {
   note("unit", "PASS");
   EXPECT_THAT(problem(), StartsWith("the golden unit was not measured here yet: "));
   note("golden", "INVALID");

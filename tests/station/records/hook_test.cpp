@@ -95,7 +95,7 @@ TEST_F(RunStationHook, KillsHookAndChildrenAtTimeLimit) {
   EXPECT_EQ(TemporaryFolder::read_content(its), "");
 }
 
-TEST_F(RunStationHook, KillsHookThatFloodsOutputOrLeavesProcessGroup) {
+TEST_F(RunStationHook, KillsHookAtTimeLimitDespiteOutputFloodOrOtherProcessGroup) {
   EXPECT_EQ(run("exec cat /dev/zero", 0.3).kind, kHookFailed);
   EXPECT_LT(took_s, 5);
   const RunEvent event =
@@ -177,7 +177,7 @@ TEST_F(RunStationHook, IsHookPendingUntilRequestedHookSucceeds) {
   EXPECT_FALSE(is_hook_pending(run));
 }
 
-TEST_F(RunStationHook, SecondHookLockOfSameRunIsNotHeld) {
+TEST_F(RunStationHook, SecondHookLockOfSameRunIsNotAcquired) {
   const std::string name = judged_run().run;
   {
     const HookLock first_lock(folder / ".", name), other(folder / ".", name);

@@ -190,7 +190,7 @@ TEST_F(KnownRunsTest, VoidRunRenamesCalibrationOfPassedRun) {
               HasSubstr("keep their names: use the same command with --station of station-1"));
 }
 
-TEST_F(KnownRunsTest, VoidRunCallsHookForRunVoidedWithoutStation) {
+TEST_F(KnownRunsTest, RepeatedVoidCallsHookIfRunWasVoidedWithoutStation) {
   config.hook = Hook{{"sh", "-c", "cat >told.json"}, folder / ".", 20};
   const std::string run = keep(1);
   {

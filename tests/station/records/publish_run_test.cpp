@@ -27,7 +27,7 @@ RunRecord passed() {
   return record;
 }
 
-TEST(PublishRun, WritesOnlyMissingFiles) {
+TEST(PublishRunFiles, WritesOnlyMissingFiles) {
   const TemporaryFolder folder;
   const RunRecord record = passed();
   const fs::path results = publish_run_files(record, {}, folder / "results");
@@ -44,7 +44,7 @@ TEST(PublishRun, WritesOnlyMissingFiles) {
   EXPECT_EQ(TemporaryFolder::read_content(results / "report.html"), report);
 }
 
-TEST(PublishRun, ReplacesDifferentReportOnRequest) {
+TEST(PublishRunFiles, ReplacesDifferentReportOnRequest) {
   const TemporaryFolder folder;
   const RunRecord record = passed();
   const fs::path results = publish_run_files(record, {}, folder / "results");
@@ -62,7 +62,7 @@ TEST(PublishRun, ReplacesDifferentReportOnRequest) {
   EXPECT_FALSE(fs::exists(results / "replaced-report.html"));
 }
 
-TEST(PublishRun, WritesNothingOutsideResultsFolder) {
+TEST(PublishRunFiles, WritesNothingOutsideResultsFolder) {
   const TemporaryFolder folder;
   fs::create_directory(folder / "elsewhere");
   RunRecord record = passed();
@@ -100,7 +100,7 @@ TEST(CheckResultsFolderWritable, RemovesSymbolicLinkOfTestFileAndKeepsItsTarget)
   EXPECT_FALSE(fs::is_symlink(folder / "results/0001/.writable"));
 }
 
-TEST(PublishRun, ThrowsWhenExistingCalibrationDiffersFromRecord) {
+TEST(PublishRunFiles, ThrowsWhenExistingCalibrationDiffersFromRecord) {
   const TemporaryFolder folder;
   const RunRecord record = passed();
   const fs::path results = publish_run_files(record, {}, folder / "results");
@@ -120,7 +120,7 @@ TEST(PublishRun, ThrowsWhenExistingCalibrationDiffersFromRecord) {
   EXPECT_FALSE(fs::exists(folder / "mine.yaml"));
 }
 
-TEST(PublishRun, PrefixesCalibrationFileNameWithFailedOrInvalid) {
+TEST(PublishRunFiles, PrefixesCalibrationFileNameWithFailedOrInvalid) {
   const TemporaryFolder folder;
   RunRecord record = passed();
   record.set_verdict_from_causes({{"the lens is decentered", true}});

@@ -207,7 +207,7 @@ TEST(Spool, NoticeAndStateForOperatorContainNoSql) {
 }
 
 /// Server that accepts only TLS, with its own certificate.
-TEST(Spool, DeliversOverTlsOnlyWithValidCertificate) {
+TEST(Spool, DeliversToTlsServerUnlessTlsIsOffOrCertificateCheckFails) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const TemporaryFolder folder;
   const PostgresServer server("right", PostgresServer::Tls::required);

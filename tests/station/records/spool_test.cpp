@@ -414,7 +414,7 @@ TEST(Spool, KeepsDifferentRunWithSameIdWaiting) {
 }
 
 /// A missing file can be on a share that is not mounted.
-TEST(Spool, CreatesDatabaseOnlyInCheckStorage) {
+TEST(Spool, CreatesDatabaseOnlyInCheckRunsCanBeStored) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);

@@ -14,7 +14,7 @@ namespace {
 
 using testing::SizeIs;
 
-TEST(VerifyStation, RecordStartsAtTimeOfRunId) {
+TEST(VerifyStationFromGoldenImages, RecordStartsAtTimeOfRunId) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "check");
   folder.file("check/0000.png", "no image");

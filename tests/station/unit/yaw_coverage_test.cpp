@@ -49,7 +49,7 @@ TEST_F(YawCoverageTest, MarksMissingYawsAndIsInsufficient) {
 }
 
 // Not from the lowest capture, which depends on the last micrometers of the fixes.
-TEST_F(YawCoverageTest, FirstPartIsAtYawOfFirstCapture) {
+TEST_F(YawCoverageTest, FirstSectorIsAtYawOfFirstCapture) {
   frames.resize(3);
   const auto forwards =
       compute_yaw_coverage(frames, config, calibration).heights.at(0).covered_sectors;
@@ -62,7 +62,7 @@ TEST_F(YawCoverageTest, FirstPartIsAtYawOfFirstCapture) {
   EXPECT_NE(forwards[11], backwards[11]);
 }
 
-TEST_F(YawCoverageTest, ReturnsEachHeightAndRequiresConfiguredNumber) {
+TEST_F(YawCoverageTest, ReturnsEachHeightAndRequiresConfiguredNumberOfHeights) {
   frames.erase(frames.begin() + 12, frames.end());
   EXPECT_THAT(compute_yaw_coverage(frames, config, calibration).heights, SizeIs(1));
   EXPECT_FALSE(compute_yaw_coverage(frames, config, calibration).sufficient);
