@@ -426,7 +426,7 @@ void print_metric_trend(const StationRecordsOptions& options) {
   check_output_option(options, *known);
   Records& records = known->station_records();
   RunFilter filter = make_filter_of_comparable_runs(options, *known);
-  if (options.filter.verdict.empty()) filter.verdict = run_verdict_name(Verdict::pass);
+  if (options.filter.verdict.empty()) filter.verdict = verdict_name(Verdict::pass);
   const auto points = records.load_metric_trend(options.metric, filter);
   check_values_are_of_one_station(points, options);
   constexpr std::size_t min_points = 2;

@@ -24,7 +24,7 @@
 #include "station/records/spool.h"
 #include "station/unit/camera_source.h"
 #include "station/unit/station_screen.h"
-#include "station/unit/unit_record.h"
+#include "station/unit/unit_verdict.h"
 #include "station/unit/verify_station.h"
 
 namespace vlp {

@@ -111,9 +111,7 @@ ReprocessedArchive read_reprocessed_archive_sessions(const fs::path& results) {
     // "look" is the former name of "review".
     const bool passed = verdict == "pass" || verdict == "review" || verdict == "look";
     const bool failed = verdict == "gate";
-    run.verdict = run_verdict_name(passed   ? Verdict::pass
-                                   : failed ? Verdict::fail
-                                            : Verdict::invalid);
+    run.verdict = verdict_name(passed ? Verdict::pass : failed ? Verdict::fail : Verdict::invalid);
     if (!passed) run.causes = text(row, "reason") + "\n";
     archive.sessions.push_back(
         {std::move(run), results / (passed || failed ? "sessions" : "failed") / session});

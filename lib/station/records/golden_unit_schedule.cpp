@@ -185,8 +185,8 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
   std::istringstream words(text.substr(0, text.find('\n')));
   std::string run, verdict, ended_utc, measured_with;
   words >> run >> verdict >> ended_utc >> measured_with;
-  const bool failed = verdict == run_verdict_name(Verdict::fail);
-  if ((!failed && verdict != run_verdict_name(Verdict::pass)) || ended_utc.empty()) {
+  const bool failed = verdict == verdict_name(Verdict::fail);
+  if ((!failed && verdict != verdict_name(Verdict::pass)) || ended_utc.empty()) {
     return describe_damaged_note(file.string() + " is damaged");
   }
   if (failed) {

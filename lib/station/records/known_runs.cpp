@@ -124,11 +124,11 @@ RunCounts count_runs_by_verdict(std::span<const RunSummary> runs) {
       ++counts.voided;
       continue;
     }
-    const bool passed = run.verdict == run_verdict_name(Verdict::pass);
-    const bool failed = run.verdict == run_verdict_name(Verdict::fail);
+    const bool passed = run.verdict == verdict_name(Verdict::pass);
+    const bool failed = run.verdict == verdict_name(Verdict::fail);
     if (passed) ++counts.passed;
     if (failed) ++counts.failed;
-    if (run.verdict == run_verdict_name(Verdict::invalid)) ++counts.invalid;
+    if (run.verdict == verdict_name(Verdict::invalid)) ++counts.invalid;
     if (run.kind != "unit") continue;
     if (passed) ++counts.units_passed;
     if (!passed && !failed) continue;

@@ -71,13 +71,13 @@ void RunRecord::set_verdict_from_causes(std::vector<Cause> new_causes) {
   if (std::string problem = describe_clock_problem(*this); !problem.empty()) {
     new_causes.insert(new_causes.begin(), {std::move(problem), false});
   }
-  verdict = run_verdict_name(decide_verdict_from_causes(new_causes));
+  verdict = verdict_name(decide_verdict_from_causes(new_causes));
   causes.clear();
   for (const Cause& cause : new_causes) causes.append(cause.text).append("\n");
 }
 
 void RunRecord::invalidate_verdict(const std::string& reason) {
-  verdict = run_verdict_name(Verdict::invalid);
+  verdict = verdict_name(Verdict::invalid);
   causes = reason + "\n" + causes;
 }
 
@@ -87,7 +87,7 @@ const CheckedMetric* RunRecord::find_metric_by_name(std::string_view name) const
 }
 
 std::ptrdiff_t RunRecord::count_used_images() const {
-  return std::ranges::count_if(images, &Image::is_used);
+  return std::ranges::count_if(images, &Image::is_image_used);
 }
 
 const RunEvent* find_voiding_event(const RunRecord& record) {

@@ -51,7 +51,7 @@ struct RunRecord {
   std::string operator_name, shift;
   /// Start and end of the run in UTC, as 2026-11-21T13:45:01Z.
   std::string begun_utc, ended_utc;
-  /// Verdict (run_verdict_name()), and its causes, one per line, the primary cause first.
+  /// Verdict (verdict_name()), and its causes, one per line, the primary cause first.
   std::string verdict, causes;
   /// Program with its version, and the libraries that affect the result with their versions.
   std::string program, libraries;
@@ -74,8 +74,8 @@ struct RunRecord {
   const CheckedMetric* find_metric_by_name(std::string_view name) const;
   /// Returns the number of images that were used.
   std::ptrdiff_t count_used_images() const;
-  bool has_run_passed() const { return verdict == run_verdict_name(Verdict::pass); }
-  bool is_verdict_invalid() const { return verdict == run_verdict_name(Verdict::invalid); }
+  bool has_run_passed() const { return verdict == verdict_name(Verdict::pass); }
+  bool is_verdict_invalid() const { return verdict == verdict_name(Verdict::invalid); }
   /// Returns the first cause, in one line; empty if the run passed.
   std::string first_verdict_cause() const { return causes.substr(0, causes.find('\n')); }
   /// Sets verdict and causes from `new_causes`, the most important cause first. A wrong clock

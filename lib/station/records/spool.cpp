@@ -335,13 +335,13 @@ ImageUser Spool::find_run_of_other_camera_using_image(const std::string& sha256,
 
 std::string Spool::find_golden_run_using_image(const std::string& sha256) {
   const auto run = find_run_that_used_image(sha256, [](const RunSummary& user) {
-    return user.kind == "golden" && user.verdict != run_verdict_name(Verdict::invalid);
+    return user.kind == "golden" && user.verdict != verdict_name(Verdict::invalid);
   });
   return run ? run->run : "";
 }
 
 std::optional<std::string> Spool::find_run_with_same_images(const RunRecord& run) {
-  const auto first = std::ranges::find_if(run.images, &RunRecord::Image::is_used);
+  const auto first = std::ranges::find_if(run.images, &RunRecord::Image::is_image_used);
   if (first == run.images.end()) return "";
   const RunFilter filter{.camera = run.camera, .kind = "unit", .image_sha256 = first->sha256};
   const std::vector<RunRecord> waiting = list_waiting_runs();
@@ -350,7 +350,7 @@ std::optional<std::string> Spool::find_run_with_same_images(const RunRecord& run
       query_records([&](Records& records) { stored = records.list_run_summaries(filter); });
   for (const RunSummary& earlier :
        merge_stored_and_waiting_runs(std::move(stored), waiting, filter)) {
-    if (earlier.verdict == run_verdict_name(Verdict::invalid) || !earlier.voided.empty()) continue;
+    if (earlier.verdict == verdict_name(Verdict::invalid) || !earlier.voided.empty()) continue;
     const auto record = find_run_by_id(earlier.run);
     if (record && uses_images_of_earlier_run(run, *record)) return earlier.run;
     has_answer = has_answer && record;

@@ -36,7 +36,7 @@ std::vector<TrendPoint> load_metric_of_judged_runs(Records& records, const std::
   const int last = std::exchange(filter.last, 0);
   auto points = records.load_metric_trend(metric, filter);
   std::erase_if(points, [](const TrendPoint& point) {
-    return point.verdict == run_verdict_name(Verdict::invalid);
+    return point.verdict == verdict_name(Verdict::invalid);
   });
   return keep_last_rows(std::move(points), last);
 }

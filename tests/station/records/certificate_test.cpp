@@ -44,7 +44,7 @@ RunRecord certified_run() {
   record.program = "vlp-station 0";
   record.config_sha256 = std::string(64, 'a');
   record.calibration = "format: vlp-calibration/1\n";
-  record.verdict = run_verdict_name(Verdict::pass);
+  record.verdict = verdict_name(Verdict::pass);
   record.metrics = check_all_metrics_against_gates(
       {{"rms_px", 0.3}, {"check_mean_mm", 1, GuardBand{0.02, 1.645}}},
       {{"rms_px", 0.123456}, {"check_mean_mm", 0.9600001}}, list_unit_metric_kinds());

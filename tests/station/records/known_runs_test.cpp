@@ -68,7 +68,7 @@ TEST_F(KnownRunsTest, ListRunsReturnsStoredAndWaitingRuns) {
     EXPECT_EQ(known.find_last_run({}).run, waits);
     EXPECT_EQ(known.find_last_run(only(&RunFilter::camera, "a")).run, kept);
     EXPECT_EQ(known.find_run_by_id(kept).camera, "a");
-    EXPECT_THROW(known.find("none"), std::invalid_argument);
+    EXPECT_THROW(known.find_run_by_id("none"), std::invalid_argument);
     EXPECT_THROW(known.find_last_run(only(&RunFilter::camera, "c")), std::invalid_argument);
   }
   make_records_unavailable();

@@ -21,7 +21,7 @@ RunRecord passed() {
   record.run = "20261121T134501Z-0001";
   record.camera = "0001";
   record.station = "station-1";
-  record.verdict = run_verdict_name(Verdict::pass);
+  record.verdict = verdict_name(Verdict::pass);
   record.calibration =
       TemporaryFolder::read_content(fs::path(VLP_SOURCE_DIR) / "datasets/example/calibration.yaml");
   return record;

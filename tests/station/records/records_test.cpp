@@ -132,7 +132,7 @@ void check_records(const std::string& where) {
   ASSERT_THAT(records.list_run_summaries(filter), SizeIs(1));
   EXPECT_EQ(records.list_run_summaries(filter)[0].run, numbered_run_id(1));
 
-  EXPECT_FALSE(records.find("another"));
+  EXPECT_FALSE(records.find_run_by_id("another"));
   const auto found = records.find_run_by_id(numbered_run_id(3));
   ASSERT_TRUE(found);
   const RunRecord expected = make_sample_record(numbered_run_id(3), "a", 1.5);
@@ -545,7 +545,7 @@ TEST(ExportRunsToFile, JsonOfRunsAndSpoolMatchesSchemas) {
   RunRecord golden = make_sample_record(numbered_run_id(2), "b", 1.5);
   golden.kind = "golden";
   RunRecord invalid = make_sample_record(numbered_run_id(3), "c", 1.5);
-  invalid.verdict = run_verdict_name(Verdict::invalid);
+  invalid.verdict = verdict_name(Verdict::invalid);
   export_runs_to_file(file, {make_sample_record(numbered_run_id(1), "a", 0.25), golden, invalid});
   EXPECT_EQ(problems_by_schema("runs", {file}), "");
   std::vector<std::filesystem::path> waiting;

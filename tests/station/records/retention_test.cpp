@@ -180,20 +180,20 @@ TEST_F(RetentionTest, CheckClockThrowsWhenNewestRunIsOverYearBeforeClock) {
   const auto refusal = [&] {
     return rejection_message([&] { check_clock_against_recorded_runs(config, records); });
   };
-  EXPECT_EQ(rejection_message(), "") << "no run";
+  EXPECT_EQ(refusal(), "") << "no run";
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   keep(make_run_id(), "a", get_current_utc(), "another");
-  EXPECT_THAT(rejection_message(),
+  EXPECT_THAT(refusal(),
               HasSubstr("the newest run ended 2020-01-01T01:00:00Z, more than a year before"));
   // The first run by such a clock does not make it right.
   const std::string today = get_current_utc();
   keep(make_run_id(), "a", today);
-  EXPECT_THAT(rejection_message(),
+  EXPECT_THAT(refusal(),
               HasSubstr("the runs since " + today + " ended more than a year after"));
   keep(make_run_id(), "a", utc_days_ago(6));
-  EXPECT_THAT(rejection_message(), HasSubstr("the runs since " + utc_days_ago(6)));
+  EXPECT_THAT(refusal(), HasSubstr("the runs since " + utc_days_ago(6)));
   keep(make_run_id(), "a", utc_days_ago(8));
-  EXPECT_EQ(rejection_message(), "");
+  EXPECT_EQ(refusal(), "");
 }
 
 TEST_F(RetentionTest, CheckClockThrowsWhenRunEndedInFutureUnlessVoided) {

@@ -331,7 +331,7 @@ TEST(Spool, DeliversAllRunsAfterServerStoppedDuringDelivery) {
             8);
   connected.store_run(numbered_run(-3));
   EXPECT_LT(measure_seconds([&] { connected.deliver_waiting_runs(); }), 1);
-  EXPECT_FALSE(connected.find("another"));
+  EXPECT_FALSE(connected.find_run_by_id("another"));
   EXPECT_THAT(connected.last_offline_reason(), HasSubstr("has not answered for 2 s"));
   EXPECT_THAT(connected.describe_spool_state(),
               AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),

@@ -124,13 +124,13 @@ TEST(ReadSpooledRun, RejectsIdsThatLeadToOtherFolders) {
       read_spooled_run(folder.file("bad.json", serialize_spooled_run({run, "records.db"})));
     });
   };
-  EXPECT_THAT(rejection_message(), HasSubstr("its run or camera is no id"));
+  EXPECT_THAT(refusal(), HasSubstr("its run or camera is no id"));
   run = numbered_run(1);
   run.run = "../x";
-  EXPECT_THAT(rejection_message(), HasSubstr("its run or camera is no id"));
+  EXPECT_THAT(refusal(), HasSubstr("its run or camera is no id"));
   run = numbered_run(1);
   run.events.push_back({"../x", kHookDone, "", ""});
-  EXPECT_THAT(rejection_message(), HasSubstr("an event is no id"));
+  EXPECT_THAT(refusal(), HasSubstr("an event is no id"));
 }
 
 TEST(ReadSpooledRun, RejectsSpecialFilesAndDeepNesting) {
@@ -159,7 +159,7 @@ TEST(Spool, DeliversStoredRunsWhenRecordsBecomeReachable) {
       spool.describe_spool_state(),
       AllOf(StartsWith("runs are queued in the spool, 3 waiting: "), HasSubstr("records.db")));
   EXPECT_EQ(spool.find_run_by_id(numbered_run(1).run)->camera, "camera-1");
-  EXPECT_FALSE(spool.find("another"));
+  EXPECT_FALSE(spool.find_run_by_id("another"));
   // Checks continue with the locally known runs.
   EXPECT_EQ(spool.find_run_of_other_camera_using_image("digest-2-7", "camera-1"),
             (ImageUser{"camera-2", numbered_run(2).run}));
@@ -420,7 +420,7 @@ TEST(Spool, CreatesDatabaseOnlyInCheckRunsCanBeStored) {
   Spool spool(folder / "spool", where);
   spool.store_run(numbered_run(1));
   spool.deliver_waiting_runs();
-  EXPECT_FALSE(spool.find("another"));
+  EXPECT_FALSE(spool.find_run_by_id("another"));
   EXPECT_THAT(spool.describe_spool_state(),
               AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
                     HasSubstr("records.db: there are no records")));

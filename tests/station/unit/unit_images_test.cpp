@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "station/unit/unit.h"
-#include "station/unit/unit_record.h"
+#include "station/unit/unit_verdict.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

@@ -6,7 +6,7 @@
 
 #include "station/records/publish_run.h"
 #include "station/unit/station_screen.h"
-#include "station/unit/unit_record.h"
+#include "station/unit/unit_verdict.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

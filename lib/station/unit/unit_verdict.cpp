@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "station/unit/unit_record.h"
+#include "station/unit/unit_verdict.h"
 
 #include <fmt/core.h>
 
