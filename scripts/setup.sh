@@ -14,7 +14,7 @@ set -euo pipefail
 build=(
   g++ cmake ninja-build ccache git pkg-config
   libeigen3-dev libyaml-cpp-dev libcsv-dev libcli11-dev libspdlog-dev libfmt-dev
-  libopencv-dev libapriltag-dev libceres-dev libssl-dev
+  libopencv-dev libpng-dev libapriltag-dev libceres-dev libssl-dev
   nlohmann-json3-dev libpugixml-dev
   libmrcal-dev libsuitesparse-dev libcairo2-dev
   libsoci-dev libsqlite3-dev libpq-dev

@@ -9,7 +9,8 @@
 
 /// Codecs of images and videos by OpenCV's imgcodecs and videoio, used through these interfaces.
 /// Both load about 240 shared libraries, which takes longer than most programs run. A separate
-/// library is therefore linked to them and loaded at the first image.
+/// library is therefore linked to them and loaded at the first image or video that needs it. Gray
+/// PNG images do not (decode_gray_image()).
 namespace vlp {
 
 /// Abstract interface to cv::VideoCapture, which reads the frames of a video or a camera. The
@@ -61,5 +62,14 @@ class Codecs {
 /// Returns the codecs. Loads their library at the first call.
 /// @throws std::runtime_error if the library cannot be loaded
 const Codecs& get_codecs();
+
+/// Decodes the bytes of an image file, which are not changed, as a gray image with the bit depth of
+/// the file. Ignores an orientation in the file. Returns an empty matrix if they cannot be decoded.
+///
+/// Gray PNG images with 8 or 16 bits are decoded by libpng alone, all others by get_codecs(). The
+/// pixels are identical.
+/// @throws cv::Exception as cv::imdecode does
+/// @throws std::runtime_error if the library of the decoder cannot be loaded
+cv::Mat decode_gray_image(std::string& bytes);
 
 }  // namespace vlp

@@ -6,7 +6,6 @@
 #include <cctype>
 #include <charconv>
 #include <cstddef>
-#include <opencv2/imgcodecs.hpp>
 #include <string_view>
 
 #include "codecs/codecs.h"
@@ -248,8 +247,7 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
   if (is_cut_png(bytes)) throw InputError(file, cut);
   cv::Mat image;
   try {
-    image = get_codecs().decode_image(
-        bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+    image = decode_gray_image(bytes);
   } catch (const cv::Exception& failure) {
     throw InputError(file, "cannot be read as an image: " + failure.err);
   }

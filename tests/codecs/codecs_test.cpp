@@ -4,7 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include <stdexcept>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <string>
 
 namespace vlp {
 namespace {
@@ -31,6 +34,64 @@ TEST(Codecs, DecodeReturnsEncoded16BitImageExactly) {
     ASSERT_EQ(decoded.size(), image.size()) << ending;
     EXPECT_EQ(cv::norm(decoded, image, cv::NORM_INF), 0) << ending;
   }
+}
+
+/// Flags of cv::imread for decode_gray_image(), without the headers of imgcodecs: gray, any depth,
+/// orientation ignored.
+constexpr int kGray = 0 | 2 | 128;
+
+cv::Mat make_random_image(int type) {
+  cv::Mat image(37, 53, type);
+  cv::randu(image, 0, image.depth() == CV_8U ? 256 : 65536);
+  return image;
+}
+
+TEST(DecodeGrayImage, MatchesOpencvForAllFormats) {
+  for (const int type : {CV_8UC1, CV_16UC1, CV_8UC3, CV_16UC3, CV_8UC4, CV_16UC4}) {
+    for (const char* ending : {".png", ".tiff", ".jpg", ".bmp", ".pgm", ".ppm"}) {
+      std::string bytes = get_codecs().encode_image_file(ending, make_random_image(type), {});
+      const cv::Mat expected = get_codecs().decode_image(bytes, kGray);
+      const cv::Mat decoded = decode_gray_image(bytes);
+      ASSERT_FALSE(expected.empty()) << ending << type;
+      ASSERT_EQ(decoded.type(), expected.type()) << ending << type;
+      ASSERT_EQ(decoded.size(), expected.size()) << ending << type;
+      EXPECT_EQ(cv::norm(decoded, expected, cv::NORM_INF), 0) << ending << type;
+    }
+  }
+}
+
+TEST(DecodeGrayImage, ReturnsEmptyImageForTruncatedPng) {
+  const std::string bytes = get_codecs().encode_image_file(".png", make_random_image(CV_8UC1), {});
+  for (const std::size_t length : {8U, 25U, 26U, 33U, 500U, 1000U}) {
+    std::string truncated = bytes.substr(0, length);
+    EXPECT_TRUE(decode_gray_image(truncated).empty()) << length;
+  }
+}
+
+TEST(DecodeGrayImage, ReturnsEmptyImageForWrongChecksum) {
+  std::string bytes = get_codecs().encode_image_file(".png", make_random_image(CV_16UC1), {});
+  bytes[bytes.size() / 2] ^= 1;
+  EXPECT_TRUE(decode_gray_image(bytes).empty());
+}
+
+TEST(DecodeGrayImageDeathTest, DoesNotLoadOpencvCodecsForGrayPng) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");  // in a new process
+  const auto decode_and_exit = [] {
+    std::string bytes(
+        "\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR\0\0\0\x02\0\0\0\x01\x08\0\0\0\0\xd1\x49\x20\x56"
+        "\0\0\0\x0bIDAT\x78\xda\x63\x88\x5a\x0a\0\x01\x5c\x01\0\x67\xf4\xa5\x15"
+        "\0\0\0\0IEND\xae\x42\x60\x82",
+        68);
+    const cv::Mat1b image = decode_gray_image(bytes);
+    std::ifstream file("/proc/self/maps");
+    const std::string libraries(std::istreambuf_iterator<char>(file), {});
+    const bool is_decoded =
+        image.size() == cv::Size(2, 1) && image(0, 0) == 0x5a && image(0, 1) == 0xa5;
+    const bool is_loaded = libraries.find("opencv_imgcodecs") != std::string::npos ||
+                           libraries.find("opencv_core") == std::string::npos;
+    std::exit(is_decoded && !is_loaded ? 0 : 1);
+  };
+  EXPECT_EXIT(decode_and_exit(), testing::ExitedWithCode(0), "");
 }
 
 TEST(Codecs, DecodeReturnsEmptyImageForBytesOfNoImage) {
