@@ -2,11 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detection/boards/edge_fit.h"
 
-#include <ceres/tiny_solver.h>
-
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -36,103 +35,81 @@ double convert_level_to_light(double level, double gamma) {
   return gamma == 1 ? level : kWhite * std::pow(level / kWhite, gamma);
 }
 
-/// Residuals and Jacobian for ceres::TinySolver. Parameters: blur, middle, contrast, slope of the
-/// light along and across the edge, coefficients of the polynomial. The solver evaluates an
-/// accepted step twice, the second time with derivatives; these are stored at the first evaluation.
-template <int terms>
-class Edge {
+/// Sums, over the rows of a matrix, of the products of each pair of its columns.
+template <int columns>
+class ColumnProducts {
  public:
-  using Scalar = double;
-  enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = 5 + terms };
-  using Parameters = Eigen::Matrix<double, NUM_PARAMETERS, 1>;
-  using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, NUM_PARAMETERS>;
+  static constexpr std::size_t kColumns = columns + columns % 2;  // pairs are added at a time
+  using Row = std::array<double, kColumns>;
 
-  /// Levels above max_level are censored.
-  Edge(const std::vector<EdgePixel>& pixels, const EdgePrior& prior, double max_level)
-      : pixels_(pixels),
-        prior_(prior),
-        max_level_(max_level),
-        residuals_(rows()),
-        d_residuals_d_kurtosis_(Eigen::VectorXd::Zero(rows())),
-        jacobian_(rows(), +NUM_PARAMETERS) {}
-
-  int NumResiduals() const { return static_cast<int>(rows()); }
-
-  bool operator()(const double* p, double* residuals, double* jacobian) const {
-    const Eigen::Map<const Parameters> parameters(p);
-    if (parameters != at_) evaluate(parameters);
-    Eigen::Map<Eigen::VectorXd>(residuals, rows()) = residuals_;
-    if (jacobian) Eigen::Map<Jacobian>(jacobian, rows(), +NUM_PARAMETERS) = jacobian_;
-    return true;
+  /// Returns the next row, which the caller fills. An additional last column stays 0.
+  Row& add_row() {
+    if (count_ == rows_.size()) add_products();
+    return rows_[count_++];
   }
-
-  double sum_squared_prior_residuals(const Parameters& p) const {
-    if (p != at_) evaluate(p);
-    return residuals_.template tail<kPriors>().squaredNorm();
+  /// Returns the sum for columns a <= b after finish().
+  double operator()(int a, int b) const {
+    return sums_[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)];
   }
-  /// Returns the variance of a linear combination `sum` of the parameters for a noise of one level.
-  double variance(const Parameters& p, const Parameters& sum) const {
-    if (p != at_) evaluate(p);
-    const Eigen::Matrix<double, NUM_PARAMETERS, NUM_PARAMETERS> normal =
-        jacobian_.transpose() * jacobian_;
-    return normal.ldlt().solve(sum).dot(sum);
-  }
-  /// Returns the sigma of the Gaussian with the MTF50 of the step. One Gauss-Newton step first
-  /// estimates the excess kurtosis of the line spread (BlurredStep). That of a disc is -1, that of
-  /// a Gaussian 0; it stays near 0 if the pixels do not determine it.
-  double compute_equivalent_blur(const Parameters& p) const {
-    constexpr double kurtosis_sd = 0.5, min_noise = 0.3;  // in levels: that of rounding
-    constexpr double min_kurtosis = -1.5, max_kurtosis = 3;
-    // A larger change of the blur, as a fraction of it, is not linear: the Gaussian's blur remains.
-    constexpr double max_change = 0.3;
-    if (p != at_) evaluate(p);
-    constexpr int count = NUM_PARAMETERS + 1;
-    Eigen::Matrix<double, Eigen::Dynamic, count> derivatives(rows(), count);
-    derivatives << jacobian_, d_residuals_d_kurtosis_;
-    Eigen::Matrix<double, count, count> normal = derivatives.transpose() * derivatives;
-    const double variance =
-        std::max(residuals_.squaredNorm() / static_cast<double>(rows()), min_noise * min_noise);
-    normal(count - 1, count - 1) += variance / (kurtosis_sd * kurtosis_sd);
-    const Eigen::Matrix<double, count, 1> right = -derivatives.transpose() * residuals_;
-    Eigen::Matrix<double, count, 1> change = normal.ldlt().solve(right);
-    const double kurtosis = std::clamp(change[count - 1], min_kurtosis, max_kurtosis);
-    if (kurtosis != change[count - 1]) {
-      const auto head = normal.template topLeftCorner<count - 1, count - 1>();
-      const auto by_kurtosis = normal.template topRightCorner<count - 1, 1>();
-      change.template head<count - 1>() =
-          head.ldlt().solve(right.template head<count - 1>() - kurtosis * by_kurtosis);
-    }
-    const double blur = p[0] + change[0];
-    if (!(std::abs(change[0]) <= max_change * p[0])) return p[0];
-    // The transfer exp(-s^2 / 2) (1 + kurtosis s^4 / 24) is 0.5 at s; without kurtosis at gaussian.
-    const double gaussian = std::sqrt(2 * std::numbers::ln2);
-    double s = gaussian;
-    for (int i = 0; i < 20; ++i) {
-      s = std::sqrt(2 * std::log(2 * (1 + kurtosis * s * s * s * s / 24)));
-    }
-    return blur * gaussian / s;
-  }
-  /// Returns EdgeFit::end_variance: the mean variance of both ends with a known curvature.
-  double compute_variance_at_edge_end(const Parameters& p) const {
-    constexpr int straight = 7;
-    using Square = Eigen::Matrix<double, straight, straight>;
-    if (p != at_) evaluate(p);
-    const auto without_bow = jacobian_.template leftCols<straight>();
-    const Square inverse =
-        Square(without_bow.transpose() * without_bow).ldlt().solve(Square::Identity());
-    return inverse(straight - 2, straight - 2) + inverse(straight - 1, straight - 1);
+  void finish() {
+    while (count_ < rows_.size()) rows_[count_++].fill(0);
+    add_products();
   }
 
  private:
-  /// Number of residuals of the prior, which are the last ones.
-  static constexpr Eigen::Index kPriors = 2;
-  Eigen::Index rows() const { return static_cast<Eigen::Index>(pixels_.size()) + kPriors; }
+  void add_products() {
+    for (std::size_t a = 0; a < kColumns; ++a) {
+      for (std::size_t b = a - a % 2; b < kColumns; ++b) {
+        sums_[a][b] += (rows_[0][a] * rows_[0][b] + rows_[1][a] * rows_[1][b]) +
+                       (rows_[2][a] * rows_[2][b] + rows_[3][a] * rows_[3][b]);
+      }
+    }
+    count_ = 0;
+  }
 
-  void evaluate(const Parameters& p) const {
-    at_ = p;
+  std::array<Row, 4> rows_{};
+  std::array<Row, kColumns> sums_{};
+  std::size_t count_ = 0;
+};
+
+/// Normal equations of the residuals of an edge at some parameters.
+template <int parameters>
+struct EdgeEquations {
+  using Column = Eigen::Matrix<double, parameters, 1>;
+  using Square = Eigen::Matrix<double, parameters, parameters>;
+
+  /// J' J and J' r, with the Jacobian J of the residuals r.
+  Square normal;
+  Column gradient;
+  /// Sum of the squared residuals, and the part of the prior in it.
+  double squares, prior_squares;
+  /// J' k, k' k and k' r, with the derivatives k of the residuals with respect to the excess
+  /// kurtosis of the line spread.
+  Column by_kurtosis;
+  double kurtosis_squares, kurtosis_gradient;
+};
+
+/// Model of the gray levels of an edge. Parameters: blur, middle, contrast, slope of the light
+/// along and across the edge, coefficients of the polynomial.
+template <int terms>
+class Edge {
+ public:
+  static constexpr int kParameters = 5 + terms;
+  using Equations = EdgeEquations<kParameters>;
+  using Parameters = typename Equations::Column;
+  using Square = typename Equations::Square;
+
+  /// Levels above max_level are censored.
+  Edge(const std::vector<EdgePixel>& pixels, const EdgePrior& prior, double max_level)
+      : pixels_(pixels), prior_(prior), max_level_(max_level) {}
+
+  /// Computes the equations with a residual for each pixel and two for the prior.
+  Equations linearize(const Parameters& p) const {
+    // Columns: derivatives with respect to the parameters, to the kurtosis, and the residuals.
+    constexpr int kurtosis = kParameters, residual = kParameters + 1;
+    ColumnProducts<kParameters + 2> products;
     const Blur blur(p[0]);
-    for (Eigen::Index i = 0; i + kPriors < rows(); ++i) {
-      const auto& [w, v, level, stripe_px, white] = pixels_[static_cast<std::size_t>(i)];
+    for (const auto& [w, v, level, stripe_px, white] : pixels_) {
       double offset_px = p[4 + terms];
       for (int k = terms - 2; k >= 0; --k) offset_px = p[5 + k] + w * offset_px;
       const double from_edge_px = v - offset_px;
@@ -146,33 +123,157 @@ class Edge {
       }
       const double lit = 1 + p[3] * w + p[4] * v, unlit = p[1] + p[2] * step.value;
       const EncodedLevel encoded(unlit * lit, prior_.gamma);
-      residuals_[i] = std::min(encoded.level, max_level_) - std::min(level, max_level_);
       const double effective_slope = encoded.level < max_level_ ? encoded.slope : 0;
       const double bright = lit * effective_slope, plain = unlit * effective_slope;
-      auto row = jacobian_.row(i);
-      row.template head<5>() << bright * p[2] * step.d_value_d_blur, bright, bright * step.value,
-          plain * w, plain * v;
-      d_residuals_d_kurtosis_[i] = bright * p[2] * step.d_value_d_kurtosis;
+      auto& row = products.add_row();
+      row[0] = bright * p[2] * step.d_value_d_blur;
+      row[1] = bright;
+      row[2] = bright * step.value;
+      row[3] = plain * w;
+      row[4] = plain * v;
       double by_term = -bright * p[2] * step.slope;
-      for (int k = 0; k < terms; ++k, by_term *= w) row[5 + k] = by_term;
+      for (std::size_t k = 0; k < terms; ++k, by_term *= w) row[5 + k] = by_term;
+      row[kurtosis] = bright * p[2] * step.d_value_d_kurtosis;
+      row[residual] = std::min(encoded.level, max_level_) - std::min(level, max_level_);
     }
-    const Eigen::Index blurs = rows() - 2, brights = rows() - 1;
-    jacobian_.template bottomRows<kPriors>().setZero();
-    residuals_[blurs] = prior_.blur_weight * (p[0] - prior_.blur_px);
-    jacobian_(blurs, 0) = prior_.blur_weight;
+    auto& blur_row = products.add_row();
+    blur_row.fill(0);
+    blur_row[0] = prior_.blur_weight;
+    const double blur_residual = prior_.blur_weight * (p[0] - prior_.blur_px);
+    blur_row[residual] = blur_residual;
     const double outside = p[2] < 0 ? -1 : 1;
-    residuals_[brights] = prior_.bright_weight * (p[1] + outside * p[2] - prior_.bright_light);
-    jacobian_(brights, 1) = prior_.bright_weight;
-    jacobian_(brights, 2) = outside * prior_.bright_weight;
+    auto& bright_row = products.add_row();
+    bright_row.fill(0);
+    bright_row[1] = prior_.bright_weight;
+    bright_row[2] = outside * prior_.bright_weight;
+    const double bright_residual =
+        prior_.bright_weight * (p[1] + outside * p[2] - prior_.bright_light);
+    bright_row[residual] = bright_residual;
+    products.finish();
+    Equations equations;
+    for (int a = 0; a < kParameters; ++a) {
+      for (int b = a; b < kParameters; ++b)
+        equations.normal(a, b) = equations.normal(b, a) = products(a, b);
+      equations.by_kurtosis[a] = products(a, kurtosis);
+      equations.gradient[a] = products(a, residual);
+    }
+    equations.squares = products(residual, residual);
+    equations.prior_squares = blur_residual * blur_residual + bright_residual * bright_residual;
+    equations.kurtosis_squares = products(kurtosis, kurtosis);
+    equations.kurtosis_gradient = products(kurtosis, residual);
+    return equations;
   }
+
+  /// Returns the sigma of the Gaussian with the MTF50 of the step. One Gauss-Newton step first
+  /// estimates the excess kurtosis of the line spread (BlurredStep). That of a disc is -1, that of
+  /// a Gaussian 0; it stays near 0 if the pixels do not determine it.
+  double compute_equivalent_blur(const Parameters& p, const Equations& equations) const {
+    constexpr double kurtosis_sd = 0.5, min_noise = 0.3;  // in levels: that of rounding
+    constexpr double min_kurtosis = -1.5, max_kurtosis = 3;
+    // A larger change of the blur, as a fraction of it, is not linear: the Gaussian's blur remains.
+    constexpr double max_change = 0.3;
+    constexpr int count = kParameters + 1;
+    const double rows = static_cast<double>(pixels_.size()) + kPriors;
+    const double variance = std::max(equations.squares / rows, min_noise * min_noise);
+    Eigen::Matrix<double, count, count> normal;
+    normal << equations.normal, equations.by_kurtosis, equations.by_kurtosis.transpose(),
+        equations.kurtosis_squares + variance / (kurtosis_sd * kurtosis_sd);
+    Eigen::Matrix<double, count, 1> right;
+    right << -equations.gradient, -equations.kurtosis_gradient;
+    Eigen::Matrix<double, count, 1> change = normal.ldlt().solve(right);
+    const double kurtosis = std::clamp(change[count - 1], min_kurtosis, max_kurtosis);
+    if (kurtosis != change[count - 1]) {
+      change.template head<kParameters>() =
+          equations.normal.ldlt().solve(-equations.gradient - kurtosis * equations.by_kurtosis);
+    }
+    const double blur = p[0] + change[0];
+    if (!(std::abs(change[0]) <= max_change * p[0])) return p[0];
+    // The transfer exp(-s^2 / 2) (1 + kurtosis s^4 / 24) is 0.5 at s; without kurtosis at gaussian.
+    const double gaussian = std::sqrt(2 * std::numbers::ln2);
+    double s = gaussian;
+    for (int i = 0; i < 20; ++i) {
+      s = std::sqrt(2 * std::log(2 * (1 + kurtosis * s * s * s * s / 24)));
+    }
+    return blur * gaussian / s;
+  }
+
+ private:
+  /// Number of residuals of the prior.
+  static constexpr int kPriors = 2;
 
   const std::vector<EdgePixel>& pixels_;
   EdgePrior prior_;
   double max_level_;
-  mutable Parameters at_ = Parameters::Constant(std::numeric_limits<double>::quiet_NaN());
-  mutable Eigen::VectorXd residuals_, d_residuals_d_kurtosis_;
-  mutable Jacobian jacobian_;
 };
+
+/// Returns EdgeFit::end_variance: the mean variance of both ends with a known curvature.
+template <int parameters>
+double compute_variance_at_edge_end(const EdgeEquations<parameters>& equations) {
+  constexpr int straight = 7;
+  using Square = Eigen::Matrix<double, straight, straight>;
+  const Square inverse = Square(equations.normal.template topLeftCorner<straight, straight>())
+                             .ldlt()
+                             .solve(Square::Identity());
+  return inverse(straight - 2, straight - 2) + inverse(straight - 1, straight - 1);
+}
+
+/// Stop criteria of minimize_residuals(). The tolerance is that of the sum of squares.
+struct EdgeFitLimits {
+  int max_iterations;
+  double function_tolerance;
+};
+
+/// Minimizes the residuals of an edge by the method of Levenberg and Marquardt, with the damping of
+/// ceres::TinySolver. Returns the equations at the final parameters. Unlike that solver, it does
+/// not store the Jacobian and evaluates accepted parameters once.
+template <int terms>
+typename Edge<terms>::Equations minimize_residuals(const Edge<terms>& edge,
+                                                   typename Edge<terms>::Parameters& p,
+                                                   const EdgeFitLimits& limits) {
+  using Parameters = typename Edge<terms>::Parameters;
+  using Square = typename Edge<terms>::Square;
+  constexpr double gradient_tolerance = 1e-10, parameter_tolerance = 1e-8;
+  constexpr double min_squares = 2 * std::numeric_limits<double>::epsilon();
+  constexpr double min_diagonal = 1e-6, max_diagonal = 1e32;
+  auto equations = edge.linearize(p);
+  const Parameters scale = (1 + equations.normal.diagonal().array().sqrt()).inverse().matrix();
+  double damping = 1e-4, growth = 2;
+  Square scaled;
+  Parameters gradient;
+  const auto scale_equations = [&] {
+    scaled = scale.asDiagonal() * equations.normal * scale.asDiagonal();
+    gradient = -scale.cwiseProduct(equations.gradient);
+    return gradient.template lpNorm<Eigen::Infinity>() >= gradient_tolerance &&
+           equations.squares >= min_squares;
+  };
+  if (!scale_equations()) return equations;
+  for (int iteration = 1; iteration < limits.max_iterations; ++iteration) {
+    Square damped = scaled;
+    damped.diagonal() += damping * scaled.diagonal().cwiseMax(min_diagonal).cwiseMin(max_diagonal);
+    const Parameters scaled_step = damped.ldlt().solve(gradient);
+    const Parameters step = scale.cwiseProduct(scaled_step);
+    if (step.norm() < parameter_tolerance * (p.norm() + parameter_tolerance)) break;
+    const Parameters next = p + step;
+    const auto next_equations = edge.linearize(next);
+    const double change = equations.squares - next_equations.squares;
+    const double model_change = scaled_step.dot(2 * gradient - scaled * scaled_step);
+    const double ratio = change / model_change;
+    const bool has_converged = std::abs(change) < limits.function_tolerance;
+    if (ratio > 0) {
+      p = next;
+      equations = next_equations;
+      if (has_converged || !scale_equations()) break;
+      const double deviation = 2 * ratio - 1;
+      damping *= std::max(1 / 3.0, 1 - deviation * deviation * deviation);
+      growth = 2;
+    } else {
+      if (has_converged) break;
+      damping *= growth;
+      growth *= 2;
+    }
+  }
+  return equations;
+}
 
 /// Mean light of the pixels on both sides of an edge, and fraction of white pixels on the brighter
 /// side.
@@ -216,7 +317,7 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
   constexpr double min_blur_px = 0.05, max_blur_px = 6;
   constexpr double min_contrast = 3, max_relative_rms = 0.35;  // in levels
   constexpr double min_white_fraction = 0.25, censoring_level = 250;
-  using Step = Edge<terms>;
+  using Parameters = typename Edge<terms>::Parameters;
   EdgeLight light;
   bool is_saturated = false;
   if (previous) {
@@ -226,20 +327,18 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
     light = make_initial_light(sides, prior.gamma);
     is_saturated = sides.white_fraction >= min_white_fraction;
   }
-  typename Step::Parameters p;
+  Parameters p;
   p << edge.blur_px, light.middle, light.contrast, light.slope, edge.coefficients.head<terms>();
   const double max_level = is_saturated ? censoring_level : std::numeric_limits<double>::infinity();
-  const Step step(pixels, prior, max_level);
-  ceres::TinySolver<Step> solver;
+  const Edge<terms> model(pixels, prior, max_level);
   // Blur, contrast and position of a saturated step are strongly correlated: slow convergence.
-  solver.options.max_num_iterations = is_saturated ? 60 : 15;
-  solver.options.function_tolerance = is_saturated ? 1e-6 : 1e-3;  // levels squared
-  solver.Solve(step, &p);
+  const EdgeFitLimits limits = is_saturated ? EdgeFitLimits{60, 1e-6} : EdgeFitLimits{15, 1e-3};
+  const auto equations = minimize_residuals(model, p, limits);
   edge.coefficients.setZero();
   edge.coefficients.head<terms>() = p.template tail<terms>();
   edge.blur_px = p[0];
   const double outside = p[2] < 0 ? -1 : 1;
-  const double squares = 2 * solver.summary.final_cost - step.sum_squared_prior_residuals(p);
+  const double squares = equations.squares - equations.prior_squares;
   EdgeFit result{squares,
                  pixels.size(),
                  is_saturated,
@@ -252,13 +351,15 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
   const bool is_accepted = p.allFinite() && p[0] > min_blur_px && p[0] < max_blur_px &&
                            contrast > min_contrast && rms < max_relative_rms * contrast;
   if (!is_accepted) return {};
-  result.end_variance = step.compute_variance_at_edge_end(p);
-  result.equivalent_blur_px = step.compute_equivalent_blur(p);
+  result.end_variance = compute_variance_at_edge_end(equations);
+  result.equivalent_blur_px = model.compute_equivalent_blur(p, equations);
   if (is_saturated || prior.gamma != 1) {
-    typename Step::Parameters brighter = Step::Parameters::Zero();
+    const auto factor = equations.normal.ldlt();
+    Parameters brighter = Parameters::Zero();
     brighter.template segment<2>(1) << 1, outside;
-    result.blur_variance = step.variance(p, Step::Parameters::Unit(0));
-    result.bright_variance = step.variance(p, brighter);
+    const Parameters blur = Parameters::Unit(0);
+    result.blur_variance = factor.solve(blur).dot(blur);
+    result.bright_variance = factor.solve(brighter).dot(brighter);
   }
   return result;
 }
