@@ -15,6 +15,7 @@
 #include <iterator>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "rig/file.h"
 #include "rig/input_error.h"
@@ -59,18 +60,24 @@ void write_script(const Descriptor& script, std::string_view text, const fs::pat
 }
 
 /// Starts gnuplot with these descriptors as stdin and stdout. Returns std::nullopt if it cannot be
-/// started. The option -d skips ~/.gnuplot, which may run commands and change the plot.
+/// started. The option -d skips ~/.gnuplot, which may run commands and change the plot. The script
+/// is named as a file, because gnuplot reads stdin itself byte by byte.
 std::optional<pid_t> start_gnuplot(int script, int output) {
-  std::string words[] = {"env", "LC_ALL=C.UTF-8", "gnuplot", "-d", "-"};
+  std::string words[] = {"gnuplot", "-d", "/dev/stdin"}, locale = "LC_ALL=C.UTF-8";
   std::array<char*, std::size(words) + 1> arguments{};
   std::ranges::transform(words, arguments.begin(), [](std::string& word) { return word.data(); });
+  std::vector<char*> environment{locale.data()};
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    if (!std::string_view(*variable).starts_with("LC_ALL=")) environment.push_back(*variable);
+  }
+  environment.push_back(nullptr);
   posix_spawn_file_actions_t actions;
   ::posix_spawn_file_actions_init(&actions);
   ::posix_spawn_file_actions_adddup2(&actions, script, STDIN_FILENO);
   ::posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
   pid_t process = 0;
-  const int failure =
-      ::posix_spawnp(&process, arguments[0], &actions, nullptr, arguments.data(), environ);
+  const int failure = ::posix_spawnp(&process, arguments[0], &actions, nullptr, arguments.data(),
+                                     environment.data());
   ::posix_spawn_file_actions_destroy(&actions);
   return failure == 0 ? std::optional(process) : std::nullopt;
 }
@@ -107,7 +114,8 @@ std::string render_with_terminal(const std::string& terminal, const Drawing& dra
                    std::to_string(drawing.height_px) + "\n" + drawing.commands,
                file);
   const auto process = start_gnuplot(script.number(), input.number());
-  if (!process) throw InputError(file, "cannot be drawn: gnuplot cannot be started");
+  if (!process)
+    throw InputError(file, "cannot be drawn: gnuplot cannot be started; is it installed?");
   input.close();  // leaves gnuplot's end as the only one
   std::string image = read_all_output(output);
   if (!has_gnuplot_succeeded(*process) || image.empty()) {
