@@ -17,7 +17,7 @@ struct LensDistortion {
   double start = 1e-6;
 };
 
-/// Name and parameters of a lens model. Its equations are in camera/lens.cpp.
+/// Name and parameters of a lens model. Its equations are in camera/lens_model.h.
 struct LensModelRow {
   LensModel model;
   std::string_view name;

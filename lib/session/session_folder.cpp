@@ -78,7 +78,7 @@ SessionFolder::SessionFolder(const fs::path& folder) : folder_(folder) {
   for (const auto& entry : fs::directory_iterator(folder_)) {
     if (!is_line_drive_folder(entry.path())) continue;
     const Id name(entry.path().filename().string(), folder_, "drive");  // used in names of outputs
-    lines_.push_back(folder_ / name.get_text());
+    lines_.push_back(folder_ / name.id_text());
   }
   std::sort(lines_.begin(), lines_.end());
 }

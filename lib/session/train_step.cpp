@@ -86,7 +86,7 @@ void warn_about_row_time(const DetectedLights& seen, const std::vector<std::vect
   if (!seen.camera.row_time_s) return;
   const auto measured = select_row_time_by_periods_and_positions(seen.observations_by_folder(),
                                                                  labels, lamps, seen.camera.lens)
-                            .found;
+                            .row_time;
   if (!measured) return;
   std::string error =
       describe_row_time_contradiction(*measured, {*seen.camera.row_time_s, "the calibration"});
