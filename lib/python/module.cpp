@@ -474,7 +474,7 @@ void define_calibration(py::module_& m) {
 /// Defines the fix of a frame.
 void define_fix(py::module_& m) {
   py::class_<Fix>(m, "Fix", "Result for one frame; values are NaN if it is not ok.")
-      .def_property_readonly("ok", &Fix::ok)
+      .def_property_readonly("ok", &Fix::has_succeeded)
       .def_property_readonly("status", [](const Fix& fix) { return fix_status_name(fix.status); })
       .def_property_readonly("explanation",
                              [](const Fix& fix) { return describe_fix_status(fix.status); })

@@ -10,7 +10,7 @@ std::optional<KnownMotion> find_capture_motion(const Capture& capture,
                                                const std::optional<KnownMotion>& default_motion,
                                                double yaw_rate_sd_rad_per_s) {
   if (!capture.velocity_m_per_s && !capture.yaw_rate_rad_per_s) return default_motion;
-  KnownMotion motion = otherwise.value_or(KnownMotion());
+  KnownMotion motion = default_motion.value_or(KnownMotion());
   if (capture.velocity_m_per_s) {
     motion.velocity_m_per_s = *capture.velocity_m_per_s;
     motion.velocity_sd_m_per_s = capture.velocity_sd_m_per_s.value_or(0);

@@ -157,7 +157,7 @@ std::string describe_alternative_row_time(const std::vector<Observation>& images
                                           const GivenRowTime& given) {
   const auto found =
       select_row_time_by_periods_and_positions(std::array{std::span(images)}, {{}}, lamps, lens)
-          .found;
+          .row_time;
   return found ? describe_row_time_contradiction(*found, given) : "";
 }
 

@@ -83,7 +83,7 @@ Eigen::Isometry3d BaseMotion::world_from_camera(double time_s) const {
   const Pose level = camera_pose_at(time_s);
   Eigen::Isometry3d world_from_camera;
   world_from_camera.linear() = rotation_about_z(level.yaw_rad) *
-                               level_rotation_from_inclination(inclination(time_s)) *
+                               level_rotation_from_inclination(base_inclination_at(time_s)) *
                                mount.level_from_camera;
   world_from_camera.translation() = level.position_m;
   return world_from_camera;

@@ -102,7 +102,7 @@ void WatchedRun::start_or_continue_run(Spool& spool) {
                                                                  : spool.last_offline_reason()));
   }
   if (!finished_) return;  // the run continues
-  publish_run_files(*finished_, {}, unit_.config().results);
+  publish_run_files(*finished_, {}, unit_.station_config().results);
   rename_finished_run_folder();
 }
 
