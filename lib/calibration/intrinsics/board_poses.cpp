@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/intrinsics/board_poses.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -14,7 +15,6 @@
 #include "calibration/intrinsics/rotation_vector.h"
 #include "geometry/frames.h"
 #include "geometry/median.h"
-#include "geometry/symmetric.h"
 
 namespace vlp {
 namespace {
@@ -59,7 +59,7 @@ std::optional<RigidPose> compute_pose_step(Corners corners, const Lens& lens, co
     right += jacobian.transpose() * (corner.weight * (corner.pixel - projection->pixel));
   }
   normal.diagonal() *= 1 + damping;
-  const Eigen::Matrix<double, 6, 1> step = solve_symmetric_system(normal, right);
+  const Eigen::Matrix<double, 6, 1> step = normal.ldlt().solve(right);
   if (!step.allFinite()) return {};
   const double angle = step.head<3>().norm();
   const Eigen::Vector3d axis =

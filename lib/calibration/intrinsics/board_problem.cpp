@@ -8,7 +8,9 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "calibration/intrinsics/intrinsics.h"
 #include "calibration/intrinsics/rotation_vector.h"
@@ -29,6 +31,10 @@ struct PointProjection {
 /// Point of the lattice, m, and the derivative of its z coordinate with respect to the warp.
 struct LatticePoint {
   Eigen::Vector2d in_board_m, d_z_d_warp;
+
+  Eigen::Vector3d apply_warp(const Eigen::Vector2d& warp_m) const {
+    return {in_board_m.x(), in_board_m.y(), warp_m.dot(d_z_d_warp)};
+  }
 };
 
 LatticePoint make_lattice_point(const BoardProblem& problem, std::size_t index) {
@@ -43,9 +49,7 @@ std::optional<PointProjection> project_point(const Lens& lens, const LatticePoin
                                              const Eigen::Matrix3d& rotation,
                                              const Eigen::Matrix3d& left, const BoardPose& pose,
                                              const Eigen::Vector2d& warp_m) {
-  Eigen::Vector3d in_board;
-  in_board << point.in_board_m, warp_m.dot(point.d_z_d_warp);
-  const Eigen::Vector3d rotated = rotation * in_board;
+  const Eigen::Vector3d rotated = rotation * point.apply_warp(warp_m);
   const auto projection = lens.project_point_with_jacobians(rotated + pose.translation_m);
   if (!projection) return {};
   PointProjection result{projection->pixel, *projection, {}, {}};
@@ -56,11 +60,36 @@ std::optional<PointProjection> project_point(const Lens& lens, const LatticePoin
   return result;
 }
 
+/// Lens of the parameters that were evaluated last. All boards have the same, and some models take
+/// long to set up. Not for use by several threads.
+class EvaluatedLens {
+ public:
+  explicit EvaluatedLens(LensModel lens_model) : lens_model_(lens_model) {}
+
+  /// Returns the lens; nullptr if the parameters are not those of a lens.
+  const Lens* update(std::span<const double> intrinsics) {
+    if (std::ranges::equal(intrinsics, intrinsics_)) return lens_ ? &*lens_ : nullptr;
+    intrinsics_.assign(intrinsics.begin(), intrinsics.end());
+    lens_.reset();
+    const bool is_finite =
+        std::ranges::all_of(intrinsics, [](double value) { return std::isfinite(value); });
+    if (is_finite && intrinsics[0] > 0 && intrinsics[1] > 0) lens_.emplace(lens_model_, intrinsics);
+    return lens_ ? &*lens_ : nullptr;
+  }
+
+ private:
+  LensModel lens_model_;
+  std::vector<double> intrinsics_;
+  std::optional<Lens> lens_;
+};
+
 /// Residuals, projected minus measured, of the points of one board that are not outliers.
 /// Parameters: intrinsics, pose, warp.
 class BoardCost : public ceres::CostFunction {
  public:
-  BoardCost(const BoardProblem& problem, std::size_t pose) : problem_(problem) {
+  /// @param lens  lens of the problem, common to all boards
+  BoardCost(const BoardProblem& problem, std::size_t pose, EvaluatedLens& lens)
+      : problem_(problem), lens_(lens) {
     const std::size_t count = problem.num_points_per_board();
     for (std::size_t i = 0; i < count; ++i) {
       if (problem.points[pose * count + i].z() > 0) inliers_.push_back(pose * count + i);
@@ -73,13 +102,9 @@ class BoardCost : public ceres::CostFunction {
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override {
-    if (!(parameters[0][0] > 0) || !(parameters[0][1] > 0)) return false;
     const std::span<const double> intrinsics(parameters[0], problem_.intrinsics.size());
-    if (!std::all_of(intrinsics.begin(), intrinsics.end(),
-                     [](double value) { return std::isfinite(value); })) {
-      return false;
-    }
-    const Lens lens(problem_.lens_model, intrinsics);
+    const Lens* const lens = lens_.update(intrinsics);
+    if (lens == nullptr) return false;
     const BoardPose pose{Eigen::Vector3d(parameters[1]), Eigen::Vector3d(parameters[1] + 3)};
     const Eigen::Matrix3d rotation = rotation_matrix_from_rotation_vector(pose.rotation),
                           left = so3_left_jacobian(pose.rotation);
@@ -88,14 +113,21 @@ class BoardCost : public ceres::CostFunction {
     const std::size_t count = problem_.num_points_per_board();
     using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     for (std::size_t k = 0; k < inliers_.size(); ++k) {
-      const auto point = project_point(lens, make_lattice_point(problem_, inliers_[k] % count),
-                                       rotation, left, pose, warp_m);
-      if (!point) return false;
       const auto row = static_cast<Eigen::Index>(2 * k);
-      const double weight = problem_.points[inliers_[k]].z();
-      Eigen::Map<Eigen::Vector2d>(residuals + row) =
-          weight * (point->pixel - problem_.points[inliers_[k]].head<2>());
-      if (jacobians == nullptr) continue;
+      const Eigen::Vector3d& measured = problem_.points[inliers_[k]];
+      const double weight = measured.z();
+      const LatticePoint in_board = make_lattice_point(problem_, inliers_[k] % count);
+      Eigen::Map<Eigen::Vector2d> residual(residuals + row);
+      if (jacobians == nullptr) {
+        const auto pixel =
+            lens->project_point(rotation * in_board.apply_warp(warp_m) + pose.translation_m);
+        if (!pixel) return false;
+        residual = weight * (*pixel - measured.head<2>());
+        continue;
+      }
+      const auto point = project_point(*lens, in_board, rotation, left, pose, warp_m);
+      if (!point) return false;
+      residual = weight * (point->pixel - measured.head<2>());
       const auto rows = static_cast<Eigen::Index>(2 * inliers_.size());
       if (jacobians[0] != nullptr) {
         Eigen::Map<Rows>(jacobians[0], rows, columns).middleRows<2>(row) =
@@ -113,6 +145,7 @@ class BoardCost : public ceres::CostFunction {
 
  private:
   const BoardProblem& problem_;
+  EvaluatedLens& lens_;
   std::vector<std::size_t> inliers_;
 };
 
@@ -124,11 +157,12 @@ bool solve_without_reweighting(BoardProblem& problem, const SolveOptions& solve_
   }
   std::vector<double> intrinsics = problem.intrinsics;
   Eigen::Vector2d warp_m = problem.warp_m;
+  EvaluatedLens lens(problem.lens_model);
   ceres::Problem equations;
   auto order = std::make_unique<ceres::ParameterBlockOrdering>();
   std::size_t residuals = 0;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    auto cost = std::make_unique<BoardCost>(problem, i);
+    auto cost = std::make_unique<BoardCost>(problem, i, lens);
     if (cost->num_residuals() == 0) return false;
     residuals += static_cast<std::size_t>(cost->num_residuals());
     equations.AddResidualBlock(cost.release(), nullptr, intrinsics.data(), poses[i].data(),

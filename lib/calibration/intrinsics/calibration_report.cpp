@@ -72,7 +72,14 @@ std::optional<ProjectionDifference> compare_lenses_of_view_halves(
 
 CalibrationReport compute_lens_calibration_report(const IntrinsicsSolution& solution,
                                                   const IntrinsicsInput& input) {
-  const ProjectionUncertainty uncertainty(solution, input.lattice);
+  return compute_lens_calibration_report(
+      solution, input, ProjectionUncertainty::compute_both(solution, input.lattice));
+}
+
+CalibrationReport compute_lens_calibration_report(
+    const IntrinsicsSolution& solution, const IntrinsicsInput& input,
+    const ProjectionUncertainty::Both& uncertainties) {
+  const auto& [independent, uncertainty] = uncertainties;
   const Lens lens = solution.fitted_lens();
   const Eigen::MatrixXd by_views = estimate_intrinsics_covariance_by_jackknife(solution);
   ImageRegion region =
@@ -97,7 +104,6 @@ CalibrationReport compute_lens_calibration_report(const IntrinsicsSolution& solu
   add_uncertainty_over_image(uncertainty, lens, input.imager_px, report);
   if (!is_splined_lens_model(lens.lens_model())) {
     // With few views each of these covariances may be too small by chance.
-    const ProjectionUncertainty independent(solution);
     for (const Eigen::MatrixXd& covariance :
          {uncertainty.intrinsics_covariance(), independent.intrinsics_covariance(), by_views}) {
       if (!covariance.allFinite()) continue;

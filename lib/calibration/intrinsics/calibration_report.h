@@ -9,6 +9,7 @@
 
 #include "calibration/intrinsics/intrinsics.h"
 #include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/projection_uncertainty.h"
 #include "calibration/intrinsics/valid_region.h"
 #include "rig/calibration.h"
 
@@ -49,6 +50,10 @@ struct CalibrationReport {
 /// @pre solution.has_succeeded()
 CalibrationReport compute_lens_calibration_report(const IntrinsicsSolution& solution,
                                                   const IntrinsicsInput& input);
+/// Computes the report with known uncertainties of the solution.
+CalibrationReport compute_lens_calibration_report(const IntrinsicsSolution& solution,
+                                                  const IntrinsicsInput& input,
+                                                  const ProjectionUncertainty::Both& uncertainties);
 
 /// Returns the RMS residual of each held-out view, per axis, px; infinity for a view without a
 /// pose.

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <memory>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -126,6 +128,8 @@ double compute_max_view_rms(const std::vector<double>& rms) {
   return std::max(fair_px, fair * upper_median(rms));
 }
 
+}  // namespace
+
 /// Stages of solve_intrinsics(), in their order. Each returns false if it fails.
 class IntrinsicsSolver {
  public:
@@ -135,6 +139,8 @@ class IntrinsicsSolver {
 
   /// Stage 2, from an initial focal length.
   bool solve_intrinsics_from_focal_length(double focal_px);
+  /// Selects the lens model of stage 3; the one of the input if it is not called.
+  void set_lens_model(LensModel lens_model) { input_.lens_model = lens_model; }
   /// Splined lenses only: initializes stage 3 with the rotationally symmetric lens OPENCV_FISHEYE.
   /// Keeps the initial lens STEREOGRAPHIC if that fails.
   void initialize_spline_from_symmetric_lens();
@@ -153,8 +159,8 @@ class IntrinsicsSolver {
   /// Stage 7: weights the corners by their variances (CornerWeights) if standard deviations of some
   /// corners are known.
   bool reweight_corners_by_variance();
-  /// Stage 8.
-  bool reject_corner_outliers();
+  /// Stage 7 once more, and stage 8. Without a spline, a single solve is enough for both.
+  bool reweight_corners_and_reject_outliers();
   /// Stage 9, splined lenses only. Returns true also if the rotation has not converged.
   bool rotate_camera_frame_to_optical_axis();
 
@@ -172,6 +178,10 @@ class IntrinsicsSolver {
   void initialize_board_poses(const Lens& lens);
   /// Sets up the problem of the views used, at their initial poses.
   void assemble_board_problem(const Lens& lens);
+  /// Computes the weights of stage 7. Returns false if they do not change.
+  bool update_weights();
+  /// Solves without outliers.
+  bool reject_corner_outliers();
   /// Returns the index of a corner in the points of the problem; `used` is the index of its view in
   /// used_.
   std::size_t find_problem_index_of_corner(std::size_t used,
@@ -401,7 +411,7 @@ bool IntrinsicsSolver::solve_board_warp() {
   return true;
 }
 
-bool IntrinsicsSolver::reweight_corners_by_variance() {
+bool IntrinsicsSolver::update_weights() {
   const auto residuals = compute_reprojection_residuals(problem_);
   std::vector<CornerError> known, unknown;
   for (std::size_t i = 0; i < used_.size(); ++i) {
@@ -412,20 +422,33 @@ bool IntrinsicsSolver::reweight_corners_by_variance() {
     }
   }
   if (std::ranges::all_of(known, [](const auto& error) { return error.square_px2 == 0; })) {
-    return true;
+    return false;
   }
   const CornerWeights weights(known, unknown);
   for (auto& view : input_.views) {
     for (auto& corner : view) corner.weight = weights.corner_weight(corner.sd_px);
   }
   copy_corners_to_board_problem();
-  return solve_current_board_problem(solved_parameters_);
+  return true;
+}
+
+bool IntrinsicsSolver::reweight_corners_by_variance() {
+  return !update_weights() || solve_current_board_problem(solved_parameters_);
+}
+
+bool IntrinsicsSolver::reweight_corners_and_reject_outliers() {
+  if (is_splined_lens_model(problem_.lens_model))
+    return reweight_corners_by_variance() && scale_spline_regularization_to_noise() &&
+           reject_corner_outliers();
+  update_weights();
+  return reject_corner_outliers();
 }
 
 bool IntrinsicsSolver::reject_corner_outliers() {
   // Without noise, residuals are caused by the regularization and are not outliers.
   constexpr double exact_px = 0.005;
-  if (make_intrinsics_solution().rms_px < exact_px) return true;
+  if (make_intrinsics_solution().rms_px < exact_px)
+    return solve_current_board_problem(solved_parameters_);
   SolveOptions without_outliers = solved_parameters_;
   without_outliers.reject_outliers = true;
   return solve_current_board_problem(without_outliers) &&
@@ -605,33 +628,98 @@ bool IntrinsicsSolver::reinstate_dropped_views() {
   return dropped_.size() < before;
 }
 
-}  // namespace
+/// Results of the first stages. Each is computed at its first use and kept.
+struct InitialSolutions::Stages {
+  using Solvers = std::vector<std::optional<IntrinsicsSolver>>;
+
+  explicit Stages(IntrinsicsInput views) : input(std::move(views)) {}
+
+  const std::vector<double>& rank_focal_lengths() {
+    if (focal_lengths_px.empty()) focal_lengths_px = rank_initial_focal_lengths(input);
+    return focal_lengths_px;
+  }
+
+  /// Returns the solver after stage 2, from one of the focal lengths; std::nullopt if that fails.
+  const std::optional<IntrinsicsSolver>& solve_initial(std::size_t start) {
+    while (initial.size() <= start) {
+      IntrinsicsSolver solver(input);
+      const bool is_solved =
+          solver.solve_intrinsics_from_focal_length(rank_focal_lengths()[initial.size()]);
+      initial.push_back(is_solved ? std::optional(std::move(solver)) : std::nullopt);
+    }
+    return initial[start];
+  }
+
+  /// Returns the solver after stage 3; std::nullopt if that or an earlier stage fails.
+  const std::optional<IntrinsicsSolver>& refine(std::size_t start, LensModel lens_model) {
+    Solvers& of_model = refined[lens_model];
+    while (of_model.size() <= start) {
+      std::optional<IntrinsicsSolver> solver = solve_initial(of_model.size());
+      if (solver) {
+        solver->set_lens_model(lens_model);
+        solver->initialize_spline_from_symmetric_lens();
+        if (!solver->refine_intrinsics()) solver.reset();
+      }
+      of_model.push_back(std::move(solver));
+    }
+    return of_model[start];
+  }
+
+  IntrinsicsInput input;
+  std::vector<double> focal_lengths_px;
+  /// Solvers from the first focal lengths, in their order: after stage 2, and after stage 3.
+  Solvers initial;
+  std::map<LensModel, Solvers> refined;
+};
+
+InitialSolutions::InitialSolutions(IntrinsicsInput input)
+    : stages_(std::make_unique<Stages>(std::move(input))) {}
+InitialSolutions::InitialSolutions(InitialSolutions&&) noexcept = default;
+InitialSolutions& InitialSolutions::operator=(InitialSolutions&&) noexcept = default;
+InitialSolutions::~InitialSolutions() = default;
+
+const IntrinsicsInput& InitialSolutions::input() const { return stages_->input; }
+
+const std::vector<double>& InitialSolutions::initial_focal_lengths_px() const {
+  return stages_->rank_focal_lengths();
+}
+
+std::optional<IntrinsicsSolution> InitialSolutions::solve_first_stages(LensModel lens_model) const {
+  constexpr std::size_t best_start = 0;
+  if (input().views.size() < IntrinsicsSolver::kMinViews) return {};
+  const auto& solver = stages_->refine(best_start, lens_model);
+  if (!solver) return {};
+  return solver->make_intrinsics_solution();
+}
 
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input) {
+  return solve_intrinsics(InitialSolutions(input), input.lens_model);
+}
+
+IntrinsicsSolution solve_intrinsics(const InitialSolutions& initial, LensModel lens_model) {
   constexpr std::size_t max_starts = 4;
-  if (input.views.size() < IntrinsicsSolver::kMinViews)
-    return make_failure(IntrinsicsStatus::too_few_views);
-  auto initial_focal_lengths_px = rank_initial_focal_lengths(input);
-  initial_focal_lengths_px.resize(std::min(initial_focal_lengths_px.size(), max_starts));
-  for (const double focal_px : initial_focal_lengths_px) {
-    IntrinsicsSolver solver(input);
-    if (!solver.solve_intrinsics_from_focal_length(focal_px)) continue;
-    solver.initialize_spline_from_symmetric_lens();
-    if (!solver.refine_intrinsics() || !solver.scale_spline_regularization_to_noise() ||
+  const std::size_t num_views = initial.input().views.size();
+  if (num_views < IntrinsicsSolver::kMinViews) return make_failure(IntrinsicsStatus::too_few_views);
+  const std::size_t starts = std::min(initial.initial_focal_lengths_px().size(), max_starts);
+  for (std::size_t start = 0; start < starts; ++start) {
+    const auto& refined = initial.stages_->refine(start, lens_model);
+    if (!refined) continue;
+    IntrinsicsSolver solver = *refined;
+    if (!solver.scale_spline_regularization_to_noise() ||
         !solver.correct_edge_curvature_and_solve_again() ||
         !solver.correct_edge_displacements_and_solve_again(DisplacementForm::constant) ||
         !solver.solve_board_warp() || !solver.reweight_corners_by_variance() ||
         !solver.correct_edge_curvature_and_solve_again() ||
         !solver.correct_edge_displacements_and_solve_again(DisplacementForm::varying) ||
-        !solver.reweight_corners_by_variance() || !solver.scale_spline_regularization_to_noise() ||
-        !solver.reject_corner_outliers() || !solver.scale_spline_regularization_to_noise() ||
+        !solver.reweight_corners_and_reject_outliers() ||
+        !solver.scale_spline_regularization_to_noise() ||
         !solver.rotate_camera_frame_to_optical_axis()) {
       continue;
     }
     IntrinsicsSolution solution = solver.make_intrinsics_solution();
     if (are_all_boards_parallel(solution.problem))
       return make_failure(IntrinsicsStatus::all_parallel);
-    if (2 * solution.views.size() > input.views.size()) return solution;
+    if (2 * solution.views.size() > num_views) return solution;
   }
   return make_failure(IntrinsicsStatus::no_solution);
 }

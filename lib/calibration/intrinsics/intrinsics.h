@@ -3,6 +3,8 @@
 #pragma once
 
 #include <array>
+#include <memory>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -108,6 +110,34 @@ struct IntrinsicsSolution {
 /// Both poses of each view are tried with each lens, to resolve the planar pose ambiguity
 /// (estimate_board_view_pose()). The result depends on the input only, not on threads.
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input);
+
+/// Views of a solve, and the results of its first stages. Stages 1 and 2 of solve_intrinsics() do
+/// not depend on the lens model and serve the solves of several models. Each result is computed at
+/// its first use and kept. Not for use by several threads at the same time.
+class InitialSolutions {
+ public:
+  /// @param input  views; its lens model is ignored
+  explicit InitialSolutions(IntrinsicsInput input);
+  InitialSolutions(InitialSolutions&&) noexcept;
+  InitialSolutions& operator=(InitialSolutions&&) noexcept;
+  ~InitialSolutions();
+
+  const IntrinsicsInput& input() const;
+  /// Returns the focal lengths of rank_initial_focal_lengths(), px, the best one first.
+  const std::vector<double>& initial_focal_lengths_px() const;
+  /// Estimates a lens of a model by stages 1 to 3, from the best focal length. Returns std::nullopt
+  /// if there are fewer than three views or a stage fails.
+  std::optional<IntrinsicsSolution> solve_first_stages(LensModel lens_model) const;
+
+ private:
+  friend IntrinsicsSolution solve_intrinsics(const InitialSolutions& initial, LensModel lens_model);
+  struct Stages;
+  std::unique_ptr<Stages> stages_;
+};
+
+/// Estimates a lens of a model as solve_intrinsics(input) does, from the results of its first
+/// stages.
+IntrinsicsSolution solve_intrinsics(const InitialSolutions& initial, LensModel lens_model);
 
 /// Solves for every second view of a solution, beginning with view `first`, starting from that
 /// solution. Estimates lens, poses and warp. Keeps from `whole` the edge shifts, the weights, the

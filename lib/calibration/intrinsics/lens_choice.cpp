@@ -25,11 +25,15 @@ using Squares = std::vector<double>;
 constexpr std::array kModels{LensModel::opencv4, LensModel::fisheye, LensModel::opencv5,
                              LensModel::opencv8, LensModel::opencv12};
 
-/// Returns the mean squared residual per axis of each view, px^2, from solves without it; infinity
-/// if it has no pose. Returns std::nullopt if a solve fails.
-std::optional<Squares> cross_validate(const IntrinsicsInput& input) {
+/// Views of two of the three parts, which are solved, and views of the third.
+struct Fold {
+  InitialSolutions solved;
+  IntrinsicsInput held_out;
+};
+
+std::vector<Fold> split_into_folds(const IntrinsicsInput& input) {
   constexpr std::size_t parts = 3;
-  Squares squares;
+  std::vector<Fold> folds;
   for (std::size_t part = 0; part < parts; ++part) {
     IntrinsicsInput solved = input, held_out = input;
     solved.views.clear();
@@ -37,7 +41,17 @@ std::optional<Squares> cross_validate(const IntrinsicsInput& input) {
     for (std::size_t view = 0; view < input.views.size(); ++view) {
       (view % parts == part ? held_out : solved).views.push_back(input.views[view]);
     }
-    const IntrinsicsSolution solution = solve_intrinsics(solved);
+    folds.push_back({InitialSolutions(std::move(solved)), std::move(held_out)});
+  }
+  return folds;
+}
+
+/// Returns the mean squared residual per axis of each view, px^2, from solves without it; infinity
+/// if it has no pose. Returns std::nullopt if a solve fails.
+std::optional<Squares> cross_validate(const std::vector<Fold>& folds, LensModel model) {
+  Squares squares;
+  for (const auto& [solved, held_out] : folds) {
+    const IntrinsicsSolution solution = solve_intrinsics(solved, model);
     if (!solution.has_succeeded()) return {};
     for (const double rms_px : compute_held_out_view_residual_rms_px(solution, held_out)) {
       squares.push_back(rms_px * rms_px);
@@ -94,13 +108,8 @@ void remove_views_no_model_fits(std::vector<std::optional<Squares>>& model_squar
   }
 }
 
-}  // namespace
-
-std::optional<FisheyeFit> fit_fisheye_lens(IntrinsicsInput input) {
-  constexpr double max_rms_px = 2;
-  input.lens_model = LensModel::fisheye;
-  IntrinsicsSolution solution = solve_intrinsics(input);
-  if (!solution.has_succeeded() || solution.rms_px > max_rms_px) return {};
+/// Returns the largest angle of a corner off the axis.
+double compute_max_corner_angle_rad(const IntrinsicsSolution& solution) {
   const Lens lens = solution.fitted_lens();
   double smallest = 1;
   for (const Eigen::Vector2d& pixel : collect_inlier_corner_pixels(solution.problem)) {
@@ -108,13 +117,33 @@ std::optional<FisheyeFit> fit_fisheye_lens(IntrinsicsInput input) {
       smallest = std::min(smallest, ray->direction.normalized().z());
     }
   }
-  return FisheyeFit{std::move(solution), std::acos(smallest)};
+  return std::acos(smallest);
 }
 
-bool may_be_wide_angle_lens(const IntrinsicsInput& input) {
+}  // namespace
+
+std::optional<FisheyeFit> fit_fisheye_lens(const InitialSolutions& initial) {
+  constexpr double max_rms_px = 2;
+  IntrinsicsSolution solution = solve_intrinsics(initial, LensModel::fisheye);
+  if (!solution.has_succeeded() || solution.rms_px > max_rms_px) return {};
+  const double max_corner_angle_rad = compute_max_corner_angle_rad(solution);
+  return FisheyeFit{std::move(solution), max_corner_angle_rad};
+}
+
+bool is_fisheye_model_clearly_worse(const InitialSolutions& initial, LensModel other) {
+  constexpr double min_square_ratio = 1.5, max_angle_rad = kRightAngle_rad - 0.05;
+  const auto fisheye = initial.solve_first_stages(LensModel::fisheye);
+  const auto compared = initial.solve_first_stages(other);
+  if (!fisheye || !compared || fisheye->views != compared->views) return false;
+  const double ratio = fisheye->rms_px / compared->rms_px;
+  return ratio * ratio > min_square_ratio && compute_max_corner_angle_rad(*fisheye) < max_angle_rad;
+}
+
+bool may_be_wide_angle_lens(const InitialSolutions& initial) {
   constexpr double wide_rad = 0.7;
+  const IntrinsicsInput& input = initial.input();
   if (input.views.empty()) return false;
-  const Lens lens = make_stereographic_lens(input, rank_initial_focal_lengths(input).front());
+  const Lens lens = make_stereographic_lens(input, initial.initial_focal_lengths_px().front());
   double farthest_px = 0;
   for (const auto& corners : input.views) {
     for (const auto& corner : corners) {
@@ -124,19 +153,18 @@ bool may_be_wide_angle_lens(const IntrinsicsInput& input) {
   return 2 * std::atan(farthest_px / lens.focal_px().x() / 2) > wide_rad;
 }
 
-std::optional<LensChoice> select_lens_model(const IntrinsicsInput& input) {
-  if (input.views.size() < kMinViewsToChoose) return {};
+std::optional<LensChoice> select_lens_model(const InitialSolutions& initial) {
+  if (initial.input().views.size() < kMinViewsToChoose) return {};
   LensChoice choice{};
-  choice.fisheye = fit_fisheye_lens(input);
+  choice.fisheye = fit_fisheye_lens(initial);
   if (choice.fisheye && choice.fisheye->max_corner_angle_rad >= kRightAngle_rad) {
     choice.beyond_right_angle_rad = choice.fisheye->max_corner_angle_rad;
   }
+  const std::vector<Fold> folds = split_into_folds(initial.input());
   std::vector<std::optional<Squares>> squares;
   for (const LensModel model : kModels) {
-    IntrinsicsInput with_model = input;
-    with_model.lens_model = model;
     const bool is_candidate = model == LensModel::fisheye || choice.beyond_right_angle_rad == 0;
-    squares.push_back(is_candidate ? cross_validate(with_model) : std::nullopt);
+    squares.push_back(is_candidate ? cross_validate(folds, model) : std::nullopt);
   }
   remove_views_no_model_fits(squares);
   constexpr double errors = 2;

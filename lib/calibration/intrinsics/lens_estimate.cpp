@@ -98,12 +98,11 @@ BoardExtent measure_board_extent(const IntrinsicsSolution& fisheye,
 /// OPENCV_FISHEYE; empty if it does. Either more than a tenth of the boards extend beyond the grid,
 /// where solves fail, some after a minute (a board of four parts counts four times). Or the grid
 /// has too few control points in the field of view.
-std::string explain_unsuitable_grid(IntrinsicsInput input) {
+std::string explain_unsuitable_grid(const InitialSolutions& initial, LensModel splined) {
   constexpr double margin = 1.05;
-  const LensModel splined = input.lens_model;
-  const SplineGrid grid = spline_grid_of_lens_model(input.lens_model);
-  input.lens_model = LensModel::fisheye;
-  const IntrinsicsSolution solution = solve_intrinsics(input);
+  const std::array<int, 2>& imager_px = initial.input().imager_px;
+  const SplineGrid grid = spline_grid_of_lens_model(splined);
+  const IntrinsicsSolution solution = solve_intrinsics(initial, LensModel::fisheye);
   if (!solution.has_succeeded() || solution.rms_px > kMaxFit_px) return "";
   const Eigen::Vector2d grid_reach =
       SplineSurface(grid, std::vector<double>(2 * grid.num_control_points())).spline_half_extent();
@@ -112,9 +111,9 @@ std::string explain_unsuitable_grid(IntrinsicsInput input) {
     const Lens lens = solution.fitted_lens();
     const auto core =
         fit_core_intrinsics_of_splined_lens(lens, collect_inlier_corner_pixels(solution.problem));
-    return fit_splined_lens_to_lens(lens, input.imager_px, splined, core)
+    return fit_splined_lens_to_lens(lens, imager_px, splined, core)
                ? ""
-               : describe_too_coarse_spline_grid(lens, input.imager_px, splined, core);
+               : describe_too_coarse_spline_grid(lens, imager_px, splined, core);
   }
   const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
   return fmt::format(
@@ -133,15 +132,13 @@ std::string recommend_model(LensModel requested, const IntrinsicsSolution& other
 }
 
 /// Recommends another model that fits if the requested one does not; empty if there is none.
-std::string explain_why_no_lens_fits(IntrinsicsInput input,
+std::string explain_why_no_lens_fits(const InitialSolutions& initial, LensModel requested,
                                      const std::optional<FisheyeFit>& fisheye) {
-  const LensModel requested = input.lens_model;
   std::string problem = fisheye ? recommend_model(requested, fisheye->solution) : "";
   double best_px = fisheye ? fisheye->solution.rms_px : kMaxFit_px;
   for (const LensModel other : {LensModel::opencv4, LensModel::opencv8, LensModel::fisheye}) {
     if (other == requested || (other == LensModel::fisheye && fisheye)) continue;
-    input.lens_model = other;
-    const IntrinsicsSolution solution = solve_intrinsics(input);
+    const IntrinsicsSolution solution = solve_intrinsics(initial, other);
     if (!solution.has_succeeded() || solution.rms_px >= best_px) continue;
     best_px = solution.rms_px;
     problem = recommend_model(requested, solution);
@@ -239,8 +236,9 @@ void warn_about_inconsistent_views(LensEstimate& result) {
 }
 
 /// Selects the lens model of the views. Returns false if there are too few.
-bool select_lens_model_for_views(SplitViews& views, LensEstimate& result) {
-  result.choice = select_lens_model(views.solved);
+bool select_lens_model_for_views(const InitialSolutions& initial, SplitViews& views,
+                                 LensEstimate& result) {
+  result.choice = select_lens_model(initial);
   if (views.solved.views.size() < kMinViewsToChoose) {
     fail(result, LensStatus::too_few_views,
          fmt::format("{} views of the board do not determine the lens model, which needs {}; add "
@@ -254,12 +252,12 @@ bool select_lens_model_for_views(SplitViews& views, LensEstimate& result) {
 }
 
 /// Returns the reason why the solver found no lens.
-std::string explain_why_lens_not_found(const SplitViews& views,
+std::string explain_why_lens_not_found(const InitialSolutions& initial, LensModel requested,
                                        const std::optional<FisheyeFit>& fisheye,
                                        IntrinsicsStatus status) {
   std::string problem;
   if (status == IntrinsicsStatus::no_solution)
-    problem = explain_why_no_lens_fits(views.solved, fisheye);
+    problem = explain_why_no_lens_fits(initial, requested, fisheye);
   return problem.empty() ? std::string(describe_intrinsics_status(status)) : problem;
 }
 
@@ -268,7 +266,8 @@ void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& f
                      bool is_chosen, double print_sd, LensEstimate& result) {
   IntrinsicsSolution& solution = result.solution;
   solution.other_model_fits = fisheye && fits_equally_well(fisheye->solution, solution);
-  result.report = compute_lens_calibration_report(solution, views.solved);
+  const auto uncertainties = ProjectionUncertainty::compute_both(solution, views.solved.lattice);
+  result.report = compute_lens_calibration_report(solution, views.solved, uncertainties);
   if (solution.other_model_fits) {
     raise_uncertainty_to_difference(solution.fitted_lens(), fisheye->solution.fitted_lens(),
                                     views.solved.imager_px, result.report);
@@ -295,7 +294,7 @@ void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& f
   }
   // The covariance of hundreds of control points would fill the file, without use for fixes.
   if (is_splined_lens_model(solution.problem.lens_model)) return;
-  const ProjectionUncertainty uncertainty(solution, views.solved.lattice);
+  const ProjectionUncertainty& uncertainty = uncertainties.by_tags;
   const Eigen::VectorXd& bias = uncertainty.intrinsics_regularization_bias();
   MatrixX covariance = uncertainty.intrinsics_covariance() + bias * bias.transpose();
   if (print) covariance += print->intrinsics * print->intrinsics.transpose();
@@ -325,18 +324,24 @@ LensEstimate estimate_lens(LensViews input) {
     return result;
   }
   SplitViews views = split_off_held_out_views(input, result);
-  if (input.choose_lens_model && !select_lens_model_for_views(views, result)) return result;
+  const InitialSolutions initial(views.solved);
+  if (input.choose_lens_model && !select_lens_model_for_views(initial, views, result))
+    return result;
   const LensModel model = views.solved.lens_model;
   if (is_splined_lens_model(model)) {
-    const std::string problem = explain_unsuitable_grid(views.solved);
+    const std::string problem = explain_unsuitable_grid(initial, model);
     if (!problem.empty()) {
       fail_undetermined(result, views, problem);
       return result;
     }
   }
   std::optional<FisheyeFit> fisheye;
-  if (is_opencv_model(model) && may_be_wide_angle_lens(views.solved)) {
-    fisheye = result.choice ? result.choice->fisheye : fit_fisheye_lens(views.solved);
+  if (is_opencv_model(model) && may_be_wide_angle_lens(initial)) {
+    if (result.choice) {
+      fisheye = result.choice->fisheye;
+    } else if (!is_fisheye_model_clearly_worse(initial, model)) {
+      fisheye = fit_fisheye_lens(initial);
+    }
     if (fisheye && fisheye->max_corner_angle_rad >= kRightAngle_rad) {
       fail_undetermined(
           result, views,
@@ -347,10 +352,10 @@ LensEstimate estimate_lens(LensViews input) {
       return result;
     }
   }
-  result.solution = solve_intrinsics(views.solved);
+  result.solution = solve_intrinsics(initial, model);
   if (!result.solution.has_succeeded()) {
     fail_undetermined(result, views,
-                      explain_why_lens_not_found(views, fisheye, result.solution.status));
+                      explain_why_lens_not_found(initial, model, fisheye, result.solution.status));
     if (result.solution.status == IntrinsicsStatus::too_few_views) {
       result.status = LensStatus::too_few_views;
     }

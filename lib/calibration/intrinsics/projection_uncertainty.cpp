@@ -76,18 +76,21 @@ Eigen::VectorXd compute_regularization_bias(const Linearization& at, double sigm
 
 }  // namespace
 
-ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution)
-    : ProjectionUncertainty(solution, nullptr) {}
+/// Sensitivity of the intrinsics and of the mean rotation to the residuals of the corners.
+struct ProjectionUncertainty::Sensitivity {
+  explicit Sensitivity(const IntrinsicsSolution& solution);
 
-ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
-                                             const BoardLattice& lattice)
-    : ProjectionUncertainty(solution, &lattice) {}
+  Eigen::VectorXd residuals_px;
+  double residual_sd_px = 0;
+  Eigen::Index num_states = 0;
+  /// A row for each residual; empty if the views do not determine all parameters.
+  Eigen::MatrixXd by_residual;
+  Eigen::VectorXd intrinsics_regularization_bias;
+};
 
-ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
-                                             const BoardLattice* lattice)
-    : lens_(solution.fitted_lens()),
-      is_determined_(false),
-      regularization_bias_(Eigen::VectorXd::Zero(std::ssize(solution.problem.intrinsics))) {
+ProjectionUncertainty::Sensitivity::Sensitivity(const IntrinsicsSolution& solution)
+    : intrinsics_regularization_bias(
+          Eigen::VectorXd::Zero(std::ssize(solution.problem.intrinsics))) {
   const BoardProblem& problem = solution.problem;
   const Linearization at = linearize_board_problem(problem, solution.solved_parameters);
   const Eigen::SparseMatrix<double>& jt = at.jacobian_transposed;
@@ -104,17 +107,45 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
         ratio * so3_left_jacobian(problem.poses[i].rotation).transpose();
   }
   wanted = at.scale.asDiagonal() * wanted;
-  const Eigen::MatrixXd by_residual =
-      (jt.leftCols(at.residuals_px.size()).transpose() * factor.solve(wanted)).eval();
-  const double sigma_px = compute_residual_sd(problem, at.residuals_px);
+  by_residual = (jt.leftCols(at.residuals_px.size()).transpose() * factor.solve(wanted)).eval();
+  residuals_px = at.residuals_px;
+  residual_sd_px = compute_residual_sd(problem, residuals_px);
+  num_states = jt.rows();
+  intrinsics_regularization_bias =
+      wanted.leftCols(intrinsics).transpose() *
+      compute_regularization_bias(at, residual_sd_px, problem.noise_px);
+}
+
+ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution)
+    : ProjectionUncertainty(solution, Sensitivity(solution), nullptr) {}
+
+ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
+                                             const BoardLattice& lattice)
+    : ProjectionUncertainty(solution, Sensitivity(solution), &lattice) {}
+
+ProjectionUncertainty::Both ProjectionUncertainty::compute_both(const IntrinsicsSolution& solution,
+                                                                const BoardLattice& lattice) {
+  const Sensitivity sensitivity(solution);
+  return {ProjectionUncertainty(solution, sensitivity, nullptr),
+          ProjectionUncertainty(solution, sensitivity, &lattice)};
+}
+
+ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
+                                             const Sensitivity& sensitivity,
+                                             const BoardLattice* lattice)
+    : lens_(solution.fitted_lens()),
+      is_determined_(false),
+      regularization_bias_(sensitivity.intrinsics_regularization_bias) {
+  const Eigen::MatrixXd& by_residual = sensitivity.by_residual;
+  if (by_residual.size() == 0) return;
   if (lattice == nullptr) {
+    const double sigma_px = sensitivity.residual_sd_px;
     covariance_ = sigma_px * sigma_px * by_residual.transpose() * by_residual;
   } else {
-    const Eigen::MatrixXd sums = sum_rows_by_tag(by_residual, at.residuals_px, *lattice);
-    covariance_ = compute_degrees_of_freedom_factor(problem, jt.rows()) * sums.transpose() * sums;
+    const Eigen::MatrixXd sums = sum_rows_by_tag(by_residual, sensitivity.residuals_px, *lattice);
+    covariance_ = compute_degrees_of_freedom_factor(solution.problem, sensitivity.num_states) *
+                  sums.transpose() * sums;
   }
-  regularization_bias_ = wanted.leftCols(intrinsics).transpose() *
-                         compute_regularization_bias(at, sigma_px, problem.noise_px);
   is_determined_ = covariance_.allFinite();
 }
 

@@ -69,14 +69,27 @@ class ProjectionUncertainty {
   /// length.
   double focal_x_sd_px() const;
 
+  /// Uncertainties of a solution for both assumptions.
+  struct Both;
+  /// Computes both uncertainties from one linearization, which takes most of the time.
+  /// @pre solution.has_succeeded(), with boards of that lattice
+  static Both compute_both(const IntrinsicsSolution& solution, const BoardLattice& lattice);
+
  private:
-  ProjectionUncertainty(const IntrinsicsSolution& solution, const BoardLattice* lattice);
+  struct Sensitivity;
+  ProjectionUncertainty(const IntrinsicsSolution& solution, const Sensitivity& sensitivity,
+                        const BoardLattice* lattice);
 
   Lens lens_;
   bool is_determined_;
   /// Covariance of the intrinsics and of the mean rotation, rad, in the camera frame.
   Eigen::MatrixXd covariance_;
   Eigen::VectorXd regularization_bias_;
+};
+
+struct ProjectionUncertainty::Both {
+  /// For independent corners; for correlated errors within tags.
+  ProjectionUncertainty by_corners, by_tags;
 };
 
 }  // namespace vlp

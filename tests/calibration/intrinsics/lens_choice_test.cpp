@@ -47,7 +47,7 @@ double find_rms(const LensChoice& choice, LensModel model) {
 
 void expect_chosen(const Lens& lens) {
   constexpr int count = 30;
-  const auto choice = select_lens_model(seen_through(lens, count));
+  const auto choice = select_lens_model(InitialSolutions(seen_through(lens, count)));
   ASSERT_TRUE(choice);
   EXPECT_EQ(lens_model_name(choice->model), lens_model_name(lens.lens_model()))
       << describe_lens_model_choice(*choice);
@@ -70,7 +70,7 @@ TEST(SelectLensModel, ReturnsOpencv8ForRationalLensDespiteOneBadView) {
   for (auto& corner : input.views[5]) {
     corner.pixel += Eigen::Vector2d(corner.point % 2 == 0 ? 2 : -2, 0);
   }
-  const auto choice = select_lens_model(input);
+  const auto choice = select_lens_model(InitialSolutions(input));
   ASSERT_TRUE(choice);
   EXPECT_EQ(lens_model_name(choice->model), lens_model_name(LensModel::opencv8))
       << describe_lens_model_choice(*choice);
@@ -95,7 +95,7 @@ TEST(SelectLensModel, RejectsOpencv4ForRationalLensEvenIfFewViewsLieFarFromCente
     // Every fifth view shows the board farther from the center.
     if (inner == (input.views.size() % (all / far) != 0)) input.views.push_back(std::move(corners));
   }
-  const auto choice = select_lens_model(input);
+  const auto choice = select_lens_model(InitialSolutions(input));
   ASSERT_TRUE(choice);
   EXPECT_NE(lens_model_name(choice->model), lens_model_name(LensModel::opencv4))
       << describe_lens_model_choice(*choice);
@@ -103,13 +103,13 @@ TEST(SelectLensModel, RejectsOpencv4ForRationalLensEvenIfFewViewsLieFarFromCente
 }
 
 TEST(SelectLensModel, ReturnsNulloptForFewerThanSixViews) {
-  EXPECT_FALSE(select_lens_model(seen_through(radial_lens(), 5)));
-  EXPECT_TRUE(select_lens_model(seen_through(radial_lens(), 6)));
+  EXPECT_FALSE(select_lens_model(InitialSolutions(seen_through(radial_lens(), 5))));
+  EXPECT_TRUE(select_lens_model(InitialSolutions(seen_through(radial_lens(), 6))));
 }
 
 TEST(SelectLensModel, ReturnsFisheyeForCornersBeyondRightAngle) {
   Random random(44);
-  const auto choice = select_lens_model(wide_input(false, 24, random, kNoise_px));
+  const auto choice = select_lens_model(InitialSolutions(wide_input(false, 24, random, kNoise_px)));
   ASSERT_TRUE(choice);
   EXPECT_EQ(choice->model, LensModel::fisheye);
   EXPECT_GT(choice->beyond_right_angle_rad, 1.58);
@@ -118,7 +118,36 @@ TEST(SelectLensModel, ReturnsFisheyeForCornersBeyondRightAngle) {
   for (const LensCandidate& tried : choice->candidates) {
     EXPECT_EQ(std::isfinite(tried.rms_px), tried.model == LensModel::fisheye);
   }
-  EXPECT_EQ(select_lens_model(seen_through(fisheye_lens(), 8)).value().beyond_right_angle_rad, 0);
+  EXPECT_EQ(select_lens_model(InitialSolutions(seen_through(fisheye_lens(), 8)))
+                .value()
+                .beyond_right_angle_rad,
+            0);
+}
+
+TEST(SolveIntrinsics, GivesSameLensFromInitialSolutionsOfOtherModel) {
+  IntrinsicsInput input = seen_through(rational_lens(), 12);
+  const InitialSolutions initial(input);
+  ASSERT_TRUE(solve_intrinsics(initial, LensModel::fisheye).has_succeeded());
+  input.lens_model = LensModel::opencv8;
+  const IntrinsicsSolution alone = solve_intrinsics(input);
+  ASSERT_TRUE(alone.has_succeeded());
+  EXPECT_EQ(solve_intrinsics(initial, LensModel::opencv8).problem.intrinsics,
+            alone.problem.intrinsics);
+}
+
+TEST(IsFisheyeModelClearlyWorse, ReturnsTrueOnlyForLensThatFisheyeCannotFit) {
+  const auto is_worse = [](const Lens& lens, LensModel other) {
+    return is_fisheye_model_clearly_worse(InitialSolutions(seen_through(lens, 12)), other);
+  };
+  EXPECT_TRUE(is_worse(rational_lens(), LensModel::opencv8));
+  EXPECT_FALSE(is_worse(fisheye_lens(), LensModel::opencv8));
+  EXPECT_FALSE(is_worse(fisheye_lens(), LensModel::opencv4));
+}
+
+TEST(IsFisheyeModelClearlyWorse, ReturnsFalseBeyondRightAngle) {
+  Random random(44);
+  const InitialSolutions initial(wide_input(false, 24, random, kNoise_px));
+  EXPECT_FALSE(is_fisheye_model_clearly_worse(initial, LensModel::opencv8));
 }
 
 TEST(DescribeLensModelChoice, StatesOffAxisAngleWhenBoardIsBeyondRightAngle) {
