@@ -192,7 +192,7 @@ void check_sealing(const std::string& where) {
   EXPECT_THAT(sealed.problems, IsEmpty());
   EXPECT_EQ(sealed.runs, 1U);
   EXPECT_EQ(sealed.entries, 3U);
-  RunRecord run = records.find("20261121T134509Z-0009").value();
+  RunRecord run = records.find_run_by_id("20261121T134509Z-0009").value();
   EXPECT_EQ(run.operator_name, "Ann");
   ASSERT_THAT(run.events, SizeIs(2));
   EXPECT_EQ(run.events[1].text, "exit code 3");

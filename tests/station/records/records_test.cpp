@@ -231,7 +231,7 @@ std::string read_state(const std::string& where) {
 /// Checks the migration of a database with kVersion1.
 void check_migration(const std::string& where) {
   Records records(where);
-  const auto found = records.find("20261121T134501Z-0001");
+  const auto found = records.find_run_by_id("20261121T134501Z-0001");
   ASSERT_TRUE(found);
   EXPECT_EQ(found->station, "station-1");
   EXPECT_EQ(found->operator_name, "");
@@ -279,7 +279,7 @@ void check_migration_by_another(const std::string& where) {
   }
   EXPECT_EQ(rejection_message([&] { Records records(where); }), "");
   done.get();
-  EXPECT_EQ(Records(where).find("20261121T134501Z-0001")->metrics[0].unit, "by another");
+  EXPECT_EQ(Records(where).find_run_by_id("20261121T134501Z-0001")->metrics[0].unit, "by another");
 }
 
 /// Checks that a database with kVersion1 is unchanged if its migration fails.

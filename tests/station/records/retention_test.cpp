@@ -188,8 +188,7 @@ TEST_F(RetentionTest, CheckClockThrowsWhenNewestRunIsOverYearBeforeClock) {
   // The first run by such a clock does not make it right.
   const std::string today = get_current_utc();
   keep(make_run_id(), "a", today);
-  EXPECT_THAT(refusal(),
-              HasSubstr("the runs since " + today + " ended more than a year after"));
+  EXPECT_THAT(refusal(), HasSubstr("the runs since " + today + " ended more than a year after"));
   keep(make_run_id(), "a", utc_days_ago(6));
   EXPECT_THAT(refusal(), HasSubstr("the runs since " + utc_days_ago(6)));
   keep(make_run_id(), "a", utc_days_ago(8));
