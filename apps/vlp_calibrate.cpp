@@ -82,7 +82,7 @@ int calibrate(int argc, char** argv) {
       ->check(CLI::Range(1e-8, 1e-3));
   add_readout_direction_option(app, how.frontend.readout);
   add_room_option(app, how.frontend.room);
-  add_board_image_limit_options(app, how.frontend);
+  add_board_image_quality_options(app, how.frontend);
   app.add_option("--gates", how.gates_file,
                  "File of gates, vlp-gates/1, for sessions without gates.yaml. Its gates are added "
                  "to the default gates of the lens, or replace them");

@@ -302,7 +302,7 @@ void add_output_options(CLI::App& app, Options& options) {
                  "Folder for the detected corners of each image, which later runs reuse");
   add_frame_step_option(app, options.frontend.every);
   add_max_mpx_option(app, options.frontend.max_mpx);
-  add_board_image_limit_options(app, options.frontend);
+  add_board_image_quality_options(app, options.frontend);
   add_threads_option(app, options.frontend.threads);
 }
 

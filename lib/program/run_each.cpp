@@ -48,7 +48,7 @@ Request parse_request(const std::string& line) {
       "stdin: a line is not {\"arguments\": [\"...\"], \"limit_s\": 1 to 86400}: " + line);
 }
 
-/// Runs the program in the forked process, with stdout and stderr redirected to `said`.
+/// Runs the program in the forked process, with stdout and stderr redirected to `output`.
 [[noreturn]] void run_in_child(const char* name, Request request, std::FILE* output, pid_t parent,
                                const std::function<int(int, char**)>& program) {
   // The process ends with its parent: an orphan could write to the files of its successor.

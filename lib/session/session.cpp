@@ -142,8 +142,8 @@ class SessionRun {
                               results_.results_folder_path());
   }
 
-  std::vector<fs::path> folders_of_drives_along_lines() const {
-    return options_.report ? session_.folders_of_drives_along_lines() : std::vector<fs::path>();
+  std::vector<fs::path> line_drive_folders() const {
+    return options_.report ? session_.line_drive_folders() : std::vector<fs::path>();
   }
 
   /// Returns the steps of this session with their outputs.
@@ -164,7 +164,7 @@ class SessionRun {
         {"rotation", with_picture({"rotated.yaml"}, "rotation.svg")},
         {"dispersion", with_picture({"calibration.yaml"}, "dispersion.svg")}};
     if (session_.accuracy_check_captures_folder()) steps.push_back({"check", {"check-fixes.csv"}});
-    for (const fs::path& line : folders_of_drives_along_lines()) {
+    for (const fs::path& line : line_drive_folders()) {
       steps.push_back({line.filename().string(), {fixes_file_path(line).filename().string()}});
     }
     steps.push_back({"evaluate", with_picture({"evaluation.json"}, "report.html")});
@@ -538,7 +538,7 @@ class SessionRun {
     if (const auto check = session_.accuracy_check_captures_folder();
         check && !locate_folder(*check))
       return false;
-    for (const fs::path& line : folders_of_drives_along_lines()) {
+    for (const fs::path& line : line_drive_folders()) {
       if (!locate_folder(line)) return false;
     }
     return true;
@@ -575,7 +575,7 @@ class SessionRun {
       if (options_.report && fs::exists(output_file_path(plot)))
         inputs.push_back(output_file_path(plot));
     }
-    for (const fs::path& line : folders_of_drives_along_lines()) {
+    for (const fs::path& line : line_drive_folders()) {
       inputs.push_back(fixes_file_path(line));
       for (const fs::path& table : add_capture_tables({}, line)) inputs.push_back(table);
     }
@@ -605,7 +605,7 @@ class SessionRun {
     input->threads = options_.frontend.threads;
     EvaluateResult found = evaluate_fixes_against_truth(*input, gates);
     std::vector<Drive> drives;
-    for (const fs::path& line : folders_of_drives_along_lines()) {
+    for (const fs::path& line : line_drive_folders()) {
       const fs::path places = *find_truth_file(line), fixes = fixes_file_path(line);
       drives.push_back({{fixes, read_fixes(fixes)},
                         find_end_points_of_drive(places, read_truth_positions(line))});

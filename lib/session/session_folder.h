@@ -77,7 +77,7 @@ class SessionFolder {
   }
   /// Folders of the drives along a line with known places, sorted by name. Includes drives whose
   /// table cannot be read: their steps report the error.
-  const std::vector<std::filesystem::path>& folders_of_drives_along_lines() const { return lines_; }
+  const std::vector<std::filesystem::path>& line_drive_folders() const { return lines_; }
 
  private:
   std::optional<std::filesystem::path> find_session_file_or_folder(const char* name) const;

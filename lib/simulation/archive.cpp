@@ -151,7 +151,7 @@ bool render_archive_session(const ArchiveSession& session, const fs::path& outpu
       session.scene, unfinished,
       {{}, 1, first_line + ": " + session.camera + "/" + session.session + " of an archive\n"},
       [](const SimulationSummary&, std::size_t) {});
-  damage_session_files(session, unfinished);
+  apply_simulated_damage_to_session_files(session, unfinished);
   fs::rename(unfinished, place);
   return true;
 }
@@ -166,7 +166,8 @@ std::string_view archive_damage_name(ArchiveDamage damage) {
   return kDamageNames[static_cast<std::size_t>(damage)];
 }
 
-void damage_session_files(const ArchiveSession& session, const fs::path& folder) {
+void apply_simulated_damage_to_session_files(const ArchiveSession& session,
+                                             const fs::path& folder) {
   if (session.fault == ArchiveFault::cut_image) {
     const auto& sets = session.scene.sets;
     const auto lamps =

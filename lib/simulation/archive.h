@@ -56,7 +56,8 @@ ArchiveSession make_simulated_archive_session(const Scene& scene, std::size_t in
 
 /// Applies the cut_image fault and the damage of a session to its files in `folder`. A second call
 /// has no further effect.
-void damage_session_files(const ArchiveSession& session, const std::filesystem::path& folder);
+void apply_simulated_damage_to_session_files(const ArchiveSession& session,
+                                             const std::filesystem::path& folder);
 
 /// Renders the first `sessions` sessions of an archive into `output`:
 ///   scene.yaml, archive.csv (camera, session, fault, damage, damaged)

@@ -51,7 +51,7 @@ TEST_F(SharedFolderTest, CreatesAndOpensSubfolders) {
   shared.open_or_create_subfolder(id("0001")).replace_file_atomically("a", "a");
   const auto found = shared.open_subfolder_if_exists(id("0001"));
   ASSERT_TRUE(found);
-  EXPECT_EQ(found->path(), path / "0001");
+  EXPECT_EQ(found->folder_path(), path / "0001");
   EXPECT_EQ(found->read_file_if_exists("a", 1), "a");
   shared.replace_file_atomically("file", "");
   EXPECT_THAT(rejection_message([&] { shared.open_or_create_subfolder(id("file")); }),

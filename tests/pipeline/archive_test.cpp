@@ -90,7 +90,7 @@ TEST_F(VlpSimulateArchive, DamagesSessionsAsListedInTable) {
   EXPECT_EQ(kinds.size(), 5U) << "four kinds and none";
 }
 
-TEST_F(VlpSimulateArchive, RejectsOptionNamedOnlyAndSceneWithoutArchiveKey) {
+TEST_F(VlpSimulateArchive, RejectsArchiveCombinedWithOnlyOptionAndSceneWithoutArchiveKey) {
   EXPECT_THAT(simulate("--archive 2 --only boards").errors, HasSubstr("--only"));
   change_scene("archive: {", "# {");
   const auto result = simulate("--archive 2");

@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-class VlpRotationErrors : public VlpRotation {
+class VlpRotationRefusals : public VlpRotation {
  protected:
   /// With `lamps` as the map, by each method.
   void expect_refusals(const std::string& message) {
@@ -28,17 +28,17 @@ class VlpRotationErrors : public VlpRotation {
   LampMap lamps = read_lamp_map(kExample + "lamps.yaml");
 };
 
-TEST_F(VlpRotationErrors, RejectsMirroredLampMap) {
+TEST_F(VlpRotationRefusals, EachMethodRejectsMirroredLampMap) {
   for (Lamp& lamp : lamps.lamps) lamp.position_m.x() *= -1;
   expect_refusals("the lamp map seems to be mirrored");
 }
 
-TEST_F(VlpRotationErrors, RejectsLampMapAndNamesSwappedLamps) {
+TEST_F(VlpRotationRefusals, RejectsLampMapAndNamesSwappedLamps) {
   std::swap(lamps.lamps[0].position_m, lamps.lamps[1].position_m);
   expect_refusals("lamps 1 and 2 seem to be swapped");
 }
 
-TEST_F(VlpRotationErrors, ExitsWith3ForTooFewCapturesYawsOrLamps) {
+TEST_F(VlpRotationRefusals, ExitsWith3ForTooFewCapturesYawsOrLamps) {
   expect_refusal(rotation(captures([](std::size_t i) { return i < 1; })), 3, "add captures");
   expect_refusal(rotation(captures([](std::size_t i) { return i < 3; })), 3,
                  "less than 90 degrees: add captures");
@@ -51,7 +51,7 @@ TEST_F(VlpRotationErrors, ExitsWith3ForTooFewCapturesYawsOrLamps) {
 }
 
 /// Captures that differ by their noise alone, at two yaws of the turn or at three.
-TEST_F(VlpRotationErrors, RejectsCircleMethodForCapturesAtTwoYaws) {
+TEST_F(VlpRotationRefusals, RejectsCircleMethodForCapturesAtTwoYaws) {
   const auto turn = read_detections(kExample + "turning.csv");
   // The turn is at two heights, one after the other.
   const std::size_t half = turn.size() / 4, quarter = turn.size() / 8;
@@ -69,7 +69,7 @@ TEST_F(VlpRotationErrors, RejectsCircleMethodForCapturesAtTwoYaws) {
             0);
 }
 
-TEST_F(VlpRotationErrors, ExitsWith2ForLampMapOfAnotherRoom) {
+TEST_F(VlpRotationRefusals, ExitsWith2ForLampMapOfAnotherRoom) {
   const std::string map = "format: vlp-lamps/1\nlamps:\n";
   const auto other = [&](const std::string& places) {
     return run_program("vlp-rotation " + kExample + "turning.csv --lamps " +
@@ -85,7 +85,7 @@ TEST_F(VlpRotationErrors, ExitsWith2ForLampMapOfAnotherRoom) {
                  2, "is it the map of this room?");
 }
 
-TEST_F(VlpRotationErrors, RejectsPlotPathEqualToLampMapAndKeepsMap) {
+TEST_F(VlpRotationRefusals, RejectsPlotPathEqualToLampMapAndKeepsMap) {
   const std::string input = kExample + "lamps.yaml";
   const std::string before = TemporaryFolder::read_content(input);
   expect_refusal(rotation(kExample + "turning.csv", "--plot " + input), 2,

@@ -73,7 +73,7 @@ TEST_F(VlpStationRecords, ListsOnlyRunsOfOwnStationInSharedRecords) {
 }
 
 /// Manual changes of the database are detected.
-TEST_F(VlpStationRecords, VerifyRecordsFailsWhenRunWasChanged) {
+TEST_F(VlpStationRecords, VerifyRecordsCommandFailsWhenRunWasChanged) {
   prepare("0001");
   ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
   const auto kept = records("verify-records");

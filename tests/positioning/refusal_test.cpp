@@ -69,7 +69,7 @@ TEST_F(PositionerStatus, ReturnsTooManyLampsForMoreThan256) {
   EXPECT_EQ(status(detections), FixStatus::ok);
 }
 
-TEST_F(PositionerStatus, ReturnsNotFiniteForInvalidPixelsSigmasOrSensors) {
+TEST_F(PositionerStatus, ReturnsNotFiniteForNonFiniteInputOrSigmaOutOfRange) {
   for (const double bad : {kNan, std::numeric_limits<double>::infinity()}) {
     for (const int which : {0, 1, 2}) {
       auto detections = seen(3);

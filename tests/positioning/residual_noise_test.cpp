@@ -115,7 +115,8 @@ TEST_F(ComputeExpectedChiSquaredOfCommonErrors, MatchesMeanChiSquaredWithEstimat
   expect_mean(sensors);
 }
 
-TEST_F(ComputeExpectedChiSquaredOfCommonErrors, PositionFixHasZeroCommonChiSquaredUnlessRequested) {
+TEST_F(ComputeExpectedChiSquaredOfCommonErrors,
+       FixHasZeroCommonChiSquaredWithDefaultPositionerOptions) {
   const Fix fix =
       Positioner(rig.map, rig.calibration).compute_position_fix(seen_from(rig, kPixelSd_px));
   ASSERT_TRUE(fix.has_succeeded());

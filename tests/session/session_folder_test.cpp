@@ -89,7 +89,7 @@ TEST(SessionFolder, FoldersOfDrivesAlongLinesAreThoseWithPositions) {
   folder.file("unit/line-x/truth.csv", "image,x_m,y_m\na.png,1,2\n");
   folder.file("unit/line-y/captures.csv", "image,x_m,y_m\na.png,1,2\n");
   folder.file("unit/line-z/captures.csv", "image,time_s\na.png,1\n");
-  const auto lines = SessionFolder(folder / "unit").folders_of_drives_along_lines();
+  const auto lines = SessionFolder(folder / "unit").line_drive_folders();
   ASSERT_THAT(lines, SizeIs(2));
   EXPECT_EQ(lines[0].filename(), "line-x");
   EXPECT_EQ(lines[1].filename(), "line-y");

@@ -23,9 +23,9 @@ class SquareCorners {
   explicit SquareCorners(const Board& board);
 
   /// Detects the inner corners of a chessboard (findChessboardCornersSB() of OpenCV, then a
-  /// sub-pixel fit). Returns all corners, row by row of the board, or none if the board is not
-  /// completely in view. The two ends of the board cannot be distinguished
-  /// (renumber_lattice_points()).
+  /// sub-pixel fit). Returns all corners, or none if the board is not completely in view. They are
+  /// numbered row by row, with the rows to the right in the image (renumber_lattice_points()). The
+  /// first corner may be at either end of the board, which looks the same rotated by 180 degrees.
   std::vector<PointDetection> detect_chessboard_corners(const GrayLevels& image) const;
 
   /// Detects the corners next to markers whose own corners are accurate to 1 to 2 px.

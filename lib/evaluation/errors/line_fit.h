@@ -16,8 +16,8 @@ namespace vlp {
 /// Commanded straight line: its start and end (x, y) in the world, m.
 using CommandedLine = std::array<Eigen::Vector2d, 2>;
 
-/// Straight line fitted to the horizontal positions of fixes, with its angle and distances from the
-/// commanded line. Result of fit_line_to_fixes().
+/// Straight line fitted to the horizontal positions of fixes. Has its angle to the commanded line,
+/// and the distances of points along it from the commanded line. Result of fit_line_to_fixes().
 struct LineFit {
   /// First and last perpendicular foot of the fixes on the line, in the direction of the commanded
   /// line.

@@ -27,7 +27,7 @@ struct LightPart {
 std::vector<Light> join_parts_of_one_light(std::vector<LightPart>& parts, const LightShape& shape,
                                            const Background& background);
 
-/// Converts parts without a fitted outline to lights of kind `formless` and sets their reason.
+/// Converts parts without a fitted outline to lights of kind `no_outline` and sets their reason.
 /// Skips parts inside one of `lights` and parts less than five pixels wide or high.
 ///
 /// @param size  size of the image whose rows are the scanlines

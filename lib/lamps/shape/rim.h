@@ -19,9 +19,9 @@ namespace vlp {
 bool is_blob_unevenly_lit(const ImageView& image, const Blob& blob,
                           const std::vector<EdgePoint>& outline, const Background& background);
 
-/// Result of fit_rim_of_light(): a light whose outline is its rim. `is_clear` is true if most
-/// pieces of the rim show a step. It is also true if the outline without any one of eight pieces
-/// still has a center.
+/// Result of fit_rim_of_light(): a light whose outline is its rim. `is_clear` is true if at
+/// least one of two conditions holds: more than 60 % of the pieces of the rim show a step, or the
+/// outline still has a center whichever of its eight pieces is omitted.
 struct Rim {
   Light light;
   bool is_clear;

@@ -58,7 +58,7 @@ std::string make_spool_notice(Spool& spool) {
 void log_arrivals(const Unit& unit, const std::vector<WatchedRun::ImageChange>& arrivals,
                   std::size_t& num_done) {
   for (const auto& [step, image, is_removed] : arrivals) {
-    if (!is_removed) spdlog::info("{}", describe_last_image_result(unit, step, image));
+    if (!is_removed) spdlog::info("{}", describe_step_image_result(unit, step, image));
   }
   for (;
        num_done < kStationSteps.size() && unit.step_state(kStationSteps[num_done]).is_step_solved();
@@ -204,9 +204,10 @@ void prepare_station_run(Spool& spool, const StationConfig& config, const std::s
 
 void prepare_station_run(Unit& unit, Spool& spool, const StationConfig& config) {
   prepare_station_run(spool, config, unit.camera_id());
-  unit.set_image_owner_lookup([&spool, camera = unit.camera_id()](const std::string& sha256) {
-    return spool.find_run_of_other_camera_using_image(sha256, camera);
-  });
+  unit.set_lookup_of_run_using_image(
+      [&spool, camera = unit.camera_id()](const std::string& sha256) {
+        return spool.find_run_of_other_camera_using_image(sha256, camera);
+      });
   unit.invalidate_verdict(describe_golden_unit_problem(config));
 }
 

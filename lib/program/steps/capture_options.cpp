@@ -91,7 +91,7 @@ void add_max_mpx_option(CLI::App& app, double& max_mpx) {
       ->check(CLI::Range(0.001, 1e6));
 }
 
-void add_board_image_limit_options(CLI::App& app, FrontendOptions& options) {
+void add_board_image_quality_options(CLI::App& app, FrontendOptions& options) {
   constexpr double max_limit_px = 100;
   app.add_option("--max-blur-px", options.max_blur_px,
                  "Maximum blur of a board image: sigma of its sharpest edges, in px; others are "

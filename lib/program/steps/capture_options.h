@@ -67,7 +67,7 @@ void write_refined_lamp_map(const std::filesystem::path& file, const LampMap& ma
 void add_max_mpx_option(CLI::App& app, double& max_mpx);
 
 /// Adds --max-blur-px and --max-white-fraction, the limits of board images.
-void add_board_image_limit_options(CLI::App& app, FrontendOptions& options);
+void add_board_image_quality_options(CLI::App& app, FrontendOptions& options);
 
 /// Adds --room, --classifier, --annotate, --readout, --exposure-s, --max-mpx and --threads.
 void add_lamp_detection_options(CLI::App& app, CaptureOptions& options);

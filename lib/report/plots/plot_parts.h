@@ -15,9 +15,9 @@ namespace vlp {
 /// @pre value > 0
 double round_down_to_1_2_5_series(double value);
 
-/// Returns consecutive numbers of the series ..., 0.5, 1, 2, 5, 10, ..., ascending, at least two.
-/// The first is the largest one that does not exceed `lowest`. The last is the smallest one that is
-/// not below `highest`.
+/// Returns consecutive numbers of the series ..., 0.5, 1, 2, 5, 10, ..., ascending. The first is
+/// the largest one that does not exceed `lowest`. The last is the smallest one that is not below
+/// `highest`. If both are the same number, the next larger one follows, so that there are two.
 /// @pre 0 < lowest <= highest
 std::vector<double> list_1_2_5_series(double lowest, double highest);
 

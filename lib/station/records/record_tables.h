@@ -14,9 +14,10 @@ namespace vlp {
 /// Current version of the tables, the number of migrations plus one, stored in vlp_schema.
 extern const int kSchemaVersion;
 
-/// Returns true if the tables in the database have the version kSchemaVersion of this program.
-/// Takes no lock, so that users without write permission can call it. Throws as
-/// create_or_migrate_record_tables().
+/// Returns true if the tables in the database have the version kSchemaVersion of this program,
+/// false if they have an earlier one or do not exist. Takes no lock, so that users without write
+/// permission can call it.
+/// @throws soci::soci_error, and std::runtime_error if the tables have a later version
 bool has_current_schema_version(soci::session& sql);
 
 /// Advisory lock of PostgreSQL for creating and migrating tables ("vlp"). Older programs do not

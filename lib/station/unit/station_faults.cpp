@@ -279,9 +279,10 @@ std::string describe_focal_length_difference(const CapturesWithPositions& captur
       mm_per_m * heights->median_m, mm_per_m * reference_heights->median_m);
 }
 
-std::string describe_lens_difference(std::span<const Frame> frames,
-                                     std::span<const Frame> reference, const LampMap& map,
-                                     const Calibration& calibration) {
+std::string describe_residual_increase_by_other_lens(std::span<const Frame> frames,
+                                                     std::span<const Frame> reference,
+                                                     const LampMap& map,
+                                                     const Calibration& calibration) {
   const AdjustmentResult result = adjust_frames_without_positions(frames, map, calibration);
   const AdjustmentResult reference_result =
       adjust_frames_without_positions(reference, map, calibration);

@@ -100,8 +100,9 @@ std::string describe_focal_length_difference(const CapturesWithPositions& captur
 /// times and above 0.1 px. Each set is adjusted with its own tilt. Another center or distortion
 /// therefore raises the residuals, and a camera that moved or tilted does not. Returns an empty
 /// string without such a difference, and if an adjustment is undetermined.
-std::string describe_lens_difference(std::span<const Frame> frames,
-                                     std::span<const Frame> reference, const LampMap& map,
-                                     const Calibration& calibration);
+std::string describe_residual_increase_by_other_lens(std::span<const Frame> frames,
+                                                     std::span<const Frame> reference,
+                                                     const LampMap& map,
+                                                     const Calibration& calibration);
 
 }  // namespace vlp

@@ -154,7 +154,7 @@ std::vector<ScreenLine> make_station_screen(const Unit& unit) {
   return lines;
 }
 
-std::string describe_last_image_result(const Unit& unit, StationStep step,
+std::string describe_step_image_result(const Unit& unit, StationStep step,
                                        const std::string& image) {
   const auto& images = unit.step_state(step).images;
   const auto found = images.find(image);

@@ -24,7 +24,7 @@ struct ScreenLine {
 std::vector<ScreenLine> make_station_screen(const Unit& unit);
 
 /// Returns the result of an image of a step, in one line.
-std::string describe_last_image_result(const Unit& unit, StationStep step,
+std::string describe_step_image_result(const Unit& unit, StationStep step,
                                        const std::string& image);
 
 /// Returns describe_pending_hook() with its remedy as lines; no line if it is empty.

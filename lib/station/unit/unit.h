@@ -56,7 +56,7 @@ class Unit {
   void solve_completed_station_steps(bool all_in);
   /// Sets the function that finds another camera's run by the SHA-256 of an image. Such images are
   /// rejected.
-  void set_image_owner_lookup(std::function<ImageUser(const std::string& sha256)> owner) {
+  void set_lookup_of_run_using_image(std::function<ImageUser(const std::string& sha256)> owner) {
     owner_ = std::move(owner);
   }
   /// Ends an incomplete unit: no more images arrive. `reason` is human-readable, as "the operator

@@ -187,7 +187,8 @@ std::vector<Cause> find_check_faults(const Unit& unit, const Calibration& calibr
   std::string other = describe_focal_length_difference(captures, reference, lamps, calibration);
   // Without an offset, residuals can be caused by a lens that is inaccurate near the corners.
   if (other.empty() && offset) {
-    other = describe_lens_difference(captures.frames, reference.frames, lamps, calibration);
+    other = describe_residual_increase_by_other_lens(captures.frames, reference.frames, lamps,
+                                                     calibration);
   }
   if (!other.empty()) {
     return {{"the images of check are of another camera: " + other + "; take them with this unit"}};

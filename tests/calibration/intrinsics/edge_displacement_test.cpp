@@ -47,12 +47,12 @@ TEST_P(TagsWithDisplacedEdges, YieldTrueEdgeDisplacementOfEachView) {
   const auto shifts = estimate_tag_edge_displacements(input.views, synthetic_lens());
   ASSERT_EQ(shifts.size(), 6U);
   for (const EdgeDisplacement& shift : shifts)
-    EXPECT_NEAR(shift.displacement_px_at_pixel(shift.middle), 0.3, 0.005);
+    EXPECT_NEAR(shift.inward_displacement_at_pixel_px(shift.middle), 0.3, 0.005);
   const auto none =
       estimate_tag_edge_displacements(make_input(shrunk_views(6, 0, 0)).views, synthetic_lens());
   ASSERT_EQ(none.size(), 6U);
   for (const EdgeDisplacement& shift : none)
-    EXPECT_NEAR(shift.displacement_px_at_pixel(shift.middle), 0, 1e-6);
+    EXPECT_NEAR(shift.inward_displacement_at_pixel_px(shift.middle), 0, 1e-6);
 }
 
 TEST_P(TagsWithDisplacedEdges, SolveIntrinsicsRecoversEdgeShiftAndTrueLens) {

@@ -111,7 +111,7 @@ TEST(EstimateAndCorrectToneCurve, ReturnsOneWhenOnlyGrayValuesIndicateCurve) {
 }
 
 /// With any curve the corners then lie on a board, once the shift is corrected.
-TEST(EstimateAndCorrectToneCurve, ReturnsGammaOfGrayValuesWhenAllEdgesShiftEqually) {
+TEST(EstimateAndCorrectToneCurve, ReturnsEstimateFromGrayValuesWhenEqualEdgeShiftsHideTrueGamma) {
   for (const double levels_gamma : {1.4, 2.2}) {
     auto views = CodedCamera{1.8, levels_gamma, 0}.views(16, 3);
     const double gamma = estimate_and_correct_tone_curve(views, synthetic_board(false));

@@ -52,7 +52,7 @@ class EstimateLampDisplacements : public testing::Test {
   std::uint64_t seed_ = 1;
 };
 
-TEST_F(EstimateLampDisplacements, ReturnsOffsetOfMovedLampDespiteWrongFixes) {
+TEST_F(EstimateLampDisplacements, ReturnsOffsetOfMovedLampWhenAllFixesHavePoseErrors) {
   for (const double by_m : {1e-3, 5e-3, 0.1}) {
     moved_m_[3] = {0.6 * by_m, -0.8 * by_m};
     const auto offsets = found();

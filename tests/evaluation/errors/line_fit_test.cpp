@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-TEST(FitLineToFixes, DistancesFromCommandedLineExcludeJitter) {
+TEST(FitLineToFixes, DistancesOfFittedLineFromCommandedLineExcludeJitter) {
   std::vector<FixRow> fixes;
   for (int i = 0; i <= 100; ++i) {  // along x = 1 - 0.01 + ..., upwards, jitter of 2 mm across
     fixes.push_back(fix_at("", 0.01 + (i % 2 == 0 ? 2e-3 : -2e-3), i / 100.0));

@@ -262,7 +262,9 @@ TEST_F(OtherCamera, DescribeDifferencesReturnEmptyTextForTiltedUnit) {
   set_camera(Lens(calibration.camera.lens_model, calibration.camera.intrinsics),
              Eigen::AngleAxisd(0.005, Eigen::Vector3d(1, 2, 0).normalized()).toRotationMatrix());
   EXPECT_EQ(describe_focal_length_difference(check, reference, map, calibration), "");
-  EXPECT_EQ(describe_lens_difference(check.frames, reference.frames, map, calibration), "");
+  EXPECT_EQ(
+      describe_residual_increase_by_other_lens(check.frames, reference.frames, map, calibration),
+      "");
 }
 
 TEST_F(OtherCamera, DescribeFocalLengthDifferenceReportsOnePercentShorterFocalLength) {
@@ -282,9 +284,10 @@ TEST_F(OtherCamera, DescribeLensDifferenceReportsDisplacedPrincipalPoint) {
   intrinsics[2] += 12;
   intrinsics[3] -= 8;
   set_camera(Lens(calibration.camera.lens_model, intrinsics), Eigen::Matrix3d::Identity());
-  EXPECT_THAT(describe_lens_difference(check.frames, reference.frames, map, calibration),
-              HasSubstr("its lens differs, by residuals of the lamps of "));
-  EXPECT_EQ(describe_lens_difference(check.frames, {}, map, calibration), "")
+  EXPECT_THAT(
+      describe_residual_increase_by_other_lens(check.frames, reference.frames, map, calibration),
+      HasSubstr("its lens differs, by residuals of the lamps of "));
+  EXPECT_EQ(describe_residual_increase_by_other_lens(check.frames, {}, map, calibration), "")
       << "nothing to compare";
 }
 

@@ -151,7 +151,7 @@ TEST(MakeVerdictScreen, NamesUnfinishedStepOrUnmeasuredGates) {
 }
 
 TEST_F(UnitTest, RejectsImageUsedByAnotherCamera) {
-  unit.set_image_owner_lookup([](const std::string&) { return ImageUser{"0001", "R"}; });
+  unit.set_lookup_of_run_using_image([](const std::string&) { return ImageUser{"0001", "R"}; });
   fs::copy_file(kView, folder / "0.png");
   unit.add_step_images(StationStep::boards, {folder / "0.png"});
   EXPECT_EQ(
