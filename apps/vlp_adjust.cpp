@@ -46,7 +46,7 @@ AdjustSet read_set(const Options& options, const std::string& set, bool is_in_pl
   if (folder) {
     CaptureOptions images = options.images;
     images.images = set;
-    read.frames = collect_kept_lamp_frames(
+    read.frames = collect_lamp_frames_of_kept_images(
         detect_lamps_in_captures(images, ImageUse::fixes, lamps, calibration).images);
     read.captures =
         options.position_sd_m ? read_captures_with_truth(path) : read_captures_csv_of_folder(path);

@@ -50,7 +50,7 @@ void run(const CaptureOptions& options, const std::string& captures) {
   const Observations found = detect_lamps_in_captures(
       options, ImageUse::fixes, read_lamps_of_room(options.lamps, options.frontend.room),
       calibration);
-  const std::vector<Frame> frames = collect_kept_lamp_frames(found.images);
+  const std::vector<Frame> frames = collect_lamp_frames_of_kept_images(found.images);
   write_detections(options.output, frames);
   if (!captures.empty()) write_capture_times(captures, frame_times(found.images));
   const auto empty = std::count_if(frames.begin(), frames.end(),

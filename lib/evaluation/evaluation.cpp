@@ -17,7 +17,7 @@ Path make_reference_path(const EvaluationInput& input) {
 }
 
 void add_horizontal(Evaluation& evaluation, const std::vector<FixError>& errors, int threads) {
-  auto [sizes_m, clusters] = collect_error_component(
+  auto [sizes_m, clusters] = collect_values_and_clusters_of_fix_errors(
       errors, [](const FixError& error) { return error.horizontal_m.norm(); });
   evaluation.intervals_m = bootstrap_error_intervals(sizes_m, clusters, threads);
   evaluation.horizontal_m = compute_error_statistics(sizes_m);
@@ -26,7 +26,7 @@ void add_horizontal(Evaluation& evaluation, const std::vector<FixError>& errors,
 
 std::optional<SignedErrorStatistics> compute_signed_statistics(
     const std::vector<FixError>& errors, std::optional<double> FixError::*part) {
-  auto values = collect_error_component(errors, std::mem_fn(part)).values;
+  auto values = collect_values_and_clusters_of_fix_errors(errors, std::mem_fn(part)).values;
   if (values.empty()) return std::nullopt;
   return compute_signed_error_statistics(std::move(values));
 }

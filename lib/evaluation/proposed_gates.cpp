@@ -41,7 +41,7 @@ double compute_proposed_limit(double value, const Interval& interval) {
 std::optional<ErrorIntervals> compute_intervals(const std::vector<FixError>& errors,
                                                 std::optional<double> FixError::*part,
                                                 int threads) {
-  auto [sizes, clusters] = collect_error_component(errors, std::mem_fn(part));
+  auto [sizes, clusters] = collect_values_and_clusters_of_fix_errors(errors, std::mem_fn(part));
   for (double& size : sizes) size = std::abs(size);
   return bootstrap_error_intervals(sizes, clusters, threads);
 }

@@ -76,7 +76,7 @@ std::vector<Detection> collect_identified_lamps(const Observation& image) {
   return lamps;
 }
 
-std::vector<BoardView> collect_kept_board_views(std::span<const Observation> images) {
+std::vector<BoardView> collect_board_views_of_kept_images(std::span<const Observation> images) {
   std::vector<BoardView> views;
   for (const Observation& image : images) {
     if (image.is_image_kept() && image.board) views.push_back(*image.board);
@@ -84,7 +84,7 @@ std::vector<BoardView> collect_kept_board_views(std::span<const Observation> ima
   return views;
 }
 
-std::vector<Frame> collect_kept_lamp_frames(std::span<const Observation> images) {
+std::vector<Frame> collect_lamp_frames_of_kept_images(std::span<const Observation> images) {
   std::vector<Frame> frames;
   for (const Observation& image : images) {
     if (image.is_image_kept())

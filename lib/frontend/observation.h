@@ -106,10 +106,10 @@ void prepend_observation_messages(const Observations& remarks, Observations& res
 std::vector<Detection> collect_identified_lamps(const Observation& image);
 
 /// Returns the detections of the board in the images that are used, in their order.
-std::vector<BoardView> collect_kept_board_views(std::span<const Observation> images);
+std::vector<BoardView> collect_board_views_of_kept_images(std::span<const Observation> images);
 
 /// Returns the lamps in the images that are used, one frame per image.
-std::vector<Frame> collect_kept_lamp_frames(std::span<const Observation> images);
+std::vector<Frame> collect_lamp_frames_of_kept_images(std::span<const Observation> images);
 
 /// Returns the number of rejected images per reason, for example "10 blurred, 2 too dark". Appends
 /// the remedy if one reason applies to more than half of them. Empty if no image is rejected.

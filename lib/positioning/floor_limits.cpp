@@ -103,7 +103,7 @@ FloorLimits compute_accuracy_limits_on_floor(const LampMap& map, const Camera& c
                                              const FloorGrid& grid, double z_m, double yaw_rad,
                                              const ErrorSources& sources, const BodyPrior& prior) {
   const Lens lens(camera.lens_model, camera.intrinsics);
-  const auto row_clock = make_row_readout_clock(camera);
+  const auto row_clock = make_readout_clock(camera);
   FloorLimits limits{list_image_error_sources(prior), make_positions_on(grid, z_m, yaw_rad)};
   for (const auto& source :
        {Source{"principal point", "principal_point"}, {"tilt", "tilt"}, kLampMap}) {

@@ -154,7 +154,7 @@ class Positioner::Impl {
         max_residual_share_(options.max_residual_share),
         unstated_sigma_px_(options.unstated_sigma_px),
         computes_common_chi_squared_(options.computes_common_chi_squared),
-        row_clock_(make_row_readout_clock(calibration.camera)) {
+        row_clock_(make_readout_clock(calibration.camera)) {
     for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
     nearest_m_ = compute_distances_to_nearest_lamp(lamps_);
     if (!(mount_.position_in_robot_m.allFinite() && std::isfinite(mount_.yaw_in_robot_rad))) {

@@ -22,7 +22,7 @@ struct RowClock {
 /// Returns the row clock of a camera, which gives the readout time of each pixel. Time 0 is the
 /// readout of the middle row (or column). Returns std::nullopt if row time or readout direction is
 /// unknown.
-inline std::optional<RowClock> make_row_readout_clock(const Camera& camera) {
+inline std::optional<RowClock> make_readout_clock(const Camera& camera) {
   if (!camera.row_time_s || !camera.readout) return std::nullopt;
   const int rows = camera.imager_px[*camera.readout == Readout::rows ? 1 : 0];
   return RowClock{*camera.row_time_s, (rows - 1) / 2.0, *camera.readout};

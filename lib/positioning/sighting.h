@@ -14,8 +14,10 @@
 ///   p = s + H e^{jg} z      so      z = e^{-jg} (p - s) / H.
 namespace vlp {
 
-/// Observation of a lamp of the map by a level camera, for the positioning equation p = s + H
-/// e^{jg} z: known position P of the lamp, measured normalized point z, and its noise.
+/// Observation of a lamp of the map by a level camera: position P of the lamp in the world, m,
+/// measured normalized point z in the level frame, and noise of its pixel. In the positioning
+/// equation p = s + H e^{jg} z, p is the lamp and s the camera, both in the floor plane, H the
+/// height of the lamp above the camera, and g the camera's yaw.
 struct Sighting {
   /// Position P of the lamp in the world, m.
   Eigen::Vector3d lamp_m;

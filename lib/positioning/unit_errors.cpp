@@ -89,7 +89,7 @@ std::optional<UnitBudget> UnitErrors::compute_unit_fix_error_budget(
   lamps_m.reserve(lamps.size());
   for (const std::size_t lamp : lamps) lamps_m.push_back(map_.lamps[lamp].position_m);
   const auto limit = compute_pose_crlb(lamps_m, lens_, camera_from_level_, level, noise_px, prior,
-                                       make_row_readout_clock(camera_));
+                                       make_readout_clock(camera_));
   if (!limit) return std::nullopt;
   const CommonErrors::BodyGain gain = whole_.compute_gain_from_errors_to_fix(
       limit->frame.observations_span(), lamps, Eigen::Vector3d::Zero(), limit->fix, lens_,

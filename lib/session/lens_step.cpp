@@ -65,7 +65,7 @@ LensResult run_lens_calibration_step(LensInput input, HistoryEntry entry) {
   LensResult result;
   add_image_intake_remarks(input.observations, result);
   if (!result.has_succeeded()) return result;
-  LensViews views{collect_kept_board_views(input.observations.images),
+  LensViews views{collect_board_views_of_kept_images(input.observations.images),
                   input.board,
                   input.camera.lens_model,
                   input.held_out,

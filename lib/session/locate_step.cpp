@@ -241,7 +241,7 @@ std::optional<double> find_speed_m_per_s(const std::vector<Fix>& fixes) {
 /// Criterion: half as many failures, or half the residual.
 void warn_about_motion(LocateResult& result, const LocateInput& input, bool is_noisy) {
   const std::size_t failed = input.frames.size() - count_fixes(result.fixes);
-  if (!make_row_readout_clock(input.calibration.camera) || !is_assumed_standing(input) ||
+  if (!make_readout_clock(input.calibration.camera) || !is_assumed_standing(input) ||
       (!is_noisy && 2 * failed < input.frames.size())) {
     return;
   }
@@ -648,7 +648,7 @@ LocateResult locate_camera_from_images(const LampImages& images, ImageUse use, L
   const auto files = list_lamp_images(images.images);
   Observations seen = intake.detect_lamps_in_all_images(files, progress);
   check_any_lamp_identified(images, seen);
-  input.frames = collect_kept_lamp_frames(seen.images);
+  input.frames = collect_lamp_frames_of_kept_images(seen.images);
   const LampIntake without_pictures = intake.copy_intake_with_annotation_folder({});
   std::map<std::string, Observation> latest;
   const LevelRotations levels =
@@ -657,7 +657,7 @@ LocateResult locate_camera_from_images(const LampImages& images, ImageUse use, L
         for (const Observation& image : repeated.images) {
           if (image.is_image_kept()) latest.insert_or_assign(image.image_file_name(), image);
         }
-        return collect_kept_lamp_frames(repeated.images);
+        return collect_lamp_frames_of_kept_images(repeated.images);
       });
   for (Observation& image : seen.images) {
     const auto repeated = latest.find(image.image_file_name());

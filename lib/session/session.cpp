@@ -346,7 +346,7 @@ class SessionRun {
                                  std::vector<Observation>& seen) const {
     Observations observed =
         detect_lamps_in_images(images, use, make_lamp_options(), observer_.progress);
-    captures.frames = collect_kept_lamp_frames(observed.images);
+    captures.frames = collect_lamp_frames_of_kept_images(observed.images);
     StepResult result;
     add_image_intake_remarks(observed, result);
     seen = std::move(observed.images);

@@ -83,7 +83,7 @@ SessionFolder::SessionFolder(const fs::path& folder) : folder_(folder) {
   std::sort(lines_.begin(), lines_.end());
 }
 
-std::optional<fs::path> SessionFolder::find_session_file_or_folder(const char* name) const {
+std::optional<fs::path> SessionFolder::find_optional_session_entry(const char* name) const {
   return fs::exists(folder_ / name) ? std::optional(folder_ / name) : std::nullopt;
 }
 

@@ -61,26 +61,26 @@ class SessionFolder {
   std::filesystem::path board_images_folder() const { return folder_ / "boards"; }
   std::filesystem::path rotation_captures_folder() const { return folder_ / "rotation"; }
   std::optional<std::filesystem::path> camera_calibration_file() const {
-    return find_session_file_or_folder("camera.yaml");
+    return find_optional_session_entry("camera.yaml");
   }
   std::optional<std::filesystem::path> dispersion_captures_folder() const {
-    return find_session_file_or_folder("dispersion");
+    return find_optional_session_entry("dispersion");
   }
   std::optional<std::filesystem::path> accuracy_check_captures_folder() const {
-    return find_session_file_or_folder("check");
+    return find_optional_session_entry("check");
   }
   std::optional<std::filesystem::path> lamp_classifier_file() const {
-    return find_session_file_or_folder("classifier.yaml");
+    return find_optional_session_entry("classifier.yaml");
   }
   std::optional<std::filesystem::path> gates_file() const {
-    return find_session_file_or_folder("gates.yaml");
+    return find_optional_session_entry("gates.yaml");
   }
   /// Folders of the drives along a line with known places, sorted by name. Includes drives whose
   /// table cannot be read: their steps report the error.
   const std::vector<std::filesystem::path>& line_drive_folders() const { return lines_; }
 
  private:
-  std::optional<std::filesystem::path> find_session_file_or_folder(const char* name) const;
+  std::optional<std::filesystem::path> find_optional_session_entry(const char* name) const;
 
   std::filesystem::path folder_;
   std::vector<std::filesystem::path> lines_;

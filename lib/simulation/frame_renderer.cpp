@@ -266,7 +266,7 @@ class LampFrame {
   /// Returns the pose of the camera in a target's frame; for a mirror, of the reflected camera.
   TargetFromCamera compute_target_from_camera(const Eigen::Isometry3d& target_from_world) const {
     return [this, target_from_rays = target_from_world * reflection_](int line) {
-      return target_from_rays * motion_.world_from_camera(part_.exposure_sample_middle_s(line));
+      return target_from_rays * motion_.world_from_camera(part_.exposure_part_middle_s(line));
     };
   }
   /// Draws a glow. `target` is the window's part of an image.
@@ -411,7 +411,7 @@ cv::Mat1f FrameRenderer::render_board_in_electrons(const BoardShot& shot) const 
   cv::Mat1f supersampled(2 * pixels.height, 2 * pixels.width, surround), image;
   for (; part.index < part.count; ++part.index) {
     const auto board_from_camera = [&](int line) {
-      return shot.camera_from_board(part.exposure_sample_middle_s(line)).inverse();
+      return shot.camera_from_board(part.exposure_part_middle_s(line)).inverse();
     };
     add_shape_to_image(rays_, make_whole_image_window(rays_), board_from_camera, *pattern_,
                        1.0 / part.count, supersampled, 2);

@@ -31,7 +31,7 @@ struct Shutter {
   double exposure_sample_end_s(int line) const {
     return exposure_sample_begin_s(line) + exposure_s / count;
   }
-  double exposure_sample_middle_s(int line) const {
+  double exposure_part_middle_s(int line) const {
     return (exposure_sample_begin_s(line) + exposure_sample_end_s(line)) / 2;
   }
 };

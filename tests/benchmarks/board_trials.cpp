@@ -125,7 +125,7 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
         observed({shot.image, {image.cols, image.rows}, detector.detect_board(image)});
   });
   std::size_t tags = 0, usable = 0;
-  for (const BoardView& view : collect_kept_board_views(input.observations.images)) {
+  for (const BoardView& view : collect_board_views_of_kept_images(input.observations.images)) {
     usable += view.detection.tags.size();
     tags += view.detection.tags.size() + static_cast<std::size_t>(view.detection.num_unusable_tags);
   }

@@ -256,7 +256,7 @@ class Trials {
                       bool odometry, double noise_px) const {
     const Lens lens(scene_.camera.lens_model, scene_.camera.intrinsics);
     const Eigen::Matrix3d camera_from_level = scene_.mount.level_from_camera.transpose();
-    const auto clock = make_row_readout_clock(scene_.camera);
+    const auto clock = make_readout_clock(scene_.camera);
     Possible moving, standing;
     int count = 0;
     for (const DrivenCapture& seen : captures) {

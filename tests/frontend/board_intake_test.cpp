@@ -181,7 +181,7 @@ TEST_F(BoardIntakeOfFolder, RejectsRepeatedImagesAndViews) {
   EXPECT_EQ(seen.images[2].rejection->message, "shows the same view as a.png: views count once");
   EXPECT_TRUE(seen.images[3].is_image_kept());
   EXPECT_FALSE(seen.failure);
-  EXPECT_EQ(collect_kept_board_views(seen.images).size(), 2U);
+  EXPECT_EQ(collect_board_views_of_kept_images(seen.images).size(), 2U);
 }
 
 TEST_F(BoardIntakeOfFolder, RejectsImagesOfMinoritySize) {

@@ -71,7 +71,7 @@ TEST_F(LampIntakeOfImage, KeepsImageWithLamps) {
   const Observation image = observe(read_image(kRig + "/sample/0000.png"));
   EXPECT_TRUE(image.is_image_kept());
   EXPECT_GE(collect_identified_lamps(image).size(), 4U);
-  EXPECT_EQ(collect_kept_lamp_frames(std::vector{image}).at(0).detections.size(),
+  EXPECT_EQ(collect_lamp_frames_of_kept_images(std::vector{image}).at(0).detections.size(),
             collect_identified_lamps(image).size());
   for (const Light& light : image.lights) EXPECT_TRUE(light.outline.empty());
 }
@@ -100,9 +100,10 @@ TEST(DetectLampsInImages, RejectsRepeatedImagesUnlessUsedForFixes) {
   EXPECT_TRUE(turn.images[2].is_image_kept());
   ASSERT_FALSE(turn.images[3].is_image_kept());
   EXPECT_EQ(turn.images[3].rejection->reason, RejectionReason::unreadable);
-  EXPECT_EQ(collect_kept_lamp_frames(turn.images).size(), 2U);
+  EXPECT_EQ(collect_lamp_frames_of_kept_images(turn.images).size(), 2U);
   EXPECT_EQ(
-      collect_kept_lamp_frames(detect_lamps_in_images(images, ImageUse::fixes, {}).images).size(),
+      collect_lamp_frames_of_kept_images(detect_lamps_in_images(images, ImageUse::fixes, {}).images)
+          .size(),
       3U);
 }
 

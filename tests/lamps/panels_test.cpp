@@ -26,7 +26,7 @@ TEST(LightDetector, LocatesAllPanelsAndTubesAccuratelyWithKnownTilt) {
   EXPECT_LT(score.chi_square / score.lamps, 1.5);
 }
 
-TEST(LightDetector, LocatesPanelsAndTubesAccuratelyWithUnknownTilt) {
+TEST(LightDetector, LocatesPanelsAndTubesAccuratelyWithUncalibratedTilt) {
   const Captures captures("panels", "check");
   DetectorCamera camera = make_detector_camera(captures.calibration());
   camera.level_from_camera.setIdentity();

@@ -108,7 +108,7 @@ TEST_F(VlpIntrinsicsCornerFiles, RejectWarpOfSquareChessboard) {
   }
 }
 
-TEST_F(VlpIntrinsicsCornerFiles, YieldLensOfImagesExactlyAndOfMrcalClosely) {
+TEST_F(VlpIntrinsicsCornerFiles, TablesYieldSameLensAsImagesAndAsSolveOfMrcal) {
   const std::string rig = (folder / "rig").string(), board = rig + "/board.yaml";
   ASSERT_EQ(run_program("vlp-simulate -q " VLP_SOURCE_DIR
                         "/datasets/paper-rig/scene.yaml --only boards -o " +

@@ -138,7 +138,7 @@ TEST_F(VlpEvaluate, CommandLineGatesOverrideGatesOfFile) {
       HasSubstr("gates.yaml:3: gates.missing_fraction: should be a fraction from 0 to 1, not 50"));
 }
 
-TEST_F(VlpEvaluate, PrintsErrorsAgainstPathAndAgainstLine) {
+TEST_F(VlpEvaluate, PrintsErrorsForPathOptionAndWithLineFitForLineOption) {
   folder.file("path.csv", "x_m,y_m,z_m\n0,0,0\n1,0,0\n");
   const auto path = evaluate("--path path.csv");
   ASSERT_EQ(path.exit_code, 0) << path.errors;

@@ -66,7 +66,7 @@ TEST_F(VlpLocate, WritesRowPerFrameWithFixOrStatus) {
   EXPECT_THAT(result.errors, HasSubstr("2 detections that contradict the others"));
 }
 
-TEST_F(VlpLocate, PositionSdFollowsSigmaPxOptionOrResidualNoise) {
+TEST_F(VlpLocate, PositionSdScalesWithSigmaPxOptionAndMatchesScatterOfFixesWithoutSigmaPx) {
   locate({{"a", seen(4, 0.1)}});
   const double stated_m = figure(0, "x_sd_m");
   locate({{"a", seen(4, 0.1)}}, "--sigma-px 0.3");

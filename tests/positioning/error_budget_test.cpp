@@ -170,7 +170,7 @@ class ErrorBudgetWithPrior : public testing::TestWithParam<FreeStates> {
     const Camera& camera = rig.calibration.camera;
     return compute_fix_error_budget(get_lamp_positions(rig.map),
                                     Lens(camera.lens_model, camera.intrinsics), rig.body.pose,
-                                    sources, prior, make_row_readout_clock(camera));
+                                    sources, prior, make_readout_clock(camera));
   }
   Eigen::Vector4d locate(const BodyRig& with, const std::vector<Detection>& detections) const {
     const Fix fix = with.positioner().compute_position_fix(detections, sensors());

@@ -133,7 +133,7 @@ class ProblemAssembler {
   explicit ProblemAssembler(const AdjustmentInput& input)
       : input_(input),
         lens_(input.calibration.camera.lens_model, input.calibration.camera.intrinsics),
-        row_clock_(make_row_readout_clock(input.calibration.camera)),
+        row_clock_(make_readout_clock(input.calibration.camera)),
         pivots_(list_pivots(input)),
         all_(make_empty_problem(input, pivots_.size())),
         sums_m_(pivots_.size(), Eigen::Vector3d::Zero()),

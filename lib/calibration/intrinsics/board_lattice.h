@@ -19,7 +19,6 @@ namespace vlp {
 class BoardLattice {
  public:
   /// Creates the lattice of a board.
-  /// Creates the lattice of a board.
   /// @throws std::invalid_argument for a board of tags if tag_spacing is not 1 and the board has
   ///     one row or column
   explicit BoardLattice(const Board& board);

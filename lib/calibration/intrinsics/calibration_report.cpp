@@ -73,12 +73,13 @@ std::optional<ProjectionDifference> compare_lenses_of_view_halves(
 CalibrationReport compute_lens_calibration_report(const IntrinsicsSolution& solution,
                                                   const IntrinsicsInput& input) {
   return compute_lens_calibration_report(
-      solution, input, ProjectionUncertainty::compute_both(solution, input.lattice));
+      solution, input,
+      ProjectionUncertainty::compute_uncertainty_by_corners_and_by_tags(solution, input.lattice));
 }
 
 CalibrationReport compute_lens_calibration_report(
     const IntrinsicsSolution& solution, const IntrinsicsInput& input,
-    const ProjectionUncertainty::Both& uncertainties) {
+    const ProjectionUncertainty::ByCornersAndByTags& uncertainties) {
   const auto& [independent, uncertainty] = uncertainties;
   const Lens lens = solution.fitted_lens();
   const Eigen::MatrixXd by_views = estimate_intrinsics_covariance_by_jackknife(solution);

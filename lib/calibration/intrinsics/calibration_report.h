@@ -51,9 +51,9 @@ struct CalibrationReport {
 CalibrationReport compute_lens_calibration_report(const IntrinsicsSolution& solution,
                                                   const IntrinsicsInput& input);
 /// Computes the report with known uncertainties of the solution.
-CalibrationReport compute_lens_calibration_report(const IntrinsicsSolution& solution,
-                                                  const IntrinsicsInput& input,
-                                                  const ProjectionUncertainty::Both& uncertainties);
+CalibrationReport compute_lens_calibration_report(
+    const IntrinsicsSolution& solution, const IntrinsicsInput& input,
+    const ProjectionUncertainty::ByCornersAndByTags& uncertainties);
 
 /// Returns the RMS residual of each held-out view, per axis, px; infinity for a view without a
 /// pose.

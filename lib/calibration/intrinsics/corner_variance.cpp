@@ -30,7 +30,7 @@ double compute_typical_variance(std::span<const CornerError> errors, const Prope
 
 }  // namespace
 
-CornerVariance estimate_corner_variance_components(std::span<const CornerError> errors) {
+CornerVariance estimate_corner_variance_floor_and_scale(std::span<const CornerError> errors) {
   constexpr int max_iterations = 10;
   constexpr double min_fraction = 0.002;  // of the mean square: no corner dominates
   // Starts with half of the variance from pixel noise. Started with the floor alone, one corner
@@ -64,7 +64,7 @@ CornerVariance estimate_corner_variance_components(std::span<const CornerError> 
 
 CornerWeights::CornerWeights(std::span<const CornerError> known,
                              std::span<const CornerError> unknown)
-    : variance_(estimate_corner_variance_components(known)), mean_px2_(0) {
+    : variance_(estimate_corner_variance_floor_and_scale(known)), mean_px2_(0) {
   for (const auto& [square_px2, sd_px] : known) {
     mean_px2_ +=
         std::min(square_px2, kMaxSigmas * kMaxSigmas * variance_.corner_variance_px2(sd_px)) /
@@ -72,8 +72,8 @@ CornerWeights::CornerWeights(std::span<const CornerError> known,
   }
   unknown_px2_ = mean_px2_;
   if (std::ranges::any_of(unknown, [](const auto& error) { return error.square_px2 > 0; })) {
-    unknown_px2_ =
-        std::max(mean_px2_, estimate_corner_variance_components(unknown).corner_variance_px2(0));
+    unknown_px2_ = std::max(
+        mean_px2_, estimate_corner_variance_floor_and_scale(unknown).corner_variance_px2(0));
   }
 }
 

@@ -35,7 +35,7 @@ struct CornerVariance {
 /// A residual beyond three standard deviations counts as three. The standard deviation of a corner
 /// is at least 4 % of the RMS residual of all, so that no corner dominates.
 /// @pre at least one error, not all of them 0; standard deviations are finite
-CornerVariance estimate_corner_variance_components(std::span<const CornerError> errors);
+CornerVariance estimate_corner_variance_floor_and_scale(std::span<const CornerError> errors);
 
 /// Factors by which a solve multiplies residuals:
 ///   weight^2 = mean of the squared residuals / variance.

@@ -266,7 +266,8 @@ void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& f
                      bool is_chosen, double print_sd, LensEstimate& result) {
   IntrinsicsSolution& solution = result.solution;
   solution.other_model_fits = fisheye && fits_equally_well(fisheye->solution, solution);
-  const auto uncertainties = ProjectionUncertainty::compute_both(solution, views.solved.lattice);
+  const auto uncertainties = ProjectionUncertainty::compute_uncertainty_by_corners_and_by_tags(
+      solution, views.solved.lattice);
   result.report = compute_lens_calibration_report(solution, views.solved, uncertainties);
   if (solution.other_model_fits) {
     raise_uncertainty_to_difference(solution.fitted_lens(), fisheye->solution.fitted_lens(),

@@ -123,8 +123,9 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
                                              const BoardLattice& lattice)
     : ProjectionUncertainty(solution, Sensitivity(solution), &lattice) {}
 
-ProjectionUncertainty::Both ProjectionUncertainty::compute_both(const IntrinsicsSolution& solution,
-                                                                const BoardLattice& lattice) {
+ProjectionUncertainty::ByCornersAndByTags
+ProjectionUncertainty::compute_uncertainty_by_corners_and_by_tags(
+    const IntrinsicsSolution& solution, const BoardLattice& lattice) {
   const Sensitivity sensitivity(solution);
   return {ProjectionUncertainty(solution, sensitivity, nullptr),
           ProjectionUncertainty(solution, sensitivity, &lattice)};

@@ -70,10 +70,11 @@ class ProjectionUncertainty {
   double focal_x_sd_px() const;
 
   /// Uncertainties of a solution for both assumptions.
-  struct Both;
+  struct ByCornersAndByTags;
   /// Computes both uncertainties from one linearization, which takes most of the time.
   /// @pre solution.has_succeeded(), with boards of that lattice
-  static Both compute_both(const IntrinsicsSolution& solution, const BoardLattice& lattice);
+  static ByCornersAndByTags compute_uncertainty_by_corners_and_by_tags(
+      const IntrinsicsSolution& solution, const BoardLattice& lattice);
 
  private:
   struct Sensitivity;
@@ -87,7 +88,7 @@ class ProjectionUncertainty {
   Eigen::VectorXd regularization_bias_;
 };
 
-struct ProjectionUncertainty::Both {
+struct ProjectionUncertainty::ByCornersAndByTags {
   /// For independent corners; for correlated errors within tags.
   ProjectionUncertainty by_corners, by_tags;
 };

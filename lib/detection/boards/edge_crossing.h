@@ -21,8 +21,8 @@ struct GrayLevels {
 /// @param guess_px   approximate pixel (u, v) of the corner
 /// @param reach_px   radius of the search for the initial pixel
 /// @param radius_px  radius of the window of the fit
-/// @return           pixel (u, v) of the saddle; std::nullopt if the fit is no saddle, its center
-///     moves more than 2 px from the initial pixel, or a window reaches beyond the image
+/// @return           pixel (u, v) of the saddle; std::nullopt if the fit is no saddle, its point
+///     is more than 2 px from the initial pixel, or a window reaches beyond the image
 ///
 /// The initial pixel has the most negative determinant of the Hessian. The saddle of
 ///   a x^2 + b x y + c y^2 + d x + e y + f

@@ -37,7 +37,8 @@ struct ErrorComponent {
 
 /// Collects `value_of(error)`, without the errors for which it returns std::nullopt.
 template <typename Value>
-ErrorComponent collect_error_component(const std::vector<FixError>& errors, const Value& value_of) {
+ErrorComponent collect_values_and_clusters_of_fix_errors(const std::vector<FixError>& errors,
+                                                         const Value& value_of) {
   ErrorComponent component;
   for (const FixError& error : errors) {
     const std::optional<double> value = value_of(error);

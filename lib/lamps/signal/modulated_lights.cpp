@@ -78,7 +78,7 @@ LineProfile compute_profile(const CellLevels& cells, const ModulationMap& map,
   LineProfile profile{
       cells.box.y + (begin + 0.5) * cells.lines_per_bin - 0.5, cells.lines_per_bin, {}};
   for (int bin = begin; bin < end; ++bin) {
-    const float* row = cells.cell_levels_of_bin(bin) + first_cell;
+    const float* row = cells.cell_levels_in_scanline_band(bin) + first_cell;
     double sum = 0;
     for (std::size_t c = 0; c < weights.size(); ++c) sum += double(weights[c]) * double(row[c]);
     profile.levels.push_back(std::max(0.0, sum));
@@ -162,7 +162,7 @@ double compute_phase_coherence(const CellLevels& cells, const ModulationMap& map
       std::complex<double> z;
       for (int bin = first; bin < last; ++bin) {
         const double weight = std::max(0.0, period - std::abs(bin + 0.5 - middle));
-        z += std::polar(weight * double(cells.cell_levels_of_bin(bin)[cell]),
+        z += std::polar(weight * double(cells.cell_levels_in_scanline_band(bin)[cell]),
                         -2 * std::numbers::pi * (bin + 0.5) / period);
       }
       sum += z;

@@ -23,7 +23,7 @@ struct CellLevels {
   /// Mean level of each cell above the dark level, in gray levels, by bin and cell.
   std::vector<float> levels;
 
-  const float* cell_levels_of_bin(int bin) const {
+  const float* cell_levels_in_scanline_band(int bin) const {
     return levels.data() + std::ptrdiff_t(bin) * cells;
   }
 };

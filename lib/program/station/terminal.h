@@ -15,9 +15,9 @@ namespace vlp {
 /// NO_COLOR is set. Without a terminal, only print_permanent_lines() writes.
 class Terminal {
  public:
-  /// Switches a terminal on stdin to single keys without echo, until destruction; only if stdout is
-  /// a terminal, too. From then on, SIGINT and SIGTERM do not end the process
-  /// (was_interrupt_signal_received()).
+  /// Switches stdin to single keys without echo if stdin and stdout are terminals. In any case,
+  /// SIGINT and SIGTERM do not end the process but are recorded (was_interrupt_signal_received()).
+  /// Both until destruction.
   Terminal();
   ~Terminal();
   Terminal(const Terminal&) = delete;

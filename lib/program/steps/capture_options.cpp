@@ -209,7 +209,7 @@ LampCaptures read_lamp_captures(const CaptureOptions& options, ImageUse use) {
   if (readout) captures.calibration.camera.readout = readout;
   captures.frames =
       std::filesystem::is_directory(options.images)
-          ? collect_kept_lamp_frames(
+          ? collect_lamp_frames_of_kept_images(
                 detect_lamps_in_captures(options, use, captures.lamps, captures.calibration).images)
           : read_captures_from_detections_file(options);
   return captures;

@@ -33,7 +33,7 @@ TEST(EstimateCornerVarianceComponents, MatchesTrueVarianceOfSimulatedCorners) {
        {std::pair{0.02, 1.2}, {0.0, 1.0}, {0.05, 0.0}, {0.2, 1.0}, {0.005, 2.0}}) {
     const CornerVariance truth{rest_px * rest_px, scale * scale};
     const CornerVariance found =
-        estimate_corner_variance_components(simulate_errors(truth, random));
+        estimate_corner_variance_floor_and_scale(simulate_errors(truth, random));
     for (const double sd_px : {0.01, 0.03, 0.1}) {
       EXPECT_NEAR(std::sqrt(found.corner_variance_px2(sd_px) / truth.corner_variance_px2(sd_px)), 1,
                   0.08)
@@ -47,7 +47,7 @@ TEST(EstimateCornerVarianceComponents, MatchesTrueVarianceWithOnePercentOutliers
   const CornerVariance truth{1e-4, 1};
   auto errors = simulate_errors(truth, random);
   for (std::size_t i = 0; i < errors.size(); i += 100) errors[i].square_px2 = 4;
-  const CornerVariance found = estimate_corner_variance_components(errors);
+  const CornerVariance found = estimate_corner_variance_floor_and_scale(errors);
   for (const double sd_px : {0.01, 0.1}) {
     EXPECT_NEAR(std::sqrt(found.corner_variance_px2(sd_px) / truth.corner_variance_px2(sd_px)), 1,
                 0.15);
@@ -60,7 +60,7 @@ TEST(EstimateCornerVarianceComponents, MatchesTrueVarianceWhenOneSdIsTooLarge) {
   for (const double sd_px : {0.5, 1.0, 1e9}) {
     auto errors = simulate_errors(truth, random);
     errors[3].sd_px = sd_px;
-    const CornerVariance found = estimate_corner_variance_components(errors);
+    const CornerVariance found = estimate_corner_variance_floor_and_scale(errors);
     for (const double known_px : {0.01, 0.1}) {
       EXPECT_NEAR(
           std::sqrt(found.corner_variance_px2(known_px) / truth.corner_variance_px2(known_px)), 1,
@@ -72,7 +72,8 @@ TEST(EstimateCornerVarianceComponents, MatchesTrueVarianceWhenOneSdIsTooLarge) {
 
 TEST(EstimateCornerVarianceComponents, ReturnsMeanSquareErrorWhenAllSdsAreEqual) {
   const std::vector<CornerError> errors{{4e-4, 0.01}, {1e-4, 0.01}, {1e-4, 0.01}};
-  EXPECT_NEAR(estimate_corner_variance_components(errors).corner_variance_px2(0.01), 2e-4, 1e-9);
+  EXPECT_NEAR(estimate_corner_variance_floor_and_scale(errors).corner_variance_px2(0.01), 2e-4,
+              1e-9);
 }
 
 /// Returns corners of 16 views with known standard deviations, ten times as large at the rim of the

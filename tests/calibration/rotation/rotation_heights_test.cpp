@@ -103,7 +103,7 @@ TEST(FitRotationAxis, OmitsLeverArmForLampsAtNearlyOneHeight) {
 }
 
 /// With a lever arm and a single height, fixes are those of the axis at that height.
-TEST(FitRotationAxis, YieldsFixesNearAxisForLeverArmAtOneHeight) {
+TEST(FitRotationAxis, CalibrationFromOneHeightHasNoLeverArmAndYieldsFixesAtAxis) {
   const RotationScene scene = tilted_scene();
   const RotationFit found = fit_rotation_axis(find_captures(scene, scene.frames()), scene.camera);
   ASSERT_TRUE(found.converged);

@@ -41,9 +41,9 @@ TEST(AveragePixelsOverCells, ReturnsMeanMinusDarkPerCellAndScanlineBin) {
   const CellLevels cells = average_pixels_over_cells(to_image_view(image), {0, 0, 19, 4}, 3, 2);
   ASSERT_EQ(cells.cells, 3);
   ASSERT_EQ(cells.bins, 2);
-  EXPECT_FLOAT_EQ(cells.cell_levels_of_bin(0)[0], 7 + 1);  // 16 more in 16 pixels
-  EXPECT_FLOAT_EQ(cells.cell_levels_of_bin(0)[1], 7);
-  EXPECT_FLOAT_EQ(cells.cell_levels_of_bin(1)[2],
+  EXPECT_FLOAT_EQ(cells.cell_levels_in_scanline_band(0)[0], 7 + 1);  // 16 more in 16 pixels
+  EXPECT_FLOAT_EQ(cells.cell_levels_in_scanline_band(0)[1], 7);
+  EXPECT_FLOAT_EQ(cells.cell_levels_in_scanline_band(1)[2],
                   7 + 5);  // 30 more in the 6 pixels that the last cell has
 }
 
