@@ -243,7 +243,7 @@ std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
     boards.write_csv_row({shot.image, length(place_m.x()), length(place_m.y()), length(place_m.z()),
                           angle(rotation_vector_rad.x()), angle(rotation_vector_rad.y()),
                           angle(rotation_vector_rad.z())});
-    const auto visible_corners = find_true_corners_in_image(scene, renderer, shot);
+    const auto visible_corners = project_scene_corners_into_image(scene, renderer, shot);
     empty += visible_corners.empty();
     for (const auto& [tag, corner, at_px] : visible_corners) {
       std::vector<std::string> row{shot.image};
@@ -289,9 +289,9 @@ std::vector<TrueOtherLight> find_true_other_lights_in_image(const Scene& scene,
   return lights;
 }
 
-std::vector<TrueCorner> find_true_corners_in_image(const Scene& scene,
-                                                   const FrameRenderer& renderer,
-                                                   const BoardShot& shot) {
+std::vector<TrueCorner> project_scene_corners_into_image(const Scene& scene,
+                                                         const FrameRenderer& renderer,
+                                                         const BoardShot& shot) {
   const BoardWarp warp(*scene.board);
   const auto camera_from_board = [&](double time_s) { return shot.camera_from_board(time_s); };
   std::vector<TrueCorner> corners;

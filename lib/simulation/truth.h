@@ -58,9 +58,9 @@ struct TrueCorner {
 };
 
 /// Returns the corners inside the image.
-std::vector<TrueCorner> find_true_corners_in_image(const Scene& scene,
-                                                   const FrameRenderer& renderer,
-                                                   const BoardShot& shot);
+std::vector<TrueCorner> project_scene_corners_into_image(const Scene& scene,
+                                                         const FrameRenderer& renderer,
+                                                         const BoardShot& shot);
 
 /// Returns the scene's camera, with its tilt as the rotation center.
 Calibration make_true_calibration(const Scene& scene);

@@ -66,7 +66,7 @@ TEST(LampDetector, DetectReturnsSameLampsAsLightDetector) {
   EXPECT_EQ(i, lamps.size());
 }
 
-TEST(LampDetector, ThrowsForImageOfWrongSizeOrLayoutAndWithoutRowTime) {
+TEST(LampDetector, ThrowsForImageOfWrongSizeStrideOrBitDepthAndWithoutRowTime) {
   const cv::Mat image = sample();
   const LampDetector detector(lamp_map(), calibration());
   const auto format_failure_message = [&](const auto& change) -> std::string {

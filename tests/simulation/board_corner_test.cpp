@@ -103,7 +103,8 @@ TEST_P(FrameRendererBoard, RenderedCornersMatchTrueCorners) {
     const cv::Mat1d image(renderer.render_board_in_electrons(shot) / 1e3);
     const cv::Mat1d transposed(image.t());
     std::map<int, std::map<int, Eigen::Vector2d>> tags;
-    for (const auto& [tag, corner, pixel] : find_true_corners_in_image(scene_, renderer, shot)) {
+    for (const auto& [tag, corner, pixel] :
+         project_scene_corners_into_image(scene_, renderer, shot)) {
       constexpr double edge_px = 8;
       if (pixel.minCoeff() > edge_px && pixel.x() < 799 - edge_px && pixel.y() < 599 - edge_px) {
         tags[tag.value()][corner] = pixel;
@@ -134,7 +135,7 @@ TEST_P(FrameRendererBoard, TrueCornersMatchMrcalProjection) {
   const BoardShot shot = make_board_capture_parameters(scene_, views_, 1);
   const auto layout = list_board_tags(scene_.board->pattern);
   const Eigen::Vector2d field_m = compute_tag_field_size_m(scene_.board->pattern);
-  const auto truth = find_true_corners_in_image(scene_, renderer, shot);
+  const auto truth = project_scene_corners_into_image(scene_, renderer, shot);
   ASSERT_FALSE(truth.empty());
   for (const auto& [tag, corner, pixel] : truth) {
     ASSERT_TRUE(tag);
@@ -179,7 +180,7 @@ TEST(FrameRenderer, BlursBoardEdgeBeforePixelIntegration) {
   double worst = 0;
   int edges = 0;
   // Left of a tag there is white, and its black border is seven pixels wide.
-  for (const auto& [tag, corner, pixel] : find_true_corners_in_image(scene, renderer, shot)) {
+  for (const auto& [tag, corner, pixel] : project_scene_corners_into_image(scene, renderer, shot)) {
     constexpr int reach_px = 4, down_px = 20;
     if (corner != 3 || pixel.x() < reach_px || pixel.y() + down_px > 599) continue;
     const int row = static_cast<int>(pixel.y()) + down_px;

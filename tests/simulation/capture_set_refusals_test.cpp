@@ -132,7 +132,7 @@ TEST(ReadSceneCaptureSet, RejectsTwoCaptureSetsWithSameFolder) {
             "scene.yaml:27: captures[2]: folder 'spots' occurs twice");
 }
 
-TEST(ReadSceneCaptureSet, RejectsSetWhoseSceneHasNoLampsOrBoard) {
+TEST(ReadSceneCaptureSet, RejectsBoardSetWithoutBoardAndLampSetWithoutLamps) {
   EXPECT_EQ(scene_refusal(without_board()),
             "scene.yaml:21: captures[3]: views are of a board, and the scene has none");
   std::string dark = kSceneYaml;

@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-TEST(MakeSimulationProvenance, PrependsProgramLineAndReplacesSceneSeed) {
+TEST(MakeSimulationProvenance, BeginsWithProgramVersionAndHoldsGivenSeed) {
   const TemporaryFolder folder;
   const auto scene = folder.file("scene.yaml", "format: vlp-scene/1\nseed: 1  # any\nlamps: []\n");
   const std::string same = make_simulation_provenance(scene, {}, "vlp-simulate", "0.1.0");

@@ -46,7 +46,7 @@ void expect_all_read(const Scene& scene, apriltag_family_t* family) {
     const BoardShot shot = make_board_capture_parameters(scene, views, index);
     const Corners found = detected(
         simulate_sensor_image(scene.sensor, renderer.render_board_in_electrons(shot), 1), family);
-    const auto truth = find_true_corners_in_image(scene, renderer, shot);
+    const auto truth = project_scene_corners_into_image(scene, renderer, shot);
     ASSERT_FALSE(truth.empty());
     EXPECT_EQ(found.size(), truth.size());
     for (const auto& [tag, corner, pixel] : truth) {

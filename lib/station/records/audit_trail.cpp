@@ -140,7 +140,7 @@ void append_run_events_to_audit_trail(soci::session& sql, const std::string& run
   std::vector<Entry> added;
   // As read from the database, which can store a number differently than given.
   if (is_new_run)
-    added.push_back({0, run, "", compute_digest(load_complete_run(sql, run).value()), ""});
+    added.push_back({0, run, "", compute_digest(load_run_with_all_parts(sql, run).value()), ""});
   for (const RunEvent& event : new_events) {
     added.push_back({0, run, event.event, compute_digest(run, event), ""});
   }
@@ -162,7 +162,8 @@ void append_run_events_to_audit_trail(soci::session& sql, const std::string& run
 
 void append_all_runs_to_audit_trail(soci::session& sql) {
   for (const std::string& run : load_run_ids(sql)) {
-    append_run_events_to_audit_trail(sql, run, true, load_complete_run(sql, run).value().events);
+    append_run_events_to_audit_trail(sql, run, true,
+                                     load_run_with_all_parts(sql, run).value().events);
   }
 }
 
@@ -193,7 +194,7 @@ TrailCheck check_audit_trail(soci::session& sql, const std::string& expected_dig
     }
   };
   for (const std::string& name : load_run_ids(sql)) {
-    const RunRecord run = load_complete_run(sql, name).value();
+    const RunRecord run = load_run_with_all_parts(sql, name).value();
     ++check.runs;
     check_item(name, "", compute_digest(run));
     for (const RunEvent& event : run.events) {

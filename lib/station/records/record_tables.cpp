@@ -215,7 +215,7 @@ std::optional<RunRecord> load_run_text_fields(soci::session& sql, const std::str
   return record;
 }
 
-std::optional<RunRecord> load_complete_run(soci::session& sql, const std::string& run) {
+std::optional<RunRecord> load_run_with_all_parts(soci::session& sql, const std::string& run) {
   std::optional<RunRecord> found = load_run_text_fields(sql, run);
   if (!found) return found;
   read_run_metrics(sql, *found);

@@ -35,6 +35,6 @@ void create_or_migrate_record_tables(soci::session& sql);
 std::optional<RunRecord> load_run_text_fields(soci::session& sql, const std::string& run);
 /// Loads a run with its metrics, images and events, with the names of metrics as they were stored;
 /// std::nullopt if no run has this id.
-std::optional<RunRecord> load_complete_run(soci::session& sql, const std::string& run);
+std::optional<RunRecord> load_run_with_all_parts(soci::session& sql, const std::string& run);
 
 }  // namespace vlp

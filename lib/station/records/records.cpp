@@ -450,8 +450,8 @@ std::vector<TrendPoint> Records::load_metric_trend(const std::string& metric,
 }
 
 std::optional<RunRecord> Records::find_run_by_id(const std::string& run) {
-  auto found =
-      database_->run([&](ConnectionWatchdog&) { return load_complete_run(database_->sql, run); });
+  auto found = database_->run(
+      [&](ConnectionWatchdog&) { return load_run_with_all_parts(database_->sql, run); });
   if (!found) return found;
   for (CheckedMetric& metric : found->metrics) metric.name = find_current_metric_name(metric.name);
   return found;

@@ -73,7 +73,7 @@ class Unit {
   const UnitStep& step_state(StationStep step) const { return steps_[step_index(step)]; }
   /// Returns the comparison of the type's row time with that of the lamps of all steps, as of the
   /// last solve_completed_station_steps().
-  const RowTimeCheck& row_time_check() const { return row_time_; }
+  const RowTimeCheck& last_row_time_comparison() const { return row_time_; }
   /// Returns the first step that is not completed; std::nullopt if all are.
   std::optional<StationStep> first_incomplete_step() const;
   /// Returns true if continuing is useless. A step then has too many consecutive rejected images,

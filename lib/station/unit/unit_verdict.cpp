@@ -282,7 +282,7 @@ std::vector<Cause> find_causes_of_failure(const Unit& unit) {
   if (!unit.invalid_verdict_reason().empty()) causes.push_back({unit.invalid_verdict_reason()});
   append_causes(causes,
                 board_causes);  // before faults of the lamps: the lens was measured without them
-  if (std::string error = unit.row_time_check().error; !error.empty()) {
+  if (std::string error = unit.last_row_time_comparison().error; !error.empty()) {
     causes.push_back({std::move(error)});
   } else if (!board_causes.empty() || !lamp_causes.empty()) {
     append_causes(causes, find_station_faults(unit));

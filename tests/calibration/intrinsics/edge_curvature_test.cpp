@@ -118,7 +118,8 @@ TEST(CorrectCornersForEdgeCurvature, ReducesCornerErrorsOfRenderedBoardByQuarter
   for (std::size_t index = 0; index < 8; ++index) {
     const BoardShot shot = make_board_capture_parameters(scene, views, index);
     std::map<int, TagDetection::Corners> truth;
-    for (const auto& [tag, corner, pixel] : find_true_corners_in_image(scene, renderer, shot)) {
+    for (const auto& [tag, corner, pixel] :
+         project_scene_corners_into_image(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
     }
     const BoardDetection seen = detector.detect_board(

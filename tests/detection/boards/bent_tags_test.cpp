@@ -58,7 +58,8 @@ TEST(BoardDetector, LocatesCornersOfCurvedTagsWithinHundredthsOfPixel) {
     const BoardShot shot = make_board_capture_parameters(scene, views, index);
     std::map<int, Corners> truth;
     std::map<int, int> seen_corners;
-    for (const auto& [tag, corner, pixel] : find_true_corners_in_image(scene, renderer, shot)) {
+    for (const auto& [tag, corner, pixel] :
+         project_scene_corners_into_image(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
       ++seen_corners[*tag];
     }

@@ -57,7 +57,8 @@ CornerErrors measure_errors(const Scene& scene, const CaptureSet& views, std::si
   for (std::size_t index = 0; index < images; ++index) {
     const BoardShot shot = make_board_capture_parameters(scene, views, index);
     std::map<int, TagDetection::Corners> truth;
-    for (const auto& [tag, corner, pixel] : find_true_corners_in_image(scene, renderer, shot)) {
+    for (const auto& [tag, corner, pixel] :
+         project_scene_corners_into_image(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
     }
     const cv::Mat image = simulate_sensor_image(

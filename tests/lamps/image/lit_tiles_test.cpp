@@ -31,7 +31,7 @@ int count(const TileMask& tiles) {
   return count;
 }
 
-TEST(FindBrightTiles, DetectsLightsOfTwoConsecutiveRows) {
+TEST(FindBrightTiles, DetectsLightsTwoPixelRowsHigh) {
   for (const int depth : {CV_8U, CV_16U}) {
     for (int y = 0; y + 2 <= 200; ++y) {
       for (const int x : {0, 63, 64, 130, 255, 256, 299}) {

@@ -375,7 +375,7 @@ bool on_another_machine(const Action& action) {
 }
 
 /// Two machines that share the folder, with different records at the same path.
-TEST(Spool, DoesNotDeliverToOtherMachinesDatabase) {
+TEST(Spool, LeavesRunsQueuedByAnotherMachineInSharedFolder) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   { const Records made(where); }
