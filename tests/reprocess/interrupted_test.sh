@@ -20,6 +20,7 @@ for moment in '*/work/*/steps/corners/*.txt' '*/work/*/rotated.yaml' '*/sessions
   patiently 60 another "$moment"
   kill -9 -- -$!
   wait $! 2>/dev/null || true
+  patiently 5 flock --nonblock "$results/.state/lock" true  # killed processes may end a moment later
   [ ! -e "$results/summary.csv" ] || fail "killed too late"
   # Every session that exists is complete.
   for session in "$results"/sessions/*/* "$results"/failed/*/*; do
