@@ -18,7 +18,7 @@ namespace vlp {
 struct ReadoutDirectionEvidence {
   /// Evidence that the shutter reads rows, and that it reads columns; dimensionless, larger is
   /// stronger. Each is the sum, over the modulated lights detected with this direction, of
-  /// periodicity times contrast times roundness. These factors are 0 to 1.
+  /// periodicity times contrast times Light::inlier_fraction. These factors are 0 to 1.
   double rows = 0, columns = 0;
 
   /// Returns the readout direction with the larger evidence. Returns std::nullopt if this evidence

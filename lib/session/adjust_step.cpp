@@ -23,7 +23,7 @@
 namespace vlp {
 namespace {
 
-/// Returns the spot of each image of a rotation in place: one spot per height.
+/// Returns the pivot of each image of a rotation in place: one pivot per height.
 std::map<std::string, std::string> find_pivot_of_images(const AdjustSet& set,
                                                         const AdjustStepInput& input,
                                                         AdjustStepResult& result) {

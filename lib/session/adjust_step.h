@@ -25,7 +25,7 @@ struct AdjustSet {
   bool is_in_place_rotation = false;
 };
 
-/// Replaces the names of sets that share one name by their paths, because a spot is identified by
+/// Replaces the names of sets that share one name by their paths, because a pivot is identified by
 /// the name of its set. `paths` are in the order of `sets`. Throws std::invalid_argument if a path
 /// occurs twice.
 void replace_duplicate_set_names_by_paths(std::vector<AdjustSet>& sets,

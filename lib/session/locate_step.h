@@ -27,7 +27,7 @@ struct LocateInput {
   LampMap lamps;
   Calibration calibration;
   /// Rows of captures.csv, by image name. Times, motions and inclinations are always used. Heights
-  /// and yaws are used only with `one_lamp` or `height_sd_m`.
+  /// and yaws are used only with `allow_single_lamp` or `height_sd_m`.
   CapturesTable captures = {};
   PositionerOptions positioner_options = {};
   /// Standard deviation of the lamp positions in the image, per axis; overrides that of the

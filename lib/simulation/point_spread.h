@@ -26,7 +26,7 @@ struct SpreadWindow {
 ///   - a Gaussian (Optics::blur_px), and a disc of defocus (Defocus), whose radius is interpolated
 ///     between discs of whole multiples of 0.5 px;
 ///   - a halo, a Gaussian into which a smear (LensSmear) scatters a fraction of the light;
-///   - a veil (Optics::veil): a fraction of the light of the whole scene, spread evenly.
+///   - a veil (Optics::veiling_glare): a fraction of the light of the whole scene, spread evenly.
 /// Edges are replicated outside the image.
 class PointSpread {
  public:

@@ -115,7 +115,7 @@ Eigen::Matrix2d d_undistorted_pixel_d_pixel(const Lens& lens, const Lens::Ray& r
          ray.direction.z();
 }
 
-/// Key of a known position that captures have in common: their spot, or the position itself.
+/// Key of a known position that captures have in common: their pivot, or the position itself.
 using PlaceKey = std::tuple<std::string, double, double, double, MeasuredPoint>;
 
 /// Lamps of a capture that the map has, in the order of their detections.
@@ -643,7 +643,7 @@ void set_adjusted_rotation_center(const AdjustmentProblem& problem,
 }
 
 /// Sets the joint covariance of intrinsics (from the directions of the lens), zenith, lever arm and
-/// lamps, without the spots. The one for the surveyed map excludes the lamps.
+/// lamps, without the pivots. The one for the surveyed map excludes the lamps.
 void set_adjusted_joint_covariance(const AdjustmentProblem& problem,
                                    const Eigen::MatrixXd& covariance, bool has_lever_arm,
                                    AdjustmentResult& result) {

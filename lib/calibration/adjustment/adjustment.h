@@ -22,13 +22,13 @@
 /// velocity u and yaw rate w. A lamp that is read out at time t after the middle of the image is
 /// then at
 ///   Rz(-w t) (Rz(-g) (P - S) - u t)
-/// in place of Rz(-g) (P - S). On a spot, the yaw rate applies in the same way.
+/// in place of Rz(-g) (P - S). At a pivot, the yaw rate applies in the same way.
 ///
 /// Unknowns:
 ///   - zenith, lever arm e, positions of the lamps
 ///   - intrinsics, within their covariance
-///   - an axis A per spot
-///   - per capture a pose (on a spot: a yaw), with u and w if they are not known exactly
+///   - an axis A per pivot
+///   - per capture a pose (at a pivot: a yaw), with u and w if they are not known exactly
 ///
 /// Observations:
 ///   - lamp centers with their sigma_px
@@ -45,7 +45,7 @@ struct KnownPosition {
   Eigen::Vector2d xy_m;
   std::optional<double> z_m;
   /// Standard deviation of each coordinate; positive. A position that is measured once counts once:
-  /// captures of one spot, or with identical positions, have the same error.
+  /// captures of one pivot, or with identical positions, have the same error.
   double sd_m;
 };
 
@@ -55,11 +55,11 @@ struct AdjustmentCapture {
   std::string name;
   std::vector<Detection> detections;
   std::optional<Inclination> inclination = {};
-  /// Name of the spot. Captures of one spot rotate about one axis at one height; empty: the capture
-  /// has a position of its own.
+  /// Name of the pivot. Captures of one pivot rotate about one axis at one height; empty: the
+  /// capture has a position of its own.
   std::string pivot = {};
   std::optional<KnownPosition> known_position = {};
-  /// Motion of the camera; on a spot only the yaw rate is used. Requires row time and readout
+  /// Motion of the camera; at a pivot only the yaw rate is used. Requires row time and readout
   /// direction of the camera.
   KnownMotion motion = {};
 };
@@ -127,7 +127,7 @@ struct AdjustmentResult {
 
   /// Known position of the camera or of the axis, with its residual after the adjustment.
   struct PositionResidual {
-    /// Name of the spot, or of the first capture with this position.
+    /// Name of the pivot, or of the first capture with this position.
     std::string name;
     MeasuredPoint measured_point;
     /// Number of captures with this position.

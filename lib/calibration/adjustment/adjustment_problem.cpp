@@ -135,7 +135,7 @@ CapturePose compute_capture_pose(const Eigen::VectorXd& state, const AdjustmentL
   return camera;
 }
 
-/// Returns the factor of the lever arm in a known position. On a spot the position of the capture
+/// Returns the factor of the lever arm in a known position. At a pivot the position of the capture
 /// is the axis', elsewhere the camera's.
 double arm_factor(const AdjustmentProblem::PositionObservation& place,
                   const AdjustmentProblem::Capture& capture) {

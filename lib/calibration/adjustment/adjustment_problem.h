@@ -27,8 +27,8 @@ struct AdjustmentLayout {
   Eigen::Index zenith = 0;
   /// Index of the lever arm (x, y) in the level frame, m.
   Eigen::Index lever_arm = 0;
-  /// Indices of the positions of the lamps and of the spots, in the world, m. Each has three
-  /// coordinates; those of a spot are x, y of the axis and z of the camera.
+  /// Indices of the positions of the lamps and of the pivots, in the world, m. Each has three
+  /// coordinates; those of a pivot are x, y of the axis and z of the camera.
   Eigen::Index lamps = 0, pivots = 0;
   /// Number of global unknowns, and index of the first local unknown.
   Eigen::Index global = 0;
@@ -79,14 +79,14 @@ class AdjustmentProblem {
   };
   /// Capture with the location of its local unknowns.
   struct Capture {
-    /// Index of the spot of the capture; std::nullopt if the capture has a position of its own.
+    /// Index of the pivot of the capture; std::nullopt if the capture has a position of its own.
     std::optional<std::size_t> pivot;
     /// Rotation from the level frame to the frame of the base.
     Eigen::Matrix3d base_from_level;
-    /// Motion of the camera; on a spot only the yaw rate is used.
+    /// Motion of the camera; at a pivot only the yaw rate is used.
     KnownMotion motion = {};
-    /// Index of its first local unknown. The local unknowns are (X, Y, Z, yaw), or only the yaw on
-    /// a spot. Velocity and yaw rate follow if these are not known exactly.
+    /// Index of its first local unknown. The local unknowns are (X, Y, Z, yaw), or only the yaw at
+    /// a pivot. Velocity and yaw rate follow if these are not known exactly.
     Eigen::Index local = 0;
 
     bool is_velocity_estimated() const { return !pivot && motion.velocity_sd_m_per_s > 0; }

@@ -96,7 +96,7 @@ struct DispersionFit {
 ///
 /// A level camera with yaw g_k has its lamps at height H_k above it. If its normalized points are
 /// too large by delta, and reference point or map have an error m, then
-///   fix_k - station = -H_k e^{j g_k} delta + m
+///   fix_k - reference = -H_k e^{j g_k} delta + m
 ///
 /// Method `chen_guan` assumes m = 0. The center D of the circle gives offset_px = -f e^{-jg} D / H.
 /// The offset is corrected until the circle of the recomputed fixes is centered at the reference
@@ -104,7 +104,8 @@ struct DispersionFit {
 /// and the rotation by the yaw, which the paper omits.
 ///
 /// Method `camera` estimates offset_px = f delta and m. The fixes are recomputed with the offset as
-/// in level_from_camera(), so that the model is exact. Each fix is weighted by its covariance.
+/// in compute_level_from_camera_matrix(), so that the model is exact. Each fix is weighted by its
+/// covariance.
 ///
 /// Fixes beyond five standard deviations, from the median of the residuals, are rejected. An
 /// existing dispersion of `calibration` is ignored.

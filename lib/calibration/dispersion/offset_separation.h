@@ -32,9 +32,9 @@ struct OffsetSeparation {
   std::vector<bool> used;
 };
 
-/// Estimates offset and world error by Gauss-Newton iterations on fix_k(offset) - station - world.
-/// Differentiates the fixes numerically. Starts with Cauchy weights, then uses plain least squares
-/// without outliers (kFixOutlierSigmas).
+/// Estimates offset and world error by Gauss-Newton iterations on
+/// fix_k(offset) - reference - world. Differentiates the fixes numerically. Starts with Cauchy
+/// weights, then uses plain least squares without outliers (kFixOutlierSigmas).
 ///
 /// Returns std::nullopt if the captures do not determine the unknowns, or if the iterations do not
 /// converge.

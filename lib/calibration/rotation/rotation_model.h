@@ -16,7 +16,7 @@ struct RotationFix {
   Pose pose;
   /// Mean height of the detected lamps above the camera, m. Only lamps of the map count.
   double height_m;
-  /// Index of the spot, at which the rotation axis stays at one position.
+  /// Index of the pivot, at which the rotation axis stays at one position.
   std::size_t pivot;
 };
 

@@ -28,7 +28,7 @@ TagDetection make_empty_tag(int id) {
   return tag;
 }
 
-/// Moves tags that the board does not have to `foreign`, removes tags without all corners, and
+/// Moves tags that the board does not have to `foreign_tags`, removes tags without all corners, and
 /// sorts tags and points.
 void complete_detection(BoardDetection& seen, const std::set<int>& ids) {
   for (TagDetection& tag : std::exchange(seen.tags, {})) {

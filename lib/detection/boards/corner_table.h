@@ -23,7 +23,7 @@ namespace vlp {
 ///   image, corner, u_px, v_px              corner as in PointDetection::index; rows may also
 ///                                          be counted upwards (renumber_lattice_points())
 /// An image without corners has one row with its name only. Tags without all four corners are
-/// rejected. Tags that the board does not have are BoardDetection::foreign.
+/// rejected. Tags that the board does not have are BoardDetection::foreign_tags.
 ///
 /// @throws InputError with file and line, also for a repeated corner, and if too many corners are
 ///         outside the image (are_too_many_corners_outside_image())

@@ -23,7 +23,8 @@ class ReferencePointTable {
     stations_.reserve(max_stations);
   }
 
-  /// Returns the first station within the radius. A position without one becomes a new station.
+  /// Returns the first reference point within the radius. A position without one becomes a new
+  /// reference point.
   std::size_t find_or_insert(const Eigen::Vector3d& place_m) {
     std::size_t found = firsts_m_.size();
     // The ball around a position covers one or two cells along each axis.

@@ -75,7 +75,7 @@ struct Light {
   /// of a source in a reflector, much brighter inside than next to its outline.
   bool is_doubtful;
   /// True if the light is lit unevenly and its outline is a rim, see fit_rim_of_light(). Its
-  /// roundness is then the fraction of the ends of its lit scanlines that show the rim.
+  /// inlier_fraction is then that of the ends of its lit scanlines that show the rim.
   bool is_uneven;
   /// Width of the edge from 25 % to 75 % of the level, in pixels.
   double rise_px;

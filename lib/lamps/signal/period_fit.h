@@ -37,8 +37,8 @@ struct PeriodFit {
 ///
 /// whatever the shape of the light. The coefficients follow from least squares with the weights
 /// E(l), over scanlines where E exceeds 8 % of its maximum. A period longer than the lit scanlines
-/// fits most signals and cannot be excluded. Returns a fit with `unexplained` 1 if the scanlines do
-/// not determine the coefficients.
+/// fits most signals and cannot be excluded. Returns a fit with `unexplained_fraction` 1 if the
+/// scanlines do not determine the coefficients.
 PeriodFit fit_periodic_signal(const LineProfile& profile, double period_lines);
 
 /// Divides a profile by its envelope for this period, see fit_periodic_signal(). Returns one value

@@ -27,7 +27,7 @@ enum class GoldenCheckTime { first_image, verdict };
 ///
 /// Reasons: the golden unit
 /// - failed,
-/// - is due (StationConfig::verify_due),
+/// - is due (StationConfig::verification_interval),
 /// - was measured with another measuring setup (compute_measurement_settings_digest()),
 /// - was never measured here.
 ///
