@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// center_methods FOLDER: compares the errors of methods for lamp centers in a folder of rendered
-/// captures. The folder contains true_detections.csv; lamps.yaml and make_true_calibration.yaml are
+/// captures. The folder contains true_detections.csv; lamps.yaml and true_calibration.yaml are
 /// next to it. Lamps are those completely in view that our detector finds with and without the
 /// lens.
 #include <fmt/core.h>
