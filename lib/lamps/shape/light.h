@@ -37,8 +37,8 @@ enum class LightReason {
   incomplete        ///< cut by the image border, or too small for an outline
 };
 
-/// Light in an image. A formless light has only a box, with `pixel` at its center, and an outline;
-/// it has no stripes and no sigma.
+/// Light in an image. A light of kind no_outline has only a box, with `pixel` at its center, and
+/// the `outline` of its pixels; it has no stripes and no sigma.
 struct Light {
   LightKind kind;
   LightReason reason;
