@@ -348,7 +348,7 @@ Drawing make_error_cdf_plot_drawing(const CdfPlot& plot) {
           blocks + make_common_gnuplot_settings() + make_gnuplot_title_command(plot.title) +
               "set xlabel 'horizontal error (mm)" + beyond +
               "'\n"
-              "set ylabel 'share of fixes no further off (%)'\n"
+              "set ylabel 'fixes with at most this error (%)'\n"
               "set key vertical maxrows " +
               std::to_string(plot.curves.size()) + "\nset xrange " +
               format_gnuplot_range(0, 1e3 * margin * range_m) +
