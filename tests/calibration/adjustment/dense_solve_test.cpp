@@ -40,8 +40,8 @@ Survey small_survey(double map_sd_m, bool lens, Random& random) {
   return survey;
 }
 
-/// Reference solution. Unknowns: lens (whitened), zenith, lever arm, lamps; per spot the axis and
-/// the height of its camera; per capture the yaw, preceded by its position if it is on no spot.
+/// Reference solution. Unknowns: lens (whitened), zenith, lever arm, lamps; per pivot the axis and
+/// the height of its camera; per capture the yaw, preceded by its position if it is at no pivot.
 class DenseAdjustment {
  public:
   explicit DenseAdjustment(const Survey& survey) : input_(survey.input) {
@@ -258,7 +258,7 @@ INSTANTIATE_TEST_SUITE_P(Adjustment, RunBundleAdjustmentReference,
                                          Known{"RefinedMapAndLens", 2e-3, true}),
                          [](const auto& one) { return one.param.name; });
 
-/// Problem with a free lens, two lamps, a capture on a spot, and a moving capture of a tilted
+/// Problem with a free lens, two lamps, a capture at a pivot, and a moving capture of a tilted
 /// robot.
 class AdjustmentDerivatives : public testing::Test {
  protected:

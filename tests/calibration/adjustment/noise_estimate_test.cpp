@@ -23,9 +23,9 @@ struct PlaceCase {
   /// Standard deviation of the known positions; 0: no position is known.
   double position_sd_m;
   bool has_height;
-  /// Captures rotate in place, three per spot; otherwise each has a position of its own.
+  /// Captures rotate in place, three per pivot; otherwise each has a position of its own.
   bool on_spots;
-  /// Known positions are those of the rotation axis instead of the camera; on spots only.
+  /// Known positions are those of the rotation axis instead of the camera; at pivots only.
   MeasuredPoint of;
   std::optional<double> reported_sigma_px;
 };
@@ -62,7 +62,7 @@ Survey make_survey(const PlaceCase& variant, Random& random) {
                 capture.detections.end());
     capture.detections.resize(4);
   }
-  // The position error is independent per capture, or per spot for captures on spots.
+  // The position error is independent per capture, or per pivot for captures at pivots.
   survey.add_noise(random, true, true, true);
   for (auto& capture : survey.input.captures) {
     if (capture.known_position && !variant.has_height) capture.known_position->z_m.reset();

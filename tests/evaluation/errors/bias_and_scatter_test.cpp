@@ -12,7 +12,8 @@
 namespace vlp {
 namespace {
 
-/// Two stations with biases of 3 mm and -3 mm along x and fixes 4 mm to either side along y.
+/// Two reference points with biases of 3 mm and -3 mm along x and fixes 4 mm to either side along
+/// y.
 TEST(ComputeBiasAndRepeatability, ReturnsTrueBiasAndScatterOfEachReferencePoint) {
   std::vector<FixError> errors;
   for (const std::size_t station : {0U, 1U}) {
@@ -20,7 +21,7 @@ TEST(ComputeBiasAndRepeatability, ReturnsTrueBiasAndScatterOfEachReferencePoint)
       errors.push_back({errors.size(), {station == 0 ? 3e-3 : -3e-3, side}, {}, {}, station, 0});
     }
   }
-  errors.push_back({4, {1, 1}, {}, {}, 2, 0});  // alone at its station
+  errors.push_back({4, {1, 1}, {}, {}, 2, 0});  // alone at its reference point
   const auto statistics = compute_bias_and_repeatability(errors, {{"a", {5, 6}, {}, {}}});
   ASSERT_TRUE(statistics);
   ASSERT_EQ(statistics->reference_points.size(), 2);

@@ -20,8 +20,8 @@ struct Errors {
   std::vector<std::size_t> clusters;
 };
 
-/// Draws horizontal errors: x and y each have a bias per station and independent noise, both
-/// normal.
+/// Draws horizontal errors: x and y each have a bias per reference point and independent noise,
+/// both normal.
 Errors draw(std::size_t stations, std::size_t captures, double bias, double scatter,
             Random& random) {
   Errors errors;
