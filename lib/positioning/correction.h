@@ -23,9 +23,9 @@ enum class Correction { none, rotation, dispersion, all };
 ///                     the rotation that takes (offset_px / f, 1) to +Z;
 ///   D otherwise:      the shear that takes z to z - offset_px / f  (eq. 12, 13, with the factor
 ///                     f / H that they lack).
-/// @throws std::invalid_argument if `correction` is rotation or dispersion and that part is missing;
-///     if a part, selected or not, has values that are not finite; if the zenith is not in front of
-///     the camera
+/// @throws std::invalid_argument if `correction` is rotation or dispersion and that part is
+///     missing; if a part, selected or not, has values that are not finite; if the zenith is not in
+///     front of the camera
 Eigen::Matrix3d compute_level_from_camera_matrix(const Calibration& calibration,
                                                  Correction correction);
 

@@ -77,8 +77,9 @@ TEST(SharedLibrary, ExportsOnlySymbolsDeclaredInPublicHeaders) {
   }
   for (const char* function :
        {"vlp::Positioner::compute_position_fix", "vlp::read_calibration", "vlp::read_lamp_map",
-        "vlp::describe", "vlp::InputError::InputError", "vlp::LampDetector::LampDetector",
-        "vlp::LampDetector::detect", "vlp_open", "vlp_detect", "vlp_locate"}) {
+        "vlp::describe_fix_status", "vlp::InputError::InputError",
+        "vlp::LampDetector::LampDetector", "vlp::LampDetector::detect_lamps", "vlp_open",
+        "vlp_detect", "vlp_locate"}) {
     EXPECT_THAT(functions, testing::Contains(function));
   }
 }
