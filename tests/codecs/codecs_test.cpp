@@ -49,7 +49,12 @@ cv::Mat make_random_image(int type) {
 TEST(DecodeGrayImage, MatchesOpencvForAllFormats) {
   for (const int type : {CV_8UC1, CV_16UC1, CV_8UC3, CV_16UC3, CV_8UC4, CV_16UC4}) {
     for (const char* ending : {".png", ".tiff", ".jpg", ".bmp", ".pgm", ".ppm"}) {
-      std::string bytes = get_codecs().encode_image_file(ending, make_random_image(type), {});
+      const cv::Mat image = make_random_image(type);
+      const int channels = std::string(ending) == ".pgm"   ? 1
+                           : std::string(ending) == ".ppm" ? 3
+                                                           : 0;
+      if (channels > 0 && image.channels() != channels) continue;
+      std::string bytes = get_codecs().encode_image_file(ending, image, {});
       const cv::Mat expected = get_codecs().decode_image(bytes, kGray);
       const cv::Mat decoded = decode_gray_image(bytes);
       ASSERT_FALSE(expected.empty()) << ending << type;
