@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <csetjmp>
+#include <cstddef>
 #include <cstring>
 #include <opencv2/core.hpp>
 #include <string_view>
@@ -76,6 +77,7 @@ extern "C" __attribute__((visibility("default"))) bool vlp_decode_gray_png(std::
   vlp::PngDecoder decoder(bytes);
   if (!decoder.read_header(image)) return false;
   std::vector<png_bytep> rows;
+  rows.reserve(static_cast<std::size_t>(image.rows));
   for (int row = 0; row < image.rows; ++row) rows.push_back(image.ptr(row));
   return decoder.read_rows(rows.data());
 }

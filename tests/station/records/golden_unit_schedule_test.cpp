@@ -264,7 +264,7 @@ TEST_F(ComputeMeasurementSettingsDigest, ChangesWithSettingsThatAffectMeasuremen
   is_new("station.yaml", "gates: {check_mean_mm: 0.5}", "gates: {check_mean_mm: 0.6}");
   is_new("station.yaml", "camera_id: golden", "camera_id: other");
   is_new("station.yaml", "captures: captures",
-         "captures: captures\ndispersion_station_m: [0, 0.001]");
+         "captures: captures\ndispersion_position_m: [0, 0.001]");
   is_new("station.yaml", "captures: captures",
          "captures: captures\n"
          "guard_bands: {k: 2, standard_uncertainties: {check_mean_mm: 0.02}}");
