@@ -78,7 +78,7 @@ class Intake : public SmallStation {
     Reasons reasons;
     const json runs = json::parse(TemporaryFolder::read_content(file));
     for (const json& image : runs.at(0).at("images")) {
-      const std::string refused = image.at("refused");
+      const std::string refused = image.at("rejection");
       if (refused.empty()) continue;
       reasons[image.at("step").get<std::string>() + "/" + image.at("image").get<std::string>()] =
           refused;
