@@ -64,7 +64,7 @@ struct Functions {
   decltype(&level_rotation_from_inclination) from_inclination = &level_rotation_from_inclination;
   decltype(&level_rotation_from_zenith) from_zenith = &level_rotation_from_zenith;
   decltype(&level_point_from_world) from_world = &level_point_from_world;
-  std::string_view (*name_of_lens)(LensModel) = &to_string;
+  std::string_view (*name_of_lens)(LensModel) = &lens_model_name;
   FromName* lens_from_name = &lens_model_from_name;
   decltype(&list_lens_model_names) lens_names = &list_lens_model_names;
   decltype(&num_lens_parameters) parameters = &num_lens_parameters;
@@ -76,9 +76,9 @@ struct Functions {
   decltype(&list_adjustment_parameter_names) names = &list_adjustment_parameter_names;
   decltype(&read_calibration) read = &read_calibration;
   decltype(&write_calibration) write = &write_calibration;
-  decltype(&level_from_camera) from_camera = &level_from_camera;
-  std::string_view (*name_of_status)(FixStatus) = &to_string;
-  decltype(&describe) explanation = &describe;
+  decltype(&compute_level_from_camera_matrix) from_camera = &compute_level_from_camera_matrix;
+  std::string_view (*name_of_status)(FixStatus) = &fix_status_name;
+  decltype(&describe_fix_status) explanation = &describe_fix_status;
   Fix (Positioner::*locate)(Seen,
                             const Sensors&) const noexcept = &Positioner::compute_position_fix;
   Fix (Positioner::*locate_together)(Seen, const Sensors&, std::span<const EarlierFrame>)
