@@ -97,7 +97,7 @@ int calibrate(int argc, char** argv) {
       },
       "Read requests from stdin, one line of JSON for each session; see apps/vlp-calibrate.md. "
       "Excludes all other arguments");
-  app.footer("Gates:\n" + describe_available_gates(list_session_metric_kinds()));
+  app.footer("Gates:\n" + describe_metrics(list_session_metric_kinds()));
   return parse_arguments_and_run(app, argc, argv, [&] { run(options); });
 }
 

@@ -337,6 +337,6 @@ int main(int argc, char** argv) {
       vlp::kName);
   vlp::Options options;
   vlp::add_options(app, options);
-  app.footer("Gates:\n" + vlp::describe_available_gates(vlp::list_evaluation_metric_kinds()));
+  app.footer("Gates:\n" + vlp::describe_metrics(vlp::list_evaluation_metric_kinds()));
   return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(app, options); });
 }

@@ -98,7 +98,7 @@ CLEAR = [
     "has a position that is not",
     "is a board of squares",
     "it names a folder",
-    "max_residual_share is",
+    "max_residual_fraction is",
     "of the camera on the robot is",
     "of UTF-8 are one",
     "is a folder",

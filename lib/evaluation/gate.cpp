@@ -67,7 +67,7 @@ std::optional<double> CheckedMetric::conformance_probability() const {
   return std::erfc(-room / guard_band->standard_uncertainty / std::numbers::sqrt2) / 2;
 }
 
-std::string describe_available_gates(const std::vector<MetricKind>& known) {
+std::string describe_metrics(const std::vector<MetricKind>& known) {
   std::size_t width = 0;
   for (const MetricKind& kind : known) width = std::max(width, std::string(kind.name).size());
   std::string text;

@@ -58,7 +58,7 @@ struct CheckedMetric {
 };
 
 /// Describes the metrics and what each requires, one line each, for humans.
-std::string describe_available_gates(const std::vector<MetricKind>& known);
+std::string describe_metrics(const std::vector<MetricKind>& known);
 
 /// Parses "NAME=VALUE".
 /// @throws std::invalid_argument with the valid names, if no kind has the name

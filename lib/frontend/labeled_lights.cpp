@@ -23,7 +23,7 @@ bool may_be_lamp(const Light& light, const std::array<int, 2>& size_px) {
 
 }  // namespace
 
-const Light* find_light_at_pixel(const Observation& image, const Eigen::Vector2d& pixel) {
+const Light* find_light_near_pixel(const Observation& image, const Eigen::Vector2d& pixel) {
   constexpr double max_distance_fraction = 0.5;
   const Light* nearest = nullptr;
   for (const Light& light : image.lights) {
@@ -44,7 +44,7 @@ void add_labeled_lights(std::span<const Observation> images, const std::vector<F
     if (frame == frames.end() || !image.is_image_kept()) continue;
     for (const Detection& label : frame->second->detections) {
       ++labeled.num_labels;
-      if (const Light* light = find_light_at_pixel(image, label.pixel)) {
+      if (const Light* light = find_light_near_pixel(image, label.pixel)) {
         labeled.lights.push_back({label.lamp, light->stripes, number});
       } else {
         ++labeled.num_labels_without_light;
@@ -80,7 +80,8 @@ std::vector<LightPeriod> collect_light_periods(std::span<const Observation> imag
     const auto frame = frames.find(image.image_file_name());
     if (frame == frames.end()) continue;
     for (const Detection& label : frame->second->detections) {
-      if (const Light* light = find_light_at_pixel(image, label.pixel)) add(i, *light, label.lamp);
+      if (const Light* light = find_light_near_pixel(image, label.pixel))
+        add(i, *light, label.lamp);
     }
   }
   return periods;

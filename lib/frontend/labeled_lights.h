@@ -17,7 +17,7 @@ namespace vlp {
 /// Finds the light at the pixel (u, v) of a label. It is the nearest modulated light that is
 /// completely in view and whose center is within half its radius of `pixel`. Returns nullptr if
 /// there is none.
-const Light* find_light_at_pixel(const Observation& image, const Eigen::Vector2d& pixel);
+const Light* find_light_near_pixel(const Observation& image, const Eigen::Vector2d& pixel);
 
 /// Lights to which a table of labels assigns a lamp id, accumulated over folders by
 /// add_labeled_lights(). Covers only images that are not rejected; lights without a label are

@@ -67,13 +67,13 @@ void mirror_observations(FrameObservations& frame) {
 
 /// Returns the residual limit in z. The RMS radii of the lamps in z and on the floor plan give the
 /// scale, since the fix may be wrong.
-double compute_residual_limit(const FrameObservations& frame, double max_residual_share) {
+double compute_residual_limit(const FrameObservations& frame, double max_residual_fraction) {
   const double spread = compute_rms_radius(frame.observations_span(),
                                            [](const Sighting& sighting) { return sighting.z; });
   const double spread_m = compute_rms_radius(
       frame.observations_span(),
       [](const Sighting& sighting) { return Eigen::Vector2d(sighting.lamp_m.head<2>()); });
-  return std::min(max_residual_share * spread,
+  return std::min(max_residual_fraction * spread,
                   kMaxNeighborFraction * find_nearest_lamp_distance_m(frame) * spread / spread_m);
 }
 
@@ -88,10 +88,10 @@ ConsistentFix estimate_pose_of_mirrored_map(FrameObservations& frame, double lim
 /// Returns the fix of the majority if the reported noise explains only this one, else the fix of
 /// all lamps.
 ConsistentFix recheck_with_noise_threshold(FrameObservations& frame, const ConsistentFix& all,
-                                           double max_residual_share) {
+                                           double max_residual_fraction) {
   const double excess = compute_reduced_chi_squared(all.fix.chi_squared, frame.size);
   const ConsistentFix mirrored =
-      estimate_pose_of_mirrored_map(frame, compute_residual_limit(frame, max_residual_share));
+      estimate_pose_of_mirrored_map(frame, compute_residual_limit(frame, max_residual_fraction));
   if (mirrored.status == FixStatus::ok &&
       kClearGain * compute_reduced_chi_squared(mirrored.fix.chi_squared, frame.size) < excess) {
     return {FixStatus::mirrored_map, {}};
@@ -104,7 +104,7 @@ ConsistentFix recheck_with_noise_threshold(FrameObservations& frame, const Consi
   FrameObservations agreeing = frame;
   agreeing.keep_only_selected_observations(majority->inliers);
   const ConsistentFix solution = estimate_and_check_pose(
-      agreeing.observations_span(), compute_residual_limit(agreeing, max_residual_share));
+      agreeing.observations_span(), compute_residual_limit(agreeing, max_residual_fraction));
   const double remaining = compute_reduced_chi_squared(solution.fix.chi_squared, agreeing.size);
   const bool explains = solution.status == FixStatus::ok && remaining < kMaxReducedChiSquared &&
                         kClearGain * remaining < excess;
@@ -115,13 +115,13 @@ ConsistentFix recheck_with_noise_threshold(FrameObservations& frame, const Consi
 
 }  // namespace
 
-ConsistentFix estimate_pose_robust(FrameObservations& frame, double max_residual_share) {
-  const double limit = compute_residual_limit(frame, max_residual_share);
+ConsistentFix estimate_pose_robust(FrameObservations& frame, double max_residual_fraction) {
+  const double limit = compute_residual_limit(frame, max_residual_fraction);
   const ConsistentFix all = estimate_and_check_pose(frame.observations_span(), limit);
   if (frame.size < 3) return all;
   if (all.status == FixStatus::ok) {
     return compute_reduced_chi_squared(all.fix.chi_squared, frame.size) > kMaxReducedChiSquared
-               ? recheck_with_noise_threshold(frame, all, max_residual_share)
+               ? recheck_with_noise_threshold(frame, all, max_residual_fraction)
                : all;
   }
   if (estimate_pose_of_mirrored_map(frame, limit).status == FixStatus::ok)
@@ -131,7 +131,7 @@ ConsistentFix estimate_pose_robust(FrameObservations& frame, double max_residual
   if (!majority) return all;
   frame.keep_only_selected_observations(majority->inliers);
   return estimate_and_check_pose(frame.observations_span(),
-                                 compute_residual_limit(frame, max_residual_share));
+                                 compute_residual_limit(frame, max_residual_fraction));
 }
 
 namespace {
@@ -221,10 +221,10 @@ double distance_from_ray(const BodyObservation& seen, const BodyProblem& problem
 }
 
 /// Returns the largest accepted distance of a lamp from its ray, in m.
-double compute_residual_limit(const BodyObservations& frame, double max_residual_share) {
+double compute_residual_limit(const BodyObservations& frame, double max_residual_fraction) {
   const double spread_m = compute_rms_radius(
       frame.observations_span(), [](const BodyObservation& seen) { return seen.lamp_m; });
-  return std::min(max_residual_share * spread_m,
+  return std::min(max_residual_fraction * spread_m,
                   kMaxNeighborFraction * find_nearest_lamp_distance_m(frame));
 }
 
@@ -318,9 +318,9 @@ std::optional<Agreeing> find_majority_if_level(const BodyObservations& frame,
 
 /// Computes the fix of a majority of the lamps, and removes the others from the frame.
 BodySolution estimate_body_from_majority(BodyObservations& frame, const BodyProblem& problem,
-                                         double max_residual_share) {
+                                         double max_residual_fraction) {
   const BodySolution none{FixStatus::inconsistent, {}};
-  const double limit_m = compute_residual_limit(frame, max_residual_share);
+  const double limit_m = compute_residual_limit(frame, max_residual_fraction);
   double latest_s = 0;
   for (const BodyObservation& seen : frame.observations_span()) {
     latest_s = std::max(latest_s, std::abs(seen.time_s));
@@ -399,9 +399,9 @@ std::optional<BodySolution> reject_moved_lamps(BodyObservations& frame, const Bo
 
 BodySolution estimate_body_state_robust(BodyObservations& frame,
                                         const Eigen::Vector3d& arm_in_body_m,
-                                        const BodyPrior& prior, double max_residual_share) {
+                                        const BodyPrior& prior, double max_residual_fraction) {
   const BodyProblem problem{arm_in_body_m, prior};
-  const double limit_m = compute_residual_limit(frame, max_residual_share);
+  const double limit_m = compute_residual_limit(frame, max_residual_fraction);
   const BodySolution all = estimate_body_state_from_all_lamps(frame, problem);
   if (frame.size < 3) return all;
   if (is_consistent(all, frame, problem, limit_m)) {
@@ -427,7 +427,7 @@ BodySolution estimate_body_state_robust(BodyObservations& frame,
     return {FixStatus::mirrored_map, {}};
   }
   if (frame.size < 4) return has_fix(all) ? BodySolution{FixStatus::inconsistent, {}} : all;
-  const BodySolution majority = estimate_body_from_majority(frame, problem, max_residual_share);
+  const BodySolution majority = estimate_body_from_majority(frame, problem, max_residual_fraction);
   if (majority.status == FixStatus::inconsistent && !has_fix(all)) return all;
   return majority;
 }

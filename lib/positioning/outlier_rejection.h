@@ -51,7 +51,7 @@ ConsistentFix estimate_and_check_pose(std::span<const Sighting> sightings, doubl
 /// Computes the fix of a frame with two lamps or more whose identities may be wrong.
 ///
 /// A lamp contradicts the fix if its residual exceeds one of two limits:
-///   `max_residual_share` times the RMS radius of all lamps in the image;
+///   `max_residual_fraction` times the RMS radius of all lamps in the image;
 ///   0.15 times the smallest distance from a lamp of the frame to its nearest lamp of the map,
 ///   which excludes confusion of neighbors.
 /// On a contradiction, with
@@ -65,7 +65,7 @@ ConsistentFix estimate_and_check_pose(std::span<const Sighting> sightings, doubl
 /// the mirror image fits a hundred times better, the status is `mirrored_map`. If all noise is
 /// reported, and explains the residuals of a majority a hundred times better, the other lamps are
 /// rejected.
-ConsistentFix estimate_pose_robust(FrameObservations& frame, double max_residual_share);
+ConsistentFix estimate_pose_robust(FrameObservations& frame, double max_residual_fraction);
 
 /// Estimates the state of a body that moves or is tilted, from a frame with at least two lamps. The
 /// identities of lamps may be wrong.
@@ -88,7 +88,7 @@ ConsistentFix estimate_pose_robust(FrameObservations& frame, double max_residual
 ///                 standard deviations
 BodySolution estimate_body_state_robust(BodyObservations& frame,
                                         const Eigen::Vector3d& arm_in_body_m,
-                                        const BodyPrior& prior, double max_residual_share);
+                                        const BodyPrior& prior, double max_residual_fraction);
 
 /// Lamps that are rejected, as indices in the frame: none, one or several.
 struct OutlierLamps {

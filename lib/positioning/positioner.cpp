@@ -151,7 +151,7 @@ class Positioner::Impl {
         mount_(options.mount.value_or(CameraMount{Eigen::Vector3d::Zero(), 0})),
         body_from_base_(rotation_about_z(mount_.yaw_in_robot_rad)),
         body_from_camera_(body_from_base_ * base_from_camera_),
-        max_residual_share_(options.max_residual_share),
+        max_residual_fraction_(options.max_residual_fraction),
         unstated_sigma_px_(options.unstated_sigma_px),
         computes_common_chi_squared_(options.computes_common_chi_squared),
         row_clock_(make_readout_clock(calibration.camera)) {
@@ -160,8 +160,8 @@ class Positioner::Impl {
     if (!(mount_.position_in_robot_m.allFinite() && std::isfinite(mount_.yaw_in_robot_rad))) {
       throw std::invalid_argument("the position of the camera on the robot is not finite");
     }
-    if (!(max_residual_share_ > 0))
-      throw std::invalid_argument("max_residual_share is not positive");
+    if (!(max_residual_fraction_ > 0))
+      throw std::invalid_argument("max_residual_fraction is not positive");
     if (!(unstated_sigma_px_ >= kMinSigma_px && unstated_sigma_px_ <= kMaxSigma_px)) {
       throw std::invalid_argument("unstated_sigma_px is not within 0.0001 and 1000");
     }
@@ -187,7 +187,7 @@ class Positioner::Impl {
       // If common errors are known, the noise alone must not reject lamps.
       const bool total = common_.are_lens_zenith_and_lamp_errors_known();
       if (total) frame.noise_is_stated = false;
-      ConsistentFix found = estimate_pose_robust(frame, max_residual_share_);
+      ConsistentFix found = estimate_pose_robust(frame, max_residual_fraction_);
       if (total) reject_outlier_lamps(frame, lean.level_from_base, found);
       const auto& [status, solution] = found;
       if (status != FixStatus::ok) return make_fix_without_pose(status, frame.unknown_lamps);
@@ -398,7 +398,7 @@ class Positioner::Impl {
     if (common_.are_lens_zenith_and_lamp_errors_known()) frame.noise_is_stated = false;
     const Eigen::Vector3d& arm_m = mount_.position_in_robot_m;
     const auto [status, solution] =
-        estimate_body_state_robust(frame, arm_m, prior, max_residual_share_);
+        estimate_body_state_robust(frame, arm_m, prior, max_residual_fraction_);
     if (status != FixStatus::ok) return make_fix_without_pose(status, fix.unknown_lamps);
     fix.status = status;
     fix.redundancy = solution.redundancy;
@@ -496,7 +496,7 @@ class Positioner::Impl {
   CameraMount mount_;
   /// The base is the camera's level frame.
   Eigen::Matrix3d body_from_base_, body_from_camera_;
-  double max_residual_share_;
+  double max_residual_fraction_;
   double unstated_sigma_px_;
   bool computes_common_chi_squared_;
   /// std::nullopt if the calibration lacks row time or readout direction.

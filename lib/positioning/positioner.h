@@ -34,7 +34,7 @@ struct PositionerOptions {
   /// inconsistent if the residual of one exceeds it, or if it is too close to another lamp
   /// (estimate_pose_robust). Noise, lens and an uncorrected tilt of 5 degrees cause residuals of
   /// 0.05 or less.
-  double max_residual_share = 0.1;
+  double max_residual_fraction = 0.1;
   /// Standard deviation per axis, in the image, of detections without sigma_px. It scales the
   /// covariance and decides if lamps close together are `degenerate`. Poses do not depend on it,
   /// unless motion, inclination or height is known with a standard deviation.

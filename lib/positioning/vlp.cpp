@@ -48,7 +48,8 @@ PositionerOptions convert_options(const vlp_options& options) {
   if (options.has_mount != 0) {
     result.mount = CameraMount{Eigen::Vector3d(options.mount_position_m), options.mount_yaw_rad};
   }
-  if (options.max_residual_share != 0) result.max_residual_share = options.max_residual_share;
+  if (options.max_residual_fraction != 0)
+    result.max_residual_fraction = options.max_residual_fraction;
   if (options.unstated_sigma_px != 0) result.unstated_sigma_px = options.unstated_sigma_px;
   return result;
 }

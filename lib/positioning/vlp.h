@@ -53,8 +53,8 @@ typedef struct vlp_options {
   int32_t has_mount;
   double mount_position_m[3];
   double mount_yaw_rad;
-  /* PositionerOptions::max_residual_share; 0: 0.1. */
-  double max_residual_share;
+  /* PositionerOptions::max_residual_fraction; 0: 0.1. */
+  double max_residual_fraction;
   /* Standard deviation per axis of detections without sigma_px, in pixels; 0: 1. */
   double unstated_sigma_px;
 } vlp_options;

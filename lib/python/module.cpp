@@ -151,12 +151,12 @@ Correction parse_correction(const std::string& name) {
 Positioner make_positioner(const LampMapFile& lamps, const Calibration& calibration,
                            const std::string& correction,
                            const std::optional<std::array<double, 4>>& mount,
-                           double unstated_sigma_px, double max_residual_share) {
+                           double unstated_sigma_px, double max_residual_fraction) {
   PositionerOptions options;
   options.correction = parse_correction(correction);
   if (mount) options.mount = CameraMount{{(*mount)[0], (*mount)[1], (*mount)[2]}, (*mount)[3]};
   options.unstated_sigma_px = unstated_sigma_px;
-  options.max_residual_share = max_residual_share;
+  options.max_residual_fraction = max_residual_fraction;
   return {lamps.map, calibration, options};
 }
 
@@ -541,7 +541,7 @@ void define_positioner(py::module_& m) {
   py::class_<Positioner>(m, "Positioner", "From identified lamps in an image to a position.")
       .def(py::init(&make_positioner), "lamp_map"_a, "calibration"_a, py::kw_only(),
            "correction"_a = "all", "mount"_a = py::none(), "unstated_sigma_px"_a = 1.0,
-           "max_residual_share"_a = 0.1,
+           "max_residual_fraction"_a = 0.1,
            "mount: (x, y, z, yaw) of the camera on the robot, whose fixes it then makes.")
       .def("locate", &locate, "lamps"_a, "pixels"_a, "sigma_px"_a = py::none(),
            "sensors"_a = Sensors(), py::kw_only(), "earlier"_a = std::vector<EarlierArrays>(),

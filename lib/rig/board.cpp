@@ -35,7 +35,7 @@ constexpr double kMaxPrintSd = 0.02;  // check_board_layout() detects larger err
 std::size_t find_word(const YamlValue& value, const auto& names, const std::string& introduction) {
   std::string list;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (value.read_yaml_text() == names[i]) return i;
+    if (value.read_yaml_string() == names[i]) return i;
     list += (i == 0 ? "" : ", ") + std::string(names[i]);
   }
   throw value.make_unknown_yaml_word_error(introduction + list);
@@ -75,7 +75,7 @@ Board read_squares(YamlMap& map, BoardKind kind) {
     throw marker.make_yaml_error("a marker is smaller than the square around it");
   }
   const YamlValue dictionary = map.get_required_yaml_value("dictionary");
-  board.family = dictionary.read_yaml_text();
+  board.family = dictionary.read_yaml_string();
   if (!board.family.starts_with("DICT_")) {
     throw dictionary.make_yaml_error(
         "should be one of OpenCV's dictionaries, such as DICT_5X5_100");
@@ -84,8 +84,8 @@ Board read_squares(YamlMap& map, BoardKind kind) {
     board.first_id = first->read_yaml_integer_within(0, kMaxId);
   }
   if (const auto top_left = map.get_optional_yaml_value("top_left")) {
-    board.top_left_white = top_left->read_yaml_text() == "white";
-    if (!board.top_left_white && top_left->read_yaml_text() != "black") {
+    board.top_left_white = top_left->read_yaml_string() == "white";
+    if (!board.top_left_white && top_left->read_yaml_string() != "black") {
       throw top_left->make_unknown_yaml_word_error("the colors of a square are: black, white");
     }
   }
@@ -117,8 +117,8 @@ Board read_kalibr_checkerboard(YamlMap& map) {
 /// from the bottom left.
 Board read_kalibr_target(YamlMap& map) {
   const YamlValue kind = map.get_required_yaml_value("target_type");
-  if (kind.read_yaml_text() == "checkerboard") return read_kalibr_checkerboard(map);
-  if (kind.read_yaml_text() != "aprilgrid") {
+  if (kind.read_yaml_string() == "checkerboard") return read_kalibr_checkerboard(map);
+  if (kind.read_yaml_string() != "aprilgrid") {
     throw kind.make_yaml_error("should be aprilgrid or checkerboard; from others no lens is found");
   }
   Board board{"tag36h11", 0, 0, 0, 0, 2, true, 0, {false, BoardCorner::bottom_left}};

@@ -19,13 +19,13 @@ namespace vlp {
 namespace {
 
 LensModel read_lens_model(const YamlValue& value) {
-  if (const auto model = lens_model_from_name(value.read_yaml_text())) return *model;
+  if (const auto model = lens_model_from_name(value.read_yaml_string())) return *model;
   throw value.make_unknown_yaml_word_error("the models are: " + list_lens_model_names());
 }
 
 Readout read_readout(const YamlValue& value) {
-  if (value.read_yaml_text() == "rows") return Readout::rows;
-  if (value.read_yaml_text() == "columns") return Readout::columns;
+  if (value.read_yaml_string() == "rows") return Readout::rows;
+  if (value.read_yaml_string() == "columns") return Readout::columns;
   throw value.make_unknown_yaml_word_error("the readout is along rows or columns");
 }
 
@@ -160,10 +160,10 @@ IntrinsicsReport read_intrinsics_report(YamlMap& map, std::size_t intrinsics) {
 RotationCenter read_rotation_center(YamlMap& map, std::size_t intrinsics) {
   RotationCenter center;
   const YamlValue model = map.get_required_yaml_value("model");
-  if (model.read_yaml_text() != "shift" && model.read_yaml_text() != "tilt") {
+  if (model.read_yaml_string() != "shift" && model.read_yaml_string() != "tilt") {
     throw model.make_unknown_yaml_word_error("the models are: shift, tilt");
   }
-  center.model = model.read_yaml_text() == "tilt" ? RotationModel::tilt : RotationModel::shift;
+  center.model = model.read_yaml_string() == "tilt" ? RotationModel::tilt : RotationModel::shift;
   center.center_px =
       Eigen::Vector2d(map.get_required_yaml_value("center_px").read_yaml_numbers(2).data());
   const YamlValue zenith = map.get_required_yaml_value("zenith_in_camera");
@@ -237,7 +237,7 @@ Adjustment::AdjustedLamp read_adjusted_lamp_position(YamlMap& map) {
 Adjustment read_adjustment(YamlMap& map, const Camera& camera) {
   Adjustment adjustment;
   for (const YamlValue& item : map.get_required_yaml_value("sets").read_yaml_list())
-    adjustment.sets.push_back(item.read_yaml_text());
+    adjustment.sets.push_back(item.read_yaml_string());
   adjustment.captures = map.get_required_yaml_value("captures").read_yaml_integer_within(1, kLarge);
   adjustment.detections =
       map.get_required_yaml_value("detections").read_yaml_integer_within(1, kLarge);
@@ -249,7 +249,7 @@ Adjustment read_adjustment(YamlMap& map, const Camera& camera) {
   const auto found = parameters.read_yaml_list();
   const auto names = list_adjustment_parameter_names(camera, adjustment);
   for (std::size_t i = 0; i < std::max(found.size(), names.size()); ++i) {
-    if (i >= found.size() || i >= names.size() || found[i].read_yaml_text() != names[i]) {
+    if (i >= found.size() || i >= names.size() || found[i].read_yaml_string() != names[i]) {
       // [FILE-4] `is missing in its place`, `there are more than these`
       throw parameters.make_yaml_error(
           "should be the lens model's, the zenith, the lever arm, the lamps: " +
@@ -262,15 +262,15 @@ Adjustment read_adjustment(YamlMap& map, const Camera& camera) {
 }
 
 HistoryEntry::Input read_history_input(YamlMap& map) {
-  return {map.get_required_yaml_value("file").read_yaml_text(),
-          map.get_required_yaml_value("sha256").read_yaml_text()};
+  return {map.get_required_yaml_value("file").read_yaml_string(),
+          map.get_required_yaml_value("sha256").read_yaml_string()};
 }
 
 HistoryEntry read_history_entry(YamlMap& map) {
-  return {map.get_required_yaml_value("part").read_yaml_text(),
-          map.get_required_yaml_value("program").read_yaml_text(),
-          map.get_required_yaml_value("version").read_yaml_text(),
-          map.get_required_yaml_value("options").read_yaml_text(),
+  return {map.get_required_yaml_value("part").read_yaml_string(),
+          map.get_required_yaml_value("program").read_yaml_string(),
+          map.get_required_yaml_value("version").read_yaml_string(),
+          map.get_required_yaml_value("options").read_yaml_string(),
           map.get_required_yaml_value("inputs").convert_yaml_mapping_list(read_history_input)};
 }
 
@@ -425,7 +425,7 @@ void emit_history(YAML::Emitter& out, const std::vector<HistoryEntry>& history) 
 
 Camera read_camera_from_yaml(YamlMap& map) {
   Camera camera;
-  camera.id = map.get_required_yaml_value("id").read_yaml_text();
+  camera.id = map.get_required_yaml_value("id").read_yaml_string();
   const YamlValue imager_px = map.get_required_yaml_value("imager_px");
   const auto imager = imager_px.read_yaml_list();
   if (imager.size() != 2) throw imager_px.make_yaml_error("should be [width, height]");

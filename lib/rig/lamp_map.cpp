@@ -88,7 +88,7 @@ LampMapFile read_lamps_and_room_names(const std::filesystem::path& file, const s
       throw item.make_yaml_error("has no key room, and lamps of room " + room +
                                  " are selected: state the room of each lamp");
     }
-    std::string room_name = lamp_room ? lamp_room->read_yaml_text() : "";
+    std::string room_name = lamp_room ? lamp_room->read_yaml_string() : "";
     const bool is_in_room = room.empty() || room_name == room;
     if (!lamp.sd_m) lamp.sd_m = sd_m;
     keys.check_all_yaml_keys_read();

@@ -55,7 +55,7 @@ LampShape read_lamp_shape_from_yaml(YamlMap& map) {
   LampShape shape;
   const auto word = map.get_optional_yaml_value("shape");
   if (word) {
-    const std::string name = word->read_yaml_text();
+    const std::string name = word->read_yaml_string();
     const auto* traits = std::ranges::find(kShapeTraits, name, &ShapeTraits::name);
     if (traits == kShapeTraits.end()) throw word->make_unknown_yaml_word_error(list_names(false));
     shape.kind = traits->kind;

@@ -226,9 +226,9 @@ void check_yaml_file_format(YamlMap& map, const std::string& format) {
     throw map.make_yaml_error(
         "key 'format' is missing: the file should begin with 'format: " + format + "'");
   }
-  if (found->read_yaml_text() != format) {
+  if (found->read_yaml_string() != format) {
     throw found->make_yaml_error("should be '" + format + "', not " +
-                                 quote_text_for_message(found->read_yaml_text()) +
+                                 quote_text_for_message(found->read_yaml_string()) +
                                  ": is it the right file?");
   }
 }
@@ -288,7 +288,7 @@ bool YamlValue::read_yaml_boolean() const {
   throw make_yaml_error("should be true or false, not " + describe_yaml_value(*node_));
 }
 
-std::string YamlValue::read_yaml_text() const {
+std::string YamlValue::read_yaml_string() const {
   if (node_->kind != YamlNode::Kind::scalar)
     throw make_yaml_error("should be text, not " + describe_yaml_value(*node_));
   return node_->text;

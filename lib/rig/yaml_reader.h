@@ -47,7 +47,7 @@ class YamlValue {
   double read_yaml_number_within(double min, double max, std::string_view unit) const;
   int read_yaml_integer_within(int min, int max) const;
   bool read_yaml_boolean() const;
-  std::string read_yaml_text() const;
+  std::string read_yaml_string() const;
   /// Returns a list of exactly `count` finite numbers. read_yaml_numbers_within() also checks each
   /// one as read_yaml_number_within() does.
   std::vector<double> read_yaml_numbers(std::size_t count) const;

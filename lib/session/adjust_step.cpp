@@ -29,16 +29,16 @@ std::map<std::string, std::string> find_pivot_of_images(const AdjustSet& set,
                                                         AdjustStepResult& result) {
   const RotationCaptures turn =
       find_in_place_rotation_captures(set.frames, input.lamps, input.calibration.camera);
-  std::map<std::string, std::string> spots;
+  std::map<std::string, std::string> pivots;
   if (turn.status != RotationStatus::ok) {
     result.warnings.push_back(fmt::format("{} is not treated as a rotation in place: {}", set.name,
                                           describe_rotation_status(turn.status)));
-    return spots;
+    return pivots;
   }
   for (const RotationCapture& capture : turn.captures) {
-    spots[capture.image] = fmt::format("height {}", capture.height + 1);
+    pivots[capture.image] = fmt::format("height {}", capture.height + 1);
   }
-  return spots;
+  return pivots;
 }
 
 std::optional<KnownPosition> make_known_place(const Capture& capture, const AdjustSet& set,
@@ -70,7 +70,7 @@ AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepRe
     }
     if (!report) report.emplace();
     report->covariance =
-        make_nominal_intrinsics_covariance(all.calibration.camera, *input.lens_sd_px);
+        compute_intrinsics_covariance_from_pixel_sd(all.calibration.camera, *input.lens_sd_px);
   }
   for (Lamp& lamp : all.lamps.lamps) {
     if (!lamp.sd_m) lamp.sd_m = input.map_sd_m;

@@ -41,8 +41,8 @@ struct AdjustStepInput {
   /// Standard deviations per axis, m, for lamps and for known positions without one of their own;
   /// std::nullopt: none.
   std::optional<double> map_sd_m, position_sd_m;
-  /// Standard deviation of a lens without a covariance (make_nominal_intrinsics_covariance()).
-  /// std::nullopt: such a lens is exact.
+  /// Standard deviation of a lens without a covariance
+  /// (compute_intrinsics_covariance_from_pixel_sd()). std::nullopt: such a lens is exact.
   std::optional<double> lens_sd_px = {};
   /// Motion of captures without velocity and yaw rate in captures.csv, and the standard deviation
   /// of the yaw rates in captures.csv (find_capture_motion()).

@@ -26,7 +26,7 @@ struct Tolerance {
   /// Standard deviation and largest residual of a light, as fractions of the spread of the lights.
   double sd_fraction, max_residual_fraction;
 };
-// 0.1 is what a positioner allows (PositionerOptions::max_residual_share).
+// 0.1 is what a positioner allows (PositionerOptions::max_residual_fraction).
 constexpr Tolerance kWithLens{0.03, 0.1}, kWithoutLens{0.1, 0.3};
 
 Lens make_nominal_lens(const std::array<int, 2>& size_px) {

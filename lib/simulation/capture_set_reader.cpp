@@ -217,7 +217,7 @@ BoardViews read_board_views(YamlMap& map) {
 }
 
 std::string read_folder(const YamlValue& value) {
-  const std::string folder = value.read_yaml_text();
+  const std::string folder = value.read_yaml_string();
   const auto plain = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
            c == '_';

@@ -413,7 +413,7 @@ cv::Mat1f FrameRenderer::render_board_in_electrons(const BoardShot& shot) const 
     const auto board_from_camera = [&](int line) {
       return shot.camera_from_board(part.exposure_part_middle_s(line)).inverse();
     };
-    add_shape_to_image(rays_, make_whole_image_window(rays_), board_from_camera, *pattern_,
+    add_shape_to_image(rays_, make_full_image_window(rays_), board_from_camera, *pattern_,
                        1.0 / part.count, supersampled, 2);
   }
   optics_.apply_point_spread(supersampled, {-rays_.image_margin_px(), -rays_.image_margin_px(), 2});

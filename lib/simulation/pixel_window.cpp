@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-PixelWindow make_whole_image_window(const PixelRays& rays) {
+PixelWindow make_full_image_window(const PixelRays& rays) {
   const int margin = rays.image_margin_px();
   return {-margin, rays.num_readout_lines() + margin, -margin, rays.pixels_per_line() + margin};
 }
@@ -38,7 +38,7 @@ PixelWindow compute_window_of_moving_object(const std::vector<Eigen::Vector3d>& 
     const Eigen::Isometry3d camera_from_world = motion.world_from_camera(time_s).inverse();
     for (const Eigen::Vector3d& point_m : outline_m) {
       const auto pixel = rays.camera_lens().project_point(camera_from_world * point_m);
-      if (!pixel) return make_whole_image_window(rays);
+      if (!pixel) return make_full_image_window(rays);
       const Eigen::Array2d at = rays.convert_pixel_to_readout_order(*pixel)
                                     .array()
                                     .max(-max_coordinate)
@@ -49,7 +49,7 @@ PixelWindow compute_window_of_moving_object(const std::vector<Eigen::Vector3d>& 
   }
   constexpr int bulge_px = 2;  // bulge of the outline between two points
   const int spare = rays.image_margin_px() + bulge_px;
-  const PixelWindow all = make_whole_image_window(rays);
+  const PixelWindow all = make_full_image_window(rays);
   return {std::max(all.line_begin, int(std::floor(lower[0])) - spare),
           std::min(all.line_end, int(std::ceil(upper[0])) + spare + 1),
           std::max(all.place_begin, int(std::floor(lower[1])) - spare),

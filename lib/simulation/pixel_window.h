@@ -30,7 +30,7 @@ struct PixelWindow {
 };
 
 /// Returns the window of the image and its margin.
-PixelWindow make_whole_image_window(const PixelRays& rays);
+PixelWindow make_full_image_window(const PixelRays& rays);
 
 /// Returns the window in which an object appears during the given part of the exposure while the
 /// camera moves, blur included. Returns the whole window if the lens does not describe the whole

@@ -82,7 +82,7 @@ Glow read_glow(YamlMap& map, const Room& room) {
   const YamlValue position = map.get_required_yaml_value("position_m");
   Glow glow{read_yaml_point(position), read_lamp_shape_from_yaml(map), 0, 1};
   if (!glow.shape.size_m) map.get_required_yaml_value("diameter_m");
-  glow.electron_rate_e_per_s = read_electron_rate(map, "electron_rate_e_per_s");
+  glow.electron_rate_e_per_s = read_yaml_electron_rate(map, "electron_rate_e_per_s");
   const Eigen::Array3d at = glow.position_m.array();
   if ((at < room.min_m.array()).any() || (at > room.max_m.array()).any()) {
     throw position.make_yaml_error("is outside the room");
@@ -147,7 +147,7 @@ Panel read_panel_edges(YamlMap& map) {
 
 Panel read_panel(YamlMap& map) {
   Panel panel = read_panel_edges(map);
-  panel.electron_rate_e_per_s = read_electron_rate(map, "electron_rate_e_per_s");
+  panel.electron_rate_e_per_s = read_yaml_electron_rate(map, "electron_rate_e_per_s");
   return panel;
 }
 

@@ -19,7 +19,7 @@ struct Room {
 };
 
 Eigen::Vector3d read_yaml_point(const YamlValue& value);
-double read_electron_rate(YamlMap& map, const std::string& key);
+double read_yaml_electron_rate(YamlMap& map, const std::string& key);
 /// Reads a list of two ascending numbers [min, max]. Throws InputError if one of them is outside
 /// `min` to `max`.
 std::pair<double, double> read_yaml_range(const YamlValue& value, double min, double max,

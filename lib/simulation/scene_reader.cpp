@@ -166,9 +166,9 @@ SceneBoard read_scene_board(YamlMap& map) {
   board.warp_m = Eigen::Vector2d(map.get_required_yaml_value("warp_m")
                                      .read_yaml_numbers_within(2, -max_warp_m, max_warp_m, "m")
                                      .data());
-  board.white_e_per_s = read_electron_rate(map, "white_e_per_s");
-  board.black_e_per_s = read_electron_rate(map, "black_e_per_s");
-  board.surround_e_per_s = read_electron_rate(map, "surround_e_per_s");
+  board.white_e_per_s = read_yaml_electron_rate(map, "white_e_per_s");
+  board.black_e_per_s = read_yaml_electron_rate(map, "black_e_per_s");
+  board.surround_e_per_s = read_yaml_electron_rate(map, "surround_e_per_s");
   try {
     BoardPattern{board};
   } catch (const std::invalid_argument& failure) {
@@ -199,7 +199,7 @@ Eigen::Vector3d read_yaml_point(const YamlValue& value) {
   return Eigen::Vector3d(value.read_yaml_numbers_within(3, -200, 200, "m").data());
 }
 
-double read_electron_rate(YamlMap& map, const std::string& key) {
+double read_yaml_electron_rate(YamlMap& map, const std::string& key) {
   return map.get_required_yaml_value(key).read_yaml_number_within(0, kLargest,
                                                                   "electrons per second");
 }
@@ -224,7 +224,7 @@ Scene read_scene_file(const std::filesystem::path& file) {
   scene.processing = document.convert_optional_yaml_mapping(
       "processing", [&](YamlMap& map) { return read_image_processing(map, scene.sensor); });
   scene.mount = document.get_required_yaml_value("mount").convert_yaml_mapping(read_mount);
-  scene.ambient_e_per_s = read_electron_rate(document, "ambient_e_per_s");
+  scene.ambient_e_per_s = read_yaml_electron_rate(document, "ambient_e_per_s");
   if (const auto lamps = document.get_optional_yaml_value("lamps"))
     scene.lamps = read_scene_lamps(*lamps, room);
   if (const auto clutter = document.get_optional_yaml_value("clutter")) {

@@ -23,7 +23,7 @@ constexpr int kMany = 10'000;
 
 /// Returns the path in a value.
 fs::path resolve_path(const YamlValue& value, const fs::path& file) {
-  const fs::path path = value.read_yaml_text();
+  const fs::path path = value.read_yaml_string();
   if (path.empty()) throw value.make_yaml_error("names nothing");
   return path.is_absolute() ? path : file.parent_path() / path;
 }
@@ -128,9 +128,9 @@ void read_guard_bands(YamlMap map, std::vector<Gate>& gates) {
 
 GoldenUnit read_golden(YamlMap map, Files& files) {
   const YamlValue camera = map.get_required_yaml_value("camera_id");
-  if (!Id::is_valid_name_of_camera_or_run(camera.read_yaml_text()))
+  if (!Id::is_valid_name_of_camera_or_run(camera.read_yaml_string()))
     throw camera.make_yaml_error("is no id of a camera: it names a folder");
-  GoldenUnit golden{camera.read_yaml_text(), {}, {}};
+  GoldenUnit golden{camera.read_yaml_string(), {}, {}};
   const YamlValue calibration = map.get_required_yaml_value("calibration");
   golden.calibration = read_row_time_and_readout(calibration, files);
   if (!golden.calibration.rotation_center) {
@@ -223,7 +223,7 @@ std::string describe_serial_pattern_mismatch(const std::string& serial,
 }
 
 std::string read_pattern(const YamlValue& value) {
-  std::string pattern = value.read_yaml_text();
+  std::string pattern = value.read_yaml_string();
   try {
     const std::regex compiled(pattern);
   } catch (const std::regex_error& error) {
@@ -238,7 +238,7 @@ Hook read_hook(YamlMap map, const fs::path& file) {
   Hook hook;
   const YamlValue command = map.get_required_yaml_value("command");
   for (const YamlValue& word : command.read_yaml_list())
-    hook.command.push_back(word.read_yaml_text());
+    hook.command.push_back(word.read_yaml_string());
   if (hook.command.empty() || hook.command.front().empty()) {
     throw command.make_yaml_error("should be a program and its arguments: [PROGRAM, ...]");
   }
@@ -256,7 +256,7 @@ Hook read_hook(YamlMap map, const fs::path& file) {
 
 /// Returns a database: a file relative to the station, or a server.
 std::string read_records_address(const YamlValue& value, const fs::path& file) {
-  const std::string where = value.read_yaml_text();
+  const std::string where = value.read_yaml_string();
   if (where.starts_with("postgresql://") || where.starts_with("postgres://")) return where;
   if (is_database_server_address(where))
     throw value.make_yaml_error("should name a file, or be postgresql://...");
@@ -268,7 +268,7 @@ std::string read_records_address(const YamlValue& value, const fs::path& file) {
 void read_camera_and_targets(YamlMap& document, Files& files, StationConfig& config) {
   const YamlValue type = document.get_required_yaml_value("camera_type");
   config.nominal_camera = read_row_time_and_readout(type, files).camera;
-  config.type_file = fs::path(type.read_yaml_text()).filename().string();
+  config.type_file = fs::path(type.read_yaml_string()).filename().string();
   const YamlValue board = document.get_required_yaml_value("board");
   config.board = read_board(files(board));
   if (config.board.has_chessboard_squares()) {
@@ -276,7 +276,7 @@ void read_camera_and_targets(YamlMap& document, Files& files, StationConfig& con
   }
   const auto room = document.get_optional_yaml_value("room");
   config.lamps = read_lamps_of_room(files(document.get_required_yaml_value("lamps")),
-                                    room ? room->read_yaml_text() : std::string());
+                                    room ? room->read_yaml_string() : std::string());
   if (const auto place = document.get_optional_yaml_value("dispersion_position_m")) {
     config.dispersion_position_m = Eigen::Vector2d(place->read_yaml_numbers(2).data());
   }
@@ -312,7 +312,7 @@ void read_serials_and_operators(YamlMap& document, StationConfig& config) {
     if (names.empty())
       throw operators->make_yaml_error("names nobody; leave it out if all may void runs");
     std::ranges::transform(names, std::back_inserter(config.void_operators),
-                           [](const YamlValue& name) { return name.read_yaml_text(); });
+                           [](const YamlValue& name) { return name.read_yaml_string(); });
   }
 }
 
@@ -351,7 +351,7 @@ StationConfig read_station_config(const fs::path& file) {
   Files files(file);
   StationConfig config;
   config.file = file;
-  config.station = document.get_required_yaml_value("station").read_yaml_text();
+  config.station = document.get_required_yaml_value("station").read_yaml_string();
   read_camera_and_targets(document, files, config);
   read_verdict_conditions(document, files, config);
   read_serials_and_operators(document, config);

@@ -297,7 +297,7 @@ TEST_F(HostileNames, UnitReportContainsNoHtmlTagsFromNames) {
   const auto report = [](const std::string& name) {
     RunRecord run = run_with(name, 0);
     run.events.clear();
-    return make_run_report_html(escape_run_texts(std::move(run)), {}, {});
+    return make_run_report_html(escape_texts_of_run(std::move(run)), {}, {});
   };
   const std::string plain = extract_tags(report("a"));
   ASSERT_GT(plain.size(), 100U);
@@ -318,7 +318,7 @@ TEST_F(HostileNames, ExportSelectedRunsToFileWritesExactlyOneRowPerRun) {
   export_runs_to_file(folder / "runs.json", runs);
   const auto json = nlohmann::json::parse(TemporaryFolder::read_content(folder / "runs.json"));
   ASSERT_EQ(json.size(), runs.size());
-  for (RunRecord& run : runs) run = escape_run_texts(std::move(run));  // as in records
+  for (RunRecord& run : runs) run = escape_texts_of_run(std::move(run));  // as in records
   export_runs_to_file(folder / "runs.csv", runs);
   const CsvTable table(folder / "runs.csv");
   ASSERT_EQ(table.num_rows(), runs.size());
@@ -353,7 +353,7 @@ TEST_F(HostileNames, RecordsListExactlyTheStoredRuns) {
     for (int i = 0; i < kNames / every; ++i) {
       std::string name = random_name(random);
       std::erase(name, '\0');  // of texts of databases
-      records.store_run(escape_run_texts(run_with(name, i)));
+      records.store_run(escape_texts_of_run(run_with(name, i)));
     }
     EXPECT_EQ(records.list_run_summaries({}).size(), std::size_t{kNames / every});
     EXPECT_THAT(records.check_records_by_audit_trail("").problems, testing::IsEmpty());

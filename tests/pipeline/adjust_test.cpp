@@ -165,7 +165,7 @@ TEST_F(VlpAdjust, CorrectsFocalLengthOnlyWithLensSdOption) {
 TEST_F(VlpAdjust, RejectsLensSdOptionForLensWithCovariance) {
   rig.calibration.intrinsics_report.emplace();
   rig.calibration.intrinsics_report->covariance =
-      make_nominal_intrinsics_covariance(rig.calibration.camera, 1);
+      compute_intrinsics_covariance_from_pixel_sd(rig.calibration.camera, 1);
   const ProgramResult result = adjust("--map-sd-m 0.001 --lens-sd-px 10");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr("camera.yaml: has a lens covariance already"));

@@ -79,7 +79,7 @@ class ComputeExpectedChiSquaredOfCommonErrors : public testing::Test {
     constexpr int draws = 4000;
     PositionerOptions options;
     options.computes_common_chi_squared = true;
-    options.max_residual_share = std::numeric_limits<double>::max();
+    options.max_residual_fraction = std::numeric_limits<double>::max();
     const Positioner positioner(rig.map, rig.calibration, options);
     double found = 0, expected = 0, common = 0;
     for (int i = 0; i < draws; ++i) {

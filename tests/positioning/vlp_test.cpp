@@ -173,7 +173,7 @@ TEST_F(CInterface, VlpLocateAppliesSigmaAndResidualLimitOptions) {
   same.unstated_sigma_px = 3;
   expect_same(fix, Positioner(rig.map, rig.calibration, same).compute_position_fix(seen));
   EXPECT_EQ(fix.rejected_lamps, 0);
-  options.max_residual_share = 0.003;
+  options.max_residual_fraction = 0.003;
   const vlp_fix strict = located(open(&options).get(), nullptr);
   ASSERT_EQ(strict.status, VLP_OK);
   EXPECT_EQ(strict.rejected_lamps, 1);
@@ -314,9 +314,9 @@ TEST_F(CInterface, VlpLastErrorNamesInvalidFileOrOption) {
   EXPECT_EQ(vlp_open(lamps.c_str(), lamps.c_str(), nullptr, &positioner), VLP_BAD_FILE);
   EXPECT_THAT(vlp_last_error(), HasSubstr("is it the right file?"));
   vlp_options options = {};
-  options.max_residual_share = -1;
+  options.max_residual_fraction = -1;
   EXPECT_EQ(vlp_open(lamps.c_str(), calibration.c_str(), &options, &positioner), VLP_BAD_ARGUMENT);
-  EXPECT_THAT(vlp_last_error(), HasSubstr("max_residual_share"));
+  EXPECT_THAT(vlp_last_error(), HasSubstr("max_residual_fraction"));
   EXPECT_EQ(vlp_open(nullptr, calibration.c_str(), nullptr, &positioner), VLP_BAD_ARGUMENT);
   EXPECT_EQ(vlp_open(lamps.c_str(), calibration.c_str(), nullptr, nullptr), VLP_BAD_ARGUMENT);
   std::string of_another_thread = "?";

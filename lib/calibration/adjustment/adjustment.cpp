@@ -753,7 +753,7 @@ void set_adjusted_lens(const AdjustmentProblem& problem, const Eigen::MatrixXd& 
 
 }  // namespace
 
-MatrixX make_nominal_intrinsics_covariance(const Camera& camera, double sd_px) {
+MatrixX compute_intrinsics_covariance_from_pixel_sd(const Camera& camera, double sd_px) {
   const Lens lens(camera.lens_model, camera.intrinsics);
   constexpr int across = 16;
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(count_intrinsics_with_covariance(camera));

@@ -170,7 +170,7 @@ struct AdjustmentResult {
 /// none. An error of each intrinsic, taken alone, displaces the pixels of a grid over the image by
 /// `sd_px` (RMS per axis). Errors of different intrinsics are independent.
 /// @pre sd_px is positive
-MatrixX make_nominal_intrinsics_covariance(const Camera& camera, double sd_px);
+MatrixX compute_intrinsics_covariance_from_pixel_sd(const Camera& camera, double sd_px);
 
 /// Estimates lens, zenith, lever arm and lamp map from all captures.
 ///

@@ -354,7 +354,7 @@ bool is_map_contradicted(const std::optional<LampDisplacements>& found) {
 /// Returns true if the RMS displacement of the lamps exceeds the tolerance of Positioner, relative
 /// to the size of the map.
 bool is_map_of_other_room(const LampDisplacements& found) {
-  constexpr double max_residual_fraction = 0.1;  // PositionerOptions::max_residual_share
+  constexpr double max_residual_fraction = 0.1;  // PositionerOptions::max_residual_fraction
   const double rms_m =
       found.displacement_m.norm() / std::sqrt(static_cast<double>(found.lamps.size()));
   return rms_m > max_residual_fraction * rms_radius(found.map_m);

@@ -96,7 +96,7 @@ std::vector<PivotArc> compute_pivot_yaw_arcs(const PivotFixes& fixes) {
   for (const RotationFix& fix : fixes.fixes) yaws_rad[fix.pivot].push_back(fix.pose.yaw_rad);
   std::vector<PivotArc> arcs;
   arcs.reserve(fixes.num_pivots);
-  for (const auto& yaws : yaws_rad) arcs.push_back({yaws.size(), compute_angular_range(yaws)});
+  for (const auto& yaws : yaws_rad) arcs.push_back({yaws.size(), compute_angular_coverage(yaws)});
   return arcs;
 }
 
@@ -176,7 +176,7 @@ class RotationSearch {
          ++iteration) {
       // The tolerance is larger while the tilt is not corrected, because lamps contradict each
       // other then.
-      locate(iteration < num_rough_iterations ? 0.3 : PositionerOptions().max_residual_share);
+      locate(iteration < num_rough_iterations ? 0.3 : PositionerOptions().max_residual_fraction);
       if (fixes_.fixes.size() < kMinCaptures) return find_rotation_status(statuses_);
       if (iteration >= num_rough_iterations) cluster_fixes_by_height(fixes_, height_noise_m_);
       const bool estimates_arm = iteration < num_rough_iterations && lever_arm_;
@@ -187,7 +187,7 @@ class RotationSearch {
     if (median_residual_m() > 0.05 * compute_median_pivot_height(fixes_, 0))
       return RotationStatus::axis_moved;
     reject_fix_outliers();
-    locate(PositionerOptions().max_residual_share);
+    locate(PositionerOptions().max_residual_fraction);
     cluster_fixes_by_height(fixes_, height_noise_m_);
     return fit_rotation_to_fixes(false);
   }
@@ -221,9 +221,9 @@ class RotationSearch {
  private:
   Eigen::Vector3d& current_zenith() { return calibration_.rotation_center->zenith_in_camera; }
 
-  void locate(double max_residual_share) {
+  void locate(double max_residual_fraction) {
     PositionerOptions options;
-    options.max_residual_share = max_residual_share;
+    options.max_residual_fraction = max_residual_fraction;
     const Positioner positioner(map_, calibration_, options);
     fixes_ = {};
     statuses_.clear();

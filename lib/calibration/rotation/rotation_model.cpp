@@ -55,7 +55,7 @@ RotationModelFit fit_rotation_model_to_fixes(std::span<const RotationFix> fixes,
   return model_fit;
 }
 
-double compute_angular_range(std::vector<double> angles_rad) {
+double compute_angular_coverage(std::vector<double> angles_rad) {
   if (angles_rad.size() < 2) return 0;
   constexpr double turn = 2 * std::numbers::pi;
   for (double& angle : angles_rad) angle -= turn * std::floor(angle / turn);

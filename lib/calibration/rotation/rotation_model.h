@@ -41,6 +41,6 @@ RotationModelFit fit_rotation_model_to_fixes(std::span<const RotationFix> fixes,
 
 /// Returns the angular range of the angles: 2 pi minus the largest gap between neighboring angles,
 /// rad. Returns 0 for fewer than two angles.
-double compute_angular_range(std::vector<double> angles_rad);
+double compute_angular_coverage(std::vector<double> angles_rad);
 
 }  // namespace vlp

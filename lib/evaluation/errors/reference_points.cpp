@@ -18,9 +18,9 @@ using Cell = Eigen::Array3d;  // whole numbers
 /// hash differ by the distance.
 class ReferencePointTable {
  public:
-  ReferencePointTable(std::size_t max_stations, double radius_m)
+  ReferencePointTable(std::size_t max_points, double radius_m)
       : radius_m_(radius_m), cell_m_(4 * radius_m) {
-    stations_.reserve(max_stations);
+    points_by_cell_.reserve(max_points);
   }
 
   /// Returns the first reference point within the radius. A position without one becomes a new
@@ -33,15 +33,15 @@ class ReferencePointTable {
     for (int corner = 0; corner < 8; ++corner) {
       const Cell step(corner & 1, (corner >> 1) & 1, corner >> 2);
       if ((step > more).any()) continue;
-      const auto [begin, end] = stations_.equal_range(hash_cell(low + step));
+      const auto [begin, end] = points_by_cell_.equal_range(hash_cell(low + step));
       for (auto each = begin; each != end; ++each) {
-        const std::size_t station = each->second;
-        const bool is_near = (firsts_m_[station] - place_m).norm() <= radius_m_;
-        if (is_near) found = std::min(found, station);
+        const std::size_t point = each->second;
+        const bool is_near = (firsts_m_[point] - place_m).norm() <= radius_m_;
+        if (is_near) found = std::min(found, point);
       }
     }
     if (found == firsts_m_.size()) {
-      stations_.emplace(hash_cell((place_m.array() / cell_m_).floor()), found);
+      points_by_cell_.emplace(hash_cell((place_m.array() / cell_m_).floor()), found);
       firsts_m_.push_back(place_m);
     }
     return found;
@@ -58,7 +58,7 @@ class ReferencePointTable {
   }
 
   double radius_m_, cell_m_;
-  std::unordered_multimap<std::uint64_t, std::size_t> stations_;
+  std::unordered_multimap<std::uint64_t, std::size_t> points_by_cell_;
   std::vector<Eigen::Vector3d> firsts_m_;
 };
 
@@ -67,10 +67,10 @@ class ReferencePointTable {
 std::vector<std::size_t> assign_positions_to_reference_points(
     std::span<const Eigen::Vector3d> places_m, double radius_m) {
   ReferencePointTable table(places_m.size(), radius_m);
-  std::vector<std::size_t> stations;
-  stations.reserve(places_m.size());
-  for (const Eigen::Vector3d& place_m : places_m) stations.push_back(table.find_or_insert(place_m));
-  return stations;
+  std::vector<std::size_t> points;
+  points.reserve(places_m.size());
+  for (const Eigen::Vector3d& place_m : places_m) points.push_back(table.find_or_insert(place_m));
+  return points;
 }
 
 }  // namespace vlp

@@ -102,7 +102,7 @@ std::optional<RobustEllipse> fit_circle_or_ellipse(const WeightedOutline& outlin
   auto fit = camera.lens ? fit_robust_circle(outline.points, outline.weights, tolerance)
                          : fit_robust_ellipse(outline.points, outline.weights, tolerance);
   if (!fit && !camera.lens && camera.max_axis_ratio > nearly_round) {
-    fit = fit_slender_ellipse(outline.points, outline.weights, tolerance);
+    fit = fit_elongated_ellipse(outline.points, outline.weights, tolerance);
   }
   if (!fit || fit->count < static_cast<int>(kMinOutlinePoints)) return std::nullopt;
   if (!camera.lens && compute_axis_ratio(fit->rim_from_circle) > camera.max_axis_ratio)

@@ -46,7 +46,7 @@ bool consists_of_two_parts(const Light& whole, const LightPart& a, const LightPa
 }
 
 /// Returns the reason for the lack of a fitted outline.
-LightReason find_formless_reason(const LightPart& part, const ImageSize& size) {
+LightReason find_missing_outline_reason(const LightPart& part, const ImageSize& size) {
   const PixelBox& box = part.box;
   const bool inside =
       box.x > 0 && box.y > 0 && box.end_column() < size.width && box.end_row() < size.height;
@@ -116,13 +116,13 @@ std::vector<Light> make_lights_without_outline(std::vector<LightPart> parts,
                                                const std::vector<Light>& lights,
                                                const LightShape& shape, const ImageSize& size) {
   constexpr int min_px = 5;
-  std::vector<Light> formless;
+  std::vector<Light> found;
   for (LightPart& part : parts) {
     const PixelBox& box = part.box;
     if (std::min(box.width, box.height) < min_px) continue;
     Light light{};
     light.kind = LightKind::no_outline;
-    light.reason = find_formless_reason(part, size);
+    light.reason = find_missing_outline_reason(part, size);
     light.box_min = shape.swap_image_and_scanline_axes({box.x - 0.5, box.y - 0.5});
     light.box_max =
         shape.swap_image_and_scanline_axes({box.end_column() - 0.5, box.end_row() - 0.5});
@@ -133,9 +133,9 @@ std::vector<Light> make_lights_without_outline(std::vector<LightPart> parts,
     });
     if (inside) continue;
     light.outline = std::move(part.outline);
-    formless.push_back(std::move(light));
+    found.push_back(std::move(light));
   }
-  return formless;
+  return found;
 }
 
 }  // namespace vlp

@@ -156,9 +156,9 @@ std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d>
   return fit;
 }
 
-std::optional<RobustEllipse> fit_slender_ellipse(std::span<const Eigen::Vector2d> points,
-                                                 std::span<const double> weights,
-                                                 double tolerance) {
+std::optional<RobustEllipse> fit_elongated_ellipse(std::span<const Eigen::Vector2d> points,
+                                                   std::span<const double> weights,
+                                                   double tolerance) {
   if (points.empty()) return std::nullopt;
   const auto count = static_cast<double>(points.size());
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();

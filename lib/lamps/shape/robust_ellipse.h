@@ -53,7 +53,8 @@ std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d>
 
 /// Fits an ellipse of any axis ratio if most of it is visible. The points are first scaled along
 /// the principal axes of their scatter, so that they are nearly on a circle.
-std::optional<RobustEllipse> fit_slender_ellipse(std::span<const Eigen::Vector2d> points,
-                                                 std::span<const double> weights, double tolerance);
+std::optional<RobustEllipse> fit_elongated_ellipse(std::span<const Eigen::Vector2d> points,
+                                                   std::span<const double> weights,
+                                                   double tolerance);
 
 }  // namespace vlp

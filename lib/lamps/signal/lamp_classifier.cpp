@@ -185,7 +185,7 @@ void check_features(const YamlValue& value) {
   }
   bool same = names.size() == kLampFeatures.size();
   for (std::size_t i = 0; same && i < names.size(); ++i)
-    same = names[i].read_yaml_text() == kLampFeatures[i];
+    same = names[i].read_yaml_string() == kLampFeatures[i];
   if (!same) throw value.make_yaml_error("should be [" + known + "]: train the classifier again");
 }
 

@@ -163,15 +163,15 @@ void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
   const auto references = parse_references(options.references);
   const auto known = open_runs(options);
   check_output_option(options, *known);
-  const auto points = load_metric_of_judged_runs(known->station_records(), options.metric,
-                                                 make_filter_of_comparable_runs(options, *known));
+  const auto points = load_metric_values(known->records_or_throw(), options.metric,
+                                         make_filter_of_comparable_runs(options, *known));
   check_values_are_of_one_station(points, options);
   const auto values = select_values_of_reference_units(points, references);
   std::vector<std::string> units;
   units.reserve(references.size());
   for (const auto& [unit, reference] : references) units.push_back(unit);
   const BiasStudy study = run_study([&] {
-    check_runs_share_no_images(known->station_records(), points,
+    check_runs_share_no_images(known->records_or_throw(), points,
                                select_values_of_study_units(points, units));
     return analyze_bias_and_linearity(values);
   });
@@ -254,8 +254,8 @@ void print_station_run_list(const StationRecordsOptions& options) {
         "{} of them with a hook that failed or did not finish: 'vlp-station hook' runs it again\n",
         without);
   }
-  known
-      ->station_records();  // throws if the records are unavailable, because the list is incomplete
+  known->records_or_throw();  // throws if the records are unavailable, because the list is
+                              // incomplete
 }
 
 void print_station_run_details(const StationRecordsOptions& options) {
@@ -301,8 +301,8 @@ void list_or_delete_expired_run_folders(const StationRecordsOptions& options) {
   if (!config.retention.images_days && !config.retention.results_days) {
     throw InputError(options.station, "nothing expires; add the key 'retention'");
   }
-  check_clock_against_recorded_runs(config, known->station_records());
-  const RetentionResult found = find_expired_run_folders(config, known->station_records());
+  check_clock_against_recorded_runs(config, known->records_or_throw());
+  const RetentionResult found = find_expired_run_folders(config, known->records_or_throw());
   constexpr double megabyte = 1e6;
   double all_mb = 0;
   std::size_t done = 0;
@@ -352,7 +352,7 @@ void void_recorded_run(const StationRecordsOptions& options) {
 void verify_records_by_audit_trail(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
   const TrailCheck found =
-      known->station_records().check_records_by_audit_trail(options.expected_digest);
+      known->records_or_throw().check_records_by_audit_trail(options.expected_digest);
   for (const std::string& problem : found.problems) print_line(problem);
   fmt::print("{} runs, {} entries in the trail\n", found.runs, found.entries);
   if (!found.last_digest.empty()) fmt::print("last digest {}\n", found.last_digest);
@@ -424,7 +424,7 @@ void print_metric_trend(const StationRecordsOptions& options) {
   const MetricKind kind = find_run_metric_kind(options.metric);
   const auto known = open_runs(options);
   check_output_option(options, *known);
-  Records& records = known->station_records();
+  Records& records = known->records_or_throw();
   RunFilter filter = make_filter_of_comparable_runs(options, *known);
   if (options.filter.verdict.empty()) filter.verdict = verdict_name(Verdict::pass);
   const auto points = records.load_metric_trend(options.metric, filter);
@@ -459,13 +459,13 @@ void print_process_capability(const StationRecordsOptions& options) {
   std::vector<MetricKind> kinds = list_run_metric_kinds();
   if (!options.metric.empty()) kinds = {find_run_metric_kind(options.metric)};
   const auto known = open_runs(options);
-  Records& records = known->station_records();
+  Records& records = known->records_or_throw();
   const RunFilter filter = make_filter_of_comparable_runs(options, *known);
   constexpr const char* head = "{:<27}{:>5}{:>10}{:>10}{:>10}{:>10}   {:<25}{}";
   std::vector<std::string> rows;
   rows.reserve(kinds.size());
   for (const MetricKind& kind : kinds) {
-    const auto points = load_metric_of_judged_runs(records, kind.name, filter);
+    const auto points = load_metric_values(records, kind.name, filter);
     check_values_are_of_one_station(points, options);
     const auto gate = find_gate_limit(kind.name, known->station_config(), records, points);
     const auto found =
@@ -493,11 +493,10 @@ void print_gauge_study(const StationRecordsOptions& options) {
   const MetricKind kind = find_run_metric_kind(options.metric);
   if (!options.references.empty()) return print_bias(kind, options);
   const auto known = open_runs(options);
-  Records& records = known->station_records();
+  Records& records = known->records_or_throw();
   RunFilter filter = options.filter;
   if (filter.kind.empty()) filter.kind = "unit";
-  const auto points =
-      load_metric_of_judged_runs(records, options.metric, remove_conditions_any(filter));
+  const auto points = load_metric_values(records, options.metric, remove_conditions_any(filter));
   const auto values = select_values_of_study_units(points, options.units);
   const MeasurementStudy study = run_study([&] {
     check_runs_share_no_images(records, points, values);

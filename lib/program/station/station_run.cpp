@@ -145,7 +145,7 @@ void store_and_report_run(
     const StationConfig& config, Terminal& terminal,
     const std::function<void()>& mark_run_stored = [] {},
     const std::function<void()>& rename_finished_run_folder = [] {}) {
-  RunRecord record = escape_run_texts(std::move(measured));  // in the form of the records
+  RunRecord record = escape_texts_of_run(std::move(measured));  // in the form of the records
   auto lines = make_verdict_screen(record);
   std::optional<HookLock> lock;
   if (config.hook) {

@@ -115,7 +115,7 @@ class Positioner:
         correction: str = "all",
         mount: tuple[float, float, float, float] | None = None,
         unstated_sigma_px: float = 1.0,
-        max_residual_share: float = 0.1,
+        max_residual_fraction: float = 0.1,
     ) -> None: ...
     def locate(
         self,

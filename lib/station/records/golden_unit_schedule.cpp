@@ -125,7 +125,7 @@ void add_gates(const std::vector<Gate>& gates, Lines& lines) {
 
 }  // namespace
 
-std::string compute_measurement_settings_digest(const StationConfig& config) {
+std::string hash_measurement_settings(const StationConfig& config) {
   Lines lines;
   Calibration type;
   type.camera = config.nominal_camera;
@@ -197,7 +197,7 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
         "the lamp map with which the golden unit was measured is unknown (run {}): {}", run,
         verify);
   }
-  if (measured_with != compute_measurement_settings_digest(config)) {
+  if (measured_with != hash_measurement_settings(config)) {
     return fmt::format(
         "station.yaml or a file that it names was changed in a way that affects measurements after "
         "the golden unit was measured (run {}): {}",
@@ -229,7 +229,7 @@ void record_run_in_golden_unit_note(const StationConfig& config, const RunRecord
     if (record.kind == "golden") {
       spool.replace_file_atomically(
           note, fmt::format("{} {} {} {}\n", record.run, record.verdict, record.ended_utc,
-                            compute_measurement_settings_digest(config)));
+                            hash_measurement_settings(config)));
     } else {
       append_line_to_note(spool, note, kUnitLine);  // never measured: nothing to count from
     }

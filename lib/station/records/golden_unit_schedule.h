@@ -16,7 +16,7 @@ namespace vlp {
 ///   excluded  name of the station, `verify_due`, serials, folders, records, spool, hook, retention
 ///
 /// Format, comments, order and names of files do not change it.
-std::string compute_measurement_settings_digest(const StationConfig& config);
+std::string hash_measurement_settings(const StationConfig& config);
 
 /// Time at which the state of the golden unit is checked (describe_golden_unit_problem()): at the
 /// first image of a unit, or at its verdict.
@@ -28,7 +28,7 @@ enum class GoldenCheckTime { first_image, verdict };
 /// Reasons: the golden unit
 /// - failed,
 /// - is due (StationConfig::verification_interval),
-/// - was measured with another measuring setup (compute_measurement_settings_digest()),
+/// - was measured with another measuring setup (hash_measurement_settings()),
 /// - was never measured here.
 ///
 /// The function uses only the note of record_run_in_golden_unit_note() in the station's spool,
@@ -45,7 +45,7 @@ std::string describe_golden_unit_problem(const StationConfig& config,
 /// runs, and all runs without `verify_due`.
 ///
 /// File .golden-DIGEST, with a digest of the station's name: run, verdict and end of the golden run
-/// and the compute_measurement_settings_digest(), then a line for each later unit. Throws
+/// and the hash_measurement_settings(), then a line for each later unit. Throws
 /// InputError if the file cannot be written. The note is then deleted, so that the golden unit is
 /// due.
 void record_run_in_golden_unit_note(const StationConfig& config, const RunRecord& record);

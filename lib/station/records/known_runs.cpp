@@ -71,7 +71,7 @@ std::vector<RunRecord> KnownRuns::list_waiting_runs() {
   return spool_ ? spool_->list_waiting_runs() : std::vector<RunRecord>();
 }
 
-Records& KnownRuns::station_records() {
+Records& KnownRuns::records_or_throw() {
   if (!records_) throw_unavailable();
   return *records_;
 }
@@ -87,7 +87,7 @@ RunRecord KnownRuns::find_run_by_id(const std::string& run) {
   for (const RunRecord& waiting : this->list_waiting_runs()) {
     if (waiting.run == run) return waiting;
   }
-  auto record = station_records().find_run_by_id(run);
+  auto record = records_or_throw().find_run_by_id(run);
   if (!record) throw std::invalid_argument("there is no run " + run);
   return *record;
 }
@@ -100,8 +100,9 @@ RunRecord KnownRuns::find_last_run(const RunFilter& filter) {
 
 std::vector<RunRecord> KnownRuns::load_matching_runs(const RunFilter& filter) {
   std::vector<RunRecord> runs;
-  for (const RunSummary& run : station_records().list_run_summaries(filter)) {
-    if (auto record = station_records().find_run_by_id(run.run)) runs.push_back(std::move(*record));
+  for (const RunSummary& run : records_or_throw().list_run_summaries(filter)) {
+    if (auto record = records_or_throw().find_run_by_id(run.run))
+      runs.push_back(std::move(*record));
   }
   return runs;
 }
@@ -197,7 +198,7 @@ VoidedRun void_recorded_run(KnownRuns& known, const std::string& run,
   bool is_any_done = repeated.empty() || calls_hook;
   Spool* spool = known.station_spool();
   if (is_any_done)
-    spool != nullptr ? spool->store_run(record) : known.station_records().store_run(record);
+    spool != nullptr ? spool->store_run(record) : known.records_or_throw().store_run(record);
   if (station != nullptr && record.kind == "golden") {
     is_any_done = delete_golden_unit_note_of_run(*station, record.run) || is_any_done;
   }

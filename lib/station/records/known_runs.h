@@ -41,7 +41,7 @@ class KnownRuns {
   /// Returns the station's spool; null without a station.
   Spool* station_spool() { return spool_ ? &*spool_ : nullptr; }
   /// Returns the records. Throws RecordsUnavailable if they are offline.
-  Records& station_records();
+  Records& records_or_throw();
   /// Returns true if the records are offline. Only the waiting runs are known then.
   bool are_records_offline() const { return !records_; }
 
@@ -49,7 +49,7 @@ class KnownRuns {
   /// (merge_stored_and_waiting_runs()).
   std::vector<RunSummary> list_run_summaries(const RunFilter& filter);
   /// Returns a run that waits or that the records contain. Throws std::invalid_argument if no run
-  /// has this id, otherwise as station_records().
+  /// has this id, otherwise as records_or_throw().
   RunRecord find_run_by_id(const std::string& run);
   /// Returns the last run that matches the filter. Throws as find_run_by_id().
   RunRecord find_last_run(const RunFilter& filter);

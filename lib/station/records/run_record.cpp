@@ -219,7 +219,7 @@ std::span<const RunField> list_run_text_fields() {
   return fields;
 }
 
-RunRecord escape_run_texts(RunRecord run) {
+RunRecord escape_texts_of_run(RunRecord run) {
   for (const RunField& field : list_run_text_fields()) {
     const bool has_lines =
         field.text == &RunRecord::causes || field.text == &RunRecord::calibration;
@@ -414,7 +414,7 @@ std::string serialize(const Json& json) {
 }  // namespace
 
 std::string serialize_spooled_run(const SpooledRun& spooled) {
-  const RunRecord run = escape_run_texts(spooled.run);
+  const RunRecord run = escape_texts_of_run(spooled.run);
   Json json;
   json["format"] = kRunFormat;
   json["records"] = escape_text_for_single_line(spooled.records);

@@ -148,7 +148,7 @@ double compute_age_of_utc_s(const std::string& utc);
 /// Returns the run with texts that are safe for terminals, reports and the spool:
 /// escape_text_for_terminal(), and escape_text_for_single_line() for operators and for names of
 /// images and events.
-RunRecord escape_run_texts(RunRecord run);
+RunRecord escape_texts_of_run(RunRecord run);
 
 /// Returns the cause INVALID of a run whose end is before its start, because the clock was set
 /// back; empty if there is none.
@@ -172,7 +172,7 @@ struct SpooledRun {
 /// Serializes a run as JSON text in format `vlp-run/2`. The object has "records" (identity of its
 /// database), the texts of list_run_text_fields(), "metrics", "images" and "events".
 /// Metrics with a guard band have "uncertainty" and "guard_k". Control characters and bytes that
-/// are not UTF-8 are escaped (escape_run_texts()).
+/// are not UTF-8 are escaped (escape_texts_of_run()).
 std::string serialize_spooled_run(const SpooledRun& spooled);
 /// Reads a run in the format of serialize_spooled_run(). A missing text of list_run_text_fields()
 /// is empty, as in files of older programs. Throws InputError with the file. Also throws it for a

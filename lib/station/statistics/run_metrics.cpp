@@ -30,8 +30,8 @@ MetricKind find_run_metric_kind(const std::string& name) {
   throw std::invalid_argument("there is no metric " + name + "; the metrics are: " + names);
 }
 
-std::vector<TrendPoint> load_metric_of_judged_runs(Records& records, const std::string& metric,
-                                                   RunFilter filter) {
+std::vector<TrendPoint> load_metric_values(Records& records, const std::string& metric,
+                                           RunFilter filter) {
   if (!filter.verdict.empty()) return records.load_metric_trend(metric, filter);
   const int last = std::exchange(filter.last, 0);
   auto points = records.load_metric_trend(metric, filter);

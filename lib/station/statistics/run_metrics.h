@@ -26,8 +26,8 @@ MetricKind find_run_metric_kind(const std::string& name);
 
 /// Returns the values of a metric in judged runs, or in runs of the verdict that the filter
 /// selects.
-std::vector<TrendPoint> load_metric_of_judged_runs(Records& records, const std::string& metric,
-                                                   RunFilter filter);
+std::vector<TrendPoint> load_metric_values(Records& records, const std::string& metric,
+                                           RunFilter filter);
 
 /// Checks that all values are of one station. Throws std::invalid_argument otherwise; several
 /// stations are compared only on request.

@@ -68,7 +68,7 @@ void Unit::reprocess_images_with_changed_inclination(StationStep step) {
 
 void Unit::solve_completed_station_steps(bool all_in) {
   solve_steps_in_order(all_in);
-  row_time_ = check_row_time_against_lamps(collect_lamp_observations(*this), config_.lamps,
+  row_time_ = check_row_time_against_lamps(list_lamp_image_observations(*this), config_.lamps,
                                            make_configured_row_time(config_));
 }
 
@@ -352,7 +352,7 @@ HistoryEntry Unit::make_step_history_entry(StationStep step) const {
           {{"station", config_.sha256}, {station_step_name(step), compute_text_sha256(digests)}}};
 }
 
-std::vector<Observation> collect_lamp_observations(const Unit& unit) {
+std::vector<Observation> list_lamp_image_observations(const Unit& unit) {
   std::vector<Observation> images;
   for (const StationStep step : kStationSteps) {
     if (step == StationStep::boards) continue;

@@ -119,7 +119,7 @@ class Unit {
 };
 
 /// Returns the observations of the images with lamps, rejected ones too.
-std::vector<Observation> collect_lamp_observations(const Unit& unit);
+std::vector<Observation> list_lamp_image_observations(const Unit& unit);
 
 /// Returns the row time of the station's type of camera.
 GivenRowTime make_configured_row_time(const StationConfig& config);

@@ -122,7 +122,7 @@ YawCoverage compute_yaw_coverage(const std::vector<Frame>& frames, const Station
       height.covered_sectors[part % parts] = true;
     }
     height.captures = static_cast<int>(yaws_rad.size());
-    height.arc_rad = compute_angular_range(yaws_rad);
+    height.arc_rad = compute_angular_coverage(yaws_rad);
     height.is_complete = height.captures >= config.completion.rotation_captures &&
                          height.arc_rad >= config.completion.rotation_arc_rad;
     map.heights.push_back(std::move(height));

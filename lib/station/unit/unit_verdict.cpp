@@ -205,7 +205,7 @@ std::vector<Cause> find_station_faults(const Unit& unit) {
   // Tested first, because a wrong row time confuses or removes lamps.
   const Lens lens(known->camera.lens_model, known->camera.intrinsics);
   std::string row_time =
-      describe_alternative_row_time(collect_lamp_observations(unit), unit.station_config().lamps,
+      describe_alternative_row_time(list_lamp_image_observations(unit), unit.station_config().lamps,
                                     lens, make_configured_row_time(unit.station_config()));
   if (!row_time.empty()) return {{std::move(row_time)}};
   std::vector<Frame> frames;

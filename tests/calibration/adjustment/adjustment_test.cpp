@@ -158,7 +158,7 @@ TEST(RunBundleAdjustment, ReportsContradictedLensWhenFocalLengthErrorExceedsCova
 
 TEST(MakeNominalIntrinsicsCovariance, ReturnsVariancesThatMatchGivenImageDisplacement) {
   const Camera camera{"", {800, 600}, LensModel::pinhole, {500, 400, 399.5, 299.5}, {}, {}, {}};
-  const MatrixX covariance = make_nominal_intrinsics_covariance(camera, 3);
+  const MatrixX covariance = compute_intrinsics_covariance_from_pixel_sd(camera, 3);
   // Rays evenly over the image: (u - cx) / fx has the mean square (800^2 - 50^2) / 12 / 500^2.
   const double x = (640000 - 2500) / 12.0 / 250000, y = (360000 - 37.5 * 37.5) / 12.0 / 160000;
   // An error that displaces one axis alone has half the mean square over both axes.
@@ -183,7 +183,7 @@ TEST(RunBundleAdjustment, RecoversFocalLengthsAndPrincipalPointFromWrongInitialL
   camera.intrinsics[4] += 0.03;
   survey.input.calibration.intrinsics_report.emplace();
   survey.input.calibration.intrinsics_report->covariance =
-      make_nominal_intrinsics_covariance(camera, 10);
+      compute_intrinsics_covariance_from_pixel_sd(camera, 10);
   const AdjustmentResult found = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   ASSERT_TRUE(found.center.lever_arm_m);

@@ -36,7 +36,8 @@ Unit calibrated(Survey& survey, const Case& the, Random& random) {
   if (the.lens == Case::boards) {
     draw_lens(calibration, lens_covariance(calibration.camera, 0.1, 8), random);
   } else if (the.lens == Case::elsewhere) {
-    draw_lens(calibration, make_nominal_intrinsics_covariance(calibration.camera, 3), random);
+    draw_lens(calibration, compute_intrinsics_covariance_from_pixel_sd(calibration.camera, 3),
+              random);
   }
   survey.add_noise(random, true, true, true);
   const AdjustmentResult found = run_bundle_adjustment(survey.input);

@@ -255,15 +255,15 @@ TEST(FitSlenderEllipse, RecoversEllipseFromExactPoints) {
     for (const double degrees : {0.0, 30.0, 90.0, 140.0}) {
       const Ellipse truth = ellipse_of(ratio, degrees * pi / 180);
       const Points points = truth.points(80);
-      const auto fit = fit_slender_ellipse(points, std::vector<double>(points.size(), 1), 0.35);
+      const auto fit = fit_elongated_ellipse(points, std::vector<double>(points.size(), 1), 0.35);
       ASSERT_TRUE(fit) << ratio << " " << degrees;
       EXPECT_THAT(fit->center, IsNear(truth.center, 1e-9));
       EXPECT_THAT(fit->rim_from_circle, IsNear(truth.rim_from_circle(), 1e-8));
     }
   }
-  EXPECT_FALSE(fit_slender_ellipse({}, {}, 0.35));
+  EXPECT_FALSE(fit_elongated_ellipse({}, {}, 0.35));
   const Points line{{0, 0}, {1, 1}, {2, 2}, {3, 3}, {4, 4}, {5, 5}, {6, 6}, {7, 7}};
-  EXPECT_FALSE(fit_slender_ellipse(line, std::vector<double>(line.size(), 1), 0.35));
+  EXPECT_FALSE(fit_elongated_ellipse(line, std::vector<double>(line.size(), 1), 0.35));
 }
 
 TEST(FitSlenderEllipse, CenterCovarianceMatchesScatter) {
@@ -273,7 +273,7 @@ TEST(FitSlenderEllipse, CenterCovarianceMatchesScatter) {
   constexpr int trials = 200;
   for (int trial = 0; trial < trials; ++trial) {
     const Points points = with_noise(truth.points(80), 0.1, random);
-    const auto fit = fit_slender_ellipse(points, std::vector<double>(points.size(), 1), 0.35);
+    const auto fit = fit_elongated_ellipse(points, std::vector<double>(points.size(), 1), 0.35);
     ASSERT_TRUE(fit);
     const Vector2d error = fit->center - truth.center;
     chi_square += error.dot(fit->center_covariance.ldlt().solve(error)) / (2 * trials);

@@ -28,7 +28,7 @@ double coherence_of_drawn(const DrawnLamp& lamp) {
   return coherence_in(render_lamps({lamp}, kPictureSize, CV_16U, 0.5), lamp);
 }
 
-TEST(ComputeStripeSimilarityBetweenLightParts, ReturnsNearlyOneForLampsOfAnyShape) {
+TEST(ComputeStripeCoherenceBetweenParts, ReturnsNearlyOneForLampsOfAnyShape) {
   for (const double period : {3.7, 11.0, 40.0}) {
     EXPECT_GT(coherence_of_drawn(DrawnLamp{.stripes = {.period_lines = period}}), 0.99) << period;
   }
@@ -36,12 +36,12 @@ TEST(ComputeStripeSimilarityBetweenLightParts, ReturnsNearlyOneForLampsOfAnyShap
   EXPECT_GT(coherence_of_drawn(DrawnLamp{.recess = DrawnRecess{}}), 0.97);
 }
 
-TEST(ComputeStripeSimilarityBetweenLightParts, ReturnsAboveNineTenthsWithOneHiddenPart) {
+TEST(ComputeStripeCoherenceBetweenParts, ReturnsAboveNineTenthsWithOneHiddenPart) {
   const DrawnBar bar{std::numbers::pi / 2, 20, 14};
   EXPECT_GT(coherence_of_drawn(DrawnLamp{.bar = bar}), 0.9);
 }
 
-TEST(ComputeStripeSimilarityBetweenLightParts, ReturnsLessThanMinimumForTiltedBars) {
+TEST(ComputeStripeCoherenceBetweenParts, ReturnsLessThanMinimumForTiltedBars) {
   const auto coherence_of_tilted_bars = [](double degrees) {
     DrawnLamp lamp;
     lamp.stripes.period_lines = 0.9 * lamp.radius_px;  // two periods
@@ -62,7 +62,7 @@ TEST(ComputeStripeSimilarityBetweenLightParts, ReturnsLessThanMinimumForTiltedBa
   EXPECT_LT(coherence_of_tilted_bars(12), kMinCoherence);
 }
 
-TEST(ComputeStripeSimilarityBetweenLightParts, HardlyEverExceedsMinimumForIndependentParts) {
+TEST(ComputeStripeCoherenceBetweenParts, HardlyEverExceedsMinimumForIndependentParts) {
   // Patches with the height of a quarter of a period and the width of a part.
   constexpr int trials = 2000, patch = 6;
   Random random(5);
@@ -82,7 +82,7 @@ TEST(ComputeStripeSimilarityBetweenLightParts, HardlyEverExceedsMinimumForIndepe
   EXPECT_LE(coherent, 10);
 }
 
-TEST(ComputeStripeSimilarityBetweenLightParts, ReturnsZeroForTooFewScanlines) {
+TEST(ComputeStripeCoherenceBetweenParts, ReturnsZeroForTooFewScanlines) {
   const DrawnLamp lamp{.stripes = {.period_lines = 170}};
   EXPECT_EQ(coherence_of_drawn(lamp), 0);
   const cv::Mat pixels(120, 120, CV_8U, cv::Scalar(10));

@@ -107,12 +107,11 @@ TEST_F(ArchiveRuns, StoreRunKeepsOneCopyOfRunsReadTwice) {
     for (const RunRecord& run : runs()) records.store_run(run);
   }
   EXPECT_THAT(records.list_run_summaries({}), SizeIs(4));
-  EXPECT_THAT(extract_trend_values(load_metric_of_judged_runs(records, "rms_px", {})),
+  EXPECT_THAT(extract_trend_values(load_metric_values(records, "rms_px", {})),
               ElementsAre(0.3, 0.1, 2));
-  EXPECT_THAT(extract_trend_values(load_metric_of_judged_runs(records, "mean_mm", {})),
+  EXPECT_THAT(extract_trend_values(load_metric_values(records, "mean_mm", {})),
               ElementsAre(0.5, 0.5, 0.5));
-  EXPECT_EQ(find_gate_limit("rms_px", nullptr, records,
-                            load_metric_of_judged_runs(records, "rms_px", {})),
+  EXPECT_EQ(find_gate_limit("rms_px", nullptr, records, load_metric_values(records, "rms_px", {})),
             1);
   EXPECT_STREQ(find_run_metric_kind("mean_mm").unit, "mm");
   EXPECT_TRUE(records.check_records_by_audit_trail("").problems.empty());

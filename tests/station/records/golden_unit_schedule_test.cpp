@@ -229,7 +229,7 @@ class ComputeMeasurementSettingsDigest : public testing::Test {
     folder.file(file, text.replace(at, from.size(), to));
   }
   std::string digest() const {
-    return compute_measurement_settings_digest(read_station_config(folder / "station.yaml"));
+    return hash_measurement_settings(read_station_config(folder / "station.yaml"));
   }
   /// Returns the digest with a temporary change.
   std::string digest_with(const std::string& file, const std::string& from, const std::string& to) {

@@ -80,7 +80,7 @@ TEST_F(KnownRunsTest, ListRunsReturnsStoredAndWaitingRuns) {
   EXPECT_THAT(known.list_run_summaries(only(&RunFilter::verdict, "FAIL")), IsEmpty());
   EXPECT_THAT(known.list_run_summaries(only(&RunFilter::until, "2026")), IsEmpty());
   EXPECT_EQ(known.find_run_by_id(alone).camera, "b");
-  EXPECT_THROW(known.station_records(), std::runtime_error) << "these are not all";
+  EXPECT_THROW(known.records_or_throw(), std::runtime_error) << "these are not all";
   EXPECT_THROW(known.load_matching_runs({}), std::runtime_error);
 }
 

@@ -46,7 +46,7 @@ TEST(EscapeRunTexts, KeepsLineBreaksOnlyInCausesAndCalibration) {
   run.calibration = "camera:\n  id: 1\n";
   run.images = {{"boards", "a\n.png", "", "\x1b"}};
   run.events = {{"", "", "why\n", "who\n"}};
-  const RunRecord printed = escape_run_texts(run);
+  const RunRecord printed = escape_texts_of_run(run);
   EXPECT_EQ(printed.operator_name, "J\\xf6rg\\x0a");
   EXPECT_EQ(printed.causes, run.causes);
   EXPECT_EQ(printed.calibration, run.calibration);

@@ -33,7 +33,7 @@ class RunMetrics : public testing::Test {
     records.store_run(run);
   }
   std::vector<TrendPoint> judged(const RunFilter& filter = {}) {
-    return load_metric_of_judged_runs(records, "rms_px", filter);
+    return load_metric_values(records, "rms_px", filter);
   }
 
   TemporaryFolder folder;
