@@ -63,17 +63,23 @@ void add_shape_to_image(const PixelRays& rays, const PixelWindow& window,
   };
   const auto columns = static_cast<std::size_t>(image.cols);
   std::vector<Eigen::Vector2d> above(columns + 1), below(columns + 1);
+  std::optional<Eigen::Isometry3d> previous_pose;
   for (int row = 0; row < image.rows; ++row) {
     const Eigen::Isometry3d pose = target_from_camera(window.line_begin + row / per_px);
-    const Eigen::Vector3d origin = pose.translation();
-    for (std::size_t i = 0; i <= columns; ++i) {
-      const int column = static_cast<int>(i);
-      above[i] = row % per_px == 0 ? shape.intersect_ray_with_shape(
-                                         origin, pose.linear() * corner_ray(row, column))
-                                   : below[i];
-      below[i] =
-          shape.intersect_ray_with_shape(origin, pose.linear() * corner_ray(row + 1, column));
+    const auto intersect_row = [&](int corner_row, std::vector<Eigen::Vector2d>& points) {
+      for (std::size_t i = 0; i <= columns; ++i) {
+        points[i] = shape.intersect_ray_with_shape(
+            pose.translation(), pose.linear() * corner_ray(corner_row, static_cast<int>(i)));
+      }
+    };
+    // Rows seen from one pose share their corners: all rows unless camera or target moves.
+    if (previous_pose && previous_pose->matrix() == pose.matrix()) {
+      std::swap(above, below);
+    } else {
+      intersect_row(row, above);
     }
+    intersect_row(row + 1, below);
+    previous_pose = pose;
     std::optional<Edge> left;
     for (std::size_t i = 0; i < columns; ++i) {
       float& element = image(row, static_cast<int>(i));
