@@ -8,11 +8,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <opencv2/calib3d.hpp>
 #include <utility>
 #include <vector>
 
 #include "calibration/intrinsics/rotation_vector.h"
+#include "detection/boards/opencv_boards_library.h"
 #include "geometry/frames.h"
 #include "geometry/median.h"
 
@@ -93,8 +93,8 @@ std::optional<ViewPose> refine_pose(Corners corners, const Lens& lens, RigidPose
                   std::sqrt(squares / (2 * static_cast<double>(corners.size())))};
 }
 
-RigidPose make_rigid_pose(const cv::Mat& rotation, const cv::Mat& translation) {
-  const Eigen::Vector3d r(rotation.ptr<double>()), t(translation.ptr<double>());
+RigidPose make_rigid_pose(const PlanarPose& pose) {
+  const Eigen::Vector3d r(pose.rotation_vector.val), t(pose.translation_m.val);
   const double angle = r.norm();
   const Eigen::Vector3d axis = angle > 0 ? (r / angle).eval() : Eigen::Vector3d::UnitX();
   return {Eigen::AngleAxisd(angle, axis).toRotationMatrix(), t};
@@ -123,12 +123,9 @@ std::optional<ViewPose> estimate_board_view_pose(Corners corners, const Lens& le
     normalized.emplace_back(z.x(), z.y());
   }
   if (in_board.size() < 4) return {};
-  std::vector<cv::Mat> rotations, translations;
-  cv::solvePnPGeneric(in_board, normalized, cv::Matx33d::eye(), cv::noArray(), rotations,
-                      translations, false, cv::SOLVEPNP_IPPE);
   std::optional<ViewPose> best;
-  for (std::size_t i = 0; i < rotations.size(); ++i) {
-    const RigidPose rotated = make_rigid_pose(rotations[i], translations[i]);
+  for (const PlanarPose& estimate : estimate_planar_poses(in_board, normalized)) {
+    const RigidPose rotated = make_rigid_pose(estimate);
     const auto pose = refine_pose(corners, lens,
                                   {turned_from_camera.transpose() * rotated.rotation,
                                    turned_from_camera.transpose() * rotated.translation_m});

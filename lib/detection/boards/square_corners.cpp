@@ -5,18 +5,16 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "detection/boards/edge_crossing.h"
 #include "detection/boards/lattice_order.h"
+#include "detection/boards/opencv_boards_library.h"
 #include "detection/boards/tag_pattern.h"
 #include "geometry/homography.h"
 
 namespace vlp {
 namespace {
-
-constexpr int kFlags = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE;
 
 /// Returns true if the pixel lies in the image; false if it is not finite.
 bool is_in_image(const Eigen::Vector2d& pixel, const cv::Mat& image) {
@@ -41,9 +39,6 @@ cv::Mat reduce_image(const cv::Mat& image, int times) {
 double scale_to_full_resolution(float at, int large, int small) {
   return (static_cast<double>(at) + 0.5) * large / small - 0.5;
 }
-
-/// Seeds OpenCV's random number generator equally for each image, so that results are reproducible.
-void seed_random_generator() { cv::theRNG().state = 1; }
 
 }  // namespace
 
@@ -81,10 +76,9 @@ std::vector<PointDetection> SquareCorners::refine_corner_guesses(const std::vect
 
 std::vector<PointDetection> SquareCorners::detect_chessboard_corners(
     const GrayLevels& image) const {
-  std::vector<cv::Point2f> found;
   const cv::Mat searched = reduce_image(image.sharp, choose_reduction_factor(image.sharp));
-  seed_random_generator();
-  if (!cv::findChessboardCornersSB(searched, {cols_, rows_}, found, kFlags)) return {};
+  const std::vector<cv::Point2f> found = find_chessboard_corners(searched, {cols_, rows_});
+  if (found.empty()) return {};
   std::vector<PointDetection> points;
   const bool whole = searched.size() == image.sharp.size();
   for (std::size_t i = 0; i < found.size(); ++i) {
@@ -156,15 +150,9 @@ std::array<int, 2> detect_chessboard_size_in_squares(const cv::Mat& image) {
   if (std::min(image.cols, image.rows) < min_px) return {0, 0};
   const cv::Mat1b levels =
       reduce_image(scale_image_to_8_bits(image), choose_reduction_factor(image));
-  std::vector<cv::Point2f> corners;
-  cv::Mat squares;
-  seed_random_generator();
-  if (!cv::findChessboardCornersSB(levels, {3, 3}, corners, kFlags | cv::CALIB_CB_LARGER,
-                                   squares)) {
-    return {0, 0};
-  }
-  // The metadata have one entry per corner.
-  return {squares.cols + 1, squares.rows + 1};
+  const cv::Size corners = find_chessboard_size_in_corners(levels, {3, 3});
+  if (corners.empty()) return {0, 0};
+  return {corners.width + 1, corners.height + 1};
 }
 
 namespace {

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
+#include <opencv2/calib3d.hpp>
 #include <opencv2/core/version.hpp>
 // OpenCV 4.7 moved ArUco from its extra modules into objdetect, with another interface.
 #if CV_VERSION_MAJOR > 4 || CV_VERSION_MINOR >= 7
@@ -13,7 +14,7 @@
 #include <map>
 #include <stdexcept>
 
-#include "detection/boards/tag_finder.h"
+#include "detection/boards/opencv_boards_library.h"
 
 namespace vlp {
 namespace {
@@ -121,9 +122,7 @@ class ArucoFinder : public TagFinder {
   int border_bits_;
 };
 
-}  // namespace
-
-ArucoMarker make_aruco_marker(const std::string& name, int id) {
+ArucoMarker make_marker(const std::string& name, int id) {
   const Dictionary dictionary = cv::aruco::getPredefinedDictionary(find_dictionary(name));
   const cv::Mat& codes = get_aruco_dictionary(dictionary).bytesList;
   const int width = get_aruco_dictionary(dictionary).markerSize;
@@ -138,8 +137,53 @@ ArucoMarker make_aruco_marker(const std::string& name, int id) {
   return marker;
 }
 
-std::unique_ptr<TagFinder> make_aruco_detector(const Board& board) {
+std::unique_ptr<TagFinder> make_aruco_finder(const Board& board) {
   return std::make_unique<ArucoFinder>(board);
 }
 
+constexpr int kChessboardFlags = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE;
+
+/// Seeds OpenCV's random number generator equally for each image, so that results are reproducible.
+void seed_random_generator() { cv::theRNG().state = 1; }
+
+std::vector<cv::Point2f> find_corners(const cv::Mat& image, const cv::Size& size) {
+  std::vector<cv::Point2f> corners;
+  seed_random_generator();
+  if (!cv::findChessboardCornersSB(image, size, corners, kChessboardFlags)) return {};
+  return corners;
+}
+
+cv::Size find_size_in_corners(const cv::Mat& image, const cv::Size& min_size) {
+  std::vector<cv::Point2f> corners;
+  cv::Mat corner_metadata;  // one element per corner
+  seed_random_generator();
+  const bool found = cv::findChessboardCornersSB(
+      image, min_size, corners, kChessboardFlags | cv::CALIB_CB_LARGER, corner_metadata);
+  return found ? corner_metadata.size() : cv::Size();
+}
+
+std::vector<PlanarPose> estimate_poses(const std::vector<cv::Point3d>& in_board_m,
+                                       const std::vector<cv::Point2d>& normalized) {
+  std::vector<cv::Mat> rotations, translations;
+  cv::solvePnPGeneric(in_board_m, normalized, cv::Matx33d::eye(), cv::noArray(), rotations,
+                      translations, false, cv::SOLVEPNP_IPPE);
+  std::vector<PlanarPose> poses;
+  poses.reserve(rotations.size());
+  for (std::size_t i = 0; i < rotations.size(); ++i) {
+    poses.push_back(
+        {cv::Vec3d(rotations[i].ptr<double>()), cv::Vec3d(translations[i].ptr<double>())});
+  }
+  return poses;
+}
+
+}  // namespace
 }  // namespace vlp
+
+/// The function that opencv_boards_library.cpp calls.
+extern "C" __attribute__((visibility("default"))) const vlp::OpencvBoardFunctions*
+vlp_opencv_board_functions() {
+  static constexpr vlp::OpencvBoardFunctions functions{
+      &vlp::make_aruco_finder, &vlp::make_marker, &vlp::find_corners, &vlp::find_size_in_corners,
+      &vlp::estimate_poses};
+  return &functions;
+}

@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/boards/opencv_boards_library.h"
+
+#include <dlfcn.h>
+
+#include "codecs/load_function.h"
+
+namespace vlp {
+namespace {
+
+const OpencvBoardFunctions& opencv_board_functions() {
+  using Get = const OpencvBoardFunctions* (*)();
+  // POSIX allows the conversion of a symbol's address to a function pointer.
+  static const auto get = reinterpret_cast<Get>(  // NOLINT
+      load_library_function(VLP_OPENCV_BOARDS_LIBRARY, "vlp_opencv_board_functions",
+                            "boards cannot be detected", RTLD_NOW));
+  return *get();
+}
+
+}  // namespace
+
+std::unique_ptr<TagFinder> make_aruco_detector(const Board& board) {
+  return opencv_board_functions().make_aruco_detector(board);
+}
+
+ArucoMarker make_aruco_marker(const std::string& dictionary, int id) {
+  return opencv_board_functions().make_aruco_marker(dictionary, id);
+}
+
+std::vector<cv::Point2f> find_chessboard_corners(const cv::Mat& image, const cv::Size& size) {
+  return opencv_board_functions().find_chessboard_corners(image, size);
+}
+
+cv::Size find_chessboard_size_in_corners(const cv::Mat& image, const cv::Size& min_size) {
+  return opencv_board_functions().find_chessboard_size_in_corners(image, min_size);
+}
+
+std::vector<PlanarPose> estimate_planar_poses(const std::vector<cv::Point3d>& in_board_m,
+                                              const std::vector<cv::Point2d>& normalized) {
+  return opencv_board_functions().estimate_planar_poses(in_board_m, normalized);
+}
+
+}  // namespace vlp

@@ -1,0 +1,49 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "detection/boards/tag_finder.h"
+
+/// Functions of OpenCV's modules calib3d and aruco. They are in a separate library, which is loaded
+/// at the first call, because these modules load two others, and most programs see no board.
+/// Each function throws std::runtime_error if the library cannot be loaded.
+namespace vlp {
+
+/// Returns the inner corners of a chessboard of `size` corners per row and column, row by row,
+/// pixels. Empty if the image shows no such board. Equal images give equal corners.
+std::vector<cv::Point2f> find_chessboard_corners(const cv::Mat& image, const cv::Size& size);
+
+/// Returns the number of inner corners per row and column of the chessboard in the image; (0, 0) if
+/// there is none of `min_size` or more.
+cv::Size find_chessboard_size_in_corners(const cv::Mat& image, const cv::Size& min_size);
+
+/// Pose of a board: rotation vector (axis times angle, rad) and translation, m, from the board
+/// frame to the camera frame.
+struct PlanarPose {
+  cv::Vec3d rotation_vector, translation_m;
+};
+
+/// Returns the two poses of a planar board that agree best with observed points, by IPPE (Collins
+/// and Bartoli, 2014).
+/// @param in_board_m  four or more points of the board, z = 0, m
+/// @param normalized  their images on the plane z = 1 of the camera frame
+std::vector<PlanarPose> estimate_planar_poses(const std::vector<cv::Point3d>& in_board_m,
+                                              const std::vector<cv::Point2d>& normalized);
+
+/// Addresses of the functions of opencv_boards_adapter.cpp that implement the functions above,
+/// make_aruco_detector() and make_aruco_marker().
+struct OpencvBoardFunctions {
+  std::unique_ptr<TagFinder> (*make_aruco_detector)(const Board&);
+  ArucoMarker (*make_aruco_marker)(const std::string&, int);
+  std::vector<cv::Point2f> (*find_chessboard_corners)(const cv::Mat&, const cv::Size&);
+  cv::Size (*find_chessboard_size_in_corners)(const cv::Mat&, const cv::Size&);
+  std::vector<PlanarPose> (*estimate_planar_poses)(const std::vector<cv::Point3d>&,
+                                                   const std::vector<cv::Point2d>&);
+};
+
+}  // namespace vlp
