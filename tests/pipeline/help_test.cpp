@@ -84,14 +84,15 @@ TEST_P(Help, LinesFitIn80Columns) {
   }
 }
 
-/// The codecs of images, with all that they bring, are loaded at the first image.
-TEST_P(Help, ProgramLinksNoImageCodecs) {
+/// The codecs of images and the board modules of OpenCV are loaded at the first image and board.
+TEST_P(Help, ProgramLinksNoImageCodecsOrBoardModules) {
   const auto libraries =
       run_program(std::string("ldd " VLP_PROGRAMS_DIR "/") + GetParam() + " | sort");
   ASSERT_EQ(libraries.exit_code, 0) << libraries.errors;
   EXPECT_THAT(libraries.output, HasSubstr("libc.so"));
-  for (const char* codec : {"libopencv_imgcodecs", "libopencv_videoio", "libgdal", "libavcodec"}) {
-    EXPECT_THAT(libraries.output, testing::Not(HasSubstr(codec)));
+  for (const char* library : {"libopencv_imgcodecs", "libopencv_videoio", "libgdal", "libavcodec",
+                              "libopencv_calib3d", "libopencv_aruco", "libopencv_objdetect"}) {
+    EXPECT_THAT(libraries.output, testing::Not(HasSubstr(library)));
   }
 }
 
