@@ -14,10 +14,8 @@ namespace {
 
 constexpr std::size_t kNeighbors = 8;
 
-using Corners = std::vector<BoardLattice::Corner>;
-
 /// Returns the nearest corners on the board, without those in `is_outlier`.
-std::vector<std::size_t> find_nearest_corners(const Corners& corners,
+std::vector<std::size_t> find_nearest_corners(const std::vector<BoardLattice::Corner>& corners,
                                               const std::vector<bool>& is_outlier,
                                               std::size_t middle) {
   std::vector<std::pair<double, std::size_t>> away;
@@ -34,8 +32,8 @@ std::vector<std::size_t> find_nearest_corners(const Corners& corners,
 
 /// Returns the distance of a corner from its predicted position, relative to the limit; 0 with too
 /// few neighbors.
-double compute_displacement_ratio(const Corners& corners, const std::vector<std::size_t>& nearest,
-                                  std::size_t middle) {
+double compute_displacement_ratio(const std::vector<BoardLattice::Corner>& corners,
+                                  const std::vector<std::size_t>& nearest, std::size_t middle) {
   constexpr double max_fraction = 0.25, min_px = 3;
   if (nearest.size() < kNeighbors) return 0;
   std::vector<PlanePair> pairs;
@@ -58,7 +56,7 @@ double compute_displacement_ratio(const Corners& corners, const std::vector<std:
 
 }  // namespace
 
-std::vector<std::size_t> find_corner_outliers(const Corners& corners) {
+std::vector<std::size_t> find_corner_outliers(const std::vector<BoardLattice::Corner>& corners) {
   constexpr std::size_t min_corners_per_outlier = 10;  // at most one in ten
   std::vector<bool> is_outlier(corners.size(), false);
   std::vector<std::vector<std::size_t>> nearest(corners.size());
