@@ -254,8 +254,7 @@ void print_station_run_list(const StationRecordsOptions& options) {
         "{} of them with a hook that failed or did not finish: 'vlp-station hook' runs it again\n",
         without);
   }
-  known->records_or_throw();  // throws if the records are unavailable, because the list is
-                              // incomplete
+  known->records_or_throw();  // an incomplete list is an error
 }
 
 void print_station_run_details(const StationRecordsOptions& options) {
