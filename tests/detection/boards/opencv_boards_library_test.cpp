@@ -1,0 +1,69 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/boards/opencv_boards_library.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+namespace vlp {
+namespace {
+
+TEST(EstimatePlanarPoses, OnePoseIsExactForExactPoints) {
+  const Eigen::Vector3d rotation_vector(0.3, -0.4, 0.7), translation_m(0.1, -0.05, 0.8);
+  const Eigen::AngleAxisd rotation(rotation_vector.norm(), rotation_vector.normalized());
+  std::vector<cv::Point3d> in_board_m;
+  std::vector<cv::Point2d> normalized;
+  for (const double x : {0.0, 0.1, 0.2}) {
+    for (const double y : {0.0, 0.15}) {
+      const Eigen::Vector2d z = (rotation * Eigen::Vector3d(x, y, 0) + translation_m).hnormalized();
+      in_board_m.emplace_back(x, y, 0);
+      normalized.emplace_back(z.x(), z.y());
+    }
+  }
+  const auto poses = estimate_planar_poses(in_board_m, normalized);
+  ASSERT_FALSE(poses.empty());
+  EXPECT_TRUE(std::ranges::any_of(poses, [&](const PlanarPose& pose) {
+    return Eigen::Vector3d(pose.rotation_vector.val).isApprox(rotation_vector, 1e-6) &&
+           Eigen::Vector3d(pose.translation_m.val).isApprox(translation_m, 1e-6);
+  }));
+}
+
+/// Returns a chessboard of `columns` x `rows` squares of 40 px on white.
+cv::Mat1b draw_chessboard(int columns, int rows) {
+  constexpr int square_px = 40;
+  cv::Mat1b image((rows + 2) * square_px, (columns + 2) * square_px, uchar{255});
+  for (int row = 0; row < rows; ++row) {
+    for (int column = row % 2; column < columns; column += 2) {
+      image({(column + 1) * square_px, (row + 1) * square_px, square_px, square_px}) = uchar{0};
+    }
+  }
+  return image;
+}
+
+TEST(FindChessboardCorners, ReturnsAllInnerCorners) {
+  const auto corners = find_chessboard_corners(draw_chessboard(7, 6), {6, 5});
+  ASSERT_EQ(corners.size(), 30U);
+  // Corners are on the borders between pixels, which are half a pixel from their centers.
+  EXPECT_NEAR(corners.front().x, 79.5, 0.1);
+  EXPECT_NEAR(corners.front().y, 79.5, 0.1);
+}
+
+TEST(FindChessboardCorners, ReturnsNoneForImageWithoutBoard) {
+  EXPECT_THAT(find_chessboard_corners(cv::Mat1b(200, 300, uchar{128}), {6, 5}), testing::IsEmpty());
+}
+
+TEST(FindChessboardSizeInCorners, ReturnsSizeOfLargerBoard) {
+  const cv::Size size = find_chessboard_size_in_corners(draw_chessboard(7, 6), {3, 3});
+  EXPECT_EQ(std::min(size.width, size.height), 5);
+  EXPECT_EQ(std::max(size.width, size.height), 6);
+}
+
+TEST(FindChessboardSizeInCorners, ReturnsZeroForImageWithoutBoard) {
+  EXPECT_EQ(find_chessboard_size_in_corners(cv::Mat1b(200, 300, uchar{128}), {3, 3}), cv::Size());
+}
+
+}  // namespace
+}  // namespace vlp
