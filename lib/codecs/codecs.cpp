@@ -15,12 +15,9 @@ namespace {
 constexpr const char* kProblem = "images cannot be read or written";
 
 const Codecs& load_codecs() {
-  using Make = const Codecs* (*)();
   // Binding the functions of all its libraries at once takes 15 ms.
-  // POSIX allows the conversion of a symbol's address to a function pointer.
-  const auto make = reinterpret_cast<Make>(  // NOLINT
-      load_library_function(VLP_CODECS_LIBRARY, "vlp_codecs", kProblem, RTLD_LAZY));
-  return *make();
+  return *load_library_function<const Codecs*()>(VLP_CODECS_LIBRARY, "vlp_codecs", kProblem,
+                                                 RTLD_LAZY)();
 }
 
 /// Returns true if the header is that of a gray PNG image with 8 or 16 bits. The signature and the
@@ -35,9 +32,8 @@ bool is_gray_png(std::string_view bytes) {
 
 /// Decodes a gray PNG image. Returns an empty matrix if it cannot be decoded.
 cv::Mat decode_gray_png(std::string_view bytes) {
-  using Decode = bool (*)(std::string_view, cv::Mat&);
-  static const auto decode = reinterpret_cast<Decode>(  // NOLINT: as above
-      load_library_function(VLP_PNG_LIBRARY, "vlp_decode_gray_png", kProblem, RTLD_LAZY));
+  static auto* const decode = load_library_function<bool(std::string_view, cv::Mat&)>(
+      VLP_PNG_LIBRARY, "vlp_decode_gray_png", kProblem, RTLD_LAZY);
   cv::Mat image;
   return decode(bytes, image) ? image : cv::Mat();
 }

@@ -6,17 +6,27 @@
 
 namespace vlp {
 
-/// Loads a shared library and returns the address of one of its functions. The library is searched
-/// in the run path of the program and is never unloaded.
+/// Returns the address of a function of a shared library; implements load_library_function().
+void* load_library_symbol(const char* library, const char* function, const std::string& problem,
+                          int binding);
+
+/// Loads a shared library and returns one of its functions. The library is searched in the run path
+/// of the program and is never unloaded.
 ///
-/// @param library   file name of the library
-/// @param function  name of an extern "C" function
-/// @param problem   beginning of the error message, such as "images cannot be read or written"
-/// @param binding   RTLD_NOW; or RTLD_LAZY to bind functions when they are called, which starts
+/// @tparam Function  type of the function, such as int(double)
+/// @param library    file name of the library
+/// @param function   name of an extern "C" function
+/// @param problem    beginning of the error message, such as "images cannot be read or written"
+/// @param binding    RTLD_NOW; or RTLD_LAZY to bind functions when they are called, which starts
 ///     faster, but ends the process if one is missing
-/// @return          address of the function, not null
+/// @return           the function, not null
 /// @throws std::runtime_error if the library cannot be loaded or lacks the function
-void* load_library_function(const char* library, const char* function, const std::string& problem,
-                            int binding);
+template <typename Function>
+Function* load_library_function(const char* library, const char* function,
+                                const std::string& problem, int binding) {
+  // POSIX allows the conversion of a symbol's address to a function pointer.
+  return reinterpret_cast<Function*>(  // NOLINT
+      load_library_symbol(library, function, problem, binding));
+}
 
 }  // namespace vlp

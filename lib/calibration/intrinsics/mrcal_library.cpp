@@ -10,12 +10,9 @@ namespace vlp {
 namespace {
 
 const MrcalFunctions& mrcal_functions() {
-  using Get = const MrcalFunctions* (*)();
-  // POSIX allows the conversion of a symbol's address to a function pointer.
-  static const auto get = reinterpret_cast<Get>(  // NOLINT
-      load_library_function(VLP_MRCAL_LIBRARY, "vlp_mrcal_functions", "lenses cannot be solved",
-                            RTLD_NOW));
-  return *get();
+  static const MrcalFunctions& functions = *load_library_function<const MrcalFunctions*()>(
+      VLP_MRCAL_LIBRARY, "vlp_mrcal_functions", "lenses cannot be solved", RTLD_NOW)();
+  return functions;
 }
 
 }  // namespace

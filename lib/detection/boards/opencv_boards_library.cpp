@@ -10,12 +10,11 @@ namespace vlp {
 namespace {
 
 const OpencvBoardFunctions& opencv_board_functions() {
-  using Get = const OpencvBoardFunctions* (*)();
-  // POSIX allows the conversion of a symbol's address to a function pointer.
-  static const auto get = reinterpret_cast<Get>(  // NOLINT
-      load_library_function(VLP_OPENCV_BOARDS_LIBRARY, "vlp_opencv_board_functions",
-                            "boards cannot be detected", RTLD_NOW));
-  return *get();
+  static const OpencvBoardFunctions& functions =
+      *load_library_function<const OpencvBoardFunctions*()>(
+          VLP_OPENCV_BOARDS_LIBRARY, "vlp_opencv_board_functions", "boards cannot be processed",
+          RTLD_NOW)();
+  return functions;
 }
 
 }  // namespace

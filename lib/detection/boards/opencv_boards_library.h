@@ -10,7 +10,7 @@
 #include "detection/boards/tag_finder.h"
 
 /// Functions of OpenCV's modules calib3d and aruco. They are in a separate library, which is loaded
-/// at the first call, because these modules load two others, and most programs see no board.
+/// at the first call, because these modules load two others and most programs process no board.
 /// Each function throws std::runtime_error if the library cannot be loaded.
 namespace vlp {
 
