@@ -6,7 +6,6 @@
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
-#include <chrono>
 #include <cstdio>
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -42,10 +41,10 @@ class HostileStation : public SmallStation {
     return run_program("timeout 30 vlp-station " + command + " --station " +
                        (home / "station.yaml").string() + " " + options);
   }
-  /// Runs a unit without images, which is INVALID immediately.
-  ProgramResult empty_run(const std::string& options = "",
-                          const std::string& camera = "0001") const {
-    return vlp_station("run", "--camera-id " + camera + " --idle-s 0.1 " + options);
+  /// Runs a unit without images, which is INVALID after idle_s.
+  ProgramResult empty_run(const std::string& options = "", const std::string& camera = "0001",
+                          const std::string& idle_s = "0.1") const {
+    return vlp_station("run", "--camera-id " + camera + " --idle-s " + idle_s + " " + options);
   }
   /// Returns the id of the only run in the records.
   std::string name_of_run() const {
@@ -206,7 +205,7 @@ const std::vector<StationTrial> kFolderTrials{
        cv::VideoWriter(video, cv::CAP_OPENCV_MJPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 10,
                        {800, 600})
            .write(cv::Mat::zeros(600, 800, CV_8UC3));
-       return s.empty_run("--source boards=" + video);
+       return s.empty_run("--source boards=" + video, "0001", "5");  // until the frame is decoded
      },
      3, "is not judged",
      [](const HostileStation& s, const ProgramResult&) {
@@ -544,21 +543,20 @@ TEST_F(HostileStation, ListEndsWithinTimeAndMemoryForHugeSpoolFiles) {
       {"more than 64 MiB", std::string(limit_bytes + 1, 'x')}};
   const auto script =
       folder.file("measure.py",
-                  "import os, subprocess, sys, time\n"
-                  "begun = time.monotonic()\n"
+                  "import os, subprocess, sys\n"
                   "process = subprocess.Popen(sys.argv[1:], stdout=subprocess.DEVNULL)\n"
                   "usage = os.wait4(process.pid, 0)[2]\n"
-                  "print(time.monotonic() - begun, usage.ru_maxrss / 1024)\n");
+                  "print(usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)\n");
   for (const auto& [name, text] : files) {
     write("spool/a.json", text);
     const auto measured =
         run_program("python3 " + script.string() + " vlp-station list --station " +
                     (home / "station.yaml").string());
-    double seconds = 0, megabytes = 0;
-    std::istringstream(measured.output) >> seconds >> megabytes;
-    std::printf("%-18s %5.2f s %5.0f MB\n", name.c_str(), seconds, megabytes);
-    EXPECT_GT(seconds, 0) << measured.errors;
-    EXPECT_LT(seconds, 10);
+    double processor_s = 0, megabytes = 0;
+    std::istringstream(measured.output) >> processor_s >> megabytes;
+    std::printf("%-18s %5.2f s %5.0f MB\n", name.c_str(), processor_s, megabytes);
+    EXPECT_GT(processor_s, 0) << measured.errors;
+    EXPECT_LT(processor_s, 10);
     EXPECT_LT(megabytes, 500);
   }
 }
@@ -567,13 +565,9 @@ class HostileFolder : public HostileStation, public testing::WithParamInterface<
 
 TEST_P(HostileFolder, ProgramEndsWithExpectedExitCodeAndWritesNothingOutside) {
   const StationTrial& trial = GetParam();
-  const auto begun = std::chrono::steady_clock::now();
   const ProgramResult result = trial.run(*this);
-  const auto duration = std::chrono::steady_clock::now() - begun;
   EXPECT_EQ(result.exit_code, trial.exit_code) << result.output << result.errors;
   EXPECT_THAT(result.errors, HasSubstr(trial.message));
-  constexpr std::chrono::seconds long_enough(20);
-  EXPECT_LT(duration, long_enough);
   if (trial.check) trial.check(*this, result);
   expect_nothing_outside();
 }
