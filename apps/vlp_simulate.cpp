@@ -67,7 +67,7 @@ int main(int argc, char** argv) {
       "records them, with ground truth. An interrupted run continues.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-simulate datasets/paper-rig/scene.yaml --only sample \\\n"
-      "    -o out/paper-rig\n",
+      "    -o out/rig\n",
       "vlp-simulate");
   vlp::Options options;
   app.add_option("scene", options.scene, "Scene file, .yaml")->required();

@@ -71,7 +71,7 @@ tests/bare_root.sh "${root[@]}" --bind "$scratch" /packages "$release" '
     # Runs the first commands of README.md with nothing but the files of the package.
     mkdir /packages/first
     sed -n "/^    mkdir -p out && cp/p; s/^    \(vlp-.*\)/\1/p" ../../README.md >/packages/first/commands
-    (cd /packages/first && bash -euo pipefail commands >>/packages/install.log && test -s out/chain-results/report.html)
+    (cd /packages/first && bash -euo pipefail commands >>/packages/install.log && test -s out/results/report.html)
     echo "a whole calibration and its report $((SECONDS - begin)) s after the first command"
     archive=/packages/archive
     vlp-simulate --quiet ../archive/scene.yaml --archive 2 -o $archive
