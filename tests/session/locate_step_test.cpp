@@ -47,6 +47,14 @@ TEST(LocateCameraFromDetections, CountsCapturesWithRejectedLamps) {
               testing::Contains(HasSubstr("3 detections that contradict the others")));
 }
 
+TEST(LocateCameraFromDetections, CountsDetectionsOfLampsMissingInMap) {
+  LocateInput input = example();
+  ASSERT_GT(input.frames.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) input.frames[i].detections.push_back({99, {400, 300}, 0.05});
+  EXPECT_THAT(locate_camera_from_detections(input).warnings,
+              ElementsAre("2 detections of lamps not in the map, rejected"));
+}
+
 /// Input with captures of a camera that drives at 1 m/s, about which nothing is stated.
 LocateInput drive_without_stated_motion(double sigma_px) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};

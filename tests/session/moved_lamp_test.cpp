@@ -8,6 +8,7 @@
 #include <array>
 #include <numbers>
 
+#include "calibration/adjustment/survey.h"
 #include "session/adjust_step.h"
 #include "session/dispersion_step.h"
 #include "session/locate_step.h"
@@ -125,6 +126,22 @@ TEST_F(MovedLamp, NoStepWarnsOfLampWhenMapIsCorrect) {
     EXPECT_TRUE(result.has_succeeded()) << result.message;
     EXPECT_THAT(result.warnings, Each(Not(HasSubstr("lamp "))));
   }
+}
+
+TEST_F(MovedLamp, AdjustmentReplacesCovarianceOfLens) {
+  take_captures({0, 0});
+  Calibration with_report = camera;
+  with_report.intrinsics_report =
+      IntrinsicsReport{40, 4000, 0, 0.1, {}, {}, lens_covariance(camera.camera, 0.1, 8)};
+  const AdjustStepResult result = run_joint_adjustment_step(
+      {{{"check", check, {}}}, map, kFile, with_report, "camera.yaml", 1e-3, {}}, {});
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
+  const auto& report = result.calibration.intrinsics_report;
+  ASSERT_TRUE(report && report->covariance && result.calibration.adjustment);
+  const Eigen::Index count = report->covariance->rows();
+  EXPECT_EQ(count, with_report.intrinsics_report->covariance->rows());
+  EXPECT_EQ(*report->covariance,
+            result.calibration.adjustment->covariance.topLeftCorner(count, count));
 }
 
 /// Captures of a large room tie few of its lamps together. The captures that fit a mirrored map by

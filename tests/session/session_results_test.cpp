@@ -192,11 +192,13 @@ TEST_F(SessionResultsTest, RemovesOutputsOfRecordedStepsIfOutputListIsMissing) {
   }
   fs::remove(results / "steps/outputs");
   folder.file("results/line-y-fixes.csv", "mine");
+  folder.file("results/rotation-fixes.csv", "mine");
   SessionResults now(results, session);
   now.set_steps_and_remove_stale_files(kPlan);
   EXPECT_TRUE(now.find_cached_step_result("lens", "key of the lens"));
   EXPECT_FALSE(fs::exists(results / "line-x-fixes.csv"));
   EXPECT_TRUE(fs::exists(results / "line-y-fixes.csv"));
+  EXPECT_TRUE(fs::exists(results / "rotation-fixes.csv")) << "only drives have fixes";
 }
 
 TEST_F(SessionResultsTest, RemoveOutputsOfLaterStepsKeepsNamedStep) {

@@ -13,6 +13,8 @@
 #include "rig/calibration_error.h"
 #include "session/dispersion_step.h"
 #include "session/rotation_step.h"
+#include "support/body_rig.h"
+#include "support/matchers.h"
 #include "support/station_verdicts.h"
 
 namespace vlp {
@@ -107,6 +109,54 @@ TEST(SequentialCalibration, LensJacobiansPredictChangeOfZenithAndOffset) {
   EXPECT_LT((offset - offset_said).norm(), 0.02 * zenith.norm());
 }
 
+TEST(RunDispersionCalibrationStep, HasNoZenithJacobianWithoutZenithCovariance) {
+  Random random(5);
+  const CalibrationChain row(random, 0.1);
+  LampCaptures leveled = row.turns;
+  leveled.calibration = row.calibrated();
+  ASSERT_TRUE(leveled.calibration.rotation_center->covariance);
+  const auto disperse = [&] {
+    return run_dispersion_calibration_step(leveled, row.known, DispersionMethod::camera,
+                                           DispersionCircle::mean, {});
+  };
+  EXPECT_TRUE(disperse().fit.dispersion.jacobian_wrt_zenith);
+  leveled.calibration.rotation_center->covariance.reset();
+  const DispersionResult dispersion = disperse();
+  ASSERT_TRUE(dispersion.has_succeeded());
+  EXPECT_FALSE(dispersion.fit.dispersion.jacobian_wrt_zenith);
+}
+
+/// All lamps hang at one height h above the camera: a lever arm error e moves the offset by f e /
+/// h.
+TEST(RunDispersionCalibrationStep, OffsetCovarianceIncludesLeverArmCovarianceForPlacesOfAxis) {
+  constexpr double lever_arm_sd_m = 1e-3;
+  for (const MeasuredPoint of : {MeasuredPoint::camera, MeasuredPoint::axis}) {
+    Random random(6);
+    const CalibrationChain row(random, 0.1, of);
+    LampCaptures leveled = row.turns;
+    leveled.calibration = row.calibrated();
+    RotationCenter& center = *leveled.calibration.rotation_center;
+    ASSERT_TRUE(center.lever_arm_covariance);
+    const auto compute_offset_covariance = [&] {
+      const DispersionResult dispersion = run_dispersion_calibration_step(
+          leveled, row.known, DispersionMethod::camera, DispersionCircle::mean, {});
+      EXPECT_TRUE(dispersion.fit.dispersion.covariance);
+      return dispersion.fit.dispersion.covariance.value_or(Matrix2::Zero());
+    };
+    const Matrix2 before = compute_offset_covariance();
+    *center.lever_arm_covariance += lever_arm_sd_m * lever_arm_sd_m * Matrix2::Identity();
+    const Matrix2 added = compute_offset_covariance() - before;
+    if (of == MeasuredPoint::camera) {
+      EXPECT_EQ(added, Matrix2::Zero());
+      continue;
+    }
+    const double height_m = row.survey.truth.map.lamps.front().position_m.z();
+    const Eigen::Vector2d sd_px = lever_arm_sd_m / height_m * leveled.calibration.camera.focal_px();
+    const Matrix2 expected = sd_px.cwiseAbs2().asDiagonal();
+    EXPECT_THAT(added, IsNear(expected, 0.02 * expected(0, 0)));
+  }
+}
+
 /// Rotations at yaws that barely determine the circles. A lens error changes the set of determined
 /// circles, which moves their mean by up to 14 times the effect of the error itself.
 TEST(RunRotationCalibrationStep, CircleMethodErrorFromLensIsWithin50PercentOfJointMethod) {
@@ -174,6 +224,25 @@ TEST(RunTiltCalibrationStep, LensJacobianPredictsChangeOfZenith) {
       compute_normalized_zenith_point(leveled()) - compute_normalized_zenith_point(exact);
   EXPECT_GT(moved.norm(), 1e-6);
   EXPECT_LT((moved - *exact.jacobian_wrt_intrinsics * error).norm(), 0.05 * moved.norm());
+}
+
+/// The camera moves by 8 mm between the readout of the middle row and that of the last.
+TEST(RunTiltCalibrationStep, TiltMatchesTruthForMovingCameraWithKnownMotion) {
+  BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
+  const Calibration camera = rig.calibration;
+  rig.calibration.rotation_center = tilted_by(camera.camera, 0.02, 1);
+  LampCaptures drive{{}, rig.map, "lamps.yaml", camera};
+  for (int k = 0; k < 40; ++k) {
+    rig.body.pose = {{0.03 * (k % 8) - 0.1, 0.04 * (k / 8) - 0.1, 0}, 0.5 * k};
+    rig.body.motion = {{0.4, -0.3}, 0, {0, 0}};
+    drive.frames.push_back({std::to_string(k), seen_from(rig, 0.01)});
+    drive.motions.push_back({rig.body.motion.velocity_m_per_s, 0, 1e-4, 1e-4});
+  }
+  const TiltResult result = run_tilt_calibration_step(drive, false, {});
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
+  ASSERT_TRUE(result.calibration.rotation_center);
+  EXPECT_THAT(compute_normalized_zenith_point(*result.calibration.rotation_center),
+              IsNear(compute_normalized_zenith_point(*rig.calibration.rotation_center), 1e-4));
 }
 
 class SequentialCalibrationFixes : public testing::TestWithParam<MeasuredPoint> {};
