@@ -115,6 +115,9 @@ TEST(LocateCameraFromDetections, NotesThatSdFollowsResidualsAboveGivenNoise) {
   EXPECT_NE(found.notes[0].find("times the stated noise: sd follows the residuals"),
             std::string::npos)
       << found.notes[0];
+  const auto ratio = find_metric_value(found.metrics, "residual_ratio");
+  ASSERT_TRUE(ratio);
+  EXPECT_NEAR(*ratio, 2, 0.3);
 }
 
 }  // namespace

@@ -192,6 +192,12 @@ TEST(LocateCameraFromDetections, WarnsOfLampsOutsideValidRegionOfLens) {
       if (one.pixel.x() > right_px) beyond.push_back(one.lamp);
     }
     EXPECT_EQ(marked.rows[i].lamps_outside_region, beyond);
+    if (beyond.empty()) continue;
+    const std::string counts =
+        std::to_string(beyond.size()) + " of " + std::to_string(input.frames[i].detections.size());
+    EXPECT_THAT(marked.details,
+                testing::Contains(input.frames[i].image + ": " + counts +
+                                  " lamps are outside the valid region of the lens"));
   }
 }
 

@@ -144,6 +144,22 @@ TEST_F(MovedLamp, AdjustmentReplacesCovarianceOfLens) {
             result.calibration.adjustment->covariance.topLeftCorner(count, count));
 }
 
+TEST_F(MovedLamp, AdjustmentWarnsOfSetThatIsNoRotationInPlace) {
+  take_captures({0, 0});
+  const AdjustStepResult result = run_joint_adjustment_step(
+      {{{"rotation", rotation.frames, {}, true}, {"check", check, {}, true}},
+       map,
+       kFile,
+       camera,
+       "camera.yaml",
+       1e-3,
+       {}},
+      {});
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
+  EXPECT_THAT(result.warnings, Contains(HasSubstr("check is not treated as a rotation in place")));
+  EXPECT_THAT(result.warnings, Not(Contains(HasSubstr("rotation is not treated"))));
+}
+
 /// Captures of a large room tie few of its lamps together. The captures that fit a mirrored map by
 /// chance must not pass for all.
 TEST(RunTiltCalibrationStep, FailsWithWrongMapForMirroredMapOfLargeRoom) {

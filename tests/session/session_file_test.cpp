@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "support/schema.h"
+#include "support/synthetic_rig.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -75,6 +76,23 @@ TEST(ReadStepRecord, ReturnsNulloptForMissingOrTruncatedFileOrOtherVersion) {
   std::string other = text;
   other.replace(other.find("vlp-step/1"), 10, "vlp-step/2");
   EXPECT_FALSE(read_step_record(folder.file("other.json", other)));
+}
+
+TEST(FormatSessionJson, ContainsLensSdsOnlyWithLensCovariance) {
+  SessionResult result;
+  result.calibration = Calibration{synthetic_camera(), {}, {}, {}, {}};
+  const auto format_calibration = [&] {
+    return nlohmann::json::parse(format_session_json(result, {}))["calibration"];
+  };
+  EXPECT_EQ(format_calibration()["focal_px"][0], synthetic_camera().focal_px().x());
+  EXPECT_FALSE(format_calibration().contains("focal_sd_px"));
+  IntrinsicsReport report{40, 4000, 0, 0.1, {}, {}};
+  result.calibration->intrinsics_report = report;
+  EXPECT_FALSE(format_calibration().contains("focal_sd_px"));
+  report.covariance = Eigen::VectorXd::LinSpaced(8, 1, 8).cwiseAbs2().asDiagonal();
+  result.calibration->intrinsics_report = report;
+  EXPECT_EQ(format_calibration()["focal_sd_px"], nlohmann::json({1, 2}));
+  EXPECT_EQ(format_calibration()["principal_point_sd_px"], nlohmann::json({3, 4}));
 }
 
 TEST(StepFailureFromName, InvertsStepFailureNameForEachValue) {

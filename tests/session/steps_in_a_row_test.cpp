@@ -242,7 +242,7 @@ TEST(RunTiltCalibrationStep, TiltMatchesTruthForMovingCameraWithKnownMotion) {
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   ASSERT_TRUE(result.calibration.rotation_center);
   EXPECT_THAT(compute_normalized_zenith_point(*result.calibration.rotation_center),
-              IsNear(compute_normalized_zenith_point(*rig.calibration.rotation_center), 1e-4));
+              IsNear(compute_normalized_zenith_point(*rig.calibration.rotation_center), 1e-7));
 }
 
 class SequentialCalibrationFixes : public testing::TestWithParam<MeasuredPoint> {};

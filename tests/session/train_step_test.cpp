@@ -10,13 +10,16 @@
 namespace vlp {
 namespace {
 
+using testing::Contains;
 using testing::HasSubstr;
+using testing::Not;
 
-const std::string kSample = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample";
+const std::string kRendered = VLP_SOURCE_DIR "/datasets/paper-rig/rendered";
+const std::string kSample = kRendered + "/sample";
 
 /// Two labeled images, repeated as several folders.
 struct Training {
-  LampMap lamps = read_lamp_map(VLP_SOURCE_DIR "/datasets/paper-rig/rendered/lamps.yaml");
+  LampMap lamps = read_lamp_map(kRendered + "/lamps.yaml");
   DetectedLights seen;
   std::vector<std::vector<Frame>> labels;
 
@@ -48,6 +51,31 @@ TEST(TrainLampClassifier, CrossValidationIdentifiesAllLamps) {
   EXPECT_EQ(result.labeled.num_labels, 12 * kMinExamples);
   EXPECT_EQ(result.confusion.counts.sum(), 12 * kMinExamples);
   EXPECT_EQ(result.confusion.count_wrongly_identified_lights(), 0);
+}
+
+TEST(TrainLampClassifier, WarnsOfRowTimeThatContradictsStripes) {
+  constexpr double true_row_time_s = 3e-5;
+  Training training(kMinExamples);
+  training.seen.camera.row_time_s = true_row_time_s;
+  EXPECT_THAT(training.trained().warnings, Not(Contains(HasSubstr("row time"))));
+  training.seen.camera.row_time_s = 1.1 * true_row_time_s;
+  EXPECT_THAT(training.trained().warnings,
+              Contains(HasSubstr("row time is 33 us in the calibration, but the stripes")));
+}
+
+TEST(DetectLightsInFolders, UsesCameraOfCalibrationWithOrWithoutItsRowTime) {
+  const LampMap lamps = read_lamp_map(kRendered + "/lamps.yaml");
+  const Calibration calibration = read_calibration(kRendered + "/true_calibration.yaml");
+  ASSERT_TRUE(calibration.camera.row_time_s);
+  for (const bool with_row_time : {true, false}) {
+    const DetectedLights seen =
+        detect_lights_in_folders({kSample}, lamps, calibration, with_row_time, {});
+    EXPECT_TRUE(seen.camera.lens);
+    EXPECT_EQ(seen.camera.readout, calibration.camera.readout);
+    EXPECT_EQ(seen.camera.row_time_s, with_row_time ? calibration.camera.row_time_s : std::nullopt);
+    ASSERT_EQ(seen.observations.images.size(), 2U);
+    EXPECT_EQ(seen.observations.images[0].size_px, calibration.camera.imager_px);
+  }
 }
 
 TEST(TrainLampClassifier, ThrowsForLabelOfUnknownLampOrIfNoLabeledImageExists) {
