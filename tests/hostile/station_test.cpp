@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
+#include <chrono>
 #include <cstdio>
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -565,9 +566,12 @@ class HostileFolder : public HostileStation, public testing::WithParamInterface<
 
 TEST_P(HostileFolder, ProgramEndsWithExpectedExitCodeAndWritesNothingOutside) {
   const StationTrial& trial = GetParam();
+  const auto begin = std::chrono::steady_clock::now();
   const ProgramResult result = trial.run(*this);
+  const auto duration = std::chrono::steady_clock::now() - begin;
   EXPECT_EQ(result.exit_code, trial.exit_code) << result.output << result.errors;
   EXPECT_THAT(result.errors, HasSubstr(trial.message));
+  EXPECT_LT(duration, std::chrono::seconds(20)) << "a program that does not wait takes far less";
   if (trial.check) trial.check(*this, result);
   expect_nothing_outside();
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "lamps/signal/frequency_identification.h"
+#include "support/datasets.h"
 #include "support/random.h"
 
 namespace vlp {
@@ -106,6 +107,21 @@ TEST(DescribeAlternativeRowTime, NamesWrongRowTimeWithWhichNoLampIsIdentified) {
               HasSubstr("row time is 22 us in camera.yaml, but the stripes of 5 lamps measure"));
   EXPECT_EQ(describe_alternative_row_time(images, map, std::nullopt, {2e-5, "camera.yaml"}), "");
   EXPECT_EQ(describe_alternative_row_time({}, map, std::nullopt, {2.2e-5, "camera.yaml"}), "");
+}
+
+TEST(DetectLightsInFolders, UsesCameraOfCalibrationWithOrWithoutItsRowTime) {
+  const LampMap lamps = read_lamp_map(kRig + "/lamps.yaml");
+  const Calibration calibration = read_calibration(kRig + "/true_calibration.yaml");
+  ASSERT_TRUE(calibration.camera.row_time_s);
+  for (const bool with_row_time : {true, false}) {
+    const DetectedLights seen =
+        detect_lights_in_folders({kRig + "/sample"}, lamps, calibration, with_row_time, {});
+    EXPECT_TRUE(seen.camera.lens);
+    EXPECT_EQ(seen.camera.readout, calibration.camera.readout);
+    EXPECT_EQ(seen.camera.row_time_s, with_row_time ? calibration.camera.row_time_s : std::nullopt);
+    ASSERT_EQ(seen.observations.images.size(), 2U);
+    EXPECT_EQ(seen.observations.images[0].size_px, calibration.camera.imager_px);
+  }
 }
 
 }  // namespace

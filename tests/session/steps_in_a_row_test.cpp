@@ -111,12 +111,12 @@ TEST(SequentialCalibration, LensJacobiansPredictChangeOfZenithAndOffset) {
 
 TEST(RunDispersionCalibrationStep, HasNoZenithJacobianWithoutZenithCovariance) {
   Random random(5);
-  const CalibrationChain row(random, 0.1);
-  LampCaptures leveled = row.turns;
-  leveled.calibration = row.calibrated();
+  const CalibrationChain chain(random, 0.1);
+  LampCaptures leveled = chain.turns;
+  leveled.calibration = chain.calibrated();
   ASSERT_TRUE(leveled.calibration.rotation_center->covariance);
   const auto disperse = [&] {
-    return run_dispersion_calibration_step(leveled, row.known, DispersionMethod::camera,
+    return run_dispersion_calibration_step(leveled, chain.known, DispersionMethod::camera,
                                            DispersionCircle::mean, {});
   };
   EXPECT_TRUE(disperse().fit.dispersion.jacobian_wrt_zenith);
@@ -126,31 +126,31 @@ TEST(RunDispersionCalibrationStep, HasNoZenithJacobianWithoutZenithCovariance) {
   EXPECT_FALSE(dispersion.fit.dispersion.jacobian_wrt_zenith);
 }
 
-/// All lamps hang at one height h above the camera: a lever arm error e moves the offset by f e /
-/// h.
+/// The lamps hang at one height h above the camera, so that an error e of the lever arm displaces
+/// the offset by f e / h.
 TEST(RunDispersionCalibrationStep, OffsetCovarianceIncludesLeverArmCovarianceForPlacesOfAxis) {
   constexpr double lever_arm_sd_m = 1e-3;
-  for (const MeasuredPoint of : {MeasuredPoint::camera, MeasuredPoint::axis}) {
+  for (const MeasuredPoint measured_point : {MeasuredPoint::camera, MeasuredPoint::axis}) {
     Random random(6);
-    const CalibrationChain row(random, 0.1, of);
-    LampCaptures leveled = row.turns;
-    leveled.calibration = row.calibrated();
+    const CalibrationChain chain(random, 0.1, measured_point);
+    LampCaptures leveled = chain.turns;
+    leveled.calibration = chain.calibrated();
     RotationCenter& center = *leveled.calibration.rotation_center;
     ASSERT_TRUE(center.lever_arm_covariance);
     const auto compute_offset_covariance = [&] {
       const DispersionResult dispersion = run_dispersion_calibration_step(
-          leveled, row.known, DispersionMethod::camera, DispersionCircle::mean, {});
+          leveled, chain.known, DispersionMethod::camera, DispersionCircle::mean, {});
       EXPECT_TRUE(dispersion.fit.dispersion.covariance);
       return dispersion.fit.dispersion.covariance.value_or(Matrix2::Zero());
     };
     const Matrix2 before = compute_offset_covariance();
     *center.lever_arm_covariance += lever_arm_sd_m * lever_arm_sd_m * Matrix2::Identity();
     const Matrix2 added = compute_offset_covariance() - before;
-    if (of == MeasuredPoint::camera) {
+    if (measured_point == MeasuredPoint::camera) {
       EXPECT_EQ(added, Matrix2::Zero());
       continue;
     }
-    const double height_m = row.survey.truth.map.lamps.front().position_m.z();
+    const double height_m = chain.survey.truth.map.lamps.front().position_m.z();
     const Eigen::Vector2d sd_px = lever_arm_sd_m / height_m * leveled.calibration.camera.focal_px();
     const Matrix2 expected = sd_px.cwiseAbs2().asDiagonal();
     EXPECT_THAT(added, IsNear(expected, 0.02 * expected(0, 0)));

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "frontend/image_file.h"
+#include "support/datasets.h"
 #include "support/rejection_message.h"
 
 namespace vlp {
@@ -14,12 +15,11 @@ using testing::Contains;
 using testing::HasSubstr;
 using testing::Not;
 
-const std::string kRendered = VLP_SOURCE_DIR "/datasets/paper-rig/rendered";
-const std::string kSample = kRendered + "/sample";
+const std::string kSample = kRig + "/sample";
 
 /// Two labeled images, repeated as several folders.
 struct Training {
-  LampMap lamps = read_lamp_map(kRendered + "/lamps.yaml");
+  LampMap lamps = read_lamp_map(kRig + "/lamps.yaml");
   DetectedLights seen;
   std::vector<std::vector<Frame>> labels;
 
@@ -61,21 +61,6 @@ TEST(TrainLampClassifier, WarnsOfRowTimeThatContradictsStripes) {
   training.seen.camera.row_time_s = 1.1 * true_row_time_s;
   EXPECT_THAT(training.trained().warnings,
               Contains(HasSubstr("row time is 33 us in the calibration, but the stripes")));
-}
-
-TEST(DetectLightsInFolders, UsesCameraOfCalibrationWithOrWithoutItsRowTime) {
-  const LampMap lamps = read_lamp_map(kRendered + "/lamps.yaml");
-  const Calibration calibration = read_calibration(kRendered + "/true_calibration.yaml");
-  ASSERT_TRUE(calibration.camera.row_time_s);
-  for (const bool with_row_time : {true, false}) {
-    const DetectedLights seen =
-        detect_lights_in_folders({kSample}, lamps, calibration, with_row_time, {});
-    EXPECT_TRUE(seen.camera.lens);
-    EXPECT_EQ(seen.camera.readout, calibration.camera.readout);
-    EXPECT_EQ(seen.camera.row_time_s, with_row_time ? calibration.camera.row_time_s : std::nullopt);
-    ASSERT_EQ(seen.observations.images.size(), 2U);
-    EXPECT_EQ(seen.observations.images[0].size_px, calibration.camera.imager_px);
-  }
 }
 
 TEST(TrainLampClassifier, ThrowsForLabelOfUnknownLampOrIfNoLabeledImageExists) {
