@@ -47,7 +47,7 @@ std::vector<ReportPlot> make_position_error_plots(const EvaluationInput& input,
   std::vector<ReportPlot> pictures;
   if (!input.line_m) {
     pictures.push_back(
-        render_report_plot(make_fix_error_plot_drawing(make_floor_plan(input, errors, lamps))));
+        make_report_plot(make_fix_error_plot_drawing(make_floor_plan(input, errors, lamps))));
   } else if (evaluation.line_fit) {
     pictures.push_back(
         make_line_drive_plot("Drive", input.fixes.rows, *input.line_m, *evaluation.line_fit));
@@ -56,7 +56,7 @@ std::vector<ReportPlot> make_position_error_plots(const EvaluationInput& input,
   curve.errors_m.reserve(errors.size());
   for (const FixError& error : errors) curve.errors_m.push_back(error.horizontal_m.norm());
   pictures.push_back(
-      render_report_plot(make_error_cdf_plot_drawing(CdfPlot{"Horizontal errors", {curve}})));
+      make_report_plot(make_error_cdf_plot_drawing(CdfPlot{"Horizontal errors", {curve}})));
   pictures.back().alt += " The median error is " + format_length_with_mm_unit(curve.p50_m) +
                          ", nine tenths no further than " +
                          format_length_with_mm_unit(curve.p90_m) + ".";
@@ -94,7 +94,7 @@ std::optional<ReportPlot> make_fix_error_budget_plot(const std::vector<FixRow>& 
                                  part_variance_m2(budget->lamp_map)});
   }
   if (plot.variances_m2.empty()) return std::nullopt;
-  ReportPlot picture = render_report_plot(make_variance_budget_plot_drawing(plot));
+  ReportPlot picture = make_report_plot(make_variance_budget_plot_drawing(plot));
   const std::vector<double> fractions = plot.compute_variance_contribution_fractions();
   for (std::size_t i = 0; i < fractions.size(); ++i) {
     picture.alt +=
@@ -110,7 +110,7 @@ ReportPlot make_line_drive_plot(const std::string& title, const std::vector<FixR
   for (const FixRow& row : fixes) {
     if (row.fix) plot.fixes_m.push_back(get_fix_position_m(row));
   }
-  ReportPlot picture = render_report_plot(make_line_drive_plot_drawing(plot));
+  ReportPlot picture = make_report_plot(make_line_drive_plot_drawing(plot));
   picture.caption = title + ". " + picture.caption;
   picture.alt = title + ". " + picture.alt + " The fitted line is off by " +
                 format_length_with_mm_unit(fit.distances_m.mean) + " on average.";

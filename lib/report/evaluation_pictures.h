@@ -18,10 +18,10 @@ namespace vlp {
 /// @throws InputError if image names do not match
 Drawing draw_fix_errors_on_floor_plan(const EvaluationInput& input, const LampMap& lamps);
 
-/// Returns the plots of an evaluation, rendered: the errors on the floor plan, and their
+/// Returns the plots of an evaluation, not rendered yet: the errors on the floor plan, and their
 /// distribution. With a commanded line, the drive along it takes the place of the floor plan.
 /// @pre there is at least one fix
-/// @throws InputError if image names do not match, and as render_plot_as_svg()
+/// @throws InputError if image names do not match
 std::vector<ReportPlot> make_position_error_plots(const EvaluationInput& input,
                                                   const Evaluation& evaluation,
                                                   const LampMap& lamps);
@@ -35,7 +35,6 @@ std::vector<ReportPlot> make_position_error_plots(const EvaluationInput& input,
 ///
 /// Returns std::nullopt if no fix reports such a common part.
 /// @pre the fixes are positions of the camera, not of a robot's center; this cannot be checked here
-/// @throws InputError as render_plot_as_svg()
 std::optional<ReportPlot> make_fix_error_budget_plot(const std::vector<FixRow>& fixes,
                                                      const LampMap& lamps,
                                                      const Calibration& calibration);

@@ -84,12 +84,12 @@ bool is_complete_svg(const std::string& svg) {
   return document.load_buffer(svg.data(), svg.size()) && document.child("svg").first_child();
 }
 
-ReportPlot classify_image(std::string image, const std::string& name) {
-  const std::string_view title = find_svg_title(image);
+/// Returns the plot of the kind with this title, without an image.
+ReportPlot classify_plot(std::string_view title, const std::string& name) {
   const auto* kind = std::find_if(kKinds.begin(), kKinds.end(),
                                   [&](const Kind& other) { return other.title == title; });
-  if (kind == kKinds.end()) return {ReportPart::other, std::move(image), name, "Picture " + name};
-  return {kind->part, std::move(image), std::string(kind->caption), std::string(kind->alt)};
+  if (kind == kKinds.end()) return {ReportPart::other, {}, name, "Picture " + name};
+  return {kind->part, {}, std::string(kind->caption), std::string(kind->alt)};
 }
 
 }  // namespace
@@ -105,13 +105,36 @@ ReportPlot read_report_plot(const std::filesystem::path& file) {
     // [FILE-4]
     throw InputError(file, "is cut short, or holds no picture");
   }
-  return classify_image(std::move(image), file.filename().string());
+  ReportPlot plot = classify_plot(find_svg_title(image), file.filename().string());
+  plot.image = std::move(image);
+  return plot;
 }
 
-ReportPlot render_report_plot(const Drawing& drawing) {
-  ReportPlot picture = classify_image(render_plot_as_svg(drawing), drawing.name);
-  picture.table = drawing.table;
-  return picture;
+ReportPlot make_report_plot(Drawing drawing) {
+  ReportPlot plot = classify_plot(drawing.name, drawing.name);
+  plot.table = drawing.table;
+  plot.drawing = std::move(drawing);
+  return plot;
+}
+
+void render_report_plots(std::vector<ReportPlot>& plots) {
+  std::vector<Drawing> drawings;
+  for (ReportPlot& plot : plots) {
+    if (plot.drawing) drawings.push_back(*plot.drawing);
+  }
+  const std::vector<std::string> images = render_plots_as_svg(drawings);
+  auto image = images.begin();
+  for (ReportPlot& plot : plots) {
+    if (!plot.drawing) continue;
+    plot.image = *image++;
+    plot.drawing.reset();
+  }
+}
+
+ReportPlot render_report_plot(Drawing drawing) {
+  std::vector<ReportPlot> plots{make_report_plot(std::move(drawing))};
+  render_report_plots(plots);
+  return std::move(plots.front());
 }
 
 }  // namespace vlp

@@ -97,6 +97,7 @@ std::string render_evaluation_report_html(EvaluationReport report_content) {
     if (budget) report.plots.push_back(std::move(*budget));
   }
   if (report.evaluation) report.evaluation->part = "evaluation";
+  render_report_plots(report.plots);
   return render_report_html(report);
 }
 

@@ -31,7 +31,7 @@ TEST(MakePositionErrorPlots, ContainsFloorPlanAndDistributionForErrorsAgainstTru
       make_position_error_plots(with_truth, evaluate_fix_accuracy(with_truth), {});
   ASSERT_EQ(pictures.size(), 2u);
   EXPECT_EQ(pictures[0].part, ReportPart::floor);
-  EXPECT_THAT(pictures[0].image, HasSubstr("no fix: 1"));
+  EXPECT_THAT(pictures[0].drawing.value().commands, HasSubstr("no fix: 1"));
   EXPECT_EQ(pictures[1].part, ReportPart::distribution);
   EXPECT_THAT(pictures[1].alt, HasSubstr("The median error is 2 mm"));
 }
@@ -76,9 +76,9 @@ TEST(MakeFixErrorBudgetPlot, StatesFractionOfVarianceForEachSource) {
   ASSERT_TRUE(picture);
   EXPECT_EQ(picture->part, ReportPart::distribution);
   // 0.18 of the 2 mm^2 are noise.
-  EXPECT_THAT(picture->image, HasSubstr("noise, 9 %"));
-  EXPECT_THAT(picture->image, HasSubstr("lamp map, "));
-  EXPECT_THAT(picture->image, testing::Not(HasSubstr("offset, ")));
+  EXPECT_THAT(picture->drawing.value().commands, HasSubstr("noise, 9 %"));
+  EXPECT_THAT(picture->drawing.value().commands, HasSubstr("lamp map, "));
+  EXPECT_THAT(picture->drawing.value().commands, testing::Not(HasSubstr("offset, ")));
   EXPECT_THAT(picture->alt, HasSubstr("noise 9 %, lens 0 %, zenith "));
 }
 
@@ -91,7 +91,7 @@ TEST(MakeFixErrorBudgetPlot, OmitsFixesWithEstimatedRollPitch) {
   fixes[1].fix->inclination = Inclination{0.1, 0};
   const auto picture = make_fix_error_budget_plot(fixes, room.lamps, room.calibration);
   ASSERT_TRUE(picture);
-  EXPECT_THAT(picture->image, HasSubstr("noise, 9 %"));
+  EXPECT_THAT(picture->drawing.value().commands, HasSubstr("noise, 9 %"));
   EXPECT_THAT(picture->caption, HasSubstr("for a level camera"));
   fixes[0].fix->inclination = Inclination{0, 0};
   EXPECT_FALSE(make_fix_error_budget_plot(fixes, room.lamps, room.calibration));

@@ -4,7 +4,10 @@
 
 #include <gmock/gmock.h>
 
+#include <regex>
+
 #include "report/plots/calibration_plots.h"
+#include "report/plots/evaluation_plots.h"
 #include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
@@ -35,6 +38,45 @@ TEST(ReadReportPlot, CaptionsUnknownImagesWithFileName) {
   EXPECT_EQ(read_report_plot(file).caption, "my room.svg");
   EXPECT_EQ(read_report_plot(folder.file("a.png", "\x89PNG...IEND\xAE\x42\x60\x82")).part,
             ReportPart::other);
+}
+
+/// Removes the groups without content, in which gnuplot leaves the pen of the plot before.
+std::string remove_empty_groups(const std::string& svg) {
+  return std::regex_replace(svg, std::regex("<g [^>]*>\\n</g>\\n"), "");
+}
+
+/// Settings of one plot must not change the next one.
+TEST(RenderReportPlots, RendersSameImagesTogetherAsOneByOne) {
+  ErrorPlot errors{"Errors", {}, {{0.3, 0.3}}, {}};
+  errors.lamps.lamps = {{17, {0.4, 0.2, 2}, {}, {}, {}}};
+  for (int i = 0; i < 5; ++i) errors.fixes.push_back({{0.1 * i, 0}, {0.1 * i, 0.002}, "a"});
+  const std::vector<Drawing> drawings{
+      make_fix_error_plot_drawing(errors),
+      make_error_cdf_plot_drawing(
+          {"Distribution", {{"fixes", {0.001, 0.002, 0.004}, 0.002, 0.003}}}),
+      make_variance_budget_plot_drawing({"Budget", {"noise", "lens"}, {{1e-6, 2e-6}}}),
+      make_line_drive_plot_drawing({"Drive",
+                                    {{{0, 0}, {1, 0}}},
+                                    {{0, 0.001}, {0.5, 0.002}, {1, 0}},
+                                    {{{0, 0.001}, {1, 0.001}}}}),
+      make_dispersion_plot_drawing(
+          DispersionPlot{"Offset", {{{0.01, 0}}, {{0, 0}, 0.01}}, {{}, {}}, {}}),
+      make_fix_error_plot_drawing(errors)};
+  std::vector<ReportPlot> plots;
+  for (const Drawing& drawing : drawings) plots.push_back(make_report_plot(drawing));
+  plots.insert(plots.begin() + 1, {ReportPart::other, "image", "", ""});
+  render_report_plots(plots);
+  EXPECT_EQ(plots[1].image, "image");
+  plots.erase(plots.begin() + 1);
+  EXPECT_EQ(plots[1].part, ReportPart::distribution);
+  ASSERT_EQ(plots.size(), drawings.size());
+  for (std::size_t i = 0; i < plots.size(); ++i) {
+    EXPECT_EQ(remove_empty_groups(plots[i].image),
+              remove_empty_groups(render_plot_as_svg(drawings[i])))
+        << i;
+    EXPECT_THAT(plots[i].image, HasSubstr("</svg>"));
+    EXPECT_FALSE(plots[i].drawing);
+  }
 }
 
 TEST(ReadReportPlot, RejectsMissingEmptyTruncatedOrTooLongFile) {

@@ -14,6 +14,7 @@
 #include <cstring>
 #include <iterator>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -46,6 +47,10 @@ class Descriptor {
 [[noreturn]] void fail_without_script(const fs::path& file) {
   throw InputError(file, std::string("cannot be drawn: gnuplot's script cannot be made: ") +
                              std::strerror(errno));
+}
+
+[[noreturn]] void fail_without_image(const fs::path& file) {
+  throw InputError(file, "cannot be drawn: gnuplot failed; is it installed?");
 }
 
 /// Writes the script into memory that gnuplot reads as its stdin, which avoids a temporary file.
@@ -101,26 +106,26 @@ bool has_gnuplot_succeeded(pid_t process) {
   return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-/// Renders a drawing with a gnuplot terminal. `file` appears in messages only.
-std::string render_with_terminal(const std::string& terminal, const Drawing& drawing,
-                                 const fs::path& file) {
+/// Returns the commands of a drawing for a gnuplot terminal.
+std::string make_script(const std::string& terminal, const Drawing& drawing) {
+  return "set terminal " + terminal + " size " + std::to_string(drawing.width_px) + "," +
+         std::to_string(drawing.height_px) + "\n" + drawing.commands;
+}
+
+/// Runs a script and returns the output. `file` appears in messages only.
+std::string run_gnuplot(const std::string& text, const fs::path& file) {
   const Descriptor script(::memfd_create("vlp-plot", MFD_CLOEXEC));
   int ends[2] = {-1, -1};
   if (script.number() < 0 || ::pipe2(ends, O_CLOEXEC) != 0) fail_without_script(file);
   const Descriptor output(ends[0]);
   Descriptor input(ends[1]);
-  write_script(script,
-               "set terminal " + terminal + " size " + std::to_string(drawing.width_px) + "," +
-                   std::to_string(drawing.height_px) + "\n" + drawing.commands,
-               file);
+  write_script(script, text, file);
   const auto process = start_gnuplot(script.number(), input.number());
   if (!process)
     throw InputError(file, "cannot be drawn: gnuplot cannot be started; is it installed?");
   input.close();  // leaves gnuplot's end as the only one
   std::string image = read_all_output(output);
-  if (!has_gnuplot_succeeded(*process) || image.empty()) {
-    throw InputError(file, "cannot be drawn: gnuplot failed; is it installed?");
-  }
+  if (!has_gnuplot_succeeded(*process) || image.empty()) fail_without_image(file);
   return image;
 }
 
@@ -134,16 +139,35 @@ std::string make_svg_terminal(const Drawing& drawing) {
 
 void write_plot(const fs::path& file, const Drawing& drawing) {
   if (file.extension() == ".png") {
-    write_file(file, render_with_terminal("pngcairo font 'DejaVu Sans,13'", drawing, file));
+    write_file(file, run_gnuplot(make_script("pngcairo font 'DejaVu Sans,13'", drawing), file));
   } else if (file.extension() == ".svg") {
-    write_file(file, render_with_terminal(make_svg_terminal(drawing), drawing, file));
+    write_file(file, run_gnuplot(make_script(make_svg_terminal(drawing), drawing), file));
   } else {
     throw InputError(file, "a picture's name should end in .png or .svg");
   }
 }
 
+std::vector<std::string> render_plots_as_svg(std::span<const Drawing> drawings) {
+  constexpr std::string_view beginning = "<?xml";
+  if (drawings.empty()) return {};
+  std::string script, names;
+  for (const Drawing& drawing : drawings) {
+    script += "reset\n" + make_script(make_svg_terminal(drawing), drawing) + "\n";
+    names += (names.empty() ? "" : ", ") + drawing.name;
+  }
+  const std::string output = run_gnuplot(script, names);
+  std::vector<std::string> images;
+  for (std::size_t begin = output.find(beginning); begin != std::string::npos;) {
+    const std::size_t end = output.find(beginning, begin + 1);
+    images.push_back(output.substr(begin, end - begin));
+    begin = end;
+  }
+  if (images.size() != drawings.size()) fail_without_image(names);
+  return images;
+}
+
 std::string render_plot_as_svg(const Drawing& drawing) {
-  return render_with_terminal(make_svg_terminal(drawing), drawing, drawing.name);
+  return render_plots_as_svg({&drawing, 1}).front();
 }
 
 }  // namespace vlp

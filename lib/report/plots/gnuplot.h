@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,8 +27,10 @@ struct Drawing {
 /// cannot be written
 void write_plot(const std::filesystem::path& file, const Drawing& drawing);
 
-/// Renders as SVG text.
-/// @throws InputError if gnuplot is missing or fails
+/// Renders drawings as SVG text, in their order, with one gnuplot process, because its start takes
+/// longer than most drawings.
+/// @throws InputError with the names of the drawings if gnuplot is missing or fails
+std::vector<std::string> render_plots_as_svg(std::span<const Drawing> drawings);
 std::string render_plot_as_svg(const Drawing& drawing);
 
 }  // namespace vlp
