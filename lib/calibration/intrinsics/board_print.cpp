@@ -52,7 +52,7 @@ std::optional<AspectErrorEffect> compute_board_aspect_error_effect_on_lens(
       measured.head<2>() += *stated - *printed;
     }
   }
-  if (!solve_lens_parameters(problem, solution.solved_parameters)) return {};
+  if (!solve_board_problem(problem, solution.solved_parameters)) return {};
   const Lens printed(problem.lens_model, problem.intrinsics);
   const auto everywhere = compute_projection_difference(lens, printed, problem.imager_px,
                                                         [](const Eigen::Vector2d&) { return 1.0; });

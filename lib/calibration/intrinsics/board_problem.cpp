@@ -3,8 +3,11 @@
 #include "calibration/intrinsics/board_problem.h"
 
 #include <ceres/ceres.h>
+#include <ceres/normal_prior.h>
+#include <glog/logging.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -149,7 +152,39 @@ class BoardCost : public ceres::CostFunction {
   std::vector<std::size_t> inliers_;
 };
 
-bool solve_without_reweighting(BoardProblem& problem, const SolveOptions& solve_options) {
+/// Returns the regularization of mrcal as the residuals A (intrinsics - target). Each is a multiple
+/// of the difference of one parameter from its target.
+/// @pre the model is not splined; residuals of splined models have several parameters
+std::unique_ptr<ceres::CostFunction> make_mrcal_regularization(const BoardProblem& problem,
+                                                               const SolveOptions& solve_options) {
+  assert(!is_splined_lens_model(problem.lens_model));
+  const Linearization start = linearize_board_problem_by_mrcal(problem, solve_options);
+  Eigen::VectorXd target = Eigen::Map<const Eigen::VectorXd>(
+      problem.intrinsics.data(), static_cast<Eigen::Index>(problem.intrinsics.size()));
+  Eigen::MatrixXd factors = Eigen::MatrixXd::Zero(start.regularization.size(), target.size());
+  for (Eigen::Index row = 0; row < factors.rows(); ++row) {
+    using Entry = Eigen::SparseMatrix<double>::InnerIterator;
+    for (Entry entry(start.jacobian_transposed, start.residuals_px.size() + row); entry; ++entry) {
+      if (entry.value() == 0) continue;
+      const Eigen::Index parameter = start.first_intrinsic + entry.row();
+      factors(row, parameter) = entry.value() / start.scale[entry.row()];
+      target[parameter] -= start.regularization[row] / factors(row, parameter);
+    }
+  }
+  return std::make_unique<ceres::NormalPrior>(factors, target);
+}
+
+/// Settings of Ceres: the relative change of the sum of squares at which it stops, and the initial
+/// radius of the trust region, the reciprocal of the damping.
+struct CeresSettings {
+  double function_tolerance, initial_radius;
+};
+constexpr CeresSettings kFinalSolve{1e-12, 1e4};
+/// Damping slows the convergence of the distortions; near the minimum little is needed.
+constexpr CeresSettings kIntermediateSolve{1e-8, 1e6};
+
+bool solve_without_reweighting(BoardProblem& problem, const SolveOptions& solve_options,
+                               const CeresSettings& settings) {
   std::vector<std::array<double, 6>> poses;
   for (const BoardPose& pose : problem.poses) {
     poses.push_back({pose.rotation.x(), pose.rotation.y(), pose.rotation.z(),
@@ -170,6 +205,10 @@ bool solve_without_reweighting(BoardProblem& problem, const SolveOptions& solve_
     order->AddElementToGroup(poses[i].data(), 0);
   }
   if (residuals < intrinsics.size() + 6 * poses.size()) return false;
+  if (solve_options.distortions && is_lens_model_supported_by_mrcal(problem.lens_model)) {
+    equations.AddResidualBlock(make_mrcal_regularization(problem, solve_options).release(), nullptr,
+                               intrinsics.data());
+  }
   order->AddElementToGroup(intrinsics.data(), 1);
   order->AddElementToGroup(warp_m.data(), 1);
   if (!solve_options.warp) equations.SetParameterBlockConstant(warp_m.data());
@@ -185,11 +224,14 @@ bool solve_without_reweighting(BoardProblem& problem, const SolveOptions& solve_
   options.linear_solver_type = ceres::DENSE_SCHUR;
   options.linear_solver_ordering.reset(order.release());
   options.max_num_iterations = 100;
-  options.function_tolerance = 1e-12;
+  options.initial_trust_region_radius = settings.initial_radius;
+  options.function_tolerance = settings.function_tolerance;
   options.parameter_tolerance = 1e-12;
   options.gradient_tolerance = 1e-12;
   options.num_threads = 1;
   options.logging_type = ceres::SILENT;
+  // The result states whether the solve failed; without this Ceres also writes to stderr.
+  FLAGS_minloglevel = google::GLOG_FATAL;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &equations, &summary);
   if (!summary.IsSolutionUsable()) return false;
@@ -222,6 +264,8 @@ bool mark_outlier_points(BoardProblem& problem) {
   }
   return any;
 }
+
+bool has_distortions(const BoardProblem& problem) { return problem.intrinsics.size() > 4; }
 
 bool is_valid_lens(const BoardProblem& problem) {
   const auto& intrinsics = problem.intrinsics;
@@ -265,7 +309,8 @@ bool is_lens_model_supported_by_mrcal(LensModel model) {
   return lens_model_name(model).starts_with("LENSMODEL_");
 }
 
-bool solve_board_problem(BoardProblem& problem, const SolveOptions& solve_options) {
+bool solve_board_problem(BoardProblem& problem, SolveOptions solve_options) {
+  solve_options.distortions = solve_options.distortions && has_distortions(problem);
   if (!is_lens_model_supported_by_mrcal(problem.lens_model))
     return solve_board_problem_by_ceres(problem, solve_options) && is_valid_lens(problem);
   constexpr double max_rms_ratio = 1.05;
@@ -284,6 +329,15 @@ bool solve_board_problem(BoardProblem& problem, const SolveOptions& solve_option
   return true;
 }
 
+bool solve_intermediate_board_problem(BoardProblem& problem, SolveOptions solve_options) {
+  solve_options.distortions = solve_options.distortions && has_distortions(problem);
+  solve_options.reject_outliers = false;
+  if (!is_splined_lens_model(problem.lens_model) && InlierFit(problem).projects_all &&
+      solve_without_reweighting(problem, solve_options, kIntermediateSolve))
+    return true;
+  return solve_board_problem(problem, solve_options);
+}
+
 Linearization linearize_board_problem(const BoardProblem& problem,
                                       const SolveOptions& solve_options) {
   return is_lens_model_supported_by_mrcal(problem.lens_model)
@@ -292,12 +346,12 @@ Linearization linearize_board_problem(const BoardProblem& problem,
 }
 
 bool solve_board_problem_by_ceres(BoardProblem& problem, const SolveOptions& solve_options) {
-  if (!solve_without_reweighting(problem, solve_options)) return false;
+  if (!solve_without_reweighting(problem, solve_options, kFinalSolve)) return false;
   constexpr int max_iterations = 10;
   for (int iteration = 0;
        solve_options.reject_outliers && iteration < max_iterations && mark_outlier_points(problem);
        ++iteration) {
-    if (!solve_without_reweighting(problem, solve_options)) return false;
+    if (!solve_without_reweighting(problem, solve_options, kFinalSolve)) return false;
   }
   return true;
 }

@@ -61,13 +61,14 @@ std::vector<Eigen::Vector2d> collect_inlier_corner_pixels(const BoardProblem& pr
 /// Parameters that a solve may change in addition to the poses.
 struct SolveOptions {
   bool core = false;         // fx fy cx cy
-  bool distortions = false;  // regularized as in mrcal
+  bool distortions = false;  // if the model has any; regularized as in mrcal
   bool warp = false;
   bool reject_outliers = false;  // gives outliers a negative weight
 };
 
 /// Minimizes the residuals in place: by mrcal_optimize, or by Ceres for models that mrcal lacks.
-/// Ceres solves without regularization and rejects outliers beyond 5 sigma.
+/// Ceres regularizes as mrcal does, except for models that mrcal lacks. It rejects outliers beyond
+/// 5 sigma.
 ///
 /// Ceres also replaces mrcal if mrcal goes from a lens that projects all points to one that does
 /// not. The result of mrcal is kept if the RMS residual of Ceres is more than 5 % larger. Reason:
@@ -77,7 +78,14 @@ struct SolveOptions {
 ///
 /// @return false if the solve fails: no lens of the model can project the points, too few points
 ///     for the unknowns, or a focal length that is not positive
-bool solve_board_problem(BoardProblem& problem, const SolveOptions& solve_options);
+bool solve_board_problem(BoardProblem& problem, SolveOptions solve_options);
+
+/// Minimizes the same sum faster, without rejecting outliers and with a larger tolerance, for a
+/// result that a later solve refines. Uses Ceres; calls solve_board_problem() for splined lenses or
+/// if Ceres fails.
+/// @pre solve_options.core, unless the lens is splined
+/// @return false if the solve fails
+bool solve_intermediate_board_problem(BoardProblem& problem, SolveOptions solve_options);
 
 /// Residuals and Jacobian of a problem. State and Jacobian are packed: the state is divided by
 /// `scale`, so that its entries have similar magnitudes.

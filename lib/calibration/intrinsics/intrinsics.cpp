@@ -85,11 +85,6 @@ std::vector<Eigen::Vector2d> compute_reprojection_residuals(const BoardProblem& 
   return residuals;
 }
 
-bool solve_lens_parameters(BoardProblem& problem, SolveOptions solve_options) {
-  solve_options.distortions = solve_options.distortions && problem.intrinsics.size() > 4;
-  return solve_board_problem(problem, solve_options);
-}
-
 namespace {
 
 IntrinsicsSolution make_failure(IntrinsicsStatus status) {
@@ -172,7 +167,6 @@ class IntrinsicsSolver {
   using CornerOfView = std::pair<std::size_t, std::size_t>;
 
   Lens current_lens() const { return Lens(problem_.lens_model, problem_.intrinsics); }
-  bool solve_current_board_problem(SolveOptions solve_options);
   /// Estimates the pose of every view with a lens. Views without a pose are unused until the next
   /// call.
   void initialize_board_poses(const Lens& lens);
@@ -234,7 +228,7 @@ bool IntrinsicsSolver::solve_intrinsics_from_focal_length(double focal_px) {
     initialize_board_poses(lens);
     if (used_.size() < kMinViews) return false;
     assemble_board_problem(lens);
-    if (!solve_current_board_problem({true, false, false, false})) return false;
+    if (!solve_intermediate_board_problem(problem_, {true, false, false, false})) return false;
     lens = this->current_lens();
     if (std::abs(lens.focal_px().x() / before_px - 1) < convergence) break;
   }
@@ -284,8 +278,7 @@ bool IntrinsicsSolver::rotate_camera_frame_to_optical_axis() {
         fit_rotation_between_lenses(current_lens(), Lens(LensModel::fisheye, symmetric_), pixels);
     if (!start) return true;
     rotate_all_board_poses(symmetric.poses, *start);
-    if (!vlp::solve_board_problem(symmetric, {true, true, solved_parameters_.warp, false}))
-      return true;
+    if (!solve_board_problem(symmetric, {true, true, solved_parameters_.warp, false})) return true;
     const Lens fisheye(LensModel::fisheye, symmetric.intrinsics);
     symmetric_ = symmetric.intrinsics;
     const auto new_from_old = fit_rotation_between_lenses(current_lens(), fisheye, pixels);
@@ -297,7 +290,7 @@ bool IntrinsicsSolver::rotate_camera_frame_to_optical_axis() {
         pixel = *seen;
     }
     rotate_all_board_poses(problem_.poses, *new_from_old);
-    if (!solve_current_board_problem(solved_parameters_)) return false;
+    if (!solve_board_problem(problem_, solved_parameters_)) return false;
   }
   return true;
 }
@@ -316,7 +309,7 @@ bool IntrinsicsSolver::refine_intrinsics() {
   }
   bool convergence = false;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    if (!solve_current_board_problem(solved_parameters_)) return false;
+    if (!solve_board_problem(problem_, solved_parameters_)) return false;
     convergence = !reestimate_poses_and_drop_bad_views();
     if (convergence) break;
     if (used_.size() < kMinViews) return false;
@@ -327,7 +320,7 @@ bool IntrinsicsSolver::refine_intrinsics() {
   } else if (convergence) {
     return can_lens_project_most_views();
   }
-  return solve_current_board_problem(solved_parameters_) && can_lens_project_most_views();
+  return solve_board_problem(problem_, solved_parameters_) && can_lens_project_most_views();
 }
 
 bool IntrinsicsSolver::scale_spline_regularization_to_noise() {
@@ -338,7 +331,7 @@ bool IntrinsicsSolver::scale_spline_regularization_to_noise() {
     const double noise_px = std::clamp(make_intrinsics_solution().rms_px, min_px, 1.0);
     if (std::abs(noise_px / problem_.noise_px - 1) < convergence) break;
     problem_.noise_px = noise_px;
-    if (!solve_current_board_problem(solved_parameters_)) return false;
+    if (!solve_board_problem(problem_, solved_parameters_)) return false;
   }
   return true;
 }
@@ -367,7 +360,7 @@ bool IntrinsicsSolver::correct_edge_curvature_and_solve_again() {
     max_px = std::max(max_px, correct_corners_for_edge_curvature(view, lens));
   if (max_px < tolerance_px) return true;
   copy_corners_to_board_problem();
-  return solve_current_board_problem(solved_parameters_);
+  return solve_intermediate_board_problem(problem_, solved_parameters_);
 }
 
 bool IntrinsicsSolver::correct_edge_displacements_and_solve_again(DisplacementForm form) {
@@ -388,7 +381,7 @@ bool IntrinsicsSolver::correct_edge_displacements_and_solve_again(DisplacementFo
           correct_corners_for_edge_displacement(input_.views[view], shifts[view]);
     }
     copy_corners_to_board_problem();
-    if (!solve_current_board_problem(solved_parameters_)) return false;
+    if (!solve_intermediate_board_problem(problem_, solved_parameters_)) return false;
   }
   return true;
 }
@@ -401,7 +394,7 @@ bool IntrinsicsSolver::solve_board_warp() {
   };
   const IntrinsicsSolution flat = make_intrinsics_solution();
   solved_parameters_.warp = true;
-  if (!solve_current_board_problem(solved_parameters_)) return false;
+  if (!solve_intermediate_board_problem(problem_, solved_parameters_)) return false;
   const IntrinsicsSolution with_warp = make_intrinsics_solution();
   if (input_.warp == WarpChoice::automatic &&
       squares(flat) - squares(with_warp) <= min_reduction * with_warp.rms_px * with_warp.rms_px) {
@@ -433,7 +426,7 @@ bool IntrinsicsSolver::update_weights() {
 }
 
 bool IntrinsicsSolver::reweight_corners_by_variance() {
-  return !update_weights() || solve_current_board_problem(solved_parameters_);
+  return !update_weights() || solve_intermediate_board_problem(problem_, solved_parameters_);
 }
 
 bool IntrinsicsSolver::reweight_corners_and_reject_outliers() {
@@ -448,10 +441,10 @@ bool IntrinsicsSolver::reject_corner_outliers() {
   // Without noise, residuals are caused by the regularization and are not outliers.
   constexpr double exact_px = 0.005;
   if (make_intrinsics_solution().rms_px < exact_px)
-    return solve_current_board_problem(solved_parameters_);
+    return solve_board_problem(problem_, solved_parameters_);
   SolveOptions without_outliers = solved_parameters_;
   without_outliers.reject_outliers = true;
-  return solve_current_board_problem(without_outliers) &&
+  return solve_board_problem(problem_, without_outliers) &&
          std::isfinite(make_intrinsics_solution().rms_px);
 }
 
@@ -462,10 +455,6 @@ IntrinsicsSolution IntrinsicsSolver::make_intrinsics_solution() const {
     result.edge_displacements_px.push_back(edge_displacements_px_[view]);
   result.update_lens_fit_statistics();
   return result;
-}
-
-bool IntrinsicsSolver::solve_current_board_problem(SolveOptions solve_options) {
-  return solve_lens_parameters(problem_, solve_options);
 }
 
 void IntrinsicsSolver::initialize_board_poses(const Lens& lens) {
@@ -747,7 +736,7 @@ IntrinsicsSolution solve_intrinsics_from_half_of_views(const IntrinsicsSolution&
   if (half.views.size() < IntrinsicsSolver::kMinViews) {
     return make_failure(IntrinsicsStatus::too_few_views);
   }
-  if (!solve_lens_parameters(half.problem, half.solved_parameters)) {
+  if (!solve_board_problem(half.problem, half.solved_parameters)) {
     return make_failure(IntrinsicsStatus::no_solution);
   }
   if (are_all_boards_parallel(half.problem)) return make_failure(IntrinsicsStatus::all_parallel);

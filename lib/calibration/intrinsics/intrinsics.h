@@ -92,6 +92,9 @@ struct IntrinsicsSolution {
 /// 8. Solves again without outliers.
 /// 9. Splined lenses: aligns the frame to the axis of the lens.
 ///
+/// Stages 3, 8 and 9 call solve_board_problem(). Other solves call the faster
+/// solve_intermediate_board_problem(); stage 8 refines their result.
+///
 /// Splined lenses start stage 3 from OPENCV_FISHEYE, whose center becomes their center. Their
 /// regularization is scaled to the residual noise instead of 1 px, which would bias the lens by
 /// more than the noise does. Tags with a corner whose residual of OPENCV_FISHEYE differs from those
@@ -149,8 +152,5 @@ IntrinsicsSolution solve_intrinsics_from_half_of_views(const IntrinsicsSolution&
 /// Returns the residuals of the points of a problem, measured minus projected, px, including
 /// outliers. NaN for points that were not seen or cannot be projected.
 std::vector<Eigen::Vector2d> compute_reprojection_residuals(const BoardProblem& problem);
-
-/// Calls solve_board_problem(), without the distortions if the model has none.
-bool solve_lens_parameters(BoardProblem& problem, SolveOptions solve_options);
 
 }  // namespace vlp
