@@ -3,6 +3,7 @@
 #include "program/app.h"
 
 #include <fmt/core.h>
+#include <malloc.h>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -201,8 +202,22 @@ void check_output_files_are_distinct(
   }
 }
 
+namespace {
+
+/// Keeps freed memory for the next allocation. Solvers allocate and free large matrices in each
+/// iteration; the system would clear their pages each time, 10 % of the time of a calibration.
+/// Setting one threshold alone would only disable the dynamic thresholds of glibc.
+void keep_freed_memory() {
+  constexpr int min_mmap_bytes = 32 << 20, max_free_top_bytes = 256 << 20;
+  ::mallopt(M_MMAP_THRESHOLD, min_mmap_bytes);
+  ::mallopt(M_TRIM_THRESHOLD, max_free_top_bytes);
+}
+
+}  // namespace
+
 int parse_arguments_and_run(CLI::App& app, int argc, char** argv,
                             const std::function<void()>& run) {
+  keep_freed_memory();
   bool quiet = false, verbose = false;
   const auto formatter = std::make_shared<HelpFormatter>();
   app.formatter(formatter);

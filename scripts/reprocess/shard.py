@@ -22,9 +22,6 @@ from outcome import SHARD_COLUMNS, KEPT_FILES, read_outcome
 
 STATE = Path(".state")
 TIME_LIMIT_S = 3600
-# Keeps the memory of an image for the next one, because the kernel clears returned pages. Both variables are needed:
-# each alone disables the dynamic thresholds of glibc.
-ENVIRONMENT = {"MALLOC_TRIM_THRESHOLD_": str(256 << 20), "MALLOC_MMAP_THRESHOLD_": str(32 << 20), **os.environ}
 
 WITHOUT_RESULT = ("no result", "crashed")
 
@@ -69,7 +66,6 @@ class BatchProcess:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 pass_fds=[self.lock.fileno()],
-                env=ENVIRONMENT,
             )
         request = json.dumps({"arguments": [str(argument) for argument in arguments], "limit_s": TIME_LIMIT_S})
         try:
