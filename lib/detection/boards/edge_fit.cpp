@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "detection/boards/blurred_step.h"
 
@@ -58,13 +59,19 @@ class ColumnProducts {
 
  private:
   void add_products() {
-    for (std::size_t a = 0; a < kColumns; ++a) {
-      for (std::size_t b = a - a % 2; b < kColumns; ++b) {
-        sums_[a][b] += (rows_[0][a] * rows_[0][b] + rows_[1][a] * rows_[1][b]) +
-                       (rows_[2][a] * rows_[2][b] + rows_[3][a] * rows_[3][b]);
-      }
-    }
+    // The compiler unrolls and vectorizes loops of constant length.
+    const auto add = [this]<std::size_t... a>(std::index_sequence<a...>) {
+      (add_products_of_column<a>(), ...);
+    };
+    add(std::make_index_sequence<kColumns>());
     count_ = 0;
+  }
+  template <std::size_t a>
+  void add_products_of_column() {
+    for (std::size_t b = a - a % 2; b < kColumns; ++b) {
+      sums_[a][b] += (rows_[0][a] * rows_[0][b] + rows_[1][a] * rows_[1][b]) +
+                     (rows_[2][a] * rows_[2][b] + rows_[3][a] * rows_[3][b]);
+    }
   }
 
   std::array<Row, 4> rows_{};
@@ -234,7 +241,7 @@ typename Edge<terms>::Equations minimize_residuals(const Edge<terms>& edge,
   using Square = typename Edge<terms>::Square;
   constexpr double gradient_tolerance = 1e-10, parameter_tolerance = 1e-8;
   constexpr double min_squares = 2 * std::numeric_limits<double>::epsilon();
-  constexpr double min_diagonal = 1e-6, max_diagonal = 1e32;
+  constexpr double min_diagonal = 1e-6, max_diagonal = 1e32, negligible_fraction = 0.01;
   auto equations = edge.linearize(p);
   const Parameters scale = (1 + equations.normal.diagonal().array().sqrt()).inverse().matrix();
   double damping = 1e-4, growth = 2;
@@ -253,10 +260,12 @@ typename Edge<terms>::Equations minimize_residuals(const Edge<terms>& edge,
     const Parameters scaled_step = damped.ldlt().solve(gradient);
     const Parameters step = scale.cwiseProduct(scaled_step);
     if (step.norm() < parameter_tolerance * (p.norm() + parameter_tolerance)) break;
+    const double model_change = scaled_step.dot(2 * gradient - scaled * scaled_step);
+    // Stops if the expected decrease is negligible compared with the tolerance.
+    if (model_change < negligible_fraction * limits.function_tolerance) break;
     const Parameters next = p + step;
     const auto next_equations = edge.linearize(next);
     const double change = equations.squares - next_equations.squares;
-    const double model_change = scaled_step.dot(2 * gradient - scaled * scaled_step);
     const double ratio = change / model_change;
     const bool has_converged = std::abs(change) < limits.function_tolerance;
     if (ratio > 0) {
