@@ -136,16 +136,17 @@ double compute_printed_margin_around_tags_m(const Board& board) {
 }
 
 BoardWarp::BoardWarp(const SceneBoard& board)
-    : field_m_(compute_tag_field_size_m(board.pattern)), warp_m_(board.warp_m) {}
+    : inverse_half_field_per_m_(2 / compute_tag_field_size_m(board.pattern).array()),
+      warp_m_(board.warp_m) {}
 
 BoardWarp::Depth BoardWarp::compute_board_deflection(const Eigen::Vector2d& at_m) const {
-  constexpr double max_offset = 1.5;  // outside the paper, where the parabola would bend back
   Depth warp{0, {0, 0}};
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
-    const double fraction = 2 * at_m[axis] / field_m_[axis] - 1;
-    const double inside = std::clamp(fraction, -max_offset, max_offset);
+    const double fraction = at_m[axis] * inverse_half_field_per_m_[axis] - 1;
+    const double inside = std::clamp(fraction, -kMaxOffset, kMaxOffset);
     warp.depth_m += warp_m_[axis] * (1 - inside * inside);
-    if (fraction == inside) warp.slope[axis] = -4 * warp_m_[axis] * inside / field_m_[axis];
+    if (fraction == inside)
+      warp.slope[axis] = -2 * warp_m_[axis] * inside * inverse_half_field_per_m_[axis];
   }
   return warp;
 }
@@ -153,11 +154,30 @@ BoardWarp::Depth BoardWarp::compute_board_deflection(const Eigen::Vector2d& at_m
 BoardPattern::BoardPattern(const SceneBoard& board)
     : warp_(board), mosaic_(make_rectangles(board)) {}
 
+std::optional<Eigen::Vector2d> BoardWarp::intersect_ray_with_parabola(
+    const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
+  // With u = o + d t in half fields: z = warp (1 - u^2) at the distance t is a t^2 + b t + c = 0.
+  const Eigen::Array2d o = origin.head<2>().array() * inverse_half_field_per_m_ - 1,
+                       d = direction.head<2>().array() * inverse_half_field_per_m_;
+  const Eigen::Array2d warp_m = warp_m_.array();
+  const double a = (warp_m * d.square()).sum(), b = direction.z() + 2 * (warp_m * o * d).sum(),
+               c = origin.z() - (warp_m * (1 - o.square())).sum();
+  const double discriminant = b * b - 4 * a * c;
+  if (!(discriminant >= 0)) return std::nullopt;
+  const double distance = -2 * c / (b + std::copysign(std::sqrt(discriminant), b));
+  const Eigen::Array2d fraction = o + distance * d;
+  if (!(distance > 0 && (fraction.abs() <= kMaxOffset).all())) return std::nullopt;
+  return origin.head<2>() + distance * direction.head<2>();
+}
+
 Eigen::Vector2d BoardPattern::intersect_ray_with_shape(const Eigen::Vector3d& origin,
                                                        const Eigen::Vector3d& direction) const {
+  if (!warp_.is_board_flat()) {
+    if (const auto at_m = warp_.intersect_ray_with_parabola(origin, direction)) return *at_m;
+  }
   Eigen::Vector2d at_m = intersect_ray_with_plane(origin, direction);
   if (warp_.is_board_flat()) return at_m;
-  // Newton's method along the ray; converges in two or three steps.
+  // Beside the paper: Newton's method along the ray; converges in two or three steps.
   constexpr double tolerance_m = 1e-9;
   double distance = -origin.z() / direction.z();
   for (int step = 0; step < 8; ++step) {

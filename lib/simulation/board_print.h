@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -63,10 +64,19 @@ class BoardWarp {
   };
   /// Returns the deflection at a point (x, y) of the board, m.
   Depth compute_board_deflection(const Eigen::Vector2d& at_m) const;
+  /// Returns (x, y) of the intersection of a ray with the warped board, in the board frame;
+  /// std::nullopt if it does not meet the board in its direction, or beside the paper.
+  std::optional<Eigen::Vector2d> intersect_ray_with_parabola(
+      const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
   bool is_board_flat() const { return warp_m_.isZero(0); }
 
  private:
-  Eigen::Vector2d field_m_, warp_m_;
+  /// Offset from the middle, in half fields, beyond which the deflection is constant: beside the
+  /// paper, where the parabola would bend back.
+  static constexpr double kMaxOffset = 1.5;
+
+  Eigen::Array2d inverse_half_field_per_m_;
+  Eigen::Vector2d warp_m_;
 };
 
 /// Printed board, warped or flat, for add_shape_to_image(). Values are radiances minus that of

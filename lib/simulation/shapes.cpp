@@ -6,25 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace vlp {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-/// Returns the coordinates in ascending order, with those that differ by rounding only merged.
-std::vector<double> merge_lines(std::vector<double> lines) {
-  constexpr double same_m = 1e-9;
-  std::sort(lines.begin(), lines.end());
-  const auto same = [](double a, double b) { return b - a < same_m; };
-  lines.erase(std::unique(lines.begin(), lines.end(), same), lines.end());
-  return lines;
-}
-
-/// Returns the number of lines at or below a coordinate: 0 before the first.
-int find_cell_of_coordinate(const std::vector<double>& lines, double at) {
-  return static_cast<int>(std::upper_bound(lines.begin(), lines.end(), at) - lines.begin());
-}
 
 /// Returns the index of the closest line.
 int find_closest_line(const std::vector<double>& lines, double at) {
@@ -40,9 +27,9 @@ Eigen::Matrix<double, 2, 4> to_matrix(const std::array<Eigen::Vector2d, 4>& corn
 /// Traversal of the cells along one axis: the current cell, and the fraction of the path at which
 /// it ends.
 struct CellTraversal {
-  CellTraversal(const std::vector<double>& all, double from, double displacement)
-      : lines(all), start(from), length(displacement), cell(find_cell_of_coordinate(all, from)) {
-    if (displacement < 0 && cell > 0 && all[std::size_t(cell) - 1] == from) --cell;  // downwards
+  CellTraversal(const PatternLines& all, double from, double displacement)
+      : lines(all.coordinates_m()), start(from), length(displacement), cell(all.find_cell(from)) {
+    if (displacement < 0 && cell > 0 && lines[std::size_t(cell) - 1] == from) --cell;  // downwards
   }
   double end() const {
     const int line = length > 0 ? cell : cell - 1;
@@ -58,24 +45,54 @@ struct CellTraversal {
 
 }  // namespace
 
-RectanglePattern::RectanglePattern(const std::vector<Rectangle>& rectangles) {
-  for (const Rectangle& each : rectangles) {
-    x_m_.insert(x_m_.end(), {each.left_m, each.right_m});
-    y_m_.insert(y_m_.end(), {each.top_m, each.bottom_m});
+PatternLines::PatternLines(std::vector<double> lines_m) : lines_m_(std::move(lines_m)) {
+  constexpr double same_m = 1e-9;
+  constexpr std::size_t intervals_per_line = 4;
+  std::sort(lines_m_.begin(), lines_m_.end());
+  const auto same = [](double a, double b) { return b - a < same_m; };
+  lines_m_.erase(std::unique(lines_m_.begin(), lines_m_.end(), same), lines_m_.end());
+  if (lines_m_.size() < 2) return;
+  lines_before_.assign(intervals_per_line * lines_m_.size(), 0);
+  intervals_per_m_ =
+      static_cast<double>(lines_before_.size()) / (lines_m_.back() - lines_m_.front());
+  for (std::size_t i = 0; i < lines_before_.size(); ++i) {
+    lines_before_[i] = static_cast<int>(
+        std::ranges::count_if(lines_m_, [&](double line_m) { return find_interval(line_m) < i; }));
   }
-  x_m_ = merge_lines(std::move(x_m_));
-  y_m_ = merge_lines(std::move(y_m_));
-  stride_ = x_m_.size() + 1;
-  values_.assign(stride_ * (y_m_.size() + 1), 0);
+}
+
+std::size_t PatternLines::find_interval(double at_m) const {
+  const double last = static_cast<double>(lines_before_.size()) - 1;
+  return static_cast<std::size_t>(
+      std::clamp((at_m - lines_m_.front()) * intervals_per_m_, 0.0, last));
+}
+
+int PatternLines::find_cell(double at_m) const {
+  std::size_t cell =
+      lines_before_.empty() ? 0 : static_cast<std::size_t>(lines_before_[find_interval(at_m)]);
+  while (cell < lines_m_.size() && lines_m_[cell] <= at_m) ++cell;
+  return static_cast<int>(cell);
+}
+
+RectanglePattern::RectanglePattern(const std::vector<Rectangle>& rectangles) {
+  std::vector<double> x_m, y_m;
+  for (const Rectangle& each : rectangles) {
+    x_m.insert(x_m.end(), {each.left_m, each.right_m});
+    y_m.insert(y_m.end(), {each.top_m, each.bottom_m});
+  }
+  x_ = PatternLines(std::move(x_m));
+  y_ = PatternLines(std::move(y_m));
+  stride_ = x_.coordinates_m().size() + 1;
+  values_.assign(stride_ * (y_.coordinates_m().size() + 1), 0);
   for (const Rectangle& rectangle : rectangles) fill_pattern_rectangle(rectangle);
   compute_cumulative_row_integrals();
 }
 
 void RectanglePattern::fill_pattern_rectangle(const Rectangle& rectangle) {
-  const int top = find_closest_line(y_m_, rectangle.top_m),
-            bottom = find_closest_line(y_m_, rectangle.bottom_m);
-  const int left = find_closest_line(x_m_, rectangle.left_m),
-            right = find_closest_line(x_m_, rectangle.right_m);
+  const int top = find_closest_line(y_.coordinates_m(), rectangle.top_m),
+            bottom = find_closest_line(y_.coordinates_m(), rectangle.bottom_m);
+  const int left = find_closest_line(x_.coordinates_m(), rectangle.left_m),
+            right = find_closest_line(x_.coordinates_m(), rectangle.right_m);
   for (int row = top + 1; row <= bottom; ++row) {
     for (int column = left + 1; column <= right; ++column) {
       values_[flat_cell_index(column, row)] = rectangle.value;
@@ -84,11 +101,12 @@ void RectanglePattern::fill_pattern_rectangle(const Rectangle& rectangle) {
 }
 
 void RectanglePattern::compute_cumulative_row_integrals() {
+  const std::vector<double>& x_m = x_.coordinates_m();
   sums_.assign(values_.size(), 0);
   for (std::size_t i = 0; i < values_.size(); ++i) {
     const std::size_t column = i % stride_;
     if (column < 2) continue;
-    sums_[i] = sums_[i - 1] + values_[i - 1] * (x_m_[column - 1] - x_m_[column - 2]);
+    sums_[i] = sums_[i - 1] + values_[i - 1] * (x_m[column - 1] - x_m[column - 2]);
   }
 }
 
@@ -96,14 +114,14 @@ void RectanglePattern::compute_cumulative_row_integrals() {
 double RectanglePattern::integrate_pattern_row_up_to(int column, int row, double x) const {
   if (column == 0) return 0;
   const std::size_t i = flat_cell_index(column, row);
-  return sums_[i] + values_[i] * (x - x_m_[static_cast<std::size_t>(column) - 1]);
+  return sums_[i] + values_[i] * (x - x_.coordinates_m()[static_cast<std::size_t>(column) - 1]);
 }
 
 double RectanglePattern::compute_edge_contribution_to_area_integral(
     const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
   const Eigen::Vector2d displacement = q - p;
   if (!displacement.allFinite()) return std::numeric_limits<double>::quiet_NaN();
-  CellTraversal x(x_m_, p.x(), displacement.x()), y(y_m_, p.y(), displacement.y());
+  CellTraversal x(x_, p.x(), displacement.x()), y(y_, p.y(), displacement.y());
   double sum = 0, done = 0;
   while (done < 1) {
     const double x_end = x.end(), y_end = y.end();
@@ -125,13 +143,12 @@ std::optional<double> RectanglePattern::find_constant_value_in_quadrilateral(
   const auto points = to_matrix(corners);
   if (!points.allFinite()) return std::nullopt;
   const Eigen::Vector2d lower = points.rowwise().minCoeff(), upper = points.rowwise().maxCoeff();
-  const int column = find_cell_of_coordinate(x_m_, lower.x()),
-            row = find_cell_of_coordinate(y_m_, lower.y());
-  const auto ends_before = [](const std::vector<double>& lines, int cell, double at) {
-    return cell < static_cast<int>(lines.size()) && lines[static_cast<std::size_t>(cell)] <= at;
+  const int column = x_.find_cell(lower.x()), row = y_.find_cell(lower.y());
+  const auto ends_before = [](const PatternLines& lines, int cell, double at_m) {
+    const std::vector<double>& all_m = lines.coordinates_m();
+    return cell < static_cast<int>(all_m.size()) && all_m[static_cast<std::size_t>(cell)] <= at_m;
   };
-  if (ends_before(x_m_, column, upper.x()) || ends_before(y_m_, row, upper.y()))
-    return std::nullopt;
+  if (ends_before(x_, column, upper.x()) || ends_before(y_, row, upper.y())) return std::nullopt;
   return values_[flat_cell_index(column, row)];
 }
 

@@ -17,6 +17,28 @@ struct Rectangle {
   double value;
 };
 
+/// Lines of a pattern across one axis, ascending, with a table for a quick search.
+class PatternLines {
+ public:
+  PatternLines() = default;
+  /// @param lines_m  coordinates in any order; those closer than 1 nm are merged
+  explicit PatternLines(std::vector<double> lines_m);
+
+  const std::vector<double>& coordinates_m() const { return lines_m_; }
+  /// Returns the number of lines at or below a coordinate: 0 before the first.
+  int find_cell(double at_m) const;
+
+ private:
+  /// Returns the index in the table of the equal interval that contains a coordinate; of the first
+  /// or the last one outside them.
+  std::size_t find_interval(double at_m) const;
+
+  std::vector<double> lines_m_;
+  double intervals_per_m_ = 0;
+  /// Number of lines in the intervals before each one.
+  std::vector<int> lines_before_;
+};
+
 /// Flat pattern of rectangles, each with a constant value; positions are in m. The value is 0
 /// outside all rectangles.
 class RectanglePattern {
@@ -47,7 +69,7 @@ class RectanglePattern {
   }
   double integrate_pattern_row_up_to(int column, int row, double x) const;
 
-  std::vector<double> x_m_, y_m_;
+  PatternLines x_, y_;
   /// Row by row. Each row begins with the empty cell to its left and ends with the one to its
   /// right.
   std::vector<double> values_, sums_;

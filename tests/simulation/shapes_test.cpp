@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numbers>
+#include <vector>
 
 #include "simulation/shapes.h"
 #include "support/random.h"
@@ -43,6 +45,31 @@ std::array<Eigen::Vector2d, 3> random_triangle(Random& random, double reach) {
     corner = {random.uniform(-reach, reach), random.uniform(-reach, reach)};
   }
   return triangle;
+}
+
+TEST(PatternLines, FindsSameCellAsBinarySearch) {
+  Random random(3);
+  for (const std::size_t count : {2u, 3u, 40u}) {
+    std::vector<double> lines_m;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double offset = random.uniform(0, 1);
+      lines_m.push_back(0.3 * offset * offset - 0.1);  // unevenly
+    }
+    const PatternLines lines(lines_m);
+    std::ranges::sort(lines_m);
+    ASSERT_EQ(lines.coordinates_m(), lines_m);
+    for (int i = 0; i < 2000; ++i) {
+      const double at_m = i % 2 == 0 ? random.uniform(-0.3, 0.5) : lines_m[random.index(count)];
+      EXPECT_EQ(lines.find_cell(at_m), std::ranges::upper_bound(lines_m, at_m) - lines_m.begin());
+    }
+  }
+}
+
+TEST(PatternLines, HandlesFewerThanTwoLines) {
+  EXPECT_EQ(PatternLines(std::vector<double>{}).find_cell(1), 0);
+  const PatternLines one(std::vector{0.5});
+  EXPECT_EQ(one.find_cell(0.4), 0);
+  EXPECT_EQ(one.find_cell(0.5), 1);
 }
 
 TEST(Disc, IntegralOverEnclosingTriangleIsThatOfWholeDisc) {
