@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -27,7 +28,10 @@ class Histogram {
     cv::minMaxLoc(image, nullptr, &max);
     if (!(max > 0)) return;
     bins_per_value_ = static_cast<float>(kBins / max);
-    for (const float value : image) ++counts_[static_cast<std::size_t>(value * bins_per_value_)];
+    for (int row = 0; row < image.rows; ++row) {  // cv::Mat's iterator is several times slower
+      for (const float value : std::span(image[row], static_cast<std::size_t>(image.cols)))
+        ++counts_[static_cast<std::size_t>(value * bins_per_value_)];
+    }
   }
 
   /// Returns the value that a fraction of the pixels does not exceed, to 1/2^14 of the largest.
