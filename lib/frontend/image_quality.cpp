@@ -28,7 +28,7 @@ class Histogram {
     cv::minMaxLoc(image, nullptr, &max);
     if (!(max > 0)) return;
     bins_per_value_ = static_cast<float>(kBins / max);
-    for (int row = 0; row < image.rows; ++row) {  // cv::Mat's iterator is several times slower
+    for (int row = 0; row < image.rows; ++row) {  // cv::Mat's iterator is slower
       for (const float value : std::span(image[row], static_cast<std::size_t>(image.cols)))
         ++counts_[static_cast<std::size_t>(value * bins_per_value_)];
     }

@@ -172,12 +172,10 @@ std::optional<Eigen::Vector2d> BoardWarp::intersect_ray_with_parabola(
 
 Eigen::Vector2d BoardPattern::intersect_ray_with_shape(const Eigen::Vector3d& origin,
                                                        const Eigen::Vector3d& direction) const {
-  if (!warp_.is_board_flat()) {
-    if (const auto at_m = warp_.intersect_ray_with_parabola(origin, direction)) return *at_m;
-  }
-  Eigen::Vector2d at_m = intersect_ray_with_plane(origin, direction);
-  if (warp_.is_board_flat()) return at_m;
+  if (warp_.is_board_flat()) return intersect_ray_with_plane(origin, direction);
+  if (const auto met_m = warp_.intersect_ray_with_parabola(origin, direction)) return *met_m;
   // Beside the paper: Newton's method along the ray; converges in two or three steps.
+  Eigen::Vector2d at_m = intersect_ray_with_plane(origin, direction);
   constexpr double tolerance_m = 1e-9;
   double distance = -origin.z() / direction.z();
   for (int step = 0; step < 8; ++step) {

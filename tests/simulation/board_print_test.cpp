@@ -18,7 +18,7 @@ SceneBoard make_warped_board() {
   return {pattern, 0.01, {0.002, -0.003}, 1, 0, 0};
 }
 
-/// Returns a ray from a random origin in front of the board to a point.
+/// Ray from a random origin in front of the board to a point.
 struct RayToPoint {
   RayToPoint(const Eigen::Vector3d& point_m, Random& random)
       : origin_m(random.uniform(-0.3, 0.5), random.uniform(-0.3, 0.5), random.uniform(-0.6, -0.1)),
