@@ -143,13 +143,15 @@ std::optional<double> RectanglePattern::find_constant_value_in_quadrilateral(
   const auto points = to_matrix(corners);
   if (!points.allFinite()) return std::nullopt;
   const Eigen::Vector2d lower = points.rowwise().minCoeff(), upper = points.rowwise().maxCoeff();
-  const int column = x_.find_cell(lower.x()), row = y_.find_cell(lower.y());
-  const auto ends_before = [](const PatternLines& lines, int cell, double at_m) {
-    const std::vector<double>& all_m = lines.coordinates_m();
-    return cell < static_cast<int>(all_m.size()) && all_m[static_cast<std::size_t>(cell)] <= at_m;
-  };
-  if (ends_before(x_, column, upper.x()) || ends_before(y_, row, upper.y())) return std::nullopt;
-  return values_[flat_cell_index(column, row)];
+  const int left = x_.find_cell(lower.x()), right = x_.find_cell(upper.x());
+  const int top = y_.find_cell(lower.y()), bottom = y_.find_cell(upper.y());
+  const double value = values_[flat_cell_index(left, top)];
+  for (int row = top; row <= bottom; ++row) {
+    const auto cell = values_.begin() + static_cast<std::ptrdiff_t>(flat_cell_index(left, row));
+    if (std::any_of(cell, cell + (right - left + 1), [&](double v) { return v != value; }))
+      return std::nullopt;
+  }
+  return value;
 }
 
 double Disc::integrate_disc_radiance_in_triangle(const Eigen::Vector2d& p,

@@ -56,8 +56,8 @@ class RectanglePattern {
   double compute_edge_contribution_to_area_integral(const Eigen::Vector2d& p,
                                                     const Eigen::Vector2d& q) const;
 
-  /// Returns the value of the pattern over a quadrilateral; std::nullopt if a line of the pattern
-  /// lies between its corners.
+  /// Returns the value of the pattern over a quadrilateral; std::nullopt if the pattern varies
+  /// within the box around the corners, or if a corner is not finite.
   std::optional<double> find_constant_value_in_quadrilateral(
       const std::array<Eigen::Vector2d, 4>& corners) const;
 

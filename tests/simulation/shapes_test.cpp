@@ -123,6 +123,20 @@ TEST(RectanglePattern, IntegralOverRandomTriangleMatchesSampling) {
   }
 }
 
+TEST(RectanglePattern, ValueIsConstantAcrossLinesOfOtherRectangles) {
+  const RectanglePattern pattern({{0, 0, 4, 4, 5}, {1, 1, 2, 2, 9}, {2, 1, 3, 2, 9}});
+  const auto find = [&](double left, double top, double right, double bottom) {
+    return pattern.find_constant_value_in_quadrilateral(
+        {Eigen::Vector2d(left, top), {right, top}, {right, bottom}, {left, bottom}});
+  };
+  EXPECT_EQ(find(0.5, 2.5, 3.5, 3.5), 5) << "below the inner rectangles";
+  EXPECT_EQ(find(1.5, 1.2, 2.5, 1.8), 9) << "across two with equal values";
+  EXPECT_EQ(find(-2, -3, 8, -1), 0) << "outside, above all lines";
+  EXPECT_EQ(find(0.5, 1.2, 1.5, 1.8), std::nullopt);
+  EXPECT_EQ(find(0.5, 0.5, 3.5, 3.5), std::nullopt) << "around the inner rectangles";
+  EXPECT_EQ(find(3.5, 3.5, 4.5, 3.8), std::nullopt);
+}
+
 TEST(RectanglePattern, IntegralIsExactForTrianglesWithSidesOnEdges) {
   const RectanglePattern square({{0, 0, 2, 3, 0.5}});
   EXPECT_DOUBLE_EQ(integral_over(square, {{{0, 0}, {2, 0}, {2, 3}}}), 1.5);
