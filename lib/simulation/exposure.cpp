@@ -121,7 +121,7 @@ std::vector<unsigned char> encode_image_as_jpeg_or_png(
       processing && processing->jpeg_quality
           ? get_codecs().encode_image_file(".jpg", image,
                                            {cv::IMWRITE_JPEG_QUALITY, *processing->jpeg_quality})
-          : get_codecs().encode_image_file(".png", image, {cv::IMWRITE_PNG_COMPRESSION, 1});
+          : get_codecs().encode_image_file(".png", image, {});
   return {bytes.begin(), bytes.end()};
 }
 
@@ -136,10 +136,11 @@ cv::Mat simulate_sensor_image(const Sensor& sensor, const cv::Mat1f& mean_electr
   }
   const auto full_well = static_cast<float>(sensor.full_well_e);
   if (sensor.bloom) add_blooming(*sensor.bloom, full_well, electrons);
-  const auto read_noise = sensor.read_noise_e;
-  for (float& value : electrons) {
-    value = std::min(value, full_well);
-    if (read_noise > 0) value += static_cast<float>(random.gaussian(read_noise));
+  electrons = cv::min(electrons, full_well);
+  if (sensor.read_noise_e > 0) {
+    cv::Mat1f noise(electrons.size());
+    random.fill(noise, cv::RNG::NORMAL, 0, sensor.read_noise_e);
+    electrons += noise;
   }
   const int type = sensor.bits == 8 ? CV_8U : CV_16U;
   cv::Mat image;
