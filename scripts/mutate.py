@@ -44,10 +44,10 @@ STATEMENT = re.compile(r"^[ \t]*(?!return\b|const\b|using\b|auto\b|break\b|case\
                        r"[\w\[\]().>:*-]+(?:\([^;{}]*\)| [-+*/]?= [^;{}]*);[ \t]*$", re.M)
 ARGUMENTS = re.compile(r"\b[a-z]\w*\(([\w.]+), ([\w.]+)\)")
 MINUS = re.compile(r"(?<=[(=,] )-(?=[a-z(])|(?<=\()-(?=[a-z(])|(?<=return )-(?=[a-z(])")
-# Lines that compare integers: only these get < for <=.
+# Lines that compare integers: only these, unless LATITUDE matches, get < for <=.
 COUNTS = re.compile(r"\+\+|size|count|rows\(\)|cols\(\)|\bnum_|\bn\b|\b(?:width|height)\b|static_cast<(?:int|std::)")
-# Constants that may increase by one without effect.
-LATITUDE = re.compile(r"\bmax_(?:iterations|halvings|steps|rounds)\b|std::array<[^<>;]*$")
+# Constants and limits that may increase by one without effect.
+LATITUDE = re.compile(r"\bmax_(?:num_)?(?:iterations|halvings|steps|rounds)\b|std::array<[^<>;]*$")
 CONDITION = re.compile(r"\bif \((?=[^;{}]*\))")
 
 
@@ -64,7 +64,8 @@ def find_mutations(text):
         for match in re.finditer((r"\b" if old[0].isalpha() else "") + re.escape(old), masked):
             if re.search(r"template|operator", masked[masked.rfind("\n", 0, match.start()) + 1:match.start()]):
                 continue
-            counts = COUNTS.search(masked[masked.rfind("\n", 0, match.start()) + 1:masked.find("\n", match.end())])
+            line = masked[masked.rfind("\n", 0, match.start()) + 1:masked.find("\n", match.end())]
+            counts = COUNTS.search(line) and not LATITUDE.search(line)
             found += [(match.start(), match.end(), new) for new in news if counts or not is_boundary(old, new)]
     for match in NUMBER.finditer(masked):
         value = match[0]

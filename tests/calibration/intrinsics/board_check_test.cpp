@@ -144,6 +144,16 @@ TEST_P(CheckBoardLayout, ReportsNoProblemForTagsOfSecondBoard) {
   EXPECT_THAT(problem(views_.board), IsEmpty());
 }
 
+/// A column determines the number of columns, but not the direction of the ids in a row.
+TEST_P(CheckBoardLayout, ReportsNoLayoutIfOnlyTagsOfOneColumnAreSeen) {
+  for (BoardView& view : seen_) {
+    std::erase_if(view.detection.tags, [](const TagDetection& tag) { return tag.id % 6 != 2; });
+  }
+  Board board = views_.board;
+  board.cols = 4;
+  EXPECT_THAT(problem(board), HasSubstr("do not lie as on a board of 4 x 5 tags"));
+}
+
 TEST_P(CheckBoardLayout, SuggestsAnotherBoardWhenTagIdsArePermuted) {
   for (BoardView& view : seen_) {
     for (TagDetection& tag : view.detection.tags) tag.id = tag.id * 7 % 30;

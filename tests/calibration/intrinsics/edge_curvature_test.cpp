@@ -96,6 +96,23 @@ TEST(CorrectCornersForEdgeCurvature, RemovesCornerErrorsCausedByCurvatureErrors)
   }
 }
 
+TEST(CorrectCornersForEdgeCurvature, CorrectsEachOfSeveralTagsLikeOneAlone) {
+  const std::vector<BoardLattice::Corner> unchanged = tag_with_errors({0.1, 0.1, 0.1, 0.1}).seen;
+  std::vector<BoardLattice::Corner> alone = tag_with_errors({0.06, -0.1, 0.03, 0.08}).seen;
+  std::vector<BoardLattice::Corner> all = unchanged;
+  all[3].curvature.reach = 0;  // an edge of the first tag has no measured curvature
+  all.insert(all.end(), alone.begin(), alone.end());
+  all.insert(all.end(), alone.begin(), alone.end());
+  const double displacement_px = correct_corners_for_edge_curvature(alone, synthetic_lens());
+  EXPECT_GT(displacement_px, 0.05);
+  EXPECT_EQ(correct_corners_for_edge_curvature(all, synthetic_lens()), displacement_px);
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_EQ(all[k].pixel, unchanged[k].pixel);
+    EXPECT_EQ(all[4 + k].pixel, alone[k].pixel);
+    EXPECT_EQ(all[8 + k].pixel, alone[k].pixel);
+  }
+}
+
 TEST(CorrectCornersForEdgeCurvature, KeepsCornersOfTagWithUnmeasuredEdgeCurvature) {
   Tag tag = tag_with_errors({0.1, 0.1, 0.1, 0.1});
   tag.seen[2].curvature.reach = 0;

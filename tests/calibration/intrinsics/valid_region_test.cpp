@@ -35,6 +35,20 @@ TEST(ComputeValidLensRegion, ClipsRegionToImage) {
   EXPECT_TRUE(polygon_contains(region, {800, 600}));
 }
 
+/// The edge from (-20, 260) to (360, -20), and its three mirror images, cross the image border
+/// 245.26 px and 332.86 px from the nearest image corner.
+TEST(ComputeValidLensRegion, SlantedEdgesEndAtTheirCrossingsWithImageBorder) {
+  const ImageRegion region = compute_valid_lens_region(
+      {{20, 300}, {400, 20}, {780, 300}, {400, 580}}, kImager, LensModel::opencv8);
+  const double slope = 280. / 380;
+  const double along_v = 260 - 20 * slope, along_u = along_v / slope;
+  EXPECT_NEAR(compute_region_fraction_of_image_area(region, kImager),
+              1 - 4 * along_u * along_v / 2 / (800 * 600), 1e-12);
+  EXPECT_TRUE(polygon_contains(region, {along_u / 2 + 0.1, along_v / 2 + 0.1}));
+  EXPECT_FALSE(polygon_contains(region, {along_u / 2 - 0.1, along_v / 2 - 0.1}));
+  EXPECT_FALSE(polygon_contains(region, {800 - along_u / 2 + 0.1, 600 - along_v / 2 + 0.1}));
+}
+
 TEST(ComputeValidLensRegion, FollowsSlantedHullInsteadOfBoundingBox) {
   const ImageRegion region = compute_valid_lens_region(
       {{100, 100}, {700, 500}, {690, 510}, {90, 110}}, kImager, LensModel::opencv8);

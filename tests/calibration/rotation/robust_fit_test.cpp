@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <numeric>
 
 #include "support/random.h"
@@ -52,6 +54,49 @@ TEST(RobustFit, CovarianceIsIdenticalForAnyMemoryOrderOfParameters) {
     for (std::size_t j = order.size(); j-- > 1;) std::swap(order[j], order[random.index(j + 1)]);
     EXPECT_EQ(covariance_with(order), expected);
   }
+}
+
+/// One offset, a rotation that is fixed and two that are free.
+TEST(RobustFit, InverseOfNormalEquationsIsExactAndZeroForFixedParameters) {
+  std::array<double, 2> offset{};
+  std::array<double, 3> turns{};
+  Random random(3);
+  RobustFit fit(true);
+  for (std::size_t i = 0; i < 12; ++i) {
+    const Eigen::Vector2d point(random.uniform(-1, 1), random.uniform(-1, 1));
+    const Eigen::Vector2d seen = point + 0.1 * Eigen::Vector2d(random.normal(), random.normal());
+    fit.add_residual_block(std::make_unique<ceres::AutoDiffCostFunction<TurnedPoint, 2, 2, 1>>(
+                               new TurnedPoint{point, seen}),
+                           {offset.data(), &turns.at(i % 3)});
+  }
+  fit.set_parameter_constant(&turns[0]);
+  ASSERT_TRUE(fit.solve_robust_fit());
+  EXPECT_EQ(turns[0], 0);
+  EXPECT_EQ(fit.degrees_of_freedom(), 24 - 4);
+  const auto at = fit.linearize_used_residuals();
+  ASSERT_TRUE(at);
+  ASSERT_EQ(at->residuals.size(), 12U);
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(5, 5);
+  double squares = 0;
+  for (const auto& residual : at->residuals) {
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      for (Eigen::Index j = 0; j < 3; ++j) {
+        normal(residual.unknowns[std::size_t(i)], residual.unknowns[std::size_t(j)]) +=
+            residual.jacobian.col(i).dot(residual.jacobian.col(j));
+      }
+    }
+    squares += std::pow(fit.residual_norms()[residual.index], 2);
+  }
+  EXPECT_NEAR(at->variance, squares / 20, 1e-12 * squares);
+  const Eigen::Index fixed = at->first_unknown.at(&turns[0]);
+  std::vector<Eigen::Index> others;
+  for (Eigen::Index i = 0; i < 5; ++i) {
+    EXPECT_EQ(at->inverse(i, fixed), 0);
+    EXPECT_EQ(at->inverse(fixed, i), 0);
+    if (i != fixed) others.push_back(i);
+  }
+  const Eigen::MatrixXd product = at->inverse(others, others) * normal(others, others);
+  EXPECT_LT((product - Eigen::MatrixXd::Identity(4, 4)).cwiseAbs().maxCoeff(), 1e-10);
 }
 
 }  // namespace
