@@ -106,7 +106,20 @@ TEST_P(BoardDetectorOnRenderedBoard, RejectsTagsDetectedTwice) {
   cv::hconcat(image, image, twice);
   const BoardDetection seen = BoardDetector(board).detect_board(twice);
   EXPECT_TRUE(seen.tags.empty()) << seen.tags.size();
-  EXPECT_GT(seen.num_unusable_tags, 20);
+  EXPECT_EQ(seen.num_unusable_tags, static_cast<int>(find_true_corners().size()));
+  EXPECT_EQ(seen.num_overexposed_tags, 0);
+}
+
+TEST_P(BoardDetectorOnRenderedBoard, CountsRejectedTagsOnOverexposedPaper) {
+  cv::Mat twice, bright;
+  cv::hconcat(image, image, twice);
+  double brightest = 0;
+  cv::minMaxLoc(image, nullptr, &brightest);
+  twice.convertTo(bright, CV_8U, 3 * 255 / brightest);
+  const BoardDetection seen = BoardDetector(board).detect_board(bright);
+  EXPECT_TRUE(seen.tags.empty()) << seen.tags.size();
+  EXPECT_GE(seen.num_unusable_tags, 20);
+  EXPECT_EQ(seen.num_overexposed_tags, seen.num_unusable_tags);
 }
 
 TEST_P(BoardDetectorOnRenderedBoard, ReturnsNoTagsForTinyImages) {

@@ -61,6 +61,16 @@ TEST(EdgeField, ReturnsTrueBlurDespiteOutliersAmongSamples) {
               1, 0.03);
 }
 
+TEST(EdgeField, VariesOverImageFor32SamplesOrMore) {
+  const auto ratio_across_image = [](int count) {
+    const EdgeField field(make_samples(count, 0), EdgeField::Terms::position);
+    return field.evaluate_field_at_edge({100, 100}, {1, 0}) /
+           field.evaluate_field_at_edge({700, 500}, {1, 0});
+  };
+  EXPECT_EQ(ratio_across_image(31), 1);
+  EXPECT_GT(std::abs(ratio_across_image(32) - 1), 0.01);
+}
+
 TEST(EdgeField, ReturnsGeometricMeanEverywhereForThreeSamples) {
   const std::vector<EdgeSample> few{
       {{10, 10}, {1, 0}, 0.5, 0.1}, {{90, 10}, {1, 0}, 0.8, 0.1}, {{50, 80}, {0, 1}, 2.0, 0.1}};

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <tuple>
 
 namespace vlp {
 namespace {
@@ -170,6 +171,15 @@ TEST(FitEdgeCurveAndBlur, RecoversDimEdgeWithSteepestToneCurve) {
   EdgeCurve edge = step.start();
   ASSERT_TRUE(fit_edge_curve_and_blur(edge, step.pixels(), {step.gamma}));
   step.expect_found(edge, 5e-3);
+}
+
+TEST(FitEdgeCurveAndBlur, RequiresSixGrayLevelsAcrossEdge) {
+  for (const auto& [black, white, is_accepted] :
+       {std::tuple{100., 107., true}, {100., 105., false}}) {
+    const Step step{.black = black, .white = white};
+    EdgeCurve edge = step.start();
+    EXPECT_EQ(fit_edge_curve_and_blur(edge, step.pixels(), {}).has_value(), is_accepted) << white;
+  }
 }
 
 TEST(FitEdgeCurveAndBlur, ReturnsNulloptForNoiseOrFewPixels) {

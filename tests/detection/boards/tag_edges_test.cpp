@@ -11,6 +11,8 @@
 #include <map>
 #include <string>
 
+#include "camera/lens.h"
+#include "detection/boards/tone_curve.h"
 #include "simulation/exposure.h"
 #include "simulation/scene.h"
 #include "simulation/truth.h"
@@ -74,6 +76,95 @@ Scene paper_rig() { return read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/s
 
 CaptureSet find_board_set(const Scene& scene) {
   return *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
+}
+
+/// Returns the distances of the image of a straight line from the chord between its ends, at
+/// w = -0.5, 0 and 0.5 along the chord, in the direction of `outwards`.
+Eigen::Vector3d compute_offsets_from_chord_px(const Lens& lens, const Eigen::Vector2d& from,
+                                              const Eigen::Vector2d& to,
+                                              const Eigen::Vector2d& outwards) {
+  const Eigen::Vector3d first = lens.unproject_pixel(from).value().direction,
+                        last = lens.unproject_pixel(to).value().direction;
+  const Eigen::Vector2d chord = to - from;
+  Eigen::Vector3d offsets_px;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const double target = 0.25 * double(i + 1);
+    double fraction = target;
+    Eigen::Vector2d off;
+    for (int iteration = 0; iteration < 20; ++iteration) {
+      off = lens.project_point((1 - fraction) * first + fraction * last).value() - from;
+      fraction += target - chord.dot(off) / chord.squaredNorm();
+    }
+    offsets_px[i] = outwards.dot(off);
+  }
+  return offsets_px;
+}
+
+TEST(BoardDetector, MeasuresCurvaturesOfStraightEdgesBehindDistortingLens) {
+  Scene scene = read_scene_file(VLP_SOURCE_DIR "/datasets/fisheye/scene.yaml");
+  scene.camera.readout = Readout::rows;  // the sensor's lines are rows of the image
+  scene.sensor.shot_noise = false;
+  scene.sensor.read_noise_e = 0;
+  const CaptureSet views = find_board_set(scene);
+  const FrameRenderer renderer(scene);
+  const BoardDetector detector(scene.board->pattern);
+  const Lens lens(scene.camera.lens_model, scene.camera.intrinsics);
+  int edges = 0;
+  double squared_errors = 0, squared_offsets = 0;
+  for (std::size_t index = 0; index < 3; ++index) {
+    const cv::Mat image = simulate_sensor_image(
+        scene.sensor,
+        renderer.render_board_in_electrons(make_board_capture_parameters(scene, views, index)),
+        index, scene.processing);
+    for (const TagDetection& tag : detector.detect_board(image).tags) {
+      const auto& corners = tag.corners_px;
+      const Eigen::Vector2d middle = (corners[0] + corners[1] + corners[2] + corners[3]) / 4;
+      for (std::size_t k = 0; k < 4; ++k) {
+        const Eigen::Vector2d &from = corners[k], &to = corners[(k + 1) % 4];
+        Eigen::Vector2d outwards = Eigen::Vector2d(from.y() - to.y(), to.x() - from.x());
+        if (outwards.dot(from - middle) < 0) outwards = -outwards;
+        outwards.normalize();
+        const Eigen::Vector3d expected_px = compute_offsets_from_chord_px(lens, from, to, outwards);
+        for (Eigen::Index i = 0; i < 3; ++i) {
+          const double measured_px =
+              tag.curvatures[k].curve_offset_from_straight_line_px(0.5 * double(i - 1));
+          squared_errors += std::pow(measured_px - expected_px[i], 2) / 3;
+          squared_offsets += expected_px.squaredNorm() / 9;
+        }
+        EXPECT_GT(tag.curvatures[k].reach, 0.5);
+        EXPECT_LE(tag.curvatures[k].reach, 1.1);
+        ++edges;
+      }
+    }
+  }
+  ASSERT_GT(edges, 100);
+  const double error_px = std::sqrt(squared_errors / edges),
+               offset_px = std::sqrt(squared_offsets / edges);
+  RecordProperty("error_px", std::to_string(error_px));
+  RecordProperty("offset_px", std::to_string(offset_px));
+  EXPECT_GT(offset_px, 0.1);
+  EXPECT_LT(error_px, 0.1 * offset_px);
+}
+
+TEST(BoardDetector, ListsFitForEachToneCurveOfImageWithGamma) {
+  Scene scene = paper_rig();
+  scene.processing = ImageProcessing{};
+  scene.processing->gamma = 2.0;
+  const FrameRenderer renderer(scene);
+  const cv::Mat image =
+      simulate_sensor_image(scene.sensor,
+                            renderer.render_board_in_electrons(
+                                make_board_capture_parameters(scene, find_board_set(scene), 0)),
+                            1, scene.processing);
+  const BoardDetection seen = BoardDetector(scene.board->pattern).detect_board(image);
+  ASSERT_GT(seen.tags.size(), 5U);
+  ASSERT_EQ(seen.curve_costs.size(), kGammas.size());
+  // The third gamma above 1 is the true one.
+  EXPECT_EQ(std::ranges::min_element(seen.curve_costs) - seen.curve_costs.begin(), 3);
+  for (const TagDetection& tag : seen.tags) {
+    ASSERT_EQ(tag.tone_curve_fits.size(), kGammas.size() - 1) << tag.id;
+    EXPECT_NE(tag.tone_curve_fits[2].corners_px, tag.corners_px);
+  }
 }
 
 TEST(BoardDetectorOnNarrowTags, CornersAreNotBiasedByWhiteBits) {

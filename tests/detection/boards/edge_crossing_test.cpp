@@ -1,0 +1,91 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/boards/edge_crossing.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "support/matchers.h"
+
+namespace vlp {
+namespace {
+
+/// Corner between two black squares, the edges of which are parabolas.
+struct CurvedEdgeCorner {
+  Eigen::Vector2d corner_px{20.3, 19.6};
+  std::array<double, 2> angles_rad{0.2, 1.7};
+  std::array<double, 2> curvatures_per_px{0, 0};
+  Eigen::Vector2d light_per_px{0, 0};
+  double blur_px = 0.9;
+
+  cv::Mat1b render_image() const {
+    cv::Mat1b image(41, 41);
+    for (int row = 0; row < image.rows; ++row) {
+      for (int column = 0; column < image.cols; ++column) {
+        const Eigen::Vector2d at = Eigen::Vector2d(column, row) - corner_px;
+        double pattern = 1;
+        for (std::size_t i = 0; i < 2; ++i) {
+          const Eigen::Vector2d along(std::cos(angles_rad[i]), std::sin(angles_rad[i]));
+          const double u = along.dot(at), v = along.x() * at.y() - along.y() * at.x();
+          pattern *= std::erf((v - curvatures_per_px[i] * u * u) / (std::numbers::sqrt2 * blur_px));
+        }
+        image(row, column) =
+            cv::saturate_cast<uchar>((120 + 70 * pattern) * (1 + light_per_px.dot(at)));
+      }
+    }
+    return image;
+  }
+
+  std::optional<Eigen::Vector2d> fit_corner() const {
+    return fit_edge_intersection_at_corner(render_image(), corner_px + Eigen::Vector2d(0.4, -0.3),
+                                           {Eigen::Vector2d(1, 0.1), Eigen::Vector2d(-0.02, 1)}, 8);
+  }
+};
+
+constexpr double kTolerance_px = 0.01;  // gray levels are rounded to integers
+
+TEST(FitEdgeIntersectionAtCorner, ReturnsCornerOfStraightEdges) {
+  const CurvedEdgeCorner corner;
+  const auto found = corner.fit_corner();
+  ASSERT_TRUE(found);
+  EXPECT_THAT(*found, IsNear(corner.corner_px, kTolerance_px));
+}
+
+TEST(FitEdgeIntersectionAtCorner, ReturnsCornerOfEdgesWithDifferentCurvatures) {
+  for (const std::array<double, 2> curvatures :
+       {std::array{0.01, 0.0}, {0.0, 0.01}, {-0.01, 0.02}, {0.02, 0.015}}) {
+    CurvedEdgeCorner corner;
+    corner.curvatures_per_px = curvatures;
+    const auto found = corner.fit_corner();
+    ASSERT_TRUE(found);
+    EXPECT_THAT(*found, IsNear(corner.corner_px, kTolerance_px))
+        << curvatures[0] << " " << curvatures[1];
+  }
+}
+
+TEST(FitEdgeIntersectionAtCorner, LightGradientDoesNotDisplaceCorner) {
+  CurvedEdgeCorner corner;
+  corner.light_per_px = {0.02, -0.01};
+  corner.curvatures_per_px = {0.01, -0.01};
+  const auto found = corner.fit_corner();
+  ASSERT_TRUE(found);
+  EXPECT_THAT(*found, IsNear(corner.corner_px, kTolerance_px));
+}
+
+TEST(FitEdgeIntersectionAtCorner, ReturnsNulloptWithoutCorner) {
+  const std::array<Eigen::Vector2d, 2> along{Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)};
+  EXPECT_FALSE(fit_edge_intersection_at_corner(cv::Mat1b(41, 41, 100), {20, 20}, along, 8));
+  EXPECT_FALSE(
+      fit_edge_intersection_at_corner(CurvedEdgeCorner().render_image(), {20, 20}, along, 2))
+      << "13 pixels";
+  EXPECT_FALSE(
+      fit_edge_intersection_at_corner(CurvedEdgeCorner().render_image(), {25, 20}, along, 8))
+      << "far from the guess";
+}
+
+}  // namespace
+}  // namespace vlp
