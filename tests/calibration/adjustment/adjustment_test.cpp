@@ -126,6 +126,22 @@ TEST(RunBundleAdjustment, AsksForSecondHeightForOneCaptureOfTwoLampsAndSucceedsW
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-6));
 }
 
+TEST(RunBundleAdjustment, NotesWhatOneOrTwoKnownPositionsDoNotDetermine) {
+  Survey survey(0.001);
+  survey.turn({0, 0, 0}, 12, 1e-4);
+  EXPECT_THAT(run_bundle_adjustment(survey.input).notes,
+              testing::Contains("1 known position: only the survey determines yaw and scale of the "
+                                "map; captures at 2 more known positions would determine it"));
+  survey.turn({0.5, 0.25, 0}, 12, 1e-4);
+  EXPECT_THAT(run_bundle_adjustment(survey.input).notes,
+              testing::Contains(HasSubstr("2 known positions: only the survey determines rotation "
+                                          "of the map about the line through both positions; "
+                                          "captures at 1 more known position")));
+  survey.turn({-0.5, 0.25, 0.1}, 12, 1e-4);
+  EXPECT_THAT(run_bundle_adjustment(survey.input).notes,
+              testing::Not(testing::Contains(HasSubstr("only the survey determines"))));
+}
+
 TEST(RunBundleAdjustment, MarksOnlyKnownPositionWithTwoCentimeterErrorAsWrong) {
   Survey survey;
   survey.five_places(1e-4);
