@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <opencv2/core.hpp>
@@ -108,6 +109,25 @@ TEST_P(BoardDetectorOnRenderedBoard, RejectsTagsDetectedTwice) {
   EXPECT_TRUE(seen.tags.empty()) << seen.tags.size();
   EXPECT_EQ(seen.num_unusable_tags, static_cast<int>(find_true_corners().size()));
   EXPECT_EQ(seen.num_overexposed_tags, 0);
+}
+
+TEST_P(BoardDetectorOnRenderedBoard, RejectsOnlyTagThatIsCopiedBesideBoard) {
+  const BoardDetector detector(board);
+  const BoardDetection all = detector.detect_board(image);
+  ASSERT_GT(all.tags.size(), 10U);
+  const TagDetection copied = all.tags[all.tags.size() / 2];
+  std::vector<cv::Point2f> corners;
+  for (const auto& corner : copied.corners_px) corners.emplace_back(corner.x(), corner.y());
+  const cv::Rect tag = cv::boundingRect(corners);
+  constexpr int margin_px = 20;
+  cv::Mat larger;
+  cv::copyMakeBorder(image, larger, 0, 0, 0, tag.width + 2 * margin_px, cv::BORDER_CONSTANT,
+                     cv::Scalar::all(double(image.at<uchar>(tag.y, tag.x))));
+  image(tag).copyTo(larger(cv::Rect(image.cols + margin_px, margin_px, tag.width, tag.height)));
+  const BoardDetection seen = detector.detect_board(larger);
+  EXPECT_EQ(seen.num_unusable_tags, all.num_unusable_tags + 1);
+  EXPECT_EQ(seen.tags.size(), all.tags.size() - 1);
+  EXPECT_EQ(std::ranges::find(seen.tags, copied.id, &TagDetection::id), seen.tags.end());
 }
 
 TEST_P(BoardDetectorOnRenderedBoard, CountsRejectedTagsOnOverexposedPaper) {
