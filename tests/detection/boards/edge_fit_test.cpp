@@ -19,11 +19,14 @@ struct Step {
   double off_px = 0.31, slope_px = 0.2, bow_px = -0.15, blur_px = 0.8;
   double black = 16, white = 200, gamma = 1;
   double stripe_px = 3, clipped_at = 255, noise = 0;
+  double glow_fraction = 0, glow_blur_px = 1;  // light with another blur
 
   double level(double w, double v, double white_behind) const {
     const double e = v - off_px - slope_px * w - bow_px * w * w;
     const auto blurred_step = [&](double x) {
-      return std::erfc(-x / (std::numbers::sqrt2 * blur_px)) / 2;
+      const double scaled = -x / std::numbers::sqrt2;
+      return (1 - glow_fraction) * std::erfc(scaled / blur_px) / 2 +
+             glow_fraction * std::erfc(scaled / glow_blur_px) / 2;
     };
     const double light =
         black + (white - black) * (blurred_step(e) + white_behind * blurred_step(-e - stripe_px));
@@ -171,6 +174,26 @@ TEST(FitEdgeCurveAndBlur, RecoversDimEdgeWithSteepestToneCurve) {
   EdgeCurve edge = step.start();
   ASSERT_TRUE(fit_edge_curve_and_blur(edge, step.pixels(), {step.gamma}));
   step.expect_found(edge, 5e-3);
+}
+
+TEST(FitEdgeCurveAndBlur, EquivalentBlurOfGaussianIsItsSigma) {
+  for (const double blur_px : {0.5, 0.8, 1.2}) {
+    const Step step{.blur_px = blur_px, .stripe_px = 10};
+    EdgeCurve edge = step.start();
+    const auto fit = fit_edge_curve_and_blur(edge, step.pixels(), {});
+    ASSERT_TRUE(fit);
+    EXPECT_NEAR(fit->equivalent_blur_px, blur_px, 1e-3);
+  }
+}
+
+/// The line spread is far from Gaussian, so that the change of the blur is not linear.
+TEST(FitEdgeCurveAndBlur, EquivalentBlurIsFittedBlurForNarrowCoreInWideGlow) {
+  const Step step{.blur_px = 0.5, .stripe_px = 10, .glow_fraction = 0.7, .glow_blur_px = 1.5};
+  EdgeCurve edge = step.start();
+  const auto fit = fit_edge_curve_and_blur(edge, step.pixels(), {});
+  ASSERT_TRUE(fit);
+  EXPECT_NEAR(edge.blur_px, 0.8, 0.05);
+  EXPECT_EQ(fit->equivalent_blur_px, edge.blur_px);
 }
 
 TEST(FitEdgeCurveAndBlur, RequiresSixGrayLevelsAcrossEdge) {
