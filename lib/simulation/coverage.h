@@ -134,6 +134,8 @@ class ElementGrid {
         pose(row).translation(), pose(row).linear() * corner_ray(corner_row, corner_column));
   }
 
+  /// Computes the points of the target at the corners of a range of columns, for the camera pose of
+  /// `row`.
   void intersect_corners(int row, int corner_row, const std::vector<cv::Range>& ranges,
                          std::vector<Eigen::Vector2d>& points) const {
     for (const cv::Range& columns : ranges) {
@@ -179,11 +181,13 @@ class ElementGrid {
     return varying_columns;
   }
 
+  /// Returns the contributions of an edge to the integral of the pattern and to the area, by
+  /// Green's theorem.
   Edge integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
     return {shape_.compute_edge_contribution_to_area_integral(p, q), cross_product_2d(p, q) / 2};
   }
 
-  /// Adds the pattern to elements of a row.
+  /// Adds the pattern to elements of a row, whose corners are in above_ and below_.
   void add_elements(const cv::Range& columns, double weight, float* row) const {
     Edge left{};
     bool is_left_known = false;

@@ -35,7 +35,7 @@ struct IntegratedEverywhere {
 };
 
 /// Returns a fisheye camera of 250 x 240 pixels with a field of view above 180 degrees.
-Camera small_fisheye() {
+Camera make_small_fisheye() {
   Camera camera = pinhole_camera();
   camera.lens_model = LensModel::fisheye;
   camera.intrinsics = {70, 71, 125, 118, 0.03, -0.012, 0.004, -0.0006};
@@ -50,7 +50,7 @@ TEST(AddShapeToImage, ConstantBlocksAndOutlinesEqualIntegrationOfEachElement) {
   board.warp_m = {0.0005, -0.0004};
   board.surround_e_per_s = 4e5;
   const BoardPattern pattern(board);
-  const PixelRays rays(small_fisheye(), 2);
+  const PixelRays rays(make_small_fisheye(), 2);
   const PixelWindow window = make_full_image_window(rays);
   Random random(8);
   for (int i = 0; i < 6; ++i) {

@@ -22,7 +22,7 @@ struct UncertainMap {
     }
   }
 
-  /// Returns the map with one coordinate of an uncertain lamp displaced by step_m.
+  /// Returns the map with the lamp coordinate of a column of the Jacobian displaced by step_m.
   LampMap displace_lamp(Eigen::Index column, double step_m) const {
     LampMap result = map;
     result.lamps[uncertain[static_cast<std::size_t>(column / 3)]].position_m[column % 3] += step_m;

@@ -10,7 +10,8 @@ namespace vlp {
 namespace {
 
 /// Returns points of a part of a board: `cols` points in each of `rows` rows.
-BoardDetection points_of_part(const BoardLattice& lattice, std::size_t part, int cols, int rows) {
+BoardDetection make_points_of_part(const BoardLattice& lattice, std::size_t part, int cols,
+                                   int rows) {
   BoardDetection seen;
   for (int row = 0; row < rows; ++row) {
     for (int col = 0; col < cols; ++col) {
@@ -25,11 +26,11 @@ BoardDetection points_of_part(const BoardLattice& lattice, std::size_t part, int
 TEST(BoardLattice, TwelvePointsInTwoRowsDeterminePoseOfBoardInOnePart) {
   const BoardLattice lattice(synthetic_board(false));
   ASSERT_EQ(lattice.num_board_parts(), 1U);
-  EXPECT_TRUE(lattice.are_corners_sufficient_for_pose(points_of_part(lattice, 0, 6, 2)));
-  EXPECT_TRUE(lattice.are_corners_sufficient_for_pose(points_of_part(lattice, 0, 2, 6)));
-  EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(points_of_part(lattice, 0, 1, 9)));
-  EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(points_of_part(lattice, 0, 12, 1)));
-  BoardDetection eleven = points_of_part(lattice, 0, 6, 2);
+  EXPECT_TRUE(lattice.are_corners_sufficient_for_pose(make_points_of_part(lattice, 0, 6, 2)));
+  EXPECT_TRUE(lattice.are_corners_sufficient_for_pose(make_points_of_part(lattice, 0, 2, 6)));
+  EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(make_points_of_part(lattice, 0, 1, 9)));
+  EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(make_points_of_part(lattice, 0, 12, 1)));
+  BoardDetection eleven = make_points_of_part(lattice, 0, 6, 2);
   eleven.points.pop_back();
   EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(eleven));
 }
@@ -40,7 +41,7 @@ TEST(BoardLattice, SixPointsOfEachPartDeterminePoseOfBoardInFourParts) {
   BoardDetection seen;
   for (std::size_t part = 0; part < 4; ++part) {
     EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(seen)) << "part " << part << " is missing";
-    const BoardDetection more = points_of_part(lattice, part, 3, 2);
+    const BoardDetection more = make_points_of_part(lattice, part, 3, 2);
     seen.points.insert(seen.points.end(), more.points.begin(), more.points.end());
   }
   EXPECT_TRUE(lattice.are_corners_sufficient_for_pose(seen));

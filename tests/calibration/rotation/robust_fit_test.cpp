@@ -89,13 +89,14 @@ TEST(RobustFit, InverseOfNormalEquationsIsExactAndZeroForFixedParameters) {
   }
   EXPECT_NEAR(at->variance, squares / 20, 1e-12 * squares);
   const Eigen::Index fixed = at->first_unknown.at(&turns[0]);
-  std::vector<Eigen::Index> others;
+  std::vector<Eigen::Index> free_unknowns;
   for (Eigen::Index i = 0; i < 5; ++i) {
     EXPECT_EQ(at->inverse(i, fixed), 0);
     EXPECT_EQ(at->inverse(fixed, i), 0);
-    if (i != fixed) others.push_back(i);
+    if (i != fixed) free_unknowns.push_back(i);
   }
-  const Eigen::MatrixXd product = at->inverse(others, others) * normal(others, others);
+  const Eigen::MatrixXd product =
+      at->inverse(free_unknowns, free_unknowns) * normal(free_unknowns, free_unknowns);
   EXPECT_LT((product - Eigen::MatrixXd::Identity(4, 4)).cwiseAbs().maxCoeff(), 1e-10);
 }
 

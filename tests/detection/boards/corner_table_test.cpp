@@ -62,11 +62,7 @@ TEST(ReadCornerTable, RestoresWrittenDetectionsExactly) {
     EXPECT_EQ(found.id, written.id);
     EXPECT_EQ(found.corners_px, written.corners_px);
     EXPECT_EQ(found.corner_sds_px, written.corner_sds_px);
-    for (std::size_t k = 0; k < 4; ++k) {
-      EXPECT_EQ(found.curvatures[k].quadratic_px, written.curvatures[k].quadratic_px);
-      EXPECT_EQ(found.curvatures[k].cubic_px, written.curvatures[k].cubic_px);
-      EXPECT_EQ(found.curvatures[k].reach, written.curvatures[k].reach);
-    }
+    EXPECT_EQ(found.curvatures, written.curvatures);
   }
   ASSERT_EQ(read[0].detection.foreign_tags.size(), 1U);
   EXPECT_EQ(read[0].detection.foreign_tags[0].id, 7);
