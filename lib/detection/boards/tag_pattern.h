@@ -51,7 +51,6 @@ class TagGeometry {
   using Sides = std::array<std::vector<Segment>, 4>;
 
   /// Computes the geometry of the tags of a board.
-  /// Computes the geometry of the tags of a board.
   /// @throws std::invalid_argument if libapriltag does not have the family
   explicit TagGeometry(const Board& board);
 

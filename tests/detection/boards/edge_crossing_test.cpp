@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 
 #include "support/matchers.h"
@@ -74,6 +75,31 @@ TEST(FitEdgeIntersectionAtCorner, LightGradientDoesNotDisplaceCorner) {
   const auto found = corner.fit_corner();
   ASSERT_TRUE(found);
   EXPECT_THAT(*found, IsNear(corner.corner_px, kTolerance_px));
+}
+
+// Each image ends 4 px beyond the corner on one side, and is a part of a larger, black one.
+TEST(FitEdgeIntersectionAtCorner, UsesOnlyPixelsInsideImage) {
+  const CurvedEdgeCorner corner;
+  const cv::Mat1b image = corner.render_image();
+  constexpr int margin_px = 4, border_px = 10;
+  const int column = static_cast<int>(corner.corner_px.x()),
+            row = static_cast<int>(corner.corner_px.y());
+  for (const cv::Rect& part :
+       {cv::Rect(0, 0, column + margin_px, image.rows), cv::Rect(0, 0, image.cols, row + margin_px),
+        cv::Rect(column - margin_px, 0, image.cols - column + margin_px, image.rows),
+        cv::Rect(0, row - margin_px, image.cols, image.rows - row + margin_px)}) {
+    SCOPED_TRACE(testing::Message() << part.x << " " << part.y << " " << part.size());
+    const Eigen::Vector2d origin(part.x, part.y);
+    cv::Mat1b larger;
+    cv::copyMakeBorder(image(part).clone(), larger, border_px, border_px, border_px, border_px,
+                       cv::BORDER_CONSTANT, cv::Scalar(0));
+    const auto found =
+        fit_edge_intersection_at_corner(larger(cv::Rect({border_px, border_px}, part.size())),
+                                        corner.corner_px - origin + Eigen::Vector2d(0.4, -0.3),
+                                        {Eigen::Vector2d(1, 0.1), Eigen::Vector2d(-0.02, 1)}, 8);
+    ASSERT_TRUE(found);
+    EXPECT_THAT(*found, IsNear(corner.corner_px - origin, kTolerance_px));
+  }
 }
 
 TEST(FitEdgeIntersectionAtCorner, ReturnsNulloptWithoutCorner) {

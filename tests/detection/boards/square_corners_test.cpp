@@ -19,6 +19,7 @@
 #include "detection/boards/other_tags.h"
 #include "detection/boards/square_corners.h"
 #include "rig/board_layout.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {
@@ -144,6 +145,21 @@ TEST(SquareCorners, NumbersChessboardCornersFromTopLeftOfImage) {
     cv::Mat turned;
     cv::rotate(image, turned, cv::ROTATE_180);
     expect_all_corners(board, detector.detect_board(turned));
+  }
+}
+
+// The squares are 22 x 8 px. The fit at a corner must not reach the corners above and below.
+TEST(SquareCorners, DetectsChessboardAccuratelyInObliqueView) {
+  const Board board = squares(BoardKind::chessboard, 6, 9);
+  const Eigen::Array2d scale(0.55, 0.2);
+  cv::Mat image;
+  cv::resize(drawn_chessboard(board), image, {}, scale.x(), scale.y(), cv::INTER_AREA);
+  const BoardDetection seen = BoardDetector(board).detect_board(image);
+  ASSERT_EQ(seen.points.size(), 40U);
+  for (std::size_t i = 0; i < seen.points.size(); ++i) {
+    const Eigen::Array2d expected = (corner_position(board, i).array() + 0.5) * scale - 0.5;
+    EXPECT_EQ(seen.points[i].index, i);
+    EXPECT_THAT(seen.points[i].pixel, IsNear(expected.matrix(), 0.05)) << i;
   }
 }
 

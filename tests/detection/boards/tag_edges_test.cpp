@@ -9,6 +9,8 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <memory>
+#include <opencv2/imgproc.hpp>
 #include <string>
 
 #include "camera/lens.h"
@@ -16,6 +18,7 @@
 #include "simulation/exposure.h"
 #include "simulation/scene.h"
 #include "simulation/truth.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {
@@ -164,6 +167,66 @@ TEST(BoardDetector, ListsFitForEachToneCurveOfImageWithGamma) {
   for (const TagDetection& tag : seen.tags) {
     ASSERT_EQ(tag.tone_curve_fits.size(), kGammas.size() - 1) << tag.id;
     EXPECT_NE(tag.tone_curve_fits[2].corners_px, tag.corners_px);
+  }
+}
+
+/// A tag drawn by libapriltag, with bits of `bit_px`, slightly blurred.
+struct DrawnTag {
+  static constexpr int kId = 5;
+  static constexpr int kMargin_px = 12;
+
+  explicit DrawnTag(int bit_px) {
+    const TagFamily family = make_tag_family("tag36h11");
+    const std::unique_ptr<image_u8_t, void (*)(image_u8_t*)> drawn(
+        apriltag_to_image(family.get(), kId), image_u8_destroy);
+    const int border = (family->total_width - family->width_at_border) / 2;
+    cv::Mat1b bits(drawn->height, drawn->width);
+    for (int row = 0; row < bits.rows; ++row) {
+      for (int col = 0; col < bits.cols; ++col) {
+        bits(row, col) = drawn->buf[row * drawn->stride + col] > 0 ? 200 : 40;
+      }
+    }
+    cv::resize(bits, image, {}, bit_px, bit_px, cv::INTER_NEAREST);
+    cv::copyMakeBorder(image, image, kMargin_px, kMargin_px, kMargin_px, kMargin_px,
+                       cv::BORDER_CONSTANT, cv::Scalar(200));
+    cv::GaussianBlur(image, image, {}, 0.9);
+    width_px = bit_px * family->width_at_border;
+    const double low = kMargin_px + bit_px * border - 0.5, high = low + width_px;
+    corners_px = {Eigen::Vector2d(low, high), {high, high}, {high, low}, {low, low}};
+  }
+
+  /// Refines the corners after the first one was displaced. Returns the refined first corner.
+  Eigen::Vector2d refine_displaced_corner(const Eigen::Vector2d& displacement_px) const {
+    Board board;
+    board.family = "tag36h11";
+    board.border_bits = 1;
+    board.tag_spacing = 0.3;
+    std::array<TagDetection, 1> tags;
+    tags[0].id = kId;
+    tags[0].corners_px = corners_px;
+    tags[0].corners_px[0] += displacement_px;
+    refine_tags_by_edge_fits(tags, image, TagGeometry(board));
+    return tags[0].corners_px[0];
+  }
+
+  cv::Mat1b image;
+  double width_px = 0;
+  TagDetection::Corners corners_px;
+};
+
+TEST(RefineTagsByEdgeFits, LimitsDisplacementToLargerOf1p5PxAnd3PercentOfWidth) {
+  for (const int bit_px : {4, 12}) {
+    SCOPED_TRACE(bit_px);
+    const DrawnTag tag(bit_px);
+    const double limit_px = std::max(1.5, 0.03 * tag.width_px);
+    for (const Eigen::Vector2d& direction : {Eigen::Vector2d(1, 1), {1, -1}, {-1, -1}, {-1, 1}}) {
+      SCOPED_TRACE(direction.transpose());
+      const Eigen::Vector2d accepted_px = 0.85 * limit_px * direction.normalized(),
+                            rejected_px = 1.15 * limit_px * direction.normalized();
+      EXPECT_THAT(tag.refine_displaced_corner(accepted_px), IsNear(tag.corners_px[0], 0.02));
+      EXPECT_THAT(tag.refine_displaced_corner(rejected_px),
+                  IsNear(tag.corners_px[0] + rejected_px, 1e-12));
+    }
   }
 }
 
