@@ -6,8 +6,9 @@
 
 namespace vlp {
 
-/// Folders of the project's data, for tests with VLP_SOURCE_DIR.
-inline const std::string kExample = VLP_SOURCE_DIR "/datasets/example/";
-inline const std::string kRig = VLP_SOURCE_DIR "/datasets/paper-rig/rendered";
+/// Folders of the project's data, for tests with VLP_SOURCE_DIR. Not
+/// inline: Clang 14 may initialize inline variables after constants that use them.
+const std::string kExample = VLP_SOURCE_DIR "/datasets/example/";
+const std::string kRig = VLP_SOURCE_DIR "/datasets/paper-rig/rendered";
 
 }  // namespace vlp

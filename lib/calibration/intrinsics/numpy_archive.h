@@ -27,8 +27,11 @@ class NumpyArchive {
     add_npz_array(name, {}, std::span(&value, 1));
   }
   void add_npz_array(std::string_view name, bool value);
-  /// Adds an ASCII string.
+  /// Adds an ASCII string. The overload for literals keeps them from being converted to bool.
   void add_npz_array(std::string_view name, std::string_view text);
+  void add_npz_array(std::string_view name, const char* text) {
+    add_npz_array(name, std::string_view(text));
+  }
 
   /// Returns the complete archive.
   std::string serialize_npz_archive() const;

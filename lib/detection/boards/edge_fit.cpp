@@ -61,7 +61,7 @@ class ColumnProducts {
   void add_products() {
     // The compiler unrolls and vectorizes loops of constant length.
     const auto add = [this]<std::size_t... a>(std::index_sequence<a...>) {
-      (add_products_of_column<a>(), ...);
+      (this->template add_products_of_column<a>(), ...);
     };
     add(std::make_index_sequence<kColumns>());
     count_ = 0;

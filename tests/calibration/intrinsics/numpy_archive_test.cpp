@@ -34,6 +34,8 @@ TEST(NumpyArchive, SerializeReturnsValidZipWithNpyHeader) {
   const auto matrix = run_program("unzip -p '" + file.string() + "' matrix.npy | head -c 80");
   EXPECT_NE(matrix.output.find("{'descr': '<f8', 'fortran_order': False, 'shape': (2,3,), }"),
             std::string::npos);
+  const auto text = run_program("unzip -p '" + file.string() + "' text.npy | tr -d '\\0'");
+  EXPECT_TRUE(text.output.ends_with("\nLENSMODEL_OPENCV8")) << text.output;
 }
 
 }  // namespace
