@@ -14,7 +14,8 @@ mkdir -p out/demo
 echo "Building (some minutes the first time; the log is out/demo/build.log) ..."
 tests=()
 [ -e build/CMakeCache.txt ] || tests=(-DBUILD_TESTING=OFF)  # the packages of the tests may be missing
-if ! { cmake --preset release -DVLP_TOOLBOX=ON "${tests[@]}" &&
+# Clang compiles in three quarters of the time of GCC. CXX in the environment chooses another compiler.
+if ! { CXX=${CXX:-clang++} cmake --preset release -DVLP_TOOLBOX=ON "${tests[@]}" &&
        cmake --build --preset release --target vlp_programs; } >out/demo/build.log 2>&1
 then
   tail -n 30 out/demo/build.log >&2

@@ -109,7 +109,7 @@ class Folder:
             sys.exit(f"mutate.py: no source of lib/{name} is compiled alone; use a preset without unity builds (dev)")
         link = subprocess.run(["ninja", "-C", str(self.build), "-t", "commands", f"tests/{name}/test_{name}"],
                               check=True, capture_output=True, text=True).stdout.rstrip().split("\n")[-1]
-        self.link = re.search(r"&& (\S*c\+\+ .*? -o \S+)(.*?)(?: && |$)", link).groups()
+        self.link = re.search(r"&& (\S*\+\+ .*? -o \S+)(.*?)(?: && |$)", link).groups()
         self.scratch = self.build / "tests" / name / "scratch"
         slow = (ROOT / "tests/slow_tests.txt").read_text().split("\n")
         self.slow = ":".join(line for line in slow if line and not line.startswith("#"))

@@ -42,7 +42,7 @@ installed=(-DCMAKE_INSTALL_PREFIX=/usr
 if [ -e build/CMakeCache.txt ]; then
   cmake "${installed[@]}" build
 else
-  cmake --preset release "${installed[@]}" -DBUILD_TESTING=OFF
+  CXX=${CXX:-clang++} cmake --preset release "${installed[@]}" -DBUILD_TESTING=OFF
 fi
 targets=("${@/#/vlp_package_}")
 [ $# -gt 0 ] || targets=(vlp_packages)

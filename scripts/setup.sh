@@ -12,7 +12,7 @@
 set -euo pipefail
 
 build=(
-  g++ cmake ninja-build ccache git pkg-config
+  clang cmake ninja-build ccache git pkg-config
   libeigen3-dev libyaml-cpp-dev libcsv-dev libcli11-dev libspdlog-dev libfmt-dev
   libopencv-dev libpng-dev libapriltag-dev libceres-dev libssl-dev
   nlohmann-json3-dev libpugixml-dev
@@ -23,7 +23,8 @@ build=(
   dpkg-dev file  # of scripts/packages.sh
 )
 tests=(
-  clang libclang-rt-dev clang-format clang-tidy
+  g++  # of the tests of the installed library and its ABI
+  libclang-rt-dev clang-format clang-tidy
   libgtest-dev libgmock-dev libbenchmark-dev mrcal python3-mrcal poppler-utils unzip
   postgresql postgresql-client tmux util-linux  # of the station
   pybind11-dev python3-dev python3-numpy python3-pil  # of the Python module
