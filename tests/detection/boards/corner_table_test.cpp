@@ -70,6 +70,40 @@ TEST(ReadCornerTable, RestoresWrittenDetectionsExactly) {
   EXPECT_TRUE(read[1].detection.tags.empty());
 }
 
+Board make_chessboard(int cols, int rows) {
+  Board board{"", cols, rows, 0, 1, 1, false, 0, {false, BoardCorner::top_left}};
+  board.kind = BoardKind::chessboard;
+  board.square_size_m = 0.02;
+  return board;
+}
+
+TEST(ReadCornerTable, RestoresChessboardCornersAndRejectsWrongRowLength) {
+  const TemporaryFolder folder;
+  std::vector<BoardView> views{{"a.png", kImager, {}}, {"b.png", kImager, {}}};
+  for (BoardView& view : views) {
+    for (std::size_t i = 0; i < 24; ++i) {
+      view.detection.points.push_back(
+          {i, {100 + 50 / 3. * double(i % 6), 80 + 40 / 7. * double(i / 6)}});
+    }
+  }
+  const auto file = folder / "corners.csv";
+  write_corner_table(file, views, make_chessboard(7, 5));
+  const auto read = read_corner_table(file, make_chessboard(7, 5), kImager);
+  ASSERT_EQ(read.size(), 2U);
+  for (const std::size_t view : {0U, 1U}) {
+    const auto& points = read[view].detection.points;
+    EXPECT_EQ(read[view].image, views[view].image);
+    ASSERT_EQ(points.size(), 24U);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      EXPECT_EQ(points[i].index, i);
+      EXPECT_EQ(points[i].pixel, views[view].detection.points[i].pixel);
+    }
+  }
+  EXPECT_THAT(rejection_message([&] { read_corner_table(file, make_chessboard(5, 7), kImager); }),
+              HasSubstr("the corners lie in rows of 6, but a board of 5 x 7 squares has 4 x 6 "
+                        "corners; swap cols and rows of board.yaml"));
+}
+
 TEST(ReadCornerTable, ToleratesTwoPercentOfCornersOutsideImage) {
   const TemporaryFolder folder;
   const auto read = [&](const std::string& text) {

@@ -170,6 +170,20 @@ TEST(BoardDetector, ListsFitForEachToneCurveOfImageWithGamma) {
   }
 }
 
+TEST(BoardDetector, ListsNoFitsForToneCurvesOfLinearImage) {
+  const Scene scene = paper_rig();
+  const FrameRenderer renderer(scene);
+  const cv::Mat image =
+      simulate_sensor_image(scene.sensor,
+                            renderer.render_board_in_electrons(
+                                make_board_capture_parameters(scene, find_board_set(scene), 0)),
+                            1);
+  const BoardDetection seen = BoardDetector(scene.board->pattern).detect_board(image);
+  ASSERT_GT(seen.tags.size(), 5U);
+  EXPECT_LT(seen.curve_costs.size(), kGammas.size());
+  for (const TagDetection& tag : seen.tags) EXPECT_TRUE(tag.tone_curve_fits.empty()) << tag.id;
+}
+
 /// A tag drawn by libapriltag, with bits of `bit_px`, slightly blurred.
 struct DrawnTag {
   static constexpr int kId = 5;
