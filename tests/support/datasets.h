@@ -6,8 +6,8 @@
 
 namespace vlp {
 
-/// Folders of the project's data, for tests with VLP_SOURCE_DIR. Not
-/// inline: Clang 14 may initialize inline variables after constants that use them.
+/// Folders of the project's data, for tests with VLP_SOURCE_DIR. Not inline: Clang 14 may
+/// initialize inline variables after constants that use them.
 const std::string kExample = VLP_SOURCE_DIR "/datasets/example/";
 const std::string kRig = VLP_SOURCE_DIR "/datasets/paper-rig/rendered";
 

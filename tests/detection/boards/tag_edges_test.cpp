@@ -149,17 +149,20 @@ TEST(BoardDetector, MeasuresCurvaturesOfStraightEdgesBehindDistortingLens) {
   EXPECT_LT(error_px, 0.1 * offset_px);
 }
 
+/// Renders the first board view of a scene.
+cv::Mat render_first_board_view(const Scene& scene) {
+  const FrameRenderer renderer(scene);
+  const BoardShot shot = make_board_capture_parameters(scene, find_board_set(scene), 0);
+  return simulate_sensor_image(scene.sensor, renderer.render_board_in_electrons(shot), 1,
+                               scene.processing);
+}
+
 TEST(BoardDetector, ListsFitForEachToneCurveOfImageWithGamma) {
   Scene scene = paper_rig();
   scene.processing = ImageProcessing{};
   scene.processing->gamma = 2.0;
-  const FrameRenderer renderer(scene);
-  const cv::Mat image =
-      simulate_sensor_image(scene.sensor,
-                            renderer.render_board_in_electrons(
-                                make_board_capture_parameters(scene, find_board_set(scene), 0)),
-                            1, scene.processing);
-  const BoardDetection seen = BoardDetector(scene.board->pattern).detect_board(image);
+  const BoardDetection seen =
+      BoardDetector(scene.board->pattern).detect_board(render_first_board_view(scene));
   ASSERT_GT(seen.tags.size(), 5U);
   ASSERT_EQ(seen.curve_costs.size(), kGammas.size());
   // The third gamma above 1 is the true one.
@@ -172,13 +175,8 @@ TEST(BoardDetector, ListsFitForEachToneCurveOfImageWithGamma) {
 
 TEST(BoardDetector, ListsNoFitsForToneCurvesOfLinearImage) {
   const Scene scene = paper_rig();
-  const FrameRenderer renderer(scene);
-  const cv::Mat image =
-      simulate_sensor_image(scene.sensor,
-                            renderer.render_board_in_electrons(
-                                make_board_capture_parameters(scene, find_board_set(scene), 0)),
-                            1);
-  const BoardDetection seen = BoardDetector(scene.board->pattern).detect_board(image);
+  const BoardDetection seen =
+      BoardDetector(scene.board->pattern).detect_board(render_first_board_view(scene));
   ASSERT_GT(seen.tags.size(), 5U);
   EXPECT_LT(seen.curve_costs.size(), kGammas.size());
   for (const TagDetection& tag : seen.tags) EXPECT_TRUE(tag.tone_curve_fits.empty()) << tag.id;
