@@ -4,9 +4,17 @@
 #
 # Installs packages, builds, renders images of a camera in a room like that of Chen and Guan, calibrates the
 # camera from them, computes its position in 432 other images, and prints the errors of the fixes.
-# Results are in out/demo; existing ones are not computed again.
+# Results are in out/demo; existing ones are not computed again. The other programs are built after that.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+
+# run_logged COMMAND...: prints the end of the log if the command fails.
+run_logged() {
+  if ! "$@" >>out/demo/build.log 2>&1; then
+    tail -n 30 out/demo/build.log >&2
+    return 1
+  fi
+}
 
 scripts/setup.sh --build
 mkdir -p out/demo
@@ -15,12 +23,8 @@ echo "Building (some minutes the first time; the log is out/demo/build.log) ..."
 tests=()
 [ -e build/CMakeCache.txt ] || tests=(-DBUILD_TESTING=OFF)  # the packages of the tests may be missing
 # Clang compiles in three quarters of the time of GCC. CXX in the environment chooses another compiler.
-if ! { CXX=${CXX:-clang++} cmake --preset release -DVLP_TOOLBOX=ON "${tests[@]}" &&
-       cmake --build --preset release --target vlp_programs; } >out/demo/build.log 2>&1
-then
-  tail -n 30 out/demo/build.log >&2
-  exit 1
-fi
+CXX=${CXX:-clang++} run_logged cmake --preset release -DVLP_TOOLBOX=ON "${tests[@]}"
+run_logged cmake --build --preset release --target vlp-simulate vlp-calibrate
 
 rig=datasets/paper-rig session=out/demo/paper-rig
 echo "Rendering captures of a camera to $session ..."
@@ -38,4 +42,6 @@ if [ -e $report ] && [ -e $calibration ]; then
 else
   echo "demo.sh: there is no report; see above" >&2
 fi
+echo "Building the other programs ..."
+run_logged cmake --build --preset release --target vlp_programs
 exit $code
