@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cstdint>
 #include <ctime>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -56,7 +57,17 @@ std::optional<std::time_t> parse_utc(const std::string& text) {
   return end != nullptr && *end == '\0' ? std::optional(::timegm(&parts)) : std::nullopt;
 }
 
-std::string utc(const char* format) { return format_utc(current_time_s(), format); }
+struct SplitTime {
+  std::time_t second = 0;
+  long long microsecond = 0;  // of that second
+};
+
+SplitTime split_current_time() {
+  using namespace std::chrono;
+  const auto now = system_clock::now();
+  const auto second = floor<seconds>(now);
+  return {system_clock::to_time_t(second), duration_cast<microseconds>(now - second).count()};
+}
 
 /// Returns the account that runs this program, and its machine.
 std::string describe_account() {
@@ -142,8 +153,11 @@ std::string describe_why_verdict_is_void_or_edited(const RunRecord& record) {
 }
 
 std::string make_run_id() {
+  const auto [second, microsecond] = split_current_time();
   std::random_device random;
-  return utc("%Y%m%dT%H%M%SZ-") + fmt::format("{:08x}{:08x}", random(), random());
+  std::uniform_int_distribution<std::uint64_t> eleven_digits(0, 0xfff'ffff'ffff);
+  return format_utc(second, "%Y%m%dT%H%M%SZ-") +
+         fmt::format("{:05x}{:011x}", microsecond, eleven_digits(random));
 }
 
 bool is_run_id(const std::string& text) {
@@ -163,16 +177,13 @@ std::string RunEvent::event_time_utc() const {
 
 RunEvent make_run_event_now(const std::string& kind, const std::string& text,
                             const std::string& operator_name) {
+  const auto [second, microsecond] = split_current_time();
   std::random_device random;
-  using std::chrono::microseconds;
-  const auto now = std::chrono::time_point_cast<microseconds>(std::chrono::system_clock::now());
-  constexpr int microseconds_per_second = 1'000'000;
-  const auto part = now.time_since_epoch().count() % microseconds_per_second;
-  return {format_utc(std::chrono::system_clock::to_time_t(now), "%Y%m%dT%H%M%S") +
-              fmt::format(".{:06d}Z-{:08x}", part, random()),
-          kind, text,
-          operator_name.empty() ? describe_account()
-                                : fmt::format("{} ({})", operator_name, describe_account())};
+  return {
+      format_utc(second, "%Y%m%dT%H%M%S") + fmt::format(".{:06d}Z-{:08x}", microsecond, random()),
+      kind, text,
+      operator_name.empty() ? describe_account()
+                            : fmt::format("{} ({})", operator_name, describe_account())};
 }
 
 double compute_age_of_utc_s(const std::string& utc) {
@@ -180,7 +191,7 @@ double compute_age_of_utc_s(const std::string& utc) {
   return time ? std::difftime(current_time_s(), *time) : std::numeric_limits<double>::quiet_NaN();
 }
 
-std::string get_current_utc() { return utc(kUtcFormat); }
+std::string get_current_utc() { return format_utc(current_time_s(), kUtcFormat); }
 
 std::string describe_utc_problem(const std::string& text) {
   constexpr std::array<std::size_t, 4> lengths{10, 16, 19, 20};

@@ -4,6 +4,10 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
 namespace vlp {
 namespace {
 
@@ -37,6 +41,15 @@ TEST(MakeRunId, ReturnsUniqueIdWithStartTime) {
                                    run.substr(0, 32) + "/"}) {
     EXPECT_FALSE(is_run_id(other)) << other;
   }
+}
+
+TEST(MakeRunId, SortsByTimeWithinSecond) {
+  std::vector<std::string> runs;
+  for (int i = 0; i < 50; ++i) {
+    runs.push_back(make_run_id());
+    std::this_thread::sleep_for(std::chrono::microseconds(2));
+  }
+  EXPECT_TRUE(std::ranges::is_sorted(runs)) << testing::PrintToString(runs);
 }
 
 TEST(EscapeRunTexts, KeepsLineBreaksOnlyInCausesAndCalibration) {
