@@ -19,7 +19,7 @@
 namespace vlp {
 
 /// Result of find_largest_consistent_lamp_set(): a pose and the observations that agree with it.
-/// `agreeing` has a bit per observation, by its index; `count` is the number of set bits.
+/// `inliers` has a bit per observation, by its index; `count` is the number of set bits.
 struct Consensus {
   Pose pose;
   std::bitset<kMaxSightings> inliers;

@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <utility>
 
+#include "positioning/body_solution.h"
 #include "support/body_rig.h"
 #include "support/matchers.h"
 
@@ -54,6 +57,40 @@ class PositionerMovingOrTiltedCamera : public testing::Test {
     }
   }
 };
+
+TEST(ComputeInitialBodyStatesFromThreeLamps, ReturnsReasonWithoutState) {
+  const Eigen::Vector3d no_arm_m = Eigen::Vector3d::Zero();
+  const BodyPrior prior;
+  const auto find_status = [&](const std::array<Eigen::Vector3d, 3>& lamps_m) {
+    BodyObservations frame;
+    for (const Eigen::Vector3d& lamp_m : lamps_m) {
+      frame.sightings[frame.size].lamp_m = lamp_m;
+      frame.sightings[frame.size++].ray = lamp_m.normalized();
+    }
+    const InitialStates initial_states =
+        compute_initial_body_states_from_three_lamps(frame, {0, 1, 2}, {no_arm_m, prior});
+    EXPECT_EQ(initial_states.count > 0, initial_states.status == FixStatus::ok);
+    return initial_states.status;
+  };
+  EXPECT_EQ(find_status({Eigen::Vector3d(-1, 0.2, 2), {1, 0.3, 2}, {0, -1, 2.5}}), FixStatus::ok);
+  EXPECT_EQ(find_status({Eigen::Vector3d(-1, 0.2, 2), {0, 0.2, 2}, {1, 0.2, 2}}),
+            FixStatus::degenerate)
+      << "collinear";
+  EXPECT_EQ(find_status({Eigen::Vector3d(-1, 0.2, -2), {1, 0.3, -2}, {0, -1, -2.5}}),
+            FixStatus::lamp_below_camera);
+}
+
+TEST(IsBodyPositionDetermined, RequiresSdBelowQuarterOfMeanDistanceToLamps) {
+  BodyObservations frame;
+  frame.size = 2;
+  frame.sightings[0].lamp_m = {0, 0, 1};
+  frame.sightings[1].lamp_m = {0, 3, 0};
+  BodyFix fix;
+  for (const auto& [sd_m, determined] : {std::pair(0.49, true), {0.51, false}}) {
+    fix.covariance(1, 1) = sd_m * sd_m;
+    EXPECT_EQ(is_body_position_determined(frame, fix), determined) << sd_m;
+  }
+}
 
 TEST_F(PositionerMovingOrTiltedCamera, EqualsFixWithoutMotionWhenMotionIsExactlyZero) {
   stand();

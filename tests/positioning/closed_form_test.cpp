@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "geometry/angles.h"
 #include "positioning/closed_form.h"
 #include "support/matchers.h"
@@ -59,6 +61,17 @@ TEST(ComputeTwoLampPoses, ContainsTruePoseForLampsAtDifferentHeights) {
   EXPECT_GT(doubles, 10) << "the ambiguous case was not met";
 }
 
+TEST(ComputeTwoLampPoses, ReturnsOnePoseWhereTwoPosesCoincide) {
+  const Sighting a{{0, 0, 6}, {0.5, 0.5}, Matrix2::Identity() * 500, 1};
+  const Sighting b{{1, 0, 4}, {1, 0.5}, Matrix2::Identity() * 500, 1};
+  const TwoLampPoses fix = compute_two_lamp_poses(a, b);
+  ASSERT_EQ(fix.count, 1);
+  EXPECT_NEAR(fix.poses[0].position_m.z(), 2, 1e-12);
+  const LevelPose pose(fix.poses[0]);
+  EXPECT_THAT(project_lamp_to_normalized_point(pose, a.lamp_m), IsNear(a.z, 1e-12));
+  EXPECT_THAT(project_lamp_to_normalized_point(pose, b.lamp_m), IsNear(b.z, 1e-12));
+}
+
 TEST(ComputeTwoLampPoses, ReturnsNoPoseForCoincidentImagePoints) {
   const Pose pose{{0, 0, 0}, 0};
   Sighting a = seen({0, 0, 2}, pose), b = seen({1, 0, 2}, pose);
@@ -87,6 +100,18 @@ TEST(ComputePoseFromCoplanarLamps, MatchesTruthForThreeLampsOrMore) {
     ASSERT_TRUE(pose);
     expect_pose(*pose, truth);
   }
+}
+
+TEST(ComputeInitialPose, AveragesNoiseOverThreeLampsAtEqualHeight) {
+  const Pose truth{{0.1, -0.2, 0}, 0.4};
+  std::array<Sighting, 3> sightings{seen({-1, 0.5, 2.5}, truth), seen({1, 0.2, 2.5}, truth),
+                                    seen({0, -0.8, 2.5}, truth)};
+  sightings[0].z.x() += 0.02;
+  const InitialPose initial = compute_initial_pose(sightings);
+  ASSERT_EQ(initial.status, FixStatus::ok);
+  const auto pose = compute_pose_from_coplanar_lamps(sightings);
+  ASSERT_TRUE(pose);
+  expect_pose(initial.pose, *pose);
 }
 
 TEST(ComputePoseAtKnownHeightAndYaw, ReturnsTruePoseForOneLamp) {

@@ -16,6 +16,7 @@
 #include "positioning/positioner.h"
 #include "positioning/stated_rig.h"
 #include "rig/calibration_error.h"
+#include "support/body_rig.h"
 #include "support/matchers.h"
 
 namespace vlp {
@@ -71,7 +72,13 @@ TEST_P(CommonErrorsOfFix, CommonCovarianceMatchesFiniteDifferencesOfFix) {
   // The yaw of a mount rotates the body relative to the camera.
   PositionerOptions options;
   if (known.motion) options.mount = CameraMount{{0, 0, 0}, 0.5};
-  const auto detections = seen_from(rig, 0.1);
+  const auto detections =
+      known.inclination
+          ? seen_from(
+                BodyRig{
+                    rig.map, rig.calibration, {rig.camera, {{0, 0}, 0, *known.inclination}}, {}},
+                0.1)
+          : seen_from(rig, 0.1);
   const auto fix_with = [&](Eigen::Index parameter, double by) {
     LampMap map = rig.map;
     Calibration other = rig.calibration;
@@ -114,6 +121,7 @@ std::string name_of_body(const testing::TestParamInfo<CommonErrorsOfFix::ParamTy
   const Sensors& known = std::get<Sensors>(body.param);
   std::string name = known.motion ? "Driving" : "Standing";
   if (known.inclination_sigma_rad > 0) name += "AndLeaning";
+  if (known.inclination) name += "Inclined";
   const bool shifted = std::get<RotationModel>(body.param) == RotationModel::shift;
   return name + (shifted ? "Shifted" : "Tilted");
 }
@@ -127,6 +135,17 @@ INSTANTIATE_TEST_SUITE_P(
                                      sensors(0.1,
                                              KnownMotion::make_motion_prior_from_limits(1, 1)))),
     name_of_body);
+
+Sensors sensors_with_exact_inclination() {
+  Sensors sensors;
+  sensors.inclination = Inclination{0.2, -0.1};
+  return sensors;
+}
+
+INSTANTIATE_TEST_SUITE_P(ExactInclination, CommonErrorsOfFix,
+                         testing::Combine(testing::Values(RotationModel::tilt),
+                                          testing::Values(sensors_with_exact_inclination())),
+                         name_of_body);
 
 /// A calibration as by vlp-intrinsics: no other part depends on the lens.
 TEST_F(CommonErrorsTest, FixCovarianceMatchesFiniteDifferencesWhenOnlyLensIsUncertain) {

@@ -160,6 +160,34 @@ TEST(UnitErrors, BudgetTermIsZeroForQuantityWithoutError) {
   EXPECT_TRUE(compute_unit_fix_error_budget(rig).common_covariance().isZero(0));
 }
 
+TEST(CommonErrors, IsolatedErrorSourceIsUnknownIfItsVarianceIsZero) {
+  StatedRig rig = adjusted();
+  const auto is_lens_error_known = [&] {
+    return UnitErrors(rig.map, rig.calibration)
+        .common_errors()
+        .isolate_error_source(CommonErrorSource::lens)
+        .are_any_errors_known();
+  };
+  EXPECT_TRUE(is_lens_error_known());
+  MatrixX& covariance = rig.calibration.adjustment->covariance;
+  covariance.topRows(12).setZero();
+  covariance.leftCols(12).setZero();
+  EXPECT_FALSE(is_lens_error_known());
+}
+
+TEST(UnitErrors, BudgetExistsOnlyForLampsAboveCamera) {
+  StatedRig rig = adjusted();
+  const UnitErrors unit(rig.map, rig.calibration);
+  const std::vector<std::size_t> lamps{0, 1};
+  const auto has_budget_at = [&](double above_lamp_m) {
+    Pose camera = rig.camera;
+    camera.position_m.z() = rig.map.lamps[0].position_m.z() + above_lamp_m;
+    return unit.compute_unit_fix_error_budget(camera, lamps, kNoise_px).has_value();
+  };
+  EXPECT_TRUE(has_budget_at(-0.5));
+  EXPECT_FALSE(has_budget_at(0.01));
+}
+
 /// Each part of sequential steps results from the covariance of one step alone.
 TEST(UnitErrors, BudgetTermEqualsBudgetWithOnlyThatError) {
   const StatedRig rig = in_a_row();

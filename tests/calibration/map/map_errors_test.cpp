@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "calibration/tilt/drive.h"
+#include "camera/lens.h"
 
 namespace vlp {
 namespace {
