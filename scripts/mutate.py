@@ -6,10 +6,11 @@
     scripts/mutate.py FOLDER [--count N] [--seed S] [--jobs N] [--preset P] [--quick]
 
 Each mutant changes one operator, constant, sign, statement or pair of arguments. It is compiled to an object of its own
-and linked before the folder's library; neither the sources nor the build folder change. Mutants that do not compile are
-replaced by others. A mutant is detected if a test of tests/FOLDER fails or crashes, or if the tests take three times
-the processor time; the slow tests run only if the others pass, with --quick never. Prints each survivor as FILE:LINE with
-both lines, then the score. Exit code 0; 1 if the tests are missing or fail without a mutant; 2 for bad usage.
+and linked before the folder's library, or to a library that the tests load in place of the one in lib/codecs; neither
+the sources nor the build folder change. Mutants that do not compile are replaced by others. A mutant is detected if a
+test of tests/FOLDER fails or crashes, or if the tests take three times the processor time; the slow tests run only if
+the others pass, with --quick never. Prints each survivor as FILE:LINE with both lines, then the score. Exit code 0; 1 if
+the tests are missing or fail without a mutant; 2 for bad usage.
 
 Changes that rarely have an effect are not made:
 - < to <= and the like between floating-point values, which are equal with probability zero (see COUNTS)
@@ -107,22 +108,32 @@ class Folder:
                         if pathlib.Path(c["file"]).is_relative_to(ROOT / "lib" / name) and c["file"].endswith(".cpp")}
         if not self.compile:
             sys.exit(f"mutate.py: no source of lib/{name} is compiled alone; use a preset without unity builds (dev)")
-        link = subprocess.run(["ninja", "-C", str(self.build), "-t", "commands", f"tests/{name}/test_{name}"],
-                              check=True, capture_output=True, text=True).stdout.rstrip().split("\n")[-1]
-        self.link = re.search(r"&& (\S*\+\+ .*? -o \S+)(.*?)(?: && |$)", link).groups()
-        self.scratch = self.build / "tests" / name / "scratch"
+        self.link = self.find_link_command(f"tests/{name}/test_{name}")
+        # Objects of libraries that the tests load, and how these are linked.
+        self.modules = {}
+        for file, command in self.compile.items():
+            target_object = re.search(r" -o (\S+/CMakeFiles/([^/]+)\.dir/\S+) -c ", command)
+            if target_object[2] != f"vlp_{name}":
+                self.modules[file] = (target_object[1], self.find_link_command(f"lib/codecs/lib{target_object[2]}.so"))
         slow = (ROOT / "tests/slow_tests.txt").read_text().split("\n")
         self.slow = ":".join(line for line in slow if line and not line.startswith("#"))
         self.quick = quick
 
+    def find_link_command(self, target):
+        """Returns the command that links a target up to its output, and the rest."""
+        commands = subprocess.run(["ninja", "-C", str(self.build), "-t", "commands", target],
+                                  check=True, capture_output=True, text=True).stdout
+        return re.search(r"&& (\S*\+\+ .*? -o \S+)(.*?)(?: && |$)", commands.rstrip().split("\n")[-1]).groups()
+
     def run(self, program, pattern, limit_s):
-        """Returns true if the tests pass within a limit of processor time."""
+        """Returns true if the tests pass within a limit of processor time. They load libraries beside the program."""
         limits = f"ulimit -v {MEMORY_KIB}; ulimit -t {limit_s}"
         with tempfile.TemporaryDirectory() as scratch:
             try:
                 done = subprocess.run(["sh", "-c", limits + '; exec "$0" "$@"', program, "--gtest_brief=1",
                                        "--gtest_fail_fast", f"--gtest_filter={pattern}"],
-                                      cwd=scratch, capture_output=True, timeout=20 * limit_s, check=False)
+                                      cwd=scratch, env=os.environ | {"LD_LIBRARY_PATH": str(program.parent)},
+                                      capture_output=True, timeout=20 * limit_s, check=False)
             except subprocess.TimeoutExpired:
                 return False
         return done.returncode == 0
@@ -153,8 +164,15 @@ class Folder:
             if subprocess.run(shlex.split(command), cwd=self.build, capture_output=True, check=False).returncode:
                 return None
             program = pathlib.Path(scratch, "test")
-            head, tail = self.link
-            link = re.sub(r" -o \S+$", f" {mutant} -o {program}", head) + tail
+            if file in self.modules:
+                target_object, (head, tail) = self.modules[file]
+                output = head.rsplit("/", maxsplit=1)[1]
+                link = re.sub(r" -o \S+$", f" -o {pathlib.Path(scratch, output)}", head) + tail.replace(
+                    target_object, str(mutant))
+                program.symlink_to(self.test)
+            else:
+                head, tail = self.link
+                link = re.sub(r" -o \S+$", f" {mutant} -o {program}", head) + tail
             if subprocess.run(link, shell=True, cwd=self.build, capture_output=True, check=False).returncode:
                 return None
             return self.passes(program, limits_s)
