@@ -14,6 +14,7 @@
 
 #include "captures/csv_reader.h"
 #include "frontend/image_file.h"
+#include "rig/board_layout.h"
 #include "support/real_data.h"
 
 namespace vlp {
@@ -153,6 +154,16 @@ TEST_P(BoardDetectorOnRenderedBoard, ReturnsNoTagsForTinyImages) {
 
 INSTANTIATE_TEST_SUITE_P(Boards, BoardDetectorOnRenderedBoard,
                          testing::Values("paper-rig", "paper-rig-faulty"));
+
+/// Small images are searched in full resolution.
+TEST(BoardDetector, DetectsTagsOf12PixelsInSmallImage) {
+  const fs::path rig = VLP_SOURCE_DIR "/datasets/paper-rig/rendered";
+  cv::Mat small;
+  cv::resize(read_image(rig / "sample-boards/0000.png"), small, {}, 0.35, 0.35, cv::INTER_AREA);
+  const Board board = read_board(rig / "board.yaml");
+  const BoardDetection seen = BoardDetector(board).detect_board(small);
+  EXPECT_EQ(seen.tags.size(), list_board_tags(board).size());
+}
 
 TEST(BoardDetector, ConstructorThrowsForTagFamilyMissingInAruco) {
   Board board = read_board(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/rendered/board.yaml");

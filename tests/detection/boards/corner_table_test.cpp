@@ -6,6 +6,7 @@
 
 #include <array>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "support/rejection_message.h"
@@ -102,6 +103,18 @@ TEST(ReadCornerTable, RestoresChessboardCornersAndRejectsWrongRowLength) {
   EXPECT_THAT(rejection_message([&] { read_corner_table(file, make_chessboard(5, 7), kImager); }),
               HasSubstr("the corners lie in rows of 6, but a board of 5 x 7 squares has 4 x 6 "
                         "corners; swap cols and rows of board.yaml"));
+}
+
+TEST(DescribeCornerOutsideImage, AcceptsCornersUpToBordersOfPixels) {
+  const auto is_accepted = [](double u_px, double v_px) {
+    return describe_corner_outside_image({u_px, v_px}, kImager).empty();
+  };
+  EXPECT_TRUE(is_accepted(-0.5, -0.5));
+  EXPECT_TRUE(is_accepted(799.5, 599.5));
+  for (const auto& [u_px, v_px] :
+       {std::pair(-0.51, 0.0), {0.0, -0.51}, {799.51, 0.0}, {0.0, 599.51}}) {
+    EXPECT_FALSE(is_accepted(u_px, v_px)) << u_px << " " << v_px;
+  }
 }
 
 TEST(ReadCornerTable, ToleratesTwoPercentOfCornersOutsideImage) {

@@ -7,6 +7,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <stdexcept>
+
+#include "detection/boards/tag_finder.h"
 
 namespace vlp {
 namespace {
@@ -58,6 +61,20 @@ TEST(FindChessboardCorners, ReturnsAllInnerCorners) {
 
 TEST(FindChessboardCorners, ReturnsNoneForImageWithoutBoard) {
   EXPECT_THAT(find_chessboard_corners(cv::Mat1b(200, 300, uchar{128}), {6, 5}), testing::IsEmpty());
+}
+
+/// Marker 0 of the published dictionary of 4 x 4 bits.
+TEST(MakeArucoMarker, ReturnsBitsRowByRowAndThrowsForMissingMarkers) {
+  const ArucoMarker marker = make_aruco_marker("DICT_4X4_50", 0);
+  EXPECT_EQ(marker.width, 4);
+  EXPECT_THAT(marker.white, testing::ElementsAre(true, false, true, true,   //
+                                                 false, true, false, true,  //
+                                                 false, false, true, true,  //
+                                                 false, false, true, false));
+  EXPECT_THAT(make_aruco_marker("DICT_4X4_50", 49).white, testing::SizeIs(16));
+  for (const int id : {-1, 50}) {
+    EXPECT_THROW(make_aruco_marker("DICT_4X4_50", id), std::invalid_argument) << id;
+  }
 }
 
 TEST(FindChessboardSizeInCorners, ReturnsSizeOfLargerBoard) {

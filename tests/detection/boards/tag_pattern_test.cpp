@@ -6,9 +6,22 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <stdexcept>
+#include <string>
 
 namespace vlp {
 namespace {
+
+TEST(MakeTagFamily, ReturnsEachFamilyByItsNameAndThrowsForOthers) {
+  for (const std::string name :
+       {"tag36h11", "tag25h9", "tag16h5", "tagCircle21h7", "tagCircle49h12", "tagCustom48h12",
+        "tagStandard41h12", "tagStandard52h13"}) {
+    const TagFamily family = make_tag_family(name);
+    ASSERT_TRUE(family);
+    EXPECT_EQ(family->name, name);
+  }
+  EXPECT_THROW(make_tag_family("tag36h12"), std::invalid_argument);
+}
 
 TEST(TagGeometry, WhiteBitSegmentsMatchImagesOfLibapriltag) {
   Board board;

@@ -69,6 +69,21 @@ TEST(CorrectViewsForToneCurve, InterpolatesCornerSdsLinearlyInLogGamma) {
   EXPECT_EQ(images[0].detection.tags[0].corner_sds_px[1], 0);
 }
 
+TEST(CorrectViewsForToneCurve, InterpolatesStepsUnlessOneIsUnknown) {
+  std::vector<BoardView> images{image(1.8, 500)};
+  TagDetection& tag = images[0].detection.tags[0];
+  const double at = std::log(1.8 / 1.6) / std::log(2.0 / 1.6);
+  tag.tone_curve_fits[1].steps[0] = {0.7, 20, 180},
+  tag.tone_curve_fits[2].steps[0] = {0.9, 10, 220};
+  tag.tone_curve_fits[1].steps[1] = {0.7, 20, 180}, tag.tone_curve_fits[2].steps[1] = {};
+  apply_curve_of_levels(images);
+  const EdgeStep& step = images[0].detection.tags[0].steps[0];
+  EXPECT_NEAR(step.blur_px, 0.7 + at * 0.2, 1e-9);
+  EXPECT_NEAR(step.dark, 20 - at * 10, 1e-9);
+  EXPECT_NEAR(step.bright, 180 + at * 40, 1e-9);
+  EXPECT_EQ(images[0].detection.tags[0].steps[1].blur_px, 0);
+}
+
 TEST(CorrectViewsForToneCurve, CorrectsAllViewsForOneCommonGamma) {
   std::vector<BoardView> images{image(1.6, 300), image(2.0, 300), image(1.1, 10)};
   const double gamma = apply_curve_of_levels(images);
