@@ -18,7 +18,8 @@ TEST(ReadCapturesWithTruth, PrefersTruthTableToCapturesTable) {
   const TemporaryFolder folder;
   EXPECT_THAT(read_captures_with_truth(folder / ""), SizeIs(0));
   folder.file("captures.csv",
-              "image,x_m,y_m,roll_rad,pitch_rad\na.png,1,2,0.1,0.2\nb.png,3,4,0,0\n");
+              "image,x_m,y_m,position_sd_m,roll_rad,pitch_rad\n"
+              "a.png,1,2,0.01,0.1,0.2\nb.png,3,4,0.02,0,0\n");
   folder.file("truth.csv", "image,x_m,y_m,z_m,yaw_rad\na.png,1.5,2.5,0.5,1\nc.png,5,6,0,0\n");
   const CapturesTable captures = read_captures_with_truth(folder / "");
   ASSERT_THAT(captures, SizeIs(3));
@@ -27,8 +28,10 @@ TEST(ReadCapturesWithTruth, PrefersTruthTableToCapturesTable) {
   EXPECT_EQ(both.y_m, 2.5);
   EXPECT_EQ(both.z_m, 0.5);
   EXPECT_EQ(both.yaw_rad, 1);
+  EXPECT_FALSE(both.position_sd_m) << "of the other position";
   EXPECT_EQ(both.inclination->roll_rad, 0.1);
   EXPECT_EQ(captures.at("b.png").x_m, 3);
+  EXPECT_EQ(captures.at("b.png").position_sd_m, 0.02);
   EXPECT_FALSE(captures.at("c.png").inclination);
 }
 
