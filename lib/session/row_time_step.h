@@ -45,7 +45,8 @@ DetectedLights detect_lights_in_folders(const std::vector<std::filesystem::path>
 /// Chooses a row time by periods and duty cycles of the lights in the images of each folder. Also
 /// uses their positions if several row times fit (compute_position_costs_of_row_time_candidates()).
 ///
-/// @param labels  lights of each folder that are lamps; empty: all lights
+/// @param labels  for each folder its lights that are lamps; an empty list: all lights of the
+/// folder
 RowTimeResult select_row_time_by_periods_and_positions(
     std::span<const std::span<const Observation>> folders,
     const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,

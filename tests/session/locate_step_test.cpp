@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <array>
+#include <utility>
 
 #include "support/body_rig.h"
 #include "support/datasets.h"
@@ -270,6 +272,26 @@ TEST(LocateCameraFromDetections, WindowOfTwoFramesReducesHeightErrorWithTwoLamps
   EXPECT_GT(alone_m, 1e-3);
   EXPECT_LT(std::abs(found.rows[2].fix->pose.position_m.z()), 1e-4);
   EXPECT_LT((*found.rows[2].fix->sd)[2], 0.2 * alone_sd_m);
+}
+
+TEST(LocateCameraFromDetections, WindowOfTwoUsesLatestEarlierFrameWithTime) {
+  LocateInput input = drive(1);
+  for (Frame& frame : input.frames) frame.detections.resize(2);
+  input.motion = KnownMotion::make_motion_prior_from_limits(2, 0);
+  input.window_size = 2;
+  Sensors sensors;
+  sensors.motion = input.motion;
+  const Positioner positioner(input.lamps, input.calibration);
+  for (const auto& [earlier, before_s] : {std::pair(1U, 0.1), {0U, 0.2}}) {
+    const LocateResult found = locate_camera_from_detections(input);
+    ASSERT_TRUE(found.rows[2].fix);
+    const Fix fix = positioner.compute_position_fix(
+        input.frames[2].detections, sensors,
+        std::array{EarlierFrame{input.frames[earlier].detections, before_s}});
+    ASSERT_TRUE(fix.has_succeeded());
+    EXPECT_LT((found.rows[2].fix->pose.position_m - fix.estimate.pose.position_m).norm(), 1e-9);
+    input.captures[input.frames[1].image].time_s.reset();
+  }
 }
 
 TEST(LocateCameraFromDetections, ThrowsForMotionWithoutRowTime) {

@@ -124,5 +124,30 @@ TEST(DetectLightsInFolders, UsesCameraOfCalibrationWithOrWithoutItsRowTime) {
   }
 }
 
+TEST(EstimateRowTimeFromLights, StoresRowTimeAndReadoutInCalibration) {
+  const LampMap map = make_map();
+  DetectedLights seen;
+  seen.observations.images.assign(4, observe(map, {0, 0, 0, 0, 0}, false));
+  seen.folder_sizes = {4};
+  seen.camera.readout = Readout::columns;
+  Calibration calibration = read_calibration(kRig + "/true_calibration.yaml");
+  calibration.camera.row_time_s = 2.2e-5;
+  const auto estimate = [&](const std::optional<Calibration>& given) {
+    return estimate_row_time_from_lights(seen, {{}}, map, "lamps.yaml", given, {});
+  };
+  const RowTimeStepResult stored = estimate(calibration);
+  ASSERT_TRUE(stored.has_succeeded()) << stored.message;
+  EXPECT_NEAR(stored.row_time.row_time_s, kTrueRowTime_s, 1e-8);
+  EXPECT_EQ(stored.calibration.camera.row_time_s, stored.row_time.row_time_s);
+  EXPECT_EQ(stored.calibration.camera.readout, Readout::columns);
+  ASSERT_FALSE(stored.calibration.history.empty());
+  EXPECT_EQ(stored.calibration.history.back().part, "camera");
+  EXPECT_THAT(stored.warnings, testing::ElementsAre(HasSubstr("22 us in the calibration")));
+  const RowTimeStepResult alone = estimate(std::nullopt);
+  ASSERT_TRUE(alone.has_succeeded()) << alone.message;
+  EXPECT_EQ(alone.row_time.row_time_s, stored.row_time.row_time_s);
+  EXPECT_FALSE(alone.calibration.camera.row_time_s);
+}
+
 }  // namespace
 }  // namespace vlp
