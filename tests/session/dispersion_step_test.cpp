@@ -68,6 +68,30 @@ TEST(RunDispersionCalibrationStep, WarnsOfThreeCapturesWithoutStatedNoise) {
   EXPECT_THAT(list_warnings(3, true), Not(Contains(few)));
 }
 
+TEST(RunDispersionCalibrationStep, ReplacesEarlierDispersion) {
+  SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
+  rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 1);
+  KnownPositions known;
+  for (int i = 0; i < 8; ++i) {
+    rig.camera = {{0, 0, 0}, 0.25 * std::numbers::pi * i};
+    auto detections = seen_from(rig, 0.05);
+    for (Detection& detection : detections) detection.pixel += Eigen::Vector2d(0.4, -0.3);
+    known.captures.push_back({detections, {0, 0}});
+    known.measured_points.push_back(MeasuredPoint::camera);
+  }
+  const auto run = [&](const Calibration& calibration) {
+    return run_dispersion_calibration_step({{}, rig.map, "lamps.yaml", calibration}, known,
+                                           DispersionMethod::camera, DispersionCircle::mean, {});
+  };
+  const DispersionResult once = run(rig.calibration);
+  ASSERT_TRUE(once.has_succeeded()) << once.message;
+  ASSERT_TRUE(once.calibration.dispersion);
+  EXPECT_GT(once.calibration.dispersion->offset_px.norm(), 0.4);
+  const DispersionResult twice = run(once.calibration);
+  ASSERT_TRUE(twice.has_succeeded()) << twice.message;
+  EXPECT_EQ(twice.calibration.dispersion->offset_px, once.calibration.dispersion->offset_px);
+}
+
 /// An inclination that the table states, at places of the axis.
 TEST(RunDispersionCalibrationStep, UsesInclinationToMovePlacesOfAxis) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};

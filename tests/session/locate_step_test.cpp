@@ -152,6 +152,8 @@ TEST(LocateCameraFromDetections, WarnsOfMovedLampAndItsDisplacement) {
                                 "moved, or entered wrongly"));
   ASSERT_EQ(found.rejected_lamps.size(), 1U);
   EXPECT_EQ(found.rejected_lamps[0].lamp, 2);
+  ASSERT_TRUE(found.rows[0].fix && found.rows[0].fix->noise_sd);
+  EXPECT_LT((*found.rows[0].fix->noise_sd)[0], (*found.rows[0].fix->sd)[0]);
   for (std::size_t i = 0; i < 36; ++i) {
     EXPECT_THAT(found.rows[i].rejected_lamps,
                 testing::ElementsAreArray(std::vector<int>(i < 12 ? 1U : 0U, 2)));
@@ -250,6 +252,8 @@ TEST(LocateCameraFromDetections, EstimatesTrueVelocityWithMotionPrior) {
   EXPECT_NEAR(found.rows[1].fix->velocity_m_per_s->y(), 0, 1e-4);
   EXPECT_EQ(found.rows[1].time_s, 10.1);
   EXPECT_FALSE(found.rows[1].fix->inclination);
+  EXPECT_TRUE(found.rows[1].fix->sd);
+  EXPECT_FALSE(found.rows[1].fix->noise_sd) << "nothing is known of common errors";
 }
 
 TEST(LocateCameraFromDetections, LocatesMovingCameraExactlyWithOdometry) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "support/schema.h"
 #include "support/synthetic_rig.h"
@@ -93,6 +94,26 @@ TEST(FormatSessionJson, ContainsLensSdsOnlyWithLensCovariance) {
   result.calibration->intrinsics_report = report;
   EXPECT_EQ(format_calibration()["focal_sd_px"], nlohmann::json({1, 2}));
   EXPECT_EQ(format_calibration()["principal_point_sd_px"], nlohmann::json({3, 4}));
+}
+
+TEST(FormatSessionJson, StatesRotationCenterAndDispersionInMillimetersAndDegrees) {
+  SessionResult result;
+  Calibration& calibration =
+      result.calibration.emplace(Calibration{synthetic_camera(), {}, {}, {}, {}});
+  constexpr double tilt_rad = 0.02, azimuth_rad = 1;
+  calibration.rotation_center = tilted_by(calibration.camera, tilt_rad, azimuth_rad);
+  calibration.rotation_center->lever_arm_m = Eigen::Vector2d(0.002, -0.003);
+  calibration.rotation_center->lever_arm_covariance =
+      Eigen::Vector2d(1e-8, 4e-8).asDiagonal().toDenseMatrix();
+  calibration.dispersion = Dispersion{{0.4, -0.3}, 0.001, {0, 0}, 12};
+  const auto json = nlohmann::json::parse(format_session_json(result, {}))["calibration"];
+  EXPECT_NEAR(json.at("tilt_deg"), tilt_rad * 180 / std::numbers::pi, 1e-9);
+  EXPECT_NEAR(json.at("tilt_azimuth_deg"), azimuth_rad * 180 / std::numbers::pi, 1e-9);
+  EXPECT_NEAR(json.at("lever_arm_mm")[0], 2, 1e-12);
+  EXPECT_NEAR(json.at("lever_arm_mm")[1], -3, 1e-12);
+  EXPECT_NEAR(json.at("lever_arm_sd_mm")[0], 0.1, 1e-12);
+  EXPECT_NEAR(json.at("lever_arm_sd_mm")[1], 0.2, 1e-12);
+  EXPECT_EQ(json.at("dispersion_offset_px"), nlohmann::json({0.4, -0.3}));
 }
 
 TEST(StepFailureFromName, InvertsStepFailureNameForEachValue) {

@@ -97,7 +97,11 @@ TEST(SessionFolder, FoldersOfDrivesAlongLinesAreThoseWithPositions) {
   EXPECT_EQ(lines[0].filename(), "line-x");
   EXPECT_EQ(lines[1].filename(), "line-y");
   EXPECT_TRUE(is_session_or_captures_folder(folder / "unit", folder / "unit"));
-  EXPECT_TRUE(is_session_or_captures_folder(folder / "unit", folder / "unit/line-x"));
+  for (const char* name : {"boards", "rotation", "dispersion", "check", "line-x", "results"}) {
+    fs::create_directories(folder / "unit" / name);
+    EXPECT_EQ(is_session_or_captures_folder(folder / "unit", folder / "unit" / name),
+              std::string(name) != "results");
+  }
   EXPECT_FALSE(is_session_or_captures_folder(folder / "unit", folder / "unit/results"));
 }
 
