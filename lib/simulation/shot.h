@@ -96,6 +96,7 @@ std::size_t count_captures_of_set(const CaptureSet& set);
 
 /// Returns capture `index` of a set. It depends on the scene, its seed, the set's folder and the
 /// index alone.
+/// @pre index < count_captures_of_set(set)
 LampShot make_lamp_capture_parameters(const Scene& scene, const CaptureSet& set, std::size_t index);
 BoardShot make_board_capture_parameters(const Scene& scene, const CaptureSet& set,
                                         std::size_t index);

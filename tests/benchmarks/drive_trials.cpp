@@ -115,6 +115,7 @@ class Trials {
   explicit Trials(double row_time_s)
       : scene_(read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml")) {
     scene_.camera.row_time_s = row_time_s;
+    scene_.sets.at(0).lamps->yaws_rad.assign(kShots, 0);  // the trials replace the yaws
   }
 
   /// The room is too low for a larger tilt: lamps would leave the image.
@@ -131,7 +132,7 @@ class Trials {
       Errors errors, again;
       for (int i = 0; i < captures; ++i) {
         LampShot shot = make_lamp_capture_parameters(scene_, scene_.sets.at(0),
-                                                     static_cast<std::size_t>(i) % 12);
+                                                     static_cast<std::size_t>(i) % kShots);
         BaseMotion& motion = shot.motion;
         motion.axis_m = {random.uniform(-0.5, 0.5), random.uniform(-0.3, 0.3), 0};
         motion.yaw_rad = random.uniform(-3.1, 3.1);
@@ -173,7 +174,7 @@ class Trials {
       std::vector<DrivenCapture> captures_seen;
       for (int i = 0; i < captures; ++i) {
         LampShot shot = make_lamp_capture_parameters(scene_, scene_.sets.at(0),
-                                                     static_cast<std::size_t>(i) % 12);
+                                                     static_cast<std::size_t>(i) % kShots);
         BaseMotion& motion = shot.motion;
         motion.axis_m.x() = random.uniform(-0.3, 0.3);
         motion.axis_m.y() = random.uniform(-0.12, 0.12);
@@ -334,6 +335,9 @@ class Trials {
     }
     fmt::print("\n");
   }
+
+  /// Number of captures of the set of the scene that are varied.
+  static constexpr std::size_t kShots = 12;
 
   Scene scene_;
 };

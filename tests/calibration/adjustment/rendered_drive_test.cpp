@@ -23,11 +23,14 @@ namespace {
 class RenderedDriveCalibration : public testing::Test {
  protected:
   static constexpr int kCaptures = 32;
+  /// Number of captures of the set of the scene that are varied.
+  static constexpr std::size_t kShots = 12;
   static constexpr double kPlaceSd_m = 1e-4, kMapSd_m = 1e-4;
 
   Scene scene = [] {
     Scene rig = read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
     rig.camera.row_time_s = 55e-6;
+    rig.sets.at(0).lamps->yaws_rad.assign(kShots, 0);  // drive() replaces the yaws
     return rig;
   }();
   const Calibration truth = make_true_calibration(scene);
@@ -46,8 +49,8 @@ class RenderedDriveCalibration : public testing::Test {
     Random random(5);
     Drive drive;
     for (int i = 0; i < kCaptures; ++i) {
-      LampShot shot =
-          make_lamp_capture_parameters(scene, scene.sets.at(0), static_cast<std::size_t>(i) % 12);
+      LampShot shot = make_lamp_capture_parameters(scene, scene.sets.at(0),
+                                                   static_cast<std::size_t>(i) % kShots);
       BaseMotion& motion = shot.motion;
       motion.axis_m = {random.uniform(-0.3, 0.3), random.uniform(-0.12, 0.12), i % 2 ? 0.3 : 0.0};
       motion.yaw_rad = random.uniform(-3.1, 3.1);
