@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "camera/distortion.h"
 #include "camera/fisheye.h"
 
 namespace vlp {

@@ -10,8 +10,10 @@ namespace {
 TEST(EvaluateFixesAgainstTruth, IsUndeterminedOnlyIfNoCaptureHasFix) {
   FixRow fix{"a.png", "ok", FixRow::Fix{{{1.003, 2.004, 0}, 0}, {}, 0.1}, 4};
   FixRow missing{"b.png", "too_few_lamps", {}, 1};
-  EvaluationInput input{{"fixes.csv", {fix, missing}}};
-  input.truth = FileRows<TruthRow>{"truth.csv", {{"a.png", {1, 2}}, {"b.png", {1, 2}}}};
+  EvaluationInput input;
+  input.fixes = {"fixes.csv", {fix, missing}};
+  const auto make_truth = [](const char* image) { return TruthRow{image, {1, 2}, {}, {}}; };
+  input.truth = FileRows<TruthRow>{"truth.csv", {make_truth("a.png"), make_truth("b.png")}};
   const EvaluateResult one = evaluate_fixes_against_truth(input, {});
   ASSERT_TRUE(one.has_succeeded()) << one.message;
   EXPECT_EQ(one.evaluation.fixes, 1U);
@@ -19,7 +21,7 @@ TEST(EvaluateFixesAgainstTruth, IsUndeterminedOnlyIfNoCaptureHasFix) {
   fix.status = "degenerate";
   input.fixes.rows = {fix, missing, missing};
   input.fixes.rows[2].image = "c.png";
-  input.truth->rows.push_back({"c.png", {1, 2}});
+  input.truth->rows.push_back(make_truth("c.png"));
   const EvaluateResult none = evaluate_fixes_against_truth(input, {});
   EXPECT_EQ(none.failure, StepFailure::undetermined);
   EXPECT_THAT(none.message, testing::HasSubstr("none of 3 captures has a fix (2 of them: "
