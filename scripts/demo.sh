@@ -43,5 +43,5 @@ else
   echo "demo.sh: there is no report; see above" >&2
 fi
 echo "Building the other programs ..."
-run_logged cmake --build --preset release --target vlp_programs
+run_logged cmake --build --preset release --target vlp_programs || code=$((code > 0 ? code : 1))
 exit $code

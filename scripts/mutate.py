@@ -113,8 +113,9 @@ class Folder:
         self.modules = {}
         for file, command in self.compile.items():
             target_object = re.search(r" -o (\S+/CMakeFiles/([^/]+)\.dir/\S+) -c ", command)
-            if target_object[2] != f"vlp_{name}":
-                self.modules[file] = (target_object[1], self.find_link_command(f"lib/codecs/lib{target_object[2]}.so"))
+            module = f"lib/codecs/lib{target_object[2]}.so"
+            if (self.build / module).exists():
+                self.modules[file] = (target_object[1], self.find_link_command(module))
         slow = (ROOT / "tests/slow_tests.txt").read_text().split("\n")
         self.slow = ":".join(line for line in slow if line and not line.startswith("#"))
         self.quick = quick

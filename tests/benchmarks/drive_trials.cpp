@@ -336,7 +336,7 @@ class Trials {
     fmt::print("\n");
   }
 
-  /// Number of captures of the set of the scene that are varied.
+  /// Number of captures of the first set of the scene, whose motions are replaced.
   static constexpr std::size_t kShots = 12;
 
   Scene scene_;

@@ -72,7 +72,7 @@ double compute_rms_distance_from_mean(std::span<const Eigen::Vector2d> points) {
   return std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-/// Of three lamps one is displaced, so that the largest residual is this multiple of the limit.
+/// One of three lamps is displaced, so that the largest residual is 0.9 or 1.1 times the limit.
 TEST(EstimatePoseRobust, ReturnsInconsistentBeyondEitherResidualLimit) {
   const auto five = sightings();
   const auto exact = std::span(five).first<3>();

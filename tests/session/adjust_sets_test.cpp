@@ -52,8 +52,13 @@ TEST_F(RunJointAdjustmentStep, PivotsOfSetsAreDifferent) {
   ASSERT_TRUE(metric_mm);
   constexpr double mm_per_m = 1000;
   EXPECT_NEAR(*metric_mm, mm_per_m * lever_arm_m.norm(), 0.01);
-  EXPECT_FALSE(
-      find_metric_value(run_joint_adjustment_step(make_input(""), {}).metrics, "lever_arm_mm"));
+}
+
+TEST_F(RunJointAdjustmentStep, HasNoLeverArmWithoutPivots) {
+  const AdjustStepResult result = run_joint_adjustment_step(make_input(""), {});
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
+  EXPECT_TRUE(find_metric_value(result.metrics, "tilt_deg"));
+  EXPECT_FALSE(find_metric_value(result.metrics, "lever_arm_mm"));
 }
 
 TEST_F(RunJointAdjustmentStep, CountsPositionsWithoutSd) {

@@ -92,7 +92,7 @@ TEST(RunDispersionCalibrationStep, ReplacesEarlierDispersion) {
   EXPECT_EQ(twice.calibration.dispersion->offset_px, once.calibration.dispersion->offset_px);
 }
 
-/// An inclination that the table states, at places of the axis.
+/// Captures with a stated inclination at a known position of the axis.
 TEST(RunDispersionCalibrationStep, UsesInclinationToMovePlacesOfAxis) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 1);

@@ -131,7 +131,8 @@ struct RunField {
 std::span<const RunField> list_run_text_fields();
 
 /// Returns the id of a run that starts now, 20261121T134501Z-0123456789abcdef: UTC, microseconds in
-/// 5 hexadecimal digits and 11 random ones. Ids of one clock sort by time.
+/// 5 hexadecimal digits and 11 random ones. Ids sort by time to the microsecond, unless the clock
+/// is set back.
 std::string make_run_id();
 /// Returns true if a text has the form of make_run_id().
 bool is_run_id(const std::string& text);

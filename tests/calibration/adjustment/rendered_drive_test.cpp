@@ -23,7 +23,7 @@ namespace {
 class RenderedDriveCalibration : public testing::Test {
  protected:
   static constexpr int kCaptures = 32;
-  /// Number of captures of the set of the scene that are varied.
+  /// Number of captures of the first set of the scene, whose motions are replaced.
   static constexpr std::size_t kShots = 12;
   static constexpr double kPlaceSd_m = 1e-4, kMapSd_m = 1e-4;
 

@@ -73,9 +73,10 @@ TEST(CorrectViewsForToneCurve, InterpolatesStepsUnlessOneIsUnknown) {
   std::vector<BoardView> images{image(1.8, 500)};
   TagDetection& tag = images[0].detection.tags[0];
   const double at = std::log(1.8 / 1.6) / std::log(2.0 / 1.6);
-  tag.tone_curve_fits[1].steps[0] = {0.7, 20, 180},
+  tag.tone_curve_fits[1].steps[0] = {0.7, 20, 180};
   tag.tone_curve_fits[2].steps[0] = {0.9, 10, 220};
-  tag.tone_curve_fits[1].steps[1] = {0.7, 20, 180}, tag.tone_curve_fits[2].steps[1] = {};
+  tag.tone_curve_fits[1].steps[1] = {0.7, 20, 180};
+  tag.tone_curve_fits[2].steps[1] = {};
   apply_curve_of_levels(images);
   const EdgeStep& step = images[0].detection.tags[0].steps[0];
   EXPECT_NEAR(step.blur_px, 0.7 + at * 0.2, 1e-9);
