@@ -41,9 +41,14 @@ TEST(CollectCapturesAtKnownPositions, TakesPositionsOfTableElseGivenPosition) {
   EXPECT_EQ(all.captures_without_position, 0U);
 }
 
-TEST(RunDispersionCalibrationStep, WarnsOfThreeCapturesWithoutStatedNoise) {
+SyntheticRig make_rig_with_tilted_camera() {
   SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 1);
+  return rig;
+}
+
+TEST(RunDispersionCalibrationStep, WarnsOfThreeCapturesWithoutStatedNoise) {
+  SyntheticRig rig = make_rig_with_tilted_camera();
   Random random(3);
   const auto list_warnings = [&](int captures, bool is_noise_stated) {
     KnownPositions known;
@@ -69,8 +74,7 @@ TEST(RunDispersionCalibrationStep, WarnsOfThreeCapturesWithoutStatedNoise) {
 }
 
 TEST(RunDispersionCalibrationStep, ReplacesEarlierDispersion) {
-  SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
-  rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 1);
+  SyntheticRig rig = make_rig_with_tilted_camera();
   KnownPositions known;
   for (int i = 0; i < 8; ++i) {
     rig.camera = {{0, 0, 0}, 0.25 * std::numbers::pi * i};

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
+#include "geometry/angles.h"
 #include "support/schema.h"
 #include "support/synthetic_rig.h"
 #include "support/temporary_folder.h"
@@ -107,8 +107,8 @@ TEST(FormatSessionJson, StatesRotationCenterAndDispersionInMillimetersAndDegrees
       Eigen::Vector2d(1e-8, 4e-8).asDiagonal().toDenseMatrix();
   calibration.dispersion = Dispersion{{0.4, -0.3}, 0.001, {0, 0}, 12};
   const auto json = nlohmann::json::parse(format_session_json(result, {}))["calibration"];
-  EXPECT_NEAR(json.at("tilt_deg"), tilt_rad * 180 / std::numbers::pi, 1e-9);
-  EXPECT_NEAR(json.at("tilt_azimuth_deg"), azimuth_rad * 180 / std::numbers::pi, 1e-9);
+  EXPECT_NEAR(json.at("tilt_deg"), deg_from_rad(tilt_rad), 1e-9);
+  EXPECT_NEAR(json.at("tilt_azimuth_deg"), deg_from_rad(azimuth_rad), 1e-9);
   EXPECT_NEAR(json.at("lever_arm_mm")[0], 2, 1e-12);
   EXPECT_NEAR(json.at("lever_arm_mm")[1], -3, 1e-12);
   EXPECT_NEAR(json.at("lever_arm_sd_mm")[0], 0.1, 1e-12);
