@@ -57,6 +57,7 @@ TEST(FindLargestConsistentLampSet, ReturnsNulloptWhenFewerThanThreeLampsAgree) {
 FrameObservations make_frame(std::span<const Sighting> seen, double nearest_m) {
   FrameObservations frame;
   for (const Sighting& sighting : seen) {
+    frame.ids[frame.size] = static_cast<int>(frame.size);
     frame.nearest_m[frame.size] = nearest_m;
     frame.sightings[frame.size++] = sighting;
   }
