@@ -92,6 +92,12 @@ TEST(IsBodyPositionDetermined, RequiresSdBelowQuarterOfMeanDistanceToLamps) {
   }
 }
 
+TEST_F(PositionerMovingOrTiltedCamera, ReturnsLampBelowCameraForInclinationBeyondHorizon) {
+  Sensors upside_down = driving();
+  upside_down.inclination = Inclination{3.1, 0};
+  EXPECT_EQ(locate(seen(), upside_down).status, FixStatus::lamp_below_camera);
+}
+
 TEST_F(PositionerMovingOrTiltedCamera, EqualsFixWithoutMotionWhenMotionIsExactlyZero) {
   stand();
   Sensors standing;

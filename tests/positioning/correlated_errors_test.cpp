@@ -6,13 +6,10 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/QR>
 #include <cmath>
 #include <tuple>
 #include <vector>
 
-#include "geometry/statistical_bounds.h"
-#include "positioning/outlier_rejection.h"
 #include "positioning/positioner.h"
 #include "positioning/stated_rig.h"
 #include "rig/calibration_error.h"
@@ -274,83 +271,6 @@ TEST_F(CommonErrorsTest, PositionFixKeepsLampMovedByAboutItsSd) {
     ASSERT_TRUE(fix.has_succeeded());
     EXPECT_EQ(fix.rejected_lamps, 0);
   }
-}
-
-/// Four lamps or more seen with z residuals of chosen size, noise of 0.2 px and common errors.
-class FindOutlierLamps : public testing::Test {
- protected:
-  static constexpr double kFocal_px = 500, kSigma_px = 0.2, kCommonSd = 3e-4;
-  const LeastSquaresFix fix{{{0.1, -0.05, 0}, 0.4}, Matrix4::Identity(), 0, 0};
-  std::vector<Sighting> sightings;
-  std::vector<Matrix2> common;
-
-  /// Sets exact observations of the first lamps.
-  void see_lamps(std::size_t count) {
-    const LampMap map = synthetic_lamps();
-    sightings.clear();
-    for (std::size_t i = 0; i < count; ++i) {
-      const Eigen::Vector3d& lamp_m = map.lamps[i].position_m;
-      sightings.push_back({lamp_m, project_lamp_to_normalized_point(LevelPose(fix.pose), lamp_m),
-                           Matrix2::Identity() * kFocal_px, kSigma_px});
-    }
-    common.assign(count, kCommonSd * kCommonSd * Matrix2::Identity());
-  }
-  OutlierLamps find() const { return find_outlier_lamps(sightings, common, fix); }
-  /// Computes chi-squared of the linear least-squares fit by an orthogonal projection.
-  double compute_chi_squared() const {
-    const double sd = std::hypot(kSigma_px / kFocal_px, kCommonSd);
-    Eigen::MatrixXd jacobian(2 * std::ssize(sightings), 4);
-    Eigen::VectorXd residuals(jacobian.rows());
-    for (std::size_t i = 0; i < sightings.size(); ++i) {
-      const Prediction prediction =
-          project_lamp_with_jacobian(LevelPose(fix.pose), sightings[i].lamp_m);
-      const auto row = 2 * static_cast<Eigen::Index>(i);
-      jacobian.middleRows<2>(row) = prediction.d_z_d_state / sd;
-      residuals.segment<2>(row) = (sightings[i].z - prediction.z) / sd;
-    }
-    return (residuals - jacobian * jacobian.householderQr().solve(residuals)).squaredNorm();
-  }
-  /// Displaces a lamp until chi-squared is `factor` times its bound.
-  void displace(std::size_t lamp, double factor) {
-    const Eigen::Vector2d exact = sightings[lamp].z, direction(0.8, -0.6);
-    sightings[lamp].z = exact + direction;
-    const double bound = compute_chi_squared_bound(kSigmasOfOneInTenThousand,
-                                                   2 * static_cast<double>(sightings.size()) - 4);
-    sightings[lamp].z = exact + std::sqrt(factor * bound / compute_chi_squared()) * direction;
-  }
-};
-
-TEST_F(FindOutlierLamps, ReturnsLampWhoseChiSquaredExceedsBound) {
-  for (const std::size_t count : {4u, 5u, 8u}) {
-    SCOPED_TRACE(count);
-    see_lamps(count);
-    displace(2, 0.98);
-    EXPECT_EQ(find().count, 0);
-    see_lamps(count);
-    displace(2, 1.02);
-    const OutlierLamps found = find();
-    ASSERT_EQ(found.count, 1);
-    EXPECT_EQ(found.lamps[0], 2);
-  }
-}
-
-TEST_F(FindOutlierLamps, ReturnsNoneWhenFewerThanThreeLampsAgree) {
-  for (const std::size_t count : {3u, 4u}) {
-    see_lamps(count);
-    sightings[0].z += Eigen::Vector2d(0.02, 0);
-    sightings[1].z += Eigen::Vector2d(0, 0.03);
-    EXPECT_EQ(find().count, 0) << count;
-  }
-}
-
-TEST_F(FindOutlierLamps, ReturnsTwoOutliersOfEightLargestFirst) {
-  see_lamps(8);
-  sightings[5].z += Eigen::Vector2d(0.02, 0);
-  sightings[2].z += Eigen::Vector2d(0, 0.05);
-  const OutlierLamps found = find();
-  ASSERT_EQ(found.count, 2);
-  EXPECT_EQ(found.lamps[0], 2);
-  EXPECT_EQ(found.lamps[1], 5);
 }
 
 TEST_F(CommonErrorsTest, PositionFixRejectsLampMovedBy30MmAmongFour) {

@@ -159,5 +159,134 @@ TEST(EstimatePoseLeastSquares, ConvergesToTruthFromInitialPoseFarBelow) {
   EXPECT_NEAR(fix->pose.yaw_rad, kTruth.yaw_rad, 1e-9);
 }
 
+/// Tests of find_outlier_lamps(): seven lamps, seen exactly from the true pose.
+class FindOutlierLamps : public testing::Test {
+ protected:
+  static constexpr double kSigma_px = 0.05;
+  std::vector<Sighting> seen = make_sightings();
+  std::vector<Matrix2> common = std::vector<Matrix2>(seen.size(), Matrix2::Zero());
+
+  static std::vector<Sighting> make_sightings() {
+    std::vector<Sighting> exact;
+    for (const Eigen::Vector3d& lamp_m : {Eigen::Vector3d{-0.6, -0.4, 1.6},
+                                          {0.6, -0.4, 1.6},
+                                          {0.6, 0.4, 1.8},
+                                          {-0.6, 0.4, 1.6},
+                                          {0, 0.5, 1.8},
+                                          {-0.2, -0.5, 1.7},
+                                          {0.3, 0.1, 1.6}}) {
+      exact.push_back({lamp_m, project_lamp_to_normalized_point(LevelPose(kTruth), lamp_m),
+                       400 * Matrix2::Identity(), kSigma_px});
+    }
+    return exact;
+  }
+  /// Displaces a lamp in the image.
+  void displace(std::size_t lamp, const Eigen::Vector2d& by_px) {
+    seen[lamp].z += seen[lamp].d_pixel_d_z.inverse() * by_px;
+  }
+  /// Returns the indices of the outliers among the first `count` lamps, in the order of rejection.
+  std::vector<std::size_t> find(std::size_t count) const {
+    const OutlierLamps found =
+        find_outlier_lamps(std::span(seen).first(count), std::span(common).first(count),
+                           {kTruth, Matrix4::Zero(), 0, 0});
+    return {found.lamps.begin(), found.lamps.begin() + static_cast<std::ptrdiff_t>(found.count)};
+  }
+  /// Returns the chi-squared of the least-squares fix of the first `count` lamps.
+  double compute_chi_squared(std::size_t count) const {
+    const auto fix = estimate_pose_least_squares(std::span(seen).first(count), kTruth);
+    return fix ? fix->chi_squared : 0;
+  }
+};
+
+TEST_F(FindOutlierLamps, RejectsLampBeyondQuantileOfChiSquared) {
+  // Upper 1e-4 quantiles of chi-squared with 2 n - 4 degrees of freedom.
+  for (const auto& [count, quantile] :
+       {std::pair<std::size_t, double>(4, 23.51), {5, 27.86}, {6, 31.83}, {7, 35.56}}) {
+    seen = make_sightings();
+    displace(1, {0.01, 0.02});
+    const double chi_squared = compute_chi_squared(count);
+    ASSERT_GT(chi_squared, 0);
+    for (const auto& [factor, is_rejected] : {std::pair(0.97, false), {1.03, true}}) {
+      seen = make_sightings();
+      displace(1, std::sqrt(factor * quantile / chi_squared) * Eigen::Vector2d(0.01, 0.02));
+      EXPECT_EQ(find(count), is_rejected ? std::vector<std::size_t>{1} : std::vector<std::size_t>{})
+          << count << " lamps, " << factor;
+    }
+  }
+}
+
+TEST_F(FindOutlierLamps, RejectsNoLampAmongThree) {
+  displace(0, {5, 0});
+  EXPECT_TRUE(find(3).empty());
+}
+
+/// The accurate lamp determines the fix, so that its residual is smaller than those of the others.
+TEST_F(FindOutlierLamps, RejectsAccurateLampWithSmallResidual) {
+  for (const std::size_t accurate : {0U, 2U, 4U}) {
+    seen = make_sightings();
+    seen[accurate].sigma_px /= 10;
+    displace(accurate, {0.8, -0.6});
+    EXPECT_EQ(find(5), std::vector<std::size_t>{accurate});
+  }
+}
+
+TEST_F(FindOutlierLamps, RejectsLampsInOrderOfTheirErrors) {
+  displace(4, {1, 0.3});
+  displace(2, {-3, 2});
+  displace(5, {0.2, -0.4});
+  EXPECT_EQ(find(7), (std::vector<std::size_t>{2, 4, 5}));
+}
+
+TEST_F(FindOutlierLamps, RejectsNoneWithoutMajority) {
+  displace(2, {-3, 2});
+  displace(4, {1, 0.5});
+  EXPECT_EQ(find(5), (std::vector<std::size_t>{2, 4})) << "three of five remain";
+  EXPECT_EQ(find(6), (std::vector<std::size_t>{2, 4}));
+  displace(0, {0.4, 0.8});
+  EXPECT_TRUE(find(6).empty()) << "three of six";
+  EXPECT_TRUE(find(5).empty()) << "two of five";
+}
+
+TEST_F(FindOutlierLamps, RejectsNoneWhenThreeOfFourContradict) {
+  displace(2, {-3, 2});
+  displace(0, {1, 1});
+  EXPECT_TRUE(find(4).empty());
+}
+
+/// Displaces a lamp along and across the axis of large errors of z.
+TEST_F(FindOutlierLamps, ComparesErrorsToTheirCovariance) {
+  const Eigen::Matrix2d axes = Eigen::Rotation2Dd(0.6).toRotationMatrix();
+  const Eigen::DiagonalMatrix<double, 2> pixels_per_z(400, 20);
+  seen[1].d_pixel_d_z = pixels_per_z * axes.transpose();
+  const Eigen::Vector2d small_z = kSigma_px / 400 * axes.col(0),
+                        large_z = kSigma_px / 20 * axes.col(1);
+  const Eigen::Vector2d exact_z = seen[1].z;
+  seen[1].z = exact_z + 2 * large_z;
+  EXPECT_TRUE(find(7).empty());
+  seen[1].z = exact_z + 15 * large_z;
+  EXPECT_EQ(find(7), std::vector<std::size_t>{1});
+  seen[1].z = exact_z + 15 * small_z;
+  EXPECT_EQ(find(7), std::vector<std::size_t>{1});
+}
+
+TEST_F(FindOutlierLamps, AddsCommonErrorsOfEachLamp) {
+  const double sd_z = kSigma_px / 400;
+  displace(1, {20 * kSigma_px, 0});
+  ASSERT_EQ(find(7), std::vector<std::size_t>{1});
+  common[1](1, 1) = std::pow(20 * sd_z, 2);
+  EXPECT_EQ(find(7), std::vector<std::size_t>{1}) << "across the error";
+  common[1].setZero();
+  common[1](0, 0) = std::pow(20 * sd_z, 2);
+  EXPECT_TRUE(find(7).empty()) << "along the error";
+  std::swap(common[1], common[2]);
+  EXPECT_EQ(find(7), std::vector<std::size_t>{1}) << "of another lamp";
+}
+
+TEST_F(FindOutlierLamps, RejectsNoneWhenLampsDoNotDetermineFix) {
+  for (Sighting& sighting : seen) sighting = seen[0];
+  displace(1, {5, 0});
+  EXPECT_TRUE(find(7).empty());
+}
+
 }  // namespace
 }  // namespace vlp
