@@ -43,7 +43,8 @@ OPERATORS = {" + ": [" - "], " - ": [" + "], " * ": [" / "], " / ": [" * "], " <
 NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*(?:e[+-]?\d+)?)(?![\w.])")
 STATEMENT = re.compile(r"^[ \t]*(?!return\b|const\b|using\b|auto\b|break\b|case\b|throw\b|[\w:<>, ]+ \w+(?: =|;|\{|\())"
                        r"[\w\[\]().>:*-]+(?:\([^;{}]*\)| [-+*/]?= [^;{}]*);[ \t]*$", re.M)
-ARGUMENTS = re.compile(r"\b[a-z]\w*\(([\w.]+), ([\w.]+)\)")
+# The order of the arguments of these functions has no effect.
+ARGUMENTS = re.compile(r"\b(?!(?:min|max|hypot|swap)\()[a-z]\w*\(([\w.]+), ([\w.]+)\)")
 MINUS = re.compile(r"(?<=[(=,] )-(?=[a-z(])|(?<=\()-(?=[a-z(])|(?<=return )-(?=[a-z(])")
 # Lines that compare integers: only these, unless LATITUDE matches, get < for <=.
 COUNTS = re.compile(r"\+\+|size|count|rows\(\)|cols\(\)|\bnum_|\bn\b|\b(?:width|height)\b|static_cast<(?:int|std::)")
