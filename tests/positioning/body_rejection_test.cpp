@@ -217,6 +217,21 @@ TEST_F(PositionerMovingOrTiltedCamera, ReturnsNoFixWhenAllLampsContradict) {
   }
 }
 
+TEST_F(PositionerMovingOrTiltedCamera, ReturnsInconsistentOrMirroredMapForThreeLamps) {
+  stand();
+  Sensors slow;
+  slow.motion = KnownMotion::make_motion_prior_from_limits(0.1, 0.1);
+  auto detections = seen();
+  ASSERT_EQ(detections.size(), 8);
+  detections.resize(3);
+  ASSERT_TRUE(locate(detections, slow).has_succeeded());
+  auto displaced = detections;
+  displaced[0].pixel.x() += 60;
+  EXPECT_EQ(locate(displaced, slow).status, FixStatus::inconsistent);
+  for (Lamp& lamp : rig.map.lamps) lamp.position_m.y() *= -1;
+  EXPECT_EQ(locate(detections, slow).status, FixStatus::mirrored_map);
+}
+
 TEST_F(PositionerMovingOrTiltedCamera, ReturnsMirroredMapForMirroredLampMap) {
   const auto mirrored = [](LampMap map) {
     for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;

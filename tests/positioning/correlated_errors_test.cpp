@@ -273,6 +273,27 @@ TEST_F(CommonErrorsTest, PositionFixKeepsLampMovedByAboutItsSd) {
   }
 }
 
+/// The detector's noise alone would reject the lamp. Errors of the map that are known to be of that
+/// size keep it.
+TEST_F(CommonErrorsTest, FixOfMovingCameraKeepsLampMovedByAboutItsSd) {
+  rig.calibration.camera.row_time_s = 30e-6;
+  rig.calibration.camera.readout = Readout::rows;
+  const Calibration with_unknown_errors = rig.calibration;
+  rig.adjust(3);
+  SyntheticRig room = rig;
+  room.map.lamps[2].position_m.y() += 0.008;
+  const auto detections = seen_from(room, 0.03);
+  ASSERT_EQ(detections.size(), 8);
+  Sensors driving;
+  driving.motion = KnownMotion::make_motion_prior_from_limits(0.5, 0.5);
+  for (const auto& [calibration, rejected] :
+       {std::pair(rig.calibration, 0), {with_unknown_errors, 1}}) {
+    const Fix fix = Positioner(rig.map, calibration).compute_position_fix(detections, driving);
+    ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
+    EXPECT_EQ(fix.rejected_lamps, rejected);
+  }
+}
+
 TEST_F(CommonErrorsTest, PositionFixRejectsLampMovedBy30MmAmongFour) {
   rig.adjust(0.3);
   SyntheticRig room = rig;

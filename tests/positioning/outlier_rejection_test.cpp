@@ -242,7 +242,8 @@ TEST_F(FindOutlierLamps, RejectsNoneWithoutMajority) {
   displace(4, {1, 0.5});
   EXPECT_EQ(find(5), (std::vector<std::size_t>{2, 4})) << "three of five remain";
   EXPECT_EQ(find(6), (std::vector<std::size_t>{2, 4}));
-  displace(0, {0.4, 0.8});
+  displace(0, {20, 30});
+  EXPECT_EQ(find(7), (std::vector<std::size_t>{0, 2, 4})) << "four of seven remain";
   EXPECT_TRUE(find(6).empty()) << "three of six";
   EXPECT_TRUE(find(5).empty()) << "two of five";
 }
