@@ -324,7 +324,7 @@ TEST_F(CInterface, VlpLastErrorNamesInvalidFileOrOption) {
   EXPECT_THAT(of_another_thread, IsEmpty());
   const std::string endless(5000, 'x');
   EXPECT_EQ(vlp_open(endless.c_str(), calibration.c_str(), nullptr, &positioner), VLP_BAD_FILE);
-  EXPECT_THAT(vlp_last_error(), HasSubstr("xxx"));
+  EXPECT_EQ(vlp_last_error(), endless.substr(0, 1023));
 }
 
 TEST(CFunctionVlpDescribeStatus, ReturnsDifferentTextForEachCode) {
