@@ -69,9 +69,26 @@ TEST(EstimateCameraTiltFromLamps, ReturnsExactTiltWithoutNoise) {
       EXPECT_EQ(result.captures, 8);
       EXPECT_EQ(result.detections_rejected, 0);
       EXPECT_LT(result.residual_px, 1e-8);
-      EXPECT_TRUE(tilt_deg == 0 || result.residual_before_px > 0.1);
+      if (tilt_deg == 0) {
+        EXPECT_LT(result.residual_before_px, 1e-8);
+      } else {
+        EXPECT_GT(result.residual_before_px, 0.1);
+      }
     }
   }
+}
+
+TEST(EstimateCameraTiltFromLamps, ResidualsOfLevelCameraEqualNoiseBeforeAndAfter) {
+  Random random(7);
+  auto rig = make_tilted_rig(0, 0);
+  rig.calibration.camera.lens_model = LensModel::pinhole;
+  rig.calibration.camera.intrinsics.resize(4);
+  auto frames = drive(rig, 40, random, 0.2);
+  for (Frame& frame : frames) frame.detections = with_noise(frame.detections, random);
+  const auto result = estimate_camera_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
+  ASSERT_EQ(result.undetermined, "");
+  EXPECT_NEAR(result.residual_before_px, 0.2, 0.03);
+  EXPECT_NEAR(result.residual_px, 0.2, 0.03);
 }
 
 TEST(EstimateCameraTiltFromLamps, ReturnsExactTiltFromThreeLampsPerCapture) {
