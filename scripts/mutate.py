@@ -8,9 +8,9 @@
 Each mutant changes one operator, constant, sign, statement or pair of arguments. It is compiled to an object of its own
 and linked before the folder's library, or to a library that the tests load in place of the one in lib/codecs; neither
 the sources nor the build folder change. Mutants that do not compile are replaced by others. A mutant is detected if a
-test of tests/FOLDER fails or crashes, or if the tests take three times the processor time; the slow tests run only if
-the others pass, with --quick never. Prints each survivor as FILE:LINE with both lines, then the score. Exit code 0; 1 if
-the tests are missing or fail without a mutant; 2 for bad usage.
+test of tests/FOLDER fails or crashes, or if the tests take three times the processor time. Quick tests run first, the
+slow ones of tests/slow_tests.txt last, and with --quick never. Prints each survivor as FILE:LINE with both lines, then
+the score. Exit code 0; 1 if the tests are missing or fail without a mutant; 2 for bad usage.
 
 Changes that rarely have an effect are not made:
 - < to <= and the like between floating-point values, which are equal with probability zero (see COUNTS)
@@ -127,36 +127,47 @@ class Folder:
                                   check=True, capture_output=True, text=True).stdout
         return re.search(r"&& (\S*\+\+ .*? -o \S+)(.*?)(?: && |$)", commands.rstrip().split("\n")[-1]).groups()
 
-    def run(self, program, pattern, limit_s):
+    def run(self, program, pattern, limit_s, *options):
         """Returns true if the tests pass within a limit of processor time. They load libraries beside the program."""
         limits = f"ulimit -v {MEMORY_KIB}; ulimit -t {limit_s}"
         with tempfile.TemporaryDirectory() as scratch:
             try:
                 done = subprocess.run(["sh", "-c", limits + '; exec "$0" "$@"', program, "--gtest_brief=1",
-                                       "--gtest_fail_fast", f"--gtest_filter={pattern}"],
+                                       "--gtest_fail_fast", f"--gtest_filter={pattern}", *options],
                                       cwd=scratch, env=os.environ | {"LD_LIBRARY_PATH": str(program.parent)},
                                       capture_output=True, timeout=20 * limit_s, check=False)
             except subprocess.TimeoutExpired:
                 return False
         return done.returncode == 0
 
-    def passes(self, program, limits_s):
-        return (self.run(program, "-" + self.slow, limits_s[0])
-                and (self.quick or not self.slow or self.run(program, self.slow, limits_s[1])))
+    def passes(self, program, stages):
+        return all(self.run(program, pattern, limit_s) for pattern, limit_s in stages)
 
     def measure(self):
-        """Returns the time limits of the quick and of the slow tests in seconds. Exits if a test fails."""
-        limits = []
-        for pattern in ("-" + self.slow, "-*" if self.quick else self.slow or "-*"):
+        """Returns the stages of the tests, each with the limit of its processor time in seconds: the quick tests, those
+        that take longer than a fifth of a second, and the slow ones. Exits if a test fails.
+        """
+        def measure_s(pattern, *options):
             before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            if not self.run(self.test, pattern, 3600):
+            if not self.run(self.test, pattern, 3600, *options):
                 sys.exit("mutate.py: the tests fail without a mutant")
             after = resource.getrusage(resource.RUSAGE_CHILDREN)
-            spent_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-            limits.append(int(3 * spent_s) + 10)
-        return limits
+            return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
-    def judge(self, file, text, limits_s):
+        with tempfile.TemporaryDirectory() as scratch:
+            output = pathlib.Path(scratch, "times.json")
+            spent_s = measure_s("-" + self.slow, f"--gtest_output=json:{output}")
+            suites = json.loads(output.read_text())["testsuites"]
+        longer = [f"{suite['name']}.{test['name']}" for suite in suites for test in suite["testsuite"]
+                  if float(test["time"].rstrip("s")) > 0.2]
+        stages = [("-" + ":".join([*longer, self.slow]), int(3 * spent_s) + 10)]
+        if longer:
+            stages.append((":".join(longer), int(3 * spent_s) + 10))
+        if self.slow and not self.quick:
+            stages.append((self.slow, int(3 * measure_s(self.slow)) + 10))
+        return stages
+
+    def judge(self, file, text, stages):
         """Returns whether the tests pass; None if the text does not compile."""
         with tempfile.TemporaryDirectory() as scratch:
             source, mutant = pathlib.Path(scratch, file.name), pathlib.Path(scratch, "mutant.o")
@@ -177,7 +188,7 @@ class Folder:
                 link = re.sub(r" -o \S+$", f" {mutant} -o {program}", head) + tail
             if subprocess.run(link, shell=True, cwd=self.build, capture_output=True, check=False).returncode:
                 return None
-            return self.passes(program, limits_s)
+            return self.passes(program, stages)
 
 
 def main():
@@ -190,7 +201,7 @@ def main():
     parser.add_argument("--quick", action="store_true", help="without the tests of tests/slow_tests.txt")
     options = parser.parse_args()
     folder = Folder(options.folder, options.preset, options.quick)
-    limits_s = folder.measure()
+    stages = folder.measure()
     draw = random.Random(options.seed)
     texts = {file: file.read_text() for file in sorted(folder.compile)}
     sites = [(file, *place) for file, text in texts.items() for place in find_mutations(text)]
@@ -200,7 +211,7 @@ def main():
         def judge(site):
             file, begin, end, new = site
             text = texts[file]
-            return site, folder.judge(file, text[:begin] + new + text[end:], limits_s)
+            return site, folder.judge(file, text[:begin] + new + text[end:], stages)
 
         while judged < options.count and sites:
             batch = [sites.pop() for _ in range(min(len(sites), options.count - judged))]
