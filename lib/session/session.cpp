@@ -60,12 +60,11 @@ std::string remove_folder(std::string text, const fs::path& named) {
 }
 
 /// Steps whose metrics can have gates.
-constexpr std::array<std::pair<MetricSource, std::string_view>, 5> kStepsOfMetrics{
+constexpr std::array<std::pair<MetricSource, std::string_view>, 4> kStepsOfMetrics{
     {{MetricSource::lens, "lens"},
      {MetricSource::rotation, "rotation"},
      {MetricSource::dispersion, "dispersion"},
-     {MetricSource::evaluation, "evaluate"},
-     {MetricSource::reference, "evaluate"}}};
+     {MetricSource::evaluation, "evaluate"}}};
 
 constexpr std::array kPlots{"lens.svg", "rotation.svg", "dispersion.svg"};
 
@@ -106,7 +105,7 @@ class SessionRun {
     check_redo_option();
     results_.set_steps_and_remove_stale_files(list_outputs());
     if (run_calibration_steps() && locate_check_and_drives()) {
-      add_gates_of_missing_steps();
+      add_gates_of_missing_dispersion();
       evaluate_session_fixes();
     }
     finish_session();
@@ -211,15 +210,16 @@ class SessionRun {
     return result_.steps.back().result.has_succeeded();
   }
 
-  /// Adds the gates of steps that the session lacks: they fail, because their metrics have no
-  /// value.
-  void add_gates_of_missing_steps() {
-    for (const char* name : {"lens", "rotation", "dispersion"}) {
-      if (std::ranges::find(result_.steps, name, &SessionStep::name) != result_.steps.end())
-        continue;
-      const auto gates = check_gates(find_step_gates(name), {});
-      result_.gates.insert(result_.gates.end(), gates.begin(), gates.end());
-    }
+  bool has_step(std::string_view name) const {
+    return std::ranges::find(result_.steps, name, &SessionStep::name) != result_.steps.end();
+  }
+
+  /// Adds the gates of the dispersion if the session has no captures for it: they fail, because
+  /// their metrics have no value.
+  void add_gates_of_missing_dispersion() {
+    if (has_step("dispersion")) return;
+    const auto gates = check_gates(find_step_gates("dispersion"), {});
+    result_.gates.insert(result_.gates.end(), gates.begin(), gates.end());
   }
 
   /// Returns the gates of the metrics of a step.
@@ -370,17 +370,15 @@ class SessionRun {
                                               describe_row_time_source(), result);
   }
 
-  /// Returns false if the row time was estimated by the step row-time, or is not used.
+  /// Returns false if the step row-time estimated the row time, or if it is not used.
   bool is_row_time_given() const {
-    return !session_.lamp_classifier_file() &&
-           (session_.camera_calibration_file() || options_.frontend.row_time_s);
+    return !session_.lamp_classifier_file() && !has_step("row-time");
   }
 
   /// Returns the name of the file or the option that gives the row time.
   std::string describe_row_time_source() const {
-    if (session_.camera_calibration_file())
-      return session_.camera_calibration_file()->filename().string();
-    return options_.frontend.row_time_s ? "--row-time-s" : "camera.yaml";
+    if (has_step("row-time")) return "camera.yaml of the results";
+    return session_.camera_calibration_file() ? "camera.yaml" : "--row-time-s";
   }
 
   /// Adds the remarks and metrics of the images to the result of a step.

@@ -193,7 +193,7 @@ SimulationSummary render_scene_to_folder(const Scene& scene, const fs::path& out
       const bool rendered = render_capture(scene, renderer, set, index, folder);
       const std::lock_guard lock(counting);
       ++(rendered ? summary.rendered : summary.existing);
-      progress(summary, total);
+      if (progress) progress(summary, total);
     });
   }
   return summary;

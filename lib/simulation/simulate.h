@@ -41,7 +41,7 @@ struct SimulationSummary {
   std::size_t existing = 0;
 };
 
-/// Callback after each capture. Calls do not overlap.
+/// Callback after each capture; may be empty. Calls do not overlap.
 using SimulationProgress = std::function<void(const SimulationSummary& so_far, std::size_t total)>;
 
 /// Renders a scene into `output`:

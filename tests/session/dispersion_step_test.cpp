@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <numbers>
 
 #include "support/body_rig.h"
@@ -94,6 +95,168 @@ TEST(RunDispersionCalibrationStep, ReplacesEarlierDispersion) {
   const DispersionResult twice = run(once.calibration);
   ASSERT_TRUE(twice.has_succeeded()) << twice.message;
   EXPECT_EQ(twice.calibration.dispersion->offset_px, once.calibration.dispersion->offset_px);
+}
+
+/// Eight captures at the origin, with yaws over the full turn. `offset_px` displaces all pixels.
+KnownPositions take_captures_at_origin(SyntheticRig rig, const Eigen::Vector2d& offset_px) {
+  KnownPositions known;
+  for (int i = 0; i < 8; ++i) {
+    rig.camera = {{0, 0, 0}, 0.25 * std::numbers::pi * i};
+    auto detections = seen_from(rig, 0.05);
+    for (Detection& detection : detections) detection.pixel += offset_px;
+    known.captures.push_back({detections, {0, 0}});
+    known.measured_points.push_back(MeasuredPoint::camera);
+  }
+  return known;
+}
+
+DispersionResult run_step(const SyntheticRig& rig, const KnownPositions& known) {
+  return run_dispersion_calibration_step({{}, rig.map, "lamps.yaml", rig.calibration}, known,
+                                         DispersionMethod::camera, DispersionCircle::mean,
+                                         {"", "test", "1.2", "", {}});
+}
+
+TEST(RunDispersionCalibrationStep, MetricsAreRadiusAndLengthOfOffset) {
+  const SyntheticRig rig = make_rig_with_tilted_camera();
+  const DispersionResult result = run_step(rig, take_captures_at_origin(rig, {0.4, -0.3}));
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
+  EXPECT_THAT(result.warnings, testing::IsEmpty());
+  const auto offset_px = find_metric_value(result.metrics, "dispersion_offset_px");
+  const auto radius_mm = find_metric_value(result.metrics, "dispersion_mm");
+  const auto world_mm = find_metric_value(result.metrics, "world_offset_mm");
+  ASSERT_TRUE(offset_px && radius_mm && world_mm);
+  EXPECT_NEAR(*offset_px, 0.5, 0.05) << "a displacement of the image, up to the lens distortion";
+  EXPECT_NEAR(*radius_mm, 1e3 * result.fit.dispersion.radius_m, 1e-9);
+  // Lamps are 1.6 m above the camera: a displacement of 0.5 px moves fixes by 1.6 m 0.5 px / f.
+  EXPECT_NEAR(*radius_mm, 1600 * 0.5 / rig.calibration.camera.focal_px().x(), 0.3);
+  EXPECT_NEAR(*world_mm, 0, 0.1);
+  ASSERT_EQ(result.calibration.history.size(), 1U);
+  EXPECT_EQ(result.calibration.history[0].part, "dispersion");
+  EXPECT_TRUE(result.drawing);
+}
+
+TEST(RunDispersionCalibrationStep, WarnsIfCalibrationHasNoRotationCenter) {
+  const auto warning = HasSubstr("the calibration has no rotation_center: run vlp-rotation first");
+  SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
+  const KnownPositions known = take_captures_at_origin(rig, {0.1, 0});
+  const DispersionResult without = run_step(rig, known);
+  ASSERT_TRUE(without.has_succeeded()) << without.message;
+  EXPECT_THAT(without.warnings, ElementsAre(warning));
+  rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0, 0);
+  EXPECT_THAT(run_step(rig, known).warnings, testing::IsEmpty());
+}
+
+TEST(RunDispersionCalibrationStep, FailsForPositionsOfAxisWithoutLeverArm) {
+  const SyntheticRig rig = make_rig_with_tilted_camera();
+  KnownPositions known = take_captures_at_origin(rig, {0, 0});
+  known.measured_points[3] = MeasuredPoint::axis;
+  const DispersionResult result = run_step(rig, known);
+  EXPECT_EQ(result.failure, StepFailure::undetermined);
+  EXPECT_THAT(result.message, HasSubstr("the positions are those of the axis, and the calibration "
+                                        "has no lever arm"));
+}
+
+TEST(RunDispersionCalibrationStep, FailsForCapturesFarFromPosition) {
+  const SyntheticRig rig = make_rig_with_tilted_camera();
+  KnownPositions known = take_captures_at_origin(rig, {0, 0});
+  for (ReferencePointCapture& capture : known.captures) capture.reference_point_m.x() += 1;
+  const DispersionResult result = run_step(rig, known);
+  EXPECT_EQ(result.failure, StepFailure::wrong_place);
+  EXPECT_FALSE(result.calibration.dispersion);
+}
+
+TEST(RunDispersionCalibrationStep, FailureNamesStatusOfFirstFix) {
+  const SyntheticRig rig = make_rig_with_tilted_camera();
+  KnownPositions known = take_captures_at_origin(rig, {0, 0});
+  for (ReferencePointCapture& capture : known.captures) capture.detections.resize(1);
+  const DispersionResult result = run_step(rig, known);
+  EXPECT_EQ(result.failure, StepFailure::undetermined);
+  EXPECT_THAT(result.message, HasSubstr("; the first: "));
+}
+
+TEST(RunDispersionCalibrationStep, HasNoCovarianceForEnclosingCircleOfPositionsOfAxis) {
+  SyntheticRig rig = make_rig_with_tilted_camera();
+  rig.calibration.rotation_center->lever_arm_m = Eigen::Vector2d(0, 0);
+  rig.calibration.rotation_center->lever_arm_covariance = 1e-8 * Matrix2::Identity();
+  KnownPositions known = take_captures_at_origin(rig, {0.1, 0});
+  known.captures.assign(3, known.captures.front());
+  known.measured_points.assign(3, MeasuredPoint::axis);
+  const DispersionResult result =
+      run_dispersion_calibration_step({{}, rig.map, "lamps.yaml", rig.calibration}, known,
+                                      DispersionMethod::chen_guan, DispersionCircle::enclosing, {});
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
+  EXPECT_FALSE(result.fit.dispersion.covariance);
+}
+
+TEST(RunDispersionCalibrationStep, AddsLeverArmCovarianceToOffsetForPositionsOfAxis) {
+  SyntheticRig rig = make_rig_with_tilted_camera();
+  rig.calibration.rotation_center->lever_arm_m = Eigen::Vector2d(0, 0);
+  KnownPositions known = take_captures_at_origin(rig, {0, 0});
+  known.measured_points.assign(8, MeasuredPoint::axis);
+  const auto find_covariance = [&] {
+    const DispersionResult result = run_step(rig, known);
+    EXPECT_TRUE(result.has_succeeded()) << result.message;
+    return result.fit.dispersion.covariance.value_or(Matrix2::Zero());
+  };
+  const Matrix2 without = find_covariance();
+  constexpr double x_sd_m = 1e-3, y_sd_m = 2e-3;
+  rig.calibration.rotation_center->lever_arm_covariance =
+      Eigen::Vector2d(x_sd_m * x_sd_m, y_sd_m * y_sd_m).asDiagonal().toDenseMatrix();
+  const Matrix2 added = find_covariance() - without;
+  // A lever arm a acts as an offset of f a / H below lamps at the height H.
+  const Eigen::Vector2d focal_px = rig.calibration.camera.focal_px();
+  const double height_m = rig.map.lamps.front().position_m.z();
+  EXPECT_NEAR(std::sqrt(added(0, 0)), focal_px.x() * x_sd_m / height_m, 1e-3);
+  EXPECT_NEAR(std::sqrt(added(1, 1)), focal_px.y() * y_sd_m / height_m, 1e-3);
+  EXPECT_NEAR(added(0, 1), 0, 1e-6);
+  // The part that follows the zenith is not counted twice: zenith_sd_px at the slope of 1.5 m.
+  constexpr double zenith_sd_px = 0.2, slope_m = 1.5;
+  rig.calibration.rotation_center->covariance = zenith_sd_px * zenith_sd_px * Matrix2::Identity();
+  rig.calibration.rotation_center->lever_arm_jacobian_wrt_zenith = slope_m * Matrix2::Identity();
+  const double removed_m = slope_m * zenith_sd_px / focal_px.x();
+  EXPECT_NEAR((find_covariance() - without)(0, 0),
+              std::pow(focal_px.x() / height_m, 2) * (x_sd_m * x_sd_m - removed_m * removed_m),
+              2e-3);
+}
+
+TEST(RunDispersionCalibrationStep, DoesNotBlameMovedLampForSingleYaw) {
+  SyntheticRig rig = make_rig_with_tilted_camera();
+  const LampMap map = rig.map;
+  rig.map.lamps[1].position_m.x() += 0.01;
+  KnownPositions known;
+  LampCaptures input{{}, map, "lamps.yaml", rig.calibration};
+  for (int i = 0; i < 12; ++i) {
+    rig.camera = {{0.05 * (i % 4), 0.05 * (i % 3), 0}, 0.5};
+    known.captures.push_back({seen_from(rig, 0.05), rig.camera.position_m.head<2>()});
+    known.measured_points.push_back(MeasuredPoint::camera);
+    input.frames.push_back({std::to_string(i), known.captures.back().detections});
+  }
+  const DispersionResult result = run_dispersion_calibration_step(
+      input, known, DispersionMethod::camera, DispersionCircle::mean, {});
+  EXPECT_EQ(result.failure, StepFailure::undetermined) << result.message;
+  EXPECT_THAT(result.message, Not(HasSubstr("lamp 2")));
+}
+
+/// Positions of the axis that are stated as those of the camera, 20 mm beside it.
+TEST(RunDispersionCalibrationStep, WarnsIfOffsetEqualsLeverArm) {
+  SyntheticRig rig = make_rig_with_tilted_camera();
+  KnownPositions known;
+  for (int i = 0; i < 8; ++i) {
+    const double yaw_rad = 0.25 * std::numbers::pi * i;
+    rig.camera = {rotation_about_z(yaw_rad) * Eigen::Vector3d(0.016, -0.012, 0), yaw_rad};
+    known.captures.push_back({seen_from(rig, 0.05), {0, 0}});
+    known.measured_points.push_back(MeasuredPoint::camera);
+  }
+  const auto warning = HasSubstr("the offset equals the lever arm, ");
+  EXPECT_THAT(run_step(rig, known).warnings, Not(Contains(warning))) << "lever arm is unknown";
+  rig.calibration.rotation_center->lever_arm_m = Eigen::Vector2d(0.016, -0.012);
+  EXPECT_THAT(run_step(rig, known).warnings,
+              ElementsAre(HasSubstr("the offset equals the lever arm, 20.0 mm: the positions are "
+                                    "those of the axis, and fixes would have an error of ")));
+  rig.calibration.rotation_center->lever_arm_m = Eigen::Vector2d(-0.016, 0.012);
+  EXPECT_THAT(run_step(rig, known).warnings, Not(Contains(warning))) << "opposite direction";
+  rig.calibration.rotation_center->lever_arm_m = Eigen::Vector2d(0.024, -0.018);
+  EXPECT_THAT(run_step(rig, known).warnings, Not(Contains(warning))) << "another length";
 }
 
 /// Captures with a stated inclination at a known position of the axis.

@@ -45,5 +45,53 @@ TEST(RunLensCalibrationStep, WarnsWhenViewsAreTooFewToHoldOut) {
   EXPECT_THAT(run_lens_calibration_step(input, {}).warnings, IsEmpty());
 }
 
+TEST(RunLensCalibrationStep, ReportsViewsResidualAndWarpOnlyIfItIsEstimated) {
+  LensInput input = views_with_edges(0);
+  input.camera.id = "unit-7";
+  input.camera.row_time_s = 3e-5;
+  for (const WarpChoice warp : {WarpChoice::on, WarpChoice::off}) {
+    input.warp = warp;
+    const LensResult result = run_lens_calibration_step(input, {"", "test", "1.2", "", {}});
+    ASSERT_TRUE(result.has_succeeded()) << result.message;
+    const auto& report = result.calibration.intrinsics_report;
+    ASSERT_TRUE(report);
+    EXPECT_EQ(report->board_warp_m.has_value(), warp == WarpChoice::on);
+    if (report->board_warp_m) {
+      EXPECT_NEAR((*report->board_warp_m)[0], 0, 2e-4);
+      EXPECT_NEAR((*report->board_warp_m)[1], 0, 2e-4);
+    }
+    EXPECT_EQ(report->views, 20);
+    EXPECT_GT(report->corners, 0);
+    EXPECT_EQ(find_metric_value(result.metrics, "rms_px"), report->rms_px);
+    EXPECT_EQ(find_metric_value(result.metrics, "views"), 20);
+    EXPECT_EQ(find_metric_value(result.metrics, "expected_max_error_px"),
+              report->expected_max_error_px);
+    EXPECT_TRUE(find_metric_value(result.metrics, "split_half_px"));
+    EXPECT_EQ(result.calibration.camera.id, "unit-7");
+    EXPECT_EQ(result.calibration.camera.row_time_s, 3e-5);
+    ASSERT_EQ(result.calibration.history.size(), 1U);
+    EXPECT_EQ(result.calibration.history[0].part, "camera");
+    EXPECT_TRUE(result.drawing);
+  }
+}
+
+TEST(RunLensCalibrationStep, FailureForFewViewsCountsRejectedImages) {
+  LensInput input = views_with_edges(0);
+  input.observations.images.resize(2);
+  const LensResult few = run_lens_calibration_step(input, {});
+  EXPECT_EQ(few.failure, StepFailure::undetermined);
+  EXPECT_THAT(few.message, testing::Not(HasSubstr("not used: ")));
+  input.observations.images[1].set_image_rejection(RejectionReason::blurred, "is blurred");
+  const LensResult rejected = run_lens_calibration_step(input, {});
+  EXPECT_EQ(rejected.failure, StepFailure::undetermined);
+  EXPECT_THAT(rejected.message, HasSubstr("; not used: 1 blurred"));
+  for (Observation& image : input.observations.images) {
+    image.set_image_rejection(RejectionReason::blurred, "is blurred");
+  }
+  const LensResult none = run_lens_calibration_step(input, {});
+  EXPECT_EQ(none.failure, StepFailure::undetermined);
+  EXPECT_THAT(none.message, HasSubstr("2 blurred"));
+}
+
 }  // namespace
 }  // namespace vlp

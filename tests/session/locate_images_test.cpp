@@ -41,6 +41,8 @@ class LeaningRig {
   std::vector<double> looks;
   /// Only ellipses show lamps.
   bool shown_by_ellipses_alone = false;
+  /// Ellipses show one lamp only.
+  bool hidden_from_ellipses = false;
 
  private:
   double off_rad(const Eigen::Matrix3d& level) const {
@@ -52,6 +54,7 @@ class LeaningRig {
     const double off_px = level ? 40 * off_rad(*level) : 2;
     for (Detection& one : seen) one.pixel += off_px * Eigen::Vector2d(one.lamp % 2, one.lamp % 3);
     if (shown_by_ellipses_alone) seen.resize(level ? 1 : 2);
+    if (hidden_from_ellipses && !level) seen.resize(1);
     return seen;
   }
 
@@ -89,6 +92,33 @@ TEST(RedetectLampsUntilTiltConverges, SkipsCapturesOnlyWhenInclinationIsExact) {
   input.inclination_sigma_rad = rad_from_deg(0.5);
   redetect_lamps_until_tilt_converges(input, rig.redetector());
   EXPECT_LT(error_m(input), 1e-4) << "but for a sensor that is not exact";
+}
+
+TEST(RedetectLampsUntilTiltConverges, BeginsWithEllipsesOnlyForTiltSdAboveThreeDegrees) {
+  for (const double sd_rad : {0.045, 0.055}) {
+    LeaningRig rig;
+    LocateInput input = rig.input(sd_rad);
+    input.captures["a"].inclination = Inclination{rad_from_deg(15), rad_from_deg(-11)};
+    input.inclination_sigma_rad = sd_rad;
+    redetect_lamps_until_tilt_converges(input, rig.redetector());
+    ASSERT_FALSE(rig.looks.empty());
+    EXPECT_EQ(rig.looks[0] == -1, sd_rad > 0.05) << sd_rad;
+    EXPECT_LT(error_m(input), 1e-3);
+  }
+}
+
+TEST(RedetectLampsUntilTiltConverges, ContinuesFromFirstFixIfEllipsesHaveNone) {
+  LeaningRig rig;
+  rig.hidden_from_ellipses = true;
+  LocateInput input = rig.input(1.6);
+  EXPECT_GT(error_m(input), 0.01);
+  const LevelRotations levels = redetect_lamps_until_tilt_converges(input, rig.redetector());
+  ASSERT_GE(rig.looks.size(), 3U);
+  EXPECT_EQ(rig.looks[0], -1);
+  EXPECT_GE(rig.looks[1], 0);
+  EXPECT_LT(error_m(input), 1e-3);
+  ASSERT_EQ(levels.size(), 1U);
+  EXPECT_TRUE(levels.at("a"));
 }
 
 TEST(RedetectLampsUntilTiltConverges, KeepsDetectionsWithMoreLampsWhenFixFails) {

@@ -150,6 +150,7 @@ TEST(LocateCameraFromDetections, WarnsOfMovedLampAndItsDisplacement) {
   EXPECT_THAT(found.warnings,
               testing::Contains("lamp 2 hangs 30 mm from where the map has it (x +30 mm, y +0 mm): "
                                 "moved, or entered wrongly"));
+  EXPECT_EQ(found.warnings.size(), 1U) << "its rejections are not counted apart";
   ASSERT_EQ(found.rejected_lamps.size(), 1U);
   EXPECT_EQ(found.rejected_lamps[0].lamp, 2);
   ASSERT_TRUE(found.rows[0].fix && found.rows[0].fix->noise_sd);

@@ -218,5 +218,117 @@ TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenTwoLampsShar
   images.expect_true_row_time();
 }
 
+/// One image of lamps at different heights, exact for a pinhole camera of 640 x 480 px whose focal
+/// length is half of the diagonal. One candidate assigns the lamps to their lights.
+struct PinholeImage {
+  LampMap map = make_lamp_map({{-0.7, -0.4, 1.2},
+                               {0.8, -0.3, 1.6},
+                               {0.2, 0.5, 2.0},
+                               {-0.5, 0.4, 1.4},
+                               {0.6, 0.3, 2.4},
+                               {-0.1, -0.6, 1.9}});
+  RowTimeCandidates found;
+  GroupedLights image{{640, 480}, {}};
+
+  explicit PinholeImage(double roll_rad = 0) {
+    constexpr double focal_px = 400;
+    RowTimeCandidate candidate{};
+    const Eigen::Matrix3d body_from_world =
+        level_rotation_from_inclination({roll_rad, 0}).transpose();
+    for (const Lamp& lamp : map.lamps) {
+      const Eigen::Vector3d point_m = body_from_world * lamp.position_m;
+      const Eigen::Vector2d pixel = Eigen::Vector2d(319.5, 239.5) +
+                                    focal_px / point_m.z() * Eigen::Vector2d(point_m.head<2>());
+      image.lights.push_back({candidate.lamps.size(), pixel, 0.01});
+      candidate.lamps.push_back({lamp.id});
+    }
+    found.groups.resize(candidate.lamps.size());
+    found.candidates.push_back(candidate);
+  }
+  double cost(bool with_lens) const {
+    std::optional<Lens> lens;
+    if (with_lens) lens.emplace(LensModel::pinhole, std::array{400., 400., 319.5, 239.5});
+    const auto costs =
+        compute_position_costs_of_row_time_candidates(found, std::array{image}, map, lens);
+    EXPECT_EQ(costs.size(), found.candidates.size());
+    return costs.front();
+  }
+};
+
+/// Cost of a residual of 20 standard deviations, the maximum.
+const double kMaxLightCost = std::log1p(20 * 20);
+
+TEST(ComputePositionCostsOfRowTimeCandidates, IsZeroForExactLightsWithLensOrNominalLens) {
+  EXPECT_NEAR(PinholeImage().cost(true), 0, 1e-6);
+  EXPECT_NEAR(PinholeImage().cost(false), 0, 1e-6);
+}
+
+TEST(ComputePositionCostsOfRowTimeCandidates, AddsSquaredTiltDividedByItsSdToEachLight) {
+  // The standard deviation of roll and pitch is 0.15 rad. Its prior draws the tilt towards level by
+  // little.
+  EXPECT_NEAR(PinholeImage(0.15).cost(true), 6 * std::log1p(1.0 / 6), 0.03);
+}
+
+/// Standard deviation of a residual: 3 % of the RMS distance of the lights from their mean.
+double compute_residual_sd_px(const std::vector<GroupedLight>& lights) {
+  Eigen::Matrix2Xd pixels(2, static_cast<Eigen::Index>(lights.size()));
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    pixels.col(static_cast<Eigen::Index>(i)) = lights[i].pixel;
+  }
+  const Eigen::Matrix2Xd from_mean_px = pixels.colwise() - pixels.rowwise().mean();
+  return 0.03 * std::sqrt(from_mean_px.squaredNorm() / static_cast<double>(lights.size()));
+}
+
+TEST(ComputePositionCostsOfRowTimeCandidates, ResidualSdIsThreePercentOfSpreadOfLights) {
+  PinholeImage image;
+  image.image.lights[2].pixel.x() += 60;
+  const double sd_px = compute_residual_sd_px(image.image.lights);
+  EXPECT_NEAR(image.cost(true), std::log1p(std::pow(60 / sd_px, 2)), 0.1);
+  image.image.lights[2].pixel.x() += 240;
+  EXPECT_NEAR(image.cost(true), kMaxLightCost, 1e-3);
+}
+
+/// The residual of a light affects the other lights unless the light is rejected.
+TEST(ComputePositionCostsOfRowTimeCandidates, RejectsSmallerResidualsNextToAnotherLamp) {
+  PinholeImage image;
+  image.image.lights[2].pixel.x() += 15;
+  const double rejected = std::log1p(std::pow(15 / compute_residual_sd_px(image.image.lights), 2));
+  EXPECT_GT(image.cost(true), rejected + 0.5);
+  Lamp neighbor = image.map.lamps[2];
+  neighbor.id = 7;
+  neighbor.position_m.y() += 0.01;
+  image.map.lamps.push_back(neighbor);
+  EXPECT_NEAR(image.cost(true), rejected, 0.1);
+}
+
+TEST(ComputePositionCostsOfRowTimeCandidates, AllowsForSurveySdOfLamp) {
+  PinholeImage image;
+  image.image.lights[2].pixel.x() += 60;
+  const double exact = image.cost(true);
+  image.map.lamps[2].sd_m = 0.5;
+  EXPECT_LT(image.cost(true), exact / 2);
+}
+
+TEST(ComputePositionCostsOfRowTimeCandidates, IsLargestForCandidateWithTwoLamps) {
+  PinholeImage image;
+  for (std::size_t i = 2; i < 6; ++i) image.found.candidates[0].lamps[i].clear();
+  EXPECT_NEAR(image.cost(true), 6 * kMaxLightCost, 1e-9);
+  image.found.candidates[0].lamps[2] = {3};
+  EXPECT_NEAR(image.cost(true), 3 * kMaxLightCost, 1e-3) << "three lamps determine the pose";
+}
+
+TEST(ComputePositionCostsOfRowTimeCandidates, IsLargestIfNoPoseFitsLights) {
+  PinholeImage image;
+  image.found.candidates[0].lamps = {{4}, {1}, {6}, {2}, {3}, {5}};
+  EXPECT_NEAR(image.cost(true), 6 * kMaxLightCost, 1e-9);
+}
+
+TEST(ComputePositionCostsOfRowTimeCandidates, IgnoresGroupsThatMayBeSeveralLamps) {
+  PinholeImage image;
+  image.image.lights[2].pixel.x() += 60;
+  image.found.candidates[0].lamps[2] = {3, 4};
+  EXPECT_NEAR(image.cost(true), 0, 1e-6);
+}
+
 }  // namespace
 }  // namespace vlp

@@ -109,6 +109,117 @@ TEST(DescribeAlternativeRowTime, NamesWrongRowTimeWithWhichNoLampIsIdentified) {
   EXPECT_EQ(describe_alternative_row_time({}, map, std::nullopt, {2.2e-5, "camera.yaml"}), "");
 }
 
+/// Periods of lamps 2 to 6 of a map whose frequencies have the ratio 1.2 fit two row times. The
+/// lights are at the positions of the lamps for one of them. There are two folders.
+TEST(SelectRowTimeByPeriodsAndPositions, DecidesAmbiguousPeriodsByPositions) {
+  LampMap map;
+  for (int id = 1; id <= 6; ++id) {
+    Lamp lamp{};
+    lamp.id = id;
+    lamp.position_m = {
+        std::array{-0.6, 0.6, 0., -0.6, 0.6, 0.}[static_cast<std::size_t>(id - 1)],
+        std::array{-0.3, 0.3, -0.32, 0.3, -0.3, 0.28}[static_cast<std::size_t>(id - 1)], 1.6};
+    lamp.frequency_hz = 2400 * std::pow(1.2, id - 1);
+    map.lamps.push_back(lamp);
+  }
+  const Lens lens(LensModel::pinhole, std::array{500., 500., 399.5, 299.5});
+  const auto select = [&](bool is_repeated) {
+    LampMap seen = map;
+    seen.lamps.erase(seen.lamps.begin());
+    Observation image = observe(seen, {0, 0, 0, 0, 0}, false);
+    for (std::size_t i = 0; i < image.lights.size(); ++i) {
+      const Eigen::Vector3d& lamp_m = seen.lamps[i].position_m;
+      image.lights[i].pixel =
+          Eigen::Vector2d(399.5, 299.5) + 500 / 1.6 * Eigen::Vector2d(lamp_m.x(), lamp_m.y());
+    }
+    // At most one of two lights with the same period is the lamp.
+    const std::vector<Light> lights = image.lights;
+    if (is_repeated) image.lights.insert(image.lights.end(), lights.begin(), lights.end());
+    const std::vector<Observation> images(5, image);
+    const std::span all(images);
+    return select_row_time_by_periods_and_positions(std::array{all.first(2), all.last(3)}, {{}, {}},
+                                                    map, lens);
+  };
+  const RowTimeResult decided = select(false);
+  ASSERT_TRUE(decided.row_time) << decided.problem;
+  EXPECT_NEAR(decided.row_time->row_time_s, kTrueRowTime_s, 1e-8);
+  const RowTimeResult undecided = select(true);
+  EXPECT_FALSE(undecided.row_time);
+  EXPECT_THAT(undecided.problem, HasSubstr("neither duties nor positions of the lamps decide"));
+}
+
+TEST(AddRowTimeContradictionToResult, WarnsOrReplacesReasonOfFailure) {
+  const LampMap map = make_map();
+  const std::vector<Observation> images(4, observe(map, {0, 0, 0, 0, 0}, true));
+  DetectorCamera camera;
+  const auto add_to = [&](StepResult result) {
+    add_row_time_contradiction_to_result(images, map, camera, "camera.yaml", result);
+    return result;
+  };
+  StepResult failed;
+  failed.set_step_failure(StepFailure::undetermined, "no fix");
+  EXPECT_EQ(add_to(failed).message, "no fix") << "the row time is unknown";
+  camera.row_time_s = kTrueRowTime_s;
+  EXPECT_EQ(add_to(failed).message, "no fix");
+  EXPECT_THAT(add_to({}).warnings, testing::IsEmpty());
+  camera.row_time_s = 2.2e-5;
+  EXPECT_THAT(add_to({}).warnings, testing::ElementsAre(StartsWith("row time is 22 us in camera")));
+  EXPECT_TRUE(add_to({}).has_succeeded());
+  EXPECT_EQ(add_to(failed).failure, StepFailure::bad_input);
+  EXPECT_THAT(add_to(failed).message, StartsWith("row time is 22 us in camera.yaml"));
+}
+
+TEST(DescribeRowTimeContradiction, AllowsLampDriftPlusThreeStandardDeviations) {
+  const auto describe = [](double measured_s, double sd_s, int lamps) {
+    return describe_row_time_contradiction({measured_s, sd_s, lamps, lamps}, {2e-5, "camera.yaml"});
+  };
+  const double limit_s = 2e-5 * std::exp(kLampDrift);
+  EXPECT_EQ(describe(0.999 * limit_s, 0, 3), "");
+  EXPECT_NE(describe(1.001 * limit_s, 0, 3), "");
+  EXPECT_EQ(describe(1.001 * limit_s, 0, 2), "") << "two lamps may be wrong in the map";
+  EXPECT_NE(describe(2e-5 * std::exp(-1.1 * kLampDrift), 0, 3), "");
+  // The standard deviation of 1 % allows for a difference of 3 % beyond the drift.
+  EXPECT_EQ(
+      describe(2e-5 * std::exp(kLampDrift + 0.029), 0.01 * 2e-5 * std::exp(kLampDrift + 0.029), 3),
+      "");
+  EXPECT_NE(
+      describe(2e-5 * std::exp(kLampDrift + 0.031), 0.01 * 2e-5 * std::exp(kLampDrift + 0.031), 3),
+      "");
+}
+
+TEST(EstimateRowTimeFromLights, ReplacesHistoryOfEarlierSearch) {
+  const LampMap map = make_map();
+  DetectedLights seen;
+  seen.observations.images.assign(4, observe(map, {0, 0, 0, 0, 0}, false));
+  seen.folder_sizes = {4};
+  Calibration calibration = read_calibration(kRig + "/true_calibration.yaml");
+  calibration.history = {{"camera", "vlp-intrinsics", "1", "", {}},
+                         {"camera", "test", "1", "--row-time", {}},
+                         {"camera", "test", "1", "--lens auto", {}},
+                         {"rotation_center", "test", "1", "--row-time", {}}};
+  const RowTimeStepResult result = estimate_row_time_from_lights(
+      seen, {{}}, map, "lamps.yaml", calibration, {"", "test", "2", "--row-time", {}});
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
+  std::vector<std::string> kept;
+  for (const HistoryEntry& entry : result.calibration.history) {
+    kept.push_back(entry.part + " " + entry.program + " " + entry.version + " " + entry.options);
+  }
+  EXPECT_THAT(
+      kept, testing::ElementsAre("camera vlp-intrinsics 1 ", "camera test 1 --lens auto",
+                                 "rotation_center test 1 --row-time", "camera test 2 --row-time"));
+}
+
+TEST(EstimateRowTimeFromLights, IsUndeterminedWithoutLights) {
+  DetectedLights seen;
+  seen.observations.images.resize(2);
+  seen.folder_sizes = {1, 1};
+  const RowTimeStepResult result =
+      estimate_row_time_from_lights(seen, {{}, {}}, make_map(), "lamps.yaml", std::nullopt, {});
+  EXPECT_EQ(result.failure, StepFailure::undetermined);
+  EXPECT_FALSE(result.message.empty());
+  EXPECT_TRUE(result.metrics.empty());
+}
+
 TEST(DetectLightsInFolders, UsesCameraOfCalibrationWithOrWithoutItsRowTime) {
   const LampMap lamps = read_lamp_map(kRig + "/lamps.yaml");
   const Calibration calibration = read_calibration(kRig + "/true_calibration.yaml");

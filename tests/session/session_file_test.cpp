@@ -116,6 +116,159 @@ TEST(FormatSessionJson, StatesRotationCenterAndDispersionInMillimetersAndDegrees
   EXPECT_EQ(json.at("dispersion_offset_px"), nlohmann::json({0.4, -0.3}));
 }
 
+TEST(FormatSessionJson, StatesFocalLengthsPrincipalPointAndRowTime) {
+  SessionResult result;
+  Calibration& calibration =
+      result.calibration.emplace(Calibration{synthetic_camera(), {}, {}, {}, {}});
+  calibration.camera.id = "unit-7";
+  calibration.camera.intrinsics[0] = 501;
+  calibration.camera.intrinsics[1] = 502;
+  calibration.camera.intrinsics[2] = 403;
+  calibration.camera.intrinsics[3] = 304;
+  calibration.camera.row_time_s.reset();
+  auto json = nlohmann::json::parse(format_session_json(result, {}));
+  EXPECT_EQ(json["camera"], "unit-7");
+  EXPECT_EQ(json["calibration"]["focal_px"], nlohmann::json({501.0, 502.0}));
+  EXPECT_EQ(json["calibration"]["principal_point_px"], nlohmann::json({403.0, 304.0}));
+  EXPECT_EQ(json["calibration"]["lens_model"], lens_model_name(calibration.camera.lens_model));
+  EXPECT_FALSE(json["calibration"].contains("row_time_s"));
+  calibration.camera.row_time_s = 3e-5;
+  json = nlohmann::json::parse(format_session_json(result, {}));
+  EXPECT_EQ(json["calibration"]["row_time_s"], 3e-5);
+}
+
+TEST(FormatSessionJson, StatesStandardDeviationsOfZenithAndOffset) {
+  SessionResult result;
+  Calibration& calibration =
+      result.calibration.emplace(Calibration{synthetic_camera(), {}, {}, {}, {}});
+  const Eigen::Vector2d focal_px = calibration.camera.focal_px();
+  calibration.rotation_center = tilted_by(calibration.camera, 0.02, 0);
+  calibration.dispersion = Dispersion{{0.4, -0.3}, 0.001, {0, 0}, 12};
+  const auto format_calibration = [&] {
+    return nlohmann::json::parse(format_session_json(result, {}))["calibration"];
+  };
+  for (const char* key : {"rotation_center_sd_px", "zenith_sd_deg", "dispersion_offset_sd_px"}) {
+    EXPECT_TRUE(format_calibration().at(key).is_null()) << key;
+  }
+  // The lens is known, and neither zenith nor offset depend on it.
+  const auto count = static_cast<Eigen::Index>(calibration.camera.intrinsics.size());
+  calibration.intrinsics_report.emplace().covariance = MatrixX::Identity(count, count);
+  calibration.rotation_center->jacobian_wrt_intrinsics = MatrixX::Zero(2, count);
+  calibration.dispersion->jacobian_wrt_intrinsics = MatrixX::Zero(2, count);
+  calibration.dispersion->jacobian_wrt_zenith = Matrix2::Zero();
+  calibration.rotation_center->covariance =
+      Eigen::Vector2d(0.01, 0.04).asDiagonal().toDenseMatrix();
+  calibration.dispersion->covariance = Eigen::Vector2d(0.0009, 0.0016).asDiagonal().toDenseMatrix();
+  const auto json = format_calibration();
+  EXPECT_NEAR(json.at("rotation_center_sd_px")[0], 0.1, 1e-12);
+  EXPECT_NEAR(json.at("rotation_center_sd_px")[1], 0.2, 1e-12);
+  EXPECT_NEAR(json.at("zenith_sd_deg")[0], deg_from_rad(0.1 / focal_px.x()), 1e-9);
+  EXPECT_NEAR(json.at("zenith_sd_deg")[1], deg_from_rad(0.2 / focal_px.y()), 1e-9);
+  EXPECT_NEAR(json.at("zenith_deg")[0], deg_from_rad(std::tan(0.02)), 1e-9);
+  EXPECT_NEAR(json.at("zenith_deg")[1], 0, 1e-9);
+  EXPECT_NEAR(json.at("dispersion_offset_sd_px")[0], 0.03, 1e-12);
+  EXPECT_NEAR(json.at("dispersion_offset_sd_px")[1], 0.04, 1e-12);
+  EXPECT_NEAR(json.at("dispersion_radius_mm"), 1, 1e-12);
+}
+
+/// Result of a session with a passed and a failed gate, and a step with remarks.
+SessionResult make_session_result() {
+  SessionResult result;
+  result.verdict = Verdict::fail;
+  result.reason = "tilt_deg is 0.9";
+  SessionStep lens{"lens", false, {}};
+  lens.result.metrics = {{"rms_px", 0.25}};
+  SessionStep rotation{"rotation", true, {}};
+  rotation.result.metrics = {{"tilt_deg", 0.9}, {"rotation_px", 0.1}};
+  rotation.result.gates =
+      check_gates({{"tilt_deg", 0.5}, {"rotation_px", 1}}, rotation.result.metrics);
+  rotation.result.warnings = {"a warning"};
+  rotation.result.notes = {"a note"};
+  rotation.result.skipped = {{"0003.png", "is empty"}};
+  rotation.result.rejected_lamps = {{2, 5}};
+  rotation.result.lamp_offsets = {{3, 12, {-0.6, 0.3}, {1e-3, -2e-3}, {1e-4, 2e-4}}};
+  result.gates = rotation.result.gates;
+  result.steps = {lens, rotation};
+  return result;
+}
+
+TEST(FormatSessionJson, ListsMetricsWithStepUnitAndGate) {
+  SessionOptions options;
+  options.camera_id = "unit-8";
+  options.program = {"vlp-calibrate", "1.2"};
+  const auto json = nlohmann::json::parse(format_session_json(make_session_result(), options));
+  EXPECT_EQ(json["verdict"], "gate");
+  EXPECT_EQ(json["reason"], "tilt_deg is 0.9");
+  EXPECT_EQ(json["camera"], "unit-8") << "without a calibration";
+  EXPECT_EQ(json["version"], "1.2");
+  EXPECT_FALSE(json.contains("calibration"));
+  const auto& metrics = json["metrics"];
+  ASSERT_EQ(metrics.size(), 3U);
+  EXPECT_EQ(metrics[0], nlohmann::json::parse(
+                            R"({"name": "rms_px", "value": 0.25, "step": "lens", "unit": "px"})"));
+  EXPECT_EQ(metrics[1],
+            nlohmann::json::parse(R"({"name": "tilt_deg", "value": 0.9, "step": "rotation",
+              "unit": "deg", "limit": 0.5, "direction": "at most", "passed": false})"));
+  EXPECT_EQ(metrics[2],
+            nlohmann::json::parse(R"({"name": "rotation_px", "value": 0.1, "step": "rotation",
+              "unit": "px", "limit": 1.0, "direction": "at most", "passed": true})"));
+  ASSERT_EQ(json["gates"].size(), 2U);
+  EXPECT_EQ(json["gates"][0],
+            nlohmann::json::parse(R"({"name": "tilt_deg", "unit": "deg", "value": 0.9,
+              "limit": 0.5, "direction": "at most", "passed": false})"));
+}
+
+TEST(FormatSessionJson, ListsStepsWithTheirRemarksOnly) {
+  const auto json = nlohmann::json::parse(format_session_json(make_session_result(), {}));
+  ASSERT_EQ(json["steps"].size(), 2U);
+  EXPECT_EQ(json["steps"][0], nlohmann::json::parse(R"({"name": "lens", "failure": "none"})"));
+  EXPECT_EQ(json["steps"][1]["warnings"], nlohmann::json({"a warning"}));
+  EXPECT_EQ(json["steps"][1]["notes"], nlohmann::json({"a note"}));
+  EXPECT_EQ(json["steps"][1]["skipped"],
+            nlohmann::json::parse(R"([{"image": "0003.png", "reason": "is empty"}])"));
+  EXPECT_EQ(json["steps"][1]["rejected_lamps"],
+            nlohmann::json::parse(R"([{"lamp": 2, "captures": 5}])"));
+  EXPECT_EQ(json["steps"][1]["lamp_offsets"],
+            nlohmann::json::parse(R"([{"lamp": 3, "captures": 12, "map_m": [-0.6, 0.3],
+              "offset_mm": [1.0, -2.0], "offset_sd_mm": [0.1, 0.2]}])"));
+  EXPECT_FALSE(json["steps"][1].contains("message"));
+}
+
+TEST(FormatSessionJson, ContainsHistoryOfCalibration) {
+  SessionResult result;
+  result.calibration = Calibration{synthetic_camera(), {}, {}, {}, {}};
+  result.calibration->history = {
+      {"camera", "vlp-calibrate", "1.2", "--lens auto", {{"boards", "abc"}, {"board.yaml", "d"}}}};
+  const auto json = nlohmann::json::parse(format_session_json(result, {}));
+  EXPECT_EQ(json["history"],
+            nlohmann::json::parse(R"([{"part": "camera", "program": "vlp-calibrate",
+              "version": "1.2", "options": "--lens auto", "inputs": [
+                {"file": "boards", "sha256": "abc"}, {"file": "board.yaml", "sha256": "d"}]}])"));
+}
+
+TEST(FormatSessionJunitXml, ListsStepsAndGates) {
+  SessionResult result = make_session_result();
+  const std::string text = format_session_junit_xml(result);
+  EXPECT_THAT(text, testing::HasSubstr("tests=\"4\""));
+  EXPECT_THAT(text, testing::HasSubstr("a warning"));
+  EXPECT_THAT(text, testing::HasSubstr("<failure"));
+  EXPECT_THAT(text, testing::Not(testing::HasSubstr("<error")));
+  result.steps[1].result.set_step_failure(StepFailure::undetermined, "too few captures");
+  EXPECT_THAT(format_session_junit_xml(result),
+              testing::HasSubstr("<error type=\"undetermined\" message=\"too few captures"));
+}
+
+TEST(FormatSessionJunitXml, StatesReasonIfThereIsNoStep) {
+  SessionResult result;
+  result.verdict = Verdict::invalid;
+  result.failure = StepFailure::bad_input;
+  result.reason = "lamps.yaml: is missing";
+  const std::string text = format_session_junit_xml(result);
+  EXPECT_THAT(text, testing::HasSubstr("tests=\"1\""));
+  EXPECT_THAT(text,
+              testing::HasSubstr("<error type=\"bad_input\" message=\"lamps.yaml: is missing"));
+}
+
 TEST(StepFailureFromName, InvertsStepFailureNameForEachValue) {
   for (const auto failure :
        {StepFailure::none, StepFailure::bad_input, StepFailure::undetermined,

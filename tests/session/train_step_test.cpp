@@ -53,6 +53,44 @@ TEST(TrainLampClassifier, CrossValidationIdentifiesAllLamps) {
   EXPECT_EQ(result.confusion.count_wrongly_identified_lights(), 0);
 }
 
+TEST(TrainLampClassifier, ListsTenInseparablePairsAndCountsOthers) {
+  Training training(kMinExamples);
+  const auto stripes = training.seen.observations.images.front().lights.front().stripes;
+  std::size_t i = 0;
+  for (Observation& image : training.seen.observations.images) {
+    for (Light& light : image.lights) {
+      light.stripes = stripes;
+      light.stripes.period_lines *= 1 + 1e-3 * static_cast<double>(i++ % 7);
+    }
+  }
+  const TrainStepResult result = training.trained();
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
+  // Six lamps have 15 pairs.
+  ASSERT_EQ(result.warnings.size(), 11U);
+  for (std::size_t k = 0; k < 10; ++k) EXPECT_THAT(result.warnings[k], HasSubstr(" look alike ("));
+  EXPECT_EQ(result.warnings.back(), "and 5 more pairs that look alike");
+}
+
+TEST(TrainLampClassifier, StoresRowTimeOfCalibration) {
+  Training training(kMinExamples);
+  EXPECT_FALSE(training.trained().classifier.row_time_s);
+  training.seen.camera.row_time_s = 3e-5;
+  EXPECT_EQ(training.trained().classifier.row_time_s, 3e-5);
+}
+
+TEST(TrainLampClassifier, ReturnsUndeterminedForSingleLamp) {
+  Training training(kMinExamples);
+  training.lamps.lamps.resize(1);
+  for (std::vector<Frame>& folder : training.labels) {
+    for (Frame& frame : folder) {
+      std::erase_if(frame.detections, [](const Detection& label) { return label.lamp != 1; });
+    }
+  }
+  const TrainStepResult result = training.trained();
+  EXPECT_EQ(result.failure, StepFailure::undetermined);
+  EXPECT_EQ(result.message, "a classifier needs two lamps or more; add lamps");
+}
+
 TEST(TrainLampClassifier, WarnsOfRowTimeThatContradictsStripes) {
   constexpr double true_row_time_s = 3e-5;
   Training training(kMinExamples);

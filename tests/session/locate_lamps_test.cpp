@@ -1,0 +1,189 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// locate_camera_from_detections(): lamps that are rejected, moved, unknown or outside the region
+/// of the lens, and cameras that move.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "session/locate_step.h"
+#include "support/body_rig.h"
+
+namespace vlp {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+/// Captures of a level camera at rest that see all eight lamps.
+struct Captures {
+  BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
+  LocateInput input{{}, rig.map, rig.calibration};
+
+  explicit Captures(int count) {
+    for (int i = 0; i < count; ++i) {
+      rig.body.pose = {{0.02 * i - 0.1, -0.02 * i, 0}, 0.1 * i};
+      input.frames.push_back({std::to_string(i) + ".png", seen_from(rig, 0.02)});
+    }
+  }
+  Detection& detection(std::size_t frame, std::size_t index) {
+    return input.frames[frame].detections[index];
+  }
+};
+
+TEST(LocateCameraFromDetections, ListsUsedLampsOutsideRegionOnly) {
+  Captures captures(3);
+  const int rejected = captures.detection(0, 0).lamp, used = captures.detection(0, 1).lamp;
+  captures.detection(0, 0).pixel.x() += 50;
+  captures.input.frames[0].detections.push_back({99, {400, 300}, 0.02});
+  // A region beside the image, which contains no lamp.
+  IntrinsicsReport& report = captures.input.calibration.intrinsics_report.emplace();
+  report.region_px = {{-1, -1}, {-1, 0}, {0, 0}, {0, -1}};
+  for (std::size_t i = 1; i < 3; ++i) captures.input.frames[i].detections.clear();
+  const LocateResult found = locate_camera_from_detections(captures.input);
+  ASSERT_TRUE(found.rows[0].fix) << found.rows[0].status;
+  EXPECT_THAT(found.rows[0].rejected_lamps, ElementsAre(rejected));
+  const auto& outside = found.rows[0].lamps_outside_region;
+  EXPECT_EQ(outside.size() + 2, captures.input.frames[0].detections.size());
+  EXPECT_THAT(outside, Contains(used));
+  EXPECT_THAT(outside, Not(Contains(rejected)));
+  EXPECT_THAT(outside, Not(Contains(99)));
+  EXPECT_THAT(found.rows[1].lamps_outside_region, IsEmpty()) << "no fix";
+  EXPECT_THAT(found.warnings,
+              Contains(testing::StartsWith("1 of 1 fixes use lamps outside the valid region")));
+}
+
+TEST(LocateCameraFromDetections, CountsRejectionsOfEachLamp) {
+  Captures captures(6);
+  for (const std::size_t frame : {1U, 4U}) captures.detection(frame, 2).pixel.y() += 40;
+  captures.detection(3, 1).pixel.x() -= 40;
+  const int twice = captures.detection(1, 2).lamp, once = captures.detection(3, 1).lamp;
+  ASSERT_EQ(captures.detection(4, 2).lamp, twice);
+  const LocateResult found = locate_camera_from_detections(captures.input);
+  ASSERT_EQ(found.rejected_lamps.size(), 2U);
+  const RejectedLamp& first = found.rejected_lamps[0];
+  EXPECT_EQ(first.lamp, std::min(once, twice));
+  EXPECT_EQ(first.captures, once < twice ? 1 : 2);
+  const std::string lamp_twice = "lamp " + std::to_string(twice);
+  EXPECT_THAT(found.warnings, Contains("3 detections that contradict the others, rejected"));
+  EXPECT_THAT(found.warnings, Contains(lamp_twice + " is rejected in 2 of 6 captures"));
+  EXPECT_THAT(found.details,
+              Contains("1.png: " + lamp_twice + " contradicts the others and is rejected"));
+  EXPECT_THAT(found.details,
+              Contains("4.png: " + lamp_twice + " contradicts the others and is rejected"));
+  EXPECT_THAT(found.rows[0].rejected_lamps, IsEmpty());
+  EXPECT_THAT(found.rows[4].rejected_lamps, ElementsAre(twice));
+}
+
+TEST(LocateCameraFromDetections, WarnsOfImagesThatTableLacks) {
+  Captures captures(4);
+  EXPECT_THAT(locate_camera_from_detections(captures.input).warnings, IsEmpty()) << "no table";
+  for (const Frame& frame : captures.input.frames) captures.input.captures[frame.image];
+  EXPECT_THAT(locate_camera_from_detections(captures.input).warnings, IsEmpty());
+  captures.input.captures.erase("2.png");
+  EXPECT_THAT(locate_camera_from_detections(captures.input).warnings,
+              ElementsAre(HasSubstr("1 of 4 images are not in captures.csv: image names have to be "
+                                    "equal ('0.png' in the images, '0.png' in the table)")));
+}
+
+TEST(LocateCameraFromDetections, WarnsOfLampsMovedSinceAdjustment) {
+  Captures captures(6);
+  Adjustment adjustment{{}, MatrixX::Zero(12 + 4 + 24, 12 + 4 + 24), {"made up"}, 1, 1, 0.1};
+  for (const Lamp& lamp : captures.input.lamps.lamps) {
+    adjustment.lamps.push_back({lamp.id, lamp.position_m});
+  }
+  captures.input.calibration.rotation_center = tilted_by(captures.input.calibration.camera, 0, 0);
+  captures.input.calibration.adjustment = adjustment;
+  const auto count_warnings = [&] {
+    return locate_camera_from_detections(captures.input).warnings.size();
+  };
+  EXPECT_EQ(count_warnings(), 0U);
+  captures.input.calibration.adjustment->lamps[2].position_m.x() += 0.1;
+  EXPECT_EQ(count_warnings(), 1U);
+}
+
+TEST(LocateCameraFromDetections, FindsMovedLampOfTiltedRobot) {
+  Captures captures(0);
+  captures.rig.mount = CameraMount{{0, 0, 0}, 0.8};
+  captures.input.positioner_options.mount = captures.rig.mount;
+  captures.rig.map.lamps[1].position_m.x() += 0.03;
+  for (int i = 0; i < 36; ++i) {
+    const Inclination inclination{0.05 * ((i % 3) - 1), 0.04 * ((i % 5) - 2)};
+    captures.rig.body = {{{0.02 * (i % 6) - 0.05, 0.02 * (i % 7), 0}, 0.3 * i},
+                         {{0, 0}, 0, inclination}};
+    const std::string image = std::to_string(i);
+    captures.input.frames.push_back({image, seen_from(captures.rig, 0.05)});
+    captures.input.captures[image].inclination = inclination;
+  }
+  EXPECT_THAT(
+      locate_camera_from_detections(captures.input).warnings,
+      Contains(HasSubstr("lamp 2 hangs 30 mm from where the map has it (x +30 mm, y +0 mm)")));
+}
+
+/// Captures of a camera that drives at a speed, about which nothing is stated.
+LocateInput drive_unstated(double speed_m_per_s, double sigma_px) {
+  Captures captures(0);
+  captures.rig.body.motion.velocity_m_per_s = {speed_m_per_s, 0};
+  for (int i = 0; i < 8; ++i) {
+    captures.rig.body.pose = {{0.02 * i - 0.1, -0.02 * i, 0}, 0.5 * i};
+    captures.input.frames.push_back({std::to_string(i), seen_from(captures.rig, sigma_px)});
+  }
+  return captures.input;
+}
+
+TEST(LocateCameraFromDetections, DoesNotWarnOfMotionThatExplainsNeitherResidualsNorFailures) {
+  const auto warning = HasSubstr("a moving camera");
+  EXPECT_THAT(locate_camera_from_detections(drive_unstated(1, 0.02)).warnings, Contains(warning));
+  EXPECT_THAT(locate_camera_from_detections(drive_unstated(1, 3)).warnings, Not(Contains(warning)))
+      << "residuals below the stated noise";
+  LocateInput noisy = drive_unstated(0, 0.02);
+  Random random(4);
+  for (Frame& frame : noisy.frames) {
+    for (Detection& detection : frame.detections) {
+      detection.pixel += 0.3 * Eigen::Vector2d(random.normal(), random.normal());
+    }
+  }
+  const auto warnings = locate_camera_from_detections(noisy).warnings;
+  EXPECT_THAT(warnings, Contains(HasSubstr("px of noise, 0.02 px are stated")));
+  EXPECT_THAT(warnings, Not(Contains(warning))) << "noise";
+}
+
+TEST(LocateCameraFromDetections, WarnsOfMotionThatHalvesResiduals) {
+  const auto find_residual_px = [](const LocateResult& result) {
+    return 0.02 * find_metric_value(result.metrics, "residual_ratio").value_or(0);
+  };
+  LocateInput input = drive_unstated(0.5, 0.02);
+  const double motion_px = find_residual_px(locate_camera_from_detections(input));
+  ASSERT_GT(motion_px, 0.1);
+  // Noise of motion_px / sqrt(r^2 - 1): the residuals at rest are r times the noise.
+  for (const double ratio : {1.6, 2.5}) {
+    const double noise_px = motion_px / std::sqrt(ratio * ratio - 1);
+    LocateInput noisy = input;
+    Random random(7);
+    for (Frame& frame : noisy.frames) {
+      for (Detection& detection : frame.detections) {
+        detection.pixel += noise_px * Eigen::Vector2d(random.normal(), random.normal());
+      }
+    }
+    const LocateResult found = locate_camera_from_detections(noisy);
+    EXPECT_NEAR(find_residual_px(found) / noise_px, ratio, 0.15 * ratio);
+    const auto warnings = std::ranges::count_if(found.warnings, [](const std::string& line) {
+      return line.find("a moving camera") != std::string::npos;
+    });
+    EXPECT_EQ(warnings, ratio > 2 ? 1 : 0) << ratio;
+  }
+}
+
+TEST(LocateCameraFromDetections, DoesNotWarnOfMotionOfCameraWhoseMotionIsStated) {
+  LocateInput input = drive_unstated(1, 0.02);
+  input.captures["3"].velocity_m_per_s = Eigen::Vector2d(0, 0);
+  EXPECT_THAT(locate_camera_from_detections(input).warnings,
+              Not(Contains(HasSubstr("a moving camera"))));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,114 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// locate_camera_from_images() with rendered images.
+#include <gmock/gmock.h>
+
+#include "rendered_session.h"
+#include "session/locate_step.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Contains;
+using testing::HasSubstr;
+using testing::Not;
+
+class LocateCameraFromImages : public RenderedSession {
+ protected:
+  LocateCameraFromImages() {
+    calibration.camera = truth().camera;
+    calibration.rotation_center = truth().rotation_center;
+  }
+  LocateResult locate(const std::string& captures, const LocateInput& input) const {
+    const LampImages images{session_file(captures), input.lamps, session_file("lamps.yaml"),
+                            input.calibration, session_file("camera.yaml")};
+    return locate_camera_from_images(images, ImageUse::fixes, input, frontend);
+  }
+  LocateInput make_input() const { return {{}, lamps, calibration}; }
+
+  const LampMap lamps = read_lamp_map(session_file("lamps.yaml"));
+  Calibration calibration;
+  FrontendOptions frontend;
+};
+
+/// Largest horizontal error of the fixes of check/, m.
+double find_largest_error_m(const LocateResult& result, const fs::path& check) {
+  const auto places = read_truth_positions(check);
+  EXPECT_EQ(result.rows.size(), places.size());
+  double largest_m = 0;
+  for (std::size_t i = 0; i < std::min(places.size(), result.rows.size()); ++i) {
+    if (!result.rows[i].fix) return 1;
+    EXPECT_EQ(result.rows[i].image, places[i].image);
+    const Eigen::Vector2d fix_m = result.rows[i].fix->pose.position_m.head<2>();
+    largest_m = std::max(largest_m, (fix_m - places[i].xy_m).norm());
+  }
+  return largest_m;
+}
+
+TEST_F(LocateCameraFromImages, LocatesCameraOfEachImage) {
+  const LocateResult result = locate("check", make_input());
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
+  EXPECT_LT(find_largest_error_m(result, session_file("check")), 3e-4);
+  EXPECT_EQ(result.observations.images.size(), 6U);
+}
+
+TEST_F(LocateCameraFromImages, ObservationsAreThoseOfFixesIfTiltIsEstimated) {
+  LocateInput input = make_input();
+  input.roll_pitch_sd_rad = 0.1;
+  const LocateResult result = locate("check", input);
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
+  input.frames = collect_lamp_frames_of_kept_images(result.observations.images);
+  const LocateResult again = locate_camera_from_detections(input);
+  ASSERT_EQ(again.rows.size(), result.rows.size());
+  for (std::size_t i = 0; i < result.rows.size(); ++i) {
+    ASSERT_TRUE(result.rows[i].fix && again.rows[i].fix) << i;
+    EXPECT_EQ(again.rows[i].fix->pose.position_m, result.rows[i].fix->pose.position_m) << i;
+  }
+}
+
+TEST_F(LocateCameraFromImages, EstimatesReadoutThatCalibrationLacks) {
+  LocateInput input = make_input();
+  input.calibration.camera.readout.reset();
+  input.motion = KnownMotion::make_motion_prior_from_limits(0.5, 0);
+  const LocateResult result = locate("check", input);
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
+  EXPECT_THAT(result.notes, Contains(HasSubstr("the images show stripes along rows")));
+}
+
+TEST_F(LocateCameraFromImages, SkipsDamagedImage) {
+  write_session_file("check/0003.png", "no image");
+  const LocateResult result = locate("check", make_input());
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
+  EXPECT_EQ(result.rows.size(), 5U);
+  ASSERT_EQ(result.skipped.size(), 1U);
+  EXPECT_EQ(result.skipped[0].image, "0003.png");
+}
+
+TEST_F(LocateCameraFromImages, FailsIfNoLampIsIdentified) {
+  LocateInput input = make_input();
+  for (Lamp& lamp : input.lamps.lamps) lamp.frequency_hz = *lamp.frequency_hz * 3;
+  const LocateResult result = locate("check", input);
+  EXPECT_FALSE(result.has_succeeded());
+  EXPECT_THAT(result.rows, testing::IsEmpty());
+}
+
+TEST_F(LocateCameraFromImages, WarnsOfContradictedRowTimeWithNameOfCalibration) {
+  LocateInput input = make_input();
+  EXPECT_THAT(locate("check", input).warnings, Not(Contains(HasSubstr("row time is"))));
+  input.calibration.camera.row_time_s = 3.1e-5;
+  const LocateResult result = locate("rotation", input);
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
+  EXPECT_THAT(result.warnings, Contains(HasSubstr("row time is 31 us in camera.yaml")));
+}
+
+TEST_F(LocateCameraFromImages, WritesAnnotatedImagesOnRequest) {
+  frontend.annotate = folder / "annotated";
+  ASSERT_TRUE(locate("check", make_input()).has_succeeded());
+  EXPECT_TRUE(fs::exists(folder / "annotated"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder / "annotated"), fs::directory_iterator()),
+            6);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,307 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// run_calibration_session(): gates, warnings, metrics and history.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+
+#include "captures/digest.h"
+#include "rendered_session.h"
+#include "session/session.h"
+#include "session/train_step.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using RunCalibrationSession = RenderedSession;
+using testing::AllOf;
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using testing::StartsWith;
+
+std::string format_gates(const std::string& gates) {
+  return "format: vlp-gates/1\ngates: {" + gates + "}\n";
+}
+
+/// Returns the names of gates, "!" before those that failed.
+std::vector<std::string> list_gates(const std::vector<CheckedMetric>& gates) {
+  std::vector<std::string> names;
+  for (const CheckedMetric& gate : gates) {
+    names.push_back((gate.has_passed_gate() ? "" : "!") + gate.name);
+  }
+  return names;
+}
+
+TEST_F(RunCalibrationSession, ChecksNoGatesByDefaultForGivenCamera) {
+  EXPECT_THAT(run().gates, IsEmpty());
+}
+
+TEST_F(RunCalibrationSession, ChecksGatesInOrderOfSteps) {
+  write_session_file("gates.yaml",
+                     format_gates("mean_mm: 1, dispersion_mm: 1, tilt_deg: 1, rotation_px: 1"));
+  const SessionResult result = run();
+  EXPECT_EQ(result.verdict, Verdict::pass) << result.reason;
+  EXPECT_THAT(list_gates(result.gates),
+              ElementsAre("rotation_px", "tilt_deg", "dispersion_mm", "mean_mm"));
+  EXPECT_THAT(list_gates(find_step(result, "rotation").result.gates),
+              ElementsAre("rotation_px", "tilt_deg"));
+  EXPECT_THAT(list_gates(find_step(result, "dispersion").result.gates),
+              ElementsAre("dispersion_mm"));
+  EXPECT_THAT(list_gates(find_step(result, "evaluate").result.gates), ElementsAre("mean_mm"));
+  EXPECT_THAT(find_step(result, "check").result.gates, IsEmpty());
+}
+
+TEST_F(RunCalibrationSession, FailedGatesAreTheReasonOfVerdict) {
+  options.report = true;
+  write_session_file("gates.yaml", format_gates("mean_mm: 1.0e-6, tilt_deg: 0.5, rotation_px: 1"));
+  const SessionResult result = run();
+  EXPECT_EQ(result.verdict, Verdict::fail);
+  EXPECT_EQ(result.failure, StepFailure::none);
+  EXPECT_THAT(list_gates(result.gates), ElementsAre("rotation_px", "!tilt_deg", "!mean_mm"));
+  EXPECT_THAT(result.reason, AllOf(StartsWith("tilt_deg is 0.8"), HasSubstr("; mean_mm is "),
+                                   Not(HasSubstr("rotation_px"))));
+  EXPECT_THAT(read_result("session.json"), HasSubstr("\"verdict\": \"gate\""));
+  EXPECT_THAT(read_result("evaluation.json"), HasSubstr("\"mean_mm\""));
+  const std::string page = read_result("report.html");
+  for (const char* text : {"<strong>FAIL</strong>", "<th scope=\"row\">rotation_px</th>",
+                           "<th scope=\"row\">tilt_deg</th>", "<th scope=\"row\">mean_mm</th>"}) {
+    EXPECT_NE(page.find(text), std::string::npos) << text;
+  }
+  const SessionResult again = run();
+  EXPECT_THAT(list_steps_run(again), IsEmpty());
+  EXPECT_EQ(again.reason, result.reason);
+  EXPECT_EQ(again.verdict, Verdict::fail);
+}
+
+TEST_F(RunCalibrationSession, ChangedGateRunsOnlyEvaluationAgain) {
+  write_session_file("gates.yaml", format_gates("tilt_deg: 0.5"));
+  run();
+  for (const char* gates : {"tilt_deg: 2", "rotation_px: 2", "rotation_px: 2, mean_mm: 1"}) {
+    write_session_file("gates.yaml", format_gates(gates));
+    const SessionResult result = run();
+    EXPECT_THAT(list_steps_run(result), ElementsAre("evaluate")) << gates;
+    EXPECT_EQ(result.verdict, Verdict::pass) << result.reason;
+  }
+}
+
+TEST_F(RunCalibrationSession, GatesFileOfOptionsAppliesOnlyToSessionWithoutGates) {
+  options.gates_file = folder.file("gates.yaml", format_gates("tilt_deg: 0.5"));
+  EXPECT_THAT(list_gates(run().gates), ElementsAre("!tilt_deg"));
+  write_session_file("gates.yaml", format_gates("rotation_px: 1"));
+  EXPECT_THAT(list_gates(run().gates), ElementsAre("rotation_px"));
+}
+
+TEST_F(RunCalibrationSession, GatesOfMissingStepsFail) {
+  write_session_file("gates.yaml", format_gates("views: 6, dispersion_mm: 1, mean_mm: 1"));
+  fs::remove_all(session_file("dispersion"));
+  fs::remove_all(session_file("check"));
+  const SessionResult result = run();
+  EXPECT_EQ(result.verdict, Verdict::fail);
+  EXPECT_THAT(list_gates(result.gates), ElementsAre("!views", "!dispersion_mm", "!mean_mm"));
+  for (const CheckedMetric& gate : result.gates) EXPECT_FALSE(gate.value) << gate.name;
+  EXPECT_EQ(find_step(result, "lens").result.gates.size(), 1U);
+}
+
+TEST_F(RunCalibrationSession, DoesNotCheckGatesOfFailedStep) {
+  write_session_file("gates.yaml", format_gates("tilt_deg: 0.5, views: 6"));
+  keep_captures("rotation", 2);
+  const SessionResult result = run();
+  EXPECT_EQ(result.verdict, Verdict::invalid) << "the failed step is the reason";
+  EXPECT_THAT(list_gates(result.gates), ElementsAre("!views"));
+  EXPECT_THAT(result.reason, StartsWith("rotation: "));
+}
+
+TEST_F(RunCalibrationSession, EvaluateStatesWhyThereIsNoReport) {
+  options.report = true;
+  fs::remove(session_file("check/truth.csv"));
+  const SessionResult without_places = run();
+  EXPECT_EQ(without_places.verdict, Verdict::pass) << without_places.reason;
+  EXPECT_THAT(find_step(without_places, "evaluate").result.notes,
+              ElementsAre("no errors and no report: check has neither truth.csv nor positions in "
+                          "captures.csv"));
+  EXPECT_TRUE(has_result("check-fixes.csv"));
+  fs::remove_all(session_file("check"));
+  const SessionResult without_check = run();
+  EXPECT_EQ(without_check.verdict, Verdict::pass) << without_check.reason;
+  EXPECT_THAT(list_steps(without_check),
+              ElementsAre("lens", "rotation", "dispersion", "line-x", "evaluate"));
+  EXPECT_THAT(find_step(without_check, "evaluate").result.notes,
+              ElementsAre("no errors and no report: there is no check"));
+  for (const char* name : {"evaluation.json", "report.html", "check-fixes.csv"}) {
+    EXPECT_FALSE(has_result(name)) << name;
+  }
+}
+
+TEST_F(RunCalibrationSession, GivenCameraTakesPrecedenceOverOptions) {
+  const auto list_ignored = [&] {
+    const SessionResult result = run();
+    EXPECT_EQ(result.verdict, Verdict::pass) << result.reason;
+    const auto& warnings = find_step(result, "lens").result.warnings;
+    const std::string start = "camera.yaml takes precedence over options of the camera; ignored: ";
+    if (warnings.size() != 1 || !warnings[0].starts_with(start)) return std::string();
+    return warnings[0].substr(start.size());
+  };
+  EXPECT_EQ(list_ignored(), "");
+  const SessionOptions defaults = options;
+  const auto expect_ignored = [&](const std::string& ignored) {
+    EXPECT_EQ(list_ignored(), ignored);
+    options = defaults;
+  };
+  options.camera_id = "other";
+  expect_ignored("name");
+  options.lens_model = LensModel::opencv5;
+  expect_ignored("lens model");
+  options.choose_lens_model = true;
+  expect_ignored("lens model");
+  options.frontend.row_time_s = 4e-5;
+  expect_ignored("row time");
+  options.frontend.readout = Readout::columns;
+  expect_ignored("readout");
+  options.frontend.max_blur_px = 1;
+  expect_ignored("limits of board images");
+  options.frontend.max_white_fraction = 0.5;
+  expect_ignored("limits of board images");
+  options.camera_id = "other";
+  options.frontend.readout = Readout::columns;
+  options.frontend.max_white_fraction = 0.5;
+  expect_ignored("name, readout, limits of board images");
+}
+
+TEST_F(RunCalibrationSession, IgnoresReadoutOptionIfRowTimeIsEstimated) {
+  write_camera(std::nullopt);
+  options.frontend.readout = Readout::columns;
+  const SessionResult result = run();
+  EXPECT_EQ(result.verdict, Verdict::pass) << result.reason;
+  ASSERT_TRUE(result.calibration);
+  EXPECT_EQ(result.calibration->camera.readout, Readout::rows);
+}
+
+TEST_F(RunCalibrationSession, StatesRmsOfGivenCameraIfItHasViews) {
+  Calibration camera = read_calibration(session_file("camera.yaml"));
+  camera.intrinsics_report = IntrinsicsReport{40, 4000, 0, 0.125, {}, {}};
+  write_calibration(session_file("camera.yaml"), camera);
+  const auto metrics = find_step(run(), "lens").result.metrics;
+  ASSERT_EQ(metrics.size(), 1U);
+  EXPECT_EQ(metrics[0].name, "rms_px");
+  EXPECT_EQ(metrics[0].value, 0.125);
+  camera.intrinsics_report = IntrinsicsReport{0, 0, 0, 0, {}, {}};
+  write_calibration(session_file("camera.yaml"), camera);
+  EXPECT_THAT(find_step(run(), "lens").result.metrics, IsEmpty()) << "lens of another program";
+}
+
+TEST_F(RunCalibrationSession, StatesMeasuredRowTimeOfGivenCamera) {
+  const SessionResult result = run();
+  const auto& metrics = find_step(result, "rotation").result.metrics;
+  const auto row_time_us = find_metric_value(metrics, "row_time_us");
+  const auto sd_us = find_metric_value(metrics, "row_time_sd_us");
+  ASSERT_TRUE(row_time_us && sd_us);
+  EXPECT_NEAR(*row_time_us, 30, 4 * *sd_us);
+  EXPECT_FALSE(find_metric_value(find_step(result, "dispersion").result.metrics, "row_time_us"));
+}
+
+TEST_F(RunCalibrationSession, WarnsOfDispersionCapturesWithoutPosition) {
+  const std::string warning = "captures ignored: they have no position; add it to captures.csv";
+  EXPECT_THAT(find_step(run(), "dispersion").result.warnings, Not(Contains(HasSubstr(warning))));
+  fs::remove(session_file("dispersion/truth.csv"));
+  edit_session_file("dispersion/captures.csv", "0003.png", "0004.png");
+  const SessionResult result = run();
+  EXPECT_EQ(result.verdict, Verdict::pass) << result.reason;
+  EXPECT_THAT(find_step(result, "dispersion").result.warnings, Contains("1 of 4 " + warning));
+  ASSERT_TRUE(result.calibration && result.calibration->dispersion);
+  EXPECT_EQ(result.calibration->dispersion->captures, 3);
+}
+
+TEST_F(RunCalibrationSession, WarnsOfCheckCaptureAtAnotherPosition) {
+  const auto& name = "was not taken at the position in its table";
+  EXPECT_THAT(find_step(run(), "evaluate").result.warnings, IsEmpty());
+  edit_session_file("check/truth.csv", "0002.png,0.321", "0002.png,0.381");
+  EXPECT_THAT(find_step(run(), "evaluate").result.warnings,
+              Contains(AllOf(StartsWith("0002.png "), HasSubstr(name),
+                             HasSubstr("its error is 60.0 mm, that of others 0.0"))));
+}
+
+TEST_F(RunCalibrationSession, DoesNotWarnOfPositionErrorOfFixFromTwoLamps) {
+  fs::copy(rendered_capture_of_two_lamps(), session_file("check/0006.png"));
+  write_session_file(
+      "check/truth.csv",
+      TemporaryFolder::read_content(session_file("check/truth.csv")) + "0006.png,1.36,0,0,0\n");
+  const SessionResult result = run();
+  EXPECT_THAT(read_result("check-fixes.csv"), HasSubstr("\n0006.png,ok,1.300"));
+  EXPECT_THAT(find_step(result, "evaluate").result.warnings, IsEmpty());
+}
+
+TEST_F(RunCalibrationSession, StatesLampOffsetsOfCheckOnly) {
+  options.report = true;
+  const SessionResult result = run();
+  const auto& offsets = find_step(result, "check").result.lamp_offsets;
+  ASSERT_EQ(offsets.size(), 6U);
+  for (const LampOffset& offset : offsets) {
+    EXPECT_LT(offset.offset_m.norm(), 5e-4) << offset.lamp;
+  }
+  for (const char* step : {"rotation", "dispersion", "line-x", "evaluate"}) {
+    EXPECT_THAT(find_step(result, step).result.lamp_offsets, IsEmpty()) << step;
+  }
+}
+
+TEST_F(RunCalibrationSession, SkipsRepeatedImagesExceptInDrives) {
+  options.report = true;
+  for (const char* captures : {"rotation", "dispersion", "check", "line-x"}) {
+    fs::copy(session_file(std::string(captures) + "/0000.png"),
+             session_file(std::string(captures) + "/0009.png"));
+  }
+  const SessionResult result = run();
+  for (const char* step : {"rotation", "dispersion", "check"}) {
+    const auto& skipped = find_step(result, step).result.skipped;
+    ASSERT_EQ(skipped.size(), 1U) << step;
+    EXPECT_EQ(skipped[0].image, "0009.png") << step;
+  }
+  EXPECT_THAT(find_step(result, "line-x").result.skipped, IsEmpty());
+  EXPECT_THAT(read_result("line-x-fixes.csv"), HasSubstr("\n0009.png,ok,-0.28"));
+}
+
+TEST_F(RunCalibrationSession, HistoryStatesProgramInputsAndDigestsOfEachStep) {
+  const SessionResult result = run();
+  ASSERT_TRUE(result.calibration);
+  const auto& history = result.calibration->history;
+  ASSERT_EQ(history.size(), 2U);
+  const auto list_inputs = [](const HistoryEntry& entry) {
+    std::vector<std::string> names;
+    for (const auto& input : entry.inputs) names.push_back(input.file);
+    return names;
+  };
+  EXPECT_EQ(history[0].part, "rotation_center");
+  EXPECT_THAT(list_inputs(history[0]), ElementsAre("rotation", "lamps.yaml", "camera.yaml"));
+  EXPECT_EQ(history[1].part, "dispersion");
+  EXPECT_THAT(list_inputs(history[1]),
+              ElementsAre("dispersion", "lamps.yaml", "rotated.yaml", "captures.csv", "truth.csv"));
+  for (const HistoryEntry& entry : history) {
+    EXPECT_EQ(entry.program, "test");
+    EXPECT_EQ(entry.version, "1.2");
+    EXPECT_EQ(entry.options, "");
+    EXPECT_EQ(entry.inputs[1].sha256, compute_file_sha256(session_file("lamps.yaml")));
+  }
+  EXPECT_EQ(history[1].inputs[2].sha256, compute_file_sha256(results_file("rotated.yaml")));
+}
+
+TEST_F(RunCalibrationSession, HistoryContainsRowTimeEstimate) {
+  write_camera(std::nullopt);
+  const SessionResult result = run();
+  ASSERT_TRUE(result.calibration);
+  const auto& history = result.calibration->history;
+  ASSERT_EQ(history.size(), 3U);
+  EXPECT_EQ(history[0].part, "camera");
+  EXPECT_EQ(history[0].options, "--row-time");
+  ASSERT_EQ(history[0].inputs.size(), 2U);
+  EXPECT_EQ(history[0].inputs[0].file, "rotation");
+  EXPECT_EQ(history[0].inputs[1].file, "lamps.yaml");
+  ASSERT_EQ(history[1].inputs.size(), 3U);
+  EXPECT_EQ(history[1].inputs[2].file, "camera.yaml");
+  EXPECT_EQ(history[1].inputs[2].sha256, compute_file_sha256(results_file("camera.yaml")));
+}
+
+}  // namespace
+}  // namespace vlp
