@@ -75,8 +75,7 @@ def find_mutations(text):
             continue
         found.append((match.start(), match.end(), str(int(value) + 1) if value.isdigit() else f"(1.5 * {value})"))
     for match in STATEMENT.finditer(masked):
-        if ".reserve(" not in match[0]:
-            found.append((match.start(), match.end(), ""))
+        found.append((match.start(), match.end(), ""))
     for match in ARGUMENTS.finditer(masked):
         if match[1] != match[2]:
             found.append((match.start(1), match.end(2), f"{match[2]}, {match[1]}"))
@@ -90,7 +89,8 @@ def find_mutations(text):
         condition = text[match.end():end - 1]
         if ";" not in condition and " = " not in condition:
             found.append((match.end(), end - 1, f"!({condition})"))
-    return found
+    return [(begin, end, new) for begin, end, new in found
+            if ".reserve(" not in text[text.rfind("\n", 0, begin) + 1:text.find("\n", end)]]
 
 
 MEMORY_KIB = 4 << 20  # limit for mutants that allocate without end
