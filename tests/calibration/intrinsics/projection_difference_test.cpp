@@ -9,6 +9,17 @@
 namespace vlp {
 namespace {
 
+TEST(MakeRegularPixelGrid, CoversImageIncludingItsEdges) {
+  const auto grid = make_regular_pixel_grid({401, 301}, 9);
+  ASSERT_EQ(grid.size(), 9U * 7U);
+  EXPECT_EQ(grid[0], Eigen::Vector2d(0, 0));
+  EXPECT_EQ(grid[1], Eigen::Vector2d(50, 0));
+  EXPECT_EQ(grid[9], Eigen::Vector2d(0, 50));
+  EXPECT_EQ(grid.back(), Eigen::Vector2d(400, 300));
+  EXPECT_EQ(make_regular_pixel_grid({300, 400}, 3).size(), 3U * 4U);
+  EXPECT_EQ(make_regular_pixel_grid({1000, 10}, 4).size(), 4U * 2U) << "two rows at least";
+}
+
 TEST(ComputeProjectionDifference, ReturnsZeroForIdenticalLenses) {
   const Lens lens = synthetic_lens();
   EXPECT_LT(compute_projection_difference(lens, lens, {800, 600}, even).value().worst_px, 1e-6);
