@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "captures/csv_reader.h"
 #include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
@@ -145,6 +146,183 @@ TEST(ReadCornerTable, CountsTagsWithoutAllCornersAndRejectsRepeatedCorner) {
               HasSubstr("should be within 0 and 3"));
   EXPECT_THAT(rejection_message([&] { read("image,tag,corner,u_px,v_px\n"); }),
               HasSubstr("contains no corner"));
+}
+
+Board make_charuco_board() {
+  Board board = make_chessboard(4, 4);
+  board.kind = BoardKind::charuco;
+  board.family = "DICT_4X4_50";
+  board.tag_size_m = 0.015;
+  return board;
+}
+
+/// Returns the views of a table with the given text.
+std::vector<BoardView> read_text(const std::string& text,
+                                 const Board& board = make_board_of_three_tags()) {
+  const TemporaryFolder folder;
+  return read_corner_table(folder.file("corners.csv", text), board, kImager);
+}
+
+/// Returns the message for a table with the given text.
+std::string reject(const std::string& text, const Board& board = make_board_of_three_tags()) {
+  return rejection_message([&] { read_text(text, board); });
+}
+
+TEST(ReadCornerTable, ReportsMissingColumns) {
+  EXPECT_THAT(reject("image,corner,u_px,v_px\na.png,0,1,1\n"), HasSubstr("tag"));
+  for (const std::string name : {"image", "corner", "u_px", "v_px"}) {
+    std::string text = "image,tag,corner,u_px,v_px\na.png,0,0,1,1\n";
+    text.replace(text.find(name), name.size(), "x");
+    EXPECT_THAT(reject(text), HasSubstr(name));
+  }
+  EXPECT_EQ(read_text("image,corner,u_px,v_px\na.png,0,1,1\n", make_charuco_board()).size(), 1U);
+}
+
+TEST(ReadCornerTable, ReportsLineOfInvalidCell) {
+  const std::string header = "image,tag,corner,u_px,v_px\na.png,0,0,1,1\n";
+  EXPECT_THAT(reject(header + ",0,1,1,1\n"), HasSubstr("corners.csv:3: image: is empty"));
+  EXPECT_THAT(reject(header + "a.png,0,-1,1,1\n"),
+              HasSubstr("corners.csv:3: corner: should be within 0 and 3"));
+  EXPECT_THAT(reject(header + "a.png,0,,1,1\n"), HasSubstr("corners.csv:3: corner"));
+  EXPECT_THAT(reject(header + "a.png,,1,1,1\n"), HasSubstr("corners.csv:3: tag"));
+  EXPECT_THAT(reject(header + "a.png,0,1,,1\n"), HasSubstr("corners.csv:3: u_px"));
+  EXPECT_THAT(reject(header + "a.png,0,1,1,\n"), HasSubstr("corners.csv:3: v_px"));
+  EXPECT_EQ(reject(header + "a.png,0,3,1,1\n"), "");
+}
+
+TEST(ReadCornerTable, RequiresAllColumnsOfCurvature) {
+  EXPECT_THAT(reject("image,tag,corner,u_px,v_px,edge_cubic_px\na.png,0,0,1,1,0.1\n"),
+              HasSubstr("edge_half_extent"));
+  EXPECT_THAT(reject("image,tag,corner,u_px,v_px,edge_half_extent\na.png,0,0,1,1,0.5\n"),
+              HasSubstr("edge_quadratic_px"));
+}
+
+TEST(ReadCornerTable, RequiresHalfExtentBetween0p01And2OrZero) {
+  const std::string header =
+      "image,tag,corner,u_px,v_px,edge_quadratic_px,edge_cubic_px,edge_half_extent\n";
+  for (const std::string reach : {"0", "0.01", "1.7", "2"}) {
+    EXPECT_EQ(reject(header + "a.png,0,0,1,1,0.1,0.2," + reach + "\n"), "") << reach;
+  }
+  for (const std::string reach : {"0.009", "2.1", "-0.5"}) {
+    EXPECT_THAT(reject(header + "a.png,0,0,1,1,0.1,0.2," + reach + "\n"),
+                HasSubstr("corners.csv:2: edge_half_extent: should be the half extent of the edge "
+                          "pixels, 0.01 to 2, or 0 if there are none"))
+        << reach;
+  }
+}
+
+TEST(ReadCornerTable, RejectsNegativeStandardDeviation) {
+  const std::string header = "image,tag,corner,u_px,v_px,sd_px\n";
+  EXPECT_EQ(reject(header + "a.png,0,0,1,1,0\n"), "");
+  EXPECT_THAT(reject(header + "a.png,0,0,1,1,-0.01\n"),
+              HasSubstr("corners.csv:2: sd_px: should be a standard deviation, or 0 if unknown"));
+}
+
+TEST(ReadCornerTable, IgnoresIncompleteForeignTags) {
+  std::string text = "image,tag,corner,u_px,v_px\n";
+  for (int corner = 0; corner < 4; ++corner) {
+    text += "a.png,9," + std::to_string(corner) + ",1,1\n";
+  }
+  const auto views = read_text(text + "a.png,8,0,1,1\na.png,1,0,1,1\n");
+  ASSERT_EQ(views.size(), 1U);
+  EXPECT_TRUE(views[0].detection.tags.empty());
+  EXPECT_EQ(views[0].detection.num_unusable_tags, 1);
+  ASSERT_EQ(views[0].detection.foreign_tags.size(), 1U);
+  EXPECT_EQ(views[0].detection.foreign_tags[0].id, 9);
+}
+
+TEST(ReadCornerTable, RequiresCornersOfSquaresOnBoard) {
+  const std::string header = "image,corner,u_px,v_px\n";
+  EXPECT_EQ(reject(header + "a.png,8,1,1\n", make_charuco_board()), "");
+  EXPECT_THAT(reject(header + "a.png,9,1,1\n", make_charuco_board()),
+              HasSubstr("corners.csv:2: corner: should be within 0 and 8, as on a board of 4 x 4 "
+                        "squares; is board.yaml that of the board?"));
+  EXPECT_THAT(reject(header + "a.png,-1,1,1\n", make_charuco_board()), HasSubstr("0 and 8"));
+  EXPECT_THAT(reject(header + "a.png,8,1,1\nb.png,8,1,1\nb.png,8,2,1\n", make_charuco_board()),
+              HasSubstr("corners.csv:4: corner: 8 occurs twice in image 'b.png'"));
+}
+
+TEST(ReadCornerTable, SortsPointsOfSquaresAndCountsRowsDownwards) {
+  const std::string header = "image,corner,u_px,v_px\n";
+  const auto views = read_text(
+      header + "b.png,4,200,200\nb.png,0,100,100\nb.png,1,200,100\nb.png,3,100,200\na.png,,,\n",
+      make_charuco_board());
+  ASSERT_EQ(views.size(), 2U);
+  EXPECT_EQ(views[0].image, "b.png");
+  EXPECT_EQ(views[0].imager_px, kImager);
+  const auto& points = views[0].detection.points;
+  ASSERT_EQ(points.size(), 4U);
+  EXPECT_EQ(points[1].index, 1U);
+  EXPECT_EQ(points[3].index, 4U);
+  EXPECT_EQ(points[3].pixel, Eigen::Vector2d(200, 200));
+  EXPECT_TRUE(views[1].detection.points.empty());
+  // Rows that are counted upwards.
+  const auto upwards =
+      read_text(header + "b.png,0,100,300\nb.png,1,200,300\nb.png,3,100,200\nb.png,6,100,100\n",
+                make_charuco_board());
+  ASSERT_EQ(upwards.size(), 1U);
+  ASSERT_EQ(upwards[0].detection.points.size(), 4U);
+  EXPECT_EQ(upwards[0].detection.points[0].pixel, Eigen::Vector2d(100, 100));
+  EXPECT_EQ(upwards[0].detection.points[3].index, 7U);
+  EXPECT_EQ(upwards[0].detection.points[3].pixel, Eigen::Vector2d(200, 300));
+}
+
+/// Only rows of chessboards are rotated: the markers of other boards determine their orientation.
+TEST(ReadCornerTable, RotatesOnlyChessboardsBy180Degrees) {
+  std::string text = "image,corner,u_px,v_px\n";
+  for (int i = 0; i < 9; ++i) {
+    text += "a.png," + std::to_string(i) + "," + std::to_string(400 - 100 * (i % 3)) + "," +
+            std::to_string(400 - 100 * (i / 3)) + "\n";
+  }
+  Board chessboard = make_charuco_board();
+  chessboard.kind = BoardKind::chessboard;
+  const auto kept = read_text(text, make_charuco_board()), rotated = read_text(text, chessboard);
+  ASSERT_EQ(kept[0].detection.points.size(), 9U);
+  ASSERT_EQ(rotated[0].detection.points.size(), 9U);
+  EXPECT_EQ(kept[0].detection.points[0].pixel, Eigen::Vector2d(400, 400));
+  EXPECT_EQ(rotated[0].detection.points[0].pixel, Eigen::Vector2d(200, 200));
+}
+
+TEST(ReadCornerTable, ReportsOtherRowLengthOfSquares) {
+  std::string text = "image,corner,u_px,v_px\n";
+  for (int i = 0; i < 24; ++i) {
+    text += "a.png," + std::to_string(i) + "," + std::to_string(50 + 30 * (i % 8)) + "," +
+            std::to_string(50 + 40 * (i / 8)) + "\n";
+  }
+  EXPECT_EQ(reject(text, make_chessboard(9, 4)), "");
+  EXPECT_THAT(reject(text, make_chessboard(7, 5)),
+              HasSubstr("the corners lie in rows of 8, but a board of 7 x 5 squares has 6 x 4 "
+                        "corners; is board.yaml that of the board?"));
+}
+
+TEST(WriteCornerTable, WritesRowWithNameOnlyForImageWithoutCorners) {
+  const TemporaryFolder folder;
+  const std::vector<BoardView> views{{"a.png", kImager, {}}, {"b.png", kImager, {}}};
+  for (const Board& board : {make_board_of_three_tags(), make_charuco_board()}) {
+    write_corner_table(folder / "corners.csv", views, board);
+    const auto read = read_corner_table(folder / "corners.csv", board, kImager);
+    ASSERT_EQ(read.size(), 2U);
+    EXPECT_EQ(read[1].image, "b.png");
+    EXPECT_FALSE(read[1].detection.has_detected_corners());
+  }
+}
+
+TEST(WriteCornerTable, WritesViewThatHasOnlyForeignTags) {
+  const TemporaryFolder folder;
+  std::vector<BoardView> views{{"a.png", kImager, {}}};
+  TagDetection foreign{7, {}};
+  foreign.corners_px.fill({5, 6});
+  views[0].detection.foreign_tags.push_back(foreign);
+  write_corner_table(folder / "corners.csv", views, make_board_of_three_tags());
+  const CsvTable table(folder / "corners.csv");
+  EXPECT_EQ(table.num_rows(), 4U);
+  EXPECT_EQ(table.get_cell_text(0, table.get_required_column("tag")), "7");
+}
+
+TEST(AreTooManyCornersOutsideImage, AcceptsOneOf50) {
+  EXPECT_FALSE(are_too_many_corners_outside_image(1, 50));
+  EXPECT_TRUE(are_too_many_corners_outside_image(1, 49));
+  EXPECT_FALSE(are_too_many_corners_outside_image(0, 0));
 }
 
 }  // namespace

@@ -83,5 +83,63 @@ TEST(EdgeField, ReturnsGeometricMeanEverywhereForThreeSamples) {
   EXPECT_GT(field.excess_relative_sd_of_edges(), 0.3);
 }
 
+std::vector<EdgeSample> make_samples_at_one_place(const std::vector<double>& logs, double sd) {
+  std::vector<EdgeSample> samples;
+  for (const double log : logs) samples.push_back({{100, 100}, {1, 0}, std::exp(log), sd});
+  return samples;
+}
+
+// The scatter is the median magnitude of the residuals divided by 0.6745.
+TEST(EdgeField, ExcessRelativeSdIsScatterWithoutMedianVariance) {
+  std::vector<double> logs;
+  for (int i = 0; i < 10; ++i) logs.insert(logs.end(), {-0.4, 0.4});
+  const EdgeField field(make_samples_at_one_place(logs, 0.3), EdgeField::Terms::position);
+  EXPECT_NEAR(field.evaluate_field_at_edge({0, 0}, {1, 0}), 1, 1e-9);
+  EXPECT_NEAR(field.excess_relative_sd_of_edges(), std::sqrt(std::pow(0.4 / 0.6745, 2) - 0.3 * 0.3),
+              1e-6);
+  const EdgeField precise(make_samples_at_one_place({0, 0, 0}, 0.3), EdgeField::Terms::position);
+  EXPECT_NEAR(precise.excess_relative_sd_of_edges(), 0.01, 1e-12);
+}
+
+// One outlier has the weight of a residual of three standard deviations. The value c minimizes
+//   30 c = 3 (d + c) / 0.6745
+// with 15 samples each at -d and d, whose median residual is d + c.
+TEST(EdgeField, OutlierHasWeightOfThreeStandardDeviations) {
+  constexpr double d = 0.1;
+  std::vector<double> logs{5};
+  for (int i = 0; i < 15; ++i) logs.insert(logs.end(), {-d, d});
+  const EdgeField field(make_samples_at_one_place(logs, 0.01), EdgeField::Terms::position);
+  const double ratio = 3 / (0.6745 * 30);
+  EXPECT_NEAR(std::log(field.evaluate_field_at_edge({0, 0}, {1, 0})), d * ratio / (1 - ratio),
+              1e-4 * d);
+}
+
+TEST(EdgeField, WeightsSamplesByInverseVariance) {
+  std::vector<EdgeSample> samples;
+  for (int i = 0; i < 10; ++i) {
+    samples.push_back({{10, 10}, {1, 0}, std::exp(0.1), 1});
+    samples.push_back({{10, 10}, {1, 0}, std::exp(-0.1), 2});
+  }
+  // The excess is 0.01: weights 1 / (1 + 1e-4) and 1 / (4 + 1e-4).
+  const double heavy = 1 / (1 + 1e-4), light = 1 / (4 + 1e-4);
+  const EdgeField field(samples, EdgeField::Terms::position);
+  EXPECT_NEAR(std::log(field.evaluate_field_at_edge({10, 10}, {1, 0})),
+              0.1 * (heavy - light) / (heavy + light), 1e-7);
+}
+
+TEST(EdgeField, DependsOnDirectionOnlyWithTermsOfDirection) {
+  const auto all = make_samples(200, 0, 0);
+  const EdgeField position(all, EdgeField::Terms::position);
+  EXPECT_EQ(position.evaluate_field_at_edge({200, 100}, {1, 0}),
+            position.evaluate_field_at_edge({200, 100}, {0.6, 0.8}));
+  const EdgeField field(all, EdgeField::Terms::position_and_direction);
+  for (const Eigen::Vector2d& along : {Eigen::Vector2d(1, 0), {0.6, 0.8}, {-0.8, 0.6}, {0, 1}}) {
+    for (const Eigen::Vector2d& at_px : {Eigen::Vector2d(200, 100), {20, 590}, {790, 300}}) {
+      EXPECT_NEAR(field.evaluate_field_at_edge(at_px, along) / blur_px(at_px, along), 1, 1e-6);
+      EXPECT_NEAR(field.evaluate_field_at_edge(at_px, -along) / blur_px(at_px, along), 1, 1e-6);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace vlp

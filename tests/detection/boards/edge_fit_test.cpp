@@ -225,5 +225,144 @@ TEST(FindEdgeIntersection, ReturnsPointOnBothCurves) {
   EXPECT_LT(std::abs(upright.distance_from_curve_px(at)), 1e-12);
 }
 
+TEST(FitEdgeCurveAndBlur, Requires24Pixels) {
+  auto pixels = Step().pixels();
+  std::vector<EdgePixel> some;
+  for (std::size_t i = 0; some.size() < 24; i += 9) some.push_back(pixels[i]);
+  EdgeCurve edge = Step().start();
+  EXPECT_TRUE(fit_edge_curve_and_blur(edge, some, {}));
+  some.pop_back();
+  edge = Step().start();
+  EXPECT_FALSE(fit_edge_curve_and_blur(edge, some, {}));
+}
+
+TEST(FitEdgeCurveAndBlur, RequiresRmsBelow35PercentOfContrast) {
+  for (const auto& [noise, is_accepted] : {std::pair(14.0, true), std::pair(22.0, false)}) {
+    const Step step{.black = 70, .white = 170, .stripe_px = 10, .noise = noise};
+    EdgeCurve edge = step.start();
+    EXPECT_EQ(fit_edge_curve_and_blur(edge, step.pixels(), {}).has_value(), is_accepted) << noise;
+  }
+}
+
+/// Creates pixels up to 20 px from an edge with a given blur.
+std::vector<EdgePixel> make_wide_band(double blur_px) {
+  std::vector<EdgePixel> pixels;
+  for (double x = -19.5; x < 20; ++x) {
+    for (double v = -20.3; v < 20; ++v) {
+      const double level = 110 + 80 * std::erf(v / (std::numbers::sqrt2 * blur_px));
+      pixels.push_back({x / 20, v, level, 100, 0});
+    }
+  }
+  return pixels;
+}
+
+TEST(FitEdgeCurveAndBlur, RequiresBlurBetween0p05And6Pixels) {
+  for (const auto& [blur_px, is_accepted] : {std::pair(5.5, true), std::pair(6.5, false)}) {
+    EdgeCurve edge = Step().start();
+    edge.blur_px = 4;
+    EXPECT_EQ(fit_edge_curve_and_blur(edge, make_wide_band(blur_px), {}).has_value(), is_accepted);
+    EXPECT_NEAR(edge.blur_px, blur_px, 0.01);
+  }
+  // A strong prior determines the blur.
+  for (const auto& [blur_px, is_accepted] : {std::pair(0.06, true), std::pair(0.04, false)}) {
+    EdgeCurve edge = Step().start();
+    edge.blur_px = blur_px;
+    auto pixels = make_wide_band(1e-3);
+    EXPECT_EQ(fit_edge_curve_and_blur(edge, pixels, {1, blur_px, 1e5}).has_value(), is_accepted);
+  }
+}
+
+// Saturation is decided by the pixels on the brighter side with level 254 or more.
+TEST(FitEdgeCurveAndBlur, IsSaturatedFor25PercentWhitePixels) {
+  for (const bool is_inside : {false, true}) {
+    for (const auto& [one_of, level, is_saturated] :
+         {std::tuple{4U, 254., true}, {4U, 253.9, false}, {5U, 255., false}}) {
+      auto pixels = make_wide_band(0.8);
+      std::size_t count = 0;
+      for (EdgePixel& pixel : pixels) {
+        if (is_inside) pixel.across_px = -pixel.across_px;
+        pixel.level += 55;
+        const bool is_bright = is_inside ? pixel.across_px < 0 : pixel.across_px > 0;
+        if (is_bright && count++ % one_of == 0) pixel.level = level;
+      }
+      EdgeCurve edge = Step().start();
+      const auto fit = fit_edge_curve_and_blur(edge, pixels, {});
+      ASSERT_TRUE(fit);
+      EXPECT_EQ(fit->is_saturated, is_saturated) << one_of << " " << level << " " << is_inside;
+    }
+  }
+}
+
+TEST(FitEdgeCurveAndBlur, StartsFromLightOfPreviousFitWithOtherToneCurve) {
+  for (const bool is_white_inside : {false, true}) {
+    Step step{.gamma = 2.4, .stripe_px = 100};
+    if (is_white_inside) std::swap(step.black, step.white);
+    auto pixels = step.pixels();
+    for (EdgePixel& pixel : pixels) {
+      pixel.white_behind = 0;
+      const double light = 255 * std::pow(pixel.level / 255, step.gamma);
+      pixel.level = 255 * std::pow(light * (1 + 0.1 * pixel.along) / 255, 1 / step.gamma);
+    }
+    EdgeCurve edge = step.start();
+    const auto linear = fit_edge_curve_and_blur(edge, pixels, {1.3});
+    ASSERT_TRUE(linear);
+    const auto fit = fit_edge_curve_and_blur(edge, pixels, {2.4}, &*linear);
+    ASSERT_TRUE(fit);
+    step.expect_found(edge, 1e-3);
+    EXPECT_FALSE(fit->is_saturated);
+    EXPECT_NEAR(fit->bright_light, std::max(step.white, step.black), 0.1);
+    EXPECT_NEAR(fit->dark_light, std::min(step.white, step.black), 0.1);
+    EXPECT_NEAR(fit->light.slope[0], 0.1, 1e-3);
+  }
+}
+
+/// Line spread of a Gaussian and a box, as of a pixel: the step is known as an integral of erf.
+TEST(FitEdgeCurveAndBlur, EquivalentBlurMatchesMtf50OfGaussianWithBox) {
+  for (const auto& [sigma_px, width_px] :
+       {std::pair(0.6, 1.0), std::pair(0.5, 2.0), std::pair(0.7, 2.5)}) {
+    const auto integral = [sigma = sigma_px](double x) {
+      const double u = x / (std::numbers::sqrt2 * sigma);
+      return x * std::erf(u) + sigma * std::sqrt(2 / std::numbers::pi) * std::exp(-u * u);
+    };
+    std::vector<EdgePixel> pixels;
+    for (double x = -19.5; x < 20; ++x) {
+      for (double v = -4.3; v < 5; ++v) {
+        const double at = v - 0.31 - 0.4 * x / 20;
+        const double step = (integral(at + width_px / 2) - integral(at - width_px / 2)) / width_px;
+        pixels.push_back({x / 20, v, 110 + 80 * step, 100, 0});
+      }
+    }
+    EdgeCurve edge = Step().start();
+    const auto fit = fit_edge_curve_and_blur(edge, pixels, {});
+    ASSERT_TRUE(fit);
+    // exp(-s^2 / 2) is 0.5 at the frequency (rad / px) where the transfer is 0.5.
+    double low = 0, high = 3;
+    for (int i = 0; i < 50; ++i) {
+      const double f = (low + high) / 2, x = f * width_px / 2;
+      (std::exp(-f * f * sigma_px * sigma_px / 2) * std::sin(x) / x > 0.5 ? low : high) = f;
+    }
+    const double expected_px = std::sqrt(2 * std::numbers::ln2) / low;
+    EXPECT_NEAR(fit->equivalent_blur_px / expected_px, 1, 0.012) << sigma_px << " " << width_px;
+  }
+}
+
+TEST(EdgeCurve, GradientOfDistanceMatchesDifferenceQuotients) {
+  EdgeCurve edge = Step().start();
+  edge.along = {0.8, 0.6};
+  edge.across = {-0.6, 0.8};
+  edge.coefficients << 0.5, -1.1, 0.7, 1.3;
+  constexpr double h = 1e-5;
+  for (const Eigen::Vector2d& x : {Eigen::Vector2d(103, 99), {88, 92}, {118, 111}}) {
+    const Eigen::Vector2d gradient = edge.compute_gradient_of_curve_distance_wrt_pixel(x);
+    for (const Eigen::Index i : {0, 1}) {
+      const Eigen::Vector2d step = h * Eigen::Vector2d::Unit(i);
+      EXPECT_NEAR(
+          gradient[i],
+          (edge.distance_from_curve_px(x + step) - edge.distance_from_curve_px(x - step)) / (2 * h),
+          1e-8);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace vlp

@@ -8,8 +8,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <stdexcept>
+#include <string>
+#include <tuple>
+#include <vector>
 
 #include "detection/boards/tag_finder.h"
+#include "support/rejection_message.h"
 
 namespace vlp {
 namespace {
@@ -75,6 +79,45 @@ TEST(MakeArucoMarker, ReturnsBitsRowByRowAndThrowsForMissingMarkers) {
   for (const int id : {-1, 50}) {
     EXPECT_THROW(make_aruco_marker("DICT_4X4_50", id), std::invalid_argument) << id;
   }
+}
+
+TEST(MakeArucoMarker, HasWidthAndNumberOfMarkersOfDictionary) {
+  std::vector<std::tuple<std::string, int, int>> dictionaries{{"DICT_ARUCO_ORIGINAL", 5, 1024},
+                                                              {"DICT_APRILTAG_16h5", 4, 30},
+                                                              {"DICT_APRILTAG_25h9", 5, 35},
+                                                              {"DICT_APRILTAG_36h10", 6, 2320},
+                                                              {"DICT_APRILTAG_36h11", 6, 587}};
+  for (const int width : {4, 5, 6, 7}) {
+    for (const int count : {50, 100, 250, 1000}) {
+      dictionaries.emplace_back("DICT_" + std::to_string(width) + "X" + std::to_string(width) +
+                                    "_" + std::to_string(count),
+                                width, count);
+    }
+  }
+  for (const auto& [name, width, count] : dictionaries) {
+    const ArucoMarker last = make_aruco_marker(name, count - 1);
+    EXPECT_EQ(last.width, width) << name;
+    EXPECT_EQ(last.white.size(), static_cast<std::size_t>(width * width)) << name;
+    EXPECT_THROW(make_aruco_marker(name, count), std::invalid_argument) << name;
+  }
+}
+
+TEST(MakeArucoMarker, MessageListsMarkersOrDictionaries) {
+  const auto reject = [](const std::string& dictionary, int id) {
+    return rejection_message<std::invalid_argument>([&] { make_aruco_marker(dictionary, id); });
+  };
+  EXPECT_EQ(reject("DICT_4X4_50", 50), "DICT_4X4_50 has no marker 50, only 0 to 49");
+  EXPECT_THAT(reject("DICT_9X9_50", 0),
+              testing::StartsWith("OpenCV has no dictionary 'DICT_9X9_50', but DICT_4X4_100, "
+                                  "DICT_4X4_1000, DICT_4X4_250, DICT_4X4_50, DICT_5X5_100"));
+  EXPECT_THAT(reject("DICT_9X9_50", 0), testing::EndsWith(", DICT_ARUCO_ORIGINAL"));
+}
+
+TEST(MakeArucoDetector, MessageListsTagFamilies) {
+  Board board{"tagCircle21h7", 2, 2, 0.05, 0.3, 1, true, 0, {false, BoardCorner::top_left}};
+  EXPECT_EQ(rejection_message<std::invalid_argument>([&] { make_aruco_detector(board); }),
+            "boards with corner squares can have tags of the families tag36h11, tag25h9 and "
+            "tag16h5, not tagCircle21h7");
 }
 
 TEST(FindChessboardSizeInCorners, ReturnsSizeOfLargerBoard) {

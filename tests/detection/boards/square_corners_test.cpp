@@ -6,6 +6,7 @@
 #include <array>
 #include <opencv2/core/version.hpp>
 #include <opencv2/imgproc.hpp>
+#include <tuple>
 #if CV_VERSION_MAJOR > 4 || CV_VERSION_MINOR >= 7
 #include <opencv2/objdetect/aruco_board.hpp>
 #include <opencv2/objdetect/aruco_dictionary.hpp>
@@ -148,18 +149,21 @@ TEST(SquareCorners, NumbersChessboardCornersFromTopLeftOfImage) {
   }
 }
 
-// The squares are 22 x 8 px. The fit at a corner must not reach the corners above and below.
+// The squares are 22 x 8 px or 10 x 22 px. The fit at a corner must not reach the adjacent corners.
 TEST(SquareCorners, DetectsChessboardAccuratelyInObliqueView) {
-  const Board board = squares(BoardKind::chessboard, 6, 9);
-  const Eigen::Array2d scale(0.55, 0.2);
-  cv::Mat image;
-  cv::resize(drawn_chessboard(board), image, {}, scale.x(), scale.y(), cv::INTER_AREA);
-  const BoardDetection seen = BoardDetector(board).detect_board(image);
-  ASSERT_EQ(seen.points.size(), 40U);
-  for (std::size_t i = 0; i < seen.points.size(); ++i) {
-    const Eigen::Array2d expected = (corner_position(board, i).array() + 0.5) * scale - 0.5;
-    EXPECT_EQ(seen.points[i].index, i);
-    EXPECT_THAT(seen.points[i].pixel, IsNear(expected.matrix(), 0.05)) << i;
+  for (const auto& [cols, rows, scale] : {std::tuple(6, 9, Eigen::Array2d(0.55, 0.2)),
+                                          std::tuple(9, 6, Eigen::Array2d(0.25, 0.55))}) {
+    SCOPED_TRACE(cols);
+    const Board board = squares(BoardKind::chessboard, cols, rows);
+    cv::Mat image;
+    cv::resize(drawn_chessboard(board), image, {}, scale.x(), scale.y(), cv::INTER_AREA);
+    const BoardDetection seen = BoardDetector(board).detect_board(image);
+    ASSERT_EQ(seen.points.size(), 40U);
+    for (std::size_t i = 0; i < seen.points.size(); ++i) {
+      const Eigen::Array2d expected = (corner_position(board, i).array() + 0.5) * scale - 0.5;
+      EXPECT_EQ(seen.points[i].index, i);
+      EXPECT_THAT(seen.points[i].pixel, IsNear(expected.matrix(), 0.05)) << i;
+    }
   }
 }
 

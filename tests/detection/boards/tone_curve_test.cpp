@@ -4,7 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 namespace vlp {
 namespace {
@@ -129,6 +132,71 @@ TEST(CorrectViewsForToneCurve, EstimatesGammaOfOneWithoutViewsOrTags) {
   std::vector<BoardView> none, without(2);
   EXPECT_EQ(apply_curve_of_levels(none), 1);
   EXPECT_EQ(apply_curve_of_levels(without), 1);
+}
+
+TEST(EstimateToneCurveGamma, ReturnsMinimumOfParabolaOverLogGamma) {
+  for (const double gamma : {1.0, 1.1, 1.45, 1.8, 2.1, 2.4}) {
+    ValuesPerGamma costs{};
+    for (std::size_t i = 0; i < costs.size(); ++i) {
+      costs[i] = 7 + 30 * std::pow(std::log(kGammas[i] / gamma), 2);
+    }
+    EXPECT_NEAR(estimate_tone_curve_gamma(costs), gamma, 1e-9);
+  }
+}
+
+TEST(EstimateToneCurveGamma, ReturnsEndOfRangeForMonotonicCosts) {
+  EXPECT_NEAR(estimate_tone_curve_gamma({1, 2, 4, 8, 16}), 1, 1e-12);
+  EXPECT_NEAR(estimate_tone_curve_gamma({1, 3, 4, 4.5, 4.7}), 1, 1e-12);  // concave
+  EXPECT_NEAR(estimate_tone_curve_gamma({16, 8, 4, 2, 1}), 2.4, 1e-12);
+  EXPECT_NEAR(estimate_tone_curve_gamma({9, 8.9, 8.5, 7, 1}), 2.4, 1e-12);  // concave
+  EXPECT_NEAR(estimate_tone_curve_gamma({3, 3, 3, 3, 3}), 1, 1e-12);
+}
+
+TEST(SumToneCurveCosts, SumsLimitedDifferencesFromSmallestCost) {
+  std::vector<BoardView> views(4);
+  views[0].detection.curve_costs = {10, 8, 9, 12, 2000};
+  views[1].detection.curve_costs = {5, 7};  // the second value stands for all larger gammas
+  views[2].detection.curve_costs = {-1000, -1, 0, 0.5, 100};
+  EXPECT_EQ(sum_tone_curve_costs(views), (ValuesPerGamma{2, 1001, 1003, 1006, 2002}));
+}
+
+TEST(CorrectViewsForToneCurve, CorrectsCornersFromGammaOf1p2) {
+  for (const auto& [gamma, is_corrected] : {std::pair(1.19, false), std::pair(1.21, true)}) {
+    std::vector<BoardView> images{image(gamma, 500)};
+    EXPECT_NEAR(apply_curve_of_levels(images), is_corrected ? gamma : 1, 1e-9);
+    const TagDetection& tag = images[0].detection.tags[0];
+    EXPECT_EQ(tag.corners_px[0].x() < 99.95, is_corrected);
+    EXPECT_TRUE(tag.tone_curve_fits.empty());
+    EXPECT_TRUE(images[0].detection.curve_costs.empty());
+  }
+}
+
+TEST(CorrectViewsForToneCurve, InterpolatesSdsAndStepsBetweenAdjacentGammas) {
+  for (const double gamma : {1.25, 1.45, 1.8, 2.2}) {
+    SCOPED_TRACE(gamma);
+    std::vector<BoardView> images{image(gamma, 500)};
+    TagDetection& tag = images[0].detection.tags[0];
+    const auto value = [](std::size_t i) { return std::array{0.5, 0.6, 0.9, 1.1, 1.9}[i]; };
+    tag.steps.fill({value(0), 10 * value(0), 100 * value(0)});
+    tag.corner_sds_px.fill(value(0));
+    for (std::size_t i = 1; i < kGammas.size(); ++i) {
+      tag.tone_curve_fits[i - 1].steps.fill({value(i), 10 * value(i), 100 * value(i)});
+      tag.tone_curve_fits[i - 1].corner_sds_px.fill(value(i));
+    }
+    apply_curve_of_levels(images);
+    std::size_t below = 0;
+    while (below + 2 < kGammas.size() && kGammas[below + 1] < gamma) ++below;
+    const double fraction =
+        std::log(gamma / kGammas[below]) / std::log(kGammas[below + 1] / kGammas[below]);
+    const double expected = (1 - fraction) * value(below) + fraction * value(below + 1);
+    const TagDetection& corrected = images[0].detection.tags[0];
+    for (std::size_t k = 0; k < 4; ++k) {
+      EXPECT_NEAR(corrected.corner_sds_px[k], expected, 1e-9);
+      EXPECT_NEAR(corrected.steps[k].blur_px, expected, 1e-9);
+      EXPECT_NEAR(corrected.steps[k].dark, 10 * expected, 1e-8);
+      EXPECT_NEAR(corrected.steps[k].bright, 100 * expected, 1e-7);
+    }
+  }
 }
 
 }  // namespace

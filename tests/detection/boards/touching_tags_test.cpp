@@ -1,0 +1,261 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Refinement of tags with corner squares, and of corners next to markers, from given detections.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <vector>
+
+#include "detection/boards/drawn_tags.h"
+#include "detection/boards/square_corners.h"
+#include "rig/board_layout.h"
+#include "support/matchers.h"
+
+namespace vlp {
+namespace {
+
+GrayLevels smooth(const cv::Mat1b& image) {
+  cv::Mat1f smoothed;
+  image.convertTo(smoothed, CV_32F);
+  cv::GaussianBlur(smoothed, smoothed, {}, 1);
+  return {image, smoothed};
+}
+
+/// Image of a board of tags with corner squares, as Kalibr prints them, with bits of `bit_px`.
+struct DrawnTouchingTags : DrawnTags {
+  explicit DrawnTouchingTags(int bit_px, int cols = 4, int rows = 3)
+      : DrawnTags(
+            {"tag36h11", cols, rows, 0.05, 0.2, 2, true, 0, {false, BoardCorner::bottom_left}},
+            bit_px),
+        levels(smooth(image)) {}
+
+  GrayLevels levels;
+};
+
+TEST(TouchingTags, RefinesDisplacedCorners) {
+  for (const int bit_px : {3, 4, 6}) {
+    SCOPED_TRACE(bit_px);
+    const DrawnTouchingTags drawn(bit_px);
+    const TouchingTags touching(drawn.board);
+    TagDetection displaced = drawn.truth[5];
+    displaced.corners_px[0] += Eigen::Vector2d(0.9, -0.4);
+    displaced.corners_px[1] += Eigen::Vector2d(-0.6, -0.7);
+    displaced.corners_px[2] += Eigen::Vector2d(0.4, 0.8);
+    displaced.corners_px[3] += Eigen::Vector2d(-0.8, 0.5);
+    const auto refined = touching.refine_tag_corners(displaced, drawn.levels);
+    ASSERT_TRUE(refined);
+    EXPECT_EQ(refined->id, displaced.id);
+    for (std::size_t k = 0; k < 4; ++k) {
+      EXPECT_THAT(refined->corners_px[k], IsNear(drawn.truth[5].corners_px[k], 0.03)) << k;
+    }
+  }
+}
+
+// The reach is 0.8 of the corner squares: 9 px for squares of 12 px.
+TEST(TouchingTags, FindsCornersWithin80PercentOfSquare) {
+  const DrawnTouchingTags drawn(6);
+  const TouchingTags touching(drawn.board);
+  for (const auto& [displacement_px, is_found] : {std::pair(6.0, true), std::pair(13.0, false)}) {
+    TagDetection displaced = drawn.truth[5];
+    displaced.corners_px[2] += Eigen::Vector2d(displacement_px, 0);
+    const auto refined = touching.refine_tag_corners(displaced, drawn.levels);
+    EXPECT_EQ(refined.has_value(), is_found) << displacement_px;
+    if (!refined) continue;
+    EXPECT_THAT(refined->corners_px[2], IsNear(drawn.truth[5].corners_px[2], 0.03));
+  }
+}
+
+TEST(TouchingTags, RejectsTagWithBitsOfOtherId) {
+  const DrawnTouchingTags drawn(4);
+  TagDetection other = drawn.truth[5];
+  other.id = 9;
+  EXPECT_FALSE(TouchingTags(drawn.board).refine_tag_corners(other, drawn.levels));
+}
+
+TEST(TouchingTags, RejectsTagWithoutSaddleAtOneCorner) {
+  for (const std::size_t k : {0U, 1U, 2U, 3U}) {
+    const DrawnTouchingTags drawn(4);
+    cv::Mat1b image = drawn.levels.sharp.clone();
+    const Eigen::Vector2i at = drawn.truth[5].corners_px[k].array().round().cast<int>();
+    image(cv::Rect(at.x() - 14, at.y() - 14, 29, 29)) = 120;
+    EXPECT_FALSE(TouchingTags(drawn.board).refine_tag_corners(drawn.truth[5], smooth(image))) << k;
+  }
+}
+
+TEST(TouchingTags, FindsAllMissingTagsFromOneTag) {
+  const DrawnTouchingTags drawn(4);
+  const TouchingTags touching(drawn.board);
+  for (const std::size_t seed : {0U, 5U, 11U}) {
+    const auto found = touching.find_missing_tags({drawn.truth[seed]}, drawn.levels);
+    ASSERT_EQ(found.size(), drawn.truth.size() - 1) << seed;
+    for (const TagDetection& tag : found) {
+      EXPECT_NE(tag.id, drawn.truth[seed].id);
+      const auto expected = std::ranges::find(drawn.truth, tag.id, &TagDetection::id);
+      ASSERT_NE(expected, drawn.truth.end());
+      for (std::size_t k = 0; k < 4; ++k) {
+        EXPECT_THAT(tag.corners_px[k], IsNear(expected->corners_px[k], 0.03)) << tag.id;
+      }
+    }
+  }
+}
+
+// Places of missing tags are predicted from tags up to 2.2 tag widths away.
+TEST(TouchingTags, FindsMissingTagsOnlyNextToOtherTags) {
+  DrawnTouchingTags drawn(4, 5, 1);
+  cv::Mat1b image = drawn.levels.sharp.clone();
+  const auto erase = [&](const TagDetection& tag) {
+    const Eigen::Vector2i at = tag.corners_px[3].array().round().cast<int>();
+    image(cv::Rect(at.x() - 2, at.y() - 2, 44, 44)) = 200;
+  };
+  erase(drawn.truth[1]);
+  const TouchingTags touching(drawn.board);
+  const auto found = touching.find_missing_tags({drawn.truth[0]}, smooth(image));
+  EXPECT_TRUE(found.empty()) << "the next tag is 2.4 tag widths away";
+  EXPECT_TRUE(touching.find_missing_tags({}, drawn.levels).empty());
+  EXPECT_TRUE(touching.find_missing_tags(drawn.truth, drawn.levels).empty());
+}
+
+/// Chessboard of 8 x 6 squares, white markers included as plain squares.
+struct DrawnSquares {
+  static constexpr int kMargin_px = 30;
+
+  explicit DrawnSquares(int size_px) : square_px(size_px) {
+    board = {"DICT_5X5_100", 8, 6, 0.015, 1, 1, false, 0, {false, BoardCorner::top_left}};
+    board.kind = BoardKind::charuco;
+    board.square_size_m = 0.02;
+    cv::Mat1b image(6 * square_px + 2 * kMargin_px, 8 * square_px + 2 * kMargin_px, uchar{200});
+    for (int row = 0; row < 6; ++row) {
+      for (int col = 0; col < 8; ++col) {
+        if (!is_square_black(board, col, row)) continue;
+        image(cv::Rect(kMargin_px + col * square_px, kMargin_px + row * square_px, square_px,
+                       square_px)) = uchar{40};
+      }
+    }
+    cv::GaussianBlur(image, image, {}, 0.8);
+    levels = smooth(image);
+    for (const BoardTag& place : list_board_tags(board)) {
+      TagDetection marker{place.id, {}};
+      for (std::size_t k = 0; k < 4; ++k) marker.corners_px[k] = pixel(place.corners_m[k]);
+      markers.push_back(marker);
+    }
+  }
+  Eigen::Vector2d pixel(const Eigen::Vector2d& at_m) const {
+    return at_m * (square_px / 0.02) + Eigen::Vector2d::Constant(kMargin_px + square_px - 0.5);
+  }
+  Eigen::Vector2d corner_px(std::size_t index) const {
+    return pixel(0.02 * Eigen::Vector2d(double(index % 7), double(index / 7)));
+  }
+  std::vector<PointDetection> detect(const std::vector<TagDetection>& near) const {
+    return SquareCorners(board).detect_corners_near_markers(near, levels);
+  }
+
+  Board board;
+  int square_px;
+  GrayLevels levels;
+  std::vector<TagDetection> markers;
+};
+
+TEST(SquareCorners, DetectsCornersNearDisplacedMarkers) {
+  for (const int square_px : {12, 24, 48}) {
+    SCOPED_TRACE(square_px);
+    const DrawnSquares drawn(square_px);
+    auto markers = drawn.markers;
+    for (TagDetection& marker : markers) {
+      for (auto& corner : marker.corners_px) corner += Eigen::Vector2d(0.7, -0.6);
+    }
+    const auto points = drawn.detect(markers);
+    ASSERT_EQ(points.size(), 35U);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      EXPECT_EQ(points[i].index, i);
+      EXPECT_THAT(points[i].pixel, IsNear(drawn.corner_px(i), 0.03)) << i;
+    }
+  }
+}
+
+// The margin of a marker is an eighth of a square, 6 px. The reach is 80 % of its diagonal, and the
+// saddle is fitted up to 2 px beyond.
+TEST(SquareCorners, SearchesCornersWithin80PercentOfDiagonalOfMargin) {
+  const DrawnSquares drawn(48);
+  for (const auto& [displacement_px, num_points] : {std::pair(7.0, 35U), std::pair(9.5, 0U)}) {
+    auto markers = drawn.markers;
+    for (TagDetection& marker : markers) {
+      for (auto& corner : marker.corners_px) corner.x() += displacement_px;
+    }
+    EXPECT_EQ(drawn.detect(markers).size(), num_points) << displacement_px;
+  }
+}
+
+// A marker is in the square next to a corner, half a diagonal (0.71 squares) away.
+TEST(SquareCorners, DetectsOnlyCornersOfSquareOfSingleMarker) {
+  const DrawnSquares drawn(30);
+  const std::size_t marker = 7;
+  const Eigen::Vector2d middle_px =
+      (drawn.markers[marker].corners_px[0] + drawn.markers[marker].corners_px[2]) / 2;
+  const auto points = drawn.detect({drawn.markers[marker]});
+  ASSERT_EQ(points.size(), 4U);
+  for (const PointDetection& point : points) {
+    EXPECT_THAT(point.pixel, IsNear(drawn.corner_px(point.index), 0.03));
+    EXPECT_NEAR((point.pixel - middle_px).norm(), 30 * std::numbers::sqrt2 / 2, 0.1);
+  }
+  EXPECT_TRUE(drawn.detect({}).empty());
+}
+
+// Homographies of adjacent markers must map their corners within a quarter of a square.
+TEST(SquareCorners, RejectsCornersNearMarkersThatContradictOnePlane) {
+  const DrawnSquares drawn(40);
+  const auto count = [&](double displacement_px) {
+    auto markers = drawn.markers;
+    for (std::size_t i = 0; i < markers.size(); i += 2) {
+      for (auto& corner : markers[i].corners_px) corner.x() += displacement_px;
+    }
+    return drawn.detect(markers).size();
+  };
+  EXPECT_EQ(count(4), 35U);
+  EXPECT_LT(count(60), 10U);
+}
+
+// Corners nearer than 2 px to the image border are rejected.
+TEST(SquareCorners, RejectsCornersWithinTwoPixelsOfImageBorder) {
+  const DrawnSquares drawn(24);
+  const auto count = [&](const cv::Rect& part) {
+    auto markers = drawn.markers;
+    for (TagDetection& marker : markers) {
+      for (auto& corner : marker.corners_px) corner -= Eigen::Vector2d(part.x, part.y);
+    }
+    const GrayLevels levels = smooth(drawn.levels.sharp(part).clone());
+    return SquareCorners(drawn.board).detect_corners_near_markers(markers, levels).size();
+  };
+  const cv::Size full = drawn.levels.sharp.size();
+  // The first corners are at 53.5 px, the last ones at 197.5 and 149.5 px.
+  EXPECT_EQ(count({{0, 0}, full}), 35U);
+  EXPECT_EQ(count({49, 0, full.width - 49, full.height}), 35U);
+  EXPECT_EQ(count({52, 0, full.width - 52, full.height}), 30U);
+  EXPECT_EQ(count({0, 49, full.width, full.height - 49}), 35U);
+  EXPECT_EQ(count({0, 52, full.width, full.height - 52}), 28U);
+  EXPECT_EQ(count({0, 0, 202, full.height}), 35U);
+  EXPECT_EQ(count({0, 0, 199, full.height}), 30U);
+  EXPECT_EQ(count({0, 0, full.width, 154}), 35U);
+  EXPECT_EQ(count({0, 0, full.width, 151}), 28U);
+}
+
+TEST(DetectChessboardSizeInSquares, ReturnsZeroForImagesWithoutBoard) {
+  EXPECT_EQ(detect_chessboard_size_in_squares(cv::Mat1b(100, 120, uchar{100})), (std::array{0, 0}));
+  EXPECT_EQ(detect_chessboard_size_in_squares(cv::Mat1b(9, 120, uchar{100})), (std::array{0, 0}));
+  EXPECT_EQ(detect_chessboard_size_in_squares(cv::Mat1b()), (std::array{0, 0}));
+}
+
+TEST(DetectChessboardSizeInSquares, CountsSquaresOf16BitImage) {
+  const DrawnSquares drawn(24);
+  cv::Mat deep;
+  drawn.levels.sharp.convertTo(deep, CV_16U, 16);
+  auto size = detect_chessboard_size_in_squares(deep);
+  std::sort(size.begin(), size.end());
+  EXPECT_EQ(size, (std::array{6, 8}));
+}
+
+}  // namespace
+}  // namespace vlp
