@@ -29,8 +29,8 @@ cv::Mat1f smooth_image(const cv::Mat1b& levels) {
 
 bool is_inside(const TagDetection& tag, const cv::Mat& image) {
   return std::all_of(tag.corners_px.begin(), tag.corners_px.end(), [&](const auto& corner) {
-    return corner.x() >= kMargin && corner.y() >= kMargin && corner.x() < image.cols - kMargin &&
-           corner.y() < image.rows - kMargin;
+    return corner.x() >= kMargin && corner.y() >= kMargin &&
+           corner.x() <= image.cols - 1 - kMargin && corner.y() <= image.rows - 1 - kMargin;
   });
 }
 

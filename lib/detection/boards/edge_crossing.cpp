@@ -164,17 +164,16 @@ std::optional<Eigen::Vector2d> find_saddle_point(const cv::Mat1f& smoothed,
   const auto initial_pixel = find_strongest_saddle(smoothed, guess_px, reach_px);
   if (!initial_pixel) return {};
   Eigen::Vector2i middle = *initial_pixel;
-  for (int step = 0; step < max_iterations; ++step) {
+  for (int step = 1;; ++step) {
     if (!is_inside_margin(smoothed, middle, radius_px)) return {};
     const auto offset = fit_saddle_offset(smoothed, middle, radius_px);
     if (!offset) return {};
     const Eigen::Vector2d point = middle.cast<double>() + *offset;
     if (!((point - initial_pixel->cast<double>()).norm() <= max_displacement_px)) return {};
     const Eigen::Vector2i nearest = point.array().round().cast<int>();
-    if (nearest == middle || step + 1 == max_iterations) return point;
+    if (nearest == middle || step == max_iterations) return point;
     middle = nearest;
   }
-  return {};
 }
 
 std::optional<Eigen::Vector2d> fit_edge_intersection_at_corner(

@@ -18,7 +18,8 @@ namespace {
 
 /// Returns true if the pixel lies in the image; false if it is not finite.
 bool is_in_image(const Eigen::Vector2d& pixel, const cv::Mat& image) {
-  return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < image.cols && pixel.y() < image.rows;
+  return pixel.x() >= -0.5 && pixel.y() >= -0.5 && pixel.x() < image.cols - 0.5 &&
+         pixel.y() < image.rows - 0.5;
 }
 
 /// Returns the factor by which a large image is reduced for OpenCV's search, which then needs a
@@ -65,8 +66,8 @@ std::vector<PointDetection> SquareCorners::refine_corner_guesses(const std::vect
     const Eigen::Vector2d at = fit_edge_intersection_at_corner(
                                    image.sharp, *saddle, {next[0] - pixel, next[1] - pixel}, fit_px)
                                    .value_or(*saddle);
-    if (at.x() < edge_px || at.y() < edge_px || at.x() >= image.sharp.cols - edge_px ||
-        at.y() >= image.sharp.rows - edge_px) {
+    if (at.x() < edge_px || at.y() < edge_px || at.x() > image.sharp.cols - 1 - edge_px ||
+        at.y() > image.sharp.rows - 1 - edge_px) {
       continue;
     }
     points.push_back({index, at});
