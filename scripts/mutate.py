@@ -144,8 +144,8 @@ class Folder:
         return all(self.run(program, pattern, limit_s) for pattern, limit_s in stages)
 
     def measure(self):
-        """Returns the stages of the tests, each with the limit of its processor time in seconds: the quick tests, those
-        that take longer than a fifth of a second, and the slow ones. Exits if a test fails.
+        """Returns the stages of the tests, each with a limit of processor time in seconds: the quick tests, those that
+        take longer than a fifth of a second, and the slow ones. Exits if a test fails.
         """
         def measure_s(pattern, *options):
             before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -158,9 +158,11 @@ class Folder:
             output = pathlib.Path(scratch, "times.json")
             spent_s = measure_s("-" + self.slow, f"--gtest_output=json:{output}")
             suites = json.loads(output.read_text())["testsuites"]
-        longer = [f"{suite['name']}.{test['name']}" for suite in suites for test in suite["testsuite"]
-                  if float(test["time"].rstrip("s")) > 0.2]
-        stages = [("-" + ":".join([*longer, self.slow]), int(3 * spent_s) + 10)]
+        times_s = {f"{suite['name']}.{test['name']}": float(test["time"].rstrip("s"))
+                   for suite in suites for test in suite["testsuite"]}
+        longer = [name for name, time_s in times_s.items() if time_s > 0.2]
+        quick_s = sum(time_s for time_s in times_s.values() if time_s <= 0.2)
+        stages = [("-" + ":".join([*longer, self.slow]), int(3 * min(quick_s, spent_s)) + 10)]
         if longer:
             stages.append((":".join(longer), int(3 * spent_s) + 10))
         if self.slow and not self.quick:

@@ -271,7 +271,7 @@ BodyObservations mirror_lamp_positions(BodyObservations frame) {
 }
 
 /// Finds the largest set of lamps that agree with a state of free roll and pitch, at rest. Every
-/// triple of lamps proposes its states. Returns std::nullopt for fewer than four lamps.
+/// triple of lamps proposes its states. Returns std::nullopt if fewer than four lamps agree.
 std::optional<Agreeing> find_majority_with_free_tilt(const BodyObservations& frame,
                                                      const BodyProblem& problem, double limit_m) {
   constexpr std::size_t few = 12, at_least = 4;

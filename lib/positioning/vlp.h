@@ -191,8 +191,8 @@ int32_t vlp_locate_with_earlier(const vlp_positioner* positioner, const vlp_dete
 const char* vlp_describe_status(int32_t code);
 
 /* Returns the message of the last vlp_open(), vlp_open_room() or vlp_detect() of this thread that
- * failed: file, line and key, or the problem with the image; its first 1023 bytes. "" before the
- * first failure. Valid until the next call of this thread. */
+ * failed: file, line and key, or the problem with the image, truncated to 1023 bytes. "" before
+ * the first failure. Valid until the next call of this thread. */
 const char* vlp_last_error(void);
 
 #ifdef __cplusplus

@@ -370,7 +370,8 @@ class SessionRun {
                                               describe_row_time_source(), result);
   }
 
-  /// Returns false if the step row-time estimated the row time, or if it is not used.
+  /// Returns true if camera.yaml or --row-time-s gives the row time and lamps are identified by
+  /// frequency.
   bool is_row_time_given() const {
     return !session_.lamp_classifier_file() && !has_step("row-time");
   }
@@ -401,10 +402,13 @@ class SessionRun {
   }
 
   std::string format_plot_setting() const { return options_.report ? "picture" : ""; }
+  std::string format_lamp_step_settings() const {
+    return format_plot_setting() + " " + describe_row_time_source();
+  }
 
   bool run_rotation(const fs::path& camera_file) {
     const auto inputs = list_lamp_inputs(session_.rotation_captures_folder(), camera_file);
-    return run_or_reuse_step("rotation", inputs, format_plot_setting(), [&] {
+    return run_or_reuse_step("rotation", inputs, format_lamp_step_settings(), [&] {
       LampCaptures captures{{}, read_lamps(), lamps_file(), read_calibration(camera_file)};
       LampImages images =
           make_session_lamp_images(session_.rotation_captures_folder(), captures, camera_file);
@@ -427,7 +431,7 @@ class SessionRun {
     const fs::path folder = *session_.dispersion_captures_folder(),
                    rotated = output_file_path("rotated.yaml");
     const auto inputs = list_lamp_inputs(folder, rotated);
-    return run_or_reuse_step("dispersion", inputs, format_plot_setting(), [&] {
+    return run_or_reuse_step("dispersion", inputs, format_lamp_step_settings(), [&] {
       LampCaptures captures{{}, read_lamps(), lamps_file(), read_calibration(rotated)};
       std::vector<Observation> seen;
       const StepResult remarks =

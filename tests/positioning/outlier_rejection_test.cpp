@@ -248,7 +248,7 @@ TEST_F(FindOutlierLamps, RejectsNoneWithoutMajority) {
   EXPECT_TRUE(find(5).empty()) << "two of five";
 }
 
-TEST_F(FindOutlierLamps, RejectsNoneWhenThreeOfFourContradict) {
+TEST_F(FindOutlierLamps, RejectsNoneWhenTwoOfFourLampsAreDisplaced) {
   displace(2, {-3, 2});
   displace(0, {1, 1});
   EXPECT_TRUE(find(4).empty());

@@ -91,15 +91,17 @@ TEST_F(RunJointAdjustmentStep, CapturesOfInPlaceRotationShareOnePivot) {
   EXPECT_NEAR(*metric_mm, 1e3 * lever_arm_m.norm(), 0.01);
 }
 
-/// Known positions of all captures of set 1, that of the first one with an error.
-AdjustStepInput with_known_positions(AdjustStepInput input, MeasuredPoint of, double error_m) {
+/// Sets the known positions of all captures of set 1; that of the first has an error of `error_m`
+/// in x.
+AdjustStepInput set_known_positions(AdjustStepInput input, MeasuredPoint measured_point,
+                                    double error_m) {
   bool is_first = true;
   for (const Frame& frame : input.sets[1].frames) {
     Capture& capture = input.sets[1].captures[frame.image];
     capture.pivot = is_first ? "first" : "others";
     capture.x_m = 0.25 + (is_first ? error_m : 0);
     capture.y_m = -0.1;
-    capture.measured_point = of;
+    capture.measured_point = measured_point;
     capture.position_sd_m = 1e-4;
     is_first = false;
   }
@@ -109,15 +111,15 @@ AdjustStepInput with_known_positions(AdjustStepInput input, MeasuredPoint of, do
 TEST_F(RunJointAdjustmentStep, WarnsOfPositionThatContradictsCaptures) {
   const AdjustStepInput input = make_input("1");
   EXPECT_THAT(
-      run_joint_adjustment_step(with_known_positions(input, MeasuredPoint::axis, 0), {}).warnings,
+      run_joint_adjustment_step(set_known_positions(input, MeasuredPoint::axis, 0), {}).warnings,
       IsEmpty());
   const auto axis =
-      run_joint_adjustment_step(with_known_positions(input, MeasuredPoint::axis, 0.05), {});
+      run_joint_adjustment_step(set_known_positions(input, MeasuredPoint::axis, 0.05), {});
   ASSERT_TRUE(axis.has_succeeded()) << axis.message;
   EXPECT_THAT(axis.warnings,
               Contains("set 1/first: the position has an error of 50.0 mm and is ignored"));
   const auto camera =
-      run_joint_adjustment_step(with_known_positions(input, MeasuredPoint::camera, 0.05), {});
+      run_joint_adjustment_step(set_known_positions(input, MeasuredPoint::camera, 0.05), {});
   ASSERT_TRUE(camera.has_succeeded()) << camera.message;
   EXPECT_THAT(camera.warnings,
               Contains(HasSubstr("mm and is ignored: is it that of the camera, and not of the "
@@ -125,7 +127,7 @@ TEST_F(RunJointAdjustmentStep, WarnsOfPositionThatContradictsCaptures) {
 }
 
 TEST_F(RunJointAdjustmentStep, UsesPositionSdOfTableElseOfOption) {
-  AdjustStepInput input = with_known_positions(make_input("1"), MeasuredPoint::axis, 0);
+  AdjustStepInput input = set_known_positions(make_input("1"), MeasuredPoint::axis, 0);
   for (auto& [image, capture] : input.sets[1].captures) capture.position_sd_m.reset();
   EXPECT_THAT(run_joint_adjustment_step(input, {}).warnings,
               Contains(HasSubstr("set 1: the positions of 12 captures are ignored")));

@@ -171,7 +171,9 @@ TEST(RunDispersionCalibrationStep, FailureNamesStatusOfFirstFix) {
   for (ReferencePointCapture& capture : known.captures) capture.detections.resize(1);
   const DispersionResult result = run_step(rig, known);
   EXPECT_EQ(result.failure, StepFailure::undetermined);
-  EXPECT_THAT(result.message, HasSubstr("; the first: "));
+  EXPECT_THAT(
+      result.message,
+      HasSubstr("; the first: " + std::string(describe_fix_status(FixStatus::too_few_lamps))));
 }
 
 TEST(RunDispersionCalibrationStep, HasNoCovarianceForEnclosingCircleOfPositionsOfAxis) {
@@ -179,13 +181,17 @@ TEST(RunDispersionCalibrationStep, HasNoCovarianceForEnclosingCircleOfPositionsO
   rig.calibration.rotation_center->lever_arm_m = Eigen::Vector2d(0, 0);
   rig.calibration.rotation_center->lever_arm_covariance = 1e-8 * Matrix2::Identity();
   KnownPositions known = take_captures_at_origin(rig, {0.1, 0});
-  known.captures.assign(3, known.captures.front());
+  const ReferencePointCapture first = known.captures.front();
+  known.captures.assign(3, first);  // at one yaw, as the circle requires
   known.measured_points.assign(3, MeasuredPoint::axis);
-  const DispersionResult result =
-      run_dispersion_calibration_step({{}, rig.map, "lamps.yaml", rig.calibration}, known,
-                                      DispersionMethod::chen_guan, DispersionCircle::enclosing, {});
-  ASSERT_TRUE(result.has_succeeded()) << result.message;
-  EXPECT_FALSE(result.fit.dispersion.covariance);
+  for (const auto& [circle, has_covariance] :
+       {std::pair(DispersionCircle::enclosing, false), {DispersionCircle::mean, true}}) {
+    const DispersionResult result =
+        run_dispersion_calibration_step({{}, rig.map, "lamps.yaml", rig.calibration}, known,
+                                        DispersionMethod::chen_guan, circle, {});
+    ASSERT_TRUE(result.has_succeeded()) << result.message;
+    EXPECT_EQ(result.fit.dispersion.covariance.has_value(), has_covariance);
+  }
 }
 
 TEST(RunDispersionCalibrationStep, AddsLeverArmCovarianceToOffsetForPositionsOfAxis) {
@@ -219,7 +225,7 @@ TEST(RunDispersionCalibrationStep, AddsLeverArmCovarianceToOffsetForPositionsOfA
               2e-3);
 }
 
-TEST(RunDispersionCalibrationStep, DoesNotBlameMovedLampForSingleYaw) {
+TEST(RunDispersionCalibrationStep, DoesNotReportMovedLampForSingleYaw) {
   SyntheticRig rig = make_rig_with_tilted_camera();
   const LampMap map = rig.map;
   rig.map.lamps[1].position_m.x() += 0.01;

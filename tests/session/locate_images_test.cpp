@@ -41,8 +41,8 @@ class LeaningRig {
   std::vector<double> looks;
   /// Only ellipses show lamps.
   bool shown_by_ellipses_alone = false;
-  /// Ellipses show one lamp only.
-  bool hidden_from_ellipses = false;
+  /// Detection with ellipses returns one lamp only.
+  bool has_one_lamp_with_ellipses = false;
 
  private:
   double off_rad(const Eigen::Matrix3d& level) const {
@@ -54,7 +54,7 @@ class LeaningRig {
     const double off_px = level ? 40 * off_rad(*level) : 2;
     for (Detection& one : seen) one.pixel += off_px * Eigen::Vector2d(one.lamp % 2, one.lamp % 3);
     if (shown_by_ellipses_alone) seen.resize(level ? 1 : 2);
-    if (hidden_from_ellipses && !level) seen.resize(1);
+    if (has_one_lamp_with_ellipses && !level) seen.resize(1);
     return seen;
   }
 
@@ -109,7 +109,7 @@ TEST(RedetectLampsUntilTiltConverges, BeginsWithEllipsesOnlyForTiltSdAboveThreeD
 
 TEST(RedetectLampsUntilTiltConverges, ContinuesFromFirstFixIfEllipsesHaveNone) {
   LeaningRig rig;
-  rig.hidden_from_ellipses = true;
+  rig.has_one_lamp_with_ellipses = true;
   LocateInput input = rig.input(1.6);
   EXPECT_GT(error_m(input), 0.01);
   const LevelRotations levels = redetect_lamps_until_tilt_converges(input, rig.redetector());

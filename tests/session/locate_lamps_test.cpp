@@ -19,7 +19,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-/// Captures of a level camera at rest that see all eight lamps.
+/// Captures of a level camera at rest, with all eight lamps visible.
 struct Captures {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   LocateInput input{{}, rig.map, rig.calibration};
@@ -45,6 +45,7 @@ TEST(LocateCameraFromDetections, ListsUsedLampsOutsideRegionOnly) {
   report.region_px = {{-1, -1}, {-1, 0}, {0, 0}, {0, -1}};
   for (std::size_t i = 1; i < 3; ++i) captures.input.frames[i].detections.clear();
   const LocateResult found = locate_camera_from_detections(captures.input);
+  ASSERT_EQ(found.rows.size(), 3U);
   ASSERT_TRUE(found.rows[0].fix) << found.rows[0].status;
   EXPECT_THAT(found.rows[0].rejected_lamps, ElementsAre(rejected));
   const auto& outside = found.rows[0].lamps_outside_region;
@@ -75,6 +76,7 @@ TEST(LocateCameraFromDetections, CountsRejectionsOfEachLamp) {
               Contains("1.png: " + lamp_twice + " contradicts the others and is rejected"));
   EXPECT_THAT(found.details,
               Contains("4.png: " + lamp_twice + " contradicts the others and is rejected"));
+  ASSERT_EQ(found.rows.size(), 6U);
   EXPECT_THAT(found.rows[0].rejected_lamps, IsEmpty());
   EXPECT_THAT(found.rows[4].rejected_lamps, ElementsAre(twice));
 }
@@ -124,8 +126,8 @@ TEST(LocateCameraFromDetections, FindsMovedLampOfTiltedRobot) {
       Contains(HasSubstr("lamp 2 hangs 30 mm from where the map has it (x +30 mm, y +0 mm)")));
 }
 
-/// Captures of a camera that drives at a speed, about which nothing is stated.
-LocateInput drive_unstated(double speed_m_per_s, double sigma_px) {
+/// Returns captures of a camera that drives at a speed, which the input does not state.
+LocateInput make_drive_at_speed(double speed_m_per_s, double sigma_px) {
   Captures captures(0);
   captures.rig.body.motion.velocity_m_per_s = {speed_m_per_s, 0};
   for (int i = 0; i < 8; ++i) {
@@ -137,10 +139,12 @@ LocateInput drive_unstated(double speed_m_per_s, double sigma_px) {
 
 TEST(LocateCameraFromDetections, DoesNotWarnOfMotionThatExplainsNeitherResidualsNorFailures) {
   const auto warning = HasSubstr("a moving camera");
-  EXPECT_THAT(locate_camera_from_detections(drive_unstated(1, 0.02)).warnings, Contains(warning));
-  EXPECT_THAT(locate_camera_from_detections(drive_unstated(1, 3)).warnings, Not(Contains(warning)))
+  EXPECT_THAT(locate_camera_from_detections(make_drive_at_speed(1, 0.02)).warnings,
+              Contains(warning));
+  EXPECT_THAT(locate_camera_from_detections(make_drive_at_speed(1, 3)).warnings,
+              Not(Contains(warning)))
       << "residuals below the stated noise";
-  LocateInput noisy = drive_unstated(0, 0.02);
+  LocateInput noisy = make_drive_at_speed(0, 0.02);
   Random random(4);
   for (Frame& frame : noisy.frames) {
     for (Detection& detection : frame.detections) {
@@ -156,7 +160,7 @@ TEST(LocateCameraFromDetections, WarnsOfMotionThatHalvesResiduals) {
   const auto find_residual_px = [](const LocateResult& result) {
     return 0.02 * find_metric_value(result.metrics, "residual_ratio").value_or(0);
   };
-  LocateInput input = drive_unstated(0.5, 0.02);
+  LocateInput input = make_drive_at_speed(0.5, 0.02);
   const double motion_px = find_residual_px(locate_camera_from_detections(input));
   ASSERT_GT(motion_px, 0.1);
   // Noise of motion_px / sqrt(r^2 - 1): the residuals at rest are r times the noise.
@@ -179,7 +183,7 @@ TEST(LocateCameraFromDetections, WarnsOfMotionThatHalvesResiduals) {
 }
 
 TEST(LocateCameraFromDetections, DoesNotWarnOfMotionOfCameraWhoseMotionIsStated) {
-  LocateInput input = drive_unstated(1, 0.02);
+  LocateInput input = make_drive_at_speed(1, 0.02);
   input.captures["3"].velocity_m_per_s = Eigen::Vector2d(0, 0);
   EXPECT_THAT(locate_camera_from_detections(input).warnings,
               Not(Contains(HasSubstr("a moving camera"))));

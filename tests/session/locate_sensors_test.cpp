@@ -3,6 +3,8 @@
 /// locate_camera_from_detections(): sensors, stated noise, and warnings about the input.
 #include <gmock/gmock.h>
 
+#include <optional>
+
 #include "session/locate_step.h"
 #include "support/body_rig.h"
 
@@ -82,8 +84,8 @@ TEST(MakeCaptureSensorReadings, SubtractsHeightOfCameraAboveRobot) {
   EXPECT_DOUBLE_EQ(sensors.height->z_m, 0.2);
 }
 
-/// Captures of a level camera at rest, each at another position and yaw.
-LocateInput stand(int count, double sigma_px) {
+/// Returns captures of a level camera at rest, each at another position and yaw.
+LocateInput make_captures_at_rest(int count, double sigma_px) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   LocateInput input{{}, rig.map, rig.calibration};
   for (int i = 0; i < count; ++i) {
@@ -107,7 +109,7 @@ double residual_ratio(const LocateResult& result) {
 }
 
 TEST(LocateCameraFromDetections, WarnsIfResidualsExceedThreeTimesStatedNoise) {
-  LocateInput input = stand(12, 0.1);
+  LocateInput input = make_captures_at_rest(12, 0.1);
   add_noise(input, 0.1);
   const double noise_px = 0.1 * residual_ratio(locate_camera_from_detections(input));
   EXPECT_NEAR(noise_px, 0.1, 0.01);
@@ -122,13 +124,15 @@ TEST(LocateCameraFromDetections, WarnsIfResidualsExceedThreeTimesStatedNoise) {
   EXPECT_THAT(above.warnings,
               Contains(HasSubstr("px are stated: sd follows the residuals; are calibration")));
   EXPECT_THAT(above.notes, IsEmpty());
+  ASSERT_TRUE(above.rows.size() == 12 && below.rows.size() == 12);
+  ASSERT_TRUE(below.rows[0].fix);
   ASSERT_TRUE(above.rows[0].fix && above.rows[0].fix->sd && below.rows[0].fix->sd);
   EXPECT_NEAR((*above.rows[0].fix->sd)[0] / (*below.rows[0].fix->sd)[0], 1, 0.05)
       << "both follow the residuals";
 }
 
 TEST(LocateCameraFromDetections, EstimatesNoiseIfNoneIsStated) {
-  LocateInput input = stand(12, 0.1);
+  LocateInput input = make_captures_at_rest(12, 0.1);
   add_noise(input, 0.1);
   const LocateResult stated = locate_camera_from_detections(input);
   for (Frame& frame : input.frames) {
@@ -139,12 +143,14 @@ TEST(LocateCameraFromDetections, EstimatesNoiseIfNoneIsStated) {
   EXPECT_THAT(found.notes, ElementsAre(HasSubstr("px estimated from the residuals")));
   EXPECT_THAT(found.warnings, IsEmpty());
   EXPECT_FALSE(find_metric_value(found.metrics, "residual_ratio"));
+  ASSERT_TRUE(found.rows.size() == 12 && stated.rows.size() == 12);
+  ASSERT_TRUE(stated.rows[0].fix);
   ASSERT_TRUE(found.rows[0].fix && found.rows[0].fix->sd && stated.rows[0].fix->sd);
   EXPECT_NEAR((*found.rows[0].fix->sd)[0] / (*stated.rows[0].fix->sd)[0], 1, 0.1);
 }
 
 TEST(LocateCameraFromDetections, HasNoSdsIfNoiseIsUnknown) {
-  LocateInput input = stand(6, 0.1);
+  LocateInput input = make_captures_at_rest(6, 0.1);
   for (Frame& frame : input.frames) {
     frame.detections.resize(2);
     for (Detection& detection : frame.detections) detection.sigma_px.reset();
@@ -154,12 +160,13 @@ TEST(LocateCameraFromDetections, HasNoSdsIfNoiseIsUnknown) {
   EXPECT_THAT(found.warnings,
               ElementsAre("sigma_px is neither stated nor determined by residuals: sd columns are "
                           "empty"));
+  ASSERT_EQ(found.rows.size(), 6U);
   ASSERT_TRUE(found.rows[0].fix);
   EXPECT_FALSE(found.rows[0].fix->sd);
 }
 
 TEST(LocateCameraFromDetections, WarnsOfDetectionsFarOutsideImage) {
-  LocateInput input = stand(6, 0.1);
+  LocateInput input = make_captures_at_rest(6, 0.1);
   EXPECT_THAT(locate_camera_from_detections(input).warnings, IsEmpty());
   input.calibration.camera.imager_px = {400, 300};
   input.frames.resize(1);
@@ -168,8 +175,8 @@ TEST(LocateCameraFromDetections, WarnsOfDetectionsFarOutsideImage) {
               Contains(HasSubstr("2 detections are far outside the 400 x 300 px of the camera")));
 }
 
-/// Captures of a camera that drives in its x direction, about which nothing is stated.
-LocateInput drive_unstated(int count, double speed_m_per_s) {
+/// Returns captures of a camera that drives in its x direction, which the input does not state.
+LocateInput make_drive_captures(int count, double speed_m_per_s) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   rig.body.motion.velocity_m_per_s = {speed_m_per_s, 0};
   LocateInput input{{}, rig.map, rig.calibration};
@@ -182,29 +189,29 @@ LocateInput drive_unstated(int count, double speed_m_per_s) {
 
 TEST(LocateCameraFromDetections, WarnsOfMotionOnlyIfResidualsDetermineIt) {
   const auto warning = HasSubstr("the images fit a moving camera, at 2 m/s: state velocities");
-  EXPECT_THAT(locate_camera_from_detections(drive_unstated(6, 2)).warnings, Contains(warning));
-  LocateInput few = drive_unstated(2, 2);
+  EXPECT_THAT(locate_camera_from_detections(make_drive_captures(6, 2)).warnings, Contains(warning));
+  LocateInput few = make_drive_captures(2, 2);
   // Per frame 2 * 6 - 4 residuals at rest, of which velocity and yaw rate fit 3.
   for (Frame& frame : few.frames) frame.detections.resize(6);
   EXPECT_THAT(locate_camera_from_detections(few).warnings, Not(Contains(HasSubstr("a moving"))));
 }
 
 TEST(LocateCameraFromDetections, DoesNotWarnOfMotionAboveThreeMetersPerSecond) {
-  EXPECT_THAT(locate_camera_from_detections(drive_unstated(6, 2.8)).warnings,
+  EXPECT_THAT(locate_camera_from_detections(make_drive_captures(6, 2.8)).warnings,
               Contains(HasSubstr("the images fit a moving camera, at 2.8 m/s")));
-  EXPECT_THAT(locate_camera_from_detections(drive_unstated(6, 4)).warnings,
+  EXPECT_THAT(locate_camera_from_detections(make_drive_captures(6, 4)).warnings,
               Not(Contains(HasSubstr("a moving camera"))));
 }
 
 TEST(LocateCameraFromDetections, DoesNotWarnOfMotionWithoutRowTime) {
-  LocateInput input = drive_unstated(6, 2);
+  LocateInput input = make_drive_captures(6, 2);
   input.calibration.camera.row_time_s.reset();
   EXPECT_THAT(locate_camera_from_detections(input).warnings,
               Not(Contains(HasSubstr("a moving camera"))));
 }
 
 TEST(LocateCameraFromDetections, NotesThatCapturesDoNotTieLampsTogether) {
-  LocateInput input = stand(2, 0.1);
+  LocateInput input = make_captures_at_rest(2, 0.1);
   input.compute_lamp_offsets = true;
   EXPECT_THAT(locate_camera_from_detections(input).notes, IsEmpty());
   for (Frame& frame : input.frames) frame.detections.resize(2);
@@ -220,20 +227,24 @@ TEST(LocateCameraFromDetections, WindowIgnoresFramesMoreThanFifthOfSecondEarlier
   rig.body.motion.velocity_m_per_s = {1, 0};
   LocateInput input{{}, rig.map, rig.calibration};
   for (int i = 0; i < 2; ++i) {
-    rig.body.pose = {{0.2 * i, 0, 0}, 0};
+    rig.body.pose = {{0.19 * i, 0, 0}, 0};
     const std::string image = std::to_string(i);
     input.frames.push_back({image, seen_from(rig, 0.05)});
     input.frames.back().detections.resize(2);
-    input.captures[image].time_s = 10 + 0.2 * i;
+    input.captures[image].time_s = 10 + 0.19 * i;
   }
   input.motion = KnownMotion::make_motion_prior_from_limits(2, 0);
-  const auto find_position_m = [&] {
+  const auto find_position_m = [&]() -> std::optional<Eigen::Vector3d> {
     const LocateResult found = locate_camera_from_detections(input);
-    return found.rows[1].fix ? found.rows[1].fix->pose.position_m : Eigen::Vector3d(0, 0, 0);
+    if (found.rows.size() != 2 || !found.rows[1].fix) return std::nullopt;
+    return found.rows[1].fix->pose.position_m;
   };
-  const Eigen::Vector3d alone_m = find_position_m();
+  const auto alone_m = find_position_m();
+  ASSERT_TRUE(alone_m);
   input.window_size = 3;
-  EXPECT_GT((find_position_m() - alone_m).norm(), 1e-6);
+  const auto with_earlier_m = find_position_m();
+  ASSERT_TRUE(with_earlier_m);
+  EXPECT_GT((*with_earlier_m - *alone_m).norm(), 1e-6);
   input.captures["1"].time_s = 10.21;
   EXPECT_EQ(find_position_m(), alone_m);
 }

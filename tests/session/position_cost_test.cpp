@@ -251,7 +251,7 @@ struct PinholeImage {
     const auto costs =
         compute_position_costs_of_row_time_candidates(found, std::array{image}, map, lens);
     EXPECT_EQ(costs.size(), found.candidates.size());
-    return costs.front();
+    return costs.empty() ? NAN : costs.front();
   }
 };
 
@@ -264,8 +264,7 @@ TEST(ComputePositionCostsOfRowTimeCandidates, IsZeroForExactLightsWithLensOrNomi
 }
 
 TEST(ComputePositionCostsOfRowTimeCandidates, AddsSquaredTiltDividedByItsSdToEachLight) {
-  // The standard deviation of roll and pitch is 0.15 rad. Its prior draws the tilt towards level by
-  // little.
+  // The standard deviation of roll and pitch is 0.15 rad. The prior barely reduces the tilt.
   EXPECT_NEAR(PinholeImage(0.15).cost(true), 6 * std::log1p(1.0 / 6), 0.03);
 }
 

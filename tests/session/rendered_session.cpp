@@ -133,7 +133,7 @@ std::vector<std::string> list_steps(const SessionResult& result) {
   return names;
 }
 
-std::vector<std::string> list_steps_run(const SessionResult& result) {
+std::vector<std::string> list_executed_steps(const SessionResult& result) {
   std::vector<std::string> names;
   for (const SessionStep& step : result.steps) {
     if (!step.is_up_to_date) names.push_back(step.name);

@@ -66,7 +66,7 @@ class RenderedSession : public testing::Test {
 /// Returns the names of the steps of a run.
 std::vector<std::string> list_steps(const SessionResult& result);
 /// Returns the names of the steps that were run, not reused.
-std::vector<std::string> list_steps_run(const SessionResult& result);
+std::vector<std::string> list_executed_steps(const SessionResult& result);
 /// Returns the step with this name. Fails the test and returns an empty step if there is none.
 SessionStep find_step(const SessionResult& result, const std::string& name);
 

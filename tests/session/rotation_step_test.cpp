@@ -20,12 +20,12 @@ using testing::Not;
 
 const auto kNoiseWarning = HasSubstr("px of noise, ");
 
-/// Rotation in place of the camera of a Survey, beside its axis.
-struct TurningCamera {
+/// Camera of a Survey that rotates about an axis, with a lever arm.
+struct RotatingCamera {
   Survey survey{1e-9};
   LampCaptures captures{{}, survey.truth.map, "lamps.yaml", survey.input.calibration};
 
-  void turn(double height_m, int count) {
+  void rotate(double height_m, int count) {
     survey.turn({0.1, -0.05, height_m}, count);
     captures.frames.clear();
     for (const AdjustmentCapture& capture : survey.input.captures) {
@@ -45,28 +45,29 @@ struct TurningCamera {
   RotationResult calibrate(RotationMethod method = RotationMethod::axis) const {
     return run_rotation_calibration_step(captures, method, {"", "test", "1.2", "--quick", {}});
   }
-  TiltResult level(bool refine_map = false) const {
+  TiltResult calibrate_tilt(bool refine_map = false) const {
     return run_tilt_calibration_step(captures, refine_map, {});
   }
 };
 
-double value_of(const StepResult& result, const std::string& metric) {
+double find_metric_or_minus_one(const StepResult& result, const std::string& metric) {
   return find_metric_value(result.metrics, metric).value_or(-1);
 }
 
 TEST(RunRotationCalibrationStep, MetricsAreTiltLeverArmAndResidualsOfExactCaptures) {
-  TurningCamera camera;
-  for (const double height_m : {0.0, 0.4}) camera.turn(height_m, 8);
+  RotatingCamera camera;
+  for (const double height_m : {0.0, 0.4}) camera.rotate(height_m, 8);
   const RotationResult result = camera.calibrate();
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_THAT(result.warnings, IsEmpty());
-  EXPECT_NEAR(value_of(result, "tilt_deg"), 0.02 * 180 / std::numbers::pi, 1e-6);
-  EXPECT_NEAR(value_of(result, "lever_arm_mm"), std::hypot(9, 4), 1e-5);
-  EXPECT_NEAR(value_of(result, "rotation_px"), 0, 1e-6);
+  EXPECT_NEAR(find_metric_or_minus_one(result, "tilt_deg"), 0.02 * 180 / std::numbers::pi, 1e-6);
+  EXPECT_NEAR(find_metric_or_minus_one(result, "lever_arm_mm"), std::hypot(9, 4), 1e-5);
+  EXPECT_NEAR(find_metric_or_minus_one(result, "rotation_px"), 0, 1e-6);
   const auto& center = result.calibration.rotation_center;
   ASSERT_TRUE(center && center->covariance);
-  EXPECT_EQ(value_of(result, "rotation_sd_px"), std::sqrt(center->covariance->trace()));
-  EXPECT_GE(value_of(result, "rotation_spread_px"), 0);
+  EXPECT_EQ(find_metric_or_minus_one(result, "rotation_sd_px"),
+            std::sqrt(center->covariance->trace()));
+  EXPECT_GE(find_metric_or_minus_one(result, "rotation_spread_px"), 0);
   ASSERT_EQ(result.calibration.history.size(), 1U);
   EXPECT_EQ(result.calibration.history[0].part, "rotation_center");
   EXPECT_EQ(result.calibration.history[0].options, "--quick");
@@ -74,11 +75,11 @@ TEST(RunRotationCalibrationStep, MetricsAreTiltLeverArmAndResidualsOfExactCaptur
 }
 
 TEST(RunRotationCalibrationStep, WarnsIfResidualsExceedThreeTimesStatedNoise) {
-  TurningCamera camera;
-  for (const double height_m : {0.0, 0.4}) camera.turn(height_m, 8);
+  RotatingCamera camera;
+  for (const double height_m : {0.0, 0.4}) camera.rotate(height_m, 8);
   Random random(4);
   camera.add_noise(random);
-  const double residual_px = value_of(camera.calibrate(), "rotation_px");
+  const double residual_px = find_metric_or_minus_one(camera.calibrate(), "rotation_px");
   ASSERT_GT(residual_px, 0.01);
   camera.state_noise(residual_px / 2.8);
   EXPECT_THAT(camera.calibrate().warnings, Not(Contains(kNoiseWarning)));
@@ -89,18 +90,18 @@ TEST(RunRotationCalibrationStep, WarnsIfResidualsExceedThreeTimesStatedNoise) {
 }
 
 TEST(RunRotationCalibrationStep, WarnsThatLeverArmIsNotEstimatedFromOneHeight) {
-  TurningCamera camera;
+  RotatingCamera camera;
   camera.survey.lever_arm_m.setZero();
   for (Lamp& lamp : camera.survey.truth.map.lamps) lamp.position_m.z() = 1.6;
   camera.captures.lamps = camera.survey.truth.map;
-  camera.turn(0.25, 8);
+  camera.rotate(0.25, 8);
   const RotationResult axis = camera.calibrate();
   ASSERT_TRUE(axis.has_succeeded()) << axis.message;
   EXPECT_THAT(axis.warnings,
               ElementsAre(HasSubstr("fixes at z = 0.250 m will be those of the rotation axis: add "
                                     "captures at a second height")));
   EXPECT_FALSE(find_metric_value(axis.metrics, "lever_arm_mm"));
-  camera.turn(0.6, 8);
+  camera.rotate(0.6, 8);
   EXPECT_THAT(camera.calibrate().warnings, IsEmpty());
   const RotationResult joint = camera.calibrate(RotationMethod::joint);
   ASSERT_TRUE(joint.has_succeeded()) << joint.message;
@@ -112,8 +113,8 @@ TEST(RunRotationCalibrationStep, WarnsThatLeverArmIsNotEstimatedFromOneHeight) {
 TEST(RunRotationCalibrationStep, WarnsIfThreeCapturesLeaveNoStandardDeviation) {
   const auto warning = HasSubstr("center has no standard deviation: add captures, four or more");
   for (const int count : {3, 4}) {
-    TurningCamera camera;
-    camera.turn(0, count);
+    RotatingCamera camera;
+    camera.rotate(0, count);
     for (Frame& frame : camera.captures.frames) {
       for (Detection& detection : frame.detections) detection.sigma_px.reset();
     }
@@ -130,8 +131,8 @@ TEST(RunRotationCalibrationStep, WarnsIfThreeCapturesLeaveNoStandardDeviation) {
 }
 
 TEST(RunRotationCalibrationStep, HasLensJacobiansOnlyWithLensCovariance) {
-  TurningCamera camera;
-  for (const double height_m : {0.0, 0.4}) camera.turn(height_m, 8);
+  RotatingCamera camera;
+  for (const double height_m : {0.0, 0.4}) camera.rotate(height_m, 8);
   EXPECT_FALSE(camera.calibrate().fit.center.jacobian_wrt_intrinsics);
   IntrinsicsReport& report = camera.captures.calibration.intrinsics_report.emplace();
   EXPECT_FALSE(camera.calibrate().fit.center.jacobian_wrt_intrinsics);
@@ -150,19 +151,19 @@ TEST(RunRotationCalibrationStep, HasLensJacobiansOnlyWithLensCovariance) {
 }
 
 TEST(RunRotationCalibrationStep, FailsIfCapturesAreNoRotationInPlace) {
-  TurningCamera camera;
+  RotatingCamera camera;
   for (int i = 0; i < 8; ++i) camera.survey.stand({{0.1 * i - 0.4, 0.05 * (i % 3), 0}, 0.7 * i});
-  camera.turn(0, 1);
+  camera.rotate(0, 1);
   const RotationResult result = camera.calibrate();
   EXPECT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_TRUE(result.file_to_correct.empty());
   EXPECT_FALSE(result.calibration.rotation_center);
 }
 
-TEST(RunRotationCalibrationStep, DoesNotBlameMovedLampForSmallArc) {
-  TurningCamera camera;
+TEST(RunRotationCalibrationStep, DoesNotReportMovedLampForSmallArc) {
+  RotatingCamera camera;
   camera.survey.truth.map.lamps[1].position_m.x() += 0.03;
-  camera.turn(0, 36);
+  camera.rotate(0, 36);
   camera.captures.frames.resize(8);  // 70 degrees
   const RotationResult result = camera.calibrate();
   EXPECT_EQ(result.failure, StepFailure::undetermined) << result.message;
@@ -171,8 +172,8 @@ TEST(RunRotationCalibrationStep, DoesNotBlameMovedLampForSmallArc) {
 }
 
 TEST(RunRotationCalibrationStep, FailsWithWrongMapForMapOfAnotherRoom) {
-  TurningCamera camera;
-  for (const double height_m : {0.0, 0.4}) camera.turn(height_m, 8);
+  RotatingCamera camera;
+  for (const double height_m : {0.0, 0.4}) camera.rotate(height_m, 8);
   std::vector<Lamp>& lamps = camera.captures.lamps.lamps;
   Random random(2);
   for (Lamp& lamp : lamps) {
@@ -184,8 +185,8 @@ TEST(RunRotationCalibrationStep, FailsWithWrongMapForMapOfAnotherRoom) {
 }
 
 TEST(RunRotationCalibrationStep, WarnsOfRejectedCaptures) {
-  TurningCamera camera;
-  for (const double height_m : {0.0, 0.4}) camera.turn(height_m, 8);
+  RotatingCamera camera;
+  for (const double height_m : {0.0, 0.4}) camera.rotate(height_m, 8);
   camera.captures.frames.push_back({"one lamp", camera.captures.frames[0].detections});
   camera.captures.frames.back().detections.resize(1);
   const RotationResult result = camera.calibrate();
@@ -194,67 +195,67 @@ TEST(RunRotationCalibrationStep, WarnsOfRejectedCaptures) {
 }
 
 TEST(RunTiltCalibrationStep, WarnsIfResidualsExceedThreeTimesStatedNoise) {
-  TurningCamera camera;
+  RotatingCamera camera;
   for (int i = 0; i < 12; ++i) camera.survey.stand({{0.05 * i - 0.3, 0.04 * (i % 3), 0}, 0.7 * i});
-  camera.turn(0, 1);
+  camera.rotate(0, 1);
   Random random(4);
   camera.add_noise(random);
   const auto warning = HasSubstr("times those expected from sigma_px: lamp map or lens");
   camera.state_noise(0.001);
-  const double scale = camera.level().tilt.noise_scale;
+  const double scale = camera.calibrate_tilt().tilt.noise_scale;
   ASSERT_GT(scale, 10);
   camera.state_noise(0.001 * scale / 2.8);
-  EXPECT_THAT(camera.level().warnings, Not(Contains(warning)));
+  EXPECT_THAT(camera.calibrate_tilt().warnings, Not(Contains(warning)));
   camera.state_noise(0.001 * scale / 3.3);
-  const TiltResult noisy = camera.level();
+  const TiltResult noisy = camera.calibrate_tilt();
   ASSERT_TRUE(noisy.has_succeeded()) << noisy.message;
   EXPECT_THAT(noisy.warnings, ElementsAre(HasSubstr("the residuals are 3.3 times those expected")));
   EXPECT_THAT(noisy.warnings, ElementsAre(HasSubstr("; --refine-map may help")));
-  EXPECT_NEAR(value_of(noisy, "tilt_deg"), 0.02 * 180 / std::numbers::pi, 0.02);
-  const TiltResult refined = camera.level(true);
+  EXPECT_NEAR(find_metric_or_minus_one(noisy, "tilt_deg"), 0.02 * 180 / std::numbers::pi, 0.02);
+  const TiltResult refined = camera.calibrate_tilt(true);
   ASSERT_TRUE(refined.has_succeeded()) << refined.message;
   EXPECT_THAT(refined.warnings, Not(Contains(HasSubstr("--refine-map"))));
 }
 
 TEST(RunTiltCalibrationStep, RequiresRowTimeOnlyForMovingCamera) {
-  TurningCamera camera;
+  RotatingCamera camera;
   for (int i = 0; i < 12; ++i) camera.survey.stand({{0.05 * i - 0.3, 0.04 * (i % 3), 0}, 0.7 * i});
-  camera.turn(0, 1);
+  camera.rotate(0, 1);
   camera.captures.motions.assign(camera.captures.frames.size(), KnownMotion());
-  EXPECT_TRUE(camera.level().has_succeeded());
+  EXPECT_TRUE(camera.calibrate_tilt().has_succeeded());
   camera.captures.motions[3].velocity_m_per_s = Eigen::Vector2d(1, 0);
-  EXPECT_THROW(camera.level(), std::invalid_argument);
+  EXPECT_THROW(camera.calibrate_tilt(), std::invalid_argument);
 }
 
 TEST(RunTiltCalibrationStep, FindsMovedLampOnlyFromCapturesAtRest) {
-  TurningCamera camera;
+  RotatingCamera camera;
   camera.survey.truth.map.lamps[1].position_m.x() += 0.03;
   for (int i = 0; i < 40; ++i) {
     camera.survey.stand({{0.05 * (i % 10) - 0.2, 0.05 * (i % 4), 0}, 0.7 * i});
   }
-  camera.turn(0, 1);
+  camera.rotate(0, 1);
   camera.captures.calibration.camera.row_time_s = 1e-9;
   camera.captures.calibration.camera.readout = Readout::rows;
   const auto lamp = HasSubstr("lamp 2 hangs 30 mm from where the map has it");
-  EXPECT_THAT(camera.level().warnings, Contains(lamp)) << "no motion is stated";
+  EXPECT_THAT(camera.calibrate_tilt().warnings, Contains(lamp)) << "no motion is stated";
   KnownMotion moving;
   moving.velocity_m_per_s = {1, 0};
   auto& motions = camera.captures.motions;
   motions.assign(camera.captures.frames.size(), KnownMotion());
   motions.back() = moving;
-  EXPECT_THAT(camera.level().warnings, Contains(lamp)) << "one of the captures moves";
+  EXPECT_THAT(camera.calibrate_tilt().warnings, Contains(lamp)) << "one of the captures moves";
   motions.assign(camera.captures.frames.size(), moving);
-  EXPECT_THAT(camera.level().warnings, Not(Contains(lamp)));
+  EXPECT_THAT(camera.calibrate_tilt().warnings, Not(Contains(lamp)));
   for (Lamp& mirrored : camera.captures.lamps.lamps) mirrored.position_m.y() *= -1;
-  const TiltResult result = camera.level();
+  const TiltResult result = camera.calibrate_tilt();
   EXPECT_EQ(result.failure, StepFailure::wrong_map) << "an error of the map as a whole";
 }
 
 TEST(RunTiltCalibrationStep, ReturnsUndeterminedForCapturesOfSingleLamp) {
-  TurningCamera camera;
-  camera.turn(0, 8);
+  RotatingCamera camera;
+  camera.rotate(0, 8);
   for (Frame& frame : camera.captures.frames) frame.detections.resize(1);
-  const TiltResult result = camera.level();
+  const TiltResult result = camera.calibrate_tilt();
   EXPECT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_FALSE(result.message.empty());
   EXPECT_FALSE(result.calibration.rotation_center);

@@ -64,7 +64,8 @@ TEST_F(RunCalibrationSessionWithClassifier, RunsStepsWithLampsAgainIfClassifierC
   run();
   write_session_file("classifier.yaml",
                      TemporaryFolder::read_content(session_file("classifier.yaml")) + "# again\n");
-  EXPECT_THAT(list_steps_run(run()), ElementsAre("rotation", "dispersion", "check", "evaluate"));
+  EXPECT_THAT(list_executed_steps(run()),
+              ElementsAre("rotation", "dispersion", "check", "evaluate"));
 }
 
 TEST_F(RunCalibrationSessionWithClassifier, RejectsRequestForStepRowTime) {

@@ -48,7 +48,7 @@ TEST_F(RunCalibrationSession, FailsStepLensIfCameraCannotBeRead) {
   }
   EXPECT_THAT(read_result("session.json"), HasSubstr("\"verdict\": \"no result\""));
   EXPECT_THAT(read_result("junit.xml"), HasSubstr("<error type=\"bad_input\""));
-  EXPECT_THAT(list_steps_run(run()), ElementsAre("lens")) << "a bad input is read again";
+  EXPECT_THAT(list_executed_steps(run()), ElementsAre("lens")) << "a bad input is read again";
 }
 
 TEST_F(RunCalibrationSession, FailsStepLensForAnotherBoard) {
@@ -68,7 +68,7 @@ TEST_F(RunCalibrationSession, FailsStepLensWithoutBoardsInImages) {
   fs::copy(session_file("check"), session_file("boards"));
   expect_failure(run(), "lens", StepFailure::undetermined, Not(IsEmpty()));
   const SessionResult again = run();
-  EXPECT_THAT(list_steps_run(again), IsEmpty()) << "the images have not changed";
+  EXPECT_THAT(list_executed_steps(again), IsEmpty()) << "the images have not changed";
   expect_failure(again, "lens", StepFailure::undetermined, Not(IsEmpty()));
 }
 
@@ -103,7 +103,7 @@ TEST_F(RunCalibrationSession, FailsStepRotationForTooFewCaptures) {
     EXPECT_FALSE(has_result(name)) << name;
   }
   EXPECT_TRUE(has_result("steps/rotation.json"));
-  EXPECT_THAT(list_steps_run(run()), IsEmpty()) << "the captures have not changed";
+  EXPECT_THAT(list_executed_steps(run()), IsEmpty()) << "the captures have not changed";
 }
 
 TEST_F(RunCalibrationSession, FailsStepRotationWithoutImages) {
@@ -281,7 +281,7 @@ TEST_F(RunCalibrationSession, InvalidGatesOfSessionRemoveOnlyEvaluation) {
   EXPECT_FALSE(has_result("evaluation.json"));
   EXPECT_THAT(read_result("session.json"), HasSubstr("odd_mm"));
   fs::remove(session_file("gates.yaml"));
-  EXPECT_THAT(list_steps_run(run()), ElementsAre("evaluate"));
+  EXPECT_THAT(list_executed_steps(run()), ElementsAre("evaluate"));
 }
 
 TEST_F(RunCalibrationSession, RejectsInvalidGatesFileOfOptionsBeforeFirstStep) {

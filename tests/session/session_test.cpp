@@ -37,7 +37,7 @@ TEST_F(RunCalibrationSession, RunsStepsInOrderAndWritesOutputsForGivenCamera) {
   EXPECT_EQ(result.reason, "");
   EXPECT_THAT(list_steps(result),
               ElementsAre("lens", "rotation", "dispersion", "check", "evaluate"));
-  EXPECT_EQ(list_steps_run(result), list_steps(result));
+  EXPECT_EQ(list_executed_steps(result), list_steps(result));
   EXPECT_EQ(list_files(results_folder),
             (std::set<std::string>{"calibration.yaml", "check-fixes.csv", "evaluation.json",
                                    "junit.xml", "rotated.yaml", "session.json"}));
@@ -99,13 +99,13 @@ TEST_F(RunCalibrationSession, ReportIncludesDigestsOfEvaluatedFiles) {
 
 TEST_F(RunCalibrationSession, LocatesDrivesInOrderOfNames) {
   fs::copy(session_file("line-x"), session_file("line-a"));
-  fs::copy(session_file("line-x"), session_file("line-without-places"));
-  fs::remove(session_file("line-without-places/truth.csv"));
+  fs::copy(session_file("line-x"), session_file("line-without-positions"));
+  fs::remove(session_file("line-without-positions/truth.csv"));
   options.report = true;
   EXPECT_THAT(list_steps(run()), ElementsAre("lens", "rotation", "dispersion", "check", "line-a",
                                              "line-x", "evaluate"));
   EXPECT_EQ(read_result("line-a-fixes.csv"), read_result("line-x-fixes.csv"));
-  EXPECT_FALSE(has_result("line-without-places-fixes.csv"));
+  EXPECT_FALSE(has_result("line-without-positions-fixes.csv"));
 }
 
 TEST_F(RunCalibrationSession, NotifiesObserverOfEachStepAndOfImages) {
@@ -140,7 +140,7 @@ TEST_F(RunCalibrationSession, ReusesAllStepsWithTheirResultsIfNothingChanged) {
   const SessionResult first = run();
   const std::string session = read_result("session.json"), junit = read_result("junit.xml");
   const SessionResult second = run();
-  EXPECT_THAT(list_steps_run(second), IsEmpty());
+  EXPECT_THAT(list_executed_steps(second), IsEmpty());
   EXPECT_EQ(list_steps(second), list_steps(first));
   EXPECT_EQ(read_result("session.json"), session);
   EXPECT_EQ(read_result("junit.xml"), junit);
@@ -148,57 +148,59 @@ TEST_F(RunCalibrationSession, ReusesAllStepsWithTheirResultsIfNothingChanged) {
 
 TEST_F(RunCalibrationSession, ReusesStepsOnlyIfTheirInputsAreUnchanged) {
   run();
-  const auto expect_steps_run = [&](const std::string& change, std::vector<std::string> steps) {
-    EXPECT_EQ(list_steps_run(run()), steps) << change;
-    EXPECT_THAT(list_steps_run(run()), IsEmpty()) << change;
+  const auto expect_executed_steps = [&](const std::string& change,
+                                         std::vector<std::string> steps) {
+    EXPECT_EQ(list_executed_steps(run()), steps) << change;
+    EXPECT_THAT(list_executed_steps(run()), IsEmpty()) << change;
   };
   const std::vector<std::string> lamp_steps{"rotation", "dispersion", "check", "evaluate"};
   const auto append = [&](const std::string& name, const std::string& text) {
     write_session_file(name, TemporaryFolder::read_content(session_file(name)) + text);
   };
   append("lamps.yaml", "# surveyed again\n");
-  expect_steps_run("lamp map", lamp_steps);
+  expect_executed_steps("lamp map", lamp_steps);
   append("camera.yaml", "# calibrated again\n");
-  expect_steps_run("camera", {"lens", "rotation", "dispersion", "check", "evaluate"});
+  expect_executed_steps("camera", {"lens", "rotation", "dispersion", "check", "evaluate"});
   append("rotation/captures.csv", "0099.png,99\n");
-  expect_steps_run("table of the rotation", {"rotation"});
+  expect_executed_steps("table of the rotation", {"rotation"});
   append("dispersion/truth.csv", "0099.png,0,0,0,0\n");
-  expect_steps_run("places of the dispersion", {"dispersion", "check", "evaluate"});
+  expect_executed_steps("positions of the dispersion", {"dispersion", "check", "evaluate"});
   append("check/truth.csv", "0099.png,0,0,0,0\n");
-  expect_steps_run("places of the check", {"check", "evaluate"});
+  expect_executed_steps("positions of the check", {"check", "evaluate"});
   append("check/captures.csv", "0099.png,99\n");
-  expect_steps_run("table of the check", {"check", "evaluate"});
+  expect_executed_steps("table of the check", {"check", "evaluate"});
   write_session_file("check/0001.png",
                      TemporaryFolder::read_content(session_file("check/0000.png")));
-  expect_steps_run("image of the check", {"check", "evaluate"});
+  expect_executed_steps("image of the check", {"check", "evaluate"});
   write_session_file("rotation/notes.txt", "taken at noon");
-  expect_steps_run("another file", {"rotation"});
+  expect_executed_steps("another file", {"rotation"});
   write_session_file("line-x/truth.csv", "image,x_m,y_m\n");
-  expect_steps_run("drive that is not reported", {});
+  expect_executed_steps("drive that is not reported", {});
 }
 
-TEST_F(RunCalibrationSession, RunsDriveAndEvaluationAgainIfPlacesOfDriveChange) {
+TEST_F(RunCalibrationSession, RunsDriveAndEvaluationAgainIfPositionsOfDriveChange) {
   options.report = true;
   run();
   edit_session_file("line-x/truth.csv", "-0.280000000,-0.010000000", "-0.281000000,-0.010000000");
-  EXPECT_THAT(list_steps_run(run()), ElementsAre("line-x", "evaluate"));
+  EXPECT_THAT(list_executed_steps(run()), ElementsAre("line-x", "evaluate"));
   edit_session_file("line-x/captures.csv", "0001.png,2.0", "0001.png,2.1");
-  EXPECT_THAT(list_steps_run(run()), ElementsAre("line-x", "evaluate"));
+  EXPECT_THAT(list_executed_steps(run()), ElementsAre("line-x", "evaluate"));
 }
 
 TEST_F(RunCalibrationSession, RunsStepsAgainIfProgramOrOptionsChange) {
   run();
   const std::vector<std::string> all{"lens", "rotation", "dispersion", "check", "evaluate"};
   options.program.version = "1.3";
-  EXPECT_EQ(list_steps_run(run()), all) << "another version";
+  EXPECT_EQ(list_executed_steps(run()), all) << "another version";
   options.program.program = "other";
-  EXPECT_EQ(list_steps_run(run()), all) << "another program";
+  EXPECT_EQ(list_executed_steps(run()), all) << "another program";
   options.frontend.threads = 2;
-  EXPECT_THAT(list_steps_run(run()), IsEmpty()) << "threads do not affect the results";
+  EXPECT_THAT(list_executed_steps(run()), IsEmpty()) << "threads do not affect the results";
   options.camera_id = "other";
-  EXPECT_THAT(list_steps_run(run()), ElementsAre("lens")) << "warning about the option";
+  EXPECT_THAT(list_executed_steps(run()), ElementsAre("lens")) << "warning about the option";
   options.report = true;
-  EXPECT_THAT(list_steps_run(run()), ElementsAre("rotation", "dispersion", "line-x", "evaluate"));
+  EXPECT_THAT(list_executed_steps(run()),
+              ElementsAre("rotation", "dispersion", "line-x", "evaluate"));
 }
 
 TEST_F(RunCalibrationSession, RunsStepsOfRoomThatIsSelected) {
@@ -212,7 +214,7 @@ TEST_F(RunCalibrationSession, RunsStepsOfRoomThatIsSelected) {
   options.frontend.room = "hall";
   const SessionResult hall = run();
   EXPECT_EQ(hall.verdict, Verdict::pass) << hall.reason;
-  EXPECT_EQ(list_steps_run(hall), list_steps(hall));
+  EXPECT_EQ(list_executed_steps(hall), list_steps(hall));
   options.frontend.room = "attic";
   const SessionResult attic = run();
   EXPECT_EQ(attic.failure, StepFailure::bad_input);
@@ -225,7 +227,7 @@ TEST_F(RunCalibrationSession, RunsStepAgainIfItsOutputWasChangedOrRemoved) {
   run();
   const std::string rotated = read_result("rotated.yaml");
   folder.file("results/rotated.yaml", "changed\n");
-  EXPECT_THAT(list_steps_run(run()), ElementsAre("rotation"));
+  EXPECT_THAT(list_executed_steps(run()), ElementsAre("rotation"));
   EXPECT_EQ(read_result("rotated.yaml"), rotated);
   for (const auto& [output, step] :
        std::vector<std::pair<std::string, std::string>>{{"rotation.svg", "rotation"},
@@ -236,7 +238,7 @@ TEST_F(RunCalibrationSession, RunsStepAgainIfItsOutputWasChangedOrRemoved) {
                                                         {"evaluation.json", "evaluate"},
                                                         {"report.html", "evaluate"}}) {
     fs::remove(results_file(output));
-    EXPECT_THAT(list_steps_run(run()), ElementsAre(step)) << output;
+    EXPECT_THAT(list_executed_steps(run()), ElementsAre(step)) << output;
     EXPECT_TRUE(has_result(output)) << output;
   }
 }
@@ -244,9 +246,9 @@ TEST_F(RunCalibrationSession, RunsStepAgainIfItsOutputWasChangedOrRemoved) {
 TEST_F(RunCalibrationSession, RunsNamedStepsAgainOnRequest) {
   run();
   options.steps_to_redo = {"evaluate", "rotation"};
-  EXPECT_THAT(list_steps_run(run()), ElementsAre("rotation", "evaluate"));
+  EXPECT_THAT(list_executed_steps(run()), ElementsAre("rotation", "evaluate"));
   options.steps_to_redo = {"lens"};
-  EXPECT_THAT(list_steps_run(run()), ElementsAre("lens"));
+  EXPECT_THAT(list_executed_steps(run()), ElementsAre("lens"));
 }
 
 TEST_F(RunCalibrationSession, RejectsRequestForUnknownStep) {
@@ -270,7 +272,7 @@ TEST_F(RunCalibrationSession, RejectsRequestForRowTimeThatIsGiven) {
   EXPECT_THAT([&] { run(); }, ThrowsMessage<std::invalid_argument>(
                                   HasSubstr("there is no step row-time in this session")));
   write_camera(std::nullopt);
-  EXPECT_THAT(list_steps_run(run()),
+  EXPECT_THAT(list_executed_steps(run()),
               ElementsAre("lens", "row-time", "rotation", "dispersion", "check", "evaluate"));
 }
 
@@ -294,7 +296,17 @@ TEST_F(RunCalibrationSession, EstimatesRowTimeIfCameraHasNone) {
   ASSERT_TRUE(result.calibration);
   EXPECT_EQ(result.calibration->camera.row_time_s, row_time_s) << "used by the next steps";
   write_session_file("rotation/notes.txt", "changes the input");
-  EXPECT_THAT(list_steps_run(run()), ElementsAre("row-time", "rotation"));
+  EXPECT_THAT(list_executed_steps(run()), ElementsAre("row-time", "rotation"));
+}
+
+TEST_F(RunCalibrationSession, StatesRowTimeInRotationOnceEstimateIsGiven) {
+  write_camera(std::nullopt);
+  run();
+  fs::copy(results_file("camera.yaml"), session_file("camera.yaml"),
+           fs::copy_options::overwrite_existing);
+  const SessionResult result = run();
+  EXPECT_THAT(list_executed_steps(result), ElementsAre("lens", "rotation", "dispersion"));
+  EXPECT_TRUE(find_metric_value(find_step(result, "rotation").result.metrics, "row_time_us"));
 }
 
 TEST_F(RunCalibrationSession, RemovesRowTimeEstimateOnceRowTimeIsGiven) {

@@ -98,21 +98,22 @@ double estimate_variance(const std::vector<double>& squares) {
                   kFixRoundingVariance);
 }
 
-/// Approaches the solution closely enough to recognize outliers. Stops if the fixes do not
-/// determine it, as solve_without_outliers() does then.
-void solve_approximately(const ReferencePointFixes& fixes, OffsetSeparation& at) {
+/// Approaches the solution closely enough to recognize outliers. Returns false if the fixes do not
+/// determine it.
+bool solve_approximately(const ReferencePointFixes& fixes, OffsetSeparation& at) {
   constexpr int iterations = 6;
   constexpr double width_squared = 2.385 * 2.385;  // 95 % efficiency for normal noise
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const auto equations = linearize_fix_equations(fixes, at);
-    if (equations.empty()) return;
+    if (equations.empty()) return false;
     std::vector<double> weights = compute_squared_residuals(equations);
     const double variance = iteration == 0 ? 0 : estimate_variance(weights);
     for (double& one : weights) {
       one = iteration == 0 ? 1 : 1 / (1 + one / (width_squared * variance));
     }
-    if (!apply_least_squares_step(equations, weights, at)) return;
+    if (!apply_least_squares_step(equations, weights, at)) return false;
   }
+  return true;
 }
 
 /// Solves by least squares without outliers. Returns true if the set of inliers differs from
@@ -167,7 +168,7 @@ std::optional<OffsetSeparation> separate_camera_and_world_offsets(
     const ReferencePointFixes& fixes) {
   OffsetSeparation result;
   result.used.resize(fixes.compute_capture_fixes_with_dispersion_offset(result.offset_px).size());
-  solve_approximately(fixes, result);
+  if (!solve_approximately(fixes, result)) return std::nullopt;
   constexpr int max_iterations = 10;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     const auto changed = solve_without_outliers(fixes, result);

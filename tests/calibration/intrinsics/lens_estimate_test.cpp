@@ -25,10 +25,10 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-constexpr double kNoise_px = 0.05;
+constexpr double kViewNoise_px = 0.05;
 
 /// Returns views named 1.png, 2.png, ... of a plain board through synthetic_lens().
-LensViews make_views(int count, double noise_px = kNoise_px) {
+LensViews make_views(int count, double noise_px = kViewNoise_px) {
   const SyntheticViews synthetic{synthetic_board(false), synthetic_lens()};
   LensViews input{{}, synthetic.board};
   Random random(11);
@@ -52,7 +52,7 @@ TEST(EstimateLens, ReturnsLensWithUncertaintyAndWithoutWarnings) {
   ASSERT_THAT(result.images, SizeIs(20));
   EXPECT_EQ(result.images.front(), "1.png");
   EXPECT_EQ(result.images.back(), "20.png");
-  EXPECT_NEAR(result.solution.rms_px, kNoise_px, 0.1 * kNoise_px);
+  EXPECT_NEAR(result.solution.rms_px, kViewNoise_px, 0.1 * kViewNoise_px);
   EXPECT_EQ(result.held_out.views, 0);
   EXPECT_FALSE(result.choice || result.better_model || result.print_px || result.sharpness);
   ASSERT_TRUE(result.lattice);
@@ -86,7 +86,7 @@ TEST(EstimateLens, HoldsOutEveryThirdView) {
     corners += 4 * static_cast<int>(input.views[i].detection.tags.size());
   }
   EXPECT_NEAR(result.held_out.corners, corners, 8);
-  EXPECT_NEAR(result.held_out.rms_px, kNoise_px, 0.2 * kNoise_px);
+  EXPECT_NEAR(result.held_out.rms_px, kViewNoise_px, 0.2 * kViewNoise_px);
   EXPECT_THAT(result.warnings, IsEmpty());
   input.views.resize(3);
   const LensEstimate few = estimate_lens(input);
@@ -172,7 +172,7 @@ LensViews make_wide_views(int count, double reach_deg, LensModel model) {
   WideBoards boards;
   boards.reach_rad = rad_from_deg(reach_deg);
   while (std::ssize(input.views) < count) {
-    BoardDetection seen = wide_view(synthetic, random, kNoise_px, boards);
+    BoardDetection seen = wide_view(synthetic, random, kViewNoise_px, boards);
     if (!has_enough_tags(seen, lattice)) continue;
     input.views.push_back({std::to_string(input.views.size()), synthetic.imager_px, seen});
   }

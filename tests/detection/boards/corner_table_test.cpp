@@ -277,6 +277,7 @@ TEST(ReadCornerTable, RotatesOnlyChessboardsBy180Degrees) {
   Board chessboard = make_charuco_board();
   chessboard.kind = BoardKind::chessboard;
   const auto kept = read_text(text, make_charuco_board()), rotated = read_text(text, chessboard);
+  ASSERT_TRUE(kept.size() == 1 && rotated.size() == 1);
   ASSERT_EQ(kept[0].detection.points.size(), 9U);
   ASSERT_EQ(rotated[0].detection.points.size(), 9U);
   EXPECT_EQ(kept[0].detection.points[0].pixel, Eigen::Vector2d(400, 400));

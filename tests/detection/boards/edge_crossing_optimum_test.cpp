@@ -133,7 +133,7 @@ TEST(FitEdgeIntersectionAtCorner, RequiresRmsBelow35PercentOfContrast) {
   EXPECT_FALSE(fit_edge_intersection_at_corner(render_image(p, 22), guess_px, directions(p), 8));
 }
 
-TEST(FitEdgeIntersectionAtCorner, RequiresBlurBelowRadius) {
+TEST(FitEdgeIntersectionAtCorner, AcceptsBlurOfHalfTheRadius) {
   Parameters p = make_parameters();
   p.tail<4>().setZero();
   const Eigen::Vector2d guess_px(20, 20);
@@ -190,8 +190,8 @@ cv::Mat1f make_quadratic_saddle(const Eigen::Vector2d& saddle_px, cv::Size size 
   return image;
 }
 
-/// All pixels are equally strong saddles, so that the first one within the reach is the initial
-/// one.
+/// The saddle strength is equal everywhere, so the search starts at the first pixel within the
+/// reach.
 TEST(FindSaddlePoint, ReturnsExactSaddleOfQuadraticSurface) {
   for (const Eigen::Vector2d& saddle_px :
        {Eigen::Vector2d(20.25, 18.5), {19.75, 19.25}, {20, 17.75}}) {

@@ -155,7 +155,7 @@ TEST(EstimateToneCurveGamma, ReturnsEndOfRangeForMonotonicCosts) {
 TEST(SumToneCurveCosts, SumsLimitedDifferencesFromSmallestCost) {
   std::vector<BoardView> views(4);
   views[0].detection.curve_costs = {10, 8, 9, 12, 2000};
-  views[1].detection.curve_costs = {5, 7};  // the second value stands for all larger gammas
+  views[1].detection.curve_costs = {5, 7};  // the second value applies to all larger gammas
   views[2].detection.curve_costs = {-1000, -1, 0, 0.5, 100};
   EXPECT_EQ(sum_tone_curve_costs(views), (ValuesPerGamma{2, 1001, 1003, 1006, 2002}));
 }

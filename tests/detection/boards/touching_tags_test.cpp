@@ -232,14 +232,14 @@ TEST(SquareCorners, RejectsCornersWithinTwoPixelsOfImageBorder) {
   const cv::Size full = drawn.levels.sharp.size();
   // The first corners are at 53.5 px, the last ones at 197.5 and 149.5 px.
   EXPECT_EQ(count({{0, 0}, full}), 35U);
-  EXPECT_EQ(count({49, 0, full.width - 49, full.height}), 35U);
+  EXPECT_EQ(count({51, 0, full.width - 51, full.height}), 35U);
   EXPECT_EQ(count({52, 0, full.width - 52, full.height}), 30U);
-  EXPECT_EQ(count({0, 49, full.width, full.height - 49}), 35U);
+  EXPECT_EQ(count({0, 51, full.width, full.height - 51}), 35U);
   EXPECT_EQ(count({0, 52, full.width, full.height - 52}), 28U);
-  EXPECT_EQ(count({0, 0, 202, full.height}), 35U);
-  EXPECT_EQ(count({0, 0, 199, full.height}), 30U);
-  EXPECT_EQ(count({0, 0, full.width, 154}), 35U);
-  EXPECT_EQ(count({0, 0, full.width, 151}), 28U);
+  EXPECT_EQ(count({0, 0, 201, full.height}), 35U);
+  EXPECT_EQ(count({0, 0, 200, full.height}), 30U);
+  EXPECT_EQ(count({0, 0, full.width, 153}), 35U);
+  EXPECT_EQ(count({0, 0, full.width, 152}), 28U);
 }
 
 TEST(DetectChessboardSizeInSquares, ReturnsZeroForImagesWithoutBoard) {
