@@ -243,7 +243,7 @@ TEST(RunDispersionCalibrationStep, DoesNotReportMovedLampForSingleYaw) {
   EXPECT_THAT(result.message, Not(HasSubstr("lamp 2")));
 }
 
-/// Positions of the axis that are stated as those of the camera, 20 mm beside it.
+/// Positions of the rotation axis, stated as camera positions; the lever arm is 20 mm.
 TEST(RunDispersionCalibrationStep, WarnsIfOffsetEqualsLeverArm) {
   SyntheticRig rig = make_rig_with_tilted_camera();
   KnownPositions known;

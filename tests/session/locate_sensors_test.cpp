@@ -219,7 +219,7 @@ TEST(LocateCameraFromDetections, NotesThatCapturesDoNotTieLampsTogether) {
               ElementsAre("relative lamp positions are not checked: captures do not tie all lamps "
                           "together"));
   input.frames.resize(1);
-  EXPECT_THAT(locate_camera_from_detections(input).notes, IsEmpty()) << "of one capture";
+  EXPECT_THAT(locate_camera_from_detections(input).notes, IsEmpty()) << "one capture";
 }
 
 TEST(LocateCameraFromDetections, WindowIgnoresFramesMoreThanFifthOfSecondEarlier) {
