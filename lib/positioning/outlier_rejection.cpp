@@ -351,6 +351,7 @@ BodySolution estimate_body_from_majority(BodyObservations& frame, const BodyProb
 
 /// Rejects lamps one after another until the reported noise explains the residuals. Returns
 /// std::nullopt if no lamp, or more than one, qualifies.
+/// @pre all observations are from the current frame
 std::optional<BodySolution> reject_moved_lamps(BodyObservations& frame, const BodyProblem& problem,
                                                const BodySolution& all) {
   BodyObservations remaining = frame;
@@ -363,7 +364,6 @@ std::optional<BodySolution> reject_moved_lamps(BodyObservations& frame, const Bo
       Agreeing others;
       others.set().reset(i);
       const BodyObservations without = select_lamps(remaining, others);
-      if (without.num_current < 2) continue;
       const auto fix = estimate_body_state(without.observations_span(), problem.arm_m,
                                            problem.prior, solution.fix.state);
       if (!fix) continue;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <utility>
 
 #include "positioning/body_solution.h"
@@ -140,6 +141,20 @@ TEST_F(PositionerMovingOrTiltedCamera, ReturnsNotFiniteForNanOrInvalidSdOfSensor
     if (which == 4) sensors.height = KnownHeight{0, 0};
     if (which == 5) sensors.height = KnownHeight{nan, 1};
     EXPECT_EQ(locate(seen(), sensors).status, FixStatus::not_finite) << which;
+  }
+}
+
+TEST_F(PositionerMovingOrTiltedCamera, ReturnsNotFiniteForEarlierFrameWithoutFiniteTime) {
+  const std::vector<Detection> detections = seen(), before = seen_from(rig, kBodyNoise_px, -0.05);
+  ASSERT_FALSE(before.empty());
+  for (const auto& [before_s, status] :
+       {std::pair(0.05, FixStatus::ok),
+        {std::numeric_limits<double>::infinity(), FixStatus::not_finite},
+        {std::numeric_limits<double>::quiet_NaN(), FixStatus::not_finite}}) {
+    const EarlierFrame earlier{before, before_s};
+    EXPECT_EQ(rig.positioner().compute_position_fix(detections, driving(), {&earlier, 1}).status,
+              status)
+        << before_s;
   }
 }
 

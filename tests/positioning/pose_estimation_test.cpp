@@ -274,6 +274,65 @@ TEST(ComputePosesFromThreeLamps, ContainsTruePoseForRandomScenes) {
   EXPECT_GE(exact, draws - 5);
 }
 
+/// Newton's method refines the distances to rounding.
+TEST(ComputePosesFromThreeLamps, PosesMatchRaysToRounding) {
+  Random random(7);
+  int num_poses = 0, num_exact = 0;
+  for (int i = 0; i < 1000; ++i) {
+    std::array<Eigen::Vector3d, 3> lamps_m, rays;
+    for (std::size_t k = 0; k < 3; ++k) {
+      lamps_m[k] = {random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(1.7, 2.3)};
+      rays[k] = lamps_m[k].normalized();
+    }
+    const ThreeLampPoses found = compute_poses_from_three_lamps(lamps_m, rays);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(found.count); ++k) {
+      const FreePose& pose = found.poses[k];
+      double max_error = 0;
+      for (std::size_t m = 0; m < 3; ++m) {
+        const Eigen::Vector3d lamp_in_camera_m =
+            pose.camera_from_world * (lamps_m[m] - pose.position_m);
+        max_error = std::max(max_error, lamp_in_camera_m.normalized().cross(rays[m]).norm());
+      }
+      ++num_poses;
+      num_exact += max_error < 1e-13;
+    }
+  }
+  EXPECT_GT(num_poses, 1000);
+  // Nearly equal solutions amplify rounding errors.
+  EXPECT_GE(num_exact, num_poses - num_poses / 100);
+}
+
+/// Rays of other points than the lamps: some have no pose, and nearly all poses match the rays.
+TEST(ComputePosesFromThreeLamps, ReturnsPosesOfRandomRaysOnlyIfTheyMatch) {
+  Random random(8);
+  int num_without_pose = 0, num_poses = 0, num_matches = 0;
+  for (int i = 0; i < 1000; ++i) {
+    std::array<Eigen::Vector3d, 3> lamps_m, rays;
+    for (std::size_t k = 0; k < 3; ++k) {
+      lamps_m[k] = {random.uniform(-2, 2), random.uniform(-2, 2), 2};
+      rays[k] = Eigen::Vector3d(random.uniform(-2, 2), random.uniform(-2, 2), 1).normalized();
+    }
+    const ThreeLampPoses found = compute_poses_from_three_lamps(lamps_m, rays);
+    num_without_pose += found.count == 0;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(found.count); ++k) {
+      const FreePose& pose = found.poses[k];
+      EXPECT_THAT(Eigen::Matrix3d(pose.camera_from_world * pose.camera_from_world.transpose()),
+                  IsNear(Eigen::Matrix3d(Eigen::Matrix3d::Identity()), 1e-9));
+      double max_error = 0;
+      for (std::size_t m = 0; m < 3; ++m) {
+        const Eigen::Vector3d lamp_in_camera_m =
+            pose.camera_from_world * (lamps_m[m] - pose.position_m);
+        max_error = std::max(max_error, lamp_in_camera_m.normalized().cross(rays[m]).norm());
+      }
+      ++num_poses;
+      num_matches += max_error < 1e-9;
+    }
+  }
+  EXPECT_GT(num_without_pose, 10);
+  EXPECT_GT(num_poses, 400);
+  EXPECT_GE(num_matches, num_poses - num_poses / 50);
+}
+
 TEST(ComputePosesFromThreeLamps, ReturnsNoPoseForCollinearLamps) {
   const std::array<Eigen::Vector3d, 3> lamps_m{
       Eigen::Vector3d(-1, 0.2, 2), {0, 0.2, 2}, {1, 0.2, 2}};

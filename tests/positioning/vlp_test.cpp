@@ -249,6 +249,10 @@ TEST_F(CInterface, VlpLocateWithEarlierRejectsNullOrTooManyDetections) {
   EXPECT_EQ(vlp_locate_with_earlier(positioner.get(), given.data(), given.size(), nullptr, &large,
                                     1, &fix),
             VLP_TOO_MANY_LAMPS);
+  const vlp_earlier_frame largest{many.data(), many.size() - given.size(), 0.05};
+  EXPECT_EQ(vlp_locate_with_earlier(positioner.get(), given.data(), given.size(), nullptr, &largest,
+                                    1, &fix),
+            VLP_DUPLICATE_LAMP);
 }
 
 TEST_F(CInterface, VlpLocateEqualsCppFixWithKnownHeight) {

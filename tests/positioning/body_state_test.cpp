@@ -1,0 +1,361 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Least-squares states of bodies from observations with given rays, without a lens.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "geometry/angles.h"
+#include "positioning/body_solution.h"
+#include "positioning/outlier_rejection.h"
+#include "positioning/pose_estimation.h"
+#include "support/matchers.h"
+
+namespace vlp {
+namespace {
+
+/// Focal length of the observations, px per rad.
+constexpr double kFocal_px = 500;
+const Eigen::Vector3d kArm_m(0.2, -0.1, 0.3);
+const std::vector<Eigen::Vector3d> kLamps_m{{-0.8, -0.5, 2.1}, {0.9, -0.4, 2.0}, {0.7, 0.6, 2.4},
+                                            {-0.6, 0.7, 2.2},  {0.1, 0.2, 2.6},  {0.2, -0.9, 2.3}};
+
+/// Returns the state whose components differ from `state` by `step` (order of BodyIndex).
+BodyState add_step(BodyState state, const Eigen::Matrix<double, kBodyStates, 1>& step) {
+  state.pose.position_m += step.head<3>();
+  state.pose.yaw_rad += step[3];
+  state.motion.velocity_m_per_s += step.segment<2>(4);
+  state.motion.yaw_rate_rad_per_s += step[6];
+  state.motion.inclination.roll_rad += step[7];
+  state.motion.inclination.pitch_rad += step[8];
+  return state;
+}
+
+/// Returns the observation of a lamp by a body, displaced by `error_px` along two directions
+/// across the ray.
+BodyObservation observe_lamp(const BodyState& state, const Eigen::Vector3d& lamp_m, double time_s,
+                             double sigma_px, const Eigen::Vector2d& error_px) {
+  const Eigen::Vector3d exact_ray =
+      (EvaluatedState(state).lamp_position_in_body(lamp_m, time_s) - kArm_m).normalized();
+  Eigen::Matrix<double, 3, 2> across;
+  across.col(0) = exact_ray.unitOrthogonal();
+  across.col(1) = exact_ray.cross(Eigen::Vector3d(across.col(0)));
+  const Eigen::Vector3d ray = (exact_ray + across * error_px / kFocal_px).normalized();
+  across.col(0) = ray.unitOrthogonal();
+  across.col(1) = ray.cross(Eigen::Vector3d(across.col(0)));
+  const Eigen::Matrix<double, 2, 3> whitened = kFocal_px / sigma_px * across.transpose();
+  return {lamp_m, ray, whitened, sigma_px, time_s};
+}
+
+/// Observations of all lamps by a body that moves, rotates and is tilted.
+class BodyStateEstimation : public testing::Test {
+ protected:
+  BodyState truth{{{0.1, -0.2, 0.05}, 0.7}, {{0.4, -0.3}, 0.5, {0.06, -0.08}}};
+  BodyPrior prior = make_prior();
+  std::vector<BodyObservation> seen = observe(0);
+
+  BodyPrior make_prior() const {
+    BodyPrior known;
+    known.mean = truth.motion;
+    return known;
+  }
+  /// Returns the observations with errors of up to `error_px`.
+  std::vector<BodyObservation> observe(double error_px) const {
+    std::vector<BodyObservation> observations;
+    for (std::size_t i = 0; i < kLamps_m.size(); ++i) {
+      const auto n = static_cast<double>(i);
+      const Eigen::Vector2d direction(std::sin(2 * n), std::cos(3 * n));
+      observations.push_back(observe_lamp(truth, kLamps_m[i], 0.004 * n - 0.008, 0.1 + 0.05 * n,
+                                          error_px * direction));
+    }
+    return observations;
+  }
+  BodyObservations make_frame() const {
+    BodyObservations frame;
+    for (const BodyObservation& observation : seen) {
+      frame.ids[frame.size] = 10 + static_cast<int>(frame.size);
+      frame.nearest_m[frame.size] = 10;
+      frame.sightings[frame.size++] = observation;
+    }
+    frame.num_current = frame.size;
+    return frame;
+  }
+  void estimate_all_states() {
+    prior.velocity_sd_m_per_s = 0.2;
+    prior.mean.velocity_m_per_s += Eigen::Vector2d(0.1, 0.05);
+    prior.yaw_rate_sd_rad_per_s = 0.3;
+    prior.mean.yaw_rate_rad_per_s -= 0.2;
+    prior.inclination_sd_rad = 0.02;
+    prior.mean.inclination.roll_rad += 0.01;
+    prior.height = KnownHeight{truth.pose.position_m.z() + 0.002, 0.003};
+  }
+  double compute_chi_squared(const BodyState& state) const {
+    return compute_body_state_chi_squared(seen, kArm_m, prior, state).value_or(-1);
+  }
+};
+
+TEST_F(BodyStateEstimation, ReturnsTruthWithoutNoise) {
+  BodyState start = truth;
+  start.pose.position_m += Eigen::Vector3d(0.3, -0.2, -0.4);
+  start.pose.yaw_rad -= 0.5;
+  const auto fix = estimate_body_state(seen, kArm_m, prior, start);
+  ASSERT_TRUE(fix);
+  EXPECT_THAT(fix->state.pose.position_m, IsNear(truth.pose.position_m, 1e-12));
+  EXPECT_NEAR(fix->state.pose.yaw_rad, truth.pose.yaw_rad, 1e-12);
+  EXPECT_NEAR(fix->chi_squared, 0, 1e-6);
+  EXPECT_NEAR(fix->residual_px, 0, 1e-4);
+  EXPECT_NEAR(fix->redundancy, 2 * static_cast<double>(seen.size()) - 4, 1e-9);
+}
+
+TEST_F(BodyStateEstimation, ReturnsNulloptWhenLampIsBehindRayAtStart) {
+  BodyState start = truth;
+  start.pose.position_m.z() += 2.05;  // between the lamps
+  EXPECT_FALSE(estimate_body_state(seen, kArm_m, prior, start));
+}
+
+/// The first full step from far below leads above the lamps, and is halved.
+TEST_F(BodyStateEstimation, ConvergesFromStartFarBelow) {
+  for (const double below_m : {3.0, 6.0, 12.0}) {
+    BodyState start = truth;
+    start.pose.position_m.z() -= below_m;
+    const auto fix = estimate_body_state(seen, kArm_m, prior, start);
+    ASSERT_TRUE(fix) << below_m;
+    EXPECT_THAT(fix->state.pose.position_m, IsNear(truth.pose.position_m, 1e-9)) << below_m;
+  }
+}
+
+TEST_F(BodyStateEstimation, ReturnsYawBetweenMinusPiAndPi) {
+  BodyState start = truth;
+  start.pose.yaw_rad += 4 * std::numbers::pi;
+  const auto fix = estimate_body_state(seen, kArm_m, prior, start);
+  ASSERT_TRUE(fix);
+  EXPECT_NEAR(fix->state.pose.yaw_rad, truth.pose.yaw_rad, 1e-12);
+}
+
+/// Compares the fix with the minimum of chi-squared, found by finite differences.
+TEST_F(BodyStateEstimation, MinimizesChiSquaredOfPixelsAndPriors) {
+  seen = observe(0.3);
+  estimate_all_states();
+  const auto fix = estimate_body_state(seen, kArm_m, prior, truth);
+  ASSERT_TRUE(fix);
+  EXPECT_NEAR(fix->chi_squared, compute_chi_squared(fix->state), 1e-5);
+  ASSERT_GT(fix->chi_squared, 1);
+  Eigen::Matrix<double, kBodyStates, kBodyStates> hessian;
+  using Vector = Eigen::Matrix<double, kBodyStates, 1>;
+  const Vector sds = fix->covariance.diagonal().cwiseSqrt();
+  ASSERT_GT(sds.minCoeff(), 0);
+  for (int i = 0; i < kBodyStates; ++i) {
+    const Vector step = 1e-3 * sds[i] * Vector::Unit(i);
+    const double slope = compute_chi_squared(add_step(fix->state, step)) -
+                         compute_chi_squared(add_step(fix->state, -step));
+    EXPECT_NEAR(slope, 0, 1e-6) << "state " << i;
+    for (int k = 0; k < kBodyStates; ++k) {
+      const Vector a = 0.1 * sds[i] * Vector::Unit(i), b = 0.1 * sds[k] * Vector::Unit(k);
+      hessian(i, k) = (compute_chi_squared(add_step(fix->state, a + b)) -
+                       compute_chi_squared(add_step(fix->state, a - b)) -
+                       compute_chi_squared(add_step(fix->state, b - a)) +
+                       compute_chi_squared(add_step(fix->state, -a - b))) /
+                      (4 * 0.01 * sds[i] * sds[k]);
+    }
+  }
+  // Chi-squared has the Hessian 2 J^T J, but for the curvature of the residuals.
+  const Eigen::Matrix<double, kBodyStates, kBodyStates> covariance = (hessian / 2).inverse();
+  for (int i = 0; i < kBodyStates; ++i) {
+    for (int k = 0; k < kBodyStates; ++k) {
+      EXPECT_NEAR(fix->covariance(i, k) / (sds[i] * sds[k]), covariance(i, k) / (sds[i] * sds[k]),
+                  0.02)
+          << i << ' ' << k;
+    }
+  }
+}
+
+TEST_F(BodyStateEstimation, SeparatesResidualsOfPixelsFromPriors) {
+  seen = observe(0.3);
+  estimate_all_states();
+  const auto fix = estimate_body_state(seen, kArm_m, prior, truth);
+  ASSERT_TRUE(fix);
+  double chi_squared = 0, sum_px2 = 0;
+  const EvaluatedState at(fix->state);
+  for (const BodyObservation& observation : seen) {
+    const Eigen::Vector3d q =
+        at.lamp_position_in_body(observation.lamp_m, observation.time_s) - kArm_m;
+    const Eigen::Vector2d residual =
+        observation.whitened_pixel_from_ray * q / observation.ray.dot(q);
+    chi_squared += residual.squaredNorm();
+    sum_px2 += (observation.sigma_px * residual).squaredNorm();
+  }
+  ASSERT_GT(chi_squared, 0);
+  EXPECT_NEAR(fix->pixels_chi_squared, chi_squared, 1e-5);
+  EXPECT_GT(fix->chi_squared, chi_squared + 0.1) << "the priors have residuals";
+  EXPECT_NEAR(fix->residual_px, std::sqrt(sum_px2 / static_cast<double>(seen.size())), 1e-6);
+}
+
+/// The expectation of chi-squared of the pixels is 2 n - trace(J C J^T), by finite differences.
+TEST_F(BodyStateEstimation, RedundancyIsExpectedChiSquaredOfPixels) {
+  for (const bool are_all_estimated : {false, true}) {
+    if (are_all_estimated) estimate_all_states();
+    const auto fix = estimate_body_state(seen, kArm_m, prior, truth);
+    ASSERT_TRUE(fix);
+    double trace = 0;
+    for (const BodyObservation& observation : seen) {
+      Eigen::Matrix<double, 2, kBodyStates> jacobian;
+      for (int i = 0; i < kBodyStates; ++i) {
+        constexpr double step = 1e-6;
+        const auto residual = [&](double by) {
+          const EvaluatedState at(
+              add_step(fix->state, by * Eigen::Matrix<double, kBodyStates, 1>::Unit(i)));
+          const Eigen::Vector3d q =
+              at.lamp_position_in_body(observation.lamp_m, observation.time_s) - kArm_m;
+          return Eigen::Vector2d(observation.whitened_pixel_from_ray * q / observation.ray.dot(q));
+        };
+        jacobian.col(i) = (residual(step) - residual(-step)) / (2 * step);
+      }
+      trace += (jacobian * fix->covariance * jacobian.transpose()).trace();
+    }
+    ASSERT_GT(trace, 1);
+    EXPECT_NEAR(fix->redundancy, 2 * static_cast<double>(seen.size()) - trace, 1e-3)
+        << are_all_estimated;
+  }
+}
+
+TEST_F(BodyStateEstimation, StatesWithoutPriorSdStayAtTheirMean) {
+  seen = observe(0.3);
+  prior.yaw_rate_sd_rad_per_s = 0.3;
+  const auto fix = estimate_body_state(seen, kArm_m, prior, truth);
+  ASSERT_TRUE(fix);
+  EXPECT_NE(fix->state.motion.yaw_rate_rad_per_s, truth.motion.yaw_rate_rad_per_s);
+  EXPECT_EQ(fix->state.motion.velocity_m_per_s, truth.motion.velocity_m_per_s);
+  EXPECT_EQ(fix->state.motion.inclination.roll_rad, truth.motion.inclination.roll_rad);
+  EXPECT_EQ(fix->state.motion.inclination.pitch_rad, truth.motion.inclination.pitch_rad);
+  EXPECT_GT(fix->covariance(6, 6), 0);
+  for (const int fixed : {4, 5, 7, 8}) {
+    EXPECT_EQ(fix->covariance.row(fixed).cwiseAbs().sum(), 0) << fixed;
+    EXPECT_EQ(fix->covariance.col(fixed).cwiseAbs().sum(), 0) << fixed;
+  }
+}
+
+TEST_F(BodyStateEstimation, ReturnsNulloptWhenLampsDoNotDetermineState) {
+  seen.resize(1);
+  EXPECT_FALSE(estimate_body_state(seen, kArm_m, prior, truth)) << "one lamp";
+}
+
+/// Tests of estimate_body_state_robust() with the same observations.
+class EstimateBodyStateRobust : public BodyStateEstimation {
+ protected:
+  static constexpr double kMaxResidualFraction = 0.1;
+
+  /// Displaces the observation of a lamp.
+  void displace(std::size_t lamp, const Eigen::Vector2d& error_px) {
+    seen[lamp] =
+        observe_lamp(truth, kLamps_m[lamp], seen[lamp].time_s, seen[lamp].sigma_px, error_px);
+  }
+  static std::vector<int> list_rejected_ids(const BodyObservations& frame) {
+    return {frame.rejected_ids.begin(), frame.rejected_ids.begin() + frame.rejected_lamps};
+  }
+};
+
+TEST_F(EstimateBodyStateRobust, RejectsLampWithResidualAboveNoise) {
+  for (std::size_t lamp = 0; lamp < seen.size(); ++lamp) {
+    seen = observe(0);
+    displace(lamp, {12, -9});
+    BodyObservations frame = make_frame();
+    const BodySolution solution =
+        estimate_body_state_robust(frame, kArm_m, prior, kMaxResidualFraction);
+    ASSERT_EQ(solution.status, FixStatus::ok) << lamp;
+    EXPECT_EQ(list_rejected_ids(frame), std::vector<int>{10 + static_cast<int>(lamp)});
+    EXPECT_EQ(frame.size, seen.size() - 1);
+    EXPECT_THAT(solution.fix.state.pose.position_m, IsNear(truth.pose.position_m, 1e-9)) << lamp;
+    EXPECT_NEAR(solution.fix.chi_squared, 0, 1e-6);
+  }
+}
+
+TEST_F(EstimateBodyStateRobust, RejectsTwoOfSixLampsWithResidualsAboveNoise) {
+  displace(1, {12, -9});
+  displace(3, {-5, -6});
+  BodyObservations frame = make_frame();
+  const BodySolution solution =
+      estimate_body_state_robust(frame, kArm_m, prior, kMaxResidualFraction);
+  ASSERT_EQ(solution.status, FixStatus::ok);
+  EXPECT_EQ(list_rejected_ids(frame), (std::vector<int>{11, 13}));
+  EXPECT_THAT(solution.fix.state.pose.position_m, IsNear(truth.pose.position_m, 1e-9));
+}
+
+TEST_F(EstimateBodyStateRobust, KeepsAllLampsWithoutMajority) {
+  displace(0, {12, -9});
+  displace(1, {-13, 10});
+  displace(4, {14, 12});
+  BodyObservations frame = make_frame();
+  const BodySolution solution =
+      estimate_body_state_robust(frame, kArm_m, prior, kMaxResidualFraction);
+  EXPECT_EQ(solution.status, FixStatus::ok);
+  EXPECT_EQ(frame.size, seen.size());
+  EXPECT_EQ(frame.rejected_lamps, 0);
+}
+
+TEST_F(EstimateBodyStateRobust, KeepsDisplacedLampWhenNoiseIsNotStated) {
+  displace(2, {12, -9});
+  BodyObservations frame = make_frame();
+  frame.noise_is_stated = false;
+  const BodySolution solution =
+      estimate_body_state_robust(frame, kArm_m, prior, kMaxResidualFraction);
+  EXPECT_EQ(solution.status, FixStatus::ok);
+  EXPECT_EQ(frame.rejected_lamps, 0);
+}
+
+TEST_F(EstimateBodyStateRobust, RejectsMisidentifiedLampBeyondResidualLimit) {
+  displace(3, {160, 120});
+  BodyObservations frame = make_frame();
+  const BodySolution solution =
+      estimate_body_state_robust(frame, kArm_m, prior, kMaxResidualFraction);
+  ASSERT_EQ(solution.status, FixStatus::ok);
+  EXPECT_EQ(list_rejected_ids(frame), std::vector<int>{13});
+  EXPECT_THAT(solution.fix.state.pose.position_m, IsNear(truth.pose.position_m, 1e-9));
+}
+
+/// One lamp of three contradicts the others, which leaves no majority.
+TEST_F(EstimateBodyStateRobust, ReturnsInconsistentForContradictionAmongThreeLamps) {
+  seen.resize(3);
+  displace(0, {160, 120});
+  BodyObservations frame = make_frame();
+  EXPECT_EQ(estimate_body_state_robust(frame, kArm_m, prior, kMaxResidualFraction).status,
+            FixStatus::inconsistent);
+}
+
+/// The motion differs from the prior by more or less than five standard deviations.
+TEST_F(EstimateBodyStateRobust, ReturnsInconsistentBeyondFiveSdsOfPrior) {
+  for (BodyObservation& observation : seen) observation.whitened_pixel_from_ray *= 1000;
+  for (const auto& [sds, status] :
+       {std::pair(4.9, FixStatus::ok), {5.1, FixStatus::inconsistent}}) {
+    BodyPrior moving = prior;
+    moving.velocity_sd_m_per_s = 0.05;
+    moving.mean.velocity_m_per_s.y() = truth.motion.velocity_m_per_s.y() - sds * 0.05;
+    BodyObservations frame = make_frame();
+    EXPECT_EQ(estimate_body_state_robust(frame, kArm_m, moving, kMaxResidualFraction).status,
+              status)
+        << "velocity, " << sds;
+    BodyPrior rotating = prior;
+    rotating.yaw_rate_sd_rad_per_s = 0.1;
+    rotating.mean.yaw_rate_rad_per_s = truth.motion.yaw_rate_rad_per_s + sds * 0.1;
+    frame = make_frame();
+    EXPECT_EQ(estimate_body_state_robust(frame, kArm_m, rotating, kMaxResidualFraction).status,
+              status)
+        << "yaw rate, " << sds;
+    BodyPrior tilted = prior;
+    tilted.inclination_sd_rad = 0.01;
+    tilted.mean.inclination.roll_rad = truth.motion.inclination.roll_rad - 0.6 * sds * 0.01;
+    tilted.mean.inclination.pitch_rad = truth.motion.inclination.pitch_rad + 0.8 * sds * 0.01;
+    frame = make_frame();
+    EXPECT_EQ(estimate_body_state_robust(frame, kArm_m, tilted, kMaxResidualFraction).status,
+              status)
+        << "tilt, " << sds;
+  }
+}
+
+}  // namespace
+}  // namespace vlp
