@@ -14,28 +14,28 @@ namespace vlp {
 
 namespace {
 
-int count_positions_along(double min_m, double max_m, double step_m) {
-  constexpr double max_places = 1e7, tolerance = 1e-9;
+/// Returns the number of positions from `min_m` to `max_m`, which may exceed every integer.
+double count_positions_along(double min_m, double max_m, double step_m) {
+  constexpr double tolerance = 1e-9;
   const double places = std::floor((max_m - min_m) / step_m + tolerance) + 1;
   if (!(step_m > 0) || !(places >= 1)) {
     throw std::invalid_argument(
         "the floor should have x_min <= x_max, y_min <= y_max and a positive step");
   }
-  if (!(places <= max_places))
-    throw std::invalid_argument("the floor has more than ten million places: take a larger step");
-  return static_cast<int>(places);
+  return places;
 }
 
 std::vector<FloorLimits::Position> make_positions_on(const FloorGrid& grid, double z_m,
                                                      double yaw_rad) {
-  const int columns = count_positions_along(grid.x_min_m, grid.x_max_m, grid.step_m);
-  const int rows = count_positions_along(grid.y_min_m, grid.y_max_m, grid.step_m);
-  if (double{1} * columns * rows > 1e7) {
+  constexpr double max_places = 1e7;
+  const double columns = count_positions_along(grid.x_min_m, grid.x_max_m, grid.step_m);
+  const double rows = count_positions_along(grid.y_min_m, grid.y_max_m, grid.step_m);
+  if (!(columns * rows <= max_places)) {
     throw std::invalid_argument("the floor has more than ten million places: take a larger step");
   }
   std::vector<FloorLimits::Position> places;
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
+  for (int row = 0; row < static_cast<int>(rows); ++row) {
+    for (int column = 0; column < static_cast<int>(columns); ++column) {
       const Eigen::Vector3d position_m(grid.x_min_m + column * grid.step_m,
                                        grid.y_min_m + row * grid.step_m, z_m);
       places.push_back({{position_m, yaw_rad}, 0, {}});

@@ -66,9 +66,9 @@ TEST_P(CommonErrorsOfFix, CommonCovarianceMatchesFiniteDifferencesOfFix) {
   rig.calibration.camera.row_time_s = 3e-5;
   rig.calibration.camera.readout = Readout::rows;
   const Adjustment adjustment = *rig.calibration.adjustment;
-  // The yaw of a mount rotates the body relative to the camera.
+  // The robot has other states than its camera.
   PositionerOptions options;
-  if (known.motion) options.mount = CameraMount{{0, 0, 0}, 0.5};
+  if (known.motion) options.mount = CameraMount{{0.3, -0.2, 0.15}, 0.5};
   const auto detections =
       known.inclination
           ? seen_from(

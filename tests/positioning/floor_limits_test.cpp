@@ -146,6 +146,8 @@ TEST(ComputeAccuracyLimitsOnFloor, ThrowsOnInvalidGrid) {
   EXPECT_THROW(on({0, 1, 0, 1, 1e-9}), std::invalid_argument);
   EXPECT_THROW(on({0, 1, 0, 1, 1e-4}), std::invalid_argument);
   EXPECT_THROW(on({0, NAN, 0, 1, 0.1}), std::invalid_argument);
+  EXPECT_THROW(on({0, 1e300, 0, 0, 1}), std::invalid_argument);
+  EXPECT_THROW(on({0, 4000, 0, 2500, 1}), std::invalid_argument) << "10,006,501 places";
 }
 
 TEST(MakeGridOfFloorPositions, GridSpansBoundingBoxOfLamps) {

@@ -102,6 +102,27 @@ TEST_F(PositionerOutlierRejection, RejectsOutlierForLampsAtManyHeightsAndTiltedC
   }
 }
 
+/// A lamp of the map near one of three detected lamps lowers the limit of their residuals, whether
+/// it comes before or after that lamp in the map.
+TEST_F(PositionerOutlierRejection, LimitsResidualsByDistanceToNearestLampOfMap) {
+  auto detections = seen(3);
+  ASSERT_EQ(detections[1].lamp, 2);
+  detections[1].pixel += Eigen::Vector2d(10, -8);
+  for (Detection& detection : detections) detection.sigma_px.reset();
+  EXPECT_EQ(locate(detections).status, FixStatus::ok);
+  const LampMap map = rig.map;
+  for (const int id : {0, 20}) {
+    for (const auto& [distance_m, status] :
+         {std::pair(2.0, FixStatus::ok), {0.01, FixStatus::inconsistent}}) {
+      rig.map = map;
+      const Eigen::Vector3d near_m =
+          map.lamps[1].position_m + Eigen::Vector3d(0.6 * distance_m, 0.8 * distance_m, 3);
+      rig.map.lamps.push_back({id, near_m, {}, {}, {}});
+      EXPECT_EQ(locate(detections).status, status) << id << ", " << distance_m;
+    }
+  }
+}
+
 TEST_F(PositionerOutlierRejection, KeepsAllLampsUnderUncorrectedTilt) {
   const LampMap map = rig.map;
   SyntheticRig tilted = rig;

@@ -127,24 +127,45 @@ TEST(LocateCameraFromDetections, FindsMovedLampOfTiltedRobot) {
 }
 
 /// Returns captures of a camera that drives at a speed, which the input does not state.
-LocateInput make_drive_at_speed(double speed_m_per_s, double sigma_px) {
+LocateInput make_drive(int count, double speed_m_per_s, double sigma_px) {
   Captures captures(0);
   captures.rig.body.motion.velocity_m_per_s = {speed_m_per_s, 0};
-  for (int i = 0; i < 8; ++i) {
+  for (int i = 0; i < count; ++i) {
     captures.rig.body.pose = {{0.02 * i - 0.1, -0.02 * i, 0}, 0.5 * i};
     captures.input.frames.push_back({std::to_string(i), seen_from(captures.rig, sigma_px)});
   }
   return captures.input;
 }
 
+TEST(LocateCameraFromDetections, WarnsOfMotionOnlyIfResidualsDetermineIt) {
+  const auto warning = HasSubstr("the images fit a moving camera, at 2 m/s: state velocities");
+  EXPECT_THAT(locate_camera_from_detections(make_drive(6, 2, 0.02)).warnings, Contains(warning));
+  LocateInput few = make_drive(2, 2, 0.02);
+  // Per frame 2 * 6 - 4 residuals at rest, of which velocity and yaw rate fit 3.
+  for (Frame& frame : few.frames) frame.detections.resize(6);
+  EXPECT_THAT(locate_camera_from_detections(few).warnings, Not(Contains(HasSubstr("a moving"))));
+}
+
+TEST(LocateCameraFromDetections, DoesNotWarnOfMotionAboveThreeMetersPerSecond) {
+  EXPECT_THAT(locate_camera_from_detections(make_drive(6, 2.8, 0.02)).warnings,
+              Contains(HasSubstr("the images fit a moving camera, at 2.8 m/s")));
+  EXPECT_THAT(locate_camera_from_detections(make_drive(6, 4, 0.02)).warnings,
+              Not(Contains(HasSubstr("a moving camera"))));
+}
+
+TEST(LocateCameraFromDetections, DoesNotWarnOfMotionWithoutRowTime) {
+  LocateInput input = make_drive(6, 2, 0.02);
+  input.calibration.camera.row_time_s.reset();
+  EXPECT_THAT(locate_camera_from_detections(input).warnings,
+              Not(Contains(HasSubstr("a moving camera"))));
+}
+
 TEST(LocateCameraFromDetections, DoesNotWarnOfMotionThatExplainsNeitherResidualsNorFailures) {
   const auto warning = HasSubstr("a moving camera");
-  EXPECT_THAT(locate_camera_from_detections(make_drive_at_speed(1, 0.02)).warnings,
-              Contains(warning));
-  EXPECT_THAT(locate_camera_from_detections(make_drive_at_speed(1, 3)).warnings,
-              Not(Contains(warning)))
+  EXPECT_THAT(locate_camera_from_detections(make_drive(8, 1, 0.02)).warnings, Contains(warning));
+  EXPECT_THAT(locate_camera_from_detections(make_drive(8, 1, 3)).warnings, Not(Contains(warning)))
       << "residuals below the stated noise";
-  LocateInput noisy = make_drive_at_speed(0, 0.02);
+  LocateInput noisy = make_drive(8, 0, 0.02);
   Random random(4);
   for (Frame& frame : noisy.frames) {
     for (Detection& detection : frame.detections) {
@@ -160,7 +181,7 @@ TEST(LocateCameraFromDetections, WarnsOfMotionThatHalvesResiduals) {
   const auto find_residual_px = [](const LocateResult& result) {
     return 0.02 * find_metric_value(result.metrics, "residual_ratio").value_or(0);
   };
-  LocateInput input = make_drive_at_speed(0.5, 0.02);
+  LocateInput input = make_drive(8, 0.5, 0.02);
   const double motion_px = find_residual_px(locate_camera_from_detections(input));
   ASSERT_GT(motion_px, 0.1);
   // Noise of motion_px / sqrt(r^2 - 1): the residuals at rest are r times the noise.
@@ -183,7 +204,7 @@ TEST(LocateCameraFromDetections, WarnsOfMotionThatHalvesResiduals) {
 }
 
 TEST(LocateCameraFromDetections, DoesNotWarnOfMotionOfCameraWhoseMotionIsStated) {
-  LocateInput input = make_drive_at_speed(1, 0.02);
+  LocateInput input = make_drive(8, 1, 0.02);
   input.captures["3"].velocity_m_per_s = Eigen::Vector2d(0, 0);
   EXPECT_THAT(locate_camera_from_detections(input).warnings,
               Not(Contains(HasSubstr("a moving camera"))));

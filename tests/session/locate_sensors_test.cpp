@@ -175,41 +175,6 @@ TEST(LocateCameraFromDetections, WarnsOfDetectionsFarOutsideImage) {
               Contains(HasSubstr("2 detections are far outside the 400 x 300 px of the camera")));
 }
 
-/// Returns captures of a camera that drives in its x direction, which the input does not state.
-LocateInput make_drive_captures(int count, double speed_m_per_s) {
-  BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
-  rig.body.motion.velocity_m_per_s = {speed_m_per_s, 0};
-  LocateInput input{{}, rig.map, rig.calibration};
-  for (int i = 0; i < count; ++i) {
-    rig.body.pose = {{0.02 * i - 0.1, -0.02 * i, 0}, 0.5 * i};
-    input.frames.push_back({std::to_string(i), seen_from(rig, 0.02)});
-  }
-  return input;
-}
-
-TEST(LocateCameraFromDetections, WarnsOfMotionOnlyIfResidualsDetermineIt) {
-  const auto warning = HasSubstr("the images fit a moving camera, at 2 m/s: state velocities");
-  EXPECT_THAT(locate_camera_from_detections(make_drive_captures(6, 2)).warnings, Contains(warning));
-  LocateInput few = make_drive_captures(2, 2);
-  // Per frame 2 * 6 - 4 residuals at rest, of which velocity and yaw rate fit 3.
-  for (Frame& frame : few.frames) frame.detections.resize(6);
-  EXPECT_THAT(locate_camera_from_detections(few).warnings, Not(Contains(HasSubstr("a moving"))));
-}
-
-TEST(LocateCameraFromDetections, DoesNotWarnOfMotionAboveThreeMetersPerSecond) {
-  EXPECT_THAT(locate_camera_from_detections(make_drive_captures(6, 2.8)).warnings,
-              Contains(HasSubstr("the images fit a moving camera, at 2.8 m/s")));
-  EXPECT_THAT(locate_camera_from_detections(make_drive_captures(6, 4)).warnings,
-              Not(Contains(HasSubstr("a moving camera"))));
-}
-
-TEST(LocateCameraFromDetections, DoesNotWarnOfMotionWithoutRowTime) {
-  LocateInput input = make_drive_captures(6, 2);
-  input.calibration.camera.row_time_s.reset();
-  EXPECT_THAT(locate_camera_from_detections(input).warnings,
-              Not(Contains(HasSubstr("a moving camera"))));
-}
-
 TEST(LocateCameraFromDetections, NotesThatCapturesDoNotTieLampsTogether) {
   LocateInput input = make_captures_at_rest(2, 0.1);
   input.compute_lamp_offsets = true;
