@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -245,6 +246,52 @@ TEST_F(BodyStateEstimation, ReturnsNulloptWhenLampsDoNotDetermineState) {
   EXPECT_FALSE(estimate_body_state(seen, kArm_m, prior, truth)) << "one lamp";
 }
 
+/// Three lamps with free roll and pitch, which have several solutions. These differ by the prior of
+/// the height only, as the pixels have almost no noise.
+class EstimateBodyStateFromThreeLamps : public BodyStateEstimation {
+ protected:
+  /// Heights of the solutions, in ascending order.
+  std::vector<double> heights_m;
+
+  void SetUp() override {
+    truth.motion = {{0, 0}, 0, truth.motion.inclination};
+    prior.mean = truth.motion;
+    seen = observe(0);
+    seen.erase(seen.begin(), seen.begin() + 3);
+    for (BodyObservation& observation : seen) observation.whitened_pixel_from_ray *= 1e4;
+    constexpr double unknown = 1e3;
+    prior.inclination_sd_rad = unknown;
+    const InitialStates states =
+        compute_initial_body_states_from_three_lamps(make_frame(), {0, 1, 2}, {kArm_m, prior});
+    ASSERT_GE(states.count, 2);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(states.count); ++i) {
+      heights_m.push_back(states.states[i].pose.position_m.z());
+    }
+    std::ranges::sort(heights_m);
+    ASSERT_GT(heights_m[1] - heights_m[0], 0.1);
+  }
+  /// Returns the status with a prior height below the lowest solution, by `height_in_gaps` times
+  /// the difference to the next one. This difference is `gap_in_sds` standard deviations.
+  FixStatus find_status(double height_in_gaps, double gap_in_sds) {
+    const double gap_m = heights_m[1] - heights_m[0];
+    prior.height = KnownHeight{heights_m[0] - height_in_gaps * gap_m, gap_m / gap_in_sds};
+    return estimate_body_state_from_all_lamps(make_frame(), {kArm_m, prior}).status;
+  }
+};
+
+TEST_F(EstimateBodyStateFromThreeLamps, IsAmbiguousIfChiSquaredDiffersByLessThan12) {
+  EXPECT_EQ(find_status(0, std::sqrt(11.8)), FixStatus::ambiguous);
+  EXPECT_EQ(find_status(0, std::sqrt(12.2)), FixStatus::ok);
+}
+
+/// The smaller chi-squared c exceeds its two degrees of freedom: the limit is 12 c / 2.
+TEST_F(EstimateBodyStateFromThreeLamps, ScalesLimitOfAmbiguityByReducedChiSquared) {
+  // c = h^2 u, and the difference is (1 + 2 h) u: equal to the limit at h = (1 + sqrt(7)) / 6.
+  constexpr double gap_in_sds = 30, height_at_limit = 0.6076;
+  EXPECT_EQ(find_status(height_at_limit + 0.02, gap_in_sds), FixStatus::ambiguous);
+  EXPECT_EQ(find_status(height_at_limit - 0.02, gap_in_sds), FixStatus::ok);
+}
+
 /// Tests of estimate_body_state_robust() with the same observations.
 class EstimateBodyStateRobust : public BodyStateEstimation {
  protected:
@@ -316,6 +363,22 @@ TEST_F(EstimateBodyStateRobust, RejectsMisidentifiedLampBeyondResidualLimit) {
   ASSERT_EQ(solution.status, FixStatus::ok);
   EXPECT_EQ(list_rejected_ids(frame), std::vector<int>{13});
   EXPECT_THAT(solution.fix.state.pose.position_m, IsNear(truth.pose.position_m, 1e-9));
+}
+
+/// The state of the majority is first estimated at rest: driving displaces its lamps by more than
+/// the limit.
+TEST_F(EstimateBodyStateRobust, RejectsMisidentifiedLampOfDrivingCamera) {
+  truth.motion.velocity_m_per_s = {2, -1.5};
+  seen = observe(0);
+  prior.velocity_sd_m_per_s = 1;
+  displace(3, {160, 120});
+  BodyObservations frame = make_frame();
+  frame.nearest_m.fill(0.08);
+  const BodySolution solution =
+      estimate_body_state_robust(frame, kArm_m, prior, kMaxResidualFraction);
+  ASSERT_EQ(solution.status, FixStatus::ok);
+  EXPECT_EQ(list_rejected_ids(frame), std::vector<int>{13});
+  EXPECT_THAT(solution.fix.state.pose.position_m, IsNear(truth.pose.position_m, 1e-3));
 }
 
 /// One lamp of three contradicts the others, which leaves no majority.

@@ -78,7 +78,10 @@ TEST_F(PositionerStatus, ReturnsNotFiniteForNonFiniteInputOrSigmaOutOfRange) {
                     : *detections[1].sigma_px) = bad;
       EXPECT_EQ(status(detections), FixStatus::not_finite);
     }
-    EXPECT_EQ(status(seen(3), {Inclination{bad, 0}, 0, {}}), FixStatus::not_finite);
+    const Fix fix = Positioner(rig.map, rig.calibration)
+                        .compute_position_fix(seen(3), {Inclination{bad, 0}, 0, {}});
+    EXPECT_EQ(fix.status, FixStatus::not_finite);
+    EXPECT_EQ(fix.unknown_lamps, 0);
     EXPECT_EQ(status(seen(3), {Inclination{0, 0}, bad, {}}), FixStatus::not_finite);
     EXPECT_EQ(status(seen(1), {{}, 0, HeightAndYaw{bad, 0}}), FixStatus::not_finite);
     EXPECT_EQ(status(seen(1), {{}, 0, HeightAndYaw{0, bad}}), FixStatus::not_finite);
@@ -88,6 +91,36 @@ TEST_F(PositionerStatus, ReturnsNotFiniteForNonFiniteInputOrSigmaOutOfRange) {
     detections[0].sigma_px = bad;
     EXPECT_EQ(status(detections), FixStatus::not_finite);
   }
+}
+
+TEST_F(PositionerStatus, ThrowsOnOptionsOutOfRange) {
+  const auto make = [&](const auto& set_option) {
+    PositionerOptions options;
+    set_option(options);
+    return Positioner(rig.map, rig.calibration, options);
+  };
+  for (const double in_range : {1e-4, 1e3}) {
+    EXPECT_NO_THROW(make([&](PositionerOptions& options) { options.unstated_sigma_px = in_range; }))
+        << in_range;
+  }
+  for (const double bad : {0.0, 0.9e-4, 1.1e3, kNan}) {
+    EXPECT_THROW(make([&](PositionerOptions& options) { options.unstated_sigma_px = bad; }),
+                 std::invalid_argument)
+        << bad;
+  }
+  for (const double bad : {0.0, -0.1, kNan}) {
+    EXPECT_THROW(make([&](PositionerOptions& options) { options.max_residual_fraction = bad; }),
+                 std::invalid_argument)
+        << bad;
+  }
+  EXPECT_THROW(make([](PositionerOptions& options) {
+                 options.mount = {{0, kNan, 0}, 0};
+               }),
+               std::invalid_argument);
+  EXPECT_THROW(make([](PositionerOptions& options) {
+                 options.mount = {{0, 0, 0}, kNan};
+               }),
+               std::invalid_argument);
 }
 
 TEST_F(PositionerStatus, ReturnsOutsideLensForUnreachablePixel) {
