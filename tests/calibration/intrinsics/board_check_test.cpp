@@ -4,8 +4,14 @@
 
 #include <gmock/gmock.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
 #include <iterator>
+#include <string>
+#include <vector>
 
 #include "calibration/intrinsics/synthetic_views.h"
 
@@ -163,6 +169,350 @@ TEST_P(CheckBoardLayout, SuggestsAnotherBoardWhenTagIdsArePermuted) {
 
 INSTANTIATE_TEST_SUITE_P(Boards, CheckBoardLayout, testing::Bool(),
                          [](const auto& board) { return board.param ? "Kalibr" : "Plain"; });
+
+/// Frontal view of a board, as by a camera without perspective.
+struct FlatView {
+  double px_per_m = 1000, turn_rad = 0, shift_px = 0;
+};
+
+bool is_any_tag(int) { return true; }
+
+/// Returns the view of the tags of a board with these ids; `shift_px` moves their edges inwards.
+BoardView make_flat_view(const Board& board, const FlatView& view,
+                         const std::function<bool(int id)>& is_shown = is_any_tag) {
+  BoardView seen{"", {2000, 2000}, {}};
+  for (const BoardTag& place : list_board_tags(board)) {
+    if (!is_shown(place.id)) continue;
+    TagDetection tag{place.id, {}};
+    for (std::size_t k = 0; k < 4; ++k) {
+      tag.corners_px[k] = Eigen::Vector2d(900, 700) +
+                          view.px_per_m * (Eigen::Rotation2Dd(view.turn_rad) * place.corners_m[k]);
+    }
+    seen.detection.tags.push_back(shrunk(tag, view.shift_px));
+  }
+  return seen;
+}
+
+std::vector<BoardView> make_flat_views(const Board& board, const std::vector<FlatView>& views,
+                                       const std::function<bool(int id)>& is_shown = is_any_tag) {
+  std::vector<BoardView> seen;
+  seen.reserve(views.size());
+  for (const FlatView& view : views) seen.push_back(make_flat_view(board, view, is_shown));
+  return seen;
+}
+
+/// Board of 4 x 3 tags of 20 mm with gaps of 8 mm.
+Board small_board() {
+  Board board = synthetic_board(false);
+  board.cols = 4;
+  board.rows = 3;
+  board.tag_spacing = 0.4;
+  board.id_order = {false, BoardCorner::top_left};
+  return board;
+}
+
+std::string layout_problem(const Board& stated, const std::vector<BoardView>& views) {
+  return check_board_layout(stated, views, {}).problem;
+}
+
+TEST(CheckFlatBoardLayout, NamesEveryIdOrder) {
+  for (const bool column_major : {false, true}) {
+    for (const auto from : {BoardCorner::bottom_left, BoardCorner::bottom_right,
+                            BoardCorner::top_left, BoardCorner::top_right}) {
+      Board truth = small_board();
+      truth.id_order = {column_major, from};
+      const auto views = make_flat_views(truth, {{1000, 0.3, 0}, {1500, -2, 0}});
+      EXPECT_EQ(layout_problem(truth, views), "");
+      EXPECT_NEAR(check_board_layout(truth, views, {}).pitch.value(), 1.4, 1e-9);
+      Board stated = truth;
+      stated.id_order.column_major = !column_major;
+      const std::string expected =
+          "the images show cols 4, rows 3, id_order " + id_order_name(truth.id_order);
+      EXPECT_EQ(layout_problem(stated, views), expected);
+      stated = truth;
+      stated.id_order.from =
+          from == BoardCorner::top_left ? BoardCorner::top_right : BoardCorner::top_left;
+      EXPECT_EQ(layout_problem(stated, views), expected);
+    }
+  }
+}
+
+TEST(CheckFlatBoardLayout, NamesFirstIdOfOtherBoard) {
+  Board truth = small_board();
+  truth.first_id = 7;
+  const auto views = make_flat_views(truth, {{1000, 0.3, 0}, {1500, -2, 0}});
+  EXPECT_EQ(layout_problem(small_board(), views),
+            "the images show cols 4, rows 3, id_order row-major-from-top-left, first_id 7");
+  Board column = truth;
+  column.id_order.column_major = true;
+  EXPECT_EQ(layout_problem(small_board(), make_flat_views(column, {{1000, 0.3, 0}, {1500, -2, 0}})),
+            "the images show cols 4, rows 3, id_order column-major-from-top-left, first_id 7");
+}
+
+TEST(CheckFlatBoardLayout, CountsRowsUpToLastTagSeen) {
+  // Two of three rows are seen; all three are stated.
+  const auto views = make_flat_views(small_board(), {{1000, 0.3, 0}, {1500, -2, 0}},
+                                     [](int id) { return id < 8; });
+  EXPECT_EQ(layout_problem(small_board(), views), "");
+  Board other = small_board();
+  other.id_order.from = BoardCorner::bottom_right;
+  EXPECT_EQ(layout_problem(other, views),
+            "the images show cols 4, rows 3, id_order row-major-from-top-left");
+  Board wide = small_board();
+  wide.cols = 6;
+  wide.rows = 2;
+  EXPECT_EQ(layout_problem(wide, views),
+            "the images show cols 4, rows 2, id_order row-major-from-top-left");
+}
+
+TEST(CheckFlatBoardLayout, NeedsTenStepsBetweenTags) {
+  // Tags of n have n (n - 1) steps to their neighbors.
+  const auto first = [](int count) { return [count](int id) { return id < count; }; };
+  std::vector<BoardView> views{make_flat_view(small_board(), {}, first(3)),
+                               make_flat_view(small_board(), {}, first(2))};
+  EXPECT_FALSE(check_board_layout(small_board(), views, {}).pitch) << "eight steps";
+  views.push_back(views.back());
+  const BoardCheck ten = check_board_layout(small_board(), views, {});
+  ASSERT_TRUE(ten.pitch);
+  EXPECT_NEAR(*ten.pitch, 1.4, 1e-9);
+  EXPECT_EQ(ten.problem, "");
+  const BoardCheck none = check_board_layout(small_board(), {}, {});
+  EXPECT_FALSE(none.pitch);
+  EXPECT_EQ(none.problem, "");
+}
+
+TEST(CheckFlatBoardLayout, ToleranceOfSpacingIsFivePercentOfPitchOrOneWithLens) {
+  const std::array parameters{800.0, 800.0, 1000.0, 1000.0};
+  const Lens lens(LensModel::pinhole, parameters);
+  const auto views = make_flat_views(small_board(), {{1000, 0.3, 0}, {1000, -2, 0}});
+  struct Stated {
+    double tag_spacing;
+    bool fits, fits_with_lens;
+  };
+  // The pitch is 1.4 tags: 1.4 / 1.05 = 1.333, 1.4 / 0.95 = 1.474, 1.4 / 1.01 = 1.386 and 1.4 /
+  // 0.99 = 1.414.
+  for (const auto& [tag_spacing, fits, fits_with_lens] :
+       {Stated{0.33, false, false}, Stated{0.335, true, false}, Stated{0.385, true, false},
+        Stated{0.388, true, true}, Stated{0.413, true, true}, Stated{0.416, true, false},
+        Stated{0.472, true, false}, Stated{0.476, false, false}}) {
+    Board stated = small_board();
+    stated.tag_spacing = tag_spacing;
+    EXPECT_EQ(layout_problem(stated, views).empty(), fits) << tag_spacing;
+    const BoardCheck with_lens = check_board_layout(stated, views, lens);
+    EXPECT_EQ(with_lens.problem.empty(), fits_with_lens) << tag_spacing;
+    EXPECT_NEAR(with_lens.pitch.value(), 1.4, 1e-9);
+  }
+  Board stated = small_board();
+  stated.tag_spacing = 0.25;
+  EXPECT_EQ(layout_problem(stated, views),
+            "tag_spacing is 0.25, but the images show gaps of 0.4 tags");
+}
+
+TEST(CheckFlatBoardLayout, PitchAllowsForStatedShiftOfEdges) {
+  // Tags of 20 px with edges moved inwards by 1 px are 18 px wide; the pitch is 28 px.
+  const auto views = make_flat_views(small_board(), {{1000, 0.3, 1}, {1000, -2, 1}});
+  EXPECT_NEAR(check_board_layout(small_board(), views, {}, 0).pitch.value(), 28 / 18.0, 1e-9);
+  EXPECT_NEAR(check_board_layout(small_board(), views, {}, 1).pitch.value(), 1.4, 1e-9);
+  EXPECT_NEAR(check_board_layout(small_board(), views, {}, 9).pitch.value(), 28 / 21.0, 1e-9);
+  EXPECT_NEAR(check_board_layout(small_board(), views, {}, -9).pitch.value(), 28 / 15.0, 1e-9);
+}
+
+/// Tags of several widths separate the spacing from a displacement of the edges of up to 1.5 px.
+TEST(CheckFlatBoardLayout, UnknownShiftOfEdgesIsNoWrongSpacing) {
+  const auto views_with_shift = [](double shift_px, const std::vector<double>& scales) {
+    std::vector<FlatView> views;
+    for (const double scale : scales) views.push_back({scale, 0.1 * scale, shift_px});
+    return make_flat_views(small_board(), views);
+  };
+  const std::vector<double> several{700, 1000, 1500, 2000};
+  for (const double shift_px : {1.45, 1.0, -1.0, -1.45}) {
+    const auto views = views_with_shift(shift_px, several);
+    EXPECT_GT(std::abs(check_board_layout(small_board(), views, {}).pitch.value() / 1.4 - 1), 0.05);
+    EXPECT_EQ(layout_problem(small_board(), views), "") << shift_px;
+    Board stated = small_board();
+    stated.tag_spacing = 0.6;  // 1.6 / 1.4 = 1.14
+    if (shift_px < 0) EXPECT_NE(layout_problem(stated, views), "") << shift_px;
+  }
+  for (const double shift_px : {1.6, -1.6}) {
+    EXPECT_NE(layout_problem(small_board(), views_with_shift(shift_px, several)), "") << shift_px;
+  }
+  EXPECT_NE(layout_problem(small_board(), views_with_shift(1.4, {1000, 1000, 1000, 1000})), "")
+      << "tags of one width";
+}
+
+TEST(CheckFlatBoardLayout, IgnoresTagsWithoutRaysOrBehindCamera) {
+  const std::array fisheye{100.0, 100.0, 400.0, 300.0, 0.0, 0.0, 0.0, 0.0};
+  const Lens lens(LensModel::fisheye, fisheye);
+  // All tags are more than 90 degrees (157 px) from the axis.
+  const auto far = make_flat_views(small_board(), {{1000, 0, 0}, {1000, 0, 0}});
+  EXPECT_TRUE(check_board_layout(small_board(), far, {}).pitch);
+  EXPECT_FALSE(check_board_layout(small_board(), far, lens).pitch);
+}
+
+TEST(CheckFlatBoardLayout, UsesTagsThatBoardDoesNotHave) {
+  // Rows 3 and 4 of a taller board count as foreign tags.
+  Board tall = small_board();
+  tall.rows = 5;
+  auto views = make_flat_views(tall, {{1000, 0.3, 0}, {1500, -2, 0}});
+  for (BoardView& view : views) {
+    auto& tags = view.detection.tags;
+    const auto foreign = std::stable_partition(tags.begin(), tags.end(),
+                                               [](const TagDetection& tag) { return tag.id < 12; });
+    view.detection.foreign_tags.assign(foreign, tags.end());
+    tags.erase(foreign, tags.end());
+  }
+  EXPECT_EQ(layout_problem(small_board(), views),
+            "the images show cols 4, rows 5, id_order row-major-from-top-left");
+}
+
+TEST(CheckFlatBoardLayout, ReportsOtherBoardForTagsInDisorder) {
+  auto views = make_flat_views(small_board(), {{1000, 0.3, 0}, {1500, -2, 0}});
+  for (BoardView& view : views) {
+    for (TagDetection& tag : view.detection.tags) tag.id = tag.id * 5 % 12;
+  }
+  EXPECT_EQ(layout_problem(small_board(), views),
+            "the tags in the images do not lie as on a board of 4 x 3 tags from id 0 in any "
+            "id_order; is it another board?");
+}
+
+/// ChArUco board of 7 x 5 squares of 30 mm with markers of 22.5 mm.
+Board charuco_board() {
+  Board board = small_board();
+  board.kind = BoardKind::charuco;
+  board.family = "DICT_5X5_100";
+  board.cols = 7;
+  board.rows = 5;
+  board.tag_size_m = 0.0225;
+  board.square_size_m = 0.03;
+  return board;
+}
+
+TEST(CheckCharucoLayout, ReportsNoProblemForCorrectBoard) {
+  for (const bool top_left_white : {false, true}) {
+    Board board = charuco_board();
+    board.top_left_white = top_left_white;
+    const auto views = make_flat_views(board, {{1000, 0.3, 0}, {1500, -2, 0}});
+    const BoardCheck check = check_board_layout(board, views, {});
+    EXPECT_EQ(check.problem, "");
+    ASSERT_TRUE(check.pitch);
+    EXPECT_NEAR(*check.pitch, 4.0 / 3, 1e-9);
+  }
+}
+
+TEST(CheckCharucoLayout, ReportsSizeOfSquareBeyondFifteenPercent) {
+  const auto views = make_flat_views(charuco_board(), {{1000, 0.3, 0}, {1500, -2, 0}});
+  struct Stated {
+    double marker_m;
+    bool fits;
+  };
+  // Squares are 1.333 markers wide: 1.333 / 1.15 = 1.159 (marker of 25.9 mm) and 1.333 / 0.85 =
+  // 1.569 (19.1 mm).
+  for (const auto& [marker_m, fits] :
+       {Stated{0.0261, false}, Stated{0.0257, true}, Stated{0.0193, true}, Stated{0.0189, false}}) {
+    Board stated = charuco_board();
+    stated.tag_size_m = marker_m;
+    EXPECT_EQ(layout_problem(stated, views).empty(), fits) << marker_m;
+  }
+  Board stated = charuco_board();
+  stated.tag_size_m = 0.018;
+  EXPECT_EQ(layout_problem(stated, views),
+            "a square is 1.67 markers wide by board.yaml, but 1.33 in the images");
+}
+
+TEST(CheckCharucoLayout, NamesSquaresThatMarkersShow) {
+  const auto views = make_flat_views(charuco_board(), {{1000, 0.3, 0}, {1500, -2, 0}});
+  Board stated = charuco_board();
+  stated.cols = 8;
+  EXPECT_EQ(layout_problem(stated, views), "the images show cols 7, rows 5, top_left black");
+  stated.cols = 5;
+  stated.rows = 7;
+  EXPECT_EQ(layout_problem(stated, views), "the images show cols 7, rows 5, top_left black");
+  Board white = charuco_board();
+  white.top_left_white = true;
+  white.rows = 6;
+  const auto white_views = make_flat_views(white, {{1000, 0.3, 0}, {1500, -2, 0}});
+  EXPECT_EQ(layout_problem(white, white_views), "");
+  stated = white;
+  stated.cols = 6;
+  stated.top_left_white = false;
+  EXPECT_EQ(layout_problem(stated, white_views), "the images show cols 7, rows 6, top_left white");
+}
+
+TEST(CheckCharucoLayout, ReportsOtherBoardForMarkersInDisorder) {
+  auto views = make_flat_views(charuco_board(), {{1000, 0.3, 0}, {1500, -2, 0}});
+  for (BoardView& view : views) {
+    for (TagDetection& tag : view.detection.tags) tag.id = tag.id * 7 % 17;
+  }
+  EXPECT_EQ(layout_problem(charuco_board(), views),
+            "the markers in the images do not lie as on a ChArUco board of 7 x 5 squares from id "
+            "0; is it another board?");
+}
+
+TEST(CheckCharucoLayout, IgnoresMarkersOfSecondBoard) {
+  auto views = make_flat_views(charuco_board(), {{1000, 0, 0}, {1500, 0, 0}});
+  const auto other = make_flat_views(charuco_board(), {{1000, 0, 0}, {1500, 0, 0}},
+                                     [](int id) { return id < 14; });
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    for (TagDetection tag : other[i].detection.tags) {
+      tag.id = 40 + tag.id * 5 % 14;
+      for (auto& corner : tag.corners_px) corner.x() += 700;
+      views[i].detection.foreign_tags.push_back(tag);
+    }
+  }
+  EXPECT_EQ(layout_problem(charuco_board(), views), "");
+}
+
+TEST(CheckFlatBoardLayout, PitchIsThatOfTagsUpToTwoPitchesApart) {
+  Board board = small_board();
+  board.cols = board.rows = 10;
+  for (const int apart : {1, 2, 3}) {
+    const auto views = make_flat_views(board, {{1000, 0.3, 0}, {1500, -2, 0}}, [apart](int id) {
+      return id % 10 % apart == 0 && id / 10 % apart == 0;
+    });
+    const auto pitch = check_board_layout(board, views, {}).pitch;
+    ASSERT_EQ(pitch.has_value(), apart < 3) << apart;
+    if (pitch) EXPECT_NEAR(*pitch, 1.4, 1e-9);
+  }
+}
+
+/// Steps may deviate from the direction on the board by a quarter of their length.
+TEST(CheckFlatBoardLayout, AcceptsTagsThatAreSlightlyOutOfLine) {
+  for (const double shear : {0.24, 0.28}) {
+    auto views = make_flat_views(small_board(), {{1000, 0, 0}, {1500, 0, 0}});
+    for (BoardView& view : views) {
+      for (TagDetection& tag : view.detection.tags) {
+        const double down_px = shear * (tag.corners_px[0].x() - 900);
+        for (auto& corner : tag.corners_px) corner.y() += down_px;
+      }
+    }
+    EXPECT_EQ(layout_problem(small_board(), views).empty(), shear < 0.25) << shear;
+  }
+}
+
+TEST(CheckCharucoLayout, NamesRowsIfMostMarkersAreUnknown) {
+  // 14 of 31 markers are known, and two fifths of the steps.
+  Board tall = charuco_board();
+  tall.rows = 9;
+  const auto views = make_flat_views(tall, {{1000, 0.3, 0}, {1500, -2, 0}});
+  Board stated = charuco_board();
+  stated.rows = 4;
+  EXPECT_EQ(layout_problem(stated, views), "the images show cols 7, rows 9, top_left black");
+}
+
+TEST(CheckCharucoLayout, KeepsStatedRowsIfFewerAreSeen) {
+  const auto views = make_flat_views(charuco_board(), {{1000, 0.3, 0}, {1500, -2, 0}});
+  Board stated = charuco_board();
+  stated.rows = 9;
+  EXPECT_EQ(layout_problem(stated, views), "");
+  // Boards of six columns, with the other color of the first square.
+  Board six = charuco_board();
+  six.cols = 6;
+  const auto views_of_six = make_flat_views(six, {{1000, 0.3, 0}, {1500, -2, 0}});
+  six.rows = 9;
+  EXPECT_EQ(layout_problem(six, views_of_six), "");
+  six.top_left_white = true;
+  EXPECT_EQ(layout_problem(six, views_of_six), "the images show cols 6, rows 9, top_left black");
+}
 
 }  // namespace
 }  // namespace vlp

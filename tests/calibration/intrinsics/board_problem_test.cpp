@@ -2,14 +2,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/intrinsics/board_problem.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
 #include <vector>
 
 #include "calibration/intrinsics/intrinsics.h"
+#include "calibration/intrinsics/rotation_vector.h"
 #include "calibration/intrinsics/synthetic_views.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {
@@ -91,6 +95,389 @@ TEST(SolveIntermediateBoardProblem, SolvesByMrcalIfLensCannotProjectAllPoints) {
             solve_board_problem(by_mrcal, kLens));
   EXPECT_EQ(intermediate.intrinsics, by_mrcal.intrinsics);
   EXPECT_NE(intermediate.intrinsics, start.intrinsics);
+}
+
+/// Returns the position of a lattice point on the warped board, m (BoardProblem).
+Eigen::Vector3d compute_warped_point(const BoardProblem& problem, std::size_t index) {
+  const auto cols = static_cast<std::size_t>(problem.cols);
+  const double i = static_cast<double>(index % cols), j = static_cast<double>(index / cols);
+  const double across = 2 * i / (problem.cols - 1) - 1, down = 2 * j / (problem.rows - 1) - 1;
+  return {problem.spacing_m * i, problem.spacing_m * j,
+          problem.warp_m.x() * (1 - across * across) + problem.warp_m.y() * (1 - down * down)};
+}
+
+/// Returns a problem of four boards of 10 x 8 points with exact measurements of weight 1.
+BoardProblem make_exact_problem(LensModel model = LensModel::fisheye) {
+  BoardProblem problem{};
+  problem.lens_model = model;
+  problem.intrinsics = {290, 295, 402, 297};
+  if (model == LensModel::fisheye)
+    problem.intrinsics.insert(problem.intrinsics.end(), {0.03, -0.012, 0.004, -0.0006});
+  if (model == LensModel::opencv8) {
+    problem.intrinsics.insert(problem.intrinsics.end(),
+                              {-0.25, 0.08, 2e-4, -1e-4, -0.012, 0.01, 0.002, 1e-4});
+  }
+  problem.imager_px = {800, 600};
+  problem.cols = 10;
+  problem.rows = 8;
+  problem.spacing_m = 0.02;
+  problem.warp_m = {0.0006, -0.0004};
+  problem.poses = {{{0.5, -0.3, 0.2}, {-0.08, -0.05, 0.25}},
+                   {{-0.4, 0.5, -0.1}, {-0.12, -0.06, 0.22}},
+                   {{0.1, 0.6, 0.3}, {-0.02, -0.09, 0.3}},
+                   {{-0.5, -0.4, 0.1}, {-0.15, 0.0, 0.28}}};
+  const Lens lens(model, problem.intrinsics);
+  for (const BoardPose& pose : problem.poses) {
+    for (std::size_t i = 0; i < problem.num_points_per_board(); ++i) {
+      const auto pixel = lens.project_point(rotation_matrix_from_rotation_vector(pose.rotation) *
+                                                compute_warped_point(problem, i) +
+                                            pose.translation_m);
+      problem.points.emplace_back(pixel->x(), pixel->y(), 1);
+    }
+  }
+  return problem;
+}
+
+/// Moves all parameters of a problem, the warp and the distortions on request.
+BoardProblem perturb(BoardProblem problem, bool distortions, bool warp) {
+  problem.intrinsics[0] *= 1.01;
+  problem.intrinsics[1] *= 0.99;
+  problem.intrinsics[2] += 2;
+  problem.intrinsics[3] -= 3;
+  for (std::size_t i = 4; distortions && i < problem.intrinsics.size(); ++i)
+    problem.intrinsics[i] *= 0.9;
+  if (warp) problem.warp_m = {0, 0};
+  for (BoardPose& pose : problem.poses) {
+    pose.rotation += Eigen::Vector3d(0.02, -0.01, 0.015);
+    pose.translation_m += Eigen::Vector3d(0.002, -0.001, 0.003);
+  }
+  return problem;
+}
+
+void expect_same_parameters(const BoardProblem& found, const BoardProblem& truth,
+                            double tolerance) {
+  ASSERT_EQ(found.intrinsics.size(), truth.intrinsics.size());
+  for (std::size_t i = 0; i < truth.intrinsics.size(); ++i)
+    EXPECT_NEAR(found.intrinsics[i], truth.intrinsics[i], tolerance * (i < 4 ? 100 : 1)) << i;
+  EXPECT_THAT(found.warp_m, IsNear(truth.warp_m, tolerance));
+  ASSERT_EQ(found.poses.size(), truth.poses.size());
+  for (std::size_t i = 0; i < truth.poses.size(); ++i) {
+    EXPECT_THAT(found.poses[i].rotation, IsNear(truth.poses[i].rotation, tolerance)) << i;
+    EXPECT_THAT(found.poses[i].translation_m, IsNear(truth.poses[i].translation_m, tolerance)) << i;
+  }
+}
+
+TEST(SolveBoardProblem, ReturnsTrueParametersOfFisheyeWithWarp) {
+  const BoardProblem truth = make_exact_problem();
+  BoardProblem problem = perturb(truth, true, true);
+  ASSERT_TRUE(solve_board_problem(problem, {true, true, true, false}));
+  expect_same_parameters(problem, truth, 1e-7);
+}
+
+TEST(SolveBoardProblem, KeepsParametersThatAreNotSolved) {
+  const BoardProblem truth = make_exact_problem();
+  BoardProblem core = perturb(truth, false, false);
+  ASSERT_TRUE(solve_board_problem(core, {true, false, false, false}));
+  expect_same_parameters(core, truth, 1e-7);
+  for (std::size_t i = 4; i < 8; ++i) EXPECT_EQ(core.intrinsics[i], truth.intrinsics[i]);
+  EXPECT_EQ(core.warp_m, truth.warp_m);
+  BoardProblem poses = perturb(truth, false, false);
+  poses.intrinsics = truth.intrinsics;
+  ASSERT_TRUE(solve_board_problem(poses, {false, false, false, false}));
+  expect_same_parameters(poses, truth, 1e-7);
+  EXPECT_EQ(poses.intrinsics, truth.intrinsics);
+  BoardProblem flat = perturb(truth, true, true);
+  ASSERT_TRUE(solve_board_problem(flat, {true, true, false, false}));
+  EXPECT_EQ(flat.warp_m, Eigen::Vector2d(0, 0));
+  EXPECT_GT(compute_max_residual_difference_px(flat, truth), 0.01);
+}
+
+TEST(SolveBoardProblem, ReturnsTrueParametersOfModelWithoutDistortions) {
+  const BoardProblem truth = make_exact_problem(LensModel::stereographic);
+  for (const bool by_ceres : {false, true}) {
+    BoardProblem problem = perturb(truth, false, true);
+    const SolveOptions options{true, true, true, false};
+    ASSERT_TRUE(by_ceres ? solve_board_problem_by_ceres(problem, options)
+                         : solve_board_problem(problem, options));
+    expect_same_parameters(problem, truth, 1e-4);
+  }
+}
+
+TEST(SolveIntermediateBoardProblem, ReturnsTrueParametersAndMarksNoOutliers) {
+  const BoardProblem truth = make_exact_problem();
+  BoardProblem problem = perturb(truth, true, true);
+  ASSERT_TRUE(solve_intermediate_board_problem(problem, {true, true, true, false}));
+  expect_same_parameters(problem, truth, 1e-6);
+  problem.points[7].x() += 50;
+  ASSERT_TRUE(solve_intermediate_board_problem(problem, {true, true, true, true}));
+  EXPECT_TRUE(std::ranges::all_of(problem.points, [](const auto& point) { return point.z() > 0; }));
+}
+
+TEST(SolveBoardProblem, IgnoresOutliersAndPointsNotSeen) {
+  const BoardProblem truth = make_exact_problem();
+  BoardProblem problem = perturb(truth, true, true);
+  for (std::size_t i = 0; i < problem.points.size(); i += 7)
+    problem.points[i] << 1, 2, i % 2 == 0 ? -1 : BoardProblem::kUnseen;
+  ASSERT_TRUE(solve_board_problem(problem, {true, true, true, false}));
+  expect_same_parameters(problem, truth, 1e-7);
+}
+
+/// One board has 6 pose parameters, the lens has 8 intrinsics: 7 points give 14 residuals.
+TEST(SolveBoardProblem, FailsWithFewerResidualsThanUnknowns) {
+  BoardProblem problem = make_exact_problem();
+  problem.poses.resize(1);
+  problem.points.resize(problem.num_points_per_board());
+  const std::array<std::size_t, 7> kept{0, 9, 34, 46, 57, 70, 79};
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    if (std::ranges::find(kept, i) == kept.end()) problem.points[i].z() = BoardProblem::kUnseen;
+  }
+  BoardProblem fewer = problem;
+  fewer.points[34].z() = -1;
+  EXPECT_TRUE(solve_board_problem(problem, kLens));
+  EXPECT_FALSE(solve_board_problem(fewer, kLens));
+}
+
+TEST(SolveBoardProblem, FailsForBoardWithoutPoints) {
+  BoardProblem problem = make_exact_problem();
+  for (std::size_t i = 80; i < 160; ++i) problem.points[i].z() = BoardProblem::kUnseen;
+  EXPECT_FALSE(solve_board_problem(problem, kLens));
+}
+
+TEST(SolveBoardProblem, FailsForInvalidInitialLens) {
+  for (const std::size_t parameter : {0U, 1U}) {
+    BoardProblem problem = make_exact_problem();
+    problem.intrinsics[parameter] *= -1;
+    EXPECT_FALSE(solve_board_problem(problem, kLens)) << parameter;
+  }
+  BoardProblem problem = make_exact_problem();
+  problem.intrinsics[5] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(solve_board_problem(problem, kLens));
+}
+
+/// The mirrored image has an exact solution with a negative focal length, which mrcal returns.
+TEST(SolveBoardProblem, FailsForNegativeFocalLength) {
+  for (const std::size_t axis : {0U, 1U}) {
+    BoardProblem problem = make_exact_problem(LensModel::stereographic);
+    for (Eigen::Vector3d& point : problem.points) {
+      double& coordinate = axis == 0 ? point.x() : point.y();
+      coordinate = 2 * problem.intrinsics[2 + axis] - coordinate;
+    }
+    problem.intrinsics[axis] *= -1;
+    BoardProblem by_mrcal = problem;
+    ASSERT_TRUE(solve_board_problem_by_mrcal(by_mrcal, {true, false, false, false}));
+    ASSERT_LT(by_mrcal.intrinsics[axis], 0);
+    EXPECT_FALSE(solve_board_problem(problem, {true, false, false, false})) << axis;
+  }
+}
+
+/// Weighted residuals are about 0.01 px on each axis. The largest one is about 0.059 px or 0.046 px
+/// after the solve, five standard deviations are 0.05 px.
+TEST(SolveBoardProblemByCeres, RejectsWeightedResidualsBeyondFiveSigmas) {
+  for (const bool is_outlier : {false, true}) {
+    for (const int axis : {0, 1}) {
+      BoardProblem problem = make_exact_problem();
+      Random random(9);
+      for (std::size_t i = 0; i < problem.points.size(); ++i) {
+        const double weight = i % 2 == 0 ? 2 : 0.5;
+        const Eigen::Vector2d signs(random.uniform(-1, 1) < 0 ? -1 : 1,
+                                    random.uniform(-1, 1) < 0 ? -1 : 1);
+        problem.points[i].head<2>() += 0.01 / weight * signs;
+        problem.points[i].z() = weight;
+      }
+      const BoardProblem without = problem;
+      Eigen::Vector3d& displaced = problem.points[101];
+      displaced[axis] = make_exact_problem().points[101][axis] + (is_outlier ? 0.062 : 0.048) / 0.5;
+      ASSERT_TRUE(solve_board_problem_by_ceres(problem, {true, true, true, true}));
+      for (std::size_t i = 0; i < problem.points.size(); ++i) {
+        const bool is_marked = is_outlier && i == 101;
+        EXPECT_EQ(problem.points[i].z(), is_marked ? -0.5 : without.points[i].z()) << i;
+      }
+      if (!is_outlier) continue;
+      // The solution is that without the outlier.
+      BoardProblem removed = without;
+      removed.points[101].z() = BoardProblem::kUnseen;
+      ASSERT_TRUE(solve_board_problem_by_ceres(removed, {true, true, true, false}));
+      expect_same_parameters(problem, removed, 1e-6);
+    }
+  }
+}
+
+TEST(SolveBoardProblemByCeres, KeepsOutliersOnRequest) {
+  BoardProblem problem = make_exact_problem();
+  problem.points[101].x() += 20;
+  ASSERT_TRUE(solve_board_problem_by_ceres(problem, {true, true, true, false}));
+  EXPECT_GT(problem.points[101].z(), 0);
+}
+
+/// Returns a problem with different weights, residuals, an outlier and a point that is not seen.
+BoardProblem make_problem_to_linearize(LensModel model) {
+  BoardProblem problem = perturb(make_exact_problem(model), true, false);
+  for (std::size_t i = 0; i < problem.points.size(); ++i)
+    problem.points[i].z() = 0.5 + 0.01 * static_cast<double>(i % 50);
+  problem.points[3].z() = -0.7;
+  problem.points[120].z() = BoardProblem::kUnseen;
+  return problem;
+}
+
+/// Returns the entry of the state: intrinsics, poses, warp.
+double& state_entry(BoardProblem& problem, std::size_t index) {
+  const std::size_t intrinsics = problem.intrinsics.size(), poses = 6 * problem.poses.size();
+  if (index < intrinsics) return problem.intrinsics[index];
+  index -= intrinsics;
+  if (index >= poses) return problem.warp_m[static_cast<Eigen::Index>(index - poses)];
+  BoardPose& pose = problem.poses[index / 6];
+  const auto k = static_cast<Eigen::Index>(index % 6);
+  return k < 3 ? pose.rotation[k] : pose.translation_m[k - 3];
+}
+
+Eigen::VectorXd compute_weighted_residuals(const BoardProblem& problem) {
+  Eigen::VectorXd residuals =
+      Eigen::VectorXd::Zero(static_cast<Eigen::Index>(2 * problem.points.size()));
+  const Lens lens(problem.lens_model, problem.intrinsics);
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    if (!(problem.points[i].z() > 0)) continue;
+    const BoardPose& pose = problem.poses[i / problem.num_points_per_board()];
+    const auto pixel =
+        lens.project_point(rotation_matrix_from_rotation_vector(pose.rotation) *
+                               compute_warped_point(problem, i % problem.num_points_per_board()) +
+                           pose.translation_m);
+    residuals.segment<2>(static_cast<Eigen::Index>(2 * i)) =
+        problem.points[i].z() * (*pixel - problem.points[i].head<2>());
+  }
+  return residuals;
+}
+
+TEST(LinearizeBoardProblemAnalytically, MatchesDifferenceQuotients) {
+  const BoardProblem problem = make_problem_to_linearize(LensModel::fisheye);
+  for (const bool warp : {false, true}) {
+    const Linearization at =
+        linearize_board_problem_analytically(problem, {true, true, warp, false});
+    const std::size_t states = 8 + 6 * 4 + (warp ? 2 : 0);
+    ASSERT_EQ(at.jacobian_transposed.rows(), static_cast<Eigen::Index>(states));
+    ASSERT_EQ(at.jacobian_transposed.cols(), 640);
+    EXPECT_EQ(at.first_intrinsic, 0);
+    EXPECT_EQ(at.poses, 8);
+    EXPECT_EQ(at.regularization.size(), 0);
+    EXPECT_THAT(at.residuals_px, IsNear(compute_weighted_residuals(problem), 1e-9));
+    const Eigen::MatrixXd packed = Eigen::MatrixXd(at.jacobian_transposed);
+    for (std::size_t k = 0; k < states; ++k) {
+      const auto row = static_cast<Eigen::Index>(k);
+      BoardProblem lower = problem, upper = problem;
+      const double step = k < 4 ? 1e-3 : 1e-6;
+      state_entry(lower, k) -= step;
+      state_entry(upper, k) += step;
+      const Eigen::VectorXd quotient =
+          (compute_weighted_residuals(upper) - compute_weighted_residuals(lower)) / (2 * step);
+      EXPECT_NEAR(packed.row(row).norm(), 1, 1e-9) << k;
+      EXPECT_THAT((packed.row(row).transpose() / at.scale[row]).eval(),
+                  IsNear(quotient, 1e-6 * quotient.norm()))
+          << k;
+    }
+  }
+}
+
+TEST(LinearizeBoardProblemAnalytically, ScaleIsOneForStateWithoutEffect) {
+  BoardProblem problem = make_exact_problem();
+  for (std::size_t i = 0; i < 80; ++i) problem.points[i].z() = -1;
+  const Linearization at = linearize_board_problem_analytically(problem, kLens);
+  for (Eigen::Index k = 8; k < 14; ++k) EXPECT_EQ(at.scale[k], 1);
+  EXPECT_NE(at.scale[14], 1);
+  EXPECT_TRUE(at.residuals_px.head(160).isZero(0));
+}
+
+/// Points behind a lens of OPENCV8 are not projected.
+TEST(LinearizeBoardProblemAnalytically, OmitsPointsThatLensDoesNotProject) {
+  BoardProblem problem = make_exact_problem(LensModel::opencv8);
+  problem.poses[1].translation_m.z() *= -1;
+  const Linearization at = linearize_board_problem_analytically(problem, kLens);
+  EXPECT_TRUE(at.residuals_px.segment(160, 160).isZero(0));
+  EXPECT_TRUE(Eigen::MatrixXd(at.jacobian_transposed).middleCols(160, 160).isZero(0));
+  EXPECT_GT(Eigen::MatrixXd(at.jacobian_transposed).middleCols(0, 160).norm(), 0);
+}
+
+TEST(LinearizeBoardProblem, MatchesMrcalForOpencv8) {
+  const BoardProblem problem = make_problem_to_linearize(LensModel::opencv8);
+  const SolveOptions options{true, true, true, false};
+  const Linearization by_mrcal = linearize_board_problem(problem, options),
+                      analytic = linearize_board_problem_analytically(problem, options);
+  EXPECT_GT(by_mrcal.regularization.size(), 0);
+  ASSERT_EQ(by_mrcal.poses, analytic.poses);
+  ASSERT_EQ(by_mrcal.residuals_px.size(), analytic.residuals_px.size());
+  EXPECT_THAT(by_mrcal.residuals_px, IsNear(analytic.residuals_px, 1e-6));
+  const auto unpack = [](const Linearization& at) -> Eigen::MatrixXd {
+    return (at.scale.cwiseInverse().asDiagonal() * Eigen::MatrixXd(at.jacobian_transposed))
+        .leftCols(at.residuals_px.size());
+  };
+  const Eigen::MatrixXd expected = unpack(by_mrcal), found = unpack(analytic);
+  ASSERT_EQ(found.rows(), expected.rows());
+  for (Eigen::Index k = 0; k < found.rows(); ++k)
+    EXPECT_LT((found.row(k) - expected.row(k)).norm(), 1e-6 * expected.row(k).norm()) << k;
+  EXPECT_EQ(linearize_board_problem(make_exact_problem(), options).regularization.size(), 0);
+}
+
+TEST(CollectInlierCornerPixels, ReturnsPixelsWithPositiveWeight) {
+  BoardProblem problem{};
+  problem.points = {{1, 2, 1}, {3, 4, -1}, {5, 6, BoardProblem::kUnseen}, {7, 8, 0.1}, {9, 10, 0}};
+  EXPECT_THAT(collect_inlier_corner_pixels(problem),
+              testing::ElementsAre(Eigen::Vector2d(1, 2), Eigen::Vector2d(7, 8)));
+}
+
+TEST(IsLensModelSupportedByMrcal, ReturnsFalseForFisheyeOnly) {
+  EXPECT_FALSE(is_lens_model_supported_by_mrcal(LensModel::fisheye));
+  for (const LensModel model : {LensModel::pinhole, LensModel::stereographic, LensModel::opencv4,
+                                LensModel::opencv5, LensModel::opencv8, LensModel::opencv12}) {
+    EXPECT_TRUE(is_lens_model_supported_by_mrcal(model)) << lens_model_name(model);
+  }
+}
+
+TEST(ComputeReprojectionResiduals, ReturnsMeasuredMinusProjected) {
+  BoardProblem problem = make_exact_problem();
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    problem.points[i].head<2>() += Eigen::Vector2d(0.01 * static_cast<double>(i), -0.5);
+    problem.points[i].z() = i % 3 == 0 ? -2 : 3;
+  }
+  problem.points[100].z() = BoardProblem::kUnseen;
+  const auto residuals = compute_reprojection_residuals(problem);
+  ASSERT_EQ(residuals.size(), 320U);
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    if (i == 100) {
+      EXPECT_TRUE(std::isnan(residuals[i].x()) && std::isnan(residuals[i].y()));
+    } else {
+      EXPECT_THAT(residuals[i], IsNear(Eigen::Vector2d(0.01 * static_cast<double>(i), -0.5), 1e-9));
+    }
+  }
+}
+
+TEST(ComputeReprojectionResiduals, ReturnsNanForPointsThatLensDoesNotProject) {
+  BoardProblem problem = make_exact_problem(LensModel::opencv8);
+  problem.poses[1].translation_m.z() *= -1;
+  const auto residuals = compute_reprojection_residuals(problem);
+  ASSERT_EQ(residuals.size(), 320U);
+  for (std::size_t i = 0; i < residuals.size(); ++i)
+    EXPECT_EQ(residuals[i].allFinite(), i < 80 || i >= 160) << i;
+}
+
+/// Residuals of 3, 1 and 2 px with weights 1, 2 and 0.5: squares 9 + 4 + 1.
+TEST(IntrinsicsSolution, FitStatisticsAreWeightedRmsPerAxisAndCounts) {
+  IntrinsicsSolution solution{};
+  solution.problem = make_exact_problem();
+  for (Eigen::Vector3d& point : solution.problem.points) point.z() = BoardProblem::kUnseen;
+  auto& points = solution.problem.points;
+  const std::vector<Eigen::Vector3d> exact = make_exact_problem().points;
+  points[5] << exact[5].x() + 3, exact[5].y(), 1;
+  points[90] << exact[90].x() + 0.6, exact[90].y() - 0.8, 2;
+  points[200] << exact[200].x(), exact[200].y() + 2, 0.5;
+  points[201] << exact[201].x(), exact[201].y() + 50, -0.5;
+  points[202] << exact[202].x(), exact[202].y() + 50, -1;
+  solution.corners = solution.outliers = 77;
+  solution.update_lens_fit_statistics();
+  EXPECT_EQ(solution.corners, 3);
+  EXPECT_EQ(solution.outliers, 2);
+  EXPECT_NEAR(solution.rms_px, std::sqrt(14. / 6), 1e-9);
+  for (const std::size_t i : {5U, 90U, 200U}) points[i].z() = BoardProblem::kUnseen;
+  solution.update_lens_fit_statistics();
+  EXPECT_EQ(solution.corners, 0);
+  EXPECT_EQ(solution.rms_px, 0);
 }
 
 }  // namespace

@@ -5,9 +5,20 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
 #include "calibration/intrinsics/camera_exports.h"
+#include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/sample_cameras.h"
+#include "camera/lens.h"
 #include "camera/spline_grid.h"
+#include "rig/calibration.h"
 #include "rig/input_error.h"
 #include "support/temporary_folder.h"
 
@@ -157,6 +168,332 @@ TEST(ConvertCameraToLensModel, IsExactOnlyIfTargetModelIncludesSourceModel) {
   const auto half =
       convert_camera_to_lens_model(make_camera(LensModel::fisheye), LensModel::opencv4);
   EXPECT_LT(half.common_fraction, 1);
+}
+
+/// A .cameramodel of a pinhole with other texts for its entries.
+std::string cameramodel_with(const std::string& imagersize, const std::string& intrinsics,
+                             const std::string& others = "") {
+  return "{ 'lensmodel': 'LENSMODEL_PINHOLE', 'imagersize': " + imagersize +
+         ", 'intrinsics': " + intrinsics + others + " }";
+}
+
+const Camera kPinhole{"camera", {800, 600}, LensModel::pinhole, {520, 521, 402, 297}, {}, {}, {}};
+
+TEST_F(ReadCameraOfAnyFormat, ReadsCameramodelWithAnyBracketsQuotesAndBlanks) {
+  comes_back(kPinhole, cameramodel_with("(800,600)", "\t\r\n((520), [521, 402], 297)"),
+             LensModel::pinhole);
+  comes_back(kPinhole,
+             "{\"lensmodel\" \t: \"LENSMODEL_PINHOLE\",'imagersize'\n:\n[ 800, 600 ],"
+             "\"intrinsics\":[520,521,402,297]}",
+             LensModel::pinhole);
+  const ImportedCamera read = read_camera_of_any_format(
+      folder_.file("a", cameramodel_with("[800, 600]", "[520, 521, 402, 297]")));
+  EXPECT_EQ(read.camera.id, "camera");
+  EXPECT_TRUE(read.region.empty());
+}
+
+TEST_F(ReadCameraOfAnyFormat, ReadsKeyInOtherQuotesIfFirstIsNoEntry) {
+  const std::string intrinsics = "\"intrinsics\": [520, 521, 402, 297]";
+  for (const char* const first : {"'a': ['intrinsics'], ", "'intrinsics': 5, ", "'intrinsics', "}) {
+    comes_back(kPinhole,
+               "{ 'lensmodel': 'LENSMODEL_PINHOLE', 'imagersize': [800, 600], " +
+                   std::string(first) + intrinsics + "}",
+               LensModel::pinhole);
+  }
+}
+
+TEST_F(ReadCameraOfAnyFormat, RejectsCameramodelWithoutEntry) {
+  const std::string size = "[800, 600]", core = "[520, 521, 402, 297]";
+  EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL_PINHOLE', 'intrinsics': " + core + "}"),
+              testing::EndsWith("camera.txt: lacks 'imagersize'"));
+  EXPECT_THAT(refusal(cameramodel_with(size, "5")), testing::EndsWith("lacks 'intrinsics'"));
+  EXPECT_THAT(refusal(cameramodel_with(size, "[520, 521")),
+              testing::EndsWith("lacks 'intrinsics'"));
+  EXPECT_THAT(refusal("{ 'lensmodel'"), testing::EndsWith("lacks 'lensmodel'"));
+  EXPECT_THAT(refusal("{ 'lensmodel':"), testing::EndsWith("lacks 'lensmodel'"));
+  EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL"), testing::EndsWith("lacks 'lensmodel'"));
+  EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL_PINHOLE', 'imagersize': [800, 600], "
+                      "'optimization_inputs': b'0', 'intrinsics': " +
+                      core + "}"),
+              testing::EndsWith("lacks 'intrinsics'"))
+      << "entries after the inputs of the solve";
+}
+
+TEST_F(ReadCameraOfAnyFormat, IgnoresEntriesOfOptimizationInputsInCameramodel) {
+  comes_back(kPinhole,
+             cameramodel_with("[800, 600]", "[520, 521, 402, 297]",
+                              ", 'optimization_inputs': b'[[', 'valid_intrinsics_region': []"),
+             LensModel::pinhole);
+}
+
+TEST_F(ReadCameraOfAnyFormat, RejectsInvalidImageSizeOfCameramodel) {
+  const std::string core = "[520, 521, 402, 297]";
+  for (const char* const size : {"[800]", "[800, 600, 3]", "[0, 600]", "[800, -1]", "[800, 0.5]",
+                                 "[1048577, 600]", "[800, 1048577]"}) {
+    EXPECT_THAT(refusal(cameramodel_with(size, core)),
+                testing::EndsWith("'imagersize' should be the image's width and height in pixels"))
+        << size;
+  }
+  EXPECT_EQ(refusal(cameramodel_with("[1, 1048576]", core)), "");
+  EXPECT_THAT(refusal(cameramodel_with("[800, x]", core)),
+              testing::EndsWith("'imagersize' should be numbers"));
+}
+
+TEST_F(ReadCameraOfAnyFormat, ReadsOpenOrClosedRegionOfThreePixelsOrMore) {
+  const auto with_region = [](const std::string& region) {
+    return cameramodel_with("[800, 600]", "[520, 521, 402, 297]",
+                            ", 'valid_intrinsics_region': " + region);
+  };
+  const ImageRegion three{{1, 2}, {300, 4}, {30, 400}};
+  for (const char* const region :
+       {"[[1, 2], [300, 4], [30, 400]]", "[[1, 2], [300, 4], [30, 400], [1, 2]]"}) {
+    EXPECT_EQ(read_camera_of_any_format(folder_.file("a", with_region(region))).region, three);
+  }
+  for (const char* const region : {"[[1, 2], [300, 4]]", "[[1, 2], [300, 4], [1, 2]]",
+                                   "[[1, 2], [300, 4], [30, 400], [1]]", "[1]"}) {
+    EXPECT_THAT(refusal(with_region(region)),
+                testing::EndsWith("'valid_intrinsics_region' should be three pixels or more"))
+        << region;
+  }
+  EXPECT_THAT(refusal(with_region("[ ]")),
+              testing::EndsWith("'valid_intrinsics_region' is empty, so the lens has no valid "
+                                "region; leave the key out if it is valid in the whole image"));
+}
+
+/// Comments end with their line, also within a string that has an escaped quote before.
+TEST_F(ReadCameraOfAnyFormat, CommentEndsWithLineAndQuotesEndWithUnescapedQuote) {
+  comes_back(kPinhole,
+             "{ 'a': \"it's #1\", 'b': '\\\\', # 'c\n"
+             "'lensmodel': 'LENSMODEL_PINHOLE', 'imagersize': [800, #9\n600],\n"
+             "'intrinsics': [520, 521, 402, 297] }\\",
+             LensModel::pinhole);
+  EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL_PINHOLE', 'imagersize': [800, 600] # "
+                      "'intrinsics': [520, 521, 402, 297] }"),
+              testing::EndsWith("lacks 'intrinsics'"));
+}
+
+/// OpenCV's text of a camera with these distortions, and further lines.
+std::string opencv_text(const std::string& distortions, const std::string& others = "") {
+  return "image_width: 800\nimage_height: 600\n"
+         "camera_matrix: {rows: 3, cols: 3, data: [520, 0, 402, 0, 521, 297, 0, 0, 1]}\n"
+         "distortion_coefficients: {data: " +
+         distortions + "}\n" + others;
+}
+
+TEST_F(ReadCameraOfAnyFormat, NumberOfYamlDistortionsDeterminesLensModel) {
+  struct Expected {
+    std::string distortions;
+    LensModel model;
+    std::size_t count;
+  };
+  for (const auto& [distortions, model, count] :
+       {Expected{"[]", LensModel::pinhole, 0}, Expected{"[0, 0, 0, 0, 0]", LensModel::pinhole, 0},
+        Expected{"[0, 0, 3, 4]", LensModel::opencv4, 4},
+        Expected{"[1, 2, 3, 4, 0]", LensModel::opencv5, 5},
+        Expected{"[1, 2, 3, 4, 5, 6, 7, 8]", LensModel::opencv8, 8},
+        Expected{"[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]", LensModel::opencv12, 12},
+        Expected{"[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0, 0]", LensModel::opencv12, 12}}) {
+    const Camera camera =
+        read_camera_of_any_format(folder_.file("a.yaml", opencv_text(distortions))).camera;
+    EXPECT_EQ(camera.lens_model, model) << distortions;
+    ASSERT_EQ(camera.intrinsics.size(), 4 + count);
+    EXPECT_EQ(std::vector<double>(camera.intrinsics.begin(), camera.intrinsics.begin() + 4),
+              (std::vector<double>{520, 521, 402, 297}));
+    if (count > 0) EXPECT_EQ(camera.intrinsics[6], 3);
+    EXPECT_EQ(camera.imager_px, (std::array{800, 600}));
+    EXPECT_EQ(camera.id, "camera");
+  }
+  for (const char* const distortions : {"[1, 2, 3]", "[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0]",
+                                        "[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 1, 0]",
+                                        "[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0, 1]"}) {
+    EXPECT_THAT(
+        refusal(opencv_text(distortions)),
+        testing::EndsWith("distortions should be 0, 4, 5, 8 or 12 numbers, the sensor not tilted"))
+        << distortions;
+  }
+}
+
+TEST_F(ReadCameraOfAnyFormat, ReadsYamlDistortionModelAndName) {
+  const auto read = [&](const std::string& others) {
+    return read_camera_of_any_format(folder_.file("a.yaml", opencv_text("[1, 2, 3, 4]", others)))
+        .camera;
+  };
+  EXPECT_EQ(read("").lens_model, LensModel::opencv4);
+  for (const char* const name : {"plumb_bob", "rational_polynomial", "radtan", "none"}) {
+    EXPECT_EQ(read(std::string("distortion_model: ") + name).lens_model, LensModel::opencv4);
+  }
+  for (const char* const fisheye :
+       {"distortion_model: fisheye", "distortion_model: equidistant", "fisheye_model: 1"}) {
+    const Camera camera = read(fisheye);
+    EXPECT_EQ(camera.lens_model, LensModel::fisheye);
+    EXPECT_EQ(camera.intrinsics, (std::vector<double>{520, 521, 402, 297, 1, 2, 3, 4}));
+  }
+  EXPECT_EQ(read("fisheye_model: 0").lens_model, LensModel::opencv4);
+  EXPECT_EQ(read("fisheye_model: 1\ndistortion_model: plumb_bob").lens_model, LensModel::opencv4);
+  EXPECT_EQ(read("camera_name: left").id, "left");
+  EXPECT_THAT(refusal(opencv_text("[1, 2, 3]", "distortion_model: equidistant")),
+              testing::EndsWith("equidistant has four coefficients"));
+  EXPECT_THAT(refusal(opencv_text("[1, 2, 3, 4]", "distortion_model: thin_prism")),
+              testing::EndsWith("there is no distortion model like thin_prism here"));
+}
+
+TEST_F(ReadCameraOfAnyFormat, ReadsKalibrCameraWithAndWithoutDistortions) {
+  const std::string head =
+      "cam0:\n  camera_model: pinhole\n  intrinsics: [520, 521, 402, 297]\n"
+      "  resolution: [800, 600]\n";
+  comes_back(kPinhole, head, LensModel::pinhole);
+  comes_back(kPinhole, head + "  distortion_model: none\n  distortion_coeffs: [1, 2, 3]\n",
+             LensModel::pinhole);
+  EXPECT_THAT(refusal(head + "  distortion_model: radtan\n"),
+              testing::HasSubstr("contains no supported camera: "));
+  EXPECT_THAT(refusal(head + "  distortion_model: radtan\n  distortion_coeffs: 5\n"),
+              testing::EndsWith("a list of numbers is missing"));
+  EXPECT_THAT(refusal("cam0:\n  camera_model: omni\n"),
+              testing::EndsWith("camera_model omni is not supported; use pinhole"));
+}
+
+TEST_F(ReadCameraOfAnyFormat, RejectsInvalidYamlCameras) {
+  const std::string text = opencv_text("[1, 2, 3, 4]");
+  const auto replaced = [&](const std::string& from, const std::string& to) {
+    return std::string(text).replace(text.find(from), from.size(), to);
+  };
+  EXPECT_THAT(refusal(replaced(", 0, 0, 1]", ", 0, 0]")),
+              testing::EndsWith("camera_matrix should be 3 x 3"));
+  EXPECT_THAT(refusal(replaced("data: [520", "dates: [520")),
+              testing::EndsWith("a list of numbers is missing"));
+  EXPECT_THAT(refusal(replaced("[1, 2, 3, 4]", "5")),
+              testing::EndsWith("a list of numbers is missing"));
+  EXPECT_THAT(refusal(replaced("[1, 2, 3, 4]", "[1, x]")),
+              testing::HasSubstr("contains no supported camera: "));
+  EXPECT_THAT(refusal(replaced("[520", "[-520")),
+              testing::EndsWith("focal length is not positive"));
+  for (const char* const width : {"0", "-3", "1048577"}) {
+    EXPECT_THAT(refusal(replaced("width: 800", std::string("width: ") + width)),
+                testing::EndsWith("the image should be 1 to 1048576 px wide and high, not " +
+                                  std::string(width)));
+  }
+  EXPECT_THAT(refusal(replaced("height: 600", "height: 0")), testing::EndsWith("high, not 0"));
+  EXPECT_EQ(refusal(replaced("width: 800", "width: 1048576")), "");
+  EXPECT_EQ(refusal(replaced("height: 600", "height: 1")), "");
+}
+
+TEST_F(ReadCameraOfAnyFormat, RejectsXmlAndLargeYaml) {
+  EXPECT_THAT(refusal("<?xml version=\"1.0\"?>\n"),
+              testing::EndsWith("is XML, which is not supported; save it as .yaml with OpenCV"));
+  const std::string text = opencv_text("[1, 2, 3, 4]");
+  EXPECT_EQ(refusal("%YAML:1.0\n" + text), "") << "OpenCV's first line";
+  constexpr std::size_t limit = 1 << 20;
+  EXPECT_EQ(refusal(text + "#" + std::string(limit - text.size() - 1, 'a')), "");
+  EXPECT_THAT(refusal(text + "#" + std::string(limit - text.size(), 'a')),
+              testing::EndsWith("a YAML file of a camera is shorter than 1 MiB"));
+  EXPECT_THAT(refusal("a"), testing::EndsWith("contains no camera"));
+}
+
+TEST_F(ReadCameraOfAnyFormat, ReadsCameraAndRegionOfCalibration) {
+  Calibration calibration;
+  calibration.camera = make_camera(LensModel::opencv8);
+  calibration.camera.id = "left";
+  for (const bool has_report : {false, true}) {
+    if (has_report) {
+      calibration.intrinsics_report = IntrinsicsReport{};
+      calibration.intrinsics_report->region_px = {{1, 2}, {700, 4}, {300, 500}};
+    }
+    const auto file = folder_ / "calibration.yaml";
+    write_calibration(file, calibration);
+    const ImportedCamera read = read_camera_of_any_format(file);
+    EXPECT_EQ(read.camera.id, "left");
+    EXPECT_EQ(read.camera.intrinsics, calibration.camera.intrinsics);
+    EXPECT_EQ(read.region, has_report ? calibration.intrinsics_report->region_px : ImageRegion());
+  }
+}
+
+TEST(ConvertCameraToLensModel, ReturnsSameCameraForItsOwnModel) {
+  const FittedCamera same =
+      convert_camera_to_lens_model(make_camera(LensModel::opencv5), LensModel::opencv5);
+  EXPECT_EQ(same.camera.lens_model, LensModel::opencv5);
+  EXPECT_EQ(same.worst_px, 0);
+  EXPECT_EQ(same.common_fraction, 1);
+}
+
+TEST(ConvertCameraToLensModel, FindsParametersOfModelThatIncludesSourceModel) {
+  Camera camera = make_camera(LensModel::opencv4);
+  camera.id = "left";
+  const FittedCamera fitted = convert_camera_to_lens_model(camera, LensModel::opencv5);
+  EXPECT_EQ(fitted.camera.lens_model, LensModel::opencv5);
+  EXPECT_EQ(fitted.camera.id, "left");
+  EXPECT_EQ(fitted.camera.imager_px, camera.imager_px);
+  ASSERT_EQ(fitted.camera.intrinsics.size(), 9U);
+  for (std::size_t i = 0; i < 8; ++i) {
+    EXPECT_NEAR(fitted.camera.intrinsics[i], camera.intrinsics[i], 1e-5) << i;
+  }
+  EXPECT_NEAR(fitted.camera.intrinsics[8], 0, 1e-5);
+}
+
+/// Sum of the squared distances between the pixels of a grid and those to which a lens projects
+/// their rays; infinite if it does not project one.
+double sum_of_squares(const Lens& from, const Lens& to, const std::array<int, 2>& imager_px) {
+  double sum = 0;
+  for (const auto& pixel : make_regular_pixel_grid(imager_px)) {
+    const auto found = to.project_point(from.unproject_pixel(pixel).value().direction);
+    sum += found ? (*found - pixel).squaredNorm() : std::numeric_limits<double>::infinity();
+  }
+  return sum;
+}
+
+TEST(ConvertCameraToLensModel, MinimizesSquaresAndReportsLargestDistance) {
+  const Camera camera{"camera", {900, 500}, LensModel::pinhole, {510, 490, 420, 260}, {}, {}, {}};
+  const Lens from(camera.lens_model, camera.intrinsics);
+  for (const LensModel model : {LensModel::stereographic, LensModel::fisheye}) {
+    const FittedCamera fitted = convert_camera_to_lens_model(camera, model);
+    EXPECT_EQ(fitted.common_fraction, 1);
+    const auto& parameters = fitted.camera.intrinsics;
+    ASSERT_EQ(parameters.size(), num_lens_parameters(model));
+    const double least = sum_of_squares(from, Lens(model, parameters), camera.imager_px);
+    for (std::size_t k = 0; k < parameters.size(); ++k) {
+      for (const double step : {-1.0, 1.0}) {
+        auto changed = parameters;
+        changed[k] += step * (k < 4 ? 0.01 : 1e-4);
+        EXPECT_GT(sum_of_squares(from, Lens(model, changed), camera.imager_px), least) << k;
+      }
+    }
+    double worst = 0;
+    for (const auto& pixel : make_regular_pixel_grid(camera.imager_px, 201)) {
+      const auto ray = from.unproject_pixel(pixel);
+      ASSERT_TRUE(ray);
+      const auto found = Lens(model, parameters).project_point(ray->direction);
+      ASSERT_TRUE(found);
+      worst = std::max(worst, (*found - pixel).norm());
+    }
+    EXPECT_NEAR(fitted.worst_px, worst, 1e-9);
+    EXPECT_GT(worst, 1e-3);
+  }
+}
+
+TEST(ConvertCameraToLensModel, CommonFractionIsThatOfPixelsWithRaysOfBothLenses) {
+  // Fisheye without distortion: angles below 90 degrees are within 100 pi / 2 = 157 px.
+  const Camera wide{"camera", {801, 601}, LensModel::fisheye, {100, 100, 400, 300, 0, 0, 0, 0}, {},
+                    {},       {}};
+  const FittedCamera fitted = convert_camera_to_lens_model(wide, LensModel::pinhole);
+  double inside = 0, all = 0;
+  for (const auto& pixel : make_regular_pixel_grid({801, 601}, 201)) {
+    all += 1;
+    if ((pixel - Eigen::Vector2d(400, 300)).norm() < 157.0796) inside += 1;
+  }
+  EXPECT_NEAR(fitted.common_fraction, inside / all, 1e-9);
+}
+
+TEST(ConvertCameraToLensModel, ThrowsIfNoRayIsInFrontOfPinhole) {
+  // All pixels are more than 90 degrees from the axis.
+  const Camera behind{
+      "camera", {300, 200}, LensModel::fisheye, {100, 100, -170, 100, 0, 0, 0, 0}, {}, {}, {}};
+  ASSERT_TRUE(Lens(behind.lens_model, behind.intrinsics).unproject_pixel({0, 100}));
+  std::string said;
+  try {
+    convert_camera_to_lens_model(behind, LensModel::pinhole);
+  } catch (const std::invalid_argument& error) {
+    said = error.what();
+  }
+  EXPECT_EQ(said, "LENSMODEL_PINHOLE has no lens near OPENCV_FISHEYE");
 }
 
 }  // namespace

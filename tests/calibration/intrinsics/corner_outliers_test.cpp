@@ -4,6 +4,9 @@
 
 #include <gmock/gmock.h>
 
+#include <cstddef>
+#include <vector>
+
 #include "calibration/intrinsics/synthetic_views.h"
 
 namespace vlp {
@@ -45,6 +48,88 @@ TEST(FindCornerOutliers, ReturnsNoneWhenAllCornersAreRandom) {
   for (auto& corner : corners) corner.pixel = {random.uniform(0, 800), random.uniform(0, 600)};
   EXPECT_THAT(find_corner_outliers(corners), IsEmpty());
   EXPECT_THAT(find_corner_outliers({}), IsEmpty());
+}
+
+/// Returns the corners of a board of cols x rows points, row by row, at a distance of step_px in
+/// the image.
+std::vector<BoardLattice::Corner> make_corner_grid(int cols, int rows,
+                                                   const Eigen::Vector2d& step_px) {
+  std::vector<BoardLattice::Corner> corners;
+  for (int row = 0; row < rows; ++row) {
+    for (int col = 0; col < cols; ++col) {
+      const Eigen::Vector2d node(col, row);
+      const Eigen::Vector2d pixel = Eigen::Vector2d(50, 70) + step_px.cwiseProduct(node);
+      corners.push_back({{0.03 * col, 0.03 * row, 0}, pixel, 0, corners.size()});
+    }
+  }
+  return corners;
+}
+
+TEST(FindCornerOutliers, LimitIsQuarterOfDistanceToNearestNeighbor) {
+  constexpr std::size_t middle = 3 * 7 + 3;
+  for (const Eigen::Vector2d& step_px : {Eigen::Vector2d(40, 60), Eigen::Vector2d(70, 40)}) {
+    for (const Eigen::Vector2d& direction : {Eigen::Vector2d(1, 0), Eigen::Vector2d(-0.6, 0.8)}) {
+      auto corners = make_corner_grid(7, 6, step_px);
+      corners[middle].pixel += 9.9 * direction;
+      EXPECT_THAT(find_corner_outliers(corners), IsEmpty()) << step_px.transpose();
+      corners[middle].pixel += 0.2 * direction;
+      EXPECT_THAT(find_corner_outliers(corners), ElementsAre(middle)) << step_px.transpose();
+    }
+  }
+}
+
+TEST(FindCornerOutliers, LimitIsAtLeastThreePixels) {
+  constexpr std::size_t middle = 3 * 7 + 3;
+  auto corners = make_corner_grid(7, 6, {8, 9});
+  corners[middle].pixel.y() += 2.95;
+  EXPECT_THAT(find_corner_outliers(corners), IsEmpty());
+  corners[middle].pixel.y() += 0.1;
+  EXPECT_THAT(find_corner_outliers(corners), ElementsAre(middle));
+}
+
+TEST(FindCornerOutliers, ReturnsAtMostOneOutlierPerTenCorners) {
+  auto corners = make_corner_grid(10, 3, {40, 50});
+  corners[0].pixel.x() += 25;
+  corners[9].pixel.y() -= 40;
+  corners[29].pixel.x() -= 60;
+  EXPECT_THAT(find_corner_outliers(corners), ElementsAre(0, 9, 29));
+  corners.erase(corners.begin() + 14);
+  EXPECT_THAT(find_corner_outliers(corners), IsEmpty());
+}
+
+TEST(FindCornerOutliers, NeedsEightNeighborsAndTenCorners) {
+  auto corners = make_corner_grid(5, 2, {40, 50});
+  corners[0].pixel.y() -= 80;
+  EXPECT_THAT(find_corner_outliers(corners), ElementsAre(0));
+  corners.pop_back();
+  EXPECT_THAT(find_corner_outliers(corners), IsEmpty());
+}
+
+/// A second outlier would be more than one in ten corners, so that no other corner may be found
+/// before or after the displaced one.
+TEST(FindCornerOutliers, ReturnsOnlyDisplacedCornerOfSmallBoard) {
+  const auto corners = make_corner_grid(4, 4, {40, 45});
+  for (std::size_t outlier = 0; outlier < corners.size(); ++outlier) {
+    for (const Eigen::Vector2d& shift_px : {Eigen::Vector2d(40, 0), Eigen::Vector2d(0, 40),
+                                            Eigen::Vector2d(28, 28), Eigen::Vector2d(-28, 28)}) {
+      auto displaced = corners;
+      displaced[outlier].pixel += shift_px;
+      EXPECT_THAT(find_corner_outliers(displaced), ElementsAre(outlier)) << shift_px.transpose();
+    }
+  }
+}
+
+/// Predictions of corners at the rim extrapolate: an outlier beside them displaces these
+/// predictions by more than its own displacement.
+TEST(FindCornerOutliers, KeepsRimCornerWhosePredictionAnOutlierDisplaces) {
+  for (const std::size_t outlier : {8U, 12U, 29U, 33U}) {
+    for (const Eigen::Vector2d& shift_px :
+         {Eigen::Vector2d(16, 0), Eigen::Vector2d(-12, 11), Eigen::Vector2d(5, -25)}) {
+      auto corners = make_corner_grid(7, 6, {40, 45});
+      corners[outlier].pixel += shift_px;
+      EXPECT_THAT(find_corner_outliers(corners), ElementsAre(outlier)) << shift_px.transpose();
+    }
+  }
 }
 
 }  // namespace

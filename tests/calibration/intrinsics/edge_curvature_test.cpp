@@ -7,8 +7,11 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
+#include <utility>
+#include <vector>
 
 #include "calibration/intrinsics/synthetic_views.h"
 #include "simulation/exposure.h"
@@ -168,6 +171,159 @@ TEST(CorrectCornersForEdgeCurvature, ReducesCornerErrorsOfRenderedBoardByQuarter
   RecordProperty("with_lens_px", std::to_string(px(squares[1])));
   RecordProperty("tags_seen_px", std::to_string(px(4 * of_tags[0])));
   RecordProperty("tags_with_lens_px", std::to_string(px(4 * of_tags[1])));
+}
+
+/// Returns the corners of an upright rectangle of 40 x 60 px around (500, 300), with the same
+/// curvature of all edges.
+std::vector<BoardLattice::Corner> rectangle_with_curvature(const EdgeCurvature& curvature) {
+  std::vector<BoardLattice::Corner> corners;
+  for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(480, 330), Eigen::Vector2d(520, 330),
+                                       Eigen::Vector2d(520, 270), Eigen::Vector2d(480, 270)}) {
+    BoardLattice::Corner& corner = corners.emplace_back();
+    corner.pixel = pixel;
+    corner.curvature = curvature;
+  }
+  return corners;
+}
+
+Lens straight_lens() { return Lens(LensModel::pinhole, std::array{500.0, 520.0, 400.0, 310.0}); }
+
+// The edges of a lens without distortion are straight. The least-squares line of q (w^2 - 1) up to
+// w = r is q (r^2 / 3 - 1), that of c (w^3 - w) is c (3 r^2 / 5 - 1) w.
+TEST(CorrectCornersForEdgeCurvature, MovesCornersByLineFittedToCurvature) {
+  constexpr double q = 0.3, c = 0.2, reach = 0.7;
+  auto corners = rectangle_with_curvature({q, c, reach});
+  const auto before = corners;
+  const double mean = q * (reach * reach / 3 - 1), slope = c * (3 * reach * reach / 5 - 1);
+  const double displacement_px = correct_corners_for_edge_curvature(corners, straight_lens());
+  // Outward displacements of the lower, right, upper and left edge at their first and second ends.
+  const double first = mean - slope, second = mean + slope;
+  const std::array<Eigen::Vector2d, 4> expected{
+      {{-second, first}, {first, second}, {second, -first}, {-first, -second}}};
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_LT((corners[k].pixel - before[k].pixel - expected[k]).norm(), 1e-9) << k;
+    EXPECT_NEAR(corners[k].curvature.quadratic_px, 0, 1e-9);
+    EXPECT_NEAR(corners[k].curvature.cubic_px, 0, 1e-9);
+    EXPECT_EQ(corners[k].curvature.reach, reach);
+  }
+  EXPECT_NEAR(displacement_px, std::hypot(first, second), 1e-9);
+}
+
+TEST(CorrectCornersForEdgeCurvature, ReturnsLargestDisplacementOfCorners) {
+  auto corners = rectangle_with_curvature({0, 0, 1});
+  corners[1].curvature.quadratic_px = 0.3;  // the right edge moves inwards by 0.2 px
+  corners[2].curvature.quadratic_px = 0.6;  // the upper edge moves inwards by 0.4 px
+  EXPECT_NEAR(correct_corners_for_edge_curvature(corners, straight_lens()), std::hypot(0.2, 0.4),
+              1e-9);
+  EXPECT_LT((corners[0].pixel - Eigen::Vector2d(480, 330)).norm(), 1e-9);
+  EXPECT_LT((corners[1].pixel - Eigen::Vector2d(519.8, 330)).norm(), 1e-9);
+  EXPECT_LT((corners[2].pixel - Eigen::Vector2d(519.8, 270.4)).norm(), 1e-9);
+  EXPECT_LT((corners[3].pixel - Eigen::Vector2d(480, 270.4)).norm(), 1e-9);
+}
+
+// Corners move by sqrt(2) 2 q / 3 with reach 1. A quarter of the shorter edge is 10 px.
+TEST(CorrectCornersForEdgeCurvature, KeepsTagIfCornerWouldMoveByQuarterOfEdge) {
+  for (const double sign : {-1.0, 1.0}) {
+    const double limit = sign * 10 / std::sqrt(2) * 3 / 2;
+    auto below = rectangle_with_curvature({0.99 * limit, 0, 1});
+    EXPECT_NEAR(correct_corners_for_edge_curvature(below, straight_lens()), 9.9, 1e-6);
+    auto above = rectangle_with_curvature({1.01 * limit, 0, 1});
+    EXPECT_EQ(correct_corners_for_edge_curvature(above, straight_lens()), 0);
+    EXPECT_EQ(above[0].pixel, Eigen::Vector2d(480, 330));
+    EXPECT_EQ(above[0].curvature.quadratic_px, 1.01 * limit);
+  }
+}
+
+TEST(CorrectCornersForEdgeCurvature, KeepsTagOutsideImageCircleOfFisheye) {
+  // The image circle ends 122 px from its center.
+  const Lens fisheye(LensModel::fisheye,
+                     std::array{100.0, 100.0, 400.0, 300.0, -0.1, 0.0, 0.0, 0.0});
+  auto outside = rectangle_with_curvature({0.1, 0, 1});
+  for (auto& corner : outside) corner.pixel.x() += 10;
+  ASSERT_TRUE(fisheye.unproject_pixel(outside[0].pixel));
+  ASSERT_FALSE(fisheye.unproject_pixel(outside[1].pixel));
+  EXPECT_EQ(correct_corners_for_edge_curvature(outside, fisheye), 0);
+  EXPECT_EQ(outside[3].pixel, Eigen::Vector2d(490, 270));
+  auto inside = rectangle_with_curvature({0.1, 0, 1});
+  for (auto& corner : inside) corner.pixel.x() -= 80;
+  EXPECT_GT(correct_corners_for_edge_curvature(inside, fisheye), 0);
+}
+
+/// Returns the outward distance of the image of a straight line from its chord at w, by bisection.
+double sagitta_by_bisection(const Lens& lens, const Eigen::Vector2d& from,
+                            const Eigen::Vector2d& to, const Eigen::Vector2d& inside, double w) {
+  const Eigen::Vector3d a = lens.unproject_pixel(from).value().direction,
+                        b = lens.unproject_pixel(to).value().direction;
+  const Eigen::Vector2d along = to - from;
+  double low = 0, high = 1;
+  Eigen::Vector2d offset(0, 0);
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (low + high) / 2;
+    offset = lens.project_point((1 - middle) * a + middle * b).value() - from;
+    (2 * along.dot(offset) / along.squaredNorm() - 1 < w ? low : high) = middle;
+  }
+  const auto side = [&](const Eigen::Vector2d& v) { return along.x() * v.y() - along.y() * v.x(); };
+  return (side(inside - from) > 0 ? -1 : 1) * side(offset) / along.norm();
+}
+
+TEST(CorrectCornersForEdgeCurvature, MatchesIntegralsOverEdgesOfDistortedLens) {
+  const Lens lens = synthetic_lens();
+  // Both directions of rotation.
+  for (const bool is_mirrored : {false, true}) {
+    std::vector<BoardLattice::Corner> corners(4);
+    const std::array<Eigen::Vector2d, 4> pixels{{{60, 120}, {158, 131}, {146, 52}, {64, 40}}};
+    const std::array<EdgeCurvature, 4> curvatures{
+        {{0.3, 0.1, 0.8}, {-0.2, 0.2, 0.9}, {0.1, -0.3, 0.7}, {-0.1, -0.15, 1.0}}};
+    for (std::size_t k = 0; k < 4; ++k) {
+      corners[k].pixel = pixels[is_mirrored ? 3 - k : k];
+      corners[k].curvature = curvatures[k];
+    }
+    const auto before = corners;
+    const Eigen::Vector2d inside = (pixels[0] + pixels[1] + pixels[2] + pixels[3]) / 4;
+    // Outward displacements of each edge at both ends: the line fitted to the difference of the
+    // curves.
+    std::array<std::array<double, 2>, 4> ends{};
+    for (std::size_t k = 0; k < 4; ++k) {
+      const auto& [from, to] = std::pair(before[k].pixel, before[(k + 1) % 4].pixel);
+      const double reach = curvatures[k].reach;
+      double sum = 0, moment = 0, squares = 0;
+      constexpr int steps = 400;
+      for (int i = 0; i < steps; ++i) {
+        const double w = reach * (2 * (i + 0.5) / steps - 1);
+        const double seen =
+            curvatures[k].quadratic_px * (w * w - 1) + curvatures[k].cubic_px * (w * w * w - w);
+        const double difference = seen - sagitta_by_bisection(lens, from, to, inside, w);
+        sum += difference;
+        moment += difference * w;
+        squares += w * w;
+      }
+      ends[k] = {sum / steps - moment / squares, sum / steps + moment / squares};
+    }
+    const double displacement_px = correct_corners_for_edge_curvature(corners, lens);
+    double largest = 0;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const Eigen::Vector2d step = corners[k].pixel - before[k].pixel;
+      largest = std::max(largest, step.norm());
+      for (const bool arriving : {false, true}) {
+        const std::size_t edge = arriving ? (k + 3) % 4 : k;
+        const Eigen::Vector2d along =
+            (before[(edge + 1) % 4].pixel - before[edge].pixel).normalized();
+        const double sign =
+            along.x() * (inside - before[k].pixel).y() - along.y() * (inside - before[k].pixel).x();
+        const double outwards = (sign > 0 ? -1 : 1) * (along.x() * step.y() - along.y() * step.x());
+        // The places on the edge are found by three iterations, accurate to 1e-4 px.
+        EXPECT_NEAR(outwards, ends[edge][arriving ? 1 : 0], 3e-4) << k << ' ' << arriving;
+      }
+      for (const double w : {-0.5, 0.0, 0.5}) {
+        EXPECT_NEAR(
+            corners[k].curvature.curve_offset_from_straight_line_px(w),
+            sagitta_by_bisection(lens, before[k].pixel, before[(k + 1) % 4].pixel, inside, w),
+            0.02 * std::abs(corners[k].curvature.quadratic_px))
+            << k << ' ' << w;
+      }
+    }
+    EXPECT_NEAR(displacement_px, largest, 1e-12);
+  }
 }
 
 }  // namespace

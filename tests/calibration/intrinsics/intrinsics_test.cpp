@@ -2,10 +2,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/intrinsics/intrinsics.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "calibration/intrinsics/board_problem.h"
 #include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/rotation_vector.h"
 #include "calibration/intrinsics/synthetic_views.h"
+#include "camera/spline_grid.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {
@@ -105,6 +116,502 @@ TEST(SolveIntrinsicsOfPartialBoards, MatchesTrueLensForBoardsTiltedUpTo60Degrees
     EXPECT_TRUE(solution.dropped_views.empty()) << set;
     EXPECT_LT(solution.rms_px, 0.06) << set;
     EXPECT_LT(difference(solution, views).mean_px, 0.2) << set;
+  }
+}
+
+/// Returns a lens of OPENCV_FISHEYE for 800 x 600 px.
+Lens fisheye_for_solves() {
+  return {LensModel::fisheye, std::array{290.0, 291.0, 402.0, 297.0, 0.03, -0.012, 0.004, -0.0006}};
+}
+
+/// Returns exact views whose edges do not shift.
+IntrinsicsInput make_exact_views(int count, const Lens& lens = fisheye_for_solves(),
+                                 const Eigen::Vector2d& warp_m = {0, 0}) {
+  SyntheticViews views{synthetic_board(false), lens};
+  views.warp_m = warp_m;
+  Random random(31);
+  IntrinsicsInput input = views.input(count, random, 0);
+  input.warp = WarpChoice::off;
+  for (auto& view : input.views) {
+    for (auto& corner : view) corner.d_pixel_d_edge_shift.setZero();
+  }
+  return input;
+}
+
+/// Displaces the corners of a view by `size_px` on each axis, in an alternating pattern that no
+/// pose and no lens explains.
+void displace_alternately(std::vector<BoardLattice::Corner>& view, double size_px) {
+  constexpr std::size_t cols = 12;
+  for (auto& corner : view) {
+    const std::size_t col = corner.point % cols, row = corner.point / cols;
+    corner.pixel.x() += (col + row) % 2 == 0 ? size_px : -size_px;
+    corner.pixel.y() += col % 2 == 0 ? size_px : -size_px;
+  }
+}
+
+TEST(DescribeIntrinsicsStatus, StatesCause) {
+  EXPECT_EQ(describe_intrinsics_status(IntrinsicsStatus::ok), "ok");
+  EXPECT_TRUE(describe_intrinsics_status(IntrinsicsStatus::too_few_views)
+                  .starts_with("fewer than three views"));
+  EXPECT_TRUE(describe_intrinsics_status(IntrinsicsStatus::all_parallel)
+                  .starts_with("all views show the board at the same angle"));
+  EXPECT_TRUE(describe_intrinsics_status(IntrinsicsStatus::no_solution)
+                  .starts_with("no lens fits the views"));
+}
+
+TEST(SolveFirstStages, DropsViewWithResidualAboveOnePixel) {
+  for (const auto& [size_px, dropped] : {std::pair{0.9, 0U}, {1.15, 1U}}) {
+    IntrinsicsInput input = make_exact_views(8);
+    displace_alternately(input.views[3], size_px);
+    const auto solution = InitialSolutions(input).solve_first_stages(LensModel::fisheye);
+    ASSERT_TRUE(solution);
+    ASSERT_EQ(solution->dropped_views.size(), dropped) << size_px;
+    ASSERT_EQ(solution->views.size(), 8 - dropped);
+    ASSERT_EQ(solution->problem.poses.size(), 8 - dropped);
+    if (dropped == 0) continue;
+    EXPECT_EQ(solution->dropped_views[0].view, 3U);
+    EXPECT_NEAR(solution->dropped_views[0].rms_px, size_px, 0.05);
+    EXPECT_THAT(solution->views, testing::ElementsAre(0, 1, 2, 4, 5, 6, 7));
+    EXPECT_LT(solution->rms_px, 1e-4);
+  }
+}
+
+TEST(SolveFirstStages, DropsViewWithResidualAboveFourMedians) {
+  for (const auto& [size_px, dropped] : {std::pair{1.8, 0U}, {2.3, 1U}}) {
+    IntrinsicsInput input = make_exact_views(9);
+    for (std::size_t i = 0; i < 9; ++i)
+      displace_alternately(input.views[i], i == 3 ? size_px : 0.5);
+    const auto solution = InitialSolutions(input).solve_first_stages(LensModel::fisheye);
+    ASSERT_TRUE(solution);
+    EXPECT_EQ(solution->dropped_views.size(), dropped) << size_px;
+  }
+}
+
+/// Views with more than half of the worst residual are dropped first.
+TEST(SolveFirstStages, DropsWorstViewFirst) {
+  IntrinsicsInput input = make_exact_views(9);
+  displace_alternately(input.views[2], 4);
+  displace_alternately(input.views[6], 10);
+  const auto solution = InitialSolutions(input).solve_first_stages(LensModel::fisheye);
+  ASSERT_TRUE(solution);
+  ASSERT_EQ(solution->dropped_views.size(), 2U);
+  EXPECT_EQ(solution->dropped_views[0].view, 6U);
+  EXPECT_EQ(solution->dropped_views[1].view, 2U);
+  EXPECT_NEAR(solution->dropped_views[1].rms_px, 4, 0.2);
+  EXPECT_THAT(solution->views, testing::ElementsAre(0, 1, 3, 4, 5, 7, 8));
+}
+
+/// Views 3 and 5 distort the lens so much that views 1 and 2 have no pose with it.
+TEST(SolveFirstStages, ReinstatesViewsThatFitLensWithoutBadViews) {
+  IntrinsicsInput input = make_exact_views(9);
+  for (const std::size_t view : {3U, 5U}) {
+    for (auto& corner : input.views[view])
+      corner.pixel.x() += 120 * std::sin(corner.pixel.y() / 60);
+  }
+  const auto solution = InitialSolutions(input).solve_first_stages(LensModel::fisheye);
+  ASSERT_TRUE(solution);
+  EXPECT_THAT(solution->views, testing::ElementsAre(0, 1, 2, 4, 6, 7, 8));
+  ASSERT_EQ(solution->dropped_views.size(), 2U);
+  EXPECT_EQ(solution->dropped_views[0].view, 3U);
+  EXPECT_EQ(solution->dropped_views[1].view, 5U);
+  EXPECT_LT(solution->rms_px, 1e-4);
+  ASSERT_EQ(solution->problem.points.size(), 7 * 120U);
+  for (std::size_t i = 0; i < 7; ++i) {
+    for (const auto& corner : input.views[solution->views[i]])
+      EXPECT_EQ(solution->problem.points[i * 120 + corner.point].head<2>(), corner.pixel);
+  }
+}
+
+TEST(SolveFirstStages, ReturnsNulloptForTwoViews) {
+  EXPECT_FALSE(InitialSolutions(make_exact_views(2)).solve_first_stages(LensModel::stereographic));
+  EXPECT_TRUE(InitialSolutions(make_exact_views(3)).solve_first_stages(LensModel::stereographic));
+}
+
+TEST(SolveFirstStages, ReturnsNulloptIfOnlyTwoViewsHavePose) {
+  IntrinsicsInput input = make_exact_views(5);
+  input.views[1].clear();
+  input.views[2].clear();
+  const auto three = InitialSolutions(input).solve_first_stages(LensModel::fisheye);
+  ASSERT_TRUE(three);
+  EXPECT_THAT(three->views, testing::ElementsAre(0, 3, 4));
+  input.views[4].clear();
+  EXPECT_FALSE(InitialSolutions(input).solve_first_stages(LensModel::fisheye));
+}
+
+TEST(SolveFirstStages, ReturnsTrueLensAndPosesForExactCorners) {
+  const IntrinsicsInput input = make_exact_views(6);
+  const auto solution = InitialSolutions(input).solve_first_stages(LensModel::fisheye);
+  ASSERT_TRUE(solution);
+  EXPECT_EQ(solution->status, IntrinsicsStatus::ok);
+  EXPECT_EQ(solution->problem.lens_model, LensModel::fisheye);
+  EXPECT_EQ(solution->problem.imager_px, input.imager_px);
+  EXPECT_EQ(solution->problem.cols, 12);
+  EXPECT_EQ(solution->problem.rows, 10);
+  EXPECT_EQ(solution->problem.spacing_m, 0.02);
+  EXPECT_TRUE(solution->solved_parameters.core);
+  EXPECT_TRUE(solution->solved_parameters.distortions);
+  EXPECT_FALSE(solution->solved_parameters.warp);
+  EXPECT_FALSE(solution->solved_parameters.reject_outliers);
+  const std::array expected{290.0, 291.0, 402.0, 297.0, 0.03, -0.012, 0.004, -0.0006};
+  ASSERT_EQ(solution->problem.intrinsics.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    EXPECT_NEAR(solution->problem.intrinsics[i], expected[i], i < 4 ? 1e-3 : 1e-4) << i;
+  int corners = 0;
+  for (const auto& view : input.views) corners += static_cast<int>(view.size());
+  EXPECT_EQ(solution->corners, corners);
+  EXPECT_EQ(solution->outliers, 0);
+}
+
+TEST(SolveIntrinsics, NeedsMoreThanHalfOfViews) {
+  IntrinsicsInput input = make_exact_views(7);
+  for (const std::size_t i : {0U, 3U, 5U}) input.views[i].clear();
+  const IntrinsicsSolution four = solve_intrinsics(input);
+  ASSERT_TRUE(four.has_succeeded());
+  EXPECT_THAT(four.views, testing::ElementsAre(1, 2, 4, 6));
+  EXPECT_EQ(four.edge_displacements_px.size(), 4U);
+  input.views.emplace_back();
+  const IntrinsicsSolution half = solve_intrinsics(input);
+  EXPECT_EQ(half.status, IntrinsicsStatus::no_solution);
+  EXPECT_EQ(half.rms_px, 0);
+  EXPECT_EQ(half.corners, 0);
+  EXPECT_EQ(half.outliers, 0);
+  EXPECT_TRUE(half.views.empty() && half.dropped_views.empty());
+}
+
+/// Returns exact views of boards whose normals lie within `tilt_rad` of each other.
+IntrinsicsInput make_tilted_views(double tilt_rad) {
+  const SyntheticViews views{synthetic_board(false), fisheye_for_solves()};
+  Random random(1);
+  IntrinsicsInput input = views.input(0, random, 0);
+  input.warp = WarpChoice::off;
+  for (int i = 0; i < 6; ++i) {
+    const double tilt = i % 2 == 0 ? 0.3 : 0.3 + tilt_rad;
+    const Eigen::Matrix3d rotation =
+        Eigen::AngleAxisd(tilt, Eigen::Vector3d(0.6, 0.8, 0)).toRotationMatrix();
+    const BoardDetection seen =
+        views.view(rotation, {0.03 * (i - 3), 0.02 * (i % 3 - 1), 0.2 + 0.01 * i}, random, 0);
+    input.views.push_back(input.lattice.list_corners_with_board_positions(seen));
+    for (auto& corner : input.views.back()) corner.d_pixel_d_edge_shift.setZero();
+  }
+  return input;
+}
+
+TEST(SolveIntrinsics, NeedsBoardNormalsFiveDegreesApart) {
+  EXPECT_EQ(solve_intrinsics(make_tilted_views(0.085)).status, IntrinsicsStatus::all_parallel);
+  EXPECT_EQ(solve_intrinsics(make_tilted_views(0.095)).status, IntrinsicsStatus::ok);
+}
+
+/// The warp is kept if it reduces the sum of squares by more than 20 mean squares. Flat and warped
+/// solutions are computed with the other choices.
+TEST(SolveIntrinsics, KeepsWarpOnlyIfItReducesSquaresBy20MeanSquares) {
+  constexpr double noise_px = 0.05;
+  int kept = 0, close = 0;
+  for (int step = 0; step < 4; ++step) {
+    IntrinsicsInput input =
+        make_exact_views(5, fisheye_for_solves(), {1.6e-5 + 1.5e-6 * step, -4e-6});
+    Random random(17);
+    for (auto& view : input.views) {
+      for (auto& corner : view) {
+        const double v = random.normal(), u = random.normal();
+        corner.pixel += noise_px * Eigen::Vector2d(u, v);
+      }
+    }
+    const IntrinsicsSolution flat = solve_intrinsics(input);
+    input.warp = WarpChoice::on;
+    const IntrinsicsSolution with_warp = solve_intrinsics(input);
+    input.warp = WarpChoice::automatic;
+    const IntrinsicsSolution found = solve_intrinsics(input);
+    ASSERT_TRUE(flat.has_succeeded() && with_warp.has_succeeded() && found.has_succeeded());
+    ASSERT_EQ(flat.outliers + with_warp.outliers, 0);
+    EXPECT_FALSE(flat.solved_parameters.warp);
+    EXPECT_EQ(flat.problem.warp_m, Eigen::Vector2d(0, 0));
+    EXPECT_TRUE(with_warp.solved_parameters.warp);
+    EXPECT_NE(with_warp.problem.warp_m, Eigen::Vector2d(0, 0));
+    const double reduction =
+        2 * flat.corners * std::pow(flat.rms_px / with_warp.rms_px, 2) - 2 * with_warp.corners;
+    if (std::abs(reduction - 20) < 3) ++close;
+    if (std::abs(reduction - 20) < 0.01) continue;
+    EXPECT_EQ(found.solved_parameters.warp, reduction > 20) << reduction;
+    EXPECT_EQ(found.problem.warp_m != Eigen::Vector2d(0, 0), reduction > 20) << reduction;
+    if (reduction > 20) ++kept;
+  }
+  EXPECT_GT(kept, 0);
+  EXPECT_LT(kept, 4);
+  EXPECT_GT(close, 0);
+}
+
+TEST(SolveIntrinsics, EstimatesWarpOfExactBoard) {
+  const Eigen::Vector2d warp_m(0.0005, -0.0003);
+  IntrinsicsInput input = make_exact_views(6, fisheye_for_solves(), warp_m);
+  input.warp = WarpChoice::automatic;
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  ASSERT_TRUE(solution.has_succeeded());
+  EXPECT_TRUE(solution.solved_parameters.warp);
+  EXPECT_THAT(solution.problem.warp_m, IsNear(warp_m, 1e-8));
+  EXPECT_LT(solution.rms_px, 1e-5);
+}
+
+/// Returns a solution of noisy views with a displaced corner in view 2.
+IntrinsicsSolution solve_noisy_views(const Board& board, int count, WarpChoice warp) {
+  const SyntheticViews views{board, fisheye_for_solves()};
+  Random random(13);
+  IntrinsicsInput input = views.input(count, random, 0.1);
+  input.warp = warp;
+  input.views[2][5].pixel.x() += 3;
+  return solve_intrinsics(input);
+}
+
+TEST(SolveIntrinsicsFromHalfOfViews, MatchesSolveOfEverySecondView) {
+  for (const bool kalibr : {false, true}) {
+    const IntrinsicsSolution whole =
+        solve_noisy_views(synthetic_board(kalibr), 9, kalibr ? WarpChoice::on : WarpChoice::off);
+    ASSERT_TRUE(whole.has_succeeded());
+    ASSERT_EQ(whole.views.size(), 9U);
+    ASSERT_GE(whole.outliers, 1);
+    const std::size_t parts = kalibr ? 4 : 1;
+    ASSERT_EQ(whole.problem.poses.size(), 9 * parts);
+    for (const std::size_t first : {0U, 1U}) {
+      const IntrinsicsSolution half = solve_intrinsics_from_half_of_views(whole, first);
+      ASSERT_TRUE(half.has_succeeded());
+      IntrinsicsSolution expected = whole;
+      expected.problem.points.clear();
+      expected.problem.poses.clear();
+      std::vector<std::size_t> views;
+      std::vector<double> shifts_px;
+      const std::size_t points_per_view = whole.problem.points.size() / 9;
+      for (std::size_t view = first; view < 9; view += 2) {
+        views.push_back(whole.views[view]);
+        shifts_px.push_back(whole.edge_displacements_px[view]);
+        for (std::size_t part = 0; part < parts; ++part)
+          expected.problem.poses.push_back(whole.problem.poses[view * parts + part]);
+        for (std::size_t i = 0; i < points_per_view; ++i)
+          expected.problem.points.push_back(whole.problem.points[view * points_per_view + i]);
+      }
+      ASSERT_TRUE(solve_board_problem(expected.problem, {true, true, kalibr, false}));
+      expected.update_lens_fit_statistics();
+      EXPECT_EQ(half.views, views);
+      EXPECT_EQ(half.edge_displacements_px, shifts_px);
+      EXPECT_EQ(half.problem.intrinsics, expected.problem.intrinsics);
+      EXPECT_EQ(half.problem.points, expected.problem.points);
+      EXPECT_EQ(half.rms_px, expected.rms_px);
+      EXPECT_EQ(half.corners, expected.corners);
+      EXPECT_EQ(half.outliers, expected.outliers);
+      EXPECT_NE(half.problem.intrinsics, whole.problem.intrinsics);
+    }
+  }
+}
+
+TEST(SolveIntrinsicsFromHalfOfViews, NeedsThreeViews) {
+  const IntrinsicsSolution whole = solve_noisy_views(synthetic_board(false), 5, WarpChoice::off);
+  ASSERT_TRUE(whole.has_succeeded());
+  ASSERT_EQ(whole.views.size(), 5U);
+  EXPECT_TRUE(solve_intrinsics_from_half_of_views(whole, 0).has_succeeded());
+  EXPECT_EQ(solve_intrinsics_from_half_of_views(whole, 1).status, IntrinsicsStatus::too_few_views);
+}
+
+TEST(SolveIntrinsicsFromHalfOfViews, FailsForParallelBoardsAndUnsolvableProblems) {
+  const IntrinsicsSolution whole = solve_intrinsics(make_tilted_views(0.3));
+  ASSERT_TRUE(whole.has_succeeded());
+  ASSERT_EQ(whole.views.size(), 6U);
+  EXPECT_EQ(solve_intrinsics_from_half_of_views(whole, 0).status, IntrinsicsStatus::all_parallel);
+  IntrinsicsSolution spoilt = whole;
+  for (Eigen::Vector3d& point : spoilt.problem.points) point.z() = BoardProblem::kUnseen;
+  EXPECT_EQ(solve_intrinsics_from_half_of_views(spoilt, 0).status, IntrinsicsStatus::no_solution);
+}
+
+/// Corners with the same standard deviation have the same weight.
+TEST(SolveIntrinsics, WeightsCornersByTheirSds) {
+  IntrinsicsInput input = make_exact_views(8);
+  Random random(19);
+  for (auto& view : input.views) {
+    for (auto& corner : view) {
+      const bool is_known = corner.point % 5 != 0;
+      const double sd_px = corner.point % 2 == 0 ? 0.03 : 0.09;
+      corner.sd_px = is_known ? sd_px : 0;
+      const double v = random.normal(), u = random.normal();
+      corner.pixel += (is_known ? sd_px : 0.3) * Eigen::Vector2d(u, v);
+    }
+  }
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  ASSERT_TRUE(solution.has_succeeded());
+  ASSERT_EQ(solution.views.size(), 8U);
+  std::array<double, 3> weights{};
+  for (std::size_t i = 0; i < 8; ++i) {
+    for (const auto& corner : input.views[i]) {
+      const double weight = std::abs(solution.problem.points[i * 120 + corner.point].z());
+      double& common = weights[corner.sd_px > 0.05 ? 0 : corner.sd_px > 0 ? 1 : 2];
+      if (common == 0) common = weight;
+      EXPECT_EQ(weight, common);
+    }
+  }
+  EXPECT_NEAR(weights[1] / weights[0], 3, 0.3);
+  EXPECT_NEAR(weights[0] / weights[2], 0.3 / 0.09, 0.3);
+  // The mean square of the known corners is that of both kinds: about half have 0.03 px.
+  EXPECT_NEAR(weights[0], std::sqrt((0.03 * 0.03 + 0.09 * 0.09) / 2) / 0.09, 0.06);
+}
+
+TEST(SolveIntrinsics, KeepsWeightsIfNoSdIsKnown) {
+  IntrinsicsInput input = make_exact_views(6);
+  Random random(19);
+  for (auto& view : input.views) {
+    for (auto& corner : view) {
+      corner.weight = corner.point % 2 == 0 ? 0.5 : 2;
+      const double v = random.normal(), u = random.normal();
+      corner.pixel += 0.05 / corner.weight * Eigen::Vector2d(u, v);
+    }
+  }
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  ASSERT_TRUE(solution.has_succeeded());
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (const auto& corner : input.views[i])
+      EXPECT_EQ(std::abs(solution.problem.points[i * 120 + corner.point].z()), corner.weight);
+  }
+  EXPECT_NEAR(solution.rms_px, 0.05, 0.004);
+}
+
+/// A displaced corner of exact views is an outlier if the RMS residual exceeds 0.005 px.
+TEST(SolveIntrinsics, RejectsOutliersOnlyAboveRmsOfExactCorners) {
+  for (const auto& [size_px, outliers] : {std::pair{0.05, 0}, {0.5, 1}}) {
+    IntrinsicsInput input = make_exact_views(6);
+    input.views[2][7].pixel.x() += size_px;
+    const IntrinsicsSolution solution = solve_intrinsics(input);
+    ASSERT_TRUE(solution.has_succeeded());
+    EXPECT_EQ(solution.outliers > 0, outliers > 0) << solution.rms_px;
+  }
+}
+
+/// Splined model that is fast to solve, and a lens up to 58 degrees off the axis.
+constexpr LensModel kSmallSpline = lens_model_for_spline_grid({3, 9, 8, 130});
+Lens lens_of_small_spline() {
+  return {LensModel::fisheye, std::array{420.0, 422.0, 402.0, 297.0, 0.03, -0.012, 0.004, -0.0006}};
+}
+
+TEST(SolveIntrinsics, SplinedLensKeepsAxisAndSidewaysRaysOfFisheye) {
+  IntrinsicsInput input = make_exact_views(14, lens_of_small_spline());
+  Random random(23);
+  for (auto& view : input.views) {
+    for (auto& corner : view) {
+      const double v = random.normal(), u = random.normal();
+      corner.pixel += 0.03 * Eigen::Vector2d(u, v);
+    }
+  }
+  input.lens_model = kSmallSpline;
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  ASSERT_TRUE(solution.has_succeeded());
+  EXPECT_FALSE(solution.solved_parameters.core);
+  EXPECT_TRUE(solution.solved_parameters.distortions);
+  EXPECT_NEAR(solution.problem.noise_px / solution.rms_px, 1, 0.15);
+  EXPECT_NEAR(solution.rms_px, 0.03, 0.004);
+  const Lens lens = solution.fitted_lens();
+  ASSERT_EQ(solution.problem.fixed_rays.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto& [pixel, ray] = solution.problem.fixed_rays[i];
+    const auto projected = lens.project_point(ray);
+    ASSERT_TRUE(projected);
+    EXPECT_LT((*projected - pixel).norm(), 0.05) << i;
+    const double beside = i == 0 ? 0 : i == 1 ? -0.25 : 0.25;
+    EXPECT_THAT(pixel, IsNear(Eigen::Vector2d(402 + beside * 800, 297), 1.5)) << i;
+    const auto true_ray = lens_of_small_spline().unproject_pixel(pixel);
+    ASSERT_TRUE(true_ray);
+    EXPECT_THAT(ray.normalized().eval(), IsNear(true_ray->direction.normalized().eval(), 0.003));
+  }
+  // OPENCV_FISHEYE of the same corners has the same frame.
+  BoardProblem symmetric = solution.problem;
+  symmetric.lens_model = LensModel::fisheye;
+  symmetric.intrinsics = {420, 422, 402, 297, 0.03, -0.012, 0.004, -0.0006};
+  ASSERT_TRUE(solve_board_problem(symmetric, {true, true, false, false}));
+  const auto rotation =
+      fit_rotation_between_lenses(lens, Lens(symmetric.lens_model, symmetric.intrinsics),
+                                  collect_inlier_corner_pixels(solution.problem));
+  ASSERT_TRUE(rotation);
+  EXPECT_LT(Eigen::AngleAxisd(*rotation).angle(), 1.2e-4);
+}
+
+TEST(SolveIntrinsics, SplinedLensHasNoiseOfAtLeastOneHundredthPixel) {
+  IntrinsicsInput input = make_exact_views(10, lens_of_small_spline());
+  input.lens_model = kSmallSpline;
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  ASSERT_TRUE(solution.has_succeeded());
+  EXPECT_EQ(solution.problem.noise_px, 0.01);
+  EXPECT_LT(solution.rms_px, 0.02);
+}
+
+/// Returns the view and the tag of each outlier of a solution.
+std::vector<std::pair<std::size_t, std::size_t>> list_outlier_tags(
+    const IntrinsicsSolution& solution, const BoardLattice& lattice) {
+  std::vector<std::pair<std::size_t, std::size_t>> tags;
+  for (std::size_t i = 0; i < solution.problem.points.size(); ++i) {
+    const double weight = solution.problem.points[i].z();
+    if (weight >= 0 || weight == BoardProblem::kUnseen) continue;
+    tags.emplace_back(i / 120, lattice.find_tag_index_of_point(i % 120));
+  }
+  return tags;
+}
+
+/// The limit of a displacement is 0.1 px for exact corners.
+TEST(SolveFirstStages, MarksTagsWithDisplacedCornerForSplinedLens) {
+  for (const double size_px : {0.08, 0.14}) {
+    IntrinsicsInput input = make_exact_views(10, lens_of_small_spline());
+    const std::size_t view = 4, corner = 9;
+    const std::size_t tag = input.lattice.find_tag_index_of_point(input.views[view][corner].point);
+    input.views[view][corner].pixel.y() += size_px;
+    const auto solution = InitialSolutions(input).solve_first_stages(kSmallSpline);
+    ASSERT_TRUE(solution);
+    const auto tags = list_outlier_tags(*solution, input.lattice);
+    if (size_px < 0.1) {
+      EXPECT_TRUE(tags.empty());
+      continue;
+    }
+    EXPECT_EQ(tags.size(), 4U);
+    for (const auto& found : tags) EXPECT_EQ(found, std::pair(view, tag));
+  }
+}
+
+/// A view in which more than a quarter of the corners would be marked is kept whole.
+TEST(SolveFirstStages, MarksAtMostQuarterOfCornersOfViewForSplinedLens) {
+  IntrinsicsInput exact = make_exact_views(10, lens_of_small_spline());
+  const auto whole =
+      std::ranges::find_if(exact.views, [](const auto& corners) { return corners.size() == 120; });
+  ASSERT_NE(whole, exact.views.end());
+  whole->resize(112);  // 28 tags with four corners each
+  const auto view = static_cast<std::size_t>(whole - exact.views.begin());
+  for (const std::size_t count : {7U, 8U}) {
+    IntrinsicsInput input = exact;
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t tag = 4 * k - (k >= 4 ? 2 : 0);  // tags that do not touch each other
+      input.views[view][4 * tag].pixel.x() += 0.4;
+    }
+    const auto solution = InitialSolutions(input).solve_first_stages(kSmallSpline);
+    ASSERT_TRUE(solution);
+    EXPECT_EQ(list_outlier_tags(*solution, input.lattice).size(), count == 7 ? 28U : 0U);
+  }
+}
+
+/// The noise of each view is inverse to its weight. The limit of weighted displacements is about
+/// nine times the weighted noise.
+TEST(SolveFirstStages, MarksTagsByWeightedDisplacementForSplinedLens) {
+  constexpr double noise_px = 0.03;
+  constexpr std::size_t displaced_view = 7, displaced_corner = 40;
+  IntrinsicsInput input = make_exact_views(10, lens_of_small_spline());
+  Random random(29);
+  for (std::size_t i = 0; i < 10; ++i) {
+    for (auto& corner : input.views[i]) {
+      corner.weight = i % 2 == 0 ? 0.5 : 2;
+      const double v = random.normal(), u = random.normal();
+      corner.pixel += noise_px / corner.weight * Eigen::Vector2d(u, v);
+    }
+  }
+  ASSERT_GT(input.views[displaced_view].size(), displaced_corner);
+  const std::size_t tag =
+      input.lattice.find_tag_index_of_point(input.views[displaced_view][displaced_corner].point);
+  for (const double displacement : {5.0, 16.0}) {
+    IntrinsicsInput displaced = input;
+    displaced.views[displaced_view][displaced_corner].pixel.x() += displacement * noise_px / 2;
+    const auto solution = InitialSolutions(displaced).solve_first_stages(kSmallSpline);
+    ASSERT_TRUE(solution);
+    const auto tags = list_outlier_tags(*solution, input.lattice);
+    EXPECT_EQ(tags.size(), displacement > 10 ? 4U : 0U);
+    for (const auto& found : tags) EXPECT_EQ(found, std::pair(displaced_view, tag));
   }
 }
 

@@ -8,7 +8,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <utility>
+#include <vector>
 
+#include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/synthetic_views.h"
 #include "calibration/intrinsics/wide_views.h"
@@ -165,6 +169,179 @@ TEST(DescribeLensModelChoice, ListsModelsForWhichNoLensWasFound) {
   const LensChoice choice{LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}};
   EXPECT_EQ(describe_lens_model_choice(choice),
             "OPENCV_FISHEYE, 0.051 px rms in held-out views; LENSMODEL_OPENCV4 no lens");
+}
+
+TEST(DescribeLensModelChoice, SeparatesOtherModelsByCommas) {
+  const LensChoice choice{LensModel::fisheye,
+                          {{LensModel::opencv4, 0.25},
+                           {LensModel::fisheye, 0.0512},
+                           {LensModel::opencv5, 0.0496},
+                           {LensModel::opencv8}}};
+  EXPECT_EQ(describe_lens_model_choice(choice),
+            "OPENCV_FISHEYE, 0.051 px rms in held-out views; LENSMODEL_OPENCV4 0.250 px, "
+            "LENSMODEL_OPENCV5 0.050 px, LENSMODEL_OPENCV8 no lens");
+}
+
+/// Returns views of a board of 4 x 3 tags without shifts of the edges, in fast solves.
+IntrinsicsInput make_small_views(const Lens& lens, int count, double noise_px) {
+  Board board = synthetic_board(false);
+  board.cols = 4;
+  board.rows = 3;
+  const SyntheticViews views{board, lens};
+  Random random(51);
+  IntrinsicsInput input = views.input(count, random, noise_px);
+  input.warp = WarpChoice::off;
+  for (auto& view : input.views) {
+    for (auto& corner : view) corner.d_pixel_d_edge_shift.setZero();
+  }
+  return input;
+}
+
+/// Displaces corners by `size_px` on each axis so that no pose and no lens explains it.
+void displace_in_pattern(std::vector<BoardLattice::Corner>& view, double size_px) {
+  constexpr std::size_t cols = 8;
+  for (auto& corner : view) {
+    const std::size_t col = corner.point % cols, row = corner.point / cols;
+    corner.pixel.x() += (col + row) % 2 == 0 ? size_px : -size_px;
+    corner.pixel.y() += col % 2 == 0 ? size_px : -size_px;
+  }
+}
+
+TEST(FitFisheyeLens, ReturnsLargestAngleOfCornerOffAxis) {
+  const IntrinsicsInput input = make_small_views(fisheye_lens(), 6, 0);
+  double max_rad = 0;
+  for (const auto& view : input.views) {
+    for (const auto& corner : view) {
+      const auto ray = fisheye_lens().unproject_pixel(corner.pixel);
+      ASSERT_TRUE(ray);
+      max_rad = std::max(max_rad, std::atan2(ray->direction.head<2>().norm(), ray->direction.z()));
+    }
+  }
+  const auto fit = fit_fisheye_lens(InitialSolutions(input));
+  ASSERT_TRUE(fit);
+  EXPECT_EQ(fit->solution.problem.lens_model, LensModel::fisheye);
+  EXPECT_GT(max_rad, 1);
+  EXPECT_NEAR(fit->max_corner_angle_rad, max_rad, 1e-4);
+}
+
+TEST(FitFisheyeLens, ReturnsNulloptAboveTwoPixelsRms) {
+  for (const auto& [size_px, fits] : {std::pair{1.9, true}, {2.25, false}}) {
+    IntrinsicsInput input = make_small_views(fisheye_lens(), 8, 0);
+    for (auto& view : input.views) displace_in_pattern(view, size_px);
+    EXPECT_EQ(fit_fisheye_lens(InitialSolutions(input)).has_value(), fits);
+  }
+}
+
+TEST(FitFisheyeLens, ReturnsNulloptForTwoViews) {
+  EXPECT_FALSE(fit_fisheye_lens(InitialSolutions(make_small_views(fisheye_lens(), 2, 0))));
+}
+
+/// A corner at the angle of 0.7 rad is 2 f tan(0.35) from the middle of the image.
+TEST(MayBeWideAngleLens, ReturnsTrueForCornerBeyond0Point7Rad) {
+  for (const double focal_px : {800 / std::sqrt(2.0), 400.0}) {
+    const Lens lens(LensModel::stereographic, std::array{focal_px, focal_px, 399.5, 299.5});
+    IntrinsicsInput input = make_small_views(lens, 5, 0.01);
+    const double limit_px = 2 * focal_px * std::tan(0.35);
+    for (auto& view : input.views) {
+      std::erase_if(view, [&](const auto& corner) {
+        return (corner.pixel - lens.principal_point_px()).norm() > 0.9 * limit_px;
+      });
+      ASSERT_GE(view.size(), 8U);
+    }
+    auto& corner = input.views[1].back();
+    corner.pixel = lens.principal_point_px() + 0.98 * limit_px * Eigen::Vector2d(0.8, -0.6);
+    const InitialSolutions inside(input);
+    ASSERT_NEAR(inside.initial_focal_lengths_px().front(), focal_px, 1e-9);
+    EXPECT_FALSE(may_be_wide_angle_lens(inside));
+    corner.pixel = lens.principal_point_px() + 1.02 * limit_px * Eigen::Vector2d(0.8, -0.6);
+    EXPECT_TRUE(may_be_wide_angle_lens(InitialSolutions(input)));
+  }
+}
+
+TEST(MayBeWideAngleLens, ReturnsFalseWithoutViews) {
+  EXPECT_FALSE(may_be_wide_angle_lens(InitialSolutions(make_small_views(fisheye_lens(), 0, 0))));
+}
+
+/// Compares the decision with the ratio of both fits after the first stages.
+TEST(IsFisheyeModelClearlyWorse, ComparesRatioOfMeanSquaresWith1Point5) {
+  int slightly_larger = 0, slightly_smaller = 0;
+  for (const double noise_px : {0.02, 0.03, 0.04, 0.06, 0.08}) {
+    const InitialSolutions initial(make_small_views(rational_lens(), 8, noise_px));
+    const auto fisheye = initial.solve_first_stages(LensModel::fisheye),
+               other = initial.solve_first_stages(LensModel::opencv8);
+    ASSERT_TRUE(fisheye && other);
+    ASSERT_EQ(fisheye->views, other->views);
+    const double ratio = std::pow(fisheye->rms_px / other->rms_px, 2);
+    if (ratio > 1.5 && ratio < 2) ++slightly_larger;
+    if (ratio > 1.1 && ratio < 1.5) ++slightly_smaller;
+    EXPECT_EQ(is_fisheye_model_clearly_worse(initial, LensModel::opencv8), ratio > 1.5) << ratio;
+  }
+  EXPECT_GT(slightly_larger, 0);
+  EXPECT_GT(slightly_smaller, 0);
+}
+
+TEST(IsFisheyeModelClearlyWorse, ReturnsFalseForTwoViews) {
+  const InitialSolutions initial(make_small_views(rational_lens(), 2, 0.001));
+  EXPECT_FALSE(is_fisheye_model_clearly_worse(initial, LensModel::opencv8));
+}
+
+TEST(IsFisheyeModelClearlyWorse, ReturnsFalseIfOtherModelDoesNotFit) {
+  Random random(5);
+  WideBoards boards;
+  boards.reach_rad = 1.4;
+  const InitialSolutions initial(wide_input(false, 7, random, kNoise_px, {0, 0}, boards));
+  ASSERT_TRUE(initial.solve_first_stages(LensModel::fisheye));
+  ASSERT_FALSE(initial.solve_first_stages(LensModel::opencv5));
+  EXPECT_FALSE(is_fisheye_model_clearly_worse(initial, LensModel::opencv5));
+}
+
+/// Returns the squared residuals of the views, each from a solve without every third view.
+std::vector<double> cross_validate_views(const IntrinsicsInput& input, LensModel model) {
+  std::vector<double> squares(input.views.size());
+  for (std::size_t part = 0; part < 3; ++part) {
+    IntrinsicsInput solved = input, held_out = input;
+    solved.lens_model = model;
+    solved.views.clear();
+    held_out.views.clear();
+    std::vector<std::size_t> indices;
+    for (std::size_t view = 0; view < input.views.size(); ++view) {
+      if ((view + 3 - part) % 3 != 0) {
+        solved.views.push_back(input.views[view]);
+      } else {
+        held_out.views.push_back(input.views[view]);
+        indices.push_back(view);
+      }
+    }
+    const auto rms_px = compute_held_out_view_residual_rms_px(solve_intrinsics(solved), held_out);
+    for (std::size_t k = 0; k < indices.size(); ++k) squares[indices[k]] = rms_px[k] * rms_px[k];
+  }
+  return squares;
+}
+
+/// View 4 has nearly three times the typical residual, or more. It then does not count.
+TEST(SelectLensModel, StatesRmsOfHeldOutViewsThatCount) {
+  for (const auto& [size_px, counts] : {std::pair{0.27, true}, {0.34, false}}) {
+    IntrinsicsInput input = make_small_views(radial_lens(), 9, 0);
+    for (std::size_t view = 0; view < 9; ++view)
+      displace_in_pattern(input.views[view], view == 4 ? size_px : 0.1);
+    const auto choice = select_lens_model(InitialSolutions(input));
+    ASSERT_TRUE(choice);
+    constexpr std::array models{LensModel::opencv4, LensModel::fisheye, LensModel::opencv5,
+                                LensModel::opencv8, LensModel::opencv12};
+    ASSERT_EQ(choice->candidates.size(), models.size());
+    for (std::size_t i = 0; i < models.size(); ++i)
+      EXPECT_EQ(choice->candidates[i].model, models[i]);
+    std::vector<double> squares = cross_validate_views(input, LensModel::opencv5);
+    if (!counts) squares.erase(squares.begin() + 4);
+    double sum = 0;
+    for (const double square : squares) sum += square;
+    EXPECT_NEAR(find_rms(*choice, LensModel::opencv5),
+                std::sqrt(sum / static_cast<double>(squares.size())), 1e-9);
+    EXPECT_EQ(choice->model, LensModel::opencv4);
+    EXPECT_EQ(choice->beyond_right_angle_rad, 0);
+    ASSERT_TRUE(choice->fisheye);
+    EXPECT_EQ(choice->fisheye->solution.views.size(), 9U);
+  }
 }
 
 }  // namespace

@@ -4,16 +4,27 @@
 
 #include <gmock/gmock.h>
 
+#include <fmt/core.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "calibration/intrinsics/board_print.h"
+#include "calibration/intrinsics/calibration_report.h"
+#include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/projection_uncertainty.h"
+#include "calibration/intrinsics/spline_fit.h"
 #include "calibration/intrinsics/synthetic_views.h"
 #include "calibration/intrinsics/wide_views.h"
+#include "camera/spline_grid.h"
 #include "geometry/angles.h"
+#include "geometry/polygon.h"
 #include "support/matchers.h"
 
 namespace vlp {
@@ -232,6 +243,335 @@ TEST(SelectBoardWarpModel, TurnsWarpOffForSquareChessboardOnly) {
       EXPECT_EQ(select_board_warp_model(board, warp), warp);
     }
   }
+}
+
+/// Returns the input of the solve of an estimate without held-out views.
+IntrinsicsInput make_solver_input(const LensEstimate& result, const Board& board) {
+  IntrinsicsInput input{
+      BoardLattice(board), {}, result.views.front().imager_px, result.solution.problem.lens_model};
+  for (const BoardView& view : result.views)
+    input.views.push_back(input.lattice.list_corners_with_board_positions(view.detection));
+  return input;
+}
+
+TEST(EstimateLens, WarnsIfNoViewIsHeldOut) {
+  LensViews input = make_views(4);
+  input.held_out = 5;
+  const LensEstimate result = estimate_lens(input);
+  ASSERT_TRUE(result.has_succeeded()) << result.problem;
+  EXPECT_THAT(result.warnings, ElementsAre("no view is held out: 4 views are fewer than 5"));
+  EXPECT_THAT(result.images, SizeIs(4));
+  input.held_out = 4;
+  const LensEstimate last = estimate_lens(input);
+  ASSERT_TRUE(last.has_succeeded()) << last.problem;
+  EXPECT_THAT(last.warnings, IsEmpty());
+  EXPECT_THAT(last.images, ElementsAre("1.png", "2.png", "3.png"));
+  EXPECT_EQ(last.held_out.views, 1);
+}
+
+TEST(EstimateLens, StatesThatViewsAreParallel) {
+  LensViews input = make_views(1, 0);
+  input.views.resize(8, input.views[0]);
+  const LensEstimate result = estimate_lens(input);
+  EXPECT_EQ(result.status, LensStatus::undetermined);
+  EXPECT_THAT(result.problem, testing::StartsWith("8 views with the board: all views show the "
+                                                  "board at the same angle"));
+}
+
+TEST(EstimateLens, CovarianceIsThatOfTagsWithBiasOfRegularization) {
+  LensViews input = make_views(7);
+  const LensEstimate result = estimate_lens(input);
+  ASSERT_TRUE(result.has_succeeded()) << result.problem;
+  ASSERT_TRUE(result.intrinsics_covariance && result.lattice);
+  const ProjectionUncertainty uncertainty(result.solution, *result.lattice);
+  const Eigen::VectorXd& bias = uncertainty.intrinsics_regularization_bias();
+  ASSERT_GT(bias.norm(), 0);
+  const Eigen::MatrixXd expected = uncertainty.intrinsics_covariance() + bias * bias.transpose();
+  const Eigen::VectorXd inverse = expected.diagonal().cwiseSqrt().cwiseInverse();
+  EXPECT_THAT(
+      (inverse.asDiagonal() * (*result.intrinsics_covariance - expected) * inverse.asDiagonal())
+          .eval(),
+      IsNear(Eigen::MatrixXd::Zero(12, 12).eval(), 1e-9));
+  const IntrinsicsInput solver_input = make_solver_input(result, input.board);
+  const ViewCoverage coverage = compute_board_view_coverage(result.solution, solver_input);
+  EXPECT_EQ(result.coverage.corners, coverage.corners);
+  EXPECT_EQ(result.coverage.covered_fraction, coverage.covered_fraction);
+  EXPECT_EQ(result.coverage.tilts_rad, coverage.tilts_rad);
+  EXPECT_FALSE(result.solution.other_model_fits);
+}
+
+TEST(EstimateLens, CombinesUncertaintyWithThatOfPrintByRootOfSquares) {
+  LensViews input = make_views(7);
+  const LensEstimate exact = estimate_lens(input);
+  input.board.print_sd = 0.001;
+  const LensEstimate result = estimate_lens(input);
+  ASSERT_TRUE(exact.has_succeeded() && result.has_succeeded());
+  const auto effect =
+      compute_board_aspect_error_effect_on_lens(exact.solution, 0.001, exact.report.region);
+  ASSERT_TRUE(effect && result.print_px);
+  EXPECT_NEAR(*result.print_px, effect->rms_px, 1e-9);
+  EXPECT_NEAR(
+      std::pow(result.report.uncertainty_mean_px, 2),
+      std::pow(exact.report.uncertainty_mean_px, 2) + std::pow(effect->mean_in_region_px, 2), 1e-9);
+  EXPECT_NEAR(
+      std::pow(result.report.uncertainty_worst_px, 2),
+      std::pow(exact.report.uncertainty_worst_px, 2) + std::pow(effect->worst_in_region_px, 2),
+      1e-9);
+  EXPECT_THAT(result.warnings, IsEmpty());
+}
+
+/// The limit of the displacement of the edges is 0.4 px.
+TEST(EstimateLens, WarnsOfEdgeDisplacementAboveLimitWithDirection) {
+  const LensViews exact = make_views(4, 0.02);
+  const auto list_warnings = [&](double shift_px) {
+    LensViews input = exact;
+    for (BoardView& view : input.views) {
+      for (TagDetection& tag : view.detection.tags) tag = shrunk(tag, shift_px);
+    }
+    const LensEstimate result = estimate_lens(input);
+    EXPECT_TRUE(result.has_succeeded()) << result.problem;
+    return result.warnings;
+  };
+  EXPECT_THAT(list_warnings(0.38), IsEmpty());
+  EXPECT_THAT(list_warnings(-0.38), IsEmpty());
+  const auto dark = list_warnings(0.45), light = list_warnings(-0.45);
+  ASSERT_THAT(dark, SizeIs(1));
+  ASSERT_THAT(light, SizeIs(1));
+  EXPECT_THAT(dark[0], HasSubstr("the edges of the tags are 0.45 px towards the dark, more"));
+  EXPECT_THAT(light[0], HasSubstr("the edges of the tags are 0.45 px towards the light, more"));
+}
+
+/// The spacing is compared with the images before the solve, to 5 %, and with the lens, to 1 %.
+TEST(EstimateLens, ReturnsWrongBoardForSpacingThatOnlyLensContradicts) {
+  const SyntheticViews synthetic{synthetic_board(true), synthetic_lens()};
+  LensViews input{{}, synthetic.board};
+  Random random(11);
+  for (int i = 0; i < 6; ++i) {
+    input.views.push_back(
+        {std::to_string(i), synthetic.imager_px, synthetic.random_view(random, 0.02)});
+  }
+  input.board.tag_spacing = 0.308;
+  EXPECT_TRUE(estimate_lens(input).has_succeeded());
+  input.board.tag_spacing = 0.325;
+  const LensEstimate result = estimate_lens(input);
+  EXPECT_EQ(result.status, LensStatus::wrong_board);
+  EXPECT_EQ(result.problem, "tag_spacing is 0.325, but the images show gaps of 0.3 tags");
+  EXPECT_TRUE(result.solution.has_succeeded());
+}
+
+/// Returns the largest position of a corner in the stereographic plane along each axis.
+Eigen::Vector2d compute_farthest(const LensViews& input) {
+  Eigen::Vector2d farthest(0, 0);
+  for (const BoardView& view : input.views) {
+    for (const TagDetection& tag : view.detection.tags) {
+      for (const Eigen::Vector2d& pixel : tag.corners_px) {
+        const Eigen::Vector3d ray =
+            wide_lens().unproject_pixel(pixel).value().direction.normalized();
+        farthest = farthest.cwiseMax(ray.head<2>().cwiseAbs() * 2 / (1 + ray.z()));
+      }
+    }
+  }
+  return farthest;
+}
+
+TEST(EstimateLens, StatesExtentOfNarrowGridAndOfBoards) {
+  constexpr SplineGrid grid{3, 11, 9, 100};
+  const LensViews input = make_wide_views(8, 180, lens_model_for_spline_grid(grid));
+  const LensEstimate result = estimate_lens(input);
+  EXPECT_EQ(result.status, LensStatus::undetermined);
+  const double u = 2 * std::tan(rad_from_deg(25)), v = u * 6 / 8;
+  const Eigen::Vector2d farthest = compute_farthest(input);
+  const auto angle_deg = [](double at) { return 2 * deg_from_rad(std::atan(at / 2)); };
+  ASSERT_GT(std::abs(angle_deg(farthest.x()) - angle_deg(farthest.y())), 1);
+  EXPECT_EQ(
+      result.problem,
+      fmt::format("8 views with the board: the control points of {} extend to 50 degrees off axis "
+                  "horizontally and {:.0f} vertically, but the board is visible to {:.0f} and "
+                  "{:.0f} degrees: use --lens {}",
+                  splined_lens_model_name(grid), angle_deg(v), angle_deg(farthest.x()),
+                  angle_deg(farthest.y()),
+                  splined_lens_model_name(resize_spline_grid_to_reach(grid, 1.05 * farthest))));
+}
+
+TEST(EstimateLens, RecommendsFinerGridIfGridHasOnePieceBeyondImage) {
+  const LensEstimate result =
+      estimate_lens(make_wide_views(8, 180, lens_model_for_spline_grid({3, 4, 4, 359})));
+  EXPECT_EQ(result.status, LensStatus::undetermined);
+  EXPECT_THAT(result.problem,
+              AllOf(HasSubstr("8 views with the board: the control points of "),
+                    HasSubstr("fov_x_deg=359 do not cover the field of view, 112 degrees off axis "
+                              "horizontally and 112 vertically: use --lens LENSMODEL_SPLINED"),
+                    HasSubstr("Nx=4_Ny=4_fov_x_deg=230")));
+}
+
+TEST(EstimateLens, ComparesEveryOpencvModelOfWideLensWithFisheye) {
+  for (const LensModel model : {LensModel::opencv4, LensModel::opencv5, LensModel::opencv12}) {
+    const LensEstimate result = estimate_lens(make_wide_views(6, 45, model));
+    ASSERT_TRUE(result.has_succeeded()) << result.problem;
+    EXPECT_TRUE(result.solution.other_model_fits) << lens_model_name(model);
+  }
+}
+
+TEST(EstimateLens, StatesThatFisheyeFitsEquallyWell) {
+  const LensEstimate result = estimate_lens(make_wide_views(10, 60, LensModel::opencv8));
+  ASSERT_TRUE(result.has_succeeded()) << result.problem;
+  EXPECT_TRUE(result.solution.other_model_fits);
+  EXPECT_FALSE(result.better_model);
+  EXPECT_THAT(result.warnings, IsEmpty());
+  EXPECT_THAT(result.details,
+              ElementsAre("OPENCV_FISHEYE fits the views as well as LENSMODEL_OPENCV8: the lens is "
+                          "valid only where corners were detected"));
+}
+
+TEST(EstimateLens, RecommendsFisheyeThatFitsClearlyBetterAndRaisesUncertainty) {
+  const LensViews input = make_wide_views(10, 60, LensModel::opencv5);
+  const LensEstimate result = estimate_lens(input);
+  ASSERT_TRUE(result.has_succeeded()) << result.problem;
+  ASSERT_TRUE(result.solution.other_model_fits);
+  EXPECT_EQ(result.better_model, LensModel::fisheye);
+  EXPECT_THAT(result.details, IsEmpty());
+  const IntrinsicsInput solver_input = make_solver_input(result, input.board);
+  const auto fisheye = fit_fisheye_lens(InitialSolutions(solver_input));
+  ASSERT_TRUE(fisheye);
+  EXPECT_THAT(result.warnings,
+              ElementsAre(fmt::format(
+                  "the board is visible up to {:.0f} degrees off axis; OPENCV_FISHEYE fits with "
+                  "{:.3f} px, LENSMODEL_OPENCV5 with {:.3f} px and no rays beyond 90 degrees: use "
+                  "--lens OPENCV_FISHEYE",
+                  deg_from_rad(fisheye->max_corner_angle_rad), fisheye->solution.rms_px,
+                  result.solution.rms_px)));
+  // Largest difference between both lenses in the region. It exceeds the standard deviation.
+  const Lens lens = result.solution.fitted_lens(), other = fisheye->solution.fitted_lens();
+  std::vector<Eigen::Vector2d> pixels;
+  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(kWideImager)) {
+    if (polygon_contains(result.report.region, pixel)) pixels.push_back(pixel);
+  }
+  const auto lens_from_other = fit_rotation_between_lenses(other, lens, pixels);
+  ASSERT_TRUE(lens_from_other);
+  double worst_px = 0;
+  for (const Eigen::Vector2d& pixel : pixels) {
+    const auto ray = other.unproject_pixel(pixel);
+    ASSERT_TRUE(ray);
+    const auto projected = lens.project_point(*lens_from_other * ray->direction);
+    ASSERT_TRUE(projected);
+    worst_px = std::max(worst_px, (*projected - pixel).norm());
+  }
+  const CalibrationReport report = compute_lens_calibration_report(result.solution, solver_input);
+  EXPECT_EQ(result.report.region, report.region);
+  ASSERT_GT(worst_px, report.uncertainty_worst_px);
+  EXPECT_NEAR(result.report.uncertainty_worst_px, worst_px, 1e-6);
+  EXPECT_EQ(result.report.uncertainty_mean_px, report.uncertainty_mean_px);
+}
+
+TEST(EstimateLens, RecommendsFisheyeOfEqualFitBeyond74Degrees) {
+  for (const auto& [reach_deg, is_recommended] : {std::pair{72, false}, {77, true}}) {
+    const LensEstimate result = estimate_lens(make_wide_views(9, reach_deg, LensModel::opencv8));
+    ASSERT_TRUE(result.has_succeeded()) << result.problem;
+    ASSERT_TRUE(result.solution.other_model_fits);
+    EXPECT_EQ(result.better_model.has_value(), is_recommended) << reach_deg;
+    EXPECT_EQ(result.details.empty(), is_recommended);
+  }
+}
+
+TEST(EstimateLens, RecommendsFisheyeIfNoLensOfModelFits) {
+  const LensEstimate result = estimate_lens(make_wide_views(7, 80, LensModel::opencv5));
+  EXPECT_EQ(result.status, LensStatus::undetermined);
+  EXPECT_EQ(result.problem,
+            "7 views with the board: no lens of LENSMODEL_OPENCV5 fits, but OPENCV_FISHEYE fits "
+            "with 0.05 px: use --lens OPENCV_FISHEYE");
+}
+
+/// OPENCV_FISHEYE is compared with OPENCVn of wide lenses only.
+TEST(EstimateLens, ComparesNoFisheyeWithNarrowLensOrFisheye) {
+  const LensEstimate fisheye = estimate_lens(make_wide_views(8, 60, LensModel::fisheye));
+  ASSERT_TRUE(fisheye.has_succeeded()) << fisheye.problem;
+  EXPECT_FALSE(fisheye.solution.other_model_fits);
+  EXPECT_THAT(fisheye.details, IsEmpty());
+  EXPECT_THAT(fisheye.warnings, IsEmpty());
+  SyntheticViews synthetic{synthetic_board(false),
+                           Lens(LensModel::pinhole, std::array{1500.0, 1500.0, 402.0, 297.0})};
+  LensViews input{{}, synthetic.board, LensModel::opencv4};
+  Random random(11);
+  for (int i = 0; i < 8; ++i) {
+    input.views.push_back(
+        {std::to_string(i), synthetic.imager_px, synthetic.random_view(random, kViewNoise_px)});
+  }
+  const LensEstimate narrow = estimate_lens(input);
+  ASSERT_TRUE(narrow.has_succeeded()) << narrow.problem;
+  EXPECT_FALSE(narrow.solution.other_model_fits);
+  EXPECT_THAT(narrow.details, IsEmpty());
+}
+
+/// OPENCV_FISHEYE fits a rational lens nearly as well as OPENCV8 if the corners are noisy.
+TEST(EstimateLens, OtherModelFitsIfSquaresIncreaseByAtMost20MeanSquares) {
+  const SyntheticViews synthetic{
+      synthetic_board(false),
+      Lens(LensModel::opencv8, std::array{420.0, 421.0, 402.0, 297.0, 0.9, 0.25, 0.0002, -0.0001,
+                                          0.01, 1.25, 0.5, 0.06})};
+  int fitting = 0, compared = 0;
+  for (const double noise_px : {0.16, 0.18}) {
+    LensViews input{{}, synthetic.board};
+    Random random(12);
+    for (int i = 0; i < 5; ++i) {
+      input.views.push_back(
+          {std::to_string(i), synthetic.imager_px, synthetic.random_view(random, noise_px)});
+    }
+    const LensEstimate result = estimate_lens(input);
+    ASSERT_TRUE(result.has_succeeded()) << result.problem;
+    const auto fisheye = fit_fisheye_lens(InitialSolutions(make_solver_input(result, input.board)));
+    ASSERT_TRUE(fisheye);
+    const double corners = result.solution.corners;
+    const double excess =
+        2 * corners * (std::pow(fisheye->solution.rms_px / result.solution.rms_px, 2) - 1);
+    EXPECT_EQ(result.solution.other_model_fits, excess <= 20) << excess;
+    if (result.solution.other_model_fits) ++fitting;
+    ++compared;
+  }
+  EXPECT_GT(fitting, 0);
+  EXPECT_LT(fitting, compared);
+}
+
+/// Returns a view of a board beyond the control points of a grid of 130 degrees.
+BoardView make_far_view() {
+  const SyntheticViews synthetic = wide_views(false);
+  Random random(2);
+  const Eigen::Matrix3d towards =
+      Eigen::AngleAxisd(rad_from_deg(78), Eigen::Vector3d::UnitY()).toRotationMatrix();
+  return {"far.png", synthetic.imager_px,
+          synthetic.view(towards, 1.2 * towards.col(2), random, kViewNoise_px)};
+}
+
+TEST(EstimateLens, RequiresThatGridCoversNineTenthsOfBoards) {
+  LensViews input = make_wide_views(10, 55, lens_model_for_spline_grid({3, 10, 10, 130}));
+  input.views.resize(12, make_far_view());
+  const LensEstimate result = estimate_lens(input);
+  EXPECT_EQ(result.status, LensStatus::undetermined);
+  EXPECT_THAT(result.problem, HasSubstr("fov_x_deg=130 extend to 65 degrees off axis"));
+}
+
+TEST(EstimateLens, AcceptsSmallGridThatCoversBoards) {
+  LensViews input = make_views(8);
+  input.lens_model = lens_model_for_spline_grid({3, 9, 8, 90});
+  const LensEstimate result = estimate_lens(input);
+  ASSERT_TRUE(result.has_succeeded()) << result.problem;
+  EXPECT_THAT(result.warnings, IsEmpty());
+  EXPECT_FALSE(result.intrinsics_covariance);
+  EXPECT_FALSE(result.solution.other_model_fits);
+}
+
+/// A board beyond the control points has no pose.
+TEST(EstimateLens, WarnsOfViewBeyondControlPointsOfSplinedLens) {
+  LensViews input = make_wide_views(10, 55, lens_model_for_spline_grid({3, 10, 10, 130}));
+  input.views.push_back(make_far_view());
+  ASSERT_GT(input.views.back().detection.tags.size(), 20U);
+  const LensEstimate result = estimate_lens(input);
+  ASSERT_TRUE(result.has_succeeded()) << result.problem;
+  EXPECT_THAT(result.warnings,
+              ElementsAre("far.png: dropped, as the board is where "
+                          "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=10_Ny=10_fov_x_deg=130 has "
+                          "no control points; use a larger fov_x_deg or Ny"));
+  EXPECT_THAT(result.images, SizeIs(11));
+  EXPECT_FALSE(result.intrinsics_covariance);
 }
 
 }  // namespace

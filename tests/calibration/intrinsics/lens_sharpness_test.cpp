@@ -7,7 +7,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <random>
+
+#include "support/random.h"
 
 namespace vlp {
 namespace {
@@ -187,6 +190,335 @@ TEST(ComputeMedianEdgeMtf50, ReturnsMtf50OfUpperMedianBlur) {
   const auto of_seven = compute_median_edge_mtf50(seen);
   ASSERT_TRUE(of_seven);
   EXPECT_DOUBLE_EQ(*of_seven, compute_mtf50_of_gaussian_blur(0.9));
+}
+
+// Tests with exact values: a small tag in the middle of each of `cols` x `rows` equal parts of an
+// image of 1200 x 540 px. MTF50 and contrast have 12 x 9 parts, the light 24 x 18.
+
+constexpr std::array kPartsImager_px{1200, 540};
+
+/// Step of an edge of the tag in a part of the image. An edge with the blur 0 is not measured.
+using StepInPart = std::function<EdgeStep(int col, int row, int view, std::size_t edge)>;
+
+TagDetection make_square_tag(int id, const Eigen::Vector2d& center_px, double half_px) {
+  const double x = center_px.x(), y = center_px.y();
+  return {id,
+          {{{x - half_px, y + half_px},
+            {x + half_px, y + half_px},
+            {x + half_px, y - half_px},
+            {x - half_px, y - half_px}}}};
+}
+
+std::vector<BoardView> make_views_of_parts(const StepInPart& step_in_part, int count, int cols = 12,
+                                           int rows = 9) {
+  std::vector<BoardView> views;
+  views.reserve(static_cast<std::size_t>(count));
+  for (int view = 0; view < count; ++view) {
+    BoardView& added = views.emplace_back(BoardView{"view", kPartsImager_px, {}});
+    for (int row = 0; row < rows; ++row) {
+      for (int col = 0; col < cols; ++col) {
+        TagDetection tag = make_square_tag(
+            row * cols + col, {(col + 0.5) * 1200 / cols, (row + 0.5) * 540 / rows}, 5);
+        for (std::size_t k = 0; k < 4; ++k) tag.steps[k] = step_in_part(col, row, view, k);
+        added.detection.tags.push_back(tag);
+      }
+    }
+  }
+  return views;
+}
+
+std::optional<LensSharpness> measure_parts(const StepInPart& step_in_part, int count, int cols = 12,
+                                           int rows = 9) {
+  return measure_lens_sharpness(make_views_of_parts(step_in_part, count, cols, rows),
+                                kPartsImager_px);
+}
+
+/// Smooth positive function without symmetry.
+double uneven_value(int col, int row) { return 0.6 + 0.03 * col + 0.05 * row; }
+
+/// Largest loss of a part relative to the upper median of the means of opposite parts, up to
+/// `reach` parts away in both directions.
+double expected_local_loss(const LensSharpness::Map& map, int reach) {
+  const auto is_inside = [&](int col, int row) {
+    return col >= 0 && row >= 0 && col < map.cols && row < map.rows;
+  };
+  double largest = -1e9;
+  for (int row = 0; row < map.rows; ++row) {
+    for (int col = 0; col < map.cols; ++col) {
+      std::vector<double> means;  // each pair twice
+      for (int v = -reach; v <= reach; ++v) {
+        for (int u = -reach; u <= reach; ++u) {
+          if (u == 0 && v == 0) continue;
+          if (!is_inside(col + u, row + v) || !is_inside(col - u, row - v)) continue;
+          const double mean = 0.5 * map.at(col + u, row + v) + 0.5 * map.at(col - u, row - v);
+          if (!std::isnan(mean)) means.push_back(mean);
+        }
+      }
+      if (means.empty() || std::isnan(map.at(col, row))) continue;
+      std::sort(means.begin(), means.end());
+      largest = std::max(largest, 1 - map.at(col, row) / means[means.size() / 2]);
+    }
+  }
+  return largest;
+}
+
+TEST(ComputeMtf50OfGaussianBlur, IsFrequencyOfHalfModulation) {
+  for (const double sigma_px : {0.4, 0.8, 2.0}) {
+    const double frequency = compute_mtf50_of_gaussian_blur(sigma_px);
+    EXPECT_GT(frequency, 0);
+    EXPECT_NEAR(std::exp(-2 * std::pow(3.14159265358979 * sigma_px * frequency, 2)), 0.5, 1e-12);
+  }
+}
+
+TEST(ComputeMedianEdgeMtf50, SkipsEdgesWithoutBlurOrWithoutLight) {
+  BoardDetection seen;
+  seen.tags.push_back(make_square_tag(0, {50, 50}, 5));
+  EXPECT_FALSE(compute_median_edge_mtf50(seen)) << "no edge is measured";
+  seen.tags[0].steps = {{{0.5, 1, 9}, {0, 1, 9}, {0.6, 1, 0}, {0, 1, 9}}};
+  const auto found = compute_median_edge_mtf50(seen);
+  ASSERT_TRUE(found);
+  EXPECT_DOUBLE_EQ(*found, compute_mtf50_of_gaussian_blur(0.5));
+}
+
+TEST(MeasureLensSharpness, EachPartHasLowerQuartileOfViewMedians) {
+  // Upper medians of the four edges: 1.1 times the blur of the view.
+  const std::array<double, 4> edges{1.1, 0.9, 1.4, 1.0};
+  const std::array<double, 8> views{1.3, 1.0, 1.7, 1.1, 1.4, 1.6, 1.2, 1.5};
+  for (const int count : {5, 8}) {
+    const auto found = measure_parts(
+        [&](int col, int row, int view, std::size_t edge) {
+          const double factor = edges[edge] * views[static_cast<std::size_t>(view)];
+          return EdgeStep{uneven_value(col, row) * factor, 20, 200};
+        },
+        count);
+    ASSERT_TRUE(found);
+    // Of 5 views at 1.0, 1.1, 1.3, ...: 2/3 of the way from the first to the second. Of 8 at 1.0,
+    // 1.1, 1.2, ...: 5/12 of the way from the second to the third.
+    const double quartile = 1.1 * (count == 5 ? 1 + 0.1 * 2 / 3 : 1.1 + 0.1 * 5 / 12);
+    double sum = 0;
+    for (int row = 0; row < 9; ++row) {
+      for (int col = 0; col < 12; ++col) {
+        const double expected = compute_mtf50_of_gaussian_blur(uneven_value(col, row) * quartile);
+        EXPECT_NEAR(found->mtf50.at(col, row), expected, 1e-12) << col << ' ' << row;
+        sum += expected;
+      }
+    }
+    EXPECT_NEAR(found->mean_mtf50, sum / 108, 1e-12);
+    const double worst = compute_mtf50_of_gaussian_blur(uneven_value(11, 8) * quartile);
+    EXPECT_NEAR(found->worst_ratio, worst / (sum / 108), 1e-12);
+  }
+}
+
+TEST(MeasureLensSharpness, PartNeedsFiveViewsForMtf50AndThreeForContrast) {
+  const auto found = measure_parts(
+      [](int col, int, int view, std::size_t) {
+        // The first columns are measured in two to four views only.
+        return EdgeStep{col < 3 && view >= 2 + col ? 0 : 0.8, 20, 200};
+      },
+      6);
+  ASSERT_TRUE(found);
+  for (int row = 0; row < 9; ++row) {
+    for (int col = 0; col < 12; ++col) {
+      EXPECT_EQ(std::isnan(found->mtf50.at(col, row)), col < 3);
+      EXPECT_EQ(std::isnan(found->black_to_white.at(col, row)), col < 1);
+    }
+  }
+  EXPECT_NEAR(found->mean_mtf50, compute_mtf50_of_gaussian_blur(0.8), 1e-12);
+  EXPECT_NEAR(found->black_level, 0.1, 1e-12);
+}
+
+TEST(MeasureLensSharpness, NeedsHalfOfParts) {
+  for (const int known : {53, 54}) {
+    const auto found = measure_parts(
+        [&](int col, int row, int, std::size_t) {
+          return EdgeStep{row * 12 + col < known ? 0.8 : 0, 20, 200};
+        },
+        5);
+    EXPECT_EQ(found.has_value(), known == 54) << known;
+  }
+}
+
+TEST(MeasureLensSharpness, EdgeCountsForPartOfItsMiddle) {
+  // A tag 220 px wide and 100 px high: the middle of each edge is in a part of its own.
+  auto views = make_views_of_parts(
+      [](int col, int row, int, std::size_t) {
+        return EdgeStep{col >= 1 && col <= 3 && row <= 1 ? 0 : 0.8, 20, 200};
+      },
+      5);
+  for (BoardView& view : views) {
+    TagDetection tag{500, {{{110, 110}, {330, 110}, {330, 10}, {110, 10}}}};
+    tag.steps = {{{0.5, 20, 200}, {0.6, 20, 200}, {0.7, 20, 200}, {0.9, 20, 200}}};
+    view.detection.tags.insert(view.detection.tags.begin(), tag);
+  }
+  const auto found = measure_lens_sharpness(views, kPartsImager_px);
+  ASSERT_TRUE(found);
+  const auto blur_px = [&](int col, int row) {
+    return compute_mtf50_of_gaussian_blur(1) / found->mtf50.at(col, row);
+  };
+  EXPECT_NEAR(blur_px(2, 1), 0.5, 1e-12) << "lower edge";
+  EXPECT_NEAR(blur_px(3, 1), 0.6, 1e-12) << "right edge";
+  EXPECT_NEAR(blur_px(2, 0), 0.7, 1e-12) << "upper edge";
+  EXPECT_NEAR(blur_px(1, 1), 0.9, 1e-12) << "left edge";
+  EXPECT_TRUE(std::isnan(found->mtf50.at(1, 0)));
+  EXPECT_TRUE(std::isnan(found->mtf50.at(3, 0)));
+}
+
+TEST(MeasureLensSharpness, AsymmetryIsTwiceTheSumOfDipoleAndQuadrupole) {
+  const double a = 0.03, b = -0.04, d = 0.005, e = 0.012;
+  const auto sharpness_at = [&](int col, int row) {
+    const double x = (100 * (col + 0.5) - 600) / 270, y = (60 * (row + 0.5) - 270) / 270;
+    return 1.2 + a * x + b * y + d * (x * x - y * y) + e * 2 * x * y - 0.03 * (x * x + y * y);
+  };
+  // Parts of two columns are unknown.
+  const auto is_known = [](int col) { return col != 1 && col != 7; };
+  const auto found = measure_parts(
+      [&](int col, int row, int, std::size_t) {
+        return EdgeStep{is_known(col) ? 1 / sharpness_at(col, row) : 0, 20, 200};
+      },
+      5);
+  ASSERT_TRUE(found);
+  double sum = 0;
+  for (int row = 0; row < 9; ++row) {
+    for (int col = 0; col < 12; ++col) {
+      if (is_known(col)) sum += sharpness_at(col, row);
+    }
+  }
+  EXPECT_NEAR(found->asymmetry, 2 * (0.05 + 0.013) / (sum / 90), 1e-10);
+}
+
+TEST(MeasureLensSharpness, BlackLevelIsUpperMedianOfPartsWithoutNegativeRatios) {
+  const auto found = measure_parts(
+      [](int col, int row, int view, std::size_t edge) {
+        // Edges 10, 20, 30, 40 of 200 and views 0, 10, 20: the median is 30 + 10 of 200.
+        const double dark = col == 0 ? -30 : 10. * (1 + static_cast<double>(edge)) + view % 3 * 10;
+        return EdgeStep{0.8, dark, row < 4 ? 200. : 400.};
+      },
+      6);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->black_to_white.at(0, 5), 0);
+  EXPECT_NEAR(found->black_to_white.at(3, 3), 0.2, 1e-12);
+  EXPECT_NEAR(found->black_to_white.at(3, 4), 0.1, 1e-12);
+  EXPECT_NEAR(found->black_level, 0.1, 1e-12) << "5 of 9 rows have the ratio 0.1, or 0";
+}
+
+TEST(MeasureLensSharpness, LocalLossComparesWithMediansOfOppositeParts) {
+  Random random(5);
+  std::vector<double> values(108);
+  for (double& value : values) value = random.uniform(0.7, 1.0);
+  const auto blur_at = [&](int col, int row) {
+    if (col > 8 && row > 6) return 0.0;  // unknown
+    return values[static_cast<std::size_t>(12 * row + col)];
+  };
+  const auto found = measure_parts(
+      [&](int col, int row, int, std::size_t) {
+        return EdgeStep{blur_at(col, row), 20, 200};
+      },
+      5);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->local_loss, expected_local_loss(found->mtf50, 2), 1e-12);
+  EXPECT_GT(found->local_loss, 0.1);
+}
+
+TEST(MeasureLensSharpness, LocalLossIncludesLossOfContrast) {
+  Random random(6);
+  std::vector<double> values(108);
+  for (double& value : values) value = random.uniform(20, 60);
+  const auto found = measure_parts(
+      [&](int col, int row, int, std::size_t) {
+        return EdgeStep{0.8, values[static_cast<std::size_t>(12 * row + col)], 200};
+      },
+      5);
+  ASSERT_TRUE(found);
+  LensSharpness::Map contrasts = found->black_to_white;
+  for (std::size_t i = 0; i < 108; ++i) {
+    EXPECT_NEAR(found->black_to_white.values[i], values[i] / 200, 1e-12);
+    contrasts.values[i] = (200 - values[i]) / (200 + values[i]);
+  }
+  EXPECT_NEAR(found->local_loss, expected_local_loss(contrasts, 2), 1e-12);
+  EXPECT_GT(found->local_loss, 0.05);
+}
+
+TEST(MeasureLensSharpness, LocalLossOfSinglePartIsItsLossOfMtf50) {
+  const auto found = measure_parts(
+      [](int col, int row, int, std::size_t) {
+        return EdgeStep{col == 2 && row == 6 ? 1.0 : 0.8, 20, 200};
+      },
+      5);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->local_loss, 0.2, 1e-12);
+}
+
+TEST(MeasureLensSharpness, LocalShadowIsLossOfMeanLightInMiddleOfItsPart) {
+  // The light decreases smoothly to the right and down, and is reduced to 70 to 90 % in one part.
+  const std::array<double, 4> shadow{0.7, 0.9, 0.75, 0.85};
+  const auto found = measure_parts(
+      [&](int col, int row, int, std::size_t edge) {
+        const double light = std::exp(5 - 0.02 * col - 0.01 * row - 0.001 * row * row);
+        return EdgeStep{0.8, 10, col == 17 && row == 5 ? light * shadow[edge] : light};
+      },
+      5, 24, 18);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->local_shadow, 0.2, 0.002);
+  EXPECT_NEAR(found->local_shadow_px.x(), 17.5 * 50 - 0.5, 1e-9);
+  EXPECT_NEAR(found->local_shadow_px.y(), 5.5 * 30 - 0.5, 1e-9);
+  EXPECT_NEAR(found->light.at(17, 5), 0.8, 0.01);
+  EXPECT_NEAR(found->light.at(3, 12), 1, 0.01);
+  EXPECT_NEAR(found->local_shadow, expected_local_loss(found->light, 4), 1e-12);
+}
+
+TEST(MeasureLensSharpness, LocalShadowComparesLightWithMediansOfOppositeParts) {
+  Random random(7);
+  std::vector<double> values(432);
+  for (double& value : values) value = random.uniform(150, 200);
+  const auto found = measure_parts(
+      [&](int col, int row, int view, std::size_t) {
+        const bool is_seen = col > 3 || view < 2;
+        return EdgeStep{is_seen ? 0.8 : 0, 10, values[static_cast<std::size_t>(24 * row + col)]};
+      },
+      5, 24, 18);
+  ASSERT_TRUE(found);
+  EXPECT_TRUE(std::isnan(found->light.at(3, 9))) << "two views";
+  EXPECT_FALSE(std::isnan(found->light.at(4, 9)));
+  EXPECT_GT(found->local_shadow, 0.05);
+  EXPECT_NEAR(found->local_shadow, expected_local_loss(found->light, 4), 1e-12);
+}
+
+TEST(MeasureLensSharpness, LightNeedsThirtyTwoEdgesPerView) {
+  for (const int edges : {31, 32}) {
+    // Each view of eight tags covers a part of a row; five views each.
+    std::vector<BoardView> views;
+    for (const BoardView& whole : make_views_of_parts(
+             [](int, int, int, std::size_t) {
+               return EdgeStep{0.8, 20, 200};
+             },
+             5)) {
+      for (int row = 0; row < 9; ++row) {
+        BoardView& view = views.emplace_back(whole);
+        std::erase_if(view.detection.tags, [&](const TagDetection& tag) {
+          return tag.id / 12 != row || tag.id % 12 >= 8;
+        });
+        ASSERT_EQ(view.detection.tags.size(), 8U);
+        if (edges < 32) view.detection.tags[3].steps[2].blur_px = 0;
+      }
+    }
+    const auto found = measure_lens_sharpness(views, kPartsImager_px);
+    ASSERT_TRUE(found);
+    EXPECT_EQ(std::isnan(found->light.at(0, 1)), edges < 32);
+  }
+}
+
+/// The smooth field of the light ignores the dark parts, so that the others have the value 1.
+TEST(MeasureLensSharpness, LightOfOtherPartsIsOneBesideManyDarkParts) {
+  const auto is_dark = [](int col, int row) { return col > 3 && col < 9 && row > 10 && row < 16; };
+  const auto found = measure_parts(
+      [&](int col, int row, int, std::size_t) {
+        return EdgeStep{0.8, 10, is_dark(col, row) ? 100. : 200.};
+      },
+      5, 24, 18);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->light.at(5, 12), 0.5, 0.01);
+  EXPECT_NEAR(found->light.at(2, 12), 1, 0.01);
+  EXPECT_NEAR(found->light.at(20, 3), 1, 0.01);
 }
 
 }  // namespace

@@ -4,10 +4,25 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
 #include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/mrcal_files.h"
 #include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/spline_fit.h"
 #include "calibration/intrinsics/synthetic_views.h"
+#include "calibration/intrinsics/valid_region.h"
+#include "calibration/intrinsics/view_jackknife.h"
+#include "camera/spline_grid.h"
+#include "geometry/polygon.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"
 
@@ -142,6 +157,539 @@ TEST(ComputeBoardViewCoverage, ReturnsTiltOnlyForSideNearerToCamera) {
   EXPECT_NEAR(right, 0.3, 1e-9);
   EXPECT_NEAR(upper, 0, 1e-9);
   EXPECT_NEAR(lower, 0, 1e-9);
+}
+
+/// Returns a solution with known lens and poses, without a solve: its points have noise, some are
+/// not in the image, and one is an outlier.
+IntrinsicsSolution make_known_solution(const SyntheticViews& views, int count, double noise_px,
+                                       std::uint64_t seed) {
+  Random random(seed);
+  const BoardLattice lattice(views.board);
+  const Eigen::Vector2d field_m = compute_tag_field_size_m(views.board);
+  IntrinsicsSolution solution{};
+  solution.status = IntrinsicsStatus::ok;
+  BoardProblem& problem = solution.problem;
+  problem.lens_model = views.lens.lens_model();
+  problem.imager_px = views.imager_px;
+  problem.cols = lattice.lattice_cols();
+  problem.rows = lattice.lattice_rows();
+  problem.spacing_m = lattice.point_spacing_m();
+  for (int view = 0; view < count; ++view) {
+    solution.views.push_back(static_cast<std::size_t>(view));
+    solution.edge_displacements_px.push_back(0);
+    const double azimuth = 2 + 1.3 * view, tilt = 0.5 + 0.1 * (view % 3);
+    const Eigen::AngleAxisd rotation(
+        Eigen::AngleAxisd(tilt, Eigen::Vector3d(std::cos(azimuth), std::sin(azimuth), 0)) *
+        Eigen::AngleAxisd(0.9 * view, Eigen::Vector3d::UnitZ()));
+    const double x = random.uniform(-0.2, 0.2), y = random.uniform(-0.15, 0.15);
+    const Eigen::Vector3d middle_m = Eigen::Vector3d(x, y, 1) * (1.2 * field_m.x());
+    const Eigen::Vector3d half_m(field_m.x() / 2, field_m.y() / 2, 0);
+    const BoardPose board{rotation.angle() * rotation.axis(), middle_m - rotation * half_m};
+    for (std::size_t part = 0; part < lattice.num_board_parts(); ++part) {
+      const BoardPose& pose =
+          problem.poses.emplace_back(lattice.compute_board_part_pose(board, part));
+      for (int row = 0; row < problem.rows; ++row) {
+        for (int col = 0; col < problem.cols; ++col) {
+          const Eigen::Vector3d in_board_m(col * problem.spacing_m, row * problem.spacing_m, 0);
+          const auto pixel = views.lens.project_point(rotation * in_board_m + pose.translation_m);
+          const double v = random.normal(), u = random.normal();
+          const bool is_seen = pixel && pixel->minCoeff() > 0 && pixel->x() < views.imager_px[0] &&
+                               pixel->y() < views.imager_px[1];
+          const Eigen::Vector2d measured =
+              is_seen ? Eigen::Vector2d(*pixel + noise_px * Eigen::Vector2d(u + 0.3, v))
+                      : Eigen::Vector2d(0, 0);
+          const double weight = col % 3 == 1 ? 0.7 : 1;
+          problem.points.emplace_back(measured.x(), measured.y(),
+                                      is_seen ? weight : BoardProblem::kUnseen);
+        }
+      }
+    }
+  }
+  problem.points[problem.points.size() / 2 + 5].z() = -1;
+  return solution;
+}
+
+const std::array kUncertainLens{520.0, 525.0, 402.0, 291.0, -0.15, 0.05, 0.0002, -0.0001};
+
+IntrinsicsSolution make_known_solution_of_board(bool kalibr, int count = 4, double noise_px = 0.2) {
+  const Lens lens(LensModel::opencv4, kUncertainLens);
+  IntrinsicsSolution solution =
+      make_known_solution({synthetic_board(kalibr), lens}, count, noise_px, 12);
+  solution.problem.intrinsics.assign(kUncertainLens.begin(), kUncertainLens.end());
+  return solution;
+}
+
+/// Dense matrices of the linearized problem.
+struct DenseProblem {
+  explicit DenseProblem(const IntrinsicsSolution& solution)
+      : at(linearize_board_problem(solution.problem, solution.solved_parameters)),
+        jacobian(Eigen::MatrixXd(at.jacobian_transposed).transpose()),
+        corners(jacobian.topRows(at.residuals_px.size())),
+        inverse((jacobian.transpose() * jacobian).inverse()) {}
+
+  /// Covariance of the state in its units from that of the packed gradient.
+  Eigen::MatrixXd covariance_of_state(const Eigen::MatrixXd& gradient) const {
+    return at.scale.asDiagonal() * inverse * gradient * inverse * at.scale.asDiagonal();
+  }
+
+  Linearization at;
+  Eigen::MatrixXd jacobian, corners, inverse;
+};
+
+/// Covariance of the state for independent corners: the variance of the used residuals times
+/// N^-1 Jo' Jo N^-1.
+Eigen::MatrixXd expected_covariance_by_corners(const IntrinsicsSolution& solution) {
+  const DenseProblem dense(solution);
+  std::vector<double> used;
+  for (std::size_t i = 0; i < solution.problem.points.size(); ++i) {
+    if (solution.problem.points[i].z() < 0) continue;
+    used.push_back(dense.at.residuals_px[2 * static_cast<Eigen::Index>(i)]);
+    used.push_back(dense.at.residuals_px[2 * static_cast<Eigen::Index>(i) + 1]);
+  }
+  double mean = 0, variance = 0;
+  for (const double residual : used) mean += residual / static_cast<double>(used.size());
+  for (const double residual : used) {
+    variance += (residual - mean) * (residual - mean) / static_cast<double>(used.size());
+  }
+  return dense.covariance_of_state(variance * dense.corners.transpose() * dense.corners);
+}
+
+/// Covariance of the state for tags whose corners have correlated errors. `tag_of_point`: index of
+/// the tag of a point of a part.
+template <typename TagOfPoint>
+Eigen::MatrixXd expected_covariance_by_tags(const IntrinsicsSolution& solution, int parts,
+                                            const TagOfPoint& tag_of_point) {
+  const DenseProblem dense(solution);
+  const auto points = static_cast<Eigen::Index>(solution.problem.num_points_per_board());
+  const Eigen::Index states = dense.jacobian.cols(), tags = 60;
+  const Eigen::Index views = std::ssize(solution.problem.poses) / parts;
+  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(states, views * tags);
+  for (Eigen::Index i = 0; i < std::ssize(solution.problem.points); ++i) {
+    const Eigen::Index view = i / points / parts;
+    sums.col(view * tags + tag_of_point(i % points)) +=
+        dense.corners.middleRows<2>(2 * i).transpose() * dense.at.residuals_px.segment<2>(2 * i);
+  }
+  const auto used = std::count_if(solution.problem.points.begin(), solution.problem.points.end(),
+                                  [](const Eigen::Vector3d& point) { return point.z() > 0; });
+  const double residuals = 2 * static_cast<double>(used);
+  return dense.covariance_of_state(residuals / (residuals - static_cast<double>(states)) * sums *
+                                   sums.transpose());
+}
+
+/// Covariance of a pixel from that of the state: by difference quotients of its change with the
+/// intrinsics and with the mean rotation of the boards.
+Eigen::Matrix2d expected_pixel_covariance(const IntrinsicsSolution& solution,
+                                          const Eigen::MatrixXd& state_covariance,
+                                          const Eigen::Vector2d& pixel) {
+  const BoardProblem& problem = solution.problem;
+  const Eigen::Vector3d ray = solution.fitted_lens().unproject_pixel(pixel).value().direction;
+  Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(2, state_covariance.rows());
+  for (std::size_t k = 0; k < problem.intrinsics.size(); ++k) {
+    const double step = k < 4 ? 1e-3 : 1e-6;
+    const auto pixel_of = [&](double change) {
+      auto changed = problem.intrinsics;
+      changed[k] += change;
+      return Lens(problem.lens_model, changed).project_point(ray).value();
+    };
+    gradient.col(static_cast<Eigen::Index>(k)) = (pixel_of(step) - pixel_of(-step)) / (2 * step);
+  }
+  const auto matrix = [](const Eigen::Vector3d& r) {
+    return Eigen::AngleAxisd(r.norm(), r.normalized()).toRotationMatrix();
+  };
+  const auto first = static_cast<Eigen::Index>(problem.intrinsics.size());
+  for (std::size_t i = 0; i < problem.poses.size(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      constexpr double step = 1e-6;
+      const Eigen::Vector3d d = step * Eigen::Vector3d::Unit(axis);
+      const auto pixel_of = [&](const Eigen::Vector3d& rotation) {
+        const Eigen::Matrix3d turn =
+            matrix(rotation) * matrix(problem.poses[i].rotation).transpose();
+        return solution.fitted_lens().project_point(turn * ray).value();
+      };
+      gradient.col(first + 6 * static_cast<Eigen::Index>(i) + axis) =
+          (pixel_of(problem.poses[i].rotation + d) - pixel_of(problem.poses[i].rotation - d)) /
+          (2 * step * static_cast<double>(problem.poses.size()));
+    }
+  }
+  return gradient * state_covariance * gradient.transpose();
+}
+
+void expect_covariances(const ProjectionUncertainty& uncertainty,
+                        const IntrinsicsSolution& solution, const Eigen::MatrixXd& of_state) {
+  ASSERT_TRUE(uncertainty.are_intrinsics_determined());
+  const auto count = static_cast<Eigen::Index>(solution.problem.intrinsics.size());
+  const Eigen::MatrixXd intrinsics = uncertainty.intrinsics_covariance();
+  ASSERT_EQ(intrinsics.rows(), count);
+  ASSERT_EQ(intrinsics.cols(), count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    for (Eigen::Index j = 0; j < count; ++j) {
+      EXPECT_NEAR(intrinsics(i, j), of_state(i, j),
+                  1e-6 * std::sqrt(of_state(i, i) * of_state(j, j)))
+          << i << ' ' << j;
+    }
+  }
+  EXPECT_NEAR(uncertainty.focal_x_sd_px(), std::sqrt(of_state(0, 0)),
+              1e-6 * std::sqrt(of_state(0, 0)));
+  for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(700, 80), Eigen::Vector2d(390, 310)}) {
+    const Eigen::Matrix2d found = uncertainty.projection_covariance(pixel);
+    const Eigen::Matrix2d expected = expected_pixel_covariance(solution, of_state, pixel);
+    EXPECT_LT((found - expected).norm(), 1e-5 * expected.norm());
+    const Eigen::Vector2d variances =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(found).eigenvalues();
+    EXPECT_NEAR(uncertainty.projection_sd_along_worst_direction_px(pixel), std::sqrt(variances[1]),
+                1e-9);
+  }
+}
+
+TEST(ProjectionUncertainty, MatchesDenseCovarianceOfIndependentCorners) {
+  for (const bool kalibr : {false, true}) {
+    const IntrinsicsSolution solution = make_known_solution_of_board(kalibr);
+    expect_covariances(ProjectionUncertainty(solution), solution,
+                       expected_covariance_by_corners(solution));
+  }
+}
+
+TEST(ProjectionUncertainty, MatchesDenseCovarianceOfCorrelatedCornersOfTags) {
+  // A plain board of 6 x 5 tags is a lattice of 12 x 10 points.
+  const IntrinsicsSolution plain = make_known_solution_of_board(false);
+  const ProjectionUncertainty by_tags(plain, BoardLattice(synthetic_board(false)));
+  expect_covariances(by_tags, plain, expected_covariance_by_tags(plain, 1, [](Eigen::Index point) {
+                       return point / 12 / 2 * 6 + point % 12 / 2;
+                     }));
+  const IntrinsicsSolution kalibr = make_known_solution_of_board(true);
+  const ProjectionUncertainty of_parts(kalibr, BoardLattice(synthetic_board(true)));
+  expect_covariances(
+      of_parts, kalibr,
+      expected_covariance_by_tags(kalibr, 4, [](Eigen::Index point) { return point; }));
+}
+
+TEST(ProjectionUncertainty, ByCornersAndByTagsMatchBothConstructors) {
+  const IntrinsicsSolution solution = make_known_solution_of_board(false, 3);
+  const BoardLattice lattice(synthetic_board(false));
+  const auto both =
+      ProjectionUncertainty::compute_uncertainty_by_corners_and_by_tags(solution, lattice);
+  EXPECT_EQ(both.by_corners.intrinsics_covariance(),
+            ProjectionUncertainty(solution).intrinsics_covariance());
+  EXPECT_EQ(both.by_tags.intrinsics_covariance(),
+            ProjectionUncertainty(solution, lattice).intrinsics_covariance());
+  EXPECT_NE(both.by_tags.focal_x_sd_px(), both.by_corners.focal_x_sd_px());
+}
+
+/// Bias by the formula of ProjectionUncertainty with dense matrices, for the noise `sd_px`.
+Eigen::VectorXd expected_regularization_bias(const IntrinsicsSolution& solution, double sd_px) {
+  const DenseProblem dense(solution);
+  const Eigen::Index corners = dense.corners.rows();
+  const Eigen::MatrixXd regularization = dense.jacobian.bottomRows(dense.jacobian.rows() - corners);
+  const double ratio = std::pow(sd_px / solution.problem.noise_px, 2);
+  const Eigen::MatrixXd normal = dense.corners.transpose() * dense.corners +
+                                 ratio * regularization.transpose() * regularization;
+  const Eigen::VectorXd packed =
+      normal.inverse() * ((1 - ratio) * regularization.transpose() * dense.at.regularization);
+  return (dense.at.scale.asDiagonal() * packed)
+      .head(static_cast<Eigen::Index>(solution.problem.intrinsics.size()));
+}
+
+double sd_of_used_residuals(const IntrinsicsSolution& solution) {
+  const DenseProblem dense(solution);
+  double used = 0, sum = 0, squares = 0;
+  for (std::size_t i = 0; i < solution.problem.points.size(); ++i) {
+    if (solution.problem.points[i].z() < 0) continue;
+    const auto residual = dense.at.residuals_px.segment<2>(2 * static_cast<Eigen::Index>(i));
+    used += 2;
+    sum += residual.sum();
+    squares += residual.squaredNorm();
+  }
+  return std::sqrt(squares / used - sum * sum / (used * used));
+}
+
+TEST(ProjectionUncertainty, RegularizationBiasMatchesDenseFormula) {
+  IntrinsicsSolution solution = make_known_solution_of_board(false, 4, 0.4);
+  for (const double noise_px : {1.0, 0.7}) {
+    solution.problem.noise_px = noise_px;
+    const Eigen::VectorXd expected =
+        expected_regularization_bias(solution, sd_of_used_residuals(solution));
+    const Eigen::VectorXd found = ProjectionUncertainty(solution).intrinsics_regularization_bias();
+    ASSERT_EQ(found.size(), 8);
+    EXPECT_GT(expected.norm(), 1e-7);
+    EXPECT_LT((found - expected).cwiseAbs().cwiseQuotient(expected.cwiseAbs()).maxCoeff(), 1e-5);
+  }
+}
+
+TEST(ProjectionUncertainty, RegularizationBiasBoundsNoise) {
+  const IntrinsicsSolution exact = make_known_solution_of_board(false, 4, 0);
+  ASSERT_LT(sd_of_used_residuals(exact), 1e-6);
+  const Eigen::VectorXd expected = expected_regularization_bias(exact, 0.01);
+  const Eigen::VectorXd found = ProjectionUncertainty(exact).intrinsics_regularization_bias();
+  ASSERT_EQ(found.size(), 8);
+  EXPECT_LT((found - expected).cwiseAbs().cwiseQuotient(expected.cwiseAbs()).maxCoeff(), 1e-6);
+
+  const IntrinsicsSolution noisy = make_known_solution_of_board(false, 4, 2);
+  ASSERT_GT(sd_of_used_residuals(noisy), 1);
+  EXPECT_EQ(ProjectionUncertainty(noisy).intrinsics_regularization_bias(),
+            Eigen::VectorXd::Zero(8));
+}
+
+TEST(ProjectionUncertainty, IsInfiniteWhenViewHasNoCorners) {
+  IntrinsicsSolution solution = make_known_solution_of_board(false, 3);
+  for (std::size_t i = 0; i < solution.problem.num_points_per_board(); ++i) {
+    solution.problem.points[i].z() = BoardProblem::kUnseen;
+  }
+  const ProjectionUncertainty uncertainty(solution);
+  EXPECT_FALSE(uncertainty.are_intrinsics_determined());
+  EXPECT_TRUE(std::isinf(uncertainty.focal_x_sd_px()));
+  EXPECT_TRUE(std::isinf(uncertainty.projection_sd_along_worst_direction_px({400, 300})));
+  EXPECT_TRUE(std::isinf(uncertainty.projection_covariance({400, 300})(0, 0)));
+  const Eigen::MatrixXd covariance = uncertainty.intrinsics_covariance();
+  ASSERT_EQ(covariance.rows(), 8);
+  ASSERT_EQ(covariance.cols(), 8);
+  EXPECT_TRUE(std::isinf(covariance.minCoeff()));
+  EXPECT_EQ(uncertainty.intrinsics_regularization_bias(), Eigen::VectorXd::Zero(8));
+}
+
+TEST(ProjectionUncertainty, IsInfiniteAtPixelWithoutRay) {
+  const ProjectionUncertainty uncertainty(make_known_solution_of_board(false, 3));
+  const Eigen::Vector2d outside(std::numeric_limits<double>::quiet_NaN(), 300);
+  EXPECT_TRUE(std::isinf(uncertainty.projection_sd_along_worst_direction_px(outside)));
+  EXPECT_TRUE(std::isinf(uncertainty.projection_covariance(outside)(1, 1)));
+}
+
+/// Inputs of a view coverage: 900 x 600 px, and boards with these rotations.
+IntrinsicsSolution make_solution_with_rotations(const std::vector<Eigen::Vector3d>& rotations) {
+  IntrinsicsSolution solution{};
+  for (const Eigen::Vector3d& rotation : rotations) {
+    solution.problem.poses.push_back({rotation, {0, 0, 1}});
+  }
+  return solution;
+}
+
+TEST(ComputeBoardViewCoverage, CountsCornersOfSolvedViewsInParts) {
+  IntrinsicsInput input{BoardLattice(synthetic_board(false)), {}, {900, 600}, LensModel::pinhole};
+  const auto add_view = [&](const std::vector<Eigen::Vector2d>& pixels) {
+    auto& view = input.views.emplace_back();
+    for (const auto& pixel : pixels) view.emplace_back().pixel = pixel;
+  };
+  add_view({{10, 10}, {450, 10}, {450, 20}, {890, 10}});
+  add_view({{450, 300}, {460, 310}, {440, 290}});  // not in the solution
+  add_view({{299, 300}, {301, 590}, {890, 201}, {899, 399}, {890, 401}});
+  IntrinsicsSolution solution = make_solution_with_rotations({});
+  solution.views = {0, 2};
+  const ViewCoverage coverage = compute_board_view_coverage(solution, input);
+  EXPECT_EQ(coverage.corners, (std::array<int, 9>{1, 2, 1, 1, 0, 2, 0, 1, 1}));
+  // Eight corners are in parts of 112.5 x 100 px of their own, two in one.
+  EXPECT_NEAR(coverage.covered_fraction, 8.0 / 48, 1e-12);
+  EXPECT_EQ(coverage.tilt_rad, 0);
+}
+
+TEST(ComputeBoardViewCoverage, TiltsAreLargestOfEachSideAndBetweenBoards) {
+  const IntrinsicsInput input{
+      BoardLattice(synthetic_board(false)), {}, {900, 600}, LensModel::pinhole};
+  // A positive rotation about y brings the right side nearer, about x the upper side.
+  const ViewCoverage coverage =
+      compute_board_view_coverage(make_solution_with_rotations({{0, 0.1, 0},
+                                                                {0, 0.4, 0},
+                                                                {0, 0.2, 0},
+                                                                {0, -0.3, 0},
+                                                                {0, -0.05, 0},
+                                                                {0.5, 0, 0},
+                                                                {0.15, 0, 0},
+                                                                {-0.25, 0, 0},
+                                                                {0, 0, 1}}),
+                                  input);
+  EXPECT_NEAR(coverage.tilts_rad[0], 0.3, 1e-12);
+  EXPECT_NEAR(coverage.tilts_rad[1], 0.4, 1e-12);
+  EXPECT_NEAR(coverage.tilts_rad[2], 0.5, 1e-12);
+  EXPECT_NEAR(coverage.tilts_rad[3], 0.25, 1e-12);
+  EXPECT_NEAR(coverage.tilt_rad, std::max(0.75, 0.7), 1e-12) << "from 0.5 to -0.25 about x";
+}
+
+TEST(RecommendNextBoardView, NamesEachPartAndSide) {
+  const std::array<std::string, 9> places{"top left",    "top middle",    "top right",
+                                          "left middle", "middle",        "right middle",
+                                          "bottom left", "bottom middle", "bottom right"};
+  const std::array<std::string, 4> sides{"left", "right", "upper", "lower"};
+  for (std::size_t i = 0; i < 9; ++i) {
+    ViewCoverage coverage;
+    coverage.corners.fill(9);
+    coverage.corners[i] = 2;
+    coverage.tilts_rad.fill(0.4);
+    coverage.tilts_rad[i % 4] = 0.3;
+    EXPECT_EQ(recommend_next_board_view(coverage),
+              "the board in the " + places[i] + " of the image, its " + sides[i % 4] +
+                  " side 30 to 40 degrees nearer to the camera");
+  }
+}
+
+TEST(EvaluateLensOnHeldOutViews, WeightsViewsByCornersAndSkipsViewsWithoutPose) {
+  const SyntheticViews views{synthetic_board(false), synthetic_lens()};
+  Random random(6);
+  IntrinsicsSolution solution{};
+  solution.problem.lens_model = LensModel::opencv8;
+  solution.problem.intrinsics = {520.0,  521.0,   402.0,  297.0, -0.25, 0.08,
+                                 0.0002, -0.0001, -0.012, 0.01,  0.002, 0.0001};
+  IntrinsicsInput held_out = views.input(1, random, 0.05);
+  held_out.views.push_back(views.input(1, random, 0.4).views[0]);
+  held_out.views[1].resize(32);
+  held_out.views.push_back(held_out.views[0]);
+  held_out.views[2].resize(2);
+  const auto rms_px = compute_held_out_view_residual_rms_px(solution, held_out);
+  ASSERT_EQ(rms_px.size(), 3U);
+  EXPECT_NEAR(rms_px[0], 0.05, 0.015);
+  EXPECT_NEAR(rms_px[1], 0.4, 0.12);
+  EXPECT_TRUE(std::isinf(rms_px[2]));
+  const HeldOutFit fit = evaluate_lens_on_held_out_views(solution, held_out);
+  const auto first = static_cast<double>(held_out.views[0].size());
+  EXPECT_EQ(fit.views, 2);
+  EXPECT_EQ(fit.corners, static_cast<int>(first) + 32);
+  const double squares = rms_px[0] * rms_px[0] * first + rms_px[1] * rms_px[1] * 32;
+  EXPECT_NEAR(fit.rms_px, std::sqrt(squares / (first + 32)), 1e-12);
+
+  held_out.views.erase(held_out.views.begin(), held_out.views.begin() + 2);
+  const HeldOutFit none = evaluate_lens_on_held_out_views(solution, held_out);
+  EXPECT_EQ(none.views, 0);
+  EXPECT_EQ(none.corners, 0);
+  EXPECT_EQ(none.rms_px, 0);
+}
+
+/// The shift of the edges, the warp of the board and the curvature of the edges are modeled, so
+/// that exact corners have no residuals.
+TEST(ComputeHeldOutViewResidualRms, VanishesForShiftedEdgesOfWarpedBoard) {
+  for (const bool kalibr : {false, true}) {
+    SyntheticViews views{synthetic_board(kalibr), synthetic_lens()};
+    views.warp_m = {0.002, -0.0015};
+    IntrinsicsInput held_out{BoardLattice(views.board), {}, views.imager_px, LensModel::opencv8};
+    Random random(8);
+    for (int i = 0; i < 2; ++i) {
+      BoardDetection seen = views.random_view(random, 0);
+      // Edges between touching squares do not move corners.
+      if (!kalibr) {
+        for (TagDetection& tag : seen.tags) tag = shrunk(tag, 0.6);
+      }
+      held_out.views.push_back(held_out.lattice.list_corners_with_board_positions(seen));
+    }
+    IntrinsicsSolution solution{};
+    solution.problem.lens_model = LensModel::opencv8;
+    solution.problem.intrinsics = {520.0,  521.0,   402.0,  297.0, -0.25, 0.08,
+                                   0.0002, -0.0001, -0.012, 0.01,  0.002, 0.0001};
+    const Eigen::Vector2d ratio = held_out.lattice.board_to_part_warp_ratio();
+    solution.problem.warp_m = views.warp_m.cwiseQuotient(ratio);
+    for (const double rms_px : compute_held_out_view_residual_rms_px(solution, held_out)) {
+      EXPECT_LT(rms_px, 0.02);
+    }
+    solution.problem.warp_m.setZero();
+    for (const double rms_px : compute_held_out_view_residual_rms_px(solution, held_out)) {
+      EXPECT_GT(rms_px, 0.1);
+    }
+  }
+}
+
+void expect_report(const IntrinsicsSolution& solution, const IntrinsicsInput& input) {
+  const CalibrationReport report = compute_lens_calibration_report(solution, input);
+  const ProjectionUncertainty by_tags(solution, input.lattice), by_corners(solution);
+  const Lens lens = solution.fitted_lens();
+  const Eigen::MatrixXd by_views = estimate_intrinsics_covariance_by_jackknife(solution);
+  const ImageRegion region = compute_valid_lens_region(
+      collect_inlier_corner_pixels(solution.problem), input.imager_px, lens.lens_model());
+  EXPECT_EQ(report.region, region);
+  EXPECT_EQ(report.region_fraction, compute_region_fraction_of_image_area(region, input.imager_px));
+  ASSERT_LT(report.region_fraction, 0.95);
+  EXPECT_EQ(report.focal_sd_px, by_tags.focal_x_sd_px());
+  EXPECT_EQ(report.focal_sd_by_views_px, std::sqrt(by_views(0, 0)));
+  const bool is_splined = is_splined_lens_model(lens.lens_model());
+  const ImageRegion compared = is_splined ? region : ImageRegion();
+  const auto expected_rms_px = [&](const Eigen::MatrixXd& covariance) {
+    return compute_expected_projection_difference(lens, input.imager_px, covariance, compared)
+        .rms_px;
+  };
+  EXPECT_EQ(report.expected_rms_px, expected_rms_px(by_tags.intrinsics_covariance()));
+  EXPECT_EQ(report.expected_by_views_rms_px, expected_rms_px(by_views));
+
+  double sum = 0, count = 0, worst = 0, beyond = 0;
+  for (const auto& pixel : make_regular_pixel_grid(input.imager_px)) {
+    if (!lens.unproject_pixel(pixel)) continue;
+    const double sd = by_tags.projection_sd_along_worst_direction_px(pixel);
+    if (polygon_contains(region, pixel)) {
+      sum += sd;
+      count += 1;
+      worst = std::max(worst, sd);
+    } else {
+      beyond = std::max(beyond, sd);
+    }
+  }
+  EXPECT_NEAR(report.uncertainty_mean_px, sum / count, 1e-12);
+  EXPECT_TRUE(std::isfinite(beyond));
+  EXPECT_NEAR(report.uncertainty_beyond_px, beyond, 1e-9);
+  for (const Eigen::MatrixXd& covariance :
+       {by_tags.intrinsics_covariance(), by_corners.intrinsics_covariance(), by_views}) {
+    if (is_splined || !covariance.allFinite()) continue;
+    worst = std::max(worst, estimate_expected_max_projection_difference_px(lens, input.imager_px,
+                                                                           covariance, region));
+  }
+  EXPECT_NEAR(report.uncertainty_worst_px, worst, 1e-12);
+
+  const IntrinsicsSolution even_views = solve_intrinsics_from_half_of_views(solution, 0);
+  const IntrinsicsSolution odd_views = solve_intrinsics_from_half_of_views(solution, 1);
+  ASSERT_EQ(report.split_half_difference.has_value(),
+            even_views.has_succeeded() && odd_views.has_succeeded());
+  if (!report.split_half_difference) return;
+  // Pixels of splined lenses are compared if the sd is less than three times as large by halves.
+  std::vector<ProjectionUncertainty> of_halves;
+  if (is_splined) of_halves = {{even_views, input.lattice}, {odd_views, input.lattice}};
+  int num_undetermined = 0;
+  const auto halves = compute_projection_difference(
+      even_views.fitted_lens(), odd_views.fitted_lens(), input.imager_px,
+      [&](const Eigen::Vector2d& pixel) {
+        const double sd_px = by_tags.projection_sd_along_worst_direction_px(pixel);
+        bool is_compared = polygon_contains(region, pixel);
+        for (const ProjectionUncertainty& half : of_halves) {
+          if (!is_compared) break;
+          is_compared = half.projection_sd_along_worst_direction_px(pixel) / sd_px <= 3;
+          if (!is_compared) ++num_undetermined;
+        }
+        return is_compared ? sd_px : std::numeric_limits<double>::infinity();
+      });
+  EXPECT_EQ(num_undetermined > 0, is_splined);
+  ASSERT_TRUE(halves);
+  EXPECT_NEAR(report.split_half_difference->mean_px, halves->mean_px, 1e-9);
+  EXPECT_NEAR(report.split_half_difference->worst_px, halves->worst_px, 1e-9);
+  EXPECT_NEAR(report.split_half_difference->rms_px, halves->rms_px, 1e-9);
+}
+
+TEST(ComputeLensCalibrationReport, FieldsMatchTheirDefinitions) {
+  expect_report(make_known_solution_of_board(false, 8),
+                {BoardLattice(synthetic_board(false)), {}, {800, 600}, LensModel::opencv4});
+}
+
+/// The image circle of the fisheye ends 365 px from the middle of the image.
+TEST(ComputeLensCalibrationReport, SkipsPixelsWithoutRaysOfFisheye) {
+  const std::array fisheye{300.0, 300.0, 400.0, 300.0, -0.1, 0.0, 0.0, 0.0};
+  IntrinsicsSolution solution =
+      make_known_solution({synthetic_board(false), Lens(LensModel::fisheye, fisheye)}, 8, 0.1, 12);
+  solution.problem.intrinsics.assign(fisheye.begin(), fisheye.end());
+  ASSERT_FALSE(solution.fitted_lens().unproject_pixel({5, 5}));
+  expect_report(solution,
+                {BoardLattice(synthetic_board(false)), {}, {800, 600}, LensModel::fisheye});
+}
+
+TEST(ComputeLensCalibrationReport, HasNoSplitHalfDifferenceIfHalfHasTwoViews) {
+  const IntrinsicsInput input{
+      BoardLattice(synthetic_board(false)), {}, {800, 600}, LensModel::opencv4};
+  const IntrinsicsSolution solution = make_known_solution_of_board(false, 5);
+  ASSERT_TRUE(solve_intrinsics_from_half_of_views(solution, 0).has_succeeded());
+  EXPECT_FALSE(compute_lens_calibration_report(solution, input).split_half_difference);
+}
+
+TEST(ComputeLensCalibrationReport, ComparesSplinedLensInItsRegionOnly) {
+  const LensModel model = lens_model_for_spline_grid({3, 9, 8, 95});
+  std::vector<double> core{500, 500, 400, 300};
+  const auto parameters =
+      fit_splined_lens_to_lens(Lens(LensModel::opencv4, kUncertainLens), {800, 600}, model, core);
+  ASSERT_TRUE(parameters);
+  IntrinsicsSolution solution =
+      make_known_solution({synthetic_board(false), Lens(model, *parameters)}, 8, 0.1, 12);
+  solution.problem.intrinsics = *parameters;
+  solution.problem.noise_px = 0.1;
+  solution.solved_parameters.core = false;
+  expect_report(solution, {BoardLattice(synthetic_board(false)), {}, {800, 600}, model});
 }
 
 }  // namespace

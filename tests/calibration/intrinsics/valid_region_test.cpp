@@ -2,8 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/intrinsics/valid_region.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
+#include <algorithm>
+#include <array>
+
+#include "camera/spline_grid.h"
 #include "geometry/polygon.h"
 
 namespace vlp {
@@ -63,6 +67,94 @@ TEST(ComputeValidLensRegion, ReturnsEmptyRegionForCollinearCorners) {
       compute_valid_lens_region({{1, 1}, {2, 2}, {3, 3}, {9, 9}}, kImager, LensModel::opencv8)
           .empty());
   EXPECT_EQ(compute_region_fraction_of_image_area({}, kImager), 0);
+}
+
+/// Model without a margin, so that the region is the clipped hull itself.
+constexpr LensModel kWithoutMargin = lens_model_for_spline_grid({3, 10, 8, 100});
+
+TEST(ComputeValidLensRegion, ReturnsHullVerticesClockwiseFromLeftmostForSplinedLens) {
+  const ImageRegion vertices{{100, 120}, {350, 40}, {700, 150}, {650, 500}, {120, 480}};
+  ImageRegion corners = vertices;
+  corners.insert(corners.end(), {{300, 300}, {110, 300}, {640, 480}, {225, 80}, {400, 200}});
+  std::reverse(corners.begin(), corners.end());
+  EXPECT_THAT(compute_valid_lens_region(corners, kImager, kWithoutMargin),
+              testing::ElementsAreArray(vertices));
+  EXPECT_THAT(compute_valid_lens_region(corners, kImager, LensModel::opencv8, true),
+              testing::ElementsAreArray(vertices));
+  EXPECT_GT(compute_valid_lens_region(corners, kImager, LensModel::opencv8).front().y(), 79);
+  EXPECT_LT(compute_valid_lens_region(corners, kImager, LensModel::opencv8).front().x(), 61);
+}
+
+TEST(ComputeValidLensRegion, OmitsCornersOnHullEdges) {
+  EXPECT_THAT(compute_valid_lens_region(
+                  {{300, 50}, {300, 250}, {100, 150}, {100, 50}, {200, 50}, {100, 250}}, kImager,
+                  kWithoutMargin),
+              testing::ElementsAreArray(ImageRegion{{100, 50}, {300, 50}, {300, 250}, {100, 250}}));
+}
+
+TEST(ComputeValidLensRegion, ReturnsTriangleForThreeCornersAndNothingForTwo) {
+  EXPECT_THAT(
+      compute_valid_lens_region({{300, 50}, {100, 150}, {350, 250}}, kImager, kWithoutMargin),
+      testing::ElementsAreArray(ImageRegion{{100, 150}, {300, 50}, {350, 250}}));
+  EXPECT_TRUE(
+      compute_valid_lens_region({{300, 50}, {100, 150}}, kImager, LensModel::opencv8).empty());
+  EXPECT_TRUE(compute_valid_lens_region({{300, 50}}, kImager, LensModel::opencv8).empty());
+}
+
+/// Triangles with one vertex 100 px beyond a border and two vertices inside the image.
+TEST(ComputeValidLensRegion, ReplacesVertexBeyondBorderByCrossingsWithBorder) {
+  EXPECT_THAT(
+      compute_valid_lens_region({{-100, 300}, {400, 100}, {400, 500}}, kImager, kWithoutMargin),
+      testing::UnorderedElementsAreArray(ImageRegion{{0, 260}, {400, 100}, {400, 500}, {0, 340}}));
+  EXPECT_THAT(
+      compute_valid_lens_region({{900, 200}, {400, 100}, {400, 500}}, kImager, kWithoutMargin),
+      testing::UnorderedElementsAreArray(
+          ImageRegion{{800, 180}, {400, 100}, {400, 500}, {800, 260}}));
+  EXPECT_THAT(
+      compute_valid_lens_region({{300, -100}, {100, 300}, {700, 400}}, kImager, kWithoutMargin),
+      testing::UnorderedElementsAreArray(ImageRegion{{250, 0}, {100, 300}, {700, 400}, {380, 0}}));
+  EXPECT_THAT(
+      compute_valid_lens_region({{300, 700}, {100, 300}, {700, 500}}, kImager, kWithoutMargin),
+      testing::UnorderedElementsAreArray(
+          ImageRegion{{250, 600}, {100, 300}, {700, 500}, {500, 600}}));
+}
+
+TEST(ComputeValidLensRegion, ClipsVertexHalfPixelBeyondBorder) {
+  const auto clipped = [](const Eigen::Vector2d& vertex) {
+    return compute_valid_lens_region({vertex, {400, 100}, {400, 500}, {420, 300}, {380, 300}},
+                                     kImager, kWithoutMargin);
+  };
+  const double across = 200 * 0.5 / 400.5;
+  const ImageRegion left = clipped({-0.5, 300}), right = clipped({800.5, 300});
+  ASSERT_EQ(left.size(), 5U);
+  ASSERT_EQ(right.size(), 5U);
+  EXPECT_TRUE(polygon_contains(left, {0, 300 - across}));
+  EXPECT_TRUE(polygon_contains(left, {0, 300 + across}));
+  EXPECT_FALSE(polygon_contains(left, {0, 300 + 1.01 * across}));
+  EXPECT_TRUE(polygon_contains(right, {800, 300 - across}));
+  EXPECT_TRUE(polygon_contains(right, {800, 300 + across}));
+  EXPECT_FALSE(polygon_contains(right, {800, 300 - 1.01 * across}));
+}
+
+TEST(ComputeValidLensRegion, KeepsVerticesOnBorder) {
+  EXPECT_THAT(compute_valid_lens_region({{0, 300}, {800, 100}, {500, 600}, {400, 0}}, kImager,
+                                        kWithoutMargin),
+              testing::ElementsAreArray(ImageRegion{{0, 300}, {400, 0}, {800, 100}, {500, 600}}));
+}
+
+TEST(ComputeValidLensRegion, ReturnsWholeImageForRegionAbove98Point5Percent) {
+  const ImageRegion smaller{{0, 0}, {787, 0}, {787, 600}, {0, 600}};
+  EXPECT_THAT(compute_valid_lens_region(smaller, kImager, kWithoutMargin),
+              testing::ElementsAreArray(smaller));
+  EXPECT_THAT(
+      compute_valid_lens_region({{0, 0}, {789, 0}, {789, 600}, {0, 600}}, kImager, kWithoutMargin),
+      testing::ElementsAreArray(ImageRegion{{0, 0}, {800, 0}, {800, 600}, {0, 600}}));
+}
+
+TEST(ComputeRegionFractionOfImageArea, ReturnsAreaDividedByAreaBetweenPixelCenters) {
+  EXPECT_NEAR(
+      compute_region_fraction_of_image_area({{0, 0}, {20, 0}, {20, 30}, {0, 30}}, {101, 61}), 0.1,
+      1e-12);
 }
 
 }  // namespace

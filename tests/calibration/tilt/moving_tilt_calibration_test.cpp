@@ -40,6 +40,20 @@ TEST(EstimateCameraTiltFromLamps, ReturnsExactTiltForKnownAndUnknownMotion) {
   }
 }
 
+/// A skipped capture does not shift the motions of the captures after it.
+TEST(EstimateCameraTiltFromLamps, AppliesMotionOfEachCaptureWhenAnotherHasFewLamps) {
+  Random random(4);
+  const BodyRig rig = make_tilted_body();
+  MovingCaptures captures = make_moving_captures(rig, 12, 2, random, 1e-3);
+  captures.frames[2].detections.resize(2);
+  const TiltCalibration found = level(captures, captures.motions, rig);
+  ASSERT_EQ(found.undetermined, "");
+  EXPECT_EQ(found.captures_of_few_lamps, 1);
+  EXPECT_EQ(found.captures, 11);
+  EXPECT_THAT(found.center.zenith_in_camera,
+              IsNear(rig.calibration.rotation_center->zenith_in_camera, 1e-8));
+}
+
 TEST(EstimateCameraTiltFromLamps, TiltErrorIsTenTimesLargerWhenMotionIsIgnored) {
   Random random(2);
   const BodyRig rig = make_tilted_body();
