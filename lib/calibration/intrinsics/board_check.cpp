@@ -294,6 +294,11 @@ bool is_pitch_consistent(const LayoutFit& fit, double expected, double tolerance
          sigmas * fit.line->pitch_sd / expected <= tolerance;
 }
 
+std::string describe_charuco_board(const Board& board) {
+  return "the images show cols " + std::to_string(board.cols) + ", rows " +
+         std::to_string(board.rows) + ", top_left " + (board.top_left_white ? "white" : "black");
+}
+
 /// Describes a ChArUco board with another number of squares, or another color of the first square,
 /// that explains the steps better than `board`; empty if `board` agrees.
 std::string describe_charuco_problem(const Board& board, const std::vector<Step>& steps) {
@@ -301,7 +306,13 @@ std::string describe_charuco_problem(const Board& board, const std::vector<Step>
   constexpr int minimum = 4, limit = 60;
   const LayoutFit stated = fit_board_layout(board, steps);
   // Unknown markers may belong to another board next to this one.
-  if (stated.fraction >= min_fraction && 2 * stated.num_counted > steps.size()) return "";
+  if (stated.fraction >= min_fraction && 2 * stated.num_counted > steps.size()) {
+    // With an odd number of columns, most steps also agree with the wrong color.
+    Board opposite = board;
+    opposite.top_left_white = !board.top_left_white;
+    const bool is_stated_better = fit_board_layout(opposite, steps).fraction <= stated.fraction;
+    return is_stated_better ? "" : describe_charuco_board(opposite);
+  }
   int largest = 0;
   for (const Step& step : steps) largest = std::max({largest, step.from, step.to});
   std::optional<Board> best;
@@ -313,7 +324,8 @@ std::string describe_charuco_problem(const Board& board, const std::vector<Step>
       candidate.top_left_white = white;
       // The number of rows that the markers need, or that of board.yaml if it is larger.
       const int markers = largest - board.first_id + 1;
-      candidate.rows = std::max(minimum, (2 * markers + cols - 1) / cols);
+      const int squares = 2 * markers - (white ? 1 : 0);
+      candidate.rows = std::max(minimum, (squares + cols - 1) / cols);
       if (candidate.rows > limit) continue;
       if (cols == board.cols) candidate.rows = std::max(candidate.rows, board.rows);
       const LayoutFit fit = fit_board_layout(candidate, steps);
@@ -330,8 +342,7 @@ std::string describe_charuco_problem(const Board& board, const std::vector<Step>
            std::to_string(board.cols) + " x " + std::to_string(board.rows) + " squares from id " +
            std::to_string(board.first_id) + "; is it another board?";
   }
-  return "the images show cols " + std::to_string(best->cols) + ", rows " +
-         std::to_string(best->rows) + ", top_left " + (best->top_left_white ? "white" : "black");
+  return describe_charuco_board(*best);
 }
 
 BoardCheck check_charuco_layout(const Board& board, const std::vector<Step>& steps) {

@@ -154,7 +154,7 @@ ImportedCamera parse_mrcal_camera(const fs::path& file, const std::string& text)
 }
 
 std::vector<double> parse_yaml_numbers(const YAML::Node& node) {
-  const YAML::Node list = node.IsMap() ? node["data"] : node;
+  const YAML::Node list = node && node.IsMap() ? node["data"] : node;
   if (!list || !list.IsSequence()) throw std::invalid_argument("a list of numbers is missing");
   return list.as<std::vector<double>>();
 }

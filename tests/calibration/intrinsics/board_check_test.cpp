@@ -438,6 +438,24 @@ TEST(CheckCharucoLayout, NamesSquaresThatMarkersShow) {
   EXPECT_EQ(layout_problem(stated, white_views), "the images show cols 7, rows 6, top_left white");
 }
 
+/// With an odd number of columns, more than four fifths of the steps agree with either color.
+TEST(CheckCharucoLayout, NamesColorOfFirstSquareForOddNumberOfColumns) {
+  for (const auto& [cols, rows] : {std::pair(7, 5), {7, 9}, {11, 8}, {5, 7}}) {
+    for (const bool is_white : {false, true}) {
+      Board board = charuco_board();
+      board.cols = cols;
+      board.rows = rows;
+      board.top_left_white = is_white;
+      const auto views = make_flat_views(board, {{1000, 0.3, 0}, {1500, -2, 0}});
+      EXPECT_EQ(layout_problem(board, views), "") << cols << " x " << rows;
+      board.top_left_white = !is_white;
+      EXPECT_EQ(layout_problem(board, views), "the images show cols " + std::to_string(cols) +
+                                                  ", rows " + std::to_string(rows) + ", top_left " +
+                                                  (is_white ? "white" : "black"));
+    }
+  }
+}
+
 TEST(CheckCharucoLayout, ReportsOtherBoardForMarkersInDisorder) {
   auto views = make_flat_views(charuco_board(), {{1000, 0.3, 0}, {1500, -2, 0}});
   for (BoardView& view : views) {
@@ -504,6 +522,8 @@ TEST(CheckCharucoLayout, KeepsStatedRowsIfFewerAreSeen) {
   Board stated = charuco_board();
   stated.rows = 9;
   EXPECT_EQ(layout_problem(stated, views), "");
+  stated.top_left_white = !stated.top_left_white;
+  EXPECT_EQ(layout_problem(stated, views), "the images show cols 7, rows 9, top_left black");
   // Boards of six columns, with the other color of the first square.
   Board six = charuco_board();
   six.cols = 6;

@@ -345,7 +345,7 @@ TEST_F(ReadCameraOfAnyFormat, ReadsKalibrCameraWithAndWithoutDistortions) {
   comes_back(kPinhole, head + "  distortion_model: none\n  distortion_coeffs: [1, 2, 3]\n",
              LensModel::pinhole);
   EXPECT_THAT(refusal(head + "  distortion_model: radtan\n"),
-              testing::HasSubstr("contains no supported camera: "));
+              testing::EndsWith("a list of numbers is missing"));
   EXPECT_THAT(refusal(head + "  distortion_model: radtan\n  distortion_coeffs: 5\n"),
               testing::EndsWith("a list of numbers is missing"));
   EXPECT_THAT(refusal("cam0:\n  camera_model: omni\n"),
