@@ -1,0 +1,421 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Compares each field of the result of run_bundle_adjustment() with an AdjustmentProblem that is
+/// assembled and solved here.
+#include <gmock/gmock.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "calibration/adjustment/adjustment.h"
+#include "calibration/adjustment/adjustment_problem.h"
+#include "calibration/adjustment/adjustment_room.h"
+#include "camera/lens.h"
+#include "geometry/statistical_bounds.h"
+#include "support/matchers.h"
+#include "support/synthetic_rig.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+class RunBundleAdjustmentResult : public AdjustmentRoom {};
+
+double compute_max_sd(const Eigen::Matrix2d& covariance) {
+  const double mean = covariance.trace() / 2;
+  return std::sqrt(mean + std::sqrt(mean * mean - covariance.determinant()));
+}
+
+TEST_F(RunBundleAdjustmentResult, EstimatesAndCovariancesMatchProblem) {
+  AdjustmentProblem problem = make_problem(0.05, 0.03);
+  const auto covariance = solve_with_noise(problem, 1);
+  ASSERT_EQ(problem.noise_scale, 1);
+  const AdjustmentLayout& at = problem.state_vector_layout();
+  const Eigen::VectorXd& state = problem.state_vector();
+  const Eigen::MatrixXd from_state = parameters_from_state(problem);
+  const Eigen::MatrixXd expected = from_state * covariance.matrix * from_state.transpose();
+  for (const bool is_checked : {true, false}) {
+    input.captures_are_checked = is_checked;
+    const AdjustmentResult found = run_bundle_adjustment(input);
+    ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
+    const double stopped = is_checked ? 1e-5 : 1e-4;  // standard deviations
+
+    ASSERT_EQ(found.refined_covariance.rows(), 34);
+    const Eigen::VectorXd sd = expected.diagonal().cwiseSqrt();
+    for (Eigen::Index i = 0; i < 34; ++i) {
+      for (Eigen::Index j = 0; j < 34; ++j) {
+        EXPECT_NEAR(found.refined_covariance(i, j), expected(i, j), 1e-4 * sd[i] * sd[j] + 1e-16);
+      }
+    }
+    EXPECT_EQ(found.refined_covariance, found.refined_covariance.transpose());
+
+    const std::vector<double> intrinsics = problem.current_intrinsics();
+    ASSERT_EQ(found.camera.intrinsics.size(), 12U);
+    for (std::size_t i = 0; i < 12; ++i) {
+      EXPECT_NEAR(found.camera.intrinsics[i], intrinsics[i],
+                  1e-12 + stopped * sd[static_cast<Eigen::Index>(i)]);
+    }
+    EXPECT_EQ(found.center.model, RotationModel::tilt);
+    const Eigen::Vector2d zenith = state.segment<2>(at.zenith);
+    EXPECT_NEAR(found.center.zenith_in_camera.norm(), 1, 1e-15);
+    EXPECT_THAT(found.center.zenith_in_camera.hnormalized(),
+                IsNear(zenith, stopped * sd.segment<2>(12).maxCoeff()));
+    EXPECT_NEAR(found.center.center_px.x(), intrinsics[2] + intrinsics[0] * zenith.x(), 1e-3);
+    EXPECT_NEAR(found.center.center_px.y(), intrinsics[3] + intrinsics[1] * zenith.y(), 1e-3);
+    ASSERT_TRUE(found.center.covariance);
+    for (int i = 0; i < 2; ++i) {
+      for (int j = 0; j < 2; ++j) {
+        EXPECT_NEAR((*found.center.covariance)(i, j),
+                    found.camera.intrinsics[static_cast<std::size_t>(i)] *
+                        found.camera.intrinsics[static_cast<std::size_t>(j)] *
+                        found.refined_covariance(12 + i, 12 + j),
+                    1e-12);
+      }
+    }
+    ASSERT_TRUE(found.center.lever_arm_m);
+    EXPECT_THAT(*found.center.lever_arm_m,
+                IsNear(state.segment<2>(at.lever_arm), stopped * sd.segment<2>(14).maxCoeff()));
+    ASSERT_TRUE(found.center.lever_arm_covariance);
+    EXPECT_THAT(*found.center.lever_arm_covariance,
+                IsNear(Eigen::Matrix2d(found.refined_covariance.block<2, 2>(14, 14)), 1e-18));
+  }
+}
+
+TEST_F(RunBundleAdjustmentResult, CountsAndResidualMatchProblem) {
+  AdjustmentProblem problem = make_problem(0.05, 0.03);
+  const auto covariance = solve_with_noise(problem, 1);
+  input.captures[5].detections.insert(input.captures[5].detections.begin(),
+                                      {99, {400, 300}, 0.05});     // not in the map
+  input.captures[5].detections.push_back({12, {400, 300}, 0.05});  // the second one of lamp 12
+  AdjustmentCapture dark{"dark", {input.captures[0].detections[0]}};
+  input.captures.insert(input.captures.begin() + 1, dark);
+  input.captures_are_checked = true;
+  const AdjustmentResult found = run_bundle_adjustment(input);
+  ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
+  EXPECT_EQ(found.captures, 13);
+  EXPECT_EQ(found.rejected_captures, 1);
+  EXPECT_EQ(found.detections, 64);
+  EXPECT_EQ(found.rejected_detections, 0);
+  EXPECT_EQ(found.noise_scale, 1);
+  EXPECT_FALSE(found.noise_is_contradicted);
+  const double expected_px = 0.05 * std::sqrt(sum_squares(problem) / covariance.degrees_of_freedom);
+  EXPECT_NEAR(found.residual_px, expected_px, 1e-7);
+}
+
+TEST_F(RunBundleAdjustmentResult, LampsAndBothMapCovariancesMatchProblem) {
+  AdjustmentProblem problem = make_problem(0.05, 0.03);
+  solve_with_noise(problem, 1);
+  const AdjustmentLayout& at = problem.state_vector_layout();
+  const AdjustmentResult found = run_bundle_adjustment(input);
+  ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
+  ASSERT_EQ(found.lamps.size(), 5U);
+  ASSERT_EQ(found.refined_map.lamps.size(), kLamps);
+  for (std::size_t i = 0; i < kLamps; ++i) {
+    const Lamp& surveyed = input.lamps.lamps[i];
+    const Lamp& refined = found.refined_map.lamps[i];
+    EXPECT_EQ(refined.id, surveyed.id);
+    const Eigen::Index row = 16 + 3 * static_cast<Eigen::Index>(i);
+    const Eigen::Matrix3d covariance = found.refined_covariance.block<3, 3>(row, row);
+    EXPECT_THAT(found.surveyed_covariance.middleRows<3>(row).rightCols(18),
+                IsNear((Eigen::MatrixXd(3, 18) << Eigen::MatrixXd::Zero(3, row - 16),
+                        *surveyed.sd_m * *surveyed.sd_m * Eigen::Matrix3d::Identity(),
+                        Eigen::MatrixXd::Zero(3, 31 - row))
+                           .finished(),
+                       1e-18));
+    if (i < 5) {
+      const auto& corrected = found.lamps[i];
+      EXPECT_EQ(corrected.id, surveyed.id);
+      EXPECT_FALSE(corrected.is_moved);
+      EXPECT_THAT(
+          corrected.correction_m,
+          IsNear(problem.state_vector().segment<3>(at.lamp_state_index(i)) - surveyed.position_m,
+                 1e-8));
+      EXPECT_THAT(corrected.sd_m, IsNear(covariance.diagonal().cwiseSqrt(), 1e-15));
+    }
+    if (i == 1 || i == 5) {
+      EXPECT_EQ(refined.position_m, surveyed.position_m) << "exact, or not in view";
+      EXPECT_EQ(refined.sd_m, surveyed.sd_m);
+      continue;
+    }
+    EXPECT_THAT(refined.position_m,
+                IsNear(surveyed.position_m + found.lamps[i].correction_m, 1e-15));
+    EXPECT_GT(found.lamps[i].correction_m.norm(), 1e-4);
+    ASSERT_TRUE(refined.sd_m);
+    EXPECT_NEAR(*refined.sd_m, std::sqrt(covariance.diagonal().mean()), 1e-12);
+  }
+  EXPECT_EQ(found.surveyed_covariance.topRows<16>(), found.refined_covariance.topRows<16>());
+  EXPECT_EQ(found.surveyed_covariance.leftCols<16>(), found.refined_covariance.leftCols<16>());
+  EXPECT_THAT(found.notes, testing::ElementsAre("lamp 16 is visible in no capture: its position "
+                                                "stays unchanged"));
+}
+
+TEST_F(RunBundleAdjustmentResult, KnownPositionsListResidualsOfEachPivotAndPosition) {
+  AdjustmentProblem problem = make_problem(0.05, 0.03);
+  solve_with_noise(problem, 1);
+  const AdjustmentResult found = run_bundle_adjustment(input);
+  ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
+  const std::vector<std::string> names{"b",       "a",       "fifth",     "other x",
+                                       "other y", "other z", "no height", "axis"};
+  const std::vector<int> captures{2, 2, 2, 1, 1, 1, 1, 1};
+  ASSERT_EQ(found.known_positions.size(), names.size());
+  std::vector<Eigen::Vector3d> residuals_m(names.size(), Eigen::Vector3d::Zero());
+  for (const auto& place : problem.position_observations) {
+    const Eigen::Vector3d residual_m =
+        problem.predict_camera_or_axis_position(place) - place.measured_m;
+    residuals_m[place.known_position].head(place.size) +=
+        residual_m.head(place.size) / captures[place.known_position];
+  }
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const auto& place = found.known_positions[i];
+    EXPECT_EQ(place.name, names[i]);
+    EXPECT_EQ(place.captures, captures[i]) << names[i];
+    EXPECT_EQ(place.measured_point, i == 0 || i == 7 ? MeasuredPoint::axis : MeasuredPoint::camera)
+        << names[i];
+    EXPECT_FALSE(place.is_outlier) << names[i];
+    EXPECT_GT(residuals_m[i].norm(), 1e-4);
+    EXPECT_THAT(place.residual_m, IsNear(residuals_m[i], 1e-7)) << names[i];
+  }
+  EXPECT_EQ(found.known_positions[1].residual_m.z(), 0);
+  EXPECT_EQ(found.known_positions[6].residual_m.z(), 0);
+}
+
+/// Errors of the focal lengths for which chi-squared is 1, and 3 % below and above its bound.
+TEST_F(RunBundleAdjustmentResult, LensChiSquaredComparesCorrectionWithItsCovariance) {
+  const AdjustmentProblem truth = make_problem(0.05, 0.03);
+  const double bound = compute_chi_squared_bound(kSigmasOfOneInTenThousand, 3);
+  input.captures_are_checked = true;
+  double error_px = 1, expected_at_1_px = 0;
+  for (const double fraction : {0.0, 0.97, 1.03}) {
+    if (fraction > 0) error_px = std::sqrt(fraction * bound / expected_at_1_px);
+    Camera& camera = input.calibration.camera;
+    camera.intrinsics[0] = 520 + error_px;
+    camera.intrinsics[1] = 522 - error_px;
+    const LensParametrization lens(camera, input.calibration.intrinsics_report->covariance);
+    AdjustmentProblem problem(camera.lens_model, lens, kLamps, 2);
+    problem.captures = truth.captures;
+    problem.sightings = truth.sightings;
+    problem.lamps = truth.lamps;
+    problem.position_observations = truth.position_observations;
+    problem.is_known_position_used = truth.is_known_position_used;
+    problem.state_vector() = truth.state_vector();
+    const auto covariance = solve_with_noise(problem, 1);
+    const Eigen::Vector3d u = problem.state_vector().head<3>();
+    const Eigen::Matrix3d determined =
+        Eigen::Matrix3d::Identity() - covariance.matrix.topLeftCorner(3, 3);
+    const double expected = u.dot(determined.inverse() * u);
+    if (fraction == 0) expected_at_1_px = expected;
+    const AdjustmentResult found = run_bundle_adjustment(input);
+    ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
+    ASSERT_EQ(found.rejected_detections, 0);
+    EXPECT_EQ(found.lens_degrees_of_freedom, 3);
+    EXPECT_NEAR(found.lens_chi_squared, expected, 1e-3 * expected);
+    if (fraction > 0) EXPECT_NEAR(found.lens_chi_squared / bound, fraction, 0.02);
+    EXPECT_EQ(found.lens_is_contradicted, fraction > 1);
+  }
+}
+
+/// The captures determine a focal length, but no coefficient that is known to 1e-9.
+TEST_F(RunBundleAdjustmentResult, LensDegreesOfFreedomCountOnlyDeterminedDirections) {
+  make_problem(0.05, 0.03);
+  for (const double focal_sd_px : {2.0, 0.0}) {
+    MatrixX covariance = MatrixX::Zero(12, 12);
+    covariance(0, 0) = focal_sd_px * focal_sd_px;
+    covariance(11, 11) = 1e-18;
+    input.calibration.intrinsics_report->covariance = covariance;
+    const AdjustmentResult found = run_bundle_adjustment(input);
+    ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
+    EXPECT_EQ(found.lens_degrees_of_freedom, focal_sd_px > 0 ? 1 : 0);
+    EXPECT_EQ(found.lens_chi_squared > 0, focal_sd_px > 0);
+    EXPECT_FALSE(found.lens_is_contradicted);
+  }
+  input.calibration.intrinsics_report.reset();
+  const AdjustmentResult exact_lens = run_bundle_adjustment(input);
+  ASSERT_TRUE(exact_lens.has_succeeded()) << exact_lens.undetermined;
+  EXPECT_EQ(exact_lens.lens_degrees_of_freedom, 0);
+  EXPECT_EQ(exact_lens.camera.intrinsics, input.calibration.camera.intrinsics);
+}
+
+TEST_F(RunBundleAdjustmentResult, NoiseScaleAndContradictionMatchResidualsForTooSmallSigma) {
+  AdjustmentProblem problem = make_problem(0.005, 0.03);
+  const auto covariance = solve_with_noise(problem, 1);
+  ASSERT_GT(problem.noise_scale, 3);
+  input.captures_are_checked = true;
+  const AdjustmentResult found = run_bundle_adjustment(input);
+  ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
+  ASSERT_EQ(found.rejected_detections, 0);
+  EXPECT_NEAR(found.noise_scale, problem.noise_scale, 1e-6 * problem.noise_scale);
+  EXPECT_TRUE(found.noise_is_contradicted);
+  EXPECT_NEAR(
+      found.residual_px,
+      0.005 * problem.noise_scale * std::sqrt(sum_squares(problem) / covariance.degrees_of_freedom),
+      1e-7);
+  const Eigen::Matrix4d zenith_and_arm = covariance.matrix.block(3, 3, 4, 4);
+  EXPECT_THAT(found.refined_covariance.block(12, 12, 4, 4), IsNear(zenith_and_arm, 1e-12));
+  // Sigmas for which the noise scale is 3 % above and below the limit of the contradiction.
+  const double limit = 1 + 3 * std::sqrt(0.5 / covariance.degrees_of_freedom);
+  for (const double factor : {0.97, 1.03}) {
+    make_problem(0.005 * problem.noise_scale / (limit * factor), 0.03);
+    const AdjustmentResult near_limit = run_bundle_adjustment(input);
+    ASSERT_TRUE(near_limit.has_succeeded());
+    EXPECT_NEAR(near_limit.noise_scale / limit, factor, 0.02);
+    EXPECT_EQ(near_limit.noise_is_contradicted, factor > 1) << factor;
+  }
+}
+
+TEST_F(RunBundleAdjustmentResult, NoiseScaleIsResidualWithoutGivenSigma) {
+  AdjustmentProblem problem = make_problem(1, 0.03);
+  const auto covariance = solve_with_noise(problem, 0);
+  // One detection without sigma is enough; the others have the sigma of the assumption.
+  input.captures[1].detections[2].sigma_px.reset();
+  input.captures_are_checked = true;
+  const AdjustmentResult found = run_bundle_adjustment(input);
+  ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
+  ASSERT_EQ(found.rejected_detections, 0);
+  EXPECT_LT(found.noise_scale, 0.03);
+  EXPECT_NEAR(found.noise_scale, problem.noise_scale, 1e-6 * problem.noise_scale);
+  EXPECT_FALSE(found.noise_is_contradicted);
+  EXPECT_NEAR(found.residual_px,
+              problem.noise_scale * std::sqrt(sum_squares(problem) / covariance.degrees_of_freedom),
+              1e-7);
+}
+
+/// Estimates with equal weights in the undistorted image have the covariance of equal noise in the
+/// distorted one.
+TEST_F(RunBundleAdjustmentResult, WeightsInUndistortedImageChangeEstimatesButNotCovariance) {
+  AdjustmentProblem problem = make_problem(1, 0.03);
+  const Lens lens(input.calibration.camera.lens_model, input.calibration.camera.intrinsics);
+  // Only captures 0 and 7 have given sigmas.
+  for (std::size_t k = 0; k < input.captures.size(); ++k) {
+    for (Detection& detection : input.captures[k].detections) {
+      detection.sigma_px.reset();
+      if (k % 7 == 0) detection.sigma_px = 0.8;
+    }
+  }
+  const auto undistort = [&](const Eigen::Vector2d& pixel) -> Eigen::Vector2d {
+    return Eigen::Vector2d(520, 522).cwiseProduct(
+        lens.unproject_pixel(pixel).value().direction.hnormalized());
+  };
+  for (auto& sighting : problem.sightings) {
+    if (sighting.capture % 7 == 0) {
+      sighting.sigma_px = 0.8;
+      sighting.whitening = Eigen::Matrix2d::Identity() / 0.8;
+      continue;
+    }
+    for (int axis = 0; axis < 2; ++axis) {
+      const Eigen::Vector2d step = 1e-3 * Eigen::Vector2d::Unit(axis);
+      sighting.whitening.col(axis) =
+          (undistort(sighting.pixel + step) - undistort(sighting.pixel - step)) / 2e-3;
+    }
+  }
+  solve_with_noise(problem, 0);
+  const Eigen::Vector2d zenith = problem.state_vector().segment<2>(3);
+  for (auto& sighting : problem.sightings) {
+    sighting.whitening = Eigen::Matrix2d::Identity() / sighting.sigma_px;
+  }
+  problem.noise_scale *= std::sqrt(sum_squares(problem) /
+                                   problem.compute_global_unknowns_covariance().degrees_of_freedom);
+  const auto covariance = problem.compute_global_unknowns_covariance();
+
+  input.captures_are_checked = true;
+  const AdjustmentResult equal = run_bundle_adjustment(input);
+  input.weighs_in_undistorted_image = true;
+  const AdjustmentResult found = run_bundle_adjustment(input);
+  ASSERT_TRUE(equal.has_succeeded() && found.has_succeeded()) << found.undetermined;
+  ASSERT_EQ(found.rejected_detections, 0);
+  const double sd = std::sqrt(covariance.matrix(3, 3));
+  EXPECT_THAT(found.center.zenith_in_camera.hnormalized(), IsNear(zenith, 1e-3 * sd));
+  EXPECT_GT((equal.center.zenith_in_camera.hnormalized() - zenith).norm(), 0.02 * sd);
+  EXPECT_NEAR(found.noise_scale, problem.noise_scale, 1e-5 * problem.noise_scale);
+  const Eigen::Matrix4d zenith_and_arm = covariance.matrix.block(3, 3, 4, 4);
+  EXPECT_THAT(found.refined_covariance.block(12, 12, 4, 4), IsNear(zenith_and_arm, 1e-5 * sd * sd));
+}
+
+TEST_F(RunBundleAdjustmentResult, LimitsOfZenithAndLeverArmApplyToLargestSd) {
+  AdjustmentProblem problem = make_problem(0.05, 0.03);
+  solve_with_noise(problem, 1);
+  double height_m = 0;
+  for (const auto& sighting : problem.sightings) {
+    const Eigen::Index lamp = 7 + 3 * static_cast<Eigen::Index>(sighting.lamp);
+    const auto& capture = problem.captures[sighting.capture];
+    Eigen::Index position = capture.local;
+    if (capture.pivot) position = 25 + 3 * static_cast<Eigen::Index>(*capture.pivot);
+    height_m += problem.state_vector()[lamp + 2] - problem.state_vector()[position + 2];
+  }
+  height_m /= static_cast<double>(problem.sightings.size());
+  const AdjustmentResult found = run_bundle_adjustment(input);
+  ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
+  ASSERT_TRUE(found.center.lever_arm_m);
+  const double zenith_sd = compute_max_sd(found.refined_covariance.block(12, 12, 2, 2));
+  const double arm_fraction =
+      compute_max_sd(found.refined_covariance.block(14, 14, 2, 2)) / height_m;
+  constexpr double less = 1 - 1e-5, more = 1 + 1e-5;
+
+  EXPECT_EQ(run_bundle_adjustment(input, {zenith_sd * more, 1}).undetermined, "");
+  EXPECT_EQ(run_bundle_adjustment(input, {zenith_sd * less, 1}).undetermined,
+            "the captures do not determine the tilt: add a rotation in place over 90 degrees or "
+            "more, or captures with more lamps at other yaws");
+  EXPECT_EQ(
+      run_bundle_adjustment(input, {zenith_sd * less, arm_fraction * less}).undetermined,
+      "tilt and lever arm cannot be separated; add a rotation in place at a second height, or "
+      "captures at known camera positions and several yaws");
+  EXPECT_TRUE(run_bundle_adjustment(input, {1, arm_fraction * more}).center.lever_arm_m);
+  const AdjustmentResult without_arm = run_bundle_adjustment(input, {1, arm_fraction * less});
+  ASSERT_TRUE(without_arm.has_succeeded());
+  EXPECT_FALSE(without_arm.center.lever_arm_m);
+  EXPECT_FALSE(without_arm.center.lever_arm_covariance);
+  ASSERT_EQ(without_arm.refined_covariance.rows(), 34);
+  Eigen::MatrixXd expected = found.refined_covariance;
+  expected.middleRows<2>(14).setZero();
+  expected.middleCols<2>(14).setZero();
+  EXPECT_THAT(without_arm.refined_covariance, IsNear(expected, 1e-15));
+  EXPECT_EQ(without_arm.center.zenith_in_camera, found.center.zenith_in_camera);
+}
+
+/// Neither a pivot nor the position of the axis.
+TEST_F(RunBundleAdjustmentResult, HasNoLeverArmWithoutDataOfTheAxis) {
+  make_problem(0.05, 0.03);
+  for (AdjustmentCapture& capture : input.captures) {
+    capture.pivot.clear();
+    if (capture.name == "axis" || capture.name[0] == 'b') capture.known_position.reset();
+  }
+  const AdjustmentResult found = run_bundle_adjustment(input);
+  ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
+  EXPECT_FALSE(found.center.lever_arm_m);
+  EXPECT_THAT(run_bundle_adjustment(input, {1e-9, 1e9}).undetermined,
+              HasSubstr("do not determine the tilt"));
+}
+
+/// Derivatives by differences, over the centers of 16 x 16 equal parts of the image.
+TEST(ComputeIntrinsicsCovarianceFromPixelSd, ReturnsVariancesOfEqualImageDisplacement) {
+  const Camera camera = synthetic_camera();
+  const Lens lens(camera.lens_model, camera.intrinsics);
+  const MatrixX found = compute_intrinsics_covariance_from_pixel_sd(camera, 0.5);
+  ASSERT_EQ(found.rows(), 12);
+  ASSERT_EQ(found.cols(), 12);
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(12);
+  for (int row = 0; row < 16; ++row) {
+    for (int column = 0; column < 16; ++column) {
+      const auto ray = lens.unproject_pixel({50 * column + 24.5, 37.5 * row + 18.25});
+      ASSERT_TRUE(ray);
+      for (std::size_t i = 0; i < 12; ++i) {
+        std::vector<double> less = camera.intrinsics, more = camera.intrinsics;
+        less[i] -= 1e-4;
+        more[i] += 1e-4;
+        const Eigen::Vector2d difference =
+            Lens(camera.lens_model, more).project_point(ray->direction).value() -
+            Lens(camera.lens_model, less).project_point(ray->direction).value();
+        squares[static_cast<Eigen::Index>(i)] += (difference / 2e-4).squaredNorm() / 512;
+      }
+    }
+  }
+  for (Eigen::Index i = 0; i < 12; ++i) {
+    EXPECT_NEAR(found(i, i) * squares[i] / 0.25, 1, 1e-5) << i;
+  }
+  EXPECT_TRUE(found.isDiagonal(0));
+}
+
+}  // namespace
+}  // namespace vlp

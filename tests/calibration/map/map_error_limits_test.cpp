@@ -1,0 +1,538 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Limits of the errors of a lamp map, and their descriptions.
+#include <gmock/gmock.h>
+
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "calibration/map/map_errors.h"
+#include "camera/lens.h"
+#include "positioning/inclination_rotation.h"
+#include "support/matchers.h"
+#include "support/random.h"
+#include "support/synthetic_rig.h"
+
+namespace vlp {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+MapError make_moved_lamp(int lamp, const Eigen::Vector3d& offset_mm) {
+  return {MapErrorKind::moved, {lamp}, 1e-3 * offset_mm};
+}
+
+TEST(DescribeMapError, RoundsOffsetsToWholeMillimetersFromTenMillimetersOn) {
+  EXPECT_EQ(describe_map_error(make_moved_lamp(7, {12.4, -3.6, 0.2})),
+            "lamp 7 hangs 13 mm from where the map has it (x +12 mm, y -4 mm): moved, or entered "
+            "wrongly");
+  EXPECT_EQ(describe_map_error(make_moved_lamp(7, {12.4, -0.3, -2.6})),
+            "lamp 7 hangs 13 mm from where the map has it (x +12 mm, y +0 mm, z -3 mm): moved, or "
+            "entered wrongly");
+  EXPECT_EQ(describe_map_error(make_moved_lamp(3, {-5.26, 2.33, 0.04})),
+            "lamp 3 hangs 5.8 mm from where the map has it (x -5.3 mm, y +2.3 mm): moved, or "
+            "entered wrongly");
+  EXPECT_EQ(describe_map_error(make_moved_lamp(3, {0, 0, 0.06})),
+            "lamp 3 hangs 0.1 mm from where the map has it (x +0.0 mm, y +0.0 mm, z +0.1 mm): "
+            "moved, or entered wrongly");
+  EXPECT_THAT(describe_map_error(make_moved_lamp(1, {9.94, 0, 0})),
+              testing::HasSubstr("hangs 9.9 mm"));
+  EXPECT_THAT(describe_map_error(make_moved_lamp(1, {0, 9.96, 0})),
+              testing::HasSubstr("hangs 10 mm from where the map has it (x +0 mm, y +10 mm)"));
+}
+
+TEST(DescribeMapError, NamesLampsAndCapturesOfOtherKinds) {
+  MapError unsteady{MapErrorKind::inconsistent, {4}};
+  unsteady.contradicting_captures = 3;
+  unsteady.captures = 20;
+  EXPECT_EQ(describe_map_error(unsteady),
+            "lamp 4 contradicts the other lamps in 3 of 20 captures, in varying directions: it is "
+            "confused with another light, was moved between captures, or has a wrong height");
+  EXPECT_EQ(describe_map_error({MapErrorKind::swapped, {5, 2}}),
+            "lamps 5 and 2 seem to be swapped: the captures fit the map if their positions or ids "
+            "are exchanged");
+  EXPECT_EQ(describe_map_error({MapErrorKind::mirrored}),
+            "the lamp map seems to be mirrored, as if drawn from below: the captures fit its "
+            "mirror image; change the sign of x or of y of every lamp");
+  EXPECT_EQ(describe_map_error({MapErrorKind::other_room}),
+            "most captures contradict the lamp map: is it the map of this room, and the "
+            "calibration of this camera?");
+  EXPECT_EQ(describe_map_error({MapErrorKind::undetected, {6}}),
+            "lamp 6 is never visible: is it lit, and not overexposed?");
+}
+
+TEST(DescribeMapErrors, SeparatesErrorsBySemicolons) {
+  const std::vector<MapError> errors{{MapErrorKind::undetected, {6}},
+                                     {MapErrorKind::undetected, {2}}};
+  EXPECT_EQ(describe_map_errors({}), "");
+  EXPECT_EQ(describe_map_errors(errors),
+            "lamp 6 is never visible: is it lit, and not overexposed?; lamp 2 is never visible: is "
+            "it lit, and not overexposed?");
+  EXPECT_THAT(describe_lamps_moved_since_calibration(3),
+              testing::StartsWith("3 lamps have other positions than in the adjustment"));
+}
+
+TEST(IsLampMapUnusable, HoldsForSwappedOrMirroredLampsOnly) {
+  MapErrors found;
+  EXPECT_FALSE(found.is_lamp_map_unusable());
+  for (const auto& [kind, is_unusable] :
+       {std::pair(MapErrorKind::moved, false), std::pair(MapErrorKind::inconsistent, false),
+        std::pair(MapErrorKind::swapped, true), std::pair(MapErrorKind::mirrored, true),
+        std::pair(MapErrorKind::other_room, false), std::pair(MapErrorKind::undetected, false)}) {
+    found.errors = {{MapErrorKind::moved, {1}}, {kind, {2}}};
+    EXPECT_EQ(found.is_lamp_map_unusable(), is_unusable) << static_cast<int>(kind);
+  }
+}
+
+TEST(FindUndetectedLamps, ListsLampsInNoFrameInOrderOfMap) {
+  const std::vector<Frame> frames{{"a", {{2, {0, 0}, {}}, {5, {0, 0}, {}}}}, {"b", {}}};
+  const auto found = find_undetected_lamps(frames, synthetic_lamps());
+  std::vector<int> ids;
+  for (const MapError& error : found) {
+    EXPECT_EQ(error.kind, MapErrorKind::undetected);
+    ASSERT_THAT(error.lamps, SizeIs(1));
+    ids.push_back(error.lamps[0]);
+  }
+  EXPECT_THAT(ids, ElementsAre(1, 3, 4, 6, 7, 8));
+}
+
+/// Eight lamps of several heights, and captures without noise of a camera whose calibration
+/// contains its tilt.
+class DetectLampErrorsAtLimits : public testing::Test {
+ protected:
+  DetectLampErrorsAtLimits() {
+    rig.map = make_lamp_map({{-0.8, -0.4, 1.60},
+                             {0.8, -0.4, 1.62},
+                             {0.7, 0.4, 1.58},
+                             {-0.8, 0.5, 1.60},
+                             {0.1, 0.5, 1.61},
+                             {-0.3, -0.5, 1.60},
+                             {0.5, 0.05, 1.59},
+                             {-0.4, 0.1, 1.60}});
+    rig.calibration.camera = synthetic_camera();
+    rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.05, 1);
+    calibration = rig.calibration;
+    map = rig.map;
+    options.min_offset_px = 0.05;
+    take_captures(12);
+  }
+
+  void take_captures(int count) {
+    frames.clear();
+    for (int k = 0; k < count; ++k) {
+      rig.camera = {{0.15 * (k % 5) - 0.3, 0.1 * (k % 4) - 0.1, k % 2 ? 0.3 : 0.0}, 1.1 * k};
+      rig.inclination.reset();
+      if (!options.inclinations.empty()) {
+        if (const auto& inclination = options.inclinations[static_cast<std::size_t>(k)]) {
+          rig.inclination = inclination;
+        }
+      }
+      frames.push_back({std::to_string(k), seen_from(rig)});
+    }
+  }
+  MapErrors detect() const {
+    return detect_misplaced_or_swapped_lamps(frames, map, calibration, options);
+  }
+  Eigen::Vector3d& place(std::size_t lamp) { return map.lamps[lamp].position_m; }
+  void set_survey_sd(double sd_m) {
+    for (Lamp& lamp : map.lamps) lamp.sd_m = sd_m;
+  }
+
+  /// Displacements of lamps without their similarity, and the sums of their squares that other
+  /// lamps leave.
+  struct Shape {
+    Eigen::VectorXd displacement_m;
+    Eigen::MatrixXd projector;
+
+    /// Returns the sum of squares that the offsets of `free` lamps do not explain.
+    double sum_squares_m2(const std::vector<std::size_t>& free) const {
+      if (free.empty()) return displacement_m.squaredNorm();
+      Eigen::MatrixXd columns(projector.rows(), 2 * std::ssize(free));
+      for (std::size_t k = 0; k < free.size(); ++k) {
+        columns.middleCols(2 * static_cast<Eigen::Index>(k), 2) =
+            projector.middleCols(2 * static_cast<Eigen::Index>(free[k]), 2);
+      }
+      return (displacement_m - columns * columns.colPivHouseholderQr().solve(displacement_m))
+          .squaredNorm();
+    }
+    /// Returns the smallest sum of squares that another lamp than `lamp` leaves.
+    double sum_squares_of_others_m2(std::size_t lamp) const {
+      double min_m2 = std::numeric_limits<double>::infinity();
+      for (std::size_t other = 0; 2 * static_cast<Eigen::Index>(other) < displacement_m.size();
+           ++other) {
+        if (other != lamp) min_m2 = std::min(min_m2, sum_squares_m2({other}));
+      }
+      return min_m2;
+    }
+  };
+  /// Returns the displacements of the true lamps relative to the map.
+  Shape compute_shape() const {
+    const Eigen::Index lamps = std::ssize(map.lamps);
+    Eigen::MatrixXd similarity(2 * lamps, 4);
+    Eigen::VectorXd difference_m(2 * lamps);
+    for (Eigen::Index i = 0; i < lamps; ++i) {
+      const auto lamp = static_cast<std::size_t>(i);
+      const Eigen::Vector2d p = map.lamps[lamp].position_m.head<2>();
+      similarity.middleRows(2 * i, 2) << 1, 0, -p.y(), p.x(), 0, 1, p.x(), p.y();
+      difference_m.segment<2>(2 * i) = rig.map.lamps[lamp].position_m.head<2>() - p;
+    }
+    const Eigen::MatrixXd inverse = (similarity.transpose() * similarity).inverse();
+    Shape shape;
+    shape.projector = Eigen::MatrixXd::Identity(2 * lamps, 2 * lamps) -
+                      similarity * inverse * similarity.transpose();
+    shape.displacement_m = shape.projector * difference_m;
+    return shape;
+  }
+
+  SyntheticRig rig{{}, {}, {{0, 0, 0}, 0}, {}};
+  Calibration calibration;
+  LampMap map;
+  std::vector<Frame> frames;
+  MapErrorOptions options;
+};
+
+/// All lamps at one height.
+TEST_F(DetectLampErrorsAtLimits, OffsetsAreExactWithOrWithoutTiltAndInclination) {
+  for (Lamp& lamp : rig.map.lamps) lamp.position_m.z() = 1.6;
+  map = rig.map;
+  place(2).head<2>() += Eigen::Vector2d(0.03, -0.02);
+  for (const bool is_inclined : {false, true}) {
+    for (const bool is_tilt_known : {true, false}) {
+      options.inclinations.clear();
+      if (is_inclined) {
+        for (int k = 0; k < 12; ++k) {
+          options.inclinations.emplace_back(Inclination{0.02 * (k % 3), 0.03 - 0.02 * (k % 4)});
+          if (k % 5 == 0) options.inclinations.back().reset();
+        }
+      }
+      take_captures(12);
+      if (!is_tilt_known) calibration.rotation_center.reset();
+      const MapErrors found = detect();
+      calibration = rig.calibration;
+      ASSERT_THAT(found.errors, SizeIs(1)) << is_inclined << is_tilt_known;
+      EXPECT_EQ(found.errors[0].kind, MapErrorKind::moved);
+      EXPECT_THAT(found.errors[0].lamps, ElementsAre(3));
+      EXPECT_THAT(found.errors[0].offset_m, IsNear(Eigen::Vector3d(-0.03, 0.02, 0), 2e-6));
+      ASSERT_THAT(found.offsets, SizeIs(8));
+      for (const LampOffset& offset : found.offsets) EXPECT_EQ(offset.captures, 12);
+      EXPECT_THAT(found.offsets[2].offset_m, IsNear(Eigen::Vector2d(-0.03, 0.02), 2e-6));
+    }
+  }
+}
+
+/// Robot with the camera turned on it: the inclination is that of the robot.
+TEST_F(DetectLampErrorsAtLimits, InclinationsRotateWithYawOfCameraOnRobot) {
+  options.yaw_in_robot_rad = 0.8;
+  const Inclination of_robot{0.06, -0.04};
+  const Eigen::Matrix3d level_from_base =
+      compute_inclination_rotation(of_robot, options.yaw_in_robot_rad).level_from_base;
+  const Lens lens(rig.calibration.camera.lens_model, rig.calibration.camera.intrinsics);
+  const Eigen::Matrix3d camera_from_base =
+      compute_level_from_camera_matrix(rig.calibration, Correction::all).transpose();
+  frames.clear();
+  for (int k = 0; k < 6; ++k) {
+    const Pose camera{{0.1 * k - 0.2, 0.05 * k, 0.1 * k}, 1.1 * k};
+    Frame frame{std::to_string(k), {}};
+    for (const Lamp& lamp : rig.map.lamps) {
+      const Eigen::Vector3d level = level_point_from_world(camera, lamp.position_m);
+      const auto pixel =
+          lens.project_point(camera_from_base * (level_from_base.transpose() * level));
+      ASSERT_TRUE(pixel);
+      frame.detections.push_back({lamp.id, *pixel, {}});
+    }
+    frames.push_back(frame);
+    options.inclinations.emplace_back(of_robot);
+  }
+  const MapErrors found = detect();
+  ASSERT_THAT(found.offsets, SizeIs(8));
+  for (const LampOffset& offset : found.offsets) {
+    EXPECT_THAT(offset.offset_m, IsNear(Eigen::Vector2d(0, 0), 1e-6)) << offset.lamp;
+  }
+}
+
+TEST_F(DetectLampErrorsAtLimits, UsesEveryNthCaptureOfManyCaptures) {
+  const auto count_used = [&](int captures, std::size_t max_captures) {
+    options.max_captures = max_captures;
+    take_captures(captures);
+    const MapErrors found = detect();
+    return found.offsets.empty() ? 0 : found.offsets[0].captures;
+  };
+  EXPECT_EQ(count_used(5, 5), 5);
+  EXPECT_EQ(count_used(6, 5), 3);
+  EXPECT_EQ(count_used(10, 5), 5);
+  EXPECT_EQ(count_used(11, 5), 4);
+}
+
+/// Captures with two lamps, lamps that are detected twice, and ids that are not in the map.
+TEST_F(DetectLampErrorsAtLimits, UsesCapturesWithThreeUniqueLampsOfTheMap) {
+  frames[0].detections.resize(2);
+  frames[0].detections.push_back({99, {400, 300}, {}});
+  frames[1].detections.resize(3);
+  frames[2].detections.push_back(frames[2].detections[0]);
+  frames[3].detections.push_back({4, {400, 300}, {}});
+  const MapErrors found = detect();
+  EXPECT_THAT(found.errors, IsEmpty());
+  ASSERT_THAT(found.offsets, SizeIs(8));
+  std::vector<int> captures;
+  for (const LampOffset& offset : found.offsets) {
+    captures.push_back(offset.captures);
+    EXPECT_THAT(offset.offset_m, IsNear(Eigen::Vector2d(0, 0), 1e-6));
+  }
+  EXPECT_THAT(captures, ElementsAre(10, 11, 11, 9, 10, 10, 10, 10));
+}
+
+/// The bound is -2 ln(0.01 / 8) if the standard deviations of the survey are known.
+TEST_F(DetectLampErrorsAtLimits, MovedLampIsSignificantFromChiSquaredBoundOn) {
+  constexpr std::size_t lamp = 4;
+  constexpr double sd_m = 2e-4;
+  const double bound = -2 * std::log(0.01 / 8);
+  set_survey_sd(sd_m);
+  place(lamp) += Eigen::Vector3d(3e-3, -4e-3, 0);
+  const double of_5_mm = compute_shape().sum_squares_of_others_m2(lamp) / (sd_m * sd_m);
+  for (const double fraction : {0.97, 1.03}) {
+    const double factor = std::sqrt(fraction * bound / of_5_mm);
+    place(lamp) = rig.map.lamps[lamp].position_m + factor * Eigen::Vector3d(3e-3, -4e-3, 0);
+    const MapErrors found = detect();
+    ASSERT_THAT(found.offsets, SizeIs(8));
+    if (fraction < 1) {
+      EXPECT_THAT(found.errors, IsEmpty());
+      continue;
+    }
+    ASSERT_THAT(found.errors, SizeIs(1));
+    EXPECT_EQ(found.errors[0].kind, MapErrorKind::moved);
+    EXPECT_THAT(found.errors[0].lamps, ElementsAre(5));
+    EXPECT_THAT(found.errors[0].offset_m,
+                IsNear(Eigen::Vector3d(factor * Eigen::Vector3d(-3e-3, 4e-3, 0)), 1e-6));
+    const double own = compute_shape().projector(2 * lamp, 2 * lamp);
+    EXPECT_THAT(found.errors[0].sd_m,
+                IsNear(Eigen::Vector3d(sd_m / std::sqrt(own), sd_m / std::sqrt(own), 0), 2e-6));
+  }
+}
+
+/// Without known standard deviations, the other lamps determine the variance of the survey: with 10
+/// degrees of freedom the sum of squares has to increase by the factor (0.01 / 8)^(-2 / 10).
+TEST_F(DetectLampErrorsAtLimits, MovedLampIsSignificantFromBoundOfFDistributionOn) {
+  constexpr std::size_t lamp = 6;
+  const double bound = std::pow(0.01 / 8, -0.2);
+  std::vector<Eigen::Vector3d> errors_m;
+  for (std::size_t i = 0; i < 8; ++i) {
+    const double n = static_cast<double>(i);
+    errors_m.emplace_back(3e-4 * Eigen::Vector3d(std::sin(9 * n + 1), std::cos(7 * n), 0));
+  }
+  const Eigen::Vector3d direction(0.6, 0.8, 0);
+  const auto compute_ratio = [&](double offset_m) {
+    for (std::size_t i = 0; i < 8; ++i) place(i) = rig.map.lamps[i].position_m + errors_m[i];
+    place(lamp) += offset_m * direction;
+    const Shape shape = compute_shape();
+    return shape.sum_squares_of_others_m2(lamp) / shape.sum_squares_m2({lamp});
+  };
+  for (const double fraction : {0.97, 1.03}) {
+    double low_m = 0, high_m = 0.02;
+    ASSERT_GT(compute_ratio(high_m), bound * fraction);
+    for (int iteration = 0; iteration < 40; ++iteration) {
+      const double middle_m = (low_m + high_m) / 2;
+      (compute_ratio(middle_m) < bound * fraction ? low_m : high_m) = middle_m;
+    }
+    ASSERT_NEAR(compute_ratio(low_m) / bound, fraction, 1e-3);
+    const Shape shape = compute_shape();
+    const double survey_sd_m = std::sqrt(shape.sum_squares_m2({lamp}) / 10);
+    const MapErrors found = detect();
+    ASSERT_THAT(found.offsets, SizeIs(8));
+    if (fraction < 1) {
+      EXPECT_THAT(found.errors, IsEmpty());
+      continue;
+    }
+    ASSERT_THAT(found.errors, SizeIs(1)) << describe_map_errors(found.errors);
+    EXPECT_THAT(found.errors[0].lamps, ElementsAre(7));
+    const double sd_m = survey_sd_m / std::sqrt(shape.projector(2 * lamp, 2 * lamp));
+    EXPECT_THAT(found.errors[0].sd_m, IsNear(Eigen::Vector3d(sd_m, sd_m, 0), 0.01 * sd_m));
+  }
+}
+
+TEST_F(DetectLampErrorsAtLimits, ReportsFewerThanHalfOfTheLampsAsMoved) {
+  set_survey_sd(1e-4);
+  const std::vector<std::size_t> moved{1, 3, 4, 6};
+  for (const std::size_t count : {1U, 2U, 3U, 4U}) {
+    map.lamps = rig.map.lamps;
+    set_survey_sd(1e-4);
+    std::vector<int> expected;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double n = static_cast<double>(i);
+      place(moved[i]) += 0.02 * Eigen::Vector3d(std::cos(2 * n), std::sin(2 * n), 0);
+      expected.push_back(static_cast<int>(moved[i]) + 1);
+    }
+    std::vector<int> lamps;
+    for (const MapError& error : detect().errors) {
+      EXPECT_EQ(error.kind, MapErrorKind::moved);
+      lamps.insert(lamps.end(), error.lamps.begin(), error.lamps.end());
+    }
+    if (count < 4) {
+      EXPECT_THAT(lamps, testing::UnorderedElementsAreArray(expected));
+    } else {
+      EXPECT_LT(lamps.size(), 4U);
+    }
+  }
+}
+
+TEST_F(DetectLampErrorsAtLimits, ReportsNoMovedLampsIfMoreThanEightMoved) {
+  std::vector<Eigen::Vector3d> positions_m;
+  for (int i = 0; i < 20; ++i) {
+    positions_m.emplace_back(0.4 * (i % 5) - 0.8 + 0.02 * (i % 3), 0.3 * (i / 5) - 0.45, 1.6);
+  }
+  rig.map = make_lamp_map(positions_m);
+  take_captures(8);
+  for (const std::size_t count : {8U, 9U}) {
+    map = rig.map;
+    set_survey_sd(1e-4);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double n = static_cast<double>(i);
+      place(2 * i + 1) += 0.01 * Eigen::Vector3d(std::cos(2 * n), std::sin(2 * n), 0);
+    }
+    EXPECT_THAT(detect().errors, SizeIs(count == 8 ? 8 : 0));
+  }
+}
+
+/// The smallest offset is given in pixels at the height of the first lamp in the first capture.
+TEST_F(DetectLampErrorsAtLimits, OmitsOffsetsBelowSmallestOffsetInPixels) {
+  place(1).head<2>() += Eigen::Vector2d(0.012, -0.016);
+  const double offset_px = 0.02 * 521 / 1.6;
+  options.min_offset_px = 0.98 * offset_px;
+  EXPECT_THAT(detect().errors, SizeIs(1));
+  options.min_offset_px = 1.02 * offset_px;
+  const MapErrors found = detect();
+  EXPECT_THAT(found.errors, IsEmpty());
+  EXPECT_THAT(found.offsets, SizeIs(8));
+}
+
+/// Twenty captures with noise in which a lamp is confused with other lights.
+class DetectUnsteadyLamp : public DetectLampErrorsAtLimits {
+ protected:
+  DetectUnsteadyLamp() {
+    take_captures(20);
+    options.min_offset_px = 0.25;
+    Random random(3);
+    for (Frame& frame : frames) {
+      for (Detection& detection : frame.detections) {
+        detection.pixel += 0.05 * Eigen::Vector2d(random.normal(), random.normal());
+      }
+    }
+  }
+  void confuse(std::size_t lamp, std::size_t captures) {
+    for (std::size_t k = 0; k < captures; ++k) {
+      const double angle = 2.4 * static_cast<double>(k + lamp);
+      frames[3 * k % 20].detections[lamp].pixel +=
+          60 * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    }
+  }
+};
+
+TEST_F(DetectUnsteadyLamp, IsReportedInMoreThanTenPercentOfCaptures) {
+  confuse(3, 2);
+  EXPECT_THAT(detect().errors, IsEmpty()) << "10 %";
+  frames[6].detections[3].pixel.x() += 60;
+  const MapErrors found = detect();
+  ASSERT_THAT(found.errors, SizeIs(1));
+  EXPECT_EQ(found.errors[0].kind, MapErrorKind::inconsistent);
+  EXPECT_THAT(found.errors[0].lamps, ElementsAre(4));
+  EXPECT_EQ(found.errors[0].contradicting_captures, 3);
+  EXPECT_EQ(found.errors[0].captures, 20);
+}
+
+TEST_F(DetectUnsteadyLamp, IsReportedInTwoOfNineteenCapturesButNotInOne) {
+  frames.pop_back();
+  frames[0].detections[3].pixel.x() += 60;
+  EXPECT_THAT(detect().errors, IsEmpty());
+  frames[5].detections[3].pixel.y() += 60;
+  const MapErrors found = detect();
+  ASSERT_THAT(found.errors, SizeIs(1));
+  EXPECT_EQ(found.errors[0].contradicting_captures, 2);
+  EXPECT_EQ(found.errors[0].captures, 19);
+}
+
+TEST_F(DetectUnsteadyLamp, IsReportedOnlyWithMostOfTheOutliers) {
+  confuse(3, 4);
+  const std::vector<Frame> before = frames;
+  for (const std::size_t others : {3U, 4U}) {
+    frames = before;
+    for (std::size_t k = 0; k < others; ++k) frames[10 + 2 * k].detections[5].pixel.y() += 60;
+    EXPECT_THAT(detect().errors, SizeIs(others == 3 ? 1 : 0)) << others;
+  }
+}
+
+/// Outliers have to exceed three standard deviations of the survey.
+TEST_F(DetectUnsteadyLamp, IsNotReportedIfSurveyExplainsOutliers) {
+  confuse(3, 5);
+  // 60 px are 0.18 m at 1.6 m, of which poses take a part.
+  map.lamps[3].sd_m = 0.03;
+  EXPECT_THAT(detect().errors, SizeIs(1));
+  map.lamps[3].sd_m = 0.07;
+  EXPECT_THAT(detect().errors, IsEmpty());
+}
+
+/// Outliers have to be five times as large as the smallest offset of a moved lamp.
+TEST_F(DetectUnsteadyLamp, IsNotReportedIfOutliersAreSmall) {
+  confuse(3, 5);
+  options.min_offset_px = 6;
+  EXPECT_THAT(detect().errors, SizeIs(1));
+  options.min_offset_px = 13;
+  EXPECT_THAT(detect().errors, IsEmpty());
+}
+
+/// Two lamps at a distance for which chi-squared of the map with both swapped is near its bound.
+TEST_F(DetectLampErrorsAtLimits, SwappedLampsAreReportedFromChiSquaredBoundOn) {
+  constexpr double sd_m = 1e-3;
+  const double bound = -2 * std::log(0.01 / (1 + 8 * 7 / 2));
+  for (const double fraction : {0.97, 1.03}) {
+    double distance_m = 5e-3;
+    for (int iteration = 0; iteration < 3; ++iteration) {
+      rig.map.lamps[5].position_m =
+          rig.map.lamps[7].position_m + distance_m * Eigen::Vector3d(0.8, -0.6, 0);
+      map = rig.map;
+      set_survey_sd(sd_m);
+      std::swap(place(5), place(7));
+      const double chi_squared = compute_shape().displacement_m.squaredNorm() / (sd_m * sd_m);
+      if (iteration < 2) distance_m *= std::sqrt(fraction * bound / chi_squared);
+    }
+    take_captures(12);
+    const MapErrors found = detect();
+    const bool is_swapped = !found.errors.empty() && found.errors[0].kind == MapErrorKind::swapped;
+    EXPECT_EQ(is_swapped, fraction > 1);
+    if (fraction > 1) {
+      ASSERT_THAT(found.errors, SizeIs(1));
+      EXPECT_THAT(found.errors[0].lamps, ElementsAre(6, 8));
+      EXPECT_TRUE(found.is_lamp_map_unusable());
+      EXPECT_THAT(found.offsets, SizeIs(8));
+    }
+  }
+}
+
+/// A rectangle with two opposite corners swapped is the rectangle with the other two swapped,
+/// turned by half a turn.
+TEST_F(DetectLampErrorsAtLimits, SwappedLampsAreNotNamedIfAnotherPairFitsAsWell) {
+  for (const bool is_rectangle : {true, false}) {
+    rig.map = make_lamp_map({{-0.8, -0.4, 1.6},
+                             {is_rectangle ? 0.8 : 0.5, -0.4, 1.6},
+                             {0.8, 0.4, 1.6},
+                             {-0.8, 0.4, 1.6}});
+    map = rig.map;
+    std::swap(place(0), place(2));
+    take_captures(12);
+    const MapErrors found = detect();
+    const bool is_swapped = !found.errors.empty() && found.errors[0].kind == MapErrorKind::swapped;
+    EXPECT_EQ(is_swapped, !is_rectangle) << describe_map_errors(found.errors);
+    EXPECT_EQ(found.is_lamp_map_unusable(), !is_rectangle);
+  }
+}
+
+}  // namespace
+}  // namespace vlp
