@@ -205,6 +205,25 @@ TEST_F(RunBundleAdjustmentOutliers, KnownPositionsAreUsedIfIncreasedNoiseExplain
   }
 }
 
+/// A wrong position that is stated as very accurate dominates the plain solution, in which the
+/// other positions seem wrong. The robust solution rejects it.
+TEST_F(RunBundleAdjustmentOutliers, WrongAccuratePositionIsRejectedInsteadOfTheOthers) {
+  Survey survey(0.05);
+  survey.five_places(1e-3);
+  for (AdjustmentCapture& capture : survey.input.captures) {
+    if (capture.pivot != "spot-24") continue;
+    capture.known_position->sd_m = 2e-4;
+    capture.known_position->xy_m.x() += 0.02;
+  }
+  const AdjustmentResult robust = run_bundle_adjustment(survey.input);
+  ASSERT_TRUE(robust.has_succeeded()) << robust.undetermined;
+  EXPECT_THAT(list_wrong_positions(robust), testing::ElementsAre("spot-24"));
+  survey.input.captures_are_checked = true;
+  const AdjustmentResult plain = run_bundle_adjustment(survey.input);
+  ASSERT_TRUE(plain.has_succeeded()) << plain.undetermined;
+  EXPECT_THAT(list_wrong_positions(plain), testing::Not(testing::ElementsAre("spot-24")));
+}
+
 /// Survey with an exact map, whose rotations determine each axis to 0.1 mm.
 TEST_F(RunBundleAdjustmentOutliers, KnownPositionIsWrongBeyondFiveSds) {
   constexpr double sd_m = 5e-3;
@@ -386,6 +405,19 @@ TEST_F(RunBundleAdjustmentOutliers, LampsOfStronglyTiltedCameraAreFoundAboveHori
   EXPECT_EQ(found.rejected_detections, 0);
   EXPECT_EQ(found.captures, 61);
   EXPECT_THAT(found.center.zenith_in_camera, IsNear(truth.rotation_center->zenith_in_camera, 1e-8));
+}
+
+/// Without a row time, all pixels are read at the middle of the image.
+TEST_F(RunBundleAdjustmentOutliers, MotionHasNoEffectWithoutRowTime) {
+  Survey survey;
+  survey.five_places(1e-4);
+  survey.stand({{0.2, -0.1, 0}, 2.0});
+  ASSERT_FALSE(survey.input.calibration.camera.row_time_s);
+  survey.input.captures.back().motion = {{0.5, -0.3}, 0.7, 0, 0};
+  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
+  EXPECT_EQ(found.rejected_detections, 0);
+  EXPECT_LT(found.residual_px, 1e-8);
 }
 
 /// Corrections of a free map neither shift, turn nor scale the lamps in view.

@@ -257,6 +257,50 @@ TEST_F(EstimateLampDisplacementsEquations, RejectsOutliersOfSeveralViews) {
   EXPECT_THAT(found->captures, ElementsAre(19, 23, 20, 24, 20, 24, 22));
 }
 
+/// Residuals below half the largest one are compared with the limit again when it is removed.
+TEST_F(EstimateLampDisplacementsEquations, RejectsOutliersAboveHalfOfLargestResidualFirst) {
+  const std::vector<CeilingView> once = views;
+  for (int i = 0; i < 3; ++i) views.insert(views.end(), once.begin(), once.end());
+  const std::vector<CeilingView> exact = views;
+  // Lamp 1 has the largest residual. Both residuals are linear in both errors.
+  const auto set_errors = [&](double first_m, double second_m) {
+    views = exact;
+    views[1].lamps[0].projected_m.x() += first_m;
+    views[4].lamps[2].projected_m.y() += second_m;
+    ASSERT_EQ(views[1].lamps[0].lamp, 1);
+    ASSERT_EQ(views[4].lamps[2].lamp, 3);
+  };
+  constexpr double first_m = 1e-4, without_rejection = 2e-4;
+  for (const double ratio : {0.45, 0.55}) {
+    // Ratio of the residuals from errors below the limit of rounding errors.
+    const auto compute_residuals_m = [&](double second_m) {
+      set_errors(without_rejection * first_m, without_rejection * second_m);
+      const auto found = estimate_lamp_displacements(map, views);
+      if (!found || !found->outliers_m.empty()) return Eigen::Vector2d(0, 0);
+      return Eigen::Vector2d(found->residuals_m[1].head<2>().norm() / without_rejection,
+                             found->residuals_m[4].segment<2>(4).norm() / without_rejection);
+    };
+    double low_m = 0, high_m = first_m;
+    for (int iteration = 0; iteration < 30; ++iteration) {
+      const double middle_m = (low_m + high_m) / 2;
+      const Eigen::Vector2d residuals_m = compute_residuals_m(middle_m);
+      ASSERT_GT(residuals_m.x(), 0);
+      (residuals_m.y() < ratio * residuals_m.x() ? low_m : high_m) = middle_m;
+    }
+    const double together_m = compute_residuals_m(low_m).y();
+    set_errors(first_m, low_m);
+    const auto found = estimate_lamp_displacements(map, views);
+    views[1].lamps.erase(views[1].lamps.begin());
+    const auto without_first = estimate_lamp_displacements(map, views);
+    ASSERT_TRUE(found && without_first);
+    ASSERT_THAT(found->outliers_m, ElementsAre(testing::Key(1), testing::Key(3)));
+    ASSERT_THAT(without_first->outliers_m, ElementsAre(testing::Key(3)));
+    const double alone_m = without_first->outliers_m.at(3)[0];
+    ASSERT_GT(std::abs(alone_m / together_m - 1), 1e-3) << "the order matters";
+    EXPECT_NEAR(found->outliers_m.at(3)[0] / (ratio < 0.5 ? alone_m : together_m), 1, 1e-4);
+  }
+}
+
 TEST_F(EstimateLampDisplacementsEquations, KeepsResidualsOfRoundingErrors) {
   views[2].lamps[3].projected_m.x() += 1e-7;
   auto found = estimate_lamp_displacements(map, views);

@@ -16,6 +16,7 @@
 
 #include "calibration/map/map_errors.h"
 #include "camera/lens.h"
+#include "geometry/plane.h"
 #include "positioning/inclination_rotation.h"
 #include "support/matchers.h"
 #include "support/random.h"
@@ -130,7 +131,9 @@ class DetectLampErrorsAtLimits : public testing::Test {
   void take_captures(int count) {
     frames.clear();
     for (int k = 0; k < count; ++k) {
-      rig.camera = {{0.15 * (k % 5) - 0.3, 0.1 * (k % 4) - 0.1, k % 2 ? 0.3 : 0.0}, 1.1 * k};
+      const Eigen::Vector3d position_m(0.15 * (k % 5) - 0.3, 0.1 * (k % 4) - 0.1,
+                                       k % 2 ? 0.3 : 0.0);
+      rig.camera = {origin_m + position_m, 1.1 * k};
       rig.inclination.reset();
       if (!options.inclinations.empty()) {
         if (const auto& inclination = options.inclinations[static_cast<std::size_t>(k)]) {
@@ -176,13 +179,14 @@ class DetectLampErrorsAtLimits : public testing::Test {
     }
   };
   /// Returns the displacements of the true lamps relative to the map.
-  Shape compute_shape() const {
-    const Eigen::Index lamps = std::ssize(map.lamps);
+  Shape compute_shape() const { return compute_shape(map); }
+  Shape compute_shape(const LampMap& other) const {
+    const Eigen::Index lamps = std::ssize(other.lamps);
     Eigen::MatrixXd similarity(2 * lamps, 4);
     Eigen::VectorXd difference_m(2 * lamps);
     for (Eigen::Index i = 0; i < lamps; ++i) {
       const auto lamp = static_cast<std::size_t>(i);
-      const Eigen::Vector2d p = map.lamps[lamp].position_m.head<2>();
+      const Eigen::Vector2d p = other.lamps[lamp].position_m.head<2>();
       similarity.middleRows(2 * i, 2) << 1, 0, -p.y(), p.x(), 0, 1, p.x(), p.y();
       difference_m.segment<2>(2 * i) = rig.map.lamps[lamp].position_m.head<2>() - p;
     }
@@ -195,15 +199,21 @@ class DetectLampErrorsAtLimits : public testing::Test {
   }
 
   SyntheticRig rig{{}, {}, {{0, 0, 0}, 0}, {}};
+  /// Position about which the captures are taken.
+  Eigen::Vector3d origin_m{0, 0, 0};
   Calibration calibration;
   LampMap map;
   std::vector<Frame> frames;
   MapErrorOptions options;
 };
 
-/// All lamps at one height.
+/// All lamps at one height, far from the origin of the world.
 TEST_F(DetectLampErrorsAtLimits, OffsetsAreExactWithOrWithoutTiltAndInclination) {
-  for (Lamp& lamp : rig.map.lamps) lamp.position_m.z() = 1.6;
+  origin_m = {12, -7, 2};
+  for (Lamp& lamp : rig.map.lamps) {
+    lamp.position_m.z() = 1.6;
+    lamp.position_m += origin_m;
+  }
   map = rig.map;
   place(2).head<2>() += Eigen::Vector2d(0.03, -0.02);
   for (const bool is_inclined : {false, true}) {
@@ -469,23 +479,27 @@ TEST_F(DetectUnsteadyLamp, IsReportedOnlyWithMostOfTheOutliers) {
   }
 }
 
-/// Outliers have to exceed three standard deviations of the survey.
-TEST_F(DetectUnsteadyLamp, IsNotReportedIfSurveyExplainsOutliers) {
+/// The median of the outliers has to exceed three standard deviations of the survey, and five times
+/// the smallest offset of a moved lamp.
+TEST_F(DetectUnsteadyLamp, IsReportedIfOutliersExceedSurveyErrorsAndSmallestOffset) {
   confuse(3, 5);
-  // 60 px are 0.18 m at 1.6 m, of which poses take a part.
-  map.lamps[3].sd_m = 0.03;
-  EXPECT_THAT(detect().errors, SizeIs(1));
-  map.lamps[3].sd_m = 0.07;
-  EXPECT_THAT(detect().errors, IsEmpty());
-}
-
-/// Outliers have to be five times as large as the smallest offset of a moved lamp.
-TEST_F(DetectUnsteadyLamp, IsNotReportedIfOutliersAreSmall) {
-  confuse(3, 5);
-  options.min_offset_px = 6;
-  EXPECT_THAT(detect().errors, SizeIs(1));
-  options.min_offset_px = 13;
-  EXPECT_THAT(detect().errors, IsEmpty());
+  // Returns the value from which on the lamp is not reported.
+  const auto find_limit = [&](double high, const auto& set_value) {
+    double low = 0;
+    for (int iteration = 0; iteration < 14; ++iteration) {
+      const double middle = (low + high) / 2;
+      set_value(middle);
+      (detect().errors.empty() ? high : low) = middle;
+    }
+    return low;
+  };
+  const double median_px = 5 * find_limit(40, [&](double px) { options.min_offset_px = px; });
+  options.min_offset_px = 0.25;
+  const double median_m = 3 * find_limit(0.2, [&](double sd_m) { map.lamps[3].sd_m = sd_m; });
+  // 60 px without the part that the poses take.
+  EXPECT_GT(median_px, 30);
+  EXPECT_LT(median_px, 60);
+  EXPECT_NEAR(median_m / (median_px / 521 * 1.6), 1, 0.01);
 }
 
 /// Two lamps at a distance for which chi-squared of the map with both swapped is near its bound.
@@ -516,21 +530,98 @@ TEST_F(DetectLampErrorsAtLimits, SwappedLampsAreReportedFromChiSquaredBoundOn) {
   }
 }
 
-/// A rectangle with two opposite corners swapped is the rectangle with the other two swapped,
-/// turned by half a turn.
+/// A parallelogram with two opposite corners swapped is the parallelogram with the other two
+/// swapped, turned by half a turn.
 TEST_F(DetectLampErrorsAtLimits, SwappedLampsAreNotNamedIfAnotherPairFitsAsWell) {
-  for (const bool is_rectangle : {true, false}) {
+  for (const bool is_parallelogram : {true, false}) {
     rig.map = make_lamp_map({{-0.8, -0.4, 1.6},
-                             {is_rectangle ? 0.8 : 0.5, -0.4, 1.6},
+                             {is_parallelogram ? 0.6 : 0.5, -0.4, 1.6},
                              {0.8, 0.4, 1.6},
-                             {-0.8, 0.4, 1.6}});
+                             {-0.6, 0.4, 1.6}});
     map = rig.map;
     std::swap(place(0), place(2));
     take_captures(12);
     const MapErrors found = detect();
     const bool is_swapped = !found.errors.empty() && found.errors[0].kind == MapErrorKind::swapped;
-    EXPECT_EQ(is_swapped, !is_rectangle) << describe_map_errors(found.errors);
-    EXPECT_EQ(found.is_lamp_map_unusable(), !is_rectangle);
+    EXPECT_EQ(is_swapped, !is_parallelogram) << describe_map_errors(found.errors);
+    EXPECT_EQ(found.is_lamp_map_unusable(), !is_parallelogram);
+  }
+}
+
+/// The map is mirrored, not swapped, if its size of displacements is at most twice as large. The
+/// fifth lamp is near a diagonal of the square, on which a mirror image is a swap of two corners.
+TEST_F(DetectLampErrorsAtLimits, MapIsMirroredUnlessSwappedLampsFitTwiceAsWell) {
+  const auto compute_ratio = [&](double from_diagonal_m) {
+    rig.map = make_lamp_map({{-0.5, -0.5, 1.6},
+                             {0.5, -0.5, 1.6},
+                             {0.5, 0.5, 1.6},
+                             {-0.5, 0.5, 1.6},
+                             {0.25, -0.25 + from_diagonal_m, 1.6}});
+    LampMap swapped = rig.map;
+    for (std::size_t i = 0; i < 5; ++i) {
+      const double n = static_cast<double>(i);
+      swapped.lamps[i].position_m +=
+          2e-3 * Eigen::Vector3d(std::sin(9 * n + 1), std::cos(7 * n), 0);
+    }
+    map = swapped;
+    std::swap(place(0), place(2));
+    LampMap mirrored = map;
+    for (Lamp& lamp : mirrored.lamps) lamp.position_m.y() *= -1;
+    return compute_shape(mirrored).displacement_m.norm() /
+           compute_shape(swapped).displacement_m.norm();
+  };
+  for (const double ratio : {1.94, 2.06}) {
+    double low_m = 0, high_m = 0.05;
+    ASSERT_LT(compute_ratio(low_m), ratio);
+    ASSERT_GT(compute_ratio(high_m), ratio);
+    for (int iteration = 0; iteration < 40; ++iteration) {
+      const double middle_m = (low_m + high_m) / 2;
+      (compute_ratio(middle_m) < ratio ? low_m : high_m) = middle_m;
+    }
+    compute_ratio(low_m);
+    take_captures(12);
+    const MapErrors found = detect();
+    ASSERT_THAT(found.errors, SizeIs(1)) << describe_map_errors(found.errors);
+    EXPECT_EQ(found.errors[0].kind, ratio < 2 ? MapErrorKind::mirrored : MapErrorKind::swapped);
+  }
+}
+
+/// Displacements of all lamps by 10 % of the size of the map.
+TEST_F(DetectLampErrorsAtLimits, MapIsOfOtherRoomIfDisplacementsExceedTenPercent) {
+  origin_m = {12, -7, 0};
+  for (Lamp& lamp : rig.map.lamps) lamp.position_m += origin_m;
+  map = rig.map;
+  take_captures(12);
+  for (const double fraction : {0.97, 1.03}) {
+    double size_m = 0.1;
+    for (int iteration = 0; iteration < 20; ++iteration) {
+      double squares_m2 = 0;
+      for (std::size_t i = 0; i < 8; ++i) {
+        const double n = static_cast<double>(i);
+        place(i) = rig.map.lamps[i].position_m +
+                   size_m * Eigen::Vector3d(std::sin(9 * n + 1), std::cos(7 * n), 0);
+      }
+      Eigen::Vector2d mean_m(0, 0), product_m2(0, 0);
+      for (const Lamp& lamp : map.lamps) mean_m += lamp.position_m.head<2>() / 8;
+      for (std::size_t i = 0; i < 8; ++i) {
+        const Eigen::Vector2d p = place(i).head<2>() - mean_m;
+        squares_m2 += p.squaredNorm();
+        product_m2 += conjugate_product(p, rig.map.lamps[i].position_m.head<2>());
+      }
+      // Similarity from the map to the room.
+      const double scale = product_m2.norm() / squares_m2;
+      const double ratio = compute_shape().displacement_m.norm() / (scale * std::sqrt(squares_m2));
+      size_m *= 0.1 * fraction / ratio;
+    }
+    const MapErrors found = detect();
+    ASSERT_THAT(found.offsets, SizeIs(8));
+    if (fraction < 1) {
+      EXPECT_THAT(found.errors, IsEmpty()) << describe_map_errors(found.errors);
+    } else {
+      ASSERT_THAT(found.errors, SizeIs(1)) << describe_map_errors(found.errors);
+      EXPECT_EQ(found.errors[0].kind, MapErrorKind::other_room);
+      EXPECT_FALSE(found.is_lamp_map_unusable());
+    }
   }
 }
 
