@@ -95,9 +95,8 @@ std::vector<Step> collect_tag_center_steps(std::span<const BoardView> views,
 
 /// Agreement of steps with a layout.
 struct LayoutFit {
-  /// Fraction of the steps between tags of the layout that agree with the layout.
-  double fraction = 0;
-  std::size_t num_counted = 0;
+  /// Numbers of steps between tags of the layout: all, and those that agree with the layout.
+  std::size_t num_counted = 0, num_agreeing = 0;
   std::optional<double> pitch;
   /// Line fitted to the distances between tags, px, over the widths of the tags:
   ///   distance = pitch (width + 2 shift_px),
@@ -107,6 +106,12 @@ struct LayoutFit {
     double pitch, pitch_sd, shift_px;
   };
   std::optional<Line> line;
+
+  /// Returns the fraction of the counted steps that agree; 0 without steps.
+  double fraction() const {
+    return num_counted == 0 ? 0
+                            : static_cast<double>(num_agreeing) / static_cast<double>(num_counted);
+  }
 };
 
 std::optional<LayoutFit::Line> fit_pitch_line(
@@ -151,7 +156,7 @@ LayoutFit fit_board_layout(const Board& board, const std::vector<Step>& steps) {
   LayoutFit fit;
   if (pitches.empty()) return fit;
   fit.num_counted = num_counted;
-  fit.fraction = static_cast<double>(pitches.size()) / static_cast<double>(num_counted);
+  fit.num_agreeing = pitches.size();
   const auto middle = pitches.begin() + static_cast<std::ptrdiff_t>(pitches.size() / 2);
   std::nth_element(pitches.begin(), middle, pitches.end());
   fit.pitch = *middle;
@@ -231,7 +236,7 @@ std::optional<Board> find_matching_layout(Board board, const std::vector<Step>& 
             ? std::max(lines, stated)
             : lines;
     if (candidate.cols > max_tags || candidate.rows > max_tags) return;
-    const double fraction = fit_board_layout(candidate, steps).fraction;
+    const double fraction = fit_board_layout(candidate, steps).fraction();
     if (fraction < min_fraction || fraction <= best_fraction) return;
     best = candidate;
     best_fraction = fraction;
@@ -248,7 +253,7 @@ std::string describe_layout_problem(const Board& board, const std::vector<Step>&
   const auto has = [&](int id) { return id >= board.first_id && id <= last_id; };
   std::copy_if(steps.begin(), steps.end(), std::back_inserter(known),
                [&](const Step& step) { return has(step.from) && has(step.to); });
-  const bool fits = known.empty() || fit_board_layout(board, known).fraction >= min_fraction;
+  const bool fits = known.empty() || fit_board_layout(board, known).fraction() >= min_fraction;
   const auto found = find_matching_layout(board, steps);
   if (fits && !known.empty()) {
     // Unknown tags may belong to another board next to this one, unless they continue its layout.
@@ -258,7 +263,7 @@ std::string describe_layout_problem(const Board& board, const std::vector<Step>&
     constexpr std::size_t few = 10;
     if (!found || across.size() < few ||
         fit_board_layout(*found, across).num_counted < across.size() ||
-        fit_board_layout(*found, across).fraction < min_fraction) {
+        fit_board_layout(*found, across).fraction() < min_fraction) {
       return "";
     }
   }
@@ -306,11 +311,12 @@ std::string describe_charuco_problem(const Board& board, const std::vector<Step>
   constexpr int minimum = 4, limit = 60;
   const LayoutFit stated = fit_board_layout(board, steps);
   // Unknown markers may belong to another board next to this one.
-  if (stated.fraction >= min_fraction && 2 * stated.num_counted > steps.size()) {
+  if (stated.fraction() >= min_fraction && 2 * stated.num_counted > steps.size()) {
     // With an odd number of columns, most steps also agree with the wrong color.
     Board opposite = board;
     opposite.top_left_white = !board.top_left_white;
-    const bool is_stated_better = fit_board_layout(opposite, steps).fraction <= stated.fraction;
+    const bool is_stated_better =
+        fit_board_layout(opposite, steps).num_agreeing <= stated.num_agreeing;
     return is_stated_better ? "" : describe_charuco_board(opposite);
   }
   int largest = 0;
@@ -328,16 +334,15 @@ std::string describe_charuco_problem(const Board& board, const std::vector<Step>
       candidate.rows = std::max(minimum, (squares + cols - 1) / cols);
       if (candidate.rows > limit) continue;
       if (cols == board.cols) candidate.rows = std::max(candidate.rows, board.rows);
-      const LayoutFit fit = fit_board_layout(candidate, steps);
-      const double fraction =
-          fit.fraction * static_cast<double>(fit.num_counted) / static_cast<double>(steps.size());
+      const double fraction = static_cast<double>(fit_board_layout(candidate, steps).num_agreeing) /
+                              static_cast<double>(steps.size());
       if (fraction < min_fraction || fraction <= best_fraction) continue;
       best_fraction = fraction;
       best = candidate;
     }
   }
   if (!best) {
-    if (stated.fraction >= min_fraction) return "";
+    if (stated.fraction() >= min_fraction) return "";
     return "the markers in the images do not lie as on a ChArUco board of " +
            std::to_string(board.cols) + " x " + std::to_string(board.rows) + " squares from id " +
            std::to_string(board.first_id) + "; is it another board?";

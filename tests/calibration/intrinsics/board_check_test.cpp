@@ -170,9 +170,9 @@ TEST_P(CheckBoardLayout, SuggestsAnotherBoardWhenTagIdsArePermuted) {
 INSTANTIATE_TEST_SUITE_P(Boards, CheckBoardLayout, testing::Bool(),
                          [](const auto& board) { return board.param ? "Kalibr" : "Plain"; });
 
-/// Frontal view of a board, as by a camera without perspective.
+/// Frontal view of a board by a camera without perspective.
 struct FlatView {
-  double px_per_m = 1000, turn_rad = 0, shift_px = 0;
+  double px_per_m = 1000, rotation_rad = 0, shift_px = 0;
 };
 
 bool is_any_tag(int) { return true; }
@@ -185,8 +185,9 @@ BoardView make_flat_view(const Board& board, const FlatView& view,
     if (!is_shown(place.id)) continue;
     TagDetection tag{place.id, {}};
     for (std::size_t k = 0; k < 4; ++k) {
-      tag.corners_px[k] = Eigen::Vector2d(900, 700) +
-                          view.px_per_m * (Eigen::Rotation2Dd(view.turn_rad) * place.corners_m[k]);
+      tag.corners_px[k] =
+          Eigen::Vector2d(900, 700) +
+          view.px_per_m * (Eigen::Rotation2Dd(view.rotation_rad) * place.corners_m[k]);
     }
     seen.detection.tags.push_back(shrunk(tag, view.shift_px));
   }
@@ -266,7 +267,7 @@ TEST(CheckFlatBoardLayout, CountsRowsUpToLastTagSeen) {
 }
 
 TEST(CheckFlatBoardLayout, NeedsTenStepsBetweenTags) {
-  // Tags of n have n (n - 1) steps to their neighbors.
+  // n neighboring tags have n (n - 1) steps between them.
   const auto first = [](int count) { return [count](int id) { return id < count; }; };
   std::vector<BoardView> views{make_flat_view(small_board(), {}, first(3)),
                                make_flat_view(small_board(), {}, first(2))};
@@ -317,8 +318,8 @@ TEST(CheckFlatBoardLayout, PitchAllowsForStatedShiftOfEdges) {
   EXPECT_NEAR(check_board_layout(small_board(), views, {}, -9).pitch.value(), 28 / 15.0, 1e-9);
 }
 
-/// Tags of several widths separate the spacing from a displacement of the edges of up to 1.5 px.
-TEST(CheckFlatBoardLayout, UnknownShiftOfEdgesIsNoWrongSpacing) {
+/// Tags of several widths separate the spacing from the displacement of the edges.
+TEST(CheckFlatBoardLayout, ReportsNoProblemForEdgesDisplacedByUpTo1Point5Pixels) {
   const auto views_with_shift = [](double shift_px, const std::vector<double>& scales) {
     std::vector<FlatView> views;
     for (const double scale : scales) views.push_back({scale, 0.1 * scale, shift_px});
@@ -331,6 +332,7 @@ TEST(CheckFlatBoardLayout, UnknownShiftOfEdgesIsNoWrongSpacing) {
     EXPECT_EQ(layout_problem(small_board(), views), "") << shift_px;
     Board stated = small_board();
     stated.tag_spacing = 0.6;  // 1.6 / 1.4 = 1.14
+    // Edges moved inwards increase the pitch, as a larger spacing does.
     if (shift_px < 0) EXPECT_NE(layout_problem(stated, views), "") << shift_px;
   }
   for (const double shift_px : {1.6, -1.6}) {
@@ -454,6 +456,20 @@ TEST(CheckCharucoLayout, NamesColorOfFirstSquareForOddNumberOfColumns) {
                                                   (is_white ? "white" : "black"));
     }
   }
+}
+
+/// Only the stated board has marker 17, which is displaced in each view.
+TEST(CheckCharucoLayout, KeepsColorWhenMarkerThatOppositeColorLacksIsDisplaced) {
+  Board white = charuco_board();
+  white.top_left_white = true;
+  auto views = make_flat_views(white, {{1000, 0, 0}, {1500, 0, 0}});
+  for (BoardView& view : views) {
+    ASSERT_EQ(view.detection.tags.size(), 18U);
+    TagDetection& last = view.detection.tags.back();
+    ASSERT_EQ(last.id, 17);
+    for (auto& corner : last.corners_px) corner.x() -= 100;
+  }
+  EXPECT_EQ(layout_problem(white, views), "");
 }
 
 TEST(CheckCharucoLayout, ReportsOtherBoardForMarkersInDisorder) {
