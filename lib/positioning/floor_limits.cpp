@@ -14,7 +14,7 @@ namespace vlp {
 
 namespace {
 
-/// Returns the number of positions from `min_m` to `max_m`, which may exceed every integer.
+/// Returns the number of positions from `min_m` to `max_m`, which may exceed the range of int.
 double count_positions_along(double min_m, double max_m, double step_m) {
   constexpr double tolerance = 1e-9;
   const double places = std::floor((max_m - min_m) / step_m + tolerance) + 1;

@@ -66,7 +66,7 @@ TEST_P(CommonErrorsOfFix, CommonCovarianceMatchesFiniteDifferencesOfFix) {
   rig.calibration.camera.row_time_s = 3e-5;
   rig.calibration.camera.readout = Readout::rows;
   const Adjustment adjustment = *rig.calibration.adjustment;
-  // The robot has other states than its camera.
+  // The mount displaces and rotates the camera relative to the base.
   PositionerOptions options;
   if (known.motion) options.mount = CameraMount{{0.3, -0.2, 0.15}, 0.5};
   const auto detections =

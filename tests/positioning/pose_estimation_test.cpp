@@ -274,6 +274,18 @@ TEST(ComputePosesFromThreeLamps, ContainsTruePoseForRandomScenes) {
   EXPECT_GE(exact, draws - 5);
 }
 
+/// Returns the largest sine of the angle between a lamp's direction from the pose and its ray.
+double compute_max_ray_error(const FreePose& pose, const std::array<Eigen::Vector3d, 3>& lamps_m,
+                             const std::array<Eigen::Vector3d, 3>& rays) {
+  double max_error = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Eigen::Vector3d lamp_in_camera_m =
+        pose.camera_from_world * (lamps_m[i] - pose.position_m);
+    max_error = std::max(max_error, lamp_in_camera_m.normalized().cross(rays[i]).norm());
+  }
+  return max_error;
+}
+
 /// Newton's method refines the distances to rounding.
 TEST(ComputePosesFromThreeLamps, PosesMatchRaysToRounding) {
   Random random(7);
@@ -286,15 +298,8 @@ TEST(ComputePosesFromThreeLamps, PosesMatchRaysToRounding) {
     }
     const ThreeLampPoses found = compute_poses_from_three_lamps(lamps_m, rays);
     for (std::size_t k = 0; k < static_cast<std::size_t>(found.count); ++k) {
-      const FreePose& pose = found.poses[k];
-      double max_error = 0;
-      for (std::size_t m = 0; m < 3; ++m) {
-        const Eigen::Vector3d lamp_in_camera_m =
-            pose.camera_from_world * (lamps_m[m] - pose.position_m);
-        max_error = std::max(max_error, lamp_in_camera_m.normalized().cross(rays[m]).norm());
-      }
       ++num_poses;
-      num_exact += max_error < 1e-13;
+      num_exact += compute_max_ray_error(found.poses[k], lamps_m, rays) < 1e-13;
     }
   }
   EXPECT_GT(num_poses, 1000);
@@ -310,7 +315,8 @@ TEST(ComputePosesFromThreeLamps, ReturnsPosesOfRandomRaysOnlyIfTheyMatch) {
     std::array<Eigen::Vector3d, 3> lamps_m, rays;
     for (std::size_t k = 0; k < 3; ++k) {
       lamps_m[k] = {random.uniform(-2, 2), random.uniform(-2, 2), 2};
-      rays[k] = Eigen::Vector3d(random.uniform(-2, 2), random.uniform(-2, 2), 1).normalized();
+      const double x = random.uniform(-2, 2), y = random.uniform(-2, 2);
+      rays[k] = Eigen::Vector3d(x, y, 1).normalized();
     }
     const ThreeLampPoses found = compute_poses_from_three_lamps(lamps_m, rays);
     num_without_pose += found.count == 0;
@@ -318,14 +324,8 @@ TEST(ComputePosesFromThreeLamps, ReturnsPosesOfRandomRaysOnlyIfTheyMatch) {
       const FreePose& pose = found.poses[k];
       EXPECT_THAT(Eigen::Matrix3d(pose.camera_from_world * pose.camera_from_world.transpose()),
                   IsNear(Eigen::Matrix3d(Eigen::Matrix3d::Identity()), 1e-9));
-      double max_error = 0;
-      for (std::size_t m = 0; m < 3; ++m) {
-        const Eigen::Vector3d lamp_in_camera_m =
-            pose.camera_from_world * (lamps_m[m] - pose.position_m);
-        max_error = std::max(max_error, lamp_in_camera_m.normalized().cross(rays[m]).norm());
-      }
       ++num_poses;
-      num_matches += max_error < 1e-9;
+      num_matches += compute_max_ray_error(pose, lamps_m, rays) < 1e-9;
     }
   }
   EXPECT_GT(num_without_pose, 10);

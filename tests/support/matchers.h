@@ -15,4 +15,12 @@ MATCHER_P2(IsNear, expected, tolerance, "is near the expected matrix") {
   return worst <= tolerance;  // false for NaN
 }
 
+/// Expects entries within `tolerance` times the largest entry of `expected`.
+inline void expect_relatively_near(const Eigen::MatrixXd& found, const Eigen::MatrixXd& expected,
+                                   double tolerance) {
+  EXPECT_THAT(found, IsNear(expected, tolerance * expected.cwiseAbs().maxCoeff()))
+      << found << "\n\n"
+      << expected;
+}
+
 }  // namespace vlp

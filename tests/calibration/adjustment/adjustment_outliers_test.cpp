@@ -119,7 +119,8 @@ TEST_F(RunBundleAdjustmentOutliers, LampsAreNotMovedIfIncreasedNoiseExplainsThem
   }
 }
 
-/// Of five lamps, two can be moved; of four only one.
+/// With two wrong lamps among five, the three others agree with the survey. With two among four,
+/// the survey is contradicted, and no lamp is moved.
 TEST_F(RunBundleAdjustmentOutliers, LampsAreMovedOnlyIfMostAgreeWithSurvey) {
   scale_survey(0.3);
   input.captures_are_checked = true;
@@ -292,7 +293,7 @@ TEST_F(RunBundleAdjustmentOutliers, DetectionIsOutlierBeyondScatterWithoutSigma)
       for (AdjustmentCapture& capture : survey.input.captures) {
         for (Detection& detection : capture.detections) {
           const Eigen::Vector2d error_px =
-              noise_px * Eigen::Vector2d(random.normal(), random.normal());
+              noise_px * Eigen::Vector2d{random.normal(), random.normal()};
           detection.pixel += error_px;
           detection.sigma_px.reset();
           squares_px2.push_back(error_px.squaredNorm());

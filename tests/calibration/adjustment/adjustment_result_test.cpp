@@ -5,13 +5,17 @@
 #include <gmock/gmock.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "calibration/adjustment/adjustment.h"
 #include "calibration/adjustment/adjustment_problem.h"
 #include "calibration/adjustment/adjustment_room.h"
+#include "calibration/adjustment/survey.h"
 #include "camera/lens.h"
 #include "geometry/statistical_bounds.h"
 #include "support/matchers.h"
@@ -231,6 +235,16 @@ TEST_F(RunBundleAdjustmentResult, LensDegreesOfFreedomCountOnlyDeterminedDirecti
     EXPECT_EQ(found.lens_chi_squared > 0, focal_sd_px > 0);
     EXPECT_FALSE(found.lens_is_contradicted);
   }
+  input.calibration.intrinsics_report->covariance = MatrixX::Zero(12, 12);
+  (*input.calibration.intrinsics_report->covariance)(1, 1) = 4;
+  const AdjustmentResult one_error = run_bundle_adjustment(input);
+  ASSERT_TRUE(one_error.has_succeeded()) << one_error.undetermined;
+  EXPECT_EQ(one_error.lens_degrees_of_freedom, 1);
+  // The determined variance of fy is the difference between its variances before and after.
+  const double correction_px = one_error.camera.intrinsics[1] - 522;
+  EXPECT_GT(std::abs(correction_px), 0);
+  const double expected = correction_px * correction_px / (4 - one_error.refined_covariance(1, 1));
+  EXPECT_NEAR(one_error.lens_chi_squared, expected, 1e-9 * expected);
   input.calibration.intrinsics_report.reset();
   const AdjustmentResult exact_lens = run_bundle_adjustment(input);
   ASSERT_TRUE(exact_lens.has_succeeded()) << exact_lens.undetermined;
@@ -415,6 +429,125 @@ TEST(ComputeIntrinsicsCovarianceFromPixelSd, ReturnsVariancesOfEqualImageDisplac
     EXPECT_NEAR(found(i, i) * squares[i] / 0.25, 1, 1e-5) << i;
   }
   EXPECT_TRUE(found.isDiagonal(0));
+}
+
+/// The noise scale changes from 1 if the residuals differ by more than 1 %.
+TEST_F(RunBundleAdjustmentResult, NoiseScaleIsKeptIfResidualsDifferByOnePercentAtMost) {
+  input.captures_are_checked = true;
+  double sigma_px = 0.02;
+  for (const double ratio : {1.009, 1.012}) {
+    for (int iteration = 0; iteration < 6; ++iteration) {
+      AdjustmentProblem problem = make_problem(sigma_px, 0.03);
+      ASSERT_TRUE(problem.solve_adjustment(false));
+      sigma_px *= std::sqrt(sum_squares(problem) /
+                            problem.compute_global_unknowns_covariance().degrees_of_freedom) /
+                  ratio;
+    }
+    make_problem(sigma_px, 0.03);
+    const AdjustmentResult found = run_bundle_adjustment(input);
+    ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
+    ASSERT_EQ(found.rejected_detections, 0);
+    if (ratio < 1.01) EXPECT_EQ(found.noise_scale, 1);
+    if (ratio > 1.01) EXPECT_NEAR(found.noise_scale, ratio, 1e-5);
+    EXPECT_NEAR(found.residual_px / sigma_px, ratio, 1e-4);
+    EXPECT_FALSE(found.noise_is_contradicted);
+  }
+}
+
+TEST_F(RunBundleAdjustmentResult, WeightsInUndistortedImageHaveNoEffectOnGivenSigmas) {
+  make_problem(0.05, 0.03);
+  const AdjustmentResult equal = run_bundle_adjustment(input);
+  input.weighs_in_undistorted_image = true;
+  const AdjustmentResult found = run_bundle_adjustment(input);
+  ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
+  EXPECT_EQ(found.noise_scale, 1);
+  EXPECT_EQ(found.center.zenith_in_camera, equal.center.zenith_in_camera);
+  EXPECT_EQ(found.refined_covariance, equal.refined_covariance);
+  EXPECT_EQ(found.residual_px, equal.residual_px);
+}
+
+TEST_F(RunBundleAdjustmentResult, NoiseOfExactDetectionsInUndistortedImageIsTheSmallest) {
+  Survey survey(0);
+  survey.turn({0, 0, 0}, 4);
+  survey.turn({0.3, 0.1, 0.2}, 4);
+  for (AdjustmentCapture& capture : survey.input.captures) {
+    for (Detection& detection : capture.detections) detection.sigma_px.reset();
+  }
+  survey.input.weighs_in_undistorted_image = true;
+  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
+  EXPECT_EQ(found.rejected_detections, 0);
+  EXPECT_EQ(found.noise_scale, 1e-4);
+  EXPECT_LT(found.residual_px, 1e-8);
+}
+
+/// Two lamps from a known position: four rows for tilt and yaw, and little more for the position.
+/// Variances are divided by one degree of freedom at least.
+TEST_F(RunBundleAdjustmentResult, NoiseOfLessThanOneDegreeOfFreedomIsSumOfSquares) {
+  const Camera camera{"", {800, 600}, LensModel::pinhole, {500, 400, 399.5, 299.5}, {}, {}, {}};
+  const Eigen::Vector3d camera_m(0.1, -0.2, 0.3);
+  const std::vector<Eigen::Vector3d> lamps_m{{-0.5, -0.3, 2.1}, {0.7, 0.2, 2.3}};
+  for (const double error_px : {4.6, 5.4}) {
+    AdjustmentInput two_lamps;
+    two_lamps.calibration.camera = camera;
+    two_lamps.lamps = make_lamp_map(lamps_m);
+    for (Lamp& lamp : two_lamps.lamps.lamps) lamp.sd_m = 0;
+    AdjustmentProblem problem(camera.lens_model, LensParametrization(camera, std::nullopt), 2, 0);
+    const AdjustmentLayout& at = problem.state_vector_layout();
+    problem.add_capture_with_initial_pose({{}, Eigen::Matrix3d::Identity()}, {camera_m, 0.4});
+    problem.is_known_position_used = {true};
+    problem.position_observations = {{0, 0, false, camera_m, 3, 1.5e-2}};
+    AdjustmentCapture capture{"known", {}};
+    capture.known_position =
+        KnownPosition{MeasuredPoint::camera, camera_m.head<2>(), camera_m.z(), 1.5e-2};
+    const Lens lens(camera.lens_model, camera.intrinsics);
+    // The direction from one lamp to the other in the image.
+    const Eigen::Vector2d apart =
+        (rotation_about_z(-0.4) * Eigen::Vector3d(600 / 1.8, 200 / 2.0, 0)).head<2>().normalized();
+    for (std::size_t i = 0; i < 2; ++i) {
+      problem.state_vector().segment<3>(at.lamp_state_index(i)) = lamps_m[i];
+      problem.lamps.push_back({lamps_m[i], 0});
+      AdjustmentProblem::Sighting sighting{0, i, {0, 0}, 2, Eigen::Matrix2d::Identity() / 2, 0};
+      const auto predicted = problem.linearize_lamp_observation(sighting, lens);
+      ASSERT_TRUE(predicted);
+      sighting.pixel = -2 * predicted->value;
+      sighting.pixel += (i == 0 ? -error_px : error_px) * apart;
+      problem.sightings.push_back(sighting);
+      capture.detections.push_back({static_cast<int>(i) + 1, sighting.pixel, 2});
+    }
+    two_lamps.captures = {capture};
+    two_lamps.captures_are_checked = true;
+    double freedom = 0, ratio = 2;
+    for (int iteration = 0; iteration < 20 && std::abs(ratio - 1) > 0.01; ++iteration) {
+      ASSERT_TRUE(problem.solve_adjustment(false));
+      freedom = problem.compute_global_unknowns_covariance().degrees_of_freedom;
+      ratio = std::sqrt(sum_squares(problem));
+      if (std::abs(ratio - 1) > 0.01) problem.noise_scale *= ratio;
+    }
+    ASSERT_GT(problem.noise_scale, 2.8);
+    ASSERT_LT(problem.noise_scale, 3.6);
+    ASSERT_GT(freedom, 0.1);
+    ASSERT_LT(freedom, 0.99);
+    const AdjustmentResult found = run_bundle_adjustment(two_lamps);
+    ASSERT_EQ(found.detections, 2);
+    ASSERT_EQ(found.captures, 1);
+    EXPECT_NEAR(found.noise_scale, problem.noise_scale, 1e-6);
+    EXPECT_NEAR(found.residual_px, 2 * problem.noise_scale * ratio, 1e-6);
+    EXPECT_EQ(found.noise_is_contradicted, problem.noise_scale > 1 + 3 * std::sqrt(0.5));
+    EXPECT_EQ(found.noise_is_contradicted, error_px > 5);
+  }
+}
+
+/// Image of zero width at the principal point: fx displaces no pixel.
+TEST(ComputeIntrinsicsCovarianceFromPixelSd, ReturnsZeroForIntrinsicThatDisplacesNoPixel) {
+  const Camera camera{"", {0, 600}, LensModel::pinhole, {500, 400, -0.5, 299.5}, {}, {}, {}};
+  const MatrixX found = compute_intrinsics_covariance_from_pixel_sd(camera, 3);
+  ASSERT_EQ(found.rows(), 4);
+  EXPECT_EQ(found(0, 0), 0);
+  // (v - cy) / fy has the mean square (600^2 - 37.5^2) / 12 / 400^2; one axis has half of it.
+  EXPECT_NEAR(found(1, 1), 9 * 2 * 12 * 160000 / (360000 - 37.5 * 37.5), 1e-9);
+  EXPECT_NEAR(found(2, 2), 18, 1e-9);
+  EXPECT_NEAR(found(3, 3), 18, 1e-9);
 }
 
 }  // namespace

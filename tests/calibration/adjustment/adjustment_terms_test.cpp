@@ -404,6 +404,52 @@ class AdjustmentProblemTerms : public testing::Test {
     return step.cwiseQuotient(covariance.diagonal().cwiseSqrt());
   }
 
+  /// Compares the covariance of the global unknowns and the degrees of freedom with one dense
+  /// matrix of all unknowns, with the weak priors that the captures' poses have in the
+  /// marginalization.
+  void expect_covariance_of_dense_matrix(Eigen::Index num_used) const {
+    const auto found = problem.compute_global_unknowns_covariance();
+    const ReferenceSystem system = linearize(false);
+    const std::vector<Eigen::Index> estimated = list_estimated();
+    const Eigen::MatrixXd jacobian = system.jacobian(Eigen::all, estimated);
+    Eigen::VectorXd weak = Eigen::VectorXd::Zero(problem.state_vector().size());
+    weak.segment<2>(kZenith).setOnes();
+    weak.segment<2>(kArm).setConstant(0.01);
+    weak.segment<3>(kLamps + 6).setConstant(0.01);
+    weak.segment<3>(kLamps + 12).setConstant(0.01);
+    weak.segment<6>(kPivots).setConstant(0.01);
+    for (const std::size_t k : {0U, 1U, 5U}) weak[kFirstLocal[k]] = kGuessInformation;
+    for (const std::size_t k : {2U, 3U, 6U}) {
+      weak.segment<4>(kFirstLocal[k]).setConstant(kGuessInformation);
+    }
+    Eigen::MatrixXd information = jacobian.transpose() * jacobian;
+    information += Eigen::VectorXd(weak(estimated)).asDiagonal();
+    const Eigen::MatrixXd covariance =
+        information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
+    const auto detections = jacobian.topRows(system.detection_rows);
+    const double freedom = static_cast<double>(system.detection_rows) -
+                           (detections * covariance * detections.transpose()).trace();
+
+    Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(kGlobal, kGlobal);
+    for (std::size_t i = 0; i < estimated.size(); ++i) {
+      for (std::size_t j = 0; j < estimated.size(); ++j) {
+        if (estimated[i] >= kGlobal || estimated[j] >= kGlobal) continue;
+        expected(estimated[i], estimated[j]) =
+            covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+      }
+    }
+    ASSERT_EQ(found.matrix.rows(), kGlobal);
+    for (Eigen::Index i = 0; i < kGlobal; ++i) {
+      for (Eigen::Index j = 0; j < kGlobal; ++j) {
+        EXPECT_NEAR(found.matrix(i, j), expected(i, j),
+                    1e-5 * std::sqrt(expected(i, i) * expected(j, j)))
+            << i << ", " << j;
+      }
+    }
+    EXPECT_EQ(system.detection_rows, 2 * num_used);
+    EXPECT_NEAR(found.degrees_of_freedom, freedom, 1e-4);
+  }
+
   static constexpr Eigen::Index kZenith = 3, kArm = 5, kLamps = 7, kPivots = 22, kGlobal = 28;
   static constexpr std::array<Eigen::Index, 7> kFirstLocal{28, 30, 31, 38, 42, 49, 50};
   Camera camera = synthetic_camera();
@@ -473,49 +519,51 @@ TEST_F(AdjustmentProblemTerms, SolutionFailsForInvalidLens) {
   EXPECT_FALSE(problem.solve_adjustment(false));
 }
 
-/// Covariance of all unknowns of one dense matrix, with the weak priors that the captures' poses
-/// have in the marginalization.
 TEST_F(AdjustmentProblemTerms, CovarianceAndDegreesOfFreedomMatchDenseMatrix) {
-  const auto found = problem.compute_global_unknowns_covariance();
-  const ReferenceSystem system = linearize(false);
-  const std::vector<Eigen::Index> estimated = list_estimated();
-  const Eigen::MatrixXd jacobian = system.jacobian(Eigen::all, estimated);
-  Eigen::VectorXd weak = Eigen::VectorXd::Zero(problem.state_vector().size());
-  weak.segment<2>(kZenith).setOnes();
-  weak.segment<2>(kArm).setConstant(0.01);
-  weak.segment<3>(kLamps + 6).setConstant(0.01);
-  weak.segment<3>(kLamps + 12).setConstant(0.01);
-  weak.segment<6>(kPivots).setConstant(0.01);
-  for (const std::size_t k : {0U, 1U, 5U}) weak[kFirstLocal[k]] = kGuessInformation;
-  for (const std::size_t k : {2U, 3U, 6U}) {
-    weak.segment<4>(kFirstLocal[k]).setConstant(kGuessInformation);
-  }
-  Eigen::MatrixXd information = jacobian.transpose() * jacobian;
-  information += Eigen::VectorXd(weak(estimated)).asDiagonal();
-  const Eigen::MatrixXd covariance =
-      information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
-  const auto detections = jacobian.topRows(system.detection_rows);
-  const double freedom = static_cast<double>(system.detection_rows) -
-                         (detections * covariance * detections.transpose()).trace();
+  expect_covariance_of_dense_matrix(27);
+}
 
-  Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(kGlobal, kGlobal);
-  for (std::size_t i = 0; i < estimated.size(); ++i) {
-    for (std::size_t j = 0; j < estimated.size(); ++j) {
-      if (estimated[i] >= kGlobal || estimated[j] >= kGlobal) continue;
-      expected(estimated[i], estimated[j]) =
-          covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+/// One detection and no known position: only a guess determines the pose. Large noise makes the
+/// guess as accurate as the detections.
+TEST_F(AdjustmentProblemTerms, CovarianceOfCaptureWithOneDetectionMatchesDenseMatrix) {
+  problem.position_observations.erase(problem.position_observations.begin() + 4);
+  Eigen::Index num_used = 0;
+  bool has_detection = false;
+  for (Problem::Sighting& sighting : problem.sightings) {
+    if (sighting.capture == 3) {
+      sighting.used &= !has_detection;
+      has_detection |= sighting.used;
     }
+    if (sighting.used) ++num_used;
   }
-  ASSERT_EQ(found.matrix.rows(), kGlobal);
-  for (Eigen::Index i = 0; i < kGlobal; ++i) {
-    for (Eigen::Index j = 0; j < kGlobal; ++j) {
-      EXPECT_NEAR(found.matrix(i, j), expected(i, j),
-                  1e-5 * std::sqrt(expected(i, i) * expected(j, j)))
-          << i << ", " << j;
-    }
-  }
-  EXPECT_EQ(system.detection_rows, 2 * 27);
-  EXPECT_NEAR(found.degrees_of_freedom, freedom, 1e-4);
+  ASSERT_LT(num_used, 25);
+  expect_covariance_of_dense_matrix(num_used);
+  problem.noise_scale = 5e3;
+  expect_covariance_of_dense_matrix(num_used);
+}
+
+TEST(AdjustmentProblem, LensWithOneErrorHasPriorAndDerivative) {
+  const Camera camera = synthetic_camera();
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(12, 12);
+  covariance(0, 0) = 4;
+  Problem problem(camera.lens_model, LensParametrization(camera, covariance), 1, 0);
+  ASSERT_EQ(problem.state_vector_layout().lens_size, 1);
+  const double fx_sd_px = problem.lens_parametrization().directions(0, 0);
+  EXPECT_NEAR(std::abs(fx_sd_px), 2, 1e-12);
+  problem.lamps = {{{0.4, 0.3, 1.6}, 0}};
+  problem.state_vector().segment<3>(problem.state_vector_layout().lamps) << 0.4, 0.3, 1.6;
+  EXPECT_NEAR(problem.compute_global_unknowns_covariance().matrix(0, 0), 1, 1e-12);
+
+  problem.add_capture_with_initial_pose({{}, Eigen::Matrix3d::Identity()}, {{0, 0, 0}, 0});
+  const Problem::Sighting sighting{0, 0, {0, 0}, 1, Eigen::Matrix2d::Identity(), 0};
+  const auto found = problem.linearize_lamp_observation(sighting, problem.current_lens().value());
+  ASSERT_TRUE(found);
+  ASSERT_EQ(found->blocks.size(), 4U);
+  EXPECT_EQ(found->blocks[3].first, 0);
+  // The pixel is fx times the distorted x, plus cx.
+  const double distorted_x = (-found->value.x() - camera.intrinsics[2]) / camera.intrinsics[0];
+  EXPECT_THAT(found->blocks[3].jacobian,
+              IsNear(Eigen::MatrixXd(Eigen::Vector2d(-fx_sd_px * distorted_x, 0)), 1e-12));
 }
 
 }  // namespace

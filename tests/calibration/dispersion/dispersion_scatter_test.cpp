@@ -110,7 +110,7 @@ TEST_P(EstimateDispersionOffsetWithFewCaptures, ChenGuanMethodIntervalCoversOffs
     for (auto& capture : captures) {
       capture.detections = with_noise(capture.detections, random);
       capture.reference_point_m +=
-          few.placement_sd_m * Eigen::Vector2d(random.normal(), random.normal());
+          few.placement_sd_m * Eigen::Vector2d{random.normal(), random.normal()};
       for (auto& detection : capture.detections) {
         if (!few.noise_is_stated) detection.sigma_px.reset();
       }

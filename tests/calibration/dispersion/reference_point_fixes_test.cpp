@@ -31,14 +31,15 @@ OptionalFixes make_fixes_at_yaws(const std::vector<double>& yaws_rad) {
 
 /// Ratio of the squared 97.5 % bounds of Student's t (Wallace's approximation) and of the normal
 /// distribution.
-double compute_expected_student_ratio(double m) {
-  const double z_squared = std::pow(1.96 * (1 + 2 / (8 * m + 1)), 2);
-  return m * (std::exp(z_squared / m) - 1) / (1.96 * 1.96);
+double compute_expected_student_ratio(double freedom) {
+  const double z_squared = std::pow(1.96 * (1 + 2 / (8 * freedom + 1)), 2);
+  return freedom * (std::exp(z_squared / freedom) - 1) / (1.96 * 1.96);
 }
 
-/// Bound of chi-squared per degree of freedom (Wilson and Hilferty).
-double compute_expected_chi_squared_ratio(double sigmas, double m) {
-  const double variance = 2 / (9 * m);
+/// Bound of chi-squared per degree of freedom (Wilson and Hilferty), at `sigmas` standard
+/// deviations of the normal distribution.
+double compute_expected_chi_squared_ratio(double sigmas, double freedom) {
+  const double variance = 2 / (9 * freedom);
   return std::pow(1 - variance + sigmas * std::sqrt(variance), 3);
 }
 
@@ -71,8 +72,8 @@ TEST(ComputeSmallSampleVarianceFactor, CombinesStatedNoiseAndResidualsThatAgree)
   }
 }
 
-/// The factor moves from that of the stated noise to that of the residuals between the bounds of
-/// chi-squared that 20 % and 5 % exceed.
+/// The factor changes from that of the stated noise to that of the residuals between the 80 % and
+/// the 95 % quantile of chi-squared (0.8416 and 1.6449 standard deviations).
 TEST(ComputeSmallSampleVarianceFactor, FollowsResidualsThatContradictStatedNoise) {
   for (const double freedom : {4., 10.}) {
     const double first = compute_expected_chi_squared_ratio(0.8416, freedom),
@@ -105,7 +106,7 @@ TEST(ComputeSmallSampleVarianceFactor, PooledRatioDeterminesContradiction) {
   EXPECT_EQ(compute_small_sample_variance_factor(0.1, freedom, true, 30), 1);
 }
 
-TEST(MeanFix, YawVariationIsSineOfSpreadAndZeroForUnitHeading) {
+TEST(MeanFix, YawVariationIsRootOfOneMinusSquaredHeading) {
   MeanFix mean;
   mean.heading = {0.36, 0.48};
   EXPECT_NEAR(mean.compute_capture_yaw_variation(), 0.8, 1e-12);
@@ -116,9 +117,9 @@ TEST(MeanFix, YawVariationIsSineOfSpreadAndZeroForUnitHeading) {
 TEST(MeanFix, YawsAreSimilarWithinTenDegreesOfMean) {
   for (const double middle_rad : {0.0, 2.0}) {
     const auto are_similar = [&](double deg) {
-      const double spread_rad = rad_from_deg(deg);
+      const double deviation_rad = rad_from_deg(deg);
       return compute_mean_fix(
-                 make_fixes_at_yaws({middle_rad - spread_rad, middle_rad + spread_rad}),
+                 make_fixes_at_yaws({middle_rad - deviation_rad, middle_rad + deviation_rad}),
                  {true, true})
           .are_capture_yaws_similar();
     };
@@ -170,9 +171,10 @@ TEST(AreAllFixesFarFromReferencePoint, ComparesErrorsWithFifthOfHeight) {
   EXPECT_FALSE(are_all_fixes_far_from_reference_point({at(3), at(0.39), at(0.41)}));
 }
 
-/// Nine fixes about (1, -2), the last at distance x. The upper median of the squared distances is
-/// 1. The bound for nine fixes, 16 degrees of freedom and five standard deviations follows from
-/// the F distribution.
+/// Nine fixes around (1, -2). The median of the squared distances is 1, that of a normal
+/// distribution in two dimensions is 2 ln 2 variances. The bound for 16 degrees of freedom and five
+/// standard deviations is a quantile of the F distribution, as the median has the efficiency
+/// (ln 2)^2.
 TEST(FlagFixesNearMedian, RejectsFixBeyondFiveStandardDeviationsOfMedian) {
   const auto flags = [](const Eigen::Vector2d& displacement_m) {
     OptionalFixes fixes;
@@ -228,6 +230,7 @@ struct UnevenStation {
   Station station{0};
 };
 
+/// Station::captures() has the yaws 6.28 i / 6, and every second capture is 0.3 m higher.
 TEST(ReferencePointFixes, ReturnsErrorYawAndHeightOfEachFix) {
   UnevenStation setup;
   Station& station = setup.station;
@@ -244,6 +247,7 @@ TEST(ReferencePointFixes, ReturnsErrorYawAndHeightOfEachFix) {
     ASSERT_TRUE(found[i]);
     EXPECT_THAT(found[i]->error_m, IsNear(Eigen::Vector2d(0.004, -0.003), 1e-9));
     EXPECT_NEAR(wrap_angle_rad(found[i]->yaw_rad - 6.28 * static_cast<double>(i) / 6), 0, 1e-9);
+    // Mean height of two or eight lamps.
     const double lamps_z_m = i == 1 ? 1.6 + 0.03 / 2 : 1.6 + 0.03 * 3.5;
     EXPECT_NEAR(found[i]->height_m, lamps_z_m - (i % 2 == 1 ? 0.3 : 0), 1e-9);
     EXPECT_EQ(found[i]->degrees_of_freedom, i == 1 ? 0 : 12);

@@ -181,6 +181,7 @@ IntrinsicsInput make_stereographic_views(double focal_px, int count) {
 }
 
 TEST(RankInitialFocalLengths, BeginsWithTrueFocalLengthOfSeries) {
+  // The width of the image times powers of sqrt(2).
   std::vector<double> series;
   for (int k = -5; k <= 6; ++k) series.push_back(800 * std::pow(std::sqrt(2.0), k));
   for (const double focal_px : {200.0, 400.0, 800 / std::sqrt(2.0)}) {
@@ -192,8 +193,8 @@ TEST(RankInitialFocalLengths, BeginsWithTrueFocalLengthOfSeries) {
   }
 }
 
-/// Views without corners have no pose. Most views of the second input have none, so that all focal
-/// lengths are equal and ascending.
+/// Views without corners have no pose. Every second of 24 views is used: all have a pose in `even`,
+/// none in `odd`. Without poses all focal lengths rank equal, and are ascending.
 TEST(RankInitialFocalLengths, UsesTwelveEvenlySpacedViews) {
   const IntrinsicsInput twelve = make_stereographic_views(400, 12);
   const std::vector<double> ranked = rank_initial_focal_lengths(twelve);
@@ -213,8 +214,8 @@ TEST(RankInitialFocalLengths, UsesTwelveEvenlySpacedViews) {
   EXPECT_EQ(rank_initial_focal_lengths(odd), ascending);
 }
 
-/// Six of the first 12 views have no pose, so that the upper median of these is infinite. The 13th
-/// view would make it finite.
+/// Six of the first 12 views have no pose, so that their upper median of the residuals is infinite.
+/// The 13th view would make it finite.
 TEST(RankInitialFocalLengths, OmitsLastOfThirteenViews) {
   IntrinsicsInput input = make_stereographic_views(400, 13);
   const std::vector<double> all = rank_initial_focal_lengths(input);

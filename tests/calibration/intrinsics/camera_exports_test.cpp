@@ -59,8 +59,8 @@ TEST(CameraExports, FormatFunctionsThrowForUnsupportedLensModel) {
   EXPECT_THROW(format_opencv_camera(round), std::invalid_argument);
 }
 
-const Camera kPlain = camera_with(LensModel::pinhole, {510.5, 501, 400, 300.25});
-const Camera kRound = camera_with(LensModel::fisheye, {500, 501, 400, 300, 0.1, -0.2, 0.3, 0.04});
+const Camera kExportedPinhole = camera_with(LensModel::pinhole, {510.5, 501, 400, 300.25});
+const Camera kFisheye = camera_with(LensModel::fisheye, {500, 501, 400, 300, 0.1, -0.2, 0.3, 0.04});
 
 /// Returns the message of an exception for a camera; "" without one.
 template <typename Format>
@@ -74,7 +74,7 @@ std::string message_for(const Format& format, const Camera& camera) {
 }
 
 TEST(FormatRosCameraInfo, WritesAllFieldsForPinhole) {
-  EXPECT_EQ(format_ros_camera_info(kPlain),
+  EXPECT_EQ(format_ros_camera_info(kExportedPinhole),
             "image_width: 800\n"
             "image_height: 600\n"
             "camera_name: '007'\n"
@@ -107,7 +107,7 @@ TEST(FormatRosCameraInfo, WritesNumberOfCoefficientsOfEachModel) {
       camera_with(LensModel::opencv5, {500, 501, 400, 300, 0.1, -0.2, 0.003, 0.004, 0.05});
   for (const auto& [camera, distortion, count] :
        {Expected{kFour, "plumb_bob", 5}, Expected{five, "plumb_bob", 5},
-        Expected{kEight, "rational_polynomial", 8}, Expected{kRound, "equidistant", 4}}) {
+        Expected{kEight, "rational_polynomial", 8}, Expected{kFisheye, "equidistant", 4}}) {
     const YAML::Node info = YAML::Load(format_ros_camera_info(camera));
     EXPECT_EQ(info["distortion_model"].as<std::string>(), distortion);
     const YAML::Node coefficients = info["distortion_coefficients"];
@@ -121,9 +121,9 @@ TEST(FormatRosCameraInfo, WritesNumberOfCoefficientsOfEachModel) {
   }
 }
 
-TEST(FormatRosCameraInfo, QuotesNameAndThrowsForNamesThatYamlLacks) {
+TEST(FormatRosCameraInfo, QuotesNameAndThrowsForControlCharactersAndInvalidUtf8) {
   const auto info_with_name = [](const std::string& name) {
-    Camera camera = kPlain;
+    Camera camera = kExportedPinhole;
     camera.id = name;
     return format_ros_camera_info(camera);
   };
@@ -133,7 +133,7 @@ TEST(FormatRosCameraInfo, QuotesNameAndThrowsForNamesThatYamlLacks) {
   for (const char* const name : {"a\nb", "\x1f", "a\x7f", "\xc3", "ab\xff"}) {
     EXPECT_THROW(info_with_name(name), std::invalid_argument);
   }
-  Camera line_feed = kPlain;
+  Camera line_feed = kExportedPinhole;
   line_feed.id = "\n";
   EXPECT_EQ(message_for(format_ros_camera_info, line_feed),
             "the camera id contains control characters or is not UTF-8; give another one with "
@@ -141,7 +141,7 @@ TEST(FormatRosCameraInfo, QuotesNameAndThrowsForNamesThatYamlLacks) {
 }
 
 TEST(FormatKalibrCamchain, WritesAllFields) {
-  EXPECT_EQ(format_kalibr_camchain(kRound),
+  EXPECT_EQ(format_kalibr_camchain(kFisheye),
             "cam0:\n"
             "  camera_model: pinhole\n"
             "  intrinsics: [500, 501, 400, 300]\n"
@@ -149,7 +149,7 @@ TEST(FormatKalibrCamchain, WritesAllFields) {
             "  distortion_coeffs: [0.1, -0.2, 0.3, 0.04]\n"
             "  resolution: [800, 600]\n"
             "  rostopic: /cam0/image_raw\n");
-  const YAML::Node plain = YAML::Load(format_kalibr_camchain(kPlain))["cam0"];
+  const YAML::Node plain = YAML::Load(format_kalibr_camchain(kExportedPinhole))["cam0"];
   EXPECT_EQ(plain["distortion_model"].as<std::string>(), "radtan");
   EXPECT_EQ(plain["distortion_coeffs"].as<std::vector<double>>(), std::vector<double>(4, 0));
   const YAML::Node four = YAML::Load(format_kalibr_camchain(kFour))["cam0"];
@@ -159,7 +159,7 @@ TEST(FormatKalibrCamchain, WritesAllFields) {
 }
 
 TEST(FormatOpencvCamera, WritesAllFieldsForFisheye) {
-  EXPECT_EQ(format_opencv_camera(kRound),
+  EXPECT_EQ(format_opencv_camera(kFisheye),
             "%YAML:1.0\n"
             "---\n"
             "image_width: 800\n"
@@ -178,7 +178,7 @@ TEST(FormatOpencvCamera, WritesAllFieldsForFisheye) {
 }
 
 TEST(FormatOpencvCamera, WritesFourZerosForPinholeAndTwelveCoefficientsOfOpencv12) {
-  const std::string plain = format_opencv_camera(kPlain);
+  const std::string plain = format_opencv_camera(kExportedPinhole);
   EXPECT_EQ(plain.find("distortion_model"), std::string::npos);
   EXPECT_NE(plain.find("cols: 4\n   dt: d\n   data: [0, 0, 0, 0]\n"), std::string::npos);
   const std::string twelve = format_opencv_camera(camera_with(
@@ -189,7 +189,7 @@ TEST(FormatOpencvCamera, WritesFourZerosForPinholeAndTwelveCoefficientsOfOpencv1
 
 TEST(FormatMrcalCameramodel, WritesAllFieldsAndClosedRegion) {
   const ImageRegion region{{1, 2}, {700.5, 3}, {400, 500}};
-  EXPECT_EQ(format_mrcal_cameramodel(kPlain, region),
+  EXPECT_EQ(format_mrcal_cameramodel(kExportedPinhole, region),
             "{\n"
             "    'lensmodel':  'LENSMODEL_PINHOLE',\n"
             "    'intrinsics': [510.5, 501, 400, 300.25],\n"
@@ -198,7 +198,7 @@ TEST(FormatMrcalCameramodel, WritesAllFieldsAndClosedRegion) {
             "    'imagersize': [ 800, 600 ]\n"
             "}\n");
   EXPECT_EQ(format_mrcal_valid_region({}), "");
-  EXPECT_EQ(format_mrcal_cameramodel(kPlain),
+  EXPECT_EQ(format_mrcal_cameramodel(kExportedPinhole),
             "{\n"
             "    'lensmodel':  'LENSMODEL_PINHOLE',\n"
             "    'intrinsics': [510.5, 501, 400, 300.25],\n"
@@ -208,18 +208,18 @@ TEST(FormatMrcalCameramodel, WritesAllFieldsAndClosedRegion) {
 }
 
 TEST(CameraExports, MessagesNameFormatLensAndRemedy) {
-  const Camera round = camera_with(LensModel::stereographic, {500, 501, 400, 300});
-  EXPECT_EQ(message_for(format_ros_camera_info, round),
+  const Camera stereographic = camera_with(LensModel::stereographic, {500, 501, 400, 300});
+  EXPECT_EQ(message_for(format_ros_camera_info, stereographic),
             "ROS has no lens model like LENSMODEL_STEREOGRAPHIC; use --lens LENSMODEL_OPENCV8 or "
             "OPENCV_FISHEYE");
-  EXPECT_EQ(message_for(format_kalibr_camchain, round),
+  EXPECT_EQ(message_for(format_kalibr_camchain, stereographic),
             "Kalibr has no lens model like LENSMODEL_STEREOGRAPHIC; use --lens LENSMODEL_OPENCV4 "
             "or OPENCV_FISHEYE");
-  EXPECT_EQ(message_for(format_opencv_camera, round),
+  EXPECT_EQ(message_for(format_opencv_camera, stereographic),
             "OpenCV has no lens model like LENSMODEL_STEREOGRAPHIC; use --lens LENSMODEL_OPENCV8 "
             "or OPENCV_FISHEYE");
   EXPECT_EQ(
-      message_for([](const Camera& camera) { return format_mrcal_cameramodel(camera); }, kRound),
+      message_for([](const Camera& camera) { return format_mrcal_cameramodel(camera); }, kFisheye),
       "mrcal has no lens model like OPENCV_FISHEYE; use --lens LENSMODEL_OPENCV8");
 }
 

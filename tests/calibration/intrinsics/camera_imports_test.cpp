@@ -99,18 +99,19 @@ TEST(ConvertCameraToLensModel, ThrowsRecommendingFittingGridWhenGridIsTooCoarse)
   const auto expect_other = [](const Camera& camera, const SplineGrid& grid) {
     const std::string words = "the control points of " + splined_lens_model_name(grid) +
                               " do not cover the field of view, ";
-    std::string said;
+    std::string message;
     try {
       convert_camera_to_lens_model(camera, lens_model_for_spline_grid(grid));
     } catch (const std::invalid_argument& error) {
-      said = error.what();
+      message = error.what();
     }
-    ASSERT_THAT(said, testing::StartsWith(words)) << camera.intrinsics[2];
-    const auto model = lens_model_from_name(said.substr(said.find("LENSMODEL", words.size())));
-    ASSERT_TRUE(model) << said;
+    ASSERT_THAT(message, testing::StartsWith(words)) << camera.intrinsics[2];
+    const auto model =
+        lens_model_from_name(message.substr(message.find("LENSMODEL", words.size())));
+    ASSERT_TRUE(model) << message;
     const FittedCamera fitted = convert_camera_to_lens_model(camera, *model);
-    EXPECT_LT(fitted.worst_px, 0.01) << said;
-    EXPECT_EQ(fitted.common_fraction, 1) << said;
+    EXPECT_LT(fitted.worst_px, 0.01) << message;
+    EXPECT_EQ(fitted.common_fraction, 1) << message;
   };
   for (const double center_px : {399.5, 380.0, 250.0}) {
     const Camera narrow{
@@ -260,7 +261,7 @@ TEST_F(ReadCameraOfAnyFormat, ReadsOpenOrClosedRegionOfThreePixelsOrMore) {
                                 "region; leave the key out if it is valid in the whole image"));
 }
 
-/// Comments end with their line, also within a string that has an escaped quote before.
+/// Neither a number sign in a string nor an escaped backslash before a quote changes the entries.
 TEST_F(ReadCameraOfAnyFormat, CommentEndsWithLineAndQuotesEndWithUnescapedQuote) {
   comes_back(kPinhole,
              "{ 'a': \"it's #1\", 'b': '\\\\', # 'c\n"
@@ -407,6 +408,9 @@ TEST_F(ReadCameraOfAnyFormat, ReadsCameraAndRegionOfCalibration) {
   }
 }
 
+/// Grid of pixels at which convert_camera_to_lens_model() compares both lenses.
+constexpr int kPointsPerRow = 201;
+
 TEST(ConvertCameraToLensModel, ReturnsSameCameraForItsOwnModel) {
   const FittedCamera same =
       convert_camera_to_lens_model(make_camera(LensModel::opencv5), LensModel::opencv5);
@@ -431,7 +435,8 @@ TEST(ConvertCameraToLensModel, FindsParametersOfModelThatIncludesSourceModel) {
 
 /// Sum of the squared distances between the pixels of a grid and those to which a lens projects
 /// their rays; infinite if it does not project one.
-double sum_of_squares(const Lens& from, const Lens& to, const std::array<int, 2>& imager_px) {
+double compute_sum_of_squares(const Lens& from, const Lens& to,
+                              const std::array<int, 2>& imager_px) {
   double sum = 0;
   for (const auto& pixel : make_regular_pixel_grid(imager_px)) {
     const auto found = to.project_point(from.unproject_pixel(pixel).value().direction);
@@ -448,16 +453,17 @@ TEST(ConvertCameraToLensModel, MinimizesSquaresAndReportsLargestDistance) {
     EXPECT_EQ(fitted.common_fraction, 1);
     const auto& parameters = fitted.camera.intrinsics;
     ASSERT_EQ(parameters.size(), num_lens_parameters(model));
-    const double least = sum_of_squares(from, Lens(model, parameters), camera.imager_px);
+    const double minimum = compute_sum_of_squares(from, Lens(model, parameters), camera.imager_px);
     for (std::size_t k = 0; k < parameters.size(); ++k) {
       for (const double step : {-1.0, 1.0}) {
         auto changed = parameters;
         changed[k] += step * (k < 4 ? 0.01 : 1e-4);
-        EXPECT_GT(sum_of_squares(from, Lens(model, changed), camera.imager_px), least) << k;
+        EXPECT_GT(compute_sum_of_squares(from, Lens(model, changed), camera.imager_px), minimum)
+            << k;
       }
     }
     double worst = 0;
-    for (const auto& pixel : make_regular_pixel_grid(camera.imager_px, 201)) {
+    for (const auto& pixel : make_regular_pixel_grid(camera.imager_px, kPointsPerRow)) {
       const auto ray = from.unproject_pixel(pixel);
       ASSERT_TRUE(ray);
       const auto found = Lens(model, parameters).project_point(ray->direction);
@@ -475,7 +481,7 @@ TEST(ConvertCameraToLensModel, CommonFractionIsThatOfPixelsWithRaysOfBothLenses)
                     {},       {}};
   const FittedCamera fitted = convert_camera_to_lens_model(wide, LensModel::pinhole);
   double inside = 0, all = 0;
-  for (const auto& pixel : make_regular_pixel_grid({801, 601}, 201)) {
+  for (const auto& pixel : make_regular_pixel_grid({801, 601}, kPointsPerRow)) {
     all += 1;
     if ((pixel - Eigen::Vector2d(400, 300)).norm() < 157.0796) inside += 1;
   }
@@ -487,13 +493,13 @@ TEST(ConvertCameraToLensModel, ThrowsIfNoRayIsInFrontOfPinhole) {
   const Camera behind{
       "camera", {300, 200}, LensModel::fisheye, {100, 100, -170, 100, 0, 0, 0, 0}, {}, {}, {}};
   ASSERT_TRUE(Lens(behind.lens_model, behind.intrinsics).unproject_pixel({0, 100}));
-  std::string said;
+  std::string message;
   try {
     convert_camera_to_lens_model(behind, LensModel::pinhole);
   } catch (const std::invalid_argument& error) {
-    said = error.what();
+    message = error.what();
   }
-  EXPECT_EQ(said, "LENSMODEL_PINHOLE has no lens near OPENCV_FISHEYE");
+  EXPECT_EQ(message, "LENSMODEL_PINHOLE has no lens near OPENCV_FISHEYE");
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ std::vector<CornerError> simulate_errors(const CornerVariance& truth, Random& ra
     const double sd_px = 0.01 * std::pow(10, random.uniform(0, 1));
     const double unweighted_rms_px = std::sqrt(truth.corner_variance_px2(sd_px));
     const Eigen::Vector2d residual =
-        unweighted_rms_px * Eigen::Vector2d(random.normal(), random.normal());
+        unweighted_rms_px * Eigen::Vector2d{random.normal(), random.normal()};
     errors.push_back({residual.squaredNorm() / 2, sd_px});
   }
   return errors;
@@ -164,7 +164,7 @@ IntrinsicsInput uneven_input(const SyntheticViews& views, Random& random) {
       const double off = (corner.pixel - Eigen::Vector2d(400, 300)).norm() / 500;
       corner.d_pixel_d_edge_shift.setZero();
       corner.sd_px = 0.01 * std::exp(3 * off);
-      corner.pixel += corner.sd_px * Eigen::Vector2d(random.normal(), random.normal());
+      corner.pixel += corner.sd_px * Eigen::Vector2d{random.normal(), random.normal()};
     }
   }
   return input;
@@ -224,7 +224,7 @@ TEST(CornerWeights, SolvedLensHardlyChangesByErroneousCornersWithoutSd) {
   for (auto& view : input.views) {
     for (std::size_t i = 0; i < view.size(); i += 25, ++unknown) {
       view[i].sd_px = 0;
-      view[i].pixel += 0.5 * Eigen::Vector2d(random.normal(), random.normal());
+      view[i].pixel += 0.5 * Eigen::Vector2d{random.normal(), random.normal()};
     }
   }
   const IntrinsicsSolution with = solve_intrinsics(input);

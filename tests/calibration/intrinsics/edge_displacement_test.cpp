@@ -147,11 +147,11 @@ TEST(CorrectCornersForEdgeDisplacement, MovesCornersOutwardsAndReturnsMean) {
   EXPECT_EQ(correct_corners_for_edge_displacement(corners, shift), 0);
 }
 
-/// Coefficients of the shift of a view by least squares with difference quotients of the pose.
-/// `prior_weights` and `prior`: weights and values of the coefficients.
-EdgeDisplacement expected_displacement(const std::vector<BoardLattice::Corner>& corners,
-                                       const Lens& lens, const Eigen::Vector4d& prior,
-                                       const Eigen::Vector4d& prior_weights) {
+/// Computes the edge displacement of a view by least squares with difference quotients of the pose.
+/// `prior` and `prior_weights`: values of the coefficients and their weights.
+EdgeDisplacement compute_expected_displacement(const std::vector<BoardLattice::Corner>& corners,
+                                               const Lens& lens, const Eigen::Vector4d& prior,
+                                               const Eigen::Vector4d& prior_weights) {
   EdgeDisplacement shift;
   const auto count = std::ssize(corners);
   for (const auto& corner : corners) shift.middle += corner.pixel / static_cast<double>(count);
@@ -165,7 +165,7 @@ EdgeDisplacement expected_displacement(const std::vector<BoardLattice::Corner>& 
   Eigen::VectorXd residuals(2 * count + 4);
   for (Eigen::Index i = 0; i < count; ++i) {
     const auto& corner = corners[static_cast<std::size_t>(i)];
-    const auto pixel_of = [&](int unknown, double step) {
+    const auto project_corner = [&](int unknown, double step) {
       const Eigen::Vector3d unit = Eigen::Vector3d::Unit(unknown % 3);
       const Eigen::Matrix3d turn = unknown < 3 ? Eigen::AngleAxisd(step, unit).toRotationMatrix()
                                                : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
@@ -176,12 +176,13 @@ EdgeDisplacement expected_displacement(const std::vector<BoardLattice::Corner>& 
     for (int unknown = 0; unknown < 6; ++unknown) {
       constexpr double step = 1e-6;
       rows.block<2, 1>(2 * i, unknown) =
-          corner.weight * (pixel_of(unknown, step) - pixel_of(unknown, -step)) / (2 * step);
+          corner.weight * (project_corner(unknown, step) - project_corner(unknown, -step)) /
+          (2 * step);
     }
     const Eigen::Vector2d x = (corner.pixel - shift.middle) / shift.radius_px;
     rows.block<2, 4>(2 * i, 6) = corner.weight * corner.d_pixel_d_edge_shift *
                                  Eigen::RowVector4d(1, x.x(), x.y(), x.squaredNorm());
-    residuals.segment<2>(2 * i) = corner.weight * (corner.pixel - pixel_of(0, 0));
+    residuals.segment<2>(2 * i) = corner.weight * (corner.pixel - project_corner(0, 0));
   }
   for (Eigen::Index k = 0; k < 4; ++k) {
     rows(2 * count + k, 6 + k) = std::sqrt(prior_weights[k]);
@@ -212,19 +213,19 @@ TEST(EstimateTagEdgeDisplacements, MatchesLeastSquaresWithPriors) {
   const auto views = make_displaced_views(4);
   for (const auto form : {DisplacementForm::varying, DisplacementForm::constant}) {
     const double uneven = form == DisplacementForm::constant ? 1e9 : 0.25;
-    std::vector<double> alone;
+    std::vector<double> separate_px;
     for (const auto& view : views) {
-      alone.push_back(
-          expected_displacement(view, lens, Eigen::Vector4d::Zero(), {1e-6, uneven, uneven, uneven})
-              .coefficients[0]);
+      separate_px.push_back(compute_expected_displacement(view, lens, Eigen::Vector4d::Zero(),
+                                                          {1e-6, uneven, uneven, uneven})
+                                .coefficients[0]);
     }
-    std::sort(alone.begin(), alone.end());
-    ASSERT_GT(alone[2] - alone[1], 0.05);
+    std::sort(separate_px.begin(), separate_px.end());
+    ASSERT_GT(separate_px[2] - separate_px[1], 0.05);
     const auto shifts = estimate_tag_edge_displacements(views, lens, form);
     ASSERT_EQ(shifts.size(), 4U);
     for (std::size_t i = 0; i < 4; ++i) {
-      const EdgeDisplacement expected = expected_displacement(views[i], lens, {alone[2], 0, 0, 0},
-                                                              {0.25, uneven, uneven, uneven});
+      const EdgeDisplacement expected = compute_expected_displacement(
+          views[i], lens, {separate_px[2], 0, 0, 0}, {0.25, uneven, uneven, uneven});
       EXPECT_LT((shifts[i].coefficients - expected.coefficients).norm(), 1e-5)
           << shifts[i].coefficients.transpose() << "; " << expected.coefficients.transpose();
       EXPECT_LT((shifts[i].middle - expected.middle).norm(), 1e-9);
@@ -249,16 +250,16 @@ TEST(EstimateTagEdgeDisplacements, ViewsOfFewerThanTwelveCornersGetMedian) {
   for (auto& corner : views[6]) corner.d_pixel_d_edge_shift.setZero();
   const auto shifts = estimate_tag_edge_displacements(views, lens);
   ASSERT_EQ(shifts.size(), 7U);
-  std::vector<double> alone;
+  std::vector<double> separate_px;
   for (std::size_t i = 0; i < 3; ++i) {
-    alone.push_back(
-        expected_displacement(views[i], lens, Eigen::Vector4d::Zero(), {1e-6, 0.25, 0.25, 0.25})
-            .coefficients[0]);
+    separate_px.push_back(compute_expected_displacement(views[i], lens, Eigen::Vector4d::Zero(),
+                                                        {1e-6, 0.25, 0.25, 0.25})
+                              .coefficients[0]);
   }
-  std::sort(alone.begin(), alone.end());
+  std::sort(separate_px.begin(), separate_px.end());
   EXPECT_GT(shifts[1].radius_px, 1) << "12 corners are enough";
   for (const std::size_t i : {3U, 5U}) {
-    EXPECT_NEAR(shifts[i].coefficients[0], alone[1], 1e-5);
+    EXPECT_NEAR(shifts[i].coefficients[0], separate_px[1], 1e-5);
     EXPECT_EQ(shifts[i].coefficients.tail<3>(), Eigen::Vector3d(0, 0, 0));
     EXPECT_EQ(shifts[i].middle, Eigen::Vector2d(0, 0));
   }

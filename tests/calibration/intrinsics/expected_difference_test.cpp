@@ -28,7 +28,7 @@ Scatter scatter(double bent_m) {
     SyntheticViews views{synthetic_board(seed % 2 == 1), synthetic_lens()};
     IntrinsicsInput input = views.input(0, random, 0);
     while (input.views.size() < 25) {
-      views.warp_m = bent_m * Eigen::Vector2d(random.normal(), random.normal());
+      views.warp_m = bent_m * Eigen::Vector2d{random.normal(), random.normal()};
       input.views.push_back(views.input(1, random, kNoise).views[0]);
     }
     const IntrinsicsSolution solution = solve_intrinsics(input);

@@ -278,7 +278,7 @@ TEST(EstimateLens, StatesThatViewsAreParallel) {
                                                   "board at the same angle"));
 }
 
-TEST(EstimateLens, CovarianceIsThatOfTagsWithBiasOfRegularization) {
+TEST(EstimateLens, CovarianceIsThatByTagsPlusBiasOfRegularization) {
   LensViews input = make_views(7);
   const LensEstimate result = estimate_lens(input);
   ASSERT_TRUE(result.has_succeeded()) << result.problem;
@@ -300,7 +300,7 @@ TEST(EstimateLens, CovarianceIsThatOfTagsWithBiasOfRegularization) {
   EXPECT_FALSE(result.solution.other_model_fits);
 }
 
-TEST(EstimateLens, CombinesUncertaintyWithThatOfPrintByRootOfSquares) {
+TEST(EstimateLens, AddsVarianceOfPrintErrorToUncertainty) {
   LensViews input = make_views(7);
   const LensEstimate exact = estimate_lens(input);
   input.board.print_sd = 0.001;
@@ -359,8 +359,8 @@ TEST(EstimateLens, ReturnsWrongBoardForSpacingThatOnlyLensContradicts) {
   EXPECT_TRUE(result.solution.has_succeeded());
 }
 
-/// Returns the largest position of a corner in the stereographic plane along each axis.
-Eigen::Vector2d compute_farthest(const LensViews& input) {
+/// Returns the largest coordinates of a corner in the stereographic plane.
+Eigen::Vector2d compute_farthest_corner(const LensViews& input) {
   Eigen::Vector2d farthest(0, 0);
   for (const BoardView& view : input.views) {
     for (const TagDetection& tag : view.detection.tags) {
@@ -379,8 +379,9 @@ TEST(EstimateLens, StatesExtentOfNarrowGridAndOfBoards) {
   const LensViews input = make_wide_views(8, 180, lens_model_for_spline_grid(grid));
   const LensEstimate result = estimate_lens(input);
   EXPECT_EQ(result.status, LensStatus::undetermined);
+  // The grid of 100 degrees has 11 - 3 pieces horizontally and 9 - 3 vertically.
   const double u = 2 * std::tan(rad_from_deg(25)), v = u * 6 / 8;
-  const Eigen::Vector2d farthest = compute_farthest(input);
+  const Eigen::Vector2d farthest = compute_farthest_corner(input);
   const auto angle_deg = [](double at) { return 2 * deg_from_rad(std::atan(at / 2)); };
   ASSERT_GT(std::abs(angle_deg(farthest.x()) - angle_deg(farthest.y())), 1);
   EXPECT_EQ(

@@ -257,13 +257,13 @@ TEST(SolveBoardProblemByMrcal, ThrowsForModelThatMrcalLacks) {
   BoardProblem problem = make_exact_mrcal_problem(LensModel::pinhole);
   problem.lens_model = LensModel::fisheye;
   problem.intrinsics.resize(8, 0);
-  std::string said;
+  std::string message;
   try {
     solve_board_problem_by_mrcal(problem, kAllParameters);
   } catch (const std::runtime_error& error) {
-    said = error.what();
+    message = error.what();
   }
-  EXPECT_EQ(said, "mrcal does not support OPENCV_FISHEYE");
+  EXPECT_EQ(message, "mrcal does not support OPENCV_FISHEYE");
 }
 
 }  // namespace

@@ -179,7 +179,7 @@ TEST(CornerWeight, SmallWeightsKeepSolvedLensAccurateDespiteCornerErrors) {
     // Every second corner has errors of a pixel, with a fiftieth of the weight.
     for (auto& view : input.views) {
       for (std::size_t i = 0; i < view.size(); i += 2) {
-        view[i].pixel += Eigen::Vector2d(random.normal(), random.normal());
+        view[i].pixel += Eigen::Vector2d{random.normal(), random.normal()};
         view[i].weight = 0.02;
       }
     }

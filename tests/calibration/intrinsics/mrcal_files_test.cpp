@@ -8,8 +8,10 @@
 #include <cstdint>
 #include <cstring>
 #include <map>
+#include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "calibration/intrinsics/numpy_archive.h"
@@ -169,7 +171,7 @@ std::string decode_base85(std::string_view text) {
   return bytes;
 }
 
-TEST(EncodeBase85, IsInverseOfDecodingForAnyLength) {
+TEST(EncodeBase85, DecodesToSameBytesForAnyLength) {
   std::string bytes;
   for (int i = 0; i < 23; ++i) {
     EXPECT_EQ(encode_base85(bytes).size(), (bytes.size() * 5 + 3) / 4);

@@ -69,7 +69,7 @@ Eigen::Vector3d unit_ray(const Lens& lens, const Eigen::Vector2d& pixel) {
 }
 
 /// Rotation of rays of `a` to those of `b` by quaternions (Horn, 1987).
-Eigen::Matrix3d rotation_by_quaternions(
+Eigen::Matrix3d compute_rotation_by_quaternions(
     const Lens& a, const Lens& b, const std::vector<Eigen::Vector2d>& pixels,
     const std::function<double(const Eigen::Vector2d&)>& weight) {
   Eigen::Matrix3d s = Eigen::Matrix3d::Zero();
@@ -93,7 +93,7 @@ TEST(FitRotationBetweenLenses, MatchesRotationByQuaternions) {
   const auto rotation = fit_rotation_between_lenses(a, b, pixels);
   ASSERT_TRUE(rotation);
   const auto same = [](const auto&) { return 1.0; };
-  EXPECT_LT((*rotation - rotation_by_quaternions(a, b, pixels, same)).norm(), 1e-9);
+  EXPECT_LT((*rotation - compute_rotation_by_quaternions(a, b, pixels, same)).norm(), 1e-9);
   EXPECT_GT((*rotation - Eigen::Matrix3d::Identity()).norm(), 0.05);
 }
 
@@ -193,7 +193,7 @@ TEST(ComputeProjectionDifference, WeightsRotationByInverseSquareOfSigma) {
   const auto difference = compute_projection_difference(a, b, {801, 601}, sigma_px);
   ASSERT_TRUE(difference);
   const auto pixels = make_regular_pixel_grid({801, 601});
-  const Eigen::Matrix3d rotation = rotation_by_quaternions(
+  const Eigen::Matrix3d rotation = compute_rotation_by_quaternions(
       a, b, pixels, [&](const Eigen::Vector2d& pixel) { return std::pow(sigma_px(pixel), -2); });
   double sum = 0, squares = 0, worst = 0;
   for (const auto& pixel : pixels) {
@@ -215,8 +215,8 @@ constexpr double kDerivativeStep = 1e-6;
 
 /// Derivatives of the pixels of a region, stacked, with respect to the parameters of a lens. The
 /// rotation that removes most of each change is removed. By difference quotients and QR.
-Eigen::MatrixXd aligned_derivatives(LensModel model, const std::vector<double>& parameters,
-                                    const ImageRegion& rectangle) {
+Eigen::MatrixXd compute_aligned_derivatives(LensModel model, const std::vector<double>& parameters,
+                                            const ImageRegion& rectangle) {
   const Lens lens(model, parameters);
   std::vector<Eigen::Vector3d> rays;
   for (const auto& pixel : make_regular_pixel_grid(kExpectedImager_px)) {
@@ -257,7 +257,7 @@ Eigen::MatrixXd aligned_derivatives(LensModel model, const std::vector<double>& 
 }
 
 /// Covariance with correlations, with standard deviations in the ratio of `sds`.
-Eigen::MatrixXd correlated_covariance(const Eigen::VectorXd& sds) {
+Eigen::MatrixXd make_correlated_covariance(const Eigen::VectorXd& sds) {
   Eigen::MatrixXd factor = Eigen::MatrixXd::Identity(sds.size(), sds.size());
   for (Eigen::Index i = 1; i < sds.size(); ++i) factor(i, i - 1) = 0.6;
   factor = sds.asDiagonal() * factor;
@@ -269,11 +269,12 @@ const std::vector<double> kRadialLens{500, 520, 390, 310, -0.1, 0.03, 0.001, -0.
 TEST(ComputeExpectedProjectionDifference, MatchesDifferenceQuotients) {
   Eigen::VectorXd sds(8);
   sds << 0.5, 0.6, 0.4, 0.3, 1e-3, 2e-3, 1e-4, 2e-4;
-  const Eigen::MatrixXd covariance = correlated_covariance(sds);
+  const Eigen::MatrixXd covariance = make_correlated_covariance(sds);
   const Lens lens(LensModel::opencv4, kRadialLens);
   for (const ImageRegion& region :
        {ImageRegion(), ImageRegion{{110, 55}, {610, 55}, {610, 405}, {110, 405}}}) {
-    const Eigen::MatrixXd changes = aligned_derivatives(LensModel::opencv4, kRadialLens, region);
+    const Eigen::MatrixXd changes =
+        compute_aligned_derivatives(LensModel::opencv4, kRadialLens, region);
     ASSERT_EQ(changes.rows(), region.empty() ? 2 * 41 * 31 : 2 * 25 * 18);
     const Eigen::MatrixXd root = covariance.llt().matrixL();
     const Eigen::MatrixXd uncorrelated = changes * root / std::sqrt(changes.rows());
@@ -295,7 +296,8 @@ TEST(ComputeExpectedProjectionDifference, CountsPixelsWithRaysOnly) {
       Eigen::Vector<double, 8>(0.04, 0.01, 0, 0, 0, 0, 0, 0).asDiagonal();
   // A region within the image circle, so that difference quotients exist.
   const ImageRegion region{{335, 215}, {465, 215}, {465, 385}, {335, 385}};
-  const Eigen::MatrixXd changes = aligned_derivatives(LensModel::fisheye, parameters, region);
+  const Eigen::MatrixXd changes =
+      compute_aligned_derivatives(LensModel::fisheye, parameters, region);
   const double mean =
       (changes * covariance * changes.transpose()).trace() / static_cast<double>(changes.rows());
   const auto inside =
@@ -318,7 +320,7 @@ TEST(ComputeExpectedProjectionDifference, IsInfiniteForUnknownCovariance) {
       estimate_expected_max_projection_difference_px(lens, kExpectedImager_px, unknown)));
 }
 
-double largest_pixel_change(const Eigen::VectorXd& stacked) {
+double compute_largest_pixel_change(const Eigen::VectorXd& stacked) {
   return std::sqrt(stacked.reshaped(2, stacked.size() / 2).colwise().squaredNorm().maxCoeff());
 }
 
@@ -333,8 +335,8 @@ TEST(EstimateExpectedMaxProjectionDifference, MatchesLargestChangeForSingleUnkno
   std::vector<double> ratios;
   for (const Eigen::VectorXd& direction : {first, all}) {
     for (const ImageRegion& part : {ImageRegion(), region}) {
-      const double largest_px = largest_pixel_change(
-          aligned_derivatives(LensModel::opencv4, kRadialLens, part) * direction);
+      const double largest_px = compute_largest_pixel_change(
+          compute_aligned_derivatives(LensModel::opencv4, kRadialLens, part) * direction);
       ratios.push_back(estimate_expected_max_projection_difference_px(
                            lens, kExpectedImager_px, direction * direction.transpose(), part) /
                        largest_px);
@@ -348,9 +350,10 @@ TEST(EstimateExpectedMaxProjectionDifference, MatchesRandomDrawsForSeveralUnknow
   const Lens lens(LensModel::opencv4, kRadialLens);
   Eigen::VectorXd sds(8);
   sds << 0.5, 0.6, 0.4, 0.3, 2e-3, 2e-3, 4e-4, 5e-4;
-  const Eigen::MatrixXd covariance = correlated_covariance(sds);
+  const Eigen::MatrixXd covariance = make_correlated_covariance(sds);
   const ImageRegion region{{110, 55}, {210, 55}, {210, 155}, {110, 155}};
-  const Eigen::MatrixXd changes = aligned_derivatives(LensModel::opencv4, kRadialLens, region);
+  const Eigen::MatrixXd changes =
+      compute_aligned_derivatives(LensModel::opencv4, kRadialLens, region);
   const Eigen::MatrixXd root = covariance.llt().matrixL();
   Random random(4);
   double squares = 0;
@@ -358,7 +361,7 @@ TEST(EstimateExpectedMaxProjectionDifference, MatchesRandomDrawsForSeveralUnknow
   for (int draw = 0; draw < draws; ++draw) {
     Eigen::VectorXd normal(8);
     for (double& value : normal) value = random.normal();
-    squares += std::pow(largest_pixel_change(changes * (root * normal)), 2) / draws;
+    squares += std::pow(compute_largest_pixel_change(changes * (root * normal)), 2) / draws;
   }
   EXPECT_NEAR(
       estimate_expected_max_projection_difference_px(lens, kExpectedImager_px, covariance, region) /

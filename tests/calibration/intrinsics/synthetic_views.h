@@ -4,6 +4,8 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <cstddef>
+#include <vector>
 
 #include "calibration/intrinsics/intrinsics.h"
 #include "rig/board_layout.h"
@@ -121,5 +123,27 @@ struct SyntheticViews {
     return input;
   }
 };
+
+/// Returns views whose edges do not shift, without an estimate of the warp of the board.
+inline IntrinsicsInput make_views_without_edge_shifts(const SyntheticViews& views, int count,
+                                                      Random& random, double noise_px) {
+  IntrinsicsInput input = views.input(count, random, noise_px);
+  input.warp = WarpChoice::off;
+  for (auto& view : input.views) {
+    for (auto& corner : view) corner.d_pixel_d_edge_shift.setZero();
+  }
+  return input;
+}
+
+/// Displaces the corners of a view by `size_px` on each axis, in an alternating pattern that no
+/// pose and no lens explains. `cols`: corners of the board in a row.
+inline void displace_alternately(std::vector<BoardLattice::Corner>& view, double size_px,
+                                 std::size_t cols) {
+  for (auto& corner : view) {
+    const std::size_t col = corner.point % cols, row = corner.point / cols;
+    corner.pixel.x() += (col + row) % 2 == 0 ? size_px : -size_px;
+    corner.pixel.y() += col % 2 == 0 ? size_px : -size_px;
+  }
+}
 
 }  // namespace vlp

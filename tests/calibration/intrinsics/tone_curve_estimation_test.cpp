@@ -187,10 +187,10 @@ TEST(EstimateLens, ReturnsAllViewsCorrectedForEstimatedToneCurve) {
   EXPECT_NE(expected[0].detection.tags[0].corners_px, views[0].detection.tags[0].corners_px);
 }
 
-/// Returns the gamma by the costs of the header, with lenses for the corners of each curve. Views
-/// that fit no pose without a curve are dropped for all curves.
-double expected_gamma(std::vector<BoardView> views, const Board& board,
-                      LensModel model = LensModel::opencv8) {
+/// Computes gamma from the costs that the header states, with a solved lens for each curve. Views
+/// that the solve without a curve drops are left out for all curves.
+double compute_expected_gamma(std::vector<BoardView> views, const Board& board,
+                              LensModel model = LensModel::opencv8) {
   const double levels_gamma = estimate_tone_curve_gamma(sum_tone_curve_costs(views));
   IntrinsicsInput input{BoardLattice(board), {}, views[0].imager_px, model};
   ValuesPerGamma ratios{};
@@ -229,7 +229,7 @@ double expected_gamma(std::vector<BoardView> views, const Board& board,
   return estimate_tone_curve_gamma(costs);
 }
 
-TagDetection::Corners displaced(TagDetection::Corners corners_px) {
+TagDetection::Corners displace_corners(TagDetection::Corners corners_px) {
   for (auto& corner : corners_px) corner.y() += 15;
   return corners_px;
 }
@@ -250,13 +250,13 @@ TEST(EstimateAndCorrectToneCurve, MinimizesSumOfCostsOfResidualsAndGrayLevels) {
   }
   // A view does not fit without a curve, another one with the first curve only.
   for (TagDetection& tag : views[1].detection.tags) {
-    if (tag.id % 2 == 0) tag.corners_px = displaced(tag.corners_px);
+    if (tag.id % 2 == 0) tag.corners_px = displace_corners(tag.corners_px);
   }
   for (TagDetection& tag : views[3].detection.tags) {
     auto& outline = tag.tone_curve_fits[0];
-    if (tag.id % 2 == 0) outline.corners_px = displaced(outline.corners_px);
+    if (tag.id % 2 == 0) outline.corners_px = displace_corners(outline.corners_px);
   }
-  const double expected = expected_gamma(views, synthetic_board(false));
+  const double expected = compute_expected_gamma(views, synthetic_board(false));
   EXPECT_GT(std::abs(std::log(expected / 1.7)), 0.01);
   EXPECT_GT(std::abs(std::log(expected / 2.3)), 0.01);
   EXPECT_NEAR(estimate_and_correct_tone_curve(views, synthetic_board(false)), expected, 1e-9);
@@ -292,7 +292,7 @@ TEST(EstimateAndCorrectToneCurve, EstimatesWarpForAllCurvesIfItIsNeededWithoutCu
     views.push_back({"image", flat.imager_px, seen});
   }
   ASSERT_GT(views[0].detection.tags.size(), 20U);
-  const double expected = expected_gamma(views, flat.board);
+  const double expected = compute_expected_gamma(views, flat.board);
   EXPECT_NEAR(estimate_and_correct_tone_curve(views, flat.board), expected, 1e-9);
 }
 
@@ -301,19 +301,22 @@ TEST(EstimateAndCorrectToneCurve, UsesFisheyeModelIfItFitsBetter) {
   const Lens fisheye(LensModel::fisheye,
                      std::array{250.0, 251.0, 402.0, 297.0, 0.03, -0.012, 0.004, -0.0006});
   auto views = CodedCamera{1.7, 2.3, 0.15, fisheye}.views(6, 10);
-  const double expected = expected_gamma(views, synthetic_board(false), LensModel::fisheye);
+  const double expected = compute_expected_gamma(views, synthetic_board(false), LensModel::fisheye);
   EXPECT_NEAR(estimate_and_correct_tone_curve(views, synthetic_board(false)), expected, 1e-9);
 }
 
-/// Of 30 views every fifth one is not used.
+/// Every fifth of 30 views is not used.
 TEST(EstimateAndCorrectToneCurve, UsesTwentyFourViewsEvenlySpaced) {
   const Board board = synthetic_board(false);
   auto all = CodedCamera{1.8, 2.2, 0.2}.views(30, 9);
   for (BoardView& view : all) view.detection.tags.resize(8, view.detection.tags[0]);
   auto used = all;
   for (std::size_t i = 4; i < used.size(); i += 5) used[i].detection.tags.clear();
-  EXPECT_EQ(estimate_and_correct_tone_curve(all, board),
-            estimate_and_correct_tone_curve(used, board));
+  auto fewer = all;
+  for (std::size_t i = 3; i < fewer.size(); i += 5) fewer[i].detection.tags.clear();
+  const double gamma = estimate_and_correct_tone_curve(all, board);
+  EXPECT_EQ(estimate_and_correct_tone_curve(used, board), gamma);
+  EXPECT_NE(estimate_and_correct_tone_curve(fewer, board), gamma);
 }
 
 }  // namespace

@@ -54,7 +54,7 @@ class EstimateLampDisplacementsEquations : public testing::Test {
     Random random(seed);
     for (CeilingView& view : views) {
       for (auto& projection : view.lamps) {
-        projection.projected_m += sd_m * Eigen::Vector2d(random.normal(), random.normal());
+        projection.projected_m += sd_m * Eigen::Vector2d{random.normal(), random.normal()};
       }
     }
   }

@@ -433,7 +433,7 @@ class DetectUnsteadyLamp : public DetectLampErrorsAtLimits {
     Random random(3);
     for (Frame& frame : frames) {
       for (Detection& detection : frame.detections) {
-        detection.pixel += 0.05 * Eigen::Vector2d(random.normal(), random.normal());
+        detection.pixel += 0.05 * Eigen::Vector2d{random.normal(), random.normal()};
       }
     }
   }

@@ -125,14 +125,6 @@ Eigen::Matrix2d covariance_of_normalized_point(const RotationFit& fit, const Cam
          inverse_px.asDiagonal();
 }
 
-/// Compares matrices relative to the largest element.
-void expect_similar(const Eigen::Matrix2d& found, const Eigen::Matrix2d& expected,
-                    double tolerance) {
-  EXPECT_THAT(found, IsNear(expected, tolerance * expected.cwiseAbs().maxCoeff()))
-      << found << "\n\n"
-      << expected;
-}
-
 TEST(FitRotationAxis, CovarianceMatchesDerivativesOfPixelsAtOneHeight) {
   Random random(21);
   for (const bool unequal : {false, true}) {
@@ -151,9 +143,9 @@ TEST(FitRotationAxis, CovarianceMatchesDerivativesOfPixelsAtOneHeight) {
     const Eigen::Matrix2d found = covariance_of_normalized_point(fit, scene.camera);
     if (unequal) {
       EXPECT_NEAR(found.trace() / inverse.trace(), 1, 0.5) << "variance of unit noise";
-      expect_similar(found / found.trace(), inverse / inverse.trace(), 0.01);
+      expect_relatively_near(found / found.trace(), inverse / inverse.trace(), 0.01);
     } else {
-      expect_similar(found, std::pow(fit.residual_px / 0.02, 2) * inverse, 0.01);
+      expect_relatively_near(found, std::pow(fit.residual_px / 0.02, 2) * inverse, 0.01);
     }
   }
 }
@@ -173,11 +165,12 @@ TEST(FitRotationAxis, CovariancesMatchDerivativesOfPixelsAtTwoHeights) {
   ASSERT_TRUE(fit.outliers.empty());
   const Eigen::MatrixXd inverse = compute_axis_fit_inverse(scene, rotation, true);
   const double variance = std::pow(fit.residual_px / 0.02, 2);
-  expect_similar(covariance_of_normalized_point(fit, scene.camera),
-                 variance * inverse.topLeftCorner<2, 2>(), 0.01);
-  expect_similar(*fit.center.lever_arm_covariance, variance * inverse.block<2, 2>(2, 2), 0.01);
-  expect_similar(*fit.center.lever_arm_jacobian_wrt_zenith,
-                 inverse.block<2, 2>(2, 0) * inverse.topLeftCorner<2, 2>().inverse(), 0.01);
+  expect_relatively_near(covariance_of_normalized_point(fit, scene.camera),
+                         variance * inverse.topLeftCorner<2, 2>(), 0.01);
+  expect_relatively_near(*fit.center.lever_arm_covariance, variance * inverse.block<2, 2>(2, 2),
+                         0.01);
+  expect_relatively_near(*fit.center.lever_arm_jacobian_wrt_zenith,
+                         inverse.block<2, 2>(2, 0) * inverse.topLeftCorner<2, 2>().inverse(), 0.01);
 }
 
 /// Zenith (normalized point) and lever arm.
@@ -242,12 +235,13 @@ TEST(FitRotationAxis, CovariancesMatchFitsWithChangedLampsForExactDetections) {
     ASSERT_TRUE(fit.converged && fit.center.covariance && fit.center.lever_arm_covariance);
     ASSERT_TRUE(fit.center.lever_arm_jacobian_wrt_zenith);
     const Eigen::Matrix4d expected = refit_with_map_errors(rotation, scene.camera).covariance;
-    expect_similar(covariance_of_normalized_point(fit, scene.camera),
-                   expected.topLeftCorner<2, 2>(), 0.01);
-    expect_similar(*fit.center.lever_arm_covariance, expected.bottomRightCorner<2, 2>(), 0.01);
-    expect_similar(*fit.center.lever_arm_jacobian_wrt_zenith,
-                   expected.bottomLeftCorner<2, 2>() * expected.topLeftCorner<2, 2>().inverse(),
-                   0.01);
+    expect_relatively_near(covariance_of_normalized_point(fit, scene.camera),
+                           expected.topLeftCorner<2, 2>(), 0.01);
+    expect_relatively_near(*fit.center.lever_arm_covariance, expected.bottomRightCorner<2, 2>(),
+                           0.01);
+    expect_relatively_near(
+        *fit.center.lever_arm_jacobian_wrt_zenith,
+        expected.bottomLeftCorner<2, 2>() * expected.topLeftCorner<2, 2>().inverse(), 0.01);
   }
 }
 
@@ -270,18 +264,20 @@ TEST(FitRotationAxis, CovariancesCountResidualsDueToMapErrorsOnce) {
   ASSERT_TRUE(fit.converged && fit.center.lever_arm_covariance && fit.center.covariance);
   ASSERT_TRUE(without.converged && without.center.lever_arm_covariance);
   ASSERT_TRUE(without.center.covariance && fit.outliers.empty());
+  ASSERT_EQ(rotation.observations.size(), 40U);
+  // Unknowns: zenith and lever arm, lamps, axis of the second height, yaws.
   const double freedom = 2 * 40 - (4 + 8 + 3 + 9);
   const double fraction = 1 - effect.squares_px2 / (freedom * std::pow(fit.residual_px, 2));
   EXPECT_GT(fraction, 0.2);
   EXPECT_LT(fraction, 0.95);
-  expect_similar(covariance_of_normalized_point(fit, scene.camera),
-                 fraction * covariance_of_normalized_point(without, scene.camera) +
-                     effect.covariance.topLeftCorner<2, 2>(),
-                 0.02);
-  expect_similar(*fit.center.lever_arm_covariance,
-                 fraction * Eigen::Matrix2d(*without.center.lever_arm_covariance) +
-                     effect.covariance.bottomRightCorner<2, 2>(),
-                 0.02);
+  expect_relatively_near(covariance_of_normalized_point(fit, scene.camera),
+                         fraction * covariance_of_normalized_point(without, scene.camera) +
+                             effect.covariance.topLeftCorner<2, 2>(),
+                         0.02);
+  expect_relatively_near(*fit.center.lever_arm_covariance,
+                         fraction * Eigen::Matrix2d(*without.center.lever_arm_covariance) +
+                             effect.covariance.bottomRightCorner<2, 2>(),
+                         0.02);
 }
 
 /// Level camera: observed points c + R(-yaw) q. Unknowns: c, q for each lamp and height, and yaws
@@ -331,8 +327,8 @@ TEST(FitRotationCenterToAllLamps, CovarianceMatchesDerivativesOfPixels) {
   Eigen::VectorXd at(26);
   at << truth.head<18>(), truth.segment<4>(19), truth.segment<4>(24);
   const Eigen::Matrix2d inverse = invert_normal_equations(observe, at).topLeftCorner<2, 2>();
-  expect_similar(covariance_of_normalized_point(fit, scene.camera),
-                 std::pow(fit.residual_px / 0.02, 2) * inverse, 0.01);
+  expect_relatively_near(covariance_of_normalized_point(fit, scene.camera),
+                         std::pow(fit.residual_px / 0.02, 2) * inverse, 0.01);
 }
 
 /// A displaced detection with a sigma_px of its own is an outlier of either method. The residual
@@ -368,8 +364,8 @@ TEST(RotationFit, OutlierDistanceAndResidualAreInPixels) {
   }
 }
 
-/// Returns captures with errors of the detections that have a fixed pattern, and the given
-/// sigma_px.
+/// Returns captures with the given sigma_px, and with errors of up to `size_px` on each axis, in a
+/// pattern that is the same for all sizes.
 RotationCaptures find_captures_with_error(const RotationScene& scene, double size_px,
                                           double sigma_px) {
   std::vector<Frame> frames = scene.frames(sigma_px);
@@ -410,7 +406,7 @@ TEST(FitRotationAxis, FailsIfResidualExceedsLimit) {
 /// The limit is 1 % of the distance between camera and highest lamp.
 TEST(FitRotationAxis, EstimatesLeverArmForLampHeightsThatDifferByOnePercent) {
   for (const double fraction : {0.0095, 0.0105}) {
-    const double step_m = 2 * fraction / (1 - fraction);
+    const double step_m = 2 * fraction / (1 - fraction);  // other lamps: 1.6 + 0.4 m
     RotationScene scene = make_small_scene({0.01, -0.02}, {-0.4}, step_m);
     const RotationFit fit = fit_rotation_axis(find_rotation(scene, scene.frames()), scene.camera);
     ASSERT_TRUE(fit.converged);
@@ -427,10 +423,11 @@ TEST(FitRotationAxis, OmitsLeverArmWithTooLargeStandardDeviation) {
   const auto fit_with = [&](double size_px) {
     return fit_rotation_axis(find_captures_with_error(scene, size_px, 0.5), scene.camera);
   };
-  const RotationFit small = fit_with(0.01);
+  constexpr double small_px = 0.01;
+  const RotationFit small = fit_with(small_px);
   ASSERT_TRUE(small.converged && small.center.lever_arm_covariance);
   const double sd_m = std::sqrt(small.center.lever_arm_covariance->diagonal().maxCoeff());
-  const double limit_px = 0.01 * 0.005 * 2.2 / sd_m;
+  const double limit_px = small_px * 0.005 * 2.2 / sd_m;  // at the height 1.6 + 0.2 + 0.4 m
   for (const double factor : {0.9, 1.1}) {
     const RotationFit fit = fit_with(factor * limit_px);
     ASSERT_TRUE(fit.converged);

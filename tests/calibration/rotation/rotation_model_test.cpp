@@ -56,7 +56,7 @@ TEST(FitRotationModelToFixes, DeltaIncludesLeverArmDividedByHeightWithoutLeverAr
   EXPECT_EQ(fit.lever_arm_m, Eigen::Vector2d(0, 0));
 }
 
-/// One fix at yaw 0 and height 2 states only A + 2 delta = p.
+/// One fix at yaw 0 and height 2 determines only A + 2 delta.
 TEST(FitRotationModelToFixes, ReturnsSolutionOfMinimumNormForOneFix) {
   const std::vector<RotationFix> fixes = {{{{3, 1, 0}, 0}, 2, 0}};
   const RotationModelFit fit = fit_rotation_model_to_fixes(fixes, 1, false);
@@ -80,6 +80,7 @@ TEST(FitRotationModelToFixes, SolutionSatisfiesNormalEquationsWithCauchyWeights)
   }
   fixes[4].pose.position_m.head<2>() += Eigen::Vector2d(0.03, -0.04);
   const RotationModelFit fit = fit_rotation_model_to_fixes(fixes, 1, false);
+  ASSERT_EQ(fit.axes_m.size(), 1U);
   ASSERT_EQ(fit.residuals_m.size(), count);
   std::vector<double> sorted = fit.residuals_m;
   std::sort(sorted.begin(), sorted.end());

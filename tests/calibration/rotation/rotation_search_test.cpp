@@ -151,7 +151,7 @@ TEST(FindInPlaceRotationCaptures, SeparatesHeightsThatDifferByMoreThanOnePercent
   EXPECT_EQ(count_heights({0.024, 0, 0.06, 0.012}), 2U);
 }
 
-/// Captures of three heights in mixed order. One height has too few captures, another too small an
+/// Captures of four heights in mixed order. The lowest has too few captures, the third too small an
 /// arc.
 TEST(FindInPlaceRotationCaptures, NumbersHeightsFromLowestAndRejectsOthers) {
   RotationScene scene = tilted_scene({0.02, -0.03});
@@ -259,7 +259,8 @@ TEST(FindInPlaceRotationCaptures, RejectsCaptureBeyondEightMedianDistances) {
   }
 }
 
-/// Standard deviation of the heights of fixes, from the positions that a level camera computes.
+/// Upper median of the standard deviations of the heights of fixes, for a level camera. The noise
+/// is that of the residuals; `noise_px` for fixes of two lamps, which have none.
 double compute_expected_height_sd_m(const RotationScene& scene, const std::vector<Frame>& frames,
                                     double noise_px) {
   Calibration calibration;
@@ -332,7 +333,7 @@ TEST(FindInPlaceRotationCaptures, SeparatesHeightsByThreeSdsOfResidualsForThreeL
   }
 }
 
-/// Lamps contradict each other by a tenth of their distances until the tilt is known.
+/// Before the tilt is estimated, the lamps have residuals of about 10 % of their distances.
 TEST(FindInPlaceRotationCaptures, FindsRotationOfCameraTiltedBy27Degrees) {
   RotationScene scene;
   scene.tilt_rad = rad_from_deg(27);
@@ -387,7 +388,7 @@ TEST(FindInPlaceRotationCaptures, ObservationsHaveRayAndDerivativeOfEachKnownLam
   }
 }
 
-TEST(FindInPlaceRotationCaptures, OmitsLampsThatOnlyRejectedCapturesShow) {
+TEST(FindInPlaceRotationCaptures, OmitsLampsThatOnlyRejectedCapturesDetect) {
   RotationFrames frames((RotationScene()));
   frames.add_turn(5, 0);
   for (Frame& frame : frames.frames) frame.detections.resize(6);

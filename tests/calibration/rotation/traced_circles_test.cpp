@@ -161,8 +161,8 @@ TEST(FitAndAverageLampCircleCenters, HasNoCovarianceForThreeCaptures) {
   EXPECT_THAT(found.mean.center.center_px, IsNear(Eigen::Vector2d(413, 292), 1e-6));
 }
 
-/// The worst of twelve points is compared with the circle of the other eleven points, by Student's
-/// t with eight degrees of freedom.
+/// The worst of twelve points is compared with the circle of the other eleven points. The bound is
+/// 4.5 standard deviations, by Student's t with eight degrees of freedom (Wallace's approximation).
 TEST(FitAndAverageLampCircleCenters, RejectsPointBeyondStudentBoundOfOtherPoints) {
   struct DeletedResidual {
     double distance, bound;
@@ -349,7 +349,7 @@ TEST(FitAndAverageLampCircleCenters, UsesResidualOfJointFitAsNoiseForThreeCaptur
   }
 }
 
-/// Lamps in a line have no circle.
+/// Points on a straight line determine no circle.
 TEST(FitAndAverageLampCircleCenters, UsesHeightOnlyIfMostOfItsCirclesAreDetermined) {
   const auto angles = make_equal_angles(5);
   const auto make = [&](int circles, int lines) {
