@@ -77,8 +77,8 @@ std::string corner_file(const CLI::App& app, const Options& options) {
   if (!options.imager_px) {
     throw std::invalid_argument(*found + ": a file of corners has no image size; give --imager-px");
   }
-  for (const char* image_option :
-       {"--cache", "--threads", "--max-mpx", "--max-blur-px", "--max-white-fraction", "--every"}) {
+  for (const char* image_option : {"--cache", "--threads", "--max-mpx", "--max-blur-fraction",
+                                   "--max-white-fraction", "--every"}) {
     if (app.count(image_option) == 0) continue;
     throw std::invalid_argument(std::string(image_option) + ": only for images, and " + *found +
                                 " is a file of corners; leave it out");

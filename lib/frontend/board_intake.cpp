@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
 #include <opencv2/imgproc.hpp>
 #include <utility>
@@ -19,6 +20,7 @@
 #include "detection/boards/square_corners.h"
 #include "frontend/image_quality.h"
 #include "frontend/observation.h"
+#include "geometry/median.h"
 #include "rig/board_layout.h"
 #include "rig/input_error.h"
 
@@ -45,9 +47,56 @@ bool are_tags_overexposed(const BoardDetection& seen) {
   return 2 * seen.num_overexposed_tags > seen.num_unusable_tags;
 }
 
-std::string describe_too_few_corners(const Board& board, const BoardDetection& seen) {
+/// Returns the median edge length in the image, px, of the detected tags, or of the squares between
+/// detected corners; 0 without any.
+double compute_median_edge_px(const Board& board, const BoardDetection& seen) {
+  std::vector<double> edges_px;
+  for (std::size_t i = 1; i < seen.points.size(); ++i) {
+    const auto &before = seen.points[i - 1], &point = seen.points[i];
+    const bool is_next = point.index == before.index + 1 &&
+                         point.index % static_cast<std::size_t>(board.cols - 1) != 0;
+    if (is_next) edges_px.push_back((point.pixel - before.pixel).norm());
+  }
+  if (!board.has_chessboard_squares()) {
+    for (const TagDetection& tag : seen.tags) {
+      for (std::size_t k = 0; k < 4; ++k)
+        edges_px.push_back((tag.corners_px[(k + 1) % 4] - tag.corners_px[k]).norm());
+    }
+  }
+  return edges_px.empty() ? 0 : upper_median(edges_px);
+}
+
+/// Returns the median of the reported standard deviations of the corners, px; std::nullopt if half
+/// of the corners have none.
+std::optional<double> compute_median_corner_sd_px(const BoardDetection& seen) {
+  std::vector<double> sds_px;
+  for (const PointDetection& corner : collect_detected_corners(seen)) {
+    sds_px.push_back(corner.sd_px > 0 ? corner.sd_px : std::numeric_limits<double>::infinity());
+  }
+  if (sds_px.empty()) return std::nullopt;
+  const double median_px = upper_median(sds_px);
+  return std::isfinite(median_px) ? std::optional(median_px) : std::nullopt;
+}
+
+/// Describes which searches did not find a chessboard, and the largest part of one.
+std::string describe_missing_chessboard(const Board& board, const BoardDetection& seen,
+                                        const std::array<int, 2>& size_px) {
+  const auto [finest, coarsest] = get_range_of_chessboard_reductions({size_px[0], size_px[1]});
+  std::string message =
+      fmt::format("no complete chessboard of {} x {} squares", board.cols, board.rows);
+  const auto [cols, rows] = seen.largest_chessboard_part;
+  message += cols > 0 ? fmt::format("; the largest part has {} x {}", cols, rows)
+                      : std::string("; no part of one is visible");
+  return message + fmt::format(
+                       " (searched by squares and by corners, image reduced {} to {} times); "
+                       "show all squares, or correct cols and rows of board.yaml",
+                       finest, coarsest);
+}
+
+std::string describe_too_few_corners(const Board& board, const BoardDetection& seen,
+                                     const std::array<int, 2>& size_px) {
   if (board.kind == BoardKind::chessboard && seen.points.empty()) {
-    return "the chessboard is not completely visible";
+    return describe_missing_chessboard(board, seen, size_px);
   }
   if (board.has_chessboard_squares() || !seen.points.empty()) {
     return fmt::format("only {} corners of the board can be used, or too many of them in a line",
@@ -140,21 +189,14 @@ void explain_from_sample_images(
   }
 }
 
-/// Explains why the chessboard is not detected, from the largest chessboard in a few of the images.
-IntakeFailure explain_no_chessboard(const std::vector<fs::path>& images, const Board& board,
-                                    const fs::path& board_file, const FrontendOptions& options,
-                                    std::size_t num_views) {
-  constexpr int num_samples = 12;
+/// Explains why the chessboard is not detected, from the largest part of one in the images.
+IntakeFailure explain_no_chessboard(const Board& board, const fs::path& board_file,
+                                    const std::vector<BoardView>& views) {
   std::array<int, 2> largest{0, 0};
-  explain_from_sample_images(images, options, num_samples,
-                             [&](const fs::path&, const cv::Mat& image) {
-                               const auto squares = detect_chessboard_size_in_squares(image);
-                               if (squares[0] * squares[1] > largest[0] * largest[1])
-                                 largest = squares;
-                               return true;
-                             });
-  // The board may be rotated by 90 degrees.
-  if ((largest[0] < largest[1]) != (board.cols < board.rows)) std::swap(largest[0], largest[1]);
+  for (const BoardView& view : views) {
+    const auto squares = view.detection.largest_chessboard_part;
+    if (squares[0] * squares[1] > largest[0] * largest[1]) largest = squares;
+  }
   const auto [cols, rows] = largest;
   if (cols > board.cols || rows > board.rows) {
     std::string message =
@@ -167,8 +209,13 @@ IntakeFailure explain_no_chessboard(const std::vector<fs::path>& images, const B
   std::string message = fmt::format(
       "no chessboard of {} x {} squares is visible in {} images: is it complete, with a white "
       "margin, sharp, well lit, and each square wider than 10 px?",
-      board.cols, board.rows, num_views);
-  if (cols > 0) message += fmt::format(" At most {} x {} squares are visible", cols, rows);
+      board.cols, board.rows, views.size());
+  if (cols > 0) {
+    message += fmt::format(
+        " At most {} x {} squares are visible: cover none, or correct cols and "
+        "rows of board.yaml",
+        cols, rows);
+  }
   return {false, std::move(message)};
 }
 
@@ -177,7 +224,7 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
                                const fs::path& board_file, const FrontendOptions& options,
                                const std::vector<BoardView>& views) {
   if (board.kind == BoardKind::chessboard) {
-    return explain_no_chessboard(images, board, board_file, options, views.size());
+    return explain_no_chessboard(board, board_file, views);
   }
   int unusable = 0, overexposed = 0;
   for (const BoardView& view : views) {
@@ -276,7 +323,7 @@ void reject_few_corners(const Board& board, const BoardLattice& lattice, Observa
   }
   image.set_image_rejection(
       are_tags_overexposed(seen) ? RejectionReason::overexposed : RejectionReason::too_few_corners,
-      describe_too_few_corners(board, seen));
+      describe_too_few_corners(board, seen, image.size_px));
 }
 
 }  // namespace
@@ -317,31 +364,55 @@ Observation BoardIntake::detect_board_in_image(const SourceImage& source) const 
 void BoardIntake::reject_unusable_board_image(Observation& image, double bright_fraction,
                                               double white_fraction) const {
   const BoardDetection& seen = image.board->detection;
+  const bool has_pose = lattice_.are_corners_sufficient_for_pose(seen);
   if (white_fraction > options_.max_white_fraction) {
-    return image.set_image_rejection(
-        RejectionReason::overexposed,
-        fmt::format("overexposed: {:.0f} % of the {} is at full scale, {:.0f} % at most",
-                    100 * white_fraction, seen.has_detected_corners() ? "board" : "image",
-                    100 * options_.max_white_fraction));
+    constexpr double max_sd_px = 0.15;
+    const auto sd_px = has_pose ? compute_median_corner_sd_px(seen) : std::nullopt;
+    const std::string text =
+        fmt::format("overexposed: {:.0f} % of the {} is at full scale", 100 * white_fraction,
+                    seen.has_detected_corners() ? "board" : "image");
+    if (!sd_px || *sd_px > max_sd_px) {
+      return image.set_image_rejection(
+          RejectionReason::overexposed,
+          fmt::format("{}, {:.0f} % at most; expose shorter (limit: --max-white-fraction)", text,
+                      100 * options_.max_white_fraction));
+    }
+    image.doubt =
+        fmt::format("{}; used, as its corners have standard deviations of {:.2f} px", text, *sd_px);
   }
-  if (!lattice_.are_corners_sufficient_for_pose(seen) &&
-      bright_fraction < options_.min_bright_fraction) {
-    // [LENS-1] `too dark:` | corners not measurable, or displaced | change exposure or light;
-    //   limit: `--max-white-fraction`
+  if (!has_pose && bright_fraction < options_.min_bright_fraction) {
+    // [LENS-1] `too dark:` | corners not measurable, or displaced | change exposure or light
     return image.set_image_rejection(
         RejectionReason::too_dark,
         fmt::format("too dark: the brightest 1 % reach {:.0f} % of the full scale, "
                     "{:.0f} % at least",
                     100 * bright_fraction, 100 * options_.min_bright_fraction));
   }
-  // [LENS-2] `blurred:`, `no contrast` | no sharp edges | focus, hold still; limit: `--max-blur-px`
+  // [LENS-2] `no contrast` | no sharp edges | focus, hold still
   if (!image.blur_px) return image.set_image_rejection(RejectionReason::no_contrast, "no contrast");
-  if (*image.blur_px > options_.max_blur_px) {
-    return image.set_image_rejection(
-        RejectionReason::blurred,
-        fmt::format("blurred: {:.1f} px, {:.1f} at most", *image.blur_px, options_.max_blur_px));
-  }
+  const std::string problem = describe_too_much_blur(image);
+  if (!problem.empty()) return image.set_image_rejection(RejectionReason::blurred, problem);
   reject_few_corners(board_, lattice_, image);
+}
+
+std::string BoardIntake::describe_too_much_blur(const Observation& image) const {
+  // Half a bit of a tag of eight bits; a square needs corners with a saddle.
+  constexpr double max_tag_fraction = 0.06, max_square_fraction = 0.2;
+  const double in_image_px = options_.max_blur_fraction * image.size_px[0];
+  if (*image.blur_px > in_image_px) {
+    return fmt::format(
+        "blurred: {:.1f} px, {:.1f} at most, {:g} of the image width (limit: --max-blur-fraction); "
+        "focus, or keep camera and board still",
+        *image.blur_px, in_image_px, options_.max_blur_fraction);
+  }
+  const double edge_px = compute_median_edge_px(board_, image.board->detection);
+  const bool has_squares = board_.has_chessboard_squares();
+  const double on_board_px = (has_squares ? max_square_fraction : max_tag_fraction) * edge_px;
+  if (edge_px == 0 || *image.blur_px <= on_board_px) return "";
+  return fmt::format(
+      "blurred: {:.1f} px, {:.1f} at most for {} of {:.0f} px; move the board nearer, "
+      "or focus",
+      *image.blur_px, on_board_px, has_squares ? "squares" : "tags", edge_px);
 }
 
 Observations detect_boards_in_images(const std::vector<fs::path>& images, const Board& board,

@@ -5,6 +5,7 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "calibration/intrinsics/board_lattice.h"
@@ -26,8 +27,9 @@ class BoardIntake {
   BoardIntake(const Board& board, const FrontendOptions& options,
               const std::optional<std::array<int, 2>>& imager_px = std::nullopt);
 
-  /// Detects the board in an image. Rejects the image if it is unreadable, of another size,
-  /// overexposed, too dark, blurred, or shows too few corners to determine the board's pose.
+  /// Detects the board in an image. Rejects the image if it is unreadable, of another size, too
+  /// dark, blurred, overexposed with inaccurate corners, or shows too few corners to determine the
+  /// board's pose. An overexposed image with accurate corners has an Observation::doubt.
   /// Repeated images are not rejected here, see Selection.
   Observation detect_board_in_image(const SourceImage& source) const;
 
@@ -35,6 +37,8 @@ class BoardIntake {
   /// Rejects an image that is overexposed, too dark, blurred, or shows too few corners.
   void reject_unusable_board_image(Observation& image, double bright_fraction,
                                    double white_fraction) const;
+  /// Returns the reason why an image with a measured blur is too blurred; empty if it is not.
+  std::string describe_too_much_blur(const Observation& image) const;
 
   const Board board_;
   const BoardLattice lattice_;

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 std::string describe_settings(const Board& board) {
   std::string settings =
-      fmt::format("13 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
+      fmt::format("14 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
                   board.rows, format_shortest_exact_number(board.tag_size_m),
                   format_shortest_exact_number(board.tag_spacing), board.border_bits,
                   board.corner_squares, board.first_id, id_order_name(board.id_order));
@@ -117,6 +117,7 @@ void transfer_view(NumberFile& file, CachedView& cached) {
   for (int& size_px : view.imager_px) file.transfer_integer(size_px);
   file.transfer_integer(view.detection.num_unusable_tags);
   file.transfer_integer(view.detection.num_overexposed_tags);
+  for (int& squares : view.detection.largest_chessboard_part) file.transfer_integer(squares);
   double blur_px = cached.blur_px.value_or(-1);
   file.transfer(blur_px);
   cached.blur_px = blur_px < 0 ? std::nullopt : std::optional(blur_px);
@@ -129,6 +130,7 @@ void transfer_view(NumberFile& file, CachedView& cached) {
     file.transfer_integer(point.index);
     file.transfer(point.pixel.x());
     file.transfer(point.pixel.y());
+    file.transfer(point.sd_px);
   });
   file.transfer_list(view.detection.curve_costs, [&](double& cost) { file.transfer(cost); });
 }

@@ -29,7 +29,7 @@ enum class RejectionReason {
   too_dark,         // nothing exceeds the noise, or the level of a board
   overexposed,      // too many pixels at full scale
   no_contrast,      // no edge in the image
-  blurred,          // by more than FrontendOptions::max_blur_px
+  blurred,          // by more than FrontendOptions::max_blur_fraction, or for the size of the squares
   other_board,      // tags that the board does not have, and none that it has
   no_board,         // no tag or corner of the board
   too_few_corners,  // they do not determine the pose of the board
@@ -64,6 +64,9 @@ struct Observation {
   std::array<int, 2> size_px = {0, 0};
   /// Rejection; std::nullopt if the image is used.
   std::optional<Rejection> rejection = {};
+  /// Doubt about an image that is used, with its measured values, in one human-readable line; empty
+  /// without one.
+  std::string doubt = {};
 
   /// Board images only: the detection, std::nullopt for images that are unreadable or of another
   /// size; sigma of the blur, std::nullopt for images without contrast.

@@ -20,9 +20,11 @@ struct FrontendOptions {
   /// Step between the frames of a video that are used: every n-th frame, beginning with the first.
   int every = 1;
 
-  /// Board images: largest sigma of the blur of the sharpest edges (measure_image_blur()).
-  double max_blur_px = 2;
-  /// Board images: largest fraction of the board's pixels at full scale. More displaces edges.
+  /// Board images: largest sigma of the blur of the sharpest edges (measure_image_blur()), as a
+  /// fraction of the image width.
+  double max_blur_fraction = 0.003;
+  /// Board images: fraction of the board's pixels at full scale above which an image is used only if
+  /// the reported standard deviations of its corners are small.
   double max_white_fraction = 0.25;
   /// Board images: level that 1 % of the pixels exceed, as a fraction of the full scale. An image
   /// below it with too few corners is too dark.

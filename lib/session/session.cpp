@@ -269,8 +269,8 @@ class SessionRun {
     }
     const FrontendOptions defaults;
     const FrontendOptions& limits = options_.frontend;
-    if (limits.max_blur_px != defaults.max_blur_px) {
-      text += fmt::format(" --max-blur-px {}", limits.max_blur_px);
+    if (limits.max_blur_fraction != defaults.max_blur_fraction) {
+      text += fmt::format(" --max-blur-fraction {}", limits.max_blur_fraction);
     }
     if (limits.max_white_fraction != defaults.max_white_fraction) {
       text += fmt::format(" --max-white-fraction {}", limits.max_white_fraction);
@@ -530,7 +530,7 @@ class SessionRun {
     add(options_.frontend.row_time_s.has_value(), "row time");
     add(options_.frontend.readout.has_value(), "readout");
     const FrontendOptions &limits = options_.frontend, &defaults = unstated.frontend;
-    add(limits.max_blur_px != defaults.max_blur_px ||
+    add(limits.max_blur_fraction != defaults.max_blur_fraction ||
             limits.max_white_fraction != defaults.max_white_fraction,
         "limits of board images");
     return stated;

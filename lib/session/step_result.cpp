@@ -81,12 +81,30 @@ std::vector<SkippedImage> list_skipped_images(const std::vector<Observation>& im
   return skipped;
 }
 
+namespace {
+
+/// Warns of images that are used in spite of a doubt: of the first one, with their number.
+void warn_about_doubtful_images(const std::vector<Observation>& images, StepResult& result) {
+  const auto is_doubtful = [](const Observation& image) {
+    return image.is_image_kept() && !image.doubt.empty();
+  };
+  const auto first = std::ranges::find_if(images, is_doubtful);
+  if (first == images.end()) return;
+  const auto others = std::ranges::count_if(images, is_doubtful) - 1;
+  result.warnings.push_back(
+      fmt::format("{}: {}{}", first->image_file_name(), first->doubt,
+                  others > 0 ? fmt::format(", and {} more images", others) : std::string()));
+}
+
+}  // namespace
+
 void add_image_intake_remarks(const Observations& seen, StepResult& result) {
   const auto skipped = list_skipped_images(seen.images);
   result.skipped.insert(result.skipped.begin(), skipped.begin(), skipped.end());
   prepend_observation_messages(seen.warnings, result.warnings);
   prepend_observation_messages(seen.notes, result.notes);
   prepend_observation_messages(seen.details, result.details);
+  warn_about_doubtful_images(seen.images, result);
   for (const Observation& image : seen.images) {
     if (image.is_image_kept() || !parse_video_name_from_frame_name(image.image_file_name()))
       continue;

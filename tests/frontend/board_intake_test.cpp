@@ -73,28 +73,65 @@ TEST_F(BoardIntakeOfFolder, RejectsBlurredDarkOverexposedUniformOrWronglySizedIm
   const Observation blur = observe(blurred);
   EXPECT_EQ(rejection_reason(blur), RejectionReason::blurred);
   ASSERT_TRUE(blur.rejection);
-  EXPECT_THAT(blur.rejection->message, testing::MatchesRegex("blurred: [23]\\.[0-9] px, 2\\.0 .*"));
+  EXPECT_THAT(blur.rejection->message,
+              testing::MatchesRegex("blurred: [23]\\.[0-9] px, 2\\.4 .*--max-blur-fraction.*"));
 
   const Observation dark = observe(scaled(good, 0.012));
   EXPECT_EQ(rejection_reason(dark), RejectionReason::too_dark);
   ASSERT_TRUE(dark.rejection);
   EXPECT_THAT(dark.rejection->message, HasSubstr("of the full scale, 10 % at least"));
 
-  const Observation white = observe(scaled(good, 8));
+  const Observation white = observe(scaled(good, 30));
   EXPECT_EQ(rejection_reason(white), RejectionReason::overexposed);
   ASSERT_TRUE(white.rejection);
-  EXPECT_THAT(white.rejection->message, HasSubstr("is at full scale, 25 % at most"));
+  EXPECT_THAT(white.rejection->message, AllOf(HasSubstr("is at full scale, 25 % at most"),
+                                              HasSubstr("--max-white-fraction")));
 
   EXPECT_EQ(rejection_reason(observe(cv::Mat1b(600, 800, uchar(128)))),
             RejectionReason::no_contrast);
   EXPECT_EQ(rejection_reason(observe(good(cv::Rect(0, 0, 400, 300)))), RejectionReason::wrong_size);
 }
 
+/// Corners of tags in moderately overexposed images are accurate, which their standard deviations
+/// report.
+TEST_F(BoardIntakeOfFolder, KeepsOverexposedImageWithAccurateCornersAndStatesDoubt) {
+  const Observation white = observe(scaled(good, 2.5));
+  ASSERT_TRUE(white.is_image_kept()) << white.rejection->message;
+  EXPECT_THAT(white.doubt, testing::MatchesRegex("overexposed: [0-9]+ % of the board is at full "
+                                                 "scale; used, as its corners have .* px"));
+  const Observation sharp = observe(good);
+  EXPECT_EQ(sharp.doubt, "");
+  const auto expected = collect_detected_corners(sharp.board->detection);
+  std::size_t compared = 0;
+  for (const PointDetection& corner : collect_detected_corners(white.board->detection)) {
+    const auto same = std::ranges::find(expected, corner.index, &PointDetection::index);
+    if (same == expected.end()) continue;
+    EXPECT_LT((corner.pixel - same->pixel).norm(), 0.3) << corner.index;
+    ++compared;
+  }
+  EXPECT_GE(compared, 80U);
+}
+
+/// Half a bit of a tag has to be wider than the blur, whatever the size of the image.
+TEST_F(BoardIntakeOfFolder, RejectsBlurThatIsLargeForTags) {
+  cv::Mat image;
+  cv::resize(good, image, {}, 0.6, 0.6, cv::INTER_AREA);
+  cv::copyMakeBorder(image, image, 0, good.rows - image.rows, 0, good.cols - image.cols,
+                     cv::BORDER_REPLICATE);
+  cv::GaussianBlur(image, image, {}, 1.4);
+  const Observation blurred = observe(image);
+  ASSERT_TRUE(blurred.board);
+  ASSERT_TRUE(blurred.board->detection.has_detected_corners());
+  EXPECT_EQ(rejection_reason(blurred), RejectionReason::blurred);
+  ASSERT_TRUE(blurred.rejection);
+  EXPECT_THAT(blurred.rejection->message, HasSubstr("at most for tags of"));
+}
+
 TEST_F(BoardIntakeOfFolder, RejectsImageBlurredBeyondMaxBlurOfOptions) {
   cv::Mat blurred;
   cv::GaussianBlur(good, blurred, {}, 1.5);
   ASSERT_TRUE(observe(blurred).is_image_kept());
-  options.max_blur_px = 1;
+  options.max_blur_fraction = 0.00125;
   EXPECT_EQ(rejection_reason(observe(blurred)), RejectionReason::blurred);
 }
 
@@ -233,7 +270,7 @@ TEST_F(BoardIntakeOfFolder, ReturnsCachedDetectionButAppliesCurrentLimits) {
       .store_cached_view(SourceImage(file), {*detected.board, 1.25, 0.9, 0.1});
   EXPECT_EQ(intake.detect_board_in_image(SourceImage(file)).blur_px, 1.25);
   // Limits are no part of the cache.
-  options.max_blur_px = 0.1;
+  options.max_blur_fraction = 0.0001;
   EXPECT_EQ(rejection_reason(BoardIntake(board, options).detect_board_in_image(SourceImage(file))),
             RejectionReason::blurred);
 }

@@ -39,7 +39,7 @@ std::vector<std::string> list_gate_names(const std::vector<CheckedMetric>& gates
 
 TEST_F(RunCalibrationSessionWithBoards, EstimatesLensWithNameModelAndRowTimeOfOptions) {
   options.frontend.readout = Readout::rows;
-  options.frontend.max_blur_px = 3;
+  options.frontend.max_blur_fraction = 0.004;
   options.frontend.max_white_fraction = 0.5;
   const SessionResult result = run();
   EXPECT_EQ(result.verdict, Verdict::pass) << result.reason;
@@ -59,7 +59,7 @@ TEST_F(RunCalibrationSessionWithBoards, EstimatesLensWithNameModelAndRowTimeOfOp
   ASSERT_EQ(lens.history.size(), 1U);
   EXPECT_EQ(lens.history[0].part, "camera");
   EXPECT_EQ(lens.history[0].options,
-            "--camera-id unit-8 --row-time-s 3e-05 --readout rows --max-blur-px 3 "
+            "--camera-id unit-8 --row-time-s 3e-05 --readout rows --max-blur-fraction 0.004 "
             "--max-white-fraction 0.5 --lens LENSMODEL_OPENCV4");
   ASSERT_EQ(lens.history[0].inputs.size(), 2U);
   EXPECT_EQ(lens.history[0].inputs[0].file, "board.yaml");

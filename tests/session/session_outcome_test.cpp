@@ -161,7 +161,7 @@ TEST_F(RunCalibrationSession, GivenCameraTakesPrecedenceOverOptions) {
   expect_ignored("row time");
   options.frontend.readout = Readout::columns;
   expect_ignored("readout");
-  options.frontend.max_blur_px = 1;
+  options.frontend.max_blur_fraction = 0.001;
   expect_ignored("limits of board images");
   options.frontend.max_white_fraction = 0.5;
   expect_ignored("limits of board images");

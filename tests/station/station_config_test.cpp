@@ -90,7 +90,7 @@ TEST_F(ReadStationConfig, RejectsImplausibleValues) {
         {"completion.turn_captures", "turn_captures: 12", "turn_captures: 10001"},
         {"completion.turn_arc_deg", "turn_arc_deg: 300", "turn_arc_deg: 361"},
         {"completion.check_captures", "check_captures: 36", "check_captures: 3.6"},
-        {"rejection.blur_px", "{blur_px: 2", "{blur_px: 101"},
+        {"rejection.blur_fraction", "{blur_fraction: 0.003", "{blur_fraction: 2"},
         {"rejection.dark_fraction", "dark_fraction: 0.1", "dark_fraction: 1.1"},
         {"rejection.same_pose_fraction", "same_pose_fraction: 0.01", "same_pose_fraction: -0.01"},
         {"rejection.max_consecutive_rejections", "max_consecutive_rejections: 12",

@@ -75,13 +75,14 @@ std::vector<BoardLattice::Corner> BoardLattice::list_corners_with_board_position
   std::vector<Corner> all;
   if (has_squares_ || !seen.points.empty()) {
     all.reserve(seen.points.size());
-    for (const auto& [index, pixel, weight] : seen.points) {
+    for (const auto& [index, pixel, sd_px, weight] : seen.points) {
       const std::size_t part = index / num_points_per_part(), point = index % num_points_per_part();
       const auto cols = static_cast<std::size_t>(cols_);
       const std::size_t row = point / cols;
       const Eigen::Vector2d node(static_cast<double>(point % cols), static_cast<double>(row));
       const Eigen::Vector2d in_board_m = origins_m_[part] + spacing_m_ * node;
-      all.push_back({{in_board_m.x(), in_board_m.y(), 0}, pixel, part, point, {0, 0}, weight});
+      all.push_back(
+          {{in_board_m.x(), in_board_m.y(), 0}, pixel, part, point, {0, 0}, weight, {}, sd_px});
     }
     return all;
   }

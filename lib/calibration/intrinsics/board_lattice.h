@@ -49,7 +49,7 @@ class BoardLattice {
     double weight = 1;
     /// Curvature of the tag's edge from this corner to the tag's next corner.
     EdgeCurvature curvature = {};
-    /// Standard deviation from pixel noise (TagDetection::corner_sds_px), px; 0 if unknown.
+    /// Standard deviation from pixel noise (PointDetection::sd_px), px; 0 if unknown.
     double sd_px = 0;
   };
   /// Returns all corners of a detection on a flat board, in the order of `seen`: its points, or

@@ -213,7 +213,7 @@ std::vector<BoardView> read_mrcal_corners(const std::filesystem::path& file, con
     for (std::size_t i = from; i < end; ++i) {
       if (!table.rows[i].pixel) continue;
       view.detection.points.push_back({lattice.point_index_on_board(part, i - from),
-                                       *table.rows[i].pixel, table.rows[i].weight});
+                                       *table.rows[i].pixel, 0, table.rows[i].weight});
     }
     if (!none) {
       if (images.empty()) first_line = line;

@@ -53,7 +53,8 @@ std::vector<PointDetection> collect_detected_corners(const BoardDetection& seen)
   std::vector<PointDetection> corners;
   for (const TagDetection& tag : seen.tags) {
     for (std::size_t k = 0; k < 4; ++k) {
-      corners.push_back({4 * static_cast<std::size_t>(tag.id) + k, tag.corners_px[k]});
+      corners.push_back(
+          {4 * static_cast<std::size_t>(tag.id) + k, tag.corners_px[k], tag.corner_sds_px[k]});
     }
   }
   return corners;
@@ -94,6 +95,9 @@ BoardDetection BoardDetector::detect_board(const cv::Mat& image) const {
   BoardDetection seen;
   if (!finder_) {
     seen.points = squares_->detect_chessboard_corners(gray);
+    if (seen.points.empty()) {
+      seen.largest_chessboard_part = squares_->detect_largest_chessboard_part(levels);
+    }
     return seen;
   }
   std::map<int, std::vector<TagDetection>> found;
@@ -114,12 +118,10 @@ BoardDetection BoardDetector::detect_board(const cv::Mat& image) const {
     seen.curve_costs = refine_tags_by_edge_fits(once, levels, *print_);
     seen.tags = once;
   } else {
-    for (const TagDetection& tag : once) {
-      if (const auto exact = touching_->refine_tag_corners(tag, gray)) seen.tags.push_back(*exact);
-    }
-    for (const TagDetection& tag : touching_->find_missing_tags(seen.tags, gray)) {
-      if (found[tag.id].size() <= 1) seen.tags.push_back(tag);
-    }
+    seen.tags = touching_->refine_and_complete_tags(once, gray);
+    std::erase_if(seen.tags, [&](const TagDetection& tag) {
+      return found.contains(tag.id) && found.at(tag.id).size() > 1;
+    });
   }
   for (auto* tags : {&seen.tags, &seen.foreign_tags}) {
     std::erase_if(*tags, [&](const TagDetection& tag) { return !is_inside(tag, levels); });

@@ -85,6 +85,8 @@ struct PointDetection {
   /// BoardLattice::point_index_on_board().
   std::size_t index;
   Eigen::Vector2d pixel;
+  /// Standard deviation from pixel noise, px, averaged over all directions; 0 if unknown.
+  double sd_px = 0;
   /// Factor by which a solve multiplies the residual of the point.
   double weight = 1;
 };
@@ -104,6 +106,10 @@ struct BoardDetection {
   int num_overexposed_tags = 0;
   /// Points sorted by index, of boards of squares and from files of corners without tags.
   std::vector<PointDetection> points = {};
+  /// Number of squares along width and height of the largest part of a chessboard, with the board's
+  /// longer side first or second as on the board. {0, 0} if the chessboard is detected completely,
+  /// if no part of one is, and for other boards.
+  std::array<int, 2> largest_chessboard_part = {0, 0};
   /// Negative log-likelihood of the edges of tags for the tone curves of kGammas, up to a constant.
   /// Only the first two if the image certainly has no tone curve. Empty if no edges are fitted, or
   /// after correct_views_for_tone_curve().

@@ -184,7 +184,7 @@ class CornerTableReader {
       const auto index = static_cast<std::size_t>(corner);
       const bool is_new =
           std::ranges::find(seen.points, index, &PointDetection::index) == seen.points.end();
-      if (is_new) seen.points.push_back({index, pixel});
+      if (is_new) seen.points.push_back({index, pixel, read_sd_px(csv_, row)});
       return is_new;
     }
     const int id = csv_.get_cell_integer(row, tag_id_);
@@ -237,8 +237,8 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
     header.erase(header.begin() + 1);
   } else {
     header.insert(header.end(), kBowColumns.begin(), kBowColumns.end());
-    header.emplace_back(kDeviationColumn);
   }
+  header.emplace_back(kDeviationColumn);
   CsvWriter csv(file, header);
   for (const BoardView& view : views) {
     const BoardDetection& seen = view.detection;
@@ -251,7 +251,8 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
       for (const PointDetection& point : seen.points) {
         csv.write_csv_row({view.image, std::to_string(point.index),
                            format_shortest_exact_number(point.pixel.x()),
-                           format_shortest_exact_number(point.pixel.y())});
+                           format_shortest_exact_number(point.pixel.y()),
+                           format_shortest_exact_number(point.sd_px)});
       }
       continue;
     }

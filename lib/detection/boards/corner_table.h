@@ -18,10 +18,11 @@ namespace vlp {
 ///   image, tag, corner, u_px, v_px         corner 0 to 3 as in BoardTag::corners_m
 ///   edge_quadratic_px, edge_cubic_px,
 ///   edge_half_extent                       optional: EdgeCurvature from this corner to the next
-///   sd_px                                  optional: TagDetection::corner_sds_px
 /// Columns for boards of squares:
 ///   image, corner, u_px, v_px              corner as in PointDetection::index; rows may also
 ///                                          be counted upwards (renumber_lattice_points())
+/// Column for both:
+///   sd_px                                  optional: PointDetection::sd_px
 /// An image without corners has one row with its name only. Tags without all four corners are
 /// rejected. Tags that the board does not have are BoardDetection::foreign_tags.
 ///

@@ -32,22 +32,35 @@ std::optional<Eigen::Vector2d> find_saddle_point(const cv::Mat1f& smoothed,
                                                  const Eigen::Vector2d& guess_px, int reach_px,
                                                  int radius_px);
 
+/// Corner of fit_edge_intersection_at_corner().
+struct FittedCorner {
+  Eigen::Vector2d pixel;
+  /// Standard deviation, px, averaged over all directions: from the residuals of the fit, which
+  /// include those of a wrong model, such as overexposed squares that do not touch.
+  double sd_px;
+  /// Blur of the edges: sigma of a Gaussian, px.
+  double blur_px = 0;
+};
+
 /// Fits the intersection of the two edges at a corner where two black squares touch, by nonlinear
 /// least squares of the gray levels.
 ///
 /// @param guess_px   approximate pixel (u, v) of the corner
 /// @param along      approximate directions of the edges in the image, of any length
 /// @param radius_px  radius of the pixels around guess_px; they should show only the two squares
-/// @return           pixel (u, v) of the corner; std::nullopt for fewer than 16 pixels, if the
-///     pixels do not match the model, or if the corner is over 1.5 px from the guess
+/// @return           the corner; std::nullopt for fewer than 16 pixels, if the pixels do not match
+///     the model, or if the corner is too far from the guess: by over 1.5 px, or 0.4 (radius - 4
+///     px) if that is larger
 ///
-///   gray = (middle + contrast step(d1) step(d2)) (1 + light . (x - corner))
+///   gray = (middle + contrast pattern) (1 + light . (x - corner))
+///   pattern = 2 (c(d1 - g) c(d2 - g) + c(-d1 - g) c(-d2 - g)) - 1
 ///   d1, d2  distances from two parabolas through the corner, because the lens bends the edges
-///   step    blurred step, with the same blur for both edges
+///   c       blurred step from 0 to 1, with the same blur for both edges
+///   g       growth of the white squares, px, by overexposure and a tone curve
 ///   light   gradient of the illumination (vignetting), which would bias a fit without it
 /// On rendered boards the corner is accurate to 0.01 px, a sixth of the error of
 /// find_saddle_point().
-std::optional<Eigen::Vector2d> fit_edge_intersection_at_corner(
+std::optional<FittedCorner> fit_edge_intersection_at_corner(
     const cv::Mat1b& image, const Eigen::Vector2d& guess_px,
     const std::array<Eigen::Vector2d, 2>& along, double radius_px);
 

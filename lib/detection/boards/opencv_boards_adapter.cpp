@@ -80,6 +80,10 @@ int find_tag_dictionary(const std::string& family) {
       family);
 }
 
+/// Margin of a bit's cell that is not read, as a fraction of its width. White grows by lens blur
+/// and overexposure, so that only the middle of a black cell is certainly black.
+constexpr double kIgnoredCellMargin = 0.3;
+
 class ArucoFinder : public TagFinder {
  public:
   explicit ArucoFinder(const Board& board)
@@ -94,11 +98,13 @@ class ArucoFinder : public TagFinder {
 #ifdef VLP_ARUCO_IS_A_CLASS
     cv::aruco::DetectorParameters parameters;
     parameters.markerBorderBits = border_bits_;
+    parameters.perspectiveRemoveIgnoredMarginPerCell = kIgnoredCellMargin;
     const cv::aruco::ArucoDetector detector(dictionary_, parameters);
     detector.detectMarkers(image, corners, ids);
 #else
     const auto parameters = cv::aruco::DetectorParameters::create();
     parameters->markerBorderBits = border_bits_;
+    parameters->perspectiveRemoveIgnoredMarginPerCell = kIgnoredCellMargin;
     cv::aruco::detectMarkers(image, dictionary_, corners, ids, parameters);
 #endif
     // OpenCV counts corners clockwise from the top left. Its AprilTags are rotated by 180 degrees
@@ -146,11 +152,14 @@ constexpr int kChessboardFlags = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXH
 /// Seeds OpenCV's random number generator equally for each image, so that results are reproducible.
 void seed_random_generator() { cv::theRNG().state = 1; }
 
-std::vector<cv::Point2f> find_corners(const cv::Mat& image, const cv::Size& size) {
+std::vector<cv::Point2f> find_corners(const cv::Mat& image, const cv::Size& size,
+                                      ChessboardSearch search) {
   std::vector<cv::Point2f> corners;
   seed_random_generator();
-  if (!cv::findChessboardCornersSB(image, size, corners, kChessboardFlags)) return {};
-  return corners;
+  const bool found = search == ChessboardSearch::by_squares
+                         ? cv::findChessboardCorners(image, size, corners)
+                         : cv::findChessboardCornersSB(image, size, corners, kChessboardFlags);
+  return found ? corners : std::vector<cv::Point2f>();
 }
 
 cv::Size find_size_in_corners(const cv::Mat& image, const cv::Size& min_size) {

@@ -27,8 +27,9 @@ ArucoMarker make_aruco_marker(const std::string& dictionary, int id) {
   return opencv_board_functions().make_aruco_marker(dictionary, id);
 }
 
-std::vector<cv::Point2f> find_chessboard_corners(const cv::Mat& image, const cv::Size& size) {
-  return opencv_board_functions().find_chessboard_corners(image, size);
+std::vector<cv::Point2f> find_chessboard_corners(const cv::Mat& image, const cv::Size& size,
+                                                 ChessboardSearch search) {
+  return opencv_board_functions().find_chessboard_corners(image, size, search);
 }
 
 cv::Size find_chessboard_size_in_corners(const cv::Mat& image, const cv::Size& min_size) {

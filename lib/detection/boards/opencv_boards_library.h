@@ -14,10 +14,15 @@
 /// Each function throws std::runtime_error if the library cannot be loaded.
 namespace vlp {
 
+/// Search of OpenCV for a chessboard: by the outlines of squares (findChessboardCorners()), which
+/// is faster if the board is there, or by saddle points (findChessboardCornersSB()).
+enum class ChessboardSearch { by_squares, by_saddle_points };
+
 /// Returns the inner corners of a chessboard of `size` corners per row and column, row by row from
-/// the top left or the bottom right of the board, pixels; accurate to 0.2 px. Empty if the image
-/// shows no such board. Equal images give equal corners.
-std::vector<cv::Point2f> find_chessboard_corners(const cv::Mat& image, const cv::Size& size);
+/// a corner of the board, pixels; accurate to 0.2 px. Empty if the image shows no such board. A
+/// part of a larger chessboard may be returned. Equal images give equal corners.
+std::vector<cv::Point2f> find_chessboard_corners(const cv::Mat& image, const cv::Size& size,
+                                                 ChessboardSearch search);
 
 /// Returns the number of inner corners per row and column of the chessboard in the image; (0, 0) if
 /// there is none of `min_size` or more.
@@ -41,7 +46,8 @@ std::vector<PlanarPose> estimate_planar_poses(const std::vector<cv::Point3d>& in
 struct OpencvBoardFunctions {
   std::unique_ptr<TagFinder> (*make_aruco_detector)(const Board&);
   ArucoMarker (*make_aruco_marker)(const std::string&, int);
-  std::vector<cv::Point2f> (*find_chessboard_corners)(const cv::Mat&, const cv::Size&);
+  std::vector<cv::Point2f> (*find_chessboard_corners)(const cv::Mat&, const cv::Size&,
+                                                      ChessboardSearch);
   cv::Size (*find_chessboard_size_in_corners)(const cv::Mat&, const cv::Size&);
   std::vector<PlanarPose> (*estimate_planar_poses)(const std::vector<cv::Point3d>&,
                                                    const std::vector<cv::Point2d>&);

@@ -6,12 +6,14 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <set>
 
 #include "detection/boards/edge_crossing.h"
 #include "detection/boards/lattice_order.h"
 #include "detection/boards/opencv_boards_library.h"
 #include "detection/boards/tag_pattern.h"
 #include "geometry/homography.h"
+#include "geometry/median.h"
 
 namespace vlp {
 namespace {
@@ -22,11 +24,37 @@ bool is_in_image(const Eigen::Vector2d& pixel, const cv::Mat& image) {
          pixel.y() < image.rows - 0.5;
 }
 
-/// Returns the factor by which a large image is reduced for OpenCV's search, which then needs a
-/// fraction of the memory. Corners are refined in the full image.
-int choose_reduction_factor(const cv::Mat& image) {
-  constexpr double large_px = 8e6;
-  return static_cast<int>(std::ceil(std::sqrt(static_cast<double>(image.total()) / large_px)));
+/// Image sizes for OpenCV's searches. On photographs, large squares at full resolution are often
+/// missed: of 14 boards 960 px wide, the search by saddle points found 3, and 13 at a third of the
+/// size. Small squares need the full resolution, which takes longest.
+constexpr double kPreferredLongSide_px = 1300;  // of the first search
+constexpr double kMaxSearched_px2 = 8e6;        // of the last search: limits time and memory
+
+/// Step of the search for a chessboard.
+struct SearchStep {
+  /// Factor by which the image is reduced.
+  int reduction;
+  ChessboardSearch search;
+};
+
+/// Returns the steps of a search, the fastest first. The search by squares takes seconds if a large
+/// image does not show the board, and is therefore used for reduced images only.
+std::vector<SearchStep> plan_chessboard_search(const cv::Size& size) {
+  constexpr int min_side_px = 200;
+  const auto round_up = [](double value) {
+    return std::max(1, static_cast<int>(std::ceil(value)));
+  };
+  const int preferred = round_up(std::max(size.width, size.height) / kPreferredLongSide_px);
+  const int finest = round_up(std::sqrt(size.area() / kMaxSearched_px2));
+  std::vector<SearchStep> steps{{preferred, ChessboardSearch::by_squares}};
+  if (std::min(size.width, size.height) / (2 * preferred) >= min_side_px) {
+    steps.push_back({2 * preferred, ChessboardSearch::by_squares});
+    steps.push_back({2 * preferred, ChessboardSearch::by_saddle_points});
+  }
+  for (int reduction = preferred;; reduction = std::max(finest, reduction / 2)) {
+    steps.push_back({reduction, ChessboardSearch::by_saddle_points});
+    if (reduction <= finest) return steps;
+  }
 }
 
 cv::Mat reduce_image(const cv::Mat& image, int times) {
@@ -43,6 +71,28 @@ double scale_to_full_resolution(float at, int large, int small) {
 
 }  // namespace
 
+namespace {
+
+/// Fits a corner by fit_edge_intersection_at_corner() in a window that is large enough for the
+/// blur.
+/// @param free_px  distance from the corner within which only its squares are visible
+std::optional<FittedCorner> fit_corner(const cv::Mat1b& image, const Eigen::Vector2d& guess_px,
+                                       const std::array<Eigen::Vector2d, 2>& along,
+                                       double free_px) {
+  constexpr double min_radius_px = 2.5, sharp_radius_px = 8, max_radius_px = 48;
+  constexpr double free_fraction = 0.75, radius_to_blur_ratio = 5;
+  const double largest_px = std::clamp(free_px * free_fraction, min_radius_px, max_radius_px);
+  double radius_px = std::min(sharp_radius_px, largest_px);
+  for (;;) {
+    const auto fit = fit_edge_intersection_at_corner(image, guess_px, along, radius_px);
+    const double required_px = fit ? radius_to_blur_ratio * fit->blur_px : 2 * radius_px;
+    if (radius_px >= std::min(required_px, largest_px)) return fit;
+    radius_px = std::min(1.1 * required_px, largest_px);
+  }
+}
+
+}  // namespace
+
 SquareCorners::SquareCorners(const Board& board)
     : cols_(board.cols - 1),
       rows_(board.rows - 1),
@@ -53,43 +103,145 @@ SquareCorners::SquareCorners(const Board& board)
 std::vector<PointDetection> SquareCorners::refine_corner_guesses(const std::vector<Guess>& guesses,
                                                                  const GrayLevels& image) const {
   constexpr int min_px = 2, max_px = 5;
-  constexpr double min_fit_px = 2.5, max_fit_px = 8, fit_fraction = 0.75;
   constexpr double edge_px = 2;  // a corner nearer to the image's edge is cut short
   std::vector<PointDetection> points;
   for (const auto& [index, pixel, next, free_px] : guesses) {
     if (!is_in_image(pixel, image.sharp)) continue;
     const int radius_px = std::clamp(static_cast<int>(free_px / 2), min_px, max_px);
     const int reach_px = std::clamp(static_cast<int>(free_px * 0.8), min_px, 2 * max_px);
+    const std::array<Eigen::Vector2d, 2> along{next[0] - pixel, next[1] - pixel};
     const auto saddle = find_saddle_point(image.smoothed, pixel, reach_px, radius_px);
-    if (!saddle) continue;
-    const double fit_px = std::clamp(free_px * fit_fraction, min_fit_px, max_fit_px);
-    const Eigen::Vector2d at = fit_edge_intersection_at_corner(
-                                   image.sharp, *saddle, {next[0] - pixel, next[1] - pixel}, fit_px)
-                                   .value_or(*saddle);
+    auto fit = saddle ? fit_corner(image.sharp, *saddle, along, free_px) : std::nullopt;
+    // Acute and blurred corners may have no saddle, or another one nearby.
+    if (!fit) fit = fit_corner(image.sharp, pixel, along, free_px);
+    if (!fit && !saddle) continue;
+    const auto [at, sd_px, blur_px] = fit ? *fit : FittedCorner{*saddle, 0};
     if (at.x() < edge_px || at.y() < edge_px || at.x() > image.sharp.cols - 1 - edge_px ||
         at.y() > image.sharp.rows - 1 - edge_px) {
       continue;
     }
-    points.push_back({index, at});
+    points.push_back({index, at, sd_px});
   }
   return points;
 }
 
+namespace {
+
+/// Levels of the squares of a chessboard, from all of its inner corners. Positions are in squares
+/// from the first corner; beyond the corners they are extrapolated.
+class SquareLevels {
+ public:
+  SquareLevels(const std::vector<PointDetection>& corners, int cols, int rows,
+               const cv::Mat1b& image)
+      : corners_(corners), cols_(cols), rows_(rows), image_(image) {}
+
+  /// Returns the mean difference between neighboring squares along a row at position y; positive if
+  /// the square at (0.5, 0.5) and every other one is brighter.
+  double compute_row_contrast(double y) const {
+    return compute_contrast(cols_, std::floor(y), [&](int col) { return get_level(col + 0.5, y); });
+  }
+  /// Returns the same along a column at position x.
+  double compute_column_contrast(double x) const {
+    return compute_contrast(rows_, std::floor(x), [&](int row) { return get_level(x, row + 0.5); });
+  }
+
+ private:
+  static double compute_contrast(int corners, double offset, const auto& level) {
+    double sum = 0;
+    for (int i = 0; i + 2 < corners; ++i) {
+      const double difference = level(i) - level(i + 1);
+      sum += std::fmod(i + offset, 2) == 0 ? difference : -difference;
+    }
+    return sum / (corners - 2);
+  }
+  /// Returns the level at a position, or gray outside the image.
+  double get_level(double x, double y) const {
+    constexpr double gray = 128;
+    const int col = std::clamp(static_cast<int>(x), 0, cols_ - 2);
+    const int row = std::clamp(static_cast<int>(y), 0, rows_ - 2);
+    const auto corner = [&](int right, int down) {
+      return corners_[static_cast<std::size_t>((row + down) * cols_ + col + right)].pixel;
+    };
+    const double u = x - col, v = y - row;
+    const Eigen::Vector2d pixel = (1 - v) * ((1 - u) * corner(0, 0) + u * corner(1, 0)) +
+                                  v * ((1 - u) * corner(0, 1) + u * corner(1, 1));
+    if (!is_in_image(pixel, image_)) return gray;
+    return image_(static_cast<int>(std::lround(pixel.y())),
+                  static_cast<int>(std::lround(pixel.x())));
+  }
+
+  const std::vector<PointDetection>& corners_;
+  int cols_, rows_;
+  const cv::Mat1b& image_;
+};
+
+/// Returns true if `corners` are those of a complete chessboard: the squares between them are
+/// alternately black and white, and there are none beyond the outermost squares. OpenCV's searches
+/// may return a part of a larger chessboard, or skip every other column.
+bool are_corners_of_whole_board(const std::vector<PointDetection>& corners, int cols, int rows,
+                                const cv::Mat1b& image) {
+  constexpr double min_fraction = 0.3, max_fraction = 0.5;  // of the contrast of the board
+  constexpr double middle = 0.5;
+  // In squares from the outermost corners. Squares that the border of a larger board cuts are
+  // narrower than others.
+  constexpr double beyond = 1.3;
+  const SquareLevels levels(corners, cols, rows, image);
+  std::vector<double> contrasts;
+  for (int row = 0; row + 1 < rows; ++row)
+    contrasts.push_back(levels.compute_row_contrast(row + middle));
+  for (int col = 0; col + 1 < cols; ++col)
+    contrasts.push_back(levels.compute_column_contrast(col + middle));
+  const double typical = upper_median(contrasts);
+  const double least_regular =
+      std::ranges::min(contrasts, {}, [&](double contrast) { return contrast / typical; });
+  const double largest_beyond =
+      std::max({std::abs(levels.compute_row_contrast(-beyond)),
+                std::abs(levels.compute_row_contrast(rows - 1 + beyond)),
+                std::abs(levels.compute_column_contrast(-beyond)),
+                std::abs(levels.compute_column_contrast(cols - 1 + beyond))});
+  return least_regular / typical > min_fraction &&
+         largest_beyond < max_fraction * std::abs(typical);
+}
+
+/// Returns true if at least 90 % of the corners of a chessboard are measured, and half of each row
+/// and column. Corners may be covered or in the shadow of an edge. A whole line is missing if
+/// OpenCV extrapolates a row beyond the board.
+bool is_chessboard_confirmed(const std::vector<PointDetection>& corners, int cols, int rows) {
+  constexpr double min_fraction = 0.9, min_line_fraction = 0.5;
+  if (static_cast<double>(corners.size()) < min_fraction * cols * rows) return false;
+  std::vector<int> in_col(static_cast<std::size_t>(cols)), in_row(static_cast<std::size_t>(rows));
+  for (const PointDetection& corner : corners) {
+    ++in_col[corner.index % in_col.size()];
+    ++in_row[corner.index / in_col.size()];
+  }
+  return *std::ranges::min_element(in_col) >= min_line_fraction * rows &&
+         *std::ranges::min_element(in_row) >= min_line_fraction * cols;
+}
+
+}  // namespace
+
+std::vector<PointDetection> SquareCorners::find_chessboard(const cv::Mat1b& image) const {
+  for (const auto& [reduction, search] : plan_chessboard_search(image.size())) {
+    const cv::Mat searched = reduce_image(image, reduction);
+    const std::vector<cv::Point2f> found =
+        find_chessboard_corners(searched, {cols_, rows_}, search);
+    if (found.empty()) continue;
+    std::vector<PointDetection> points;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      points.push_back({i,
+                        {scale_to_full_resolution(found[i].x, image.cols, searched.cols),
+                         scale_to_full_resolution(found[i].y, image.rows, searched.rows)}});
+    }
+    renumber_lattice_points(points, cols_, rows_, true);
+    if (are_corners_of_whole_board(points, cols_, rows_, image)) return points;
+  }
+  return {};
+}
+
 std::vector<PointDetection> SquareCorners::detect_chessboard_corners(
     const GrayLevels& image) const {
-  const cv::Mat searched = reduce_image(image.sharp, choose_reduction_factor(image.sharp));
-  const std::vector<cv::Point2f> found = find_chessboard_corners(searched, {cols_, rows_});
-  if (found.empty()) return {};
-  std::vector<PointDetection> points;
-  const bool whole = searched.size() == image.sharp.size();
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    const auto [x, y] = found[i];
-    points.push_back({i, {x, y}});
-    if (whole) continue;
-    points.back().pixel = {scale_to_full_resolution(x, image.sharp.cols, searched.cols),
-                           scale_to_full_resolution(y, image.sharp.rows, searched.rows)};
-  }
-  renumber_lattice_points(points, cols_, rows_, true);
+  const std::vector<PointDetection> points = find_chessboard(image.sharp);
+  if (points.empty()) return {};
   const auto at = [&](int col, int row) {
     return points[static_cast<std::size_t>(row * cols_ + col)].pixel;
   };
@@ -107,8 +259,7 @@ std::vector<PointDetection> SquareCorners::detect_chessboard_corners(
     }
   }
   auto corners = refine_corner_guesses(guesses, image);
-  // A single missing corner makes all others doubtful, because OpenCV extrapolates the lattice.
-  return corners.size() == guesses.size() ? corners : std::vector<PointDetection>();
+  return is_chessboard_confirmed(corners, cols_, rows_) ? corners : std::vector<PointDetection>();
 }
 
 std::vector<PointDetection> SquareCorners::detect_corners_near_markers(
@@ -146,14 +297,20 @@ std::vector<PointDetection> SquareCorners::detect_corners_near_markers(
   return refine_corner_guesses(guesses, image);
 }
 
-std::array<int, 2> detect_chessboard_size_in_squares(const cv::Mat& image) {
-  constexpr int min_px = 10;
-  if (std::min(image.cols, image.rows) < min_px) return {0, 0};
-  const cv::Mat1b levels =
-      reduce_image(scale_image_to_8_bits(image), choose_reduction_factor(image));
-  const cv::Size corners = find_chessboard_size_in_corners(levels, {3, 3});
+std::array<int, 2> SquareCorners::detect_largest_chessboard_part(const cv::Mat1b& image) const {
+  const int reduction = plan_chessboard_search(image.size()).front().reduction;
+  const cv::Size corners = find_chessboard_size_in_corners(reduce_image(image, reduction), {3, 3});
   if (corners.empty()) return {0, 0};
-  return {corners.width + 1, corners.height + 1};
+  std::array<int, 2> squares{corners.width + 1, corners.height + 1};
+  // The board may be rotated by 90 degrees.
+  if ((squares[0] < squares[1]) != (cols_ < rows_)) std::swap(squares[0], squares[1]);
+  return squares;
+}
+
+std::array<int, 2> get_range_of_chessboard_reductions(const cv::Size& size) {
+  const auto [finest, coarsest] =
+      std::ranges::minmax(plan_chessboard_search(size), {}, &SearchStep::reduction);
+  return {finest.reduction, coarsest.reduction};
 }
 
 namespace {
@@ -180,7 +337,6 @@ TouchingTags::TouchingTags(const Board& board)
 std::optional<TagDetection> TouchingTags::refine_tag_corners(TagDetection tag,
                                                              const GrayLevels& image) const {
   constexpr int min_px = 2, max_px = 5;
-  constexpr double min_fit_px = 2.5, max_fit_px = 8, fit_fraction = 0.75;
   const double free_px = compute_shortest_edge_px(tag) * free_fraction_;
   const int radius_px = std::clamp(static_cast<int>(free_px / 2), min_px, max_px);
   const int reach_px = std::max(min_px, static_cast<int>(free_px * 0.8));
@@ -189,15 +345,16 @@ std::optional<TagDetection> TouchingTags::refine_tag_corners(TagDetection tag,
     if (!found) return {};
     corner = *found;
   }
-  const double fit_px = std::clamp(free_px * fit_fraction, min_fit_px, max_fit_px);
   const auto saddles = tag.corners_px;
   for (std::size_t k = 0; k < 4; ++k) {
-    const auto found = fit_edge_intersection_at_corner(
-        image.sharp, saddles[k],
-        {saddles[(k + 1) % 4] - saddles[k], saddles[(k + 3) % 4] - saddles[k]}, fit_px);
-    if (found) tag.corners_px[k] = *found;
+    const auto found =
+        fit_corner(image.sharp, saddles[k],
+                   {saddles[(k + 1) % 4] - saddles[k], saddles[(k + 3) % 4] - saddles[k]}, free_px);
+    if (!found) return {};
+    tag.corners_px[k] = found->pixel;
+    tag.corner_sds_px[k] = found->sd_px;
   }
-  if (!image_matches_tag_bits(tag, image.smoothed, *family_, border_bits_)) return {};
+  if (!image_matches_tag_bits(tag, image.sharp, *family_, border_bits_)) return {};
   return tag;
 }
 
@@ -216,23 +373,29 @@ std::optional<TagDetection> TouchingTags::predict_missing_tag(
   return tag;
 }
 
-std::vector<TagDetection> TouchingTags::find_missing_tags(const std::vector<TagDetection>& tags,
-                                                          const GrayLevels& image) const {
-  std::vector<TagDetection> all = tags;
+std::vector<TagDetection> TouchingTags::refine_and_complete_tags(
+    const std::vector<TagDetection>& rough, const GrayLevels& image) const {
+  std::vector<TagDetection> refined, known = rough;
+  std::set<int> refined_ids;
+  const auto refine = [&](const TagDetection& guess) {
+    const auto tag = refine_tag_corners(guess, image);
+    if (!tag) return false;
+    refined.push_back(*tag);
+    refined_ids.insert(tag->id);
+    std::erase_if(known, [&](const TagDetection& other) { return other.id == tag->id; });
+    known.push_back(*tag);
+    return true;
+  };
+  for (const TagDetection& tag : rough) refine(tag);
   for (bool more = true; more;) {
     more = false;
     for (const BoardTag& place : layout_) {
-      const bool known = std::any_of(all.begin(), all.end(),
-                                     [&](const TagDetection& tag) { return tag.id == place.id; });
-      if (known) continue;
-      const auto guess = predict_missing_tag(place, all);
-      const auto tag = guess ? refine_tag_corners(*guess, image) : std::nullopt;
-      if (!tag) continue;
-      all.push_back(*tag);
-      more = true;
+      if (refined_ids.contains(place.id)) continue;
+      const auto guess = predict_missing_tag(place, known);
+      more = (guess && refine(*guess)) || more;
     }
   }
-  return {all.begin() + static_cast<std::ptrdiff_t>(tags.size()), all.end()};
+  return refined;
 }
 
 }  // namespace vlp

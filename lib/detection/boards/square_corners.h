@@ -22,11 +22,15 @@ class SquareCorners {
  public:
   explicit SquareCorners(const Board& board);
 
-  /// Detects the inner corners of a chessboard (findChessboardCornersSB() of OpenCV, then a
-  /// sub-pixel fit). Returns all corners, or none if the board is not completely in view. They are
-  /// numbered row by row, with the rows to the right in the image (renumber_lattice_points()). The
-  /// first corner may be at either end of the board, which looks the same rotated by 180 degrees.
+  /// Detects the inner corners of a chessboard: searches by OpenCV in the image at several
+  /// resolutions, then a sub-pixel fit at full resolution. Returns all corners, or none if the
+  /// board is not completely in view, or is a part of a larger chessboard. They are numbered row by
+  /// row, with the rows to the right in the image (renumber_lattice_points()). The first corner may
+  /// be at either end of the board, which looks the same rotated by 180 degrees.
   std::vector<PointDetection> detect_chessboard_corners(const GrayLevels& image) const;
+
+  /// Returns BoardDetection::largest_chessboard_part of an image that does not show all squares.
+  std::array<int, 2> detect_largest_chessboard_part(const cv::Mat1b& image) const;
 
   /// Detects the corners next to markers whose own corners are accurate to 1 to 2 px.
   std::vector<PointDetection> detect_corners_near_markers(const std::vector<TagDetection>& markers,
@@ -43,31 +47,34 @@ class SquareCorners {
   };
   std::vector<PointDetection> refine_corner_guesses(const std::vector<Guess>& guesses,
                                                     const GrayLevels& image) const;
+  /// Finds the corners of a chessboard, accurate to 0.2 px of a reduced image. Empty if no search
+  /// finds it.
+  std::vector<PointDetection> find_chessboard(const cv::Mat1b& image) const;
 
   int cols_, rows_;
   double square_size_m_, margin_m_;
   std::vector<BoardTag> layout_;
 };
 
-/// Counts the squares of a chessboard that an image of 8 or 16 bits shows, along both edges of the
-/// board. Returns {0, 0} if it shows no chessboard.
-std::array<int, 2> detect_chessboard_size_in_squares(const cv::Mat& image);
+/// Returns the smallest and the largest factor by which SquareCorners reduces an image of this size
+/// to find a chessboard.
+std::array<int, 2> get_range_of_chessboard_reductions(const cv::Size& size);
 
-/// Refinement of tags whose corners touch black squares, and detection of tags that the first
-/// detector missed.
+/// Detector of tags whose corners touch black squares, from tags found roughly by another detector.
 class TouchingTags {
  public:
   explicit TouchingTags(const Board& board);
 
   /// Returns the tag with refined corners: the intersections of the edges next to the saddle points
-  /// at its corners, or the saddle points. Returns std::nullopt if a saddle point is not found, or
-  /// if the bits between the corners are not those of the tag.
+  /// at its corners. Returns std::nullopt if a corner cannot be fitted, or if the bits between the
+  /// corners are not those of the tag.
   std::optional<TagDetection> refine_tag_corners(TagDetection tag, const GrayLevels& image) const;
 
-  /// Finds tags of the board that are missing in `tags`, which are refined. Predicts their position
-  /// by a homography of the nearest tags. Returns those that refine_tag_corners() accepts.
-  std::vector<TagDetection> find_missing_tags(const std::vector<TagDetection>& tags,
-                                              const GrayLevels& image) const;
+  /// Returns the tags of the board that refine_tag_corners() accepts, in the order of acceptance.
+  /// Refines the tags of `rough`, then predicts the others by a homography of the nearest tags,
+  /// refined ones or those of `rough`. An overexposed board may have few tags in `rough`.
+  std::vector<TagDetection> refine_and_complete_tags(const std::vector<TagDetection>& rough,
+                                                     const GrayLevels& image) const;
 
  private:
   std::optional<TagDetection> predict_missing_tag(const BoardTag& missing,

@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -40,7 +41,26 @@ bool is_tag_bit_white(const apriltag_family_t& family, int id, uint32_t bit) {
   return ((family.codes[id] >> (family.nbits - 1 - bit)) & 1) != 0;
 }
 
-bool image_matches_tag_bits(const TagDetection& tag, const cv::Mat1f& levels,
+namespace {
+
+/// Returns the level between four pixels by linear interpolation; std::nullopt for a point that is
+/// in no pixel.
+std::optional<float> interpolate_level(const cv::Mat1b& levels, const Eigen::Vector2d& pixel) {
+  const Eigen::Array2d last(levels.cols - 1, levels.rows - 1);
+  const Eigen::Array2d inside = pixel.array().max(0).min(last);
+  if (!((pixel.array() - inside).abs() <= 0.5).all()) return std::nullopt;
+  const int column = std::min(static_cast<int>(inside.x()), levels.cols - 2);
+  const int row = std::min(static_cast<int>(inside.y()), levels.rows - 2);
+  const auto x = static_cast<float>(inside.x() - column), y = static_cast<float>(inside.y() - row);
+  const auto at = [&](int right, int down) {
+    return static_cast<float>(levels(row + down, column + right));
+  };
+  return (1 - y) * ((1 - x) * at(0, 0) + x * at(1, 0)) + y * ((1 - x) * at(0, 1) + x * at(1, 1));
+}
+
+}  // namespace
+
+bool image_matches_tag_bits(const TagDetection& tag, const cv::Mat1b& levels,
                             const apriltag_family_t& family, int border_bits) {
   constexpr int max_wrong = 2;
   const double width = tag_width_with_border_in_bits(family, border_bits);
@@ -54,13 +74,17 @@ bool image_matches_tag_bits(const TagDetection& tag, const cv::Mat1f& levels,
     const Eigen::Vector2d at =
         (px_from_bits * Eigen::Vector3d(family.bit_x[bit] + middle, family.bit_y[bit] + middle, 1))
             .hnormalized();
-    const int column = static_cast<int>(std::lround(at.x()));
-    const int row = static_cast<int>(std::lround(at.y()));
-    if (column < 0 || row < 0 || column >= levels.cols || row >= levels.rows) return false;
-    seen[bit] = levels(row, column);
+    const auto level = interpolate_level(levels, at);
+    if (!level) return false;
+    seen[bit] = *level;
   }
-  const auto [darkest, brightest] = std::minmax_element(seen.begin(), seen.end());
-  const float threshold = (*darkest + *brightest) / 2;
+  std::array<float, 2> sums{}, counts{};
+  for (uint32_t bit = 0; bit < family.nbits; ++bit) {
+    const std::size_t color = is_tag_bit_white(family, tag.id, bit) ? 1 : 0;
+    sums[color] += seen[bit];
+    counts[color] += 1;
+  }
+  const float threshold = (sums[0] / counts[0] + sums[1] / counts[1]) / 2;
   int wrong = 0;
   for (uint32_t bit = 0; bit < family.nbits; ++bit) {
     wrong += is_tag_bit_white(family, tag.id, bit) != (seen[bit] > threshold);

@@ -32,12 +32,13 @@ int tag_width_with_border_in_bits(const apriltag_family_t& family, int border_bi
 bool is_tag_bit_white(const apriltag_family_t& family, int id, uint32_t bit);
 
 /// Returns true if the image shows the bits of the tag's id between the corners of `tag`. Bits are
-/// sampled at their centers. A bit is white above the mean of the brightest and the darkest sample.
-/// Up to two bits may differ. Returns false if a bit lies outside the image.
+/// sampled at their centers. A bit is white above the middle between the mean samples of white and
+/// of black bits: white that grows by blur or overexposure makes single black bits gray. Up to two
+/// bits may differ. Returns false if a bit lies outside the image.
 ///
 /// @param levels       gray levels of the image
 /// @param border_bits  width of the printed border, in bits
-bool image_matches_tag_bits(const TagDetection& tag, const cv::Mat1f& levels,
+bool image_matches_tag_bits(const TagDetection& tag, const cv::Mat1b& levels,
                             const apriltag_family_t& family, int border_bits);
 
 /// Printed pattern next to the edges of a board's tags, in bits.

@@ -92,14 +92,14 @@ void add_max_mpx_option(CLI::App& app, double& max_mpx) {
 }
 
 void add_board_image_quality_options(CLI::App& app, FrontendOptions& options) {
-  constexpr double max_limit_px = 100;
-  app.add_option("--max-blur-px", options.max_blur_px,
-                 "Maximum blur of a board image: sigma of its sharpest edges, in px; others are "
-                 "skipped (default: 2)")
-      ->check(CLI::Range(0.1, max_limit_px));
+  constexpr double min_limit = 1e-4, max_limit = 0.1;
+  app.add_option("--max-blur-fraction", options.max_blur_fraction,
+                 "Maximum blur of a board image: sigma of its sharpest edges, as a fraction of the "
+                 "image width; others are skipped (default: 0.003)")
+      ->check(CLI::Range(min_limit, max_limit));
   app.add_option("--max-white-fraction", options.max_white_fraction,
-                 "Maximum fraction of the board at full scale in an image; others are skipped "
-                 "(default: 0.25)")
+                 "Maximum fraction of the board at full scale in an image; others are used only if "
+                 "their corners are measured well (default: 0.25)")
       ->check(CLI::Range(0.0, 1.0));
 }
 

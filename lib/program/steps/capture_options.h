@@ -66,7 +66,7 @@ void write_refined_lamp_map(const std::filesystem::path& file, const LampMap& ma
 /// Adds --max-mpx.
 void add_max_mpx_option(CLI::App& app, double& max_mpx);
 
-/// Adds --max-blur-px and --max-white-fraction, the limits of board images.
+/// Adds --max-blur-fraction and --max-white-fraction, the limits of board images.
 void add_board_image_quality_options(CLI::App& app, FrontendOptions& options);
 
 /// Adds --room, --classifier, --annotate, --readout, --exposure-s, --max-mpx and --threads.

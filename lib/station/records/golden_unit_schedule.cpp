@@ -144,7 +144,7 @@ std::string hash_measurement_settings(const StationConfig& config) {
              {"dispersion_captures", completion.dispersion_captures},
              {"check_captures", completion.check_captures}});
   const FrontendOptions& limits = config.frontend;
-  lines.add({{"blur_px", limits.max_blur_px},
+  lines.add({{"blur_fraction", limits.max_blur_fraction},
              {"dark_fraction", limits.min_bright_fraction},
              {"same_pose_fraction", limits.same_view_fraction},
              {"max_consecutive_rejections", config.max_consecutive_rejections}});

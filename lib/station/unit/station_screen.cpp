@@ -44,7 +44,9 @@ std::vector<ScreenLine> make_problem_lines(const std::string& label, const std::
 }
 
 std::string describe_outcome(const UnitImage& image) {
-  return image.is_image_used() ? "taken" : "refused: " + image.rejection_message();
+  if (!image.is_image_used()) return "refused: " + image.rejection_message();
+  const std::string& doubt = image.observation.doubt;
+  return doubt.empty() ? "taken" : "taken; " + doubt;
 }
 
 /// Returns the step of a unit's run that did not finish, with which its causes begin

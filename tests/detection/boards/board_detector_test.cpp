@@ -195,5 +195,33 @@ TEST(BoardDetector, DetectsAllVisibleTagsInStereoImages) {
   EXPECT_EQ(images_by_tags(folder / "cam1", folder / "board.yaml"), expected);
 }
 
+/// Boards in the shadow, cut by the image circle, and with corners of acute angles.
+TEST(BoardDetector, DetectsChessboardInEachFisheyeImage) {
+  const auto folder = real_data("chessboard-fisheye");
+  if (folder.empty()) GTEST_SKIP() << "no real captures here";
+  const BoardDetector detector(read_board(folder / "board.yaml"));
+  const auto images = list_images(folder);
+  ASSERT_EQ(images.size(), 26U);
+  for (const fs::path& image : images) {
+    EXPECT_GE(detector.detect_board(read_image(image)).points.size(), 22U) << image;  // of 24
+  }
+}
+
+/// White is clipped in most images, and markers cover the corners of five tags.
+TEST(BoardDetector, DetectsTagsInOverexposedImages) {
+  const auto folder = real_data("aprilgrid-mocap");
+  if (folder.empty()) GTEST_SKIP() << "no real captures here";
+  const BoardDetector detector(read_board(folder / "board.yaml"));
+  const auto images = list_images(folder / "images");
+  ASSERT_EQ(images.size(), 30U);
+  std::size_t tags = 0;
+  for (const fs::path& image : images) {
+    const BoardDetection seen = detector.detect_board(read_image(image));
+    EXPECT_GE(seen.tags.size(), 15U) << image;
+    tags += seen.tags.size();
+  }
+  EXPECT_GE(tags, 850U);
+}
+
 }  // namespace
 }  // namespace vlp

@@ -41,7 +41,7 @@ struct CurvedEdgeCorner {
     return image;
   }
 
-  std::optional<Eigen::Vector2d> fit_corner() const {
+  std::optional<FittedCorner> fit_corner() const {
     return fit_edge_intersection_at_corner(render_image(), corner_px + Eigen::Vector2d(0.4, -0.3),
                                            {Eigen::Vector2d(1, 0.1), Eigen::Vector2d(-0.02, 1)}, 8);
   }
@@ -53,7 +53,7 @@ TEST(FitEdgeIntersectionAtCorner, ReturnsCornerOfStraightEdges) {
   const CurvedEdgeCorner corner;
   const auto found = corner.fit_corner();
   ASSERT_TRUE(found);
-  EXPECT_THAT(*found, IsNear(corner.corner_px, kTolerance_px));
+  EXPECT_THAT(found->pixel, IsNear(corner.corner_px, kTolerance_px));
 }
 
 TEST(FitEdgeIntersectionAtCorner, ReturnsCornerOfEdgesWithDifferentCurvatures) {
@@ -63,8 +63,32 @@ TEST(FitEdgeIntersectionAtCorner, ReturnsCornerOfEdgesWithDifferentCurvatures) {
     corner.curvatures_per_px = curvatures;
     const auto found = corner.fit_corner();
     ASSERT_TRUE(found);
-    EXPECT_THAT(*found, IsNear(corner.corner_px, kTolerance_px))
+    EXPECT_THAT(found->pixel, IsNear(corner.corner_px, kTolerance_px))
         << curvatures[0] << " " << curvatures[1];
+  }
+}
+
+/// The scatter of corners in noisy images agrees with the reported standard deviation.
+TEST(FitEdgeIntersectionAtCorner, ReportsScatterOfNoisyImages) {
+  for (const double noise : {2.0, 6.0}) {
+    CurvedEdgeCorner corner;
+    cv::RNG random(7);
+    constexpr int images = 400;
+    double squares_px2 = 0, variances_px2 = 0;
+    for (int i = 0; i < images; ++i) {
+      corner.corner_px = {20 + random.uniform(-0.5, 0.5), 20 + random.uniform(-0.5, 0.5)};
+      cv::Mat levels, noise_levels(41, 41, CV_32F);
+      corner.render_image().convertTo(levels, CV_32F);
+      random.fill(noise_levels, cv::RNG::NORMAL, 0, noise);
+      cv::Mat1b image;
+      cv::Mat(levels + noise_levels).convertTo(image, CV_8U);
+      const auto found = fit_edge_intersection_at_corner(
+          image, corner.corner_px, {Eigen::Vector2d(1, 0.1), Eigen::Vector2d(-0.02, 1)}, 8);
+      ASSERT_TRUE(found);
+      squares_px2 += (found->pixel - corner.corner_px).squaredNorm() / 2;
+      variances_px2 += found->sd_px * found->sd_px;
+    }
+    EXPECT_NEAR(std::sqrt(squares_px2 / variances_px2), 1, 0.15) << noise;
   }
 }
 
@@ -74,7 +98,7 @@ TEST(FitEdgeIntersectionAtCorner, LightGradientDoesNotDisplaceCorner) {
   corner.curvatures_per_px = {0.01, -0.01};
   const auto found = corner.fit_corner();
   ASSERT_TRUE(found);
-  EXPECT_THAT(*found, IsNear(corner.corner_px, kTolerance_px));
+  EXPECT_THAT(found->pixel, IsNear(corner.corner_px, kTolerance_px));
 }
 
 // Each image ends 4 px beyond the corner on one side, and is a part of a larger, black one.
@@ -98,7 +122,7 @@ TEST(FitEdgeIntersectionAtCorner, UsesOnlyPixelsInsideImage) {
                                         corner.corner_px - origin + Eigen::Vector2d(0.4, -0.3),
                                         {Eigen::Vector2d(1, 0.1), Eigen::Vector2d(-0.02, 1)}, 8);
     ASSERT_TRUE(found);
-    EXPECT_THAT(*found, IsNear(corner.corner_px - origin, kTolerance_px));
+    EXPECT_THAT(found->pixel, IsNear(corner.corner_px - origin, kTolerance_px));
   }
 }
 

@@ -50,8 +50,13 @@ cv::Mat1b draw_chessboard(int columns, int rows) {
   return image;
 }
 
-TEST(FindChessboardCorners, ReturnsAllInnerCorners) {
-  const auto corners = find_chessboard_corners(draw_chessboard(7, 6), {6, 5});
+class FindChessboardCorners : public testing::TestWithParam<ChessboardSearch> {};
+INSTANTIATE_TEST_SUITE_P(Searches, FindChessboardCorners,
+                         testing::Values(ChessboardSearch::by_squares,
+                                         ChessboardSearch::by_saddle_points));
+
+TEST_P(FindChessboardCorners, ReturnsAllInnerCorners) {
+  const auto corners = find_chessboard_corners(draw_chessboard(7, 6), {6, 5}, GetParam());
   ASSERT_EQ(corners.size(), 30U);
   // The board has no unique beginning: rows start at the top left or at the bottom right.
   const bool is_reversed = corners.front().x > corners.back().x;
@@ -63,8 +68,9 @@ TEST(FindChessboardCorners, ReturnsAllInnerCorners) {
   }
 }
 
-TEST(FindChessboardCorners, ReturnsNoneForImageWithoutBoard) {
-  EXPECT_THAT(find_chessboard_corners(cv::Mat1b(200, 300, uchar{128}), {6, 5}), testing::IsEmpty());
+TEST_P(FindChessboardCorners, ReturnsNoneForImageWithoutBoard) {
+  EXPECT_THAT(find_chessboard_corners(cv::Mat1b(200, 300, uchar{128}), {6, 5}, GetParam()),
+              testing::IsEmpty());
 }
 
 /// Marker 0 of the published dictionary of 4 x 4 bits.

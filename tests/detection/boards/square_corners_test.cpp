@@ -167,36 +167,85 @@ TEST(SquareCorners, DetectsChessboardAccuratelyInObliqueView) {
   }
 }
 
-/// Large images are searched at a reduced resolution.
-TEST(SquareCorners, DetectsChessboardAccuratelyInLargeImage) {
+/// Photographs of 12 megapixels: squares of 40 to 280 px, with the blur of a phone.
+TEST(SquareCorners, DetectsChessboardAccuratelyInLargeImages) {
   const Board board = squares(BoardKind::chessboard, 9, 6);
-  const cv::Mat drawn = drawn_chessboard(board);
-  cv::Mat image(3001, 4002, CV_8U, cv::Scalar(255));
-  const cv::Point at(1703, 1201);
-  drawn.copyTo(image(cv::Rect(at, drawn.size())));
-  BoardDetection seen = BoardDetector(board).detect_board(image);
-  for (PointDetection& point : seen.points) point.pixel -= Eigen::Vector2d(at.x, at.y);
-  expect_all_corners(board, seen);
-  auto shown = detect_chessboard_size_in_squares(image);  // either way around
-  std::sort(shown.begin(), shown.end());
-  EXPECT_EQ(shown, (std::array{6, 9}));
+  for (const auto& [square_px, blur_px] :
+       {std::pair(40, 1.5), std::pair(160, 3.0), std::pair(280, 8.0)}) {
+    SCOPED_TRACE(square_px);
+    const double scale = static_cast<double>(square_px) / kSquare_px;
+    cv::Mat drawn;
+    cv::resize(drawn_chessboard(board), drawn, {}, scale, scale, cv::INTER_NEAREST);
+    cv::Mat image(3001, 4002, CV_8U, cv::Scalar(200));
+    const cv::Point at(image.cols - drawn.cols - 317, image.rows - drawn.rows - 201);
+    drawn.copyTo(image(cv::Rect(at, drawn.size())));
+    cv::GaussianBlur(image, image, {}, blur_px);
+    const BoardDetection seen = BoardDetector(board).detect_board(image);
+    ASSERT_EQ(seen.points.size(), 40U);
+    for (const PointDetection& point : seen.points) {
+      const Eigen::Array2d expected = (corner_position(board, point.index).array() + 0.5) * scale -
+                                      0.5 + Eigen::Array2d(at.x, at.y);
+      EXPECT_THAT(point.pixel, IsNear(expected.matrix(), 0.05)) << point.index;
+      EXPECT_GT(point.sd_px, 0) << point.index;
+    }
+  }
 }
 
-TEST(SquareCorners, ReturnsNoCornersForIncompleteChessboard) {
+TEST(SquareCorners, ReturnsNoCornersForTruncatedChessboard) {
+  const Board board = squares(BoardKind::chessboard, 9, 6);
+  const cv::Mat image = drawn_chessboard(board);
+  const BoardDetection seen =
+      BoardDetector(board).detect_board(image(cv::Rect(80, 0, image.cols - 80, image.rows)));
+  EXPECT_TRUE(seen.points.empty());
+  EXPECT_EQ(seen.largest_chessboard_part[1], 6);
+  EXPECT_LT(seen.largest_chessboard_part[0], 9);
+}
+
+/// A part of a larger chessboard is not the board, in which OpenCV finds smaller ones.
+TEST(SquareCorners, ReturnsNoCornersForLargerChessboard) {
+  const cv::Mat image = drawn_chessboard(squares(BoardKind::chessboard, 10, 7));
+  for (const auto& [cols, rows] :
+       {std::pair(9, 7), std::pair(10, 6), std::pair(9, 6), std::pair(8, 5), std::pair(5, 7)}) {
+    const BoardDetection seen =
+        BoardDetector(squares(BoardKind::chessboard, cols, rows)).detect_board(image);
+    EXPECT_TRUE(seen.points.empty()) << cols << " x " << rows;
+    auto size = seen.largest_chessboard_part;
+    std::ranges::sort(size);
+    EXPECT_EQ(size, (std::array{7, 10})) << cols << " x " << rows;
+  }
+}
+
+/// A corner in the shadow of an edge, or covered, is dropped; the others are used.
+TEST(SquareCorners, DropsCoveredCornerOfChessboard) {
   const Board board = squares(BoardKind::chessboard, 9, 6);
   cv::Mat image = drawn_chessboard(board);
-  EXPECT_TRUE(BoardDetector(board)
-                  .detect_board(image(cv::Rect(80, 0, image.cols - 80, image.rows)))
-                  .points.empty());
-  image(cv::Rect(100, 100, 60, 60)) = 128;
+  const Eigen::Vector2d covered = corner_position(board, 19);
+  cv::circle(image, cv::Point(static_cast<int>(covered.x()), static_cast<int>(covered.y())), 5,
+             cv::Scalar(128), -1);
+  const BoardDetection seen = BoardDetector(board).detect_board(image);
+  EXPECT_GE(seen.points.size(), 39U);
+  for (const PointDetection& point : seen.points) {
+    EXPECT_THAT(point.pixel, IsNear(corner_position(board, point.index), 0.05)) << point.index;
+  }
+}
+
+TEST(SquareCorners, ReturnsNoCornersIfSquaresAreCovered) {
+  const Board board = squares(BoardKind::chessboard, 9, 6);
+  cv::Mat image = drawn_chessboard(board);
+  image(cv::Rect(100, 100, 100, 60)) = 128;
   EXPECT_TRUE(BoardDetector(board).detect_board(image).points.empty());
 }
 
-TEST(OtherBoardKinds, ChessboardSizeIsDetectedAndMarkerDictionaryIsNamed) {
-  const cv::Mat image = drawn_chessboard(squares(BoardKind::chessboard, 9, 6));
-  const auto [cols, rows] = detect_chessboard_size_in_squares(image);
-  EXPECT_EQ(std::max(cols, rows), 9);
-  EXPECT_EQ(std::min(cols, rows), 6);
+TEST(SquareCorners, FindsNoPartOfChessboardInImageWithoutBoard) {
+  const BoardDetector detector(squares(BoardKind::chessboard, 9, 6));
+  for (const cv::Size size : {cv::Size(100, 120), cv::Size(9, 120), cv::Size()}) {
+    const BoardDetection seen = detector.detect_board(cv::Mat1b(size, uchar{100}));
+    EXPECT_TRUE(seen.points.empty());
+    EXPECT_EQ(seen.largest_chessboard_part, (std::array{0, 0}));
+  }
+}
+
+TEST(OtherBoardKinds, MarkerDictionaryIsNamed) {
   Board charuco = squares(BoardKind::charuco, 7, 5);
   const cv::Mat markers = drawn_by_opencv(charuco);
   charuco.family = "DICT_4X4_50";

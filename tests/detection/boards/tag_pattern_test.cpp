@@ -102,26 +102,26 @@ struct SampledTag {
   explicit SampledTag(int border_bits, int id = 5) : border(border_bits) {
     tag.id = id;
     const int width_px = kBit_px * tag_width_with_border_in_bits(*family, border);
-    levels = cv::Mat1f(width_px + 2 * margin_px, width_px + 2 * margin_px, 100.0F);
+    levels = cv::Mat1b(width_px + 2 * margin_px, width_px + 2 * margin_px, uchar{100});
     const double low = margin_px - 0.5, high = low + width_px;
     tag.corners_px = {Eigen::Vector2d(low, high), {high, high}, {high, low}, {low, low}};
     for (uint32_t bit = 0; bit < family->nbits; ++bit) {
-      level(bit) = is_tag_bit_white(*family, id, bit) ? 150.0F : 60.0F;
+      level(bit) = is_tag_bit_white(*family, id, bit) ? uchar{150} : uchar{60};
     }
   }
-  float& level(uint32_t bit) {
+  uchar& level(uint32_t bit) {
     const auto center = [&](uint32_t at) {
       return margin_px + kBit_px * (static_cast<int>(at) + border - 1) + kBit_px / 2;
     };
     return levels(center(family->bit_y[bit]), center(family->bit_x[bit]));
   }
-  void invert(uint32_t bit) { level(bit) = 210 - level(bit); }
+  void invert(uint32_t bit) { level(bit) = static_cast<uchar>(210 - level(bit)); }
   bool matches() const { return image_matches_tag_bits(tag, levels, *family, border); }
 
   TagFamily family = make_tag_family("tag36h11");
   int border, margin_px = 10;
   TagDetection tag{};
-  cv::Mat1f levels;
+  cv::Mat1b levels;
 };
 
 TEST(ImageMatchesTagBits, SamplesCentersOfBits) {
@@ -149,16 +149,20 @@ TEST(ImageMatchesTagBits, ToleratesTwoWrongBits) {
   EXPECT_FALSE(sampled.matches());
 }
 
-TEST(ImageMatchesTagBits, ThresholdIsMeanOfDarkestAndBrightestBit) {
+/// A black bit between white ones is gray in overexposed and blurred images.
+TEST(ImageMatchesTagBits, ThresholdIsBetweenMeansOfWhiteAndBlackBits) {
   SampledTag sampled(1);
   std::vector<uint32_t> black;
   for (uint32_t bit = 0; bit < sampled.family->nbits; ++bit) {
     if (!is_tag_bit_white(*sampled.family, sampled.tag.id, bit)) black.push_back(bit);
   }
   ASSERT_GT(black.size(), 4U);
-  for (std::size_t i = 0; i < 3; ++i) sampled.level(black[i]) = 104;
+  // The level x of three bits equals the threshold (150 + 60 + 3 (x - 60) / n) / 2.
+  const auto n = static_cast<double>(black.size());
+  const double limit = (105 - 90 / n) / (1 - 1.5 / n);
+  for (std::size_t i = 0; i < 3; ++i) sampled.level(black[i]) = static_cast<uchar>(limit - 1);
   EXPECT_TRUE(sampled.matches());
-  for (std::size_t i = 0; i < 3; ++i) sampled.level(black[i]) = 106;
+  for (std::size_t i = 0; i < 3; ++i) sampled.level(black[i]) = static_cast<uchar>(limit + 2);
   EXPECT_FALSE(sampled.matches());
 }
 

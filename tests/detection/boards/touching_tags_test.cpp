@@ -86,37 +86,66 @@ TEST(TouchingTags, RejectsTagWithoutSaddleAtOneCorner) {
   }
 }
 
-TEST(TouchingTags, FindsAllMissingTagsFromOneTag) {
+TEST(TouchingTags, FindsAllTagsFromOneTag) {
   const DrawnTouchingTags drawn(4);
   const TouchingTags touching(drawn.board);
   for (const std::size_t seed : {0U, 5U, 11U}) {
-    const auto found = touching.find_missing_tags({drawn.truth[seed]}, drawn.levels);
-    ASSERT_EQ(found.size(), drawn.truth.size() - 1) << seed;
+    const auto found = touching.refine_and_complete_tags({drawn.truth[seed]}, drawn.levels);
+    ASSERT_EQ(found.size(), drawn.truth.size()) << seed;
+    EXPECT_EQ(found.front().id, drawn.truth[seed].id);
     for (const TagDetection& tag : found) {
-      EXPECT_NE(tag.id, drawn.truth[seed].id);
       const auto expected = std::ranges::find(drawn.truth, tag.id, &TagDetection::id);
       ASSERT_NE(expected, drawn.truth.end());
       for (std::size_t k = 0; k < 4; ++k) {
         EXPECT_THAT(tag.corners_px[k], IsNear(expected->corners_px[k], 0.03)) << tag.id;
+        EXPECT_GT(tag.corner_sds_px[k], 0) << tag.id;
       }
     }
   }
+}
+
+TEST(TouchingTags, FindsTagsFromTagThatCannotBeRefined) {
+  const DrawnTouchingTags drawn(4);
+  cv::Mat1b image = drawn.levels.sharp.clone();
+  const Eigen::Vector2i at = drawn.truth[0].corners_px[0].array().round().cast<int>();
+  image(cv::Rect(at.x() - 3, at.y() - 3, 7, 7)) = 120;
+  const auto found =
+      TouchingTags(drawn.board).refine_and_complete_tags({drawn.truth[0]}, smooth(image));
+  EXPECT_EQ(found.size(), drawn.truth.size() - 1);
+  EXPECT_EQ(std::ranges::find(found, drawn.truth[0].id, &TagDetection::id), found.end());
 }
 
 // Places of missing tags are predicted from tags up to 2.2 tag widths away.
 TEST(TouchingTags, FindsMissingTagsOnlyNextToOtherTags) {
   DrawnTouchingTags drawn(4, 5, 1);
   cv::Mat1b image = drawn.levels.sharp.clone();
-  const auto erase = [&](const TagDetection& tag) {
-    const Eigen::Vector2i at = tag.corners_px[3].array().round().cast<int>();
-    image(cv::Rect(at.x() - 2, at.y() - 2, 44, 44)) = 200;
-  };
-  erase(drawn.truth[1]);
+  const Eigen::Vector2i at = drawn.truth[1].corners_px[3].array().round().cast<int>();
+  image(cv::Rect(at.x() - 2, at.y() - 2, 44, 44)) = 200;
   const TouchingTags touching(drawn.board);
-  const auto found = touching.find_missing_tags({drawn.truth[0]}, smooth(image));
-  EXPECT_TRUE(found.empty()) << "the next tag is 2.4 tag widths away";
-  EXPECT_TRUE(touching.find_missing_tags({}, drawn.levels).empty());
-  EXPECT_TRUE(touching.find_missing_tags(drawn.truth, drawn.levels).empty());
+  EXPECT_EQ(touching.refine_and_complete_tags({drawn.truth[0]}, drawn.levels).size(), 5U);
+  EXPECT_LE(touching.refine_and_complete_tags({drawn.truth[0]}, smooth(image)).size(), 1U)
+      << "the next tag is 2.4 tag widths away";
+  EXPECT_TRUE(touching.refine_and_complete_tags({}, drawn.levels).empty());
+}
+
+/// Overexposed white grows by about 1 px on each side, as in photographs of boards in the sun.
+TEST(TouchingTags, FindsAllTagsWithOverexposedWhite) {
+  for (const int bit_px : {4, 5}) {
+    SCOPED_TRACE(bit_px);
+    const DrawnTouchingTags drawn(bit_px);
+    cv::Mat1b image;
+    cv::dilate(drawn.levels.sharp, image, cv::getStructuringElement(cv::MORPH_CROSS, {3, 3}));
+    cv::GaussianBlur(image, image, {}, 0.7);
+    const BoardDetection seen = BoardDetector(drawn.board).detect_board(image);
+    EXPECT_EQ(seen.tags.size(), drawn.truth.size());
+    for (const TagDetection& tag : seen.tags) {
+      const auto expected = std::ranges::find(drawn.truth, tag.id, &TagDetection::id);
+      ASSERT_NE(expected, drawn.truth.end());
+      for (std::size_t k = 0; k < 4; ++k) {
+        EXPECT_THAT(tag.corners_px[k], IsNear(expected->corners_px[k], 0.3)) << tag.id;
+      }
+    }
+  }
 }
 
 /// Chessboard of 8 x 6 squares, white markers included as plain squares.
@@ -240,21 +269,6 @@ TEST(SquareCorners, RejectsCornersWithinTwoPixelsOfImageBorder) {
   EXPECT_EQ(count({0, 0, 200, full.height}), 30U);
   EXPECT_EQ(count({0, 0, full.width, 153}), 35U);
   EXPECT_EQ(count({0, 0, full.width, 152}), 28U);
-}
-
-TEST(DetectChessboardSizeInSquares, ReturnsZeroForImagesWithoutBoard) {
-  EXPECT_EQ(detect_chessboard_size_in_squares(cv::Mat1b(100, 120, uchar{100})), (std::array{0, 0}));
-  EXPECT_EQ(detect_chessboard_size_in_squares(cv::Mat1b(9, 120, uchar{100})), (std::array{0, 0}));
-  EXPECT_EQ(detect_chessboard_size_in_squares(cv::Mat1b()), (std::array{0, 0}));
-}
-
-TEST(DetectChessboardSizeInSquares, CountsSquaresOf16BitImage) {
-  const DrawnSquares drawn(24);
-  cv::Mat deep;
-  drawn.levels.sharp.convertTo(deep, CV_16U, 16);
-  auto size = detect_chessboard_size_in_squares(deep);
-  std::sort(size.begin(), size.end());
-  EXPECT_EQ(size, (std::array{6, 8}));
 }
 
 }  // namespace

@@ -259,7 +259,7 @@ TEST_F(ComputeMeasurementSettingsDigest, ChangesWithSettingsThatAffectMeasuremen
   is_new("camera_type.yaml", "-0.25", "-0.24");
   is_new("station.yaml", "board_views: 36", "board_views: 35");
   is_new("station.yaml", "check_captures: 36", "check_captures: 30");
-  is_new("station.yaml", "rejection: {blur_px: 2", "rejection: {blur_px: 2.5");
+  is_new("station.yaml", "rejection: {blur_fraction: 0.003", "rejection: {blur_fraction: 0.004");
   is_new("station.yaml", "check_worst_mm: 3", "check_worst_mm: 4");
   is_new("station.yaml", "gates: {check_mean_mm: 0.5}", "gates: {check_mean_mm: 0.6}");
   is_new("station.yaml", "camera_id: golden", "camera_id: other");
