@@ -58,11 +58,11 @@ Board make_board(const Options& options) {
 }
 
 void run(const Options& options) {
-  constexpr int min_squares = 4;
   const bool squares = options.chessboard || options.charuco;
-  if (squares && std::min(options.cols.value_or(min_squares), options.rows.value_or(min_squares)) <
-                     min_squares) {
-    throw std::invalid_argument("--cols, --rows: a board of squares needs at least 4 x 4 squares");
+  if (squares && std::min(options.cols.value_or(kMinSquaresPerSide),
+                          options.rows.value_or(kMinSquaresPerSide)) < kMinSquaresPerSide) {
+    throw std::invalid_argument(fmt::format(
+        "--cols, --rows: a board of squares needs at least {0} x {0} squares", kMinSquaresPerSide));
   }
   if (!squares && options.square_mm) {
     throw std::invalid_argument("--square-mm: only for --chessboard and --charuco; use --tag-mm");
@@ -108,10 +108,10 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--paper", options.paper, "Paper size, A0 to A4 or Letter (default: A4)");
   app.add_option("--cols", options.cols,
                  "Number of tags or squares along the width (default: 6 tags or 10 squares)")
-      ->check(CLI::Range(1, 100));
+      ->check(CLI::Range(1, kMaxTagsPerSide));
   app.add_option("--rows", options.rows,
                  "Number of tags or squares along the height (default: 5 tags or 7 squares)")
-      ->check(CLI::Range(1, 100));
+      ->check(CLI::Range(1, kMaxTagsPerSide));
   auto* tag_mm = app.add_option("--tag-mm", options.tag_mm,
                                 "Width of a tag including its black border, in mm (default: "
                                 "largest that fits on the paper)")

@@ -18,14 +18,14 @@ constexpr const char* kBoardFormat = "vlp-board/1";
 constexpr std::array kFamilies{"tag36h11",         "tag25h9",         "tag16h5",
                                "tagCircle21h7",    "tagCircle49h12",  "tagCustom48h12",
                                "tagStandard41h12", "tagStandard52h13"};
+// Number of tags of each family in libapriltag.
+constexpr std::array kFamilySizes{587, 35, 30, 38, 65535, 42211, 2115, 48714};
 // In the order of BoardCorner.
 constexpr std::array kCorners{"bottom-left", "bottom-right", "top-left", "top-right"};
 
 // In the order of BoardKind.
 constexpr std::array kKinds{"apriltags", "chessboard", "charuco"};
 
-constexpr int kMaxTags = 1000;
-constexpr int kMinSquares = 4, kMaxSquares = 100;
 constexpr int kMaxId = 1'000'000;  // families have fewer
 constexpr double kMinTag_m = 1e-4, kMaxTag_m = 2;
 constexpr double kMaxPrintSd = 0.02;  // check_board_layout() detects larger errors
@@ -62,10 +62,10 @@ Board make_board_of_squares(BoardKind kind) {
 
 Board read_squares(YamlMap& map, BoardKind kind) {
   Board board = make_board_of_squares(kind);
-  board.cols =
-      map.get_required_yaml_value("cols").read_yaml_integer_within(kMinSquares, kMaxSquares);
-  board.rows =
-      map.get_required_yaml_value("rows").read_yaml_integer_within(kMinSquares, kMaxSquares);
+  board.cols = map.get_required_yaml_value("cols").read_yaml_integer_within(kMinSquaresPerSide,
+                                                                            kMaxTagsPerSide);
+  board.rows = map.get_required_yaml_value("rows").read_yaml_integer_within(kMinSquaresPerSide,
+                                                                            kMaxTagsPerSide);
   board.square_size_m = map.get_required_yaml_value("square_size_m")
                             .read_yaml_number_within(kMinTag_m, kMaxTag_m, "m");
   if (kind == BoardKind::chessboard) return board;
@@ -96,10 +96,10 @@ Board read_squares(YamlMap& map, BoardKind kind) {
 Board read_kalibr_checkerboard(YamlMap& map) {
   Board board = make_board_of_squares(BoardKind::chessboard);
   board.cols = map.get_required_yaml_value("targetCols")
-                   .read_yaml_integer_within(kMinSquares - 1, kMaxSquares - 1) +
+                   .read_yaml_integer_within(kMinSquaresPerSide - 1, kMaxTagsPerSide - 1) +
                1;
   board.rows = map.get_required_yaml_value("targetRows")
-                   .read_yaml_integer_within(kMinSquares - 1, kMaxSquares - 1) +
+                   .read_yaml_integer_within(kMinSquaresPerSide - 1, kMaxTagsPerSide - 1) +
                1;
   const YamlValue height = map.get_required_yaml_value("rowSpacingMeters");
   board.square_size_m = map.get_required_yaml_value("colSpacingMeters")
@@ -112,25 +112,49 @@ Board read_kalibr_checkerboard(YamlMap& map) {
   return board;
 }
 
-/// Reads Kalibr's target of kind checkerboard, or aprilgrid as in its documentation: tag36h11 with
-/// a border of two bits and squares at the corners. Ids count from codeOffset, or 0, along the rows
-/// from the bottom left.
-Board read_kalibr_target(YamlMap& map) {
-  const YamlValue kind = map.get_required_yaml_value("target_type");
-  if (kind.read_yaml_string() == "checkerboard") return read_kalibr_checkerboard(map);
-  if (kind.read_yaml_string() != "aprilgrid") {
-    throw kind.make_yaml_error("should be aprilgrid or checkerboard; from others no lens is found");
+/// Throws InputError at the number of rows if the family has fewer tags than the board.
+void check_family_has_tags(const Board& board, const YamlValue& rows) {
+  const auto family = std::ranges::find(kFamilies, board.family) - kFamilies.begin();
+  const int size = kFamilySizes[static_cast<std::size_t>(family)];
+  const int tags = board.cols * board.rows;
+  if (board.first_id <= size - tags) return;
+  throw rows.make_yaml_error("a board of " + std::to_string(tags) + " tags from id " +
+                             std::to_string(board.first_id) + " needs more than the " +
+                             std::to_string(size) + " tags of " + board.family +
+                             "; correct cols, rows, or the first id");
+}
+
+/// Names of the keys of an AprilGrid in the files of a calibration tool.
+struct GridKeys {
+  const char *cols, *rows, *size, *spacing;
+};
+constexpr GridKeys kKalibrKeys{"tagCols", "tagRows", "tagSize", "tagSpacing"};
+constexpr GridKeys kYacKeys{"tag_cols", "tag_rows", "tag_size", "tag_spacing"};
+
+/// Reads a target of kind checkerboard of Kalibr, or aprilgrid of Kalibr, basalt or yac, as in
+/// Kalibr's documentation: tag36h11 with a border of two bits and squares at the corners. Ids count
+/// from codeOffset, or 0, along the rows from the bottom left.
+Board read_grid_target(YamlMap& map) {
+  if (const auto kind = map.get_optional_yaml_value("target_type")) {
+    if (kind->read_yaml_string() == "checkerboard") return read_kalibr_checkerboard(map);
+    if (kind->read_yaml_string() != "aprilgrid") {
+      throw kind->make_yaml_error(
+          "should be aprilgrid or checkerboard; from others no lens is found");
+    }
   }
+  const GridKeys& keys = map.has_yaml_key(kYacKeys.cols) ? kYacKeys : kKalibrKeys;
   Board board{"tag36h11", 0, 0, 0, 0, 2, true, 0, {false, BoardCorner::bottom_left}};
-  board.cols = map.get_required_yaml_value("tagCols").read_yaml_integer_within(1, kMaxTags);
-  board.rows = map.get_required_yaml_value("tagRows").read_yaml_integer_within(1, kMaxTags);
+  board.cols = map.get_required_yaml_value(keys.cols).read_yaml_integer_within(1, kMaxTagsPerSide);
+  const YamlValue rows = map.get_required_yaml_value(keys.rows);
+  board.rows = rows.read_yaml_integer_within(1, kMaxTagsPerSide);
   board.tag_size_m =
-      map.get_required_yaml_value("tagSize").read_yaml_number_within(kMinTag_m, kMaxTag_m, "m");
+      map.get_required_yaml_value(keys.size).read_yaml_number_within(kMinTag_m, kMaxTag_m, "m");
   board.tag_spacing =
-      map.get_required_yaml_value("tagSpacing").read_yaml_number_within(0.01, 10, "(gap / tag)");
+      map.get_required_yaml_value(keys.spacing).read_yaml_number_within(0.01, 10, "(gap / tag)");
   if (const auto first = map.get_optional_yaml_value("codeOffset")) {
     board.first_id = first->read_yaml_integer_within(0, kMaxId);
   }
+  check_family_has_tags(board, rows);
   return board;
 }
 
@@ -150,8 +174,9 @@ Board read_board_from_yaml(YamlMap& map) {
   Board board;
   board.family =
       kFamilies[find_word(map.get_required_yaml_value("family"), kFamilies, "the families are: ")];
-  board.cols = map.get_required_yaml_value("cols").read_yaml_integer_within(1, kMaxTags);
-  board.rows = map.get_required_yaml_value("rows").read_yaml_integer_within(1, kMaxTags);
+  board.cols = map.get_required_yaml_value("cols").read_yaml_integer_within(1, kMaxTagsPerSide);
+  const YamlValue rows = map.get_required_yaml_value("rows");
+  board.rows = rows.read_yaml_integer_within(1, kMaxTagsPerSide);
   board.tag_size_m =
       map.get_required_yaml_value("tag_size_m").read_yaml_number_within(kMinTag_m, kMaxTag_m, "m");
   board.tag_spacing =
@@ -160,15 +185,20 @@ Board read_board_from_yaml(YamlMap& map) {
   board.corner_squares = map.get_required_yaml_value("corner_squares").read_yaml_boolean();
   board.first_id = map.get_required_yaml_value("first_id").read_yaml_integer_within(0, kMaxId);
   board.id_order = read_id_order(map.get_required_yaml_value("id_order"));
+  check_family_has_tags(board, rows);
   return board;
 }
 
 Board read_board(const std::filesystem::path& file) {
   YamlMap document = read_yaml_file(file);
-  const bool kalibr = document.has_yaml_key("target_type");
-  if (!kalibr) check_yaml_file_format(document, kBoardFormat);
-  Board board = kalibr ? read_kalibr_target(document) : read_board_from_yaml(document);
-  if (const auto print_sd = kalibr ? std::nullopt : document.get_optional_yaml_value("print_sd")) {
+  for (const char* const key : {"calib_target", "calibration_target"}) {
+    if (const auto target = document.get_optional_yaml_value(key))
+      return target->convert_yaml_mapping(read_grid_target);
+  }
+  const bool grid = document.has_yaml_key("target_type") || document.has_yaml_key(kKalibrKeys.cols);
+  if (!grid) check_yaml_file_format(document, kBoardFormat);
+  Board board = grid ? read_grid_target(document) : read_board_from_yaml(document);
+  if (const auto print_sd = grid ? std::nullopt : document.get_optional_yaml_value("print_sd")) {
     board.print_sd = print_sd->read_yaml_number_within(0, kMaxPrintSd, "(relative)");
   }
   document.check_all_yaml_keys_read();

@@ -25,6 +25,10 @@ std::string id_order_name(const IdOrder& order);
 /// each white square, as OpenCV's CharucoBoard. In YAML: "apriltags", "chessboard", "charuco".
 enum class BoardKind { apriltags, chessboard, charuco };
 
+/// Minimum number of squares, and maximum number of squares or tags, along each side of a board.
+/// The time of a lens calibration increases with all corners of the board, not only visible ones.
+inline constexpr int kMinSquaresPerSide = 4, kMaxTagsPerSide = 50;
+
 /// Printed calibration board: its pattern and dimensions, seen flat and upright. Boards of squares
 /// use square_size_m instead of tag_spacing, border_bits and corner_squares.
 struct Board {
@@ -59,7 +63,7 @@ struct Board {
   bool has_chessboard_squares() const { return kind != BoardKind::apriltags; }
 };
 
-/// Reads a board from `vlp-board/1` or from a target file of Kalibr.
+/// Reads a board from `vlp-board/1` or from a target file of Kalibr, basalt or yac.
 ///
 /// Keys of `vlp-board/1`:
 ///   apriltags   the fields up to id_order, by name
@@ -68,9 +72,15 @@ struct Board {
 ///               white)
 ///   all         print_sd?
 /// Keys of Kalibr's targets:
-///   AprilGrid     target_type, tagCols, tagRows, tagSize in m, tagSpacing, codeOffset
-///   checkerboard  targetCols, targetRows (of corners), rowSpacingMeters, colSpacingMeters
-/// @throws InputError if the file cannot be read or is invalid
+///   AprilGrid     target_type? (aprilgrid; basalt's JSON has none), tagCols, tagRows, tagSize in
+///   m,
+///                 tagSpacing, codeOffset?
+///   checkerboard  target_type, targetCols, targetRows (of corners), rowSpacingMeters,
+///                 colSpacingMeters
+/// Keys of yac's targets, at the top, or in calib_target or calibration_target of a calibration
+/// file of yac, whose other keys are ignored:
+///   AprilGrid     target_type, tag_cols, tag_rows, tag_size in m, tag_spacing
+/// @throws InputError if the file cannot be read or is invalid, or if the family has fewer tags
 Board read_board(const std::filesystem::path& file);
 
 /// Writes a file for read_board(), atomically. Throws InputError if it cannot be written.

@@ -77,6 +77,69 @@ TEST(ReadBoard, UsesKalibrCodeOffsetAsFirstId) {
   EXPECT_THAT(refusal(read_board, with("0.5")), HasSubstr("target.yaml:6: codeOffset: should be"));
 }
 
+constexpr const char* kYacTarget =
+    "target_type: 'aprilgrid'  # Target type\n"
+    "tag_rows: 4               # Number of rows\n"
+    "tag_cols: 5               # Number of cols\n"
+    "tag_size: 0.02            # Size of apriltag, edge to edge [m]\n"
+    "tag_spacing: 0.2          # Ratio of space between tags to tagSize\n";
+
+/// The same text with each line indented, below `key` of a calibration file.
+std::string nested(const std::string& key, const std::string& target) {
+  std::string text = "settings: {fix_intrinsics: true}\n" + key + ":\n  ";
+  for (const char letter : target) text += letter == '\n' ? "\n  " : std::string(1, letter);
+  return text + "\ncam0: {resolution: [640, 480]}\n";
+}
+
+TEST(ReadBoard, ReadsBoardFromYacTargetAndCalibrationFile) {
+  const TemporaryFolder folder;
+  const Board board{"tag36h11", 5, 4, 0.02, 0.2, 2, true, 0, {false, BoardCorner::bottom_left}};
+  expect_same(read_board(folder.file("target.yaml", kYacTarget)), board);
+  for (const char* key : {"calib_target", "calibration_target"})
+    expect_same(read_board(folder.file("calib.yaml", nested(key, kYacTarget))), board);
+}
+
+TEST(ReadBoard, RejectsInvalidKeysAndValuesOfYacTarget) {
+  const TemporaryFolder folder;
+  const auto rejection_message = [&](const std::string& from, const std::string& to) {
+    return refusal(read_board, folder.file("target.yaml", changed(kYacTarget, from, to)));
+  };
+  EXPECT_THAT(rejection_message("tag_size", "tagSize"), HasSubstr("key 'tag_size' is missing"));
+  EXPECT_THAT(rejection_message("tag_rows: 4", "tag_rows: 51"),
+              HasSubstr("target.yaml:2: tag_rows: should be a whole number within 1 and 50"));
+  EXPECT_THAT(rejection_message("aprilgrid", "circlegrid"), HasSubstr("aprilgrid or checkerboard"));
+  EXPECT_THAT(rejection_message("# Target type", "\nfamily: tag36h11"), HasSubstr("'family'"));
+  const std::string wrong = changed(nested("calib_target", kYacTarget), "0.02", "20");
+  EXPECT_THAT(refusal(read_board, folder.file("calib.yaml", wrong)),
+              HasSubstr("calib.yaml:6: calib_target.tag_size: 20 m is not within"));
+}
+
+/// basalt's JSON has no target_type.
+TEST(ReadBoard, ReadsBoardFromBasaltJson) {
+  const TemporaryFolder folder;
+  const Board board{"tag36h11", 5, 4, 0.02, 0.2, 2, true, 0, {false, BoardCorner::bottom_left}};
+  expect_same(
+      read_board(folder.file("aprilgrid.json",
+                             "{\n    \"tagCols\": 5,\n    \"tagRows\": 4,\n    \"tagSize\": 0.02,\n"
+                             "    \"tagSpacing\": 0.2\n}\n")),
+      board);
+}
+
+TEST(ReadBoard, RejectsMoreTagsThanFamilyHas) {
+  const TemporaryFolder folder;
+  // tag36h11 has the ids 0 to 586.
+  const auto kalibr = [&](const std::string& rows, const std::string& offset) {
+    return folder.file("target.yaml", changed(kKalibrTarget, "tagRows: 4", "tagRows: " + rows) +
+                                          "codeOffset: " + offset + "\n");
+  };
+  EXPECT_EQ(read_board(kalibr("50", "337")).rows, 50);
+  EXPECT_EQ(refusal(read_board, kalibr("50", "338")),
+            "target.yaml:3: tagRows: a board of 250 tags from id 338 needs more than the 587 tags "
+            "of tag36h11; correct cols, rows, or the first id");
+  EXPECT_THAT(refusal_with("tag36h11", "tag16h5"),
+              HasSubstr("board.yaml:4: rows: a board of 40 tags from id 1 needs more than the 30"));
+}
+
 TEST(ReadBoard, RejectsOtherKalibrTargetTypesAndWrongKeys) {
   const TemporaryFolder folder;
   const auto rejection_message = [&](const std::string& from, const std::string& to) {
@@ -129,7 +192,8 @@ TEST(ReadBoard, RejectsInvalidValuesOfCharucoBoard) {
               HasSubstr("board.yaml:2: kind: 'checkers' is unknown; the kinds of boards are: "
                         "apriltags, chessboard, charuco"));
   EXPECT_THAT(rejection_message("charuco", "chessboard"), HasSubstr("'marker_size_m'"));
-  EXPECT_THAT(rejection_message("rows: 7", "rows: 3"), HasSubstr("within 4 and 100"));
+  EXPECT_THAT(rejection_message("rows: 7", "rows: 3"),
+              HasSubstr("board.yaml:4: rows: should be a whole number within 4 and 50"));
   EXPECT_THAT(rejection_message("0.02", "0.03"), HasSubstr("smaller than the square around it"));
   EXPECT_THAT(rejection_message("DICT_5X5_100", "tag36h11"),
               HasSubstr("one of OpenCV's dictionaries"));
@@ -191,9 +255,9 @@ TEST(ReadBoard, ListsValidWordsForUnknownFamilyOrIdOrder) {
 
 TEST(ReadBoard, ReportsLineAndKeyOfInvalidValue) {
   EXPECT_EQ(refusal_with("cols: 8", "cols: 0"),
-            "board.yaml:3: cols: should be a whole number within 1 and 1000, not '0'");
+            "board.yaml:3: cols: should be a whole number within 1 and 50, not '0'");
   EXPECT_EQ(refusal_with("rows: 5", "rows: 4.5"),
-            "board.yaml:4: rows: should be a whole number within 1 and 1000, not '4.5'");
+            "board.yaml:4: rows: should be a whole number within 1 and 50, not '4.5'");
   EXPECT_EQ(refusal_with("0.016", "16"),
             "board.yaml:5: tag_size_m: 16 m is not within 0.0001 and 2 m: is it in the right "
             "unit?");

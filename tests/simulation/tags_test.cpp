@@ -9,10 +9,13 @@
 #include <map>
 
 #include "geometry/angles.h"
+#include "rig/board.h"
+#include "rig/input_error.h"
 #include "simulation/board_print.h"
 #include "simulation/exposure.h"
 #include "simulation/plain_scene.h"
 #include "simulation/truth.h"
+#include "support/temporary_folder.h"
 
 namespace vlp {
 namespace {
@@ -102,6 +105,29 @@ TEST(MakeTagPattern, ThrowsForUnknownIdOrBorderWidth) {
   EXPECT_NO_THROW(make_tag_pattern("tag36h11", 586, 1));
   EXPECT_THROW(make_tag_pattern("tag36h11", -1, 1), std::invalid_argument);
   EXPECT_THROW(make_tag_pattern("tagStandard41h12", 0, 2), std::invalid_argument);
+}
+
+/// The last id of each family is readable as a board and has a pattern; the next one is neither.
+TEST(ReadBoard, KnowsNumberOfTagsOfEachFamily) {
+  const TemporaryFolder folder;
+  for (const auto& [family, tags] : {std::pair("tag36h11", 587),
+                                     {"tag25h9", 35},
+                                     {"tag16h5", 30},
+                                     {"tagCircle21h7", 38},
+                                     {"tagCircle49h12", 65535},
+                                     {"tagCustom48h12", 42211},
+                                     {"tagStandard41h12", 2115},
+                                     {"tagStandard52h13", 48714}}) {
+    const auto read_with_first_id = [&, name = family](int id) {
+      Board board{name, 1, 1, 0.1, 1, 1, false, id, {false, BoardCorner::top_left}};
+      write_board(folder / "board.yaml", board);
+      read_board(folder / "board.yaml");
+    };
+    EXPECT_NO_THROW(read_with_first_id(tags - 1)) << family;
+    EXPECT_THROW(read_with_first_id(tags), InputError) << family;
+    EXPECT_NO_THROW(make_tag_pattern(family, tags - 1, 1)) << family;
+    EXPECT_THROW(make_tag_pattern(family, tags, 1), std::invalid_argument) << family;
+  }
 }
 
 }  // namespace
