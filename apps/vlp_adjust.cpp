@@ -16,6 +16,7 @@
 #include "program/steps/print_calibration.h"
 #include "program/steps/step_outcome.h"
 #include "rig/input_error.h"
+#include "rig/lamp_map_file.h"
 #include "session/adjust_step.h"
 #include "session/session_folder.h"
 #include "session/step_history.h"
@@ -75,7 +76,7 @@ void run(const CLI::App& app, const Options& options) {
   check_output_files_are_distinct(
       {{"--output", images.output}, {"--refine-map", options.refined_map}}, inputs);
   AdjustStepInput input;
-  input.lamps = read_lamps_of_room(images.lamps, images.frontend.room);
+  input.lamps = read_overhead_lamps_of_room(images.lamps, images.frontend.room);
   input.lamps_file = images.lamps;
   input.calibration = read_calibration(images.calibration);
   input.calibration_file = images.calibration;

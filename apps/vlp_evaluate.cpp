@@ -28,6 +28,7 @@
 #include "program/steps/print_fixes.h"
 #include "program/steps/step_outcome.h"
 #include "rig/file.h"
+#include "rig/lamp_map_file.h"
 #include "session/evaluate_step.h"
 
 namespace vlp {
@@ -144,7 +145,7 @@ EvaluationInput read_input(const Options& options) {
   input.reference_point_radius_m = compute_reference_point_radius_m(options);
   if (!options.compare.empty()) input.other_fixes = {options.compare, read_fixes(options.compare)};
   if (options.noise_px > 0) {
-    input.crlb_input = {read_lamps_of_room(options.lamps, options.room),
+    input.crlb_input = {read_overhead_lamps_of_room(options.lamps, options.room),
                         read_calibration(options.calibration).camera, options.noise_px};
   }
   input.threads = options.threads;

@@ -19,6 +19,7 @@
 #include "program/steps/print_fixes.h"
 #include "report/plots/floor_plot.h"
 #include "rig/input_error.h"
+#include "rig/lamp_map_file.h"
 #include "session/lamp_captures.h"
 #include "session/locate_step.h"
 
@@ -106,7 +107,7 @@ FloorLimits find_floor_limits(const Options& options, const LampMap& lamps, cons
 void run(const Options& options) {
   check_output_files_are_distinct({{"--map", options.map}, {"--picture", options.picture}},
                                   {options.lamps, options.calibration});
-  const LampMap lamps = read_lamps_of_room(options.lamps, options.room);
+  const LampMap lamps = read_overhead_lamps_of_room(options.lamps, options.room);
   FloorGrid grid = make_grid_of_floor_positions(lamps, options.step_m);
   if (const auto& floor = options.floor_m; !floor.empty()) {
     grid = {floor[0], floor[1], floor[2], floor[3], options.step_m};

@@ -17,6 +17,7 @@
 #include "lamps/signal/frequency_identification.h"
 #include "lamps/signal/lamp_map_check.h"
 #include "positioning/inclination_rotation.h"
+#include "positioning/lamps_below.h"
 #include "rig/find_lamp.h"
 #include "rig/input_error.h"
 
@@ -268,7 +269,12 @@ LevelRotations read_level_rotations(const LampImages& images) {
   CapturesTable captures = images.captures.value_or(CapturesTable());
   if (!images.captures && !is_video_file_name(images.images))
     captures = read_captures_csv_of_folder(images.images);
-  return compute_level_rotations_of_images(captures, *images.calibration, images.yaw_in_robot_rad);
+  const bool below = images.lamps.lamps_below_camera;
+  for (auto& [image, capture] : captures) {
+    if (capture.inclination) capture.inclination = turn_over_if(below, *capture.inclination);
+  }
+  return compute_level_rotations_of_images(captures, *images.calibration,
+                                           (below ? -1 : 1) * images.yaw_in_robot_rad);
 }
 
 }  // namespace

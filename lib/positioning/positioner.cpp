@@ -16,6 +16,7 @@
 #include "positioning/correlated_errors.h"
 #include "positioning/inclination_rotation.h"
 #include "positioning/known_motion.h"
+#include "positioning/lamps_below.h"
 #include "positioning/outlier_rejection.h"
 #include "positioning/pose_observations.h"
 #include "positioning/row_clock.h"
@@ -143,12 +144,14 @@ static_assert(Positioner::max_lamps == kMaxSightings);
 class Positioner::Impl {
  public:
   Impl(const LampMap& map, const Calibration& calibration, const PositionerOptions& options)
-      : lamps_(sorted_by_id(map.lamps)),
+      : lamps_below_camera_(map.lamps_below_camera),
+        lamps_(sorted_by_id(turn_over_if(map.lamps_below_camera, map).lamps)),
         lens_(calibration.camera.lens_model, calibration.camera.intrinsics),
         origin_m_(get_lamp_center(lamps_)),
         base_from_camera_(compute_level_from_camera_matrix(calibration, options.correction)),
         common_(lamps_, calibration, options.correction),
-        mount_(options.mount.value_or(CameraMount{Eigen::Vector3d::Zero(), 0})),
+        mount_(turn_over_if(map.lamps_below_camera,
+                            options.mount.value_or(CameraMount{Eigen::Vector3d::Zero(), 0}))),
         body_from_base_(rotation_about_z(mount_.yaw_in_robot_rad)),
         body_from_camera_(body_from_base_ * base_from_camera_),
         max_residual_fraction_(options.max_residual_fraction),
@@ -220,6 +223,8 @@ class Positioner::Impl {
     fix.estimate.pose.position_m += origin_m_;
     return fix;
   }
+
+  bool are_lamps_below_camera() const { return lamps_below_camera_; }
 
   Fix compute_position_fix(std::span<const Detection> detections, const Sensors& sensors,
                            std::span<const EarlierFrame> earlier) const {
@@ -486,6 +491,8 @@ class Positioner::Impl {
     return readout;
   }
 
+  /// If true, all other members and the methods refer to the rotated world (lamps_below.h).
+  bool lamps_below_camera_;
   std::vector<Lamp> lamps_;        // in the order of ids, positions relative to origin_m_
   std::vector<double> nearest_m_;  // from each to the nearest other, on the floor plan
   Lens lens_;
@@ -509,12 +516,15 @@ Positioner::Positioner(const LampMap& map, const Calibration& calibration,
 
 Fix Positioner::compute_position_fix(std::span<const Detection> detections,
                                      const Sensors& sensors) const noexcept {
-  return impl_->compute_position_fix(detections, sensors);
+  const bool below = impl_->are_lamps_below_camera();
+  return turn_over_if(below, impl_->compute_position_fix(detections, turn_over_if(below, sensors)));
 }
 
 Fix Positioner::compute_position_fix(std::span<const Detection> detections, const Sensors& sensors,
                                      std::span<const EarlierFrame> earlier) const noexcept {
-  return impl_->compute_position_fix(detections, sensors, earlier);
+  const bool below = impl_->are_lamps_below_camera();
+  return turn_over_if(
+      below, impl_->compute_position_fix(detections, turn_over_if(below, sensors), earlier));
 }
 
 int Positioner::num_lamps_moved_since_calibration() const noexcept {

@@ -123,7 +123,8 @@ typedef struct vlp_fix {
   int64_t stamp;
   /* Position of the robot's center or, without a mount, of the camera. */
   double position_m[3];
-  /* Estimated if vlp_sensors leave roll and pitch free, otherwise as given; level is 0. */
+  /* Estimated if vlp_sensors leave roll and pitch free, otherwise as given; level is 0, as is a
+   * camera that looks straight down if the map states lamps_below_camera (rig/lamp_map.h). */
   double roll_rad, pitch_rad;
   double yaw_rad;
   /* Covariance of (x, y, z, roll, pitch, yaw) by rows, including all known errors. If roll and

@@ -67,12 +67,23 @@ LampMap read_lamps_of_room(const std::filesystem::path& file, const std::string&
   return read_lamps_and_room_names(file, room).map;
 }
 
+LampMap read_overhead_lamps_of_room(const std::filesystem::path& file, const std::string& room) {
+  LampMap map = read_lamps_of_room(file, room);
+  if (map.lamps_below_camera) {
+    throw InputError(file,
+                     "lamps_below_camera: only vlp-detect and vlp-locate support a camera that "
+                     "looks down; use a map of lamps above the camera");
+  }
+  return map;
+}
+
 LampMapFile read_lamps_and_room_names(const std::filesystem::path& file, const std::string& room) {
   YamlMap document = read_yaml_file(file, kLampsFormat);
   const auto sd_m = document.get_optional_yaml_number("sd_m", 0, kMaxSurveySd_m, "m");
+  const auto below = document.get_optional_yaml_value("lamps_below_camera");
   const YamlValue list = document.get_required_yaml_value("lamps");
   document.check_all_yaml_keys_read();
-  LampMapFile result{file, {}, {}};
+  LampMapFile result{file, {{}, below && below->read_yaml_boolean()}, {}};
   UniqueLamps in_room;
   std::unordered_set<int> ids_of_other_rooms;
   const auto items = list.read_yaml_list();
@@ -116,6 +127,7 @@ void write_lamp_map(const std::filesystem::path& file, const LampMap& map) {
   YAML::Emitter out;
   out << YAML::BeginMap;
   emit_yaml_plain_word(out, "format", kLampsFormat);
+  if (map.lamps_below_camera) emit_yaml_plain_word(out, "lamps_below_camera", "true");
   out << YAML::Key << "lamps" << YAML::Value << YAML::BeginSeq;
   for (const Lamp& lamp : map.lamps) {
     out << YAML::Flow << YAML::BeginMap;

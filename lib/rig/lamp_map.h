@@ -29,11 +29,16 @@ struct Lamp {
 /// Lamps of a room, in the order of the file. Ids are unique, and no two lamps coincide.
 struct LampMap {
   std::vector<Lamp> lamps;
+  /// True if the camera is above the lamps and looks down, for example at a board on the floor. The
+  /// axes of the camera are then x right, y up in the image, and z up, against the line of sight:
+  /// yaw, roll and pitch are 0 if it looks straight down with the image's x along the world's.
+  bool lamps_below_camera = false;
 };
 
 /// Reads `vlp-lamps/1`:
 ///   format: vlp-lamps/1
-///   sd_m: 0.002            # of the survey, for all lamps without sd_m
+///   sd_m: 0.002                # of the survey, for all lamps without sd_m
+///   lamps_below_camera: false  # true: LampMap::lamps_below_camera
 ///   lamps:
 ///     - {id: 1, position_m: [0.5, -0.3, 2.1], diameter_m: 0.18, frequency_hz: 2000, duty: 0.5}
 ///     - {id: 2, position_m: [0, 1, 2.1], shape: rectangle, size_m: [1.2, 0.1], yaw_rad: 0.3}

@@ -23,4 +23,8 @@ struct LampMapFile {
 /// InputError.
 LampMapFile read_lamps_and_room_names(const std::filesystem::path& file, const std::string& room);
 
+/// Reads a map as read_lamps_of_room() does, for a purpose that needs lamps above the camera.
+/// @throws InputError also if the map states lamps_below_camera
+LampMap read_overhead_lamps_of_room(const std::filesystem::path& file, const std::string& room);
+
 }  // namespace vlp

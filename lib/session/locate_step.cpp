@@ -20,6 +20,7 @@
 #include "geometry/polygon.h"
 #include "positioning/correction.h"
 #include "positioning/known_motion.h"
+#include "positioning/lamps_below.h"
 #include "positioning/residual_noise.h"
 #include "positioning/row_clock.h"
 #include "rig/find_lamp.h"
@@ -403,6 +404,7 @@ void warn_about_captures(LocateResult& result, const LocateInput& input) {
 
 /// Finds errors of the lamp map from the captures in which the camera stands.
 MapErrors find_errors_while_standing(const LocateInput& input, const std::vector<Fix>& fixes) {
+  const bool below = input.lamps.lamps_below_camera;
   std::vector<Frame> frames;
   MapErrorOptions options;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
@@ -411,11 +413,21 @@ MapErrors find_errors_while_standing(const LocateInput& input, const std::vector
     const auto& body = fixes[i].body;
     frames.push_back(input.frames[i]);
     options.inclinations.push_back(body ? std::optional(body->inclination) : sensors.inclination);
+    auto& inclination = options.inclinations.back();
+    if (inclination) inclination = turn_over_if(below, *inclination);
   }
-  if (input.positioner_options.mount)
-    options.yaw_in_robot_rad = input.positioner_options.mount->yaw_in_robot_rad;
+  if (const auto& mount = input.positioner_options.mount)
+    options.yaw_in_robot_rad = turn_over_if(below, *mount).yaw_in_robot_rad;
   if (input.compute_lamp_offsets) options.max_captures = std::max<std::size_t>(frames.size(), 1);
-  return detect_misplaced_or_swapped_lamps(frames, input.lamps, input.calibration, options);
+  MapErrors found = detect_misplaced_or_swapped_lamps(frames, turn_over_if(below, input.lamps),
+                                                      input.calibration, options);
+  if (!below) return found;
+  for (MapError& error : found.errors) error.offset_m.tail<2>() *= -1;
+  for (LampOffset& offset : found.offsets) {
+    offset.map_m.y() *= -1;
+    offset.offset_m.y() *= -1;
+  }
+  return found;
 }
 
 void warn_about_rejected_lamps(LocateResult& result, const LocateInput& input,
@@ -589,10 +601,12 @@ class TiltedCaptures {
       const Fix& fix = fixes_[capture.frame];
       capture.has_converged = capture.has_converged || !fix.has_succeeded() || !fix.body;
       if (capture.has_converged) continue;
-      const double yaw_in_robot_rad =
-          input_.positioner_options.mount ? input_.positioner_options.mount->yaw_in_robot_rad : 0;
-      capture.level = compute_level_rotation_from_inclination(fix.body->inclination,
-                                                              yaw_in_robot_rad, base_from_camera_);
+      const bool below = input_.lamps.lamps_below_camera;
+      const CameraMount mount =
+          input_.positioner_options.mount.value_or(CameraMount{Eigen::Vector3d::Zero(), 0});
+      capture.level = compute_level_rotation_from_inclination(
+          turn_over_if(below, fix.body->inclination), turn_over_if(below, mount).yaw_in_robot_rad,
+          base_from_camera_);
       levels.emplace(image_name(capture), *capture.level);
     }
     const std::vector<Fix> before = fixes_;

@@ -19,6 +19,7 @@
 #include "frontend/lamp_intake.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
+#include "rig/lamp_map_file.h"
 #include "session/check_outliers.h"
 #include "session/dispersion_step.h"
 #include "session/evaluate_step.h"
@@ -134,7 +135,9 @@ class SessionRun {
     return output_file_path(captures.filename().string() + "-fixes.csv");
   }
   fs::path lamps_file() const { return session_.lamp_map_file(); }
-  LampMap read_lamps() const { return read_lamps_of_room(lamps_file(), options_.frontend.room); }
+  LampMap read_lamps() const {
+    return read_overhead_lamps_of_room(lamps_file(), options_.frontend.room);
+  }
 
   std::string remove_folder(std::string text) const {
     return vlp::remove_folder(vlp::remove_folder(std::move(text), session_.session_folder_path()),

@@ -11,6 +11,7 @@
 #include "captures/id.h"
 #include "geometry/angles.h"
 #include "rig/input_error.h"
+#include "rig/lamp_map_file.h"
 #include "rig/yaml_reader.h"
 #include "station/database_name.h"
 
@@ -274,8 +275,8 @@ void read_camera_and_targets(YamlMap& document, Files& files, StationConfig& con
     throw board.make_yaml_error("is a board of squares: the station looks for one of AprilTags");
   }
   const auto room = document.get_optional_yaml_value("room");
-  config.lamps = read_lamps_of_room(files(document.get_required_yaml_value("lamps")),
-                                    room ? room->read_yaml_string() : std::string());
+  config.lamps = read_overhead_lamps_of_room(files(document.get_required_yaml_value("lamps")),
+                                             room ? room->read_yaml_string() : std::string());
   if (const auto place = document.get_optional_yaml_value("dispersion_position_m")) {
     config.dispersion_position_m = Eigen::Vector2d(place->read_yaml_numbers(2).data());
   }

@@ -192,6 +192,24 @@ class Module(unittest.TestCase):
             with self.assertRaisesRegex(vlp.InputError, "has no lamp with 'room: attic'"):
                 vlp.LampMap(file, "attic")
 
+    def test_lamps_below_camera_turn_fixes_over(self):
+        turned = re.sub(
+            r"position_m: \[(.*?), (.*?), (.*?)\]",
+            lambda m: f"position_m: [{m[1]}, {-float(m[2])}, {-float(m[3])}]",
+            (EXAMPLE / "lamps.yaml").read_text(),
+        )
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "lamps.yaml"
+            file.write_text(turned.replace("lamps:", "lamps_below_camera: true\nlamps:"))
+            self.positioner = vlp.Positioner(vlp.LampMap(file), self.calibration)
+        fixes = self.located()
+        self.assertTrue((fixes["status"] == 0).all())
+        signs = np.array([1, -1, -1])
+        np.testing.assert_allclose(fixes["position_m"] * signs, self.truth["position_m"], atol=1e-3)
+        np.testing.assert_allclose(
+            np.cos(fixes["yaw_rad"] + self.truth["yaw_rad"]), 1, atol=1e-6
+        )
+
     def test_detect_accepts_any_memory_layout(self):
         detector = self.detector()
         image = np.array(PIL.Image.open(RENDERED / "sample/0000.png"))

@@ -33,7 +33,8 @@ TEST(ReadLampMap, ReportsLineAndKeyOfUnknownKey) {
             "lamps.yaml:3: lamps[0]: key 'position_mm' is unknown; the keys are: id, position_m, "
             "shape, diameter_m, size_m, yaw_rad, frequency_hz, duty, sd_m, room");
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\nunits: mm\nlamps: []\n"),
-            "lamps.yaml:2: key 'units' is unknown; the keys are: format, sd_m, lamps");
+            "lamps.yaml:2: key 'units' is unknown; the keys are: format, sd_m, "
+            "lamps_below_camera, lamps");
 }
 
 TEST(ReadLampMap, ReportsLineAndKeyOfDuplicateKey) {

@@ -28,6 +28,30 @@ TEST(WriteLampMap, WritesExpectedYamlByteForByte) {
   EXPECT_EQ(folder.read_content(folder / "lamps.yaml"), kLampsYaml);
 }
 
+TEST(ReadLampMap, RoundTripsLampsBelowCamera) {
+  const TemporaryFolder folder;
+  const auto with = [&](const std::string& value) {
+    return folder.file("lamps.yaml",
+                       changed(kLampsYaml, "lamps:", "lamps_below_camera: " + value + "\nlamps:"));
+  };
+  EXPECT_FALSE(read_lamp_map(with("false")).lamps_below_camera);
+  const LampMap map = read_lamp_map(with("true"));
+  EXPECT_TRUE(map.lamps_below_camera);
+  write_lamp_map(folder / "written.yaml", map);
+  expect_same(read_lamp_map(folder / "written.yaml"), map);
+  EXPECT_THAT(refusal(read_lamp_map, with("1")),
+              HasSubstr("lamps.yaml:2: lamps_below_camera: should be true or false"));
+}
+
+TEST(ReadOverheadLampsOfRoom, RejectsLampsBelowCamera) {
+  const TemporaryFolder folder;
+  const auto file = folder.file("lamps.yaml", kLampsYaml);
+  expect_same(read_overhead_lamps_of_room(file, ""), sample_lamps());
+  folder.file("lamps.yaml", changed(kLampsYaml, "lamps:", "lamps_below_camera: true\nlamps:"));
+  EXPECT_THAT(rejection_message([&] { read_overhead_lamps_of_room(file, ""); }),
+              HasSubstr("lamps.yaml: lamps_below_camera: only vlp-detect and vlp-locate"));
+}
+
 TEST(ReadLampMap, PrefersSdOfLampToSdOfMap) {
   const TemporaryFolder folder;
   const LampMap map = read_lamp_map(folder.file("lamps.yaml", R"(format: vlp-lamps/1

@@ -8,6 +8,7 @@
 namespace vlp {
 
 void expect_same(const LampMap& found, const LampMap& expected) {
+  EXPECT_EQ(found.lamps_below_camera, expected.lamps_below_camera);
   ASSERT_EQ(found.lamps.size(), expected.lamps.size());
   for (std::size_t i = 0; i < found.lamps.size(); ++i) {
     SCOPED_TRACE(i);

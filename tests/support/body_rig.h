@@ -54,6 +54,8 @@ inline Eigen::Isometry3d world_from_body(const BodyState& state, double time_s) 
 inline Eigen::Isometry3d body_from_camera(const BodyRig& rig) {
   Eigen::Isometry3d body_from_camera = Eigen::Isometry3d::Identity();
   body_from_camera.linear() = compute_level_from_camera_matrix(rig.calibration, Correction::all);
+  // y and z of a camera that looks down are opposite to those of its image and its line of sight.
+  if (rig.map.lamps_below_camera) body_from_camera.linear().bottomRows<2>() *= -1;
   if (!rig.mount) return body_from_camera;
   const Eigen::Matrix3d robot_from_level = rotation_about_z(rig.mount->yaw_in_robot_rad);
   body_from_camera.linear() = robot_from_level * body_from_camera.linear();

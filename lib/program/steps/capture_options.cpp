@@ -20,6 +20,7 @@
 #include "geometry/angles.h"
 #include "program/progress.h"
 #include "program/steps/step_outcome.h"
+#include "rig/lamp_map_file.h"
 #include "session/row_time_step.h"
 
 namespace vlp {
@@ -202,7 +203,7 @@ Observations detect_lamps_in_captures(const CaptureOptions& options, ImageUse us
 
 LampCaptures read_lamp_captures(const CaptureOptions& options, ImageUse use) {
   LampCaptures captures{{},
-                        read_lamps_of_room(options.lamps, options.frontend.room),
+                        read_overhead_lamps_of_room(options.lamps, options.frontend.room),
                         options.lamps,
                         read_calibration(options.calibration)};
   const std::optional<Readout>& readout = options.frontend.readout;

@@ -1,0 +1,67 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/lamps_below.h"
+
+namespace vlp {
+namespace {
+
+Eigen::Vector3d turn_over(const Eigen::Vector3d& v) { return {v.x(), -v.y(), -v.z()}; }
+Eigen::Vector2d turn_over(const Eigen::Vector2d& v) { return {v.x(), -v.y()}; }
+
+/// Signs of X, Y, Z, yaw, velocity, yaw rate, roll and pitch (BodyIndex).
+constexpr std::array<double, kBodyStates> kSigns{1, -1, -1, -1, 1, -1, -1, 1, -1};
+
+template <typename Covariance>
+void change_signs(Covariance& covariance) {
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
+    for (Eigen::Index k = 0; k < covariance.cols(); ++k) {
+      covariance(i, k) *= kSigns[static_cast<std::size_t>(i)] * kSigns[static_cast<std::size_t>(k)];
+    }
+  }
+}
+
+}  // namespace
+
+Inclination turn_over(const Inclination& inclination) {
+  return {inclination.roll_rad, -inclination.pitch_rad};
+}
+
+CameraMount turn_over(const CameraMount& mount) {
+  return {turn_over(mount.position_in_robot_m), -mount.yaw_in_robot_rad};
+}
+
+LampMap turn_over(LampMap map) {
+  for (Lamp& lamp : map.lamps) lamp.position_m = turn_over(lamp.position_m);
+  return map;
+}
+
+Sensors turn_over(Sensors sensors) {
+  if (sensors.inclination) sensors.inclination = turn_over(*sensors.inclination);
+  if (auto& known = sensors.height_and_yaw) {
+    known->z_m *= -1;
+    known->yaw_rad *= -1;
+  }
+  if (auto& motion = sensors.motion) {
+    motion->velocity_m_per_s = turn_over(motion->velocity_m_per_s);
+    motion->yaw_rate_rad_per_s *= -1;
+  }
+  if (sensors.height) sensors.height->z_m *= -1;
+  return sensors;
+}
+
+Fix turn_over(Fix fix) {
+  Pose& pose = fix.estimate.pose;
+  pose = {turn_over(pose.position_m), -pose.yaw_rad};
+  change_signs(fix.estimate.covariance);
+  change_signs(fix.noise_covariance);
+  if (auto& body = fix.body) {
+    body->velocity_m_per_s = turn_over(body->velocity_m_per_s);
+    body->yaw_rate_rad_per_s *= -1;
+    body->inclination = turn_over(body->inclination);
+    change_signs(body->covariance);
+    change_signs(body->noise_covariance);
+  }
+  return fix;
+}
+
+}  // namespace vlp

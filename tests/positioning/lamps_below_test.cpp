@@ -1,0 +1,220 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Fixes of a camera that looks down at lamps below it. Pixels are computed from world to image.
+#include "positioning/lamps_below.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "positioning/vlp.h"
+#include "support/body_rig.h"
+#include "support/matchers.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kSigma_px = 0.1;
+
+/// A camera 1.4 m above lamps on a floor with steps.
+class CameraAboveLamps : public testing::Test {
+ protected:
+  BodyRig rig;
+
+  CameraAboveLamps() {
+    std::vector<Eigen::Vector3d> positions_m;
+    for (int i = 0; i < 12; ++i)
+      positions_m.emplace_back(0.3 * (i % 4) - 0.3, 0.25 * (i / 4) - 0.3, 0.05 * (i % 3));
+    rig.map = make_lamp_map(positions_m);
+    rig.map.lamps_below_camera = true;
+    rig.calibration = rolling_calibration();
+    rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 1);
+    rig.body.pose = {{0.1, -0.05, 1.4}, 0.7};
+  }
+  void add_mount() { rig.mount = CameraMount{{0.1, -0.2, 0.3}, 0.4}; }
+
+  Fix locate(const Sensors& sensors) const {
+    const auto detections = seen_from(rig, kSigma_px);
+    EXPECT_GE(detections.size(), 8U);
+    return rig.positioner().compute_position_fix(detections, sensors);
+  }
+  void expect_exact(const Sensors& sensors) const {
+    const Fix fix = locate(sensors);
+    ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
+    EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.body.pose.position_m, 1e-7));
+    EXPECT_NEAR(fix.estimate.pose.yaw_rad, rig.body.pose.yaw_rad, 1e-7);
+    if (!fix.body) return;
+    EXPECT_NEAR(fix.body->inclination.roll_rad, rig.body.motion.inclination.roll_rad, 1e-7);
+    EXPECT_NEAR(fix.body->inclination.pitch_rad, rig.body.motion.inclination.pitch_rad, 1e-7);
+    const Eigen::Vector2d velocity =
+        Eigen::Rotation2Dd(rig.body.pose.yaw_rad) * rig.body.motion.velocity_m_per_s;
+    EXPECT_NEAR((fix.body->velocity_m_per_s - velocity).norm(), 0, 1e-5);
+    EXPECT_NEAR(fix.body->yaw_rate_rad_per_s, rig.body.motion.yaw_rate_rad_per_s, 1e-5);
+  }
+};
+
+TEST_F(CameraAboveLamps, FixIsExactForCameraThatLooksStraightDown) {
+  expect_exact({});
+  add_mount();
+  expect_exact({});
+}
+
+/// A prior of 1e6 rad does not affect the fix.
+TEST_F(CameraAboveLamps, FixIsExactWithUnknownRollAndPitch) {
+  rig.body.motion.inclination = {0.3, -0.2};
+  rig.body.pose.position_m = {0.22, -0.57, 1.4};
+  Sensors sensors;
+  sensors.inclination_sigma_rad = 1e6;
+  expect_exact(sensors);
+  add_mount();
+  expect_exact(sensors);
+}
+
+TEST_F(CameraAboveLamps, FixIsExactWithInclinationSensor) {
+  rig.body.motion.inclination = {0.2, -0.1};
+  rig.body.pose.position_m = {0.1, 0.3, 1.3};
+  Sensors sensors;
+  sensors.inclination = rig.body.motion.inclination;
+  expect_exact(sensors);
+  add_mount();
+  expect_exact(sensors);
+}
+
+TEST_F(CameraAboveLamps, FixIsExactWithUnknownAndKnownMotion) {
+  rig.body.motion.velocity_m_per_s = {0.8, -0.5};
+  rig.body.motion.yaw_rate_rad_per_s = 0.6;
+  add_mount();
+  Sensors sensors;
+  sensors.motion = KnownMotion{{0, 0}, 0, 1e4, 1e4};
+  expect_exact(sensors);
+  sensors.motion = KnownMotion{{0.8, -0.5}, 0.6};
+  expect_exact(sensors);
+}
+
+TEST_F(CameraAboveLamps, FixOfOneLampUsesHeightAndYaw) {
+  Sensors sensors;
+  sensors.height_and_yaw = HeightAndYaw{1.4, 0.7};
+  rig.map.lamps.resize(1);
+  const Fix fix = rig.positioner().compute_position_fix(seen_from(rig, kSigma_px), sensors);
+  ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
+  EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.body.pose.position_m, 1e-9));
+}
+
+TEST_F(CameraAboveLamps, FixUsesKnownHeight) {
+  Sensors sensors;
+  sensors.inclination_sigma_rad = 1;
+  sensors.height = KnownHeight{1.4, 1e-6};
+  const Fix fix = locate(sensors);
+  ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
+  EXPECT_NEAR(std::sqrt(fix.estimate.covariance(2, 2)), 1e-6, 1e-8);
+}
+
+/// States (X, Y, Z, yaw, vx, vy, yaw rate, roll, pitch) of a fix.
+Eigen::VectorXd states_of(const Fix& fix) {
+  const auto& [position_m, yaw_rad] = fix.estimate.pose;
+  Eigen::VectorXd states(kBodyStates);
+  states << position_m, yaw_rad, fix.body->velocity_m_per_s, fix.body->yaw_rate_rad_per_s,
+      fix.body->inclination.roll_rad, fix.body->inclination.pitch_rad;
+  return states;
+}
+
+/// Compares the covariance with derivatives of the fix with respect to every pixel.
+TEST_F(CameraAboveLamps, CovarianceIsThatOfPixelNoise) {
+  rig.body.motion.inclination = {0.1, -0.15};
+  rig.body.pose.position_m = {0.08, -0.31, 1.5};
+  Sensors sensors;
+  sensors.inclination_sigma_rad = 1e6;
+  sensors.motion = KnownMotion{{0, 0}, 0, 1e4, 1e4};
+  auto detections = seen_from(rig, kSigma_px);
+  ASSERT_EQ(detections.size(), 12U);
+  const Positioner positioner = rig.positioner();
+  const auto states = [&] {
+    const Fix fix = positioner.compute_position_fix(detections, sensors);
+    EXPECT_TRUE(fix.has_succeeded() && fix.body);
+    return states_of(fix);
+  };
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(kBodyStates, kBodyStates);
+  constexpr double step_px = 0.01;
+  for (Detection& detection : detections) {
+    for (double& coordinate : detection.pixel) {
+      const double before = coordinate;
+      coordinate = before + step_px;
+      const Eigen::VectorXd above = states();
+      coordinate = before - step_px;
+      const Eigen::VectorXd derivative = (above - states()) / (2 * step_px);
+      coordinate = before;
+      covariance += kSigma_px * kSigma_px * derivative * derivative.transpose();
+    }
+  }
+  const Fix fix = positioner.compute_position_fix(detections, sensors);
+  const Eigen::VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd difference = scale.asDiagonal() *
+                                     (Eigen::MatrixXd(fix.body->covariance) - covariance) *
+                                     scale.asDiagonal();
+  EXPECT_LT(difference.cwiseAbs().maxCoeff(), 0.01);
+  EXPECT_EQ(fix.estimate.covariance, (fix.body->covariance.topLeftCorner<4, 4>()));
+}
+
+/// Also between errors of the lamp map and the fix of a level camera.
+TEST_F(CameraAboveLamps, CovarianceOfLevelCameraIncludesSurvey) {
+  for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.01;
+  rig.map.lamps.resize(2);
+  const auto detections = seen_from(rig, 1e-3);
+  ASSERT_EQ(detections.size(), 2U);
+  const Fix fix = rig.positioner().compute_position_fix(detections);
+  ASSERT_TRUE(fix.has_succeeded());
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+  constexpr double step_m = 1e-4;
+  for (Lamp& lamp : rig.map.lamps) {
+    for (double& coordinate : lamp.position_m) {
+      coordinate += step_m;
+      const Pose moved = rig.positioner().compute_position_fix(detections).estimate.pose;
+      coordinate -= step_m;
+      Eigen::Vector4d derivative;
+      derivative << (moved.position_m - fix.estimate.pose.position_m) / step_m,
+          (moved.yaw_rad - fix.estimate.pose.yaw_rad) / step_m;
+      covariance += 1e-4 * derivative * derivative.transpose();
+    }
+  }
+  EXPECT_LT((fix.estimate.covariance - covariance).cwiseAbs().maxCoeff(),
+            0.01 * covariance.cwiseAbs().maxCoeff());
+}
+
+TEST_F(CameraAboveLamps, FixFailsWithoutKeyOfMap) {
+  rig.body.motion.inclination = {0.1, -0.1};
+  BodyRig overhead = rig;
+  overhead.map.lamps_below_camera = false;
+  Sensors sensors;
+  sensors.inclination_sigma_rad = 1;
+  EXPECT_FALSE(overhead.positioner()
+                   .compute_position_fix(seen_from(rig, kSigma_px), sensors)
+                   .has_succeeded());
+}
+
+TEST_F(CameraAboveLamps, FixOfCLibraryIsThatOfPositioner) {
+  rig.body.motion.inclination = {0.1, -0.15};
+  const TemporaryFolder folder;
+  write_lamp_map(folder / "lamps.yaml", rig.map);
+  write_calibration(folder / "calibration.yaml", rig.calibration);
+  vlp_positioner* positioner = nullptr;
+  ASSERT_EQ(vlp_open((folder / "lamps.yaml").c_str(), (folder / "calibration.yaml").c_str(),
+                     nullptr, &positioner),
+            VLP_OK)
+      << vlp_last_error();
+  std::vector<vlp_detection> detections;
+  for (const auto& [lamp, pixel, sigma_px] : seen_from(rig, kSigma_px))
+    detections.push_back({lamp, pixel.x(), pixel.y(), sigma_px.value_or(0)});
+  vlp_sensors sensors{};
+  sensors.inclination_sigma_rad = 1e6;
+  vlp_fix fix;
+  EXPECT_EQ(vlp_locate(positioner, detections.data(), detections.size(), &sensors, &fix), VLP_OK);
+  vlp_close(positioner);
+  EXPECT_THAT(Eigen::Vector3d(fix.position_m), IsNear(rig.body.pose.position_m, 1e-7));
+  EXPECT_NEAR(fix.yaw_rad, 0.7, 1e-7);
+  EXPECT_NEAR(fix.roll_rad, 0.1, 1e-7);
+  EXPECT_NEAR(fix.pitch_rad, -0.15, 1e-7);
+}
+
+}  // namespace
+}  // namespace vlp
