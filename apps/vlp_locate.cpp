@@ -34,6 +34,7 @@ struct Options {
   CaptureOptions images;
   /// File captures.csv; empty: the one in the folder, if it exists.
   std::string captures;
+  std::string poses;
   std::string correction = "all";
   std::optional<double> sigma_px;
   std::optional<double> inclination_sigma_deg;
@@ -129,7 +130,13 @@ LocateResult locate_in_images(const Options& options, LocateInput input) {
 void run(Options options) {
   std::vector<std::string> inputs = list_capture_input_files(options.images);
   inputs.push_back(options.captures);
-  check_output_is_not_input(options.images.output, inputs);
+  check_output_files_are_distinct({{"--output", options.images.output}, {"--poses", options.poses}},
+                                  inputs);
+  if (!options.poses.empty() && !options.roll_pitch_sd_deg && !options.inclination_sigma_deg) {
+    throw std::invalid_argument(
+        "--poses needs estimated roll and pitch; give --roll-pitch-sd-deg or "
+        "--inclination-sigma-deg");
+  }
   const CapturesTable captures = read_captures_table(options);
   options.images.captures = captures;
   if (const auto& mount = options.camera_on_robot) {
@@ -146,6 +153,7 @@ void run(Options options) {
   print_step_remarks(found);
   if (found.rows.empty()) throw_if_step_failed(found);
   write_fixes(options.images.output, found.rows);
+  if (!options.poses.empty()) write_poses(options.poses, found.poses);
   print_position_fix_summary(found.summary);
   throw_if_step_failed(found);
 }
@@ -158,7 +166,7 @@ void add_sensor_options(CLI::App& app, Options& options) {
       ->check(make_finite_non_negative_validator());
   app.add_option("--camera-on-robot", options.camera_on_robot,
                  "Position and yaw of the camera in the frame of the robot, in m and degrees. "
-                 "Fixes are then of the robot center")
+                 "Fixes and poses are then of the robot center")
       ->check(make_finite_validator())
       ->option_text("X_M Y_M Z_M YAW_DEG");
   CLI::Option* const one_lamp =
@@ -210,6 +218,9 @@ void add_options(CLI::App& app, Options& options) {
       "vx_m_per_s, vy_m_per_s, yaw_rate_rad_per_s, velocity_sd_m_per_s (odometry); z_m, yaw_rad. "
       "Inclination and odometry are those of the robot with --camera-on-robot, otherwise of the "
       "camera (default: captures.csv in the folder)");
+  app.add_option("--poses", options.poses,
+                 "Output file of poses: position and orientation (quaternion) with covariance of "
+                 "each fix with estimated roll and pitch, CSV");
   add_sensor_options(app, options);
 }
 

@@ -4,6 +4,7 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -183,6 +184,29 @@ FixRow make_fix_row(const Frame& frame, const CapturesTable& captures, const Fix
   }
   const auto rejected = list_rejected(fix);
   row.rejected_lamps.assign(rejected.begin(), rejected.end());
+  return row;
+}
+
+/// Returns the pose of a fix whose roll and pitch are estimated; std::nullopt for other fixes.
+std::optional<PoseRow> find_pose_row(const std::string& image, const Fix& fix, bool noise_known,
+                                     bool is_camera_turned_over) {
+  if (!fix.has_succeeded() || !fix.body || !(fix.body->covariance(kBodyRoll, kBodyRoll) > 0))
+    return std::nullopt;
+  const auto& [position_m, yaw_rad] = fix.estimate.pose;
+  const Eigen::Matrix3d world_from_level = rotation_about_z(yaw_rad);
+  const Eigen::Matrix3d level_from_body = level_rotation_from_inclination(fix.body->inclination);
+  Eigen::Matrix3d world_from_camera = world_from_level * level_from_body;
+  if (is_camera_turned_over) world_from_camera.rightCols<2>() *= -1;
+  PoseRow row{image, position_m, Eigen::Quaterniond(world_from_camera), {}};
+  if (!noise_known) return row;
+  // Small rotation about the axes of the world, by yaw, pitch and roll.
+  Eigen::Matrix<double, 6, kBodyStates> d_pose_d_body =
+      Eigen::Matrix<double, 6, kBodyStates>::Identity();
+  d_pose_d_body.bottomRows<3>().setZero();
+  d_pose_d_body.block<3, 1>(3, kBodyYaw) = Eigen::Vector3d::UnitZ();
+  d_pose_d_body.block<3, 1>(3, kBodyPitch) = world_from_level.col(1);
+  d_pose_d_body.block<3, 1>(3, kBodyRoll) = world_from_level * level_from_body.col(0);
+  row.covariance = d_pose_d_body * fix.body->covariance * d_pose_d_body.transpose();
   return row;
 }
 
@@ -474,10 +498,13 @@ LocateResult locate_camera_from_detections(const LocateInput& input) {
   check_motion(input);
   LocateResult result;
   const bool noise_known = locate_with_noise(input, result);
+  const bool turned = input.lamps.lamps_below_camera && !input.positioner_options.mount;
   result.rows.reserve(result.fixes.size());
   for (std::size_t i = 0; i < result.fixes.size(); ++i) {
     result.rows.push_back(
         make_fix_row(input.frames[i], input.captures, result.fixes[i], noise_known));
+    if (auto pose = find_pose_row(input.frames[i].image, result.fixes[i], noise_known, turned))
+      result.poses.push_back(std::move(*pose));
   }
   warn_about_image(result, input);
   mark_fixes_outside_valid_region(result, input);

@@ -12,6 +12,7 @@
 #include "captures/captures_table.h"
 #include "captures/detections_table.h"
 #include "captures/fixes_table.h"
+#include "captures/poses_table.h"
 #include "evaluation/fix_summary.h"
 #include "frontend/lamp_intake.h"
 #include "frontend/observation.h"
@@ -72,6 +73,10 @@ struct LocateResult : StepResult {
   std::vector<Fix> fixes;
   /// Rows of fixes.csv, in the order of `fixes`.
   std::vector<FixRow> rows;
+  /// Rows of poses.csv: one for each fix whose roll and pitch are estimated. The orientation is
+  /// that of the camera, corrected by its calibrated tilt. With a mount, the pose is that of the
+  /// robot.
+  std::vector<PoseRow> poses;
   FixSummary summary;
   /// Observations of the images in which the lamps were detected (locate_camera_from_images()).
   Observations observations = {};
