@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "calibration/intrinsics/board_lattice.h"
@@ -23,5 +25,11 @@ namespace vlp {
 /// Each corner is predicted by the homography of its nearest eight corners on the board, which
 /// approximates any lens. The worst corner is removed and its neighbors are tested again.
 std::vector<std::size_t> find_corner_outliers(const std::vector<BoardLattice::Corner>& corners);
+
+/// Estimates the noise of corners of weight 1, px per axis, without a lens: from the residuals of
+/// a homography with cubic terms for each 16 neighboring corners (estimate_robust_variance_2d()).
+/// Errors that neighbors share are not included. Returns std::nullopt if no view has 16 corners.
+std::optional<double> estimate_corner_noise_px(
+    std::span<const std::vector<BoardLattice::Corner>> views);
 
 }  // namespace vlp

@@ -1,0 +1,95 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/corner_lamps.h"
+
+#include <algorithm>
+
+#include "calibration/intrinsics/board_lattice.h"
+#include "calibration/intrinsics/corner_outliers.h"
+#include "positioning/positioner.h"
+#include "rig/board_layout.h"
+
+namespace vlp {
+namespace {
+
+/// Returns the id of corner `corner` of a tag.
+int corner_lamp_id(int tag, std::size_t corner) { return 4 * tag + static_cast<int>(corner); }
+
+/// Returns the id of each point of a board of tags, by BoardLattice::point_index_on_board().
+std::vector<int> list_ids_of_lattice_points(const BoardLattice& lattice,
+                                            const std::vector<BoardTag>& tags) {
+  std::vector<int> ids(lattice.num_board_parts() * lattice.num_points_per_part());
+  BoardDetection all;
+  for (const BoardTag& tag : tags) all.tags.push_back({tag.id, tag.corners_m});
+  const auto corners = lattice.list_corners_with_board_positions(all);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const auto index = lattice.point_index_on_board(corners[i].part, corners[i].point);
+    ids[index] = corner_lamp_id(tags[i / 4].id, i % 4);
+  }
+  return ids;
+}
+
+/// Returns every n-th detection, with the smallest n for which a fix takes all of them.
+std::vector<Detection> thin_out_to_fix_limit(const std::vector<Detection>& detections) {
+  const std::size_t step = (detections.size() + Positioner::max_lamps - 1) / Positioner::max_lamps;
+  std::vector<Detection> kept;
+  for (std::size_t i = 0; i < detections.size(); i += step) kept.push_back(detections[i]);
+  return kept;
+}
+
+/// Adds all corners of the board to the map. Returns the ids of points (PointDetection::index).
+std::vector<int> add_board_corners(const Board& board, const BoardLattice& lattice,
+                                   const std::optional<double>& sd_m, LampMap& map) {
+  const double height_m = compute_tag_field_size_m(board).y();
+  const auto add_lamp = [&](int id, const Eigen::Vector2d& in_board_m) {
+    map.lamps.push_back({id, {in_board_m.x(), height_m - in_board_m.y(), 0}, {}, {}, {}, sd_m});
+  };
+  if (board.has_chessboard_squares()) {
+    std::vector<int> ids;
+    for (const Eigen::Vector2d& corner_m : list_chessboard_corners_m(board)) {
+      ids.push_back(static_cast<int>(ids.size()));
+      add_lamp(ids.back(), corner_m);
+    }
+    return ids;
+  }
+  const auto tags = list_board_tags(board);
+  for (const BoardTag& tag : tags) {
+    for (std::size_t k = 0; k < 4; ++k) add_lamp(corner_lamp_id(tag.id, k), tag.corners_m[k]);
+  }
+  return list_ids_of_lattice_points(lattice, tags);
+}
+
+}  // namespace
+
+CornerLamps convert_corners_to_lamps(std::span<const BoardView> views, const Board& board,
+                                     const std::optional<double>& sigma_px,
+                                     const std::optional<double>& sd_m) {
+  const BoardLattice lattice(board);
+  CornerLamps result;
+  result.map.lamps_below_camera = true;
+  const std::vector<int> point_ids = add_board_corners(board, lattice, sd_m, result.map);
+  std::vector<std::vector<BoardLattice::Corner>> corners_of_views;
+  for (const BoardView& view : views)
+    corners_of_views.push_back(lattice.list_corners_with_board_positions(view.detection));
+  result.sigma_px = sigma_px ? sigma_px : estimate_corner_noise_px(corners_of_views);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    Frame frame{views[i].image, {}};
+    for (const BoardLattice::Corner& corner : corners_of_views[i]) {
+      const bool is_sd_known = corner.sd_px > 0;
+      ++result.corners;
+      result.corners_without_sd += is_sd_known ? 0 : 1;
+      std::optional<double> sigma = is_sd_known ? std::optional(corner.sd_px) : result.sigma_px;
+      if (sigma) sigma = std::clamp(*sigma / corner.weight, kMinSigma_px, kMaxSigma_px);
+      const auto index = lattice.point_index_on_board(corner.part, corner.point);
+      frame.detections.push_back({point_ids[index], corner.pixel, sigma});
+    }
+    if (frame.detections.empty()) continue;
+    const std::size_t detected = frame.detections.size();
+    frame.detections = thin_out_to_fix_limit(frame.detections);
+    result.left_out += detected - frame.detections.size();
+    result.frames.push_back(std::move(frame));
+  }
+  return result;
+}
+
+}  // namespace vlp

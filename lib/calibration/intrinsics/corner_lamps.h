@@ -1,0 +1,43 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "captures/detections_table.h"
+#include "detection/boards/board_detector.h"
+#include "rig/board.h"
+#include "rig/lamp_map.h"
+
+namespace vlp {
+
+/// Corners of a board as lamps at known positions, for a position fix of each view.
+struct CornerLamps {
+  /// All corners of the board, below the camera (LampMap::lamps_below_camera). World: x right and y
+  /// up on the board as printed, z towards the viewer, origin at the bottom left corner. Ids: 4 tag
+  /// + corner, with corner 0 to 3 as in BoardTag::corners_m; on boards of squares the index of
+  /// list_chessboard_corners_m().
+  LampMap map;
+  /// Corners detected in each view.
+  std::vector<Frame> frames;
+  /// Number of corners in the views, of those among them without a standard deviation, and of those
+  /// left out so that a view has at most Positioner::max_lamps.
+  std::size_t corners = 0, corners_without_sd = 0, left_out = 0;
+  /// Standard deviation of corners that state none; std::nullopt if it is not given and there are
+  /// too few corners to estimate it.
+  std::optional<double> sigma_px = {};
+};
+
+/// Converts the corners of views of a board to lamps.
+///
+/// @param sigma_px  standard deviation of corners that state none, per axis; divided by the weight
+///     of a point (PointDetection::weight). std::nullopt: estimate_corner_noise_px()
+/// @param sd_m  standard deviation of the positions on the board, per axis; std::nullopt: exact
+CornerLamps convert_corners_to_lamps(std::span<const BoardView> views, const Board& board,
+                                     const std::optional<double>& sigma_px,
+                                     const std::optional<double>& sd_m);
+
+}  // namespace vlp
