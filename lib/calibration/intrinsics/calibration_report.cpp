@@ -83,9 +83,8 @@ CalibrationReport compute_lens_calibration_report(
   const auto& [independent, uncertainty] = uncertainties;
   const Lens lens = solution.fitted_lens();
   const Eigen::MatrixXd by_views = estimate_intrinsics_covariance_by_jackknife(solution);
-  ImageRegion region =
-      compute_valid_lens_region(collect_inlier_corner_pixels(solution.problem), input.imager_px,
-                                lens.lens_model(), solution.other_model_fits);
+  ImageRegion region = compute_valid_lens_region(collect_inlier_corner_pixels(solution.problem),
+                                                 input.imager_px, lens);
   // Splines are undetermined outside the region.
   const ImageRegion compared = is_splined_lens_model(lens.lens_model()) ? region : ImageRegion();
   const auto expected = compute_expected_projection_difference(

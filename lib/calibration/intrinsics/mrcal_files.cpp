@@ -71,9 +71,8 @@ std::string format_mrcal_optimization_inputs(const IntrinsicsSolution& solution)
 void write_mrcal_cameramodel(const std::filesystem::path& file,
                              const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
-  const ImageRegion region =
-      compute_valid_lens_region(collect_inlier_corner_pixels(problem), problem.imager_px,
-                                problem.lens_model, solution.other_model_fits);
+  const ImageRegion region = compute_valid_lens_region(collect_inlier_corner_pixels(problem),
+                                                       problem.imager_px, solution.fitted_lens());
   std::string text = "{\n    'lensmodel':  '";
   text.append(lens_model_name(problem.lens_model)).append("',\n    'intrinsics': [");
   for (const double value : problem.intrinsics) {

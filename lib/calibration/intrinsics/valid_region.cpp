@@ -3,6 +3,9 @@
 #include "calibration/intrinsics/valid_region.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
 
 #include "camera/spline_grid.h"
 #include "geometry/polygon.h"
@@ -57,12 +60,61 @@ ImageRegion clip_polygon(const ImageRegion& region, int axis, double limit, doub
   return clipped;
 }
 
+/// Returns points along the edges of a polygon, at most `spacing_px` apart, with its vertices.
+ImageRegion subdivide_edges(const ImageRegion& region, double spacing_px) {
+  ImageRegion points;
+  for (std::size_t i = 0; i < region.size(); ++i) {
+    const Eigen::Vector2d edge = region[(i + 1) % region.size()] - region[i];
+    const int parts = std::max(1, static_cast<int>(std::ceil(edge.norm() / spacing_px)));
+    for (int part = 0; part < parts; ++part) points.emplace_back(region[i] + edge * part / parts);
+  }
+  return points;
+}
+
+/// Returns the last point with a ray on the line from `inside`, which has one, to `outside`, less a
+/// distance that keeps the edges between such points inside.
+Eigen::Vector2d find_end_of_rays(const Lens& lens, const Eigen::Vector2d& inside,
+                                 const Eigen::Vector2d& outside) {
+  constexpr double tolerance_px = 0.01, distance_px = 0.25;
+  const Eigen::Vector2d line = outside - inside;
+  const double length_px = line.norm();
+  double with_ray = 0, without = 1;
+  while ((without - with_ray) * length_px > tolerance_px) {
+    const double middle = (with_ray + without) / 2;
+    (lens.unproject_pixel(inside + middle * line) ? with_ray : without) = middle;
+  }
+  return inside + std::max(0.0, with_ray - distance_px / length_px) * line;
+}
+
+/// Returns the part of a region where the lens has rays. Removes points on straight edges again.
+ImageRegion clip_to_rays(const ImageRegion& region, const Lens& lens, const Eigen::Vector2d& inside,
+                         double spacing_px) {
+  const ImageRegion points = subdivide_edges(region, spacing_px);
+  std::vector<bool> has_ray;
+  for (const Eigen::Vector2d& point : points)
+    has_ray.push_back(lens.unproject_pixel(point).has_value());
+  const bool has_all = std::ranges::all_of(has_ray, [](bool ray) { return ray; });
+  if (has_all || !lens.unproject_pixel(inside)) return region;
+  ImageRegion clipped;
+  const std::size_t count = points.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool is_vertex = std::ranges::find(region, points[i]) != region.end();
+    const bool is_beside = !has_ray[(i + 1) % count] || !has_ray[(i + count - 1) % count];
+    if (!has_ray[i]) {
+      clipped.push_back(find_end_of_rays(lens, inside, points[i]));
+    } else if (is_vertex || is_beside) {
+      clipped.push_back(points[i]);
+    }
+  }
+  return clipped;
+}
+
 }  // namespace
 
 ImageRegion compute_valid_lens_region(const std::vector<Eigen::Vector2d>& corners_px,
-                                      const std::array<int, 2>& imager_px, LensModel model,
-                                      bool other_model_fits) {
-  const double margin = is_splined_lens_model(model) || other_model_fits ? 0 : 0.04;
+                                      const std::array<int, 2>& imager_px, const Lens& lens) {
+  constexpr double model_margin = 0.04, spacing = 0.02;
+  const double margin = is_splined_lens_model(lens.lens_model()) ? 0 : model_margin;
   const Eigen::Vector2d last(imager_px[0] - 1, imager_px[1] - 1);
   const double margin_px = margin * last.norm();
   // Extends the hull by a square: near a corner of the image it reaches both edges.
@@ -79,8 +131,13 @@ ImageRegion compute_valid_lens_region(const std::vector<Eigen::Vector2d>& corner
     region = clip_polygon(region, axis, last[axis], 1);
   }
   constexpr double whole = 0.985;
-  if (compute_region_fraction_of_image_area(region, imager_px) < whole) return region;
-  return {{0, 0}, {last.x(), 0}, last, {0, last.y()}};
+  if (region.empty()) return region;
+  if (compute_region_fraction_of_image_area(region, imager_px) >= whole)
+    region = {{0, 0}, {last.x(), 0}, last, {0, last.y()}};
+  const Eigen::Vector2d mean =
+      std::accumulate(corners_px.begin(), corners_px.end(), Eigen::Vector2d(0, 0)) /
+      static_cast<double>(corners_px.size());
+  return clip_to_rays(region, lens, mean, spacing * last.norm());
 }
 
 double compute_region_fraction_of_image_area(const ImageRegion& region,

@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "camera/lens_model.h"
+#include "camera/lens.h"
 
 namespace vlp {
 
@@ -14,21 +14,21 @@ namespace vlp {
 using ImageRegion = std::vector<Eigen::Vector2d>;
 
 /// Computes the region of the image where a lens is calibrated. It is the convex hull of the
-/// corners used, extended by a margin and clipped to the image.
+/// corners used, extended by a margin and clipped to the image and to the pixels with a ray.
 ///
-/// @param corners_px        corners used by the solve, px
-/// @param imager_px         width and height of the image
-/// @param other_model_fits  true if the corners do not distinguish the lens model from another one
-/// @return                  convex polygon, px, clockwise in the image; empty if all corners are on
-///     one line
+/// @param corners_px  corners used by the solve, px
+/// @param imager_px   width and height of the image
+/// @return            polygon, px, clockwise in the image; empty if all corners are on one line
 ///
-/// The margin is 4 % of the image diagonal along each axis. It is 0 with `other_model_fits`, and
-/// for splined lenses, which are undetermined outside the corners. If the region covers at least
-/// 98.5 % of the image, it is the whole image. Outside the region no corner contradicts a wrong
-/// lens model.
+/// The margin is 4 % of the image diagonal along each axis. It is 0 for splined lenses, which are
+/// undetermined outside the corners. If the region covers at least 98.5 % of the image, it is the
+/// whole image. Outside the region no corner contradicts a wrong lens model.
+///
+/// A lens has rays up to the fold of its model only (Lens::project_point()). Where the boundary has
+/// no ray, it moves towards the mean of the corners, to 0.25 px inside the image of the rays. This
+/// assumes that each line from that mean leaves the image of the rays once.
 ImageRegion compute_valid_lens_region(const std::vector<Eigen::Vector2d>& corners_px,
-                                      const std::array<int, 2>& imager_px, LensModel model,
-                                      bool other_model_fits = false);
+                                      const std::array<int, 2>& imager_px, const Lens& lens);
 
 /// Computes the area of a region as a fraction of the image. The image extends from the center of
 /// its first pixel to that of its last.

@@ -600,7 +600,7 @@ void expect_report_matches_definitions(const IntrinsicsSolution& solution,
   const Lens lens = solution.fitted_lens();
   const Eigen::MatrixXd by_views = estimate_intrinsics_covariance_by_jackknife(solution);
   const ImageRegion region = compute_valid_lens_region(
-      collect_inlier_corner_pixels(solution.problem), input.imager_px, lens.lens_model());
+      collect_inlier_corner_pixels(solution.problem), input.imager_px, lens);
   EXPECT_EQ(report.region, region);
   EXPECT_EQ(report.region_fraction, compute_region_fraction_of_image_area(region, input.imager_px));
   ASSERT_LT(report.region_fraction, 0.95);

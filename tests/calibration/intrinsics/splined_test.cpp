@@ -117,7 +117,7 @@ TEST(SolveSplinedLens, RejectsOnlyDisplacedTagsWhenFisheyeModelFitsPoorly) {
   ASSERT_TRUE(slipped.has_succeeded()) << describe_intrinsics_status(slipped.status);
   EXPECT_GE(slipped.outliers, 20);  // the tags whole
   const ImageRegion region = compute_valid_lens_region(
-      collect_inlier_corner_pixels(slipped.problem), input.imager_px, input.lens_model);
+      collect_inlier_corner_pixels(slipped.problem), input.imager_px, slipped.fitted_lens());
   const auto difference = compute_projection_difference(
       views.lens, slipped.fitted_lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
         return polygon_contains(region, pixel) ? 1.0 : INFINITY;

@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <vector>
 
+#include "calibration/intrinsics/projection_difference.h"
 #include "camera/spline_grid.h"
 #include "geometry/polygon.h"
 #include "support/matchers.h"
@@ -18,9 +20,16 @@ namespace {
 constexpr std::array kImager{801, 601};
 constexpr double kMargin = 40;  // 4 % of 1000 px
 
+/// Returns a lens without distortion.
+Lens straight_lens() {
+  std::vector<double> parameters{1000, 1000, 400, 300};
+  parameters.resize(num_lens_parameters(LensModel::opencv8));
+  return {LensModel::opencv8, parameters};
+}
+
 TEST(ComputeValidLensRegion, ReturnsConvexHullOfCornersWithMargin) {
   const ImageRegion region = compute_valid_lens_region(
-      {{200, 100}, {600, 100}, {400, 250}, {600, 500}, {200, 500}}, kImager, LensModel::opencv8);
+      {{200, 100}, {600, 100}, {400, 250}, {600, 500}, {200, 500}}, kImager, straight_lens());
   EXPECT_EQ(region.size(), 4U);
   EXPECT_NEAR(compute_region_fraction_of_image_area(region, kImager),
               (400 + 2 * kMargin) * (400 + 2 * kMargin) / (800 * 600), 1e-12);
@@ -31,8 +40,8 @@ TEST(ComputeValidLensRegion, ReturnsConvexHullOfCornersWithMargin) {
 }
 
 TEST(ComputeValidLensRegion, ClipsRegionToImage) {
-  const ImageRegion region = compute_valid_lens_region({{5, 5}, {790, 5}, {790, 590}, {5, 590}},
-                                                       kImager, LensModel::opencv8);
+  const ImageRegion region =
+      compute_valid_lens_region({{5, 5}, {790, 5}, {790, 590}, {5, 590}}, kImager, straight_lens());
   EXPECT_NEAR(compute_region_fraction_of_image_area(region, kImager), 1, 1e-12);
   for (const Eigen::Vector2d& corner : region) {
     EXPECT_TRUE(corner.x() == 0 || corner.x() == 800);
@@ -45,7 +54,7 @@ TEST(ComputeValidLensRegion, ClipsRegionToImage) {
 /// 245.26 px and 332.86 px from the nearest image corner.
 TEST(ComputeValidLensRegion, SlantedEdgesEndAtTheirCrossingsWithImageBorder) {
   const ImageRegion region = compute_valid_lens_region(
-      {{20, 300}, {400, 20}, {780, 300}, {400, 580}}, kImager, LensModel::opencv8);
+      {{20, 300}, {400, 20}, {780, 300}, {400, 580}}, kImager, straight_lens());
   const double slope = 280. / 380;
   const double along_v = 260 - 20 * slope, along_u = along_v / slope;
   EXPECT_NEAR(compute_region_fraction_of_image_area(region, kImager),
@@ -57,17 +66,16 @@ TEST(ComputeValidLensRegion, SlantedEdgesEndAtTheirCrossingsWithImageBorder) {
 
 TEST(ComputeValidLensRegion, FollowsSlantedHullInsteadOfBoundingBox) {
   const ImageRegion region = compute_valid_lens_region(
-      {{100, 100}, {700, 500}, {690, 510}, {90, 110}}, kImager, LensModel::opencv8);
+      {{100, 100}, {700, 500}, {690, 510}, {90, 110}}, kImager, straight_lens());
   EXPECT_TRUE(polygon_contains(region, {400, 300}));
   EXPECT_FALSE(polygon_contains(region, {700, 100}));
   EXPECT_LT(compute_region_fraction_of_image_area(region, kImager), 0.3);
 }
 
 TEST(ComputeValidLensRegion, ReturnsEmptyRegionForCollinearCorners) {
-  EXPECT_TRUE(compute_valid_lens_region({}, kImager, LensModel::opencv8).empty());
-  EXPECT_TRUE(
-      compute_valid_lens_region({{1, 1}, {2, 2}, {3, 3}, {9, 9}}, kImager, LensModel::opencv8)
-          .empty());
+  EXPECT_TRUE(compute_valid_lens_region({}, kImager, straight_lens()).empty());
+  EXPECT_TRUE(compute_valid_lens_region({{1, 1}, {2, 2}, {3, 3}, {9, 9}}, kImager, straight_lens())
+                  .empty());
   EXPECT_EQ(compute_region_fraction_of_image_area({}, kImager), 0);
 }
 
@@ -78,54 +86,57 @@ std::vector<testing::Matcher<const Eigen::Vector2d&>> near_vertices(const ImageR
   return matchers;
 }
 
-/// Model without a margin, so that the region is the clipped hull itself.
-constexpr LensModel kWithoutMargin = lens_model_for_spline_grid({3, 10, 8, 100});
+/// Returns a lens without a margin, so that the region is the clipped hull itself. It has rays in
+/// the whole image.
+Lens splined_lens() {
+  constexpr SplineGrid grid{3, 10, 8, 100};
+  std::vector<double> parameters{1000, 1000, 400, 300};
+  parameters.resize(4 + 2 * grid.num_control_points());
+  return {lens_model_for_spline_grid(grid), parameters};
+}
 
 TEST(ComputeValidLensRegion, ReturnsHullVerticesClockwiseFromLeftmostForSplinedLens) {
   const ImageRegion vertices{{100, 120}, {350, 40}, {700, 150}, {650, 500}, {120, 480}};
   ImageRegion corners = vertices;
   corners.insert(corners.end(), {{300, 300}, {110, 300}, {640, 480}, {225, 80}, {400, 200}});
   std::reverse(corners.begin(), corners.end());
-  EXPECT_THAT(compute_valid_lens_region(corners, kImager, kWithoutMargin),
+  EXPECT_THAT(compute_valid_lens_region(corners, kImager, splined_lens()),
               testing::ElementsAreArray(vertices));
-  EXPECT_THAT(compute_valid_lens_region(corners, kImager, LensModel::opencv8, true),
-              testing::ElementsAreArray(vertices));
-  EXPECT_GT(compute_valid_lens_region(corners, kImager, LensModel::opencv8).front().y(), 79);
-  EXPECT_LT(compute_valid_lens_region(corners, kImager, LensModel::opencv8).front().x(), 61);
+  EXPECT_GT(compute_valid_lens_region(corners, kImager, straight_lens()).front().y(), 79);
+  EXPECT_LT(compute_valid_lens_region(corners, kImager, straight_lens()).front().x(), 61);
 }
 
 TEST(ComputeValidLensRegion, OmitsCornersOnHullEdges) {
   EXPECT_THAT(compute_valid_lens_region(
                   {{300, 50}, {300, 250}, {100, 150}, {100, 50}, {200, 50}, {100, 250}}, kImager,
-                  kWithoutMargin),
+                  splined_lens()),
               testing::ElementsAreArray(ImageRegion{{100, 50}, {300, 50}, {300, 250}, {100, 250}}));
 }
 
 TEST(ComputeValidLensRegion, ReturnsTriangleForThreeCornersAndEmptyRegionForTwo) {
   EXPECT_THAT(
-      compute_valid_lens_region({{300, 50}, {100, 150}, {350, 250}}, kImager, kWithoutMargin),
+      compute_valid_lens_region({{300, 50}, {100, 150}, {350, 250}}, kImager, splined_lens()),
       testing::ElementsAreArray(ImageRegion{{100, 150}, {300, 50}, {350, 250}}));
-  EXPECT_TRUE(
-      compute_valid_lens_region({{300, 50}, {100, 150}}, kImager, LensModel::opencv8).empty());
-  EXPECT_TRUE(compute_valid_lens_region({{300, 50}}, kImager, LensModel::opencv8).empty());
+  EXPECT_TRUE(compute_valid_lens_region({{300, 50}, {100, 150}}, kImager, straight_lens()).empty());
+  EXPECT_TRUE(compute_valid_lens_region({{300, 50}}, kImager, straight_lens()).empty());
 }
 
 /// Triangles with one vertex 100 px beyond a border and two vertices inside the image.
 TEST(ComputeValidLensRegion, ReplacesVertexBeyondBorderByCrossingsWithBorder) {
   EXPECT_THAT(
-      compute_valid_lens_region({{-100, 300}, {400, 100}, {400, 500}}, kImager, kWithoutMargin),
+      compute_valid_lens_region({{-100, 300}, {400, 100}, {400, 500}}, kImager, splined_lens()),
       testing::UnorderedElementsAreArray(
           near_vertices({{0, 260}, {400, 100}, {400, 500}, {0, 340}})));
   EXPECT_THAT(
-      compute_valid_lens_region({{900, 200}, {400, 100}, {400, 500}}, kImager, kWithoutMargin),
+      compute_valid_lens_region({{900, 200}, {400, 100}, {400, 500}}, kImager, splined_lens()),
       testing::UnorderedElementsAreArray(
           near_vertices({{800, 180}, {400, 100}, {400, 500}, {800, 260}})));
   EXPECT_THAT(
-      compute_valid_lens_region({{300, -100}, {100, 300}, {700, 400}}, kImager, kWithoutMargin),
+      compute_valid_lens_region({{300, -100}, {100, 300}, {700, 400}}, kImager, splined_lens()),
       testing::UnorderedElementsAreArray(
           near_vertices({{250, 0}, {100, 300}, {700, 400}, {380, 0}})));
   EXPECT_THAT(
-      compute_valid_lens_region({{300, 700}, {100, 300}, {700, 500}}, kImager, kWithoutMargin),
+      compute_valid_lens_region({{300, 700}, {100, 300}, {700, 500}}, kImager, splined_lens()),
       testing::UnorderedElementsAreArray(
           near_vertices({{250, 600}, {100, 300}, {700, 500}, {500, 600}})));
 }
@@ -133,7 +144,7 @@ TEST(ComputeValidLensRegion, ReplacesVertexBeyondBorderByCrossingsWithBorder) {
 TEST(ComputeValidLensRegion, ClipsVertexHalfPixelBeyondBorder) {
   const auto clipped = [](const Eigen::Vector2d& vertex) {
     return compute_valid_lens_region({vertex, {400, 100}, {400, 500}, {420, 300}, {380, 300}},
-                                     kImager, kWithoutMargin);
+                                     kImager, splined_lens());
   };
   const double across = 200 * 0.5 / 400.5;
   const ImageRegion left = clipped({-0.5, 300}), right = clipped({800.5, 300});
@@ -149,17 +160,82 @@ TEST(ComputeValidLensRegion, ClipsVertexHalfPixelBeyondBorder) {
 
 TEST(ComputeValidLensRegion, KeepsVerticesOnBorder) {
   EXPECT_THAT(compute_valid_lens_region({{0, 300}, {800, 100}, {500, 600}, {400, 0}}, kImager,
-                                        kWithoutMargin),
+                                        splined_lens()),
               testing::ElementsAreArray(ImageRegion{{0, 300}, {400, 0}, {800, 100}, {500, 600}}));
 }
 
 TEST(ComputeValidLensRegion, ReturnsWholeImageForRegionAbove98Point5Percent) {
   const ImageRegion smaller{{0, 0}, {787, 0}, {787, 600}, {0, 600}};
-  EXPECT_THAT(compute_valid_lens_region(smaller, kImager, kWithoutMargin),
+  EXPECT_THAT(compute_valid_lens_region(smaller, kImager, splined_lens()),
               testing::ElementsAreArray(smaller));
   EXPECT_THAT(
-      compute_valid_lens_region({{0, 0}, {789, 0}, {789, 600}, {0, 600}}, kImager, kWithoutMargin),
+      compute_valid_lens_region({{0, 0}, {789, 0}, {789, 600}, {0, 600}}, kImager, splined_lens()),
       testing::ElementsAreArray(ImageRegion{{0, 0}, {800, 0}, {800, 600}, {0, 600}}));
+}
+
+/// Expects that every pixel of the region has a ray: those of a grid, and of the boundary.
+void expect_all_rays(const ImageRegion& region, const Lens& lens) {
+  ASSERT_GE(region.size(), 3U);
+  int inside = 0;
+  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(kImager, 161)) {
+    if (!polygon_contains(region, pixel)) continue;
+    ++inside;
+    EXPECT_TRUE(lens.unproject_pixel(pixel)) << pixel.transpose();
+  }
+  EXPECT_GT(inside, 1000);
+  for (std::size_t i = 0; i < region.size(); ++i) {
+    for (double along = 0; along < 1; along += 0.05) {
+      const Eigen::Vector2d pixel =
+          region[i] + along * (region[(i + 1) % region.size()] - region[i]);
+      EXPECT_TRUE(lens.unproject_pixel(pixel)) << pixel.transpose();
+    }
+  }
+}
+
+/// The models fold within the image: OPENCV_FISHEYE 307 px from its center, where its distance
+/// stops growing; OPENCVn with and without tangential and prism terms.
+TEST(ComputeValidLensRegion, LiesInsideImageOfRaysOfLensWithFold) {
+  const std::array lenses{
+      Lens(LensModel::fisheye, std::array{188.0, 192.0, 400.0, 300.0, 0.0, 0.0, -0.003, 0.0}),
+      Lens(LensModel::opencv4, std::array{400.0, 400.0, 410.0, 290.0, -0.4, 0.0, 0.0, 0.0}),
+      Lens(LensModel::opencv12, std::array{400.0, 400.0, 400.0, 300.0, -0.35, 0.0, 0.02, -0.01, 0.0,
+                                           0.0, 0.0, 0.0, 0.03, 0.0, -0.02, 0.0})};
+  for (const Lens& lens : lenses) {
+    // Corners on rays up to 96 % of the fold's distance, at most 39 px beyond the margin.
+    ImageRegion corners;
+    double max_px = 0;
+    for (double angle_rad = 0; angle_rad < 6.28; angle_rad += 0.1) {
+      const Eigen::Vector2d direction(std::cos(angle_rad), std::sin(angle_rad));
+      double reach_px = 0;
+      while (lens.unproject_pixel(lens.principal_point_px() + (reach_px + 1) * direction))
+        ++reach_px;
+      ASSERT_GT(reach_px, 150);
+      ASSERT_LT(reach_px, 390);
+      max_px = std::max(max_px, reach_px);
+      corners.emplace_back(lens.principal_point_px() + 0.96 * reach_px * direction);
+    }
+    const ImageRegion region = compute_valid_lens_region(corners, kImager, lens);
+    expect_all_rays(region, lens);
+    // No more than necessary is cut off: all corners remain.
+    for (const Eigen::Vector2d& corner : corners) {
+      const bool is_in_image =
+          (corner.array() >= 0).all() && corner.x() <= 800 && corner.y() <= 600;
+      EXPECT_TRUE(!is_in_image || polygon_contains(region, corner)) << corner.transpose();
+    }
+    EXPECT_LT(region.size(), 160U);
+  }
+}
+
+TEST(ComputeValidLensRegion, KeepsStraightEdgesInsideImageOfRays) {
+  const Lens lens(LensModel::fisheye,
+                  std::array{188.0, 188.0, 400.0, 300.0, 0.0, 0.0, -0.003, 0.0});
+  const ImageRegion region =
+      compute_valid_lens_region({{300, 100}, {600, 100}, {600, 500}, {300, 500}}, kImager, lens);
+  expect_all_rays(region, lens);
+  // The left edge is 140 px from the center and keeps its two vertices.
+  EXPECT_THAT(region, testing::Contains(IsNear(Eigen::Vector2d(260, 60), 1e-9)));
+  EXPECT_THAT(region, testing::Contains(IsNear(Eigen::Vector2d(260, 540), 1e-9)));
+  EXPECT_FALSE(polygon_contains(region, {640, 60}));
 }
 
 TEST(ComputeRegionFractionOfImageArea, ReturnsAreaDividedByAreaBetweenPixelCenters) {
