@@ -9,13 +9,6 @@
 namespace vlp {
 namespace {
 
-/// Normal equations of some rows in the parameters common to all views, intrinsics and warp, with
-/// the poses of the view eliminated.
-struct ReducedEquations {
-  Eigen::MatrixXd normal;
-  Eigen::VectorXd gradient;
-};
-
 struct Layout {
   Eigen::Index intrinsics, poses, warp, states;
 
@@ -24,7 +17,7 @@ struct Layout {
 
 /// Computes the equations of `count` columns of the transposed Jacobian, with the boards from
 /// `pose` on.
-ReducedEquations compute_reduced_equations(const Linearization& at, const Layout& layout,
+ViewEquations::View compute_view_equations(const Linearization& at, const Layout& layout,
                                            Eigen::Index first, Eigen::Index count,
                                            Eigen::Index pose, Eigen::Index boards) {
   const Eigen::Index shared = layout.shared(), num_pose_states = 6 * boards;
@@ -36,9 +29,12 @@ ReducedEquations compute_reduced_equations(const Linearization& at, const Layout
     if (state >= layout.warp) return layout.intrinsics + state - layout.warp;
     return shared + state - layout.poses - 6 * pose;
   };
+  double squares = 0, inliers = 0;
   using Entry = Eigen::SparseMatrix<double>::InnerIterator;
   for (Eigen::Index column = first; column < first + count; ++column) {
     const double residual = column < at.residuals_px.size() ? at.residuals_px[column] : 0;
+    squares += residual * residual;
+    if (residual != 0) ++inliers;
     for (Entry a(at.jacobian_transposed, column); a; ++a) {
       gradient[reduced_index(a.row())] += a.value() * residual;
       for (Entry b(at.jacobian_transposed, column); b; ++b) {
@@ -46,50 +42,88 @@ ReducedEquations compute_reduced_equations(const Linearization& at, const Layout
       }
     }
   }
-  if (num_pose_states == 0) return {normal, gradient};
+  if (num_pose_states == 0) return {normal, gradient, squares, inliers};
   const Eigen::LDLT<Eigen::MatrixXd> poses(
       normal.bottomRightCorner(num_pose_states, num_pose_states));
   const Eigen::MatrixXd cross_block = normal.topRightCorner(shared, num_pose_states);
+  const Eigen::VectorXd pose_gradient = gradient.tail(num_pose_states);
   return {normal.topLeftCorner(shared, shared) - cross_block * poses.solve(cross_block.transpose()),
-          gradient.head(shared) - cross_block * poses.solve(gradient.tail(num_pose_states))};
+          gradient.head(shared) - cross_block * poses.solve(pose_gradient),
+          squares - pose_gradient.dot(poses.solve(pose_gradient)), inliers};
+}
+
+/// Returns the change of the common parameters if views with this normal matrix and gradient are
+/// left out, to first order; infinite if the others do not determine a lens.
+Eigen::VectorXd compute_change_without_views(const ViewEquations& equations,
+                                             const Eigen::MatrixXd& normal,
+                                             const Eigen::VectorXd& gradient) {
+  const Eigen::LDLT<Eigen::MatrixXd> remaining(equations.normal - normal);
+  if (remaining.isPositive() && remaining.vectorD().minCoeff() > 0)
+    return remaining.solve(gradient);
+  return Eigen::VectorXd::Constant(gradient.size(), std::numeric_limits<double>::infinity());
 }
 
 }  // namespace
 
-Eigen::MatrixXd estimate_intrinsics_covariance_by_jackknife(const IntrinsicsSolution& solution) {
+ViewEquations::ViewEquations(const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
   const Linearization at = linearize_board_problem(problem, solution.solved_parameters);
-  const auto views = static_cast<Eigen::Index>(solution.views.size());
+  const auto num_views = static_cast<Eigen::Index>(solution.views.size());
   const auto boards = static_cast<Eigen::Index>(problem.poses.size());
-  const auto intrinsics = static_cast<Eigen::Index>(problem.intrinsics.size());
   const Layout layout{at.poses, at.poses, at.poses + 6 * boards, at.jacobian_transposed.rows()};
-  const Eigen::Index rows = at.residuals_px.size(), rows_of_view = rows / views;
-
-  std::vector<ReducedEquations> all_equations;
-  all_equations.reserve(solution.views.size());
-  for (Eigen::Index view = 0; view < views; ++view) {
-    all_equations.push_back(compute_reduced_equations(at, layout, view * rows_of_view, rows_of_view,
-                                                      view * boards / views, boards / views));
+  const Eigen::Index rows = at.residuals_px.size(), rows_of_view = rows / num_views;
+  num_intrinsics = static_cast<Eigen::Index>(problem.intrinsics.size());
+  scale = at.scale.head(at.poses);
+  normal =
+      compute_view_equations(at, layout, rows, at.jacobian_transposed.cols() - rows, 0, 0).normal;
+  views.reserve(solution.views.size());
+  for (Eigen::Index view = 0; view < num_views; ++view) {
+    views.push_back(compute_view_equations(at, layout, view * rows_of_view, rows_of_view,
+                                           view * boards / num_views, boards / num_views));
+    normal += views.back().normal;
   }
-  Eigen::MatrixXd normal =
-      compute_reduced_equations(at, layout, rows, at.jacobian_transposed.cols() - rows, 0, 0)
-          .normal;
-  for (const ReducedEquations& view_equations : all_equations) normal += view_equations.normal;
+}
 
+Eigen::MatrixXd estimate_intrinsics_covariance_by_jackknife(const ViewEquations& equations) {
+  const auto views = std::ssize(equations.views);
+  const Eigen::Index intrinsics = equations.num_intrinsics, solved = equations.scale.size();
   Eigen::MatrixXd changes = Eigen::MatrixXd::Zero(intrinsics, views);
   for (Eigen::Index view = 0; view < views; ++view) {
-    const ReducedEquations& view_equations = all_equations[static_cast<std::size_t>(view)];
-    const Eigen::LDLT<Eigen::MatrixXd> remaining(normal - view_equations.normal);
-    if (!remaining.isPositive() || !(remaining.vectorD().minCoeff() > 0)) {
+    const auto& [normal, gradient, squares, count] =
+        equations.views[static_cast<std::size_t>(view)];
+    const Eigen::VectorXd change = compute_change_without_views(equations, normal, gradient);
+    if (!change.allFinite()) {
       return Eigen::MatrixXd::Constant(intrinsics, intrinsics,
                                        std::numeric_limits<double>::infinity());
     }
-    changes.col(view).tail(at.poses) = at.scale.head(at.poses).cwiseProduct(
-        remaining.solve(view_equations.gradient).head(at.poses));
+    changes.col(view).tail(solved) = equations.scale.cwiseProduct(change.head(solved));
   }
   changes.colwise() -= changes.rowwise().mean().eval();
   const auto n = static_cast<double>(views);
   return (n - 1) / n * changes * changes.transpose();
+}
+
+std::vector<double> compute_left_out_mean_squares_px2(const ViewEquations& equations,
+                                                      std::size_t blocks) {
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  const std::size_t views = equations.views.size();
+  std::vector<double> squares_px2;
+  for (std::size_t first = 0; first < views;) {
+    ViewEquations::View block = equations.views[first];
+    std::size_t end = first + 1;
+    for (; end < views && end * blocks / views == first * blocks / views; ++end) {
+      block.normal += equations.views[end].normal;
+      block.gradient += equations.views[end].gradient;
+    }
+    const Eigen::VectorXd change =
+        compute_change_without_views(equations, block.normal, block.gradient);
+    for (; first < end; ++first) {
+      const auto& [normal, gradient, squares, count] = equations.views[first];
+      const double added = 2 * change.dot(gradient) + change.dot(normal * change);
+      squares_px2.push_back(change.allFinite() ? (squares + added) / count : inf);
+    }
+  }
+  return squares_px2;
 }
 
 }  // namespace vlp
