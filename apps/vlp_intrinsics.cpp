@@ -18,6 +18,7 @@
 #include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/camera_exports.h"
 #include "calibration/intrinsics/mrcal_files.h"
+#include "camera/spline_grid.h"
 #include "detection/boards/corner_table.h"
 #include "evaluation/gate.h"
 #include "frontend/board_intake.h"
@@ -181,6 +182,26 @@ void throw_if_gate_failed(const std::vector<Gate>& gates, const LensResult& resu
                   failed));
 }
 
+/// Prints the components of the uncertainty other than noise.
+void print_uncertainty_components(const LensEstimate& lens) {
+  if (const auto& model = lens.model_uncertainty) {
+    fmt::print(
+        "model choice  {:.3f} px mean, {:.3f} px worst: difference to {}, which the views do not "
+        "exclude; focal length by {:.2f} px; in the uncertainty above and in the covariance\n",
+        model->mean_px, model->worst_px, lens_model_name(model->model),
+        std::abs(model->intrinsics[0]));
+  } else if (!lens.are_models_compared) {
+    fmt::print("model choice  not in the uncertainty above: {}\n",
+               is_splined_lens_model(lens.solution.problem.lens_model)
+                   ? "splined lenses are not compared"
+                   : fmt::format("needs {} views", kMinViewsToCompare));
+  }
+  if (lens.print_px) {
+    fmt::print("board print   {:.3f} px, in the covariance and not in the uncertainty above\n",
+               *lens.print_px);
+  }
+}
+
 void run(const CLI::App& app, const Options& options) {
   const std::vector<Gate> gates = parse_gates(options);
   if (!chooses_lens(options)) check_exports(options, known_camera(options));
@@ -223,10 +244,7 @@ void run(const CLI::App& app, const Options& options) {
   write_results(options, result);
   if (lens.choice) fmt::print("lens model    {}\n", describe_lens_model_choice(*lens.choice));
   print_lens_calibration(lens.solution, lens.report, lens.coverage, lens.held_out);
-  if (lens.print_px) {
-    fmt::print("board print   {:.3f} px, in the covariance and not in the uncertainty above\n",
-               *lens.print_px);
-  }
+  print_uncertainty_components(lens);
   throw_if_gate_failed(gates, result);
 }
 

@@ -26,8 +26,8 @@ struct CalibrationReport {
   ///
   /// The maximum is at least estimate_expected_max_projection_difference_px() over the region for
   /// each of three covariances: by tags, by independent corners and by views. Splined lenses are
-  /// excluded from this rule. If another lens model fits equally well, estimate_lens() raises the
-  /// maximum to the largest difference between the two lenses.
+  /// excluded from this rule. estimate_lens() adds the uncertainty of the lens model and of the
+  /// print.
   double uncertainty_mean_px, uncertainty_worst_px;
   /// Maximum of ProjectionUncertainty::projection_sd_along_worst_direction_px() outside the region,
   /// px.

@@ -69,9 +69,6 @@ struct IntrinsicsSolution {
   /// Estimated parameters: the intrinsics (splined lenses: without the core), and the warp if
   /// selected.
   SolveOptions solved_parameters{true, true, true, false};
-  /// True if another lens model fits the corners equally well. The lens is then undetermined
-  /// outside the region of the corners.
-  bool other_model_fits = false;
 };
 
 /// Estimates lens, poses and warp of the board. Needs no initial focal length. Stages:

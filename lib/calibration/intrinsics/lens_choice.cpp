@@ -7,105 +7,96 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <numeric>
+#include <stdexcept>
 #include <utility>
 
 #include "calibration/intrinsics/board_poses.h"
-#include "calibration/intrinsics/calibration_report.h"
+#include "calibration/intrinsics/camera_imports.h"
+#include "calibration/intrinsics/view_jackknife.h"
 #include "geometry/angles.h"
-#include "geometry/median.h"
+#include "geometry/statistical_bounds.h"
 
 namespace vlp {
 namespace {
 
-using Squares = std::vector<double>;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Candidates in the order of their number of parameters.
 constexpr std::array kModels{LensModel::opencv4, LensModel::fisheye, LensModel::opencv5,
                              LensModel::opencv8, LensModel::opencv12};
+/// Blocks of views of the cross-validation, and standard errors up to which models are equal.
+constexpr std::size_t kBlocks = kMinViewsToCompare;
+constexpr double kMaxErrors = 2;
 
-/// Views of two of the three parts, which are solved, and views of the third.
-struct Fold {
-  InitialSolutions solved;
-  IntrinsicsInput held_out;
-};
-
-std::vector<Fold> split_into_folds(const IntrinsicsInput& input) {
-  constexpr std::size_t parts = 3;
-  std::vector<Fold> folds;
-  for (std::size_t part = 0; part < parts; ++part) {
-    IntrinsicsInput solved = input, held_out = input;
-    solved.views.clear();
-    held_out.views.clear();
-    for (std::size_t view = 0; view < input.views.size(); ++view) {
-      (view % parts == part ? held_out : solved).views.push_back(input.views[view]);
-    }
-    folds.push_back({InitialSolutions(std::move(solved)), std::move(held_out)});
-  }
-  return folds;
-}
-
-/// Returns the mean squared residual per axis of each view, px^2, from solves without it; infinity
-/// if it has no pose. Returns std::nullopt if a solve fails.
-std::optional<Squares> cross_validate(const std::vector<Fold>& folds, LensModel model) {
-  Squares squares;
-  for (const auto& [solved, held_out] : folds) {
-    const IntrinsicsSolution solution = solve_intrinsics(solved, model);
-    if (!solution.has_succeeded()) return {};
-    for (const double rms_px : compute_held_out_view_residual_rms_px(solution, held_out)) {
-      squares.push_back(rms_px * rms_px);
+/// Fits a model to the corners of a solution, starting from its lens.
+std::optional<IntrinsicsSolution> fit_model_to_corners(const IntrinsicsSolution& start,
+                                                       LensModel model) {
+  const BoardProblem& from = start.problem;
+  if (model == from.lens_model) return start;
+  IntrinsicsSolution fit = start;
+  fit.problem.lens_model = model;
+  if (model == LensModel::opencv12 && from.lens_model == LensModel::opencv8) {
+    fit.problem.intrinsics.resize(num_lens_parameters(model), 0);
+  } else {
+    Camera camera;
+    camera.lens_model = from.lens_model;
+    camera.imager_px = from.imager_px;
+    camera.intrinsics = from.intrinsics;
+    try {
+      fit.problem.intrinsics = convert_camera_to_lens_model(camera, model).camera.intrinsics;
+    } catch (const std::invalid_argument&) {
+      return {};  // no lens of the model is similar
     }
   }
-  return squares;
+  if (!solve_intermediate_board_problem(fit.problem, fit.solved_parameters)) return {};
+  fit.update_lens_fit_statistics();
+  return fit;
 }
 
-double mean_square(const Squares& squares) {
-  return std::accumulate(squares.begin(), squares.end(), 0.0) / static_cast<double>(squares.size());
+/// Logarithms of the mean squared residuals of the held-out views.
+using LogSquares = Eigen::VectorXd;
+
+/// Computes the logarithms for a fit; infinite if a view is not determined.
+LogSquares compute_log_squares(const IntrinsicsSolution& fit) {
+  const std::vector<double> squares_px2 = compute_left_out_mean_squares_px2(fit, kBlocks);
+  LogSquares logs(std::ssize(squares_px2));
+  for (std::size_t view = 0; view < squares_px2.size(); ++view)
+    logs[static_cast<Eigen::Index>(view)] = std::log(squares_px2[view]);
+  return logs.allFinite() ? logs : LogSquares::Constant(logs.size(), kInfinity);
 }
 
-/// Mean over the views of log(a / b), and its standard error.
-struct MeanLogRatio {
-  double mean, error;
-};
-
-MeanLogRatio compute_mean_log_residual_ratio(const Squares& a, const Squares& b) {
-  const auto n = static_cast<double>(a.size());
-  double sum = 0, sum_of_squares = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += std::log(a[i] / b[i]);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    sum_of_squares += std::pow(std::log(a[i] / b[i]) - sum / n, 2);
-  }
-  return {sum / n, std::sqrt(sum_of_squares / (n - 1) / n)};
+/// Returns the largest mean of one value per view that is not significant: the standard error, from
+/// the means of blocks of consecutive views, times the factor of kMaxErrors and of the few blocks.
+double compute_max_mean(const Eigen::VectorXd& values, Eigen::Index blocks) {
+  const Eigen::Index views = values.size();
+  Eigen::VectorXd sums = Eigen::VectorXd::Zero(blocks);
+  for (Eigen::Index view = 0; view < views; ++view)
+    sums[view * blocks / views] += values[view] - values.mean();
+  const double freedom = static_cast<double>(blocks - 1), count = static_cast<double>(views);
+  const double variance =
+      sums.squaredNorm() * static_cast<double>(blocks) / freedom / count / count;
+  return std::sqrt(compute_squared_student_t_bound(kMaxErrors, freedom) * variance);
 }
 
-/// Removes the views that no model fits from all models: the lens is not the cause of their
-/// residuals.
-void remove_views_no_model_fits(std::vector<std::optional<Squares>>& model_squares) {
-  constexpr double max_ratio = 9;
-  constexpr double inf = std::numeric_limits<double>::infinity();
-  double typical = inf;
-  Squares smallest;
-  for (const auto& squares : model_squares) {
-    if (!squares) continue;
-    typical = std::min(typical, upper_median(*squares));
-    smallest.resize(squares->size(), inf);
-    for (std::size_t view = 0; view < smallest.size(); ++view) {
-      smallest[view] = std::min(smallest[view], (*squares)[view]);
-    }
+/// Compares the candidates with the best one: sets their excess and its limits.
+void compare_with_best(const std::vector<LogSquares>& logs, LensChoice& choice) {
+  const auto best = std::ranges::min_element(logs, {}, [](const auto& log) { return log.mean(); });
+  const auto relative_rms = [](double mean_log) { return std::expm1(mean_log / 2); };
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    LensCandidate& candidate = choice.candidates[i];
+    const double mean = logs[i].mean();
+    if (!std::isfinite(mean)) continue;
+    const Eigen::VectorXd ratios = logs[i] - *best;
+    candidate.rms_px = std::exp(mean / 2);
+    candidate.excess = relative_rms(ratios.mean());
+    candidate.max_excess = relative_rms(compute_max_mean(ratios, ratios.size()));
+    candidate.max_excess_by_blocks = relative_rms(compute_max_mean(ratios, kBlocks));
   }
-  for (auto& squares : model_squares) {
-    if (!squares) continue;
-    Squares kept;
-    for (std::size_t view = 0; view < smallest.size(); ++view) {
-      if (smallest[view] <= max_ratio * typical && std::isfinite(smallest[view])) {
-        kept.push_back((*squares)[view]);
-      }
-    }
-    const bool fits =
-        std::all_of(kept.begin(), kept.end(), [](double square) { return std::isfinite(square); });
-    squares = fits && kept.size() > 1 ? std::optional(kept) : std::nullopt;
-  }
+  const auto first = std::ranges::find(choice.candidates, false, &LensCandidate::is_rejected);
+  if (first == choice.candidates.end()) return;
+  const double max_excess = first->excess;
+  for (LensCandidate& candidate : choice.candidates)
+    candidate.max_excess = std::max(candidate.max_excess, max_excess);
 }
 
 /// Returns the largest angle of a corner off the axis.
@@ -153,57 +144,73 @@ bool may_be_wide_angle_lens(const InitialSolutions& initial) {
   return 2 * std::atan(farthest_px / lens.focal_px().x() / 2) > wide_rad;
 }
 
-std::optional<LensChoice> select_lens_model(const InitialSolutions& initial) {
-  if (initial.input().views.size() < kMinViewsToChoose) return {};
-  LensChoice choice{};
-  choice.fisheye = fit_fisheye_lens(initial);
-  if (choice.fisheye && choice.fisheye->max_corner_angle_rad >= kRightAngle_rad) {
-    choice.beyond_right_angle_rad = choice.fisheye->max_corner_angle_rad;
+IntrinsicsSolution solve_opencv8_or_fisheye(const InitialSolutions& initial) {
+  std::optional<FisheyeFit> fisheye;
+  if (may_be_wide_angle_lens(initial) &&
+      !is_fisheye_model_clearly_worse(initial, LensModel::opencv8)) {
+    fisheye = fit_fisheye_lens(initial);
   }
-  const std::vector<Fold> folds = split_into_folds(initial.input());
-  std::vector<std::optional<Squares>> squares;
+  if (fisheye && fisheye->max_corner_angle_rad >= kRightAngle_rad)
+    return std::move(fisheye->solution);
+  IntrinsicsSolution solution = solve_intrinsics(initial, LensModel::opencv8);
+  const bool other =
+      fisheye && !(solution.has_succeeded() && solution.rms_px < fisheye->solution.rms_px);
+  return other ? std::move(fisheye->solution) : solution;
+}
+
+std::optional<LensChoice> compare_lens_models(const IntrinsicsSolution& reference) {
+  if (reference.views.size() < kMinViewsToCompare) return {};
+  LensChoice choice{reference.problem.lens_model, {}};
+  const double max_angle_rad = compute_max_corner_angle_rad(reference);
+  if (max_angle_rad >= kRightAngle_rad) choice.beyond_right_angle_rad = max_angle_rad;
+  std::vector<LogSquares> logs;
+  const auto views = std::ssize(reference.views);
   for (const LensModel model : kModels) {
     const bool is_candidate = model == LensModel::fisheye || choice.beyond_right_angle_rad == 0;
-    squares.push_back(is_candidate ? cross_validate(folds, model) : std::nullopt);
+    const bool extends_last = model == LensModel::opencv12 && choice.candidates.back().fit;
+    const IntrinsicsSolution& start = extends_last && reference.problem.lens_model != model
+                                          ? *choice.candidates.back().fit
+                                          : reference;
+    auto fit = is_candidate ? fit_model_to_corners(start, model) : std::nullopt;
+    logs.push_back(fit ? compute_log_squares(*fit) : LogSquares::Constant(views, kInfinity));
+    choice.candidates.push_back({.model = model, .fit = std::move(fit)});
   }
-  remove_views_no_model_fits(squares);
-  constexpr double errors = 2;
-  const Squares* best = nullptr;
-  for (std::size_t i = 0; i < kModels.size(); ++i) {
-    choice.candidates.push_back({kModels[i]});
-    if (!squares[i]) continue;
-    choice.candidates.back().rms_px = std::sqrt(mean_square(*squares[i]));
-    if (best == nullptr || compute_mean_log_residual_ratio(*squares[i], *best).mean < 0)
-      best = &*squares[i];
-  }
-  if (best == nullptr) return {};
-  for (std::size_t i = 0; i < kModels.size(); ++i) {
-    if (!squares[i]) continue;
-    const auto [mean, error] = compute_mean_log_residual_ratio(*squares[i], *best);
-    if (mean > errors * error) continue;
-    choice.model = kModels[i];
-    break;
-  }
+  compare_with_best(logs, choice);
+  const auto selected = std::ranges::find(choice.candidates, false, &LensCandidate::is_rejected);
+  if (selected == choice.candidates.end()) return {};
+  choice.model = selected->model;
   return choice;
 }
 
+std::optional<LensChoice> select_lens_model(const InitialSolutions& initial) {
+  if (initial.input().views.size() < kMinViewsToChoose) return {};
+  IntrinsicsSolution reference = solve_opencv8_or_fisheye(initial);
+  if (!reference.has_succeeded()) reference = solve_intrinsics(initial, LensModel::opencv4);
+  if (!reference.has_succeeded()) return {};
+  return compare_lens_models(reference);
+}
+
 std::string describe_lens_model_choice(const LensChoice& choice) {
-  std::string taken, others;
-  if (choice.beyond_right_angle_rad > 0) {
-    others = fmt::format(
-        "the board is visible up to {:.0f} degrees off axis, where no LENSMODEL_OPENCVn has rays",
-        deg_from_rad(choice.beyond_right_angle_rad));
-  }
-  for (const auto& [model, rms_px] : choice.candidates) {
-    const std::string left =
-        std::isfinite(rms_px) ? fmt::format("{:.3f} px", rms_px) : std::string("no lens");
-    if (model == choice.model) {
-      taken = fmt::format("{}, {}", lens_model_name(model), left);
+  std::string selected, others;
+  for (const LensCandidate& candidate : choice.candidates) {
+    std::string figures(lens_model_name(candidate.model));
+    figures +=
+        std::isfinite(candidate.rms_px)
+            ? fmt::format(" {:.4f} px ({:.1f} % above the best, limit {:.1f} %)", candidate.rms_px,
+                          100 * candidate.excess, 100 * candidate.max_excess)
+            : " no lens";
+    if (candidate.model == choice.model) {
+      selected = figures + " in held-out views";
     } else if (choice.beyond_right_angle_rad == 0) {
-      others += fmt::format("{}{} {}", others.empty() ? "" : ", ", lens_model_name(model), left);
+      others += "; " + figures;
     }
   }
-  return fmt::format("{} rms in held-out views; {}", taken, others);
+  if (choice.beyond_right_angle_rad > 0) {
+    others = fmt::format(
+        "; the board is visible up to {:.0f} degrees off axis, where no LENSMODEL_OPENCVn has rays",
+        deg_from_rad(choice.beyond_right_angle_rad));
+  }
+  return selected + others;
 }
 
 }  // namespace vlp

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <numbers>
@@ -13,16 +14,24 @@
 
 namespace vlp {
 
-/// Lens model with its residuals in views that were held out of its solves.
+/// Lens model with its fit to the corners of a solution, compared with the other models.
 struct LensCandidate {
   LensModel model;
-  /// RMS residual of the held-out views per axis, px, over the views that count
-  /// (select_lens_model()). Infinity if no lens of the model fits all of them.
+  /// Geometric mean, over the views, of the RMS residual per axis of a held-out view, px
+  /// (compute_left_out_mean_squares_px2()). Infinity if no lens of the model fits.
   double rms_px = std::numeric_limits<double>::infinity();
+  /// `rms_px` relative to the smallest one of all candidates, minus 1. The model is rejected if
+  /// this exceeds `max_excess`. It may describe the lens up to `max_excess_by_blocks`.
+  double excess = std::numeric_limits<double>::infinity(), max_excess = 0, max_excess_by_blocks = 0;
+  /// Fit of the model; std::nullopt if there is none.
+  std::optional<IntrinsicsSolution> fit = {};
+
+  bool is_rejected() const { return !(excess <= max_excess); }
+  bool may_describe_lens() const { return excess <= std::max(max_excess, max_excess_by_blocks); }
 };
 
-/// Minimum number of views for select_lens_model().
-constexpr std::size_t kMinViewsToChoose = 6;
+/// Minimum number of views for the selection of a lens model, and for the comparison of the models.
+constexpr std::size_t kMinViewsToChoose = 6, kMinViewsToCompare = 5;
 
 /// Fit of OPENCV_FISHEYE, and the largest angle of a corner off its axis.
 struct FisheyeFit {
@@ -30,16 +39,14 @@ struct FisheyeFit {
   double max_corner_angle_rad;
 };
 
-/// Selected lens model and the results of its selection.
+/// Comparison of the lens models, and the selected one.
 struct LensChoice {
   LensModel model;
   /// Candidates in the order of their number of parameters; OPENCV4 before OPENCV_FISHEYE.
   std::vector<LensCandidate> candidates;
-  /// Largest angle of a corner off the axis of OPENCV_FISHEYE if it is at least a right angle,
-  /// where no OPENCVn has rays; 0 otherwise.
+  /// Largest angle of a corner off the axis of the compared solution if it is at least a right
+  /// angle, where no OPENCVn has rays; 0 otherwise.
   double beyond_right_angle_rad = 0;
-  /// Fit of OPENCV_FISHEYE; std::nullopt if it does not fit.
-  std::optional<FisheyeFit> fisheye = {};
 };
 
 /// Angle off the axis from which on no OPENCVn has rays.
@@ -61,26 +68,35 @@ bool is_fisheye_model_clearly_worse(const InitialSolutions& initial, LensModel o
 /// which the poses of the views fit best. Takes a small fraction of the time of a solve.
 bool may_be_wide_angle_lens(const InitialSolutions& initial);
 
-/// Selects a lens model by three-fold cross-validation. Every third view is in the same part.
+/// Solves OPENCV8, and OPENCV_FISHEYE for wide lenses if it may fit. Returns the solution with the
+/// smaller residuals, that of OPENCV_FISHEYE if corners are 90 degrees off its axis or more.
+IntrinsicsSolution solve_opencv8_or_fisheye(const InitialSolutions& initial);
+
+/// Compares the models with distortion by cross-validation and selects one.
 ///
-/// Each model with distortion is solved with two parts (solve_intrinsics()) and evaluated with the
-/// third, so that each view is evaluated once. The evaluation fits only poses and edge shifts
-/// (compute_held_out_view_residual_rms_px()). Two models are compared by the mean, over the views,
-/// of the logarithm of the ratio of their squared residuals. The views of a few positions do not
-/// dominate this mean.
+/// Each model is fitted to the corners of `reference`, with its corrections, weights and outliers,
+/// starting from its lens. The views are divided into five blocks of consecutive views. Each view
+/// is evaluated with the lens of the other blocks (compute_left_out_mean_squares_px2()).
+/// Consecutive views are often alike, and have the same errors and the same blind spots.
 ///
-/// Selects the model with the fewest parameters whose mean exceeds that of the best by at most two
-/// standard errors: the one-standard-error rule of Breiman, Friedman, Olshen and Stone,
-/// Classification and Regression Trees, 1984, 3.4.3. With one standard error, the rule would select
-/// a model larger than the lens in one of six cases.
+/// Two models are compared by the mean, over the views, of the logarithm of the ratio of their
+/// squared residuals. The views of a few positions do not dominate this mean. Its standard error
+/// follows from the means of the blocks. A model is rejected if its mean exceeds that of the best
+/// by more than two standard errors, widened for the few blocks
+/// (compute_squared_student_t_bound()), and also that of each model which is not. The smallest
+/// model that is not rejected is selected: the one-standard-error rule of Breiman, Friedman, Olshen
+/// and Stone, Classification and Regression Trees, 1984, 3.4.3, with two standard errors.
 ///
-/// Views in which the residuals of every model exceed three times the typical residual do not
-/// count. OPENCVn models are skipped if OPENCV_FISHEYE fits and has corners at 90 degrees off the
-/// axis or more.
+/// OPENCVn models are not compared if corners are at 90 degrees off the axis or more.
+/// @return std::nullopt if no model fits the views, or with fewer than kMinViewsToCompare views
+std::optional<LensChoice> compare_lens_models(const IntrinsicsSolution& reference);
+
+/// Selects a lens model by compare_lens_models(), with solve_opencv8_or_fisheye() as reference;
+/// with OPENCV4 if that fails.
 /// @return std::nullopt if no model fits the views, or with fewer than kMinViewsToChoose views
 std::optional<LensChoice> select_lens_model(const InitialSolutions& initial);
 
-/// Describes the candidates with their residuals, the selected one first.
+/// Describes the candidates with the figures that were compared, the selected one first.
 std::string describe_lens_model_choice(const LensChoice& choice);
 
 }  // namespace vlp

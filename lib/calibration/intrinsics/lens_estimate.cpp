@@ -6,21 +6,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <utility>
 
 #include "calibration/intrinsics/board_check.h"
 #include "calibration/intrinsics/board_print.h"
 #include "calibration/intrinsics/inconsistent_views.h"
-#include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
 #include "calibration/intrinsics/spline_fit.h"
 #include "calibration/intrinsics/tone_curve_estimation.h"
 #include "camera/spline_surface.h"
 #include "geometry/angles.h"
 #include "geometry/median.h"
-#include "geometry/polygon.h"
 
 namespace vlp {
 namespace {
@@ -151,45 +148,15 @@ bool is_opencv_model(LensModel model) {
          model == LensModel::opencv8 || model == LensModel::opencv12;
 }
 
-/// Returns true if the residuals of a lens are as small as those of another, up to 20 times their
-/// mean square, as for the warp.
-bool fits_equally_well(const IntrinsicsSolution& lens, const IntrinsicsSolution& other) {
-  constexpr double max_excess = 20;
-  const double ratio = lens.rms_px / other.rms_px;
-  return ratio * ratio <= 1 + max_excess / (2.0 * other.corners);
-}
-
-/// Raises the largest uncertainty to the difference between two lenses that fit equally well, where
-/// the lens is known.
-void raise_uncertainty_to_difference(const Lens& lens, const Lens& other,
-                                     const std::array<int, 2>& imager_px,
-                                     CalibrationReport& report) {
-  std::vector<Eigen::Vector2d> pixels = make_regular_pixel_grid(imager_px);
-  std::erase_if(pixels, [&](const auto& pixel) { return !polygon_contains(report.region, pixel); });
-  const auto lens_from_other = fit_rotation_between_lenses(other, lens, pixels);
-  if (!lens_from_other) return;
-  for (const Eigen::Vector2d& pixel : pixels) {
-    const auto ray = other.unproject_pixel(pixel);
-    const auto seen = ray ? lens.project_point(*lens_from_other * ray->direction) : std::nullopt;
-    const double difference_px =
-        seen ? (*seen - pixel).norm() : std::numeric_limits<double>::infinity();
-    report.uncertainty_worst_px = std::max(report.uncertainty_worst_px, difference_px);
-  }
-}
-
-/// Recommends OPENCV_FISHEYE if it fits clearly better, or if the board is seen nearly as far off
-/// the axis as the rays of the lens reach.
+/// Recommends OPENCV_FISHEYE if it fits clearly better, or as well with the board seen nearly as
+/// far off the axis as the rays of the lens reach.
 void recommend_fisheye(const FisheyeFit& fisheye, LensEstimate& result) {
-  constexpr double max_ratio = 0.95, min_angle_rad = 1.3;
+  constexpr double better_ratio = 0.95, equal_ratio = 1.01, min_angle_rad = 1.3;
   const IntrinsicsSolution& solution = result.solution;
   const LensModel model = solution.problem.lens_model;
-  if (fisheye.solution.rms_px > max_ratio * solution.rms_px &&
-      fisheye.max_corner_angle_rad < min_angle_rad) {
-    result.details.push_back(fmt::format(
-        "{} fits the views as well as {}: the lens is valid only where corners were detected",
-        lens_model_name(LensModel::fisheye), lens_model_name(model)));
-    return;
-  }
+  const double max_ratio =
+      fisheye.max_corner_angle_rad < min_angle_rad ? better_ratio : equal_ratio;
+  if (fisheye.solution.rms_px > max_ratio * solution.rms_px) return;
   result.better_model = LensModel::fisheye;
   result.warnings.push_back(fmt::format(
       "the board is visible up to {:.0f} degrees off axis; {} fits with {:.3f} px, {} with {:.3f} "
@@ -261,44 +228,62 @@ std::string explain_why_lens_not_found(const InitialSolutions& initial, LensMode
   return problem.empty() ? std::string(describe_intrinsics_status(status)) : problem;
 }
 
-/// Adds the uncertainty of a solution. `print_sd` is Board::print_sd.
-void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& fisheye,
-                     bool is_chosen, double print_sd, LensEstimate& result) {
-  IntrinsicsSolution& solution = result.solution;
-  solution.other_model_fits = fisheye && fits_equally_well(fisheye->solution, solution);
-  const auto uncertainties = ProjectionUncertainty::compute_uncertainty_by_corners_and_by_tags(
-      solution, views.solved.lattice);
-  result.report = compute_lens_calibration_report(solution, views.solved, uncertainties);
-  if (solution.other_model_fits) {
-    raise_uncertainty_to_difference(solution.fitted_lens(), fisheye->solution.fitted_lens(),
-                                    views.solved.imager_px, result.report);
-    if (!is_chosen) recommend_fisheye(*fisheye, result);
-  }
-  result.coverage = compute_board_view_coverage(solution, views.solved);
-  result.held_out = evaluate_lens_on_held_out_views(solution, views.held_out);
-  result.lattice = views.solved.lattice;
-  result.sharpness = measure_lens_sharpness(result.views, views.solved.imager_px);
-  std::optional<AspectErrorEffect> print;
-  if (print_sd > 0)
-    print = compute_board_aspect_error_effect_on_lens(solution, print_sd, result.report.region);
+/// Adds the uncertainty from the choice of the lens model to the report.
+void add_model_uncertainty(LensEstimate& result) {
+  const IntrinsicsSolution& solution = result.solution;
+  if (is_splined_lens_model(solution.problem.lens_model)) return;
+  const auto comparison = compare_lens_models(solution);
+  if (!comparison) return;
+  result.are_models_compared = true;
+  CalibrationReport& report = result.report;
+  result.model_uncertainty =
+      compute_model_uncertainty(solution, *comparison, report.region, report.uncertainty_worst_px);
+  if (!result.model_uncertainty) return;
+  const ModelUncertainty& model = *result.model_uncertainty;
+  report.uncertainty_mean_px = std::hypot(report.uncertainty_mean_px, model.mean_px);
+  report.uncertainty_worst_px = std::hypot(report.uncertainty_worst_px, model.worst_px);
+}
+
+/// Adds the uncertainty from the print of the board to the report. `print_sd` is Board::print_sd.
+std::optional<AspectErrorEffect> add_print_uncertainty(double print_sd, LensEstimate& result) {
+  if (print_sd == 0) return {};
+  CalibrationReport& report = result.report;
+  auto print = compute_board_aspect_error_effect_on_lens(result.solution, print_sd, report.region);
   if (print) {
-    CalibrationReport& report = result.report;
     result.print_px = print->rms_px;
     report.uncertainty_mean_px = std::hypot(report.uncertainty_mean_px, print->mean_in_region_px);
     report.uncertainty_worst_px =
         std::hypot(report.uncertainty_worst_px, print->worst_in_region_px);
-  }
-  if (print_sd > 0 && !print) {
+  } else {
     result.warnings.emplace_back(
         "the effect of print_sd of board.yaml cannot be computed, and the lens's uncertainty lacks "
         "it");
   }
+  return print;
+}
+
+/// Adds the uncertainty of a solution. `print_sd` is Board::print_sd.
+void add_uncertainty(const SplitViews& views, double print_sd, LensEstimate& result) {
+  const IntrinsicsSolution& solution = result.solution;
+  const auto uncertainties = ProjectionUncertainty::compute_uncertainty_by_corners_and_by_tags(
+      solution, views.solved.lattice);
+  result.report = compute_lens_calibration_report(solution, views.solved, uncertainties);
+  result.coverage = compute_board_view_coverage(solution, views.solved);
+  result.held_out = evaluate_lens_on_held_out_views(solution, views.held_out);
+  result.lattice = views.solved.lattice;
+  result.sharpness = measure_lens_sharpness(result.views, views.solved.imager_px);
+  add_model_uncertainty(result);
+  const auto print = add_print_uncertainty(print_sd, result);
   // The covariance of hundreds of control points would fill the file, without use for fixes.
   if (is_splined_lens_model(solution.problem.lens_model)) return;
   const ProjectionUncertainty& uncertainty = uncertainties.by_tags;
-  const Eigen::VectorXd& bias = uncertainty.intrinsics_regularization_bias();
-  MatrixX covariance = uncertainty.intrinsics_covariance() + bias * bias.transpose();
-  if (print) covariance += print->intrinsics * print->intrinsics.transpose();
+  MatrixX covariance = uncertainty.intrinsics_covariance();
+  const auto add_change = [&](const Eigen::VectorXd& change) {
+    covariance += change * change.transpose();
+  };
+  add_change(uncertainty.intrinsics_regularization_bias());
+  if (result.model_uncertainty) add_change(result.model_uncertainty->intrinsics);
+  if (print) add_change(print->intrinsics);
   if (covariance.allFinite()) result.intrinsics_covariance = covariance;
 }
 
@@ -337,12 +322,8 @@ LensEstimate estimate_lens(LensViews input) {
     }
   }
   std::optional<FisheyeFit> fisheye;
-  if (is_opencv_model(model) && may_be_wide_angle_lens(initial)) {
-    if (result.choice) {
-      fisheye = result.choice->fisheye;
-    } else if (!is_fisheye_model_clearly_worse(initial, model)) {
-      fisheye = fit_fisheye_lens(initial);
-    }
+  if (!result.choice && is_opencv_model(model) && may_be_wide_angle_lens(initial)) {
+    if (!is_fisheye_model_clearly_worse(initial, model)) fisheye = fit_fisheye_lens(initial);
     if (fisheye && fisheye->max_corner_angle_rad >= kRightAngle_rad) {
       fail_undetermined(
           result, views,
@@ -372,7 +353,8 @@ LensEstimate estimate_lens(LensViews input) {
   }
   warn_about_inconsistent_views(result);
   warn_about_edge_displacement(result.solution, result);
-  add_uncertainty(views, fisheye, input.choose_lens_model, input.board.print_sd, result);
+  add_uncertainty(views, input.board.print_sd, result);
+  if (fisheye) recommend_fisheye(*fisheye, result);
   return result;
 }
 

@@ -10,6 +10,7 @@
 #include "calibration/intrinsics/intrinsics.h"
 #include "calibration/intrinsics/lens_choice.h"
 #include "calibration/intrinsics/lens_sharpness.h"
+#include "calibration/intrinsics/model_uncertainty.h"
 #include "detection/boards/board_detector.h"
 #include "rig/board.h"
 
@@ -43,8 +44,8 @@ struct LensEstimate {
   std::string problem = {};
 
   IntrinsicsSolution solution{};
-  /// Uncertainty of the lens. `uncertainty_mean_px` and `uncertainty_worst_px` include the error of
-  /// the printed board.
+  /// Uncertainty of the lens. `uncertainty_mean_px` and `uncertainty_worst_px` include those of the
+  /// lens model and of the printed board.
   CalibrationReport report{};
   ViewCoverage coverage{};
   HeldOutFit held_out{};
@@ -52,6 +53,12 @@ struct LensEstimate {
   std::optional<LensSharpness> sharpness = {};
   /// Result of the selection of the lens model, if it was requested.
   std::optional<LensChoice> choice = {};
+  /// True if the lens models were compared (compare_lens_models()): not with splined lenses, or
+  /// fewer than kMinViewsToCompare views. The uncertainty then lacks the choice of the model.
+  bool are_models_compared = false;
+  /// Uncertainty from the choice of the lens model; std::nullopt if noise explains all differences
+  /// between the models.
+  std::optional<ModelUncertainty> model_uncertainty = {};
   /// Model that fits clearly better than the requested one, or equally well if the board is seen
   /// near a right angle off the axis.
   std::optional<LensModel> better_model = {};
@@ -60,7 +67,8 @@ struct LensEstimate {
   /// Board::print_sd is 0 or the solve fails.
   std::optional<double> print_px = {};
   /// Lattice of the corners in `solution`. Covariance of the intrinsics including the bias of the
-  /// regularization and the print of the board; std::nullopt for splined lenses and if not finite.
+  /// regularization, the choice of the lens model and the print of the board; std::nullopt for
+  /// splined lenses and if not finite.
   std::optional<BoardLattice> lattice = {};
   std::optional<MatrixX> intrinsics_covariance = {};
 
@@ -85,7 +93,7 @@ WarpChoice select_board_warp_model(const Board& board, WarpChoice warp);
 /// Estimates a lens from views of a board in these stages: tone curve of the camera
 /// (estimate_and_correct_tone_curve()), layout of the board (check_board_layout()), lens model,
 /// solve (solve_intrinsics()), board again with the lens, uncertainty
-/// (compute_lens_calibration_report()).
+/// (compute_lens_calibration_report(), compute_model_uncertainty()).
 /// @throws std::invalid_argument as BoardLattice
 LensEstimate estimate_lens(LensViews input);
 

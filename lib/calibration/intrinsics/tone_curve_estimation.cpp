@@ -49,21 +49,6 @@ std::vector<const BoardDetection*> select_detections(const std::vector<BoardView
   return selected;
 }
 
-/// Solves OPENCV8 and OPENCV_FISHEYE and returns the solution with the smaller residuals.
-IntrinsicsSolution solve_better_fitting_model(const InitialSolutions& initial) {
-  std::optional<FisheyeFit> fisheye;
-  if (may_be_wide_angle_lens(initial) &&
-      !is_fisheye_model_clearly_worse(initial, LensModel::opencv8)) {
-    fisheye = fit_fisheye_lens(initial);
-  }
-  if (fisheye && fisheye->max_corner_angle_rad >= kRightAngle_rad)
-    return std::move(fisheye->solution);
-  IntrinsicsSolution solution = solve_intrinsics(initial, LensModel::opencv8);
-  const bool other =
-      fisheye && !(solution.has_succeeded() && solution.rms_px < fisheye->solution.rms_px);
-  return other ? std::move(fisheye->solution) : solution;
-}
-
 /// Returns the median standard deviation of the corners from pixel noise; std::nullopt if unknown.
 std::optional<double> compute_median_sd_px(const IntrinsicsInput& input) {
   std::vector<double> known_sds_px;
@@ -91,7 +76,7 @@ std::optional<ValuesPerGamma> compute_residual_noise_ratios(const std::vector<Bo
           correct_corners_for_tone_curve(*seen, curve)));
     }
     const IntrinsicsSolution solution =
-        curve == 0 ? solve_better_fitting_model(InitialSolutions(input)) : solve_intrinsics(input);
+        curve == 0 ? solve_opencv8_or_fisheye(InitialSolutions(input)) : solve_intrinsics(input);
     const auto noise_px = compute_median_sd_px(input);
     if (!solution.has_succeeded() || !noise_px) return {};
     ratios[curve] = std::max(solution.rms_px, exact_px) / *noise_px;

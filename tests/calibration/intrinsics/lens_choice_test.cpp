@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/synthetic_views.h"
+#include "calibration/intrinsics/view_jackknife.h"
 #include "calibration/intrinsics/wide_views.h"
 
 namespace vlp {
@@ -68,15 +68,15 @@ TEST(SelectLensModel, ReturnsOpencv8ForRationalLens) { expect_chosen(rational_le
 
 TEST(SelectLensModel, ReturnsFisheyeForFisheyeLens) { expect_chosen(fisheye_lens()); }
 
-TEST(SelectLensModel, ReturnsOpencv8ForRationalLensDespiteOneBadView) {
-  constexpr int count = 24;
+TEST(SelectLensModel, ReturnsRationalModelDespiteOneBadView) {
+  constexpr int count = 36;
   IntrinsicsInput input = seen_through(rational_lens(), count);
   for (auto& corner : input.views[5]) {
     corner.pixel += Eigen::Vector2d(corner.point % 2 == 0 ? 2 : -2, 0);
   }
   const auto choice = select_lens_model(InitialSolutions(input));
   ASSERT_TRUE(choice);
-  EXPECT_EQ(lens_model_name(choice->model), lens_model_name(LensModel::opencv8))
+  EXPECT_TRUE(choice->model == LensModel::opencv8 || choice->model == LensModel::opencv12)
       << describe_lens_model_choice(*choice);
   EXPECT_NEAR(find_rms(*choice, choice->model), kNoise_px, 0.4 * kNoise_px);
 }
@@ -159,27 +159,23 @@ TEST(IsFisheyeModelClearlyWorse, ReturnsFalseBeyondRightAngle) {
 
 TEST(DescribeLensModelChoice, StatesOffAxisAngleWhenBoardIsBeyondRightAngle) {
   const LensChoice choice{
-      LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}, 1.7};
+      LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512, 0, 0}}, 1.7};
   EXPECT_EQ(describe_lens_model_choice(choice),
-            "OPENCV_FISHEYE, 0.051 px rms in held-out views; the board is visible up to 97 degrees "
-            "off axis, where no LENSMODEL_OPENCVn has rays");
+            "OPENCV_FISHEYE 0.0512 px (0.0 % above the best, limit 0.0 %) in held-out views; the "
+            "board is visible up to 97 degrees off axis, where no LENSMODEL_OPENCVn has rays");
 }
 
-TEST(DescribeLensModelChoice, ListsModelsForWhichNoLensWasFound) {
-  const LensChoice choice{LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}};
-  EXPECT_EQ(describe_lens_model_choice(choice),
-            "OPENCV_FISHEYE, 0.051 px rms in held-out views; LENSMODEL_OPENCV4 no lens");
-}
-
-TEST(DescribeLensModelChoice, SeparatesOtherModelsByCommas) {
+TEST(DescribeLensModelChoice, ListsFiguresOfOtherModelsAndThoseWithoutLens) {
   const LensChoice choice{LensModel::fisheye,
-                          {{LensModel::opencv4, 0.25},
-                           {LensModel::fisheye, 0.0512},
-                           {LensModel::opencv5, 0.0496},
+                          {{LensModel::opencv4, 0.25, 4.0403, 0.2},
+                           {LensModel::fisheye, 0.0512, 0.0323, 0.048},
+                           {LensModel::opencv5, 0.0496, 0, 0.0323},
                            {LensModel::opencv8}}};
   EXPECT_EQ(describe_lens_model_choice(choice),
-            "OPENCV_FISHEYE, 0.051 px rms in held-out views; LENSMODEL_OPENCV4 0.250 px, "
-            "LENSMODEL_OPENCV5 0.050 px, LENSMODEL_OPENCV8 no lens");
+            "OPENCV_FISHEYE 0.0512 px (3.2 % above the best, limit 4.8 %) in held-out views; "
+            "LENSMODEL_OPENCV4 0.2500 px (404.0 % above the best, limit 20.0 %); "
+            "LENSMODEL_OPENCV5 0.0496 px (0.0 % above the best, limit 3.2 %); "
+            "LENSMODEL_OPENCV8 no lens");
 }
 
 /// Corners in a row of a board of 4 x 3 tags.
@@ -283,52 +279,86 @@ TEST(IsFisheyeModelClearlyWorse, ReturnsFalseIfOtherModelDoesNotFit) {
   EXPECT_FALSE(is_fisheye_model_clearly_worse(initial, LensModel::opencv5));
 }
 
-/// Returns the squared residuals of the views, each from a solve without every third view.
-std::vector<double> cross_validate_views(const IntrinsicsInput& input, LensModel model) {
-  std::vector<double> squares(input.views.size());
-  for (std::size_t part = 0; part < 3; ++part) {
-    IntrinsicsInput solved = input, held_out = input;
-    solved.lens_model = model;
-    solved.views.clear();
-    held_out.views.clear();
-    std::vector<std::size_t> indices;
-    for (std::size_t view = 0; view < input.views.size(); ++view) {
-      if ((view + 3 - part) % 3 != 0) {
-        solved.views.push_back(input.views[view]);
-      } else {
-        held_out.views.push_back(input.views[view]);
-        indices.push_back(view);
-      }
-    }
-    const auto rms_px = compute_held_out_view_residual_rms_px(solve_intrinsics(solved), held_out);
-    for (std::size_t k = 0; k < indices.size(); ++k) squares[indices[k]] = rms_px[k] * rms_px[k];
-  }
-  return squares;
+/// Returns the largest mean of log ratios of squares that is not significant: two standard errors
+/// from the means of blocks, times a factor of Student's t.
+double compute_expected_limit(const std::vector<double>& log_ratios, std::size_t blocks,
+                              double student) {
+  const std::size_t views = log_ratios.size();
+  const auto count = static_cast<double>(blocks);
+  double mean = 0;
+  std::vector<double> sums(blocks);
+  for (const double log : log_ratios) mean += log / static_cast<double>(views);
+  for (std::size_t view = 0; view < views; ++view)
+    sums[view * blocks / views] += log_ratios[view] - mean;
+  double squares = 0;
+  for (const double sum : sums) squares += sum * sum;
+  return 2 * student * std::sqrt(count / (count - 1) * squares) / static_cast<double>(views);
 }
 
-/// View 4 has 2.7 or 3.4 times the typical residual. Above three times, it does not count.
-TEST(SelectLensModel, StatesRmsOfHeldOutViewsThatCount) {
-  for (const auto& [size_px, counts] : {std::pair{0.27, true}, {0.34, false}}) {
-    IntrinsicsInput input = make_small_views(radial_lens(), 9, 0);
-    for (std::size_t view = 0; view < 9; ++view)
-      displace_alternately(input.views[view], view == 4 ? size_px : 0.1, kSmallCols);
-    const auto choice = select_lens_model(InitialSolutions(input));
-    ASSERT_TRUE(choice);
-    constexpr std::array models{LensModel::opencv4, LensModel::fisheye, LensModel::opencv5,
-                                LensModel::opencv8, LensModel::opencv12};
-    ASSERT_EQ(choice->candidates.size(), models.size());
-    for (std::size_t i = 0; i < models.size(); ++i)
-      EXPECT_EQ(choice->candidates[i].model, models[i]);
-    std::vector<double> squares = cross_validate_views(input, LensModel::opencv5);
-    if (!counts) squares.erase(squares.begin() + 4);
-    double sum = 0;
-    for (const double square : squares) sum += square;
-    EXPECT_NEAR(find_rms(*choice, LensModel::opencv5),
-                std::sqrt(sum / static_cast<double>(squares.size())), 1e-9);
-    EXPECT_EQ(choice->model, LensModel::opencv4);
-    EXPECT_EQ(choice->beyond_right_angle_rad, 0);
-    ASSERT_TRUE(choice->fisheye);
-    EXPECT_EQ(choice->fisheye->solution.views.size(), 9U);
+/// Recomputes the printed figures and the rule from the fits, with views that only some models fit.
+TEST(CompareLensModels, RejectsModelsAboveLimitAndSelectsSmallestOther) {
+  constexpr std::array models{LensModel::opencv4, LensModel::fisheye, LensModel::opencv5,
+                              LensModel::opencv8, LensModel::opencv12};
+  int rejected = 0, kept = 0;
+  // Factors of Student's t with one degree of freedom less than views.
+  for (const auto& [count, student] : {std::pair{7, 1.26033}, {11, 1.14232}}) {
+    for (const double noise_px : {0.02, 0.1}) {
+      const IntrinsicsSolution reference =
+          solve_intrinsics(make_small_views(rational_lens(), count, noise_px));
+      ASSERT_TRUE(reference.has_succeeded());
+      const auto choice = compare_lens_models(reference);
+      ASSERT_TRUE(choice);
+      ASSERT_EQ(choice->candidates.size(), models.size());
+      std::vector<std::vector<double>> logs;
+      std::vector<double> means;
+      for (std::size_t i = 0; i < models.size(); ++i) {
+        const LensCandidate& candidate = choice->candidates[i];
+        ASSERT_EQ(candidate.model, models[i]);
+        ASSERT_TRUE(candidate.fit);
+        logs.push_back(compute_left_out_mean_squares_px2(*candidate.fit, 5));
+        means.push_back(0);
+        for (double& value : logs.back()) {
+          value = std::log(value);
+          means.back() += value / count;
+        }
+        EXPECT_NEAR(candidate.rms_px, std::exp(means.back() / 2), 1e-9);
+      }
+      const auto best = static_cast<std::size_t>(std::ranges::min_element(means) - means.begin());
+      std::vector<bool> is_within_limit;
+      for (std::size_t i = 0; i < models.size(); ++i) {
+        std::vector<double> ratios = logs[i];
+        for (std::size_t view = 0; view < ratios.size(); ++view) ratios[view] -= logs[best][view];
+        const double excess = means[i] - means[best];
+        is_within_limit.push_back(excess <= compute_expected_limit(ratios, ratios.size(), student));
+        const bool may_describe = excess <= compute_expected_limit(ratios, 5, 1.442173);
+        EXPECT_EQ(choice->candidates[i].excess <= choice->candidates[i].max_excess_by_blocks,
+                  may_describe);
+      }
+      const auto first = std::ranges::find(is_within_limit, true) - is_within_limit.begin();
+      const double max_mean = means[static_cast<std::size_t>(first)];
+      std::size_t selected = models.size();
+      for (std::size_t i = models.size(); i-- > 0;) {
+        const bool is_rejected = !is_within_limit[i] && means[i] > max_mean;
+        EXPECT_EQ(choice->candidates[i].is_rejected(), is_rejected) << i;
+        ++(is_rejected ? rejected : kept);
+        if (!is_rejected) selected = i;
+      }
+      ASSERT_LT(selected, models.size());
+      EXPECT_EQ(choice->model, models[selected]);
+      for (std::size_t i = 0; i < models.size(); ++i)
+        EXPECT_TRUE(!choice->candidates[i].is_rejected() || means[i] > means[selected]) << i;
+    }
+  }
+  EXPECT_GT(rejected, 2);
+  EXPECT_GT(kept, 4);
+}
+
+TEST(CompareLensModels, ReturnsNulloptForFewerThanFiveViews) {
+  for (const int count : {4, 5}) {
+    const IntrinsicsSolution reference =
+        solve_intrinsics(make_small_views(radial_lens(), count, 0.02));
+    ASSERT_TRUE(reference.has_succeeded());
+    EXPECT_EQ(compare_lens_models(reference).has_value(), count == 5);
   }
 }
 
