@@ -14,6 +14,7 @@
 #include "captures/csv_reader.h"
 #include "captures/fixes_table.h"
 #include "geometry/frames.h"
+#include "rig/calibration.h"
 #include "support/program.h"
 #include "support/real_data.h"
 #include "support/temporary_folder.h"
@@ -214,14 +215,28 @@ class MotionCapture : public testing::Test {
 
 /// OpenCV's calibrateCamera and solvePnP on the same corners: median 5.4 to 10.9 mm, worst 17 to
 /// 26 mm.
-TEST_F(MotionCapture, MedianErrorIsBelow4500UmWithOwnCorners) {
+TEST_F(MotionCapture, MedianErrorIsBelow6MmWithOwnCorners) {
   calibrate_halves_from_images();
   for (const auto& [fitted, judged] : {std::pair("even", "odd"), {"odd", "even"}}) {
     const Figures figures = compare(fitted, judged);
-    EXPECT_LT(figures.median_mm, 4.5);
+    EXPECT_EQ(figures.fixes, 15);
+    EXPECT_LT(figures.median_mm, 6);
     EXPECT_LT(figures.max_mm, 12);
-    EXPECT_GT(figures.normalized, 0.6);
+    EXPECT_GT(figures.normalized, 0.7);
     EXPECT_LT(figures.normalized, 1.1);
+  }
+}
+
+/// Few tilts: from the stereographic lens alone, the solve of the even images ends in a local
+/// minimum with focal lengths of 881 and 1123 px.
+TEST_F(MotionCapture, FisheyeLensOfEachHalfHasFocalLengthOfOtherModels) {
+  calibrate_halves_from_images();
+  for (const std::string half : {"even", "odd"}) {
+    run("vlp-intrinsics " + path(half + ".csv") + board() +
+            "--imager-px 640 480 --lens OPENCV_FISHEYE -o " + path("fisheye.yaml"),
+        1);
+    const Eigen::Vector2d focal_px = read_calibration(folder / "fisheye.yaml").camera.focal_px();
+    EXPECT_LT((focal_px - Eigen::Vector2d(611, 611)).norm(), 10) << half;
   }
 }
 

@@ -11,10 +11,12 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "calibration/intrinsics/board_poses.h"
+#include "calibration/intrinsics/camera_imports.h"
 #include "calibration/intrinsics/corner_variance.h"
 #include "calibration/intrinsics/edge_corrections.h"
 #include "calibration/intrinsics/projection_difference.h"
@@ -141,6 +143,9 @@ class IntrinsicsSolver {
   void initialize_spline_from_symmetric_lens();
   /// Stage 3.
   bool refine_intrinsics();
+  /// Repeats stage 3 from the solution of another model if that fits clearly better, and keeps the
+  /// better result: views with few tilts have local minima.
+  void restart_if_fit_is_worse(const std::optional<IntrinsicsSolver>& other);
   /// Splined lenses only: scales the regularization to the noise of the corners.
   bool scale_spline_regularization_to_noise();
   /// Stages 4 and 7: applies correct_corners_for_edge_curvature() to all views and solves again.
@@ -321,6 +326,27 @@ bool IntrinsicsSolver::refine_intrinsics() {
     return can_lens_project_most_views();
   }
   return solve_board_problem(problem_, solved_parameters_) && can_lens_project_most_views();
+}
+
+void IntrinsicsSolver::restart_if_fit_is_worse(const std::optional<IntrinsicsSolver>& other) {
+  constexpr double max_ratio = 1.5;
+  const double rms_px = make_intrinsics_solution().rms_px;
+  if (!other || rms_px <= max_ratio * other->make_intrinsics_solution().rms_px) return;
+  IntrinsicsSolver restarted = *other;
+  restarted.set_lens_model(input_.lens_model);
+  Camera camera;
+  camera.lens_model = other->problem_.lens_model;
+  camera.imager_px = input_.imager_px;
+  camera.intrinsics = other->problem_.intrinsics;
+  try {
+    restarted.problem_.intrinsics =
+        convert_camera_to_lens_model(camera, input_.lens_model).camera.intrinsics;
+  } catch (const std::invalid_argument&) {
+    return;  // no lens of the model is similar
+  }
+  const bool is_better = restarted.refine_intrinsics() && restarted.used_.size() >= used_.size() &&
+                         restarted.make_intrinsics_solution().rms_px < rms_px;
+  if (is_better) *this = std::move(restarted);
 }
 
 bool IntrinsicsSolver::scale_spline_regularization_to_noise() {
@@ -648,6 +674,8 @@ struct InitialSolutions::Stages {
         solver->set_lens_model(lens_model);
         solver->initialize_spline_from_symmetric_lens();
         if (!solver->refine_intrinsics()) solver.reset();
+        if (solver && lens_model == LensModel::fisheye)
+          solver->restart_if_fit_is_worse(refine(of_model.size(), LensModel::opencv4));
       }
       of_model.push_back(std::move(solver));
     }

@@ -229,7 +229,7 @@ TEST(BoardLattice, InwardDisplacementIsZeroForTagOnLine) {
 TEST(BoardLattice, ListsPointsOfBoardOfSquares) {
   const BoardLattice lattice(squares_board());
   BoardDetection seen;
-  seen.points = {{9, {30, 40}, 0.5}, {34, {50, 60}}};
+  seen.points = {{9, {30, 40}, 0.02, 0.5}, {34, {50, 60}}};
   const auto corners = lattice.list_corners_with_board_positions(seen);
   ASSERT_EQ(corners.size(), 2U);
   EXPECT_EQ(corners[0].part, 0U);
@@ -237,6 +237,7 @@ TEST(BoardLattice, ListsPointsOfBoardOfSquares) {
   EXPECT_LT((corners[0].in_board_m - Eigen::Vector3d(0.06, 0.03, 0)).norm(), 1e-12);
   EXPECT_EQ(corners[0].pixel, Eigen::Vector2d(30, 40));
   EXPECT_EQ(corners[0].weight, 0.5);
+  EXPECT_EQ(corners[0].sd_px, 0.02);
   EXPECT_EQ(corners[0].d_pixel_d_edge_shift, Eigen::Vector2d::Zero());
   EXPECT_LT((corners[1].in_board_m - Eigen::Vector3d(0.18, 0.12, 0)).norm(), 1e-12);
   EXPECT_EQ(corners[1].weight, 1);

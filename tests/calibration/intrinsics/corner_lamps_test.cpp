@@ -23,7 +23,7 @@ TEST(ConvertCornersToLamps, GivesPointsIdsOfTagCorners) {
     BoardDetection points;
     for (const auto& corner : lattice.list_corners_with_board_positions(tags))
       points.points.push_back(
-          {lattice.point_index_on_board(corner.part, corner.point), corner.pixel, 0.5});
+          {lattice.point_index_on_board(corner.part, corner.point), corner.pixel, 0, 0.5});
     const std::vector<BoardView> seen{{"tags", {800, 600}, tags}, {"points", {800, 600}, points}};
     const CornerLamps lamps = convert_corners_to_lamps(seen, views.board, 0.1, 0.001);
     ASSERT_EQ(lamps.frames.size(), 2U);
