@@ -279,20 +279,20 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
                              tag, board.family, views.size(), tag)};
 }
 
-/// Rejects corners that contradict their neighbors. A tag is rejected as a whole.
-void remove_corner_outliers(const BoardLattice& lattice, BoardView& view,
-                            std::vector<std::string>& warnings) {
+/// Rejects corners that contradict their neighbors. A tag is rejected as a whole. Returns a
+/// description; empty if no corner is rejected.
+std::string remove_corner_outliers(const BoardLattice& lattice, BoardView& view) {
   const auto blunders =
       find_corner_outliers(lattice.list_corners_with_board_positions(view.detection));
-  if (blunders.empty()) return;
+  if (blunders.empty()) return "";
   const auto corners = collect_detected_corners(view.detection);
   const Eigen::Vector2d first = corners[blunders.front()].pixel;
   // [LENS-5] `neighbors predict them` | outliers: corners (for tags, the whole tag) or image
-  //   rejected | check the image
-  warnings.push_back(
-      fmt::format("{}: {} of its {} corners are not where their neighbors predict them, the first "
-                  "at ({:.1f}, {:.1f}); rejected",
-                  view.image, blunders.size(), corners.size(), first.x(), first.y()));
+  //   rejected; something covers them, or the board is damaged | check the image
+  std::string message = fmt::format(
+      "{} of its {} corners are not where their neighbors predict them, the first at "
+      "({:.1f}, {:.1f}); rejected",
+      blunders.size(), corners.size(), first.x(), first.y());
   for (auto i = blunders.rbegin(); i != blunders.rend(); ++i) {
     if (!view.detection.points.empty()) {
       view.detection.points.erase(view.detection.points.begin() + static_cast<std::ptrdiff_t>(*i));
@@ -303,6 +303,7 @@ void remove_corner_outliers(const BoardLattice& lattice, BoardView& view,
     view.detection.tags.erase(view.detection.tags.begin() + static_cast<std::ptrdiff_t>(*i / 4));
     ++view.detection.num_unusable_tags;
   }
+  return message;
 }
 
 bool is_mrcal_table(const fs::path& file) { return file.extension() == ".vnl"; }
@@ -357,6 +358,7 @@ Observation BoardIntake::detect_board_in_image(const SourceImage& source) const 
   }
   result.blur_px = found->blur_px;
   result.board = std::move(found->view);
+  result.doubt = remove_corner_outliers(lattice_, *result.board);
   reject_unusable_board_image(result, found->bright_fraction, found->white_fraction);
   return result;
 }
@@ -366,7 +368,7 @@ void BoardIntake::reject_unusable_board_image(Observation& image, double bright_
   const BoardDetection& seen = image.board->detection;
   const bool has_pose = lattice_.are_corners_sufficient_for_pose(seen);
   if (white_fraction > options_.max_white_fraction) {
-    constexpr double max_sd_px = 0.15;
+    constexpr double max_sd_px = 0.25;
     const auto sd_px = has_pose ? compute_median_corner_sd_px(seen) : std::nullopt;
     const std::string text =
         fmt::format("overexposed: {:.0f} % of the {} is at full scale", 100 * white_fraction,
@@ -377,8 +379,8 @@ void BoardIntake::reject_unusable_board_image(Observation& image, double bright_
           fmt::format("{}, {:.0f} % at most; expose shorter (limit: --max-white-fraction)", text,
                       100 * options_.max_white_fraction));
     }
-    image.doubt =
-        fmt::format("{}; used, as its corners have standard deviations of {:.2f} px", text, *sd_px);
+    image.doubt = fmt::format("{}; used, as its corners have standard deviations of {:.2f} px{}{}",
+                              text, *sd_px, image.doubt.empty() ? "" : "; ", image.doubt);
   }
   if (!has_pose && bright_fraction < options_.min_bright_fraction) {
     // [LENS-1] `too dark:` | corners not measurable, or displaced | change exposure or light
@@ -447,9 +449,10 @@ Observations read_board_views(const fs::path& file, const Board& board, const fs
   bool is_seen = false;
   for (BoardView& view : is_mrcal_table(file) ? read_mrcal_corners(file, board, imager_px)
                                               : read_corner_table(file, board, imager_px)) {
-    remove_corner_outliers(lattice, view, result.warnings);
+    std::string doubt = remove_corner_outliers(lattice, view);
     is_seen = is_seen || view.detection.has_detected_corners();
     Observation image{view.image};
+    image.doubt = std::move(doubt);
     image.size_px = view.imager_px;
     image.board = std::move(view);
     reject_few_corners(board, lattice, image);

@@ -85,7 +85,8 @@ struct PointDetection {
   /// BoardLattice::point_index_on_board().
   std::size_t index;
   Eigen::Vector2d pixel;
-  /// Standard deviation from pixel noise, px, averaged over all directions; 0 if unknown.
+  /// Standard deviation, px, averaged over all directions: TagDetection::corner_sds_px, or of
+  /// fit_edge_intersection_at_corner(); 0 if unknown.
   double sd_px = 0;
   /// Factor by which a solve multiplies the residual of the point.
   double weight = 1;

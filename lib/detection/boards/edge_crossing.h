@@ -35,8 +35,8 @@ std::optional<Eigen::Vector2d> find_saddle_point(const cv::Mat1f& smoothed,
 /// Corner of fit_edge_intersection_at_corner().
 struct FittedCorner {
   Eigen::Vector2d pixel;
-  /// Standard deviation, px, averaged over all directions: from the residuals of the fit, which
-  /// include those of a wrong model, such as overexposed squares that do not touch.
+  /// Standard deviation, px, averaged over all directions: from the residuals of the fit, and the
+  /// growth of the white squares, which is not the same along all edges.
   double sd_px;
   /// Blur of the edges: sigma of a Gaussian, px.
   double blur_px = 0;

@@ -192,15 +192,14 @@ bool are_corners_of_whole_board(const std::vector<PointDetection>& corners, int 
   for (int col = 0; col + 1 < cols; ++col)
     contrasts.push_back(levels.compute_column_contrast(col + middle));
   const double typical = upper_median(contrasts);
-  const double least_regular =
+  const double weakest =
       std::ranges::min(contrasts, {}, [&](double contrast) { return contrast / typical; });
   const double largest_beyond =
       std::max({std::abs(levels.compute_row_contrast(-beyond)),
                 std::abs(levels.compute_row_contrast(rows - 1 + beyond)),
                 std::abs(levels.compute_column_contrast(-beyond)),
                 std::abs(levels.compute_column_contrast(cols - 1 + beyond))});
-  return least_regular / typical > min_fraction &&
-         largest_beyond < max_fraction * std::abs(typical);
+  return weakest / typical > min_fraction && largest_beyond < max_fraction * std::abs(typical);
 }
 
 /// Returns true if at least 90 % of the corners of a chessboard are measured, and half of each row

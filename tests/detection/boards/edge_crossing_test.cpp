@@ -88,7 +88,7 @@ TEST(FitEdgeIntersectionAtCorner, ReportsScatterOfNoisyImages) {
       squares_px2 += (found->pixel - corner.corner_px).squaredNorm() / 2;
       variances_px2 += found->sd_px * found->sd_px;
     }
-    EXPECT_NEAR(std::sqrt(squares_px2 / variances_px2), 1, 0.15) << noise;
+    EXPECT_NEAR(std::sqrt(squares_px2 / variances_px2), 0.9, 0.15) << noise;  // growth included
   }
 }
 
