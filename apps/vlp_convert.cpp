@@ -101,6 +101,14 @@ void convert_corner_file(const Options& options) {
 }
 
 void run(const CLI::App& app, const Options& options) {
+  for (const char* option : {"--board", "--sigma-px", "--sd-m"}) {
+    if (app.count(option) > 0 && options.to != "lamps")
+      throw std::invalid_argument(std::string(option) + ": only with --to lamps; leave it out");
+  }
+  for (const char* option : {"--lens", "--camera-id"}) {
+    if (app.count(option) > 0 && options.to == "lamps")
+      throw std::invalid_argument(std::string(option) + ": not with --to lamps; leave it out");
+  }
   if (options.to == "lamps") return convert_corner_file(options);
   check_output_is_not_input(options.output, {options.input});
   const auto [read, region] = read_camera_of_any_format(options.input);

@@ -191,13 +191,14 @@ void print_uncertainty_components(const LensEstimate& lens) {
         model->mean_px, model->worst_px, lens_model_name(model->model),
         std::abs(model->intrinsics[0]));
   } else if (!lens.are_models_compared) {
-    fmt::print("model choice  not in the uncertainty above: {}\n",
-               is_splined_lens_model(lens.solution.problem.lens_model)
-                   ? "splined lenses are not compared"
-                   : fmt::format("needs {} views", kMinViewsToCompare));
+    fmt::print(
+        "model choice  not in the uncertainty above: {}\n",
+        is_splined_lens_model(lens.solution.problem.lens_model)
+            ? "splined lenses are not compared"
+            : fmt::format("needs {} views, and another model that fits", kMinViewsToCompare));
   }
   if (lens.print_px) {
-    fmt::print("board print   {:.3f} px, in the covariance and not in the uncertainty above\n",
+    fmt::print("board print   {:.3f} px, in the uncertainty above and in the covariance\n",
                *lens.print_px);
   }
 }

@@ -85,6 +85,18 @@ std::string describe_missing_chessboard(const Board& board, const BoardDetection
   std::string message =
       fmt::format("no complete chessboard of {} x {} squares", board.cols, board.rows);
   const auto [cols, rows] = seen.largest_chessboard_part;
+  if (cols > board.cols || rows > board.rows) {
+    return fmt::format(
+        "a larger chessboard of {} x {} squares or more is visible; correct cols and "
+        "rows of board.yaml",
+        cols, rows);
+  }
+  if (cols == board.cols && rows == board.rows) {
+    return fmt::format(
+        "{} x {} squares are visible, but over a tenth of the corners cannot be "
+        "measured; uncover them, or focus",
+        cols, rows);
+  }
   message += cols > 0 ? fmt::format("; the largest part has {} x {}", cols, rows)
                       : std::string("; no part of one is visible");
   return message + fmt::format(
@@ -400,10 +412,11 @@ void BoardIntake::reject_unusable_board_image(Observation& image, double bright_
 std::string BoardIntake::describe_too_much_blur(const Observation& image) const {
   // Half a bit of a tag of eight bits; a square needs corners with a saddle.
   constexpr double max_tag_fraction = 0.06, max_square_fraction = 0.2;
-  const double in_image_px = options_.max_blur_fraction * image.size_px[0];
+  const double in_image_px =
+      options_.max_blur_fraction * std::max(image.size_px[0], image.size_px[1]);
   if (*image.blur_px > in_image_px) {
     return fmt::format(
-        "blurred: {:.1f} px, {:.1f} at most, {:g} of the image width (limit: --max-blur-fraction); "
+        "blurred: {:.1f} px, {:.1f} at most, {:g} of the longer side (limit: --max-blur-fraction); "
         "focus, or keep camera and board still",
         *image.blur_px, in_image_px, options_.max_blur_fraction);
   }

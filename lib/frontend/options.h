@@ -21,7 +21,7 @@ struct FrontendOptions {
   int every = 1;
 
   /// Board images: largest sigma of the blur of the sharpest edges (measure_image_blur()), as a
-  /// fraction of the image width.
+  /// fraction of the longer side of the image.
   double max_blur_fraction = 0.003;
   /// Board images: fraction of the board's pixels at full scale above which an image is used only if
   /// the reported standard deviations of its corners are small.

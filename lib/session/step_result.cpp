@@ -91,9 +91,9 @@ void warn_about_doubtful_images(const std::vector<Observation>& images, StepResu
   const auto first = std::ranges::find_if(images, is_doubtful);
   if (first == images.end()) return;
   const auto others = std::ranges::count_if(images, is_doubtful) - 1;
-  result.warnings.push_back(
-      fmt::format("{}: {}{}", first->image_file_name(), first->doubt,
-                  others > 0 ? fmt::format(", and {} more images", others) : std::string()));
+  result.warnings.push_back(fmt::format(
+      "{}: {}{}", first->image_file_name(), first->doubt,
+      others > 0 ? fmt::format(", and {} more images with a doubt", others) : std::string()));
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ CompletionCriteria read_completion_criteria(YamlMap map) {
 
 void read_rejection_limits(YamlMap map, StationConfig& config) {
   FrontendOptions& limits = config.frontend;
-  read_optional_into(map, "blur_fraction", limits.max_blur_fraction, 1, "(share)");
+  read_optional_into(map, "blur_fraction", limits.max_blur_fraction, 0.1, "(share)");
   read_optional_into(map, "dark_fraction", limits.min_bright_fraction, 1, "(share)");
   read_optional_into(map, "white_fraction", limits.max_white_fraction, 1, "(share)");
   read_optional_into(map, "same_pose_fraction", limits.same_view_fraction, 1, "(share)");

@@ -30,7 +30,8 @@ Displacements compute_displacements(const Lens& lens, const Lens& other,
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto ray = lens.unproject_pixel(pixel);
     const auto seen = ray ? other.project_point(*other_from_lens * ray->direction) : std::nullopt;
-    if (!seen) continue;
+    // Without a ray through both lenses there is no displacement: the worst one is a lower limit.
+    if (!seen || !lens.project_point(ray->direction.normalized())) continue;
     result.rays.push_back(ray->direction.normalized());
     result.displacements_px.emplace_back(*seen - pixel);
     const double length_px = result.displacements_px.back().norm();
@@ -85,7 +86,7 @@ std::optional<ModelUncertainty> compute_model_uncertainty(const IntrinsicsSoluti
     const double worst_px = std::max(displacements.worst_px, reverse.worst_px),
                  mean_px = std::max(displacements.mean_px, reverse.mean_px),
                  found_px = farthest ? farthest->worst_px : 0;
-    if (worst_px <= std::max(noise_px, found_px)) continue;
+    if (displacements.rays.empty() || worst_px <= std::max(noise_px, found_px)) continue;
     const double other_noise_px = estimate_expected_max_projection_difference_px(
         other, imager_px, estimate_intrinsics_covariance_by_jackknife(*candidate.fit), region);
     const double ratio = std::max(noise_px, other_noise_px) / worst_px;

@@ -120,7 +120,10 @@ std::vector<double> compute_left_out_mean_squares_px2(const ViewEquations& equat
     for (; first < end; ++first) {
       const auto& [normal, gradient, squares, count] = equations.views[first];
       const double added = 2 * change.dot(gradient) + change.dot(normal * change);
-      squares_px2.push_back(change.allFinite() ? (squares + added) / count : inf);
+      // Exact corners leave rounding errors.
+      constexpr double min_square_px2 = 1e-16;
+      const double mean_px2 = (squares + added) / std::max<double>(count, 1);
+      squares_px2.push_back(change.allFinite() ? std::max(min_square_px2, mean_px2) : inf);
     }
   }
   return squares_px2;

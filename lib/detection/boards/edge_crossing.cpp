@@ -248,7 +248,8 @@ std::optional<FittedCorner> fit_edge_intersection_at_corner(
   // Guesses in blurred images, which need a large radius, are less accurate.
   const double max_displacement_px = std::max(1.5, 0.4 * (radius_px - 4));
   constexpr double function_tolerance = 1e-3;  // gray levels squared
-  constexpr double min_contrast = 3, max_relative_rms = 0.22, max_turn_rad = 0.5, max_sd_px = 0.5;
+  constexpr double min_contrast = 3, max_relative_rms = 0.22, max_sagitta_fraction = 0.5,
+                   max_sd_px = 0.5;
   constexpr double max_growth_fraction = 0.17;
   const auto pixels = collect_pixels_near_corner(image, guess_px, radius_px);
   if (pixels.size() < min_pixels) return {};
@@ -264,11 +265,11 @@ std::optional<FittedCorner> fit_edge_intersection_at_corner(
   solver.options.function_tolerance = function_tolerance;
   solver.Solve(crossing, &p);
   const double rms = std::sqrt(2 * solver.summary.final_cost / static_cast<double>(pixels.size()));
-  const bool is_accepted = p.allFinite() && p.head<2>().norm() < max_displacement_px &&
-                           std::abs(p[4]) < radius_px &&
-                           p.segment<2>(9).cwiseAbs().maxCoeff() * radius_px < max_turn_rad &&
-                           std::abs(p[11]) < max_growth_fraction * radius_px &&
-                           std::abs(p[6]) > min_contrast && rms < max_relative_rms * std::abs(p[6]);
+  const bool is_accepted =
+      p.allFinite() && p.head<2>().norm() < max_displacement_px && std::abs(p[4]) < radius_px &&
+      p.segment<2>(9).cwiseAbs().maxCoeff() * radius_px < max_sagitta_fraction &&
+      std::abs(p[11]) < max_growth_fraction * radius_px && std::abs(p[6]) > min_contrast &&
+      rms < max_relative_rms * std::abs(p[6]);
   if (!is_accepted) return {};
   const double sd_px = compute_corner_sd_px(crossing, p);
   if (!(sd_px < max_sd_px)) return {};

@@ -40,14 +40,18 @@ struct SearchStep {
 /// Returns the steps of a search, the fastest first. The search by squares takes seconds if a large
 /// image does not show the board, and is therefore used for reduced images only.
 std::vector<SearchStep> plan_chessboard_search(const cv::Size& size) {
-  constexpr int min_side_px = 200;
+  // OpenCV's search by squares requires a window of some pixels.
+  constexpr int min_by_squares_px = 30, min_side_px = 200;
   const auto round_up = [](double value) {
     return std::max(1, static_cast<int>(std::ceil(value)));
   };
   const int preferred = round_up(std::max(size.width, size.height) / kPreferredLongSide_px);
   const int finest = round_up(std::sqrt(size.area() / kMaxSearched_px2));
-  std::vector<SearchStep> steps{{preferred, ChessboardSearch::by_squares}};
-  if (std::min(size.width, size.height) / (2 * preferred) >= min_side_px) {
+  const int preferred_side_px = std::min(size.width, size.height) / preferred;
+  std::vector<SearchStep> steps;
+  if (preferred_side_px >= min_by_squares_px)
+    steps.push_back({preferred, ChessboardSearch::by_squares});
+  if (preferred_side_px / 2 >= min_side_px) {
     steps.push_back({2 * preferred, ChessboardSearch::by_squares});
     steps.push_back({2 * preferred, ChessboardSearch::by_saddle_points});
   }

@@ -96,7 +96,7 @@ void add_board_image_quality_options(CLI::App& app, FrontendOptions& options) {
   constexpr double min_limit = 1e-4, max_limit = 0.1;
   app.add_option("--max-blur-fraction", options.max_blur_fraction,
                  "Maximum blur of a board image: sigma of its sharpest edges, as a fraction of the "
-                 "image width; others are skipped (default: 0.003)")
+                 "longer side; others are skipped (default: 0.003)")
       ->check(CLI::Range(min_limit, max_limit));
   app.add_option("--max-white-fraction", options.max_white_fraction,
                  "Maximum fraction of the board at full scale in an image; others are used only if "
