@@ -24,14 +24,14 @@ namespace vlp {
 
 /// Reason why an image is not used.
 enum class RejectionReason {
-  unreadable,       // no image, damaged, or larger than FrontendOptions::max_mpx
-  wrong_size,       // not of the camera
-  too_dark,         // nothing exceeds the noise, or the level of a board
-  overexposed,      // too many pixels at full scale
-  no_contrast,      // no edge in the image
-  blurred,          // by more than FrontendOptions::max_blur_fraction, or for the size of the squares
-  other_board,      // tags that the board does not have, and none that it has
-  no_board,         // no tag or corner of the board
+  unreadable,   // no image, damaged, or larger than FrontendOptions::max_mpx
+  wrong_size,   // not of the camera
+  too_dark,     // nothing exceeds the noise, or the level of a board
+  overexposed,  // too many pixels at full scale
+  no_contrast,  // no edge in the image
+  blurred,      // by more than FrontendOptions::max_blur_fraction, or for the size of the squares
+  other_board,  // tags that the board does not have, and none that it has
+  no_board,     // no tag or corner of the board
   too_few_corners,  // they do not determine the pose of the board
   too_few_lamps,    // fewer than the step needs
   same_image,       // a copy of an image that is used

@@ -80,10 +80,10 @@ IntrinsicsSolution solve_opencv8_or_fisheye(const InitialSolutions& initial);
 /// Consecutive views are often alike, and have the same errors and the same blind spots.
 ///
 /// Two models are compared by the mean, over the views, of the logarithm of the ratio of their
-/// squared residuals. The views of a few positions do not dominate this mean. A model is rejected if
-/// its mean exceeds that of the best by more than two standard errors over the views, widened for
-/// few views (compute_squared_student_t_bound()). A model with a smaller mean than the selected one
-/// is never rejected. Standard errors over the blocks are used for
+/// squared residuals. The views of a few positions do not dominate this mean. A model is rejected
+/// if its mean exceeds that of the best by more than two standard errors over the views, widened
+/// for few views (compute_squared_student_t_bound()). A model with a smaller mean than the selected
+/// one is never rejected. Standard errors over the blocks are used for
 /// LensCandidate::may_describe_lens(). The smallest
 /// model that is not rejected is selected: the one-standard-error rule of Breiman, Friedman, Olshen
 /// and Stone, Classification and Regression Trees, 1984, 3.4.3, with two standard errors.
