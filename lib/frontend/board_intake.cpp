@@ -300,7 +300,7 @@ std::string remove_corner_outliers(const BoardLattice& lattice, BoardView& view)
   const auto corners = collect_detected_corners(view.detection);
   const Eigen::Vector2d first = corners[blunders.front()].pixel;
   // [LENS-5] `neighbors predict them` | outliers: corners (for tags, the whole tag) or image
-  //   rejected; something covers them, or the board is damaged | check the image
+  //   rejected | check the image
   std::string message = fmt::format(
       "{} of its {} corners are not where their neighbors predict them, the first at "
       "({:.1f}, {:.1f}); rejected",
@@ -370,7 +370,6 @@ Observation BoardIntake::detect_board_in_image(const SourceImage& source) const 
   }
   result.blur_px = found->blur_px;
   result.board = std::move(found->view);
-  result.doubt = remove_corner_outliers(lattice_, *result.board);
   reject_unusable_board_image(result, found->bright_fraction, found->white_fraction);
   return result;
 }

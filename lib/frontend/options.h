@@ -23,8 +23,8 @@ struct FrontendOptions {
   /// Board images: largest sigma of the blur of the sharpest edges (measure_image_blur()), as a
   /// fraction of the longer side of the image.
   double max_blur_fraction = 0.003;
-  /// Board images: fraction of the board's pixels at full scale above which an image is used only if
-  /// the reported standard deviations of its corners are small.
+  /// Board images: fraction of the board's pixels at full scale above which an image is used only
+  /// if the reported standard deviations of its corners are small.
   double max_white_fraction = 0.25;
   /// Board images: level that 1 % of the pixels exceed, as a fraction of the full scale. An image
   /// below it with too few corners is too dark.

@@ -58,7 +58,8 @@ TEST_F(VlpIntrinsicsSquareBoards, EstimatesLensFromChessboardAndRejectsCornerCou
   const std::string cache = " --cache " + (folder / "cache").string();
   const auto found = calibrate(boards, board, "-v" + cache);
   ASSERT_EQ(found.exit_code, 0) << found.errors;
-  EXPECT_THAT(found.errors, HasSubstr("no complete chessboard of 10 x 7 squares; the largest part has "));
+  EXPECT_THAT(found.errors,
+              HasSubstr("no complete chessboard of 10 x 7 squares; the largest part has "));
   EXPECT_THAT(found.errors,
               HasSubstr("a chessboard has the same appearance after a rotation by 180 degrees"));
   EXPECT_LT(mean_error_px(), 0.04);  // of twelve views
