@@ -390,8 +390,8 @@ void BoardIntake::reject_unusable_board_image(Observation& image, double bright_
           fmt::format("{}, {:.0f} % at most; expose shorter (limit: --max-white-fraction)", text,
                       100 * options_.max_white_fraction));
     }
-    image.doubt = fmt::format("{}; used, as its corners have standard deviations of {:.2f} px{}{}",
-                              text, *sd_px, image.doubt.empty() ? "" : "; ", image.doubt);
+    image.doubt =
+        fmt::format("{}; used, as its corners have standard deviations of {:.2f} px", text, *sd_px);
   }
   if (!has_pose && bright_fraction < options_.min_bright_fraction) {
     // [LENS-1] `too dark:` | corners not measurable, or displaced | change exposure or light

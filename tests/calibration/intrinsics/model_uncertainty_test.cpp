@@ -52,7 +52,7 @@ TEST(ComputeModelUncertainty, ReturnsDifferenceToModelThatIsNotRejected) {
   EXPECT_NEAR(found->intrinsics[1], 2, 0.05);
   EXPECT_LT(found->intrinsics.segment(2, 2).norm(), 0.1);
   EXPECT_LT(found->intrinsics.tail(4).norm(), 1e-3);
-  // Of the pixel (100, 100), 2 / f of its distance from the center; there is no other rotation.
+  // The pixel (100, 100) moves by 2 / f of its distance from the center; there is no rotation.
   const Lens lens = solution.fitted_lens();
   EXPECT_NEAR(found->worst_px,
               2. / 520 * (Eigen::Vector2d(100, 100) - Eigen::Vector2d(402, 297)).norm(), 0.1);
