@@ -64,6 +64,7 @@ double add_squared_patch_residuals(const std::vector<BoardLattice::Corner>& corn
                                    std::vector<double>& squares_px2) {
   constexpr double rank_tolerance = 1e-6;
   std::vector<PlanePair> pairs;
+  pairs.reserve(patch.size());
   for (const std::size_t i : patch)
     pairs.push_back({corners[i].in_board_m.head<2>(), corners[i].pixel});
   const Eigen::Matrix3d px_from_board = estimate_homography(pairs);
