@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "detection/boards/square_corners.h"
 #include "detection/boards/tag_edges.h"
@@ -118,10 +119,14 @@ BoardDetection BoardDetector::detect_board(const cv::Mat& image) const {
     seen.curve_costs = refine_tags_by_edge_fits(once, levels, *print_);
     seen.tags = once;
   } else {
-    seen.tags = touching_->refine_and_complete_tags(once, gray);
+    auto [tags, rejected_predictions] = touching_->refine_and_complete_tags(once, gray);
+    seen.tags = std::move(tags);
     std::erase_if(seen.tags, [&](const TagDetection& tag) {
       return found.contains(tag.id) && found.at(tag.id).size() > 1;
     });
+    for (const TagDetection& tag : rejected_predictions) {
+      if (is_inside(tag, levels)) found.try_emplace(tag.id, 1, tag);
+    }
   }
   for (auto* tags : {&seen.tags, &seen.foreign_tags}) {
     std::erase_if(*tags, [&](const TagDetection& tag) { return !is_inside(tag, levels); });

@@ -100,7 +100,8 @@ struct BoardDetection {
   /// accurate to 1 to 2 px.
   std::vector<TagDetection> foreign_tags = {};
   /// Number of rejected tags of the board: detected twice, or with a corner that cannot be measured
-  /// to a fraction of a pixel (at the image border, occluded, blurred, overexposed).
+  /// to a fraction of a pixel (at the image border, occluded, blurred, overexposed). With corner
+  /// squares also tags that are only predicted from their neighbors, inside the image.
   int num_unusable_tags = 0;
   /// Number of rejected tags with more than 10 % white pixels (level 254 or 255 of 8 bits) in their
   /// bounding box.

@@ -376,29 +376,32 @@ std::optional<TagDetection> TouchingTags::predict_missing_tag(
   return tag;
 }
 
-std::vector<TagDetection> TouchingTags::refine_and_complete_tags(
+TouchingTags::CompletedTags TouchingTags::refine_and_complete_tags(
     const std::vector<TagDetection>& rough, const GrayLevels& image) const {
-  std::vector<TagDetection> refined, known = rough;
+  CompletedTags result;
   std::set<int> refined_ids;
-  const auto refine = [&](const TagDetection& guess) {
-    const auto tag = refine_tag_corners(guess, image);
+  const auto refine = [&](const std::optional<TagDetection>& guess) {
+    const auto tag = guess ? refine_tag_corners(*guess, image) : std::nullopt;
     if (!tag) return false;
-    refined.push_back(*tag);
+    result.tags.push_back(*tag);
     refined_ids.insert(tag->id);
-    std::erase_if(known, [&](const TagDetection& other) { return other.id == tag->id; });
-    known.push_back(*tag);
     return true;
   };
   for (const TagDetection& tag : rough) refine(tag);
   for (bool more = true; more;) {
     more = false;
+    result.rejected_predictions.clear();
     for (const BoardTag& place : layout_) {
       if (refined_ids.contains(place.id)) continue;
-      const auto guess = predict_missing_tag(place, known);
-      more = (guess && refine(*guess)) || more;
+      const auto guess = predict_missing_tag(place, result.tags);
+      if (refine(guess) || refine(predict_missing_tag(place, rough))) {
+        more = true;
+      } else if (guess) {
+        result.rejected_predictions.push_back(*guess);
+      }
     }
   }
-  return refined;
+  return result;
 }
 
 }  // namespace vlp

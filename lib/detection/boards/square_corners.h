@@ -70,11 +70,17 @@ class TouchingTags {
   /// corners are not those of the tag.
   std::optional<TagDetection> refine_tag_corners(TagDetection tag, const GrayLevels& image) const;
 
-  /// Returns the tags of the board that refine_tag_corners() accepts, in the order of acceptance.
-  /// Refines the tags of `rough`, then predicts the others by a homography of the nearest tags,
-  /// refined ones or those of `rough`. An overexposed board may have few tags in `rough`.
-  std::vector<TagDetection> refine_and_complete_tags(const std::vector<TagDetection>& rough,
-                                                     const GrayLevels& image) const;
+  struct CompletedTags {
+    /// Tags that refine_tag_corners() accepts, in the order of acceptance.
+    std::vector<TagDetection> tags;
+    /// Predictions from `tags` that it rejects, in the image or outside.
+    std::vector<TagDetection> rejected_predictions;
+  };
+  /// Refines the tags of `rough`, then predicts the others by a homography of the nearest refined
+  /// tags. If that fails, the nearest tags of `rough` predict a tag: an overexposed board may have
+  /// few tags, and none that can be refined. They may be wrong; refined tags take precedence.
+  CompletedTags refine_and_complete_tags(const std::vector<TagDetection>& rough,
+                                         const GrayLevels& image) const;
 
  private:
   std::optional<TagDetection> predict_missing_tag(const BoardTag& missing,

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "detection/boards/drawn_tags.h"
@@ -90,7 +91,9 @@ TEST(TouchingTags, FindsAllTagsFromOneTag) {
   const DrawnTouchingTags drawn(4);
   const TouchingTags touching(drawn.board);
   for (const std::size_t seed : {0U, 5U, 11U}) {
-    const auto found = touching.refine_and_complete_tags({drawn.truth[seed]}, drawn.levels);
+    const auto [found, rejected_predictions] =
+        touching.refine_and_complete_tags({drawn.truth[seed]}, drawn.levels);
+    EXPECT_TRUE(rejected_predictions.empty());
     ASSERT_EQ(found.size(), drawn.truth.size()) << seed;
     EXPECT_EQ(found.front().id, drawn.truth[seed].id);
     for (const TagDetection& tag : found) {
@@ -111,8 +114,48 @@ TEST(TouchingTags, FindsTagsFromTagThatCannotBeRefined) {
   image(cv::Rect(at.x() - 3, at.y() - 3, 7, 7)) = 120;
   const auto found =
       TouchingTags(drawn.board).refine_and_complete_tags({drawn.truth[0]}, smooth(image));
-  EXPECT_EQ(found.size(), drawn.truth.size() - 1);
-  EXPECT_EQ(std::ranges::find(found, drawn.truth[0].id, &TagDetection::id), found.end());
+  EXPECT_EQ(found.tags.size(), drawn.truth.size() - 1);
+  EXPECT_EQ(std::ranges::find(found.tags, drawn.truth[0].id, &TagDetection::id), found.tags.end());
+  ASSERT_EQ(found.rejected_predictions.size(), 1U);
+  EXPECT_EQ(found.rejected_predictions[0].id, drawn.truth[0].id);
+}
+
+/// The wrong tag has the id of another one, which is next to most tags of the board.
+TEST(TouchingTags, FindsAllTagsIfOneTagHasWrongId) {
+  const DrawnTouchingTags drawn(4);
+  TagDetection wrong = drawn.truth[11];
+  wrong.id = drawn.truth[5].id;
+  const auto found =
+      TouchingTags(drawn.board).refine_and_complete_tags({drawn.truth[0], wrong}, drawn.levels);
+  EXPECT_EQ(found.tags.size(), drawn.truth.size());
+}
+
+/// The bits of the tag are covered; its corners and its neighbors are visible.
+TEST(BoardDetector, CountsPredictedTagsWithoutFitAsUnusable) {
+  const DrawnTouchingTags drawn(5);
+  const TagDetection& covered = drawn.truth[5];
+  const Eigen::Vector2i at = covered.corners_px[3].array().ceil().cast<int>();
+  const BoardDetector detector(drawn.board);
+  for (const auto& [level, num_overexposed] : {std::pair(150, 0), std::pair(255, 1)}) {
+    cv::Mat1b image = drawn.image.clone();
+    image(cv::Rect(at.x() + 10, at.y() + 10, 30, 30)) = static_cast<uchar>(level);
+    const BoardDetection seen = detector.detect_board(image);
+    EXPECT_EQ(seen.tags.size(), drawn.truth.size() - 1);
+    EXPECT_EQ(seen.num_unusable_tags, 1);
+    EXPECT_EQ(seen.num_overexposed_tags, num_overexposed);
+  }
+  EXPECT_EQ(detector.detect_board(drawn.image).num_unusable_tags, 0);
+}
+
+/// The first column of tags is outside of the image.
+TEST(BoardDetector, CountsNoTagsPredictedOutsideImage) {
+  const DrawnTouchingTags drawn(5);
+  const int first_px = static_cast<int>(drawn.truth[0].corners_px[1].x()) + 2;
+  const cv::Mat1b image =
+      drawn.image(cv::Rect(first_px, 0, drawn.image.cols - first_px, drawn.image.rows)).clone();
+  const BoardDetection seen = BoardDetector(drawn.board).detect_board(image);
+  EXPECT_EQ(seen.tags.size(), 9U);
+  EXPECT_EQ(seen.num_unusable_tags, 0);
 }
 
 // Places of missing tags are predicted from tags up to 2.2 tag widths away.
@@ -122,10 +165,10 @@ TEST(TouchingTags, FindsMissingTagsOnlyNextToOtherTags) {
   const Eigen::Vector2i at = drawn.truth[1].corners_px[3].array().round().cast<int>();
   image(cv::Rect(at.x() - 2, at.y() - 2, 44, 44)) = 200;
   const TouchingTags touching(drawn.board);
-  EXPECT_EQ(touching.refine_and_complete_tags({drawn.truth[0]}, drawn.levels).size(), 5U);
-  EXPECT_LE(touching.refine_and_complete_tags({drawn.truth[0]}, smooth(image)).size(), 1U)
+  EXPECT_EQ(touching.refine_and_complete_tags({drawn.truth[0]}, drawn.levels).tags.size(), 5U);
+  EXPECT_LE(touching.refine_and_complete_tags({drawn.truth[0]}, smooth(image)).tags.size(), 1U)
       << "the next tag is 2.4 tag widths away";
-  EXPECT_TRUE(touching.refine_and_complete_tags({}, drawn.levels).empty());
+  EXPECT_TRUE(touching.refine_and_complete_tags({}, drawn.levels).tags.empty());
 }
 
 /// Overexposed white grows by about 1 px on each side, as in photographs of boards in the sun.
