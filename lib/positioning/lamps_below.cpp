@@ -2,6 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "positioning/lamps_below.h"
 
+#include <array>
+#include <cstddef>
+#include <iterator>
+
 namespace vlp {
 namespace {
 
@@ -33,6 +37,26 @@ CameraMount turn_over(const CameraMount& mount) {
 LampMap turn_over(LampMap map) {
   for (Lamp& lamp : map.lamps) lamp.position_m = turn_over(lamp.position_m);
   return map;
+}
+
+Calibration turn_over(Calibration calibration) {
+  if (auto& dispersion = calibration.dispersion) {
+    for (Dispersion::UncertainLamp& lamp : dispersion->uncertain_lamps) {
+      lamp.position_m = turn_over(lamp.position_m);
+      lamp.jacobian_wrt_position.rightCols<2>() *= -1;
+    }
+  }
+  if (auto& adjustment = calibration.adjustment) {
+    // The last rows of the covariance are those of the lamps.
+    Eigen::Index row = adjustment->covariance.rows() - 3 * std::ssize(adjustment->lamps);
+    for (Adjustment::AdjustedLamp& lamp : adjustment->lamps) {
+      lamp.position_m = turn_over(lamp.position_m);
+      adjustment->covariance.middleRows<2>(row + 1) *= -1;
+      adjustment->covariance.middleCols<2>(row + 1) *= -1;
+      row += 3;
+    }
+  }
+  return calibration;
 }
 
 Sensors turn_over(Sensors sensors) {

@@ -15,6 +15,8 @@ Inclination turn_over(const Inclination& inclination);
 CameraMount turn_over(const CameraMount& mount);
 /// Rotates the positions of the lamps. Shapes are unchanged.
 LampMap turn_over(LampMap map);
+/// Rotates positions and errors of the lamps; the rest refers to the camera.
+Calibration turn_over(Calibration calibration);
 Sensors turn_over(Sensors sensors);
 /// Rotates pose, motion and covariances of a fix.
 Fix turn_over(Fix fix);

@@ -149,7 +149,7 @@ class Positioner::Impl {
         lens_(calibration.camera.lens_model, calibration.camera.intrinsics),
         origin_m_(get_lamp_center(lamps_)),
         base_from_camera_(compute_level_from_camera_matrix(calibration, options.correction)),
-        common_(lamps_, calibration, options.correction),
+        common_(lamps_, turn_over_if(map.lamps_below_camera, calibration), options.correction),
         mount_(turn_over_if(map.lamps_below_camera,
                             options.mount.value_or(CameraMount{Eigen::Vector3d::Zero(), 0}))),
         body_from_base_(rotation_about_z(mount_.yaw_in_robot_rad)),

@@ -156,29 +156,70 @@ TEST_F(CameraAboveLamps, CovarianceIsThatOfPixelNoise) {
   EXPECT_EQ(fix.estimate.covariance, (fix.body->covariance.topLeftCorner<4, 4>()));
 }
 
-/// Also between errors of the lamp map and the fix of a level camera.
-TEST_F(CameraAboveLamps, CovarianceOfLevelCameraIncludesSurvey) {
-  for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.01;
-  rig.map.lamps.resize(2);
-  const auto detections = seen_from(rig, 1e-3);
-  ASSERT_EQ(detections.size(), 2U);
-  const Fix fix = rig.positioner().compute_position_fix(detections);
-  ASSERT_TRUE(fix.has_succeeded());
-  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
-  constexpr double step_m = 1e-4;
-  for (Lamp& lamp : rig.map.lamps) {
-    for (double& coordinate : lamp.position_m) {
-      coordinate += step_m;
-      const Pose moved = rig.positioner().compute_position_fix(detections).estimate.pose;
-      coordinate -= step_m;
-      Eigen::Vector4d derivative;
-      derivative << (moved.position_m - fix.estimate.pose.position_m) / step_m,
-          (moved.yaw_rad - fix.estimate.pose.yaw_rad) / step_m;
-      covariance += 1e-4 * derivative * derivative.transpose();
+/// A level camera above two lamps with known errors.
+class CameraAboveUncertainLamps : public CameraAboveLamps {
+ protected:
+  CameraAboveUncertainLamps() { rig.map.lamps.resize(2); }
+
+  /// Compares the covariance of the fix with that of the lamps' positions, propagated by
+  /// derivatives of the fix. A dispersion offset changes with the positions.
+  void expect_propagated(const Eigen::MatrixXd& lamp_covariance) const {
+    constexpr double step_m = 1e-4;
+    const auto detections = seen_from(rig, 1e-3);
+    ASSERT_EQ(detections.size(), 2U);
+    const Positioner positioner = rig.positioner();
+    EXPECT_EQ(positioner.num_lamps_moved_since_calibration(), 0);
+    const Fix fix = positioner.compute_position_fix(detections);
+    ASSERT_TRUE(fix.has_succeeded());
+    Eigen::MatrixXd derivatives(4, 6);
+    for (Eigen::Index i = 0; i < 6; ++i) {
+      const auto lamp = static_cast<std::size_t>(i / 3);
+      BodyRig other = rig;
+      other.map.lamps[lamp].position_m[i % 3] += step_m;
+      if (auto& dispersion = other.calibration.dispersion) {
+        dispersion->offset_px +=
+            step_m * other.calibration.camera.focal_px().cwiseProduct(
+                         dispersion->uncertain_lamps[lamp].jacobian_wrt_position.col(i % 3));
+      }
+      const Pose pose = other.positioner().compute_position_fix(detections).estimate.pose;
+      derivatives.col(i) << (pose.position_m - fix.estimate.pose.position_m) / step_m,
+          (pose.yaw_rad - fix.estimate.pose.yaw_rad) / step_m;
     }
+    const Eigen::Matrix4d covariance = derivatives * lamp_covariance * derivatives.transpose();
+    EXPECT_LT((fix.estimate.covariance - covariance).cwiseAbs().maxCoeff(),
+              0.01 * covariance.cwiseAbs().maxCoeff());
   }
-  EXPECT_LT((fix.estimate.covariance - covariance).cwiseAbs().maxCoeff(),
-            0.01 * covariance.cwiseAbs().maxCoeff());
+};
+
+TEST_F(CameraAboveUncertainLamps, CovarianceIncludesErrorsOfSurvey) {
+  for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.01;
+  expect_propagated(1e-4 * Eigen::MatrixXd::Identity(6, 6));
+}
+
+TEST_F(CameraAboveUncertainLamps, CovarianceIncludesErrorsOfAdjustedLamps) {
+  Eigen::MatrixXd factors(6, 6);
+  Random random(5);
+  for (double& value : factors.reshaped()) value = random.uniform(-0.01, 0.01);
+  const Eigen::MatrixXd covariance = factors * factors.transpose();
+  Adjustment& adjustment = rig.calibration.adjustment.emplace();
+  for (const Lamp& lamp : rig.map.lamps) adjustment.lamps.push_back({lamp.id, lamp.position_m});
+  adjustment.covariance = Eigen::MatrixXd::Zero(12 + 4 + 6, 12 + 4 + 6);
+  adjustment.covariance.bottomRightCorner<6, 6>() = covariance;
+  expect_propagated(covariance);
+}
+
+TEST_F(CameraAboveUncertainLamps, CovarianceIncludesErrorsOfDispersionOffsetByLamps) {
+  Dispersion& dispersion = rig.calibration.dispersion.emplace();
+  dispersion = {{0.4, -0.3}, 0.001, {0, 0}, 12};
+  dispersion.jacobian_wrt_zenith = Eigen::Matrix2d::Zero();
+  Eigen::Matrix<double, 2, 3> jacobian;
+  jacobian << 0.5, -0.1, 0.2, 0.1, 0.6, -0.3;
+  for (Lamp& lamp : rig.map.lamps) {
+    lamp.sd_m = 0.01;
+    dispersion.uncertain_lamps.push_back({lamp.id, lamp.position_m, 0.01, jacobian});
+    jacobian *= -0.6;
+  }
+  expect_propagated(1e-4 * Eigen::MatrixXd::Identity(6, 6));
 }
 
 TEST_F(CameraAboveLamps, FixFailsWithoutKeyOfMap) {
