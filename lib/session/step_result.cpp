@@ -83,17 +83,23 @@ std::vector<SkippedImage> list_skipped_images(const std::vector<Observation>& im
 
 namespace {
 
-/// Warns of images that are used in spite of a doubt: of the first one, with their number.
+/// Warns of images that are used in spite of a doubt: their number, the first names, and the first
+/// doubt.
 void warn_about_doubtful_images(const std::vector<Observation>& images, StepResult& result) {
-  const auto is_doubtful = [](const Observation& image) {
-    return image.is_image_kept() && !image.doubt.empty();
-  };
-  const auto first = std::ranges::find_if(images, is_doubtful);
-  if (first == images.end()) return;
-  const auto others = std::ranges::count_if(images, is_doubtful) - 1;
-  result.warnings.push_back(fmt::format(
-      "{}: {}{}", first->image_file_name(), first->doubt,
-      others > 0 ? fmt::format(", and {} more images with a doubt", others) : std::string()));
+  constexpr int max_names = 3;
+  std::string names, first_doubt;
+  int count = 0;
+  for (const Observation& image : images) {
+    if (!image.is_image_kept() || image.doubt.empty()) continue;
+    if (++count == 1) first_doubt = image.doubt;
+    if (count <= max_names) names += (count > 1 ? ", " : "") + image.image_file_name();
+  }
+  if (count == 0) return;
+  if (count > 1) {
+    names = fmt::format("{} doubtful images are used ({}{}), the first", count, names,
+                        count > max_names ? ", ..." : "");
+  }
+  result.warnings.push_back(names + ": " + first_doubt);
 }
 
 }  // namespace

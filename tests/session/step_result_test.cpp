@@ -4,6 +4,9 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
+#include <string>
+
 namespace vlp {
 namespace {
 
@@ -54,6 +57,24 @@ TEST(AddImageIntakeRemarks, CombinesRejectedFramesOfVideoByReason) {
   EXPECT_THAT(result.details,
               ElementsAre("b.avi#000000: shows 2 tags", "b.avi#000003: shows 3 tags",
                           "c.avi#000000: shows 2 tags", "b.avi#000004: is as #000003"));
+}
+
+TEST(AddImageIntakeRemarks, WarnsOfNumberAndFirstThreeNamesOfDoubtfulImages) {
+  const std::array expected{
+      "a.png: 9 outliers", "2 doubtful images are used (a.png, b.png), the first: 9 outliers",
+      "3 doubtful images are used (a.png, b.png, c.png), the first: 9 outliers",
+      "4 doubtful images are used (a.png, b.png, c.png, ...), the first: 9 outliers"};
+  Observations seen;
+  seen.images = {Observation{"f/good.png"},
+                 rejected("f/bad.png", RejectionReason::blurred, "blurred")};
+  seen.images.back().doubt = "overexposed";
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    seen.images.push_back(Observation{std::string("f/") + "abcd"[i] + ".png"});
+    seen.images.back().doubt = i == 0 ? "9 outliers" : "overexposed";
+    StepResult result;
+    add_image_intake_remarks(seen, result);
+    EXPECT_THAT(result.warnings, ElementsAre(expected[i]));
+  }
 }
 
 TEST(AddImageIntakeRemarks, CopiesFailureAndPrependsWarnings) {
