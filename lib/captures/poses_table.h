@@ -10,7 +10,8 @@
 
 namespace vlp {
 
-/// A row of `poses.csv`: position and orientation of the camera of an image.
+/// A row of `poses.csv`: position and orientation of the camera of an image in the world, the frame
+/// of the lamp map. If the mounting of the camera is given, they are those of the robot.
 struct PoseRow {
   std::string image;
   Eigen::Vector3d position_m;
