@@ -84,7 +84,7 @@ void convert_corner_file(const Options& options) {
   write_lamp_map(folder / "lamps.yaml", lamps.map);
   write_detections(folder / "detections.csv", lamps.frames);
   fmt::print("lamps         {} corners of the board, in lamps.yaml\n", lamps.map.lamps.size());
-  fmt::print("detections    {} in {} images, in detections.csv\n", lamps.corners - lamps.left_out,
+  fmt::print("detections    {} in {} images, in detections.csv\n", lamps.corners,
              lamps.frames.size());
   fmt::print("sigma_px      {} from sd_px", lamps.corners - lamps.corners_without_sd);
   if (lamps.corners_without_sd > 0) {

@@ -285,8 +285,10 @@ TEST_F(CornersToPoses, KeepsEveryNthCornerOfLargeBoard) {
     for (int corner = 0; corner < 380; ++corner)
       csv << fmt::format("a.png,{},{},{}\n", corner, 30 * (corner % 20), 30 * (corner / 20));
   }
-  EXPECT_THAT(convert("corners.csv", "--sigma-px 0.1"),
-              HasSubstr("left out      190 corners: a fix takes at most 256"));
+  const std::string printed = convert("corners.csv", "--sigma-px 0.1");
+  EXPECT_THAT(printed, HasSubstr("detections    190 in 1 images, in detections.csv\n"
+                                 "sigma_px      0 from sd_px, 190 of 0.1 px from --sigma-px\n"
+                                 "left out      190 corners: a fix takes at most 256"));
   const auto frames = read_detections(folder / "points/detections.csv");
   ASSERT_EQ(frames.size(), 1U);
   ASSERT_EQ(frames[0].detections.size(), 190U);

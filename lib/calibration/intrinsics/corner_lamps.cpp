@@ -29,12 +29,9 @@ std::vector<int> list_ids_of_lattice_points(const BoardLattice& lattice,
   return ids;
 }
 
-/// Returns every n-th detection, with the smallest n for which a fix takes all of them.
-std::vector<Detection> thin_out_to_fix_limit(const std::vector<Detection>& detections) {
-  const std::size_t step = (detections.size() + Positioner::max_lamps - 1) / Positioner::max_lamps;
-  std::vector<Detection> kept;
-  for (std::size_t i = 0; i < detections.size(); i += step) kept.push_back(detections[i]);
-  return kept;
+/// Returns the smallest n for which a fix takes every n-th of the corners of a view.
+std::size_t compute_step_to_fix_limit(std::size_t corners) {
+  return std::max<std::size_t>(1, (corners + Positioner::max_lamps - 1) / Positioner::max_lamps);
 }
 
 /// Adds all corners of the board to the map. Returns the ids of points (PointDetection::index).
@@ -74,7 +71,9 @@ CornerLamps convert_corners_to_lamps(std::span<const BoardView> views, const Boa
   result.sigma_px = sigma_px ? sigma_px : estimate_corner_noise_px(corners_of_views);
   for (std::size_t i = 0; i < views.size(); ++i) {
     Frame frame{views[i].image, {}};
-    for (const BoardLattice::Corner& corner : corners_of_views[i]) {
+    const std::size_t step = compute_step_to_fix_limit(corners_of_views[i].size());
+    for (std::size_t k = 0; k < corners_of_views[i].size(); k += step) {
+      const BoardLattice::Corner& corner = corners_of_views[i][k];
       const bool is_sd_known = corner.sd_px > 0;
       ++result.corners;
       result.corners_without_sd += is_sd_known ? 0 : 1;
@@ -84,9 +83,7 @@ CornerLamps convert_corners_to_lamps(std::span<const BoardView> views, const Boa
       frame.detections.push_back({point_ids[index], corner.pixel, sigma});
     }
     if (frame.detections.empty()) continue;
-    const std::size_t detected = frame.detections.size();
-    frame.detections = thin_out_to_fix_limit(frame.detections);
-    result.left_out += detected - frame.detections.size();
+    result.left_out += corners_of_views[i].size() - frame.detections.size();
     result.frames.push_back(std::move(frame));
   }
   return result;

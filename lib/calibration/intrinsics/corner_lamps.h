@@ -21,9 +21,9 @@ struct CornerLamps {
   /// + corner, with corner 0 to 3 as in BoardTag::corners_m; on boards of squares the index of
   /// list_chessboard_corners_m().
   LampMap map;
-  /// Corners detected in each view.
+  /// Corners of each view; every n-th one if a fix does not take all of them.
   std::vector<Frame> frames;
-  /// Number of corners in the views, of those among them without a standard deviation, and of those
+  /// Number of corners in `frames`, of those among them without a standard deviation, and of those
   /// left out so that a view has at most Positioner::max_lamps.
   std::size_t corners = 0, corners_without_sd = 0, left_out = 0;
   /// Standard deviation of corners that state none; std::nullopt if it is not given and there are
