@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "camera/spline_grid.h"
@@ -71,37 +74,53 @@ ImageRegion subdivide_edges(const ImageRegion& region, double spacing_px) {
   return points;
 }
 
-/// Returns the last point with a ray on the line from `inside`, which has one, to `outside`, less a
+using HasRays = std::function<bool(const Eigen::Vector2d&)>;
+
+/// Returns the last point with rays on the line from `inside`, which has them, to `outside`, less a
 /// distance that keeps the edges between such points inside.
-Eigen::Vector2d find_end_of_rays(const Lens& lens, const Eigen::Vector2d& inside,
+Eigen::Vector2d find_end_of_rays(const HasRays& has_rays, const Eigen::Vector2d& inside,
                                  const Eigen::Vector2d& outside) {
   constexpr double tolerance_px = 0.01, distance_px = 0.25;
   const Eigen::Vector2d line = outside - inside;
   const double length_px = line.norm();
-  double with_ray = 0, without = 1;
-  while ((without - with_ray) * length_px > tolerance_px) {
-    const double middle = (with_ray + without) / 2;
-    (lens.unproject_pixel(inside + middle * line) ? with_ray : without) = middle;
+  double with_rays = 0, without = 1;
+  while ((without - with_rays) * length_px > tolerance_px) {
+    const double middle = (with_rays + without) / 2;
+    (has_rays(inside + middle * line) ? with_rays : without) = middle;
   }
-  return inside + std::max(0.0, with_ray - distance_px / length_px) * line;
+  return inside + std::max(0.0, with_rays - distance_px / length_px) * line;
 }
 
-/// Returns the part of a region where the lens has rays. Removes points on straight edges again.
-ImageRegion clip_to_rays(const ImageRegion& region, const Lens& lens, const Eigen::Vector2d& inside,
-                         double spacing_px) {
+/// Returns the mean of the corners, or else the corner nearest to it that has rays; std::nullopt if
+/// none has.
+std::optional<Eigen::Vector2d> find_center_with_rays(std::vector<Eigen::Vector2d> corners_px,
+                                                     const HasRays& has_rays) {
+  const Eigen::Vector2d mean =
+      std::accumulate(corners_px.begin(), corners_px.end(), Eigen::Vector2d(0, 0)) /
+      static_cast<double>(corners_px.size());
+  if (has_rays(mean)) return mean;
+  std::erase_if(corners_px, [&](const auto& corner) { return !has_rays(corner); });
+  if (corners_px.empty()) return {};
+  return *std::ranges::min_element(
+      corners_px, {}, [&](const auto& corner) { return (corner - mean).squaredNorm(); });
+}
+
+/// Returns the part of a region that has rays. Removes points on straight edges again.
+ImageRegion clip_to_rays(const ImageRegion& region, const HasRays& has_rays,
+                         const std::vector<Eigen::Vector2d>& corners_px, double spacing_px) {
   const ImageRegion points = subdivide_edges(region, spacing_px);
   std::vector<bool> has_ray;
-  for (const Eigen::Vector2d& point : points)
-    has_ray.push_back(lens.unproject_pixel(point).has_value());
-  const bool has_all = std::ranges::all_of(has_ray, [](bool ray) { return ray; });
-  if (has_all || !lens.unproject_pixel(inside)) return region;
+  std::ranges::transform(points, std::back_inserter(has_ray), has_rays);
+  if (std::ranges::find(has_ray, false) == has_ray.end()) return region;
+  const auto inside = find_center_with_rays(corners_px, has_rays);
+  if (!inside) return {};
   ImageRegion clipped;
   const std::size_t count = points.size();
   for (std::size_t i = 0; i < count; ++i) {
     const bool is_vertex = std::ranges::find(region, points[i]) != region.end();
     const bool is_beside = !has_ray[(i + 1) % count] || !has_ray[(i + count - 1) % count];
     if (!has_ray[i]) {
-      clipped.push_back(find_end_of_rays(lens, inside, points[i]));
+      clipped.push_back(find_end_of_rays(has_rays, *inside, points[i]));
     } else if (is_vertex || is_beside) {
       clipped.push_back(points[i]);
     }
@@ -112,7 +131,8 @@ ImageRegion clip_to_rays(const ImageRegion& region, const Lens& lens, const Eige
 }  // namespace
 
 ImageRegion compute_valid_lens_region(const std::vector<Eigen::Vector2d>& corners_px,
-                                      const std::array<int, 2>& imager_px, const Lens& lens) {
+                                      const std::array<int, 2>& imager_px, const Lens& lens,
+                                      std::span<const Lens> others) {
   constexpr double model_margin = 0.04, spacing = 0.02;
   const double margin = is_splined_lens_model(lens.lens_model()) ? 0 : model_margin;
   const Eigen::Vector2d last(imager_px[0] - 1, imager_px[1] - 1);
@@ -134,10 +154,12 @@ ImageRegion compute_valid_lens_region(const std::vector<Eigen::Vector2d>& corner
   if (region.empty()) return region;
   if (compute_region_fraction_of_image_area(region, imager_px) >= whole)
     region = {{0, 0}, {last.x(), 0}, last, {0, last.y()}};
-  const Eigen::Vector2d mean =
-      std::accumulate(corners_px.begin(), corners_px.end(), Eigen::Vector2d(0, 0)) /
-      static_cast<double>(corners_px.size());
-  return clip_to_rays(region, lens, mean, spacing * last.norm());
+  const auto has_rays = [&](const Eigen::Vector2d& pixel) {
+    return lens.unproject_pixel(pixel) && std::ranges::all_of(others, [&](const Lens& other) {
+             return other.unproject_pixel(pixel).has_value();
+           });
+  };
+  return clip_to_rays(region, has_rays, corners_px, spacing * last.norm());
 }
 
 double compute_region_fraction_of_image_area(const ImageRegion& region,

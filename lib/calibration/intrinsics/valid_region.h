@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <span>
 #include <vector>
 
 #include "camera/lens.h"
@@ -18,6 +19,7 @@ using ImageRegion = std::vector<Eigen::Vector2d>;
 ///
 /// @param corners_px  corners used by the solve, px
 /// @param imager_px   width and height of the image
+/// @param others      other lenses that may be the true one; pixels need a ray through each
 /// @return            polygon, px, clockwise in the image; empty if all corners are on one line
 ///
 /// The margin is 4 % of the image diagonal along each axis. It is 0 for splined lenses, which are
@@ -25,10 +27,12 @@ using ImageRegion = std::vector<Eigen::Vector2d>;
 /// whole image. Outside the region no corner contradicts a wrong lens model.
 ///
 /// A lens has rays up to the fold of its model only (Lens::project_point()). Where the boundary has
-/// no ray, it moves towards the mean of the corners, to 0.25 px inside the image of the rays. This
-/// assumes that each line from that mean leaves the image of the rays once.
+/// no ray, it moves towards the mean of the corners, to 0.25 px inside the image of the rays. If
+/// that mean has no ray, the nearest corner with one replaces it; without any the region is empty.
+/// This assumes that each line from there leaves the image of the rays once.
 ImageRegion compute_valid_lens_region(const std::vector<Eigen::Vector2d>& corners_px,
-                                      const std::array<int, 2>& imager_px, const Lens& lens);
+                                      const std::array<int, 2>& imager_px, const Lens& lens,
+                                      std::span<const Lens> others = {});
 
 /// Computes the area of a region as a fraction of the image. The image extends from the center of
 /// its first pixel to that of its last.

@@ -238,6 +238,31 @@ TEST(ComputeValidLensRegion, KeepsStraightEdgesInsideImageOfRays) {
   EXPECT_FALSE(polygon_contains(region, {640, 60}));
 }
 
+TEST(ComputeValidLensRegion, LiesInsideImagesOfRaysOfOtherLenses) {
+  const std::array others{
+      Lens(LensModel::fisheye, std::array{188.0, 192.0, 400.0, 300.0, 0.0, 0.0, -0.003, 0.0}),
+      straight_lens()};
+  const ImageRegion corners{{150, 150}, {650, 150}, {650, 450}, {150, 450}};
+  const ImageRegion region = compute_valid_lens_region(corners, kImager, straight_lens(), others);
+  expect_all_rays(region, others[0]);
+  EXPECT_EQ(region, compute_valid_lens_region(corners, kImager, others[0]));
+  EXPECT_NE(region, compute_valid_lens_region(corners, kImager, straight_lens()));
+}
+
+/// Most corners are beyond the fold, 307 px from the center, and have no ray.
+TEST(ComputeValidLensRegion, LiesInsideImageOfRaysIfMeanOfCornersHasNoRay) {
+  const Lens lens(LensModel::fisheye,
+                  std::array{188.0, 192.0, 400.0, 300.0, 0.0, 0.0, -0.003, 0.0});
+  ImageRegion corners{{5, 5}, {60, 5}, {5, 60}, {30, 30}, {8, 40}, {40, 8}};
+  EXPECT_TRUE(compute_valid_lens_region(corners, kImager, lens).empty());
+  corners.insert(corners.end(), {{300, 200}, {500, 200}, {400, 400}});
+  ASSERT_FALSE(lens.unproject_pixel({150, 105})) << "mean of the corners";
+  const ImageRegion region = compute_valid_lens_region(corners, kImager, lens);
+  expect_all_rays(region, lens);
+  for (std::size_t i = 6; i < corners.size(); ++i)
+    EXPECT_TRUE(polygon_contains(region, corners[i])) << i;
+}
+
 TEST(ComputeRegionFractionOfImageArea, ReturnsAreaDividedByAreaBetweenPixelCenters) {
   EXPECT_NEAR(
       compute_region_fraction_of_image_area({{0, 0}, {20, 0}, {20, 30}, {0, 30}}, {101, 61}), 0.1,
