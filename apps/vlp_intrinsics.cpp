@@ -152,7 +152,8 @@ void write_results(const Options& options, const LensResult& result) {
   const LensEstimate& lens = result.lens;
   write_calibration(options.output, result.calibration);
   if (is_lens_model_supported_by_mrcal(result.calibration.camera.lens_model)) {
-    write_mrcal_cameramodel(replace_extension(options.output, ".cameramodel"), lens.solution);
+    write_mrcal_cameramodel(replace_extension(options.output, ".cameramodel"), lens.solution,
+                            lens.report.region);
   } else {
     // A file of an earlier run would belong to another lens.
     std::filesystem::remove(replace_extension(options.output, ".cameramodel"));
@@ -186,10 +187,11 @@ void throw_if_gate_failed(const std::vector<Gate>& gates, const LensResult& resu
 void print_uncertainty_components(const LensEstimate& lens) {
   if (const auto& model = lens.model_uncertainty) {
     fmt::print(
-        "model choice  {:.3f} px mean, {:.3f} px worst: difference to {}, which the views do not "
-        "exclude; focal length by {:.2f} px; in the uncertainty above and in the covariance\n",
+        "model choice  {:.3f} px mean, {:.3f} px worst: differences to models that the views do "
+        "not exclude, the largest to {}; focal length {:.2f} px; in the uncertainty above and in "
+        "the covariance\n",
         model->mean_px, model->worst_px, lens_model_name(model->model),
-        std::abs(model->intrinsics[0]));
+        std::sqrt(model->intrinsics_covariance(0, 0)));
   } else if (!lens.are_models_compared) {
     fmt::print(
         "model choice  not in the uncertainty above: {}\n",

@@ -308,7 +308,7 @@ class SessionRun {
           return Work{lens, [this, lens] {
                         if (is_lens_model_supported_by_mrcal(lens.calibration.camera.lens_model)) {
                           write_mrcal_cameramodel(output_file_path("lens.cameramodel"),
-                                                  lens.lens.solution);
+                                                  lens.lens.solution, lens.lens.report.region);
                         }
                         write_picture(lens, "lens.svg");
                         write_calibration(output_file_path("lens.yaml"), lens.calibration);

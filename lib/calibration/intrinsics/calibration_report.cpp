@@ -74,17 +74,17 @@ CalibrationReport compute_lens_calibration_report(const IntrinsicsSolution& solu
                                                   const IntrinsicsInput& input) {
   return compute_lens_calibration_report(
       solution, input,
-      ProjectionUncertainty::compute_uncertainty_by_corners_and_by_tags(solution, input.lattice));
+      ProjectionUncertainty::compute_uncertainty_by_corners_and_by_tags(solution, input.lattice),
+      compute_valid_lens_region(collect_inlier_corner_pixels(solution.problem), input.imager_px,
+                                solution.fitted_lens()));
 }
 
 CalibrationReport compute_lens_calibration_report(
     const IntrinsicsSolution& solution, const IntrinsicsInput& input,
-    const ProjectionUncertainty::ByCornersAndByTags& uncertainties) {
+    const ProjectionUncertainty::ByCornersAndByTags& uncertainties, ImageRegion region) {
   const auto& [independent, uncertainty] = uncertainties;
   const Lens lens = solution.fitted_lens();
   const Eigen::MatrixXd by_views = estimate_intrinsics_covariance_by_jackknife(solution);
-  ImageRegion region = compute_valid_lens_region(collect_inlier_corner_pixels(solution.problem),
-                                                 input.imager_px, lens);
   // Splines are undetermined outside the region.
   const ImageRegion compared = is_splined_lens_model(lens.lens_model()) ? region : ImageRegion();
   const auto expected = compute_expected_projection_difference(

@@ -18,7 +18,8 @@ namespace vlp {
 /// Uncertainty of the lens of a solution, over the image.
 struct CalibrationReport {
   /// Region of the image where the lens is calibrated (compute_valid_lens_region()): polygon, px.
-  /// `region_fraction` is its area as a fraction of the image, 0 to 1.
+  /// In estimate_lens() each model that may describe the lens has rays there. `region_fraction` is
+  /// its area as a fraction of the image, 0 to 1.
   ImageRegion region;
   double region_fraction;
   /// Mean and maximum of ProjectionUncertainty::projection_sd_along_worst_direction_px() by tags,
@@ -50,10 +51,10 @@ struct CalibrationReport {
 /// @pre solution.has_succeeded()
 CalibrationReport compute_lens_calibration_report(const IntrinsicsSolution& solution,
                                                   const IntrinsicsInput& input);
-/// Computes the report with known uncertainties of the solution.
+/// Computes the report with known uncertainties of the solution, over a given region.
 CalibrationReport compute_lens_calibration_report(
     const IntrinsicsSolution& solution, const IntrinsicsInput& input,
-    const ProjectionUncertainty::ByCornersAndByTags& uncertainties);
+    const ProjectionUncertainty::ByCornersAndByTags& uncertainties, ImageRegion region);
 
 /// Returns the RMS residual of each held-out view, per axis, px; infinity for a view without a
 /// pose.

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "calibration/intrinsics/board_check.h"
 #include "calibration/intrinsics/board_print.h"
@@ -228,16 +229,32 @@ std::string explain_why_lens_not_found(const InitialSolutions& initial, LensMode
   return problem.empty() ? std::string(describe_intrinsics_status(status)) : problem;
 }
 
-/// Adds the uncertainty from the choice of the lens model to the report.
-void add_model_uncertainty(LensEstimate& result) {
+/// Returns the fits of the other models that may describe the lens. Sets are_models_compared.
+std::vector<IntrinsicsSolution> fit_other_models(LensEstimate& result) {
   const IntrinsicsSolution& solution = result.solution;
-  if (is_splined_lens_model(solution.problem.lens_model)) return;
+  if (is_splined_lens_model(solution.problem.lens_model)) return {};
   const auto comparison = compare_lens_models(solution);
-  if (!comparison) return;
-  result.are_models_compared = true;
+  result.are_models_compared = comparison.has_value();
+  return comparison ? list_fits_of_possible_models(solution, *comparison)
+                    : std::vector<IntrinsicsSolution>();
+}
+
+/// Returns the region in which the lens is calibrated and each of the other models has rays.
+ImageRegion compute_region(const IntrinsicsSolution& solution,
+                           const std::vector<IntrinsicsSolution>& others) {
+  std::vector<Lens> other_lenses;
+  other_lenses.reserve(others.size());
+  for (const IntrinsicsSolution& other : others) other_lenses.push_back(other.fitted_lens());
+  return compute_valid_lens_region(collect_inlier_corner_pixels(solution.problem),
+                                   solution.problem.imager_px, solution.fitted_lens(),
+                                   other_lenses);
+}
+
+/// Adds the uncertainty from the choice of the lens model to the report.
+void add_model_uncertainty(const std::vector<IntrinsicsSolution>& others, LensEstimate& result) {
   CalibrationReport& report = result.report;
-  result.model_uncertainty =
-      compute_model_uncertainty(solution, *comparison, report.region, report.uncertainty_worst_px);
+  result.model_uncertainty = compute_model_uncertainty(result.solution, others, report.region,
+                                                       report.uncertainty_worst_px);
   if (!result.model_uncertainty) return;
   const ModelUncertainty& model = *result.model_uncertainty;
   report.uncertainty_mean_px = std::hypot(report.uncertainty_mean_px, model.mean_px);
@@ -267,23 +284,23 @@ void add_uncertainty(const SplitViews& views, double print_sd, LensEstimate& res
   const IntrinsicsSolution& solution = result.solution;
   const auto uncertainties = ProjectionUncertainty::compute_uncertainty_by_corners_and_by_tags(
       solution, views.solved.lattice);
-  result.report = compute_lens_calibration_report(solution, views.solved, uncertainties);
+  const std::vector<IntrinsicsSolution> others = fit_other_models(result);
+  result.report = compute_lens_calibration_report(solution, views.solved, uncertainties,
+                                                  compute_region(solution, others));
   result.coverage = compute_board_view_coverage(solution, views.solved);
   result.held_out = evaluate_lens_on_held_out_views(solution, views.held_out);
   result.lattice = views.solved.lattice;
   result.sharpness = measure_lens_sharpness(result.views, views.solved.imager_px);
-  add_model_uncertainty(result);
+  add_model_uncertainty(others, result);
   const auto print = add_print_uncertainty(print_sd, result);
   // The covariance of hundreds of control points would fill the file, without use for fixes.
   if (is_splined_lens_model(solution.problem.lens_model)) return;
   const ProjectionUncertainty& uncertainty = uncertainties.by_tags;
   MatrixX covariance = uncertainty.intrinsics_covariance();
-  const auto add_change = [&](const Eigen::VectorXd& change) {
-    covariance += change * change.transpose();
-  };
-  add_change(uncertainty.intrinsics_regularization_bias());
-  if (result.model_uncertainty) add_change(result.model_uncertainty->intrinsics);
-  if (print) add_change(print->intrinsics);
+  const Eigen::VectorXd& bias = uncertainty.intrinsics_regularization_bias();
+  covariance += bias * bias.transpose();
+  if (result.model_uncertainty) covariance += result.model_uncertainty->intrinsics_covariance;
+  if (print) covariance += print->intrinsics * print->intrinsics.transpose();
   if (covariance.allFinite()) result.intrinsics_covariance = covariance;
 }
 

@@ -2,10 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/intrinsics/model_uncertainty.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <vector>
+#include <functional>
+#include <iterator>
+#include <utility>
 
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/rotation_vector.h"
@@ -15,87 +19,126 @@
 namespace vlp {
 namespace {
 
-/// Pixels of a lens with their rays, and their displacements through another lens, px.
-struct Displacements {
-  std::vector<Eigen::Vector3d> rays;
-  std::vector<Eigen::Vector2d> displacements_px;
-  double mean_px = 0, worst_px = 0;
+/// Difference between the lens of a solution and that of another model.
+struct ModelDifference {
+  LensModel model;
+  /// Displacement of each pixel, u and v, and the larger one of both directions, px.
+  Eigen::VectorXd displacements_px, lengths_px;
+  /// Change of the intrinsics that causes the displacements.
+  Eigen::VectorXd intrinsics;
+  double worst_px, noise_px;
+
+  double excess_px2() const { return worst_px * worst_px - noise_px * noise_px; }
 };
 
-Displacements compute_displacements(const Lens& lens, const Lens& other,
-                                    const std::vector<Eigen::Vector2d>& pixels) {
-  Displacements result;
-  const auto other_from_lens = fit_rotation_between_lenses(lens, other, pixels);
-  if (!other_from_lens) return result;
-  for (const Eigen::Vector2d& pixel : pixels) {
-    const auto ray = lens.unproject_pixel(pixel);
-    const auto seen = ray ? other.project_point(*other_from_lens * ray->direction) : std::nullopt;
-    // Without a ray through both lenses there is no displacement: the worst one is a lower limit.
-    if (!seen || !lens.project_point(ray->direction.normalized())) continue;
-    result.rays.push_back(ray->direction.normalized());
-    result.displacements_px.emplace_back(*seen - pixel);
-    const double length_px = result.displacements_px.back().norm();
-    result.mean_px += length_px;
-    result.worst_px = std::max(result.worst_px, length_px);
-  }
-  result.mean_px /= std::max(1.0, static_cast<double>(result.rays.size()));
-  return result;
-}
-
-/// Fits the change of the intrinsics that displaces the pixels, with a rotation of the camera free.
-Eigen::VectorXd fit_intrinsics_change(const Lens& lens, const Displacements& displacements) {
+/// Returns std::nullopt if the lenses have rays of fewer than three pixels in common.
+std::optional<ModelDifference> compute_difference(const Lens& lens, const Lens& other,
+                                                  const std::vector<Eigen::Vector2d>& pixels) {
   constexpr double min_pivot = 1e-5;  // combinations that displace hardly any pixel are left out
+  const auto other_from_lens = fit_rotation_between_lenses(lens, other, pixels);
+  if (!other_from_lens) return {};
   const auto count = static_cast<Eigen::Index>(num_lens_parameters(lens.lens_model()));
-  const auto pixels = std::ssize(displacements.rays);
-  Eigen::MatrixXd jacobian(2 * pixels, count + 3);
-  Eigen::VectorXd target(2 * pixels);
-  for (Eigen::Index i = 0; i < pixels; ++i) {
-    const Eigen::Vector3d& ray = displacements.rays[static_cast<std::size_t>(i)];
-    const auto at = lens.project_point_with_jacobians(ray).value();
-    jacobian.middleRows<2>(2 * i) << at.d_pixel_d_parameters,
-        -at.d_pixel_d_point * skew_symmetric_matrix(ray);
-    target.segment<2>(2 * i) = displacements.displacements_px[static_cast<std::size_t>(i)];
+  const auto rows = std::ssize(pixels);
+  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(2 * rows, count + 3);
+  Eigen::VectorXd displacements_px = Eigen::VectorXd::Zero(2 * rows),
+                  lengths_px = Eigen::VectorXd::Zero(rows);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const auto ray = lens.unproject_pixel(pixels[static_cast<std::size_t>(i)]),
+               other_ray = other.unproject_pixel(pixels[static_cast<std::size_t>(i)]);
+    if (!ray || !other_ray) continue;
+    const Eigen::Vector3d from = ray->direction.normalized(),
+                          to = other_ray->direction.normalized(),
+                          change = *other_from_lens * from - to;
+    const auto at = lens.project_point_with_jacobians(from),
+               other_at = other.project_point_with_jacobians(to);
+    if (!at || !other_at) continue;
+    const Eigen::Vector2d displacement_px = other_at->d_pixel_d_point * change;
+    const Eigen::Vector2d reverse_px = at->d_pixel_d_point * other_from_lens->transpose() * change;
+    jacobian.middleRows<2>(2 * i) << at->d_pixel_d_parameters,
+        -at->d_pixel_d_point * skew_symmetric_matrix(from);
+    displacements_px.segment<2>(2 * i) = displacement_px;
+    lengths_px[i] = std::max(displacement_px.norm(), reverse_px.norm());
   }
   const Eigen::VectorXd scale = jacobian.colwise().norm().cwiseMax(1e-300).cwiseInverse();
   Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
   solver.setThreshold(min_pivot);
   solver.compute(jacobian * scale.asDiagonal());
-  return (scale.asDiagonal() * solver.solve(target)).head(count);
+  const Eigen::VectorXd intrinsics =
+      (scale.asDiagonal() * solver.solve(displacements_px)).head(count);
+  const double worst_px = lengths_px.maxCoeff();
+  return ModelDifference{other.lens_model(), displacements_px, lengths_px, intrinsics, worst_px, 0};
+}
+
+/// Returns w_m of each difference. The differences are in descending order of their excess.
+Eigen::VectorXd compute_weights(const std::vector<ModelDifference>& differences) {
+  const auto count = std::ssize(differences);
+  Eigen::MatrixXd scaled_px(differences.front().displacements_px.size(), count);
+  for (Eigen::Index m = 0; m < count; ++m) {
+    const ModelDifference& difference = differences[static_cast<std::size_t>(m)];
+    scaled_px.col(m) = difference.worst_px * difference.displacements_px.normalized();
+  }
+  const Eigen::MatrixXd products = scaled_px.transpose() * scaled_px;
+  Eigen::VectorXd weights = Eigen::VectorXd::Zero(count);
+  for (Eigen::Index m = 0; m < count; ++m) {
+    const double noise_px2 = std::pow(differences[static_cast<std::size_t>(m)].noise_px, 2);
+    // Inverse of s^2 1 + B B' by the matrix inversion lemma.
+    const Eigen::VectorXd root = weights.cwiseSqrt();
+    const Eigen::MatrixXd inner =
+        Eigen::MatrixXd(root.asDiagonal() * products * root.asDiagonal()) +
+        noise_px2 * Eigen::MatrixXd::Identity(count, count);
+    const Eigen::VectorXd common = root.cwiseProduct(products.col(m));
+    const double beyond_px2 = products(m, m) - common.dot(inner.ldlt().solve(common));
+    weights[m] = 1 - noise_px2 / std::max(beyond_px2, noise_px2);
+  }
+  return weights;
 }
 
 }  // namespace
 
-std::optional<ModelUncertainty> compute_model_uncertainty(const IntrinsicsSolution& solution,
-                                                          const LensChoice& comparison,
-                                                          const ImageRegion& region,
-                                                          double noise_px) {
+std::vector<IntrinsicsSolution> list_fits_of_possible_models(const IntrinsicsSolution& solution,
+                                                             const LensChoice& comparison) {
+  const LensModel model = solution.problem.lens_model;
+  const auto own = std::ranges::find(comparison.candidates, model, &LensCandidate::model);
+  const double own_excess = own == comparison.candidates.end() ? 0 : own->excess;
+  std::vector<IntrinsicsSolution> fits;
+  for (const LensCandidate& candidate : comparison.candidates) {
+    const bool counts = candidate.may_describe_lens() || candidate.excess <= own_excess;
+    if (candidate.fit && counts && candidate.model != model) fits.push_back(*candidate.fit);
+  }
+  return fits;
+}
+
+std::optional<ModelUncertainty> compute_model_uncertainty(
+    const IntrinsicsSolution& solution, std::span<const IntrinsicsSolution> others,
+    const ImageRegion& region, double noise_px) {
   const Lens lens = solution.fitted_lens();
   const std::array<int, 2>& imager_px = solution.problem.imager_px;
   std::vector<Eigen::Vector2d> pixels = make_regular_pixel_grid(imager_px);
   std::erase_if(pixels, [&](const auto& pixel) { return !polygon_contains(region, pixel); });
-  const auto own =
-      std::ranges::find(comparison.candidates, lens.lens_model(), &LensCandidate::model);
-  const double own_excess = own == comparison.candidates.end() ? 0 : own->excess;
-  std::optional<ModelUncertainty> farthest;
-  for (const LensCandidate& candidate : comparison.candidates) {
-    const bool counts = candidate.may_describe_lens() || candidate.excess <= own_excess;
-    if (!candidate.fit || !counts || candidate.model == lens.lens_model()) continue;
-    const Lens other = candidate.fit->fitted_lens();
-    const Displacements displacements = compute_displacements(lens, other, pixels);
-    const Displacements reverse = compute_displacements(other, lens, pixels);
-    const double worst_px = std::max(displacements.worst_px, reverse.worst_px),
-                 mean_px = std::max(displacements.mean_px, reverse.mean_px),
-                 found_px = farthest ? farthest->worst_px : 0;
-    if (displacements.rays.empty() || worst_px <= std::max(noise_px, found_px)) continue;
-    const double other_noise_px = estimate_expected_max_projection_difference_px(
-        other, imager_px, estimate_intrinsics_covariance_by_jackknife(*candidate.fit), region);
-    const double ratio = std::max(noise_px, other_noise_px) / worst_px;
-    const double factor = std::sqrt(std::max(0.0, 1 - ratio * ratio));
-    if (factor * worst_px <= found_px) continue;
-    farthest = {candidate.model, factor * fit_intrinsics_change(lens, displacements),
-                factor * mean_px, factor * worst_px};
+  std::vector<ModelDifference> differences;
+  for (const IntrinsicsSolution& fit : others) {
+    auto difference = compute_difference(lens, fit.fitted_lens(), pixels);
+    if (!difference || difference->worst_px <= noise_px) continue;
+    difference->noise_px =
+        std::max(noise_px, estimate_expected_max_projection_difference_px(
+                               fit.fitted_lens(), imager_px,
+                               estimate_intrinsics_covariance_by_jackknife(fit), region));
+    if (difference->excess_px2() > 0) differences.push_back(std::move(*difference));
   }
-  return farthest;
+  if (differences.empty()) return {};
+  std::ranges::sort(differences, std::greater(), &ModelDifference::excess_px2);
+  const Eigen::VectorXd weights = compute_weights(differences);
+  const auto count = differences.front().intrinsics.size();
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(count, count);
+  Eigen::VectorXd variances_px2 = Eigen::VectorXd::Zero(std::ssize(pixels));
+  for (std::size_t m = 0; m < differences.size(); ++m) {
+    const ModelDifference& difference = differences[m];
+    const double weight = weights[static_cast<Eigen::Index>(m)];
+    covariance += weight * difference.intrinsics * difference.intrinsics.transpose();
+    variances_px2 += weight * difference.lengths_px.cwiseAbs2();
+  }
+  return ModelUncertainty{differences.front().model, covariance, variances_px2.cwiseSqrt().mean(),
+                          std::sqrt(variances_px2.maxCoeff())};
 }
 
 }  // namespace vlp

@@ -4,50 +4,62 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "calibration/intrinsics/lens_choice.h"
 #include "calibration/intrinsics/valid_region.h"
 
 namespace vlp {
 
-/// Part of the uncertainty of a lens that comes from the choice of its model, as one standard
-/// deviation (compute_model_uncertainty()).
+/// Part of the uncertainty of a lens that comes from the choice of its model
+/// (compute_model_uncertainty()).
 struct ModelUncertainty {
   /// Model whose fit differs most.
   LensModel model;
-  /// Change of each intrinsic, in the order of the lens model.
-  Eigen::VectorXd intrinsics;
-  /// Change of projections over the region where the lens is known, mean and maximum, px.
+  /// Covariance of the intrinsics, in the order of the lens model. Its rank is at most the number
+  /// of the other models.
+  Eigen::MatrixXd intrinsics_covariance;
+  /// Standard deviation of projections over the region where the lens is known, mean and maximum,
+  /// px.
   double mean_px, worst_px;
 };
 
-/// Computes the uncertainty of a lens from the choice of its model: its difference to the fits of
-/// the other models that cross-validation does not reject. If it rejects the model of the lens, all
-/// models that fit better count, too. With the solution c, another model m,
-/// and pixels v of the region,
-///   d_m(v)  pixel of m on the ray of v through c, minus v; after the rotation that aligns the rays
-///   s       larger one of the expected largest errors of c and of m from noise, px
-///   a_m     sqrt(max(0, 1 - s^2 / max |d_m|^2))
-/// the result is a_m d_m of the model with the largest a_m max |d_m|. Its intrinsics are the change
-/// that causes it, by least squares over v, with a rotation free. Its mean and maximum are those
-/// from c to m or from m to c, the larger ones: they differ if one lens compresses the rim.
-///
-/// The factor a_m removes what noise explains. The larger one of two models that both describe the
-/// lens differs from the other by its own noise, which its covariance states: m of the covariance
-/// by views, c of the report. Of such models with good views, a_m is 0. Fits that noise does not
-/// explain cannot both be right.
-///
-/// All models that are not rejected count alike, and as a whole. Weights exp(elpd) would take
-/// millions of corners with common errors for independent and prefer one model for a hundredth of
-/// the residuals. The stated error then covers the difference to each of these models.
-///
+/// Returns the fits of the other models that may describe the lens of a solution: those that
+/// cross-validation does not reject. If it rejects the model of the lens, all models that fit
+/// better count, too.
 /// @param comparison  compare_lens_models() of the solution
-/// @param region      CalibrationReport::region
-/// @param noise_px    CalibrationReport::uncertainty_worst_px
+std::vector<IntrinsicsSolution> list_fits_of_possible_models(const IntrinsicsSolution& solution,
+                                                             const LensChoice& comparison);
+
+/// Computes the uncertainty of a lens from the choice of its model: its differences to the fits of
+/// the other models. With the solution c, another model m, and pixels v of the region,
+///   r_c(v), r_m(v)  unit rays of v through both lenses, rotated so that they agree best
+///   d_m(v)   displacement from c to m, to first order: (d pixel / d ray of m) (r_c - r_m)
+///   D_m      maximum of |d_m| and of the same from m to c, different for a compressed rim
+///   s_m      larger one of the expected largest errors of c and of m from noise, px
+///   b_m      d_m of all pixels in one vector, scaled to the length D_m
+///   w_m      max(0, 1 - 1 / (b_m' (s_m^2 1 + sum of w_k b_k b_k')^-1 b_m)), with the sum over the
+///            models k with larger D_k^2 - s_k^2
+/// the variance at v is the sum of w_m |d_m(v)|^2. The covariance of the intrinsics is the sum of
+/// w_m i_m i_m', where the change i_m causes d_m by least squares over v, with a rotation free.
+///
+/// The weight w_m is the smallest one with which noise and models together cover the difference to
+/// m as one standard deviation. For the first model it is 1 - s_m^2 / D_m^2, which removes what
+/// noise explains. The larger one of two models that both describe the lens differs from the other
+/// by its own noise, which its covariance states; of such models with good views, w_m is 0. A
+/// difference parallel to a larger one has the weight 0, one in another direction adds to the
+/// covariance.
+///
+/// All models that are not rejected count alike. Weights exp(elpd) would take millions of corners
+/// with common errors for independent and prefer one model for a hundredth of the residual.
+///
+/// @param others    list_fits_of_possible_models()
+/// @param region    CalibrationReport::region, where each of these lenses has rays
+/// @param noise_px  CalibrationReport::uncertainty_worst_px
 /// @return std::nullopt if noise explains all differences
-std::optional<ModelUncertainty> compute_model_uncertainty(const IntrinsicsSolution& solution,
-                                                          const LensChoice& comparison,
-                                                          const ImageRegion& region,
-                                                          double noise_px);
+std::optional<ModelUncertainty> compute_model_uncertainty(
+    const IntrinsicsSolution& solution, std::span<const IntrinsicsSolution> others,
+    const ImageRegion& region, double noise_px);
 
 }  // namespace vlp

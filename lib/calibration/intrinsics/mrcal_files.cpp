@@ -10,7 +10,6 @@
 
 #include "calibration/intrinsics/camera_exports.h"
 #include "calibration/intrinsics/numpy_archive.h"
-#include "calibration/intrinsics/valid_region.h"
 #include "captures/number_text.h"
 #include "rig/file.h"
 #include "rig/yaml_text.h"
@@ -68,11 +67,9 @@ std::string format_mrcal_optimization_inputs(const IntrinsicsSolution& solution)
 
 }  // namespace
 
-void write_mrcal_cameramodel(const std::filesystem::path& file,
-                             const IntrinsicsSolution& solution) {
+void write_mrcal_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution,
+                             const ImageRegion& region) {
   const BoardProblem& problem = solution.problem;
-  const ImageRegion region = compute_valid_lens_region(collect_inlier_corner_pixels(problem),
-                                                       problem.imager_px, solution.fitted_lens());
   std::string text = "{\n    'lensmodel':  '";
   text.append(lens_model_name(problem.lens_model)).append("',\n    'intrinsics': [");
   for (const double value : problem.intrinsics) {

@@ -9,13 +9,14 @@
 #include <vector>
 
 #include "calibration/intrinsics/intrinsics.h"
+#include "calibration/intrinsics/valid_region.h"
 #include "detection/boards/board_detector.h"
 #include "rig/board.h"
 
 namespace vlp {
 
 /// Writes mrcal's .cameramodel: the lens with 17 digits, its calibrated region
-/// (valid_intrinsics_region, compute_valid_lens_region()), and the solved problem
+/// (valid_intrinsics_region, CalibrationReport::region), and the solved problem
 /// (format_optimization_inputs).
 ///
 /// mrcal's tools use the problem, such as mrcal-show-projection-uncertainty and
@@ -24,7 +25,8 @@ namespace vlp {
 /// (ProjectionUncertainty).
 /// @throws InputError
 /// @pre is_lens_model_supported_by_mrcal() of the lens model, also for write_mrcal_corners()
-void write_mrcal_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution);
+void write_mrcal_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution,
+                             const ImageRegion& region);
 
 /// Writes the corners of a solution in the format of mrcal-calibrate-cameras (--corners-cache),
 /// image by image and row by row of the lattice. Pixels are in px.

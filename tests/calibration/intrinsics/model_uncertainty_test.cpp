@@ -4,10 +4,12 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,72 +24,111 @@ namespace {
 constexpr std::array kImager{800, 600};
 
 /// Returns a solution of nearly exact views through a lens without tangential distortion.
-IntrinsicsSolution solve_exact_views(LensModel model, double focal_px) {
+IntrinsicsSolution solve_exact_views(LensModel model, double focal_px, double k1 = -0.2) {
   const SyntheticViews views{
       synthetic_board(false),
-      Lens(LensModel::opencv4, std::array{focal_px, focal_px, 402., 297., -0.2, 0.05, 0., 0.})};
+      Lens(LensModel::opencv4, std::array{focal_px, focal_px, 402., 297., k1, 0.05, 0., 0.})};
   Random random(61);
   IntrinsicsInput input = make_views_without_edge_shifts(views, 10, random, 0.001);
   input.lens_model = model;
   return solve_intrinsics(input);
 }
 
-/// Returns a comparison in which OPENCV5 fits as well, with a focal length larger by 2 px.
-LensChoice make_comparison(const IntrinsicsSolution& solution) {
-  return {LensModel::opencv4,
-          {{LensModel::opencv4, 0.05, 0, 0.1, 0, solution},
-           {LensModel::opencv5, 0.052, 0.04, 0.1, 0, solve_exact_views(LensModel::opencv5, 522)}}};
-}
-
 const ImageRegion kRegion{{100, 100}, {700, 100}, {700, 500}, {100, 500}};
 
-TEST(ComputeModelUncertainty, ReturnsDifferenceToModelThatIsNotRejected) {
+/// Compares OPENCV4, 520 px, with fits of OPENCV5.
+class ComputeModelUncertainty : public testing::Test {
+ protected:
   const IntrinsicsSolution solution = solve_exact_views(LensModel::opencv4, 520);
-  ASSERT_TRUE(solution.has_succeeded());
-  const auto found = compute_model_uncertainty(solution, make_comparison(solution), kRegion, 0.001);
+  const IntrinsicsSolution longer = solve_exact_views(LensModel::opencv5, 522);
+
+  std::optional<ModelUncertainty> compute(const std::vector<IntrinsicsSolution>& others,
+                                          double noise_px = 0.001) const {
+    return compute_model_uncertainty(solution, others, kRegion, noise_px);
+  }
+};
+
+TEST_F(ComputeModelUncertainty, ReturnsDifferenceToOneModel) {
+  const auto found = compute({longer});
   ASSERT_TRUE(found);
   EXPECT_EQ(found->model, LensModel::opencv5);
-  ASSERT_EQ(found->intrinsics.size(), 8);
-  EXPECT_NEAR(found->intrinsics[0], 2, 0.05);
-  EXPECT_NEAR(found->intrinsics[1], 2, 0.05);
-  EXPECT_LT(found->intrinsics.segment(2, 2).norm(), 0.1);
-  EXPECT_LT(found->intrinsics.tail(4).norm(), 1e-3);
+  ASSERT_EQ(found->intrinsics_covariance.rows(), 8);
+  ASSERT_EQ(found->intrinsics_covariance.cols(), 8);
+  const Eigen::VectorXd sds = found->intrinsics_covariance.diagonal().cwiseSqrt();
+  EXPECT_NEAR(sds[0], 2, 0.05);
+  EXPECT_NEAR(sds[1], 2, 0.05);
+  EXPECT_NEAR(found->intrinsics_covariance(0, 1), sds[0] * sds[1], 1e-6);
+  EXPECT_LT(sds.segment(2, 2).norm(), 0.1);
+  EXPECT_LT(sds.tail(4).norm(), 1e-3);
   // The pixel (100, 100) moves by 2 / f of its distance from the center; there is no rotation.
-  const Lens lens = solution.fitted_lens();
   EXPECT_NEAR(found->worst_px,
               2. / 520 * (Eigen::Vector2d(100, 100) - Eigen::Vector2d(402, 297)).norm(), 0.1);
   EXPECT_GT(found->mean_px, 0.3 * found->worst_px);
   EXPECT_LT(found->mean_px, 0.7 * found->worst_px);
 }
 
-TEST(ComputeModelUncertainty, SubtractsSquareOfNoise) {
-  const IntrinsicsSolution solution = solve_exact_views(LensModel::opencv4, 520);
-  ASSERT_TRUE(solution.has_succeeded());
-  const LensChoice comparison = make_comparison(solution);
-  const auto all = compute_model_uncertainty(solution, comparison, kRegion, 1e-3);
+TEST_F(ComputeModelUncertainty, SubtractsSquareOfNoise) {
+  const auto all = compute({longer});
   ASSERT_TRUE(all);
-  const auto part = compute_model_uncertainty(solution, comparison, kRegion, 0.6 * all->worst_px);
+  const auto part = compute({longer}, 0.6 * all->worst_px);
   ASSERT_TRUE(part);
   EXPECT_NEAR(part->worst_px, 0.8 * all->worst_px, 1e-3);
   EXPECT_NEAR(part->mean_px, 0.8 * all->mean_px, 1e-3);
-  EXPECT_NEAR(part->intrinsics[0], 0.8 * all->intrinsics[0], 1e-2);
-  EXPECT_FALSE(compute_model_uncertainty(solution, comparison, kRegion, 1.01 * all->worst_px));
+  EXPECT_NEAR(part->intrinsics_covariance(0, 0), 0.64 * all->intrinsics_covariance(0, 0), 1e-2);
+  EXPECT_FALSE(compute({longer}, 1.01 * all->worst_px));
+  EXPECT_FALSE(compute({}));
 }
 
-TEST(ComputeModelUncertainty, IgnoresRejectedModelsUnlessTheyFitBetterThanRejectedLens) {
-  const IntrinsicsSolution solution = solve_exact_views(LensModel::opencv4, 520);
-  ASSERT_TRUE(solution.has_succeeded());
-  LensChoice comparison = make_comparison(solution);
+TEST_F(ComputeModelUncertainty, CountsEqualAndSmallerParallelDifferencesOnce) {
+  const auto one = compute({longer}, 0.1);
+  const auto three = compute({solve_exact_views(LensModel::opencv5, 521), longer, longer}, 0.1);
+  ASSERT_TRUE(one && three);
+  EXPECT_NEAR(three->worst_px, one->worst_px, 1e-3);
+  EXPECT_NEAR(three->mean_px, one->mean_px, 1e-3);
+  EXPECT_NEAR(three->intrinsics_covariance(0, 0), one->intrinsics_covariance(0, 0), 0.01);
+}
+
+/// Both differences together; the covariance covers each of them as one standard deviation.
+TEST_F(ComputeModelUncertainty, AddsDifferencesInOtherDirections) {
+  const IntrinsicsSolution bent = solve_exact_views(LensModel::opencv5, 520, -0.22);
+  const auto first = compute({longer}), second = compute({bent}), both = compute({bent, longer});
+  ASSERT_TRUE(first && second && both);
+  const auto largest_eigenvalues = [](const ModelUncertainty& model) {
+    const Eigen::VectorXd scale{{1, 1, 1, 1, 1e-2, 1e-2, 1e-2, 1e-2}};
+    const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * model.intrinsics_covariance *
+                                   scale.cwiseInverse().asDiagonal();
+    return Eigen::VectorXd(
+        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(scaled).eigenvalues().tail<2>());
+  };
+  EXPECT_LT(largest_eigenvalues(*first)[0], 1e-6);
+  EXPECT_GT(largest_eigenvalues(*both)[0], 0.1);
+  const Eigen::MatrixXd sum = first->intrinsics_covariance + second->intrinsics_covariance;
+  EXPECT_LT((both->intrinsics_covariance - sum).norm(), 0.01 * sum.norm());
+  EXPECT_GT(both->worst_px, std::max(first->worst_px, second->worst_px));
+  EXPECT_LE(both->worst_px, std::hypot(first->worst_px, second->worst_px) + 1e-9);
+}
+
+TEST(ListFitsOfPossibleModels, OmitsRejectedModelsUnlessTheyFitBetterThanRejectedLens) {
+  IntrinsicsSolution solution{}, other{};
+  solution.problem.lens_model = LensModel::opencv4;
+  other.problem.lens_model = LensModel::opencv5;
+  LensChoice comparison{LensModel::opencv4,
+                        {{LensModel::opencv4, 0.05, 0, 0.1, 0, solution},
+                         {LensModel::opencv5, 0.052, 0.04, 0.1, 0, other}}};
+  const auto count = [&] { return list_fits_of_possible_models(solution, comparison).size(); };
+  ASSERT_EQ(count(), 1U);
+  EXPECT_EQ(list_fits_of_possible_models(solution, comparison)[0].problem.lens_model,
+            LensModel::opencv5);
   comparison.candidates[1].excess = 0.2;
-  EXPECT_FALSE(compute_model_uncertainty(solution, comparison, kRegion, 0.001));
+  EXPECT_EQ(count(), 0U);
   comparison.candidates[1].max_excess_by_blocks = 0.21;
-  EXPECT_TRUE(compute_model_uncertainty(solution, comparison, kRegion, 0.001));
+  EXPECT_EQ(count(), 1U);
   comparison.candidates[1].max_excess_by_blocks = 0;
   comparison.candidates[0].excess = 0.3;
-  EXPECT_TRUE(compute_model_uncertainty(solution, comparison, kRegion, 0.001));
+  EXPECT_EQ(count(), 1U);
   comparison.candidates[0].excess = 0;
   comparison.candidates[1] = {LensModel::opencv5};
-  EXPECT_FALSE(compute_model_uncertainty(solution, comparison, kRegion, 0.001));
+  EXPECT_EQ(count(), 0U);
 }
 
 /// Returns views of nearly the same tilt around the middle of the image.

@@ -202,7 +202,7 @@ IntrinsicsSolution make_small_solution(LensModel model, std::vector<double> intr
 /// Writes a solution and returns the text of the file.
 std::string written_cameramodel(const IntrinsicsSolution& solution) {
   const TemporaryFolder folder;
-  write_mrcal_cameramodel(folder / "a.cameramodel", solution);
+  write_mrcal_cameramodel(folder / "a.cameramodel", solution, {});
   return TemporaryFolder::read_content(folder / "a.cameramodel");
 }
 

@@ -80,7 +80,7 @@ TEST(ProjectionUncertainty, MaxProjectionSdMatchesMrcalForIndependentCorners) {
     Random random(8);
     const auto solution = solve_intrinsics(views.input(20, random, 0.05));
     ASSERT_TRUE(solution.has_succeeded());
-    write_mrcal_cameramodel(folder / "camera.cameramodel", solution);
+    write_mrcal_cameramodel(folder / "camera.cameramodel", solution, {});
     const auto mrcals =
         run_program("/usr/bin/python3 -c \"import mrcal, numpy as np; m = mrcal.cameramodel('" +
                     (folder / "camera.cameramodel").string() +
