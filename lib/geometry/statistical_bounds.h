@@ -8,9 +8,9 @@
 ///
 /// A bound is given by `sigmas`. Chi-squared exceeds its bound, and t the root of its bound, as
 /// rarely as a normal variable of unit variance exceeds `sigmas` on one side. Tested for sigmas of
-/// 1.96 to 4.5 and at least two degrees of freedom: the bounds are exceeded as rarely as sigmas -
-/// 0.01 to sigmas + 0.3. Few degrees of freedom therefore reduce the power of a test but cause no
-/// false alarms.
+/// 1.96 (t: 1) to 4.5 and at least two degrees of freedom: the bounds are exceeded as rarely as
+/// sigmas - 0.01 to sigmas + 0.3. Few degrees of freedom therefore reduce the power of a test but
+/// cause no false alarms.
 namespace vlp {
 
 /// Number of standard deviations that a normal variable exceeds with probability 1e-4 on one side:

@@ -25,9 +25,10 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Candidates in the order of their number of parameters.
 constexpr std::array kModels{LensModel::opencv4, LensModel::fisheye, LensModel::opencv5,
                              LensModel::opencv8, LensModel::opencv12};
-/// Blocks of views of the cross-validation, and standard errors up to which models are equal.
+/// Blocks of views of the cross-validation.
 constexpr std::size_t kBlocks = kMinViewsToCompare;
-constexpr double kMaxErrors = 2;
+/// Standard errors within which a smaller model is selected, and may describe the lens.
+constexpr double kMaxErrors = 1, kMaxPlausibleErrors = 2;
 
 /// Fits a model to the corners of a solution, starting from its lens.
 std::optional<IntrinsicsSolution> fit_model_to_corners(const IntrinsicsSolution& start,
@@ -67,8 +68,8 @@ LogSquares compute_log_squares(const IntrinsicsSolution& fit) {
 }
 
 /// Returns the largest mean of one value per view that is not significant: the standard error, from
-/// the means of blocks of consecutive views, times the factor of kMaxErrors and of the few blocks.
-double compute_max_mean(const Eigen::VectorXd& values, Eigen::Index blocks) {
+/// the means of blocks of consecutive views, times the factor of `errors` and of the few blocks.
+double compute_max_mean(const Eigen::VectorXd& values, Eigen::Index blocks, double errors) {
   const Eigen::Index views = values.size();
   Eigen::VectorXd sums = Eigen::VectorXd::Zero(blocks);
   for (Eigen::Index view = 0; view < views; ++view)
@@ -76,7 +77,7 @@ double compute_max_mean(const Eigen::VectorXd& values, Eigen::Index blocks) {
   const double freedom = static_cast<double>(blocks - 1), count = static_cast<double>(views);
   const double variance =
       sums.squaredNorm() * static_cast<double>(blocks) / freedom / count / count;
-  return std::sqrt(compute_squared_student_t_bound(kMaxErrors, freedom) * variance);
+  return std::sqrt(compute_squared_student_t_bound(errors, freedom) * variance);
 }
 
 /// Compares the candidates with the best one: sets their excess and its limits.
@@ -90,8 +91,10 @@ void compare_with_best(const std::vector<LogSquares>& logs, LensChoice& choice) 
     const Eigen::VectorXd ratios = logs[i] - *best;
     candidate.rms_px = std::exp(mean / 2);
     candidate.excess = relative_rms(ratios.mean());
-    candidate.max_excess = relative_rms(compute_max_mean(ratios, ratios.size()));
-    candidate.max_excess_by_blocks = relative_rms(compute_max_mean(ratios, kBlocks));
+    candidate.max_excess = relative_rms(compute_max_mean(ratios, ratios.size(), kMaxErrors));
+    candidate.max_plausible_excess =
+        relative_rms(std::max(compute_max_mean(ratios, ratios.size(), kMaxPlausibleErrors),
+                              compute_max_mean(ratios, kBlocks, kMaxPlausibleErrors)));
   }
   const auto first = std::ranges::find(choice.candidates, false, &LensCandidate::is_rejected);
   if (first == choice.candidates.end()) return;

@@ -21,13 +21,13 @@ struct LensCandidate {
   /// (compute_left_out_mean_squares_px2()). Infinity if no lens of the model fits.
   double rms_px = std::numeric_limits<double>::infinity();
   /// `rms_px` relative to the smallest one of all candidates, minus 1. The model is rejected if
-  /// this exceeds `max_excess`. It may describe the lens up to `max_excess_by_blocks`.
-  double excess = std::numeric_limits<double>::infinity(), max_excess = 0, max_excess_by_blocks = 0;
+  /// this exceeds `max_excess`. It may describe the lens up to `max_plausible_excess`.
+  double excess = std::numeric_limits<double>::infinity(), max_excess = 0, max_plausible_excess = 0;
   /// Fit of the model; std::nullopt if there is none.
   std::optional<IntrinsicsSolution> fit = {};
 
   bool is_rejected() const { return !(excess <= max_excess); }
-  bool may_describe_lens() const { return excess <= std::max(max_excess, max_excess_by_blocks); }
+  bool may_describe_lens() const { return excess <= std::max(max_excess, max_plausible_excess); }
 };
 
 /// Minimum number of views for the selection of a lens model, and for the comparison of the models.
@@ -81,12 +81,15 @@ IntrinsicsSolution solve_opencv8_or_fisheye(const InitialSolutions& initial);
 ///
 /// Two models are compared by the mean, over the views, of the logarithm of the ratio of their
 /// squared residuals. The views of a few positions do not dominate this mean. A model is rejected
-/// if its mean exceeds that of the best by more than two standard errors over the views, widened
+/// if its mean exceeds that of the best by more than one standard error over the views, widened
 /// for few views (compute_squared_student_t_bound()). A model with a smaller mean than the selected
-/// one is never rejected. Standard errors over the blocks are used for
-/// LensCandidate::may_describe_lens(). The smallest
-/// model that is not rejected is selected: the one-standard-error rule of Breiman, Friedman, Olshen
-/// and Stone, Classification and Regression Trees, 1984, 3.4.3, with two standard errors.
+/// one is never rejected. The smallest model that is not rejected is selected: the
+/// one-standard-error rule of Breiman, Friedman, Olshen and Stone, Classification and Regression
+/// Trees, 1984, 3.4.3. With two standard errors, few views select wrong models with a bias that
+/// exceeds the scatter of larger ones.
+///
+/// Two standard errors, over the views or over the blocks, are used for
+/// LensCandidate::may_describe_lens().
 ///
 /// OPENCVn models are not compared if corners are at 90 degrees off the axis or more.
 /// @return std::nullopt if no model fits the views, or with fewer than kMinViewsToCompare views

@@ -121,9 +121,9 @@ TEST(ListFitsOfPossibleModels, OmitsRejectedModelsUnlessTheyFitBetterThanRejecte
             LensModel::opencv5);
   comparison.candidates[1].excess = 0.2;
   EXPECT_EQ(count(), 0U);
-  comparison.candidates[1].max_excess_by_blocks = 0.21;
+  comparison.candidates[1].max_plausible_excess = 0.21;
   EXPECT_EQ(count(), 1U);
-  comparison.candidates[1].max_excess_by_blocks = 0;
+  comparison.candidates[1].max_plausible_excess = 0;
   comparison.candidates[0].excess = 0.3;
   EXPECT_EQ(count(), 1U);
   comparison.candidates[0].excess = 0;
