@@ -17,6 +17,7 @@
 #include "lamps/image/pixel_runs.h"
 #include "lamps/image/scanlines.h"
 #include "lamps/shape/light_center_noise.h"
+#include "lamps/shape/plane_ratio.h"
 #include "lamps/shape/rectangle.h"
 #include "lamps/shape/rim.h"
 #include "lamps/signal/frequency_identification.h"
@@ -177,13 +178,19 @@ Light make_light_without_outline(const ImageView& lines, const ModulatedLight& f
 /// the centroid of the lit area. Kind, reason and lamp are not set.
 ///
 /// @param lines  image whose rows are the scanlines
-/// @param blobs  lit pixels of the image, in which the rim is searched
+/// @param blobs   lit pixels of the image, in which the rim is searched
+/// @param radius  range of the radius of the rim if it is known
 Light make_light_from_modulation(const ImageView& lines, const ModulatedLight& found,
                                  std::span<const Blob> blobs, const Background& background,
-                                 const LightShape& shape) {
+                                 const LightShape& shape,
+                                 const std::optional<RadiusRange>& radius) {
   const Blob blob = find_lit_pixels_of_light(found.box, blobs, lines.size());
   std::optional<Rim> rim;
-  if (!blob.runs.empty()) rim = fit_rim_of_light(lines, blob, background, shape);
+  if (!blob.runs.empty()) rim = fit_rim_of_light(lines, blob, background, shape, radius);
+  if (!blob.runs.empty() && !rim && radius) {
+    rim = fit_rim_of_light(lines, blob, background, shape);
+    if (rim) rim->is_clear = false;
+  }
   Light light = make_light_without_outline(lines, found, shape);
   if (rim && rim->light.inlier_fraction >= kMinInlierFraction) {
     // Without a clear rim either center may be correct.
@@ -338,15 +345,33 @@ void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
     if (!is_known)
       boxes.push_back(expand_and_clip_box(box, std::max(box.width, box.height) / 2, lines.size()));
   }
-  for (const ModulatedLight& found : find_modulated_lights(
-           lines, merge_overlapping_boxes(std::move(boxes)), background, lamp_periods_)) {
+  const auto modulated_lights = find_modulated_lights(
+      lines, merge_overlapping_boxes(std::move(boxes)), background, lamp_periods_);
+  const auto find_lamp_of_period = [&](const ModulatedLight& found) -> const Lamp* {
+    const auto id = found.lamp ? lamps_by_period_[*found.lamp] : std::nullopt;
+    return id ? find_lamp_by_id(lamps_.lamps, *id) : nullptr;
+  };
+  std::vector<LampInPlane> in_plane;
+  for (const Light& light : lights) {
+    const auto id = is_conclusive(light) ? identify_lamp_by_stripes(light.stripes) : std::nullopt;
+    if (id) add_lamp_in_plane(find_lamp_by_id(lamps_.lamps, *id), light.pixel, in_plane);
+  }
+  for (const ModulatedLight& found : modulated_lights) {
+    add_lamp_in_plane(find_lamp_of_period(found), shape_.swap_image_and_scanline_axes(found.center),
+                      in_plane);
+  }
+  const auto ratio = estimate_plane_ratio(in_plane);
+  for (const ModulatedLight& found : modulated_lights) {
     const auto is_at_found = [&](const Light& other) {
       return (other.pixel - shape_.swap_image_and_scanline_axes(found.center)).norm() <
              std::max(other.radius_px, found.radius_px);
     };
     // Without a lamp the light would be dropped below; this avoids the fit of its rim.
     if (!found.lamp && std::any_of(lights.begin(), lights.end(), is_at_found)) continue;
-    Light light = make_light_from_modulation(lines, found, blobs, background, shape_);
+    const Lamp* lamp = find_lamp_of_period(found);
+    Light light = make_light_from_modulation(
+        lines, found, blobs, background, shape_,
+        ratio && lamp ? predict_radius(*lamp, found, *ratio) : std::nullopt);
     if (found.lamp) light.lamp = lamps_by_period_[*found.lamp];
     // Lamps with the same period differ in duty; without known periods a classifier decides.
     const bool has_choice = found.lamp ? !light.lamp : lamp_periods_.empty();
@@ -360,6 +385,39 @@ void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
     std::erase_if(lights, is_at_it);
     lights.push_back(std::move(light));
   }
+}
+
+void LightDetector::add_lamp_in_plane(const Lamp* lamp, const Eigen::Vector2d& pixel,
+                                      std::vector<LampInPlane>& lamps) const {
+  const auto position = shape_.level_plane_point_from_pixel(pixel);
+  if (lamp == nullptr || !lamp->shape.size_m || !position || !shape_.has_known_lens()) return;
+  lamps.push_back({*position, lamp->position_m.head<2>(), height_above_first_lamp_m(*lamp),
+                   lamp->shape.size_m->maxCoeff() / 2});
+}
+
+std::optional<RadiusRange> LightDetector::predict_radius(const Lamp& lamp,
+                                                         const ModulatedLight& found,
+                                                         const LogPlaneRatio& ratio) const {
+  constexpr double max_sds = 2, step_px = 1;
+  if (lamp.shape.kind != ShapeKind::disc || !lamp.shape.size_m) return std::nullopt;
+  const Eigen::Vector2d pixel = shape_.swap_image_and_scanline_axes(found.center);
+  Matrix2 d_plane_d_pixel;
+  const auto at = shape_.level_plane_point_from_pixel(pixel);
+  for (int i = 0; i < 2; ++i) {
+    const auto beside =
+        shape_.level_plane_point_from_pixel(pixel + step_px * Eigen::Vector2d::Unit(i));
+    if (!at || !beside) return std::nullopt;
+    d_plane_d_pixel.col(i) = (*beside - *at) / step_px;
+  }
+  const double radius_px =
+      ratio.compute_radius_in_plane(lamp.shape.size_m->x() / 2, height_above_first_lamp_m(lamp)) /
+      std::sqrt(std::abs(d_plane_d_pixel.determinant()));
+  const double factor = std::exp(max_sds * ratio.sd);
+  return RadiusRange{radius_px / factor, radius_px * factor};
+}
+
+double LightDetector::height_above_first_lamp_m(const Lamp& lamp) const {
+  return lamp.position_m.z() - lamps_.lamps.front().position_m.z();
 }
 
 void LightDetector::refine_and_measure_light(const ImageView& lines, const Background& background,

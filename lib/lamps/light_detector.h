@@ -12,7 +12,10 @@
 #include "lamps/shape/light.h"
 #include "lamps/shape/light_center.h"
 #include "lamps/shape/light_parts.h"
+#include "lamps/shape/plane_ratio.h"
+#include "lamps/shape/rim.h"
 #include "lamps/signal/lamp_classifier.h"
+#include "lamps/signal/modulated_lights.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
 
@@ -64,6 +67,13 @@ class LightDetector {
   void add_lights_found_by_modulation(const ImageView& lines, const std::vector<Blob>& blobs,
                                       const Background& background,
                                       std::vector<Light>& lights) const;
+  /// Adds a lamp whose light is at `pixel` to `lamps` if its size and the lens are known.
+  void add_lamp_in_plane(const Lamp* lamp, const Eigen::Vector2d& pixel,
+                         std::vector<LampInPlane>& lamps) const;
+  /// Predicts the radius of a lamp in the image; std::nullopt if it is no disc of known size.
+  std::optional<RadiusRange> predict_radius(const Lamp& lamp, const ModulatedLight& found,
+                                            const LogPlaneRatio& ratio) const;
+  double height_above_first_lamp_m(const Lamp& lamp) const;
   /// Refines the outline of a light and measures its stripes.
   void refine_and_measure_light(const ImageView& lines, const Background& background,
                                 Light& light) const;

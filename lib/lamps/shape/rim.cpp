@@ -248,13 +248,14 @@ class Steps {
 
 /// Returns the ring with the largest sum. Rings are circles in the level plane, whose derivative is
 /// `unit_plane_from_pixel`.
-Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_plane_from_pixel) {
-  constexpr double fine = 20, max_radius = 0.75, max_shift = 0.35;
+Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_plane_from_pixel,
+                    const RadiusRange& range) {
+  constexpr double fine = 20, max_shift = 0.35;
   const Steps steps(face);
   const double size = std::max(blob.width, blob.height), step = std::max(1.0, size / 2 / fine);
   const Eigen::Vector2d middle(blob.x + blob.width / 2.0, blob.y + blob.height / 2.0);
   Ring best{{middle, unit_plane_from_pixel}, -std::numeric_limits<double>::infinity()};
-  for (double radius = size / 6; radius <= max_radius * size; radius += step) {
+  for (double radius = range.min_px; radius <= range.max_px; radius += step) {
     const Matrix2 unit_from_pixel = unit_plane_from_pixel / radius;
     for (double dv = -max_shift * size; dv <= max_shift * size; dv += step) {
       for (double du = -max_shift * size; du <= max_shift * size; du += step) {
@@ -416,12 +417,18 @@ bool is_blob_unevenly_lit(const ImageView& image, const Blob& blob,
 }
 
 std::optional<Rim> fit_rim_of_light(const ImageView& image, const Blob& blob,
-                                    const Background& background, const LightShape& shape) {
+                                    const Background& background, const LightShape& shape,
+                                    const std::optional<RadiusRange>& radius) {
   constexpr int min_size = 20, min_lines = 10;
-  constexpr double margin = 0.2, min_step = 0.28;
+  constexpr double margin = 0.2, min_step = 0.28, max_radius = 0.75;
   const PixelBox box = blob.blob_bounding_box();
   if (std::min(box.width, box.height) < min_size) return std::nullopt;
-  const int margin_px = static_cast<int>(margin * std::max(box.width, box.height));
+  const double blob_size = std::max(box.width, box.height);
+  RadiusRange range{blob_size / 6, max_radius * blob_size};
+  if (radius) {
+    range = {std::max(range.min_px, radius->min_px), std::min(range.max_px, radius->max_px)};
+  }
+  const int margin_px = static_cast<int>(margin * blob_size);
   const PixelBox wide = expand_and_clip_box(box, margin_px, image.size());
   // Window sizes for the search of the ring and for the rim.
   const int size = std::max(wide.width, wide.height);
@@ -430,7 +437,8 @@ std::optional<Rim> fit_rim_of_light(const ImageView& image, const Blob& blob,
   const Face face = fine == coarse ? blurred : Face(image, wide, background, fine);
   if (face.bright_stripe_scanlines().size() < min_lines) return std::nullopt;
   const Eigen::Vector2d middle(box.x + box.width / 2.0, box.y + box.height / 2.0);
-  const Ring best = find_best_ring(blurred, box, compute_unit_plane_from_pixel(shape, middle));
+  const Ring best =
+      find_best_ring(blurred, box, compute_unit_plane_from_pixel(shape, middle), range);
   const auto crossings = 2 * std::count_if(face.bright_stripe_scanlines().begin(),
                                            face.bright_stripe_scanlines().end(), [&](int line) {
                                              return best.ellipse.intersect(line).has_value();
@@ -453,6 +461,8 @@ std::optional<Rim> fit_rim_of_light(const ImageView& image, const Blob& blob,
     light->sigma_px = std::max(scatter_px, jackknife_px.value_or(0));
     is_clear = jackknife_px.has_value();
   }
+  if (radius && (light->radius_px < radius->min_px || light->radius_px > radius->max_px))
+    is_clear = false;
   light->is_uneven = true;
   light->inlier_fraction = rim_fraction;
   return Rim{std::move(*light), is_clear};

@@ -27,6 +27,11 @@ struct Rim {
   bool is_clear;
 };
 
+/// Smallest and largest radius of a rim in the image, px.
+struct RadiusRange {
+  double min_px, max_px;
+};
+
 /// Fits the rim of an unevenly lit light, such as a source deep in a reflector. Its core is at
 /// least ten times as bright as its rim and moves with the point of view. A part of the rim is
 /// dark, and the ceiling around it is lit. A rim appears as a step, not as a level. The step at a
@@ -49,9 +54,13 @@ struct Rim {
 ///   tone curve causes. Otherwise sigma is the larger one of the scatter of the points and the
 ///   jackknife over eight pieces of the outline.
 ///
-/// Returns std::nullopt if the blob is smaller than 20 px or has less than 10 lit scanlines. Also
-/// returns std::nullopt if no circle has such steps, or if the steps determine no circle.
+/// @param radius  range of the radius if it is known; a rim out of range is not clear. The edge of
+/// a
+///        source in a reflector is clearer than the rim, and is a circle, too.
+/// @return std::nullopt if the blob is smaller than 20 px or has less than 10 lit scanlines; if no
+///     circle has such steps; or if the steps determine no circle
 std::optional<Rim> fit_rim_of_light(const ImageView& image, const Blob& blob,
-                                    const Background& background, const LightShape& shape);
+                                    const Background& background, const LightShape& shape,
+                                    const std::optional<RadiusRange>& radius = {});
 
 }  // namespace vlp

@@ -29,11 +29,11 @@ Blob largest_blob(const ImageView& image, const Background& background) {
   });
 }
 
-std::optional<Rim> rim_in(const cv::Mat& pixels) {
+std::optional<Rim> rim_in(const cv::Mat& pixels, const std::optional<RadiusRange>& radius = {}) {
   const ImageView image = to_image_view(pixels);
   const Background background = estimate_image_background(image);
   return fit_rim_of_light(image, largest_blob(image, background), background,
-                          LightShape(drawn_camera(kSize)));
+                          LightShape(drawn_camera(kSize)), radius);
 }
 
 /// Returns a downlight with a core off the middle in this direction.
@@ -191,6 +191,32 @@ TEST(LightDetector, IdentifiesDownlightsOnlyWithReliableNumberOfPeriods) {
     EXPECT_LT((lights[0].pixel - lamp.center).norm(), 1);
   });
   EXPECT_GT(identified, 0);
+}
+
+/// The edge of a source and the rim around it are two circles.
+TEST(FitRimOfLight, RadiusIsInKnownRange) {
+  const Vector2d center(151.3, 139.6), source(146.2, 142.9);
+  cv::Mat1b image(kSize);
+  for (int row = 0; row < image.rows; ++row) {
+    for (int column = 0; column < image.cols; ++column) {
+      const Vector2d pixel(column, row);
+      const auto cover = [&](const Vector2d& middle, double radius_px) {
+        return std::clamp(0.5 + radius_px - (pixel - middle).norm(), 0.0, 1.0);
+      };
+      const double lit = (row / 9) % 2 == 0 ? 1 : 0;
+      image(row, column) = cv::saturate_cast<std::uint8_t>(
+          8 + lit * (24 * cover(center, 50.7) + 190 * cover(source, 27)));
+    }
+  }
+  const auto rim = rim_in(image, RadiusRange{44, 58});
+  ASSERT_TRUE(rim);
+  EXPECT_NEAR(rim->light.radius_px, 50.7, 1);
+  EXPECT_LT((rim->light.pixel - center).norm(), 0.5);
+  const auto edge_of_source = rim_in(image, RadiusRange{23, 32});
+  ASSERT_TRUE(edge_of_source);
+  EXPECT_NEAR(edge_of_source->light.radius_px, 27, 1);
+  const auto other = rim_in(image, RadiusRange{34, 40});
+  EXPECT_FALSE(other && other->is_clear);
 }
 
 TEST(FitRimOfLight, ReportsNoClearRimForGlows) {
