@@ -16,8 +16,8 @@
 #include "lamps/image/background.h"
 #include "lamps/image/pixel_runs.h"
 #include "lamps/image/scanlines.h"
+#include "lamps/shape/inverse_height.h"
 #include "lamps/shape/light_center_noise.h"
-#include "lamps/shape/plane_ratio.h"
 #include "lamps/shape/rectangle.h"
 #include "lamps/shape/rim.h"
 #include "lamps/signal/frequency_identification.h"
@@ -360,7 +360,7 @@ void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
     add_lamp_in_plane(find_lamp_of_period(found), shape_.swap_image_and_scanline_axes(found.center),
                       in_plane);
   }
-  const auto ratio = estimate_plane_ratio(in_plane);
+  const auto inverse_height = estimate_inverse_height(in_plane);
   for (const ModulatedLight& found : modulated_lights) {
     const auto is_at_found = [&](const Light& other) {
       return (other.pixel - shape_.swap_image_and_scanline_axes(found.center)).norm() <
@@ -371,7 +371,7 @@ void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
     const Lamp* lamp = find_lamp_of_period(found);
     Light light = make_light_from_modulation(
         lines, found, blobs, background, shape_,
-        ratio && lamp ? predict_radius(*lamp, found, *ratio) : std::nullopt);
+        inverse_height && lamp ? predict_radius(*lamp, found, *inverse_height) : std::nullopt);
     if (found.lamp) light.lamp = lamps_by_period_[*found.lamp];
     // Lamps with the same period differ in duty; without known periods a classifier decides.
     const bool has_choice = found.lamp ? !light.lamp : lamp_periods_.empty();
@@ -391,13 +391,12 @@ void LightDetector::add_lamp_in_plane(const Lamp* lamp, const Eigen::Vector2d& p
                                       std::vector<LampInPlane>& lamps) const {
   const auto position = shape_.level_plane_point_from_pixel(pixel);
   if (lamp == nullptr || !lamp->shape.size_m || !position || !shape_.has_known_lens()) return;
-  lamps.push_back({*position, lamp->position_m.head<2>(), height_above_first_lamp_m(*lamp),
+  lamps.push_back({*position, lamp->position_m.head<2>(), compute_height_beyond_first_lamp_m(*lamp),
                    lamp->shape.size_m->maxCoeff() / 2});
 }
 
-std::optional<RadiusRange> LightDetector::predict_radius(const Lamp& lamp,
-                                                         const ModulatedLight& found,
-                                                         const LogPlaneRatio& ratio) const {
+std::optional<RadiusRange> LightDetector::predict_radius(
+    const Lamp& lamp, const ModulatedLight& found, const InverseHeight& inverse_height) const {
   constexpr double max_sds = 2, step_px = 1;
   if (lamp.shape.kind != ShapeKind::disc || !lamp.shape.size_m) return std::nullopt;
   const Eigen::Vector2d pixel = shape_.swap_image_and_scanline_axes(found.center);
@@ -410,14 +409,16 @@ std::optional<RadiusRange> LightDetector::predict_radius(const Lamp& lamp,
     d_plane_d_pixel.col(i) = (*beside - *at) / step_px;
   }
   const double radius_px =
-      ratio.compute_radius_in_plane(lamp.shape.size_m->x() / 2, height_above_first_lamp_m(lamp)) /
+      inverse_height.compute_radius_in_plane(lamp.shape.size_m->x() / 2,
+                                             compute_height_beyond_first_lamp_m(lamp)) /
       std::sqrt(std::abs(d_plane_d_pixel.determinant()));
-  const double factor = std::exp(max_sds * ratio.sd);
+  const double factor = std::exp(max_sds * inverse_height.log_sd);
   return RadiusRange{radius_px / factor, radius_px * factor};
 }
 
-double LightDetector::height_above_first_lamp_m(const Lamp& lamp) const {
-  return lamp.position_m.z() - lamps_.lamps.front().position_m.z();
+double LightDetector::compute_height_beyond_first_lamp_m(const Lamp& lamp) const {
+  const double rise_m = lamp.position_m.z() - lamps_.lamps.front().position_m.z();
+  return lamps_.lamps_below_camera ? -rise_m : rise_m;
 }
 
 void LightDetector::refine_and_measure_light(const ImageView& lines, const Background& background,
@@ -515,21 +516,21 @@ void reject_contradicting_periods(const LampMap& lamps, double row_time_s,
   const auto has_clear_period = [](const Light& light) {
     return !light.is_found_by_modulation && are_stripes_reliable(light.stripes);
   };
-  std::vector<std::pair<Light*, double>> log_ratios;
+  std::vector<std::pair<Light*, double>> log_values;
   std::vector<double> clear_ones;
   for (Light& light : lights) {
     const Lamp* lamp = light.lamp ? find_lamp_by_id(lamps.lamps, *light.lamp) : nullptr;
     if (lamp == nullptr || !lamp->frequency_hz) continue;
-    const double log_ratio =
+    const double log_value =
         std::log(light.stripes.period_lines * row_time_s * *lamp->frequency_hz);
-    log_ratios.emplace_back(&light, log_ratio);
-    if (has_clear_period(light)) clear_ones.push_back(log_ratio);
+    log_values.emplace_back(&light, log_value);
+    if (has_clear_period(light)) clear_ones.push_back(log_value);
   }
   if (clear_ones.size() < min_lights) return;
   const double estimate = (lower_median(clear_ones) + upper_median(clear_ones)) / 2;
-  for (const auto& [light, log_ratio] : log_ratios) {
+  for (const auto& [light, log_value] : log_values) {
     const double max_off = kLampDrift + (has_clear_period(*light) ? kLampDrift : kMaxUnclearDrift);
-    if (std::abs(log_ratio - estimate) > max_off) reject(*light, LightReason::unknown_period);
+    if (std::abs(log_value - estimate) > max_off) reject(*light, LightReason::unknown_period);
   }
 }
 

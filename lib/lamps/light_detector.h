@@ -9,10 +9,10 @@
 
 #include "lamps/image/image_view.h"
 #include "lamps/image/pixel_box.h"
+#include "lamps/shape/inverse_height.h"
 #include "lamps/shape/light.h"
 #include "lamps/shape/light_center.h"
 #include "lamps/shape/light_parts.h"
-#include "lamps/shape/plane_ratio.h"
 #include "lamps/shape/rim.h"
 #include "lamps/signal/lamp_classifier.h"
 #include "lamps/signal/modulated_lights.h"
@@ -72,8 +72,8 @@ class LightDetector {
                          std::vector<LampInPlane>& lamps) const;
   /// Predicts the radius of a lamp in the image; std::nullopt if it is no disc of known size.
   std::optional<RadiusRange> predict_radius(const Lamp& lamp, const ModulatedLight& found,
-                                            const LogPlaneRatio& ratio) const;
-  double height_above_first_lamp_m(const Lamp& lamp) const;
+                                            const InverseHeight& inverse_height) const;
+  double compute_height_beyond_first_lamp_m(const Lamp& lamp) const;
   /// Refines the outline of a light and measures its stripes.
   void refine_and_measure_light(const ImageView& lines, const Background& background,
                                 Light& light) const;

@@ -54,9 +54,8 @@ struct RadiusRange {
 ///   tone curve causes. Otherwise sigma is the larger one of the scatter of the points and the
 ///   jackknife over eight pieces of the outline.
 ///
-/// @param radius  range of the radius if it is known; a rim out of range is not clear. The edge of
-/// a
-///        source in a reflector is clearer than the rim, and is a circle, too.
+/// @param radius  range of the radius if it is known: excludes the edge of a source in a reflector,
+///        which is a clearer circle than the rim. A rim out of range is not clear.
 /// @return std::nullopt if the blob is smaller than 20 px or has less than 10 lit scanlines; if no
 ///     circle has such steps; or if the steps determine no circle
 std::optional<Rim> fit_rim_of_light(const ImageView& image, const Blob& blob,

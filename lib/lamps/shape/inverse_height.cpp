@@ -1,34 +1,34 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "lamps/shape/plane_ratio.h"
+#include "lamps/shape/inverse_height.h"
 
 #include <algorithm>
 #include <cmath>
 
 namespace vlp {
 
-double LogPlaneRatio::compute_radius_in_plane(double radius_m, double above_m) const {
-  return radius_m / (std::exp(-log_ratio) + above_m);
+double InverseHeight::compute_radius_in_plane(double radius_m, double height_beyond_first_m) const {
+  return radius_m / (std::exp(-log_value) + height_beyond_first_m);
 }
 
-std::optional<LogPlaneRatio> estimate_plane_ratio(const std::vector<LampInPlane>& lamps) {
+std::optional<InverseHeight> estimate_inverse_height(const std::vector<LampInPlane>& lamps) {
   constexpr double center_sd_radii = 0.5, min_sd = 0.06, max_sd = 0.2;
   struct Pair {
-    double log_ratio, weight;
+    double log_value, weight;
   };
   std::vector<Pair> pairs;
   double total = 0, largest = 0;
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
       const LampInPlane &a = lamps[i], &b = lamps[j];
-      const Eigen::Vector2d apart = a.position - b.position;
-      const Eigen::Vector2d rise_m = a.above_m * a.position - b.above_m * b.position;
+      const Eigen::Vector2d apart = a.position_in_plane - b.position_in_plane;
+      const Eigen::Vector2d rise_m = a.height_beyond_first_m * a.position_in_plane -
+                                     b.height_beyond_first_m * b.position_in_plane;
       // |apart h + rise_m| is the distance in the map: a quadratic equation of h.
       const double half = apart.dot(rise_m), square = apart.squaredNorm();
       const double distance_m = (a.position_m - b.position_m).norm();
       const double excess = rise_m.squaredNorm() - distance_m * distance_m;
-      const double height_m =
-          (std::sqrt(std::max(0.0, half * half - square * excess)) - half) / square;
+      const double height_m = (std::sqrt(half * half - square * excess) - half) / square;
       const double weight = distance_m / (a.radius_m + b.radius_m);
       if (!(height_m > 0) || !std::isfinite(height_m)) continue;
       pairs.push_back({-std::log(height_m), weight});
@@ -37,11 +37,11 @@ std::optional<LogPlaneRatio> estimate_plane_ratio(const std::vector<LampInPlane>
     }
   }
   if (pairs.empty() || center_sd_radii / largest > max_sd) return std::nullopt;
-  std::ranges::sort(pairs, {}, &Pair::log_ratio);
+  std::ranges::sort(pairs, {}, &Pair::log_value);
   double sum = 0;
   const auto middle = std::ranges::find_if(
       pairs, [&](const Pair& pair) { return (sum += pair.weight) >= total / 2; });
-  return LogPlaneRatio{middle->log_ratio, std::max(min_sd, center_sd_radii / largest)};
+  return InverseHeight{middle->log_value, std::max(min_sd, center_sd_radii / largest)};
 }
 
 }  // namespace vlp

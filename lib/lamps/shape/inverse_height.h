@@ -1,0 +1,37 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+namespace vlp {
+
+/// Lamp in an image: its approximate position in the level plane at height 1, its position in the
+/// map, its height beyond the first lamp of the map, seen from the camera, and its radius.
+struct LampInPlane {
+  Eigen::Vector2d position_in_plane, position_m;
+  double height_beyond_first_m, radius_m;
+};
+
+/// Ratio of the level plane and the room: 1 / height of the first lamp of the map above the camera,
+/// or below it, as logarithm of 1/m, and the standard deviation of the logarithm.
+struct InverseHeight {
+  double log_value, log_sd;
+
+  /// Returns the radius in the plane of a lamp of `radius_m`.
+  double compute_radius_in_plane(double radius_m, double height_beyond_first_m) const;
+};
+
+/// Estimates the inverse height from the distances between lamps. With the height h of the first
+/// lamp and the heights z of two lamps beyond it,
+///
+///     |p_i (h + z_i) - p_j (h + z_j)| = |x_i - x_j|,
+///
+/// with the positions p in the plane and x in the map. The result is the median over all pairs,
+/// weighted by the distance in radii, because the center of a light may be anywhere in
+/// its lamp. Returns std::nullopt without lamps that are far enough apart.
+std::optional<InverseHeight> estimate_inverse_height(const std::vector<LampInPlane>& lamps);
+
+}  // namespace vlp

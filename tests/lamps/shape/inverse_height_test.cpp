@@ -1,0 +1,58 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/shape/inverse_height.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace vlp {
+namespace {
+
+using Eigen::Vector2d;
+
+/// Returns lamps seen by a camera at `camera_m`, `height_m` below the first one.
+std::vector<LampInPlane> project_lamps(double height_m, const Vector2d& camera_m) {
+  std::vector<LampInPlane> lamps{{{}, {0, 0}, 0, 0.1},
+                                 {{}, {1.2, 0.1}, 0.3, 0.1},
+                                 {{}, {-0.4, 0.9}, -0.2, 0.15},
+                                 {{}, {0.8, -1.1}, 0, 0.1}};
+  for (LampInPlane& lamp : lamps)
+    lamp.position_in_plane = (lamp.position_m - camera_m) / (height_m + lamp.height_beyond_first_m);
+  return lamps;
+}
+
+TEST(EstimateInverseHeight, IsExactForLampsAtSeveralHeights) {
+  for (const double height_m : {0.8, 2.0, 5.0}) {
+    const auto inverse_height = estimate_inverse_height(project_lamps(height_m, {0.3, -0.2}));
+    ASSERT_TRUE(inverse_height);
+    EXPECT_NEAR(inverse_height->log_value, -std::log(height_m), 1e-12);
+    EXPECT_NEAR(inverse_height->compute_radius_in_plane(0.1, 0.3), 0.1 / (height_m + 0.3), 1e-12);
+  }
+}
+
+TEST(EstimateInverseHeight, IgnoresOneWrongLamp) {
+  auto lamps = project_lamps(2, {0.3, -0.2});
+  lamps.push_back({{0.9, 0.9}, {-1.5, -1.5}, 0, 0.1});
+  const auto inverse_height = estimate_inverse_height(lamps);
+  ASSERT_TRUE(inverse_height);
+  EXPECT_NEAR(inverse_height->log_value, -std::log(2), 0.05);
+}
+
+TEST(EstimateInverseHeight, StandardDeviationIsThatOfCentersAnywhereInTheLamps) {
+  const auto inverse_height =
+      estimate_inverse_height({{{0, 0}, {0, 0}, 0, 0.1}, {{0.5, 0}, {1, 0}, 0, 0.1}});
+  ASSERT_TRUE(inverse_height);
+  EXPECT_NEAR(inverse_height->log_value, -std::log(2), 1e-12);
+  EXPECT_NEAR(inverse_height->log_sd, 0.5 * 0.2 / 1, 1e-12);
+}
+
+TEST(EstimateInverseHeight, ReturnsNulloptForFewOrCloseLamps) {
+  EXPECT_FALSE(estimate_inverse_height({}));
+  EXPECT_FALSE(estimate_inverse_height({{{0, 0}, {0, 0}, 0, 0.1}}));
+  EXPECT_FALSE(estimate_inverse_height({{{0, 0}, {0, 0}, 0, 0.1}, {{0.1, 0}, {0.2, 0}, 0, 0.1}}));
+  EXPECT_FALSE(estimate_inverse_height({{{0.1, 0}, {0, 0}, 0, 0.1}, {{0.1, 0}, {2, 0}, 0, 0.1}}));
+}
+
+}  // namespace
+}  // namespace vlp
