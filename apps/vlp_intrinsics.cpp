@@ -188,7 +188,7 @@ void print_uncertainty_components(const LensEstimate& lens) {
   if (const auto& model = lens.model_uncertainty) {
     fmt::print(
         "model choice  {:.3f} px mean, {:.3f} px worst: differences to models that the views do "
-        "not exclude, the largest to {}; focal length {:.2f} px; in the uncertainty above and in "
+        "not exclude, mainly to {}; focal length sd {:.2f} px; in the uncertainty above and in "
         "the covariance\n",
         model->mean_px, model->worst_px, lens_model_name(model->model),
         std::sqrt(model->intrinsics_covariance(0, 0)));

@@ -245,9 +245,13 @@ ImageRegion compute_region(const IntrinsicsSolution& solution,
   std::vector<Lens> other_lenses;
   other_lenses.reserve(others.size());
   for (const IntrinsicsSolution& other : others) other_lenses.push_back(other.fitted_lens());
-  return compute_valid_lens_region(collect_inlier_corner_pixels(solution.problem),
-                                   solution.problem.imager_px, solution.fitted_lens(),
-                                   other_lenses);
+  const auto compute = [&](const std::vector<Lens>& lenses) {
+    return compute_valid_lens_region(collect_inlier_corner_pixels(solution.problem),
+                                     solution.problem.imager_px, solution.fitted_lens(), lenses);
+  };
+  // Without a region no fix would be checked.
+  const ImageRegion region = compute(other_lenses);
+  return region.empty() ? compute({}) : region;
 }
 
 /// Adds the uncertainty from the choice of the lens model to the report.

@@ -15,7 +15,7 @@ namespace vlp {
 /// Part of the uncertainty of a lens that comes from the choice of its model
 /// (compute_model_uncertainty()).
 struct ModelUncertainty {
-  /// Model whose fit differs most.
+  /// Model with the largest D_m^2 - s_m^2.
   LensModel model;
   /// Covariance of the intrinsics, in the order of the lens model. Its rank is at most the number
   /// of the other models.
@@ -36,12 +36,13 @@ std::vector<IntrinsicsSolution> list_fits_of_possible_models(const IntrinsicsSol
 /// the other models. With the solution c, another model m, and pixels v of the region,
 ///   r_c(v), r_m(v)  unit rays of v through both lenses, rotated so that they agree best
 ///   d_m(v)   displacement from c to m, to first order: (d pixel / d ray of m) (r_c - r_m)
-///   D_m      maximum of |d_m| and of the same from m to c, different for a compressed rim
+///   D_m      maximum of l_m(v); the directions differ where one lens compresses the rim
 ///   s_m      larger one of the expected largest errors of c and of m from noise, px
 ///   b_m      d_m of all pixels in one vector, scaled to the length D_m
 ///   w_m      max(0, 1 - 1 / (b_m' (s_m^2 1 + sum of w_k b_k b_k')^-1 b_m)), with the sum over the
 ///            models k with larger D_k^2 - s_k^2
-/// the variance at v is the sum of w_m |d_m(v)|^2. The covariance of the intrinsics is the sum of
+/// the variance at v is the sum of w_m l_m(v)^2, where l_m(v) is the larger length of the
+/// displacements from c to m and from m to c. The covariance of the intrinsics is the sum of
 /// w_m i_m i_m', where the change i_m causes d_m by least squares over v, with a rotation free.
 ///
 /// The weight w_m is the smallest one with which noise and models together cover the difference to

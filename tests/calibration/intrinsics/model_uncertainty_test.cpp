@@ -39,6 +39,11 @@ const ImageRegion kRegion{{100, 100}, {700, 100}, {700, 500}, {100, 500}};
 /// Compares OPENCV4, 520 px, with fits of OPENCV5.
 class ComputeModelUncertainty : public testing::Test {
  protected:
+  void SetUp() override {
+    ASSERT_TRUE(solution.has_succeeded());
+    ASSERT_TRUE(longer.has_succeeded());
+  }
+
   const IntrinsicsSolution solution = solve_exact_views(LensModel::opencv4, 520);
   const IntrinsicsSolution longer = solve_exact_views(LensModel::opencv5, 522);
 
@@ -88,7 +93,7 @@ TEST_F(ComputeModelUncertainty, CountsEqualAndSmallerParallelDifferencesOnce) {
   EXPECT_NEAR(three->intrinsics_covariance(0, 0), one->intrinsics_covariance(0, 0), 0.01);
 }
 
-/// Both differences together; the covariance covers each of them as one standard deviation.
+/// The covariances of differences in other directions add up if noise explains none of them.
 TEST_F(ComputeModelUncertainty, AddsDifferencesInOtherDirections) {
   const IntrinsicsSolution bent = solve_exact_views(LensModel::opencv5, 520, -0.22);
   const auto first = compute({longer}), second = compute({bent}), both = compute({bent, longer});
