@@ -88,7 +88,7 @@ LineProfile compute_profile(const CellLevels& cells, const ModulationMap& map,
 
 /// Fits a lamp's period within its drift.
 PeriodFit fit_period_of_lamp(const LineProfile& profile, double period_lines) {
-  constexpr double finest = kLampDrift / 16;
+  constexpr double finest = kLampDrift / 128;
   PeriodFit best = fit_periodic_signal(profile, period_lines);
   const auto improve = [&](double drift) {
     if (std::abs(drift) > kLampDrift) return;
@@ -247,15 +247,13 @@ void add_region_area(const ModulationMap& map, const ModulatedRegion& region, do
   }
 }
 
-/// Measures the stripes of a candidate after division by its envelope. The period is that of
-/// measure_stripes() if it agrees with the fitted period, and the fitted period otherwise.
+/// Measures the stripes of a candidate after division by its envelope. Their period is that of the
+/// fit, because stripes that the ends of a light cut bias that of measure_stripes().
 Stripes measure_candidate_stripes(const RegionCandidate& candidate) {
   const PeriodFit& fit = candidate.fit;
   Stripes stripes =
       measure_stripes(divide_profile_by_envelope(candidate.profile, fit.period_lines));
-  if (!(std::abs(stripes.period_lines / fit.period_lines - 1) < 2 * kLampDrift)) {
-    stripes.period_lines = fit.period_lines;
-  }
+  stripes.period_lines = fit.period_lines;
   stripes.periodicity_r2 = 1 - fit.unexplained_fraction;
   stripes.periods = count_periods(candidate);
   stripes.is_regular = true;

@@ -134,7 +134,7 @@ PeriodFit find_best_fitting_period(const LineProfile& profile, double min_period
        period < lines / min_periods; period *= 1 + step_fraction * period / lines) {
     improve(period);
   }
-  for (double step = step_fraction * best.period_lines / lines / 2; step > 5e-4; step /= 2) {
+  for (double step = step_fraction * best.period_lines / lines / 2; step > 1e-4; step /= 2) {
     const double middle = best.period_lines;
     improve(middle * (1 - step));
     improve(middle * (1 + step));

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 #include <opencv2/core.hpp>
+#include <vector>
 
 #include "frontend/mat_view.h"
 #include "lamps/drawn_lamp.h"
@@ -52,6 +53,22 @@ TEST(FindModulatedLights, ReturnsPeriodWithoutGivenLampPeriods) {
   ASSERT_EQ(lights.size(), 1U);
   EXPECT_FALSE(lights[0].lamp);
   EXPECT_NEAR(lights[0].stripes.period_lines, 13, 0.2);
+}
+
+TEST(FindModulatedLights, ReturnsPeriodOfStripWithHardEnds) {
+  constexpr double period = 21.92;
+  for (const double phase : {0.0, 0.25, 0.5, 0.75}) {
+    const DrawnStripes stripes{.period_lines = period, .phase = phase};
+    cv::Mat image(600, 64, CV_8U, cv::Scalar(6));
+    for (int line = 80; line < 520; ++line) {
+      image(cv::Rect(24, line, 16, 1)) = 6 + 200 * stripes.lit(line);
+    }
+    for (const std::vector<double>& periods : {std::vector<double>{}, {period}}) {
+      const auto lights = find_lights(image, periods);
+      ASSERT_EQ(lights.size(), 1U) << phase;
+      EXPECT_NEAR(lights[0].stripes.period_lines / period, 1, 1e-3) << phase;
+    }
+  }
 }
 
 TEST(FindModulatedLights, ReportsNoLampForUnknownPeriod) {
