@@ -73,7 +73,7 @@ std::vector<LightPeriod> collect_light_periods(std::span<const Observation> imag
     }
     if (labels.empty()) {
       for (const Light& light : image.lights) {
-        if (may_be_lamp(light, image.size_px)) add(i, light, std::nullopt);
+        if (is_light_modulated(light)) add(i, light, std::nullopt);
       }
       continue;
     }

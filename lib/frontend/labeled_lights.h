@@ -40,8 +40,8 @@ struct LightPeriod : MeasuredPeriod {
   double sigma_px;
 };
 
-/// Returns the periods of the lights that are completely in view and whose stripes are reliable
-/// (are_stripes_reliable()). If `labels` is not empty, only of labeled lights.
+/// Returns the periods of the modulated lights whose stripes are reliable (are_stripes_reliable()),
+/// also of lights that the image border cuts. If `labels` is not empty, only of labeled lights.
 std::vector<LightPeriod> collect_light_periods(std::span<const Observation> images,
                                                const std::vector<Frame>& labels);
 

@@ -473,8 +473,15 @@ void LightDetector::correct_light_centers_for_motion(std::vector<Light>& lights)
 }
 
 std::vector<Light> LightDetector::detect_lights(const ImageView& image) const {
-  const Background background = estimate_image_background(image);
-  const auto [lines, lit, memory] = make_scanline_image(image, camera_.readout, background);
+  Background background = estimate_image_background(image);
+  ScanlineImage scanlines = make_scanline_image(image, camera_.readout, background);
+  if (!scanlines.lit.has_nonzero_tile()) {
+    const auto behind_lights = estimate_background_behind_lights(image);
+    if (!behind_lights) return {};
+    background = *behind_lights;
+    scanlines = make_scanline_image(image, camera_.readout, background);
+  }
+  const auto& [lines, lit, memory] = scanlines;
   const auto blobs = group_pixel_runs_into_blobs(find_pixel_runs(lines, background.threshold, lit),
                                                  max_dark_rows_);
   std::vector<LightPart> parts;

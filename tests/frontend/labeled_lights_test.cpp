@@ -70,5 +70,12 @@ TEST(CollectLightPeriods, ReturnsPeriodsOfAllLightsOrOnlyLabeledOnes) {
   for (const MeasuredPeriod& period : some) EXPECT_TRUE(period.lamp);
 }
 
+TEST(CollectLightPeriods, ReturnsPeriodsOfLightsCutByBorder) {
+  auto images = sample_lights();
+  const std::size_t all = collect_light_periods(images, {}).size();
+  for (Observation& image : images) image.size_px = {400, 300};
+  EXPECT_EQ(collect_light_periods(images, {}).size(), all);
+}
+
 }  // namespace
 }  // namespace vlp

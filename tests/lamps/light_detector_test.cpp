@@ -196,6 +196,72 @@ TEST(LightDetector, IdentifiesLampsByClassifierDespiteWrongMapFrequency) {
             std::vector(4, lamp));
 }
 
+/// Expects one light that the image border cuts, identified as lamp 1, with this period.
+void expect_one_cut_lamp(const std::vector<Light>& lights, double period_lines) {
+  ASSERT_EQ(lights.size(), 1);
+  EXPECT_EQ(lights[0].kind, LightKind::truncated);
+  EXPECT_EQ(lights[0].lamp, 1);
+  EXPECT_NEAR(lights[0].stripes.period_lines / period_lines, 1, 0.003);
+}
+
+TEST(LightDetector, ReportsCutForLampThatFillsImage) {
+  const cv::Size size(640, 480);
+  for (const double period : {9.0, 25.0, 68.6}) {
+    for (const double duty : {0.3, 0.5}) {
+      for (const double exposure_lines : {1.0, 0.25 * period}) {
+        for (const double radius_px : {500.0, 2000.0}) {
+          SCOPED_TRACE(testing::Message()
+                       << period << ", " << duty << ", " << exposure_lines << ", " << radius_px);
+          DrawnLamp lamp{.center = {300, 250}, .radius_px = radius_px};
+          lamp.stripes = {period, duty, 0.3, exposure_lines};
+          const cv::Mat image = render_lamps({lamp}, size, CV_8U, 1.5);
+          const LightDetector detector({{drawn_lamp(1, period)}}, drawn_camera(size));
+          expect_one_cut_lamp(detector.detect_lights(to_image_view(image)), period);
+        }
+      }
+    }
+  }
+}
+
+TEST(LightDetector, ReportsCutForUnevenLampThatFillsImageReadByColumns) {
+  const cv::Size size(640, 480);
+  DrawnLamp lamp{.center = {100, 100}, .level = 0.9, .stripes = {.period_lines = 40}};
+  lamp.glow = DrawnGlow{.fall_px = 500, .core_px = 300};
+  const cv::Mat image = render_lamps({lamp}, size, CV_16U, 1).t();
+  DetectorCamera camera = drawn_camera(size);
+  camera.readout = Readout::columns;
+  expect_one_cut_lamp(
+      LightDetector({{drawn_lamp(1, 40)}}, camera).detect_lights(to_image_view(image)), 40);
+}
+
+TEST(LightDetector, ReturnsPeriodOfLampThatFillsImageWithoutRowTime) {
+  const cv::Size size(640, 480);
+  const DrawnLamp lamp{.radius_px = 2000, .stripes = {.period_lines = 68.6}};
+  const auto lights = LightDetector({}, {Readout::rows, {}, {}})
+                          .detect_lights(to_image_view(render_lamps({lamp}, size, CV_8U, 1)));
+  ASSERT_EQ(lights.size(), 1);
+  EXPECT_TRUE(are_stripes_reliable(lights[0].stripes));
+  EXPECT_NEAR(lights[0].stripes.period_lines / 68.6, 1, 0.003);
+}
+
+TEST(LightDetector, LocatesLampHalfAsWideAsImage) {
+  const cv::Size size(640, 480);
+  const DrawnLamp lamp{.center = {300.3, 240.6}, .radius_px = 160, .stripes = {.period_lines = 25}};
+  const LightDetector detector({{drawn_lamp(1, 25)}}, drawn_camera(size));
+  const auto lights = detector.detect_lights(to_image_view(render_lamps({lamp}, size, CV_8U, 1.5)));
+  ASSERT_EQ(lights.size(), 1);
+  EXPECT_EQ(lights[0].kind, LightKind::lamp);
+  EXPECT_LT((lights[0].pixel - lamp.center).norm(), 0.1);
+}
+
+TEST(LightDetector, ReturnsNoLightsForNoise) {
+  const LightDetector detector({{drawn_lamp(1, 11)}}, drawn_camera({640, 480}));
+  for (const double noise : {0.3, 2.0, 8.0, 15.0}) {
+    const cv::Mat image = render_lamps({}, {640, 480}, CV_8U, noise);
+    EXPECT_TRUE(detector.detect_lights(to_image_view(image)).empty()) << noise;
+  }
+}
+
 TEST(LightDetector, ReturnsNoLightsForUniformImages) {
   const LightDetector detector = Captures("paper-rig", "sample").detector();
   for (const int type : {CV_8U, CV_16U}) {

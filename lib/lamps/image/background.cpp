@@ -47,19 +47,22 @@ class Histogram {
   int count_ = 0, highest_ = 0;
 };
 
-Histogram sample_histogram(const ImageView& image) {
+/// Calls `function` for a sample of the pixels, with the level of the pixel and the mean level of
+/// `width_px` pixels of its row from it on.
+template <typename Function>
+void for_each_sample(const ImageView& image, int width_px, Function&& function) {
   constexpr double sufficient_count = 8000;
   const double pixels = static_cast<double>(image.height) * image.width;
   // An odd step that shifts from row to row samples all rows and columns of a periodic pattern.
   const int step = static_cast<int>(std::sqrt(pixels / sufficient_count)) | 1;
-  Histogram sample(image.get_max_gray_level() + 1);
   for (int row = std::min(step / 2, image.height / 2); row < image.height; row += step) {
-    for (int column = row / step % step; column < image.width; column += step) {
-      sample.add(image.gray_level_at_pixel(column, row));
+    for (int column = row / step % step; column + width_px <= image.width; column += step) {
+      const int level = image.gray_level_at_pixel(column, row);
+      int sum = level;
+      for (int i = 1; i < width_px; ++i) sum += image.gray_level_at_pixel(column + i, row);
+      function(level, sum / width_px);
     }
   }
-  if (sample.count_samples() == 0) sample.add(image.gray_level_at_pixel(0, 0));
-  return sample;
 }
 
 /// Returns the smallest difference between two levels: above 1 for images of 12 bits in 16, or of 8
@@ -100,10 +103,24 @@ double estimate_noise_above_median(const Histogram& sample, int median) {
   return std::min(above(80) / 0.8416, above(90) / 1.2816);
 }
 
-}  // namespace
+/// Returns the highest level of the darker of two classes, between which the variance is largest
+/// (Otsu 1979).
+int find_max_dark_level(const Histogram& sample) {
+  const double count = sample.count_samples();
+  double sum = 0, dark_sum = 0, dark_count = 0, largest = -1;
+  int max_dark_level = 0;
+  sample.for_each([&](int level, int pixels) { sum += double(level) * pixels; });
+  sample.for_each([&](int level, int pixels) {
+    dark_count += pixels;
+    dark_sum += double(level) * pixels;
+    const double between = std::pow(dark_sum * count - dark_count * sum, 2) /
+                           (dark_count * std::max(1.0, count - dark_count));
+    if (between > largest) largest = between, max_dark_level = level;
+  });
+  return max_dark_level;
+}
 
-Background estimate_image_background(const ImageView& image) {
-  const Histogram sample = sample_histogram(image);
+Background estimate_background(const Histogram& sample) {
   const double step = find_level_step(sample);
   const int half = sample.count_samples() / 2, median = sample.level_at(half);
   // Lit pixels are above the median; the pixels below contain only noise.
@@ -130,6 +147,32 @@ Background estimate_image_background(const ImageView& image) {
   noise = std::max(noise, min_noise);
   constexpr double clear = 4.5, min_steps = 1.6;
   return {level, noise, level + std::max(clear * noise, min_steps * step)};
+}
+
+}  // namespace
+
+Background estimate_image_background(const ImageView& image) {
+  Histogram sample(image.get_max_gray_level() + 1);
+  for_each_sample(image, 1, [&](int level, int) { sample.add(level); });
+  if (sample.count_samples() == 0) sample.add(image.gray_level_at_pixel(0, 0));
+  return estimate_background(sample);
+}
+
+std::optional<Background> estimate_background_behind_lights(const ImageView& image) {
+  // Means of four pixels average the mosaic of a color filter and most of the noise.
+  constexpr int mean_px = 4;
+  constexpr int min_lit_per_cent = 5;
+  Histogram means(image.get_max_gray_level() + 1), dark_sample = means;
+  for_each_sample(image, mean_px, [&](int, int mean) { means.add(mean); });
+  if (means.count_samples() == 0) return std::nullopt;
+  const int max_dark_level = find_max_dark_level(means);
+  for_each_sample(image, mean_px, [&](int level, int mean) {
+    if (mean <= max_dark_level) dark_sample.add(level);
+  });
+  const Background dark = estimate_background(dark_sample);
+  const auto rank = std::int64_t{means.count_samples()} * (100 - min_lit_per_cent) / 100;
+  if (means.level_at(static_cast<int>(rank)) <= dark.threshold) return std::nullopt;
+  return dark;
 }
 
 }  // namespace vlp

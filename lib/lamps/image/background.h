@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
+
 #include "lamps/image/image_view.h"
 
 namespace vlp {
@@ -22,5 +24,11 @@ struct Background {
 
 /// Estimates dark level, noise and threshold of an image. @pre The image is not empty.
 Background estimate_image_background(const ImageView& image);
+
+/// Estimates the background of an image of which lights cover the larger part, so that the median
+/// is none of the dark level. Uses the darker of two classes of pixels, which differ most. Returns
+/// std::nullopt if less than 5 % of the image is brighter than the threshold of this class, as in
+/// an image of noise. @pre The image is not empty.
+std::optional<Background> estimate_background_behind_lights(const ImageView& image);
 
 }  // namespace vlp

@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "lamps/image/image_view.h"
@@ -24,6 +26,7 @@ struct TileMask {
   TileMask(int columns_, int rows_)
       : columns(columns_), rows(rows_), values(std::size_t(columns_) * std::size_t(rows_)) {}
   bool empty() const { return values.empty(); }
+  bool has_nonzero_tile() const { return std::ranges::any_of(values, std::identity()); }
   std::uint8_t* tile_row(int y) { return values.data() + std::ptrdiff_t(y) * columns; }
   const std::uint8_t* tile_row(int y) const { return values.data() + std::ptrdiff_t(y) * columns; }
 };

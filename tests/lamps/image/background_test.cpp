@@ -149,6 +149,28 @@ TEST(EstimateImageBackground, LevelAveragesAllColumnsOfColorFilterPattern) {
       for (int column = darker; column < size.width; column += 4) image.col(column) = 20;
       EXPECT_NEAR(estimate_image_background(to_image_view(image)).level, 27.5, 0.1)
           << size << ", " << darker;
+      EXPECT_FALSE(estimate_background_behind_lights(to_image_view(image)));
+    }
+  }
+}
+
+TEST(EstimateBackgroundBehindLights, MatchesLevelAndNoiseOfDarkPixels) {
+  for (const int lit_rows : {60, 300, 540}) {  // of 600
+    cv::Mat image = noisy<std::uint8_t>({800, 600}, 20, 3, 0, 0);
+    image.rowRange(30, 30 + lit_rows) += 150;
+    const auto background = estimate_background_behind_lights(to_image_view(image));
+    ASSERT_TRUE(background) << lit_rows;
+    EXPECT_NEAR(background->level, 20, 0.5) << lit_rows;
+    EXPECT_NEAR(background->noise, 3, 0.4) << lit_rows;
+  }
+}
+
+TEST(EstimateBackgroundBehindLights, ReturnsNulloptForNoise) {
+  for (const double level : {0.0, 2.0, 60.0}) {  // clipped at black, or not
+    for (const double noise : {0.5, 3.0, 10.0}) {
+      const cv::Mat image = noisy<std::uint8_t>({800, 600}, level, noise, 0, 0);
+      EXPECT_FALSE(estimate_background_behind_lights(to_image_view(image)))
+          << level << ", " << noise;
     }
   }
 }
