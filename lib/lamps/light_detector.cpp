@@ -192,7 +192,9 @@ Light make_light_from_modulation(const ImageView& lines, const ModulatedLight& f
     if (rim) rim->is_clear = false;
   }
   Light light = make_light_without_outline(lines, found, shape);
-  if (rim && rim->light.inlier_fraction >= kMinInlierFraction) {
+  // The rim of another object, for example of a letter, does not enclose the light's center.
+  const bool encloses_light = rim && (rim->light.pixel - light.pixel).norm() < rim->light.radius_px;
+  if (encloses_light && rim->light.inlier_fraction >= kMinInlierFraction) {
     // Without a clear rim either center may be correct.
     const double apart_px =
         rim->is_clear ? 0 : (rim->light.pixel - light.pixel).norm() / std::numbers::sqrt2;

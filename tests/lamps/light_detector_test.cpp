@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <map>
+#include <opencv2/imgproc.hpp>
 #include <utility>
 #include <vector>
 
@@ -232,6 +233,61 @@ TEST(LightDetector, ReportsCutForUnevenLampThatFillsImageReadByColumns) {
   camera.readout = Readout::columns;
   expect_one_cut_lamp(
       LightDetector({{drawn_lamp(1, 40)}}, camera).detect_lights(to_image_view(image)), 40);
+}
+
+TEST(LightDetector, ReportsCutForGlowThatContinuesToBorder) {
+  const cv::Size size(300, 160);
+  const LightDetector detector({{drawn_lamp(1, 16)}}, drawn_camera(size));
+  for (const double to_border_px : {40.0, 45.0, 50.0, 55.0}) {
+    for (const double phase : {0.0, 0.25, 0.5, 0.75}) {
+      SCOPED_TRACE(testing::Message() << to_border_px << ", " << phase);
+      DrawnLamp lamp{.center = {150, size.height - 1 - to_border_px}};
+      lamp.stripes = {.period_lines = 16, .phase = phase};
+      lamp.glow = DrawnGlow{.fall_px = 22, .core_px = 20};
+      const auto lights =
+          detector.detect_lights(to_image_view(render_lamps({lamp}, size, CV_8U, 0.5)));
+      ASSERT_EQ(lights.size(), 1);
+      EXPECT_EQ(lights[0].kind, LightKind::truncated);
+    }
+  }
+}
+
+/// The lamps and a steady panel between them form one blob, whose clearest rim is that of lamp 2.
+TEST(LightDetector, ReportsCutForFragmentInBlobOfOtherLamps) {
+  const cv::Size size(460, 300);
+  const LightDetector detector({{drawn_lamp(1, 16.7), drawn_lamp(2, 13.3), drawn_lamp(3, 10.8)}},
+                               drawn_camera(size));
+  int num_cut = 0;
+  for (const double phase : {0.0, 0.1, 0.2}) {
+    for (const double x : {292.0, 296.0, 300.0, 304.0}) {
+      DrawnLamp cut{.center = {x, 40.4}, .radius_px = 75, .blur_px = 1};
+      cut.stripes = {.period_lines = 16.7, .phase = phase};
+      cut.recess = DrawnRecess{.core_off_px = {16, 0}, .core_px = 28, .walls = 0.15, .halo = 0};
+      DrawnLamp other = cut;
+      other.center = {174, 105}, other.radius_px = 58, other.level = 0.9;
+      other.stripes = {.period_lines = 10.8, .phase = phase};
+      other.recess->core_off_px = {12, 0}, other.recess->core_px = 20;
+      const DrawnLamp sharp{
+          .center = {159, 56}, .radius_px = 41, .stripes = {.period_lines = 13.3}};
+      cv::Mat image = render_lamps({cut}, size, CV_8U, 1);
+      for (const DrawnLamp& lamp : {other, sharp}) {
+        image = cv::max(image, render_lamps({lamp}, size, CV_8U, 1));
+      }
+      cv::Mat panel = image.clone();
+      panel(cv::Rect(200, 37, 120, 110)) = 40;
+      for (const DrawnLamp& lamp : {cut, other, sharp}) {
+        cv::circle(panel, cv::Point2d(lamp.center.x(), lamp.center.y()), int(lamp.radius_px), 0,
+                   cv::FILLED);
+      }
+      image = cv::max(image, panel);
+      for (const Light& light : detector.detect_lights(to_image_view(image))) {
+        if (light.lamp != 1) continue;
+        EXPECT_EQ(light.kind, LightKind::truncated) << light.pixel.transpose();
+        num_cut += light.kind == LightKind::truncated ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GE(num_cut, 8);
 }
 
 TEST(LightDetector, ReturnsPeriodOfLampThatFillsImageWithoutRowTime) {

@@ -260,6 +260,38 @@ Stripes measure_candidate_stripes(const RegionCandidate& candidate) {
   return stripes;
 }
 
+/// Returns the largest mean level in the columns of a span, at a step.
+float find_largest_mean(const ModulationMap& map, const ModulatedRegion::Span& span, int step) {
+  float largest = 0;
+  for (int x = span.begin; x < span.end; x += kCellWidth_px) {
+    const int cell = (x - map.box.x) / kCellWidth_px;
+    largest = std::max(largest, map.mean[map.modulation_cell_index(step, cell)]);
+  }
+  return largest;
+}
+
+/// Returns the box of a region, extended to the first and last scanline of the map if the region
+/// continues there. A region may end within a period of them, because the half of the filter's
+/// window that is outside counts as dark. The other half contains a quarter of the mean level if a
+/// dark stripe is at the border.
+PixelBox extend_box_to_lit_border(const ModulationMap& map, const ModulatedRegion& region,
+                                  double period_lines) {
+  PixelBox box = region.box;
+  float peak = 0;
+  for (const auto& span : region.spans) {
+    peak = std::max(peak, find_largest_mean(map, span, span.step));
+  }
+  for (const auto& span : region.spans) {
+    for (const int border : {0, map.steps - 1}) {
+      const bool is_near = std::abs(span.step - border) * map.lines_per_step < period_lines;
+      if (!is_near || 4 * find_largest_mean(map, span, border) < kBorderFraction * peak) continue;
+      box = enclosing_box(box, {span.begin, map.box.y + border * map.lines_per_step,
+                                span.end - span.begin, map.lines_per_step});
+    }
+  }
+  return box;
+}
+
 ModulatedLight make_light(const ModulationMap& map,
                           const std::vector<const RegionCandidate*>& parts) {
   // The whole area, and the areas above a quarter and a half of the brightest level.
@@ -287,7 +319,8 @@ ModulatedLight make_light(const ModulationMap& map,
     // Darker parts are light that the lamp casts on its surroundings.
     if (part->region.peak_amplitude < double(kBorderFraction) * brightest.region.peak_amplitude)
       continue;
-    light.box = enclosing_box(light.box, part->region.box);
+    light.box = enclosing_box(
+        light.box, extend_box_to_lit_border(map, part->region, brightest.fit.period_lines));
     add_region_area(map, part->region, brightest.region.peak_amplitude, fractions, areas);
   }
   light.energy = areas[0].energy;
