@@ -344,8 +344,10 @@ void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
                  light.radius_px / 2 &&
              std::max(box.width, box.height) < 3 * light.radius_px;
     });
-    if (!is_known)
-      boxes.push_back(expand_and_clip_box(box, std::max(box.width, box.height) / 2, lines.size()));
+    if (is_known) continue;
+    // Stripes with a long dark part are blobs of their own.
+    const int margin_px = std::max(std::max(box.width, box.height) / 2, max_dark_rows_);
+    boxes.push_back(expand_and_clip_box(box, margin_px, lines.size()));
   }
   const auto modulated_lights = find_modulated_lights(
       lines, merge_overlapping_boxes(std::move(boxes)), background, lamp_periods_);

@@ -300,6 +300,28 @@ TEST(LightDetector, ReturnsPeriodOfLampThatFillsImageWithoutRowTime) {
   EXPECT_NEAR(lights[0].stripes.period_lines / 68.6, 1, 0.003);
 }
 
+TEST(LightDetector, ReturnsSamePeriodOfStripsWithAndWithoutRowTime) {
+  const cv::Size size(16, 855);  // 39 periods
+  const double period = size.height / 39.0;
+  for (int i = 0; i < 12; ++i) {
+    for (const double exposure_lines : {2.0, 8.0}) {
+      DrawnLamp strip{.center = {8, 427}, .level = 0.7};
+      strip.stripes = {period, 0.5, i / 12.0, exposure_lines};
+      strip.glow = DrawnGlow{.fall_px = 900, .core_px = 300};
+      const cv::Mat image = render_lamps({strip}, size, CV_8U, 4, std::uint64_t(i));
+      for (const bool has_row_time : {true, false}) {
+        DetectorCamera camera{Readout::rows, {}, {}};
+        if (has_row_time) camera.row_time_s = kDrawnRowTime_s;
+        const auto lights =
+            LightDetector({{drawn_lamp(1, period)}}, camera).detect_lights(to_image_view(image));
+        ASSERT_EQ(lights.size(), 1) << i << ", " << exposure_lines << ", " << has_row_time;
+        EXPECT_TRUE(are_stripes_reliable(lights[0].stripes));
+        EXPECT_NEAR(lights[0].stripes.period_lines / period, 1, 5e-4);
+      }
+    }
+  }
+}
+
 TEST(LightDetector, LocatesLampHalfAsWideAsImage) {
   const cv::Size size(640, 480);
   const DrawnLamp lamp{.center = {300.3, 240.6}, .radius_px = 160, .stripes = {.period_lines = 25}};

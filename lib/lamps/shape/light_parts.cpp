@@ -11,6 +11,9 @@ namespace vlp {
 namespace {
 
 bool contains_point(const Light& light, const Eigen::Vector2d& pixel) {
+  if (light.is_glow) {
+    return (pixel - light.box_min).minCoeff() > 0 && (light.box_max - pixel).minCoeff() > 0;
+  }
   if (!is_light_disc_shaped(light)) return polygon_contains(light.inner_polygon, pixel);
   return (light.pixel - pixel).norm() < light.radius_px;
 }
