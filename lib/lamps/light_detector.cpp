@@ -18,6 +18,7 @@
 #include "lamps/image/scanlines.h"
 #include "lamps/shape/inverse_height.h"
 #include "lamps/shape/light_center_noise.h"
+#include "lamps/shape/outline_fit.h"
 #include "lamps/shape/rectangle.h"
 #include "lamps/shape/rim.h"
 #include "lamps/signal/frequency_identification.h"
@@ -123,9 +124,11 @@ std::optional<LightReason> find_reason_for_steady_light(const Light& light) {
   return std::nullopt;
 }
 
-/// Maximum distance of the bright part's center from that of the whole area, as a fraction of the
-/// area's radius, for a round glow. Applies to lights without a clear rim.
-constexpr double kMaxEccentricity = 0.1;
+/// Standard deviation of the centroid of a light, in radii: its core may be anywhere in the lamp.
+constexpr double kCentroidSd = 0.5;
+/// The same for the center of a rim. It is larger than that of the fit, because one wrong
+/// light must not outweigh the others.
+constexpr double kRimCenterSd = 0.1;
 
 /// Returns the runs within a box, as one blob.
 Blob clip(std::span<const Blob> blobs, const PixelBox& box) {
@@ -173,35 +176,15 @@ Light make_light_without_outline(const ImageView& lines, const ModulatedLight& f
   return light;
 }
 
-/// Converts a light that was found by its modulation to a Light. The outline is the rim, see
-/// fit_rim_of_light(), if the rim is clear. Otherwise the light has no outline, and its center is
-/// the centroid of the lit area. Kind, reason and lamp are not set.
+/// Converts a light that was found by its modulation to a Light. Without a rim the light has no
+/// outline, and its center is the centroid of the lit area. Kind, reason and lamp are not set.
 ///
 /// @param lines  image whose rows are the scanlines
-/// @param blobs   lit pixels of the image, in which the rim is searched
-/// @param radius  range of the radius of the rim if it is known
 Light make_light_from_modulation(const ImageView& lines, const ModulatedLight& found,
-                                 std::span<const Blob> blobs, const Background& background,
-                                 const LightShape& shape,
-                                 const std::optional<RadiusRange>& radius) {
-  const Blob blob = find_lit_pixels_of_light(found.box, blobs, lines.size());
-  std::optional<Rim> rim;
-  if (!blob.runs.empty()) rim = fit_rim_of_light(lines, blob, background, shape, radius);
-  if (!blob.runs.empty() && !rim && radius) {
-    rim = fit_rim_of_light(lines, blob, background, shape);
-    if (rim) rim->is_clear = false;
-  }
+                                 std::optional<Light> rim, const LightShape& shape) {
   Light light = make_light_without_outline(lines, found, shape);
   // The rim of another object, for example of a letter, does not enclose the light's center.
-  const bool encloses_light = rim && (rim->light.pixel - light.pixel).norm() < rim->light.radius_px;
-  if (encloses_light && rim->light.inlier_fraction >= kMinInlierFraction) {
-    // Without a clear rim either center may be correct.
-    const double apart_px =
-        rim->is_clear ? 0 : (rim->light.pixel - light.pixel).norm() / std::numbers::sqrt2;
-    const bool is_round = found.asymmetry_px < kMaxEccentricity * found.radius_px;
-    if (rim->is_clear || !is_round) light = std::move(rim->light);
-    add_error_to_center_sigma(apart_px, light);
-  }
+  if (rim && (rim->pixel - light.pixel).norm() < rim->radius_px) light = std::move(*rim);
   light.is_found_by_modulation = true;
   light.stripes = found.stripes;
   light.peak_level = found.peak_level;
@@ -351,31 +334,56 @@ void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
   }
   const auto modulated_lights = find_modulated_lights(
       lines, merge_overlapping_boxes(std::move(boxes)), background, lamp_periods_);
-  const auto find_lamp_of_period = [&](const ModulatedLight& found) -> const Lamp* {
-    const auto id = found.lamp ? lamps_by_period_[*found.lamp] : std::nullopt;
+  const auto find_identified_lamp = [&](const Light& light) {
+    const auto id = is_conclusive(light) ? identify_lamp_by_stripes(light.stripes) : std::nullopt;
     return id ? find_lamp_by_id(lamps_.lamps, *id) : nullptr;
   };
-  std::vector<LampInPlane> in_plane;
+  std::vector<LampInPlane> lamps;
   for (const Light& light : lights) {
-    const auto id = is_conclusive(light) ? identify_lamp_by_stripes(light.stripes) : std::nullopt;
-    if (id) add_lamp_in_plane(find_lamp_by_id(lamps_.lamps, *id), light.pixel, in_plane);
+    const auto lamp = make_lamp_in_plane(find_identified_lamp(light), light.pixel, kCentroidSd);
+    if (lamp) lamps.push_back(*lamp);
   }
-  for (const ModulatedLight& found : modulated_lights) {
-    add_lamp_in_plane(find_lamp_of_period(found), shape_.swap_image_and_scanline_axes(found.center),
-                      in_plane);
+  RimFits fitted = fit_rims(lines, modulated_lights, blobs, background, lamps);
+  std::vector<std::optional<Light>>& rims = fitted.rims;
+  // The edge of a source in a reflector is a clear outline with another radius than its lamp.
+  const auto has_other_radius = [&](const Light& light) {
+    const auto radius = predict_radius(find_identified_lamp(light), fitted.inverse_height);
+    return radius && !radius->agrees_with(light);
+  };
+  const auto num_others = std::count_if(lights.begin(), lights.end(), has_other_radius);
+  const auto num_clear =
+      std::count_if(rims.begin(), rims.end(), [](const auto& rim) { return rim.has_value(); });
+  const bool are_sizes_correct = 2 * num_others < std::ptrdiff_t(lamps.size()) + num_clear;
+  for (Light& light : lights) {
+    if (!are_sizes_correct || !has_other_radius(light)) continue;
+    const auto radius = predict_radius(find_identified_lamp(light), fitted.inverse_height);
+    const Eigen::Vector2d low = shape_.swap_image_and_scanline_axes(light.box_min),
+                          high = shape_.swap_image_and_scanline_axes(light.box_max);
+    const PixelBox box{static_cast<int>(low.x()), static_cast<int>(low.y()),
+                       static_cast<int>(high.x() - low.x()), static_cast<int>(high.y() - low.y())};
+    const Blob blob = find_lit_pixels_of_light(box, blobs, lines.size());
+    std::optional<Light> rim;
+    if (!blob.runs.empty()) {
+      rim = fit_rim_of_light(lines, blob, light.stripes.period_lines, background, shape_, radius);
+    }
+    if (!rim) {
+      add_error_to_center_sigma(light.radius_px, light);
+      light.outline_equations.reset();  // their center is not that of the lamp
+      continue;
+    }
+    rim->stripes = light.stripes;
+    rim->peak_level = light.peak_level;
+    rim->coherence = light.coherence;
+    light = std::move(*rim);
   }
-  const auto inverse_height = estimate_inverse_height(in_plane);
-  for (const ModulatedLight& found : modulated_lights) {
+  for (std::size_t i = 0; i < modulated_lights.size(); ++i) {
+    const ModulatedLight& found = modulated_lights[i];
     const auto is_at_found = [&](const Light& other) {
       return (other.pixel - shape_.swap_image_and_scanline_axes(found.center)).norm() <
              std::max(other.radius_px, found.radius_px);
     };
-    // Without a lamp the light would be dropped below; this avoids the fit of its rim.
     if (!found.lamp && std::any_of(lights.begin(), lights.end(), is_at_found)) continue;
-    const Lamp* lamp = find_lamp_of_period(found);
-    Light light = make_light_from_modulation(
-        lines, found, blobs, background, shape_,
-        inverse_height && lamp ? predict_radius(*lamp, found, *inverse_height) : std::nullopt);
+    Light light = make_light_from_modulation(lines, found, std::move(rims[i]), shape_);
     if (found.lamp) light.lamp = lamps_by_period_[*found.lamp];
     // Lamps with the same period differ in duty; without known periods a classifier decides.
     const bool has_choice = found.lamp ? !light.lamp : lamp_periods_.empty();
@@ -391,33 +399,62 @@ void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
   }
 }
 
-void LightDetector::add_lamp_in_plane(const Lamp* lamp, const Eigen::Vector2d& pixel,
-                                      std::vector<LampInPlane>& lamps) const {
-  const auto position = shape_.level_plane_point_from_pixel(pixel);
-  if (lamp == nullptr || !lamp->shape.size_m || !position || !shape_.has_known_lens()) return;
-  lamps.push_back({*position, lamp->position_m.head<2>(), compute_height_beyond_first_lamp_m(*lamp),
-                   lamp->shape.size_m->maxCoeff() / 2});
+LightDetector::RimFits LightDetector::fit_rims(const ImageView& lines,
+                                               const std::vector<ModulatedLight>& found,
+                                               const std::vector<Blob>& blobs,
+                                               const Background& background,
+                                               const std::vector<LampInPlane>& lamps) const {
+  std::vector<std::optional<Light>> rims(found.size());
+  std::optional<InverseHeight> before;
+  for (const bool is_first : {true, false}) {
+    std::vector<LampInPlane> all = lamps;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const auto lamp = make_lamp_in_plane(
+          find_lamp_of_period(found[i]),
+          rims[i] ? rims[i]->pixel : shape_.swap_image_and_scanline_axes(found[i].center),
+          rims[i] ? kRimCenterSd : kCentroidSd);
+      if (lamp) all.push_back(*lamp);
+    }
+    const auto inverse_height = estimate_inverse_height(all);
+    if (!is_first && (!inverse_height || !(inverse_height->log_sd < before->log_sd))) break;
+    before = inverse_height;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const auto radius = predict_radius(find_lamp_of_period(found[i]), inverse_height);
+      if (rims[i] && (!radius || radius->agrees_with(*rims[i]))) continue;
+      const Blob blob = find_lit_pixels_of_light(found[i].box, blobs, lines.size());
+      if (blob.runs.empty()) continue;
+      rims[i] =
+          fit_rim_of_light(lines, blob, found[i].fit.period_lines, background, shape_, radius);
+    }
+    if (!inverse_height) break;
+  }
+  return {std::move(rims), before};
 }
 
-std::optional<RadiusRange> LightDetector::predict_radius(
-    const Lamp& lamp, const ModulatedLight& found, const InverseHeight& inverse_height) const {
-  constexpr double max_sds = 2, step_px = 1;
-  if (lamp.shape.kind != ShapeKind::disc || !lamp.shape.size_m) return std::nullopt;
-  const Eigen::Vector2d pixel = shape_.swap_image_and_scanline_axes(found.center);
-  Matrix2 d_plane_d_pixel;
-  const auto at = shape_.level_plane_point_from_pixel(pixel);
-  for (int i = 0; i < 2; ++i) {
-    const auto beside =
-        shape_.level_plane_point_from_pixel(pixel + step_px * Eigen::Vector2d::Unit(i));
-    if (!at || !beside) return std::nullopt;
-    d_plane_d_pixel.col(i) = (*beside - *at) / step_px;
-  }
-  const double radius_px =
-      inverse_height.compute_radius_in_plane(lamp.shape.size_m->x() / 2,
-                                             compute_height_beyond_first_lamp_m(lamp)) /
-      std::sqrt(std::abs(d_plane_d_pixel.determinant()));
-  const double factor = std::exp(max_sds * inverse_height.log_sd);
-  return RadiusRange{radius_px / factor, radius_px * factor};
+std::optional<KnownRadius> LightDetector::predict_radius(
+    const Lamp* lamp, const std::optional<InverseHeight>& inverse_height) const {
+  if (!inverse_height || !lamp || !lamp->shape.size_m || lamp->shape.kind != ShapeKind::disc)
+    return std::nullopt;
+  const double radius = inverse_height->compute_radius_in_plane(
+      lamp->shape.size_m->x() / 2, compute_height_beyond_first_lamp_m(*lamp));
+  if (!(radius > 0) || !std::isfinite(radius)) return std::nullopt;
+  return KnownRadius{radius, inverse_height->log_sd};
+}
+
+std::optional<LampInPlane> LightDetector::make_lamp_in_plane(const Lamp* lamp,
+                                                             const Eigen::Vector2d& pixel,
+                                                             double center_sd) const {
+  const auto position = shape_.level_plane_point_from_pixel(pixel);
+  if (lamp == nullptr || !lamp->shape.size_m || !position || !shape_.has_known_lens())
+    return std::nullopt;
+  return LampInPlane{*position, lamp->position_m.head<2>(),
+                     compute_height_beyond_first_lamp_m(*lamp),
+                     center_sd * lamp->shape.size_m->maxCoeff() / 2};
+}
+
+const Lamp* LightDetector::find_lamp_of_period(const ModulatedLight& found) const {
+  const auto id = found.lamp ? lamps_by_period_[*found.lamp] : std::nullopt;
+  return id ? find_lamp_by_id(lamps_.lamps, *id) : nullptr;
 }
 
 double LightDetector::compute_height_beyond_first_lamp_m(const Lamp& lamp) const {
@@ -425,29 +462,25 @@ double LightDetector::compute_height_beyond_first_lamp_m(const Lamp& lamp) const
   return lamps_.lamps_below_camera ? -rise_m : rise_m;
 }
 
-void LightDetector::refine_and_measure_light(const ImageView& lines, const Background& background,
-                                             Light& light) const {
+void LightDetector::measure_stripes_and_fit_outline(const ImageView& lines,
+                                                    const Background& background,
+                                                    Light& light) const {
+  constexpr double max_start_blur_px = 3;
+  const auto find_chords = [&] {
+    const auto swap = [&](const auto& at) { return shape_.swap_image_and_scanline_axes(at); };
+    return is_light_disc_shaped(light)
+               ? find_chords_in_ellipse(swap(light.box_min), swap(light.box_max), lines.size())
+               : find_chords_in_polygon(swap(light.inner_polygon), lines.size());
+  };
   if (is_light_disc_shaped(light)) {
-    const DiscImage disc{shape_.swap_image_and_scanline_axes(light.box_min),
-                         shape_.swap_image_and_scanline_axes(light.box_max),
-                         shape_.swap_image_and_scanline_axes(light.pixel)};
-    auto outline = refine_disc_outline(lines, light.outline, disc, background);
-    auto better =
-        shape_.fit_light_to_outline(std::move(outline.points), background, outline.is_mottled);
-    if (better && 2 * better->outline.size() > light.outline.size()) {
-      better->inlier_fraction = light.inlier_fraction;
-      better->outside_ratio = light.outside_ratio;
-      better->is_doubtful = light.is_doubtful;
-      light = std::move(*better);
-    }
+    const auto stripes =
+        measure_stripes(compute_scanline_signal(lines, find_chords(), background.level));
+    const auto fit = fit_disc_outline(lines, {light.plane_center, light.unit_from_plane},
+                                      std::min(light.rise_px / kRisePerBlur, max_start_blur_px),
+                                      stripes.period_lines, background, shape_);
+    if (fit) set_fitted_outline(*fit, shape_, light);
   }
-  const Eigen::Vector2d low = shape_.swap_image_and_scanline_axes(light.box_min),
-                        high = shape_.swap_image_and_scanline_axes(light.box_max);
-  const auto chords =
-      is_light_disc_shaped(light)
-          ? find_chords_in_ellipse(low, high, lines.size())
-          : find_chords_in_polygon(shape_.swap_image_and_scanline_axes(light.inner_polygon),
-                                   lines.size());
+  const auto chords = find_chords();
   const auto signal = compute_scanline_signal(lines, chords, background.level);
   light.stripes = measure_stripes(signal);
   light.peak_level = signal.empty() ? 0 : *std::max_element(signal.begin(), signal.end());
@@ -455,24 +488,50 @@ void LightDetector::refine_and_measure_light(const ImageView& lines, const Backg
     light.coherence = compute_stripe_coherence_between_parts(lines, chords, background,
                                                              light.stripes.period_lines);
   }
-  if (light.stripes.contrast < kMinContrast)
-    light.clipped_fraction = clipped_fraction(lines, low, high);
+  if (light.stripes.contrast < kMinContrast) {
+    light.clipped_fraction =
+        clipped_fraction(lines, shape_.swap_image_and_scanline_axes(light.box_min),
+                         shape_.swap_image_and_scanline_axes(light.box_max));
+  }
 }
 
-void LightDetector::correct_light_centers_for_motion(std::vector<Light>& lights) const {
-  const auto has_sharp_circle = [](const Light& light) {
-    return !light.outline_sums.empty() && !light.is_glow && !light.is_uneven;
-  };
-  std::vector<OutlineSums> sums;
-  for (const Light& light : lights) {
-    if (has_sharp_circle(light)) sums.push_back(light.outline_sums);
+void LightDetector::correct_light_centers_for_motion(const ImageView& lines,
+                                                     const Background& background,
+                                                     std::vector<Light>& lights) const {
+  constexpr int num_passes = 2;  // the fit of a circle to a strongly sheared outline is inaccurate
+  constexpr double start_blur_px = 0.5, rim_log_radius_sd = 0.02;
+  std::vector<std::optional<Oval>> ovals(lights.size());
+  std::vector<Eigen::Vector2d> motions(lights.size(), Eigen::Vector2d::Zero());
+  for (int pass = 0; pass < num_passes; ++pass) {
+    std::vector<OutlineEquations> outlines;
+    for (const Light& light : lights) {
+      if (light.outline_equations) outlines.push_back(*light.outline_equations);
+    }
+    const auto shear = Shear::estimate_shear_from_outlines(outlines);
+    if (!shear) break;
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+      Light& light = lights[i];
+      if (!light.outline_equations) continue;
+      Oval oval = shear->predict_oval_from_motion(*light.outline_equations);
+      const Eigen::Vector2d motion = shear->motion_per_scanline(*light.outline_equations);
+      std::optional<KnownRadius> radius;
+      if (light.is_uneven) {
+        radius = {1 / std::sqrt(std::abs(light.unit_from_plane.determinant())), rim_log_radius_sd};
+      }
+      const auto fit = fit_disc_outline(
+          lines, {light.plane_center, oval.unit_from_oval() * light.unit_from_plane}, start_blur_px,
+          light.stripes.period_lines, background, shape_, radius);
+      if (fit && set_fitted_outline(*fit, shape_, light)) {
+        motions[i] += motion;
+        oval.oval.setZero();
+      } else if (pass == 0) {
+        motions[i] = motion;
+      }
+      if (pass == 0 || fit) ovals[i] = oval;
+    }
   }
-  const auto shear = Shear::estimate_shear_from_outlines(sums);
-  if (!shear) return;
-  for (Light& light : lights) {
-    if (!has_sharp_circle(light)) continue;
-    shape_.correct_light_for_motion(shear->predict_oval_from_motion(light.outline_sums),
-                                    shear->motion_per_scanline(light.outline_sums), light);
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    if (ovals[i]) shape_.correct_light_for_motion(*ovals[i], motions[i], lights[i]);
   }
 }
 
@@ -495,9 +554,9 @@ std::vector<Light> LightDetector::detect_lights(const ImageView& image) const {
       parts.push_back(std::move(part));
   }
   std::vector<Light> lights = join_parts_of_one_light(parts, shape_, background);
-  for (Light& light : lights) refine_and_measure_light(lines, background, light);
-  correct_light_centers_for_motion(lights);
+  for (Light& light : lights) measure_stripes_and_fit_outline(lines, background, light);
   add_lights_found_by_modulation(lines, blobs, background, lights);
+  correct_light_centers_for_motion(lines, background, lights);
   for (Light& light : make_lights_without_outline(std::move(parts), lights, shape_, lines.size())) {
     lights.push_back(std::move(light));
   }
@@ -612,7 +671,7 @@ void LightDetector::identify_lamps_of_lights(std::vector<Light>& lights,
   // A surface that blurs the image of a lamp reflects less than 5 % of its light in one direction.
   // A tone curve of gamma 2.2 displays this as a quarter of the level.
   constexpr double min_peak_ratio = 0.25;
-  constexpr double max_rise_ratio = 5, max_outside = 0.25;
+  constexpr double max_rise_ratio = 3, min_rise_px = 1, max_outside = 0.25;
   double sharpest_px = std::numeric_limits<double>::infinity(), brightest = 0;
   for (Light& light : lights) {
     if (light.kind == LightKind::no_outline) continue;
@@ -623,7 +682,7 @@ void LightDetector::identify_lamps_of_lights(std::vector<Light>& lights,
       light.lamp.reset();
       continue;
     }
-    if (!light.is_uneven && !light.is_glow) sharpest_px = std::min(sharpest_px, light.rise_px);
+    if (!light.is_glow) sharpest_px = std::min(sharpest_px, light.rise_px);
     if (!light.is_found_by_modulation) light.lamp = identify_lamp_by_stripes(light.stripes);
     if (!are_stripes_readable(light.stripes)) light.reason = LightReason::no_clear_period;
     if (!light.lamp) continue;
@@ -643,7 +702,7 @@ void LightDetector::identify_lamps_of_lights(std::vector<Light>& lights,
     const bool has_other_outline = light.outside_ratio > max_outside;
     const bool is_soft = light.is_glow
                              ? light.peak_level < min_peak_ratio * brightest
-                             : !light.is_uneven && light.rise_px > max_rise_ratio * sharpest_px;
+                             : light.rise_px > max_rise_ratio * std::max(sharpest_px, min_rise_px);
     if (is_soft) {
       reject(light, LightReason::reflection);
     } else if (has_other_outline || light.inlier_fraction < kMinInlierFraction) {

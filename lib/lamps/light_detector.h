@@ -32,11 +32,11 @@ DetectorCamera make_detector_camera(const Calibration& calibration);
 /// Detects and identifies the lamps of a map in images of a rolling-shutter camera. All methods are
 /// const and thread-safe.
 ///
-/// Center: estimated from the outline of the lit scanlines, never from brightness, see LightShape.
-/// Other shapes than discs are searched if the map has them, see ShapeDetector. Where no light with
-/// a clear outline is identified, lights are detected by their modulation, whatever their shape,
-/// see find_modulated_lights(). Their center is that of their rim, see fit_rim_of_light(). Without
-/// a clear rim it is the centroid of the lit area.
+/// Center: from a fit of the outline to the levels near it, see fit_disc_outline(); LightShape
+/// gives the first outline. Other shapes than discs are searched if the map has them, see
+/// ShapeDetector. Where no light with a clear outline is identified, lights are detected by their
+/// modulation, whatever their shape, see find_modulated_lights(). Their center is that of their
+/// rim, see fit_rim_of_light(). Without a rim it is the centroid of the lit area.
 ///
 /// Identity: a lamp of frequency f has stripes with a period of 1 / (f row_time) scanlines (Chen
 /// and Guan, section 2.1). With a trained classifier the classifier decides.
@@ -67,18 +67,35 @@ class LightDetector {
   void add_lights_found_by_modulation(const ImageView& lines, const std::vector<Blob>& blobs,
                                       const Background& background,
                                       std::vector<Light>& lights) const;
-  /// Adds a lamp whose light is at `pixel` to `lamps` if its size and the lens are known.
-  void add_lamp_in_plane(const Lamp* lamp, const Eigen::Vector2d& pixel,
-                         std::vector<LampInPlane>& lamps) const;
-  /// Predicts the radius of a lamp in the image; std::nullopt if it is no disc of known size.
-  std::optional<RadiusRange> predict_radius(const Lamp& lamp, const ModulatedLight& found,
-                                            const InverseHeight& inverse_height) const;
+  /// Rims of lights, and the inverse height from the distances between identified lamps.
+  struct RimFits {
+    std::vector<std::optional<Light>> rims;
+    std::optional<InverseHeight> inverse_height;
+  };
+  /// Fits the rims of modulated lights. Distances between identified lamps determine the height of
+  /// the camera, and thereby the radii of the rims. Rims determine the height more accurately;
+  /// the other ones are then fitted again.
+  /// @param lamps  identified lights with a clear outline
+  RimFits fit_rims(const ImageView& lines, const std::vector<ModulatedLight>& found,
+                   const std::vector<Blob>& blobs, const Background& background,
+                   const std::vector<LampInPlane>& lamps) const;
+  /// Returns the radius of a lamp in the level plane; std::nullopt if it is no disc of known size,
+  /// or if the height is unknown.
+  std::optional<KnownRadius> predict_radius(
+      const Lamp* lamp, const std::optional<InverseHeight>& inverse_height) const;
+  /// Returns a lamp whose light is at `pixel`; std::nullopt if its size or the lens is unknown.
+  /// @param center_sd  standard deviation of the center per axis, in radii
+  std::optional<LampInPlane> make_lamp_in_plane(const Lamp* lamp, const Eigen::Vector2d& pixel,
+                                                double center_sd) const;
+  /// Returns the lamp with the period of a modulated light; nullptr if there is none or several.
+  const Lamp* find_lamp_of_period(const ModulatedLight& found) const;
   double compute_height_beyond_first_lamp_m(const Lamp& lamp) const;
-  /// Refines the outline of a light and measures its stripes.
-  void refine_and_measure_light(const ImageView& lines, const Background& background,
-                                Light& light) const;
-  /// Corrects the centers of partly visible lights for camera motion, see Shear.
-  void correct_light_centers_for_motion(std::vector<Light>& lights) const;
+  /// Measures the stripes of a light and fits its outline.
+  void measure_stripes_and_fit_outline(const ImageView& lines, const Background& background,
+                                       Light& light) const;
+  /// Fits the outlines of discs again, twice, sheared by the camera motion that Shear estimates.
+  void correct_light_centers_for_motion(const ImageView& lines, const Background& background,
+                                        std::vector<Light>& lights) const;
   void identify_lamps_of_lights(std::vector<Light>& lights, const ImageSize& size) const;
   /// Returns the absolute difference between the log aspect ratios of a light and a lamp. Returns
   /// std::nullopt if the light has another shape or the difference exceeds its limit.

@@ -75,13 +75,14 @@ Identified identified(const fs::path& data, const ImageProcessing& picture) {
     if (!found.contains(image)) found[image] = lamps_in(detector, picture(data / image));
     const auto lamp = found[image].find(table.get_cell_integer(row, lamp_column));
     if (lamp == found[image].end()) continue;
-    // Expected positions are those of the lit area, accurate to about 20 px; its middle is not that
-    // of the rim.
+    // Expected positions are those of the lit area, accurate to about 20 px. It may be anywhere
+    // within the rim.
     const Eigen::Vector2d expected(table.get_cell_number(row, u_column),
                                    table.get_cell_number(row, v_column));
     const double apart_px = (lamp->second.pixel - expected).norm();
     ++result.lamps;
-    result.wrong += apart_px > table.get_cell_number(row, size_column) / 2;
+    result.wrong += apart_px > std::max(table.get_cell_number(row, size_column) / 2,
+                                        lamp->second.is_glow ? 0 : lamp->second.radius_px);
   }
   return result;
 }

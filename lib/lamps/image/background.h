@@ -25,10 +25,11 @@ struct Background {
 /// Estimates dark level, noise and threshold of an image. @pre The image is not empty.
 Background estimate_image_background(const ImageView& image);
 
-/// Estimates the background of an image of which lights cover the larger part, so that the median
-/// is none of the dark level. Uses the darker of two classes of pixels, which differ most. Returns
-/// std::nullopt if less than 5 % of the image is brighter than the threshold of this class, as in
-/// an image of noise. @pre The image is not empty.
+/// Estimates the background of an image that lights cover by more than half, where the median is a
+/// lit level. Uses the darker one of two classes of pixels (Otsu 1979). Returns std::nullopt if
+/// less than 5 % of the image is brighter than the threshold of this class, as in an image of
+/// noise.
+/// @pre The image is not empty.
 std::optional<Background> estimate_background_behind_lights(const ImageView& image);
 
 }  // namespace vlp

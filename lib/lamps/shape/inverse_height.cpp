@@ -12,7 +12,7 @@ double InverseHeight::compute_radius_in_plane(double radius_m, double height_bey
 }
 
 std::optional<InverseHeight> estimate_inverse_height(const std::vector<LampInPlane>& lamps) {
-  constexpr double center_sd_radii = 0.5, min_sd = 0.06, max_sd = 0.2;
+  constexpr double min_sd = 0.015, max_sd = 0.2;
   struct Pair {
     double log_value, weight;
   };
@@ -29,19 +29,19 @@ std::optional<InverseHeight> estimate_inverse_height(const std::vector<LampInPla
       const double distance_m = (a.position_m - b.position_m).norm();
       const double excess = rise_m.squaredNorm() - distance_m * distance_m;
       const double height_m = (std::sqrt(half * half - square * excess) - half) / square;
-      const double weight = distance_m / (a.radius_m + b.radius_m);
+      const double weight = distance_m / std::hypot(a.center_sd_m, b.center_sd_m);
       if (!(height_m > 0) || !std::isfinite(height_m)) continue;
       pairs.push_back({-std::log(height_m), weight});
       total += weight;
       largest = std::max(largest, weight);
     }
   }
-  if (pairs.empty() || center_sd_radii / largest > max_sd) return std::nullopt;
+  if (pairs.empty() || largest * max_sd < 1) return std::nullopt;
   std::ranges::sort(pairs, {}, &Pair::log_value);
   double sum = 0;
   const auto middle = std::ranges::find_if(
       pairs, [&](const Pair& pair) { return (sum += pair.weight) >= total / 2; });
-  return InverseHeight{middle->log_value, std::max(min_sd, center_sd_radii / largest)};
+  return InverseHeight{middle->log_value, std::max(min_sd, 1 / largest)};
 }
 
 }  // namespace vlp

@@ -9,10 +9,11 @@
 namespace vlp {
 
 /// Lamp in an image: its approximate position in the level plane at height 1, its position in the
-/// map, its height beyond the first lamp of the map, seen from the camera, and its radius.
+/// map, its height beyond the first lamp of the map, seen from the camera, and the standard
+/// deviation of the position in the image per axis, in meters at the lamp.
 struct LampInPlane {
   Eigen::Vector2d position_in_plane, position_m;
-  double height_beyond_first_m, radius_m;
+  double height_beyond_first_m, center_sd_m;
 };
 
 /// Ratio of the level plane and the room: 1 / height of the first lamp of the map above the camera,
@@ -30,8 +31,8 @@ struct InverseHeight {
 ///     |p_i (h + z_i) - p_j (h + z_j)| = |x_i - x_j|,
 ///
 /// with the positions p in the plane and x in the map. The result is the median over all pairs,
-/// weighted by the distance in radii, because the center of a light may be anywhere in
-/// its lamp. Returns std::nullopt without lamps that are far enough apart.
+/// weighted by the ratio of distance and standard deviation. Returns std::nullopt if no pair has a
+/// relative standard deviation of at most 20 %.
 std::optional<InverseHeight> estimate_inverse_height(const std::vector<LampInPlane>& lamps);
 
 }  // namespace vlp

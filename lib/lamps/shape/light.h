@@ -74,8 +74,8 @@ struct Light {
   /// True if the outline may differ from the outline of the lamp: blurred, partly visible, or that
   /// of a source in a reflector, much brighter inside than next to its outline.
   bool is_doubtful;
-  /// True if the light is lit unevenly and its outline is a rim, see fit_rim_of_light(). Its
-  /// inlier_fraction is then that of the ends of its lit scanlines that show the rim.
+  /// True if the outline is a rim, see fit_rim_of_light(). Its inlier_fraction is then that of
+  /// OutlineFit.
   bool is_uneven;
   /// Width of the edge from 25 % to 75 % of the level, in pixels.
   double rise_px;
@@ -84,16 +84,17 @@ struct Light {
   /// Ratio of the long to the short axis in the plane of LightShape, and the standard deviation of
   /// its logarithm; 1 and 0 for discs.
   double aspect = 1, aspect_sd = 0;
-  /// Discs: fraction of the blob's edge points that lie on the circle. Rectangles: fraction of the
-  /// pixels along the worst edge that agree with the edge model.
+  /// Discs: fraction of the blob's edge points that lie on the first outline. Rectangles: fraction
+  /// of the pixels along the worst edge that agree with the edge model.
   double inlier_fraction;
   /// Ratio of the number of the blob's edge points outside all lights of the blob to the number of
   /// edge points on the outline.
   double outside_ratio;
-  /// Points of the outline, (column, line): (v, u) for readout along columns.
+  /// Points of the first outline, or of the rim, (column, line): (v, u) for readout along columns.
   std::vector<EdgePoint> outline;
-  /// Normal equations of the circle fit in the level plane; empty for other outlines.
-  OutlineSums outline_sums;
+  /// Normal equations of the circle in the level plane, for discs with a known lens that were
+  /// fitted by fit_disc_outline().
+  std::optional<OutlineEquations> outline_equations;
 };
 
 /// Minimum of Light::inlier_fraction for an identified lamp.

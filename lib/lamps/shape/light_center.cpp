@@ -110,24 +110,6 @@ std::optional<RobustEllipse> fit_circle_or_ellipse(const WeightedOutline& outlin
   return fit;
 }
 
-/// Sets the center of a light and its bounding box. Returns false if the lens does not cover its
-/// rim.
-bool set_center_and_box(const RobustEllipse& fit, const LightShape& shape, Light& light) {
-  const auto pixel = shape.pixel_from_level_plane_point(fit.center);
-  if (!pixel) return false;
-  light.pixel = light.box_min = light.box_max = *pixel;
-  for (int i = 0; i < 16; ++i) {
-    const double angle = std::numbers::pi / 8 * i;
-    const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
-    const auto rim =
-        shape.pixel_from_level_plane_point(fit.center + fit.rim_from_circle * direction);
-    if (!rim) return false;
-    light.box_min = light.box_min.cwiseMin(*rim);
-    light.box_max = light.box_max.cwiseMax(*rim);
-  }
-  return true;
-}
-
 }  // namespace
 
 Eigen::Vector2d LightShape::swap_image_and_scanline_axes(const Eigen::Vector2d& at) const {
@@ -156,37 +138,48 @@ std::optional<Eigen::Vector2d> LightShape::pixel_from_level_plane_point(
   return camera_.lens->project_point(camera_.level_from_camera.transpose() * plane.homogeneous());
 }
 
+bool LightShape::set_outline_of_light(const PlaneEllipse& outline, double radius_px,
+                                      Light& light) const {
+  const auto pixel = pixel_from_level_plane_point(outline.center);
+  if (!pixel) return false;
+  const Matrix2 rim_from_circle = outline.unit_from_plane.inverse();
+  Eigen::Vector2d box_min = *pixel, box_max = *pixel;
+  for (int i = 0; i < 16; ++i) {
+    const double angle = std::numbers::pi / 8 * i;
+    const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
+    const auto rim = pixel_from_level_plane_point(outline.center + rim_from_circle * direction);
+    if (!rim) return false;
+    box_min = box_min.cwiseMin(*rim);
+    box_max = box_max.cwiseMax(*rim);
+  }
+  light.pixel = *pixel;
+  light.box_min = box_min;
+  light.box_max = box_max;
+  light.plane_center = outline.center;
+  light.unit_from_plane = outline.unit_from_plane;
+  light.radius_px = radius_px;
+  return true;
+}
+
 std::optional<Light> LightShape::fit_light_to_outline(std::vector<EdgePoint> outline,
-                                                      const Background& background,
-                                                      bool is_mottled) const {
+                                                      const Background& background) const {
   const WeightedOutline weighted = make_weighted_outline(std::move(outline), *this);
   if (weighted.points.size() < kMinOutlinePoints || !(weighted.per_px > 0)) return std::nullopt;
   const auto fit = fit_circle_or_ellipse(weighted, background.noise, camera_);
   Light light{};
-  if (!fit || !set_center_and_box(*fit, *this, light)) return std::nullopt;
-  light.plane_center = fit->center;
-  light.unit_from_plane = fit->rim_from_circle.inverse();
-  light.radius_px = std::sqrt(fit->rim_from_circle.determinant()) / weighted.per_px;
+  if (!fit) return std::nullopt;
+  const double radius_px = std::sqrt(fit->rim_from_circle.determinant()) / weighted.per_px;
+  if (!set_outline_of_light({fit->center, fit->rim_from_circle.inverse()}, radius_px, light))
+    return std::nullopt;
   const std::vector<EdgePoint>& edges = weighted.edges;
   const std::vector<bool> selected = select_points_on_circle(edges, fit->inliers);
-  const double num_correlated =
-      is_mottled ? estimate_num_correlated_points(weighted.points, edges, selected, *fit) : 1;
   const auto sigma_px =
-      limit_center_sd(compute_center_sd(fit->center_covariance, num_correlated) / weighted.per_px);
+      limit_center_sd(compute_center_sd(fit->center_covariance) / weighted.per_px);
   if (!sigma_px) return std::nullopt;
   light.sigma_px = *sigma_px;
   light.inlier_fraction = double(fit->count) / double(edges.size());
   for (std::size_t i = 0; i < edges.size(); ++i) {
     if (selected[i]) light.outline.push_back(edges[i]);
-  }
-  if (camera_.lens) {
-    const Circle circle = fit->to_circle();
-    light.outline_sums = {weighted.points,
-                          weighted.weights,
-                          selected,
-                          circle,
-                          compute_scanline_gradient_wrt_position(circle),
-                          num_correlated};
   }
   light.rise_px = compute_median_rise_px(light.outline);
   return light;
@@ -221,9 +214,9 @@ Eigen::Vector2d LightShape::compute_center_offset_from_curved_scanlines(
 
 void LightShape::correct_light_for_motion(const Oval& oval, const Eigen::Vector2d& motion_per_line,
                                           Light& light) const {
-  const auto estimate = light.outline_sums.solve_outline_with_oval_prior(oval);
+  const auto estimate = light.outline_equations->solve_with_oval_prior(oval);
   if (!estimate) return;
-  const Circle& circle = light.outline_sums.fitted_circle();
+  const Circle& circle = light.outline_equations->circle;
   const auto pixel = pixel_from_level_plane_point(
       circle.center + circle.radius * estimate->p.head<2>() -
       compute_center_offset_from_curved_scanlines(circle, motion_per_line));

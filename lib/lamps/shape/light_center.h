@@ -29,29 +29,39 @@ struct DetectorCamera {
   double max_axis_ratio = 2;
 };
 
-/// Estimates the shape of lights from their outline. Edge points are projected through the lens
-/// into the level plane, where a circle is fitted robustly. The center of the circle is projected
-/// back to the image. Reason: the center of an outline in the image is not the image of the center
-/// (lib/THEORY.md, "Lamp centroid"). Without a lens an ellipse is fitted in the image.
+/// Ellipse |unit_from_plane (p - center)| = 1 in the plane of LightShape. With a lens it is a
+/// circle.
+struct PlaneEllipse {
+  Eigen::Vector2d center;
+  Matrix2 unit_from_plane;
+};
+
+/// Fits the first outlines of lights, see fit_disc_outline() for the final ones. Edge points are
+/// projected through the lens into the level plane, where a circle is fitted robustly. The center
+/// of the circle is projected back to the image. Reason: the center of an outline in the image is
+/// not the image of the center (lib/THEORY.md, "Lamp centroid"). Without a lens an ellipse is
+/// fitted in the image.
 class LightShape {
  public:
   explicit LightShape(const DetectorCamera& camera) : camera_(camera) {}
 
-  /// Fits a light to the majority of the points of an outline. Sets all members but kind, lamp and
-  /// stripes. Returns std::nullopt if the outline is not round, or if the sigma of its center
-  /// exceeds kMaxSigma_px, about a pixel.
+  /// Fits a light to the majority of the points of an outline. Sets center, sigma_px, outline, box,
+  /// radius, rise_px and inlier_fraction. Returns std::nullopt if the outline is not round, or if
+  /// the sigma of its center exceeds kMaxSigma_px.
   ///
   /// @param outline     edge points, (column, line)
   /// @param background  dark level and noise of the image
-  /// @param is_mottled  RefinedOutline::is_mottled: sigma then allows for correlated errors of
-  ///        neighboring points
   std::optional<Light> fit_light_to_outline(std::vector<EdgePoint> outline,
-                                            const Background& background,
-                                            bool is_mottled = false) const;
+                                            const Background& background) const;
 
-  /// Corrects center and sigma_px of a light for camera motion.
+  /// Sets center, outline, bounding box and radius of a light. Returns false, and changes nothing,
+  /// if the lens does not cover its rim.
+  bool set_outline_of_light(const PlaneEllipse& outline, double radius_px, Light& light) const;
+
+  /// Corrects center and sigma_px of a light for camera motion. @pre light.outline_equations has a
+  /// value.
   ///
-  /// @param oval             ovality of its outline
+  /// @param oval             prior of the ovality, relative to the fitted outline, in radii
   /// @param motion_per_line  motion of the light in the level plane per scanline
   void correct_light_for_motion(const Oval& oval, const Eigen::Vector2d& motion_per_line,
                                 Light& light) const;
@@ -72,11 +82,11 @@ class LightShape {
   std::optional<Eigen::Vector2d> level_plane_point_from_pixel(const Eigen::Vector2d& pixel) const;
   std::optional<Eigen::Vector2d> pixel_from_level_plane_point(const Eigen::Vector2d& plane) const;
 
- private:
   /// Returns the derivative of the scanline at which a point near the circle is read with respect
   /// to its x, y.
   Eigen::Vector2d compute_scanline_gradient_wrt_position(const Circle& circle) const;
 
+ private:
   /// Returns the center error of a circle's outline that lens distortion of the scanlines causes:
   /// on average the outline is read later, or earlier, than the center. The outline in direction a
   /// is displaced by m (l(a) - l). m is the motion per scanline, l(a) the scanline of the outline,

@@ -4,63 +4,30 @@
 
 #include <Eigen/Core>
 #include <optional>
-#include <vector>
 
-#include "lamps/image/background.h"
 #include "lamps/image/pixel_box.h"
 #include "lamps/shape/light.h"
-#include "lamps/shape/light_center.h"
-#include "lamps/shape/robust_ellipse.h"
 
 namespace vlp {
 
 // Noise model of lamp centers, Light::sigma_px:
 //
-//     sigma^2 = n trace(C) / 2 + sum of b^2
+//     sigma^2 = trace(C) / 2 + sum of b^2
 //
-//   C  covariance of the center from the fit of its outline: fit_robust_circle(),
-//      fit_straight_edge(), estimate_outline_offset(), or OutlineSums for a camera that moves
-//   n  number of points with a common error, 1 if their errors are independent
-//   b  systematic errors per axis: another tone curve, another possible center, a hidden end, an
-//      unknown lens
+//   C  covariance of the center from the fit of its outline: fit_disc_outline(),
+//      fit_straight_edge(), or OutlineEquations for a camera that moves
+//   b  systematic errors per axis: another possible center, a hidden end, an unknown lens
 //
-// A rim without clear steps has the standard deviation of the jackknife. A center without an
-// outline has ModulatedLight::center_sd_px.
+// A center without an outline has ModulatedLight::center_sd_px.
 
-/// Returns the standard deviation per axis, sqrt(n trace(C) / 2 + |bias|^2 / 2), in the unit of
-/// the covariance C.
-double compute_center_sd(const Matrix2& covariance, double num_correlated = 1,
-                         const Eigen::Vector2d& bias = Eigen::Vector2d::Zero());
+/// Returns the standard deviation per axis, sqrt(trace(C) / 2), in the unit of the covariance C.
+double compute_center_sd(const Matrix2& covariance);
 
 /// Returns the standard deviation, at least kMinSigma_px; std::nullopt if it exceeds kMaxSigma_px.
 std::optional<double> limit_center_sd(double sigma_px);
 
 /// Adds an independent error of the center to Light::sigma_px, up to kMaxSigma_px.
 void add_error_to_center_sigma(double sd_px, Light& light);
-
-/// Returns the number of points with a common error. It is the sum of the products of the errors of
-/// neighboring points, including their own squares, divided by the sum of squares. For independent
-/// errors the fit, which removes three degrees of freedom, causes products of -3 / n of the mean
-/// square; this is corrected.
-///
-/// @param points   outline in the plane of the fit
-/// @param outline  the same points in the image
-/// @param counted  points that are used
-double estimate_num_correlated_points(const std::vector<Eigen::Vector2d>& points,
-                                      const std::vector<EdgePoint>& outline,
-                                      const std::vector<bool>& counted, const RobustEllipse& fit);
-
-/// Returns the number of points with a common error: those of a stripe, on consecutive scanlines.
-double count_outline_points_per_stripe(const std::vector<EdgePoint>& outline);
-
-/// Returns the standard deviation per axis of a light's center by the delete-a-group jackknife
-/// (Efron and Tibshirani 1993, section 11.5): its outline is fitted again without each of its
-/// pieces. A piece on another edge than the others moves the center by more than the scatter of its
-/// points. Outliers of the fit are excluded beforehand. Returns std::nullopt if the outline without
-/// one of the pieces has no center.
-std::optional<double> estimate_center_sd_by_jackknife_px(const Light& light,
-                                                         const Background& background,
-                                                         const LightShape& shape);
 
 /// Adds the error of a partly hidden light to its sigma. If the aspect ratio differs from that of
 /// the lamp, an object may hide one end: the center of the visible part is offset by half of the

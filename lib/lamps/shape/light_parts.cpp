@@ -26,8 +26,7 @@ bool may_belong_together(const PixelBox& a, const PixelBox& b) {
 
 /// Returns true if a part is not a piece of a light that an occluder splits.
 bool is_whole_light(const LightPart& part) {
-  return part.light &&
-         (part.light->is_glow || part.light->is_uneven || !is_light_disc_shaped(*part.light));
+  return part.light && !is_light_disc_shaped(*part.light);
 }
 
 std::size_t count_points(const LightPart& part) {

@@ -7,12 +7,11 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numbers>
 #include <utility>
 #include <vector>
 
 #include "geometry/median.h"
-#include "lamps/shape/light_center_noise.h"
-#include "lamps/shape/rim_fit.h"
 
 namespace vlp {
 namespace {
@@ -39,37 +38,33 @@ struct Ellipse {
     const double half = std::sqrt((1 - square) / a), middle = center.x() - b / a;
     return Crossing{middle - half, middle + half, std::sqrt(square)};
   }
-
-  /// Returns the cosine of the angle between the outline's normal at a point and the scanlines.
-  double compute_normal_cosine(const Eigen::Vector2d& pixel) const {
-    const Eigen::Vector2d normal =
-        unit_from_pixel.transpose() * (unit_from_pixel * (pixel - center));
-    return std::abs(normal.x()) / normal.norm();
-  }
-
-  double mean_radius_px() const { return 1 / std::sqrt(std::abs(unit_from_pixel.determinant())); }
 };
 
-/// Returns the derivative of the level plane with respect to (column, row) at a pixel, scaled to
-/// determinant 1.
-Matrix2 compute_unit_plane_from_pixel(const LightShape& shape, const Eigen::Vector2d& pixel) {
+/// Returns the derivative of the level plane with respect to (column, row) at a pixel; std::nullopt
+/// if the lens does not cover it.
+std::optional<Matrix2> compute_plane_from_pixel(const LightShape& shape,
+                                                const Eigen::Vector2d& pixel) {
   constexpr double step_px = 1;
-  Matrix2 derivative = Matrix2::Identity();
+  Matrix2 derivative;
   const auto at = shape.level_plane_point_from_pixel(shape.swap_image_and_scanline_axes(pixel));
   for (int i = 0; i < 2; ++i) {
     const auto beside = shape.level_plane_point_from_pixel(
         shape.swap_image_and_scanline_axes(pixel + step_px * Eigen::Vector2d::Unit(i)));
-    if (!at || !beside) return Matrix2::Identity();
-    derivative.col(i) = *beside - *at;
+    if (!at || !beside) return std::nullopt;
+    derivative.col(i) = (*beside - *at) / step_px;
   }
-  const double determinant = std::abs(derivative.determinant());
-  return determinant > 0 ? Matrix2(derivative / std::sqrt(determinant)) : Matrix2::Identity();
+  return derivative;
 }
 
 /// Ellipse in the image, and the sum of e over its crossings with lit scanlines.
 struct Ring {
   Ellipse ellipse;
   double sum;
+};
+
+/// Range of the radius of a ring, in pixels.
+struct RadiusRange {
+  double min_px, max_px;
 };
 
 /// Levels above the dark level in the box of a light with a margin.
@@ -115,24 +110,6 @@ class Face {
     const double ratio = (inside + soft_) / (outside + soft_);
     const double slope = std::max(1.0, (beyond + soft_) / (inside + soft_));
     return std::log(ratio / slope);
-  }
-
-  /// Returns the column next to a border where the level of a scanline crosses the given fraction
-  /// between the levels on both sides.
-  std::optional<double> find_level_passage(int line, int column, double fraction) const {
-    const auto [before, after] = around(line, column);
-    const auto [dark, bright] = std::minmax(before, after);
-    const double middle = dark + fraction * (bright - dark), sign = after > before ? 1 : -1;
-    const double border = column - 0.5;
-    std::optional<double> nearest;
-    for (int i = column - window_; i + 1 < column + window_; ++i) {
-      const double from = sign * (levels_[index(line, i)] - middle);
-      const double to = sign * (levels_[index(line, i + 1)] - middle);
-      if (!(from < 0 && to >= 0)) continue;
-      const double at = i - from / (to - from);
-      if (!nearest || std::abs(at - border) < std::abs(*nearest - border)) nearest = at;
-    }
-    return nearest;
   }
 
  private:
@@ -268,81 +245,6 @@ Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_
   return best;
 }
 
-/// Returns the ellipse of a light's outline, linearized at its center.
-Ellipse make_ellipse(const Light& light, const LightShape& shape) {
-  const Eigen::Vector2d low = shape.swap_image_and_scanline_axes(light.box_min),
-                        high = shape.swap_image_and_scanline_axes(light.box_max);
-  const Eigen::Vector2d center = (low + high) / 2;
-  Matrix2 unit_from_pixel;
-  const auto at = shape.level_plane_point_from_pixel(shape.swap_image_and_scanline_axes(center));
-  for (int i = 0; i < 2; ++i) {
-    // The difference spans the whole outline, because of lens distortion.
-    const double reach_px = (high - low)[i] / 2;
-    const auto beside = shape.level_plane_point_from_pixel(
-        shape.swap_image_and_scanline_axes(center + reach_px * Eigen::Vector2d::Unit(i)));
-    const auto before = shape.level_plane_point_from_pixel(
-        shape.swap_image_and_scanline_axes(center - reach_px * Eigen::Vector2d::Unit(i)));
-    if (!at || !beside || !before) return {center, Matrix2::Identity() / light.radius_px};
-    unit_from_pixel.col(i) = light.unit_from_plane * (*beside - *before) / (2 * reach_px);
-  }
-  return {center, unit_from_pixel};
-}
-
-/// Returns the clearest steps within `reach_px` of an ellipse in the image.
-std::vector<EdgePoint> find_steps_near_ring(const Face& face, const Ellipse& ellipse,
-                                            double reach_px) {
-  constexpr double min_step = 0.35, min_cosine = 0.3;
-  std::vector<EdgePoint> points;
-  std::vector<double> levels;
-  for (const int line : face.bright_stripe_scanlines()) {
-    const auto crossing = ellipse.intersect(line);
-    if (!crossing) continue;
-    for (const bool begins : {true, false}) {
-      const double column = begins ? crossing->begin : crossing->end;
-      const double cosine = ellipse.compute_normal_cosine({column, double(line)});
-      if (cosine < min_cosine) continue;
-      const double at = column + 0.5;
-      const double reach = reach_px / std::max(cosine, 0.5);
-      double best = min_step;
-      std::optional<int> border;
-      for (int i = static_cast<int>(std::ceil(at - reach)); i <= at + reach; ++i) {
-        const double step = face.step(line, i, begins);
-        if (step > best) best = step, border = i;
-      }
-      if (!border) continue;
-      const auto at_half = face.find_level_passage(line, *border, 0.5);
-      const auto low_end = face.find_level_passage(line, *border, 0.25);
-      const auto high_end = face.find_level_passage(line, *border, 0.75);
-      if (!at_half || !low_end || !high_end) continue;
-      const auto [before, after] = face.around(line, *border);
-      levels.push_back(std::max(before, after));
-      points.push_back({{*at_half, line}, 0, std::abs(*high_end - *low_end), begins});
-    }
-  }
-  // All points have the same weight: a dim part of the rim is as accurate as a bright one.
-  if (!levels.empty()) {
-    const double level = upper_median(std::move(levels));
-    for (EdgePoint& point : points) point.level = level;
-  }
-  return points;
-}
-
-/// Fits a light to the steps near a ring.
-std::optional<Light> fit_light_near_ring(const Ring& ring, const Face& face,
-                                         const Background& background, const LightShape& shape) {
-  Ellipse ellipse = ring.ellipse;
-  std::optional<Light> light;
-  for (const double reach : {0.16, 0.12, 0.08, 0.08}) {
-    const double reach_px = reach * ring.ellipse.mean_radius_px();
-    auto better =
-        shape.fit_light_to_outline(find_steps_near_ring(face, ellipse, reach_px), background);
-    if (!better) return std::nullopt;
-    light = std::move(better);
-    ellipse = make_ellipse(*light, shape);
-  }
-  return light;
-}
-
 /// Returns the level above the dark level that one line of ten exceeds at the middle or the
 /// quarters of its runs.
 double measure_bright_level(const ImageView& image, const Blob& blob, double dark) {
@@ -358,44 +260,6 @@ double measure_bright_level(const ImageView& image, const Blob& blob, double dar
   const auto tenth = levels.begin() + std::ptrdiff_t(levels.size() * 9 / 10);
   std::nth_element(levels.begin(), tenth, levels.end());
   return *tenth - dark;
-}
-
-/// Fits a light and the sigma of its center to the steps next to its outline. These have no bias if
-/// the contrast of the sides differs. Returns std::nullopt unless most pieces of the outline show a
-/// step.
-std::optional<Light> fit_light_to_steps(const ImageView& image, const std::vector<int>& lit_lines,
-                                        const Background& background, const LightShape& shape,
-                                        Light light) {
-  constexpr int num_iterations = 3;
-  constexpr double first_blur_px = 0.9, min_inlier_fraction = 0.6;
-  // Consumer cameras code approximately light^(1 / 2.2); others barely have the bit depth to record
-  // a rim. The difference to the center with another gamma estimates the error from the tone curve.
-  constexpr double gamma = 2, other_gamma = 1.8;
-  StepImageModel image_model{first_blur_px, gamma};
-  for (int iteration = 1; iteration < num_iterations; ++iteration) {
-    auto steps = fit_brightness_steps_at_rim(image, light, lit_lines, background, image_model,
-                                             iteration > 1, shape);
-    if (!estimate_outline_offset(steps.pieces, shape.has_known_lens())) return std::nullopt;
-    image_model.blur_px = steps.blur_px;
-    auto better = shape.fit_light_to_outline(std::move(steps.points), background);
-    if (!better || 2 * better->outline.size() < light.outline.size()) return std::nullopt;
-    light = std::move(*better);
-  }
-  const auto steps =
-      fit_brightness_steps_at_rim(image, light, lit_lines, background, image_model, true, shape);
-  const auto shift = estimate_outline_offset(steps.pieces, shape.has_known_lens());
-  image_model.gamma = other_gamma;
-  const auto other = estimate_outline_offset(
-      fit_brightness_steps_at_rim(image, light, lit_lines, background, image_model, true, shape)
-          .pieces,
-      shape.has_known_lens());
-  if (!shift || !other ||
-      !(shift->num_inliers > min_inlier_fraction * double(steps.num_examined))) {
-    return std::nullopt;
-  }
-  light.pixel += shape.swap_image_and_scanline_axes(shift->offset_px);
-  light.sigma_px = compute_center_sd(shift->covariance, 1, shift->offset_px - other->offset_px);
-  return light;
 }
 
 }  // namespace
@@ -416,56 +280,64 @@ bool is_blob_unevenly_lit(const ImageView& image, const Blob& blob,
          much * upper_median(std::move(levels));
 }
 
-std::optional<Rim> fit_rim_of_light(const ImageView& image, const Blob& blob,
-                                    const Background& background, const LightShape& shape,
-                                    const std::optional<RadiusRange>& radius) {
+std::optional<Light> fit_rim_of_light(const ImageView& image, const Blob& blob, double period_lines,
+                                      const Background& background, const LightShape& shape,
+                                      const std::optional<KnownRadius>& radius) {
   constexpr int min_size = 20, min_lines = 10;
-  constexpr double margin = 0.2, min_step = 0.28, max_radius = 0.75;
+  constexpr double margin = 0.2, min_step = 0.28, min_known_step = 0.15, max_radius = 0.75,
+                   max_sds = 2;
+  constexpr double min_start_blur_px = 1.5, start_blur = 0.04, max_center_sd = 0.006;
   const PixelBox box = blob.blob_bounding_box();
   if (std::min(box.width, box.height) < min_size) return std::nullopt;
+  const Eigen::Vector2d middle(box.x + box.width / 2.0, box.y + box.height / 2.0);
+  const auto plane_from_pixel = compute_plane_from_pixel(shape, middle);
+  if (!plane_from_pixel) return std::nullopt;
+  const double plane_per_px = std::sqrt(std::abs(plane_from_pixel->determinant()));
   const double blob_size = std::max(box.width, box.height);
   RadiusRange range{blob_size / 6, max_radius * blob_size};
   if (radius) {
-    range = {std::max(range.min_px, radius->min_px), std::min(range.max_px, radius->max_px)};
+    const double radius_px = radius->radius / plane_per_px,
+                 factor = std::exp(max_sds * radius->log_sd);
+    range = {std::max(range.min_px, radius_px / factor),
+             std::min(range.max_px, radius_px * factor)};
   }
   const int margin_px = static_cast<int>(margin * blob_size);
   const PixelBox wide = expand_and_clip_box(box, margin_px, image.size());
-  // Window sizes for the search of the ring and for the rim.
-  const int size = std::max(wide.width, wide.height);
-  const int fine = std::clamp(size / 30, 2, 6), coarse = std::max(fine, size / 50);
-  const Face blurred(image, wide, background, coarse);
-  const Face face = fine == coarse ? blurred : Face(image, wide, background, fine);
+  const int size = std::max(wide.width, wide.height),
+            window = std::max(std::clamp(size / 30, 2, 6), size / 50);
+  const Face face(image, wide, background, window);
   if (face.bright_stripe_scanlines().size() < min_lines) return std::nullopt;
-  const Eigen::Vector2d middle(box.x + box.width / 2.0, box.y + box.height / 2.0);
-  const Ring best =
-      find_best_ring(blurred, box, compute_unit_plane_from_pixel(shape, middle), range);
+  const Ring best = find_best_ring(face, box, *plane_from_pixel / plane_per_px, range);
   const auto crossings = 2 * std::count_if(face.bright_stripe_scanlines().begin(),
                                            face.bright_stripe_scanlines().end(), [&](int line) {
                                              return best.ellipse.intersect(line).has_value();
                                            });
-  if (!(best.sum > min_step * double(crossings))) return std::nullopt;
+  if (!(best.sum > (radius ? min_known_step : min_step) * double(crossings))) return std::nullopt;
 
-  auto light = fit_light_near_ring(best, face, background, shape);
-  if (!light) return std::nullopt;
-  // The fraction counts the clearest steps, before fit_light_to_steps() replaces them.
-  const double rim_fraction = std::min(1.0, double(light->outline.size()) / double(crossings));
-  auto fitted =
-      fit_light_to_steps(image, face.bright_stripe_scanlines(), background, shape, *light);
-  bool is_clear = fitted.has_value();
-  if (fitted) {
-    light = std::move(fitted);
-  } else {
-    const double scatter_px =
-        light->sigma_px * std::sqrt(count_outline_points_per_stripe(light->outline));
-    const auto jackknife_px = estimate_center_sd_by_jackknife_px(*light, background, shape);
-    light->sigma_px = std::max(scatter_px, jackknife_px.value_or(0));
-    is_clear = jackknife_px.has_value();
+  const auto center =
+      shape.level_plane_point_from_pixel(shape.swap_image_and_scanline_axes(best.ellipse.center));
+  if (!center) return std::nullopt;
+  const double ring_radius_px = 1 / std::sqrt(std::abs(best.ellipse.unit_from_pixel.determinant()));
+  const auto fit =
+      fit_disc_outline(image, {*center, Matrix2::Identity() / (plane_per_px * ring_radius_px)},
+                       std::max(min_start_blur_px, start_blur * ring_radius_px), period_lines,
+                       background, shape, radius);
+  Light light{};
+  if (!fit || fit->center_sd_px > max_center_sd * fit->radius_px ||
+      !set_fitted_outline(*fit, shape, light) || (radius && !radius->agrees_with(light))) {
+    return std::nullopt;
   }
-  if (radius && (light->radius_px < radius->min_px || light->radius_px > radius->max_px))
-    is_clear = false;
-  light->is_uneven = true;
-  light->inlier_fraction = rim_fraction;
-  return Rim{std::move(*light), is_clear};
+  constexpr int num_outline_points = 64;
+  for (int i = 0; i < num_outline_points; ++i) {
+    const double angle = 2 * std::numbers::pi * i / num_outline_points;
+    const auto pixel = shape.pixel_from_level_plane_point(
+        light.plane_center +
+        light.unit_from_plane.inverse() * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+    if (pixel) light.outline.push_back({shape.swap_image_and_scanline_axes(*pixel), 0, 0, false});
+  }
+  light.is_uneven = true;
+  light.inlier_fraction = fit->inlier_fraction;
+  return light;
 }
 
 }  // namespace vlp

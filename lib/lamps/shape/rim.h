@@ -10,6 +10,7 @@
 #include "lamps/image/pixel_runs.h"
 #include "lamps/shape/light.h"
 #include "lamps/shape/light_center.h"
+#include "lamps/shape/outline_fit.h"
 
 namespace vlp {
 
@@ -18,19 +19,6 @@ namespace vlp {
 /// point. Returns false if `outline` is empty.
 bool is_blob_unevenly_lit(const ImageView& image, const Blob& blob,
                           const std::vector<EdgePoint>& outline, const Background& background);
-
-/// Result of fit_rim_of_light(): a light whose outline is its rim. `is_clear` is true if at
-/// least one of two conditions holds: more than 60 % of the pieces of the rim show a step, or the
-/// outline still has a center whichever of its eight pieces is omitted.
-struct Rim {
-  Light light;
-  bool is_clear;
-};
-
-/// Smallest and largest radius of a rim in the image, px.
-struct RadiusRange {
-  double min_px, max_px;
-};
 
 /// Fits the rim of an unevenly lit light, such as a source deep in a reflector. Its core is at
 /// least ten times as bright as its rim and moves with the point of view. A part of the rim is
@@ -43,23 +31,22 @@ struct RadiusRange {
 /// b. The constant c is half of the noise threshold, and at least 2 % of the brightest level.
 ///
 /// 1. Searches the circle in the level plane whose crossings with the lit scanlines have the
-/// largest sum of e. Its mean has to be at least 0.28. (Daugman 1993 sums steps of irises.) Circles
-/// in the image would follow a part of a rim that is viewed obliquely.
+/// largest sum of e. Its mean has to be at least 0.28, or 0.15 if the radius is known. (Daugman
+/// 1993 sums steps of irises.) Circles in the image would follow a part of a rim that is viewed
+/// obliquely.
 ///
-/// 2. Fits a circle, or an ellipse without a lens, to the clearest steps near it.
+/// 2. Fits the outline to the pixels near this circle, see fit_disc_outline().
 ///
-/// 3. Fits steps to the pixels next to it, see fit_brightness_steps_at_rim(). If 60 % of the pieces
-/// show a step,
-///   the steps define the rim and the sigma of its center. Sigma includes the shift that another
-///   tone curve causes. Otherwise sigma is the larger one of the scatter of the points and the
-///   jackknife over eight pieces of the outline.
-///
-/// @param radius  range of the radius if it is known: excludes the edge of a source in a reflector,
-///        which is a clearer circle than the rim. A rim out of range is not clear.
-/// @return std::nullopt if the blob is smaller than 20 px or has less than 10 lit scanlines; if no
-///     circle has such steps; or if the steps determine no circle
-std::optional<Rim> fit_rim_of_light(const ImageView& image, const Blob& blob,
-                                    const Background& background, const LightShape& shape,
-                                    const std::optional<RadiusRange>& radius = {});
+/// @param period_lines  period of the stripes in scanlines
+/// @param radius  known radius in the plane of LightShape: excludes the edge of a source in a
+/// reflector, which is a
+///        clearer circle than the rim
+/// @return light with the rim as its outline; std::nullopt if the blob is smaller than 20 px or has
+///     less than 10 lit scanlines; if no circle has such steps; if the outline has no fit, see
+///     fit_disc_outline(); if the standard deviation of the center is above 0.6 % of the radius; or
+///     if the radius is another one than the known one
+std::optional<Light> fit_rim_of_light(const ImageView& image, const Blob& blob, double period_lines,
+                                      const Background& background, const LightShape& shape,
+                                      const std::optional<KnownRadius>& radius = {});
 
 }  // namespace vlp

@@ -5,7 +5,6 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
 
 namespace vlp {
 namespace {
@@ -14,9 +13,8 @@ namespace {
 constexpr double kModelDeviation = 0.15;
 
 /// Returns the derivative of the oval with respect to the motion (v, w) / 2.
-Eigen::Matrix<double, 2, 3> compute_d_oval_d_motion(const OutlineSums& light) {
-  const Eigen::Vector2d &slope = light.scanline_gradient_wrt_position(),
-                        &at = light.fitted_circle().center;
+Eigen::Matrix<double, 2, 3> compute_d_oval_d_motion(const OutlineEquations& light) {
+  const Eigen::Vector2d &slope = light.scanline_gradient, &at = light.circle.center;
   const Eigen::Matrix2d times_slope{{slope.x(), -slope.y()}, {slope.y(), slope.x()}};
   Eigen::Matrix<double, 2, 3> result;
   result << times_slope, times_slope * Eigen::Vector2d(-at.y(), at.x());
@@ -61,57 +59,27 @@ Motion estimate_camera_motion(const std::vector<MeasuredOval>& lights) {
 
 }  // namespace
 
-OutlineSums::OutlineSums(std::span<const Eigen::Vector2d> points, std::span<const double> weights,
-                         const std::vector<bool>& counted, const Circle& circle,
-                         const Eigen::Vector2d& line_slope, double num_correlated)
-    : circle_(circle), line_slope_(line_slope), num_correlated_(num_correlated) {
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!counted[i]) continue;
-    const Eigen::Vector2d away = (points[i] - circle_.center) / circle_.radius;
-    const double norm = away.norm(), c = away.x() / norm, s = away.y() / norm;
-    const Vector5 slope{{c, s, 1, c * c - s * s, 2 * c * s}};
-    const double weight = weights[i], out = norm - 1;
-    normal_ += weight * slope * slope.transpose();
-    gradient_ += weight * out * slope;
-    squares_ += weight * out * out;
-    weight_ += weight;
-    ++count_;
-  }
-}
-
-std::optional<OutlineSums::Estimate> OutlineSums::solve_outline_with_oval_prior(
+std::optional<OutlineEquations::Estimate> OutlineEquations::solve_with_oval_prior(
     const std::optional<Oval>& known) const {
-  constexpr int unknowns = 5, min_points = 2 * unknowns;
-  if (count_ < min_points) return std::nullopt;
-  const auto solve = [&](double variance) -> std::optional<Estimate> {
-    Matrix5 information = normal_ / variance;
-    Vector5 right = gradient_ / variance;
-    if (known) {
-      const Matrix2 prior = known->covariance.inverse();
-      information.bottomRightCorner<2, 2>() += prior;
-      right.tail<2>() += prior * known->oval;
-    }
-    const Eigen::LDLT<Matrix5> solver(information);
-    if (!(solver.vectorD().minCoeff() > 1e-9 * solver.vectorD().maxCoeff())) return std::nullopt;
-    return Estimate{solver.solve(right), solver.solve(Matrix5::Identity())};
-  };
-  const auto variance_left = [&](const Vector5& p) {
-    const double left = squares_ - 2 * gradient_.dot(p) + p.dot(normal_ * p);
-    return num_correlated_ * std::max(left, 1e-12 * weight_) / (count_ - unknowns);
-  };
-  constexpr double first = 1e-4;  // of the radius, squared
-  auto estimate = solve(first);
-  if (estimate) estimate = solve(variance_left(estimate->p));
-  return estimate;
+  Matrix5 information = matrix;
+  Vector5 right = gradient;
+  if (known) {
+    const Matrix2 prior = known->covariance.inverse();
+    information.bottomRightCorner<2, 2>() += prior;
+    right.tail<2>() += prior * known->oval;
+  }
+  const Eigen::LDLT<Matrix5> solver(information);
+  if (!(solver.vectorD().minCoeff() > 1e-9 * solver.vectorD().maxCoeff())) return std::nullopt;
+  return Estimate{solver.solve(right), solver.solve(Matrix5::Identity())};
 }
 
-std::optional<Shear> Shear::estimate_shear_from_outlines(std::span<const OutlineSums> lights) {
+std::optional<Shear> Shear::estimate_shear_from_outlines(std::span<const OutlineEquations> lights) {
   constexpr double max_sd = 0.01;      // of the radius; of lights that are used
   constexpr double beyond_doubt = 30;  // a chi-square of 2
   constexpr double contradicts = 14;   // a chi-square of 2
   std::vector<MeasuredOval> ovals;
-  for (const OutlineSums& light : lights) {
-    const auto estimate = light.solve_outline_with_oval_prior(std::nullopt);
+  for (const OutlineEquations& light : lights) {
+    const auto estimate = light.solve_with_oval_prior(std::nullopt);
     if (!estimate) continue;
     const Matrix2 covariance = estimate->covariance.bottomRightCorner<2, 2>();
     if (covariance.trace() > 2 * max_sd * max_sd) continue;
@@ -136,15 +104,15 @@ std::optional<Shear> Shear::estimate_shear_from_outlines(std::span<const Outline
   return std::nullopt;
 }
 
-Oval Shear::predict_oval_from_motion(const OutlineSums& light) const {
+Oval Shear::predict_oval_from_motion(const OutlineEquations& light) const {
   const auto from_motion = compute_d_oval_d_motion(light);
   const Eigen::Vector2d oval = from_motion * motion_;
   return {oval,
           from_motion * covariance_ * from_motion.transpose() + compute_model_covariance(oval)};
 }
 
-Eigen::Vector2d Shear::motion_per_scanline(const OutlineSums& light) const {
-  const Eigen::Vector2d& at = light.fitted_circle().center;
+Eigen::Vector2d Shear::motion_per_scanline(const OutlineEquations& light) const {
+  const Eigen::Vector2d& at = light.circle.center;
   return 2 * (motion_.head<2>() + motion_[2] * Eigen::Vector2d(-at.y(), at.x()));
 }
 

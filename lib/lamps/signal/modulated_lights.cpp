@@ -270,10 +270,10 @@ float find_largest_mean(const ModulationMap& map, const ModulatedRegion::Span& s
   return largest;
 }
 
-/// Returns the box of a region, extended to the first and last scanline of the map if the region
-/// continues there. A region may end within a period of them, because the half of the filter's
-/// window that is outside counts as dark. The other half contains a quarter of the mean level if a
-/// dark stripe is at the border.
+/// Returns the box of a region, extended to the first and last scanline of the searched box if the
+/// region continues there. A region may end within a period of them, because the half of the
+/// filter's window that is outside counts as dark. The other half contains a quarter of the mean
+/// level if a dark stripe is at the border.
 PixelBox extend_box_to_lit_border(const ModulationMap& map, const ModulatedRegion& region,
                                   double period_lines) {
   PixelBox box = region.box;
@@ -303,7 +303,6 @@ ModulatedLight make_light(const ModulationMap& map,
                        {},
                        0,
                        0,
-                       0,
                        brightest.fit,
                        brightest.lamp,
                        measure_candidate_stripes(brightest),
@@ -327,11 +326,12 @@ ModulatedLight make_light(const ModulationMap& map,
   light.center = areas[0].center();
   const double cell_px2 = double(kCellWidth_px) * map.lines_per_step;
   light.radius_px = std::sqrt(areas[0].cells * cell_px2 / std::numbers::pi);
+  double asymmetry_px = 0;
   for (std::size_t i = 1; i < areas.size(); ++i) {
     const double apart_px = (areas[i].center() - light.center).norm() / std::numbers::sqrt2;
-    light.asymmetry_px = std::max(light.asymmetry_px, apart_px);
+    asymmetry_px = std::max(asymmetry_px, apart_px);
   }
-  light.center_sd_px = std::hypot(light.asymmetry_px, light.radius_px / std::numbers::sqrt2);
+  light.center_sd_px = std::hypot(asymmetry_px, light.radius_px / std::numbers::sqrt2);
   return light;
 }
 

@@ -18,14 +18,13 @@ namespace vlp {
 
 /// Light that was found by its modulation, whatever its shape.
 struct ModulatedLight {
-  PixelBox box;  ///< bounding box of its cells
+  /// Bounding box of its cells, extended to the border of the searched box if the light continues
+  /// there.
+  PixelBox box;
   /// Centroid (column, line) of the lit area in the image whose rows are the scanlines, px.
   /// `radius_px` is the radius of the disc of equal area.
   Eigen::Vector2d center;
   double radius_px;
-  /// Largest distance per axis between `center` and the centroid of the brighter part of the area,
-  /// in pixels. Brighter parts are those above a quarter and above a half of the largest amplitude.
-  double asymmetry_px;
   /// Standard deviation per axis of the lamp's center from `center`, in pixels. A source deep in a
   /// reflector may appear anywhere in the lamp: the lamp's center may lie on the border of the lit
   /// area.

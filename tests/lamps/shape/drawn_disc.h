@@ -15,7 +15,7 @@
 namespace vlp {
 
 constexpr double kDark = 0.04;  // fraction of white
-/// Minimum cosine between the row and the normal at which the unrefined outline is accurate.
+/// Minimum cosine between the row and the normal for which find_blob_outline() is accurate.
 constexpr double kSteep = 0.75;
 
 /// Blurred disc on a dark image of 200 x 160 pixels with a fill factor of 1. The blur includes that
@@ -30,8 +30,6 @@ struct DrawnDisc {
   /// Additional fraction of the level above LED chips, and the distance between chips.
   double chips = 0, pitch_px = 6;
 
-  Eigen::Vector2d low() const { return center - Eigen::Vector2d(radius_px, radius_px); }
-  Eigen::Vector2d high() const { return center + Eigen::Vector2d(radius_px, radius_px); }
   double off(const Eigen::Vector2d& pixel) const { return (pixel - center).norm() - radius_px; }
   /// Returns the cosine of the angle between the row and the outline's normal.
   double cosine(const Eigen::Vector2d& pixel) const {
@@ -82,16 +80,6 @@ inline std::vector<EdgePoint> outline_in(const cv::Mat& pixels) {
   return all;
 }
 
-inline RefinedOutline refined_outline_in(const cv::Mat& image, const DrawnDisc& disc) {
-  return refine_disc_outline(to_image_view(image), outline_in(image),
-                             {disc.low(), disc.high(), disc.center},
-                             estimate_image_background(to_image_view(image)));
-}
-
-inline std::vector<EdgePoint> refined_in(const cv::Mat& image, const DrawnDisc& disc) {
-  return refined_outline_in(image, disc).points;
-}
-
 /// Returns the largest error of the points with at least this cosine between row and normal;
 /// infinity if there are none.
 inline double worst_off(const DrawnDisc& disc, const std::vector<EdgePoint>& points,
@@ -102,12 +90,6 @@ inline double worst_off(const DrawnDisc& disc, const std::vector<EdgePoint>& poi
     worst = std::max(worst, std::abs(disc.off(point.pixel)));
   }
   return worst < 0 ? std::numeric_limits<double>::infinity() : worst;
-}
-
-inline double rms_off(const DrawnDisc& disc, const std::vector<EdgePoint>& points) {
-  double squares = 0;
-  for (const EdgePoint& point : points) squares += std::pow(disc.off(point.pixel), 2);
-  return std::sqrt(squares / double(points.size()));
 }
 
 }  // namespace vlp

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 namespace vlp {
 namespace {
@@ -39,12 +40,12 @@ TEST(EstimateInverseHeight, IgnoresOneWrongLamp) {
   EXPECT_NEAR(inverse_height->log_value, -std::log(2), 0.05);
 }
 
-TEST(EstimateInverseHeight, StandardDeviationIsThatOfCentersAnywhereInTheLamps) {
+TEST(EstimateInverseHeight, StandardDeviationIsThatOfTheDistance) {
   const auto inverse_height =
       estimate_inverse_height({{{0, 0}, {0, 0}, 0, 0.1}, {{0.5, 0}, {1, 0}, 0, 0.1}});
   ASSERT_TRUE(inverse_height);
   EXPECT_NEAR(inverse_height->log_value, -std::log(2), 1e-12);
-  EXPECT_NEAR(inverse_height->log_sd, 0.5 * 0.2 / 1, 1e-12);
+  EXPECT_NEAR(inverse_height->log_sd, 0.1 * std::numbers::sqrt2 / 1, 1e-12);
 }
 
 TEST(EstimateInverseHeight, ReturnsNulloptForFewOrCloseLamps) {

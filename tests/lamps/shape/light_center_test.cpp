@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "geometry/plane.h"
+#include "lamps/shape/outline_equations.h"
 #include "support/matchers.h"
 
 namespace vlp {
@@ -41,6 +42,20 @@ class LightShapeOfMovingDisc : public testing::Test {
     return points;
   }
 
+  /// Fits a circle to the rim, and the normal equations for its ovality.
+  std::optional<Light> fit_light(const Vector2d& motion_per_line) const {
+    const auto points = outline(motion_per_line);
+    auto light = shape.fit_light_to_outline(points, dark);
+    if (!light) return light;
+    std::vector<Vector2d> in_plane;
+    for (const EdgePoint& point : points)
+      in_plane.push_back(shape.level_plane_point_from_pixel(point.pixel).value());
+    const Circle fitted{light->plane_center, 1 / light->unit_from_plane(0, 0)};
+    light->outline_equations = make_outline_equations(
+        in_plane, fitted, shape.compute_scanline_gradient_wrt_position(fitted), 1e-3);
+    return light;
+  }
+
   static constexpr std::array kIntrinsics{600.0, 600.0, 399.5, 299.5, -0.3, 0.1, 0.0, 0.0};
   DetectorCamera camera{Readout::rows, 3e-5, Lens(LensModel::opencv4, kIntrinsics)};
   LightShape shape;
@@ -53,10 +68,9 @@ TEST_F(LightShapeOfMovingDisc, CorrectedCenterMatchesPositionAtReadoutOfCenterRo
   // A lamp 2.5 m above a camera that moves at 2 m/s, with a row time of 30 us.
   for (const Vector2d& motion :
        {Vector2d(2.4e-5, 0), Vector2d(0, 2.4e-5), Vector2d(-1.5e-5, 2e-5)}) {
-    auto light = shape.fit_light_to_outline(outline(motion), dark);
+    auto light = fit_light(motion);
     ASSERT_TRUE(light);
-    const Vector2d oval =
-        complex_product(light->outline_sums.scanline_gradient_wrt_position(), motion) / 2;
+    const Vector2d oval = complex_product(light->outline_equations->scanline_gradient, motion) / 2;
     Light unshifted = *light;
     shape.correct_light_for_motion({oval, 1e-12 * Matrix2::Identity()}, motion, *light);
     shape.correct_light_for_motion({oval, 1e-12 * Matrix2::Identity()}, Vector2d::Zero(),
@@ -67,7 +81,7 @@ TEST_F(LightShapeOfMovingDisc, CorrectedCenterMatchesPositionAtReadoutOfCenterRo
 }
 
 TEST_F(LightShapeOfMovingDisc, CorrectedCenterMatchesTrueCenterForStationaryCamera) {
-  auto light = shape.fit_light_to_outline(outline(Vector2d::Zero()), dark);
+  auto light = fit_light(Vector2d::Zero());
   ASSERT_TRUE(light);
   shape.correct_light_for_motion({Vector2d::Zero(), 1e-12 * Matrix2::Identity()}, Vector2d::Zero(),
                                  *light);

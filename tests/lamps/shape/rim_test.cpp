@@ -29,11 +29,13 @@ Blob largest_blob(const ImageView& image, const Background& background) {
   });
 }
 
-std::optional<Rim> rim_in(const cv::Mat& pixels, const std::optional<RadiusRange>& radius = {}) {
+/// Fits the rim of the largest light of an image.
+std::optional<Light> rim_in(const cv::Mat& pixels, double period_lines,
+                            const std::optional<KnownRadius>& radius = {}) {
   const ImageView image = to_image_view(pixels);
   const Background background = estimate_image_background(image);
-  return fit_rim_of_light(image, largest_blob(image, background), background,
-                          LightShape(drawn_camera(kSize)), radius);
+  return fit_rim_of_light(image, largest_blob(image, background), period_lines, background,
+                          LightShape(drawn_camera(pixels.size())), radius);
 }
 
 /// Returns a downlight with a core off the middle in this direction.
@@ -65,14 +67,14 @@ void for_each_downlight(const Test& test) {
 TEST(FitRimOfLight, CenterAndRadiusMatchDownlightForAllCorePositions) {
   double chi_square = 0, worst_px = 0, count = 0;
   for_each_downlight([&](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
-    const auto rim = rim_in(render_lamps({lamp}, kSize, depth, noise, seed));
+    const auto rim =
+        rim_in(render_lamps({lamp}, kSize, depth, noise, seed), lamp.stripes.period_lines);
     ASSERT_TRUE(rim);
-    EXPECT_TRUE(rim->is_clear);
-    EXPECT_TRUE(rim->light.is_uneven);
-    EXPECT_NEAR(rim->light.radius_px, lamp.radius_px, 1);
-    const double error_px = (rim->light.pixel - lamp.center).norm();
+    EXPECT_TRUE(rim->is_uneven);
+    EXPECT_NEAR(rim->radius_px, lamp.radius_px, 1);
+    const double error_px = (rim->pixel - lamp.center).norm();
     worst_px = std::max(worst_px, error_px);
-    chi_square += std::pow(error_px / rim->light.sigma_px, 2) / 2;
+    chi_square += std::pow(error_px / rim->sigma_px, 2) / 2;
     ++count;
   });
   EXPECT_LT(worst_px, 0.5) << "the core is 16 px off";
@@ -98,13 +100,14 @@ TEST(FitRimOfLight, CenterIsUnbiasedUnderToneCurve) {
     for (int i = 0; i < 12; ++i) {
       const double angle = i * std::numbers::pi / 6 + 0.2;
       const DrawnLamp lamp = downlight(angle, period);
-      const auto rim = rim_in(coded(render_lamps({lamp}, kSize, CV_8U, 1, std::uint64_t(++count))));
+      const auto rim =
+          rim_in(coded(render_lamps({lamp}, kSize, CV_8U, 1, std::uint64_t(++count))), period);
       ASSERT_TRUE(rim);
-      const Vector2d error = rim->light.pixel - lamp.center;
+      const Vector2d error = rim->pixel - lamp.center;
       towards_px += error.dot(Vector2d(std::cos(angle), std::sin(angle)));
       squares += error.squaredNorm();
-      chi_square += error.squaredNorm() / 2 / std::pow(rim->light.sigma_px, 2);
-      worst = std::max(worst, error.norm() / rim->light.sigma_px);
+      chi_square += error.squaredNorm() / 2 / std::pow(rim->sigma_px, 2);
+      worst = std::max(worst, error.norm() / rim->sigma_px);
     }
   }
   EXPECT_NEAR(towards_px / count, 0, 0.03);
@@ -139,12 +142,12 @@ TEST(FitRimOfLight, CenterIsUnbiasedNextToSaturatedWalls) {
         lamp.level = white;
         lamp.recess->core_off_px = 36 * towards;
         lamp.recess->core_px = 24;
-        const auto rim = rim_in(coded_and_clipped(lamp, 1, random));
+        const auto rim = rim_in(coded_and_clipped(lamp, 1, random), period);
         ASSERT_TRUE(rim);
-        const Vector2d error = rim->light.pixel - lamp.center;
+        const Vector2d error = rim->pixel - lamp.center;
         towards_px += error.dot(towards);
-        chi_square += error.squaredNorm() / 2 / std::pow(rim->light.sigma_px, 2);
-        worst = std::max(worst, error.norm() / rim->light.sigma_px);
+        chi_square += error.squaredNorm() / 2 / std::pow(rim->sigma_px, 2);
+        worst = std::max(worst, error.norm() / rim->sigma_px);
         ++count;
       }
     }
@@ -160,14 +163,9 @@ TEST(FitRimOfLight, DetectsClearRimOfLargeDownlights) {
     lamp.center *= scale, lamp.radius_px *= scale;
     lamp.recess->core_off_px *= scale, lamp.recess->core_px *= scale, lamp.recess->halo_px *= scale;
     const cv::Size size(int(scale * kSize.width), int(scale * kSize.height));
-    const cv::Mat pixels = render_lamps({lamp}, size, CV_8U, 1);
-    const ImageView image = to_image_view(pixels);
-    const Background background = estimate_image_background(image);
-    const auto rim = fit_rim_of_light(image, largest_blob(image, background), background,
-                                      LightShape(drawn_camera(size)));
+    const auto rim = rim_in(render_lamps({lamp}, size, CV_8U, 1), lamp.stripes.period_lines);
     ASSERT_TRUE(rim) << scale;
-    EXPECT_TRUE(rim->is_clear) << scale;
-    EXPECT_LT((rim->light.pixel - lamp.center).norm(), 0.5) << scale;
+    EXPECT_LT((rim->pixel - lamp.center).norm(), 0.5) << scale;
   }
 }
 
@@ -208,15 +206,15 @@ TEST(FitRimOfLight, RadiusIsInKnownRange) {
           8 + lit * (24 * cover(center, 50.7) + 190 * cover(source, 27)));
     }
   }
-  const auto rim = rim_in(image, RadiusRange{44, 58});
+  const auto rim = rim_in(image, 18, KnownRadius{50.7 / 520, 0.07});
   ASSERT_TRUE(rim);
-  EXPECT_NEAR(rim->light.radius_px, 50.7, 1);
-  EXPECT_LT((rim->light.pixel - center).norm(), 0.5);
-  const auto edge_of_source = rim_in(image, RadiusRange{23, 32});
+  EXPECT_NEAR(rim->radius_px, 50.7, 1);
+  EXPECT_LT((rim->pixel - center).norm(), 0.5);
+  const auto edge_of_source = rim_in(image, 18, KnownRadius{27.0 / 520, 0.07});
   ASSERT_TRUE(edge_of_source);
-  EXPECT_NEAR(edge_of_source->light.radius_px, 27, 1);
-  const auto other = rim_in(image, RadiusRange{34, 40});
-  EXPECT_FALSE(other && other->is_clear);
+  EXPECT_NEAR(edge_of_source->radius_px, 27, 1);
+  const auto other = rim_in(image, 18, KnownRadius{37.0 / 520, 0.04});
+  EXPECT_FALSE(other);
 }
 
 TEST(FitRimOfLight, ReportsNoClearRimForGlows) {
@@ -224,23 +222,25 @@ TEST(FitRimOfLight, ReportsNoClearRimForGlows) {
     for (const double noise : {0.0, 0.5, 1.5}) {
       const DrawnLamp glow{
           .center = {151.3, 139.6}, .stripes = {.period_lines = period}, .glow = DrawnGlow()};
-      const auto rim = rim_in(render_lamps({glow}, kSize, CV_8U, noise));
-      EXPECT_FALSE(rim && rim->is_clear) << period << " lines, noise " << noise;
+      const auto rim = rim_in(render_lamps({glow}, kSize, CV_8U, noise), period);
+      EXPECT_FALSE(rim) << period << " lines, noise " << noise;
     }
   }
 }
 
 TEST(FitRimOfLight, ReturnsClearRimWithCenterOfDisc) {
   const DrawnLamp disc{.center = {151.3, 139.6}, .radius_px = 50.7};
-  const auto rim = rim_in(render_lamps({disc}, kSize, CV_8U, 1));
+  const auto rim = rim_in(render_lamps({disc}, kSize, CV_8U, 1), 0);
   ASSERT_TRUE(rim);
-  EXPECT_TRUE(rim->is_clear);
-  EXPECT_LT((rim->light.pixel - disc.center).norm(), 0.2);
+  EXPECT_LT((rim->pixel - disc.center).norm(), 0.2);
+  EXPECT_EQ(rim->outline.size(), 64U);
+  for (const EdgePoint& point : rim->outline)
+    EXPECT_NEAR((point.pixel - disc.center).norm(), disc.radius_px, 0.5);
 }
 
 TEST(FitRimOfLight, ReturnsNulloptForSmallBlob) {
   const DrawnLamp speck{.center = {151.3, 139.6}, .radius_px = 8};
-  EXPECT_FALSE(rim_in(render_lamps({speck}, kSize, CV_8U)));
+  EXPECT_FALSE(rim_in(render_lamps({speck}, kSize, CV_8U), 0));
 }
 
 TEST(IsBlobUnevenlyLit, ReturnsTrueForDownlightsAndFalseForDiscs) {

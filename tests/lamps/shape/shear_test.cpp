@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "geometry/arc.h"
+#include "lamps/shape/outline_equations.h"
 #include "lamps/shape/robust_ellipse.h"
 #include "support/matchers.h"
 #include "support/random.h"
@@ -35,13 +36,13 @@ class MovingCamera {
   Vector2d motion_at(const Vector2d& center) const {
     return v + w * Vector2d(-center.y(), center.x());
   }
-  OutlineSums make_outline(const Vector2d& center, double angle_rad, Random& random) const {
+  OutlineEquations make_outline(const Vector2d& center, double angle_rad, Random& random) const {
     Points points = read_line_by_line(arc({center, kRadius}, 0.4, 0.4 + angle_rad, 90), center,
                                       motion_at(center));
     for (Vector2d& point : points) point += noise * Vector2d(random.normal(), random.normal());
     const std::vector<double> weights(points.size(), 1);
-    const RobustEllipse circle = fit_robust_circle(points, weights, 1e-3).value();
-    return {points, weights, circle.inliers, circle.to_circle(), kLineSlope};
+    return make_outline_equations(points, fit_robust_circle(points, weights, 1e-3)->to_circle(),
+                                  kLineSlope, noise / kRadius);
   }
 
   Vector2d v{2.0e-5, -1.5e-5};
@@ -49,7 +50,7 @@ class MovingCamera {
   double noise = 1e-4;
 };
 
-std::vector<OutlineSums> three_whole(const MovingCamera& moving_camera, Random& random) {
+std::vector<OutlineEquations> three_whole(const MovingCamera& moving_camera, Random& random) {
   return {moving_camera.make_outline({0.4, 0.3}, 2 * pi, random),
           moving_camera.make_outline({-0.4, 0.2}, 2 * pi, random),
           moving_camera.make_outline({0.1, -0.4}, 2 * pi, random)};
@@ -81,12 +82,12 @@ TEST(Shear, ReducesCenterErrorOfPartialOutline) {
   for (int trial = 0; trial < trials; ++trial) {
     auto lights = three_whole(moving_camera, random);
     lights.push_back(moving_camera.make_outline(center, 1.1 * pi, random));
-    const OutlineSums& part = lights.back();
+    const OutlineEquations& part = lights.back();
     const auto shear = Shear::estimate_shear_from_outlines(lights);
     ASSERT_TRUE(shear);
-    const auto found = part.solve_outline_with_oval_prior(shear->predict_oval_from_motion(part));
+    const auto found = part.solve_with_oval_prior(shear->predict_oval_from_motion(part));
     ASSERT_TRUE(found);
-    const Vector2d by_circle = part.fitted_circle().center - center;
+    const Vector2d by_circle = part.circle.center - center;
     const Vector2d error = (by_circle + kRadius * found->p.head<2>()) / kRadius;
     squared += error.squaredNorm() / trials;
     circle_squared += by_circle.squaredNorm() / (kRadius * kRadius) / trials;
@@ -129,9 +130,8 @@ TEST(Shear, EstimateReturnsNulloptWithoutUsableLights) {
   EXPECT_FALSE(Shear::estimate_shear_from_outlines({}));
   // Three points of an outline do not determine the motion.
   const Points points{{1, 0}, {0, 1}, {-1, 0}};
-  const OutlineSums few(points, std::vector<double>{1, 1, 1}, {true, true, true}, {{0, 0}, 1},
-                        kLineSlope);
-  EXPECT_FALSE(few.solve_outline_with_oval_prior(std::nullopt));
+  const OutlineEquations few = make_outline_equations(points, {{0, 0}, 1}, kLineSlope, 1);
+  EXPECT_FALSE(few.solve_with_oval_prior(std::nullopt));
   EXPECT_FALSE(Shear::estimate_shear_from_outlines(std::vector{few}));
 }
 

@@ -1,0 +1,89 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "lamps/image/background.h"
+#include "lamps/image/image_view.h"
+#include "lamps/shape/light.h"
+#include "lamps/shape/light_center.h"
+#include "lamps/shape/shear.h"
+
+namespace vlp {
+
+/// Result of fit_disc_outline().
+struct OutlineFit {
+  PlaneEllipse outline;
+  /// Standard deviation of the center per axis, in pixels of the image.
+  double center_sd_px;
+  /// Radius of the disc of equal area, and standard deviation of the blur of the outline, in px.
+  double radius_px, blur_px;
+  /// Fraction of the ends of scanlines with contrast that agree with the outline.
+  double inlier_fraction;
+  /// Normal equations with free ovality, in units of the radius; see OutlineEquations.
+  OutlineEquations::Matrix5 matrix;
+  OutlineEquations::Vector5 gradient;
+
+  /// Adds an independent error of the center, as a standard deviation per axis.
+  void add_error_to_center(double sd_px);
+};
+
+/// Ratio of Light::rise_px and the blur: distance of the quartiles of a normal distribution.
+inline constexpr double kRisePerBlur = 1.349;
+
+/// Known size of an outline in the plane of LightShape: its radius, and the standard deviation of
+/// the logarithm.
+struct KnownRadius {
+  double radius, log_sd;
+
+  /// Returns true if a light has this radius, within two standard deviations and the error of its
+  /// outline.
+  bool agrees_with(const Light& light) const;
+};
+
+/// Fits the outline of a disc to the levels of all pixels within 5 px or 3 blurs of it.
+///
+/// A cell is the part of a scanline on one side of the center. With the depth d of a pixel behind
+/// the outline, in pixels, and the coverage C = Phi(d / blur), the levels of a cell are
+///
+///     level = (out + out_slope d) (1 - H) + (in + in_slope d) H,   H = C + tone (H_coded - C),
+///     H_coded = ((r^2.2 (1 - C) + C)^(1 / 2.2) - r) / (1 - r),     r = out / in.
+///
+/// H_coded is the coverage in levels coded as light^(1 / 2.2), and `tone` the share of this tone
+/// curve, with the prior 0.85 +- 0.2. Each cell has its own four levels: stripes, LED chips behind
+/// a diffuser, halos, vignetting and reflectors need no further unknowns. The model is linear in
+/// the levels, which are eliminated in closed form. Slopes are 0 with a standard deviation of 3 %
+/// of the level per pixel. A cell without pixels deeper than 2.5 blurs has the level of the
+/// scanlines one and two periods away.
+///
+/// The unknowns are center, size, blur, tone, and without a lens the ovality. They are estimated by
+/// variable projection (Golub and Pereyra 1973; Kaufman 1975), from a wide blur to the actual one.
+/// Tukey's biweight applies to cells. The variance of a pixel is that of the background plus a
+/// multiple of the level, which is estimated from the residuals of cells with contrast, plus 0.1
+/// for quantization and the square of 0.3 % of the level.
+///
+/// The covariance of the center is that of the normal equations, scaled by the larger one of the
+/// mean square of the residuals and the power of the 3rd to 8th harmonic of the residuals along the
+/// outline. If the levels inside vary, the variance includes the square of the shift of the center
+/// in a narrower band.
+///
+/// @param lines         image whose rows are the scanlines
+/// @param start         first outline
+/// @param start_blur_px blur of the first iteration, about the error of the first outline
+/// @param period_lines  period of the stripes in scanlines; 0 if the light is steady
+/// @param known_radius  prior of the radius
+/// @return              std::nullopt if less than 60 pixels are near the outline, if they do not
+///                      determine it, or if its center or radius differ from the first ones by more
+///                      than a quarter of the radius
+std::optional<OutlineFit> fit_disc_outline(const ImageView& lines, const PlaneEllipse& start,
+                                           double start_blur_px, double period_lines,
+                                           const Background& background, const LightShape& shape,
+                                           const std::optional<KnownRadius>& known_radius = {});
+
+/// Sets the outline of a light: center, sigma, box, radius, width of the edge, and with a lens
+/// outline_equations. Returns false, and changes nothing, if the lens does not cover the outline.
+bool set_fitted_outline(const OutlineFit& fit, const LightShape& shape, Light& light);
+
+}  // namespace vlp

@@ -1,0 +1,47 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+
+#include "geometry/types.h"
+#include "lamps/image/pixel_box.h"
+#include "lamps/shape/light_center.h"
+
+namespace vlp {
+
+/// Map from the pixels (column, line) of a box to the plane of LightShape: a polynomial of degree
+/// 7, fitted at 8 x 8 Chebyshev nodes. Its error is below 0.01 px for a lens of 80 degrees and
+/// boxes of half of the image.
+class PlanePatch {
+  static constexpr int kDegree = 7, kTerms = (kDegree + 1) * (kDegree + 2) / 2;
+
+ public:
+  /// Point of the plane, and its derivative with respect to (column, line).
+  struct Point {
+    Eigen::Vector2d at;
+    Matrix2 d_at_d_pixel;
+  };
+
+  /// Returns std::nullopt if the lens has no ray at a node of the box.
+  static std::optional<PlanePatch> fit(const LightShape& shape, const PixelBox& box);
+
+  /// Polynomials in the column, for one scanline.
+  class Row {
+   public:
+    Row(const PlanePatch& patch, double line);
+    Point at_column(double column) const;
+
+   private:
+    double middle_, half_;
+    std::array<Eigen::Vector2d, kDegree + 1> at_, d_line_;
+  };
+
+ private:
+  Eigen::Vector2d middle_, half_;
+  Eigen::Matrix<double, kTerms, 2> coefficients_;
+};
+
+}  // namespace vlp
