@@ -502,16 +502,18 @@ void LightDetector::correct_light_centers_for_motion(const ImageView& lines,
   constexpr double start_blur_px = 0.5, rim_log_radius_sd = 0.02;
   std::vector<std::optional<Oval>> ovals(lights.size());
   std::vector<Eigen::Vector2d> motions(lights.size(), Eigen::Vector2d::Zero());
+  std::vector<bool> is_fitted(lights.size(), true);
   for (int pass = 0; pass < num_passes; ++pass) {
     std::vector<OutlineEquations> outlines;
-    for (const Light& light : lights) {
-      if (light.outline_equations) outlines.push_back(*light.outline_equations);
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+      if (lights[i].outline_equations && is_fitted[i])
+        outlines.push_back(*lights[i].outline_equations);
     }
     const auto shear = Shear::estimate_shear_from_outlines(outlines);
     if (!shear) break;
     for (std::size_t i = 0; i < lights.size(); ++i) {
       Light& light = lights[i];
-      if (!light.outline_equations) continue;
+      if (!light.outline_equations || !is_fitted[i]) continue;
       Oval oval = shear->predict_oval_from_motion(*light.outline_equations);
       const Eigen::Vector2d motion = shear->motion_per_scanline(*light.outline_equations);
       std::optional<KnownRadius> radius;
@@ -521,13 +523,10 @@ void LightDetector::correct_light_centers_for_motion(const ImageView& lines,
       const auto fit = fit_disc_outline(
           lines, {light.plane_center, oval.unit_from_oval() * light.unit_from_plane}, start_blur_px,
           light.stripes.period_lines, background, shape_, radius);
-      if (fit && set_fitted_outline(*fit, shape_, light)) {
-        motions[i] += motion;
-        oval.oval.setZero();
-      } else if (pass == 0) {
-        motions[i] = motion;
-      }
-      if (pass == 0 || fit) ovals[i] = oval;
+      is_fitted[i] = fit && set_fitted_outline(*fit, shape_, light);
+      if (is_fitted[i]) oval.oval.setZero();
+      motions[i] += motion;
+      ovals[i] = oval;
     }
   }
   for (std::size_t i = 0; i < lights.size(); ++i) {
