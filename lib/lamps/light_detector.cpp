@@ -353,7 +353,7 @@ void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
   const auto num_others = std::count_if(lights.begin(), lights.end(), has_other_radius);
   const auto num_clear =
       std::count_if(rims.begin(), rims.end(), [](const auto& rim) { return rim.has_value(); });
-  const bool are_sizes_correct = 2 * num_others < std::ptrdiff_t(lamps.size()) + num_clear;
+  const bool are_sizes_correct = 2 * num_others <= std::ptrdiff_t(lamps.size()) + num_clear;
   for (Light& light : lights) {
     if (!are_sizes_correct || !has_other_radius(light)) continue;
     const auto radius = predict_radius(find_identified_lamp(light), fitted.inverse_height);
@@ -404,31 +404,58 @@ LightDetector::RimFits LightDetector::fit_rims(const ImageView& lines,
                                                const std::vector<Blob>& blobs,
                                                const Background& background,
                                                const std::vector<LampInPlane>& lamps) const {
+  constexpr int num_passes = 3;
+  constexpr double start_blur_px = 1;
   std::vector<std::optional<Light>> rims(found.size());
   std::optional<InverseHeight> before;
-  for (const bool is_first : {true, false}) {
-    std::vector<LampInPlane> all = lamps;
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      const auto lamp = make_lamp_in_plane(
-          find_lamp_of_period(found[i]),
-          rims[i] ? rims[i]->pixel : shape_.swap_image_and_scanline_axes(found[i].center),
-          rims[i] ? kRimCenterSd : kCentroidSd);
-      if (lamp) all.push_back(*lamp);
-    }
-    const auto inverse_height = estimate_inverse_height(all);
-    if (!is_first && (!inverse_height || !(inverse_height->log_sd < before->log_sd))) break;
+  for (int pass = 0; pass < num_passes; ++pass) {
+    const bool is_last = pass + 1 == num_passes;
+    const auto inverse_height =
+        is_last ? estimate_inverse_height_from_radii(find_radii(found, rims))
+                : estimate_inverse_height(find_lamps_in_plane(found, rims, lamps));
+    if (pass > 0 && (!inverse_height || !(inverse_height->log_sd < before->log_sd))) break;
     before = inverse_height;
     for (std::size_t i = 0; i < found.size(); ++i) {
+      const double period_lines = found[i].fit.period_lines;
       const auto radius = predict_radius(find_lamp_of_period(found[i]), inverse_height);
-      if (rims[i] && (!radius || radius->agrees_with(*rims[i]))) continue;
-      const Blob blob = find_lit_pixels_of_light(found[i].box, blobs, lines.size());
-      if (blob.runs.empty()) continue;
-      rims[i] =
-          fit_rim_of_light(lines, blob, found[i].fit.period_lines, background, shape_, radius);
+      if (!rims[i] || (radius && !radius->agrees_with(*rims[i]))) {
+        const Blob blob = find_lit_pixels_of_light(found[i].box, blobs, lines.size());
+        if (blob.runs.empty()) continue;
+        rims[i] = fit_rim_of_light(lines, blob, period_lines, background, shape_, radius);
+      } else if (is_last && radius) {
+        const auto fit = fit_disc_outline(lines, rims[i]->plane_outline, start_blur_px,
+                                          period_lines, background, shape_, radius);
+        if (fit) set_fitted_outline(*fit, shape_, *rims[i]);
+      }
     }
     if (!inverse_height) break;
   }
   return {std::move(rims), before};
+}
+
+std::vector<LampInPlane> LightDetector::find_lamps_in_plane(
+    const std::vector<ModulatedLight>& found, const std::vector<std::optional<Light>>& rims,
+    std::vector<LampInPlane> lamps) const {
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const auto lamp = make_lamp_in_plane(
+        find_lamp_of_period(found[i]),
+        rims[i] ? rims[i]->pixel : shape_.swap_image_and_scanline_axes(found[i].center),
+        rims[i] ? kRimCenterSd : kCentroidSd);
+    if (lamp) lamps.push_back(*lamp);
+  }
+  return lamps;
+}
+
+std::vector<LampRadius> LightDetector::find_radii(
+    const std::vector<ModulatedLight>& found, const std::vector<std::optional<Light>>& rims) const {
+  std::vector<LampRadius> radii;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const Lamp* lamp = find_lamp_of_period(found[i]);
+    if (!rims[i] || lamp == nullptr || !lamp->shape.size_m) continue;
+    radii.push_back({rims[i]->plane_outline.radius(), lamp->shape.size_m->x() / 2,
+                     compute_height_beyond_first_lamp_m(*lamp)});
+  }
+  return radii;
 }
 
 std::optional<KnownRadius> LightDetector::predict_radius(
@@ -475,7 +502,7 @@ void LightDetector::measure_stripes_and_fit_outline(const ImageView& lines,
   if (is_light_disc_shaped(light)) {
     const auto stripes =
         measure_stripes(compute_scanline_signal(lines, find_chords(), background.level));
-    const auto fit = fit_disc_outline(lines, {light.plane_center, light.unit_from_plane},
+    const auto fit = fit_disc_outline(lines, light.plane_outline,
                                       std::min(light.rise_px / kRisePerBlur, max_start_blur_px),
                                       stripes.period_lines, background, shape_);
     if (fit) set_fitted_outline(*fit, shape_, light);
@@ -518,11 +545,12 @@ void LightDetector::correct_light_centers_for_motion(const ImageView& lines,
       const Eigen::Vector2d motion = shear->motion_per_scanline(*light.outline_equations);
       std::optional<KnownRadius> radius;
       if (light.is_uneven) {
-        radius = {1 / std::sqrt(std::abs(light.unit_from_plane.determinant())), rim_log_radius_sd};
+        radius = {light.plane_outline.radius(), rim_log_radius_sd};
       }
       const auto fit = fit_disc_outline(
-          lines, {light.plane_center, oval.unit_from_oval() * light.unit_from_plane}, start_blur_px,
-          light.stripes.period_lines, background, shape_, radius);
+          lines,
+          {light.plane_outline.center, oval.unit_from_oval() * light.plane_outline.unit_from_plane},
+          start_blur_px, light.stripes.period_lines, background, shape_, radius);
       is_fitted[i] = fit && set_fitted_outline(*fit, shape_, light);
       if (is_fitted[i]) oval.oval.setZero();
       motions[i] += motion;

@@ -73,12 +73,20 @@ class LightDetector {
     std::optional<InverseHeight> inverse_height;
   };
   /// Fits the rims of modulated lights. Distances between identified lamps determine the height of
-  /// the camera, and thereby the radii of the rims. Rims determine the height more accurately;
-  /// the other ones are then fitted again.
+  /// the camera, and thereby the radii of the rims. The distances between the centers of rims
+  /// determine the height more accurately; rims of another radius are then searched again. The
+  /// median of the radii is still more accurate: all rims are then fitted with this radius.
   /// @param lamps  identified lights with a clear outline
   RimFits fit_rims(const ImageView& lines, const std::vector<ModulatedLight>& found,
                    const std::vector<Blob>& blobs, const Background& background,
                    const std::vector<LampInPlane>& lamps) const;
+  /// Adds the lamps of modulated lights to `lamps`, with the centers of their rims if known.
+  std::vector<LampInPlane> find_lamps_in_plane(const std::vector<ModulatedLight>& found,
+                                               const std::vector<std::optional<Light>>& rims,
+                                               std::vector<LampInPlane> lamps) const;
+  /// Returns the radii of the rims of lamps of known size.
+  std::vector<LampRadius> find_radii(const std::vector<ModulatedLight>& found,
+                                     const std::vector<std::optional<Light>>& rims) const;
   /// Returns the radius of a lamp in the level plane; std::nullopt if it is no disc of known size,
   /// or if the height is unknown.
   std::optional<KnownRadius> predict_radius(

@@ -163,6 +163,8 @@ class Score {
 
  private:
   static constexpr double kPeriods = 2.5;
+  /// A gross error is larger than both.
+  static constexpr double kMinGross_px = 1, kMinGrossSds = 3;
 
   void add_lamp(const TrueLamp& lamp, const Extent& extent, const std::vector<Light>& lights) {
     Tally& tally = tallies_[extent.periods >= kPeriods];
@@ -188,6 +190,7 @@ class Score {
   void add_found(double error_px, double sigma_px, Tally& tally) {
     ++tally.found;
     errors_px_.push_back(error_px);
+    num_gross_ += error_px > std::max(kMinGross_px, kMinGrossSds * sigma_px) ? 1 : 0;
     chi_square_ += std::pow(error_px / sigma_px, 2) / 2;
   }
 
@@ -212,9 +215,10 @@ class Score {
     double squares = 0;
     for (const double error_px : sorted) squares += error_px * error_px;
     const auto count = static_cast<double>(sorted.size());
-    fmt::print("  centers: rms {:.3f}, median {:.3f}, worst {:.3f} px; chi-squared {:.2f}\n",
-               std::sqrt(squares / count), sorted[sorted.size() / 2], sorted.back(),
-               chi_square_ / count);
+    fmt::print(
+        "  centers: rms {:.3f}, median {:.3f}, worst {:.3f} px; chi-squared {:.2f}; {} gross\n",
+        std::sqrt(squares / count), sorted[sorted.size() / 2], sorted.back(), chi_square_ / count,
+        num_gross_);
   }
 
   int images_ = 0;
@@ -222,6 +226,7 @@ class Score {
   std::map<std::string, int> false_lamps_, reasons_;
   std::vector<double> errors_px_;
   double chi_square_ = 0;
+  int num_gross_ = 0;
 };
 
 /// Detects the lamps of one image and adds them to the score.

@@ -139,6 +139,27 @@ TEST(LightDetectorOnRealObliqueDownlights, IdentifiesAllLamps) {
   EXPECT_EQ(found.lamps, 12);
 }
 
+TEST(LightDetectorOnRealObliqueDownlights, LocatesRimsWithoutLens) {
+  const fs::path data = real_data("downlights-oblique");
+  if (data.empty()) GTEST_SKIP() << "no real captures here";
+  constexpr double accuracy_px = 8;  // of positions measured by eye
+  const LightDetector detector(read_lamp_map(data / "lamps.yaml"), {Readout::columns, 15.1e-6, {}});
+  int num_rims = 0;
+  for (const auto& [name, lamp, u_px, v_px] :
+       {std::tuple("e548.jpg", 1, 1303.0, 1921.0), std::tuple("e548.jpg", 2, 331.0, 2003.0),
+        std::tuple("e548.jpg", 3, 282.0, 1137.0), std::tuple("e548.jpg", 4, 1322.0, 1156.0),
+        std::tuple("e548.jpg", 5, 770.0, 1484.0), std::tuple("e608.jpg", 1, 505.0, 1775.0),
+        std::tuple("e608.jpg", 2, 508.0, 878.0)}) {
+    const auto lamps = lamps_in(detector, read_image(data / name));
+    ASSERT_TRUE(lamps.contains(lamp)) << name << lamp;
+    if (lamps.at(lamp).is_glow) continue;
+    ++num_rims;
+    EXPECT_LT((lamps.at(lamp).pixel - Eigen::Vector2d(u_px, v_px)).norm(), accuracy_px)
+        << name << lamp;
+  }
+  EXPECT_GE(num_rims, 6);
+}
+
 /// Photographs with readout along rows and along columns, without a given readout direction.
 TEST(DetectLightsWithUnknownReadout, ReturnsReadoutAndAllLampsOfRealGlows) {
   const fs::path data = real_data("luxapose");

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "geometry/median.h"
 
 namespace vlp {
 
@@ -42,6 +45,22 @@ std::optional<InverseHeight> estimate_inverse_height(const std::vector<LampInPla
   const auto middle = std::ranges::find_if(
       pairs, [&](const Pair& pair) { return (sum += pair.weight) >= total / 2; });
   return InverseHeight{middle->log_value, std::max(min_sd, 1 / largest)};
+}
+
+std::optional<InverseHeight> estimate_inverse_height_from_radii(
+    const std::vector<LampRadius>& radii) {
+  constexpr std::size_t min_lamps = 3;
+  constexpr double min_sd = 0.005, sd_per_median_deviation = 1.4826;
+  std::vector<double> log_values;
+  for (const LampRadius& lamp : radii) {
+    const double height_m = lamp.radius_m / lamp.radius_in_plane - lamp.height_beyond_first_m;
+    if (height_m > 0) log_values.push_back(-std::log(height_m));
+  }
+  if (log_values.size() < min_lamps) return std::nullopt;
+  const double median = upper_median(log_values);
+  for (double& value : log_values) value = std::abs(value - median);
+  const double deviation = upper_median(std::move(log_values));
+  return InverseHeight{median, std::max(min_sd, sd_per_median_deviation * deviation)};
 }
 
 }  // namespace vlp

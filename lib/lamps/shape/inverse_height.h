@@ -16,6 +16,12 @@ struct LampInPlane {
   double height_beyond_first_m, center_sd_m;
 };
 
+/// Radius of a lamp in the level plane at height 1 and in the map, and its height beyond the first
+/// lamp of the map, seen from the camera.
+struct LampRadius {
+  double radius_in_plane, radius_m, height_beyond_first_m;
+};
+
 /// Ratio of the level plane and the room: 1 / height of the first lamp of the map above the camera,
 /// or below it, as logarithm of 1/m, and the standard deviation of the logarithm.
 struct InverseHeight {
@@ -34,5 +40,11 @@ struct InverseHeight {
 /// weighted by the ratio of distance and standard deviation. Returns std::nullopt if no pair has a
 /// relative standard deviation of at most 20 %.
 std::optional<InverseHeight> estimate_inverse_height(const std::vector<LampInPlane>& lamps);
+
+/// Estimates the inverse height from the radii of lamps, as their median. Its standard deviation
+/// is the scatter of a single radius, and at least 0.5 %. Returns std::nullopt for less than three
+/// lamps.
+std::optional<InverseHeight> estimate_inverse_height_from_radii(
+    const std::vector<LampRadius>& radii);
 
 }  // namespace vlp

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/LU>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -37,6 +39,16 @@ enum class LightReason {
   incomplete        ///< cut by the image border, or too small for an outline
 };
 
+/// Ellipse |unit_from_plane (p - center)| = 1 in the plane of LightShape. With a lens it is a
+/// circle.
+struct PlaneEllipse {
+  Eigen::Vector2d center;
+  Matrix2 unit_from_plane;
+
+  /// Returns the radius of the circle of equal area.
+  double radius() const { return 1 / std::sqrt(std::abs(unit_from_plane.determinant())); }
+};
+
 /// Light in an image. A light of kind no_outline has only a box, with `pixel` at its center, and
 /// the `outline` of its pixels; it has no stripes and no sigma.
 struct Light {
@@ -53,9 +65,8 @@ struct Light {
   ShapeKind shape;
   /// Radius in the image; for other shapes than discs the radius of the disc of equal area.
   double radius_px;
-  /// Outline of a round light in the plane of LightShape: |unit_from_plane (p - plane_center)| = 1.
-  Eigen::Vector2d plane_center;
-  Matrix2 unit_from_plane;
+  /// Outline of a round light in the plane of LightShape.
+  PlaneEllipse plane_outline;
   /// Top left and bottom right corner of the bounding box of the outline, (u, v).
   Eigen::Vector2d box_min, box_max;
   Stripes stripes;

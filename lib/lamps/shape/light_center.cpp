@@ -155,8 +155,7 @@ bool LightShape::set_outline_of_light(const PlaneEllipse& outline, double radius
   light.pixel = *pixel;
   light.box_min = box_min;
   light.box_max = box_max;
-  light.plane_center = outline.center;
-  light.unit_from_plane = outline.unit_from_plane;
+  light.plane_outline = outline;
   light.radius_px = radius_px;
   return true;
 }

@@ -29,13 +29,6 @@ struct DetectorCamera {
   double max_axis_ratio = 2;
 };
 
-/// Ellipse |unit_from_plane (p - center)| = 1 in the plane of LightShape. With a lens it is a
-/// circle.
-struct PlaneEllipse {
-  Eigen::Vector2d center;
-  Matrix2 unit_from_plane;
-};
-
 /// Fits the first outlines of lights, see fit_disc_outline() for the final ones. Edge points are
 /// projected through the lens into the level plane, where a circle is fitted robustly. The center
 /// of the circle is projected back to the image. Reason: the center of an outline in the image is

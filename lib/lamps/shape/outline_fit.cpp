@@ -103,7 +103,7 @@ class DiscFit {
   }
 
   std::optional<OutlineFit> run(double start_blur_px) {
-    constexpr int max_rounds = 24;
+    constexpr int max_rounds = 60;
     constexpr double shrink = 0.6, max_fine_blur_px = 1.2, tolerance_px = 0.01;
     blur_px_ = std::max(kMinBlur_px, start_blur_px);
     const double start_radius_px = radius_px_;
@@ -116,7 +116,7 @@ class DiscFit {
       step_px = take_step();
       if (!std::isfinite(step_px) || is_far_from_start(start_radius_px)) return std::nullopt;
       if (!is_coarse_ && step_px < tolerance_px) break;
-      if (is_coarse_) blur_px_ *= shrink;
+      if (is_coarse_ && step_px < blur_px_) blur_px_ *= shrink;
     }
     if (is_coarse_) return std::nullopt;
     auto fit = make_result();
@@ -168,9 +168,7 @@ class DiscFit {
     return (outline_.center - outline.center).norm() * px_per_unit_;
   }
 
-  void update_radius() {
-    radius_px_ = px_per_unit_ / std::sqrt(std::abs(outline_.unit_from_plane.determinant()));
-  }
+  void update_radius() { radius_px_ = px_per_unit_ * outline_.radius(); }
 
   /// Selects the pixels of the band around the outline if it has moved. Returns false if there are
   /// too few.
@@ -493,7 +491,7 @@ class DiscFit {
   }
 
   bool is_free(int unknown) const {
-    if (unknown == kOval0 || unknown == kOval1) return !is_coarse_ && !is_round_;
+    if (unknown == kOval0 || unknown == kOval1) return !is_round_;
     return unknown < kGeometry || !is_coarse_;
   }
 
@@ -685,9 +683,9 @@ void OutlineFit::add_error_to_center(double sd_px) {
 }
 
 bool KnownRadius::agrees_with(const Light& light) const {
-  constexpr double max_sds = 2, max_outline_error = 0.03;
-  const double fitted = 1 / std::sqrt(std::abs(light.unit_from_plane.determinant()));
-  return std::abs(std::log(fitted / radius)) < max_sds * log_sd + max_outline_error;
+  constexpr double max_sds = 2, max_rim_error = 0.02, max_edge_error = 0.03;
+  return std::abs(std::log(light.plane_outline.radius() / radius)) <
+         max_sds * log_sd + (light.is_uneven ? max_rim_error : max_edge_error);
 }
 
 std::optional<OutlineFit> fit_disc_outline(const ImageView& lines, const PlaneEllipse& start,
@@ -709,13 +707,14 @@ std::optional<OutlineFit> fit_disc_outline(const ImageView& lines, const PlaneEl
   return fit.run(start_blur_px);
 }
 
-bool set_fitted_outline(const OutlineFit& fit, const LightShape& shape, Light& light) {
+bool set_fitted_outline(OutlineFit fit, const LightShape& shape, Light& light) {
+  constexpr double rim_error = 0.0005;  // in radii
+  if (light.is_uneven) fit.add_error_to_center(rim_error * fit.radius_px);
   if (!shape.set_outline_of_light(fit.outline, fit.radius_px, light)) return false;
   light.rise_px = kRisePerBlur * fit.blur_px;
   light.sigma_px = std::clamp(fit.center_sd_px, kMinSigma_px, kMaxSigma_px);
   if (shape.has_known_lens()) {
-    const Circle circle{fit.outline.center,
-                        1 / std::sqrt(std::abs(fit.outline.unit_from_plane.determinant()))};
+    const Circle circle{fit.outline.center, fit.outline.radius()};
     light.outline_equations = {circle, fit.matrix, fit.gradient,
                                shape.compute_scanline_gradient_wrt_position(circle)};
   }

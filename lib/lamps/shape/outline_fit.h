@@ -83,7 +83,8 @@ std::optional<OutlineFit> fit_disc_outline(const ImageView& lines, const PlaneEl
                                            const std::optional<KnownRadius>& known_radius = {});
 
 /// Sets the outline of a light: center, sigma, box, radius, width of the edge, and with a lens
-/// outline_equations. Returns false, and changes nothing, if the lens does not cover the outline.
-bool set_fitted_outline(const OutlineFit& fit, const LightShape& shape, Light& light);
+/// outline_equations. Adds 0.05 % of the radius to the standard deviation of the center of a rim.
+/// Returns false, and changes nothing, if the lens does not cover the outline.
+bool set_fitted_outline(OutlineFit fit, const LightShape& shape, Light& light);
 
 }  // namespace vlp

@@ -323,6 +323,7 @@ std::optional<Light> fit_rim_of_light(const ImageView& image, const Blob& blob, 
                        std::max(min_start_blur_px, start_blur * ring_radius_px), period_lines,
                        background, shape, radius);
   Light light{};
+  light.is_uneven = true;
   if (!fit || fit->center_sd_px > max_center_sd * fit->radius_px ||
       !set_fitted_outline(*fit, shape, light) || (radius && !radius->agrees_with(light))) {
     return std::nullopt;
@@ -331,11 +332,10 @@ std::optional<Light> fit_rim_of_light(const ImageView& image, const Blob& blob, 
   for (int i = 0; i < num_outline_points; ++i) {
     const double angle = 2 * std::numbers::pi * i / num_outline_points;
     const auto pixel = shape.pixel_from_level_plane_point(
-        light.plane_center +
-        light.unit_from_plane.inverse() * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+        light.plane_outline.center + light.plane_outline.unit_from_plane.inverse() *
+                                         Eigen::Vector2d(std::cos(angle), std::sin(angle)));
     if (pixel) light.outline.push_back({shape.swap_image_and_scanline_axes(*pixel), 0, 0, false});
   }
-  light.is_uneven = true;
   light.inlier_fraction = fit->inlier_fraction;
   return light;
 }

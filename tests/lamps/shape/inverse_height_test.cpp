@@ -55,5 +55,36 @@ TEST(EstimateInverseHeight, ReturnsNulloptForFewOrCloseLamps) {
   EXPECT_FALSE(estimate_inverse_height({{{0.1, 0}, {0, 0}, 0, 0.1}, {{0.1, 0}, {2, 0}, 0, 0.1}}));
 }
 
+/// Returns the radii of lamps at several heights, the first one by a factor wrong.
+std::vector<LampRadius> make_radii(double height_m, double factor_of_first) {
+  std::vector<LampRadius> radii{{0, 0.1, 0}, {0, 0.1, 0.3}, {0, 0.08, -0.2}, {0, 0.15, 0}};
+  for (LampRadius& lamp : radii)
+    lamp.radius_in_plane = lamp.radius_m / (height_m + lamp.height_beyond_first_m);
+  radii.front().radius_in_plane *= factor_of_first;
+  return radii;
+}
+
+TEST(EstimateInverseHeightFromRadii, IsExactIfMostRadiiAgree) {
+  for (const double factor : {1.0, 0.7, 1.5}) {
+    const auto inverse_height = estimate_inverse_height_from_radii(make_radii(2, factor));
+    ASSERT_TRUE(inverse_height) << factor;
+    EXPECT_NEAR(inverse_height->log_value, -std::log(2), 1e-12) << factor;
+    EXPECT_NEAR(inverse_height->log_sd, 0.005, 1e-12) << factor;
+  }
+}
+
+TEST(EstimateInverseHeightFromRadii, StandardDeviationIsScatterOfRadii) {
+  const auto inverse_height = estimate_inverse_height_from_radii(
+      {{0.1, 0.2, 0}, {0.1 * std::exp(0.1), 0.2, 0}, {0.1 * std::exp(-0.1), 0.2, 0}});
+  ASSERT_TRUE(inverse_height);
+  EXPECT_NEAR(inverse_height->log_value, -std::log(2), 1e-12);
+  EXPECT_NEAR(inverse_height->log_sd, 1.4826 * 0.1, 1e-12);
+}
+
+TEST(EstimateInverseHeightFromRadii, ReturnsNulloptForLessThanThreeLamps) {
+  EXPECT_FALSE(estimate_inverse_height_from_radii({}));
+  EXPECT_FALSE(estimate_inverse_height_from_radii({{0.1, 0.2, 0}, {0.1, 0.2, 0}}));
+}
+
 }  // namespace
 }  // namespace vlp

@@ -50,7 +50,7 @@ class LightShapeOfMovingDisc : public testing::Test {
     std::vector<Vector2d> in_plane;
     for (const EdgePoint& point : points)
       in_plane.push_back(shape.level_plane_point_from_pixel(point.pixel).value());
-    const Circle fitted{light->plane_center, 1 / light->unit_from_plane(0, 0)};
+    const Circle fitted{light->plane_outline.center, light->plane_outline.radius()};
     light->outline_equations = make_outline_equations(
         in_plane, fitted, shape.compute_scanline_gradient_wrt_position(fitted), 1e-3);
     return light;
