@@ -41,6 +41,17 @@ struct Motion {
   Eigen::Matrix3d information;
 };
 
+/// Returns the ratio of the scatter of the ovals about the motion and their stated variances, from
+/// 0.5 to 1: the variance of a sheared outline includes a part of the shear, which a circle does
+/// not fit.
+double estimate_variance_ratio(const std::vector<MeasuredOval>& lights, const Motion& motion) {
+  constexpr double min_ratio = 0.5;
+  double chi_square = 0;
+  for (const MeasuredOval& light : lights) chi_square += light.compute_chi_square(motion.value);
+  const double degrees_of_freedom = std::max(1.0, 2.0 * double(lights.size()) - 3);
+  return std::clamp(chi_square / degrees_of_freedom, min_ratio, 1.0);
+}
+
 Motion estimate_camera_motion(const std::vector<MeasuredOval>& lights) {
   // Prior of the rotation: a camera that observes lamps rotates by less than a radian or two in
   // 10,000 scanlines.
@@ -98,7 +109,10 @@ std::optional<Shear> Shear::estimate_shear_from_outlines(std::span<const Outline
       ovals.erase(worst);
       continue;
     }
-    if (motion.value.dot(motion.information * motion.value) < beyond_doubt) break;
+    if (motion.value.dot(motion.information * motion.value) <
+        beyond_doubt * estimate_variance_ratio(ovals, motion)) {
+      break;
+    }
     return Shear(motion.value, motion.information.inverse());
   }
   return std::nullopt;

@@ -59,7 +59,8 @@ class Shear {
  public:
   /// Estimates the motion from lights with a sufficiently visible outline. Rejects lights that
   /// contradict the majority. Returns std::nullopt if less than half of the lights agree, or if the
-  /// motion is not significant.
+  /// motion is not significant. Ovals that agree better than their variances state are up to twice
+  /// as significant.
   static std::optional<Shear> estimate_shear_from_outlines(
       std::span<const OutlineEquations> lights);
 

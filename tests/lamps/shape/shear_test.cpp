@@ -112,6 +112,28 @@ TEST(Shear, EstimateReturnsNulloptForStationaryCamera) {
   EXPECT_EQ(found, 0);
 }
 
+TEST(Shear, EstimateRecognizesMotionIfOvalsAgreeBetterThanStated) {
+  // The variances that a shear inflates: the ovals are significant only by their agreement.
+  constexpr double inflation = 400;
+  Random random(5);
+  const MovingCamera moving_camera;
+  auto lights = three_whole(moving_camera, random);
+  for (const Vector2d& at : {Vector2d(0.3, 0.2), {-0.3, -0.3}})
+    lights.push_back(moving_camera.make_outline(at, 2 * pi, random));
+  double significance = 0;
+  for (OutlineEquations& light : lights) {
+    const auto estimate = light.solve_with_oval_prior(std::nullopt);
+    ASSERT_TRUE(estimate);
+    const double per_light =
+        estimate->p.tail<2>().squaredNorm() / (estimate->covariance(3, 3) * inflation);
+    significance += per_light;
+    light.matrix /= inflation;
+    light.gradient /= inflation;
+  }
+  ASSERT_GT(significance, 15) << significance;
+  EXPECT_TRUE(Shear::estimate_shear_from_outlines(lights)) << significance;
+}
+
 TEST(Shear, EstimateIgnoresLightWithContradictingMotion) {
   Random random(4);
   const MovingCamera moving_camera;
