@@ -27,6 +27,15 @@ inline double compute_squared_student_t_bound(double sigmas, double m) {
   return m * std::expm1(z * z / m);
 }
 
+/// Computes the factor of a variance estimated with m degrees of freedom by which 1.96 standard
+/// deviations cover 95 %: the square of the ratio of the quantiles of Student's t and of a normal
+/// variable.
+inline double compute_student_factor(double m) {
+  constexpr double sigmas_of_95_percent = 1.96;
+  return compute_squared_student_t_bound(sigmas_of_95_percent, m) /
+         (sigmas_of_95_percent * sigmas_of_95_percent);
+}
+
 /// Computes the bound of chi-squared with m degrees of freedom for `sigmas`, see above.
 ///
 ///   m (1 - 2 / (9 m) + sigmas sqrt(2 / (9 m)))^3

@@ -128,13 +128,6 @@ namespace {
 
 constexpr double kMaxErrorFraction = 0.2;  // of the lamps' height
 
-/// Computes q of compute_small_sample_variance_factor().
-double compute_student_factor(double degrees_of_freedom) {
-  constexpr double sigmas_of_95_percent = 1.96;
-  return compute_squared_student_t_bound(sigmas_of_95_percent, degrees_of_freedom) /
-         (sigmas_of_95_percent * sigmas_of_95_percent);
-}
-
 /// Computes the weight of residuals that contradict given noise: 0 up to the ratio that 20 % of
 /// all residuals exceed, 1 from that of 5 %, linear in between.
 double compute_noise_contradiction_weight(double ratio, double degrees_of_freedom) {

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "geometry/median.h"
+#include "geometry/statistical_bounds.h"
 
 namespace vlp {
 namespace {
@@ -208,7 +209,10 @@ RowTime make_row_time(const PeriodMatch& match, const std::vector<PeriodGroup>& 
   double variance = 1 / information;
   // The scatter is not weighted, because five lamps do not reveal which of them is the most
   // reliable.
-  if (lamps > 1) variance = std::max(variance, squares / (lamps - 1) / lamps);
+  if (lamps > 1) {
+    const double scatter = squares / (lamps - 1) / lamps * compute_student_factor(lamps - 1);
+    variance = std::max(variance, scatter);
+  }
   variance += common_error * common_error;
   const double row_time_s = std::exp(match.log_row_time);
   return {row_time_s, row_time_s * std::sqrt(variance), lamps, lights};

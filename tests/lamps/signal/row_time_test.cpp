@@ -49,23 +49,31 @@ TEST(EstimateRowTimeCandidates, ReturnsExactRowTimeWithoutNoise) {
   EXPECT_EQ(result.row_time->lights, 5);
 }
 
-TEST(EstimateRowTimeCandidates, RowTimeSdMatchesScatter) {
-  Random random(2);
-  double chi_square = 0;
-  constexpr int draws = 300;
-  for (int draw = 0; draw < draws; ++draw) {
-    // Frequencies of the lamps have errors of 0.5 %.
-    std::vector<MeasuredPeriod> lights;
-    for (const Lamp& lamp : kMap.lamps) {
-      add(lights, *lamp.frequency_hz * std::exp(0.005 * random.normal()), 20, 0.002, random);
+TEST(EstimateRowTimeCandidates, IntervalOf95PercentCoversRowTimeForEachNumberOfLamps) {
+  constexpr double frequency_sd = 0.005;
+  constexpr int draws = 1000;
+  for (const std::size_t count : {2U, 3U, 4U, 5U, 6U}) {
+    Random random(2 + count);
+    const std::vector<double> frequencies_hz{2000, 2500, 3010, 3500, 4020, 4600};
+    const LampMap map =
+        make_lamp_map({frequencies_hz.begin(), frequencies_hz.begin() + std::ptrdiff_t(count)});
+    int covered = 0, found = 0;  // two lamps that differ by several sd have two row times
+    for (int draw = 0; draw < draws; ++draw) {
+      std::vector<MeasuredPeriod> lights;
+      for (const Lamp& lamp : map.lamps) {
+        add(lights, *lamp.frequency_hz * std::exp(frequency_sd * random.normal()), 20, 0.002,
+            random, lamp.id);
+      }
+      const auto result = find_row_time(lights, map);
+      if (!result.row_time) continue;
+      ++found;
+      const double error_s = std::abs(result.row_time->row_time_s - kTrue_s);
+      covered += error_s < 1.96 * result.row_time->sd_s ? 1 : 0;
     }
-    const auto result = find_row_time(lights, kMap);
-    ASSERT_TRUE(result.row_time) << result.problem;
-    chi_square += std::pow((result.row_time->row_time_s - kTrue_s) / result.row_time->sd_s, 2);
+    ASSERT_GT(found, 0.95 * draws) << count;
+    EXPECT_GE(covered, 0.93 * found) << count;
+    EXPECT_LE(covered, 0.97 * found) << count;
   }
-  // The scatter of five lamps is known to a third: Student's t has a variance of 2.
-  EXPECT_GT(chi_square / draws, 0.7);
-  EXPECT_LT(chi_square / draws, 3);
 }
 
 TEST(EstimateRowTimeCandidates, RowTimeIsAccurateDespiteOneWrongLampFrequency) {
