@@ -5,10 +5,15 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <map>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "camera/lens.h"
 #include "geometry/plane.h"
@@ -28,15 +33,14 @@ namespace {
 using Sightings = std::span<const Sighting>;
 
 void check_lamp_positions(const std::vector<Lamp>& lamps) {
-  for (std::size_t i = 0; i < lamps.size(); ++i) {
-    const std::string name = "lamp " + std::to_string(lamps[i].id);
-    if (!lamps[i].position_m.allFinite()) {
-      throw std::invalid_argument(name + " has a position that is not finite");
-    }
-    for (std::size_t k = 0; k < i; ++k) {
-      if (lamps[k].position_m == lamps[i].position_m) {
-        throw std::invalid_argument(name + " is where lamp " + std::to_string(lamps[k].id) + " is");
-      }
+  std::map<std::array<double, 3>, int> id_by_position;
+  for (const Lamp& lamp : lamps) {
+    const Eigen::Vector3d& at = lamp.position_m;
+    const std::string name = "lamp " + std::to_string(lamp.id);
+    if (!at.allFinite()) throw std::invalid_argument(name + " has a position that is not finite");
+    const auto [other, is_free] = id_by_position.try_emplace({at.x(), at.y(), at.z()}, lamp.id);
+    if (!is_free) {
+      throw std::invalid_argument(name + " is where lamp " + std::to_string(other->second) + " is");
     }
   }
 }
@@ -84,12 +88,17 @@ Eigen::Vector3d get_lamp_center(const std::vector<Lamp>& lamps) {
 /// none.
 std::vector<double> compute_distances_to_nearest_lamp(const std::vector<Lamp>& lamps) {
   std::vector<double> nearest_m(lamps.size(), std::numeric_limits<double>::infinity());
-  for (std::size_t i = 0; i < lamps.size(); ++i) {
-    for (std::size_t k = 0; k < i; ++k) {
-      const double distance_m = (lamps[k].position_m - lamps[i].position_m).head<2>().norm();
-      nearest_m[i] = std::min(nearest_m[i], distance_m);
-      nearest_m[k] = std::min(nearest_m[k], distance_m);
-    }
+  std::vector<std::pair<Eigen::Vector2d, std::size_t>> sorted;
+  for (const Lamp& lamp : lamps) sorted.emplace_back(lamp.position_m.head<2>(), sorted.size());
+  std::ranges::sort(sorted, {}, [](const auto& lamp) { return lamp.first.x(); });
+  for (auto lamp = sorted.begin(); lamp != sorted.end(); ++lamp) {
+    double& distance_m = nearest_m[lamp->second];
+    const auto improve = [&](const auto& other) {
+      distance_m = std::min(distance_m, (other.first - lamp->first).norm());
+      return std::abs(other.first.x() - lamp->first.x()) < distance_m;
+    };
+    for (auto after = lamp + 1; after != sorted.end() && improve(*after);) ++after;
+    for (auto before = lamp; before != sorted.begin() && improve(*std::prev(before));) --before;
   }
   return nearest_m;
 }

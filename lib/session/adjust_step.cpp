@@ -16,6 +16,7 @@
 #include "positioning/known_motion.h"
 #include "rig/calibration_builder.h"
 #include "rig/calibration_error.h"
+#include "rig/find_lamp.h"
 #include "rig/input_error.h"
 #include "session/lamp_captures.h"
 #include "session/rotation_step.h"
@@ -199,8 +200,9 @@ AdjustStepResult run_joint_adjustment_step(const AdjustStepInput& input, History
                         found.detections,
                         found.residual_px};
   for (const AdjustSet& set : input.sets) adjustment.sets.push_back(set.name);
-  for (const Lamp& lamp : (input.refine_map ? found.refined_map : input.lamps).lamps) {
-    adjustment.lamps.push_back({lamp.id, lamp.position_m});
+  const LampMap& map = input.refine_map ? found.refined_map : input.lamps;
+  for (const int id : found.covariance_lamp_ids) {
+    adjustment.lamps.push_back({id, find_lamp_by_id(map.lamps, id)->position_m});
   }
   Calibration calibration = input.calibration;
   calibration.camera = found.camera;

@@ -35,6 +35,8 @@ constexpr double kMovedChiSquared = 21.1;
 /// Number of standard deviations beyond which a known position is wrong, and a detection an
 /// outlier.
 constexpr double kMaxPlaceSigmas = 5, kDetectionOutlierSigmas = 4.5;
+constexpr const char* kTooFewLampsMessage =
+    "no capture shows two lamps of the map clearly enough for a fix";
 /// Smallest noise of detections without sigma_px, in pixels.
 constexpr double kMinNoise_px = 1e-4;
 
@@ -664,15 +666,44 @@ void set_adjusted_joint_covariance(const AdjustmentProblem& problem,
   result.surveyed_covariance.bottomRightCorner(rows - first_lamp, rows - first_lamp).setZero();
 }
 
+/// Returns the lamps with a detection, in the order of the map.
+LampMap select_detected_lamps(const AdjustmentInput& input) {
+  std::set<int> ids;
+  for (const AdjustmentCapture& capture : input.captures) {
+    for (const Detection& detection : capture.detections) ids.insert(detection.lamp);
+  }
+  LampMap map = input.lamps;
+  std::erase_if(map.lamps, [&](const Lamp& lamp) { return !ids.contains(lamp.id); });
+  return map;
+}
+
+/// Adds a note if a lamp of the map is visible in no capture.
+void add_note_of_undetected_lamps(AdjustmentResult& result) {
+  const std::size_t count = result.refined_map.lamps.size() - result.lamps.size();
+  if (count == 0) return;
+  const auto first = std::ranges::find_if(result.refined_map.lamps, [&](const Lamp& lamp) {
+    return std::ranges::find(result.lamps, lamp.id, &AdjustmentResult::LampCorrection::id) ==
+           result.lamps.end();
+  });
+  result.notes.push_back(
+      count == 1
+          ? fmt::format("lamp {} is visible in no capture: its position stays unchanged", first->id)
+          : fmt::format("{} lamps, such as {}, are visible in no capture: their positions stay "
+                        "unchanged",
+                        count, first->id));
+}
+
 /// Sets the lamps with their covariances, in both joint covariances.
-void set_adjusted_map(const AssembledProblem& all, const Contradictions& contradictions,
-                      AdjustmentResult& result) {
+void set_adjusted_map(const AssembledProblem& all, const LampMap& detected_lamps,
+                      const Contradictions& contradictions, AdjustmentResult& result) {
   const AdjustmentProblem& problem = all.problem;
   const AdjustmentLayout& at = problem.state_vector_layout();
   const Eigen::VectorXd& state = problem.state_vector();
   const Eigen::Index first_lamp = count_intrinsics_with_covariance(result.camera) + 4;
   for (std::size_t i = 0; i < problem.lamps.size(); ++i) {
-    Lamp& lamp = result.refined_map.lamps[i];
+    const int id = detected_lamps.lamps[i].id;
+    Lamp& lamp = *std::ranges::find(result.refined_map.lamps, id, &Lamp::id);
+    result.covariance_lamp_ids.push_back(id);
     const Eigen::Index row = first_lamp + 3 * static_cast<Eigen::Index>(i);
     const double surveyed_sd_m = contradictions.expected_lamp_sd_m(i);
     const Eigen::Vector3d correction_m =
@@ -687,17 +718,14 @@ void set_adjusted_map(const AssembledProblem& all, const Contradictions& contrad
     // Applies to a moved lamp also, so that fixes with this map detect that its position is wrong.
     result.surveyed_covariance.block<3, 3>(row, row) =
         surveyed_sd_m * surveyed_sd_m * Eigen::Matrix3d::Identity();
-    if (!all.lamp_seen[i]) {
-      result.notes.push_back(
-          fmt::format("lamp {} is visible in no capture: its position stays unchanged", lamp.id));
-      continue;
-    }
+    if (!all.lamp_seen[i]) continue;
     result.lamps.push_back(
         {lamp.id, correction_m, found.diagonal().cwiseMax(0).cwiseSqrt(), moved});
     if (!(surveyed_sd_m > 0)) continue;
     lamp.position_m += correction_m;
     lamp.sd_m = std::sqrt(found.trace() / 3);
   }
+  add_note_of_undetected_lamps(result);
   if (contradictions.has_contradicting_majority()) {
     // [ROTATION-3] `half the lamps or more` | `sd_m` too small, or map frame differs from that of
     //   the known positions | correct it
@@ -775,17 +803,23 @@ MatrixX compute_intrinsics_covariance_from_pixel_sd(const Camera& camera, double
   return Eigen::MatrixXd((squares.array() > 0).select(variances, 0).matrix().asDiagonal());
 }
 
-AdjustmentResult run_bundle_adjustment(const AdjustmentInput& input,
+AdjustmentResult run_bundle_adjustment(const AdjustmentInput& all_lamps,
                                        const AdjustmentLimits& limits) {
   AdjustmentResult result;
+  AdjustmentInput input = all_lamps;
+  input.lamps = select_detected_lamps(all_lamps);
+  result.camera = input.calibration.camera;
+  result.refined_map = all_lamps.lamps;
+  if (input.lamps.lamps.empty()) {
+    result.undetermined = kTooFewLampsMessage;
+    return result;
+  }
   AssembledProblem all = assemble_adjustment_problem(input);
   const AdjustmentProblem& problem = all.problem;
   result.rejected_captures = all.rejected_captures;
   result.rejected_detections = static_cast<int>(problem.sightings.size());
-  result.camera = input.calibration.camera;
-  result.refined_map = input.lamps;
   if (problem.captures.empty()) {
-    result.undetermined = "no capture shows two lamps of the map clearly enough for a fix";
+    result.undetermined = kTooFewLampsMessage;
     return result;
   }
   Contradictions contradictions(all);
@@ -803,7 +837,7 @@ AdjustmentResult run_bundle_adjustment(const AdjustmentInput& input,
                                              limits, has_lever_arm);
   set_adjusted_rotation_center(problem, covariance, has_lever_arm, result);
   set_adjusted_joint_covariance(problem, covariance, has_lever_arm, result);
-  set_adjusted_map(all, contradictions, result);
+  set_adjusted_map(all, input.lamps, contradictions, result);
   set_position_residuals(all, result);
   set_adjusted_lens(problem, covariance, result);
   return result;

@@ -121,6 +121,8 @@ struct AdjustmentResult {
   };
   /// Corrections of the detected lamps.
   std::vector<LampCorrection> lamps;
+  /// Ids of the lamps in the joint covariance, in its order: those with a detection.
+  std::vector<int> covariance_lamp_ids;
   /// Joint covariance (Adjustment::covariance) for `refined_map`, and for the surveyed map. The
   /// latter has the same estimates with the errors of the survey in the positions of the lamps.
   Eigen::MatrixXd refined_covariance, surveyed_covariance;

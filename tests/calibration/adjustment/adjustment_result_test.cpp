@@ -47,10 +47,11 @@ TEST_F(RunBundleAdjustmentResult, EstimatesAndCovariancesMatchProblem) {
     ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
     const double stopped = is_checked ? 1e-5 : 1e-4;  // standard deviations
 
-    ASSERT_EQ(found.refined_covariance.rows(), 34);
+    EXPECT_THAT(found.covariance_lamp_ids, testing::ElementsAre(11, 12, 13, 14, 15));
+    ASSERT_EQ(found.refined_covariance.rows(), 31);
     const Eigen::VectorXd sd = expected.diagonal().cwiseSqrt();
-    for (Eigen::Index i = 0; i < 34; ++i) {
-      for (Eigen::Index j = 0; j < 34; ++j) {
+    for (Eigen::Index i = 0; i < 31; ++i) {
+      for (Eigen::Index j = 0; j < 31; ++j) {
         EXPECT_NEAR(found.refined_covariance(i, j), expected(i, j), 1e-4 * sd[i] * sd[j] + 1e-16);
       }
     }
@@ -121,15 +122,17 @@ TEST_F(RunBundleAdjustmentResult, LampsAndBothMapCovariancesMatchProblem) {
     const Lamp& surveyed = input.lamps.lamps[i];
     const Lamp& refined = found.refined_map.lamps[i];
     EXPECT_EQ(refined.id, surveyed.id);
-    const Eigen::Index row = 16 + 3 * static_cast<Eigen::Index>(i);
-    const Eigen::Matrix3d covariance = found.refined_covariance.block<3, 3>(row, row);
-    EXPECT_THAT(found.surveyed_covariance.middleRows<3>(row).rightCols(18),
-                IsNear((Eigen::MatrixXd(3, 18) << Eigen::MatrixXd::Zero(3, row - 16),
-                        *surveyed.sd_m * *surveyed.sd_m * Eigen::Matrix3d::Identity(),
-                        Eigen::MatrixXd::Zero(3, 31 - row))
-                           .finished(),
-                       1e-18));
-    if (i < 5) {
+    const bool is_detected = i < 5;
+    Eigen::Matrix3d covariance;
+    if (is_detected) {
+      const Eigen::Index row = 16 + 3 * static_cast<Eigen::Index>(i);
+      covariance = found.refined_covariance.block<3, 3>(row, row);
+      EXPECT_THAT(found.surveyed_covariance.middleRows<3>(row).rightCols(15),
+                  IsNear((Eigen::MatrixXd(3, 15) << Eigen::MatrixXd::Zero(3, row - 16),
+                          *surveyed.sd_m * *surveyed.sd_m * Eigen::Matrix3d::Identity(),
+                          Eigen::MatrixXd::Zero(3, 28 - row))
+                             .finished(),
+                         1e-18));
       const auto& corrected = found.lamps[i];
       EXPECT_EQ(corrected.id, surveyed.id);
       EXPECT_FALSE(corrected.is_moved);
@@ -139,7 +142,7 @@ TEST_F(RunBundleAdjustmentResult, LampsAndBothMapCovariancesMatchProblem) {
                  1e-8));
       EXPECT_THAT(corrected.sd_m, IsNear(covariance.diagonal().cwiseSqrt(), 1e-15));
     }
-    if (i == 1 || i == 5) {
+    if (i == 1 || !is_detected) {
       EXPECT_EQ(refined.position_m, surveyed.position_m) << "exact, or not in view";
       EXPECT_EQ(refined.sd_m, surveyed.sd_m);
       continue;
@@ -154,6 +157,22 @@ TEST_F(RunBundleAdjustmentResult, LampsAndBothMapCovariancesMatchProblem) {
   EXPECT_EQ(found.surveyed_covariance.leftCols<16>(), found.refined_covariance.leftCols<16>());
   EXPECT_THAT(found.notes, testing::ElementsAre("lamp 16 is visible in no capture: its position "
                                                 "stays unchanged"));
+}
+
+TEST_F(RunBundleAdjustmentResult, LampsWithoutDetectionAreNoUnknowns) {
+  make_problem(0.05, 0.03);
+  const AdjustmentResult few = run_bundle_adjustment(input);
+  ASSERT_TRUE(few.has_succeeded()) << few.undetermined;
+  constexpr int num_more = 3000;
+  for (int i = 0; i < num_more; ++i)
+    input.lamps.lamps.push_back({1000 + i, {20. + i, 5, 3}, {}, {}, {}, 0.002});
+  const AdjustmentResult many = run_bundle_adjustment(input);
+  ASSERT_TRUE(many.has_succeeded()) << many.undetermined;
+  EXPECT_EQ(many.covariance_lamp_ids, few.covariance_lamp_ids);
+  EXPECT_EQ(many.refined_covariance, few.refined_covariance);
+  EXPECT_EQ(many.refined_map.lamps.size(), input.lamps.lamps.size());
+  EXPECT_THAT(many.notes, testing::ElementsAre("3001 lamps, such as 16, are visible in no capture: "
+                                               "their positions stay unchanged"));
 }
 
 TEST_F(RunBundleAdjustmentResult, KnownPositionsListResidualsOfEachPivotAndPosition) {
@@ -380,7 +399,7 @@ TEST_F(RunBundleAdjustmentResult, LimitsOfZenithAndLeverArmApplyToLargestSd) {
   ASSERT_TRUE(without_arm.has_succeeded());
   EXPECT_FALSE(without_arm.center.lever_arm_m);
   EXPECT_FALSE(without_arm.center.lever_arm_covariance);
-  ASSERT_EQ(without_arm.refined_covariance.rows(), 34);
+  ASSERT_EQ(without_arm.refined_covariance.rows(), 31);
   Eigen::MatrixXd expected = found.refined_covariance;
   expected.middleRows<2>(14).setZero();
   expected.middleCols<2>(14).setZero();
