@@ -282,8 +282,7 @@ LevelRotations read_level_rotations(const LampImages& images) {
 Eigen::Matrix3d compute_level_rotation_from_inclination(const Inclination& inclination,
                                                         double yaw_in_robot_rad,
                                                         const Eigen::Matrix3d& base_from_camera) {
-  const Eigen::Matrix3d level_from_base =
-      compute_inclination_rotation(inclination, yaw_in_robot_rad).level_from_base;
+  const Eigen::Matrix3d level_from_base = compute_level_from_base(inclination, yaw_in_robot_rad);
   return level_rotation_from_zenith((level_from_base * base_from_camera).inverse().col(2));
 }
 

@@ -8,6 +8,8 @@
 #include <limits>
 #include <optional>
 
+#include "geometry/angles.h"
+#include "geometry/symmetric.h"
 #include "positioning/closed_form.h"
 #include "positioning/three_lamp_poses.h"
 
@@ -31,9 +33,9 @@ bool is_below_lamps(const FreePose& camera, const std::array<Eigen::Vector3d, 3>
   });
 }
 
-double compute_mean_lamp_distance_m(const BodyObservations& frame, const BodyState& state) {
+double compute_mean_lamp_distance_m(const FrameObservations& frame, const BodyState& state) {
   double sum = 0;
-  for (const BodyObservation& seen : frame.observations_span()) {
+  for (const LampObservation& seen : frame.observations_span()) {
     sum += (seen.lamp_m - state.pose.position_m).norm();
   }
   return sum / static_cast<double>(frame.size);
@@ -46,15 +48,19 @@ bool has_fix(const BodySolution& solution) {
          solution.status == FixStatus::undetermined;
 }
 
-bool LevelSightings::set_sightings_in_level_frame(const BodyObservations& frame,
-                                                  const Eigen::Matrix3d& level_from_body) {
+bool is_roll_pitch_unknown(const BodyPrior& prior) {
+  constexpr double max_known_sd_rad = 0.15;
+  return prior.inclination_sd_rad > max_known_sd_rad;
+}
+
+LevelSightings::LevelSightings(const FrameObservations& frame,
+                               const Eigen::Matrix3d& level_from_body) {
   for (; size < frame.num_current; ++size) {
-    const BodyObservation& seen = frame.sightings[size];
+    const LampObservation& seen = frame.sightings[size];
     const Eigen::Vector3d ray = level_from_body * seen.ray;
-    if (!(ray.z() > 0)) return false;
-    sightings[size] = {seen.lamp_m, ray.head<2>() / ray.z(), Matrix2::Identity(), seen.sigma_px};
+    are_lamps_above_horizon = are_lamps_above_horizon && ray.z() > 0;
+    sightings[size] = {seen.lamp_m, ray.head<2>() / ray.z()};
   }
-  return true;
 }
 
 BodyState make_body_state_from_camera_pose(const Pose& camera, const BodyProblem& problem,
@@ -64,7 +70,7 @@ BodyState make_body_state_from_camera_pose(const Pose& camera, const BodyProblem
   return state;
 }
 
-InitialStates compute_initial_body_states_from_three_lamps(const BodyObservations& frame,
+InitialStates compute_initial_body_states_from_three_lamps(const FrameObservations& frame,
                                                            const std::array<std::size_t, 3>& lamps,
                                                            const BodyProblem& problem) {
   std::array<Eigen::Vector3d, 3> points_m, rays;
@@ -86,26 +92,38 @@ InitialStates compute_initial_body_states_from_three_lamps(const BodyObservation
   return initial_states;
 }
 
-bool is_body_position_determined(const BodyObservations& frame, const BodyFix& fix) {
-  constexpr double max_sd_fraction = 0.25;
+bool is_body_position_determined(const FrameObservations& frame, const BodyPrior& prior,
+                                 const BodyFix& fix) {
+  // An estimated tilt or motion adds errors that are not linear in the state.
+  const double max_sd_fraction = prior.is_motion_or_tilt_estimated() ? 0.25 : 1;
   const double limit_m = max_sd_fraction * compute_mean_lamp_distance_m(frame, fix.state);
   return fix.covariance.diagonal().head<3>().maxCoeff() < limit_m * limit_m;
 }
 
 namespace {
 
-InitialStates compute_level_state(const BodyObservations& frame, const BodyProblem& problem) {
-  const Eigen::Matrix3d lean = level_rotation_from_inclination(problem.prior.mean.inclination);
-  LevelSightings level;
-  if (!level.set_sightings_in_level_frame(frame, lean))
-    return {FixStatus::lamp_below_camera, 0, {}};
-  const InitialPose start = compute_initial_pose(level.observations_span());
-  if (start.status != FixStatus::ok) return {start.status, 0, {}};
-  return {FixStatus::ok, 1, {make_body_state_from_camera_pose(start.pose, problem, lean)}};
+InitialStates compute_level_states(const FrameObservations& frame, const BodyProblem& problem) {
+  const BodyPrior& prior = problem.prior;
+  const Eigen::Matrix3d lean = level_rotation_from_inclination(prior.mean.inclination);
+  const LevelSightings level(frame, lean);
+  InitialLevelPoses start{FixStatus::lamp_below_camera};
+  if (level.are_lamps_above_horizon && level.size > 1) {
+    start = compute_initial_poses(level.observations_span());
+  } else if (level.are_lamps_above_horizon && prior.height && prior.yaw) {
+    const double arm_z_m = (lean * (problem.arm_m - prior.height_point_m)).z();
+    const auto pose = compute_pose_at_known_height_and_yaw(
+        level.sightings.front(), prior.height->z_m + arm_z_m, prior.yaw->yaw_rad);
+    if (pose) start = {FixStatus::ok, 1, {*pose}};
+  }
+  InitialStates states{start.status, start.count, {}};
+  for (std::size_t i = 0; static_cast<int>(i) < start.count; ++i) {
+    states.states[i] = make_body_state_from_camera_pose(start.poses[i], problem, lean);
+  }
+  return states;
 }
 
 /// Returns three lamps of the current frame that are far apart and far from collinear.
-std::array<std::size_t, 3> find_widest_lamps(const BodyObservations& frame) {
+std::array<std::size_t, 3> find_widest_lamps(const FrameObservations& frame) {
   const auto best = [&](const auto& value) {
     std::size_t found = 0;
     for (std::size_t i = 1; i < frame.num_current; ++i) {
@@ -125,28 +143,48 @@ std::array<std::size_t, 3> find_widest_lamps(const BodyObservations& frame) {
   return {first, second, third};
 }
 
-bool are_below_lamps(const BodyObservations& frame, const BodyProblem& problem,
+bool are_below_lamps(const FrameObservations& frame, const BodyProblem& problem,
                      const BodyState& state) {
   const double z_m =
-      state.pose.position_m.z() +
-      (level_rotation_from_inclination(state.motion.inclination) * problem.arm_m).z();
+      state.pose.position_m.z() + EvaluatedState(state).body_from_level.col(2).dot(problem.arm_m);
   return std::all_of(frame.sightings.begin(),
                      frame.sightings.begin() + static_cast<std::ptrdiff_t>(frame.size),
-                     [&](const BodyObservation& seen) { return seen.lamp_m.z() > z_m; });
+                     [&](const LampObservation& seen) { return seen.lamp_m.z() > z_m; });
+}
+
+double compute_prior_chi_squared(const BodyState& state, const BodyProblem& problem) {
+  return compute_body_state_chi_squared({}, problem, state).value_or(0);
+}
+
+/// Returns true if the chi-squared of a state is much smaller than its distance from the fix, in
+/// standard deviations, implies: a valley of chi-squared connects them, which the covariance of the
+/// fix does not describe.
+bool is_beyond_linear_range(const BodyState& state, double chi_squared, const BodyFix& fix) {
+  constexpr double max_ratio = 3, max_excess = 12;
+  Eigen::Vector4d difference;
+  difference << state.pose.position_m - fix.state.pose.position_m,
+      wrap_angle_rad(state.pose.yaw_rad - fix.state.pose.yaw_rad);
+  const auto information =
+      invert_positive_definite_matrix(Eigen::Matrix4d(fix.covariance.topLeftCorner<4, 4>()));
+  if (!information) return true;
+  return difference.dot(*information * difference) >
+         max_ratio * (chi_squared - fix.chi_squared) + max_excess;
 }
 
 /// Returns the fix with the smallest chi-squared from several initial states; `ambiguous` if
 /// another fix explains the frame nearly as well.
 BodySolution find_best_body_solution(const InitialStates& initial_states,
-                                     const BodyObservations& frame, const BodyProblem& problem) {
+                                     const FrameObservations& frame, const BodyProblem& problem) {
   constexpr double hopeless = 100, small = 100, unlikely = 12, same_m = 1e-4;
-  std::array<double, 4> at_start;
+  std::array<double, 6> at_start;
   at_start.fill(std::numeric_limits<double>::infinity());
-  if (initial_states.count == 1) at_start[0] = 0;
-  for (std::size_t i = 0; initial_states.count > 1 && static_cast<int>(i) < initial_states.count;
-       ++i) {
-    const auto chi_squared = compute_body_state_chi_squared(
-        frame.observations_span(), problem.arm_m, problem.prior, initial_states.states[i]);
+  // Three lamps with unknown roll and pitch: pixels and states are equal in number.
+  const bool is_exact = frame.size == 3 && problem.prior.inclination_sd_rad > 0;
+  const bool is_single = initial_states.count == 1 && !is_exact;
+  if (is_single) at_start[0] = 0;
+  for (std::size_t i = 0; !is_single && static_cast<int>(i) < initial_states.count; ++i) {
+    const auto chi_squared = compute_body_state_chi_squared(frame.observations_span(), problem,
+                                                            initial_states.states[i]);
     if (chi_squared) at_start[i] = *chi_squared;
   }
   const double min_chi_squared = *std::min_element(at_start.begin(), at_start.end());
@@ -154,8 +192,11 @@ BodySolution find_best_body_solution(const InitialStates& initial_states,
   double second = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; static_cast<int>(i) < initial_states.count; ++i) {
     if (!(at_start[i] <= hopeless * (min_chi_squared + small))) continue;
-    const auto fix = estimate_body_state(frame.observations_span(), problem.arm_m, problem.prior,
-                                         initial_states.states[i]);
+    const auto fix =
+        estimate_body_state(frame.observations_span(), problem, initial_states.states[i]);
+    // Such a state that does not converge is close to two solutions.
+    if (!fix && is_exact)
+      second = std::min(second, compute_prior_chi_squared(initial_states.states[i], problem));
     if (!fix || !are_below_lamps(frame, problem, fix->state)) continue;
     if (!best) {
       best = fix;
@@ -167,7 +208,14 @@ BodySolution find_best_body_solution(const InitialStates& initial_states,
     if (fix->chi_squared < best->chi_squared) best = fix;
   }
   if (!best) return {FixStatus::degenerate, {}};
-  if (!is_body_position_determined(frame, *best)) return {FixStatus::undetermined, *best};
+  if (!is_body_position_determined(frame, problem.prior, *best)) {
+    const bool is_pose_alone = !problem.prior.is_motion_or_tilt_estimated();
+    return {is_pose_alone ? FixStatus::degenerate : FixStatus::undetermined, *best};
+  }
+  for (std::size_t i = 0; is_exact && static_cast<int>(i) < initial_states.count; ++i) {
+    if (is_beyond_linear_range(initial_states.states[i], at_start[i], *best))
+      second = std::min(second, at_start[i]);
+  }
   const double freedom = std::max(1.0, 2 * static_cast<double>(frame.size) - 4);
   const double scale = std::max(1.0, best->chi_squared / freedom);
   const bool ambiguous = second - best->chi_squared < unlikely * scale;
@@ -177,7 +225,7 @@ BodySolution find_best_body_solution(const InitialStates& initial_states,
 /// Computes the fix with free roll and pitch from the three lamps that are farthest apart. If
 /// motion or noise hides their pose, tries other lamps in place of the third. Returns std::nullopt
 /// if all lamps are collinear.
-std::optional<BodySolution> estimate_body_with_free_tilt(const BodyObservations& frame,
+std::optional<BodySolution> estimate_body_with_free_tilt(const FrameObservations& frame,
                                                          const BodyProblem& problem) {
   constexpr std::size_t max_tries = 8;
   if (frame.num_current < 3) return std::nullopt;
@@ -188,8 +236,11 @@ std::optional<BodySolution> estimate_body_with_free_tilt(const BodyObservations&
   for (std::size_t i = 0; i < std::min(frame.num_current, max_tries);
        ++i, third = (third + 1) % frame.num_current) {
     if (third == first || third == second) continue;
-    const InitialStates initial_states =
+    InitialStates initial_states =
         compute_initial_body_states_from_three_lamps(frame, {first, second, third}, problem);
+    // Noise may remove the solution of three lamps that is close to the known inclination.
+    if (initial_states.count > 0 && !is_roll_pitch_unknown(problem.prior))
+      initial_states.add(compute_level_states(frame, problem));
     const BodySolution solution = initial_states.count > 0
                                       ? find_best_body_solution(initial_states, frame, problem)
                                       : BodySolution{initial_states.status, {}};
@@ -206,15 +257,17 @@ std::optional<BodySolution> estimate_body_with_free_tilt(const BodyObservations&
 
 }  // namespace
 
-BodySolution estimate_body_state_from_all_lamps(const BodyObservations& frame,
+BodySolution estimate_body_state_from_all_lamps(const FrameObservations& frame,
                                                 const BodyProblem& problem) {
-  if (problem.is_roll_pitch_estimated()) {
+  // Three lamps have several solutions even if roll and pitch are roughly known.
+  const bool has_several = problem.prior.inclination_sd_rad > 0 && frame.size == 3;
+  if (has_several || is_roll_pitch_unknown(problem.prior)) {
     if (const auto solution = estimate_body_with_free_tilt(frame, problem);
         solution && has_fix(*solution)) {
       return *solution;
     }
   }
-  const InitialStates start = compute_level_state(frame, problem);
+  const InitialStates start = compute_level_states(frame, problem);
   if (start.count == 0) return {start.status, {}};
   return find_best_body_solution(start, frame, problem);
 }

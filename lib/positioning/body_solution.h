@@ -10,6 +10,7 @@
 #include "fix.h"
 #include "pose_estimation.h"
 #include "pose_observations.h"
+#include "sighting.h"
 
 namespace vlp {
 
@@ -22,17 +23,6 @@ inline double compute_reduced_chi_squared(double chi_squared, std::size_t lamps)
 /// deviations. A larger value does not reject a fix. It starts the tests of a mirrored map and of
 /// outlier lamps, which can replace the fix or reject it.
 inline constexpr double kMaxReducedChiSquared = 25;
-
-/// Arm of the camera and prior of the motion.
-struct BodyProblem {
-  const Eigen::Vector3d& arm_m;
-  const BodyPrior& prior;
-
-  bool is_roll_pitch_estimated() const {
-    constexpr double gentle_rad = 0.15;
-    return prior.inclination_sd_rad > gentle_rad;
-  }
-};
 
 /// Fix of a body, valid if the status is `ok`.
 struct BodySolution {
@@ -48,38 +38,55 @@ struct InitialStates {
   /// `ok`, or the reason of failure.
   FixStatus status = FixStatus::degenerate;
   int count = 0;
-  std::array<BodyState, 4> states;
+  std::array<BodyState, 6> states;
+
+  void add(const InitialStates& others) {
+    for (const BodyState& state : others.list()) states[static_cast<std::size_t>(count++)] = state;
+  }
+
+  std::span<const BodyState> list() const {
+    return {states.data(), static_cast<std::size_t>(count)};
+  }
 };
 
 /// Observations of the current frame by a camera with the inclination of the prior, rotated to the
-/// level frame. set_sightings_in_level_frame() returns false if a lamp is not above the horizon.
+/// level frame.
 struct LevelSightings {
   std::array<Sighting, kMaxSightings> sightings;
   std::size_t size = 0;
+  bool are_lamps_above_horizon = true;
 
+  LevelSightings(const FrameObservations& frame, const Eigen::Matrix3d& level_from_body);
   std::span<const Sighting> observations_span() const { return {sightings.data(), size}; }
-
-  bool set_sightings_in_level_frame(const BodyObservations& frame,
-                                    const Eigen::Matrix3d& level_from_body);
 };
 
 /// Returns the state of the body for a pose of the camera and the motion of the prior.
 BodyState make_body_state_from_camera_pose(const Pose& camera, const BodyProblem& problem,
                                            const Eigen::Matrix3d& lean);
 
+/// Returns true if roll and pitch are so uncertain that a level camera is no initial state.
+bool is_roll_pitch_unknown(const BodyPrior& prior);
+
 /// Computes the states below the lamps from three of them.
-InitialStates compute_initial_body_states_from_three_lamps(const BodyObservations& frame,
+InitialStates compute_initial_body_states_from_three_lamps(const FrameObservations& frame,
                                                            const std::array<std::size_t, 3>& lamps,
                                                            const BodyProblem& problem);
 
-/// Returns true if the standard deviation of the position is at most a quarter of the mean distance
-/// to the lamps.
-bool is_body_position_determined(const BodyObservations& frame, const BodyFix& fix);
+/// Returns true if the standard deviation of the position is at most the mean distance to the
+/// lamps, and a quarter of it if motion or tilt are estimated.
+bool is_body_position_determined(const FrameObservations& frame, const BodyPrior& prior,
+                                 const BodyFix& fix);
 
-/// Computes the fix of all lamps, assuming that the identities are correct. Initial states: the
-/// pose of a level camera (compute_initial_pose()), or if roll and pitch are estimated the poses
-/// from the three lamps that are farthest apart (compute_poses_from_three_lamps()).
-BodySolution estimate_body_state_from_all_lamps(const BodyObservations& frame,
+/// Computes the fix of all lamps, assuming that the identities are correct. Initial states:
+///   one lamp   the position at height and yaw of the prior;
+///   others     the poses of a level camera (compute_initial_poses()), or if roll and pitch are
+///              unknown the poses from the three lamps that are farthest apart
+///              (compute_poses_from_three_lamps()).
+/// Statuses:
+///   degenerate    the lamps do not determine the position, with known motion, roll and pitch
+///   undetermined  lamps and priors do not determine the position
+///   ambiguous     another solution is nearly as likely: by a factor of exp(-6) or more
+BodySolution estimate_body_state_from_all_lamps(const FrameObservations& frame,
                                                 const BodyProblem& problem);
 
 }  // namespace vlp

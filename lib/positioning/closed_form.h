@@ -8,8 +8,6 @@
 
 #include "../geometry/frames.h"
 #include "fix.h"
-#include "known_motion.h"
-#include "robot.h"
 #include "sighting.h"
 
 namespace vlp {
@@ -39,53 +37,24 @@ TwoLampPoses compute_two_lamp_poses(const Sighting& first, const Sighting& secon
 /// @pre the lamps have equal heights; their mean is used
 std::optional<Pose> compute_pose_from_coplanar_lamps(std::span<const Sighting> sightings);
 
-/// Result of compute_initial_pose(): pose of the camera, valid if the status is `ok`.
-struct InitialPose {
-  /// `ok`, or the reason of failure.
+/// Poses of a camera that are initial values for least squares: `count` of them at the beginning of
+/// `poses`.
+struct InitialLevelPoses {
+  /// `ok`, or the reason why there are none.
   FixStatus status;
-  Pose pose;
+  int count = 0;
+  std::array<Pose, 2> poses = {};
 };
 
-/// Computes a pose from two or more lamps in closed form, exact without noise. Two lamps:
+/// Computes the poses from two or more lamps in closed form, exact without noise. Two lamps:
 /// compute_two_lamp_poses(). Lamps at one height: the similarity. Otherwise the solutions from the
-/// two lamps that are far apart in the image; of these, the one that fits the other lamps best.
-InitialPose compute_initial_pose(std::span<const Sighting> sightings);
-
-/// Motion of the camera at the readout time of the lamp's row.
-struct MotionAtReadout {
-  /// Velocity and yaw rate of the camera's base, along the axes of the camera's level frame.
-  KnownMotion motion = {};
-  /// Position of the camera relative to the center of rotation (x, y), along the axes of the level
-  /// frame.
-  Eigen::Vector2d arm_m{0, 0};
-  /// Time from the middle of the image to the readout of the row.
-  double time_s = 0;
-};
+/// two lamps that are far apart in the image.
+InitialLevelPoses compute_initial_poses(std::span<const Sighting> sightings);
 
 /// Computes the position from one lamp if height and yaw are known (eq. 6 solved for s):
-///   s = p - e^{jg} (H e^{jwt} z + (e^{jwt} - 1) a + u t)
-///   u, w  velocity and yaw rate;   a  arm;   t  time of the readout
+///   s = p - H e^{jg} z
 /// Returns std::nullopt if the lamp is not above the camera.
-std::optional<Pose> compute_pose_at_known_height_and_yaw(const Sighting& sighting,
-                                                         const HeightAndYaw& known,
-                                                         const MotionAtReadout& readout = {});
-
-/// Returns the covariance of (X, Y, Zs, g), in m and rad, from the pixel noise alone.
-/// @pre compute_pose_at_known_height_and_yaw() computed `pose`
-Matrix4 compute_one_lamp_fix_covariance_from_pixel_noise(const Sighting& sighting,
-                                                         const Pose& pose);
-
-/// Returns the covariance of (X, Y, Zs, g), in m and rad, from the errors of height, yaw and
-/// motion.
-/// @pre compute_pose_at_known_height_and_yaw() computed `pose`
-Matrix4 compute_one_lamp_fix_covariance_from_sensors(const Sighting& sighting, const Pose& pose,
-                                                     const HeightAndYaw& known,
-                                                     const MotionAtReadout& readout);
-
-/// Returns the derivative of (X, Y, Zs, g), in m and rad, with respect to a small rotation of the
-/// level frame, in rad. The columns are the x, y and z axis of the rotation.
-/// @pre compute_pose_at_known_height_and_yaw() computed `pose`
-Eigen::Matrix<double, 4, 3> compute_one_lamp_fix_jacobian_wrt_level_rotation(
-    const Sighting& sighting, const Pose& pose);
+std::optional<Pose> compute_pose_at_known_height_and_yaw(const Sighting& sighting, double z_m,
+                                                         double yaw_rad);
 
 }  // namespace vlp

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <utility>
 
-#include "geometry/plane.h"
 #include "geometry/symmetric.h"
 #include "rig/calibration_error.h"
 #include "rig/find_lamp.h"
@@ -286,78 +285,46 @@ CommonErrors::RayJacobian CommonErrors::compute_ray_jacobian_wrt_errors(
   return effect;
 }
 
-CommonErrors::Effect CommonErrors::compute_observation_jacobians_wrt_errors(
-    const Sighting& sighting, const LevelPose& pose, const Lens& lens,
-    const Eigen::Matrix3d& level_from_base) const {
-  // Derivative of z by the direction, which has z = 1.
-  Eigen::Matrix<double, 2, 3> d_z;
-  d_z << 1, 0, -sighting.z.x(), 0, 1, -sighting.z.y();
-  const Eigen::Matrix<double, 2, 3> d_z_d_base = d_z * level_from_base;
-  Effect effect;
-  effect.jacobian_wrt_lamp =
-      project_lamp_with_jacobian(pose, sighting.lamp_m).d_z_d_state.leftCols<3>();
-  effect.jacobian_wrt_shared = d_z_d_base.lazyProduct(compute_ray_jacobian_wrt_errors(
-      level_from_base.transpose() * sighting.z.homogeneous(), lens));
-  return effect;
-}
-
-CommonErrors::Gain CommonErrors::compute_gain_from_errors_to_fix(
-    std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
-    const PoseEstimate& camera, const Lens& lens, const Eigen::Matrix3d& level_from_base) const {
-  const LevelPose pose(camera.pose);
-  Gain gain(num_shared_errors());
-  for (std::size_t i = 0; i < sightings.size(); ++i) {
-    const Sighting& sighting = sightings[i];
-    const Effect effect =
-        compute_observation_jacobians_wrt_errors(sighting, pose, lens, level_from_base);
-    Eigen::Matrix<double, 4, 2> d_fix_d_z;
-    if (sightings.size() == 1) {
-      // compute_pose_at_known_height_and_yaw(): s = p - H e^{jg} z.
-      d_fix_d_z.setZero();
-      d_fix_d_z.topRows<2>() =
-          -lamp_height_above_camera_m(pose, sighting.lamp_m) * complex_product_matrix(pose.heading);
-    } else {
-      const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
-      d_fix_d_z = camera.covariance *
-                  project_lamp_with_jacobian(pose, sighting.lamp_m).d_z_d_state.transpose() *
-                  (whitening.transpose() * whitening);
-    }
-    gain.jacobian_wrt_shared.noalias() += d_fix_d_z.lazyProduct(effect.jacobian_wrt_shared);
-    gain.add(lamps[i], d_fix_d_z * effect.jacobian_wrt_lamp);
-  }
+CommonErrors::GainMatrix<2> CommonErrors::compute_residual_gain(
+    const Observations& observations, std::size_t index,
+    const LinearizedObservation& linearized) const {
+  const auto& [sightings, lamps, lens, body_from_base, arm_m] = observations;
+  const LampObservation& seen = sightings[index];
+  const Eigen::Matrix<double, 2, 3> by_ray =
+      seen.whitened_pixel_from_ray * body_from_base / seen.depth_axis.dot(seen.ray);
+  GainMatrix<2> gain(num_shared_errors());
+  gain.jacobian_wrt_shared = by_ray.lazyProduct(
+      compute_ray_jacobian_wrt_errors(body_from_base.transpose() * seen.ray, lens));
+  gain.add(lamps[index], linearized.jacobian.leftCols<3>());
   return gain;
 }
 
-CommonErrors::BodyEffect CommonErrors::compute_observation_jacobians_wrt_errors(
-    const BodyObservation& sighting, const EvaluatedState& body, const Eigen::Vector3d& arm_m,
-    const Lens& lens, const Eigen::Matrix3d& body_from_base) const {
-  const Eigen::Matrix<double, 2, 3> d_pixel = d_whitened_pixel_d_lamp_position(
-      sighting, body.lamp_position_in_body(sighting.lamp_m, sighting.time_s) - arm_m);
-  BodyEffect effect;
-  effect.jacobian_wrt_state =
-      d_pixel.lazyProduct(body.d_lamp_position_in_body_d_state(sighting.lamp_m, sighting.time_s));
-  const Eigen::Matrix<double, 2, 3> by_ray = sighting.whitened_pixel_from_ray * body_from_base;
-  effect.by_errors.jacobian_wrt_shared = by_ray.lazyProduct(
-      compute_ray_jacobian_wrt_errors(body_from_base.transpose() * sighting.ray, lens));
-  effect.by_errors.jacobian_wrt_lamp = effect.jacobian_wrt_state.leftCols<3>();
-  return effect;
-}
-
-CommonErrors::BodyGain CommonErrors::compute_gain_from_errors_to_fix(
-    std::span<const BodyObservation> sightings, std::span<const std::size_t> lamps,
-    const Eigen::Vector3d& arm_m, const BodyFix& fix, const Lens& lens,
-    const Eigen::Matrix3d& body_from_base) const {
+template <int States>
+CommonErrors::GainMatrix<States> CommonErrors::compute_gain_from_errors_to_fix(
+    const Observations& observations, const BodyFix& fix) const {
   const EvaluatedState body(fix.state);
-  BodyGain whole(num_shared_errors());
-  for (std::size_t i = 0; i < sightings.size(); ++i) {
-    const auto [by_state, by_errors] =
-        compute_observation_jacobians_wrt_errors(sightings[i], body, arm_m, lens, body_from_base);
-    const Eigen::Matrix<double, kBodyStates, 2> gain =
-        fix.covariance.lazyProduct(by_state.transpose());
+  const Eigen::Matrix<double, States, kBodyStates> covariance = fix.covariance.topRows<States>();
+  GainMatrix<States> whole(num_shared_errors());
+  for (std::size_t i = 0; i < observations.sightings.size(); ++i) {
+    const LinearizedObservation seen =
+        linearize_observation(observations.sightings[i], body, observations.arm_m);
+    const GainMatrix<2> by_errors = compute_residual_gain(observations, i, seen);
+    const Eigen::Matrix<double, States, 2> gain = covariance.lazyProduct(seen.jacobian.transpose());
     whole.jacobian_wrt_shared.noalias() += gain.lazyProduct(by_errors.jacobian_wrt_shared);
-    whole.add(lamps[i], gain * by_errors.jacobian_wrt_lamp);
+    whole.add(observations.lamps[i], gain * by_errors.jacobian_wrt_lamp[0]);
   }
   return whole;
+}
+
+void CommonErrors::compute_residual_covariances(const Observations& observations,
+                                                const BodyState& state,
+                                                std::span<Matrix2> covariances) const {
+  const EvaluatedState body(state);
+  for (std::size_t i = 0; i < covariances.size(); ++i) {
+    const LinearizedObservation seen =
+        linearize_observation(observations.sightings[i], body, observations.arm_m);
+    covariances[i] = propagate_covariance_to_fix(compute_residual_gain(observations, i, seen));
+  }
 }
 
 template <int States>
@@ -386,55 +353,35 @@ Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::propagate_
   return sum;
 }
 
-double CommonErrors::compute_expected_chi_squared_of_common_errors(
-    std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
-    const PoseEstimate& camera, const Matrix4& common, const Lens& lens,
-    const Eigen::Matrix3d& level_from_base) const {
-  const LevelPose pose(camera.pose);
-  double sum = -(camera.covariance.inverse() * common).trace();
-  for (std::size_t i = 0; i < sightings.size(); ++i) {
-    const Eigen::Matrix2d whitening = sightings[i].d_pixel_d_z / sightings[i].sigma_px;
-    const Effect effect =
-        compute_observation_jacobians_wrt_errors(sightings[i], pose, lens, level_from_base);
-    sum += (whitening * compute_observation_covariance(effect, lamps[i]) * whitening.transpose())
-               .trace();
-  }
-  return sum;
-}
-
-double CommonErrors::compute_expected_chi_squared_of_common_errors(
-    std::span<const BodyObservation> sightings, std::span<const std::size_t> lamps,
-    const Eigen::Vector3d& arm_m, const BodyFix& fix, const BodyCovariance& common,
-    const Lens& lens, const Eigen::Matrix3d& body_from_base) const {
+double compute_expected_chi_squared_of_common_errors(const CommonErrors::Observations& observations,
+                                                     std::span<const Matrix2> residual_covariances,
+                                                     const BodyFix& fix,
+                                                     const BodyCovariance& common) {
+  using Matrix = Eigen::Matrix<double, kBodyStates, kBodyStates>;
   const EvaluatedState body(fix.state);
-  Eigen::Matrix<double, kBodyStates, kBodyStates> information;
-  information.setZero();
+  Matrix information = Matrix::Zero();
   double sum = 0;
-  for (std::size_t i = 0; i < sightings.size(); ++i) {
-    const auto [by_state, by_errors] =
-        compute_observation_jacobians_wrt_errors(sightings[i], body, arm_m, lens, body_from_base);
-    sum += compute_observation_covariance(by_errors, lamps[i]).trace();
-    information += by_state.transpose() * by_state;
+  for (std::size_t i = 0; i < residual_covariances.size(); ++i) {
+    const auto jacobian =
+        linearize_observation(observations.sightings[i], body, observations.arm_m).jacobian;
+    sum += residual_covariances[i].trace();
+    information += jacobian.transpose() * jacobian;
   }
   // States that are not estimated have no variance, and `common` is zero there.
-  Eigen::Matrix<double, kBodyStates, kBodyStates> covariance = fix.covariance;
+  Matrix covariance = fix.covariance;
   for (int i = 0; i < kBodyStates; ++i) {
     if (!(covariance(i, i) > 0)) covariance(i, i) = 1;
   }
-  const Eigen::Matrix<double, kBodyStates, kBodyStates> with_priors =
-      2 * covariance.inverse() - information;
-  return sum - (with_priors * common).trace();
+  return sum - ((2 * covariance.inverse() - information) * common).trace();
 }
 
-template Matrix4 CommonErrors::propagate_covariance_to_fix(const Gain& gain) const;
-template BodyCovariance CommonErrors::propagate_covariance_to_fix(const BodyGain& gain) const;
-
-Matrix2 CommonErrors::compute_observation_covariance(const Effect& effect, std::size_t lamp) const {
-  GainMatrix<2> gain(num_shared_errors());
-  gain.jacobian_wrt_shared = effect.jacobian_wrt_shared;
-  gain.add(lamp, effect.jacobian_wrt_lamp);
-  return propagate_covariance_to_fix(gain);
-}
+template CommonErrors::GainMatrix<4> CommonErrors::compute_gain_from_errors_to_fix(
+    const Observations& observations, const BodyFix& fix) const;
+template CommonErrors::GainMatrix<kBodyStates> CommonErrors::compute_gain_from_errors_to_fix(
+    const Observations& observations, const BodyFix& fix) const;
+template Matrix4 CommonErrors::propagate_covariance_to_fix(const GainMatrix<4>& gain) const;
+template BodyCovariance CommonErrors::propagate_covariance_to_fix(
+    const GainMatrix<kBodyStates>& gain) const;
 
 namespace {
 

@@ -15,8 +15,6 @@
 #include "../rig/lamp_map.h"
 #include "correction.h"
 #include "fix.h"
-#include "inclination_rotation.h"
-#include "least_squares_fix.h"
 #include "pose_estimation.h"
 #include "pose_observations.h"
 
@@ -83,21 +81,9 @@ class CommonErrors {
   RayJacobian compute_ray_jacobian_wrt_errors(const Eigen::Vector3d& ray_in_base,
                                               const Lens& lens) const;
 
-  /// Derivatives of the normalized point z of one lamp with respect to the shared errors and to the
-  /// error of the lamp's position, m. Two rows each.
-  struct Effect {
-    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 20> jacobian_wrt_shared;
-    Eigen::Matrix<double, 2, 3> jacobian_wrt_lamp;
-  };
-  /// Returns the derivatives for an observation by a camera at `pose`. Its rotation
-  /// level_from_camera is level_from_base base_from_camera.
-  Effect compute_observation_jacobians_wrt_errors(const Sighting& sighting, const LevelPose& pose,
-                                                  const Lens& lens,
-                                                  const Eigen::Matrix3d& level_from_base) const;
-
+  /// G: derivatives of the first `States` states of a fix, or of the residuals of an observation,
+  /// with respect to the shared errors and to the errors of each lamp.
   template <int States>
-  /// G: derivatives of the states of a fix with respect to the shared errors and to the errors of
-  /// each lamp.
   struct GainMatrix {
     using SharedGain = Eigen::Matrix<double, States, Eigen::Dynamic, Eigen::ColMajor, States, 20>;
     using LampGain = Eigen::Matrix<double, States, 3>;
@@ -116,43 +102,29 @@ class CommonErrors {
       lamps[size++] = lamp;
     }
   };
-  /// Gains of (X, Y, Z, yaw), and of all states of a body (BodyIndex).
-  using Gain = GainMatrix<4>;
-  using BodyGain = GainMatrix<kBodyStates>;
-  /// Returns the gain of a least-squares fix (estimate_pose_least_squares) with the covariance of
-  /// `camera`. `lamps` are the indices in the map of the observed lamps. For a single lamp, returns
-  /// the gain of compute_pose_at_known_height_and_yaw().
-  Gain compute_gain_from_errors_to_fix(std::span<const Sighting> sightings,
-                                       std::span<const std::size_t> lamps,
-                                       const PoseEstimate& camera, const Lens& lens,
-                                       const Eigen::Matrix3d& level_from_base) const;
-  /// Returns the gain of a body with the camera at `arm_m` in the body frame, m. The gain of the
-  /// pixels, in standard deviations, is that of the least-squares fix (estimate_body_state()).
-  BodyGain compute_gain_from_errors_to_fix(std::span<const BodyObservation> sightings,
-                                           std::span<const std::size_t> lamps,
-                                           const Eigen::Vector3d& arm_m, const BodyFix& fix,
-                                           const Lens& lens,
-                                           const Eigen::Matrix3d& body_from_base) const;
-  /// Computes the expected contribution of the errors to chi-squared, from the common covariance
-  /// `common` = G C G' of the fix:
-  ///   tr(R C R') = tr(W J_c C J_c') - tr(N common),   R = W^1/2 (J_c - J G),   N = J' W J.
-  /// For a body with priors of information P, N + 2 P takes the place of N.
-  double compute_expected_chi_squared_of_common_errors(
-      std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
-      const PoseEstimate& camera, const Matrix4& common, const Lens& lens,
-      const Eigen::Matrix3d& level_from_base) const;
-  double compute_expected_chi_squared_of_common_errors(
-      std::span<const BodyObservation> sightings, std::span<const std::size_t> lamps,
-      const Eigen::Vector3d& arm_m, const BodyFix& fix, const BodyCovariance& common,
-      const Lens& lens, const Eigen::Matrix3d& body_from_base) const;
+  /// Observations of a fix. `lamps` are the indices in the map of the observed lamps, `lens` and
+  /// `body_from_base` those of the camera.
+  struct Observations {
+    std::span<const LampObservation> sightings;
+    std::span<const std::size_t> lamps;
+    const Lens& lens;
+    const Eigen::Matrix3d& body_from_base;
+    const Eigen::Vector3d& arm_m;
+  };
+  /// Returns the gain of the least-squares fix (estimate_body_state()): of (X, Y, Z, yaw), or of
+  /// all states of a body (BodyIndex).
+  template <int States>
+  GainMatrix<States> compute_gain_from_errors_to_fix(const Observations& observations,
+                                                     const BodyFix& fix) const;
+  /// Computes the covariance of the residuals of each observation from the common errors, in
+  /// standard deviations of the pixel.
+  void compute_residual_covariances(const Observations& observations, const BodyState& state,
+                                    std::span<Matrix2> covariances) const;
   /// Returns G C G', the covariance of the states of a fix from the common errors, in the units of
   /// the states.
   template <int States>
   Eigen::Matrix<double, States, States, Eigen::DontAlign> propagate_covariance_to_fix(
       const GainMatrix<States>& gain) const;
-  /// Returns the covariance of the normalized point z of one observation from the common errors.
-  /// `lamp` is the index of the lamp in the map.
-  Matrix2 compute_observation_covariance(const Effect& effect, std::size_t lamp) const;
 
   /// Returns the joint covariance: intrinsics, zenith and offset, as far as they exist. Lamps with
   /// correlated errors follow, in the order of the map.
@@ -171,17 +143,9 @@ class CommonErrors {
     /// Variance per axis of a lamp without rows; 0 if unknown.
     double variance_m2 = 0;
   };
-  /// Derivatives of the pixel of a body's observation, in standard deviations, with respect to the
-  /// states and to the errors.
-  struct BodyEffect {
-    Eigen::Matrix<double, 2, kBodyStates> jacobian_wrt_state;
-    Effect by_errors;
-  };
-  BodyEffect compute_observation_jacobians_wrt_errors(const BodyObservation& sighting,
-                                                      const EvaluatedState& body,
-                                                      const Eigen::Vector3d& arm_m,
-                                                      const Lens& lens,
-                                                      const Eigen::Matrix3d& body_from_base) const;
+  /// Derivatives of the residuals of one observation with respect to the errors.
+  GainMatrix<2> compute_residual_gain(const Observations& observations, std::size_t index,
+                                      const LinearizedObservation& linearized) const;
   /// Gives rows to the lamps that are correlated with other errors, and sets the size of the joint
   /// covariance.
   void assign_covariance_rows_to_lamps(std::span<const Lamp> lamps, const Calibration& calibration);
@@ -213,6 +177,15 @@ class CommonErrors {
   std::array<bool, kCommonErrorSources.size()> part_stated_ = {};
   int num_lamps_moved_since_calibration_ = 0;
 };
+
+/// Computes the expected contribution of the common errors to chi-squared, from their covariances
+/// of the residuals and from their covariance `common` = G C G' of the states:
+///   tr(R C R') = tr(W J_c C J_c') - tr((N + 2 P) common),   R = W^1/2 (J_c - J G)
+/// with N = J' W J and the information P of the priors.
+double compute_expected_chi_squared_of_common_errors(const CommonErrors::Observations& observations,
+                                                     std::span<const Matrix2> residual_covariances,
+                                                     const BodyFix& fix,
+                                                     const BodyCovariance& common);
 
 /// Computes the covariance of the zenith's normalized point from all its sources: its captures and
 /// the lens, or the adjustment if there is one. Returns std::nullopt if a source is not reported,

@@ -15,19 +15,13 @@
 
 namespace vlp {
 
-/// Returns true if velocity, yaw rate or roll and pitch are estimated together with the pose.
-bool is_motion_or_tilt_estimated(const BodyPrior& prior);
-/// Returns true if the prior leaves velocity or yaw rate free (standard deviation > 0), so that
-/// they are estimated together with the pose.
-bool is_motion_estimated(const BodyPrior& prior);
-
 /// Cramer-Rao lower bound of a camera that may move and be tilted, predicted from the pixel noise.
 struct BodyPoseBound {
   /// Covariances of (X, Y, Z, yaw): `noise` for known motion, roll and pitch; `motion` is the
   /// increase due to unknown motion; `roll_pitch` the increase due to unknown roll and pitch.
   Matrix4 noise, motion, roll_pitch;
   /// Exact observations of the lamps, and the fix from these and the prior.
-  BodyObservations frame;
+  FrameObservations frame;
   BodyFix fix;
 };
 
@@ -35,8 +29,8 @@ struct BodyPoseBound {
 /// rest and level.
 ///
 /// @param noise_px   standard deviation of each pixel per axis
-/// @return std::nullopt if estimate_body_state_robust() finds no fix, or if the lens does not image
-/// a lamp
+/// @return std::nullopt for fewer than two lamps; if these do not determine a fix, or not a unique
+///     one with unknown motion or tilt; or if a lamp is not above the camera or not imaged
 /// @pre `row_clock` has a value if the prior leaves the motion free
 std::optional<BodyPoseBound> compute_pose_crlb(std::span<const Eigen::Vector3d> lamps_m,
                                                const Lens& lens,
@@ -78,23 +72,16 @@ struct ErrorBudget {
   }
 };
 
-/// Computes the error budget of a fix at `level`, the pose of a level camera that observes
-/// `lamps_m` (positions in the world) with equal weights. Propagates each source through the
-/// least-squares fix to first order. Returns std::nullopt for fewer than two lamps, for lamps that
-/// the lens does not image, or for lamps that do not determine a fix.
-std::optional<ErrorBudget> compute_fix_error_budget(std::span<const Eigen::Vector3d> lamps_m,
-                                                    const Lens& lens, const Pose& level,
-                                                    const ErrorSources& sources);
-
-/// Computes the error budget of a camera that may move and be tilted, with the prior `prior`. Its
-/// mean is at rest and level. Returns std::nullopt also if lamps and prior do not determine a fix
-/// (estimate_body_state_robust()). If the tilt is estimated, an error of the calibrated tilt has
-/// almost no effect.
+/// Computes the error budget of a fix at `level`, the pose of a camera that observes `lamps_m`
+/// (positions in the world) with equal weights. The mean of the prior is at rest and level; by
+/// default the camera is known to be. Propagates each source through the least-squares fix to first
+/// order. If the tilt is estimated, an error of the calibrated tilt has almost no effect. Returns
+/// std::nullopt as compute_pose_crlb().
 /// @pre `row_clock` has a value if the prior leaves the motion free
 std::optional<ErrorBudget> compute_fix_error_budget(std::span<const Eigen::Vector3d> lamps_m,
                                                     const Lens& lens, const Pose& level,
                                                     const ErrorSources& sources,
-                                                    const BodyPrior& prior,
-                                                    const std::optional<RowClock>& row_clock);
+                                                    const BodyPrior& prior = {},
+                                                    const std::optional<RowClock>& row_clock = {});
 
 }  // namespace vlp

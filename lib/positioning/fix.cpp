@@ -26,7 +26,9 @@ constexpr std::array<Entry, 13> kStatuses{{
     {FixStatus::duplicate_lamp, "duplicate_lamp", "one lamp occurs twice in the frame"},
     {FixStatus::not_finite, "not_finite",
      "a pixel or sensor reading is not finite, a sigma is outside 0.0001 to 1000 px, the standard "
-     "deviation of a sensor is negative, or that of a known height is not positive"},
+     "deviation of a sensor is negative, that of a known height is not positive, or an earlier "
+     "frame "
+     "is not earlier, or simultaneous with another"},
     // [FIX-8] `outside_lens` | calibration of another camera | give the right one
     {FixStatus::outside_lens, "outside_lens",
      "no ray through this lens reaches the pixel: is it the calibration of this camera?"},
@@ -44,8 +46,9 @@ constexpr std::array<Entry, 13> kStatuses{{
     // [FIX-2] `inconsistent` | lamp misidentified, map of another room, or camera tilted | check
     //   map and tilt (`--roll-pitch-sd-deg`)
     {FixStatus::inconsistent, "inconsistent",
-     "the lamps contradict each other: misidentified lamp, lamp map of another room, or tilted "
-     "camera, for which roll and pitch can be estimated (--roll-pitch-sd-deg)"},
+     "the lamps contradict each other or the known state: misidentified lamp, lamp map of another "
+     "room, wrong height, or tilted camera, for which roll and pitch can be estimated "
+     "(--roll-pitch-sd-deg)"},
     // [FIX-3] `mirrored_map` | map drawn from below, or ids swapped | negate x or y of every lamp
     {FixStatus::mirrored_map, "mirrored_map",
      "the lamps fit the mirror image of the map: the map is drawn from below, or ids are swapped"},

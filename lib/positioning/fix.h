@@ -65,10 +65,12 @@ struct Fix {
   FixStatus status = FixStatus::too_few_lamps;
   /// Pose of the camera, or of the robot's center if there is a CameraMount. The covariance of (X,
   /// Y, Z, yaw) includes all known errors: noise_covariance, and the errors of calibration and lamp
-  /// map as far as they are reported (correlated_errors.h).
+  /// map as far as they are reported (correlated_errors.h). If the residuals contradict the noise
+  /// (probability below 1e-4), it includes an unknown tilt or motion that explains them.
   PoseEstimate estimate;
   /// Part of the covariance due to pixel noise and inclination, and, for one lamp, height, yaw and
-  /// motion. It averages out over frames as far as these errors are independent between frames.
+  /// motion. It averages out over frames as far as these errors are independent between frames. The
+  /// reported noise is scaled if neither it nor a tilt or motion explains the residuals.
   Matrix4 noise_covariance = Matrix4::Zero();
   /// RMS distance in the image between the observed and the predicted lamps, over both axes
   /// together. Zero, to rounding, with one or two lamps.

@@ -58,7 +58,7 @@ constexpr Source kLampMap{"lamp map", "lamp_map"};
 /// Returns the sources that are independent between images.
 std::vector<Source> list_image_error_sources(const BodyPrior& prior) {
   std::vector<Source> sources{{"noise", "noise"}};
-  if (is_motion_estimated(prior)) sources.push_back({"motion", "motion"});
+  if (prior.is_motion_estimated()) sources.push_back({"motion", "motion"});
   if (prior.inclination_sd_rad > 0) sources.push_back({"roll and pitch", "roll_pitch"});
   return sources;
 }
@@ -67,7 +67,7 @@ template <typename Budget>
 std::vector<Matrix4> split_covariance_by_image_source(const Budget& budget,
                                                       const BodyPrior& prior) {
   std::vector<Matrix4> parts{budget.noise};
-  if (is_motion_estimated(prior)) parts.push_back(budget.motion);
+  if (prior.is_motion_estimated()) parts.push_back(budget.motion);
   if (prior.inclination_sd_rad > 0) parts.push_back(budget.roll_pitch);
   return parts;
 }
@@ -115,9 +115,7 @@ FloorLimits compute_accuracy_limits_on_floor(const LampMap& map, const Camera& c
     place.lamps = static_cast<int>(lamps.size());
     const auto lamps_m = get_lamp_positions(map, lamps);
     const auto budget =
-        is_motion_or_tilt_estimated(prior)
-            ? compute_fix_error_budget(lamps_m, lens, place.camera, sources, prior, row_clock)
-            : compute_fix_error_budget(lamps_m, lens, place.camera, sources);
+        compute_fix_error_budget(lamps_m, lens, place.camera, sources, prior, row_clock);
     if (!budget) continue;
     place.covariances = split_covariance_by_image_source(*budget, prior);
     place.covariances.insert(place.covariances.end(),
@@ -137,10 +135,7 @@ FloorLimits compute_accuracy_limits_on_floor(const UnitErrors& unit, const Floor
   for (FloorLimits::Position& place : limits.positions) {
     const auto lamps = unit.find_fully_visible_lamp_indices(place.camera);
     place.lamps = static_cast<int>(lamps.size());
-    const auto budget =
-        is_motion_or_tilt_estimated(prior)
-            ? unit.compute_unit_fix_error_budget(place.camera, lamps, noise_px, prior)
-            : unit.compute_unit_fix_error_budget(place.camera, lamps, noise_px);
+    const auto budget = unit.compute_unit_fix_error_budget(place.camera, lamps, noise_px, prior);
     if (!budget) continue;
     place.covariances = split_covariance_by_image_source(*budget, prior);
     place.covariances.insert(place.covariances.end(), {budget->lens, budget->zenith});

@@ -2,17 +2,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "positioning/outlier_rejection.h"
 
-#include <Eigen/Geometry>
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
-#include <type_traits>
+#include <optional>
+#include <utility>
 
-#include "geometry/angles.h"
-#include "geometry/statistical_bounds.h"
-#include "geometry/symmetric.h"
+#include "geometry/normal_equations.h"
 #include "positioning/closed_form.h"
+#include "positioning/residual_noise.h"
 
 namespace vlp {
 
@@ -23,260 +24,95 @@ namespace {
 /// small error of the tilt or of the map affects all lamps and rarely has this pattern.
 constexpr double kClearGain = 100;
 
-/// Maximum distance of a lamp from its prediction, as a fraction of the distance of neighbors.
-constexpr double kMaxNeighborFraction = 0.15;
-
-/// Returns the RMS distance of the points of the observations from their mean.
-template <typename Observation, typename Point>
-double compute_rms_radius(std::span<const Observation> observations, const Point& point_of) {
-  using Vector = std::decay_t<decltype(point_of(observations.front()))>;
-  const double n = static_cast<double>(observations.size());
-  Vector mean = Vector::Zero();
-  for (const Observation& observation : observations) mean += point_of(observation) / n;
-  double sum = 0;
-  for (const Observation& observation : observations) {
-    sum += (point_of(observation) - mean).squaredNorm();
-  }
-  return std::sqrt(sum / n);
-}
-
-/// Returns the smallest distance from a lamp of the frame to its nearest lamp of the map.
-template <typename Observation>
-double find_nearest_lamp_distance_m(const LampObservations<Observation>& frame) {
-  return *std::min_element(frame.nearest_m.begin(),
-                           frame.nearest_m.begin() + static_cast<std::ptrdiff_t>(frame.size));
-}
-
-/// Returns the largest standard deviation of z.
-double compute_max_point_sd(std::span<const Sighting> sightings) {
-  double noise = 0;
-  for (const Sighting& sighting : sightings) {
-    noise = std::max(noise,
-                     sighting.sigma_px / std::sqrt(std::abs(sighting.d_pixel_d_z.determinant())));
-  }
-  return noise;
-}
-
-/// Mirrors the observations, as by a camera under the mirrored map.
-void mirror_observations(FrameObservations& frame) {
-  for (Sighting& sighting : std::span(frame.sightings.data(), frame.size)) {
-    sighting.z.y() = -sighting.z.y();
-    sighting.d_pixel_d_z.col(1) = -sighting.d_pixel_d_z.col(1);
-  }
-}
-
-/// Returns the residual limit in z. The RMS radii of the lamps in z and on the floor plan give the
-/// scale, since the fix may be wrong.
-double compute_residual_limit(const FrameObservations& frame, double max_residual_fraction) {
-  const double spread = compute_rms_radius(frame.observations_span(),
-                                           [](const Sighting& sighting) { return sighting.z; });
-  const double spread_m = compute_rms_radius(
-      frame.observations_span(),
-      [](const Sighting& sighting) { return Eigen::Vector2d(sighting.lamp_m.head<2>()); });
-  return std::min(max_residual_fraction * spread,
-                  kMaxNeighborFraction * find_nearest_lamp_distance_m(frame) * spread / spread_m);
-}
-
-/// Computes the fix with the mirror image of the map.
-ConsistentFix estimate_pose_of_mirrored_map(FrameObservations& frame, double limit) {
-  mirror_observations(frame);
-  const ConsistentFix solution = estimate_and_check_pose(frame.observations_span(), limit);
-  mirror_observations(frame);
-  return solution;
-}
-
-/// Returns the fix of the majority if the reported noise explains only this one, else the fix of
-/// all lamps.
-ConsistentFix recheck_with_noise_threshold(FrameObservations& frame, const ConsistentFix& all,
-                                           double max_residual_fraction) {
-  const double excess = compute_reduced_chi_squared(all.fix.chi_squared, frame.size);
-  const ConsistentFix mirrored =
-      estimate_pose_of_mirrored_map(frame, compute_residual_limit(frame, max_residual_fraction));
-  if (mirrored.status == FixStatus::ok &&
-      kClearGain * compute_reduced_chi_squared(mirrored.fix.chi_squared, frame.size) < excess) {
-    return {FixStatus::mirrored_map, {}};
-  }
-  if (!frame.noise_is_stated || frame.size < 4) return all;
-  const auto majority = find_largest_consistent_lamp_set(
-      frame.observations_span(),
-      std::sqrt(kMaxReducedChiSquared) * compute_max_point_sd(frame.observations_span()));
-  if (!majority) return all;
-  FrameObservations agreeing = frame;
-  agreeing.keep_only_selected_observations(majority->inliers);
-  const ConsistentFix solution = estimate_and_check_pose(
-      agreeing.observations_span(), compute_residual_limit(agreeing, max_residual_fraction));
-  const double remaining = compute_reduced_chi_squared(solution.fix.chi_squared, agreeing.size);
-  const bool explains = solution.status == FixStatus::ok && remaining < kMaxReducedChiSquared &&
-                        kClearGain * remaining < excess;
-  if (!explains) return all;
-  frame = agreeing;
-  return solution;
-}
-
-}  // namespace
-
-ConsistentFix estimate_pose_robust(FrameObservations& frame, double max_residual_fraction) {
-  const double limit = compute_residual_limit(frame, max_residual_fraction);
-  const ConsistentFix all = estimate_and_check_pose(frame.observations_span(), limit);
-  if (frame.size < 3) return all;
-  if (all.status == FixStatus::ok) {
-    return compute_reduced_chi_squared(all.fix.chi_squared, frame.size) > kMaxReducedChiSquared
-               ? recheck_with_noise_threshold(frame, all, max_residual_fraction)
-               : all;
-  }
-  if (estimate_pose_of_mirrored_map(frame, limit).status == FixStatus::ok)
-    return {FixStatus::mirrored_map, {}};
-  if (frame.size < 4) return all;
-  const auto majority = find_largest_consistent_lamp_set(frame.observations_span(), limit);
-  if (!majority) return all;
-  frame.keep_only_selected_observations(majority->inliers);
-  return estimate_and_check_pose(frame.observations_span(),
-                                 compute_residual_limit(frame, max_residual_fraction));
-}
-
-namespace {
-
-struct Vote {
-  Consensus consensus;
-  double sum_of_squares;
-};
-
-Vote find_pose_with_most_votes(std::span<const Sighting> sightings, const Pose& pose,
-                               double max_residual) {
-  const LevelPose camera(pose);
-  Vote result{{pose, {}, 0}, 0};
-  for (std::size_t i = 0; i < sightings.size(); ++i) {
-    if (!(lamp_height_above_camera_m(camera, sightings[i].lamp_m) > 0)) continue;
-    const double square =
-        (sightings[i].z - project_lamp_to_normalized_point(camera, sightings[i].lamp_m))
-            .squaredNorm();
-    if (!(square <= max_residual * max_residual)) continue;
-    result.consensus.inliers.set(i);
-    ++result.consensus.count;
-    result.sum_of_squares += square;
-  }
-  return result;
-}
-
-}  // namespace
-
-std::optional<Consensus> find_largest_consistent_lamp_set(std::span<const Sighting> sightings,
-                                                          double max_residual) {
-  const std::size_t n = sightings.size();
-  const std::size_t stride = 1 + n / 65;
-  Vote best{{{}, {}, 0}, 0};
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = i + 1; j < n; j += stride) {
-      const TwoLampPoses pair = compute_two_lamp_poses(sightings[i], sightings[j]);
-      for (int k = 0; k < pair.count; ++k) {
-        const Vote next = find_pose_with_most_votes(
-            sightings, pair.poses[static_cast<std::size_t>(k)], max_residual);
-        const bool wins = next.consensus.count > best.consensus.count ||
-                          (next.consensus.count == best.consensus.count &&
-                           next.sum_of_squares < best.sum_of_squares);
-        if (wins) best = next;
-      }
-    }
-  }
-  if (best.consensus.count < 3 || 2 * best.consensus.count <= n) return std::nullopt;
-  return best.consensus;
-}
-
-namespace {
-
-bool are_consistent_with_pose(std::span<const Sighting> sightings, const Pose& pose,
-                              double max_residual) {
-  const LevelPose camera(pose);
-  return std::all_of(sightings.begin(), sightings.end(), [&](const Sighting& sighting) {
-    return (sighting.z - project_lamp_to_normalized_point(camera, sighting.lamp_m)).norm() <=
-           max_residual;
-  });
-}
-
-}  // namespace
-
-ConsistentFix estimate_and_check_pose(std::span<const Sighting> sightings, double max_residual) {
-  const InitialPose start = compute_initial_pose(sightings);
-  if (start.status != FixStatus::ok) return {start.status, {}};
-  const auto fix = estimate_pose_least_squares(sightings, start.pose);
-  if (!fix) return {FixStatus::degenerate, {}};
-  const double height_m = sightings.front().lamp_m.z() - fix->pose.position_m.z();
-  if (!(fix->covariance(2, 2) < height_m * height_m)) return {FixStatus::degenerate, *fix};
-  if (sightings.size() > 2 && !are_consistent_with_pose(sightings, fix->pose, max_residual)) {
-    return {FixStatus::inconsistent, *fix};
-  }
-  return {FixStatus::ok, *fix};
-}
-
-namespace {
-
 using Agreeing = std::bitset<kMaxSightings>;
 
-/// Returns the distance of a lamp from its observed ray; infinity if the lamp is behind it.
-double distance_from_ray(const BodyObservation& seen, const BodyProblem& problem,
+/// Returns the distance of a lamp from its observed ray at its height, in m; infinity if the lamp
+/// is behind the ray or not above the camera.
+double distance_from_ray(const LampObservation& seen, const BodyProblem& problem,
                          const EvaluatedState& body) {
   const Eigen::Vector3d q = body.lamp_position_in_body(seen.lamp_m, seen.time_s) - problem.arm_m;
-  const double depth_m = seen.ray.dot(q);
-  return depth_m > 0 ? (q - depth_m * seen.ray).norm() : std::numeric_limits<double>::infinity();
+  const Eigen::Vector3d up = body.body_from_level.col(2);
+  const double height_m = up.dot(q), slope = up.dot(seen.ray);
+  if (!(height_m > 0 && slope > 0)) return std::numeric_limits<double>::infinity();
+  return (q - height_m / slope * seen.ray).norm();
 }
 
 /// Returns the largest accepted distance of a lamp from its ray, in m.
-double compute_residual_limit(const BodyObservations& frame, double max_residual_fraction) {
-  const double spread_m = compute_rms_radius(
-      frame.observations_span(), [](const BodyObservation& seen) { return seen.lamp_m; });
-  return std::min(max_residual_fraction * spread_m,
-                  kMaxNeighborFraction * find_nearest_lamp_distance_m(frame));
-}
-
-/// Returns true if the motion is within five standard deviations of the prior.
-bool is_within_prior(const BodyPrior& prior, const BodyMotion& motion) {
-  constexpr double sigmas = 5;
-  const Inclination &lean = motion.inclination, &mean = prior.mean.inclination;
-  const double tilt_rad = std::hypot(wrap_angle_rad(lean.roll_rad - mean.roll_rad),
-                                     wrap_angle_rad(lean.pitch_rad - mean.pitch_rad));
-  return (motion.velocity_m_per_s - prior.mean.velocity_m_per_s).norm() <=
-             sigmas * prior.velocity_sd_m_per_s &&
-         std::abs(motion.yaw_rate_rad_per_s - prior.mean.yaw_rate_rad_per_s) <=
-             sigmas * prior.yaw_rate_sd_rad_per_s &&
-         tilt_rad <= sigmas * prior.inclination_sd_rad;
-}
-
-Agreeing find_agreeing_observations(const BodyState& state, const BodyObservations& frame,
-                                    const BodyProblem& problem, double limit_m) {
-  Agreeing agreeing;
-  const EvaluatedState body(state);
-  for (std::size_t i = 0; i < frame.size; ++i) {
-    agreeing[i] = distance_from_ray(frame.sightings[i], problem, body) <= limit_m;
+double compute_residual_limit(const FrameObservations& frame, double max_residual_fraction) {
+  constexpr double max_neighbor_fraction = 0.15;
+  const double n = static_cast<double>(frame.size);
+  Eigen::Vector3d mean_m = Eigen::Vector3d::Zero();
+  for (const LampObservation& seen : frame.observations_span()) mean_m += seen.lamp_m / n;
+  double sum_m2 = 0;
+  for (const LampObservation& seen : frame.observations_span()) {
+    sum_m2 += (seen.lamp_m - mean_m).squaredNorm();
   }
-  return agreeing;
+  const double nearest_m = *std::min_element(
+      frame.nearest_m.begin(), frame.nearest_m.begin() + static_cast<std::ptrdiff_t>(frame.size));
+  return std::min(max_residual_fraction * std::sqrt(sum_m2 / n), max_neighbor_fraction * nearest_m);
 }
 
-bool is_consistent(const BodySolution& solution, const BodyObservations& frame,
+/// Returns true if each quantity with a prior is within five standard deviations of its mean. The
+/// two components of velocity, and of the inclination, count together.
+bool is_within_prior(const BodyPrior& prior, const BodyState& state) {
+  constexpr double max_sds = 5;
+  constexpr std::array<std::size_t, kBodyStates> quantities{0, 0, 0, 1, 2, 2, 3, 4, 4};
+  std::array<double, 5> squares{};
+  const PriorTerms priors = compute_prior_terms(prior, EvaluatedState(state));
+  for (const PriorTerm& term : priors.list()) {
+    squares[quantities[static_cast<std::size_t>(term.state)]] += term.residual * term.residual;
+  }
+  return *std::max_element(squares.begin(), squares.end()) <= max_sds * max_sds;
+}
+
+/// Observations that agree with a state: those whose lamp is within `limit_m` of its ray.
+struct Agreement {
+  Agreeing agreeing;
+  /// Sum of the squared distances of these lamps, m^2.
+  double sum_m2 = 0;
+
+  Agreement() = default;
+  Agreement(const BodyState& state, const FrameObservations& frame, const BodyProblem& problem,
+            double limit_m) {
+    const EvaluatedState body(state);
+    for (std::size_t i = 0; i < frame.size; ++i) {
+      const double distance_m = distance_from_ray(frame.sightings[i], problem, body);
+      if (!(distance_m <= limit_m)) continue;
+      agreeing.set(i);
+      sum_m2 += distance_m * distance_m;
+    }
+  }
+  bool is_better_than(const Agreement& other) const {
+    const std::size_t count = agreeing.count(), other_count = other.agreeing.count();
+    return count > other_count || (count == other_count && sum_m2 < other.sum_m2);
+  }
+};
+
+bool is_consistent(const BodySolution& solution, const FrameObservations& frame,
                    const BodyProblem& problem, double limit_m) {
-  return has_fix(solution) && is_within_prior(problem.prior, solution.fix.state.motion) &&
-         find_agreeing_observations(solution.fix.state, frame, problem, limit_m).count() ==
-             frame.size;
+  return has_fix(solution) && is_within_prior(problem.prior, solution.fix.state) &&
+         Agreement(solution.fix.state, frame, problem, limit_m).agreeing.count() == frame.size;
 }
 
-BodyObservations select_lamps(const BodyObservations& frame, const Agreeing& agreeing) {
-  BodyObservations remaining = frame;
+FrameObservations select_lamps(const FrameObservations& frame, const Agreeing& agreeing) {
+  FrameObservations remaining = frame;
   remaining.keep_only_selected_observations(agreeing);
   return remaining;
 }
 
 /// Returns the frame with the mirror image of the map.
-BodyObservations mirror_lamp_positions(BodyObservations frame) {
+FrameObservations mirror_lamp_positions(FrameObservations frame) {
   for (std::size_t i = 0; i < frame.size; ++i) frame.sightings[i].lamp_m.y() *= -1;
   return frame;
 }
 
-/// Finds the largest set of lamps that agree with a state of free roll and pitch, at rest. Every
-/// triple of lamps proposes its states. Returns std::nullopt if fewer than four lamps agree.
-std::optional<Agreeing> find_majority_with_free_tilt(const BodyObservations& frame,
-                                                     const BodyProblem& problem, double limit_m) {
-  constexpr std::size_t few = 12, at_least = 4;
+/// Finds the largest set of lamps that agree with a state of unknown roll and pitch, at rest. Every
+/// triple of lamps proposes its states.
+Agreeing find_majority_with_unknown_tilt(const FrameObservations& frame, const BodyProblem& problem,
+                                         double limit_m) {
+  constexpr std::size_t few = 12;
   const std::size_t n = frame.num_current, stride = n <= few ? 1 : n * n * n / (few * few * few);
-  Agreeing best;
+  Agreement best;
   std::size_t turn = 0;
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = i + 1; j < n; ++j) {
@@ -284,63 +120,65 @@ std::optional<Agreeing> find_majority_with_free_tilt(const BodyObservations& fra
         if (turn++ % stride != 0) continue;
         const InitialStates initial_states =
             compute_initial_body_states_from_three_lamps(frame, {i, j, k}, problem);
-        for (std::size_t m = 0; static_cast<int>(m) < initial_states.count; ++m) {
-          const Agreeing agreeing =
-              find_agreeing_observations(initial_states.states[m], frame, problem, limit_m);
-          if (agreeing.count() > best.count()) best = agreeing;
+        for (const BodyState& state : initial_states.list()) {
+          const Agreement agreement(state, frame, problem, limit_m);
+          if (agreement.is_better_than(best)) best = agreement;
         }
       }
     }
   }
-  if (best.count() < at_least) return std::nullopt;
-  return best;
+  return best.agreeing;
 }
 
-/// Finds the largest set of lamps that agree with a state with the inclination of the prior.
-std::optional<Agreeing> find_majority_if_level(const BodyObservations& frame,
-                                               const BodyProblem& problem, double limit_m) {
+/// Finds the largest set of lamps that agree with a state with the inclination of the prior, at
+/// rest. Every pair of lamps proposes its states; of more than 64 lamps, a fixed selection of
+/// pairs.
+Agreeing find_majority_if_level(const FrameObservations& frame, const BodyProblem& problem,
+                                double limit_m) {
   const Eigen::Matrix3d lean = level_rotation_from_inclination(problem.prior.mean.inclination);
-  LevelSightings level;
-  if (!level.set_sightings_in_level_frame(frame, lean)) return std::nullopt;
-  // The limit is converted to z by the ratio of the distances between lamps.
-  double sum_z = 0, sum_m = 0;
-  const Sighting& first = level.sightings[0];
-  for (const Sighting& seen : level.observations_span()) {
-    sum_z += (seen.z - first.z).norm();
-    sum_m += (seen.lamp_m - first.lamp_m).head<2>().norm();
+  const LevelSightings level(frame, lean);
+  if (!level.are_lamps_above_horizon) return {};
+  const std::size_t stride = 1 + level.size / 65;
+  Agreement best;
+  for (std::size_t i = 0; i < level.size; ++i) {
+    for (std::size_t j = i + 1; j < level.size; j += stride) {
+      const TwoLampPoses pair = compute_two_lamp_poses(level.sightings[i], level.sightings[j]);
+      for (std::size_t k = 0; static_cast<int>(k) < pair.count; ++k) {
+        const Agreement agreement(make_body_state_from_camera_pose(pair.poses[k], problem, lean),
+                                  frame, problem, limit_m);
+        if (agreement.is_better_than(best)) best = agreement;
+      }
+    }
   }
-  const auto majority =
-      find_largest_consistent_lamp_set(level.observations_span(), limit_m * sum_z / sum_m);
-  if (!majority) return std::nullopt;
-  return find_agreeing_observations(make_body_state_from_camera_pose(majority->pose, problem, lean),
-                                    frame, problem, limit_m);
+  return best.agreeing;
 }
 
 /// Computes the fix of a majority of the lamps, and removes the others from the frame.
-BodySolution estimate_body_from_majority(BodyObservations& frame, const BodyProblem& problem,
+BodySolution estimate_body_from_majority(FrameObservations& frame, const BodyProblem& problem,
                                          double max_residual_fraction) {
   const BodySolution none{FixStatus::inconsistent, {}};
   const double limit_m = compute_residual_limit(frame, max_residual_fraction);
   double latest_s = 0;
-  for (const BodyObservation& seen : frame.observations_span()) {
+  for (const LampObservation& seen : frame.observations_span()) {
     latest_s = std::max(latest_s, std::abs(seen.time_s));
   }
   const double driven_m = 2 * problem.prior.velocity_sd_m_per_s * latest_s;
-  auto agreeing = problem.is_roll_pitch_estimated()
-                      ? find_majority_with_free_tilt(frame, problem, limit_m + driven_m)
-                      : find_majority_if_level(frame, problem, limit_m + driven_m);
+  const bool is_tilt_unknown = is_roll_pitch_unknown(problem.prior);
+  const std::size_t min_lamps = is_tilt_unknown ? 4 : 3;  // one more than propose a state
+  Agreeing agreeing = is_tilt_unknown
+                          ? find_majority_with_unknown_tilt(frame, problem, limit_m + driven_m)
+                          : find_majority_if_level(frame, problem, limit_m + driven_m);
   // The majority ignored motion: with estimated motion, rejected lamps may agree.
   constexpr int max_iterations = 3;
-  for (int iteration = 0; agreeing && iteration < max_iterations; ++iteration) {
-    if (2 * agreeing->count() <= frame.size) return none;
-    BodyObservations remaining = select_lamps(frame, *agreeing);
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    if (agreeing.count() < min_lamps || 2 * agreeing.count() <= frame.size) return none;
+    const FrameObservations remaining = select_lamps(frame, agreeing);
     if (remaining.num_current < 2) return none;
     const BodySolution solution = estimate_body_state_from_all_lamps(remaining, problem);
     if (solution.status != FixStatus::ok) return {solution.status, solution.fix};
-    const Agreeing now_agreeing =
-        find_agreeing_observations(solution.fix.state, frame, problem, limit_m);
-    if (now_agreeing == *agreeing) {
-      if (!is_within_prior(problem.prior, solution.fix.state.motion)) return none;
+    const Agreeing now_agreeing = Agreement(solution.fix.state, frame, problem, limit_m).agreeing;
+    if (now_agreeing == agreeing) {
+      if (!is_within_prior(problem.prior, solution.fix.state)) return none;
       frame = remaining;
       return solution;
     }
@@ -349,138 +187,187 @@ BodySolution estimate_body_from_majority(BodyObservations& frame, const BodyProb
   return none;
 }
 
-/// Rejects lamps one after another until the reported noise explains the residuals. Returns
-/// std::nullopt if no lamp, or more than one, qualifies.
-/// @pre all observations are from the current frame
-std::optional<BodySolution> reject_moved_lamps(BodyObservations& frame, const BodyProblem& problem,
-                                               const BodySolution& all) {
-  BodyObservations remaining = frame;
-  BodySolution solution = all;
-  while (remaining.size > 3 && 2 * (remaining.size - 1) > frame.size) {
-    std::optional<BodyFix> best;
-    std::size_t moved = 0;
-    double second = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < remaining.size; ++i) {
-      Agreeing others;
-      others.set().reset(i);
-      const BodyObservations without = select_lamps(remaining, others);
-      const auto fix = estimate_body_state(without.observations_span(), problem.arm_m,
-                                           problem.prior, solution.fix.state);
-      if (!fix) continue;
-      if (!best || fix->chi_squared < best->chi_squared) {
-        if (best) second = best->chi_squared;
-        best = fix, moved = i;
-      } else {
-        second = std::min(second, fix->chi_squared);
-      }
-    }
-    if (!best) return std::nullopt;
-    Agreeing others;
-    others.set().reset(moved);
-    remaining = select_lamps(remaining, others);
-    solution.fix = *best;
-    const double excess = compute_reduced_chi_squared(best->chi_squared, remaining.size);
-    if (excess < kMaxReducedChiSquared) {
-      const double of_second = compute_reduced_chi_squared(second, remaining.size);
-      if (of_second < kMaxReducedChiSquared ||
-          kClearGain * excess > compute_reduced_chi_squared(all.fix.chi_squared, frame.size) ||
-          !is_within_prior(problem.prior, best->state.motion) ||
-          !is_body_position_determined(remaining, *best)) {
-        return std::nullopt;
-      }
-      frame = remaining;
-      return BodySolution{FixStatus::ok, *best};
-    }
-  }
-  return std::nullopt;
-}
-
 }  // namespace
 
-BodySolution estimate_body_state_robust(BodyObservations& frame,
-                                        const Eigen::Vector3d& arm_in_body_m,
-                                        const BodyPrior& prior, double max_residual_fraction) {
-  const BodyProblem problem{arm_in_body_m, prior};
-  const double limit_m = compute_residual_limit(frame, max_residual_fraction);
+BodySolution estimate_body_state_robust(FrameObservations& frame, const BodyProblem& problem,
+                                        double max_residual_fraction) {
   const BodySolution all = estimate_body_state_from_all_lamps(frame, problem);
-  if (frame.size < 3) return all;
-  if (is_consistent(all, frame, problem, limit_m)) {
-    if (all.status != FixStatus::ok ||
-        compute_reduced_chi_squared(all.fix.chi_squared, frame.size) <= kMaxReducedChiSquared)
-      return all;
-    const BodySolution mirror_image =
-        estimate_body_state_from_all_lamps(mirror_lamp_positions(frame), problem);
-    if (mirror_image.status == FixStatus::ok &&
-        kClearGain * compute_reduced_chi_squared(mirror_image.fix.chi_squared, frame.size) <
-            compute_reduced_chi_squared(all.fix.chi_squared, frame.size)) {
-      return {FixStatus::mirrored_map, {}};
-    }
-    // Constant velocity and yaw rate do not explain the frames.
-    if (frame.num_current < frame.size) return {FixStatus::inconsistent, {}};
-    if (!frame.noise_is_stated) return all;
-    return reject_moved_lamps(frame, problem, all).value_or(all);
+  if (frame.size < 3) {
+    const bool is_contradicted =
+        all.status == FixStatus::ok && !is_within_prior(problem.prior, all.fix.state);
+    return is_contradicted ? BodySolution{FixStatus::inconsistent, {}} : all;
   }
-  const BodyObservations mirror_frame = mirror_lamp_positions(frame);
+  const double limit_m = compute_residual_limit(frame, max_residual_fraction);
+  const bool is_all_consistent = is_consistent(all, frame, problem, limit_m);
+  const double excess = compute_reduced_chi_squared(all.fix.chi_squared, frame.size);
+  if (is_all_consistent && (all.status != FixStatus::ok || excess <= kMaxReducedChiSquared))
+    return all;
+  const FrameObservations mirror_frame = mirror_lamp_positions(frame);
   const BodySolution mirror_image = estimate_body_state_from_all_lamps(mirror_frame, problem);
-  if (mirror_image.status == FixStatus::ok &&
-      is_consistent(mirror_image, mirror_frame, problem, limit_m)) {
-    return {FixStatus::mirrored_map, {}};
-  }
+  const bool is_mirrored =
+      mirror_image.status == FixStatus::ok &&
+      is_consistent(mirror_image, mirror_frame, problem, limit_m) &&
+      (!is_all_consistent ||
+       kClearGain * compute_reduced_chi_squared(mirror_image.fix.chi_squared, frame.size) < excess);
+  if (is_mirrored) return {FixStatus::mirrored_map, {}};
+  // Constant velocity and yaw rate do not explain the earlier frames.
+  if (is_all_consistent && frame.num_current < frame.size) return {FixStatus::inconsistent, {}};
+  if (is_all_consistent) return all;
   if (frame.size < 4) return has_fix(all) ? BodySolution{FixStatus::inconsistent, {}} : all;
   const BodySolution majority = estimate_body_from_majority(frame, problem, max_residual_fraction);
   if (majority.status == FixStatus::inconsistent && !has_fix(all)) return all;
   return majority;
 }
 
-OutlierLamps find_outlier_lamps(std::span<const Sighting> sightings,
-                                std::span<const Matrix2> common, const LeastSquaresFix& fix) {
-  OutlierLamps found;
-  if (sightings.size() < 4) return found;
-  const LevelPose pose(fix.pose);
-  std::bitset<kMaxSightings> rejected;
-  for (std::size_t left = sightings.size(); left >= 3; --left) {
-    Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
-    Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
-    const auto each = [&](auto&& use) {
-      for (std::size_t i = 0; i < sightings.size(); ++i) {
-        if (rejected[i]) continue;
-        const Sighting& one = sightings[i];
-        const Eigen::Matrix2d by_pixel = one.d_pixel_d_z.inverse() * one.sigma_px;
-        const Eigen::Matrix2d covariance = by_pixel * by_pixel.transpose() + common[i];
-        const Prediction prediction = project_lamp_with_jacobian(pose, one.lamp_m);
-        use(i, covariance, prediction.d_z_d_state, Eigen::Vector2d(one.z - prediction.z));
+namespace {
+
+/// Observations linearized at a fix, in standard deviations of all errors together.
+class LinearizedFrame {
+ public:
+  /// Effect of the removal of a lamp.
+  struct Removal {
+    std::size_t lamp = 0;
+    double chi_squared_reduction = 0;
+  };
+  /// Chi-squared of the residuals and its expectation; removals with the two largest effects.
+  struct Residuals {
+    double chi_squared = 0, redundancy = 0;
+    Removal best = {}, second = {};
+  };
+
+  LinearizedFrame(std::span<const LampObservation> sightings, std::span<const Matrix2> common,
+                  const BodyProblem& problem, const BodyFix& fix)
+      : size_(sightings.size()),
+        priors_(compute_prior_terms(problem.prior, EvaluatedState(fix.state))),
+        is_fixed_(fix.covariance.diagonal().array() <= 0) {
+    const EvaluatedState body(fix.state);
+    for (std::size_t i = 0; i < size_; ++i) {
+      LinearizedObservation seen = linearize_observation(sightings[i], body, problem.arm_m);
+      for (int state = 0; state < kBodyStates; ++state) {
+        if (is_fixed_[state]) seen.jacobian.col(state).setZero();
       }
-    };
-    each([&](std::size_t, const Eigen::Matrix2d& covariance, const auto& jacobian,
-             const Eigen::Vector2d& residual) {
-      const Eigen::Matrix<double, 4, 2> weighted = jacobian.transpose() * covariance.inverse();
-      information += weighted * jacobian;
-      gradient += weighted * residual;
-    });
-    const auto state_covariance = invert_positive_definite_matrix(information);
-    if (!state_covariance) return {};
-    const Eigen::Vector4d step = *state_covariance * gradient;
-    double chi_squared = 0, worst = 0;
-    std::size_t worst_lamp = 0;
-    each([&](std::size_t i, const Eigen::Matrix2d& covariance, const auto& jacobian,
-             const Eigen::Vector2d& residual) {
-      const Eigen::Vector2d r = residual - jacobian * step;
-      chi_squared += r.dot(covariance.inverse() * r);
-      const Eigen::Matrix2d of_residual =
-          covariance - jacobian * *state_covariance * jacobian.transpose();
-      const double drop = r.dot(of_residual.inverse() * r);
-      if (!(of_residual.determinant() > 0) || drop <= worst) return;
-      worst = drop;
-      worst_lamp = i;
-    });
-    const double freedom = 2 * static_cast<double>(left) - 4;
-    if (chi_squared <= compute_chi_squared_bound(kSigmasOfOneInTenThousand, freedom)) return found;
-    // Three contradicting lamps do not determine which is wrong; nor does a minority.
-    if (!(worst > 0) || left == 3 || 2 * (left - 1) <= sightings.size()) return {};
-    rejected.set(worst_lamp);
-    found.lamps[found.count++] = worst_lamp;
+      const Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity() + common[i];
+      const Eigen::Matrix2d root = covariance.llt().matrixL();
+      const Eigen::Matrix2d whitening = root.inverse();
+      observations_[i] = {whitening * seen.residual, whitening * seen.jacobian};
+    }
   }
-  return {};
+
+  /// Solves for the state without the rejected lamps. Returns std::nullopt if the others do not
+  /// determine it.
+  std::optional<Residuals> compute_residuals(const OutlierLamps& rejected) const {
+    const Normal<kBodyStates> normal = make_normal_equations(rejected);
+    const Cholesky<kBodyStates> factor(normal);
+    if (!factor.is_positive) return std::nullopt;
+    const BodyVector step = solve(factor, normal.gradient);
+    Residuals found;
+    for (std::size_t i = 0; i < size_; ++i) {
+      if (rejected[i]) continue;
+      const auto& [residual, jacobian] = observations_[i];
+      const Eigen::Vector2d r = residual - jacobian * step;
+      Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity();
+      for (const int axis : {0, 1}) {
+        std::array<double, kBodyStates> row;
+        BodyVector::Map(row.data()) = jacobian.row(axis);
+        covariance.col(axis) -= jacobian * solve(factor, row);
+      }
+      found.chi_squared += r.squaredNorm();
+      found.redundancy += covariance.trace();
+      if (!(covariance.determinant() > 0)) continue;
+      const Removal removal{i, r.dot(covariance.inverse() * r)};
+      if (removal.chi_squared_reduction > found.best.chi_squared_reduction) {
+        found.second = std::exchange(found.best, removal);
+      } else if (removal.chi_squared_reduction > found.second.chi_squared_reduction) {
+        found.second = removal;
+      }
+    }
+    return found;
+  }
+
+ private:
+  using BodyVector = Eigen::Matrix<double, kBodyStates, 1>;
+
+  static BodyVector solve(const Cholesky<kBodyStates>& factor,
+                          const std::array<double, kBodyStates>& right) {
+    const auto solution = factor.solve_normal_equations(right);
+    return BodyVector::Map(solution.data());
+  }
+
+  Normal<kBodyStates> make_normal_equations(const OutlierLamps& rejected) const {
+    Normal<kBodyStates> normal;
+    for (std::size_t i = 0; i < size_; ++i) {
+      for (const int axis : {0, 1}) {
+        if (rejected[i]) continue;
+        const BodyVector row = observations_[i].jacobian.row(axis);
+        normal.add_residual_row(row, observations_[i].residual[axis]);
+      }
+    }
+    for (const PriorTerm& prior : priors_.list()) {
+      BodyVector row = prior.weight * BodyVector::Unit(prior.state);
+      row.tail<2>() += prior.weight * prior.d_inclination;
+      normal.add_residual_row(row, prior.residual);
+    }
+    for (std::size_t i = 0; i < kBodyStates; ++i) {
+      if (is_fixed_[static_cast<int>(i)]) normal.information[i][i] = 1;
+    }
+    return normal;
+  }
+
+  std::size_t size_;
+  PriorTerms priors_;
+  Eigen::Array<bool, kBodyStates, 1> is_fixed_;
+  std::array<LinearizedObservation, kMaxSightings> observations_;
+};
+
+}  // namespace
+
+OutlierLamps find_outlier_lamps(std::span<const LampObservation> sightings,
+                                std::span<const Matrix2> common, const BodyProblem& problem,
+                                const BodyFix& fix, bool are_all_errors_known) {
+  constexpr double min_redundancy = 1.5;  // two, less the information of the priors
+  constexpr double max_remaining_ratio = 9;
+  const auto is_contradiction = [&](double chi_squared, double redundancy) {
+    const double limit = are_all_errors_known ? compute_chi_squared_limit(redundancy)
+                                              : kMaxReducedChiSquared * redundancy;
+    return chi_squared > limit;
+  };
+  const LinearizedFrame frame(sightings, common, problem, fix);
+  OutlierLamps found;
+  double initial_ratio = 0;
+  for (std::size_t num_left = sightings.size();; --num_left) {
+    const auto residuals = frame.compute_residuals(found);
+    if (!residuals) return {};
+    const auto& [chi_squared, redundancy, best, second] = *residuals;
+    if (found.none()) initial_ratio = chi_squared / redundancy;
+    if (!is_contradiction(chi_squared, redundancy)) {
+      const bool is_clear =
+          are_all_errors_known || (chi_squared < max_remaining_ratio * redundancy &&
+                                   kClearGain * chi_squared < initial_ratio * redundancy);
+      return is_clear ? found : OutlierLamps();
+    }
+    const bool is_unique =
+        are_all_errors_known ||
+        is_contradiction(chi_squared - second.chi_squared_reduction, redundancy - 2);
+    // Fewer lamps, or a minority, do not determine which lamp is wrong.
+    if (!(best.chi_squared_reduction > 0) || !is_unique || redundancy - 2 < min_redundancy ||
+        2 * (num_left - 1) <= sightings.size()) {
+      return {};
+    }
+    found.set(best.lamp);
+  }
+}
+
+BodySolution reject_outlier_lamps(FrameObservations& frame, const OutlierLamps& outliers,
+                                  const BodyProblem& problem, const BodySolution& all) {
+  if (outliers.none()) return all;
+  FrameObservations remaining = select_lamps(frame, ~outliers);
+  const auto fix = estimate_body_state(remaining.observations_span(), problem, all.fix.state);
+  if (!fix || !is_within_prior(problem.prior, fix->state) ||
+      !is_body_position_determined(remaining, problem.prior, *fix)) {
+    return all;
+  }
+  frame = remaining;
+  return {FixStatus::ok, *fix};
 }
 
 }  // namespace vlp

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "geometry/angles.h"
 #include "geometry/normal_equations.h"
@@ -26,9 +27,6 @@ Eigen::Vector3d rotate_back_by_heading(const Eigen::Vector2d& heading, const Eig
 Eigen::Vector2d make_unit_heading(double angle_rad) {
   return {std::cos(angle_rad), std::sin(angle_rad)};
 }
-
-/// Returns z x v.
-Eigen::Vector3d cross_z(const Eigen::Vector3d& v) { return {-v.y(), v.x(), 0}; }
 
 /// Intermediate results of q: relative to R along the level axes of time 0, without u t; along the
 /// level axes of time t; and q + arm.
@@ -52,37 +50,38 @@ LampTerms compute_lamp_terms(const EvaluatedState& at, const Eigen::Vector3d& la
   return terms;
 }
 
-/// Derivative of q, a column for each state.
-template <std::size_t count>
-using Columns = std::array<Eigen::Vector3d, count>;
-
 /// The estimated states; their number is a compile-time constant.
 template <bool velocity, bool yaw_rate, bool lean>
 struct States {
   static constexpr std::size_t kYawRate = velocity ? 6 : 4, kLean = kYawRate + (yaw_rate ? 1 : 0);
   static constexpr std::size_t kCount = kLean + (lean ? 2 : 0);
 
-  static Columns<kCount> d_lamp_in_body_d_estimated_states(const EvaluatedState& at,
-                                                           const LampTerms& terms, double time_s) {
-    const auto& body_from_level = at.body_from_level;
-    const Eigen::Vector2d back(terms.turn.x() * at.heading.x() - terms.turn.y() * at.heading.y(),
-                               -terms.turn.x() * at.heading.y() - terms.turn.y() * at.heading.x());
-    Columns<kCount> d;
-    d[0] = body_from_level * Eigen::Vector3d(-back.x(), -back.y(), 0);
-    d[1] = body_from_level * Eigen::Vector3d(back.y(), -back.x(), 0);
-    d[2] = -body_from_level.col(2);
-    d[3] = body_from_level * -cross_z(rotate_back_by_heading(terms.turn, terms.still));
+  /// Returns the derivatives of a function of q with respect to the estimated states. `d_q` are its
+  /// derivatives with respect to q, `d_level` those with respect to L q.
+  static std::array<double, kCount> make_row(const EvaluatedState& at, const LampTerms& terms,
+                                             double time_s, const Eigen::Vector3d& d_q,
+                                             const Eigen::Vector3d& d_level) {
+    const double x = d_level.x(), y = d_level.y();
+    const Eigen::Vector2d& turn = terms.turn;
+    const Eigen::Vector2d yaw = complex_product(turn, at.heading);
+    const Eigen::Vector2d still = conjugate_product(turn, terms.still.head<2>());
+    std::array<double, kCount> row;
+    row[0] = yaw.y() * y - yaw.x() * x;
+    row[1] = -yaw.y() * x - yaw.x() * y;
+    row[2] = -d_level.z();
+    row[3] = still.y() * x - still.x() * y;
     if constexpr (velocity) {
-      const Eigen::Vector2d turn = time_s * terms.turn;
-      d[4] = body_from_level * Eigen::Vector3d(-turn.x(), turn.y(), 0);
-      d[5] = body_from_level * Eigen::Vector3d(-turn.y(), -turn.x(), 0);
+      row[4] = time_s * (turn.y() * y - turn.x() * x);
+      row[5] = -time_s * (turn.y() * x + turn.x() * y);
     }
-    if constexpr (yaw_rate) d[kYawRate] = body_from_level * (-time_s * cross_z(terms.turned_level));
+    if constexpr (yaw_rate)
+      row[kYawRate] = time_s * (terms.turned_level.y() * x - terms.turned_level.x() * y);
     if constexpr (lean) {
-      d[kLean] = Eigen::Vector3d(0, terms.in_body.z(), -terms.in_body.y());
-      d[kLean + 1] = terms.in_body.cross(at.pitch_axis);
+      const Eigen::Vector3d& in_body = terms.in_body;
+      row[kLean] = in_body.z() * d_q.y() - in_body.y() * d_q.z();
+      row[kLean + 1] = in_body.cross(at.pitch_axis).dot(d_q);
     }
-    return d;
+    return row;
   }
 
   /// Index of each estimated state among all states.
@@ -93,6 +92,23 @@ struct States {
     if (yaw_rate) all[next++] = kBodyYawRate;
     if (lean) all[next++] = kBodyRoll, all[next++] = kBodyPitch;
     return all;
+  }
+  /// Position of each state among the estimated ones; 0 if it is not estimated.
+  static constexpr std::array<std::size_t, kBodyStates> state_positions() {
+    std::array<std::size_t, kBodyStates> all{};
+    constexpr auto indices = estimated_state_indices();
+    for (std::size_t i = 0; i < kCount; ++i) all[static_cast<std::size_t>(indices[i])] = i;
+    return all;
+  }
+  /// Returns the derivatives of a prior with respect to the estimated states.
+  static std::array<double, kCount> make_prior_row(const PriorTerm& prior) {
+    std::array<double, kCount> row{};
+    row[state_positions()[static_cast<std::size_t>(prior.state)]] = prior.weight;
+    if constexpr (lean) {
+      row[kLean] += prior.weight * prior.d_inclination.x();
+      row[kLean + 1] += prior.weight * prior.d_inclination.y();
+    }
+    return row;
   }
 };
 
@@ -108,48 +124,22 @@ BodyState apply_body_step(const BodyState& from, const BodyVector& step) {
   return next;
 }
 
-/// Returns the weights of the priors: 1 / sd of each state, zero for fixed states.
-BodyVector compute_prior_weights(const BodyPrior& prior) {
-  const auto inverse = [](double sd) { return sd > 0 ? 1 / sd : 0; };
-  BodyVector weights = BodyVector::Zero();
-  if (prior.height) weights[2] = inverse(prior.height->sd_m);
-  weights[kBodyVelocity] = weights[kBodyVelocity + 1] = inverse(prior.velocity_sd_m_per_s);
-  weights[kBodyYawRate] = inverse(prior.yaw_rate_sd_rad_per_s);
-  weights[kBodyRoll] = weights[kBodyPitch] = inverse(prior.inclination_sd_rad);
-  return weights;
-}
-
-/// Returns the prior residuals, (state - prior mean) / sd.
-BodyVector compute_prior_residuals(const BodyState& state, const BodyPrior& prior,
-                                   const BodyVector& weights) {
-  const BodyMotion &motion = state.motion, &mean = prior.mean;
-  BodyVector deviations = BodyVector::Zero();
-  if (prior.height) deviations[2] = state.pose.position_m.z() - prior.height->z_m;
-  deviations.segment<2>(kBodyVelocity) = motion.velocity_m_per_s - mean.velocity_m_per_s;
-  deviations[kBodyYawRate] = motion.yaw_rate_rad_per_s - mean.yaw_rate_rad_per_s;
-  deviations[kBodyRoll] = wrap_angle_rad(motion.inclination.roll_rad - mean.inclination.roll_rad);
-  deviations[kBodyPitch] =
-      wrap_angle_rad(motion.inclination.pitch_rad - mean.inclination.pitch_rad);
-  return deviations.cwiseProduct(weights);
-}
-
-/// Residual of a lamp in standard deviations, and 1 / depth along its ray; not positive if the
-/// lamp
+/// Residual of a lamp in standard deviations, and 1 / depth; not positive if the lamp
 /// is behind the ray.
 struct LampResidual {
   Eigen::Vector2d value;
   double inverse_depth;
 };
 
-LampResidual compute_lamp_residual(const BodyObservation& sighting, const Eigen::Vector3d& q) {
-  const double inverse_depth = 1 / sighting.ray.dot(q);
+LampResidual compute_lamp_residual(const LampObservation& sighting, const Eigen::Vector3d& q) {
+  const double inverse_depth = 1 / sighting.depth_axis.dot(q);
   return {-inverse_depth * (sighting.whitened_pixel_from_ray * q), inverse_depth};
 }
 
 /// Returns the derivative of the lamp's pixel by q.
-Matrix23 d_pixel_d_lamp_in_body(const BodyObservation& sighting, const LampResidual& residual) {
+Matrix23 d_pixel_d_lamp_in_body(const LampObservation& sighting, const LampResidual& residual) {
   return residual.inverse_depth *
-         (sighting.whitened_pixel_from_ray + residual.value * sighting.ray.transpose());
+         (sighting.whitened_pixel_from_ray + residual.value * sighting.depth_axis.transpose());
 }
 
 template <typename S>
@@ -159,21 +149,20 @@ struct Linearized : Normal<S::kCount> {
   double pixels_chi_squared = 0, sum_px2 = 0;
   bool lamps_ahead = true;
 
-  Linearized(std::span<const BodyObservation> sightings, const Eigen::Vector3d& arm_m,
-             const BodyPrior& prior, const BodyVector& weights, const EvaluatedState& at) {
-    for (const BodyObservation& sighting : sightings) {
+  Linearized(std::span<const LampObservation> sightings, const BodyProblem& problem,
+             const EvaluatedState& at) {
+    for (const LampObservation& sighting : sightings) {
       const LampTerms terms = compute_lamp_terms(at, sighting.lamp_m, sighting.time_s);
-      const LampResidual residual = compute_lamp_residual(sighting, terms.in_body - arm_m);
+      const LampResidual residual = compute_lamp_residual(sighting, terms.in_body - problem.arm_m);
       if (!(residual.inverse_depth > 0)) {
         lamps_ahead = false;
         return;
       }
       const Matrix23 d_pixel_d_q = d_pixel_d_lamp_in_body(sighting, residual);
-      const auto d_q = S::d_lamp_in_body_d_estimated_states(at, terms, sighting.time_s);
+      const Matrix23 d_pixel_d_level = d_pixel_d_q.lazyProduct(at.body_from_level);
       for (const int axis : {0, 1}) {
-        const Eigen::Vector3d d_axis = d_pixel_d_q.row(axis);
-        std::array<double, S::kCount> row;
-        for (std::size_t i = 0; i < S::kCount; ++i) row[i] = d_axis.dot(d_q[i]);
+        const auto row = S::make_row(at, terms, sighting.time_s, d_pixel_d_q.row(axis),
+                                     d_pixel_d_level.row(axis));
         this->add_residual_row(row, residual.value[axis]);
       }
       const double square = residual.value.squaredNorm();
@@ -181,14 +170,18 @@ struct Linearized : Normal<S::kCount> {
       sum_px2 += sighting.sigma_px * sighting.sigma_px * square;
     }
     pixels_chi_squared = chi_squared;
-    const BodyVector deviations = compute_prior_residuals(at.state, prior, weights);
-    constexpr auto indices = S::estimated_state_indices();
-    for (std::size_t i = 2; i < S::kCount; ++i) {
-      const double weight = weights[indices[i]];
-      this->information[i][i] += weight * weight;
-      this->gradient[i] -= weight * deviations[indices[i]];
+    constexpr auto positions = S::state_positions();
+    const PriorTerms priors = compute_prior_terms(problem.prior, at);
+    for (const PriorTerm& prior : priors.list()) {
+      const std::size_t i = positions[static_cast<std::size_t>(prior.state)];
+      if (prior.state == 2) {
+        this->add_residual_row(S::make_prior_row(prior), prior.residual);
+      } else {
+        this->information[i][i] += prior.weight * prior.weight;
+        this->gradient[i] += prior.weight * prior.residual;
+      }
+      chi_squared += prior.residual * prior.residual;
     }
-    chi_squared += deviations.squaredNorm();
   }
 };
 
@@ -204,7 +197,7 @@ bool is_step_negligible(const BodyVector& step, double scale_m, bool whole) {
 
 template <typename S>
 BodyFix make_body_fix(const Linearized<S>& normal, const Cholesky<S::kCount>& factor,
-                      const BodyVector& weights, const BodyState& state, double lamps) {
+                      const BodyPrior& prior, const BodyState& state, double lamps) {
   BodyFix fix;
   fix.state = state;
   fix.state.pose.yaw_rad = wrap_angle_rad(state.pose.yaw_rad);
@@ -215,26 +208,28 @@ BodyFix make_body_fix(const Linearized<S>& normal, const Cholesky<S::kCount>& fa
   constexpr auto indices = S::estimated_state_indices();
   for (std::size_t i = 0; i < S::kCount; ++i) {
     const auto column = factor.compute_inverse_column(i);
-    const double weight = weights[indices[i]];
-    fix.redundancy += weight * weight * column[i];
     for (std::size_t k = 0; k < S::kCount; ++k) {
       fix.covariance(indices[k], indices[i]) = column[k];
     }
+  }
+  const PriorTerms priors = compute_prior_terms(prior, EvaluatedState(state));
+  for (const PriorTerm& term : priors.list()) {
+    const auto row = S::make_prior_row(term);
+    const auto gain = factor.solve_normal_equations(row);
+    fix.redundancy += std::inner_product(row.begin(), row.end(), gain.begin(), 0.0);
   }
   return fix;
 }
 
 template <typename S>
-std::optional<BodyFix> solve(std::span<const BodyObservation> sightings,
-                             const Eigen::Vector3d& arm_m, const BodyPrior& prior,
+std::optional<BodyFix> solve(std::span<const LampObservation> sightings, const BodyProblem& problem,
                              const BodyState& start) {
   constexpr int max_iterations = 50, max_halvings = 60;
   // Near the minimum the sum of squares changes by less than it can be computed.
   constexpr double rounding = 1e-12;
   constexpr auto indices = S::estimated_state_indices();
-  const BodyVector weights = compute_prior_weights(prior);
   EvaluatedState at(start);
-  Linearized<S> normal(sightings, arm_m, prior, weights, at);
+  Linearized<S> normal(sightings, problem, at);
   if (!normal.lamps_ahead) return std::nullopt;
   const double scale_m = (sightings.front().lamp_m - start.pose.position_m).norm();
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
@@ -248,12 +243,13 @@ std::optional<BodyFix> solve(std::span<const BodyObservation> sightings,
       const BodyState next_state = apply_body_step(at.state, step);
       if (is_step_negligible(step, scale_m, halving == 0)) {
         const auto lamps = static_cast<double>(sightings.size());
-        std::optional<BodyFix> fix = make_body_fix<S>(normal, factor, weights, next_state, lamps);
-        if (!fix->covariance.allFinite()) fix.reset();
+        std::optional<BodyFix> fix =
+            make_body_fix<S>(normal, factor, problem.prior, next_state, lamps);
+        if (!std::isfinite(fix->covariance.sum())) fix.reset();
         return fix;
       }
       const EvaluatedState next(next_state);
-      const Linearized<S> next_normal(sightings, arm_m, prior, weights, next);
+      const Linearized<S> next_normal(sightings, problem, next);
       if (next_normal.lamps_ahead &&
           next_normal.chi_squared <= normal.chi_squared * (1 + rounding)) {
         at = next, normal = next_normal;
@@ -269,19 +265,32 @@ std::optional<BodyFix> solve(std::span<const BodyObservation> sightings,
 
 std::optional<Eigen::Matrix<double, 2, 3>> compute_whitened_pixel_jacobian_wrt_ray(
     const Eigen::Vector3d& ray, const Eigen::Matrix<double, 3, 2>& d_ray_d_pixel, double sigma_px) {
-  const double inverse_length = 1 / ray.norm();
-  const Eigen::Vector3d unit_ray = inverse_length * ray;
-  // Derivative of the unit ray, perpendicular to it.
-  const Eigen::Matrix<double, 3, 2> across =
-      inverse_length * (d_ray_d_pixel - unit_ray * (unit_ray.transpose() * d_ray_d_pixel));
-  const Eigen::Matrix2d square = across.transpose() * across;
-  const Matrix23 pixel_from_ray = square.inverse() * across.transpose();
-  if (!pixel_from_ray.allFinite()) return std::nullopt;
-  return pixel_from_ray / sigma_px;
+  // M is the inverse of (d_ray_d_pixel, ray), without the last row, for a ray of unit length.
+  const Eigen::Vector3d across_u = d_ray_d_pixel.col(1).cross(ray);
+  const Eigen::Vector3d across_v = ray.cross(d_ray_d_pixel.col(0));
+  const double scale = ray.norm() / (sigma_px * d_ray_d_pixel.col(0).dot(across_u));
+  if (!std::isfinite(scale)) return std::nullopt;
+  Matrix23 whitened;
+  whitened << scale * across_u.transpose(), scale * across_v.transpose();
+  return whitened;
+}
+
+LampObservation make_level_observation(const Eigen::Vector3d& lamp_m, const Eigen::Vector2d& z,
+                                       const Eigen::Matrix2d& d_pixel_d_z, double sigma_px) {
+  Matrix23 whitened;
+  whitened << d_pixel_d_z, -d_pixel_d_z * z;
+  LampObservation seen(lamp_m, z.homogeneous().normalized(), whitened / sigma_px, sigma_px, 0);
+  seen.depth_axis = Eigen::Vector3d::UnitZ();
+  return seen;
 }
 
 EvaluatedState::EvaluatedState(const BodyState& at)
     : state(at), heading(make_unit_heading(at.pose.yaw_rad)) {
+  if (at.motion.inclination.roll_rad == 0 && at.motion.inclination.pitch_rad == 0) {
+    body_from_level.setIdentity();
+    pitch_axis = Eigen::Vector3d::UnitY();
+    return;
+  }
   const Eigen::Vector2d roll = make_unit_heading(at.motion.inclination.roll_rad);
   const Eigen::Vector2d pitch = make_unit_heading(at.motion.inclination.pitch_rad);
   const double cr = roll.x(), sr = roll.y(), cp = pitch.x(), sp = pitch.y();
@@ -294,29 +303,72 @@ Eigen::Vector3d EvaluatedState::lamp_position_in_body(const Eigen::Vector3d& lam
   return compute_lamp_terms(*this, lamp_m, time_s).in_body;
 }
 
-Eigen::Matrix<double, 3, kBodyStates> EvaluatedState::d_lamp_position_in_body_d_state(
-    const Eigen::Vector3d& lamp_m, double time_s) const {
-  const auto columns = States<true, true, true>::d_lamp_in_body_d_estimated_states(
-      *this, compute_lamp_terms(*this, lamp_m, time_s), time_s);
-  Eigen::Matrix<double, 3, kBodyStates> derivative;
-  for (int i = 0; i < kBodyStates; ++i) derivative.col(i) = columns[static_cast<std::size_t>(i)];
-  return derivative;
+LinearizedObservation linearize_observation(const LampObservation& sighting,
+                                            const EvaluatedState& body,
+                                            const Eigen::Vector3d& arm_m) {
+  const LampTerms terms = compute_lamp_terms(body, sighting.lamp_m, sighting.time_s);
+  const LampResidual residual = compute_lamp_residual(sighting, terms.in_body - arm_m);
+  const Matrix23 d_pixel_d_q = d_pixel_d_lamp_in_body(sighting, residual);
+  const Matrix23 d_pixel_d_level = d_pixel_d_q.lazyProduct(body.body_from_level);
+  LinearizedObservation linearized{residual.value, {}};
+  for (const int axis : {0, 1}) {
+    const auto row = States<true, true, true>::make_row(
+        body, terms, sighting.time_s, d_pixel_d_q.row(axis), d_pixel_d_level.row(axis));
+    for (int i = 0; i < kBodyStates; ++i)
+      linearized.jacobian(axis, i) = row[static_cast<std::size_t>(i)];
+  }
+  return linearized;
 }
 
-Matrix23 d_whitened_pixel_d_lamp_position(const BodyObservation& sighting,
-                                          const Eigen::Vector3d& lamp_from_camera_m) {
-  return d_pixel_d_lamp_in_body(sighting, compute_lamp_residual(sighting, lamp_from_camera_m));
+PriorTerms compute_prior_terms(const BodyPrior& prior, const EvaluatedState& body) {
+  constexpr double exact_sd = 1e-9;
+  PriorTerms priors;
+  const auto add = [&](int state, double sd, double difference) {
+    PriorTerm& term = priors.terms[priors.size++];
+    term = {state, 1 / sd, difference / sd, {0, 0}};
+    return &term;
+  };
+  const BodyMotion &motion = body.state.motion, &mean = prior.mean;
+  if (const auto& height = prior.height) {
+    const Eigen::Matrix3d body_from_level = body.body_from_level;
+    const Eigen::Vector3d& point_m = prior.height_point_m;
+    const double height_m = body.state.pose.position_m.z() + body_from_level.col(2).dot(point_m);
+    add(2, std::max(height->sd_m, exact_sd), height->z_m - height_m)->d_inclination = {
+        point_m.y() * body_from_level(2, 2) - point_m.z() * body_from_level(1, 2),
+        -body_from_level.col(0).dot(point_m)};
+  }
+  if (const auto& yaw = prior.yaw) {
+    add(kBodyYaw, std::max(yaw->sd_rad, exact_sd),
+        wrap_angle_rad(yaw->yaw_rad - body.state.pose.yaw_rad));
+  }
+  if (const double sd = prior.velocity_sd_m_per_s; sd > 0) {
+    for (const int axis : {0, 1}) {
+      add(kBodyVelocity + axis, sd, (mean.velocity_m_per_s - motion.velocity_m_per_s)[axis]);
+    }
+  }
+  if (const double sd = prior.yaw_rate_sd_rad_per_s; sd > 0) {
+    add(kBodyYawRate, sd, mean.yaw_rate_rad_per_s - motion.yaw_rate_rad_per_s);
+  }
+  if (const double sd = prior.inclination_sd_rad; sd > 0) {
+    const Inclination &from = mean.inclination, &to = motion.inclination;
+    add(kBodyRoll, sd, wrap_angle_rad(from.roll_rad - to.roll_rad));
+    add(kBodyPitch, sd, wrap_angle_rad(from.pitch_rad - to.pitch_rad));
+  }
+  return priors;
 }
 
-std::optional<double> compute_body_state_chi_squared(std::span<const BodyObservation> sightings,
-                                                     const Eigen::Vector3d& arm_in_body_m,
-                                                     const BodyPrior& prior,
+std::optional<double> compute_body_state_chi_squared(std::span<const LampObservation> sightings,
+                                                     const BodyProblem& problem,
                                                      const BodyState& state) {
   const EvaluatedState at(state);
-  double sum = compute_prior_residuals(state, prior, compute_prior_weights(prior)).squaredNorm();
-  for (const BodyObservation& sighting : sightings) {
+  double sum = 0;
+  const PriorTerms priors = compute_prior_terms(problem.prior, at);
+  for (const PriorTerm& prior : priors.list()) {
+    sum += prior.residual * prior.residual;
+  }
+  for (const LampObservation& sighting : sightings) {
     const Eigen::Vector3d q =
-        compute_lamp_terms(at, sighting.lamp_m, sighting.time_s).in_body - arm_in_body_m;
+        at.lamp_position_in_body(sighting.lamp_m, sighting.time_s) - problem.arm_m;
     const LampResidual residual = compute_lamp_residual(sighting, q);
     if (!(residual.inverse_depth > 0)) return std::nullopt;
     sum += residual.value.squaredNorm();
@@ -324,19 +376,37 @@ std::optional<double> compute_body_state_chi_squared(std::span<const BodyObserva
   return sum;
 }
 
-std::optional<BodyFix> estimate_body_state(std::span<const BodyObservation> sightings,
-                                           const Eigen::Vector3d& arm_in_body_m,
-                                           const BodyPrior& prior, const BodyState& start) {
-  using Solver = std::optional<BodyFix> (*)(
-      std::span<const BodyObservation>, const Eigen::Vector3d&, const BodyPrior&, const BodyState&);
+std::optional<BodyFix> estimate_body_state(std::span<const LampObservation> sightings,
+                                           const BodyProblem& problem, const BodyState& start) {
+  using Solver = std::optional<BodyFix> (*)(std::span<const LampObservation>, const BodyProblem&,
+                                            const BodyState&);
   static constexpr std::array<Solver, 8> solvers{
       solve<States<false, false, false>>, solve<States<true, false, false>>,
       solve<States<false, true, false>>,  solve<States<true, true, false>>,
       solve<States<false, false, true>>,  solve<States<true, false, true>>,
       solve<States<false, true, true>>,   solve<States<true, true, true>>};
+  const BodyPrior& prior = problem.prior;
   const int index = 1 * (prior.velocity_sd_m_per_s > 0) + 2 * (prior.yaw_rate_sd_rad_per_s > 0) +
                     4 * (prior.inclination_sd_rad > 0);
-  return solvers[static_cast<std::size_t>(index)](sightings, arm_in_body_m, prior, start);
+  return solvers[static_cast<std::size_t>(index)](sightings, problem, start);
+}
+
+void convert_covariance_to_image_noise(const FrameObservations& frame, const BodyProblem& problem,
+                                       BodyFix& fix) {
+  using Matrix = Eigen::Matrix<double, kBodyStates, kBodyStates>;
+  const EvaluatedState body(fix.state);
+  Matrix by_weights = Matrix::Zero(), by_noise = Matrix::Zero();
+  double expected_squares = 0;
+  for (std::size_t i = 0; i < frame.size; ++i) {
+    const auto jacobian = linearize_observation(frame.sightings[i], body, problem.arm_m).jacobian;
+    by_weights += jacobian.transpose().lazyProduct(jacobian);
+    by_noise += jacobian.transpose().lazyProduct(frame.noise[i].lazyProduct(jacobian));
+    expected_squares += frame.noise[i].trace();
+  }
+  const Matrix old = fix.covariance;
+  fix.covariance += old.lazyProduct((by_noise - by_weights).lazyProduct(old).eval());
+  fix.redundancy = expected_squares - 2 * old.cwiseProduct(by_noise).sum() +
+                   by_weights.cwiseProduct(fix.covariance).sum();
 }
 
 }  // namespace vlp

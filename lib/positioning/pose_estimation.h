@@ -3,16 +3,18 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cstddef>
 #include <optional>
 #include <span>
 
 #include "../geometry/frames.h"
 #include "fix.h"
+#include "pose_observations.h"
 #include "robot.h"
 
-/// Least-squares position fix of a body that moves and is tilted while a rolling shutter reads the
-/// image. The body is the robot with the camera at `arm_in_body_m`, or the camera itself with no
-/// arm.
+/// Least-squares position fix of a body that may move and be tilted while a rolling shutter reads
+/// the image. The body is the robot with the camera at `arm_m`, or the camera itself with no arm.
 ///
 /// Time 0 is the middle of the exposure of the image's middle row. At time 0 the body is at R with
 /// yaw g. A lamp P read at time t has, relative to the camera and along the axes of the body, the
@@ -45,42 +47,47 @@ struct BodyState {
   BodyMotion motion = {};
 };
 
-/// Prior knowledge of the motion: each state is normally distributed about `mean`, with its
-/// standard deviation per component. A state with standard deviation 0 is fixed at its mean.
+/// Yaw with its standard deviation; 0: exact.
+struct KnownYaw {
+  double yaw_rad, sd_rad;
+};
+
+/// Prior knowledge of the state: each quantity is normally distributed about its mean, with its
+/// standard deviation per component. Motion and inclination with standard deviation 0 are fixed at
+/// their mean.
 struct BodyPrior {
-  BodyMotion mean;
+  BodyMotion mean = {};
   double velocity_sd_m_per_s = 0;
   double yaw_rate_sd_rad_per_s = 0;
   double inclination_sd_rad = 0;
-  /// Prior of the height of the body; std::nullopt: unknown.
+  /// Prior of the height of the point `height_point_m` of the body, or of its yaw; std::nullopt:
+  /// unknown. A standard deviation of 0 counts as 1e-9.
   std::optional<KnownHeight> height = {};
+  std::optional<KnownYaw> yaw = {};
+  /// Position in the body frame, m.
+  Eigen::Vector3d height_point_m{0, 0, 0};
+
+  /// Returns true if velocity or yaw rate are estimated together with the pose.
+  bool is_motion_estimated() const { return velocity_sd_m_per_s > 0 || yaw_rate_sd_rad_per_s > 0; }
+  /// Returns true if velocity, yaw rate or roll and pitch are estimated together with the pose.
+  bool is_motion_or_tilt_estimated() const {
+    return is_motion_estimated() || inclination_sd_rad > 0;
+  }
 };
 
-/// Observation of a lamp of the map by a body that may move and be tilted.
-struct BodyObservation {
-  /// Position P of the lamp in the world, m.
-  Eigen::Vector3d lamp_m;
-  /// Direction to the lamp along the axes of the body, unit length.
-  Eigen::Vector3d ray;
-  /// M: the pixel residual is M q / (ray . q), in standard deviations. M ray = 0.
-  Eigen::Matrix<double, 2, 3, Eigen::DontAlign> whitened_pixel_from_ray;
-  double sigma_px;
-  /// Readout time of the lamp's center, s, relative to time 0 of the body.
-  double time_s;
+/// Arm of the camera, its position in the body frame, and prior of the state.
+struct BodyProblem {
+  const Eigen::Vector3d& arm_m;
+  const BodyPrior& prior;
 };
 
-/// Computes M of a pixel from its standard deviation and the derivative of its ray, which may have
-/// any length. Returns std::nullopt if the lens is not invertible there.
-std::optional<Eigen::Matrix<double, 2, 3>> compute_whitened_pixel_jacobian_wrt_ray(
-    const Eigen::Vector3d& ray, const Eigen::Matrix<double, 3, 2>& d_ray_d_pixel, double sigma_px);
-
-/// Estimated state of a body with covariance and statistics of the residuals.
+/// Least-squares state of a body with its covariance and residuals.
 struct BodyFix {
   BodyState state;
-  /// Covariance in meters, radians and seconds; zero for fixed states.
+  /// Covariance of the state (BodyIndex) from the pixel noise and the priors. Zero for fixed
+  /// states.
   BodyCovariance covariance = BodyCovariance::Zero();
-  /// Sum of the squared residuals of pixels and priors over their variances. Its expectation is 2n
-  /// - 4, or 2n - 3 with a known height.
+  /// Sum of the squared residuals of pixels and priors over their variances.
   double chi_squared = 0;
   /// Contribution of the pixel residuals to chi_squared, without the priors.
   double pixels_chi_squared = 0;
@@ -99,11 +106,6 @@ class EvaluatedState {
   /// Returns the position of a lamp relative to the body, q + arm, along the axes of the body, m.
   /// `time_s` is the readout time.
   Eigen::Vector3d lamp_position_in_body(const Eigen::Vector3d& lamp_m, double time_s) const;
-  /// Returns the derivative of q, m, with respect to the states X, Y, Z, yaw, u, w, roll, pitch
-  /// (BodyIndex), in m, rad and s.
-  Eigen::Matrix<double, 3, kBodyStates> d_lamp_position_in_body_d_state(
-      const Eigen::Vector3d& lamp_m, double time_s) const;
-
   BodyState state;
   /// Unit vector (cos g, sin g) of the yaw g.
   Eigen::Vector2d heading;
@@ -113,16 +115,38 @@ class EvaluatedState {
   Eigen::Vector3d pitch_axis;
 };
 
-/// Returns the derivative of a lamp's pixel, in standard deviations, with respect to q, m. q is its
-/// position relative to the camera, along the axes of the body.
-Eigen::Matrix<double, 2, 3> d_whitened_pixel_d_lamp_position(
-    const BodyObservation& sighting, const Eigen::Vector3d& lamp_from_camera_m);
+/// Residual of an observation, in standard deviations, and derivative of its prediction with
+/// respect to all states.
+struct LinearizedObservation {
+  Eigen::Vector2d residual;
+  Eigen::Matrix<double, 2, kBodyStates> jacobian;
+};
+LinearizedObservation linearize_observation(const LampObservation& sighting,
+                                            const EvaluatedState& body,
+                                            const Eigen::Vector3d& arm_m);
+
+/// Prior of one state: its index (BodyIndex), 1 / sd, and mean minus state, in standard deviations.
+struct PriorTerm {
+  int state;
+  double weight, residual;
+  /// Derivatives of the prior quantity with respect to roll and pitch, m; zero except for the
+  /// height.
+  Eigen::Vector2d d_inclination;
+};
+
+/// Priors of the states that are neither free nor fixed: `size` terms at the beginning.
+struct PriorTerms {
+  std::array<PriorTerm, 7> terms;
+  std::size_t size = 0;
+
+  std::span<const PriorTerm> list() const { return {terms.data(), size}; }
+};
+PriorTerms compute_prior_terms(const BodyPrior& prior, const EvaluatedState& body);
 
 /// Computes the sum of the squared residuals of pixels and priors over their variances at `state`.
 /// Returns std::nullopt if a lamp is behind its ray.
-std::optional<double> compute_body_state_chi_squared(std::span<const BodyObservation> sightings,
-                                                     const Eigen::Vector3d& arm_in_body_m,
-                                                     const BodyPrior& prior,
+std::optional<double> compute_body_state_chi_squared(std::span<const LampObservation> sightings,
+                                                     const BodyProblem& problem,
                                                      const BodyState& state);
 
 /// Estimates the state by least squares over pixels and priors. Gauss-Newton from `start`; a step
@@ -130,8 +154,13 @@ std::optional<double> compute_body_state_chi_squared(std::span<const BodyObserva
 /// ray at `start` or if lamps and priors do not determine the state. Also returns it without
 /// convergence in 50 steps.
 /// @pre `start` has the values of the states that the prior fixes
-std::optional<BodyFix> estimate_body_state(std::span<const BodyObservation> sightings,
-                                           const Eigen::Vector3d& arm_in_body_m,
-                                           const BodyPrior& prior, const BodyState& start);
+std::optional<BodyFix> estimate_body_state(std::span<const LampObservation> sightings,
+                                           const BodyProblem& problem, const BodyState& start);
+
+/// Replaces covariance and redundancy for the weights of the observations by those for the noise V
+/// of their pixels (FrameObservations::noise):
+///   C + C D C,   tr(V) - 2 tr(C S) + tr(N (C + C D C)),   S = J' V J,   N = J' J,   D = S - N
+void convert_covariance_to_image_noise(const FrameObservations& frame, const BodyProblem& problem,
+                                       BodyFix& fix);
 
 }  // namespace vlp

@@ -3,7 +3,6 @@
 #include "positioning/positioner.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,21 +15,21 @@
 #include <vector>
 
 #include "camera/lens.h"
+#include "geometry/angles.h"
 #include "geometry/plane.h"
-#include "positioning/closed_form.h"
 #include "positioning/correlated_errors.h"
-#include "positioning/inclination_rotation.h"
 #include "positioning/known_motion.h"
 #include "positioning/lamps_below.h"
 #include "positioning/outlier_rejection.h"
 #include "positioning/pose_observations.h"
+#include "positioning/residual_noise.h"
 #include "positioning/row_clock.h"
-#include "positioning/sighting.h"
 
 namespace vlp {
 namespace {
 
-using Sightings = std::span<const Sighting>;
+/// Redundancies below are rounding errors of zero.
+constexpr double kMinRedundancy = 1e-6;
 
 void check_lamp_positions(const std::vector<Lamp>& lamps) {
   std::map<std::array<double, 3>, int> id_by_position;
@@ -77,6 +76,14 @@ bool are_values_finite(const Sensors& sensors) {
                      is_valid_sd(known->z_sd_m) && is_valid_sd(known->yaw_sd_rad)));
 }
 
+/// Returns true if all frames are earlier than the current one, and no two of them simultaneous.
+bool are_times_valid(std::span<const EarlierFrame> frames) {
+  return std::all_of(frames.begin(), frames.end(), [&](const EarlierFrame& frame) {
+    return std::isfinite(frame.before_s) && frame.before_s > 0 &&
+           std::ranges::count(frames, frame.before_s, &EarlierFrame::before_s) == 1;
+  });
+}
+
 /// Returns the mean position of the lamps, relative to which national coordinates lose no digits.
 Eigen::Vector3d get_lamp_center(const std::vector<Lamp>& lamps) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -103,8 +110,9 @@ std::vector<double> compute_distances_to_nearest_lamp(const std::vector<Lamp>& l
   return nearest_m;
 }
 
-/// Returns true if more than a pose is estimated, or if the camera moves during the readout.
-bool needs_body_estimation(const Sensors& sensors) {
+/// Returns true if the result has a BodyEstimate: more than a pose is estimated from two lamps or
+/// more, or the camera moves during the readout, or its height is known.
+bool has_body_estimate(const Sensors& sensors) {
   return sensors.inclination_sigma_rad > 0 || sensors.height ||
          (sensors.motion && may_camera_move_during_readout(*sensors.motion));
 }
@@ -131,8 +139,37 @@ BodyEstimate rotate_estimate_to_world(const BodyFix& fix, const BodyCovariance& 
   return estimate;
 }
 
-template <typename Frame>
-void set_rejected_lamps(const Frame& frame, Fix& fix) {
+/// Returns the difference of two states, in the order of BodyIndex.
+Eigen::Matrix<double, kBodyStates, 1> compute_state_difference(const BodyState& to,
+                                                               const BodyState& from) {
+  const BodyMotion &a = to.motion, &b = from.motion;
+  Eigen::Matrix<double, kBodyStates, 1> difference;
+  difference << to.pose.position_m - from.pose.position_m,
+      wrap_angle_rad(to.pose.yaw_rad - from.pose.yaw_rad), a.velocity_m_per_s - b.velocity_m_per_s,
+      a.yaw_rate_rad_per_s - b.yaw_rate_rad_per_s, a.inclination.roll_rad - b.inclination.roll_rad,
+      a.inclination.pitch_rad - b.inclination.pitch_rad;
+  return difference;
+}
+
+/// Returns the covariance of x and y, m^2, from second-order effects of the errors of yaw and
+/// height on a fix of one lamp. With the horizontal positions d of the lamp from the body and c
+/// from the camera, and H its height above the camera, the effects are d yaw^2 / 2 and J c / H yaw
+/// height. J is a quarter turn.
+Matrix2 compute_second_order_covariance_of_one_lamp(const LampObservation& seen,
+                                                    const BodyProblem& problem,
+                                                    const BodyFix& fix) {
+  const EvaluatedState body(fix.state);
+  const Eigen::Vector3d arm_m = body.body_from_level.transpose() * problem.arm_m;
+  const Eigen::Vector3d from_body_m = seen.lamp_m - fix.state.pose.position_m;
+  const Eigen::Vector2d d = from_body_m.head<2>();
+  const Eigen::Vector2d c = d - complex_product(body.heading, arm_m.head<2>());
+  const Eigen::Vector2d slope = Eigen::Vector2d(-c.y(), c.x()) / (from_body_m.z() - arm_m.z());
+  const double yaw_variance = fix.covariance(kBodyYaw, kBodyYaw);
+  return 0.75 * yaw_variance * yaw_variance * d * d.transpose() +
+         yaw_variance * fix.covariance(2, 2) * slope * slope.transpose();
+}
+
+void set_rejected_lamps(const FrameObservations& frame, Fix& fix) {
   fix.rejected_lamps = frame.rejected_lamps;
   const auto listed =
       std::min(static_cast<std::size_t>(frame.rejected_lamps), fix.rejected_ids.size());
@@ -179,71 +216,36 @@ class Positioner::Impl {
     }
   }
 
-  Fix compute_position_fix(std::span<const Detection> detections, const Sensors& sensors) const {
-    if (!are_values_finite(sensors)) return make_fix_without_pose(FixStatus::not_finite, 0);
-    if (needs_body_estimation(sensors) && detections.size() > 1) {
-      if (auto fix = compute_body_fix(detections, sensors, {})) return *fix;
-    }
-    const InclinationRotation lean =
-        sensors.inclination
-            ? compute_inclination_rotation(*sensors.inclination, mount_.yaw_in_robot_rad)
-            : InclinationRotation();
-    FrameObservations frame;
-    const FixStatus seen = make_observations(detections, lean.level_from_base, frame);
-    if (seen != FixStatus::ok) return make_fix_without_pose(seen, frame.unknown_lamps);
-
-    Fix fix;
-    Matrix4 height_and_yaw_covariance = Matrix4::Zero();
-    InclinationJacobian d_pose_d_inclination = InclinationJacobian::Zero();
-    if (frame.size > 1) {
-      // If common errors are known, the noise alone must not reject lamps.
-      const bool total = common_.are_lens_zenith_and_lamp_errors_known();
-      if (total) frame.noise_is_stated = false;
-      ConsistentFix found = estimate_pose_robust(frame, max_residual_fraction_);
-      if (total) reject_outlier_lamps(frame, lean.level_from_base, found);
-      const auto& [status, solution] = found;
-      if (status != FixStatus::ok) return make_fix_without_pose(status, frame.unknown_lamps);
-      fix.estimate = {solution.pose, solution.covariance};
-      fix.residual_px = solution.residual_px;
-      fix.chi_squared = solution.chi_squared;
-    } else if (frame.size == 1 && sensors.height_and_yaw) {
-      const auto readout = motion_at_readout(detections, frame.ids.front(), sensors);
-      if (!readout) return make_fix_without_pose(FixStatus::row_time_unknown, frame.unknown_lamps);
-      const Sighting& sighting = frame.sightings.front();
-      HeightAndYaw known = *sensors.height_and_yaw;
-      known.z_m -= origin_m_.z();
-      const auto pose = compute_pose_at_known_height_and_yaw(sighting, known, *readout);
-      if (!pose) return make_fix_without_pose(FixStatus::lamp_below_camera, frame.unknown_lamps);
-      fix.estimate = {*pose, compute_one_lamp_fix_covariance_from_pixel_noise(sighting, *pose)};
-      height_and_yaw_covariance =
-          compute_one_lamp_fix_covariance_from_sensors(sighting, *pose, known, *readout);
-      d_pose_d_inclination =
-          compute_one_lamp_fix_jacobian_wrt_level_rotation(sighting, *pose) * lean.error_axes;
-    } else {
-      return make_fix_without_pose(FixStatus::too_few_lamps, frame.unknown_lamps);
-    }
-    fix.status = FixStatus::ok;
-    fix.lamps = fix.sightings = static_cast<int>(frame.size);
-    fix.redundancy = frame.size < 3 ? 0 : 2 * static_cast<double>(frame.size) - 4;
-    fix.time_s = sensors.time_s;
-    set_rejected_lamps(frame, fix);
-    fix.unknown_lamps = frame.unknown_lamps;
-    add_covariances(frame, lean, d_pose_d_inclination, sensors, height_and_yaw_covariance, fix);
-    fix.estimate.pose.position_m += origin_m_;
-    return fix;
-  }
-
   bool are_lamps_below_camera() const { return lamps_below_camera_; }
 
   Fix compute_position_fix(std::span<const Detection> detections, const Sensors& sensors,
                            std::span<const EarlierFrame> earlier) const {
-    const bool finite_times =
-        std::all_of(earlier.begin(), earlier.end(),
-                    [](const EarlierFrame& before) { return std::isfinite(before.before_s); });
-    if (!are_values_finite(sensors) || !finite_times)
+    if (!are_values_finite(sensors) || !are_times_valid(earlier))
       return make_fix_without_pose(FixStatus::not_finite, 0);
-    if (const auto fix = compute_body_fix(detections, sensors, earlier)) return *fix;
-    return compute_position_fix(detections, sensors);
+    FrameObservations frame;
+    FixStatus status = make_observations(detections, 0, sensors, frame);
+    const int unknown_lamps = frame.unknown_lamps;
+    frame.num_current = frame.size;
+    for (const EarlierFrame& before : earlier) {
+      if (status != FixStatus::ok || frame.num_current < 2) break;
+      status = make_observations(before.detections, -before.before_s, sensors, frame);
+    }
+    if (status != FixStatus::ok) return make_fix_without_pose(status, unknown_lamps);
+    if (frame.size == 0 || (frame.size == 1 && !sensors.height_and_yaw))
+      return make_fix_without_pose(FixStatus::too_few_lamps, unknown_lamps);
+    if (sensors.motion && may_camera_move_during_readout(*sensors.motion) && !row_clock_)
+      return make_fix_without_pose(FixStatus::row_time_unknown, unknown_lamps);
+    const BodyPrior prior = make_prior(sensors, frame.size == 1);
+    const BodyProblem problem{mount_.position_in_robot_m, prior};
+    BodySolution solution = estimate_body_state_robust(frame, problem, max_residual_fraction_);
+    if (solution.status == FixStatus::ok) reject_contradicting_lamps(frame, problem, solution);
+    if (solution.status != FixStatus::ok)
+      return make_fix_without_pose(solution.status, unknown_lamps);
+    Fix fix = make_consistent_fix(frame, problem, solution.fix,
+                                  has_body_estimate(sensors) && frame.num_current > 1);
+    fix.time_s = sensors.time_s;
+    fix.unknown_lamps = unknown_lamps;
+    return fix;
   }
 
   int num_lamps_moved_since_calibration() const {
@@ -251,11 +253,34 @@ class Positioner::Impl {
   }
 
  private:
-  /// Adds each detection of a lamp of the map to the frame: `add` takes it, its lamp, its ray and
-  /// its standard deviation, and fills the frame's sighting.
-  template <typename Frame, typename Add>
-  FixStatus match_detections_to_map(std::span<const Detection> detections, Frame& frame,
-                                    const Add& add) const {
+  /// Returns the prior of the state. A single lamp requires height and yaw of the camera.
+  BodyPrior make_prior(const Sensors& sensors, bool is_single_lamp) const {
+    const KnownMotion motion = sensors.motion.value_or(KnownMotion());
+    BodyPrior prior{.mean = {motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
+                             sensors.inclination.value_or(Inclination{0, 0})},
+                    .velocity_sd_m_per_s = motion.velocity_sd_m_per_s,
+                    .yaw_rate_sd_rad_per_s = motion.yaw_rate_sd_rad_per_s,
+                    .inclination_sd_rad = sensors.inclination_sigma_rad,
+                    .height = sensors.height};
+    if (is_single_lamp) {
+      const HeightAndYaw& known = *sensors.height_and_yaw;
+      prior.height = KnownHeight{known.z_m, known.z_sd_m};
+      prior.height_point_m = mount_.position_in_robot_m;
+      prior.yaw = KnownYaw{known.yaw_rad - mount_.yaw_in_robot_rad, known.yaw_sd_rad};
+    }
+    if (prior.height) prior.height->z_m -= origin_m_.z();
+    return prior;
+  }
+
+  /// Adds the detections of lamps of the map to the frame. `time_s` is the time of the detections.
+  FixStatus make_observations(std::span<const Detection> detections, double time_s,
+                              const Sensors& sensors, FrameObservations& frame) const {
+    // With known roll and pitch, detections without sigma_px have equal weights in the level plane.
+    std::optional<Eigen::Matrix3d> level_from_body;
+    if (sensors.inclination_sigma_rad == 0) {
+      level_from_body =
+          level_rotation_from_inclination(sensors.inclination.value_or(Inclination{0, 0}));
+    }
     const auto ids_begin = frame.ids.begin() + static_cast<std::ptrdiff_t>(frame.size);
     for (const Detection& detection : detections) {
       const auto lamp = std::ranges::lower_bound(lamps_, detection.lamp, {}, &Lamp::id);
@@ -271,13 +296,46 @@ class Positioner::Impl {
       if (!detection.pixel.allFinite() || !plausible) return FixStatus::not_finite;
       const auto ray = lens_.unproject_pixel(detection.pixel);
       if (!ray) return FixStatus::outside_lens;
-      const FixStatus added = add(detection, *lamp, *ray, sigma_px);
-      if (added != FixStatus::ok) return added;
-      if (!detection.sigma_px) frame.noise_is_stated = false;
+      const Eigen::Vector3d direction = body_from_camera_ * ray->direction;
+      const Eigen::Matrix<double, 3, 2> d_direction = body_from_camera_ * ray->d_direction_d_pixel;
+      const auto whitened =
+          compute_whitened_pixel_jacobian_wrt_ray(direction, d_direction, sigma_px);
+      if (!whitened) return FixStatus::outside_lens;
+      const double read_s =
+          row_clock_ ? row_clock_->compute_pixel_readout_time_s(detection.pixel) : 0;
+      frame.sightings[frame.size] = {lamp->position_m, direction.normalized(), *whitened, sigma_px,
+                                     time_s + read_s};
+      frame.noise[frame.size].setIdentity();
+      if (!detection.sigma_px) {
+        frame.noise_is_stated = false;
+        if (level_from_body &&
+            !weight_in_level_plane(*level_from_body, d_direction / direction.norm(), frame))
+          return FixStatus::lamp_below_camera;
+      }
       frame.nearest_m[frame.size] = nearest_m_[static_cast<std::size_t>(lamp - lamps_.begin())];
       frame.ids[frame.size++] = lamp->id;
     }
     return FixStatus::ok;
+  }
+
+  /// Weights the last observation as if the noise were equal in the undistorted image, the level
+  /// plane. `d_ray_d_pixel` is the derivative of a ray of unit length. Returns false if the lamp is
+  /// not above the horizon.
+  bool weight_in_level_plane(const Eigen::Matrix3d& level_from_body,
+                             const Eigen::Matrix<double, 3, 2>& d_ray_d_pixel,
+                             FrameObservations& frame) const {
+    LampObservation& seen = frame.sightings[frame.size];
+    const Eigen::Vector3d ray = level_from_body * seen.ray;
+    if (!(ray.z() > 0)) return false;
+    const LampObservation level = make_level_observation(
+        seen.lamp_m, ray.hnormalized(), lens_.focal_px().asDiagonal(), seen.sigma_px);
+    seen.whitened_pixel_from_ray = level.whitened_pixel_from_ray * level_from_body;
+    seen.depth_axis = level_from_body.transpose() * level.depth_axis;
+    const Eigen::Matrix2d d_residual_d_noise =
+        seen.sigma_px / ray.z() * seen.whitened_pixel_from_ray * d_ray_d_pixel;
+    frame.noise[frame.size] = d_residual_d_noise * d_residual_d_noise.transpose();
+    frame.is_weighted_by_noise = false;
+    return true;
   }
 
   std::size_t find_lamp_index_by_id(int id) const {
@@ -285,219 +343,168 @@ class Positioner::Impl {
                                     lamps_.begin());
   }
 
-  /// Rejects lamps by the reported uncertainties if all are known; otherwise estimate_pose_robust()
-  /// decides.
-  void reject_outlier_lamps(FrameObservations& frame, const Eigen::Matrix3d& level_from_base,
-                            ConsistentFix& solution) const {
+  /// Observations of a frame with the indices of their lamps in the map.
+  struct MapObservations {
+    std::array<std::size_t, max_lamps> lamps;
+    CommonErrors::Observations errors;
+
+    MapObservations(const FrameObservations& frame, const BodyProblem& problem, const Impl& impl)
+        : errors{frame.observations_span(),
+                 {lamps.data(), frame.size},
+                 impl.lens_,
+                 impl.body_from_base_,
+                 problem.arm_m} {
+      for (std::size_t i = 0; i < frame.size; ++i)
+        lamps[i] = impl.find_lamp_index_by_id(frame.ids[i]);
+    }
+  };
+
+  /// Rejects the lamps that noise and common errors do not explain.
+  void reject_contradicting_lamps(FrameObservations& frame, const BodyProblem& problem,
+                                  BodySolution& solution) const {
     constexpr std::size_t min_lamps = 4;  // fewer identify no outlier
-    if (solution.status != FixStatus::ok || frame.size < min_lamps) return;
+    const bool are_all_errors_known = common_.are_lens_zenith_and_lamp_errors_known();
+    const BodyFix& fix = solution.fix;
+    if (frame.num_current < frame.size || frame.size < min_lamps ||
+        !(are_all_errors_known || frame.noise_is_stated)) {
+      return;
+    }
     // If the noise alone explains the residuals, no other error is needed.
-    if (solution.fix.chi_squared <= static_cast<double>(2 * frame.size - 4)) return;
-    const LevelPose pose(solution.fix.pose);
+    if (fix.pixels_chi_squared <= compute_chi_squared_limit(fix.redundancy)) {
+      return;
+    }
     std::array<Matrix2, max_lamps> common;
-    for (std::size_t i = 0; i < frame.size; ++i) {
-      common[i] = common_.compute_observation_covariance(
-          common_.compute_observation_jacobians_wrt_errors(frame.sightings[i], pose, lens_,
-                                                           level_from_base),
-          find_lamp_index_by_id(frame.ids[i]));
-    }
-    const OutlierLamps wrong =
-        find_outlier_lamps(frame.observations_span(), {common.data(), frame.size}, solution.fix);
-    if (wrong.count == 0) return;
-    std::bitset<kMaxSightings> kept;
-    kept.set();
-    for (std::size_t i = 0; i < wrong.count; ++i) kept.reset(wrong.lamps[i]);
-    frame.keep_only_selected_observations(kept);
-    solution =
-        estimate_and_check_pose(frame.observations_span(), std::numeric_limits<double>::infinity());
+    const std::span<Matrix2> covariances(common.data(), frame.size);
+    compute_residual_covariances(frame, problem, fix, covariances);
+    const OutlierLamps outliers = find_outlier_lamps(frame.observations_span(), covariances,
+                                                     problem, fix, are_all_errors_known);
+    solution = reject_outlier_lamps(frame, outliers, problem, solution);
   }
 
-  /// Returns G C G'. Sets fix.common_chi_squared if PositionerOptions require it.
-  Matrix4 compute_common_covariance(const FrameObservations& frame,
-                                    const Eigen::Matrix3d& level_from_base, Fix& fix) const {
-    std::array<std::size_t, max_lamps> lamps;
-    for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_lamp_index_by_id(frame.ids[i]);
-    const std::span<const std::size_t> in_map(lamps.data(), frame.size);
-    const Matrix4 common =
-        common_.propagate_covariance_to_fix(common_.compute_gain_from_errors_to_fix(
-            frame.observations_span(), in_map, fix.estimate, lens_, level_from_base));
-    if (computes_common_chi_squared_ && fix.redundancy > 0) {
-      fix.common_chi_squared = common_.compute_expected_chi_squared_of_common_errors(
-          frame.observations_span(), in_map, fix.estimate, common, lens_, level_from_base);
-    }
+  void compute_residual_covariances(const FrameObservations& frame, const BodyProblem& problem,
+                                    const BodyFix& fix, std::span<Matrix2> covariances) const {
+    std::ranges::fill(covariances, Matrix2::Zero());
+    if (!common_.are_any_errors_known()) return;
+    common_.compute_residual_covariances(MapObservations(frame, problem, *this).errors, fix.state,
+                                         covariances);
+  }
+
+  /// Returns G C G', the covariance of the states from the common errors. Only that of the pose if
+  /// no other state is estimated.
+  BodyCovariance compute_common_covariance(const FrameObservations& frame,
+                                           const BodyProblem& problem, const BodyFix& fix) const {
+    BodyCovariance common = BodyCovariance::Zero();
+    if (!common_.are_any_errors_known()) return common;
+    const MapObservations observations(frame, problem, *this);
+    if (problem.prior.is_motion_or_tilt_estimated())
+      return common_.propagate_covariance_to_fix(
+          common_.compute_gain_from_errors_to_fix<kBodyStates>(observations.errors, fix));
+    common.topLeftCorner<4, 4>() = common_.propagate_covariance_to_fix(
+        common_.compute_gain_from_errors_to_fix<4>(observations.errors, fix));
     return common;
   }
 
-  BodyCovariance compute_common_covariance(const BodyObservations& frame,
-                                           const Eigen::Vector3d& arm_m, const BodyFix& solution,
-                                           Fix& fix) const {
-    std::array<std::size_t, max_lamps> lamps;
-    for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_lamp_index_by_id(frame.ids[i]);
-    const std::span<const std::size_t> in_map(lamps.data(), frame.size);
-    const BodyCovariance common =
-        common_.propagate_covariance_to_fix(common_.compute_gain_from_errors_to_fix(
-            frame.observations_span(), in_map, arm_m, solution, lens_, body_from_base_));
-    if (computes_common_chi_squared_ && fix.redundancy > 0) {
-      fix.common_chi_squared = common_.compute_expected_chi_squared_of_common_errors(
-          frame.observations_span(), in_map, arm_m, solution, common, lens_, body_from_base_);
-    }
-    return common;
-  }
-
-  FixStatus make_observations(std::span<const Detection> detections,
-                              const Eigen::Matrix3d& level_from_base,
-                              FrameObservations& frame) const {
-    const Eigen::Matrix3d level_from_camera = level_from_base * base_from_camera_;
-    const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
-                         double sigma_px) {
-      const Eigen::Vector3d direction = level_from_camera * ray.direction;
-      if (!(direction.z() > 0)) return FixStatus::lamp_below_camera;
-      const Eigen::Matrix<double, 3, 2> d_direction = level_from_camera * ray.d_direction_d_pixel;
-      const Eigen::Vector2d z = direction.head<2>() / direction.z();
-      const Eigen::Matrix2d d_z_d_pixel =
-          (d_direction.topRows<2>() - z * d_direction.row(2)) / direction.z();
-      frame.sightings[frame.size] = {lamp.position_m, z, lens_.focal_px().asDiagonal(), sigma_px};
-      if (detection.sigma_px) {
-        frame.sightings[frame.size].d_pixel_d_z = d_z_d_pixel.inverse();
+  /// Makes a fix whose covariance agrees with its residuals. If these contradict the noise, it
+  /// includes an unknown tilt or motion that explains them, or the noise is scaled until it does.
+  /// Chi-squared stays that of the stated noise.
+  Fix make_consistent_fix(FrameObservations& frame, const BodyProblem& problem,
+                          const BodyFix& solution, bool has_body) const {
+    Fix fix = make_fix(frame, problem, solution, BodyCovariance::Zero(), has_body);
+    // Noise that is not stated is no contradiction.
+    const double scale = frame.noise_is_stated ? estimate_noise_scale_of_contradiction(fix) : 1;
+    if (scale > 1) {
+      if (const auto covariance = find_covariance_with_tilt_or_motion(frame, problem, solution)) {
+        fix = make_fix(frame, problem, solution, *covariance - solution.covariance, has_body);
       } else {
-        frame.is_weighed_by_noise = false;
+        fix = make_fix_with_scaled_noise(frame, problem, solution, scale, has_body);
       }
-      return FixStatus::ok;
-    };
-    return match_detections_to_map(detections, frame, add);
-  }
-
-  FixStatus make_body_observations(std::span<const Detection> detections, double time_s,
-                                   BodyObservations& frame) const {
-    const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
-                         double sigma_px) {
-      const Eigen::Vector3d direction = body_from_camera_ * ray.direction;
-      const auto whitened = compute_whitened_pixel_jacobian_wrt_ray(
-          direction, body_from_camera_ * ray.d_direction_d_pixel, sigma_px);
-      if (!whitened) return FixStatus::outside_lens;
-      const double read_s =
-          row_clock_ ? row_clock_->compute_pixel_readout_time_s(detection.pixel) : 0;
-      frame.sightings[frame.size] = {lamp.position_m, direction.normalized(), *whitened, sigma_px,
-                                     time_s + read_s};
-      return FixStatus::ok;
-    };
-    return match_detections_to_map(detections, frame, add);
-  }
-
-  /// Returns std::nullopt if the frame has fewer than two lamps of the map.
-  std::optional<Fix> compute_body_fix(std::span<const Detection> detections, const Sensors& sensors,
-                                      std::span<const EarlierFrame> earlier) const {
-    const KnownMotion motion = sensors.motion.value_or(KnownMotion());
-    if (may_camera_move_during_readout(motion) && !row_clock_)
-      return make_fix_without_pose(FixStatus::row_time_unknown, 0);
-    BodyPrior prior{{motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
-                     sensors.inclination.value_or(Inclination{0, 0})},
-                    motion.velocity_sd_m_per_s,
-                    motion.yaw_rate_sd_rad_per_s,
-                    sensors.inclination_sigma_rad,
-                    sensors.height};
-    if (prior.height) prior.height->z_m -= origin_m_.z();
-    Fix fix;
-    BodyObservations frame;
-    const FixStatus seen = make_body_observations(detections, 0, frame);
-    fix.unknown_lamps = frame.unknown_lamps;
-    if (seen != FixStatus::ok) return make_fix_without_pose(seen, fix.unknown_lamps);
-    frame.num_current = frame.size;
-    for (const EarlierFrame& before : earlier) {
-      const FixStatus status = make_body_observations(before.detections, -before.before_s, frame);
-      if (status != FixStatus::ok) return make_fix_without_pose(status, fix.unknown_lamps);
     }
-    if (frame.num_current < 2) return std::nullopt;
-    // If common errors are known, the noise alone must not reject lamps.
-    if (common_.are_lens_zenith_and_lamp_errors_known()) frame.noise_is_stated = false;
-    const Eigen::Vector3d& arm_m = mount_.position_in_robot_m;
-    const auto [status, solution] =
-        estimate_body_state_robust(frame, arm_m, prior, max_residual_fraction_);
-    if (status != FixStatus::ok) return make_fix_without_pose(status, fix.unknown_lamps);
-    fix.status = status;
-    fix.redundancy = solution.redundancy;
+    if (!computes_common_chi_squared_) fix.common_chi_squared = 0;
+    return fix;
+  }
+
+  Fix make_fix_with_scaled_noise(FrameObservations& frame, const BodyProblem& problem,
+                                 const BodyFix& solution, double scale, bool has_body) const {
+    for (std::size_t i = 0; i < frame.size; ++i) {
+      frame.sightings[i].whitened_pixel_from_ray /= scale;
+      frame.sightings[i].sigma_px *= scale;
+    }
+    const auto again = estimate_body_state(frame.observations_span(), problem, solution.state);
+    if (!again) return make_fix_without_pose(FixStatus::inconsistent, 0);
+    Fix fix = make_fix(frame, problem, *again, BodyCovariance::Zero(), has_body);
+    fix.chi_squared *= scale * scale;
+    fix.common_chi_squared *= scale * scale;
+    return fix;
+  }
+
+  /// Returns the covariance of a state if roll and pitch that were assumed to be exact, or the
+  /// motion, are unknown instead: that of the state estimated with them, plus the square of the
+  /// difference. Returns std::nullopt if neither explains the residuals.
+  std::optional<BodyCovariance> find_covariance_with_tilt_or_motion(const FrameObservations& frame,
+                                                                    const BodyProblem& problem,
+                                                                    const BodyFix& fix) const {
+    constexpr double tilt_sd_rad = 0.15, speed_sd_m_per_s = 1.5, yaw_rate_sd_rad_per_s = 1;
+    const BodyPrior& known = problem.prior;
+    BodyPrior tilted = known, moving = known;
+    tilted.inclination_sd_rad = tilt_sd_rad;
+    moving.velocity_sd_m_per_s = speed_sd_m_per_s;
+    moving.yaw_rate_sd_rad_per_s = yaw_rate_sd_rad_per_s;
+    std::optional<BodyCovariance> found;
+    const auto add = [&](const BodyPrior& prior) {
+      const auto other =
+          estimate_body_state(frame.observations_span(), {problem.arm_m, prior}, fix.state);
+      if (!other || other->pixels_chi_squared > compute_chi_squared_limit(other->redundancy))
+        return;
+      const Eigen::Matrix<double, kBodyStates, 1> difference =
+          compute_state_difference(other->state, fix.state);
+      const BodyCovariance covariance =
+          other->covariance + BodyCovariance(difference * difference.transpose());
+      found = found ? BodyCovariance(*found + covariance) : covariance;
+    };
+    if (known.inclination_sd_rad == 0) add(tilted);
+    if (!known.is_motion_estimated() && row_clock_) add(moving);
+    if (!found) return found;
+    // States given as exact remain so in the result.
+    for (int i = 0; i < kBodyStates; ++i) {
+      if (fix.covariance(i, i) > 0) continue;
+      found->row(i).setZero();
+      found->col(i).setZero();
+    }
+    return found;
+  }
+
+  /// `excess` is added to the covariance as an error that is not noise.
+  Fix make_fix(const FrameObservations& frame, const BodyProblem& problem, BodyFix solution,
+               const BodyCovariance& excess, bool has_body) const {
+    const BodyCovariance common = compute_common_covariance(frame, problem, solution);
+    Fix fix;
+    fix.status = FixStatus::ok;
+    const bool is_contradiction = solution.pixels_chi_squared > solution.redundancy;
+    if ((computes_common_chi_squared_ || is_contradiction) && common_.are_any_errors_known() &&
+        solution.redundancy > kMinRedundancy) {
+      std::array<Matrix2, max_lamps> covariances;
+      compute_residual_covariances(frame, problem, solution, {covariances.data(), frame.size});
+      fix.common_chi_squared = compute_expected_chi_squared_of_common_errors(
+          MapObservations(frame, problem, *this).errors, {covariances.data(), frame.size}, solution,
+          common);
+    }
+    if (!frame.is_weighted_by_noise) convert_covariance_to_image_noise(frame, problem, solution);
+    fix.redundancy = solution.redundancy > kMinRedundancy ? solution.redundancy : 0;
     fix.chi_squared = solution.pixels_chi_squared;
-    fix.body = rotate_estimate_to_world(solution,
-                                        common_.are_any_errors_known()
-                                            ? compute_common_covariance(frame, arm_m, solution, fix)
-                                            : BodyCovariance(BodyCovariance::Zero()));
-    fix.noise_covariance = fix.body->noise_covariance.topLeftCorner<4, 4>();
-    fix.estimate = {solution.state.pose, fix.body->covariance.topLeftCorner<4, 4>()};
+    fix.noise_covariance = solution.covariance.topLeftCorner<4, 4>();
+    if (frame.size == 1) {
+      fix.noise_covariance.topLeftCorner<2, 2>() +=
+          compute_second_order_covariance_of_one_lamp(frame.sightings[0], problem, solution);
+    }
+    fix.estimate = {solution.state.pose,
+                    fix.noise_covariance + (common + excess).topLeftCorner<4, 4>()};
+    if (has_body) fix.body = rotate_estimate_to_world(solution, common + excess);
     fix.estimate.pose.position_m += origin_m_;
     fix.residual_px = solution.residual_px;
     fix.lamps = static_cast<int>(frame.num_current);
     fix.sightings = static_cast<int>(frame.size);
     set_rejected_lamps(frame, fix);
-    fix.time_s = sensors.time_s;
     return fix;
-  }
-
-  /// Replaces covariance and redundancy for equal noise in the undistorted image, by which the fix
-  /// weighs its sightings, by those for equal noise in the image:
-  ///   A = N^-1 J' W,   cov = A V A',   redundancy = tr(W V) - tr(N cov),   N = J' W J.
-  void convert_covariance_to_image_noise(const FrameObservations& frame,
-                                         const Eigen::Matrix3d& level_from_base, Fix& fix) const {
-    const LevelPose pose(fix.estimate.pose);
-    const Eigen::Matrix3d camera_from_level = (level_from_base * base_from_camera_).transpose();
-    const Matrix4 by_weights = fix.estimate.covariance;
-    Matrix4 covariance = Matrix4::Zero();
-    double expected_squares = 0;
-    for (const Sighting& sighting : frame.observations_span()) {
-      const auto seen =
-          lens_.project_point_with_jacobians(camera_from_level * sighting.z.homogeneous());
-      Eigen::Matrix2d d_pixel_d_z = sighting.d_pixel_d_z;
-      if (seen) d_pixel_d_z = seen->d_pixel_d_point * camera_from_level.leftCols<2>();
-      const Eigen::Matrix2d z_by_noise = sighting.sigma_px * d_pixel_d_z.inverse();
-      const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
-      const Eigen::Matrix2d residual_by_noise = whitening * z_by_noise;
-      const Eigen::Matrix<double, 4, 2> fix_by_noise =
-          by_weights * project_lamp_with_jacobian(pose, sighting.lamp_m).d_z_d_state.transpose() *
-          whitening.transpose() * residual_by_noise;
-      covariance += fix_by_noise * fix_by_noise.transpose();
-      expected_squares += residual_by_noise.squaredNorm();
-    }
-    if (fix.redundancy > 0) {
-      fix.redundancy = expected_squares - (by_weights.inverse() * covariance).trace();
-    }
-    fix.estimate.covariance = covariance;
-  }
-
-  /// Adds the covariances of a fix of lamps, and transfers it to the robot if there is a mount.
-  void add_covariances(const FrameObservations& frame, const InclinationRotation& lean,
-                       const InclinationJacobian& d_pose_d_inclination, const Sensors& sensors,
-                       const Matrix4& height_and_yaw_covariance, Fix& fix) const {
-    const double sigma_rad = sensors.inclination_sigma_rad;
-    const Matrix4 common = common_.are_any_errors_known()
-                               ? compute_common_covariance(frame, lean.level_from_base, fix)
-                               : Matrix4(Matrix4::Zero());
-    if (!frame.is_weighed_by_noise)
-      convert_covariance_to_image_noise(frame, lean.level_from_base, fix);
-    fix.estimate.covariance += height_and_yaw_covariance;
-    // The error of the inclination is independent between frames, too.
-    PoseEstimate whole = fix.estimate;
-    whole.covariance += common;
-    fix.noise_covariance = compute_robot_pose_from_camera_pose(fix.estimate, d_pose_d_inclination,
-                                                               sigma_rad, mount_, lean)
-                               .covariance;
-    fix.estimate =
-        compute_robot_pose_from_camera_pose(whole, d_pose_d_inclination, sigma_rad, mount_, lean);
-  }
-
-  /// Returns the motion of the camera when a lamp is read, or std::nullopt if it moves and the row
-  /// time is not known.
-  std::optional<MotionAtReadout> motion_at_readout(std::span<const Detection> detections, int lamp,
-                                                   const Sensors& sensors) const {
-    MotionAtReadout readout;
-    if (!sensors.motion || !may_camera_move_during_readout(*sensors.motion)) return readout;
-    if (!row_clock_) return std::nullopt;
-    const auto detection = std::find_if(detections.begin(), detections.end(),
-                                        [&](const Detection& one) { return one.lamp == lamp; });
-    readout.motion = *sensors.motion;
-    readout.time_s = row_clock_->compute_pixel_readout_time_s(detection->pixel);
-    const Eigen::Rotation2Dd camera_from_robot(-mount_.yaw_in_robot_rad);
-    readout.motion.velocity_m_per_s = camera_from_robot * sensors.motion->velocity_m_per_s;
-    readout.arm_m = camera_from_robot * mount_.position_in_robot_m.head<2>();
-    return readout;
   }
 
   /// If true, all other members and the methods refer to the rotated world (lamps_below.h).
@@ -526,7 +533,8 @@ Positioner::Positioner(const LampMap& map, const Calibration& calibration,
 Fix Positioner::compute_position_fix(std::span<const Detection> detections,
                                      const Sensors& sensors) const noexcept {
   const bool below = impl_->are_lamps_below_camera();
-  return turn_over_if(below, impl_->compute_position_fix(detections, turn_over_if(below, sensors)));
+  return turn_over_if(below,
+                      impl_->compute_position_fix(detections, turn_over_if(below, sensors), {}));
 }
 
 Fix Positioner::compute_position_fix(std::span<const Detection> detections, const Sensors& sensors,

@@ -30,16 +30,16 @@ struct PositionerOptions {
   /// Pose of the camera on the robot. With a mount, fixes are of the robot's center and yaw;
   /// without one (std::nullopt), of the camera.
   std::optional<CameraMount> mount;
-  /// Residual limit as a fraction of the RMS radius of all lamps in the image. Lamps are
+  /// Residual limit as a fraction of the RMS radius of all lamps. Lamps are
   /// inconsistent if the residual of one exceeds it, or if it is too close to another lamp
-  /// (estimate_pose_robust). Noise, lens and an uncorrected tilt of 5 degrees cause residuals of
-  /// 0.05 or less.
+  /// (estimate_body_state_robust). Noise, lens and an uncorrected tilt of 5 degrees cause residuals
+  /// of 0.05 or less.
   double max_residual_fraction = 0.1;
   /// Standard deviation per axis, in the image, of detections without sigma_px. It scales the
   /// covariance and decides if lamps close together are `degenerate`. Poses do not depend on it,
   /// unless motion, inclination or height is known with a standard deviation.
   ///
-  /// If the camera is at rest, such lamps have equal weights in the undistorted image, as in the
+  /// If roll and pitch are known, such lamps have equal weights in the undistorted image, as in the
   /// closed forms. Errors of lens, tilt and map affect these weights less than weights in the
   /// distorted image.
   double unstated_sigma_px = 1;
@@ -71,7 +71,7 @@ struct Sensors {
   /// the camera corrected for its calibrated tilt. Level if std::nullopt.
   std::optional<Inclination> inclination;
   /// Standard deviation of each angle of the inclination, or, without a sensor, of roll and pitch
-  /// about level. If positive, roll and pitch are estimated with the pose, given two lamps or more.
+  /// about level. If positive, roll and pitch are estimated with the pose.
   /// 0: exact. 1 or more: unknown.
   double inclination_sigma_rad = 0;
   /// Height and yaw of the camera. Allows a fix of a single lamp; not used with two lamps or more.
@@ -88,7 +88,7 @@ struct Sensors {
 /// assumed to be the same.
 struct EarlierFrame {
   std::span<const Detection> detections;
-  /// Time from the earlier frame to the frame of the fix.
+  /// Time from the earlier frame to the frame of the fix. Positive, and different for each frame.
   double before_s;
 };
 
@@ -107,15 +107,9 @@ class Positioner {
 
   /// Computes the fix of one frame. Neither allocates memory nor throws.
   ///
-  /// Methods, by the number of lamps:
-  ///   one   compute_pose_at_known_height_and_yaw()
-  ///   two   closed form
-  ///   more  estimate_pose_least_squares() from compute_initial_pose(), without outliers
-  ///   (estimate_pose_robust)
-  /// With two lamps or more estimate_body_state_robust() is used instead if the sensors leave
-  /// motion or inclination free, or give a height. If the covariances of calibration or survey
-  /// cover every lamp, lamps that contradict all uncertainties together are rejected, too
-  /// (find_outlier_lamps).
+  /// Least squares over the pixels and the known states (estimate_body_state_robust()), from
+  /// initial values in closed form. One lamp requires height and yaw. Lamps that contradict the
+  /// others are rejected (find_outlier_lamps()).
   Fix compute_position_fix(std::span<const Detection> detections,
                            const Sensors& sensors = {}) const noexcept;
   /// Computes the fix of one frame together with frames from shortly before. Velocity, yaw rate,

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <vector>
 
+#include "geometry/statistical_bounds.h"
 #include "rig/detection.h"
 
 namespace vlp {
@@ -63,6 +64,16 @@ double estimate_birge_ratio(const ResidualSums& sums) {
   if (sums.degrees_of_freedom < min_degrees_of_freedom) return 1;
   const double noise_chi_squared = sums.chi_squared - 2 * sums.common_chi_squared;
   return std::sqrt(std::max(1.0, noise_chi_squared / sums.degrees_of_freedom));
+}
+
+double compute_chi_squared_limit(double degrees_of_freedom) {
+  return compute_chi_squared_bound(kSigmasOfOneInTenThousand, std::max(1.0, degrees_of_freedom));
+}
+
+double estimate_noise_scale_of_contradiction(const Fix& fix) {
+  const double noise_chi_squared = fix.chi_squared - 2 * fix.common_chi_squared;
+  if (noise_chi_squared <= compute_chi_squared_limit(fix.redundancy)) return 1;
+  return std::sqrt(noise_chi_squared / std::max(1.0, fix.redundancy));
 }
 
 }  // namespace vlp

@@ -46,4 +46,11 @@ std::optional<double> estimate_noise_scale_factor(const ResidualSums& sums);
 /// @pre the fixes were computed with PositionerOptions::computes_common_chi_squared
 double estimate_birge_ratio(const ResidualSums& sums);
 
+/// Returns the 1e-4 bound of chi-squared; that of one degree of freedom for fewer.
+double compute_chi_squared_limit(double degrees_of_freedom);
+
+/// Estimates the factor by which the noise of one fix is too small, as estimate_birge_ratio(), if
+/// its residuals contradict the noise: if chi-squared exceeds its 1e-4 bound. Otherwise returns 1.
+double estimate_noise_scale_of_contradiction(const Fix& fix);
+
 }  // namespace vlp

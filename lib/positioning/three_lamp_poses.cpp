@@ -88,8 +88,11 @@ Cones make_cones(const std::array<Eigen::Vector3d, 3>& points_m,
   return cones;
 }
 
-/// Refines the distances by Newton steps on the three equations.
+/// Refines the distances by Newton steps on the three equations. Keeps them if these lead far away,
+/// as near two solutions that have just vanished.
 void refine_distances_by_newton(const Cones& cones, Eigen::Vector3d& distances) {
+  constexpr double max_change = 0.1;
+  const Eigen::Vector3d start = distances;
   for (int i = 0; i < 3; ++i) {
     Eigen::Matrix3d jacobian;
     const Eigen::Vector3d d01 = cones.m01 * distances, d02 = cones.m02 * distances,
@@ -98,8 +101,11 @@ void refine_distances_by_newton(const Cones& cones, Eigen::Vector3d& distances) 
     const Eigen::Vector3d residual(distances.dot(d01) - cones.a01, distances.dot(d02) - cones.a02,
                                    distances.dot(d12) - cones.a12);
     const Eigen::Vector3d step = 0.5 * (jacobian.inverse() * residual);
-    if (!step.allFinite()) return;
     distances -= step;
+    if (!((distances - start).norm() <= max_change * start.norm())) {
+      distances = start;
+      return;
+    }
     if (step.norm() <= 1e-9 * distances.norm()) return;  // the error is the square of the step
   }
 }
@@ -145,8 +151,8 @@ ThreeLampPoses compute_poses_from_three_lamps(const std::array<Eigen::Vector3d, 
                  fab = evaluate_bilinear_form(second, a, b),
                  fbb = evaluate_bilinear_form(second, b, b);
     const double discriminant = fab * fab - faa * fbb;
-    // Noise may remove two nearly equal solutions; the point between them is close to both.
-    constexpr double near = 1e-2;
+    // Noise may remove two solutions; the point between them is an initial value close to both.
+    constexpr double near = 0.5;
     if (!(discriminant >= -near * fab * fab)) continue;
     const double root = std::sqrt(std::max(0.0, discriminant));
     const double q = -(fab + std::copysign(root, fab));
@@ -169,6 +175,7 @@ ThreeLampPoses compute_poses_from_three_lamps(const std::array<Eigen::Vector3d, 
       FreePose pose;
       pose.camera_from_world = seen_frame * world_frame.transpose();
       pose.position_m = points_m[0] - pose.camera_from_world.transpose() * seen[0];
+      pose.is_exact = discriminant >= 0;
       if (!pose.position_m.allFinite()) continue;
       found.poses[static_cast<std::size_t>(found.count++)] = pose;
     }

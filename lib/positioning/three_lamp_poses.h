@@ -11,6 +11,8 @@ namespace vlp {
 struct FreePose {
   Eigen::Matrix3d camera_from_world;
   Eigen::Vector3d position_m;
+  /// False for the point between two solutions that have just vanished.
+  bool is_exact = true;
 };
 
 /// Poses of a camera with any rotation that explain three lamps: `count` of them, 0 to 4, at the
@@ -27,9 +29,9 @@ struct ThreeLampPoses {
 /// d_1 : d_2 : d_3. One root of a cubic gives a degenerate conic, a pair of lines. On these lines
 /// the points are the roots of quadratics.
 ///
-/// Exact to rounding if the solutions are separate. If two solutions have just vanished, returns
-/// the point between them, which fits the rays only approximately. Returns none for collinear
-/// points. Source: Haralick et al., "Review and Analysis of Solutions of the Three Point
+/// Exact to rounding if the solutions are separate. If two solutions have just vanished, as by
+/// noise, returns the point between them, which fits the rays only approximately. Returns none for
+/// collinear points. Source: Haralick et al., "Review and Analysis of Solutions of the Three Point
 /// Perspective Pose Estimation Problem", 1994, compares this and other methods.
 ThreeLampPoses compute_poses_from_three_lamps(const std::array<Eigen::Vector3d, 3>& points_m,
                                               const std::array<Eigen::Vector3d, 3>& rays);

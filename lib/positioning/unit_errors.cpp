@@ -6,7 +6,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 
-#include "geometry/symmetric.h"
 #include "positioning/correction.h"
 #include "positioning/error_budget.h"
 
@@ -53,36 +52,6 @@ std::vector<std::size_t> UnitErrors::find_fully_visible_lamp_indices(const Pose&
 }
 
 std::optional<UnitBudget> UnitErrors::compute_unit_fix_error_budget(
-    const Pose& level, std::span<const std::size_t> lamps, double noise_px) const {
-  if (lamps.size() < 2 || lamps.size() > kMaxSightings) return std::nullopt;
-  const LevelPose pose(level);
-  std::vector<Sighting> sightings;
-  Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
-  for (const std::size_t lamp : lamps) {
-    const Eigen::Vector3d& lamp_m = map_.lamps[lamp].position_m;
-    if (!(lamp_height_above_camera_m(pose, lamp_m) > 0)) return std::nullopt;
-    const Prediction seen = project_lamp_with_jacobian(pose, lamp_m);
-    const auto projection =
-        lens_.project_point_with_jacobians(camera_from_level_ * seen.z.homogeneous());
-    if (!projection) return std::nullopt;
-    const Eigen::Matrix2d d_pixel_d_z =
-        projection->d_pixel_d_point * camera_from_level_.leftCols<2>();
-    sightings.push_back({lamp_m, seen.z, d_pixel_d_z, noise_px});
-    const Eigen::Matrix<double, 2, 4> by_state = d_pixel_d_z * seen.d_z_d_state / noise_px;
-    information += by_state.transpose() * by_state;
-  }
-  const auto noise = invert_positive_definite_matrix(information);
-  if (!noise) return std::nullopt;
-  const CommonErrors::Gain gain = whole_.compute_gain_from_errors_to_fix(
-      sightings, lamps, {level, *noise}, lens_, Eigen::Matrix3d::Identity());
-  const auto part = [&](CommonErrorSource of) {
-    return parts_[static_cast<std::size_t>(of)].propagate_covariance_to_fix(gain);
-  };
-  return UnitBudget{*noise, part(CommonErrorSource::lens), part(CommonErrorSource::zenith),
-                    part(CommonErrorSource::offset), part(CommonErrorSource::lamps)};
-}
-
-std::optional<UnitBudget> UnitErrors::compute_unit_fix_error_budget(
     const Pose& level, std::span<const std::size_t> lamps, double noise_px,
     const BodyPrior& prior) const {
   std::vector<Eigen::Vector3d> lamps_m;
@@ -91,13 +60,12 @@ std::optional<UnitBudget> UnitErrors::compute_unit_fix_error_budget(
   const auto limit = compute_pose_crlb(lamps_m, lens_, camera_from_level_, level, noise_px, prior,
                                        make_readout_clock(camera_));
   if (!limit) return std::nullopt;
-  const CommonErrors::BodyGain gain = whole_.compute_gain_from_errors_to_fix(
-      limit->frame.observations_span(), lamps, Eigen::Vector3d::Zero(), limit->fix, lens_,
-      Eigen::Matrix3d::Identity());
+  const Eigen::Matrix3d body_from_base = Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d no_arm_m = Eigen::Vector3d::Zero();
+  const auto gain = whole_.compute_gain_from_errors_to_fix<4>(
+      {limit->frame.observations_span(), lamps, lens_, body_from_base, no_arm_m}, limit->fix);
   const auto part = [&](CommonErrorSource of) {
-    return Matrix4(parts_[static_cast<std::size_t>(of)]
-                       .propagate_covariance_to_fix(gain)
-                       .topLeftCorner<4, 4>());
+    return parts_[static_cast<std::size_t>(of)].propagate_covariance_to_fix(gain);
   };
   return UnitBudget{limit->noise,
                     part(CommonErrorSource::lens),

@@ -58,19 +58,15 @@ class UnitErrors {
   /// rim if the diameter is known, in the image.
   std::vector<std::size_t> find_fully_visible_lamp_indices(const Pose& level) const;
 
-  /// Computes the budget of a fix from these lamps, with noise `noise_px` per axis. Agrees with the
-  /// covariance of Positioner::compute_position_fix(). Returns std::nullopt for fewer than two
-  /// lamps or more than kMaxSightings. Also returns it for lamps that the lens does not image or
-  /// that do not determine a fix.
-  std::optional<UnitBudget> compute_unit_fix_error_budget(const Pose& level,
-                                                          std::span<const std::size_t> lamps,
-                                                          double noise_px) const;
-  /// Computes the budget of a camera that may move and be tilted, as compute_fix_error_budget().
+  /// Computes the budget of a fix from these lamps, with noise `noise_px` per axis. The camera may
+  /// move and be tilted as in compute_fix_error_budget(). Agrees with the covariance of
+  /// Positioner::compute_position_fix(). Returns std::nullopt as compute_pose_crlb(), and for more
+  /// than kMaxSightings lamps.
   /// @pre the calibration has row time and readout direction if the prior leaves the motion free
   std::optional<UnitBudget> compute_unit_fix_error_budget(const Pose& level,
                                                           std::span<const std::size_t> lamps,
                                                           double noise_px,
-                                                          const BodyPrior& prior) const;
+                                                          const BodyPrior& prior = {}) const;
 
  private:
   LampMap map_;

@@ -89,8 +89,8 @@ typedef struct vlp_sensors {
   int32_t has_inclination;
   double roll_rad, pitch_rad;
   /* Standard deviation of roll_rad and pitch_rad, or, without a sensor, of roll and pitch about
-   * level. If positive, roll and pitch are estimated from two lamps or more. 0: exact. 1 or more:
-   * unknown. */
+   * level. If positive, roll and pitch are estimated with the pose. 0: exact. 1 or more: unknown.
+   */
   double inclination_sigma_rad;
   /* Height and yaw of the camera and their standard deviations (0: exact), for fixes of one lamp.
    */
@@ -111,7 +111,7 @@ typedef struct vlp_sensors {
 typedef struct vlp_earlier_frame {
   const vlp_detection* detections;
   size_t count;
-  /* Time from this frame to that of the fix. */
+  /* Time from this frame to that of the fix. Positive, and different for each frame. */
   double before_s;
 } vlp_earlier_frame;
 

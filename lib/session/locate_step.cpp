@@ -97,6 +97,7 @@ class EarlierFrames {
       const double before_s = *time_s - at->first;
       constexpr double tolerance_s = 1e-6;
       if (before_s > kMaxJointInterval_s + tolerance_s) break;
+      if (!earlier.empty() && before_s == earlier.back().before_s) continue;
       earlier.push_back({input_.frames[at->second].detections, before_s});
     }
     return earlier;

@@ -74,8 +74,8 @@ std::vector<AssignedLight> assigned_lights(const GroupedLights& image,
 }
 
 /// Makes the frame of the assigned lights, and removes those without a ray from `assigned`.
-BodyObservations make_frame(const GroupedLights& image, std::vector<AssignedLight>& assigned,
-                            const LampMap& lamps, const Lens& lens, double sd_fraction) {
+FrameObservations make_frame(const GroupedLights& image, std::vector<AssignedLight>& assigned,
+                             const LampMap& lamps, const Lens& lens, double sd_fraction) {
   std::vector<Eigen::Vector2d> pixels;
   std::vector<Eigen::Vector3d> positions_m;
   pixels.reserve(image.lights.size());
@@ -83,7 +83,7 @@ BodyObservations make_frame(const GroupedLights& image, std::vector<AssignedLigh
   for (const GroupedLight& light : image.lights) pixels.push_back(light.pixel);
   for (const AssignedLight& light : assigned) positions_m.push_back(light.lamp->position_m);
   const double spread_px = compute_rms_spread(pixels), spread_m = compute_rms_spread(positions_m);
-  BodyObservations frame;
+  FrameObservations frame;
   std::vector<AssignedLight> kept;
   for (const AssignedLight& light : assigned) {
     const auto& [group, pixel, sigma_px] = image.lights[light.index];
@@ -95,15 +95,11 @@ BodyObservations make_frame(const GroupedLights& image, std::vector<AssignedLigh
     const auto whitened =
         compute_whitened_pixel_jacobian_wrt_ray(ray->direction, ray->d_direction_d_pixel, sd_px);
     if (!whitened) continue;
-    frame.sightings[frame.size] = {lamp.position_m, ray->direction.normalized(), *whitened, sd_px,
-                                   0};
-    frame.ids[frame.size] = lamp.id;
-    frame.nearest_m[frame.size++] = distance_to_nearest_lamp_m(lamp, lamps);
+    frame.add_current({lamp.position_m, ray->direction.normalized(), *whitened, sd_px, 0}, lamp.id,
+                      distance_to_nearest_lamp_m(lamp, lamps));
     kept.push_back(light);
   }
   assigned = std::move(kept);
-  frame.num_current = frame.size;
-  frame.noise_is_stated = false;
   return frame;
 }
 
@@ -120,20 +116,21 @@ std::vector<double> compute_squared_residuals_of_lights(const GroupedLights& ima
   std::vector<double> squares(image.lights.size(), kMaxSquare);
   std::vector<AssignedLight> assigned = assigned_lights(image, candidate, lamps);
   if (assigned.size() < kMinLights || assigned.size() > kMaxSightings) return squares;
-  const BodyObservations frame = make_frame(image, assigned, lamps, lens, tolerance.sd_fraction);
+  const FrameObservations frame = make_frame(image, assigned, lamps, lens, tolerance.sd_fraction);
   if (frame.size < kMinLights) return squares;
   BodyPrior prior;
   prior.inclination_sd_rad = kLeanSd_rad;
-  BodyObservations agreeing = frame;
-  const auto [status, fix] = estimate_body_state_robust(agreeing, Eigen::Vector3d::Zero(), prior,
-                                                        tolerance.max_residual_fraction);
+  FrameObservations agreeing = frame;
+  const Eigen::Vector3d no_arm_m = Eigen::Vector3d::Zero();
+  const auto [status, fix] =
+      estimate_body_state_robust(agreeing, {no_arm_m, prior}, tolerance.max_residual_fraction);
   if (!has_pose(status) || agreeing.size < std::min(frame.size, kMinMajority)) return squares;
   const auto& [roll_rad, pitch_rad] = fix.state.motion.inclination;
   const double lean_square = (roll_rad * roll_rad + pitch_rad * pitch_rad) /
                              (kLeanSd_rad * kLeanSd_rad) / static_cast<double>(agreeing.size);
   const EvaluatedState body(fix.state);
   for (std::size_t i = 0; i < frame.size; ++i) {
-    const BodyObservation& seen = frame.sightings[i];
+    const LampObservation& seen = frame.sightings[i];
     const Eigen::Vector3d lamp_in_body = body.lamp_position_in_body(seen.lamp_m, 0);
     const double depth_m = seen.ray.dot(lamp_in_body);
     if (!(depth_m > 0)) continue;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <tuple>
 #include <utility>
 
 #include "positioning/body_solution.h"
@@ -63,10 +64,9 @@ TEST(ComputeInitialBodyStatesFromThreeLamps, ReturnsReasonWithoutState) {
   const Eigen::Vector3d no_arm_m = Eigen::Vector3d::Zero();
   const BodyPrior prior;
   const auto find_status = [&](const std::array<Eigen::Vector3d, 3>& lamps_m) {
-    BodyObservations frame;
+    FrameObservations frame;
     for (const Eigen::Vector3d& lamp_m : lamps_m) {
-      frame.sightings[frame.size].lamp_m = lamp_m;
-      frame.sightings[frame.size++].ray = lamp_m.normalized();
+      frame.add_current({lamp_m, lamp_m.normalized(), {}, 1, 0}, 0, 1);
     }
     const InitialStates initial_states =
         compute_initial_body_states_from_three_lamps(frame, {0, 1, 2}, {no_arm_m, prior});
@@ -81,15 +81,20 @@ TEST(ComputeInitialBodyStatesFromThreeLamps, ReturnsReasonWithoutState) {
             FixStatus::lamp_below_camera);
 }
 
-TEST(IsBodyPositionDetermined, RequiresSdBelowQuarterOfMeanDistanceToLamps) {
-  BodyObservations frame;
-  frame.size = 2;
-  frame.sightings[0].lamp_m = {0, 0, 1};
-  frame.sightings[1].lamp_m = {0, 3, 0};
+TEST(IsBodyPositionDetermined, LimitsSdByMeanDistanceToLamps) {
+  FrameObservations frame;
+  frame.add_current({{0, 0, 1}, {}, {}, 1, 0}, 1, 1);
+  frame.add_current({{0, 3, 0}, {}, {}, 1, 0}, 2, 1);
   BodyFix fix;
-  for (const auto& [sd_m, determined] : {std::pair(0.49, true), {0.51, false}}) {
+  BodyPrior at_rest, moving;
+  moving.velocity_sd_m_per_s = 1;
+  for (const auto& [sd_m, determined, determined_if_moving] : {std::tuple(0.49, true, true),
+                                                               {0.51, true, false},
+                                                               {1.99, true, false},
+                                                               {2.01, false, false}}) {
     fix.covariance(1, 1) = sd_m * sd_m;
-    EXPECT_EQ(is_body_position_determined(frame, fix), determined) << sd_m;
+    EXPECT_EQ(is_body_position_determined(frame, at_rest, fix), determined) << sd_m;
+    EXPECT_EQ(is_body_position_determined(frame, moving, fix), determined_if_moving) << sd_m;
   }
 }
 

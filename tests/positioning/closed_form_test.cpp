@@ -13,8 +13,7 @@ namespace vlp {
 namespace {
 
 Sighting seen(const Eigen::Vector3d& lamp_m, const Pose& pose) {
-  return {lamp_m, project_lamp_to_normalized_point(LevelPose(pose), lamp_m),
-          Matrix2::Identity() * 500, 1};
+  return {lamp_m, project_lamp_to_normalized_point(LevelPose(pose), lamp_m)};
 }
 
 Pose random_pose(Random& random) {
@@ -62,8 +61,8 @@ TEST(ComputeTwoLampPoses, ContainsTruePoseForLampsAtDifferentHeights) {
 }
 
 TEST(ComputeTwoLampPoses, ReturnsOnePoseWhereTwoPosesCoincide) {
-  const Sighting a{{0, 0, 6}, {0.5, 0.5}, Matrix2::Identity() * 500, 1};
-  const Sighting b{{1, 0, 4}, {1, 0.5}, Matrix2::Identity() * 500, 1};
+  const Sighting a{{0, 0, 6}, {0.5, 0.5}};
+  const Sighting b{{1, 0, 4}, {1, 0.5}};
   const TwoLampPoses fix = compute_two_lamp_poses(a, b);
   ASSERT_EQ(fix.count, 1);
   EXPECT_NEAR(fix.poses[0].position_m.z(), 2, 1e-12);
@@ -81,8 +80,8 @@ TEST(ComputeTwoLampPoses, ReturnsNoPoseForCoincidentImagePoints) {
 
 TEST(ComputeTwoLampPoses, FlagsLampBelowCameraAndReturnsNoPose) {
   // The only pose has the second lamp, 2 m below the first, at the camera's own height.
-  const Sighting a{{0, 0, 3}, {-1, 0}, Matrix2::Identity(), 1};
-  const Sighting b{{2, 0, 1}, {1, 0}, Matrix2::Identity(), 1};
+  const Sighting a{{0, 0, 3}, {-1, 0}};
+  const Sighting b{{2, 0, 1}, {1, 0}};
   const TwoLampPoses fix = compute_two_lamp_poses(a, b);
   EXPECT_EQ(fix.count, 0);
   EXPECT_TRUE(fix.lamp_below_camera);
@@ -102,16 +101,17 @@ TEST(ComputePoseFromCoplanarLamps, MatchesTruthForThreeLampsOrMore) {
   }
 }
 
-TEST(ComputeInitialPose, AveragesNoiseOverThreeLampsAtEqualHeight) {
+TEST(ComputeInitialPoses, AveragesNoiseOverThreeLampsAtEqualHeight) {
   const Pose truth{{0.1, -0.2, 0}, 0.4};
   std::array<Sighting, 3> sightings{seen({-1, 0.5, 2.5}, truth), seen({1, 0.2, 2.5}, truth),
                                     seen({0, -0.8, 2.5}, truth)};
   sightings[0].z.x() += 0.02;
-  const InitialPose initial = compute_initial_pose(sightings);
+  const InitialLevelPoses initial = compute_initial_poses(sightings);
   ASSERT_EQ(initial.status, FixStatus::ok);
+  ASSERT_EQ(initial.count, 1);
   const auto pose = compute_pose_from_coplanar_lamps(sightings);
   ASSERT_TRUE(pose);
-  expect_pose(initial.pose, *pose);
+  expect_pose(initial.poses[0], *pose);
 }
 
 TEST(ComputePoseAtKnownHeightAndYaw, ReturnsTruePoseForOneLamp) {
@@ -119,7 +119,7 @@ TEST(ComputePoseAtKnownHeightAndYaw, ReturnsTruePoseForOneLamp) {
   for (int i = 0; i < 100; ++i) {
     const Pose truth = random_pose(random);
     const auto pose = compute_pose_at_known_height_and_yaw(seen({0.3, -0.4, 2}, truth),
-                                                           {truth.position_m.z(), truth.yaw_rad});
+                                                           truth.position_m.z(), truth.yaw_rad);
     ASSERT_TRUE(pose);
     expect_pose(*pose, truth);
   }
@@ -127,8 +127,8 @@ TEST(ComputePoseAtKnownHeightAndYaw, ReturnsTruePoseForOneLamp) {
 
 TEST(ComputePoseAtKnownHeightAndYaw, ReturnsNulloptWhenLampIsNotAboveCamera) {
   const Sighting sighting = seen({0, 0, 2}, {{0, 0, 0}, 0});
-  EXPECT_FALSE(compute_pose_at_known_height_and_yaw(sighting, {2, 0}));
-  EXPECT_FALSE(compute_pose_at_known_height_and_yaw(sighting, {2.5, 0}));
+  EXPECT_FALSE(compute_pose_at_known_height_and_yaw(sighting, 2, 0));
+  EXPECT_FALSE(compute_pose_at_known_height_and_yaw(sighting, 2.5, 0));
 }
 
 }  // namespace

@@ -42,17 +42,17 @@ std::optional<Matrix4> compute_limit(const BodyRig& rig, const Sensors& sensors)
   return exact.noise_covariance;
 }
 
-TEST(IsMotionEstimated, ReturnsTrueWhenVelocityOrYawRateIsUncertain) {
+TEST(BodyPrior, MotionIsEstimatedWhenVelocityOrYawRateIsUncertain) {
   BodyPrior prior;
-  EXPECT_FALSE(is_motion_estimated(prior) || is_motion_or_tilt_estimated(prior));
+  EXPECT_FALSE(prior.is_motion_estimated() || prior.is_motion_or_tilt_estimated());
   prior.velocity_sd_m_per_s = 0.01;
-  EXPECT_TRUE(is_motion_estimated(prior) && is_motion_or_tilt_estimated(prior));
+  EXPECT_TRUE(prior.is_motion_estimated() && prior.is_motion_or_tilt_estimated());
   prior.velocity_sd_m_per_s = 0;
   prior.yaw_rate_sd_rad_per_s = 0.01;
-  EXPECT_TRUE(is_motion_estimated(prior) && is_motion_or_tilt_estimated(prior));
+  EXPECT_TRUE(prior.is_motion_estimated() && prior.is_motion_or_tilt_estimated());
   prior.yaw_rate_sd_rad_per_s = 0;
   prior.inclination_sd_rad = 0.01;
-  EXPECT_TRUE(!is_motion_estimated(prior) && is_motion_or_tilt_estimated(prior));
+  EXPECT_TRUE(!prior.is_motion_estimated() && prior.is_motion_or_tilt_estimated());
 }
 
 /// Four or five lamps of a ceiling, tilt of up to 80 degrees known from the image alone: errors at

@@ -19,7 +19,6 @@
 #include "geometry/robust_scatter.h"
 #include "geometry/statistical_bounds.h"
 #include "geometry/symmetric.h"
-#include "positioning/inclination_rotation.h"
 #include "positioning/outlier_rejection.h"
 #include "positioning/row_clock.h"
 #include "rig/calibration_error.h"
@@ -57,33 +56,32 @@ Eigen::Vector3d compute_mean_position(const LampMap& map) {
   return map.lamps.front().position_m + sum / static_cast<double>(map.lamps.size());
 }
 
-/// Estimates an approximate pose from two lamps or more, even if the map has small errors. With
-/// more than three lamps, tries the lamps that agree with each other first. Returns std::nullopt
-/// for fewer than two lamps, or if there is no pose.
-std::optional<Pose> estimate_rough_pose(const std::vector<Sighting>& sightings,
+/// Estimates an approximate pose of a level camera from two lamps or more, even if the map has
+/// small errors. With more than three lamps, tries the lamps that agree with each other first.
+/// Returns std::nullopt for fewer than two lamps, or if there is no pose.
+std::optional<Pose> estimate_rough_pose(const std::vector<LampObservation>& sightings,
                                         const std::vector<std::size_t>& lamps,
                                         const std::vector<Eigen::Vector3d>& lamps_m) {
   if (sightings.size() < 2) return std::nullopt;
   constexpr double max_residual_fraction = 0.1;
-  if (sightings.size() > 3) {
-    FrameObservations frame;
-    frame.noise_is_stated = false;
-    for (std::size_t i = 0; i < sightings.size(); ++i) {
-      frame.sightings[i] = sightings[i];
-      frame.ids[i] = static_cast<int>(i);
-      frame.nearest_m[i] = kInfinite;
-      for (std::size_t j = 0; j < lamps_m.size(); ++j) {
-        if (j == lamps[i]) continue;
-        frame.nearest_m[i] =
-            std::min(frame.nearest_m[i], (lamps_m[j] - sightings[i].lamp_m).head<2>().norm());
-      }
+  FrameObservations frame;
+  for (std::size_t i = 0; i < sightings.size(); ++i) {
+    double nearest_m = kInfinite;
+    for (std::size_t j = 0; j < lamps_m.size(); ++j) {
+      if (j == lamps[i]) continue;
+      nearest_m = std::min(nearest_m, (lamps_m[j] - sightings[i].lamp_m).head<2>().norm());
     }
-    frame.size = sightings.size();
-    const auto [status, fix] = estimate_pose_robust(frame, max_residual_fraction);
-    if (status == FixStatus::ok) return fix.pose;
+    frame.add_current(sightings[i], static_cast<int>(i), nearest_m);
   }
-  const auto [status, fix] = estimate_and_check_pose(sightings, kInfinite);
-  return status == FixStatus::ok ? std::optional(fix.pose) : std::nullopt;
+  const Eigen::Vector3d no_arm_m = Eigen::Vector3d::Zero();
+  const BodyPrior level_at_rest;
+  const BodyProblem problem{no_arm_m, level_at_rest};
+  const BodySolution all = estimate_body_state_from_all_lamps(frame, problem);
+  if (sightings.size() > 3) {
+    const auto [status, fix] = estimate_body_state_robust(frame, problem, max_residual_fraction);
+    if (status == FixStatus::ok) return fix.state.pose;
+  }
+  return all.status == FixStatus::ok ? std::optional(all.fix.state.pose) : std::nullopt;
 }
 
 /// Returns an orthonormal basis of translation, yaw and scale of the detected lamps, divided by the
@@ -124,7 +122,7 @@ using PlaceKey = std::tuple<std::string, double, double, double, MeasuredPoint>;
 struct CaptureLamps {
   std::vector<std::size_t> indices;
   /// For the rough pose.
-  std::vector<Sighting> sightings;
+  std::vector<LampObservation> sightings;
   /// For the adjustment; their capture is set with its pose.
   std::vector<AdjustmentProblem::Sighting> terms;
 };
@@ -146,10 +144,9 @@ class ProblemAssembler {
 
   /// Adds a capture with its known position; counts it as rejected if it determines no pose.
   void add_capture_or_count_as_rejected(const AdjustmentCapture& capture) {
-    const InclinationRotation inclination =
-        capture.inclination ? compute_inclination_rotation(*capture.inclination, 0)
-                            : InclinationRotation();
-    CaptureLamps lamps = find_lamps(capture, inclination.level_from_base);
+    const Eigen::Matrix3d level_from_base =
+        level_rotation_from_inclination(capture.inclination.value_or(Inclination{0, 0}));
+    CaptureLamps lamps = find_lamps(capture, level_from_base);
     const auto pose = estimate_rough_pose(lamps.sightings, lamps.indices, lamps_m_);
     if (!pose) {
       ++all_.rejected_captures;
@@ -157,8 +154,7 @@ class ProblemAssembler {
     }
     const std::size_t index = problem_.captures.size();
     problem_.add_capture_with_initial_pose(
-        {add_to_pivot(capture, *pose), inclination.level_from_base.transpose(), capture.motion},
-        *pose);
+        {add_to_pivot(capture, *pose), level_from_base.transpose(), capture.motion}, *pose);
     for (auto& term : lamps.terms) {
       term.capture = index;
       problem_.sightings.push_back(term);
@@ -247,8 +243,8 @@ class ProblemAssembler {
           {0, index, detection.pixel, sigma_px, whitening,
            row_clock_ ? row_clock_->compute_pixel_readout_time_s(detection.pixel) : 0});
       found.indices.push_back(index);
-      found.sightings.push_back({lamps_m_[index], level.hnormalized(),
-                                 Eigen::Matrix2d(lens_.focal_px().asDiagonal()), 1});
+      found.sightings.push_back(make_level_observation(
+          lamps_m_[index], level.hnormalized(), Eigen::Matrix2d(lens_.focal_px().asDiagonal()), 1));
     }
     return found;
   }

@@ -131,11 +131,10 @@ struct MapCaptures {
     const std::size_t stride = 1 + (frames.size() - 1) / options.max_captures;
     for (std::size_t i = 0; i < frames.size(); i += stride) {
       const bool is_inclined = !inclinations.empty() && inclinations[i];
-      const InclinationRotation inclination =
-          is_inclined ? compute_inclination_rotation(*inclinations[i], options.yaw_in_robot_rad)
-                      : InclinationRotation();
+      const Eigen::Matrix3d level_from_base = compute_level_from_base(
+          is_inclined ? *inclinations[i] : Inclination{0, 0}, options.yaw_in_robot_rad);
       const auto rays =
-          compute_level_rays(frames[i], map, lens, inclination.level_from_base * base_from_camera);
+          compute_level_rays(frames[i], map, lens, level_from_base * base_from_camera);
       if (rays.size() < min_lamps) continue;
       if (auto view = project_rays_to_ceiling(rays, positions_m)) views.push_back(std::move(*view));
     }

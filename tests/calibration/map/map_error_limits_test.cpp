@@ -245,7 +245,7 @@ TEST_F(DetectLampErrorsAtLimits, InclinationsRotateWithYawOfCameraOnRobot) {
   options.yaw_in_robot_rad = 0.8;
   const Inclination of_robot{0.06, -0.04};
   const Eigen::Matrix3d level_from_base =
-      compute_inclination_rotation(of_robot, options.yaw_in_robot_rad).level_from_base;
+      compute_level_from_base(of_robot, options.yaw_in_robot_rad);
   const Lens lens(rig.calibration.camera.lens_model, rig.calibration.camera.intrinsics);
   const Eigen::Matrix3d camera_from_base =
       compute_level_from_camera_matrix(rig.calibration, Correction::all).transpose();
