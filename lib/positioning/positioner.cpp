@@ -96,6 +96,7 @@ Eigen::Vector3d get_lamp_center(const std::vector<Lamp>& lamps) {
 std::vector<double> compute_distances_to_nearest_lamp(const std::vector<Lamp>& lamps) {
   std::vector<double> nearest_m(lamps.size(), std::numeric_limits<double>::infinity());
   std::vector<std::pair<Eigen::Vector2d, std::size_t>> sorted;
+  sorted.reserve(lamps.size());
   for (const Lamp& lamp : lamps) sorted.emplace_back(lamp.position_m.head<2>(), sorted.size());
   std::ranges::sort(sorted, {}, [](const auto& lamp) { return lamp.first.x(); });
   for (auto lamp = sorted.begin(); lamp != sorted.end(); ++lamp) {
