@@ -112,8 +112,8 @@ void check_options(const Options& options, const std::vector<Gate>& gates) {
   if (const auto& line_m = options.line_m; !line_m.empty()) {
     check_line("--line", {line_m[0], line_m[1], line_m[2], line_m[3]});
   }
-  if (!options.junit.empty() && gates.empty()) {
-    throw std::invalid_argument("--junit: there are no gates; add --gate or --gates");
+  if (!options.junit.empty() && gates.empty() && options.compare.empty()) {
+    throw std::invalid_argument("--junit: there are no gates; add --gate, --gates or --compare");
   }
   if (options.noise_px == 0 && options.report.file.empty() && !options.lamps.empty()) {
     throw std::invalid_argument(
@@ -190,9 +190,9 @@ std::string format_proposed_gates(const EvaluationInput& input, const Evaluation
 std::vector<JUnitTest> make_evaluation_tests(const EvaluateResult& found) {
   std::vector<JUnitTest> tests = make_junit_tests_from_gates(found.gates);
   const auto& comparison = found.evaluation.comparison;
-  if (!comparison || !comparison->has_too_few_clusters()) return tests;
+  if (!comparison || !comparison->horizontal().has_too_few_clusters()) return tests;
   for (JUnitTest& test : tests) {
-    if (test.name != "worse_mm") continue;
+    if (!test.name.starts_with("worse_")) continue;
     // [GATE-2] `a change from chance`
     test.warnings.emplace_back(
         "too few reference points or captures to distinguish a change from chance");
@@ -288,7 +288,9 @@ void add_options(CLI::App& app, Options& options) {
       ->check(make_finite_positive_validator());
   app.add_option("--compare", options.compare,
                  "Other fixes of the same captures, fixes.csv. Reports better, worse, equivalent "
-                 "(within 1 um or 1 % of their mean error, whichever is larger) or inconclusive");
+                 "(within 1 um or 1 % of their mean error, whichever is larger) or inconclusive "
+                 "for horizontal, height and yaw error, sd and error / sd. Adds gates of 0 for the "
+                 "metrics worse_* and unpaired_fraction; --gate changes them");
   app.add_option("--gate", options.gates,
                  "Limit of a metric. Repeat, or separate by commas, for several")
       ->delimiter(',')

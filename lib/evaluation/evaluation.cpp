@@ -11,6 +11,8 @@
 namespace vlp {
 namespace {
 
+constexpr const char* kUnpairedMetric = "unpaired_fraction";
+
 Path make_reference_path(const EvaluationInput& input) {
   if (input.path) return *input.path;
   return {{(*input.line_m)[0], (*input.line_m)[1]}, {}};
@@ -35,16 +37,8 @@ void add_comparison(Evaluation& evaluation, const EvaluationInput& input,
                     const std::vector<FixError>& errors) {
   if (!input.truth) check_same_images_in_fixes(input.fixes, *input.other_fixes);
   const FixErrors others = compute_fix_errors(input, *input.other_fixes);
-  evaluation.comparison = compare_horizontal_errors(
-      input.fixes.rows, errors, input.other_fixes->rows, others.errors, input.threads);
-}
-
-/// Returns the lower end of the difference's interval, negative if the fixes may be better. Returns
-/// 0 for too few clusters, and for a positive difference too small to matter.
-double compute_loss_against_reference_m(const Comparison& comparison) {
-  if (comparison.has_too_few_clusters()) return 0;
-  const double low_m = comparison.interval_m->low;
-  return low_m > 0 && low_m <= comparison.min_relevant_m ? 0 : low_m;
+  evaluation.comparison = compare_fix_errors(input.fixes.rows, errors, input.other_fixes->rows,
+                                             others.errors, input.threads);
 }
 
 }  // namespace
@@ -109,9 +103,24 @@ std::vector<Metric> collect_evaluation_metrics(const Evaluation& evaluation) {
     add_mm("fitted_max_mm", fit->distances_m.max);
   }
   if (const auto& comparison = evaluation.comparison; comparison && comparison->pairs > 0) {
-    add_mm("worse_mm", compute_loss_against_reference_m(*comparison));
+    for (std::size_t i = 0; const ComparedQuantity& quantity : list_compared_quantities()) {
+      const QuantityComparison& compared = comparison->quantities[i++];
+      if (compared.pairs > 0) add(quantity.metric, quantity.units_per_si * compared.compute_loss());
+    }
+    add(kUnpairedMetric,
+        static_cast<double>(comparison->unpaired) / static_cast<double>(evaluation.captures));
   }
   return metrics;
+}
+
+std::vector<Gate> make_default_comparison_gates(const std::vector<Metric>& metrics) {
+  std::vector<Gate> gates;
+  const auto add = [&](const char* metric) {
+    if (find_metric_value(metrics, metric)) gates.push_back({metric, 0});
+  };
+  for (const ComparedQuantity& quantity : list_compared_quantities()) add(quantity.metric);
+  add(kUnpairedMetric);
+  return gates;
 }
 
 }  // namespace vlp

@@ -15,6 +15,7 @@
 #include "evaluation/errors/error_ratios.h"
 #include "evaluation/errors/fix_errors.h"
 #include "evaluation/errors/line_fit.h"
+#include "evaluation/gate.h"
 #include "evaluation/metric.h"
 
 namespace vlp {
@@ -80,5 +81,9 @@ Evaluation evaluate_fix_accuracy(const EvaluationInput& input);
 /// Returns the metrics of MetricSource::evaluation and ::reference that were measured, in their
 /// order.
 std::vector<Metric> collect_evaluation_metrics(const Evaluation& evaluation);
+
+/// Returns gates of 0 for the metrics of the comparison that were measured: no quantity may be
+/// worse than in the other fixes, and no capture may escape the comparison.
+std::vector<Gate> make_default_comparison_gates(const std::vector<Metric>& metrics);
 
 }  // namespace vlp

@@ -38,8 +38,8 @@ Json to_json(const SignedErrorStatistics& statistics, const KeyUnit& unit) {
   return json;
 }
 
-Json to_json(const Interval& interval_m) {
-  return {kMmKeys.factor * interval_m.low, kMmKeys.factor * interval_m.high};
+Json to_json(const Interval& interval, double factor = kMmKeys.factor) {
+  return {factor * interval.low, factor * interval.high};
 }
 
 Json to_json(const std::vector<std::pair<double, double>>& distribution_m) {
@@ -89,20 +89,34 @@ Json to_json(const NormalizedErrors& normalized_errors) {
   return json;
 }
 
-Json to_json(const Comparison& comparison) {
+Json to_json(const QuantityComparison& comparison, const ComparedQuantity& quantity) {
+  const auto key = [&](const std::string& name) {
+    return *quantity.unit == 0 ? name : name + "_" + quantity.unit;
+  };
   Json json{{"verdict", comparison.comparison_verdict()},
             {"pairs", comparison.pairs},
             {"clusters", comparison.clusters},
-            {"only_in_fixes", comparison.only_in_fixes},
-            {"only_in_compared", comparison.only_in_other_fixes},
             {"smaller_errors", comparison.smaller},
             {"larger_errors", comparison.larger}};
   if (comparison.pairs > 0) {
-    json["mean_difference_mm"] = kMmKeys.factor * comparison.mean_difference_m;
+    json[key("mean_difference")] = quantity.units_per_si * comparison.mean_difference;
   }
-  json["min_relevant_difference_mm"] = kMmKeys.factor * comparison.min_relevant_m;
+  json[key("min_relevant_difference")] = quantity.units_per_si * comparison.min_relevant;
   if (comparison.has_too_few_clusters()) json["reason"] = "too few clusters";
-  if (comparison.interval_m) json["interval_95_mm"] = to_json(*comparison.interval_m);
+  if (comparison.interval)
+    json[key("interval_95")] = to_json(*comparison.interval, quantity.units_per_si);
+  return json;
+}
+
+Json to_json(const Comparison& comparison) {
+  Json json{{"verdict", comparison.comparison_verdict()},
+            {"only_in_fixes", comparison.only_in_fixes},
+            {"only_in_compared", comparison.only_in_other_fixes},
+            {"unpaired", comparison.unpaired}};
+  for (std::size_t i = 0; const ComparedQuantity& quantity : list_compared_quantities()) {
+    const QuantityComparison& compared = comparison.quantities[i++];
+    if (i == 1 || compared.pairs > 0) json[quantity.key] = to_json(compared, quantity);
+  }
   return json;
 }
 
@@ -125,7 +139,7 @@ bool is_gate_failed(const CheckedMetric& gate) { return !gate.has_passed_gate();
 
 std::string format_evaluation_json(const Evaluation& evaluation,
                                    const std::vector<CheckedMetric>& gates) {
-  Json json{{"format", "vlp-evaluation/3"},
+  Json json{{"format", "vlp-evaluation/4"},
             {"reference", evaluation.reference},
             {"captures", evaluation.captures},
             {"fixes", evaluation.fixes},

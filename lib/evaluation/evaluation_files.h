@@ -11,7 +11,7 @@
 namespace vlp {
 
 /// Formats an evaluation as machine-readable JSON: the content of `evaluation.json`, format
-/// "vlp-evaluation/3".
+/// "vlp-evaluation/4".
 ///
 /// Every key ends in the unit of its value (_mm, _deg, _m). Fractions and ratios have no unit.
 /// Counts are named after what they count. Missing parts are omitted. Errors have mean, median,
@@ -23,7 +23,8 @@ namespace vlp {
 ///   fitted_line   of --line; jitter, angle, ends
 ///   normalized_error_rms  errors / reported standard deviation
 ///   limit         errors / theoretical limit, and whether they are below it
-///   comparison    verdict, pairs, difference, and the smallest difference that matters
+///   comparison    verdict, captures in one file only; for each quantity its verdict, pairs,
+///                 difference, and the smallest difference that matters
 ///   gates         name, unit, value, limit, direction ("at most" or "at least"), passed
 ///   passed        true if all gates are passed
 std::string format_evaluation_json(const Evaluation& evaluation,

@@ -152,6 +152,20 @@ constexpr auto kMetricKinds = std::to_array<MetricKind>({
      "um or 1 % of their mean error): 0 fails on the verdict 'worse'; always 0 for fewer than 20 "
      "reference points or captures",
      "the fixes are worse than those of --compare"},
+    {"worse_height_mm", "mm", reference, "the same for the height error",
+     "the heights are worse than those of --compare"},
+    {"worse_yaw_deg", "deg", reference, "the same for the yaw error",
+     "the yaw angles are worse than those of --compare", at_most, 180},
+    {"worse_sd_mm", "mm", reference, "the same for the reported horizontal sd",
+     "the reported standard deviations are larger than those of --compare"},
+    {"worse_normalized_error", "", reference,
+     "the same for the RMS of error / reported sd over x, y, z and yaw; 0 up to 1, its correct "
+     "mean",
+     "the reported standard deviations are too small, compared with --compare"},
+    {"unpaired_fraction", "", reference,
+     "fraction of the captures that are not compared: a fix or its sd is only in --compare, or "
+     "--compare has no row",
+     "fixes were lost, or --compare is not of all captures", at_most, 1},
 });
 
 }  // namespace

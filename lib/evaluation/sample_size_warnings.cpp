@@ -23,7 +23,7 @@ std::string make_missing_fixes_warning(const Evaluation& evaluation,
                                        const std::vector<CheckedMetric>& gates) {
   const std::size_t missing = evaluation.captures - evaluation.fixes;
   const bool has_gate = std::any_of(gates.begin(), gates.end(), [](const CheckedMetric& gate) {
-    return gate.name == "missing_fraction";
+    return gate.name == "missing_fraction" || gate.name == "unpaired_fraction";
   });
   if (gates.empty() || missing == 0 || has_gate) return "";
   // [GATE-1] `no gate 'missing_fraction'` | verdict ignores captures without fix | add gate
@@ -62,13 +62,13 @@ std::vector<std::string> make_sample_size_warnings(const Evaluation& evaluation)
   }
   if (const auto& comparison = evaluation.comparison; !comparison) {
     return warnings;
-  } else if (comparison->has_too_few_clusters()) {
+  } else if (comparison->horizontal().has_too_few_clusters()) {
     // [GATE-2] `is inconclusive`
-    warnings.push_back(describe_small_sample(comparison->clusters, resampling_unit) +
+    warnings.push_back(describe_small_sample(comparison->horizontal().clusters, resampling_unit) +
                        "with a fix in both files the comparison is inconclusive; it needs " +
                        std::to_string(kMinClustersCompared));
-  } else if (comparison->clusters < kSufficientClusters) {
-    warnings.push_back(describe_small_sample(comparison->clusters, resampling_unit) +
+  } else if (comparison->horizontal().clusters < kSufficientClusters) {
+    warnings.push_back(describe_small_sample(comparison->horizontal().clusters, resampling_unit) +
                        "with a fix in both files the difference's interval is somewhat too narrow");
   }
   return warnings;

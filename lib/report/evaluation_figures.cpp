@@ -40,20 +40,27 @@ void add_horizontal_statistics(std::vector<ReportStatistic>& figures,
 }
 
 std::string describe_comparison(const Comparison& comparison) {
-  std::string note =
-      "Compared with the other fixes: " + comparison.describe_comparison_result() + "; ";
-  if (comparison.pairs > 0) {
-    note += "the mean error is " + format_length_in_mm(std::abs(comparison.mean_difference_m)) +
-            " mm " + (comparison.mean_difference_m < 0 ? "smaller" : "larger") + " than theirs";
+  std::string note = "Compared with the other fixes: ";
+  for (std::size_t i = 0; const ComparedQuantity& quantity : list_compared_quantities()) {
+    const QuantityComparison& compared = comparison.quantities[i++];
+    if (compared.pairs == 0 && i > 1) continue;
+    const double factor = quantity.units_per_si;
+    const std::string unit = *quantity.unit == 0 ? "" : std::string(" ") + quantity.unit;
+    note.append(quantity.name).append(" ").append(compared.describe_comparison_result(quantity));
+    if (compared.pairs > 0) {
+      note += ", the mean is " + format_number(factor * std::abs(compared.mean_difference)) + unit +
+              (compared.mean_difference < 0 ? " smaller" : " larger") + " than theirs";
+    }
+    if (const auto& interval = compared.interval) {
+      note +=
+          " (difference, 95 %: " + format_range(factor * interval->low, factor * interval->high) +
+          unit + ")";
+    }
+    note += "; ";
   }
-  if (const auto& interval_m = comparison.interval_m) {
-    note += " (difference, 95 %: " + format_range(1e3 * interval_m->low, 1e3 * interval_m->high) +
-            " mm)";
-  }
-  return note + (comparison.pairs > 0 ? "; " : "") + std::to_string(comparison.pairs) +
-         " captures have a fix in both, " + std::to_string(comparison.only_in_fixes) +
-         " only in these fixes, " + std::to_string(comparison.only_in_other_fixes) +
-         " only in the others.";
+  return note + std::to_string(comparison.pairs) + " captures have a fix in both, " +
+         std::to_string(comparison.only_in_fixes) + " only in these fixes, " +
+         std::to_string(comparison.only_in_other_fixes) + " only in the others.";
 }
 
 }  // namespace

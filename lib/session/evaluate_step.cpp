@@ -71,7 +71,8 @@ EvaluateResult evaluate_fixes_against_truth(const EvaluationInput& input,
     return result;
   }
   result.metrics = collect_evaluation_metrics(evaluation);
-  result.gates = check_gates(gates, result.metrics);
+  result.gates = check_gates(merge_gates(make_default_comparison_gates(result.metrics), gates),
+                             result.metrics);
   result.caution = make_missing_fixes_warning(evaluation, result.gates);
   add_warnings(result, input);
   return result;

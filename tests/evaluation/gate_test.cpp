@@ -142,21 +142,36 @@ TEST(MergeGates, ReplacesLimitsAndAppendsNewGates) {
 TEST(CheckGates, FailsComparisonGateOnlyForEnoughClustersAndRelevantDifference) {
   Evaluation compared = evaluation();
   compared.comparison = Comparison{};
+  QuantityComparison& horizontal = compared.comparison->quantities[0];
+  horizontal.min_relevant = 1e-6;
   const auto passed = [&] {
     return check_gates({{"worse_mm", 0}}, collect_evaluation_metrics(compared))[0]
         .has_passed_gate();
   };
   EXPECT_FALSE(find_metric_value(collect_evaluation_metrics(compared), "worse_mm")) << "no pair";
-  compared.comparison->pairs = compared.comparison->clusters = 19;
-  compared.comparison->interval_m = {0.1, 1};
+  compared.comparison->pairs = horizontal.pairs = horizontal.clusters = 19;
+  horizontal.interval = {0.1, 1};
   EXPECT_TRUE(passed());
-  compared.comparison->interval_m = {};
+  horizontal.interval = {};
   EXPECT_TRUE(passed());
-  compared.comparison->clusters = 20;
-  compared.comparison->interval_m = {0.1, 1};
+  horizontal.clusters = 20;
+  horizontal.interval = {0.1, 1};
   EXPECT_FALSE(passed());
-  compared.comparison->interval_m = {1e-7, 2.4e-7};  // of no matter
+  horizontal.interval = {1e-7, 2.4e-7};  // of no matter
   EXPECT_TRUE(passed());
+}
+
+TEST(MakeDefaultComparisonGates, HasOneForEachMeasuredMetricOfComparison) {
+  EXPECT_TRUE(make_default_comparison_gates(collect_evaluation_metrics(evaluation())).empty());
+  Evaluation compared = evaluation();
+  compared.comparison = Comparison{};
+  compared.comparison->pairs = compared.comparison->quantities[1].pairs = 1;
+  std::vector<std::string> names;
+  for (const Gate& gate : make_default_comparison_gates(collect_evaluation_metrics(compared))) {
+    EXPECT_EQ(gate.limit, 0);
+    names.push_back(gate.metric);
+  }
+  EXPECT_THAT(names, testing::ElementsAre("worse_height_mm", "unpaired_fraction"));
 }
 
 TEST(ParseGate, RejectsLimitOutsideRangeAndFormerOrUnknownMetric) {
@@ -237,7 +252,7 @@ TEST(FormatEvaluationJson, WritesMetricsWithUnitsInKeys) {
   const auto json = nlohmann::json::parse(
       format_evaluation_json(evaluation(), check_gates({{"max_mm", 5}, {"missing_fraction", 1}},
                                                        collect_evaluation_metrics(evaluation()))));
-  EXPECT_EQ(json["format"], "vlp-evaluation/3");
+  EXPECT_EQ(json["format"], "vlp-evaluation/4");
   EXPECT_EQ(json["captures"], 4);
   EXPECT_EQ(json["missing"]["degenerate"], 1);
   EXPECT_NEAR(json["horizontal"]["mean_mm"].get<double>(), 3, 1e-9);
@@ -256,12 +271,12 @@ TEST(FormatEvaluationJson, OmitsMissingP90IntervalAndStatesTooFewClusters) {
   const auto json = nlohmann::json::parse(format_evaluation_json(few, {}));
   EXPECT_FALSE(json["horizontal"]["intervals_95"].contains("p90_mm"));
   EXPECT_NEAR(json["horizontal"]["intervals_95"]["rms_mm"][1].get<double>(), 2, 1e-9);
-  EXPECT_EQ(json["comparison"]["reason"], "too few clusters");
+  EXPECT_EQ(json["comparison"]["horizontal"]["reason"], "too few clusters");
   few.intervals_m->p90 = interval;
-  few.comparison->clusters = 20;
+  few.comparison->quantities[0].clusters = 20;
   const auto sufficient = nlohmann::json::parse(format_evaluation_json(few, {}));
   EXPECT_NEAR(sufficient["horizontal"]["intervals_95"]["p90_mm"][0].get<double>(), 1, 1e-9);
-  EXPECT_FALSE(sufficient["comparison"].contains("reason"));
+  EXPECT_FALSE(sufficient["comparison"]["horizontal"].contains("reason"));
 }
 
 }  // namespace

@@ -73,14 +73,14 @@ TEST(MakeErrorsBelowCrlbWarning, WarnsIfErrorsAreSignificantlyBelowCrlb) {
 TEST(MakeSampleSizeWarnings, WarnsForFewerThanFiftyReferencePointsInComparison) {
   Evaluation compared = evaluation(1000);
   compared.comparison = Comparison{};
-  compared.comparison->clusters = 8;
+  compared.comparison->quantities[0].clusters = 8;
   EXPECT_THAT(make_sample_size_warnings(compared),
               ElementsAre("with only 8 reference points with a fix in both files the comparison is "
                           "inconclusive; it needs 20"));
-  compared.comparison->clusters = 49;
+  compared.comparison->quantities[0].clusters = 49;
   EXPECT_THAT(make_sample_size_warnings(compared),
               ElementsAre(HasSubstr("49 reference points with a fix in both")));
-  compared.comparison->clusters = 50;
+  compared.comparison->quantities[0].clusters = 50;
   EXPECT_THAT(make_sample_size_warnings(compared), IsEmpty());
 }
 

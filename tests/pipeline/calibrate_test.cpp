@@ -77,7 +77,7 @@ TEST_P(VlpCalibrateAccuracy, RenderedSessionPassesGatesOfItsDataset) {
   fs::copy(rig + "/gates.yaml", folder / "a session/gates.yaml");
   const auto run = calibrate();
   EXPECT_EQ(run.exit_code, 0) << run.output << run.errors;
-  EXPECT_THAT(result("evaluation.json"), HasSubstr("vlp-evaluation/3"));
+  EXPECT_THAT(result("evaluation.json"), HasSubstr("vlp-evaluation/4"));
   EXPECT_THAT(result("report.html"), HasSubstr("PASS"));
 }
 

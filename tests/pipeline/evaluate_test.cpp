@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-evaluate as its users call it.
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 
 #include "support/program.h"
@@ -163,10 +164,10 @@ TEST_F(VlpEvaluate, CompareOptionReportsBetterSameOrWorseRun) {
   folder.file("fixes.csv", good);
   folder.file("other.csv", bad);
   folder.file("truth.csv", truth);
-  EXPECT_THAT(
-      with_truth("--compare other.csv --gate worse_mm=0 --json better.json").output,
-      AllOf(HasSubstr("compared    better by more than 0.0025 mm: mean error differs by -0.150 mm"),
-            HasSubstr("20 in both: 20 with a smaller error")));
+  EXPECT_THAT(with_truth("--compare other.csv --gate worse_mm=0 --json better.json").output,
+              AllOf(HasSubstr("compared    horizontal error better by more than 0.0025 mm: mean "
+                              "differs by -0.150 mm"),
+                    HasSubstr("20 in both: 20 with a smaller error")));
   EXPECT_THAT(with_truth("--compare fixes.csv --json same.json").output,
               HasSubstr("equivalent within 0.001 mm"));
   // All errors are significantly larger by 0.17 um, which is negligible.
@@ -178,7 +179,7 @@ TEST_F(VlpEvaluate, CompareOptionReportsBetterSameOrWorseRun) {
   folder.file("other.csv", good);
   const auto same = with_truth("--compare other.csv --gate worse_mm=0");
   EXPECT_EQ(same.exit_code, 0) << same.output;
-  EXPECT_THAT(same.output, HasSubstr("compared    equivalent within 0.001 mm: mean error differs"));
+  EXPECT_THAT(same.output, HasSubstr("horizontal error equivalent within 0.001 mm: mean differs"));
   folder.file("fixes.csv", bad);
   folder.file("other.csv", good);
   EXPECT_EQ(with_truth("--compare other.csv --gate worse_mm=0").exit_code, 1);
@@ -186,6 +187,45 @@ TEST_F(VlpEvaluate, CompareOptionReportsBetterSameOrWorseRun) {
   EXPECT_EQ(problems_by_schema("evaluation", {folder / "better.json", folder / "same.json"}), "");
   EXPECT_EQ(with_truth("--compare other.csv").exit_code, 2);
   EXPECT_EQ(evaluate("--line 0 0 9 0 --compare other.csv").exit_code, 2);
+}
+
+/// Baseline of 42 captures at as many places, and changes of it that have to be red.
+TEST_F(VlpEvaluate, CompareOptionFailsForWorseHeightYawOrSdAndForLostRows) {
+  const auto make_fixes = [](int first, double height_m, double yaw_rad, double sd_m) {
+    std::string text = kFixes;
+    for (int i = first; i < 42; ++i) {
+      const double error_m = 0.0004 * (i % 7 - 3);
+      text += fmt::format("{},ok,{},0,{},{},{},{},{},0.001,3,0\n", i, i + error_m,
+                          error_m + height_m, 0.5 * error_m + yaw_rad, sd_m, sd_m, sd_m);
+    }
+    return text;
+  };
+  std::string truth = "image,x_m,y_m,z_m,yaw_rad\n";
+  for (int i = 0; i < 42; ++i) truth += fmt::format("{},{},0,0,0\n", i, i);
+  folder.file("truth.csv", truth);
+  const std::string accepted = make_fixes(0, 0, 0, 0.001);
+  const auto compare = [&](const std::string& fixes, const std::string& baseline,
+                           const std::string& options = "") {
+    folder.file("fixes.csv", fixes);
+    folder.file("baseline.csv", baseline);
+    return with_truth("--compare baseline.csv --json c.json --junit c.xml " + options);
+  };
+  const auto same = compare(accepted, accepted);
+  EXPECT_EQ(same.exit_code, 0) << same.errors;
+  EXPECT_THAT(content("c.xml"), HasSubstr("tests=\"6\" failures=\"0\""));
+  const auto expect_red = [&](const ProgramResult& result, const std::string& words) {
+    EXPECT_EQ(result.exit_code, 1) << words;
+    EXPECT_THAT(result.errors, HasSubstr(words));
+    EXPECT_EQ(problems_by_schema("evaluation", {folder / "c.json"}), "");
+  };
+  expect_red(compare(make_fixes(0, 0.02, 0, 0.001), accepted), "worse_height_mm is 1");
+  expect_red(compare(make_fixes(0, 0, 0.0192, 0.001), accepted), "worse_yaw_deg is 1");
+  expect_red(compare(make_fixes(0, 0, 0, 0.0001), accepted), "worse_normalized_error is ");
+  expect_red(compare(accepted, make_fixes(24, 0, 0, 0.001)), "unpaired_fraction is 0.5714");
+  const std::string lost = make_fixes(1, 0, 0, 0.001) + "0,too_few_lamps,,,,,,,,,1,\n";
+  expect_red(compare(lost, accepted), "unpaired_fraction is 0.02381");
+  EXPECT_EQ(compare(accepted, lost).exit_code, 0) << "a fix more";
+  EXPECT_EQ(compare(lost, accepted, "--gate unpaired_fraction=0.1").exit_code, 0);
 }
 
 TEST_F(VlpEvaluate, SchemaRejectsChangedEvaluationJson) {
@@ -201,7 +241,7 @@ TEST_F(VlpEvaluate, SchemaRejectsChangedEvaluationJson) {
   EXPECT_THAT(problems_with("\"captures\": 6", "\"captures\": 6.5"), HasSubstr("$.captures: 6.5"));
   EXPECT_THAT(problems_with("\"captures\": 6,", ""), HasSubstr("'captures' is a required"));
   EXPECT_THAT(problems_with("\"captures\"", "\"caught\": 0, \"captures\""), HasSubstr("'caught'"));
-  EXPECT_THAT(problems_with("vlp-evaluation/3", "vlp-evaluation/2"), HasSubstr("$.format"));
+  EXPECT_THAT(problems_with("vlp-evaluation/4", "vlp-evaluation/3"), HasSubstr("$.format"));
 }
 
 TEST_F(VlpEvaluate, ErrorsOfExampleAreWithinThirtyPercentOfCrlb) {
@@ -287,7 +327,7 @@ TEST_F(VlpEvaluate, WritesIdenticalJsonForOneAndFourThreads) {
   with_truth("--threads 4 --json four.json");
   EXPECT_THAT(content("one.json"), HasSubstr("intervals_95"));
   EXPECT_EQ(content("one.json"), content("four.json"));
-  EXPECT_THAT(content("one.json"), StartsWith("{\n  \"format\": \"vlp-evaluation/3\""));
+  EXPECT_THAT(content("one.json"), StartsWith("{\n  \"format\": \"vlp-evaluation/4\""));
 }
 
 }  // namespace

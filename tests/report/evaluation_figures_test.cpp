@@ -59,7 +59,8 @@ TEST(FormatEvaluationStatistics, AddsIntervalToEachStatisticThatHasOne) {
   full.comparison = Comparison{};
   EXPECT_THAT(
       make_evaluation_notes(full),
-      Contains(HasSubstr("other fixes: inconclusive, too few; 0 captures have a fix in both")));
+      Contains(HasSubstr(
+          "other fixes: horizontal error inconclusive, too few; 0 captures have a fix in both")));
 }
 
 TEST(MakeEvaluationNotes, StatesReferenceMissingFixesAndMissingIntervals) {

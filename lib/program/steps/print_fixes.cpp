@@ -116,19 +116,26 @@ void print_normalized_errors_and_crlb(const Evaluation& evaluation) {
 }
 
 void print_comparison(const Comparison& comparison) {
-  fmt::print("compared    {}", comparison.describe_comparison_result());
-  if (comparison.pairs > 0) {
-    fmt::print(": mean error differs by {:+.3f} mm", convert_m_to_mm(comparison.mean_difference_m));
-  }
-  if (const auto& interval_m = comparison.interval_m) {
-    fmt::print(" (95 %: {:+.3f} to {:+.3f})", convert_m_to_mm(interval_m->low),
-               convert_m_to_mm(interval_m->high));
+  for (std::size_t i = 0; const ComparedQuantity& quantity : list_compared_quantities()) {
+    const QuantityComparison& compared = comparison.quantities[i++];
+    const double factor = quantity.units_per_si;
+    if (compared.pairs == 0 && i > 1) continue;
+    fmt::print("{:11} {} {}", i == 1 ? "compared" : "", quantity.name,
+               compared.describe_comparison_result(quantity));
+    if (compared.pairs > 0) {
+      fmt::print(": mean differs by {:+.3f}{}{}", factor * compared.mean_difference,
+                 *quantity.unit == 0 ? "" : " ", quantity.unit);
+    }
+    if (const auto& interval = compared.interval) {
+      fmt::print(" (95 %: {:+.3f} to {:+.3f})", factor * interval->low, factor * interval->high);
+    }
+    fmt::print("\n");
   }
   fmt::print(
-      "\n  captures  {} in both: {} with a smaller error, {} with a larger; {} only in the "
+      "  captures  {} in both: {} with a smaller error, {} with a larger; {} only in the "
       "fixes, {} only in --compare\n",
-      comparison.pairs, comparison.smaller, comparison.larger, comparison.only_in_fixes,
-      comparison.only_in_other_fixes);
+      comparison.pairs, comparison.horizontal().smaller, comparison.horizontal().larger,
+      comparison.only_in_fixes, comparison.only_in_other_fixes);
 }
 
 /// Returns the remedy that reduces an error source.
