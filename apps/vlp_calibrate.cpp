@@ -3,6 +3,7 @@
 /// vlp-calibrate: runs the whole procedure on the folder of a session: calibration, fixes, report.
 
 #include <CLI/CLI.hpp>
+#include <exception>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,6 +16,7 @@
 #include "program/steps/capture_options.h"
 #include "program/steps/print_session.h"
 #include "session/session.h"
+#include "session/session_results.h"
 
 namespace vlp {
 namespace {
@@ -31,8 +33,15 @@ void run(Options options) {
   if (const auto model = lens_model_from_name(options.lens)) options.how.lens_model = *model;
   options.how.program = {kName, VLP_VERSION};
   SessionLog log;
-  const SessionResult result = run_calibration_session(options.session, options.results,
-                                                       options.how, log.make_session_observer());
+  const SessionResult result = [&] {
+    try {
+      return run_calibration_session(options.session, options.results, options.how,
+                                     log.make_session_observer());
+    } catch (const std::exception& error) {
+      write_refusal_junit_xml(options.results, error.what());
+      throw;
+    }
+  }();
   if (result.verdict == Verdict::invalid) {
     if (result.failure == StepFailure::undetermined) throw Undetermined(result.reason);
     throw std::invalid_argument(result.reason);
@@ -98,7 +107,11 @@ int calibrate(int argc, char** argv) {
       "Read requests from stdin, one line of JSON for each session; see apps/vlp-calibrate.md. "
       "Excludes all other arguments");
   app.footer("Gates:\n" + describe_metrics(list_session_metric_kinds()));
-  return parse_arguments_and_run(app, argc, argv, [&] { run(options); });
+  return parse_arguments_and_run(
+      app, argc, argv, [&] { run(options); },
+      [&](const std::string& message) {
+        write_refusal_junit_xml(find_option_value(argc, argv, {"-o", "--output"}), message);
+      });
 }
 
 }  // namespace

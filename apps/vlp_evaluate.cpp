@@ -228,16 +228,19 @@ void run_evaluation(const CLI::App& app, const Options& options, const std::vect
 }
 
 /// Writes an error that leaves no gate checked to the JUnit file, which CI reads in place of
-/// stderr.
-void write_junit_error(const std::string& file, const char* type, const char* message) {
-  if (file.empty()) return;
+/// stderr. Replaces only files of this kind.
+void write_junit_error(const std::string& file, const char* type, const std::string& message) {
+  constexpr std::size_t max_bytes = 1 << 24;
+  if (file.empty() || (std::filesystem::exists(file) &&
+                       read_text_file(file, max_bytes).find("<testsuites") == std::string::npos))
+    return;
   const JUnitTest test{"evaluation", JUnitTest::Result::error, message, type};
   write_file(file, format_junit_xml(kName, std::span(&test, 1)));
 }
 
 void run(const CLI::App& app, const Options& options) {
-  check_files(options);
   try {
+    check_files(options);
     const std::vector<Gate> gates = parse_gates(options);
     check_options(options, gates);
     run_evaluation(app, options, gates);
@@ -341,5 +344,10 @@ int main(int argc, char** argv) {
   vlp::Options options;
   vlp::add_options(app, options);
   app.footer("Gates:\n" + vlp::describe_metrics(vlp::list_evaluation_metric_kinds()));
-  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(app, options); });
+  return vlp::parse_arguments_and_run(
+      app, argc, argv, [&] { vlp::run(app, options); },
+      [&](const std::string& message) {
+        vlp::write_junit_error(vlp::find_option_value(argc, argv, {"--junit"}), "bad_input",
+                               message);
+      });
 }

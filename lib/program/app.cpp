@@ -215,8 +215,23 @@ void keep_freed_memory() {
 
 }  // namespace
 
-int parse_arguments_and_run(CLI::App& app, int argc, char** argv,
-                            const std::function<void()>& run) {
+std::string find_option_value(int argc, char** argv,
+                              std::initializer_list<std::string_view> names) {
+  for (int i = 1; i < argc; ++i) {
+    for (const std::string_view name : names) {
+      std::string_view word(argv[i]);
+      if (!word.starts_with(name)) continue;
+      word.remove_prefix(name.size());
+      if (word.empty()) return i + 1 < argc ? argv[i + 1] : "";
+      if (word.starts_with('=')) return std::string(word.substr(1));
+      if (!name.starts_with("--")) return std::string(word);
+    }
+  }
+  return "";
+}
+
+int parse_arguments_and_run(CLI::App& app, int argc, char** argv, const std::function<void()>& run,
+                            const std::function<void(const std::string&)>& report_bad_usage) {
   keep_freed_memory();
   bool quiet = false, verbose = false;
   const auto formatter = std::make_shared<HelpFormatter>();
@@ -250,7 +265,9 @@ int parse_arguments_and_run(CLI::App& app, int argc, char** argv,
     // A misspelled option is more informative than a missing one.
     if (problem.empty()) problem = describe_unknown_options(app);
     if (problem.empty()) problem = error.what();
-    spdlog::error("{}; see {} --help", problem, app.get_name());
+    problem += "; see " + app.get_name() + " --help";
+    spdlog::error("{}", problem);
+    if (report_bad_usage) report_bad_usage(problem);
     return kBadInput;
   } catch (const GateNotMet& error) {
     spdlog::error("{}", error.what());

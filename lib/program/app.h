@@ -3,8 +3,10 @@
 #pragma once
 
 #include <functional>
+#include <initializer_list>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -66,6 +68,14 @@ void check_output_files_are_distinct(
 ///
 /// Returns the exit code. Errors print one line: bad usage and bad input return 2, Undetermined 3,
 /// GateNotMet 1. `--reference` prints the manual page or a shell completion (reference.h).
-int parse_arguments_and_run(CLI::App& app, int argc, char** argv, const std::function<void()>& run);
+///
+/// @param report_bad_usage  called with the message if the arguments cannot be parsed
+int parse_arguments_and_run(
+    CLI::App& app, int argc, char** argv, const std::function<void()>& run,
+    const std::function<void(const std::string& message)>& report_bad_usage = {});
+
+/// Returns the value of an option in arguments that need not be valid; empty without the option.
+/// @param names  all names of the option, such as "-o" and "--output"
+std::string find_option_value(int argc, char** argv, std::initializer_list<std::string_view> names);
 
 }  // namespace vlp

@@ -17,6 +17,7 @@
 #include "captures/digest.h"
 #include "captures/id.h"
 #include "captures/shared_folder.h"
+#include "evaluation/junit.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 #include "session/session_file.h"
@@ -42,16 +43,20 @@ bool contains_name(std::span<const char* const> names, std::string_view name) {
 /// Returns the file with the path of the session of these results.
 fs::path owner_mark_file(const fs::path& results) { return results / "steps/session"; }
 
+constexpr const char* kNoOwner = "\n";
+constexpr std::size_t kMaxMarkBytes = 1 << 16;
+
 std::string owner_mark_text(const fs::path& session) {
+  if (session.empty()) return kNoOwner;
   return fs::weakly_canonical(session / "").string() + "\n";
 }
 
 /// Throws InputError if the folder holds results of another session or files of other origin.
 void check_owner(const fs::path& results, const fs::path& session) {
   const fs::path mark = owner_mark_file(results);
-  constexpr std::size_t max_bytes = 1 << 16;
   if (fs::exists(mark)) {
-    if (read_text_file(mark, max_bytes) == owner_mark_text(session)) return;
+    const std::string owner = read_text_file(mark, kMaxMarkBytes);
+    if (session.empty() || owner == kNoOwner || owner == owner_mark_text(session)) return;
     throw InputError(results, "contains the results of another session; choose another folder");
   }
   std::vector<const char*> foreign_names(kResults.begin(), kResults.end());
@@ -130,6 +135,17 @@ bool is_output_name(std::string_view name) {
 
 }  // namespace
 
+void write_refusal_junit_xml(const fs::path& results, const std::string& message) try {
+  const bool is_free = !fs::exists(results) || (fs::is_directory(results) && fs::is_empty(results));
+  if (results.empty() || !(is_free || fs::exists(owner_mark_file(results)))) return;
+  const SessionResults locked(results, {});
+  const JUnitTest test{"session", JUnitTest::Result::error, message,
+                       std::string(step_failure_name(StepFailure::bad_input))};
+  write_file(locked.results_file_path("junit.xml"),
+             format_junit_xml("vlp-calibrate", std::span(&test, 1)));
+} catch (const std::exception&) {  // the refusal is reported, not this
+}
+
 SessionResults::SessionResults(fs::path folder, const fs::path& session)
     : folder_(std::move(folder)) {
   check_owner(folder_, session);
@@ -140,7 +156,8 @@ SessionResults::SessionResults(fs::path folder, const fs::path& session)
   const SharedFolder steps = make_steps_folder(folder_);
   lock_ = lock_folder(steps, folder_);
   steps.open_subfolder_if_exists({"corners", folder_, "step"});  // throws if it is a link
-  if (steps.contains_folder_entry("session")) return;
+  const auto owner = steps.read_file_if_exists("session", kMaxMarkBytes);
+  if (owner && (session.empty() || *owner != kNoOwner)) return;
   // The list of files that do not require a plan, written before the mark: a folder without the
   // mark is free.
   steps.replace_file_atomically(kOutputs, "junit.xml\nsession.json\n");

@@ -18,6 +18,10 @@ struct StepOutputs {
   std::vector<std::string> files;
 };
 
+/// Writes junit.xml with an error in place of that of an earlier run, for a run that is refused
+/// before its first step. Leaves a folder that is in use or holds files of other origin unchanged.
+void write_refusal_junit_xml(const std::filesystem::path& results, const std::string& message);
+
 /// Folder with the results of a session, which one run at a time may use. Results of an earlier run
 /// are reused for steps whose inputs have not changed. Content:
 ///
@@ -25,7 +29,8 @@ struct StepOutputs {
 ///   session.json                  outcome of the last run
 ///   steps/STEP.json               result of a step, digests of its inputs and outputs
 ///   steps/corners                 cached corners of boards
-///   steps/session                 path of the session of these results
+///   steps/session                 path of the session of these results; an empty line if all runs
+///                                 were refused
 ///   steps/outputs                 names of all files above that runs wrote or may have written
 ///   steps/lock                    locked while a run uses the folder
 ///
@@ -33,9 +38,10 @@ struct StepOutputs {
 /// in folders of earlier versions, all names count that the steps of those versions could write.
 class SessionResults {
  public:
-  /// Locks the folder for this session and creates it if missing. The operating system releases the
-  /// lock when the process ends, also after a crash. Throws InputError if the folder holds results
-  /// of another session or files of other origin, is in use by another run, or cannot be written.
+  /// Locks the folder for this session, or for any if it is empty, and creates it if missing. The
+  /// operating system releases the lock when the process ends, also after a crash. Throws
+  /// InputError if the folder holds results of another session or files of other origin, is in use
+  /// by another run, or cannot be written.
   SessionResults(std::filesystem::path folder, const std::filesystem::path& session);
   ~SessionResults();
   SessionResults(const SessionResults&) = delete;

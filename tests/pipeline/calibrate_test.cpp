@@ -556,7 +556,11 @@ TEST_F(VlpCalibrate, ErrorNamesMissingFolderFileOrUnknownOption) {
   const auto nowhere = calibrate();
   EXPECT_EQ(nowhere.exit_code, 2);
   EXPECT_THAT(nowhere.errors, HasSubstr("a session: is not a folder of captures"));
-  EXPECT_FALSE(fs::exists(folder / "results"));
+  const auto expect_junit_error = [&](const std::string& words) {
+    EXPECT_THAT(result("junit.xml"), HasSubstr("errors=\"1\""));
+    EXPECT_THAT(result("junit.xml"), HasSubstr(words));
+  };
+  expect_junit_error("a session: is not a folder of captures");
   fs::create_directory(folder / "a session");
   const auto empty = calibrate();
   EXPECT_EQ(empty.exit_code, 2);
@@ -565,9 +569,16 @@ TEST_F(VlpCalibrate, ErrorNamesMissingFolderFileOrUnknownOption) {
   EXPECT_THAT(result("junit.xml"),
               HasSubstr("<error type=\"bad_input\" message=\"lamps.yaml: is "));
   EXPECT_THAT(calibrate("--nonsense").errors, HasSubstr("unknown: --nonsense"));
+  expect_junit_error("unknown: --nonsense; see vlp-calibrate --help");
   EXPECT_EQ(calibrate("--row-time-s").exit_code, 2);
+  expect_junit_error("--row-time-s");
   folder.file("gates.yaml", "format: vlp-gates/1\ngates: {odd_mm: 1}\n");
   EXPECT_THAT(calibrate("--gates '" + path("gates.yaml") + "'").errors, HasSubstr("'odd_mm'"));
+  expect_junit_error("odd_mm");
+  // Folders of other files are not changed.
+  const auto refused = run_program("vlp-calibrate --nonsense -o '" + path("") + "'");
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_FALSE(fs::exists(folder / "junit.xml"));
 }
 
 }  // namespace

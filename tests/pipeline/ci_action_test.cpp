@@ -56,6 +56,22 @@ TEST_F(CiAction, PassesWithAndWithoutAcceptedFixesAndComparesOnlyWithThem) {
               AllOf(HasSubstr("failures=\"0\" errors=\"0\""), HasSubstr("name=\"worse_mm\"")));
 }
 
+TEST_F(CiAction, ComparesAlsoIfCalibrationMissesGate) {
+  const auto first = run_action("results=accepted");
+  ASSERT_EQ(first.exit_code, 0) << first.output << first.errors;
+  folder.file("gates.yaml", "format: vlp-gates/1\ngates: {mean_mm: 1e-6}\n");
+  const auto missed = run_action("accepted=accepted/check-fixes.csv");
+  EXPECT_EQ(missed.exit_code, 1) << missed.output << missed.errors;
+  EXPECT_THAT(content("results/junit.xml"), HasSubstr("failures=\"1\""));
+  EXPECT_THAT(content("results/comparison.xml"), HasSubstr("failures=\"0\" errors=\"0\""));
+  // A run that is refused leaves no results of the former one.
+  folder.file("gates.yaml", "format: vlp-gates/1\ngates: {odd_mm: 1}\n");
+  const auto refused = run_action("accepted=accepted/check-fixes.csv");
+  EXPECT_EQ(refused.exit_code, 2) << refused.output << refused.errors;
+  EXPECT_THAT(content("results/junit.xml"), AllOf(HasSubstr("errors=\"1\""), HasSubstr("odd_mm")));
+  EXPECT_FALSE(fs::exists(folder / "results/comparison.xml"));
+}
+
 TEST_F(CiAction, NamesLampThatMapMisplacesByThirtyMillimeters) {
   const std::string lamps = content("session/lamps.yaml"), before = "position_m: [-0.6, -0.3,";
   ASSERT_NE(lamps.find(before), std::string::npos);

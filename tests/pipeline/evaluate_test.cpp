@@ -100,6 +100,22 @@ TEST_F(VlpEvaluate, WritesErrorToJUnitWhenNoGateIsChecked) {
   EXPECT_THAT(content("junit.xml"), HasSubstr("<error type=\"undetermined\" message=\""));
 }
 
+TEST_F(VlpEvaluate, WritesErrorToJUnitForBadArguments) {
+  const auto expect_error = [&](const std::string& options, const std::string& words) {
+    ASSERT_EQ(with_truth("--gate mean_mm=3 --junit junit.xml").exit_code, 0);
+    EXPECT_THAT(content("junit.xml"), HasSubstr("errors=\"0\""));
+    EXPECT_EQ(with_truth(options).exit_code, 2);
+    EXPECT_THAT(content("junit.xml"), AllOf(HasSubstr("errors=\"1\""), HasSubstr(words)));
+  };
+  expect_error("--gate mean_mm=1 --junit junit.xml --odd", "unknown: --odd");
+  expect_error("--junit=junit.xml --gate", "--gate: 1 required");
+  expect_error("--gate mean_mm=1 --junit junit.xml --json truth.csv", "is also an input");
+  expect_error("--gates none.yaml --junit junit.xml", "none.yaml");
+  const std::string truth = content("truth.csv");
+  EXPECT_EQ(with_truth("--junit truth.csv --odd").exit_code, 2);
+  EXPECT_EQ(content("truth.csv"), truth) << "not a JUnit file";
+}
+
 TEST_F(VlpEvaluate, ProposedGatesPassForSameFixes) {
   const auto few = with_truth("--propose-gates gates.yaml");
   EXPECT_EQ(few.exit_code, 3);
