@@ -311,6 +311,17 @@ TEST_F(VlpEvaluate, NamesFileAndLineOfBadInput) {
   EXPECT_THAT(refused(kFixes + good), HasSubstr("truth.csv:3: image: 'a.png' occurs twice"));
 }
 
+TEST_F(VlpEvaluate, NamesUnitOfTruthInMillimeters) {
+  folder.file("truth.csv",
+              "image,x_m,y_m\n"
+              "a.png,0,0\nb.png,0,0\nc.png,1000,0\nd.png,1000,0\ne.png,1000,0\nf.png,1000,0\n");
+  const auto result = with_truth("--gate missing_fraction=1 --junit junit.xml");
+  EXPECT_EQ(result.exit_code, 2);
+  const std::string problem = "truth.csv:2: x_m: the values agree with the fixes if they are in mm";
+  EXPECT_THAT(result.errors, HasSubstr(problem));
+  EXPECT_THAT(content("junit.xml"), HasSubstr(problem));
+}
+
 TEST_F(VlpEvaluate, ReturnsTwoForBadUsage) {
   for (const char* options :
        {"", "--truth truth.csv --line 0 0 1 0", "--line 0 0 0 0", "--line 0 0 1",

@@ -1,8 +1,10 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// run_calibration_session(): steps that fail, and sessions and options that it rejects.
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 
+#include "captures/truth_table.h"
 #include "rendered_session.h"
 #include "rig/input_error.h"
 #include "session/session.h"
@@ -169,6 +171,16 @@ TEST_F(RunCalibrationSession, FailsStepEvaluateIfCaptureHasNoTruePosition) {
                  AllOf(HasSubstr("0002.png"), Not(HasSubstr((folder / "").string()))));
   EXPECT_TRUE(has_result("check-fixes.csv"));
   EXPECT_FALSE(has_result("evaluation.json"));
+}
+
+TEST_F(RunCalibrationSession, FailsStepEvaluateIfTruthIsInMillimeters) {
+  std::string truth_in_mm = "image,x_m,y_m\n";
+  for (const TruthRow& row : read_truth_table(session_file("check/truth.csv")))
+    truth_in_mm += fmt::format("{},{},{}\n", row.image, 1e3 * row.xy_m.x(), 1e3 * row.xy_m.y());
+  write_session_file("check/truth.csv", truth_in_mm);
+  expect_failure(run(), "evaluate", StepFailure::bad_input,
+                 StartsWith("check/truth.csv:2: x_m: the values agree with the fixes if they are "
+                            "in mm; convert them to m"));
 }
 
 TEST_F(RunCalibrationSession, FailsStepEvaluateIfDriveHasNoDirection) {

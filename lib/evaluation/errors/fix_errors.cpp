@@ -3,10 +3,15 @@
 #include "evaluation/errors/fix_errors.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <span>
 
 #include "captures/csv_reader.h"
 #include "evaluation/errors/reference_points.h"
 #include "geometry/angles.h"
+#include "geometry/median.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -47,6 +52,72 @@ std::vector<std::size_t> group_captures(const std::vector<TruthRow>& truth, doub
   return assign_positions_to_reference_points(places_m, radius_m);
 }
 
+/// Unit that tables can have by mistake in place of that of the column.
+struct MistakenUnit {
+  const char* name;
+  double units_per_si;
+};
+constexpr std::array<MistakenUnit, 4> kMistakenLengths{
+    {{"mm", 1e3}, {"cm", 1e2}, {"inches", 1 / 0.0254}, {"feet", 1 / 0.3048}}};
+constexpr std::array<MistakenUnit, 1> kMistakenAngles{{{"degrees", deg_from_rad(1)}}};
+
+/// Column of a ground truth, and the ratio of its errors before and after a conversion.
+struct TruthColumn {
+  const char* name;
+  std::span<const MistakenUnit> mistaken_units;
+  const char* unit;
+  /// Smallest median error that a mistaken unit can explain.
+  double min_error;
+  /// Returns the magnitude of the error of a pose if the truth is divided by a factor;
+  /// std::nullopt if the truth lacks the column.
+  std::optional<double> (*compute_error)(const Pose& pose, const TruthRow& truth, double factor);
+};
+const std::array<TruthColumn, 3> kTruthColumns{
+    {{"x_m", kMistakenLengths, "m", 0.5,
+      [](const Pose& pose, const TruthRow& truth, double factor) -> std::optional<double> {
+        return (pose.position_m.head<2>() - truth.xy_m / factor).norm();
+      }},
+     {"z_m", kMistakenLengths, "m", 0.5,
+      [](const Pose& pose, const TruthRow& truth, double factor) -> std::optional<double> {
+        if (!truth.z_m) return std::nullopt;
+        return std::abs(pose.position_m.z() - *truth.z_m / factor);
+      }},
+     {"yaw_rad", kMistakenAngles, "rad", 0.2,
+      [](const Pose& pose, const TruthRow& truth, double factor) -> std::optional<double> {
+        if (!truth.yaw_rad) return std::nullopt;
+        return std::abs(wrap_angle_rad(pose.yaw_rad - *truth.yaw_rad / factor));
+      }}}};
+
+/// Throws InputError if a conversion of a column reduces the median of its errors to less than a
+/// twentieth.
+void check_units(const FixErrors& errors, const FileRows<FixRow>& fixes,
+                 const FileRows<TruthRow>& truth) {
+  constexpr double max_ratio = 0.05;
+  constexpr std::size_t min_fixes = 3;
+  for (const TruthColumn& column : kTruthColumns) {
+    const auto compute_median = [&](double factor) -> std::optional<double> {
+      const auto values =
+          collect_values_and_clusters_of_fix_errors(errors.errors, [&](const FixError& error) {
+            return column.compute_error(fixes.rows[error.fix].fix->pose, truth.rows[error.truth],
+                                        factor);
+          }).values;
+      return values.size() < min_fixes ? std::nullopt : std::optional(lower_median(values));
+    };
+    const auto error = compute_median(1);
+    if (!error || *error < column.min_error) continue;
+    const auto find_error = [&](const MistakenUnit& unit) {
+      return *compute_median(unit.units_per_si);
+    };
+    const MistakenUnit& unit = *std::ranges::min_element(column.mistaken_units, {}, find_error);
+    if (find_error(unit) < max_ratio * *error) {
+      // [FILE-3] `agree with the fixes`
+      throw InputError(truth.file, truth.rows.front().line, column.name,
+                       "the values agree with the fixes if they are in " + std::string(unit.name) +
+                           "; convert them to " + column.unit);
+    }
+  }
+}
+
 }  // namespace
 
 FixErrors compute_fix_errors_against_truth(const FileRows<FixRow>& fixes,
@@ -80,6 +151,7 @@ FixErrors compute_fix_errors_against_truth(const FileRows<FixRow>& fixes,
   if (truth.rows.size() > fixes.rows.size()) {
     result.failures_by_status["no row"] = truth.rows.size() - fixes.rows.size();
   }
+  check_units(result, fixes, truth);
   return result;
 }
 

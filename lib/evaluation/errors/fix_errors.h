@@ -72,7 +72,7 @@ struct FileRows {
 /// the status "no row". Clusters are reference points: captures whose true positions are within
 /// `radius_m`.
 /// @throws InputError if images of the fixes are not in the ground truth, with the count and the
-/// line of the first
+/// line of the first; if the ground truth agrees with the fixes only in another unit, such as mm
 FixErrors compute_fix_errors_against_truth(const FileRows<FixRow>& fixes,
                                            const FileRows<TruthRow>& truth, double radius_m);
 

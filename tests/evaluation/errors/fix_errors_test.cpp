@@ -42,6 +42,33 @@ TEST(ComputeFixErrorsAgainstTruth, ThrowsForFixesOfImagesMissingInTruth) {
   EXPECT_THAT(refusal, HasSubstr("2 of 3"));
 }
 
+TEST(ComputeFixErrorsAgainstTruth, NamesColumnAndUnitThatAgreeWithFixes) {
+  const FileRows<FixRow> fixes{
+      "fixes.csv",
+      {fix_at("a", 1, 2, 1.5, 1), fix_at("b", -2, 1, 1.4, -0.5), fix_at("c", 3, -1, 1.6, 0.8)}};
+  const auto refusal = [&](double units_per_m, double units_per_z_m, double units_per_rad) {
+    FileRows<TruthRow> truth{"truth.csv", {}};
+    for (const FixRow& row : fixes.rows) {
+      const Pose& pose = row.fix->pose;
+      truth.rows.push_back({row.image, units_per_m * (pose.position_m.head<2>().array() + 0.01),
+                            units_per_z_m * (pose.position_m.z() + 0.01),
+                            units_per_rad * (pose.yaw_rad + 0.01), 2});
+    }
+    return rejection_message([&] { compute_fix_errors_against_truth(fixes, truth, 1e-3); });
+  };
+  EXPECT_EQ(refusal(1, 1, 1), "");
+  EXPECT_EQ(refusal(7, 1, 1), "") << "wrong, but not by a unit";
+  EXPECT_EQ(refusal(1e3, 1, 1),
+            "truth.csv:2: x_m: the values agree with the fixes if they are in mm; convert them to "
+            "m");
+  EXPECT_THAT(refusal(1 / 0.3048, 1, 1), HasSubstr("x_m: the values agree with the fixes if they "
+                                                   "are in feet"));
+  EXPECT_THAT(refusal(1, 100, 1), HasSubstr("z_m: the values agree with the fixes if they are in "
+                                            "cm"));
+  EXPECT_THAT(refusal(1, 1, 57.29578), HasSubstr("yaw_rad: the values agree with the fixes if they "
+                                                 "are in degrees; convert them to rad"));
+}
+
 TEST(ComputeFixErrorsAgainstPath, MeasuresErrorsToNearestPointOfPath) {
   const Path path{{{0, 0}, {1, 0}, {1, 1}}, {0, 1, 1}};
   const FixErrors errors = compute_fix_errors_against_path(
