@@ -48,8 +48,10 @@
 #                  last), or the result in OTHER_RESULTS
 #
 # Exit code: 0 done; 1 done, but a gate of the archive is not met, or a gate of
-# a session if the archive has no gate_fraction. By default the archive has one
-# gate, vanished: 0: no session of RESULTS or --previous is missing in ARCHIVE.
+# a session if the archive has no gate_fraction. By default the archive has two
+# gates, vanished: 0: no session of RESULTS or --previous is missing in ARCHIVE;
+# suspect: 0: no session is a copy, lost inputs that it had, has unusual metrics,
+# or boards of another camera.
 # 2 invalid input; 3 incomplete: the run could not finish, no session has a
 # result, or more sessions have none than no_result or no_result_fraction of
 # --gates allow.

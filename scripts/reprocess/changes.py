@@ -19,6 +19,8 @@ from collections import Counter
 
 import yaml
 
+from plausibility import lost_inputs
+
 VERDICTS_WITH_RESULT = ("pass", "review", "gate", "look")  # "look": former name of "review", in earlier results
 MIN_CAMERAS = 20  # as vlp-evaluate requires 20 reference points
 MAX_EQUAL_CHANGE_MM = 0.001  # below all measurement uncertainties
@@ -105,6 +107,9 @@ def compare_results(rows, before_rows):
         changes["mean_difference_mm"] = mean
         if interval:
             changes["interval_95_mm"] = interval
+        if changes["same"] == len(pairs):
+            changes["verdict"] = "the same"
+        elif interval:
             better, worse = interval[1] < 0, interval[0] > 0
             changes["verdict"] = "better" if better else "worse" if worse else "inconclusive"
         else:
@@ -135,6 +140,7 @@ GATES = {
     "median_mm": (0, math.inf, lambda counts, changes, items: counts.get("median_mm")),
     "p90_mm": (0, math.inf, lambda counts, changes, items: counts.get("p90_mm")),
     "vanished": (0, math.inf, count_items("vanished")),
+    "suspect": (0, math.inf, count_items("suspect")),
     "lost_results": (0, math.inf, count_items("lost_results")),
     "cameras_changed": (0, math.inf, count_items("cameras_changed")),
     "lamps_moved": (0, math.inf, count_items("lamps_moved")),
@@ -148,7 +154,7 @@ GATES = {
 }
 FORMER_GATES = {f"{name}_share": f"{name}_fraction" for name in ("no_result", "gate", "worse")}
 FORMER_GATES |= {name: "review_fraction" for name in ("look_share", "look_fraction")}
-DEFAULT_GATES = {"vanished": 0}
+DEFAULT_GATES = {"vanished": 0, "suspect": 0}
 COMPLETENESS_GATES = ("no_result", "no_result_fraction")  # exit code 3 if one is not met
 
 
@@ -166,6 +172,17 @@ def find_lost_results(rows, before_rows, had_result):
     before = {session_name(row) for row in before_rows if row["verdict"] in VERDICTS_WITH_RESULT}
     names = [session_name(row) for row in rows if row["verdict"] not in VERDICTS_WITH_RESULT]
     return [name for name in names if name in before or had_result(name)]
+
+
+def list_suspects(rows, before_rows):
+    """Returns the descriptions of sessions that are not plausible, or lost inputs that they had in earlier results."""
+    before, found = {session_name(row): row for row in before_rows}, []
+    for row in rows:
+        name = session_name(row)
+        known = [reason for reason in row.get("suspect", "").split("; ") if reason]
+        if reasons := dict.fromkeys([*known, *lost_inputs(row, before.get(name, {}))]):
+            found.append(f"{name}: {'; '.join(reasons)}")
+    return found
 
 
 def describe_date(change):
@@ -187,12 +204,13 @@ def describe_lamp(lamp):
     return f"{place}lamp {lamp['lamp']} (map {lamp['map']}): {abs(complex(*lamp['displacement_mm'])):.2f} mm, {date}"
 
 
-def collect_gate_items(vanished, lost, fleet):
+def collect_gate_items(vanished, lost, fleet, suspects=()):
     """Returns {gate: descriptions of the items that it counts}; None for a gate if there were too few data to test."""
     tested = fleet["between_sessions"]
     cameras_tested = any(tau is not None for name, tau in tested.items() if name != "lamps")
     return {
         "vanished": vanished,
+        "suspect": list(suspects),
         "lost_results": lost,
         "cameras_changed": [describe_camera(alarm) for alarm in fleet["cameras"]] if cameras_tested else None,
         "lamps_moved": [describe_lamp(lamp) for lamp in fleet["lamps"]] if tested.get("lamps") is not None else None,

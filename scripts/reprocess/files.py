@@ -7,6 +7,7 @@ import io
 import json
 import os
 import re
+from collections import Counter
 from pathlib import Path
 
 # Inputs of vlp-calibrate in a session (lib/session/session_folder.h), except line drives, which only its report uses.
@@ -71,7 +72,7 @@ def table(columns, rows):
 
 def read_table(file):
     """Returns a dictionary {column: text} for each line that is not empty. A short line lacks the last columns."""
-    with open(file, newline="") as stream:
+    with open(file, newline="", encoding="utf-8-sig") as stream:
         lines = csv.reader(stream)
         columns = next(lines, [])
         return [dict(zip(columns, map(unescape_formula, line))) for line in lines if line]
@@ -143,9 +144,13 @@ def entry_digest(entry):
 
 
 def input_digests(session):
-    """Returns the digest of all inputs of a session, and {name: digest} of its input files and folders."""
-    lines = {}
+    """Returns the digest of all inputs of a session, {name: digest} and {name: number of files} of its input files and
+    folders, and the names of entries that are no readable files, such as broken links."""
+    lines, counts, unreadable = {}, Counter(), []
     for name, entry in input_files(session):
-        lines.setdefault(name.split("/")[0], []).append(f"{entry_digest(entry)}  {name}\n")
+        part, found = name.split("/")[0], entry_digest(entry)
+        lines.setdefault(part, []).append(f"{found}  {name}\n")
+        counts[part] += " " not in found
+        unreadable += [f"{name}: {found}"] if " " in found else []
     texts = {name: "".join(listed) for name, listed in lines.items()}
-    return digest("".join(texts.values())), {name: digest(text) for name, text in texts.items()}
+    return digest("".join(texts.values())), {name: digest(text) for name, text in texts.items()}, counts, unreadable

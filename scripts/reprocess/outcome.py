@@ -18,6 +18,9 @@ SUMMARY_COLUMNS = [
     *REMARKS,
     "date",
     "reason",
+    "suspect",
+    "files",
+    "expected",
     "version",
     "inputs",
     "key",
@@ -37,6 +40,7 @@ def sd_column(column):
 
 
 RESIDUALS = ["rms_px", "rotation_px", "residual_ratio", "normalized_error_rms"]
+RESIDUALS += ["mtf50", "dispersion_mm", "height_rms_mm", "yaw_rms_deg"]
 FLEET_COLUMNS = ["camera", "session", "date", "room", "map", "tilt_deg"]
 FLEET_COLUMNS += [column for name in TRACKED_COLUMNS for column in (name, sd_column(name))] + [*RESIDUALS, "mean_mm"]
 LAMP_COLUMNS = ["room", "map", "lamp", "camera", "session", "date", "captures", "map_x_m", "map_y_m"]

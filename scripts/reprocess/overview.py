@@ -17,6 +17,7 @@ from changes import (
     count_reasons,
     count_verdicts,
     is_incomplete,
+    list_suspects,
     collect_gate_items,
     load_json,
     find_lost_results,
@@ -166,6 +167,8 @@ def list_actions(document, items, rows):
     if items["vanished"]:
         words = "Restore these sessions, or delete their results if they were removed on purpose"
         actions.append((f"{words}: {shorten(items['vanished'])}", "vanished"))
+    if items.get("suspect"):
+        actions.append((f"Check these sessions: {shorten(items['suspect'])}", "suspect"))
     if items["lost_results"]:
         actions.append((f"Find out why these sessions lost their result: {shorten(items['lost_results'])}", "failed"))
     if items["cameras_changed"]:
@@ -209,6 +212,8 @@ def render_page(run, rows, document, items, fleet, parts):
     if items["vanished"]:
         html += '<h2 id="vanished">No longer in the archive</h2>\n'
         html += table(["session"], [(name,) for name in items["vanished"]], "changes.json")
+    if items.get("suspect"):
+        html += '<h2 id="suspect">Not plausible</h2>\n' + table(["session"], [(words,) for words in items["suspect"]])
     html += fleet
     html += '<h2 id="gates">Gates</h2>\n'
     gates = document["gates"]
@@ -251,7 +256,7 @@ def main():
     lost = find_lost_results(rows, before, had_result)
     fleet_rows, lamp_rows = read_table("fleet.csv"), read_table("lamps.csv")
     fleet = analyze_fleet(fleet_rows, lamp_rows)
-    items = collect_gate_items(vanished, lost, fleet)
+    items = collect_gate_items(vanished, lost, fleet, list_suspects(rows, before))
     gates = DEFAULT_GATES | (read_gates(Path(compare["gates"])) if compare["gates"] else {})
     results = check_gates(gates, counts, changes, items)
     incomplete = is_incomplete(counts, results)
@@ -263,7 +268,7 @@ def main():
     if changes:
         parts += comparison(run, Path(compare["previous"]), rows, before, changes, pairs)
     document = {"counts": counts, "changes": changes, "gates": results, "passed": passed, "fleet": fleet}
-    document |= {"vanished": vanished, "lost_results": lost}
+    document |= {"vanished": vanished, "lost_results": lost, "suspect": items["suspect"]}
     write_atomically("changes.json", json_text({"format": "vlp-archive-changes/2", **document}))
     write_atomically(
         "overview.html",

@@ -19,6 +19,7 @@ from pathlib import Path
 
 from files import digest, input_digests, json_text, read_table, table, write_atomically
 from outcome import SHARD_COLUMNS, KEPT_FILES, read_outcome
+from plausibility import count_inputs, format_counts
 
 STATE = Path(".state")
 TIME_LIMIT_S = 3600
@@ -181,6 +182,13 @@ def record_run(shard, row, cost, size):
     append_line("ran", shard, f"{row['camera']}/{row['session']}", row["verdict"], cost, str(size))
 
 
+def expect_inputs(name, counts):
+    """Returns the columns `files`, the number of files of each input, and `expected`, the largest one so far."""
+    old = read_row(Path("sessions") / name) or read_row(Path("failed") / name) or {}
+    expected = count_inputs(old.get("expected", "")) | counts
+    return {"files": format_counts(counts), "expected": format_counts(expected)}
+
+
 def read_previous_rows(shard):
     """Returns {CAMERA/SESSION: row} of the previous run; empty if the rows cannot be read."""
     try:
@@ -197,9 +205,12 @@ def reprocess(run, shard, fingerprints, lock, keep):
     each = BatchProcess(Path(run["bin"]) / "vlp-calibrate", lock)
     before, rows, made, at_work = read_previous_rows(shard), {}, 0, None
 
-    def finish(name, known, answer):
+    def finish(name, known, unreadable, answer):
         exit_code, seconds, output = answer
         row = read_outcome(work / name, name, exit_code, output.replace(run["archive"] + "/", "")) | known
+        if unreadable:
+            row["remarks"] = "; ".join(filter(None, [row.get("remarks"), *unreadable]))
+            row["verdict"] = "review" if row["verdict"] == "pass" else row["verdict"]
         if "gates.yaml" in known["parts"] and "gate_metrics" in row:
             row["gate_metrics"] = ""
         cost = f"{seconds:.3f}"
@@ -214,7 +225,7 @@ def reprocess(run, shard, fingerprints, lock, keep):
             if known and known.get("fingerprint") == fingerprint:
                 row = find_current_row(name, compute_key(known["inputs"], run))
             if row is None:
-                inputs, parts = input_digests(Path(run["archive"]) / name)
+                inputs, parts, counts, unreadable = input_digests(Path(run["archive"]) / name)
                 key = compute_key(inputs, run)
                 row = find_current_row(name, key)
             rows[name] = (row or {}) | {"fingerprint": fingerprint}
@@ -223,7 +234,8 @@ def reprocess(run, shard, fingerprints, lock, keep):
                 start_session(run, each, name, work)
                 if at_work:
                     finish(*at_work, answer)
-                at_work = name, {"key": key, "inputs": inputs, "parts": parts, "version": run["version"]}
+                known = {"key": key, "inputs": inputs, "parts": parts, "version": run["version"]}
+                at_work = name, known | expect_inputs(name, counts), unreadable
                 made += 1
         if at_work:
             finish(*at_work, each.answer())

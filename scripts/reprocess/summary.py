@@ -10,6 +10,7 @@ from pathlib import Path
 
 from files import read_table, table, write_atomically
 from outcome import SUMMARY_COLUMNS, FLEET_COLUMNS, LAMP_COLUMNS
+from plausibility import find_suspects, name_of
 from session_gates import apply_session_gates
 
 
@@ -49,6 +50,10 @@ def main():
         known = stated.get((row["camera"], row["session"]), {"date": "", "room": ""})
         row |= {"date": known["date"], "room": known["room"]}
         row["cpu_s"] = costs.get(f"{row['camera']}/{row['session']}", "")
+    suspects = find_suspects(rows)
+    for row in rows:
+        row["suspect"] = "; ".join(suspects[name_of(row)])
+        row["verdict"] = "review" if row["suspect"] and row["verdict"] == "pass" else row["verdict"]
     calibrated = [row for row in rows if row["focal_x_px"]]
     write_atomically("lamps.csv", table(LAMP_COLUMNS, (lamp for row in calibrated for lamp in make_lamp_rows(row))))
     write_atomically("fleet.csv", table(FLEET_COLUMNS, calibrated))

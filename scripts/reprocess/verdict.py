@@ -65,7 +65,7 @@ def main():
     results = Path(sys.argv[1])
     document, rows = load_json(results / "changes.json"), read_table(results / "summary.csv")
     counts, changes, fleet = document["counts"], document["changes"], document["fleet"]
-    items = collect_gate_items(document["vanished"], document["lost_results"], fleet)
+    items = collect_gate_items(document["vanished"], document["lost_results"], fleet, document["suspect"])
     cost_s = sum(float(row["cpu_s"] or 0) for row in rows)
     print(f"this run    {describe_run(results / '.state', counts['sessions'])}")
     print(f"passed      {counts['pass']}")
@@ -78,6 +78,8 @@ def main():
         print(f"lost        {len(items['lost_results'])} had a result before: {join_items(items['lost_results'])}")
     if items["vanished"]:
         print(f"vanished    {len(items['vanished'])} no longer in the archive: {join_items(items['vanished'])}")
+    if items["suspect"]:
+        print(f"suspect     {len(items['suspect'])}: {join_items(items['suspect'], '; ')}")
     if "median_mm" in counts:
         print(f"error       {counts['median_mm']:.3f} mm in the median session, 90 % below {counts['p90_mm']:.3f} mm")
     print(

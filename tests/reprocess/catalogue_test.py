@@ -240,7 +240,7 @@ class Files(unittest.TestCase):
                 (session / name).parent.mkdir(exist_ok=True)
                 (session / name).write_text(name)
                 lines += f"{hashlib.sha256(name.encode()).hexdigest()}  {name}\n"
-            inputs, parts = files.input_digests(session)
+            inputs, parts, counts, _ = files.input_digests(session)
             self.assertEqual(inputs, hashlib.sha256(lines.encode()).hexdigest())
             self.assertEqual(list(parts), ["board.yaml", "boards", "lamps.yaml"])
 

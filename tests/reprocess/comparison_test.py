@@ -43,6 +43,19 @@ class Changes(unittest.TestCase):
 
         self.assertEqual([verdict(shift) for shift in (-0.05, 0, 0.05)], ["better", "inconclusive", "worse"])
 
+    def test_verdict_is_the_same_without_changes(self):
+        for cameras in (4, 42):
+            rows = [row(2 * i, "pass", 1) for i in range(cameras)]
+            self.assertEqual(changes.compare_results(rows, rows)[0]["verdict"], "the same")
+
+    def test_names_suspects_and_inputs_lost_since_earlier_results(self):
+        rows = [row(0, "review", 1) | {"suspect": "is a copy of c/1"}, row(1, "pass", 1) | {"files": "boards 20, check 6"}]
+        before = [row(1, "pass", 1) | {"expected": "boards 20, check 12"}]
+        expected = ["c0000/s0: is a copy of c/1", "c0000/s1: check has 6 of 12 files"]
+        self.assertEqual(changes.list_suspects(rows, before), expected)
+        rows[1]["suspect"] = "mean_mm is 9; check has 6 of 12 files"
+        self.assertEqual(changes.list_suspects(rows, before)[1], "c0000/s1: mean_mm is 9; check has 6 of 12 files")
+
     def test_interval_covers_truth_in_95_percent(self):
         # Sessions of a camera are correlated: intervals over sessions would cover only 83 %.
         chance = random.Random(2)
@@ -78,7 +91,7 @@ class Changes(unittest.TestCase):
         untested = changes.collect_gate_items([], [], {"between_sessions": {"focal": None, "lamps": None}, "cameras": [], "lamps": []})
         checked = changes.check_gates(limits, counts, None, untested)
         self.assertEqual([gate["passed"] for gate in checked], [True, True, False, False])
-        self.assertEqual(changes.DEFAULT_GATES, {"vanished": 0})
+        self.assertEqual(changes.DEFAULT_GATES, {"vanished": 0, "suspect": 0})
 
     def test_finds_vanished_sessions_and_lost_results(self):
         rows = [row(0, "pass", 1), row(1, "no result", None), row(2, "crashed", None), row(3, "no result", None)]

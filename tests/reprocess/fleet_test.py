@@ -107,7 +107,7 @@ class OverTime(unittest.TestCase):
     def test_result_matches_schema(self):
         made_up = Fleet(0, drifts=self.DRIFTS, moved=self.MOVED, broken={7: (6, {"principal_point": (0.4, -0.3)})}, noisy=(11,))
         document = {"format": "vlp-archive-changes/2", "changes": None, "gates": [], "passed": True}
-        document |= {"vanished": [], "lost_results": []}
+        document |= {"vanished": [], "lost_results": [], "suspect": []}
         document |= {"counts": changes.count_verdicts([]), "fleet": fleet.analyze_fleet(*fleet_rows(made_up))}
         alarms = [one["kind"] for alarm in document["fleet"]["cameras"] for one in alarm["changes"]]
         self.assertEqual((set(alarms), len(document["fleet"]["lamps"])), ({"step", "drift", "undecided"}, 2))

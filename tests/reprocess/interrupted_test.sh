@@ -75,6 +75,7 @@ run
 sed -i '1a # changed' "$archive/$good/lamps.yaml"
 mv "$archive/$broken" "$results-broken"
 cp -r "$archive/$good" "$archive/$broken"
+echo '# not a copy' >>"$archive/$broken/lamps.yaml"
 run
 [ "$(redone)" = "$(printf '%s/row.json\n' "$good" "$broken" | sort)" ] || fail "another content is not seen, or too much"
 [ -e "$results/sessions/$broken" ] && [ ! -e "$results/failed/$broken" ] || fail "$broken is repaired"

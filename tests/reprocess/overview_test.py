@@ -33,7 +33,7 @@ def document_of(rows, items, limits):
 
 
 def items_of(**items):
-    return {"vanished": [], "lost_results": [], "cameras_changed": [], "lamps_moved": []} | items
+    return {"vanished": [], "suspect": [], "lost_results": [], "cameras_changed": [], "lamps_moved": []} | items
 
 
 class Overview(unittest.TestCase):

@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""Finds sessions that are not plausible among those of the archive: copies, lost inputs, unusual metrics, and a lens or
+a rotation that is that of another camera."""
+import math
+import statistics
+from collections import Counter, defaultdict
+
+MIN_SESSIONS = 8  # with a metric, for a median
+MIN_DEVIATION = 6  # robust standard deviations of the logarithm
+# Ratio to the median from which a metric is unusual; below 1 if larger values are better.
+UNUSUAL_RATIO = {"mtf50": 0.85, "mean_mm": 5, "height_rms_mm": 5, "yaw_rms_deg": 5, "dispersion_mm": 5}
+UNUSUAL_RATIO |= {"normalized_error_rms": 5, "rms_px": 5, "rotation_px": 5}
+LENS = ("focal_x_px", "focal_y_px", "principal_point_x_px", "principal_point_y_px")
+IDENTIFYING = {"boards": LENS, "rotation": ("rotation_center_x_px", "rotation_center_y_px")}
+MIN_OWN = 4  # sessions of cameras that have several, for the usual distance between these
+MIN_RATIO, MIN_DISTANCE_PX = 10, 0.1  # of the distance from the nearest session of the same camera
+
+
+def count_inputs(text):
+    """Returns {input: number of files} of a column such as "boards 20, check 12"."""
+    words = (part.rsplit(" ", 1) for part in text.split(", ") if part)
+    return Counter({name: int(count) for name, count in words})
+
+
+def format_counts(counts):
+    return ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
+
+
+def lost_inputs(row, before):
+    """Returns the inputs with fewer files than `before` has or expects."""
+    now, expected = count_inputs(row.get("files", "")), count_inputs(before.get("expected", ""))
+    return [f"{name} has {now[name]} of {count} files" for name, count in expected.items() if now[name] < count]
+
+
+def name_of(row):
+    return f"{row['camera']}/{row['session']}"
+
+
+def find_copies(rows):
+    first = {}
+    for row in rows:
+        if row.get("inputs") and first.setdefault(row["inputs"], row) is not row:
+            yield name_of(row), f"is a copy of {name_of(first[row['inputs']])}"
+
+
+def find_unusual_metrics(rows):
+    for metric, limit in UNUSUAL_RATIO.items():
+        logs = {name_of(row): math.log(float(row[metric])) for row in rows if float(row.get(metric) or 0) > 0}
+        if len(logs) < MIN_SESSIONS:
+            continue
+        median = statistics.median(logs.values())
+        sd = 1.4826 * statistics.median(abs(value - median) for value in logs.values())
+        for name, value in logs.items():
+            deviation = (value - median) * math.copysign(1, math.log(limit))
+            if deviation > max(abs(math.log(limit)), MIN_DEVIATION * sd):
+                ratio = math.exp(value - median)
+                yield name, f"{metric} is {math.exp(value):.4g}, {ratio:.3g} times the median of the archive"
+
+
+def find_foreign_inputs(rows):
+    for part, columns in IDENTIFYING.items():
+        places = {name_of(row): [float(row[one]) for one in columns] for row in rows if row.get(columns[0])}
+        by_camera = defaultdict(dict)
+        for name, place in places.items():
+            by_camera[name.split("/")[0]][name] = place
+        own = {}
+        for sessions in by_camera.values():
+            for name, place in sessions.items():
+                others = [math.dist(place, other) for known, other in sessions.items() if known != name]
+                if others:
+                    own[name] = min(others)
+        if len(own) < MIN_OWN:
+            continue
+        limit = max(MIN_DISTANCE_PX, MIN_RATIO * sorted(own.values())[len(own) // 4])
+        for name, distance in own.items():
+            if distance < limit:
+                continue
+            camera = name.split("/")[0]
+            others = (one for one in places if one.split("/")[0] != camera)
+            nearest, other = min(((math.dist(places[name], places[one]), one) for one in others), default=(math.inf, ""))
+            if nearest < distance / MIN_RATIO:
+                words = f"{part}: of {other.split('/')[0]}? {distance:.2g} px from the nearest session of {camera}, "
+                yield part, name, words + f"{nearest:.2g} px from {other}"
+
+
+def find_suspects(rows):
+    """Returns {CAMERA/SESSION: list of reasons}."""
+    found = defaultdict(list)
+    for name, reason in [*find_copies(rows), *find_unusual_metrics(rows)]:
+        found[name].append(reason)
+    for part, name, reason in find_foreign_inputs(rows):
+        # A camera that was tilted in the meantime can have the rotation center of another one, but usual errors.
+        if part == "boards" or found[name]:
+            found[name].insert(0, reason)
+    for row in rows:
+        found[name_of(row)] += lost_inputs(row, row)
+    return found

@@ -1,0 +1,41 @@
+#!/bin/bash
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Sessions that calibrate without an error, but not with what they should: none passes in silence.
+source "$(dirname "$0")/common.sh"
+results=$scratch/suspect
+rm -rf "$results"
+sessions=(camera-00001/session-01 camera-00002/session-0{1,2} camera-00003/session-02 camera-00004/session-0{1,2}
+          camera-00005/session-02)
+take "$results-archive" "${sessions[@]}"
+expect() {  # EXIT-CODE WORDS OPTION...: of a run
+  local code=0
+  reprocess "$results" --shard-size 2 --cores 2 "${@:3}" >"$said" 2>"$said.errors" || code=$?
+  [ "$code" = "$1" ] && cat "$said" "$said.errors" | grep -q -- "$2" || fail "$code, and not '$2': $(cat "$said" "$said.errors")"
+}
+expect 0 '^no result   0'
+
+# Another camera's boards; half of a check is gone, and all of another; a session copied; a truth in mm.
+rm -r "$archive/camera-00004/session-01/boards" "$archive"/camera-00001/session-01/check/*[13579].png "$archive/camera-00002/session-01/check"
+cp -r "$archive/camera-00002/session-02/boards" "$archive/camera-00004/session-01"
+awk -F, -v OFS=, 'NR > 1 { $2 *= 1000; $3 *= 1000 } 1' "$archive/camera-00003/session-02/check/truth.csv" >"$results-truth"
+mv "$results-truth" "$archive/camera-00003/session-02/check/truth.csv"
+cp -r "$archive/camera-00005/session-02" "$archive/camera-00005/session-03"
+rm "$archive/camera-00002/session-02/check/0000.png"
+ln -s nowhere.png "$archive/camera-00002/session-02/check/0000.png"
+expect 1 'gate suspect: is 5, at most 0 is allowed'
+for words in 'camera-00004/session-01: boards: of camera-00002? ' 'camera-00002/session-01: check has 0 of [0-9]* files' \
+  'camera-00001/session-01: check has [0-9]* of [0-9]* files' 'camera-00005/session-03: is a copy of camera-00005/session-02' \
+  'check/truth.csv:2: x_m: the values agree with the fixes if they are in mm'; do
+  cat "$said" "$said.errors" | grep -q "$words" || fail "no '$words' in $(cat "$said" "$said.errors")"
+done
+grep -q '>FAIL<' "$results/overview.html" && grep -q 'boards: of camera-00002?' "$results/overview.html" || fail "the page"
+grep -q 'camera-00002,session-02,review,.*check/0000.png: not a file' "$results/summary.csv" || fail "no remark on the link"
+as_its_schema_says row "$results"/*/*/*/row.json
+as_its_schema_says changes "$results/changes.json"
+# They are named as long as they are there, and can be allowed.
+expect 1 'gate suspect: is 5'
+printf 'format: vlp-archive-gates/1\ngates: {suspect: 5}\n' >"$results-gates.yaml"
+expect 0 '^suspect     5: ' --gates "$results-gates.yaml"
+rm -r "$results" "$results"-*
