@@ -3,12 +3,18 @@
 """Date and room of each session: from ARCHIVE/archive.csv (columns camera, session, date, room; others are ignored), or
 else the date in the name of the session, as in 2026-03-14 or 20260314-b."""
 import re
+import sys
 from datetime import datetime, timezone
 from functools import lru_cache
 
 from files import read_table
 
+COLUMNS = {"camera", "session", "date", "room"} | {"fault", "damage", "damaged"}  # the latter of vlp-simulate
 DATE_IN_NAME = re.compile(r"(?<!\d)(\d{4})-?(\d\d)-?(\d\d)(?!\d)")
+
+
+def warn(message):
+    print(f"reprocess.sh: warning: {message}", file=sys.stderr)
 
 
 @lru_cache(maxsize=None)
@@ -28,13 +34,18 @@ def parse_utc(text):
 
 
 def read_archive_table(archive):
-    """Returns {(camera, session): (date in UTC, room)}. Raises ValueError with file and line."""
+    """Returns {(camera, session): (date in UTC, room)}. Raises ValueError with file and line. Warns of other columns."""
     file, stated = archive / "archive.csv", {}
     if not file.is_file():
         return stated
-    for line, row in enumerate(read_table(file), 2):
+    rows = read_table(file)
+    if others := ", ".join(sorted({column for row in rows for column in row} - COLUMNS)):
+        warn(f"{file}:1: columns that are ignored: {others}; known are {', '.join(sorted(COLUMNS))}")
+    for line, row in enumerate(rows, 2):
         if not row.get("camera") or not row.get("session"):
             raise ValueError(f"{file}:{line}: should name a camera and a session")
+        if (row["camera"], row["session"]) in stated:
+            raise ValueError(f"{file}:{line}: {row['camera']}/{row['session']} occurs twice; remove one row")
         date = (row.get("date") or "").strip()
         try:
             date = date and parse_utc(date).isoformat()
@@ -47,6 +58,8 @@ def read_archive_table(archive):
 def read_dates(archive, sessions):
     """Returns a row for each session with a date or a room. sessions: CAMERA/SESSION."""
     stated, lines = read_archive_table(archive), []
+    if unknown := sorted({"/".join(name) for name in stated} - set(sessions)):
+        warn(f"{archive / 'archive.csv'}: names {len(unknown)} sessions that the archive lacks, as {unknown[0]}; correct it")
     for name in sessions:
         camera, session = name.split("/")
         date, room = stated.get((camera, session), ("", ""))

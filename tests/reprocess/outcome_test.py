@@ -2,6 +2,8 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 """Outcome of a session, its date, and its processor time."""
+import contextlib
+import io
 import json
 import tempfile
 import unittest
@@ -111,6 +113,19 @@ class Dates(unittest.TestCase):
             self.assertEqual([line["date"] for line in lines], ["2026-03-14T07:30:00", "2026-03-15T04:30:00"])
             file.write_text("camera,session,date\na,1,14.3.2026\n")
             self.assertRaisesRegex(ValueError, "archive.csv:2: date: should be as", dates.read_archive_table, Path(folder))
+
+    def test_names_faults_of_table(self):
+        with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stderr(io.StringIO()) as said:
+            file = Path(folder) / "archive.csv"
+            file.write_text("\ufeffcamera,session,date\na,1,2026-03-14\n", encoding="utf-8")
+            self.assertEqual(dates.read_dates(Path(folder), ["a/1"])[0]["date"], "2026-03-14")
+            file.write_text("camera,session,date\na,1,2026-03-14\na,1,2026-03-15\n")
+            self.assertRaisesRegex(ValueError, "archive.csv:3: a/1 occurs twice", dates.read_archive_table, Path(folder))
+            self.assertEqual(said.getvalue(), "")
+            file.write_text("camera,session,Date\na,1,2026-03-14\na,7,2026-03-14\n")
+            dates.read_dates(Path(folder), ["a/1"])
+            self.assertIn("archive.csv:1: columns that are ignored: Date; known are camera, ", said.getvalue())
+            self.assertIn("archive.csv: names 1 sessions that the archive lacks, as a/7", said.getvalue())
 
 
 if __name__ == "__main__":
