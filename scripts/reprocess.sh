@@ -164,6 +164,7 @@ stop() {
   while level=$(pgrep --parent "$level" | paste -sd,) && [ -n "$level" ]; do started+=(${level//,/ }); done
   kill -TERM "${started[@]}" 2>/dev/null || true
   wait "$run" || true
+  "$python" "$scripts/run_page.py" "$results" || true
   # [ARCHIVE-3] `interrupted;`
   echo "reprocess.sh: error: interrupted; the same command continues" >&2
   exit 3
@@ -179,6 +180,7 @@ if [ "$code" != 0 ]; then
     last_line=$(tail -n 1 "$results/$file")
     echo "$results/$file: ${last_line:-is empty; is the disk full?}" >&2
   done
+  "$python" "$scripts/run_page.py" "$results" || true
   # [ARCHIVE-3] `not all could` | job ended early: disk, memory, or SIGTERM, SIGINT, SIGHUP | same command continues
   echo "reprocess.sh: error: not all could be processed; see $log; the same command continues" >&2
   exit 3

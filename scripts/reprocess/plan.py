@@ -24,6 +24,7 @@ import sqlite3
 import time
 from pathlib import Path
 
+import run_page
 from catalogue import SCANS, Catalogue
 from checks import INCOMPLETE, check, fail
 from dates import read_dates
@@ -187,6 +188,7 @@ def main():
         "vanished": sorted(list_results(results) - set(sessions)),
     }
     write_if_changed(state / "compare.json", json_text(compare))
+    run_page.write(results)
     print(f"{len(sessions)} sessions in {archive}; {looked}")
 
 

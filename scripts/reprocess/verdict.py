@@ -18,6 +18,7 @@ from changes import (
 from checks import INCOMPLETE
 from files import read_table
 from layout import describe_missing_inputs
+from run_page import restore
 
 MAX_NAMES = 20  # in a line on stdout; changes.json has all
 MAX_REASONS = 3
@@ -63,6 +64,7 @@ def describe_missed_gate(gate, items):
 
 def main():
     results = Path(sys.argv[1])
+    restore(results)
     document, rows = load_json(results / "changes.json"), read_table(results / "summary.csv")
     counts, changes, fleet = document["counts"], document["changes"], document["fleet"]
     items = collect_gate_items(document["vanished"], document["lost_results"], fleet, document["suspect"])

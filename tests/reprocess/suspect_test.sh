@@ -2,7 +2,8 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Sessions that calibrate without an error, but not with what they should: none passes in silence.
+# Sessions that calibrate without an error, but not with what they should: none passes in silence. The page of a run
+# that is interrupted is that of no complete run.
 source "$(dirname "$0")/common.sh"
 results=$scratch/suspect
 rm -rf "$results"
@@ -15,6 +16,7 @@ expect() {  # EXIT-CODE WORDS OPTION...: of a run
   [ "$code" = "$1" ] && cat "$said" "$said.errors" | grep -q -- "$2" || fail "$code, and not '$2': $(cat "$said" "$said.errors")"
 }
 expect 0 '^no result   0'
+cp "$results/overview.html" "$results-page"
 
 # Another camera's boards; half of a check is gone, and all of another; a session copied; a truth in mm.
 rm -r "$archive/camera-00004/session-01/boards" "$archive"/camera-00001/session-01/check/*[13579].png "$archive/camera-00002/session-01/check"
@@ -38,4 +40,19 @@ as_its_schema_says changes "$results/changes.json"
 expect 1 'gate suspect: is 5'
 printf 'format: vlp-archive-gates/1\ngates: {suspect: 5}\n' >"$results-gates.yaml"
 expect 0 '^suspect     5: ' --gates "$results-gates.yaml"
+
+# A run that is interrupted.
+archive=$scratch/archive
+take "$results-archive" "${sessions[@]}"
+rm -r "$results/sessions/camera-00005/session-03"
+start_reprocess "$results" --shard-size 2 --cores 1
+patiently 60 eval '[ "$(cat "$results"/.state/ran/* | wc -l)" -gt 0 ]'
+kill -TERM $!
+wait $! && fail "the run ended" || [ $? = 3 ] || fail "another exit code"
+grep -q '>INCOMPLETE<' "$results/overview.html" && grep -q 'Results of this run: camera-0000' "$results/overview.html" ||
+  fail "the page is that of another run: $(head -c 500 "$results/overview.html")"
+expect 0 '^no result   0'
+cmp "$results/overview.html" "$results-page" || fail "another page"
+expect 0 'ran 0, of them'
+cmp "$results/overview.html" "$results-page" || fail "no page of a run without changes"
 rm -r "$results" "$results"-*
