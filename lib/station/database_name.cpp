@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <string_view>
 
 #include "rig/input_error.h"
 
@@ -78,7 +79,20 @@ bool is_database_server_address(const std::string& where) {
 }
 
 bool contains_database_password(const std::string& where) {
-  return is_database_server_address(where) && !parse_parts(where)["password"].empty();
+  if (!is_database_server_address(where)) return false;
+  PQconninfoOption* options = PQconninfoParse(where.c_str(), nullptr);
+  const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> owned(options, PQconninfoFree);
+  for (; options != nullptr && options->keyword != nullptr; ++options) {
+    const std::string value = options->val == nullptr ? "" : options->val;
+    // libpq marks passwords by "*". Encoded, a password can be part of another value.
+    const bool is_secret = *options->dispchar == '*' && !value.empty();
+    const bool is_user_with_password =
+        std::string_view(options->keyword) == "user" && value.find(':') != std::string::npos;
+    if (is_secret || is_user_with_password || value.find("password=") != std::string::npos ||
+        value.find(kScheme) != std::string::npos)
+      return true;
+  }
+  return false;
 }
 
 std::string describe_database(const std::string& where) {

@@ -33,6 +33,21 @@ struct DatabaseIdentity : testing::Test {
   std::string here;
 };
 
+TEST(ContainsDatabasePassword, FindsEachSecretOfLibpqAndEncodedOnes) {
+  for (const char* where :
+       {"postgresql://u:secret@db/vlp", "postgresql://u:%73ecret@db/vlp",
+        "postgresql://u%3Asecret@db/vlp", "postgresql://u@db/vlp?password=secret",
+        "postgresql://u@db/vlp?p%61ssword=secret", "postgresql://u@db/vlp?sslpassword=secret",
+        "postgresql://u@db/vlp?options=-c%20password%3Dsecret",
+        "dbname=postgresql://u:secret@db/vlp"}) {
+    EXPECT_TRUE(contains_database_password(where)) << where;
+  }
+  for (const char* where : {"postgresql://u@db/vlp", "postgresql://db:5433/vlp?sslmode=require",
+                            "postgresql:///vlp?passfile=/etc/vlp/pass", "records.db"}) {
+    EXPECT_FALSE(contains_database_password(where)) << where;
+  }
+}
+
 TEST_F(DatabaseIdentity, IsMachineAndNormalizedPathForFile) {
   EXPECT_EQ(derive_database_identity("/var/lib/vlp/records.db"), here + "/var/lib/vlp/records.db");
   EXPECT_EQ(derive_database_identity("/var/lib/../lib/records.db"), here + "/var/lib/records.db");
