@@ -48,10 +48,9 @@
 #                  last), or the result in OTHER_RESULTS
 #
 # Exit code: 0 done; 1 done, but a gate of the archive is not met, or a gate of
-# a session if the archive has no gate_fraction. By default the archive has two
-# gates, vanished: 0: no session of RESULTS or --previous is missing in ARCHIVE;
-# suspect: 0: no session is a copy, lost inputs that it had, has unusual metrics,
-# or boards of another camera.
+# a session if the archive has no gate_fraction. Default gates: vanished: 0, no
+# session of RESULTS or --previous is missing in ARCHIVE; suspect: 0, none is
+# implausible, such as a copy, or with boards of another camera.
 # 2 invalid input; 3 incomplete: the run could not finish, no session has a
 # result, or more sessions have none than no_result or no_result_fraction of
 # --gates allow.
@@ -157,6 +156,7 @@ mapfile -t again <"$results/.state/again.txt"
   --rerun-incomplete --rerun-triggers mtime --keep-going --scheduler greedy "${how[@]}" \
   >"$log" 2>&1 &
 run=$!
+end_incomplete() { "$python" "$scripts/run_page.py" "$results" || true; echo "reprocess.sh: error: $1" >&2; exit 3; }
 # Snakemake would finish its shards first: its child processes on this machine are terminated, too.
 stop() {
   trap '' HUP INT TERM
@@ -164,10 +164,8 @@ stop() {
   while level=$(pgrep --parent "$level" | paste -sd,) && [ -n "$level" ]; do started+=(${level//,/ }); done
   kill -TERM "${started[@]}" 2>/dev/null || true
   wait "$run" || true
-  "$python" "$scripts/run_page.py" "$results" || true
   # [ARCHIVE-3] `interrupted;`
-  echo "reprocess.sh: error: interrupted; the same command continues" >&2
-  exit 3
+  end_incomplete "interrupted; the same command continues"
 }
 trap stop HUP INT TERM
 code=0
@@ -180,9 +178,7 @@ if [ "$code" != 0 ]; then
     last_line=$(tail -n 1 "$results/$file")
     echo "$results/$file: ${last_line:-is empty; is the disk full?}" >&2
   done
-  "$python" "$scripts/run_page.py" "$results" || true
   # [ARCHIVE-3] `not all could` | job ended early: disk, memory, or SIGTERM, SIGINT, SIGHUP | same command continues
-  echo "reprocess.sh: error: not all could be processed; see $log; the same command continues" >&2
-  exit 3
+  end_incomplete "not all could be processed; see $log; the same command continues"
 fi
 exec "$python" "$scripts/verdict.py" "$results"

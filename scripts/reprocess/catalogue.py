@@ -4,20 +4,11 @@
 
 A fingerprint is a digest of the names of the input files of a session and, for each, of size, times of content and of
 inode (st_mtime_ns, st_ctime_ns), and inode number. Unchanged fingerprints imply unchanged files, because programs
-cannot set the time of an inode. There are two kinds of scans:
+cannot set the time of an inode. README.md describes the two kinds of scans, files and folders: which changes each
+detects, and which one is the default.
 
-  files    checks each file. Detects all changes that the file system reports.
-  folders  checks the folders and the files that people edit (*.yaml, captures.csv, truth.csv). Detects files that are
-           added, removed, renamed or replaced by another file of the same name. Does not detect an image that is
-           overwritten in place, or that is a symbolic link to a changed file. All files of a session with a detected
-           change are checked.
-
-By default, an archive of up to FEW_SESSIONS, which takes a few seconds, is scanned by files; a larger one by folders,
-and by files once in ALL_FILES_AGAIN_NS.
-
-A change within RACY_NS before a scan may leave the times unchanged, because time stamps have a finite resolution and
-clocks of machines differ. The fingerprint of such new files is salted with the time of the scan, so that it differs
-from the next one. A catalogue that is new, belongs to another archive or cannot be read gets a new salt: all
+A change within RACY_NS before a scan may leave the times unchanged, as their resolution is finite and clocks differ: the
+fingerprint of such new files is salted with the time of the scan, so that it differs from the next one. A catalogue that is new, belongs to another archive or cannot be read gets a new salt: all
 fingerprints then differ from earlier ones, and all digests are computed again.
 """
 import os
@@ -25,11 +16,12 @@ import resource
 import sqlite3
 import time
 from array import array
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from hashlib import blake2b
 from urllib.parse import quote
 
-from files import INPUTS, MAX_FOLDERS, folder_id
+from files import INPUTS, MAX_FOLDERS, digest, file_digest, folder_id
 
 SCANS = ("files", "folders")
 FEW_SESSIONS = 10_000
@@ -108,6 +100,23 @@ class SessionFiles:
         return max(max(self.numbers[2::4], default=0), max(self.path_attributes[2::4]))
 
 
+def input_digests(session):
+    """Returns the digest of all inputs of a session, {name: digest} and {name: number of files} of its input files and
+    folders, and the names of entries that are no readable files, such as broken links."""
+    lines, counts, unreadable = {}, Counter(), []
+    for name in SessionFiles(session, None).files:
+        part, found = name.split("/")[0], "not a file"
+        try:
+            found = file_digest(session / name) if (session / name).is_file() else found
+        except OSError:
+            found = "cannot be read"
+        lines.setdefault(part, []).append(f"{found}  {name}\n")
+        counts[part] += " " not in found
+        unreadable += [f"{name}: {found}"] if " " in found else []
+    texts = {name: "".join(listed) for name, listed in lines.items()}
+    return digest("".join(texts.values())), {name: digest(text) for name, text in texts.items()}, counts, unreadable
+
+
 def read_attributes(session, places, archive):
     """Returns the attributes of the paths of a session. archive: file descriptor of the archive, which shortens
     lookups."""
@@ -145,9 +154,8 @@ class Catalogue:
                 return False
             self.settings = dict(database.execute("SELECT name, value FROM settings"))
             self.saved = dict(self.settings)
-            self.paths = [
-                paths.split("\n") for (paths,) in database.execute("SELECT paths FROM path_lists ORDER BY id")
-            ]
+            lists = database.execute("SELECT paths FROM path_lists ORDER BY id")
+            self.paths = [paths.split("\n") for (paths,) in lists]
             rows = database.execute("SELECT session, shard, fingerprint, folders_fingerprint, path_list FROM sessions")
             self.sessions = {row[0]: row[1:] for row in rows}
         finally:
@@ -165,7 +173,7 @@ class Catalogue:
         return int(self.settings.get("all_files_at_ns", 0))
 
     def fingerprints(self, names, how):
-        """Returns the fingerprint of each session, in this order."""
+        """Returns the fingerprint of each session."""
         began_ns = time.time_ns()
         archive = os.open(self.archive, os.O_RDONLY)
         try:
@@ -189,9 +197,8 @@ class Catalogue:
             if seen.latest() >= began_ns - RACY_NS:
                 fingerprint, folders_fingerprint = compute_digest(f"{salt} {began_ns}", seen.numbers, seen.files), ""
             else:
-                fingerprint, folders_fingerprint = compute_digest(salt, seen.numbers, seen.files), compute_digest(
-                    salt, seen.path_attributes
-                )
+                fingerprint = compute_digest(salt, seen.numbers, seen.files)
+                folders_fingerprint = compute_digest(salt, seen.path_attributes)
             places = "\n".join(seen.paths)
             number = ids_of_paths.get(places)
             return fingerprint, folders_fingerprint, places if number is None else number

@@ -2,14 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compares the results of an archive with earlier ones, and checks the gates of the archive.
 
-Sessions are paired by camera and session. A session that lost its result is counted even if its inputs changed; mean
-errors are compared only if the inputs are unchanged. Sessions of a camera share its lens. The statistic is therefore
-the mean over cameras of the change of mean_mm, with its 95 % interval (Student's t) if there are MIN_CAMERAS or more.
-Changes of up to MAX_EQUAL_CHANGE_MM are treated as equal.
-
-The gates of counts limit how many items a list may have: vanished sessions, lost results, changed cameras, moved lamps.
-A vanished session has a folder in RESULTS or a row in the earlier results, and no folder in the archive. A lost result
-belongs to a session that has none now and had one in the earlier results or in former/.
+README.md describes pairs, statistic, verdict and gates. A vanished session has a folder in RESULTS or a row in the
+earlier results, and no folder in the archive. A lost result belongs to a session that has none now and had one in the
+earlier results or in former/.
 """
 import json
 import math
@@ -19,15 +14,11 @@ from collections import Counter
 
 import yaml
 
-from plausibility import lost_inputs
+from plausibility import lost_inputs, session_name
 
 VERDICTS_WITH_RESULT = ("pass", "review", "gate", "look")  # "look": former name of "review", in earlier results
 MIN_CAMERAS = 20  # as vlp-evaluate requires 20 reference points
 MAX_EQUAL_CHANGE_MM = 0.001  # below all measurement uncertainties
-
-
-def session_name(row):
-    return f"{row['camera']}/{row['session']}"
 
 
 def rows_with_mean(rows):
@@ -146,11 +137,7 @@ GATES = {
     "lamps_moved": (0, math.inf, count_items("lamps_moved")),
     "newly_failed": (0, math.inf, lambda counts, changes, items: newly_failed(changes)),
     "worse_fraction": (0, 1, lambda counts, changes, items: worse_fraction(changes)),
-    "mean_difference_mm": (
-        -math.inf,
-        math.inf,
-        lambda counts, changes, items: changes and changes.get("interval_95_mm", [None, None])[1],
-    ),
+    "mean_difference_mm": (-math.inf, math.inf, lambda *args: args[1] and args[1].get("interval_95_mm", [None] * 2)[1]),
 }
 FORMER_GATES = {f"{name}_share": f"{name}_fraction" for name in ("no_result", "gate", "worse")}
 FORMER_GATES |= {name: "review_fraction" for name in ("look_share", "look_fraction")}

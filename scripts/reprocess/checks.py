@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the options of scripts/reprocess.sh."""
+"""Checks the options of scripts/reprocess.sh; version and digest of the programs that it runs."""
 import subprocess
 import sys
+from pathlib import Path
 
 from changes import read_gates
-from files import read_table
-from toolbox import PROGRAMS
+from files import digest, file_digest, read_table
 
-
+PROGRAMS = ["vlp-calibrate", "vlp-evaluate"]  # the second compares captures for the overview
 BAD_INPUT, INCOMPLETE = 2, 3  # exit codes of reprocess.sh
 
 
@@ -57,3 +57,16 @@ def check(options):
     if options.previous:
         check_previous(options.previous, options.results)
     check_session_gates(options)
+
+
+def toolbox(folder):
+    """Returns the version of vlp-calibrate, and a digest of it and of the script that reads its results."""
+    program = folder / PROGRAMS[0]
+    # Both run in parallel, because a start takes 0.2 s, mostly to load libraries.
+    nothing = subprocess.DEVNULL
+    with subprocess.Popen([program, "--batch-stdin"], stdin=nothing, stdout=nothing, stderr=nothing) as each:
+        stated = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
+    if each.returncode != 0:
+        raise ValueError(f"{program}: vlp-calibrate is too old for these scripts")
+    files = [program, Path(__file__).parent / "outcome.py"]
+    return {"version": stated.split()[-1], "toolbox": digest("".join(file_digest(file) for file in files))}

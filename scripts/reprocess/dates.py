@@ -59,7 +59,8 @@ def read_dates(archive, sessions):
     """Returns a row for each session with a date or a room. sessions: CAMERA/SESSION."""
     stated, lines = read_archive_table(archive), []
     if unknown := sorted({"/".join(name) for name in stated} - set(sessions)):
-        warn(f"{archive / 'archive.csv'}: names {len(unknown)} sessions that the archive lacks, as {unknown[0]}; correct it")
+        words = f"names {len(unknown)} sessions that the archive lacks, as {unknown[0]}; correct it"
+        warn(f"{archive / 'archive.csv'}: {words}")
     for name in sessions:
         camera, session = name.split("/")
         date, room = stated.get((camera, session), ("", ""))

@@ -81,9 +81,8 @@ def main():
         fail("--diff needs RESULTS CAMERA/SESSION and, if not the last former result, its KEY or OTHER_RESULTS")
     results, name, other = Path(sys.argv[1]), sys.argv[2].strip("/"), (sys.argv[3:] or [""])[0]
     now = find_result(results, name)
-    before = (
-        find_result(Path(other), name) if other and Path(other).is_dir() else find_former_result(results, name, other)
-    )
+    is_folder = other and Path(other).is_dir()
+    before = find_result(Path(other), name) if is_folder else find_former_result(results, name, other)
     print(f"{before} -> {now}")
     for line in list_differences(load(before), load(now)):
         print(line)

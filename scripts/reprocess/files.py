@@ -7,7 +7,6 @@ import io
 import json
 import os
 import re
-from collections import Counter
 from pathlib import Path
 
 # Inputs of vlp-calibrate in a session (lib/session/session_folder.h), except line drives, which only its report uses.
@@ -105,52 +104,3 @@ def folder_id(entry, above):
         return None
     found = status.st_dev, status.st_ino
     return None if found in above else found
-
-
-def input_files(session):
-    """Yields the input files of a session in order: (name, entry). A folder that cannot be read has no files; the
-    programs report the error. A link to a parent folder is treated as a file that cannot be read."""
-
-    folders = 0
-
-    def below(folder, prefix, above, wanted=None):
-        nonlocal folders
-        folders += 1
-        try:
-            entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
-        except OSError:
-            return
-        for entry in entries:
-            if wanted and entry.name not in wanted:
-                continue
-            found = folder_id(entry, above)
-            if found and folders < MAX_FOLDERS:
-                yield from below(entry.path, prefix + entry.name + "/", above | {found})
-            else:
-                yield prefix + entry.name, entry
-
-    try:
-        status = os.stat(session)
-    except OSError:
-        return
-    yield from below(session, "", {(status.st_dev, status.st_ino)}, set(INPUTS))
-
-
-def entry_digest(entry):
-    try:
-        return file_digest(entry.path) if entry.is_file() else "not a file"
-    except OSError:
-        return "cannot be read"
-
-
-def input_digests(session):
-    """Returns the digest of all inputs of a session, {name: digest} and {name: number of files} of its input files and
-    folders, and the names of entries that are no readable files, such as broken links."""
-    lines, counts, unreadable = {}, Counter(), []
-    for name, entry in input_files(session):
-        part, found = name.split("/")[0], entry_digest(entry)
-        lines.setdefault(part, []).append(f"{found}  {name}\n")
-        counts[part] += " " not in found
-        unreadable += [f"{name}: {found}"] if " " in found else []
-    texts = {name: "".join(listed) for name, listed in lines.items()}
-    return digest("".join(texts.values())), {name: digest(text) for name, text in texts.items()}, counts, unreadable

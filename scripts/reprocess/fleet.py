@@ -2,12 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Detects cameras that changed and lamps that were moved, from fleet.csv and lamps.csv.
 
-Each parameter of a camera is tested for a step at each session and for a steady drift, each lamp for a step at each
-session. Test statistics are the difference of the weighted means before and after the step, and the slope, divided by
-their standard deviations; the step with the largest |z| is the change point. The probability of any false alarm in the
-whole fleet is at most FALSE_ALARM_RATE: half of it is for drifts and half for steps, which are more numerous. A p value
-is multiplied by the number of tests of its kind (Bonferroni), which holds for any correlation of the parameters. The
-axes of a parameter are tested separately.
+Each parameter and axis of a camera is tested for a step at each session and for a steady drift, each lamp for a step.
+Test statistics are the difference of the weighted means before and after the step, and the slope, divided by their
+standard deviations; the step with the largest |z| is the change point. The probability of any false alarm in the whole
+fleet is at most FALSE_ALARM_RATE, half of it for drifts and half for steps. A p value is multiplied by the number of
+tests of its kind (Bonferroni), which holds for any correlation of the parameters.
 
 A detected change is a step, a drift or undecided, by the marginal likelihoods of the two models. Both have a mean and a
 change with the same wide prior; a step also has a date, with equal prior probability for each of its K sessions:
@@ -18,19 +17,15 @@ drifts are equally frequent. Otherwise it is "undecided", and the change and its
 
 The reported standard deviations exclude variations between sessions (of lens or map). If neighboring sessions of the
 whole fleet differ by more than reported, each parameter has a standard deviation between sessions, tau: the variance of
-a session is sd^2 + tau^2. (A factor on the reported standard deviations would be too small for sessions that report
-small ones.) tau is estimated from the smallest 95 % of the differences, so that the few cameras and lamps that changed
-do not increase it. It is then increased so that deviates decrease by a factor of 1 + 20 / n, because n differences
-determine it only approximately: if deviates are divided by a scale with relative variance v, exp(z^4 v / 2) times as
-many are beyond z as with the true scale. A relative decrease of the deviates by z^2 v / 2 compensates for that, with z
-= 4.5 and v = 2 / n. This v is a conservative choice, because some differences are excluded and neighboring ones are
-correlated; n independent ones would give 1 / (2 n). Nothing is tested with fewer than MIN_DIFFERENCES differences.
+a session is sd^2 + tau^2. tau is estimated from the smallest 95 % of the differences, so that the few cameras and lamps
+that changed do not increase it. It is then increased so that deviates decrease by a factor of 1 + 20 / n, because n
+differences determine it only approximately: if deviates are divided by a scale with relative variance v,
+exp(z^4 v / 2) times as many are beyond z as with the true scale; z = 4.5 and v = 2 / n, a conservative choice (n
+independent differences would give 1 / (2 n)). Nothing is tested with fewer than MIN_DIFFERENCES differences.
 
-A camera whose sessions scatter more than those of the fleet has its own tau (estimate_camera_taus()). The test
-compares the squared differences between neighboring sessions, over all its parameters, with those that the tau of the
-fleet explains. The largest OWN_REJECTED of a series are excluded, so that a change does not count as scatter. The same
-factor allows for few differences. Cameras with fewer than MIN_OWN_SESSIONS sessions have the tau of the fleet; one of
-them that scatters more causes an alarm.
+A camera whose sessions scatter more than those of the fleet has its own tau (estimate_camera_taus()), by the squared
+differences between neighboring sessions over all its parameters. The largest OWN_REJECTED of a series are excluded, so
+that a change does not count as scatter. Cameras with fewer than MIN_OWN_SESSIONS sessions have the tau of the fleet.
 
 `min_detectable` is the change of a parameter that is detected with DETECTION_PROBABILITY, for the sessions of the
 median series: a drift, or a step in the middle.
@@ -256,14 +251,8 @@ def find_change(rows, series, tests):
     before, since = rows[k - 1], rows[k]
     if kind == "drift":
         (change, sd), before, since = drift_change, rows[0], rows[-1]
-    return {
-        "kind": kind,
-        "change": change,
-        "sd": sd,
-        "p": min(1.0, p),
-        "before": identify(before),
-        "since": identify(since),
-    }
+    ends = {"before": identify(before), "since": identify(since)}
+    return {"kind": kind, "change": change, "sd": sd, "p": min(1.0, p), **ends}
 
 
 def median_sd(sds):
@@ -280,10 +269,8 @@ def sd_of_middle_step(series):
 
 def compute_min_detectable(all_series, between, tests):
     """Returns {parameter: {"drift", "step"}} in the unit of the parameter. all_series: (parameter, times, series)."""
-    z = {
-        kind: NORMAL.inv_cdf(DETECTION_PROBABILITY) - NORMAL.inv_cdf(FALSE_ALARM_RATE / 4 / max(1, tests[kind]))
-        for kind in tests
-    }
+    z_detected, rate = NORMAL.inv_cdf(DETECTION_PROBABILITY), FALSE_ALARM_RATE / 4
+    z = {kind: z_detected - NORMAL.inv_cdf(rate / max(1, number)) for kind, number in tests.items()}
     found = {}
     for name in (name for name in TRACKED_UNITS if between[name] is not None):
         of_kind = [(times, with_added_sd(series, between[name])) for kind, times, series in all_series if kind == name]
@@ -414,11 +401,8 @@ def make_rooms(rows):
 def analyze_fleet(rows, lamp_rows):
     """Returns the section `fleet` of changes.json. rows: of fleet.csv; lamp_rows: of lamps.csv."""
     cameras, rooms = collect_camera_series(rows), make_rooms(lamp_rows)
-    all_series = [
-        (parameter_of(column), session_times(used), series)
-        for columns in cameras.values()
-        for column, (used, series) in columns.items()
-    ]
+    of_columns = [(column, *one) for columns in cameras.values() for column, one in columns.items()]
+    all_series = [(parameter_of(column), session_times(used), series) for column, used, series in of_columns]
     between = {}
     for name in TRACKED_UNITS:
         of_parameter = [series for parameter, _, series in all_series if parameter == name]

@@ -4,7 +4,7 @@
 import pictures
 from changes import describe_date
 from fleet import collect_camera_series, parameter_of, make_rooms, session_times, with_added_sd
-from html_parts import picture, table
+from pictures import picture, table
 from outcome import TRACKED_UNITS
 
 MAX_PLOTS = 12
@@ -32,16 +32,8 @@ def cameras(fleet, fleet_rows):
     html, rows = '<h2 id="cameras">Cameras that changed</h2>\n', []
     for alarm in fleet["cameras"]:
         for change in alarm["changes"]:
-            by = f"{change['change']:+.4g} ± {change['sd']:.2g}"
-            rows.append(
-                (
-                    alarm["camera"],
-                    describe_column(change["column"]),
-                    by,
-                    describe_date(change),
-                    format_probability(change["p"]),
-                )
-            )
+            words = describe_column(change["column"]), f"{change['change']:+.4g} ± {change['sd']:.2g}"
+            rows.append((alarm["camera"], *words, describe_date(change), format_probability(change["p"])))
     html += table(["camera", "parameter", "change", "step or drift", "false alarm probability"], rows, "changes.json")
     pictured = {alarm["camera"] for alarm in fleet["cameras"][:MAX_PLOTS]}
     series = collect_camera_series([row for row in fleet_rows if row["camera"] in pictured])
@@ -59,9 +51,8 @@ def cameras(fleet, fleet_rows):
         at = next((time for time, row in zip(times, rows_of_first) if row["session"] == since), None)
         dated = all(row["date"] for row in rows_of_first)
         what = f"{name.replace('_', ' ')} from the first session ({TRACKED_UNITS[name]})"
-        html += picture(
-            pictures.over_time(points, f"change ({TRACKED_UNITS[name]})", dated, at), f"{alarm['camera']}: {what}"
-        )
+        drawn = pictures.over_time(points, f"change ({TRACKED_UNITS[name]})", dated, at)
+        html += picture(drawn, f"{alarm['camera']}: {what}")
     return html
 
 
@@ -76,16 +67,13 @@ def lamps(fleet, lamp_rows):
     columns = ["room", "lamp", "moved by", "after", "not later than", "false alarm probability", ""]
     html += table(columns, rows, "changes.json")
     pictured = {(lamp["room"], lamp["map"]) for lamp in fleet["lamps"][:MAX_PLOTS]}
-    rooms = {
-        room.name: room for room in make_rooms([row for row in lamp_rows if (row["room"], row["map"]) in pictured])
-    }
+    pictured_rows = [row for row in lamp_rows if (row["room"], row["map"]) in pictured]
+    rooms = {room.name: room for room in make_rooms(pictured_rows)}
     for lamp in fleet["lamps"][:MAX_PLOTS]:
         room = rooms[lamp["room"], lamp["map"]]
         times, numbers = session_times(room.sessions), [entry[0] for entry in room.series[lamp["lamp"]]]
-        points = {
-            axis: [(times[i], value, sd) for i, (value, sd) in zip(numbers, series)]
-            for axis, series in zip("xy", room.axis_series(lamp["lamp"], fleet["between_sessions"]["lamps"]))
-        }
+        all_series = zip("xy", room.axis_series(lamp["lamp"], fleet["between_sessions"]["lamps"]))
+        points = {axis: [(times[i], *one) for i, one in zip(numbers, series)] for axis, series in all_series}
         is_since = [all(row[key] == lamp["since"][key] for key in ("camera", "session")) for row in room.sessions]
         what = f"lamp {lamp['lamp']}: position relative to the other lamps minus the map (mm)"
         dated = all(row["date"] for row in room.sessions)
@@ -124,11 +112,9 @@ def render_page(fleet, fleet_rows, lamp_rows):
     if not tested:
         return html + "<p>Too few sessions of a camera or of a room to test for changes of cameras or lamps.</p>\n"
     if not html:
-        html = "<h2>Cameras and lamps over time</h2>\n"
-        html += "<p>No change of a camera or lamp was detected.</p>\n"
-    wide = ", ".join(
-        f"{name.replace('_', ' ')} {tau:.2g} {TRACKED_UNITS.get(name, 'mm')}" for name, tau in tested.items() if tau
-    )
+        html = "<h2>Cameras and lamps over time</h2>\n<p>No change of a camera or lamp was detected.</p>\n"
+    added = ((name, tau) for name, tau in tested.items() if tau)
+    wide = ", ".join(f"{name.replace('_', ' ')} {tau:.2g} {TRACKED_UNITS.get(name, 'mm')}" for name, tau in added)
     rate = f"{100 * fleet['false_alarm_rate']:.0f} %"
     drifts, steps = fleet["tests"]["drift"], fleet["tests"]["step"]
     html += f"<p>{drifts} parameters were tested for drifts, {steps} sessions of parameters and lamps for steps; the "

@@ -10,22 +10,8 @@ import signal
 
 METRICS = ["captures", "fixes", "missing_fraction", "mean_mm", "median_mm", "p90_mm", "max_mm", "rms_px"]
 REMARKS = ["warnings", "images_skipped", "rejected_lamps", "remarks"]
-SUMMARY_COLUMNS = [
-    "camera",
-    "session",
-    "verdict",
-    *METRICS,
-    *REMARKS,
-    "date",
-    "reason",
-    "suspect",
-    "files",
-    "expected",
-    "version",
-    "inputs",
-    "key",
-    "cpu_s",
-]
+SUMMARY_COLUMNS = ["camera", "session", "verdict", *METRICS, *REMARKS, "date", "reason", "suspect", "files", "expected"]
+SUMMARY_COLUMNS += ["version", "inputs", "key", "cpu_s"]
 # Units of the calibrated parameters that are tracked over time, by their names in session.json. Each has components
 # along x and y with standard deviations.
 TRACKED_UNITS = {"focal": "px", "principal_point": "px", "zenith": "deg", "rotation_center": "px"}
@@ -45,18 +31,12 @@ FLEET_COLUMNS = ["camera", "session", "date", "room", "map", "tilt_deg"]
 FLEET_COLUMNS += [column for name in TRACKED_COLUMNS for column in (name, sd_column(name))] + [*RESIDUALS, "mean_mm"]
 LAMP_COLUMNS = ["room", "map", "lamp", "camera", "session", "date", "captures", "map_x_m", "map_y_m"]
 LAMP_COLUMNS += ["offset_x_mm", "offset_y_mm", "offset_x_sd_mm", "offset_y_sd_mm"]
-SHARD_COLUMNS = list(
-    dict.fromkeys([*SUMMARY_COLUMNS, *FLEET_COLUMNS, "lamps", "gate_metrics", "fingerprint"])
-)  # of the rows of a shard
+# Columns of the rows of a shard.
+SHARD_COLUMNS = list(dict.fromkeys([*SUMMARY_COLUMNS, *FLEET_COLUMNS, "lamps", "gate_metrics", "fingerprint"]))
 TIMED_OUT = -signal.SIGALRM
 # Output files of vlp-calibrate that are kept, and their names in the results.
-KEPT_FILES = {
-    "calibration.yaml": "calibration.yaml",
-    "lens.cameramodel": "camera.cameramodel",
-    "check-fixes.csv": "fixes.csv",
-    "evaluation.json": "evaluation.json",
-    "session.json": "session.json",
-}
+KEPT_FILES = {name: name for name in ("calibration.yaml", "evaluation.json", "session.json")}
+KEPT_FILES |= {"lens.cameramodel": "camera.cameramodel", "check-fixes.csv": "fixes.csv"}
 
 
 def format_value(value):

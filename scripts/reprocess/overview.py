@@ -9,27 +9,12 @@ from pathlib import Path
 
 import fleet_page
 import pictures
-from changes import (
-    DEFAULT_GATES,
-    VERDICTS_WITH_RESULT,
-    compare_results,
-    check_gates,
-    count_reasons,
-    count_verdicts,
-    is_incomplete,
-    list_suspects,
-    collect_gate_items,
-    load_json,
-    find_lost_results,
-    session_name,
-    read_gates,
-    count_failed_sessions,
-    find_vanished_sessions,
-    rows_with_mean,
-)
+from changes import DEFAULT_GATES, VERDICTS_WITH_RESULT, check_gates, collect_gate_items, compare_results, count_reasons
+from changes import count_failed_sessions, count_verdicts, find_lost_results, find_vanished_sessions, is_incomplete
+from changes import list_suspects, load_json, read_gates, rows_with_mean, session_name
 from files import json_text, read_table, write_atomically
 from fleet import analyze_fleet
-from html_parts import number, picture, table
+from pictures import number, picture, table
 
 MAX_NAMES = 5  # in a line of the list of actions
 MAX_PLOTS = 6
@@ -51,28 +36,17 @@ def compare_captures(run, truth, now, before):
 
 
 def list_largest_differences(run, previous, pairs):
-    html = "<h2>Sessions that differ most</h2>\n"
-    rows = []
+    html, plots, rows = "<h2>Sessions that differ most</h2>\n", "", []
     for row, old, change in pairs[:MAX_PLOTS]:
-        files = [
-            Path(run["archive"]) / session_name(row) / "check/truth.csv",
-            Path("sessions") / session_name(row) / "fixes.csv",
-        ]
-        files.append(previous / "sessions" / session_name(row) / "fixes.csv")
-        verdict = compare_captures(run, *files) if all(file.exists() for file in files) else "fixes are missing"
-        rows.append((session_name(row), old["mean_mm"], row["mean_mm"], f"{change:+.4g}", verdict))
-    html += table(["session", "before (mm)", "now (mm)", "change (mm)", "vlp-evaluate"], rows)
-    for row, _, change in pairs[:MAX_PLOTS]:
-        truth = Path(run["archive"]) / session_name(row) / "check/truth.csv"
-        fixes = [folder / "sessions" / session_name(row) / "fixes.csv" for folder in (previous, Path("."))]
-        if change == 0 or not all(file.exists() for file in [truth, *fixes]):
-            continue
-        data, scale = pictures.floor(truth, *fixes)
+        name, truth = session_name(row), Path(run["archive"]) / session_name(row) / "check/truth.csv"
+        before, now = (folder / "sessions" / name / "fixes.csv" for folder in (previous, Path(".")))
+        exist = all(file.exists() for file in (truth, now, before))
+        verdict = compare_captures(run, truth, now, before) if exist else "fixes are missing"
+        rows.append((name, old["mean_mm"], row["mean_mm"], f"{change:+.4g}", verdict))
+        data, scale = pictures.floor(truth, before, now) if exist and change != 0 else (None, 0)
         if data:
-            html += picture(
-                data, f"{session_name(row)}: errors over the floor, before and now, magnified {scale} times"
-            )
-    return html
+            plots += picture(data, f"{name}: errors over the floor, before and now, magnified {scale} times")
+    return html + table(["session", "before (mm)", "now (mm)", "change (mm)", "vlp-evaluate"], rows) + plots
 
 
 def read_input_digests(results, name):
@@ -89,9 +63,7 @@ def changed_inputs(previous, rows, before, changes):
     by_name, listed = {session_name(row): row for row in rows}, []
     rows_before = {session_name(row): row for row in before}
     lost = changes["lost_with_changed_inputs"]
-    for name in [*lost, *(name for name in changes["sessions_with_changed_inputs"] if name not in set(lost))][
-        :MAX_EXAMINED
-    ]:
+    for name in list(dict.fromkeys([*lost, *changes["sessions_with_changed_inputs"]]))[:MAX_EXAMINED]:
         parts_now, parts_before = read_input_digests(Path("."), name), read_input_digests(previous, name)
         files = sorted(part for part in {*parts_now, *parts_before} if parts_now.get(part) != parts_before.get(part))
         what = "lost its result" if name in lost else by_name[name]["verdict"]
@@ -105,10 +77,8 @@ def changed_inputs(previous, rows, before, changes):
 
 def comparison(run, previous, rows, before, changes, pairs):
     html = "<h2>Comparison with earlier results</h2>\n"
-    html += table(
-        ["", "sessions"],
-        [(words, len(changes[key]) if isinstance(changes[key], list) else changes[key]) for words, key in COUNTED],
-    )
+    counts = [(words, changes[key]) for words, key in COUNTED]
+    html += table(["", "sessions"], [(words, len(one) if isinstance(one, list) else one) for words, one in counts])
     if pairs:
         html += f"<p>Mean change: {number(changes['mean_difference_mm'])} mm"
         if "interval_95_mm" in changes:
@@ -129,17 +99,10 @@ def comparison(run, previous, rows, before, changes, pairs):
 
 COMPARED = ("verdict", "mean_mm", "rms_px")  # columns shown before and now for sessions with changed inputs
 
-COUNTED = [
-    ("better", "better"),
-    ("worse", "worse"),
-    ("the same", "same"),
-    ("newly without a result", "newly_failed"),
-    ("newly with a result", "newly_succeeded"),
-    ("with changed inputs", "changed_inputs"),
-    ("with changed inputs, newly without a result", "lost_with_changed_inputs"),
-    ("new", "only_now"),
-    ("no longer in the archive", "only_before"),
-]
+COUNTED = [("better", "better"), ("worse", "worse"), ("the same", "same"), ("newly without a result", "newly_failed")]
+COUNTED += [("newly with a result", "newly_succeeded"), ("with changed inputs", "changed_inputs")]
+COUNTED += [("with changed inputs, newly without a result", "lost_with_changed_inputs")]
+COUNTED += [("new", "only_now"), ("no longer in the archive", "only_before")]
 
 
 def list_sessions_to_review(rows):
@@ -157,6 +120,15 @@ def shorten(items):
     return "; ".join(items[:MAX_NAMES]) + more
 
 
+ACTIONS = [
+    ("vanished", "Restore these sessions, or delete their results if they were removed on purpose", "vanished"),
+    ("suspect", "Check these sessions", "suspect"),
+    ("lost_results", "Find out why these sessions lost their result", "failed"),
+    ("cameras_changed", "Examine these cameras", "cameras"),
+    ("lamps_moved", "Survey these lamps", "lamps"),
+]
+
+
 def list_actions(document, items, rows):
     """Returns the actions, most urgent first: (description, id of the section with the details)."""
     counts, actions = document["counts"], []
@@ -164,17 +136,7 @@ def list_actions(document, items, rows):
         reason, count = count_reasons(rows)[0]
         words = f"{count} of {counts['sessions']} sessions have no result: {reason}"
         actions.append((f"Correct the archive: {words}", "failed"))
-    if items["vanished"]:
-        words = "Restore these sessions, or delete their results if they were removed on purpose"
-        actions.append((f"{words}: {shorten(items['vanished'])}", "vanished"))
-    if items.get("suspect"):
-        actions.append((f"Check these sessions: {shorten(items['suspect'])}", "suspect"))
-    if items["lost_results"]:
-        actions.append((f"Find out why these sessions lost their result: {shorten(items['lost_results'])}", "failed"))
-    if items["cameras_changed"]:
-        actions.append((f"Examine these cameras: {shorten(items['cameras_changed'])}", "cameras"))
-    if items["lamps_moved"]:
-        actions.append((f"Survey these lamps: {shorten(items['lamps_moved'])}", "lamps"))
+    actions += [(f"{words}: {shorten(items[name])}", section) for name, words, section in ACTIONS if items.get(name)]
     missed = [gate["name"] for gate in document["gates"] if not gate["passed"] and not items.get(gate["name"])]
     if missed:
         actions.append((f"Check the gates that are not met: {', '.join(missed)}", "gates"))
@@ -204,11 +166,8 @@ def render_verdict(document, items, rows):
 def render_page(run, rows, document, items, fleet, parts):
     html = '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
     html += '<meta name="viewport" content="width=device-width, initial-scale=1">'
-    html += (
-        f"<title>Reprocessed archive</title><style>{STYLE}</style></head><body><main>\n<h1>Reprocessed archive</h1>\n"
-    )
-    html += render_verdict(document, items, rows)
-    html += list_sessions_to_review(rows)
+    html += f"<title>Reprocessed archive</title><style>{STYLE}</style></head><body><main>\n"
+    html += "<h1>Reprocessed archive</h1>\n" + render_verdict(document, items, rows) + list_sessions_to_review(rows)
     if items["vanished"]:
         html += '<h2 id="vanished">No longer in the archive</h2>\n'
         html += table(["session"], [(name,) for name in items["vanished"]], "changes.json")
@@ -226,24 +185,20 @@ def render_page(run, rows, document, items, fleet, parts):
     if failed:
         lost = set(items["lost_results"])
         html += '<h2 id="failed">Without a result</h2>\n' + table(["reason", "sessions"], count_reasons(failed))
-        columns = [
-            (session_name(row), "had one earlier" if session_name(row) in lost else "", row["reason"]) for row in failed
-        ]
+        columns = [(session_name(r), "had one earlier" * (session_name(r) in lost), r["reason"]) for r in failed]
         html += table(["session", "", "reason"], sorted(columns, key=lambda column: not column[1]))
     missing = [row for row in rows if row["verdict"] == "gate"]
     if missing:
         html += '<h2 id="session-gates">A gate is not met</h2>\n'
-        html += table(
-            ["session", "mean (mm)", "reason"], [(session_name(r), r["mean_mm"], r["reason"]) for r in missing]
-        )
+        cells = [(session_name(r), r["mean_mm"], r["reason"]) for r in missing]
+        html += table(["session", "mean (mm)", "reason"], cells)
     return html + parts + "</main></body></html>\n"
 
 
 def had_result(name):
     """Returns true if RESULTS has a former result of a session that has none now."""
-    return any(
-        load_json(file)["verdict"] in VERDICTS_WITH_RESULT for file in (Path("former") / name).glob("*/row.json")
-    )
+    rows = (load_json(file) for file in (Path("former") / name).glob("*/row.json"))
+    return any(row["verdict"] in VERDICTS_WITH_RESULT for row in rows)
 
 
 def main():
@@ -270,10 +225,8 @@ def main():
     document = {"counts": counts, "changes": changes, "gates": results, "passed": passed, "fleet": fleet}
     document |= {"vanished": vanished, "lost_results": lost, "suspect": items["suspect"]}
     write_atomically("changes.json", json_text({"format": "vlp-archive-changes/2", **document}))
-    write_atomically(
-        "overview.html",
-        render_page(run, rows, document, items, fleet_page.render_page(fleet, fleet_rows, lamp_rows), parts),
-    )
+    over_time = fleet_page.render_page(fleet, fleet_rows, lamp_rows)
+    write_atomically("overview.html", render_page(run, rows, document, items, over_time, parts))
 
 
 if __name__ == "__main__":

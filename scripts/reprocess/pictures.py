@@ -1,13 +1,15 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Plots of the overview, rendered by gnuplot, as data URLs for <img>."""
+"""HTML elements of the overview; its plots, rendered by gnuplot, as data URLs for <img>."""
 import base64
 import subprocess
+from html import escape
 
 from files import read_table
 
 BEFORE, NOW = "#E69F00", "#0072B2"  # from the palette of Okabe and Ito
 MAX_POINTS = 4000
+MAX_ROWS = 200  # of a table
 BETWEEN = "(0.02, 0.05, 0.2, 0.5, 2, 5, 20, 50, 200, 500)"  # marks on logarithmic axes
 
 
@@ -96,3 +98,20 @@ def floor(truth_file, before_file, now_file):
     script += f"plot $before with vectors lw 2 dt 2 lc rgb '{BEFORE}' title 'before', "
     script += f"$now with vectors lw 2 lc rgb '{NOW}' title 'now'\n"
     return render(script, "520,380"), scale
+
+
+def table(columns, rows, where="summary.csv"):
+    head = "".join(f'<th scope="col">{escape(column)}</th>' if column else "<td></td>" for column in columns)
+    cells = ["".join(f"<td>{escape(str(cell))}</td>" for cell in row) for row in rows[:MAX_ROWS]]
+    body = "".join(f"<tr>{row}</tr>\n" for row in cells)
+    more = f"<p>and {len(rows) - MAX_ROWS} more, in {where}</p>" if len(rows) > MAX_ROWS else ""
+    scrolled = '<div class="wide" tabindex="0" role="region" aria-label="Table">'
+    return f"{scrolled}<table><thead><tr>{head}</tr></thead><tbody>\n{body}</tbody></table></div>{more}\n"
+
+
+def picture(data, words):
+    return f'<p><img src="{data}" alt="{escape(words)}"></p><p>{escape(words)}</p>\n'
+
+
+def number(value):
+    return f"{value:.4g}" if isinstance(value, float) else "none" if value is None else str(value)

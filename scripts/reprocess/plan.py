@@ -26,12 +26,11 @@ from pathlib import Path
 
 import run_page
 from catalogue import SCANS, Catalogue
-from checks import INCOMPLETE, check, fail
+from checks import INCOMPLETE, check, fail, toolbox
 from dates import read_dates
 from files import digest, json_text, table, write_if_changed, write_atomically
 from layout import LAYOUT, check_layout, describe_wrong_level, list_sessions_in
 from session_gates import read_limits
-from toolbox import toolbox
 
 
 def list_results(results):
@@ -135,9 +134,7 @@ def list_pending_shards(state, summary):
         made = modification_time_ns(rows)
         if (made is None and summed_up is not None) or (made is not None and b",crashed," in rows.read_bytes()):
             again.append(file.stem)
-        elif (
-            made is not None and summed_up is not None and max(modification_time_ns(file), options) <= made <= summed_up
-        ):
+        elif None not in (made, summed_up) and max(modification_time_ns(file), options) <= made <= summed_up:
             continue
         known.append(file.stem)
     return known, again
@@ -145,15 +142,10 @@ def list_pending_shards(state, summary):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("archive", type=Path)
-    parser.add_argument("results", type=Path)
-    parser.add_argument("--bin", type=Path, required=True)
-    parser.add_argument("--gates", type=Path)
-    parser.add_argument("--session-gates", type=Path)
-    parser.add_argument("--previous", type=Path)
-    parser.add_argument("--keep", type=int, default=1)
-    parser.add_argument("--shard-size", type=int, default=50)
-    parser.add_argument("--at-a-time", type=int, default=1)
+    for name in ("archive", "results", "--bin", "--gates", "--session-gates", "--previous"):
+        parser.add_argument(name, type=Path)
+    for name, default in (("--keep", 1), ("--shard-size", 50), ("--at-a-time", 1)):
+        parser.add_argument(name, type=int, default=default)
     parser.add_argument("--scan", choices=SCANS)
     parser.add_argument("--rebuild-catalogue", action="store_true")
     parser.add_argument("--camera-option", action="append", default=[])

@@ -10,7 +10,7 @@ MIN_SESSIONS = 8  # with a metric, for a median
 MIN_DEVIATION = 6  # robust standard deviations of the logarithm
 # Ratio to the median from which a metric is unusual; below 1 if larger values are better.
 UNUSUAL_RATIO = {"mtf50": 0.85, "mean_mm": 5, "height_rms_mm": 5, "yaw_rms_deg": 5, "dispersion_mm": 5}
-UNUSUAL_RATIO |= {"normalized_error_rms": 5, "rms_px": 5, "rotation_px": 5}
+UNUSUAL_RATIO |= {"normalized_error_rms": 5, "rotation_px": 5}
 LENS = ("focal_x_px", "focal_y_px", "principal_point_x_px", "principal_point_y_px")
 IDENTIFYING = {"boards": LENS, "rotation": ("rotation_center_x_px", "rotation_center_y_px")}
 MIN_OWN = 4  # sessions of cameras that have several, for the usual distance between these
@@ -19,8 +19,7 @@ MIN_RATIO, MIN_DISTANCE_PX = 10, 0.1  # of the distance from the nearest session
 
 def count_inputs(text):
     """Returns {input: number of files} of a column such as "boards 20, check 12"."""
-    words = (part.rsplit(" ", 1) for part in text.split(", ") if part)
-    return Counter({name: int(count) for name, count in words})
+    return Counter({name: int(count) for name, count in (part.rsplit(" ", 1) for part in text.split(", ") if part)})
 
 
 def format_counts(counts):
@@ -33,7 +32,7 @@ def lost_inputs(row, before):
     return [f"{name} has {now[name]} of {count} files" for name, count in expected.items() if now[name] < count]
 
 
-def name_of(row):
+def session_name(row):
     return f"{row['camera']}/{row['session']}"
 
 
@@ -41,12 +40,12 @@ def find_copies(rows):
     first = {}
     for row in rows:
         if row.get("inputs") and first.setdefault(row["inputs"], row) is not row:
-            yield name_of(row), f"is a copy of {name_of(first[row['inputs']])}"
+            yield session_name(row), f"is a copy of {session_name(first[row['inputs']])}"
 
 
 def find_unusual_metrics(rows):
     for metric, limit in UNUSUAL_RATIO.items():
-        logs = {name_of(row): math.log(float(row[metric])) for row in rows if float(row.get(metric) or 0) > 0}
+        logs = {session_name(row): math.log(float(row[metric])) for row in rows if float(row.get(metric) or 0) > 0}
         if len(logs) < MIN_SESSIONS:
             continue
         median = statistics.median(logs.values())
@@ -60,16 +59,12 @@ def find_unusual_metrics(rows):
 
 def find_foreign_inputs(rows):
     for part, columns in IDENTIFYING.items():
-        places = {name_of(row): [float(row[one]) for one in columns] for row in rows if row.get(columns[0])}
-        by_camera = defaultdict(dict)
-        for name, place in places.items():
-            by_camera[name.split("/")[0]][name] = place
-        own = {}
-        for sessions in by_camera.values():
-            for name, place in sessions.items():
-                others = [math.dist(place, other) for known, other in sessions.items() if known != name]
-                if others:
-                    own[name] = min(others)
+        places = {session_name(row): [float(row[one]) for one in columns] for row in rows if row.get(columns[0])}
+        by_camera, own = defaultdict(list), {}
+        for name in places:
+            by_camera[name.split("/")[0]].append(name)
+        for names in filter(lambda names: len(names) > 1, by_camera.values()):
+            own |= {name: min(math.dist(places[name], places[one]) for one in names if one != name) for name in names}
         if len(own) < MIN_OWN:
             continue
         limit = max(MIN_DISTANCE_PX, MIN_RATIO * sorted(own.values())[len(own) // 4])
@@ -78,7 +73,8 @@ def find_foreign_inputs(rows):
                 continue
             camera = name.split("/")[0]
             others = (one for one in places if one.split("/")[0] != camera)
-            nearest, other = min(((math.dist(places[name], places[one]), one) for one in others), default=(math.inf, ""))
+            distances = ((math.dist(places[name], places[one]), one) for one in others)
+            nearest, other = min(distances, default=(math.inf, ""))
             if nearest < distance / MIN_RATIO:
                 words = f"{part}: of {other.split('/')[0]}? {distance:.2g} px from the nearest session of {camera}, "
                 yield part, name, words + f"{nearest:.2g} px from {other}"
@@ -94,5 +90,5 @@ def find_suspects(rows):
         if part == "boards" or found[name]:
             found[name].insert(0, reason)
     for row in rows:
-        found[name_of(row)] += lost_inputs(row, row)
+        found[session_name(row)] += lost_inputs(row, row)
     return found

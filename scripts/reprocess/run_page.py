@@ -16,20 +16,19 @@ def is_run_page(page):
     return page.exists() and MARK in page.read_text()
 
 
-def utc(seconds):
-    return time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(seconds))
-
-
 def write(results):
     page, last, state = results / "overview.html", results / ".state/overview.html", results / ".state"
     if page.exists() and not is_run_page(page):
         os.replace(page, last)
-    ran = [line.split("\t")[0] for file in sorted((state / "ran").glob("*")) for line in file.read_text().splitlines()]
-    text = f'<!DOCTYPE html>\n<meta charset="utf-8"><title>Incomplete run</title>{MARK}\n<p class="verdict">INCOMPLETE</p>\n'
-    text += f"<p>The run that began on {utc(float((state / 'started').read_text()))} has not ended; the same command "
-    text += f"continues it. Results of this run: {escape(', '.join(sorted(set(ran)))) or 'none'}.</p>\n"
+    ran = {line.split("\t")[0] for file in (state / "ran").glob("*") for line in file.read_text().splitlines()}
+    text = f'<!DOCTYPE html>\n<meta charset="utf-8"><title>Incomplete run</title>{MARK}\n'
+    text += '<p class="verdict">INCOMPLETE</p>\n'
+    began, form = float((state / "started").read_text()), "%Y-%m-%d %H:%M:%S UTC"
+    text += f"<p>The run that began on {time.strftime(form, time.gmtime(began))} has not ended; the same command "
+    text += f"continues it. Results of this run: {escape(', '.join(sorted(ran))) or 'none'}.</p>\n"
     if last.exists():
-        text += f"<p>All other results, summary.csv and changes.json are of runs up to {utc(last.stat().st_mtime)}.</p>\n"
+        until = time.strftime(form, time.gmtime(last.stat().st_mtime))
+        text += f"<p>All other results, summary.csv and changes.json are of runs up to {until}.</p>\n"
     page.write_text(text)
 
 

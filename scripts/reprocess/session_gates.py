@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Applies --session-gates (vlp-gates/1) to the rows of sessions that have no gates.yaml of their own.
 
-vlp-calibrate runs without these gates, so that a change of the gates requires no new calibration. A row has the metrics
-and gates of session.json (`gate_metrics`), from which the verdict follows as in lib/session/session.cpp. A gate of the
-file replaces the gate of the lens with the same name.
+A change of the gates requires no new calibration: a row has the metrics and gates of session.json (`gate_metrics`). A
+gate of the file replaces the gate of the lens with the same name.
 """
 import json
 

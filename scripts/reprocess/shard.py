@@ -17,7 +17,8 @@ import sys
 import time
 from pathlib import Path
 
-from files import digest, input_digests, json_text, read_table, table, write_atomically
+from catalogue import input_digests
+from files import digest, json_text, read_table, table, write_atomically
 from outcome import SHARD_COLUMNS, KEPT_FILES, read_outcome
 from plausibility import count_inputs, format_counts
 
@@ -62,12 +63,8 @@ class BatchProcess:
     def ask(self, arguments):
         """Starts a session. Call answer() before the next one."""
         if self.process is None:
-            self.process = subprocess.Popen(
-                [self.program, "--batch-stdin"],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                pass_fds=[self.lock.fileno()],
-            )
+            pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "pass_fds": [self.lock.fileno()]}
+            self.process = subprocess.Popen([self.program, "--batch-stdin"], **pipes)
         request = json.dumps({"arguments": [str(argument) for argument in arguments], "limit_s": TIME_LIMIT_S})
         try:
             self.process.stdin.write(request.encode() + b"\n")
@@ -177,11 +174,6 @@ def append_line(folder, shard, *words):
         log.write("\t".join(words) + "\n")
 
 
-def record_run(shard, row, cost, size):
-    """Records a session that this run processed, also if the run is killed and continued."""
-    append_line("ran", shard, f"{row['camera']}/{row['session']}", row["verdict"], cost, str(size))
-
-
 def expect_inputs(name, counts):
     """Returns the columns `files`, the number of files of each input, and `expected`, the largest one so far."""
     old = read_row(Path("sessions") / name) or read_row(Path("failed") / name) or {}
@@ -215,7 +207,8 @@ def reprocess(run, shard, fingerprints, lock, keep):
             row["gate_metrics"] = ""
         cost = f"{seconds:.3f}"
         append_line("costs", shard, name, cost, f"{time.time():.3f}")  # a session may move to another shard
-        record_run(shard, row, cost, publish(row, work, keep))
+        size = publish(row, work, keep)
+        append_line("ran", shard, name, row["verdict"], cost, str(size))  # also if the run is killed and continued
         shutil.rmtree(work / name)
         rows[name] |= row
 

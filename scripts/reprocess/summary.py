@@ -10,7 +10,7 @@ from pathlib import Path
 
 from files import read_table, table, write_atomically
 from outcome import SUMMARY_COLUMNS, FLEET_COLUMNS, LAMP_COLUMNS
-from plausibility import find_suspects, name_of
+from plausibility import find_suspects, session_name
 from session_gates import apply_session_gates
 
 
@@ -30,9 +30,8 @@ def read_costs(folder):
     costs = {}
     for file in filter(Path.is_file, folder.glob("*")):
         for line in file.read_text().splitlines():
-            if whole := re.fullmatch(
-                r"([^\t]+)\t([\d.]+)\t(\d+\.\d{3})", line
-            ):  # a killed process may leave an incomplete line
+            # A killed process may leave an incomplete line.
+            if whole := re.fullmatch(r"([^\t]+)\t([\d.]+)\t(\d+\.\d{3})", line):
                 name, cost, at = whole.groups()
                 costs[name] = max(costs.get(name, (0, "")), (float(at), cost))
     return {name: cost for name, (_, cost) in costs.items()}
@@ -52,7 +51,7 @@ def main():
         row["cpu_s"] = costs.get(f"{row['camera']}/{row['session']}", "")
     suspects = find_suspects(rows)
     for row in rows:
-        row["suspect"] = "; ".join(suspects[name_of(row)])
+        row["suspect"] = "; ".join(suspects[session_name(row)])
         row["verdict"] = "review" if row["suspect"] and row["verdict"] == "pass" else row["verdict"]
     calibrated = [row for row in rows if row["focal_x_px"]]
     write_atomically("lamps.csv", table(LAMP_COLUMNS, (lamp for row in calibrated for lamp in make_lamp_rows(row))))

@@ -6,15 +6,8 @@ import sys
 import time
 from pathlib import Path
 
-from changes import (
-    VERDICTS_WITH_RESULT,
-    count_reasons,
-    is_incomplete,
-    collect_gate_items,
-    load_json,
-    session_name,
-    count_failed_sessions,
-)
+from changes import VERDICTS_WITH_RESULT, collect_gate_items, count_failed_sessions, count_reasons, is_incomplete
+from changes import load_json, session_name
 from checks import INCOMPLETE
 from files import read_table
 from layout import describe_missing_inputs
@@ -84,9 +77,8 @@ def main():
         print(f"suspect     {len(items['suspect'])}: {join_items(items['suspect'], '; ')}")
     if "median_mm" in counts:
         print(f"error       {counts['median_mm']:.3f} mm in the median session, 90 % below {counts['p90_mm']:.3f} mm")
-    print(
-        f"cost        {cost_s:.1f} s of processor time for all results, {cost_s / counts['sessions']:.2f} s a session"
-    )
+    each_s = cost_s / counts["sessions"]
+    print(f"cost        {cost_s:.1f} s of processor time for all results, {each_s:.2f} s a session")
     print(f"fleet       {len(fleet['cameras'])} cameras changed, {len(fleet['lamps'])} lamps were moved")
     if changes:
         print(f"changed     {changes['better']} better, {changes['worse']} worse, {changes['same']} the same,", end=" ")

@@ -115,18 +115,18 @@ class Scan(unittest.TestCase):
         self.assertNotEqual(self.fingerprint("files"), said[-1])
 
     def test_links_to_parent_folders_end(self):
-        first, digest = self.fingerprint(), files.input_digests(self.session)
+        first, digest = self.fingerprint(), catalogue.input_digests(self.session)
         os.symlink("..", self.session / "boards/up")
         os.symlink(".", self.session / "check/here")
         os.symlink("itself", self.session / "check/itself")
         for folder in "boards", "check":
             os.symlink(self.session, self.session / folder / "session")
         said = [first, self.fingerprint()]
-        self.assertNotEqual(files.input_digests(self.session), digest)
+        self.assertNotEqual(catalogue.input_digests(self.session), digest)
         self.overwrite("check/more/2.png", "two")
         said += [self.fingerprint(), self.fingerprint("folders")]
         self.assertEqual(len(set(said)), 3)
-        names = [name for name, _ in files.input_files(self.session)]
+        names = catalogue.SessionFiles(self.session, None).files
         self.assertIn("check/more/2.png", names)
         self.assertIn("check/itself", names)
         self.assertLess(len(names), 20)
@@ -138,7 +138,7 @@ class Scan(unittest.TestCase):
                 os.symlink(f"../{other}", self.session / f"rotation/{folder}/to{other}")
         begun = time.monotonic()
         self.fingerprint()
-        self.assertLessEqual(len(list(files.input_files(self.session))), 20 * files.MAX_FOLDERS)
+        self.assertLessEqual(len(catalogue.SessionFiles(self.session, None).files), 20 * files.MAX_FOLDERS)
         self.assertLess(time.monotonic() - begun, 5)
 
     def default_scan(self, days=0):
@@ -196,7 +196,6 @@ class Scan(unittest.TestCase):
         opened = os.open(self.archive, os.O_RDONLY)
         self.addCleanup(os.close, opened)
         seen = catalogue.SessionFiles("c/s", opened)
-        self.assertEqual(seen.files, [name for name, _ in files.input_files(self.session)])
         self.assertEqual(seen.path_attributes, catalogue.read_attributes("c/s", seen.paths, opened))
 
     def test_writes_only_changed_sessions(self):
@@ -221,17 +220,17 @@ class Files(unittest.TestCase):
             session = Path(folder)
             (session / "boards").mkdir()
             (session / "boards/0.png").write_text("one")
-            first = files.input_digests(session)[0]
+            first = catalogue.input_digests(session)[0]
             (session / "notes.txt").write_text("not read")
             (session / "results").mkdir()
             (session / "results/boards").write_text("not read")
             os.utime(session / "boards/0.png", (1, 1))
-            self.assertEqual(files.input_digests(session)[0], first)
+            self.assertEqual(catalogue.input_digests(session)[0], first)
             (session / "boards/0.png").rename(session / "boards/1.png")
-            second = files.input_digests(session)[0]
+            second = catalogue.input_digests(session)[0]
             (session / "boards/1.png").write_text("two")
-            self.assertEqual(len({first, second, files.input_digests(session)[0]}), 3)
-            self.assertEqual(list(files.input_digests(session)[1]), ["boards"])
+            self.assertEqual(len({first, second, catalogue.input_digests(session)[0]}), 3)
+            self.assertEqual(list(catalogue.input_digests(session)[1]), ["boards"])
 
     def test_digest_of_inputs_is_stable(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -240,7 +239,7 @@ class Files(unittest.TestCase):
                 (session / name).parent.mkdir(exist_ok=True)
                 (session / name).write_text(name)
                 lines += f"{hashlib.sha256(name.encode()).hexdigest()}  {name}\n"
-            inputs, parts, counts, _ = files.input_digests(session)
+            inputs, parts, counts, _ = catalogue.input_digests(session)
             self.assertEqual(inputs, hashlib.sha256(lines.encode()).hexdigest())
             self.assertEqual(list(parts), ["board.yaml", "boards", "lamps.yaml"])
 

@@ -12,6 +12,7 @@ import unittest.mock
 from pathlib import Path
 
 import parts  # noqa: F401
+import catalogue
 import files
 import outcome
 import shard
@@ -70,7 +71,7 @@ class Shard(unittest.TestCase):
 
             def reprocess(**fingerprints):
                 digested, made[:] = [], []
-                digests = lambda session: digested.append(session.name) or files.input_digests(session)
+                digests = lambda session: digested.append(session.name) or catalogue.input_digests(session)
                 fingerprints = {f"c/{name[1:]}": fingerprint for name, fingerprint in fingerprints.items()}
                 with unittest.mock.patch.multiple(
                     shard, start_session=start_session, read_outcome=read_outcome, input_digests=digests, BatchProcess=unittest.mock.DEFAULT
