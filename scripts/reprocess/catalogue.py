@@ -7,9 +7,9 @@ inode (st_mtime_ns, st_ctime_ns), and inode number. Unchanged fingerprints imply
 cannot set the time of an inode. README.md describes the two kinds of scans, files and folders: which changes each
 detects, and which one is the default.
 
-A change within RACY_NS before a scan may leave the times unchanged, as their resolution is finite and clocks differ: the
-fingerprint of such new files is salted with the time of the scan, so that it differs from the next one. A catalogue that is new, belongs to another archive or cannot be read gets a new salt: all
-fingerprints then differ from earlier ones, and all digests are computed again.
+A change within RACY_NS before a scan may leave the times unchanged, as their resolution is finite and clocks differ:
+the fingerprint of such new files is salted with the time of the scan. A catalogue that is new, belongs to another
+archive or cannot be read gets a new salt: all digests are computed again.
 """
 import os
 import resource

@@ -34,7 +34,7 @@ def parse_utc(text):
 
 
 def read_archive_table(archive):
-    """Returns {(camera, session): (date in UTC, room)}. Raises ValueError with file and line. Warns of other columns."""
+    """Returns {(camera, session): (date in UTC, room)}. Raises ValueError with file and line."""
     file, stated = archive / "archive.csv", {}
     if not file.is_file():
         return stated

@@ -62,6 +62,9 @@ def list_differences(before, now):
     yield f"inputs      {changed_inputs(old_row, row)}"
     same = " (the same)" if old["version"] == new["version"] else ""
     yield f"version     {old['version'] or 'none'} -> {new['version'] or 'none'}{same}"
+    models = (session["calibration"].get("lens_model") for session in (old, new))
+    causes = [("lens model", *models), *((key, old_row.get(key), row.get(key)) for key in ("options", "toolbox"))]
+    yield from (f"{key:11} {was or 'none'} -> {now or 'none'}" for key, was, now in causes if was != now)
     values, old_values = collect_values(new), collect_values(old)
     differing = [name for name in {**old_values, **values} if values.get(name) != old_values.get(name)]
     yield f"metrics     {len(differing)} of {len({**old_values, **values})} differ"

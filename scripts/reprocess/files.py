@@ -14,8 +14,6 @@ INPUTS = ["board.yaml", "boards", "camera.yaml", "check", "classifier.yaml", "di
 INPUTS += ["rotation"]
 # Maximum number of folders examined per session: links between folders can make the number of paths unlimited.
 MAX_FOLDERS = 1000
-
-
 # First characters of a field that a spreadsheet evaluates as a formula unless an apostrophe precedes it (OWASP, "CSV
 # injection"). lib/captures/csv_writer.cpp escapes in the same way.
 FIRST_CHARACTERS = tuple("'=+-@\t\r")

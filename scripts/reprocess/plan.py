@@ -78,9 +78,8 @@ def list_sessions(archive):
         #   unchanged | stated folder
         fail(f"{archive}: no sessions in it; " + (describe_wrong_level(archive) or LAYOUT))
     well_named = re.compile(r"\w[\w .-]*/\w[\w .-]*", re.ASCII)
-    for name in sessions:
-        if not well_named.fullmatch(name):
-            fail(f"{archive / name}: names of cameras and sessions are of letters, digits, '.', '_', '-' and blanks")
+    if others := ", ".join(repr(name) for name in sessions if not well_named.fullmatch(name)):
+        fail(f"{archive}: names of cameras and sessions are of letters, digits, '.', '_', '-' and blanks, not {others}")
     if problem := check_layout(archive, sessions):
         fail(problem, INCOMPLETE)
     return sessions

@@ -228,6 +228,7 @@ def reprocess(run, shard, fingerprints, lock, keep):
                 if at_work:
                     finish(*at_work, answer)
                 known = {"key": key, "inputs": inputs, "parts": parts, "version": run["version"]}
+                known |= {"options": run["camera"], "toolbox": run["toolbox"][:12]}
                 at_work = name, known | expect_inputs(name, counts), unreadable
                 made += 1
         if at_work:

@@ -13,7 +13,7 @@ take "$results-archive" "${sessions[@]}"
 expect() {  # EXIT-CODE WORDS OPTION...: of a run
   local code=0
   reprocess "$results" --shard-size 2 --cores 2 "${@:3}" >"$said" 2>"$said.errors" || code=$?
-  [ "$code" = "$1" ] && cat "$said" "$said.errors" | grep -q -- "$2" || fail "$code, and not '$2': $(cat "$said" "$said.errors")"
+  [ "$code" = "$1" ] && grep -q -- "$2" "$said" "$said.errors" || fail "$code, and not '$2': $(cat "$said" "$said.errors")"
 }
 expect 0 '^no result   0'
 cp "$results/overview.html" "$results-page"
@@ -30,7 +30,7 @@ expect 1 'gate suspect: is 5, at most 0 is allowed'
 for words in 'camera-00004/session-01: boards: of camera-00002? ' 'camera-00002/session-01: check has 0 of [0-9]* files' \
   'camera-00001/session-01: check has [0-9]* of [0-9]* files' 'camera-00005/session-03: is a copy of camera-00005/session-02' \
   'check/truth.csv:2: x_m: the values agree with the fixes if they are in mm'; do
-  cat "$said" "$said.errors" | grep -q "$words" || fail "no '$words' in $(cat "$said" "$said.errors")"
+  grep -q "$words" "$said" "$said.errors" || fail "no '$words' in $(cat "$said" "$said.errors")"
 done
 grep -q '>FAIL<' "$results/overview.html" && grep -q 'boards: of camera-00002?' "$results/overview.html" || fail "the page"
 grep -q 'camera-00002,session-02,review,.*check/0000.png: not a file' "$results/summary.csv" || fail "no remark on the link"
