@@ -50,7 +50,17 @@ TEST_F(CiAction, PassesWithAndWithoutAcceptedFixesAndComparesOnlyWithThem) {
   EXPECT_THAT(content("accepted/junit.xml"),
               AllOf(HasSubstr("failures=\"0\" errors=\"0\""), HasSubstr("name=\"mean_mm\"")));
   EXPECT_FALSE(fs::exists(folder / "accepted/comparison.xml"));
-  const auto again = run_action("accepted=accepted/check-fixes.csv");
+  const auto accept = [&](const std::string& words) {
+    return run_program("cd '" + (folder / "").string() +
+                       "' && " VLP_SOURCE_DIR "/scripts/ci/accept-fixes.sh " + words);
+  };
+  const auto accepted = accept("accepted fixes.csv");
+  EXPECT_EQ(accepted.exit_code, 0) << accepted.errors;
+  EXPECT_EQ(content("fixes.csv"), content("accepted/check-fixes.csv"));
+  EXPECT_THAT(content("fixes.csv.origin"),
+              testing::ContainsRegex("commit .+\ndate 20.+Z\nversion .+\nsha256 [0-9a-f]{64}\n"));
+  EXPECT_THAT(accept("session fixes.csv").errors, HasSubstr("check-fixes.csv: is missing"));
+  const auto again = run_action("accepted=fixes.csv");
   EXPECT_EQ(again.exit_code, 0) << again.output << again.errors;
   EXPECT_THAT(content("results/comparison.xml"),
               AllOf(HasSubstr("failures=\"0\" errors=\"0\""), HasSubstr("name=\"worse_mm\"")));
