@@ -228,14 +228,16 @@ void run_evaluation(const CLI::App& app, const Options& options, const std::vect
 }
 
 /// Writes an error that leaves no gate checked to the JUnit file, which CI reads in place of
-/// stderr. Replaces only files of this kind.
-void write_junit_error(const std::string& file, const char* type, const std::string& message) {
+/// stderr. Replaces only files of this kind. A file that cannot be written leaves the error as it
+/// is.
+void write_junit_error(const std::string& file, const char* type, const std::string& message) try {
   constexpr std::size_t max_bytes = 1 << 24;
   if (file.empty() || (std::filesystem::exists(file) &&
                        read_text_file(file, max_bytes).find("<testsuites") == std::string::npos))
     return;
   const JUnitTest test{"evaluation", JUnitTest::Result::error, message, type};
   write_file(file, format_junit_xml(kName, std::span(&test, 1)));
+} catch (const std::exception&) {  // the error is reported, not this
 }
 
 void run(const CLI::App& app, const Options& options) {

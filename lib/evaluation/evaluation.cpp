@@ -102,13 +102,13 @@ std::vector<Metric> collect_evaluation_metrics(const Evaluation& evaluation) {
     add_mm("fitted_p90_mm", fit->distances_m.p90);
     add_mm("fitted_max_mm", fit->distances_m.max);
   }
-  if (const auto& comparison = evaluation.comparison; comparison && comparison->pairs > 0) {
+  if (const auto& comparison = evaluation.comparison; comparison) {
     for (std::size_t i = 0; const ComparedQuantity& quantity : list_compared_quantities()) {
       const QuantityComparison& compared = comparison->quantities[i++];
       if (compared.pairs > 0) add(quantity.metric, quantity.units_per_si * compared.compute_loss());
     }
-    add(kUnpairedMetric,
-        static_cast<double>(comparison->unpaired) / static_cast<double>(evaluation.captures));
+    const auto captures = static_cast<double>(std::max<std::size_t>(1, evaluation.captures));
+    add(kUnpairedMetric, static_cast<double>(comparison->unpaired) / captures);
   }
   return metrics;
 }

@@ -23,7 +23,7 @@ std::string make_missing_fixes_warning(const Evaluation& evaluation,
                                        const std::vector<CheckedMetric>& gates) {
   const std::size_t missing = evaluation.captures - evaluation.fixes;
   const bool has_gate = std::any_of(gates.begin(), gates.end(), [](const CheckedMetric& gate) {
-    return gate.name == "missing_fraction" || gate.name == "unpaired_fraction";
+    return gate.name == "missing_fraction";
   });
   if (gates.empty() || missing == 0 || has_gate) return "";
   // [GATE-1] `no gate 'missing_fraction'` | verdict ignores captures without fix | add gate

@@ -413,7 +413,7 @@ LightDetector::RimFits LightDetector::fit_rims(const ImageView& lines,
     const auto inverse_height =
         is_last ? estimate_inverse_height_from_radii(find_radii(found, rims))
                 : estimate_inverse_height(find_lamps_in_plane(found, rims, lamps));
-    if (pass > 0 && (!inverse_height || !(inverse_height->log_sd < before->log_sd))) break;
+    if (pass > 0 && (!inverse_height || !(inverse_height->log_sd < before->log_sd))) continue;
     before = inverse_height;
     for (std::size_t i = 0; i < found.size(); ++i) {
       const double period_lines = found[i].fit.period_lines;
@@ -425,10 +425,11 @@ LightDetector::RimFits LightDetector::fit_rims(const ImageView& lines,
       } else if (is_last && radius) {
         const auto fit = fit_disc_outline(lines, rims[i]->plane_outline, start_blur_px,
                                           period_lines, background, shape_, radius);
-        if (fit) set_fitted_outline(*fit, shape_, *rims[i]);
+        if (fit && set_fitted_outline(*fit, shape_, *rims[i]))
+          rims[i]->inlier_fraction = fit->inlier_fraction;
       }
     }
-    if (!inverse_height) break;
+    if (!inverse_height) break;  // without a lens, or with less than two lamps
   }
   return {std::move(rims), before};
 }
@@ -451,7 +452,8 @@ std::vector<LampRadius> LightDetector::find_radii(
   std::vector<LampRadius> radii;
   for (std::size_t i = 0; i < found.size(); ++i) {
     const Lamp* lamp = find_lamp_of_period(found[i]);
-    if (!rims[i] || lamp == nullptr || !lamp->shape.size_m) continue;
+    if (!rims[i] || lamp == nullptr || !lamp->shape.size_m || lamp->shape.kind != ShapeKind::disc)
+      continue;
     radii.push_back({rims[i]->plane_outline.radius(), lamp->shape.size_m->x() / 2,
                      compute_height_beyond_first_lamp_m(*lamp)});
   }

@@ -27,8 +27,7 @@ constexpr std::array<Entry, 13> kStatuses{{
     {FixStatus::not_finite, "not_finite",
      "a pixel or sensor reading is not finite, a sigma is outside 0.0001 to 1000 px, the standard "
      "deviation of a sensor is negative, that of a known height is not positive, or an earlier "
-     "frame "
-     "is not earlier, or simultaneous with another"},
+     "frame is not earlier or is simultaneous with another"},
     // [FIX-8] `outside_lens` | calibration of another camera | give the right one
     {FixStatus::outside_lens, "outside_lens",
      "no ray through this lens reaches the pixel: is it the calibration of this camera?"},

@@ -18,12 +18,12 @@ enum class FixStatus {
   too_few_lamps,      // fewer than two lamps of the map
   too_many_lamps,     // more than Positioner::max_lamps
   duplicate_lamp,     // one id twice in a frame
-  not_finite,         // a pixel or sensor reading is not finite, or a sigma or sd is out of range
+  not_finite,         // a value is not finite or out of range, or an earlier frame is not earlier
   outside_lens,       // a pixel that no ray through the lens reaches
   lamp_below_camera,  // a lamp would have to be at or below the camera's height
   degenerate,         // the lamps are too close together in the image, or fit no pose
   ambiguous,          // two poses explain the lamps
-  inconsistent,       // three lamps or more contradict each other
+  inconsistent,       // three lamps or more contradict each other, or two a known height
   mirrored_map,       // the lamps fit a mirror image of the map
   undetermined,       // lamps and priors do not determine motion or tilt, and so the position
   row_time_unknown    // motion compensation requires the row time

@@ -222,7 +222,10 @@ std::string find_option_value(int argc, char** argv,
       std::string_view word(argv[i]);
       if (!word.starts_with(name)) continue;
       word.remove_prefix(name.size());
-      if (word.empty()) return i + 1 < argc ? argv[i + 1] : "";
+      if (word.empty()) {
+        const bool has_value = i + 1 < argc && !std::string_view(argv[i + 1]).starts_with('-');
+        return has_value ? argv[i + 1] : "";
+      }
       if (word.starts_with('=')) return std::string(word.substr(1));
       if (!name.starts_with("--")) return std::string(word);
     }

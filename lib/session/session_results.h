@@ -19,7 +19,8 @@ struct StepOutputs {
 };
 
 /// Writes junit.xml with an error in place of that of an earlier run, for a run that is refused
-/// before its first step. Leaves a folder that is in use or holds files of other origin unchanged.
+/// before its first step. Leaves a folder that is in use, or that holds no results of a session,
+/// unchanged.
 void write_refusal_junit_xml(const std::filesystem::path& results, const std::string& message);
 
 /// Folder with the results of a session, which one run at a time may use. Results of an earlier run

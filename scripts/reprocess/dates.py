@@ -40,7 +40,7 @@ def read_archive_table(archive):
         return stated
     rows = read_table(file)
     if others := ", ".join(sorted({column for row in rows for column in row} - COLUMNS)):
-        warn(f"{file}:1: columns that are ignored: {others}; known are {', '.join(sorted(COLUMNS))}")
+        warn(f"{file}:1: columns that are ignored: {others}; known are camera, session, date, room")
     for line, row in enumerate(rows, 2):
         if not row.get("camera") or not row.get("session"):
             raise ValueError(f"{file}:{line}: should name a camera and a session")

@@ -30,7 +30,7 @@ struct ComparedQuantity {
   const char* name;
   /// Key in evaluation.json, and metric whose gate limits its increase.
   const char *key, *metric;
-  /// Unit of messages and of the metric, and its value in SI units.
+  /// Unit of messages and of the metric, and the number of these units in an SI unit.
   const char* unit;
   double units_per_si;
   /// Smallest relevant change of the mean, in SI units.

@@ -3,8 +3,8 @@
 #include "evaluation/errors/fix_errors.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <span>
 
@@ -89,10 +89,11 @@ const std::array<TruthColumn, 3> kTruthColumns{
       }}}};
 
 /// Throws InputError if a conversion of a column reduces the median of its errors to less than a
-/// twentieth.
+/// twentieth, and to less than a fifth of the median of the fixes: fixes near 0 agree with any
+/// values that a conversion reduces to 0.
 void check_units(const FixErrors& errors, const FileRows<FixRow>& fixes,
                  const FileRows<TruthRow>& truth) {
-  constexpr double max_ratio = 0.05;
+  constexpr double max_ratio = 0.05, max_ratio_to_fixes = 0.2;
   constexpr std::size_t min_fixes = 3;
   for (const TruthColumn& column : kTruthColumns) {
     const auto compute_median = [&](double factor) -> std::optional<double> {
@@ -109,7 +110,8 @@ void check_units(const FixErrors& errors, const FileRows<FixRow>& fixes,
       return *compute_median(unit.units_per_si);
     };
     const MistakenUnit& unit = *std::ranges::min_element(column.mistaken_units, {}, find_error);
-    if (find_error(unit) < max_ratio * *error) {
+    const double size_of_fixes = *compute_median(std::numeric_limits<double>::infinity());
+    if (find_error(unit) < std::min(max_ratio * *error, max_ratio_to_fixes * size_of_fixes)) {
       // [FILE-3] `agree with the fixes`
       throw InputError(truth.file, truth.rows.front().line, column.name,
                        "the values agree with the fixes if they are in " + std::string(unit.name) +

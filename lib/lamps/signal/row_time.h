@@ -42,9 +42,9 @@ std::vector<PeriodGroup> group_lights_by_lamp_or_period(std::span<const Measured
 
 struct RowTime {
   double row_time_s;
-  /// Standard deviation; 1.96 of them cover 95 %. Includes the scatter of the lamps about their
-  /// frequencies, with Student's factor, and of the lights about their lamps. Also includes 0.05 %,
-  /// a common relative error of all measured periods. With one lamp only, the error of its
+  /// Standard deviation; 1.96 of them cover 95 % or more. Includes the scatter of the lamps about
+  /// their frequencies, with Student's factor, and of the lights about their lamps. Also includes
+  /// 0.05 %, a common relative error of all measured periods. With one lamp only, the error of its
   /// frequency is not included.
   double sd_s;
   /// Number of lamps that determine the row time, and number of their lights.
