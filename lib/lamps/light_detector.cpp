@@ -429,7 +429,7 @@ LightDetector::RimFits LightDetector::fit_rims(const ImageView& lines,
           rims[i]->inlier_fraction = fit->inlier_fraction;
       }
     }
-    if (!inverse_height) break;  // without a lens, or with less than two lamps
+    if (!inverse_height) break;  // without a lens, or with fewer than two lamps
   }
   return {std::move(rims), before};
 }

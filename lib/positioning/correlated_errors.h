@@ -129,7 +129,6 @@ class CommonErrors {
   /// Returns the joint covariance: intrinsics, zenith and offset, as far as they exist. Lamps with
   /// correlated errors follow, in the order of the map.
   const MatrixX& joint_error_covariance() const { return covariance_; }
-  Eigen::Index num_intrinsics() const { return intrinsics_; }
   Eigen::Index num_shared_errors() const { return intrinsics_ + std::ssize(rotation_derivatives_); }
 
  private:

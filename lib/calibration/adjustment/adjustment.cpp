@@ -34,6 +34,7 @@ constexpr double kMovedChiSquared = 21.1;
 /// Number of standard deviations beyond which a known position is wrong, and a detection an
 /// outlier.
 constexpr double kMaxPlaceSigmas = 5, kDetectionOutlierSigmas = 4.5;
+/// Message if no capture determines a pose.
 constexpr const char* kTooFewLampsMessage =
     "no capture shows two lamps of the map clearly enough for a fix";
 /// Smallest noise of detections without sigma_px, in pixels.
@@ -76,6 +77,7 @@ std::optional<Pose> estimate_rough_pose(const std::vector<LampObservation>& sigh
   const Eigen::Vector3d no_arm_m = Eigen::Vector3d::Zero();
   const BodyPrior level_at_rest;
   const BodyProblem problem{no_arm_m, level_at_rest};
+  // Before estimate_body_state_robust(), which removes lamps from the frame.
   const BodySolution all = estimate_body_state_from_all_lamps(frame, problem);
   if (sightings.size() > 3) {
     const auto [status, fix] = estimate_body_state_robust(frame, problem, max_residual_fraction);

@@ -123,8 +123,9 @@ struct AdjustmentResult {
   std::vector<LampCorrection> lamps;
   /// Ids of the lamps in the joint covariance, in its order: those with a detection.
   std::vector<int> covariance_lamp_ids;
-  /// Joint covariance (Adjustment::covariance) for `refined_map`, and for the surveyed map. The
-  /// latter has the same estimates with the errors of the survey in the positions of the lamps.
+  /// Joint covariance (Adjustment::covariance) with these lamps of `refined_map`, and of the
+  /// surveyed map. The latter has the same estimates with the errors of the survey in the positions
+  /// of the lamps.
   Eigen::MatrixXd refined_covariance, surveyed_covariance;
 
   /// Known position of the camera or of the axis, with its residual after the adjustment.

@@ -42,8 +42,8 @@ struct InverseHeight {
 std::optional<InverseHeight> estimate_inverse_height(const std::vector<LampInPlane>& lamps);
 
 /// Estimates the inverse height from the radii of lamps, as their median. Its standard deviation
-/// is the scatter of a single radius, and at least 0.5 %. Returns std::nullopt for less than three
-/// lamps.
+/// is the scatter of a single radius, and at least 0.5 %. Returns std::nullopt for fewer than
+/// three lamps.
 std::optional<InverseHeight> estimate_inverse_height_from_radii(
     const std::vector<LampRadius>& radii);
 
