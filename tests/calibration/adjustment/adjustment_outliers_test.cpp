@@ -433,7 +433,8 @@ TEST_F(RunBundleAdjustmentOutliers, CorrectionsOfFreeMapContainNoSimilarity) {
   for (std::size_t i = 0; i < 5; ++i) mean_m += input.lamps.lamps[i].position_m / 5;
   Eigen::Vector3d shift_m(0, 0, 0);
   double turn_m2 = 0, scale_m2 = 0;
-  Eigen::MatrixXd similarity = Eigen::MatrixXd::Zero(34, 5);
+  ASSERT_EQ(found.refined_covariance.rows(), 16 + 3 * 5);
+  Eigen::MatrixXd similarity = Eigen::MatrixXd::Zero(found.refined_covariance.rows(), 5);
   for (std::size_t i = 0; i < 5; ++i) {
     const Eigen::Vector3d p = input.lamps.lamps[i].position_m - mean_m;
     const Eigen::Vector3d& d = found.lamps[i].correction_m;
