@@ -1,15 +1,16 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Date and room of each session: from ARCHIVE/archive.csv (columns camera, session, date, room; others are ignored), or
-else the date in the name of the session, as in 2026-03-14 or 20260314-b."""
+"""Date, room and expected files of each session: from ARCHIVE/archive.csv (columns camera, session, date, room, files;
+others are ignored), or else the date in the name of the session, as in 2026-03-14 or 20260314-b."""
 import re
 import sys
 from datetime import datetime, timezone
 from functools import lru_cache
 
 from files import read_table
+from plausibility import count_inputs
 
-COLUMNS = {"camera", "session", "date", "room"} | {"fault", "damage", "damaged"}  # the latter of vlp-simulate
+COLUMNS = {"camera", "session", "date", "room", "files"} | {"fault", "damage", "damaged"}  # the latter of vlp-simulate
 DATE_IN_NAME = re.compile(r"(?<!\d)(\d{4})-?(\d\d)-?(\d\d)(?!\d)")
 
 
@@ -34,40 +35,45 @@ def parse_utc(text):
 
 
 def read_archive_table(archive):
-    """Returns {(camera, session): (date in UTC, room)}. Raises ValueError with file and line."""
+    """Returns {CAMERA/SESSION: (date in UTC, room, files)}. Raises ValueError with file and line."""
     file, stated = archive / "archive.csv", {}
     if not file.is_file():
         return stated
     rows = read_table(file)
     if others := ", ".join(sorted({column for row in rows for column in row} - COLUMNS)):
-        warn(f"{file}:1: columns that are ignored: {others}; known are camera, session, date, room")
+        warn(f"{file}:1: columns that are ignored: {others}; known are camera, session, date, room, files")
     for line, row in enumerate(rows, 2):
         if not row.get("camera") or not row.get("session"):
             raise ValueError(f"{file}:{line}: should name a camera and a session")
-        if (row["camera"], row["session"]) in stated:
-            raise ValueError(f"{file}:{line}: {row['camera']}/{row['session']} occurs twice; remove one row")
+        if (name := f"{row['camera']}/{row['session']}") in stated:
+            raise ValueError(f"{file}:{line}: {name} occurs twice; remove one row")
         date = (row.get("date") or "").strip()
         try:
             date = date and parse_utc(date).isoformat()
         except ValueError:
             raise ValueError(f"{file}:{line}: date: should be as 2026-03-14 or 2026-03-14T09:30, not {date}") from None
-        stated[row["camera"], row["session"]] = (date.removesuffix("T00:00:00"), (row.get("room") or "").strip())
+        try:
+            count_inputs(files := (row.get("files") or "").strip())
+        except ValueError:
+            raise ValueError(f"{file}:{line}: files: should be as 'boards 20, check 12', not {files}") from None
+        stated[name] = (date.removesuffix("T00:00:00"), (row.get("room") or "").strip(), files)
     return stated
 
 
 def read_dates(archive, sessions):
-    """Returns a row for each session with a date or a room. sessions: CAMERA/SESSION."""
+    """Returns a row for each session with a date, a room or files, and the sessions with files that the archive lacks.
+    sessions: CAMERA/SESSION."""
     stated, lines = read_archive_table(archive), []
-    if unknown := sorted({"/".join(name) for name in stated} - set(sessions)):
+    if unknown := sorted(set(stated) - set(sessions)):
         words = f"names {len(unknown)} sessions that the archive lacks, as {unknown[0]}; correct it"
         warn(f"{archive / 'archive.csv'}: {words}")
     for name in sessions:
         camera, session = name.split("/")
-        date, room = stated.get((camera, session), ("", ""))
+        date, room, files = stated.get(name, ("", "", ""))
         date = date or find_date(session)
-        if date or room:
-            lines.append({"camera": camera, "session": session, "date": date, "room": room})
-    return lines
+        if date or room or files:
+            lines.append({"camera": camera, "session": session, "date": date, "room": room, "files": files})
+    return lines, [name for name in unknown if stated[name][2]]
 
 
 @lru_cache(maxsize=None)

@@ -44,7 +44,7 @@ def unescape_formula(field):
 def write_atomically(file, text):
     file = Path(file)
     file.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = file.with_name(f".{file.name}.{os.getpid()}")
+    unfinished = file.with_name(f".{file.name}.new")  # one run at a time: that of a killed one is replaced
     with open(unfinished, "w", newline="") as stream:
         stream.write(text)
         stream.flush()

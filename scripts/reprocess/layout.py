@@ -2,20 +2,50 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compares the folders of an archive with its layout, ARCHIVE/CAMERA/SESSION/ with the inputs of vlp-calibrate."""
 import os
+import re
 from collections import Counter
 
 LAYOUT = "the layout is ARCHIVE/CAMERA/SESSION/ with lamps.yaml, rotation/ and board.yaml and boards/, or camera.yaml"
 INPUTS = ("lamps.yaml", "rotation", "boards", "board.yaml", "camera.yaml")
 MIN_INPUTS = 2  # names that make a folder a session; one can be the name of a camera
+NAME = re.compile(r"\w[\w .-]*", re.ASCII)
 
 
-def list_folders(folder):
-    with os.scandir(folder) as entries:
-        return sorted(entry.name for entry in entries if not entry.name.startswith(".") and entry.is_dir())
+def describe_fault(entry, archive):
+    """Returns why an entry of the archive is no camera or session; "" for a folder that is one, and for a file."""
+    # [ARCHIVE-5] `is no folder`, `names are of`, `in the archive or above` | no camera or session; the others are
+    #   processed | rename or remove it
+    link = os.path.realpath(entry.path) if entry.is_symlink() else ""
+    if entry.is_file(follow_symlinks=False) or (link and os.path.isfile(link)):
+        return ""
+    if not os.path.isdir(link or entry.path):
+        return "leads to a folder that is missing, or to itself" if link else "is no folder"
+    if not NAME.fullmatch(entry.name):
+        return "names are of letters, digits, '.', '_', '-' and blanks, and do not begin with '.', '-' or a blank"
+    is_inside = link and os.path.commonpath([link, archive]) in (link, str(archive))
+    return f"leads to {link!r}, in the archive or above" if is_inside else ""
 
 
-def list_sessions_in(archive):
-    return [f"{camera}/{session}" for camera in list_folders(archive) for session in list_folders(archive / camera)]
+def list_folders(folder, archive=None, faults=None):
+    """Lists the folders that can be cameras or sessions. Appends the other entries to `faults`, as "NAME: reason"."""
+    with os.scandir(folder) as found:
+        entries = sorted(found, key=lambda entry: entry.name)
+    reasons = {entry.name: describe_fault(entry, archive or folder) for entry in entries}
+    if faults is not None:
+        names = {name: repr(os.path.relpath(folder / name, archive)) for name, reason in reasons.items() if reason}
+        faults += [f"{names[name]}: {reasons[name]}" for name in names]
+    return [name for entry in entries if not reasons[name := entry.name] and entry.is_dir()]
+
+
+def list_sessions_in(archive, faults=None):
+    sessions = []
+    for camera in list_folders(archive, archive, faults):
+        names = list_folders(archive / camera, archive, faults)
+        sessions += [f"{camera}/{name}" for name in names]
+        if faults is not None and not names:
+            # [ARCHIVE-5] `has no session`
+            faults.append(f"{camera!r}: has no session")
+    return sessions
 
 
 def is_session(folder):

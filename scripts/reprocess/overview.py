@@ -211,7 +211,7 @@ def main():
     lost = find_lost_results(rows, before, had_result)
     fleet_rows, lamp_rows = read_table("fleet.csv"), read_table("lamps.csv")
     fleet = analyze_fleet(fleet_rows, lamp_rows)
-    items = collect_gate_items(vanished, lost, fleet, list_suspects(rows, before))
+    items = collect_gate_items(vanished, lost, fleet, compare["faults"] + list_suspects(rows, before))
     gates = DEFAULT_GATES | (read_gates(Path(compare["gates"])) if compare["gates"] else {})
     results = check_gates(gates, counts, changes, items)
     incomplete = is_incomplete(counts, results)

@@ -8,8 +8,8 @@
   shards.txt          number of shards
   to_do.txt           shards that Snakemake has to consider
   again.txt           rows to make again
-  dates.csv           dates and rooms of sessions
-  compare.json        earlier results, gates, vanished sessions
+  dates.csv           dates, rooms and expected files of sessions
+  compare.json        earlier results, gates, vanished sessions, faults of the layout
   keep.txt            number of former results to keep
   session_gates.json  limits of --session-gates
 
@@ -18,7 +18,6 @@ runs only what depends on changed ones.
 """
 import argparse
 import gc
-import re
 import shutil
 import sqlite3
 import time
@@ -71,23 +70,22 @@ def assign_shards(sessions, catalogue, size, at_a_time):
 
 
 def list_sessions(archive):
-    """Lists the sessions. Exits if there are none or if none has inputs, so that earlier results are kept."""
-    sessions = list_sessions_in(archive)
+    """Lists the sessions, and the faults of the layout. Exits if there are no sessions or if none has inputs, so that
+    earlier results are kept."""
+    faults = []
+    sessions = list_sessions_in(archive, faults)
     if not sessions:
         # [ARCHIVE-1] `no sessions in` | ARCHIVE is a camera, a session or the folder above; earlier results are
         #   unchanged | stated folder
-        fail(f"{archive}: no sessions in it; " + (describe_wrong_level(archive) or LAYOUT))
-    well_named = re.compile(r"\w[\w .-]*/\w[\w .-]*", re.ASCII)
-    if others := ", ".join(repr(name) for name in sessions if not well_named.fullmatch(name)):
-        fail(f"{archive}: names of cameras and sessions are of letters, digits, '.', '_', '-' and blanks, not {others}")
+        fail(f"{archive}: no sessions in it; " + "; ".join([*faults, describe_wrong_level(archive) or LAYOUT]))
     if problem := check_layout(archive, sessions):
         fail(problem, INCOMPLETE)
-    return sessions
+    return sessions, faults
 
 
 def write_shards(archive, sessions, state, options):
-    dates = read_dates(archive, sessions)
-    write_if_changed(state / "dates.csv", table(["camera", "session", "date", "room"], dates))
+    dates, missing = read_dates(archive, sessions)
+    write_if_changed(state / "dates.csv", table(["camera", "session", "date", "room", "files"], dates))
     catalogue = Catalogue(state / "catalogue.sqlite", archive, options.rebuild_catalogue)
     look = options.scan or catalogue.choose_scan(len(sessions))
     seen = dict(zip(sessions, catalogue.fingerprints(sessions, look)))
@@ -102,7 +100,7 @@ def write_shards(archive, sessions, state, options):
             file.unlink()
     write_if_changed(state / "shards.txt", f"{len(wanted)}\n")
     catalogue.save(shards, options.shard_size)
-    return describe_scan(catalogue, look)
+    return describe_scan(catalogue, look), missing
 
 
 def describe_scan(catalogue, look):
@@ -151,7 +149,7 @@ def main():
     options = parser.parse_args()
     archive, results = options.archive.resolve(), options.results.resolve()
     check(options)
-    sessions = list_sessions(archive)
+    sessions, faults = list_sessions(archive)
     state = results / ".state"
     (state / "logs").mkdir(parents=True, exist_ok=True)  # jobs of a cluster need it
     shutil.rmtree(state / "ran", ignore_errors=True)
@@ -162,7 +160,7 @@ def main():
         "camera": " ".join(options.camera_option),
         **toolbox(options.bin),
     }
-    looked = write_shards(archive, sessions, state, options)
+    looked, missing = write_shards(archive, sessions, state, options)
     limits = read_limits(options.session_gates) if options.session_gates else {}
     write_if_changed(state / "session_gates.json", json_text(limits))
     write_if_changed(state / "keep.txt", f"{options.keep}\n")
@@ -176,7 +174,8 @@ def main():
         "previous_digest": digest((previous / "summary.csv").read_text()) if previous else "",
         "gates": str(options.gates.resolve()) if options.gates else "",
         "gates_digest": digest(options.gates.read_text()) if options.gates else "",
-        "vanished": sorted(list_results(results) - set(sessions)),
+        "vanished": sorted((list_results(results) | set(missing)) - set(sessions)),
+        "faults": faults,
     }
     write_if_changed(state / "compare.json", json_text(compare))
     run_page.write(results)

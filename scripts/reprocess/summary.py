@@ -10,7 +10,7 @@ from pathlib import Path
 
 from files import read_table, table, write_atomically
 from outcome import SUMMARY_COLUMNS, FLEET_COLUMNS, LAMP_COLUMNS
-from plausibility import find_suspects, session_name
+from plausibility import count_inputs, find_suspects, format_counts, session_name
 from session_gates import apply_session_gates
 
 
@@ -46,8 +46,9 @@ def main():
     rows.sort(key=lambda row: (row["camera"], row["session"]))
     for row in rows:
         apply_session_gates(row, limits)
-        known = stated.get((row["camera"], row["session"]), {"date": "", "room": ""})
+        known = stated.get((row["camera"], row["session"]), {"date": "", "room": "", "files": ""})
         row |= {"date": known["date"], "room": known["room"]}
+        row["expected"] = format_counts(count_inputs(row["expected"]) | count_inputs(known["files"]))
         row["cpu_s"] = costs.get(f"{row['camera']}/{row['session']}", "")
     suspects = find_suspects(rows)
     for row in rows:

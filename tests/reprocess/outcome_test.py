@@ -105,11 +105,11 @@ class Dates(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "archive.csv"
             file.write_text("camera,session,fault,date,room\na,1,,2026-03-14T09:30,hall\na,20260101,,,attic\n")
-            lines = dates.read_dates(Path(folder), ["a/1", "a/20260101", "b/1"])
-            expected = [("a", "1", "2026-03-14T09:30:00", "hall"), ("a", "20260101", "2026-01-01", "attic")]
+            lines, _ = dates.read_dates(Path(folder), ["a/1", "a/20260101", "b/1"])
+            expected = [("a", "1", "2026-03-14T09:30:00", "hall", ""), ("a", "20260101", "2026-01-01", "attic", "")]
             self.assertEqual([tuple(line.values()) for line in lines], expected)
             file.write_text("camera,session,date\na,1,2026-03-14T09:30+02:00\na,2,2026-03-14T23:30-05:00\n")
-            lines = dates.read_dates(Path(folder), ["a/1", "a/2"])
+            lines, _ = dates.read_dates(Path(folder), ["a/1", "a/2"])
             self.assertEqual([line["date"] for line in lines], ["2026-03-14T07:30:00", "2026-03-15T04:30:00"])
             file.write_text("camera,session,date\na,1,14.3.2026\n")
             self.assertRaisesRegex(ValueError, "archive.csv:2: date: should be as", dates.read_archive_table, Path(folder))
@@ -118,7 +118,7 @@ class Dates(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stderr(io.StringIO()) as said:
             file = Path(folder) / "archive.csv"
             file.write_text("\ufeffcamera,session,date\na,1,2026-03-14\n", encoding="utf-8")
-            self.assertEqual(dates.read_dates(Path(folder), ["a/1"])[0]["date"], "2026-03-14")
+            self.assertEqual(dates.read_dates(Path(folder), ["a/1"])[0][0]["date"], "2026-03-14")
             file.write_text("camera,session,date\na,1,2026-03-14\na,1,2026-03-15\n")
             self.assertRaisesRegex(ValueError, "archive.csv:3: a/1 occurs twice", dates.read_archive_table, Path(folder))
             self.assertEqual(said.getvalue(), "")
@@ -126,6 +126,15 @@ class Dates(unittest.TestCase):
             dates.read_dates(Path(folder), ["a/1"])
             self.assertIn("archive.csv:1: columns that are ignored: Date; known are camera, ", said.getvalue())
             self.assertIn("archive.csv: names 1 sessions that the archive lacks, as a/7", said.getvalue())
+
+    def test_reads_expected_files_of_table(self):
+        with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stderr(io.StringIO()):
+            file = Path(folder) / "archive.csv"
+            file.write_text('camera,session,files\na,1,"boards 20, check 12"\na,7,check 12\na,8,\n')
+            lines, missing = dates.read_dates(Path(folder), ["a/1"])
+            self.assertEqual(([line["files"] for line in lines], missing), (["boards 20, check 12"], ["a/7"]))
+            file.write_text("camera,session,files\na,1,many\n")
+            self.assertRaisesRegex(ValueError, "archive.csv:2: files: should be as", dates.read_archive_table, Path(folder))
 
 
 if __name__ == "__main__":

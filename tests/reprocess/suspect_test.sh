@@ -9,6 +9,7 @@ results=$scratch/suspect
 rm -rf "$results"
 sessions=(camera-00001/session-01 camera-00002/session-0{1,2} camera-00003/session-02 camera-00004/session-0{1,2}
           camera-00005/session-02)
+good=$archive
 take "$results-archive" "${sessions[@]}"
 expect() {  # EXIT-CODE WORDS OPTION...: of a run
   local code=0
@@ -17,6 +18,25 @@ expect() {  # EXIT-CODE WORDS OPTION...: of a run
 }
 expect 0 '^no result   0'
 cp "$results/overview.html" "$results-page"
+
+# Entries that are no cameras or sessions are named in one list, and the others run; so are files and sessions that
+# archive.csv expects.
+mkdir -p "$archive/.hidden" "$archive/empty" "$archive/camera-00001/"{-dash,$'line\nbreak'}
+ln -s loop "$archive/loop"
+ln -s / "$archive/camera-00002/root"
+ln -s camera-00001 "$archive/again"
+mkfifo "$archive/camera-00003/pipe"
+printf '%s\n' camera,session,files 'camera-00001,session-01,"boards 20, check 99"' camera-00009,session-09,boards\ 1 >"$archive/archive.csv"
+expect 1 'gate suspect: is 9, at most 0 is allowed'
+for words in "'.hidden': names are of" "'empty': has no session" "'camera-00001/-dash': names" "'camera-00001/line.nbreak': names" \
+  "'loop': leads to a folder that is missing" "'camera-00002/root': leads to '/'" "'again': leads to " "'camera-00003/pipe': is no folder" \
+  'camera-00001/session-01: check has [0-9]* of 99 files' 'gate vanished: is 1, .*: camera-00009/session-09'; do
+  grep -q -- "$words" "$said.errors" || fail "no '$words' in $(cat "$said.errors")"
+done
+grep -q 'ran 0, of them' "$said" || fail "run again: $(cat "$said")"
+as_its_schema_says plan "$results/.state/compare.json"
+archive=$good
+take "$results-archive" "${sessions[@]}"
 
 # Another camera's boards; half of a check is gone, and all of another; a session copied; a truth in mm.
 rm -r "$archive/camera-00004/session-01/boards" "$archive"/camera-00001/session-01/check/*[13579].png "$archive/camera-00002/session-01/check"

@@ -16,7 +16,7 @@ run() {  # EXIT_CODE OPTION...
 }
 run 0
 grep -q '>PASS<' "$results/overview.html" || fail "the overview has no verdict"
-mv "$archive/$gone" "$scratch/vanished-session"
+mv "$archive/${gone%/*}" "$scratch/vanished-camera"
 for _ in 1 2; do  # the second run has no row of it in the summary before
   run 1
   grep -q "^vanished    1 no longer in the archive: $gone\$" "$said" || fail "$(cat "$said")"
@@ -32,7 +32,7 @@ grep -q "^vanished    1 no longer in the archive: $gone\$" "$said" || fail "allo
 # Other results than these have it.
 run 1 --previous "$baseline"
 grep -q "gate vanished: is 9, at most 0 is allowed: camera-00001/session-02; $gone; " "$errors" || fail "$(cat "$errors")"
-mv "$scratch/vanished-session" "$archive/$gone"
+mv "$scratch/vanished-camera" "$archive/${gone%/*}"
 run 0
 grep -q '^this run    ran 0' "$said" || fail "its result was lost: $(cat "$said")"
 
@@ -46,6 +46,6 @@ grep -q "gate lost_results: is 1, at most 0 is allowed: $gone\$" "$errors" || fa
 [ -n "$(find "$results/former/$gone" -name calibration.yaml)" ] || fail "the former result is gone"
 mv "$scratch/vanished-rotation" "$archive/$gone/rotation"
 run 0 --gates "$gates"
-rm -rf "$archive/$gone" "$results/sessions/$gone"
+rm -rf "$archive/${gone%/*}" "$results/sessions/$gone"
 run 0
 rm -rf "$archive" "$results" "$gates" "$errors"
