@@ -4,6 +4,7 @@
 #include "rig/file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <algorithm>
@@ -105,15 +106,40 @@ std::size_t check_file_kind(const fs::path& path, int descriptor, std::size_t ma
   return bytes;
 }
 
-/// Creates a file in the folder of `target` with a name that is unique among processes and threads.
+/// Locks an open file against other processes until it is closed. Returns false if it is locked or
+/// was removed. A file system without locks counts as locked for `is_required`.
+bool lock_file(int descriptor, const fs::path& path, bool is_required) {
+  struct stat opened {
+  }, present{};
+  return (::flock(descriptor, LOCK_EX | LOCK_NB) == 0 || (!is_required && errno != EWOULDBLOCK)) &&
+         ::fstat(descriptor, &opened) == 0 && ::lstat(path.c_str(), &present) == 0 &&
+         opened.st_dev == present.st_dev && opened.st_ino == present.st_ino;
+}
+
+/// Removes the temporary file of a killed process: its writer would hold the lock.
+bool remove_abandoned_file(const fs::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) return false;
+  const bool is_removed = lock_file(descriptor, path, true) && ::unlink(path.c_str()) == 0;
+  ::close(descriptor);
+  return is_removed;
+}
+
+/// Creates a file in the folder of `target` with a name that is unique among processes and threads,
+/// and locks it.
 int create_temporary_file_beside(const fs::path& target, mode_t mode, fs::path& temporary) {
   constexpr std::size_t max_bytes = 200;  // of the 255 of a file name
-  const std::string name = "." + target.filename().string().substr(0, max_bytes) + ".tmp-" +
-                           std::to_string(::getpid()) + "-";
+  const std::string name = "." + target.filename().string().substr(0, max_bytes) + ".tmp-";
   for (int number = 0;; ++number) {
     temporary = target.parent_path() / (name + std::to_string(number));
-    const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
-    if (descriptor >= 0 || errno != EEXIST) return descriptor;
+    int descriptor = -1;
+    do {
+      descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+      if (descriptor < 0 && errno != EEXIST) return descriptor;
+    } while (descriptor < 0 && remove_abandoned_file(temporary));
+    if (descriptor < 0) continue;
+    if (lock_file(descriptor, temporary, false)) return descriptor;
+    ::close(descriptor);
   }
 }
 

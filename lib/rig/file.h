@@ -54,8 +54,8 @@ class InputFile {
 ///
 /// A replaced file keeps its permissions, and its owner and group as far as this process may set
 /// them. Symbolic links are followed. A pipe, a device or a stream of this process (/dev/stdout,
-/// /dev/fd/N) is written directly. A killed process may leave its temporary file,
-/// ".NAME.tmp-PID-N", which no program reads.
+/// /dev/fd/N) is written directly. A killed process may leave its temporary file, ".NAME.tmp-N",
+/// which no program reads and the next writer of the file removes.
 class AtomicFileWriter {
  public:
   /// Creates the temporary file. This and the next functions throw InputError if the file cannot be

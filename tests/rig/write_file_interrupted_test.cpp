@@ -4,6 +4,7 @@
 #include <sched.h>
 #include <sys/mount.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 
 #include <chrono>
 #include <csignal>
@@ -43,6 +44,25 @@ TEST(WriteFile, KeepsOldFileWhenFolderIsReadOnly) {
   fs::permissions(folder / "", fs::perms(0755));
   EXPECT_EQ(message, file.string() + ": cannot be written: Permission denied");
   EXPECT_EQ(folder.read_content(file), kOld);
+  EXPECT_EQ(count_in(folder / ""), 1U);
+}
+
+TEST(WriteFile, RemovesTemporaryFileOfKilledProcessButNotOfOthers) {
+  const TemporaryFolder folder;
+  const auto file = folder.file("a.yaml", kOld);
+  AtomicFileWriter other(file);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    AtomicFileWriter killed(file);
+    ::kill(::getpid(), SIGKILL);
+  }
+  ASSERT_EQ(::waitpid(child, nullptr, 0), child);
+  EXPECT_EQ(count_in(folder / ""), 3U);
+  write_file(file, kLarge);
+  EXPECT_EQ(count_in(folder / ""), 2U);
+  EXPECT_EQ(folder.read_content(file), kLarge);
+  other.save_file();
+  EXPECT_EQ(folder.read_content(file), "");
   EXPECT_EQ(count_in(folder / ""), 1U);
 }
 
