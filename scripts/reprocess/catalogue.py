@@ -12,13 +12,13 @@ the fingerprint of such new files is salted with the time of the scan. A catalog
 archive or cannot be read gets a new salt: all digests are computed again.
 """
 import os
-import resource
 import sqlite3
 import time
 from array import array
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from hashlib import blake2b
+from resource import RUSAGE_THREAD, getrusage
 from urllib.parse import quote
 
 from files import INPUTS, MAX_FOLDERS, digest, file_digest, folder_id
@@ -46,10 +46,6 @@ def file_attributes(status):
 
 def compute_digest(salt, numbers, words=()):
     return blake2b("\n".join((salt, *words)).encode() + array("q", numbers).tobytes(), digest_size=16).hexdigest()
-
-
-def count_waits():
-    return resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw
 
 
 class SessionFiles:
@@ -204,9 +200,9 @@ class Catalogue:
             return fingerprint, folders_fingerprint, places if number is None else number
 
         chunks = [names[first : first + CHUNK] for first in range(0, len(names), CHUNK)]
-        waits = count_waits()
+        waits = getrusage(RUSAGE_THREAD).ru_nvcsw
         found = [scan(name) for name in chunks[0]]
-        if count_waits() - waits >= len(found):  # most scans waited for the file system
+        if getrusage(RUSAGE_THREAD).ru_nvcsw - waits >= len(found):  # most scans waited for the file system
             with ThreadPoolExecutor(NUM_THREADS) as threads:
                 for of_chunk in threads.map(lambda chunk: [scan(name) for name in chunk], chunks[1:]):
                     found += of_chunk

@@ -109,14 +109,6 @@ def compare_results(rows, before_rows):
     return changes, pairs
 
 
-def newly_failed(changes):
-    return len(changes["newly_failed"]) if changes and changes["in_both"] else None
-
-
-def worse_fraction(changes):
-    return changes["worse"] / changes["pairs"] if changes and changes["pairs"] else None
-
-
 def count_items(name):
     return lambda counts, changes, items: len(items[name]) if items.get(name) is not None else None
 
@@ -135,8 +127,8 @@ GATES = {
     "lost_results": (0, math.inf, count_items("lost_results")),
     "cameras_changed": (0, math.inf, count_items("cameras_changed")),
     "lamps_moved": (0, math.inf, count_items("lamps_moved")),
-    "newly_failed": (0, math.inf, lambda counts, changes, items: newly_failed(changes)),
-    "worse_fraction": (0, 1, lambda counts, changes, items: worse_fraction(changes)),
+    "newly_failed": (0, math.inf, lambda _, now, items: now and (len(now["newly_failed"]) if now["in_both"] else None)),
+    "worse_fraction": (0, 1, lambda _, now, items: now and (now["worse"] / now["pairs"] if now["pairs"] else None)),
     "mean_difference_mm": (-math.inf, math.inf, lambda *args: args[1] and args[1].get("interval_95_mm", [None] * 2)[1]),
 }
 FORMER_GATES = {f"{name}_share": f"{name}_fraction" for name in ("no_result", "gate", "worse")}
@@ -255,6 +247,11 @@ def count_reasons(rows):
     failed = [row for row in rows if row["verdict"] not in VERDICTS_WITH_RESULT]
     reasons = Counter(re.sub(re.escape(session_name(row)) + "/?", "", row["reason"]) for row in failed)
     return sorted(reasons.items(), key=lambda item: (-item[1], item[0]))
+
+
+def join_items(items, max_items=20):
+    more = f"; and {len(items) - max_items} more in changes.json" if len(items) > max_items else ""
+    return "; ".join(items[:max_items]) + more
 
 
 def load_json(file):

@@ -65,8 +65,7 @@ def read_dates(archive, sessions):
     sessions: CAMERA/SESSION."""
     stated, lines = read_archive_table(archive), []
     if unknown := sorted(set(stated) - set(sessions)):
-        words = f"names {len(unknown)} sessions that the archive lacks, as {unknown[0]}; correct it"
-        warn(f"{archive / 'archive.csv'}: {words}")
+        warn(f"{archive}/archive.csv: names {len(unknown)} sessions that the archive lacks, as {unknown[0]}")
     for name in sessions:
         camera, session = name.split("/")
         date, room, files = stated.get(name, ("", "", ""))

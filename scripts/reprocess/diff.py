@@ -10,10 +10,9 @@ from outcome import collect_remarks
 
 
 def find_result(results, name):
-    for place in ("sessions", "failed"):
-        if (results / place / name / "row.json").is_file():
-            return results / place / name
-    fail(f"{results}: contains no result of {name}")
+    places = (results / place / name for place in ("sessions", "failed"))
+    found = next((place for place in places if (place / "row.json").is_file()), None)
+    return found or fail(f"{results}: contains no result of {name}")
 
 
 def find_former_result(results, name, key):
@@ -47,10 +46,8 @@ def words(value):
 
 
 def changed_inputs(old_row, row):
-    """The files and folders that differ; unknown for rows of earlier versions."""
-    parts, old_parts = row.get("parts"), old_row.get("parts")
-    if parts is None or old_parts is None:
-        return "the same" if row["inputs"] == old_row["inputs"] else "changed, unknown which"
+    """Names the files and folders that differ."""
+    parts, old_parts = row["parts"], old_row["parts"]
     changed = sorted(part for part in {*parts, *old_parts} if parts.get(part) != old_parts.get(part))
     return ", ".join(changed) or "the same"
 

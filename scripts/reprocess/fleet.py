@@ -413,10 +413,8 @@ def analyze_fleet(rows, lamp_rows):
     between["lamps"] = tau_mm
     tried = [series for kind, _, series in all_series if between[kind] is not None]
     tests = {"drift": len(tried), "step": sum(len(series) - 1 for series in tried)}
-    if tau_mm is not None:
-        tests["step"] += sum(room.count_tests() for room in rooms)
-    min_detectable = compute_min_detectable(all_series, between, tests)
-    moved = []
+    tests["step"] += sum(room.count_tests() for room in rooms) if tau_mm is not None else 0
+    min_detectable, moved = compute_min_detectable(all_series, between, tests), []
     if tau_mm is not None:
         min_detectable["lamps"] = compute_min_detectable_of_lamps(rooms, tau_mm, tests)
         moved = [lamp for room in rooms for lamp in room.find_moved_lamps(tau_mm, tests)]

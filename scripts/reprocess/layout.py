@@ -26,25 +26,25 @@ def describe_fault(entry, archive):
     return f"leads to {link!r}, in the archive or above" if is_inside else ""
 
 
-def list_folders(folder, archive=None, faults=None):
+def list_folders(folder, archive, faults):
     """Lists the folders that can be cameras or sessions. Appends the other entries to `faults`, as "NAME: reason"."""
-    with os.scandir(folder) as found:
-        entries = sorted(found, key=lambda entry: entry.name)
-    reasons = {entry.name: describe_fault(entry, archive or folder) for entry in entries}
-    if faults is not None:
-        names = {name: repr(os.path.relpath(folder / name, archive)) for name, reason in reasons.items() if reason}
-        faults += [f"{names[name]}: {reasons[name]}" for name in names]
-    return [name for entry in entries if not reasons[name := entry.name] and entry.is_dir()]
+    names = []
+    with os.scandir(folder) as entries:
+        for entry in sorted(entries, key=lambda entry: entry.name):
+            if reason := describe_fault(entry, archive):
+                faults.append(f"{os.path.relpath(entry.path, archive)!r}: {reason}")
+            elif entry.is_dir():
+                names.append(entry.name)
+    return names
 
 
-def list_sessions_in(archive, faults=None):
+def list_sessions_in(archive, faults):
     sessions = []
     for camera in list_folders(archive, archive, faults):
         names = list_folders(archive / camera, archive, faults)
         sessions += [f"{camera}/{name}" for name in names]
-        if faults is not None and not names:
-            # [ARCHIVE-5] `has no session`
-            faults.append(f"{camera!r}: has no session")
+        # [ARCHIVE-5] `has no session`
+        faults += [] if names else [f"{camera!r}: has no session"]
     return sessions
 
 
@@ -65,11 +65,10 @@ def describe_wrong_level(archive):
     if is_session(archive):
         # [ARCHIVE-1] `too deep`, `too high`
         return f"{archive} is a session, two levels too deep: give {archive.parent.parent}"
-    cameras = list_folders(archive)
-    if any(is_session(archive / camera) for camera in cameras):
+    if any(is_session(archive / camera) for camera in list_folders(archive, archive, [])):
         return f"{archive} holds sessions in place of cameras, one level too deep: give {archive.parent}"
-    for name in list_sessions_in(archive):
-        if any(is_session(archive / name / below) for below in list_folders(archive / name)):
+    for name in list_sessions_in(archive, []):
+        if any(is_session(archive / name / below) for below in list_folders(archive / name, archive, [])):
             return f"{archive} is one level too high: give {archive / name.split('/')[0]}"
     return ""
 

@@ -11,12 +11,11 @@ import fleet_page
 import pictures
 from changes import DEFAULT_GATES, VERDICTS_WITH_RESULT, check_gates, collect_gate_items, compare_results, count_reasons
 from changes import count_failed_sessions, count_verdicts, find_lost_results, find_vanished_sessions, is_incomplete
-from changes import list_suspects, load_json, read_gates, rows_with_mean, session_name
+from changes import join_items, list_suspects, load_json, read_gates, rows_with_mean, session_name
 from files import json_text, read_table, write_atomically
 from fleet import analyze_fleet
 from pictures import number, picture, table
 
-MAX_NAMES = 5  # in a line of the list of actions
 MAX_PLOTS = 6
 MAX_EXAMINED = 200  # sessions with changed inputs whose changed files are listed
 
@@ -51,11 +50,8 @@ def list_largest_differences(run, previous, pairs):
 
 def read_input_digests(results, name):
     """Returns the digest of each input of a session at its last run in `results`."""
-    for place in ("sessions", "failed"):
-        file = results / place / name / "row.json"
-        if file.exists():
-            return load_json(file).get("parts", {})
-    return {}
+    files = (results / place / name / "row.json" for place in ("sessions", "failed"))
+    return next((load_json(file).get("parts", {}) for file in files if file.exists()), {})
 
 
 def changed_inputs(previous, rows, before, changes):
@@ -106,18 +102,10 @@ COUNTED += [("new", "only_now"), ("no longer in the archive", "only_before")]
 
 
 def list_sessions_to_review(rows):
-    look = [row for row in rows if row["verdict"] == "review"]
-    if not look:
-        return ""
-    words = '<h2 id="review">Passed with remarks</h2>\n'
     columns = ["session", "mean (mm)", "images skipped", "rejected lamps (captures)", "remarks"]
     keys = ("mean_mm", "images_skipped", "rejected_lamps", "remarks")
-    return words + table(columns, [(session_name(row), *(row[key] for key in keys)) for row in look])
-
-
-def shorten(items):
-    more = f" and {len(items) - MAX_NAMES} more" if len(items) > MAX_NAMES else ""
-    return "; ".join(items[:MAX_NAMES]) + more
+    cells = [(session_name(row), *(row[key] for key in keys)) for row in rows if row["verdict"] == "review"]
+    return '<h2 id="review">Passed with remarks</h2>\n' + table(columns, cells) if cells else ""
 
 
 ACTIONS = [
@@ -136,7 +124,8 @@ def list_actions(document, items, rows):
         reason, count = count_reasons(rows)[0]
         words = f"{count} of {counts['sessions']} sessions have no result: {reason}"
         actions.append((f"Correct the archive: {words}", "failed"))
-    actions += [(f"{words}: {shorten(items[name])}", section) for name, words, section in ACTIONS if items.get(name)]
+    listed = [(words, join_items(items.get(name) or [], 5), section) for name, words, section in ACTIONS]
+    actions += [(f"{words}: {names}", section) for words, names, section in listed if names]
     missed = [gate["name"] for gate in document["gates"] if not gate["passed"] and not items.get(gate["name"])]
     if missed:
         actions.append((f"Check the gates that are not met: {', '.join(missed)}", "gates"))
@@ -157,10 +146,9 @@ def render_verdict(document, items, rows):
     verdict = "INCOMPLETE" if is_incomplete(counts, document["gates"]) else "PASS" if document["passed"] else "FAIL"
     html = f'<p class="verdict">{verdict}</p>\n'
     actions = list_actions(document, items, rows)
-    if not actions:
-        return html + "<p>Nothing to do.</p>\n"
     lines = "".join(f'<li><a href="#{section}">{escape(words)}</a></li>' for words, section in actions)
-    return html + f"<h2>Actions, most urgent first</h2><ol>{lines}</ol>\n"
+    listed = f"<h2>Actions, most urgent first</h2><ol>{lines}</ol>\n"
+    return html + (listed if actions else "<p>Nothing to do.</p>\n")
 
 
 def render_page(run, rows, document, items, fleet, parts):

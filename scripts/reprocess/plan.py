@@ -35,7 +35,7 @@ from session_gates import read_limits
 def list_results(results):
     """Returns the sessions that have a folder in RESULTS."""
     places = [results / place for place in ("sessions", "failed")]
-    return {name for place in places if place.is_dir() for name in list_sessions_in(place)}
+    return {name for place in places if place.is_dir() for name in list_sessions_in(place, [])}
 
 
 def compute_shard_ends(sessions, size, at_a_time):
@@ -114,10 +114,7 @@ def describe_scan(catalogue, look):
 
 def modification_time_ns(file):
     """Returns the modification time in ns; None if the file does not exist."""
-    try:
-        return file.stat().st_mtime_ns
-    except FileNotFoundError:
-        return None
+    return file.stat().st_mtime_ns if file.exists() else None
 
 
 def list_pending_shards(state, summary):

@@ -7,13 +7,12 @@ import time
 from pathlib import Path
 
 from changes import VERDICTS_WITH_RESULT, collect_gate_items, count_failed_sessions, count_reasons, is_incomplete
-from changes import load_json, session_name
+from changes import join_items, load_json, session_name
 from checks import INCOMPLETE
 from files import read_table
 from layout import describe_missing_inputs
 from run_page import restore
 
-MAX_NAMES = 20  # in a line on stdout; changes.json has all
 MAX_REASONS = 3
 
 
@@ -31,11 +30,6 @@ def describe_run(state, sessions):
     return text + f"{seconds:.1f} s, {cpu_s:.1f} s of processor time in the programs, {size / 1e6:.2f} MB written"
 
 
-def join_items(items, separator=", "):
-    more = f"{separator}and {len(items) - MAX_NAMES} more in changes.json" if len(items) > MAX_NAMES else ""
-    return separator.join(items[:MAX_NAMES]) + more
-
-
 def describe_incomplete(archive, rows):
     """Returns a line: how many sessions have no result, and the most frequent reason."""
     failed = [session_name(row) for row in rows if row["verdict"] not in VERDICTS_WITH_RESULT]
@@ -43,8 +37,7 @@ def describe_incomplete(archive, rows):
     # [ARCHIVE-2] `have no result` | exit code 3: no result, or above `no_result` or `no_result_fraction` of `--gates`
     #   | reasons and missing inputs follow
     words = f"{len(failed)} of {len(rows)} sessions have no result; {count} of them: {reason}"
-    missing = describe_missing_inputs(archive, failed)
-    return words + (f"; {missing}" if missing else "")
+    return "; ".join(filter(None, [words, describe_missing_inputs(archive, failed)]))
 
 
 def describe_missed_gate(gate, items):
@@ -52,7 +45,7 @@ def describe_missed_gate(gate, items):
     # [ARCHIVE-4] `is allowed` | exit code 1 (3: `no_result`, `no_result_fraction`); `vanished`: session no longer in
     #   the archive | see the message
     words = f"reprocess.sh: gate {gate['name']}: {value}, at most {gate['limit']} is allowed"
-    return words + (f": {join_items(items[gate['name']], '; ')}" if items.get(gate["name"]) else "")
+    return words + (f": {join_items(items[gate['name']])}" if items.get(gate["name"]) else "")
 
 
 def main():
@@ -74,7 +67,7 @@ def main():
     if items["vanished"]:
         print(f"vanished    {len(items['vanished'])} no longer in the archive: {join_items(items['vanished'])}")
     if items["suspect"]:
-        print(f"suspect     {len(items['suspect'])}: {join_items(items['suspect'], '; ')}")
+        print(f"suspect     {len(items['suspect'])}: {join_items(items['suspect'])}")
     if "median_mm" in counts:
         print(f"error       {counts['median_mm']:.3f} mm in the median session, 90 % below {counts['p90_mm']:.3f} mm")
     each_s = cost_s / counts["sessions"]

@@ -56,7 +56,7 @@ class Overview(unittest.TestCase):
         self.assertIn("PASS</p>\n<p>Nothing to do", overview.render_verdict(document, items_of(), good))
 
     def test_names_five_items_and_counts_others(self):
-        self.assertEqual(overview.shorten(list("abcdefg")), "a; b; c; d; e and 2 more")
+        self.assertEqual(overview.join_items(list("abcdefg"), 5), "a; b; c; d; e; and 2 more in changes.json")
 
     def test_each_action_links_to_a_section(self):
         rows = [row("1", "review", "1"), row("2", "no result"), row("3", "gate", "9")]
@@ -92,7 +92,7 @@ class Layout(unittest.TestCase):
                 (session / name).write_text("")
 
             def problem(place):
-                return layout.check_layout(place, layout.list_sessions_in(place))
+                return layout.check_layout(place, layout.list_sessions_in(place, []))
 
             self.assertEqual(problem(archive), "")
             self.assertIn(f"one level too deep: give {archive}", problem(archive / "camera"))
