@@ -10,6 +10,7 @@
 #include <set>
 #include <utility>
 
+#include "calibration/ceres_solve.h"
 #include "geometry/symmetric.h"
 #include "rig/calibration_error.h"
 
@@ -381,11 +382,7 @@ bool AdjustmentProblem::solve_adjustment(bool robust) {
   options.function_tolerance = robust ? 1e-5 : 1e-14;
   options.gradient_tolerance = 1e-14;
   options.parameter_tolerance = 1e-12;
-  options.num_threads = 1;  // keeps the order of sums and so their rounding
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &ceres, &summary);
-  return summary.IsSolutionUsable() && state_.allFinite();
+  return solve_with_ceres(options, ceres) && state_.allFinite();
 }
 
 Eigen::MatrixXd AdjustmentProblem::make_weak_prior_information_matrix() const {

@@ -4,7 +4,6 @@
 
 #include <ceres/ceres.h>
 #include <ceres/normal_prior.h>
-#include <glog/logging.h>
 
 #include <algorithm>
 #include <cassert>
@@ -15,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "calibration/ceres_solve.h"
 #include "calibration/intrinsics/intrinsics.h"
 #include "calibration/intrinsics/rotation_vector.h"
 #include "camera/lens.h"
@@ -228,13 +228,7 @@ bool solve_without_reweighting(BoardProblem& problem, const SolveOptions& solve_
   options.function_tolerance = settings.function_tolerance;
   options.parameter_tolerance = 1e-12;
   options.gradient_tolerance = 1e-12;
-  options.num_threads = 1;
-  options.logging_type = ceres::SILENT;
-  // The result states whether the solve failed; without this Ceres also writes to stderr.
-  FLAGS_minloglevel = google::GLOG_FATAL;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &equations, &summary);
-  if (!summary.IsSolutionUsable()) return false;
+  if (!solve_with_ceres(options, equations)) return false;
   problem.intrinsics = intrinsics;
   problem.warp_m = warp_m;
   for (std::size_t i = 0; i < poses.size(); ++i) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "calibration/ceres_solve.h"
 #include "geometry/robust_scatter.h"
 
 namespace vlp {
@@ -60,12 +61,9 @@ bool RobustFit::minimize_residuals_with_cauchy_loss(double loss_width) {
   options.function_tolerance = loss_width > 0 ? 1e-4 : 1e-15;  // the last fits start from the first
   options.gradient_tolerance = 1e-14;
   options.parameter_tolerance = 1e-13;
-  options.num_threads = 1;  // keeps the order of sums and so their rounding
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, make_ceres_problem(loss_width).get(), &summary);
+  const bool is_usable = solve_with_ceres(options, *make_ceres_problem(loss_width));
   update_residual_norms();
-  return summary.IsSolutionUsable();
+  return is_usable;
 }
 
 void RobustFit::update_residual_norms() {

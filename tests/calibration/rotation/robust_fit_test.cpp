@@ -11,11 +11,30 @@
 #include <numeric>
 #include <vector>
 
+#include "calibration/ceres_solve.h"
 #include "support/matchers.h"
 #include "support/random.h"
 
 namespace vlp {
 namespace {
+
+/// Residual that cannot be computed.
+struct NoResidual {
+  template <typename T>
+  bool operator()(const T*, T*) const {
+    return false;
+  }
+};
+
+TEST(SolveWithCeres, WritesNothingIfResidualsCannotBeComputed) {
+  double value = 0;
+  ceres::Problem problem;
+  problem.AddResidualBlock(new ceres::AutoDiffCostFunction<NoResidual, 1, 1>(new NoResidual),
+                           nullptr, &value);
+  testing::internal::CaptureStderr();
+  EXPECT_FALSE(solve_with_ceres({}, problem));
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
 
 /// Observed point with a common offset and a rotation of its own.
 struct TurnedPoint {
