@@ -26,6 +26,12 @@ std::optional<Number> parse_number(std::string_view text) {
   return value;
 }
 
+/// Returns the text of a cell for a message, cut to 300 bytes.
+std::string quote_cell(std::string_view text) {
+  constexpr std::size_t max_bytes = 300;
+  return "'" + truncate_text(text, max_bytes) + "'";
+}
+
 }  // namespace
 
 /// Parser of a table by libcsv, which calls back for each field and each row. It is fed line by
@@ -138,8 +144,7 @@ double CsvTable::get_cell_number(std::size_t row, Column column) const {
   const auto value = parse_number<double>(get_cell_text(row, column));
   if (!value || !std::isfinite(*value)) {
     throw make_cell_error(
-        row, column,
-        "should be a finite number, not '" + std::string(get_cell_text(row, column)) + "'");
+        row, column, "should be a finite number, not " + quote_cell(get_cell_text(row, column)));
   }
   return *value;
 }
@@ -148,9 +153,9 @@ double CsvTable::get_cell_coordinate_m(std::size_t row, Column column) const {
   const double value_m = get_cell_number(row, column);
   if (std::abs(value_m) > kMaxCoordinate_m) {
     // [FILE-3] `within 1,000 km, in meters`
-    throw make_cell_error(row, column,
-                          "should be within 1,000 km, in meters, not '" +
-                              std::string(get_cell_text(row, column)) + "'");
+    throw make_cell_error(
+        row, column,
+        "should be within 1,000 km, in meters, not " + quote_cell(get_cell_text(row, column)));
   }
   return value_m;
 }
@@ -159,8 +164,7 @@ int CsvTable::get_cell_integer(std::size_t row, Column column) const {
   const auto value = parse_number<int>(get_cell_text(row, column));
   if (!value) {
     throw make_cell_error(
-        row, column,
-        "should be a whole number, not '" + std::string(get_cell_text(row, column)) + "'");
+        row, column, "should be a whole number, not " + quote_cell(get_cell_text(row, column)));
   }
   return *value;
 }

@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "program/app.h"
+#include "rig/yaml_text.h"
 
 namespace vlp {
 namespace {
@@ -36,6 +37,7 @@ struct Request {
 };
 
 Request parse_request(const std::string& line) {
+  constexpr std::size_t max_bytes = 300;  // in the message
   try {
     const auto json = nlohmann::json::parse(line);
     const auto& limit_s = json.at("limit_s");
@@ -45,7 +47,8 @@ Request parse_request(const std::string& line) {
   } catch (const nlohmann::json::exception&) {  // reported below
   }
   throw std::invalid_argument(
-      "stdin: a line is not {\"arguments\": [\"...\"], \"limit_s\": 1 to 86400}: " + line);
+      "stdin: a line is not {\"arguments\": [\"...\"], \"limit_s\": 1 to 86400}: " +
+      truncate_text(line, max_bytes));
 }
 
 /// Runs the program in the forked process, with stdout and stderr redirected to `output`.

@@ -4,8 +4,16 @@
 
 #include <algorithm>
 
+#include "rig/yaml_text.h"
+
 namespace vlp {
 namespace {
+
+/// Returns a problem without a long text of a file.
+std::string shorten_problem(const std::string& problem) {
+  constexpr std::size_t max_bytes = 1000, shortened_bytes = 300;
+  return truncate_text(problem, problem.size() > max_bytes ? shortened_bytes : max_bytes);
+}
 
 /// Returns one line without control characters.
 std::string escape_control_characters(std::string text) {
@@ -21,8 +29,8 @@ InputError::InputError(const std::filesystem::path& file, const std::string& pro
 
 InputError::InputError(const std::filesystem::path& file, std::size_t line, const std::string& key,
                        const std::string& problem)
-    : std::runtime_error(
-          escape_control_characters(file.string() + (line > 0 ? ":" + std::to_string(line) : "") +
-                                    ": " + (key.empty() ? "" : key + ": ") + problem)) {}
+    : std::runtime_error(escape_control_characters(
+          file.string() + (line > 0 ? ":" + std::to_string(line) : "") + ": " +
+          (key.empty() ? "" : shorten_problem(key) + ": ") + shorten_problem(problem))) {}
 
 }  // namespace vlp

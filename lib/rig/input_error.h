@@ -8,8 +8,8 @@
 
 namespace vlp {
 
-/// Invalid input. what() is one line, "file:line: key: problem and remedy". Programs catch it once,
-/// in main, print the line and exit with 2.
+/// Invalid input. what() is one line, "file:line: key: problem and remedy", which programs print.
+/// A key or problem of more than 1,000 bytes, which repeats content of a file, is cut to 300.
 class InputError : public std::runtime_error {
  public:
   InputError(const std::filesystem::path& file, const std::string& problem);

@@ -25,6 +25,7 @@
 #include "positioning/residual_noise.h"
 #include "positioning/row_clock.h"
 #include "rig/find_lamp.h"
+#include "rig/yaml_text.h"
 #include "session/lamp_captures.h"
 #include "session/row_time_step.h"
 
@@ -422,9 +423,10 @@ void warn_about_captures(LocateResult& result, const LocateInput& input) {
       [&](const Frame& frame) { return captures.find(frame.image) == captures.end(); });
   if (captures.empty() || without == 0) return;
   result.warnings.push_back(fmt::format(
-      "{} of {} images are not in captures.csv: image names have to be equal ('{}' in the images, "
-      "'{}' in the table)",
-      without, input.frames.size(), input.frames.front().image, captures.begin()->first));
+      "{} of {} images are not in captures.csv: image names have to be equal ({} in the images, "
+      "{} in the table)",
+      without, input.frames.size(), quote_text_for_message(input.frames.front().image),
+      quote_text_for_message(captures.begin()->first)));
 }
 
 /// Finds errors of the lamp map from the captures in which the camera stands.

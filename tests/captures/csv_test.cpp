@@ -87,6 +87,16 @@ TEST_F(CsvTableTest, GetNumberReportsLineAndColumnOfInvalidNumber) {
               HasSubstr("a.csv:2: lamp: should be a whole number, not '1.5'"));
 }
 
+TEST_F(CsvTableTest, MessagesRepeatAtMost300BytesOfFile) {
+  const std::string text(100'000, 'x');
+  const CsvTable table = read("image,u_px\n" + text + "," + text + "\n" + text + ",1\n");
+  EXPECT_LT(rejection_message([&] {
+              (void)table.get_cell_number(0, table.get_required_column("u_px"));
+            }).size(),
+            600U);
+  EXPECT_LT(std::string(InputError("a.csv", text).what()).size(), 320U);
+}
+
 TEST_F(CsvTableTest, ReturnsFieldsWrittenByCsvWriter) {
   const std::vector<std::string> fields{"plain", "a,b", "say \"hi\"", "two\nlines", " spaces ", ""};
   CsvWriter writer(folder / "b.csv", {"one", "two"});

@@ -95,6 +95,7 @@ TEST_F(RunProgramForEachStdinLine, RejectsInvalidLineAndExtraArguments) {
         "86400}: " +
             bad + "\n");
   }
+  EXPECT_LT(run(std::string(100'000, 'x') + "\n").errors.size(), 500U);
   EXPECT_EQ(run("").exit_code, 0);
   const auto with_more = run_program("vlp-calibrate a -o b --batch-stdin");
   EXPECT_EQ(with_more.exit_code, 2);
