@@ -38,7 +38,7 @@ void run(Options options) {
       return run_calibration_session(options.session, options.results, options.how,
                                      log.make_session_observer());
     } catch (const std::exception& error) {
-      write_refusal_junit_xml(options.results, error.what());
+      write_refusal_junit_xml(options.results, options.session, error.what());
       throw;
     }
   }();
@@ -94,7 +94,8 @@ int calibrate(int argc, char** argv) {
   add_board_image_quality_options(app, how.frontend);
   app.add_option("--gates", how.gates_file,
                  "File of gates, vlp-gates/1, for sessions without gates.yaml. Its gates are added "
-                 "to the default gates of the lens, or replace them");
+                 "to the default gates, or replace them");
+  app.add_flag("--strict", how.strict, "Adds the gate warnings=0: each warning fails");
   app.add_flag("--report,!--no-report", how.report, "Write plots and report.html (default: yes)");
   app.add_option("--redo", how.steps_to_redo, "Steps to run even if nothing has changed")
       ->option_text("STEP ...");
@@ -110,7 +111,7 @@ int calibrate(int argc, char** argv) {
   return parse_arguments_and_run(
       app, argc, argv, [&] { run(options); },
       [&](const std::string& message) {
-        write_refusal_junit_xml(find_option_value(argc, argv, {"-o", "--output"}), message);
+        write_refusal_junit_xml(find_option_value(argc, argv, {"-o", "--output"}), {}, message);
       });
 }
 

@@ -94,8 +94,10 @@ std::vector<Metric> collect_evaluation_metrics(const Evaluation& evaluation) {
   if (evaluation.height_m) add_mm("height_rms_mm", evaluation.height_m->magnitudes.rms);
   if (evaluation.yaw_rad) add("yaw_rms_deg", deg_from_rad(evaluation.yaw_rad->magnitudes.rms));
   add("missing_fraction", evaluation.missing_fix_fraction());
-  if (evaluation.normalized_errors)
-    add("normalized_error_rms", evaluation.normalized_errors->horizontal);
+  if (const auto& ratios = evaluation.normalized_errors) {
+    add("normalized_error_rms", ratios->horizontal);
+    if (ratios->height) add("normalized_height_error_rms", *ratios->height);
+  }
   if (evaluation.crlb_ratio) add("crlb_ratio", evaluation.crlb_ratio->horizontal);
   if (const auto& fit = evaluation.line_fit) {
     add_mm("fitted_mean_mm", fit->distances_m.mean);

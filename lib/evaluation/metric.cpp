@@ -90,6 +90,10 @@ constexpr auto kMetricKinds = std::to_array<MetricKind>({
      "the row time is not that of this camera", at_most, kMaxLimit, false},
     {"row_time_sd_us", "us", rotation, "standard deviation of the row time",
      "the row time is too uncertain", at_most, kMaxLimit, false},
+    {"row_time_error_percent", "%", rotation,
+     "difference between the given row time and that of the lamp stripes, less three standard "
+     "deviations; needs a given row time and three lamps",
+     "the given row time is wrong", at_most, kMaxLimit, false},
     {"dispersion_mm", "mm", dispersion,
      "radius of the dispersion circle, before correction of its offset",
      "the fixes at the reference point scatter too much"},
@@ -138,6 +142,10 @@ constexpr auto kMetricKinds = std::to_array<MetricKind>({
     {"normalized_error_rms", "", evaluation,
      "RMS of horizontal errors / reported sd; needs ground truth and sd columns",
      "the fixes report too small standard deviations"},
+    {"normalized_height_error_rms", "", evaluation, "the same for the height",
+     "the heights are wrong: the lens, or its boards, of another camera?"},
+    {"warnings", "", evaluation, "number of warnings; 0: each warning fails (--strict)",
+     "there are warnings", at_most, kMaxLimit, false},
     {"crlb_ratio", "", reference,
      "RMS of horizontal errors / theoretical limit (CRLB); needs --lamps, --calibration, "
      "--noise-px",

@@ -42,6 +42,12 @@ void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
     result.warnings.push_back(std::move(warning));
   }
   if (!result.caution.empty()) result.warnings.push_back(result.caution);
+  if (const auto& comparison = evaluation.comparison;
+      comparison && comparison->horizontal().has_too_few_clusters()) {
+    // [GATE-2] `a change from chance`
+    result.warnings.emplace_back(
+        "too few reference points or captures to distinguish a change from chance");
+  }
   for (std::string& warning : make_sample_size_warnings(evaluation)) {
     result.notes.push_back(std::move(warning));
   }
@@ -56,7 +62,7 @@ double compute_same_position_radius_m(const Calibration& calibration) {
 }
 
 EvaluateResult evaluate_fixes_against_truth(const EvaluationInput& input,
-                                            const std::vector<Gate>& gates) {
+                                            const std::vector<Gate>& given_gates) {
   EvaluateResult result;
   result.evaluation = evaluate_fix_accuracy(input);
   const Evaluation& evaluation = result.evaluation;
@@ -71,10 +77,11 @@ EvaluateResult evaluate_fixes_against_truth(const EvaluationInput& input,
     return result;
   }
   result.metrics = collect_evaluation_metrics(evaluation);
-  result.gates = check_gates(merge_gates(make_default_comparison_gates(result.metrics), gates),
-                             result.metrics);
-  result.caution = make_missing_fixes_warning(evaluation, result.gates);
+  const auto gates = merge_gates(make_default_comparison_gates(result.metrics), given_gates);
+  result.caution = make_missing_fixes_warning(evaluation, check_gates(gates, result.metrics));
   add_warnings(result, input);
+  result.metrics.push_back({"warnings", static_cast<double>(result.warnings.size())});
+  result.gates = check_gates(gates, result.metrics);
   return result;
 }
 

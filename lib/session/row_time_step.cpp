@@ -4,6 +4,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -75,6 +76,12 @@ std::vector<MeasuredPeriod> collect_lamp_periods(const std::vector<Observation>&
   return periods;
 }
 
+double compute_row_time_error_fraction(const RowTime& measured, double given_s) {
+  constexpr double max_sds = 3;
+  return std::max(0.0, std::abs(std::log(measured.row_time_s / given_s)) -
+                           max_sds * measured.sd_s / measured.row_time_s);
+}
+
 }  // namespace
 
 std::vector<std::span<const Observation>> DetectedLights::observations_by_folder() const {
@@ -130,10 +137,10 @@ DetectedLights detect_lights_in_folders(const std::vector<fs::path>& folders, co
 }
 
 std::string describe_row_time_contradiction(const RowTime& measured, const GivenRowTime& given) {
-  constexpr double max_sds = 3;
-  const double max_deviation = kLampDrift + max_sds * measured.sd_s / measured.row_time_s;
-  const double deviation = std::abs(std::log(measured.row_time_s / given.row_time_s));
-  if (measured.lamps < kMinRowTimeLamps || deviation <= max_deviation) return "";
+  if (measured.lamps < kMinRowTimeLamps ||
+      compute_row_time_error_fraction(measured, given.row_time_s) <= kLampDrift) {
+    return "";
+  }
   // [LAMP-13] `row time is ... us in` | contradicts the frequencies of the map by more than 1.5 %
   //   and three standard deviations | use the measured one, if the frequencies are right
   return fmt::format(
@@ -149,7 +156,8 @@ RowTimeCheck check_row_time_against_lamps(const std::vector<Observation>& images
   if (found.candidates.empty()) return {};
   const RowTime& measured = found.candidates.front().row_time;
   if (measured.lamps < kMinRowTimeLamps) return {};
-  return {measured, describe_row_time_contradiction(measured, given)};
+  return {measured, describe_row_time_contradiction(measured, given),
+          compute_row_time_error_fraction(measured, given.row_time_s)};
 }
 
 std::string describe_alternative_row_time(const std::vector<Observation>& images,
@@ -179,8 +187,11 @@ void add_row_time_contradiction_to_result(const std::vector<Observation>& images
 
 std::vector<Metric> make_row_time_metrics(const RowTimeCheck& check) {
   if (!check.measured) return {};
-  return {{"row_time_us", kMicrosecondsPerSecond * check.measured->row_time_s},
-          {"row_time_sd_us", kMicrosecondsPerSecond * check.measured->sd_s}};
+  std::vector<Metric> metrics{{"row_time_us", kMicrosecondsPerSecond * check.measured->row_time_s},
+                              {"row_time_sd_us", kMicrosecondsPerSecond * check.measured->sd_s}};
+  if (check.error_fraction)
+    metrics.push_back({"row_time_error_percent", 100 * *check.error_fraction});
+  return metrics;
 }
 
 RowTimeStepResult estimate_row_time_from_lights(const DetectedLights& seen,

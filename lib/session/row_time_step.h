@@ -83,6 +83,8 @@ struct RowTimeCheck {
   std::optional<RowTime> measured = {};
   /// Contradiction between measured and given row time, in one line; empty if they agree.
   std::string error = {};
+  /// |log(measured / given)| - 3 sd / measured, at least 0; std::nullopt if it was not compared.
+  std::optional<double> error_fraction = {};
 };
 
 /// Compares a measured row time with the stated one, as check_row_time_against_lamps() does.
@@ -124,7 +126,8 @@ void add_row_time_contradiction_to_result(const std::vector<Observation>& images
                                           const LampMap& lamps, const DetectorCamera& camera,
                                           const std::string& source, StepResult& result);
 
-/// Returns the metrics row_time_us and row_time_sd_us; none if the row time was not measured.
+/// Returns the metrics row_time_us, row_time_sd_us and, if it was compared, row_time_error_percent;
+/// none if the row time was not measured.
 std::vector<Metric> make_row_time_metrics(const RowTimeCheck& check);
 
 }  // namespace vlp

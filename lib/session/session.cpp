@@ -17,6 +17,7 @@
 #include "frontend/board_intake.h"
 #include "frontend/image_file.h"
 #include "frontend/lamp_intake.h"
+#include "lamps/signal/frequency_identification.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 #include "rig/lamp_map_file.h"
@@ -74,8 +75,9 @@ std::vector<Gate> read_session_gates(const SessionFolder& session, const Session
   std::vector<Gate> gates;
   if (!session.camera_calibration_file()) gates = make_default_lens_gates();
   const fs::path file = session.gates_file().value_or(options.gates_file);
-  if (file.empty()) return gates;
-  return merge_gates(std::move(gates), read_gates(file, list_session_metric_kinds()));
+  if (!file.empty())
+    gates = merge_gates(std::move(gates), read_gates(file, list_session_metric_kinds()));
+  return options.strict ? merge_gates(std::move(gates), {{"warnings", 0}}) : gates;
 }
 
 /// Result of a step, and the function that writes its outputs.
@@ -104,7 +106,7 @@ class SessionRun {
 
   SessionResult run() {
     check_redo_option();
-    results_.set_steps_and_remove_stale_files(list_outputs());
+    results_.set_steps(list_outputs());
     if (run_calibration_steps() && locate_check_and_drives()) {
       add_gates_of_missing_dispersion();
       evaluate_session_fixes();
@@ -140,8 +142,11 @@ class SessionRun {
   }
 
   std::string remove_folder(std::string text) const {
-    return vlp::remove_folder(vlp::remove_folder(std::move(text), session_.session_folder_path()),
-                              results_.results_folder_path());
+    for (const fs::path& folder : {session_.session_folder_path(), results_.new_outputs_folder(),
+                                   results_.results_folder_path()}) {
+      text = vlp::remove_folder(std::move(text), folder);
+    }
+    return text;
   }
 
   std::vector<fs::path> line_drive_folders() const {
@@ -205,8 +210,10 @@ class SessionRun {
       done.result = run_step_work(work);
       results_.store_step_result(name, key, done.result);
     }
-    if (done.result.has_succeeded())
-      done.result.gates = check_gates(find_step_gates(name), done.result.metrics);
+    if (done.result.has_succeeded()) {
+      if (name == "evaluate") add_warnings_metric(done.result);
+      done.result.gates = check_step_gates(name, done.result.metrics);
+    }
     result_.gates.insert(result_.gates.end(), done.result.gates.begin(), done.result.gates.end());
     result_.steps.push_back(std::move(done));
     if (observer_.on_step_finished) observer_.on_step_finished(result_.steps.back());
@@ -225,6 +232,20 @@ class SessionRun {
     result_.gates.insert(result_.gates.end(), gates.begin(), gates.end());
   }
 
+  /// Sets the metric `warnings` of the last step to the number of warnings of all steps.
+  void add_warnings_metric(StepResult& last) const {
+    std::size_t warnings = last.warnings.size();
+    for (const SessionStep& step : result_.steps) warnings += step.result.warnings.size();
+    std::erase_if(last.metrics, [](const Metric& metric) { return metric.name == "warnings"; });
+    last.metrics.push_back({"warnings", static_cast<double>(warnings)});
+  }
+
+  std::vector<CheckedMetric> check_step_gates(const std::string& step,
+                                              const std::vector<Metric>& metrics) const {
+    return check_gates(merge_gates(make_default_step_gates(metrics), find_step_gates(step)),
+                       metrics);
+  }
+
   /// Returns the gates of the metrics of a step.
   std::vector<Gate> find_step_gates(const std::string& step) const {
     std::vector<Gate> gates;
@@ -241,6 +262,7 @@ class SessionRun {
     Work done;
     try {
       done = work();
+      if (!done.result.has_succeeded()) add_readout_contradiction_to_result(done.result);
     } catch (const InputError& error) {
       done.result.set_step_failure(StepFailure::bad_input, error.what());
     } catch (const std::invalid_argument& error) {
@@ -373,6 +395,26 @@ class SessionRun {
                                               describe_row_time_source(), result);
   }
 
+  /// Replaces the reason of a step with lamps that failed if the images show stripes along another
+  /// direction than the readout direction of the camera.
+  void add_readout_contradiction_to_result(StepResult& result) const {
+    if (result_.steps.empty() || session_.lamp_classifier_file()) return;
+    const Camera& camera = result_.calibration->camera;
+    Observations remarks;
+    const Readout shown =
+        estimate_readout_direction(list_images(session_.rotation_captures_folder()), {},
+                                   make_lamp_options(), camera.imager_px, remarks);
+    if (!camera.readout || shown == *camera.readout || !remarks.warnings.empty()) return;
+    // [LAMP-12] `stripes along`
+    result.set_step_failure(
+        StepFailure::bad_input,
+        fmt::format("the readout is along {} in {}, but the images show stripes along {}; correct "
+                    "it",
+                    shown == Readout::rows ? "columns" : "rows",
+                    session_.camera_calibration_file() ? "camera.yaml" : "--readout",
+                    shown == Readout::rows ? "rows" : "columns"));
+  }
+
   /// Returns true if camera.yaml or --row-time-s gives the row time and lamps are identified by
   /// frequency.
   bool is_row_time_given() const {
@@ -474,13 +516,9 @@ class SessionRun {
   }
 
   bool run_calibration_steps() {
-    fs::path camera = output_file_path("lens.yaml");
-    if (const auto is_known_step = session_.camera_calibration_file()) {
-      camera = *is_known_step;
-      if (!read_given_camera(camera)) return false;
-    } else if (!run_lens()) {
-      return false;
-    }
+    const auto given = session_.camera_calibration_file();
+    if (given ? !read_given_camera(*given) : !run_lens()) return false;
+    fs::path camera = given ? *given : output_file_path("lens.yaml");
     result_.calibration = read_calibration(camera);
     if (result_.calibration->camera.row_time_s || session_.lamp_classifier_file()) {
       results_.remove_outputs_of_step("row-time");
@@ -629,6 +667,8 @@ class SessionRun {
     if (std::string outliers = describe_position_error_outliers(errors); !outliers.empty()) {
       found.warnings.push_back(std::move(outliers));
     }
+    add_warnings_metric(found);
+    found.gates = check_step_gates("evaluate", found.metrics);
     return {found, [=, this] {
               write_file(output_file_path("evaluation.json"),
                          format_evaluation_json(found.evaluation, found.gates));
@@ -662,6 +702,7 @@ class SessionRun {
       result_.verdict = Verdict::fail;
       result_.reason = missed;
     }
+    results_.publish_outputs();
     write_summaries(results_, result_, options_);
   }
 
@@ -676,6 +717,15 @@ class SessionRun {
 };
 
 }  // namespace
+
+std::vector<Gate> make_default_step_gates(const std::vector<Metric>& metrics) {
+  std::vector<Gate> gates{{"row_time_error_percent", 100 * kLampDrift},
+                          {"dispersion_offset_px", 3},
+                          {"normalized_error_rms", 5},
+                          {"normalized_height_error_rms", 5}};
+  std::erase_if(gates, [&](const Gate& gate) { return !find_metric_value(metrics, gate.metric); });
+  return gates;
+}
 
 std::vector<MetricKind> list_session_metric_kinds() {
   return list_metric_kinds({MetricSource::lens, MetricSource::rotation, MetricSource::dispersion,

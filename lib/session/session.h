@@ -40,9 +40,11 @@ struct SessionOptions {
   /// Threads, limits for images, row time and readout direction of the camera.
   FrontendOptions frontend = {};
   /// File in format vlp-gates/1 with gates of list_session_metric_kinds(), for a session without
-  /// its own gates.yaml; may be empty. Its gates are added to make_default_lens_gates(), or replace
-  /// the gates of the same metric.
+  /// its own gates.yaml; may be empty. Its gates are added to make_default_lens_gates() and to
+  /// make_default_step_gates(), or replace the gates of the same metric.
   std::filesystem::path gates_file = {};
+  /// Adds the gate `warnings: 0`.
+  bool strict = false;
   /// Makes plots, drives along lines and report.html, which take longer than all other results.
   bool report = true;
   /// Names of steps that are run even if their inputs have not changed.
@@ -79,6 +81,11 @@ struct SessionObserver {
   std::function<void(const SessionStep& step)> on_step_finished = {};
 };
 
+/// Returns gates that every correct session passes, for the metrics that a step has: they notice a
+/// wrong row time, a rotation or a lens of another camera, and errors that contradict the reported
+/// standard deviations.
+std::vector<Gate> make_default_step_gates(const std::vector<Metric>& metrics);
+
 /// Returns the metrics of the procedure, which its gates can limit.
 std::vector<MetricKind> list_session_metric_kinds();
 
@@ -86,7 +93,7 @@ std::vector<MetricKind> list_session_metric_kinds();
 /// writes a report. All outputs are written into `results`, which is created if it does not exist.
 ///
 /// A step is skipped if its inputs, options, program and outputs are unchanged since it last ended.
-/// Outputs of earlier runs that this run does not produce are removed. Every file is written
+/// Outputs of the last run are replaced or removed when this run ends. Every file is written
 /// atomically; after a kill, the next run resumes. session.json (session_file.h) and junit.xml
 /// report the outcome for every verdict.
 ///

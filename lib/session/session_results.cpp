@@ -48,7 +48,8 @@ constexpr std::size_t kMaxMarkBytes = 1 << 16;
 
 std::string owner_mark_text(const fs::path& session) {
   if (session.empty()) return kNoOwner;
-  return fs::weakly_canonical(session / "").string() + "\n";
+  const fs::path path = fs::weakly_canonical(session / "");  // of a missing folder, with a slash
+  return (path.has_filename() ? path : path.parent_path()).string() + "\n";
 }
 
 /// Throws InputError if the folder holds results of another session or files of other origin.
@@ -135,10 +136,11 @@ bool is_output_name(std::string_view name) {
 
 }  // namespace
 
-void write_refusal_junit_xml(const fs::path& results, const std::string& message) try {
+void write_refusal_junit_xml(const fs::path& results, const fs::path& session,
+                             const std::string& message) try {
   const bool is_free = !fs::exists(results) || (fs::is_directory(results) && fs::is_empty(results));
   if (results.empty() || !(is_free || fs::exists(owner_mark_file(results)))) return;
-  const SessionResults locked(results, {});
+  const SessionResults locked(results, session);
   const JUnitTest test{"session", JUnitTest::Result::error, message,
                        std::string(step_failure_name(StepFailure::bad_input))};
   write_file(locked.results_file_path("junit.xml"),
@@ -166,8 +168,13 @@ SessionResults::SessionResults(fs::path folder, const fs::path& session)
 
 SessionResults::~SessionResults() { ::close(lock_); }
 
+fs::path SessionResults::results_file_path(const std::string& name) const {
+  const bool is_stale = !wanted_.empty() && !wanted_.contains(name);
+  return (is_stale || new_outputs_.contains(name) ? new_outputs_folder() : folder_) / name;
+}
+
 fs::path SessionResults::step_record_file(const std::string& step) const {
-  return results_file_path(step_record_file_name(step));
+  return folder_ / step_record_file_name(step);
 }
 
 std::set<std::string> SessionResults::list_recorded_output_files() const {
@@ -188,35 +195,55 @@ std::set<std::string> SessionResults::remove_unwanted_output_files(
   for (const std::string& name : list_recorded_output_files()) {
     if (wanted.contains(name)) continue;
     std::error_code error;
-    fs::remove(results_file_path(name), error);
+    fs::remove(folder_ / name, error);
     if (error) not_removed.insert(name);
   }
   return not_removed;
 }
 
-void SessionResults::set_steps_and_remove_stale_files(std::vector<StepOutputs> steps) {
+void SessionResults::write_output_list(const std::set<std::string>& names) const {
+  const SharedFolder records = make_steps_folder(folder_);
+  if (names == list_recorded_output_files() && records.contains_folder_entry(kOutputs)) return;
+  std::string list;
+  for (const std::string& name : names) list.append(name).append("\n");
+  records.replace_file_atomically(kOutputs, list);
+}
+
+void SessionResults::set_steps(std::vector<StepOutputs> steps) {
   steps_ = std::move(steps);
-  std::set<std::string> wanted{"session.json", "junit.xml"};
+  wanted_ = {"session.json", "junit.xml"};
   for (const auto& [step, files] : steps_) {
-    wanted.insert(files.begin(), files.end());
-    wanted.insert(step_record_file_name(step));
+    wanted_.insert(files.begin(), files.end());
+    wanted_.insert(step_record_file_name(step));
+    for (const std::string& file : files) {
+      if (fs::is_regular_file(fs::symlink_status(new_outputs_folder() / file)))
+        new_outputs_.insert(file);
+    }
   }
-  const std::set<std::string> written = list_recorded_output_files();
-  for (const std::string& name : wanted) {
-    if (is_existing(results_file_path(name)) &&
-        (!written.contains(name) || fs::is_symlink(results_file_path(name)))) {
+  std::set<std::string> written = list_recorded_output_files();
+  for (const std::string& name : wanted_) {
+    if (is_existing(folder_ / name) &&
+        (!written.contains(name) || fs::is_symlink(folder_ / name))) {
       throw InputError(folder_, fmt::format("holds {}, which is not of vlp-calibrate; give the "
                                             "results a folder of their own",
                                             name));
     }
   }
-  wanted.merge(remove_unwanted_output_files(wanted));  // the next run tries again
-  const SharedFolder records = make_steps_folder(folder_);
-  // An unchanged list is not written again, which avoids waiting for the disk.
-  if (wanted == written && records.contains_folder_entry(kOutputs)) return;
-  std::string list;
-  for (const std::string& name : wanted) list.append(name).append("\n");
-  records.replace_file_atomically(kOutputs, list);
+  written.insert(wanted_.begin(), wanted_.end());
+  write_output_list(written);
+}
+
+void SessionResults::publish_outputs() {
+  std::error_code missing;
+  for (const std::string& name : new_outputs_) {
+    fs::rename(new_outputs_folder() / name, folder_ / name, missing);
+    if (missing) fs::remove(folder_ / name, missing);
+  }
+  new_outputs_.clear();
+  fs::remove_all(new_outputs_folder(), missing);
+  std::set<std::string> names = remove_unwanted_output_files(wanted_);  // the next run tries again
+  names.insert(wanted_.begin(), wanted_.end());
+  write_output_list(names);
 }
 
 std::optional<StepResult> SessionResults::find_cached_step_result(const std::string& step,
@@ -251,14 +278,17 @@ std::string SessionResults::compute_step_outputs_digest(const std::string& step)
   return compute_text_sha256(digests);
 }
 
-void SessionResults::remove_outputs_of_step(const std::string& step) const {
+void SessionResults::remove_outputs_of_step(const std::string& step) {
   std::error_code ignored;
   fs::remove(step_record_file(step), ignored);
-  for (const std::string& output : list_planned_output_files(step))
+  make_steps_folder(folder_).open_or_create_subfolder({"new", folder_, "step"});
+  for (const std::string& output : list_planned_output_files(step)) {
+    new_outputs_.insert(output);
     fs::remove(results_file_path(output), ignored);
+  }
 }
 
-void SessionResults::remove_outputs_of_later_steps(const std::string& step) const {
+void SessionResults::remove_outputs_of_later_steps(const std::string& step) {
   bool is_later = false;
   for (const auto& [name, files] : steps_) {
     if (is_later) remove_outputs_of_step(name);
@@ -269,7 +299,7 @@ void SessionResults::remove_outputs_of_later_steps(const std::string& step) cons
 void SessionResults::remove_evaluation_outputs() const {
   const std::set<std::string> written = list_recorded_output_files();
   for (const char* name : {"evaluation.json", "report.html", "steps/evaluate.json"}) {
-    if (written.contains(name)) fs::remove(results_file_path(name));
+    if (written.contains(name)) fs::remove(folder_ / name);
   }
 }
 

@@ -19,9 +19,10 @@ struct StepOutputs {
 };
 
 /// Writes junit.xml with an error in place of that of an earlier run, for a run that is refused
-/// before its first step. Leaves a folder that is in use, or that holds no results of a session,
-/// unchanged.
-void write_refusal_junit_xml(const std::filesystem::path& results, const std::string& message);
+/// before its first step. Leaves a folder unchanged that is in use, or that holds no results of
+/// this session; of any session, if its name is empty.
+void write_refusal_junit_xml(const std::filesystem::path& results,
+                             const std::filesystem::path& session, const std::string& message);
 
 /// Folder with the results of a session, which one run at a time may use. Results of an earlier run
 /// are reused for steps whose inputs have not changed. Content:
@@ -29,6 +30,7 @@ void write_refusal_junit_xml(const std::filesystem::path& results, const std::st
 ///   lens.yaml, report.html, ...   the outputs of the steps
 ///   session.json                  outcome of the last run
 ///   steps/STEP.json               result of a step, digests of its inputs and outputs
+///   steps/new                     outputs of the steps of a run that has not ended
 ///   steps/corners                 cached corners of boards
 ///   steps/session                 path of the session of these results; an empty line if all runs
 ///                                 were refused
@@ -49,13 +51,20 @@ class SessionResults {
   SessionResults& operator=(const SessionResults&) = delete;
 
   const std::filesystem::path& results_folder_path() const { return folder_; }
-  std::filesystem::path results_file_path(const std::string& name) const { return folder_ / name; }
+  /// Returns the path of an output: in steps/new if this run makes it again, if a run that was
+  /// killed made it, or if it is of no step of this run.
+  std::filesystem::path results_file_path(const std::string& name) const;
+  /// Returns the folder steps/new.
+  std::filesystem::path new_outputs_folder() const { return folder_ / "steps/new"; }
   /// Returns the folder with the cached corners of boards.
   std::filesystem::path corner_cache_folder() const { return folder_ / "steps/corners"; }
 
-  /// Sets the steps of this run, in their order, and removes files of earlier runs that this run
-  /// does not write. Throws InputError if the run would overwrite a file that no run wrote.
-  void set_steps_and_remove_stale_files(std::vector<StepOutputs> steps);
+  /// Sets the steps of this run, in their order. Throws InputError if the run would overwrite a
+  /// file that no run wrote.
+  void set_steps(std::vector<StepOutputs> steps);
+  /// Replaces the outputs of the last complete run by those of this run, and removes files that
+  /// this run did not write.
+  void publish_outputs();
 
   /// Returns the result of the last execution of a step if it is up to date. `key`, the digest of
   /// all that the step depends on, and the outputs must be unchanged. Returns std::nullopt
@@ -66,14 +75,15 @@ class SessionResults {
   void store_step_result(const std::string& step, const std::string& key,
                          const StepResult& result) const;
 
-  /// Removes the outputs and the record of a step.
-  void remove_outputs_of_step(const std::string& step) const;
-  /// Removes outputs and records of all steps after `step`.
-  void remove_outputs_of_later_steps(const std::string& step) const;
+  /// Removes the record of a step, and its outputs with publish_outputs() if they are not made
+  /// again.
+  void remove_outputs_of_step(const std::string& step);
+  /// Applies remove_outputs_of_step() to all steps after `step`.
+  void remove_outputs_of_later_steps(const std::string& step);
   /// Removes outputs and record of the step evaluate, which depend on the gates. Does not require
-  /// set_steps_and_remove_stale_files().
+  /// set_steps().
   void remove_evaluation_outputs() const;
-  /// Removes outputs and records of all steps. Does not require set_steps_and_remove_stale_files().
+  /// Removes outputs and records of all steps. Does not require set_steps().
   void remove_outputs_of_all_steps() const;
 
  private:
@@ -85,8 +95,13 @@ class SessionResults {
   std::set<std::string> remove_unwanted_output_files(const std::set<std::string>& wanted) const;
   std::string compute_step_outputs_digest(const std::string& step) const;
 
+  /// Writes the list of outputs if it changes, which avoids waiting for the disk.
+  void write_output_list(const std::set<std::string>& names) const;
+
   std::filesystem::path folder_;
   std::vector<StepOutputs> steps_;
+  std::set<std::string> wanted_;       // files of this run
+  std::set<std::string> new_outputs_;  // in steps/new, if they exist
   int lock_;
 };
 

@@ -59,11 +59,16 @@ TEST_F(CiAction, PassesWithAndWithoutAcceptedFixesAndComparesOnlyWithThem) {
   EXPECT_EQ(content("fixes.csv"), content("accepted/check-fixes.csv"));
   EXPECT_THAT(content("fixes.csv.origin"),
               testing::ContainsRegex("commit .+\ndate 20.+Z\nversion .+\nsha256 [0-9a-f]{64}\n"));
+  EXPECT_THAT(content("fixes.csv.gates.yaml"), testing::ContainsRegex("gates: .mtf50: 0.2[0-9]+."));
   EXPECT_THAT(accept("session fixes.csv").errors, HasSubstr("check-fixes.csv: is missing"));
   const auto again = run_action("accepted=fixes.csv");
   EXPECT_EQ(again.exit_code, 0) << again.output << again.errors;
   EXPECT_THAT(content("results/comparison.xml"),
               AllOf(HasSubstr("failures=\"0\" errors=\"0\""), HasSubstr("name=\"worse_mm\"")));
+  EXPECT_EQ(run_action("accepted=fixes.csv gates=").exit_code, 0);
+  folder.file("fixes.csv.gates.yaml", "format: vlp-gates/1\ngates: {mtf50: 0.4}\n");
+  EXPECT_EQ(run_action("accepted=fixes.csv gates=").exit_code, 1) << "a blurred lens";
+  EXPECT_THAT(content("results/junit.xml"), HasSubstr("mtf50 is 0.2"));
 }
 
 TEST_F(CiAction, ComparesAlsoIfCalibrationMissesGate) {

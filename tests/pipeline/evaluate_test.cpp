@@ -84,7 +84,7 @@ TEST_F(VlpEvaluate, ReturnsOneAndWritesJsonAndJUnitWhenGateFails) {
               AllOf(HasSubstr("NOT MET gate p90_mm"), HasSubstr("met    gate mean_mm")));
   EXPECT_THAT(content("evaluation.json"), HasSubstr("\"passed\": false"));
   EXPECT_EQ(problems_by_schema("evaluation", {folder / "evaluation.json"}), "");
-  EXPECT_THAT(content("junit.xml"), HasSubstr("tests=\"3\" failures=\"2\""));
+  EXPECT_THAT(content("junit.xml"), HasSubstr("tests=\"4\" failures=\"2\""));
   EXPECT_EQ(with_truth("--gate mean_mm=2.5 --gate p90_mm=4.5").exit_code, 0);
 }
 
@@ -228,7 +228,7 @@ TEST_F(VlpEvaluate, CompareOptionFailsForWorseHeightYawOrSdAndForLostRows) {
   };
   const auto same = compare(accepted, accepted);
   EXPECT_EQ(same.exit_code, 0) << same.errors;
-  EXPECT_THAT(content("c.xml"), HasSubstr("tests=\"6\" failures=\"0\""));
+  EXPECT_THAT(content("c.xml"), HasSubstr("tests=\"7\" failures=\"0\""));
   const auto expect_red = [&](const ProgramResult& result, const std::string& words) {
     EXPECT_EQ(result.exit_code, 1) << words;
     EXPECT_THAT(result.errors, HasSubstr(words));

@@ -3,9 +3,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Comparison of two runs, gates of the archive, and differences between two results of a session."""
 import random
+import re
 import tempfile
 import unittest
 from pathlib import Path
+
+import yaml
 
 import parts  # noqa: F401
 import changes
@@ -187,6 +190,16 @@ class Diff(unittest.TestCase):
         self.assertIn("  calibration focal_px y: 261 -> 261.5 (+0.5)", said)
         self.assertIn("  + check: the residuals; they show", said)
         self.assertEqual(len(said.splitlines()), 7)
+
+    def test_example_of_page_passes_with_one_damaged_session_of_ten(self):
+        page = (Path(__file__).parents[2] / "scripts/reprocess/README.md").read_text()
+        limits = yaml.safe_load(re.search(r"'(gates: {.*})' >out/gates.yaml", page)[1])["gates"]
+        rows = [row(i, "pass", 1) for i in range(9)] + [row(9, "no result", None)]
+        found, _ = changes.compare_results(rows, rows)
+        self.assertEqual((found["same"], found["verdict"]), (9, "the same"))
+        items = changes.collect_gate_items([], [], {"between_sessions": {}, "cameras": [], "lamps": []})
+        results = changes.check_gates(limits, changes.count_verdicts(rows), found, items)
+        self.assertEqual([gate for gate in results if not gate["passed"]], [])
 
     def test_names_changed_lens_model_options_and_program(self):
         def result(model, options, toolbox):

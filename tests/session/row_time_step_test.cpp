@@ -69,6 +69,8 @@ TEST(CheckRowTimeAgainstLamps, ReportsMeasuredRowTimeWhenGivenIs5PercentOff) {
   EXPECT_NEAR(*find_metric_value(metrics, "row_time_us"), 20, 1e-3);
   ASSERT_TRUE(find_metric_value(metrics, "row_time_sd_us"));
   EXPECT_NEAR(*find_metric_value(metrics, "row_time_sd_us"), 0.01, 0.005);
+  ASSERT_TRUE(find_metric_value(metrics, "row_time_error_percent"));
+  EXPECT_NEAR(*find_metric_value(metrics, "row_time_error_percent"), 5, 0.2);
 }
 
 TEST(CheckRowTimeAgainstLamps, ReportsNoErrorForFrequenciesWithinLampDrift) {

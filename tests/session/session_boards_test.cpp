@@ -31,9 +31,12 @@ class RunCalibrationSessionWithBoards : public RenderedSession {
   }
 };
 
+/// Returns the names of gates, without the default ones of steps with lamps.
 std::vector<std::string> list_gate_names(const std::vector<CheckedMetric>& gates) {
   std::vector<std::string> names;
-  for (const CheckedMetric& gate : gates) names.push_back(gate.name);
+  for (const CheckedMetric& gate : gates) {
+    if (make_default_step_gates({{gate.name, 0}}).empty()) names.push_back(gate.name);
+  }
   return names;
 }
 

@@ -219,12 +219,20 @@ TEST_F(RunCalibrationSession, ReportsContradictedRowTimeAndItsSource) {
                  HasSubstr("row time is 33 us in camera.yaml, but the stripes of"));
   write_camera(3.1e-5);
   const SessionResult result = run();
-  EXPECT_EQ(result.verdict, Verdict::pass) << result.reason;
+  EXPECT_EQ(result.verdict, Verdict::fail);
+  EXPECT_THAT(result.reason, StartsWith("row_time_error_percent is 2."));
   for (const char* step : {"rotation", "dispersion"}) {
     EXPECT_THAT(find_step(result, step).result.warnings,
                 testing::Contains(HasSubstr("row time is 31 us in camera.yaml")))
         << step;
   }
+}
+
+TEST_F(RunCalibrationSession, NamesReadoutThatContradictsImages) {
+  edit_session_file("camera.yaml", "readout: rows", "readout: columns");
+  expect_failure(run(), "rotation", StepFailure::bad_input,
+                 HasSubstr("the readout is along columns in camera.yaml, but the images show "
+                           "stripes along rows; correct it"));
 }
 
 TEST_F(RunCalibrationSession, MessagesDoNotContainPathOfSession) {

@@ -18,7 +18,7 @@ class SessionResultsTest : public testing::Test {
  protected:
   /// A folder in which lens and rotation have ended, with an output each.
   void keep_two_steps(SessionResults& cached_result) const {
-    cached_result.set_steps_and_remove_stale_files(kPlan);
+    cached_result.set_steps(kPlan);
     folder.file("results/lens.yaml", "lens");
     cached_result.store_step_result("lens", "key of the lens", StepResult());
     folder.file("results/rotated.yaml", "rotated");
@@ -44,7 +44,7 @@ TEST_F(SessionResultsTest, ReturnsCachedResultOnlyForUnchangedKeyAndOutputs) {
 
 TEST_F(SessionResultsTest, CachesUndeterminedResultButNotBadInput) {
   SessionResults cached_result(results, session);
-  cached_result.set_steps_and_remove_stale_files(kPlan);
+  cached_result.set_steps(kPlan);
   StepResult bad, undetermined;
   bad.set_step_failure(StepFailure::bad_input, "cut");
   undetermined.set_step_failure(StepFailure::undetermined, "too few");
@@ -55,19 +55,56 @@ TEST_F(SessionResultsTest, CachesUndeterminedResultButNotBadInput) {
   EXPECT_EQ(cached_result.find_cached_step_result("lens", "key")->message, "too few");
 }
 
-TEST_F(SessionResultsTest, SetStepsAndRemoveStaleFilesRemovesOutputsOfStepsNotPlanned) {
+TEST_F(SessionResultsTest, KeepsOutputsOfLastRunUntilThoseOfThisRunArePublished) {
+  {
+    SessionResults before(results, session);
+    keep_two_steps(before);
+  }
+  {
+    SessionResults killed(results, session);
+    killed.set_steps({kPlan[0]});
+    killed.remove_outputs_of_step("lens");
+    EXPECT_EQ(killed.results_file_path("lens.yaml"), results / "steps/new/lens.yaml");
+    folder.file("results/steps/new/lens.yaml", "new");
+    killed.store_step_result("lens", "new key", StepResult());
+    EXPECT_EQ(TemporaryFolder::read_content(results / "lens.yaml"), "lens");
+    EXPECT_TRUE(fs::exists(results / "rotated.yaml"));
+  }
+  SessionResults now(results, session);
+  now.set_steps(kPlan);
+  EXPECT_TRUE(now.find_cached_step_result("lens", "new key"));
+  EXPECT_TRUE(now.find_cached_step_result("rotation", "key of the rotation"));
+  now.remove_outputs_of_step("rotation");  // which has no output this time
+  EXPECT_TRUE(fs::exists(results / "rotated.yaml"));
+  now.publish_outputs();
+  EXPECT_EQ(TemporaryFolder::read_content(results / "lens.yaml"), "new");
+  EXPECT_TRUE(now.find_cached_step_result("lens", "new key"));
+  EXPECT_FALSE(fs::exists(results / "rotated.yaml"));
+  EXPECT_FALSE(fs::exists(results / "steps/new"));
+}
+
+TEST_F(SessionResultsTest, WriteRefusalJunitXmlLeavesResultsOfOtherSessions) {
+  { const SessionResults taken(results, session); }
+  write_refusal_junit_xml(results, folder / "another", "refused");
+  EXPECT_FALSE(fs::exists(results / "junit.xml"));
+  write_refusal_junit_xml(results, session, "refused");
+  EXPECT_THAT(TemporaryFolder::read_content(results / "junit.xml"), HasSubstr("refused"));
+}
+
+TEST_F(SessionResultsTest, PublishOutputsRemovesOutputsOfStepsNotPlanned) {
   {
     SessionResults before(results, session);
     keep_two_steps(before);
     std::vector<StepOutputs> with_drive = kPlan;
     with_drive.push_back({"line-x", {"line-x-fixes.csv"}});
-    before.set_steps_and_remove_stale_files(with_drive);
+    before.set_steps(with_drive);
     folder.file("results/line-x-fixes.csv", "of a drive");
     before.store_step_result("line-x", "key", StepResult());
     folder.file("results/mine.txt", "of somebody");
   }
   SessionResults now(results, session);
-  now.set_steps_and_remove_stale_files({{"lens", {"lens.yaml"}}});
+  now.set_steps({{"lens", {"lens.yaml"}}});
+  now.publish_outputs();
   EXPECT_TRUE(now.find_cached_step_result("lens", "key of the lens"));
   EXPECT_FALSE(fs::exists(results / "rotated.yaml"));
   EXPECT_FALSE(fs::exists(results / "steps/rotation.json"));
@@ -82,9 +119,9 @@ TEST_F(SessionResultsTest, KeepsForeignFilesAndRejectsThemAsOutputs) {
   for (const std::string& name : mine) folder.file("results/" + name, "mine");
   {
     SessionResults first(results, session);
-    first.set_steps_and_remove_stale_files(kPlan);
+    first.set_steps(kPlan);
     folder.file("results/lens.svg", "mine, beside results");
-    first.set_steps_and_remove_stale_files(kPlan);
+    first.set_steps(kPlan);
     first.remove_evaluation_outputs();
     first.remove_outputs_of_all_steps();
   }
@@ -95,7 +132,7 @@ TEST_F(SessionResultsTest, KeepsForeignFilesAndRejectsThemAsOutputs) {
   SessionResults next(results, session);
   EXPECT_THAT(
       [&] {
-        next.set_steps_and_remove_stale_files({{"lens", {"lens.yaml", "lens.svg"}}});
+        next.set_steps({{"lens", {"lens.yaml", "lens.svg"}}});
       },
       ThrowsMessage<InputError>(HasSubstr("holds lens.svg, which is not of vlp-calibrate")));
 }
@@ -106,7 +143,7 @@ TEST_F(SessionResultsTest, RemovesNoFileOutsideResultsFolderDespiteForgedOutputL
   folder.file("results/steps/outputs", "../outside.txt\nsteps/../../outside.txt\n" +
                                            (folder / "outside.txt").string() + "\n..\n");
   SessionResults taken(results, session);
-  taken.set_steps_and_remove_stale_files(kPlan);
+  taken.set_steps(kPlan);
   taken.remove_outputs_of_all_steps();
   EXPECT_TRUE(fs::exists(folder / "outside.txt"));
 }
@@ -132,27 +169,29 @@ TEST_F(SessionResultsTest, KeepsListingOutputsThatCouldNotBeRemoved) {
   const std::vector<StepOutputs> with_picture{{"lens", {"lens.yaml", "lens.svg"}}};
   {
     SessionResults before(results, session);
-    before.set_steps_and_remove_stale_files(with_picture);
+    before.set_steps(with_picture);
     fs::create_directories(results / "lens.svg/full");  // cannot be removed, even by root
-    before.set_steps_and_remove_stale_files(kPlan);
+    before.set_steps(kPlan);
+    before.publish_outputs();
   }
   fs::remove_all(results / "lens.svg");
   folder.file("results/lens.svg", "of a run");
   SessionResults now(results, session);
-  EXPECT_NO_THROW(now.set_steps_and_remove_stale_files(with_picture));
+  EXPECT_NO_THROW(now.set_steps(with_picture));
   EXPECT_TRUE(fs::exists(results / "lens.svg"));
-  now.set_steps_and_remove_stale_files(kPlan);
+  now.set_steps(kPlan);
+  now.publish_outputs();
   EXPECT_FALSE(fs::exists(results / "lens.svg"));
 }
 
-TEST_F(SessionResultsTest, SetStepsAndRemoveStaleFilesAcceptsPlannedOutputsIfListIsMissing) {
+TEST_F(SessionResultsTest, SetStepsAcceptsPlannedOutputsIfListIsMissing) {
   { const SessionResults taken(results, session); }
   fs::remove(results / "steps/outputs");
   folder.file("results/line-x-fixes.csv", "of a drive whose step is not recorded");
   folder.file("results/steps/line-x.json", "cannot be read");
   folder.file("results/line-y-fixes.csv", "of no drive of the session");
   SessionResults now(results, session);
-  EXPECT_NO_THROW(now.set_steps_and_remove_stale_files({{"line-x", {"line-x-fixes.csv"}}}));
+  EXPECT_NO_THROW(now.set_steps({{"line-x", {"line-x-fixes.csv"}}}));
   EXPECT_TRUE(fs::exists(results / "line-x-fixes.csv"));
   EXPECT_TRUE(fs::exists(results / "line-y-fixes.csv"));
 }
@@ -161,12 +200,13 @@ TEST_F(SessionResultsTest, RemovesOutputsOfDrivesWithLongNames) {
   const std::string drive = "line-" + std::string(195, 'x'), fixes = drive + "-fixes.csv";
   {
     SessionResults before(results, session);
-    before.set_steps_and_remove_stale_files({{drive, {fixes}}});
+    before.set_steps({{drive, {fixes}}});
     folder.file("results/" + fixes, "of a drive");
   }
   SessionResults now(results, session);
-  EXPECT_NO_THROW(now.set_steps_and_remove_stale_files({{drive, {fixes}}}));
-  now.set_steps_and_remove_stale_files(kPlan);
+  EXPECT_NO_THROW(now.set_steps({{drive, {fixes}}}));
+  now.set_steps(kPlan);
+  now.publish_outputs();
   EXPECT_FALSE(fs::exists(results / fixes));
 }
 
@@ -174,7 +214,7 @@ TEST_F(SessionResultsTest, RejectsSymbolicLinkInPlaceOfOutput) {
   { const SessionResults taken(results, session); }
   fs::create_symlink(folder.file("mine.txt", "mine"), results / "lens.yaml");
   SessionResults taken(results, session);
-  EXPECT_THAT([&] { taken.set_steps_and_remove_stale_files(kPlan); },
+  EXPECT_THAT([&] { taken.set_steps(kPlan); },
               ThrowsMessage<InputError>(HasSubstr("holds lens.yaml, which is not of")));
   EXPECT_EQ(TemporaryFolder::read_content(folder / "mine.txt"), "mine");
 }
@@ -184,9 +224,9 @@ TEST_F(SessionResultsTest, RemovesOutputsOfRecordedStepsIfOutputListIsMissing) {
     SessionResults before(results, session);
     std::vector<StepOutputs> with_drive = kPlan;
     with_drive.push_back({"line-x", {"line-x-fixes.csv"}});
-    before.set_steps_and_remove_stale_files(with_drive);
+    before.set_steps(with_drive);
     keep_two_steps(before);
-    before.set_steps_and_remove_stale_files(with_drive);
+    before.set_steps(with_drive);
     folder.file("results/line-x-fixes.csv", "of a drive");
     before.store_step_result("line-x", "key", StepResult());
   }
@@ -194,7 +234,8 @@ TEST_F(SessionResultsTest, RemovesOutputsOfRecordedStepsIfOutputListIsMissing) {
   folder.file("results/line-y-fixes.csv", "mine");
   folder.file("results/rotation-fixes.csv", "mine");
   SessionResults now(results, session);
-  now.set_steps_and_remove_stale_files(kPlan);
+  now.set_steps(kPlan);
+  now.publish_outputs();
   EXPECT_TRUE(now.find_cached_step_result("lens", "key of the lens"));
   EXPECT_FALSE(fs::exists(results / "line-x-fixes.csv"));
   EXPECT_TRUE(fs::exists(results / "line-y-fixes.csv"));
@@ -205,9 +246,11 @@ TEST_F(SessionResultsTest, RemoveOutputsOfLaterStepsKeepsNamedStep) {
   SessionResults cached_result(results, session);
   keep_two_steps(cached_result);
   cached_result.remove_outputs_of_later_steps("lens");
+  cached_result.publish_outputs();
   EXPECT_TRUE(cached_result.find_cached_step_result("lens", "key of the lens"));
   EXPECT_FALSE(fs::exists(results / "rotated.yaml"));
   cached_result.remove_outputs_of_step("lens");
+  cached_result.publish_outputs();
   EXPECT_FALSE(fs::exists(results / "lens.yaml"));
   EXPECT_FALSE(cached_result.find_cached_step_result("lens", "key of the lens"));
 }

@@ -488,7 +488,7 @@ TEST(ExportRunsToFile, WritesMetricsAndSelectedTextsAsCsv) {
       "error_px,"
       "split_half_px,coverage,"
       "views,board_tilt_deg,rotation_px,rotation_spread_px,rotation_sd_px,tilt_deg,lever_arm_"
-      "mm,row_time_us,row_time_sd_us,dispersion_mm,"
+      "mm,row_time_us,row_time_sd_us,row_time_error_percent,dispersion_mm,"
       "dispersion_offset_px,world_offset_mm,check_fix_fraction,check_lamp_inlier_fraction,check_"
       "lamps_seen,check_mean_mm,"
       "check_worst_mm,check_offset_mm,check_height_mm,check_residual_px");
