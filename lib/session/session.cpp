@@ -722,7 +722,7 @@ std::vector<Gate> make_default_step_gates(const std::vector<Metric>& metrics) {
   std::vector<Gate> gates{{"row_time_error_percent", 100 * kLampDrift},
                           {"dispersion_offset_px", 3},
                           {"normalized_error_rms", 5},
-                          {"normalized_height_error_rms", 5}};
+                          {"normalized_height_error_rms", 10}};
   std::erase_if(gates, [&](const Gate& gate) { return !find_metric_value(metrics, gate.metric); });
   return gates;
 }

@@ -11,7 +11,7 @@ import yaml
 
 # Metrics with a lower limit; all others have an upper limit.
 AT_LEAST = ("mtf50", "mtf50_worst_ratio", "coverage", "views", "board_tilt_deg")
-UNITS = ("px", "mm", "deg")  # suffixes of the names of metrics
+UNITS = {"px": "px", "mm": "mm", "deg": "deg", "percent": "%"}  # by suffixes of the names of metrics
 
 
 def read_limits(file):
@@ -27,7 +27,7 @@ def is_met(name, value, limit):
 
 def describe_missed(name, value, limit):
     """Returns the text of vlp-calibrate, for example "mean_mm is 1.25 mm, at most 1 mm is required"."""
-    unit = next((f" {unit}" for unit in UNITS if name.endswith(f"_{unit}")), "")
+    unit = next((f" {unit}" for end, unit in UNITS.items() if name.endswith(f"_{end}")), "")
     measured = "not known" if value is None else f"{value:.4g}{unit}"
     return f"{name} is {measured}, {'at least' if name in AT_LEAST else 'at most'} {limit:.4g}{unit} is required"
 
