@@ -89,7 +89,7 @@ hand() {
 }
 reprocess() {  # half OR all
   rm -rf "$folder/$1-results"
-  printf 'format: vlp-archive-gates/1\ngates: {gate_fraction: 1}\n' >"$folder/gates.yaml"  # some lenses fail their gates
+  printf 'format: vlp-archive-gates/1\ngates: {gate_fraction: 1, suspect: 200}\n' >"$folder/gates.yaml"  # some lenses fail their gates
   measured "$1" "$source_dir/scripts/reprocess.sh" "$folder/$1" "$folder/$1-results" --row-time-s 3e-5 \
     --readout rows --gates "$folder/gates.yaml"
 }
