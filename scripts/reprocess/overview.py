@@ -40,8 +40,8 @@ def list_largest_differences(run, previous, pairs):
         name, truth = session_name(row), Path(run["archive"]) / session_name(row) / "check/truth.csv"
         before, now = (folder / "sessions" / name / "fixes.csv" for folder in (previous, Path(".")))
         exist = all(file.exists() for file in (truth, now, before))
-        verdict = compare_captures(run, truth, now, before) if exist else "fixes are missing"
-        rows.append((name, old["mean_mm"], row["mean_mm"], f"{change:+.4g}", verdict))
+        compared = "the same" if change == 0 else compare_captures(run, truth, now, before) if exist else ""
+        rows.append((name, old["mean_mm"], row["mean_mm"], f"{change:+.4g}", compared or "fixes are missing"))
         data, scale = pictures.floor(truth, before, now) if exist and change != 0 else (None, 0)
         if data:
             plots += picture(data, f"{name}: errors over the floor, before and now, magnified {scale} times")
