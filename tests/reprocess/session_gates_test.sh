@@ -35,7 +35,7 @@ expect_baseline "$results"
 
 # The metrics with a lower limit are those of vlp-calibrate.
 at_least=$("$bin/vlp-calibrate" --help | sed -n '/^Gates:/,$p' |
-  awk '/^  [a-z]/ { name = $1 } /, at least$/ { printf "%s ", name }')
+  awk '/^  [a-z]/ { name = $1 } { text = text " " $0 } text ~ /, +at +least$/ { printf "%s ", name }')
 stated=$(cd "$source_dir/scripts/reprocess" && PYTHONDONTWRITEBYTECODE=1 /usr/bin/python3 -c '
 import session_gates
 print(*session_gates.AT_LEAST, end=" ")')
