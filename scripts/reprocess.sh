@@ -50,7 +50,8 @@
 # Exit code: 0 done; 1 done, but a gate of the archive is not met, or a gate of
 # a session if the archive has no gate_fraction. Default gates: vanished: 0, no
 # session of RESULTS or --previous is missing in ARCHIVE; suspect: 0, none is
-# implausible, such as a copy, or with boards of another camera.
+# implausible, such as a copy, or with boards of another camera, and no entry of
+# ARCHIVE is something else. archive.csv can state the expected files.
 # 2 invalid input; 3 incomplete: the run could not finish, no session has a
 # result, or more sessions have none than no_result or no_result_fraction of
 # --gates allow.
